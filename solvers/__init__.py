@@ -1,0 +1,1 @@
+"""Solvers that tyrecal can drive, one folder each. None of them imports tyrecal."""

@@ -1,0 +1,114 @@
+"""Symmetric and Hermitian banded matrices: numbering, storage and Cholesky factors (LAPACK)."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.linalg.lapack import dpbtrf, dpbtrs, zpbtrf, zpbtrs
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import reverse_cuthill_mckee
+
+Array = np.ndarray
+
+
+class Indefinite(ArithmeticError):
+    """The matrix is not positive definite: the state is unstable, or has a free rigid body."""
+
+
+class Numbering:
+    """Equations of the free displacement components, in the order of the deck's nodes or, where
+    that gives the narrower band, of reverse Cuthill and McKee.
+
+    ``equation`` (n, 3): equation of each component, or ``size`` (a spare place that is dropped)
+    where it is held; ``bandwidth``: sub-diagonals; ``order``: flat component of each equation.
+    """
+
+    def __init__(self, connectivities: list[Array], free: Array):
+        n = len(free)
+        rows = np.concatenate([np.repeat(c, c.shape[1], 1).ravel() for c in connectivities])
+        cols = np.concatenate([np.tile(c, (1, c.shape[1])).ravel() for c in connectivities])
+        touching = free.any(1)
+        keep = touching[rows] & touching[cols]
+        graph = csr_array((np.ones(keep.sum(), np.int8), (rows[keep], cols[keep])), (n, n))
+        orders = np.arange(n), reverse_cuthill_mckee(graph, symmetric_mode=True)
+        nodes = min(orders, key=lambda order: _spread(graph, order))
+        flat = (3 * nodes[:, None] + np.arange(3)).ravel()
+        self.order = flat[free.ravel()[flat]]
+        self.size = len(self.order)
+        equation = np.full(3 * n, self.size)
+        equation[self.order] = np.arange(self.size)
+        self.equation = equation.reshape(n, 3)
+        self._scatter: dict[int, tuple[Array, Array, Array]] = {}
+        self.bandwidth = 0
+        for c in connectivities:
+            e = self.elements(c)
+            held = e == self.size
+            span = np.where(held, -1, e).max(1) - np.where(held, self.size, e).min(1)
+            self.bandwidth = max(self.bandwidth, int(span.max(initial=0)))
+
+    def elements(self, connectivity: Array) -> Array:
+        """Equations (e, 3a) of the elements' components."""
+        return self.equation[connectivity].reshape(len(connectivity), -1)
+
+    def lower(self, connectivity: Array) -> tuple[Array, Array]:
+        """Places of element-matrix entries: which flat entries stay, and where in the band."""
+        key = id(connectivity)
+        if key not in self._scatter:
+            e = self.elements(connectivity)
+            i = np.repeat(e[:, :, None], e.shape[1], 2)
+            j = i.swapaxes(1, 2)
+            entries = np.flatnonzero((i >= j) & (i < self.size))
+            place = (i - j + (self.bandwidth + 1) * j).ravel()[entries]
+            self._scatter[key] = connectivity, entries, place
+        return self._scatter[key][1:]
+
+    def assemble(self, parts: list[tuple[Array, Array]]) -> Array:
+        """Lower band (bandwidth + 1, size), Fortran order, of (connectivity, matrices) parts."""
+        length = (self.bandwidth + 1) * self.size
+        band = np.zeros(length)
+        for connectivity, matrices in parts:
+            entries, place = self.lower(connectivity)
+            band += np.bincount(place, matrices.reshape(-1)[entries], length)
+        return band.reshape((self.bandwidth + 1, self.size), order="F")
+
+    def vector(self, parts: list[tuple[Array, Array]]) -> Array:
+        """Assembled vector (size,), real or complex, of (connectivity, element vectors)."""
+        total = np.zeros(self.size + 1, np.result_type(*(v for _, v in parts)))
+        for connectivity, values in parts:
+            np.add.at(total, self.elements(connectivity), values)
+        return total[:-1]
+
+    def spread(self, vectors: Array) -> Array:
+        """Vectors (size, ...) on the equations to all components (n, 3, ...), zero where held."""
+        full = np.zeros((self.equation.size, *vectors.shape[1:]), vectors.dtype)
+        full[self.order] = vectors
+        return full.reshape(-1, 3, *vectors.shape[1:])
+
+    def gather(self, full: Array) -> Array:
+        """Components (n, 3, ...) to equations (size, ...)."""
+        return full.reshape(self.equation.size, *full.shape[2:])[self.order]
+
+
+def _spread(graph: csr_array, order: Array) -> int:
+    """Largest distance of two connected nodes in an order."""
+    place = np.empty(len(order), int)
+    place[order] = np.arange(len(order))
+    rows, cols = graph.nonzero()
+    return int(abs(place[rows] - place[cols]).max(initial=0))
+
+
+class Cholesky:
+    """Factor of a symmetric or Hermitian positive definite band; overwrites the band given.
+
+    Raises Indefinite.
+    """
+
+    def __init__(self, band: Array):
+        self._solve = zpbtrs if np.iscomplexobj(band) else dpbtrs
+        factorise = zpbtrf if np.iscomplexobj(band) else dpbtrf
+        self._factor, info = factorise(band, lower=1, overwrite_ab=1)
+        if info:
+            raise Indefinite(f"pivot {info} of {band.shape[1]} is not positive")
+
+    def solve(self, right: Array) -> Array:
+        """K^-1 right for (size,) or (size, b)."""
+        return self._solve(self._factor, right, lower=1)[0]

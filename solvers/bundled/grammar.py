@@ -1,0 +1,108 @@
+"""What the solver honours of the ABAQUS keyword language; everything else is refused by name.
+
+Per keyword: the parameters it may carry, each with the values it may take (None = any value,
+an empty string = the parameter stands without a value).
+"""
+
+from __future__ import annotations
+
+from .keywords import DeckError, Keyword
+
+Values = tuple[str, ...] | None
+
+YES = ("YES", "")
+SECTION_JOB: dict[str, dict[str, Values]] = {
+    "HEADING": {},
+    "RESTART": {"WRITE": ("",), "FREQUENCY": None},
+    "NODE": {"NSET": None},
+    "ELEMENT": {
+        "TYPE": ("CGAX8R", "CGAX8", "CGAX4R", "SFMGAX2", "SFMGAX1"),
+        "ELSET": None,
+    },
+    "NSET": {"NSET": None, "GENERATE": ("",)},
+    "ELSET": {"ELSET": None, "GENERATE": ("",)},
+    "RIGID BODY": {"REF NODE": None, "TIE NSET": None},
+    "SURFACE": {"NAME": None, "TYPE": ("ELEMENT",)},
+    "SOLID SECTION": {"ELSET": None, "MATERIAL": None, "CONTROLS": None},
+    "SECTION CONTROLS": {"NAME": None, "HOURGLASS": ("STIFFNESS",)},
+    "HOURGLASS STIFFNESS": {},
+    "SURFACE SECTION": {"ELSET": None},
+    "REBAR LAYER": {"GEOMETRY": ("CONSTANT", "ANGULAR")},
+    "MATERIAL": {"NAME": None},
+    "DENSITY": {},
+    "ELASTIC": {"TYPE": ("ISOTROPIC",)},
+    "HYPERELASTIC": {
+        "N": ("1",),
+        "MOONEY-RIVLIN": ("",),
+        "NEO HOOKE": ("",),
+        "MODULI": ("LONG TERM", "INSTANTANEOUS"),
+    },
+    "VISCOELASTIC": {"TIME": ("PRONY",)},
+    "BOUNDARY": {},
+}
+STEPS: dict[str, dict[str, Values]] = {
+    "STEP": {"NAME": None, "NLGEOM": YES, "INC": None},
+    "STATIC": {"LONG TERM": ("",), "DIRECT": ("",)},
+    "FREQUENCY": {
+        "EIGENSOLVER": ("LANCZOS",),
+        "NORMALIZATION": ("MASS",),
+        "PROPERTY EVALUATION": None,
+        "SIM": ("NO",),
+    },
+    "BOUNDARY": {},
+    "DSLOAD": {"OP": ("MOD",)},
+    "FILE FORMAT": {"ASCII": ("",)},
+    "NODE FILE": {"NSET": None, "FREQUENCY": None},
+    "MODAL FILE": {},
+    "END STEP": {},
+}
+REVOLVE_JOB: dict[str, dict[str, Values]] = {
+    "HEADING": {},
+    "SYMMETRIC MODEL GENERATION": {"REVOLVE": ("",)},
+    "SYMMETRIC RESULTS TRANSFER": {"STEP": None, "INC": None},
+    "NODE": {"NSET": None},
+    "RIGID BODY": {"REF NODE": None, "TIE NSET": None},
+    "BOUNDARY": {},
+}
+
+
+def check(keywords: list[Keyword], revolve: bool) -> tuple[list[Keyword], list[list[Keyword]]]:
+    """Split a job into its model and its steps, refusing what is not honoured.
+
+    Raises DeckError naming the keyword or parameter and its line.
+    """
+    model: list[Keyword] = []
+    steps: list[list[Keyword]] = []
+    inside = False
+    for keyword in keywords:
+        if keyword.name == "STEP":
+            if inside:
+                raise DeckError(keyword.line, "*STEP inside a step: *END STEP is missing")
+            inside = True
+            steps.append([])
+        allowed = STEPS if inside else REVOLVE_JOB if revolve else SECTION_JOB
+        _check_one(keyword, allowed, "a step" if inside else "the model")
+        (steps[-1] if inside else model).append(keyword)
+        if keyword.name == "END STEP":
+            inside = False
+    if inside:
+        raise DeckError(steps[-1][0].line, "*STEP without *END STEP: the deck is cut off")
+    return model, steps
+
+
+def _check_one(keyword: Keyword, allowed: dict[str, dict[str, Values]], where: str) -> None:
+    if keyword.name not in allowed:
+        raise DeckError(keyword.line, f"keyword *{keyword.name} is not honoured in {where}")
+    parameters = allowed[keyword.name]
+    for name, value in keyword.parameters.items():
+        if name not in parameters:
+            raise DeckError(
+                keyword.line, f"parameter {name} of *{keyword.name} is not honoured"
+            )
+        values = parameters[name]
+        if values is not None and " ".join(value.upper().split()) not in values:
+            expected = " or ".join(v or "no value" for v in values)
+            raise DeckError(
+                keyword.line,
+                f"{name}={value} of *{keyword.name} is not honoured, only {expected}",
+            )

@@ -1,0 +1,94 @@
+"""Modes of the revolved tyre, one Hermitian problem per circumferential harmonic n.
+
+u = Re[U(R, Z) exp(i n Theta)], U complex (n, 3): K(n) = K0 + i n K1 + n^2 K2 exactly, the limit
+of infinitely many sectors. A mode with n >= 1 stands for a pair turned by a quarter wave.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import csr_array
+
+from . import eigen, mechanics
+from .band import Cholesky, Indefinite, Numbering
+from .mechanics import Load
+from .model import Model
+
+Array = np.ndarray
+
+
+class Unstable(ArithmeticError):
+    """The inflated state is not stable: a harmonic of it buckles."""
+
+
+@dataclass
+class HarmonicModes:
+    """Modes of one harmonic: omega^2 (m,) in 1/s2 and shapes (m, n, 3), u^H M u = 1.
+
+    M is the mass per radian: over the whole circle the kinetic mass is 2 pi for n = 0, pi else.
+    """
+
+    n: int
+    eigenvalues: Array
+    shapes: Array
+
+
+class Vibration:
+    """The inflated tyre's small vibrations: factors per harmonic on demand."""
+
+    def __init__(
+        self, model: Model, U: Array, loads: list[Load], numbering: Numbering, shift: float
+    ):
+        self.numbering, self.shift = numbering, shift
+        parts = mechanics.tangents(model, U, loads, harmonics=True)
+        self._bands = [numbering.assemble(p) for p in parts]
+        self.mass: csr_array = mechanics.mass(model)
+        self._X = model.mesh.X.real
+        self._shifted_mass = None
+        if shift:
+            masses = [(c, np.einsum("eab,ij->eaibj", m.real, np.eye(3)).reshape(len(m), 3 * m.shape[1], -1))
+                      for c, m in mechanics.mass_matrices(model)]  # fmt: skip
+            self._shifted_mass = numbering.assemble(masses)
+
+    def factor(self, n: int) -> Cholesky:
+        """Factor of K(n) - shift M. Raises Unstable."""
+        K0, K1, K2 = self._bands
+        band = K0.copy(order="F") if n == 0 else np.asfortranarray(K0 + n * n * K2 + 1j * n * K1)
+        if self._shifted_mass is not None:
+            band -= self.shift * self._shifted_mass
+        try:
+            return Cholesky(band)
+        except Indefinite:
+            raise Unstable(
+                f"the inflated tyre is not stable: its stiffness for {n} waves round the"
+                " circumference is not positive definite"
+            ) from None
+
+    def _times_mass(self, x: Array) -> Array:
+        full = self.numbering.spread(x)
+        image = self.mass @ full.reshape(len(full), -1)
+        return self.numbering.gather(image.reshape(full.shape))
+
+    def modes(self, n: int, count: int, factor: Cholesky | None = None) -> HarmonicModes:
+        """The ``count`` lowest modes of harmonic n. Raises Unstable, eigen.NotConverged."""
+        factor = factor or self.factor(n)
+        start = self.numbering.gather(_start_fields(self._X, n))
+        values, vectors = eigen.lowest(factor.solve, self._times_mass, start, count, self.shift)
+        shapes = self.numbering.spread(vectors)  # (nodes, 3, modes)
+        return HarmonicModes(n, values, np.moveaxis(shapes, -1, 0))
+
+
+def _start_fields(X: Array, n: int) -> Array:
+    """Smooth fields (nodes, 3, 3) that hold much of the lowest modes of harmonic n.
+
+    Axial shift and tilt; spin for n = 0, else bending without stretching the circumference,
+    u_r + i n u_theta = 0.
+    """
+    fields = np.zeros((len(X), 3, 3), complex if n else float)
+    fields[:, 2, 0] = 1.0
+    fields[:, 0, 1] = X[:, 1] / np.ptp(X[:, 1])
+    fields[:, 0, 2] = 1.0 if n else 0.0
+    fields[:, 1, 2] = 1j / n if n else X[:, 0] / np.ptp(X[:, 0])
+    return fields

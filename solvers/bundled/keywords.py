@@ -1,0 +1,168 @@
+"""ABAQUS keyword grammar: a deck as a list of keyword blocks that remember their lines."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+
+
+class DeckError(ValueError):
+    """The deck asks for something that the solver cannot honour, or is not a deck.
+
+    ``line`` is the 1-based line of the deck, ``job`` the job that it belongs to.
+    """
+
+    def __init__(self, line: int, message: str, job: str = ""):
+        super().__init__(f"{job + '.inp' if job else 'deck'}, line {line}: {message}")
+        self.line = line
+
+
+@dataclass
+class Row:
+    """One data line: its 1-based number, its comma-separated fields, and tangents of fields.
+
+    ``tangents`` maps a field's index to d(number)/d(variable) where a sensitivity is asked for.
+    """
+
+    line: int
+    fields: list[str]
+    tangents: Mapping[int, float] = field(default_factory=dict)
+
+    def text(self, index: int, default: str = "") -> str:
+        """Field ``index`` as text, or ``default`` when it is missing or blank."""
+        value = self.fields[index] if index < len(self.fields) else ""
+        return value or default
+
+    def number(self, index: int, default: float | None = None) -> complex | float:
+        """Field ``index`` as a number; complex by ``STEP`` times its tangent when it has one."""
+        text = self.text(index)
+        if not text:
+            if default is None:
+                raise DeckError(self.line, f"number {index + 1} of the line is missing")
+            return default
+        try:
+            value = float(text.replace("D", "E").replace("d", "e"))
+        except ValueError:
+            raise DeckError(self.line, f"'{text}' is not a number") from None
+        if value - value != 0.0:
+            raise DeckError(self.line, f"'{text}' is not a finite number")
+        tangent = self.tangents.get(index)
+        return value if tangent is None else complex(value, STEP * tangent)
+
+    def integer(self, index: int) -> int:
+        """Field ``index`` as an integer."""
+        try:
+            return int(self.text(index))
+        except ValueError:
+            raise DeckError(self.line, f"'{self.text(index)}' is not a whole number") from None
+
+
+STEP = 1e-30  # complex step: so small that its square vanishes beside every real part
+
+
+@dataclass
+class Keyword:
+    """One keyword with its parameters (upper-case names) and its data lines.
+
+    ``lines``: 1-based numbers and texts; ``tangents``: by line, then by field (see `seed`).
+    """
+
+    name: str
+    line: int
+    parameters: dict[str, str]
+    lines: list[tuple[int, str]]
+    tangents: Mapping[int, Mapping[int, float]] = field(default_factory=dict)
+
+    @cached_property
+    def rows(self) -> list[Row]:
+        """The data lines, split at their commas."""
+        return [
+            Row(number, [f.strip() for f in text.split(",")], self.tangents.get(number, {}))
+            for number, text in self.lines
+        ]
+
+    @property
+    def identity(self) -> tuple[object, ...]:
+        """What the block says, wherever it stands: a key for what is derived from it."""
+        return self.name, tuple(self.parameters.items()), tuple(text for _, text in self.lines)
+
+    def get(self, parameter: str, default: str = "") -> str:
+        """A parameter's value, upper case, as ABAQUS compares names."""
+        return self.parameters.get(parameter, default).upper()
+
+    def need(self, parameter: str) -> str:
+        """A parameter that must be present."""
+        if not self.parameters.get(parameter):
+            raise DeckError(self.line, f"*{self.name} needs {parameter}=")
+        return self.get(parameter)
+
+    def only_row(self) -> Row:
+        """The single data row of a keyword that has exactly one."""
+        if len(self.rows) != 1:
+            raise DeckError(self.line, f"*{self.name} takes one data line, got {len(self.rows)}")
+        return self.rows[0]
+
+
+def read_keywords(text: str) -> list[Keyword]:
+    """Split a deck into keyword blocks.
+
+    Raises DeckError where data stand before the first keyword.
+    """
+    keywords: list[Keyword] = []
+    pending, pending_line = "", 0
+    lines: list[tuple[int, str]] = []
+    for number, raw in enumerate(text.splitlines(), start=1):
+        line = raw.strip()
+        if pending:
+            pending += line
+        elif line.startswith("*"):
+            if line.startswith("**"):
+                continue
+            pending, pending_line = line, number
+        elif not line:
+            continue
+        elif not keywords:
+            raise DeckError(number, f"data '{line[:40]}' before the first keyword")
+        else:
+            lines.append((number, line))
+            continue
+        if pending.endswith(","):
+            continue
+        lines = []
+        keywords.append(_keyword(pending, pending_line, lines))
+        pending = ""
+    if pending:
+        raise DeckError(pending_line, f"'{pending}' ends in a comma but the deck ends there")
+    return keywords
+
+
+def _keyword(line: str, number: int, lines: list[tuple[int, str]]) -> Keyword:
+    name, *rest = (part.strip() for part in line[1:].split(","))
+    parameters = {}
+    for part in rest:
+        key, _, value = part.partition("=")
+        key = " ".join(key.upper().split())
+        if key in parameters:
+            raise DeckError(number, f"{key} is given twice")
+        parameters[key] = value.strip().strip('"')
+    return Keyword(" ".join(name.upper().split()), number, parameters, lines)
+
+
+def seed(keywords: list[Keyword], tangents: list[tuple[int, int, float]]) -> list[Keyword]:
+    """Copies of the blocks in which the numbers at (line, field) carry a tangent.
+
+    ``tangents``: (1-based line, 0-based field, d number / d variable).
+    Raises DeckError when a place holds no data field.
+    """
+    by_line: dict[int, dict[int, float]] = {}
+    for line, index, value in tangents:
+        by_line.setdefault(line, {})[index] = value
+    result = []
+    for keyword in keywords:
+        own = {line: by_line.pop(line) for line, _ in keyword.lines if line in by_line}
+        copy = Keyword(keyword.name, keyword.line, keyword.parameters, keyword.lines, own)
+        result.append(copy if own else keyword)
+    if by_line:
+        raise DeckError(min(by_line), "a sensitivity is asked for, but the line holds no data")
+    return result

@@ -1,0 +1,54 @@
+"""Follower pressure on the inner surface, as the potential -p V of the enclosed volume.
+
+Per radian, with x = (x_r, x_theta, x_z) in the cylindrical frame of the reference angle,
+' = d/ds along the section and D = d/dTheta + e_z x:
+
+    V = 1/2 int (x_r, x_theta, 0) . (x' x Dx) ds
+
+The gauge (x_r, x_theta, 0)/2 makes the second variation symmetric also at open ends.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+Array = np.ndarray
+
+IN_PLANE = np.diag([1.0, 1.0, 0.0])
+SPIN = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])  # e_z x
+
+
+def _cross(a: Array) -> Array:
+    """Matrices [a] with [a] b = a x b, (p, 3, 3)."""
+    X = np.zeros((*a.shape, 3), a.dtype)
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        X[..., i, j] = -a[..., k]
+        X[..., j, i] = a[..., k]
+    return X
+
+
+def volume(x: Array, dx: Array, weights: Array) -> Array:
+    """V per radian (m3) from x, x' (p, 3) at Gauss points with their weights."""
+    y, d = x @ IN_PLANE, x @ SPIN.T
+    return (weights * (y * np.cross(dx, d)).sum(-1)).sum() / 2
+
+
+def first(x: Array, dx: Array) -> tuple[Array, Array]:
+    """Gradients of the integrand of V with respect to x and to x', each (p, 3)."""
+    y, d = x @ IN_PLANE, x @ SPIN.T
+    by_x = np.cross(dx, d) @ IN_PLANE + np.cross(y, dx) @ SPIN
+    return by_x / 2, np.cross(d, y) / 2
+
+
+def second(x: Array, dx: Array) -> tuple[Array, Array, Array]:
+    """Second variation for a perturbation u exp(i n Theta): blocks over (u, u'), (p, 3, 3).
+
+    u^H Q u with Q = xx (u, u) + xd (u, u') + n-linear terms. Returns
+    (xx, xd, dx_n): xx and xd at n = 0 with the whole Q not yet symmetrised, and the pair
+    (n-linear u-u block, n-linear u'-u block) stacked in ``dx_n`` (..., 2, 3, 3), times i n.
+    """
+    y, d = x @ IN_PLANE, x @ SPIN.T
+    along = IN_PLANE @ _cross(dx)
+    xx = along @ SPIN
+    xd = -IN_PLANE @ _cross(d) - (_cross(y) @ SPIN).swapaxes(-1, -2)
+    return xx, xd, np.stack([along, -_cross(y)], -3)

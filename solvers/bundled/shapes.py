@@ -1,0 +1,66 @@
+"""Shape functions and Gauss rules of the section's elements (any finite-element textbook).
+
+Corners run counter-clockwise in the (R, Z) plane, then the midside nodes 1-2, 2-3, 3-4, 4-1.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+CORNERS = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+FACES_QUADRATIC = ((0, 4, 1), (1, 5, 2), (2, 6, 3), (3, 7, 0))
+FACES_LINEAR = ((0, 1), (1, 2), (2, 3), (3, 0))
+
+
+@dataclass(frozen=True)
+class Rule:
+    """Shape functions at Gauss points: N (g, a), dN/dxi (g, a, dim), weights (g)."""
+
+    N: np.ndarray
+    dN: np.ndarray
+    weights: np.ndarray
+
+
+def gauss(points: int, dimension: int) -> tuple[np.ndarray, np.ndarray]:
+    """Gauss-Legendre points (g, dimension) and weights (g) on [-1, 1]^dimension."""
+    x, w = np.polynomial.legendre.leggauss(points)
+    grids = np.meshgrid(*[x] * dimension, indexing="ij")
+    weights = np.meshgrid(*[w] * dimension, indexing="ij")
+    return np.stack([g.ravel() for g in grids], -1), np.prod([g.ravel() for g in weights], 0)
+
+
+def quad(nodes: int, points: int) -> Rule:
+    """Four-node bilinear or eight-node serendipity quadrilateral with points x points Gauss."""
+    xi, weights = gauss(points, 2)
+    x, y = xi[:, :1], xi[:, 1:]
+    a, b = CORNERS.T
+    if nodes == 4:
+        N = (1 + a * x) * (1 + b * y) / 4
+        dN = np.stack([a * (1 + b * y) / 4, b * (1 + a * x) / 4], -1)
+        return Rule(N, dN, weights)
+    corner = (1 + a * x) * (1 + b * y) * (a * x + b * y - 1) / 4
+    corner_x = a * (1 + b * y) * (2 * a * x + b * y) / 4
+    corner_y = b * (1 + a * x) * (a * x + 2 * b * y) / 4
+    s = np.array([-1.0, 1.0])  # midsides 1-2 and 3-4 lie at y = -1, 1; 2-3 and 4-1 at x = 1, -1
+    flat = [(1 - x**2) * (1 + s * y) / 2, -x * (1 + s * y), s * (1 - x**2) / 2]
+    steep = [(1 - s * x) * (1 - y**2) / 2, -s * (1 - y**2) / 2, -y * (1 - s * x)]
+    N, dx, dy = (
+        np.stack([c[:, i] for c, i in ((f, 0), (t, 0), (f, 1), (t, 1))], -1)
+        for f, t in zip(flat, [steep[i] for i in range(3)], strict=True)
+    )
+    # steep[0] with s = -1 is the side x = +1 (2-3), s = +1 the side x = -1 (4-1)
+    dN = np.stack([np.hstack([corner_x, dx]), np.hstack([corner_y, dy])], -1)
+    return Rule(np.hstack([corner, N]), dN, weights)
+
+
+def line(nodes: int, points: int) -> Rule:
+    """Two-node or three-node (end, middle, end) line with Gauss points."""
+    xi, weights = gauss(points, 1)
+    x = xi
+    if nodes == 2:
+        dN = np.broadcast_to([-0.5, 0.5], (points, 2))
+        return Rule(np.hstack([1 - x, 1 + x]) / 2, dN[..., None], weights)
+    N = np.hstack([x * (x - 1) / 2, 1 - x**2, x * (x + 1) / 2])
+    return Rule(N, np.hstack([x - 0.5, -2 * x, x + 0.5])[..., None], weights)

@@ -1,0 +1,37 @@
+"""A labelled mode [c, m] of the tyre."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..evaluate.results import RawMode
+
+
+@dataclass(frozen=True, order=True)
+class Label:
+    """[c, m]: c waves round the circumference; m nodal circles of the radial motion on the belt.
+
+    m = 0 is in-plane, 1 out-of-plane (the belt tilts), 2 and more bend the belt across its width.
+    The two [0, 0] modes move the belt as a rigid ring and differ in ``kind``: ``axial`` (along
+    the axle) and ``torsional`` (about it); all others have kind None.
+    """
+
+    c: int
+    m: int
+    kind: str | None = None
+
+    def __str__(self) -> str:
+        return f"[{self.c},{self.m}]" + (f" {self.kind}" if self.kind else "")
+
+
+@dataclass(frozen=True)
+class Mode:
+    """A label on a solver's mode. ``clarity``: how far the label's share of the motion leads
+    the next label's, 0 (a tie) to 1; ``position``: index in the evaluation's modes."""
+
+    label: Label
+    frequency_Hz: float
+    multiplicity: int
+    clarity: float
+    position: int
+    raw: RawMode

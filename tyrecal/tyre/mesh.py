@@ -1,0 +1,122 @@
+"""Mesh of the whole section: element rows with their edges on the cord lines."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from .section import Section, SectionError, resample
+
+Array = np.ndarray
+
+
+@dataclass
+class SectionMesh:
+    """Nodes, solids and cord lines of both halves; everything keyed by its deck number.
+
+    nodes: number to (r, z) in m; solids: number to corner (and midside) nodes, counter-clockwise
+    in (r, z); ``cells``: number of a solid to (region, row); ``cords``: line name to
+    {number: nodes}, running from -z to +z; rim: nodes that the rim holds; inner: solids whose
+    face S4 is the inner surface; shape: (elements along, rows).
+    """
+
+    quadratic: bool
+    nodes: dict[int, tuple[float, float]]
+    solids: dict[int, tuple[int, ...]]
+    cells: dict[int, tuple[str, int]]
+    cords: dict[str, dict[int, tuple[int, ...]]]
+    rim: list[int]
+    inner: list[int]
+    shape: tuple[int, int]
+    crown_outer: list[int] = field(default_factory=list)
+
+
+def build_mesh(
+    section: Section,
+    elements: list[int],
+    rows: list[int],
+    quadratic: bool,
+    grading: list[float] | None = None,
+) -> SectionMesh:
+    """Mesh ``section`` with ``elements`` per region (half section) and ``rows`` between lines.
+
+    ``grading``: thickness of a row over that of the row inside it, per gap between two lines.
+
+    Quadratic: 8-node elements, their midside nodes on the section's own curves.
+    Raises SectionError when an element folds over.
+    """
+    step = 2 if quadratic else 1
+    lines, regions, rigid, present = resample(section, [step * n for n in elements])
+    grid = _through_thickness(lines, rows, step, grading or [1.0] * len(rows))  # (row points, columns, 2)
+    mirrored = grid[:, :0:-1] * [1.0, -1.0]
+    grid = np.concatenate([mirrored, grid], 1)
+    regions = regions[::-1] + regions
+    rigid = np.concatenate([rigid[:0:-1], rigid])
+    present = np.concatenate([present[:, :0:-1], present], 1)
+    _check_unfolded(grid, regions)
+
+    height, width = grid.shape[0], grid.shape[1]
+    number = lambda i, j: 1000 * (j + 1) + i + 1  # noqa: E731
+    nodes, rim = {}, []
+    for j in range(width):
+        for i in range(0, height, step if j % step else 1):
+            nodes[number(i, j)] = (float(grid[i, j, 0]), float(grid[i, j, 1]))
+            if rigid[j]:
+                rim.append(number(i, j))
+    solids, cells, inner = {}, {}, []
+    for j in range(0, width - 1, step):
+        for i in range(0, height - 1, step):
+            corners = [(i, j), (i + step, j), (i + step, j + step), (i, j + step)]
+            if quadratic:
+                corners += [(i + 1, j), (i + 2, j + 1), (i + 1, j + 2), (i, j + 1)]
+            name = number(i // step, j // step)
+            solids[name] = tuple(number(*c) for c in corners)
+            cells[name] = regions[j], i // step
+            if i == 0:
+                inner.append(name)
+    edges = np.concatenate([[0], np.cumsum(rows)]) * step
+    cords = {}
+    for k, line in enumerate(section.names[1:-1], start=1):
+        cords[line] = {
+            1000000 * k + j // step + 1: tuple(
+                number(int(edges[k]), c) for c in range(j, j + step + 1)
+            )
+            for j in range(0, width - 1, step)
+            if present[k, j : j + step + 1].all()
+        }
+    crown = [j for j in range(width) if present[-2, j]] or list(range(width))
+    outer = [number(height - 1, j) for j in crown]
+    return SectionMesh(quadratic, nodes, solids, cells, cords, rim, inner,
+                       ((width - 1) // step, (height - 1) // step), outer)  # fmt: skip
+
+
+def _through_thickness(lines: Array, rows: list[int], step: int, grading: list[float]) -> Array:
+    """Points on and between the lines, (row points, columns, 2)."""
+    layers = [lines[:1]]
+    for below, above, count, ratio in zip(lines, lines[1:], rows, grading, strict=False):
+        edges = np.concatenate([[0.0], np.cumsum(ratio ** np.arange(count))])
+        places = np.arange(1, count * step + 1) / step
+        share = np.interp(places, np.arange(count + 1), edges / edges[-1])[:, None, None]
+        layers.append(below + share * (above - below))
+    return np.concatenate(layers)
+
+
+def _check_unfolded(grid: Array, regions: list[str]) -> None:
+    """Every cell of the grid has positive area at its four corners."""
+    along, across = np.diff(grid, axis=1), np.diff(grid, axis=0)
+
+    def area(u: Array, v: Array) -> Array:
+        return u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]
+
+    corners = [
+        area(across[:, c], along[r])
+        for c in (slice(None, -1), slice(1, None))
+        for r in (slice(None, -1), slice(1, None))
+    ]
+    folded = np.argwhere(np.minimum.reduce(corners) <= 0)
+    if len(folded):
+        i, j = folded[0]
+        r, z = grid[i, j] * 1e3
+        raise SectionError(f"the section folds over in region '{regions[j]}'"
+                           f" near r = {r:.1f} mm, z = {z:.1f} mm")  # fmt: skip
