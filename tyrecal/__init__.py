@@ -1,0 +1,3 @@
+"""tyrecal: calibrates tyre finite element models to measured modes."""
+
+__version__ = "0.1.0"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -37,12 +38,20 @@ class State:
     factorisations: int
 
 
-def equilibrium(model: Model, numbering: Numbering, loads: list[Load], start: Array) -> State:
+def equilibrium(
+    model: Model,
+    numbering: Numbering,
+    loads: list[Load],
+    start: Array,
+    check: Callable[[], None] = lambda: None,
+) -> State:
     """Equilibrium under ``loads``, reached from the displacements ``start``.
 
     The whole load is tried first. A slack membrane has no stiffness against the pressure yet, so
     the first tangents carry the tension p * rho that the cords are about to take up; this changes
     the path of the iteration, never its end. Where that fails the load comes in adaptive steps.
+
+    ``check`` is called between load steps and may raise to stop.
 
     Raises InflationFailed with the pressure that was reached.
     """
@@ -51,6 +60,7 @@ def equilibrium(model: Model, numbering: Numbering, loads: list[Load], start: Ar
     radius = SECTION_RADIUS * np.ptp(model.mesh.X[:, 0].real)
     why = ""
     while reached < 1.0:
+        check()
         target = min(1.0, reached + step)
         part = [Load(load.lines, load.pressure * target) for load in loads]
         tension = (target - reached) * full * radius

@@ -7,14 +7,27 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 
+class Line(int):
+    """A 1-based line number that knows the job whose deck it counts in."""
+
+    job = ""
+
+    def __new__(cls, number: int, job: str) -> Line:
+        line = super().__new__(cls, number)
+        line.job = job
+        return line
+
+
 class DeckError(ValueError):
     """The deck asks for something that the solver cannot honour, or is not a deck.
 
-    ``line`` is the 1-based line of the deck, ``job`` the job that it belongs to.
+    ``line``: 1-based line of the deck, 0 where no single line is to blame.
     """
 
-    def __init__(self, line: int, message: str, job: str = ""):
-        super().__init__(f"{job + '.inp' if job else 'deck'}, line {line}: {message}")
+    def __init__(self, line: int, message: str):
+        job = getattr(line, "job", "")
+        where = f"{job}.inp" if job else "deck"
+        super().__init__(f"{where}, line {line}: {message}" if line else f"{where}: {message}")
         self.line = line
 
 
@@ -69,7 +82,7 @@ class Keyword:
     """
 
     name: str
-    line: int
+    line: Line
     parameters: dict[str, str]
     lines: list[tuple[int, str]]
     tangents: Mapping[int, Mapping[int, float]] = field(default_factory=dict)
@@ -78,7 +91,8 @@ class Keyword:
     def rows(self) -> list[Row]:
         """The data lines, split at their commas."""
         return [
-            Row(number, [f.strip() for f in text.split(",")], self.tangents.get(number, {}))
+            Row(Line(number, self.line.job), [f.strip() for f in text.split(",")],
+                self.tangents.get(number, {}))
             for number, text in self.lines
         ]
 
@@ -104,28 +118,28 @@ class Keyword:
         return self.rows[0]
 
 
-def read_keywords(text: str) -> list[Keyword]:
+def read_keywords(text: str, job: str = "") -> list[Keyword]:
     """Split a deck into keyword blocks.
 
     Raises DeckError where data stand before the first keyword.
     """
     keywords: list[Keyword] = []
-    pending, pending_line = "", 0
+    pending, pending_line = "", Line(0, job)
     lines: list[tuple[int, str]] = []
-    for number, raw in enumerate(text.splitlines(), start=1):
+    for count, raw in enumerate(text.splitlines(), start=1):
         line = raw.strip()
         if pending:
             pending += line
         elif line.startswith("*"):
             if line.startswith("**"):
                 continue
-            pending, pending_line = line, number
+            pending, pending_line = line, Line(count, job)
         elif not line:
             continue
         elif not keywords:
-            raise DeckError(number, f"data '{line[:40]}' before the first keyword")
+            raise DeckError(Line(count, job), f"data '{line[:40]}' before the first keyword")
         else:
-            lines.append((number, line))
+            lines.append((count, line))
             continue
         if pending.endswith(","):
             continue
@@ -137,7 +151,7 @@ def read_keywords(text: str) -> list[Keyword]:
     return keywords
 
 
-def _keyword(line: str, number: int, lines: list[tuple[int, str]]) -> Keyword:
+def _keyword(line: str, number: Line, lines: list[tuple[int, str]]) -> Keyword:
     name, *rest = (part.strip() for part in line[1:].split(","))
     parameters = {}
     for part in rest:
@@ -160,7 +174,9 @@ def seed(keywords: list[Keyword], tangents: list[tuple[int, int, float]]) -> lis
         by_line.setdefault(line, {})[index] = value
     result = []
     for keyword in keywords:
-        own = {line: by_line.pop(line) for line, _ in keyword.lines if line in by_line}
+        first = keyword.lines[0][0] if keyword.lines else 0
+        last = keyword.lines[-1][0] if keyword.lines else -1
+        own = {line: by_line.pop(line) for line in list(by_line) if first <= line <= last}
         copy = Keyword(keyword.name, keyword.line, keyword.parameters, keyword.lines, own)
         result.append(copy if own else keyword)
     if by_line:

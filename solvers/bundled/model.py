@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from . import section as geometry
 from . import shapes
+from .band import Numbering
 from .keywords import DeckError, Keyword
 from .materials import Material, read_materials
 from .rubber import MooneyRivlin
@@ -34,6 +35,7 @@ class Mesh:
     element_sets: dict[str, list[int]]
     faces: dict[str, geometry.Lines]
     reference_nodes: dict[int, list[int]]
+    numberings: dict[bytes, Numbering] = field(default_factory=dict)
 
 
 @dataclass

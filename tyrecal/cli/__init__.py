@@ -1,0 +1,1 @@
+"""The command line: one command = one call into the library. Nothing heavy is imported here."""

@@ -11,7 +11,7 @@ from .section import Section, SectionError, resample
 Array = np.ndarray
 
 
-@dataclass
+@dataclass(eq=False)
 class SectionMesh:
     """Nodes, solids and cord lines of both halves; everything keyed by its deck number.
 

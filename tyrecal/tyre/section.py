@@ -20,7 +20,7 @@ class SectionError(ValueError):
         self.line = line
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Section:
     """Half a section, uninflated, from the crown's centre (z = 0) to the bead.
 

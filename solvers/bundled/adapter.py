@@ -1,0 +1,74 @@
+"""The bundled solver behind the tool's door: write, run, read. Imports nothing of the tool."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+
+from . import VERSION
+from .job import Failures, TimedOut, run
+from .keywords import DeckError
+
+JOB, OLDJOB = "modes", "inflate"
+
+
+class Decks(Protocol):
+    """What the tool hands over: deck texts of a dialect, and where its variables stand in them."""
+
+    request: Mapping[str, Any]
+
+    def texts(self, dialect: str) -> dict[str, str]:
+        """File name to text."""
+
+    def tangents(self, dialect: str) -> dict[str, list[tuple[str, int, int, float]]]:
+        """Variable to [job, 1-based line, 0-based field, d number / d variable] rows."""
+
+
+class Bundled:
+    """Adapter of the bundled solver (see the tool's solver contract)."""
+
+    name = "bundled"
+    version = VERSION
+    dialect = "abaqus"
+    capabilities = frozenset({"modes", "gradients"})
+    refusals = (DeckError,)
+    failures = (*Failures, TimedOut)
+
+    def write(self, decks: Decks, folder: Path) -> list[Path]:
+        """Write the decks and, beside them, what only this solver is asked."""
+        paths = []
+        for name, text in decks.texts(self.dialect).items():
+            paths.append(folder / name)
+            paths[-1].write_text(text)
+        request = {
+            "harmonics": list(range(decks.request["highest_harmonic"] + 1)),
+            "modes_per_harmonic": decks.request["modes_per_harmonic"],
+            "sensitivities": decks.tangents(self.dialect),
+        }
+        paths.append(folder / f"{JOB}.request.json")
+        paths[-1].write_text(json.dumps(request))
+        return paths
+
+    def run(self, folder: Path, time_limit_s: float) -> None:
+        """Run in this process. Raises ``refusals`` and ``failures``."""
+        run(folder, JOB, OLDJOB, time_limit_s)
+
+    def read(self, folder: Path) -> dict[str, Any]:
+        """Results as plain data: the last frequency step of the job."""
+        step = json.loads((folder / f"{JOB}.json").read_text())["steps"][-1]
+        with np.load(folder / f"{JOB}.npz", allow_pickle=False) as arrays:
+            nodes, points = arrays["nodes"], arrays["points"]
+            displacement = arrays[f"displacement_{step['step']}"]
+            shapes = arrays[f"shapes_{step['step']}"] if step["modes"] else []
+        modes = [
+            {"frequency_Hz": mode["frequency_Hz"], "multiplicity": mode["multiplicity"],
+             "n": mode["n"], "amplitude": shape}
+            for mode, shape in zip(step["modes"], shapes, strict=True)
+        ]  # fmt: skip
+        return {"pressure_Pa": step["pressure_Pa"], "mass_kg": step["mass_kg"], "modes": modes,
+                "gradients": step["sensitivities"], "nodes": nodes, "points": points,
+                "displacement": displacement}  # fmt: skip

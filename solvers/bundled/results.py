@@ -1,0 +1,77 @@
+"""Result files of a job: JOB.json (numbers) and JOB.npz (shapes). Same deck, same bytes.
+
+JOB.json: ``steps`` [{step, pressure_Pa, mass_kg, factorisations, modes [{n, frequency_Hz,
+eigenvalue, multiplicity}], sensitivities {variable: [d f / d variable, Hz per unit]}}].
+JOB.npz: ``nodes`` (k,), ``points`` (k, 2) R, Z in m, and per step S ``displacement_S`` (k, 3) and
+``shapes_S`` (modes, k, 3): complex amplitudes of u = Re[U exp(i n Theta)] in r, theta, z, scaled
+to unit modal mass of the whole tyre.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from . import VERSION
+from .harmonics import HarmonicModes
+from .model import Model
+
+Array = np.ndarray
+
+
+@dataclass
+class StepResult:
+    """Results of one step; ``rates``: variable to d lambda per harmonic."""
+
+    step: int
+    pressure_Pa: float
+    mass_kg: float
+    modes: list[HarmonicModes]
+    rates: dict[str, list[Array]]
+    U: Array
+    factorisations: int
+
+
+def write(stem: Path, model: Model, results: list[StepResult]) -> None:
+    """Write STEM.json and STEM.npz."""
+    mesh = model.mesh
+    arrays: dict[str, Array] = {
+        "nodes": np.array(list(mesh.index)),
+        "points": mesh.X,
+    }
+    steps = []
+    for result in results:
+        order = [(float(v), i, j) for i, m in enumerate(result.modes)
+                 for j, v in enumerate(m.eigenvalues)]  # fmt: skip
+        order.sort()
+        lines = []
+        for value, i, _ in order:
+            n = result.modes[i].n
+            lines.append({"n": n, "frequency_Hz": _hertz(value), "eigenvalue": value,
+                          "multiplicity": 2 if n else 1})  # fmt: skip
+        rates = {
+            variable: [float(per[i][j] / (8 * np.pi**2 * _hertz(value))) for value, i, j in order]
+            for variable, per in result.rates.items()
+        }
+        steps.append({"step": result.step, "pressure_Pa": result.pressure_Pa,
+                      "mass_kg": result.mass_kg, "factorisations": result.factorisations,
+                      "modes": lines, "sensitivities": rates})  # fmt: skip
+        arrays[f"displacement_{result.step}"] = result.U
+        if order:
+            whole = [  # from unit mass per radian to the whole circle's 2 pi, or pi for a wave
+                result.modes[i].shapes[j] / np.sqrt(np.pi * (1 if result.modes[i].n else 2))
+                for _, i, j in order
+            ]
+            arrays[f"shapes_{result.step}"] = np.array(whole, np.complex64)
+    with stem.with_suffix(".npz").open("wb") as file:
+        np.savez(file, **arrays)  # type: ignore[arg-type]
+    text = json.dumps({"format": 1, "solver": f"bundled {VERSION}", "steps": steps}, indent=1)
+    stem.with_suffix(".json").write_text(text + "\n")
+
+
+def _hertz(eigenvalue: float) -> float:
+    """Frequency; negative for a negative eigenvalue (an unstable mode under a shift)."""
+    return float(np.sign(eigenvalue) * np.sqrt(abs(eigenvalue)) / (2 * np.pi))

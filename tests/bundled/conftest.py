@@ -1,0 +1,47 @@
+"""Fixtures: one small tyre, not inflated and inflated, for the whole folder."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from threadpoolctl import threadpool_limits
+from tyrecal_solvers.bundled.mechanics import Load
+from tyrecal_solvers.bundled.model import Model
+
+from . import support
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True)
+class Inflated:
+    """The small tyre under 240 kPa: held (n, 3), displacements U (n, 3)."""
+
+    tyre: support.Tyre
+    model: Model
+    held: Array
+    loads: list[Load]
+    U: Array
+
+
+@pytest.fixture(scope="session", autouse=True)
+def one_thread() -> Iterator[None]:
+    """Matrices this small only lose by threads."""
+    with threadpool_limits(1):
+        yield
+
+
+@pytest.fixture(scope="session")
+def inflated() -> Inflated:
+    tyre = support.tyre()
+    model = support.model_of(tyre.deck)
+    held, loads = support.held(model, tyre.rim), support.cavity(model, 240e3)
+    return Inflated(tyre, model, held, loads, support.inflate(model, held, loads))
+
+
+@pytest.fixture
+def random() -> np.random.Generator:
+    return np.random.default_rng(7)

@@ -1,0 +1,220 @@
+"""Decks, meshes and shorthands that the tests of the bundled solver share."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from tyrecal_solvers.bundled import grammar, harmonics, inflation, keywords, mechanics, model, section
+from tyrecal_solvers.bundled.band import Numbering
+from tyrecal_solvers.bundled.mechanics import Load
+from tyrecal_solvers.bundled.model import Model
+
+from tyrecal.tyre.mesh import build_mesh
+from tyrecal.tyre.section import read_section
+
+Array = np.ndarray
+SECTION = Path(__file__).parents[2] / "cases" / "p235_75r17.csv"
+
+
+@dataclass(frozen=True)
+class Rubber:
+    """Constants of a deck: Pa, 1/Pa, kg/m3."""
+
+    C10: float = 1e6
+    C01: float = 0.0
+    D1: float = 5.085e-8
+    density: float = 1100.0
+
+    @property
+    def shear(self) -> float:
+        return 2 * (self.C10 + self.C01)
+
+    @property
+    def plane_strain(self) -> float:
+        """E / (1 - nu^2) of the small strains, from the shear modulus and the bulk's 2 / D1."""
+        G, K = self.shear, 2 / self.D1
+        return 4 * G * (3 * K + G) / (3 * K + 4 * G)
+
+
+@dataclass(frozen=True)
+class Layer:
+    """Cords along lines of node rows (e, 2 or 3); ``angle`` in degrees from the meridian."""
+
+    lines: Array
+    area: float
+    spacing: float
+    modulus: float
+    density: float
+    angle: float
+
+
+@dataclass(frozen=True)
+class Block:
+    """A rectangle of elements: X (n, 2); solids (e, 4 or 8); ``inner``: 1-based elements at the
+    smallest R; column(i): the lines along z at the i-th edge of elements, counted from inside."""
+
+    X: Array
+    solids: Array
+    inner: list[int]
+    columns: list[Array]
+
+    def where(self, axis: int, value: float) -> Array:
+        """Nodes (n,) whose coordinate has a value."""
+        return abs(self.X[:, axis] - value) < 1e-9
+
+
+def block(r: tuple[float, float, int], z: tuple[float, float, int], quadratic: bool) -> Block:
+    """Elements between two radii and two heights, (from, to, elements) each."""
+    step = 2 if quadratic else 1
+    R, Z = (np.linspace(a, b, step * m + 1) for a, b, m in (r, z))
+    number = np.arange(R.size * Z.size).reshape(R.size, Z.size)
+    corner = [(0, 0), (step, 0), (step, step), (0, step)]
+    midside = [(1, 0), (2, 1), (1, 2), (0, 1)] if quadratic else []
+    starts = [(step * i, step * j) for i in range(r[2]) for j in range(z[2])]
+    full = np.array([[number[i + a, j + b] for a, b in corner + midside] for i, j in starts])
+    used, solids = np.unique(full, return_inverse=True)
+    place = np.full(number.size, -1)
+    place[used] = np.arange(used.size)
+    columns = [
+        np.array([place[number[i, step * j : step * (j + 1) + 1]] for j in range(z[2])])
+        for i in range(0, R.size, step)
+    ]
+    X = np.stack(np.meshgrid(R, Z, indexing="ij"), -1).reshape(-1, 2)[used]
+    return Block(X, solids.reshape(full.shape), list(range(1, z[2] + 1)), columns)
+
+
+def deck(
+    X: Array,
+    solids: Array,
+    rubber: Rubber,
+    layers: Sequence[Layer] = (),
+    inner: Sequence[int] = (),
+) -> str:
+    """Deck of solids 1, 2, ... with face S4 of ``inner`` as surface CAVITY; node = row + 1."""
+    kind = {8: "CGAX8R", 4: "CGAX4R", 0: ""}[solids.shape[1] if len(solids) else 0]
+    out = ["*HEADING", "test", "*NODE, NSET=ALL"]
+    out += [f"{i}, {r!r}, {z!r}" for i, (r, z) in enumerate(X.tolist(), 1)]
+    if kind:
+        out += [f"*ELEMENT, TYPE={kind}, ELSET=RUBBER", *_rows(solids, 1)]
+        out += ["*SOLID SECTION, ELSET=RUBBER, MATERIAL=RUBBER"]
+    if inner:
+        out += ["*SURFACE, NAME=CAVITY", *(f"{e}, S4" for e in inner)]
+    for k, layer in enumerate(layers, 1):
+        out += [f"*ELEMENT, TYPE=SFMGAX{layer.lines.shape[1] - 1}, ELSET=L{k}"]
+        out += [*_rows(layer.lines, 1000000 * k), f"*SURFACE SECTION, ELSET=L{k}", "*REBAR LAYER"]
+        out += [f"L{k}, {layer.area!r}, {layer.spacing!r}, 0.0, CORD{k}, {layer.angle!r}"]
+    if kind:
+        out += ["*MATERIAL, NAME=RUBBER", "*HYPERELASTIC, MOONEY-RIVLIN"]
+        out += [f"{rubber.C10!r}, {rubber.C01!r}, {rubber.D1!r}", "*DENSITY", f"{rubber.density!r}"]
+    for k, layer in enumerate(layers, 1):
+        out += [f"*MATERIAL, NAME=CORD{k}", "*ELASTIC", f"{layer.modulus!r}, 0.3"]
+        out += ["*DENSITY", f"{layer.density!r}"] if layer.density else []
+    return "\n".join(out) + "\n"
+
+
+def _rows(connectivity: Array, first: int) -> list[str]:
+    return [", ".join(map(str, (first + e, *(nodes + 1)))) for e, nodes in enumerate(connectivity)]
+
+
+@dataclass(frozen=True)
+class Tyre:
+    """A tyre's deck and the rows of its nodes on the rim."""
+
+    deck: str
+    rim: list[int]
+    outline: list[Array]
+
+
+def tyre(
+    elements: Sequence[int] = (4, 3, 3, 1),
+    rows: Sequence[int] = (1, 1, 1, 1),
+    quadratic: bool = True,
+    rubber: Rubber = Rubber(C01=1e5),  # noqa: B008
+) -> Tyre:
+    """The tyre of the case study: a radial ply and two belts at +-20 degrees to the crown."""
+    mesh = build_mesh(read_section(SECTION), list(elements), list(rows), quadratic)
+    row = {number: i for i, number in enumerate(mesh.nodes)}
+    look = np.vectorize(row.__getitem__)
+    solids = {number: i for i, number in enumerate(mesh.solids, 1)}
+    cord = {"ply": (4.2e-7, 1e-3, 9.87e9, 1500.0, 0.0), "belt1": (2.1e-7, 1.16e-3, 1.722e11, 5900.0, 70.0)}
+    cord["belt2"] = (*cord["belt1"][:4], 110.0)
+    layers = [Layer(look(list(mesh.cords[name].values())), *cord[name]) for name in cord]
+    connectivity = look(list(mesh.solids.values()))
+    text = deck(np.array(list(mesh.nodes.values())), connectivity, rubber, layers,
+                [solids[e] for e in mesh.inner])  # fmt: skip
+    return Tyre(text, [row[n] for n in mesh.rim], _outline(connectivity))
+
+
+def _outline(solids: Array) -> list[Array]:
+    """Edges (corner, middle, corner) of eight-node elements that belong to one element only."""
+    if solids.shape[1] != 8:
+        return []
+    edges = np.concatenate([solids[:, [i, 4 + i, (i + 1) % 4]] for i in range(4)])
+    middle, count = np.unique(edges[:, 1], return_counts=True)
+    return list(edges[np.isin(edges[:, 1], middle[count == 1])])
+
+
+def model_of(text: str) -> Model:
+    """The model of a deck with static moduli."""
+    return model.build(grammar.check(keywords.read_keywords(text), False)[0], None, True)
+
+
+def numbering(m: Model, held: Array | None = None) -> Numbering:
+    """Equations with the components ``held`` (n, 3) or none taken out."""
+    free = np.ones((len(m.mesh.X), 3), bool) if held is None else ~held
+    connectivities = [r.solids.connectivity for r in m.rubbers]
+    connectivities += [c.lines.connectivity for c in m.cords]
+    return Numbering(connectivities, free)
+
+
+def held(m: Model, rows: Array | list[int] = (), axial: bool = False) -> Array:
+    """Mask (n, 3): the nodes ``rows`` wholly and, for plane strain, u_z everywhere."""
+    mask = np.zeros((len(m.mesh.X), 3), bool)
+    mask[list(rows)] = True
+    mask[:, 2] |= axial
+    return mask
+
+
+def cavity(m: Model, pressure: float) -> list[Load]:
+    return [Load(m.mesh.faces["CAVITY"], pressure)]
+
+
+def inflate(m: Model, mask: Array, loads: list[Load]) -> Array:
+    """Equilibrium displacements (n, 3)."""
+    return inflation.equilibrium(m, numbering(m, mask), loads, np.zeros((len(m.mesh.X), 3))).U
+
+
+def eigenvalues(
+    m: Model, U: Array, loads: list[Load], mask: Array, n: int, count: int, shift: float = -1e3
+) -> Array:
+    """Lowest omega^2 (count,) of a harmonic; the shift below zero allows for rigid modes."""
+    vibration = harmonics.Vibration(m, U, loads, numbering(m, mask), shift)
+    return vibration.modes(n, count).eigenvalues
+
+
+def hertz(omega2: Array) -> Array:
+    """Frequencies, negative where omega^2 is."""
+    return np.sign(omega2) * np.sqrt(abs(omega2)) / (2 * np.pi)
+
+
+def matrices(m: Model, U: Array, loads: list[Load]) -> tuple[Array, Array, Array]:
+    """Dense K0, K1, K2 (3n, 3n) over all components."""
+    return tuple(dense(part, len(U)) for part in mechanics.tangents(m, U, loads, True))
+
+
+def dense(parts: list[tuple[Array, Array]], n: int) -> Array:
+    """Element matrices added up over all components (3n, 3n)."""
+    K = np.zeros((3 * n, 3 * n))
+    for connectivity, values in parts:
+        e = (3 * connectivity[:, :, None] + np.arange(3)).reshape(len(connectivity), -1)
+        np.add.at(K, (e[:, :, None], e[:, None, :]), values)
+    return K
+
+
+def order(errors: Sequence[float], ratio: float = 2.0) -> Array:
+    """Observed orders between successive meshes."""
+    e = abs(np.asarray(errors))
+    return np.log(e[:-1] / e[1:]) / np.log(ratio)

@@ -1,0 +1,194 @@
+"""Whole sections: rigid bodies, the second variation of the 3-D energy, mass, symmetry."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from tyrecal_solvers.bundled import cords, harmonics, mechanics, rubber, shapes
+from tyrecal_solvers.bundled.model import Model
+
+from . import support
+from .conftest import Inflated
+
+Array = np.ndarray
+ANGLES = np.arange(24) * 2 * np.pi / 24
+RIGID: dict[str, tuple[int, Callable[[Array, Array], list[Array]]]] = {
+    "axial shift": (0, lambda R, Z: [0 * R, 0 * R, 1 + 0 * R]),
+    "spin": (0, lambda R, Z: [0 * R, R, 0 * R]),
+    "translation": (1, lambda R, Z: [1 + 0 * R, 1j + 0 * R, 0 * R]),
+    "tilt": (1, lambda R, Z: [Z, 1j * Z, -R]),
+}
+
+
+@pytest.fixture(scope="module", params=[True, False], ids=["Q8", "Q4"])
+def free_tyre(request) -> Model:
+    return support.model_of(support.tyre(quadratic=request.param).deck)
+
+
+@pytest.mark.parametrize("motion", RIGID)
+def test_rigid_bodies_cost_nothing(free_tyre: Model, motion: str) -> None:
+    """|K(n) u| <= 1e-13 |K| |u| for infinitesimal rigid motions of the unloaded tyre with free
+    beads: n = 0 axial shift and spin; n = 1 translation in x, (cos, -sin) Theta, and tilt
+    e_y x X; the other translation and tilt are i times these."""
+    n, field = RIGID[motion]
+    X = free_tyre.mesh.X
+    u = np.stack(field(*X.T), -1).ravel()
+    K0, K1, K2 = support.matrices(free_tyre, np.zeros((len(X), 3)), [])
+
+    def relative(n: int) -> float:
+        K = K0 + 1j * n * K1 + n * n * K2
+        size = np.linalg.norm(K, axis=0).max()  # at most the 2-norm, so the bound is stricter
+        return np.linalg.norm(K @ u) / (size * np.linalg.norm(u))
+
+    assert relative(n) <= 1e-13
+    assert relative(n + 2) > 1e-5
+
+
+def test_finite_spin_changes_no_energy(inflated: Inflated) -> None:
+    """The inflated tyre turned by a finite angle: x' = Q x in the frame of the reference angle,
+    the same potential and the same force, turned."""
+    X3 = np.insert(inflated.model.mesh.X, 1, 0.0, 1)
+    c, s = np.cos(1.1), np.sin(1.1)
+    Q = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+    turned = (X3 + inflated.U) @ Q.T - X3
+    energy = mechanics.potential(inflated.model, inflated.U, inflated.loads)
+    after = mechanics.potential(inflated.model, turned, inflated.loads)
+    assert after == pytest.approx(energy, rel=1e-10)
+    number = support.numbering(inflated.model)
+    before, after = (
+        number.spread(mechanics.residual(inflated.model, u, inflated.loads, number))
+        for u in (inflated.U, turned)
+    )
+    assert abs(after - before @ Q.T).max() <= 1e-9 * abs(before).max()
+
+
+def test_residual_is_the_gradient_of_the_potential(inflated: Inflated) -> None:
+    """r . phi = d/de potential(U + e phi) by complex step, at a state out of balance."""
+    U, phi = 0.7 * inflated.U, smooth(inflated.model.mesh.X, 0)
+    number = support.numbering(inflated.model)
+    r = number.spread(mechanics.residual(inflated.model, U, inflated.loads, number))
+    slope = mechanics.potential(inflated.model, U + 1e-30j * phi, inflated.loads).imag / 1e-30
+    assert (r * phi).sum() == pytest.approx(slope, rel=1e-11)
+
+
+def smooth(X: Array, n: int) -> Array:
+    """A field (nodes, 3) without symmetry that varies slowly along the section."""
+    R, Z = (X - X.mean(0)).T / 0.1
+    field = np.stack([1 + Z - 0.3 * R * Z, 0.5 * R + 0.8 * Z**2, 0.4 - R + 0.2 * Z], -1)
+    return field if n == 0 else field + 1j * np.stack([0.3 * Z**2, 1 - R, R * Z], -1)
+
+
+def energy_3d(m: Model, p: float, fields: list[tuple[int, Array]], step: Array) -> complex:
+    """Strain energy - p V of the revolved tyre, J, for u = Re[sum U exp(i n Theta)] + step field.
+
+    Sampled at 24 angles (exact to second order: 2 n <= 8 < 24), with gradients formed afresh:
+    H = [u,R | (u,Theta + e_z x u) / R | u,Z]. ``fields``: real (n, U); ``step`` scales the last.
+    """
+    X, total = m.mesh.X, 0.0
+    for angle in ANGLES:
+        u, turn = 0.0, 0.0
+        for (n, U), scale in zip(fields, (1.0, step), strict=True):
+            u = u + scale * (U * np.exp(1j * n * angle)).real
+            turn = turn + scale * (1j * n * U * np.exp(1j * n * angle)).real
+        around = turn + np.stack([-u[:, 1], u[:, 0], 0 * u[:, 2]], -1)  # + e_z x u
+        for r in m.rubbers:
+            c = r.solids.connectivity
+            rule = shapes.quad(c.shape[1], round(np.sqrt(r.solids.weights.shape[1])))
+            J = np.einsum("gak,eaj->egjk", rule.dN, X[c])
+            dN = np.einsum("gak,egkj->egaj", rule.dN, np.linalg.inv(J))
+            R = X[c, 0] @ rule.N.T
+            H = np.empty((*R.shape, 3, 3), np.result_type(u, float))
+            H[..., 0::2] = np.einsum("egaj,eai->egij", dN, u[c])
+            H[..., 1] = np.einsum("ga,eai->egi", rule.N, around[c]) / R[..., None]
+            W = rubber.energy((np.eye(3) + H).reshape(-1, 3, 3), r.material)
+            total += (W * (rule.weights * np.linalg.det(J) * R).ravel()).sum()
+        for c in m.cords:
+            lines = c.lines
+            nodes = lines.connectivity
+            along = np.einsum("ega,eai->egi", lines.slope, u[nodes])
+            hoop = np.einsum("ga,eai->egi", lines.N, around[nodes]) / lines.R[..., None]
+            sin = c.direction[..., 1:2]
+            cos = (c.direction[..., ::2] * lines.tangent).sum(-1)[..., None]
+            q = (c.direction + cos * along + sin * hoop).reshape(-1, 3)
+            total += (cords.energy(q, c.stiffness) * (lines.R * lines.weights).ravel()).sum()
+        lines = m.mesh.faces["CAVITY"]
+        x = np.insert(X, 1, 0.0, 1) + u
+        y = turn + np.stack([-x[:, 1], x[:, 0], 0 * x[:, 2]], -1)
+        at = lambda v: np.einsum("ga,eai->egi", lines.N, v[lines.connectivity])  # noqa: E731
+        slope = np.einsum("ega,eai->egi", lines.slope, x[lines.connectivity])
+        flux = (at(x)[..., :2] * np.cross(slope, at(y))[..., :2]).sum(-1) / 2
+        total -= p * (flux * lines.weights).sum()
+    return total * 2 * np.pi / len(ANGLES)
+
+
+@pytest.mark.parametrize("n", range(5))
+def test_second_variation_of_the_3d_energy(inflated: Inflated, n: int) -> None:
+    """d2/de2 E(u0 + e Re[phi exp(i n Theta)]) = pi phi^H K(n) phi (2 pi for n = 0) about the
+    inflated, twisted tyre, for its two lowest modes and a generic field. First derivative by
+    complex step, second by a central difference of fourth order."""
+    m, U = inflated.model, inflated.U
+    assert abs(U[:, 1]).max() > 1e-5  # the belts twist the section
+    K0, K1, K2 = support.matrices(m, U, inflated.loads)
+    K = K0 + 1j * n * K1 + n * n * K2
+    number = support.numbering(m, inflated.held)
+    modes = harmonics.Vibration(m, U, inflated.loads, number, 0.0).modes(n, 2).shapes
+    for phi in (*modes, smooth(m.mesh.X, n)):
+        phi = phi / abs(phi).max()
+        e = 1e-4
+
+        def slope(s: float, phi: Array = phi) -> float:
+            return energy_3d(m, 240e3, [(0, U), (n, phi)], s + 1e-30j).imag / 1e-30
+
+        wanted = (8 * (slope(e) - slope(-e)) - slope(2 * e) + slope(-2 * e)) / (12 * e)
+        form = np.pi * (1 if n else 2) * (phi.ravel().conj() @ K @ phi.ravel()).real
+        assert form == pytest.approx(wanted, rel=1e-6)
+
+
+def test_mass_of_a_tyre_by_pappus(inflated: Inflated) -> None:
+    """M = 2 pi rho int R dA + cords; int R dA = 1/2 contour integral of R^2 dZ (Green), taken
+    along the outline; cords: 2 pi (A rho / s) int R ds."""
+    m, rule = inflated.model, shapes.line(3, 4)
+    moment = 0.0
+    for edge in inflated.tyre.outline:
+        X, dX = rule.N @ m.mesh.X[edge], rule.dN[..., 0] @ m.mesh.X[edge]
+        moment += (rule.weights * X[:, 0] ** 2 * dX[:, 1]).sum() / 2
+    total = 1100.0 * moment
+    per_area = {"ply": 4.2e-7 * 1500 / 1e-3, "belt": 2.1e-7 * 5900 / 1.16e-3}
+    sin = m.cords[0].direction[..., 1]
+    smeared = np.where(sin < 0.5, per_area["ply"], per_area["belt"])
+    total += (smeared * m.cords[0].lines.R * m.cords[0].lines.weights).sum()
+    assert mechanics.mass(m).sum() == pytest.approx(total, rel=1e-12)
+
+
+@pytest.mark.parametrize("quadratic", [True, False])
+def test_mass_of_a_ring(quadratic: bool) -> None:
+    """M = rho pi (b^2 - a^2) L = 2 pi 1^T m 1, and pi u^H m u = M for a unit translation
+    u = (1, i, 0) exp(i Theta); moment of inertia about the axis rho pi (b^4 - a^4) L / 2."""
+    b = support.block((0.2, 0.5, 3), (0.0, 0.1, 2), quadratic)
+    m = support.model_of(support.deck(b.X, b.solids, support.Rubber()))
+    mass, one = mechanics.mass(m), np.ones(len(b.X))
+    total = 1100.0 * np.pi * (0.5**2 - 0.2**2) * 0.1
+    assert 2 * np.pi * one @ mass @ one == pytest.approx(total, rel=1e-13)
+    u = np.outer(one, [1, 1j, 0])
+    assert np.pi * (u.conj() * (mass @ u)).sum().real == pytest.approx(total, rel=1e-13)
+    R = b.X[:, 0]
+    inertia = 1100.0 * np.pi * (0.5**4 - 0.2**4) * 0.1 / 2
+    assert 2 * np.pi * R @ mass @ R == pytest.approx(inertia, rel=1e-13)
+
+
+def test_harmonics_of_a_state_without_twist_are_mirror_symmetric() -> None:
+    """A lone layer at +alpha and its mirror image at -alpha have the same frequencies: reflection
+    u_theta -> -u_theta, n -> -n."""
+    text = support.tyre((2, 2, 2, 1)).deck
+    mirrored = text.replace("CORD2, 70.0", "CORD2, -70.0").replace("CORD3, 110.0", "CORD3, -110.0")
+    assert mirrored != text
+    values = []
+    for deck in (text, mirrored):
+        m = support.model_of(deck)
+        mask = support.held(m, support.tyre((2, 2, 2, 1)).rim)
+        loads = support.cavity(m, 240e3)
+        U = support.inflate(m, mask, loads)
+        values.append(support.eigenvalues(m, U, loads, mask, 2, 4))
+    np.testing.assert_allclose(values[0], values[1], rtol=1e-9)

@@ -1,0 +1,112 @@
+"""Enclosed volume of the pressure surface and its variations."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from tyrecal_solvers.bundled import mechanics, pressure, section
+from tyrecal_solvers.bundled.mechanics import Load
+from tyrecal_solvers.bundled.model import Model
+
+from . import support
+
+Array = np.ndarray
+ANGLES = np.arange(24) * 2 * np.pi / 24
+
+
+def arc(elements: int, nodes: int) -> tuple[Array, Array]:
+    """Nodes (n, 2) and lines of an open, asymmetric arc in the section."""
+    count = (nodes - 1) * elements + 1
+    t = np.linspace(0.4, 4.9, count)
+    X = np.stack([0.3 + 0.06 * np.cos(t), 0.08 * np.sin(t) + 0.01 * t], -1)
+    return X, np.arange(nodes) + (nodes - 1) * np.arange(elements)[:, None]
+
+
+def revolved_volume(X: Array, lines: section.Lines, fields: list[tuple[int, Array]]) -> float:
+    """1/2 of the flux of (x, y, 0) through the surface, in Cartesian components, for
+    u = sum of Re[U exp(i n Theta)]: independent of the solver's frame and formulas."""
+    total = 0.0
+    for angle in ANGLES:
+        c, s = np.cos(angle), np.sin(angle)
+        Q, dQ = (np.array([[a, -b, 0], [b, a, 0], [0, 0, d]]) for a, b, d in ((c, s, 1), (-s, c, 0)))
+        wave = [(U, np.exp(1j * n * angle), n) for n, U in fields]
+        local = np.insert(X, 1, 0.0, 1) + sum((U * w).real for U, w, _ in wave)
+        turn = sum((1j * n * U * w).real for U, w, n in wave)
+        x = local @ Q.T
+        by_angle = local @ dQ.T + turn @ Q.T
+        at = lambda v: np.einsum("ga,eai->egi", lines.N, v[lines.connectivity])  # noqa: E731
+        slope = np.einsum("ega,eai->egi", lines.slope, x[lines.connectivity])
+        flux = (at(x) * [1, 1, 0] * np.cross(slope, at(by_angle))).sum(-1) / 2
+        total += (flux * lines.weights).sum() * 2 * np.pi / len(ANGLES)
+    return total
+
+
+def test_volume_of_a_torus() -> None:
+    """V = 2 pi^2 R a^2 (Pappus). The trapezoidal rule is exact for a trigonometric integrand."""
+    R, a, m = 0.3, 0.08, 16
+    t = np.arange(m) * 2 * np.pi / m
+    x = np.stack([R + a * np.cos(t), 0 * t, a * np.sin(t)], -1)
+    slope = np.stack([-a * np.sin(t), 0 * t, a * np.cos(t)], -1)
+    V = pressure.volume(x, -slope, np.full(m, 2 * np.pi / m))
+    assert V == pytest.approx(np.pi * R * a**2, rel=1e-13)
+
+
+def test_volume_of_a_cylinder_and_a_cone() -> None:
+    """V = pi r^2 L and pi L (r^2 + r s + s^2) / 3; 2 pi of the solver's volume per radian."""
+    for r, s in ((0.3, 0.3), (0.2, 0.35)):
+        lines = section.lines(np.array([[s, 0.5], [r, 0.0]]), np.array([[0, 1]]))
+        x = np.einsum("ga,ai->gi", lines.N, [[s, 0, 0.5], [r, 0, 0.0]])
+        dx = np.einsum("ga,ai->gi", lines.slope[0], [[s, 0, 0.5], [r, 0, 0.0]])
+        V = 2 * np.pi * pressure.volume(x, dx, lines.weights[0])
+        assert V == pytest.approx(np.pi * 0.5 * (r * r + r * s + s * s) / 3, rel=1e-13)
+
+
+def test_first_variation(random: np.random.Generator) -> None:
+    """Gradients of the integrand of V by x and x' = those by complex step."""
+    x, dx = random.normal(size=(2, 6, 3))
+    one, h = np.ones(1), 1e-30
+    by_x, by_dx = pressure.first(x, dx)
+    for g in range(6):
+        for i in range(3):
+            step = 1j * h * np.eye(3)[i]
+            V = pressure.volume(x[g : g + 1] + step, dx[g : g + 1], one)
+            assert V.imag / h == pytest.approx(by_x[g, i], rel=1e-13, abs=1e-15)
+            V = pressure.volume(x[g : g + 1], dx[g : g + 1] + step, one)
+            assert V.imag / h == pytest.approx(by_dx[g, i], rel=1e-13, abs=1e-15)
+
+
+@pytest.mark.parametrize("nodes", [2, 3])
+@pytest.mark.parametrize("n", range(5))
+def test_second_variation(n: int, nodes: int, random: np.random.Generator) -> None:
+    """d2/de2 of the three-dimensional volume of U0 + e phi = pi phi^H K(n) phi (2 pi for n = 0)
+    at p = -1, about a deformed and twisted state, with free open ends. V is cubic in u, so the
+    central second difference is exact. K(n) is Hermitian."""
+    X, table = arc(5, nodes)
+    lines = section.lines(X, table, 3)
+    U0 = 0.02 * random.normal(size=(len(X), 3))
+    phi = random.normal(size=(2, len(X), 3)).T @ [1, 1j if n else 0]
+    phi = 0.1 * phi.T
+    V = [revolved_volume(X, lines, [(0, U0), (n, e * phi)]) for e in (1.0, 0.0, -1.0)]
+    wanted = V[0] - 2 * V[1] + V[2]
+    model = Model(SimpleNamespace(X=X), [], [])
+    K0, K1, K2 = support.matrices(model, U0, [Load(lines, -1.0)])
+    K = K0 + 1j * n * K1 + n * n * K2
+    assert abs(K - K.conj().T).max() <= 1e-13 * abs(K).max()
+    form = np.pi * (1 if n else 2) * (phi.ravel().conj() @ K @ phi.ravel())
+    assert form.real == pytest.approx(wanted, rel=1e-10)
+
+
+def test_pressure_force_is_minus_p_times_the_first_variation(random: np.random.Generator) -> None:
+    """r = -p dV/du, against a central difference of the three-dimensional volume."""
+    X, table = arc(5, 3)
+    lines = section.lines(X, table, 3)
+    U0, phi = 0.02 * random.normal(size=(2, len(X), 3))
+    model = Model(SimpleNamespace(X=X), [], [])
+    e = 1e-4
+    V = [revolved_volume(X, lines, [(0, U0 + s * e * phi)]) for s in (2, 1, -1, -2)]
+    slope = (8 * (V[1] - V[2]) - V[0] + V[3]) / (12 * e)  # exact for a cubic
+    number = mechanics.Numbering([table], np.ones((len(X), 3), bool))
+    force = number.spread(mechanics.residual(model, U0, [Load(lines, 7.0)], number))
+    assert (force * phi).sum() * 2 * np.pi == pytest.approx(-7.0 * slope, rel=1e-10)

@@ -1,0 +1,123 @@
+"""Mooney-Rivlin rubber: consistency of energy, stress and tangent, invariance, small strains."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.linalg import qr
+from tyrecal_solvers.bundled import rubber
+from tyrecal_solvers.bundled.rubber import MooneyRivlin
+
+Array = np.ndarray
+H = 1e-30
+LAWS = {
+    "C10": MooneyRivlin(np.full(5, 1.1e6), np.zeros(5), np.full(5, 3e7)),
+    "C01": MooneyRivlin(np.zeros(5), np.full(5, 0.7e6), np.full(5, 3e7)),
+    "both": MooneyRivlin(np.linspace(1e6, 2e6, 5), np.linspace(2e5, 3e5, 5), np.full(5, 2e7)),
+}
+LAW = pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
+
+
+@pytest.fixture
+def F(random: np.random.Generator) -> Array:
+    return np.eye(3) + 0.25 * random.uniform(-1, 1, (5, 3, 3))
+
+
+def rotations(random: np.random.Generator) -> Array:
+    Q = np.array([qr(random.normal(size=(3, 3)))[0] for _ in range(5)])
+    return Q * np.sign(np.linalg.det(Q))[:, None, None]
+
+
+def complex_step(function, F: Array) -> Array:
+    """d function / dF, with the nine components of F last."""
+    steps = np.eye(9).reshape(9, 1, 3, 3) * 1j * H
+    return np.stack([np.imag(function(F + s)) / H for s in steps], -1)
+
+
+def close(got: Array, wanted: Array, tolerance: float = 1e-13) -> None:
+    assert abs(got - wanted).max() <= tolerance * abs(wanted).max()
+
+
+@LAW
+def test_energy_of_known_states(law: MooneyRivlin) -> None:
+    """Volume change F = c 1: W = (c^3 - 1)^2 / D1, the isochoric part being blind to it; simple
+    shear by g: I1 = I2 = 3 + g^2, J = 1, W = (C10 + C01) g^2 (Holzapfel 2000, ch. 6)."""
+    dilation = np.broadcast_to(1.1 * np.eye(3), (5, 3, 3))
+    close(rubber.energy(dilation, law), (1.1**3 - 1) ** 2 * law.inverse_D1, 1e-12)
+    shear = np.eye(3) + 0.3 * np.outer([1, 0, 0], [0, 1, 0])
+    wanted = (law.C10 + law.C01) * 0.3**2
+    close(rubber.energy(np.broadcast_to(shear, (5, 3, 3)), law), wanted, 1e-12)
+
+
+@LAW
+def test_stress_is_the_gradient_of_the_energy(law: MooneyRivlin, F: Array) -> None:
+    """P = dW/dF by complex step."""
+    wanted = complex_step(lambda f: rubber.energy(f, law), F)
+    close(rubber.stress(F, law).reshape(5, 9), wanted)
+
+
+@LAW
+def test_tangent_is_the_gradient_of_the_stress(law: MooneyRivlin, F: Array) -> None:
+    """A = dP/dF by complex step, with the major symmetry A_iJkL = A_kLiJ."""
+    wanted = complex_step(lambda f: rubber.stress(f, law).reshape(5, 9), F)
+    A = rubber.tangent(F, law)
+    close(A, wanted)
+    close(A, A.swapaxes(1, 2), 1e-14)
+
+
+@LAW
+def test_frame_indifference(law: MooneyRivlin, F: Array, random: np.random.Generator) -> None:
+    """W(QF) = W(F) and P(QF) = Q P(F) for every rotation Q."""
+    Q = rotations(random)
+    close(rubber.energy(Q @ F, law), rubber.energy(F, law), 1e-12)
+    close(rubber.stress(Q @ F, law), Q @ rubber.stress(F, law), 1e-12)
+
+
+@LAW
+def test_isotropy(law: MooneyRivlin, F: Array, random: np.random.Generator) -> None:
+    """W(FQ) = W(F): no direction of the material is preferred."""
+    close(rubber.energy(F @ rotations(random), law), rubber.energy(F, law), 1e-12)
+
+
+@LAW
+def test_reference_state_is_free_of_stress(law: MooneyRivlin) -> None:
+    """P(1) = 0 and W(1) = 0."""
+    one = np.broadcast_to(np.eye(3), (5, 3, 3))
+    assert abs(rubber.stress(one, law)).max() <= 1e-14 * law.inverse_D1.max()
+    assert abs(rubber.energy(one, law)).max() <= 1e-14 * law.inverse_D1.max()
+
+
+@LAW
+def test_small_strain_moduli(law: MooneyRivlin) -> None:
+    """A(1) = G (d_ik d_JL + d_iL d_kJ) + (K - 2G/3) d_iJ d_kL with G = 2 (C10 + C01) and
+    K = 2 / D1 (ABAQUS theory manual, hyperelasticity, gives both)."""
+    G, K = 2 * (law.C10 + law.C01), 2 * law.inverse_D1
+    d = np.eye(3)
+    pair = np.einsum("ik,JL->iJkL", d, d) + np.einsum("iL,kJ->iJkL", d, d)
+    trace = np.einsum("iJ,kL->iJkL", d, d)
+    wanted = G[:, None, None] * pair.reshape(9, 9) + (K - 2 / 3 * G)[:, None, None] * trace.reshape(9, 9)  # fmt: skip
+    close(rubber.tangent(np.broadcast_to(d, (5, 3, 3)), law), wanted)
+
+
+@LAW
+def test_vibration_modulus(law: MooneyRivlin, F: Array) -> None:
+    """A vibration at c times the moduli about a static state: the material part is c times the
+    static one, the geometric part d_ik S_JL of the initial stress S = F^-1 P stays as it is."""
+    c = 1.43
+    vibrating = replace(law, shear_ratio=np.full(5, c), bulk_ratio=np.full(5, c))
+    S = np.linalg.solve(F, rubber.stress(F, law))
+    geometric = np.einsum("ik,pJL->piJkL", np.eye(3), S).reshape(5, 9, 9)
+    wanted = c * (rubber.tangent(F, law) - geometric) + geometric
+    close(rubber.tangent(F, vibrating), wanted, 1e-12)
+
+
+@LAW
+def test_vibration_shear_and_bulk_modulus_are_separate(law: MooneyRivlin) -> None:
+    """At the reference the ratios scale G = 2 (C10 + C01) and K = 2 / D1, each its own."""
+    one = np.broadcast_to(np.eye(3), (5, 3, 3))
+    vibrating = replace(law, shear_ratio=np.full(5, 1.4), bulk_ratio=np.full(5, 1.1))
+    scaled = MooneyRivlin(1.4 * law.C10, 1.4 * law.C01, 1.1 * law.inverse_D1)
+    close(rubber.tangent(one, vibrating), rubber.tangent(one, scaled))
+    assert np.array_equal(rubber.stress(one, vibrating), rubber.stress(one, law))

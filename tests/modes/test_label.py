@@ -1,0 +1,247 @@
+import time
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.polynomial.legendre import legval
+
+from tyrecal.evaluate.results import HarmonicShape, RawMode, RingShape
+from tyrecal.modes.label import belt_motion, label_modes, pair_rings
+from tyrecal.modes.mode import Label
+from tyrecal.modes.sample import on_rings
+
+AXIAL, TORSIONAL = Label(0, 0, "axial"), Label(0, 0, "torsional")
+
+
+def section():
+    """Nodes on a tyre's outline: a crown of 0.18 m and round sidewalls down to the rim."""
+    z = np.linspace(-0.09, 0.09, 25)
+    height = np.linspace(0.0, np.pi, 15)[1:-1]
+    side = np.column_stack([0.30 + 0.08 * np.cos(height), 0.09 + 0.03 * np.sin(height)])
+    return np.concatenate(
+        [side * [1, -1], np.column_stack([0.39 - 0.8 * z**2, z]), side]
+    )  # fmt: skip
+
+
+POINTS = section()
+NODES = np.arange(1, len(POINTS) + 1) * 10
+# component, polynomial: motions of the belt by order
+ORDERS = {
+    0: {"r": [1.0], "t": [0.6]},
+    1: {"r": [0, 0.7], "t": [0, 0.3], "z": [1.0]},
+    2: {"r": [0, 0, 1.0], "z": [0, 0.4]},
+    3: {"r": [0, 0, 0, 1.0], "z": [0, 0, 0.5]},
+}
+RINGS = NODES[[3, 9, 13, 19, 25, 31, 37, 41, 47]]
+CROWN = NODES[[13, 16, 19, 22, 25, 28, 31, 34, 37]]
+ANGLES = np.arange(24) / 24 * 2 * np.pi
+
+
+def shape(c, motions, weights=(1.0,), sidewall=0.0, points=POINTS):
+    """r, z in phase and theta a quarter wave behind, on the order's polynomials, fading to the
+    rim; ``sidewall``: motion that the sidewalls make on their own."""
+    zeta = points[:, 1] / 0.09
+    fade = np.clip((points[:, 0] - 0.22) / 0.14, 0, 1)
+    u = np.zeros((len(points), 3), complex)
+    for motion, weight in zip(motions, weights, strict=True):
+        for name, series in motion.items():
+            k = "rtz".index(name)
+            lag = 1j if name == "t" and c else 1
+            u[:, k] += weight * lag * legval(np.clip(zeta, -1, 1), series) * fade
+    u[:, 2] += sidewall * (fade < 1)
+    return HarmonicShape(c, NODES, points, u)
+
+
+def mode(frequency, *args, **kwargs):
+    made = shape(*args, **kwargs)
+    return RawMode(frequency, made, 2 if made.n else 1)
+
+
+def labels(modes):
+    return [found.label for found in label_modes(modes)]
+
+
+def rings(made, rng, noise=0.0, nodes=RINGS, angles=ANGLES):
+    """Both halves of a pair, turned at random, their points shuffled."""
+    turn = rng.uniform(0, 2 * np.pi)
+    halves = []
+    order = rng.permutation(len(nodes) * len(angles))
+    for phase in (turn, turn + np.pi / 2) if made.n else (0.0,):
+        ring = on_rings(made, nodes, angles, phase)
+        u = ring.displacement[order]
+        u = u + noise * np.abs(u).max() * rng.standard_normal(u.shape)
+        halves.append(RingShape(ring.points[order], u))
+    return halves
+
+
+@pytest.mark.parametrize("c", range(1, 8))
+@pytest.mark.parametrize("m", ORDERS)
+def test_a_belt_moving_on_one_order_has_that_label(c, m):
+    (found,) = label_modes([mode(50.0, c, [ORDERS[m]])])
+    assert found.label == Label(c, m)
+    assert found.clarity > 0.7
+    assert (found.frequency_Hz, found.multiplicity, found.position) == (50.0, 2, 0)
+
+
+@pytest.mark.parametrize(
+    "motion, label",
+    [
+        ({"z": [1.0]}, AXIAL),
+        ({"t": [1.0]}, TORSIONAL),
+        ({"r": [1.0]}, Label(0, 2)),
+        ({"r": [0, 1.0]}, Label(0, 1)),
+        ({"r": [0, 0, 1.0]}, Label(0, 2)),
+    ],
+)
+def test_without_waves_only_a_rigid_belt_is_0_0(motion, label):
+    assert labels([mode(50.0, 0, [motion])]) == [label]
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    c=st.integers(0, 6),
+    m=st.integers(0, 3),
+    phase=st.floats(0, 6.3),
+    size=st.floats(1e-6, 1e6),
+)
+def test_phase_and_size_of_a_shape_do_not_matter(c, m, phase, size):
+    made = shape(c, [ORDERS[m]])
+    turned = HarmonicShape(c, NODES, POINTS, made.amplitude * size * np.exp(1j * phase))
+    one, two = belt_motion(made), belt_motion(turned)
+    assert two.shares == pytest.approx(one.shares, abs=1e-12)
+    assert two.participation == pytest.approx(one.participation)
+
+
+def test_two_modes_that_share_both_rigid_motions_are_told_apart_together():
+    axial, torsional = {"z": [1.0]}, {"t": [1.0]}
+    # the second holds more axial than torsional motion too, but less than the first
+    modes = [
+        mode(36.0, 0, [axial, torsional], (0.80, 0.60)),
+        mode(36.5, 0, [axial, torsional], (0.72, -0.69)),
+    ]
+    first, second = label_modes(modes)
+    assert (first.label, second.label) == (AXIAL, TORSIONAL)
+    assert first.clarity == pytest.approx(0.28, abs=0.02)
+    assert second.clarity == 0.0
+
+
+def test_an_even_tie_still_gives_both_labels_and_no_clarity():
+    both = [{"z": [1.0]}, {"t": [1.0]}]
+    modes = [mode(36.0, 0, both, (1.0, 1.0)), mode(36.2, 0, both, (1.0, -1.0))]
+    found = label_modes(modes)
+    assert {one.label for one in found} == {AXIAL, TORSIONAL}
+    assert max(one.clarity for one in found) < 1e-6
+
+
+@pytest.mark.parametrize("order", [(0, 1, 2), (2, 1, 0), (1, 2, 0)])
+def test_an_overtone_does_not_steal_the_label_however_pure_it_is(order):
+    modes = [
+        mode(60.0, 2, [ORDERS[1], ORDERS[0]], (0.8, 0.5)),
+        mode(70.0, 2, [ORDERS[0], ORDERS[1]], (0.8, -0.5)),
+        mode(190.0, 2, [{"r": [0, 1.0]}]),
+    ]
+    wanted = [Label(2, 1), Label(2, 0), Label(2, 3)]
+    assert labels([modes[i] for i in order]) == [wanted[i] for i in order]
+
+
+def test_a_sidewall_mode_below_the_belts_does_not_take_the_label():
+    modes = [
+        mode(40.0, 3, [ORDERS[0]], (0.05,), sidewall=1.0),
+        mode(90.0, 3, [ORDERS[0]]),
+    ]
+    assert labels(modes) == [Label(3, 2), Label(3, 0)]
+
+
+def test_no_label_twice_among_many_overtones():
+    modes = [mode(50.0 + i, c, [ORDERS[i % 3]]) for c in (0, 1, 4) for i in range(9)]
+    found = labels(modes)
+    assert len(set(found)) == len(found)
+    assert sum(label.c == label.m == 0 for label in found) <= 2
+
+
+@settings(max_examples=25, deadline=None)
+@given(c=st.integers(0, 8), m=st.integers(0, 3), seed=st.integers(0, 1000))
+@pytest.mark.parametrize("nodes", [RINGS, CROWN], ids=["all over", "crown only"])
+def test_rings_of_shuffled_noisy_points_carry_the_same_label(nodes, c, m, seed):
+    made = shape(c, [ORDERS[m]])
+    (expected,) = labels([RawMode(50.0, made, 2)])
+    for half in rings(made, np.random.default_rng(seed), 0.02, nodes):
+        assert labels([RawMode(50.0, half, 1)]) == [expected]
+
+
+@pytest.mark.parametrize("missing, m", [("r", 1), ("t", 0), ("z", 0), ("tz", 0), ("tz", 2)])
+def test_components_that_were_not_measured_may_be_missing(missing, m):
+    half = rings(shape(2, [ORDERS[m]]), np.random.default_rng(0), 0.02)[0]
+    u = half.displacement.copy()
+    u[:, ["rtz".index(name) for name in missing]] = np.nan
+    assert labels([RawMode(50.0, RingShape(half.points, u), 1)]) == [Label(2, m)]
+
+
+def test_points_at_no_regular_place_and_a_few_lost_ones():
+    rng = np.random.default_rng(3)
+    z = rng.uniform(-0.09, 0.09, 150)
+    points = np.column_stack([0.39 - 0.8 * z**2, z])
+    theta = rng.uniform(0, 2 * np.pi, 150)
+    made = shape(3, [ORDERS[1]], points=points)
+    u = (made.amplitude * np.exp(1j * (3 * theta + 0.4))[:, None]).real
+    u[rng.random(u.shape) < 0.2] = np.nan
+    scattered = RingShape(np.column_stack([points[:, 0], theta, z]), u)
+    assert labels([RawMode(50.0, scattered, 1)]) == [Label(3, 1)]
+
+
+def test_one_ring_of_radial_motion_tells_c():
+    half = rings(shape(4, [ORDERS[0]]), np.random.default_rng(0), nodes=NODES[[25]])[0]
+    u = half.displacement * [1, np.nan, np.nan]
+    assert labels([RawMode(50.0, RingShape(half.points, u), 1)]) == [Label(4, 0)]
+
+
+def test_nothing_measured_on_the_belt_is_refused():
+    half = rings(shape(2, [ORDERS[0]]), np.random.default_rng(0))[0]
+    u = np.where(half.points[:, :1] > 0.36, np.nan, half.displacement)
+    with pytest.raises(ValueError, match="four points of the belt"):
+        label_modes([RawMode(50.0, RingShape(half.points, u), 1)])
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_halves_of_pairs_find_each_other_where_four_modes_meet(seed):
+    rng = np.random.default_rng(seed)
+    flat, tilted = shape(2, [ORDERS[0]]), shape(2, [ORDERS[1]])
+    other = shape(3, [ORDERS[0]])
+    halves = [
+        RawMode(f + split, half, 1)
+        for f, made in ((48.2, flat), (48.3, tilted), (48.25, other))
+        for split, half in zip((0.0, 0.02), rings(made, rng, 0.02), strict=True)
+    ]
+    joined = pair_rings([halves[i] for i in rng.permutation(6)])
+    assert [one.multiplicity for one in joined] == [2, 2, 2]
+    found = {one.label: one.frequency_Hz for one in label_modes(joined)}
+    assert found == pytest.approx({Label(2, 0): 48.21, Label(2, 1): 48.31, Label(3, 0): 48.26})
+
+
+def test_a_lone_half_and_a_single_mode_stay_as_they_are():
+    rng = np.random.default_rng(0)
+    lone = RawMode(80.0, rings(shape(2, [ORDERS[0]]), rng)[0], 1)
+    (spin,) = rings(shape(0, [{"t": [1.0]}]), rng)
+    modes = [RawMode(36.0, spin, 1), lone, mode(90.0, 3, [ORDERS[0]])]
+    joined = pair_rings(modes)
+    assert joined == modes
+    assert labels(joined) == [TORSIONAL, Label(2, 0), Label(3, 0)]
+
+
+def test_halves_that_are_too_far_apart_are_not_joined():
+    a, b = rings(shape(2, [ORDERS[0]]), np.random.default_rng(0))
+    halves = [RawMode(80.0, a, 1), RawMode(81.0, b, 1)]
+    assert len(pair_rings(halves)) == 2
+    assert len(pair_rings(halves, tolerance=0.02)) == 1
+
+
+def test_labels_cost_little():
+    modes = [mode(50.0 + i, i // 2, [ORDERS[i % 2]]) for i in range(10)]
+    label_modes(modes)
+    best = np.inf
+    for _ in range(20):
+        start = time.perf_counter()
+        label_modes(modes)
+        best = min(best, time.perf_counter() - start)
+    assert best < 2e-3

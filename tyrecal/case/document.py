@@ -1,0 +1,168 @@
+"""YAML as plain data that remembers its lines, without anything YAML could do to us."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from math import isfinite
+from pathlib import Path as FilePath
+from typing import Any
+
+from ruamel.yaml import YAML
+from ruamel.yaml.error import MarkedYAMLError, YAMLError
+from ruamel.yaml.events import AliasEvent, CollectionEndEvent, CollectionStartEvent, NodeEvent
+from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
+
+from .mistakes import Mistake, Path, dotted, shortened
+from .numbers import WRONG
+
+MOST_BYTES = 1_000_000
+DEEPEST = 20
+
+
+@dataclass
+class Document:
+    """A YAML file: plain data, the line and text of every path in it, and its mistakes.
+
+    Values that are wrong as YAML are WRONG in ``data``; None when there is no data at all.
+    """
+
+    file: str
+    data: dict[str, Any] | None = None
+    places: dict[Path, tuple[int, str]] = field(default_factory=dict)
+    mistakes: list[Mistake] = field(default_factory=list)
+
+    def add(self, path: Path, message: str) -> None:
+        """Record a mistake at ``path``, or at the nearest line above it when it is missing."""
+        known = path
+        while known and known not in self.places:
+            known = known[:-1]
+        line, text = self.places.get(known, (1, ""))
+        value = text if known == path else "missing"
+        self.mistakes.append(Mistake(self.file, line, dotted(path), value, message))
+
+    def refuse(self, line: int, message: str) -> None:
+        """Record that the file as a whole is wrong."""
+        self.mistakes.append(Mistake(self.file, line, "", "", message))
+
+
+def read_document(path: FilePath) -> Document:
+    """Read a YAML file that holds a mapping; whatever is wrong stands in its mistakes."""
+    document = Document(str(path))
+    text = _text(path, document)
+    if text is None:
+        return document
+    yaml = YAML(typ="safe", pure=True)
+    try:
+        if _harmless(yaml, text, document):
+            root = yaml.compose(text)
+            if isinstance(root, MappingNode):
+                document.data = _Reader(document, yaml.constructor).mapping(root, ())
+            else:
+                document.refuse(1, "the file must hold keys and values, as in 'format: 1'")
+    except MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        document.refuse(mark.line + 1 if mark else 1, f"not YAML: {_sentence(error)}")
+    except YAMLError as error:
+        line = text.count("\n", 0, getattr(error, "position", 0)) + 1
+        document.refuse(line, f"not YAML: {shortened(str(error), 100)}")
+    return document
+
+
+def _text(path: FilePath, document: Document) -> str | None:
+    try:
+        if path.is_dir():
+            document.refuse(1, "is a directory, must be a case file")
+            return None
+        if path.exists() and not path.is_file():
+            document.refuse(1, "is not a regular file")
+            return None
+        with path.open("rb") as file:
+            content = file.read(MOST_BYTES + 1)
+    except FileNotFoundError:
+        document.refuse(1, "there is no such file")
+    except (OSError, ValueError) as error:
+        document.refuse(1, f"cannot be read: {getattr(error, 'strerror', None) or error}")
+    else:
+        if len(content) > MOST_BYTES:
+            document.refuse(1, f"the file is larger than {MOST_BYTES} bytes")
+        elif not content.strip():
+            document.refuse(1, "the file is empty")
+        else:
+            try:
+                return content.decode("utf-8-sig")
+            except UnicodeDecodeError as error:
+                line = content.count(b"\n", 0, error.start) + 1
+                document.refuse(line, "the text must be in UTF-8")
+    return None
+
+
+def _harmless(yaml: YAML, text: str, document: Document) -> bool:
+    """No alias, tag or deep nest, judged from the events: nothing is expanded or built."""
+    depth = 0
+    for event in yaml.parse(text):
+        line = event.start_mark.line + 1
+        depth += isinstance(event, CollectionStartEvent) - isinstance(event, CollectionEndEvent)
+        if depth > DEEPEST:
+            document.refuse(line, f"keys are nested more than {DEEPEST} deep")
+            return False
+        if isinstance(event, AliasEvent):
+            document.refuse(line, f"the alias *{event.anchor} must be written out in full")
+            return False
+        if isinstance(event, NodeEvent) and getattr(event, "tag", None):
+            document.refuse(line, f"the tag {event.tag} is not allowed, only plain values are")
+            return False
+    return True
+
+
+def _sentence(error: MarkedYAMLError) -> str:
+    text = error.problem or error.context or "it cannot be read"
+    hint = "; indent with spaces, not tabs" if "\\t" in text or "'\t'" in text else ""
+    return shortened(text, 150) + hint
+
+
+@dataclass
+class _Reader:
+    """Turns YAML nodes into plain data, noting lines."""
+
+    document: Document
+    constructor: Any
+
+    def value(self, node: Node, path: Path) -> Any:
+        if isinstance(node, MappingNode):
+            return self.mapping(node, path)
+        if isinstance(node, SequenceNode):
+            return [self.item(v, (*path, i), v.start_mark.line) for i, v in enumerate(node.value)]
+        return self.scalar(node, path)
+
+    def item(self, node: Node, path: Path, line: int) -> Any:
+        text = {MappingNode: "a table", SequenceNode: "a list"}.get(type(node))
+        text = text or ("null" if node.value == "" and not node.style else str(node.value))
+        self.document.places[path] = line + 1, shortened(text) or "''"
+        return self.value(node, path)
+
+    def mapping(self, node: MappingNode, path: Path) -> dict[str, Any]:
+        data: dict[str, Any] = {}
+        for name, content in node.value:
+            line = name.start_mark.line
+            key = name.value if isinstance(name, ScalarNode) else "?"
+            if not isinstance(name, ScalarNode) or not name.tag.endswith(":str"):
+                self.document.refuse(line + 1, f"the key {shortened(key)} must be a plain word")
+            elif key in data:
+                first = self.document.places[(*path, key)][0]
+                where = dotted((*path, key))
+                self.document.refuse(line + 1, f"{where} is given twice, first on line {first}")
+            else:
+                data[key] = self.item(content, (*path, key), line)
+        return data
+
+    def scalar(self, node: ScalarNode, path: Path) -> Any:
+        if node.tag.rpartition(":")[2] not in ("int", "float", "bool", "null"):
+            return node.value
+        try:
+            value = self.constructor.construct_object(node, deep=True)
+        except (ValueError, OverflowError):
+            value = float("inf")
+        if isinstance(value, int | float) and not isfinite(value):
+            self.document.add(path, "must be a finite number")
+            return WRONG
+        return value

@@ -1,0 +1,222 @@
+"""The case file as typed data; attributes are named as the file's keys, units as in the names."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Any, Literal
+
+from pydantic import Field
+
+from .numbers import Degrees, Name, NotNegative, Part, Positive, Problem, Text, WRONG, number
+
+Moduli = Literal["long_term", "instantaneous"]
+Element = Literal[
+    "CGAX4", "CGAX4R", "CGAX4H", "CGAX4RH", "CGAX8", "CGAX8R", "CGAX8H", "CGAX8RH"
+]  # fmt: skip
+
+
+class SectionSource(Part):
+    """``stations``: the station table (CSV), relative to the case file."""
+
+    stations: Text
+
+
+class Level(Part):
+    """A mesh: elements per region of the half section, rows per gap between two lines.
+
+    ``grading``: thickness of a row over that of the row inside it, per gap.
+    """
+
+    elements: dict[Name, Annotated[int, Field(ge=1, le=200)]]
+    rows: list[Annotated[int, Field(ge=1, le=20)]]
+    grading: list[Annotated[float, Field(ge=0.1, le=10)]] | None = None
+
+
+class Mesh(Part):
+    """Element type and the mesh levels by name; ``level`` is the one in use."""
+
+    element: Element
+    level: str
+    levels: Annotated[dict[Name, Level], Field(min_length=1)]
+    hourglass_stiffness_Pa: Positive | None = None
+
+
+class Prony(Part):
+    """A term of the Prony series: shares of the shear and bulk modulus, relaxation time."""
+
+    g: Annotated[float, Field(ge=0, lt=1)]
+    k: Annotated[float, Field(ge=0, lt=1)]
+    tau_s: Positive
+
+
+class Rubber(Part):
+    """Mooney-Rivlin: C10 (I1 - 3) + C01 (I2 - 3) + (J - 1)^2 / D1, with a Prony series.
+
+    ``moduli`` says whether the constants are those of relaxed or of instantaneous rubber.
+    """
+
+    kind: Literal["rubber"]
+    C10_Pa: float
+    C01_Pa: float
+    D1_per_Pa: Positive
+    moduli: Moduli = "long_term"
+    prony: list[Prony] = []
+    density_kg_per_m3: Positive
+
+    @classmethod
+    def problems(cls, values: Mapping[str, Any]) -> Iterator[Problem]:
+        c10, c01 = number(values, "C10_Pa"), number(values, "C01_Pa")
+        if c10 is not None and c01 is not None and not c10 + c01 > 0:
+            yield "C10_Pa", f"C10_Pa + C01_Pa must be greater than 0, their sum is {c10 + c01:g}"
+        for share in "gk":
+            terms = values.get("prony", [])
+            total = sum(number(dict(term), share) or 0 for term in terms if term is not WRONG)
+            if total >= 1:
+                yield "prony", f"the sum of all {share} must be less than 1, got {total:g}"
+
+
+class Cord(Part):
+    """A linear elastic cord."""
+
+    kind: Literal["cord"]
+    youngs_modulus_Pa: Positive
+    poissons_ratio: Annotated[float, Field(ge=0, lt=0.5)]
+    density_kg_per_m3: Positive
+
+
+class Solid(Part):
+    """A material in the whole section, or only in ``regions`` and/or ``between`` two lines."""
+
+    material: str
+    regions: Annotated[list[str], Field(min_length=1)] | None = None
+    between: Annotated[list[str], Field(min_length=2, max_length=2)] | None = None
+
+
+class RebarLayer(Part):
+    """Cords on a line of the section; ``angle_deg`` from the meridian, ``area_m2`` of one cord.
+
+    Cords stand ``spacing_m`` apart or, with ``geometry: angular``, ``spacing_deg`` apart.
+    """
+
+    line: str
+    material: str
+    area_m2: Positive
+    geometry: Literal["constant", "angular"] = "constant"
+    spacing_m: Positive | None = None
+    spacing_deg: Annotated[float, Field(gt=0, le=360)] | None = None
+    angle_deg: Degrees
+
+    @classmethod
+    def problems(cls, values: Mapping[str, Any]) -> Iterator[Problem]:
+        geometry = values.get("geometry", "constant")
+        pair = {"constant": ("spacing_m", "spacing_deg"), "angular": ("spacing_deg", "spacing_m")}
+        if geometry in pair:
+            needed, other = pair[geometry]
+            if values.get(other) is not None:
+                yield other, f"must be absent with geometry: {geometry}, which takes {needed}"
+            if values.get(needed) is None:
+                yield needed, f"must be given with geometry: {geometry}"
+
+
+class Point(Part):
+    """A point of the section's plane, m."""
+
+    r: float
+    z: float
+
+
+class Rim(Part):
+    """The rigid rim; its reference point is the wheel's centre."""
+
+    reference_point_m: Point
+
+
+class Analysis(Part):
+    """What is computed: the inflation, then modes up to ``highest_harmonic``."""
+
+    static_moduli: Moduli = "long_term"
+    static_increments: Annotated[int, Field(ge=1, le=1000)] = 10
+    vibration_frequency_Hz: Positive | None = None
+    sectors: Annotated[int, Field(ge=8, le=1000)] = 60
+    highest_harmonic: Annotated[int, Field(ge=0, le=20)] = 4
+    modes_per_harmonic: Annotated[int, Field(ge=1, le=10)] = 2
+
+
+class Variable(Part):
+    """A design variable: the numbers it sets (dotted paths), its start and its bounds."""
+
+    sets: Annotated[list[str], Field(min_length=1)]
+    start: float
+    lower: float
+    upper: float
+    scale: Literal["log", "linear"] = "log"
+
+    @classmethod
+    def problems(cls, values: Mapping[str, Any]) -> Iterator[Problem]:
+        start, lower, upper = (number(values, key) for key in ("start", "lower", "upper"))
+        if lower is not None and upper is not None and not lower < upper:
+            yield "upper", f"must be greater than lower, {lower:g}"
+        elif start is not None and lower is not None and start < lower:
+            yield "start", f"must be at least lower, {lower:g}"
+        elif start is not None and upper is not None and start > upper:
+            yield "start", f"must be at most upper, {upper:g}"
+        if lower is not None and lower <= 0 and values.get("scale", "log") == "log":
+            yield "lower", "must be greater than 0, or the variable needs scale: linear"
+
+
+class TargetMode(Part):
+    """A measured mode [c, m]; ``kind`` tells the two [0, 0] apart; ``sigma_Hz`` if known."""
+
+    c: Annotated[int, Field(ge=0, le=20)]
+    m: Annotated[int, Field(ge=0, le=10)]
+    kind: Literal["axial", "torsional"] | None = None
+    frequency_Hz: Positive
+    weight: NotNegative = 1.0
+    sigma_Hz: Positive | None = None
+
+    @classmethod
+    def problems(cls, values: Mapping[str, Any]) -> Iterator[Problem]:
+        c, m, kind = number(values, "c"), number(values, "m"), values.get("kind")
+        if c is None or m is None:
+            return
+        if c == m == 0 and kind is None:
+            yield "kind", "must be axial or torsional for the mode [0,0]"
+        if (c or m) and kind is not None:
+            yield "kind", f"must be absent: only [0,0] has a kind, this mode is [{c},{m}]"
+
+
+class Targets(Part):
+    """The measured modes, and where they come from."""
+
+    source: Text = ""
+    modes: list[TargetMode] = []
+
+
+class Solver(Part):
+    """Which solver runs, how long one run may take, and the solver's own options."""
+
+    name: Name
+    time_limit_s: Positive
+    options: dict[str, Any] = {}
+
+
+class Case(Part):
+    """One tyre, its mesh and analysis, what may vary and what was measured."""
+
+    format: Literal[1]
+    name: Text
+    size: Text
+    pressure_kPa: Annotated[float, Field(ge=0, lt=2000)]
+    section: SectionSource
+    mesh: Mesh
+    materials: Annotated[
+        dict[Name, Annotated[Rubber | Cord, Field(discriminator="kind")]], Field(min_length=1)
+    ]
+    solids: Annotated[list[Solid], Field(min_length=1)]
+    rebar_layers: dict[Name, RebarLayer] = {}
+    rim: Rim
+    analysis: Analysis
+    variables: dict[Name, Variable] = {}
+    targets: Targets = Targets()
+    solver: Solver
+    templates: Text | None = None

@@ -1,0 +1,154 @@
+"""tyrecal fit"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import click
+
+from . import options
+
+
+@click.command()
+@options.every(options.case_argument, options.assignments, options.pressure)
+@click.option("--method", type=click.Choice(["slsqp", "least-squares"]), default="slsqp",
+              show_default=True, help="Optimiser.")  # fmt: skip
+@click.option("--fix", multiple=True, metavar="NAME", help="Hold a variable at its start value.")
+@click.option("--starts", type=click.IntRange(1, 100000), default=1, metavar="N", show_default=True,
+              help="Starts: the case's own, the others drawn within the bounds.")  # fmt: skip
+@click.option("--seed", type=click.IntRange(0), default=0, metavar="S", show_default=True,
+              help="Seed of the drawn starts.")  # fmt: skip
+@click.option("--pictures/--no-pictures", default=True, help="Draw convergence, section, modes.")
+@options.every(options.jobs, options.mesh, options.solver, options.output, options.as_json,
+               options.quiet, options.verbose)  # fmt: skip
+def command(
+    case: Path,
+    assignments: tuple[str, ...],
+    pressure_kPa: float | None,
+    method: str,
+    fix: tuple[str, ...],
+    starts: int,
+    seed: int,
+    pictures: bool,
+    jobs: int,
+    mesh: str,
+    solver: str,
+    output: Path | None,
+    as_json: bool,
+    quiet: bool,
+    verbose: bool,
+) -> int:
+    """Calibrate the variables of CASE to its target frequencies.
+
+    Writes fit.json, fit.csv, fit_history.csv and pictures. --set NAME=VALUE on a variable changes
+    where the fit starts.
+
+    \b
+    tyrecal fit cases/p235_75r17.yaml
+    tyrecal fit cases/p235_75r17.yaml --fix C10 --method least-squares
+    tyrecal fit cases/p235_75r17.yaml --starts 20 --seed 1 --jobs 2
+    """
+    from ..evaluate.door import Door
+    from ..fit.calibrate import calibrate, write_history
+    from ..report.table import fit_csv, fit_table
+    from .output import Run, print_json, say, show
+
+    loaded, values = options.load(case, mesh, assignments, pressure_kPa)
+    unknown = [name for name in fix if name not in values]
+    if unknown:
+        raise click.UsageError(f"--fix {unknown[0]}: no such variable, only {', '.join(values)}")
+    loaded = _starting_at(loaded, values)
+    door = Door(loaded, solver)
+    adapter = door.solver
+    run = Run(case, output, "fit", adapter)
+    door.folder, door.keep = run.folder / "runs", verbose
+    with _Progress(quiet, verbose) as progress:
+        fit = calibrate(loaded, door, method, {name: values[name] for name in fix}, starts, seed,
+                        jobs, progress.notify)  # fmt: skip
+    run.write_json("fit.json", fit.result)
+    run.write_text("fit.csv", fit_csv(fit.result))
+    write_history(run.folder / "fit_history.csv", fit.history)
+    if pictures:
+        from ..report.pictures import draw_fit
+
+        draw_fit(run.folder, loaded, fit)
+    run.finish()
+    if as_json:
+        print_json(fit.result)
+    else:
+        show(fit_table(fit.result), as_json, quiet)
+    for warning in _warnings(fit.result):
+        click.secho(warning, fg="yellow", err=True)
+    say(f"results in {run.folder}", as_json, quiet)
+    return 0 if fit.result["converged"] and fit.result["moved"] else 4
+
+
+def _starting_at(loaded: Any, values: Mapping[str, float]) -> Any:
+    """The case with its variables' start values replaced."""
+    from dataclasses import replace
+
+    variables = {
+        name: variable.model_copy(update={"start": values[name]})
+        for name, variable in loaded.case.variables.items()
+    }
+    for name, variable in variables.items():
+        if not variable.lower <= variable.start <= variable.upper:
+            raise click.UsageError(
+                f"--set {name}={variable.start:g}: a fit must start within the bounds"
+                f" {variable.lower:g} to {variable.upper:g}"
+            )
+    return replace(loaded, case=loaded.case.model_copy(update={"variables": variables}))
+
+
+def _warnings(result: Mapping[str, Any]) -> list[str]:
+    """What the user must not overlook."""
+    warnings = []
+    if not result["moved"]:
+        warnings.append("THE FIT DID NOT MOVE: every variable ended where it started")
+    if not result["converged"]:
+        warnings.append(
+            f"not converged: {result['message']}; projected gradient"
+            f" {result['projected_gradient_norm']:.3g} Hz"
+        )
+    for name, variable in result["variables"].items():
+        if variable["at_bound"]:
+            warnings.append(f"{name} ended at a bound: the data want it beyond")
+    if result["failed_evaluations"]:
+        warnings.append(f"{result['failed_evaluations']} designs could not be evaluated; the search"
+                        " stepped back from them")  # fmt: skip
+    values = result["singular_values"]
+    if values and values[-1] < 1e-3 * values[0]:
+        warnings.append("the data do not determine all variables: see singular_values in fit.json")
+    return warnings
+
+
+class _Progress:
+    """A line that follows the fit on a terminal; silent elsewhere unless verbose."""
+
+    def __init__(self, quiet: bool, verbose: bool):
+        import sys
+
+        self.live = sys.stderr.isatty() and not quiet
+        self.verbose = verbose and not quiet
+        self.best = float("inf")
+
+    def __enter__(self) -> _Progress:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self.live:
+            click.echo("\r\033[K", nl=False, err=True)
+
+    def notify(self, number: int, values: Mapping[str, float], outcome: Any) -> None:
+        """One more design point."""
+        objective = getattr(outcome, "objective", None)
+        self.best = min(self.best, objective or float("inf"))
+        state = f"{objective:.4f} Hz" if objective is not None else f"failed: {outcome}"
+        if self.verbose:
+            numbers = "  ".join(f"{k}={v:.5g}" for k, v in values.items())
+            click.echo(f"point {number}: {state}  {numbers}", err=True)
+        elif self.live:
+            text = f"\r\033[Kdesign {number}: {state:.60}, best {self.best:.4f} Hz"
+            click.echo(text, nl=False, err=True)

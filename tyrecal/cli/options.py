@@ -1,0 +1,74 @@
+"""Options that the commands share."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import click
+
+case_argument = click.argument("case", type=click.Path(path_type=Path))
+solver = click.option("--solver", default="", metavar="NAME", help="Solver (default: the case's).")
+output = click.option("--output", type=click.Path(path_type=Path), metavar="DIR",
+                      help="Folder for the results (default: ./NAME-of-case).")  # fmt: skip
+mesh = click.option("--mesh", default="", metavar="LEVEL",
+                    help="Mesh level of the case, e.g. refined (default: the case's).")  # fmt: skip
+as_json = click.option("--json", "as_json", is_flag=True,
+                       help="Result as JSON on standard output, all else on standard error.")  # fmt: skip
+quiet = click.option("--quiet", is_flag=True, help="Print nothing but errors.")
+verbose = click.option("--verbose", is_flag=True, help="Say more; keep the run folders.")
+jobs = click.option("--jobs", type=click.IntRange(1, 256), default=1, metavar="N", show_default=True,
+                    help="Designs evaluated at a time.")  # fmt: skip
+assignments = click.option("--set", "assignments", multiple=True, metavar="NAME=VALUE",
+                           help="Set a variable or any number of the case; repeatable.")  # fmt: skip
+pressure = click.option("--pressure-kPa", "pressure_kPa", type=float, metavar="P",
+                        help="Inflation pressure (default: the case's).")  # fmt: skip
+
+
+def every(*options: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    """Apply several options in the order given."""
+
+    def apply(function: Any) -> Any:
+        for option in reversed(options):
+            function = option(function)
+        return function
+
+    return apply
+
+
+def load(path: Path, mesh_level: str, assigned: tuple[str, ...], pressure_kPa: float | None) -> Any:
+    """The case with its start values, mesh level, assignments and pressure applied.
+
+    Returns (case, values of the variables). Raises CaseError, click.UsageError.
+    """
+    from ..case import load_case, parse_assignment, start_values, with_values
+    from ..case.load import CaseError
+
+    case = load_case(path)
+    if mesh_level:
+        case = _with_level(case, mesh_level)
+    try:
+        given = dict(parse_assignment(text) for text in assigned)
+        if pressure_kPa is not None:
+            given["pressure_kPa"] = pressure_kPa
+        names = set(case.case.variables)
+        case = with_values(case, {k: v for k, v in given.items() if k not in names})
+        values = {**start_values(case), **{k: v for k, v in given.items() if k in names}}
+        return with_values(case, values), values
+    except CaseError:
+        raise
+    except ValueError as error:
+        raise click.UsageError(str(error)) from None
+
+
+def _with_level(case: Any, level: str) -> Any:
+    from dataclasses import replace
+
+    mesh = case.case.mesh
+    if level not in mesh.levels:
+        raise click.UsageError(
+            f"mesh level '{level}' is not one of the case's: {', '.join(mesh.levels)}"
+        )
+    chosen = case.case.model_copy(update={"mesh": mesh.model_copy(update={"level": level})})
+    return replace(case, case=chosen)

@@ -1,0 +1,137 @@
+"""The tyre as plain data for deck templates: numbers, names and element tables, nothing else."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any
+
+from ..case import LoadedCase
+from ..tyre.mesh import SectionMesh, build_mesh
+from ..tyre.section import Section
+
+REFERENCE_NODE = 900001
+
+
+def section_mesh(case: LoadedCase) -> SectionMesh:
+    """The mesh of a case's section at its chosen level (remembered while the case keeps it)."""
+    mesh, level = case.case.mesh, case.case.mesh.levels[case.case.mesh.level]
+    elements = tuple(level.elements[name] for name, _ in case.section.regions)
+    grading = tuple(level.grading) if level.grading else None
+    return _mesh(case.section, elements, tuple(level.rows), mesh.element == "CGAX8R", grading)
+
+
+@lru_cache(maxsize=8)
+def _mesh(
+    section: Section,
+    elements: tuple[int, ...],
+    rows: tuple[int, ...],
+    quadratic: bool,
+    grading: tuple[float, ...] | None,
+) -> SectionMesh:
+    return build_mesh(section, list(elements), list(rows), quadratic, list(grading or ()) or None)
+
+
+def context(case: LoadedCase) -> dict[str, Any]:
+    """Names for the templates; the guide to own templates lists them."""
+    c = case.case
+    mesh = section_mesh(case)
+    materials = [
+        {"name": _name(name), **_material(material)} for name, material in c.materials.items()
+    ]
+    layers: dict[str, dict[str, Any]] = {}
+    for name, layer in c.rebar_layers.items():
+        angular = layer.geometry == "angular"
+        group = layers.setdefault(
+            f"{layer.line}|{angular}",
+            {"set": _name(layer.line), "angular": angular, "cords": []},
+        )
+        group["cords"].append({
+            "name": _name(name), "area": layer.area_m2,
+            "spacing": layer.spacing_deg if angular else layer.spacing_m,
+            "material": _name(layer.material), "angle": layer.angle_deg,
+        })  # fmt: skip
+    rows = tuple(c.mesh.levels[c.mesh.level].rows)
+    claims = tuple((tuple(s.regions or ()), tuple(s.between or ())) for s in c.solids)
+    lines = frozenset(layer.line for layer in c.rebar_layers.values())
+    point = c.rim.reference_point_m
+    tables = _tables(mesh, case.section.names, rows, claims, lines, (point.r, point.z))
+    hourglass = None if mesh.quadratic else {"stiffness": c.mesh.hourglass_stiffness_Pa}
+    return {
+        "name": c.name,
+        "mesh": tables,
+        "solids": [
+            {"set": block["name"], "material": _name(c.solids[block["entry"]].material)}
+            for block in tables["solids"]
+        ],
+        "layers": list(layers.values()),
+        "materials": materials,
+        "hourglass": hourglass,
+        "pressure": c.pressure_kPa * 1e3,
+        "long_term": c.analysis.static_moduli == "long_term",
+        "increments": c.analysis.static_increments,
+        "vibration_frequency": c.analysis.vibration_frequency_Hz,
+        "sectors": c.analysis.sectors,
+        "modes": 2 * c.analysis.modes_per_harmonic * (c.analysis.highest_harmonic + 1),
+    }
+
+
+def _name(text: str) -> str:
+    return text.upper().replace("-", "_").replace(" ", "_")
+
+
+def _material(material: Any) -> dict[str, Any]:
+    if material.kind == "cord":
+        return {"kind": "cord", "youngs_modulus": material.youngs_modulus_Pa,
+                "poissons_ratio": material.poissons_ratio,
+                "density": material.density_kg_per_m3}  # fmt: skip
+    return {
+        "kind": "rubber", "C10": material.C10_Pa, "C01": material.C01_Pa, "D1": material.D1_per_Pa,
+        "moduli": material.moduli.upper().replace("_", " "),
+        "prony": [{"g": t.g, "k": t.k, "tau": t.tau_s} for t in material.prony],
+        "density": material.density_kg_per_m3,
+    }  # fmt: skip
+
+
+Claims = tuple[tuple[tuple[str, ...], tuple[str, ...]], ...]
+
+
+@lru_cache(maxsize=8)
+def _tables(
+    mesh: SectionMesh,
+    lines: tuple[str, ...],
+    rows: tuple[int, ...],
+    claims: Claims,
+    used_lines: frozenset[str],
+    reference: tuple[float, float],
+) -> dict[str, Any]:
+    """Node and element tables; elements go to the last entry of ``solids`` that claims them."""
+    edges = [sum(rows[:k]) for k in range(len(rows) + 1)]
+    blocks: dict[int, list[tuple[int, ...]]] = {}
+    regions: dict[str, list[int]] = {}
+    for number, (region, row) in mesh.cells.items():
+        regions.setdefault(region, []).append(number)
+        for i, (wanted, between) in reversed(list(enumerate(claims))):
+            low, high = sorted(edges[lines.index(n)] for n in between) if between else (0, edges[-1])
+            if low <= row < high and (not wanted or region in wanted):
+                blocks.setdefault(i, []).append((number, *mesh.solids[number]))
+                break
+    return {
+        "nodes": [(n, r, z) for n, (r, z) in mesh.nodes.items()],
+        "solid_type": "CGAX8R" if mesh.quadratic else "CGAX4R",
+        "cord_type": "SFMGAX2" if mesh.quadratic else "SFMGAX1",
+        "solids": [
+            {"name": f"SOLID_{i + 1}", "entry": i, "elements": b} for i, b in sorted(blocks.items())
+        ],
+        "lines": [
+            {"name": _name(line), "elements": [(n, *nodes) for n, nodes in elements.items()]}
+            for line, elements in mesh.cords.items()
+            if line in used_lines
+        ],
+        "regions": [{"name": f"REGION_{_name(k)}", "members": v} for k, v in regions.items()],
+        "inner": mesh.inner,
+        "rim": mesh.rim,
+        "crown": mesh.crown_outer,
+        "reference_node": REFERENCE_NODE,
+        "reference_r": reference[0],
+        "reference_z": reference[1],
+    }

@@ -1,0 +1,24 @@
+"""Typed failures of an evaluation. None of them ever becomes a number."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+
+class EvaluationFailed(Exception):
+    """The solver could not evaluate a design.
+
+    cause: ``no_equilibrium``, ``unstable``, ``timed_out``, ``crashed`` or ``lost_label``;
+    words: the solver's own last words; folder: where the run is kept, or None.
+    """
+
+    def __init__(self, cause: str, words: str, folder: Path | None = None):
+        super().__init__(words + (f" (run kept in {folder})" if folder else ""))
+        self.cause, self.words, self.folder = cause, words, folder
+
+    def __reduce__(self) -> tuple[type[EvaluationFailed], tuple[str, str, Path | None]]:
+        return type(self), (self.cause, self.words, self.folder)
+
+
+class DeckRefused(ValueError):
+    """The solver refuses the deck: the case, or the user's template, asks for what it lacks."""

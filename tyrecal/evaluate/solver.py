@@ -1,0 +1,47 @@
+"""Solver adapters: the contract, and the registry filled by entry points."""
+
+from __future__ import annotations
+
+from importlib.metadata import entry_points
+from pathlib import Path
+from typing import Any, Protocol
+
+GROUP = "tyrecal.solvers"
+
+
+class Solver(Protocol):
+    """What a solver brings: one class, registered under the entry point group above.
+
+    dialect: the template folder of its decks; capabilities: of ``modes``, ``gradients``;
+    refusals, failures: exceptions of `run` for a deck it cannot honour and for no solution.
+    """
+
+    name: str
+    version: str
+    dialect: str
+    capabilities: frozenset[str]
+    refusals: tuple[type[Exception], ...]
+    failures: tuple[type[Exception], ...]
+
+    def write(self, decks: Any, folder: Path) -> list[Path]:
+        """Write all input files of `tyrecal.deck.Decks` into an empty folder."""
+
+    def run(self, folder: Path, time_limit_s: float) -> None:
+        """Run to the end or raise."""
+
+    def read(self, folder: Path) -> dict[str, Any]:
+        """pressure_Pa, mass_kg, modes [{frequency_Hz, multiplicity, n, amplitude}], gradients
+        {variable: [Hz per unit]}, nodes, points, displacement."""
+
+
+class UnknownSolver(ValueError):
+    """No solver of that name is installed."""
+
+
+def find_solver(name: str) -> Solver:
+    """The installed solver of that name. Raises UnknownSolver."""
+    found = {entry.name: entry for entry in entry_points(group=GROUP)}
+    if name not in found:
+        raise UnknownSolver(f"solver '{name}' is not installed, only {', '.join(sorted(found))}")
+    solver: Solver = found[name].load()()
+    return solver

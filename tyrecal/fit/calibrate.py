@@ -1,0 +1,263 @@
+"""The calibration of a case, from one start or many, and its result."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable, Mapping
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, field
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..case import LoadedCase
+from ..evaluate.door import Door
+from ..evaluate.failure import EvaluationFailed
+from . import least_squares, slsqp
+from .problem import Point, Problem
+from .uncertainty import uncertainty
+
+Array = np.ndarray
+METHODS: dict[str, Callable[[Problem, Array, float], slsqp.Outcome]] = {
+    "slsqp": slsqp.minimise,
+    "least-squares": least_squares.minimise,
+}
+TOLERANCE = 1e-3  # projected gradient, Hz per unit of a logarithm: 1e-5 Hz for a change of 1 %
+UNMOVED = 1e-6  # largest change of a scaled variable below which the fit did not move
+MOST_REPLACED = 20  # replaced starts per start asked for
+
+Notify = Callable[[int, Mapping[str, float], Point | EvaluationFailed], None]
+
+
+class NothingToFit(ValueError):
+    """The case has no targets, or no variable is left free."""
+
+
+@dataclass
+class StartReport:
+    """One start of a fit: where it began and ended. ``message``: the optimiser's own words."""
+
+    initial: dict[str, float]
+    point: Point
+    message: str
+    converged: bool
+    history: list[dict[str, Any]]
+
+
+@dataclass
+class Fit:
+    """A finished fit. ``result``: the content of fit.json; history: design points in order."""
+
+    result: dict[str, Any]
+    history: list[dict[str, Any]]
+    initial: Point
+    fitted: Point
+    messages: list[str] = field(default_factory=list)
+
+    @property
+    def moved(self) -> bool:
+        """Whether any variable changed."""
+        return bool(self.result["moved"])
+
+
+def calibrate(
+    case: LoadedCase,
+    door: Door,
+    method: str = "slsqp",
+    fixed: Mapping[str, float] | None = None,
+    starts: int = 1,
+    seed: int = 0,
+    jobs: int = 1,
+    notify: Notify | None = None,
+) -> Fit:
+    """Fit the case's free variables to its targets.
+
+    starts: the case's own start and ``starts - 1`` drawn uniformly in the scaled box; drawn
+    starts that cannot be evaluated are counted and replaced.
+    Raises NothingToFit; EvaluationFailed when the case's own start cannot be evaluated.
+    """
+    problem = Problem(case, door, fixed, notify)
+    if not problem.targets:
+        raise NothingToFit("the case has no targets: there is nothing to fit to")
+    if not problem.variables:
+        raise NothingToFit("no variable is free: there is nothing to fit")
+    initial = problem.evaluate(problem.start())
+    reports = [_run(problem, problem.start(), method)]
+    replaced = 0
+    if starts > 1:
+        more, replaced = _more_starts(problem, starts - 1, seed, jobs, method)
+        reports += more
+    best = min(reports, key=lambda r: r.point.objective)
+    history = _joined([r.history for r in reports])
+    return Fit(_result(problem, initial, best, reports, history, replaced, method), history,
+               initial, best.point)  # fmt: skip
+
+
+def _run(problem: Problem, start: Array, method: str) -> StartReport:
+    known = len(problem.points)
+    first = problem.evaluate(start)
+    outcome = METHODS[method](problem, start, TOLERANCE)
+    norm = slsqp.projected_gradient(problem, outcome.point)
+    history = _history(problem)
+    return StartReport(dict(first.values), outcome.point, outcome.message, norm <= 10 * TOLERANCE,
+                       history if known <= 1 else history[known:])  # fmt: skip
+
+
+def _more_starts(
+    problem: Problem, count: int, seed: int, jobs: int, method: str
+) -> tuple[list[StartReport], int]:
+    generator = np.random.default_rng(seed)
+    reports: list[StartReport] = []
+    replaced = 0
+    with _workers(jobs) as run_all:
+        while len(reports) < count:
+            drawn = [generator.uniform(problem.lower, problem.upper)
+                     for _ in range(count - len(reports))]  # fmt: skip
+            for answer in run_all(problem, drawn, method):
+                if isinstance(answer, EvaluationFailed):
+                    replaced += 1
+                else:
+                    reports.append(answer)
+            if replaced > MOST_REPLACED * count:
+                raise EvaluationFailed("no_equilibrium", f"{replaced} drawn starts could not be"
+                                       " evaluated: the bounds hold too few tyres")  # fmt: skip
+    return reports, replaced
+
+
+class _workers:
+    """Runs starts one after the other, or in a process pool; answers come in order."""
+
+    def __init__(self, jobs: int):
+        self.pool = ProcessPoolExecutor(jobs, get_context("forkserver")) if jobs > 1 else None
+
+    def __enter__(self) -> Callable[[Problem, list[Array], str], Any]:
+        return self._run_all
+
+    def __exit__(self, *_: object) -> None:
+        if self.pool:
+            self.pool.shutdown(cancel_futures=True)
+
+    def _run_all(self, problem: Problem, starts: list[Array], method: str) -> Any:
+        tasks = [(problem.case, problem.door.solver_name, problem.door.folder, problem.fixed, x,
+                  method) for x in starts]  # fmt: skip
+        if self.pool:
+            return self.pool.map(_start_alone, tasks)
+        return (_start_here(problem, x, method) for x in starts)
+
+
+def _start_here(problem: Problem, start: Array, method: str) -> StartReport | EvaluationFailed:
+    alone = Problem(problem.case, problem.door, problem.fixed, problem.notify)
+    try:
+        return _run(alone, start, method)
+    except EvaluationFailed as failure:
+        return failure
+
+
+def _start_alone(task: tuple) -> StartReport | EvaluationFailed:
+    case, solver_name, folder, fixed, start, method = task
+    return _start_here(Problem(case, Door(case, solver_name, folder), fixed), start, method)
+
+
+def _history(problem: Problem) -> list[dict[str, Any]]:
+    names = list(problem.fixed) + [v.name for v in problem.variables]
+    return [
+        {"objective_Hz": p.objective if isinstance(p, Point) else None,
+         "failure": None if isinstance(p, Point) else p.words,
+         "values": dict(zip(names, key, strict=True))}
+        for key, p in problem.points.items()
+    ]  # fmt: skip
+
+
+def _joined(histories: list[list[dict[str, Any]]]) -> list[dict[str, Any]]:
+    rows: list[dict[str, Any]] = []
+    for start, history in enumerate(histories, start=1):
+        for row in history:
+            rows.append({"point": len(rows) + 1, "start": start, **row})
+    return rows
+
+
+def _result(
+    problem: Problem,
+    initial: Point,
+    best: StartReport,
+    reports: list[StartReport],
+    history: list[dict[str, Any]],
+    replaced: int,
+    method: str,
+) -> dict[str, Any]:
+    point = best.point
+    moved = float(abs(point.x - initial.x).max()) > UNMOVED
+    objectives = [row["objective_Hz"] for row in history]
+    near = next(i for i, f in enumerate(objectives, start=1)
+                if f is not None and f < point.objective + 0.05)  # fmt: skip
+    known = uncertainty(problem, point)
+    names = [v.name for v in problem.variables]
+    variables = {}
+    for i, v in enumerate(problem.variables):
+        value = point.values[v.name]
+        at_bound = bool(min(point.x[i] - problem.lower[i], problem.upper[i] - point.x[i]) < 1e-6)
+        variables[v.name] = {
+            "initial": initial.values[v.name], "value": value, "lower": v.lower, "upper": v.upper,
+            "standard_error": known.standard_errors[i], "at_bound": at_bound,
+        }  # fmt: skip
+    modes = []
+    for target in problem.targets:
+        mode = point.modes[target.label]
+        fitted = mode.frequency_Hz
+        modes.append({
+            "c": target.label.c, "m": target.label.m, "kind": target.label.kind,
+            "frequency_Hz": fitted, "multiplicity": mode.multiplicity,
+            "initial_Hz": initial.modes[target.label].frequency_Hz, "fitted_Hz": fitted,
+            "target_Hz": target.frequency_Hz,
+            "deviation_percent": 100 * (fitted / target.frequency_Hz - 1),
+        })  # fmt: skip
+    return {
+        "format": 1,
+        "method": method,
+        "pressure_kPa": problem.case.case.pressure_kPa,
+        "mass_kg": point.mass_kg,
+        "objective_Hz": point.objective,
+        "initial_objective_Hz": initial.objective,
+        "evaluations": len(history),
+        "evaluations_to_0.05_Hz": near,
+        "gradient_evaluations": sum(f is not None for f in objectives),
+        "failed_evaluations": sum(f is None for f in objectives),
+        "converged": best.converged,
+        "moved": moved,
+        "message": best.message,
+        "projected_gradient_norm": slsqp.projected_gradient(problem, point),
+        "label_margin": point.clarity,
+        "variables": variables,
+        "fixed": dict(problem.fixed),
+        "modes": modes,
+        "noise_Hz": known.noise_Hz,
+        "correlations": {
+            a: {b: _finite(known.correlations[i, j]) for j, b in enumerate(names)}
+            for i, a in enumerate(names)
+        },
+        "singular_values": [float(s) for s in known.singular_values],
+        "starts": [
+            {"initial": r.initial, "objective_Hz": r.point.objective, "converged": r.converged,
+             "evaluations": len(r.history), "message": r.message,
+             "values": dict(r.point.values)}
+            for r in reports
+        ],
+        "replaced_starts": replaced,
+    }  # fmt: skip
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
+
+
+def write_history(path: Path, history: list[dict[str, Any]]) -> None:
+    """All design points as CSV: point, start, variables, objective_Hz, failure."""
+    names = list(history[0]["values"])
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(["point", "start", *names, "objective_Hz", "failure"])
+        for row in history:
+            writer.writerow([row["point"], row["start"], *(row["values"][n] for n in names),
+                             row["objective_Hz"], row["failure"] or ""])  # fmt: skip

@@ -1,0 +1,209 @@
+"""The calibration problem: design variables, targets, and the paper's objective, equation (1).
+
+    F = sqrt( sum over modes, doublets twice, of w (f_num - f_ref)^2 )
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..case import LoadedCase, start_values
+from ..evaluate.door import Door, Question
+from ..evaluate.failure import EvaluationFailed
+from ..evaluate.results import Evaluation
+from ..modes.label import label_modes
+from ..modes.match import LostLabel, match
+from ..modes.mode import Label, Mode
+
+Array = np.ndarray
+MORE_MODES = (4, 8)  # per harmonic, when a label is not among the modes first asked for
+DIFFERENCE_STEP = 1e-4  # of a logarithm: best between truncation and the solver's digits
+
+
+@dataclass(frozen=True)
+class Variable:
+    """A design variable: bounds in its own unit; ``log`` scaled inside the optimiser or not."""
+
+    name: str
+    start: float
+    lower: float
+    upper: float
+    log: bool = True
+
+    def scaled(self, value: float) -> float:
+        """The optimiser's coordinate of a value."""
+        return math.log(value) if self.log else (value - self.lower) / (self.upper - self.lower)
+
+    def value(self, x: float) -> float:
+        """The value at an optimiser's coordinate, inside the bounds to the last bit."""
+        raw = math.exp(x) if self.log else self.lower + x * (self.upper - self.lower)
+        return min(max(raw, self.lower), self.upper)
+
+    def slope(self, value: float) -> float:
+        """d value / d coordinate."""
+        return value if self.log else self.upper - self.lower
+
+
+@dataclass(frozen=True)
+class Target:
+    """A measured mode: frequency and standard deviation in Hz, weight in the objective."""
+
+    label: Label
+    frequency_Hz: float
+    weight: float = 1.0
+    sigma_Hz: float | None = None
+
+    @property
+    def multiplicity(self) -> int:
+        """How many modes it stands for: doublets count twice."""
+        return 2 if self.label.c else 1
+
+
+@dataclass(frozen=True)
+class Point:
+    """One evaluated design: coordinates x, residuals sqrt(w) (f - f_ref) in Hz (a doublet's by
+    sqrt 2), their Jacobian by x, the modes that were matched, and the label's margin."""
+
+    values: Mapping[str, float]
+    x: Array
+    residuals: Array
+    jacobian: Array
+    modes: dict[Label, Mode]
+    clarity: float
+    mass_kg: float
+
+    @property
+    def objective(self) -> float:
+        """F, Hz."""
+        return float(np.linalg.norm(self.residuals))
+
+    @property
+    def gradient(self) -> Array:
+        """dF/dx, Hz."""
+        return self.jacobian.T @ self.residuals / max(self.objective, 1e-300)
+
+
+def objective(frequencies: Mapping[Label, float], targets: list[Target]) -> float:
+    """Equation (1) in Hz for frequencies by label."""
+    return math.sqrt(
+        sum(
+            t.weight * t.multiplicity * (frequencies[t.label] - t.frequency_Hz) ** 2
+            for t in targets
+        )
+    )
+
+
+class Problem:
+    """Evaluates designs for an optimiser, each distinct one once.
+
+    notify: called with (number of the point, its values, Point or failure) as they come.
+    """
+
+    def __init__(
+        self,
+        case: LoadedCase,
+        door: Door,
+        fixed: Mapping[str, float] | None = None,
+        notify: Callable[[int, Mapping[str, float], Point | EvaluationFailed], None] | None = None,
+    ):
+        self.case, self.door, self.notify = case, door, notify
+        self.fixed = dict(fixed or {})
+        starts = start_values(case)
+        self.variables = [
+            Variable(name, starts[name], v.lower, v.upper, v.scale == "log")
+            for name, v in case.case.variables.items()
+            if name not in self.fixed
+        ]
+        self.targets = read_targets(case)
+        self.lower = np.array([v.scaled(v.lower) for v in self.variables])
+        self.upper = np.array([v.scaled(v.upper) for v in self.variables])
+        self.points: dict[tuple[float, ...], Point | EvaluationFailed] = {}
+
+    def start(self) -> Array:
+        """Coordinates of the case's start values."""
+        return np.array([v.scaled(v.start) for v in self.variables])
+
+    def values(self, x: Array) -> dict[str, float]:
+        """Values of all variables, fixed ones included, at coordinates x."""
+        free = {v.name: v.value(float(xi)) for v, xi in zip(self.variables, x, strict=True)}
+        return {**self.fixed, **free}
+
+    def evaluate(self, x: Array) -> Point:
+        """The design at x with its Jacobian, from memory if it was asked for before.
+
+        Raises EvaluationFailed.
+        """
+        values = self.values(x)
+        key = tuple(values.values())
+        if key not in self.points:
+            try:
+                self.points[key] = self._evaluate(values)
+            except EvaluationFailed as failure:
+                self.points[key] = failure
+            if self.notify:
+                self.notify(len(self.points), values, self.points[key])
+        known = self.points[key]
+        if isinstance(known, EvaluationFailed):
+            raise known
+        return known
+
+    def evaluated(self) -> list[Point]:
+        """All designs that could be evaluated, in order."""
+        return [p for p in self.points.values() if isinstance(p, Point)]
+
+    def _evaluate(self, values: dict[str, float]) -> Point:
+        names = tuple(v.name for v in self.variables)
+        exact = self.door.has_gradients
+        evaluation, modes, clarity = self._modes(values, names if exact else ())
+        order = [modes[t.label] for t in self.targets]
+        weights = np.array([math.sqrt(t.weight * t.multiplicity) for t in self.targets])
+        wanted = np.array([t.frequency_Hz for t in self.targets])
+        frequencies = np.array([m.frequency_Hz for m in order])
+        if exact:
+            slopes = np.array([[evaluation.gradients[n][m.position] for n in names] for m in order])
+            slopes *= [v.slope(values[v.name]) for v in self.variables]
+        else:
+            slopes = self._differences(values, frequencies)
+        x = np.array([v.scaled(values[v.name]) for v in self.variables])
+        return Point(values, x, weights * (frequencies - wanted), weights[:, None] * slopes, modes,
+                     clarity, evaluation.mass_kg)  # fmt: skip
+
+    def _modes(
+        self, values: dict[str, float], names: tuple[str, ...]
+    ) -> tuple[Evaluation, dict[Label, Mode], float]:
+        labels = [t.label for t in self.targets]
+        for count in (None, *MORE_MODES):
+            evaluation = self.door.evaluate(Question(values, names, count))
+            try:
+                found = match(label_modes(evaluation.modes), labels)
+            except LostLabel as lost:
+                last = lost
+                continue
+            return evaluation, found, min(m.clarity for m in found.values())
+        raise EvaluationFailed("lost_label", str(last))
+
+    def _differences(self, values: dict[str, float], frequencies: Array) -> Array:
+        """d f / d x by forward differences, inward at an upper bound."""
+        columns = []
+        for i, variable in enumerate(self.variables):
+            x = variable.scaled(values[variable.name])
+            step = DIFFERENCE_STEP if x + DIFFERENCE_STEP <= self.upper[i] else -DIFFERENCE_STEP
+            moved = {**values, variable.name: variable.value(x + step)}
+            modes = self._modes(moved, ())[1]
+            shifted = np.array([modes[t.label].frequency_Hz for t in self.targets])
+            columns.append((shifted - frequencies) / step)
+        return np.array(columns).T
+
+
+def read_targets(case: LoadedCase) -> list[Target]:
+    """Targets of a case; an empty list where it has none."""
+    if case.case.targets is None:
+        return []
+    return [
+        Target(Label(t.c, t.m, t.kind), t.frequency_Hz, t.weight, t.sigma_Hz)
+        for t in case.case.targets.modes
+    ]

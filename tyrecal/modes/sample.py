@@ -1,0 +1,30 @@
+"""Harmonic shapes sampled on rings of points."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..evaluate.results import HarmonicShape, RingShape
+
+Array = np.ndarray
+
+
+def on_rings(shape: HarmonicShape, nodes: Array, angles: Array, phase: float = 0.0) -> RingShape:
+    """Re[amplitude exp(i (n Theta + phase))] on one ring of points per node.
+
+    nodes (k,): deck numbers; angles (a,): Theta in rad; phase in rad: 0 and pi/2 give the two
+    halves of a pair (on n = 0 leave it at 0, there it scales a real amplitude). Returns k * a
+    points, ring after ring.
+
+    Raises ValueError for a node that the shape does not have.
+    """
+    row = {int(node): k for k, node in enumerate(shape.nodes)}
+    unknown = [int(node) for node in nodes if int(node) not in row]
+    if unknown:
+        raise ValueError(f"the shape has no node {unknown[0]}")
+    rows = [row[int(node)] for node in nodes]
+    turn = np.exp(1j * (shape.n * np.asarray(angles, float) + phase))
+    displacement = (shape.amplitude[rows, None, :] * turn[:, None]).real
+    R, Z = np.repeat(shape.points[rows], len(turn), axis=0).T
+    points = np.column_stack([R, np.tile(angles, len(rows)), Z])
+    return RingShape(points, displacement.reshape(-1, 3))
