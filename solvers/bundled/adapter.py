@@ -65,10 +65,20 @@ class Bundled:
             displacement = arrays[f"displacement_{step['step']}"]
             shapes = arrays[f"shapes_{step['step']}"] if step["modes"] else []
         modes = [
-            {"frequency_Hz": mode["frequency_Hz"], "multiplicity": mode["multiplicity"],
-             "n": mode["n"], "amplitude": shape}
+            {
+                "frequency_Hz": mode["frequency_Hz"],
+                "multiplicity": mode["multiplicity"],
+                "n": mode["n"],
+                "amplitude": shape,
+            }
             for mode, shape in zip(step["modes"], shapes, strict=True)
-        ]  # fmt: skip
-        return {"pressure_Pa": step["pressure_Pa"], "mass_kg": step["mass_kg"], "modes": modes,
-                "gradients": step["sensitivities"], "nodes": nodes, "points": points,
-                "displacement": displacement}  # fmt: skip
+        ]
+        return {
+            "pressure_Pa": step["pressure_Pa"],
+            "mass_kg": step["mass_kg"],
+            "modes": modes,
+            "gradients": step["sensitivities"],
+            "nodes": nodes,
+            "points": points,
+            "displacement": displacement,
+        }

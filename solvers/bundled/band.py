@@ -26,10 +26,10 @@ class Numbering:
         n = len(free)
         rows = np.concatenate([np.repeat(c, c.shape[1], 1).ravel() for c in connectivities])
         cols = np.concatenate([np.tile(c, (1, c.shape[1])).ravel() for c in connectivities])
-        touching = free.any(1)
+        touching = np.asarray(free.any(1))
         keep = touching[rows] & touching[cols]
         graph = csr_array((np.ones(keep.sum(), np.int8), (rows[keep], cols[keep])), (n, n))
-        orders = np.arange(n), reverse_cuthill_mckee(graph, symmetric_mode=True)
+        orders: list[Array] = [np.arange(n), reverse_cuthill_mckee(graph, symmetric_mode=True)]
         nodes = min(orders, key=lambda order: _spread(graph, order))
         flat = (3 * nodes[:, None] + np.arange(3)).ravel()
         self.order = flat[free.ravel()[flat]]

@@ -11,7 +11,9 @@ from collections.abc import Callable
 import numpy as np
 
 Array = np.ndarray
-TOLERANCE = 1e-7  # residual of the inverse, in the norm of M, over 1 / lambda; lambda's is its square
+TOLERANCE = (
+    1e-7  # residual of the inverse, in the norm of M, over 1 / lambda; lambda's is its square
+)
 LARGEST_BASIS = 300
 
 
@@ -34,6 +36,8 @@ def lowest(
     size = start.shape[0]
     count = min(count, size)
     block, image, _ = _orthonormal(start, mass(start))
+    if not block.shape[1]:
+        raise NotConverged("there is no mass that is free to vibrate")
     basis, images = block[:, :0], image[:, :0]
     projected = np.empty((0, 0), start.dtype)
     while block.shape[1]:

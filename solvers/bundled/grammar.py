@@ -96,9 +96,7 @@ def _check_one(keyword: Keyword, allowed: dict[str, dict[str, Values]], where: s
     parameters = allowed[keyword.name]
     for name, value in keyword.parameters.items():
         if name not in parameters:
-            raise DeckError(
-                keyword.line, f"parameter {name} of *{keyword.name} is not honoured"
-            )
+            raise DeckError(keyword.line, f"parameter {name} of *{keyword.name} is not honoured")
         values = parameters[name]
         if values is not None and " ".join(value.upper().split()) not in values:
             expected = " or ".join(v or "no value" for v in values)

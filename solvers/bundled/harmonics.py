@@ -48,14 +48,26 @@ class Vibration:
         self._X = model.mesh.X.real
         self._shifted_mass = None
         if shift:
-            masses = [(c, np.einsum("eab,ij->eaibj", m.real, np.eye(3)).reshape(len(m), 3 * m.shape[1], -1))
-                      for c, m in mechanics.mass_matrices(model)]  # fmt: skip
+            masses = [
+                (
+                    c,
+                    np.einsum("eab,ij->eaibj", m.real, np.eye(3)).reshape(
+                        len(m), 3 * m.shape[1], -1
+                    ),
+                )
+                for c, m in mechanics.mass_matrices(model)
+            ]
             self._shifted_mass = numbering.assemble(masses)
 
     def factor(self, n: int) -> Cholesky:
         """Factor of K(n) - shift M. Raises Unstable."""
         K0, K1, K2 = self._bands
-        band = K0.copy(order="F") if n == 0 else np.asfortranarray(K0 + n * n * K2 + 1j * n * K1)
+        if n == 0:
+            band = K0.copy(order="F")
+        else:
+            band = np.empty(K0.shape, complex, order="F")
+            band.real = K0 + n * n * K2
+            band.imag = n * K1
         if self._shifted_mass is not None:
             band -= self.shift * self._shifted_mass
         try:
@@ -86,9 +98,13 @@ def _start_fields(X: Array, n: int) -> Array:
     Axial shift and tilt; spin for n = 0, else bending without stretching the circumference,
     u_r + i n u_theta = 0.
     """
+    tilt = X[:, 1] / np.ptp(X[:, 1])
+    lop = (
+        0.0 if n else 0.3
+    )  # lopsided, for all three are odd under z -> -z, theta -> -theta at n = 0
     fields = np.zeros((len(X), 3, 3), complex if n else float)
-    fields[:, 2, 0] = 1.0
-    fields[:, 0, 1] = X[:, 1] / np.ptp(X[:, 1])
+    fields[:, 2, 0] = 1.0 + lop * tilt
+    fields[:, 0, 1] = tilt + lop
     fields[:, 0, 2] = 1.0 if n else 0.0
-    fields[:, 1, 2] = 1j / n if n else X[:, 0] / np.ptp(X[:, 0])
+    fields[:, 1, 2] = 1j / n if n else X[:, 0] / X[:, 0].max() * (1.0 + lop * tilt)
     return fields

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,9 +14,13 @@ from .model import Model
 
 Array = np.ndarray
 TOLERANCE = 1e-9  # out-of-balance force over pressure force; the next step is at round-off
+LOOSE = 1e-6  # accepted where round-off lets the force fall no further
 SMALLEST_STEP = 1 / 256
 LONGEST = 30  # iterations
+QUICK = 11  # iterations after which another path is likely to be shorter
+FIRM = 8.0  # multiple of the rubber's stiffness that inflates without trouble
 SECTION_RADIUS = 0.3  # meridional radius of curvature over the section's height, for the start
+SLOWEST, FASTEST = 4e5, 4e15  # of the inertia that holds back a wrinkling path, rad2/s2
 RELEASE = 0.05  # factor on the artificial tension from one iteration to the next
 
 
@@ -25,7 +29,8 @@ class InflationFailed(ArithmeticError):
 
     def __init__(self, reached: float, pressure: float, why: str):
         super().__init__(
-            f"inflation stopped at {reached * pressure / 1e3:.4g} of {pressure / 1e3:.4g} kPa: {why}"
+            f"inflation stopped at {reached * pressure / 1e3:.4g} of"
+            f" {pressure / 1e3:.4g} kPa: {why}"
         )
         self.reached_Pa = reached * pressure
 
@@ -47,51 +52,131 @@ def equilibrium(
 ) -> State:
     """Equilibrium under ``loads``, reached from the displacements ``start``.
 
-    The whole load is tried first. A slack membrane has no stiffness against the pressure yet, so
-    the first tangents carry the tension p * rho that the cords are about to take up; this changes
-    the path of the iteration, never its end. Where that fails the load comes in adaptive steps.
-
-    ``check`` is called between load steps and may raise to stop.
+    The whole load is tried first. Where that takes long, because soft rubber between stiff cords
+    wrinkles on the way, the rubber is stiffened and let down again step by step. Where that fails
+    too the load comes in steps. Each is another path to the same equilibrium. ``check`` is called
+    between steps and may raise to stop.
 
     Raises InflationFailed with the pressure that was reached.
     """
-    U, reached, step, count = start, 0.0, 1.0, 0
-    full = max((abs(load.pressure) for load in loads), default=0.0)
-    radius = SECTION_RADIUS * np.ptp(model.mesh.X[:, 0].real)
-    why = ""
+    solve = _Solver(model, numbering, loads)
+    U = solve(start, 1.0, 1.0, QUICK) if loads else solve(start, 1.0, 1.0, LONGEST)
+    if U is None:
+        check()
+        U = _by_stiffness(solve, start, check)
+    if U is None:
+        U = _by_pressure(solve, start, check)
+    return State(U, solve.factorisations)
+
+
+class _Solver:
+    """Newton solutions at a share of the load and a multiple of the rubber's stiffness."""
+
+    def __init__(self, model: Model, numbering: Numbering, loads: list[Load]):
+        self.model, self.numbering, self.loads = model, numbering, loads
+        self.full = max((abs(load.pressure) for load in loads), default=0.0)
+        # a slack membrane has no stiffness against pressure yet, so the first tangents from rest
+        # carry the tension p rho that the cords are about to take up
+        self.tension = self.full * SECTION_RADIUS * np.ptp(model.mesh.X[:, 0].real)
+        lumped = mechanics.mass(model).diagonal()  # row sums are negative at Q8 corners
+        self.mass = numbering.gather(np.repeat(lumped[:, None], 3, 1))
+        self.factorisations = 0
+        self.why = ""
+
+    def __call__(self, U: Array, share: float, stiffness: float, longest: int) -> Array | None:
+        """Displacements from the start U, or None and ``why``."""
+        model = self.model if stiffness == 1.0 else _stiffened(self.model, stiffness)
+        loads = [Load(load.lines, load.pressure * share) for load in self.loads]
+        tension = 0.0 if U.any() else share * self.tension
+        found, used, self.why = _newton(
+            model, self.numbering, loads, self.mass, U, tension, longest
+        )
+        self.factorisations += used
+        return found
+
+
+def _by_stiffness(solve: _Solver, start: Array, check: Callable[[], None]) -> Array | None:
+    """From rubber ``FIRM`` times as stiff down to its own stiffness, in adaptive factors."""
+    stiffness, factor = FIRM, FIRM
+    U = solve(start, 1.0, stiffness, LONGEST)
+    while U is not None and stiffness > 1.0:
+        check()
+        target = max(1.0, stiffness / factor)
+        softer = solve(U, 1.0, target, QUICK)
+        if softer is None:
+            factor = factor**0.5
+            if factor < 1.1:
+                return None
+        else:
+            U, stiffness = softer, target
+    return U
+
+
+def _by_pressure(solve: _Solver, start: Array, check: Callable[[], None]) -> Array:
+    """In adaptive load steps, which tell how far the tyre can be inflated."""
+    U, reached, step = start, 0.0, 0.25
     while reached < 1.0:
         check()
         target = min(1.0, reached + step)
-        part = [Load(load.lines, load.pressure * target) for load in loads]
-        tension = (target - reached) * full * radius
-        trial, used, why = _newton(model, numbering, part, U, tension)
-        count += used
-        if trial is None:
-            step = min(step, 0.5) / 2
+        further = solve(U, target, 1.0, LONGEST)
+        if further is None:
+            step /= 2
             if step < SMALLEST_STEP:
-                raise InflationFailed(reached, full, why)
+                raise InflationFailed(reached, solve.full, solve.why)
         else:
-            U, reached = trial, target
+            U, reached = further, target
             step *= 2
-    return State(U, count)
+    return U
+
+
+def _stiffened(model: Model, factor: float) -> Model:
+    rubbers = [
+        replace(
+            r,
+            material=replace(
+                r.material,
+                C10=factor * r.material.C10,
+                C01=factor * r.material.C01,
+                inverse_D1=factor * r.material.inverse_D1,
+            ),
+        )
+        for r in model.rubbers
+    ]
+    return replace(model, rubbers=rubbers)
 
 
 def _newton(
-    model: Model, numbering: Numbering, loads: list[Load], U: Array, tension: float
+    model: Model,
+    numbering: Numbering,
+    loads: list[Load],
+    mass: Array,
+    U: Array,
+    tension: float,
+    longest: int,
 ) -> tuple[Array | None, int, str]:
     scale = np.linalg.norm(_pressure_force(model, U, loads, numbering))
     energy = mechanics.potential(model, U, loads)
     force = mechanics.residual(model, U, loads, numbering)
-    smallest = 1e-3 * tension
-    for iteration in range(LONGEST):
-        size = np.linalg.norm(force)
-        if size <= TOLERANCE * scale:
-            return U, iteration, ""
+    smallest, used, inertia, before = 1e-3 * tension, 0, 0.0, float("inf")
+    for _ in range(longest):
+        size = float(np.linalg.norm(force))
+        if size <= TOLERANCE * scale or (size <= LOOSE * scale and size > 0.5 * before):
+            return U, used, ""
+        before = size
         K0, _, _ = mechanics.tangents(model, U, loads, harmonics=False, tension=tension)
-        try:
-            step = -Cholesky(numbering.assemble(K0)).solve(force)
-        except Indefinite:
-            return None, iteration + 1, "the tangent stiffness is no longer positive definite"
+        band = numbering.assemble(K0)
+        while True:
+            used += 1
+            held = band.copy(order="F")
+            held[0] += inertia * mass
+            try:
+                step = -Cholesky(held).solve(force)
+                break
+            except Indefinite:  # it wrinkles on the way: hold it back by its inertia, 1 / dt^2
+                inertia = max(10 * inertia, SLOWEST)
+                if inertia > FASTEST:
+                    return None, used, "the tangent stiffness is not positive definite"
+        inertia = inertia / 10 if inertia > SLOWEST else 0.0
         slope = float(force @ step)
         field, length = numbering.spread(step), 1.0
         while True:
@@ -104,10 +189,10 @@ def _newton(
                 break
             length /= 2
             if length < 1e-4:
-                return None, iteration + 1, "the line search found no lower energy"
+                return None, used, "the line search found no lower energy"
         U, energy = trial, lower
         tension = tension * RELEASE if tension > smallest else 0.0
-    return None, LONGEST, f"Newton's method did not converge in {LONGEST} iterations"
+    return None, used, f"Newton's method did not converge in {longest} iterations"
 
 
 def _pressure_force(model: Model, U: Array, loads: list[Load], numbering: Numbering) -> Array:

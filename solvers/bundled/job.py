@@ -111,7 +111,8 @@ class Analysis:
         self.deadline = deadline
         self.section, self.revolve, self.steps = self.deck.split([])
         self._check_transfer()
-        self.model: Model = build(self.section, None, True)
+        self._models: dict[tuple[float | None, bool], Model] = {}
+        self.model = self._model(None, True)
         self.U = np.zeros((len(self.model.mesh.X), 3))
         self.factorisations = 0
         self._numberings: dict[bytes, Numbering] = self.model.mesh.numberings
@@ -129,8 +130,17 @@ class Analysis:
             else:
                 results.append(self._frequency(place, procedure, state))
         if not results:
-            results.append(StepResult(len(self.steps), self._pressure(state), self._mass(),
-                                      [], {}, self.U, self.factorisations))  # fmt: skip
+            results.append(
+                StepResult(
+                    len(self.steps),
+                    self._pressure(state),
+                    self._mass(),
+                    [],
+                    {},
+                    self.U,
+                    self.factorisations,
+                )
+            )
         return results
 
     def _check_transfer(self) -> None:
@@ -144,10 +154,13 @@ class Analysis:
             if k.name == "SYMMETRIC RESULTS TRANSFER":
                 increments = _increments(self.section_steps()[0])
                 if int(k.need("STEP")) != 1 or int(k.need("INC")) > increments:
-                    raise DeckError(k.line, f"the first job has one step of {increments}"
-                                            " increments")  # fmt: skip
-            if k.name == "SYMMETRIC MODEL GENERATION" and k.rows and (
-                np.real(k.rows[-1].number(0)) != 360.0
+                    raise DeckError(
+                        k.line, f"the first job has one step of {increments} increments"
+                    )
+            if (
+                k.name == "SYMMETRIC MODEL GENERATION"
+                and k.rows
+                and (np.real(k.rows[-1].number(0)) != 360.0)
             ):
                 raise DeckError(k.line, "the tyre is revolved by 360 degrees, in one segment")
 
@@ -155,12 +168,15 @@ class Analysis:
         """Steps of the section job."""
         return self.steps[:1]
 
-    def _model(self, keywords: list[Keyword], dynamic_Hz: float | None, state: _Conditions) -> Model:
-        return build(keywords, dynamic_Hz, state.long_term)
+    def _model(self, dynamic_Hz: float | None, long_term: bool) -> Model:
+        key = dynamic_Hz, long_term
+        if key not in self._models:
+            self._models[key] = build(self.section, dynamic_Hz, long_term)
+        return self._models[key]
 
     def _static(self, state: _Conditions) -> None:
         self._check_time()
-        model = self._model(self.section, None, state)
+        model = self._model(None, state.long_term)
         numbering = self._numbering(state)
         found = equilibrium(model, numbering, self._loads(model, state), self.U, self._check_time)
         self.U = found.U
@@ -173,21 +189,30 @@ class Analysis:
         wanted = row.integer(0) if row.text(0) else None
         highest = np.real(row.number(2, np.inf)) if row.text(2) else np.inf
         shift = float(np.real(row.number(3, 0.0))) * (2 * np.pi) ** 2
-        model = self._model(self.section, dynamic_Hz, state)
+        model = self._model(dynamic_Hz, state.long_term)
         loads, numbering = self._loads(model, state), self._numbering(state)
         vibration = Vibration(model, self.U, loads, numbering, shift)
         static_factor = vibration.factor(0)
         modes = self._harmonics(vibration, static_factor, wanted)
         modes = [_below(m, highest) for m in modes]
-        rates = {}
+        rates: dict[str, list[Array]] = {}
+        strains: sensitivity.Strains = {}
         for variable, tangents in self.request.sensitivities.items():
             if dynamic_Hz is not None or shift:  # then K(0) of the vibration is not Newton's
-                plain = Vibration(self._model(self.section, None, state), self.U, loads,
-                                  numbering, 0.0)  # fmt: skip
+                plain = Vibration(self._model(None, state.long_term), self.U, loads, numbering, 0.0)
                 static_factor = plain.factor(0)
-            rates[variable] = self._rates(tangents, place, dynamic_Hz, static_factor, modes)
-        return StepResult(place + 1, self._pressure(state), self._mass(), modes, rates, self.U,
-                          self.factorisations)  # fmt: skip
+            rates[variable] = self._rates(
+                tangents, place, dynamic_Hz, static_factor, modes, strains
+            )
+        return StepResult(
+            place + 1,
+            self._pressure(state),
+            self._mass(),
+            modes,
+            rates,
+            self.U,
+            self.factorisations,
+        )
 
     def _harmonics(
         self, vibration: Vibration, static_factor: Any, wanted: int | None
@@ -211,6 +236,7 @@ class Analysis:
         dynamic_Hz: float | None,
         factor: Any,
         modes: list[HarmonicModes],
+        strains: sensitivity.Strains,
     ) -> list[Array]:
         """d lambda / d variable per harmonic, with the deck's numbers carrying its tangent."""
         section, _, steps = self.deck.split([tuple(t) for t in tangents])
@@ -221,14 +247,14 @@ class Analysis:
             if procedure.name == "STATIC":
                 state.long_term = "LONG TERM" in procedure.parameters
         numbering = self._numbering(state)
-        static = self._model(section, None, state)
+        static = build(section, None, state.long_term)
         V = sensitivity.state_rate(static, self.U, self._loads(static, state), numbering, factor)
-        moving = static if dynamic_Hz is None else self._model(section, dynamic_Hz, state)
+        moving = static if dynamic_Hz is None else build(section, dynamic_Hz, state.long_term)
         n = np.concatenate([np.full(len(m.eigenvalues), m.n) for m in modes])
         shapes = np.concatenate([m.shapes for m in modes])
         values = np.concatenate([m.eigenvalues for m in modes])
         rates = sensitivity.eigenvalue_rates(
-            moving, self.U, V, self._loads(moving, state), n, shapes, values
+            moving, self.U, V, self._loads(moving, state), n, shapes, values, strains
         )
         return np.split(rates, np.cumsum([len(m.eigenvalues) for m in modes])[:-1])
 
@@ -255,10 +281,17 @@ class Analysis:
             touched[block.connectivity] = True
         free[~touched] = False
         for reference, tied in mesh.reference_nodes.items():
-            if not any(row.text(0) == str(reference) and int(row.text(1)) <= 1
-                       and int(row.text(2) or row.text(1)) >= 6 for row in state.held):  # fmt: skip
-                raise DeckError(state.line, f"the rim's reference node {reference} must be held in"
-                                            " 1, 6: a wheel free to move is not honoured")  # fmt: skip
+            if not any(
+                row.text(0) == str(reference)
+                and int(row.text(1)) <= 1
+                and int(row.text(2) or row.text(1)) >= 6
+                for row in state.held
+            ):
+                raise DeckError(
+                    state.line,
+                    f"the rim's reference node {reference} must be held in"
+                    " 1, 6: a wheel free to move is not honoured",
+                )
             free[[mesh.index[i] for i in tied]] = False
         for row in state.held:
             self._hold(row, free)
@@ -286,8 +319,9 @@ class Analysis:
             components = {1: 0, 2: 1, 3: 2}
         chosen = [components[d] for d in range(first, last + 1) if d in components]
         if not chosen:
-            raise DeckError(row.line, f"degrees of freedom {first} to {last} of a set cannot be"
-                                      " held here")  # fmt: skip
+            raise DeckError(
+                row.line, f"degrees of freedom {first} to {last} of a set cannot be held here"
+            )
         for component in chosen:
             free[[mesh.index[n] for n in nodes], component] = False
 
@@ -314,7 +348,9 @@ class _Conditions:
             elif k.name == "DSLOAD":
                 for row in k.rows:
                     if row.text(1).upper() != "P":
-                        raise DeckError(row.line, f"load type {row.text(1)} is not honoured, only P")
+                        raise DeckError(
+                            row.line, f"load type {row.text(1)} is not honoured, only P"
+                        )
                     self.pressures[row.text(0).upper()] = row.line, row.number(2)
 
 
@@ -339,7 +375,9 @@ def _increments(step: list[Keyword]) -> int:
 
 def _below(modes: HarmonicModes, highest_Hz: float) -> HarmonicModes:
     keep = modes.eigenvalues <= (2 * np.pi * highest_Hz) ** 2
-    return modes if keep.all() else HarmonicModes(modes.n, modes.eigenvalues[keep], modes.shapes[keep])
+    return (
+        modes if keep.all() else HarmonicModes(modes.n, modes.eigenvalues[keep], modes.shapes[keep])
+    )
 
 
 def lowest_of_all(

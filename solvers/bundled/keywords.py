@@ -91,12 +91,15 @@ class Keyword:
     def rows(self) -> list[Row]:
         """The data lines, split at their commas."""
         return [
-            Row(Line(number, self.line.job), [f.strip() for f in text.split(",")],
-                self.tangents.get(number, {}))
+            Row(
+                Line(number, self.line.job),
+                [f.strip() for f in text.split(",")],
+                self.tangents.get(number, {}),
+            )
             for number, text in self.lines
         ]
 
-    @property
+    @cached_property
     def identity(self) -> tuple[object, ...]:
         """What the block says, wherever it stands: a key for what is derived from it."""
         return self.name, tuple(self.parameters.items()), tuple(text for _, text in self.lines)
@@ -128,11 +131,11 @@ def read_keywords(text: str, job: str = "") -> list[Keyword]:
     lines: list[tuple[int, str]] = []
     for count, raw in enumerate(text.splitlines(), start=1):
         line = raw.strip()
+        if line.startswith("**"):
+            continue
         if pending:
             pending += line
         elif line.startswith("*"):
-            if line.startswith("**"):
-                continue
             pending, pending_line = line, Line(count, job)
         elif not line:
             continue
@@ -176,7 +179,9 @@ def seed(keywords: list[Keyword], tangents: list[tuple[int, int, float]]) -> lis
     for keyword in keywords:
         first = keyword.lines[0][0] if keyword.lines else 0
         last = keyword.lines[-1][0] if keyword.lines else -1
-        own = {line: by_line.pop(line) for line in list(by_line) if first <= line <= last}
+        inside = [line for line in by_line if first <= line <= last]
+        numbers = {line for line, _ in keyword.lines} if inside else set()
+        own = {line: by_line.pop(line) for line in inside if line in numbers}
         copy = Keyword(keyword.name, keyword.line, keyword.parameters, keyword.lines, own)
         result.append(copy if own else keyword)
     if by_line:

@@ -6,6 +6,7 @@ State U (n, 3) in m: displacements in the frame of the reference angle (see `sec
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -45,14 +46,16 @@ def surface_point(mesh_X: Array, lines: Lines, U: Array) -> tuple[Array, Array]:
     x = U[lines.connectivity] + np.zeros(1, mesh_X.dtype)
     x[..., 0] += mesh_X[lines.connectivity, 0]
     x[..., 2] += mesh_X[lines.connectivity, 1]
-    return np.einsum("ga,eai->egi", lines.N, x), np.einsum("ega,eai->egi", lines.slope, x)
+    return lines.N @ x, lines.slope @ x
 
 
 def potential(model: Model, U: Array, loads: list[Load]) -> float:
     """Strain energy minus the work of the pressure, J per radian."""
-    total = 0.0
+    total: Any = 0.0
     for r in model.rubbers:
-        total += (rubber.energy(deformation(r.solids, U), r.material) * r.solids.weights.ravel()).sum()
+        total += (
+            rubber.energy(deformation(r.solids, U), r.material) * r.solids.weights.ravel()
+        ).sum()
         if r.solids.hourglass is not None:
             strain = np.einsum("ea,eai->ei", r.solids.hourglass, U[r.solids.connectivity])
             total += (r.hourglass_stiffness * (strain**2).sum(1)).sum() / 2
@@ -82,15 +85,16 @@ def residual(model: Model, U: Array, loads: list[Load], numbering: Numbering) ->
         e, g, _, d = c.b0.shape
         q = cords.force(cord_vectors(c, U), c.stiffness)
         q = q.reshape(e, g, 3) * (c.lines.weights * c.lines.R)[..., None]
-        parts.append((c.lines.connectivity,
-                      (q.reshape(e, 1, g * 3) @ c.b0.reshape(e, g * 3, d))[:, 0]))  # fmt: skip
+        parts.append(
+            (c.lines.connectivity, (q.reshape(e, 1, g * 3) @ c.b0.reshape(e, g * 3, d))[:, 0])
+        )
     for load in loads:
         lines = load.lines
         x, dx = surface_point(model.mesh.X, lines, U)
         by_x, by_dx = pressure.first(x, dx)
         weights = -load.pressure * lines.weights
-        force = np.einsum("eg,ga,egi->eai", weights, lines.N, by_x, optimize=False)
-        force = force + np.einsum("eg,ega,egi->eai", weights, lines.slope, by_dx)
+        force = lines.N.T @ (weights[..., None] * by_x)
+        force = force + (weights[..., None] * lines.slope).swapaxes(1, 2) @ by_dx
         parts.append((lines.connectivity, force.reshape(len(force), -1)))
     return numbering.vector(parts)
 
@@ -122,8 +126,7 @@ def tangents(
 def _rubber_tangents(r: Rubber, U: Array, harmonics: bool, K0: Parts, K1: Parts, K2: Parts) -> None:
     s = r.solids
     e, g, _, d = s.B0.shape
-    A = rubber.tangent(deformation(s, U), r.material).reshape(e, g, 9, 9)
-    A *= s.weights[..., None, None]
+    A = rubber.tangent(deformation(s, U), r.material, s.weights.ravel()).reshape(e, g, 9, 9)
     B = s.B0.reshape(e, g * 9, d)
     Bt = B.swapaxes(1, 2)
     matrices = Bt @ (A @ s.B0).reshape(e, g * 9, d)
@@ -136,8 +139,12 @@ def _rubber_tangents(r: Rubber, U: Array, harmonics: bool, K0: Parts, K1: Parts,
         AB1 = A[..., 1::3] @ B1  # columns (r, theta, z; Theta) meet the rows of B1
         S = Bt @ AB1.reshape(e, g * 9, d)
         K1.append((s.connectivity, S - S.swapaxes(1, 2)))
-        K2.append((s.connectivity,
-                   B1.reshape(e, g * 3, d).swapaxes(1, 2) @ AB1[:, :, 1::3].reshape(e, g * 3, d)))  # fmt: skip
+        K2.append(
+            (
+                s.connectivity,
+                B1.reshape(e, g * 3, d).swapaxes(1, 2) @ AB1[:, :, 1::3].reshape(e, g * 3, d),
+            )
+        )
 
 
 def _cord_tangents(
@@ -161,7 +168,9 @@ def _cord_tangents(
         K2.append((c.lines.connectivity, b1.reshape(e, g * 3, d).swapaxes(1, 2) @ Db1))
 
 
-def _pressure_tangents(X: Array, load: Load, U: Array, harmonics: bool, K0: Parts, K1: Parts) -> None:
+def _pressure_tangents(
+    X: Array, load: Load, U: Array, harmonics: bool, K0: Parts, K1: Parts
+) -> None:
     lines = load.lines
     e, g, a = lines.slope.shape
     x, dx = surface_point(X, lines, U)
@@ -170,8 +179,10 @@ def _pressure_tangents(X: Array, load: Load, U: Array, harmonics: bool, K0: Part
     N = np.broadcast_to(lines.N, (e, g, a))
 
     def blocks(left: Array, middle: Array, right: Array) -> Array:
-        return np.einsum("eg,ega,egij,egb->eaibj", weights, left, middle, right,
-                         optimize=["einsum_path", (0, 1), (0, 2), (0, 1)]).reshape(e, 3 * a, 3 * a)  # fmt: skip
+        """sum over Gauss points of weights left_a middle_ij right_b as (e, 3a, 3a)."""
+        pairs = (weights[..., None] * left)[..., :, None] * right[..., None, :]
+        table = pairs.reshape(e, g, a * a).swapaxes(1, 2) @ middle.reshape(e, g, 9)
+        return table.reshape(e, a, a, 3, 3).swapaxes(2, 3).reshape(e, 3 * a, 3 * a)
 
     Q = blocks(N, xx, N) + blocks(N, xd, lines.slope)
     K0.append((lines.connectivity, Q + Q.swapaxes(1, 2)))
@@ -202,10 +213,10 @@ def mass_matrices(model: Model) -> Parts:
     for r in model.rubbers:
         s = r.solids
         NN = s.mass_N[:, :, None] * s.mass_N[:, None, :]
-        parts.append((s.connectivity,
-                      np.tensordot(r.density[:, None] * s.mass_weights, NN, 1)))  # fmt: skip
+        parts.append((s.connectivity, np.tensordot(r.density[:, None] * s.mass_weights, NN, 1)))
     for c in model.cords:
         NN = c.lines.N[:, :, None] * c.lines.N[:, None, :]
-        parts.append((c.lines.connectivity,
-                      np.tensordot(c.mass * c.lines.R * c.lines.weights, NN, 1)))  # fmt: skip
+        parts.append(
+            (c.lines.connectivity, np.tensordot(c.mass * c.lines.R * c.lines.weights, NN, 1))
+        )
     return parts

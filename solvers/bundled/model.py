@@ -10,7 +10,7 @@ import numpy as np
 from . import section as geometry
 from . import shapes
 from .band import Numbering
-from .keywords import DeckError, Keyword
+from .keywords import DeckError, Keyword, Row
 from .materials import Material, read_materials
 from .rubber import MooneyRivlin
 
@@ -128,8 +128,11 @@ def _mesh(keywords: list[Keyword]) -> Mesh:
                 blocks[kind] = geometry.solids(X, table, POINTS[kind])
             except geometry.FoldedElement as error:
                 number = next(e for e, p in place.items() if p == (kind, error.index))
-                raise DeckError(0, f"element {number} has no positive area: it folds over"
-                                   " or its nodes run clockwise") from None  # fmt: skip
+                raise DeckError(
+                    0,
+                    f"element {number} has no positive area: it folds over"
+                    " or its nodes run clockwise",
+                ) from None
         else:
             blocks[kind] = geometry.lines(X, table)
     faces = {
@@ -234,7 +237,9 @@ def _properties(
             if control and control not in stiffness:
                 raise DeckError(k.line, f"section controls {control} are not defined")
             for kind, rows in _by_type(k, mesh, POINTS).items():
-                rubber_of.setdefault(kind, []).append((rows, material, stiffness.get(control, -1.0)))
+                rubber_of.setdefault(kind, []).append(
+                    (rows, material, stiffness.get(control, -1.0))
+                )
         elif k.name == "SURFACE SECTION":
             layers = k
         elif k.name == "REBAR LAYER":
@@ -246,7 +251,7 @@ def _properties(
     rubbers = [
         _rubber(kind, parts, mesh, dynamic_Hz, long_term) for kind, parts in rubber_of.items()
     ]
-    for kind, block in mesh.blocks.items():
+    for kind in mesh.blocks:
         if kind in POINTS and kind not in rubber_of:
             raise DeckError(0, f"the {kind} elements have no *SOLID SECTION")
     return Model(mesh, rubbers, [_merge(group) for group in cords.values()])
@@ -303,23 +308,36 @@ def _rubber(
             raise DeckError(0, f"a {kind} element has two *SOLID SECTION")
         owner[rows] = i
         scale, bulk = material.static_scale(long_term)
-        C10, C01, D = material.C10, material.C01, material.inverse_D1
+        C10, C01, D = material.C10 or 0.0, material.C01, material.inverse_D1
         ratio = material.dynamic_ratio(dynamic_Hz, long_term)
         G = 2 * (C10 + C01) * scale
-        table.append([C10 * scale, C01 * scale, D * bulk, *ratio, material.density,
-                      0.005 * G if hourglass == -1.0 else hourglass])  # fmt: skip
+        table.append(
+            [
+                C10 * scale,
+                C01 * scale,
+                D * bulk,
+                *ratio,
+                material.density,
+                0.005 * G if hourglass == -1.0 else hourglass,
+            ]
+        )
     if (owner < 0).any():
         raise DeckError(0, f"{(owner < 0).sum()} {kind} elements have no *SOLID SECTION")
     C10, C01, D, shear, bulk, density, hourglass = np.array(table).T[:, owner]
-    point = lambda values: np.repeat(values, g)  # noqa: E731
+    point = lambda values: np.repeat(values, g)
     still = dynamic_Hz is None or not (np.any(shear != 1) or np.any(bulk != 1))
-    law = MooneyRivlin(point(C10), point(C01), point(D), None if still else point(shear),
-                       None if still else point(bulk))  # fmt: skip
+    law = MooneyRivlin(
+        point(C10),
+        point(C01),
+        point(D),
+        None if still else point(shear),
+        None if still else point(bulk),
+    )
     return Rubber(solids, law, density, hourglass)
 
 
 def _layer(
-    k: Keyword, row, mesh: Mesh, kind: str, rows: Array, materials: dict[str, Material]
+    k: Keyword, row: Row, mesh: Mesh, kind: str, rows: Array, materials: dict[str, Material]
 ) -> Cords:
     """Data line: name, area, spacing, position, material, angle from the meridian (degrees)."""
     area, spacing = row.number(1), row.number(2)
@@ -332,25 +350,48 @@ def _layer(
         raise DeckError(row.line, "area and spacing of a layer must be positive")
     block = mesh.blocks[kind]
     assert isinstance(block, geometry.Lines)
-    lines = geometry.Lines(block.connectivity[rows], block.N, block.slope[rows], block.R[rows],
-                           block.tangent[rows], block.weights[rows])  # fmt: skip
+    lines = geometry.Lines(
+        block.connectivity[rows],
+        block.N,
+        block.slope[rows],
+        block.R[rows],
+        block.tangent[rows],
+        block.weights[rows],
+    )
     angle = row.number(5, 0.0) * np.pi / 180
     direction, b0, hoop = geometry.cord_operators(lines, np.cos(angle), np.sin(angle))
     width = spacing * np.ones_like(lines.R)
     if k.get("GEOMETRY") == "ANGULAR":  # spacing in degrees: the cords fan out with the radius
         width = spacing * np.pi / 180 * lines.R
     smeared = area / width
-    return Cords(lines, direction, b0, hoop, (material.youngs_modulus * smeared).ravel(),
-                 material.density * smeared)  # fmt: skip
+    return Cords(
+        lines,
+        direction,
+        b0,
+        hoop,
+        (material.youngs_modulus * smeared).ravel(),
+        material.density * smeared,
+    )
 
 
 def _merge(parts: list[Cords]) -> Cords:
     if len(parts) == 1:
         return parts[0]
     first = parts[0].lines
-    join = lambda pick: np.concatenate([pick(p) for p in parts])  # noqa: E731
-    lines = geometry.Lines(join(lambda p: p.lines.connectivity), first.N,
-                           join(lambda p: p.lines.slope), join(lambda p: p.lines.R),
-                           join(lambda p: p.lines.tangent), join(lambda p: p.lines.weights))  # fmt: skip
-    return Cords(lines, join(lambda p: p.direction), join(lambda p: p.b0), join(lambda p: p.hoop),
-                 join(lambda p: p.stiffness), join(lambda p: p.mass))  # fmt: skip
+    join = lambda pick: np.concatenate([pick(p) for p in parts])
+    lines = geometry.Lines(
+        join(lambda p: p.lines.connectivity),
+        first.N,
+        join(lambda p: p.lines.slope),
+        join(lambda p: p.lines.R),
+        join(lambda p: p.lines.tangent),
+        join(lambda p: p.lines.weights),
+    )
+    return Cords(
+        lines,
+        join(lambda p: p.direction),
+        join(lambda p: p.b0),
+        join(lambda p: p.hoop),
+        join(lambda p: p.stiffness),
+        join(lambda p: p.mass),
+    )

@@ -27,17 +27,24 @@ def _cross(a: Array) -> Array:
     return X
 
 
+def cross(a: Array, b: Array) -> Array:
+    """a x b over the last axis; np.cross spends ten times as long on its arguments."""
+    ax, ay, az = a[..., 0], a[..., 1], a[..., 2]
+    bx, by, bz = b[..., 0], b[..., 1], b[..., 2]
+    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], -1)
+
+
 def volume(x: Array, dx: Array, weights: Array) -> Array:
     """V per radian (m3) from x, x' (p, 3) at Gauss points with their weights."""
     y, d = x @ IN_PLANE, x @ SPIN.T
-    return (weights * (y * np.cross(dx, d)).sum(-1)).sum() / 2
+    return (weights * (y * cross(dx, d)).sum(-1)).sum() / 2
 
 
 def first(x: Array, dx: Array) -> tuple[Array, Array]:
     """Gradients of the integrand of V with respect to x and to x', each (p, 3)."""
     y, d = x @ IN_PLANE, x @ SPIN.T
-    by_x = np.cross(dx, d) @ IN_PLANE + np.cross(y, dx) @ SPIN
-    return by_x / 2, np.cross(d, y) / 2
+    by_x = cross(dx, d) @ IN_PLANE + cross(y, dx) @ SPIN
+    return by_x / 2, cross(d, y) / 2
 
 
 def second(x: Array, dx: Array) -> tuple[Array, Array, Array]:

@@ -44,21 +44,37 @@ def write(stem: Path, model: Model, results: list[StepResult]) -> None:
     }
     steps = []
     for result in results:
-        order = [(float(v), i, j) for i, m in enumerate(result.modes)
-                 for j, v in enumerate(m.eigenvalues)]  # fmt: skip
+        order = [
+            (float(v), i, j)
+            for i, m in enumerate(result.modes)
+            for j, v in enumerate(m.eigenvalues)
+        ]
         order.sort()
         lines = []
         for value, i, _ in order:
             n = result.modes[i].n
-            lines.append({"n": n, "frequency_Hz": _hertz(value), "eigenvalue": value,
-                          "multiplicity": 2 if n else 1})  # fmt: skip
+            lines.append(
+                {
+                    "n": n,
+                    "frequency_Hz": _hertz(value),
+                    "eigenvalue": value,
+                    "multiplicity": 2 if n else 1,
+                }
+            )
         rates = {
             variable: [float(per[i][j] / (8 * np.pi**2 * _hertz(value))) for value, i, j in order]
             for variable, per in result.rates.items()
         }
-        steps.append({"step": result.step, "pressure_Pa": result.pressure_Pa,
-                      "mass_kg": result.mass_kg, "factorisations": result.factorisations,
-                      "modes": lines, "sensitivities": rates})  # fmt: skip
+        steps.append(
+            {
+                "step": result.step,
+                "pressure_Pa": result.pressure_Pa,
+                "mass_kg": result.mass_kg,
+                "factorisations": result.factorisations,
+                "modes": lines,
+                "sensitivities": rates,
+            }
+        )
         arrays[f"displacement_{result.step}"] = result.U
         if order:
             whole = [  # from unit mass per radian to the whole circle's 2 pi, or pi for a wave

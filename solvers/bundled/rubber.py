@@ -78,40 +78,50 @@ def _stress_C01(F: Array, J: Array, G: Array, m: MooneyRivlin) -> Array:
     return b[:, None, None] * (Y - (4 / 3 * I2)[:, None, None] * G)
 
 
-def tangent(F: Array, m: MooneyRivlin) -> Array:
+def tangent(F: Array, m: MooneyRivlin, weights: Array | float = 1.0) -> Array:
     """First elasticity tensor A = d2W/dFdF (p, 9, 9), Pa: material and geometric part in one.
 
-    With ``shear_ratio`` the deviatoric material part is scaled, the initial stress is not:
-    a small vibration about the static state at the modulus of its own frequency.
+    ``weights`` (p,) multiply it. With ``shear_ratio`` the material part is scaled, the initial
+    stress is not: a small vibration about the static state at the modulus of its own frequency.
     """
     if m.shear_ratio is not None:
-        dynamic = replace(m, C10=m.C10 * m.shear_ratio, C01=m.C01 * m.shear_ratio,
-                          inverse_D1=m.inverse_D1 * m.bulk_ratio, shear_ratio=None)
-        extra = stress(F, dynamic) - stress(F, m)
-        S = np.linalg.solve(F, extra)  # second Piola-Kirchhoff stress that is not there
-        A = tangent(F, dynamic).reshape(-1, 3, 3, 3, 3)
-        for i in range(3):
-            A[:, i, :, i, :] -= S
-        return A.reshape(-1, 9, 9)
+        return _dynamic_tangent(F, m, weights)
     p = len(F)
     J, G = determinant(F)
-    a = m.C10 * J ** (-2 / 3)
+    a = m.C10 * J ** (-2 / 3) * weights
     I1 = (F * F).sum((1, 2))
-    k = 2 * m.inverse_D1 * J
+    k = 2 * m.inverse_D1 * J * weights
     f, g = F.reshape(p, 9), G.reshape(p, 9)
     swap = 2 / 3 * a * I1 - k * (J - 1)
     gg = 4 / 9 * a * I1 + k * (2 * J - 1)
-    left = (-4 / 3 * a)[:, None] * f + gg[:, None] * g
-    A = left[:, :, None] * g[:, None, :]
-    A += ((-4 / 3 * a)[:, None] * g)[:, :, None] * f[:, None, :]
+    af = (-4 / 3 * a)[:, None] * f
+    # (af g + g af + gg g g)_ab as a product of p matrices 9 x 2 and 2 x 9
+    left = np.stack([g, af + gg[:, None] * g], -1)
+    A = left @ np.stack([af, g], 1)
     A5 = A.reshape(p, 3, 3, 3, 3)
     sG = swap[:, None, None] * G
     A5 += sG[:, :, None, None, :] * G.swapaxes(1, 2)[:, None, :, :, None]  # G_iL G_kJ
     diagonal = np.arange(9)
     A[:, diagonal, diagonal] += (2 * a)[:, None]
     if np.any(m.C01):
-        A += _tangent_C01(F, J, G, m)
+        A += _tangent_C01(F, J, G, m) * np.reshape(weights, (-1, 1, 1))
     return A
+
+
+def _dynamic_tangent(F: Array, m: MooneyRivlin, weights: Array | float) -> Array:
+    """Tangent at the dynamic moduli, less the initial stress that they would bring along."""
+    dynamic = replace(
+        m,
+        C10=m.C10 * m.shear_ratio,
+        C01=m.C01 * m.shear_ratio,
+        inverse_D1=m.inverse_D1 * m.bulk_ratio,
+        shear_ratio=None,
+    )
+    S = np.linalg.solve(F, stress(F, dynamic) - stress(F, m))  # second Piola-Kirchhoff
+    A = tangent(F, dynamic, weights).reshape(-1, 3, 3, 3, 3)
+    for i in range(3):
+        A[:, i, :, i, :] -= S * np.reshape(weights, (-1, 1, 1))
+    return A.reshape(-1, 9, 9)
 
 
 def _tangent_C01(F: Array, J: Array, G: Array, m: MooneyRivlin) -> Array:

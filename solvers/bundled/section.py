@@ -75,10 +75,15 @@ def solids(X: Array, connectivity: Array, points: int) -> Solids:
     mass_rule = shapes.quad(nodes, 3 if nodes == 8 else 2)
     _, mass_weights, _ = _map(X, connectivity, mass_rule)
     return Solids(
-        connectivity, rule.N, weights, B0.reshape(e, g, 9, 3 * a), hoop,
+        connectivity,
+        rule.N,
+        weights,
+        B0.reshape(e, g, 9, 3 * a),
+        hoop,
         _hourglass(X[connectivity], gradient[:, 0], weights[:, 0]) if points == 1 else None,
-        mass_rule.N, mass_weights,
-    )  # fmt: skip
+        mass_rule.N,
+        mass_weights,
+    )
 
 
 def _map(X: Array, connectivity: Array, rule: shapes.Rule) -> tuple[Array, Array, Array]:

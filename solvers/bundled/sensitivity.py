@@ -9,6 +9,8 @@ with its number p + i h dp, at the state u + i h v; no second derivative is writ
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from . import cords, mechanics, pressure, rubber
@@ -31,21 +33,36 @@ def state_rate(
     return numbering.spread(-factor.solve(rate))
 
 
+Strains = dict[int, tuple[Array, tuple[Array, Array]]]
+
+
 def eigenvalue_rates(
-    model: Model, U: Array, V: Array, loads: list[Load], n: Array, shapes: Array, eigenvalues: Array
+    model: Model,
+    U: Array,
+    V: Array,
+    loads: list[Load],
+    n: Array,
+    shapes: Array,
+    eigenvalues: Array,
+    strains: Strains | None = None,
 ) -> Array:
     """d lambda/dp (m,) of modes with harmonics n (m,), shapes (m, nodes, 3), lambda (m,).
 
-    ``model`` and ``loads`` carry the tangent of p, V = dU/dp.
+    ``model`` and ``loads`` carry the tangent of p, V = dU/dp. ``strains`` remembers the modes'
+    displacement gradients in the rubber from one variable to the next; empty at first.
     """
+    strains = {} if strains is None else strains
     state = U + 1j * STEP * V
     real, imag = shapes.real, shapes.imag
     total = np.zeros(len(n), complex)
     for r in model.rubbers:
         s = r.solids
-        A = rubber.tangent(mechanics.deformation(s, state), r.material)
-        A = A.reshape(*s.weights.shape, 9, 9) * s.weights[..., None, None]
-        for H in _gradients(s.B0, s.hoop, s.connectivity, real, imag, n):
+        A = rubber.tangent(mechanics.deformation(s, state), r.material, s.weights.ravel())
+        A = A.reshape(*s.weights.shape, 9, 9)
+        key = id(s.B0)
+        if key not in strains:
+            strains[key] = s.B0, _gradients(s.B0, s.hoop, s.connectivity, real, imag, n)
+        for H in strains[key][1]:
             total += _contract(A, H)
         if s.hourglass is not None:
             for part in (real, imag):
@@ -106,9 +123,11 @@ def _pressure_form(
         du.append(np.einsum("ega,meai->megi", lines.slope, nodal))
     turn = n[:, None, None, None]
     Du = [u[0] @ pressure.SPIN.T - turn * u[1], u[1] @ pressure.SPIN.T + turn * u[0]]
-    form = 0.0
+    form: Any = 0.0
     for a, da, Da in zip(u, du, Du, strict=True):
-        density = ((a @ pressure.IN_PLANE) * (np.cross(dx, Da) - np.cross(d, da))).sum(-1)
-        density = density - (da * np.cross(y, Da)).sum(-1)
+        density = ((a @ pressure.IN_PLANE) * (pressure.cross(dx, Da) - pressure.cross(d, da))).sum(
+            -1
+        )
+        density = density - (da * pressure.cross(y, Da)).sum(-1)
         form = form + (density * lines.weights).sum((1, 2))
     return -load.pressure * form

@@ -7,7 +7,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from tyrecal_solvers.bundled import grammar, harmonics, inflation, keywords, mechanics, model, section
+from tyrecal_solvers.bundled import (
+    grammar,
+    harmonics,
+    inflation,
+    keywords,
+    mechanics,
+    model,
+)
 from tyrecal_solvers.bundled.band import Numbering
 from tyrecal_solvers.bundled.mechanics import Load
 from tyrecal_solvers.bundled.model import Model
@@ -132,19 +139,27 @@ def tyre(
     elements: Sequence[int] = (4, 3, 3, 1),
     rows: Sequence[int] = (1, 1, 1, 1),
     quadratic: bool = True,
-    rubber: Rubber = Rubber(C01=1e5),  # noqa: B008
+    rubber: Rubber = Rubber(C01=1e5),
 ) -> Tyre:
     """The tyre of the case study: a radial ply and two belts at +-20 degrees to the crown."""
     mesh = build_mesh(read_section(SECTION), list(elements), list(rows), quadratic)
     row = {number: i for i, number in enumerate(mesh.nodes)}
     look = np.vectorize(row.__getitem__)
     solids = {number: i for i, number in enumerate(mesh.solids, 1)}
-    cord = {"ply": (4.2e-7, 1e-3, 9.87e9, 1500.0, 0.0), "belt1": (2.1e-7, 1.16e-3, 1.722e11, 5900.0, 70.0)}
+    cord = {
+        "ply": (4.2e-7, 1e-3, 9.87e9, 1500.0, 0.0),
+        "belt1": (2.1e-7, 1.16e-3, 1.722e11, 5900.0, 70.0),
+    }
     cord["belt2"] = (*cord["belt1"][:4], 110.0)
     layers = [Layer(look(list(mesh.cords[name].values())), *cord[name]) for name in cord]
     connectivity = look(list(mesh.solids.values()))
-    text = deck(np.array(list(mesh.nodes.values())), connectivity, rubber, layers,
-                [solids[e] for e in mesh.inner])  # fmt: skip
+    text = deck(
+        np.array(list(mesh.nodes.values())),
+        connectivity,
+        rubber,
+        layers,
+        [solids[e] for e in mesh.inner],
+    )
     return Tyre(text, [row[n] for n in mesh.rim], _outline(connectivity))
 
 

@@ -5,7 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.linalg import eigh
 from scipy.optimize import brentq
+from tyrecal_solvers.bundled import mechanics, section
+from tyrecal_solvers.bundled.mechanics import Load
 
 from . import support
 from .support import Layer, Rubber
@@ -28,7 +31,11 @@ def ring(
     b = support.block(radii, (0.0, 0.01, 1), quadratic)
     layers = [Layer(b.columns[radii[2] // 2], *list(vars(STEEL).values())[1:5], a) for a in angles]
     m = support.model_of(support.deck(b.X, b.solids, rubber, layers, b.inner))
-    mask, loads, U = support.held(m, axial=True), support.cavity(m, pressure), np.zeros((len(b.X), 3))
+    mask, loads, U = (
+        support.held(m, axial=True),
+        support.cavity(m, pressure),
+        np.zeros((len(b.X), 3)),
+    )
     if pressure:
         no_spin = mask.copy()
         no_spin[0, 1] = True
@@ -36,7 +43,7 @@ def ring(
     return {n: support.eigenvalues(m, U, loads, mask, n, count, -1.0) for n in harmonics}
 
 
-@pytest.mark.parametrize("share", [0.0, 0.5])
+@pytest.mark.parametrize("share", [0.0, 0.5, 2.7])  # 2.7: as in the CalculiX study
 @pytest.mark.parametrize("n", [2, 3, 4, 6])
 def test_inflated_ring(n: int, share: float) -> None:
     """omega^2 = (EI (n^2 - 1)^2 / R^4 + p (n^2 - 1) / R) / (rho h (1 + 1/n^2)), an inextensible
@@ -79,7 +86,9 @@ def test_ring_of_the_calculix_study() -> None:
 def test_cord_cylinder() -> None:
     """Two steel plies at +-20 degrees from the circumference keep the mid-line's length:
     omega^2 = p (n^2 - 1) / (m R (1 + 1/n^2)), m = rho h: 85.84, 148.68, 208.20 Hz for n = 2..4.
-    Breathing without pressure: omega^2 = (2 (EA/s) cos^4 20 + E' h) / (m R^2): 1446.9 Hz."""
+    Breathing without pressure: omega0^2 = (2 (EA/s) cos^4 20 + E' h) / (m R^2): 1446.9 Hz for a
+    thin wall. The rubber on either side hangs on the plies by its P-wave modulus, which raises
+    its inertia to m tan(x) / x, x = omega h / 2 sqrt(rho / (K + 4 G / 3)): 0.3 % lower."""
     R, h, rubber, p = 0.3, 6e-3, Rubber(), 240e3
     m = rubber.density * h
     values = ring((R - h / 2, R + h / 2, 2), rubber, p, (2, 3, 4), angles=(70.0, 110.0))
@@ -90,12 +99,18 @@ def test_cord_cylinder() -> None:
     np.testing.assert_allclose(got, exact, rtol=1e-4)
     still = ring((R - h / 2, R + h / 2, 2), rubber, 0.0, (0,), 2, angles=(70.0, 110.0))[0][1]
     hoop = 2 * 1.722e11 * 2.118683e-7 / 1.16e-3 * np.cos(np.radians(20)) ** 4
-    breathing = support.hertz((hoop + rubber.plane_strain * h) / (m * R**2))
-    assert breathing == pytest.approx(1446.9, abs=0.1)
-    assert support.hertz(still) == pytest.approx(breathing, rel=2e-4)
+    hoop += rubber.plane_strain * h
+    omega0 = np.sqrt(hoop / (m * R**2))
+    assert omega0 / (2 * np.pi) == pytest.approx(1446.9, abs=0.1)
+    half = h / 2 / np.sqrt((2 / rubber.D1 + 4 / 3 * rubber.shear) / rubber.density)
+    omega = brentq(lambda w: w * np.tan(w * half) / half - omega0**2, 0.8 * omega0, omega0)
+    assert np.sqrt(still) == pytest.approx(omega, rel=2e-4)
+    assert omega < 0.998 * omega0
 
 
-@pytest.mark.parametrize(("linear", "wanted"), [(True, 2.0), (False, 4.0)], ids=["2-node", "3-node"])
+@pytest.mark.parametrize(
+    ("linear", "wanted"), [(True, 2.0), (False, 4.0)], ids=["2-node", "3-node"]
+)
 @pytest.mark.parametrize("n", range(5))
 def test_prestressed_net(n: int, linear: bool, wanted: float) -> None:
     """A cylinder of axial and hoop cords alone, stretched by l_z and l_t, under the pressure that
@@ -117,27 +132,36 @@ def test_prestressed_net(n: int, linear: bool, wanted: float) -> None:
     exact = [n * n * t_t / R**2 / m]  # k = 0: axial shift, restrained by the hoop cords' tension
     for k in np.arange(1, 40) * np.pi / L:
         uw, uv = n * e_t / R**2, k * t_t * l_t / (R * l_z)
-        K = [[t_z * k * k + (e_t + (n * n - 1) * t_t) / R**2, uw, uv],
-             [uw, t_z * k * k + n * n * e_t / R**2, 0.0],
-             [uv, 0.0, e_z * k * k + n * n * t_t / R**2]]  # fmt: skip
+        K = [
+            [t_z * k * k + (e_t + (n * n - 1) * t_t) / R**2, uw, uv],
+            [uw, t_z * k * k + n * n * e_t / R**2, 0.0],
+            [uv, 0.0, e_z * k * k + n * n * t_t / R**2],
+        ]
         exact += list(np.linalg.eigvalsh(K) / m)
     exact = np.sort(exact)[:6]
     errors = []
     for elements in (32, 64) if linear else (16, 32):
-        X = np.stack([0 * (z := np.linspace(0, L, (elements if linear else 2 * elements) + 1)) + R, z], -1)
+        X = np.stack(
+            [0 * (z := np.linspace(0, L, (elements if linear else 2 * elements) + 1)) + R, z], -1
+        )
         step = 1 if linear else 2
         lines = np.arange(step, -1, -1) + step * np.arange(elements)[:, None]  # normal outwards
         layers = [Layer(lines, A, s, EA, rho, a) for a in (0.0, 90.0)]
         model = support.model_of(support.deck(X, np.empty((0, 0), int), Rubber(), layers))
         U = np.stack([X[:, 0] * (l_t - 1), 0 * z, X[:, 1] * (l_z - 1)], -1)
         p = t_t / (l_z * R)
-        loads = [support.Load(support.section.lines(X, lines, 3), p)]
+        loads = [Load(section.lines(X, lines, 3), p)]
         mask = np.zeros((len(X), 3), bool)
         mask[[0, -1], :2] = True
-        got = support.eigenvalues(model, U, loads, mask, n, 6, -1e3)
+        free = ~mask.ravel()
+        K0, K1, K2 = support.matrices(model, U, loads)
+        K = (K0 + 1j * n * K1 + n * n * K2)[free][:, free]
+        M = np.kron(mechanics.mass(model).toarray(), np.eye(3))[free][:, free]
+        # two Gauss points leave M of bare cords singular: solve for 1 / (lambda + 1000)
+        got = 1 / eigh(M, K + 1e3 * M, eigvals_only=True)[: -6 - 1 : -1] - 1e3
         errors.append(abs(got - exact).max() / exact[-1])
     assert support.order(errors) == pytest.approx(wanted, abs=0.25)
-    assert errors[-1] < (1e-2 if linear else 1e-4)
+    assert errors[-1] < (1e-2 if linear else 1e-3)
 
 
 def cylinder_pressure(A: float, B: float, a: float, G: float, K: float) -> float:
@@ -147,7 +171,7 @@ def cylinder_pressure(A: float, B: float, a: float, G: float, K: float) -> float
 
     def piola(l_r: complex | float, l_t: complex | float) -> tuple[complex, complex]:
         J, I1 = l_r * l_t, l_r**2 + l_t**2 + 1
-        P = lambda x: G * J ** (-2 / 3) * (x - I1 / (3 * x)) + K * (J - 1) * J / x  # noqa: E731
+        P = lambda x: G * J ** (-2 / 3) * (x - I1 / (3 * x)) + K * (J - 1) * J / x
         return P(l_r), P(l_t)
 
     def slopes(R: float, y: Array) -> list[float]:
@@ -192,7 +216,9 @@ def test_thick_cylinder_inflated_by_a_fifth() -> None:
     assert abs(errors[-1]) < 1e-5
 
 
-@pytest.mark.parametrize(("quadratic", "least"), [(True, 3.5), (False, 1.8)], ids=["CGAX8R", "CGAX4R"])
+@pytest.mark.parametrize(
+    ("quadratic", "least"), [(True, 3.5), (False, 1.8)], ids=["CGAX8R", "CGAX4R"]
+)
 @pytest.mark.parametrize("n", [2, 3])
 def test_order_of_the_elements(n: int, quadratic: bool, least: float) -> None:
     """A frequency of a smooth problem converges with twice the polynomial's degree: 4 for CGAX8R
@@ -201,8 +227,10 @@ def test_order_of_the_elements(n: int, quadratic: bool, least: float) -> None:
     rubber = Rubber(C01=1e5)
     limit = np.sqrt(ring((0.2, 0.4, 32), rubber, 0.0, (n,))[n][0])
     meshes = (4, 8, 16)
-    errors = [np.sqrt(ring((0.2, 0.4, k), rubber, 0.0, (n,), 1, quadratic)[n][0]) / limit - 1
-              for k in meshes]  # fmt: skip
+    errors = [
+        np.sqrt(ring((0.2, 0.4, k), rubber, 0.0, (n,), 1, quadratic)[n][0]) / limit - 1
+        for k in meshes
+    ]
     assert (support.order(errors) >= least).all()
 
 

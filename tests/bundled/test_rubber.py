@@ -97,7 +97,8 @@ def test_small_strain_moduli(law: MooneyRivlin) -> None:
     d = np.eye(3)
     pair = np.einsum("ik,JL->iJkL", d, d) + np.einsum("iL,kJ->iJkL", d, d)
     trace = np.einsum("iJ,kL->iJkL", d, d)
-    wanted = G[:, None, None] * pair.reshape(9, 9) + (K - 2 / 3 * G)[:, None, None] * trace.reshape(9, 9)  # fmt: skip
+    G, K = G[:, None, None], K[:, None, None]
+    wanted = G * pair.reshape(9, 9) + (K - 2 / 3 * G) * trace.reshape(9, 9)
     close(rubber.tangent(np.broadcast_to(d, (5, 3, 3)), law), wanted)
 
 

@@ -34,20 +34,20 @@ def harmonics_of(A: Array, shift: Array, X: Array) -> dict[int, Array]:
         Q = frame(angle)
         x = np.insert(X, 1, 0.0, 1) @ Q.T
         samples.append((x @ A.T + shift) @ Q)
-    return {
-        n: (2 if n else 1) * np.mean([u * np.exp(-1j * n * t) for u, t in zip(samples, ANGLES, strict=True)], 0)  # fmt: skip
-        for n in HARMONICS
-    }
+    waves = {n: np.exp(-1j * n * ANGLES)[:, None, None] for n in HARMONICS}
+    return {n: (2 if n else 1) * (np.array(samples) * wave).mean(0) for n, wave in waves.items()}
 
 
 @pytest.fixture
 def patch(random: np.random.Generator) -> tuple[Array, Array]:
     """Nodes and 3 x 3 distorted eight-node elements; the first four columns serve as Q4."""
-    grid = np.stack(np.meshgrid(np.linspace(0.2, 0.5, 7), np.linspace(-0.2, 0.1, 7), indexing="ij"), -1)  # fmt: skip
-    X = grid.reshape(-1, 2) + 0.008 * random.uniform(-1, 1, (49, 2))
+    R, Z = np.linspace(0.2, 0.5, 7), np.linspace(-0.2, 0.1, 7)
+    X = np.stack(np.meshgrid(R, Z, indexing="ij"), -1).reshape(-1, 2)
+    X = X + 0.008 * random.uniform(-1, 1, (49, 2))
     number = np.arange(49).reshape(7, 7)
     steps = [(0, 0), (2, 0), (2, 2), (0, 2), (1, 0), (2, 1), (1, 2), (0, 1)]
-    return X, np.array([[number[i + a, j + b] for a, b in steps] for i in (0, 2, 4) for j in (0, 2, 4)])  # fmt: skip
+    starts = [(i, j) for i in (0, 2, 4) for j in (0, 2, 4)]
+    return X, np.array([[number[i + a, j + b] for a, b in steps] for i, j in starts])
 
 
 @STATE
@@ -118,6 +118,16 @@ def test_hourglass_vectors(patch: tuple[Array, Array], random: np.random.Generat
     size = abs(s.hourglass).max()
     assert abs((s.hourglass * linear[s.connectivity]).sum(1)).max() <= 1e-14 * size
     assert (abs(s.hourglass @ [1, -1, 1, -1]) > 0.5 * size).all()
+
+
+def test_hourglass_scale() -> None:
+    """On a rectangle a x b at mean radius R: gamma . h = sqrt(R a b (1/a^2 + 1/b^2)) for
+    h = (1, -1, 1, -1), since sum |grad N|^2 = 1/a^2 + 1/b^2 at the centre."""
+    a, b, R = 0.02, 0.05, 0.3
+    X = np.array([R, 0.0]) + np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * [a / 2, b / 2]
+    (gamma,) = section.solids(X, np.arange(4)[None], 1).hourglass
+    wanted = np.sqrt(R * a * b * (1 / a**2 + 1 / b**2))
+    assert gamma @ [1, -1, 1, -1] == pytest.approx(wanted, rel=1e-13)
 
 
 @pytest.mark.parametrize("nodes", [4, 8])

@@ -19,9 +19,7 @@ def section():
     z = np.linspace(-0.09, 0.09, 25)
     height = np.linspace(0.0, np.pi, 15)[1:-1]
     side = np.column_stack([0.30 + 0.08 * np.cos(height), 0.09 + 0.03 * np.sin(height)])
-    return np.concatenate(
-        [side * [1, -1], np.column_stack([0.39 - 0.8 * z**2, z]), side]
-    )  # fmt: skip
+    return np.concatenate([side * [1, -1], np.column_stack([0.39 - 0.8 * z**2, z]), side])
 
 
 POINTS = section()

@@ -37,9 +37,16 @@ Array = np.ndarray
 
 SECTION = Path(__file__).parents[2] / "cases" / "p235_75r17.csv"
 TABLE_2 = (
-    Label(0, 0, "axial"), Label(0, 0, "torsional"), Label(1, 1), Label(1, 0), Label(2, 1),
-    Label(2, 0), Label(3, 0), Label(3, 1), Label(4, 0),
-)  # fmt: skip
+    Label(0, 0, "axial"),
+    Label(0, 0, "torsional"),
+    Label(1, 1),
+    Label(1, 0),
+    Label(2, 1),
+    Label(2, 0),
+    Label(3, 0),
+    Label(3, 1),
+    Label(4, 0),
+)
 NOISE = 0.02  # of a mode's largest motion
 TREAD_Z = (-0.08, -0.04, 0.0, 0.04, 0.08)  # m
 SIDEWALL_R = (0.35, 0.30)  # m
@@ -129,8 +136,9 @@ def mirrored(modes: list[RawMode]) -> dict[Label, float]:
     """Frequencies (Hz) by label, from the reflection of the whole section."""
     result = {}
     for n in range(5):
-        pair = [mode for mode in modes if isinstance(mode.shape, HarmonicShape)
-                and mode.shape.n == n][:2]  # fmt: skip
+        pair = [
+            mode for mode in modes if isinstance(mode.shape, HarmonicShape) and mode.shape.n == n
+        ][:2]
         even = [_evenness(mode.shape) for mode in pair]  # type: ignore[arg-type]
         inner, outer = (pair[i] for i in np.argsort(even)[::-1])
         result[Label(n, 0) if n else TABLE_2[1]] = inner.frequency_Hz

@@ -1,0 +1,18 @@
+"""The case file: what a tyre is, read, judged and varied."""
+
+from .load import LoadedCase, load_case, validate
+from .mistakes import CaseError, Mistake
+from .schema import Case
+from .variables import parse_assignment, start_values, with_values
+
+__all__ = [
+    "Case",
+    "CaseError",
+    "LoadedCase",
+    "Mistake",
+    "load_case",
+    "parse_assignment",
+    "start_values",
+    "validate",
+    "with_values",
+]

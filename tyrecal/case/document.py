@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, field
 from math import isfinite
-from pathlib import Path as FilePath
+from pathlib import Path
 from typing import Any
 
 from ruamel.yaml import YAML
@@ -12,8 +13,8 @@ from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.events import AliasEvent, CollectionEndEvent, CollectionStartEvent, NodeEvent
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
-from .mistakes import Mistake, Path, dotted, shortened
-from .numbers import WRONG
+from .mistakes import Keys, Mistake, dotted, shortened
+from .parts import WRONG
 
 MOST_BYTES = 1_000_000
 DEEPEST = 20
@@ -28,24 +29,24 @@ class Document:
 
     file: str
     data: dict[str, Any] | None = None
-    places: dict[Path, tuple[int, str]] = field(default_factory=dict)
+    places: dict[Keys, tuple[int, str]] = field(default_factory=dict)
     mistakes: list[Mistake] = field(default_factory=list)
 
-    def add(self, path: Path, message: str) -> None:
-        """Record a mistake at ``path``, or at the nearest line above it when it is missing."""
-        known = path
+    def add(self, keys: Keys, message: str) -> None:
+        """Record a mistake at ``keys``, on the nearest line above them when they are missing."""
+        known = keys
         while known and known not in self.places:
             known = known[:-1]
         line, text = self.places.get(known, (1, ""))
-        value = text if known == path else "missing"
-        self.mistakes.append(Mistake(self.file, line, dotted(path), value, message))
+        value = text if known == keys else "missing"
+        self.mistakes.append(Mistake(self.file, line, dotted(keys), value, message))
 
     def refuse(self, line: int, message: str) -> None:
         """Record that the file as a whole is wrong."""
         self.mistakes.append(Mistake(self.file, line, "", "", message))
 
 
-def read_document(path: FilePath) -> Document:
+def read_document(path: Path) -> Document:
     """Read a YAML file that holds a mapping; whatever is wrong stands in its mistakes."""
     document = Document(str(path))
     text = _text(path, document)
@@ -68,7 +69,7 @@ def read_document(path: FilePath) -> Document:
     return document
 
 
-def _text(path: FilePath, document: Document) -> str | None:
+def _text(path: Path, document: Document) -> str | None:
     try:
         if path.is_dir():
             document.refuse(1, "is a directory, must be a case file")
@@ -127,20 +128,20 @@ class _Reader:
     document: Document
     constructor: Any
 
-    def value(self, node: Node, path: Path) -> Any:
+    def value(self, node: Node, keys: Keys) -> Any:
         if isinstance(node, MappingNode):
-            return self.mapping(node, path)
+            return self.mapping(node, keys)
         if isinstance(node, SequenceNode):
-            return [self.item(v, (*path, i), v.start_mark.line) for i, v in enumerate(node.value)]
-        return self.scalar(node, path)
+            return [self.item(v, (*keys, i), v.start_mark.line) for i, v in enumerate(node.value)]
+        return self.scalar(node, keys)
 
-    def item(self, node: Node, path: Path, line: int) -> Any:
+    def item(self, node: Node, keys: Keys, line: int) -> Any:
         text = {MappingNode: "a table", SequenceNode: "a list"}.get(type(node))
         text = text or ("null" if node.value == "" and not node.style else str(node.value))
-        self.document.places[path] = line + 1, shortened(text) or "''"
-        return self.value(node, path)
+        self.document.places[keys] = line + 1, shortened(text) or "''"
+        return self.value(node, keys)
 
-    def mapping(self, node: MappingNode, path: Path) -> dict[str, Any]:
+    def mapping(self, node: MappingNode, keys: Keys) -> dict[str, Any]:
         data: dict[str, Any] = {}
         for name, content in node.value:
             line = name.start_mark.line
@@ -148,21 +149,21 @@ class _Reader:
             if not isinstance(name, ScalarNode) or not name.tag.endswith(":str"):
                 self.document.refuse(line + 1, f"the key {shortened(key)} must be a plain word")
             elif key in data:
-                first = self.document.places[(*path, key)][0]
-                where = dotted((*path, key))
-                self.document.refuse(line + 1, f"{where} is given twice, first on line {first}")
+                first = self.document.places[(*keys, key)][0]
+                self.document.mistakes.append(
+                    Mistake(self.document.file, line + 1, dotted((*keys, key)), "given twice",
+                            f"it stands on line {first} already, one of the two must go")
+                )  # fmt: skip
             else:
-                data[key] = self.item(content, (*path, key), line)
+                data[key] = self.item(content, (*keys, key), line)
         return data
 
-    def scalar(self, node: ScalarNode, path: Path) -> Any:
+    def scalar(self, node: ScalarNode, keys: Keys) -> Any:
         if node.tag.rpartition(":")[2] not in ("int", "float", "bool", "null"):
             return node.value
-        try:
+        with suppress(ValueError, OverflowError):  # thousands of digits
             value = self.constructor.construct_object(node, deep=True)
-        except (ValueError, OverflowError):
-            value = float("inf")
-        if isinstance(value, int | float) and not isfinite(value):
-            self.document.add(path, "must be a finite number")
-            return WRONG
-        return value
+            if value is None or isfinite(value):
+                return value
+        self.document.add(keys, "must be a finite number")
+        return WRONG

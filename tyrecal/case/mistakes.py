@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from difflib import get_close_matches
 
-Path = tuple[str | int, ...]
+Keys = tuple[str | int, ...]
 """Keys and list indices that lead to a value of the case."""
 
 
@@ -36,9 +36,9 @@ class CaseError(ValueError):
         self.mistakes = mistakes
 
 
-def dotted(path: Path) -> str:
+def dotted(keys: Keys) -> str:
     """The key as people write it: ``materials.rubber.prony.0.g``."""
-    return ".".join(map(str, path))
+    return ".".join(map(str, keys))
 
 
 def printable(text: str) -> str:

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from .numbers import Degrees, Name, NotNegative, Part, Positive, Problem, Text, WRONG, number
+from .parts import Degrees, Name, NotNegative, Part, Positive, Problem, Text, WRONG, number
 
 Moduli = Literal["long_term", "instantaneous"]
 Element = Literal[
@@ -69,7 +69,8 @@ class Rubber(Part):
         if c10 is not None and c01 is not None and not c10 + c01 > 0:
             yield "C10_Pa", f"C10_Pa + C01_Pa must be greater than 0, their sum is {c10 + c01:g}"
         for share in "gk":
-            terms = values.get("prony", [])
+            terms = values.get("prony")
+            terms = terms if isinstance(terms, list) else []
             total = sum(number(dict(term), share) or 0 for term in terms if term is not WRONG)
             if total >= 1:
                 yield "prony", f"the sum of all {share} must be less than 1, got {total:g}"

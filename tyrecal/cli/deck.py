@@ -10,8 +10,16 @@ from . import options
 
 
 @click.command()
-@options.every(options.case_argument, options.assignments, options.pressure, options.mesh,
-               options.solver, options.output, options.as_json, options.quiet)  # fmt: skip
+@options.every(
+    options.case_argument,
+    options.assignments,
+    options.pressure,
+    options.mesh,
+    options.solver,
+    options.output,
+    options.as_json,
+    options.quiet,
+)
 def command(
     case: Path,
     assignments: tuple[str, ...],

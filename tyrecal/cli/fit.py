@@ -13,16 +13,40 @@ from . import options
 
 @click.command()
 @options.every(options.case_argument, options.assignments, options.pressure)
-@click.option("--method", type=click.Choice(["slsqp", "least-squares"]), default="slsqp",
-              show_default=True, help="Optimiser.")  # fmt: skip
+@click.option(
+    "--method",
+    type=click.Choice(["slsqp", "least-squares"]),
+    default="slsqp",
+    show_default=True,
+    help="Optimiser.",
+)
 @click.option("--fix", multiple=True, metavar="NAME", help="Hold a variable at its start value.")
-@click.option("--starts", type=click.IntRange(1, 100000), default=1, metavar="N", show_default=True,
-              help="Starts: the case's own, the others drawn within the bounds.")  # fmt: skip
-@click.option("--seed", type=click.IntRange(0), default=0, metavar="S", show_default=True,
-              help="Seed of the drawn starts.")  # fmt: skip
+@click.option(
+    "--starts",
+    type=click.IntRange(1, 100000),
+    default=1,
+    metavar="N",
+    show_default=True,
+    help="Starts: the case's own, the others drawn within the bounds.",
+)
+@click.option(
+    "--seed",
+    type=click.IntRange(0),
+    default=0,
+    metavar="S",
+    show_default=True,
+    help="Seed of the drawn starts.",
+)
 @click.option("--pictures/--no-pictures", default=True, help="Draw convergence, section, modes.")
-@options.every(options.jobs, options.mesh, options.solver, options.output, options.as_json,
-               options.quiet, options.verbose)  # fmt: skip
+@options.every(
+    options.jobs,
+    options.mesh,
+    options.solver,
+    options.output,
+    options.as_json,
+    options.quiet,
+    options.verbose,
+)
 def command(
     case: Path,
     assignments: tuple[str, ...],
@@ -65,8 +89,16 @@ def command(
     run = Run(case, output, "fit", adapter)
     door.folder, door.keep = run.folder / "runs", verbose
     with _Progress(quiet, verbose) as progress:
-        fit = calibrate(loaded, door, method, {name: values[name] for name in fix}, starts, seed,
-                        jobs, progress.notify)  # fmt: skip
+        fit = calibrate(
+            loaded,
+            door,
+            method,
+            {name: values[name] for name in fix},
+            starts,
+            seed,
+            jobs,
+            progress.notify,
+        )
     run.write_json("fit.json", fit.result)
     run.write_text("fit.csv", fit_csv(fit.result))
     write_history(run.folder / "fit_history.csv", fit.history)
@@ -116,8 +148,10 @@ def _warnings(result: Mapping[str, Any]) -> list[str]:
         if variable["at_bound"]:
             warnings.append(f"{name} ended at a bound: the data want it beyond")
     if result["failed_evaluations"]:
-        warnings.append(f"{result['failed_evaluations']} designs could not be evaluated; the search"
-                        " stepped back from them")  # fmt: skip
+        warnings.append(
+            f"{result['failed_evaluations']} designs could not be evaluated; the search"
+            " stepped back from them"
+        )
     values = result["singular_values"]
     if values and values[-1] < 1e-3 * values[0]:
         warnings.append("the data do not determine all variables: see singular_values in fit.json")

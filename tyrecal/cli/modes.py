@@ -10,8 +10,17 @@ from . import options
 
 
 @click.command()
-@options.every(options.case_argument, options.assignments, options.pressure, options.mesh,
-               options.solver, options.output, options.as_json, options.quiet, options.verbose)  # fmt: skip
+@options.every(
+    options.case_argument,
+    options.assignments,
+    options.pressure,
+    options.mesh,
+    options.solver,
+    options.output,
+    options.as_json,
+    options.quiet,
+    options.verbose,
+)
 @click.option("--pictures/--no-pictures", default=False, help="Draw the section and each mode.")
 def command(
     case: Path,

@@ -10,20 +10,48 @@ import click
 
 case_argument = click.argument("case", type=click.Path(path_type=Path))
 solver = click.option("--solver", default="", metavar="NAME", help="Solver (default: the case's).")
-output = click.option("--output", type=click.Path(path_type=Path), metavar="DIR",
-                      help="Folder for the results (default: ./NAME-of-case).")  # fmt: skip
-mesh = click.option("--mesh", default="", metavar="LEVEL",
-                    help="Mesh level of the case, e.g. refined (default: the case's).")  # fmt: skip
-as_json = click.option("--json", "as_json", is_flag=True,
-                       help="Result as JSON on standard output, all else on standard error.")  # fmt: skip
+output = click.option(
+    "--output",
+    type=click.Path(path_type=Path),
+    metavar="DIR",
+    help="Folder for the results (default: ./NAME-of-case).",
+)
+mesh = click.option(
+    "--mesh",
+    default="",
+    metavar="LEVEL",
+    help="Mesh level of the case, e.g. refined (default: the case's).",
+)
+as_json = click.option(
+    "--json",
+    "as_json",
+    is_flag=True,
+    help="Result as JSON on standard output, all else on standard error.",
+)
 quiet = click.option("--quiet", is_flag=True, help="Print nothing but errors.")
 verbose = click.option("--verbose", is_flag=True, help="Say more; keep the run folders.")
-jobs = click.option("--jobs", type=click.IntRange(1, 256), default=1, metavar="N", show_default=True,
-                    help="Designs evaluated at a time.")  # fmt: skip
-assignments = click.option("--set", "assignments", multiple=True, metavar="NAME=VALUE",
-                           help="Set a variable or any number of the case; repeatable.")  # fmt: skip
-pressure = click.option("--pressure-kPa", "pressure_kPa", type=float, metavar="P",
-                        help="Inflation pressure (default: the case's).")  # fmt: skip
+jobs = click.option(
+    "--jobs",
+    type=click.IntRange(1, 256),
+    default=1,
+    metavar="N",
+    show_default=True,
+    help="Designs evaluated at a time.",
+)
+assignments = click.option(
+    "--set",
+    "assignments",
+    multiple=True,
+    metavar="NAME=VALUE",
+    help="Set a variable or any number of the case; repeatable.",
+)
+pressure = click.option(
+    "--pressure-kPa",
+    "pressure_kPa",
+    type=float,
+    metavar="P",
+    help="Inflation pressure (default: the case's).",
+)
 
 
 def every(*options: Callable[[Any], Any]) -> Callable[[Any], Any]:

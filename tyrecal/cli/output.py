@@ -59,18 +59,21 @@ class Run:
         """Write run.json: command, times, host, versions, and what else is volatile."""
         import tyrecal
 
-        self.write_json("run.json", {
-            "case": str(self.case),
-            "command": self.command,
-            "arguments": sys.argv[1:],
-            "started": self.started.isoformat(timespec="seconds"),
-            "seconds": round(time.monotonic() - self._clock, 3),
-            "host": platform.node(),
-            "python": platform.python_version(),
-            "tyrecal": tyrecal.__version__,
-            "solver": f"{self.solver.name} {self.solver.version}" if self.solver else None,
-            **facts,
-        })  # fmt: skip
+        self.write_json(
+            "run.json",
+            {
+                "case": str(self.case),
+                "command": self.command,
+                "arguments": sys.argv[1:],
+                "started": self.started.isoformat(timespec="seconds"),
+                "seconds": round(time.monotonic() - self._clock, 3),
+                "host": platform.node(),
+                "python": platform.python_version(),
+                "tyrecal": tyrecal.__version__,
+                "solver": f"{self.solver.name} {self.solver.version}" if self.solver else None,
+                **facts,
+            },
+        )
 
 
 def say(text: str, as_json: bool, quiet: bool) -> None:

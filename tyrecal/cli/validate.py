@@ -22,10 +22,18 @@ def command(case: Path, as_json: bool, quiet: bool) -> int:
     for mistake in mistakes:
         click.echo(f"error: {mistake}", err=True)
     if as_json:
-        print_json([
-            {"file": str(m.file), "line": m.line, "key": m.key, "value": m.value,
-             "message": m.message} for m in mistakes
-        ])  # fmt: skip
+        print_json(
+            [
+                {
+                    "file": str(m.file),
+                    "line": m.line,
+                    "key": m.key,
+                    "value": m.value,
+                    "message": m.message,
+                }
+                for m in mistakes
+            ]
+        )
     if mistakes:
         return 2
     say(f"{case}: no mistakes", as_json, quiet)

@@ -45,11 +45,15 @@ def context(case: LoadedCase) -> dict[str, Any]:
             f"{layer.line}|{angular}",
             {"set": _name(layer.line), "angular": angular, "cords": []},
         )
-        group["cords"].append({
-            "name": _name(name), "area": layer.area_m2,
-            "spacing": layer.spacing_deg if angular else layer.spacing_m,
-            "material": _name(layer.material), "angle": layer.angle_deg,
-        })  # fmt: skip
+        group["cords"].append(
+            {
+                "name": _name(name),
+                "area": layer.area_m2,
+                "spacing": layer.spacing_deg if angular else layer.spacing_m,
+                "material": _name(layer.material),
+                "angle": layer.angle_deg,
+            }
+        )
     rows = tuple(c.mesh.levels[c.mesh.level].rows)
     claims = tuple((tuple(s.regions or ()), tuple(s.between or ())) for s in c.solids)
     lines = frozenset(layer.line for layer in c.rebar_layers.values())
@@ -81,15 +85,21 @@ def _name(text: str) -> str:
 
 def _material(material: Any) -> dict[str, Any]:
     if material.kind == "cord":
-        return {"kind": "cord", "youngs_modulus": material.youngs_modulus_Pa,
-                "poissons_ratio": material.poissons_ratio,
-                "density": material.density_kg_per_m3}  # fmt: skip
+        return {
+            "kind": "cord",
+            "youngs_modulus": material.youngs_modulus_Pa,
+            "poissons_ratio": material.poissons_ratio,
+            "density": material.density_kg_per_m3,
+        }
     return {
-        "kind": "rubber", "C10": material.C10_Pa, "C01": material.C01_Pa, "D1": material.D1_per_Pa,
+        "kind": "rubber",
+        "C10": material.C10_Pa,
+        "C01": material.C01_Pa,
+        "D1": material.D1_per_Pa,
         "moduli": material.moduli.upper().replace("_", " "),
         "prony": [{"g": t.g, "k": t.k, "tau": t.tau_s} for t in material.prony],
         "density": material.density_kg_per_m3,
-    }  # fmt: skip
+    }
 
 
 Claims = tuple[tuple[tuple[str, ...], tuple[str, ...]], ...]
@@ -111,7 +121,9 @@ def _tables(
     for number, (region, row) in mesh.cells.items():
         regions.setdefault(region, []).append(number)
         for i, (wanted, between) in reversed(list(enumerate(claims))):
-            low, high = sorted(edges[lines.index(n)] for n in between) if between else (0, edges[-1])
+            low, high = (
+                sorted(edges[lines.index(n)] for n in between) if between else (0, edges[-1])
+            )
             if low <= row < high and (not wanted or region in wanted):
                 blocks.setdefault(i, []).append((number, *mesh.solids[number]))
                 break

@@ -64,8 +64,18 @@ def render(env: Environment, template: str, names: dict[str, Any]) -> str:
         raise TemplateFailed(f"template '{template}': {error}") from None
     except TemplateSyntaxError as error:
         raise TemplateFailed(f"template '{error.name}', line {error.lineno}: {error}") from None
-    except (TemplateError, OverflowError, ArithmeticError, TypeError, ValueError,
-            AttributeError, LookupError, OSError, RecursionError, MemoryError) as error:  # fmt: skip
+    except (
+        TemplateError,
+        OverflowError,
+        ArithmeticError,
+        TypeError,
+        ValueError,
+        AttributeError,
+        LookupError,
+        OSError,
+        RecursionError,
+        MemoryError,
+    ) as error:
         raise TemplateFailed(
             f"template '{template}'{_place(error, template)}: {type(error).__name__}: {error}"
         ) from None

@@ -91,8 +91,12 @@ def calibrate(
         reports += more
     best = min(reports, key=lambda r: r.point.objective)
     history = _joined([r.history for r in reports])
-    return Fit(_result(problem, initial, best, reports, history, replaced, method), history,
-               initial, best.point)  # fmt: skip
+    return Fit(
+        _result(problem, initial, best, reports, history, replaced, method),
+        history,
+        initial,
+        best.point,
+    )
 
 
 def _run(problem: Problem, start: Array, method: str) -> StartReport:
@@ -101,8 +105,13 @@ def _run(problem: Problem, start: Array, method: str) -> StartReport:
     outcome = METHODS[method](problem, start, TOLERANCE)
     norm = slsqp.projected_gradient(problem, outcome.point)
     history = _history(problem)
-    return StartReport(dict(first.values), outcome.point, outcome.message, norm <= 10 * TOLERANCE,
-                       history if known <= 1 else history[known:])  # fmt: skip
+    return StartReport(
+        dict(first.values),
+        outcome.point,
+        outcome.message,
+        norm <= 10 * TOLERANCE,
+        history if known <= 1 else history[known:],
+    )
 
 
 def _more_starts(
@@ -113,16 +122,20 @@ def _more_starts(
     replaced = 0
     with _workers(jobs) as run_all:
         while len(reports) < count:
-            drawn = [generator.uniform(problem.lower, problem.upper)
-                     for _ in range(count - len(reports))]  # fmt: skip
+            drawn = [
+                generator.uniform(problem.lower, problem.upper) for _ in range(count - len(reports))
+            ]
             for answer in run_all(problem, drawn, method):
                 if isinstance(answer, EvaluationFailed):
                     replaced += 1
                 else:
                     reports.append(answer)
             if replaced > MOST_REPLACED * count:
-                raise EvaluationFailed("no_equilibrium", f"{replaced} drawn starts could not be"
-                                       " evaluated: the bounds hold too few tyres")  # fmt: skip
+                raise EvaluationFailed(
+                    "no_equilibrium",
+                    f"{replaced} drawn starts could not be"
+                    " evaluated: the bounds hold too few tyres",
+                )
     return reports, replaced
 
 
@@ -140,8 +153,10 @@ class _workers:
             self.pool.shutdown(cancel_futures=True)
 
     def _run_all(self, problem: Problem, starts: list[Array], method: str) -> Any:
-        tasks = [(problem.case, problem.door.solver_name, problem.door.folder, problem.fixed, x,
-                  method) for x in starts]  # fmt: skip
+        tasks = [
+            (problem.case, problem.door.solver_name, problem.door.folder, problem.fixed, x, method)
+            for x in starts
+        ]
         if self.pool:
             return self.pool.map(_start_alone, tasks)
         return (_start_here(problem, x, method) for x in starts)
@@ -163,11 +178,13 @@ def _start_alone(task: tuple) -> StartReport | EvaluationFailed:
 def _history(problem: Problem) -> list[dict[str, Any]]:
     names = list(problem.fixed) + [v.name for v in problem.variables]
     return [
-        {"objective_Hz": p.objective if isinstance(p, Point) else None,
-         "failure": None if isinstance(p, Point) else p.words,
-         "values": dict(zip(names, key, strict=True))}
+        {
+            "objective_Hz": p.objective if isinstance(p, Point) else None,
+            "failure": None if isinstance(p, Point) else p.words,
+            "values": dict(zip(names, key, strict=True)),
+        }
         for key, p in problem.points.items()
-    ]  # fmt: skip
+    ]
 
 
 def _joined(histories: list[list[dict[str, Any]]]) -> list[dict[str, Any]]:
@@ -190,8 +207,9 @@ def _result(
     point = best.point
     moved = float(abs(point.x - initial.x).max()) > UNMOVED
     objectives = [row["objective_Hz"] for row in history]
-    near = next(i for i, f in enumerate(objectives, start=1)
-                if f is not None and f < point.objective + 0.05)  # fmt: skip
+    near = next(
+        i for i, f in enumerate(objectives, start=1) if f is not None and f < point.objective + 0.05
+    )
     known = uncertainty(problem, point)
     names = [v.name for v in problem.variables]
     variables = {}
@@ -199,20 +217,30 @@ def _result(
         value = point.values[v.name]
         at_bound = bool(min(point.x[i] - problem.lower[i], problem.upper[i] - point.x[i]) < 1e-6)
         variables[v.name] = {
-            "initial": initial.values[v.name], "value": value, "lower": v.lower, "upper": v.upper,
-            "standard_error": known.standard_errors[i], "at_bound": at_bound,
-        }  # fmt: skip
+            "initial": initial.values[v.name],
+            "value": value,
+            "lower": v.lower,
+            "upper": v.upper,
+            "standard_error": known.standard_errors[i],
+            "at_bound": at_bound,
+        }
     modes = []
     for target in problem.targets:
         mode = point.modes[target.label]
         fitted = mode.frequency_Hz
-        modes.append({
-            "c": target.label.c, "m": target.label.m, "kind": target.label.kind,
-            "frequency_Hz": fitted, "multiplicity": mode.multiplicity,
-            "initial_Hz": initial.modes[target.label].frequency_Hz, "fitted_Hz": fitted,
-            "target_Hz": target.frequency_Hz,
-            "deviation_percent": 100 * (fitted / target.frequency_Hz - 1),
-        })  # fmt: skip
+        modes.append(
+            {
+                "c": target.label.c,
+                "m": target.label.m,
+                "kind": target.label.kind,
+                "frequency_Hz": fitted,
+                "multiplicity": mode.multiplicity,
+                "initial_Hz": initial.modes[target.label].frequency_Hz,
+                "fitted_Hz": fitted,
+                "target_Hz": target.frequency_Hz,
+                "deviation_percent": 100 * (fitted / target.frequency_Hz - 1),
+            }
+        )
     return {
         "format": 1,
         "method": method,
@@ -239,13 +267,18 @@ def _result(
         },
         "singular_values": [float(s) for s in known.singular_values],
         "starts": [
-            {"initial": r.initial, "objective_Hz": r.point.objective, "converged": r.converged,
-             "evaluations": len(r.history), "message": r.message,
-             "values": dict(r.point.values)}
+            {
+                "initial": r.initial,
+                "objective_Hz": r.point.objective,
+                "converged": r.converged,
+                "evaluations": len(r.history),
+                "message": r.message,
+                "values": dict(r.point.values),
+            }
             for r in reports
         ],
         "replaced_starts": replaced,
-    }  # fmt: skip
+    }
 
 
 def _finite(value: float) -> float | None:
@@ -259,5 +292,12 @@ def write_history(path: Path, history: list[dict[str, Any]]) -> None:
         writer = csv.writer(file)
         writer.writerow(["point", "start", *names, "objective_Hz", "failure"])
         for row in history:
-            writer.writerow([row["point"], row["start"], *(row["values"][n] for n in names),
-                             row["objective_Hz"], row["failure"] or ""])  # fmt: skip
+            writer.writerow(
+                [
+                    row["point"],
+                    row["start"],
+                    *(row["values"][n] for n in names),
+                    row["objective_Hz"],
+                    row["failure"] or "",
+                ]
+            )

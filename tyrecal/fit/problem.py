@@ -1,6 +1,6 @@
 """The calibration problem: design variables, targets, and the paper's objective, equation (1).
 
-    F = sqrt( sum over modes, doublets twice, of w (f_num - f_ref)^2 )
+F = sqrt( sum over modes, doublets twice, of w (f_num - f_ref)^2 )
 """
 
 from __future__ import annotations
@@ -169,8 +169,15 @@ class Problem:
         else:
             slopes = self._differences(values, frequencies)
         x = np.array([v.scaled(values[v.name]) for v in self.variables])
-        return Point(values, x, weights * (frequencies - wanted), weights[:, None] * slopes, modes,
-                     clarity, evaluation.mass_kg)  # fmt: skip
+        return Point(
+            values,
+            x,
+            weights * (frequencies - wanted),
+            weights[:, None] * slopes,
+            modes,
+            clarity,
+            evaluation.mass_kg,
+        )
 
     def _modes(
         self, values: dict[str, float], names: tuple[str, ...]

@@ -110,8 +110,14 @@ def _restart(problem: Problem, point: Point, damping: float) -> tuple[Point, boo
         ),
         "jac": lambda y: np.concatenate([turn, -turn]),
     }
-    minimize(function, np.zeros(len(J.T)), jac=True, method="SLSQP", constraints=[bounds],
-             options={"maxiter": 1, "ftol": 1e-15})  # fmt: skip
+    minimize(
+        function,
+        np.zeros(len(J.T)),
+        jac=True,
+        method="SLSQP",
+        constraints=[bounds],
+        options={"maxiter": 1, "ftol": 1e-15},
+    )
     best = min(seen, key=lambda p: p.objective)
     return best, len(seen) > 2 and best is seen[2]
 

@@ -48,7 +48,9 @@ def build_mesh(
     """
     step = 2 if quadratic else 1
     lines, regions, rigid, present = resample(section, [step * n for n in elements])
-    grid = _through_thickness(lines, rows, step, grading or [1.0] * len(rows))  # (row points, columns, 2)
+    grid = _through_thickness(
+        lines, rows, step, grading or [1.0] * len(rows)
+    )  # (row points, columns, 2)
     mirrored = grid[:, :0:-1] * [1.0, -1.0]
     grid = np.concatenate([mirrored, grid], 1)
     regions = regions[::-1] + regions
@@ -57,7 +59,7 @@ def build_mesh(
     _check_unfolded(grid, regions)
 
     height, width = grid.shape[0], grid.shape[1]
-    number = lambda i, j: 1000 * (j + 1) + i + 1  # noqa: E731
+    number = lambda i, j: 1000 * (j + 1) + i + 1
     nodes, rim = {}, []
     for j in range(width):
         for i in range(0, height, step if j % step else 1):
@@ -87,8 +89,17 @@ def build_mesh(
         }
     crown = [j for j in range(width) if present[-2, j]] or list(range(width))
     outer = [number(height - 1, j) for j in crown]
-    return SectionMesh(quadratic, nodes, solids, cells, cords, rim, inner,
-                       ((width - 1) // step, (height - 1) // step), outer)  # fmt: skip
+    return SectionMesh(
+        quadratic,
+        nodes,
+        solids,
+        cells,
+        cords,
+        rim,
+        inner,
+        ((width - 1) // step, (height - 1) // step),
+        outer,
+    )
 
 
 def _through_thickness(lines: Array, rows: list[int], step: int, grading: list[float]) -> Array:
@@ -118,5 +129,6 @@ def _check_unfolded(grid: Array, regions: list[str]) -> None:
     if len(folded):
         i, j = folded[0]
         r, z = grid[i, j] * 1e3
-        raise SectionError(f"the section folds over in region '{regions[j]}'"
-                           f" near r = {r:.1f} mm, z = {z:.1f} mm")  # fmt: skip
+        raise SectionError(
+            f"the section folds over in region '{regions[j]}' near r = {r:.1f} mm, z = {z:.1f} mm"
+        )

@@ -52,12 +52,15 @@ def read_section(path: Path) -> Section:
             if needed not in header:
                 raise SectionError(f"column '{needed}' is missing", 1)
         if len(names) < 2:
-            raise SectionError("at least an inner and an outer line are needed, got"
-                               f" {', '.join(names) or 'none'}", 1)  # fmt: skip
+            raise SectionError(
+                f"at least an inner and an outer line are needed, got {', '.join(names) or 'none'}",
+                1,
+            )
         points, labels, rigid = [], [], []
         for row in reader:
-            points.append([[_mm(row, f"{n}_{axis}_mm", reader.line_num) for axis in "rz"]
-                           for n in names])  # fmt: skip
+            points.append(
+                [[_mm(row, f"{n}_{axis}_mm", reader.line_num) for axis in "rz"] for n in names]
+            )
             labels.append(row["region"])
             if row["rigid"] not in ("0", "1"):
                 raise SectionError(f"rigid is '{row['rigid']}', must be 0 or 1", reader.line_num)
@@ -68,8 +71,9 @@ def read_section(path: Path) -> Section:
     for end in (0, -1):
         missing = np.flatnonzero(np.isnan(table[end]).any(1))
         if len(missing):
-            raise SectionError(f"line '{names[end]}' must be given at every station",
-                               int(missing[0]) + 2)  # fmt: skip
+            raise SectionError(
+                f"line '{names[end]}' must be given at every station", int(missing[0]) + 2
+            )
     if abs(table[0, 0, 1]) > 1e-9:
         raise SectionError("the first station must lie on the centre plane, z = 0", 2)
     starts = [0] + [i for i in range(1, len(labels)) if labels[i] != labels[i - 1]]

@@ -1,0 +1,180 @@
+"""Derivatives of the modes by numbers of the deck, against central differences."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from tyrecal_solvers.bundled import harmonics, keywords, model, sensitivity
+from tyrecal_solvers.bundled.mechanics import Load
+
+from . import support
+
+Array = np.ndarray
+HARMONICS, COUNT, PRESSURE = (0, 1, 2, 3), 2, 240e3
+TYRE = support.tyre((3, 2, 2, 1))
+LINES = TYRE.deck.splitlines()
+
+
+def line(start: str, after: str = "*HEADING") -> int:
+    """0-based line of the deck, the first that starts so behind ``after``."""
+    return next(i for i in range(LINES.index(after), len(LINES)) if LINES[i].startswith(start))
+
+
+@dataclass(frozen=True)
+class Place:
+    """Numbers of the deck that one variable moves: 0-based lines, a field, the variable's scale."""
+
+    lines: tuple[int, ...]
+    field: int
+    scale: float
+
+    def moved(self, by: float) -> str:
+        """The deck with the numbers increased by ``by`` times the scale."""
+        lines = LINES.copy()
+        for i in self.lines:
+            fields = lines[i].split(",")
+            fields[self.field] = repr(float(fields[self.field]) + by * self.scale)
+            lines[i] = ",".join(fields)
+        return "\n".join(lines)
+
+    @property
+    def tangents(self) -> list[tuple[int, int, float]]:
+        return [(i + 1, self.field, self.scale) for i in self.lines]
+
+
+BELTS, PLY = (line("L2,"), line("L3,")), (line("L1,"),)
+NODE = (line("80,"),)  # on the inner surface, so that the pressure meets it too
+RUBBER = (line("1000000.0,"),)
+VARIABLES = {
+    "belt area": Place(BELTS, 1, 2.1e-7),
+    "carcass area": Place(PLY, 1, 4.2e-7),
+    "belt angle": Place(BELTS[:1], 5, 20.0),
+    "carcass spacing": Place(PLY, 2, 1e-3),
+    "rubber density": Place((line("1100.0"),), 0, 1100.0),
+    "cord density": Place((line("1500.0"),), 0, 1500.0),
+    "belt modulus": Place((line("1722", "*MATERIAL, NAME=CORD2"),), 0, 1.722e11),
+    "C10": Place(RUBBER, 0, 1e6),
+    "C01": Place(RUBBER, 1, 1e6),
+    "D1": Place(RUBBER, 2, 5.085e-8),
+    "R of a node": Place(NODE, 1, 0.003),
+    "Z of a node": Place(NODE, 2, 0.003),
+}
+
+
+@dataclass(frozen=True)
+class Modes:
+    state: Array
+    vibration: harmonics.Vibration
+    n: Array
+    shapes: Array
+    eigenvalues: Array
+
+
+def solve(text: str, pressure: float = PRESSURE) -> Modes:
+    m = support.model_of(text)
+    mask, loads = support.held(m, TYRE.rim), support.cavity(m, pressure)
+    U = support.inflate(m, mask, loads)
+    vibration = harmonics.Vibration(m, U, loads, support.numbering(m, mask), 0.0)
+    found = [vibration.modes(n, COUNT) for n in HARMONICS]
+    return Modes(
+        U,
+        vibration,
+        np.repeat(HARMONICS, COUNT),
+        np.concatenate([f.shapes for f in found]),
+        np.concatenate([f.eigenvalues for f in found]),
+    )
+
+
+@pytest.fixture(scope="module")
+def base() -> Modes:
+    return solve(TYRE.deck)
+
+
+def rates(
+    base: Modes,
+    tangents: list[tuple[int, int, float]],
+    pressure: complex,
+    strains: sensitivity.Strains | None = None,
+) -> Array:
+    """d lambda by the solver's complex step, for tangents on the deck and on the pressure."""
+    seeded = model.build(keywords.seed(keywords.read_keywords(TYRE.deck), tangents), None, True)
+    loads = [Load(seeded.mesh.faces["CAVITY"], pressure)]
+    factor = base.vibration.factor(0)
+    number = base.vibration.numbering
+    V = sensitivity.state_rate(seeded, base.state, loads, number, factor)
+    return sensitivity.eigenvalue_rates(
+        seeded, base.state, V, loads, base.n, base.shapes, base.eigenvalues, strains
+    )
+
+
+def difference(at: Callable[[float], Array]) -> Array:
+    """Derivative at 0, central difference of fourth order."""
+    h = 5e-3
+    return (8 * (at(h) - at(-h)) - at(2 * h) + at(-2 * h)) / (12 * h)
+
+
+def hertz_per_unit(rate: Array, eigenvalues: Array) -> Array:
+    return rate / (8 * np.pi**2 * support.hertz(eigenvalues))
+
+
+def agree(got: Array, wanted: Array) -> None:
+    assert abs(wanted).max() > 1e-3  # Hz per scale of the variable: something to compare
+    assert abs(got - wanted).max() <= 1e-5 * abs(wanted).max()
+
+
+@pytest.mark.parametrize("name", VARIABLES)
+def test_against_central_differences(base: Modes, name: str) -> None:
+    """d f/dp of eight modes, the change of the inflated state included: within 1e-5 of the mode
+    that moves most. f = sqrt(lambda) / 2 pi."""
+    place = VARIABLES[name]
+    got = hertz_per_unit(rates(base, place.tangents, PRESSURE), base.eigenvalues)
+    agree(got, difference(lambda s: support.hertz(solve(place.moved(s)).eigenvalues)))
+
+
+def test_pressure_against_central_differences(base: Modes) -> None:
+    """The same by ln p."""
+    got = rates(base, [], complex(PRESSURE, keywords.STEP * PRESSURE))
+    wanted = difference(lambda s: support.hertz(solve(TYRE.deck, PRESSURE * np.exp(s)).eigenvalues))
+    agree(hertz_per_unit(got, base.eigenvalues), wanted)
+
+
+def test_remembered_strains_change_nothing(base: Modes) -> None:
+    """One memory of the modes' gradients serves all variables, a node's among them, whose
+    operators differ: the same rates to the last digit as each on its own."""
+    strains: sensitivity.Strains = {}
+    for name in ("C10", "R of a node", "belt area"):
+        tangents = VARIABLES[name].tangents
+        shared = rates(base, tangents, PRESSURE, strains)
+        np.testing.assert_array_equal(shared, rates(base, tangents, PRESSURE))
+    assert len(strains) == 2
+
+
+def test_preload_matters(base: Modes) -> None:
+    """With the state frozen the derivative by the carcass' area comes out wrong by more than its
+    own size: the change of the preload is part of the answer (facts/mechanics.md)."""
+    tangents = VARIABLES["carcass area"].tangents
+    whole = rates(base, tangents, PRESSURE)
+    seeded = model.build(keywords.seed(keywords.read_keywords(TYRE.deck), tangents), None, True)
+    loads = support.cavity(seeded, PRESSURE)
+    frozen = sensitivity.eigenvalue_rates(
+        seeded, base.state, 0 * base.state, loads, base.n, base.shapes, base.eigenvalues
+    )
+    assert abs(frozen - whole).max() > abs(whole).max()
+
+
+def test_euler_identity(base: Modes) -> None:
+    """lambda is homogeneous of degree 0 in (moduli, 1/D1, pressure, densities) scaled together:
+    stiffness and mass grow alike, the shape stays. sum of p d lambda/dp = 0."""
+    total = rates(base, [], complex(PRESSURE, keywords.STEP * PRESSURE))
+    C10, C01, D1 = map(float, LINES[RUBBER[0]].split(","))
+    places = [Place(RUBBER, 0, C10), Place(RUBBER, 1, C01), Place(RUBBER, 2, -D1)]
+    places += [VARIABLES["rubber density"], VARIABLES["cord density"], VARIABLES["belt modulus"]]
+    belt3 = "*MATERIAL, NAME=CORD3"
+    places += [Place((line("1722", belt3),), 0, 1.722e11), Place((line("9870"),), 0, 9.87e9)]
+    places += [Place((line("5900", m),), 0, 5900.0) for m in ("*MATERIAL, NAME=CORD2", belt3)]
+    tangents = [t for place in places for t in place.tangents]
+    total = total + rates(base, tangents, PRESSURE)
+    assert abs(total).max() <= 1e-9 * base.eigenvalues.max()

@@ -1,0 +1,180 @@
+"""The deck is a real door: what stands in it, and only that, decides the result."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from importlib.resources import files
+from pathlib import Path
+
+import pytest
+
+from tyrecal.case import load_case, start_values, with_values
+from tyrecal.deck.environment import TemplateFailed, number
+from tyrecal.deck.write import Decks
+from tyrecal.evaluate.door import Door, Question
+from tyrecal.evaluate.failure import DeckRefused
+
+from ..conftest import CASES
+
+SHIPPED = Path(str(files("tyrecal_templates") / "abaqus"))
+
+
+def case_with_template(folder: Path, name: str, old: str, new: str):
+    """The case with one of its templates edited in the user's own folder."""
+    own = folder / "my templates"
+    own.mkdir(exist_ok=True)
+    text = (SHIPPED / name).read_text()
+    assert old in text
+    (own / name).write_text(text.replace(old, new))
+    path = folder / "p235_75r17.yaml"
+    path.write_text(path.read_text() + "\ntemplates: my templates\n")
+    return load_case(path)
+
+
+def frequencies(case) -> list[float]:
+    return [m.frequency_Hz for m in Door(case).evaluate(Question(start_values(case))).modes]
+
+
+def test_a_number_edited_in_the_users_template_moves_the_frequencies(case_folder: Path) -> None:
+    """Density x 1.21 in the template is density x 1.21 in the case; so is a cord angle."""
+    plain = load_case(CASES / "p235_75r17.yaml")
+    edited = case_with_template(
+        case_folder,
+        "inflate.inp.j2",
+        "{{ material.density | number }}",
+        "{{ (material.density * 1.21) | number }}",
+    )
+    same = with_values(
+        plain,
+        {
+            f"materials.{name}.density_kg_per_m3": 1.21 * density
+            for name, density in (
+                ("rubber", 1100.0),
+                ("belt_cord", 5900.0),
+                ("carcass_cord", 1500.0),
+            )
+        },
+    )
+    assert frequencies(edited) == pytest.approx(frequencies(same), rel=1e-9)
+    # every mass grows by 1.21, so every frequency falls by 1.1
+    assert frequencies(edited) == pytest.approx([f / 1.1 for f in frequencies(plain)], rel=1e-9)
+
+
+def test_a_cord_angle_edited_in_the_users_template(case_folder: Path) -> None:
+    plain = load_case(CASES / "p235_75r17.yaml")
+    edited = case_with_template(
+        case_folder,
+        "inflate.inp.j2",
+        "{{ cord.angle | number }}",
+        "{{ (cord.angle - 2 if cord.name == 'BELT_1' else cord.angle) | number }}",
+    )
+    same = with_values(plain, {"rebar_layers.belt_1.angle_deg": 68.0})
+    assert frequencies(edited) == pytest.approx(frequencies(same), rel=1e-12)
+    assert abs(frequencies(edited)[6] / frequencies(plain)[6] - 1) > 1e-3
+
+
+def test_the_solver_alone_gives_the_same_bytes(tmp_path: Path) -> None:
+    """The written decks, run by another process through the solver's own command."""
+    case = load_case(CASES / "p235_75r17.yaml")
+    values = start_values(case)
+    door = Door(case, folder=tmp_path / "runs", keep=True)
+    door.evaluate(Question(values, tuple(values)))
+    (run,) = door.folder.iterdir()
+    alone = tmp_path / "alone"
+    alone.mkdir()
+    for name in ("inflate.inp", "modes.inp", "modes.request.json"):
+        (alone / name).write_bytes((run / name).read_bytes())
+    subprocess.run(
+        [
+            sys.executable,
+            "-m",
+            "tyrecal_solvers.bundled",
+            str(alone / "modes.inp"),
+            "--oldjob",
+            "inflate",
+        ],
+        check=True,
+    )
+    for name in ("modes.json", "modes.npz"):
+        assert (alone / name).read_bytes() == (run / name).read_bytes()
+
+
+def test_without_the_side_file_the_deck_alone_is_solved(tmp_path: Path) -> None:
+    """*FREQUENCY's number of modes then decides, over all harmonics, doublets counted twice."""
+    case = load_case(CASES / "p235_75r17.yaml")
+    for name, text in Decks(case, start_values(case)).texts("abaqus").items():
+        (tmp_path / name).write_text(text.replace("\n20\n", "\n16\n"))
+    from tyrecal_solvers.bundled.job import run
+
+    run(tmp_path, "modes", "inflate")
+    import json
+
+    modes = json.loads((tmp_path / "modes.json").read_text())["steps"][0]["modes"]
+    assert sum(mode["multiplicity"] for mode in modes) == 16
+    expected = sorted(frequencies(with_values(case, start_values(case))))
+    assert [m["frequency_Hz"] for m in modes] == pytest.approx(expected[: len(modes)], rel=1e-9)
+
+
+def test_tangents_find_every_place_of_a_variable() -> None:
+    """Both belts' areas move with A_belt, one for one; C10 stands in one place."""
+    case = load_case(CASES / "p235_75r17.yaml")
+    values = start_values(case)
+    decks = Decks(case, values, tuple(values))
+    tangents = decks.tangents("abaqus")
+    lines = decks.texts("abaqus")["inflate.inp"].splitlines()
+    assert {n: len(rows) for n, rows in tangents.items()} == {"A_belt": 2, "A_carcass": 1, "C10": 1}
+    for job, line, field, slope in (row for rows in tangents.values() for row in rows):
+        assert job == "inflate"
+        assert slope == pytest.approx(1.0, rel=1e-8)
+        assert float(lines[line - 1].split(",")[field]) in values.values()
+
+
+@pytest.mark.parametrize(
+    ("edit", "words"),
+    [
+        ("{{ ''.__class__.__mro__ }}", "unsafe"),
+        ("{{ cycler.__init__.__globals__.os.system('true') }}", "unsafe"),
+        ("{% include '/etc/passwd' %}", "passwd"),
+        ("{% include '../p235_75r17.yaml' %}", "p235"),
+        ("{{ no_such_name }}", "no_such_name"),
+        ("{{ layers.append(1) }}", "unsafe"),
+        ("{{ 'abc' | number }}", "not a number"),
+        ("{{ (1e308 * 10) | number }}", "finite"),
+        ("{% for i in range(100000000) %}x{% endfor %}", "range"),
+        ("{% if %}", "line 2"),
+    ],
+)
+def test_a_template_may_not_leave_its_sandbox(case_folder: Path, edit: str, words: str) -> None:
+    case = case_with_template(case_folder, "inflate.inp.j2", "*HEADING\n", f"*HEADING\n{edit}\n")
+    with pytest.raises(TemplateFailed, match="inflate") as failure:
+        Decks(case).texts("abaqus")
+    assert words in str(failure.value)
+    assert "\n" not in str(failure.value)
+
+
+def test_a_link_out_of_the_template_folder_is_refused(case_folder: Path, tmp_path: Path) -> None:
+    case = case_with_template(
+        case_folder, "inflate.inp.j2", "*HEADING\n", "*HEADING\n{% include 'link.txt' %}\n"
+    )
+    (tmp_path / "secret.txt").write_text("secret")
+    (case_folder / "my templates" / "link.txt").symlink_to(tmp_path / "secret.txt")
+    with pytest.raises(TemplateFailed, match="leads out"):
+        Decks(case).texts("abaqus")
+
+
+@pytest.mark.parametrize("keyword", ["*TIE, NAME=X", "*NODE, SYSTEM=C", "*INCLUDE, INPUT=x.inp"])
+def test_an_unknown_keyword_is_refused_by_name_and_line(case_folder: Path, keyword: str) -> None:
+    case = case_with_template(case_folder, "inflate.inp.j2", "*RESTART, WRITE\n", f"{keyword}\n")
+    with pytest.raises(DeckRefused, match=r"inflate\.inp, line 4: .* is not honoured"):
+        Door(case).evaluate(Question({}))
+
+
+def test_numbers_have_thirteen_digits_and_fit_abaqus_fields() -> None:
+    for value in (-1.2345678901234567e-107, 1 / 3, -2.118683e-7, 1e6, 0.0, 240000):
+        text = number(value)
+        assert len(text) <= 20
+        assert float(text) == pytest.approx(value, rel=1e-12)
+    for wrong in (float("nan"), float("inf"), True, "1", None, 1j):
+        with pytest.raises(TemplateFailed):
+            number(wrong)

@@ -1,0 +1,74 @@
+"""A tyre with frequencies in closed form behind the same door, to test the optimiser alone."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from tyrecal.evaluate.door import Question
+from tyrecal.evaluate.failure import EvaluationFailed
+from tyrecal.evaluate.results import Evaluation, HarmonicShape, RawMode
+from tyrecal.modes.mode import Label
+
+WIDTH = np.linspace(-0.08, 0.08, 9)
+POINTS = np.stack([np.full(9, 0.39), WIDTH], 1)
+LABELS = [
+    Label(0, 0, "axial"),
+    Label(0, 0, "torsional"),
+    Label(1, 1),
+    Label(1, 0),
+    Label(2, 1),
+    Label(2, 0),
+    Label(3, 0),
+    Label(3, 1),
+    Label(4, 0),
+]
+
+
+def shape(label: Label) -> HarmonicShape:
+    """The belt moving as the label says."""
+    u = np.zeros((9, 3), complex)
+    if label.kind == "axial" or label.m == 1:
+        u[:, 2] = 1.0
+    elif label.kind == "torsional":
+        u[:, 1] = 1.0
+    else:
+        u[:, 0], u[:, 1] = 1.0, 1j / label.c
+    return HarmonicShape(label.c, np.arange(9), POINTS, u)
+
+
+class FakeDoor:
+    """Frequencies f_i = base_i exp(sum_j power_ij ln(x_j / start_j)), with exact slopes.
+
+    fails: designs for which the solver gives up.
+    """
+
+    solver_name, folder = "fake", None
+
+    def __init__(
+        self,
+        base: Mapping[Label, float],
+        powers: Mapping[str, np.ndarray],
+        start: Mapping[str, float],
+        fails: Callable[[Mapping[str, float]], bool] = lambda values: False,
+        has_gradients: bool = True,
+    ):
+        self.base, self.powers, self.start = base, powers, start
+        self.fails, self.has_gradients = fails, has_gradients
+        self.calls = 0
+
+    def evaluate(self, question: Question) -> Evaluation:
+        self.calls += 1
+        values = question.values
+        if self.fails(values):
+            raise EvaluationFailed("no_equilibrium", "inflation stopped at 12 of 240 kPa")
+        f = np.array([self.base[label] for label in LABELS])
+        for name, power in self.powers.items():
+            f = f * (values[name] / self.start[name]) ** power
+        modes = tuple(
+            RawMode(float(x), shape(label), 2 if label.c else 1)
+            for x, label in zip(f, LABELS, strict=True)
+        )
+        gradients = {n: f * self.powers[n] / values[n] for n in question.gradients}
+        return Evaluation(240.0, 12.8, modes, gradients)

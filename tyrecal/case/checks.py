@@ -1,0 +1,262 @@
+"""What must agree between the parts of a case, and between the case and its section.
+
+All checks read plain data in which wrong values are WRONG, so that one mistake never hides
+another one, nor causes one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from typing import TYPE_CHECKING, Any
+
+from pydantic import BaseModel, ValidationError
+
+from .mistakes import Keys, dotted, suggestion
+from .parts import WRONG, number
+from .shape import KINDS, explain, table, type_at
+
+if TYPE_CHECKING:
+    from ..tyre.section import Section
+
+Problems = Iterator[tuple[Keys, str]]
+MOST_ELEMENTS = 20_000
+# what a variable cannot set: a fit that moved its own bounds or targets would mean nothing
+FIXED = ("format", "variables", "targets", "solver")
+
+
+def problems(data: Mapping[str, Any], section: Section | None) -> Problems:
+    """Every disagreement in ``data``; those with the section only where there is one."""
+    yield from _names(data)
+    yield from _targets(data)
+    yield from _variables(data)
+    level = table(data, "mesh").get("level")
+    levels = table(data, "mesh").get("levels")
+    if isinstance(level, str) and isinstance(levels, dict) and level not in levels:
+        yield ("mesh", "level"), f"is not one of the levels{suggestion(level, levels)}"
+    if section:
+        yield from _places(data, section)
+        yield from _levels(data, section)
+
+
+def _names(data: Mapping[str, Any]) -> Problems:
+    """Materials exist and have the right kind; names differ by more than upper and lower case."""
+    for part in ("materials", "rebar_layers"):
+        seen: dict[str, str] = {}
+        for name in table(data, part):
+            first = seen.setdefault(name.casefold(), name)
+            if first != name:
+                yield (part, name), f"differs from '{first}' only in upper and lower case"
+    uses: list[tuple[Keys, Any, str]] = [
+        (("rebar_layers", name), layer, "cord")
+        for name, layer in table(data, "rebar_layers").items()
+    ]
+    uses += [(("solids", i), solid, "rubber") for i, solid in enumerate(_list(data, "solids"))]
+    materials = table(data, "materials")
+    for keys, part, kind in uses:
+        name = part.get("material") if isinstance(part, dict) else None
+        if not isinstance(name, str) or not materials:
+            continue
+        if name not in materials:
+            yield (*keys, "material"), f"is not one of the materials{suggestion(name, materials)}"
+        else:
+            found = table(materials, name).get("kind", kind)
+            if found not in (kind, WRONG):
+                yield (*keys, "material"), f"must be a {kind}, '{name}' is a {found}"
+
+
+def _targets(data: Mapping[str, Any]) -> Problems:
+    seen: dict[tuple[Any, ...], int] = {}
+    highest = number(table(data, "analysis"), "highest_harmonic")
+    for i, mode in enumerate(_list(table(data, "targets"), "modes")):
+        if not isinstance(mode, dict):
+            continue
+        c = number(mode, "c")
+        if c is not None and highest is not None and c > highest:
+            yield ("targets", "modes", i, "c"), f"must be at most highest_harmonic, {highest}"
+        label = (c, number(mode, "m"), mode.get("kind"))
+        if WRONG in label or None in label[:2]:
+            continue
+        first = seen.setdefault(label, i)
+        if first != i:
+            name = f"[{label[0]},{label[1]}]" + (f" {label[2]}" if label[2] else "")
+            yield ("targets", "modes", i), f"the mode {name} is a target already"
+
+
+def _variables(data: Mapping[str, Any]) -> Problems:
+    """Variables set numbers that exist, are not whole, allow the bounds, and are set once."""
+    owners: dict[Keys, str] = {}
+    for name, variable in table(data, "variables").items():
+        for i, path in enumerate(_list(variable, "sets")):
+            here: Keys = ("variables", name, "sets", i)
+            if not isinstance(path, str):
+                continue
+            try:
+                keys = find(data, path)
+            except KeyError as error:
+                yield here, str(error.args[0])
+                continue
+            if not keys:
+                continue
+            parent, value = keys[:-1], at(data, keys)
+            if keys[0] in FIXED:
+                yield here, f"a variable cannot set {keys[0]}"
+            elif type_at(keys) is int:
+                yield here, "is a whole number, which cannot vary"
+            elif value is not WRONG and not _is_number(value):
+                yield here, "leads to no number"
+            elif keys in owners:
+                yield here, f"is set by '{owners[keys]}' already"
+            else:
+                owners[keys] = name
+                for bound in ("lower", "upper"):
+                    limit = number(variable, bound)
+                    if limit is not None and (message := _refusal(data, parent, keys, limit)):
+                        yield ("variables", name, bound), f"{path} {message}"
+
+
+def _refusal(data: Mapping[str, Any], parent: Keys, keys: Keys, value: float) -> str | None:
+    """Why the schema would not have ``value`` at ``keys``, judged in the part that holds it."""
+    part, model = at(data, parent), type_at(parent)
+    if not isinstance(part, dict):
+        return None
+    if keys[0] == "materials" and len(parent) == 2:
+        model = KINDS.get(part.get("kind", ""))
+    if not (isinstance(model, type) and issubclass(model, BaseModel)):
+        return None
+    try:
+        model.model_validate({**part, keys[-1]: value})
+    except ValidationError as error:
+        for wrong, message in explain(error, parent):
+            if wrong == keys:
+                return message
+    return None
+
+
+def _places(data: Mapping[str, Any], section: Section) -> Problems:
+    """Lines and regions exist, and every part of the section has a material."""
+    lines = list(section.names)
+    regions = [name for name, _ in section.regions]
+    for name, layer in table(data, "rebar_layers").items():
+        line = layer.get("line") if isinstance(layer, dict) else None
+        if isinstance(line, str) and line not in lines[1:-1]:
+            hint = suggestion(line, lines[1:-1])
+            yield ("rebar_layers", name, "line"), f"is not a line inside the section{hint}"
+    bare = {(region, gap) for region in regions for gap in range(len(lines) - 1)}
+    whole = True
+    for i, solid in enumerate(_list(data, "solids")):
+        where, between = _list(solid, "regions"), _list(solid, "between")
+        whole &= isinstance(solid, dict) and WRONG not in solid.values()
+        for j, region in enumerate(where):
+            if isinstance(region, str) and region not in regions:
+                hint = suggestion(region, regions)
+                yield ("solids", i, "regions", j), f"is not a region of the section{hint}"
+        unknown = [line for line in between if line not in lines]
+        for j, line in enumerate(between):
+            if isinstance(line, str) and line in unknown:
+                hint = suggestion(line, lines)
+                yield ("solids", i, "between", j), f"is not a line of the section{hint}"
+        low, high = 0, len(lines) - 1
+        if between:
+            if unknown or len(between) != 2:
+                whole = False
+                continue
+            low, high = lines.index(between[0]), lines.index(between[1])
+            if low >= high:
+                yield ("solids", i, "between"), "must name the inner line first, then the outer"
+                whole = False
+        bare -= {(r, gap) for r in where or regions for gap in range(low, high)}
+    if bare and whole and isinstance(data.get("solids"), list):
+        region, gap = min(bare, key=lambda place: (regions.index(place[0]), place[1]))
+        yield ("solids",), (f"must cover the section: region '{region}' has no material"
+                            f" between '{lines[gap]}' and '{lines[gap + 1]}'")  # fmt: skip
+
+
+def _levels(data: Mapping[str, Any], section: Section) -> Problems:
+    """Every mesh level fits the section."""
+    gaps = len(section.names) - 1
+    regions = [name for name, _ in section.regions]
+    for name, level in table(table(data, "mesh"), "levels").items():
+        here: Keys = ("mesh", "levels", name)
+        elements = table(level, "elements")
+        if elements:
+            for region in elements:
+                if region not in regions:
+                    hint = suggestion(region, regions)
+                    yield (*here, "elements", region), f"is not a region of the section{hint}"
+            for region in regions:
+                if region not in elements:
+                    yield (*here, "elements", region), "must be given, the section has this region"
+        for key in ("rows", "grading"):
+            entries = _list(level, key)
+            if entries and len(entries) != gaps:
+                yield (*here, key), (f"must have {gaps} entries, one for each gap between the"
+                                     f" lines {', '.join(section.names)}, got {len(entries)}")  # fmt: skip
+        count = _sum(elements.values()) * _sum(_list(level, "rows"))
+        if count > MOST_ELEMENTS:
+            yield here, f"must have at most {MOST_ELEMENTS} elements, elements x rows is {count}"
+
+
+def folds(data: Mapping[str, Any], section: Section) -> str | None:
+    """Why the section cannot be meshed at the chosen level of ``data``, which is right so far."""
+    import numpy as np
+
+    from ..tyre.mesh import build_mesh
+
+    mesh = data["mesh"]
+    level = mesh["levels"][mesh["level"]]
+    elements = [level["elements"][region] for region, _ in section.regions]
+    try:
+        with np.errstate(all="ignore"):
+            built = build_mesh(
+                section, elements, level["rows"], "8" in mesh["element"], level.get("grading")
+            )
+    except ValueError as error:
+        return str(error)
+    if not np.isfinite(list(built.nodes.values())).all():
+        return "two lines of the section run through one point, no mesh fits between them"
+    return None
+
+
+def find(data: Mapping[str, Any] | BaseModel, path: str) -> Keys:
+    """Keys of the dotted ``path``; none when a WRONG value stands in the way.
+
+    KeyError, with what would be right, where there is no such path.
+    """
+    keys: Keys = ()
+    here: Any = data
+    for word in path.split("."):
+        if here is WRONG:
+            return ()
+        key: str | int = word
+        if isinstance(here, list):
+            known = [str(i) for i in range(len(here))]
+            key = int(word) if word in known else word
+        elif isinstance(here, BaseModel):
+            known, here = list(type(here).model_fields), here.__dict__
+        else:
+            known = list(here) if isinstance(here, Mapping) else []
+        if word not in known:
+            place = f" in '{dotted(keys)}'" if keys else " in the case"
+            raise KeyError(f"there is no '{word}'{place}{suggestion(word, known)}")
+        here, keys = here[key], (*keys, key)
+    return keys
+
+
+def at(data: Any, keys: Keys) -> Any:
+    """The value at ``keys``, which exists."""
+    for key in keys:
+        data = data[key]
+    return data
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _list(data: Any, key: str) -> list[Any]:
+    value = data.get(key) if isinstance(data, dict) else None
+    return value if isinstance(value, list) else []
+
+
+def _sum(values: Iterable[Any]) -> int:
+    return sum(v for v in values if isinstance(v, int))

@@ -1,0 +1,86 @@
+"""A case file read and judged: everything that is wrong with it in one go."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from copy import deepcopy
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from pydantic import ValidationError
+
+from .checks import folds, problems
+from .document import Document, read_document
+from .mistakes import CaseError, Keys, Mistake, dotted
+from .schema import Case
+from .shape import disagreements, explain, without
+from .stations import check_templates, read_stations
+
+if TYPE_CHECKING:
+    from ..tyre.section import Section
+
+
+@dataclass(frozen=True)
+class LoadedCase:
+    """A valid case: typed (``case``), as plain data (``raw``), with its section and its place.
+
+    path: the case file; folder: where it lies, to which its own paths are relative.
+    """
+
+    case: Case
+    path: Path
+    section: Section
+    folder: Path
+    raw: dict[str, Any]
+
+
+def load_case(path: Path | str) -> LoadedCase:
+    """Read a case file. Raises CaseError with every mistake in it."""
+    loaded, mistakes = _read(Path(path))
+    if loaded is None:
+        raise CaseError(mistakes)
+    return loaded
+
+
+def validate(path: Path | str) -> list[Mistake]:
+    """Every mistake in a case file and the files it names, by line; empty when it is right."""
+    return _read(Path(path))[1]
+
+
+def _read(path: Path) -> tuple[LoadedCase | None, list[Mistake]]:
+    document = read_document(path)
+    data = document.data
+    if data is None:
+        return None, document.mistakes
+    raw = deepcopy(data)
+    case = _typed(document, data)
+    _add(document, disagreements(data))
+    section = read_stations(document, data, path.parent)
+    check_templates(document, data, path.parent)
+    _add(document, problems(data, section))
+    meshable = not any(m.key.startswith(("mesh", "section")) for m in document.mistakes)
+    if section and meshable and (message := folds(data, section)):
+        document.add(("section", "stations"), message)
+    if case is None or section is None or document.mistakes:
+        return None, sorted(document.mistakes, key=lambda m: (m.file != str(path), m.line))
+    return LoadedCase(case, path, section, path.parent, raw), []
+
+
+def _typed(document: Document, data: dict[str, Any]) -> Case | None:
+    """The case as the schema sees it; else its mistakes are recorded, and WRONG in ``data``."""
+    try:
+        return Case.model_validate(data)
+    except ValidationError as error:
+        found = list(explain(error))
+        _add(document, found)
+        without(data, [keys for keys, _ in found])
+        return None
+
+
+def _add(document: Document, found: Iterable[tuple[Keys, str]]) -> None:
+    """Record what is found at keys of which nothing has been said yet."""
+    told = {mistake.key for mistake in document.mistakes}
+    for keys, message in found:
+        if dotted(keys) not in told:
+            document.add(keys, message)

@@ -1,0 +1,131 @@
+"""What the schema says of plain data, in the user's words."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from types import UnionType
+from typing import Annotated, Any, Union, get_args, get_origin
+
+from pydantic import BaseModel, ValidationError
+
+from .mistakes import Keys, suggestion
+from .parts import WRONG
+from .schema import Case, Cord, RebarLayer, Rubber, TargetMode, Variable
+
+UNIONS = (Union, UnionType)
+KINDS = {"rubber": Rubber, "cord": Cord}
+MESSAGES = {
+    "missing": "must be given",
+    "float_type": "must be a number",
+    "int_type": "must be a whole number",
+    "int_from_float": "must be a whole number",
+    "finite_number": "must be a finite number",
+    "greater_than": "must be greater than {gt:g}",
+    "greater_than_equal": "must be at least {ge:g}",
+    "less_than": "must be less than {lt:g}",
+    "less_than_equal": "must be at most {le:g}",
+    "string_type": "must be text",
+    "literal_error": "must be {expected}",
+    "union_tag_invalid": "must be {expected_tags}",
+    "union_tag_not_found": "must be given: 'rubber' or 'cord'",
+    "list_type": "must be a list, as in [1, 2]",
+    "dict_type": "must be a table of keys and values",
+    "model_type": "must be a table of keys and values",
+    "model_attributes_type": "must be a table of keys and values",
+    "too_short": "must have at least {min_length} entries, got {actual_length}",
+    "too_long": "must have at most {max_length} entries, got {actual_length}",
+    "string_too_long": "must have at most {max_length} characters",
+    "disagree": "{message}",
+}
+NAME = "must be one word of letters, digits, - and _, a letter first"
+LINE = "must be text without line breaks or control characters"
+
+
+def explain(error: ValidationError, start: Keys = ()) -> Iterator[tuple[Keys, str]]:
+    """Keys and messages of the schema's complaint about the part at ``start`` of the case."""
+    for item in error.errors(include_url=False, include_input=False):
+        keys, kind, context = (*start, *item["loc"]), item["type"], item.get("ctx", {})
+        material = None
+        if keys[0] == "materials" and len(keys) > 2 and keys[2] in KINDS:
+            # pydantic names the kind between the material and its key
+            keys, material = (*keys[:2], *keys[3:]), KINDS[str(keys[2])]
+        if keys[-1:] == ("[key]",):
+            yield keys[:-1], NAME
+        elif kind == "extra_forbidden":
+            known = fields_at(keys[:-1], material)
+            yield keys, f"is not a known key{suggestion(str(keys[-1]), known)}"
+        elif kind.startswith("union_tag"):
+            yield (*keys, "kind"), MESSAGES[kind].format(**context)
+        elif kind == "disagree":
+            yield (*keys, context["key"]), context["message"]
+        elif kind == "string_pattern_mismatch":
+            yield keys, NAME if "A-Za-z" in context["pattern"] else LINE
+        else:
+            yield keys, MESSAGES[kind].format(**context) if kind in MESSAGES else item["msg"]
+
+
+def type_at(keys: Keys) -> Any:
+    """The schema's type of the value at ``keys``; None where the schema has no such place."""
+    here: Any = Case
+    for key in keys:
+        here = _plain(here)
+        if get_origin(here) in (dict, list):
+            here = get_args(here)[-1]
+        else:
+            parts = get_args(here) if get_origin(here) in UNIONS else (here,)
+            fields = (getattr(part, "model_fields", {}).get(key) for part in parts)
+            here = next((field.annotation for field in fields if field), None)
+    return _plain(here)
+
+
+def _plain(annotation: Any) -> Any:
+    """Without Annotated and None; a material stays a union of its kinds."""
+    while get_origin(annotation) is Annotated:
+        annotation = get_args(annotation)[0]
+    if get_origin(annotation) in UNIONS:
+        choices = [a for a in get_args(annotation) if a is not type(None)]
+        return _plain(choices[0]) if len(choices) == 1 else annotation
+    return annotation
+
+
+def fields_at(keys: Keys, material: type[BaseModel] | None = None) -> list[str]:
+    """The keys that the schema knows at ``keys``."""
+    part = material if material and len(keys) == 2 else type_at(keys)
+    return list(getattr(part, "model_fields", {}))
+
+
+def disagreements(data: Mapping[str, Any]) -> Iterator[tuple[Keys, str]]:
+    """What is wrong between the keys of one part, in data whose wrong values are WRONG."""
+    parts: list[tuple[Keys, Any, type[Any]]] = []
+    for name, part in table(data, "materials").items():
+        if isinstance(part, dict) and part.get("kind") == "rubber":
+            parts.append((("materials", name), part, Rubber))
+    parts += [(("rebar_layers", k), v, RebarLayer) for k, v in table(data, "rebar_layers").items()]
+    parts += [(("variables", k), v, Variable) for k, v in table(data, "variables").items()]
+    modes = table(data, "targets").get("modes")
+    for i, mode in enumerate(modes if isinstance(modes, list) else []):
+        parts.append((("targets", "modes", i), mode, TargetMode))
+    for keys, part, kind in parts:
+        if isinstance(part, dict):
+            for key, message in kind.problems(part):
+                yield (*keys, key), message
+
+
+def table(data: Any, key: str) -> dict[str, Any]:
+    """The mapping at ``key``, empty when it is absent or wrong."""
+    value = data.get(key) if isinstance(data, dict) else None
+    return value if isinstance(value, dict) else {}
+
+
+def without(data: dict[str, Any], mistakes: list[Keys]) -> None:
+    """Put WRONG in the place of every value that ``mistakes`` lead to, in ``data`` itself."""
+    for keys in mistakes:
+        here: Any = data
+        for key in keys[:-1]:
+            inside = isinstance(here, dict) and key in here
+            inside |= isinstance(here, list) and isinstance(key, int) and key < len(here)
+            here = here[key] if inside else None
+        if isinstance(here, dict) and keys:
+            here[keys[-1]] = WRONG
+        elif isinstance(here, list) and isinstance(keys[-1], int) and keys[-1] < len(here):
+            here[keys[-1]] = WRONG

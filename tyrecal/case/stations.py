@@ -1,0 +1,120 @@
+"""Files that a case names: they must lie in its folder and be what they should be."""
+
+from __future__ import annotations
+
+import csv
+from collections import Counter
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from .document import MOST_BYTES, Document
+from .mistakes import Mistake, shortened, suggestion
+
+if TYPE_CHECKING:
+    from ..tyre.section import Section
+
+
+def inside(folder: Path, name: str) -> Path:
+    """The path of ``name`` in ``folder``; ValueError when it leads outside, links included."""
+    path = Path(name)
+    if not name.strip() or path.is_absolute() or ".." in path.parts:
+        raise ValueError("must be a path inside the case's folder")
+    try:
+        if not (folder / path).resolve().is_relative_to(folder.resolve()):
+            raise ValueError("must not link to a place outside the case's folder")
+        (folder / path).exists()
+    except (OSError, RuntimeError) as error:
+        raise ValueError(f"cannot be read: {getattr(error, 'strerror', None) or error}") from None
+    return folder / path
+
+
+def check_templates(document: Document, data: dict[str, Any], folder: Path) -> None:
+    """Record what is wrong with the case's folder of templates, if it names one."""
+    name = data.get("templates")
+    if isinstance(name, str):
+        try:
+            if not inside(folder, name).is_dir():
+                document.add(("templates",), "must be a folder, there is none of this name")
+        except ValueError as error:
+            document.add(("templates",), str(error))
+
+
+def read_stations(document: Document, data: dict[str, Any], folder: Path) -> Section | None:
+    """The section that the case names; None, with the mistakes recorded, where it is wrong."""
+    from ..tyre.section import SectionError, fill_lines, read_section
+
+    source = data.get("section")
+    name = source.get("stations") if isinstance(source, dict) else None
+    if not isinstance(name, str):
+        return None
+    keys = ("section", "stations")
+    try:
+        path = inside(folder, name)
+        if not path.is_file():
+            raise ValueError("must be a file, there is none of this name")
+        if path.stat().st_size > MOST_BYTES:
+            raise ValueError(f"the station table is larger than {MOST_BYTES} bytes")
+        _check_table(path)
+        section = read_section(path)
+        fill_lines(section)
+        _check_section(section)
+    except SectionError as error:
+        message = shortened(str(error), 300)
+        if error.line:
+            value = document.places.get(keys, (1, name))[1]
+            document.mistakes.append(
+                Mistake(str(path), error.line, "section.stations", value, message)
+            )
+        else:
+            document.add(keys, message)
+    except UnicodeDecodeError:
+        document.add(keys, "the station table must be text in UTF-8")
+    except (ValueError, csv.Error) as error:
+        document.add(keys, shortened(str(error), 300))
+    except OSError as error:
+        document.add(keys, f"cannot be read: {error.strerror}")
+    else:
+        return section
+    return None
+
+
+def _check_table(path: Path) -> None:
+    """The table is a table: a comma for a decimal point would shift its columns unseen."""
+    from ..tyre.section import SectionError
+
+    with path.open(newline="", encoding="utf-8-sig") as file:
+        rows = csv.reader(file)
+        header = next(rows, [])
+        if not header:
+            raise SectionError("the station table is empty", 1)
+        lines = [column[: -len("_r_mm")] for column in header if column.endswith("_r_mm")]
+        known = ["station", "region", "rigid", *(f"{n}_{axis}_mm" for n in lines for axis in "rz")]
+        for column, count in Counter(header).items():
+            if count > 1:
+                raise SectionError(f"column '{column}' is given {count} times", 1)
+            if column not in known and column.endswith("_z_mm"):
+                raise SectionError(f"column '{column[: -len('_z_mm')]}_r_mm' is missing", 1)
+            if column not in known:
+                hint = suggestion(column, known)
+                raise SectionError(f"column '{shortened(column)}' is not known{hint}", 1)
+        for row in rows:
+            if row and len(row) != len(header):
+                raise SectionError(
+                    f"{len(row)} values for {len(header)} columns", rows.line_num
+                )  # fmt: skip
+
+
+def _check_section(section: Section) -> None:
+    from ..tyre.section import SectionError
+
+    for name in [*section.names, *(region for region, _ in section.regions)]:
+        if not name.isascii() or not name.replace("_", "").replace("-", "").isalnum():
+            raise SectionError(
+                f"the name '{shortened(name)}' of a line or region must be one word of"
+                " letters, digits, - and _"
+            )
+    for name, count in section.regions:
+        if count < 1:
+            raise SectionError(f"region '{name}' needs at least two stations")
+    if not section.rigid.any():
+        raise SectionError("no station is held by the rim, rigid must be 1 somewhere")

@@ -1,0 +1,119 @@
+"""Design variables: the numbers of a case set by name or by dotted path."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from math import isfinite
+from numbers import Real
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+
+from .checks import find, folds, problems
+from .load import LoadedCase
+from .mistakes import Keys, dotted, suggestion
+from .shape import explain
+
+# numbers that stand alone: no other part of the case, and no mesh, depends on their values
+ALONE = {"pressure_kPa", "materials", "rebar_layers", "rim", "solver"}
+
+
+def start_values(loaded: LoadedCase) -> dict[str, float]:
+    """The start value of every variable by name, in the unit of the numbers it sets."""
+    return {name: variable.start for name, variable in loaded.case.variables.items()}
+
+
+def parse_assignment(text: str) -> tuple[str, float]:
+    """``NAME=VALUE`` as name and number. Raises ValueError."""
+    name, equals, value = text.partition("=")
+    name = name.strip()
+    if not equals or not name:
+        raise ValueError(f"'{text}' must be NAME=VALUE, as in C10=1.2e6")
+    try:
+        number = float(value)
+    except ValueError:
+        raise ValueError(f"{name} is '{value.strip()}', must be a number") from None
+    if not isfinite(number):
+        raise ValueError(f"{name} is '{value.strip()}', must be a finite number")
+    return name, number
+
+
+def with_values(loaded: LoadedCase, values: Mapping[str, float]) -> LoadedCase:
+    """A new case with variables (by name) or any of its numbers (by dotted path) set.
+
+    Values are in the unit of the numbers they set; a variable's bounds are not enforced. Raises
+    ValueError, in one sentence, for an unknown name or a value that the case cannot have.
+    """
+    targets: dict[Keys, float] = {}
+    tree: dict[str | int, Any] = {}
+    for name, value in values.items():
+        if isinstance(value, bool) or not isinstance(value, Real):
+            raise ValueError(f"{name} is {value!r}, must be a number")
+        for keys in _keys(loaded, name):
+            if keys in targets:
+                raise ValueError(f"{name}: {dotted(keys)} is set twice")
+            targets[keys] = float(value)
+            branch = tree
+            for key in keys[:-1]:
+                branch = branch.setdefault(key, {})
+            branch[keys[-1]] = float(value)
+    case = _set(loaded.case, tree, ())
+    raw = _set_raw(loaded.raw, case, tree)
+    touched = set(tree) - ALONE
+    if touched:
+        for keys, message in problems(raw, loaded.section):
+            raise ValueError(f"{dotted(keys)} {message}")
+    if "mesh" in touched and (message := folds(raw, loaded.section)):
+        raise ValueError(message)
+    return replace(loaded, case=case, raw=raw)
+
+
+def _keys(loaded: LoadedCase, name: str) -> list[Keys]:
+    """Where the variable or the dotted path ``name`` leads."""
+    variables = loaded.case.variables
+    paths = variables[name].sets if name in variables else [name]
+    try:
+        return [find(loaded.case, path) for path in paths]
+    except KeyError as error:
+        if "." in name:
+            raise ValueError(f"{name}: {error.args[0]}") from None
+        known = [*variables, "pressure_kPa"]
+        raise ValueError(f"there is no variable '{name}'{suggestion(name, known)}") from None
+
+
+def _set(node: Any, tree: Any, keys: Keys) -> Any:
+    """``node`` at ``keys`` of the case with the numbers of ``tree`` in it.
+
+    Only the parts on the way are copied and judged again; the rest is shared.
+    """
+    if isinstance(tree, float):
+        if node is not None and (isinstance(node, bool) or not isinstance(node, int | float)):
+            raise ValueError(f"{dotted(keys)} is not a number, it cannot be {tree:g}")
+        return int(tree) if isinstance(node, int) and tree.is_integer() else tree
+    fields = node.__dict__ if isinstance(node, BaseModel) else node
+    new = list(fields) if isinstance(fields, list) else dict(fields)
+    for key, branch in tree.items():
+        new[key] = _set(fields[key], branch, (*keys, key))
+    if not isinstance(node, BaseModel):
+        return new
+    try:
+        return type(node).model_validate(new)
+    except ValidationError as error:
+        wrong, message = next(explain(error, keys))
+        value: Any = tree
+        for key in wrong[len(keys) :]:
+            value = value.get(key) if isinstance(value, dict) else None
+        got = f", got {value:g}" if isinstance(value, float) else ""
+        raise ValueError(f"{dotted(wrong)} {message}{got}") from None
+
+
+def _set_raw(raw: Any, case: Any, tree: Any) -> Any:
+    """The plain data with the same numbers as the typed ``case``."""
+    if isinstance(tree, float):
+        return case
+    fields = case.__dict__ if isinstance(case, BaseModel) else case
+    if isinstance(fields, list):
+        return [_set_raw(r, fields[i], tree[i]) if i in tree else r for i, r in enumerate(raw)]
+    new = {k: _set_raw((raw or {}).get(k), fields[k], branch) for k, branch in tree.items()}
+    return {**(raw or {}), **new}

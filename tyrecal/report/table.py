@@ -1,0 +1,100 @@
+"""Results as tables: for a terminal, and as CSV."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Mapping
+from typing import Any
+
+from rich import box
+from rich.table import Table
+from rich.text import Text
+
+from .words import motion
+
+NONE = "-"
+
+
+def fit_table(fit: Mapping[str, Any]) -> Table:
+    """The content of fit.json like Table 2 of the paper: modes, variables, objective."""
+    table = _table(("mode", "motion", "×", "initial Hz", "fitted Hz", "target Hz", "deviation %"))
+    for mode in fit["modes"]:
+        deviation = mode["deviation_percent"]
+        hertz = [f"{mode[key]:.2f}" for key in ("initial_Hz", "fitted_Hz", "target_Hz")]
+        _add(table, *_named(mode), *hertz, Text(f"{deviation:+.2f}", _colour(deviation)))
+    table.add_section()
+    header = ("variable", "", "", "initial", "fitted", "bounds", "std. error %")
+    _add(table, *(Text(text, "bold") for text in header))
+    for name, variable in fit["variables"].items():
+        error, value = variable["standard_error"], variable["value"]
+        _add(
+            table,
+            name,
+            Text("at bound" if variable["at_bound"] else "", "yellow"),
+            "",
+            f"{variable['initial']:.5g}",
+            f"{value:.5g}",
+            f"{variable['lower']:g} to {variable['upper']:g}",
+            NONE if error is None or not value else f"{100 * error / abs(value):.2g}",
+        )
+    for name, value in fit.get("fixed", {}).items():
+        _add(table, name, "held", "", f"{value:.5g}", f"{value:.5g}", NONE, NONE)
+    table.add_section()
+    objective = (f"{fit[key]:.3f}" for key in ("initial_objective_Hz", "objective_Hz"))
+    _add(table, Text("objective", "bold"), "equation (1), Hz", "", *objective, "", "")
+    return table
+
+
+def modes_table(modes: Mapping[str, Any]) -> Table:
+    """The content of modes.json: one row a mode, in its order."""
+    entries = modes["modes"]
+    extra = [key for key in ("symmetry", "clarity") if any(key in mode for mode in entries)]
+    table = _table(("mode", "motion", "×", "Hz", *extra))
+    load = f", {modes['load_N']:g} N" if modes["load_N"] else ""
+    table.title = f"{modes['pressure_kPa']:g} kPa{load}, {modes['mass_kg']:.2f} kg"
+    for mode in entries:
+        cells = [mode.get(key, NONE) for key in extra]
+        _add(
+            table,
+            *_named(mode),
+            f"{mode['frequency_Hz']:.2f}",
+            *(f"{cell:.2f}" if isinstance(cell, float) else str(cell) for cell in cells),
+        )
+    return table
+
+
+def fit_csv(fit: Mapping[str, Any]) -> str:
+    """The modes of fit.json as CSV, all digits."""
+    keys = ("initial_Hz", "fitted_Hz", "target_Hz", "deviation_percent")
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(["c", "m", "kind", "multiplicity", *keys])
+    for mode in fit["modes"]:
+        writer.writerow([mode["c"], mode["m"], mode["kind"] or "", mode["multiplicity"],
+                         *(mode[key] for key in keys)])  # fmt: skip
+    return text.getvalue()
+
+
+def _table(columns: tuple[str, ...]) -> Table:
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    for name in columns:
+        if name == "motion":
+            table.add_column(name)
+        else:
+            table.add_column(name, justify="left" if name == "mode" else "right", no_wrap=True)
+    return table
+
+
+def _add(table: Table, *cells: str | Text) -> None:
+    # square brackets of names and labels are markup to rich unless they come as Text
+    table.add_row(*(Text(cell) if isinstance(cell, str) else cell for cell in cells))
+
+
+def _named(mode: Mapping[str, Any]) -> tuple[str, str, str]:
+    words = motion(mode["c"], mode["m"], mode["kind"])
+    return f"[{mode['c']},{mode['m']}]", words, str(mode["multiplicity"])
+
+
+def _colour(deviation: float) -> str:
+    return "green" if abs(deviation) < 2 else "yellow" if abs(deviation) < 5 else "red"
