@@ -92,7 +92,8 @@ def test_any_number_of_the_case_has_an_exact_derivative(
 ) -> None:
     """Against fourth-order central differences: within 1e-5 of the largest of all modes."""
     case = load_case(CASES / "p235_75r17.yaml")
-    case = with_values(case, {"analysis.vibration_frequency_Hz": vibration_Hz})
+    if vibration_Hz is not None:
+        case = with_values(case, {"analysis.vibration_frequency_Hz": vibration_Hz})
     case = with_values(case, start_values(case))
     if path in case.case.variables:
         value = case.case.variables[path].start

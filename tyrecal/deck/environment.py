@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from jinja2 import BaseLoader, ChoiceLoader, Environment, FileSystemLoader, StrictUndefined
-from jinja2.exceptions import SecurityError, TemplateError, TemplateSyntaxError
+from jinja2.exceptions import SecurityError, TemplateSyntaxError
 from jinja2.sandbox import ImmutableSandboxedEnvironment
 
 
@@ -64,18 +64,7 @@ def render(env: Environment, template: str, names: dict[str, Any]) -> str:
         raise TemplateFailed(f"template '{template}': {error}") from None
     except TemplateSyntaxError as error:
         raise TemplateFailed(f"template '{error.name}', line {error.lineno}: {error}") from None
-    except (
-        TemplateError,
-        OverflowError,
-        ArithmeticError,
-        TypeError,
-        ValueError,
-        AttributeError,
-        LookupError,
-        OSError,
-        RecursionError,
-        MemoryError,
-    ) as error:
+    except Exception as error:  # whatever the user's own template runs into
         raise TemplateFailed(
             f"template '{template}'{_place(error, template)}: {type(error).__name__}: {error}"
         ) from None

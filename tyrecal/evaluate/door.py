@@ -67,7 +67,10 @@ class Door:
 
         Raises EvaluationFailed; DeckRefused, TemplateFailed, CaseError where the input is wrong.
         """
-        case = with_values(self.case, question.values)
+        try:
+            case = with_values(self.case, question.values)
+        except ValueError as error:
+            raise DeckRefused(str(error)) from None
         decks = Decks(case, question.values, question.gradients, question.modes_per_harmonic)
         folder = self._fresh_folder()
         solver = self.solver

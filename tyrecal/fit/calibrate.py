@@ -103,13 +103,13 @@ def _run(problem: Problem, start: Array, method: str) -> StartReport:
     known = len(problem.points)
     first = problem.evaluate(start)
     outcome = METHODS[method](problem, start, TOLERANCE)
-    norm = slsqp.projected_gradient(problem, outcome.point)
+    converged = slsqp.is_converged(problem, outcome.point, 10 * TOLERANCE)
     history = _history(problem)
     return StartReport(
         dict(first.values),
         outcome.point,
         outcome.message,
-        norm <= 10 * TOLERANCE,
+        converged,
         history if known <= 1 else history[known:],
     )
 

@@ -151,10 +151,6 @@ class Problem:
             raise known
         return known
 
-    def evaluated(self) -> list[Point]:
-        """All designs that could be evaluated, in order."""
-        return [p for p in self.points.values() if isinstance(p, Point)]
-
     def _evaluate(self, values: dict[str, float]) -> Point:
         names = tuple(v.name for v in self.variables)
         exact = self.door.has_gradients

@@ -20,6 +20,7 @@ from .problem import Point, Problem
 
 Array = np.ndarray
 RESTARTS = 40
+EXACT = 1e-3  # Hz, an objective below every measurement's resolution
 DAMPING = 0.1  # mu over the mean diagonal of J^T J, at first
 MIXED = 0.8  # labels of the two [0, 0] modes are less clear than this: they have met
 AXIAL, TORSIONAL = Label(0, 0, "axial"), Label(0, 0, "torsional")
@@ -63,6 +64,11 @@ def projected_gradient(problem: Problem, point: Point) -> float:
     return float(np.linalg.norm(g))
 
 
+def is_converged(problem: Problem, point: Point, tolerance: float) -> bool:
+    """Whether no admissible change lowers the objective, or the fit is exact for all purposes."""
+    return point.objective <= EXACT or projected_gradient(problem, point) <= tolerance
+
+
 def _pair_clarity(point: Point) -> float:
     """How clearly the two [0, 0] modes are told apart; 1 where they are not both wanted."""
     modes = [point.modes[label] for label in (AXIAL, TORSIONAL) if label in point.modes]
@@ -72,8 +78,8 @@ def _pair_clarity(point: Point) -> float:
 def _descend(problem: Problem, point: Point, tolerance: float) -> Outcome:
     damping, message = DAMPING, "restarts used up"
     for _ in range(RESTARTS):
-        if projected_gradient(problem, point) <= tolerance:
-            return Outcome(point, "projected gradient below the tolerance")
+        if is_converged(problem, point, tolerance):
+            return Outcome(point, "converged")
         reached, full_step = _restart(problem, point, damping)
         if reached.objective >= point.objective - 1e-9 * max(point.objective, 1e-3):
             if damping > 1e3 * DAMPING:

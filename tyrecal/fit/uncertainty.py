@@ -40,7 +40,8 @@ def uncertainty(problem: Problem, point: Point) -> Uncertainty:
     else:
         freedom = max(len(problem.targets) - len(problem.variables), 1)
         noise = float(np.sqrt(point.residuals @ point.residuals / freedom))
-        covariance = _inverse(J.T @ J) * noise**2
+        covariance = _inverse(J.T @ J)
+        covariance[np.isfinite(covariance)] *= noise**2
     spread = np.sqrt(np.diag(covariance))
     slopes = np.array([v.slope(point.values[v.name]) for v in problem.variables])
     errors = [float(s * k) if np.isfinite(s) else None for s, k in zip(spread, slopes, strict=True)]
