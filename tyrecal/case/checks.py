@@ -53,15 +53,16 @@ def _names(data: Mapping[str, Any]) -> Problems:
     uses += [(("solids", i), solid, "rubber") for i, solid in enumerate(_list(data, "solids"))]
     materials = table(data, "materials")
     for keys, part, kind in uses:
-        name = part.get("material") if isinstance(part, dict) else None
-        if not isinstance(name, str) or not materials:
+        wanted = part.get("material") if isinstance(part, dict) else None
+        if not isinstance(wanted, str) or not materials:
             continue
-        if name not in materials:
-            yield (*keys, "material"), f"is not one of the materials{suggestion(name, materials)}"
+        if wanted not in materials:
+            hint = suggestion(wanted, materials)
+            yield (*keys, "material"), f"is not one of the materials{hint}"
         else:
-            found = table(materials, name).get("kind", kind)
+            found = table(materials, wanted).get("kind", kind)
             if found not in (kind, WRONG):
-                yield (*keys, "material"), f"must be a {kind}, '{name}' is a {found}"
+                yield (*keys, "material"), f"must be a {kind}, '{wanted}' is a {found}"
 
 
 def _targets(data: Mapping[str, Any]) -> Problems:
@@ -189,8 +190,10 @@ def _levels(data: Mapping[str, Any], section: Section) -> Problems:
         for key in ("rows", "grading"):
             entries = _list(level, key)
             if entries and len(entries) != gaps:
-                yield (*here, key), (f"must have {gaps} entries, one for each gap between the"
-                                     f" lines {', '.join(section.names)}, got {len(entries)}")  # fmt: skip
+                message = (
+                    f"must have {gaps} entries, one for each gap between lines, got {len(entries)}"
+                )
+                yield (*here, key), message
         count = _sum(elements.values()) * _sum(_list(level, "rows"))
         if count > MOST_ELEMENTS:
             yield here, f"must have at most {MOST_ELEMENTS} elements, elements x rows is {count}"

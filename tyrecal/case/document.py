@@ -10,7 +10,7 @@ from typing import Any
 
 from ruamel.yaml import YAML
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
-from ruamel.yaml.events import AliasEvent, CollectionEndEvent, CollectionStartEvent, NodeEvent
+from ruamel.yaml.events import AliasEvent, CollectionEndEvent, CollectionStartEvent
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
 from .mistakes import Keys, Mistake, dotted, shortened
@@ -109,8 +109,9 @@ def _harmless(yaml: YAML, text: str, document: Document) -> bool:
         if isinstance(event, AliasEvent):
             document.refuse(line, f"the alias *{event.anchor} must be written out in full")
             return False
-        if isinstance(event, NodeEvent) and getattr(event, "tag", None):
-            document.refuse(line, f"the tag {event.tag} is not allowed, only plain values are")
+        tag = getattr(event, "tag", None)
+        if tag:
+            document.refuse(line, f"the tag {tag} is not allowed, only plain values are")
             return False
     return True
 
@@ -128,25 +129,26 @@ class _Reader:
     document: Document
     constructor: Any
 
-    def value(self, node: Node, keys: Keys) -> Any:
+    def item(self, node: Node, keys: Keys, line: int) -> Any:
+        """The value of ``node``, and its place noted."""
         if isinstance(node, MappingNode):
+            self.document.places[keys] = line + 1, "a table"
             return self.mapping(node, keys)
         if isinstance(node, SequenceNode):
-            return [self.item(v, (*keys, i), v.start_mark.line) for i, v in enumerate(node.value)]
+            self.document.places[keys] = line + 1, "a list"
+            nodes = enumerate(node.value)
+            return [self.item(entry, (*keys, i), entry.start_mark.line) for i, entry in nodes]
+        assert isinstance(node, ScalarNode)
+        empty = "''" if node.style else "null"
+        self.document.places[keys] = line + 1, shortened(str(node.value)) or empty
         return self.scalar(node, keys)
-
-    def item(self, node: Node, keys: Keys, line: int) -> Any:
-        text = {MappingNode: "a table", SequenceNode: "a list"}.get(type(node))
-        text = text or ("null" if node.value == "" and not node.style else str(node.value))
-        self.document.places[keys] = line + 1, shortened(text) or "''"
-        return self.value(node, keys)
 
     def mapping(self, node: MappingNode, keys: Keys) -> dict[str, Any]:
         data: dict[str, Any] = {}
         for name, content in node.value:
             line = name.start_mark.line
             key = name.value if isinstance(name, ScalarNode) else "?"
-            if not isinstance(name, ScalarNode) or not name.tag.endswith(":str"):
+            if not isinstance(name, ScalarNode) or _kind(name) != "str":
                 self.document.refuse(line + 1, f"the key {shortened(key)} must be a plain word")
             elif key in data:
                 first = self.document.places[(*keys, key)][0]
@@ -159,7 +161,7 @@ class _Reader:
         return data
 
     def scalar(self, node: ScalarNode, keys: Keys) -> Any:
-        if node.tag.rpartition(":")[2] not in ("int", "float", "bool", "null"):
+        if _kind(node) not in ("int", "float", "bool", "null"):
             return node.value
         with suppress(ValueError, OverflowError):  # thousands of digits
             value = self.constructor.construct_object(node, deep=True)
@@ -167,3 +169,7 @@ class _Reader:
                 return value
         self.document.add(keys, "must be a finite number")
         return WRONG
+
+
+def _kind(node: Node) -> str:
+    return (node.tag or "").rpartition(":")[2]

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from .parts import Degrees, Name, NotNegative, Part, Positive, Problem, Text, WRONG, number
+from .parts import WRONG, Degrees, Name, NotNegative, Part, Positive, Problem, Text, number
 
 Moduli = Literal["long_term", "instantaneous"]
 Element = Literal[
@@ -60,20 +60,20 @@ class Rubber(Part):
     C01_Pa: float
     D1_per_Pa: Positive
     moduli: Moduli = "long_term"
-    prony: list[Prony] = []
+    prony: list[Prony] = Field(default_factory=list)
     density_kg_per_m3: Positive
 
     @classmethod
     def problems(cls, values: Mapping[str, Any]) -> Iterator[Problem]:
         c10, c01 = number(values, "C10_Pa"), number(values, "C01_Pa")
         if c10 is not None and c01 is not None and not c10 + c01 > 0:
-            yield "C10_Pa", f"C10_Pa + C01_Pa must be greater than 0, their sum is {c10 + c01:g}"
+            yield "C10_Pa", f"must be greater than -C01_Pa, C10_Pa + C01_Pa is {c10 + c01:g}"
         for share in "gk":
             terms = values.get("prony")
             terms = terms if isinstance(terms, list) else []
             total = sum(number(dict(term), share) or 0 for term in terms if term is not WRONG)
             if total >= 1:
-                yield "prony", f"the sum of all {share} must be less than 1, got {total:g}"
+                yield "prony", f"must have a sum of all {share} less than 1, got {total:g}"
 
 
 class Cord(Part):
@@ -190,7 +190,7 @@ class Targets(Part):
     """The measured modes, and where they come from."""
 
     source: Text = ""
-    modes: list[TargetMode] = []
+    modes: list[TargetMode] = Field(default_factory=list)
 
 
 class Solver(Part):
@@ -198,7 +198,7 @@ class Solver(Part):
 
     name: Name
     time_limit_s: Positive
-    options: dict[str, Any] = {}
+    options: dict[str, Any] = Field(default_factory=dict)
 
 
 class Case(Part):
@@ -214,10 +214,10 @@ class Case(Part):
         dict[Name, Annotated[Rubber | Cord, Field(discriminator="kind")]], Field(min_length=1)
     ]
     solids: Annotated[list[Solid], Field(min_length=1)]
-    rebar_layers: dict[Name, RebarLayer] = {}
+    rebar_layers: dict[Name, RebarLayer] = Field(default_factory=dict)
     rim: Rim
     analysis: Analysis
-    variables: dict[Name, Variable] = {}
+    variables: dict[Name, Variable] = Field(default_factory=dict)
     targets: Targets = Targets()
     solver: Solver
     templates: Text | None = None

@@ -13,7 +13,7 @@ from .parts import WRONG
 from .schema import Case, Cord, RebarLayer, Rubber, TargetMode, Variable
 
 UNIONS = (Union, UnionType)
-KINDS = {"rubber": Rubber, "cord": Cord}
+KINDS: dict[str, type[BaseModel]] = {"rubber": Rubber, "cord": Cord}
 MESSAGES = {
     "missing": "must be given",
     "float_type": "must be a number",
@@ -45,7 +45,7 @@ def explain(error: ValidationError, start: Keys = ()) -> Iterator[tuple[Keys, st
     """Keys and messages of the schema's complaint about the part at ``start`` of the case."""
     for item in error.errors(include_url=False, include_input=False):
         keys, kind, context = (*start, *item["loc"]), item["type"], item.get("ctx", {})
-        material = None
+        material: type[BaseModel] | None = None
         if keys[0] == "materials" and len(keys) > 2 and keys[2] in KINDS:
             # pydantic names the kind between the material and its key
             keys, material = (*keys[:2], *keys[3:]), KINDS[str(keys[2])]
@@ -122,10 +122,12 @@ def without(data: dict[str, Any], mistakes: list[Keys]) -> None:
     for keys in mistakes:
         here: Any = data
         for key in keys[:-1]:
-            inside = isinstance(here, dict) and key in here
-            inside |= isinstance(here, list) and isinstance(key, int) and key < len(here)
-            here = here[key] if inside else None
-        if isinstance(here, dict) and keys:
+            here = here[key] if _holds(here, key) else None
+        if isinstance(here, dict) or _holds(here, keys[-1]):
             here[keys[-1]] = WRONG
-        elif isinstance(here, list) and isinstance(keys[-1], int) and keys[-1] < len(here):
-            here[keys[-1]] = WRONG
+
+
+def _holds(part: Any, key: str | int) -> bool:
+    if isinstance(part, list):
+        return isinstance(key, int) and key < len(part)
+    return isinstance(part, dict) and key in part

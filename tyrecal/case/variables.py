@@ -13,6 +13,7 @@ from pydantic import BaseModel, ValidationError
 from .checks import find, folds, problems
 from .load import LoadedCase
 from .mistakes import Keys, dotted, suggestion
+from .schema import Case
 from .shape import explain
 
 # numbers that stand alone: no other part of the case, and no mesh, depends on their values
@@ -53,17 +54,18 @@ def with_values(loaded: LoadedCase, values: Mapping[str, float]) -> LoadedCase:
         for keys in _keys(loaded, name):
             if keys in targets:
                 raise ValueError(f"{name}: {dotted(keys)} is set twice")
-            targets[keys] = float(value)
-            branch = tree
-            for key in keys[:-1]:
-                branch = branch.setdefault(key, {})
-            branch[keys[-1]] = float(value)
+            targets[keys] = _number(loaded.case, keys, float(value))
+    for keys, number in targets.items():
+        branch = tree
+        for key in keys[:-1]:
+            branch = branch.setdefault(key, {})
+        branch[keys[-1]] = number
     case = _set(loaded.case, tree, ())
     raw = _set_raw(loaded.raw, case, tree)
     touched = set(tree) - ALONE
     if touched:
-        for keys, message in problems(raw, loaded.section):
-            raise ValueError(f"{dotted(keys)} {message}")
+        for wrong, reason in problems(raw, loaded.section):
+            raise ValueError(f"{dotted(wrong)} {reason}")
     if "mesh" in touched and (message := folds(raw, loaded.section)):
         raise ValueError(message)
     return replace(loaded, case=case, raw=raw)
@@ -82,15 +84,23 @@ def _keys(loaded: LoadedCase, name: str) -> list[Keys]:
         raise ValueError(f"there is no variable '{name}'{suggestion(name, known)}") from None
 
 
+def _number(case: Case, keys: Keys, value: float) -> float:
+    """``value`` as the kind of number that stands at ``keys`` of the case."""
+    old: Any = case
+    for key in keys:
+        old = old.__dict__[key] if isinstance(old, BaseModel) else old[key]
+    if isinstance(old, bool) or not isinstance(old, int | float | None):
+        raise ValueError(f"{dotted(keys)} is not a number, it cannot be {value:g}")
+    return int(value) if isinstance(old, int) and value.is_integer() else value
+
+
 def _set(node: Any, tree: Any, keys: Keys) -> Any:
     """``node`` at ``keys`` of the case with the numbers of ``tree`` in it.
 
     Only the parts on the way are copied and judged again; the rest is shared.
     """
-    if isinstance(tree, float):
-        if node is not None and (isinstance(node, bool) or not isinstance(node, int | float)):
-            raise ValueError(f"{dotted(keys)} is not a number, it cannot be {tree:g}")
-        return int(tree) if isinstance(node, int) and tree.is_integer() else tree
+    if not isinstance(tree, dict):
+        return tree
     fields = node.__dict__ if isinstance(node, BaseModel) else node
     new = list(fields) if isinstance(fields, list) else dict(fields)
     for key, branch in tree.items():
@@ -104,14 +114,14 @@ def _set(node: Any, tree: Any, keys: Keys) -> Any:
         value: Any = tree
         for key in wrong[len(keys) :]:
             value = value.get(key) if isinstance(value, dict) else None
-        got = f", got {value:g}" if isinstance(value, float) else ""
+        got = "" if value is None or isinstance(value, dict) else f", got {value:g}"
         raise ValueError(f"{dotted(wrong)} {message}{got}") from None
 
 
 def _set_raw(raw: Any, case: Any, tree: Any) -> Any:
     """The plain data with the same numbers as the typed ``case``."""
-    if isinstance(tree, float):
-        return case
+    if not isinstance(tree, dict):
+        return tree
     fields = case.__dict__ if isinstance(case, BaseModel) else case
     if isinstance(fields, list):
         return [_set_raw(r, fields[i], tree[i]) if i in tree else r for i, r in enumerate(raw)]
