@@ -1,8 +1,8 @@
 """The second method: Levenberg and Marquardt's damped Gauss-Newton steps within the bounds.
 
-Each step d minimises |r + J d|^2 + mu |D d|^2, D^2 = diag(J^T J), subject to the bounds on x + d
+Each step d minimises |r + J d|^2 + mu |d|^2 tr(J^T J) / v, v variables, within the bounds on x + d
 (Nocedal and Wright, Numerical Optimization, sec. 10.3); mu falls after a step that lowers the
-objective and rises after one that does not, or that leads to a design without a solution.
+objective and rises after one that does not.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from .slsqp import Outcome, is_converged
 
 Array = np.ndarray
 STEPS = 100
+HALVINGS = 5  # of a step towards a design without a solution
 DAMPING, STIFFEST = 0.1, 1e8  # mu at first, and where no step is left to try
 
 
@@ -30,23 +31,30 @@ def minimise(problem: Problem, start: Array, tolerance: float) -> Outcome:
             return Outcome(point, "converged")
         if damping > STIFFEST:
             return Outcome(point, "no lower objective along any damped step")
-        try:
-            trial = problem.evaluate(point.x + _step(problem, point, damping))
-        except EvaluationFailed:
-            damping *= 4
-            continue
-        if trial.objective < point.objective:
+        trial = _first_solvable(problem, point, _step(problem, point, damping))
+        if trial is not None and trial.objective < point.objective:
             point, damping = trial, damping / 5
         else:
             damping *= 4
     return Outcome(point, f"stopped after {STEPS} steps")
 
 
+def _first_solvable(problem: Problem, point: Point, step: Array) -> Point | None:
+    """The first design with a solution on the way back along ``step``, halved each time."""
+    for halvings in range(HALVINGS):
+        try:
+            return problem.evaluate(point.x + step / 2**halvings)
+        except EvaluationFailed:
+            continue
+    return None
+
+
 def _step(problem: Problem, point: Point, damping: float) -> Array:
     J, r = point.jacobian, point.residuals
-    scale = np.maximum(np.linalg.norm(J, axis=0), 1e-6 * np.linalg.norm(J) + 1e-300)
-    matrix = np.vstack([J, np.sqrt(damping) * np.diag(scale)])
-    right = np.concatenate([-r, np.zeros(len(scale))])
+    count = J.shape[1]
+    spread = np.sqrt(damping / count) * np.linalg.norm(J)
+    matrix = np.vstack([J, spread * np.eye(count)])
+    right = np.concatenate([-r, np.zeros(count)])
     below, above = problem.lower - point.x, problem.upper - point.x
     room = 1e-12 * (problem.upper - problem.lower)  # lsq_linear wants the start strictly inside
     step: Array = lsq_linear(

@@ -4,27 +4,34 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 from matplotlib import rc_context
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from PIL import Image
 
 DPI = 150
 GREY = "0.45"
-# Okabe and Ito: told apart by colour-blind readers; yellow is left out, pale on paper
+# Okabe and Ito: told apart by colour-blind readers; their yellow is left out, pale on paper
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
-TYPE = {"font.size": 9, "axes.titlesize": 11, "axes.spines.top": False, "axes.spines.right": False}
+
+in_house_style = rc_context({
+    "font.size": 9, "axes.titlesize": 11, "axes.spines.top": False, "axes.spines.right": False,
+    "figure.dpi": DPI, "hatch.linewidth": 0.6,
+})  # fmt: skip
 
 
 def new_figure(width: float, height: float, layout: str | None = "constrained") -> Figure:
-    """An empty figure, inches."""
-    figure = Figure((width, height), DPI, layout=layout)
+    """An empty figure, its size in inches."""
+    figure = Figure((width, height), dpi=DPI, layout=layout)  # type: ignore[arg-type]
     FigureCanvasAgg(figure)
     return figure
 
 
 def save(figure: Figure, path: Path) -> None:
-    """Write a PNG, its colours reduced to 256: a third of the size and no difference to see."""
-    from PIL import Image
-
-    figure.canvas.draw()
-    Image.fromarray(np.asarray(figure.canvas.buffer_rgba())).convert("RGB").quantize(256).save(path)
+    """Write a PNG of 256 colours: a third of the size, and no difference to see."""
+    canvas = figure.canvas
+    assert isinstance(canvas, FigureCanvasAgg)
+    canvas.draw()
+    image = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
+    image.quantize(256, dither=Image.Dither.NONE).save(path, format="PNG", optimize=True)

@@ -1,0 +1,58 @@
+"""The section swept round the axle: rings of points and how a mode moves them.
+
+Cartesian axes: y is the axle, z points up, (R, Theta, Z) lies at (R cos Theta, Z, -R sin Theta).
+The sign makes (r, theta, z) and (x, y, z) both right-handed: Theta turns about +y, as ABAQUS
+revolves the section of the deck.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..evaluate.results import HarmonicShape, RawMode
+from ..modes.sample import on_rings
+from ..tyre.mesh import SectionMesh
+
+Array = np.ndarray
+
+
+class NoSectionShape(ValueError):
+    """The mode's shape is not given on the nodes of the section."""
+
+
+def corners(mesh: SectionMesh) -> Array:
+    """Numbers of the solids' corner nodes: (row points, columns), from the inner surface out."""
+    step = 2 if mesh.quadratic else 1
+    along, rows = mesh.shape
+    return 1000 * (step * np.arange(along + 1) + 1) + step * np.arange(rows + 1)[:, None] + 1
+
+
+def skin(mesh: SectionMesh) -> Array:
+    """Corner nodes of the outer surface from -z to +z, from inner bead edge to inner bead edge."""
+    grid = corners(mesh)
+    return np.concatenate([grid[:-1, 0], grid[-1], grid[-2::-1, -1]])
+
+
+def swept(nodes: Array, mesh: SectionMesh, angles: Array) -> Array:
+    """Undeformed points (node, angle, 3), m."""
+    R, Z = np.array([mesh.nodes[int(n)] for n in nodes]).T
+    points = np.stack(np.broadcast_arrays(R[:, None], angles, Z[:, None]), -1)
+    return _cartesian(points, points * [1, 0, 1])
+
+
+def motion(mode: RawMode, nodes: Array, angles: Array, phase: float = 0.0) -> Array:
+    """Displacement (node, angle, 3) of Re[amplitude exp(i (n Theta + phase))].
+
+    Raises NoSectionShape.
+    """
+    if not isinstance(mode.shape, HarmonicShape):
+        raise NoSectionShape("only modes known on the section's nodes can be swept")
+    rings = on_rings(mode.shape, nodes, angles, phase)
+    return _cartesian(rings.points, rings.displacement).reshape(len(nodes), len(angles), 3)
+
+
+def _cartesian(points: Array, vectors: Array) -> Array:
+    """Vectors with components (r, theta, z) at points (R, Theta, Z), in x, y, z."""
+    cos, sin = np.cos(points[..., 1]), np.sin(points[..., 1])
+    r, theta, z = np.moveaxis(vectors, -1, 0)
+    return np.stack([r * cos - theta * sin, z, -r * sin - theta * cos], -1)
