@@ -196,5 +196,7 @@ def _newton(
 
 
 def _pressure_force(model: Model, U: Array, loads: list[Load], numbering: Numbering) -> Array:
+    """Force of the pressure alone, of at least 1 Pa: the scale of what counts as balanced."""
     bare = Model(model.mesh, [], [])
-    return mechanics.residual(bare, U, loads, numbering) if loads else np.ones(1)
+    felt = [Load(load.lines, max(load.pressure, 1.0)) for load in loads]
+    return mechanics.residual(bare, U, felt, numbering) if felt else np.ones(1)

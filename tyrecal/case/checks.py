@@ -6,20 +6,20 @@ another one, nor causes one.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from pydantic import BaseModel, ValidationError
 
+from .meshable import Problems, levels, places
 from .mistakes import Keys, dotted, suggestion
 from .parts import WRONG, number
-from .shape import KINDS, explain, table, type_at
+from .schema import Analysis
+from .shape import KINDS, entries, explain, table, type_at
 
 if TYPE_CHECKING:
     from ..tyre.section import Section
 
-Problems = Iterator[tuple[Keys, str]]
-MOST_ELEMENTS = 20_000
 # what a variable cannot set: a fit that moved its own bounds or targets would mean nothing
 FIXED = ("format", "variables", "targets", "solver")
 
@@ -29,13 +29,13 @@ def problems(data: Mapping[str, Any], section: Section | None) -> Problems:
     yield from _names(data)
     yield from _targets(data)
     yield from _variables(data)
-    level = table(data, "mesh").get("level")
-    levels = table(data, "mesh").get("levels")
-    if isinstance(level, str) and isinstance(levels, dict) and level not in levels:
-        yield ("mesh", "level"), f"is not one of the levels{suggestion(level, levels)}"
+    chosen = table(data, "mesh").get("level")
+    known = table(data, "mesh").get("levels")
+    if isinstance(chosen, str) and isinstance(known, dict) and chosen not in known:
+        yield ("mesh", "level"), f"is not one of the levels{suggestion(chosen, known)}"
     if section:
-        yield from _places(data, section)
-        yield from _levels(data, section)
+        yield from places(data, section)
+        yield from levels(data, section)
 
 
 def _names(data: Mapping[str, Any]) -> Problems:
@@ -50,7 +50,7 @@ def _names(data: Mapping[str, Any]) -> Problems:
         (("rebar_layers", name), layer, "cord")
         for name, layer in table(data, "rebar_layers").items()
     ]
-    uses += [(("solids", i), solid, "rubber") for i, solid in enumerate(_list(data, "solids"))]
+    uses += [(("solids", i), solid, "rubber") for i, solid in enumerate(entries(data, "solids"))]
     materials = table(data, "materials")
     for keys, part, kind in uses:
         wanted = part.get("material") if isinstance(part, dict) else None
@@ -67,8 +67,9 @@ def _names(data: Mapping[str, Any]) -> Problems:
 
 def _targets(data: Mapping[str, Any]) -> Problems:
     seen: dict[tuple[Any, ...], int] = {}
-    highest = number(table(data, "analysis"), "highest_harmonic")
-    for i, mode in enumerate(_list(table(data, "targets"), "modes")):
+    default = Analysis.model_fields["highest_harmonic"].default
+    highest = number({"highest_harmonic": default, **table(data, "analysis")}, "highest_harmonic")
+    for i, mode in enumerate(entries(table(data, "targets"), "modes")):
         if not isinstance(mode, dict):
             continue
         c = number(mode, "c")
@@ -87,7 +88,7 @@ def _variables(data: Mapping[str, Any]) -> Problems:
     """Variables set numbers that exist, are not whole, allow the bounds, and are set once."""
     owners: dict[Keys, str] = {}
     for name, variable in table(data, "variables").items():
-        for i, path in enumerate(_list(variable, "sets")):
+        for i, path in enumerate(entries(variable, "sets")):
             here: Keys = ("variables", name, "sets", i)
             if not isinstance(path, str):
                 continue
@@ -133,93 +134,6 @@ def _refusal(data: Mapping[str, Any], parent: Keys, keys: Keys, value: float) ->
     return None
 
 
-def _places(data: Mapping[str, Any], section: Section) -> Problems:
-    """Lines and regions exist, and every part of the section has a material."""
-    lines = list(section.names)
-    regions = [name for name, _ in section.regions]
-    for name, layer in table(data, "rebar_layers").items():
-        line = layer.get("line") if isinstance(layer, dict) else None
-        if isinstance(line, str) and line not in lines[1:-1]:
-            hint = suggestion(line, lines[1:-1])
-            yield ("rebar_layers", name, "line"), f"is not a line inside the section{hint}"
-    bare = {(region, gap) for region in regions for gap in range(len(lines) - 1)}
-    whole = True
-    for i, solid in enumerate(_list(data, "solids")):
-        where, between = _list(solid, "regions"), _list(solid, "between")
-        whole &= isinstance(solid, dict) and WRONG not in solid.values()
-        for j, region in enumerate(where):
-            if isinstance(region, str) and region not in regions:
-                hint = suggestion(region, regions)
-                yield ("solids", i, "regions", j), f"is not a region of the section{hint}"
-        unknown = [line for line in between if line not in lines]
-        for j, line in enumerate(between):
-            if isinstance(line, str) and line in unknown:
-                hint = suggestion(line, lines)
-                yield ("solids", i, "between", j), f"is not a line of the section{hint}"
-        low, high = 0, len(lines) - 1
-        if between:
-            if unknown or len(between) != 2:
-                whole = False
-                continue
-            low, high = lines.index(between[0]), lines.index(between[1])
-            if low >= high:
-                yield ("solids", i, "between"), "must name the inner line first, then the outer"
-                whole = False
-        bare -= {(r, gap) for r in where or regions for gap in range(low, high)}
-    if bare and whole and isinstance(data.get("solids"), list):
-        region, gap = min(bare, key=lambda place: (regions.index(place[0]), place[1]))
-        yield ("solids",), (f"must cover the section: region '{region}' has no material"
-                            f" between '{lines[gap]}' and '{lines[gap + 1]}'")  # fmt: skip
-
-
-def _levels(data: Mapping[str, Any], section: Section) -> Problems:
-    """Every mesh level fits the section."""
-    gaps = len(section.names) - 1
-    regions = [name for name, _ in section.regions]
-    for name, level in table(table(data, "mesh"), "levels").items():
-        here: Keys = ("mesh", "levels", name)
-        elements = table(level, "elements")
-        if elements:
-            for region in elements:
-                if region not in regions:
-                    hint = suggestion(region, regions)
-                    yield (*here, "elements", region), f"is not a region of the section{hint}"
-            for region in regions:
-                if region not in elements:
-                    yield (*here, "elements", region), "must be given, the section has this region"
-        for key in ("rows", "grading"):
-            entries = _list(level, key)
-            if entries and len(entries) != gaps:
-                message = (
-                    f"must have {gaps} entries, one for each gap between lines, got {len(entries)}"
-                )
-                yield (*here, key), message
-        count = _sum(elements.values()) * _sum(_list(level, "rows"))
-        if count > MOST_ELEMENTS:
-            yield here, f"must have at most {MOST_ELEMENTS} elements, elements x rows is {count}"
-
-
-def folds(data: Mapping[str, Any], section: Section) -> str | None:
-    """Why the section cannot be meshed at the chosen level of ``data``, which is right so far."""
-    import numpy as np
-
-    from ..tyre.mesh import build_mesh
-
-    mesh = data["mesh"]
-    level = mesh["levels"][mesh["level"]]
-    elements = [level["elements"][region] for region, _ in section.regions]
-    try:
-        with np.errstate(all="ignore"):
-            built = build_mesh(
-                section, elements, level["rows"], "8" in mesh["element"], level.get("grading")
-            )
-    except ValueError as error:
-        return str(error)
-    if not np.isfinite(list(built.nodes.values())).all():
-        return "two lines of the section run through one point, no mesh fits between them"
-    return None
-
-
 def find(data: Mapping[str, Any] | BaseModel, path: str) -> Keys:
     """Keys of the dotted ``path``; none when a WRONG value stands in the way.
 
@@ -254,12 +168,3 @@ def at(data: Any, keys: Keys) -> Any:
 
 def _is_number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool)
-
-
-def _list(data: Any, key: str) -> list[Any]:
-    value = data.get(key) if isinstance(data, dict) else None
-    return value if isinstance(value, list) else []
-
-
-def _sum(values: Iterable[Any]) -> int:
-    return sum(v for v in values if isinstance(v, int))

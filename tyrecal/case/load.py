@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import ValidationError
 
-from .checks import folds, problems
+from .checks import problems
 from .document import Document, read_document
+from .meshable import folds
 from .mistakes import CaseError, Keys, Mistake, dotted
 from .schema import Case
 from .shape import disagreements, explain, without

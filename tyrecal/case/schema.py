@@ -204,7 +204,7 @@ class Solver(Part):
 class Case(Part):
     """One tyre, its mesh and analysis, what may vary and what was measured."""
 
-    format: Literal[1]
+    format: Annotated[int, Field(ge=1, le=1)]  # Literal[1] would take true
     name: Text
     size: Text
     pressure_kPa: Annotated[float, Field(ge=0, lt=2000)]

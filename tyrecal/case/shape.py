@@ -102,8 +102,7 @@ def disagreements(data: Mapping[str, Any]) -> Iterator[tuple[Keys, str]]:
             parts.append((("materials", name), part, Rubber))
     parts += [(("rebar_layers", k), v, RebarLayer) for k, v in table(data, "rebar_layers").items()]
     parts += [(("variables", k), v, Variable) for k, v in table(data, "variables").items()]
-    modes = table(data, "targets").get("modes")
-    for i, mode in enumerate(modes if isinstance(modes, list) else []):
+    for i, mode in enumerate(entries(table(data, "targets"), "modes")):
         parts.append((("targets", "modes", i), mode, TargetMode))
     for keys, part, kind in parts:
         if isinstance(part, dict):
@@ -115,6 +114,12 @@ def table(data: Any, key: str) -> dict[str, Any]:
     """The mapping at ``key``, empty when it is absent or wrong."""
     value = data.get(key) if isinstance(data, dict) else None
     return value if isinstance(value, dict) else {}
+
+
+def entries(data: Any, key: str) -> list[Any]:
+    """The list at ``key``, empty when it is absent or wrong."""
+    value = data.get(key) if isinstance(data, dict) else None
+    return value if isinstance(value, list) else []
 
 
 def without(data: dict[str, Any], mistakes: list[Keys]) -> None:

@@ -10,8 +10,9 @@ from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
-from .checks import find, folds, problems
+from .checks import find, problems
 from .load import LoadedCase
+from .meshable import folds
 from .mistakes import Keys, dotted, suggestion
 from .schema import Case
 from .shape import explain
@@ -47,7 +48,7 @@ def with_values(loaded: LoadedCase, values: Mapping[str, float]) -> LoadedCase:
     ValueError, in one sentence, for an unknown name or a value that the case cannot have.
     """
     targets: dict[Keys, float] = {}
-    tree: dict[str | int, Any] = {}
+    tree: dict[Any, Any] = {}
     for name, value in values.items():
         if isinstance(value, bool) or not isinstance(value, Real):
             raise ValueError(f"{name} is {value!r}, must be a number")
@@ -56,7 +57,7 @@ def with_values(loaded: LoadedCase, values: Mapping[str, float]) -> LoadedCase:
                 raise ValueError(f"{name}: {dotted(keys)} is set twice")
             targets[keys] = _number(loaded.case, keys, float(value))
     for keys, number in targets.items():
-        branch = tree
+        branch: Any = tree
         for key in keys[:-1]:
             branch = branch.setdefault(key, {})
         branch[keys[-1]] = number
@@ -88,7 +89,7 @@ def _number(case: Case, keys: Keys, value: float) -> float:
     """``value`` as the kind of number that stands at ``keys`` of the case."""
     old: Any = case
     for key in keys:
-        old = old.__dict__[key] if isinstance(old, BaseModel) else old[key]
+        old = getattr(old, str(key)) if isinstance(old, BaseModel) else old[key]
     if isinstance(old, bool) or not isinstance(old, int | float | None):
         raise ValueError(f"{dotted(keys)} is not a number, it cannot be {value:g}")
     return int(value) if isinstance(old, int) and value.is_integer() else value
@@ -102,7 +103,7 @@ def _set(node: Any, tree: Any, keys: Keys) -> Any:
     if not isinstance(tree, dict):
         return tree
     fields = node.__dict__ if isinstance(node, BaseModel) else node
-    new = list(fields) if isinstance(fields, list) else dict(fields)
+    new: Any = list(fields) if isinstance(fields, list) else dict(fields)
     for key, branch in tree.items():
         new[key] = _set(fields[key], branch, (*keys, key))
     if not isinstance(node, BaseModel):

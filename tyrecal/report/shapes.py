@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from matplotlib import colormaps
 from matplotlib.cm import ScalarMappable
-from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d import Axes3D
 from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
@@ -24,6 +24,7 @@ Array = np.ndarray
 ANGLES = 72
 LARGEST = 0.12  # displacement in the picture over the tyre's radius
 VIEW = 1.15  # half a view's width over the tyre's radius
+COLOUR_MAP = colormaps["viridis"]
 PERSPECTIVE = (22.0, -55.0)
 
 
@@ -35,15 +36,32 @@ def draw_mode(path: Path, mode: Mode, mesh: SectionMesh, scale: float | None = N
     of the radius. Raises NoSectionShape.
     """
     surface = _surface(mode, mesh, scale)
-    figure = new_figure(9.6, 5.2, None)
-    for name, x, y, size, elevation, azimuth in (
-        ("front, along the axle", 2.0, 1.95, 3.4, 0, -90),
-        ("top", 2.0, 4.15, 3.4, 90, -90),
-        ("side", 4.2, 1.95, 3.4, 0, 0),
-        ("perspective", 7.4, 2.4, 4.3, *PERSPECTIVE),
+    figure = new_figure(9.2, 5.6, None)
+    for name, x, y, half, below, elevation, azimuth in (
+        ("top", 1.9, 4.3, 1.85, 0.85, 90, -90),
+        ("front, along the axle", 1.9, 1.9, 1.85, 1.7, 0, -90),
+        ("side", 4.3, 1.9, 1.85, 1.7, 0, 0),
+        ("perspective", 7.1, 2.75, 2.3, 2.2, *PERSPECTIVE),
     ):
-        _view(figure, surface, (x, y), size, elevation, azimuth)
-    figure.suptitle(_title(mode))
+        _view(figure, surface, (x, y), half, elevation, azimuth)
+        figure.text(x / 9.2, (y - below) / 5.6, name, ha="center", va="center", color="0.3")
+    figure.suptitle(title(mode), x=0.5)
+    bar = figure.add_axes((5.9 / 9.2, 0.3 / 5.6, 2.4 / 9.2, 0.08 / 5.6))
+    figure.colorbar(ScalarMappable(cmap=COLOUR_MAP), bar, orientation="horizontal", ticks=[0, 0.5, 1])
+    bar.set_title("displacement over the largest", fontsize=8, color="0.3")
+    bar.tick_params(labelsize=8)
+    save(figure, path)
+
+
+@in_house_style
+def draw_modes_overview(path: Path, modes: Sequence[Mode], mesh: SectionMesh) -> None:
+    """Draw up to nine modes, lowest first, in perspective on one sheet. Raises NoSectionShape."""
+    figure = new_figure(9.0, 9.6, None)
+    lowest = sorted(modes, key=lambda mode: mode.frequency_Hz)[:9]
+    for k, mode in enumerate(lowest):
+        x, y = 1.5 + 3 * (k % 3), 8.0 - 3.2 * (k // 3)
+        _view(figure, _surface(mode, mesh, None), (x, y), 1.45, *PERSPECTIVE)
+        figure.text(x / 9.0, (y + 1.4) / 9.6, title(mode).replace(" - ", "\n"), ha="center")
     save(figure, path)
 
 
@@ -62,17 +80,65 @@ def _surface(mode: Mode, mesh: SectionMesh, scale: float | None) -> _Surface:
     rest = swept(nodes, mesh, angles)
     u = motion(mode.raw, nodes, angles)
     if mode.label.c:
-        # the member of the pair that moves most at the top
+        # of all members of the pair the one whose crest stands at the top, out of Theta's direction
         quarter = motion(mode.raw, nodes, angles, np.pi / 2)
         top = 3 * ANGLES // 4
-        k = np.argmax((u[:, top] ** 2 + quarter[:, top] ** 2).sum(-1))
-        phase = -np.arctan2(*(v[k, top] @ (u[k, top] + quarter[k, top]) for v in (quarter, u)))
-        u = motion(mode.raw, nodes, angles, phase)
+        a, b = u[:, top, 1:], quarter[:, top, 1:]
+        k = np.argmax((a**2 + b**2).sum(-1))
+        phase = np.arctan2(2 * a[k] @ b[k], a[k] @ a[k] - b[k] @ b[k]) / 2
+        u = np.cos(phase) * u + np.sin(phase) * quarter
     size = np.linalg.norm(u, axis=-1)
     scale = LARGEST * np.abs(rest).max() / size.max() if scale is None else scale
     return _Surface(rest, rest + scale * u, size / size.max())
 
 
-def _title(mode: Mode) -> str:
+def title(mode: Mode) -> str:
+    """Label, frequency and words: '[2,1] 66.1 Hz - first out-of-plane bending'."""
     label = mode.label
     return f"[{label.c},{label.m}] {mode.frequency_Hz:.1f} Hz - {words(label.c, label.m, label.kind)}"
+
+
+def _view(
+    figure: Figure,
+    surface: _Surface,
+    centre: tuple[float, float],
+    half: float,
+    elevation: float,
+    azimuth: float,
+) -> None:
+    """One orthographic view, ``half`` inches to each side of ``centre``."""
+    width, height = figure.get_size_inches()
+    x, y = centre
+    place = ((x - half) / width, (y - half) / height, 2 * half / width, 2 * half / height)
+    axes = figure.add_axes(place, projection="3d", computed_zorder=False)
+    assert isinstance(axes, Axes3D)
+    axes.set_axis_off()
+    axes.patch.set_alpha(0)
+    axes.set_proj_type("ortho")
+    axes.view_init(elevation, azimuth)
+    reach = VIEW * np.abs(surface.rest).max()
+    axes.set(xlim=(-reach, reach), ylim=(-reach, reach), zlim=(-reach, reach))
+    axes.set_box_aspect((1, 1, 1), zoom=1.5)
+    axes.add_collection3d(_faces(surface))
+    axes.add_collection3d(_outline(surface.rest, elevation, azimuth))
+
+
+def _faces(surface: _Surface) -> Poly3DCollection:
+    p, share = surface.moved, surface.share
+    quads = np.stack([p[:-1, :-1], p[1:, :-1], p[1:, 1:], p[:-1, 1:]], 2).reshape(-1, 4, 3)
+    mean = (share[:-1, :-1] + share[1:, :-1] + share[1:, 1:] + share[:-1, 1:]).ravel() / 4
+    colours = COLOUR_MAP(mean)
+    return Poly3DCollection(quads, facecolors=colours, edgecolors=(0, 0, 0, 0.25), lw=0.2)
+
+
+def _outline(rest: Array, elevation: float, azimuth: float) -> Line3DCollection:
+    """The silhouette of the tyre at rest: edges between faces turned to the viewer and away."""
+    up, round_ = np.radians([elevation, azimuth])
+    viewer = [np.cos(up) * np.cos(round_), np.cos(up) * np.sin(round_), np.sin(up)]
+    along, around = rest[1:, :-1] - rest[:-1, :-1], rest[:-1, 1:] - rest[:-1, :-1]
+    towards = np.cross(along, around) @ viewer > 0
+    rings = np.argwhere(towards[1:] != towards[:-1]) + [1, 0]
+    meridians = np.argwhere(towards != np.roll(towards, 1, axis=1))
+    edges = [(rest[i, j], rest[i, j + 1]) for i, j in rings]
+    edges += [(rest[i, j], rest[i + 1, j]) for i, j in meridians]
+    return Line3DCollection(edges, colors="0.35", lw=0.8)

@@ -1,0 +1,28 @@
+"""Every wrong case is refused in sentences that name what is wrong."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tyrecal.case import validate
+
+from .bad_cases import BAD, write
+
+
+def test_the_table_is_long_enough() -> None:
+    assert len(BAD) >= 60
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_wrong_case(name: str, tmp_path: Path) -> None:
+    path = write(name, tmp_path)
+    before = {file: file.read_bytes() for file in tmp_path.iterdir()}
+    mistakes = validate(path)
+    assert {file: file.read_bytes() for file in tmp_path.iterdir()} == before
+    told = "\n".join(map(str, mistakes))
+    assert any(m.key == BAD[name].key and BAD[name].words in m.message for m in mistakes), told
+    for mistake in mistakes:
+        assert str(mistake).isprintable() and len(mistake.message) < 400
+        assert mistake.line >= 1 and mistake.file.startswith(str(tmp_path))

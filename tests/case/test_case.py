@@ -1,0 +1,176 @@
+"""The shipped cases load; their numbers can be set; every mistake is told in one go."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import pytest
+
+from tyrecal.case import (
+    CaseError,
+    load_case,
+    parse_assignment,
+    start_values,
+    validate,
+    with_values,
+)
+
+from .bad_cases import CASES, CSV, GOOD, TABLE
+
+P235 = load_case(CASES / "p235_75r17.yaml")
+
+
+def put(folder: Path, *edits: tuple[str, str]) -> Path:
+    content = GOOD
+    for old, new in edits:
+        assert old in content
+        content = content.replace(old, new, 1)
+    (folder / CSV).write_text(TABLE)
+    path = folder / "case.yaml"
+    path.write_text(content)
+    return path
+
+
+@pytest.mark.parametrize("name", ["p235_75r17", "p235_75r17_narrow_rim"])
+def test_shipped_cases_are_right(name: str) -> None:
+    path = CASES / f"{name}.yaml"
+    assert validate(path) == []
+    assert load_case(str(path)).case.size == "P235/75R17"
+
+
+def test_values_and_defaults() -> None:
+    case = P235.case
+    assert case.pressure_kPa == 240
+    assert case.materials["rubber"].kind == "rubber"
+    assert case.materials["belt_cord"].density_kg_per_m3 == 5900
+    assert case.rebar_layers["belt_2"].angle_deg == 110
+    assert case.rebar_layers["belt_2"].geometry == "constant"
+    assert case.mesh.levels["default"].rows == [1, 1, 1, 3]
+    assert case.mesh.hourglass_stiffness_Pa is None and case.templates is None
+    assert len(case.targets.modes) == 9 and case.targets.modes[0].weight == 1
+    assert P235.section.names == ("inner", "ply", "belt1", "belt2", "outer")
+    assert P235.folder == CASES and P235.raw["rim"]["reference_point_m"] == {"r": 0, "z": 0}
+
+
+def test_a_case_without_targets_and_variables(tmp_path: Path) -> None:
+    content = GOOD[: GOOD.index("variables:")] + GOOD[GOOD.index("solver:") :]
+    path = put(tmp_path)
+    path.write_text(content)
+    case = load_case(path).case
+    assert case.targets.modes == [] and case.variables == {}
+
+
+def test_angular_cords_templates_and_linear_variables(tmp_path: Path) -> None:
+    (tmp_path / "mine").mkdir()
+    angle = "  angle: {sets: [rebar_layers.belt_1.angle_deg], start: -70, lower: -80, upper: 0,"
+    path = put(
+        tmp_path,
+        ("spacing_m: 1.0e-3", "geometry: angular, spacing_deg: 0.15"),
+        ("targets:", angle + " scale: linear}\ntargets:"),
+        ("solver:", "templates: mine\nsolver:"),
+    )
+    loaded = load_case(path)
+    assert loaded.case.rebar_layers["carcass"].spacing_deg == 0.15
+    assert with_values(loaded, {"angle": -60}).case.rebar_layers["belt_1"].angle_deg == -60
+
+
+def test_every_mistake_in_one_go_with_its_line(tmp_path: Path) -> None:
+    path = put(
+        tmp_path,
+        ("pressure_kPa: 240.0", "pressure_kPa: wide"),
+        ("1100.0", "-1100.0"),
+        ("material: belt_cord", "material: steel"),
+        ("upper: 1.0e+7", "upper: 1.0e+4"),
+        ("level: default\n", "level: coarse\n"),
+        ("{c: 1, m: 0,", "{c: 1, m: 1,"),
+        ("sectors: 60", "sector: 60"),
+    )
+    table = TABLE.splitlines()
+    table[4] = table[4][:-1] + "7"
+    (tmp_path / CSV).write_text("\n".join(table))
+    with pytest.raises(CaseError) as error:
+        load_case(path)
+    mistakes = error.value.mistakes
+    assert mistakes == validate(path)
+    lines = path.read_text().splitlines()
+    here = [m for m in mistakes if m.file == str(path)]
+    assert [m.line for m in here] == sorted(m.line for m in here)
+    assert {m.key for m in here} == {
+        "pressure_kPa",
+        "mesh.level",
+        "materials.rubber.density_kg_per_m3",
+        "rebar_layers.belt_1.material",
+        "variables.C10.upper",
+        "targets.modes.3",
+        "analysis.sector",
+    }
+    for mistake in here:
+        if not mistake.key.endswith("3"):
+            assert mistake.value in lines[mistake.line - 1]
+    (there,) = [m for m in mistakes if m.file != str(path)]
+    assert (there.file, there.line) == (str(tmp_path / CSV), 5)
+    assert str(here[0]) == f"{path}, line 6: pressure_kPa is wide: must be a number"
+
+
+def test_start_values_and_with_values() -> None:
+    start = start_values(P235)
+    assert start == {"A_belt": 2.118683e-7, "A_carcass": 4.208352e-7, "C10": 1e6}
+    new = with_values(P235, {"A_belt": 3e-7, "mesh.levels.default.rows.0": 2, "pressure_kPa": 200})
+    assert new.case.rebar_layers["belt_1"].area_m2 == new.case.rebar_layers["belt_2"].area_m2
+    assert new.case.rebar_layers["belt_2"].area_m2 == 3e-7 and new.case.pressure_kPa == 200
+    assert new.case.mesh.levels["default"].rows == [2, 1, 1, 3]
+    assert new.raw["mesh"]["levels"]["default"]["rows"] == [2, 1, 1, 3]
+    assert new.raw["rebar_layers"]["belt_1"]["area_m2"] == 3e-7
+    # the old one is as it was
+    assert P235.case.rebar_layers["belt_1"].area_m2 == 2.118683e-7
+    assert P235.raw["pressure_kPa"] == 240 and P235.case.mesh.levels["default"].rows[0] == 1
+
+
+def test_optional_numbers_can_be_set() -> None:
+    values = {"analysis.vibration_frequency_Hz": 60.0, "mesh.hourglass_stiffness_Pa": 3e4}
+    new = with_values(P235, values)
+    assert new.case.analysis.vibration_frequency_Hz == 60
+    assert new.raw["mesh"]["hourglass_stiffness_Pa"] == 3e4
+
+
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        ({"C1": 1.0}, "did you mean 'C10'"),
+        ({"materials.rubber.C10": 1.0}, "did you mean 'C10_Pa'"),
+        ({"materials.rubber.density_kg_per_m3": -1.0}, "must be greater than 0, got -1"),
+        ({"C10": float("nan")}, "finite"),
+        ({"C10": True}, "must be a number"),
+        ({"C10": "1"}, "must be a number"),
+        ({"C10": 1e6, "materials.rubber.C10_Pa": 2e6}, "set twice"),
+        ({"name": 1.0}, "not a number"),
+        ({"materials": 1.0, "C10": 1e6}, "not a number"),
+        ({"mesh.levels.default.rows.0": 1.5}, "whole number"),
+        ({"mesh.levels.default.rows.9": 1}, "there is no '9'"),
+        ({"targets.modes.8.c": 3}, "a target already"),
+        ({"variables.C10.start": 1e9}, "at most upper"),
+        ({"rebar_layers.belt_1.spacing_deg": 1}, "must be absent"),
+    ],
+)
+def test_with_values_refuses(values: dict[str, float], words: str) -> None:
+    with pytest.raises(ValueError, match=words) as error:
+        with_values(P235, values)
+    assert "\n" not in str(error.value)
+
+
+def test_with_values_is_fast() -> None:
+    start = start_values(P235)
+    durations = []
+    for _ in range(50):
+        began = time.perf_counter()
+        with_values(P235, start)
+        durations.append(time.perf_counter() - began)
+    assert min(durations) < 1e-3
+
+
+def test_parse_assignment() -> None:
+    assert parse_assignment("C10=1.2e6") == ("C10", 1.2e6)
+    for text in ("C10", "=3", "C10=", "C10=high", "C10=nan", "C10=inf"):
+        with pytest.raises(ValueError, match="must be"):
+            parse_assignment(text)

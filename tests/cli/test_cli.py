@@ -1,0 +1,189 @@
+"""The command line: results, exit codes, one sentence per mistake, nothing written over."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tyrecal.cli.main import main
+
+from ..conftest import CASES
+
+CASE = str(CASES / "p235_75r17.yaml")
+
+
+def run(*arguments: str) -> int:
+    """Exit code of a command run in this process."""
+    with pytest.raises(SystemExit) as leave:
+        main(list(arguments))
+    code = leave.value.code
+    return code if isinstance(code, int) else 0
+
+
+def test_help_imports_nothing_heavy() -> None:
+    code = (
+        "import sys; sys.argv = ['tyrecal', '--help']\n"
+        "from tyrecal.cli.main import main\n"
+        "try: main()\n"
+        "except SystemExit: pass\n"
+        "heavy = {'numpy', 'scipy', 'pydantic', 'jinja2', 'matplotlib', 'rich', 'meshio'}\n"
+        "assert not heavy & set(sys.modules), heavy & set(sys.modules)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    for name in ("validate", "deck", "modes", "fit", "Exit codes"):
+        assert name in done.stdout
+
+
+@pytest.mark.parametrize("command", ["validate", "deck", "modes", "fit"])
+def test_every_command_explains_itself(command: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(command, "--help") == 0
+    assert "CASE" in capsys.readouterr().out
+
+
+def test_modes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ["modes", CASE, "--output", str(tmp_path / "out"), "--json"]
+    assert run(*arguments, "--pressure-kPa", "200", "--set", "A_belt=2.118683e-7") == 0
+    printed = json.loads(capsys.readouterr().out)
+    assert printed == json.loads((tmp_path / "out" / "modes.json").read_text())
+    assert printed["pressure_kPa"] == 200.0 and printed["load_N"] == 0.0
+    assert printed["mass_kg"] == pytest.approx(12.797, abs=0.01)
+    axial = next(m for m in printed["modes"] if m["kind"] == "axial")
+    assert axial["frequency_Hz"] == pytest.approx(33.9071, rel=5e-3)
+    assert not (tmp_path / "out" / "runs").exists()
+    assert run(*arguments, "--set", "materials.rubber.density_kg_per_m3=2200") == 0
+    heavier = json.loads(capsys.readouterr().out)
+    assert heavier["mass_kg"] > 1.5 * printed["mass_kg"]
+
+
+def test_fit_writes_the_same_bytes_twice(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name in ("one", "two"):
+        assert run("fit", CASE, "--output", str(tmp_path / name), "--no-pictures") == 0
+    assert "objective" in capsys.readouterr().out
+    for file in ("fit.json", "fit.csv", "fit_history.csv"):
+        assert (tmp_path / "one" / file).read_bytes() == (tmp_path / "two" / file).read_bytes()
+    fit = json.loads((tmp_path / "one" / "fit.json").read_text())
+    assert fit["objective_Hz"] == pytest.approx(3.115, abs=0.01)
+    assert fit["evaluations_to_0.05_Hz"] <= 12
+    assert set(fit["variables"]) == {"A_belt", "A_carcass", "C10"}
+    run_facts = json.loads((tmp_path / "one" / "run.json").read_text())
+    assert run_facts["command"] == "fit" and run_facts["solver"].startswith("bundled ")
+
+
+def test_fit_with_pictures(tmp_path: Path) -> None:
+    assert run("fit", CASE, "--output", str(tmp_path), "--quiet", "--fix", "C10") == 0
+    names = {path.name for path in tmp_path.iterdir()}
+    assert {"fit.json", "convergence.png", "section.png", "modes.png"} <= names
+    for kind in (".png", ".vtu"):
+        assert len([n for n in names if n.startswith("mode_") and n.endswith(kind)]) == 9
+    assert "C10" not in json.loads((tmp_path / "fit.json").read_text())["variables"]
+
+
+def test_deck_runs_alone(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("deck", CASE, "--output", str(tmp_path / "decks"), "--json") == 0
+    paths = [Path(p) for p in json.loads(capsys.readouterr().out)]
+    assert {p.name for p in paths} == {"inflate.inp", "modes.inp", "modes.request.json"}
+    solver = [sys.executable, "-m", "tyrecal_solvers.bundled"]
+    subprocess.run([*solver, str(tmp_path / "decks" / "modes"), "--oldjob", "inflate"], check=True)
+    modes = json.loads((tmp_path / "decks" / "modes.json").read_text())["steps"][0]["modes"]
+    assert len(modes) == 10
+
+
+def test_validate(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("validate", CASE) == 0
+    assert "no mistakes" in capsys.readouterr().out
+
+
+def test_a_failed_solver_run_is_kept_and_quoted(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    arguments = ["--pressure-kPa", "1900", "--set", "A_carcass=1e-8", "--set", "C10=1e5"]
+    assert run("modes", CASE, "--output", str(out), *arguments) == 3
+    message = capsys.readouterr().err
+    assert "inflation stopped at" in message and "of 1900 kPa" in message
+    (kept,) = (out / "runs").iterdir()
+    assert str(kept) in message and (kept / "inflate.inp").exists()
+    assert not (out / "modes.json").exists()
+
+
+def test_says_so_when_it_does_not_move(
+    case_folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Targets equal to the start's own frequencies: nothing to gain, exit code 4."""
+    path = case_folder / "p235_75r17.yaml"
+    out = str(case_folder / "out")
+    assert run("modes", str(path), "--output", out, "--json") == 0
+    text = path.read_text()
+    for mode in json.loads(capsys.readouterr().out)["modes"]:
+        kind = f", kind: {mode['kind']}" if mode["kind"] else ""
+        start = f"    - {{c: {mode['c']}, m: {mode['m']}{kind}, frequency_Hz: "
+        for line in text.splitlines():
+            if line.startswith(start):
+                text = text.replace(line, f"{start}{mode['frequency_Hz']!r}}}")
+    path.write_text(text)
+    assert run("fit", str(path), "--output", out, "--no-pictures") == 4
+    assert "DID NOT MOVE" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--set", "A_bolt=1"], "A_belt"),
+        (["--set", "A_belt"], "NAME=VALUE"),
+        (["--set", "A_belt=wide"], "number"),
+        (["--set", "A_belt=nan"], "finite"),
+        (["--set", "A_belt=-1e-7"], "area_m2"),
+        (["--pressure-kPa", "-3"], "pressure_kPa"),
+        (["--mesh", "finest"], "refined"),
+        (["--solver", "nastran"], "bundled"),
+    ],
+)
+def test_wrong_options(
+    arguments: list[str], words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    assert run("modes", CASE, "--output", str(out), *arguments) == 2
+    message = capsys.readouterr().err
+    assert words in message and "Traceback" not in message
+    assert not out.exists()
+
+
+def test_wrong_options_of_fit(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = ["--output", str(tmp_path / "out"), "--no-pictures"]
+    assert run("fit", CASE, *out, "--fix", "A_bolt") == 2
+    assert "A_belt" in capsys.readouterr().err
+    assert run("fit", CASE, *out, "--set", "A_belt=1e-3") == 2
+    assert "bounds" in capsys.readouterr().err
+    assert run("fit", CASE, *out, "--fix", "A_belt", "--fix", "A_carcass", "--fix", "C10") == 2
+    assert "no variable is free" in capsys.readouterr().err
+
+
+def test_a_folder_of_another_case_is_refused(
+    case_folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = str(tmp_path / "out")
+    assert run("modes", CASE, "--output", out, "--quiet") == 0
+    before = (tmp_path / "out" / "modes.json").read_bytes()
+    other = str(case_folder / "p235_75r17.yaml")
+    assert run("modes", other, "--output", out, "--set", "A_belt=3e-7") == 2
+    assert "--output" in capsys.readouterr().err
+    assert (tmp_path / "out" / "modes.json").read_bytes() == before
+
+
+def test_a_template_that_runs_code_is_refused(
+    case_folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    own = case_folder / "own"
+    own.mkdir()
+    (own / "inflate.inp.j2").write_text("{{ ''.__class__.__base__.__subclasses__() }}")
+    path = case_folder / "p235_75r17.yaml"
+    path.write_text(path.read_text() + "\ntemplates: own\n")
+    assert run("modes", str(path), "--output", str(case_folder / "out")) == 2
+    message = capsys.readouterr().err
+    assert "unsafe" in message and "Traceback" not in message and message.count("\n") == 1
