@@ -7,7 +7,7 @@ from typing import Any
 
 from ..case import LoadedCase, with_values
 from .context import context
-from .environment import environment, render
+from .environment import TemplateFailed, environment, render
 
 JOBS = {"abaqus": ("inflate", "modes")}
 STEP = 1e-4  # of a variable, to see which numbers of the deck it moves and how fast
@@ -91,8 +91,12 @@ def _slopes(above: str, below: str, width: float) -> list[tuple[int, int, float]
     rows = []
     pairs = zip(above.splitlines(), below.splitlines(), strict=True)
     for line, (one, other) in enumerate(pairs, start=1):
-        if one == other or one.startswith("*"):
+        if one == other:
             continue
+        if one.startswith("*"):
+            raise TemplateFailed(
+                f"a variable stands in '{one.strip()}', a keyword line: it has no exact derivative"
+            )
         fields = zip(one.split(","), other.split(","), strict=True)
         for index, (a, b) in enumerate(fields):
             if a != b:

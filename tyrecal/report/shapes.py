@@ -36,17 +36,17 @@ def draw_mode(path: Path, mode: Mode, mesh: SectionMesh, scale: float | None = N
     of the radius. Raises NoSectionShape.
     """
     surface = _surface(mode, mesh, scale)
-    figure = new_figure(9.2, 5.6, None)
+    figure = new_figure(9.2, 5.7, None)
     for name, x, y, half, below, elevation, azimuth in (
-        ("top", 1.9, 4.3, 1.85, 0.85, 90, -90),
-        ("front, along the axle", 1.9, 1.9, 1.85, 1.7, 0, -90),
-        ("side", 4.3, 1.9, 1.85, 1.7, 0, 0),
-        ("perspective", 7.1, 2.75, 2.3, 2.2, *PERSPECTIVE),
+        ("top", 1.9, 4.55, 1.85, 0.95, 90, -90),
+        ("front, along the axle", 1.9, 1.8, 1.85, 1.68, 0, -90),
+        ("side", 4.3, 1.8, 1.85, 1.68, 0, 0),
+        ("perspective", 7.1, 3.1, 2.3, 2.12, *PERSPECTIVE),
     ):
         _view(figure, surface, (x, y), half, elevation, azimuth)
-        figure.text(x / 9.2, (y - below) / 5.6, name, ha="center", va="center", color="0.3")
+        figure.text(x / 9.2, (y - below) / 5.7, name, ha="center", va="center", color="0.3")
     figure.suptitle(title(mode), x=0.5)
-    bar = figure.add_axes((5.9 / 9.2, 0.3 / 5.6, 2.4 / 9.2, 0.08 / 5.6))
+    bar = figure.add_axes((5.9 / 9.2, 0.3 / 5.7, 2.4 / 9.2, 0.08 / 5.7))
     figure.colorbar(ScalarMappable(cmap=COLOUR_MAP), bar, orientation="horizontal", ticks=[0, 0.5, 1])
     bar.set_title("displacement over the largest", fontsize=8, color="0.3")
     bar.tick_params(labelsize=8)
@@ -56,12 +56,12 @@ def draw_mode(path: Path, mode: Mode, mesh: SectionMesh, scale: float | None = N
 @in_house_style
 def draw_modes_overview(path: Path, modes: Sequence[Mode], mesh: SectionMesh) -> None:
     """Draw up to nine modes, lowest first, in perspective on one sheet. Raises NoSectionShape."""
-    figure = new_figure(9.0, 9.6, None)
+    figure = new_figure(9.0, 9.7, None)
     lowest = sorted(modes, key=lambda mode: mode.frequency_Hz)[:9]
     for k, mode in enumerate(lowest):
-        x, y = 1.5 + 3 * (k % 3), 8.0 - 3.2 * (k // 3)
+        x, y = 1.5 + 3 * (k % 3), 7.9 - 3.2 * (k // 3)
         _view(figure, _surface(mode, mesh, None), (x, y), 1.45, *PERSPECTIVE)
-        figure.text(x / 9.0, (y + 1.4) / 9.6, title(mode).replace(" - ", "\n"), ha="center")
+        figure.text(x / 9.0, (y + 1.38) / 9.7, title(mode).replace(" - ", "\n"), ha="center")
     save(figure, path)
 
 
@@ -132,7 +132,12 @@ def _faces(surface: _Surface) -> Poly3DCollection:
 
 
 def _outline(rest: Array, elevation: float, azimuth: float) -> Line3DCollection:
-    """The silhouette of the tyre at rest: edges between faces turned to the viewer and away."""
+    """The tyre at rest in silhouette: edges between faces turned to the viewer and away.
+
+    Only outside the widest points: nearer the rim such edges are hidden or do not move.
+    """
+    widest = np.sort([np.argmin(rest[:, 0, 1]), np.argmax(rest[:, 0, 1])])
+    rest = rest[widest[0] - 1 : widest[1] + 2]
     up, round_ = np.radians([elevation, azimuth])
     viewer = [np.cos(up) * np.cos(round_), np.cos(up) * np.sin(round_), np.sin(up)]
     along, around = rest[1:, :-1] - rest[:-1, :-1], rest[:-1, 1:] - rest[:-1, :-1]
