@@ -4,7 +4,6 @@ import json
 from pathlib import Path
 
 import pytest
-from threadpoolctl import threadpool_limits
 
 from tyrecal.modes.label import label_modes
 from tyrecal.modes.match import margin, match
@@ -24,8 +23,7 @@ def label(key):
 def test_the_nine_modes_of_the_paper_have_the_reference_frequencies(number):
     point = json.loads(REFERENCE.read_text())["sections"]["p235_75r17"][number]
     values = {name: point[name] for name in ("A_belt", "A_carcass", "C10")}
-    with threadpool_limits(1):  # small matrices: threads only wait for each other
-        modes = label_modes(evaluate(values, point["pressure_kPa"], 2))
+    modes = label_modes(evaluate(values, point["pressure_kPa"], 2))
     expected = {label(key): hertz for key, hertz in point["modes"].items()}
     matched = match(modes, list(expected))
     assert {k: v.frequency_Hz for k, v in matched.items()} == pytest.approx(expected, rel=6e-3)

@@ -22,20 +22,18 @@ from pathlib import Path
 
 import numpy as np
 from scipy.spatial import KDTree
-from tyrecal_solvers.bundled import grammar, harmonics, inflation, keywords, model
-from tyrecal_solvers.bundled.band import Numbering
-from tyrecal_solvers.bundled.mechanics import Load
 
+from tyrecal.case import load_case
+from tyrecal.evaluate.door import Door, Question
+from tyrecal.evaluate.failure import EvaluationFailed
 from tyrecal.evaluate.results import HarmonicShape, RawMode, RingShape
 from tyrecal.modes.label import label_modes, pair_rings
 from tyrecal.modes.mode import Label, Mode
 from tyrecal.modes.sample import on_rings
-from tyrecal.tyre.mesh import SectionMesh, build_mesh
-from tyrecal.tyre.section import read_section
 
 Array = np.ndarray
 
-SECTION = Path(__file__).parents[2] / "cases" / "p235_75r17.csv"
+CASE = Path(__file__).parents[2] / "cases" / "p235_75r17.yaml"
 TABLE_2 = (
     Label(0, 0, "axial"),
     Label(0, 0, "torsional"),
@@ -52,58 +50,18 @@ TREAD_Z = (-0.08, -0.04, 0.0, 0.04, 0.08)  # m
 SIDEWALL_R = (0.35, 0.30)  # m
 
 
+@cache
+def door() -> Door:
+    return Door(load_case(CASE))
+
+
 def evaluate(
     values: dict[str, float], pressure_kPa: float, modes_per_harmonic: int
 ) -> list[RawMode]:
-    """Modes of harmonics 0 to 4. Raises ArithmeticError where no stable tyre is reached."""
-    marks, _ = grammar.check(keywords.read_keywords(_deck(**values)), False)
-    tyre = model.build(marks, None, True)
-    points = tyre.mesh.X.real
-    free = np.ones((len(points), 3), bool)
-    free[[tyre.mesh.index[node] for node in tyre.mesh.node_sets["RIM"]]] = False
-    connectivity = [part.solids.connectivity for part in tyre.rubbers]
-    connectivity += [part.lines.connectivity for part in tyre.cords]
-    numbering = Numbering(connectivity, free)
-    loads = [Load(tyre.mesh.faces["CAVITY"], pressure_kPa * 1e3)]
-    state = inflation.equilibrium(tyre, numbering, loads, np.zeros((len(points), 3)))
-    vibration = harmonics.Vibration(tyre, state.U, loads, numbering, 0.0)
-    nodes = np.array(sorted(tyre.mesh.index, key=tyre.mesh.index.__getitem__))
-    return [
-        RawMode(np.sqrt(value) / 2 / np.pi, HarmonicShape(n, nodes, points, shape), 2 if n else 1)
-        for n in range(5)
-        for found in [vibration.modes(n, modes_per_harmonic)]
-        for value, shape in zip(found.eigenvalues, found.shapes, strict=True)
-    ]
-
-
-@cache
-def _mesh() -> SectionMesh:
-    return build_mesh(read_section(SECTION), [8, 8, 8, 2], [1, 1, 1, 2], True)
-
-
-def _deck(A_belt: float, A_carcass: float, C10: float) -> str:
-    mesh = _mesh()
-    deck = ["*HEADING", "tyre", "*NODE, NSET=ALL"]
-    deck += [f"{k}, {r:.13g}, {z:.13g}" for k, (r, z) in mesh.nodes.items()]
-    deck += ["*ELEMENT, TYPE=CGAX8R, ELSET=RUBBER"]
-    deck += [", ".join(map(str, (k, *v))) for k, v in mesh.solids.items()]
-    for line, elements in mesh.cords.items():
-        deck += [f"*ELEMENT, TYPE=SFMGAX2, ELSET={line}"]
-        deck += [", ".join(map(str, (k, *v))) for k, v in elements.items()]
-    deck += ["*NSET, NSET=RIM", *map(str, mesh.rim), "*ELSET, ELSET=INNER", *map(str, mesh.inner)]
-    deck += ["*SURFACE, NAME=CAVITY", "INNER, S4", "*SOLID SECTION, ELSET=RUBBER, MATERIAL=RUBBER"]
-    for layer, area, spacing, cord, angle in (
-        ("ply", A_carcass, 1e-3, "CARCASS", 0),
-        ("belt1", A_belt, 1.16e-3, "BELT", 70),
-        ("belt2", A_belt, 1.16e-3, "BELT", 110),
-    ):
-        deck += [f"*SURFACE SECTION, ELSET={layer}", "*REBAR LAYER"]
-        deck += [f"{layer}, {area:.13g}, {spacing}, 0.0, {cord}, {angle}"]
-    deck += ["*MATERIAL, NAME=RUBBER", "*HYPERELASTIC, MOONEY-RIVLIN, MODULI=LONG TERM"]
-    deck += [f"{C10:.13g}, 0., 5.085e-8", "*VISCOELASTIC, TIME=PRONY", "0.3, 0., 0.1"]
-    deck += ["*DENSITY", "1100.", "*MATERIAL, NAME=BELT", "*ELASTIC", "172.2e9, 0.3"]
-    deck += ["*DENSITY", "5900.", "*MATERIAL, NAME=CARCASS", "*ELASTIC", "9.87e9, 0.3"]
-    return "\n".join([*deck, "*DENSITY", "1500.", ""])
+    """Modes of harmonics 0 to 4, harmonic by harmonic. Raises EvaluationFailed."""
+    question = Question({**values, "pressure_kPa": pressure_kPa}, (), modes_per_harmonic)
+    modes = door().evaluate(question).modes
+    return sorted(modes, key=lambda mode: mode.shape.n)  # type: ignore[union-attr]
 
 
 def ring_nodes(shape: HarmonicShape) -> Array:
@@ -175,7 +133,7 @@ def main(designs: int) -> None:
         values = {"A_belt": belt, "A_carcass": carcass, "C10": rubber}
         try:
             every = evaluate(values, pressure, 4)
-        except ArithmeticError as error:
+        except EvaluationFailed as error:
             failed += 1
             print(f"replaced: {values} at {pressure:.0f} kPa: {error}")
             continue

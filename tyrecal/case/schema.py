@@ -10,9 +10,7 @@ from pydantic import Field
 from .parts import WRONG, Degrees, Name, NotNegative, Part, Positive, Problem, Text, number
 
 Moduli = Literal["long_term", "instantaneous"]
-Element = Literal[
-    "CGAX4", "CGAX4R", "CGAX4H", "CGAX4RH", "CGAX8", "CGAX8R", "CGAX8H", "CGAX8RH"
-]  # fmt: skip
+Element = Literal["CGAX8R", "CGAX8", "CGAX4R"]
 
 
 class SectionSource(Part):

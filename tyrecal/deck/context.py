@@ -17,7 +17,8 @@ def section_mesh(case: LoadedCase) -> SectionMesh:
     mesh, level = case.case.mesh, case.case.mesh.levels[case.case.mesh.level]
     elements = tuple(level.elements[name] for name, _ in case.section.regions)
     grading = tuple(level.grading) if level.grading else None
-    return _mesh(case.section, elements, tuple(level.rows), mesh.element == "CGAX8R", grading)
+    quadratic = mesh.element.startswith("CGAX8")
+    return _mesh(case.section, elements, tuple(level.rows), quadratic, grading)
 
 
 @lru_cache(maxsize=8)
@@ -58,7 +59,7 @@ def context(case: LoadedCase) -> dict[str, Any]:
     claims = tuple((tuple(s.regions or ()), tuple(s.between or ())) for s in c.solids)
     lines = frozenset(layer.line for layer in c.rebar_layers.values())
     point = c.rim.reference_point_m
-    tables = _tables(mesh, case.section.names, rows, claims, lines, (point.r, point.z))
+    tables = _tables(mesh, case.section.names, rows, claims, lines, (point.r, point.z), c.mesh.element)
     hourglass = None if mesh.quadratic else {"stiffness": c.mesh.hourglass_stiffness_Pa}
     return {
         "name": c.name,
@@ -113,6 +114,7 @@ def _tables(
     claims: Claims,
     used_lines: frozenset[str],
     reference: tuple[float, float],
+    element: str,
 ) -> dict[str, Any]:
     """Node and element tables; elements go to the last entry of ``solids`` that claims them."""
     edges = [sum(rows[:k]) for k in range(len(rows) + 1)]
@@ -129,7 +131,7 @@ def _tables(
                 break
     return {
         "nodes": [(n, r, z) for n, (r, z) in mesh.nodes.items()],
-        "solid_type": "CGAX8R" if mesh.quadratic else "CGAX4R",
+        "solid_type": element,
         "cord_type": "SFMGAX2" if mesh.quadratic else "SFMGAX1",
         "solids": [
             {"name": f"SOLID_{i + 1}", "entry": i, "elements": b} for i, b in sorted(blocks.items())

@@ -34,4 +34,4 @@ def save(figure: Figure, path: Path) -> None:
     assert isinstance(canvas, FigureCanvasAgg)
     canvas.draw()
     image = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
-    image.quantize(256, dither=Image.Dither.NONE).save(path, format="PNG", optimize=True)
+    image.quantize(256, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE).save(path, "PNG")

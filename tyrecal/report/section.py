@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.lines import Line2D
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 
 Array = np.ndarray
 
-RUBBER = ("#D9D9D9", "#BFD3E6", "#F3E0B5", "#C9B8A3", "#DCCBE3", "#C8E0C4")  # pale: cords stand out
+RUBBER = ("#E3E3E3", "#C9DCEB", "#F5E6C0", "#D3C3B3", "#E2D3E8", "#CFE5CB")  # pale: cords stand out
 DETAIL = 4.0  # magnification of the belt's edge
 
 
@@ -31,19 +32,100 @@ def draw_section(
     mesh: SectionMesh,
     displacement: Mapping[int, Array] | None = None,
 ) -> None:
-    """Draw rubber by region, elements, the cords of each rebar layer and what the rim holds.
+    """Draw rubber by region, elements, the cords of each layer and what the rim holds, in mm.
 
-    displacement: node number to (r, theta, z) of the inflation in m; draws the inflated outline.
+    The belt's edge is repeated four times as large. displacement: node number to (r, theta, z)
+    of the inflation, m; with it the inflated outline is dashed, at true scale.
     """
-    drawing = _Drawing(case, mesh)
-    figure = new_figure(9.0, 7.2)
-    axes = figure.add_subplot()
-    drawing.draw(axes, 1.0)
+    place = {n: np.array([z, r]) * 1e3 for n, (r, z) in mesh.nodes.items()}
+    outline = _outline(mesh)
+    figure = new_figure(9.0, 8.0)
+    axes = figure.add_subplot(aspect="equal")
+    entries = _draw(axes, case, mesh, place, 1.0)
+    axes.axvline(0, color=GREY, lw=0.8, ls=(0, (12, 3, 2, 3)))
     if displacement is not None:
-        drawing.inflated(axes, displacement)
-    axes.set_aspect("equal")
-    axes.set_xlabel("z (along the axle), mm")
-    axes.set_ylabel("r, mm")
-    axes.set_title(case.case.name)
-    axes.margins(0.04)
+        moved = [place[n] + np.take(displacement[n], [2, 0]) * 1e3 for n in outline]
+        (line,) = axes.plot(*np.transpose(moved), color="black", lw=1.0, ls=(0, (5, 3)))
+        entries[f"inflated to {case.case.pressure_kPa:g} kPa"] = line
+    _detail(axes, case, mesh, place)
+    axes.set_xlabel("z along the axle, mm")
+    axes.set_ylabel("r from the axle, mm")
+    z, r = np.transpose([place[n] for n in outline])
+    figure.suptitle(case.case.name, fontsize=13)
+    axes.set_title(
+        f"outer diameter {2 * r.max():.1f} mm, section width {np.ptp(z):.1f} mm,"
+        f" {len(mesh.solids)} elements", fontsize=9, color="0.3",
+    )  # fmt: skip
+    figure.legend(entries.values(), entries.keys(), loc="outside lower center", ncols=3,
+                  frameon=False)  # fmt: skip
     save(figure, path)
+
+
+def _outline(mesh: SectionMesh) -> list[int]:
+    """Numbers of the nodes round the section, closed."""
+    step = 2 if mesh.quadratic else 1
+    columns, rows = (step * n for n in mesh.shape)
+    walk = [(0, j) for j in range(columns)] + [(i, columns) for i in range(rows)]
+    walk += [(rows, j) for j in range(columns, 0, -1)] + [(i, 0) for i in range(rows, -1, -1)]
+    return [1000 * (j + 1) + i + 1 for i, j in walk]
+
+
+def _draw(
+    axes: Axes, case: LoadedCase, mesh: SectionMesh, place: dict[int, Array], size: float
+) -> dict[str, Artist]:
+    """Fill ``axes``, lines ``size`` times as thick; returns the legend's entries."""
+    entries: dict[str, Artist] = {}
+    colours = dict(zip(dict.fromkeys(r for r, _ in mesh.cells.values()), RUBBER * 9, strict=False))
+    cells = {number: [place[n] for n in _round(nodes)] for number, nodes in mesh.solids.items()}
+    for region, colour in colours.items():
+        own = [cells[k] for k, (name, _) in mesh.cells.items() if name == region]
+        axes.add_collection(PolyCollection(own, fc=colour, ec="0.62", lw=0.3 * size))
+        entries[region.replace("_", " ")] = Patch(fc=colour, ec="0.62")
+    held = set(mesh.rim)
+    rim = [cells[k] for k, nodes in mesh.solids.items() if held.issuperset(nodes)]
+    look: dict[str, Any] = {"fc": "none", "ec": "0.25", "hatch": "/////", "lw": 0.0}
+    axes.add_collection(PolyCollection(rim, **look))
+    entries["held by the rim"] = Patch(**look)
+
+    layers = case.case.rebar_layers
+    for k, (name, layer) in enumerate(layers.items()):
+        sharing = [other for other, its in layers.items() if its.line == layer.line]
+        # layers on one line take turns, element by element
+        turns = slice(sharing.index(name), None, len(sharing))
+        lines = [[place[n] for n in nodes] for nodes in mesh.cords[layer.line].values()]
+        colour = COLOURS[k % len(COLOURS)]
+        axes.add_collection(
+            LineCollection(lines[turns], color=colour, lw=1.3 * size, capstyle="butt")
+        )
+        words = f"{name.replace('_', ' ')}: {layer.angle_deg:g}° from the meridian"
+        entries[words] = Line2D([], [], color=colour, lw=2)
+    return entries
+
+
+def _round(nodes: tuple[int, ...]) -> list[int]:
+    """An element's nodes in the order in which they lie round it."""
+    if len(nodes) == 4:
+        return list(nodes)
+    return [n for pair in zip(nodes[:4], nodes[4:], strict=True) for n in pair]
+
+
+def _detail(
+    axes: Axes, case: LoadedCase, mesh: SectionMesh, place: dict[int, Array]
+) -> None:
+    """The edge of the belt, or the crown of a tyre without one, enlarged inside the cavity."""
+    held = set(mesh.rim)
+    lasts = [list(elements.values())[-1][-1] for elements in mesh.cords.values()]
+    ends = [place[n] for n in lasts if n not in held]
+    inner = np.array([place[n] for k in mesh.inner for n in mesh.solids[k][:1]])
+    half_width, height = abs(inner[0, 0]) * 0.9, np.ptp(inner[:, 1]) * 0.6
+    top = inner[:, 1].max() - 0.16 * np.ptp(inner[:, 1])
+    inset = axes.inset_axes((-half_width, top - height, 2 * half_width, height),
+                            transform=axes.transData)  # fmt: skip
+    _draw(inset, case, mesh, place, 2.0)
+    z, r = np.mean(ends, axis=0) if ends else inner[len(inner) // 2]
+    across, up = half_width / DETAIL, height / DETAIL / 2
+    inset.set(xlim=(z - across, z + across), ylim=(r - up, r + up), xticks=[], yticks=[])
+    for spine in inset.spines.values():
+        spine.set(visible=True, color=GREY)
+    inset.set_title(f"belt edge, {DETAIL:g} : 1", fontsize=9, loc="left", color="0.3")
+    axes.indicate_inset_zoom(inset, edgecolor=GREY, alpha=1.0)

@@ -127,8 +127,16 @@ def _faces(surface: _Surface) -> Poly3DCollection:
     p, share = surface.moved, surface.share
     quads = np.stack([p[:-1, :-1], p[1:, :-1], p[1:, 1:], p[:-1, 1:]], 2).reshape(-1, 4, 3)
     mean = (share[:-1, :-1] + share[1:, :-1] + share[1:, 1:] + share[:-1, 1:]).ravel() / 4
-    colours = COLOUR_MAP(mean)
-    return Poly3DCollection(quads, facecolors=colours, edgecolors=(0, 0, 0, 0.25), lw=0.2)
+    # meridians in bold, as faces without area so that nearer faces hide them: they show a twist
+    bold = p[:, :-1 : ANGLES // 12]
+    lines = np.stack([bold[:-1], bold[1:], bold[1:], bold[:-1]], 2).reshape(-1, 4, 3)
+    thin = np.arange(len(quads) + len(lines)) < len(quads)
+    return Poly3DCollection(
+        np.concatenate([quads, lines]),
+        facecolors=COLOUR_MAP(np.append(mean, np.zeros(len(lines)))),
+        edgecolors=np.where(thin[:, None], (0, 0, 0, 0.12), (0, 0, 0, 1)),
+        linewidths=0.5,
+    )
 
 
 def _outline(rest: Array, elevation: float, azimuth: float) -> Line3DCollection:
