@@ -87,7 +87,7 @@ def command(
     door = Door(loaded, solver)
     adapter = door.solver
     run = Run(case, output, "fit", adapter)
-    door.folder, door.keep = run.folder / "runs", verbose
+    door.folder, door.keep = run.runs, verbose
     with _Progress(quiet, verbose) as progress:
         fit = calibrate(
             loaded,

@@ -48,7 +48,7 @@ def command(
     door = Door(loaded, solver)
     adapter = door.solver
     run = Run(case, output, "modes", adapter)
-    door.folder, door.keep = run.folder / "runs", verbose
+    door.folder, door.keep = run.runs, verbose
     evaluation = door.evaluate(Question(values))
     result, modes = modes_result(loaded, values, evaluation)
     run.write_json("modes.json", result)

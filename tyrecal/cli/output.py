@@ -55,10 +55,17 @@ class Run:
         partial.replace(path)
         return path
 
+    @property
+    def runs(self) -> Path:
+        """Where the solver's run folders go."""
+        return self.folder / "runs"
+
     def finish(self, **facts: Any) -> None:
         """Write run.json: command, times, host, versions, and what else is volatile."""
         import tyrecal
 
+        if self.runs.is_dir() and not any(self.runs.iterdir()):
+            self.runs.rmdir()
         self.write_json(
             "run.json",
             {

@@ -114,8 +114,6 @@ class Door:
 
     def _drop(self, folder: Path) -> None:
         shutil.rmtree(folder, ignore_errors=True)
-        if self.folder is not None and self.folder.is_dir() and not any(self.folder.iterdir()):
-            self.folder.rmdir()
 
 
 def _answer(door: Door, question: Question) -> Evaluation | EvaluationFailed:

@@ -25,7 +25,7 @@ def draw_convergence(path: Path, history: Sequence[Mapping[str, Any]]) -> None:
     point = np.array([row["point"] for row in history])
     objective = np.array([row["objective_Hz"] or np.nan for row in history], float)
     failed = np.isnan(objective)
-    figure = new_figure(7.0, 5.6)
+    figure = new_figure(8.0, 5.6)
     top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=[3, 2])
     top.set_title(_summary(objective))
 
@@ -35,32 +35,37 @@ def draw_convergence(path: Path, history: Sequence[Mapping[str, Any]]) -> None:
     top.semilogy(point, objective, "o", color=COLOURS[1], ms=2.5 if many else 4.5, mec="white",
                  mew=0 if many else 0.5, label="design point")  # fmt: skip
     if failed.any():
-        top.plot(point[failed], np.full(failed.sum(), 0.96), "x", color="black", ms=6, mew=1.5,
+        top.plot(point[failed], np.full(failed.sum(), 0.96), "x", color="black", ms=3 if many else 6, mew=0.8 if many else 1.5,
                  transform=top.get_xaxis_transform(), label="could not be evaluated")  # fmt: skip
     top.set_ylabel("objective, Hz")
-    top.legend(frameon=False)
 
     for k, (name, start) in enumerate(history[0]["values"].items()):
         ratio = np.array([row["values"][name] for row in history], float) / (start or np.nan)
         drawn = bool((ratio > 0).all())
-        colour, marker = COLOURS[k % len(COLOURS)], MARKERS[k % len(MARKERS)]
-        bottom.semilogy(point, ratio if drawn else np.nan * ratio, "-", marker=marker, ms=0 if many else 4,
-                        color=colour, lw=1.2, label=name if drawn else f"{name}: not drawn")  # fmt: skip
+        bottom.semilogy(
+            point,
+            ratio if drawn else np.nan * ratio,
+            marker=MARKERS[k % len(MARKERS)],
+            ms=0 if many else 4,
+            color=COLOURS[k % len(COLOURS)],
+            lw=1.2,
+            label=name if drawn else f"{name}: no ratio",
+        )
     bottom.axhline(1, color=GREY, lw=0.8, ls=":")
     bottom.set_ylabel("value / start value")
     bottom.set_xlabel("design point")
     bottom.xaxis.set_major_locator(MaxNLocator(integer=True))
-    bottom.legend(frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))
 
     starts = [row.get("start", 1) for row in history]
     for axes in (top, bottom):
         for i in range(1, len(starts)):
             if starts[i] != starts[i - 1]:
                 axes.axvline(point[i] - 0.5, color=GREY, lw=0.5)
+        axes.legend(frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))
         axes.grid(True, which="major", color="0.9", lw=0.6)
         low, high = axes.get_ylim()
         if high / low < 100:  # powers of ten alone would leave the axis without numbers
-            axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+            axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 3, 5)))
         axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         axes.yaxis.set_minor_formatter(NullFormatter())
     save(figure, path)

@@ -51,11 +51,10 @@ def draw_section(
     axes.set_xlabel("z along the axle, mm")
     axes.set_ylabel("r from the axle, mm")
     z, r = np.transpose([place[n] for n in outline])
-    figure.suptitle(case.case.name, fontsize=13)
-    axes.set_title(
-        f"outer diameter {2 * r.max():.1f} mm, section width {np.ptp(z):.1f} mm,"
-        f" {len(mesh.solids)} elements", fontsize=9, color="0.3",
-    )  # fmt: skip
+    axes.set_title(case.case.name, fontsize=13, pad=22)
+    facts = (f"outer diameter {2 * r.max():.1f} mm, section width {np.ptp(z):.1f} mm,"
+             f" {len(mesh.solids)} elements")  # fmt: skip
+    axes.text(0.5, 1.02, facts, transform=axes.transAxes, ha="center", color="0.3")
     figure.legend(entries.values(), entries.keys(), loc="outside lower center", ncols=3,
                   frameon=False)  # fmt: skip
     save(figure, path)
@@ -75,7 +74,21 @@ def _draw(
 ) -> dict[str, Artist]:
     """Fill ``axes``, lines ``size`` times as thick; returns the legend's entries."""
     entries: dict[str, Artist] = {}
-    colours = dict(zip(dict.fromkeys(r for r, _ in mesh.cells.values()), RUBBER * 9, strict=False))
+    layers = case.case.rebar_layers
+    for k, (name, layer) in enumerate(layers.items()):
+        sharing = [other for other, its in layers.items() if its.line == layer.line]
+        # layers on one line take turns, element by element
+        turns = slice(sharing.index(name), None, len(sharing))
+        lines = [[place[n] for n in nodes] for nodes in mesh.cords[layer.line].values()]
+        colour = COLOURS[k % len(COLOURS)]
+        axes.add_collection(
+            LineCollection(lines[turns], color=colour, lw=1.3 * size, capstyle="butt", zorder=3)
+        )
+        words = f"{name.replace('_', ' ')}: {layer.angle_deg:g}° from the meridian"
+        entries[words] = Line2D([], [], color=colour, lw=2)
+
+    names = [name for name, _ in case.section.regions]
+    colours = dict(zip(names, RUBBER * 9, strict=False))
     cells = {number: [place[n] for n in _round(nodes)] for number, nodes in mesh.solids.items()}
     for region, colour in colours.items():
         own = [cells[k] for k, (name, _) in mesh.cells.items() if name == region]
@@ -86,19 +99,6 @@ def _draw(
     look: dict[str, Any] = {"fc": "none", "ec": "0.25", "hatch": "/////", "lw": 0.0}
     axes.add_collection(PolyCollection(rim, **look))
     entries["held by the rim"] = Patch(**look)
-
-    layers = case.case.rebar_layers
-    for k, (name, layer) in enumerate(layers.items()):
-        sharing = [other for other, its in layers.items() if its.line == layer.line]
-        # layers on one line take turns, element by element
-        turns = slice(sharing.index(name), None, len(sharing))
-        lines = [[place[n] for n in nodes] for nodes in mesh.cords[layer.line].values()]
-        colour = COLOURS[k % len(COLOURS)]
-        axes.add_collection(
-            LineCollection(lines[turns], color=colour, lw=1.3 * size, capstyle="butt")
-        )
-        words = f"{name.replace('_', ' ')}: {layer.angle_deg:g}° from the meridian"
-        entries[words] = Line2D([], [], color=colour, lw=2)
     return entries
 
 
@@ -109,9 +109,7 @@ def _round(nodes: tuple[int, ...]) -> list[int]:
     return [n for pair in zip(nodes[:4], nodes[4:], strict=True) for n in pair]
 
 
-def _detail(
-    axes: Axes, case: LoadedCase, mesh: SectionMesh, place: dict[int, Array]
-) -> None:
+def _detail(axes: Axes, case: LoadedCase, mesh: SectionMesh, place: dict[int, Array]) -> None:
     """The edge of the belt, or the crown of a tyre without one, enlarged inside the cavity."""
     held = set(mesh.rim)
     lasts = [list(elements.values())[-1][-1] for elements in mesh.cords.values()]
@@ -127,5 +125,6 @@ def _detail(
     inset.set(xlim=(z - across, z + across), ylim=(r - up, r + up), xticks=[], yticks=[])
     for spine in inset.spines.values():
         spine.set(visible=True, color=GREY)
-    inset.set_title(f"belt edge, {DETAIL:g} : 1", fontsize=9, loc="left", color="0.3")
+    inset.text(0.02, 0.03, f"belt edge, {DETAIL:g} : 1" if ends else f"{DETAIL:g} : 1",
+               transform=inset.transAxes, color="0.3")  # fmt: skip
     axes.indicate_inset_zoom(inset, edgecolor=GREY, alpha=1.0)

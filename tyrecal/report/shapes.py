@@ -10,8 +10,11 @@ import numpy as np
 from matplotlib import colormaps
 from matplotlib.cm import ScalarMappable
 from matplotlib.figure import Figure
-from mpl_toolkits.mplot3d import Axes3D
-from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
+from mpl_toolkits.mplot3d import Axes3D  # type: ignore[import-untyped]
+from mpl_toolkits.mplot3d.art3d import (  # type: ignore[import-untyped]
+    Line3DCollection,
+    Poly3DCollection,
+)
 
 from ..modes.mode import Mode
 from ..tyre.mesh import SectionMesh
@@ -47,7 +50,9 @@ def draw_mode(path: Path, mode: Mode, mesh: SectionMesh, scale: float | None = N
         figure.text(x / 9.2, (y - below) / 5.7, name, ha="center", va="center", color="0.3")
     figure.suptitle(title(mode), x=0.5)
     bar = figure.add_axes((5.9 / 9.2, 0.3 / 5.7, 2.4 / 9.2, 0.08 / 5.7))
-    figure.colorbar(ScalarMappable(cmap=COLOUR_MAP), bar, orientation="horizontal", ticks=[0, 0.5, 1])
+    figure.colorbar(
+        ScalarMappable(cmap=COLOUR_MAP), bar, orientation="horizontal", ticks=[0, 0.5, 1]
+    )
     bar.set_title("displacement over the largest", fontsize=8, color="0.3")
     bar.tick_params(labelsize=8)
     save(figure, path)
@@ -95,7 +100,9 @@ def _surface(mode: Mode, mesh: SectionMesh, scale: float | None) -> _Surface:
 def title(mode: Mode) -> str:
     """Label, frequency and words: '[2,1] 66.1 Hz - first out-of-plane bending'."""
     label = mode.label
-    return f"[{label.c},{label.m}] {mode.frequency_Hz:.1f} Hz - {words(label.c, label.m, label.kind)}"
+    return (
+        f"[{label.c},{label.m}] {mode.frequency_Hz:.1f} Hz - {words(label.c, label.m, label.kind)}"
+    )
 
 
 def _view(
@@ -128,7 +135,7 @@ def _faces(surface: _Surface) -> Poly3DCollection:
     quads = np.stack([p[:-1, :-1], p[1:, :-1], p[1:, 1:], p[:-1, 1:]], 2).reshape(-1, 4, 3)
     mean = (share[:-1, :-1] + share[1:, :-1] + share[1:, 1:] + share[:-1, 1:]).ravel() / 4
     # meridians in bold, as faces without area so that nearer faces hide them: they show a twist
-    bold = p[:, :-1 : ANGLES // 12]
+    bold = p[:, : -1 : ANGLES // 12]
     lines = np.stack([bold[:-1], bold[1:], bold[1:], bold[:-1]], 2).reshape(-1, 4, 3)
     thin = np.arange(len(quads) + len(lines)) < len(quads)
     return Poly3DCollection(
@@ -150,8 +157,8 @@ def _outline(rest: Array, elevation: float, azimuth: float) -> Line3DCollection:
     viewer = [np.cos(up) * np.cos(round_), np.cos(up) * np.sin(round_), np.sin(up)]
     along, around = rest[1:, :-1] - rest[:-1, :-1], rest[:-1, 1:] - rest[:-1, :-1]
     towards = np.cross(along, around) @ viewer > 0
-    rings = np.argwhere(towards[1:] != towards[:-1]) + [1, 0]
+    rings = np.argwhere(towards[1:] != towards[:-1])
     meridians = np.argwhere(towards != np.roll(towards, 1, axis=1))
-    edges = [(rest[i, j], rest[i, j + 1]) for i, j in rings]
+    edges = [(rest[i + 1, j], rest[i + 1, j + 1]) for i, j in rings]
     edges += [(rest[i, j], rest[i + 1, j]) for i, j in meridians]
     return Line3DCollection(edges, colors="0.35", lw=0.8)

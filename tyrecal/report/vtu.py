@@ -7,7 +7,6 @@ from pathlib import Path
 import meshio
 import numpy as np
 
-from ..evaluate.results import HarmonicShape
 from ..modes.mode import Mode
 from ..tyre.mesh import SectionMesh
 from .revolve import corners, motion, swept
