@@ -6,6 +6,7 @@ of infinitely many sectors. A mode with n >= 1 stands for a pair turned by a qua
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +18,7 @@ from .mechanics import Load
 from .model import Model
 
 Array = np.ndarray
+MOST_HARMONICS = 60
 
 
 class Unstable(ArithmeticError):
@@ -33,6 +35,11 @@ class HarmonicModes:
     n: int
     eigenvalues: Array
     shapes: Array
+
+    def below(self, frequency_Hz: float) -> HarmonicModes:
+        """Those up to a frequency."""
+        keep = self.eigenvalues <= (2 * np.pi * frequency_Hz) ** 2
+        return HarmonicModes(self.n, self.eigenvalues[keep], self.shapes[keep])
 
 
 class Vibration:
@@ -108,3 +115,32 @@ def _start_fields(X: Array, n: int) -> Array:
     fields[:, 0, 2] = 1.0 if n else 0.0
     fields[:, 1, 2] = 1j / n if n else X[:, 0] / X[:, 0].max() * (1.0 + lop * tilt)
     return fields
+
+
+def lowest_of_all(
+    vibration: Vibration, wanted: int, check: Callable[[], None]
+) -> list[HarmonicModes]:
+    """The ``wanted`` lowest modes over all harmonics, doublets counted twice.
+
+    Harmonics are added until one starts above the highest mode kept; ``check`` may raise to stop.
+    """
+    found: list[HarmonicModes] = []
+    for n in range(MOST_HARMONICS):
+        check()
+        count = 2
+        while True:
+            count = min(2 * count, wanted)
+            modes = vibration.modes(n, count)
+            limit = _highest_kept([*found, modes], wanted)
+            if modes.eigenvalues[-1] > limit or count == wanted:
+                break
+        found.append(modes)
+        if n >= 2 and modes.eigenvalues[0] > limit:
+            break
+    limit = _highest_kept(found, wanted)
+    return [m.below(np.sqrt(limit) / (2 * np.pi) * (1 + 1e-12)) for m in found]
+
+
+def _highest_kept(found: list[HarmonicModes], wanted: int) -> float:
+    values = np.sort(np.concatenate([np.repeat(m.eigenvalues, 2 if m.n else 1) for m in found]))
+    return float(values[wanted - 1]) if len(values) >= wanted else float("inf")

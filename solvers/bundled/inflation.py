@@ -198,5 +198,5 @@ def _newton(
 def _pressure_force(model: Model, U: Array, loads: list[Load], numbering: Numbering) -> Array:
     """Force of the pressure alone, of at least 1 Pa: the scale of what counts as balanced."""
     bare = Model(model.mesh, [], [])
-    felt = [Load(load.lines, max(load.pressure, 1.0)) for load in loads]
+    felt = [Load(load.lines, max(float(np.real(load.pressure)), 1.0)) for load in loads]
     return mechanics.residual(bare, U, felt, numbering) if felt else np.ones(1)

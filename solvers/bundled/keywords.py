@@ -114,6 +114,14 @@ class Keyword:
             raise DeckError(self.line, f"*{self.name} needs {parameter}=")
         return self.get(parameter)
 
+    def number(self, parameter: str) -> float | None:
+        """A parameter as a number, None where it is not given."""
+        text = self.get(parameter)
+        try:
+            return float(text) if text else None
+        except ValueError:
+            raise DeckError(self.line, f"{parameter}={text} is not a number") from None
+
     def only_row(self) -> Row:
         """The single data row of a keyword that has exactly one."""
         if len(self.rows) != 1:

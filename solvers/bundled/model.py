@@ -143,7 +143,7 @@ def _mesh(keywords: list[Keyword]) -> Mesh:
     bodies = {}
     for k in keywords:
         if k.name == "RIGID BODY":
-            reference, tied = int(k.need("REF NODE")), k.need("TIE NSET")
+            reference, tied = int(k.number("REF NODE") or 0), k.need("TIE NSET")
             if reference not in index or tied not in node_sets:
                 raise DeckError(k.line, f"node {reference} or node set {tied} is not defined")
             bodies[reference] = node_sets[tied]

@@ -178,3 +178,41 @@ def test_numbers_have_thirteen_digits_and_fit_abaqus_fields() -> None:
     for wrong in (float("nan"), float("inf"), True, "1", None, 1j):
         with pytest.raises(TemplateFailed):
             number(wrong)
+
+
+@pytest.mark.parametrize(
+    ("template", "old", "new", "words"),
+    [
+        ("modes.inp.j2", "*RIGID BODY, REF NODE={{ mesh.reference_node }}, TIE NSET=RIM\n", "",
+         "must be restated"),
+        ("modes.inp.j2", "*BOUNDARY\n{{ mesh.reference_node }}, 1, 6\n", "", "must be held"),
+        ("modes.inp.j2", "INC={{ increments }}", "INC=3", "INC=10"),
+        ("modes.inp.j2", "360.0, {{ sectors }}", "180.0, {{ sectors }}", "360 degrees"),
+        ("modes.inp.j2", "CAVITY, P, ", "OUTSIDE, P, ", "OUTSIDE"),
+        ("modes.inp.j2", "CAVITY, P, ", "CAVITY, HP, ", "only P"),
+        ("modes.inp.j2", ", NORMALIZATION=MASS", ", PROPERTY EVALUATION=fast", "not a number"),
+        ("inflate.inp.j2", ", NLGEOM=YES", "", "NLGEOM"),
+        ("inflate.inp.j2", ", DIRECT", "", "DIRECT"),
+        ("inflate.inp.j2", "*END STEP\n", "", "cut off"),
+        ("inflate.inp.j2", "{{ material.density | number }}", "-5", "density"),
+        ("inflate.inp.j2", "{{ cord.spacing | number }}", "0.0", "positive"),
+        ("mesh.inp.j2", "INNER_ROW, S4", "INNER_ROW, S5", "S1, S2, S3, S4"),
+    ],
+)  # fmt: skip
+def test_a_deck_that_would_mean_another_tyre_is_refused(
+    case_folder: Path, template: str, old: str, new: str, words: str
+) -> None:
+    """Each with the deck's name, and its line where a line is to blame."""
+    case = case_with_template(case_folder, template, old, new)
+    with pytest.raises(DeckRefused, match=r"(inflate|modes)\.inp") as failure:
+        Door(case).evaluate(Question({}))
+    assert words in str(failure.value)
+
+
+def test_without_its_load_the_second_job_is_not_inflated(case_folder: Path) -> None:
+    """ABAQUS drops the first job's loads at the transfer, so a deck without *DSLOAD is flat."""
+    case = case_with_template(case_folder, "modes.inp.j2",
+                              "*DSLOAD\nCAVITY, P, {{ pressure | number }}\n", "")  # fmt: skip
+    answer = Door(case).evaluate(Question({}))
+    assert answer.pressure_kPa == 0.0
+    assert abs(answer.displacement).max() < 1e-6

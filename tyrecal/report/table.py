@@ -18,13 +18,13 @@ NONE = "-"
 
 def fit_table(fit: Mapping[str, Any]) -> Table:
     """The content of fit.json like Table 2 of the paper: modes, variables, objective."""
-    table = _table(("mode", "motion", "×", "initial Hz", "fitted Hz", "target Hz", "deviation %"))
+    table = _table(("mode", "motion", "initial", "fitted", "target", "deviation %"))
     for mode in fit["modes"]:
         deviation = mode["deviation_percent"]
         hertz = [f"{mode[key]:.2f}" for key in ("initial_Hz", "fitted_Hz", "target_Hz")]
         _add(table, *_named(mode), *hertz, Text(f"{deviation:+.2f}", _colour(deviation)))
     table.add_section()
-    header = ("variable", "", "", "initial", "fitted", "bounds", "std. error %")
+    header = ("variable", "", "initial", "fitted", "bounds", "std. err. %")
     _add(table, *(Text(text, "bold") for text in header))
     for name, variable in fit["variables"].items():
         error, value = variable["standard_error"], variable["value"]
@@ -32,17 +32,17 @@ def fit_table(fit: Mapping[str, Any]) -> Table:
             table,
             name,
             Text("at bound" if variable["at_bound"] else "", "yellow"),
-            "",
-            f"{variable['initial']:.5g}",
-            f"{value:.5g}",
-            f"{variable['lower']:g} to {variable['upper']:g}",
+            f"{variable['initial']:.4g}",
+            f"{value:.4g}",
+            f"{variable['lower']:g}..{variable['upper']:g}",
             NONE if error is None or not value else f"{100 * error / abs(value):.2g}",
         )
     for name, value in fit.get("fixed", {}).items():
-        _add(table, name, "held", "", f"{value:.5g}", f"{value:.5g}", NONE, NONE)
+        _add(table, name, "held", f"{value:.4g}", f"{value:.4g}", NONE, NONE)
     table.add_section()
     objective = (f"{fit[key]:.3f}" for key in ("initial_objective_Hz", "objective_Hz"))
-    _add(table, Text("objective", "bold"), "equation (1), Hz", "", *objective, "", "")
+    _add(table, Text("objective", "bold"), "equation (1)", *objective, "", "")
+    table.caption = "frequencies and objective in Hz"
     return table
 
 
@@ -50,7 +50,7 @@ def modes_table(modes: Mapping[str, Any]) -> Table:
     """The content of modes.json: one row a mode, in its order."""
     entries = modes["modes"]
     extra = [key for key in ("symmetry", "clarity") if any(key in mode for mode in entries)]
-    table = _table(("mode", "motion", "×", "Hz", *extra))
+    table = _table(("mode", "motion", "Hz", *extra))
     load = f", {modes['load_N']:g} N" if modes["load_N"] else ""
     table.title = f"{modes['pressure_kPa']:g} kPa{load}, {modes['mass_kg']:.2f} kg"
     for mode in entries:
@@ -77,12 +77,12 @@ def fit_csv(fit: Mapping[str, Any]) -> str:
 
 
 def _table(columns: tuple[str, ...]) -> Table:
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    # figures never break: on a narrow terminal only names and words do
+    table = Table(box=box.SIMPLE_HEAD, padding=(0, 0, 0, 1), pad_edge=False, show_edge=False)
     for name in columns:
-        if name == "motion":
-            table.add_column(name)
-        else:
-            table.add_column(name, justify="left" if name == "mode" else "right", no_wrap=True)
+        figures = name not in ("mode", "motion")
+        table.add_column(name, justify="right" if figures else "left", no_wrap=figures,
+                         overflow="fold")  # fmt: skip
     return table
 
 
@@ -91,9 +91,9 @@ def _add(table: Table, *cells: str | Text) -> None:
     table.add_row(*(Text(cell) if isinstance(cell, str) else cell for cell in cells))
 
 
-def _named(mode: Mapping[str, Any]) -> tuple[str, str, str]:
-    words = motion(mode["c"], mode["m"], mode["kind"])
-    return f"[{mode['c']},{mode['m']}]", words, str(mode["multiplicity"])
+def _named(mode: Mapping[str, Any]) -> tuple[str, str]:
+    pair = f" ×{mode['multiplicity']}" if mode["multiplicity"] > 1 else ""
+    return f"[{mode['c']},{mode['m']}]{pair}", motion(mode["c"], mode["m"], mode["kind"])
 
 
 def _colour(deviation: float) -> str:

@@ -1,0 +1,129 @@
+"""Steps of a pair of jobs: procedure, loads and supports of each, and what must agree."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from . import grammar
+from .keywords import DeckError, Keyword, Row, read_keywords, seed
+
+Tangent = tuple[str, int, int, float]  # job, 1-based line, 0-based field, d number / d variable
+
+
+@dataclass
+class Step:
+    """One step with what holds in it; loads and supports carry on from step to step of a job.
+
+    number: in the job, from 1; procedure: its *STATIC or *FREQUENCY; pressures: surface to the
+    deck's number (Pa); held: rows of *BOUNDARY; long_term: the static state is relaxed;
+    revolved: of the second job, in three dimensions.
+    """
+
+    number: int
+    procedure: Keyword
+    pressures: dict[str, complex | float] = field(default_factory=dict)
+    held: list[Row] = field(default_factory=list)
+    long_term: bool = True
+    revolved: bool = False
+
+    @property
+    def pressure(self) -> float:
+        """The largest pressure, Pa."""
+        return max((float(np.real(p)) for p in self.pressures.values()), default=0.0)
+
+
+class Deck:
+    """A section job, and the job that revolves it or None, as keyword blocks.
+
+    Raises DeckError.
+    """
+
+    def __init__(self, texts: dict[str, str], job: str, oldjob: str | None):
+        self._order = [oldjob, job] if oldjob else [job]
+        self._keywords = {name: read_keywords(texts[name], name) for name in self._order}
+
+    def read(self, tangents: list[Tangent]) -> tuple[list[Keyword], list[Step]]:
+        """The section's model blocks and all steps, their numbers carrying ``tangents``."""
+        models, steps = [], []
+        for place, name in enumerate(self._order):
+            own = [(line, index, value) for job, line, index, value in tangents if job == name]
+            keywords = self._keywords[name]
+            model, blocks = grammar.check(seed(keywords, own) if own else keywords, place > 0)
+            models.append(model)
+            steps.append(_steps(model, blocks, place > 0))
+        if len(models) > 1:
+            _check_transfer(models[0], steps[0], models[1])
+        return models[0], [step for part in steps for step in part]
+
+
+def _steps(model: list[Keyword], blocks: list[list[Keyword]], revolved: bool) -> list[Step]:
+    steps: list[Step] = []
+    held = [row for k in model if k.name == "BOUNDARY" for row in k.rows]
+    pressures: dict[str, complex | float] = {}
+    long_term = True
+    for number, block in enumerate(blocks, start=1):
+        procedure = _procedure(block)
+        for k in block:
+            if k.name == "BOUNDARY":
+                held = [*held, *k.rows]
+            elif k.name == "DSLOAD":
+                pressures = {**pressures, **_pressures(k)}
+        if procedure.name == "STATIC":
+            long_term = "LONG TERM" in procedure.parameters
+        steps.append(Step(number, procedure, pressures, held, long_term, revolved))
+    return steps
+
+
+def _pressures(k: Keyword) -> dict[str, complex | float]:
+    found = {}
+    for row in k.rows:
+        if row.text(1).upper() != "P":
+            raise DeckError(row.line, f"load type '{row.text(1)}' is not honoured, only P")
+        found[row.text(0).upper()] = row.number(2)
+    return found
+
+
+def _procedure(block: list[Keyword]) -> Keyword:
+    found = [k for k in block if k.name in ("STATIC", "FREQUENCY")]
+    if len(found) != 1:
+        raise DeckError(block[0].line, "a step needs one *STATIC or *FREQUENCY")
+    if found[0].name == "STATIC" and "NLGEOM" not in block[0].parameters:
+        raise DeckError(block[0].line, "a *STATIC step needs NLGEOM=YES")
+    return found[0]
+
+
+def _check_transfer(section: list[Keyword], steps: list[Step], revolve: list[Keyword]) -> None:
+    """The revolve job takes over the end of the section job's only step, and holds its rim."""
+    blocks = {k.name: k for k in revolve}
+    for needed in ("SYMMETRIC MODEL GENERATION", "SYMMETRIC RESULTS TRANSFER"):
+        if needed not in blocks:
+            line = revolve[0].line if revolve else 0
+            raise DeckError(line, f"a job that runs on another one needs *{needed}")
+    generation, transfer = (
+        blocks[f"SYMMETRIC {n}"] for n in ("MODEL GENERATION", "RESULTS TRANSFER")
+    )
+    if len(generation.rows) < 3 or generation.rows[-1].number(0) != 360.0:
+        raise DeckError(generation.line, "the tyre is revolved by 360 degrees, in one segment")
+    if len(steps) != 1 or steps[0].procedure.name != "STATIC":
+        raise DeckError(transfer.line, "the first job must have one step, a *STATIC")
+    increments = _increments(steps[0].procedure)
+    if (transfer.need("STEP"), transfer.need("INC")) != ("1", str(increments)):
+        raise DeckError(transfer.line, f"the first job ends with STEP=1, INC={increments}")
+    for k in section:
+        restated = (
+            r.need("TIE NSET") == k.need("TIE NSET") for r in revolve if r.name == "RIGID BODY"
+        )
+        if k.name == "RIGID BODY" and not any(restated):
+            raise DeckError(
+                transfer.line,
+                f"a revolve drops the *RIGID BODY of {k.need('TIE NSET')}: it must be restated",
+            )
+
+
+def _increments(procedure: Keyword) -> int:
+    if "DIRECT" not in procedure.parameters:
+        raise DeckError(procedure.line, "the increments must be fixed (DIRECT) for a transfer")
+    row = procedure.only_row()
+    return int(np.ceil(np.real(row.number(1) / row.number(0)) - 1e-9))

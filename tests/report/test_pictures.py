@@ -1,0 +1,117 @@
+"""Pictures of the real tyre: written, of the size meant, small, and showing something."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+from PIL import Image
+from threadpoolctl import threadpool_limits
+
+from tyrecal.case import LoadedCase, load_case, start_values
+from tyrecal.deck.context import section_mesh
+from tyrecal.evaluate.door import Door, Question
+from tyrecal.evaluate.results import Evaluation
+from tyrecal.modes.label import label_modes
+from tyrecal.modes.mode import Label, Mode
+from tyrecal.report import shapes
+from tyrecal.report.convergence import draw_convergence
+from tyrecal.report.section import draw_section
+from tyrecal.report.shapes import draw_mode, draw_modes_overview, title
+from tyrecal.tyre.mesh import SectionMesh, build_mesh
+
+from ..conftest import CASES
+
+
+@dataclass
+class Tyre:
+    case: LoadedCase
+    mesh: SectionMesh
+    evaluation: Evaluation
+    modes: dict[Label, Mode]
+
+
+@pytest.fixture(scope="module")
+def tyre() -> Tyre:
+    case = load_case(CASES / "p235_75r17.yaml")
+    with threadpool_limits(1):
+        evaluation = Door(case).evaluate(Question(start_values(case)))
+    modes = {mode.label: mode for mode in label_modes(evaluation.modes)}
+    return Tyre(case, section_mesh(case), evaluation, modes)
+
+
+def ink(path, width: int, height: int, most_bytes: int) -> float:
+    """Share of the picture that is not paper, its size having been checked."""
+    assert path.stat().st_size < most_bytes
+    with Image.open(path) as image:
+        assert image.format == "PNG"
+        assert image.size == (width, height)
+        return float((np.asarray(image.convert("L")) < 245).mean())
+
+
+@pytest.mark.parametrize("label", [Label(0, 0, "torsional"), Label(3, 1)])
+def test_mode(tyre, tmp_path, label):
+    draw_mode(tmp_path / "mode.png", tyre.modes[label], tyre.mesh)
+    assert 0.25 < ink(tmp_path / "mode.png", 1380, 855, 300_000) < 0.6
+
+
+def test_modes_overview_takes_the_nine_lowest(tyre, tmp_path):
+    assert len(tyre.modes) > 9
+    draw_modes_overview(tmp_path / "modes.png", list(tyre.modes.values()), tyre.mesh)
+    assert 0.25 < ink(tmp_path / "modes.png", 1350, 1455, 600_000) < 0.6
+
+
+def test_the_largest_motion_is_12_percent_and_stands_at_the_top(tyre):
+    surface = shapes._surface(tyre.modes[Label(2, 0)], tyre.mesh, None)
+    motion = np.linalg.norm(surface.moved - surface.rest, axis=-1)
+    radius = np.hypot(surface.rest[..., 0], surface.rest[..., 2]).max()
+    assert motion.max() == pytest.approx(0.12 * radius)
+    node, angle = np.unravel_index(motion[:, :-1].argmax(), motion[:, :-1].shape)
+    assert 4 * angle % shapes.ANGLES == 0  # one of the four crests, one of them at the top
+    x, _, z = surface.rest[node, 3 * shapes.ANGLES // 4]
+    assert z > 0.3
+    assert abs(x) < 1e-9
+
+
+def test_a_scale_is_kept(tyre):
+    mode = tyre.modes[Label(0, 0, "axial")]
+    surface = shapes._surface(mode, tyre.mesh, 0.01)
+    assert (surface.moved - surface.rest)[..., 1] == pytest.approx(
+        0.01 * np.tile(_amplitude(mode, tyre.mesh)[:, 2:], shapes.ANGLES + 1)
+    )
+
+
+def _amplitude(mode: Mode, mesh: SectionMesh) -> np.ndarray:
+    rows = {int(n): k for k, n in enumerate(mode.raw.shape.nodes)}
+    return mode.raw.shape.amplitude[[rows[int(n)] for n in shapes.skin(mesh)]].real
+
+
+def test_title(tyre):
+    mode = replace(tyre.modes[Label(2, 1)], frequency_Hz=66.1)
+    assert title(mode) == "[2,1] 66.1 Hz - first out-of-plane bending"
+
+
+def test_section(tyre, tmp_path):
+    inflation = dict(zip(tyre.evaluation.nodes, tyre.evaluation.displacement, strict=True))
+    draw_section(tmp_path / "inflated.png", tyre.case, tyre.mesh, inflation)
+    draw_section(tmp_path / "plain.png", tyre.case, tyre.mesh)
+    plain = ink(tmp_path / "plain.png", 1350, 1200, 200_000)
+    assert 0.05 < plain < ink(tmp_path / "inflated.png", 1350, 1200, 200_000) < 0.3
+
+
+def test_section_of_linear_elements(tyre, tmp_path):
+    mesh = build_mesh(tyre.case.section, [4, 4, 4, 1], [1, 1, 1, 2], False)
+    draw_section(tmp_path / "section.png", tyre.case, mesh)
+    assert 0.05 < ink(tmp_path / "section.png", 1350, 1200, 200_000) < 0.3
+
+
+@pytest.mark.parametrize("failed", [(), (3,), range(1, 9)], ids=["none", "one", "all"])
+def test_convergence(tmp_path, failed):
+    history = [
+        {"point": k, "objective_Hz": None if k in failed else 3 + 30 / k**2, "start": 1 + k // 5,
+         "values": {"A_belt": 2e-7 * k, "angle": 3.0 - k, "zero": 0.0}}
+        for k in range(1, 9)
+    ]  # fmt: skip
+    draw_convergence(tmp_path / "fit.png", history)
+    assert 0.01 < ink(tmp_path / "fit.png", 1200, 840, 100_000) < 0.2
