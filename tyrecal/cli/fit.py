@@ -102,17 +102,20 @@ def command(
     run.write_json("fit.json", fit.result)
     run.write_text("fit.csv", fit_csv(fit.result))
     write_history(run.folder / "fit_history.csv", fit.history)
-    if pictures:
-        from ..report.pictures import draw_fit
-
-        draw_fit(run.folder, loaded, fit)
-    run.finish()
     if as_json:
         print_json(fit.result)
     else:
         show(fit_table(fit.result), as_json, quiet)
     for warning in _warnings(fit.result):
         click.secho(warning, fg="yellow", err=True)
+    if pictures:
+        from ..evaluate.door import Question
+        from ..report.pictures import draw_fit
+
+        values = fit.fitted.values
+        modes = sorted(fit.fitted.modes.values(), key=lambda mode: mode.frequency_Hz)
+        draw_fit(run.folder, loaded, values, door.evaluate(Question(values)), modes, fit.history)
+    run.finish()
     say(f"results in {run.folder}", as_json, quiet)
     return 0 if fit.result["converged"] and fit.result["moved"] else 4
 

@@ -59,7 +59,9 @@ def context(case: LoadedCase) -> dict[str, Any]:
     claims = tuple((tuple(s.regions or ()), tuple(s.between or ())) for s in c.solids)
     lines = frozenset(layer.line for layer in c.rebar_layers.values())
     point = c.rim.reference_point_m
-    tables = _tables(mesh, case.section.names, rows, claims, lines, (point.r, point.z), c.mesh.element)
+    tables = _tables(
+        mesh, case.section.names, rows, claims, lines, (point.r, point.z), c.mesh.element
+    )
     hourglass = None if mesh.quadratic else {"stiffness": c.mesh.hourglass_stiffness_Pa}
     return {
         "name": c.name,

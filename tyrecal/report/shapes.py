@@ -10,8 +10,8 @@ import numpy as np
 from matplotlib import colormaps
 from matplotlib.cm import ScalarMappable
 from matplotlib.figure import Figure
-from mpl_toolkits.mplot3d import Axes3D  # type: ignore[import-untyped]
-from mpl_toolkits.mplot3d.art3d import (  # type: ignore[import-untyped]
+from mpl_toolkits.mplot3d import Axes3D
+from mpl_toolkits.mplot3d.art3d import (
     Line3DCollection,
     Poly3DCollection,
 )
@@ -152,7 +152,7 @@ def _outline(rest: Array, elevation: float, azimuth: float) -> Line3DCollection:
     Only outside the widest points: nearer the rim such edges are hidden or do not move.
     """
     widest = np.sort([np.argmin(rest[:, 0, 1]), np.argmax(rest[:, 0, 1])])
-    rest = rest[widest[0] - 1 : widest[1] + 2]
+    rest = rest[max(widest[0] - 1, 0) : widest[1] + 2]
     up, round_ = np.radians([elevation, azimuth])
     viewer = [np.cos(up) * np.cos(round_), np.cos(up) * np.sin(round_), np.sin(up)]
     along, around = rest[1:, :-1] - rest[:-1, :-1], rest[:-1, 1:] - rest[:-1, :-1]

@@ -1,0 +1,48 @@
+"""The pictures of a study in its folder: section, modes from four views, VTU, convergence."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from ..case import LoadedCase, with_values
+from ..deck.context import section_mesh
+from ..evaluate.results import Evaluation
+from ..modes.mode import Label, Mode
+from .convergence import draw_convergence
+from .section import draw_section
+from .shapes import draw_mode, draw_modes_overview
+from .vtu import write_vtu
+
+
+def draw_evaluation(
+    folder: Path, case: LoadedCase, evaluation: Evaluation, modes: Sequence[Mode]
+) -> None:
+    """section.png, modes.png (at most nine of them) and, per mode, mode_C_M[_KIND].png and .vtu."""
+    mesh = section_mesh(case)
+    moved = dict(zip(evaluation.nodes.tolist(), evaluation.displacement, strict=True))
+    draw_section(folder / "section.png", case, mesh, moved)
+    draw_modes_overview(folder / "modes.png", modes[:9], mesh)
+    for mode in modes:
+        stem = folder / file_name(mode.label)
+        draw_mode(stem.with_suffix(".png"), mode, mesh)
+        write_vtu(stem.with_suffix(".vtu"), mode, mesh)
+
+
+def draw_fit(
+    folder: Path,
+    case: LoadedCase,
+    values: Mapping[str, float],
+    evaluation: Evaluation,
+    modes: Sequence[Mode],
+    history: Sequence[Mapping[str, Any]],
+) -> None:
+    """The pictures of the fitted design, and convergence.png."""
+    draw_evaluation(folder, with_values(case, values), evaluation, modes)
+    draw_convergence(folder / "convergence.png", history)
+
+
+def file_name(label: Label) -> str:
+    """mode_2_1, mode_0_0_axial ..."""
+    return f"mode_{label.c}_{label.m}" + (f"_{label.kind}" if label.kind else "")
