@@ -94,7 +94,8 @@ def test_a_region_and_a_gap_can_have_their_own_rubber(case_folder: Path) -> None
         ("  belt_cord:\n", block.replace("  rubber:", "  tread:") + "  belt_cord:\n"),
         (
             "  - {material: rubber}",
-            "  - {material: rubber}\n  - {material: tread, regions: [crown], between: [belt2, outer]}",
+            "  - {material: rubber}\n"
+            "  - {material: tread, regions: [crown], between: [belt2, outer]}",
         ),
     )
     assert frequencies(case) == pytest.approx(frequencies(CASE), rel=1e-9)
