@@ -82,7 +82,7 @@ class Door:
             self._drop(folder)
             raise DeckRefused(str(error)) from None
         except solver.failures as error:
-            cause = CAUSES.get(type(error).__name__, "crashed")
+            cause = getattr(error, "cause", None) or CAUSES.get(type(error).__name__, "crashed")
             kept = folder if self.folder is not None else None
             if kept is None:
                 self._drop(folder)

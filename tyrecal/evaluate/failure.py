@@ -8,7 +8,8 @@ from pathlib import Path
 class EvaluationFailed(Exception):
     """The solver could not evaluate a design.
 
-    cause: ``no_equilibrium``, ``unstable``, ``timed_out``, ``crashed`` or ``lost_label``;
+    cause: ``no_equilibrium``, ``unstable``, ``timed_out``, ``crashed``, ``no_results``,
+    ``licence`` or ``lost_label``;
     words: the solver's own last words; folder: where the run is kept, or None.
     """
 

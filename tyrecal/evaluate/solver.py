@@ -13,7 +13,8 @@ class Solver(Protocol):
     """What a solver brings: one class, registered under the entry point group above.
 
     dialect: the template folder of its decks; capabilities: of ``modes``, ``gradients``;
-    refusals, failures: exceptions of `run` for a deck it cannot honour and for no solution.
+    refusals, failures: exceptions of `write`, `run` and `read` for a deck it cannot honour and
+    for no solution; a failure's attribute ``cause``, where it has one, is `EvaluationFailed`'s.
     """
 
     name: str
