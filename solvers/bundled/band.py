@@ -37,7 +37,7 @@ class Numbering:
         equation = np.full(3 * n, self.size)
         equation[self.order] = np.arange(self.size)
         self.equation = equation.reshape(n, 3)
-        self._scatter: dict[int, tuple[Array, Array, Array]] = {}
+        self._scatter: dict[bytes, tuple[Array, Array]] = {}
         self.bandwidth = 0
         for c in connectivities:
             e = self.elements(c)
@@ -51,15 +51,15 @@ class Numbering:
 
     def lower(self, connectivity: Array) -> tuple[Array, Array]:
         """Places of element-matrix entries: which flat entries stay, and where in the band."""
-        key = id(connectivity)
+        key = connectivity.tobytes()
         if key not in self._scatter:
             e = self.elements(connectivity)
             i = np.repeat(e[:, :, None], e.shape[1], 2)
             j = i.swapaxes(1, 2)
             entries = np.flatnonzero((i >= j) & (i < self.size))
             place = (i - j + (self.bandwidth + 1) * j).ravel()[entries]
-            self._scatter[key] = connectivity, entries, place
-        return self._scatter[key][1:]
+            self._scatter[key] = entries, place
+        return self._scatter[key]
 
     def assemble(self, parts: list[tuple[Array, Array]]) -> Array:
         """Lower band (bandwidth + 1, size), Fortran order, of (connectivity, matrices) parts."""

@@ -6,7 +6,8 @@ import numpy as np
 
 from .band import Numbering
 from .keywords import DeckError, Row
-from .model import Mesh, Model
+from .mesh import Mesh
+from .model import Model
 from .steps import Step
 
 Array = np.ndarray
