@@ -135,6 +135,15 @@ def label_modes(evaluation_modes: Sequence[RawMode]) -> list[Mode]:
     ]
 
 
+def paired_labels(modes: Sequence[RawMode]) -> list[Mode]:
+    """`label_modes`, with the halves of sampled pairs joined first; harmonic shapes come in pairs.
+
+    Raises ValueError as ``belt_motion``.
+    """
+    sampled = any(isinstance(mode.shape, RingShape) for mode in modes)
+    return label_modes(pair_rings(modes) if sampled else modes)
+
+
 def pair_rings(modes: Sequence[RawMode], tolerance: float = 5e-3) -> list[RawMode]:
     """``modes`` by frequency, with the two halves of each sampled pair joined into one.
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from ..case import LoadedCase, with_values
 from ..deck.context import section_mesh
-from ..evaluate.results import Evaluation
+from ..evaluate.results import Evaluation, HarmonicShape
 from ..modes.mode import Label, Mode
 from .convergence import draw_convergence
 from .section import draw_section
@@ -19,11 +19,16 @@ from .vtu import write_vtu
 def draw_evaluation(
     folder: Path, case: LoadedCase, evaluation: Evaluation, modes: Sequence[Mode]
 ) -> None:
-    """section.png, modes.png (at most nine of them) and, per mode, mode_C_M[_KIND].png and .vtu."""
+    """section.png, modes.png (at most nine of them) and, per mode, mode_C_M[_KIND].png and .vtu.
+
+    Only modes known on the whole section are drawn: a 3-D solver gives them on the crown alone.
+    """
     mesh = section_mesh(case)
     moved = dict(zip(evaluation.nodes.tolist(), evaluation.displacement, strict=True))
-    draw_section(folder / "section.png", case, mesh, moved)
-    draw_modes_overview(folder / "modes.png", modes[:9], mesh)
+    draw_section(folder / "section.png", case, mesh, moved or None)
+    modes = [mode for mode in modes if isinstance(mode.raw.shape, HarmonicShape)]
+    if modes:
+        draw_modes_overview(folder / "modes.png", modes[:9], mesh)
     for mode in modes:
         stem = folder / file_name(mode.label)
         draw_mode(stem.with_suffix(".png"), mode, mesh)

@@ -1,0 +1,100 @@
+"""ABAQUS behind the tool's door: write, run, read. Imports nothing of the tool."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+
+from ..bundled.keywords import DeckError
+from ..process import RunFailed
+from .dat import read_dat
+from .evidence import checked_modes
+from .launch import run_job
+from .options import OptionRefused, load, read_options
+from .question import read_question
+from .rings import check_revolved, components, cylindrical
+
+JOB, OLDJOB = "modes", "inflate"
+
+
+class Decks(Protocol):
+    """What the tool hands over; of ``case``, ``case.case.solver.options`` is read."""
+
+    case: Any
+
+    def texts(self, dialect: str) -> dict[str, str]:
+        """File name to text."""
+
+
+class Abaqus:
+    """Adapter of ABAQUS/Standard (see the tool's solver contract). Unconfirmed on an ABAQUS."""
+
+    name = "abaqus"
+    dialect = "abaqus"
+    capabilities = frozenset({"modes"})
+    refusals = (OptionRefused, DeckError)
+    failures = (RunFailed,)
+
+    @cached_property
+    def version(self) -> str:
+        """Release of the ``abaqus`` on the path, "unknown" where there is none."""
+        try:
+            said = subprocess.run(
+                ["abaqus", "information=release"],
+                capture_output=True,
+                text=True,
+                timeout=60,
+                stdin=subprocess.DEVNULL,
+            ).stdout
+        except (OSError, subprocess.TimeoutExpired):
+            return "unknown"
+        release = re.search(r"abaqus\D*(\d[\w.\-]*)", said, re.IGNORECASE)
+        return release[1] if release else "unknown"
+
+    def write(self, decks: Decks, folder: Path) -> list[Path]:
+        """Write the decks and, beside them, the case's options. Raises ``refusals``."""
+        paths = [read_options(decks.case.case.solver.options).save(folder)]
+        for name, text in decks.texts(self.dialect).items():
+            paths.append(folder / name)
+            paths[-1].write_text(text)
+        read_question(folder / f"{JOB}.inp")  # refused before it runs, not after
+        return paths
+
+    def run(self, folder: Path, time_limit_s: float) -> None:
+        """Run both jobs, ``time_limit_s`` for the two together. Raises ``failures``."""
+        options = load(folder)
+        spent = run_job(OLDJOB, None, options, folder, time_limit_s)
+        run_job(JOB, OLDJOB, options, folder, max(time_limit_s - spent, 0.0))
+
+    def read(self, folder: Path) -> dict[str, Any]:
+        """Results as plain data: each mode a real shape on the crown's nodes.
+
+        Raises RunFailed where the results are stale, not whole, or no result.
+        """
+        asked = read_question(folder / f"{JOB}.inp")
+        table = read_dat(folder / f"{JOB}.dat")
+        found = checked_modes(folder / f"{JOB}.fil", asked.modes, table)
+        points = cylindrical(found.coordinates)
+        check_revolved(points)
+        shapes = components(found.displacement, points[:, 1])
+        return {
+            "pressure_Pa": asked.pressure_Pa,
+            "mass_kg": table.mass_kg,
+            "modes": [
+                {
+                    "frequency_Hz": float(np.sqrt(value) / (2 * np.pi)),
+                    "multiplicity": 1,
+                    "displacement": shape / np.sqrt(mass),
+                }
+                for value, mass, shape in zip(found.eigenvalues, found.masses, shapes, strict=True)
+            ],
+            "gradients": {},
+            "nodes": np.empty(0, int),
+            "points": points,
+            "displacement": np.empty((0, 3)),
+        }

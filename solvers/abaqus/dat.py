@@ -1,0 +1,49 @@
+"""The printed output (.dat): table of eigenvalues, about five digits, and the model's mass."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+_HEADER = re.compile(r"E I G E N V A L U E\s+O U T P U T")
+_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[EeDd][-+]?\d+)?"
+_ROW = re.compile(rf"^\s*(\d+)((?:\s+{_NUMBER}){{5}})\s*$")
+_MASS = re.compile(rf"TOTAL MASS OF MODEL[\s=:]*({_NUMBER})")
+
+
+@dataclass(frozen=True)
+class Table:
+    """frequencies_Hz: by number of the mode, of the last table; mass_kg: None where unsaid."""
+
+    frequencies_Hz: dict[int, float]
+    mass_kg: float | None
+
+
+def read_dat(path: Path) -> Table:
+    """The last table of eigenvalues and the last total mass; empty where the file has none.
+
+    Rows hold mode, eigenvalue, rad/time, cycles/time, generalised mass, composite damping.
+    """
+    text = path.read_text(encoding="latin-1") if path.exists() else ""
+    headers = list(_HEADER.finditer(text))
+    masses = _MASS.findall(text)
+    return Table(
+        _rows(text[headers[-1].end() :]) if headers else {},
+        _number(masses[-1]) if masses else None,
+    )
+
+
+def _rows(text: str) -> dict[int, float]:
+    found: dict[int, float] = {}
+    for line in text.splitlines():
+        row = _ROW.match(line)
+        if row and int(row[1]) == len(found) + 1:
+            found[int(row[1])] = _number(row[2].split()[2])
+        elif found and line.strip():  # the next table, of participation factors
+            break
+    return found
+
+
+def _number(text: str) -> float:
+    return float(text.upper().replace("D", "E"))

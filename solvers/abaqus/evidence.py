@@ -1,0 +1,47 @@
+"""Whether what a run left is its result: new, whole, complete, sound, and twice the same."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from ..process import RunFailed
+from .dat import Table
+from .fil import SIM, Modes, read_fil
+
+DIGITS = 1e-3  # largest relative difference of a frequency between .fil and .dat: five digits
+
+
+def checked_modes(path: Path, asked: int | None, table: Table) -> Modes:
+    """Modes of the results file at ``path``; ``asked`` of them, those that the .dat's table lists.
+
+    Raises RunFailed: ``no_results``, or ``unstable`` for a negative eigenvalue.
+    """
+    dat = path.with_suffix(".dat").name
+    if not path.exists():
+        printed = f"{dat} lists {len(table.frequencies_Hz)} frequencies, but "
+        raise _failed(f"{printed * bool(table.frequencies_Hz)}there is no {path.name}: {SIM}")
+    if path.stat().st_mtime < path.with_suffix(".inp").stat().st_mtime:
+        raise _failed(f"{path.name} is older than the deck: not of this run")
+    found = read_fil(path)
+    values = found.eigenvalues
+    if asked is not None and len(values) != asked:
+        raise _failed(f"{path.name} has {len(values)} modes, {asked} were asked")
+    if not all(np.isfinite(part).all() for part in (values, found.masses, found.displacement)):
+        raise _failed(f"{path.name} holds numbers that are none")
+    if (values < 0).any():
+        raise RunFailed("unstable", f"{path.name}: eigenvalue {values.min():g} is negative")
+    if not (values.all() and (found.masses > 0).all() and found.displacement.any((1, 2)).all()):
+        raise _failed(f"{path.name}: a mode's eigenvalue, mass or shape is zero")
+    own_Hz = np.sqrt(values) / (2 * np.pi)
+    for number, printed_Hz in table.frequencies_Hz.items():
+        if number > len(own_Hz) or not abs(own_Hz[number - 1] - printed_Hz) <= DIGITS * printed_Hz:
+            raise _failed(f"{path.name} and {dat} disagree on mode {number}")
+    if table.mass_kg is None:
+        raise _failed(f"{dat} states no TOTAL MASS OF MODEL")
+    return found
+
+
+def _failed(message: str) -> RunFailed:
+    return RunFailed("no_results", message)

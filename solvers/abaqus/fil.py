@@ -1,0 +1,97 @@
+"""The ASCII results file (.fil): modes with their shapes.
+
+Keys of records read here: 1901 node, 1980 mode, 101 U, 107 COORD, 2000 and 2001 start and end of
+an increment; nodal records after a 1980 belong to its mode.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ..process import RunFailed
+from .records import Item, records
+
+Array = np.ndarray
+NODE, MODE, U, COORD, START, END = 1901, 1980, 101, 107, 2000, 2001
+SIM = (
+    "a mode without a shape cannot be labelled; a release that uses the SIM architecture may"
+    " need SIM=NO on *FREQUENCY to write shapes to the results file"
+)
+
+
+@dataclass(frozen=True)
+class Modes:
+    """eigenvalues (m,): omega^2 in 1/s2; masses (m,): generalised, kg; nodes (k,);
+    coordinates (k, 3): m, undeformed; displacement (m, k, 3): both in global x, y, z."""
+
+    eigenvalues: Array
+    masses: Array
+    nodes: Array
+    coordinates: Array
+    displacement: Array
+
+
+def read_fil(path: Path) -> Modes:
+    """Modes with shapes. Raises RunFailed (``no_results``) for a file that is not whole."""
+    try:
+        return _modes(path.read_text(encoding="latin-1"))
+    except (OSError, ValueError, TypeError, IndexError) as error:
+        raise RunFailed("no_results", f"{path.name}: {error}") from None
+
+
+def _modes(text: str) -> Modes:
+    places: dict[int, list[float]] = {}
+    found: dict[int, tuple[float, float]] = {}
+    shapes: dict[int, dict[int, list[float]]] = {}
+    mode, is_open, last = 0, False, 0
+    for key, a in records(text):
+        last = key
+        if key in (START, END):
+            mode, is_open = 0, key == START
+        elif key == NODE:
+            places[int(a[0])] = _vector(a)
+        elif key == MODE:
+            mode = int(a[0])
+            if mode in found:
+                raise ValueError(f"mode {mode} stands in it twice: two runs, or two steps of modes")
+            found[mode], shapes[mode] = (float(a[1]), float(a[2])), {}
+        elif key == U and mode:
+            shapes[mode][int(a[0])] = _vector(a)
+        elif key == COORD and mode:
+            places.setdefault(int(a[0]), _vector(a))
+    if is_open or last != END:
+        raise ValueError("it is cut short: its last increment does not end")
+    return _arrays(places, found, shapes)
+
+
+def _vector(a: list[Item]) -> list[float]:
+    return [float(value) for value in (*a[1:4], 0.0, 0.0)[:3]]
+
+
+def _arrays(
+    places: dict[int, list[float]],
+    found: dict[int, tuple[float, float]],
+    shapes: dict[int, dict[int, list[float]]],
+) -> Modes:
+    if not found:
+        raise ValueError("it holds no mode")
+    order = sorted(found)
+    nodes = list(shapes[order[0]])
+    if not nodes:
+        raise ValueError(f"no shapes in it: {SIM}")
+    for number in order:
+        if list(shapes[number]) != nodes:
+            raise ValueError(f"mode {number} is not given at the same nodes as mode {order[0]}")
+    bare = [node for node in nodes if node not in places]
+    if bare:
+        raise ValueError(f"node {bare[0]} has no coordinates")
+    return Modes(
+        np.array([found[n][0] for n in order]),
+        np.array([found[n][1] for n in order]),
+        np.array(nodes),
+        np.array([places[n] for n in nodes]),
+        np.array([list(shapes[n].values()) for n in order]),
+    )

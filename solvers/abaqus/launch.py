@@ -1,0 +1,93 @@
+"""Runs one ABAQUS job to its end, waits where a licence is denied, and judges how it ended."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+from ..process import RunFailed, last_words, run_command
+from .licence import denial, is_queueing
+from .options import Options
+
+SUCCESS = "THE ANALYSIS HAS COMPLETED SUCCESSFULLY"  # last line of the .sta file
+NO_EQUILIBRIUM = (  # of the .sta and .msg files, as recalled
+    "TOO MANY ATTEMPTS MADE FOR THIS INCREMENT",
+    "TIME INCREMENT REQUIRED IS LESS THAN THE MINIMUM",
+    "FIXED TIME INCREMENT IS TOO LARGE",
+)
+TAIL = 200_000  # bytes of a file that are searched for messages: they stand near its end
+
+
+def run_job(
+    job: str, oldjob: str | None, options: Options, folder: Path, time_limit_s: float
+) -> float:
+    """Run ``job`` (on top of ``oldjob``) in ``folder``; the seconds that its last attempt took.
+
+    Output goes to JOB.out. A denied licence is asked for again, after waits that double, until
+    ``options.licence_wait_s`` are over; waiting does not count towards ``time_limit_s``.
+    Raises RunFailed: ``licence``, ``timed_out``, ``no_equilibrium`` or ``crashed``.
+    """
+    command = [*options.command, f"job={job}", *([f"oldjob={oldjob}"] if oldjob else [])]
+    waited, wait = 0.0, options.licence_first_wait_s
+    while True:
+        _clear(job, folder)
+        start = time.monotonic()
+        failure = _attempt([*command, "interactive"], job, folder, time_limit_s)
+        if failure is None:
+            return time.monotonic() - start
+        refusal = denial(_said(job, folder))
+        if not refusal:
+            raise failure
+        wait = min(wait, options.licence_wait_s - waited)
+        if wait <= 0:
+            raise RunFailed(
+                "licence", f"no licence for job {job} after {waited:g} s of waiting", refusal
+            )
+        time.sleep(wait)
+        waited, wait = waited + wait, 2 * wait
+
+
+def _clear(job: str, folder: Path) -> None:
+    """Remove all that an earlier attempt left: no stale result, no question before overwriting."""
+    for path in folder.glob(f"{job}.*"):
+        if path.suffix != ".inp":
+            path.unlink()
+
+
+def _attempt(command: list[str], job: str, folder: Path, time_limit_s: float) -> RunFailed | None:
+    """How the job ended badly, or None. Raises RunFailed where asking again is no use."""
+    try:
+        code = run_command(command, folder, time_limit_s, f"{job}.out")
+    except RunFailed:
+        said = last_words(folder / f"{job}.out", 1)
+        if is_queueing(said):
+            raise RunFailed("licence", f"job {job} never got its licence", said) from None
+        raise
+    status = _tail(folder / f"{job}.sta")
+    if code == 0 and SUCCESS in status:
+        return None
+    ended = f"exit code {code}" if code else "exit code 0, but without completing"
+    lost = any(words in status + _said(job, folder) for words in NO_EQUILIBRIUM)
+    cause = "no_equilibrium" if lost else "crashed"
+    return RunFailed(cause, f"abaqus ended job {job} with {ended}", words(job, folder))
+
+
+def words(job: str, folder: Path) -> str:
+    """The solver's own last words: the errors of .dat and .msg, or else the end of its output."""
+    errors = []
+    for name in (f"{job}.dat", f"{job}.msg"):
+        lines = [line.strip() for line in _tail(folder / name).splitlines()]
+        errors += [line for line in lines if line.startswith("***ERROR")]
+    return " | ".join(errors[:3]) or last_words(folder / f"{job}.out")
+
+
+def _said(job: str, folder: Path) -> str:
+    return "\n".join(_tail(folder / f"{job}.{end}") for end in ("out", "log", "dat", "msg"))
+
+
+def _tail(path: Path) -> str:
+    if not path.exists():
+        return ""
+    with path.open("rb") as file:
+        file.seek(max(0, path.stat().st_size - TAIL))
+        return file.read().decode(errors="replace")

@@ -1,0 +1,32 @@
+"""What the modes deck asks for, read from the deck itself: an own template is taken at its word."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..bundled.keywords import DeckError, read_keywords
+
+
+@dataclass(frozen=True)
+class Question:
+    """modes: how many, None where a frequency range decides; pressure_Pa: the largest."""
+
+    modes: int | None
+    pressure_Pa: float
+
+
+def read_question(path: Path) -> Question:
+    """The question of a deck. Raises DeckError."""
+    modes, pressure = None, 0.0
+    procedures = 0
+    for k in read_keywords(path.read_text(), path.stem):
+        if k.name == "FREQUENCY":
+            procedures += 1
+            row = k.only_row()
+            modes = row.integer(0) if not (row.text(1) or row.text(2)) else None
+        elif k.name == "DSLOAD":
+            pressure = max(float(row.number(2).real) for row in k.rows)
+    if procedures != 1:
+        raise DeckError(0, f"{path.name} needs one *FREQUENCY step, it has {procedures}")
+    return Question(modes, pressure)

@@ -1,0 +1,213 @@
+"""The ABAQUS runner against a stand-in that solves the decks with the bundled solver."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from tyrecal_solvers.abaqus.adapter import Abaqus
+
+from tyrecal.case import load_case
+from tyrecal.cli.main import main
+from tyrecal.evaluate.door import Door, Question
+from tyrecal.evaluate.failure import DeckRefused, EvaluationFailed
+
+STANDIN = Path(__file__).with_name("standin_abaqus.py")
+COARSE = """
+    coarse:
+      elements: {crown: 4, upper_sidewall: 3, lower_sidewall: 3, bead: 1}
+      rows: [1, 1, 1, 1]
+    default:
+"""
+
+
+@pytest.fixture
+def coarse(case_folder: Path) -> Callable[..., Path]:
+    """Makes a coarse case that runs ``command``."""
+
+    def make(
+        command: object = (sys.executable, str(STANDIN)),
+        wait_s: float = 2.0,
+        time_limit_s: float = 60,
+    ) -> Path:
+        options = {"command": command, "licence_wait_s": wait_s, "licence_first_wait_s": 0.1}
+        path = case_folder / "p235_75r17.yaml"
+        text = path.read_text()
+        for old, new in (
+            ("  options: {}", f"  options: {json.dumps(options)}"),
+            ("\n    default:\n", COARSE),
+            ("time_limit_s: 300", f"time_limit_s: {time_limit_s}"),
+            ("level: default", "level: coarse"),
+            ("sectors: 60", "sectors: 24"),
+        ):
+            assert text.count(old) == 1
+            text = text.replace(old, new)
+        path.write_text(text)
+        return path
+
+    return make
+
+
+def tyrecal(*arguments: object) -> int:
+    with pytest.raises(SystemExit) as leaving:
+        main([str(a) for a in arguments])
+    return int(leaving.value.code or 0)
+
+
+def test_modes_are_those_of_the_bundled_solver(coarse: Callable[..., Path], tmp_path: Path) -> None:
+    case = coarse()
+    common = ("--pressure-kPa", 200, "--quiet")
+    assert tyrecal("modes", case, "--solver", "abaqus", "--output", tmp_path / "a", *common) == 0
+    assert tyrecal("modes", case, "--output", tmp_path / "b", *common) == 0
+    ours, theirs = (json.loads((tmp_path / d / "modes.json").read_text()) for d in "ab")
+    label = lambda mode: (mode["c"], mode["m"], mode["kind"], mode["multiplicity"])
+    found = {label(mode): mode["frequency_Hz"] for mode in ours["modes"]}
+    for mode in theirs["modes"][:9]:
+        assert found[label(mode)] == pytest.approx(mode["frequency_Hz"], rel=1e-9)
+    assert ours["pressure_kPa"] == 200
+    assert ours["mass_kg"] == pytest.approx(theirs["mass_kg"], rel=1e-6)
+
+
+def test_a_fit_ends_where_the_bundled_solver_ends(
+    coarse: Callable[..., Path], tmp_path: Path
+) -> None:
+    case = coarse()
+    common = ("--fix", "A_belt", "--fix", "A_carcass", "--quiet")
+    assert tyrecal("fit", case, "--solver", "abaqus", "--output", tmp_path / "a", *common) == 0
+    assert tyrecal("fit", case, "--no-pictures", "--output", tmp_path / "b", *common) == 0
+    ours, theirs = (json.loads((tmp_path / d / "fit.json").read_text()) for d in "ab")
+    assert ours["objective_Hz"] == pytest.approx(theirs["objective_Hz"], rel=1e-6)
+    for one, other in zip(ours["modes"], theirs["modes"], strict=True):
+        assert one["fitted_Hz"] == pytest.approx(other["fitted_Hz"], rel=1e-4)
+    assert (tmp_path / "a" / "section.png").exists()
+
+
+@pytest.mark.parametrize(
+    ("fault", "cause", "said"),
+    [
+        ("crash", "crashed", r"exit code 1: \*\*\*ERROR: ELEMENT 7 IS TOO ODD"),
+        ("diverge", "no_equilibrium", "TOO MANY ATTEMPTS"),
+        ("hang", "timed_out", "time limit"),
+        ("nothing", "crashed", "without completing"),
+        ("aborted", "crashed", "without completing"),
+        ("no_fil", "no_results", "lists 20 frequencies, but there is no modes.fil.*SIM=NO"),
+        ("truncated", "no_results", "cut short|same nodes"),
+        ("disc_full", "no_results", "cut short"),
+        ("doubled", "no_results", "mode 1 stands in it twice"),
+        ("zeros", "no_results", "is zero"),
+        ("nan", "no_results", "numbers that are none"),
+        ("negative", "unstable", "is negative"),
+        ("few", "no_results", "has 19 modes, 20 were asked"),
+        ("stale", "no_results", "older than the deck"),
+        ("other_dat", "no_results", "disagree on mode 1"),
+        ("no_mass", "no_results", "no TOTAL MASS"),
+    ],
+)
+def test_no_fault_becomes_a_number(
+    coarse: Callable[..., Path],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    fault: str,
+    cause: str,
+    said: str,
+) -> None:
+    monkeypatch.setenv("STANDIN_FAULT", fault)
+    door = Door(
+        load_case(coarse(time_limit_s=4 if fault == "hang" else 60)), "abaqus", tmp_path / "runs"
+    )
+    with pytest.raises(EvaluationFailed, match=said) as failure:
+        door.evaluate(Question({}))
+    assert failure.value.cause == cause
+    assert failure.value.folder and (failure.value.folder / "modes.inp").exists()
+
+
+def test_results_of_an_earlier_run_are_removed_first(
+    coarse: Callable[..., Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    door = Door(load_case(coarse()), "abaqus", tmp_path / "runs", keep=True)
+    door.evaluate(Question({}))
+    (folder,) = (tmp_path / "runs").iterdir()
+    monkeypatch.setenv("STANDIN_FAULT", "nothing")
+    adapter = Abaqus()
+    with pytest.raises(adapter.failures):
+        adapter.run(folder, 60)
+    assert not (folder / "inflate.sta").exists()
+
+
+def test_a_licence_is_waited_for(
+    coarse: Callable[..., Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("STANDIN_FAULT", "licence:2")
+    door = Door(load_case(coarse()), "abaqus", tmp_path / "runs", keep=True)
+    assert len(door.evaluate(Question({})).modes) == 20
+    (folder,) = (tmp_path / "runs").iterdir()
+    assert len((folder / "denials").read_text()) == 4  # two denied, two granted
+
+
+def test_a_licence_that_never_comes(
+    coarse: Callable[..., Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("STANDIN_FAULT", "licence:inf")
+    door = Door(load_case(coarse(wait_s=0.5)), "abaqus", tmp_path / "runs")
+    start = time.monotonic()
+    with pytest.raises(EvaluationFailed, match=r"after 0\.5 s of waiting.*FLEXnet") as failure:
+        door.evaluate(Question({}))
+    assert failure.value.cause == "licence"
+    assert time.monotonic() - start < 20
+    assert failure.value.folder
+    assert len((failure.value.folder / "denials").read_text()) == 4  # at 0, 0.1, 0.3 and 0.5 s
+
+
+def test_a_job_that_queues_until_its_time_is_over(
+    coarse: Callable[..., Path], tmp_path: Path
+) -> None:
+    words = "import time; print('Queued for 5 Abaqus licenses', flush=True); time.sleep(60)"
+    case = load_case(coarse([sys.executable, "-c", words], time_limit_s=1))
+    with pytest.raises(EvaluationFailed, match="Queued for 5") as failure:
+        Door(case, "abaqus", tmp_path / "runs").evaluate(Question({}))
+    assert failure.value.cause == "licence"
+
+
+def test_a_missing_command(
+    coarse: Callable[..., Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    case = coarse("no-such-abaqus")
+    assert tyrecal("modes", case, "--solver", "abaqus", "--output", tmp_path / "out") == 3
+    said = capsys.readouterr().err
+    assert said.startswith("error: cannot start 'no-such-abaqus'") and said.count("\n") == 1
+
+
+def test_options_that_are_wrong(
+    coarse: Callable[..., Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert tyrecal("modes", coarse([]), "--solver", "abaqus", "--output", tmp_path / "out") == 2
+    assert "solver.options.command must be" in capsys.readouterr().err
+
+
+def test_a_deck_without_modes_is_refused_before_it_runs(
+    coarse: Callable[..., Path], tmp_path: Path
+) -> None:
+    case = coarse()
+    own = case.parent / "own"
+    own.mkdir()
+    (own / "modes.inp.j2").write_text("*STEP\n*STATIC\n1.0, 1.0\n*END STEP\n")
+    case.write_text(case.read_text() + "templates: own\n")
+    with pytest.raises(DeckRefused, match="needs one"):
+        Door(load_case(case), "abaqus", tmp_path / "runs").evaluate(Question({}))
+
+
+def test_the_release_is_asked_of_the_command_on_the_path(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path))
+    assert Abaqus().version == "unknown"
+    command = tmp_path / "abaqus"
+    command.write_text("#!/bin/sh\necho Abaqus 2023.HF4\n")
+    command.chmod(0o755)
+    monkeypatch.setenv("PATH", os.pathsep.join([str(tmp_path), os.defpath]))
+    assert Abaqus().version == "2023.HF4"
