@@ -187,3 +187,67 @@ def test_a_template_that_runs_code_is_refused(
     assert run("modes", str(path), "--output", str(case_folder / "out")) == 2
     message = capsys.readouterr().err
     assert "unsafe" in message and "Traceback" not in message and message.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--set", "rebar_layers.belt_1.area_m2=3e-7"], "A_belt=VALUE"),
+        (["--set", "A_belt=3e-7", "--set", "A_belt=4e-7"], "set twice"),
+        (["--set", "pressure_kPa=200", "--pressure-kPa", "220"], "set twice"),
+    ],
+)
+def test_an_assignment_is_never_ignored(
+    arguments: list[str], words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run("modes", CASE, "--output", str(tmp_path / "out"), *arguments) == 2
+    assert words in capsys.readouterr().err
+
+
+def test_variables_that_start_at_zero(
+    case_folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Pressure and a Prony share have no design below 0: slopes are one-sided there."""
+    path = case_folder / "p235_75r17.yaml"
+    text = path.read_text()
+    extra = "".join(
+        f"  {name}:\n    sets: [{where}]\n    start: 0\n    lower: 0\n    upper: {upper}\n"
+        "    scale: linear\n"
+        for name, where, upper in (
+            ("p", "pressure_kPa", 300),
+            ("k", "materials.rubber.prony.0.k", 0.5),
+        )
+    )  # fmt: skip
+    path.write_text(text.replace("\ntargets:", f"\n{extra}\ntargets:"))
+    assert run("deck", str(path), "--output", str(case_folder / "out"), "--quiet") == 0
+    request = json.loads((case_folder / "out" / "modes.request.json").read_text())
+    slopes = {name: [row[3] for row in rows] for name, rows in request["sensitivities"].items()}
+    assert slopes["p"] == pytest.approx([1e3, 1e3])
+    assert slopes["k"] == pytest.approx([1.0])
+
+
+def test_a_gauge_is_a_number_like_any_other(
+    case_folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A thicker tread is heavier, and as a variable its slope is exact."""
+    path = case_folder / "p235_75r17.yaml"
+    gauge = "\n  gauges: [{between: [belt2, outer], regions: [crown], factor: 1.0}]\n\nmesh:"
+    path.write_text(path.read_text().replace("\n\nmesh:", gauge))
+    arguments = ["modes", str(path), "--output", str(case_folder / "out"), "--json"]
+    masses, axial = [], []
+    for factor in (1.0, 1.01, 0.99):
+        assert run(*arguments, "--set", f"section.gauges.0.factor={factor}") == 0
+        result = json.loads(capsys.readouterr().out)
+        masses.append(result["mass_kg"])
+        axial.append(next(m["frequency_Hz"] for m in result["modes"] if m["kind"] == "axial"))
+    assert masses[1] > masses[0] > masses[2]
+    assert masses[1] - masses[2] == pytest.approx(0.02 * 4.4, rel=0.2)  # a tread of 4.4 kg
+    from tyrecal.case import load_case, start_values
+    from tyrecal.evaluate.door import Door, Question
+
+    case = load_case(path)
+    name = "section.gauges.0.factor"
+    answer = Door(case).evaluate(Question({**start_values(case), name: 1.0}, (name,)))
+    modes = [(m.frequency_Hz, g) for m, g in zip(answer.modes, answer.gradients[name], strict=True)]
+    slope = min(modes, key=lambda mode: abs(mode[0] - axial[0]))[1]
+    assert slope == pytest.approx((axial[1] - axial[2]) / 0.02, rel=1e-3)

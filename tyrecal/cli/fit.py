@@ -9,6 +9,7 @@ from typing import Any
 import click
 
 from . import options
+from .main import EXIT_FIT
 
 
 @click.command()
@@ -43,6 +44,8 @@ from . import options
     options.mesh,
     options.solver,
     options.output,
+    options.store,
+    options.no_store,
     options.as_json,
     options.quiet,
     options.verbose,
@@ -60,6 +63,8 @@ def command(
     mesh: str,
     solver: str,
     output: Path | None,
+    store: Path | None,
+    no_store: bool,
     as_json: bool,
     quiet: bool,
     verbose: bool,
@@ -75,7 +80,7 @@ def command(
     tyrecal fit cases/p235_75r17.yaml --starts 20 --seed 1 --jobs 2
     """
     from ..evaluate.door import Door
-    from ..fit.calibrate import calibrate, write_history
+    from ..fit.calibrate import calibrate, history_csv
     from ..report.table import fit_csv, fit_table
     from .output import Run, print_json, say, show
 
@@ -88,6 +93,7 @@ def command(
     adapter = door.solver
     run = Run(case, output, "fit", adapter)
     door.folder, door.keep = run.runs, verbose
+    door.store = run.open_store(store, no_store)
     with _Progress(quiet, verbose) as progress:
         fit = calibrate(
             loaded,
@@ -101,7 +107,7 @@ def command(
         )
     run.write_json("fit.json", fit.result)
     run.write_text("fit.csv", fit_csv(fit.result))
-    write_history(run.folder / "fit_history.csv", fit.history)
+    run.write_text("fit_history.csv", history_csv(fit.history))
     if as_json:
         print_json(fit.result)
     else:
@@ -115,9 +121,9 @@ def command(
         values = fit.fitted.values
         modes = sorted(fit.fitted.modes.values(), key=lambda mode: mode.frequency_Hz)
         draw_fit(run.folder, loaded, values, door.evaluate(Question(values)), modes, fit.history)
-    run.finish()
+    run.finish(solver_runs=door.counts.runs, answered_from_record=door.counts.recorded)
     say(f"results in {run.folder}", as_json, quiet)
-    return 0 if fit.result["converged"] and fit.result["moved"] else 4
+    return 0 if fit.result["converged"] and fit.result["moved"] else EXIT_FIT
 
 
 def _starting_at(loaded: Any, values: Mapping[str, float]) -> Any:
@@ -149,11 +155,18 @@ def _warnings(result: Mapping[str, Any]) -> list[str]:
         )
     for name, variable in result["variables"].items():
         if variable["at_bound"]:
-            warnings.append(f"{name} ended at a bound: the data want it beyond")
+            seen = variable["standard_error"] is not None
+            why = "the data want it beyond" if seen else "the data do not see it"
+            warnings.append(f"{name} ended at a bound: {why}")
     if result["failed_evaluations"]:
         warnings.append(
             f"{result['failed_evaluations']} designs could not be evaluated; the search"
             " stepped back from them"
+        )
+    if result["label_margin"] < 0.3:
+        warnings.append(
+            f"a mode is hard to name (margin {result['label_margin']:.2f} of 1): two modes have"
+            " met; look at their pictures"
         )
     values = result["singular_values"]
     if values and values[-1] < 1e-3 * values[0]:

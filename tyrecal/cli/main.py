@@ -19,6 +19,8 @@ COMMANDS = {  # name: one line of help, so that the overview imports no command
     "deck": "Write the decks of a case, to read or to run elsewhere.",
     "modes": "Evaluate one design: frequencies with their labels.",
     "fit": "Calibrate the case's variables to its target frequencies.",
+    "solvers": "List the installed solvers and what they can do.",
+    "store": "Look at a record of evaluations, check it, prune it.",
 }
 EXIT_INPUT, EXIT_SOLVER, EXIT_FIT, EXIT_INTERRUPTED = 2, 3, 4, 130
 
@@ -84,11 +86,13 @@ def _exit_code(error: Exception) -> int | None:
     """Exit code of a failure that is somebody's, None for a bug of ours."""
     kinds: list[tuple[str, str, int]] = [
         ("tyrecal.evaluate.failure", "EvaluationFailed", EXIT_SOLVER),
+        ("tyrecal.evaluate.failure", "SolverUnavailable", EXIT_SOLVER),
         ("tyrecal.evaluate.failure", "DeckRefused", EXIT_INPUT),
         ("tyrecal.evaluate.solver", "UnknownSolver", EXIT_INPUT),
         ("tyrecal.deck.environment", "TemplateFailed", EXIT_INPUT),
         ("tyrecal.fit.calibrate", "NothingToFit", EXIT_INPUT),
         ("tyrecal.cli.output", "OutputRefused", EXIT_INPUT),
+        ("tyrecal.cli.lock", "Locked", EXIT_INPUT),
         ("tyrecal.case", "CaseError", EXIT_INPUT),
     ]
     for module, name, code in kinds:

@@ -17,6 +17,8 @@ from . import options
     options.mesh,
     options.solver,
     options.output,
+    options.store,
+    options.no_store,
     options.as_json,
     options.quiet,
     options.verbose,
@@ -29,6 +31,8 @@ def command(
     mesh: str,
     solver: str,
     output: Path | None,
+    store: Path | None,
+    no_store: bool,
     as_json: bool,
     quiet: bool,
     verbose: bool,
@@ -49,6 +53,7 @@ def command(
     adapter = door.solver
     run = Run(case, output, "modes", adapter)
     door.folder, door.keep = run.runs, verbose
+    door.store = run.open_store(store, no_store)
     evaluation = door.evaluate(Question(values))
     result, modes = modes_result(loaded, values, evaluation)
     run.write_json("modes.json", result)
@@ -56,7 +61,7 @@ def command(
         from ..report.pictures import draw_evaluation
 
         draw_evaluation(run.folder, loaded, evaluation, modes)
-    run.finish()
+    run.finish(solver_runs=door.counts.runs, answered_from_record=door.counts.recorded)
     if as_json:
         print_json(result)
     else:

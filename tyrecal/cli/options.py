@@ -38,6 +38,15 @@ jobs = click.option(
     show_default=True,
     help="Designs evaluated at a time.",
 )
+store = click.option(
+    "--store",
+    type=click.Path(path_type=Path, file_okay=False),
+    envvar="TYRECAL_STORE",
+    metavar="DIR",
+    help="Record of evaluations, which answers what was asked before (default: the folder 'record'"
+    " of the results; also from TYRECAL_STORE).",
+)
+no_store = click.option("--no-store", is_flag=True, help="Neither ask nor keep a record.")
 assignments = click.option(
     "--set",
     "assignments",
@@ -77,10 +86,13 @@ def load(path: Path, mesh_level: str, assigned: tuple[str, ...], pressure_kPa: f
     if mesh_level:
         case = _with_level(case, mesh_level)
     try:
-        given = dict(parse_assignment(text) for text in assigned)
-        if pressure_kPa is not None:
-            given["pressure_kPa"] = pressure_kPa
         names = set(case.case.variables)
+        given = _once([parse_assignment(text) for text in assigned], pressure_kPa)
+        for name, variable in case.case.variables.items():
+            for number in set(variable.sets) & set(given):
+                raise click.UsageError(
+                    f"{number} is set by the variable '{name}'; give --set {name}=VALUE instead"
+                )
         case = with_values(case, {k: v for k, v in given.items() if k not in names})
         values = {**start_values(case), **{k: v for k, v in given.items() if k in names}}
         return with_values(case, values), values
@@ -88,6 +100,17 @@ def load(path: Path, mesh_level: str, assigned: tuple[str, ...], pressure_kPa: f
         raise
     except ValueError as error:
         raise click.UsageError(str(error)) from None
+
+
+def _once(pairs: list[tuple[str, float]], pressure_kPa: float | None) -> dict[str, float]:
+    """Assignments by name, none of them twice."""
+    if pressure_kPa is not None:
+        pairs = [*pairs, ("pressure_kPa", pressure_kPa)]
+    given = dict(pairs)
+    if len(given) < len(pairs):
+        twice = next(name for name in given if sum(n == name for n, _ in pairs) > 1)
+        raise click.UsageError(f"{twice} is set twice")
+    return given
 
 
 def _with_level(case: Any, level: str) -> Any:

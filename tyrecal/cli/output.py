@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import platform
 import sys
 import time
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
+
+from ..files import whole
+from . import lock
+
+if TYPE_CHECKING:
+    from ..evaluate.store import Store
 
 
 class OutputRefused(ValueError):
@@ -18,30 +25,37 @@ class OutputRefused(ValueError):
 
 
 class Run:
-    """One command's run: its folder, and run.json, which holds all that differs between runs.
+    """One command's run: its folder, locked until the command ends, and run.json, which holds
+    all that differs between runs.
 
-    Raises OutputRefused where the folder holds another case's results; OSError.
+    Raises OutputRefused where the folder holds another case's results; Locked; OSError.
     """
 
     def __init__(self, case: Path, output: Path | None, command: str, solver: Any = None):
         self.case, self.command, self.solver = case.resolve(), command, solver
         self.folder = output or Path(case.stem)
-        self.started, self._clock = datetime.now(UTC), time.monotonic()
-        record = self.folder / "run.json"
-        if record.exists():
-            try:
-                owner = json.loads(record.read_text()).get("case")
-            except ValueError:
-                owner = None
-            if owner != str(self.case):
-                raise OutputRefused(
-                    f"folder '{self.folder}' holds results of {owner or 'something else'};"
-                    " give another one with --output"
-                )
-        elif self.folder.exists() and not self.folder.is_dir():
+        self._started = datetime.now(UTC).isoformat(timespec="seconds")
+        self._clock = time.monotonic()
+        self.store: Store | None = None
+        if self.folder.exists() and not self.folder.is_dir():
             raise OutputRefused(f"'{self.folder}' is a file; give a folder with --output")
         self.folder.mkdir(parents=True, exist_ok=True)
+        self._lock = lock.lock(self.folder, command, self._started)
+        click.get_current_context().call_on_close(self._close)
+        self._check_owner()
+        if self._lock and solver:
+            from ..evaluate.folders import drop_unfinished
+
+            drop_unfinished(self.runs)
         self.finish()
+
+    def open_store(self, folder: Path | None, none: bool) -> Store | None:
+        """The record of evaluations: in ``folder``, or beside the results, or ``none``."""
+        if not none:
+            from ..evaluate.store import Store
+
+            self.store = Store((folder or self.folder / "record").resolve())
+        return self.store
 
     def write_json(self, name: str, content: Any) -> Path:
         """Write a result file whole or not at all."""
@@ -50,9 +64,9 @@ class Run:
 
     def write_text(self, name: str, text: str) -> Path:
         """Write a result file whole or not at all."""
-        path, partial = self.folder / name, self.folder / f".{name}.partial"
-        partial.write_text(text, encoding="utf-8")
-        partial.replace(path)
+        path = self.folder / name
+        with whole(path) as partial:
+            partial.write_text(text, encoding="utf-8", newline="")
         return path
 
     @property
@@ -64,23 +78,44 @@ class Run:
         """Write run.json: command, times, host, versions, and what else is volatile."""
         import tyrecal
 
-        if self.runs.is_dir() and not any(self.runs.iterdir()):
-            self.runs.rmdir()
         self.write_json(
             "run.json",
             {
                 "case": str(self.case),
                 "command": self.command,
                 "arguments": sys.argv[1:],
-                "started": self.started.isoformat(timespec="seconds"),
+                "started": self._started,
                 "seconds": round(time.monotonic() - self._clock, 3),
                 "host": platform.node(),
                 "python": platform.python_version(),
                 "tyrecal": tyrecal.__version__,
                 "solver": f"{self.solver.name} {self.solver.version}" if self.solver else None,
+                "record": str(self.store.folder) if self.store else None,
                 **facts,
             },
         )
+
+    def _check_owner(self) -> None:
+        record = self.folder / "run.json"
+        if not record.exists():
+            return
+        try:
+            owner = json.loads(record.read_text(encoding="utf-8")).get("case")
+        except ValueError:
+            owner = None
+        if owner != str(self.case):
+            raise OutputRefused(
+                f"folder '{self.folder}' holds results of {owner or 'something else'};"
+                " give another one with --output"
+            )
+
+    def _close(self) -> None:
+        with contextlib.suppress(OSError):  # it holds failures, or was never made
+            self.runs.rmdir()
+        if self.store:
+            self.store.prune()
+        if self._lock:
+            self._lock.close()
 
 
 def say(text: str, as_json: bool, quiet: bool) -> None:
@@ -98,7 +133,9 @@ def show(table: Any, as_json: bool, quiet: bool) -> None:
     console = Console(stderr=as_json)
     if not console.is_terminal:
         console = Console(stderr=as_json, width=110)
-    console.print(table)
+    with console.capture() as text:  # rich answers a closed pipe by leaving the process
+        console.print(table)
+    click.echo(text.get(), nl=False, err=as_json)
 
 
 def print_json(content: Any) -> None:

@@ -9,7 +9,7 @@ class EvaluationFailed(Exception):
     """The solver could not evaluate a design.
 
     cause: ``no_equilibrium``, ``unstable``, ``timed_out``, ``crashed``, ``no_results``,
-    ``licence`` or ``lost_label``;
+    ``licence``, ``lost_label`` or ``refused`` (values that the case cannot have);
     words: the solver's own last words; folder: where the run is kept, or None.
     """
 
@@ -19,6 +19,10 @@ class EvaluationFailed(Exception):
 
     def __reduce__(self) -> tuple[type[EvaluationFailed], tuple[str, str, Path | None]]:
         return type(self), (self.cause, self.words, self.folder)
+
+
+class SolverUnavailable(Exception):
+    """The solver cannot be had at all, so that no design can be evaluated: the study ends."""
 
 
 class DeckRefused(ValueError):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from importlib.metadata import entry_points
+from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -12,6 +12,7 @@ GROUP = "tyrecal.solvers"
 class Solver(Protocol):
     """What a solver brings: one class, registered under the entry point group above.
 
+    version: of the program that runs, "unknown" where it is not found; part of every record's key.
     dialect: the template folder of its decks; capabilities: of ``modes``, ``gradients``;
     refusals, failures: exceptions of `write`, `run` and `read` for a deck it cannot honour and
     for no solution; a failure's attribute ``cause``, where it has one, is `EvaluationFailed`'s.
@@ -32,7 +33,11 @@ class Solver(Protocol):
 
     def read(self, folder: Path) -> dict[str, Any]:
         """pressure_Pa, mass_kg, modes [{frequency_Hz, multiplicity, n, amplitude}], gradients
-        {variable: [Hz per unit]}, nodes, points, displacement."""
+        {variable: [Hz per unit]}, nodes, points, displacement.
+
+        A solver in three dimensions gives each mode {frequency_Hz, multiplicity 1, displacement
+        (k, 3)} at ``points`` (k, 3), as in `RingShape`; pairs are joined by the tool.
+        """
 
 
 class UnknownSolver(ValueError):
@@ -46,3 +51,28 @@ def find_solver(name: str) -> Solver:
         raise UnknownSolver(f"solver '{name}' is not installed, only {', '.join(sorted(found))}")
     solver: Solver = found[name].load()()
     return solver
+
+
+def installed() -> list[dict[str, Any]]:
+    """Every registered solver: ``name``, ``version``, ``dialect``, ``capabilities``, and
+    ``problem``: why it cannot be used, or None. Raises nothing."""
+    return [_described(entry) for entry in sorted(entry_points(group=GROUP))]
+
+
+def _described(entry: EntryPoint) -> dict[str, Any]:
+    facts: dict[str, Any] = {
+        "name": entry.name,
+        "version": None,
+        "dialect": None,
+        "capabilities": [],
+        "problem": None,
+    }
+    try:
+        solver: Solver = entry.load()()
+        facts["dialect"], facts["capabilities"] = solver.dialect, sorted(solver.capabilities)
+        facts["version"] = solver.version
+        if solver.version == "unknown":
+            facts["problem"] = "its program was not found"
+    except Exception as error:  # whatever a stranger's code raises when it is imported
+        facts["problem"] = f"{type(error).__name__}: {error}"
+    return facts

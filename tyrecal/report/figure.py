@@ -10,6 +10,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from PIL import Image
 
+from ..files import whole
+
 DPI = 150
 GREY = "0.45"
 # Okabe and Ito: told apart by colour-blind readers; their yellow is left out, pale on paper
@@ -34,4 +36,6 @@ def save(figure: Figure, path: Path) -> None:
     assert isinstance(canvas, FigureCanvasAgg)
     canvas.draw()
     image = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
-    image.quantize(256, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE).save(path, "PNG")
+    small = image.quantize(256, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
+    with whole(path) as partial:
+        small.save(partial, "PNG")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from rich import box
@@ -76,11 +76,23 @@ def fit_csv(fit: Mapping[str, Any]) -> str:
     return text.getvalue()
 
 
+SOLVER_COLUMNS = ("solver", "version", "decks", "can do")
+
+
+def solvers_table(solvers: Sequence[Mapping[str, Any]]) -> Table:
+    """The installed solvers and what they can do, or why they cannot."""
+    table = _table(SOLVER_COLUMNS)
+    for solver in solvers:
+        words = solver["problem"] or ", ".join(solver["capabilities"])
+        _add(table, solver["name"], solver["version"] or "", solver["dialect"] or "", words)
+    return table
+
+
 def _table(columns: tuple[str, ...]) -> Table:
     # figures never break: on a narrow terminal only names and words do
     table = Table(box=box.SIMPLE_HEAD, padding=(0, 0, 0, 1), pad_edge=False, show_edge=False)
     for name in columns:
-        figures = name not in ("mode", "motion")
+        figures = name not in ("mode", "motion", *SOLVER_COLUMNS)
         table.add_column(name, justify="right" if figures else "left", no_wrap=figures,
                          overflow="fold")  # fmt: skip
     return table

@@ -7,6 +7,7 @@ from pathlib import Path
 import meshio
 import numpy as np
 
+from ..files import whole
 from ..modes.mode import Mode
 from ..tyre.mesh import SectionMesh
 from .revolve import corners, motion, swept
@@ -26,11 +27,13 @@ def write_vtu(path: Path, mode: Mode, mesh: SectionMesh, sectors: int = 60) -> N
     fields = {"mode": motion(mode.raw, nodes, angles)}
     if mode.label.c:
         fields["second_of_pair"] = motion(mode.raw, nodes, angles, np.pi / 2)
-    meshio.Mesh(
+    tyre = meshio.Mesh(
         swept(nodes, mesh, angles).reshape(-1, 3),
         [("hexahedron", _hexahedra(grid.shape, sectors))],
         point_data={name: field.reshape(-1, 3) for name, field in fields.items()},
-    ).write(path, file_format="vtu")
+    )
+    with whole(path) as partial:
+        tyre.write(partial, file_format="vtu")
 
 
 def _hexahedra(shape: tuple[int, int], sectors: int) -> np.ndarray:

@@ -1,0 +1,206 @@
+"""Killed, refused, short of space: the same command again ends as if nothing had been."""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import random
+import resource
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from ..conftest import CASES
+from .test_cli import run
+
+CASE = str(CASES / "p235_75r17.yaml")
+RESULTS = ("fit.json", "fit.csv", "fit_history.csv")
+COMMAND = [sys.executable, "-m", "tyrecal", "fit", CASE, "--no-pictures", "--quiet", "--output"]
+
+
+def record(out: Path) -> set[str]:
+    """Names of the finished evaluations."""
+    return {path.name for path in out.glob("record/*/*.record")}
+
+
+def facts(out: Path) -> dict:
+    return json.loads((out / "run.json").read_text())
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("undisturbed")
+    subprocess.run([*COMMAND, str(out), "--no-store"], check=True)
+    assert not (out / "record").exists()
+    return out
+
+
+def test_killed_four_times_and_run_again(undisturbed: Path, tmp_path: Path) -> None:
+    out = tmp_path / "Reifen für Köln"
+    chance = random.Random(1)
+    runs = facts(undisturbed)["solver_runs"]
+    for _ in range(4):
+        before = record(out)
+        process = subprocess.Popen([*COMMAND, str(out)])
+        wanted = len(before) + chance.choice([1, 2])
+        while len(record(out)) < min(wanted, runs) and process.poll() is None:
+            time.sleep(0.005)
+        time.sleep(chance.uniform(0, 0.1))
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+        assert before <= record(out)
+    finished = record(out)
+    subprocess.run([*COMMAND, str(out)], check=True)
+    for name in RESULTS:
+        assert (out / name).read_bytes() == (undisturbed / name).read_bytes()
+    said = facts(out)
+    assert said["answered_from_record"] == len(finished)
+    assert said["solver_runs"] == runs - len(finished) == len(record(out) - finished)
+    assert not (out / "runs").exists()
+    assert not list(out.rglob("*.partial"))
+
+
+def test_two_at_once_in_one_folder(
+    undisturbed: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    first = subprocess.Popen([*COMMAND, str(tmp_path)])
+    while not (tmp_path / "run.json").exists() and first.poll() is None:
+        time.sleep(0.005)
+    assert run("fit", CASE, "--output", str(tmp_path), "--no-pictures") == 2
+    message = capsys.readouterr().err
+    assert f"process {first.pid}" in message and "tyrecal fit" in message
+    assert message.count("\n") == 1 and "--output" in message
+    assert first.wait() == 0
+    assert (tmp_path / "fit.json").read_bytes() == (undisturbed / "fit.json").read_bytes()
+    assert run("fit", CASE, "--output", str(tmp_path), "--no-pictures") == 0  # it is free again
+
+
+def test_two_at_once_with_one_store(undisturbed: Path, tmp_path: Path) -> None:
+    store = ["--store", str(tmp_path / "gemeinsamer Speicher")]
+    both = [subprocess.Popen([*COMMAND, str(tmp_path / name), *store]) for name in ("a", "b")]
+    for process in both:
+        assert process.wait() == 0
+    for name in ("a", "b"):
+        assert (tmp_path / name / "fit.json").read_bytes() == (
+            undisturbed / "fit.json"
+        ).read_bytes()
+        assert not (tmp_path / name / "record").exists()
+    assert len(list((tmp_path / "gemeinsamer Speicher").glob("*/*.record"))) == 9
+
+
+def test_the_lock_of_a_dead_process_holds_nobody(tmp_path: Path) -> None:
+    (tmp_path / ".lock").write_text('{"pid": 1, "host": "x", "command": "fit", "started": "t"}\n')
+    assert run("modes", CASE, "--output", str(tmp_path), "--quiet") == 0
+
+
+def test_a_lock_whose_owner_has_not_written_yet(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with (tmp_path / ".lock").open("w") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        assert run("modes", CASE, "--output", str(tmp_path)) == 2
+    assert "in use by another process" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("most_bytes", "command"),
+    [
+        (20_000, "modes"),  # the decks do not fit
+        (200_000, "modes"),  # the solver's results do not fit
+        (2_000, "fit"),
+    ],
+)
+def test_a_full_disc_ends_in_one_sentence(most_bytes: int, command: str, tmp_path: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "tyrecal", command, CASE, "--output", str(tmp_path / "out")],
+        capture_output=True,
+        text=True,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (most_bytes, most_bytes)),
+    )
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1 and "File too large" in done.stderr, done.stderr
+    left = {p.relative_to(tmp_path / "out").as_posix() for p in (tmp_path / "out").rglob("*")}
+    assert left <= {"run.json", ".lock", "record"}
+
+
+def test_a_full_disc_under_the_results(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    plain = Path.write_text
+
+    def full(path: Path, text: str, **options: str) -> int:
+        if "fit.csv" not in path.name:
+            return plain(path, text, **options)
+        plain(path, text[:10])
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Path, "write_text", full)
+    arguments = ["fit", CASE, "--output", str(tmp_path), "--no-pictures"]
+    assert run(*arguments) == 2
+    message = capsys.readouterr().err
+    assert "No space left on device" in message and "fit.csv" in message
+    assert not (tmp_path / "fit.csv").exists() and not list(tmp_path.rglob("*.partial"))
+    monkeypatch.undo()
+    assert run(*arguments, "--quiet") == 0
+    assert facts(tmp_path)["solver_runs"] == 0  # nothing was lost
+
+
+def test_no_store_and_a_store_of_the_environment(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("TYRECAL_STORE", str(tmp_path / "shared"))
+    for name, runs in (("a", 1), ("b", 0)):
+        assert run("modes", CASE, "--output", str(tmp_path / name), "--quiet") == 0
+        assert facts(tmp_path / name)["solver_runs"] == runs
+    assert (tmp_path / "a/modes.json").read_bytes() == (tmp_path / "b/modes.json").read_bytes()
+    assert run("modes", CASE, "--output", str(tmp_path / "a"), "--quiet", "--no-store") == 0
+    assert facts(tmp_path / "a")["solver_runs"] == 1
+    assert run("store", "--json") == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["records"] == 1 and found["solvers"] == {"bundled 1.0.0": 1}
+
+
+def test_store_verifies_and_prunes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for pressure in ("180", "200", "220"):
+        arguments = ["--output", str(tmp_path), "--quiet", "--pressure-kPa", pressure]
+        assert run("modes", CASE, *arguments) == 0
+    first = sorted(tmp_path.glob("record/*/*.record"))[0]
+    first.write_bytes(first.read_bytes()[:-1])
+    capsys.readouterr()
+    assert run("store", str(tmp_path)) == 0
+    assert "3 records" in capsys.readouterr().out
+    assert run("store", str(tmp_path), "--verify", "--json") == 0
+    found = json.loads(capsys.readouterr().out)
+    assert (found["records"], found["damaged"]) == (2, 1)
+    assert run("store", str(tmp_path), "--prune", "0.4") == 0
+    said = capsys.readouterr().out
+    assert "1 records" in said and "removed: 1" in said and "damaged: 0" in said
+    assert run("store") == 2 and run("store", str(tmp_path / "none")) == 2
+    assert "Traceback" not in capsys.readouterr().err
+
+
+def test_solvers_lists_what_works_and_what_does_not(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from importlib.metadata import EntryPoint
+
+    from tyrecal.evaluate import solver
+
+    entries = [
+        EntryPoint("bundled", "tyrecal_solvers.bundled.adapter:Bundled", solver.GROUP),
+        EntryPoint("broken", "no_such_package:Solver", solver.GROUP),
+        EntryPoint("not_one", "json:JSONDecoder", solver.GROUP),
+    ]
+    monkeypatch.setattr(solver, "entry_points", lambda group: entries)
+    assert run("solvers", "--json") == 0
+    found = {each["name"]: each for each in json.loads(capsys.readouterr().out)}
+    assert found["bundled"]["capabilities"] == ["gradients", "modes"]
+    assert found["bundled"]["dialect"] == "abaqus" and found["bundled"]["problem"] is None
+    assert "no_such_package" in found["broken"]["problem"]
+    assert found["not_one"]["problem"]
+    assert run("solvers") == 0
+    assert "no_such_package" in capsys.readouterr().out

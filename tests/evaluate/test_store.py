@@ -1,0 +1,239 @@
+"""The record: the same answer to the last bit, never a damaged one, safe for many writers."""
+
+from __future__ import annotations
+
+import logging
+import os
+import time
+from multiprocessing import get_context
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tyrecal.evaluate import store as store_module
+from tyrecal.evaluate.door import Counts, Door, Question
+from tyrecal.evaluate.failure import EvaluationFailed
+from tyrecal.evaluate.record import Damaged, pack, unpack
+from tyrecal.evaluate.results import Evaluation, HarmonicShape
+from tyrecal.evaluate.store import Store
+
+from .stand_in import CASE, StandIn, ask, door
+
+
+def same(one: Evaluation, other: Evaluation) -> None:
+    """Equal to the last bit, in type and layout too."""
+    assert (one.pressure_kPa, one.mass_kg) == (other.pressure_kPa, other.mass_kg)
+    assert one.gradients.keys() == other.gradients.keys()
+    pairs = [(one.gradients[k], other.gradients[k]) for k in one.gradients]
+    pairs += [(one.nodes, other.nodes), (one.displacement, other.displacement)]
+    for a, b in zip(one.modes, other.modes, strict=True):
+        assert (a.frequency_Hz, a.multiplicity) == (b.frequency_Hz, b.multiplicity)
+        assert isinstance(a.shape, HarmonicShape) and isinstance(b.shape, HarmonicShape)
+        assert a.shape.n == b.shape.n and {a.shape.n: 1}[b.shape.n]
+        pairs += [(a.shape.amplitude, b.shape.amplitude), (a.shape.points, b.shape.points)]
+    for x, y in pairs:
+        assert x.dtype == y.dtype and x.strides == y.strides and x.tobytes() == y.tobytes()
+
+
+def records(folder: Path) -> list[Path]:
+    return sorted((folder / "record").glob("*/*.record"))
+
+
+def test_plain_data_survives_exactly() -> None:
+    content = {
+        "numbers": [0.1 + 0.2, 5e-324, -0.0, 10**30, True, None, "ü\n"],
+        "arrays": [np.arange(6.0).reshape(2, 3).T, np.array(["a", "bc"]), np.zeros(1)],
+        "scalars": [np.float32(0.1), np.int64(7), 2 + 3j],
+    }
+    about, back = unpack(pack({"solver": "s"}, content))
+    assert about == {"solver": "s"}
+    assert back["numbers"] == content["numbers"] and str(back["numbers"][2]) == "-0.0"
+    assert back["scalars"] == content["scalars"] and hash(back["scalars"][1]) == hash(7)
+    for a, b in zip(content["arrays"], back["arrays"], strict=True):
+        assert isinstance(a, np.ndarray)
+        assert a.dtype == b.dtype and a.strides == b.strides and (a == b).all()
+
+
+@pytest.mark.parametrize("content", [{1: 2}, {"x": object()}, [np.array([object()])]])
+def test_what_json_and_npz_cannot_hold_is_refused(content: object) -> None:
+    with pytest.raises(TypeError):
+        pack({}, content)
+
+
+def test_any_changed_or_missing_byte_is_seen() -> None:
+    data = pack({}, {"x": np.arange(50.0), "y": [1.5, "word"]})
+    for place in range(0, len(data), 7):
+        changed = bytearray(data)
+        changed[place] ^= 1
+        with pytest.raises(Damaged):
+            unpack(bytes(changed))
+        with pytest.raises(Damaged):
+            unpack(data[:place])
+    with pytest.raises(Damaged):
+        unpack(data + data)
+
+
+def test_the_record_answers_like_the_solver(tmp_path: Path) -> None:
+    first = door(tmp_path)
+    fresh = ask(first)
+    again = door(tmp_path)
+    same(fresh, ask(again))
+    assert (first.counts, again.counts) == (Counts(1, 0), Counts(0, 1))
+    assert ask(again, 2e6) and again.counts == Counts(1, 1)
+    assert not any((tmp_path / "runs").iterdir())
+
+
+def test_the_bundled_solvers_answers_too(tmp_path: Path) -> None:
+    question = Question({"A_belt": 2.1e-7, "C10": 9e5}, ("A_belt", "C10"))
+    plain = Door(CASE).evaluate(question)
+    for runs in (1, 0):
+        recorded = Door(CASE, store=Store(tmp_path))
+        same(plain, recorded.evaluate(question))
+        assert recorded.counts.runs == runs
+
+
+@pytest.mark.parametrize("damage", ["cut", "empty", "flipped", "doubled", "stranger"])
+def test_a_damaged_record_is_computed_again(
+    damage: str, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    fresh = ask(door(tmp_path))
+    (path,) = records(tmp_path)
+    data = path.read_bytes()
+    middle = len(data) // 2
+    path.write_bytes(
+        {
+            "cut": data[:middle],
+            "empty": b"",
+            "flipped": data[:middle] + bytes([data[middle] ^ 1]) + data[middle + 1 :],
+            "doubled": data + data,
+            "stranger": b"not a record\n",
+        }[damage]
+    )
+    for runs in (1, 0):
+        again = door(tmp_path)
+        same(fresh, ask(again))
+        assert again.counts.runs == runs
+    assert [str(path) in r.getMessage() for r in caplog.records] == [True]  # said once
+    assert path.read_bytes() == data
+    assert Store(tmp_path / "record").summary()["damaged"] == 1
+
+
+@pytest.mark.parametrize(
+    ("cause", "recorded"),
+    [
+        ("no_equilibrium", True),
+        ("unstable", True),
+        ("timed_out", False),
+        ("crashed", False),
+        ("licence", False),
+        ("no_results", False),
+    ],
+)
+def test_only_failures_of_the_deck_are_recorded(cause: str, recorded: bool, tmp_path: Path) -> None:
+    folders = []
+    solver = StandIn(cause)
+    for _ in range(2):
+        with pytest.raises(EvaluationFailed, match=f"said: {cause}") as failure:
+            ask(door(tmp_path, solver))
+        assert failure.value.cause == cause and failure.value.words == f"said: {cause}"
+        assert failure.value.folder and (failure.value.folder / "deck.inp").exists()
+        folders.append(failure.value.folder)
+    assert solver.runs == (1 if recorded else 2)
+    assert (folders[0] == folders[1]) == recorded
+    assert len(list((tmp_path / "runs").iterdir())) == (1 if recorded else 2)
+    assert bool(records(tmp_path)) == recorded
+
+
+def test_numbers_that_are_none_are_not_recorded(tmp_path: Path) -> None:
+    class Zeros(StandIn):
+        def read(self, folder: Path) -> dict:
+            answer = super().read(folder)
+            answer["modes"][0]["frequency_Hz"] = float("nan")
+            return answer
+
+    with pytest.raises(EvaluationFailed, match="nan Hz") as failure:
+        ask(door(tmp_path, Zeros()))
+    assert failure.value.folder and failure.value.folder.exists()
+    assert not records(tmp_path)
+
+
+def test_another_version_or_reader_is_another_question(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    solver = StandIn()
+    ask(door(tmp_path, solver))
+    solver.version = "2"
+    ask(door(tmp_path, solver))
+    monkeypatch.setitem(store_module._SOURCES, StandIn, "an edited reader")
+    ask(door(tmp_path, solver))
+    ask(door(tmp_path, solver))
+    assert solver.runs == 3
+    found = Store(tmp_path / "record").summary(verify=True)
+    assert found["solvers"] == {"stand-in 1": 1, "stand-in 2": 2} and found["records"] == 3
+
+
+def _write(folder: Path, number: int) -> None:
+    store = Store(folder)
+    content = {"x": np.full(20000, 1 / 3), "failed": None}
+    for _ in range(20):
+        store.write("ab" * 32, {"solver": "s", "version": "1"}, content)
+        back = store.read("ab" * 32)
+        assert back["x"].tobytes() == content["x"].tobytes()
+
+
+def test_many_writers_of_one_record(tmp_path: Path) -> None:
+    workers = [
+        get_context("forkserver").Process(target=_write, args=(tmp_path, i)) for i in (1, 2, 3)
+    ]
+    for worker in workers:
+        worker.start()
+    for worker in workers:
+        worker.join(60)
+        assert worker.exitcode == 0
+    assert [p.name for p in tmp_path.glob("*/*")] == ["ab" * 32 + ".record"]
+    assert Store(tmp_path).summary(verify=True)["records"] == 1
+
+
+def test_the_least_recently_used_go_first_and_none_of_this_run(tmp_path: Path) -> None:
+    old = Store(tmp_path)
+    keys = [f"{i:02d}" * 32 for i in range(6)]
+    for age, key in enumerate(keys):
+        old.write(key, {}, {"x": np.zeros(1000)})
+        os.utime(old.path(key), times=(time.time() - 9000 - age,) * 2)
+    size = old.path(keys[0]).stat().st_size
+    store = Store(tmp_path)
+    store.read(keys[5])  # the oldest, used again
+    store.write("66" * 32, {}, {"x": np.zeros(1000)})
+    (tmp_path / "66" / "x.damaged").write_bytes(b"x" * 100)
+    assert store.prune(4 * size) == 3
+    left = {p.name[:2] for p in tmp_path.glob("*/*")}
+    assert left == {"00", "01", "05", "66"}
+    assert store.prune(0) == 2 and store.read(keys[5]) and store.read("66" * 32)
+
+
+def test_a_full_disc_does_not_spoil_an_evaluation(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    plain = Path.write_bytes
+
+    def full(path: Path, data: bytes) -> int:
+        plain(path, data[: len(data) // 2])
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Path, "write_bytes", full)
+    asked = door(tmp_path)
+    assert ask(asked).modes and ask(asked, 2e6).modes
+    assert [r.levelno for r in caplog.records] == [logging.WARNING]  # said once
+    assert "No space left" in caplog.text and "not recorded" in caplog.text
+    assert not list((tmp_path / "record").glob("*/*"))
+
+
+def test_a_full_disc_under_the_run_is_an_error(tmp_path: Path) -> None:
+    class Full(StandIn):
+        def run(self, folder: Path, time_limit_s: float) -> None:
+            raise OSError(28, "No space left on device")
+
+    with pytest.raises(OSError, match=r"No space left on device: .*run-"):
+        ask(door(tmp_path, Full()))
+    assert not any((tmp_path / "runs").iterdir()) and not records(tmp_path)

@@ -1,0 +1,58 @@
+"""tyrecal store"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from . import options
+
+
+@click.command()
+@click.argument(
+    "folder",
+    metavar="DIR",
+    type=click.Path(path_type=Path, exists=True, file_okay=False),
+    envvar="TYRECAL_STORE",
+)
+@click.option("--verify", is_flag=True, help="Check every checksum; set damaged records aside.")
+@click.option(
+    "--prune",
+    type=click.FloatRange(0),
+    metavar="SIZE_MB",
+    help="Remove the least recently used until SIZE_MB are left.",
+)
+@click.option("--json", "as_json", is_flag=True, help="As JSON.")
+@options.quiet
+def command(folder: Path, verify: bool, prune: float | None, as_json: bool, quiet: bool) -> int:
+    """Look at the record of evaluations in DIR, a results folder or a --store of several.
+
+    Nothing else depends on a record: one that is removed is evaluated again when it is needed.
+
+    \b
+    tyrecal store p235_75r17
+    tyrecal store p235_75r17 --verify --prune 100
+    """
+    from ..evaluate.store import Store
+    from .output import print_json, say
+
+    own = folder / "record"
+    store = Store(own if own.is_dir() else folder, opened=float("inf"))
+    removed = None if prune is None else store.prune(round(1e6 * prune))
+    found = store.summary(verify)
+    if removed is not None:
+        found["removed"] = removed
+    if as_json:
+        print_json(found)
+        return 0
+    size = found["bytes"] / 1e6
+    lines = [f"{found['folder']}: {found['records']} records, {size:.1f} MB"]
+    lines += [f"  {solver}: {count}" for solver, count in found["solvers"].items()]
+    if found["failures"]:
+        lines.append(f"  of them failures of the design itself: {found['failures']}")
+    if removed is not None:
+        lines.append(f"  removed: {removed}")
+    lines.append(f"  damaged: {found['damaged']}" + ("" if verify else " (found so far)"))
+    say("\n".join(lines), as_json, quiet)
+    return 0
