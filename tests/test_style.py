@@ -17,7 +17,10 @@ ROOT = Path(__file__).parents[1]
         (".", ["ruff", "check", "."]),
         (".", ["ruff", "format", "--check", "."]),
         (".", ["mypy", "tyrecal"]),
-        ("solvers", ["mypy", "--config-file", "../pyproject.toml", "bundled"]),
+        (
+            "solvers",
+            ["mypy", "--config-file", "../pyproject.toml", "bundled", "abaqus", "calculix"],
+        ),
     ],
 )
 def test_clean(folder: str, command: list[str]) -> None:

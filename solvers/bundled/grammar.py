@@ -66,6 +66,20 @@ REVOLVE_JOB: dict[str, dict[str, Values]] = {
 }
 
 
+FIELDS = {  # data fields that are honoured; a further one that is not blank is refused
+    "DENSITY": 1,
+    "ELASTIC": 2,
+    "HYPERELASTIC": 3,
+    "VISCOELASTIC": 3,
+    "HOURGLASS STIFFNESS": 1,
+    "REBAR LAYER": 6,
+    "BOUNDARY": 4,
+    "DSLOAD": 3,
+    "STATIC": 2,
+    "FREQUENCY": 4,
+}
+
+
 def check(keywords: list[Keyword], revolve: bool) -> tuple[list[Keyword], list[list[Keyword]]]:
     """Split a job into its model and its steps, refusing what is not honoured.
 
@@ -93,6 +107,10 @@ def check(keywords: list[Keyword], revolve: bool) -> tuple[list[Keyword], list[l
 def _check_one(keyword: Keyword, allowed: dict[str, dict[str, Values]], where: str) -> None:
     if keyword.name not in allowed:
         raise DeckError(keyword.line, f"keyword *{keyword.name} is not honoured in {where}")
+    for row in keyword.rows if keyword.name in FIELDS else ():
+        extra = [text for text in row.fields[FIELDS[keyword.name] :] if text]
+        if extra:
+            raise DeckError(row.line, f"data '{extra[0]}' of *{keyword.name} is not honoured")
     parameters = allowed[keyword.name]
     for name, value in keyword.parameters.items():
         if name not in parameters:

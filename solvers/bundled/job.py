@@ -114,6 +114,8 @@ class Analysis:
         procedure = step.procedure
         dynamic_Hz = procedure.number("PROPERTY EVALUATION")
         row = procedure.rows[0] if procedure.rows else Row(procedure.line, [])
+        if row.text(1):
+            raise DeckError(row.line, "a lowest frequency of interest is not honoured")
         shift = float(np.real(row.number(3, 0.0))) * (2 * np.pi) ** 2
         model = self._model(dynamic_Hz, step.long_term)
         equations = numbering(model, step)

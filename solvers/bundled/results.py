@@ -82,10 +82,10 @@ def write(stem: Path, model: Model, results: list[StepResult]) -> None:
                 for _, i, j in order
             ]
             arrays[f"shapes_{result.step}"] = np.array(whole, np.complex64)
-    with stem.with_suffix(".npz").open("wb") as file:
+    with stem.with_name(stem.name + ".npz").open("wb") as file:
         np.savez(file, **arrays)  # type: ignore[arg-type]
     text = json.dumps({"format": 1, "solver": f"bundled {VERSION}", "steps": steps}, indent=1)
-    stem.with_suffix(".json").write_text(text + "\n")
+    stem.with_name(stem.name + ".json").write_text(text + "\n")
 
 
 def _hertz(eigenvalue: float) -> float:

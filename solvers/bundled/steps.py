@@ -106,6 +106,11 @@ def _check_transfer(section: list[Keyword], steps: list[Step], revolve: list[Key
     )
     if len(generation.rows) < 3 or generation.rows[-1].number(0) != 360.0:
         raise DeckError(generation.line, "the tyre is revolved by 360 degrees, in one segment")
+    axis = [generation.rows[0].number(i, 0.0) for i in range(6)]
+    if any(axis[:4]) or axis[5] or not np.real(axis[4]) > 0:
+        raise DeckError(
+            generation.line, "the tyre is revolved about the second axis, 0, 0, 0 to 0, 1, 0"
+        )
     if len(steps) != 1 or steps[0].procedure.name != "STATIC":
         raise DeckError(transfer.line, "the first job must have one step, a *STATIC")
     increments = _increments(steps[0].procedure)

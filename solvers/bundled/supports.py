@@ -36,7 +36,7 @@ def _free(mesh: Mesh, step: Step) -> Array:
     for block in mesh.blocks.values():
         free[block.connectivity] = True
     for reference, tied in mesh.reference_nodes.items():
-        if not any(_holds_all(row, reference) for row in step.held):
+        if not any(_holds_all(mesh, row, reference) for row in step.held):
             raise DeckError(
                 step.procedure.line,
                 f"the rim's reference node {reference} must be held in 1, 6: a wheel that is free"
@@ -45,7 +45,7 @@ def _free(mesh: Mesh, step: Step) -> Array:
         free[[mesh.index[n] for n in tied]] = False
     for row in step.held:
         name = row.text(0).upper()
-        if name.isdigit() and int(name) in mesh.reference_nodes:
+        if any(_holds_all(mesh, row, reference) for reference in mesh.reference_nodes):
             continue
         nodes = mesh.node_sets.get(name) or ([int(name)] if name.isdigit() else [])
         if not nodes or any(n not in mesh.index for n in nodes):
@@ -55,9 +55,11 @@ def _free(mesh: Mesh, step: Step) -> Array:
     return free
 
 
-def _holds_all(row: Row, reference: int) -> bool:
+def _holds_all(mesh: Mesh, row: Row, reference: int) -> bool:
     first, last = _range(row)
-    return row.text(0) == str(reference) and first == 1 and last >= 6
+    name = row.text(0).upper()
+    named = name == str(reference) or mesh.node_sets.get(name) == [reference]
+    return named and first == 1 and last >= 6
 
 
 def _range(row: Row) -> tuple[int, int]:

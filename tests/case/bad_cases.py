@@ -127,7 +127,7 @@ _edit("no_kind", f"{RUBBER}.kind", "must be given", "    kind: rubber  ", "    #
 _edit("unknown_key", f"{RUBBER}.C10_MPa", "did you mean 'C10_Pa'", C10, C10 + "    C10_MPa: 1.0\n")
 _edit("misspelt_key", "presure_kPa", "did you mean 'pressure_kPa'", PRESSURE, "presure_kPa: 240.0")
 _edit("material_name", "materials.belt cord", "one word", "  belt_cord:", '  "belt cord":')
-_edit("same_name", "materials.BELT_CORD", "upper and lower", "  carcass_cord:\n", "  BELT_CORD:\n")
+_edit("same_name", "materials.BELT_CORD", "upper case", "  carcass_cord:\n", "  BELT_CORD:\n")
 # solids and cords
 _edit(
     "unknown_material", "solids.0.material", "did you mean 'rubber'", SOLID, "- {material: ruber}"

@@ -43,9 +43,10 @@ def _names(data: Mapping[str, Any]) -> Problems:
     for part in ("materials", "rebar_layers"):
         seen: dict[str, str] = {}
         for name in table(data, part):
-            first = seen.setdefault(name.casefold(), name)
+            same = name.casefold().replace("-", "_").replace(" ", "_")  # in a deck
+            first = seen.setdefault(same, name)
             if first != name:
-                yield (part, name), f"differs from '{first}' only in upper and lower case"
+                yield (part, name), f"differs from '{first}' only in upper case, '-', '_' or blanks"
     uses: list[tuple[Keys, Any, str]] = [
         (("rebar_layers", name), layer, "cord")
         for name, layer in table(data, "rebar_layers").items()

@@ -25,6 +25,12 @@ def places(data: Mapping[str, Any], section: Section) -> Problems:
         if isinstance(line, str) and line not in lines[1:-1]:
             hint = suggestion(line, lines[1:-1])
             yield ("rebar_layers", name, "line"), f"is not a line inside the section{hint}"
+    for i, gauge in enumerate(entries(table(data, "section"), "gauges")):
+        for key, known in (("regions", regions), ("between", lines)):
+            for j, word in enumerate(entries(gauge, key)):
+                if isinstance(word, str) and word not in known:
+                    place = ("section", "gauges", i, key, j)
+                    yield place, f"is not one of the section's{suggestion(word, known)}"
     bare = {(region, gap) for region in regions for gap in range(len(lines) - 1)}
     whole = True
     for i, solid in enumerate(entries(data, "solids")):
@@ -84,15 +90,24 @@ def folds(data: Mapping[str, Any], section: Section) -> str | None:
     """Why the section cannot be meshed at the chosen level of ``data``, which is right so far."""
     import numpy as np
 
+    from ..tyre.gauges import with_gauges
     from ..tyre.mesh import build_mesh
 
     mesh = data["mesh"]
     level = mesh["levels"][mesh["level"]]
     elements = [level["elements"][region] for region, _ in section.regions]
+    gauges = tuple(
+        (tuple(g.get("regions") or ()), tuple(g["between"]), float(g["factor"]))
+        for g in data["section"].get("gauges") or ()
+    )
     try:
         with np.errstate(all="ignore"):
             built = build_mesh(
-                section, elements, level["rows"], "8" in mesh["element"], level.get("grading")
+                with_gauges(section, gauges),
+                elements,
+                level["rows"],
+                "8" in mesh["element"],
+                level.get("grading"),
             )
     except ValueError as error:
         return str(error)

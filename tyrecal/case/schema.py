@@ -13,10 +13,19 @@ Moduli = Literal["long_term", "instantaneous"]
 Element = Literal["CGAX8R", "CGAX8", "CGAX4R"]
 
 
+class Gauge(Part):
+    """A factor on the thickness between two lines, in some regions or in all."""
+
+    between: Annotated[list[Text], Field(min_length=2, max_length=2)]
+    regions: list[Text] | None = None
+    factor: Annotated[float, Field(ge=0.1, le=10)]
+
+
 class SectionSource(Part):
-    """``stations``: the station table (CSV), relative to the case file."""
+    """``stations``: the station table (CSV), relative to the case file; ``gauges`` scale it."""
 
     stations: Text
+    gauges: list[Gauge] | None = None
 
 
 class Level(Part):
@@ -167,7 +176,7 @@ class TargetMode(Part):
     """A measured mode [c, m]; ``kind`` tells the two [0, 0] apart; ``sigma_Hz`` if known."""
 
     c: Annotated[int, Field(ge=0, le=20)]
-    m: Annotated[int, Field(ge=0, le=10)]
+    m: Annotated[int, Field(ge=0, le=3)]  # beyond, the belt's motion has no clear order
     kind: Literal["axial", "torsional"] | None = None
     frequency_Hz: Positive
     weight: NotNegative = 1.0

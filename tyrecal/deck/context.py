@@ -6,6 +6,7 @@ from functools import lru_cache
 from typing import Any
 
 from ..case import LoadedCase
+from ..tyre.gauges import with_gauges
 from ..tyre.mesh import SectionMesh, build_mesh
 from ..tyre.section import Section
 
@@ -18,7 +19,16 @@ def section_mesh(case: LoadedCase) -> SectionMesh:
     elements = tuple(level.elements[name] for name, _ in case.section.regions)
     grading = tuple(level.grading) if level.grading else None
     quadratic = mesh.element.startswith("CGAX8")
-    return _mesh(case.section, elements, tuple(level.rows), quadratic, grading)
+    return _mesh(gauged_section(case), elements, tuple(level.rows), quadratic, grading)
+
+
+def gauged_section(case: LoadedCase) -> Section:
+    """The case's section with its gauges applied."""
+    gauges = case.case.section.gauges or []
+    return with_gauges(
+        case.section,
+        tuple((tuple(g.regions or ()), (g.between[0], g.between[1]), g.factor) for g in gauges),
+    )
 
 
 @lru_cache(maxsize=8)
@@ -37,26 +47,26 @@ def context(case: LoadedCase) -> dict[str, Any]:
     c = case.case
     mesh = section_mesh(case)
     materials = [
-        {"name": _name(name), **_material(material)} for name, material in c.materials.items()
+        {"name": deck_name(name), **_material(material)} for name, material in c.materials.items()
     ]
     layers: dict[str, dict[str, Any]] = {}
     for name, layer in c.rebar_layers.items():
         angular = layer.geometry == "angular"
         group = layers.setdefault(
             f"{layer.line}|{angular}",
-            {"set": _name(layer.line), "angular": angular, "cords": []},
+            {"set": deck_name(layer.line), "angular": angular, "cords": []},
         )
         group["cords"].append(
             {
-                "name": _name(name),
+                "name": deck_name(name),
                 "area": layer.area_m2,
                 "spacing": layer.spacing_deg if angular else layer.spacing_m,
-                "material": _name(layer.material),
+                "material": deck_name(layer.material),
                 "angle": layer.angle_deg,
             }
         )
     rows = tuple(c.mesh.levels[c.mesh.level].rows)
-    claims = tuple((tuple(s.regions or ()), tuple(s.between or ())) for s in c.solids)
+    claims = solid_claims(case)
     lines = frozenset(layer.line for layer in c.rebar_layers.values())
     point = c.rim.reference_point_m
     tables = _tables(
@@ -67,7 +77,7 @@ def context(case: LoadedCase) -> dict[str, Any]:
         "name": c.name,
         "mesh": tables,
         "solids": [
-            {"set": block["name"], "material": _name(c.solids[block["entry"]].material)}
+            {"set": block["name"], "material": deck_name(c.solids[block["entry"]].material)}
             for block in tables["solids"]
         ],
         "layers": list(layers.values()),
@@ -78,11 +88,11 @@ def context(case: LoadedCase) -> dict[str, Any]:
         "increments": c.analysis.static_increments,
         "vibration_frequency": c.analysis.vibration_frequency_Hz,
         "sectors": c.analysis.sectors,
-        "modes": 2 * c.analysis.modes_per_harmonic * (c.analysis.highest_harmonic + 1),
     }
 
 
-def _name(text: str) -> str:
+def deck_name(text: str) -> str:
+    """A name of the case as decks have it."""
     return text.upper().replace("-", "_").replace(" ", "_")
 
 
@@ -108,6 +118,23 @@ def _material(material: Any) -> dict[str, Any]:
 Claims = tuple[tuple[tuple[str, ...], tuple[str, ...]], ...]
 
 
+def solid_claims(case: LoadedCase) -> Claims:
+    """Per entry of ``solids``: the regions and the pair of lines it names, empty where none."""
+    return tuple((tuple(s.regions or ()), tuple(s.between or ())) for s in case.case.solids)
+
+
+def claimed(
+    claims: Claims, lines: tuple[str, ...], rows: tuple[int, ...], region: str, row: int
+) -> int | None:
+    """The last entry of ``solids`` that claims an element of ``region`` in element row ``row``."""
+    edges = [sum(rows[:k]) for k in range(len(rows) + 1)]
+    for i, (wanted, between) in reversed(list(enumerate(claims))):
+        low, high = sorted(edges[lines.index(n)] for n in between) if between else (0, edges[-1])
+        if low <= row < high and (not wanted or region in wanted):
+            return i
+    return None
+
+
 @lru_cache(maxsize=8)
 def _tables(
     mesh: SectionMesh,
@@ -119,18 +146,13 @@ def _tables(
     element: str,
 ) -> dict[str, Any]:
     """Node and element tables; elements go to the last entry of ``solids`` that claims them."""
-    edges = [sum(rows[:k]) for k in range(len(rows) + 1)]
     blocks: dict[int, list[tuple[int, ...]]] = {}
     regions: dict[str, list[int]] = {}
     for number, (region, row) in mesh.cells.items():
         regions.setdefault(region, []).append(number)
-        for i, (wanted, between) in reversed(list(enumerate(claims))):
-            low, high = (
-                sorted(edges[lines.index(n)] for n in between) if between else (0, edges[-1])
-            )
-            if low <= row < high and (not wanted or region in wanted):
-                blocks.setdefault(i, []).append((number, *mesh.solids[number]))
-                break
+        entry = claimed(claims, lines, rows, region, row)
+        if entry is not None:
+            blocks.setdefault(entry, []).append((number, *mesh.solids[number]))
     return {
         "nodes": [(n, r, z) for n, (r, z) in mesh.nodes.items()],
         "solid_type": element,
@@ -139,11 +161,11 @@ def _tables(
             {"name": f"SOLID_{i + 1}", "entry": i, "elements": b} for i, b in sorted(blocks.items())
         ],
         "lines": [
-            {"name": _name(line), "elements": [(n, *nodes) for n, nodes in elements.items()]}
+            {"name": deck_name(line), "elements": [(n, *nodes) for n, nodes in elements.items()]}
             for line, elements in mesh.cords.items()
             if line in used_lines
         ],
-        "regions": [{"name": f"REGION_{_name(k)}", "members": v} for k, v in regions.items()],
+        "regions": [{"name": f"REGION_{deck_name(k)}", "members": v} for k, v in regions.items()],
         "inner": mesh.inner,
         "rim": mesh.rim,
         "crown": mesh.crown_outer,

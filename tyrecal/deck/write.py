@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from typing import Any
 
 from ..case import LoadedCase, with_values
+from .calculix import calculix_context
 from .context import context
 from .environment import TemplateFailed, environment, render
 
-JOBS = {"abaqus": ("inflate", "modes")}
 STEP = 1e-4  # of a variable, to see which numbers of the deck it moves and how fast
 
 Tangents = dict[str, list[tuple[str, int, int, float]]]
@@ -38,7 +38,12 @@ class Decks:
 
     def texts(self, dialect: str) -> dict[str, str]:
         """File name to text. Raises TemplateFailed."""
-        return _texts(self.case, dialect)
+        return self._texts(self.case, dialect)
+
+    def _texts(self, case: LoadedCase, dialect: str) -> dict[str, str]:
+        own = case.case.templates
+        env = environment(dialect, case.folder / own if own else None)
+        return DIALECTS[dialect](case, env, self.request)
 
     def tangents(self, dialect: str) -> Tangents:
         """Per variable, rows [job, 1-based line, 0-based field, d number / d variable].
@@ -48,26 +53,50 @@ class Decks:
         """
         result: Tangents = {}
         for name in self.gradients:
-            value = self.values[name]
-            step = STEP * (abs(value) or 1.0)
-            ends = [
-                _texts(with_values(self.case, {name: value + side * step}), dialect)
-                for side in (1, -1)
-            ]
+            above, below = self._beside(name, 1), self._beside(name, -1)
+            texts = [self._texts(case, dialect) for case, _ in (above, below)]
             result[name] = [
                 (file.removesuffix(".inp"), *row)
-                for file in ends[0]
-                for row in _slopes(ends[0][file], ends[1][file], 2 * step)
+                for file in texts[0]
+                for row in _slopes(file, texts[0][file], texts[1][file], above[1] - below[1])
             ]
         return result
 
+    def _beside(self, name: str, side: int) -> tuple[LoadedCase, float]:
+        """The case a small step to one side of a variable, or at it where that side is none."""
+        value = self.values[name]
+        variable = self.case.case.variables.get(name)
+        span = max(abs(variable.lower), abs(variable.upper)) if variable else 1.0
+        moved = value + side * STEP * (abs(value) or span)
+        try:
+            return with_values(self.case, {name: moved}), moved
+        except ValueError:
+            return with_values(self.case, {name: value}), value
 
-def _texts(case: LoadedCase, dialect: str) -> dict[str, str]:
-    own = case.case.templates
-    env = environment(dialect, case.folder / own if own else None)
+
+def _abaqus(case: LoadedCase, env: Any, request: Mapping[str, Any]) -> dict[str, str]:
     names = context(case)
     names["mesh_block"] = _mesh_block(env, names["mesh"])
-    return {f"{job}.inp": render(env, f"{job}.inp.j2", names) for job in JOBS[dialect]}
+    names["modes"] = 2 * request["modes_per_harmonic"] * (request["highest_harmonic"] + 1)
+    return {f"{job}.inp": render(env, f"{job}.inp.j2", names) for job in ("inflate", "modes")}
+
+
+def _calculix(case: LoadedCase, env: Any, request: Mapping[str, Any]) -> dict[str, str]:
+    """The sector, and a deck per nodal diameter that includes it."""
+    if case.case.analysis.sectors < 4 * request["highest_harmonic"]:
+        raise TemplateFailed(
+            f"analysis.sectors is {case.case.analysis.sectors}, must be at least 4 times"
+            " highest_harmonic for CalculiX"
+        )
+    names = calculix_context(case)
+    names["modes"] = 2 * request["modes_per_harmonic"]  # they come in pairs, n = 0 too
+    texts = {"sector.inp": render(env, "sector.inp.j2", names)}
+    for n in range(request["highest_harmonic"] + 1):
+        texts[f"modes_{n}.inp"] = render(env, "diameter.inp.j2", {**names, "diameter": n})
+    return texts
+
+
+DIALECTS = {"abaqus": _abaqus, "calculix": _calculix}
 
 
 _BLOCKS: dict[tuple[int, int], tuple[Any, Any, str]] = {}
@@ -84,21 +113,34 @@ def _mesh_block(env: Any, mesh: dict[str, Any]) -> str:
     return _BLOCKS[key][2]
 
 
-def _slopes(above: str, below: str, width: float) -> list[tuple[int, int, float]]:
-    """Fields that differ between two decks: (line, field, difference over ``width``)."""
+def _slopes(file: str, above: str, below: str, width: float) -> list[tuple[int, int, float]]:
+    """Fields that differ between two decks: (line, field, difference over ``width``).
+
+    Comments and headings may differ as they like. Raises TemplateFailed.
+    """
     if above == below:
         return []
-    rows = []
-    pairs = zip(above.splitlines(), below.splitlines(), strict=True)
-    for line, (one, other) in enumerate(pairs, start=1):
-        if one == other:
+    first, second = above.splitlines(), below.splitlines()
+    if len(first) != len(second):
+        raise TemplateFailed(f"{file}: its number of lines depends on a variable: no derivative")
+    rows, keyword = [], ""
+    for line, (one, other) in enumerate(zip(first, second, strict=True), start=1):
+        if one.startswith("*") and not one.startswith("**"):
+            keyword = one.split(",")[0].upper()
+        if one == other or one.startswith("**") or keyword == "*HEADING":
             continue
-        if one.startswith("*"):
+        try:
+            if one.startswith("*"):
+                raise ValueError("a keyword line")
+            fields = zip(one.split(","), other.split(","), strict=True)
+            rows += [
+                (line, i, (float(a) - float(b)) / width)
+                for i, (a, b) in enumerate(fields)
+                if a != b
+            ]
+        except ValueError:
             raise TemplateFailed(
-                f"a variable stands in '{one.strip()}', a keyword line: it has no exact derivative"
-            )
-        fields = zip(one.split(","), other.split(","), strict=True)
-        for index, (a, b) in enumerate(fields):
-            if a != b:
-                rows.append((line, index, (float(a) - float(b)) / width))
+                f"{file}, line {line}: '{one.strip()}' changes with a variable, but not as numbers"
+                " of a data line: it has no exact derivative"
+            ) from None
     return rows

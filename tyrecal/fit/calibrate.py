@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import csv
+import io
 from collections.abc import Callable, Mapping
-from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass, field
-from multiprocessing import get_context
-from pathlib import Path
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from ..case import LoadedCase
-from ..evaluate.door import Door
+from ..evaluate.door import Counts, Door
 from ..evaluate.failure import EvaluationFailed
+from ..evaluate.pool import process_pool
 from . import least_squares, slsqp
 from .problem import Point, Problem
 from .uncertainty import uncertainty
@@ -54,12 +53,6 @@ class Fit:
     history: list[dict[str, Any]]
     initial: Point
     fitted: Point
-    messages: list[str] = field(default_factory=list)
-
-    @property
-    def moved(self) -> bool:
-        """Whether any variable changed."""
-        return bool(self.result["moved"])
 
 
 def calibrate(
@@ -100,7 +93,6 @@ def calibrate(
 
 
 def _run(problem: Problem, start: Array, method: str) -> StartReport:
-    known = len(problem.points)
     first = problem.evaluate(start)
     outcome = METHODS[method](problem, start, TOLERANCE)
     converged = slsqp.is_converged(problem, outcome.point, 10 * TOLERANCE)
@@ -110,7 +102,7 @@ def _run(problem: Problem, start: Array, method: str) -> StartReport:
         outcome.point,
         outcome.message,
         converged,
-        history if known <= 1 else history[known:],
+        history,
     )
 
 
@@ -143,7 +135,7 @@ class _workers:
     """Runs starts one after the other, or in a process pool; answers come in order."""
 
     def __init__(self, jobs: int):
-        self.pool = ProcessPoolExecutor(jobs, get_context("forkserver")) if jobs > 1 else None
+        self.pool = process_pool(jobs) if jobs > 1 else None
 
     def __enter__(self) -> Callable[[Problem, list[Array], str], Any]:
         return self._run_all
@@ -153,13 +145,14 @@ class _workers:
             self.pool.shutdown(cancel_futures=True)
 
     def _run_all(self, problem: Problem, starts: list[Array], method: str) -> Any:
-        tasks = [
-            (problem.case, problem.door.solver_name, problem.door.folder, problem.fixed, x, method)
-            for x in starts
-        ]
-        if self.pool:
-            return self.pool.map(_start_alone, tasks)
-        return (_start_here(problem, x, method) for x in starts)
+        if self.pool is None:
+            yield from (_start_here(problem, x, method) for x in starts)
+            return
+        door = problem.door.worker()
+        tasks = [(Problem(problem.case, door, problem.fixed), x, method) for x in starts]
+        for answer, counts in self.pool.map(_start_alone, tasks):
+            problem.door.counts.add(counts)
+            yield answer
 
 
 def _start_here(problem: Problem, start: Array, method: str) -> StartReport | EvaluationFailed:
@@ -170,9 +163,11 @@ def _start_here(problem: Problem, start: Array, method: str) -> StartReport | Ev
         return failure
 
 
-def _start_alone(task: tuple) -> StartReport | EvaluationFailed:
-    case, solver_name, folder, fixed, start, method = task
-    return _start_here(Problem(case, Door(case, solver_name, folder), fixed), start, method)
+def _start_alone(
+    task: tuple[Problem, Array, str],
+) -> tuple[StartReport | EvaluationFailed, Counts]:
+    problem, start, method = task
+    return _start_here(problem, start, method), problem.door.counts
 
 
 def _history(problem: Problem) -> list[dict[str, Any]]:
@@ -215,7 +210,8 @@ def _result(
     variables = {}
     for i, v in enumerate(problem.variables):
         value = point.values[v.name]
-        at_bound = bool(min(point.x[i] - problem.lower[i], problem.upper[i] - point.x[i]) < 1e-6)
+        room = point.x[i] - problem.lower[i], problem.upper[i] - point.x[i]
+        at_bound = bool(min(room) < 1e-6)
         variables[v.name] = {
             "initial": initial.values[v.name],
             "value": value,
@@ -285,19 +281,20 @@ def _finite(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
 
 
-def write_history(path: Path, history: list[dict[str, Any]]) -> None:
+def history_csv(history: list[dict[str, Any]]) -> str:
     """All design points as CSV: point, start, variables, objective_Hz, failure."""
     names = list(history[0]["values"])
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow(["point", "start", *names, "objective_Hz", "failure"])
-        for row in history:
-            writer.writerow(
-                [
-                    row["point"],
-                    row["start"],
-                    *(row["values"][n] for n in names),
-                    row["objective_Hz"],
-                    row["failure"] or "",
-                ]
-            )
+    file = io.StringIO(newline="")
+    writer = csv.writer(file)
+    writer.writerow(["point", "start", *names, "objective_Hz", "failure"])
+    for row in history:
+        writer.writerow(
+            [
+                row["point"],
+                row["start"],
+                *(row["values"][n] for n in names),
+                row["objective_Hz"],
+                row["failure"] or "",
+            ]
+        )
+    return file.getvalue()

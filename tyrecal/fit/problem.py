@@ -13,10 +13,10 @@ import numpy as np
 
 from ..case import LoadedCase, start_values
 from ..evaluate.door import Door, Question
-from ..evaluate.failure import EvaluationFailed
+from ..evaluate.failure import EvaluationFailed, SolverUnavailable
 from ..evaluate.results import Evaluation
-from ..modes.label import label_modes
-from ..modes.match import LostLabel, match
+from ..modes.label import paired_labels
+from ..modes.match import LostLabel, margin, match
 from ..modes.mode import Label, Mode
 
 Array = np.ndarray
@@ -40,6 +40,8 @@ class Variable:
 
     def value(self, x: float) -> float:
         """The value at an optimiser's coordinate, inside the bounds to the last bit."""
+        if x == self.scaled(self.start):
+            return self.start
         raw = math.exp(x) if self.log else self.lower + x * (self.upper - self.lower)
         return min(max(raw, self.lower), self.upper)
 
@@ -143,6 +145,8 @@ class Problem:
             try:
                 self.points[key] = self._evaluate(values)
             except EvaluationFailed as failure:
+                if failure.cause == "licence":  # says nothing about the design
+                    raise SolverUnavailable(str(failure)) from None
                 self.points[key] = failure
             if self.notify:
                 self.notify(len(self.points), values, self.points[key])
@@ -182,11 +186,11 @@ class Problem:
         for count in (None, *MORE_MODES):
             evaluation = self.door.evaluate(Question(values, names, count))
             try:
-                found = match(label_modes(evaluation.modes), labels)
+                found = match(paired_labels(evaluation.modes), labels)
             except LostLabel as lost:
                 last = lost
                 continue
-            return evaluation, found, min(m.clarity for m in found.values())
+            return evaluation, found, margin(found)
         raise EvaluationFailed("lost_label", str(last))
 
     def _differences(self, values: dict[str, float], frequencies: Array) -> Array:
@@ -194,7 +198,8 @@ class Problem:
         columns = []
         for i, variable in enumerate(self.variables):
             x = variable.scaled(values[variable.name])
-            step = DIFFERENCE_STEP if x + DIFFERENCE_STEP <= self.upper[i] else -DIFFERENCE_STEP
+            step = getattr(self.door.solver, "difference_step", DIFFERENCE_STEP)
+            step = step if x + step <= self.upper[i] else -step
             moved = {**values, variable.name: variable.value(x + step)}
             modes = self._modes(moved, ())[1]
             shifted = np.array([modes[t.label].frequency_Hz for t in self.targets])

@@ -139,12 +139,16 @@ def _beyond_crossing(problem: Problem, point: Point) -> Iterator[Array]:
         return
     i, j = labels.index(AXIAL), labels.index(TORSIONAL)
     weights = np.sqrt([t.weight * t.multiplicity for t in problem.targets])
+    if not (weights[i] and weights[j]):
+        return
     slopes = point.jacobian / np.where(weights > 0, weights, 1.0)[:, None]
     gap = point.modes[AXIAL].frequency_Hz - point.modes[TORSIONAL].frequency_Hz
     rise = slopes[i] - slopes[j]
     H = point.jacobian.T @ point.jacobian
     H[np.diag_indices(len(H))] += 1e-3 * np.trace(H) / len(H)
     direction = np.linalg.solve(H, rise)
+    if abs(rise @ direction) < 1e-12 * (rise @ rise + 1e-300):
+        return
     for wanted in (1.0, 2.0, 4.0):  # Hz beyond
         change = -(gap + np.sign(gap) * wanted) * direction / (rise @ direction)
         yield np.clip(point.x + change, problem.lower, problem.upper)

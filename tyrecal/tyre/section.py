@@ -34,10 +34,6 @@ class Section:
     regions: tuple[tuple[str, int], ...]
     rigid: Array
 
-    def station_counts(self) -> list[int]:
-        """Intervals between stations in each region."""
-        return [count for _, count in self.regions]
-
 
 def read_section(path: Path) -> Section:
     """Read a station table: station, region, <line>_r_mm, <line>_z_mm ..., rigid (0 or 1).
