@@ -1,0 +1,186 @@
+"""CalculiX behind the tool's door: write, run, read. Imports nothing of the tool."""
+
+from __future__ import annotations
+
+import json
+import re
+import shlex
+import subprocess
+import time
+from concurrent.futures import ThreadPoolExecutor
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+
+from ..process import RunFailed
+from .results import Fields, pairs, read_eigenvalues, read_fields, read_mass
+from .runner import run_job
+
+Array = np.ndarray
+SECTOR, SETTINGS = "sector.inp", "calculix.json"
+OPTIONS: dict[str, Any] = {
+    "command": "ccx",
+    "parallel": 1,
+    "element": "C3D20R",
+    "ply_thickness_m": 2e-4,
+}
+
+
+class Refused(ValueError):
+    """The case asks for what CalculiX, or this adapter, cannot do."""
+
+
+class Decks(Protocol):
+    """What the tool hands over; of ``case``, options and the vibration frequency are read."""
+
+    case: Any
+
+    def texts(self, dialect: str) -> dict[str, str]:
+        """File name to text."""
+
+
+class CalculiX:
+    """Adapter of CalculiX (see the tool's solver contract).
+
+    Options: ``command``; ``parallel``, decks of one evaluation at a time; ``element``, C3D20R or
+    C3D8, and ``ply_thickness_m`` are the deck's. A difference in ln of a variable needs
+    ``difference_step``, since frequencies have seven digits.
+    """
+
+    name = "calculix"
+    dialect = "calculix"
+    capabilities = frozenset({"modes"})
+    refusals = (Refused,)
+    failures = (RunFailed,)
+    difference_step = 1e-3
+
+    @property
+    def version(self) -> str:
+        """As ``ccx -v`` has it; "unknown" where there is no ccx."""
+        return _version(OPTIONS["command"])
+
+    def write(self, decks: Decks, folder: Path) -> list[Path]:
+        """Write the decks and, beside them, how to run them. Raises Refused."""
+        settings = _settings(decks.case.case)
+        paths = []
+        for name, text in decks.texts(self.dialect).items():
+            paths.append(folder / name)
+            paths[-1].write_text(text)
+        paths.append(folder / SETTINGS)
+        paths[-1].write_text(json.dumps(settings))
+        return paths
+
+    def run(self, folder: Path, time_limit_s: float) -> None:
+        """Run every deck; ``time_limit_s`` is for all of them together. Raises RunFailed."""
+        settings = json.loads((folder / SETTINGS).read_text())
+        command = shlex.split(settings["command"])
+        end = time.monotonic() + time_limit_s
+
+        def run_one(job: str) -> None:
+            run_job(folder, job, [SECTOR], command, max(0.0, end - time.monotonic()))
+
+        jobs = [job for _, job in _jobs(folder)]
+        if settings["parallel"] == 1:
+            for job in jobs:
+                run_one(job)
+            return
+        with ThreadPoolExecutor(settings["parallel"]) as pool:
+            list(pool.map(run_one, jobs))
+
+    def read(self, folder: Path) -> dict[str, Any]:
+        """Results as plain data, shapes on the section at Theta = 0. Raises RunFailed."""
+        modes = []
+        jobs = _jobs(folder)
+        if not jobs:
+            raise RunFailed("no_results", "there are no decks in the folder")
+        sectors = int(_find(r"\*CYCLIC SYMMETRY MODEL, *N=(\d+)", folder / SECTOR))
+        for diameter, job in jobs:
+            deck = folder / f"{job}.inp"
+            asked = int(_find(r"\*FREQUENCY\s+(\d+)", deck))
+            eigenvalues = read_eigenvalues(folder / f"{job}.dat", diameter, asked)
+            fields = read_fields(folder / f"{job}.frd")
+            values = pairs(eigenvalues, f"{job}.dat")
+            shapes = _shapes(fields, len(values), diameter, sectors, job)
+            modes += [
+                {
+                    "frequency_Hz": float(np.sqrt(value) / (2 * np.pi)),
+                    "multiplicity": 2 if diameter else 1,
+                    "n": diameter,
+                    "amplitude": shape,
+                }
+                for value, shape in zip(values, shapes, strict=True)
+            ]
+        return {
+            "pressure_Pa": float(_find(r"\*DLOAD\s+CAVITY, *\w+, *(\S+)", deck)),
+            "mass_kg": sectors * read_mass(folder / f"{job}.dat"),
+            "modes": modes,
+            "gradients": {},
+            "nodes": fields.nodes,
+            "points": fields.points[:, [0, 2]],
+            "displacement": fields.blocks[0][2],
+        }
+
+
+@lru_cache
+def _version(command: str) -> str:
+    try:
+        said = subprocess.run([command, "-v"], capture_output=True, text=True, timeout=20).stdout
+    except (OSError, subprocess.TimeoutExpired):
+        return "unknown"
+    found = re.search(r"Version (\S+)", said)
+    return found[1] if found else "unknown"
+
+
+def _shapes(fields: Fields, count: int, n: int, sectors: int, job: str) -> list[Array]:
+    """Amplitudes (nodes, 3), complex, of each pair's first mode, mass-normalised to the tyre.
+
+    At Theta = 0, x, y, z are r, theta, z. CalculiX normalises to one sector's mass.
+    """
+    found: dict[int, dict[str, Array]] = {}
+    for mode, name, values in fields.blocks:
+        found.setdefault(mode, {})[name] = values
+    wanted = range(1, 2 * count, 2)
+    if any(set(found.get(mode, ())) != {"DISP", "DISPI"} for mode in wanted):
+        raise RunFailed("no_results", f"{job}.frd lacks shapes of modes")
+    shapes = []
+    for mode in wanted:
+        shape = found[mode]["DISP"] + 1j * found[mode]["DISPI"]
+        largest = shape.ravel()[abs(shape).argmax()]
+        if not np.isfinite(shape).all() or not abs(largest) > 0:
+            raise RunFailed("no_results", f"{job}.frd: the shape of mode {mode} is no shape")
+        turned = shape * abs(largest) / largest  # a pair's phase is arbitrary: make it definite
+        shapes.append(turned * np.sqrt((2 if n else 1) / sectors))
+    return shapes
+
+
+def _jobs(folder: Path) -> list[tuple[int, str]]:
+    """Nodal diameter and job name of each deck."""
+    decks = folder.glob("modes_*.inp")
+    return sorted((int(path.stem.removeprefix("modes_")), path.stem) for path in decks)
+
+
+def _find(pattern: str, path: Path) -> str:
+    found = re.search(pattern, path.read_text(), re.I)
+    if not found:
+        raise RunFailed("no_results", f"{path.name} has no {pattern.split(' *')[0]}")
+    return found[1]
+
+
+def _settings(case: Any) -> dict[str, Any]:
+    given = case.solver.options
+    unknown = [name for name in given if name not in OPTIONS]
+    if unknown:
+        raise Refused(f"solver.options: calculix has no '{unknown[0]}', only {', '.join(OPTIONS)}")
+    if case.analysis.vibration_frequency_Hz is not None:
+        raise Refused(
+            "analysis.vibration_frequency_Hz must be null: CalculiX cannot evaluate hyperelastic"
+            " rubber at a frequency"
+        )
+    settings = {**OPTIONS, **given}
+    if not isinstance(settings["command"], str) or not settings["command"].strip():
+        raise Refused(f"solver.options.command is '{settings['command']}', must be a command")
+    if type(settings["parallel"]) is not int or settings["parallel"] < 1:
+        raise Refused(f"solver.options.parallel is '{settings['parallel']}', must be 1 or more")
+    return {name: settings[name] for name in ("command", "parallel")}

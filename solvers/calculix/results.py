@@ -1,0 +1,125 @@
+"""CalculiX's result files: eigenvalues and mass from .dat, shapes from .frd."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ..process import RunFailed
+
+Array = np.ndarray
+SAME = 1e-4  # relative difference of the two eigenvalues of a pair, at most
+MASS = re.compile(r"total mass for set EVERYTHING and time\s+\S+\s+(\S+)")
+
+
+@dataclass
+class Fields:
+    """Contents of a .frd file: nodes (k,), points x, y, z (k, 3) in m; blocks: (mode number, 0
+    for a static step; name, DISP or DISPI; values (k, 3) on ``nodes``) in the file's order."""
+
+    nodes: Array
+    points: Array
+    blocks: list[tuple[int, str, Array]]
+
+
+def read_eigenvalues(path: Path, diameter: int, asked: int) -> Array:
+    """omega^2 (asked,) in 1/s2, ascending, as .dat has them.
+
+    Raises RunFailed: ``no_results`` unless there are as many as asked, ``unstable`` where one is
+    not positive.
+    """
+    text = _text(path)
+    row = re.compile(rf"^ +{diameter} +(\d+)((?: +\S+){{4}}) *$", re.M)
+    found = [(int(m[1]), _number(m[2].split()[0], path)) for m in row.finditer(_table(text))]
+    if [number for number, _ in found] != list(range(1, asked + 1)):
+        raise RunFailed("no_results", f"{path.name} has {len(found)} of {asked} modes")
+    values = np.array([value for _, value in found])
+    if not np.isfinite(values).all() or not values.any():
+        raise RunFailed("no_results", f"{path.name}: eigenvalues are {values[0]:g}, not numbers")
+    if (values <= 0).any():
+        raise RunFailed(
+            "unstable", f"{path.name}: an eigenvalue is {values.min():g}: the state is unstable"
+        )
+    return values
+
+
+def _table(text: str) -> str:
+    """The last table of eigenvalues in a .dat file."""
+    table = text.rpartition("E I G E N V A L U E   O U T P U T")[2]
+    return table.partition("P A R T I C I P A T I O N")[0]
+
+
+def read_mass(path: Path) -> float:
+    """Mass of the sector in kg, after the inflation. Raises RunFailed (``no_results``)."""
+    found = MASS.findall(_text(path))
+    if not found:
+        raise RunFailed("no_results", f"{path.name} has no mass")
+    return _number(found[-1], path)
+
+
+def pairs(eigenvalues: Array, name: str) -> Array:
+    """One eigenvalue of each pair. Raises RunFailed (``no_results``) where two do not match."""
+    first, second = eigenvalues[::2], eigenvalues[1::2]
+    if len(first) != len(second) or (abs(second - first) > SAME * second).any():
+        raise RunFailed("no_results", f"{name}: modes do not come in pairs")
+    return (first + second) / 2
+
+
+def read_fields(path: Path) -> Fields:
+    """A whole .frd file. Raises RunFailed (``no_results``) where it is cut, doubled or empty.
+
+    Columns have a fixed width and may touch.
+    """
+    lines = _text(path).splitlines()
+    if not lines or lines[-1].strip() != "9999":
+        raise RunFailed("no_results", f"{path.name} is cut off")
+    if sum(line.strip() in ("9999", "1C") for line in lines) != 2:
+        raise RunFailed("no_results", f"{path.name} holds the results of two runs")
+    nodes: dict[int, list[float]] = {}
+    kept: list[tuple[int, list[float]]] = []
+    blocks: list[tuple[int, str, dict[int, list[float]]]] = []
+    mode, name = 0, ""
+    for line in lines:
+        key = line[:6].strip()
+        if key == "2C":
+            name = "nodes"
+        elif line.startswith("    1PMODE"):
+            mode = int(line.split()[1])
+        elif line.startswith(" -4"):
+            name = line.split()[1]
+        elif line.startswith(" -1") and name:
+            kept.append((int(line[3:13]), _columns(line, path)))
+        elif line.startswith(" -3"):
+            if name == "nodes":
+                nodes = dict(kept)
+            elif name.startswith("DISP"):
+                blocks.append((mode, name, dict(kept)))
+            name, kept = "", []
+    numbers = [n for n in nodes if blocks and n in blocks[0][2]]
+    if not numbers or any(list(block) != numbers for _, _, block in blocks):
+        raise RunFailed("no_results", f"{path.name}: nodes are missing")
+    return Fields(
+        np.array(numbers),
+        np.array([nodes[n] for n in numbers]),
+        [(mode, name, np.array(list(block.values()))) for mode, name, block in blocks],
+    )
+
+
+def _columns(line: str, path: Path) -> list[float]:
+    return [_number(line[i : i + 12], path) for i in (13, 25, 37)]
+
+
+def _number(text: str, path: Path) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise RunFailed("no_results", f"{path.name}: '{text.strip()}' is not a number") from None
+
+
+def _text(path: Path) -> str:
+    if not path.exists() or not path.stat().st_size:
+        raise RunFailed("no_results", f"CalculiX left no {path.name}")
+    return path.read_text(errors="replace")

@@ -1,0 +1,73 @@
+"""Running ccx on one deck. It lies about failure: an exit code of 0 proves nothing."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+
+from ..process import RunFailed, last_words, run_command
+
+RESULTS = ("dat", "frd", "sta", "cvg", "12d")
+LONGEST_PATH = 100  # ccx keeps 132 characters of a file's path, the file's name included
+NO_EQUILIBRIUM = re.compile(r"increment size smaller|too many cutbacks|max\. # of increments", re.I)
+
+
+def run_job(
+    folder: Path, job: str, includes: Sequence[str], command: Sequence[str], time_limit_s: float
+) -> None:
+    """Run ``job``.inp of ``folder`` to its end; the results and ``job``.log stand beside it.
+
+    ``includes``: files that the deck reads. One thread: two are slower, and results of one are
+    the same to the last bit. Where ccx could not cope with the folder's path it runs elsewhere.
+
+    Raises RunFailed: ``timed_out``, ``no_equilibrium``, ``crashed``.
+    """
+    for suffix in (*RESULTS, "log"):  # results of another run must not pass for this one's
+        (folder / f"{job}.{suffix}").unlink(missing_ok=True)
+    if _is_safe(folder):
+        _run(folder, job, command, time_limit_s)
+        return
+    with tempfile.TemporaryDirectory(prefix="ccx-") as short:
+        for name in (f"{job}.inp", *includes):
+            shutil.copy(folder / name, short)
+        try:
+            _run(Path(short), job, command, time_limit_s)
+        finally:
+            for suffix in (*RESULTS, "log"):
+                if (Path(short) / f"{job}.{suffix}").exists():
+                    shutil.copy(Path(short) / f"{job}.{suffix}", folder)
+
+
+def _is_safe(folder: Path) -> bool:
+    """ccx writes astray where a path holds a blank, and ends where it is too long."""
+    path = str(folder.resolve())
+    return len(path) <= LONGEST_PATH and path.isascii() and " " not in path
+
+
+def _run(folder: Path, job: str, command: Sequence[str], time_limit_s: float) -> None:
+    log = folder / f"{job}.log"
+    threads = {"OMP_NUM_THREADS": "1", "CCX_NPROC_STIFFNESS": "1", "CCX_NPROC_RESULTS": "1"}
+    code = run_command([*command, job], folder, time_limit_s, log.name, threads)
+    said = log.read_text(errors="replace")
+    error = _error(said)
+    words = error or last_words(log)
+    if NO_EQUILIBRIUM.search(said):
+        raise RunFailed("no_equilibrium", f"CalculiX found no inflated state ({job})", words)
+    if code != 0:
+        raise RunFailed("crashed", f"CalculiX ended with code {code} ({job})", words)
+    if error:
+        raise RunFailed("crashed", f"CalculiX reported an error ({job})", words)
+    if "Job finished" not in said:
+        raise RunFailed("crashed", f"CalculiX stopped before its end ({job})", words)
+
+
+def _error(said: str) -> str:
+    """The first ``*ERROR`` of a log with the two lines that follow it; empty where none is."""
+    lines = [line.strip() for line in said.splitlines() if line.strip()]
+    for i, line in enumerate(lines):
+        if line.upper().startswith("*ERROR"):
+            return " ".join(lines[i : i + 3])
+    return ""

@@ -1,0 +1,320 @@
+"""CalculiX: its files are read to the last column, and its silent failures never pass."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tyrecal_solvers.calculix.adapter import CalculiX, Refused
+from tyrecal_solvers.process import RunFailed
+
+from tyrecal.case import LoadedCase, load_case, start_values, with_values
+from tyrecal.deck.environment import TemplateFailed
+from tyrecal.deck.write import Decks
+from tyrecal.evaluate.door import Door, Question
+from tyrecal.evaluate.failure import DeckRefused, EvaluationFailed
+from tyrecal.modes.label import label_modes
+
+from ..conftest import CASES
+
+needs_ccx = pytest.mark.skipif(
+    shutil.which("ccx") is None, reason="CalculiX (ccx, Debian: calculix-ccx) is not installed"
+)
+
+# a folder of one deck of diameter 1, and what ccx 2.20 would leave there
+DECK = "*STEP\n*DLOAD\nCAVITY, P6, 240000\n*FREQUENCY\n2\n*DLOAD\nCAVITY, P6, 120000\n"
+SECTOR = "*CYCLIC SYMMETRY MODEL, N=60, TIE=SECTORS\n"
+DAT = """
+ total mass for set EVERYTHING and time  0.1000000E+01
+
+        2.130910E-01
+
+     E I G E N V A L U E   O U T P U T
+
+  NODAL   MODE NO    EIGENVALUE                      FREQUENCY
+ DIAMETER                                    REAL PART            IMAGINARY PART
+                                    (RAD/TIME)      (CYCLES/TIME)   (RAD/TIME)
+
+    1          1   0.1000000E+06   0.3162278E+03   0.5032921E+02   0.0000000E+00
+    1          2   0.1000000E+06   0.3162278E+03   0.5032921E+02   0.0000000E+00
+
+     P A R T I C I P A T I O N   F A C T O R S
+
+    1          1   0.2000000E+01   0.0000000E+00   0.0000000E+00   0.0000000E+00
+"""
+NODES = [(1, (0.3, 0.0, -0.1)), (2, (0.3, 0.0, 0.1)), (3, (0.3, -0.01, 0.1))]
+STATIC = [(1, (0.001, 0.0, 0.0)), (2, (0.0, 0.0, 0.0))]
+REAL = [(1, (0.0, -2.0, -0.5)), (2, (0.0, 1.0, 0.0))]  # (3 stands behind: it has no shape)
+IMAGINARY = [(1, (-4.0, 0.0, 0.0)), (2, (0.5, 0.0, -0.25))]
+
+
+def rows(table: list) -> str:
+    """Node lines in fixed columns, which touch where numbers are negative."""
+    return "".join(f" -1{n:10d}" + "".join(f"{x:12.5E}" for x in v) + "\n" for n, v in table)
+
+
+def block(name: str, table: list, mode: int) -> str:
+    head = f"    1PHID{1:27d}\n    1PMODE{mode:26d}\n" if mode else ""
+    return f"{head}  100CL  101 50.3\n -4  {name:8s}4    1\n -5  D1\n{rows(table)} -3\n"
+
+
+FRD = (
+    "    1C\n    2C\n" + rows(NODES) + " -3\n" + block("DISP", STATIC, 0)
+    + block("DISP", REAL, 1) + block("DISPI", IMAGINARY, 1) + " 9999\n"
+)  # fmt: skip
+
+STAND_IN = """import sys, time
+from pathlib import Path
+fault, job = sys.argv[1], sys.argv[2]
+dat, frd = (Path(__file__).with_name(n).read_text() for n in ("dat", "frd"))
+code = 0
+said = "CalculiX Version 2.20\\n Job finished\\n"
+if fault == "crash": sys.exit(139)
+if fault == "code": code, said = 201, "*ERROR reading *NODE:\\n  a node is wrong\\n"
+if fault == "hang": print("Newton goes on", flush=True); time.sleep(60)
+if fault == "silent": dat = frd = None
+if fault == "no shapes": frd = None
+if fault == "empty": dat = ""
+if fault == "unfinished": said = "CalculiX Version 2.20\\n"
+if fault == "error": said = " *ERROR in linstatic: a is wrong\\n" + said
+if fault == "cutbacks": code, said = 201, " *ERROR: too many cutbacks\\n"
+if fault == "fewer": dat = dat.replace("    1          2   0.1000000E+06", "x")
+if fault == "zeros": dat = dat.replace("0.1000000E+06", "0.0000000E+00")
+if fault == "nan": dat = dat.replace("0.1000000E+06", "          NaN")
+if fault == "negative": dat = dat.replace(" 0.1000000E+06", "-0.1000000E+06")
+if fault == "unpaired": dat = dat.replace("2   0.1000000E+06", "2   0.1010000E+06")
+if fault == "cut": frd = frd[: len(frd) * 3 // 4 - 5]
+if fault == "doubled": frd += frd
+if fault == "nan shape": frd = frd.replace("-2.00000E+00", "         NaN")
+if fault == "stars": frd = frd.replace("-2.00000E+00", "************")
+if fault == "one part": frd = frd.replace("DISPI", "NDISP")
+if fault == "missing node": frd = frd.replace(" -1         2 5.0", " -9         2 5.0")
+for suffix, text in (("dat", dat), ("frd", frd)):
+    if text is not None: Path(f"{job}.{suffix}").write_text(text)
+print(said)
+sys.exit(code)
+"""
+
+
+def folder_for(tmp_path: Path, fault: str) -> Path:
+    """A folder as `CalculiX.write` leaves it, run by a stand-in for ccx with ``fault``."""
+    tools, folder = tmp_path / "tools", tmp_path / "run"
+    tools.mkdir(parents=True)
+    folder.mkdir()
+    (tools / "ccx.py").write_text(STAND_IN)
+    (tools / "dat").write_text(DAT)
+    (tools / "frd").write_text(FRD)
+    (folder / "sector.inp").write_text(SECTOR)
+    (folder / "modes_1.inp").write_text(DECK)
+    command = f"'{sys.executable}' '{tools / 'ccx.py'}' '{fault}'"
+    (folder / "calculix.json").write_text(json.dumps({"command": command, "parallel": 1}))
+    return folder
+
+
+def evaluate(folder: Path, time_limit_s: float = 30.0) -> dict:
+    solver = CalculiX()
+    solver.run(folder, time_limit_s)
+    return solver.read(folder)
+
+
+@pytest.mark.parametrize("place", ["plain", "with blanks and ümlauts", "long" * 30])
+def test_whole_results_are_read(tmp_path: Path, place: str) -> None:
+    folder = folder_for(tmp_path / place, "none")
+    answer = evaluate(folder)
+    (mode,) = answer["modes"]
+    assert mode["frequency_Hz"] == pytest.approx(np.sqrt(1e5) / (2 * np.pi), rel=1e-12)
+    assert (mode["n"], mode["multiplicity"]) == (1, 2)
+    assert answer["mass_kg"] == pytest.approx(60 * 0.213091)
+    assert answer["pressure_Pa"] == 240000.0
+    assert answer["nodes"].tolist() == [1, 2]
+    np.testing.assert_allclose(answer["points"], [[0.3, -0.1], [0.3, 0.1]])
+    np.testing.assert_allclose(answer["displacement"], [[0.001, 0, 0], [0, 0, 0]])
+    shape = np.array([v for _, v in REAL]) + 1j * np.array([v for _, v in IMAGINARY])
+    expected = shape * 1j * np.sqrt(2 / 60)  # -4i, the largest, becomes real and positive
+    np.testing.assert_allclose(mode["amplitude"], expected, atol=1e-12)
+    assert (folder / "modes_1.log").exists() and (folder / "modes_1.frd").exists()
+
+
+@pytest.mark.parametrize(
+    ("fault", "cause", "words"),
+    [
+        ("crash", "crashed", "ended with code 139"),
+        ("code", "crashed", "code 201.*a node is wrong"),
+        ("cutbacks", "no_equilibrium", "too many cutbacks"),
+        ("error", "crashed", "a is wrong"),
+        ("unfinished", "crashed", "before its end"),
+        ("silent", "no_results", "left no modes_1.dat"),
+        ("no shapes", "no_results", "left no modes_1.frd"),
+        ("empty", "no_results", "left no modes_1.dat"),
+        ("fewer", "no_results", "1 of 2 modes"),
+        ("zeros", "no_results", "eigenvalues are 0"),
+        ("nan", "no_results", "eigenvalues are nan"),
+        ("negative", "unstable", "-100000"),
+        ("unpaired", "no_results", "pairs"),
+        ("cut", "no_results", "cut off"),
+        ("doubled", "no_results", "two runs"),
+        ("nan shape", "no_results", "no shape"),
+        ("stars", "no_results", "not a number"),
+        ("one part", "no_results", "lacks shapes"),
+        ("missing node", "no_results", "nodes are missing"),
+    ],
+)
+def test_a_failure_is_typed_and_never_a_number(
+    tmp_path: Path, fault: str, cause: str, words: str
+) -> None:
+    folder = folder_for(tmp_path, fault)
+    for suffix, text in (("dat", DAT), ("frd", FRD)):  # whole results of an older run
+        (folder / f"modes_1.{suffix}").write_text(text)
+    with pytest.raises(RunFailed, match=words) as failure:
+        evaluate(folder)
+    assert failure.value.cause == cause
+
+
+def test_a_run_that_hangs_is_ended(tmp_path: Path) -> None:
+    with pytest.raises(RunFailed, match=r"time limit.*Newton goes on") as failure:
+        evaluate(folder_for(tmp_path, "hang"), 2.0)
+    assert failure.value.cause == "timed_out"
+
+
+def test_a_command_that_is_not_there(tmp_path: Path) -> None:
+    folder = folder_for(tmp_path, "none")
+    (folder / "calculix.json").write_text('{"command": "no-such-ccx", "parallel": 2}')
+    with pytest.raises(RunFailed, match="cannot start 'no-such-ccx'"):
+        evaluate(folder)
+
+
+def main_case(**options: object) -> LoadedCase:
+    """The paper's tyre with options of the solver."""
+    loaded = load_case(CASES / "p235_75r17.yaml")
+    solver = loaded.case.solver.model_copy(update={"name": "calculix", "options": options})
+    return LoadedCase(
+        loaded.case.model_copy(update={"solver": solver}),
+        loaded.path, loaded.section, loaded.folder, loaded.raw,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"comand": "ccx"}, "no 'comand'"),
+        ({"command": ""}, "must be a command"),
+        ({"parallel": 0}, "must be 1 or more"),
+        ({"parallel": True}, "must be 1 or more"),
+    ],
+)
+def test_wrong_options_are_refused(tmp_path: Path, options: dict, words: str) -> None:
+    with pytest.raises(Refused, match=words):
+        CalculiX().write(Decks(main_case(**options)), tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"element": "C3D4"}, "must be C3D20R or C3D8"),
+        ({"ply_thickness_m": "thin"}, "must be a thickness"),
+        ({"ply_thickness_m": 2e-3}, "do not fit.*folds over"),
+    ],
+)
+def test_decks_that_cannot_be_written(options: dict, words: str) -> None:
+    with pytest.raises(TemplateFailed, match=words):
+        Decks(main_case(**options)).texts("calculix")
+
+
+def test_a_vibration_frequency_is_refused(tmp_path: Path) -> None:
+    case = with_values(main_case(), {})
+    analysis = case.case.analysis.model_copy(update={"vibration_frequency_Hz": 50.0})
+    case = LoadedCase(
+        case.case.model_copy(update={"analysis": analysis}),
+        case.path, case.section, case.folder, case.raw,
+    )  # fmt: skip
+    with pytest.raises(DeckRefused, match="vibration_frequency_Hz must be null"):
+        Door(case, "calculix", folder=tmp_path).evaluate(Question({}))
+
+
+def test_decks_have_one_diameter_each_and_half_the_pressure() -> None:
+    """What three silent traps of ccx 2.20 demand, and the plies' stiffness and mass."""
+    texts = Decks(main_case(), {}, modes_per_harmonic=3).texts("calculix")
+    assert list(texts) == ["sector.inp", *(f"modes_{n}.inp" for n in range(5))]
+    for n in range(5):
+        deck = texts[f"modes_{n}.inp"]
+        assert deck.count("*FREQUENCY\n6\n") == 1
+        assert f"NMIN={n}, NMAX={n}\n" in deck
+        first, second = deck.split("*STEP, PERTURBATION")
+        assert "CAVITY, P6, 240000\n" in first and "CAVITY, P6, 120000\n" in second
+    lines = texts["sector.inp"].splitlines()
+    start = lines.index("*MATERIAL, NAME=BELT_1_8")
+    values = [float(x) for x in ",".join(lines[start + 2 : start + 5]).split(",")]
+    k = 172.2e9 * 2.118683e-7 / (1.16e-3 * 2e-4)
+    # near the crown, 70 degrees from the meridian: theta theta theta theta is sin^4
+    assert len(values) == 21
+    assert values[2] == pytest.approx(k * np.sin(np.radians(70)) ** 4, rel=1e-4)
+    assert values[5] == pytest.approx(k * np.cos(np.radians(70)) ** 4, rel=2e-3)
+    density = float(lines[lines.index("*DENSITY", start) + 1])
+    assert density == pytest.approx(5900 * 2.118683e-7 / (1.16e-3 * 2e-4))
+
+
+def coarse_case(folder: Path) -> Path:
+    """A small model of the paper's tyre: half the elements, two diameters."""
+    text = (CASES / "p235_75r17.yaml").read_text()
+    for old, new in (
+        ("{crown: 8, upper_sidewall: 8, lower_sidewall: 8, bead: 2}",
+         "{crown: 6, upper_sidewall: 6, lower_sidewall: 6, bead: 1}"),
+        ("rows: [1, 1, 1, 3]", "rows: [1, 1, 1, 1]"),
+        ("grading: [1.0, 1.0, 1.0, 0.7]", "grading: null"),
+        ("highest_harmonic: 4", "highest_harmonic: 1"),
+        ("pressure_kPa: 240.0", "pressure_kPa: 100.0"),
+        ("modes_per_harmonic: 2", "modes_per_harmonic: 2"),
+    ):  # fmt: skip
+        assert old in text
+        text = text.replace(old, new)
+    text = text[: text.index("targets:")] + text[text.index("solver:") :]
+    path = folder / "p235_75r17.yaml"
+    path.write_text(text)
+    return path
+
+
+@needs_ccx
+def test_calculix_agrees_with_the_bundled_solver(case_folder: Path) -> None:
+    """In a folder with a blank, of which ccx itself cannot write to the absolute path."""
+    case = load_case(coarse_case(case_folder))
+    values = start_values(case)
+    ours = Door(case).evaluate(Question(values))
+    theirs = Door(case, "calculix", folder=case_folder / "runs").evaluate(Question(values))
+    assert theirs.mass_kg == pytest.approx(ours.mass_kg, rel=3e-3)
+    assert abs(theirs.displacement).max() == pytest.approx(abs(ours.displacement).max(), rel=0.05)
+    known = {mode.label: mode.frequency_Hz for mode in label_modes(ours.modes)}
+    found = {mode.label: mode.frequency_Hz for mode in label_modes(theirs.modes)}
+    assert found.keys() == known.keys()
+    assert found == pytest.approx(known, rel=0.01)
+
+
+@needs_ccx
+@pytest.mark.parametrize(
+    ("template", "old", "new", "cause"),
+    [
+        ("sector.inp.j2", "*TIE, NAME", "*NO_SUCH_KEYWORD, NAME", "crashed"),
+        ("sector.inp.j2", "*SOLID SECTION, ELSET={{ solid.set }}, MATERIAL={{ solid.material }}",
+         "*SOLID SECTION, ELSET={{ solid.set }}, MATERIAL=NO_SUCH", "crashed"),
+        ("sector.inp.j2", "{{ rubber.C10 | number }}", "nan", "crashed"),
+        ("diameter.inp.j2", "U\n*END STEP\n", "U\n", "no_results"),
+    ],
+)  # fmt: skip
+def test_decks_that_ccx_rejects(
+    case_folder: Path, template: str, old: str, new: str, cause: str
+) -> None:
+    from importlib.resources import files
+
+    path = coarse_case(case_folder)
+    text = path.read_text().replace("highest_harmonic: 1", "highest_harmonic: 0")
+    path.write_text(text + "\ntemplates: own\n")
+    (case_folder / "own").mkdir()
+    text = (Path(str(files("tyrecal_templates") / "calculix")) / template).read_text()
+    assert old in text
+    (case_folder / "own" / template).write_text(text.replace(old, new))
+    with pytest.raises(EvaluationFailed) as failure:
+        Door(load_case(path), "calculix").evaluate(Question({"pressure_kPa": 0.0}))
+    assert failure.value.cause == cause

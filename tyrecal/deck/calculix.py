@@ -1,0 +1,131 @@
+"""Names for CalculiX's deck templates: one sector, plies as thin anisotropic solids."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..case import LoadedCase
+from ..tyre.section import SectionError
+from .context import claimed, deck_name, gauged_section, solid_claims
+from .environment import TemplateFailed
+from .sector import INNER_FACE, Sector, build_sector
+
+ELEMENTS = ("C3D20R", "C3D8")
+PLY_THICKNESS_M = 2e-4
+FILLER = 1e-6  # of a ply's stiffness, isotropic, so that its tensor is not singular
+PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))  # CalculiX's order of components
+FIRST_PLY = 1000000
+
+
+def calculix_context(case: LoadedCase) -> dict[str, Any]:
+    """Names for the templates, the same for every nodal diameter. Raises TemplateFailed."""
+    c = case.case
+    element = c.solver.options.get("element", ELEMENTS[0])
+    thickness = c.solver.options.get("ply_thickness_m", PLY_THICKNESS_M)
+    if element not in ELEMENTS:
+        raise TemplateFailed(f"solver.options.element is '{element}', must be C3D20R or C3D8")
+    if not isinstance(thickness, float) or not 0 < thickness < 1:
+        raise TemplateFailed(
+            f"solver.options.ply_thickness_m is '{thickness}', must be a thickness in m"
+        )
+    level = c.mesh.levels[c.mesh.level]
+    try:
+        sector = build_sector(
+            gauged_section(case),
+            tuple(level.elements[name] for name, _ in case.section.regions),
+            tuple(level.rows),
+            tuple(level.grading) if level.grading else None,
+            element != "C3D8",
+            c.analysis.sectors,
+            thickness,
+        )
+    except SectionError as error:
+        raise TemplateFailed(f"plies of {thickness} m do not fit: {error}") from None
+    return {
+        "name": c.name,
+        "element": element,
+        "sectors": c.analysis.sectors,
+        "sector": sector,
+        "inner_face": INNER_FACE,
+        "solids": _solids(case, sector),
+        "rubbers": _rubbers(case),
+        "plies": _plies(case, sector, thickness),
+        "pressure": c.pressure_kPa * 1e3,
+    }
+
+
+def _solids(case: LoadedCase, sector: Sector) -> list[dict[str, Any]]:
+    level = case.case.mesh.levels[case.case.mesh.level]
+    claims, rows = solid_claims(case), tuple(level.rows)
+    blocks: dict[int, list[tuple[int, ...]]] = {}
+    for number, nodes in sector.bricks.items():
+        region, row = sector.regions[number], sector.rows[number]
+        entry = claimed(claims, case.section.names, rows, region, row)
+        if entry is not None:
+            blocks.setdefault(entry, []).append((number, *nodes))
+    return [
+        {
+            "set": f"SOLID_{entry + 1}",
+            "material": deck_name(case.case.solids[entry].material),
+            "elements": elements,
+        }
+        for entry, elements in sorted(blocks.items())
+    ]
+
+
+def _rubbers(case: LoadedCase) -> list[dict[str, Any]]:
+    """Constants in the static state: CalculiX has no viscoelasticity for hyperelastic rubber."""
+    rubbers = []
+    for name, m in case.case.materials.items():
+        if m.kind != "rubber":
+            continue
+        shear, bulk = 1 - sum(t.g for t in m.prony), 1 - sum(t.k for t in m.prony)
+        if m.moduli == case.case.analysis.static_moduli:
+            shear = bulk = 1.0
+        elif m.moduli == "long_term":
+            shear, bulk = 1 / shear, 1 / bulk
+        rubbers.append(
+            {
+                "name": deck_name(name),
+                "C10": m.C10_Pa * shear,
+                "C01": m.C01_Pa * shear,
+                "D1": m.D1_per_Pa / bulk,
+                "density": m.density_kg_per_m3,
+            }
+        )
+    return rubbers
+
+
+def _plies(case: LoadedCase, sector: Sector, thickness: float) -> list[dict[str, Any]]:
+    """One material a layer and strip: stiffness E A / (s t) along the cords, their mass."""
+    plies, number = [], FIRST_PLY
+    for name, layer in case.case.rebar_layers.items():
+        cord: Any = case.case.materials[layer.material]
+        angle = np.radians(layer.angle_deg)
+        for k, (element, (r, z), radius) in enumerate(sector.strips[layer.line], start=1):
+            number += 1
+            spacing = layer.spacing_m or np.radians(layer.spacing_deg or 0.0) * radius
+            share = layer.area_m2 / (spacing * thickness)
+            along = np.array([np.cos(angle) * r, np.sin(angle), np.cos(angle) * z])
+            plies.append(
+                {
+                    "name": f"{deck_name(name)}_{k}",
+                    "element": (number, *sector.bricks[element]),
+                    "stiffness": _tensor(cord.youngs_modulus_Pa * share, along),
+                    "density": cord.density_kg_per_m3 * share,
+                }
+            )
+    return plies
+
+
+def _tensor(stiffness: float, along: np.ndarray) -> list[float]:
+    """The 21 components of ``stiffness`` (Pa) f f f f in r, theta, z, with the filler."""
+    components = []
+    for column, (k, m) in enumerate(PAIRS):
+        for i, j in PAIRS[: column + 1]:
+            ffff = along[i] * along[j] * along[k] * along[m]
+            shear = ((i == k) * (j == m) + (i == m) * (j == k)) / 2
+            components.append(float(stiffness * (ffff + FILLER * shear)))
+    return components
