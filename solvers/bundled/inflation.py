@@ -32,7 +32,6 @@ class InflationFailed(ArithmeticError):
             f"inflation stopped at {reached * pressure / 1e3:.4g} of"
             f" {pressure / 1e3:.4g} kPa: {why}"
         )
-        self.reached_Pa = reached * pressure
 
 
 @dataclass
@@ -60,7 +59,7 @@ def equilibrium(
     Raises InflationFailed with the pressure that was reached.
     """
     solve = _Solver(model, numbering, loads)
-    U = solve(start, 1.0, 1.0, QUICK) if loads else solve(start, 1.0, 1.0, LONGEST)
+    U = solve(start, 1.0, 1.0, QUICK if loads else LONGEST)
     if U is None:
         check()
         U = _by_stiffness(solve, start, check)

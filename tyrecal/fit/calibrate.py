@@ -96,14 +96,8 @@ def _run(problem: Problem, start: Array, method: str) -> StartReport:
     first = problem.evaluate(start)
     outcome = METHODS[method](problem, start, TOLERANCE)
     converged = slsqp.is_converged(problem, outcome.point, 10 * TOLERANCE)
-    history = _history(problem)
-    return StartReport(
-        dict(first.values),
-        outcome.point,
-        outcome.message,
-        converged,
-        history,
-    )
+    values, history = dict(first.values), _history(problem)
+    return StartReport(values, outcome.point, outcome.message, converged, history)
 
 
 def _more_starts(
