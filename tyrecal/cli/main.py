@@ -19,6 +19,7 @@ COMMANDS = {  # name: one line of help, so that the overview imports no command
     "deck": "Write the decks of a case, to read or to run elsewhere.",
     "modes": "Evaluate one design: frequencies with their labels.",
     "fit": "Calibrate the case's variables to its target frequencies.",
+    "sweep-pressure": "Follow every mode over the inflation pressure.",
     "solvers": "List the installed solvers and what they can do.",
     "store": "Look at a record of evaluations, check it, prune it.",
 }
@@ -34,7 +35,7 @@ class Commands(click.Group):
     def get_command(self, ctx: click.Context, name: str) -> click.Command | None:
         if name not in COMMANDS:
             return None
-        command: click.Command = import_module(f"tyrecal.cli.{name}").command
+        command: click.Command = import_module(f"tyrecal.cli.{name.replace('-', '_')}").command
         return command
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 from ..evaluate.results import RawMode
 
+FAMILIES = ("in-plane", "out-of-plane")
+
 
 @dataclass(frozen=True, order=True)
 class Label:
@@ -19,6 +21,14 @@ class Label:
     c: int
     m: int
     kind: str | None = None
+
+    @property
+    def family(self) -> str | None:
+        """``in-plane``: [c,0] and [0,0] torsional; ``out-of-plane``: [c,1] and [0,0] axial, which
+        move the belt likewise; None: overtones, and modes across the belt."""
+        if self.c == 0:
+            return {"torsional": FAMILIES[0], "axial": FAMILIES[1]}.get(self.kind or "")
+        return FAMILIES[self.m] if self.m < 2 else None
 
     def __str__(self) -> str:
         return f"[{self.c},{self.m}]" + (f" {self.kind}" if self.kind else "")

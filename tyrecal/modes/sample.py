@@ -1,4 +1,4 @@
-"""Harmonic shapes sampled on rings of points."""
+"""Harmonic shapes sampled on rings of points, and back."""
 
 from __future__ import annotations
 
@@ -28,3 +28,23 @@ def on_rings(shape: HarmonicShape, nodes: Array, angles: Array, phase: float = 0
     R, Z = np.repeat(shape.points[rows], len(turn), axis=0).T
     points = np.column_stack([R, np.tile(angles, len(rows)), Z])
     return RingShape(points, displacement.reshape(-1, 3))
+
+
+def harmonic_of(shape: RingShape, n: int) -> HarmonicShape:
+    """The harmonic shape of which ``shape`` is a sample, by least squares ring by ring.
+
+    Rings: points of one R and Z (to 10 micrometres); its nodes are the rings' numbers. One half
+    of a pair tells the whole amplitude, but for its phase. A component that was not measured on
+    a ring is 0 there.
+    """
+    places, ring = np.unique(np.round(shape.points[:, [0, 2]], 5), axis=0, return_inverse=True)
+    angle = n * shape.points[:, 1]
+    basis = np.column_stack([np.cos(angle), -np.sin(angle)])
+    amplitude = np.zeros((len(places), 3), complex)
+    for k in range(len(places)):
+        for component, u in enumerate(shape.displacement.T):
+            rows = (ring.ravel() == k) & np.isfinite(u)
+            if rows.any():
+                real, imaginary = np.linalg.lstsq(basis[rows], u[rows], rcond=None)[0]
+                amplitude[k, component] = real + 1j * imaginary
+    return HarmonicShape(n, np.arange(len(places)), places, amplitude)

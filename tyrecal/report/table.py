@@ -76,6 +76,41 @@ def fit_csv(fit: Mapping[str, Any]) -> str:
     return text.getvalue()
 
 
+def sweep_table(rows: Sequence[Mapping[str, Any]], findings: Mapping[str, Any]) -> Table:
+    """One design's modes: Hz at both ends of the sweep, rise, slopes at both ends, curvature."""
+    first, last = ({_key(mode): mode for mode in row["modes"]} for row in (rows[0], rows[-1]))
+    low, high = findings["from_kPa"], findings["to_kPa"]
+    table = _table(("mode", "motion", f"Hz, {low:g} kPa", f"{high:g} kPa", "rise Hz", "rise %",
+                    "slope", f"{high:g} kPa", "curvature"))  # fmt: skip
+    table.title = findings["design"]
+    table.caption = f"slope: d ln f / d ln p, at {low:g} and {high:g} kPa"
+    for mode in findings["modes"]:
+        ends = first[_key(mode)], last[_key(mode)]
+        _add(
+            table,
+            *_named(ends[0]),
+            *(f"{end['frequency_Hz']:.2f}" for end in ends),
+            f"{mode['rise_Hz']:+.2f}",
+            f"{mode['rise_percent']:+.1f}",
+            *(NONE if e["d_ln_f_d_ln_p"] is None else f"{e['d_ln_f_d_ln_p']:.3f}" for e in ends),
+            Text(mode["curvature"], "" if mode["curvature"] == "concave" else "yellow"),
+        )
+    return table
+
+
+def sweep_csv(rows: Sequence[Mapping[str, Any]]) -> str:
+    """The rows of pressure_sweep.json as CSV, a line a mode, all digits."""
+    keys = ("c", "m", "kind", "multiplicity", "frequency_Hz", "d_ln_f_d_ln_p")
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(["design", "pressure_kPa", *keys])
+    for row in rows:
+        for mode in row["modes"]:
+            cells = ["" if mode[key] is None else mode[key] for key in keys]
+            writer.writerow([row["design"], row["pressure_kPa"], *cells])
+    return text.getvalue()
+
+
 SOLVER_COLUMNS = ("solver", "version", "decks", "can do")
 
 
@@ -92,7 +127,7 @@ def _table(columns: tuple[str, ...]) -> Table:
     # figures never break: on a narrow terminal only names and words do
     table = Table(box=box.SIMPLE_HEAD, padding=(0, 0, 0, 1), pad_edge=False, show_edge=False)
     for name in columns:
-        figures = name not in ("mode", "motion", *SOLVER_COLUMNS)
+        figures = name not in ("mode", "motion", "curvature", *SOLVER_COLUMNS)
         table.add_column(name, justify="right" if figures else "left", no_wrap=figures,
                          overflow="fold")  # fmt: skip
     return table
@@ -110,3 +145,7 @@ def _named(mode: Mapping[str, Any]) -> tuple[str, str]:
 
 def _colour(deviation: float) -> str:
     return "green" if abs(deviation) < 2 else "yellow" if abs(deviation) < 5 else "red"
+
+
+def _key(mode: Mapping[str, Any]) -> tuple[int, int, str | None]:
+    return mode["c"], mode["m"], mode["kind"]

@@ -1,0 +1,251 @@
+"""tyrecal sweep-pressure: against the reference, whatever fails, the same bytes every time."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tyrecal.evaluate.door import Door, Question
+from tyrecal.evaluate.failure import EvaluationFailed
+from tyrecal.evaluate.results import Evaluation
+
+from ..conftest import CASES, ROOT
+from ..solvers import test_abaqus
+from .test_cli import CASE, run
+
+REFERENCE = json.loads((ROOT / "tests/data/reference.json").read_text())["sections"]
+RESULTS = ("pressure_sweep.json", "pressure_sweep.csv", "pressure_sweep.png")
+VARIABLES = ("A_belt", "A_carcass", "C10")
+coarse = test_abaqus.coarse
+
+
+def key(mode: dict[str, Any]) -> str:
+    return ",".join(str(mode[k]) for k in ("c", "m", "kind") if mode[k] is not None)
+
+
+def result(out: Path) -> dict[str, Any]:
+    return json.loads((out / "pressure_sweep.json").read_text())
+
+
+def fit_of(point: dict[str, Any], path: Path) -> str:
+    """A fit.json that ended at a point of the reference, with the reference's frequencies."""
+    modes = []
+    for text, frequency in point["modes"].items():
+        c, m, *kind = text.split(",")
+        modes.append({"c": int(c), "m": int(m), "kind": kind[0] if kind else None,
+                      "fitted_Hz": frequency})  # fmt: skip
+    fit = {"variables": {v: {"value": point[v]} for v in VARIABLES}, "fixed": {},
+           "modes": modes, "pressure_kPa": point["pressure_kPa"]}  # fmt: skip
+    path.write_text(json.dumps(fit))
+    return str(path)
+
+
+@pytest.mark.parametrize("name", sorted(REFERENCE))
+def test_both_designs_against_the_reference(
+    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Every mode at 100, 160, 200, 240, 320 kPa (fitted: 240) within 0.2 % (0.5 % asked for)."""
+    fit = fit_of(REFERENCE[name][1], tmp_path / "fit.json")
+    out = tmp_path / "out"
+    assert run("sweep-pressure", str(CASES / f"{name}.yaml"), "--output", str(out),
+               "--fitted", fit) == 0  # fmt: skip
+    found = result(out)
+    assert [row["pressure_kPa"] for row in found["rows"]] == [*range(100, 321, 20)] * 2
+    compared = 0
+    for design, points in (("initial", [0, 2, 3, 4, 5]), ("fitted", [1])):
+        for point in (REFERENCE[name][i] for i in points):
+            (row,) = (
+                row
+                for row in found["rows"]
+                if (row["design"], row["pressure_kPa"]) == (design, point["pressure_kPa"])
+            )
+            modes = {key(mode): mode["frequency_Hz"] for mode in row["modes"]}
+            assert set(modes) == {*point["modes"], "4,1"}
+            for text, frequency in point["modes"].items():
+                assert modes[text] == pytest.approx(frequency, rel=2e-3), (design, text)
+                compared += 1
+    assert compared == 6 * 9
+    for findings in found["findings"]:
+        assert all(m["rises"] and m["curvature"] == "concave" for m in findings["modes"])
+        assert all(each["grows_with_c"] for each in findings["families"])
+        assert findings["disagreements"] == [] and findings["least_mac"] > 0.9
+    said = capsys.readouterr().out
+    assert "fitted: every mode rises from 100 to 320 kPa" in said
+    assert "fitted: labels stay with the shapes throughout" in said
+    lines = (out / "pressure_sweep.csv").read_text().splitlines()
+    assert len(lines) == 1 + 2 * 12 * 10
+    assert lines[0] == "design,pressure_kPa,c,m,kind,multiplicity,frequency_Hz,d_ln_f_d_ln_p"
+
+
+def test_exact_slopes_are_those_of_the_frequencies(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Between 199 and 201 kPa, against the difference of the logarithms: 1e-5."""
+    arguments = ["--from-kPa", "199", "--to-kPa", "201", "--steps", "3", "--no-pictures"]
+    assert run("sweep-pressure", CASE, "--output", str(tmp_path), *arguments, "--json") == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found == result(tmp_path) and found["slopes"] == "exact"
+    assert not (tmp_path / "pressure_sweep.png").exists()
+    below, at, above = ({key(m): m for m in row["modes"]} for row in found["rows"])
+    for text, mode in at.items():
+        rise = math.log(above[text]["frequency_Hz"] / below[text]["frequency_Hz"])
+        assert mode["d_ln_f_d_ln_p"] == pytest.approx(rise / math.log(201 / 199), rel=1e-5), text
+
+
+def test_a_solver_in_three_dimensions_without_slopes(
+    coarse: Callable[..., Path], tmp_path: Path
+) -> None:
+    """Shapes on rings, pairs apart and turned; slopes by differences near the exact ones."""
+    case, found = str(coarse()), {}
+    for solver in ("abaqus", "bundled"):
+        out = tmp_path / solver
+        assert run("sweep-pressure", case, "--solver", solver, "--output", str(out), "--quiet",
+                   "--from-kPa", "200", "--to-kPa", "240", "--steps", "3") == 0  # fmt: skip
+        found[solver] = result(out)
+    assert (found["abaqus"]["slopes"], found["bundled"]["slopes"]) == ("differences", "exact")
+    for theirs, ours in zip(found["abaqus"]["rows"], found["bundled"]["rows"], strict=True):
+        modes = {key(mode): mode for mode in theirs["modes"]}
+        for mode in ours["modes"]:
+            other = modes[key(mode)]
+            assert other["frequency_Hz"] == pytest.approx(mode["frequency_Hz"], rel=1e-6)
+            assert other["d_ln_f_d_ln_p"] == pytest.approx(mode["d_ln_f_d_ln_p"], rel=0.02)
+            assert other["multiplicity"] == mode["multiplicity"]
+    (findings,) = found["abaqus"]["findings"]
+    assert findings["disagreements"] == [] and findings["least_mac"] > 0.99
+
+
+def test_jobs_and_the_record_change_no_byte(tmp_path: Path) -> None:
+    fit = fit_of(REFERENCE["p235_75r17"][1], tmp_path / "fit.json")
+    arguments = ["sweep-pressure", CASE, "--fitted", fit, "--steps", "3", "--quiet", "--output"]
+    one, two = tmp_path / "one", tmp_path / "two"
+    assert run(*arguments, str(one)) == 0
+    assert run(*arguments, str(two), "--jobs", "2") == 0
+    first = {name: (one / name).read_bytes() for name in RESULTS}
+    assert {name: (two / name).read_bytes() for name in RESULTS} == first
+    for out in (one, two):
+        facts = json.loads((out / "run.json").read_text())
+        assert (facts["solver_runs"], facts["answered_from_record"]) == (6, 0)
+        assert facts["command"] == "sweep-pressure" and not (out / "runs").exists()
+    lost = next(one.glob("record/*/*.record"))
+    lost.unlink()  # as if the first run had been killed before it
+    assert run(*arguments, str(one), "--jobs", "2") == 0
+    assert {name: (one / name).read_bytes() for name in RESULTS} == first
+    facts = json.loads((one / "run.json").read_text())
+    assert (facts["solver_runs"], facts["answered_from_record"]) == (1, 5)
+
+
+SOFT = ["--set", "A_carcass=1e-8", "--set", "C10=1e5"]  # has no equilibrium beyond 353 kPa
+
+
+@pytest.mark.parametrize("jobs", ["1", "2"])
+def test_a_pressure_that_fails_costs_no_other(
+    jobs: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    ends = ["--from-kPa", "100", "--to-kPa", "400", "--steps", "3", "--jobs", jobs]
+    assert run("sweep-pressure", CASE, "--output", str(out), *SOFT, *ends) == 3
+    printed, found = capsys.readouterr(), result(out)
+    assert [row["pressure_kPa"] for row in found["rows"]] == [100, 250]
+    (failed,) = found["failed"]
+    assert (failed["pressure_kPa"], failed["cause"]) == (400, "no_equilibrium")
+    (kept,) = (out / "runs").iterdir()
+    assert "error: initial, 400 kPa: inflation stopped at 353" in printed.err
+    assert str(kept) in printed.err and "1 of 3 evaluations failed" in printed.err
+    assert "from 100 to 250 kPa" in printed.out
+    assert (out / "pressure_sweep.png").exists()
+    assert kept.name not in (out / "pressure_sweep.json").read_text()
+
+
+def test_a_failure_amid_the_sweep(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Findings go on over the gap: the bows of uneven steps are still those of concave curves."""
+    evaluate = Door.evaluate
+
+    def moody(door: Door, question: Question) -> Evaluation:
+        if question.values["pressure_kPa"] == 140:
+            raise EvaluationFailed("timed_out", "ran out of time")
+        return evaluate(door, question)
+
+    monkeypatch.setattr(Door, "evaluate", moody)
+    arguments = ["--output", str(tmp_path), "--to-kPa", "180", "--steps", "5", "--quiet"]
+    assert run("sweep-pressure", CASE, *arguments) == 3
+    found = result(tmp_path)
+    assert [row["pressure_kPa"] for row in found["rows"]] == [100, 120, 160, 180]
+    assert found["failed"] == [{"design": "initial", "pressure_kPa": 140, "cause": "timed_out",
+                                "words": "ran out of time"}]  # fmt: skip
+    assert {mode["curvature"] for mode in found["findings"][0]["modes"]} == {"concave"}
+
+
+def test_nothing_is_written_where_every_pressure_fails(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    ends = ["--from-kPa", "400", "--to-kPa", "450", "--steps", "2"]
+    assert run("sweep-pressure", CASE, "--output", str(out), *SOFT, *ends) == 3
+    assert capsys.readouterr().err.count("inflation stopped at") == 2
+    assert not [name for name in RESULTS if (out / name).exists()]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--from-kPa", "320", "--to-kPa", "100"], "less than --to-kPa 100"),
+        (["--from-kPa", "200", "--to-kPa", "200"], "less than --to-kPa 200"),
+        (["--from-kPa", "-10"], "above 0"),
+        (["--from-kPa", "0"], "above 0"),
+        (["--from-kPa", "nan"], "finite"),
+        (["--to-kPa", "inf"], "finite"),
+        (["--to-kPa", "5000"], "2000"),
+        (["--to-kPa", "high"], "not a valid float"),
+        (["--steps", "1"], "2<=x"),
+        (["--steps", "2.5"], "not a valid int"),
+        (["--set", "pressure_kPa=200"], "--from-kPa"),
+        (["--set", "A_bolt=1"], "A_belt"),
+        (["--fitted", "no_such.json"], "does not exist"),
+        (["--fitted", CASE], "not the fit.json"),
+        (["--solver", "nastran"], "bundled"),
+        (["--mesh", "finest"], "refined"),
+    ],
+)
+def test_wrong_options(
+    arguments: list[str], words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    assert run("sweep-pressure", CASE, "--output", str(out), *arguments) == 2
+    printed = capsys.readouterr()
+    assert words in printed.err and "Traceback" not in printed.err and printed.out == ""
+    assert not out.exists()
+
+
+def test_a_fit_of_another_case_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    fit = fit_of(REFERENCE["p235_75r17_narrow_rim"][1], tmp_path / "fit.json")
+    out = tmp_path / "out"
+    assert run("sweep-pressure", CASE, "--output", str(out), "--fitted", fit) == 2
+    assert "is a fit of another case" in capsys.readouterr().err
+    assert not out.exists()
+
+
+def test_a_fit_is_taken_as_it_is_written(tmp_path: Path) -> None:
+    """The real fit.json, in the same folder; the sweep passes through its frequencies."""
+    out = ["--output", str(tmp_path), "--quiet"]
+    assert run("fit", CASE, *out, "--fix", "A_belt", "--no-pictures") == 0
+    assert run("sweep-pressure", CASE, *out, "--fitted", str(tmp_path / "fit.json"),
+               "--from-kPa", "220", "--to-kPa", "240", "--steps", "2") == 0  # fmt: skip
+    fit = json.loads((tmp_path / "fit.json").read_text())
+    last = result(tmp_path)["rows"][-1]
+    found = {key(mode): mode["frequency_Hz"] for mode in last["modes"]}
+    assert (last["design"], last["pressure_kPa"]) == ("fitted", 240)
+    for mode in fit["modes"]:
+        assert found[key(mode)] == pytest.approx(mode["fitted_Hz"], rel=1e-9)
+    assert result(tmp_path)["designs"]["fitted"]["A_belt"] == fit["fixed"]["A_belt"]
+
+
+def test_the_command_explains_itself(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("sweep-pressure", "--help") == 0
+    assert "--from-kPa" in capsys.readouterr().out

@@ -1,0 +1,63 @@
+"""Shapes followed from one state to the next, harmonic or sampled on rings."""
+
+import numpy as np
+import pytest
+
+from tyrecal.evaluate.results import HarmonicShape, RawMode
+from tyrecal.modes.follow import follow
+from tyrecal.modes.mode import Label, Mode
+from tyrecal.modes.sample import harmonic_of, on_rings
+
+ANGLES = np.arange(24) / 24 * 2 * np.pi
+NODES = np.arange(4)
+POINTS = np.array([[0.30, -0.1], [0.39, -0.05], [0.39, 0.05], [0.30, 0.1]])
+RNG = np.random.default_rng(2)
+
+
+def shape(n):
+    made = RNG.standard_normal((4, 3)) + 1j * RNG.standard_normal((4, 3)) * (n > 0)
+    return HarmonicShape(n, NODES, POINTS, made)
+
+
+def mode(label, made, ring_turn=None):
+    if ring_turn is not None:
+        made = on_rings(made, NODES, ANGLES, ring_turn)
+    return Mode(label, 50.0, 1, 1.0, 0, RawMode(50.0, made, 1))
+
+
+@pytest.mark.parametrize(("n", "phase"), [(0, 0.0), (1, 0.4), (3, 2.0)])
+def test_a_sample_gives_its_harmonic_shape_back(n, phase):
+    made = shape(n)
+    ring = on_rings(made, NODES, ANGLES, phase)
+    mixed = RNG.permutation(len(ring.points))
+    ring = type(ring)(ring.points[mixed], ring.displacement[mixed])
+    found = harmonic_of(ring, n)
+    order = np.lexsort(POINTS.T[::-1])
+    assert found.points == pytest.approx(POINTS[order])
+    assert found.amplitude == pytest.approx(made.amplitude[order] * np.exp(1j * phase))
+
+
+def test_a_component_that_was_not_measured_is_zero():
+    ring = on_rings(shape(2), NODES, ANGLES)
+    ring.displacement[:, 1] = np.nan
+    found = harmonic_of(ring, 2).amplitude
+    assert not found[:, 1].any() and found[:, [0, 2]].all()
+
+
+@pytest.mark.parametrize("turns", [(None, None), (0.3, 1.9)])
+def test_a_shape_is_followed_whatever_its_label_and_place(turns):
+    """Labels and order change places in one of two harmonics: the shapes tell."""
+    a, b, c = shape(2), shape(2), shape(3)
+    one, two, three = Label(2, 0), Label(2, 1), Label(3, 0)
+    before = [mode(x, y, turns[0]) for x, y in ((one, a), (two, b), (three, c))]
+    after = [mode(x, y, turns[1]) for x, y in ((three, c), (one, b), (two, a))]
+    steps = {step.before: step for step in follow(before, after)}
+    assert {k: s.after for k, s in steps.items()} == {one: two, two: one, three: three}
+    assert [s.mac for s in steps.values()] == pytest.approx([1.0, 1.0, 1.0])
+
+
+def test_a_mode_without_a_partner_ends():
+    a, b = shape(2), shape(2)
+    before = [mode(Label(2, 0), a), mode(Label(2, 1), b), mode(Label(4, 0), shape(4))]
+    (step,) = follow(before, [mode(Label(2, 3), b)])
+    assert (step.before, step.after) == (Label(2, 1), Label(2, 3))

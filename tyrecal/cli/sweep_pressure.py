@@ -1,0 +1,154 @@
+"""tyrecal sweep-pressure"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from . import options
+from .main import EXIT_SOLVER
+
+
+@click.command()
+@options.every(options.case_argument, options.assignments)
+@click.option("--from-kPa", "from_kPa", type=float, default=100.0, metavar="A", show_default=True,
+              help="Lowest pressure.")  # fmt: skip
+@click.option("--to-kPa", "to_kPa", type=float, default=320.0, metavar="B", show_default=True,
+              help="Highest pressure.")  # fmt: skip
+@click.option("--steps", type=click.IntRange(2, 10000), default=12, metavar="N",
+              show_default=True, help="Pressures, both ends among them.")  # fmt: skip
+@click.option(
+    "--fitted",
+    type=click.Path(path_type=Path, exists=True, dir_okay=False),
+    metavar="fit.json",
+    help="Sweep the design that 'tyrecal fit' found for this case, too.",
+)
+@click.option("--pictures/--no-pictures", default=True, help="Draw frequencies over pressure.")
+@options.every(
+    options.jobs,
+    options.mesh,
+    options.solver,
+    options.output,
+    options.store,
+    options.no_store,
+    options.as_json,
+    options.quiet,
+    options.verbose,
+)
+def command(
+    case: Path,
+    assignments: tuple[str, ...],
+    from_kPa: float,
+    to_kPa: float,
+    steps: int,
+    fitted: Path | None,
+    pictures: bool,
+    jobs: int,
+    mesh: str,
+    solver: str,
+    output: Path | None,
+    store: Path | None,
+    no_store: bool,
+    as_json: bool,
+    quiet: bool,
+    verbose: bool,
+) -> int:
+    """Follow every mode of CASE over the inflation pressure.
+
+    Writes pressure_sweep.json, .csv and .png: frequencies, their slopes d ln f / d ln p, and what
+    they say. --set NAME=VALUE on a variable changes the initial design, on any other number both.
+
+    \b
+    tyrecal sweep-pressure cases/p235_75r17.yaml
+    tyrecal sweep-pressure cases/p235_75r17.yaml --fitted p235_75r17/fit.json --jobs 2
+    tyrecal sweep-pressure cases/p235_75r17.yaml --from-kPa 180 --to-kPa 260 --steps 5 --json
+    """
+    from ..evaluate.door import Door
+    from ..fit.problem import read_targets
+    from ..report.pressure import draw_pressure_sweep
+    from ..report.table import sweep_csv, sweep_table
+    from ..studies.pressure import Failure, Outcome, sweep
+    from ..studies.pressure_result import sweep_result
+    from .output import Run, print_json, say, show
+
+    loaded, values = options.load(case, mesh, assignments, None)
+    pressures = _pressures(loaded, assignments, from_kPa, to_kPa, steps)
+    door = Door(loaded, solver)
+    adapter = door.solver
+    designs = {"initial": values}
+    if fitted:
+        designs["fitted"] = _fitted(fitted, loaded, solver)
+    run = Run(case, output, "sweep-pressure", adapter)
+    door.folder, door.keep = run.runs, verbose
+    door.store = run.open_store(store, no_store)
+
+    def notify(outcome: Outcome) -> None:
+        place = f"{outcome.design}, {outcome.pressure_kPa:g} kPa"
+        if isinstance(outcome, Failure):
+            click.secho(f"error: {place}: {outcome.failed}", fg="red", err=True)
+        elif verbose and not quiet:
+            click.echo(f"{place}: {len(outcome.modes)} modes", err=True)
+
+    outcomes = sweep(door, designs, pressures, jobs, notify)
+    failed = [each for each in outcomes if isinstance(each, Failure)]
+    if len(failed) == len(outcomes):
+        return EXIT_SOLVER
+    result = sweep_result(loaded, designs, outcomes)
+    run.write_json("pressure_sweep.json", result)
+    run.write_text("pressure_sweep.csv", sweep_csv(result["rows"]))
+    if pictures:
+        targets = {each.label: each.frequency_Hz for each in read_targets(loaded)}
+        picture = run.folder / "pressure_sweep.png"
+        draw_pressure_sweep(picture, result["rows"], targets, loaded.case.pressure_kPa)
+    run.finish(solver_runs=door.counts.runs, answered_from_record=door.counts.recorded)
+    if as_json:
+        print_json(result)
+    for found in [] if as_json else result["findings"]:
+        rows = [row for row in result["rows"] if row["design"] == found["design"]]
+        show(sweep_table(rows, found), as_json, quiet)
+        for sentence in found["words"]:
+            say(f"{found['design']}: {sentence}", as_json, quiet)
+    if failed:
+        text = f"error: {len(failed)} of {len(outcomes)} evaluations failed; the others are kept"
+        click.secho(text, fg="red", err=True)
+    say(f"results in {run.folder}", as_json, quiet)
+    return EXIT_SOLVER if failed else 0
+
+
+def _pressures(
+    loaded: Any, assignments: tuple[str, ...], low: float, high: float, steps: int
+) -> list[float]:
+    """The pressures of the sweep, kPa. Raises click.UsageError."""
+    from math import isfinite
+
+    import numpy as np
+
+    from ..case import parse_assignment, with_values
+    from ..studies.fitted import pressure_name
+
+    name = pressure_name(loaded)
+    if name in [parse_assignment(text)[0] for text in assignments]:
+        raise click.UsageError(
+            f"--set {name}: the sweep sets the pressure, by --from-kPa, --to-kPa"
+        )
+    for option, value in (("--from-kPa", low), ("--to-kPa", high)):
+        if not (isfinite(value) and value > 0):
+            raise click.UsageError(f"{option} {value:g}: must be a finite pressure above 0")
+        try:
+            with_values(loaded, {name: value})
+        except ValueError as error:
+            raise click.UsageError(f"{option} {value:g}: {error}") from None
+    if low >= high:
+        raise click.UsageError(f"--from-kPa {low:g} must be less than --to-kPa {high:g}")
+    return [round(float(p), 9) for p in np.linspace(low, high, steps)]
+
+
+def _fitted(path: Path, loaded: Any, solver: str) -> dict[str, float]:
+    from ..studies.fitted import NotThisFit, read_fitted
+
+    try:
+        return read_fitted(path, loaded, solver)
+    except NotThisFit as error:
+        raise click.UsageError(f"--fitted: {error}") from None

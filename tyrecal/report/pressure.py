@@ -1,0 +1,129 @@
+"""Frequencies and their slopes over the inflation pressure."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from ..modes.mode import FAMILIES, Label
+from .figure import COLOURS, GREY, in_house_style, new_figure, save
+
+LINES = {"initial": (0, (4, 2)), "fitted": "-"}
+MARKERS = "os^Dv<>P"
+GAP = 0.042  # of an axis' height between two labels' centres
+
+Curves = dict[Label, tuple[np.ndarray, np.ndarray, np.ndarray]]
+
+
+@in_house_style
+def draw_pressure_sweep(
+    path: Path,
+    rows: Sequence[Mapping[str, Any]],
+    targets: Mapping[Label, float] | None = None,
+    target_kPa: float = 0.0,
+) -> None:
+    """Draw frequency over pressure, one column a family, and below the slopes d ln f / d ln p.
+
+    rows: of pressure_sweep.json; a design "initial" is dashed, "fitted" solid; c has a colour and
+    a marker. targets: measured Hz by label at ``target_kPa``, crosses where that was swept.
+    """
+    swept = [row["pressure_kPa"] for row in rows]
+    if not min(swept) <= target_kPa <= max(swept):
+        targets = None
+    designs = {row["design"]: _curves(rows, row["design"]) for row in rows}
+    labels = sorted({label for curves in designs.values() for label in curves}, key=str)
+    columns = {name: [x for x in labels if x.family == name] for name in (*FAMILIES, None)}
+    shown = [name for name in columns if columns[name]]
+    figure = new_figure(1.2 + 4.2 * len(shown), 7.6)
+    grid = figure.subplots(2, len(shown), sharex=True, sharey="row", height_ratios=[5, 3],
+                           squeeze=False)  # fmt: skip
+    for (top, bottom), name in zip(grid.T, shown, strict=True):
+        top.set_title(name or "overtones, belt bends across", loc="left")
+        for design, curves in designs.items():
+            for label in columns[name]:
+                if label in curves:
+                    _draw(top, bottom, curves[label], design, label.c)
+        for label in columns[name]:
+            if targets and label in targets:
+                top.plot(target_kPa, targets[label], "kx", ms=7, mew=1.5, zorder=4)
+        bottom.axhline(0.5, color=GREY, lw=0.8, ls=":")
+        bottom.set_xlabel("inflation pressure, kPa")
+    top, bottom = grid[:, 0]
+    top.set_ylabel("frequency, Hz")
+    bottom.set_ylabel("d ln f / d ln p")
+    bottom.text(0.01, 0.5, "membrane: f ~ √p", color=GREY, va="bottom", fontsize=8,
+                transform=bottom.get_yaxis_transform())  # fmt: skip
+    top.set_ylim(bottom=0)
+    bottom.set_ylim(top=max(0.54, bottom.get_ylim()[1]))
+    for axes in grid.flat:
+        axes.grid(True, color="0.92", lw=0.6)
+    last = designs.get("fitted") or next(iter(designs.values()))
+    for axes_pair, name in zip(grid.T, shown, strict=True):
+        for axes, which in zip(axes_pair, (1, 2), strict=True):
+            _name_lines(axes, {x: last[x] for x in columns[name] if x in last}, which)
+    for design in designs:
+        top.plot([], [], color="k", ls=LINES.get(design, ":"), label=design)
+    if targets:
+        top.plot([], [], "kx", ms=7, mew=1.5, label="target")
+    top.legend(frameon=False, loc="upper left")
+    save(figure, path)
+
+
+def _draw(top: Axes, bottom: Axes, curve: Any, design: str, c: int) -> None:
+    style: dict[str, Any] = {
+        "color": COLOURS[c % len(COLOURS)],
+        "ls": LINES.get(design, ":"),
+        "marker": MARKERS[c % len(MARKERS)],
+        "ms": 4,
+        "lw": 1.4,
+        "mfc": "white" if design == "initial" else None,
+    }
+    p, f, slope = curve
+    top.plot(p, f, **style)
+    bottom.plot(p, slope, **{**style, "ms": 0 if len(p) > 1 else 4})
+
+
+def _curves(rows: Sequence[Mapping[str, Any]], design: str) -> Curves:
+    """Label to pressures (kPa), frequencies (Hz) and slopes of a design, each (row,)."""
+    found: dict[Label, list[tuple[float, float, float]]] = {}
+    for row in rows:
+        for mode in row["modes"] if row["design"] == design else []:
+            slope = mode["d_ln_f_d_ln_p"]
+            point = row["pressure_kPa"], mode["frequency_Hz"], np.nan if slope is None else slope
+            found.setdefault(Label(mode["c"], mode["m"], mode["kind"]), []).append(point)
+    return {label: tuple(np.array(points).T) for label, points in found.items()}
+
+
+def _name_lines(axes: Axes, curves: Curves, which: int) -> None:
+    """Labels right of the lines' ends, moved apart where they would touch."""
+    ends = sorted((float(curve[which][-1]), label) for label, curve in curves.items())
+    if not np.isfinite([y for y, _ in ends]).all():
+        return
+    low, high = axes.get_ylim()
+    place = _apart([(y - low) / (high - low) for y, _ in ends], GAP * (1 if which == 1 else 5 / 3))
+    for (y, label), height in zip(ends, place, strict=True):
+        axes.annotate(
+            str(label),
+            (float(curves[label][0][-1]), y),
+            xytext=(1.03, height),
+            textcoords="axes fraction",
+            va="center",
+            color=COLOURS[label.c % len(COLOURS)],
+            arrowprops={"arrowstyle": "-", "color": "0.75", "lw": 0.6, "shrinkB": 4, "shrinkA": 0},
+            annotation_clip=False,
+        )
+
+
+def _apart(heights: Sequence[float], gap: float) -> list[float]:
+    """Rising heights moved as little as is simple, so that neighbours are ``gap`` apart."""
+    place = list(heights)
+    for _ in range(100):
+        for i in range(1, len(place)):
+            close = gap - (place[i] - place[i - 1])
+            if close > 0:
+                place[i], place[i - 1] = place[i] + close / 2, place[i - 1] - close / 2
+    return place

@@ -1,0 +1,113 @@
+"""What a pressure sweep says: does every mode rise, by how much, bent which way, and do the labels
+stay with the shapes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from ..modes.follow import follow
+from ..modes.mode import FAMILIES, Label
+from .pressure import State
+
+STRAIGHT = 1e-6  # of a frequency: solvers that print them give seven digits
+
+
+def findings(states: Sequence[State], labels: Sequence[Label]) -> dict[str, Any]:
+    """Findings on one design's states by rising pressure, two at least; ``words`` has sentences."""
+    p = np.array([state.pressure_kPa for state in states])
+    table = {label: np.array([s.frequencies[label] for s in states]) for label in labels}
+    modes = [{"c": x.c, "m": x.m, "kind": x.kind, **_curve(p, table[x])} for x in labels]
+    rises = {label: float(f[-1] - f[0]) for label, f in table.items()}
+    families = [_family(name, rises) for name in FAMILIES]
+    steps = [
+        (before.pressure_kPa, after.pressure_kPa, step)
+        for before, after in pairwise(states)
+        for step in follow(before.modes, after.modes)
+        if step.before in table
+    ]
+    result: dict[str, Any] = {
+        "design": states[0].design,
+        "from_kPa": states[0].pressure_kPa,
+        "to_kPa": states[-1].pressure_kPa,
+        "modes": modes,
+        "families": [each for each in families if each["members"]],
+        "least_mac": min((step.mac for _, _, step in steps), default=1.0),
+        "disagreements": [
+            {"from_kPa": low, "to_kPa": high, "label": str(step.before),
+             "followed_to": str(step.after), "mac": step.mac}
+            for low, high, step in steps
+            if step.before != step.after
+        ],
+    }  # fmt: skip
+    result["words"] = _words(result, labels)
+    return result
+
+
+def _curve(p: np.ndarray, f: np.ndarray) -> dict[str, Any]:
+    """Of one mode: its rise, whether it rises at every step, and how it bends."""
+    weight = (p[2:] - p[1:-1]) / (p[2:] - p[:-2])
+    bow = f[1:-1] - (weight * f[:-2] + (1 - weight) * f[2:])  # above the neighbours' chord
+    up, down = bow > STRAIGHT * f[1:-1], bow < -STRAIGHT * f[1:-1]
+    return {
+        "rise_Hz": float(f[-1] - f[0]),
+        "rise_percent": float(100 * (f[-1] / f[0] - 1)),
+        "rises": bool((np.diff(f) > 0).all()),
+        "curvature": {(True, False): "concave", (False, True): "convex"}.get(
+            (bool(up.any()), bool(down.any())), "neither"
+        ),
+        "convex_at_kPa": [float(x) for x in p[1:-1][down]],
+    }
+
+
+def _family(name: str, rises: Mapping[Label, float]) -> dict[str, Any]:
+    """Whether the rise grows with c; exceptions: members that rise no more than the one before."""
+    members = [label for label in sorted(rises) if label.family == name]
+    hertz = [rises[label] for label in members]
+    exceptions = [str(x) for i, x in enumerate(members) if i and hertz[i] <= hertz[i - 1]]
+    return {
+        "family": name,
+        "members": [str(label) for label in members],
+        "rise_Hz": hertz,
+        "grows_with_c": not exceptions,
+        "exceptions": exceptions,
+    }
+
+
+def _words(found: Mapping[str, Any], labels: Sequence[Label]) -> list[str]:
+    modes = list(zip(map(str, labels), found["modes"], strict=True))
+    span = f"from {found['from_kPa']:g} to {found['to_kPa']:g} kPa"
+    falling = [name for name, mode in modes if not mode["rises"]]
+    words = [f"{_all_but('every mode rises', falling)} {span}"]
+    for each in found["families"]:
+        if len(each["members"]) > 1:
+            first, *_, last = (
+                f"{name} rises {hertz:.1f} Hz"
+                for name, hertz in zip(each["members"], each["rise_Hz"], strict=True)
+            )
+            grows = _all_but(f"{each['family']}, the rise grows with c", each["exceptions"])
+            words.append(f"{grows}: {first}, {last}")
+    bent = {name: mode["curvature"] for name, mode in modes if mode["curvature"] != "neither"}
+    if bent:
+        odd = [f"{name} ({bent.get(name, 'neither')})" for name, _ in modes
+               if bent.get(name) != "concave"]  # fmt: skip
+        words.append(_all_but("every curve is concave, steeper at low pressure", odd))
+    if not found["disagreements"]:
+        words.append(
+            "labels stay with the shapes throughout; least MAC between neighbouring pressures"
+            f" {found['least_mac']:.3f}"
+        )
+    for odd_step in found["disagreements"]:
+        words.append(
+            f"from {odd_step['from_kPa']:g} to {odd_step['to_kPa']:g} kPa the shape of"
+            f" {odd_step['label']} goes on under the label {odd_step['followed_to']}"
+            f" (MAC {odd_step['mac']:.2f})"
+        )
+    return words
+
+
+def _all_but(claim: str, exceptions: Sequence[str]) -> str:
+    return f"{claim}, but for {', '.join(exceptions)}" if exceptions else claim
