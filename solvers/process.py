@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import signal
 import subprocess
 from collections.abc import Mapping, Sequence
@@ -31,13 +32,14 @@ def run_command(
     """Run ``command`` (an argument list, no shell) in ``folder``; its exit code.
 
     All output goes to the file ``log`` there. The command gets a process group of its own, which
-    is ended as a whole when the time is over or this process is interrupted.
+    is ended as a whole when the time is over or this process is interrupted. Where this process
+    is killed outright, Linux ends the command, but not what the command has started.
     Raises RunFailed (``timed_out``, or ``crashed`` where the command cannot be started).
     """
     with (folder / log).open("wb") as output:
         try:
             process = subprocess.Popen(
-                command,
+                [*_leash(command[0]), *command],
                 cwd=folder,
                 stdin=subprocess.DEVNULL,
                 stdout=output,
@@ -58,6 +60,16 @@ def run_command(
         finally:
             if process.poll() is None:
                 _end(process)
+
+
+def _leash(program: str) -> list[str]:
+    """What a command starts with so that the kernel ends it with the thread that started it.
+
+    `run_command` waits in that thread. (util-linux; Python's preexec_fn is not safe in threads.)
+    Nothing where it is not installed, or where ``program`` is not: Popen then says so.
+    """
+    setpriv = shutil.which("setpriv") if shutil.which(program) else None
+    return [setpriv, "--pdeathsig", "KILL", "--"] if setpriv else []
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import shlex
+import shutil
 import subprocess
 import time
 from concurrent.futures import ThreadPoolExecutor
@@ -16,10 +17,10 @@ import numpy as np
 
 from ..process import RunFailed
 from .results import Fields, pairs, read_eigenvalues, read_fields, read_mass
-from .runner import run_job
+from .runner import clear, run_job
 
 Array = np.ndarray
-SECTOR, SETTINGS = "sector.inp", "calculix.json"
+SECTOR, SETTINGS, INFLATE = "sector.inp", "calculix.json", "inflate"
 OPTIONS: dict[str, Any] = {
     "command": "ccx",
     "parallel": 1,
@@ -78,16 +79,32 @@ class CalculiX:
         command = shlex.split(settings["command"])
         end = time.monotonic() + time_limit_s
 
-        def run_one(job: str) -> None:
-            run_job(folder, job, [SECTOR], command, max(0.0, end - time.monotonic()))
+        def run_one(job: str, *inputs: str) -> None:
+            run_job(folder, job, inputs, command, max(0.0, end - time.monotonic()))
 
-        jobs = [job for _, job in _jobs(folder)]
-        if settings["parallel"] == 1:
+        def run_modes(job: str) -> None:
+            start, ended = f"{job}.rin", f"{job}.rout"
+            shutil.copy(state, folder / start)
+            run_one(job, start)
+            for name in (start, ended):
+                (folder / name).unlink(missing_ok=True)
+
+        jobs, state = [job for _, job in _jobs(folder)], folder / f"{INFLATE}.rout"
+        for job in (INFLATE, *jobs):
+            clear(folder, job)
+        run_one(INFLATE, SECTOR)
+        if not state.exists() or not state.stat().st_size:
+            raise RunFailed("no_results", f"CalculiX left no {state.name}")
+        if settings["parallel"] == 1:  # in this thread, so that Ctrl-C ends ccx at once
             for job in jobs:
-                run_one(job)
-            return
-        with ThreadPoolExecutor(settings["parallel"]) as pool:
-            list(pool.map(run_one, jobs))
+                run_modes(job)
+        else:
+            pool = ThreadPoolExecutor(settings["parallel"])
+            try:
+                list(pool.map(run_modes, jobs))
+            finally:
+                pool.shutdown(cancel_futures=True)  # what has not begun, after a failure
+        state.unlink()
 
     def read(self, folder: Path) -> dict[str, Any]:
         """Results as plain data, shapes on the section at Theta = 0. Raises RunFailed."""
@@ -96,6 +113,8 @@ class CalculiX:
         if not jobs:
             raise RunFailed("no_results", "there are no decks in the folder")
         sectors = int(_find(r"\*CYCLIC SYMMETRY MODEL, *N=(\d+)", folder / SECTOR))
+        pressure = _find(r"\*DLOAD\s+CAVITY, *\w+, *(\S+)", folder / f"{INFLATE}.inp")
+        inflated = read_fields(folder / f"{INFLATE}.frd")
         for diameter, job in jobs:
             deck = folder / f"{job}.inp"
             asked = int(_find(r"\*FREQUENCY\s+(\d+)", deck))
@@ -113,13 +132,13 @@ class CalculiX:
                 for value, shape in zip(values, shapes, strict=True)
             ]
         return {
-            "pressure_Pa": float(_find(r"\*DLOAD\s+CAVITY, *\w+, *(\S+)", deck)),
-            "mass_kg": sectors * read_mass(folder / f"{job}.dat"),
+            "pressure_Pa": float(pressure),
+            "mass_kg": sectors * read_mass(folder / f"{INFLATE}.dat"),
             "modes": modes,
             "gradients": {},
-            "nodes": fields.nodes,
-            "points": fields.points[:, [0, 2]],
-            "displacement": fields.blocks[0][2],
+            "nodes": inflated.nodes,
+            "points": inflated.points[:, [0, 2]],
+            "displacement": inflated.blocks[0][2],
         }
 
 
@@ -148,7 +167,7 @@ def _shapes(fields: Fields, count: int, n: int, sectors: int, job: str) -> list[
     for mode in wanted:
         shape = found[mode]["DISP"] + 1j * found[mode]["DISPI"]
         largest = shape.ravel()[abs(shape).argmax()]
-        if not np.isfinite(shape).all() or not abs(largest) > 0:
+        if not abs(largest) > 0:
             raise RunFailed("no_results", f"{job}.frd: the shape of mode {mode} is no shape")
         turned = shape * abs(largest) / largest  # a pair's phase is arbitrary: make it definite
         shapes.append(turned * np.sqrt((2 if n else 1) / sectors))

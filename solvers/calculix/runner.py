@@ -10,28 +10,27 @@ from pathlib import Path
 
 from ..process import RunFailed, last_words, run_command
 
-RESULTS = ("dat", "frd", "sta", "cvg", "12d")
+RESULTS = ("dat", "frd", "sta", "cvg", "12d", "rout")
 LONGEST_PATH = 100  # ccx keeps 132 characters of a file's path, the file's name included
 NO_EQUILIBRIUM = re.compile(r"increment size smaller|too many cutbacks|max\. # of increments", re.I)
 
 
 def run_job(
-    folder: Path, job: str, includes: Sequence[str], command: Sequence[str], time_limit_s: float
+    folder: Path, job: str, inputs: Sequence[str], command: Sequence[str], time_limit_s: float
 ) -> None:
     """Run ``job``.inp of ``folder`` to its end; the results and ``job``.log stand beside it.
 
-    ``includes``: files that the deck reads. One thread: two are slower, and results of one are
+    ``inputs``: other files that it reads. One thread: two are slower, and results of one are
     the same to the last bit. Where ccx could not cope with the folder's path it runs elsewhere.
 
     Raises RunFailed: ``timed_out``, ``no_equilibrium``, ``crashed``.
     """
-    for suffix in (*RESULTS, "log"):  # results of another run must not pass for this one's
-        (folder / f"{job}.{suffix}").unlink(missing_ok=True)
+    clear(folder, job)
     if _is_safe(folder):
         _run(folder, job, command, time_limit_s)
         return
     with tempfile.TemporaryDirectory(prefix="ccx-") as short:
-        for name in (f"{job}.inp", *includes):
+        for name in (f"{job}.inp", *inputs):
             shutil.copy(folder / name, short)
         try:
             _run(Path(short), job, command, time_limit_s)
@@ -39,6 +38,12 @@ def run_job(
             for suffix in (*RESULTS, "log"):
                 if (Path(short) / f"{job}.{suffix}").exists():
                     shutil.copy(Path(short) / f"{job}.{suffix}", folder)
+
+
+def clear(folder: Path, job: str) -> None:
+    """Remove results of another run, which must not pass for this one's."""
+    for suffix in (*RESULTS, "log"):
+        (folder / f"{job}.{suffix}").unlink(missing_ok=True)
 
 
 def _is_safe(folder: Path) -> bool:
@@ -65,9 +70,13 @@ def _run(folder: Path, job: str, command: Sequence[str], time_limit_s: float) ->
 
 
 def _error(said: str) -> str:
-    """The first ``*ERROR`` of a log with the two lines that follow it; empty where none is."""
+    """The first ``*ERROR`` of a log with the two lines that follow it; empty where none is.
+
+    A card that ccx skips, or of which it skips a parameter, is an error too: it only warns.
+    """
     lines = [line.strip() for line in said.splitlines() if line.strip()]
     for i, line in enumerate(lines):
-        if line.upper().startswith("*ERROR"):
+        skipped = line.startswith("*WARNING reading") and line.endswith("Card image:")
+        if skipped or line.upper().startswith("*ERROR"):
             return " ".join(lines[i : i + 3])
     return ""

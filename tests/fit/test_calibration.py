@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -19,6 +20,7 @@ from .fake import LABELS, FakeDoor
 
 CASE = load_case(CASES / "p235_75r17.yaml")
 START = start_values(CASE)
+START_X = np.log(list(START.values()))
 TARGETS = {t.label: t.frequency_Hz for t in read_targets(CASE)}
 POWERS = {
     "A_belt": np.array([-0.05, -0.05, -0.05, -0.05, -0.03, -0.05, -0.045, -0.03, -0.04]),
@@ -75,9 +77,61 @@ def test_steps_back_from_designs_that_fail(
     assert all("inflation stopped" in row["failure"] for row in failed)
 
 
+@pytest.mark.parametrize("method", ["slsqp", "least-squares"])
+def test_converges_on_eigenvalues_of_seven_digits(method: str) -> None:
+    """As CalculiX prints them; differences then leave noise in the gradient."""
+    base = door(has_gradients=False)
+    base.solver = SimpleNamespace(difference_step=1e-3)  # type: ignore[assignment]
+    base.round = lambda f: np.sqrt([float(f"{x:.6e}") for x in f**2])
+    noisy = [TARGETS[label] * (1 + 0.02 * (-1) ** i) for i, label in enumerate(LABELS)]
+    fit = calibrate(with_targets(frequency_Hz=noisy), base, method)  # type: ignore[arg-type]
+    assert fit.result["converged"] and fit.result["evaluations"] <= 20
+    exact = calibrate(with_targets(frequency_Hz=noisy), door(), method)  # type: ignore[arg-type]
+    assert fit.result["objective_Hz"] == pytest.approx(exact.result["objective_Hz"], abs=1e-3)
+
+
 def test_a_start_that_fails_is_a_failure_not_a_number() -> None:
     with pytest.raises(EvaluationFailed, match="12 of 240 kPa"):
         calibrate(CASE, door(fails=lambda values: True))  # type: ignore[arg-type]
+
+
+def test_a_neighbour_that_fails_gives_way_to_the_one_on_the_other_side() -> None:
+    edge = lambda values: values["C10"] > START["C10"] * 1.00005
+    there = Problem(CASE, door(has_gradients=False, fails=edge)).evaluate(START_X)  # type: ignore[arg-type]
+    plain = Problem(CASE, door(has_gradients=False)).evaluate(START_X)  # type: ignore[arg-type]
+    assert there.jacobian == pytest.approx(plain.jacobian, rel=1e-4)
+    assert not (there.jacobian == plain.jacobian).all()
+
+
+def test_a_point_without_neighbours_fails() -> None:
+    alone = lambda values: values["C10"] != START["C10"]
+    problem = Problem(CASE, door(has_gradients=False, fails=alone))  # type: ignore[arg-type]
+    with pytest.raises(EvaluationFailed, match="12 of 240 kPa") as failure:
+        problem.evaluate(START_X)
+    assert failure.value.cause == "no_equilibrium"
+
+
+@pytest.mark.parametrize("bound", ["lower", "upper"])
+def test_differences_stay_within_the_bounds(bound: str) -> None:
+    """At a bound there is one neighbour only, and where it fails no other takes its place."""
+    at = getattr(CASE.case.variables["C10"], bound)
+    within = lambda values: not 1e5 <= values["C10"] <= 1e7
+    x = np.log([START["A_belt"], START["A_carcass"], at])
+    differ = Problem(CASE, door(has_gradients=False, fails=within)).evaluate(x)  # type: ignore[arg-type]
+    exact = Problem(CASE, door()).evaluate(x)  # type: ignore[arg-type]
+    assert differ.jacobian == pytest.approx(exact.jacobian, rel=1e-4)
+    alone = lambda values: values["C10"] != at
+    with pytest.raises(EvaluationFailed):
+        Problem(CASE, door(has_gradients=False, fails=alone)).evaluate(x)  # type: ignore[arg-type]
+
+
+def test_jobs_go_to_the_neighbours_of_the_first_start() -> None:
+    tyre = door(has_gradients=False)
+    plain = calibrate(CASE, tyre)  # type: ignore[arg-type]
+    assert set(tyre.jobs) == {1}
+    tyre = door(has_gradients=False)
+    assert calibrate(CASE, tyre, jobs=8).result == plain.result  # type: ignore[arg-type]
+    assert set(tyre.jobs) == {1, 3}  # a point, and its three neighbours
 
 
 def test_says_that_it_did_not_move() -> None:

@@ -16,6 +16,8 @@ from tyrecal.case import load_case
 from tyrecal.cli.main import main
 from tyrecal.evaluate.door import Door, Question
 from tyrecal.evaluate.failure import DeckRefused, EvaluationFailed
+from tyrecal.evaluate.store import Store
+from tyrecal.fit.problem import Problem
 
 STANDIN = Path(__file__).with_name("standin_abaqus.py")
 COARSE = """
@@ -85,6 +87,23 @@ def test_a_fit_ends_where_the_bundled_solver_ends(
     for one, other in zip(ours["modes"], theirs["modes"], strict=True):
         assert one["fitted_Hz"] == pytest.approx(other["fitted_Hz"], rel=1e-4)
     assert (tmp_path / "a" / "section.png").exists()
+
+
+def test_slopes_and_record_are_the_same_with_any_number_of_jobs(
+    coarse: Callable[..., Path], tmp_path: Path
+) -> None:
+    """Of a design whose neighbours, from which the slopes come, are evaluated in parallel."""
+    case, points, records = load_case(coarse()), [], []
+    for jobs in (1, 2):
+        door = Door(case, "abaqus", store=Store(tmp_path / f"{jobs}"))
+        problem = Problem(case, door, {"A_belt": 2.2e-7}, jobs=jobs)
+        points.append(problem.evaluate(problem.start()))
+        assert (door.counts.runs, door.counts.recorded) == (3, 0)
+        found = door.store.folder.rglob("*.record") if door.store else ()
+        records.append({path.name: path.read_bytes() for path in found})
+    assert (points[0].jacobian == points[1].jacobian).all()
+    assert (points[0].residuals == points[1].residuals).all()
+    assert records[0] == records[1] and len(records[0]) == 3
 
 
 @pytest.mark.parametrize(

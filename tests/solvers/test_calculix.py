@@ -26,13 +26,15 @@ needs_ccx = pytest.mark.skipif(
 )
 
 # a folder of one deck of diameter 1, and what ccx 2.20 would leave there
-DECK = "*STEP\n*DLOAD\nCAVITY, P6, 240000\n*FREQUENCY\n2\n*DLOAD\nCAVITY, P6, 120000\n"
+INFLATE = "*STEP, NLGEOM\n*DLOAD\nCAVITY, P6, 240000\n"
+DECK = "*RESTART, READ, STEP=1\n*FREQUENCY\n2\n*DLOAD\nCAVITY, P6, 120000\n"
 SECTOR = "*CYCLIC SYMMETRY MODEL, N=60, TIE=SECTORS\n"
-DAT = """
+MASS = """
  total mass for set EVERYTHING and time  0.1000000E+01
 
         2.130910E-01
-
+"""
+DAT = """
      E I G E N V A L U E   O U T P U T
 
   NODAL   MODE NO    EIGENVALUE                      FREQUENCY
@@ -62,15 +64,25 @@ def block(name: str, table: list, mode: int) -> str:
     return f"{head}  100CL  101 50.3\n -4  {name:8s}4    1\n -5  D1\n{rows(table)} -3\n"
 
 
-FRD = (
-    "    1C\n    2C\n" + rows(NODES) + " -3\n" + block("DISP", STATIC, 0)
-    + block("DISP", REAL, 1) + block("DISPI", IMAGINARY, 1) + " 9999\n"
-)  # fmt: skip
+def frd(*blocks: str) -> str:
+    return "    1C\n    2C\n" + rows(NODES) + " -3\n" + "".join(blocks) + " 9999\n"
+
+
+LEFT = {  # file: its content after a run that went well
+    "inflate.dat": MASS, "inflate.frd": frd(block("DISP", STATIC, 0)), "inflate.rout": "state",
+    "modes_1.dat": DAT, "modes_1.frd": frd(block("DISP", REAL, 1), block("DISPI", IMAGINARY, 1)),
+}  # fmt: skip
 
 STAND_IN = """import sys, time
 from pathlib import Path
 fault, job = sys.argv[1], sys.argv[2]
-dat, frd = (Path(__file__).with_name(n).read_text() for n in ("dat", "frd"))
+here = Path(__file__).parent
+with (here / "jobs").open("a") as jobs: jobs.write(job + " ")
+if job != "inflate" and Path(f"{job}.rin").read_text() != "state": sys.exit("not this state")
+if (job == "inflate") != fault.startswith("inflation: "): fault = "none"
+fault = fault.removeprefix("inflation: ")
+left = {p.suffix[1:]: p.read_text() for p in here.glob(f"{job}.*")}
+dat, frd = left["dat"], left["frd"]
 code = 0
 said = "CalculiX Version 2.20\\n Job finished\\n"
 if fault == "crash": sys.exit(139)
@@ -81,20 +93,26 @@ if fault == "no shapes": frd = None
 if fault == "empty": dat = ""
 if fault == "unfinished": said = "CalculiX Version 2.20\\n"
 if fault == "error": said = " *ERROR in linstatic: a is wrong\\n" + said
+if fault == "skipped": said = " *WARNING reading *STEP. Card image:\\n   *STEP,NLGEO\\n" + said
 if fault == "cutbacks": code, said = 201, " *ERROR: too many cutbacks\\n"
+if fault == "no state": del left["rout"]
+if fault == "empty state": left["rout"] = ""
 if fault == "fewer": dat = dat.replace("    1          2   0.1000000E+06", "x")
 if fault == "zeros": dat = dat.replace("0.1000000E+06", "0.0000000E+00")
 if fault == "nan": dat = dat.replace("0.1000000E+06", "          NaN")
+if fault == "nan mass": dat = dat.replace("2.130910E-01", "NaN")
 if fault == "negative": dat = dat.replace(" 0.1000000E+06", "-0.1000000E+06")
 if fault == "unpaired": dat = dat.replace("2   0.1000000E+06", "2   0.1010000E+06")
 if fault == "cut": frd = frd[: len(frd) * 3 // 4 - 5]
 if fault == "doubled": frd += frd
 if fault == "nan shape": frd = frd.replace("-2.00000E+00", "         NaN")
+if fault == "nan displacement": frd = frd.replace(" 1.00000E-03", "         NaN")
 if fault == "stars": frd = frd.replace("-2.00000E+00", "************")
 if fault == "one part": frd = frd.replace("DISPI", "NDISP")
 if fault == "missing node": frd = frd.replace(" -1         2 5.0", " -9         2 5.0")
-for suffix, text in (("dat", dat), ("frd", frd)):
+for suffix, text in {**left, "dat": dat, "frd": frd}.items():
     if text is not None: Path(f"{job}.{suffix}").write_text(text)
+if job != "inflate": Path(f"{job}.rout").write_text("another state")
 print(said)
 sys.exit(code)
 """
@@ -106,9 +124,10 @@ def folder_for(tmp_path: Path, fault: str) -> Path:
     tools.mkdir(parents=True)
     folder.mkdir()
     (tools / "ccx.py").write_text(STAND_IN)
-    (tools / "dat").write_text(DAT)
-    (tools / "frd").write_text(FRD)
+    for name, text in LEFT.items():
+        (tools / name).write_text(text)
     (folder / "sector.inp").write_text(SECTOR)
+    (folder / "inflate.inp").write_text(INFLATE)
     (folder / "modes_1.inp").write_text(DECK)
     command = f"'{sys.executable}' '{tools / 'ccx.py'}' '{fault}'"
     (folder / "calculix.json").write_text(json.dumps({"command": command, "parallel": 1}))
@@ -137,6 +156,7 @@ def test_whole_results_are_read(tmp_path: Path, place: str) -> None:
     expected = shape * 1j * np.sqrt(2 / 60)  # -4i, the largest, becomes real and positive
     np.testing.assert_allclose(mode["amplitude"], expected, atol=1e-12)
     assert (folder / "modes_1.log").exists() and (folder / "modes_1.frd").exists()
+    assert not list(folder.glob("*.rin")) and not list(folder.glob("*.rout"))  # they are large
 
 
 @pytest.mark.parametrize(
@@ -146,32 +166,55 @@ def test_whole_results_are_read(tmp_path: Path, place: str) -> None:
         ("code", "crashed", "code 201.*a node is wrong"),
         ("cutbacks", "no_equilibrium", "too many cutbacks"),
         ("error", "crashed", "a is wrong"),
+        ("skipped", "crashed", "STEP,NLGEO"),
         ("unfinished", "crashed", "before its end"),
         ("silent", "no_results", "left no modes_1.dat"),
         ("no shapes", "no_results", "left no modes_1.frd"),
         ("empty", "no_results", "left no modes_1.dat"),
         ("fewer", "no_results", "1 of 2 modes"),
         ("zeros", "no_results", "eigenvalues are 0"),
-        ("nan", "no_results", "eigenvalues are nan"),
+        ("nan", "no_results", "'NaN' is not a number"),
         ("negative", "unstable", "-100000"),
         ("unpaired", "no_results", "pairs"),
         ("cut", "no_results", "cut off"),
         ("doubled", "no_results", "two runs"),
-        ("nan shape", "no_results", "no shape"),
+        ("nan shape", "no_results", "'NaN' is not a number"),
         ("stars", "no_results", "not a number"),
         ("one part", "no_results", "lacks shapes"),
         ("missing node", "no_results", "nodes are missing"),
+        ("inflation: crash", "crashed", "code 139"),
+        ("inflation: cutbacks", "no_equilibrium", "too many cutbacks"),
+        ("inflation: unfinished", "crashed", "before its end"),
+        ("inflation: no state", "no_results", "left no inflate.rout"),
+        ("inflation: empty state", "no_results", "left no inflate.rout"),
+        ("inflation: silent", "no_results", "left no inflate.frd"),
+        ("inflation: empty", "no_results", "left no inflate.dat"),
+        ("inflation: nan mass", "no_results", "'NaN' is not a number"),
+        ("inflation: nan displacement", "no_results", "'NaN' is not a number"),
+        ("inflation: doubled", "no_results", "two runs"),
     ],
 )
 def test_a_failure_is_typed_and_never_a_number(
     tmp_path: Path, fault: str, cause: str, words: str
 ) -> None:
     folder = folder_for(tmp_path, fault)
-    for suffix, text in (("dat", DAT), ("frd", FRD)):  # whole results of an older run
-        (folder / f"modes_1.{suffix}").write_text(text)
+    for name, text in LEFT.items():  # whole results of an older run
+        (folder / name).write_text(text.replace("state", "older state"))
     with pytest.raises(RunFailed, match=words) as failure:
         evaluate(folder)
     assert failure.value.cause == cause
+
+
+@pytest.mark.parametrize("fault", ["crash", "cutbacks", "no state"])
+def test_no_modes_about_a_state_that_was_not_found(tmp_path: Path, fault: str) -> None:
+    folder = folder_for(tmp_path, f"inflation: {fault}")
+    for name, text in LEFT.items():
+        (folder / name).write_text(text)
+    with pytest.raises(RunFailed):
+        evaluate(folder)
+    assert (tmp_path / "tools" / "jobs").read_text() == "inflate "
+    with pytest.raises(RunFailed, match="left no"):
+        CalculiX().read(folder)
 
 
 def test_a_run_that_hangs_is_ended(tmp_path: Path) -> None:
@@ -238,13 +281,13 @@ def test_a_vibration_frequency_is_refused(tmp_path: Path) -> None:
 def test_decks_have_one_diameter_each_and_half_the_pressure() -> None:
     """What three silent traps of ccx 2.20 demand, and the plies' stiffness and mass."""
     texts = Decks(main_case(), {}, modes_per_harmonic=3).texts("calculix")
-    assert list(texts) == ["sector.inp", *(f"modes_{n}.inp" for n in range(5))]
+    assert list(texts) == ["sector.inp", "inflate.inp", *(f"modes_{n}.inp" for n in range(5))]
+    assert "CAVITY, P6, 240000\n" in texts["inflate.inp"]
     for n in range(5):
         deck = texts[f"modes_{n}.inp"]
         assert deck.count("*FREQUENCY\n6\n") == 1
         assert f"NMIN={n}, NMAX={n}\n" in deck
-        first, second = deck.split("*STEP, PERTURBATION")
-        assert "CAVITY, P6, 240000\n" in first and "CAVITY, P6, 120000\n" in second
+        assert "CAVITY, P6, 120000\n" in deck and "*RESTART, READ, STEP=1\n" in deck
     lines = texts["sector.inp"].splitlines()
     start = lines.index("*MATERIAL, NAME=BELT_1_8")
     values = [float(x) for x in ",".join(lines[start + 2 : start + 5]).split(",")]
@@ -300,6 +343,7 @@ def test_calculix_agrees_with_the_bundled_solver(case_folder: Path) -> None:
         ("sector.inp.j2", "*SOLID SECTION, ELSET={{ solid.set }}, MATERIAL={{ solid.material }}",
          "*SOLID SECTION, ELSET={{ solid.set }}, MATERIAL=NO_SUCH", "crashed"),
         ("sector.inp.j2", "{{ rubber.C10 | number }}", "nan", "crashed"),
+        ("inflate.inp.j2", "PARAMETERS=FIELD", "PARAMETER=FIELD", "crashed"),
         ("diameter.inp.j2", "U\n*END STEP\n", "U\n", "no_results"),
     ],
 )  # fmt: skip

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import shutil
+import subprocess
 import sys
 import time
 from pathlib import Path
@@ -29,12 +31,41 @@ time.sleep(60)"""
         run_command([sys.executable, "-c", parent], tmp_path, 2, "log")
     assert failure.value.cause == "timed_out"
     assert time.monotonic() - start < 20
-    pid = int((tmp_path / "child").read_text())
+    assert _ends(int((tmp_path / "child").read_text()))
+
+
+@pytest.mark.skipif(shutil.which("setpriv") is None, reason="needs Linux with util-linux")
+@pytest.mark.parametrize("parallel", [False, True])
+def test_a_command_ends_with_a_killed_process(tmp_path: Path, parallel: bool) -> None:
+    """Started from the main thread, or as the CalculiX runner does where it runs several."""
+    solver = "import os, time; open('pid', 'w').write(f'{os.getpid()}.'); time.sleep(60)"
+    call = f"run_command([sys.executable, '-c', {solver!r}], Path('.'), 60, 'log')"
+    if parallel:
+        call = f"list(ThreadPoolExecutor(2).map(lambda _: {call}, [0]))"
+    tool = f"""import sys
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from tyrecal_solvers.process import run_command
+{call}"""
+    process = subprocess.Popen([sys.executable, "-c", tool], cwd=tmp_path)
+    said = tmp_path / "pid"
+    while not (said.exists() and said.read_text().endswith(".")):
+        assert process.poll() is None
+        time.sleep(0.05)
+    pid = int(said.read_text()[:-1])
+    assert _alive(pid)
+    process.kill()
+    process.wait()
+    assert _ends(pid)
+
+
+def _ends(pid: int) -> bool:
+    """Whether a process is gone within ten seconds."""
     for _ in range(100):
         if not _alive(pid):
-            return
+            return True
         time.sleep(0.1)
-    raise AssertionError("the command's child outlived it")
+    return False
 
 
 def _alive(pid: int) -> bool:

@@ -24,6 +24,7 @@ METHODS: dict[str, Callable[[Problem, Array, float], slsqp.Outcome]] = {
     "least-squares": least_squares.minimise,
 }
 TOLERANCE = 1e-3  # projected gradient, Hz per unit of a logarithm: 1e-5 Hz for a change of 1 %
+SLOPE_NOISE_HZ = 50.0  # differences of a step that suits the digits: this times the step
 UNMOVED = 1e-6  # largest change of a scaled variable below which the fit did not move
 MOST_REPLACED = 20  # replaced starts per start asked for
 
@@ -68,10 +69,11 @@ def calibrate(
     """Fit the case's free variables to its targets.
 
     starts: the case's own start and ``starts - 1`` drawn uniformly in the scaled box; drawn
-    starts that cannot be evaluated are counted and replaced.
+    starts that cannot be evaluated are counted and replaced. jobs: processes for the drawn starts,
+    and for the neighbours of a point of the first one where the solver gives no slopes.
     Raises NothingToFit; EvaluationFailed when the case's own start cannot be evaluated.
     """
-    problem = Problem(case, door, fixed, notify)
+    problem = Problem(case, door, fixed, notify, jobs)
     if not problem.targets:
         raise NothingToFit("the case has no targets: there is nothing to fit to")
     if not problem.variables:
@@ -94,8 +96,9 @@ def calibrate(
 
 def _run(problem: Problem, start: Array, method: str) -> StartReport:
     first = problem.evaluate(start)
-    outcome = METHODS[method](problem, start, TOLERANCE)
-    converged = slsqp.is_converged(problem, outcome.point, 10 * TOLERANCE)
+    tolerance = max(TOLERANCE, SLOPE_NOISE_HZ * (problem.difference_step or 0.0))
+    outcome = METHODS[method](problem, start, tolerance)
+    converged = slsqp.is_converged(problem, outcome.point, max(10 * TOLERANCE, tolerance))
     values, history = dict(first.values), _history(problem)
     return StartReport(values, outcome.point, outcome.message, converged, history)
 

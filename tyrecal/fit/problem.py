@@ -18,10 +18,11 @@ from ..evaluate.results import Evaluation
 from ..modes.label import paired_labels
 from ..modes.match import LostLabel, margin, match
 from ..modes.mode import Label, Mode
+from .differences import STEP, differences
 
 Array = np.ndarray
 MORE_MODES = (4, 8)  # per harmonic, when a label is not among the modes first asked for
-DIFFERENCE_STEP = 1e-4  # of a logarithm: best between truncation and the solver's digits
+Found = tuple[Evaluation, dict[Label, Mode], float]
 
 
 @dataclass(frozen=True)
@@ -102,7 +103,8 @@ def objective(frequencies: Mapping[Label, float], targets: list[Target]) -> floa
 class Problem:
     """Evaluates designs for an optimiser, each distinct one once.
 
-    notify: called with (number of the point, its values, Point or failure) as they come.
+    notify: called with (number of the point, its values, Point or failure) as they come; jobs: how
+    many neighbours of a point are evaluated at a time, where the solver gives no slopes.
     """
 
     def __init__(
@@ -111,8 +113,9 @@ class Problem:
         door: Door,
         fixed: Mapping[str, float] | None = None,
         notify: Callable[[int, Mapping[str, float], Point | EvaluationFailed], None] | None = None,
+        jobs: int = 1,
     ):
-        self.case, self.door, self.notify = case, door, notify
+        self.case, self.door, self.notify, self.jobs = case, door, notify, jobs
         self.fixed = dict(fixed or {})
         starts = start_values(case)
         self.variables = [
@@ -123,6 +126,9 @@ class Problem:
         self.targets = read_targets(case)
         self.lower = np.array([v.scaled(v.lower) for v in self.variables])
         self.upper = np.array([v.scaled(v.upper) for v in self.variables])
+        self.difference_step = (
+            None if door.has_gradients else getattr(door.solver, "difference_step", STEP)
+        )
         self.points: dict[tuple[float, ...], Point | EvaluationFailed] = {}
 
     def start(self) -> Array:
@@ -157,8 +163,11 @@ class Problem:
 
     def _evaluate(self, values: dict[str, float]) -> Point:
         names = tuple(v.name for v in self.variables)
-        exact = self.door.has_gradients
-        evaluation, modes, clarity = self._modes(values, names if exact else ())
+        exact = self.difference_step is None
+        (answer,) = self.modes([values], names if exact else ())
+        if isinstance(answer, EvaluationFailed):
+            raise answer
+        evaluation, modes, clarity = answer
         order = [modes[t.label] for t in self.targets]
         weights = np.array([math.sqrt(t.weight * t.multiplicity) for t in self.targets])
         wanted = np.array([t.frequency_Hz for t in self.targets])
@@ -167,7 +176,7 @@ class Problem:
             slopes = np.array([[evaluation.gradients[n][m.position] for n in names] for m in order])
             slopes *= [v.slope(values[v.name]) for v in self.variables]
         else:
-            slopes = self._differences(values, frequencies)
+            slopes = differences(self, values, frequencies)
         x = np.array([v.scaled(values[v.name]) for v in self.variables])
         return Point(
             values,
@@ -179,32 +188,30 @@ class Problem:
             evaluation.mass_kg,
         )
 
-    def _modes(
-        self, values: dict[str, float], names: tuple[str, ...]
-    ) -> tuple[Evaluation, dict[Label, Mode], float]:
+    def modes(
+        self, designs: list[dict[str, float]], names: tuple[str, ...] = ()
+    ) -> list[Found | EvaluationFailed]:
+        """Of each design its evaluation, target modes and margin, or its failure."""
         labels = [t.label for t in self.targets]
+        answers: dict[int, Found | EvaluationFailed] = {}
+        waiting = list(range(len(designs)))
         for count in (None, *MORE_MODES):
-            evaluation = self.door.evaluate(Question(values, names, count))
-            try:
-                found = match(paired_labels(evaluation.modes), labels)
-            except LostLabel as lost:
-                last = lost
-                continue
-            return evaluation, found, margin(found)
-        raise EvaluationFailed("lost_label", str(last))
-
-    def _differences(self, values: dict[str, float], frequencies: Array) -> Array:
-        """d f / d x by forward differences, inward at an upper bound."""
-        columns = []
-        for i, variable in enumerate(self.variables):
-            x = variable.scaled(values[variable.name])
-            step = getattr(self.door.solver, "difference_step", DIFFERENCE_STEP)
-            step = step if x + step <= self.upper[i] else -step
-            moved = {**values, variable.name: variable.value(x + step)}
-            modes = self._modes(moved, ())[1]
-            shifted = np.array([modes[t.label].frequency_Hz for t in self.targets])
-            columns.append((shifted - frequencies) / step)
-        return np.array(columns).T
+            asked, waiting = waiting, []
+            questions = [Question(designs[i], names, count) for i in asked]
+            jobs = min(self.jobs, len(asked))
+            for i, answer in zip(asked, self.door.evaluate_all(questions, jobs), strict=True):
+                if isinstance(answer, EvaluationFailed):
+                    answers[i] = answer
+                    continue
+                try:
+                    found = match(paired_labels(answer.modes), labels)
+                    answers[i] = answer, found, margin(found)
+                except LostLabel as lost:
+                    answers[i] = EvaluationFailed("lost_label", str(lost))
+                    waiting.append(i)
+            if not waiting:
+                break
+        return [answers[i] for i in range(len(designs))]
 
 
 def read_targets(case: LoadedCase) -> list[Target]:
