@@ -9,17 +9,18 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from . import VERSION
+from . import VERSION, press_job
 from .job import Failures, TimedOut, run
 from .keywords import DeckError
 
-JOB, OLDJOB = "modes", "inflate"
+JOB, PRESS, OLDJOB = "modes", "press", "inflate"
 
 
 class Decks(Protocol):
     """What the tool hands over: deck texts of a dialect, and where its variables stand in them."""
 
     request: Mapping[str, Any]
+    loads_N: tuple[float, ...]
 
     def texts(self, dialect: str) -> dict[str, str]:
         """File name to text."""
@@ -34,7 +35,7 @@ class Bundled:
     name = "bundled"
     version = VERSION
     dialect = "abaqus"
-    capabilities = frozenset({"modes", "gradients"})
+    capabilities = frozenset({"modes", "gradients", "footprint"})
     refusals = (DeckError,)
     failures = (*Failures, TimedOut)
 
@@ -44,6 +45,8 @@ class Bundled:
         for name, text in decks.texts(self.dialect).items():
             paths.append(folder / name)
             paths[-1].write_text(text)
+        if decks.loads_N:
+            return paths
         request = {
             "harmonics": list(range(decks.request["highest_harmonic"] + 1)),
             "modes_per_harmonic": decks.request["modes_per_harmonic"],
@@ -55,10 +58,13 @@ class Bundled:
 
     def run(self, folder: Path, time_limit_s: float) -> None:
         """Run in this process. Raises ``refusals`` and ``failures``."""
-        run(folder, JOB, OLDJOB, time_limit_s)
+        job = PRESS if (folder / f"{PRESS}.inp").exists() else JOB
+        run(folder, job, OLDJOB, time_limit_s)
 
     def read(self, folder: Path) -> dict[str, Any]:
-        """Results as plain data: the last frequency step of the job."""
+        """Results as plain data: the last frequency step of the job, or the footprints."""
+        if (folder / f"{PRESS}.inp").exists():
+            return press_job.read(folder / PRESS)
         step = json.loads((folder / f"{JOB}.json").read_text())["steps"][-1]
         with np.load(folder / f"{JOB}.npz", allow_pickle=False) as arrays:
             nodes, points = arrays["nodes"], arrays["points"]

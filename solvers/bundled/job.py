@@ -7,11 +7,12 @@ import time
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from threadpoolctl import ThreadpoolController
 
-from . import sensitivity
+from . import press_job, sensitivity
 from .band import Cholesky, Numbering
 from .eigen import NotConverged
 from .harmonics import HarmonicModes, Unstable, Vibration, lowest_of_all
@@ -19,12 +20,13 @@ from .inflation import InflationFailed, equilibrium
 from .keywords import DeckError, Row
 from .mechanics import Load, mass
 from .model import Model, build
+from .pressing import NotPressed
 from .results import StepResult, write
 from .steps import Deck, Step, Tangent
 from .supports import numbering
 
 Array = np.ndarray
-Failures = (InflationFailed, Unstable, NotConverged)
+Failures = (InflationFailed, Unstable, NotConverged, NotPressed)
 
 
 class TimedOut(ArithmeticError):
@@ -54,8 +56,10 @@ def run(folder: Path, job: str, oldjob: str | None, time_limit: float = float("i
         texts = {name: (folder / f"{name}.inp").read_text() for name in (job, oldjob) if name}
         request = read_request(folder / f"{job}.request.json")
         analysis = Analysis(Deck(texts, job, oldjob), request, deadline)
-        results = analysis.run()
-        write(folder / job, analysis.model, results)
+        if analysis.road is not None:
+            press_job.write(folder / job, analysis.model, analysis.press())
+        else:
+            write(folder / job, analysis.model, analysis.run())
 
 
 @cache
@@ -80,6 +84,7 @@ class Analysis:
     def __init__(self, deck: Deck, request: Request, deadline: float = float("inf")):
         self.deck, self.request, self.deadline = deck, request, deadline
         self.section, self.steps = deck.read([])
+        self.road = press_job.read_road(deck.revolve)
         self._models: dict[tuple[float | None, bool], Model] = {}
         self.model = self._model(None, True)
         self.U = np.zeros((len(self.model.mesh.X), 3))
@@ -95,6 +100,34 @@ class Analysis:
             else:
                 results.append(self._frequency(place, step))
         return results or [self._result(self.steps[-1], [], {})]
+
+    def press(self) -> dict[str, Any]:
+        """Footprints of a job with a road, one per step with a force on it."""
+        assert self.road is not None
+        wanted = []
+        for step in self.steps:
+            if step.procedure.name != "STATIC":
+                raise DeckError(step.procedure.line, "modes of a tyre on a road are not honoured")
+            step.held = [row for row in step.held if row.text(0) != self.road.node]
+            if not step.forces:
+                self._static(step)
+                continue
+            row = step.forces[-1]
+            if row.text(0) != self.road.node or row.integer(1) != 1:
+                raise DeckError(row.line, "the force on the road is along the first axis")
+            wanted.append(-float(np.real(row.number(2))))
+            if not wanted[-1] > max([0.0, *wanted[:-1]]):
+                raise DeckError(row.line, "loads on the road must push it to the tyre, and rise")
+        if not wanted:
+            raise DeckError(self.steps[-1].procedure.line, "no *CLOAD presses the road")
+        step = self.steps[-1]
+        model = self._model(None, step.long_term)
+        loads = _loads(model, step)
+        found = press_job.press(
+            model, numbering(model, step), loads, self.U, self.road, wanted,
+            self._check_time, TimedOut,
+        )  # fmt: skip
+        return {"pressure_Pa": step.pressure, "mass_kg": self.mass_kg, **found}
 
     def _model(self, dynamic_Hz: float | None, long_term: bool) -> Model:
         key = dynamic_Hz, long_term

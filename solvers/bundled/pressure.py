@@ -59,3 +59,28 @@ def second(x: Array, dx: Array) -> tuple[Array, Array, Array]:
     xx = along @ SPIN
     xd = -IN_PLANE @ _cross(d) - (_cross(y) @ SPIN).swapaxes(-1, -2)
     return xx, xd, np.stack([along, -_cross(y)], -3)
+
+
+def density(x: Array, dx: Array, around: Array) -> Array:
+    """V's integrand (...) from x, x' and ``around`` = dx/dTheta."""
+    y, d = x @ IN_PLANE, around + x @ SPIN.T
+    return np.asarray((y * cross(dx, d)).sum(-1) / 2)
+
+
+def first_around(x: Array, dx: Array, around: Array) -> tuple[Array, Array, Array]:
+    """Gradients of V's integrand by x, x' and ``around`` = dx/dTheta, each (..., 3)."""
+    y, d = x @ IN_PLANE, around + x @ SPIN.T
+    by_around = cross(y, dx)
+    by_x = cross(dx, d) @ IN_PLANE + by_around @ SPIN
+    return by_x / 2, cross(d, y) / 2, by_around / 2
+
+
+def change(
+    x: Array, dx: Array, around: Array, u: Array, du: Array, u_around: Array
+) -> tuple[Array, Array, Array]:
+    """Change of `first_around` with a small displacement u, u', du/dTheta (..., 3)."""
+    y, d = x @ IN_PLANE, around + x @ SPIN.T
+    v, e = u @ IN_PLANE, u_around + u @ SPIN.T
+    by_around = cross(v, dx) + cross(y, du)
+    by_x = (cross(du, d) + cross(dx, e)) @ IN_PLANE + by_around @ SPIN
+    return by_x / 2, (cross(e, y) + cross(d, v)) / 2, by_around / 2

@@ -18,7 +18,8 @@ class Step:
 
     number: in the job, from 1; procedure: its *STATIC or *FREQUENCY; pressures: surface to the
     deck's number (Pa); held: rows of *BOUNDARY; long_term: the static state is relaxed;
-    revolved: of the second job, in three dimensions.
+    revolved: of the second job, in three dimensions;
+    forces: rows of *CLOAD.
     """
 
     number: int
@@ -27,6 +28,7 @@ class Step:
     held: list[Row] = field(default_factory=list)
     long_term: bool = True
     revolved: bool = False
+    forces: list[Row] = field(default_factory=list)
 
     @property
     def pressure(self) -> float:
@@ -46,7 +48,8 @@ class Deck:
 
     def read(self, tangents: list[Tangent]) -> tuple[list[Keyword], list[Step]]:
         """The section's model blocks and all steps, their numbers carrying ``tangents``."""
-        models, steps = [], []
+        models: list[list[Keyword]] = []
+        steps = []
         for place, name in enumerate(self._order):
             own = [(line, index, value) for job, line, index, value in tangents if job == name]
             keywords = self._keywords[name]
@@ -55,6 +58,7 @@ class Deck:
             steps.append(_steps(model, blocks, place > 0))
         if len(models) > 1:
             _check_transfer(models[0], steps[0], models[1])
+        self.revolve = models[-1] if len(models) > 1 else []
         return models[0], [step for part in steps for step in part]
 
 
@@ -62,17 +66,20 @@ def _steps(model: list[Keyword], blocks: list[list[Keyword]], revolved: bool) ->
     steps: list[Step] = []
     held = [row for k in model if k.name == "BOUNDARY" for row in k.rows]
     pressures: dict[str, complex | float] = {}
+    forces: list[Row] = []
     long_term = True
     for number, block in enumerate(blocks, start=1):
         procedure = _procedure(block)
         for k in block:
             if k.name == "BOUNDARY":
-                held = [*held, *k.rows]
+                held = k.rows if k.get("OP") == "NEW" else [*held, *k.rows]
+            elif k.name == "CLOAD":
+                forces = k.rows
             elif k.name == "DSLOAD":
                 pressures = {**pressures, **_pressures(k)}
         if procedure.name == "STATIC":
             long_term = "LONG TERM" in procedure.parameters
-        steps.append(Step(number, procedure, pressures, held, long_term, revolved))
+        steps.append(Step(number, procedure, pressures, held, long_term, revolved, forces))
     return steps
 
 
@@ -104,8 +111,9 @@ def _check_transfer(section: list[Keyword], steps: list[Step], revolve: list[Key
     generation, transfer = (
         blocks[f"SYMMETRIC {n}"] for n in ("MODEL GENERATION", "RESULTS TRANSFER")
     )
-    if len(generation.rows) < 3 or generation.rows[-1].number(0) != 360.0:
-        raise DeckError(generation.line, "the tyre is revolved by 360 degrees, in one segment")
+    segments = [float(np.real(row.number(0))) for row in generation.rows[2:]]
+    if not abs(sum(segments) - 360.0) < 1e-6:
+        raise DeckError(generation.line, "the tyre is revolved by 360 degrees")
     axis = [generation.rows[0].number(i, 0.0) for i in range(6)]
     if any(axis[:4]) or axis[5] or not np.real(axis[4]) > 0:
         raise DeckError(
@@ -118,7 +126,7 @@ def _check_transfer(section: list[Keyword], steps: list[Step], revolve: list[Key
         raise DeckError(transfer.line, f"the first job ends with STEP=1, INC={increments}")
     for k in section:
         restated = (
-            r.need("TIE NSET") == k.need("TIE NSET") for r in revolve if r.name == "RIGID BODY"
+            r.get("TIE NSET") == k.need("TIE NSET") for r in revolve if r.name == "RIGID BODY"
         )
         if k.name == "RIGID BODY" and not any(restated):
             raise DeckError(

@@ -218,6 +218,19 @@ _edit("grading_length", "mesh.levels.default.grading", "must have 4", "1.0, 0.7]
 # analysis, solver
 _edit("few_sectors", "analysis.sectors", "at least 8", "sectors: 60", "sectors: 3")
 _edit("harmonics", "analysis.highest_harmonic", "at most 20", "harmonic: 4", "harmonic: 400")
+ROAD = "road: {loads_N: [500, 500]}\nsolver:"
+_edit("loads_not_rising", "road.loads_N", "must rise", "solver:", ROAD)
+_edit("negative_load", "road.loads_N.1", "greater than 0", "solver:", ROAD.replace(", 5", ", -5"))
+_edit("no_loads", "road.loads_N", "at least 1", "solver:", "road: {loads_N: []}\nsolver:")
+_edit("slippery", "road.friction", "at least 0", "solver:", "road: {friction: -0.1}\nsolver:")
+_edit(
+    "around",
+    "road.element_angles_deg",
+    "sum 180, got 190",
+    "solver:",
+    "road: {element_angles_deg: [10, 180]}\nsolver:",
+)
+_edit("road_key", "road.frction", "'friction'", "solver:", "road: {frction: 0.1}\nsolver:")
 _edit("no_modes", "analysis.modes_per_harmonic", "at least 1", "per_harmonic: 2", "per_harmonic: 0")
 _edit("solver_number", "solver.name", "must be text", "name: bundled", "name: 7")
 _edit("no_time", "solver.time_limit_s", "greater than 0", "time_limit_s: 300", "time_limit_s: 0")

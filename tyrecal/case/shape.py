@@ -10,7 +10,7 @@ from pydantic import BaseModel, ValidationError
 
 from .mistakes import Keys, suggestion
 from .parts import WRONG
-from .schema import Case, Cord, RebarLayer, Rubber, TargetMode, Variable
+from .schema import Case, Cord, RebarLayer, Road, Rubber, TargetMode, Variable
 
 UNIONS = (Union, UnionType)
 KINDS: dict[str, type[BaseModel]] = {"rubber": Rubber, "cord": Cord}
@@ -104,6 +104,7 @@ def disagreements(data: Mapping[str, Any]) -> Iterator[tuple[Keys, str]]:
     parts += [(("variables", k), v, Variable) for k, v in table(data, "variables").items()]
     for i, mode in enumerate(entries(table(data, "targets"), "modes")):
         parts.append((("targets", "modes", i), mode, TargetMode))
+    parts.append((("road",), table(data, "road"), Road))
     for keys, part, kind in parts:
         if isinstance(part, dict):
             for key, message in kind.problems(part):

@@ -125,6 +125,8 @@ def _set_raw(raw: Any, case: Any, tree: Any) -> Any:
         return tree
     fields = case.__dict__ if isinstance(case, BaseModel) else case
     if isinstance(fields, list):
-        return [_set_raw(r, fields[i], tree[i]) if i in tree else r for i, r in enumerate(raw)]
+        return [
+            _set_raw(r, fields[i], tree[i]) if i in tree else r for i, r in enumerate(raw or fields)
+        ]
     new = {k: _set_raw((raw or {}).get(k), fields[k], branch) for k, branch in tree.items()}
     return {**(raw or {}), **new}

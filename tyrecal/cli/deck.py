@@ -14,6 +14,7 @@ from . import options
     options.case_argument,
     options.assignments,
     options.pressure,
+    options.loads,
     options.mesh,
     options.solver,
     options.output,
@@ -24,6 +25,7 @@ def command(
     case: Path,
     assignments: tuple[str, ...],
     pressure_kPa: float | None,
+    loads: str | None,
     mesh: str,
     solver: str,
     output: Path | None,
@@ -35,15 +37,20 @@ def command(
     \b
     tyrecal deck cases/p235_75r17.yaml --output decks
     python -m tyrecal_solvers.bundled decks/modes --oldjob inflate
+    tyrecal deck cases/p235_75r17.yaml --output pressed --loads-N 3000,5000
     """
     from ..deck.write import Decks
-    from ..evaluate.solver import find_solver
+    from ..evaluate.door import Door
     from .output import Run, print_json, say
 
     loaded, values = options.load(case, mesh, assignments, pressure_kPa)
-    adapter = find_solver(solver or loaded.case.solver.name)
-    gradients = tuple(values) if "gradients" in adapter.capabilities else ()
-    decks = Decks(loaded, values, gradients)
+    door = Door(loaded, solver)
+    adapter = door.solver
+    if loads is not None:
+        door.needs_road()
+        decks = Decks(loaded, values, loads_N=tuple(options.parse_loads(loads)))
+    else:
+        decks = Decks(loaded, values, tuple(values) if door.has_gradients else ())
     decks.texts(adapter.dialect)  # a template that fails leaves the folder untouched
     run = Run(case, output, "deck", adapter)
     paths = [str(path) for path in adapter.write(decks, run.folder)]

@@ -20,6 +20,7 @@ COMMANDS = {  # name: one line of help, so that the overview imports no command
     "modes": "Evaluate one design: frequencies with their labels.",
     "fit": "Calibrate the case's variables to its target frequencies.",
     "sweep-pressure": "Follow every mode over the inflation pressure.",
+    "footprint": "Press the tyre on a road: contact area and pressure over load.",
     "solvers": "List the installed solvers and what they can do.",
     "store": "Look at a record of evaluations, check it, prune it.",
 }

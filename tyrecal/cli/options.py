@@ -61,6 +61,12 @@ pressure = click.option(
     metavar="P",
     help="Inflation pressure (default: the case's).",
 )
+loads = click.option(
+    "--loads-N",
+    "loads",
+    metavar="F1,F2,...",
+    help="Vertical loads on the road, rising (footprint's default: the case's road.loads_N).",
+)
 
 
 def every(*options: Callable[[Any], Any]) -> Callable[[Any], Any]:
@@ -100,6 +106,35 @@ def load(path: Path, mesh_level: str, assigned: tuple[str, ...], pressure_kPa: f
         raise
     except ValueError as error:
         raise click.UsageError(str(error)) from None
+
+
+def parse_loads(text: str) -> list[float]:
+    """Loads in N. Raises click.UsageError."""
+    from itertools import pairwise
+    from math import isfinite
+
+    loads: list[float] = []
+    for word in text.split(","):
+        try:
+            loads.append(float(word))
+        except ValueError:
+            raise click.UsageError(f"--loads-N: '{word.strip()}' is not a number") from None
+        if not (isfinite(loads[-1]) and loads[-1] > 0):
+            raise click.UsageError(f"--loads-N {loads[-1]:g}: must be a finite load above 0")
+    for before, after in pairwise(loads):
+        if after <= before:
+            raise click.UsageError(f"--loads-N: {after:g} after {before:g}, loads must rise")
+    return loads
+
+
+def fitted_values(path: Path, loaded: Any, solver: str) -> dict[str, float]:
+    """The design of a fit.json. Raises click.UsageError where it is not this case's."""
+    from ..studies.fitted import NotThisFit, read_fitted
+
+    try:
+        return read_fitted(path, loaded, solver)
+    except NotThisFit as error:
+        raise click.UsageError(f"--fitted: {error}") from None
 
 
 def _once(pairs: list[tuple[str, float]], pressure_kPa: float | None) -> dict[str, float]:

@@ -79,7 +79,7 @@ def command(
     adapter = door.solver
     designs = {"initial": values}
     if fitted:
-        designs["fitted"] = _fitted(fitted, loaded, solver)
+        designs["fitted"] = options.fitted_values(fitted, loaded, solver)
     run = Run(case, output, "sweep-pressure", adapter)
     door.folder, door.keep = run.runs, verbose
     door.store = run.open_store(store, no_store)
@@ -143,12 +143,3 @@ def _pressures(
     if low >= high:
         raise click.UsageError(f"--from-kPa {low:g} must be less than --to-kPa {high:g}")
     return [round(float(p), 9) for p in np.linspace(low, high, steps)]
-
-
-def _fitted(path: Path, loaded: Any, solver: str) -> dict[str, float]:
-    from ..studies.fitted import NotThisFit, read_fitted
-
-    try:
-        return read_fitted(path, loaded, solver)
-    except NotThisFit as error:
-        raise click.UsageError(f"--fitted: {error}") from None

@@ -10,7 +10,8 @@ from ..tyre.gauges import with_gauges
 from ..tyre.mesh import SectionMesh, build_mesh
 from ..tyre.section import Section
 
-REFERENCE_NODE = 900001
+REFERENCE_NODE, ROAD_NODE = 900001, 900002
+CLEARANCE = 0.05  # m from the section, not inflated, to the road
 
 
 def section_mesh(case: LoadedCase) -> SectionMesh:
@@ -88,6 +89,14 @@ def context(case: LoadedCase) -> dict[str, Any]:
         "increments": c.analysis.static_increments,
         "vibration_frequency": c.analysis.vibration_frequency_Hz,
         "sectors": c.analysis.sectors,
+        "road": {
+            "reference_node": ROAD_NODE,
+            "height": max(r for r, _ in mesh.nodes.values()) + CLEARANCE,
+            "angles": c.road.element_angles_deg + c.road.element_angles_deg[::-1],
+            "stiffness": c.road.stiffness_Pa_per_m,
+            "friction": c.road.friction,
+            "elastic_slip": c.road.elastic_slip_m,
+        },
     }
 
 
@@ -167,6 +176,7 @@ def _tables(
         ],
         "regions": [{"name": f"REGION_{deck_name(k)}", "members": v} for k, v in regions.items()],
         "inner": mesh.inner,
+        "outer": mesh.outer,
         "rim": mesh.rim,
         "crown": mesh.crown_outer,
         "reference_node": REFERENCE_NODE,

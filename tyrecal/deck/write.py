@@ -19,7 +19,8 @@ class Decks:
     """Texts of a case's decks, rendered when asked for.
 
     values: design variables already in ``case``; gradients: those whose places in the deck are
-    wanted; modes_per_harmonic: the case's, or a larger number for a second look.
+    wanted; modes_per_harmonic: the case's, or a larger number for a second look; loads_N: press
+    the tyre on the road with these instead of finding modes.
     """
 
     def __init__(
@@ -28,12 +29,15 @@ class Decks:
         values: Mapping[str, float] | None = None,
         gradients: tuple[str, ...] = (),
         modes_per_harmonic: int | None = None,
+        loads_N: tuple[float, ...] = (),
     ):
         self.case, self.values, self.gradients = case, dict(values or {}), gradients
+        self.loads_N = loads_N
         analysis = case.case.analysis
         self.request: dict[str, Any] = {
             "highest_harmonic": analysis.highest_harmonic,
             "modes_per_harmonic": modes_per_harmonic or analysis.modes_per_harmonic,
+            "loads_N": loads_N,
         }
 
     def texts(self, dialect: str) -> dict[str, str]:
@@ -78,11 +82,13 @@ def _abaqus(case: LoadedCase, env: Any, request: Mapping[str, Any]) -> dict[str,
     names = context(case)
     names["mesh_block"] = _mesh_block(env, names["mesh"])
     names["modes"] = 2 * request["modes_per_harmonic"] * (request["highest_harmonic"] + 1)
-    return {f"{job}.inp": render(env, f"{job}.inp.j2", names) for job in ("inflate", "modes")}
+    names["loads"] = request["loads_N"]
+    jobs = ("inflate", "press" if names["loads"] else "modes")
+    return {f"{job}.inp": render(env, f"{job}.inp.j2", names) for job in jobs}
 
 
 def _calculix(case: LoadedCase, env: Any, request: Mapping[str, Any]) -> dict[str, str]:
-    """The sector, and a deck per nodal diameter that includes it."""
+    """The sector, its inflation, and a deck per nodal diameter that goes on from there."""
     if case.case.analysis.sectors < 4 * request["highest_harmonic"]:
         raise TemplateFailed(
             f"analysis.sectors is {case.case.analysis.sectors}, must be at least 4 times"
@@ -90,7 +96,7 @@ def _calculix(case: LoadedCase, env: Any, request: Mapping[str, Any]) -> dict[st
         )
     names = calculix_context(case)
     names["modes"] = 2 * request["modes_per_harmonic"]  # they come in pairs, n = 0 too
-    texts = {"sector.inp": render(env, "sector.inp.j2", names)}
+    texts = {f"{job}.inp": render(env, f"{job}.inp.j2", names) for job in ("sector", "inflate")}
     for n in range(request["highest_harmonic"] + 1):
         texts[f"modes_{n}.inp"] = render(env, "diameter.inp.j2", {**names, "diameter": n})
     return texts

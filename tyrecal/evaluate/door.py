@@ -1,20 +1,20 @@
-"""The one door for evaluations: a design goes in, modes or a typed failure come out."""
+"""The one door for evaluations: a design goes in, modes, footprints or a typed failure come out."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
-from typing import Any
-
-import numpy as np
+from typing import Any, TypeVar
 
 from ..case import LoadedCase, with_values
 from ..deck.write import Decks
 from . import folders
 from .failure import DeckRefused, EvaluationFailed
 from .pool import process_pool
-from .results import Evaluation, HarmonicShape, RawMode, RingShape
+from .pressed import Pressed, pressed
+from .results import Evaluation, evaluation
 from .solver import Solver, find_solver
 from .store import Store, key_of
 
@@ -24,6 +24,7 @@ CAUSES = {
     "TimedOut": "timed_out",
 }
 SETTLED = ("no_equilibrium", "unstable")  # the deck's own doing: another run would say the same
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -84,20 +85,54 @@ class Door:
         Raises EvaluationFailed; DeckRefused, TemplateFailed, CaseError where the input is wrong;
         OSError where the run folder cannot be written.
         """
+        case = self._with(question.values)
+        decks = Decks(case, question.values, question.gradients, question.modes_per_harmonic)
+        return self._ask(decks, lambda answer, kept: evaluation(answer))
+
+    def press(self, values: Mapping[str, float], loads_N: Sequence[float]) -> Pressed:
+        """One design on the road at rising loads, as far as the solver gets.
+
+        Raises what `evaluate` does; DeckRefused too where the solver has no road.
+        """
+        self.needs_road()
+        decks = Decks(self._with(values), values, loads_N=tuple(loads_N))
+        return self._ask(decks, lambda answer, kept: pressed(answer, loads_N, kept))
+
+    def needs_road(self) -> None:
+        """Raises DeckRefused where the solver cannot press a tyre on a road."""
+        if "footprint" not in self.solver.capabilities:
+            raise DeckRefused(
+                f"solver '{self.solver.name}' cannot press a tyre on a road; 'tyrecal solvers'"
+                " shows which one can (footprint)"
+            )
+
+    def _with(self, values: Mapping[str, float]) -> LoadedCase:
         try:
-            case = with_values(self.case, question.values)
+            return with_values(self.case, values)
         except ValueError as error:  # no such tyre: the optimiser steps back from it
             raise EvaluationFailed("refused", str(error)) from None
-        decks = Decks(case, question.values, question.gradients, question.modes_per_harmonic)
+
+    def _ask(self, decks: Decks, typed: Callable[[dict[str, Any], Path | None], T]) -> T:
+        """The solver's answer, or the record's, ``typed``, which is told where a run that ended
+        early is kept."""
         folder = folders.fresh(self.folder)
         solver, key = self.solver, ""
+        kept: Path | None = None
         try:
             solver.write(decks, folder)
             if self.store:
                 key = key_of(folder, solver)
-            evaluation = self._recall(key)
-            if evaluation is None:
-                evaluation = self._run(folder, key, case.case.solver.time_limit_s)
+            answer = self._recall(key)
+            if answer is not None:
+                result = typed(answer, None)
+            else:
+                limit_s = decks.case.case.solver.time_limit_s * max(1, len(decks.loads_N))
+                answer = self._run(folder, limit_s)
+                words = answer.get("failure", "")
+                kept = self._kept(folder, words) if words else None
+                result = typed(answer, kept)
+                if not words or answer.get("cause", SETTLED[0]) in SETTLED:
+                    self._record(key, {}, {"answer": answer})
         except solver.refusals as error:
             folders.drop(folder)
             raise DeckRefused(str(error)) from None
@@ -105,8 +140,8 @@ class Door:
             cause = getattr(error, "cause", None) or CAUSES.get(type(error).__name__, "crashed")
             failure = EvaluationFailed(cause, str(error), self._kept(folder, str(error)))
             if cause in SETTLED:
-                kept = str(failure.folder.resolve()) if failure.folder else None
-                content = {"cause": cause, "words": failure.words, "folder": kept}
+                place = str(failure.folder.resolve()) if failure.folder else None
+                content = {"cause": cause, "words": failure.words, "folder": place}
                 self._record(key, {"cause": cause}, content)
             raise failure from None
         except EvaluationFailed as failure:
@@ -122,24 +157,32 @@ class Door:
         except BaseException:
             folders.drop(folder)
             raise
-        if self.keep:
-            folders.keep(folder, f"{len(evaluation.modes)} modes")
-        else:
+        if self.keep and not kept:
+            folders.keep(folder, "finished")
+        elif not kept:
             folders.drop(folder)
-        return evaluation
+        return result
 
     def evaluate_all(
         self, questions: Iterable[Question], jobs: int = 1
     ) -> Iterator[Evaluation | EvaluationFailed]:
         """Answers in the order of the questions, failures among them; ``jobs`` at a time."""
+        return self._each("evaluate", [(question,) for question in questions], jobs)
+
+    def press_all(
+        self, designs: Iterable[Mapping[str, float]], loads_N: Sequence[float], jobs: int = 1
+    ) -> Iterator[Pressed | EvaluationFailed]:
+        """`press` for each design, in their order; ``jobs`` at a time."""
+        return self._each("press", [(values, loads_N) for values in designs], jobs)
+
+    def _each(self, ask: str, asked: Sequence[tuple[Any, ...]], jobs: int) -> Iterator[Any]:
         if jobs <= 1:
-            for question in questions:
-                yield _answer(self, question)
+            for arguments in asked:
+                yield _answer(self, ask, arguments)
             return
-        worker = self.worker()
         with process_pool(jobs) as pool:
-            tasks = zip(*((worker, q) for q in questions), strict=True)
-            for answer, counts in pool.map(_answer_and_count, *tasks):
+            tasks = partial(_answer_and_count, self.worker(), ask)
+            for answer, counts in pool.map(tasks, asked):
                 self.counts.add(counts)
                 yield answer
 
@@ -147,23 +190,21 @@ class Door:
         """The same door for another process, with counts of its own."""
         return Door(self.case, self.solver_name, self.folder, self.keep, self.store)
 
-    def _recall(self, key: str) -> Evaluation | None:
+    def _recall(self, key: str) -> dict[str, Any] | None:
         content = self.store.read(key) if self.store else None
         if content is None:
             return None
         self.counts.recorded += 1
         if "answer" in content:
-            return _evaluation(content["answer"])
+            answer: dict[str, Any] = content["answer"]
+            return answer
         kept = content["folder"]
         raise EvaluationFailed(content["cause"], content["words"], Path(kept) if kept else None)
 
-    def _run(self, folder: Path, key: str, time_limit_s: float) -> Evaluation:
+    def _run(self, folder: Path, time_limit_s: float) -> dict[str, Any]:
         self.counts.runs += 1
         self.solver.run(folder, time_limit_s)
-        answer = self.solver.read(folder)
-        evaluation = _evaluation(answer)
-        self._record(key, {}, {"answer": answer})
-        return evaluation
+        return self.solver.read(folder)
 
     def _record(self, key: str, about: dict[str, str], content: dict[str, Any]) -> None:
         if self.store and key:
@@ -178,40 +219,13 @@ class Door:
         return folders.keep(folder, outcome)
 
 
-def _answer(door: Door, question: Question) -> Evaluation | EvaluationFailed:
+def _answer(door: Door, ask: str, arguments: tuple[Any, ...]) -> Any:
+    """What the door's method ``ask`` returns, or the failure that it raises."""
     try:
-        return door.evaluate(question)
+        return getattr(door, ask)(*arguments)
     except EvaluationFailed as failure:
         return failure
 
 
-def _answer_and_count(
-    door: Door, question: Question
-) -> tuple[Evaluation | EvaluationFailed, Counts]:
-    return _answer(door, question), door.counts
-
-
-def _evaluation(answer: dict[str, Any]) -> Evaluation:
-    nodes, points, displacement = (  # laid out alike, so that sums are too, recorded or not
-        np.ascontiguousarray(answer[name]) for name in ("nodes", "points", "displacement")
-    )
-    modes = []
-    for mode in answer["modes"]:
-        frequency = mode["frequency_Hz"]
-        if not (np.isfinite(frequency) and frequency > 0):
-            raise EvaluationFailed("unstable", f"a mode of {frequency} Hz: the state is unstable")
-        shape: HarmonicShape | RingShape
-        if "amplitude" in mode:
-            amplitude = np.ascontiguousarray(mode["amplitude"])
-            shape = HarmonicShape(mode["n"], nodes, points, amplitude)
-        else:
-            shape = RingShape(points, np.ascontiguousarray(mode["displacement"]))
-        modes.append(RawMode(frequency, shape, mode["multiplicity"]))
-    return Evaluation(
-        pressure_kPa=answer["pressure_Pa"] / 1e3,
-        mass_kg=answer["mass_kg"],
-        modes=tuple(modes),
-        gradients={name: np.array(slope) for name, slope in answer["gradients"].items()},
-        nodes=nodes,
-        displacement=displacement,
-    )
+def _answer_and_count(door: Door, ask: str, arguments: tuple[Any, ...]) -> tuple[Any, Counts]:
+    return _answer(door, ask, arguments), door.counts

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
+
+from .failure import EvaluationFailed
 
 Array = np.ndarray
 
@@ -58,3 +61,30 @@ class Evaluation:
     gradients: dict[str, Array] = field(default_factory=dict)
     nodes: Array = field(default_factory=lambda: np.empty(0, int))
     displacement: Array = field(default_factory=lambda: np.empty((0, 3)))
+
+
+def evaluation(answer: dict[str, Any]) -> Evaluation:
+    """A solver's answer. Raises EvaluationFailed for a mode without a frequency."""
+    nodes, points, displacement = (  # laid out alike, so that sums are too, recorded or not
+        np.ascontiguousarray(answer[name]) for name in ("nodes", "points", "displacement")
+    )
+    modes = []
+    for mode in answer["modes"]:
+        frequency = mode["frequency_Hz"]
+        if not (np.isfinite(frequency) and frequency > 0):
+            raise EvaluationFailed("unstable", f"a mode of {frequency} Hz: the state is unstable")
+        shape: HarmonicShape | RingShape
+        if "amplitude" in mode:
+            amplitude = np.ascontiguousarray(mode["amplitude"])
+            shape = HarmonicShape(mode["n"], nodes, points, amplitude)
+        else:
+            shape = RingShape(points, np.ascontiguousarray(mode["displacement"]))
+        modes.append(RawMode(frequency, shape, mode["multiplicity"]))
+    return Evaluation(
+        pressure_kPa=answer["pressure_Pa"] / 1e3,
+        mass_kg=answer["mass_kg"],
+        modes=tuple(modes),
+        gradients={name: np.array(slope) for name, slope in answer["gradients"].items()},
+        nodes=nodes,
+        displacement=displacement,
+    )

@@ -13,7 +13,8 @@ class Solver(Protocol):
     """What a solver brings: one class, registered under the entry point group above.
 
     version: of the program that runs, "unknown" where it is not found; part of every record's key.
-    dialect: the template folder of its decks; capabilities: of ``modes``, ``gradients``;
+    dialect: the template folder of its decks; capabilities: of ``modes``,
+    ``gradients``, ``footprint``;
     refusals, failures: exceptions of `write`, `run` and `read` for a deck it cannot honour and
     for no solution; a failure's attribute ``cause``, where it has one, is `EvaluationFailed`'s.
     """
@@ -26,7 +27,10 @@ class Solver(Protocol):
     failures: tuple[type[Exception], ...]
 
     def write(self, decks: Any, folder: Path) -> list[Path]:
-        """Write all input files of `tyrecal.deck.Decks` into an empty folder."""
+        """Write all input files of `tyrecal.deck.Decks` into an empty folder.
+
+        ``loads_N`` is not empty only where the solver can do footprints.
+        """
 
     def run(self, folder: Path, time_limit_s: float) -> None:
         """Run to the end or raise."""
@@ -37,6 +41,10 @@ class Solver(Protocol):
 
         A solver in three dimensions gives each mode {frequency_Hz, multiplicity 1, displacement
         (k, 3)} at ``points`` (k, 3), as in `RingShape`; pairs are joined by the tool.
+
+        Where loads were asked for: pressure_Pa, mass_kg, nodes, points, angles, free_radius_m,
+        footprints [the fields of `Footprint`], of one load at least, and ``failure``: "" or why
+        the next one was not reached (its ``cause``, if not no_equilibrium).
         """
 
 

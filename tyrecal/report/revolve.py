@@ -37,7 +37,7 @@ def swept(nodes: Array, mesh: SectionMesh, angles: Array) -> Array:
     """Undeformed points (node, angle, 3), m."""
     R, Z = np.array([mesh.nodes[int(n)] for n in nodes]).T
     points = np.stack(np.broadcast_arrays(R[:, None], angles, Z[:, None]), -1)
-    return _cartesian(points, points * [1, 0, 1])
+    return cartesian(points, points * [1, 0, 1])
 
 
 def motion(mode: RawMode, nodes: Array, angles: Array, phase: float = 0.0) -> Array:
@@ -48,10 +48,10 @@ def motion(mode: RawMode, nodes: Array, angles: Array, phase: float = 0.0) -> Ar
     if not isinstance(mode.shape, HarmonicShape):
         raise NoSectionShape("only modes known on the section's nodes can be swept")
     rings = on_rings(mode.shape, nodes, angles, phase)
-    return _cartesian(rings.points, rings.displacement).reshape(len(nodes), len(angles), 3)
+    return cartesian(rings.points, rings.displacement).reshape(len(nodes), len(angles), 3)
 
 
-def _cartesian(points: Array, vectors: Array) -> Array:
+def cartesian(points: Array, vectors: Array) -> Array:
     """Vectors with components (r, theta, z) at points (R, Theta, Z), in x, y, z."""
     cos, sin = np.cos(points[..., 1]), np.sin(points[..., 1])
     r, theta, z = np.moveaxis(vectors, -1, 0)

@@ -111,6 +111,37 @@ def sweep_csv(rows: Sequence[Mapping[str, Any]]) -> str:
     return text.getvalue()
 
 
+FOOTPRINT = {  # key of a row: heading, unit over SI, decimals
+    "load_N": ("load N", 1.0, 0),
+    "deflection_m": ("deflection mm", 1e3, 2),
+    "area_m2": ("area cm²", 1e4, 1),
+    "length_m": ("length mm", 1e3, 1),
+    "width_m": ("width mm", 1e3, 1),
+    "mean_pressure_Pa": ("mean kPa", 1e-3, 1),
+    "peak_pressure_Pa": ("peak kPa", 1e-3, 1),
+    "vertical_stiffness_N_per_m": ("stiffness N/mm", 1e-3, 1),
+}
+
+
+def footprint_table(rows: Sequence[Mapping[str, Any]]) -> Table:
+    """The rows of footprint.json, a line a load."""
+    table = _table(("design", *(heading for heading, _, _ in FOOTPRINT.values())))
+    for row in rows:
+        cells = (f"{row[key] * unit:.{n}f}" for key, (_, unit, n) in FOOTPRINT.items())
+        _add(table, row["design"], *cells)
+    table.caption = "mean and peak: contact pressure; stiffness: tangent at the load"
+    return table
+
+
+def footprint_csv(rows: Sequence[Mapping[str, Any]]) -> str:
+    """The rows of footprint.json as CSV, SI units, all digits."""
+    text = io.StringIO()
+    writer = csv.DictWriter(text, ["design", *FOOTPRINT], lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    return text.getvalue()
+
+
 SOLVER_COLUMNS = ("solver", "version", "decks", "can do")
 
 
@@ -127,7 +158,7 @@ def _table(columns: tuple[str, ...]) -> Table:
     # figures never break: on a narrow terminal only names and words do
     table = Table(box=box.SIMPLE_HEAD, padding=(0, 0, 0, 1), pad_edge=False, show_edge=False)
     for name in columns:
-        figures = name not in ("mode", "motion", "curvature", *SOLVER_COLUMNS)
+        figures = name not in ("mode", "motion", "curvature", "design", *SOLVER_COLUMNS)
         table.add_column(name, justify="right" if figures else "left", no_wrap=figures,
                          overflow="fold")  # fmt: skip
     return table

@@ -1,4 +1,4 @@
-"""A mode on the revolved tyre, for ParaView."""
+"""The revolved tyre for ParaView: a mode, or the tyre pressed on the road."""
 
 from __future__ import annotations
 
@@ -7,10 +7,13 @@ from pathlib import Path
 import meshio
 import numpy as np
 
+from ..evaluate.pressed import Footprint, Pressed
 from ..files import whole
 from ..modes.mode import Mode
 from ..tyre.mesh import SectionMesh
-from .revolve import corners, motion, swept
+from .revolve import cartesian, corners, motion, swept
+
+WIDEST = np.radians(5.0)  # between rings of points of the pressed tyre
 
 
 def write_vtu(path: Path, mode: Mode, mesh: SectionMesh, sectors: int = 60) -> None:
@@ -27,10 +30,50 @@ def write_vtu(path: Path, mode: Mode, mesh: SectionMesh, sectors: int = 60) -> N
     fields = {"mode": motion(mode.raw, nodes, angles)}
     if mode.label.c:
         fields["second_of_pair"] = motion(mode.raw, nodes, angles, np.pi / 2)
+    _write(path, grid, swept(nodes, mesh, angles), fields)
+
+
+def write_pressed_vtu(
+    path: Path, pressed: Pressed, footprint: Footprint, mesh: SectionMesh
+) -> None:
+    """Write the deformed tyre at a load, in the axes of `write_vtu`, the road square to +x.
+
+    Points in m, deformed; point data ``displacement`` in m, in x, y, z, of inflation and load
+    together, and ``contact_pressure`` in Pa, interpolated where rings are far apart. Raises
+    OSError.
+    """
+    grid = corners(mesh)
+    nodes, row = grid.ravel(), {int(node): i for i, node in enumerate(pressed.nodes)}
+    field = np.zeros((len(pressed.angles), len(row), 4))
+    field[..., :3] = footprint.displacement
+    field[footprint.ring, [row[int(n)] for n in footprint.node], 3] = footprint.pressure_Pa
+    angles, field = _refined(pressed.angles, field[:, [row[int(n)] for n in nodes]])
+    place = np.stack(np.broadcast_arrays(0.0, angles, 0.0), -1)
+    u = cartesian(place, np.moveaxis(field[..., :3], 0, 1))
+    fields = {"displacement": u, "contact_pressure": field[..., 3].T}
+    _write(path, grid, swept(nodes, mesh, angles) + u, fields)
+
+
+def _refined(angles: np.ndarray, field: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Angles, and a field (angle, ...) linear between them, with no gap wider than ``WIDEST``."""
+    gaps = np.diff(angles, append=angles[0] + 2 * np.pi)
+    parts = np.ceil(gaps / WIDEST - 1e-9).astype(int)
+    ring = np.repeat(np.arange(len(angles)), parts)
+    share = np.concatenate([np.arange(count) / count for count in parts])
+    following = field[(ring + 1) % len(angles)]
+    weight = share.reshape(-1, *[1] * (field.ndim - 1))
+    return angles[ring] + share * gaps[ring], (1 - weight) * field[ring] + weight * following
+
+
+def _write(path: Path, grid: np.ndarray, points: np.ndarray, fields: dict[str, np.ndarray]) -> None:
+    """Points and fields (node, angle, ...) on the grid of corner nodes swept round."""
     tyre = meshio.Mesh(
-        swept(nodes, mesh, angles).reshape(-1, 3),
-        [("hexahedron", _hexahedra(grid.shape, sectors))],
-        point_data={name: field.reshape(-1, 3) for name, field in fields.items()},
+        points.reshape(-1, 3),
+        [("hexahedron", _hexahedra(grid.shape, points.shape[1]))],
+        point_data={
+            name: field.reshape(grid.size * points.shape[1], *field.shape[2:])
+            for name, field in fields.items()
+        },
     )
     with whole(path) as partial:
         tyre.write(partial, file_format="vtu")

@@ -17,8 +17,8 @@ class SectionMesh:
 
     nodes: number to (r, z) in m; solids: number to corner (and midside) nodes, counter-clockwise
     in (r, z); ``cells``: number of a solid to (region, row); ``cords``: line name to
-    {number: nodes}, running from -z to +z; rim: nodes that the rim holds; inner: solids whose
-    face S4 is the inner surface; shape: (elements along, rows).
+    {number: nodes}, running from -z to +z; rim: nodes that the rim holds; inner, outer: solids
+    whose faces S4, S2 are the inner, the outer surface; shape: (elements along, rows).
     """
 
     quadratic: bool
@@ -28,8 +28,15 @@ class SectionMesh:
     cords: dict[str, dict[int, tuple[int, ...]]]
     rim: list[int]
     inner: list[int]
+    outer: list[int]
     shape: tuple[int, int]
     crown_outer: list[int] = field(default_factory=list)
+
+    @property
+    def outer_nodes(self) -> list[int]:
+        """Nodes of the outer surface from -z to +z, midside ones too."""
+        faces = (self.solids[number] for number in self.outer)
+        return sorted({nodes[k] for nodes in faces for k in (1, 2, 5) if k < len(nodes)})
 
 
 def build_mesh(
@@ -66,7 +73,7 @@ def build_mesh(
             nodes[number(i, j)] = (float(grid[i, j, 0]), float(grid[i, j, 1]))
             if rigid[j]:
                 rim.append(number(i, j))
-    solids, cells, inner = {}, {}, []
+    solids, cells, inner, outer = {}, {}, [], []
     for j in range(0, width - 1, step):
         for i in range(0, height - 1, step):
             corners = [(i, j), (i + step, j), (i + step, j + step), (i, j + step)]
@@ -77,6 +84,8 @@ def build_mesh(
             cells[name] = regions[j], i // step
             if i == 0:
                 inner.append(name)
+            if i + step == height - 1:
+                outer.append(name)
     edges = np.concatenate([[0], np.cumsum(rows)]) * step
     cords = {}
     for k, line in enumerate(section.names[1:-1], start=1):
@@ -88,7 +97,7 @@ def build_mesh(
             if present[k, j : j + step + 1].all()
         }
     crown = [j for j in range(width) if present[-2, j]] or list(range(width))
-    outer = [number(height - 1, j) for j in crown]
+    crown_outer = [number(height - 1, j) for j in crown]
     return SectionMesh(
         quadratic,
         nodes,
@@ -97,8 +106,9 @@ def build_mesh(
         cords,
         rim,
         inner,
-        ((width - 1) // step, (height - 1) // step),
         outer,
+        ((width - 1) // step, (height - 1) // step),
+        crown_outer,
     )
 
 

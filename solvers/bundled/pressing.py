@@ -1,0 +1,222 @@
+"""The inflated tyre pressed on the road: Newton's method for its displacements and the road's
+height at a given load, preconditioned GMRES inside, loads one after the other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from .band import Indefinite
+from .blockwise import Elimination, Factor
+from .fold import Fold
+from .gmres import gmres
+from .revolved import Inverted, Revolved
+from .road import Contact, Road
+
+Array = np.ndarray
+TOLERANCE = 1e-8  # out-of-balance force over the load
+LONGEST = 40  # Newton iterations a load
+TIRED = 20  # GMRES iterations of a step, after which the preconditioner is formed anew
+LONGEST_LINEAR = 60
+EXACT = 1e-2  # residual of the linear problem, relative
+PATIENCE = 2  # steps that may fail to halve the residual, with Coulomb's friction
+NEAR = 1e-2  # as loosely as that, before Coulomb's friction is tried
+SHORTEST = 1 / 64  # step of the line search
+TOUCH = 1e-6  # m/N of deflection to begin with: it must touch, and stay small
+LARGEST = 0.5  # step, share of the load
+SOFTEST = 1 / 16  # share of a load's increase, below which it counts as unreachable
+
+
+class NotPressed(ArithmeticError):
+    """No equilibrium with the road at a load."""
+
+    cause = "no_equilibrium"
+
+
+@dataclass
+class Pressed:
+    """An equilibrium: parts (2, k, q, 3) of the displacements, the road's height (m), contact,
+    and the tangent vertical stiffness dF / d(deflection), N/m."""
+
+    parts: Array
+    height: float
+    contact: Contact
+    stiffness: float
+
+
+class Press:
+    """Presses a tyre from its inflated state ``U`` (k, n, 3) to rising loads."""
+
+    def __init__(self, tyre: Revolved, fold: Fold, road: Road, U: Array, check: Callable[[], None]):
+        self.tyre, self.fold, self.check = tyre, fold, check
+        self.road = road
+        tyre.residual(U)
+        self.order = Elimination([t[0] for t in tyre.tangents()], fold, tyre.around)
+        self.parts = fold.parts(U)
+        self.free_radius = float(self.road.positions(U)[..., 0].max())
+        self.height = self.free_radius
+        self.load = 0.0
+        self._before: tuple[Array, float, float] | None = None
+        self._normal = np.zeros_like(road.area)
+        self._factor: Factor | None = None
+        self._used = 0
+        self.factorisations = self.products = self.iterations = 0
+
+    def to(self, load: float) -> Pressed:
+        """The equilibrium at ``load`` (N), in steps of half of it at most, for friction acts on
+        what touched before, and in smaller ones where need be. Raises NotPressed."""
+        step = min(load - self.load, LARGEST * load)
+        smallest = SOFTEST * step
+        while True:
+            self.check()
+            target = min(self.load + step, load)
+            self._factor = None
+            try:
+                found = self._newton(target)
+            except (NotPressed, Indefinite, Inverted) as error:
+                step /= 2
+                self._before = None
+                if step < smallest:
+                    raise NotPressed(
+                        f"no equilibrium between {self.load:.4g} and {target:.4g} N: {error}"
+                    ) from None
+                continue
+            self._before = self.parts, self.height, self.load
+            self.parts, self.height, self.load = found.parts, found.height, target
+            self.road = self.road.settled(found.contact)
+            if target == load:
+                return found
+
+    def _start(self, load: float) -> tuple[Array, float]:
+        """Where the last two equilibria point to."""
+        if self._before is None or not self._before[2]:
+            return self.parts, self.height - (TOUCH * load if self.load == 0 else 0.0)
+        parts, height, before = self._before
+        ahead = (load - self.load) / (self.load - before)
+        return self.parts + ahead * (self.parts - parts), self.height + ahead * (
+            self.height - height
+        )
+
+    def _state(
+        self, parts: Array, height: float, load: float, bound: Array | None
+    ) -> tuple[Array, float, Contact]:
+        """Residuals: forces on the parts, and half the load less the contact's."""
+        U = self.fold.spread(parts)
+        forces = self.tyre.residual(U)
+        contact = self.road.forces(U, height, bound)
+        force = self.fold.gather(forces + contact.nodal(U.shape))
+        return force, (load - contact.force) / 2, contact
+
+    def _newton(self, load: float) -> Pressed:
+        """By Tresca's friction, with the last normal forces, to where Coulomb's converges."""
+        parts, height = self._start(load)
+        normal, near = self._normal, NEAR
+        for _ in range(LONGEST):
+            parts, height, contact = self._settle(parts, height, load, normal, near)
+            try:
+                parts, height, contact = self._settle(parts, height, load, None, TOLERANCE)
+            except NotPressed:
+                normal, near = contact.local[..., 0], max(0.1 * near, TOLERANCE)
+                continue
+            self._normal = contact.local[..., 0]
+            return Pressed(parts, height, contact, self._stiffness(contact))
+        raise NotPressed("the friction did not settle")
+
+    def _settle(
+        self, parts: Array, height: float, load: float, bound: Array | None, tolerance: float
+    ) -> tuple[Array, float, Contact]:
+        """Newton's method, with an energy line search where the friction is bounded; with
+        Coulomb's friction it is left as soon as it does not converge."""
+        force, lacking, contact = self._state(parts, height, load, bound)
+        size = float(np.hypot(np.linalg.norm(force), lacking))
+        setbacks = 0
+        for _ in range(LONGEST):
+            self.check()
+            if size <= tolerance * load:
+                return parts, height, contact
+            self.iterations += 1
+            energy = self.tyre.potential() + contact.energy + load / 2 * height
+            step, rise = self._step(contact, force, lacking)
+            slope = float((force * step).sum() + lacking * rise)
+            length, before = 1.0, size
+            while True:
+                ahead = parts + length * step, height + length * rise
+                try:
+                    force, lacking, contact = self._state(*ahead, load, bound)
+                    size = float(np.hypot(np.linalg.norm(force), lacking))
+                    total = self.tyre.potential() + contact.energy + load / 2 * ahead[1]
+                    lower = total <= energy + 1e-4 * length * slope
+                    if bound is None or lower or size < 0.5 * before:
+                        break
+                except Inverted:
+                    pass
+                length /= 2
+                if length < SHORTEST:
+                    raise NotPressed("the line search found no lower energy")
+            parts, height = ahead
+            setbacks += size > 0.5 * before
+            if bound is None and setbacks > PATIENCE:
+                break
+        raise NotPressed(f"Newton's method did not converge in {LONGEST} iterations")
+
+    def _step(self, contact: Contact, force: Array, lacking: float) -> tuple[Array, float]:
+        """Newton's step of the parts and of the road's height."""
+        border = _Border(self.fold, contact)
+        right = -np.append(force.ravel(), lacking * border.scale)
+        if self._used > TIRED:
+            self._factor = None  # its memory goes first
+        found, self._used, left = self._solve(border, contact, right, EXACT)
+        if not left <= 0.1:
+            raise NotPressed("the tangent is too far from a stable one")
+        return found[:-1].reshape(force.shape), float(found[-1]) * border.scale
+
+    def _solve(
+        self, border: _Border, contact: Contact, right: Array, tolerance: float
+    ) -> tuple[Array, int, float]:
+        if self._factor is None:
+            stiffness = contact.stiffness(self.fold.shape[0], self.fold.shape[1])
+            self._factor = Factor(self.order, self.tyre.tangents(), stiffness)
+            self.factorisations += 1
+        factor, shape, scale = self._factor, self.parts.shape, border.scale
+        answer = factor.solve(border.by_height)
+        schur = border.stiffness - float((border.of_force * answer).sum())
+
+        def product(v: Array) -> Array:
+            self.products += 1
+            parts, rise = v[:-1].reshape(shape), v[-1] * scale
+            V = self.fold.spread(parts)
+            image = self.fold.gather(self.tyre.product(V) + contact.product(V))
+            image += border.by_height * rise
+            more = float((border.of_force * parts).sum()) + border.stiffness * rise
+            return np.append(image.ravel(), more * scale)
+
+        def precondition(v: Array) -> Array:
+            y = factor.solve(v[:-1].reshape(shape))
+            rise = (v[-1] / scale - float((border.of_force * y).sum())) / schur
+            return np.append((y - answer * rise).ravel(), rise / scale)
+
+        return gmres(product, precondition, right, tolerance, LONGEST_LINEAR)
+
+    def _stiffness(self, contact: Contact) -> float:
+        """dF / d(deflection): the whole tyre's force against the road's rise, tyre following."""
+        border = _Border(self.fold, contact)
+        unit = np.append(np.zeros(self.parts.size), border.scale)
+        found = self._solve(border, contact, unit, 1e-6)[0]
+        return 2 / (float(found[-1]) * border.scale)
+
+
+class _Border:
+    """The road's height as one more unknown: its row and column of the tangent, of half the
+    tyre. ``scale`` brings it to the size of the displacements."""
+
+    def __init__(self, fold: Fold, contact: Contact):
+        by_height = -contact.K[..., 0]
+        of_force = np.zeros_like(by_height)
+        of_force[..., 0] = by_height[..., 0]
+        self.by_height = fold.gather(contact.nodal(fold.shape, by_height))
+        self.of_force = fold.gather(contact.nodal(fold.shape, of_force))
+        self.stiffness = float(contact.K[..., 0, 0].sum())
+        self.scale = max(self.stiffness, 1.0) ** -0.5

@@ -1,0 +1,157 @@
+"""A rigid flat road under the tyre: unilateral contact and Coulomb friction at nodes.
+
+The road's normal is the vertical at theta = 0, downwards; its distance from the axle is H. With
+c = cos theta, s = sin theta of a node's reference angle its depth and its place in the road are
+
+    d = c (R + u_r) - s u_theta,   x = s (R + u_r) + c u_theta,   z = Z + u_z
+
+    pressure = k <d - H>,   traction = mu pressure min(|slip| / e, 1) slip / |slip|
+
+with the overclosure's stiffness k and the elastic slip e; slip counts from where a node stood
+when the last load had been reached, plus the elastic slip that it had then. A node that did not
+touch then has not slipped yet.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .circumference import Circumference
+from .section import Lines
+
+Array = np.ndarray
+FARTHEST = np.pi / 3  # from the vertical: no node beyond it can touch
+
+
+@dataclass(frozen=True)
+class Road:
+    """Contact at nodes (k, c) of half the circumference.
+
+    nodes (c,): rows of the section; area (k, c): reference area that a node stands for, m2;
+    stiffness: Pa/m; friction: coefficient; elastic_slip: m; anchor (k, c, 2), m: where slip
+    counts from, for nodes that ``touched`` (k, c) at the last load.
+    """
+
+    nodes: Array
+    area: Array
+    frame: Array
+    origin: Array
+    stiffness: float
+    friction: float
+    elastic_slip: float
+    anchor: Array
+    touched: Array
+
+    def positions(self, U: Array) -> Array:
+        """Depth, and place in the road along and across (k, c, 3), m."""
+        u = U[: len(self.area), self.nodes]
+        return np.asarray(self.origin + np.einsum("kij,kcj->kci", self.frame, u))
+
+    def forces(self, U: Array, height: float, bound: Array | None = None) -> Contact:
+        """Forces and tangents at a state U (k, n, 3) with the road at ``height`` (m).
+
+        ``bound`` (k, c): normal forces that limit the friction (Tresca), instead of those of the
+        state itself (Coulomb).
+        """
+        at = self.positions(U)
+        overclosure = at[..., 0] - height
+        touching = overclosure > 0
+        normal = self.stiffness * self.area * np.where(touching, overclosure, 0.0)
+        slip = (at[..., 1:] - self.anchor) * self.touched[..., None]
+        length = np.maximum(np.linalg.norm(slip, axis=-1), 1e-300)
+        sticking = length <= self.elastic_slip
+        share = slip / np.where(sticking, self.elastic_slip, length)[..., None]
+        pressed = normal if bound is None else bound
+        local = np.concatenate([normal[..., None], self.friction * pressed[..., None] * share], -1)
+        K = np.zeros((*normal.shape, 3, 3))
+        stiff = self.stiffness * self.area * touching
+        K[..., 0, 0] = stiff
+        if bound is None:
+            K[..., 1:, 0] = self.friction * stiff[..., None] * share
+        reach = self.friction * pressed / np.where(sticking, self.elastic_slip, length)
+        reach = reach * self.touched
+        K[..., 1:, 1:] = reach[..., None, None] * np.eye(2)
+        sliding = np.where(sticking, 0.0, reach)[..., None, None]
+        K[..., 1:, 1:] -= sliding * share[..., :, None] * share[..., None, :]
+        overlap = (self.stiffness * self.area * np.maximum(overclosure, 0.0) ** 2).sum() / 2
+        e = self.elastic_slip
+        path = np.where(sticking, length**2 / (2 * e), length - e / 2) * self.touched
+        energy = float(overlap + self.friction * (pressed * path).sum())
+        return Contact(self, at, local, K, energy)
+
+    def settled(self, contact: Contact) -> Road:
+        """The road after a load was reached: slip counts anew, less the elastic one."""
+        slip = contact.positions[..., 1:] - self.anchor
+        length = np.maximum(np.linalg.norm(slip, axis=-1, keepdims=True), 1e-300)
+        elastic = slip * np.minimum(self.elastic_slip / length, 1.0)
+        touched = contact.local[..., 0] > 0
+        elastic *= (touched & self.touched)[..., None]
+        return replace(self, anchor=contact.positions[..., 1:] - elastic, touched=touched)
+
+
+@dataclass(frozen=True)
+class Contact:
+    """Forces of the tyre on the road (k, c, 3), N, in the road's frame: down, along, across; of
+    half the tyre. K (k, c, 3, 3): their derivatives by the nodes' positions. energy, J: stored
+    and dissipated, their potential where the friction is bounded beforehand."""
+
+    road: Road
+    positions: Array
+    local: Array
+    K: Array
+    energy: float
+
+    @property
+    def force(self) -> float:
+        """Vertical force of the whole tyre, N."""
+        return 2 * float(self.local[..., 0].sum())
+
+    def nodal(self, shape: tuple[int, ...], local: Array | None = None) -> Array:
+        """Forces on the road as a field (k, n, 3) in the frame of the reference angle."""
+        field = np.zeros(shape)
+        turned = np.einsum("kij,kci->kcj", self.road.frame, self.local if local is None else local)
+        field[: len(turned), self.road.nodes] = turned
+        return field
+
+    def product(self, V: Array) -> Array:
+        """Tangent times a field (k, n, 3)."""
+        v = np.einsum("kij,kcj->kci", self.road.frame, V[: len(self.local), self.road.nodes])
+        return self.nodal(V.shape, np.einsum("kcij,kcj->kci", self.K, v))
+
+    def stiffness(self, angles: int, nodes: int) -> Array:
+        """What of it is positive (k, n, 3, 3), in the frame of the reference angle: all but the
+        friction's growth with the pressure."""
+        K = self.K.copy()
+        K[..., 1:, 0] = 0.0
+        field = np.zeros((angles, nodes, 3, 3))
+        turned = np.einsum("kai,kcab,kbj->kcij", self.road.frame, K, self.road.frame)
+        field[: len(turned), self.road.nodes] = turned
+        return field
+
+
+def flat_road(
+    X: Array,
+    tread: Lines,
+    around: Circumference,
+    stiffness: float,
+    friction: float,
+    elastic_slip: float,
+) -> Road:
+    """The road under the nodes of the surface ``tread``. X (n, 2): R, Z of the section, m."""
+    share = np.zeros(len(X))
+    np.add.at(share, tread.connectivity, (tread.weights * tread.R) @ tread.N)
+    nodes = np.flatnonzero(share)
+    near = around.angles < FARTHEST
+    c, s = np.cos(around.angles[near]), np.sin(around.angles[near])
+    frame = np.zeros((len(c), 3, 3))
+    frame[:, 0, 0], frame[:, 0, 1] = c, -s
+    frame[:, 1, 0], frame[:, 1, 1] = s, c
+    frame[:, 2, 2] = 1.0
+    R, Z = X[nodes].T
+    origin = np.stack([c[:, None] * R, s[:, None] * R, np.broadcast_to(Z, (len(c), len(Z)))], -1)
+    area = around.shares[near][:, None] * share[nodes]
+    return Road(
+        nodes, area, frame, origin, stiffness, friction, elastic_slip, origin[..., 1:], area < 0
+    )

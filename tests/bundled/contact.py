@@ -1,0 +1,119 @@
+"""Rings and tyres round half the circumference, for the tests of the tyre on the road."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from tyrecal_solvers.bundled.circumference import Circumference, half_circle
+from tyrecal_solvers.bundled.fold import Fold
+from tyrecal_solvers.bundled.mechanics import Load
+from tyrecal_solvers.bundled.model import Model
+from tyrecal_solvers.bundled.pressing import Press
+from tyrecal_solvers.bundled.revolved import Revolved
+from tyrecal_solvers.bundled.road import Road, flat_road
+
+from . import support
+from .support import Rubber
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True)
+class Round:
+    """A section with the surface TREAD, its loads and inflated state U (n, 3); free (n, 3)."""
+
+    model: Model
+    free: Array
+    loads: list[Load]
+    U: Array
+
+    def tyre(self, around: Circumference) -> Revolved:
+        return Revolved(self.model, self.loads, around)
+
+    def fold(self, around: Circumference, parity: int = 1) -> Fold:
+        return Fold(self.model.mesh, self.free, len(around.angles), parity)
+
+    def road(
+        self, around: Circumference, stiffness: float, friction: float = 0.0, slip: float = 1e-5
+    ) -> Road:
+        mesh = self.model.mesh
+        return flat_road(mesh.X, mesh.faces["TREAD"], around, stiffness, friction, slip)
+
+    def everywhere(self, around: Circumference) -> Array:
+        """The inflated state at all angles (k, n, 3)."""
+        return np.repeat(self.U[None], len(around.angles), 0)
+
+    def press(
+        self,
+        lengths: Array,
+        stiffness: float,
+        friction: float = 0.0,
+        slip: float = 1e-5,
+        check: Callable[[], None] = lambda: None,
+    ) -> Press:
+        around = half_circle(lengths)
+        road = self.road(around, stiffness, friction, slip)
+        return Press(self.tyre(around), self.fold(around), road, self.everywhere(around), check)
+
+
+def ring(
+    radii: Array | Sequence[float],
+    half_width: float,
+    columns: int,
+    rubber: Rubber,
+    pressure: float = 0.0,
+    plane: bool = False,
+    quadratic: bool = True,
+) -> Round:
+    """A rubber ring on a rigid hub, elements between ``radii`` and of ``columns`` (even) across;
+    ``plane``: no displacement along the axle."""
+    across = np.linspace(-half_width, half_width, columns + 1)
+    return _round(radii, across, rubber, pressure, plane, quadratic, lambda r, z: (r, z))
+
+
+def ball(
+    radii: Array | Sequence[float], latitudes: Array | Sequence[float], rubber: Rubber
+) -> Round:
+    """A rubber ball about a point of the axle, on a rigid core; latitudes (rad) >= 0."""
+    across = np.concatenate([-np.asarray(latitudes)[:0:-1], latitudes])
+    polar = lambda r, angle: (r * np.cos(angle), r * np.sin(angle))
+    return _round(radii, across, rubber, 0.0, False, True, polar)
+
+
+def _round(
+    radii: Array | Sequence[float],
+    across: Array,
+    rubber: Rubber,
+    pressure: float,
+    plane: bool,
+    quadratic: bool,
+    place: Callable[[Array, Array], tuple[Array, Array]],
+) -> Round:
+    rows, columns = len(radii) - 1, len(across) - 1
+    b = support.block((0.0, rows, rows), (0.0, columns, columns), quadratic)
+    first = np.interp(b.X[:, 0], np.arange(rows + 1), radii)
+    second = np.interp(b.X[:, 1], np.arange(columns + 1), across)
+    X = np.stack(place(first, second), -1)
+    text = support.deck(X, b.solids, rubber, (), b.inner)
+    outer = [len(b.solids) - columns + i + 1 for i in range(columns)]
+    m = support.model_of(with_tread(text, outer))
+    held = support.held(m, list(np.flatnonzero(b.where(0, 0.0))), plane)
+    loads = support.cavity(m, pressure) if pressure else []
+    U = support.inflate(m, held, loads) if pressure else np.zeros((len(X), 3))
+    return Round(m, ~held, loads, U)
+
+
+def with_tread(text: str, elements: Sequence[int], face: str = "S2") -> str:
+    return text + "\n".join(["*SURFACE, NAME=TREAD", *(f"{e}, {face}" for e in elements), ""])
+
+
+def graded(first: float, ratio: float, total: float, largest: float = np.inf) -> Array:
+    """Lengths from ``first`` on, each ``ratio`` times the one before, that fill ``total``."""
+    lengths = [first]
+    while sum(lengths) < total:
+        lengths.append(min(lengths[-1] * ratio, largest))
+    excess = sum(lengths) - total
+    shares = np.array(lengths) - first  # the first ones keep theirs
+    return np.array(lengths) - excess * shares / shares.sum()

@@ -1,0 +1,94 @@
+"""Footprints through the door: the same from the record, nothing believed that is not whole."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tyrecal.evaluate.door import Door
+from tyrecal.evaluate.failure import EvaluationFailed
+from tyrecal.evaluate.store import Store
+
+from ..studies.hertz import Hertz
+from .stand_in import CASE
+
+LOADS = (500.0, 4000.0)
+
+
+def door(folder: Path, **changes: Any) -> Door:
+    solver = Hertz()
+    for name, value in changes.items():
+        setattr(solver, name, value)
+    return Door(CASE, folder=folder / "runs", store=Store(folder / "record"), _solver=solver)
+
+
+def test_the_record_answers_the_same_and_other_loads_are_another_question(tmp_path: Path) -> None:
+    first, second = door(tmp_path), door(tmp_path)
+    run, recorded = first.press({}, LOADS), second.press({}, LOADS)
+    assert (first.counts.runs, second.counts.runs, second.counts.recorded) == (1, 0, 1)
+    for one, other in zip(run.footprints, recorded.footprints, strict=True):
+        for name, value in vars(one).items():
+            assert np.array_equal(value, getattr(other, name)), name
+    second.press({}, LOADS[:1])
+    assert second.counts.runs == 1
+    assert not list((tmp_path / "runs").iterdir())
+
+
+def test_a_load_not_reached_is_on_record_and_its_run_is_kept(tmp_path: Path) -> None:
+    first = door(tmp_path, reach=1e3).press({}, LOADS)
+    assert first.failed and first.failed.folder and first.failed.folder.exists()
+    assert (first.failed.folder / "press.inp").exists()
+    again = door(tmp_path)
+    recorded = again.press({}, LOADS)
+    assert again.counts.runs == 0 and len(recorded.footprints) == 1
+    assert recorded.failed and recorded.failed.words == first.failed.words
+
+
+def test_time_that_ran_out_is_not_on_record(tmp_path: Path) -> None:
+    slow = door(tmp_path, reach=1e3)
+    read = slow.solver.read
+    slow.solver.read = lambda folder: {**read(folder), "cause": "timed_out"}  # type: ignore[method-assign]
+    pressed = slow.press({}, LOADS)
+    assert pressed.failed and pressed.failed.cause == "timed_out"
+    again = door(tmp_path)
+    assert again.press({}, LOADS).failed is None and again.counts.runs == 1
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda answer: answer["footprints"].pop(), "footprints at"),
+        (lambda answer: answer["footprints"].clear(), "footprints at"),
+        (lambda answer: answer["footprints"].reverse(), "footprints at"),
+        (lambda answer: answer.update(failure="no more"), "footprints at"),
+        (lambda answer: answer["footprints"][0].update(road_N=400.0), "bears 400 N of 500 N"),
+        (lambda answer: answer["footprints"][0].update(road_N=float("nan")), "bears nan N"),
+    ],
+)
+def test_answers_that_are_not_whole(change: Any, words: str, tmp_path: Path) -> None:
+    wrong = door(tmp_path)
+    read = wrong.solver.read
+
+    def changed(folder: Path) -> dict[str, Any]:
+        answer = read(folder)
+        change(answer)
+        return answer
+
+    wrong.solver.read = changed  # type: ignore[method-assign]
+    with pytest.raises(EvaluationFailed, match=words) as failure:
+        wrong.press({}, LOADS)
+    assert failure.value.cause == "no_results"
+    assert failure.value.folder and failure.value.folder.exists()
+    assert not list((tmp_path / "record").glob("*/*"))
+
+
+def test_each_load_has_the_time_of_a_run(tmp_path: Path) -> None:
+    asked = door(tmp_path)
+    limits: list[float] = []
+    asked.solver.run = lambda folder, limit: limits.append(limit)  # type: ignore[method-assign]
+    asked.press({}, LOADS)
+    asked.press({}, LOADS[:1])
+    assert limits == [600.0, 300.0] == [n * CASE.case.solver.time_limit_s for n in (2, 1)]

@@ -1,0 +1,142 @@
+"""The pressed tyre drawn, tabulated and written for ParaView."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import meshio
+import numpy as np
+import pytest
+from matplotlib.collections import QuadMesh
+from matplotlib.figure import Figure
+from PIL import Image
+from rich.console import Console
+
+from tyrecal.deck.context import section_mesh
+from tyrecal.evaluate.door import Door
+from tyrecal.evaluate.pressed import Pressed
+from tyrecal.report import footprint
+from tyrecal.report.footprint import draw_curves, draw_footprint
+from tyrecal.report.table import footprint_csv, footprint_table
+from tyrecal.report.vtu import write_pressed_vtu
+from tyrecal.studies.footprint import footprint_result
+
+from ..evaluate.stand_in import CASE
+from ..studies.hertz import ANGLES, FREE, Hertz
+from .test_vtu import volume
+
+LOADS = [500.0, 1000.0, 2000.0, 4000.0, 8000.0]
+MESH = section_mesh(CASE)
+BOTH = {"initial": MESH, "fitted": MESH}
+
+
+@pytest.fixture(scope="module")
+def designs() -> dict[str, Pressed]:
+    door = Door(CASE, _solver=Hertz())
+    return {"initial": door.press({}, LOADS), "fitted": door.press({"A_belt": 1e-7}, LOADS[:4])}
+
+
+@pytest.fixture
+def drawn(monkeypatch: pytest.MonkeyPatch) -> list[Figure]:
+    """The figures that were saved."""
+    figures: list[Figure] = []
+    save = footprint.save
+    monkeypatch.setattr(footprint, "save", lambda f, path: (figures.append(f), save(f, path)))
+    return figures
+
+
+def rows(designs: dict[str, Pressed]) -> list[dict]:
+    return footprint_result({}, LOADS, designs, BOTH)["rows"]
+
+
+def test_every_load_of_every_design_in_one_scale(
+    drawn: list[Figure], designs: dict[str, Pressed], tmp_path: Path
+) -> None:
+    draw_footprint(tmp_path, designs, BOTH, rows(designs))
+    names = {path.name for path in tmp_path.iterdir()}
+    assert {"footprint.png", "footprint_initial.png", "footprint_fitted.png"} < names
+    assert {f"footprint_initial_{load:g}N.vtu" for load in LOADS} < names
+    assert len(names) == 3 + 5 + 4
+    _, initial, fitted = drawn
+    limits = set()
+    for figure, count in ((initial, 5), (fitted, 4)):
+        panels = [axes for axes in figure.axes if axes.get_title("left")]
+        assert [axes.get_title("left") for axes in panels] == [f"{x:g} N" for x in LOADS[:count]]
+        assert all(axes.get_aspect() == 1.0 for axes in panels)
+        assert len({axes.get_xlim() + axes.get_ylim() for axes in panels}) == 1
+        (bar,) = (axes for axes in figure.axes if axes.get_ylabel() == "kPa")
+        limits.add(bar.get_ylim())
+        assert any(isinstance(each, QuadMesh) for each in bar.collections)
+    assert len(limits) == 1
+    with Image.open(tmp_path / "footprint_initial.png") as image:
+        assert image.format == "PNG" and max(image.size) < 2000
+        assert 0.05 < (np.asarray(image.convert("L")) < 245).mean() < 0.5
+
+
+def test_area_and_deflection_of_both_designs(
+    drawn: list[Figure], designs: dict[str, Pressed], tmp_path: Path
+) -> None:
+    table = rows(designs)
+    draw_curves(tmp_path / "footprint.png", table)
+    left, right = drawn[0].axes
+    assert [text.get_text() for text in left.get_legend().get_texts()] == ["initial", "fitted"]
+    assert [line.get_linestyle() for line in left.lines] == ["--", "-"]
+    assert list(left.lines[1].get_xdata()) == [0.5, 1, 2, 4]
+    assert left.lines[0].get_ydata()[3] == pytest.approx(1e4 * table[3]["area_m2"])
+    assert right.lines[0].get_ydata()[3] == pytest.approx(20.0)
+
+
+def test_one_design_and_one_load(tmp_path: Path) -> None:
+    pressed = Door(CASE, _solver=Hertz()).press({}, [3000.0])
+    draw_footprint(tmp_path, {"initial": pressed}, BOTH, rows({"initial": pressed}))
+    assert len(list(tmp_path.iterdir())) == 3
+
+
+def test_the_deformed_tyre(designs: dict[str, Pressed], tmp_path: Path) -> None:
+    """Flat on the road at +x, whole, with the solver's own numbers on its rings."""
+    pressed = designs["initial"]
+    at = pressed.footprints[3]
+    write_pressed_vtu(tmp_path / "tyre.vtu", pressed, at, MESH)
+    result = meshio.read(tmp_path / "tyre.vtu")
+    (block,) = result.cells
+    along, lines = MESH.shape
+    turns = len(result.points) // ((along + 1) * (lines + 1))
+    assert len(block.data) == along * lines * turns and turns >= 72
+    assert result.points[:, 0].max() == pytest.approx(FREE - at.deflection_m)
+    corners = result.points[block.data]
+    whole = volume(result.points[block.data] - result.point_data["displacement"][block.data])
+    assert 0.9 * whole < volume(corners) < whole
+    pressure = result.point_data["contact_pressure"]
+    touching = pressure > 0.02 * pressure.max()
+    assert pressure.max() == pytest.approx(at.pressure_Pa.max())
+    assert abs(result.points[touching, 2]).max() < 0.09  # along: half the patch and a ring
+    assert abs(result.points[touching, 1]).max() < 0.06
+    top = np.argmin(result.points[:, 0])
+    assert np.linalg.norm(result.point_data["displacement"][top]) < 1e-12
+
+
+def test_between_rings_far_apart_points_are_added(
+    designs: dict[str, Pressed], tmp_path: Path
+) -> None:
+    """15 degrees of the formula's rings become three times five."""
+    pressed = designs["initial"]
+    write_pressed_vtu(tmp_path / "tyre.vtu", pressed, pressed.footprints[0], MESH)
+    points = meshio.read(tmp_path / "tyre.vtu").points
+    angles = np.unique(np.round(np.degrees(np.arctan2(-points[:, 2], points[:, 0])), 6) % 360)
+    rings = np.degrees(ANGLES)
+    assert all(np.abs(angles - ring).min() < 1 for ring in rings)  # the patch moved some a little
+    assert np.diff(np.sort(angles)).max() < 5.01
+
+
+def test_table_and_csv(designs: dict[str, Pressed]) -> None:
+    table = rows(designs)
+    lines = footprint_csv(table).splitlines()
+    assert lines[0] == ("design,load_N,deflection_m,area_m2,length_m,width_m,mean_pressure_Pa,"
+                        "peak_pressure_Pa,vertical_stiffness_N_per_m")  # fmt: skip
+    assert len(lines) == 1 + 9
+    assert [float(x) for x in lines[4].split(",")[1:]] == list(table[3].values())[1:]
+    console = Console(width=110)
+    with console.capture() as text:
+        console.print(footprint_table(table))
+    shown = text.get()
+    assert "area cm²" in shown and "20.00" in shown and "125.7" in shown and "300.0" in shown

@@ -1,0 +1,171 @@
+"""The footprint's own arithmetic, on tyres pressed by a formula."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tyrecal.case import load_case
+from tyrecal.deck.context import section_mesh
+from tyrecal.evaluate.door import Door
+from tyrecal.evaluate.failure import DeckRefused, EvaluationFailed
+from tyrecal.evaluate.pressed import Pressed
+from tyrecal.studies.footprint import findings, footprint_result, footprint_row, press
+from tyrecal.studies.patch import Patch, patch_of
+
+from ..evaluate.stand_in import CASE, StandIn
+from .hertz import BELT, Hertz, coarse_case
+
+LOADS = [500.0, 4000.0]
+MESH = section_mesh(CASE)
+START = {"A_belt": BELT}
+
+
+def door(reach: float = 20e3) -> Door:
+    solver = Hertz()
+    solver.reach = reach
+    return Door(CASE, _solver=solver)
+
+
+def test_numbers_of_a_hertzian_patch() -> None:
+    """Ellipse of half axes 80 and 50 mm under 4 kN: 125.7 cm2, its peak 1.5 times the mean."""
+    pressed = door().press(START, LOADS)
+    row = footprint_row(pressed, pressed.footprints[1], MESH)
+    assert row["load_N"] == 4000 and row["deflection_m"] == pytest.approx(0.02)
+    assert row["area_m2"] == pytest.approx(np.pi * 0.08 * 0.05)
+    assert row["mean_pressure_Pa"] == pytest.approx(4000 / row["area_m2"])
+    assert row["peak_pressure_Pa"] == pytest.approx(1.5 * row["mean_pressure_Pa"], rel=0.03)
+    assert row["vertical_stiffness_N_per_m"] == pytest.approx(1.5 * 4000 / 0.02)
+    # rings stand 10.2 mm apart, nodes across 5.6 mm: an extent is uncertain by as much
+    assert row["length_m"] == pytest.approx(0.16, abs=0.0102)
+    assert row["width_m"] == pytest.approx(0.10, abs=0.0056)
+
+
+def test_the_patch_is_where_the_solver_says_and_in_order() -> None:
+    pressed = door().press(START, LOADS)
+    footprint = pressed.footprints[1]
+    patch = patch_of(pressed, footprint, MESH)
+    assert patch.touches.sum() == len(footprint.node)
+    for ours, theirs in (
+        (patch.along, footprint.along_m),
+        (patch.across, footprint.across_m),
+        (patch.pressure, footprint.pressure_Pa),
+    ):
+        assert sorted(ours[patch.touches]) == pytest.approx(sorted(theirs), abs=1e-12)
+    middle = patch.touches.any(axis=1)
+    assert (np.diff(patch.along[middle], axis=0)[:, patch.touches.any(axis=0)] > 0).all()
+    assert patch.along[middle].mean() == pytest.approx(0, abs=1e-9)
+
+
+def test_extents_end_half_way_to_the_next_node() -> None:
+    along, across = np.meshgrid([-3.0, -1.0, 0.0, 2.0, 5.0], [-4.0, 0.0, 2.0, 3.0], indexing="ij")
+    touches = np.zeros(along.shape, bool)
+    touches[1:4, 1:3] = True
+    patch = Patch(along, across, 0.0 * along, touches)
+    assert patch.length_m == 3.5 - -2.0 and patch.width_m == 2.5 - -2.0
+    everywhere = Patch(along, across, 0.0 * along, touches | True)  # no next node to the mesh's end
+    assert everywhere.length_m == 8.0 and everywhere.width_m == 7.0
+
+
+def test_both_designs_and_what_they_say() -> None:
+    designs = {"initial": START, "fitted": {"A_belt": 0.5 * BELT}}
+    told: list[str] = []
+    outcomes = press(door(), designs, LOADS, notify=lambda name, outcome: told.append(name))
+    assert told == ["initial", "fitted"]
+    result = footprint_result(designs, LOADS, outcomes, {name: MESH for name in designs})
+    assert [(row["design"], row["load_N"]) for row in result["rows"]] == [
+        ("initial", 500), ("initial", 4000), ("fitted", 500), ("fitted", 4000)
+    ]  # fmt: skip
+    assert result["failed"] == [] and result["pressure_kPa"] == {"initial": 240, "fitted": 240}
+    found = result["findings"]
+    ratio = 2 ** (2 * 0.05)
+    assert [x["ratio"] for x in found["fitted_over_initial"]] == pytest.approx([ratio, ratio])
+    assert found["words"][0] == (
+        "the fitted tyre's area is larger than the initial one's at every load:"
+        " +7.2 % at 500 N, +7.2 % at 4000 N"
+    )
+    mean = 4000 / (np.pi * 0.08 * 0.05) / 240e3
+    assert found["mean_over_inflation"]["initial"][1]["ratio"] == pytest.approx(mean)
+
+
+@pytest.mark.parametrize(
+    ("areas", "words"),
+    [((1.1, 0.9, 1.2), "at all loads but 2000 N: +10.0 % at 1000 N, -10.0 % at 2000 N"),
+     ((1.0, 0.9, 0.8), "at no load: +0.0 % at 1000 N")],
+)  # fmt: skip
+def test_areas_that_do_not_grow_are_said(areas: tuple[float, ...], words: str) -> None:
+    rows = [
+        {"design": design, "load_N": load, "area_m2": area, "mean_pressure_Pa": 240e3}
+        for design, own in (("initial", (1.0, 1.0, 1.0)), ("fitted", areas))
+        for load, area in zip((1e3, 2e3, 3e3), own, strict=True)
+    ]
+    found = findings(rows, {"initial": 240.0, "fitted": 120.0})
+    assert words in found["words"][0]
+    assert found["words"][1].endswith("1.00 of the inflation pressure, within the usual 0.8 to 1.6")
+    assert "outside the usual 0.8 to 1.6 at 1000 N (2.00), 2000 N" in found["words"][2]
+    assert findings(rows[:3], {"initial": 0.0}) == {
+        "fitted_over_initial": [], "mean_over_inflation": {}, "words": []
+    }  # fmt: skip
+
+
+def test_a_load_out_of_reach_keeps_those_below() -> None:
+    outcomes = press(door(3000.0), {"initial": START}, LOADS)
+    pressed = outcomes["initial"]
+    assert isinstance(pressed, Pressed) and pressed.failed is not None
+    assert len(pressed.footprints) == 1 and pressed.failed.cause == "no_equilibrium"
+    result = footprint_result({"initial": START}, LOADS, outcomes, {"initial": MESH})
+    assert result["failed"] == [{"design": "initial", "load_N": 4000, "cause": "no_equilibrium",
+                                 "words": "the rim is on the road at 3000 N"}]  # fmt: skip
+    (failed,) = press(door(100.0), {"initial": START}, LOADS).values()
+    assert isinstance(failed, EvaluationFailed) and "rim" in failed.words
+
+
+def test_a_solver_without_a_road_says_so() -> None:
+    with pytest.raises(DeckRefused, match="'stand-in' cannot press a tyre on a road"):
+        Door(CASE, _solver=StandIn()).press(START, LOADS)  # type: ignore[arg-type]
+
+
+def test_the_bundled_solvers_own_footprints(tmp_path: Path) -> None:
+    """Its loads are borne, by rim and road; it says where it touches; it is the same after half a
+    turn; forces over deflections are the tangents' mean."""
+    case = load_case(coarse_case(tmp_path))
+    mesh = section_mesh(case)
+    loads = [2000.0, 2500.0]
+    pressed = Door(case).press({}, loads)
+    assert pressed.failed is None and 12 < pressed.mass_kg < 14
+    assert 0.39 < pressed.free_radius_m < 0.40
+    for footprint, load in zip(pressed.footprints, loads, strict=True):
+        assert footprint.road_N == pytest.approx(load, rel=1e-6)
+        assert footprint.rim_N == pytest.approx([load, 0, 0], abs=1e-5 * load)
+        pressure, area = footprint.pressure_Pa, footprint.area_m2
+        assert (pressure > 0).all() and pressure @ area == pytest.approx(load, rel=0.02)
+        patch = patch_of(pressed, footprint, mesh)
+        assert sorted(patch.along[patch.touches]) == pytest.approx(sorted(footprint.along_m))
+        assert sorted(patch.across[patch.touches]) == pytest.approx(sorted(footprint.across_m))
+        turned = sorted(zip(-footprint.along_m, -footprint.across_m, pressure, strict=True))
+        same = sorted(zip(footprint.along_m, footprint.across_m, pressure, strict=True))
+        np.testing.assert_allclose(turned, same, rtol=1e-5, atol=1e-9)
+        slip = np.linalg.norm(footprint.traction_Pa, axis=1)
+        assert (slip <= 0.5 * pressure * (1 + 1e-6)).all()
+    first, second = (footprint_row(pressed, each, mesh) for each in pressed.footprints)
+    assert second["area_m2"] > first["area_m2"]
+    chord = 500 / (second["deflection_m"] - first["deflection_m"])
+    tangents = [row["vertical_stiffness_N_per_m"] for row in (first, second)]
+    assert chord == pytest.approx(np.mean(tangents), rel=0.1)
+
+
+def test_a_patch_of_another_design_of_the_same_mesh() -> None:
+    """Nodes that the solver adds, like the rim's reference, are no matter."""
+    pressed = door().press(START, LOADS)
+    footprint = pressed.footprints[0]
+    more = replace(
+        pressed,
+        nodes=np.append(pressed.nodes, 900001),
+        points=np.vstack([pressed.points, (0.0, 0.0)]),
+    )
+    u = np.concatenate([footprint.displacement, np.zeros((len(pressed.angles), 1, 3))], axis=1)
+    row = footprint_row(more, replace(footprint, displacement=u), MESH)
+    assert row == footprint_row(pressed, footprint, MESH)

@@ -1,0 +1,149 @@
+"""tyrecal footprint"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from . import options
+from .main import EXIT_SOLVER
+
+DESIGNS = ("initial", "fitted")
+
+
+@click.command()
+@options.every(options.case_argument, options.assignments, options.pressure, options.loads)
+@click.option(
+    "--fitted",
+    type=click.Path(path_type=Path, exists=True, dir_okay=False),
+    metavar="fit.json",
+    help="Press the design that 'tyrecal fit' found for this case, too.",
+)
+@click.option("--compare", metavar="initial,fitted",
+              help="Designs to press (default: initial, and fitted where --fitted is given)."
+              )  # fmt: skip
+@click.option("--pictures/--no-pictures", default=True, help="Draw the patches; write VTU.")
+@options.every(
+    options.jobs,
+    options.mesh,
+    options.solver,
+    options.output,
+    options.store,
+    options.no_store,
+    options.as_json,
+    options.quiet,
+    options.verbose,
+)
+def command(
+    case: Path,
+    assignments: tuple[str, ...],
+    pressure_kPa: float | None,
+    loads: str | None,
+    fitted: Path | None,
+    compare: str | None,
+    pictures: bool,
+    jobs: int,
+    mesh: str,
+    solver: str,
+    output: Path | None,
+    store: Path | None,
+    no_store: bool,
+    as_json: bool,
+    quiet: bool,
+    verbose: bool,
+) -> int:
+    """Press the tyre of CASE on a flat road, load after load.
+
+    Writes footprint.json, .csv and .png: contact area, length, width, mean and peak pressure,
+    deflection and vertical stiffness; the pressure in the patch as a picture, the deformed tyre as
+    VTU. --set NAME=VALUE on a variable changes the initial design, on any other number both.
+
+    \b
+    tyrecal footprint cases/p235_75r17.yaml
+    tyrecal footprint cases/p235_75r17.yaml --fitted p235_75r17/fit.json --jobs 2
+    tyrecal footprint cases/p235_75r17.yaml --loads-N 3000,5000 --set road.friction=0 --json
+    """
+    from ..evaluate.door import Door
+    from ..evaluate.pressed import Pressed
+    from ..report.table import footprint_csv, footprint_table
+    from ..studies.footprint import footprint_result, press, progress
+    from .output import Run, print_json, say, show
+
+    loaded, values = options.load(case, mesh, assignments, pressure_kPa)
+    asked = options.parse_loads(loads) if loads is not None else loaded.case.road.loads_N
+    door = Door(loaded, solver)
+    adapter = door.solver
+    door.needs_road()
+    fitted = _fit_compared(compare, fitted, (output or Path(case.stem)) / "fit.json")
+    designs = _designs(compare, values, fitted, loaded, solver)
+    run = Run(case, output, "footprint", adapter)
+    door.folder, door.keep = run.runs, verbose
+    door.store = run.open_store(store, no_store)
+
+    def notify(design: str, outcome: Any) -> None:
+        reached, failure = progress(outcome)
+        if failure:
+            text = f"error: {design}, {asked[reached]:g} N: {failure}"
+            click.secho(text, fg="red", err=True)
+        elif verbose and not quiet:
+            click.echo(f"{design}: {reached} loads", err=True)
+
+    outcomes = press(door, designs, asked, jobs, notify)
+    pressed = {name: each for name, each in outcomes.items() if isinstance(each, Pressed)}
+    if not pressed:
+        return EXIT_SOLVER
+    meshes = {name: _mesh(loaded, designs[name]) for name in pressed}
+    result = footprint_result(designs, asked, outcomes, meshes)
+    run.write_json("footprint.json", result)
+    run.write_text("footprint.csv", footprint_csv(result["rows"]))
+    if pictures:
+        from ..report.footprint import draw_footprint
+
+        draw_footprint(run.folder, pressed, meshes, result["rows"])
+    run.finish(solver_runs=door.counts.runs, answered_from_record=door.counts.recorded)
+    if as_json:
+        print_json(result)
+    else:
+        show(footprint_table(result["rows"]), as_json, quiet)
+    for sentence in result["findings"]["words"]:
+        say(sentence, as_json, quiet)
+    if result["failed"]:
+        text = "error: not every load was reached; the loads below it are kept"
+        click.secho(text, fg="red", err=True)
+    say(f"results in {run.folder}", as_json, quiet)
+    return EXIT_SOLVER if result["failed"] else 0
+
+
+def _fit_compared(compare: str | None, fitted: Path | None, own: Path) -> Path | None:
+    """The fit to press: as given, else the one in the results folder where it is asked for."""
+    if fitted or "fitted" not in (compare or "").split(","):
+        return fitted
+    if not own.exists():
+        raise click.UsageError(f"--compare fitted needs --fitted fit.json: there is no '{own}'")
+    return own
+
+
+def _designs(
+    compare: str | None, values: dict[str, float], fitted: Path | None, loaded: Any, solver: str
+) -> dict[str, dict[str, float]]:
+    """Values of the variables by design. Raises click.UsageError."""
+    names = DESIGNS[: 2 if fitted else 1] if compare is None else tuple(compare.split(","))
+    for name in names:
+        if name not in DESIGNS:
+            raise click.UsageError(f"--compare: '{name}' is no design, only {', '.join(DESIGNS)}")
+    if len(set(names)) < len(names):
+        raise click.UsageError("--compare: a design is named twice")
+    designs = {"initial": values}
+    if fitted and "fitted" in names:
+        designs["fitted"] = options.fitted_values(fitted, loaded, solver)
+    return {name: designs[name] for name in names}
+
+
+def _mesh(loaded: Any, values: dict[str, float]) -> Any:
+    """The section's mesh of a design; gauges can be variables."""
+    from ..case import with_values
+    from ..deck.context import section_mesh
+
+    return section_mesh(with_values(loaded, values))

@@ -1,0 +1,99 @@
+"""What pressing a tyre on the road returns, whichever solver ran: the patch at each load."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .failure import EvaluationFailed
+
+Array = np.ndarray
+BALANCE = 0.01  # of the load, by which the road's force may differ from it
+
+
+@dataclass(frozen=True)
+class Footprint:
+    """The tyre at one load.
+
+    road_N: resultant of the contact pressure; rim_N (3,): reaction at the rim: down, then along y
+    (the axle) and z; deflection_m: of the axle since the tyre was free; stiffness_N_per_m: tangent
+    d force / d deflection. Of each node that touches (p,): ``ring`` (place among the angles) and
+    ``node`` (deck number), along_m and across_m in the road, pressure_Pa, area_m2, which it stands
+    for, traction_Pa (p, 2). displacement (ring, node, 3): r, theta, z at the reference angle, m.
+    contact_area_m2: of a solver that places the patch's edge between nodes, else None.
+    """
+
+    load_N: float
+    road_N: float
+    rim_N: Array
+    deflection_m: float
+    stiffness_N_per_m: float
+    ring: Array
+    node: Array
+    along_m: Array
+    across_m: Array
+    pressure_Pa: Array
+    area_m2: Array
+    traction_Pa: Array
+    displacement: Array
+    contact_area_m2: float | None = None
+
+
+@dataclass(frozen=True)
+class Pressed:
+    """One design at rising loads.
+
+    nodes (n,): deck numbers; points (n, 2): R, Z in m, not inflated; angles (k,): of the rings,
+    rad from the patch's middle, 0 <= angle < 2 pi; free_radius_m: inflated, without a load.
+    failed: why the load after the last footprint was not reached, or None.
+    """
+
+    pressure_kPa: float
+    mass_kg: float
+    nodes: Array
+    points: Array
+    angles: Array
+    free_radius_m: float
+    footprints: tuple[Footprint, ...]
+    failed: EvaluationFailed | None = None
+
+
+def pressed(answer: dict[str, Any], loads_N: Sequence[float], kept: Path | None) -> Pressed:
+    """A solver's answer to ``loads_N``, of a run ``kept`` there.
+
+    Raises EvaluationFailed where it does not hold the loads in their order, one at least, each
+    borne by the road.
+    """
+    found = tuple(
+        Footprint(**{k: _plain(v) for k, v in each.items()}) for each in answer["footprints"]
+    )
+    words, reached = answer["failure"], [each.load_N for each in found]
+    asked = np.allclose(reached, loads_N[: len(found)], rtol=1e-9) if found else False
+    if not asked or bool(words) == (len(found) == len(loads_N)):
+        raise EvaluationFailed("no_results", f"footprints at {reached} N of {list(loads_N)} N")
+    for each in found:
+        if not abs(each.road_N - each.load_N) <= BALANCE * each.load_N:
+            raise EvaluationFailed(
+                "no_results", f"the road bears {each.road_N:g} N of {each.load_N:g} N"
+            )
+    return Pressed(
+        pressure_kPa=answer["pressure_Pa"] / 1e3,
+        mass_kg=answer["mass_kg"],
+        nodes=np.ascontiguousarray(answer["nodes"]),
+        points=np.ascontiguousarray(answer["points"]),
+        angles=np.ascontiguousarray(answer["angles"]),
+        free_radius_m=answer["free_radius_m"],
+        footprints=found,
+        failed=EvaluationFailed(answer.get("cause", "no_equilibrium"), words, kept)
+        if words
+        else None,
+    )
+
+
+def _plain(value: Any) -> Any:
+    """Arrays laid out alike, so that sums are too, recorded or not; numbers as floats."""
+    return np.ascontiguousarray(value) if np.ndim(value) else float(value)
