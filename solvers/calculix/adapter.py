@@ -89,6 +89,7 @@ class CalculiX:
             for name in (start, ended):
                 (folder / name).unlink(missing_ok=True)
 
+        _check_rubber(folder / SECTOR)
         jobs, state = [job for _, job in _jobs(folder)], folder / f"{INFLATE}.rout"
         for job in (INFLATE, *jobs):
             clear(folder, job)
@@ -178,6 +179,21 @@ def _jobs(folder: Path) -> list[tuple[int, str]]:
     """Nodal diameter and job name of each deck."""
     decks = folder.glob("modes_*.inp")
     return sorted((int(path.stem.removeprefix("modes_")), path.stem) for path in decks)
+
+
+def _check_rubber(path: Path) -> None:
+    """ccx gives frequencies of rubber that is none: it looks for eigenvalues next to zero, and
+    does not see the negative ones. Raises RunFailed (``unstable``)."""
+    for row in re.findall(r"\*HYPERELASTIC[^\n]*\n([^\n*]*)", path.read_text()):
+        try:
+            *shear, D1 = (float(value) for value in row.split(","))
+        except ValueError:
+            continue  # ccx complains of it
+        if sum(shear) <= 0 or D1 <= 0:
+            raise RunFailed(
+                "unstable",
+                f"{path.name}: rubber of C10 + C01 = {sum(shear):g}, D1 = {D1:g} is unstable",
+            )
 
 
 def _find(pattern: str, path: Path) -> str:

@@ -64,6 +64,7 @@ CUT_INFLATION, CUT_MODES = INFLATE[: INFLATE.index("*DLOAD")], MODES[: MODES.ind
         ({"inflate": INFLATE.replace("240000", "inf")}, "crashed", "code 255"),
         ({"inflate": INFLATE.replace("INC=1000", "INC=1")}, "no_equilibrium", "max. # of"),
         ({"sector": sector(C10=1e4)}, "no_equilibrium", "inflated state"),
+        ({"sector": sector(C10=-1e8)}, "unstable", "rubber of C10"),
         ({"modes_2": MODES.replace("STEP=1", "STEP=3")}, "crashed", "code 201"),
     ],
 )  # fmt: skip
