@@ -41,11 +41,9 @@ class Elimination:
         self.fold, self.around = fold, around
         place = np.full(fold.shape[1], -1)
         place[fold.nodes] = np.arange(len(fold.nodes))
-        other = np.empty(fold.shape[1], int)
-        other[fold.nodes], other[fold.beyond] = fold.beyond, fold.nodes
-        chosen: list[
-            tuple[Array, ...]
-        ] = []  # elements on z >= 0, their images, and their nodes' places in the quarter
+        other = fold.other
+        # elements on z >= 0, their images, and their nodes' places in the quarter
+        chosen: list[tuple[Array, ...]] = []
         beyond = ~np.isin(np.arange(fold.shape[1]), fold.nodes)
         inner = (place >= 0) & (other != np.arange(fold.shape[1]))
         for c in connectivities:

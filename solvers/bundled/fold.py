@@ -28,7 +28,8 @@ class NotSymmetric(ValueError):
 class Fold:
     """Fields (k, n, 3) on half the circumference as parts (2, k, q, 3) on the nodes z >= 0.
 
-    mesh; free (n, 3); angles k; parity p. Raises NotSymmetric.
+    mesh; free (n, 3); angles k; parity p; ``other`` (n,): each node's mirror image.
+    Raises NotSymmetric.
     """
 
     def __init__(self, mesh: Mesh, free: Array, angles: int, parity: int = 1):
@@ -37,6 +38,7 @@ class Fold:
         other = np.array([places.get((r, -z), -1) for r, z in np.round(X / SAME_PLACE).astype(int)])
         if (other < 0).any() or (free != free[other]).any():
             raise NotSymmetric("the section or its supports differ between z and -z")
+        self.other = other
         self.nodes = np.flatnonzero(X[:, 1] > -SAME_PLACE)
         self.beyond = other[self.nodes]
         self.parity, self.shape = parity, (angles, len(X), 3)

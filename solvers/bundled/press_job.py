@@ -135,13 +135,10 @@ def press(
             " round the circumference: take CGAX8R",
         )
     tread = model.mesh.faces[data.tread]
-    try:
-        fold = Fold(model.mesh, equations.equation < equations.size, k)
-    except NotSymmetric as error:
-        raise DeckError(0, f"a pressed tyre must be symmetric: {error}") from None
     road = flat_road(model.mesh.X, tread, around, data.stiffness, data.friction, data.elastic_slip)
     tyre = Revolved(model, loads, around)
     try:
+        fold = Fold(model.mesh, equations.equation < equations.size, k)
         work = Press(tyre, fold, road, np.repeat(U[None], k, 0), check)
     except NotSymmetric as error:
         raise DeckError(0, f"a pressed tyre must be symmetric: {error}") from None
@@ -172,8 +169,7 @@ def _footprint(work: Press, found: Pressed, load: float, tread: Any) -> dict[str
     fold, around = work.fold, work.tyre.around
     U = fold.spread(found.parts)
     contact = found.contact
-    other = np.empty(fold.shape[1], int)
-    other[fold.nodes], other[fold.beyond] = fold.beyond, fold.nodes
+    other = fold.other
     turned = np.empty_like(U)
     turned[:, other] = U * HALF_TURN
     area = work.tyre.surface_shares(tread)[: len(contact.local), contact.road.nodes]
@@ -193,6 +189,7 @@ def _footprint(work: Press, found: Pressed, load: float, tread: Any) -> dict[str
     held = ~fold.free
     c, s = np.cos(around.angles)[:, None], np.sin(around.angles)[:, None]
     at_rim = residual * held
+    # the half turn cancels what the two halves bear along and across
     down = float((c * at_rim[..., 0] - s * at_rim[..., 1]).sum())
     return {
         "load_N": load,

@@ -36,15 +36,13 @@ def cross(a: Array, b: Array) -> Array:
 
 def volume(x: Array, dx: Array, weights: Array) -> Array:
     """V per radian (m3) from x, x' (p, 3) at Gauss points with their weights."""
-    y, d = x @ IN_PLANE, x @ SPIN.T
-    return (weights * (y * cross(dx, d)).sum(-1)).sum() / 2
+    return np.asarray((weights * density(x, dx, 0.0)).sum())
 
 
 def first(x: Array, dx: Array) -> tuple[Array, Array]:
     """Gradients of the integrand of V with respect to x and to x', each (p, 3)."""
-    y, d = x @ IN_PLANE, x @ SPIN.T
-    by_x = cross(dx, d) @ IN_PLANE + cross(y, dx) @ SPIN
-    return by_x / 2, cross(d, y) / 2
+    by_x, by_dx, _ = first_around(x, dx, 0.0)
+    return by_x, by_dx
 
 
 def second(x: Array, dx: Array) -> tuple[Array, Array, Array]:
@@ -61,13 +59,13 @@ def second(x: Array, dx: Array) -> tuple[Array, Array, Array]:
     return xx, xd, np.stack([along, -_cross(y)], -3)
 
 
-def density(x: Array, dx: Array, around: Array) -> Array:
+def density(x: Array, dx: Array, around: Array | float) -> Array:
     """V's integrand (...) from x, x' and ``around`` = dx/dTheta."""
     y, d = x @ IN_PLANE, around + x @ SPIN.T
     return np.asarray((y * cross(dx, d)).sum(-1) / 2)
 
 
-def first_around(x: Array, dx: Array, around: Array) -> tuple[Array, Array, Array]:
+def first_around(x: Array, dx: Array, around: Array | float) -> tuple[Array, Array, Array]:
     """Gradients of V's integrand by x, x' and ``around`` = dx/dTheta, each (..., 3)."""
     y, d = x @ IN_PLANE, around + x @ SPIN.T
     by_around = cross(y, dx)
