@@ -39,17 +39,7 @@ from .main import EXIT_FIT
     help="Seed of the drawn starts.",
 )
 @click.option("--pictures/--no-pictures", default=True, help="Draw convergence, section, modes.")
-@options.every(
-    options.jobs,
-    options.mesh,
-    options.solver,
-    options.output,
-    options.store,
-    options.no_store,
-    options.as_json,
-    options.quiet,
-    options.verbose,
-)
+@options.every(*options.STUDY)
 def command(
     case: Path,
     assignments: tuple[str, ...],

@@ -15,27 +15,12 @@ DESIGNS = ("initial", "fitted")
 
 @click.command()
 @options.every(options.case_argument, options.assignments, options.pressure, options.loads)
-@click.option(
-    "--fitted",
-    type=click.Path(path_type=Path, exists=True, dir_okay=False),
-    metavar="fit.json",
-    help="Press the design that 'tyrecal fit' found for this case, too.",
-)
+@options.fitted("Press the design that 'tyrecal fit' found for this case, too.")
 @click.option("--compare", metavar="initial,fitted",
               help="Designs to press (default: initial, and fitted where --fitted is given)."
               )  # fmt: skip
 @click.option("--pictures/--no-pictures", default=True, help="Draw the patches; write VTU.")
-@options.every(
-    options.jobs,
-    options.mesh,
-    options.solver,
-    options.output,
-    options.store,
-    options.no_store,
-    options.as_json,
-    options.quiet,
-    options.verbose,
-)
+@options.every(*options.STUDY)
 def command(
     case: Path,
     assignments: tuple[str, ...],

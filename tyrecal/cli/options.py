@@ -80,6 +80,15 @@ def every(*options: Callable[[Any], Any]) -> Callable[[Any], Any]:
     return apply
 
 
+STUDY = (jobs, mesh, solver, output, store, no_store, as_json, quiet, verbose)
+
+
+def fitted(text: str) -> Callable[[Any], Any]:
+    """A finished fit whose design is studied too; ``text``: the option's help."""
+    path = click.Path(path_type=Path, exists=True, dir_okay=False)
+    return click.option("--fitted", type=path, metavar="fit.json", help=text)
+
+
 def load(path: Path, mesh_level: str, assigned: tuple[str, ...], pressure_kPa: float | None) -> Any:
     """The case with its start values, mesh level, assignments and pressure applied.
 

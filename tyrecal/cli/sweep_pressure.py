@@ -19,24 +19,9 @@ from .main import EXIT_SOLVER
               help="Highest pressure.")  # fmt: skip
 @click.option("--steps", type=click.IntRange(2, 10000), default=12, metavar="N",
               show_default=True, help="Pressures, both ends among them.")  # fmt: skip
-@click.option(
-    "--fitted",
-    type=click.Path(path_type=Path, exists=True, dir_okay=False),
-    metavar="fit.json",
-    help="Sweep the design that 'tyrecal fit' found for this case, too.",
-)
+@options.fitted("Sweep the design that 'tyrecal fit' found for this case, too.")
 @click.option("--pictures/--no-pictures", default=True, help="Draw frequencies over pressure.")
-@options.every(
-    options.jobs,
-    options.mesh,
-    options.solver,
-    options.output,
-    options.store,
-    options.no_store,
-    options.as_json,
-    options.quiet,
-    options.verbose,
-)
+@options.every(*options.STUDY)
 def command(
     case: Path,
     assignments: tuple[str, ...],
