@@ -126,16 +126,20 @@ class Factor:
 
     def __init__(self, order: Elimination, tangents: Tangents, contact: Array):
         self.order = order
-        self._steps: list[list[tuple[Array, Array]]] = []  # per level: L, X of each block
+        self.contact = order.fold.blocks(contact)
+        self._steps: list[tuple[Array, Array, slice, Array, Array]] = []
         carried: list[Array] = []
         with ThreadPoolExecutor(2) as pool:
             for front in order.fronts:
                 same, cross = _tables(front, tangents, order)
                 coupled = len(carried) == 1 or abs(cross).max() > BIAS * abs(same).max()
-                step, rests = [], []
+                gone, left = front.nodes[: front.eliminated], front.nodes[front.eliminated :]
+                if not coupled:
+                    self.contact[:, gone, :3, 3:] = self.contact[:, gone, 3:, :3] = 0.0
+                rests = []
                 for group in [(0, 1)] if coupled else [(0,), (1,)]:
                     block = lambda rows, cols, t=(same, cross), f=front, g=group: _block(
-                        t, f, g, order, contact, rows, cols
+                        t, f, g, order, self.contact, rows, cols
                     )
                     L, X, rest = _eliminate(
                         block("gone", "gone"),
@@ -146,29 +150,43 @@ class Factor:
                         order.fold.shape[0],
                         pool,
                     )
-                    step.append((L, X))
+                    if len(gone):
+                        self._steps.append((gone, left, slice(group[0], group[-1] + 1), L, X))
                     rests.append(rest)
-                self._steps.append(step)
                 carried = rests
 
     def solve(self, right: Array) -> Array:
-        """K^-1 right for parts (2, k, q, 3)."""
+        """K^-1 right for parts (..., 2, k, q, 3)."""
+        rows = right.reshape(-1, *right.shape[-4:])
+        return self.backward(self.forward(rows)).reshape(right.shape)
+
+    def forward(self, right: Array) -> list[Array]:
+        """L^-1 right for parts (v, 2, k, q, 3): by level and block, (rows, v); without rows up to
+        the first level where ``right`` is not zero."""
         b = np.array(right, np.float32, order="C")
         pieces = []
-        for front, step in zip(self.order.fronts, self._steps, strict=True):
-            gone, left = front.nodes[: front.eliminated], front.nodes[front.eliminated :]
-            slots = [slice(0, 2)] if len(step) == 1 else [slice(0, 1), slice(1, 2)]
-            for slot, (L, X) in zip(slots if len(gone) else [], step, strict=False):
-                y = strtrs(L, b[slot, :, gone].ravel(), lower=1)[0].ravel()
-                if len(left):
-                    b[slot, :, left] -= (y @ X).reshape(b[slot, :, left].shape)
-                pieces.append((slot, gone, left, L, X, y))
-        x = np.zeros_like(b)
-        for slot, gone, left, L, X, y in pieces[::-1]:
+        begun = False
+        for gone, left, slot, L, X in self._steps:
+            rows = b[:, slot, :, gone].reshape(len(b), -1)
+            begun = begun or bool(rows.any())
+            if not begun:
+                pieces.append(np.zeros((0, len(b)), np.float32))
+                continue
+            y = strtrs(L, rows.T, lower=1, overwrite_b=1)[0]
             if len(left):
-                y = y - X @ x[slot, :, left].ravel()
-            solved = strtrs(L, y, lower=1, trans=1)[0]
-            x[slot, :, gone] = solved.reshape(x[slot, :, gone].shape)
+                b[:, slot, :, left] -= (y.T @ X).reshape(b[:, slot, :, left].shape)
+            pieces.append(y)
+        return pieces
+
+    def backward(self, pieces: list[Array]) -> Array:
+        """L^-T of what `forward` gave, as parts (v, 2, k, q, 3)."""
+        x = np.zeros((pieces[-1].shape[1], *self.order.fold.mask.shape), np.float32)
+        for (gone, left, slot, L, X), y in zip(self._steps[::-1], pieces[::-1], strict=True):
+            right = y if len(y) else np.zeros((len(L), len(x)), np.float32)
+            if len(left):
+                right = right - X @ x[:, slot, :, left].reshape(len(x), -1).T
+            solved = strtrs(L, right, lower=1, trans=1)[0]
+            x[:, slot, :, gone] = solved.T.reshape(x[:, slot, :, gone].shape)
         return np.asarray(x * self.order.fold.mask, float)
 
 
@@ -232,28 +250,16 @@ def _block(
                 part = (weights @ flat).reshape(3, 3, m, n).transpose(0, 2, 1, 3)
                 tiles[2 * t : 2 * t + 3, :, 2 * t : 2 * t + 3] += part
             if rows == cols and rows == "gone":
-                _add_contact(tiles, contact, front, order, g == h)
+                for k, i in np.argwhere(contact[:, front.nodes[here]].any((2, 3))):
+                    a = slice(3 * i, 3 * i + 3)
+                    block = contact[k, front.nodes[i], 3 * g : 3 * g + 3, 3 * h : 3 * h + 3]
+                    tiles[k, a, k, a] += block.T
             place[~masks[h][:, there].ravel()] = 0.0
             place[:, ~masks[g][:, here].ravel()] = 0.0
     if rows == cols:
         diagonal = np.einsum("ii->i", out)
         diagonal += np.concatenate([~masks[g][:, here].ravel() for g in group])
     return out
-
-
-def _add_contact(
-    tiles: Array, contact: Array, front: _Front, order: Elimination, same: bool
-) -> None:
-    nodes = front.nodes[: front.eliminated]
-    here, there = order.fold.nodes[nodes], order.fold.beyond[nodes]
-    image = contact[:, there] * np.multiply.outer(MIRROR, MIRROR)
-    image[:, here == there] = 0.0
-    total = contact[:, here] + (image if same else -image)
-    if not same:
-        total[:, here == there] = 0.0
-    for k, place in zip(*np.nonzero(total.any((2, 3))), strict=True):
-        a = slice(3 * place, 3 * place + 3)
-        tiles[k, a, k, a] += total[k, place].T
 
 
 def _eliminate(

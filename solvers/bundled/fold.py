@@ -70,3 +70,13 @@ class Fold:
         """The two parts of a field that has the symmetry."""
         here, there = U[:, self.nodes], self.parity * MIRROR * U[:, self.beyond]
         return np.stack([here + there, here - there]) / 2
+
+    def blocks(self, stiffness: Array) -> Array:
+        """Of stiffness at single nodes (k, n, 3, 3), what acts on the parts (k, q, 6, 6)."""
+        here = stiffness[:, self.nodes]
+        there = stiffness[:, self.beyond] * np.multiply.outer(MIRROR, MIRROR)
+        there[:, self._middle] = 0.0
+        same, cross = here + there, here - there
+        free = self.mask.transpose(1, 2, 0, 3).reshape(*same.shape[:2], 6)
+        whole = np.block([[same, cross], [cross, same]])
+        return np.asarray(whole * (free[..., :, None] & free[..., None, :]))

@@ -15,13 +15,15 @@ from .fold import Fold
 from .gmres import gmres
 from .revolved import Inverted, Revolved
 from .road import Contact, Road
+from .touching import Touching
 
 Array = np.ndarray
 TOLERANCE = 1e-8  # out-of-balance force over the load
 LONGEST = 40  # Newton iterations a load
-TIRED = 20  # GMRES iterations of a step, after which the preconditioner is formed anew
+TIRED = 7  # GMRES iterations of a step, after which the preconditioner is formed anew
 LONGEST_LINEAR = 60
 EXACT = 1e-2  # residual of the linear problem, relative
+ROUGH = 5e-2  # the same as long as the contact changes much
 PATIENCE = 2  # steps that may fail to halve the residual, with Coulomb's friction
 NEAR = 1e-2  # as loosely as that, before Coulomb's friction is tried
 SHORTEST = 1 / 64  # step of the line search
@@ -61,7 +63,7 @@ class Press:
         self.load = 0.0
         self._before: tuple[Array, float, float] | None = None
         self._normal = np.zeros_like(road.area)
-        self._factor: Factor | None = None
+        self._factor: Touching | None = None
         self._used = 0
         self.factorisations = self.products = self.iterations = 0
 
@@ -73,12 +75,11 @@ class Press:
         while True:
             self.check()
             target = min(self.load + step, load)
-            self._factor = None
             try:
                 found = self._newton(target)
             except (NotPressed, Indefinite, Inverted) as error:
                 step /= 2
-                self._before = None
+                self._before = self._factor = None
                 if step < smallest:
                     raise NotPressed(
                         f"no equilibrium between {self.load:.4g} and {target:.4g} N: {error}"
@@ -139,7 +140,7 @@ class Press:
                 return parts, height, contact
             self.iterations += 1
             energy = self.tyre.potential() + contact.energy + load / 2 * height
-            step, rise = self._step(contact, force, lacking)
+            step, rise = self._step(contact, load, force, lacking)
             slope = float((force * step).sum() + lacking * rise)
             length, before = 1.0, size
             while True:
@@ -162,13 +163,16 @@ class Press:
                 break
         raise NotPressed(f"Newton's method did not converge in {LONGEST} iterations")
 
-    def _step(self, contact: Contact, force: Array, lacking: float) -> tuple[Array, float]:
+    def _step(
+        self, contact: Contact, load: float, force: Array, lacking: float
+    ) -> tuple[Array, float]:
         """Newton's step of the parts and of the road's height."""
         border = _Border(self.fold, contact)
         right = -np.append(force.ravel(), lacking * border.scale)
         if self._used > TIRED:
             self._factor = None  # its memory goes first
-        found, self._used, left = self._solve(border, contact, right, EXACT)
+        rough = float(np.linalg.norm(force)) > NEAR * load
+        found, self._used, left = self._solve(border, contact, right, ROUGH if rough else EXACT)
         if not left <= 0.1:
             raise NotPressed("the tangent is too far from a stable one")
         return found[:-1].reshape(force.shape), float(found[-1]) * border.scale
@@ -176,11 +180,13 @@ class Press:
     def _solve(
         self, border: _Border, contact: Contact, right: Array, tolerance: float
     ) -> tuple[Array, int, float]:
+        size = self.fold.shape[:2]
         if self._factor is None:
-            stiffness = contact.stiffness(self.fold.shape[0], self.fold.shape[1])
-            self._factor = Factor(self.order, self.tyre.tangents(), stiffness)
+            stiffness = contact.stiffness(*size, positive=True)
+            self._factor = Touching(Factor(self.order, self.tyre.tangents(), stiffness))
             self.factorisations += 1
         factor, shape, scale = self._factor, self.parts.shape, border.scale
+        factor.to(contact.stiffness(*size, positive=False))
         answer = factor.solve(border.by_height)
         schur = border.stiffness - float((border.of_force * answer).sum())
 
@@ -204,7 +210,7 @@ class Press:
         """dF / d(deflection): the whole tyre's force against the road's rise, tyre following."""
         border = _Border(self.fold, contact)
         unit = np.append(np.zeros(self.parts.size), border.scale)
-        found = self._solve(border, contact, unit, 1e-6)[0]
+        found = self._solve(border, contact, unit, EXACT**2)[0]
         return 2 / (float(found[-1]) * border.scale)
 
 

@@ -120,11 +120,12 @@ class Contact:
         v = np.einsum("kij,kcj->kci", self.road.frame, V[: len(self.local), self.road.nodes])
         return self.nodal(V.shape, np.einsum("kcij,kcj->kci", self.K, v))
 
-    def stiffness(self, angles: int, nodes: int) -> Array:
-        """What of it is positive (k, n, 3, 3), in the frame of the reference angle: all but the
-        friction's growth with the pressure."""
+    def stiffness(self, angles: int, nodes: int, positive: bool) -> Array:
+        """At the nodes (k, n, 3, 3), in the frame of the reference angle; ``positive``: all but
+        the friction's growth with the pressure."""
         K = self.K.copy()
-        K[..., 1:, 0] = 0.0
+        if positive:
+            K[..., 1:, 0] = 0.0
         field = np.zeros((angles, nodes, 3, 3))
         turned = np.einsum("kai,kcab,kbj->kcij", self.road.frame, K, self.road.frame)
         field[: len(turned), self.road.nodes] = turned
