@@ -7,6 +7,7 @@ a bias the two parts of the fold are eliminated as one, elsewhere each by itself
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
@@ -19,6 +20,8 @@ from .fold import MIRROR, Fold, NotSymmetric
 
 Array = np.ndarray
 Tangents = list[tuple[Array, Array, Array, Array]]
+SMALL = 300  # rows of a triangle that are not halved any more
+_Assembled = tuple[tuple[int, ...], Array, Array, Array]
 BIAS = 1e-2  # of what couples the parts over what does not, above which a level takes both as one
 
 
@@ -129,31 +132,57 @@ class Factor:
         self.contact = order.fold.blocks(contact)
         self._steps: list[tuple[Array, Array, slice, Array, Array]] = []
         carried: list[Array] = []
-        with ThreadPoolExecutor(2) as pool:
-            for front in order.fronts:
-                same, cross = _tables(front, tangents, order)
-                coupled = len(carried) == 1 or abs(cross).max() > BIAS * abs(same).max()
-                gone, left = front.nodes[: front.eliminated], front.nodes[front.eliminated :]
-                if not coupled:
-                    self.contact[:, gone, :3, 3:] = self.contact[:, gone, 3:, :3] = 0.0
-                rests = []
-                for group in [(0, 1)] if coupled else [(0,), (1,)]:
-                    block = lambda rows, cols, t=(same, cross), f=front, g=group: _block(
-                        t, f, g, order, self.contact, rows, cols
+        levels = self._assemble(tangents)
+        with ThreadPoolExecutor(1) as ahead, ThreadPoolExecutor(2) as pool:
+            following = ahead.submit(next, levels, None)
+            while (level := following.result()) is not None:
+                following = ahead.submit(next, levels, None)
+                carried = self._eliminate(*level, carried, pool)
+
+    def _assemble(self, tangents: Tangents) -> Iterator[tuple[_Front, list[_Assembled]]]:
+        """Level by level its blocks, of each part or of both where the bias couples them."""
+        coupled = False
+        for front in self.order.fronts:
+            same, cross = _tables(front, tangents, self.order)
+            coupled = coupled or bool(abs(cross).max() > BIAS * abs(same).max())
+            if not coupled:
+                gone = front.nodes[: front.eliminated]
+                self.contact[:, gone, :3, 3:] = self.contact[:, gone, 3:, :3] = 0.0
+            groups = [(0, 1)] if coupled else [(0,), (1,)]
+            block = lambda group, rows, cols, t=(same, cross), f=front: _block(
+                t, f, group, self.order, self.contact, rows, cols
+            )
+            yield (
+                front,
+                [
+                    (
+                        g,
+                        block(g, "gone", "gone"),
+                        block(g, "gone", "left"),
+                        block(g, "left", "left"),
                     )
-                    L, X, rest = _eliminate(
-                        block("gone", "gone"),
-                        block("gone", "left"),
-                        block("left", "left"),
-                        [carried[h] for h in group if h < len(carried)],
-                        coupled,
-                        order.fold.shape[0],
-                        pool,
-                    )
-                    if len(gone):
-                        self._steps.append((gone, left, slice(group[0], group[-1] + 1), L, X))
-                    rests.append(rest)
-                carried = rests
+                    for g in groups
+                ],
+            )
+
+    def _eliminate(
+        self,
+        front: _Front,
+        blocks: list[_Assembled],
+        carried: list[Array],
+        pool: ThreadPoolExecutor,
+    ) -> list[Array]:
+        """What a level leaves to the next one, of each part or of both."""
+        gone, left = front.nodes[: front.eliminated], front.nodes[front.eliminated :]
+        rests = []
+        for group, first, beside, rest in blocks:
+            if len(gone):
+                before = [carried[h] for h in group if h < len(carried)]
+                _add_carried(first, before, len(group), self.order.fold.shape[0])
+                _eliminate(first, beside, rest, pool)
+                self._steps.append((gone, left, slice(group[0], group[-1] + 1), first, beside))
+            rests.append(rest)
+        return rests
 
     def solve(self, right: Array) -> Array:
         """K^-1 right for parts (..., 2, k, q, 3)."""
@@ -262,45 +291,65 @@ def _block(
     return out
 
 
-def _eliminate(
-    first: Array,
-    beside: Array,
-    rest: Array,
-    carried: list[Array],
-    joint: bool,
-    angles: int,
-    pool: ThreadPoolExecutor,
-) -> tuple[Array, Array, Array]:
-    """L of the first block, X = L^-1 beside, and rest - X^T X; lower triangles only.
-
-    ``carried``: what earlier levels left of the first nodes, of each part or of both;
-    ``joint``: the blocks hold both parts.
-    """
-    if not len(first):
-        return first, beside, rest
-    parts = 2 if joint else 1
+def _add_carried(first: Array, carried: list[Array], parts: int, angles: int) -> None:
+    """Add to the first block what earlier levels left of its nodes, of each part or of both."""
     whole = first.T.reshape(parts, angles, -1, parts, angles, len(first) // (parts * angles))
     blocks = parts // max(len(carried), 1)
     for h, more in enumerate(carried):
         add = more.T.reshape(blocks, angles, -1, blocks, angles, len(more) // (blocks * angles))
         m = add.shape[2]
         whole[h : h + blocks, :, :m, h : h + blocks, :, :m] += add
-    L, info = spotrf(first, lower=1, overwrite_a=1)
-    if info:
-        raise Indefinite("the tangent stiffness is not positive definite")
-    width = beside.shape[1]
-    if not width:
-        return L, beside, rest
-    middle = width // 2
-    halves = [slice(0, middle), slice(middle, width)]
-    # two threads share the work the same way everywhere, so that the bits are the same too
-    solve = lambda cols: strtrs(L, beside[:, cols], lower=1, overwrite_b=1)[0]
-    X = np.concatenate(list(pool.map(solve, halves)), 1)
 
-    def update(rows: slice) -> None:
-        cols = slice(0, rows.stop)
-        rest[rows, cols] -= (X[:, cols].T @ X[:, rows]).T
 
-    third = int(width * 0.7)  # about half of the triangle
-    list(pool.map(update, [slice(0, third), slice(third, width)]))
-    return L, X, rest
+def _eliminate(first: Array, beside: Array, rest: Array, pool: ThreadPoolExecutor) -> None:
+    """L of the first block, X = L^-1 beside and rest - X^T X in their places; lower triangles."""
+    _cholesky(first, pool)
+    if beside.shape[1]:
+        _divide_both(first, beside, pool)
+        _subtract_square(rest, beside, pool)
+
+
+def _cholesky(A: Array, pool: ThreadPoolExecutor) -> None:
+    """The lower triangle of A becomes its Cholesky factor, half by half. Raises Indefinite."""
+    n = len(A)
+    if n <= SMALL:
+        A[:], info = spotrf(A, lower=1)
+        if info:
+            raise Indefinite("the tangent stiffness is not positive definite")
+        return
+    h = n // 2
+    _cholesky(A[:h, :h], pool)
+    across = np.asfortranarray(A[h:, :h].T)
+    _divide_both(A[:h, :h], across, pool)
+    A[h:, :h] = across.T
+    _subtract_square(A[h:, h:], across, pool)
+    _cholesky(A[h:, h:], pool)
+
+
+# Two threads share the work the same way everywhere, so that the bits are the same too. Most of it
+# is in NumPy's products, for SciPy's triangular solver keeps the interpreter's lock.
+
+
+def _divide_both(L: Array, B: Array, pool: ThreadPoolExecutor) -> None:
+    """B becomes L^-1 B."""
+    list(pool.map(lambda columns: _divide(L, columns), np.array_split(B, 2, 1)))
+
+
+def _divide(L: Array, B: Array) -> None:
+    if len(L) <= SMALL:
+        B[:] = strtrs(L, B, lower=1)[0]
+        return
+    h = len(L) // 2
+    _divide(L[:h, :h], B[:h])
+    B[h:] -= L[h:, :h] @ B[:h]
+    _divide(L[h:, h:], B[h:])
+
+
+def _subtract_square(A: Array, X: Array, pool: ThreadPoolExecutor) -> None:
+    """The lower triangle of A becomes that of A - X^T X."""
+    cut = int(len(A) * 0.7)  # about half of the triangle
+
+    def subtract(rows: slice) -> None:
+        A[rows, : rows.stop] -= (X[:, : rows.stop].T @ X[:, rows]).T
+
+    list(pool.map(subtract, [slice(0, cut), slice(cut, len(A))]))
