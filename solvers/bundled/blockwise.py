@@ -12,7 +12,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg.lapack import spotrf, strtrs
+from scipy.linalg.lapack import spotrf, strtri
 
 from .band import Indefinite
 from .circumference import Circumference
@@ -138,6 +138,11 @@ class Factor:
             while (level := following.result()) is not None:
                 following = ahead.submit(next, levels, None)
                 carried = self._eliminate(*level, carried, pool)
+        # steps of one part, of the other, and after these of both: two threads for the first two
+        slots = [slot for _, _, slot, _, _ in self._steps]
+        parts = [slice(0, 1), slice(1, 2), slice(0, 2)]
+        self._chains = [[i for i, s in enumerate(slots) if s == part] for part in parts]
+        self._pool = ThreadPoolExecutor(2)
 
     def _assemble(self, tangents: Tangents) -> Iterator[tuple[_Front, list[_Assembled]]]:
         """Level by level its blocks, of each part or of both where the bias couples them."""
@@ -190,32 +195,42 @@ class Factor:
         return self.backward(self.forward(rows)).reshape(right.shape)
 
     def forward(self, right: Array) -> list[Array]:
-        """L^-1 right for parts (v, 2, k, q, 3): by level and block, (rows, v); without rows up to
-        the first level where ``right`` is not zero."""
+        """L^-1 right for parts (v, 2, k, q, 3): by step, (rows, v); without rows up to the first
+        level where ``right`` is not zero."""
         b = np.array(right, np.float32, order="C")
-        pieces = []
-        begun = False
-        for gone, left, slot, L, X in self._steps:
-            rows = b[:, slot, :, gone].reshape(len(b), -1)
-            begun = begun or bool(rows.any())
-            if not begun:
-                pieces.append(np.zeros((0, len(b)), np.float32))
-                continue
-            y = strtrs(L, rows.T, lower=1, overwrite_b=1)[0]
-            if len(left):
-                b[:, slot, :, left] -= (y.T @ X).reshape(b[:, slot, :, left].shape)
-            pieces.append(y)
+        pieces = [np.zeros((0, len(b)), np.float32)] * len(self._steps)
+
+        def go(steps: list[int]) -> None:
+            begun = False
+            for i in steps:
+                gone, left, slot, L, X = self._steps[i]
+                y = b[:, slot, :, gone].reshape(len(b), -1).T
+                begun = begun or bool(y.any())
+                if begun:
+                    _divide(L, y)
+                    if len(left):
+                        b[:, slot, :, left] -= (y.T @ X).reshape(b[:, slot, :, left].shape)
+                    pieces[i] = y
+
+        list(self._pool.map(go, self._chains[:2]))
+        go(self._chains[2])
         return pieces
 
     def backward(self, pieces: list[Array]) -> Array:
         """L^-T of what `forward` gave, as parts (v, 2, k, q, 3)."""
         x = np.zeros((pieces[-1].shape[1], *self.order.fold.mask.shape), np.float32)
-        for (gone, left, slot, L, X), y in zip(self._steps[::-1], pieces[::-1], strict=True):
-            right = y if len(y) else np.zeros((len(L), len(x)), np.float32)
-            if len(left):
-                right = right - X @ x[:, slot, :, left].reshape(len(x), -1).T
-            solved = strtrs(L, right, lower=1, trans=1)[0]
-            x[:, slot, :, gone] = solved.T.reshape(x[:, slot, :, gone].shape)
+
+        def go(steps: list[int]) -> None:
+            for i in steps[::-1]:
+                gone, left, slot, L, X = self._steps[i]
+                y = pieces[i] if len(pieces[i]) else np.zeros((len(L), len(x)), np.float32)
+                if len(left):
+                    y = y - X @ x[:, slot, :, left].reshape(len(x), -1).T
+                _divide_transposed(L, y)
+                x[:, slot, :, gone] = y.T.reshape(x[:, slot, :, gone].shape)
+
+        go(self._chains[2])
+        list(self._pool.map(go, self._chains[:2]))
         return np.asarray(x * self.order.fold.mask, float)
 
 
@@ -309,25 +324,27 @@ def _eliminate(first: Array, beside: Array, rest: Array, pool: ThreadPoolExecuto
         _subtract_square(rest, beside, pool)
 
 
+# Triangles are halved down to small ones, of which the inverses are kept. All that takes time is
+# thus in NumPy's products, which leave the interpreter to the other thread, as SciPy's triangular
+# solvers do not. Threads share the work the same way everywhere, so that the bits are the same too.
+
+
 def _cholesky(A: Array, pool: ThreadPoolExecutor) -> None:
-    """The lower triangle of A becomes its Cholesky factor, half by half. Raises Indefinite."""
-    n = len(A)
-    if n <= SMALL:
-        A[:], info = spotrf(A, lower=1)
+    """The lower triangle of A becomes its Cholesky factor L, but the inverse in L's small triangles
+    on the diagonal. Raises Indefinite."""
+    if len(A) <= SMALL:
+        L, info = spotrf(A, lower=1)
         if info:
             raise Indefinite("the tangent stiffness is not positive definite")
+        A[:] = np.tril(strtri(L, lower=1)[0])
         return
-    h = n // 2
+    h = len(A) // 2
     _cholesky(A[:h, :h], pool)
     across = np.asfortranarray(A[h:, :h].T)
     _divide_both(A[:h, :h], across, pool)
     A[h:, :h] = across.T
     _subtract_square(A[h:, h:], across, pool)
     _cholesky(A[h:, h:], pool)
-
-
-# Two threads share the work the same way everywhere, so that the bits are the same too. Most of it
-# is in NumPy's products, for SciPy's triangular solver keeps the interpreter's lock.
 
 
 def _divide_both(L: Array, B: Array, pool: ThreadPoolExecutor) -> None:
@@ -337,12 +354,23 @@ def _divide_both(L: Array, B: Array, pool: ThreadPoolExecutor) -> None:
 
 def _divide(L: Array, B: Array) -> None:
     if len(L) <= SMALL:
-        B[:] = strtrs(L, B, lower=1)[0]
+        B[:] = L @ B
         return
     h = len(L) // 2
     _divide(L[:h, :h], B[:h])
     B[h:] -= L[h:, :h] @ B[:h]
     _divide(L[h:, h:], B[h:])
+
+
+def _divide_transposed(L: Array, B: Array) -> None:
+    """B becomes L^-T B."""
+    if len(L) <= SMALL:
+        B[:] = L.T @ B
+        return
+    h = len(L) // 2
+    _divide_transposed(L[h:, h:], B[h:])
+    B[:h] -= L[h:, :h].T @ B[h:]
+    _divide_transposed(L[:h, :h], B[:h])
 
 
 def _subtract_square(A: Array, X: Array, pool: ThreadPoolExecutor) -> None:

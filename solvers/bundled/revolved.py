@@ -9,6 +9,7 @@ Gauss station with the station's displacement and its derivative by the angle:
 from __future__ import annotations
 
 import numpy as np
+from scipy.sparse import csr_matrix
 
 from . import cords, pressure, rubber
 from .circumference import Circumference
@@ -32,29 +33,25 @@ class Revolved:
 
     def __init__(self, model: Model, loads: list[Load], around: Circumference):
         self.model, self.loads, self.around = model, loads, around
-        self._parts: list[_Part] = [_RubberPart(r) for r in model.rubbers]
-        self._parts += [_CordPart(c) for c in model.cords]
+        nodes = len(model.mesh.X)
+        self._parts: list[_Part] = [_RubberPart(r, nodes) for r in model.rubbers]
+        self._parts += [_CordPart(c, nodes) for c in model.cords]
         self._parts += [_PressurePart(model.mesh.X, load) for load in loads]
 
     def _stations(self, U: Array) -> tuple[Array, Array]:
-        """Displacement and its derivative by the angle at the stations (s, n, 3)."""
-        flat = U.reshape(len(U), -1)
-        return (
-            (self.around.N @ flat).reshape(-1, *U.shape[1:]),
-            (self.around.slope @ flat).reshape(-1, *U.shape[1:]),
-        )
+        """Displacement and its derivative by the angle at the stations (3n, s)."""
+        flat = U.reshape(len(U), -1).T
+        return flat @ self.around.N.T, flat @ self.around.slope.T
 
-    def _nodes(self, forces: list[tuple[Array, Array, Array]]) -> Array:
-        """Nodal forces (k, n, 3) from (connectivity, by u, by du/dTheta), each (e, s, a, 3)."""
-        s, n = len(self.around.weights), len(self.model.mesh.X)
-        total = np.zeros((2, n, s, 3))
-        for connectivity, by_u, by_du in forces:
-            for slot, force in enumerate((by_u, by_du)):
-                np.add.at(total[slot], connectivity, force.swapaxes(1, 2))
-        total *= self.around.weights[:, None]
-        by_u, by_du = total.swapaxes(1, 2).reshape(2, s, -1)
-        result = self.around.N.T @ by_u + self.around.slope.T @ by_du
-        return np.asarray(result.reshape(-1, n, 3))
+    def _nodes(self, forces: list[tuple[Array, Array]]) -> Array:
+        """Nodal forces (k, n, 3) from each part's, by u and by du/dTheta (e, 3a, s)."""
+        by_u, by_du = (
+            sum(part.gather(f) for part, f in zip(self._parts, each, strict=True))
+            for each in zip(*forces, strict=True)
+        )
+        weights = self.around.weights[:, None]
+        result = by_u @ (weights * self.around.N) + by_du @ (weights * self.around.slope)
+        return np.ascontiguousarray(result.T).reshape(len(result.T), -1, 3)
 
     def residual(self, U: Array) -> Array:
         """Internal force less that of the pressure (k, n, 3), N; the tangents follow U."""
@@ -78,7 +75,7 @@ class Revolved:
         x, dx, around = part.place(u, du)
         density = np.linalg.norm(pressure.cross(dx, around + x @ pressure.SPIN.T), axis=-1)
         by_node = np.einsum("ega,eg,egs->eas", part.N, lines.weights, density)
-        shares = np.zeros((len(self.model.mesh.X), len(u)))
+        shares = np.zeros((len(self.model.mesh.X), u.shape[1]))
         np.add.at(shares, lines.connectivity, by_node)
         return np.asarray((shares * self.around.weights @ self.around.N).T)
 
@@ -90,34 +87,34 @@ class Revolved:
 class _Part:
     """What rubber, cords and pressure have in common: rows of F or q at Gauss points."""
 
-    def force(self, u: Array, du: Array) -> tuple[Array, Array, Array]:
+    def __init__(self, connectivity: Array, nodes: int):
+        self.dofs = (3 * connectivity[..., None] + np.arange(3)).reshape(len(connectivity), -1)
+        size = self.dofs.size
+        ones = (np.ones(size), (self.dofs.ravel(), np.arange(size)))
+        self._assembly = csr_matrix(ones, shape=(3 * nodes, size))
+
+    def gather(self, forces: Array) -> Array:
+        """Sums (3n, s) at the nodes of the elements' forces (e, 3a, s)."""
+        return np.asarray(self._assembly @ forces.reshape(self.dofs.size, -1))
+
+    def force(self, u: Array, du: Array) -> tuple[Array, Array]:
+        """By u and by du/dTheta (e, 3a, s), of u and du (3n, s)."""
         raise NotImplementedError
 
     def potential(self) -> Array:
         """At the stations (s,), J per radian."""
         raise NotImplementedError
 
-    def product(self, u: Array, du: Array) -> tuple[Array, Array, Array]:
+    def product(self, u: Array, du: Array) -> tuple[Array, Array]:
         raise NotImplementedError
 
     def tangents(self) -> tuple[Array, Array, Array, Array]:
         raise NotImplementedError
 
 
-def _columns(connectivity: Array, u: Array) -> Array:
-    """Element displacements (e, 3a, s) from the stations' (s, n, 3)."""
-    s, (e, a) = len(u), connectivity.shape
-    return np.ascontiguousarray(u[:, connectivity].reshape(s, e, 3 * a).transpose(1, 2, 0))
-
-
-def _rows(forces: Array) -> Array:
-    """Element forces (e, 3a, s) as (e, s, a, 3)."""
-    e, d, s = forces.shape
-    return forces.swapaxes(1, 2).reshape(e, s, d // 3, 3)
-
-
 class _RubberPart(_Part):
-    def __init__(self, r: Rubber):
+    def __init__(self, r: Rubber, nodes: int):
+        super().__init__(r.solids.connectivity, nodes)
         self.r, s = r, r.solids
         self._A: Array | None = None
         self.e, self.g, _, self.d = s.B0.shape
@@ -126,25 +123,28 @@ class _RubberPart(_Part):
 
     def _gradient(self, u: Array, du: Array) -> Array:
         """H = B0 u + B1 du (e, g, s, 9)."""
-        c = self.r.solids.connectivity
-        H = (self.B0 @ _columns(c, u)).reshape(self.e, self.g, 9, -1)
-        H[:, :, 1::3] += (self.B1 @ _columns(c, du)).reshape(self.e, self.g, 3, -1)
+        H = (self.B0 @ u[self.dofs]).reshape(self.e, self.g, 9, -1)
+        H[:, :, 1::3] += (self.B1 @ du[self.dofs]).reshape(self.e, self.g, 3, -1)
         return H.swapaxes(2, 3)
 
-    def _forces(self, P: Array, u: Array) -> tuple[Array, Array, Array]:
+    def _hourglass(self, u: Array, h: Array) -> Array:
+        """Hourglass strains (e, 3, s)."""
+        at = u[self.dofs].reshape(self.e, -1, 3, u.shape[1])
+        return np.asarray(np.einsum("ea,eais->eis", h, at))
+
+    def _forces(self, P: Array, u: Array) -> tuple[Array, Array]:
         """From stresses times weights (e, g, s, 9), and the hourglass stiffness."""
         solids = self.r.solids
         P = P.swapaxes(2, 3)
         by_u = self.B0.swapaxes(1, 2) @ P.reshape(self.e, self.g * 9, -1)
         by_du = self.B1.swapaxes(1, 2) @ P[:, :, 1::3].reshape(self.e, self.g * 3, -1)
-        by_u = _rows(by_u)
         if solids.hourglass is not None:
             h = solids.hourglass
-            strain = np.einsum("ea,seai->esi", h, u[:, solids.connectivity])
-            by_u += (self.r.hourglass_stiffness[:, None] * h)[:, None, :, None] * strain[:, :, None]
-        return solids.connectivity, by_u, _rows(by_du)
+            hold = self.r.hourglass_stiffness[:, None] * h
+            by_u += np.einsum("ea,eis->eais", hold, self._hourglass(u, h)).reshape(by_u.shape)
+        return by_u, by_du
 
-    def force(self, u: Array, du: Array) -> tuple[Array, Array, Array]:
+    def force(self, u: Array, du: Array) -> tuple[Array, Array]:
         H = self._gradient(u, du)
         shape = H.shape
         F = (H + np.eye(3).ravel()).reshape(-1, 3, 3)
@@ -159,13 +159,11 @@ class _RubberPart(_Part):
         return self._forces(P, u)
 
     def potential(self) -> Array:
-        s = len(self._u)
+        s, h = self._u.shape[1], self.r.solids.hourglass
         W = (rubber.energy(self._F, self._law) * self._weights).reshape(-1, s).sum(0)
-        solids = self.r.solids
-        if solids.hourglass is not None:
-            strain = np.einsum("ea,seai->sei", solids.hourglass, self._u[:, solids.connectivity])
-            W += (self.r.hourglass_stiffness * (strain**2).sum(-1)).sum(-1) / 2
-        return W
+        if h is not None:
+            W += self.r.hourglass_stiffness @ (self._hourglass(self._u, h) ** 2).sum(1) / 2
+        return np.asarray(W)
 
     @property
     def A(self) -> Array:
@@ -175,7 +173,7 @@ class _RubberPart(_Part):
             self._A = A.reshape(self.e, self.g, -1, 9, 9)
         return self._A
 
-    def product(self, u: Array, du: Array) -> tuple[Array, Array, Array]:
+    def product(self, u: Array, du: Array) -> tuple[Array, Array]:
         H = self._gradient(u, du)
         return self._forces((self.A @ H[..., None])[..., 0], u)
 
@@ -202,7 +200,8 @@ def _at_stations(law: rubber.MooneyRivlin, points: int, s: int) -> rubber.Mooney
 
 
 class _CordPart(_Part):
-    def __init__(self, c: Cords):
+    def __init__(self, c: Cords, nodes: int):
+        super().__init__(c.lines.connectivity, nodes)
         self.c = c
         self.e, self.g, _, self.d = c.b0.shape
         self.b0 = c.b0.reshape(self.e, self.g * 3, self.d)
@@ -214,16 +213,14 @@ class _CordPart(_Part):
 
     def _vectors(self, u: Array, du: Array) -> Array:
         """b0 u + hoop du (e, g, s, 3)."""
-        n = self.c.lines.connectivity
-        q = self.b0 @ _columns(n, u) + self.b1 @ _columns(n, du)
+        q = self.b0 @ u[self.dofs] + self.b1 @ du[self.dofs]
         return q.reshape(self.e, self.g, 3, -1).swapaxes(2, 3)
 
-    def _forces(self, q: Array) -> tuple[Array, Array, Array]:
+    def _forces(self, q: Array) -> tuple[Array, Array]:
         q = (q * self.weights[..., None, None]).swapaxes(2, 3).reshape(self.e, self.g * 3, -1)
-        by_u, by_du = self.b0.swapaxes(1, 2) @ q, self.b1.swapaxes(1, 2) @ q
-        return self.c.lines.connectivity, _rows(by_u), _rows(by_du)
+        return self.b0.swapaxes(1, 2) @ q, self.b1.swapaxes(1, 2) @ q
 
-    def force(self, u: Array, du: Array) -> tuple[Array, Array, Array]:
+    def force(self, u: Array, du: Array) -> tuple[Array, Array]:
         q = self._vectors(u, du) + self.c.direction[:, :, None]
         shape = q.shape
         stiffness = np.repeat(self.c.stiffness, shape[2])
@@ -234,7 +231,7 @@ class _CordPart(_Part):
     def potential(self) -> Array:
         return np.asarray((self._W * self.weights[..., None]).sum((0, 1)))
 
-    def product(self, u: Array, du: Array) -> tuple[Array, Array, Array]:
+    def product(self, u: Array, du: Array) -> tuple[Array, Array]:
         return self._forces((self.D @ self._vectors(u, du)[..., None])[..., 0])
 
     def tangents(self) -> tuple[Array, Array, Array, Array]:
@@ -250,6 +247,7 @@ class _PressurePart(_Part):
     """Potential -p V, V = 1/2 int (x_r, x_theta, 0) . (x' x (dx/dTheta + e_z x x))."""
 
     def __init__(self, X: Array, load: Load):
+        super().__init__(load.lines.connectivity, len(X))
         self.load, lines = load, load.lines
         self.X = np.stack([X[:, 0], np.zeros(len(X)), X[:, 1]], -1)
         e, g, a = lines.slope.shape
@@ -258,19 +256,19 @@ class _PressurePart(_Part):
 
     def _fields(self, u: Array, du: Array) -> tuple[Array, Array, Array]:
         """u, u', du (e, g, s, 3) on the surface."""
-        c, lines = self.load.lines.connectivity, self.load.lines
-        shape = (*self.N.shape[:2], len(u), 3)
-        at = lambda w, rows: (rows @ _flat(c, w)).reshape(shape)
-        return at(u, self.N), at(u, lines.slope), at(du, self.N)
+        lines, (e, g, a) = self.load.lines, self.N.shape
+        at = lambda w, rows: (rows @ w[self.dofs].reshape(e, a, -1)).reshape(e, g, 3, -1)
+        fields = at(u, self.N), at(u, lines.slope), at(du, self.N)
+        return tuple(np.ascontiguousarray(f.swapaxes(2, 3)) for f in fields)  # type: ignore[return-value]
 
-    def _forces(self, by_x: Array, by_dx: Array, by_around: Array) -> tuple[Array, Array, Array]:
+    def _forces(self, by_x: Array, by_dx: Array, by_around: Array) -> tuple[Array, Array]:
         lines = self.load.lines
         e, g, s, _ = by_x.shape
         w = self.weights[..., None, None]
-        at = lambda rows, f: rows.swapaxes(1, 2) @ (w * f).reshape(e, g, s * 3)
-        shape = lambda f: f.reshape(e, -1, s, 3).swapaxes(1, 2)
-        by_u = at(self.N, by_x) + at(lines.slope, by_dx)
-        return lines.connectivity, shape(by_u), shape(at(self.N, by_around))
+        at = lambda rows, f: (
+            rows.swapaxes(1, 2) @ (w * f).swapaxes(2, 3).reshape(e, g, 3 * s)
+        ).reshape(e, -1, s)
+        return at(self.N, by_x) + at(lines.slope, by_dx), at(self.N, by_around)
 
     def place(self, u: Array, du: Array) -> tuple[Array, Array, Array]:
         """Deformed x, x', dx/dTheta (e, g, s, 3) on the surface."""
@@ -279,7 +277,7 @@ class _PressurePart(_Part):
         x = x + (self.N @ self.X[c])[:, :, None]
         return x, dx + (lines.slope @ self.X[c])[:, :, None], around
 
-    def force(self, u: Array, du: Array) -> tuple[Array, Array, Array]:
+    def force(self, u: Array, du: Array) -> tuple[Array, Array]:
         self.at = self.place(u, du)
         return self._forces(*pressure.first_around(*self.at))
 
@@ -287,7 +285,7 @@ class _PressurePart(_Part):
         density = pressure.density(*self.at) * self.weights[..., None]
         return np.asarray(density.sum((0, 1)))
 
-    def product(self, u: Array, du: Array) -> tuple[Array, Array, Array]:
+    def product(self, u: Array, du: Array) -> tuple[Array, Array]:
         return self._forces(*pressure.change(*self.at, *self._fields(u, du)))
 
     def tangents(self) -> tuple[Array, Array, Array, Array]:
@@ -302,14 +300,8 @@ class _PressurePart(_Part):
                 unit[..., j] = 1.0
                 N, slope = self.N[:, :, b, None, None], lines.slope[:, :, b, None, None]
                 zero = np.zeros_like(unit)
-                _, by_u, _ = self._forces(*pressure.change(*self.at, unit * N, unit * slope, zero))
-                _, mixed, _ = self._forces(*pressure.change(*self.at, zero, zero, unit * N))
-                K[0, ..., 3 * b + j] = by_u.swapaxes(0, 1).reshape(s, e, 3 * a)
-                K[1, ..., 3 * b + j] = mixed.swapaxes(0, 1).reshape(s, e, 3 * a)
+                by_u, _ = self._forces(*pressure.change(*self.at, unit * N, unit * slope, zero))
+                mixed, _ = self._forces(*pressure.change(*self.at, zero, zero, unit * N))
+                K[0, ..., 3 * b + j] = by_u.transpose(2, 0, 1)
+                K[1, ..., 3 * b + j] = mixed.transpose(2, 0, 1)
         return lines.connectivity, K[0], K[1], K[2]
-
-
-def _flat(connectivity: Array, u: Array) -> Array:
-    """Stations' vectors (s, n, 3) at the elements' nodes, (e, a, s * 3)."""
-    e, a = connectivity.shape
-    return u[:, connectivity].transpose(1, 2, 0, 3).reshape(e, a, -1)
