@@ -69,6 +69,17 @@ def is_converged(problem: Problem, point: Point, tolerance: float) -> bool:
     return point.objective <= EXACT or projected_gradient(problem, point) <= tolerance
 
 
+def gain_left(problem: Problem, point: Point) -> float:
+    """How much lower the objective would be after a Gauss-Newton step, were it quadratic:
+    (J^T r) . (J^T J)^-1 (J^T r) / 2F, of the variables that no bound holds."""
+    free = ((point.x > problem.lower + 1e-9) | (point.gradient < 0)) & (
+        (point.x < problem.upper - 1e-9) | (point.gradient > 0)
+    )
+    step = np.linalg.lstsq(point.jacobian[:, free], -point.residuals, rcond=None)[0]
+    gain = -0.5 * float(point.gradient[free] @ step)
+    return min(gain, point.objective)
+
+
 def _pair_clarity(point: Point) -> float:
     """How clearly the two [0, 0] modes are told apart; 1 where they are not both wanted."""
     modes = [point.modes[label] for label in (AXIAL, TORSIONAL) if label in point.modes]
@@ -138,10 +149,10 @@ def _beyond_crossing(problem: Problem, point: Point) -> Iterator[Array]:
     if AXIAL not in labels or TORSIONAL not in labels:
         return
     i, j = labels.index(AXIAL), labels.index(TORSIONAL)
-    weights = np.sqrt([t.weight * t.multiplicity for t in problem.targets])
-    if not (weights[i] and weights[j]):
+    scale = problem.scale
+    if not (scale[i] and scale[j]):
         return
-    slopes = point.jacobian / np.where(weights > 0, weights, 1.0)[:, None]
+    slopes = point.jacobian / np.where(scale > 0, scale, 1.0)[:, None]
     gap = point.modes[AXIAL].frequency_Hz - point.modes[TORSIONAL].frequency_Hz
     rise = slopes[i] - slopes[j]
     H = point.jacobian.T @ point.jacobian
