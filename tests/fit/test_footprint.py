@@ -203,13 +203,17 @@ def test_a_jump_between_neighbours_does_not_spoil_the_slope() -> None:
         differences([Variable("x", 1.0, 0.5, 2.0)], {"x": 1.0}, 1e-5, both, steepest=20.0)
 
 
-def test_a_minimum_at_a_jump_counts_as_converged() -> None:
-    """Least squares of two areas that no tyre has both, at a jump of less than their difference."""
-    case = case_with(exact_modes(0.5), FOOTPRINT)
-    result = calibrate(case, door(case, jump=0.001, jump_at=1.0002 * TRUTH["C10"])).result
-    assert result["converged"]
+@pytest.mark.parametrize("method", ["slsqp", "least-squares"])
+def test_a_minimum_at_a_jump_is_found_and_not_searched_for_ever(method: str) -> None:
+    """The area jumps just before the C10 that the targets want, by less than they can tell."""
+    targets = [area_target(1.001 * AREA_TRUE, 0.02 * AREA_TRUE), FOOTPRINT[1]]
+    case = case_with(exact_modes(0.5), targets)
+    result = calibrate(case, door(case, jump=0.001, jump_at=1.0002 * TRUTH["C10"]), method).result
+    assert result["converged"] and "jump" in result["message"] and result["evaluations"] <= 15
+    assert result["projected_gradient_norm"] > 1  # no minimum of a smooth function
     for name, value in TRUTH.items():
-        assert result["variables"][name]["value"] == pytest.approx(value, rel=0.02)
+        found = result["variables"][name]
+        assert abs(found["value"] - value) < 0.3 * found["standard_error"]
 
 
 @pytest.mark.parametrize("method", ["slsqp", "least-squares"])

@@ -15,7 +15,6 @@ from ..evaluate.door import Counts, Door
 from ..evaluate.failure import EvaluationFailed
 from ..evaluate.pool import process_pool
 from . import least_squares, slsqp
-from .footprint import JUMP
 from .problem import Point, Problem, objective_unit
 from .uncertainty import uncertainty
 
@@ -73,9 +72,9 @@ def calibrate(
 
     starts: the case's own start and ``starts - 1`` drawn uniformly in the scaled box; drawn
     starts that cannot be evaluated are counted and replaced. jobs: processes for the drawn starts,
-    and for the neighbours of a point of the first one where the solver gives no slopes.
-    Raises NothingToFit; DeckRefused where there are footprint targets and the solver has no road;
-    EvaluationFailed when the case's own start cannot be evaluated.
+    and for the neighbours of a point of the first one, where the solver gives no slopes or the
+    tyre is pressed. Raises NothingToFit; DeckRefused where there are footprint targets and the
+    solver has no road; EvaluationFailed when the case's own start cannot be evaluated.
     """
     problem = Problem(case, door, fixed, notify, jobs)
     if not len(problem.scale):
@@ -107,10 +106,9 @@ def _run(problem: Problem, start: Array, method: str) -> StartReport:
     tolerance = _tolerance(problem)
     outcome = METHODS[method](problem, start, tolerance)
     converged = slsqp.is_converged(problem, outcome.point, max(10 * TOLERANCE, tolerance))
-    message = outcome.message
-    if not converged and slsqp.gain_left(problem, outcome.point) <= _jumps(problem):
-        converged, message = True, f"{message}; what is left to gain is below the jumps of the area"
-    return StartReport(dict(first.values), outcome.point, message, converged, _history(problem))
+    converged = converged or slsqp.is_at_jump(problem, outcome.point)
+    values, history = dict(first.values), _history(problem)
+    return StartReport(values, outcome.point, outcome.message, converged, history)
 
 
 def _tolerance(problem: Problem) -> float:
@@ -119,11 +117,6 @@ def _tolerance(problem: Problem) -> float:
     sigma = min((t.sigma_Hz or 1.0 for t in problem.targets), default=1.0)
     pressed = SLOPE_ERROR * float(np.linalg.norm([t.scale * t.value for t in problem.footprint]))
     return max(TOLERANCE, modal / sigma + pressed)
-
-
-def _jumps(problem: Problem) -> float:
-    """By how much the objective may jump as nodes of the tread come to touch."""
-    return JUMP * float(np.linalg.norm([t.scale * t.value for t in problem.footprint]))
 
 
 def _more_starts(

@@ -27,7 +27,7 @@ from ..modes.label import paired_labels
 from ..modes.match import LostLabel, margin, match
 from ..modes.mode import Label, Mode
 from .differences import STEP, differences
-from .footprint import PRESS_STEP, STEEPEST, press, read_footprint_targets
+from .footprint import JUMP, PRESS_STEP, STEEPEST, press, read_footprint_targets
 
 Array = np.ndarray
 MORE_MODES = (4, 8)  # per harmonic, when a label is not among the modes first asked for
@@ -122,8 +122,9 @@ class Problem:
     """Evaluates designs for an optimiser, each distinct one once.
 
     notify: called with (number of the point, its values, Point or failure) as they come; jobs: how
-    many neighbours of a point are evaluated at a time, where the solver gives no slopes.
-    targets: the modes'; footprint: those of footprints, whose residuals follow the modes'.
+    many neighbours of a point are evaluated at a time, where the solver gives no slopes or presses.
+    targets: the modes'; footprint: those of footprints, whose residuals follow the modes';
+    roughness: what the objective may jump by as nodes of the tread come to touch the road.
     """
 
     def __init__(
@@ -145,6 +146,7 @@ class Problem:
         self.targets, self.footprint = read_targets(case), read_footprint_targets(case)
         modal, pressed = ([t.scale for t in each] for each in (self.targets, self.footprint))
         self.scale = np.array(modal + pressed)
+        self.roughness = JUMP * math.hypot(*(t.scale * t.value for t in self.footprint))
         self.lower = np.array([v.scaled(v.lower) for v in self.variables])
         self.upper = np.array([v.scaled(v.upper) for v in self.variables])
         self.difference_step = (

@@ -60,18 +60,14 @@ def _noise(problem: Problem, point: Point, counts: Array, leverage: Array) -> Ar
     leverage: diagonal of J (J^T J)^-1 J^T, whose sum is the number of variables that the data see:
     what the targets with a sigma do not determine of them, the others lose as freedom.
     """
-    targets = [t for t, c in zip((*problem.targets, *problem.footprint), counts, strict=True) if c]
-    stated = np.array(
-        [getattr(t, "sigma_Hz", None) or getattr(t, "sigma", np.nan) for t in targets]
-    )
-    unknown = np.isnan(stated)
-    if unknown.any():
-        freedom = unknown.sum() - (len(problem.variables) - leverage[~unknown].sum())
+    modal = [t.sigma_Hz or np.nan for t in problem.targets]
+    sigma = np.array(modal + [t.sigma for t in problem.footprint])[counts]
+    unknown = np.isnan(sigma)
+    freedom = unknown.sum() - (len(problem.variables) - leverage[~unknown].sum())
+    if freedom > 1e-9:  # else the fit goes through every point and says nothing about noise
         plain = (point.residuals[counts] / problem.scale[counts])[unknown]
-        # a fit that goes through every point says nothing about noise
-        share = np.linalg.norm(plain) / np.sqrt(freedom) if freedom > 1e-9 else np.nan
-        stated[unknown] = share
-    return stated
+        sigma[unknown] = np.linalg.norm(plain) / np.sqrt(freedom)
+    return sigma
 
 
 def _inverse(information: Array) -> tuple[Array, Array]:
