@@ -5,8 +5,9 @@ friction remembers the loads on the way.
 
 Areas are reproducible to 1e-12 of themselves, stiffnesses to 1e-10, so slopes over 1e-5 have five
 digits. But both are smooth in pieces only, and jump as nodes come to touch or to slide: at 4 kN by
-0.2 and 0.14 %, once within 0.04 of ln C10, on the default mesh. The small step sees the slope of a
-piece; a jump between two neighbours is rare, and known by its steepness.
+0.2 and 0.14 %, once within 0.04 of ln C10, on the default mesh; by a node's share of the patch at
+most. The small step sees the slope of a piece; a jump between two neighbours is rare, and known by
+its steepness.
 """
 
 from __future__ import annotations
@@ -28,7 +29,6 @@ from ..studies.footprint import footprint_row
 Array = np.ndarray
 PRESS_STEP = 1e-5  # of a scaled variable: the root of the precision of a stiffness
 STEEPEST = 20.0  # d ln q / d x; a jump of 0.1 % within a step is 100
-JUMP = 2e-3  # of areas and stiffnesses, relative
 ROW = {"contact_area_m2": "area_m2"}  # quantities with another name in a row of a footprint
 
 
@@ -65,7 +65,8 @@ def press(
     designs: Sequence[Mapping[str, float]],
     jobs: int,
 ) -> Iterator[Array | EvaluationFailed]:
-    """The targets' quantities (targets,) of each design, or why a load was not reached."""
+    """Of each design the targets' quantities and, behind them, by which share of itself each may
+    jump (2 targets,): a touching node's share of the patch; or why a load was not reached."""
     last = max(t.load_N for t in targets)
     loads = [load for load in door.case.case.loads_N if load <= last]
     for values, outcome in zip(designs, door.press_all(designs, loads, jobs), strict=True):
@@ -85,4 +86,6 @@ def _quantities(
 ) -> Array:
     mesh = section_mesh(with_values(case, values))
     rows = {each.load_N: footprint_row(pressed, each, mesh) for each in pressed.footprints}
-    return np.array([rows[t.load_N][ROW.get(t.quantity, t.quantity)] for t in targets])
+    share = {each.load_N: 1 / len(each.node) for each in pressed.footprints}
+    found = [rows[t.load_N][ROW.get(t.quantity, t.quantity)] for t in targets]
+    return np.array(found + [share[t.load_N] for t in targets])

@@ -27,7 +27,7 @@ from ..modes.label import paired_labels
 from ..modes.match import LostLabel, margin, match
 from ..modes.mode import Label, Mode
 from .differences import STEP, differences
-from .footprint import JUMP, PRESS_STEP, STEEPEST, press, read_footprint_targets
+from .footprint import PRESS_STEP, STEEPEST, press, read_footprint_targets
 
 Array = np.ndarray
 MORE_MODES = (4, 8)  # per harmonic, when a label is not among the modes first asked for
@@ -84,7 +84,8 @@ class Target:
 class Point:
     """One evaluated design: coordinates x, residuals sqrt(w) (q - q_ref) / sigma (a doublet's by
     sqrt 2), their Jacobian by x, the modes that were matched, and the label's margin; of each
-    footprint target its quantity, in its own unit."""
+    footprint target its quantity, in its own unit; by how much the objective may jump nearby, as
+    nodes of the tread come to touch the road."""
 
     values: Mapping[str, float]
     x: Array
@@ -94,6 +95,7 @@ class Point:
     clarity: float
     mass_kg: float
     footprint: Array
+    roughness: float
 
     @property
     def objective(self) -> float:
@@ -123,8 +125,7 @@ class Problem:
 
     notify: called with (number of the point, its values, Point or failure) as they come; jobs: how
     many neighbours of a point are evaluated at a time, where the solver gives no slopes or presses.
-    targets: the modes'; footprint: those of footprints, whose residuals follow the modes';
-    roughness: what the objective may jump by as nodes of the tread come to touch the road.
+    targets: the modes'; footprint: those of footprints, whose residuals follow the modes'.
     """
 
     def __init__(
@@ -146,7 +147,6 @@ class Problem:
         self.targets, self.footprint = read_targets(case), read_footprint_targets(case)
         modal, pressed = ([t.scale for t in each] for each in (self.targets, self.footprint))
         self.scale = np.array(modal + pressed)
-        self.roughness = JUMP * math.hypot(*(t.scale * t.value for t in self.footprint))
         self.lower = np.array([v.scaled(v.lower) for v in self.variables])
         self.upper = np.array([v.scaled(v.upper) for v in self.variables])
         self.difference_step = (
@@ -200,11 +200,12 @@ class Problem:
         else:
             step = self.difference_step or STEP
             slopes = differences(self.variables, values, step, self._frequencies, frequencies)[1]
-        pressed = np.empty(0)
+        pressed = shares = np.empty(0)
         if self.footprint:
             ask = lambda designs: press(self.door, self.footprint, designs, self.jobs)
-            pressed, rises = differences(self.variables, values, PRESS_STEP, ask, steepest=STEEPEST)
-            slopes = np.vstack([slopes, rises])
+            found, rises = differences(self.variables, values, PRESS_STEP, ask, steepest=STEEPEST)
+            pressed, shares = np.split(found, 2)
+            slopes = np.vstack([slopes, rises[: len(pressed)]])
         wanted = [t.frequency_Hz for t in self.targets] + [t.value for t in self.footprint]
         x = np.array([v.scaled(values[v.name]) for v in self.variables])
         return Point(
@@ -216,6 +217,7 @@ class Problem:
             clarity,
             evaluation.mass_kg,
             pressed,
+            float(np.linalg.norm(self.scale[len(order) :] * pressed * shares)),
         )
 
     def _frequencies(

@@ -81,14 +81,14 @@ def is_at_jump(problem: Problem, point: Point, lowered: float = 0.0) -> bool:
     ``lowered`` the objective by less than a quarter of that: were it quadratic, a Gauss-Newton
     step would lower it by (J^T r) . (J^T J)^-1 (J^T r) / 2F, of the variables that no bound holds.
     """
-    if not problem.roughness:
+    if not point.roughness:
         return False
     free = ((point.x > problem.lower + 1e-9) | (point.gradient < 0)) & (
         (point.x < problem.upper - 1e-9) | (point.gradient > 0)
     )
     step = np.linalg.lstsq(point.jacobian[:, free], -point.residuals, rcond=None)[0]
     gain = -0.5 * float(point.gradient[free] @ step)
-    return gain <= problem.roughness and lowered < gain / 4
+    return gain <= point.roughness and lowered < gain / 4
 
 
 def _pair_clarity(point: Point) -> float:
@@ -124,7 +124,7 @@ def _restart(problem: Problem, point: Point, damping: float) -> tuple[Point, boo
     seen = [point]
 
     def function(y: Array) -> tuple[float, Array]:
-        if problem.roughness and len(seen) > TRIALS + 1:
+        if point.roughness and len(seen) > TRIALS + 1:
             raise _Jump  # each trial presses several tyres
         x = np.clip(point.x + turn @ y, problem.lower, problem.upper)
         try:
