@@ -245,6 +245,8 @@ class TargetFootprint(Part):
     @classmethod
     def problems(cls, values: Mapping[str, Any]) -> Iterator[Problem]:
         given = [key for key in MEASURED if values.get(key) is not None]
+        if not given and WRONG in values.values():  # a misspelt key, which is reported
+            return
         if not given:
             both = " or ".join(MEASURED)
             yield "load_N", f"must come with what was measured at this load, {both}"
