@@ -121,9 +121,12 @@ def test_too_few_targets(
 def test_jobs_change_no_bit(tmp_path: Path) -> None:
     """The bundled solver; a design and its neighbours, one after the other and two at a time."""
     path = coarse_case(tmp_path)
-    text = path.read_text().replace("[6, 6, 6, 12, 30, 120]", "[8, 8, 14, 30, 120]")
+    text = path.read_text().replace("[6, 6, 6, 12, 30, 120]", "[10, 14, 36, 120]")
     text = text.replace("120]}", "120], loads_N: [1000]}", 1).replace("4000", "1000")
-    text = text.replace("{crown: 4, upper_sidewall: 3", "{crown: 3, upper_sidewall: 2")
+    text = text.replace(
+        "crown: 4, upper_sidewall: 3, lower_sidewall: 3",
+        "crown: 3, upper_sidewall: 2, lower_sidewall: 2",
+    )
     path.write_text(text.replace("\nsolver:", f"\n{FOOTPRINT.replace('3500', '1000')}", 1))
     path.write_text(path.read_text().replace("load_N: 4000", "load_N: 1000"))
     case = load_case(path)
