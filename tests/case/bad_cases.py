@@ -293,6 +293,41 @@ _edit("same_target", "targets.modes.3", "already", "{c: 1, m: 0,", "{c: 1, m: 1,
 _edit("high_target", "targets.modes.8.c", "highest_harmonic", "{c: 4, m: 0,", "{c: 5, m: 0,")
 _edit("zero_frequency", "targets.modes.0.frequency_Hz", "greater than 0", "31.7", "0")
 _edit("negative_weight", "targets.modes.0.weight", "at least 0", "31.7}", "31.7, weight: -1}")
+FOOTPRINT = "  footprint:\n    - {load_N: 4000, contact_area_m2: 0.0158, sigma_m2: 0.0003}\nsolver:"
+
+
+def _footprint(name: str, key: str, words: str, *edits: str) -> None:
+    """Edits of a good footprint target, which stands before ``solver``."""
+    text = FOOTPRINT
+    for old, new in zip(edits[::2], edits[1::2], strict=True):
+        assert old in text, old
+        text = text.replace(old, new, 1)
+    _edit(name, f"targets.footprint{key}", words, "\nsolver:", f"\n{text}")
+
+
+AREA, SIGMA = "contact_area_m2: 0.0158", ", sigma_m2: 0.0003"
+STIFF = "vertical_stiffness_N_per_m: 2.3e+5"
+_footprint("no_load", ".0.load_N", "must be given", "load_N: 4000, ", "")
+_footprint("load_below_zero", ".0.load_N", "greater than 0", "4000", "-4000")
+_footprint("nothing_measured", ".0.load_N", "contact_area_m2 or", f", {AREA}{SIGMA}", "")
+_footprint("area_zero", ".0.contact_area_m2", "greater than 0", "0.0158", "0")
+_footprint("area_without_sigma", ".0.sigma_m2", "must be given: the standard", SIGMA, "")
+_footprint("sigma_zero", ".0.sigma_m2", "greater than 0", "0.0003", "0.0")
+_footprint("sigma_of_other", ".0.sigma_m2", "must be absent", AREA, STIFF)
+_footprint("stiffness_without_sigma", ".0.sigma_N_per_m", "must be given", AREA, STIFF)
+_footprint("two_in_one", ".0.vertical_stiffness_N_per_m", "of its own", AREA, f"{AREA}, {STIFF}")
+_footprint("area_key", ".0.area_m2", "did you mean", "contact_area_m2", "area_m2")
+_footprint("area_text", ".0.contact_area_m2", "must be a number", "0.0158", "158 cm2")
+_footprint("footprint_weight", ".0.weight", "at least 0", "0.0003", "0.0003, weight: -1")
+_footprint(
+    "same_footprint",
+    ".1",
+    "contact_area_m2 at 4000 N is a target already",
+    "\nsolver:",
+    "\n    - {load_N: 4000.0, contact_area_m2: 0.016, sigma_m2: 0.001}\nsolver:",
+)
+_footprint("footprint_table", "", "must be a list", "    - {load_N", "    {load_N")
+_edit("zero_sigma", "targets.modes.0.sigma_Hz", "greater than 0", "31.7}", "31.7, sigma_Hz: 0}")
 # YAML
 _edit("duplicate_key", "pressure_kPa", "on line 6 already", PRESSURE, f"{PRESSURE}\n{PRESSURE}")
 _edit("python_tag", "", "tag", "name: P235", "name: !!python/object/apply:os.system [x] #")

@@ -14,7 +14,7 @@ from pydantic import BaseModel, ValidationError
 from .meshable import Problems, levels, places
 from .mistakes import Keys, dotted, suggestion
 from .parts import WRONG, number
-from .schema import Analysis
+from .schema import MEASURED, Analysis
 from .shape import KINDS, entries, explain, table, type_at
 
 if TYPE_CHECKING:
@@ -83,6 +83,14 @@ def _targets(data: Mapping[str, Any]) -> Problems:
         if first != i:
             name = f"[{label[0]},{label[1]}]" + (f" {label[2]}" if label[2] else "")
             yield ("targets", "modes", i), f"the mode {name} is a target already"
+    for i, target in enumerate(entries(table(data, "targets"), "footprint")):
+        load = number(target, "load_N") if isinstance(target, dict) else None
+        for quantity in MEASURED:
+            if load is None or target.get(quantity) is None:
+                continue
+            first = seen.setdefault((load, quantity), i)
+            if first != i:
+                yield ("targets", "footprint", i), f"{quantity} at {load:g} N is a target already"
 
 
 def _variables(data: Mapping[str, Any]) -> Problems:

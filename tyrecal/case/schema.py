@@ -207,7 +207,8 @@ class Variable(Part):
 
 
 class TargetMode(Part):
-    """A measured mode [c, m]; ``kind`` tells the two [0, 0] apart; ``sigma_Hz`` if known."""
+    """A measured mode [c, m]; ``kind`` tells the two [0, 0] apart; ``sigma_Hz``, its standard
+    deviation, counts as 1 Hz where it is not known."""
 
     c: Annotated[int, Field(ge=0, le=20)]
     m: Annotated[int, Field(ge=0, le=3)]  # beyond, the belt's motion has no clear order
@@ -227,11 +228,44 @@ class TargetMode(Part):
             yield "kind", f"must be absent: only [0,0] has a kind, this mode is [{c},{m}]"
 
 
+MEASURED = {"contact_area_m2": "sigma_m2", "vertical_stiffness_N_per_m": "sigma_N_per_m"}
+"""What a footprint target can hold, and the key of its standard deviation."""
+
+
+class TargetFootprint(Part):
+    """A measured contact area, or tangent vertical stiffness, at a load, with its sigma."""
+
+    load_N: Positive
+    contact_area_m2: Positive | None = None
+    sigma_m2: Positive | None = None
+    vertical_stiffness_N_per_m: Positive | None = None
+    sigma_N_per_m: Positive | None = None
+    weight: NotNegative = 1.0
+
+    @classmethod
+    def problems(cls, values: Mapping[str, Any]) -> Iterator[Problem]:
+        given = [key for key in MEASURED if values.get(key) is not None]
+        if not given and WRONG in values.values():  # a misspelt key, which is reported
+            return
+        if not given:
+            both = " or ".join(MEASURED)
+            yield "load_N", f"must come with what was measured at this load, {both}"
+        elif len(given) > 1:
+            yield given[1], f"must be a target of its own: this one holds {given[0]} already"
+        else:
+            for key, sigma in MEASURED.items():
+                if key in given and values.get(sigma) is None:
+                    yield sigma, f"must be given: the standard deviation of {key}, in its unit"
+                if key not in given and values.get(sigma) is not None:
+                    yield sigma, f"must be absent: it is of {key}, this target is {given[0]}"
+
+
 class Targets(Part):
-    """The measured modes, and where they come from."""
+    """What was measured, and where it comes from."""
 
     source: Text = ""
     modes: list[TargetMode] = Field(default_factory=list)
+    footprint: list[TargetFootprint] = Field(default_factory=list)
 
 
 class Solver(Part):
@@ -263,3 +297,8 @@ class Case(Part):
     targets: Targets = Targets()
     solver: Solver
     templates: Text | None = None
+
+    @property
+    def loads_N(self) -> list[float]:
+        """Loads at which the tyre is pressed, rising: the road's and those with a target."""
+        return sorted({*self.road.loads_N, *(target.load_N for target in self.targets.footprint)})

@@ -59,7 +59,8 @@ def command(
     quiet: bool,
     verbose: bool,
 ) -> int:
-    """Calibrate the variables of CASE to its target frequencies.
+    """Calibrate the variables of CASE to its targets: frequencies, and contact areas and vertical
+    stiffnesses on the road.
 
     Writes fit.json, fit.csv, fit_history.csv and pictures. --set NAME=VALUE on a variable changes
     where the fit starts.
@@ -71,6 +72,7 @@ def command(
     """
     from ..evaluate.door import Door
     from ..fit.calibrate import calibrate, history_csv
+    from ..fit.problem import objective_unit
     from ..report.table import fit_csv, fit_table
     from .output import Run, print_json, say, show
 
@@ -81,10 +83,13 @@ def command(
     loaded = _starting_at(loaded, values)
     door = Door(loaded, solver)
     adapter = door.solver
+    if loaded.case.targets.footprint:
+        door.needs_road()
     run = Run(case, output, "fit", adapter)
     door.folder, door.keep = run.runs, verbose
     door.store = run.open_store(store, no_store)
-    with _Progress(quiet, verbose) as progress:
+    unit = objective_unit(loaded)
+    with _Progress(quiet, verbose, unit) as progress:
         fit = calibrate(
             loaded,
             door,
@@ -110,7 +115,8 @@ def command(
 
         values = fit.fitted.values
         modes = sorted(fit.fitted.modes.values(), key=lambda mode: mode.frequency_Hz)
-        draw_fit(run.folder, loaded, values, door.evaluate(Question(values)), modes, fit.history)
+        evaluation = door.evaluate(Question(values))
+        draw_fit(run.folder, loaded, values, evaluation, modes, fit.history, unit)
     run.finish(solver_runs=door.counts.runs, answered_from_record=door.counts.recorded)
     say(f"results in {run.folder}", as_json, quiet)
     return 0 if fit.result["converged"] and fit.result["moved"] else EXIT_FIT
@@ -141,7 +147,7 @@ def _warnings(result: Mapping[str, Any]) -> list[str]:
     if not result["converged"]:
         warnings.append(
             f"not converged: {result['message']}; projected gradient"
-            f" {result['projected_gradient_norm']:.3g} Hz"
+            f" {result['projected_gradient_norm']:.3g} {result['objective_unit']}"
         )
     for name, variable in result["variables"].items():
         if variable["at_bound"]:
@@ -167,12 +173,12 @@ def _warnings(result: Mapping[str, Any]) -> list[str]:
 class _Progress:
     """A line that follows the fit on a terminal; silent elsewhere unless verbose."""
 
-    def __init__(self, quiet: bool, verbose: bool):
+    def __init__(self, quiet: bool, verbose: bool, unit: str):
         import sys
 
         self.live = sys.stderr.isatty() and not quiet
         self.verbose = verbose and not quiet
-        self.best = float("inf")
+        self.best, self.unit = float("inf"), unit
 
     def __enter__(self) -> _Progress:
         return self
@@ -185,10 +191,10 @@ class _Progress:
         """One more design point."""
         objective = getattr(outcome, "objective", None)
         self.best = min(self.best, objective or float("inf"))
-        state = f"{objective:.4f} Hz" if objective is not None else f"failed: {outcome}"
+        state = f"{objective:.4f} {self.unit}" if objective is not None else f"failed: {outcome}"
         if self.verbose:
             numbers = "  ".join(f"{k}={v:.5g}" for k, v in values.items())
             click.echo(f"point {number}: {state}  {numbers}", err=True)
         elif self.live:
-            text = f"\r\033[Kdesign {number}: {state:.60}, best {self.best:.4f} Hz"
+            text = f"\r\033[Kdesign {number}: {state:.60}, best {self.best:.4f} {self.unit}"
             click.echo(text, nl=False, err=True)

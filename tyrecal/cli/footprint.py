@@ -57,7 +57,7 @@ def command(
     from .output import Run, print_json, say, show
 
     loaded, values = options.load(case, mesh, assignments, pressure_kPa)
-    asked = options.parse_loads(loads) if loads is not None else loaded.case.road.loads_N
+    asked = options.parse_loads(loads) if loads is not None else loaded.case.loads_N
     door = Door(loaded, solver)
     adapter = door.solver
     door.needs_road()

@@ -65,7 +65,8 @@ loads = click.option(
     "--loads-N",
     "loads",
     metavar="F1,F2,...",
-    help="Vertical loads on the road, rising (footprint's default: the case's road.loads_N).",
+    help="Vertical loads on the road, rising (footprint's default: road.loads_N of the case, and"
+    " the loads of its targets).",
 )
 
 

@@ -15,7 +15,7 @@ from ..evaluate.door import Counts, Door
 from ..evaluate.failure import EvaluationFailed
 from ..evaluate.pool import process_pool
 from . import least_squares, slsqp
-from .problem import Point, Problem
+from .problem import Point, Problem, objective_unit
 from .uncertainty import uncertainty
 
 Array = np.ndarray
@@ -23,8 +23,10 @@ METHODS: dict[str, Callable[[Problem, Array, float], slsqp.Outcome]] = {
     "slsqp": slsqp.minimise,
     "least-squares": least_squares.minimise,
 }
+FEW = "{} targets cannot determine {} free variables: give more, or hold variables with --fix"
 TOLERANCE = 1e-3  # projected gradient, Hz per unit of a logarithm: 1e-5 Hz for a change of 1 %
 SLOPE_NOISE_HZ = 50.0  # differences of a step that suits the digits: this times the step
+SLOPE_ERROR = 1e-4  # of d ln q / d x of areas and stiffnesses, by the curvature within a step
 UNMOVED = 1e-6  # largest change of a scaled variable below which the fit did not move
 MOST_REPLACED = 20  # replaced starts per start asked for
 
@@ -32,7 +34,7 @@ Notify = Callable[[int, Mapping[str, float], Point | EvaluationFailed], None]
 
 
 class NothingToFit(ValueError):
-    """The case has no targets, or no variable is left free."""
+    """The case has no targets or fewer than free variables, or no variable is left free."""
 
 
 @dataclass
@@ -70,14 +72,19 @@ def calibrate(
 
     starts: the case's own start and ``starts - 1`` drawn uniformly in the scaled box; drawn
     starts that cannot be evaluated are counted and replaced. jobs: processes for the drawn starts,
-    and for the neighbours of a point of the first one where the solver gives no slopes.
-    Raises NothingToFit; EvaluationFailed when the case's own start cannot be evaluated.
+    and for the neighbours of a point of the first one, where the solver gives no slopes or the
+    tyre is pressed. Raises NothingToFit; DeckRefused where there are footprint targets and the
+    solver has no road; EvaluationFailed when the case's own start cannot be evaluated.
     """
     problem = Problem(case, door, fixed, notify, jobs)
-    if not problem.targets:
+    if not len(problem.scale):
         raise NothingToFit("the case has no targets: there is nothing to fit to")
     if not problem.variables:
         raise NothingToFit("no variable is free: there is nothing to fit")
+    if len(problem.scale) < len(problem.variables):
+        raise NothingToFit(FEW.format(len(problem.scale), len(problem.variables)))
+    if problem.footprint:
+        door.needs_road()
     initial = problem.evaluate(problem.start())
     reports = [_run(problem, problem.start(), method)]
     replaced = 0
@@ -96,11 +103,20 @@ def calibrate(
 
 def _run(problem: Problem, start: Array, method: str) -> StartReport:
     first = problem.evaluate(start)
-    tolerance = max(TOLERANCE, SLOPE_NOISE_HZ * (problem.difference_step or 0.0))
+    tolerance = _tolerance(problem)
     outcome = METHODS[method](problem, start, tolerance)
     converged = slsqp.is_converged(problem, outcome.point, max(10 * TOLERANCE, tolerance))
+    converged = converged or slsqp.is_at_jump(problem, outcome.point)
     values, history = dict(first.values), _history(problem)
     return StartReport(values, outcome.point, outcome.message, converged, history)
+
+
+def _tolerance(problem: Problem) -> float:
+    """What the projected gradient can be told from 0 by, given how exact the slopes are."""
+    modal = SLOPE_NOISE_HZ * (problem.difference_step or 0.0)
+    sigma = min((t.sigma_Hz or 1.0 for t in problem.targets), default=1.0)
+    pressed = SLOPE_ERROR * float(np.linalg.norm([t.scale * t.value for t in problem.footprint]))
+    return max(TOLERANCE, modal / sigma + pressed)
 
 
 def _more_starts(
@@ -234,12 +250,25 @@ def _result(
                 "deviation_percent": 100 * (fitted / target.frequency_Hz - 1),
             }
         )
+    pressed = [
+        {
+            "load_N": target.load_N,
+            "quantity": target.quantity,
+            "initial": float(initial.footprint[i]),
+            "fitted": float(point.footprint[i]),
+            "target": target.value,
+            "sigma": target.sigma,
+            "deviation_percent": 100 * (float(point.footprint[i]) / target.value - 1),
+        }
+        for i, target in enumerate(problem.footprint)
+    ]
     return {
         "format": 1,
         "method": method,
         "pressure_kPa": problem.case.case.pressure_kPa,
         "mass_kg": point.mass_kg,
         "objective_Hz": point.objective,
+        "objective_unit": objective_unit(problem.case),
         "initial_objective_Hz": initial.objective,
         "evaluations": len(history),
         "evaluations_to_0.05_Hz": near,
@@ -253,6 +282,7 @@ def _result(
         "variables": variables,
         "fixed": dict(problem.fixed),
         "modes": modes,
+        **({"footprint": pressed} if pressed else {}),
         "noise_Hz": known.noise_Hz,
         "correlations": {
             a: {b: _finite(known.correlations[i, j]) for j, b in enumerate(names)}

@@ -1,8 +1,8 @@
-"""Slopes of frequencies from neighbouring designs, where a solver gives none."""
+"""Slopes from neighbouring designs, where a solver gives none."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,21 +10,32 @@ import numpy as np
 from ..evaluate.failure import EvaluationFailed
 
 if TYPE_CHECKING:
-    from .problem import Problem, Variable
+    from .problem import Variable
 
 Array = np.ndarray
+Design = Mapping[str, float]
+Ask = Callable[[Sequence[Design]], Iterable[Array | EvaluationFailed]]
 STEP = 1e-4  # of a logarithm: best between truncation and the solver's digits
 
 
-def differences(problem: Problem, values: Mapping[str, float], frequencies: Array) -> Array:
-    """d f / d x, Hz (targets, variables), about a design whose ``frequencies`` are known.
+def differences(
+    variables: Sequence[Variable],
+    values: Design,
+    step: float,
+    ask: Ask,
+    centre: Array | None = None,
+    steepest: float = np.inf,
+) -> tuple[Array, Array]:
+    """Quantities q (q,) of a design and their slopes d q / d x (q, variables).
 
-    One neighbour a variable: above, or below where that lies beyond the bound or has no solution.
-    Raises EvaluationFailed where neither has one.
+    ask: the quantities of designs, in their order, or why there are none; centre: those of the
+    design itself, which is asked for together with its neighbours where they are not known;
+    steepest: d ln q / d x beyond which a quantity jumps between the two.
+    One neighbour a variable: above, or below where that lies beyond the bound, has no solution or
+    is beyond a jump. Raises EvaluationFailed where neither has one, or the design itself has none.
     """
     columns: dict[int, Array] = {}
     failures: dict[int, EvaluationFailed] = {}
-    variables, step = problem.variables, problem.difference_step or STEP
     sides = [_sides(v, values[v.name], step) for v in variables]
     for side in (0, 1):
         asked = [i for i, steps in enumerate(sides) if i not in columns and side < len(steps)]
@@ -35,18 +46,28 @@ def differences(problem: Problem, values: Mapping[str, float], frequencies: Arra
             for i, v in enumerate(variables)
             if i in asked
         ]
-        for i, answer in zip(asked, problem.modes(designs), strict=True):
+        answers = iter(ask(designs if centre is not None else [values, *designs]))
+        if centre is None:
+            first = next(answers)
+            if isinstance(first, EvaluationFailed):
+                raise first
+            centre = first
+        for i, answer in zip(asked, answers, strict=True):
             if isinstance(answer, EvaluationFailed):
                 if answer.cause == "licence":  # says nothing about the design
                     raise answer
                 failures[i] = answer
                 continue
-            shifted = np.array([answer[1][t.label].frequency_Hz for t in problem.targets])
-            columns[i] = (shifted - frequencies) / sides[i][side]
+            slope = (answer - centre) / sides[i][side]
+            if (abs(slope) > steepest * abs(centre)).any():
+                failures[i] = EvaluationFailed("no_results", f"jumps on both sides: {slope}")
+                continue
+            columns[i] = slope
     for i in range(len(variables)):
         if i not in columns:
             raise failures[i]
-    return np.array([columns[i] for i in range(len(variables))]).T
+    assert centre is not None  # a variable has room on one side at least
+    return centre, np.array([columns[i] for i in range(len(variables))]).T
 
 
 def _sides(variable: Variable, value: float, step: float) -> list[float]:

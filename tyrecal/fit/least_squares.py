@@ -12,7 +12,7 @@ from scipy.optimize import lsq_linear
 
 from ..evaluate.failure import EvaluationFailed
 from .problem import Point, Problem
-from .slsqp import Outcome, is_converged
+from .slsqp import AT_JUMP, Outcome, is_at_jump, is_converged
 
 Array = np.ndarray
 STEPS = 100
@@ -32,6 +32,8 @@ def minimise(problem: Problem, start: Array, tolerance: float) -> Outcome:
         if damping > STIFFEST:
             return Outcome(point, "no lower objective along any damped step")
         trial = _first_solvable(problem, point, _step(problem, point, damping))
+        if trial and is_at_jump(problem, point, point.objective - trial.objective):
+            return Outcome(min(point, trial, key=lambda p: p.objective), AT_JUMP)
         if trial is not None and trial.objective < point.objective:
             point, damping = trial, damping / 5
         else:

@@ -1,12 +1,20 @@
 """The calibration problem: design variables, targets, and the paper's objective, equation (1).
 
 F = sqrt( sum over modes, doublets twice, of w (f_num - f_ref)^2 )
+
+With standard deviations sigma, and footprint targets q (contact areas, vertical stiffnesses):
+
+F = sqrt( sum over modes, doublets twice, of w ((f_num - f_ref) / sigma)^2
+          + sum over footprint targets of w ((q_num - q_ref) / sigma)^2 )
+
+A frequency without sigma counts as one of 1 Hz, so that without any F is equation (1) in Hz; with
+some, F is a number of standard deviations.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,6 +27,7 @@ from ..modes.label import paired_labels
 from ..modes.match import LostLabel, margin, match
 from ..modes.mode import Label, Mode
 from .differences import STEP, differences
+from .footprint import PRESS_STEP, STEEPEST, press, read_footprint_targets
 
 Array = np.ndarray
 MORE_MODES = (4, 8)  # per harmonic, when a label is not among the modes first asked for
@@ -65,11 +74,18 @@ class Target:
         """How many modes it stands for: doublets count twice."""
         return 2 if self.label.c else 1
 
+    @property
+    def scale(self) -> float:
+        """Residual per Hz, sqrt(weight multiplicity) / sigma."""
+        return math.sqrt(self.weight * self.multiplicity) / (self.sigma_Hz or 1.0)
+
 
 @dataclass(frozen=True)
 class Point:
-    """One evaluated design: coordinates x, residuals sqrt(w) (f - f_ref) in Hz (a doublet's by
-    sqrt 2), their Jacobian by x, the modes that were matched, and the label's margin."""
+    """One evaluated design: coordinates x, residuals sqrt(w) (q - q_ref) / sigma (a doublet's by
+    sqrt 2), their Jacobian by x, the modes that were matched, and the label's margin; of each
+    footprint target its quantity, in its own unit; by how much the objective may jump nearby, as
+    nodes of the tread come to touch the road."""
 
     values: Mapping[str, float]
     x: Array
@@ -78,10 +94,12 @@ class Point:
     modes: dict[Label, Mode]
     clarity: float
     mass_kg: float
+    footprint: Array
+    roughness: float
 
     @property
     def objective(self) -> float:
-        """F, Hz."""
+        """F, Hz, or in standard deviations where targets have some."""
         return float(np.linalg.norm(self.residuals))
 
     @property
@@ -91,10 +109,12 @@ class Point:
 
 
 def objective(frequencies: Mapping[Label, float], targets: list[Target]) -> float:
-    """Equation (1) in Hz for frequencies by label."""
+    """F for frequencies by label: equation (1) in Hz where no target has a sigma."""
     return math.sqrt(
         sum(
-            t.weight * t.multiplicity * (frequencies[t.label] - t.frequency_Hz) ** 2
+            t.weight
+            * t.multiplicity
+            * ((frequencies[t.label] - t.frequency_Hz) / (t.sigma_Hz or 1.0)) ** 2
             for t in targets
         )
     )
@@ -104,7 +124,8 @@ class Problem:
     """Evaluates designs for an optimiser, each distinct one once.
 
     notify: called with (number of the point, its values, Point or failure) as they come; jobs: how
-    many neighbours of a point are evaluated at a time, where the solver gives no slopes.
+    many neighbours of a point are evaluated at a time, where the solver gives no slopes or presses.
+    targets: the modes'; footprint: those of footprints, whose residuals follow the modes'.
     """
 
     def __init__(
@@ -123,7 +144,9 @@ class Problem:
             for name, v in case.case.variables.items()
             if name not in self.fixed
         ]
-        self.targets = read_targets(case)
+        self.targets, self.footprint = read_targets(case), read_footprint_targets(case)
+        modal, pressed = ([t.scale for t in each] for each in (self.targets, self.footprint))
+        self.scale = np.array(modal + pressed)
         self.lower = np.array([v.scaled(v.lower) for v in self.variables])
         self.upper = np.array([v.scaled(v.upper) for v in self.variables])
         self.difference_step = (
@@ -169,27 +192,46 @@ class Problem:
             raise answer
         evaluation, modes, clarity = answer
         order = [modes[t.label] for t in self.targets]
-        weights = np.array([math.sqrt(t.weight * t.multiplicity) for t in self.targets])
-        wanted = np.array([t.frequency_Hz for t in self.targets])
         frequencies = np.array([m.frequency_Hz for m in order])
         if exact:
             slopes = np.array([[evaluation.gradients[n][m.position] for n in names] for m in order])
+            slopes = slopes.reshape(len(order), len(names))
             slopes *= [v.slope(values[v.name]) for v in self.variables]
         else:
-            slopes = differences(self, values, frequencies)
+            step = self.difference_step or STEP
+            slopes = differences(self.variables, values, step, self._frequencies, frequencies)[1]
+        pressed = shares = np.empty(0)
+        if self.footprint:
+            ask = lambda designs: press(self.door, self.footprint, designs, self.jobs)
+            found, rises = differences(self.variables, values, PRESS_STEP, ask, steepest=STEEPEST)
+            pressed, shares = np.split(found, 2)
+            slopes = np.vstack([slopes, rises[: len(pressed)]])
+        wanted = [t.frequency_Hz for t in self.targets] + [t.value for t in self.footprint]
         x = np.array([v.scaled(values[v.name]) for v in self.variables])
         return Point(
             values,
             x,
-            weights * (frequencies - wanted),
-            weights[:, None] * slopes,
+            self.scale * (np.concatenate([frequencies, pressed]) - wanted),
+            self.scale[:, None] * slopes,
             modes,
             clarity,
             evaluation.mass_kg,
+            pressed,
+            float(np.linalg.norm(self.scale[len(order) :] * pressed * shares)),
         )
 
+    def _frequencies(
+        self, designs: Sequence[Mapping[str, float]]
+    ) -> Iterator[Array | EvaluationFailed]:
+        """Frequencies (targets,) of each design, Hz, or its failure."""
+        for answer in self.modes(designs):
+            if isinstance(answer, EvaluationFailed):
+                yield answer
+            else:
+                yield np.array([answer[1][t.label].frequency_Hz for t in self.targets])
+
     def modes(
-        self, designs: list[dict[str, float]], names: tuple[str, ...] = ()
+        self, designs: Sequence[Mapping[str, float]], names: tuple[str, ...] = ()
     ) -> list[Found | EvaluationFailed]:
         """Of each design its evaluation, target modes and margin, or its failure."""
         labels = [t.label for t in self.targets]
@@ -214,8 +256,14 @@ class Problem:
         return [answers[i] for i in range(len(designs))]
 
 
+def objective_unit(case: LoadedCase) -> str:
+    """``Hz``, or ``sigma`` where a target has a standard deviation: the objective counts them."""
+    modal = any(target.sigma_Hz for target in read_targets(case))
+    return "sigma" if modal or read_footprint_targets(case) else "Hz"
+
+
 def read_targets(case: LoadedCase) -> list[Target]:
-    """Targets of a case; an empty list where it has none."""
+    """Target modes of a case; an empty list where it has none."""
     if case.case.targets is None:
         return []
     return [

@@ -9,6 +9,7 @@ Numerical Optimization, ch. 10 and 18); bounds become linear constraints.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,8 +23,14 @@ Array = np.ndarray
 RESTARTS = 40
 EXACT = 1e-3  # Hz, an objective below every measurement's resolution
 DAMPING = 0.1  # mu over the mean diagonal of J^T J, at first
+TRIALS = 3  # of a step, where the objective may jump
+AT_JUMP = "less is left to gain than areas and stiffnesses jump by"
 MIXED = 0.8  # labels of the two [0, 0] modes are less clear than this: they have met
 AXIAL, TORSIONAL = Label(0, 0, "axial"), Label(0, 0, "torsional")
+
+
+class _Jump(Exception):
+    """No lower objective along a step, however short."""
 
 
 @dataclass(frozen=True)
@@ -69,6 +76,21 @@ def is_converged(problem: Problem, point: Point, tolerance: float) -> bool:
     return point.objective <= EXACT or projected_gradient(problem, point) <= tolerance
 
 
+def is_at_jump(problem: Problem, point: Point, lowered: float = 0.0) -> bool:
+    """Whether areas and stiffnesses jump by more than is left to gain, and a step from the point
+    ``lowered`` the objective by less than a quarter of that: were it quadratic, a Gauss-Newton
+    step would lower it by (J^T r) . (J^T J)^-1 (J^T r) / 2F, of the variables that no bound holds.
+    """
+    if not point.roughness:
+        return False
+    free = ((point.x > problem.lower + 1e-9) | (point.gradient < 0)) & (
+        (point.x < problem.upper - 1e-9) | (point.gradient > 0)
+    )
+    step = np.linalg.lstsq(point.jacobian[:, free], -point.residuals, rcond=None)[0]
+    gain = -0.5 * float(point.gradient[free] @ step)
+    return gain <= point.roughness and lowered < gain / 4
+
+
 def _pair_clarity(point: Point) -> float:
     """How clearly the two [0, 0] modes are told apart; 1 where they are not both wanted."""
     modes = [point.modes[label] for label in (AXIAL, TORSIONAL) if label in point.modes]
@@ -81,6 +103,8 @@ def _descend(problem: Problem, point: Point, tolerance: float) -> Outcome:
         if is_converged(problem, point, tolerance):
             return Outcome(point, "converged")
         reached, full_step = _restart(problem, point, damping)
+        if is_at_jump(problem, point, point.objective - reached.objective):
+            return Outcome(reached, AT_JUMP)
         if reached.objective >= point.objective - 1e-9 * max(point.objective, 1e-3):
             if damping > 1e3 * DAMPING:
                 return Outcome(point, "no lower objective along the search direction")
@@ -100,6 +124,8 @@ def _restart(problem: Problem, point: Point, damping: float) -> tuple[Point, boo
     seen = [point]
 
     def function(y: Array) -> tuple[float, Array]:
+        if point.roughness and len(seen) > TRIALS + 1:
+            raise _Jump  # each trial presses several tyres
         x = np.clip(point.x + turn @ y, problem.lower, problem.upper)
         try:
             there = problem.evaluate(x)
@@ -116,14 +142,15 @@ def _restart(problem: Problem, point: Point, damping: float) -> tuple[Point, boo
         ),
         "jac": lambda y: np.concatenate([turn, -turn]),
     }
-    minimize(
-        function,
-        np.zeros(len(J.T)),
-        jac=True,
-        method="SLSQP",
-        constraints=[bounds],
-        options={"maxiter": 1, "ftol": 1e-15},
-    )
+    with suppress(_Jump):
+        minimize(
+            function,
+            np.zeros(len(J.T)),
+            jac=True,
+            method="SLSQP",
+            constraints=[bounds],
+            options={"maxiter": 1, "ftol": 1e-15},
+        )
     best = min(seen, key=lambda p: p.objective)
     return best, len(seen) > 2 and best is seen[2]
 
@@ -138,10 +165,10 @@ def _beyond_crossing(problem: Problem, point: Point) -> Iterator[Array]:
     if AXIAL not in labels or TORSIONAL not in labels:
         return
     i, j = labels.index(AXIAL), labels.index(TORSIONAL)
-    weights = np.sqrt([t.weight * t.multiplicity for t in problem.targets])
-    if not (weights[i] and weights[j]):
+    scale = problem.scale
+    if not (scale[i] and scale[j]):
         return
-    slopes = point.jacobian / np.where(weights > 0, weights, 1.0)[:, None]
+    slopes = point.jacobian / np.where(scale > 0, scale, 1.0)[:, None]
     gap = point.modes[AXIAL].frequency_Hz - point.modes[TORSIONAL].frequency_Hz
     rise = slopes[i] - slopes[j]
     H = point.jacobian.T @ point.jacobian

@@ -15,8 +15,9 @@ Array = np.ndarray
 class Uncertainty:
     """standard_errors: in each variable's own unit, None where the data do not tell;
     correlations (v, v); singular_values (v,) of the weighted Jacobian by the scaled variables,
-    Hz, largest first: a small one is a combination that the data do not see; noise_Hz: the
-    standard deviation of a frequency behind the errors, None where it cannot be known."""
+    in the objective's unit, largest first: a small one is a combination that the data do not see;
+    noise_Hz: the standard deviation of a frequency behind the errors, None where there is no
+    frequency that counts, or it cannot be known."""
 
     standard_errors: list[float | None]
     correlations: Array
@@ -27,17 +28,16 @@ class Uncertainty:
 def uncertainty(problem: Problem, point: Point) -> Uncertainty:
     """Linearised uncertainty at ``point`` of the fit that was made, whatever its weights.
 
-    The fit answers noise df in the measured frequencies with dx = (J^T J)^-1 J^T W^(1/2) df, J
-    and W^(1/2) with the weights and multiplicities of the objective, so its covariance is
+    The fit answers noise dq in the measured values with dx = (J^T J)^-1 J^T W^(1/2) dq, J and
+    W^(1/2) with the weights, multiplicities and sigmas of the objective, so its covariance is
     B diag(sigma^2) B^T with B = (J^T J)^-1 J^T W^(1/2) (Seber and Wild, Nonlinear Regression,
-    sec. 2.1). A doublet is one measured value. sigma is stated by the targets where all that
-    count have one, else one sigma for all is estimated from the residuals.
+    sec. 2.1). A doublet is one measured value. sigma is the targets' own; frequencies that have
+    none share one that is estimated from their residuals.
     """
-    root = np.sqrt([t.weight * t.multiplicity for t in problem.targets])
-    counts = root > 0
-    J, root = point.jacobian[counts], root[counts]
-    sigma = _noise(problem, point, counts)
+    counts = problem.scale > 0
+    J, root = point.jacobian[counts], problem.scale[counts]
     inverse, seen = _inverse(J.T @ J)
+    sigma = _noise(problem, point, counts, np.einsum("ij,jk,ik->i", J, inverse, J))
     response = inverse @ (J * root[:, None]).T
     covariance = (response * sigma**2) @ response.T
     spread = np.sqrt(np.where(seen & np.isfinite(sigma).all(), np.diag(covariance), np.inf))
@@ -49,24 +49,25 @@ def uncertainty(problem: Problem, point: Point) -> Uncertainty:
     values = np.zeros(J.shape[1])  # fewer data than variables leave some combinations unseen
     found = np.linalg.svd(J, compute_uv=False)
     values[: len(found)] = found
-    noise = float(np.sqrt(np.mean(sigma**2))) if len(sigma) else float("nan")
+    modal = sigma[: int(counts[: len(problem.targets)].sum())]
+    noise = float(np.sqrt(np.mean(modal**2))) if len(modal) else float("nan")
     return Uncertainty(errors, correlations, values, noise if np.isfinite(noise) else None)
 
 
-def _noise(problem: Problem, point: Point, counts: Array) -> Array:
-    """Standard deviation of each target that counts, Hz; NaN where nothing tells."""
-    stated = [t.sigma_Hz for t, c in zip(problem.targets, counts, strict=True) if c]
-    if all(stated):
-        return np.array(stated, float)
-    freedom = len(stated) - len(problem.variables)
-    if freedom <= 0:  # the fit goes through every point and says nothing about noise
-        return np.full(len(stated), np.nan)
-    plain = [
-        point.modes[t.label].frequency_Hz - t.frequency_Hz
-        for t, c in zip(problem.targets, counts, strict=True)
-        if c
-    ]
-    return np.full(len(stated), np.linalg.norm(plain) / np.sqrt(freedom))
+def _noise(problem: Problem, point: Point, counts: Array, leverage: Array) -> Array:
+    """Standard deviation of each target that counts, in its unit; NaN where nothing tells.
+
+    leverage: diagonal of J (J^T J)^-1 J^T, whose sum is the number of variables that the data see:
+    what the targets with a sigma do not determine of them, the others lose as freedom.
+    """
+    modal = [t.sigma_Hz or np.nan for t in problem.targets]
+    sigma = np.array(modal + [t.sigma for t in problem.footprint])[counts]
+    unknown = np.isnan(sigma)
+    freedom = unknown.sum() - (len(problem.variables) - leverage[~unknown].sum())
+    if freedom > 1e-9:  # else the fit goes through every point and says nothing about noise
+        plain = (point.residuals[counts] / problem.scale[counts])[unknown]
+        sigma[unknown] = np.linalg.norm(plain) / np.sqrt(freedom)
+    return sigma
 
 
 def _inverse(information: Array) -> tuple[Array, Array]:

@@ -15,19 +15,19 @@ MARKERS = "os^Dv<>P"
 
 
 @in_house_style
-def draw_convergence(path: Path, history: Sequence[Mapping[str, Any]]) -> None:
+def draw_convergence(path: Path, history: Sequence[Mapping[str, Any]], unit: str = "Hz") -> None:
     """Draw the objective and, below, every variable over its start value, both logarithmic.
 
     history: ``point``, ``objective_Hz`` (None: the design failed), ``values``, in order; where
-    there is a ``start``, new starts are marked. Variables that start at 0 or change sign have no
-    such ratio and are only named.
+    there is a ``start``, new starts are marked; ``unit`` is the objective's. Variables that start
+    at 0 or change sign have no such ratio and are only named.
     """
     point = np.array([row["point"] for row in history])
     objective = np.array([row["objective_Hz"] or np.nan for row in history], float)
     failed = np.isnan(objective)
     figure = new_figure(8.0, 5.6)
     top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=[3, 2])
-    top.set_title(_summary(objective))
+    top.set_title(_summary(objective, unit))
 
     many = len(point) > 60
     best = np.fmin.accumulate(objective)
@@ -37,7 +37,7 @@ def draw_convergence(path: Path, history: Sequence[Mapping[str, Any]]) -> None:
     if failed.any():
         top.plot(point[failed], np.full(failed.sum(), 0.96), "kx", ms=3 if many else 6,
                  transform=top.get_xaxis_transform(), label="could not be evaluated")  # fmt: skip
-    top.set_ylabel("objective, Hz")
+    top.set_ylabel(f"objective, {unit}")
 
     for k, (name, start) in enumerate(history[0]["values"].items()):
         ratio = np.array([row["values"][name] for row in history], float) / (start or np.nan)
@@ -71,8 +71,8 @@ def draw_convergence(path: Path, history: Sequence[Mapping[str, Any]]) -> None:
     save(figure, path)
 
 
-def _summary(objective: np.ndarray) -> str:
+def _summary(objective: np.ndarray, unit: str) -> str:
     if np.isnan(objective).all():
         return f"none of {len(objective)} design points could be evaluated"
     first, best = objective[~np.isnan(objective)][0], np.nanmin(objective)
-    return f"objective {first:.2f} Hz to {best:.2f} Hz in {len(objective)} design points"
+    return f"objective {first:.2f} {unit} to {best:.2f} {unit} in {len(objective)} design points"

@@ -42,10 +42,11 @@ def draw_fit(
     evaluation: Evaluation,
     modes: Sequence[Mode],
     history: Sequence[Mapping[str, Any]],
+    unit: str = "Hz",
 ) -> None:
-    """The pictures of the fitted design, and convergence.png."""
+    """The pictures of the fitted design, and convergence.png; ``unit``: of the objective."""
     draw_evaluation(folder, with_values(case, values), evaluation, modes)
-    draw_convergence(folder / "convergence.png", history)
+    draw_convergence(folder / "convergence.png", history, unit)
 
 
 def file_name(label: Label) -> str:

@@ -14,6 +14,10 @@ from rich.text import Text
 from .words import motion
 
 NONE = "-"
+QUANTITIES = {  # of a footprint target: words, unit over SI, decimals
+    "contact_area_m2": ("contact area, cm²", 1e4, 1),
+    "vertical_stiffness_N_per_m": ("vertical stiffness, N/mm", 1e-3, 1),
+}
 
 
 def fit_table(fit: Mapping[str, Any]) -> Table:
@@ -23,6 +27,12 @@ def fit_table(fit: Mapping[str, Any]) -> Table:
         deviation = mode["deviation_percent"]
         hertz = [f"{mode[key]:.2f}" for key in ("initial_Hz", "fitted_Hz", "target_Hz")]
         _add(table, *_named(mode), *hertz, Text(f"{deviation:+.2f}", _colour(deviation)))
+    for pressed in fit.get("footprint", ()):
+        name, per_si, digits = QUANTITIES[pressed["quantity"]]
+        figures = [f"{pressed[key] * per_si:.{digits}f}" for key in ("initial", "fitted", "target")]
+        deviation = pressed["deviation_percent"]
+        coloured = Text(f"{deviation:+.2f}", _colour(deviation))
+        _add(table, f"{pressed['load_N']:g} N", name, *figures, coloured)
     table.add_section()
     header = ("variable", "", "initial", "fitted", "bounds", "std. err. %")
     _add(table, *(Text(text, "bold") for text in header))
@@ -41,8 +51,10 @@ def fit_table(fit: Mapping[str, Any]) -> Table:
         _add(table, name, "held", f"{value:.4g}", f"{value:.4g}", NONE, NONE)
     table.add_section()
     objective = (f"{fit[key]:.3f}" for key in ("initial_objective_Hz", "objective_Hz"))
-    _add(table, Text("objective", "bold"), "equation (1)", *objective, "", "")
-    table.caption = "frequencies and objective in Hz"
+    in_hertz = fit.get("objective_unit", "Hz") == "Hz"
+    words = "equation (1)" if in_hertz else "deviations in sigmas"
+    _add(table, Text("objective", "bold"), words, *objective, "", "")
+    table.caption = f"frequencies{' and objective' * in_hertz} in Hz"
     return table
 
 
@@ -65,14 +77,17 @@ def modes_table(modes: Mapping[str, Any]) -> Table:
 
 
 def fit_csv(fit: Mapping[str, Any]) -> str:
-    """The modes of fit.json as CSV, all digits."""
-    keys = ("initial_Hz", "fitted_Hz", "target_Hz", "deviation_percent")
+    """The modes of fit.json as CSV, all digits; where there are footprint targets, they follow in
+    columns of their own."""
+    keys = ["c", "m", "kind", "multiplicity", "initial_Hz", "fitted_Hz", "target_Hz",
+            "deviation_percent"]  # fmt: skip
+    footprint = fit.get("footprint", [])
+    if footprint:
+        keys += ["load_N", "quantity", "initial", "fitted", "target", "sigma"]
     text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(["c", "m", "kind", "multiplicity", *keys])
-    for mode in fit["modes"]:
-        writer.writerow([mode["c"], mode["m"], mode["kind"] or "", mode["multiplicity"],
-                         *(mode[key] for key in keys)])  # fmt: skip
+    writer = csv.DictWriter(text, keys, restval="", extrasaction="ignore", lineterminator="\n")
+    writer.writeheader()
+    writer.writerows([*fit["modes"], *footprint])
     return text.getvalue()
 
 

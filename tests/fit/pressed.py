@@ -1,0 +1,84 @@
+"""A stand-in with areas and stiffnesses that are powers of the variables, and the real modes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from tyrecal_solvers.bundled.adapter import Bundled
+
+from tyrecal.case import LoadedCase, load_case, start_values
+from tyrecal.case.schema import TargetFootprint, TargetMode
+from tyrecal.evaluate.door import Door
+from tyrecal.evaluate.store import Store
+
+from ..conftest import CASES
+from ..studies.hertz import Hertz
+
+CASE = load_case(CASES / "p235_75r17.yaml")
+START = start_values(CASE)
+AREA = {"A_belt": -0.05, "A_carcass": -0.2, "C10": -0.1}
+STIFFNESS = {"A_belt": 0.1, "A_carcass": 0.15, "C10": 0.3}
+AREA_0, STIFFNESS_0 = np.pi * 0.08 * 0.05, 1.5 * 4000 / 0.02  # of Hertz at 4 kN
+
+
+def power(values: Mapping[str, float], powers: Mapping[str, float]) -> float:
+    """prod_j (x_j / start_j)^p_j."""
+    return float(np.prod([(values[n] / START[n]) ** p for n, p in powers.items()]))
+
+
+class Elastic(Hertz):
+    """``jump``: of the area, relative, where C10 exceeds ``jump_at``."""
+
+    jump, jump_at = 0.0, 0.0
+
+    def write(self, decks: Any, folder: Path) -> list[Path]:
+        """The real decks; remembers what the formulas need."""
+        paths = super().write(decks, folder)
+        if decks.loads_N:
+            area = power(decks.values, AREA)
+            area *= 1 + self.jump * (decks.values["C10"] > self.jump_at)
+            self.size, self.factor = area**0.5, power(decks.values, STIFFNESS)
+        return paths
+
+    def footprint(self, load: float) -> dict[str, Any]:
+        """One load."""
+        found = super().footprint(load)
+        found["stiffness_N_per_m"] *= self.factor
+        return found
+
+
+class Roadless(Bundled):
+    """The bundled solver, were it to know no road."""
+
+    capabilities = Bundled.capabilities - {"footprint"}
+
+
+def case_with(modes: list[TargetMode], footprint: list[TargetFootprint]) -> LoadedCase:
+    """The main case with other targets, pressed at 4 kN at once."""
+    targets = CASE.case.targets.model_copy(update={"modes": modes, "footprint": footprint})
+    road = CASE.case.road.model_copy(update={"loads_N": [4000.0, 6000.0]})
+    return replace(CASE, case=CASE.case.model_copy(update={"targets": targets, "road": road}))
+
+
+def area_target(value: float, sigma: float, load: float = 4000.0, **more: float) -> TargetFootprint:
+    return TargetFootprint(load_N=load, contact_area_m2=value, sigma_m2=sigma, **more)
+
+
+def stiffness_target(
+    value: float, sigma: float, load: float = 4000.0, **more: float
+) -> TargetFootprint:
+    return TargetFootprint(
+        load_N=load, vertical_stiffness_N_per_m=value, sigma_N_per_m=sigma, **more
+    )
+
+
+def door(case: LoadedCase, folder: Path | None = None, **options: float) -> Door:
+    """A door to the stand-in, with a record where there is a folder."""
+    solver = Elastic()
+    for name, value in options.items():
+        setattr(solver, name, value)
+    return Door(case, store=Store(folder) if folder else None, _solver=solver)

@@ -1,0 +1,262 @@
+"""Contact area and vertical stiffness as targets, on a tyre that is pressed by a formula."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tyrecal.evaluate.door import Door, Question
+from tyrecal.evaluate.failure import DeckRefused, EvaluationFailed
+from tyrecal.fit.calibrate import NothingToFit, calibrate
+from tyrecal.fit.differences import differences
+from tyrecal.fit.problem import Problem, Target, Variable, objective, objective_unit
+from tyrecal.modes.label import paired_labels
+from tyrecal.modes.mode import Label
+from tyrecal.studies.footprint import footprint_result, press
+
+from .pressed import (
+    AREA,
+    AREA_0,
+    CASE,
+    START,
+    STIFFNESS,
+    STIFFNESS_0,
+    Roadless,
+    area_target,
+    case_with,
+    door,
+    power,
+    stiffness_target,
+)
+
+TRUTH = {"A_belt": 2.6e-7, "A_carcass": 2.5e-7, "C10": 7e5}
+MODES = CASE.case.targets.modes
+START_X = np.log(list(START.values()))
+
+
+def exact_modes(sigma_Hz: float | None) -> list:
+    """The case's target modes with the frequencies that the model has at TRUTH."""
+    found = {
+        m.label: m.frequency_Hz for m in paired_labels(Door(CASE).evaluate(Question(TRUTH)).modes)
+    }
+    return [
+        t.model_copy(update={"frequency_Hz": found[Label(t.c, t.m, t.kind)], "sigma_Hz": sigma_Hz})
+        for t in MODES
+    ]
+
+
+AREA_TRUE, STIFFNESS_TRUE = AREA_0 * power(TRUTH, AREA), STIFFNESS_0 * power(TRUTH, STIFFNESS)
+FOOTPRINT = [
+    area_target(AREA_TRUE, 0.02 * AREA_TRUE),
+    stiffness_target(STIFFNESS_TRUE, 0.02 * STIFFNESS_TRUE),
+]
+
+
+def test_without_sigmas_and_footprints_it_is_equation_1_to_the_last_bit() -> None:
+    point = Problem(CASE, Door(CASE)).evaluate(START_X)
+    root = np.sqrt([2.0 if t.c else 1.0 for t in MODES])
+    f = np.array([point.modes[Label(t.c, t.m, t.kind)].frequency_Hz for t in MODES])
+    residuals = root * (f - np.array([t.frequency_Hz for t in MODES]))
+    assert (point.residuals == residuals).all()
+    assert point.objective == np.linalg.norm(residuals)
+    ones = [t.model_copy(update={"sigma_Hz": 1.0}) for t in MODES]
+    same = Problem(case_with(ones, []), Door(CASE)).evaluate(START_X)
+    assert (same.residuals == point.residuals).all() and (same.jacobian == point.jacobian).all()
+    assert objective_unit(CASE) == "Hz" and objective_unit(case_with(ones, [])) == "sigma"
+
+
+def test_the_weighted_objective_by_hand() -> None:
+    """A singlet 2 sigma off, a doublet 1 Hz off without sigma and of weight 3, an area 4 sigma, a
+    stiffness half a sigma off and of weight 8: sqrt(2^2 + 2 . 3 + 4^2 + 8 / 4) = sqrt(28)."""
+    raw = {
+        m.label: m.frequency_Hz for m in paired_labels(Door(CASE).evaluate(Question(START)).modes)
+    }
+    torsional, ovals = Label(0, 0, "torsional"), Label(2, 0)
+    modes = [
+        MODES[1].model_copy(update={"frequency_Hz": raw[torsional] + 0.4, "sigma_Hz": 0.2}),
+        MODES[5].model_copy(update={"frequency_Hz": raw[ovals] - 1.0, "weight": 3.0}),
+    ]
+    case = case_with(
+        modes,
+        [
+            area_target(0.9 * AREA_0, 0.025 * AREA_0),
+            stiffness_target(1.05 * STIFFNESS_0, 0.1 * STIFFNESS_0, weight=8.0),
+        ],
+    )
+    point = Problem(case, door(case)).evaluate(START_X)
+    assert point.objective == pytest.approx(28**0.5, rel=1e-9)
+    assert point.residuals == pytest.approx([-2, 6**0.5, 4, -(2**0.5)])
+    by_label = [Target(torsional, 40.4, 1.0, 0.2), Target(ovals, 79.0, 3.0)]
+    assert objective({torsional: 40.0, ovals: 80.0}, by_label) == pytest.approx(10**0.5)
+
+
+def test_slopes_are_those_of_the_formula_and_of_central_differences() -> None:
+    case = case_with(exact_modes(0.5), FOOTPRINT)
+    problem = Problem(case, door(case))
+    x = np.log(list(TRUTH.values())) + 0.05
+    point = problem.evaluate(x)
+    powers = np.array([list(AREA.values()), list(STIFFNESS.values())])
+    elasticities = (
+        point.jacobian[-2:] * 0.02 / (point.footprint / [AREA_TRUE, STIFFNESS_TRUE])[:, None]
+    )
+    assert elasticities == pytest.approx(powers, rel=1e-4, abs=1e-6)
+    step = 2e-4
+    for i in range(3):
+        there = [problem.evaluate(x + s * step * np.eye(3)[i]) for s in (1, -1)]
+        central = (there[0].objective - there[1].objective) / (2 * step)
+        assert point.gradient[i] == pytest.approx(central, rel=1e-4)
+
+
+@pytest.mark.parametrize("method", ["slsqp", "least-squares"])
+def test_finds_the_truth(method: str) -> None:
+    case = case_with(exact_modes(0.5), FOOTPRINT)
+    result = calibrate(case, door(case), method).result
+    assert result["converged"] and result["moved"] and result["objective_Hz"] < 0.01
+    for name, value in TRUTH.items():
+        assert result["variables"][name]["value"] == pytest.approx(value, rel=1e-3)
+    area, stiffness = result["footprint"]
+    assert (area["load_N"], area["quantity"], area["target"]) == (
+        4000,
+        "contact_area_m2",
+        AREA_TRUE,
+    )
+    assert stiffness["quantity"] == "vertical_stiffness_N_per_m"
+    assert area["initial"] == pytest.approx(AREA_0) and stiffness["sigma"] == 0.02 * STIFFNESS_TRUE
+    assert abs(area["deviation_percent"]) < 0.02 and abs(stiffness["deviation_percent"]) < 0.02
+    assert result["objective_unit"] == "sigma"
+
+
+def test_footprints_alone_determine_as_many_variables_as_there_are() -> None:
+    case = case_with([], FOOTPRINT)
+    held = {"A_belt": TRUTH["A_belt"]}
+    result = calibrate(case, door(case), fixed=held).result
+    assert result["converged"] and result["modes"] == [] and result["noise_Hz"] is None
+    for name in ("A_carcass", "C10"):
+        assert result["variables"][name]["value"] == pytest.approx(TRUTH[name], rel=1e-3)
+    with pytest.raises(NothingToFit, match="2 targets cannot determine 3 free variables"):
+        calibrate(case, door(case))
+
+
+def test_standard_errors_with_footprints_by_the_normal_equations() -> None:
+    """All sigmas stated, singlets and doublets alike: (J'^T J')^-1 where the weights are those of
+    the noise; with footprints no error is larger than without."""
+    modes = [t for t in exact_modes(0.5) if t.c == 0]
+    case = case_with(modes, FOOTPRINT)
+    problem = Problem(case, door(case))
+    result = calibrate(case, door(case)).result
+    x = np.log([v["value"] for v in result["variables"].values()])
+    J = problem.evaluate(x).jacobian
+    errors = np.sqrt(np.diag(np.linalg.inv(J.T @ J)))
+    stated = [v["standard_error"] / v["value"] for v in result["variables"].values()]
+    assert stated == pytest.approx(errors, rel=1e-6)
+    assert result["singular_values"] == pytest.approx(np.linalg.svd(J, compute_uv=False))
+    all_modes = case_with(exact_modes(0.5), [])
+    alone = calibrate(all_modes, Door(all_modes)).result["variables"]
+    both = case_with(exact_modes(0.5), FOOTPRINT)
+    together = calibrate(both, door(both)).result["variables"]
+    for name in TRUTH:
+        assert together[name]["standard_error"] < alone[name]["standard_error"]
+
+
+def test_frequencies_without_sigma_share_one_from_their_own_residuals() -> None:
+    """Footprints that are known exactly hold two of the three variables, so that nine frequencies
+    have eight degrees of freedom left, not six."""
+    modes = [
+        t.model_copy(update={"frequency_Hz": t.frequency_Hz + 0.3 * (-1) ** i})
+        for i, t in enumerate(exact_modes(None))
+    ]
+    sharp = [area_target(AREA_TRUE, 1e-6 * AREA_TRUE), stiffness_target(STIFFNESS_TRUE, 0.1)]
+    case = case_with(modes, sharp)
+    result = calibrate(case, door(case)).result
+    plain = [m["fitted_Hz"] - m["target_Hz"] for m in result["modes"]]
+    assert result["noise_Hz"] == pytest.approx(np.linalg.norm(plain) / 8**0.5, rel=1e-3)
+
+
+def test_numbers_are_those_of_a_footprint_at_the_cases_loads() -> None:
+    case = case_with([], [*FOOTPRINT, area_target(0.01, 0.001, 5000.0)])
+    assert case.case.loads_N == [4000, 5000, 6000]
+    tyre = door(case)
+    point = Problem(case, tyre).evaluate(START_X)
+    outcomes = press(tyre, {"initial": START}, case.case.loads_N)
+    from tyrecal.deck.context import section_mesh
+
+    rows = footprint_result({"initial": START}, [], outcomes, {"initial": section_mesh(CASE)})[
+        "rows"
+    ]
+    assert list(point.footprint) == [
+        rows[0]["area_m2"], rows[0]["vertical_stiffness_N_per_m"], rows[1]["area_m2"]
+    ]  # fmt: skip
+
+
+def test_a_jump_between_neighbours_does_not_spoil_the_slope() -> None:
+    case = case_with([], FOOTPRINT)
+    plain = Problem(case, door(case)).evaluate(START_X)
+    beside = door(case, jump=0.002, jump_at=START["C10"] * (1 + 5e-6))
+    assert Problem(case, beside).evaluate(START_X).jacobian == pytest.approx(
+        plain.jacobian, rel=1e-4
+    )
+    both = lambda designs: [np.array([1.0 + (d["x"] != 1.0)]) for d in designs]
+    with pytest.raises(EvaluationFailed, match="jumps"):
+        differences([Variable("x", 1.0, 0.5, 2.0)], {"x": 1.0}, 1e-5, both, steepest=20.0)
+
+
+@pytest.mark.parametrize("method", ["slsqp", "least-squares"])
+def test_a_minimum_at_a_jump_is_found_and_not_searched_for_ever(method: str) -> None:
+    """The area jumps just before the C10 that the targets want, by less than they can tell."""
+    targets = [area_target(1.001 * AREA_TRUE, 0.02 * AREA_TRUE), FOOTPRINT[1]]
+    case = case_with(exact_modes(0.5), targets)
+    result = calibrate(case, door(case, jump=0.001, jump_at=1.0002 * TRUTH["C10"]), method).result
+    assert result["converged"] and "jump" in result["message"] and result["evaluations"] <= 15
+    assert result["projected_gradient_norm"] > 1  # no minimum of a smooth function
+    for name, value in TRUTH.items():
+        found = result["variables"][name]
+        assert abs(found["value"] - value) < 0.3 * found["standard_error"]
+
+
+@pytest.mark.parametrize("method", ["slsqp", "least-squares"])
+def test_loads_out_of_reach_are_stepped_back_from(method: str) -> None:
+    """The tyre of small C10 bottoms out before the load; the truth lies just before that."""
+    case = case_with(exact_modes(0.5), FOOTPRINT)
+    tyre = door(case)
+    solver = tyre.solver
+    original = solver.write
+
+    def write(decks, folder):  # type: ignore[no-untyped-def]
+        solver.reach = 3000.0 if decks.values["C10"] < 0.99 * TRUTH["C10"] else 20e3
+        return original(decks, folder)
+
+    solver.write = write  # type: ignore[method-assign]
+    fit = calibrate(case, tyre, method)
+    assert fit.result["failed_evaluations"] > 0 and fit.result["objective_Hz"] < 0.05
+    failed = [row for row in fit.history if row["objective_Hz"] is None]
+    assert all("the rim is on the road" in row["failure"] for row in failed)
+
+
+def test_a_later_load_out_of_reach_fails_and_one_without_a_target_is_not_pressed() -> None:
+    case = case_with([], [*FOOTPRINT, area_target(0.01, 0.001, 5000.0)])
+    with pytest.raises(EvaluationFailed, match="4500") as failure:
+        Problem(case, door(case, reach=4500.0)).evaluate(START_X)
+    assert failure.value.cause == "no_equilibrium"
+    Problem(case, door(case, reach=5500.0)).evaluate(START_X)
+
+
+def test_the_record_answers_a_second_fit_to_the_last_bit(tmp_path: Path) -> None:
+    case = case_with(exact_modes(0.5), FOOTPRINT)
+    first, second = door(case, tmp_path), door(case, tmp_path)
+    results = [json.dumps(calibrate(case, each).result) for each in (first, second)]
+    assert results[0] == results[1]
+    assert first.counts.runs > 0 and (second.counts.runs, second.counts.recorded) == (
+        0, first.counts.runs + first.counts.recorded
+    )  # fmt: skip
+
+
+def test_a_solver_without_a_road_is_refused_before_anything_runs() -> None:
+    case = case_with(MODES, FOOTPRINT)
+    tyre = Door(case, _solver=Roadless())
+    with pytest.raises(DeckRefused, match="cannot press a tyre on a road"):
+        calibrate(case, tyre)
+    assert tyre.counts.runs == 0
+    assert calibrate(CASE, Door(CASE, _solver=Roadless())).result["converged"]

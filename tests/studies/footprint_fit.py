@@ -1,0 +1,105 @@
+"""A known tyre found again from its frequencies, contact area and vertical stiffness.
+
+    python -m tests.studies.footprint_fit DIR [--mesh LEVEL]
+
+Writes DIR/known.yaml: the main case with targets that its own model has at TRUTH, frequencies with
+a sigma of 0.5 Hz, areas and stiffnesses of 2 %, and a mesh ``coarse`` besides its own. Then fits it
+with and without the footprint targets, and prints what was found and the standard errors.
+"""
+
+from __future__ import annotations
+
+import shutil
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+from tyrecal.case import LoadedCase, load_case, start_values, with_values
+from tyrecal.deck.context import section_mesh
+from tyrecal.evaluate.door import Door, Question
+from tyrecal.evaluate.store import Store
+from tyrecal.fit.calibrate import calibrate
+from tyrecal.modes.label import paired_labels
+from tyrecal.studies.footprint import footprint_row
+
+from ..conftest import CASES
+
+TRUTH = {"A_belt": 2.6e-7, "A_carcass": 2.5e-7, "C10": 7.0e5}
+COARSE = """\
+    coarse:
+      elements: {crown: 4, upper_sidewall: 4, lower_sidewall: 4, bead: 1}
+      rows: [1, 1, 1, 1]
+"""
+ROAD = "road: {element_angles_deg: [6, 6, 6, 12, 30, 120], loads_N: [2000, 4000]}\n\n"
+
+
+def known_case(folder: Path, mesh: str) -> Path:
+    """The case file with targets of TRUTH on the mesh."""
+    folder.mkdir(parents=True, exist_ok=True)
+    shutil.copy(CASES / "p235_75r17.csv", folder)
+    text = (
+        (CASES / "p235_75r17.yaml")
+        .read_text()
+        .replace("    default:\n", f"{COARSE}    default:\n", 1)
+    )
+    text = text.replace("level: default\n", f"level: {mesh}\n", 1)
+    if mesh == "coarse":
+        text = text.replace("variables:", f"{ROAD}variables:", 1)
+    path = folder / "known.yaml"
+    path.write_text(text)
+    case = load_case(path)
+    wanted = {(t.c, t.m, t.kind) for t in case.case.targets.modes}
+    door = Door(case, store=Store(folder / "record"))
+    lines = [
+        f"    - {{c: {mode.label.c}, m: {mode.label.m}, frequency_Hz: {mode.frequency_Hz!r},"
+        f" sigma_Hz: 0.5{f', kind: {mode.label.kind}' if mode.label.kind else ''}}}"
+        for mode in paired_labels(door.evaluate(Question(TRUTH)).modes)
+        if (mode.label.c, mode.label.m, mode.label.kind) in wanted
+    ]
+    pressed = door.press(TRUTH, case.case.loads_N[: case.case.loads_N.index(4000) + 1])
+    row = footprint_row(pressed, pressed.footprints[-1], section_mesh(with_values(case, TRUTH)))
+    area, stiffness = row["area_m2"], row["vertical_stiffness_N_per_m"]
+    lines += [
+        "  footprint:",
+        f"    - {{load_N: 4000, contact_area_m2: {area!r}, sigma_m2: {0.02 * area!r}}}",
+        f"    - {{load_N: 4000, vertical_stiffness_N_per_m: {stiffness!r},"
+        f" sigma_N_per_m: {0.02 * stiffness!r}}}",
+    ]
+    before, rest = text.split("  modes:\n", 1)
+    path.write_text("\n".join([f"{before}  modes:", *lines, "", rest[rest.index("solver:") :]]))
+    return path
+
+
+def without_footprint(case: LoadedCase) -> LoadedCase:
+    """The case with its target modes alone."""
+    targets = case.case.targets.model_copy(update={"footprint": []})
+    return replace(case, case=case.case.model_copy(update={"targets": targets}))
+
+
+def main(folder: Path, mesh: str) -> None:
+    """Print both fits."""
+    case = load_case(known_case(folder, mesh))
+    print("start", start_values(case))
+    for words, each in (("frequencies alone", without_footprint(case)), ("both", case)):
+        door, began = Door(each, store=Store(folder / "record")), time.perf_counter()
+        result = calibrate(each, door).result
+        seconds, counts = time.perf_counter() - began, door.counts
+        print(f"{words}: {result['evaluations']} designs, {counts.runs} runs, {counts.recorded}")
+        print(f"  from the record, {seconds:.0f} s; converged {result['converged']}:")
+        print(f"  {result['message']}; objective", result["initial_objective_Hz"], "to")
+        print(f"  {result['objective_Hz']:.2e} sigma")
+        for name, found in result["variables"].items():
+            error = 100 * found["standard_error"] / found["value"]
+            off = 100 * (found["value"] / TRUTH[name] - 1)
+            print(f"  {name} {found['value']:.6e}, off {off:+.4f} %, standard error {error:.2f} %")
+        for row in result.get("footprint", ()):
+            print("  ", row)
+        print("   singular values", [f"{s:.3g}" for s in result["singular_values"]])
+        for name, row in result["correlations"].items():
+            print("   correlations of", name, [f"{x:.2f}" for x in row.values()], flush=True)
+
+
+if __name__ == "__main__":
+    level = sys.argv[sys.argv.index("--mesh") + 1] if "--mesh" in sys.argv else "coarse"
+    main(Path(sys.argv[1]), level)
