@@ -29,6 +29,7 @@ from .road import flat_road
 Array = np.ndarray
 HALF_TURN = np.array([1.0, -1.0, -1.0])  # about the vertical: r, theta, z
 ARRAYS = ("ring", "node", "along_m", "across_m", "pressure_Pa", "area_m2", "traction_Pa")
+SMALLEST_SLIP = 1e-6  # m, before friction is full: harder sticks are not reached
 
 
 @dataclass(frozen=True)
@@ -64,10 +65,11 @@ def read_road(model: list[Keyword]) -> RoadData | None:
     stiffness = float(np.real(found["SURFACE BEHAVIOR"].only_row().number(0)))
     friction = float(np.real(found["FRICTION"].only_row().number(0)))
     slip = float(np.real(found["FRICTION"].number("ELASTIC SLIP") or 0.0))
-    if not (stiffness > 0 and friction >= 0 and slip > 0):
+    if not (stiffness > 0 and friction >= 0 and slip >= SMALLEST_SLIP):
         raise DeckError(
             found["FRICTION"].line,
-            "stiffness and elastic slip of the contact must be positive, friction not negative",
+            "the contact's stiffness must be positive, friction not negative, the elastic slip at"
+            f" least {SMALLEST_SLIP:g} m",
         )
     return RoadData(
         bodies[0].need("REF NODE"), tread, stiffness, friction, slip, _half_lengths(model)

@@ -5,7 +5,7 @@ height at a given load, preconditioned GMRES inside, loads one after the other.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -26,10 +26,14 @@ EXACT = 1e-2  # residual of the linear problem, relative
 ROUGH = 5e-2  # the same as long as the contact changes much
 PATIENCE = 2  # steps that may fail to halve the residual, with Coulomb's friction
 NEAR = 1e-2  # as loosely as that, before Coulomb's friction is tried
+SOFT = 1e-4  # m: an elastic slip that is no obstacle
+HARDER = 0.3  # from one elastic slip to the next smaller one
 SHORTEST = 1 / 64  # step of the line search
 TOUCH = 1e-6  # m/N of deflection to begin with: it must touch, and stay small
-LARGEST = 0.5  # step, share of the load
 SOFTEST = 1 / 16  # share of a load's increase, below which it counts as unreachable
+
+
+Bound = tuple[Array, Array]
 
 
 class NotPressed(ArithmeticError):
@@ -54,23 +58,22 @@ class Press:
 
     def __init__(self, tyre: Revolved, fold: Fold, road: Road, U: Array, check: Callable[[], None]):
         self.tyre, self.fold, self.check = tyre, fold, check
-        self.road = road
+        self.free_radius = float(road.positions(U)[..., 0].max())
+        self.road = road.settled(road.forces(U, self.free_radius))
         tyre.residual(U)
         self.order = Elimination([t[0] for t in tyre.tangents()], fold, tyre.around)
         self.parts = fold.parts(U)
-        self.free_radius = float(self.road.positions(U)[..., 0].max())
         self.height = self.free_radius
         self.load = 0.0
         self._before: tuple[Array, float, float] | None = None
-        self._normal = np.zeros_like(road.area)
+        self._bound = np.zeros_like(road.area), np.zeros_like(road.area)
         self._factor: Touching | None = None
         self._used = 0
         self.factorisations = self.products = self.iterations = 0
 
     def to(self, load: float) -> Pressed:
-        """The equilibrium at ``load`` (N), in steps of half of it at most, for friction acts on
-        what touched before, and in smaller ones where need be. Raises NotPressed."""
-        step = min(load - self.load, LARGEST * load)
+        """The equilibrium at ``load`` (N), in smaller steps where need be. Raises NotPressed."""
+        step = load - self.load
         smallest = SOFTEST * step
         while True:
             self.check()
@@ -102,7 +105,7 @@ class Press:
         )
 
     def _state(
-        self, parts: Array, height: float, load: float, bound: Array | None
+        self, parts: Array, height: float, load: float, bound: Bound | None
     ) -> tuple[Array, float, Contact]:
         """Residuals: forces on the parts, and half the load less the contact's."""
         U = self.fold.spread(parts)
@@ -114,20 +117,37 @@ class Press:
     def _newton(self, load: float) -> Pressed:
         """By Tresca's friction, with the last normal forces, to where Coulomb's converges."""
         parts, height = self._start(load)
-        normal, near = self._normal, NEAR
+        bound, near = self._bound, NEAR
         for _ in range(LONGEST):
-            parts, height, contact = self._settle(parts, height, load, normal, near)
+            parts, height, contact = self._softly(parts, height, load, bound, near)
             try:
                 parts, height, contact = self._settle(parts, height, load, None, TOLERANCE)
             except NotPressed:
-                normal, near = contact.local[..., 0], max(0.1 * near, TOLERANCE)
+                bound = contact.local[..., 0], self.road.share(height)[0]
+                near = max(0.1 * near, TOLERANCE)
                 continue
-            self._normal = contact.local[..., 0]
+            self._bound = contact.local[..., 0], np.ones_like(self.road.area)
             return Pressed(parts, height, contact, self._stiffness(contact))
         raise NotPressed("the friction did not settle")
 
+    def _softly(
+        self, parts: Array, height: float, load: float, bound: Bound, tolerance: float
+    ) -> tuple[Array, float, Contact]:
+        """By Tresca's friction; a hard stick is approached by softer ones."""
+        road = self.road
+        slips = [road.elastic_slip]
+        while slips[0] < SOFT:
+            slips.insert(0, slips[0] / HARDER)
+        try:
+            for slip in slips:
+                self.road = replace(road, elastic_slip=slip)
+                parts, height, contact = self._settle(parts, height, load, bound, tolerance)
+        finally:
+            self.road = road
+        return parts, height, contact
+
     def _settle(
-        self, parts: Array, height: float, load: float, bound: Array | None, tolerance: float
+        self, parts: Array, height: float, load: float, bound: Bound | None, tolerance: float
     ) -> tuple[Array, float, Contact]:
         """Newton's method, with an energy line search where the friction is bounded; with
         Coulomb's friction it is left as soon as it does not converge."""
@@ -219,10 +239,9 @@ class _Border:
     tyre. ``scale`` brings it to the size of the displacements."""
 
     def __init__(self, fold: Fold, contact: Contact):
-        by_height = -contact.K[..., 0]
-        of_force = np.zeros_like(by_height)
-        of_force[..., 0] = by_height[..., 0]
-        self.by_height = fold.gather(contact.nodal(fold.shape, by_height))
+        of_force = np.zeros_like(contact.by_height)
+        of_force[..., 0] = contact.by_height[..., 0]
+        self.by_height = fold.gather(contact.nodal(fold.shape, contact.by_height))
         self.of_force = fold.gather(contact.nodal(fold.shape, of_force))
         self.stiffness = float(contact.K[..., 0, 0].sum())
         self.scale = max(self.stiffness, 1.0) ** -0.5

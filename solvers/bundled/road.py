@@ -8,8 +8,10 @@ c = cos theta, s = sin theta of a node's reference angle its depth and its place
     pressure = k <d - H>,   traction = mu pressure min(|slip| / e, 1) slip / |slip|
 
 with the overclosure's stiffness k and the elastic slip e; slip counts from where a node stood
-when the last load had been reached, plus the elastic slip that it had then. A node that did not
-touch then has not slipped yet.
+when the last load had been reached, plus the elastic slip that it had then. A node that the road
+was a gap g away from then, at H0, met it on its way to H, and slips from there on:
+
+    slip = (1 - g / (H0 - H)) (x - x0)
 """
 
 from __future__ import annotations
@@ -31,7 +33,7 @@ class Road:
 
     nodes (c,): rows of the section; area (k, c): reference area that a node stands for, m2;
     stiffness: Pa/m; friction: coefficient; elastic_slip: m; anchor (k, c, 2), m: where slip
-    counts from, for nodes that ``touched`` (k, c) at the last load.
+    counts from; gap (k, c), m: to the road at the last load, at ``height``, 0 where it touched.
     """
 
     nodes: Array
@@ -42,65 +44,81 @@ class Road:
     friction: float
     elastic_slip: float
     anchor: Array
-    touched: Array
+    gap: Array
+    height: float
 
     def positions(self, U: Array) -> Array:
         """Depth, and place in the road along and across (k, c, 3), m."""
         u = U[: len(self.area), self.nodes]
         return np.asarray(self.origin + np.einsum("kij,kcj->kci", self.frame, u))
 
-    def forces(self, U: Array, height: float, bound: Array | None = None) -> Contact:
+    def share(self, height: float) -> tuple[Array, Array]:
+        """Of a step to ``height``, what each node went on the road (k, c), and its slope, 1/m."""
+        rise = max(self.height - height, 1e-12)
+        met = self.gap < rise
+        share = np.where(met, 1.0 - self.gap / rise, 0.0)
+        return share, np.where(met, -self.gap / rise**2, 0.0)
+
+    def forces(self, U: Array, height: float, bound: tuple[Array, Array] | None = None) -> Contact:
         """Forces and tangents at a state U (k, n, 3) with the road at ``height`` (m).
 
-        ``bound`` (k, c): normal forces that limit the friction (Tresca), instead of those of the
-        state itself (Coulomb).
+        ``bound``: normal forces (k, c) that limit the friction (Tresca) and shares of the step,
+        instead of those of the state itself (Coulomb).
         """
         at = self.positions(U)
         overclosure = at[..., 0] - height
         touching = overclosure > 0
         normal = self.stiffness * self.area * np.where(touching, overclosure, 0.0)
-        slip = (at[..., 1:] - self.anchor) * self.touched[..., None]
+        moved = at[..., 1:] - self.anchor
+        share, growth = self.share(height) if bound is None else (bound[1], 0.0 * normal)
+        slip = moved * share[..., None]
         length = np.maximum(np.linalg.norm(slip, axis=-1), 1e-300)
-        sticking = length <= self.elastic_slip
-        share = slip / np.where(sticking, self.elastic_slip, length)[..., None]
-        pressed = normal if bound is None else bound
-        local = np.concatenate([normal[..., None], self.friction * pressed[..., None] * share], -1)
+        e, sticking = self.elastic_slip, length <= self.elastic_slip
+        along = slip / np.where(sticking, e, length)[..., None]
+        pressed = normal if bound is None else bound[0]
+        local = np.concatenate([normal[..., None], self.friction * pressed[..., None] * along], -1)
         K = np.zeros((*normal.shape, 3, 3))
         stiff = self.stiffness * self.area * touching
         K[..., 0, 0] = stiff
         if bound is None:
-            K[..., 1:, 0] = self.friction * stiff[..., None] * share
-        reach = self.friction * pressed / np.where(sticking, self.elastic_slip, length)
-        reach = reach * self.touched
-        K[..., 1:, 1:] = reach[..., None, None] * np.eye(2)
+            K[..., 1:, 0] = self.friction * stiff[..., None] * along
+        reach = self.friction * pressed / np.where(sticking, e, length)
+        by_slip = reach[..., None, None] * np.eye(2)
         sliding = np.where(sticking, 0.0, reach)[..., None, None]
-        K[..., 1:, 1:] -= sliding * share[..., :, None] * share[..., None, :]
+        by_slip -= sliding * along[..., :, None] * along[..., None, :]
+        K[..., 1:, 1:] = by_slip * share[..., None, None]
+        by_height = -K[..., 0]
+        by_height[..., 1:] += np.einsum("kcij,kcj->kci", by_slip, moved) * growth[..., None]
         overlap = (self.stiffness * self.area * np.maximum(overclosure, 0.0) ** 2).sum() / 2
-        e = self.elastic_slip
-        path = np.where(sticking, length**2 / (2 * e), length - e / 2) * self.touched
+        path = np.where(sticking, length**2 / (2 * e), length - e / 2)
+        path = np.divide(path, share, out=np.zeros_like(path), where=share > 0)
         energy = float(overlap + self.friction * (pressed * path).sum())
-        return Contact(self, at, local, K, energy)
+        return Contact(self, height, at, local, K, by_height, energy)
 
     def settled(self, contact: Contact) -> Road:
         """The road after a load was reached: slip counts anew, less the elastic one."""
-        slip = contact.positions[..., 1:] - self.anchor
+        share, _ = self.share(contact.height)
+        slip = (contact.positions[..., 1:] - self.anchor) * share[..., None]
         length = np.maximum(np.linalg.norm(slip, axis=-1, keepdims=True), 1e-300)
         elastic = slip * np.minimum(self.elastic_slip / length, 1.0)
-        touched = contact.local[..., 0] > 0
-        elastic *= (touched & self.touched)[..., None]
-        return replace(self, anchor=contact.positions[..., 1:] - elastic, touched=touched)
+        gap = np.maximum(contact.height - contact.positions[..., 0], 0.0)
+        elastic *= (gap == 0.0)[..., None]
+        anchor = contact.positions[..., 1:] - elastic
+        return replace(self, anchor=anchor, gap=gap, height=contact.height)
 
 
 @dataclass(frozen=True)
 class Contact:
-    """Forces of the tyre on the road (k, c, 3), N, in the road's frame: down, along, across; of
-    half the tyre. K (k, c, 3, 3): their derivatives by the nodes' positions. energy, J: stored
-    and dissipated, their potential where the friction is bounded beforehand."""
+    """Forces ``local`` of the tyre on the road (k, c, 3), N, in the road's frame: down, along,
+    across; of half the tyre. Their derivatives K (k, c, 3, 3) by the nodes' positions and by_height
+    (k, c, 3). energy, J: stored and dissipated, their potential where the friction is bounded."""
 
     road: Road
+    height: float
     positions: Array
     local: Array
     K: Array
+    by_height: Array
     energy: float
 
     @property
@@ -153,6 +171,7 @@ def flat_road(
     R, Z = X[nodes].T
     origin = np.stack([c[:, None] * R, s[:, None] * R, np.broadcast_to(Z, (len(c), len(Z)))], -1)
     area = around.shares[near][:, None] * share[nodes]
-    return Road(
-        nodes, area, frame, origin, stiffness, friction, elastic_slip, origin[..., 1:], area < 0
-    )
+    height = float(origin[..., 0].max())
+    gap = height - origin[..., 0]
+    anchor = origin[..., 1:]
+    return Road(nodes, area, frame, origin, stiffness, friction, elastic_slip, anchor, gap, height)

@@ -350,7 +350,7 @@ def test_a_much_larger_load_after_a_small_one(solid: Round) -> None:
     np.testing.assert_allclose(found.parts, direct.parts, atol=1e-6 * abs(direct.parts).max())
 
 
-@pytest.mark.parametrize("slip", [1e-2, 1e-6, 1e-10])
+@pytest.mark.parametrize("slip", [1e-2, 1e-4, 1e-6])
 @pytest.mark.parametrize("friction", [0.5, 3.0])
 def test_friction_of_any_size_converges(solid: Round, friction: float, slip: float) -> None:
     """From a soft to a hard stick, and more friction than rubber has."""

@@ -160,7 +160,7 @@ class Road(Part):
 
     friction: NotNegative = 0.5
     stiffness_Pa_per_m: Positive = 1e10
-    elastic_slip_m: Positive = 1e-4
+    elastic_slip_m: Annotated[float, Field(ge=1e-6)] = 1e-4
     element_angles_deg: Annotated[list[Positive], Field(min_length=1, max_length=200)] = Field(
         default_factory=lambda: [4.0] * 3 + [5.0, 7.0, 12.0, 21.0, 40.0, 83.0]
     )
