@@ -14,8 +14,20 @@ if TYPE_CHECKING:
 
 # Each a module of this package; in this order they are listed, and applied to a case.
 IDS = (
+    "dynamic_stiffening",
+    "tread_density",
+    "tread_wear",
+    "bead_filler",
+    "cap_ply",
+    "belt_angle",
+    "belt_width",
+    "carcass_fanning",
+    "carcass_turn_up",
+    "sidewall_gauge",
+    "rim_width",
     "pressure_offset",
     "temperature",
+    "temperature_drift",
 )
 
 __all__ = ["IDS", "Effect", "EffectRefused", "catalogue", "with_effects"]
