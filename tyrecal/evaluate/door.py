@@ -112,8 +112,8 @@ class Door:
         for id in (id for id, value in case.case.effects.items() if value):
             if not catalogue()[id].within(self.solver.capabilities):
                 raise DeckRefused(
-                    f"solver '{self.solver.name}' cannot express the effect '{id}'; 'tyrecal effects'"
-                    " shows which one can"
+                    f"solver '{self.solver.name}' cannot express the effect '{id}';"
+                    " 'tyrecal effects' shows which one can"
                 )
 
     def _with(self, values: Mapping[str, float]) -> LoadedCase:
