@@ -171,6 +171,26 @@ class Factor:
             x[slot, :, gone] = solved.reshape(x[slot, :, gone].shape)
         return np.asarray(x * self.order.fold.mask, float)
 
+    def solve_block(self, right: Array) -> Array:
+        """`solve` for several right-hand sides (b, 2, k, q, 3): one pass over the factor."""
+        b = np.array(right, np.float32, order="C")
+        count, pieces = len(b), []
+        for front, step in zip(self.order.fronts, self._steps, strict=True):
+            gone, left = front.nodes[: front.eliminated], front.nodes[front.eliminated :]
+            slots = [slice(0, 2)] if len(step) == 1 else [slice(0, 1), slice(1, 2)]
+            for slot, (L, X) in zip(slots if len(gone) else [], step, strict=False):
+                y = strtrs(L, b[:, slot, :, gone].reshape(count, -1).T, lower=1)[0]
+                if len(left):
+                    b[:, slot, :, left] -= (y.T @ X).reshape(b[:, slot, :, left].shape)
+                pieces.append((slot, gone, left, L, X, y))
+        x = np.zeros_like(b)
+        for slot, gone, left, L, X, y in pieces[::-1]:
+            if len(left):
+                y = y - X @ x[:, slot, :, left].reshape(count, -1).T
+            solved = strtrs(L, y, lower=1, trans=1)[0].T
+            x[:, slot, :, gone] = solved.reshape(x[:, slot, :, gone].shape)
+        return np.asarray(x * self.order.fold.mask, float)
+
 
 def _tables(front: _Front, tangents: Tangents, order: Elimination) -> tuple[Array, Array]:
     """Tangents at the stations over the front's nodes, (4, s, nodes, 3, nodes, 3): of W by u u,
