@@ -129,8 +129,8 @@ class Analysis:
         model = self._model(None, step.long_term)
         loads = _loads(model, step)
         found = press_job.press(
-            model, numbering(model, step), loads, self.U, self.road, wanted, vibrations,
-            self._check_time, TimedOut,
+            model, numbering(model, step), loads, self.U, self.road, wanted,
+            self._check_time, TimedOut, vibrations,
         )  # fmt: skip
         return {"pressure_Pa": step.pressure, "mass_kg": self.mass_kg, **found}
 

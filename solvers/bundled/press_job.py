@@ -13,6 +13,7 @@ import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -24,7 +25,7 @@ from .fold import HALF_TURN, Fold, NotSymmetric
 from .harmonics import Unstable, Vibration, lowest_of_all
 from .hold import held
 from .keywords import DeckError, Keyword
-from .loaded_modes import loaded_modes
+from .loaded_modes import SPARE, loaded_modes
 from .mechanics import Load
 from .model import Model
 from .patch import contact_area
@@ -138,9 +139,9 @@ def press(
     U: Array,
     data: RoadData,
     wanted: list[float],
-    vibrations: Mapping[float, Vibrating],
     check: Callable[[], None],
     give_up: type[Exception],
+    vibrations: Mapping[float, Vibrating] = MappingProxyType({}),
 ) -> dict[str, Any]:
     """Footprints at the ``wanted`` loads (N) of a tyre inflated to ``U`` (n, 3), with modes where
     there are ``vibrations``.
@@ -250,7 +251,7 @@ def _modes(
     area = work.tyre.surface_shares(tread)[: len(found.contact.local), work.road.nodes]
     hold = held(found.contact, found.height, area, tyre.around)
     vibration = Vibration(wanted.model, inflated, tyre.loads, equations, 0.0)
-    start = lowest_of_all(vibration, 2 * wanted.count, work.check)
+    start = lowest_of_all(vibration, 2 * (wanted.count + 2 * SPARE), work.check)
     work.rest()
     modes = loaded_modes(tyre, work.fold.free, U, hold, start, wanted.count, work.check)
     shapes, other = modes.shapes, work.fold.other
