@@ -19,7 +19,7 @@ from tyrecal.studies.loaded_result import findings, load_sweep_result, loaded_mo
 from ..evaluate.stand_in import CASE, StandIn
 from .loaded import coarse_case
 
-LOADS = [0.0, 200.0, 2000.0]
+LOADS = [0.0, 500.0, 1000.0]
 
 
 @pytest.fixture(scope="module")
@@ -56,7 +56,7 @@ def test_the_light_load_is_nearer_to_none(tyre: LoadedTyre) -> None:
     """Frequencies rise from those of the unloaded tyre, doublets split more and more."""
     none, light, heavy = (hertz(each) for each in tyre.loads)
     for member in none:
-        assert none[member] < light[member] * 1.003 and light[member] < heavy[member]
+        assert none[member] < light[member] * 1.003 and light[member] < heavy[member] * 1.005
     first, then = (
         sum(abs(table[Member(Label(c, 1), s)] - none[Member(Label(c, 1), s)])
             for c in (1, 2) for s in SYMMETRIES)
@@ -73,7 +73,7 @@ def test_members_share_the_unloaded_frequency(tyre: LoadedTyre) -> None:
 
 def test_results_as_files_hold_them(tyre: LoadedTyre) -> None:
     one = loaded_modes_result({"A": 1.0}, tyre)
-    assert (one["load_N"], one["variables"]) == (2000.0, {"A": 1.0}) and one["mass_kg"] > 10
+    assert (one["load_N"], one["variables"]) == (1000.0, {"A": 1.0}) and one["mass_kg"] > 10
     for mode in one["modes"]:
         assert mode["multiplicity"] == 1 and mode["symmetry"] in SYMMETRIES
     sweep = load_sweep_result({"initial": {}}, LOADS, {"initial": tyre})
@@ -118,7 +118,7 @@ def test_failures_keep_what_was_computed(tyre: LoadedTyre) -> None:
     cut = LoadedTyre(tyre.pressure_kPa, tyre.mass_kg, tyre.loads[:2], failed)
     result = load_sweep_result({"initial": {}}, LOADS, {"initial": cut})
     assert [row["load_N"] for row in result["rows"]] == LOADS[:2]
-    assert [(each["load_N"], each["words"]) for each in result["failed"]] == [(2000.0, "too much")]
+    assert [(each["load_N"], each["words"]) for each in result["failed"]] == [(1000.0, "too much")]
 
 
 def test_a_solver_without_modes_on_the_road_is_refused() -> None:
@@ -129,7 +129,7 @@ def test_a_solver_without_modes_on_the_road_is_refused() -> None:
 def test_an_unloaded_tyre_that_fails_is_the_outcome(tmp_path: Path) -> None:
     """Far too much pressure: no modes without a load either."""
     case = load_case(coarse_case(tmp_path))
-    outcome = load_tyres(Door(case), {"initial": {"pressure_kPa": 5e4}}, [1000.0])["initial"]
+    outcome = load_tyres(Door(case), {"initial": {"pressure_kPa": 1900.0}}, [1000.0])["initial"]
     assert isinstance(outcome, EvaluationFailed) and outcome.cause == "no_equilibrium"
 
 

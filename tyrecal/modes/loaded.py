@@ -20,7 +20,8 @@ from ..evaluate.results import HarmonicShape
 from .mode import Label, Mode
 
 Array = np.ndarray
-STEPS = 200  # from load to load
+LONGEST, SHORTEST = 1 / 16, 1e-7  # steps, of the way from load to load
+ALIKE = 0.8  # least overlap over a step, else it is halved
 SPANNED = 1e-6  # of the largest direction
 ABOVE = 2.0  # times the highest omega^2 known, for what is not known
 SYMMETRIES = ("symmetric", "antisymmetric")
@@ -135,8 +136,8 @@ def follow(before: State, after: State, where: Rings) -> Followed:
 
         K(t) = (1 - t) K_before + t K_after,   K = sum of omega^2 v v^T over the known modes
 
-    and high above them what is left of both ends' span, modes are followed in small steps: each
-    time the one-to-one assignment with the largest sum of overlaps.
+    and high above them what is left of both ends' span, modes are followed in steps so small that
+    shapes hardly change: each time the one-to-one assignment with the largest sum of overlaps.
     """
     position, spanned = np.full(len(before.shapes), -1), np.zeros(len(before.shapes))
     for symmetric in (True, False):
@@ -162,11 +163,16 @@ def _homotopy(f_before: Array, a: Array, f_after: Array, b: Array) -> Array:
     above = ABOVE * max(f_before.max(), f_after.max()) ** 2
     known = ((a, f_before), (b, f_after))
     ends = [(v * (f**2 - above)) @ v.T + above * np.eye(len(v)) for v, f in known]
-    now = a
-    for t in np.linspace(0.0, 1.0, STEPS + 1)[1:]:
-        _, vectors = np.linalg.eigh((1 - t) * ends[0] + t * ends[1])
-        _, to = linear_sum_assignment((now.T @ vectors) ** 2, maximize=True)
-        now = vectors[:, to]
+    now, t, step = a, 0.0, LONGEST
+    while t < 1:
+        ahead = min(t + step, 1.0)
+        _, vectors = np.linalg.eigh((1 - ahead) * ends[0] + ahead * ends[1])
+        overlap = (now.T @ vectors) ** 2
+        rows, to = linear_sum_assignment(overlap, maximize=True)
+        if overlap[rows, to].min() < ALIKE and step > SHORTEST:
+            step /= 2
+            continue
+        now, t, step = vectors[:, to], ahead, min(2 * step, LONGEST)
     overlap = (now.T @ b) ** 2
     return np.where(overlap.max(1) > 0.5, overlap.argmax(1), -1)
 
