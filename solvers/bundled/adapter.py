@@ -35,7 +35,9 @@ class Bundled:
     name = "bundled"
     version = VERSION
     dialect = "abaqus"
-    capabilities = frozenset({"modes", "gradients", "footprint", "vibration_modulus"})
+    capabilities = frozenset(
+        {"modes", "gradients", "footprint", "loaded_modes", "vibration_modulus"}
+    )
     refusals = (DeckError,)
     failures = (*Failures, TimedOut)
 

@@ -18,6 +18,7 @@ from .mesh import Mesh
 
 Array = np.ndarray
 MIRROR = np.array([1.0, 1.0, -1.0])
+HALF_TURN = np.array([1.0, -1.0, -1.0])  # about the vertical: r, theta, z
 SAME_PLACE = 1e-6  # m
 
 

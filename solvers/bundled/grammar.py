@@ -41,7 +41,7 @@ SECTION_JOB: dict[str, dict[str, Values]] = {
     "BOUNDARY": {},
 }
 STEPS: dict[str, dict[str, Values]] = {
-    "STEP": {"NAME": None, "NLGEOM": YES, "INC": None},
+    "STEP": {"NAME": None, "NLGEOM": YES, "INC": None, "PERTURBATION": ("",)},
     "STATIC": {"LONG TERM": ("",), "DIRECT": ("",)},
     "FREQUENCY": {
         "EIGENSOLVER": ("LANCZOS",),

@@ -102,12 +102,17 @@ class Analysis:
         return results or [self._result(self.steps[-1], [], {})]
 
     def press(self) -> dict[str, Any]:
-        """Footprints of a job with a road, one per step with a force on it."""
+        """Footprints of a job with a road, one per step with a force on it, and modes there."""
         assert self.road is not None
-        wanted = []
+        wanted: list[float] = []
+        vibrations: dict[float, press_job.Vibrating] = {}
         for step in self.steps:
-            if step.procedure.name != "STATIC":
-                raise DeckError(step.procedure.line, "modes of a tyre on a road are not honoured")
+            if step.procedure.name == "FREQUENCY":
+                if not wanted:
+                    line = step.procedure.line
+                    raise DeckError(line, "modes of a tyre on a road come after a force on it")
+                vibrations[wanted[-1]] = self._vibrating(step)
+                continue
             step.held = [row for row in step.held if row.text(0) != self.road.node]
             if not step.forces:
                 self._static(step)
@@ -120,14 +125,31 @@ class Analysis:
                 raise DeckError(row.line, "loads on the road must push it to the tyre, and rise")
         if not wanted:
             raise DeckError(self.steps[-1].procedure.line, "no *CLOAD presses the road")
-        step = self.steps[-1]
+        step = [each for each in self.steps if each.procedure.name == "STATIC"][-1]
         model = self._model(None, step.long_term)
         loads = _loads(model, step)
         found = press_job.press(
             model, numbering(model, step), loads, self.U, self.road, wanted,
-            self._check_time, TimedOut,
+            self._check_time, TimedOut, vibrations,
         )  # fmt: skip
         return {"pressure_Pa": step.pressure, "mass_kg": self.mass_kg, **found}
+
+    def _vibrating(self, step: Step) -> press_job.Vibrating:
+        """What a *FREQUENCY step on the road asks for."""
+        assert self.road is not None
+        line, row = step.procedure.line, step.procedure.only_row()
+        if any(row.fields[1:]):
+            raise DeckError(row.line, "limits and shifts of a loaded tyre's modes are not honoured")
+        if not any(r.text(0) == self.road.node and r.integer(1) == 1 for r in step.held):
+            raise DeckError(
+                line, f"node {self.road.node} must hold the road while the tyre vibrates"
+            )
+        if step.output not in self.model.mesh.node_sets:
+            raise DeckError(line, "modes on the road need a *NODE FILE with a set of the section")
+        numbers = self.model.mesh.node_sets[step.output]
+        nodes = np.array([self.model.mesh.index[n] for n in numbers])
+        model = self._model(step.procedure.number("PROPERTY EVALUATION"), step.long_term)
+        return press_job.Vibrating(model, row.integer(0), nodes)
 
     def _model(self, dynamic_Hz: float | None, long_term: bool) -> Model:
         key = dynamic_Hz, long_term

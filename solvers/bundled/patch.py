@@ -32,11 +32,11 @@ def contact_area(contact: Contact, shares: Array, around: Circumference) -> floa
         # an inner gap, as under a hollow tread, counts as whole shares
         gap = sum(length[i, column] for i in range(last) if force[i, column] <= 0)
         pressure = force[:, column] / shares[:, column]
-        total += width * (_edge(x[:, column], pressure, last) - gap)
+        total += width * (edge(x[:, column], pressure, last) - gap)
     return 2 * total
 
 
-def _edge(x: Array, pressure: Array, last: int) -> float:
+def edge(x: Array, pressure: Array, last: int) -> float:
     """Where the pressure ends, beyond the node ``last`` and before the next one."""
     following = float(x[last + 1]) if last + 1 < len(x) else float(x[last])
     middle = (float(x[last]) + following) / 2

@@ -2,34 +2,48 @@
 
 JOB.json: pressure_Pa, mass_kg, free_radius_m, failure, cause, ``footprints`` [load_N, road_N, rim_N
 (x down, y, z), deflection_m, stiffness_N_per_m, contact_area_m2]. JOB.npz: nodes, points, angles of
-the whole tyre, and per footprint i the arrays of its patch and the displacement, as NAME_i.
+the whole tyre, and per footprint i the arrays of its patch and the displacement, as NAME_i; where
+modes were asked for: mode_frequency_Hz (m,), mode_shape (m, ring, node, 3) at mode_node, modal mass
+1 kg.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
 from .band import Numbering
 from .circumference import half_circle
-from .fold import Fold, NotSymmetric
+from .eigen import NotConverged
+from .fold import HALF_TURN, Fold, NotSymmetric
+from .harmonics import Unstable, Vibration, lowest_of_all
+from .hold import held
 from .keywords import DeckError, Keyword
+from .loaded_modes import SPARE, loaded_modes
 from .mechanics import Load
 from .model import Model
 from .patch import contact_area
 from .pressing import NotPressed, Press, Pressed
 from .revolved import Revolved
 from .road import flat_road
+from .section import Lines
 
 Array = np.ndarray
-HALF_TURN = np.array([1.0, -1.0, -1.0])  # about the vertical: r, theta, z
 ARRAYS = ("ring", "node", "along_m", "across_m", "pressure_Pa", "area_m2", "traction_Pa")
 SMALLEST_SLIP = 1e-6  # m, before friction is full: harder sticks are not reached
+
+CAUSES: dict[type[Exception], str] = {
+    NotPressed: "no_equilibrium",
+    Unstable: "unstable",
+    NotConverged: "crashed",
+}
+OF_MODES = ("mode_frequency_Hz", "mode_node", "mode_shape")
 
 
 @dataclass(frozen=True)
@@ -43,6 +57,15 @@ class RoadData:
     friction: float
     elastic_slip: float
     lengths: Array
+
+
+@dataclass(frozen=True)
+class Vibrating:
+    """Modes wanted at a load: of ``model``, how many, and at which nodes (rows) their shapes."""
+
+    model: Model
+    count: int
+    nodes: Array
 
 
 def read_road(model: list[Keyword]) -> RoadData | None:
@@ -121,10 +144,12 @@ def press(
     wanted: list[float],
     check: Callable[[], None],
     give_up: type[Exception],
+    vibrations: Mapping[float, Vibrating] = MappingProxyType({}),
 ) -> dict[str, Any]:
-    """Footprints at the ``wanted`` loads (N) of a tyre inflated to ``U`` (n, 3).
+    """Footprints at the ``wanted`` loads (N) of a tyre inflated to ``U`` (n, 3), with modes where
+    there are ``vibrations``.
 
-    Raises DeckError; NotPressed where not even the first load is reached.
+    Raises DeckError; NotPressed, Unstable, NotConverged where not even the first load is reached.
     """
     around = half_circle(data.lengths)
     k = len(around.angles)
@@ -149,13 +174,16 @@ def press(
     for load in wanted:
         try:
             found = work.to(load)
-        except (NotPressed, give_up) as error:
+            footprint = _footprint(work, found, load, tread)
+            if load in vibrations:
+                footprint |= _modes(work, found, vibrations[load], tread, equations, U)
+        except (NotPressed, Unstable, NotConverged, give_up) as error:
             if not footprints:
                 raise
             failure = str(error)
-            cause = "timed_out" if isinstance(error, give_up) else "no_equilibrium"
+            cause = "timed_out" if isinstance(error, give_up) else CAUSES[type(error)]
             break
-        footprints.append(_footprint(work, found, load, tread))
+        footprints.append(footprint)
     rest = around.angles[1:-1][::-1]
     return {
         "free_radius_m": work.free_radius,
@@ -211,6 +239,34 @@ def _footprint(work: Press, found: Pressed, load: float, tread: Any) -> dict[str
     }
 
 
+def _modes(
+    work: Press,
+    found: Pressed,
+    wanted: Vibrating,
+    tread: Lines,
+    equations: Numbering,
+    inflated: Array,
+) -> dict[str, Array]:
+    """The whole tyre's modes about one load, their shapes at the wanted nodes."""
+    tyre = Revolved(wanted.model, work.tyre.loads, work.tyre.around)
+    U = work.fold.spread(found.parts)
+    work.tyre.residual(U)
+    area = work.tyre.surface_shares(tread)[: len(found.contact.local), work.road.nodes]
+    hold = held(found.contact, found.height, area, tyre.around)
+    vibration = Vibration(wanted.model, inflated, tyre.loads, equations, 0.0)
+    start = lowest_of_all(vibration, 2 * (wanted.count + 2 * SPARE), work.check)
+    work.rest()
+    modes = loaded_modes(tyre, work.fold.free, U, hold, start, wanted.count, work.check)
+    shapes, other = modes.shapes, work.fold.other
+    turned = modes.parity[:, None, None, None] * (HALF_TURN * shapes)[:, :, other]
+    whole = np.concatenate([shapes, turned[:, 1:-1][:, ::-1]], 1)
+    return {
+        "mode_frequency_Hz": np.sqrt(modes.eigenvalues) / (2 * np.pi),
+        "mode_node": wanted.nodes,
+        "mode_shape": whole[:, :, wanted.nodes],
+    }
+
+
 def _images(nodes: Array, other: Array) -> Array:
     """Where among ``nodes`` the mirror image of each stands."""
     place = {n: i for i, n in enumerate(nodes)}
@@ -224,8 +280,11 @@ def write(stem: Path, model: Model, result: dict[str, Any]) -> None:
     lines = []
     for i, footprint in enumerate(result["footprints"]):
         footprint = {**footprint, "node": numbers[footprint["node"]]}
-        for name in (*ARRAYS, "displacement"):
-            arrays[f"{name}_{i}"] = footprint.pop(name)
+        if "mode_node" in footprint:
+            footprint["mode_node"] = numbers[footprint["mode_node"]]
+        for name in (*ARRAYS, "displacement", *OF_MODES):
+            if name in footprint:
+                arrays[f"{name}_{i}"] = footprint.pop(name)
         lines.append({**footprint, "rim_N": footprint["rim_N"].tolist()})
     with stem.with_name(stem.name + ".npz").open("wb") as file:
         np.savez(file, **arrays)
@@ -242,8 +301,9 @@ def read(stem: Path) -> dict[str, Any]:
             answer[name] = arrays[name]
         for i, footprint in enumerate(answer["footprints"]):
             footprint["rim_N"] = np.array(footprint["rim_N"])
-            for name in (*ARRAYS, "displacement"):
-                footprint[name] = arrays[f"{name}_{i}"]
+            for name in (*ARRAYS, "displacement", *OF_MODES):
+                if f"{name}_{i}" in arrays:
+                    footprint[name] = arrays[f"{name}_{i}"]
     del answer["format"]
     if not answer["cause"]:
         del answer["cause"]

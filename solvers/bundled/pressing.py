@@ -94,6 +94,10 @@ class Press:
             if target == load:
                 return found
 
+    def rest(self) -> None:
+        """Let go of the memory that is only of use while the load stays."""
+        self._factor = None
+
     def _start(self, load: float) -> tuple[Array, float]:
         """Where the last two equilibria point to."""
         if self._before is None or not self._before[2]:

@@ -196,7 +196,8 @@ class _RubberPart(_Part):
 def _at_stations(law: rubber.MooneyRivlin, points: int, s: int) -> rubber.MooneyRivlin:
     """The law's constants per Gauss point, repeated for every station."""
     spread = lambda c: np.repeat(np.broadcast_to(c, points), s)
-    return rubber.MooneyRivlin(spread(law.C10), spread(law.C01), spread(law.inverse_D1))
+    ratios = (None if c is None else spread(c) for c in (law.shear_ratio, law.bulk_ratio))
+    return rubber.MooneyRivlin(spread(law.C10), spread(law.C01), spread(law.inverse_D1), *ratios)
 
 
 class _CordPart(_Part):

@@ -19,7 +19,7 @@ class Step:
     number: in the job, from 1; procedure: its *STATIC or *FREQUENCY; pressures: surface to the
     deck's number (Pa); held: rows of *BOUNDARY; long_term: the static state is relaxed;
     revolved: of the second job, in three dimensions;
-    forces: rows of *CLOAD.
+    forces: rows of *CLOAD; output: the node set of its *NODE FILE, or "".
     """
 
     number: int
@@ -29,6 +29,7 @@ class Step:
     long_term: bool = True
     revolved: bool = False
     forces: list[Row] = field(default_factory=list)
+    output: str = ""
 
     @property
     def pressure(self) -> float:
@@ -79,7 +80,8 @@ def _steps(model: list[Keyword], blocks: list[list[Keyword]], revolved: bool) ->
                 pressures = {**pressures, **_pressures(k)}
         if procedure.name == "STATIC":
             long_term = "LONG TERM" in procedure.parameters
-        steps.append(Step(number, procedure, pressures, held, long_term, revolved, forces))
+        output = next((k.get("NSET") for k in block if k.name == "NODE FILE"), "")
+        steps.append(Step(number, procedure, pressures, held, long_term, revolved, forces, output))
     return steps
 
 
@@ -98,6 +100,8 @@ def _procedure(block: list[Keyword]) -> Keyword:
         raise DeckError(block[0].line, "a step needs one *STATIC or *FREQUENCY")
     if found[0].name == "STATIC" and "NLGEOM" not in block[0].parameters:
         raise DeckError(block[0].line, "a *STATIC step needs NLGEOM=YES")
+    if found[0].name == "STATIC" and "PERTURBATION" in block[0].parameters:
+        raise DeckError(block[0].line, "a *STATIC step is no linear PERTURBATION")
     return found[0]
 
 

@@ -221,11 +221,6 @@ def test_a_road_without_a_load_is_refused(tmp_path: Path) -> None:
     assert "no *CLOAD presses the road" in refused(tmp_path, edit)
 
 
-def test_modes_on_the_road_are_refused(tmp_path: Path) -> None:
-    step = "*STEP, NAME=MODES\n*FREQUENCY, EIGENSOLVER=LANCZOS, NORMALIZATION=MASS\n4\n*END STEP\n"
-    assert "modes of a tyre on a road" in refused(tmp_path, lambda text: text + step)
-
-
 def test_elements_that_do_not_mirror_are_refused(tmp_path: Path) -> None:
     def edit(text: str) -> str:
         rows = [line for line in text.splitlines() if line.endswith(", C")]

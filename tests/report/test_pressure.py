@@ -83,7 +83,7 @@ def test_whatever_was_found_is_drawn(given, drawn, tmp_path):
 
 
 def test_names_that_would_touch_are_moved_apart():
-    place = pressure._apart([0.30, 0.31, 0.32, 0.8], 0.05)
+    place = pressure.apart([0.30, 0.31, 0.32, 0.8], 0.05)
     assert min(np.diff(place)) > 0.05 - 1e-3
     assert place[1] == pytest.approx(0.31, abs=1e-3) and place[3] == 0.8
 

@@ -17,7 +17,7 @@ for _name in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS"):
 COMMANDS = {  # name: one line of help, so that the overview imports no command
     "validate": "Check a case file and report every mistake.",
     "deck": "Write the decks of a case, to read or to run elsewhere.",
-    "modes": "Evaluate one design: frequencies with their labels.",
+    "modes": "Evaluate one design, unloaded or on a road: frequencies with their labels.",
     "fit": "Calibrate the case's variables to its target frequencies.",
     "sweep-pressure": "Follow every mode over the inflation pressure.",
     "footprint": "Press the tyre on a road: contact area and pressure over load.",

@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from . import options
+from .loaded_modes import at_load, over_loads, wanted_loads
 
 
 @click.command()
@@ -14,6 +15,10 @@ from . import options
     options.case_argument,
     options.assignments,
     options.pressure,
+    options.one_load,
+    options.sweep_load,
+    options.fitted("With --sweep-load: the design that 'tyrecal fit' found for this case, too."),
+    options.jobs,
     options.mesh,
     options.solver,
     options.output,
@@ -23,11 +28,17 @@ from . import options
     options.quiet,
     options.verbose,
 )
-@click.option("--pictures/--no-pictures", default=False, help="Draw the section and each mode.")
+@click.option("--pictures/--no-pictures", default=None,
+              help="Draw the section and each mode (default: no); with --sweep-load the frequencies"
+              " over the load (default: yes).")  # fmt: skip
 def command(
     case: Path,
     assignments: tuple[str, ...],
     pressure_kPa: float | None,
+    load_N: float | None,
+    sweep: str | None,
+    fitted: Path | None,
+    jobs: int,
     mesh: str,
     solver: str,
     output: Path | None,
@@ -36,24 +47,45 @@ def command(
     as_json: bool,
     quiet: bool,
     verbose: bool,
-    pictures: bool,
+    pictures: bool | None,
 ) -> int:
     """Evaluate one design of CASE: frequencies with their labels, in modes.json.
+
+    With --load-N the tyre stands on a flat road, and vibrates about its deflected state while the
+    patch is held: doublets split in a member symmetric about the patch and an antisymmetric one.
+    --sweep-load follows them over the load: load_sweep.json, .csv and .png.
 
     \b
     tyrecal modes cases/p235_75r17.yaml --set A_belt=3e-7 --pressure-kPa 200
     tyrecal modes cases/p235_75r17.yaml --set rebar_layers.belt_1.angle_deg=68 --json
+    tyrecal modes cases/p235_75r17.yaml --load-N 4000
+    tyrecal modes cases/p235_75r17.yaml --sweep-load 0,1000,2000,4000 --fitted p235_75r17/fit.json
     """
     from ..evaluate.door import Door, Question
     from ..studies.modes import modes_result
     from .output import Run, print_json, show
 
+    loads = wanted_loads(load_N, sweep)
+    if fitted and sweep is None:
+        raise click.UsageError("--fitted goes with --sweep-load")
+    if pictures and load_N is not None:
+        raise click.UsageError("--pictures goes with --sweep-load, or without a load")
     loaded, values = options.load(case, mesh, assignments, pressure_kPa)
     door = Door(loaded, solver)
     adapter = door.solver
+    designs = {"initial": values}
+    if loads:
+        door.needs_road(modes=True)
+    if fitted:
+        designs["fitted"] = options.fitted_values(fitted, loaded, solver)
     run = Run(case, output, "modes", adapter)
     door.folder, door.keep = run.runs, verbose
     door.store = run.open_store(store, no_store)
+    if sweep is not None:
+        draw = pictures is not False
+        return over_loads(door, run, designs, loads, jobs, draw, as_json, quiet)
+    if loads:
+        return at_load(door, run, values, loads[0], as_json, quiet)
     evaluation = door.evaluate(Question(values))
     result, modes = modes_result(loaded, values, evaluation)
     run.write_json("modes.json", result)

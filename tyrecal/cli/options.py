@@ -68,6 +68,19 @@ loads = click.option(
     help="Vertical loads on the road, rising (footprint's default: road.loads_N of the case, and"
     " the loads of its targets).",
 )
+one_load = click.option(
+    "--load-N",
+    "load_N",
+    type=float,
+    metavar="F",
+    help="Modes of the tyre on a flat road under this vertical load, about its deflected state.",
+)
+sweep_load = click.option(
+    "--sweep-load",
+    "sweep",
+    metavar="F1,F2,...",
+    help="The same at several loads, rising; 0: the unloaded tyre.",
+)
 
 
 def every(*options: Callable[[Any], Any]) -> Callable[[Any], Any]:
@@ -118,8 +131,8 @@ def load(path: Path, mesh_level: str, assigned: tuple[str, ...], pressure_kPa: f
         raise click.UsageError(str(error)) from None
 
 
-def parse_loads(text: str) -> list[float]:
-    """Loads in N. Raises click.UsageError."""
+def parse_loads(text: str, option: str = "--loads-N", zero: bool = False) -> list[float]:
+    """Loads in N; ``zero``: 0 may be the first. Raises click.UsageError."""
     from itertools import pairwise
     from math import isfinite
 
@@ -128,12 +141,13 @@ def parse_loads(text: str) -> list[float]:
         try:
             loads.append(float(word))
         except ValueError:
-            raise click.UsageError(f"--loads-N: '{word.strip()}' is not a number") from None
-        if not (isfinite(loads[-1]) and loads[-1] > 0):
-            raise click.UsageError(f"--loads-N {loads[-1]:g}: must be a finite load above 0")
+            raise click.UsageError(f"{option}: '{word.strip()}' is not a number") from None
+        allowed = loads[-1] > 0 or (zero and loads == [0.0])
+        if not (isfinite(loads[-1]) and allowed):
+            raise click.UsageError(f"{option} {loads[-1]:g}: must be a finite load above 0")
     for before, after in pairwise(loads):
         if after <= before:
-            raise click.UsageError(f"--loads-N: {after:g} after {before:g}, loads must rise")
+            raise click.UsageError(f"{option}: {after:g} after {before:g}, loads must rise")
     return loads
 
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from itertools import takewhile
+from math import ceil
 from typing import Any
 
 from ..case import LoadedCase, with_values
@@ -12,6 +14,7 @@ from .calculix import calculix_context
 from .context import context
 from .environment import TemplateFailed, environment, render
 
+ELEMENTS_A_WAVE = 7.5  # of quadratic ones: the frequencies are right to 0.4 %
 STEP = 1e-4  # of a variable, to see which numbers of the deck it moves and how fast
 
 Tangents = dict[str, list[tuple[str, int, int, float]]]
@@ -22,7 +25,7 @@ class Decks:
 
     values: design variables already in ``case``; gradients: those whose places in the deck are
     wanted; modes_per_harmonic: the case's, or a larger number for a second look; loads_N: press
-    the tyre on the road with these instead of finding modes.
+    the tyre on the road with these instead of finding modes; loaded_modes: how many to find there.
     """
 
     def __init__(
@@ -32,14 +35,16 @@ class Decks:
         gradients: tuple[str, ...] = (),
         modes_per_harmonic: int | None = None,
         loads_N: tuple[float, ...] = (),
+        loaded_modes: int = 0,
     ):
         self.case, self.values, self.gradients = case, dict(values or {}), gradients
-        self.loads_N = loads_N
+        self.loads_N, self.loaded_modes = loads_N, loaded_modes
         analysis = case.case.analysis
         self.request: dict[str, Any] = {
             "highest_harmonic": analysis.highest_harmonic,
             "modes_per_harmonic": modes_per_harmonic or analysis.modes_per_harmonic,
             "loads_N": loads_N,
+            "loaded_modes": loaded_modes,
         }
 
     def texts(self, dialect: str) -> dict[str, str]:
@@ -97,9 +102,22 @@ def _abaqus(case: LoadedCase, env: Any, request: Mapping[str, Any]) -> dict[str,
     names = context(case)
     names["mesh_block"] = _mesh_block(env, names["mesh"])
     names["modes"] = 2 * request["modes_per_harmonic"] * (request["highest_harmonic"] + 1)
-    names["loads"] = request["loads_N"]
+    names["loads"], names["loaded_modes"] = request["loads_N"], request["loaded_modes"]
+    if names["loaded_modes"]:
+        half = fine_enough(case.case.road.element_angles_deg, request["highest_harmonic"])
+        names["road"]["angles"] = half + half[::-1]
     jobs = ("inflate", "press" if names["loads"] else "modes")
     return {f"{job}.inp": render(env, f"{job}.inp.j2", names) for job in jobs}
+
+
+def fine_enough(angles_deg: Sequence[float], waves: int) -> list[float]:
+    """Elements' lengths from the patch's middle to the top, those from the first one on that is
+    too long for ``waves`` round the circumference made equal."""
+    longest = 360 / (ELEMENTS_A_WAVE * max(waves, 1))
+    kept = list(takewhile(lambda angle: angle <= longest, angles_deg))
+    rest = 180 - sum(kept)
+    more = ceil(rest / longest - 1e-9)
+    return [*kept, *([rest / more] * more)]
 
 
 def _calculix(case: LoadedCase, env: Any, request: Mapping[str, Any]) -> dict[str, str]:

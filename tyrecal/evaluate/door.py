@@ -25,6 +25,7 @@ CAUSES = {
     "TimedOut": "timed_out",
 }
 SETTLED = ("no_equilibrium", "unstable")  # the deck's own doing: another run would say the same
+MODES_ON_TOP = 3  # times the time limit of a load, where modes are sought there too
 T = TypeVar("T")
 
 
@@ -90,21 +91,27 @@ class Door:
         decks = Decks(case, question.values, question.gradients, question.modes_per_harmonic)
         return self._ask(decks, lambda answer, kept: evaluation(answer))
 
-    def press(self, values: Mapping[str, float], loads_N: Sequence[float]) -> Pressed:
-        """One design on the road at rising loads, as far as the solver gets.
+    def press(
+        self, values: Mapping[str, float], loads_N: Sequence[float], modes: int = 0
+    ) -> Pressed:
+        """One design on the road at rising loads, as far as the solver gets, with so many ``modes``
+        at each.
 
         Raises what `evaluate` does; DeckRefused too where the solver has no road.
         """
-        self.needs_road()
-        decks = Decks(self._with(values), values, loads_N=tuple(loads_N))
-        return self._ask(decks, lambda answer, kept: pressed(answer, loads_N, kept))
+        self.needs_road(bool(modes))
+        decks = Decks(self._with(values), values, loads_N=tuple(loads_N), loaded_modes=modes)
+        return self._ask(decks, lambda answer, kept: pressed(answer, loads_N, kept, modes))
 
-    def needs_road(self) -> None:
-        """Raises DeckRefused where the solver cannot press a tyre on a road."""
-        if "footprint" not in self.solver.capabilities:
+    def needs_road(self, modes: bool = False) -> None:
+        """Raises DeckRefused where the solver cannot press a tyre on a road, or has no modes of it
+        there."""
+        capability = "loaded_modes" if modes else "footprint"
+        if capability not in self.solver.capabilities:
+            what = "find modes of a tyre" if modes else "press a tyre"
             raise DeckRefused(
-                f"solver '{self.solver.name}' cannot press a tyre on a road; 'tyrecal solvers'"
-                " shows which one can (footprint)"
+                f"solver '{self.solver.name}' cannot {what} on a road; 'tyrecal solvers'"
+                f" shows which one can ({capability})"
             )
 
     def needs_effects_of(self, case: LoadedCase) -> None:
@@ -139,6 +146,7 @@ class Door:
                 result = typed(answer, None)
             else:
                 limit_s = decks.case.case.solver.time_limit_s * max(1, len(decks.loads_N))
+                limit_s *= MODES_ON_TOP if decks.loaded_modes else 1
                 answer = self._run(folder, limit_s)
                 words = answer.get("failure", "")
                 kept = self._kept(folder, words) if words else None
@@ -182,10 +190,14 @@ class Door:
         return self._each("evaluate", [(question,) for question in questions], jobs)
 
     def press_all(
-        self, designs: Iterable[Mapping[str, float]], loads_N: Sequence[float], jobs: int = 1
+        self,
+        designs: Iterable[Mapping[str, float]],
+        loads_N: Sequence[float],
+        jobs: int = 1,
+        modes: int = 0,
     ) -> Iterator[Pressed | EvaluationFailed]:
         """`press` for each design, in their order; ``jobs`` at a time."""
-        return self._each("press", [(values, loads_N) for values in designs], jobs)
+        return self._each("press", [(values, loads_N, modes) for values in designs], jobs)
 
     def _each(self, ask: str, asked: Sequence[tuple[Any, ...]], jobs: int) -> Iterator[Any]:
         if jobs <= 1:

@@ -25,6 +25,9 @@ class Footprint:
     ``node`` (deck number), along_m and across_m in the road, pressure_Pa, area_m2, which it stands
     for, traction_Pa (p, 2). displacement (ring, node, 3): r, theta, z at the reference angle, m.
     contact_area_m2: of a solver that places the patch's edge between nodes, else None.
+
+    Of modes, where they were asked for: mode_frequency_Hz (m,); mode_shape (m, ring, j, 3), as
+    displacement, at the nodes mode_node (j,) only.
     """
 
     load_N: float
@@ -41,6 +44,9 @@ class Footprint:
     traction_Pa: Array
     displacement: Array
     contact_area_m2: float | None = None
+    mode_frequency_Hz: Array | None = None
+    mode_node: Array | None = None
+    mode_shape: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -62,11 +68,13 @@ class Pressed:
     failed: EvaluationFailed | None = None
 
 
-def pressed(answer: dict[str, Any], loads_N: Sequence[float], kept: Path | None) -> Pressed:
-    """A solver's answer to ``loads_N``, of a run ``kept`` there.
+def pressed(
+    answer: dict[str, Any], loads_N: Sequence[float], kept: Path | None, modes: int = 0
+) -> Pressed:
+    """A solver's answer to ``loads_N``, of a run ``kept`` there, with so many ``modes`` at each.
 
     Raises EvaluationFailed where it does not hold the loads in their order, one at least, each
-    borne by the road.
+    borne by the road, or not their modes.
     """
     found = tuple(
         Footprint(**{k: _plain(v) for k, v in each.items()}) for each in answer["footprints"]
@@ -80,6 +88,9 @@ def pressed(answer: dict[str, Any], loads_N: Sequence[float], kept: Path | None)
             raise EvaluationFailed(
                 "no_results", f"the road bears {each.road_N:g} N of {each.load_N:g} N"
             )
+        hertz = each.mode_frequency_Hz
+        if modes and (hertz is None or len(hertz) < modes or not (hertz > 0).all()):
+            raise EvaluationFailed("no_results", f"not {modes} modes at {each.load_N:g} N")
     return Pressed(
         pressure_kPa=answer["pressure_Pa"] / 1e3,
         mass_kg=answer["mass_kg"],

@@ -14,8 +14,8 @@ class Solver(Protocol):
 
     version: of the program that runs, "unknown" where it is not found; part of every record's key.
     dialect: the template folder of its decks; capabilities: of ``modes``,
-    ``gradients``, ``footprint``, and what effects need (`Effect.needs`): ``vibration_modulus``,
-    a modulus in the frequency step other than in the static one;
+    ``gradients``, ``footprint``, ``loaded_modes``, and what effects need (`Effect.needs`):
+    ``vibration_modulus``, a modulus in the frequency step other than in the static one;
     refusals, failures: exceptions of `write`, `run` and `read` for a deck it cannot honour and
     for no solution; a failure's attribute ``cause``, where it has one, is `EvaluationFailed`'s.
     """
@@ -30,7 +30,8 @@ class Solver(Protocol):
     def write(self, decks: Any, folder: Path) -> list[Path]:
         """Write all input files of `tyrecal.deck.Decks` into an empty folder.
 
-        ``loads_N`` is not empty only where the solver can do footprints.
+        ``loads_N`` is not empty only where the solver can do footprints, ``loaded_modes`` not 0
+        only where it finds modes there.
         """
 
     def run(self, folder: Path, time_limit_s: float) -> None:

@@ -104,7 +104,7 @@ def _name_lines(axes: Axes, curves: Curves, which: int) -> None:
     if not np.isfinite([y for y, _ in ends]).all():
         return
     low, high = axes.get_ylim()
-    place = _apart([(y - low) / (high - low) for y, _ in ends], GAP * (1 if which == 1 else 5 / 3))
+    place = apart([(y - low) / (high - low) for y, _ in ends], GAP * (1 if which == 1 else 5 / 3))
     for (y, label), height in zip(ends, place, strict=True):
         axes.annotate(
             str(label),
@@ -118,7 +118,7 @@ def _name_lines(axes: Axes, curves: Curves, which: int) -> None:
         )
 
 
-def _apart(heights: Sequence[float], gap: float) -> list[float]:
+def apart(heights: Sequence[float], gap: float) -> list[float]:
     """Rising heights moved as little as is simple, so that neighbours are ``gap`` apart."""
     place = list(heights)
     for _ in range(100):

@@ -61,7 +61,8 @@ def fit_table(fit: Mapping[str, Any]) -> Table:
 def modes_table(modes: Mapping[str, Any]) -> Table:
     """The content of modes.json: one row a mode, in its order."""
     entries = modes["modes"]
-    extra = [key for key in ("symmetry", "clarity") if any(key in mode for mode in entries)]
+    known = ("symmetry", "clarity", "overlap")
+    extra = [key for key in known if any(key in mode for mode in entries)]
     table = _table(("mode", "motion", "Hz", *extra))
     load = f", {modes['load_N']:g} N" if modes["load_N"] else ""
     table.title = f"{modes['pressure_kPa']:g} kPa{load}, {modes['mass_kg']:.2f} kg"
@@ -74,6 +75,33 @@ def modes_table(modes: Mapping[str, Any]) -> Table:
             *(f"{cell:.2f}" if isinstance(cell, float) else str(cell) for cell in cells),
         )
     return table
+
+
+def load_table(rows: Sequence[Mapping[str, Any]], design: str) -> Table:
+    """One design's modes in load_sweep.json, a line a member of a doublet: Hz at each load."""
+    table = _table(("mode", "motion", "symmetry", *(f"{row['load_N']:g} N" for row in rows)))
+    table.title = f"{design}, Hz"
+    found = [{(*_key(m), m["symmetry"]): m for m in row["modes"]} for row in rows]
+    members = {key: mode for modes in reversed(found) for key, mode in modes.items()}
+    lowest = {_key(m): min(x["frequency_Hz"] for k, x in members.items() if k[:3] == _key(m))
+              for m in members.values()}  # fmt: skip
+    for key in sorted(members, key=lambda k: (lowest[k[:3]], str(k[:3]), k[3] != "symmetric")):
+        hertz = (f"{m[key]['frequency_Hz']:.2f}" if key in m else NONE for m in found)
+        _add(table, *_named(members[key]), key[3], *hertz)
+    return table
+
+
+def load_csv(rows: Sequence[Mapping[str, Any]]) -> str:
+    """The rows of load_sweep.json as CSV, a line a mode, all digits."""
+    keys = ("c", "m", "kind", "symmetry", "frequency_Hz", "overlap", "spanned")
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(["design", "load_N", "deflection_m", *keys])
+    for row in rows:
+        for mode in row["modes"]:
+            cells = ["" if mode[key] is None else mode[key] for key in keys]
+            writer.writerow([row["design"], row["load_N"], row["deflection_m"], *cells])
+    return text.getvalue()
 
 
 def fit_csv(fit: Mapping[str, Any]) -> str:
@@ -207,7 +235,8 @@ def _table(columns: tuple[str, ...]) -> Table:
     # figures never break: on a narrow terminal only names and words do
     table = Table(box=box.SIMPLE_HEAD, padding=(0, 0, 0, 1), pad_edge=False, show_edge=False)
     for name in columns:
-        figures = name not in ("mode", "motion", "curvature", "design", *SOLVER_COLUMNS, *EFFECTS)
+        words = ("mode", "motion", "symmetry", "curvature", "design", *SOLVER_COLUMNS, *EFFECTS)
+        figures = name not in words
         table.add_column(name, justify="right" if figures else "left", no_wrap=figures,
                          overflow="fold")  # fmt: skip
     return table

@@ -1,0 +1,301 @@
+"""Modes of the pressed tyre: against harmonics and dense algebra, the hold, what decks may ask."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.linalg import eigh
+from tyrecal_solvers.bundled import davidson, hold, job, press_job
+from tyrecal_solvers.bundled.circumference import Circumference, half_circle
+from tyrecal_solvers.bundled.eigen import NotConverged
+from tyrecal_solvers.bundled.fold import HALF_TURN
+from tyrecal_solvers.bundled.harmonics import HarmonicModes, Unstable, Vibration
+from tyrecal_solvers.bundled.keywords import DeckError
+from tyrecal_solvers.bundled.loaded_modes import Inertia, LoadedModes, loaded_modes
+from tyrecal_solvers.bundled.mechanics import mass
+from tyrecal_solvers.bundled.pressing import Pressed
+from tyrecal_solvers.bundled.revolved import Revolved
+from tyrecal_solvers.bundled.road import Contact
+
+from tyrecal.deck.write import Decks
+
+from . import support
+from .contact import Round, ring
+from .test_pressing import coarse_case
+
+Array = np.ndarray
+LENGTHS = np.radians([5.0] * 4 + [20.0] * 8)
+
+
+@pytest.fixture(scope="module")
+def tyre() -> Round:
+    """A soft ring on a hub."""
+    return ring((0.08, 0.09, 0.1), 0.02, 2, support.Rubber(C10=2e5, D1=2.5e-7))
+
+
+def harmonic(work: Round, n: int, count: int = 2) -> HarmonicModes:
+    equations = support.numbering(work.model, ~work.free)
+    return Vibration(work.model, work.U, work.loads, equations, 0.0).modes(n, count)
+
+
+def start(work: Round) -> list[HarmonicModes]:
+    return [harmonic(work, n, 4) for n in range(5)]
+
+
+def modes(work: Round, U: Array, held: Contact, around: Circumference, count: int) -> LoadedModes:
+    return loaded_modes(work.tyre(around), work.free, U, held, start(work), count, lambda: None)
+
+
+def no_hold(work: Round, around: Circumference) -> Contact:
+    return work.road(around, 1e10).forces(work.everywhere(around), 1.0)
+
+
+@dataclass
+class State:
+    """A pressed ring and what holds it."""
+
+    around: Circumference
+    U: Array
+    pressed: Pressed
+    hold: Contact
+    areas: Array
+
+
+def press(work: Round, load: float, friction: float = 0.5, stiffness: float = 1e9) -> State:
+    stand = work.press(LENGTHS, stiffness, friction)
+    found = stand.to(load)
+    U = stand.fold.spread(found.parts)
+    stand.tyre.residual(U)
+    contact = found.contact
+    areas = stand.tyre.surface_shares(work.model.mesh.faces["TREAD"])
+    areas = areas[: len(contact.local), contact.road.nodes]
+    around = stand.tyre.around
+    return State(around, U, found, hold.held(contact, found.height, areas, around), areas)
+
+
+@pytest.fixture(scope="module")
+def pressed(tyre: Round) -> State:
+    return press(tyre, 10.0)
+
+
+@pytest.fixture(scope="module")
+def found(tyre: Round, pressed: State) -> LoadedModes:
+    return modes(tyre, pressed.U, pressed.hold, pressed.around, 10)
+
+
+def test_without_a_road_the_modes_are_the_harmonic_ones(tyre: Round) -> None:
+    """n <= 1 to rounding, for the elements' functions hold it; n = 2, 3 with the fourth power of
+    the elements' length; doublets have one member of each parity, equal to rounding."""
+    exact = {n: harmonic(tyre, n).eigenvalues[0] for n in range(4)}
+    errors: dict[int, list[float]] = {2: [], 3: []}
+    for elements in (8, 16):
+        around = half_circle(np.full(elements, np.pi / elements))
+        found = modes(tyre, tyre.everywhere(around), no_hold(tyre, around), around, 12)
+        assert (np.diff(found.eigenvalues) >= 0).all()
+        for n, value in exact.items():
+            near = np.argsort(abs(found.eigenvalues - value))[: 2 if n else 1]
+            if n < 2:
+                np.testing.assert_allclose(found.eigenvalues[near], value, rtol=1e-7)
+            else:
+                errors[n].append(found.eigenvalues[near].mean() / value - 1)
+                np.testing.assert_allclose(*found.eigenvalues[near], rtol=1e-7)
+            assert sorted(found.parity[near]) == ([-1, 1] if n else sorted(found.parity[near]))
+    for each in errors.values():
+        assert 0 < each[1] < 0.01
+        assert support.order(each)[0] > 3.5
+
+
+def test_they_solve_the_whole_problem(tyre: Round, pressed: State, found: LoadedModes) -> None:
+    """K x = lambda M x on the whole tyre, modal masses 1, different modes orthogonal."""
+    work = tyre.tyre(pressed.around)
+    work.residual(pressed.U)
+    weigh = Inertia(tyre.model, pressed.around)
+    for value, parity, x in zip(found.eigenvalues, found.parity, found.shapes, strict=True):
+        fold = tyre.fold(pressed.around, int(parity))
+        gathered = lambda F, fold=fold: fold.gather(F)
+        force = gathered(work.product(x) + pressed.hold.product(x))
+        inertia = value * gathered(weigh(x))
+        assert np.linalg.norm(force - inertia) < 2e-3 * np.linalg.norm(inertia)
+        energy = float((x * (work.product(x) + pressed.hold.product(x))).sum())
+        assert 2 * energy == pytest.approx(value, rel=1e-8)
+    gram = 2 * np.einsum("akni,bkni->ab", found.shapes, [weigh(x) for x in found.shapes])
+    same = found.parity[:, None] == found.parity
+    np.testing.assert_allclose(gram[same], np.eye(10)[same], atol=1e-7)
+
+
+def test_mass_of_rigid_motions(tyre: Round) -> None:
+    """Half the tyre's mass for shifts down and along the axle, whatever the elements' lengths."""
+    around = half_circle(LENGTHS)
+    weigh, total = Inertia(tyre.model, around), 2 * np.pi * mass(tyre.model).sum()
+    c, s = np.cos(around.angles)[:, None], np.sin(around.angles)[:, None]
+    ones = np.ones((1, len(tyre.U)))
+    down = np.stack([c * ones, -s * ones, 0 * c * ones], -1)
+    across = np.stack([0 * c * ones, 0 * c * ones, 1 + 0 * c * ones], -1)
+    for V in (down, across):
+        assert (V * weigh(V)).sum() == pytest.approx(total / 2, rel=1e-9)
+
+
+def test_a_hold_raises_every_frequency(tyre: Round, pressed: State, found: LoadedModes) -> None:
+    """Weyl: none of the pressed tyre's eigenvalues falls with the hold, more so a rigid one; what
+    the contact's own stiffness leaves to a rigid hold is little."""
+    free = modes(tyre, pressed.U, replace(pressed.hold, K=0 * pressed.hold.K), pressed.around, 10)
+    rigid = modes(
+        tyre, pressed.U, replace(pressed.hold, K=1e2 * pressed.hold.K), pressed.around, 10
+    )
+    assert (free.eigenvalues < found.eigenvalues * (1 + 1e-9)).all()
+    assert (found.eigenvalues < rigid.eigenvalues * (1 + 1e-9)).all()
+    np.testing.assert_allclose(found.eigenvalues, rigid.eigenvalues, rtol=0.02)
+    assert (found.eigenvalues / free.eigenvalues).max() > 1.05
+
+
+def test_the_hold_covers_the_patch(pressed: State) -> None:
+    """Shares of the nodes' areas: all inside, none outside, and about the contact area."""
+    contact = pressed.pressed.contact
+    share = hold.covered(contact, pressed.pressed.height, pressed.areas, pressed.around)
+    assert share.min() == 0.0 and share.max() == 1.0
+    inside = contact.local[..., 0] > 0
+    assert (share[1:][~inside[:-1] & ~inside[1:]] == 0).all()
+    assert (share[:-1][inside[1:]] == 1).all()
+    area = press_job.contact_area(contact, pressed.areas, pressed.around)
+    assert 2 * (share * pressed.areas).sum() == pytest.approx(area, rel=0.15)
+
+
+def test_the_hold_goes_to_nothing_with_the_load(tyre: Round) -> None:
+    """Total stiffness over the contact's: steadily to nothing, on one mesh; without friction
+    nothing holds along the road."""
+    totals = [press(tyre, load).hold.K[..., 0, 0].sum() for load in (3.0, 1.0, 0.1, 0.01)]
+    assert all(after < before for before, after in pairwise(totals))
+    assert totals[-1] < 0.1 * totals[0]
+    assert press(tyre, 1.0).hold.K[..., 1, 1].any()
+    smooth = press(tyre, 1.0, 0.0).hold.K
+    assert not smooth[..., 1:, 1:].any() and smooth[..., 0, 0].any()
+
+
+def test_light_loads_leave_the_unloaded_modes(tyre: Round) -> None:
+    """The least frequencies come down to those of the same mesh without a road."""
+    around = half_circle(LENGTHS)
+    unloaded = modes(tyre, tyre.everywhere(around), no_hold(tyre, around), around, 8)
+    away = []
+    for load in (1.0, 0.1, 0.01):
+        state = press(tyre, load, stiffness=1e7)
+        loaded = modes(tyre, state.U, state.hold, state.around, 8)
+        away.append(abs(loaded.eigenvalues / unloaded.eigenvalues - 1).max())
+    assert away[0] > away[1] > away[2]
+    assert away[2] < 0.4 * away[0]
+
+
+def test_the_same_bits_again(tyre: Round, pressed: State, found: LoadedModes) -> None:
+    again = modes(tyre, pressed.U, pressed.hold, pressed.around, 10)
+    np.testing.assert_array_equal(again.eigenvalues, found.eigenvalues)
+    np.testing.assert_array_equal(again.shapes, found.shapes)
+
+
+def test_an_unstable_state_fails_by_its_name(tyre: Round, pressed: State) -> None:
+    pushed = replace(pressed.hold, K=-10 * pressed.hold.K)
+    with pytest.raises(Unstable, match="not stable"):
+        modes(tyre, pressed.U, pushed, pressed.around, 4)
+
+
+def block(matrix: Array) -> davidson.Operator:
+    return lambda x: x @ matrix
+
+
+def matrices(random: np.random.Generator) -> tuple[Array, Array]:
+    A, B = random.normal(size=(2, 120, 120))
+    return A @ A.T / 100 + np.diag(np.arange(1.0, 121.0)), B @ B.T / 1000 + np.eye(120)
+
+
+def test_davidson_against_dense_algebra(random: np.random.Generator) -> None:
+    """An inverse that is off by a tenth, a start of noise, a basis that is cut down on the way."""
+    K, M = matrices(random)
+    rough = np.linalg.inv(K + 0.1 * np.diag(np.diag(K)))
+    values, x = davidson.lowest(block(K), block(M), block(rough), random.normal(size=(6, 120)), 5)
+    np.testing.assert_allclose(values, eigh(K, M, eigvals_only=True)[:5], rtol=1e-8)
+    np.testing.assert_allclose(x @ M @ x.T, np.eye(5), atol=1e-8)
+
+
+def test_davidson_fails_by_name(
+    random: np.random.Generator, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    K, M = matrices(random)
+    fields = random.normal(size=(4, 120))
+    with pytest.raises(Unstable, match="not positive"):
+        davidson.lowest(block(K - 50 * np.eye(120)), block(M), block(np.eye(120)), fields, 3)
+    with pytest.raises(NotConverged, match="do not span"):
+        davidson.lowest(block(K), block(M), block(np.eye(120)), np.repeat(fields[:1], 4, 0), 3)
+    monkeypatch.setattr(davidson, "LONGEST", 2)
+    with pytest.raises(NotConverged, match="did not converge"):
+        davidson.lowest(block(K), block(M), block(np.eye(120)), fields, 3)
+
+
+LOADS = (1000.0,)
+
+
+def texts(count: int = 6) -> dict[str, str]:
+    return Decks(coarse_case(), loads_N=LOADS, loaded_modes=count).texts("abaqus")
+
+
+def refused(folder: Path, edit: Callable[[str], str]) -> str:
+    for name, text in texts().items():
+        (folder / name).write_text(edit(text) if name == "press.inp" else text)
+    with pytest.raises(DeckError) as error:
+        job.run(folder, "press", "inflate")
+    return str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("pattern", "new", "words"),
+    [
+        (r"(?s)\*STEP, NAME=LOAD_1.*?\*END STEP\n", "", "come after a force"),
+        (r"(MASS\n6\n\*BOUNDARY, OP=NEW\n.*\n)900002, 1, 6\n", r"\1", "must hold the road"),
+        (r"MASS\n6\n", "MASS\n6, , 100.0\n", "limits and shifts"),
+        (r"NSET=CROWN", "NSET=HUB", "a set of the section"),
+        (r"PERTURBATION", "INTERMITTENT", "INTERMITTENT"),
+        (r"LOAD_1, NLGEOM=YES", "LOAD_1, NLGEOM=YES, PERTURBATION", "no linear PERTURBATION"),
+    ],
+)
+def test_what_is_not_honoured(tmp_path: Path, pattern: str, new: str, words: str) -> None:
+    def edit(text: str) -> str:
+        changed, count = re.subn(pattern, new, text)
+        assert count
+        return changed
+
+    assert words in refused(tmp_path, edit)
+
+
+def test_results_hold_the_half_turn(tyre: Round, pressed: State, found: LoadedModes) -> None:
+    """Shapes on the whole tyre, as the job writes them: each kept or reversed by the half turn."""
+    work = tyre.press(LENGTHS, 1e9, 0.5)
+    rows = np.arange(len(tyre.U))
+    wanted = press_job.Vibrating(tyre.model, 6, rows)
+    state = work.to(10.0)
+    equations = support.numbering(tyre.model, ~tyre.free)
+    tread = tyre.model.mesh.faces["TREAD"]
+    written = press_job._modes(work, state, wanted, tread, equations, tyre.U)
+    shapes = written["mode_shape"]
+    back = (-np.arange(shapes.shape[1])) % shapes.shape[1]
+    image = HALF_TURN * shapes[:, back][:, :, work.fold.other]
+    parity = found.parity[:6, None, None, None]
+    np.testing.assert_allclose(shapes, parity * image, atol=1e-6 * abs(shapes).max())
+    hertz = np.sqrt(found.eigenvalues[:6]) / (2 * np.pi)
+    np.testing.assert_allclose(written["mode_frequency_Hz"], hertz, rtol=1e-7)
+
+
+def test_the_vibration_modulus_counts(tyre: Round, pressed: State) -> None:
+    """Twice the shear and bulk moduli for vibrations: K of the rubber, all there is, doubles but
+    for the pressure's part."""
+    (rubber,) = tyre.model.rubbers
+    points = np.ones(rubber.solids.weights.size)
+    law = replace(rubber.material, shear_ratio=2.0 * points, bulk_ratio=2.0 * points)
+    moving = replace(tyre.model, rubbers=[replace(rubber, material=law)])
+    works = [Revolved(m, [], pressed.around) for m in (tyre.model, moving)]
+    x = np.random.default_rng(1).normal(size=pressed.U.shape)
+    small = np.zeros_like(pressed.U)
+    still, twice = ((w.residual(small), w.product(x))[1] for w in works)
+    np.testing.assert_allclose(twice, 2 * still, atol=1e-9 * abs(still).max())

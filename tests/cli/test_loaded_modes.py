@@ -1,0 +1,100 @@
+"""tyrecal modes --load-N and --sweep-load: what they write, what they refuse, what they keep."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from tyrecal.report.load import draw_load_sweep
+from tyrecal.report.table import load_csv
+
+from ..studies.loaded import coarse_case
+from .test_cli import CASE, run
+
+
+def test_one_load_the_record_and_a_load_out_of_reach(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """modes.json as the interface has it, the same bytes from the record; a sweep that ends early
+    keeps the loads below."""
+    case, out = str(coarse_case(tmp_path)), tmp_path / "out"
+    arguments = ["modes", case, "--output", str(out), "--load-N", "300"]
+    assert run(*arguments) == 0
+    first = (out / "modes.json").read_bytes()
+    result = json.loads(first)
+    assert (result["load_N"], result["pressure_kPa"]) == (300, 240) and result["mass_kg"] > 10
+    assert len(result["modes"]) == 10
+    assert {mode["multiplicity"] for mode in result["modes"]} == {1}
+    assert "antisymmetric" in capsys.readouterr().out
+    assert run(*arguments, "--json") == 0
+    assert json.loads(capsys.readouterr().out) == result
+    assert (out / "modes.json").read_bytes() == first
+    facts = json.loads((out / "run.json").read_text())
+    assert (facts["solver_runs"], facts["answered_from_record"]) == (0, 2)
+    sweep = ["modes", case, "--output", str(out), "--sweep-load", "0,300,300000"]
+    assert run(*sweep) == 3
+    assert "error: initial, 300000 N: no equilibrium between" in capsys.readouterr().err
+    found = json.loads((out / "load_sweep.json").read_text())
+    assert [row["load_N"] for row in found["rows"]] == [0, 300]
+    assert found["failed"][0]["load_N"] == 300000
+    lines = (out / "load_sweep.csv").read_text().splitlines()
+    assert len(lines) == 1 + 2 * 10 and lines[0].startswith("design,load_N,deflection_m,c,m,kind")
+    assert (out / "load_sweep.png").stat().st_size > 10000
+
+
+def test_a_tyre_that_no_load_is_borne_by(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    arguments = ["modes", str(coarse_case(tmp_path)), "--output", str(out), "--load-N", "300000"]
+    assert run(*arguments) == 3
+    printed = capsys.readouterr()
+    assert "no equilibrium between" in printed.err and "Traceback" not in printed.err
+    assert not (out / "modes.json").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--load-N", "0"], "--load-N 0: must be a finite load above 0"),
+        (["--load-N", "-5"], "above 0"),
+        (["--load-N", "nan"], "finite"),
+        (["--sweep-load", "0"], "needs a load above 0"),
+        (["--sweep-load", "1000,500"], "loads must rise"),
+        (["--sweep-load", "500,0"], "above 0"),
+        (["--sweep-load", "much"], "'much' is not a number"),
+        (["--sweep-load", "500", "--load-N", "500"], "not both"),
+        (["--load-N", "500", "--fitted", CASE], "--fitted goes with --sweep-load"),
+        (["--load-N", "500", "--pictures"], "--pictures goes with"),
+        (["--load-N", "500", "--solver", "calculix"], "cannot find modes of a tyre on a road"),
+    ],
+)
+def test_wrong_options(
+    arguments: list[str], words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    assert run("modes", CASE, "--output", str(out), *arguments) == 2
+    printed = capsys.readouterr()
+    assert words in printed.err and "Traceback" not in printed.err and printed.out == ""
+    assert not out.exists()
+
+
+def test_a_picture_of_both_designs(tmp_path: Path) -> None:
+    """Overtones, one load only, members that are missing: drawn all the same."""
+    mode = {"c": 2, "m": 0, "kind": None, "frequency_Hz": 80.0, "symmetry": "symmetric",
+            "overlap": 1.0, "spanned": 1.0}  # fmt: skip
+    rows = [
+        {"design": "initial", "load_N": 0.0, "deflection_m": 0.0, "modes": [mode]},
+        {"design": "fitted", "load_N": 9.0, "deflection_m": 0.0, "modes": [mode, mode | {"m": 2}]},
+    ]
+    draw_load_sweep(tmp_path / "both.png", rows)
+    assert (tmp_path / "both.png").read_bytes()[:4] == b"\x89PNG"
+    assert len(load_csv(rows).splitlines()) == 4
+
+
+def test_the_command_explains_itself(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("modes", "--help") == 0
+    said = capsys.readouterr().out
+    assert "--load-N" in said and "--sweep-load" in said and "--load-N 4000" in said

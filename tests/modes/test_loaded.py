@@ -1,0 +1,137 @@
+"""Loaded modes by their shapes: members of unloaded modes, symmetry, following over the load."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tyrecal.evaluate.results import HarmonicShape, RawMode, RingShape
+from tyrecal.modes.loaded import (
+    SYMMETRIES,
+    Member,
+    Rings,
+    State,
+    follow,
+    members,
+    rings,
+    state,
+)
+from tyrecal.modes.mode import Label, Mode
+
+Array = np.ndarray
+NODES = np.array([3, 5, 7])
+POINTS = np.array([[0.30, -0.05], [0.31, 0.0], [0.30, 0.05]])
+ANGLES = np.sort(np.concatenate([np.arange(12) * np.pi / 6, [0.1, 2 * np.pi - 0.1]]))
+WHERE = rings(ANGLES, NODES, NODES, POINTS)
+LEAN = np.array([-1.0, 0.0, 1.0])
+
+
+def mode(n: int, r: Array, theta: Array, z: Array, kind: str | None = None) -> Mode:
+    """u_r, u_z ~ exp(i n theta), u_theta ~ -i exp(i n theta), turned round the tyre by 0.7 rad."""
+    amplitude = np.stack([r + 0j * LEAN, theta + 0j * LEAN, z + 0j * LEAN], -1) * np.exp(0.7j * n)
+    shape = HarmonicShape(n, NODES, POINTS, amplitude)
+    label = Label(n, 0, kind)
+    return Mode(label, 50.0, 2 if n else 1, 1.0, 0, RawMode(50.0, shape, 2 if n else 1))
+
+
+OVAL = mode(2, np.ones(3), 0.5j * np.ones(3), 0.1 * LEAN)
+
+
+def test_areas_are_the_bands() -> None:
+    """A band of the width of the line and the tyre's radius, whatever the rings' angles."""
+    width = 2 * np.hypot(0.05, 0.01)
+    assert WHERE.areas.sum() == pytest.approx(2 * np.pi * 0.305 * width)
+    np.testing.assert_allclose(WHERE.areas[0], WHERE.areas[0][::-1])
+
+
+def test_members_of_a_doublet_stand_by_the_patch() -> None:
+    """One even, one odd, about angle 0, wherever the doublet was turned to; orthogonal."""
+    both = members(OVAL, WHERE)
+    assert list(both) == [Member(OVAL.label, symmetry) for symmetry in SYMMETRIES]
+    shapes = np.array(list(both.values()))
+    np.testing.assert_allclose(WHERE.evenness(shapes), [1, 0], atol=1e-12)
+    assert (
+        abs(shapes[0][0, :, 0]).min() == pytest.approx(1) and abs(shapes[1][0, :, 0]).max() < 1e-12
+    )
+    np.testing.assert_allclose(WHERE.overlaps(shapes, shapes), np.eye(2), atol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("shape", "symmetry"),
+    [
+        ((0 * LEAN, 0 * LEAN, np.ones(3)), "symmetric"),
+        ((0 * LEAN, np.ones(3), 0 * LEAN), "antisymmetric"),
+        ((0.3j * np.ones(3), 0 * LEAN, 1j * np.ones(3)), "symmetric"),
+    ],
+)
+def test_single_modes(shape: tuple[Array, ...], symmetry: str) -> None:
+    """[0,0]: along the axle is symmetric about the patch, about the axle is not."""
+    (member,) = members(mode(0, *shape, kind="axial"), WHERE)
+    assert member.symmetry == symmetry and str(member) == f"[0,0] axial {symmetry}"
+
+
+def test_sampled_shapes_have_no_members() -> None:
+    ring = RingShape(np.zeros((1, 3)), np.zeros((1, 3)))
+    sampled = Mode(Label(2, 0), 50.0, 1, 1.0, 0, RawMode(50.0, ring, 1))
+    with pytest.raises(TypeError, match="harmonic"):
+        members(sampled, WHERE)
+
+
+def waves(count: int) -> Array:
+    """Orthonormal even fields, then as many odd ones, (2 count, ring, node, 3)."""
+    where = rings(np.arange(24) * np.pi / 12, NODES, NODES, POINTS)
+    shapes = [
+        [np.cos(n * where.angles), np.sin(n * where.angles)][odd][:, None, None]
+        * np.array([1.0, 0.0, 0.0])
+        * np.ones((1, 3, 1))
+        for odd in (0, 1)
+        for n in range(1, count + 1)
+    ]
+    return (
+        np.array(shapes) / np.sqrt((WIDE.flat(np.array(shapes)) ** 2).sum(1))[:, None, None, None]
+    )
+
+
+WIDE: Rings = rings(np.arange(24) * np.pi / 12, NODES, NODES, POINTS)
+
+
+def solved(K: Array, basis: Array) -> State:
+    """Modes of a stiffness on a basis of one symmetry."""
+    values, vectors = np.linalg.eigh(K)
+    return state(np.sqrt(values), np.einsum("im,ikjc->mkjc", vectors, basis), WIDE)
+
+
+def test_a_spring_that_exchanges_shapes_keeps_the_order() -> None:
+    """A point of the tyre held ever harder: modes end below the next one's frequency, with much of
+    its shape, and still are themselves."""
+    basis = waves(5)[:5]
+    K = np.diag(np.array([40.0, 60.0, 80.0, 100.0, 120.0]) ** 2)
+    held = np.ones(5)
+    free, tight = solved(K, basis), solved(K + 1e6 * np.outer(held, held), basis)
+    found = follow(free, tight, WIDE)
+    np.testing.assert_array_equal(found.position, np.arange(5))
+    np.testing.assert_allclose(found.spanned, 1.0)
+    likest = WIDE.overlaps(free.shapes, tight.shapes).argmax(1)
+    assert (likest < np.arange(5)).any()  # by the likest shape they would have other names
+
+
+def test_a_curve_that_crosses_others_goes_on() -> None:
+    """Modes that hardly attract cross, and so do those of different symmetry, in whatever order
+    and with whatever sign they come."""
+    basis = waves(3)
+    before = State(np.array([40.0, 50.0, 60.0, 45.0]), basis[[0, 1, 2, 3]], np.arange(4) < 3)
+    after = State(np.array([70.0, 52.0, 62.0, 99.0]), -basis[[0, 1, 2, 3]], np.arange(4) < 3)
+    order = np.array([2, 0, 3, 1])
+    mixed = State(after.frequencies[order], after.shapes[order], after.symmetric[order])
+    found = follow(before, mixed, WIDE)
+    np.testing.assert_array_equal(order[found.position], np.arange(4))
+
+
+def test_a_mode_that_left_is_not_named() -> None:
+    """What the next load's modes do not hold has no place there; a kind that is missing neither."""
+    basis = waves(4)
+    before = State(np.array([40.0, 50.0, 45.0]), basis[[0, 1, 4]], np.array([True, True, False]))
+    after = State(np.array([41.0, 60.0]), basis[[0, 2]], np.array([True, True]))
+    found = follow(before, after, WIDE)
+    assert found.position[0] == 0 and found.position[2] == -1
+    assert found.spanned[0] == pytest.approx(1) and found.spanned[1] < 0.1

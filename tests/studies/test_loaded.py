@@ -1,0 +1,154 @@
+"""Loaded modes end to end on a coarse tyre, and what a sweep over the load says."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tyrecal.case import load_case
+from tyrecal.deck.write import Decks, fine_enough
+from tyrecal.evaluate.door import Door
+from tyrecal.evaluate.failure import DeckRefused, EvaluationFailed
+from tyrecal.evaluate.store import Store
+from tyrecal.modes.loaded import SYMMETRIES, Member
+from tyrecal.modes.mode import Label
+from tyrecal.studies.loaded import Loaded, LoadedMode, LoadedTyre, load_tyres
+from tyrecal.studies.loaded_result import findings, load_sweep_result, loaded_modes_result
+
+from ..evaluate.stand_in import CASE, StandIn
+from .loaded import coarse_case
+
+LOADS = [0.0, 500.0, 1000.0]
+
+
+@pytest.fixture(scope="module")
+def tyre(tmp_path_factory: pytest.TempPathFactory) -> LoadedTyre:
+    """A coarse tyre at three loads."""
+    folder = tmp_path_factory.mktemp("coarse")
+    case = load_case(coarse_case(folder))
+    outcome = load_tyres(Door(case, store=Store(folder / "record")), {"initial": {}}, LOADS)
+    assert isinstance(outcome["initial"], LoadedTyre)
+    return outcome["initial"]
+
+
+def hertz(each: Loaded) -> dict[Member, float]:
+    return {mode.member: mode.frequency_Hz for mode in each.modes}
+
+
+def test_every_family_at_every_load(tyre: LoadedTyre) -> None:
+    """Both [0,0] once, every doublet's two members, by rising frequency, no load out of place."""
+    assert [each.load_N for each in tyre.loads] == LOADS and tyre.failed is None
+    doublets = [Label(1, 1), Label(1, 0), Label(2, 1), Label(2, 0)]
+    wanted = {Member(label, symmetry) for label in doublets for symmetry in SYMMETRIES}
+    wanted |= {
+        Member(Label(0, 0, "axial"), "symmetric"),
+        Member(Label(0, 0, "torsional"), "antisymmetric"),
+    }
+    for each in tyre.loads:
+        assert set(hertz(each)) == wanted and not each.unnamed
+        frequencies = [mode.frequency_Hz for mode in each.modes]
+        assert frequencies == sorted(frequencies)
+        assert all(0 <= mode.overlap <= 1 + 1e-9 for mode in each.modes)
+
+
+def test_the_light_load_is_nearer_to_none(tyre: LoadedTyre) -> None:
+    """Frequencies rise from those of the unloaded tyre, doublets split more and more."""
+    none, light, heavy = (hertz(each) for each in tyre.loads)
+    for member in none:
+        assert none[member] < light[member] * 1.003 and light[member] < heavy[member] * 1.005
+    first, then = (
+        sum(abs(table[Member(Label(c, 1), s)] - none[Member(Label(c, 1), s)])
+            for c in (1, 2) for s in SYMMETRIES)
+        for table in (light, heavy)
+    )  # fmt: skip
+    assert first < then
+
+
+def test_members_share_the_unloaded_frequency(tyre: LoadedTyre) -> None:
+    none = hertz(tyre.loads[0])
+    for label in {member.label for member in none if member.label.c}:
+        assert len({none[Member(label, symmetry)] for symmetry in SYMMETRIES}) == 1
+
+
+def test_results_as_files_hold_them(tyre: LoadedTyre) -> None:
+    one = loaded_modes_result({"A": 1.0}, tyre)
+    assert (one["load_N"], one["variables"]) == (1000.0, {"A": 1.0}) and one["mass_kg"] > 10
+    for mode in one["modes"]:
+        assert mode["multiplicity"] == 1 and mode["symmetry"] in SYMMETRIES
+    sweep = load_sweep_result({"initial": {}}, LOADS, {"initial": tyre})
+    assert [row["load_N"] for row in sweep["rows"]] == LOADS and not sweep["failed"]
+    assert sweep["rows"][0]["deflection_m"] == 0 < sweep["rows"][1]["deflection_m"]
+    assert sweep["rows"][-1]["modes"] == one["modes"]
+
+
+def loaded(load_N: float, symmetric: float, antisymmetric: float, overlap: float = 0.9) -> Loaded:
+    modes = (
+        LoadedMode(Member(Label(2, 0), s), hertz, overlap, 0.95)
+        for s, hertz in zip(SYMMETRIES, (symmetric, antisymmetric), strict=True)
+    )
+    return Loaded(load_N, load_N / 2e5, tuple(modes))
+
+
+def test_findings_in_words() -> None:
+    """What grows, what does not, what falls, what could not be named."""
+    loads = [
+        loaded(0.0, 80.0, 80.0, 1.0),
+        loaded(500.0, 82.0, 84.0),
+        loaded(900.0, 85.0, 92.0, 0.3),
+    ]
+    found = findings(loads)
+    assert [x["split"] for x in found["splits"][0]["split_Hz"]] == pytest.approx([0, 2, 7])
+    assert found["words"][0] == (
+        "every doublet's split grows with the load; antisymmetric less symmetric at the last, Hz:"
+        " [2,0] +7.0"
+    )
+    assert found["words"][1] == "every frequency rises with the load"
+    assert "0.30, [2,0] symmetric at 900 N" in found["words"][2]
+    assert found["least_overlap"] == 0.3
+    back = findings([*loads, loaded(2000.0, 90.0, 91.0)])["words"]
+    assert "but for [2,0] (900 N) from the load named on" in back[0]
+    assert back[1] == "every frequency rises with the load, but for [2,0] antisymmetric"
+    lost = Loaded(900.0, 0.01, (), (Member(Label(3, 0), "symmetric"),), ())
+    assert "at 900 N no shape could be told to be [3,0] symmetric" in findings([lost])["words"][-1]
+
+
+def test_failures_keep_what_was_computed(tyre: LoadedTyre) -> None:
+    failed = EvaluationFailed("no_equilibrium", "too much")
+    cut = LoadedTyre(tyre.pressure_kPa, tyre.mass_kg, tyre.loads[:2], failed)
+    result = load_sweep_result({"initial": {}}, LOADS, {"initial": cut})
+    assert [row["load_N"] for row in result["rows"]] == LOADS[:2]
+    assert [(each["load_N"], each["words"]) for each in result["failed"]] == [(1000.0, "too much")]
+
+
+def test_a_solver_without_modes_on_the_road_is_refused() -> None:
+    with pytest.raises(DeckRefused, match=r"cannot find modes of a tyre on a road.*loaded_modes"):
+        load_tyres(Door(CASE, _solver=StandIn()), {"initial": {}}, [1000.0])
+
+
+def test_an_unloaded_tyre_that_fails_is_the_outcome(tmp_path: Path) -> None:
+    """Far too much pressure: no modes without a load either."""
+    case = load_case(coarse_case(tmp_path))
+    outcome = load_tyres(Door(case), {"initial": {"pressure_kPa": 1900.0}}, [1000.0])["initial"]
+    assert isinstance(outcome, EvaluationFailed) and outcome.cause == "no_equilibrium"
+
+
+@pytest.mark.parametrize("waves", [1, 2, 4, 8])
+def test_elements_are_short_enough_for_the_waves(waves: int) -> None:
+    """Those near the patch stay; the rest are as equal as they are short, and end at the top."""
+    angles = [4.0, 4.0, 4.0, 5.0, 7.0, 12.0, 21.0, 40.0, 83.0]
+    half = fine_enough(angles, waves)
+    longest = 360 / (7.5 * waves)
+    assert sum(half) == pytest.approx(180) and max(half) <= longest * (1 + 1e-9)
+    kept = [angle for angle in angles if angle <= longest]
+    assert half[: len(kept)] == kept
+    assert len(set(half[len(kept) :])) <= 1
+
+
+def test_the_deck_asks_for_modes_after_each_load() -> None:
+    plain = Decks(CASE, loads_N=(500.0, 900.0)).texts("abaqus")["press.inp"]
+    deck = Decks(CASE, loads_N=(500.0, 900.0), loaded_modes=24).texts("abaqus")["press.inp"]
+    assert "FREQUENCY" not in plain
+    assert deck.count("*STEP, NAME=MODES_") == 2 == deck.count("NORMALIZATION=MASS\n24\n")
+    steps = [line.split("NAME=")[1].split(",")[0] for line in deck.splitlines() if "*STEP" in line]
+    assert steps == ["EQUILIBRIUM", "LOAD_1", "MODES_1", "LOAD_2", "MODES_2"]

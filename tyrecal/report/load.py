@@ -1,0 +1,82 @@
+"""Frequencies of the loaded tyre over its load."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from ..modes.loaded import SYMMETRIES
+from ..modes.mode import FAMILIES, Label
+from .figure import COLOURS, in_house_style, new_figure, save
+from .pressure import GAP, MARKERS, apart
+
+STYLES: dict[str, dict[str, Any]] = {  # symmetric solid, antisymmetric dashed and hollow
+    SYMMETRIES[0]: {"ls": "-"},
+    SYMMETRIES[1]: {"ls": (0, (4, 2)), "mfc": "white"},
+}
+Curve = tuple[list[float], list[float]]
+
+
+@in_house_style
+def draw_load_sweep(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
+    """Draw frequency over load, a column a family and a line a design; c has a colour and a marker,
+    the two members of a doublet share them.
+
+    rows: of load_sweep.json; a load of 0 is the unloaded tyre.
+    """
+    designs = {row["design"]: _curves(rows, row["design"]) for row in rows}
+    labels = {label for curves in designs.values() for label, _ in curves}
+    shown = [name for name in (*FAMILIES, None) if any(x.family == name for x in labels)]
+    figure = new_figure(1.0 + 4.4 * len(shown), 0.6 + 5.4 * len(designs))
+    grid = figure.subplots(len(designs), len(shown), sharex=True, sharey=True, squeeze=False)
+    for line, (design, curves) in zip(grid, designs.items(), strict=True):
+        for axes, name in zip(line, shown, strict=True):
+            own = {k: curve for k, curve in curves.items() if k[0].family == name}
+            for (label, symmetry), (load, hertz) in own.items():
+                axes.plot(load, hertz, color=COLOURS[label.c % len(COLOURS)], lw=1.4, ms=4.5,
+                          marker=MARKERS[label.c % len(MARKERS)], **STYLES[symmetry])  # fmt: skip
+            axes.set_title(f"{design}, {name or 'overtones'}", loc="left")
+            axes.grid(True, color="0.92", lw=0.6)
+        line[0].set_ylabel("frequency, Hz")
+    for axes in grid[-1]:
+        axes.set_xlabel("load, kN")
+    grid[0, 0].set_xlim(left=0)
+    grid[0, 0].set_ylim(bottom=0)
+    for line, curves in zip(grid, designs.values(), strict=True):
+        for axes, name in zip(line, shown, strict=True):
+            _name_lines(axes, {k: c for k, c in curves.items() if k[0].family == name})
+    for symmetry, style in STYLES.items():
+        grid[0, 0].plot([], [], color="k", marker="o", ms=4.5, lw=1.4, label=symmetry, **style)
+    grid[0, 0].legend(frameon=False, loc="lower right")
+    save(figure, path)
+
+
+def _curves(rows: Sequence[Mapping[str, Any]], design: str) -> dict[tuple[Label, str], Curve]:
+    """Loads (kN) and frequencies (Hz) of each member."""
+    found: dict[tuple[Label, str], Curve] = {}
+    for row in rows:
+        for mode in row["modes"] if row["design"] == design else []:
+            key = Label(mode["c"], mode["m"], mode["kind"]), mode["symmetry"]
+            load, hertz = found.setdefault(key, ([], []))
+            load.append(row["load_N"] / 1e3)
+            hertz.append(mode["frequency_Hz"])
+    return found
+
+
+def _name_lines(axes: Any, curves: Mapping[tuple[Label, str], Curve]) -> None:
+    """Labels right of the lines' ends, moved apart where they would touch."""
+    ends = sorted((curve[1][-1], key) for key, curve in curves.items())
+    low, high = axes.get_ylim()
+    place = apart([(y - low) / (high - low) for y, _ in ends], GAP)
+    for (y, key), height in zip(ends, place, strict=True):
+        axes.annotate(
+            str(key[0]),
+            (curves[key][0][-1], y),
+            xytext=(1.03, height),
+            textcoords="axes fraction",
+            va="center",
+            color=COLOURS[key[0].c % len(COLOURS)],
+            arrowprops={"arrowstyle": "-", "color": "0.75", "lw": 0.6, "shrinkB": 4, "shrinkA": 0},
+            annotation_clip=False,
+        )

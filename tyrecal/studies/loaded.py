@@ -1,0 +1,200 @@
+"""Modes of the loaded tyre, named after the unloaded tyre's and followed from load to load."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..case import LoadedCase
+from ..evaluate.door import Door, Question
+from ..evaluate.failure import EvaluationFailed
+from ..evaluate.pressed import Pressed
+from ..evaluate.results import Evaluation
+from ..fit.problem import MORE_MODES, read_targets
+from ..modes.label import paired_labels
+from ..modes.loaded import Member, Rings, follow, members, rings, state
+from ..modes.match import LostLabel, match
+from ..modes.mode import Label, Mode
+
+FURTHER = 3  # harmonics beyond the case's that may stand among its modes
+SPARE = 6  # modes at a load beyond as many as stand for [0,0] to [c,1]
+NEAR = 1.5  # times the highest frequency at a load: unloaded modes beyond it take no part in names
+DECENT = 0.5  # share of a loaded shape that the modes before must make up to name it
+
+
+@dataclass(frozen=True)
+class LoadedMode:
+    """A mode at a load: overlap with its unloaded member, 0 to 1, and the share of its shape that
+    the modes at the load before ``spanned``."""
+
+    member: Member
+    frequency_Hz: float
+    overlap: float
+    spanned: float
+
+
+@dataclass(frozen=True)
+class Loaded:
+    """The tyre at one load: its named modes by rising frequency; ``unnamed``: members that no
+    shape could be found for; ``disputed``: members that have another name where they are followed
+    from the unloaded tyre in one stride."""
+
+    load_N: float
+    deflection_m: float
+    modes: tuple[LoadedMode, ...]
+    unnamed: tuple[Member, ...] = ()
+    disputed: tuple[Member, ...] = ()
+
+
+@dataclass(frozen=True)
+class LoadedTyre:
+    """One design at rising loads, 0 among them where it was asked for; ``failed``: why no more."""
+
+    pressure_kPa: float
+    mass_kg: float
+    loads: tuple[Loaded, ...]
+    failed: EvaluationFailed | None = None
+
+
+Outcome = LoadedTyre | EvaluationFailed
+
+
+def load_tyres(
+    door: Door,
+    designs: Mapping[str, Mapping[str, float]],
+    loads_N: Sequence[float],
+    jobs: int = 1,
+    notify: Callable[[str, Outcome], None] = lambda design, outcome: None,
+) -> dict[str, Outcome]:
+    """Every design (name to values of the variables) at rising loads, one above 0 at least, or why
+    it has no modes. Raises DeckRefused and what else ``Door.press`` raises for wrong input.
+    """
+    door.needs_road(modes=True)
+    unloaded = {name: _unloaded(door, values) for name, values in designs.items()}
+    able = [name for name, each in unloaded.items() if not isinstance(each, EvaluationFailed)]
+    loads = [load for load in loads_N if load]
+    answers = door.press_all([designs[name] for name in able], loads, jobs, _count(door.case))
+    found: dict[str, Outcome] = {}
+    for name in designs:
+        free = unloaded[name]
+        found[name] = (
+            free
+            if isinstance(free, EvaluationFailed)
+            else _loaded_tyre(door.case, free, next(answers), 0.0 in loads_N)
+        )
+        notify(name, found[name])
+    return found
+
+
+def progress(outcome: Outcome) -> tuple[int, EvaluationFailed | None]:
+    """How many loads above 0 were reached, and why no more."""
+    if isinstance(outcome, LoadedTyre):
+        return sum(each.load_N > 0 for each in outcome.loads), outcome.failed
+    return 0, outcome
+
+
+def _wanted(case: LoadedCase, modes: Sequence[Mode]) -> list[Label]:
+    """The case's targets or, where it has none, all with m <= 1 up to its highest harmonic."""
+    targets = [target.label for target in read_targets(case)]
+    highest = case.case.analysis.highest_harmonic
+    return targets or [m.label for m in modes if m.label.m <= 1 and m.label.c <= highest]
+
+
+def _count(case: LoadedCase) -> int:
+    """Modes to seek at each load: both [0,0], the two members of [c,0] and [c,1], and some."""
+    return 2 + 4 * case.case.analysis.highest_harmonic + SPARE
+
+
+def _unloaded(door: Door, values: Mapping[str, float]) -> Evaluation | EvaluationFailed:
+    """The unloaded tyre's modes with a few harmonics more, the wanted ones surely among them."""
+    highest = door.case.case.analysis.highest_harmonic + FURTHER
+    lost = ""
+    for count in (None, *MORE_MODES):
+        question = Question({**values, "analysis.highest_harmonic": highest}, (), count)
+        try:
+            found = door.evaluate(question)
+            modes = paired_labels(found.modes)
+            match(modes, _wanted(door.case, modes))
+        except EvaluationFailed as failure:
+            return failure
+        except LostLabel as error:
+            lost = str(error)
+            continue
+        return found
+    return EvaluationFailed("lost_label", lost)
+
+
+def _loaded_tyre(
+    case: LoadedCase,
+    evaluation: Evaluation,
+    pressed: Pressed | EvaluationFailed,
+    with_zero: bool,
+) -> Outcome:
+    if isinstance(pressed, EvaluationFailed):
+        return pressed
+    first = pressed.footprints[0]
+    assert first.mode_node is not None
+    where = rings(pressed.angles, first.mode_node, pressed.nodes, pressed.points)
+    modes = paired_labels(evaluation.modes)
+    wanted = set(_wanted(case, modes))
+    hertz_there = [f.mode_frequency_Hz for f in pressed.footprints]
+    highest = max(float(f.max()) for f in hertz_there if f is not None)
+    shapes: dict[Member, np.ndarray] = {}
+    hertz: dict[Member, float] = {}
+    for mode in modes:
+        if mode.label in wanted or mode.frequency_Hz < NEAR * highest:
+            shapes |= (both := members(mode, where))
+            hertz |= dict.fromkeys(both, mode.frequency_Hz)
+    loads = _followed(pressed, where, wanted, shapes, hertz)
+    if with_zero:
+        named = (LoadedMode(x, f, 1.0, 1.0) for x, f in hertz.items() if x.label in wanted)
+        loads = [Loaded(0.0, 0.0, _by_frequency(named)), *loads]
+    return LoadedTyre(pressed.pressure_kPa, pressed.mass_kg, tuple(loads), pressed.failed)
+
+
+def _followed(
+    pressed: Pressed,
+    where: Rings,
+    wanted: set[Label],
+    shapes: Mapping[Member, np.ndarray],
+    hertz: Mapping[Member, float],
+) -> list[Loaded]:
+    """The named modes at each load, followed from the unloaded ``shapes`` on."""
+    names = list(shapes)
+    free = state(np.array(list(hertz.values())), np.array(list(shapes.values())), where)
+    before, place = free, np.arange(len(names))
+    loads = []
+    for footprint in pressed.footprints:
+        assert footprint.mode_frequency_Hz is not None and footprint.mode_shape is not None
+        here = state(footprint.mode_frequency_Hz, footprint.mode_shape, where)
+        step, straight = follow(before, here, where), follow(free, here, where)
+        spanned = np.where(place < 0, 0.0, step.spanned[place])
+        place = np.where(spanned < DECENT, -1, step.position[place])
+        overlaps = where.overlaps(free.shapes, here.shapes)
+        chosen = [i for i, name in enumerate(names) if name.label in wanted]
+        loads.append(
+            Loaded(
+                footprint.load_N,
+                footprint.deflection_m,
+                _by_frequency(
+                    LoadedMode(
+                        names[i],
+                        float(here.frequencies[place[i]]),
+                        float(overlaps[i, place[i]]),
+                        float(spanned[i]),
+                    )
+                    for i in chosen
+                    if place[i] >= 0
+                ),
+                tuple(names[i] for i in chosen if place[i] < 0),
+                tuple(names[i] for i in chosen if 0 <= place[i] != straight.position[i]),
+            )
+        )
+        before = here
+    return loads
+
+
+def _by_frequency(modes: Iterable[LoadedMode]) -> tuple[LoadedMode, ...]:
+    return tuple(sorted(modes, key=lambda mode: (mode.frequency_Hz, mode.member)))

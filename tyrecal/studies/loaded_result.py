@@ -1,0 +1,180 @@
+"""The content of load_sweep.json, and of modes.json for the tyre on the road."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+from typing import Any
+
+from ..modes.loaded import SYMMETRIES
+from ..modes.mode import Label
+from .loaded import Loaded, LoadedMode, LoadedTyre, Outcome, progress
+
+STEADY = 1e-3  # Hz, below which a split is none
+
+
+def loaded_modes_result(values: Mapping[str, float], tyre: LoadedTyre) -> dict[str, Any]:
+    """The content of modes.json: the tyre at its last load."""
+    last = tyre.loads[-1]
+    return {
+        "format": 1,
+        "pressure_kPa": tyre.pressure_kPa,
+        "load_N": last.load_N,
+        "mass_kg": tyre.mass_kg,
+        "variables": dict(values),
+        "deflection_m": last.deflection_m,
+        "modes": [_entry(mode) for mode in last.modes],
+        "findings": {"words": _doubts([last])},
+    }
+
+
+def load_sweep_result(
+    designs: Mapping[str, Mapping[str, float]],
+    loads_N: Sequence[float],
+    outcomes: Mapping[str, Outcome],
+) -> dict[str, Any]:
+    """The content of load_sweep.json: ``rows``, ``failed``, ``findings`` of each design, the
+    ``designs``' values.
+
+    outcomes: of ``load_tyres``, one LoadedTyre at least.
+    """
+    tyres = {name: each for name, each in outcomes.items() if isinstance(each, LoadedTyre)}
+    above = [load for load in loads_N if load]
+    failed = []
+    for name, outcome in outcomes.items():
+        reached, failure = progress(outcome)
+        if failure:
+            failed.append({"design": name, "load_N": above[reached],
+                           "cause": failure.cause, "words": failure.words})  # fmt: skip
+    return {
+        "format": 1,
+        "pressure_kPa": {name: tyre.pressure_kPa for name, tyre in tyres.items()},
+        "designs": {name: dict(values) for name, values in designs.items()},
+        "rows": [
+            {
+                "design": name,
+                "load_N": each.load_N,
+                "deflection_m": each.deflection_m,
+                "modes": [_entry(mode) for mode in each.modes],
+            }
+            for name, tyre in tyres.items()
+            for each in tyre.loads
+        ],
+        "failed": failed,
+        "findings": [{"design": name, **findings(tyre.loads)} for name, tyre in tyres.items()],
+    }
+
+
+def _entry(mode: LoadedMode) -> dict[str, Any]:
+    label = mode.member.label
+    return {
+        "c": label.c,
+        "m": label.m,
+        "kind": label.kind,
+        "frequency_Hz": mode.frequency_Hz,
+        "multiplicity": 1,
+        "symmetry": mode.member.symmetry,
+        "overlap": round(mode.overlap, 6),
+        "spanned": round(mode.spanned, 6),
+    }
+
+
+def findings(loads: Sequence[Loaded]) -> dict[str, Any]:
+    """What one design's loads say: ``splits`` of each doublet, antisymmetric less symmetric member,
+    and whether their size grows with the load; ``least_overlap`` with the unloaded member;
+    ``words``: sentences."""
+    tables = {
+        each.load_N: {(m.member.label, m.member.symmetry): m.frequency_Hz for m in each.modes}
+        for each in loads
+    }
+    labels = sorted({label for table in tables.values() for label, _ in table if label.c})
+    splits = [_split(label, tables) for label in labels]
+    loaded = [mode for each in loads if each.load_N for mode in each.modes]
+    least = min(loaded, key=lambda mode: mode.overlap, default=None)
+    words = _splitting(splits) + _rising(tables)
+    if least:
+        words.append(
+            f"least overlap of a loaded shape with the unloaded one of its name:"
+            f" {least.overlap:.2f}, {least.member} at {_load_of(loads, least):g} N; the modes at"
+            f" the load before make up {min(m.spanned for m in loaded):.2f} of each shape or more"
+        )
+    return {
+        "splits": splits,
+        "least_overlap": least.overlap if least else 1.0,
+        "words": words + _doubts(loads),
+    }
+
+
+def _load_of(loads: Sequence[Loaded], mode: LoadedMode) -> float:
+    return next(each.load_N for each in loads if any(m is mode for m in each.modes))
+
+
+def _split(label: Label, tables: Mapping[float, Mapping[Any, float]]) -> dict[str, Any]:
+    """A doublet's split at each load where both members are known, and whether it only grows."""
+    both = {
+        load: table[label, SYMMETRIES[1]] - table[label, SYMMETRIES[0]]
+        for load, table in tables.items()
+        if all((label, symmetry) in table for symmetry in SYMMETRIES)
+    }
+    sizes = [(load, abs(hertz)) for load, hertz in both.items()]
+    return {
+        "c": label.c,
+        "m": label.m,
+        "kind": label.kind,
+        "split_Hz": [{"load_N": load, "split": hertz} for load, hertz in both.items()],
+        "grows": all(b > a - STEADY for (_, a), (_, b) in pairwise(sizes)),
+        "shrinks_from_N": [low for (low, a), (_, b) in pairwise(sizes) if b <= a - STEADY],
+    }
+
+
+def _splitting(splits: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Which doublets' splits grow with the load."""
+    if not any(len(each["split_Hz"]) > 1 for each in splits):
+        return []
+    odd = [
+        f"[{each['c']},{each['m']}] (" + ", ".join(f"{x:g} N" for x in each["shrinks_from_N"]) + ")"
+        for each in splits
+        if not each["grows"]
+    ]
+    last = ", ".join(
+        f"[{each['c']},{each['m']}] {each['split_Hz'][-1]['split']:+.1f}"
+        for each in splits
+        if each["split_Hz"]
+    )
+    claim = "every doublet's split grows with the load"
+    if odd:
+        claim += f", but for {', '.join(odd)} from the load named on"
+    return [f"{claim}; antisymmetric less symmetric at the last, Hz: {last}"]
+
+
+def _rising(tables: Mapping[float, Mapping[Any, float]]) -> list[str]:
+    """Which frequencies do not rise with the load."""
+    falling = sorted(
+        {
+            f"[{label.c},{label.m}] {symmetry}"
+            for before, after in pairwise(tables.values())
+            for (label, symmetry), hertz in after.items()
+            if hertz < before.get((label, symmetry), 0.0) - STEADY
+        }
+    )
+    if len(tables) < 2:
+        return []
+    claim = "every frequency rises with the load"
+    return [claim + (f", but for {', '.join(falling)}" if falling else "")]
+
+
+def _doubts(loads: Sequence[Loaded]) -> list[str]:
+    """Modes without a name, and names that depend on the loads in between."""
+    words = []
+    for each in loads:
+        if each.unnamed:
+            words.append(
+                f"at {each.load_N:g} N no shape could be told to be"
+                f" {', '.join(map(str, each.unnamed))}: take loads in between (--sweep-load)"
+            )
+        if each.disputed:
+            words.append(
+                f"at {each.load_N:g} N {', '.join(map(str, each.disputed))} would have other names"
+                " straight from the unloaded tyre: the curves come close in between"
+            )
+    return words
