@@ -6,8 +6,9 @@ from collections.abc import Iterator, Mapping
 from itertools import pairwise
 from typing import Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import AfterValidator, Field
 
+from ..effects import IDS
 from .parts import WRONG, Degrees, Name, NotNegative, Part, Positive, Problem, Text, number
 
 Moduli = Literal["long_term", "instantaneous"]
@@ -104,7 +105,8 @@ class Solid(Part):
 class RebarLayer(Part):
     """Cords on a line of the section; ``angle_deg`` from the meridian, ``area_m2`` of one cord.
 
-    Cords stand ``spacing_m`` apart or, with ``geometry: angular``, ``spacing_deg`` apart.
+    Cords stand ``spacing_m`` apart or, with ``geometry: angular``, ``spacing_deg`` apart. The
+    layer is as long as its line, or ends with some of its ``regions``.
     """
 
     line: str
@@ -114,6 +116,7 @@ class RebarLayer(Part):
     spacing_m: Positive | None = None
     spacing_deg: Annotated[float, Field(gt=0, le=360)] | None = None
     angle_deg: Degrees
+    regions: Annotated[list[str], Field(min_length=1)] | None = None
 
     @classmethod
     def problems(cls, values: Mapping[str, Any]) -> Iterator[Problem]:
@@ -242,8 +245,16 @@ class Solver(Part):
     options: dict[str, Any] = Field(default_factory=dict)
 
 
+def _every_effect(given: dict[str, float]) -> dict[str, float]:
+    """Those not given are absent: 0."""
+    return {**dict.fromkeys(IDS, 0.0), **given}
+
+
 class Case(Part):
-    """One tyre, its mesh and analysis, what may vary and what was measured."""
+    """One tyre, its mesh and analysis, what may vary and what was measured.
+
+    ``effects``: parameters of effects that are in it, by id, in the effect's unit.
+    """
 
     format: Annotated[int, Field(ge=1, le=1)]  # Literal[1] would take true
     name: Text
@@ -259,6 +270,9 @@ class Case(Part):
     rim: Rim
     analysis: Analysis
     road: Road = Road()
+    effects: Annotated[dict[str, float], AfterValidator(_every_effect)] = Field(
+        default_factory=lambda: dict.fromkeys(IDS, 0.0)
+    )
     variables: dict[Name, Variable] = Field(default_factory=dict)
     targets: Targets = Targets()
     solver: Solver
