@@ -1,6 +1,6 @@
 """The air in the tyre's cavity as an acoustic medium, per circumferential harmonic.
 
-Its pressure is p = sum_k P_k psi_k(r, z) exp(i n theta), psi_k the monomials of (r, z) up to DEGREE:
+Its pressure is p = sum_k P_k psi_k(r, z) exp(i n theta), psi_k monomials of (r, z) up to DEGREE:
 exact for plane waves round the torus and for air that a rigid wheel carries along, and a good
 approximation of the flow across the section, whose own waves (above 700 Hz) are far away. Weakly,
 
@@ -47,7 +47,7 @@ class Air:
 
 
 def read_air(keywords: list[Keyword], mesh: Mesh, cavity: Mapping[str, Any]) -> Air:
-    """The gas of material ``cavity["material"]`` inside ``cavity["surfaces"]``. Raises DeckError."""
+    """The gas ``cavity["material"]`` inside ``cavity["surfaces"]``. Raises DeckError."""
     name = str(cavity.get("material", "")).upper()
     material = read_materials(keywords).get(name)
     surfaces = [str(surface).upper() for surface in cavity.get("surfaces", ())]

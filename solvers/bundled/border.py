@@ -41,6 +41,14 @@ class Border:
         flow = self.air.H[:, self.air.flowing]
         return self.fields.shape[2], flow.shape[1], flow.shape[0]
 
+    @property
+    def flow_mass(self) -> Array:
+        """H of w (w, w), kg per radian."""
+        if self.air is None:
+            return np.zeros((0, 0))
+        flow: Array = self.air.H[self.air.flowing, self.air.flowing]
+        return flow
+
     def columns(self, shift: float) -> tuple[Array, Array]:
         """E (size, q + w + s) and D beside the band of K - shift M."""
         q, w, s = self.widths
@@ -54,7 +62,7 @@ class Border:
             E[:, k:] = self.wall.T
             D[k:, :q], D[k:, q:k], D[k:, k:] = self.wall_rim, flow, -self.air.Q
             D[:k, k:] = D[k:, :k].conj().T
-            D[q:k, q:k] = -shift * flow[self.air.flowing]
+            D[q:k, q:k] = -shift * self.flow_mass
         return E, D
 
     def times_mass(self, x: Array, tyre: Array) -> Array:
@@ -65,7 +73,7 @@ class Border:
         beside, own = self.mass
         parts = [tyre + beside @ rim, beside.conj().T @ u + own @ rim]
         if w:
-            parts.append(self.air.H[self.air.flowing, self.air.flowing] @ flow)  # type: ignore[union-attr]
+            parts.append(self.flow_mass @ flow)
         return np.concatenate(parts)
 
 
@@ -124,7 +132,7 @@ def assemble(
 
 def apply(parts: Parts, fields: Array) -> Array:
     """Element matrices on ``fields`` (nodes, 3, k), zero at most nodes."""
-    touched = fields.any((1, 2))
+    touched: Array = np.asarray(fields.any((1, 2)))
     image = np.zeros_like(fields)
     for connectivity, matrices in parts:
         near = touched[connectivity].any(1)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Protocol
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -50,7 +51,7 @@ class HarmonicModes:
         """Those up to a frequency."""
         return self.where(self.eigenvalues <= (2 * np.pi * frequency_Hz) ** 2)
 
-    def where(self, keep: Array) -> HarmonicModes:
+    def where(self, keep: Array | slice) -> HarmonicModes:
         """Those of a mask or slice."""
         return HarmonicModes(
             self.n, self.eigenvalues[keep], self.shapes[keep], self.rim[keep], self.air[keep]
@@ -194,15 +195,14 @@ class Vibration:
         )
         shapes = self.numbering.spread(vectors[:size])  # (nodes, 3, modes)
         rim, flow = vectors[size:size], vectors[size:size]
-        is_tyres = (
-            values >= (2 * np.pi * self.lowest_Hz) ** 2 if self.lowest_Hz else values == values
-        )
+        is_tyres = np.ones(len(values), bool)
+        if self.lowest_Hz:
+            is_tyres = values >= (2 * np.pi * self.lowest_Hz) ** 2
         if beside:
             rim, flow = vectors[size : size + q], vectors[size + q :]
             shapes = shapes + beside.fields @ rim
             if w:
-                H = beside.air.H[beside.air.flowing, beside.air.flowing]  # type: ignore[union-attr]
-                energy = np.einsum("wm,wv,vm->m", flow.conj(), H, flow).real
+                energy = np.einsum("wm,wv,vm->m", flow.conj(), beside.flow_mass, flow).real
                 is_tyres &= energy < IN_THE_AIR
         return HarmonicModes(n, values, np.moveaxis(shapes, -1, 0), rim.T, flow.T), is_tyres
 
@@ -225,8 +225,15 @@ def _start_fields(X: Array, n: int) -> Array:
     return fields
 
 
+class HasModes(Protocol):
+    """A vibration, of one modulus or of each mode's own."""
+
+    def modes(self, n: int, count: int, factor: Cholesky | Bordered | None = None) -> HarmonicModes:
+        """The lowest modes of a harmonic."""
+
+
 def lowest_of_all(
-    vibration: Vibration, wanted: int, check: Callable[[], None]
+    vibration: HasModes, wanted: int, check: Callable[[], None]
 ) -> list[HarmonicModes]:
     """The ``wanted`` lowest modes over all harmonics, doublets counted twice.
 

@@ -17,7 +17,7 @@ from .air import Air, read_air
 from .band import Cholesky, Numbering
 from .border import Bordered
 from .eigen import NotConverged
-from .harmonics import HarmonicModes, Unstable, Vibration, lowest_of_all
+from .harmonics import HarmonicModes, HasModes, Unstable, Vibration, lowest_of_all
 from .inflation import InflationFailed, equilibrium
 from .keywords import DeckError, Keyword, Row
 from .mechanics import Load, mass
@@ -168,7 +168,9 @@ class Analysis:
             wheel, air, float(np.real(row.number(1, 0.0))),
         )  # fmt: skip
         factor = vibration.factor(0)
-        solver = SelfConsistent(vibration, model.laws) if model.laws else vibration
+        solver: HasModes = vibration
+        if model.laws:
+            solver = SelfConsistent(vibration, model.laws)
         modes = self._modes(step, row, solver, factor)
         if row.text(2):
             modes = [m.below(float(np.real(row.number(2)))) for m in modes]
@@ -197,7 +199,7 @@ class Analysis:
         self,
         step: Step,
         row: Row,
-        vibration: Vibration | SelfConsistent,
+        vibration: HasModes,
         factor: Cholesky | Bordered,
     ) -> list[HarmonicModes]:
         harmonics = self.request.harmonics if step.revolved else [0]

@@ -1,6 +1,6 @@
 """Rubber whose modulus grows with frequency: each mode at the modulus of its own frequency.
 
-    K(f) = K + sum_l (rho_l(f) - 1) dK_l,      K(f_j) phi_j = lambda_j M phi_j,   lambda = (2 pi f)^2
+    K(f) = K + sum_l (rho_l(f) - 1) dK_l,    K(f_j) phi_j = lambda_j M phi_j,  lambda = (2 pi f)^2
 
 rho_l: storage over static shear modulus of law l, from the deck's table, linear between its rows
 in the logarithms of both. The j-th mode of a harmonic is the fixed point of the j-th eigenvalue.
@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
+    from .band import Cholesky
+    from .border import Bordered
     from .harmonics import HarmonicModes, Vibration
     from .model import Model
 
@@ -78,7 +80,7 @@ class SelfConsistent:
     def __init__(self, vibration: Vibration, laws: list[Law]):
         self.vibration, self.laws = vibration, laws
 
-    def modes(self, n: int, count: int, factor: object = None) -> HarmonicModes:
+    def modes(self, n: int, count: int, factor: Cholesky | Bordered | None = None) -> HarmonicModes:
         """The ``count`` lowest modes of harmonic n, each at the modulus of its own frequency.
 
         By the secant method on ln lambda. ``factor`` serves a constant modulus only.
@@ -114,8 +116,11 @@ class SelfConsistent:
 
 def joined(modes: list[HarmonicModes]) -> HarmonicModes:
     """Modes of one harmonic in one."""
-    every = {
-        name: np.concatenate([getattr(m, name) for m in modes])
-        for name in ("eigenvalues", "shapes", "rim", "air")
-    }
-    return replace(modes[0], **every)
+    join = lambda name: np.concatenate([getattr(m, name) for m in modes])
+    return replace(
+        modes[0],
+        eigenvalues=join("eigenvalues"),
+        shapes=join("shapes"),
+        rim=join("rim"),
+        air=join("air"),
+    )
