@@ -17,6 +17,7 @@ from .model import Cords, Model, Rubber
 from .section import Lines, Solids
 
 Array = np.ndarray
+Parts = list[tuple[Array, Array]]
 
 
 @dataclass
@@ -70,6 +71,19 @@ def potential(model: Model, U: Array, loads: list[Load]) -> float:
 
 def residual(model: Model, U: Array, loads: list[Load], numbering: Numbering) -> Array:
     """Out-of-balance force (size,), N per radian: gradient of the potential."""
+    return numbering.vector(_forces(model, U, loads))
+
+
+def gradient(model: Model, U: Array, loads: list[Load]) -> Array:
+    """Gradient of the potential by every component (n, 3), those that are held among them."""
+    parts = _forces(model, U, loads)
+    total = np.zeros(U.shape, np.result_type(*(v for _, v in parts)))
+    for connectivity, values in parts:
+        np.add.at(total, connectivity, values.reshape(*connectivity.shape, 3))
+    return total
+
+
+def _forces(model: Model, U: Array, loads: list[Load]) -> Parts:
     parts = []
     for r in model.rubbers:
         s = r.solids
@@ -96,10 +110,7 @@ def residual(model: Model, U: Array, loads: list[Load], numbering: Numbering) ->
         force = lines.N.T @ (weights[..., None] * by_x)
         force = force + (weights[..., None] * lines.slope).swapaxes(1, 2) @ by_dx
         parts.append((lines.connectivity, force.reshape(len(force), -1)))
-    return numbering.vector(parts)
-
-
-Parts = list[tuple[Array, Array]]
+    return parts
 
 
 def tangents(

@@ -8,6 +8,8 @@ Gauss station with the station's displacement and its derivative by the angle:
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.sparse import csr_matrix
 
@@ -195,9 +197,9 @@ class _RubberPart(_Part):
 
 def _at_stations(law: rubber.MooneyRivlin, points: int, s: int) -> rubber.MooneyRivlin:
     """The law's constants per Gauss point, repeated for every station."""
-    spread = lambda c: np.repeat(np.broadcast_to(c, points), s)
-    ratios = (None if c is None else spread(c) for c in (law.shear_ratio, law.bulk_ratio))
-    return rubber.MooneyRivlin(spread(law.C10), spread(law.C01), spread(law.inverse_D1), *ratios)
+    spread = lambda c: None if c is None else np.repeat(np.broadcast_to(c, points), s)
+    constants = ("C10", "C01", "inverse_D1", "shear_ratio", "bulk_ratio")
+    return replace(law, **{name: spread(getattr(law, name)) for name in constants})
 
 
 class _CordPart(_Part):

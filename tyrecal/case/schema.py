@@ -61,7 +61,9 @@ class Prony(Part):
 class Rubber(Part):
     """Mooney-Rivlin: C10 (I1 - 3) + C01 (I2 - 3) + (J - 1)^2 / D1, with a Prony series.
 
-    ``moduli`` says whether the constants are those of relaxed or of instantaneous rubber.
+    ``moduli`` says whether the constants are those of relaxed or of instantaneous rubber. In a
+    mode of frequency f the shear modulus is (f / reference_frequency_Hz)^frequency_exponent times
+    as large.
     """
 
     kind: Literal["rubber"]
@@ -70,6 +72,8 @@ class Rubber(Part):
     D1_per_Pa: Positive
     moduli: Moduli = "long_term"
     prony: list[Prony] = Field(default_factory=list)
+    frequency_exponent: Annotated[float, Field(ge=0, le=0.5)] = 0.0
+    reference_frequency_Hz: Positive = 60.0
     density_kg_per_m3: Positive
 
     @classmethod
@@ -137,10 +141,64 @@ class Point(Part):
     z: float
 
 
+def _values(part: Any) -> Mapping[str, Any]:
+    """The values of a part, checked or as in the file; none where it is wrong."""
+    if isinstance(part, Part):
+        return part.__dict__
+    return part if isinstance(part, Mapping) else {}
+
+
+class Spindle(Part):
+    """Compliance of what holds the wheel, at the rim's reference point; 0 = clamped."""
+
+    lateral_m_per_N: NotNegative = 0.0
+    radial_m_per_N: NotNegative = 0.0
+    torsional_rad_per_N_m: NotNegative = 0.0
+    tilt_rad_per_N_m: NotNegative = 0.0
+
+    @property
+    def gives_way(self) -> bool:
+        """Whether the wheel moves on it."""
+        return any(self.__dict__.values())
+
+
 class Rim(Part):
-    """The rigid rim; its reference point is the wheel's centre."""
+    """The rigid rim; its reference point is the wheel's centre.
+
+    In a vibration it moves on its ``spindle``, or is ``free``; its own mass and moments of
+    inertia (polar: about the axle) are then those of wheel and hub, by default of steel, 17 inch.
+    """
 
     reference_point_m: Point
+    mass_kg: Positive = 15.0
+    polar_inertia_kg_m2: Positive = 0.43
+    diametral_inertia_kg_m2: Positive = 0.27
+    spindle: Spindle = Spindle()
+    free: bool = False
+
+    @property
+    def moves(self) -> bool:
+        """Whether it moves in a vibration."""
+        return self.free or self.spindle.gives_way
+
+    @classmethod
+    def problems(cls, values: Mapping[str, Any]) -> Iterator[Problem]:
+        spindle, point = (_values(values.get(key)) for key in ("spindle", "reference_point_m"))
+        soft, free = any(number(spindle, key) for key in spindle), values.get("free") is True
+        if soft and free:
+            yield "free", "must be false where the spindle has a compliance"
+        r = number(point, "r")
+        if (soft or free) and r:
+            yield "reference_point_m", f"must have r = 0 where the rim moves, got {r:g}"
+
+
+class Cavity(Part):
+    """The gas in the tyre as it moves with the walls; ``share`` of its mass and stiffness, 0 =
+    a constant pressure only, 1 = the gas as it is."""
+
+    gas: Literal["air", "helium", "sulphur_hexafluoride"] = "air"
+    temperature_C: Annotated[float, Field(gt=-100, lt=300)] = 20.0
+    share: NotNegative = 0.0
 
 
 class Analysis(Part):
@@ -302,6 +360,7 @@ class Case(Part):
     solids: Annotated[list[Solid], Field(min_length=1)]
     rebar_layers: dict[Name, RebarLayer] = Field(default_factory=dict)
     rim: Rim
+    cavity: Cavity = Cavity()
     analysis: Analysis
     road: Road = Road()
     effects: Annotated[dict[str, float], AfterValidator(_every_effect)] = Field(

@@ -19,7 +19,7 @@ from .schema import Case
 from .shape import explain
 
 # numbers that stand alone: no other part of the case, and no mesh, depends on their values
-ALONE = {"pressure_kPa", "materials", "rebar_layers", "rim", "effects", "solver"}
+ALONE = {"pressure_kPa", "materials", "rebar_layers", "rim", "cavity", "effects", "solver"}
 
 
 def start_values(loaded: LoadedCase) -> dict[str, float]:
