@@ -197,9 +197,16 @@ class _RubberPart(_Part):
 
 def _at_stations(law: rubber.MooneyRivlin, points: int, s: int) -> rubber.MooneyRivlin:
     """The law's constants per Gauss point, repeated for every station."""
-    spread = lambda c: None if c is None else np.repeat(np.broadcast_to(c, points), s)
-    constants = ("C10", "C01", "inverse_D1", "shear_ratio", "bulk_ratio")
-    return replace(law, **{name: spread(getattr(law, name)) for name in constants})
+    spread = lambda c: np.repeat(np.broadcast_to(c, points), s)
+    optional = lambda c: None if c is None else spread(c)
+    return replace(
+        law,
+        C10=spread(law.C10),
+        C01=spread(law.C01),
+        inverse_D1=spread(law.inverse_D1),
+        shear_ratio=optional(law.shear_ratio),
+        bulk_ratio=optional(law.bulk_ratio),
+    )
 
 
 class _CordPart(_Part):
