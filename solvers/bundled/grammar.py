@@ -64,6 +64,9 @@ REVOLVE_JOB: dict[str, dict[str, Values]] = {
     "SYMMETRIC MODEL GENERATION": {"REVOLVE": ("",)},
     "SYMMETRIC RESULTS TRANSFER": {"STEP": None, "INC": None},
     "NODE": {"NSET": None},
+    "ELEMENT": {"TYPE": ("MASS", "SPRING1"), "ELSET": None},
+    "MASS": {"ELSET": None},
+    "SPRING": {"ELSET": None},
     "RIGID BODY": {"REF NODE": None, "TIE NSET": None, "ANALYTICAL SURFACE": None},
     "SURFACE": {"NAME": None, "TYPE": ("CYLINDER",)},
     "SURFACE INTERACTION": {"NAME": None},
@@ -87,6 +90,8 @@ FIELDS = {  # data fields that are honoured; a further one that is not blank is 
     "SURFACE BEHAVIOR": 1,
     "FRICTION": 1,
     "CONTACT PAIR": 2,
+    "MASS": 1,
+    "SPRING": 1,
     "STATIC": 2,
     "FREQUENCY": 4,
 }

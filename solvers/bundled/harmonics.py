@@ -30,16 +30,20 @@ class HarmonicModes:
     """Modes of one harmonic: omega^2 (m,) in 1/s2 and shapes (m, n, 3), u^H M u = 1.
 
     M is the mass per radian: over the whole circle the kinetic mass is 2 pi for n = 0, pi else.
+    ``members`` (m,): None, or where each doublet has split into two modes, 1 and 2 in turn; the
+    shape is then the part of harmonic n.
     """
 
     n: int
     eigenvalues: Array
     shapes: Array
+    members: Array | None = None
 
     def below(self, frequency_Hz: float) -> HarmonicModes:
         """Those up to a frequency."""
         keep = self.eigenvalues <= (2 * np.pi * frequency_Hz) ** 2
-        return HarmonicModes(self.n, self.eigenvalues[keep], self.shapes[keep])
+        members = None if self.members is None else self.members[keep]
+        return HarmonicModes(self.n, self.eigenvalues[keep], self.shapes[keep], members)
 
 
 class Vibration:
@@ -85,7 +89,8 @@ class Vibration:
                 " circumference is not positive definite"
             ) from None
 
-    def _times_mass(self, x: Array) -> Array:
+    def times_mass(self, x: Array) -> Array:
+        """M x for (size,) or (size, b), per radian."""
         full = self.numbering.spread(x)
         image = self.mass @ full.reshape(len(full), -1)
         return self.numbering.gather(image.reshape(full.shape))
@@ -94,7 +99,7 @@ class Vibration:
         """The ``count`` lowest modes of harmonic n. Raises Unstable, eigen.NotConverged."""
         factor = factor or self.factor(n)
         start = self.numbering.gather(_start_fields(self._X, n))
-        values, vectors = eigen.lowest(factor.solve, self._times_mass, start, count, self.shift)
+        values, vectors = eigen.lowest(factor.solve, self.times_mass, start, count, self.shift)
         shapes = self.numbering.spread(vectors)  # (nodes, 3, modes)
         return HarmonicModes(n, values, np.moveaxis(shapes, -1, 0))
 

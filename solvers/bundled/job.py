@@ -13,7 +13,9 @@ import numpy as np
 from threadpoolctl import ThreadpoolController
 
 from . import press_job, sensitivity
+from .attached import read_attached
 from .band import Cholesky, Numbering
+from .coupled import attached_modes
 from .eigen import NotConverged
 from .harmonics import HarmonicModes, Unstable, Vibration, lowest_of_all
 from .inflation import InflationFailed, equilibrium
@@ -175,6 +177,10 @@ class Analysis:
         if harmonics is None:
             return lowest_of_all(vibration, row.integer(0), self._check_time)
         modes = []
+        attached = read_attached(self.deck.revolve, self.model.mesh)
+        if attached:
+            count = self.request.modes_per_harmonic
+            return attached_modes(vibration, attached, harmonics, count, self._check_time)
         for n in harmonics:
             self._check_time()
             known = factor if n == 0 else None
