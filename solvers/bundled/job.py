@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -24,6 +24,7 @@ from .mechanics import Load, mass
 from .model import Model, build
 from .pressing import NotPressed
 from .results import StepResult, write
+from .rotation import waves
 from .steps import Deck, Step, Tangent
 from .supports import numbering
 
@@ -120,6 +121,8 @@ class Analysis:
             wanted.append(-float(np.real(row.number(2))))
             if not wanted[-1] > max([0.0, *wanted[:-1]]):
                 raise DeckError(row.line, "loads on the road must push it to the tyre, and rise")
+            if step.centrifugal:
+                raise DeckError(step.procedure.line, "a turning tyre on a road is not honoured")
         if not wanted:
             raise DeckError(self.steps[-1].procedure.line, "no *CLOAD presses the road")
         step = self.steps[-1]
@@ -137,9 +140,14 @@ class Analysis:
             self._models[key] = build(self.section, dynamic_Hz, long_term)
         return self._models[key]
 
+    def _turning(self, model: Model, step: Step) -> Model:
+        """The model with the centrifugal load of a step. Raises DeckError."""
+        spin2 = _uniform(model, step, step.centrifugal, "CENTRIF")
+        return replace(model, spin2=spin2) if spin2 else model
+
     def _static(self, step: Step) -> None:
         self._check_time()
-        model = self._model(None, step.long_term)
+        model = self._turning(self._model(None, step.long_term), step)
         equations = numbering(model, step)
         found = equilibrium(model, equations, _loads(model, step), self.U, self._check_time)
         self.U = found.U
@@ -152,7 +160,7 @@ class Analysis:
         if row.text(1):
             raise DeckError(row.line, "a lowest frequency of interest is not honoured")
         shift = float(np.real(row.number(3, 0.0))) * (2 * np.pi) ** 2
-        model = self._model(dynamic_Hz, step.long_term)
+        model = self._turning(self._model(dynamic_Hz, step.long_term), step)
         equations = numbering(model, step)
         vibration = Vibration(model, self.U, _loads(model, step), equations, shift)
         factor = vibration.factor(0)
@@ -160,7 +168,7 @@ class Analysis:
         if row.text(2):
             modes = [m.below(float(np.real(row.number(2)))) for m in modes]
         if self.request.sensitivities and (dynamic_Hz is not None or shift):
-            still = self._model(None, step.long_term)  # the Newton tangent is another matrix then
+            still = self._turning(self._model(None, step.long_term), step)  # Newton's tangent
             factor = Vibration(still, self.U, _loads(still, step), equations, 0.0).factor(0)
         rates: dict[str, list[Array]] = {}
         strains: sensitivity.Strains = {}
@@ -178,6 +186,13 @@ class Analysis:
             return lowest_of_all(vibration, row.integer(0), self._check_time)
         modes = []
         attached = read_attached(self.deck.revolve, self.model.mesh)
+        spin = float(np.real(_uniform(self.model, step, step.spin, "ROTDYNF")))
+        if step.procedure.name == "COMPLEX FREQUENCY":
+            _check_spin(step, spin, bool(attached))
+            for n in harmonics:
+                self._check_time()
+                modes.append(waves(vibration, spin, n, self.request.modes_per_harmonic))
+            return modes
         if attached:
             count = self.request.modes_per_harmonic
             return attached_modes(vibration, attached, harmonics, count, self._check_time)
@@ -226,6 +241,34 @@ class Analysis:
     def _check_time(self) -> None:
         if time.monotonic() > self.deadline:
             raise TimedOut("the time limit passed")
+
+
+def _uniform(
+    model: Model, step: Step, sets: dict[str, complex | float], kind: str
+) -> complex | float:
+    """The magnitude of a load that all of the tyre bears, 0 where there is none."""
+    if not sets:
+        return 0.0
+    line, elements = step.procedure.line, model.mesh.element_sets
+    unknown = [name for name in sets if name not in elements]
+    if unknown:
+        raise DeckError(line, f"element set {unknown[0]} of the step's *DLOAD is not defined")
+    loaded = {number for name in sets for number in elements[name]}
+    if len(set(sets.values())) > 1 or loaded != set(model.mesh.place):
+        raise DeckError(line, f"the load {kind} must be one for all elements of the tyre")
+    return next(iter(sets.values()))
+
+
+def _check_spin(step: Step, spin: float, attached: bool) -> None:
+    """The three places where a deck says how fast the tyre turns agree. Raises DeckError."""
+    line = step.procedure.line
+    if attached:
+        raise DeckError(line, "masses or springs on a turning tyre are not honoured")
+    spin2 = np.real(next(iter(step.centrifugal.values()), 0.0))
+    if not abs(spin2 - spin**2) <= 1e-9 * spin**2:
+        raise DeckError(line, f"CENTRIF {spin2:g} is not the square of ROTDYNF {spin:g}")
+    if not spin:
+        raise DeckError(line, "*COMPLEX FREQUENCY is honoured of a turning tyre: no ROTDYNF")
 
 
 def _loads(model: Model, step: Step) -> list[Load]:
