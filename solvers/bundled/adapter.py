@@ -35,7 +35,7 @@ class Bundled:
     name = "bundled"
     version = VERSION
     dialect = "abaqus"
-    capabilities = frozenset({"modes", "gradients", "footprint"})
+    capabilities = frozenset({"modes", "gradients", "footprint", "coupled", "rotation"})
     refusals = (DeckError,)
     failures = (*Failures, TimedOut)
 
@@ -70,15 +70,28 @@ class Bundled:
             nodes, points = arrays["nodes"], arrays["points"]
             displacement = arrays[f"displacement_{step['step']}"]
             shapes = arrays[f"shapes_{step['step']}"] if step["modes"] else []
-        modes = [
-            {
-                "frequency_Hz": mode["frequency_Hz"],
-                "multiplicity": mode["multiplicity"],
-                "n": mode["n"],
-                "amplitude": shape,
-            }
-            for mode, shape in zip(step["modes"], shapes, strict=True)
-        ]
+        modes = []
+        doublets: dict[tuple[int, int], dict[str, Any]] = {}
+        for mode, shape in zip(step["modes"], shapes, strict=True):
+            key = mode["n"], mode.get("doublet", -1)
+            if key in doublets:  # the upper one of two that have split
+                lower = doublets[key]["frequency_Hz"]
+                doublets[key] |= {
+                    "frequency_Hz": (lower + mode["frequency_Hz"]) / 2,
+                    "multiplicity": 2,
+                    "members": [lower, mode["frequency_Hz"]],
+                }
+                continue
+            modes.append(
+                {
+                    "frequency_Hz": mode["frequency_Hz"],
+                    "multiplicity": mode["multiplicity"],
+                    "n": mode["n"],
+                    "amplitude": shape,
+                }
+            )
+            if "doublet" in mode:
+                doublets[key] = modes[-1]
         return {
             "pressure_Pa": step["pressure_Pa"],
             "mass_kg": step["mass_kg"],
