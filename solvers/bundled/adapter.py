@@ -35,7 +35,9 @@ class Bundled:
     name = "bundled"
     version = VERSION
     dialect = "abaqus"
-    capabilities = frozenset({"modes", "gradients", "footprint", "coupled", "rotation"})
+    capabilities = frozenset(
+        {"modes", "gradients", "footprint", "vibration_modulus", "coupled", "rotation"}
+    )
     refusals = (DeckError,)
     failures = (*Failures, TimedOut)
 

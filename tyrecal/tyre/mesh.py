@@ -32,6 +32,10 @@ class SectionMesh:
     shape: tuple[int, int]
     crown_outer: list[int] = field(default_factory=list)
 
+    def region_of(self, cord: int) -> str:
+        """The region that an element of a cord line lies in."""
+        return self.cells[1000 * (cord % 1_000_000) + 1][0]
+
     @property
     def outer_nodes(self) -> list[int]:
         """Nodes of the outer surface from -z to +z, midside ones too."""
@@ -96,7 +100,10 @@ def build_mesh(
             for j in range(0, width - 1, step)
             if present[k, j : j + step + 1].all()
         }
-    crown = [j for j in range(width) if present[-2, j]] or list(range(width))
+    there = present[-2]  # the outermost line; of its runs, the one over the crown
+    middle = width // 2
+    run = [j for j in range(width) if there[min(j, middle) : max(j, middle) + 1].all()]
+    crown = run or list(range(width))
     crown_outer = [number(height - 1, j) for j in crown]
     return SectionMesh(
         quadratic,
