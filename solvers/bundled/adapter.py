@@ -36,7 +36,17 @@ class Bundled:
     version = VERSION
     dialect = "abaqus"
     capabilities = frozenset(
-        {"modes", "gradients", "footprint", "vibration_modulus", "coupled", "rotation"}
+        {
+            "modes",
+            "gradients",
+            "footprint",
+            "vibration_modulus",
+            "spindle",
+            "frequency_modulus",
+            "cavity",
+            "coupled",
+            "rotation",
+        }
     )
     refusals = (DeckError,)
     failures = (*Failures, TimedOut)
@@ -53,6 +63,7 @@ class Bundled:
             "harmonics": list(range(decks.request["highest_harmonic"] + 1)),
             "modes_per_harmonic": decks.request["modes_per_harmonic"],
             "sensitivities": decks.tangents(self.dialect),
+            **{k: decks.request[k] for k in ("own_frequency", "cavity") if k in decks.request},
         }
         paths.append(folder / f"{JOB}.request.json")
         paths[-1].write_text(json.dumps(request))

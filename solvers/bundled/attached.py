@@ -46,13 +46,17 @@ class Attached:
 def read_attached(revolve: list[Keyword], mesh: Mesh) -> Attached:
     """The *MASS and *SPRING elements of a revolve job. Raises DeckError."""
     nodes: dict[str, tuple[str, list[int]]] = {}
+    rims: set[str] = set()  # element sets on a rim's reference node are `wheel`'s
     mass = np.zeros((len(mesh.X), 3))
     stiffness = np.zeros((len(mesh.X), 3))
     for k in revolve:
         if k.name == "ELEMENT":
+            if all(row.integer(1) in mesh.reference_nodes for row in k.rows):
+                rims.add(k.need("ELSET"))
+                continue
             _, members = nodes.setdefault(k.need("ELSET"), (k.need("TYPE"), []))
             members += [_row(row.integer(1), row.line, mesh) for row in k.rows]
-        elif k.name in ("MASS", "SPRING"):
+        elif k.name in ("MASS", "SPRING") and k.need("ELSET") not in rims:
             kind, members = nodes.get(k.need("ELSET"), ("", []))
             if kind != ("MASS" if k.name == "MASS" else "SPRING1"):
                 raise DeckError(k.line, f"*{k.name} needs an element set of its type before it")

@@ -142,5 +142,5 @@ def named(
         fields = family.shapes[[basis.place[i][1] for i in rows]]
         shapes = np.tensordot((weights[:, None] * vectors[rows][:, mine]).T, fields, 1)
         members = np.tile([1, 2], count) if n else None
-        result.append(HarmonicModes(n, values[mine], shapes, members))
+        result.append(HarmonicModes(n, values[mine], shapes, members=members))
     return result

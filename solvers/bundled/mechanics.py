@@ -74,6 +74,19 @@ def potential(model: Model, U: Array, loads: list[Load]) -> float:
 
 def residual(model: Model, U: Array, loads: list[Load], numbering: Numbering) -> Array:
     """Out-of-balance force (size,), N per radian: gradient of the potential."""
+    return numbering.vector(_forces(model, U, loads))
+
+
+def gradient(model: Model, U: Array, loads: list[Load]) -> Array:
+    """Gradient of the potential by every component (n, 3), those that are held among them."""
+    parts = _forces(model, U, loads)
+    total = np.zeros(U.shape, np.result_type(*(v for _, v in parts)))
+    for connectivity, values in parts:
+        np.add.at(total, connectivity, values.reshape(*connectivity.shape, 3))
+    return total
+
+
+def _forces(model: Model, U: Array, loads: list[Load]) -> Parts:
     parts = []
     for r in model.rubbers:
         s = r.solids
@@ -103,7 +116,7 @@ def residual(model: Model, U: Array, loads: list[Load], numbering: Numbering) ->
     for connectivity, M in _whirled(model):
         force = -model.spin2 * M @ _turning(model, U, connectivity)
         parts.append((connectivity, force.reshape(len(force), -1)))
-    return numbering.vector(parts)
+    return parts
 
 
 def _whirled(model: Model) -> Parts:
