@@ -122,25 +122,47 @@ def named(
 ) -> list[HarmonicModes]:
     """Coupled modes, eigenvalues (m,) rising and vectors (fields, m), by the plain modes of
     which they hold most; of a doublet's two the lower comes first."""
-    wanted = [(n, k) for n in harmonics for k in range(count)]
-    seats = [w for w in wanted for _ in range(2 if w[0] else 1)]
-    looked = min(len(values), CANDIDATES * len(seats) + 10)
     held: dict[tuple[int, int], Array] = {}
     for row, (f, k, _) in enumerate(basis.place):
         key = basis.families[f].n, k
-        held[key] = held.get(key, 0.0) + vectors[row, :looked] ** 2
-    overlap = np.array([held[seat] for seat in seats])
-    _, taken = linear_sum_assignment(overlap, maximize=True)
+        held[key] = held.get(key, 0.0) + vectors[row] ** 2
+    told = tell(held, harmonics, count)
     result = []
-    for n in harmonics:
-        mine = [
-            j for k in range(count) for j in sorted(t for s, t in zip(seats, taken) if s == (n, k))
-        ]
-        family = next(f for f in basis.families if f.n == n)
-        rows = [i for i, (f, _, _) in enumerate(basis.place) if basis.families[f].n == n]
+    for family in basis.families:
+        if family.n not in harmonics:
+            continue
+        mine = told[family.n]
+        rows = [i for i, (f, _, _) in enumerate(basis.place) if basis.families[f] is family]
         weights = np.array([basis.place[i][2] for i in rows])
         fields = family.shapes[[basis.place[i][1] for i in rows]]
         shapes = np.tensordot((weights[:, None] * vectors[rows][:, mine]).T, fields, 1)
-        members = np.tile([1, 2], count) if n else None
-        result.append(HarmonicModes(n, values[mine], shapes, members=members))
+        result.append(split(family.n, values[mine], shapes))
     return result
+
+
+def tell(
+    held: dict[tuple[int, int], Array], harmonics: list[int], count: int
+) -> dict[int, list[int]]:
+    """Per harmonic the places of its coupled modes, two for each of its ``count`` doublets.
+
+    held: how much of the plain mode (n, k), k-th of harmonic n, is in each coupled mode (m,)
+    by rising frequency.
+    """
+    seats = [(n, k) for n in harmonics for k in range(count) for _ in range(2 if n else 1)]
+    looked = CANDIDATES * len(seats) + 10
+    overlap = np.array([held[seat][:looked] for seat in seats])
+    _, taken = linear_sum_assignment(overlap, maximize=True)
+    told: dict[int, list[int]] = {n: [] for n in harmonics}
+    for n in harmonics:
+        for k in range(count):
+            places = [
+                int(t) for seat, t in zip(seats, taken, strict=True) if seat == (n, k)
+            ]
+            told[n] += sorted(places)
+    return told
+
+
+def split(n: int, values: Array, shapes: Array) -> HarmonicModes:
+    """Modes that come two by two for n >= 1."""
+    members = np.tile([1, 2], len(values) // 2) if n else None
+    return HarmonicModes(n, values, shapes, members=members)

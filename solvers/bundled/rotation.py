@@ -18,7 +18,7 @@ import numpy as np
 from scipy.linalg import eigh
 from scipy.optimize import linear_sum_assignment
 
-from .coupled import Family, ritz
+from .coupled import Family, ritz, split
 from .harmonics import HarmonicModes, Vibration
 from .pressure import SPIN
 
@@ -53,7 +53,7 @@ def waves(vibration: Vibration, spin: float, n: int, count: int) -> HarmonicMode
     fixed = np.take_along_axis(np.array(values), order, 0)
     shape = np.take_along_axis(np.array(shapes), order[..., None, None], 0)
     whole = shape.swapaxes(0, 1).reshape(2 * count, *shape.shape[2:])
-    return HarmonicModes(n, fixed.T.ravel(), whole, members=np.tile([1, 2], count))
+    return split(n, fixed.T.ravel(), whole)
 
 
 def _basis(vibration: Vibration, spin: float, n: int, count: int) -> Family:
