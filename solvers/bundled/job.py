@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
@@ -12,21 +13,22 @@ from typing import Any
 import numpy as np
 from threadpoolctl import ThreadpoolController
 
-from . import press_job, sensitivity
+from . import grammar, press_job, sensitivity
 from .air import Air, read_air
 from .attached import read_attached
 from .band import Cholesky, Numbering
 from .border import Bordered
 from .coupled import attached_modes
 from .eigen import NotConverged
-from .harmonics import HarmonicModes, HasModes, Unstable, Vibration, lowest_of_all
+from .harmonics import Change, HarmonicModes, HasModes, Unstable, Vibration, lowest_of_all
 from .inflation import InflationFailed, equilibrium
-from .keywords import DeckError, Keyword, Row
+from .keywords import DeckError, Keyword, Row, read_keywords
 from .mechanics import Load, mass
 from .model import Model, build
 from .pressing import NotPressed
 from .results import StepResult, write
 from .rotation import waves
+from .sector import Sector, sector_modes
 from .spectrum import NotSelfConsistent, SelfConsistent
 from .steps import Deck, Step, Tangent
 from .supports import numbering
@@ -48,7 +50,8 @@ class Request:
     modes_per_harmonic; sensitivities: variable to [job, line, field, d number / d variable] rows;
     own_frequency: rubber with a table of moduli over frequency has, in each mode, that of the
     mode's own frequency, not of PROPERTY EVALUATION; cavity: {"material", "surfaces"} of the gas
-    inside the closed surfaces.
+    inside the closed surfaces; sector: {"job", "width_deg"} of a sector about Theta = 0 in which
+    the tyre is that of another section job, of the same mesh.
     """
 
     harmonics: list[int] | None = None
@@ -56,6 +59,7 @@ class Request:
     sensitivities: dict[str, list[Tangent]] = field(default_factory=dict)
     own_frequency: bool = False
     cavity: dict[str, Any] | None = None
+    sector: dict[str, Any] | None = None
 
 
 def run(folder: Path, job: str, oldjob: str | None, time_limit: float = float("inf")) -> None:
@@ -67,7 +71,8 @@ def run(folder: Path, job: str, oldjob: str | None, time_limit: float = float("i
     with _threads().limit(limits=1, user_api="blas"):
         texts = {name: (folder / f"{name}.inp").read_text() for name in (job, oldjob) if name}
         request = read_request(folder / f"{job}.request.json")
-        analysis = Analysis(Deck(texts, job, oldjob), request, deadline)
+        sector = read_sector(folder, request.sector) if request.sector else []
+        analysis = Analysis(Deck(texts, job, oldjob), request, deadline, sector)
         if analysis.road is not None:
             press_job.write(folder / job, analysis.model, analysis.press())
         else:
@@ -90,10 +95,24 @@ def read_request(path: Path) -> Request:
         raise DeckError(0, f"{path.name} is not a request: {error}") from None
 
 
+def read_sector(folder: Path, sector: dict[str, Any]) -> list[Keyword]:
+    """The model blocks of the sector's section job. Raises DeckError, OSError."""
+    job = sector["job"]
+    text = (folder / f"{job}.inp").read_text()
+    return grammar.check(read_keywords(text, job), False)[0]
+
+
 class Analysis:
     """The steps of a deck, carried out one after the other from the state at rest."""
 
-    def __init__(self, deck: Deck, request: Request, deadline: float = float("inf")):
+    def __init__(
+        self,
+        deck: Deck,
+        request: Request,
+        deadline: float = float("inf"),
+        sector: Sequence[Keyword] = (),
+    ):
+        self.sector = list(sector)
         self.deck, self.request, self.deadline = deck, request, deadline
         self.section, self.steps = deck.read([])
         self.road = press_job.read_road(deck.revolve)
@@ -215,30 +234,60 @@ class Analysis:
         harmonics = self.request.harmonics if step.revolved else [0]
         if harmonics is None:
             return lowest_of_all(vibration, row.integer(0), self._check_time)
+        uneven = self._uneven(step, vibration, harmonics)
+        if uneven is not None:
+            return uneven
         modes = []
-        count = self.request.modes_per_harmonic
+        for n in harmonics:
+            self._check_time()
+            known = factor if n == 0 else None
+            modes.append(vibration.modes(n, self.request.modes_per_harmonic, known))
+        return modes
+
+    def _uneven(
+        self, step: Step, vibration: HasModes, harmonics: list[int]
+    ) -> list[HarmonicModes] | None:
+        """Modes of a tyre that is not the same all round, or that turns; None of any other."""
+        line, count = step.procedure.line, self.request.modes_per_harmonic
         attached = read_attached(self.deck.revolve, self.model.mesh)
-        waving = step.procedure.name == "COMPLEX FREQUENCY"
-        if (attached or waving) and not (isinstance(vibration, Vibration) and vibration.plain):
+        turns = step.procedure.name == "COMPLEX FREQUENCY"
+        if not (attached or turns or self.sector):
+            return None
+        if bool(attached) + turns + bool(self.sector) > 1:
             raise DeckError(
-                step.procedure.line,
-                "masses and springs on the tyre, or its turning, are not honoured together with a"
-                " rim that moves, air in the cavity or rubber at each mode's own frequency",
+                line,
+                "of masses and springs on the tyre, a sector of other stuff, and its turning, one"
+                " at a time is honoured",
             )
-        if waving:
-            spin = float(np.real(_uniform(self.model, step, step.spin, "ROTDYNF")))
-            _check_spin(step, spin, bool(attached))
+        if not (isinstance(vibration, Vibration) and vibration.plain):
+            raise DeckError(
+                line,
+                "masses and springs on the tyre, a sector of other stuff, or its turning, are not"
+                " honoured together with a rim that moves, air in the cavity or rubber at each"
+                " mode's own frequency",
+            )
+        if turns:
+            spin = _agreed_spin(self.model, step)
+            modes = []
             for n in harmonics:
                 self._check_time()
                 modes.append(waves(vibration, spin, n, count))
             return modes
         if attached:
             return attached_modes(vibration, attached, harmonics, count, self._check_time)
-        for n in harmonics:
-            self._check_time()
-            known = factor if n == 0 else None
-            modes.append(vibration.modes(n, count, known))
-        return modes
+        if step.procedure.number("PROPERTY EVALUATION") is not None or vibration.shift:
+            raise DeckError(line, "a sector of other stuff is honoured at the static moduli")
+        if self.request.sensitivities:
+            raise DeckError(line, "a tyre with a sector of other stuff has no exact derivatives")
+        assert self.request.sector
+        model, other = (build(k, None, step.long_term) for k in (self.section, self.sector))
+        if model.mesh is not other.mesh:
+            raise DeckError(line, "the sector's section job must have the same mesh")
+        sector = Sector(np.radians(float(self.request.sector["width_deg"])), other)
+        return sector_modes(
+            vibration, self.U, _loads(model, step), model, sector, harmonics, count,
+            self._check_time,
+        )  # fmt: skip
 
     def _rates(
         self,
@@ -253,30 +302,38 @@ class Analysis:
         """d lambda / d variable per harmonic, with the deck's numbers carrying its tangent."""
         section, steps = self.deck.read(tangents)
         step = steps[place]
-        still = build(section, None, step.long_term)
+        still = self._turning(build(section, None, step.long_term), step)
         V = sensitivity.state_rate(still, self.U, _loads(still, step), equations, factor)
         moving = still
         own = self.request.own_frequency
         if dynamic_Hz is not None or own:
-            moving = build(section, dynamic_Hz, step.long_term, own)
+            moving = self._turning(build(section, dynamic_Hz, step.long_term, own), step)
         wheel, air = self._beside(section, moving, step)
         beside = None
         if wheel or air:
             rim, flow = [q for m in modes for q in m.rim], [w for m in modes for w in m.air]
             beside = sensitivity.Beside(wheel, air, rim, flow)
-        counts = [len(m.eigenvalues) for m in modes]
-        rates = sensitivity.eigenvalue_rates(
+        asked = [m.forms() for m in modes]
+        n, shapes, eigenvalues = (np.concatenate(part) for part in zip(*asked, strict=True))
+        forms = sensitivity.eigenvalue_rates(
             moving,
             self.U,
             V,
             _loads(moving, step),
-            np.repeat([m.n for m in modes], counts),
-            np.concatenate([m.shapes for m in modes]),
-            np.concatenate([m.eigenvalues for m in modes]),
+            n,
+            shapes,
+            eigenvalues,
             strains,
             beside,
         )
-        return np.split(rates, np.cumsum(counts)[:-1])
+        attached = read_attached(self.deck.revolve, self.model.mesh)
+        spin = _uniform(self.model, step, step.spin, "ROTDYNF")
+        change = Change(moving, spin, attached)
+        each = np.split(forms, np.cumsum([len(part[0]) for part in asked])[:-1])
+        return [
+            m.makeup.rates(own_forms, change) if m.makeup else own_forms
+            for m, own_forms in zip(modes, each, strict=True)
+        ]
 
     def _result(
         self, step: Step, modes: list[HarmonicModes], rates: dict[str, list[Array]]
@@ -306,16 +363,15 @@ def _uniform(
     return next(iter(sets.values()))
 
 
-def _check_spin(step: Step, spin: float, attached: bool) -> None:
-    """The three places where a deck says how fast the tyre turns agree. Raises DeckError."""
-    line = step.procedure.line
-    if attached:
-        raise DeckError(line, "masses or springs on a turning tyre are not honoured")
-    spin2 = np.real(next(iter(step.centrifugal.values()), 0.0))
-    if not abs(spin2 - spin**2) <= 1e-9 * spin**2:
-        raise DeckError(line, f"CENTRIF {spin2:g} is not the square of ROTDYNF {spin:g}")
+def _agreed_spin(model: Model, step: Step) -> float:
+    """Omega, rad/s, on which the step's loads agree. Raises DeckError."""
+    line, spin = step.procedure.line, float(np.real(_uniform(model, step, step.spin, "ROTDYNF")))
+    spin2 = float(np.real(_uniform(model, step, step.centrifugal, "CENTRIF")))
     if not spin:
         raise DeckError(line, "*COMPLEX FREQUENCY is honoured of a turning tyre: no ROTDYNF")
+    if not abs(spin2 - spin**2) <= 1e-9 * spin**2:
+        raise DeckError(line, f"CENTRIF {spin2:g} is not the square of ROTDYNF {spin:g}")
+    return spin
 
 
 def _loads(model: Model, step: Step) -> list[Load]:

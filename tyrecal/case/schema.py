@@ -333,7 +333,8 @@ def _every_effect(given: dict[str, float]) -> dict[str, float]:
 class Case(Part):
     """One tyre, its mesh and analysis, what may vary and what was measured.
 
-    ``spin_rad_per_s``: the tyre turns about its axle, not touching a road. ``effects``: parameters of effects that are in it, by id, in the effect's unit.
+    ``spin_rad_per_s``: the tyre turns about its axle, not touching a road. ``effects``: parameters
+    of effects that are in it, by id, in the effect's unit.
     """
 
     format: Annotated[int, Field(ge=1, le=1)]  # Literal[1] would take true

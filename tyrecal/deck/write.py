@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
-from ..case import LoadedCase, with_values
+from ..case import LoadedCase, number_at, with_values
 from ..effects import catalogue, with_effects
 from .beside import beside_the_deck
 from .calculix import calculix_context
@@ -101,7 +101,24 @@ def _abaqus(case: LoadedCase, env: Any, request: Mapping[str, Any]) -> dict[str,
     names["modes"] = 2 * request["modes_per_harmonic"] * (request["highest_harmonic"] + 1)
     names["loads"] = request["loads_N"]
     jobs = ("inflate", "press" if names["loads"] else "modes")
-    return {f"{job}.inp": render(env, f"{job}.inp.j2", names) for job in jobs}
+    texts = {f"{job}.inp": render(env, f"{job}.inp.j2", names) for job in jobs}
+    if case.case.splice.share:
+        if names["loads"]:
+            raise TemplateFailed("splice: a tyre with a splice cannot be pressed on a road")
+        names = context(_spliced(case))
+        names["mesh_block"] = _mesh_block(env, names["mesh"])
+        texts["splice.inp"] = render(env, "inflate.inp.j2", names)
+    return texts
+
+
+def _spliced(case: LoadedCase) -> LoadedCase:
+    """The case as it is in its splice. Raises TemplateFailed."""
+    splice = case.case.splice
+    try:
+        values = {path: number_at(case, path) * (1 + splice.share) for path in splice.numbers}
+        return with_values(case, values)
+    except ValueError as error:
+        raise TemplateFailed(f"splice.numbers: {error}") from None
 
 
 def _calculix(case: LoadedCase, env: Any, request: Mapping[str, Any]) -> dict[str, str]:
