@@ -30,7 +30,7 @@ from .revolved import Inverted, Revolved
 Array = np.ndarray
 NEAR = 2  # harmonics beyond the highest wanted whose modes may lie close to wanted ones
 BEYOND = 6  # harmonics of the displacements beyond the highest wanted
-TOLERANCE = 1e-9  # of the forces that the sector brings in
+TOLERANCE = 1e-9  # out-of-balance force over the rim's
 LONGEST = 20  # iterations
 LOOSE = 1e-4  # of each step of Newton's method
 INDEPENDENT = 1e-11  # of the basis' Gram matrix
@@ -199,16 +199,16 @@ def equilibrium(fields: Round, U: Array, check: Callable[[], None]) -> None:
     shape = state.shape
     product = lambda x: fields.forces(x.reshape(shape)).ravel()
     response = lambda x: fields.response(x.reshape(shape)).ravel()
-    first = 0.0
+    scale = 0.0
     for _ in range(LONGEST):
         check()
         try:
-            force = (fields.tyre.residual(state) * fields.free).ravel()
+            whole = fields.tyre.residual(state)
         except Inverted as error:
             raise InflationFailed(0.0, 0.0, f"with the splice {error}") from None
-        size = float(np.linalg.norm(force))
-        first = first or size
-        if size <= TOLERANCE * first:
+        force = (whole * fields.free).ravel()
+        scale = scale or float(np.linalg.norm(whole))  # of what the rim bears
+        if np.linalg.norm(force) <= TOLERANCE * scale:
             return
         step, _, _ = gmres(product, response, -force, LOOSE, LONGEST)
         state = state + step.reshape(shape)
