@@ -82,11 +82,11 @@ class Decks:
         """The case a small step to one side of a variable, or at it where that side is none."""
         value = self.values[name]
         variable = self.case.case.variables.get(name)
-        effect = catalogue().get(name.removeprefix("effects."))
         span = 1.0
         if variable:
             span = max(abs(variable.lower), abs(variable.upper))
-        elif effect:
+        elif name.startswith("effects."):
+            effect = catalogue()[name.removeprefix("effects.")]
             span = max(abs(effect.low), abs(effect.high))
         moved = value + side * STEP * (abs(value) or span)
         try:
