@@ -249,6 +249,9 @@ class Vibration:
             rim, flow = vectors[size : size + q], vectors[size + q :]
             shapes = shapes + beside.fields @ rim
             if w:
+                air = self._couplings[n]
+                modes = zip(np.moveaxis(shapes, -1, 0), values, strict=True)
+                flow = np.stack([air.flow(u, value) for u, value in modes], -1)
                 energy = np.einsum("wm,wv,vm->m", flow.conj(), beside.flow_mass, flow).real
                 is_tyres &= energy < IN_THE_AIR
         return HarmonicModes(n, values, np.moveaxis(shapes, -1, 0), rim.T, flow.T), is_tyres
