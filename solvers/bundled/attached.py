@@ -41,6 +41,11 @@ class Attached:
         return np.asarray(k @ at**2 - eigenvalues * (m @ at**2))
 
     @property
+    def total_kg(self) -> float:
+        """The sum of the masses, each of which is in three components."""
+        return float(self.mass.real.sum()) / 3
+
+    @property
     def highest(self) -> int:
         """Harmonic at which the mean over a sector first vanishes: the sum ends there."""
         return self.sectors

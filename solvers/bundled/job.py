@@ -28,6 +28,7 @@ from .model import Model, build
 from .pressing import NotPressed
 from .results import StepResult, write
 from .rotation import waves
+from .section import Solids
 from .sector import Sector, sector_modes
 from .spectrum import NotSelfConsistent, SelfConsistent
 from .steps import Deck, Step, Tangent
@@ -120,6 +121,7 @@ class Analysis:
         self.model = self._model(None, True)
         self.U = np.zeros((len(self.model.mesh.X), 3))
         self.mass_kg = float(2 * np.pi * mass(self.model).sum().real)
+        self.mass_kg += read_attached(deck.revolve, self.model.mesh).total_kg
         self.factorisations = 0
 
     def run(self) -> list[StepResult]:
@@ -137,6 +139,8 @@ class Analysis:
         assert self.road is not None
         wanted = []
         for step in self.steps:
+            if step.centrifugal:
+                raise DeckError(step.procedure.line, "a turning tyre on a road is not honoured")
             if step.procedure.name != "STATIC":
                 raise DeckError(step.procedure.line, "modes of a tyre on a road are not honoured")
             step.held = [row for row in step.held if row.text(0) != self.road.node]
@@ -149,8 +153,6 @@ class Analysis:
             wanted.append(-float(np.real(row.number(2))))
             if not wanted[-1] > max([0.0, *wanted[:-1]]):
                 raise DeckError(row.line, "loads on the road must push it to the tyre, and rise")
-            if step.centrifugal:
-                raise DeckError(step.procedure.line, "a turning tyre on a road is not honoured")
         if not wanted:
             raise DeckError(self.steps[-1].procedure.line, "no *CLOAD presses the road")
         step = self.steps[-1]
@@ -348,7 +350,7 @@ class Analysis:
 
 
 def _uniform(
-    model: Model, step: Step, sets: dict[str, complex | float], kind: str
+    model: Model, step: Step, sets: dict[str, complex | float], load: str
 ) -> complex | float:
     """The magnitude of a load that all of the tyre bears, 0 where there is none."""
     if not sets:
@@ -358,8 +360,14 @@ def _uniform(
     if unknown:
         raise DeckError(line, f"element set {unknown[0]} of the step's *DLOAD is not defined")
     loaded = {number for name in sets for number in elements[name]}
-    if len(set(sets.values())) > 1 or loaded != set(model.mesh.place):
-        raise DeckError(line, f"the load {kind} must be one for all elements of the tyre")
+    cords = {tuple(row) for c in model.cords for row in c.lines.connectivity.tolist()}
+    for number in set(model.mesh.place) - loaded:
+        kind, row = model.mesh.place[number]
+        block = model.mesh.blocks[kind]
+        if isinstance(block, Solids) or tuple(block.connectivity[row].tolist()) in cords:
+            raise DeckError(line, f"element {number} has mass, but is left out of the load {load}")
+    if len(set(sets.values())) > 1:
+        raise DeckError(line, f"the load {load} must be one for all elements of the tyre")
     return next(iter(sets.values()))
 
 

@@ -66,7 +66,11 @@ class Decks:
             texts = [self._texts(case, dialect) for case, _ in (above, below)]
             if self.values[name] == 0:  # an effect: its keywords may be there on one side only
                 own = self.texts(dialect)
-                if any(_keywords(t[file]) != _keywords(own[file]) for t in texts for file in own):
+                if any(
+                    t.keys() != own.keys() or _keywords(t[file]) != _keywords(own[file])
+                    for t in texts
+                    for file in own
+                ):
                     raise TemplateFailed(
                         f"{name} is 0, where keywords of the deck come and go: it has no slope"
                         " there, give it another value"
