@@ -70,8 +70,9 @@ def read_attached(revolve: list[Keyword], mesh: Mesh) -> Attached:
             members += [_row(row.integer(1), row.line, mesh) for row in k.rows]
         elif k.name in ("MASS", "SPRING") and k.need("ELSET") not in rims:
             kind, members = nodes.get(k.need("ELSET"), ("", []))
-            if kind != ("MASS" if k.name == "MASS" else "SPRING1"):
-                raise DeckError(k.line, f"*{k.name} needs an element set of its type before it")
+            needed = "MASS" if k.name == "MASS" else "SPRING1"
+            if kind != needed:
+                raise DeckError(k.line, f"{k.get('ELSET')} is no set of {needed} elements")
             if k.name == "MASS":
                 mass[members] += _positive(k, 0)
             elif (axis := k.rows[0].integer(0)) in AXES:

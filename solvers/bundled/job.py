@@ -234,27 +234,34 @@ class Analysis:
         factor: Cholesky | Bordered,
     ) -> list[HarmonicModes]:
         harmonics = self.request.harmonics if step.revolved else [0]
+        count = self.request.modes_per_harmonic
+        uneven = self._is_uneven(step)
         if harmonics is None:
-            return lowest_of_all(vibration, row.integer(0), self._check_time)
-        uneven = self._uneven(step, vibration, harmonics)
-        if uneven is not None:
-            return uneven
+            lowest = lowest_of_all(vibration, row.integer(0), self._check_time)
+            if not uneven:
+                return lowest
+            harmonics, count = [m.n for m in lowest], max(len(m.eigenvalues) for m in lowest)
+        if uneven:
+            return self._uneven(step, vibration, harmonics, count)
         modes = []
         for n in harmonics:
             self._check_time()
             known = factor if n == 0 else None
-            modes.append(vibration.modes(n, self.request.modes_per_harmonic, known))
+            modes.append(vibration.modes(n, count, known))
         return modes
 
+    def _is_uneven(self, step: Step) -> bool:
+        """Whether the tyre is not the same all round, or turns."""
+        turns = step.procedure.name == "COMPLEX FREQUENCY"
+        return bool(turns or self.sector or read_attached(self.deck.revolve, self.model.mesh))
+
     def _uneven(
-        self, step: Step, vibration: HasModes, harmonics: list[int]
-    ) -> list[HarmonicModes] | None:
-        """Modes of a tyre that is not the same all round, or that turns; None of any other."""
-        line, count = step.procedure.line, self.request.modes_per_harmonic
+        self, step: Step, vibration: HasModes, harmonics: list[int], count: int
+    ) -> list[HarmonicModes]:
+        """Modes of a tyre that is not the same all round, or that turns."""
+        line = step.procedure.line
         attached = read_attached(self.deck.revolve, self.model.mesh)
         turns = step.procedure.name == "COMPLEX FREQUENCY"
-        if not (attached or turns or self.sector):
-            return None
         if bool(attached) + turns + bool(self.sector) > 1:
             raise DeckError(
                 line,
@@ -276,6 +283,9 @@ class Analysis:
                 modes.append(waves(vibration, spin, n, count))
             return modes
         if attached:
+            equations = vibration.numbering
+            if (equations.equation[attached.rows, attached.components] == equations.size).any():
+                raise DeckError(line, "masses and springs on nodes that are held do nothing")
             return attached_modes(vibration, attached, harmonics, count, self._check_time)
         if step.procedure.number("PROPERTY EVALUATION") is not None or vibration.shift:
             raise DeckError(line, "a sector of other stuff is honoured at the static moduli")

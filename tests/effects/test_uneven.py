@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from tyrecal_solvers.bundled.job import run
+from tyrecal_solvers.bundled.keywords import DeckError
 
 from tyrecal.case import LoadedCase, load_case, with_values
 from tyrecal.deck.environment import TemplateFailed
@@ -164,3 +167,29 @@ def test_splice_in_the_case_file(case_folder) -> None:
     path.write_text(text + splice.replace("area_m2", "area"))
     with pytest.raises(TemplateFailed, match=r"splice.numbers: .*there is no 'area'"):
         Decks(load_case(path)).texts("abaqus")
+
+
+@pytest.mark.parametrize("id", ["point_mass", "rotation"])
+def test_deck_alone_gives_the_same(tmp_path, id: str) -> None:
+    """Run without the side file: as many modes as the deck asks for, split all the same."""
+    for name, text in decks(few(), **{id: SMALL[id]}).items():
+        (tmp_path / name).write_text(text)
+    run(tmp_path, "modes", "inflate")
+    step = json.loads((tmp_path / "modes.json").read_text())["steps"][-1]
+    alone = {(m["n"], m["doublet"], m["member"]): m for m in step["modes"] if "member" in m}
+    for label, mode in by_label(evaluated(id, SMALL[id])).items():
+        if label.c:
+            own = [alone[label.c, k, i]["frequency_Hz"] for k in range(2) for i in (1, 2)]
+            assert min(abs(mode.frequency_Hz - (own[j] + own[j + 1]) / 2) for j in (0, 2)) < 1e-5
+
+
+def test_mass_on_a_held_node_is_refused(tmp_path) -> None:
+    for name, text in decks(few(), point_mass=0.1).items():
+        rim = decks(few())["inflate.inp"].split("*NSET, NSET=RIM\n")[1].split(",")[0]
+        lines = text.split("\n")
+        if "*MASS, ELSET=POINT_MASS" in lines:
+            at = lines.index("*MASS, ELSET=POINT_MASS") - 1
+            lines[at] = f"{lines[at].split(',')[0]}, {rim}"
+        (tmp_path / name).write_text("\n".join(lines))
+    with pytest.raises(DeckError, match="do nothing"):
+        run(tmp_path, "modes", "inflate")
