@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 Array = np.ndarray
 Number = complex | float
 START_HZ = 60.0  # amid the modes of a tyre
-TOLERANCE = 1e-10  # of lambda
+TOLERANCE = 1e-9  # of ln lambda from modulus to mode; a tenth of it or less is left
 LONGEST = 20
 
 
