@@ -73,10 +73,11 @@ def read_attached(revolve: list[Keyword], mesh: Mesh) -> Attached:
             needed = "MASS" if k.name == "MASS" else "SPRING1"
             if kind != needed:
                 raise DeckError(k.line, f"{k.get('ELSET')} is no set of {needed} elements")
+            value = _positive(k, 0 if k.name == "MASS" else 1)
             if k.name == "MASS":
-                mass[members] += _positive(k, 0)
+                mass[members] += value
             elif (axis := k.rows[0].integer(0)) in AXES:
-                stiffness[members, AXES[axis]] += _positive(k, 1)
+                stiffness[members, AXES[axis]] += value
             else:
                 raise DeckError(k.line, f"a spring acts along 1, 2 or 3, got {axis}")
     rows, components = np.nonzero(mass.real + stiffness.real)

@@ -64,7 +64,7 @@ def full_circle(highest: int) -> Circumference:
 
 
 def blended(model: Model, other: Model, share: Array) -> Model:
-    """``model`` with constants per Gauss point and station (p, s)."""
+    """``model`` with constants per Gauss point and station (p, s); an hourglass stiffness stays."""
     mix = lambda a, b, p: (
         np.broadcast_to(a, p)[:, None]
         + np.outer(np.broadcast_to(b, p) - np.broadcast_to(a, p), share)

@@ -193,3 +193,57 @@ def test_mass_on_a_held_node_is_refused(tmp_path) -> None:
         (tmp_path / name).write_text("\n".join(lines))
     with pytest.raises(DeckError, match="do nothing"):
         run(tmp_path, "modes", "inflate")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        (", CENTRIF, 144\n", ", GRAV, 144\n", "'GRAV' of \\*DLOAD is not honoured"),
+        (", ROTDYNF, 12, 0.0", ", ROTDYNF, 13, 0.0", "not the square of ROTDYNF 13"),
+        ("PLY, ROTDYNF, 12, 0.0", "PLY, ROTDYNF, 13, 0.0", "must be one for all"),
+        ("0.0, 0.0, 0.0, 0.0, 1.0, 0.0\n*", "0.0, 0.0, 0.0, 1.0, 0.0, 0.0\n*", "about its axle"),
+        ("SOLID_1, CENTRIF, 144\n", "", "is left out of the load CENTRIF"),
+        ("SOLID_1, CENTRIF", "SOLID_9, CENTRIF", "SOLID_9 .* is not defined"),
+        ("*COMPLEX FREQUENCY\n", "*COMPLEX FREQUENCY, FRICTION DAMPING=YES\n", "FRICTION DAMPING"),
+    ],
+)
+def test_turning_decks_that_are_refused(tmp_path, old: str, new: str, words: str) -> None:
+    texts = decks(few(), rotation=12.0)
+    assert any(old in text for text in texts.values())
+    for name, text in texts.items():
+        (tmp_path / name).write_text(text.replace(old, new))
+    with pytest.raises(DeckError, match=words):
+        run(tmp_path, "modes", "inflate")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("*MASS, ELSET=POINT_MASS\n0.02", "*MASS, ELSET=POINT_MASS\n-0.02", "must be positive"),
+        ("*MASS, ELSET=POINT_MASS", "*MASS, ELSET=NOTHING", "NOTHING is no set of MASS elements"),
+        ("*SPRING, ELSET=ROAD_RADIAL\n1\n", "*SPRING, ELSET=ROAD_RADIAL\n4\n", "1, 2 or 3, got 4"),
+        ("*SPRING, ELSET=ROAD_RADIAL\n1\n", "*SPRING, ELSET=ROAD_RADIAL\n", "takes 2 data lines"),
+        ("TYPE=MASS", "TYPE=MASSES", "TYPE=MASSES of \\*ELEMENT is not honoured"),
+    ],
+)
+def test_attached_decks_that_are_refused(tmp_path, old: str, new: str, words: str) -> None:
+    texts = decks(few(), point_mass=0.02, road_contact=2e4)
+    assert old in texts["modes.inp"]
+    for name, text in texts.items():
+        (tmp_path / name).write_text(text.replace(old, new))
+    with pytest.raises(DeckError, match=words):
+        run(tmp_path, "modes", "inflate")
+
+
+def test_sector_of_another_mesh_is_refused(tmp_path) -> None:
+    texts = Decks(with_values(few(), {"splice.share": 0.5})).texts("abaqus")
+    for name, text in texts.items():
+        (tmp_path / name).write_text(text)
+    request = {"harmonics": [0, 1], "sector": {"job": "splice", "width_deg": 10.0}}
+    (tmp_path / "modes.request.json").write_text(json.dumps(request))
+    first = texts["splice.inp"].split("*NODE, NSET=TYRE\n")[1].split("\n")[0]
+    node, r, z = first.split(", ")
+    moved = texts["splice.inp"].replace(first, f"{node}, {float(r) + 1e-4}, {z}")
+    (tmp_path / "splice.inp").write_text(moved)
+    with pytest.raises(DeckError, match="the same mesh"):
+        run(tmp_path, "modes", "inflate")
