@@ -148,6 +148,16 @@ class Vibration:
         other._borders = {}
         return other
 
+    def forms(self, n: int, shape: Array) -> Array:
+        """phi^H dK_l phi of a shape (nodes, 3) for every law of frequency."""
+        field, found = shape[..., None], []
+        for K0, K1, K2 in self._parts[1:]:
+            image = border.apply(K0, field)
+            if n:
+                image = image + 1j * n * border.apply(K1, field) + n * n * border.apply(K2, field)
+            found.append(float(np.vdot(field, image).real))
+        return np.array(found)
+
     def factor(self, n: int) -> Cholesky | Bordered:
         """Factor of K(n) - shift M. Raises Unstable."""
         three = self._bands[0]
