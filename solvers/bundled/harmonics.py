@@ -16,6 +16,7 @@ from scipy.sparse import csr_array
 
 from . import border, eigen, mechanics
 from .air import Air, Coupling, coupling
+from .attached import Attached
 from .band import Cholesky, Indefinite, Numbering
 from .border import Border, Bordered
 from .mechanics import Load
@@ -32,13 +33,38 @@ class Unstable(ArithmeticError):
     """The inflated state is not stable: a harmonic of it buckles."""
 
 
+class Makeup(Protocol):
+    """What a mode that is not one harmonic of a tyre at rest is made of."""
+
+    def forms(self) -> tuple[Array, Array, Array]:
+        """As `HarmonicModes.forms`."""
+
+    def rates(self, forms: Array, change: Change) -> Array:
+        """d lambda / dp (m,) from the forms (p,) and what else has p's tangent."""
+
+    def where(self, keep: Array | slice) -> Makeup:
+        """That of some of the modes."""
+
+
+@dataclass
+class Change:
+    """What carries the tangent of p beside the section and its loads: the model, Omega, and what
+    is attached to the tyre."""
+
+    model: Model
+    spin: complex | float
+    attached: Attached
+
+
 @dataclass
 class HarmonicModes:
     """Modes of one harmonic: omega^2 (m,) in 1/s2 and shapes (m, n, 3), u^H M u = 1.
 
     M is the mass per radian: over the whole circle the kinetic mass is 2 pi for n = 0, pi else.
     rim (m, q), air (m, w): the amplitudes of the rim's motions (in ``shapes`` too) and of the
-    cavity's flow (see `wheel`, `air`).
+    cavity's flow (see `wheel`, `air`). members (m,): None, or where each doublet has split into
+    two modes, 1 and 2 in turn; the shape is then the part of harmonic n. makeup: what modes that
+    are more than that are made of.
     """
 
     n: int
@@ -46,6 +72,15 @@ class HarmonicModes:
     shapes: Array
     rim: Array = field(default_factory=lambda: np.zeros((0, 0)))
     air: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    members: Array | None = None
+    makeup: Makeup | None = None
+
+    def forms(self) -> tuple[Array, Array, Array]:
+        """Harmonics (p,), shapes (p, nodes, 3) and lambda (p,) of the forms phi^H (K' - lambda M')
+        phi that the derivatives of the eigenvalues are made of."""
+        if self.makeup is not None:
+            return self.makeup.forms()
+        return np.full(len(self.eigenvalues), self.n), self.shapes, self.eigenvalues
 
     def below(self, frequency_Hz: float) -> HarmonicModes:
         """Those up to a frequency."""
@@ -53,8 +88,11 @@ class HarmonicModes:
 
     def where(self, keep: Array | slice) -> HarmonicModes:
         """Those of a mask or slice."""
+        rim, air = (a[keep] if len(a) else a for a in (self.rim, self.air))
+        members = None if self.members is None else self.members[keep]
+        makeup = self.makeup.where(keep) if self.makeup else None
         return HarmonicModes(
-            self.n, self.eigenvalues[keep], self.shapes[keep], self.rim[keep], self.air[keep]
+            self.n, self.eigenvalues[keep], self.shapes[keep], rim, air, members, makeup
         )
 
 
@@ -146,6 +184,17 @@ class Vibration:
                 " circumference is not positive definite"
             ) from None
 
+    @property
+    def plain(self) -> bool:
+        """The tyre alone moves: neither its rim nor air in the cavity."""
+        return self.wheel is None and self.air is None
+
+    def times_mass(self, x: Array) -> Array:
+        """The tyre's M x for (size,) or (size, b), per radian."""
+        full = self.numbering.spread(x)
+        image = self.mass @ full.reshape(len(full), -1)
+        return self.numbering.gather(image.reshape(full.shape))
+
     def _border(self, n: int) -> Border | None:
         if n not in self._borders:
             self._borders[n] = self._new_border(n)
@@ -174,9 +223,7 @@ class Vibration:
 
     def _times_mass(self, n: int, x: Array) -> Array:
         beside = self._border(n)
-        full = self.numbering.spread(x[: self.numbering.size])
-        image = self.mass @ full.reshape(len(full), -1)
-        tyre = self.numbering.gather(image.reshape(full.shape))
+        tyre = self.times_mass(x[: self.numbering.size])
         return beside.times_mass(x, tyre) if beside else tyre
 
     def modes(self, n: int, count: int, factor: Cholesky | Bordered | None = None) -> HarmonicModes:

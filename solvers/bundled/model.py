@@ -44,12 +44,16 @@ class Cords:
 
 @dataclass
 class Model:
-    """The tyre's section, ready for mechanics."""
+    """The tyre's section, ready for mechanics.
+
+    spin2: square of the spin about the axle, rad2/s2.
+    """
 
     mesh: Mesh
     rubbers: list[Rubber]
     cords: list[Cords]
     laws: list[Law] = field(default_factory=list)
+    spin2: complex | float = 0.0
 
 
 def build(

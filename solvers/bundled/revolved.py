@@ -197,7 +197,7 @@ class _RubberPart(_Part):
 
 def _at_stations(law: rubber.MooneyRivlin, points: int, s: int) -> rubber.MooneyRivlin:
     """The law's constants per Gauss point, repeated for every station."""
-    spread = lambda c: np.repeat(np.broadcast_to(c, points), s)
+    spread = lambda c: _spread(np.broadcast_to(c, points) if np.ndim(c) < 2 else c, s)
     optional = lambda c: None if c is None else spread(c)
     return replace(
         law,
@@ -207,6 +207,11 @@ def _at_stations(law: rubber.MooneyRivlin, points: int, s: int) -> rubber.Mooney
         shear_ratio=optional(law.shear_ratio),
         bulk_ratio=optional(law.bulk_ratio),
     )
+
+
+def _spread(constant: Array, s: int) -> Array:
+    """A constant per Gauss point (p,), or per Gauss point and station (p, s), as (p * s,)."""
+    return constant.ravel() if constant.ndim == 2 else np.repeat(constant, s)
 
 
 class _CordPart(_Part):
@@ -233,7 +238,7 @@ class _CordPart(_Part):
     def force(self, u: Array, du: Array) -> tuple[Array, Array]:
         q = self._vectors(u, du) + self.c.direction[:, :, None]
         shape = q.shape
-        stiffness = np.repeat(self.c.stiffness, shape[2])
+        stiffness = _spread(self.c.stiffness, shape[2])
         self.D = cords.tangent(q.reshape(-1, 3), stiffness).reshape(*shape, 3)
         self._W = cords.energy(q.reshape(-1, 3), stiffness).reshape(shape[:3])
         return self._forces(cords.force(q.reshape(-1, 3), stiffness).reshape(shape))

@@ -104,12 +104,15 @@ def read_wheel(keywords: list[Keyword], mesh: Mesh, step: Step) -> Wheel | None:
 
 
 def _point_elements(keywords: list[Keyword], mesh: Mesh) -> dict[str, tuple[str, list[int]]]:
-    """Element set to type and nodes of the job's point elements."""
+    """Element set to type and nodes of the job's point elements on a rim's reference node; those
+    on the tyre are `attached`'s."""
     sets: dict[str, tuple[str, list[int]]] = {}
     for k in keywords:
         if k.name == "ELEMENT":
             nodes = [row.integer(1) for row in k.rows]
             missing = [node for node in nodes if node not in mesh.reference_nodes]
+            if missing and all(node in mesh.index for node in missing):
+                continue
             if missing:
                 raise DeckError(k.line, f"node {missing[0]} is not the rim's reference node")
             sets[k.need("ELSET")] = k.need("TYPE"), nodes
@@ -124,7 +127,7 @@ def _properties(
     inertia: dict[str, Number] = {}
     needed = {"SPRING": "SPRING1", "MASS": "MASS", "ROTARY INERTIA": "ROTARYI"}
     for k in keywords:
-        if k.name not in needed:
+        if k.name not in needed or k.get("ELSET") not in elements:
             continue
         kind, nodes = elements.get(k.need("ELSET"), ("", []))
         if kind != needed[k.name]:

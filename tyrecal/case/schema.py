@@ -212,6 +212,34 @@ class Analysis(Part):
     modes_per_harmonic: Annotated[int, Field(ge=1, le=10)] = 2
 
 
+class PointMass(Part):
+    """A lumped mass on the tread, at the angle 0 and the height z over the middle."""
+
+    mass_kg: NotNegative = 0.0
+    z_m: float = 0.0
+
+
+class RoadSpring(Part):
+    """A road that barely touches: springs from the tread to the ground at the angle 0, over
+    ``width_m`` about the middle; the deflection by the static load is left out."""
+
+    radial_N_per_m: NotNegative = 0.0
+    lateral_N_per_m: NotNegative = 0.0
+    tangential_N_per_m: NotNegative = 0.0
+    width_m: Positive = 0.08
+
+
+class Splice(Part):
+    """A sector about the angle 0 in which numbers of the case are larger by ``share`` of
+    themselves: materials, layers and densities, but no geometry."""
+
+    share: Annotated[float, Field(gt=-1, le=10)] = 0.0
+    width_deg: Annotated[float, Field(gt=0, le=180)] = 10.0
+    numbers: Annotated[list[Text], Field(min_length=1)] = Field(
+        default_factory=lambda: ["materials.rubber.C10_Pa"]
+    )
+
+
 class Road(Part):
     """The flat, rigid road that a tyre is pressed on, and the mesh round the tyre for it.
 
@@ -345,7 +373,8 @@ def _every_effect(given: dict[str, float]) -> dict[str, float]:
 class Case(Part):
     """One tyre, its mesh and analysis, what may vary and what was measured.
 
-    ``effects``: parameters of effects that are in it, by id, in the effect's unit.
+    ``spin_rad_per_s``: the tyre turns about its axle, not touching a road. ``effects``: parameters
+    of effects that are in it, by id, in the effect's unit.
     """
 
     format: Annotated[int, Field(ge=1, le=1)]  # Literal[1] would take true
@@ -361,6 +390,10 @@ class Case(Part):
     rebar_layers: dict[Name, RebarLayer] = Field(default_factory=dict)
     rim: Rim
     cavity: Cavity = Cavity()
+    spin_rad_per_s: NotNegative = 0.0
+    point_mass: PointMass = PointMass()
+    road_spring: RoadSpring = RoadSpring()
+    splice: Splice = Splice()
     analysis: Analysis
     road: Road = Road()
     effects: Annotated[dict[str, float], AfterValidator(_every_effect)] = Field(

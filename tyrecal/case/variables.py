@@ -19,7 +19,10 @@ from .schema import Case
 from .shape import explain
 
 # numbers that stand alone: no other part of the case, and no mesh, depends on their values
-ALONE = {"pressure_kPa", "materials", "rebar_layers", "rim", "cavity", "effects", "solver"}
+ALONE = {
+    "pressure_kPa", "materials", "rebar_layers", "rim", "cavity", "effects", "solver",
+    "spin_rad_per_s", "point_mass", "road_spring", "splice",
+}  # fmt: skip
 
 
 def start_values(loaded: LoadedCase) -> dict[str, float]:
@@ -73,6 +76,20 @@ def with_values(loaded: LoadedCase, values: Mapping[str, float]) -> LoadedCase:
     changed = replace(loaded, case=case, raw=raw)
     with_effects(changed)
     return changed
+
+
+def number_at(loaded: LoadedCase, path: str) -> float:
+    """The number at a dotted path of the case. Raises ValueError."""
+    try:
+        keys = find(loaded.case, path)
+    except KeyError as error:
+        raise ValueError(f"{path}: {error.args[0]}") from None
+    node: Any = loaded.case
+    for key in keys:
+        node = getattr(node, str(key)) if isinstance(node, BaseModel) else node[key]
+    if isinstance(node, bool) or not isinstance(node, int | float):
+        raise ValueError(f"{path} is not a number")
+    return node
 
 
 def _keys(loaded: LoadedCase, name: str) -> list[Keys]:

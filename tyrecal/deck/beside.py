@@ -9,6 +9,7 @@ import numpy as np
 from ..case import LoadedCase
 from ..case.schema import Analysis, Case, Rim, Rubber
 from ..effects import with_effects
+from .uneven import uneven
 
 ELEMENT = 999_000_001  # beyond all that a revolve makes
 LOWEST_HZ, SHIFT = 1.0, -100.0  # of a free wheel's modes: above its rigid motions; 1/s2
@@ -26,6 +27,8 @@ WORDS = {
     "spindle": "a rim that moves",
     "frequency_modulus": "rubber whose modulus follows each mode's frequency",
     "cavity": "the gas in the cavity",
+    "coupled": "a mass, a spring or a splice that couples harmonics",
+    "rotation": "a tyre that turns",
 }
 
 
@@ -36,6 +39,8 @@ def needs(case: LoadedCase) -> dict[str, str]:
         "spindle": c.rim.moves,
         "frequency_modulus": bool(_following(c)),
         "cavity": bool(c.cavity.share),
+        "coupled": uneven(c),
+        "rotation": bool(c.spin_rad_per_s),
     }
     return {need: WORDS[need] for need, there in asked.items() if there}
 
@@ -48,6 +53,9 @@ def beside_the_deck(case: LoadedCase) -> dict[str, Any]:
         request["own_frequency"] = True
     if "cavity" in asked:
         request["cavity"] = {"material": GAS, "surfaces": ["CAVITY", "WELL"]}
+    splice = with_effects(case).case.splice
+    if splice.share:
+        request["sector"] = {"job": "splice", "width_deg": splice.width_deg}
     return request
 
 

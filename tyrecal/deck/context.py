@@ -12,6 +12,7 @@ from ..tyre.gauges import with_gauges
 from ..tyre.mesh import SectionMesh, build_mesh
 from ..tyre.section import Section
 from .beside import frequency_rubber, gas_material, wheel
+from .uneven import attached, turning
 
 REFERENCE_NODE, ROAD_NODE = 900001, 900002
 WELL_ELEMENT = 900001
@@ -89,6 +90,8 @@ def context(case: LoadedCase) -> dict[str, Any]:
         "well": _well(mesh) if c.rim.moves or gas else None,
         "wheel": wheel(c.rim) if c.rim.moves else None,
         "gas": gas,
+        "attached": attached(c, mesh),
+        "turning": turning(c, [block["name"] for block in (*tables["solids"], *tables["lines"])]),
         "solids": [
             {"set": block["name"], "material": deck_name(c.solids[block["entry"]].material)}
             for block in tables["solids"]

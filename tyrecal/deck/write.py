@@ -8,7 +8,7 @@ from itertools import takewhile
 from math import ceil
 from typing import Any
 
-from ..case import LoadedCase, with_values
+from ..case import LoadedCase, number_at, with_values
 from ..effects import catalogue, with_effects
 from .beside import beside_the_deck
 from .calculix import calculix_context
@@ -71,7 +71,11 @@ class Decks:
             texts = [self._texts(case, dialect) for case, _ in (above, below)]
             if self.values[name] == 0:  # an effect: its keywords may be there on one side only
                 own = self.texts(dialect)
-                if any(_keywords(t[file]) != _keywords(own[file]) for t in texts for file in own):
+                if any(
+                    t.keys() != own.keys() or _keywords(t[file]) != _keywords(own[file])
+                    for t in texts
+                    for file in own
+                ):
                     raise TemplateFailed(
                         f"{name} is 0, where keywords of the deck come and go: it has no slope"
                         " there, give it another value"
@@ -109,7 +113,24 @@ def _abaqus(case: LoadedCase, env: Any, request: Mapping[str, Any]) -> dict[str,
         half = fine_enough(case.case.road.element_angles_deg, request["highest_harmonic"])
         names["road"]["angles"] = half + half[::-1]
     jobs = ("inflate", "press" if names["loads"] else "modes")
-    return {f"{job}.inp": render(env, f"{job}.inp.j2", names) for job in jobs}
+    texts = {f"{job}.inp": render(env, f"{job}.inp.j2", names) for job in jobs}
+    if case.case.splice.share:
+        if names["loads"]:
+            raise TemplateFailed("splice: a tyre with a splice cannot be pressed on a road")
+        names = context(_spliced(case))
+        names["mesh_block"] = _mesh_block(env, names["mesh"])
+        texts["splice.inp"] = render(env, "inflate.inp.j2", names)
+    return texts
+
+
+def _spliced(case: LoadedCase) -> LoadedCase:
+    """The case as it is in its splice. Raises TemplateFailed."""
+    splice = case.case.splice
+    try:
+        values = {path: number_at(case, path) * (1 + splice.share) for path in splice.numbers}
+        return with_values(case, values)
+    except ValueError as error:
+        raise TemplateFailed(f"splice.numbers: {error}") from None
 
 
 def fine_enough(angles_deg: Sequence[float], waves: int) -> list[float]:

@@ -35,6 +35,10 @@ IDS = (
     "spindle_torsional",
     "spindle_tilt",
     "wheel_free",
+    "stiffness_splice",
+    "point_mass",
+    "road_contact",
+    "rotation",
 )
 
 __all__ = ["IDS", "Effect", "EffectRefused", "catalogue", "with_effects"]

@@ -61,7 +61,7 @@ def fit_table(fit: Mapping[str, Any]) -> Table:
 def modes_table(modes: Mapping[str, Any]) -> Table:
     """The content of modes.json: one row a mode, in its order."""
     entries = modes["modes"]
-    known = ("symmetry", "clarity", "overlap")
+    known = ("symmetry", "member", "clarity", "overlap")
     extra = [key for key in known if any(key in mode for mode in entries)]
     table = _table(("mode", "motion", "Hz", *extra))
     load = f", {modes['load_N']:g} N" if modes["load_N"] else ""
