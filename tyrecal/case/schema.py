@@ -251,7 +251,7 @@ class Road(Part):
     stiffness_Pa_per_m: Positive = 1e10
     elastic_slip_m: Annotated[float, Field(ge=1e-6)] = 1e-4
     element_angles_deg: Annotated[list[Positive], Field(min_length=1, max_length=200)] = Field(
-        default_factory=lambda: [4.0] * 3 + [5.0, 7.0, 12.0, 21.0, 40.0, 83.0]
+        default_factory=lambda: [4.0] * 3 + [5.0, 8.0, 17.0, 45.0, 93.0]
     )
     loads_N: Annotated[list[Positive], Field(min_length=1, max_length=100)] = Field(
         default_factory=lambda: [500.0, *(1000.0 * kN for kN in (1, 2, 3, 4, 5, 6, 8))]
