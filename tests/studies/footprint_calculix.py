@@ -1,6 +1,6 @@
 """The footprint by CalculiX and by the bundled solver: force and area over meshes, extrapolated.
 
-    nice python tests/studies/footprint_calculix.py --record FILE --work FOLDER --runs NAME ...
+    nice python -m tests.studies.footprint_calculix --record FILE --work FOLDER --runs NAME ...
 
 Every finished run is a line of the record and is not run again. Deflection counts from the radius
 of the same mesh inflated with the road away. Meshes of a family are refined alike along the
@@ -29,7 +29,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from calculix import common
 from scipy.interpolate import PchipInterpolator
 from tyrecal_solvers.calculix.press import read_press, read_radius, run_press
 from tyrecal_solvers.calculix.results import read_fields
@@ -42,6 +41,9 @@ from tyrecal.deck.press import OUTER_NODES, Angles, Road, press_texts
 from tyrecal.deck.write import Decks
 from tyrecal.evaluate.door import Door
 from tyrecal.evaluate.failure import EvaluationFailed
+from tyrecal.evaluate.pressed import Footprint, Pressed
+
+from .calculix import common
 
 Array = np.ndarray
 ROOT = Path(__file__).parents[2]
@@ -49,6 +51,7 @@ CASE = ROOT / "cases" / "p235_75r17.yaml"
 INITIAL = {"A_belt": 2.118683e-7, "A_carcass": 4.208352e-7, "C10": 1e6}
 DEFLECTIONS_M = (0.006, 0.010, 0.014, 0.018, 0.022, 0.026)
 AWAY_M = -0.005  # a road that stays clear of the inflated tyre
+CROWN_M = 0.09  # half of what can touch, from the middle
 REGIONS = ("crown", "upper_sidewall", "lower_sidewall", "bead")
 LOADS_N = (500.0, 1000.0, 2000.0, 3000.0, 4000.0, 5000.0, 6000.0)
 
@@ -127,7 +130,7 @@ RUNS: dict[str, Run | Ours] = {
     "bundled 8": Ours(8.0, (3, 3, 3, 1), A8),
     "bundled 6": Ours(6.0, (4, 4, 4, 1), A6),
     "bundled 4": Ours(4.0, (6, 6, 6, 1), A4),
-    "bundled 2.5": Ours(2.5, (10, 5, 5, 1), A25, loads_N=(500.0, 1000.0, 2000.0, 4000.0)),
+    "bundled 2.5": Ours(2.5, (10, 5, 5, 1), A25, loads_N=(500.0, 1000.0, 2000.0, 4000.0, 6000.0)),
     "bundled 6, as shipped": Ours(6.0, (4, 4, 4, 1), A6, alike=False),
     "bundled 4, as shipped": Ours(4.0, (6, 6, 6, 1), A4, alike=False),
     "bundled 6, as shipped, friction": Ours(6.0, (4, 4, 4, 1), A6, alike=False, friction=0.5),
@@ -210,15 +213,21 @@ def solve(run: Run, folder: Path, limit_s: float) -> dict[str, Any]:
         radius = inflated_radius(run, folder / "free", limit_s)
         deck(run, run.deflections_m, radius, folder)
         run_press(folder, ["ccx"], limit_s)
-        rows = zip(read_press(folder), sunk_in(folder, run.road.normal), strict=True)
+        kept, gaps = sunk_in(folder, run.road.normal), areas_of_gap(folder)
+        rows = zip(read_press(folder), kept, gaps, strict=True)
     except RunFailed as failure:
         return {"failed": f"{failure.cause}: {failure}"}
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
     return {
         "inflated_radius_m": radius,
         "pressed": [
-            {**asdict(row), "deflection_m": row.deflection_m - kept, "kept_m": kept}
-            for row, kept in rows
+            {
+                **asdict(row),
+                "deflection_m": row.deflection_m - kept,
+                "kept_m": kept,
+                "area_of_gap_m2": area,
+            }
+            for row, kept, area in rows
         ],
         "wall_s": time.monotonic() - start,
         "cpu_s": used.ru_utime + used.ru_stime,
@@ -248,6 +257,9 @@ def solve_ours(run: Ours) -> dict[str, Any]:
                 "force_N": row.road_N,
                 "area_m2": row.contact_area_m2,
                 "area_of_nodes_m2": float(row.area_m2.sum()),
+                "area_of_gap_m2": float(
+                    np.mean([area_of_gap(*outside(pressed, row, side)) for side in (1, -1)])
+                ),
             }
             for row in pressed.footprints
         ],
@@ -282,6 +294,70 @@ def sunk_in(folder: Path, stiffness: float) -> list[float]:
         mean = 2 * (over * area)[touching].sum() / whole
         kept.append(float(mean - row.force_N / (stiffness * whole)))
     return kept
+
+
+def area_of_gap(along: Array, across: Array, over: Array) -> float:
+    """The patch's area (m2), its edge told by the gap beside it, alike for any solver and mesh.
+
+    Places and overclosure (m) of the tread's nodes (ring from the patch's middle, node from the
+    crown to one side); the patch is four such quarters. Beyond the edge of a smooth contact the
+    gap opens as distance^(3/2) (Johnson, Contact Mechanics, 4.2).
+    """
+    widths = [_edge(z, gap) for z, gap in zip(across, over, strict=True) if gap[0] > 0]
+    y = along[: len(widths), 0]
+    end = _edge(along[:, 0], over[:, 0])
+    return float(4 * (np.trapezoid(widths, y) + 2 / 3 * widths[-1] * (end - y[-1])))
+
+
+def _edge(place: Array, over: Array) -> float:
+    """Where a line's contact ends, between its last node that touches and the next; half-way
+    where a coarse mesh has no two nodes beyond."""
+    last = int(np.flatnonzero(over > 0)[-1])
+    if last + 2 >= len(place):
+        return float(place[last : last + 2].mean())
+    one, other = -over[last + 1 : last + 3]
+    growth = (other / max(one, 1e-12)) ** (2 / 3)
+    step = place[last + 2] - place[last + 1]
+    found = place[last + 1] - step / (growth - 1) if growth > 1 else place[last + 1]
+    return float(np.clip(found, place[last], place[last + 1]))
+
+
+def outside(pressed: Pressed, row: Footprint, side: int) -> tuple[Array, Array, Array]:
+    """Rings of the crown's nodes on one ``side`` in the bundled solver: along, across,
+    overclosure, m."""
+    R, Z = pressed.points.T
+    top = pressed.nodes % 1000 == (pressed.nodes % 1000).max()
+    line = [i for i in np.argsort(side * Z) if top[i] and -1e-9 < side * Z[i] < CROWN_M]
+    rings = np.flatnonzero(pressed.angles < np.radians(24.1))
+    c, s = np.cos(pressed.angles[rings, None]), np.sin(pressed.angles[rings, None])
+    u_r, u_theta, u_z = np.moveaxis(row.displacement[np.ix_(rings, line)], -1, 0)
+    down = c * (R[line] + u_r) - s * u_theta
+    along = s * (R[line] + u_r) + c * u_theta
+    return along, side * (Z[line] + u_z), down - (pressed.free_radius_m - row.deflection_m)
+
+
+def areas_of_gap(folder: Path) -> list[float]:
+    """`area_of_gap` per deflection of a CalculiX run, of both sides' mean."""
+    fields, text = read_fields(folder / "press.frd"), (folder / "press.inp").read_text()
+    road = float(re.findall(r"^\*NODE, NSET=ROAD\n\d+, (\S+),", text, re.M)[0])
+    travels = [float(d) for d in re.findall(r"^\*\* deflection .*\n\S+, (\S+)$", text, re.M)]
+    used = np.isin(fields.nodes, np.unique(np.concatenate(tread_faces(folder))))
+    X = fields.points[used]
+    turn = np.round(np.degrees(-np.arctan2(X[:, 1], X[:, 0])), 2)
+    areas = []
+    for travel, (_, _, moved) in zip(travels, fields.blocks, strict=True):
+        sides = []
+        for side in (1, -1):
+            z = side * X[:, 2]
+            rings = [
+                [i for i in np.argsort(z) if turn[i] == angle and -1e-9 < z[i] < CROWN_M]
+                for angle in np.unique(turn)
+            ]
+            full = [ring for ring in rings if len(ring) == len(rings[0])]
+            x, y, w = np.moveaxis((X + moved[used])[full], -1, 0)
+            sides.append(area_of_gap(-y, side * w, x - road - travel))
+        areas.append(float(np.mean(sides)))
+    return areas
 
 
 def tread_faces(folder: Path) -> list[list[int]]:
