@@ -12,7 +12,7 @@ from tyrecal.deck.environment import environment
 from tyrecal.deck.press import Angles, press_texts
 
 from ..deck.test_press import coarse_case
-from .footprint_calculix import area_of_gap, extrapolated, serendipity, tread_faces, with_wide
+from .footprint_calculix import area_of_gap, extrapolated, serendipity, tread_faces
 
 HALF = Angles(8.0, 24.0, 20.0, 1.5)
 
@@ -61,18 +61,3 @@ def test_faces_lie_on_the_tread(element: str, tmp_path: Path) -> None:
         assert normal @ outwards > 0.1 * np.linalg.norm(normal) * np.linalg.norm(outwards)
         if element == "C3D20":
             assert p[4:] == pytest.approx((p[:4] + np.roll(p[:4], -1, 0)) / 2, abs=2e-3)
-
-
-def test_wide_elements_of_another_kind() -> None:
-    env = environment("calculix", None)
-    text = press_texts(coarse_case("C3D20R"), env, [0.01], HALF, 0.3925)["wheel.inp"]
-    split = with_wide(text, HALF, "C3D20R", "C3D20")
-    kinds = {
-        kind: re.findall(r"^\d+, .*,$", "".join(
-            lines for k, lines in re.findall(
-                r"^\*ELEMENT, TYPE=(\w+), .*\n((?:\d.*\n)+)", split, re.M) if k == kind), re.M)
-        for kind in ("C3D20R", "C3D20")
-    }  # fmt: skip
-    everything = re.findall(r"^\d+, .*,$", text, re.M)
-    assert sorted(kinds["C3D20R"] + kinds["C3D20"]) == sorted(everything)
-    assert len(kinds["C3D20R"]) / len(everything) == pytest.approx(3 / len(HALF.sizes()))
