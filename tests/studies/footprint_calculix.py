@@ -275,8 +275,8 @@ def area_of_gap(along: Array, across: Array, over: Array) -> float:
     """The patch's area (m2), its edge told by the gap beside it, alike for any solver and mesh.
 
     Places and overclosure (m) of the tread's nodes (ring from the patch's middle, node from the
-    crown to one side); the patch is four such quarters. Beyond the edge of a smooth contact the
-    gap opens as distance^(3/2) (Johnson, Contact Mechanics, 4.2).
+    crown to one side); the patch is four such quarters, longest in its middle. Beyond the edge of
+    a smooth contact the gap opens as distance^(3/2) (Johnson, Contact Mechanics, 4.2).
     """
     widths = [_edge(z, gap) for z, gap in zip(across, over, strict=True) if gap[0] > 0]
     y = along[: len(widths), 0]
@@ -371,11 +371,14 @@ def serendipity(a: Array, b: Array) -> tuple[Array, Array, Array]:
 
 def at(rows: Sequence[dict[str, float]], deflection_m: float) -> tuple[float, float]:
     """Force (N) and area (cm2) at a deflection, on cubics through nothing and the rows."""
-    d, force, area = (
-        np.array([0.0, *(row[key] for row in rows)])
-        for key in ("deflection_m", "force_N", "area_m2")
-    )
+    d, force = (np.array([0.0, *(row[key] for row in rows)]) for key in ("deflection_m", "force_N"))
+    area = np.array([0.0, *map(touching, rows)])
     return tuple(float(PchipInterpolator(d, y)(deflection_m)) for y in (force, 1e4 * area))  # type: ignore[return-value]
+
+
+def touching(row: dict[str, float]) -> float:
+    """Area (m2) of the points (CalculiX) or nodes (bundled) that touch."""
+    return row.get("area_of_nodes_m2", row["area_m2"])
 
 
 def extrapolated(sizes: Sequence[float], values: Sequence[float]) -> tuple[float, float]:
@@ -401,7 +404,7 @@ def table(done: dict[str, dict[str, Any]]) -> None:
         line = done[name]
         for row in line["pressed"]:
             print(f"| {name} | {1e3 * row['deflection_m']:.3f}", end=" | ")
-            print(f"{row['force_N']:.1f} | {1e4 * row['area_m2']:.2f}", end=" | ")
+            print(f"{row['force_N']:.1f} | {1e4 * touching(row):.2f}", end=" | ")
             print(f"{line['cpu_s']:.0f} | {line['wall_s']:.0f} | {line['memory_MB']:.0f} |")
     for family in FAMILIES:
         _extrapolate({name: done[name] for name in family if name in done})
@@ -411,10 +414,11 @@ def _extrapolate(family: dict[str, dict[str, Any]]) -> None:
     if len(family) < 2:
         return
     sizes = [RUNS[name].size for name in family]
-    reached = min(line["pressed"][-1]["deflection_m"] for line in family.values())
+    least = max(line["pressed"][0]["deflection_m"] for line in family.values())
+    most = min(line["pressed"][-1]["deflection_m"] for line in family.values())
     print(f"\nExtrapolated to h = 0 over {', '.join(family)}:\n")
     print("| mm | force, N | error | area, cm2 | error |\n|---|---|---|---|---|")
-    for d in [d for d in DEFLECTIONS_M if d < reached + 1e-5]:
+    for d in [d for d in DEFLECTIONS_M if least <= d < most + 1e-5]:
         meshes = [at(line["pressed"], d) for line in family.values()]
         force, force_error = extrapolated(sizes, [force for force, _ in meshes])
         area, area_error = extrapolated(sizes, [area for _, area in meshes])
