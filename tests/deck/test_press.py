@@ -126,7 +126,7 @@ def test_the_half_turned_about_x_is_the_other_half(element: str) -> None:
     assert not whole["turned"]
 
 
-@pytest.mark.parametrize("element", ["C3D8", "C3D20R"])
+@pytest.mark.parametrize("element", ["C3D8", "C3D20R", "C3D20"])
 def test_the_road_meets_the_tread(element: str) -> None:
     """Its face lies at the outer radius, its travel ends at inflated radius less deflection."""
     case = coarse_case(element)
@@ -138,6 +138,8 @@ def test_the_road_meets_the_tread(element: str) -> None:
     radius = max(np.hypot(x, y) for x, y, _ in place.values())
     assert min(np.hypot(x, y) for x, y, _ in outer) > 0.3 and len(outer) > 20
     assert max(abs(np.degrees(np.arctan2(y, x))) for x, y, _ in outer) == pytest.approx(24)
+    kinds = set(re.findall(r"^\*ELEMENT, TYPE=(\w+)", texts["wheel.inp"], re.M))
+    assert kinds == {element}
     press = texts["press.inp"]
     assert "*FRICTION" not in press and "*FRICTION" in press_texts(
         case, env, [0.006], HALF, 0.3925

@@ -257,7 +257,7 @@ def test_wrong_options_are_refused(tmp_path: Path, options: dict, words: str) ->
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"element": "C3D4"}, "must be C3D20R or C3D8"),
+        ({"element": "C3D4"}, "must be C3D20R, C3D20 or C3D8"),
         ({"ply_thickness_m": "thin"}, "must be a thickness"),
         ({"ply_thickness_m": 2e-3}, "do not fit.*folds over"),
     ],

@@ -1,43 +1,60 @@
-"""The footprint by CalculiX: force and area at given deflections, over meshes, extrapolated.
+"""The footprint by CalculiX and by the bundled solver: force and area over meshes, extrapolated.
 
-    nice python tests/studies/footprint_calculix.py --record runs.jsonl --work FOLDER > table.md
+    nice python -m tests.studies.footprint_calculix --record FILE --work FOLDER --runs NAME ...
 
 Every finished run is a line of the record and is not run again. Deflection counts from the radius
 of the same mesh inflated with the road away. Meshes of a family are refined alike along the
 section and, at the patch, around the tyre, not through the thickness; force and area are taken
-as a + b h^2, h the size of elements.
+as a + b h^2, h the size of elements. "alike": the bundled solver with CalculiX's cord law (St
+Venant and Kirchhoff) and sides straight in the section, its cords on lines.
 """
 
 from __future__ import annotations
 
+import os
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 import argparse
 import json
+import re
 import resource
 import sys
 import time
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
+from contextlib import nullcontext
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.integrate import trapezoid
+from scipy.interpolate import PchipInterpolator
 from tyrecal_solvers.calculix.press import read_press, read_radius, run_press
+from tyrecal_solvers.calculix.results import read_fields
+from tyrecal_solvers.calculix.runner import run_job
 from tyrecal_solvers.process import RunFailed
 
 from tyrecal.case import LoadedCase, load_case, with_values
 from tyrecal.deck.environment import environment
-from tyrecal.deck.press import Angles, Road, press_texts
+from tyrecal.deck.press import OUTER_NODES, Angles, Road, press_texts
+from tyrecal.deck.write import Decks
+from tyrecal.evaluate.door import Door
+from tyrecal.evaluate.failure import EvaluationFailed
+from tyrecal.evaluate.pressed import Footprint, Pressed
 
+from .calculix import common
+
+Array = np.ndarray
 ROOT = Path(__file__).parents[2]
 CASE = ROOT / "cases" / "p235_75r17.yaml"
-DESIGNS = {
-    "initial": {"A_belt": 2.118683e-7, "A_carcass": 4.208352e-7, "C10": 1e6},
-    "optimised": {"A_belt": 3.64826e-7, "A_carcass": 8.01133e-8, "C10": 1e6},  # by the paper
-}
+INITIAL = {"A_belt": 2.118683e-7, "A_carcass": 4.208352e-7, "C10": 1e6}
 DEFLECTIONS_M = (0.006, 0.010, 0.014, 0.018, 0.022, 0.026)
 AWAY_M = -0.005  # a road that stays clear of the inflated tyre
+CROWN_M = 0.09  # half of what can touch, from the middle
 REGIONS = ("crown", "upper_sidewall", "lower_sidewall", "bead")
+LOADS_N = (500.0, 1000.0, 2000.0, 3000.0, 4000.0, 5000.0, 6000.0)
 
 
 @dataclass(frozen=True)
@@ -56,69 +73,85 @@ class Mesh:
 class Run:
     """One CalculiX run: its name in the table is its key in the record."""
 
-    design: str
     mesh: Mesh
     road: Road = field(default_factory=Road)
     largest_increment: float = 1.0
     deflections_m: tuple[float, ...] = DEFLECTIONS_M
 
+    @property
+    def size(self) -> float:
+        return self.mesh.size
 
+
+@dataclass(frozen=True)
+class Ours:
+    """One run of the bundled solver; angles: elements from the patch's middle to the top."""
+
+    size: float
+    along: tuple[int, int, int, int]
+    angles: tuple[float, ...]
+    alike: bool = True
+    friction: float = 0.0
+    loads_N: tuple[float, ...] = LOADS_N
+
+
+SMOOTH = Road(friction=0.0)
 M0 = Mesh("C3D8", 6.0, (4, 4, 4, 1), Angles(6.0, 24.0, 12.0))
 M1 = Mesh("C3D8", 4.0, (6, 6, 6, 1), Angles(4.0, 24.0, 8.0))
 M2 = Mesh("C3D8", 3.0, (8, 8, 8, 2), Angles(3.0, 24.0, 12.0))
-M3 = Mesh("C3D8", 2.0, (12, 12, 12, 2), Angles(2.0, 24.0, 12.0))
-FAMILIES = (("M0", "M1", "M2", "M3"), ("Q2", "Q3"))
-RUNS = {
-    "M0": Run("initial", M0),
-    "M1": Run("initial", M1),
-    "M0, penalty 1e11": Run("initial", M0, Road(normal=1e11)),
-    "M1, penalty 1e11": Run("initial", M1, Road(normal=1e11)),
-    "M2, penalty 1e11": Run("initial", M2, Road(normal=1e11)),
+F8 = Mesh("C3D20", 8.0, (3, 3, 3, 1), Angles(8.0, 24.0, 15.0, 1.6))
+F6 = Mesh("C3D20", 6.0, (4, 4, 4, 1), Angles(6.0, 24.0, 15.0, 1.6))
+F4 = Mesh("C3D20", 4.0, (6, 6, 6, 1), Angles(4.0, 24.0, 15.0, 1.6))
+A6 = (6.0, 6.0, 6.0, 6.0, 9.0, 14.0, 22.0, 36.0, 75.0)
+A4 = (4.0, 4.0, 4.0, 4.0, 4.0, 4.0, 6.0, 9.0, 14.0, 22.0, 36.0, 69.0)
+A25 = (2.5, 2.5, 2.5, 2.5, 2.5, 2.5, 3.0, 5.0, 8.0, 14.0, 25.0, 44.0, 66.0)
+FAMILIES = (("M0", "M1", "M2"), ("F8", "F6", "F4"), ("bundled 6", "bundled 4", "bundled 2.5"))
+RUNS: dict[str, Run | Ours] = {
+    "M0": Run(M0),
+    "M1": Run(M1),
+    "M2": Run(M2),
     "M1, patch twice as fine": Run(
-        "initial",
         replace(M1, along=(12, 6, 6, 1), angles=Angles(2.0, 24.0, 12.0)),
         deflections_m=(0.010, 0.018, 0.026),
     ),
-    "M0 at 18 mm": Run("initial", M0, deflections_m=(0.018,)),
-    "M0, no friction": Run("initial", M0, Road(friction=0.0)),
-    "M0, penalty doubled": Run("initial", M0, Road(normal=2e10)),
-    "M0, stick slope doubled": Run("initial", M0, Road(stick=2e9)),
-    "M0, half the increment": Run("initial", M0, largest_increment=0.5),
-    "M0, plies 0.1 mm": Run("initial", replace(M0, thickness_m=1e-4)),
-    "M0, two rows in the tread": Run("initial", replace(M0, rows=(1, 1, 1, 2))),
-    "M0, crown twice as fine": Run("initial", replace(M0, along=(8, 4, 4, 1))),
-    "M0, the whole tyre": Run("initial", replace(M0, angles=replace(M0.angles, whole=True))),
-    "M0, optimised": Run("optimised", M0),
-    "M2": Run("initial", M2),
-    "M3": Run("initial", M3),
-    "M1, optimised": Run("optimised", M1),
-    "Q2 at 18 mm": Run(
-        "initial",
-        Mesh("C3D20R", 4.0, (4, 4, 4, 1), Angles(4.0, 24.0, 12.0)),
-        deflections_m=(0.018,),
-    ),
-    "Q2": Run("initial", Mesh("C3D20R", 4.0, (4, 4, 4, 1), Angles(4.0, 24.0, 12.0))),
-    "Q3": Run("initial", Mesh("C3D20R", 3.0, (6, 6, 6, 1), Angles(3.0, 24.0, 12.0))),
+    "M0, no friction": Run(M0, SMOOTH),
+    "M0, penalty doubled": Run(M0, Road(normal=2e10)),
+    "M0, stick slope doubled": Run(M0, Road(stick=2e9)),
+    "M0, plies 0.1 mm": Run(replace(M0, thickness_m=1e-4)),
+    "M0, two rows in the tread": Run(replace(M0, rows=(1, 1, 1, 2))),
+    "F8": Run(F8, SMOOTH, deflections_m=(0.010, 0.018, 0.026)),
+    "F6": Run(F6, SMOOTH, 0.6, (0.006, 0.010, 0.018, 0.026)),
+    "F4": Run(F4, SMOOTH, deflections_m=(0.006, 0.010, 0.018, 0.026)),
+    "bundled 6": Ours(6.0, (4, 4, 4, 1), A6),
+    "bundled 4": Ours(4.0, (6, 6, 6, 1), A4),
+    "bundled 2.5": Ours(2.5, (10, 5, 5, 1), A25, loads_N=(500.0, 1000.0, 2000.0, 4000.0, 6000.0)),
+    "bundled 6, as shipped": Ours(6.0, (4, 4, 4, 1), A6, alike=False),
+    "bundled 4, as shipped": Ours(4.0, (6, 6, 6, 1), A4, alike=False),
+    "bundled 6, as shipped, friction": Ours(6.0, (4, 4, 4, 1), A6, alike=False, friction=0.5),
 }
 
 
 def case_of(run: Run) -> LoadedCase:
-    """The case with the run's variables and mesh."""
-    case = with_values(load_case(CASE), DESIGNS[run.design])
-    c, mesh = case.case, run.mesh
-    level = c.mesh.levels[c.mesh.level].model_copy(
+    """The case with the run's mesh."""
+    options = {"element": run.mesh.element, "ply_thickness_m": run.mesh.thickness_m}
+    case = meshed(run.mesh.along, run.mesh.rows)
+    solver = case.case.solver.model_copy(update={"options": options})
+    return replace(case, case=case.case.model_copy(update={"solver": solver}))
+
+
+def meshed(along: Sequence[int], rows: Sequence[int]) -> LoadedCase:
+    """The main case, initial variables."""
+    case = with_values(load_case(CASE), INITIAL)
+    mesh = case.case.mesh
+    level = mesh.levels[mesh.level].model_copy(
         update={
-            "elements": dict(zip(REGIONS, mesh.along, strict=True)),
-            "rows": mesh.rows,
+            "elements": dict(zip(REGIONS, along, strict=True)),
+            "rows": tuple(rows),
             "grading": None,
         }
     )
-    options = {"element": mesh.element, "ply_thickness_m": mesh.thickness_m}
-    changes = {
-        "mesh": c.mesh.model_copy(update={"levels": {c.mesh.level: level}}),
-        "solver": c.solver.model_copy(update={"options": options}),
-    }
-    return replace(case, case=c.model_copy(update=changes))
+    mesh = mesh.model_copy(update={"levels": {mesh.level: level}})
+    return replace(case, case=case.case.model_copy(update={"mesh": mesh}))
 
 
 def deck(run: Run, deflections_m: Sequence[float], radius_m: float, folder: Path) -> None:
@@ -132,26 +165,220 @@ def deck(run: Run, deflections_m: Sequence[float], radius_m: float, folder: Path
         (folder / name).write_text(text)
 
 
+def inflated_radius(run: Run, folder: Path, limit_s: float) -> float:
+    """Outer radius (m) of the run's mesh, inflated. C3D8's chords make it depend on the mesh round
+    the tyre, so that all of it is inflated; C3D20's is one sector's within 0.1 micrometres."""
+    if run.mesh.element == "C3D8":
+        deck(run, [AWAY_M], 0.3928, folder)
+        run_press(folder, ["ccx"], limit_s)
+        return read_radius(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    texts = Decks(case_of(run)).texts("calculix")
+    for name in ("sector.inp", "inflate.inp"):
+        (folder / name).write_text(texts[name])
+    run_job(folder, "inflate", ["sector.inp"], ["ccx"], limit_s)
+    fields = read_fields(folder / "inflate.frd")
+    return float((fields.points + fields.blocks[-1][2])[:, 0].max())
+
+
 def solve(run: Run, folder: Path, limit_s: float) -> dict[str, Any]:
     """A line of the record; in a process of its own, whose children's memory is the run's."""
     start = time.monotonic()
     try:
-        deck(run, [AWAY_M], 0.3928, folder / "free")
-        run_press(folder / "free", ["ccx"], limit_s)
-        radius = read_radius(folder / "free")
+        radius = inflated_radius(run, folder / "free", limit_s)
         deck(run, run.deflections_m, radius, folder)
         run_press(folder, ["ccx"], limit_s)
-        pressed = [asdict(row) for row in read_press(folder)]
+        kept, gaps = sunk_in(folder, run.road.normal), areas_of_gap(folder)
+        rows = zip(read_press(folder), kept, gaps, strict=True)
     except RunFailed as failure:
         return {"failed": f"{failure.cause}: {failure}"}
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
     return {
         "inflated_radius_m": radius,
-        "pressed": pressed,
+        "pressed": [
+            {
+                **asdict(row),
+                "deflection_m": row.deflection_m - kept,
+                "kept_m": kept,
+                "area_of_gap_m2": area,
+            }
+            for row, kept, area in rows
+        ],
         "wall_s": time.monotonic() - start,
         "cpu_s": used.ru_utime + used.ru_stime,
         "memory_MB": used.ru_maxrss / 1024,
     }
+
+
+def solve_ours(run: Ours) -> dict[str, Any]:
+    """The bundled solver's line of the record."""
+    start, used = time.monotonic(), time.process_time()
+    case = meshed(run.along, (1, 1, 1, 1))
+    road = case.case.road.model_copy(
+        update={"friction": run.friction, "element_angles_deg": list(run.angles)}
+    )
+    solver = case.case.solver.model_copy(update={"time_limit_s": 3000.0})
+    case = replace(case, case=case.case.model_copy(update={"road": road, "solver": solver}))
+    try:
+        with common() if run.alike else nullcontext():
+            pressed = Door(case, "bundled").press({}, run.loads_N)
+    except EvaluationFailed as failure:
+        return {"failed": str(failure)}
+    return {
+        "inflated_radius_m": pressed.free_radius_m,
+        "pressed": [
+            {
+                "deflection_m": row.deflection_m,
+                "force_N": row.road_N,
+                "area_m2": row.contact_area_m2,
+                "area_of_nodes_m2": float(row.area_m2.sum()),
+                "area_of_gap_m2": float(
+                    np.mean([area_of_gap(*outside(pressed, row, side)) for side in (1, -1)])
+                ),
+            }
+            for row in pressed.footprints
+        ],
+        "wall_s": time.monotonic() - start,
+        "cpu_s": time.process_time() - used,
+        "memory_MB": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
+    }
+
+
+def sunk_in(folder: Path, stiffness: float) -> list[float]:
+    """Per deflection, how deep (m) the tread has sunk in that CalculiX does not yet count.
+
+    The overclosure's mean over the faces' 3 x 3 Gauss points less force / (stiffness area).
+    """
+    fields, text = read_fields(folder / "press.frd"), (folder / "press.inp").read_text()
+    road = float(re.findall(r"^\*NODE, NSET=ROAD\n\d+, (\S+),", text, re.M)[0])
+    travels = [float(d) for d in re.findall(r"^\*\* deflection .*\n\S+, (\S+)$", text, re.M)]
+    place = {int(n): i for i, n in enumerate(fields.nodes)}
+    faces = np.array([[place[n] for n in face] for face in tread_faces(folder)])
+    g, w = np.polynomial.legendre.leggauss(3)
+    N, by_a, by_b = serendipity(*(x.ravel() for x in np.meshgrid(g, g)))
+    weights = np.outer(w, w).ravel()
+    kept = []
+    for travel, row, (_, _, moved) in zip(travels, read_press(folder), fields.blocks, strict=True):
+        corners = (fields.points + moved)[faces]
+        if faces.shape[1] == 4:
+            corners = np.concatenate([corners, (corners + np.roll(corners, -1, 1)) / 2], 1)
+        over = (N @ corners)[..., 0] - (road + travel)
+        area = np.linalg.norm(np.cross(by_a @ corners, by_b @ corners), axis=-1) * weights
+        touching = over > 0
+        whole = 2 * area[touching].sum()
+        mean = 2 * (over * area)[touching].sum() / whole
+        kept.append(float(mean - row.force_N / (stiffness * whole)))
+    return kept
+
+
+def area_of_gap(along: Array, across: Array, over: Array) -> float:
+    """The patch's area (m2), its edge told by the gap beside it, alike for any solver and mesh.
+
+    Places and overclosure (m) of the tread's nodes (ring from the patch's middle, node from the
+    crown to one side); the patch is four such quarters, longest in its middle. Beyond the edge of
+    a smooth contact the gap opens as distance^(3/2) (Johnson, Contact Mechanics, 4.2).
+    """
+    widths = [_edge(z, gap) for z, gap in zip(across, over, strict=True) if gap[0] > 0]
+    y = along[: len(widths), 0]
+    end = _edge(along[:, 0], over[:, 0])
+    return float(4 * (trapezoid(widths, y) + 2 / 3 * widths[-1] * (end - y[-1])))
+
+
+def _edge(place: Array, over: Array) -> float:
+    """Where a line's contact ends, between its last node that touches and the next; half-way
+    where a coarse mesh has no two nodes beyond."""
+    last = int(np.flatnonzero(over > 0)[-1])
+    if last + 2 >= len(place):
+        return float(place[last : last + 2].mean())
+    one, other = -over[last + 1 : last + 3]
+    growth = (other / max(one, 1e-12)) ** (2 / 3)
+    step = place[last + 2] - place[last + 1]
+    found = place[last + 1] - step / (growth - 1) if growth > 1 else place[last + 1]
+    return float(np.clip(found, place[last], place[last + 1]))
+
+
+def outside(pressed: Pressed, row: Footprint, side: int) -> tuple[Array, Array, Array]:
+    """Rings of the crown's nodes on one ``side`` in the bundled solver: along, across,
+    overclosure, m."""
+    R, Z = pressed.points.T
+    top = pressed.nodes % 1000 == (pressed.nodes % 1000).max()
+    line = [i for i in np.argsort(side * Z) if top[i] and -1e-9 < side * Z[i] < CROWN_M]
+    rings = np.flatnonzero(pressed.angles < np.radians(24.1))
+    c, s = np.cos(pressed.angles[rings, None]), np.sin(pressed.angles[rings, None])
+    u_r, u_theta, u_z = np.moveaxis(row.displacement[np.ix_(rings, line)], -1, 0)
+    down = c * (R[line] + u_r) - s * u_theta
+    along = s * (R[line] + u_r) + c * u_theta
+    return along, side * (Z[line] + u_z), down - (pressed.free_radius_m - row.deflection_m)
+
+
+def areas_of_gap(folder: Path) -> list[float]:
+    """`area_of_gap` per deflection of a CalculiX run, of both sides' mean."""
+    fields, text = read_fields(folder / "press.frd"), (folder / "press.inp").read_text()
+    road = float(re.findall(r"^\*NODE, NSET=ROAD\n\d+, (\S+),", text, re.M)[0])
+    travels = [float(d) for d in re.findall(r"^\*\* deflection .*\n\S+, (\S+)$", text, re.M)]
+    used = np.isin(fields.nodes, np.unique(np.concatenate(tread_faces(folder))))
+    X = fields.points[used]
+    turn = np.round(np.degrees(-np.arctan2(X[:, 1], X[:, 0])), 2)
+    areas = []
+    for travel, (_, _, moved) in zip(travels, fields.blocks, strict=True):
+        sides = []
+        for side in (1, -1):
+            z = side * X[:, 2]
+            rings = [
+                [i for i in np.argsort(z) if turn[i] == angle and -1e-9 < z[i] < CROWN_M]
+                for angle in np.unique(turn)
+            ]
+            full = [ring for ring in rings if len(ring) == len(rings[0])]
+            x, y, w = np.moveaxis((X + moved[used])[full], -1, 0)
+            sides.append(area_of_gap(-y, side * w, x - road - travel))
+        areas.append(float(np.mean(sides)))
+    return areas
+
+
+def tread_faces(folder: Path) -> list[list[int]]:
+    """Nodes of the faces that can touch, corners in turn, then those between them."""
+    text = (folder / "wheel.inp").read_text()
+    numbers = lambda lines: [int(n) for n in re.findall(r"\d+", lines)]
+    tread = set(
+        numbers(re.findall(r"^\*ELSET, ELSET=TREAD_ELEMENTS\n((?:\d.*\n)+)", text, re.M)[0])
+    )
+    turn = [OUTER_NODES[i] for i in (0, 1, 3, 2, 4, 7, 5, 6)]
+    faces = []
+    for kind, lines in re.findall(r"^\*ELEMENT, TYPE=(\w+),.*\n((?:\d.*\n| .*\n)+)", text, re.M):
+        rows = np.reshape(numbers(lines), (-1, 9 if kind == "C3D8" else 21))
+        faces += [
+            [int(row[1 + i]) for i in turn if 1 + i < len(row)] for row in rows if row[0] in tread
+        ]
+    return faces
+
+
+def serendipity(a: Array, b: Array) -> tuple[Array, Array, Array]:
+    """The eight functions (point, 8) of a face at a, b in -1..1, and their derivatives."""
+    s, t = np.array([-1, 1, 1, -1]), np.array([-1, -1, 1, 1])
+    a, b = a[:, None], b[:, None]
+    corner = (1 + s * a) * (1 + t * b) * (s * a + t * b - 1) / 4
+    corner_a = s * (1 + t * b) * (2 * s * a + t * b) / 4
+    corner_b = t * (1 + s * a) * (s * a + 2 * t * b) / 4
+    A, B = 1 - a * a, 1 - b * b
+    side = [A * (1 - b) / 2, (1 + a) * B / 2, A * (1 + b) / 2, (1 - a) * B / 2]
+    side_a = [-a * (1 - b), B / 2, -a * (1 + b), -B / 2]
+    side_b = [-A / 2, -b * (1 + a), A / 2, -b * (1 - a)]
+    return tuple(
+        np.concatenate([c, *e], 1)
+        for c, e in ((corner, side), (corner_a, side_a), (corner_b, side_b))
+    )  # type: ignore[return-value]
+
+
+def at(rows: Sequence[dict[str, float]], deflection_m: float) -> tuple[float, float]:
+    """Force (N) and area (cm2) at a deflection, on cubics through nothing and the rows."""
+    d, force = (np.array([0.0, *(row[key] for row in rows)]) for key in ("deflection_m", "force_N"))
+    area = np.array([0.0, *map(touching, rows)])
+    return tuple(float(PchipInterpolator(d, y)(deflection_m)) for y in (force, 1e4 * area))  # type: ignore[return-value]
+
+
+def touching(row: dict[str, float]) -> float:
+    """Area (m2) of the points (CalculiX) or nodes (bundled) that touch."""
+    return row.get("area_of_nodes_m2", row["area_m2"])
 
 
 def extrapolated(sizes: Sequence[float], values: Sequence[float]) -> tuple[float, float]:
@@ -170,14 +397,14 @@ def extrapolated(sizes: Sequence[float], values: Sequence[float]) -> tuple[float
 
 
 def table(done: dict[str, dict[str, Any]]) -> None:
-    """All runs, then the family's extrapolation."""
-    print("| run | element | mm | force, N | area, cm2 | cpu, s | wall, s | memory, MB |")
-    print("|---|---|---|---|---|---|---|---|")
+    """All runs, then the families' extrapolations."""
+    print("| run | mm | force, N | area, cm2 | cpu, s | wall, s | memory, MB |")
+    print("|---|---|---|---|---|---|---|")
     for name in [name for name in RUNS if name in done]:
-        line, element = done[name], RUNS[name].mesh.element
+        line = done[name]
         for row in line["pressed"]:
-            print(f"| {name} | {element} | {1e3 * row['deflection_m']:g}", end=" | ")
-            print(f"{row['force_N']:.1f} | {1e4 * row['area_m2']:.2f}", end=" | ")
+            print(f"| {name} | {1e3 * row['deflection_m']:.3f}", end=" | ")
+            print(f"{row['force_N']:.1f} | {1e4 * touching(row):.2f}", end=" | ")
             print(f"{line['cpu_s']:.0f} | {line['wall_s']:.0f} | {line['memory_MB']:.0f} |")
     for family in FAMILIES:
         _extrapolate({name: done[name] for name in family if name in done})
@@ -186,13 +413,16 @@ def table(done: dict[str, dict[str, Any]]) -> None:
 def _extrapolate(family: dict[str, dict[str, Any]]) -> None:
     if len(family) < 2:
         return
-    sizes = [RUNS[name].mesh.size for name in family]
+    sizes = [RUNS[name].size for name in family]
+    least = max(line["pressed"][0]["deflection_m"] for line in family.values())
+    most = min(line["pressed"][-1]["deflection_m"] for line in family.values())
     print(f"\nExtrapolated to h = 0 over {', '.join(family)}:\n")
     print("| mm | force, N | error | area, cm2 | error |\n|---|---|---|---|---|")
-    for rows in zip(*(line["pressed"] for line in family.values()), strict=False):
-        force, force_error = extrapolated(sizes, [row["force_N"] for row in rows])
-        area, area_error = extrapolated(sizes, [1e4 * row["area_m2"] for row in rows])
-        print(f"| {1e3 * rows[0]['deflection_m']:g} | {force:.1f} | {force_error:.1f}", end=" | ")
+    for d in [d for d in DEFLECTIONS_M if least <= d < most + 1e-5]:
+        meshes = [at(line["pressed"], d) for line in family.values()]
+        force, force_error = extrapolated(sizes, [force for force, _ in meshes])
+        area, area_error = extrapolated(sizes, [area for _, area in meshes])
+        print(f"| {1e3 * d:g} | {force:.1f} | {force_error:.1f}", end=" | ")
         print(f"{area:.2f} | {area_error:.2f} |")
 
 
@@ -206,9 +436,12 @@ def main() -> None:
     lines = options.record.read_text().splitlines() if options.record.exists() else []
     done = {line["run"]: line for line in map(json.loads, lines)}
     for name in [name for name in options.runs if name not in done]:
-        folder = options.work / name.replace(" ", "_").replace(",", "")
+        run, folder = RUNS[name], options.work / name.replace(" ", "_").replace(",", "")
         with ProcessPoolExecutor(1) as one:
-            answer = one.submit(solve, RUNS[name], folder, options.limit_s).result()
+            if isinstance(run, Ours):
+                answer = one.submit(solve_ours, run).result()
+            else:
+                answer = one.submit(solve, run, folder, options.limit_s).result()
         if "failed" in answer:
             print(f"{name}: {answer['failed']}", file=sys.stderr)
             continue

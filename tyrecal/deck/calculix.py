@@ -12,7 +12,7 @@ from .context import claimed, deck_name, gauged_section, solid_claims
 from .environment import TemplateFailed
 from .sector import INNER_FACE, Sector, build_sector
 
-ELEMENTS = ("C3D20R", "C3D8")
+ELEMENTS = ("C3D20R", "C3D20", "C3D8")
 PLY_THICKNESS_M = 2e-4
 # Of each of the case's sectors: with C3D20R of 6 degrees, 40 mm at the crown, CalculiX found no
 # inflated state for rubber of half the paper's C10.
@@ -27,7 +27,9 @@ def calculix_context(case: LoadedCase) -> dict[str, Any]:
     element = c.solver.options.get("element", ELEMENTS[0])
     thickness = c.solver.options.get("ply_thickness_m", PLY_THICKNESS_M)
     if element not in ELEMENTS:
-        raise TemplateFailed(f"solver.options.element is '{element}', must be C3D20R or C3D8")
+        raise TemplateFailed(
+            f"solver.options.element is '{element}', must be C3D20R, C3D20 or C3D8"
+        )
     if not isinstance(thickness, float) or not 0 < thickness < 1:
         raise TemplateFailed(
             f"solver.options.ply_thickness_m is '{thickness}', must be a thickness in m"
