@@ -21,6 +21,8 @@ Array = np.ndarray
 TOLERANCE = 1e-8  # out-of-balance force over the load
 LONGEST = 40  # Newton iterations a load
 TIRED = 7  # GMRES iterations of a step, after which the preconditioner is formed anew
+FAR = 0.1  # residual over the load, beyond which one bears more iterations:
+EXHAUSTED = 15
 LONGEST_LINEAR = 60
 EXACT = 1e-2  # residual of the linear problem, relative
 ROUGH = 5e-2  # the same as long as the contact changes much
@@ -65,7 +67,6 @@ class Press:
         self.parts = fold.parts(U)
         self.height = self.free_radius
         self.load = 0.0
-        self._before: tuple[Array, float, float] | None = None
         self._bound = np.zeros_like(road.area), np.zeros_like(road.area)
         self._factor: Touching | None = None
         self._used = 0
@@ -82,13 +83,12 @@ class Press:
                 found = self._newton(target)
             except (NotPressed, Indefinite, Inverted) as error:
                 step /= 2
-                self._before = self._factor = None
+                self._factor = None
                 if step < smallest:
                     raise NotPressed(
                         f"no equilibrium between {self.load:.4g} and {target:.4g} N: {error}"
                     ) from None
                 continue
-            self._before = self.parts, self.height, self.load
             self.parts, self.height, self.load = found.parts, found.height, target
             self.road = self.road.settled(found.contact)
             if target == load:
@@ -97,16 +97,6 @@ class Press:
     def rest(self) -> None:
         """Let go of the memory that is only of use while the load stays."""
         self._factor = None
-
-    def _start(self, load: float) -> tuple[Array, float]:
-        """Where the last two equilibria point to."""
-        if self._before is None or not self._before[2]:
-            return self.parts, self.height - (TOUCH * load if self.load == 0 else 0.0)
-        parts, height, before = self._before
-        ahead = (load - self.load) / (self.load - before)
-        return self.parts + ahead * (self.parts - parts), self.height + ahead * (
-            self.height - height
-        )
 
     def _state(
         self, parts: Array, height: float, load: float, bound: Bound | None
@@ -120,14 +110,18 @@ class Press:
 
     def _newton(self, load: float) -> Pressed:
         """By Tresca's friction, with the last normal forces, to where Coulomb's converges."""
-        parts, height = self._start(load)
+        parts, height = self.parts, self.height
+        if not self.load:
+            height -= TOUCH * load
         bound, near = self._bound, NEAR
-        for _ in range(LONGEST):
+        for attempt in range(LONGEST):
             parts, height, contact = self._softly(parts, height, load, bound, near)
+            bound = contact.local[..., 0], self.road.share(height)[0]
+            if not attempt:
+                continue  # what newly touches had no friction yet
             try:
                 parts, height, contact = self._settle(parts, height, load, None, TOLERANCE)
             except NotPressed:
-                bound = contact.local[..., 0], self.road.share(height)[0]
                 near = max(0.1 * near, TOLERANCE)
                 continue
             self._bound = contact.local[..., 0], np.ones_like(self.road.area)
@@ -164,7 +158,7 @@ class Press:
                 return parts, height, contact
             self.iterations += 1
             energy = self.tyre.potential() + contact.energy + load / 2 * height
-            step, rise = self._step(contact, load, force, lacking)
+            step, rise = self._step(contact, force, lacking, size / load)
             slope = float((force * step).sum() + lacking * rise)
             length, before = 1.0, size
             while True:
@@ -188,15 +182,17 @@ class Press:
         raise NotPressed(f"Newton's method did not converge in {LONGEST} iterations")
 
     def _step(
-        self, contact: Contact, load: float, force: Array, lacking: float
+        self, contact: Contact, force: Array, lacking: float, rough: float
     ) -> tuple[Array, float]:
-        """Newton's step of the parts and of the road's height."""
+        """Newton's step of the parts and of the road's height. ``rough``: residual over the load;
+        where it is large a new preconditioner would be formed of a state that does not last."""
         border = _Border(self.fold, contact)
         right = -np.append(force.ravel(), lacking * border.scale)
-        if self._used > TIRED:
-            self._factor = None  # its memory goes first
-        rough = float(np.linalg.norm(force)) > NEAR * load
-        found, self._used, left = self._solve(border, contact, right, ROUGH if rough else EXACT)
+        if self._used > (EXHAUSTED if rough > FAR else TIRED):
+            self._form(contact)
+        found, self._used, left = self._solve(
+            border, contact, right, ROUGH if rough > NEAR else EXACT
+        )
         if not left <= 0.1:
             raise NotPressed("the tangent is too far from a stable one")
         return found[:-1].reshape(force.shape), float(found[-1]) * border.scale
@@ -204,13 +200,9 @@ class Press:
     def _solve(
         self, border: _Border, contact: Contact, right: Array, tolerance: float
     ) -> tuple[Array, int, float]:
-        size = self.fold.shape[:2]
-        if self._factor is None:
-            stiffness = contact.stiffness(*size, positive=True)
-            self._factor = Touching(Factor(self.order, self.tyre.tangents(), stiffness))
-            self.factorisations += 1
-        factor, shape, scale = self._factor, self.parts.shape, border.scale
-        factor.to(contact.stiffness(*size, positive=False))
+        factor = self._factor or self._form(contact)
+        shape, scale = self.parts.shape, border.scale
+        factor.to(contact.stiffness(*self.fold.shape[:2], positive=False))
         answer = factor.solve(border.by_height)
         schur = border.stiffness - float((border.of_force * answer).sum())
 
@@ -229,6 +221,17 @@ class Press:
             return np.append((y - answer * rise).ravel(), rise / scale)
 
         return gmres(product, precondition, right, tolerance, LONGEST_LINEAR)
+
+    def _form(self, contact: Contact) -> Touching:
+        """The preconditioner at the last state; where that is unstable, the one before stays."""
+        self.factorisations += 1
+        stiffness = contact.stiffness(*self.fold.shape[:2], positive=True)
+        try:
+            self._factor = Touching(Factor(self.order, self.tyre.tangents(), stiffness))
+        except Indefinite:
+            if self._factor is None:
+                raise
+        return self._factor
 
     def _stiffness(self, contact: Contact) -> float:
         """dF / d(deflection): the whole tyre's force against the road's rise, tyre following."""
