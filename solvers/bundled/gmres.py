@@ -15,10 +15,12 @@ def gmres(
     right: Array,
     tolerance: float,
     longest: int,
+    first: Array | None = None,
 ) -> tuple[Array, int, float]:
     """Solution of ``product(x) = right`` (size,), iterations, and residual over ``right``'s norm.
 
-    Ends at a relative residual of ``tolerance`` or after ``longest`` iterations.
+    first: ``precondition`` of the right side over its norm, where it is known. Ends at a relative
+    residual of ``tolerance`` or after ``longest`` iterations.
     """
     size = float(np.linalg.norm(right))
     if not size:
@@ -28,7 +30,7 @@ def gmres(
     target = np.zeros(longest + 1)
     target[0] = size
     for j in range(longest):
-        ahead.append(precondition(basis[j]))
+        ahead.append(precondition(basis[j]) if j or first is None else first)
         w = product(ahead[j])
         for _ in range(2):
             for i, v in enumerate(basis):

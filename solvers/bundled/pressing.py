@@ -25,6 +25,7 @@ FAR = 0.1  # residual over the load, beyond which one bears more iterations:
 EXHAUSTED = 15
 LONGEST_LINEAR = 60
 EXACT = 1e-2  # residual of the linear problem, relative
+STIFF = 1e-3  # the same of the vertical stiffness
 ROUGH = 5e-2  # the same as long as the contact changes much
 PATIENCE = 2  # steps that may fail to halve the residual, with Coulomb's friction
 NEAR = 1e-2  # as loosely as that, before Coulomb's friction is tried
@@ -203,7 +204,8 @@ class Press:
         factor = self._factor or self._form(contact)
         shape, scale = self.parts.shape, border.scale
         factor.to(contact.stiffness(*self.fold.shape[:2], positive=False))
-        answer = factor.solve(border.by_height)
+        # two right-hand sides at once cost little more than one: all wait for the factor's memory
+        answer, first = factor.solve(np.stack([border.by_height, right[:-1].reshape(shape)]))
         schur = border.stiffness - float((border.of_force * answer).sum())
 
         def product(v: Array) -> Array:
@@ -215,12 +217,13 @@ class Press:
             more = float((border.of_force * parts).sum()) + border.stiffness * rise
             return np.append(image.ravel(), more * scale)
 
-        def precondition(v: Array) -> Array:
-            y = factor.solve(v[:-1].reshape(shape))
+        def precondition(v: Array, y: Array | None = None) -> Array:
+            y = factor.solve(v[:-1].reshape(shape)) if y is None else y
             rise = (v[-1] / scale - float((border.of_force * y).sum())) / schur
             return np.append((y - answer * rise).ravel(), rise / scale)
 
-        return gmres(product, precondition, right, tolerance, LONGEST_LINEAR)
+        begin = precondition(right, first) / float(np.linalg.norm(right))
+        return gmres(product, precondition, right, tolerance, LONGEST_LINEAR, begin)
 
     def _form(self, contact: Contact) -> Touching:
         """The preconditioner at the last state; where that is unstable, the one before stays."""
@@ -237,7 +240,7 @@ class Press:
         """dF / d(deflection): the whole tyre's force against the road's rise, tyre following."""
         border = _Border(self.fold, contact)
         unit = np.append(np.zeros(self.parts.size), border.scale)
-        found = self._solve(border, contact, unit, EXACT**2)[0]
+        found = self._solve(border, contact, unit, STIFF)[0]
         return 2 / (float(found[-1]) * border.scale)
 
 

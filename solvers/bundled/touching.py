@@ -73,20 +73,21 @@ class Touching:
         return self.factor.forward(right)
 
     def solve(self, right: Array) -> Array:
-        """The inverse times parts (2, k, q, 3)."""
-        y = self.factor.forward(right[None])
+        """The inverse times parts (..., 2, k, q, 3)."""
+        rows = right.reshape(-1, *right.shape[-4:])
+        y = self.factor.forward(rows)
         if len(self._active):
             image = np.concatenate([_products(block, y) for block in self._blocks])[self._active]
-            share = np.zeros(len(self._compliance), np.float32)
-            share[self._active] = lu_solve(self._small, self._D @ image, check_finite=False)[:, 0]
+            share = np.zeros((len(self._compliance), len(rows)), np.float32)
+            share[self._active] = lu_solve(self._small, self._D @ image, check_finite=False)
             start = 0
             for block in self._blocks:
-                part = share[start : start + block[-1].shape[1], None]
+                part = share[start : start + block[-1].shape[1]]
                 start += len(part)
                 for i, Y in enumerate(block):
                     if len(Y):
                         y[i] = y[i] - Y @ part if len(y[i]) else -Y @ part
-        return self.factor.backward(y)[0]
+        return self.factor.backward(y).reshape(right.shape)
 
 
 def _beside(a: Array, b: Array) -> Array:

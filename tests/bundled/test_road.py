@@ -231,6 +231,22 @@ def test_gmres_solves(random: np.random.Generator, preconditioned: bool) -> None
     assert used < (15 if preconditioned else 60)
 
 
+def test_gmres_takes_the_first_direction_that_it_is_given(random: np.random.Generator) -> None:
+    A, b = np.diag(np.arange(1.0, 41.0)), random.normal(size=40)
+    M, calls = np.diag(1 / np.arange(1.0, 41.0)) + 1e-2, []
+
+    def precondition(v: np.ndarray) -> np.ndarray:
+        calls.append(1)
+        return np.asarray(M @ v)
+
+    plain = gmres(lambda v: A @ v, precondition, b, 1e-8, 40)
+    asked = len(calls)
+    given = gmres(lambda v: A @ v, precondition, b, 1e-8, 40, M @ b / np.linalg.norm(b))
+    assert len(calls) == 2 * asked - 1
+    np.testing.assert_allclose(given[0], plain[0], rtol=1e-12, atol=1e-12)
+    assert given[1] == plain[1]
+
+
 def test_gmres_ends_where_it_is_told(random: np.random.Generator) -> None:
     A, b = np.diag(np.arange(1.0, 41.0)), np.ones(40)
     identity = lambda v: v
