@@ -1,0 +1,256 @@
+"""How probable each explanation is: evidence over design variables and effect parameters.
+
+    ln Z(e) = -r^T S^-1 r / 2 - ln|2 pi S| / 2 - x^T x / 2 - ln|I + J^T S^-1 J| / 2 + ln p(splits)
+
+at the re-fitted x, counted from its centre in units of its spread (Laplace's approximation;
+MacKay, Information Theory, ch. 27-28); S: Sigma, and what the effect's law may be off. Then
+Z = integral of Z(e) p(e) de, p(e) uniform over the range, by Gauss and Legendre's rule.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from .covariance import alike
+from .expansion import Nodes
+from .problem import Problem
+
+Array = np.ndarray
+NONE, OUTSIDE = "none", "outside"
+PRIOR_NONE, PRIOR_OUTSIDE, PRIOR_PAIRS = 0.25, 0.10, 0.10  # the singles share the rest
+NODES, PAIR_NODES = 25, 15
+STEPS = 6  # of Gauss and Newton, in a model that is quadratic and near its minimum
+PARTNERS = 4  # singles that are tried with every other
+UNKNOWN = (0.005, 0.01, 0.02, 0.04)  # shift of modes by what no catalogue holds
+INFLATED = (2.0, 4.0)  # all of Sigma's standard deviations
+MISREAD = 0.2  # of a frequency whose label is another mode's
+NEAR = 0.25  # relative distance of modes that could be taken for one another
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """Re-fits at parameters (q,): ln Z (q,), d = x - x0 (q, v), chi2 (q,) and the inverse of the
+    posterior information about d, (q, v, v)."""
+
+    ln_evidence: Array
+    d: Array
+    chi2: Array
+    covariance: Array
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """An explanation: its key ("none", "outside", an id, "id1+id2"), prior probability, ln of its
+    evidence, and over the grid of its parameters: values {id: (q,)}, ln of weight times prior
+    density (q,), and the re-fits."""
+
+    key: str
+    prior: float
+    ln_evidence: float
+    values: Mapping[str, Array]
+    ln_weights: Array
+    fitted: Fitted | None
+    words: str = ""
+
+    @property
+    def posterior(self) -> Array:
+        """Probability (q,) of the grid's parameters."""
+        assert self.fitted is not None
+        ln = self.fitted.ln_evidence + self.ln_weights
+        p = np.exp(ln - ln.max())
+        return np.asarray(p / p.sum())
+
+    @property
+    def best(self) -> int:
+        """The most probable parameters' place on the grid, its weights aside."""
+        assert self.fitted is not None
+        return int(np.argmax(self.fitted.ln_evidence))
+
+    def mean(self) -> dict[str, float]:
+        """Mean parameters."""
+        return {id: float(self.posterior @ e) for id, e in self.values.items()}
+
+    def quantile(self, id: str, share: float) -> float:
+        """The parameter below which ``share`` of the probability lies."""
+        order = np.argsort(self.values[id], kind="stable")
+        e, p = self.values[id][order], self.posterior[order]
+        return float(np.interp(share, np.cumsum(p) - p / 2, e))
+
+
+def refit(
+    problem: Problem,
+    effects: Mapping[str, Array],
+    count: int,
+    extra: Array | None = None,
+    sigma: Array | None = None,
+) -> Fitted:
+    """x re-fitted at each of ``count`` parameters. extra (n, n) or (q, n, n): more covariance."""
+    y = problem.observations.y
+    shift, tilt, split = problem.added(effects, count)
+    S = (problem.sigma if sigma is None else sigma) + problem.law(shift)
+    if extra is not None:
+        S = S + extra
+    inverse = np.linalg.inv(S)
+    _, ln_det = np.linalg.slogdet(S)
+    centre = problem.centre - problem.expansion.x0
+    information = np.diag(problem.spread**-2.0)
+    eta0, J0 = problem.plain(np.zeros_like(centre))
+    H = problem.expansion.hessian[problem.places]
+    d = np.zeros((count, len(centre)))
+    for step in range(STEPS + 1):
+        bent = np.einsum("nvw,qw->qnv", H, d)
+        J = J0 + bent + tilt
+        r = y - eta0 - shift - np.einsum("qnv,qv->qn", J0 + bent / 2 + tilt, d)
+        weighted = np.einsum("qnm,qmv->qnv", inverse, J)
+        normal = np.einsum("qnv,qnw->qvw", weighted, J) + information
+        if step == STEPS:
+            break
+        slope = np.einsum("qnv,qn->qv", weighted, r) + (centre - d) @ information
+        d = d + np.linalg.solve(normal, slope[:, :, None])[:, :, 0]
+    chi2 = np.einsum("qn,qnm,qm->q", r, inverse, r)
+    off = (d - centre) / problem.spread
+    _, ln_normal = np.linalg.slogdet(normal * np.outer(problem.spread, problem.spread))
+    n = len(y)
+    ln_evidence = -(chi2 + ln_det + n * np.log(2 * np.pi) + (off**2).sum(1) + ln_normal) / 2
+    return Fitted(ln_evidence + ln_splits(problem, split), d, chi2, np.linalg.inv(normal))
+
+
+def ln_splits(problem: Problem, split: Array) -> Array:
+    """ln p(splits) (q,) where pairs should be ``split`` (q, n) apart.
+
+    Folded normal distribution: s = |N(split, tau^2)|, tau with the non-uniformity that every
+    tyre has.
+    """
+    s = problem.observations.split
+    seen = np.isfinite(s)
+    tau = np.hypot(problem.observations.split_scatter[seen], problem.assumed.split)
+    apart, s = split[:, seen], s[seen]
+    ln = np.logaddexp(-(((s - apart) / tau) ** 2) / 2, -(((s + apart) / tau) ** 2) / 2)
+    return np.asarray((ln - np.log(tau) - np.log(2 * np.pi) / 2).sum(1))
+
+
+def weigh(problem: Problem, ids: Sequence[str] | None = None, pairs: bool = True) -> list[Hypothesis]:
+    """Every hypothesis with its evidence: none, outside, singles, pairs of the best with all."""
+    ids = list(problem.expansion.nodes) if ids is None else list(ids)
+    sigma = problem.sigma
+    plain = refit(problem, {}, 1, sigma=sigma)
+    none = Hypothesis(NONE, PRIOR_NONE, float(plain.ln_evidence[0]), {}, np.zeros(1), plain)
+    singles = 1 - PRIOR_NONE - PRIOR_OUTSIDE - (PRIOR_PAIRS if len(ids) > 1 and pairs else 0)
+    found = [single(problem, id, singles / len(ids), sigma=sigma) for id in ids]
+    result = [none, outside(problem, sigma), *found]
+    if pairs:
+        result += _pairs(problem, found, sigma)
+    return result
+
+
+def probabilities(hypotheses: Sequence[Hypothesis]) -> dict[str, float]:
+    """Posterior probability by key; they sum to 1."""
+    ln = np.array([h.ln_evidence + np.log(h.prior) for h in hypotheses])
+    p = np.exp(ln - ln.max())
+    return {h.key: float(x) for h, x in zip(hypotheses, p / p.sum(), strict=True)}
+
+
+def single(problem: Problem, id: str, prior: float, sigma: Array | None = None) -> Hypothesis:
+    """One effect over its range."""
+    e, ln_weights = _grid(problem.expansion.nodes[id], NODES)
+    return _hypothesis(problem, id, prior, {id: e}, ln_weights, sigma)
+
+
+def pair(
+    problem: Problem, first: str, second: str, prior: float, sigma: Array | None = None
+) -> Hypothesis:
+    """Two effects at once; what they add is added up."""
+    grids = [_grid(problem.expansion.nodes[id], PAIR_NODES) for id in (first, second)]
+    a, b = np.meshgrid(grids[0][0], grids[1][0], indexing="ij")
+    ln_weights = np.add.outer(grids[0][1], grids[1][1]).ravel()
+    values = {first: a.ravel(), second: b.ravel()}
+    return _hypothesis(problem, f"{first}+{second}", prior, values, ln_weights, sigma)
+
+
+def _pairs(
+    problem: Problem, singles: Sequence[Hypothesis], sigma: Array
+) -> Iterable[Hypothesis]:
+    """Forward stepping: the best singles, each with every other effect."""
+    order = [h.key for h in singles]
+    if len(order) < 2:
+        return []
+    best = sorted(singles, key=lambda h: -h.ln_evidence)[:PARTNERS]
+    chosen = {h.key for h in best}
+    tried = [two for two in combinations(order, 2) if chosen & set(two)]
+    prior = PRIOR_PAIRS / (len(order) * (len(order) - 1) / 2)
+    return [pair(problem, a, b, prior, sigma) for a, b in tried]
+
+
+def outside(problem: Problem, sigma: Array | None = None) -> Hypothesis:
+    """What the catalogue does not hold: half of it errors of reading, half unknown effects.
+
+    Unknown effects shift modes by a random amount each, alike at all pressures, or all of Sigma
+    is too small; errors of reading: one label is another mode's at all pressures, or the labels
+    of two neighbours are swapped. ``words`` names the likeliest.
+    """
+    sigma = problem.sigma if sigma is None else sigma
+    rows = problem.observations.rows
+    same = alike(rows) * [row.label is not None for row in rows]
+    plain: list[tuple[str, Array]] = [
+        (f"modes are off by {size:.1%} in a way of their own", size**2 * same) for size in UNKNOWN
+    ]
+    plain += [(f"all scatter is {k:g} times as large", (k**2 - 1) * sigma) for k in INFLATED]
+    labels = sorted({row.label for row in rows if row.label}, key=str)
+    reading: list[tuple[str, Array | None, Array]] = []
+    for label in labels:
+        hit = np.array([row.label == label for row in rows])
+        reading.append((f"{label} is misread", MISREAD**2 * np.outer(hit, hit), np.array([])))
+    y = problem.observations.y
+    for a, b in combinations(labels, 2):
+        other = _swapped(problem, a, b)
+        if other is not None:
+            reading.append((f"{a} and {b} are swapped", None, other))
+    parts: list[tuple[float, str, Fitted]] = []
+    for words, extra in plain:
+        parts.append((0.5 / len(plain), words, refit(problem, {}, 1, extra, sigma)))
+    for words, more, swapped in reading:
+        there = problem.measured(swapped) if len(swapped) == len(y) else problem
+        parts.append((0.5 / len(reading), words, refit(there, {}, 1, more, sigma)))
+    ln = np.array([np.log(p) + f.ln_evidence[0] for p, _, f in parts])
+    best = int(np.argmax(ln))
+    return Hypothesis(
+        OUTSIDE, PRIOR_OUTSIDE, float(np.logaddexp.reduce(ln)), {}, np.zeros(1), parts[best][2],
+        parts[best][1],
+    )  # fmt: skip
+
+
+def _swapped(problem: Problem, a: object, b: object) -> Array | None:
+    """y with the labels a and b exchanged; None where they are far apart or not both there."""
+    rows, y = problem.observations.rows, problem.observations.y.copy()
+    where = {(row.label, row.pressure_kPa, row.run): i for i, row in enumerate(rows) if row.label}
+    both = [(i, where[b, p, run]) for (label, p, run), i in where.items()
+            if label == a and (b, p, run) in where]  # fmt: skip
+    if not both or max(abs(y[i] - y[j]) for i, j in both) > NEAR:
+        return None
+    for i, j in both:
+        y[i], y[j] = y[j], y[i]
+    return y
+
+
+def _hypothesis(
+    problem: Problem,
+    key: str,
+    prior: float,
+    values: dict[str, Array],
+    ln_weights: Array,
+    sigma: Array | None,
+) -> Hypothesis:
+    fitted = refit(problem, values, len(ln_weights), sigma=sigma)
+    ln = float(np.logaddexp.reduce(fitted.ln_evidence + ln_weights))
+    return Hypothesis(key, prior, ln, values, ln_weights, fitted)
+
+
+def _grid(nodes: Nodes, count: int) -> tuple[Array, Array]:
+    """Parameters (count,) over the reach and ln of weight times density, which sum to 1."""
+    low, high = nodes.reach
+    points, weights = np.polynomial.legendre.leggauss(count)
+    return low + (high - low) * (points + 1) / 2, np.log(weights / 2)

@@ -1,0 +1,179 @@
+"""The model between the few points where it was asked.
+
+With d = x - x0, quadratic about the plain fit x0, plus what each effect adds:
+
+    eta(x, e) = eta0 + J0 d + d^T H d / 2 + sum over effects i of [a_i(e_i) + B_i(e_i) d]
+
+a_i, B_i: polynomials in e_i through its nodes, 0 at e_i = 0. A node k may stand at any x_k: with
+B_k = J_k - J(x_k, 0) it is a_k = eta_k - eta(x_k, 0) - B_k (x_k - x0). So the model is exact at
+every point that was asked, and effects add up (two at a time are asked again where it matters).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from .response import Answer, Point, Response, Span
+
+Array = np.ndarray
+ONE_SIDED = (0.25, 0.75, 1.0)  # with 0 the Lobatto points of a cubic
+TWO_SIDED = (0.5, 1.0)  # on either side
+CURVATURE_STEP = 0.05  # of a logarithm, for H from two Jacobians
+
+
+@dataclass(frozen=True)
+class Nodes:
+    """An effect where it was asked: values (k,); shift (k, n), tilt (k, n, v): a_k, B_k; split
+    (k, n); reach: the range of the parameter between nodes that have a solution."""
+
+    values: Array
+    shift: Array
+    tilt: Array
+    split: Array
+    reach: tuple[float, float]
+
+    def at(self, e: Array) -> tuple[Array, Array, Array]:
+        """a (q, n), B (q, n, v) and split (q, n) at parameters (q,)."""
+        weights = _lagrange(self.values, e)
+        return (
+            weights @ self.shift,
+            np.einsum("qk,knv->qnv", weights, self.tilt),
+            np.abs(weights @ self.split),
+        )
+
+
+@dataclass(frozen=True)
+class Expansion:
+    """x0 (v,); eta (n,), jacobian (n, v), hessian (n, v, v), split (n,) there without effects;
+    constants (n, k); failed: why effects, by id, have no nodes."""
+
+    x0: Array
+    eta: Array
+    jacobian: Array
+    hessian: Array
+    split: Array
+    constants: Array
+    nodes: Mapping[str, Nodes]
+    failed: Mapping[str, str] = field(default_factory=dict)
+
+    def plain(self, x: Array) -> tuple[Array, Array]:
+        """eta (n,) and Jacobian (n, v) without effects."""
+        d = x - self.x0
+        bent = np.einsum("nvw,w->nv", self.hessian, d)
+        return self.eta + self.jacobian @ d + bent @ d / 2, self.jacobian + bent
+
+    def node(self, x: Array, answer: Answer) -> tuple[Array, Array, Array]:
+        """a, B and split of an answer at x."""
+        eta, jacobian = self.plain(x)
+        tilt = answer.jacobian - jacobian
+        return answer.eta - eta - tilt @ (x - self.x0), tilt, answer.split
+
+
+def expand(response: Response, x0: Array, ids: Sequence[str] | None = None) -> Expansion:
+    """Ask the model about x0: curvature by x, sources of error, every effect at its nodes.
+
+    Raises what the model answered where it has no solution at x0 itself.
+    """
+    ids = list(response.spans) if ids is None else list(ids)
+    count = len(x0)
+    steps = CURVATURE_STEP * np.eye(count)
+    values = {id: node_values(response.spans[id]) for id in ids}
+    points = [Point(x0, constants=True)]
+    points += [Point(x0 + side * step) for step in steps for side in (1, -1)]
+    asked = [(id, float(e)) for id in ids for e in values[id]]
+    points += [Point(x0, {id: e}) for id, e in asked]
+    answers = response.answers(points)
+    first = answers[0]
+    if isinstance(first, Exception):
+        raise first
+    hessian = np.zeros((*first.jacobian.shape, count))
+    for i in range(count):
+        above, below = answers[1 + 2 * i : 3 + 2 * i]
+        if isinstance(above, Answer) and isinstance(below, Answer):
+            hessian[:, :, i] = (above.jacobian - below.jacobian) / (2 * CURVATURE_STEP)
+    hessian = (hessian + hessian.transpose(0, 2, 1)) / 2
+    assert first.constants is not None
+    plain = Expansion(
+        x0, first.eta, first.jacobian, hessian, first.split, first.constants, {}, {}
+    )  # fmt: skip
+    nodes, failed = {}, {}
+    replies = dict(zip(asked, answers[1 + 2 * count :], strict=True))
+    for id in ids:
+        found = {e: replies[id, e] for e in map(float, values[id])}
+        made = _nodes(plain, response.spans[id], {e: (x0, a) for e, a in found.items()})
+        if made is None:
+            failed[id] = str(next(a for a in found.values() if isinstance(a, Exception)))
+        else:
+            nodes[id] = made
+    return Expansion(x0, plain.eta, plain.jacobian, hessian, plain.split, plain.constants,
+                     nodes, failed)  # fmt: skip
+
+
+def node_values(span: Span) -> Array:
+    """Where an effect is asked: parameters other than 0, rising."""
+    if span.low < 0 < span.high:
+        sides = [-f * -span.low for f in reversed(TWO_SIDED)] + [f * span.high for f in TWO_SIDED]
+        return np.array(sides)
+    far = span.high if abs(span.high) >= abs(span.low) else span.low
+    return np.sort(far * np.array(ONE_SIDED))
+
+
+def moved(
+    expansion: Expansion, response: Response, wanted: Mapping[str, Mapping[float, Array]]
+) -> Expansion:
+    """The expansion with nodes of effects asked again at re-fitted x: {id: {value: x (v,)}}.
+
+    Values that are no nodes yet become nodes. A node without a solution there stays as it was.
+    """
+    asked = [(id, e, x) for id, places in wanted.items() for e, x in places.items()]
+    answers = response.answers([Point(x, {id: e}) for id, e, x in asked])
+    nodes = dict(expansion.nodes)
+    for id in wanted:
+        old = nodes[id]
+        rows = {float(e): (old.shift[k], old.tilt[k], old.split[k])
+                for k, e in enumerate(old.values)}  # fmt: skip
+        for (other, e, x), answer in zip(asked, answers, strict=True):
+            if other == id and isinstance(answer, Answer):
+                rows[e] = expansion.node(x, answer)
+        nodes[id] = _stacked(rows, old.reach)
+    return Expansion(expansion.x0, expansion.eta, expansion.jacobian, expansion.hessian,
+                     expansion.split, expansion.constants, nodes, expansion.failed)  # fmt: skip
+
+
+def _nodes(
+    plain: Expansion, span: Span, replies: Mapping[float, tuple[Array, Answer | Exception]]
+) -> Nodes | None:
+    """Nodes from 0 outwards as far as there are solutions; None where there is none at all."""
+    zero = np.zeros_like(plain.eta), np.zeros_like(plain.jacobian), plain.split
+    rows = {0.0: zero}
+    reach = [max(0.0, span.low), min(0.0, span.high)]  # 0, or the near end of the range
+    for side in (1, -1):
+        for e in sorted((e for e in replies if e * side > 0), key=abs):
+            x, answer = replies[e]
+            if not isinstance(answer, Answer):
+                break
+            rows[e] = plain.node(x, answer)
+            reach[0 if side < 0 else 1] = e
+    if len(rows) == 1:
+        return None
+    low, high = sorted(reach)
+    return _stacked(rows, (low, high))
+
+
+def _stacked(rows: Mapping[float, tuple[Array, Array, Array]], reach: tuple[float, float]) -> Nodes:
+    values = np.array(sorted(rows))
+    shift, tilt, split = (np.array([rows[float(e)][part] for e in values]) for part in range(3))
+    return Nodes(values, shift, tilt, split, reach)
+
+
+def _lagrange(nodes: Array, e: Array) -> Array:
+    """Lagrange's polynomials of the nodes (k,) at e (q,): (q, k)."""
+    e = np.atleast_1d(e)[:, None]
+    weights = np.ones((len(e), len(nodes)))
+    for k, here in enumerate(nodes):
+        others = np.delete(nodes, k)
+        weights[:, k] = np.prod((e - others) / (here - others), axis=1)
+    return weights
