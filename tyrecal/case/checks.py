@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import BaseModel, ValidationError
 
+from ..effects import IDS
 from .meshable import Problems, levels, places
 from .mistakes import Keys, dotted, suggestion
 from .parts import WRONG, number
@@ -26,6 +27,7 @@ FIXED = ("format", "variables", "targets", "uncertainties", "solver")
 
 def problems(data: Mapping[str, Any], section: Section | None) -> Problems:
     """Every disagreement in ``data``; those with the section only where there is one."""
+    yield from _effects(data)
     yield from _names(data)
     yield from _targets(data)
     yield from _variables(data)
@@ -37,6 +39,12 @@ def problems(data: Mapping[str, Any], section: Section | None) -> Problems:
     if section:
         yield from places(data, section)
         yield from levels(data, section)
+
+
+def _effects(data: Mapping[str, Any]) -> Problems:
+    for id in table(data, "effects"):
+        if id not in IDS:
+            yield ("effects", id), f"is not one of the effects{suggestion(id, IDS)}"
 
 
 def _names(data: Mapping[str, Any]) -> Problems:
@@ -89,6 +97,7 @@ def _targets(data: Mapping[str, Any]) -> Problems:
 def _variables(data: Mapping[str, Any]) -> Problems:
     """Variables set numbers that exist, are not whole, allow the bounds, and are set once."""
     owners: dict[Keys, str] = {}
+    data = {**data, "effects": {**dict.fromkeys(IDS, 0.0), **table(data, "effects")}}
     for name, variable in table(data, "variables").items():
         for i, path in enumerate(entries(variable, "sets")):
             here: Keys = ("variables", name, "sets", i)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import ValidationError
 
+from ..effects import EffectRefused, with_effects
 from .checks import problems
 from .document import Document, read_document
 from .meshable import folds
@@ -65,7 +66,13 @@ def _read(path: Path) -> tuple[LoadedCase | None, list[Mistake]]:
         document.add(("section", "stations"), message)
     if case is None or section is None or document.mistakes:
         return None, sorted(document.mistakes, key=lambda m: (m.file != str(path), m.line))
-    return LoadedCase(case, path, section, path.parent, raw), []
+    loaded = LoadedCase(case, path, section, path.parent, raw)
+    try:
+        with_effects(loaded)
+    except EffectRefused as error:
+        document.add(("effects", error.id), error.reason)
+        return None, document.mistakes
+    return loaded, []
 
 
 def _typed(document: Document, data: dict[str, Any]) -> Case | None:

@@ -6,8 +6,9 @@ from collections.abc import Iterator, Mapping
 from itertools import pairwise
 from typing import Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import AfterValidator, Field
 
+from ..effects import IDS
 from .parts import WRONG, Degrees, Name, NotNegative, Part, Positive, Problem, Text, number
 
 Moduli = Literal["long_term", "instantaneous"]
@@ -266,8 +267,16 @@ class Solver(Part):
     options: dict[str, Any] = Field(default_factory=dict)
 
 
+def _every_effect(given: dict[str, float]) -> dict[str, float]:
+    """Those not given are absent: 0."""
+    return {**dict.fromkeys(IDS, 0.0), **given}
+
+
 class Case(Part):
-    """One tyre, its mesh and analysis, what may vary and what was measured."""
+    """One tyre, its mesh and analysis, what may vary and what was measured.
+
+    ``effects``: parameters of effects that are in it, by id, in the effect's unit.
+    """
 
     format: Annotated[int, Field(ge=1, le=1)]  # Literal[1] would take true
     name: Text
@@ -283,6 +292,9 @@ class Case(Part):
     rim: Rim
     analysis: Analysis
     road: Road = Road()
+    effects: Annotated[dict[str, float], AfterValidator(_every_effect)] = Field(
+        default_factory=lambda: dict.fromkeys(IDS, 0.0)
+    )
     variables: dict[Name, Variable] = Field(default_factory=dict)
     targets: Targets = Targets()
     uncertainties: dict[Name, Uncertainty] = Field(default_factory=dict)

@@ -10,6 +10,7 @@ from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
+from ..effects import with_effects
 from .checks import find, problems
 from .load import LoadedCase
 from .meshable import folds
@@ -18,7 +19,7 @@ from .schema import Case
 from .shape import explain
 
 # numbers that stand alone: no other part of the case, and no mesh, depends on their values
-ALONE = {"pressure_kPa", "materials", "rebar_layers", "rim", "solver"}
+ALONE = {"pressure_kPa", "materials", "rebar_layers", "rim", "effects", "solver"}
 
 
 def start_values(loaded: LoadedCase) -> dict[str, float]:
@@ -69,7 +70,9 @@ def with_values(loaded: LoadedCase, values: Mapping[str, float]) -> LoadedCase:
             raise ValueError(f"{dotted(wrong)} {reason}")
     if "mesh" in touched and (message := folds(raw, loaded.section)):
         raise ValueError(message)
-    return replace(loaded, case=case, raw=raw)
+    changed = replace(loaded, case=case, raw=raw)
+    with_effects(changed)
+    return changed
 
 
 def _keys(loaded: LoadedCase, name: str) -> list[Keys]:

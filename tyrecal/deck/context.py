@@ -6,6 +6,7 @@ from functools import lru_cache
 from typing import Any
 
 from ..case import LoadedCase
+from ..effects import with_effects
 from ..tyre.gauges import with_gauges
 from ..tyre.mesh import SectionMesh, build_mesh
 from ..tyre.section import Section
@@ -16,6 +17,7 @@ CLEARANCE = 0.05  # m from the section, not inflated, to the road
 
 def section_mesh(case: LoadedCase) -> SectionMesh:
     """The mesh of a case's section at its chosen level (remembered while the case keeps it)."""
+    case = with_effects(case)
     mesh, level = case.case.mesh, case.case.mesh.levels[case.case.mesh.level]
     elements = tuple(level.elements[name] for name, _ in case.section.regions)
     grading = tuple(level.grading) if level.grading else None

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from typing import Any
 
 from ..case import LoadedCase, with_values
+from ..effects import catalogue, with_effects
 from .calculix import calculix_context
 from .context import context
 from .environment import TemplateFailed, environment, render
@@ -47,18 +49,26 @@ class Decks:
     def _texts(self, case: LoadedCase, dialect: str) -> dict[str, str]:
         own = case.case.templates
         env = environment(dialect, case.folder / own if own else None)
-        return DIALECTS[dialect](case, env, self.request)
+        return DIALECTS[dialect](with_effects(case), env, self.request)
 
     def tangents(self, dialect: str) -> Tangents:
         """Per variable, rows [job, 1-based line, 0-based field, d number / d variable].
 
         From two decks written a little to either side of the variable, so it holds for any
         template; the derivative is exact where the deck's number is linear in the variable.
+        Raises TemplateFailed where keywords come and go with the variable.
         """
         result: Tangents = {}
         for name in self.gradients:
             above, below = self._beside(name, 1), self._beside(name, -1)
             texts = [self._texts(case, dialect) for case, _ in (above, below)]
+            if self.values[name] == 0:  # an effect: its keywords may be there on one side only
+                own = self.texts(dialect)
+                if any(_keywords(t[file]) != _keywords(own[file]) for t in texts for file in own):
+                    raise TemplateFailed(
+                        f"{name} is 0, where keywords of the deck come and go: it has no slope"
+                        " there, give it another value"
+                    )
             result[name] = [
                 (file.removesuffix(".inp"), *row)
                 for file in texts[0]
@@ -70,7 +80,12 @@ class Decks:
         """The case a small step to one side of a variable, or at it where that side is none."""
         value = self.values[name]
         variable = self.case.case.variables.get(name)
-        span = max(abs(variable.lower), abs(variable.upper)) if variable else 1.0
+        effect = catalogue().get(name.removeprefix("effects."))
+        span = 1.0
+        if variable:
+            span = max(abs(variable.lower), abs(variable.upper))
+        elif effect:
+            span = max(abs(effect.low), abs(effect.high))
         moved = value + side * STEP * (abs(value) or span)
         try:
             return with_values(self.case, {name: moved}), moved
@@ -117,6 +132,11 @@ def _mesh_block(env: Any, mesh: dict[str, Any]) -> str:
         text = render(env, "mesh.inp.j2", {"mesh": mesh}).rstrip("\n")
         _BLOCKS[key] = env, mesh, text  # holding both keeps their ids from being reused
     return _BLOCKS[key][2]
+
+
+def _keywords(text: str) -> tuple[int, list[str]]:
+    """The deck's number of lines, and its keyword lines."""
+    return text.count("\n"), re.findall(r"^\*\w.*", text, re.MULTILINE)
 
 
 def _slopes(file: str, above: str, below: str, width: float) -> list[tuple[int, int, float]]:

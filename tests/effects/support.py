@@ -1,0 +1,52 @@
+"""A coarse case, and frequencies through the public door."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from tyrecal.case import LoadedCase, load_case, start_values, with_values
+from tyrecal.deck.write import Decks
+from tyrecal.evaluate.door import Door, Question
+from tyrecal.modes.label import paired_labels
+from tyrecal.modes.mode import Label
+
+CASES = Path(__file__).parents[2] / "cases"
+COARSE = {"crown": 3, "upper_sidewall": 3, "lower_sidewall": 3, "bead": 1}
+
+
+def coarse(name: str = "p235_75r17.yaml") -> LoadedCase:
+    """A shipped case with a coarse mesh."""
+    loaded = load_case(CASES / name)
+    case = loaded.case
+    level = case.mesh.levels["default"]
+    coarser = level.model_copy(update={"elements": COARSE, "rows": [1, 1, 1, 1], "grading": None})
+    mesh = case.mesh.model_copy(update={"levels": {"default": coarser}})
+    raw = {**loaded.raw, "mesh": mesh.model_dump(exclude_none=True)}
+    return replace(loaded, case=case.model_copy(update={"mesh": mesh}), raw=raw)
+
+
+CASE = coarse()
+START = start_values(CASE)
+
+
+def decks(case: LoadedCase, **effects: float) -> dict[str, str]:
+    """The decks of a case with effects."""
+    values = {f"effects.{id}": value for id, value in effects.items()}
+    return Decks(with_values(case, values)).texts("abaqus")
+
+
+def frequencies(case: LoadedCase = CASE, **effects: float) -> dict[Label, float]:
+    """Hz by label of a case with effects."""
+    values = {f"effects.{id}": value for id, value in effects.items()}
+    modes = paired_labels(Door(case).evaluate(Question({**START, **values})).modes)
+    return {mode.label: mode.frequency_Hz for mode in modes}
+
+
+def slopes(case: LoadedCase, id: str, value: float) -> np.ndarray:
+    """Exact d Hz / d parameter of every mode, in the order of the solver."""
+    name = f"effects.{id}"
+    answer = Door(case).evaluate(Question({**START, name: value}, (name,)))
+    return np.array(answer.gradients[name])

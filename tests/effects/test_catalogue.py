@@ -1,0 +1,104 @@
+"""What holds for every effect: absent at 0, smooth, exact slopes, refusals in one sentence."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tyrecal.case import CaseError, load_case, with_values
+from tyrecal.deck.environment import TemplateFailed
+from tyrecal.deck.write import Decks
+from tyrecal.effects import IDS, Effect, catalogue, with_effects
+from tyrecal.evaluate.door import Door, Question
+
+from .support import CASE, CASES, START, decks, slopes
+
+EFFECTS = list(catalogue().values())
+each = pytest.mark.parametrize("effect", EFFECTS, ids=[effect.id for effect in EFFECTS])
+STEP = 1e-3  # of the parameter; central differences are then right to 1e-5 or so
+
+
+@each
+def test_entry_is_complete(effect: Effect) -> None:
+    assert effect.id in IDS
+    assert effect.low < effect.high and effect.low <= 0 <= effect.high
+    assert all((effect.title, effect.symbol, effect.changes, effect.signature, effect.toggle))
+    assert set(effect.aliases) <= set(IDS)
+
+
+def test_a_case_without_effects_is_the_very_case() -> None:
+    assert with_effects(CASE) is CASE
+
+
+@each
+def test_zero_writes_the_same_decks(effect: Effect) -> None:
+    plain = Decks(CASE).texts("abaqus")
+    assert decks(CASE, **{effect.id: 0.0}) == plain
+    assert decks(CASE, **{effect.id: effect.high}) != plain
+
+
+@each
+def test_effect_is_written_in_the_case_and_none_is_left(effect: Effect) -> None:
+    case = with_values(CASE, {f"effects.{effect.id}": effect.high})
+    applied = with_effects(case)
+    assert not any(applied.case.effects.values())
+    assert with_effects(applied) is applied
+    assert CASE.case.effects[effect.id] == 0
+
+
+@each
+def test_slopes_are_those_of_the_frequencies(effect: Effect) -> None:
+    at = 0.4 * effect.high
+    name = f"effects.{effect.id}"
+    door = Door(CASE)
+    f = {
+        side: np.array(
+            [m.frequency_Hz for m in door.evaluate(Question({**START, name: at * side})).modes]
+        )
+        for side in (1 - STEP, 1 + STEP)
+    }
+    central = (f[1 + STEP] - f[1 - STEP]) / (2 * STEP * at)
+    exact = slopes(CASE, effect.id, at)
+    assert abs(central).max() * effect.high > 1e-3 * f[1 + STEP].min()  # it does something
+    assert exact == pytest.approx(central, rel=1e-4, abs=1e-4 * abs(central).max())
+
+
+@each
+def test_slope_at_zero_or_one_sentence(effect: Effect) -> None:
+    name = f"effects.{effect.id}"
+    evaluate = Decks(with_values(CASE, {name: 0.0}), {name: 0.0}, (name,)).tangents
+    try:
+        rows = evaluate("abaqus")[name]
+    except TemplateFailed as error:
+        assert f"{name} is 0" in str(error)
+    else:
+        assert rows
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("effects: {tread_density: 0.1, cap_pli: 1.0}", "did you mean 'cap_ply'"),
+        ("effects: {tread_wear: 5.0}", "effects.tread_wear is 5.0: must be"),
+        ("effects: {tread_wear: much}", "must be a number"),
+        ("effects: 3", "must be a table"),
+    ],
+)
+def test_case_file_says_what_is_wrong(case_folder, text: str, words: str) -> None:
+    path = case_folder / "p235_75r17.yaml"
+    path.write_text(path.read_text() + text + "\n")
+    with pytest.raises(CaseError) as refused:
+        load_case(path)
+    assert words in str(refused.value)
+
+
+def test_case_file_holds_effects_and_varies_them(case_folder) -> None:
+    path = case_folder / "p235_75r17.yaml"
+    variable = (
+        "variables:\n  gauge: {sets: [effects.pressure_offset], start: 2, lower: 1, upper: 5}"
+    )
+    text = path.read_text().replace("variables:", variable)
+    path.write_text(text + "effects: {temperature: 5}\n")
+    case = load_case(path)
+    by_variable = Decks(with_values(case, {"gauge": 3.0})).texts("abaqus")
+    assert by_variable == decks(load_case(CASES / path.name), temperature=5, pressure_offset=3)

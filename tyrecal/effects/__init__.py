@@ -1,0 +1,44 @@
+"""What a plain model leaves out: one file an effect, each with one parameter; 0 = absent."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+from .effect import Effect, EffectRefused
+
+if TYPE_CHECKING:
+    from ..case import LoadedCase
+
+# Each a module of this package; in this order they are listed, and applied to a case.
+IDS = (
+    "pressure_offset",
+    "temperature",
+)
+
+__all__ = ["IDS", "Effect", "EffectRefused", "catalogue", "with_effects"]
+
+
+@cache
+def catalogue() -> dict[str, Effect]:
+    """Every effect by its id. (Modules are imported here: the case's schema needs the ids only.)"""
+    return {id: import_module(f".{id}", __package__).EFFECT for id in IDS}
+
+
+def with_effects(case: LoadedCase) -> LoadedCase:
+    """The case with its effects written into its other numbers, and none left to apply.
+
+    The very case where it has none. Raises EffectRefused for a parameter that cannot be.
+    """
+    present = {id: value for id, value in case.case.effects.items() if value}
+    if not present:
+        return case
+    case = replace(case, case=case.case.model_copy(update={"effects": dict.fromkeys(IDS, 0.0)}))
+    for id in sorted(present, key=IDS.index):
+        try:
+            case = catalogue()[id].add(case, present[id])
+        except ValueError as error:
+            raise EffectRefused(id, str(error), present[id]) from None
+    return case

@@ -1,0 +1,32 @@
+"""The rubber is warmer or colder than where its modulus was calibrated: softer or stiffer."""
+
+from __future__ import annotations
+
+from ..case import LoadedCase
+from .edit import scaled_rubbers
+from .effect import Effect
+
+PER_KELVIN = -0.0075  # of the shear modulus; filled tread rubbers at 20 to 60 C: -0.005 to -0.01
+
+
+def add(case: LoadedCase, value: float) -> LoadedCase:
+    """C10 and C01 times 1 - 0.0075 value; the bulk modulus stays."""
+    factor = 1 + PER_KELVIN * value
+    if not factor > 0:
+        raise ValueError(f"must be less than {-1 / PER_KELVIN:g} K")
+    return scaled_rubbers(case, factor)
+
+
+EFFECT = Effect(
+    id="temperature",
+    title="Rubber temperature",
+    symbol="dT",
+    unit="K",
+    low=-15.0,
+    high=15.0,
+    changes=("*HYPERELASTIC",),
+    signature="",
+    toggle="measure again with the tyre soaked at another temperature",
+    aliases=("dynamic_stiffening", "sidewall_gauge"),
+    add=add,
+)
