@@ -156,7 +156,7 @@ def probabilities(hypotheses: Sequence[Hypothesis]) -> dict[str, float]:
 
 def single(problem: Problem, id: str, prior: float, sigma: Array | None = None) -> Hypothesis:
     """One effect over its range."""
-    e, ln_weights = _grid(problem.expansion.nodes[id], NODES)
+    e, ln_weights = grid(problem.expansion.nodes[id])
     return _hypothesis(problem, id, prior, {id: e}, ln_weights, sigma)
 
 
@@ -164,7 +164,7 @@ def pair(
     problem: Problem, first: str, second: str, prior: float, sigma: Array | None = None
 ) -> Hypothesis:
     """Two effects at once; what they add is added up."""
-    grids = [_grid(problem.expansion.nodes[id], PAIR_NODES) for id in (first, second)]
+    grids = [grid(problem.expansion.nodes[id], PAIR_NODES) for id in (first, second)]
     a, b = np.meshgrid(grids[0][0], grids[1][0], indexing="ij")
     ln_weights = np.add.outer(grids[0][1], grids[1][1]).ravel()
     values = {first: a.ravel(), second: b.ravel()}
@@ -249,7 +249,7 @@ def _hypothesis(
     return Hypothesis(key, prior, ln, values, ln_weights, fitted)
 
 
-def _grid(nodes: Nodes, count: int) -> tuple[Array, Array]:
+def grid(nodes: Nodes, count: int = NODES) -> tuple[Array, Array]:
     """Parameters (count,) over the reach and ln of weight times density, which sum to 1."""
     low, high = nodes.reach
     points, weights = np.polynomial.legendre.leggauss(count)
