@@ -36,7 +36,7 @@ class Abaqus:
 
     name = "abaqus"
     dialect = "abaqus"
-    capabilities = frozenset({"modes"})
+    capabilities = frozenset({"modes", "vibration_modulus"})
     refusals = (OptionRefused, DeckError)
     failures = (RunFailed,)
 

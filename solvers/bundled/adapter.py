@@ -35,7 +35,7 @@ class Bundled:
     name = "bundled"
     version = VERSION
     dialect = "abaqus"
-    capabilities = frozenset({"modes", "gradients", "footprint"})
+    capabilities = frozenset({"modes", "gradients", "footprint", "vibration_modulus"})
     refusals = (DeckError,)
     failures = (*Failures, TimedOut)
 

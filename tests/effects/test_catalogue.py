@@ -10,6 +10,7 @@ from tyrecal.deck.environment import TemplateFailed
 from tyrecal.deck.write import Decks
 from tyrecal.effects import IDS, Effect, catalogue, with_effects
 from tyrecal.evaluate.door import Door, Question
+from tyrecal.evaluate.failure import DeckRefused, EvaluationFailed
 
 from .support import CASE, CASES, START, decks, slopes
 
@@ -102,3 +103,40 @@ def test_case_file_holds_effects_and_varies_them(case_folder) -> None:
     case = load_case(path)
     by_variable = Decks(with_values(case, {"gauge": 3.0})).texts("abaqus")
     assert by_variable == decks(load_case(CASES / path.name), temperature=5, pressure_offset=3)
+
+
+@pytest.mark.parametrize(
+    ("id", "value"),
+    [
+        ("dynamic_stiffening", -0.1),
+        ("tread_density", -1.0),
+        ("tread_wear", 0.95),
+        ("bead_filler", -1.0),
+        ("cap_ply", -1.0),
+        ("belt_angle", 70.0),
+        ("belt_angle", -20.0),
+        ("belt_width", 0.1),
+        ("carcass_fanning", 1.01),
+        ("carcass_turn_up", -0.1),
+        ("sidewall_gauge", -0.95),
+        ("sidewall_gauge", 9.0),  # the section folds over
+        ("rim_width", 0.1),
+        ("pressure_offset", -161.0),
+        ("temperature", 134.0),
+        ("temperature_drift", -170.0),
+    ],
+)
+def test_what_cannot_be_is_refused_in_one_sentence(id: str, value: float) -> None:
+    with pytest.raises(ValueError, match=f"^effects.{id} [^\n]*, got {value:g}$"):
+        with_values(CASE, {f"effects.{id}": value})
+
+
+def test_a_design_that_cannot_be_is_a_failure_to_step_back_from() -> None:
+    with pytest.raises(EvaluationFailed, match="tread_wear") as failed:
+        Door(CASE).evaluate(Question({"effects.tread_wear": 2.0}))
+    assert failed.value.cause == "refused"
+
+
+def test_a_solver_says_which_effect_it_cannot_express() -> None:
+    with pytest.raises(DeckRefused, match="'calculix' cannot express .* 'dynamic_stiffening'"):
+        Door(CASE, "calculix").evaluate(Question({"effects.dynamic_stiffening": 0.1}))

@@ -27,7 +27,8 @@ if TYPE_CHECKING:
 class LoadedCase:
     """A valid case: typed (``case``), as plain data (``raw``), with its section and its place.
 
-    path: the case file; folder: where it lies, to which its own paths are relative.
+    path: the case file; folder: where it lies, to which its own paths are relative;
+    file_pressure_kPa: the pressure in the file, whatever is set later.
     """
 
     case: Case
@@ -35,6 +36,7 @@ class LoadedCase:
     section: Section
     folder: Path
     raw: dict[str, Any]
+    file_pressure_kPa: float | None = None
 
 
 def load_case(path: Path | str) -> LoadedCase:
@@ -66,7 +68,7 @@ def _read(path: Path) -> tuple[LoadedCase | None, list[Mistake]]:
         document.add(("section", "stations"), message)
     if case is None or section is None or document.mistakes:
         return None, sorted(document.mistakes, key=lambda m: (m.file != str(path), m.line))
-    loaded = LoadedCase(case, path, section, path.parent, raw)
+    loaded = LoadedCase(case, path, section, path.parent, raw, case.pressure_kPa)
     try:
         with_effects(loaded)
     except EffectRefused as error:

@@ -25,6 +25,10 @@ def places(data: Mapping[str, Any], section: Section) -> Problems:
         if isinstance(line, str) and line not in lines[1:-1]:
             hint = suggestion(line, lines[1:-1])
             yield ("rebar_layers", name, "line"), f"is not a line inside the section{hint}"
+        for j, region in enumerate(entries(layer, "regions")):
+            if isinstance(region, str) and region not in regions:
+                hint = suggestion(region, regions)
+                yield ("rebar_layers", name, "regions", j), f"is not a region of the section{hint}"
     for i, gauge in enumerate(entries(table(data, "section"), "gauges")):
         for key, known in (("regions", regions), ("between", lines)):
             for j, word in enumerate(entries(gauge, key)):

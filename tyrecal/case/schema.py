@@ -105,7 +105,8 @@ class Solid(Part):
 class RebarLayer(Part):
     """Cords on a line of the section; ``angle_deg`` from the meridian, ``area_m2`` of one cord.
 
-    Cords stand ``spacing_m`` apart or, with ``geometry: angular``, ``spacing_deg`` apart.
+    Cords stand ``spacing_m`` apart or, with ``geometry: angular``, ``spacing_deg`` apart. The
+    layer is as long as its line, or ends with some of its ``regions``.
     """
 
     line: str
@@ -115,6 +116,7 @@ class RebarLayer(Part):
     spacing_m: Positive | None = None
     spacing_deg: Annotated[float, Field(gt=0, le=360)] | None = None
     angle_deg: Degrees
+    regions: Annotated[list[str], Field(min_length=1)] | None = None
 
     @classmethod
     def problems(cls, values: Mapping[str, Any]) -> Iterator[Problem]:

@@ -46,6 +46,7 @@ def command(
     loaded, values = options.load(case, mesh, assignments, pressure_kPa)
     door = Door(loaded, solver)
     adapter = door.solver
+    door.needs_effects_of(loaded)
     if loads is not None:
         door.needs_road()
         decks = Decks(loaded, values, loads_N=tuple(options.parse_loads(loads)))

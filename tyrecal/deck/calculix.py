@@ -113,6 +113,8 @@ def _plies(case: LoadedCase, sector: Sector, thickness: float) -> list[dict[str,
         cord: Any = case.case.materials[layer.material]
         angle = np.radians(layer.angle_deg)
         for k, (element, (r, z), radius) in enumerate(sector.strips[layer.line], start=1):
+            if layer.regions and sector.regions[element] not in layer.regions:
+                continue
             number += 1
             spacing = layer.spacing_m or np.radians(layer.spacing_deg or 0.0) * radius
             share = layer.area_m2 / (spacing * thickness)

@@ -52,14 +52,17 @@ def context(case: LoadedCase) -> dict[str, Any]:
     materials = [
         {"name": deck_name(name), **_material(material)} for name, material in c.materials.items()
     ]
-    layers: dict[str, dict[str, Any]] = {}
+    layers: dict[tuple[Any, ...], dict[str, Any]] = {}
+    sets: list[tuple[str, str, tuple[str, ...]]] = []
     for name, layer in c.rebar_layers.items():
         angular = layer.geometry == "angular"
-        group = layers.setdefault(
-            f"{layer.line}|{angular}",
-            {"set": deck_name(layer.line), "angular": angular, "cords": []},
-        )
-        group["cords"].append(
+        key = layer.line, angular, tuple(layer.regions or ())
+        if key not in layers:  # layers of one kind and place share their surface elements
+            same = sum(line == layer.line for _, line, _ in sets)
+            own = deck_name(layer.line) + (f"_{same + 1}" if same else "")
+            sets.append((own, layer.line, key[2]))
+            layers[key] = {"set": own, "angular": angular, "cords": []}
+        layers[key]["cords"].append(
             {
                 "name": deck_name(name),
                 "area": layer.area_m2,
@@ -70,10 +73,9 @@ def context(case: LoadedCase) -> dict[str, Any]:
         )
     rows = tuple(c.mesh.levels[c.mesh.level].rows)
     claims = solid_claims(case)
-    lines = frozenset(layer.line for layer in c.rebar_layers.values())
     point = c.rim.reference_point_m
     tables = _tables(
-        mesh, case.section.names, rows, claims, lines, (point.r, point.z), c.mesh.element
+        mesh, case.section.names, rows, claims, tuple(sets), (point.r, point.z), c.mesh.element
     )
     hourglass = None if mesh.quadratic else {"stiffness": c.mesh.hourglass_stiffness_Pa}
     return {
@@ -146,17 +148,31 @@ def claimed(
     return None
 
 
+def _surface(
+    mesh: SectionMesh, line: str, regions: tuple[str, ...], offset: int
+) -> list[tuple[int, ...]]:
+    """Surface elements on a line, in some regions or all; ``offset`` of their numbers."""
+    return [
+        (offset + n, *nodes)
+        for n, nodes in mesh.cords[line].items()
+        if not regions or mesh.region_of(n) in regions
+    ]
+
+
 @lru_cache(maxsize=8)
 def _tables(
     mesh: SectionMesh,
     lines: tuple[str, ...],
     rows: tuple[int, ...],
     claims: Claims,
-    used_lines: frozenset[str],
+    sets: tuple[tuple[str, str, tuple[str, ...]], ...],
     reference: tuple[float, float],
     element: str,
 ) -> dict[str, Any]:
-    """Node and element tables; elements go to the last entry of ``solids`` that claims them."""
+    """Node and element tables; elements go to the last entry of ``solids`` that claims them.
+
+    sets: of surface elements, each with its line and the regions it is in (none: all).
+    """
     blocks: dict[int, list[tuple[int, ...]]] = {}
     regions: dict[str, list[int]] = {}
     for number, (region, row) in mesh.cells.items():
@@ -172,9 +188,9 @@ def _tables(
             {"name": f"SOLID_{i + 1}", "entry": i, "elements": b} for i, b in sorted(blocks.items())
         ],
         "lines": [
-            {"name": deck_name(line), "elements": [(n, *nodes) for n, nodes in elements.items()]}
-            for line, elements in mesh.cords.items()
-            if line in used_lines
+            {"name": name, "elements": _surface(mesh, line, regions, 100_000 * k)}
+            for line in mesh.cords
+            for k, (name, regions) in enumerate((s[0], s[2]) for s in sets if s[1] == line)
         ],
         "regions": [{"name": f"REGION_{deck_name(k)}", "members": v} for k, v in regions.items()],
         "inner": mesh.inner,

@@ -14,8 +14,20 @@ if TYPE_CHECKING:
 
 # Each a module of this package; in this order they are listed, and applied to a case.
 IDS = (
+    "dynamic_stiffening",
+    "tread_density",
+    "tread_wear",
+    "bead_filler",
+    "cap_ply",
+    "belt_angle",
+    "belt_width",
+    "carcass_fanning",
+    "carcass_turn_up",
+    "sidewall_gauge",
+    "rim_width",
     "pressure_offset",
     "temperature",
+    "temperature_drift",
 )
 
 __all__ = ["IDS", "Effect", "EffectRefused", "catalogue", "with_effects"]
@@ -35,10 +47,14 @@ def with_effects(case: LoadedCase) -> LoadedCase:
     present = {id: value for id, value in case.case.effects.items() if value}
     if not present:
         return case
+    from ..deck.context import section_mesh
+
     case = replace(case, case=case.case.model_copy(update={"effects": dict.fromkeys(IDS, 0.0)}))
     for id in sorted(present, key=IDS.index):
         try:
-            case = catalogue()[id].add(case, present[id])
+            before, case = case, catalogue()[id].add(case, present[id])
+            if (case.section, case.case.section) != (before.section, before.case.section):
+                section_mesh(case)  # remembered for the deck; refuses a section that folds over
         except ValueError as error:
             raise EffectRefused(id, str(error), present[id]) from None
     return case

@@ -2,36 +2,92 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
-from typing import Any
+from typing import Any, TypeVar
 
 from pydantic import BaseModel
 
 from ..case import Case, LoadedCase
-from ..case.schema import Rubber
+from ..case.schema import Gauge, Part, Rubber, Solid
+
+P = TypeVar("P", bound=Part)
 
 
 def changed(loaded: LoadedCase, **parts: Any) -> LoadedCase:
-    """The case with whole parts of it (``materials=...``) replaced."""
+    """The case with whole parts of it (``materials=...``) replaced, and judged."""
     case = Case.model_validate({**loaded.case.__dict__, **parts})
     raw = {**loaded.raw, **{key: _plain(value) for key, value in parts.items()}}
     return replace(loaded, case=case, raw=raw)
 
 
-def with_part(part: Any, **values: Any) -> Any:
+def with_part(part: P, **values: Any) -> P:
     """A part of the case with some of its values replaced, and judged."""
     return type(part).model_validate({**part.__dict__, **values})
 
 
-def scaled_rubbers(loaded: LoadedCase, factor: float) -> LoadedCase:
-    """All rubbers' C10 and C01 times ``factor``; the bulk modulus 2 / D1 stays."""
+def unused(name: str, taken: Iterable[str]) -> str:
+    """``name``, or with a number behind it where a deck could not tell it from one taken."""
+    known = {other.casefold().replace("-", "_") for other in taken}
+    count = 2
+    new = name
+    while new.casefold().replace("-", "_") in known:
+        new, count = f"{name}_{count}", count + 1
+    return new
+
+
+def with_rubbers(loaded: LoadedCase, change: Callable[[Rubber], Rubber]) -> LoadedCase:
+    """The case with all its rubbers changed."""
     materials = {
-        name: with_part(m, C10_Pa=factor * m.C10_Pa, C01_Pa=factor * m.C01_Pa)
-        if isinstance(m, Rubber)
-        else m
-        for name, m in loaded.case.materials.items()
+        name: change(material) if isinstance(material, Rubber) else material
+        for name, material in loaded.case.materials.items()
     }
     return changed(loaded, materials=materials)
+
+
+def with_rubbers_at(
+    loaded: LoadedCase,
+    regions: list[str],
+    between: tuple[str, str],
+    ending: str,
+    change: Callable[[Rubber], Rubber],
+) -> LoadedCase:
+    """The case with the rubbers of some regions changed, between two lines (inner, outer).
+
+    Each gets a copy under its name and ``ending``; later entries of ``solids`` override earlier
+    ones, so each entry is repeated for the part of the place that it claims.
+    """
+    lines = loaded.section.names
+    low, high = lines.index(between[0]), lines.index(between[1])
+    materials: dict[str, Any] = dict(loaded.case.materials)
+    copies: dict[str, str] = {}
+    solids = list(loaded.case.solids)
+    for solid in loaded.case.solids:
+        where = [region for region in regions if region in (solid.regions or regions)]
+        own = [lines.index(name) for name in solid.between or (lines[0], lines[-1])]
+        inner, outer = max(low, own[0]), min(high, own[1])
+        if not where or inner >= outer:
+            continue
+        if solid.material not in copies:
+            copies[solid.material] = unused(f"{solid.material}_{ending}", materials)
+            materials[copies[solid.material]] = change(materials[solid.material])
+        span = [lines[inner], lines[outer]]
+        solids.append(Solid(material=copies[solid.material], regions=where, between=span))
+    return changed(loaded, materials=materials, solids=solids)
+
+
+def with_gauge(
+    loaded: LoadedCase, between: tuple[str, str], regions: list[str], factor: float
+) -> LoadedCase:
+    """The case with one more factor on the thickness between two lines."""
+    section = loaded.case.section
+    gauge = Gauge(between=list(between), regions=regions, factor=factor)
+    return changed(loaded, section=with_part(section, gauges=[*(section.gauges or []), gauge]))
+
+
+def with_layers(loaded: LoadedCase, layers: Mapping[str, Any]) -> LoadedCase:
+    """The case with layers of cords added, or replaced where their name is taken."""
+    return changed(loaded, rebar_layers={**loaded.case.rebar_layers, **layers})
 
 
 def _plain(value: Any) -> Any:

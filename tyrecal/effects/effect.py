@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -35,6 +35,10 @@ class Effect:
     aliases: tuple[str, ...]
     add: Callable[[LoadedCase, float], LoadedCase]
     needs: str = ""
+
+    def within(self, capabilities: Collection[str]) -> bool:
+        """Whether a solver with these capabilities can express it."""
+        return not self.needs or self.needs in capabilities
 
 
 class EffectRefused(ValueError):

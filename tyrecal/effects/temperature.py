@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from ..case import LoadedCase
-from .edit import scaled_rubbers
+from .edit import with_part, with_rubbers
 from .effect import Effect
 
 PER_KELVIN = -0.0075  # of the shear modulus; filled tread rubbers at 20 to 60 C: -0.005 to -0.01
 
 
 def add(case: LoadedCase, value: float) -> LoadedCase:
-    """C10 and C01 times 1 - 0.0075 value; the bulk modulus stays."""
+    """C10 and C01 times 1 - 0.0075 value; the bulk modulus 2 / D1 stays."""
     factor = 1 + PER_KELVIN * value
     if not factor > 0:
         raise ValueError(f"must be less than {-1 / PER_KELVIN:g} K")
-    return scaled_rubbers(case, factor)
+    return with_rubbers(
+        case, lambda m: with_part(m, C10_Pa=factor * m.C10_Pa, C01_Pa=factor * m.C01_Pa)
+    )
 
 
 EFFECT = Effect(
@@ -26,7 +28,7 @@ EFFECT = Effect(
     high=15.0,
     changes=("*HYPERELASTIC",),
     signature="",
-    toggle="measure again with the tyre soaked at another temperature",
+    toggle="measure again with the tyre soaked at another temperature, at the same pressure",
     aliases=("dynamic_stiffening", "sidewall_gauge"),
     add=add,
 )

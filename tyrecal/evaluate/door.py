@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 
 from ..case import LoadedCase, with_values
 from ..deck.write import Decks
+from ..effects import catalogue
 from . import folders
 from .failure import DeckRefused, EvaluationFailed
 from .pool import process_pool
@@ -106,11 +107,22 @@ class Door:
                 " shows which one can (footprint)"
             )
 
+    def needs_effects_of(self, case: LoadedCase) -> None:
+        """Raises DeckRefused where the solver cannot express an effect that the case has."""
+        for id in (id for id, value in case.case.effects.items() if value):
+            if not catalogue()[id].within(self.solver.capabilities):
+                raise DeckRefused(
+                    f"solver '{self.solver.name}' cannot express the effect '{id}'; 'tyrecal effects'"
+                    " shows which one can"
+                )
+
     def _with(self, values: Mapping[str, float]) -> LoadedCase:
         try:
-            return with_values(self.case, values)
+            case = with_values(self.case, values)
         except ValueError as error:  # no such tyre: the optimiser steps back from it
             raise EvaluationFailed("refused", str(error)) from None
+        self.needs_effects_of(case)
+        return case
 
     def _ask(self, decks: Decks, typed: Callable[[dict[str, Any], Path | None], T]) -> T:
         """The solver's answer, or the record's, ``typed``, which is told where a run that ended

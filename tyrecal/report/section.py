@@ -13,6 +13,7 @@ from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from ..effects import with_effects
 from ..tyre.mesh import SectionMesh
 from .figure import COLOURS, GREY, in_house_style, new_figure, save
 
@@ -37,6 +38,7 @@ def draw_section(
     The belt's edge is repeated four times as large. displacement: node number to (r, theta, z)
     of the inflation, m; with it the inflated outline is dashed, at true scale.
     """
+    case = with_effects(case)
     place = {n: np.array([z, r]) * 1e3 for n, (r, z) in mesh.nodes.items()}
     outline = _outline(mesh)
     figure = new_figure(9.0, 8.0)
@@ -76,10 +78,18 @@ def _draw(
     entries: dict[str, Artist] = {}
     layers = case.case.rebar_layers
     for k, (name, layer) in enumerate(layers.items()):
-        sharing = [other for other, its in layers.items() if its.line == layer.line]
+        sharing = [
+            other
+            for other, its in layers.items()
+            if (its.line, its.regions) == (layer.line, layer.regions)
+        ]
         # layers on one line take turns, element by element
         turns = slice(sharing.index(name), None, len(sharing))
-        lines = [[place[n] for n in nodes] for nodes in mesh.cords[layer.line].values()]
+        lines = [
+            [place[n] for n in nodes]
+            for cord, nodes in mesh.cords[layer.line].items()
+            if not layer.regions or mesh.region_of(cord) in layer.regions
+        ]
         colour = COLOURS[k % len(COLOURS)]
         axes.add_collection(
             LineCollection(lines[turns], color=colour, lw=1.3 * size, capstyle="butt", zorder=3)

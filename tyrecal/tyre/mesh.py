@@ -32,6 +32,10 @@ class SectionMesh:
     shape: tuple[int, int]
     crown_outer: list[int] = field(default_factory=list)
 
+    def region_of(self, cord: int) -> str:
+        """The region that an element of a cord line lies in."""
+        return self.cells[1000 * (cord % 1_000_000) + 1][0]
+
     @property
     def outer_nodes(self) -> list[int]:
         """Nodes of the outer surface from -z to +z, midside ones too."""

@@ -1,0 +1,42 @@
+"""A stiffer filler (apex) above the bead, which a tyre of one rubber does not have."""
+
+from __future__ import annotations
+
+from ..case import LoadedCase
+from .edit import with_part, with_rubbers_at
+from .effect import Effect
+from .parts import lower_sidewall
+
+
+def add(case: LoadedCase, value: float) -> LoadedCase:
+    """Shear and bulk modulus of the lower sidewall's rubber times 1 + value."""
+    if not value > -1:
+        raise ValueError("must be greater than -1")
+    factor = 1 + value
+    return with_rubbers_at(
+        case,
+        lower_sidewall(case),
+        (case.section.names[0], case.section.names[-1]),
+        "filler",
+        lambda m: with_part(
+            m,
+            C10_Pa=factor * m.C10_Pa,
+            C01_Pa=factor * m.C01_Pa,
+            D1_per_Pa=m.D1_per_Pa / factor,
+        ),
+    )
+
+
+EFFECT = Effect(
+    id="bead_filler",
+    title="Bead filler",
+    symbol="e",
+    unit="",
+    low=0.0,
+    high=3.0,
+    changes=("*HYPERELASTIC", "*SOLID SECTION"),
+    signature="",
+    toggle="section a tyre of the same build and measure the hardness above the bead",
+    aliases=("carcass_turn_up", "rim_width"),
+    add=add,
+)

@@ -1,0 +1,39 @@
+"""The belts' cords lie at another angle than stated: lift in the mould, or the cutter's setting."""
+
+from __future__ import annotations
+
+from ..case import LoadedCase
+from .edit import with_layers, with_part
+from .effect import Effect
+from .parts import belts
+
+
+def add(case: LoadedCase, value: float) -> LoadedCase:
+    """Every belt cord ``value`` degrees further from the circumference, mirrored as they are."""
+    moved = {}
+    for name in belts(case):
+        layer = case.case.rebar_layers[name]
+        angle = layer.angle_deg % 180  # a cord has no head
+        if not 0 < abs(90 - angle) + value < 90:
+            raise ValueError(
+                f"must leave a belt cord between circumference and meridian, '{name}' is"
+                f" {abs(90 - angle):g} degrees from the circumference"
+            )
+        side = 1 if angle > 90 else -1
+        moved[name] = with_part(layer, angle_deg=layer.angle_deg + side * value)
+    return with_layers(case, moved)
+
+
+EFFECT = Effect(
+    id="belt_angle",
+    title="Belt cord angle",
+    symbol="da",
+    unit="degrees",
+    low=-3.0,
+    high=3.0,
+    changes=("*REBAR LAYER",),
+    signature="",
+    toggle="peel the tread of a tyre of the same build and measure the angle, or X-ray it",
+    aliases=("cap_ply", "tread_density"),
+    add=add,
+)

@@ -1,0 +1,43 @@
+"""A textile layer over the belt, its cords round the tyre."""
+
+from __future__ import annotations
+
+from ..case import LoadedCase
+from ..case.schema import Cord, RebarLayer
+from .edit import changed, unused, with_layers
+from .effect import Effect
+from .parts import belt_lines
+
+NYLON = Cord(kind="cord", youngs_modulus_Pa=3.5e9, poissons_ratio=0.3, density_kg_per_m3=1140.0)
+SPACING_M = 1e-3
+
+
+def add(case: LoadedCase, value: float) -> LoadedCase:
+    """A nylon layer on the outer belt's line, at 90 degrees, of stiffness E A / s = value."""
+    if not value > 0:
+        raise ValueError("must be at least 0")
+    material = unused("cap_ply_cord", case.case.materials)
+    layer = RebarLayer(
+        line=belt_lines(case)[-1],
+        material=material,
+        area_m2=value * SPACING_M / NYLON.youngs_modulus_Pa,
+        spacing_m=SPACING_M,
+        angle_deg=90.0,
+    )
+    case = changed(case, materials={**case.case.materials, material: NYLON})
+    return with_layers(case, {unused("cap_ply", case.case.rebar_layers): layer})
+
+
+EFFECT = Effect(
+    id="cap_ply",
+    title="Cap ply",
+    symbol="EA/s",
+    unit="N/m",
+    low=0.0,
+    high=2e6,
+    changes=("*REBAR LAYER", "*MATERIAL"),
+    signature="",
+    toggle="section a tyre of the same build, or look the construction up on its sidewall",
+    aliases=("belt_angle",),
+    add=add,
+)

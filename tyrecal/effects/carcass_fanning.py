@@ -1,0 +1,55 @@
+"""Cords of a radial carcass keep their number round the tyre: they stand closer at the bead."""
+
+from __future__ import annotations
+
+from math import degrees
+
+from ..case import LoadedCase
+from .edit import unused, with_layers, with_part
+from .effect import Effect
+from .parts import carcass, carcass_line, rim_edge
+
+
+def add(case: LoadedCase, value: float) -> LoadedCase:
+    """A share ``value`` of the carcass' cords at a constant angle, the rest at constant spacing.
+
+    A/s = A/s0 (1 - value + value R_bead / R). Equal at the bead, because the spacing in a
+    tyre's specification is that on the building drum, whose diameter is about the bead's.
+    """
+    if not 0 < value <= 1:
+        raise ValueError("must be between 0 and 1")
+    line = case.section.points[case.section.names.index(carcass_line(case))]
+    bead = float(line[rim_edge(case.section), 0])
+    layers = dict(case.case.rebar_layers)
+    for name in carcass(case):
+        layer = layers[name]
+        if layer.spacing_m is None:
+            raise ValueError(f"must be 0: the cords of '{name}' fan out already")
+        fanned = with_part(
+            layer,
+            area_m2=value * layer.area_m2,
+            geometry="angular",
+            spacing_deg=degrees(layer.spacing_m / bead),
+            spacing_m=None,
+        )
+        if value < 1:
+            layers[name] = with_part(layer, area_m2=(1 - value) * layer.area_m2)
+            layers[unused(f"{name}_fanned", layers)] = fanned
+        else:
+            layers[name] = fanned
+    return with_layers(case, layers)
+
+
+EFFECT = Effect(
+    id="carcass_fanning",
+    title="Fanned carcass cords",
+    symbol="e",
+    unit="",
+    low=0.0,
+    high=1.0,
+    changes=("*REBAR LAYER",),
+    signature="",
+    toggle="count the cords per length at the crown and at the bead of a tyre that is cut open",
+    aliases=(),
+    add=add,
+)

@@ -1,0 +1,69 @@
+"""Rubber is stiffer in a small, fast vibration than in the slow, large inflation."""
+
+from __future__ import annotations
+
+from math import pi
+
+from ..case import LoadedCase
+from ..case.schema import Analysis, Prony, Rubber
+from .edit import changed, with_part, with_rubbers
+from .effect import Effect
+
+# One term that has relaxed in a static step and has not in any vibration: 1/(2 pi f tau)^2 = 2e-12
+FREQUENCY_HZ, TAU_S = 100.0, 1000.0
+
+
+def add(case: LoadedCase, value: float) -> LoadedCase:
+    """Shear modulus of the vibration times 1 + value; that of the inflated state stays."""
+    analysis = case.case.analysis
+    long_term = analysis.static_moduli == "long_term"
+
+    def stiffened(m: Rubber) -> Rubber:
+        """The same static state, its vibration as one Prony term: G'/G0 = 1/(1 - g)."""
+        static, ratio = zip(*(_moduli(m, k, long_term, analysis) for k in "gk"), strict=True)
+        shear, bulk = ratio[0] * (1 + value), ratio[1]
+        if not (shear >= 1 and bulk >= 1):
+            raise ValueError("must leave the vibration at least as stiff as the inflated state")
+        return with_part(
+            m,
+            C10_Pa=m.C10_Pa * static[0],
+            C01_Pa=m.C01_Pa * static[0],
+            D1_per_Pa=m.D1_per_Pa / static[1],
+            moduli="long_term",
+            prony=[Prony(g=1 - 1 / shear, k=1 - 1 / bulk, tau_s=TAU_S)],
+        )
+
+    case = with_rubbers(case, stiffened)
+    relaxed = with_part(analysis, static_moduli="long_term", vibration_frequency_Hz=FREQUENCY_HZ)
+    return changed(case, analysis=relaxed)
+
+
+def _moduli(m: Rubber, share: str, long_term: bool, analysis: Analysis) -> tuple[float, float]:
+    """The static modulus over the given constants', and the vibration's over the static one.
+
+    share: g (shear) or k (bulk). G'(w)/G0 = 1 - sum g + sum g w^2 tau^2 / (1 + w^2 tau^2).
+    """
+    terms = [(getattr(term, share), term.tau_s) for term in m.prony]
+    relaxed = 1 - sum(g for g, _ in terms)
+    given = relaxed if m.moduli == "long_term" else 1.0
+    static = relaxed if long_term else 1.0
+    if analysis.vibration_frequency_Hz is None:
+        return static / given, 1.0
+    squares = [((2 * pi * analysis.vibration_frequency_Hz * tau) ** 2, g) for g, tau in terms]
+    return static / given, (relaxed + sum(g * x / (1 + x) for x, g in squares)) / static
+
+
+EFFECT = Effect(
+    id="dynamic_stiffening",
+    title="Dynamic stiffening of rubber",
+    symbol="e",
+    unit="",
+    low=0.0,
+    high=1.0,
+    changes=("*VISCOELASTIC", "*FREQUENCY"),
+    signature="",
+    toggle="excite ten times harder: the modulus of filled rubber falls with strain amplitude",
+    aliases=("temperature", "sidewall_gauge"),
+    add=add,
+    needs="vibration_modulus",
+)

@@ -1,0 +1,32 @@
+"""The tyre warms or cools from one pressure of the run to the next."""
+
+from __future__ import annotations
+
+from ..case import LoadedCase
+from . import temperature
+from .effect import Effect
+
+
+def add(case: LoadedCase, value: float) -> LoadedCase:
+    """A temperature of value (p - p0) / 100 kPa, p0 being the pressure in the case file."""
+    nominal = case.case.pressure_kPa if case.file_pressure_kPa is None else case.file_pressure_kPa
+    kelvin = value * (case.case.pressure_kPa - nominal) / 100
+    try:
+        return temperature.add(case, kelvin)
+    except ValueError as error:
+        raise ValueError(f"gives {kelvin:g} K at this pressure, which {error}") from None
+
+
+EFFECT = Effect(
+    id="temperature_drift",
+    title="Temperature drift over the run of pressures",
+    symbol="dT'",
+    unit="K per 100 kPa",
+    low=-5.0,
+    high=5.0,
+    changes=("*HYPERELASTIC",),
+    signature="",
+    toggle="measure the first pressure once more at the end of the run",
+    aliases=("pressure_offset",),
+    add=add,
+)

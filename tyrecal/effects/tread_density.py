@@ -1,0 +1,36 @@
+"""The tread weighs more or less than its rubber: voids of the pattern, another compound."""
+
+from __future__ import annotations
+
+from ..case import LoadedCase
+from .edit import with_part, with_rubbers_at
+from .effect import Effect
+from .parts import belt_lines, crown
+
+
+def add(case: LoadedCase, value: float) -> LoadedCase:
+    """Density outside the outer belt times 1 + value."""
+    if not value > -1:
+        raise ValueError("must be greater than -1")
+    return with_rubbers_at(
+        case,
+        crown(case),
+        (belt_lines(case)[-1], case.section.names[-1]),
+        "tread",
+        lambda m: with_part(m, density_kg_per_m3=(1 + value) * m.density_kg_per_m3),
+    )
+
+
+EFFECT = Effect(
+    id="tread_density",
+    title="Tread density",
+    symbol="e",
+    unit="",
+    low=-0.25,
+    high=0.1,
+    changes=("*DENSITY", "*SOLID SECTION"),
+    signature="",
+    toggle="weigh the tyre; buff the tread smooth, weigh and measure again",
+    aliases=("tread_wear", "pressure_offset"),
+    add=add,
+)

@@ -1,0 +1,30 @@
+"""Part of the tread is worn off."""
+
+from __future__ import annotations
+
+from ..case import LoadedCase
+from .edit import with_gauge
+from .effect import Effect
+from .parts import belt_lines, crown
+
+
+def add(case: LoadedCase, value: float) -> LoadedCase:
+    """Gauge between the outer belt and the surface times 1 - value."""
+    if not -1 <= value <= 0.9:
+        raise ValueError("must be between -1 and 0.9 of the tread's gauge")
+    return with_gauge(case, (belt_lines(case)[-1], case.section.names[-1]), crown(case), 1 - value)
+
+
+EFFECT = Effect(
+    id="tread_wear",
+    title="Tread wear",
+    symbol="w",
+    unit="",
+    low=0.0,
+    high=0.5,
+    changes=("*NODE",),
+    signature="",
+    toggle="measure the groove depth; buff the tread by a known depth and measure again",
+    aliases=("tread_density",),
+    add=add,
+)
