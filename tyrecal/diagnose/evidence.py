@@ -100,18 +100,19 @@ def refit(
     information = np.diag(problem.spread**-2.0)
     eta0, J0 = problem.plain(np.zeros_like(centre))
     H = problem.expansion.hessian[problem.places]
+    by_variable = H.transpose(2, 0, 1).reshape(len(centre), -1)
     d = np.zeros((count, len(centre)))
     for step in range(STEPS + 1):
-        bent = np.einsum("nvw,qw->qnv", H, d)
+        bent = (d @ by_variable).reshape(tilt.shape)
         J = J0 + bent + tilt
-        r = y - eta0 - shift - np.einsum("qnv,qv->qn", J0 + bent / 2 + tilt, d)
-        weighted = np.einsum("qnm,qmv->qnv", inverse, J)
-        normal = np.einsum("qnv,qnw->qvw", weighted, J) + information
+        r = y - eta0 - shift - ((J0 + bent / 2 + tilt) @ d[:, :, None])[:, :, 0]
+        weighted = inverse @ J
+        normal = weighted.transpose(0, 2, 1) @ J + information
         if step == STEPS:
             break
-        slope = np.einsum("qnv,qn->qv", weighted, r) + (centre - d) @ information
+        slope = (r[:, None, :] @ weighted)[:, 0] + (centre - d) @ information
         d = d + np.linalg.solve(normal, slope[:, :, None])[:, :, 0]
-    chi2 = np.einsum("qn,qnm,qm->q", r, inverse, r)
+    chi2 = ((r[:, None, :] @ inverse)[:, 0] * r).sum(1)
     off = (d - centre) / problem.spread
     _, ln_normal = np.linalg.slogdet(normal * np.outer(problem.spread, problem.spread))
     n = len(y)

@@ -42,11 +42,12 @@ def regions(model: TyreModel, x: Array) -> list[Region]:
         keys = ("C10_Pa", "C01_Pa", "D1_per_Pa") if rubber else ("youngs_modulus_Pa",)
         for key in (*keys, "density_kg_per_m3"):
             numbers[f"materials.{material}.{key}"] = float(getattr(materials[material], key))
-    door = replace(model.door, case=case)
+    door = model.door.worker()
+    door.case = case
     problem = fit.Problem(case, door, jobs=model.jobs)
     own = model.values(x)
     taken = {path: own[name] for name, v in case.case.variables.items() for path in v.sets}
-    design = {**numbers, **{path: value for path, value in taken.items()}}
+    design = {**numbers, **taken}
     found = problem.modes([{**design, "pressure_kPa": p} for p in model.pressures], tuple(numbers))
     for each in found:
         if isinstance(each, EvaluationFailed):

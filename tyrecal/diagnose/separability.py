@@ -67,7 +67,7 @@ def separate(problem: Problem, P: Array, sizes: Mapping[str, float]) -> Separabi
     for id in ids:
         nearest = int(np.argmin(abs(grids[id] - sizes.get(id, 0.0))))
         at[id] = nearest if length[id][nearest] >= VISIBLE else ends[id]
-    chosen = np.array([shifts[id][at[id]] for id in ids]).reshape(len(ids), -1)
+    chosen = np.array([shifts[id][at[id]] for id in ids]).reshape(len(ids), len(P))
     gram = chosen @ P @ chosen.T
     norm = np.sqrt(np.maximum(np.diag(gram), 1e-300))
     distances = np.zeros_like(gram)

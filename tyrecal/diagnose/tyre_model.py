@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import product
 from math import exp, log, sqrt
@@ -28,8 +28,7 @@ class TyreModel:
     """ln f of the modes ``rows`` (label, pressure in kPa), and ln mass where the label is None.
 
     case: its variables are x; found: sources of error; spans: effects that may be asked for;
-    notify: told (evaluations done, asked) as they come. Raises DeckRefused where the solver has
-    no exact slopes.
+    jobs: evaluations at a time. Raises DeckRefused where the solver has no exact slopes.
     """
 
     def __init__(
@@ -185,6 +184,3 @@ def _asked_for(case: LoadedCase, labels: Sequence[Label]) -> LoadedCase:
         "analysis": analysis.model_copy(update={"highest_harmonic": highest}),
     }
     return replace(case, case=case.case.model_copy(update=wanted))
-
-
-Notify = Callable[[int, int], None]

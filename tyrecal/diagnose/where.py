@@ -38,13 +38,15 @@ def section_map(
     One number k with prior N(0, s^2): with a = g^T P g and b = g^T P r it is b / (a + 1/s^2), and
     ln Z / Z0 = b^2 / (a + 1/s^2) / 2 - ln(1 + s^2 a) / 2.
     """
+    if not parts:
+        return [], 0
     columns = [(part.stiffness, STIFFNESS, part) for part in parts]
     columns += [(part.mass, MASS, part) for part in parts]
-    G = np.array([g[problem.places] * s for g, s, _ in columns]).reshape(len(columns), -1)
+    G = np.array([g[problem.places] * s for g, s, _ in columns])
     gram = G @ P @ G.T
     size = np.sqrt(np.maximum(np.diag(gram), 1e-300))
     cosine = gram / np.outer(size, size)
-    rank = int((np.linalg.eigvalsh(gram) > 1).sum()) if len(gram) else 0
+    rank = int((np.linalg.eigvalsh(gram) > 1).sum())
     a, b = np.diag(gram), G @ P @ residuals
     change, sigma = b / (a + 1), 1 / np.sqrt(a + 1)
     ln = b**2 / (a + 1) / 2 - np.log1p(a) / 2
