@@ -21,7 +21,7 @@ from .problem import Problem
 
 Array = np.ndarray
 NONE, OUTSIDE = "none", "outside"
-PRIOR_NONE, PRIOR_OUTSIDE, PRIOR_PAIRS = 0.25, 0.10, 0.10  # the singles share the rest
+PRIOR_NONE, PRIOR_OUTSIDE, PRIOR_PAIRS = 0.25, 0.10, 0.03  # the singles share the rest
 NODES, PAIR_NODES = 25, 15
 STEPS = 6  # of Gauss and Newton, in a model that is quadratic and near its minimum
 PARTNERS = 4  # singles that are tried with every other
