@@ -108,4 +108,6 @@ def drawn(
     x = random.normal(0, spread, 3)
     (answer,) = toy.answers([Point(x, effects)])
     assert isinstance(answer, Answer)
-    return answer.eta[base.places] + random.multivariate_normal(np.zeros(len(base.places)), base.sigma)
+    return answer.eta[base.places] + random.multivariate_normal(
+        np.zeros(len(base.places)), base.sigma
+    )

@@ -117,5 +117,3 @@ def _added(case: Path, assignment: str, output: Path | None) -> Path:
         return add(case, id, value, output)
     except (ValueError, NotAdded) as error:
         raise click.UsageError(f"--add: {error}") from None
-
-

@@ -5,6 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from ruamel.yaml import YAML
+from ruamel.yaml.nodes import ScalarNode
+from ruamel.yaml.representer import RoundTripRepresenter
 
 from ..case import load_case, with_values
 from ..files import whole
@@ -31,6 +33,7 @@ def add(path: Path, id: str, value: float, folder: Path | None = None) -> Path:
     yaml = YAML()
     yaml.preserve_quotes = True
     yaml.width = 1000
+    yaml.representer.add_representer(type(None), _null)
     data = yaml.load(path.read_text(encoding="utf-8"))
     effects = dict(data.get("effects") or {})
     if "effects" in data:
@@ -42,3 +45,7 @@ def add(path: Path, id: str, value: float, folder: Path | None = None) -> Path:
         yaml.dump(data, file)
     load_case(target)
     return target
+
+
+def _null(representer: RoundTripRepresenter, _: None) -> ScalarNode:
+    return representer.represent_scalar("tag:yaml.org,2002:null", "null")

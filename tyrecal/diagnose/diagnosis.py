@@ -116,9 +116,7 @@ def diagnose(
     )  # fmt: skip
 
 
-def _asked_again(
-    problem: Problem, response: Response, hypotheses: Sequence[Hypothesis]
-) -> Problem:
+def _asked_again(problem: Problem, response: Response, hypotheses: Sequence[Hypothesis]) -> Problem:
     """The problem with the model asked where the effects in play have their re-fits."""
     singles = [h for h in hypotheses if h.key in problem.expansion.nodes]
     best = max(h.ln_evidence for h in hypotheses)
@@ -145,5 +143,3 @@ def _rung(verdict: Verdict, shrinkage: Shrinkage | None, problem: Problem) -> in
         return 4
     proven = shrinkage is not None and verdict.kind == NAMED
     return 2 if proven and shrinkage and shrinkage.fraction > shrinkage.placebo_95 else 1
-
-

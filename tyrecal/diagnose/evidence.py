@@ -134,7 +134,9 @@ def ln_splits(problem: Problem, split: Array) -> Array:
     return np.asarray((ln - np.log(tau) - np.log(2 * np.pi) / 2).sum(1))
 
 
-def weigh(problem: Problem, ids: Sequence[str] | None = None, pairs: bool = True) -> list[Hypothesis]:
+def weigh(
+    problem: Problem, ids: Sequence[str] | None = None, pairs: bool = True
+) -> list[Hypothesis]:
     """Every hypothesis with its evidence: none, outside, singles, pairs of the best with all."""
     ids = list(problem.expansion.nodes) if ids is None else list(ids)
     sigma = problem.sigma
@@ -172,9 +174,7 @@ def pair(
     return _hypothesis(problem, f"{first}+{second}", prior, values, ln_weights, sigma)
 
 
-def _pairs(
-    problem: Problem, singles: Sequence[Hypothesis], sigma: Array
-) -> Iterable[Hypothesis]:
+def _pairs(problem: Problem, singles: Sequence[Hypothesis], sigma: Array) -> Iterable[Hypothesis]:
     """Forward stepping: the best singles, each with every other effect."""
     order = [h.key for h in singles]
     if len(order) < 2:

@@ -108,7 +108,10 @@ def rank(
 
 
 def _look(
-    problem: Problem, d: Array, likely: Mapping[str, float], sizes: Mapping[str, Mapping[str, float]]
+    problem: Problem,
+    d: Array,
+    likely: Mapping[str, float],
+    sizes: Mapping[str, Mapping[str, float]],
 ) -> _Look:
     shifts = {
         key: problem.added({id: np.array([e]) for id, e in sizes.get(key, {}).items()}, 1)[0][0]

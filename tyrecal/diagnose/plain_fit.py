@@ -56,7 +56,12 @@ def _asked(response: Response, point: Point) -> Answer:
 
 
 def _value(
-    x: Array, answer: Answer, observed: Observations, rows: Array, inverse: Array, response: Response
+    x: Array,
+    answer: Answer,
+    observed: Observations,
+    rows: Array,
+    inverse: Array,
+    response: Response,
 ) -> float:
     r, off = observed.y - answer.eta[rows], (x - response.start) / response.spread
     return float(r @ inverse @ r + off @ off)

@@ -149,5 +149,3 @@ def _placebo(problem: Problem, hold: Array, random: np.random.Generator) -> floa
         best[better], best_ln = here[better], np.maximum(ln, best_ln)
     rms = lambda e: np.sqrt(np.mean(e**2, axis=1))
     return float(np.quantile(1 - rms(best) / rms(before), 0.95))
-
-

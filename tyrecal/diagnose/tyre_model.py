@@ -19,7 +19,7 @@ from .response import Answer, Point, Span
 from .uncertainties import EFFECTS, Source, values_of
 
 Array = np.ndarray
-MASS_STEP = 0.02  # of a logarithm, for the mass, which is nearly linear in all it depends on
+MASS_STEP = 0.02  # of a logarithm: the mass is linear in areas and densities
 
 ModelRow = tuple[Label | None, float]
 
@@ -62,7 +62,7 @@ class TyreModel:
         self.spread = np.array(wide) / sqrt(12)  # of a uniform distribution within the bounds
         self._plain = values_of(case, found)
         self._plain.setdefault("pressure_kPa", case.case.pressure_kPa)
-        self._mass: tuple[Array, Array] | None = None
+        self._mass: tuple[Array, Array, Array] | None = None
 
     def values(self, x: Array) -> dict[str, float]:
         """Design variables at x, in their own units, bounds not enforced."""
@@ -102,7 +102,10 @@ class TyreModel:
                 for i, p in enumerate(points)]  # fmt: skip
 
     def _answer(
-        self, point: Point, designs: list[dict[str, float]], found: list[fit.Found | EvaluationFailed]
+        self,
+        point: Point,
+        designs: list[dict[str, float]],
+        found: list[fit.Found | EvaluationFailed],
     ) -> Answer | Exception:
         for each in found:
             if isinstance(each, EvaluationFailed):
@@ -113,6 +116,7 @@ class TyreModel:
         for i, (label, pressure) in enumerate(self.rows):
             if label is None:
                 eta[i] = log(found[0][0].mass_kg)  # type: ignore[index]
+                jacobian[i], slopes[i] = self._mass_slopes(point.x)
                 continue
             design, answer = at[pressure]
             evaluation, modes, _ = answer  # type: ignore[misc]
@@ -127,10 +131,6 @@ class TyreModel:
                         for path, step in source.steps.items()
                         if not path.startswith(EFFECTS)
                     )
-        weighed = [i for i, (label, _) in enumerate(self.rows) if label is None]
-        if weighed:
-            by_variables, by_sources = self._mass_slopes(point.x)
-            jacobian[weighed], slopes[weighed] = by_variables, by_sources
         split = np.zeros(len(self.rows))
         return Answer(eta, jacobian, split, slopes if point.constants else None)
 
@@ -155,23 +155,37 @@ class TyreModel:
         return answer
 
     def _mass_slopes(self, x: Array) -> tuple[Array, Array]:
-        """d ln mass by x (v,) and by the sources of error (k,), from neighbours; found once."""
+        """d ln mass by x (v,) and by the sources of error (k,).
+
+        From neighbours, found once: the mass is m0 + sum of m_j times the value of variable j.
+        """
         if self._mass is None:
-            pressure = {"pressure_kPa": self.pressures[0]}
-            own = {**self._plain, **self.values(x), **pressure}
+            own = {**self._plain, **self.values(x), "pressure_kPa": self.pressures[0]}
             designs = [own]
             designs += [{**own, **self.values(x + d)} for d in MASS_STEP * np.eye(len(x))]
             for source in self.found:
                 steps = {k: s for k, s in source.steps.items() if not k.startswith(EFFECTS)}
-                designs.append({**own, **{k: own[k] + s for k, s in steps.items()}, **pressure})
+                steps.pop("pressure_kPa", None)
+                designs.append({**own, **{k: own[k] + s for k, s in steps.items()}})
             found = self._fit.modes(designs)
             for each in found:
                 if isinstance(each, EvaluationFailed):
                     raise each
-            mass = np.log([each[0].mass_kg for each in found])  # type: ignore[index]
-            change, count = mass[1:] - mass[0], len(x)
-            self._mass = change[:count] / MASS_STEP, change[count:]
-        return self._mass
+            mass = np.array([each[0].mass_kg for each in found])  # type: ignore[index]
+            count, ratio = len(x), mass[1:] / mass[0]
+            rise = self._rise(x, x + MASS_STEP)
+            self._mass = x, (ratio[:count] - 1) / rise, np.log(ratio[count:])
+        there, shares, sources = self._mass
+        rise = self._rise(there, x)
+        growth = np.array([1 + r if v.scale == "log" else 1.0
+                           for r, v in zip(rise, self._variables.values(), strict=True)])  # fmt: skip
+        return shares * growth / (1 + shares @ rise), sources
+
+    def _rise(self, before: Array, after: Array) -> Array:
+        """Relative rise of log variables, rise of x of linear ones."""
+        step = after - before
+        log_scaled = [v.scale == "log" for v in self._variables.values()]
+        return np.where(log_scaled, np.expm1(step), step)
 
 
 def _asked_for(case: LoadedCase, labels: Sequence[Label]) -> LoadedCase:

@@ -154,7 +154,10 @@ def _where(d: Diagnosis) -> Iterator[str]:
 def _which(study: Study) -> Iterator[str]:
     d = study.diagnosis
     order = sorted(d.probabilities.items(), key=lambda item: -item[1])
-    rows = ["| explanation | probability | size, 90 % | detectability lambda |", "|---|---|---|---|"]
+    rows = [
+        "| explanation | probability | size, 90 % | detectability lambda |",
+        "|---|---|---|---|",
+    ]
     for key, p in order[:SHOWN]:
         size, seen = "", ""
         if key in d.problem.spans:
