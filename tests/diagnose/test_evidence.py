@@ -38,7 +38,7 @@ def flat(**keys: object) -> Toy:
 
 
 def test_evidence_against_the_marginal_in_closed_form() -> None:
-    """Linear and Gaussian: y ~ N(eta0 + e g, Sigma + J S J^T), the integral over e by 4001 points."""
+    """Linear and Gaussian: y ~ N(eta0 + e g, Sigma + J J^T), its integral over e by 4001 points."""
     toy = flat(pressures=(240.0,), effects=2)
     base = problem(toy)
     y = drawn(toy, base, np.random.default_rng(1), {"e0": 0.5}, 0.3)

@@ -47,7 +47,7 @@ def asked(point: Point) -> Answer:
 
 
 def test_slopes_against_differences() -> None:
-    x, step = MODEL.start + [0.1, -0.2, 0.05], 1e-4
+    x, step = MODEL.start + np.array((0.1, -0.2, 0.05)), 1e-4
     own = asked(Point(x, constants=True))
     for j, d in enumerate(step * np.eye(3)):
         two = (asked(Point(x + d)).eta - asked(Point(x - d)).eta) / (2 * step)
@@ -76,7 +76,7 @@ def test_slopes_against_differences() -> None:
 
 def test_the_expansion_is_the_model_at_its_nodes_and_close_between() -> None:
     found = expand(MODEL, MODEL.start)
-    there = MODEL.start + [0.15, -0.15, 0.1]
+    there = MODEL.start + np.array((0.15, -0.15, 0.1))
     plain, _ = found.plain(there)
     assert plain == pytest.approx(asked(Point(there)).eta, abs=5e-4)
     for id in EFFECTS:
@@ -127,7 +127,7 @@ def written(path: Path, eta: np.ndarray, rows: list = ROWS, noise: float = 1e-3)
     return path
 
 
-X = MODEL.start + [0.2, -0.1, 0.15]
+X = MODEL.start + np.array((0.2, -0.1, 0.15))
 
 
 def test_an_effect_in_the_models_own_data_is_named_with_its_size(tmp_path: Path) -> None:

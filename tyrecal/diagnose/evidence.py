@@ -15,6 +15,7 @@ from itertools import combinations
 
 import numpy as np
 
+from ..modes.mode import Label
 from .covariance import alike
 from .expansion import Nodes
 from .problem import Problem
@@ -224,7 +225,7 @@ def outside(problem: Problem, sigma: Array | None = None) -> Hypothesis:
     )  # fmt: skip
 
 
-def _swapped(problem: Problem, a: object, b: object) -> Array | None:
+def _swapped(problem: Problem, a: Label, b: Label) -> Array | None:
     """y with the labels a and b exchanged; None where they are far apart or not both there."""
     rows, y = problem.observations.rows, problem.observations.y.copy()
     where = {(row.label, row.pressure_kPa, row.run): i for i, row in enumerate(rows) if row.label}

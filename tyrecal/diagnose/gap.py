@@ -96,7 +96,8 @@ def find_gap(problem: Problem, d: Array, variables: tuple[str, ...]) -> Gap:
     splits = float((s[seen] ** 2 / (tau[seen] ** 2 + problem.assumed.split**2)).sum())
     total = float(r @ P @ r) + splits
     freedom = max(1, len(r) - len(d) + int(seen.sum()))
-    absorbed, bias = {}, {name: {} for name in variables}
+    absorbed: dict[str, float] = {}
+    bias: dict[str, dict[str, float]] = {name: {} for name in variables}
     for id, nodes in problem.expansion.nodes.items():
         e = np.array([max(nodes.reach, key=abs)])
         g = problem.added({id: e}, 1)[0][0] - shift[0]

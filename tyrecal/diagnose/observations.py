@@ -76,7 +76,7 @@ def observe(
     rows, numbers = [], []
     for index, run in enumerate(runs):
         for key in sorted({key[:3] for key in run}, key=_order):
-            rows.append(Row(*key, run=index))
+            rows.append(Row(key[0], key[1], key[2], index))
             numbers.append(_pair(run, key, split))
     table = np.array(numbers, float).reshape(-1, 4).T
     return Observations(

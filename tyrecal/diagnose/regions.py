@@ -20,7 +20,7 @@ TREAD = "tread"
 @dataclass(frozen=True)
 class Region:
     """A part of the section: its name; stiffness, mass (n,): d ln f by the logarithm of either;
-    places: (region, 'tread' | 'under the tread' | '') that it covers, none for cords."""
+    material: what the split case calls it."""
 
     name: str
     stiffness: Array
@@ -67,7 +67,7 @@ def regions(model: TyreModel, x: Array) -> list[Region]:
                 key = path.rpartition(".")[2]
                 sign = -1.0 if key == "D1_per_Pa" else 1.0
                 columns[int(key.startswith("density")), i] += sign * slope
-        result.append(Region(name, *columns, material))
+        result.append(Region(name, columns[0], columns[1], material))
     return result
 
 
@@ -92,8 +92,8 @@ def split_by_region(case: LoadedCase) -> tuple[LoadedCase, Mapping[str, str]]:
                 solids.append(Solid(material=copy, regions=[region], between=between))
                 one = len(case.case.solids) == 1
                 parts[copy] = words.replace("_", " ") + ("" if one else f", {solid.material}")
-    for name, material in case.case.materials.items():
-        if not isinstance(material, Rubber):
+    for name, own in case.case.materials.items():
+        if not isinstance(own, Rubber):
             parts[name] = name.replace("_", " ") + "s"
     variables = {}
     for name, variable in case.case.variables.items():

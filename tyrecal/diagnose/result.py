@@ -27,7 +27,7 @@ def result(diagnosis: Diagnosis) -> dict[str, Any]:
         "verdict": d.verdict.kind,
         "words": d.verdict.words,
         "effect": named,
-        "parameter": _parameter(d, named or best) if named or best else None,
+        "parameter": _parameter(d, named or best),
         "likeliest": best,
         "probabilities": _sorted(d.probabilities),
         "candidate_set": list(d.verdict.candidates),
@@ -100,7 +100,9 @@ def result(diagnosis: Diagnosis) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _parameter(diagnosis: Diagnosis, key: str) -> dict[str, Any]:
+def _parameter(diagnosis: Diagnosis, key: str | None) -> dict[str, Any] | None:
+    if key is None:
+        return None
     own = diagnosis.parameter(key)
     hypothesis = diagnosis.hypothesis(key)
     effects = {id: np.array([e]) for id, e in hypothesis.mean().items()}

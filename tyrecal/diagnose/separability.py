@@ -71,7 +71,7 @@ def separate(problem: Problem, P: Array, sizes: Mapping[str, float]) -> Separabi
     gram = chosen @ P @ chosen.T
     norm = np.sqrt(np.maximum(np.diag(gram), 1e-300))
     distances = np.zeros_like(gram)
-    for i, a in enumerate(ids):
+    for i in range(len(ids)):
         for j, b in enumerate(ids):
             if i != j:
                 off = shifts[b] - chosen[i]

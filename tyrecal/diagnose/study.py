@@ -10,7 +10,7 @@ from ..case import LoadedCase
 from ..effects import catalogue
 from ..evaluate.door import Door
 from .diagnosis import Diagnosis, diagnose
-from .measurements import BadMeasurements, Reading, read_measurements
+from .measurements import BadMeasurements, read_measurements
 from .observations import Observations, observe
 from .problem import Assumed, Change
 from .regions import regions
@@ -80,7 +80,7 @@ def spans_of(door: Door, ids: Sequence[str] | None = None) -> tuple[dict[str, Sp
     for id, effect in catalogue().items():
         if ids is not None and id not in ids:
             continue
-        if effect.needs and effect.needs not in door.solver.capabilities:
+        if not effect.within(door.solver.capabilities):
             unable.append(id)
         else:
             able[id] = Span(effect.low, effect.high, effect.unit, effect.title, effect.toggle)

@@ -45,7 +45,8 @@ class TyreModel:
                 f"solver '{door.solver.name}' gives no exact slopes, which a diagnosis needs:"
                 " 'tyrecal solvers' shows which one does (gradients)"
             )
-        self.rows, self.found, self.spans, self.jobs = list(rows), found, spans, jobs
+        self.rows, self.found, self.jobs = list(rows), found, jobs
+        self.spans: Mapping[str, Span] = spans
         self.pressures = sorted({p for label, p in rows if label}) or [case.case.pressure_kPa]
         labels = sorted({label for label, _ in rows if label}, key=str)
         case = _asked_for(case, labels)
@@ -53,8 +54,8 @@ class TyreModel:
         door.case = case
         self._fit = fit.Problem(case, door, jobs=jobs)
         self._variables = case.case.variables
-        self.variables = list(self._variables)
-        self.sources = [source.name for source in found]
+        self.variables: Sequence[str] = list(self._variables)
+        self.sources: Sequence[str] = [source.name for source in found]
         self.start = np.array([self._scaled(n, v) for n, v in start_values(case).items()])
         wide = [
             log(v.upper / v.lower) if v.scale == "log" else 1.0 for v in self._variables.values()
@@ -80,8 +81,9 @@ class TyreModel:
                 for i, answer in zip(chosen, self._ask([points[i] for i in chosen]), strict=True):
                     results[i] = answer
         for i, point in enumerate(points):
-            if point.constants and isinstance(results[i], Answer):
-                results[i] = self._with_finite(point, results[i])
+            answer = results[i]
+            if point.constants and isinstance(answer, Answer):
+                results[i] = self._with_finite(point, answer)
         return results
 
     def _scaled(self, name: str, value: float) -> float:
@@ -177,8 +179,7 @@ class TyreModel:
             self._mass = x, (ratio[:count] - 1) / rise, np.log(ratio[count:])
         there, shares, sources = self._mass
         rise = self._rise(there, x)
-        growth = np.array([1 + r if v.scale == "log" else 1.0
-                           for r, v in zip(rise, self._variables.values(), strict=True)])  # fmt: skip
+        growth = np.where([v.scale == "log" for v in self._variables.values()], 1 + rise, 1.0)
         return shares * growth / (1 + shares @ rise), sources
 
     def _rise(self, before: Array, after: Array) -> Array:

@@ -167,20 +167,20 @@ def _which(study: Study) -> Iterator[str]:
         rows.append(f"| {_title(study, key)} | {p:.2f} | {size} | {seen} |")
     yield "\n".join(rows)
     yield (
-        f"lambda: squared distance from the plain model, in standard deviations, that calibration"
-        f" cannot absorb; below 10 an effect can hide, from 25 on it is named as a rule."
+        "lambda: squared distance from the plain model, in standard deviations, that calibration"
+        " cannot absorb; below 10 an effect can hide, from 25 on it is named as a rule."
     )
     for group in d.separability.groups():
         names = ", ".join(f"`{id}`" for id in group)
         yield f"These data cannot separate {names}."
     blind = [id for id, e in d.separability.smallest.items() if e is None]
-    seen = [
+    sizes = [
         f"`{id}` {abs(e):.2g} {d.problem.spans[id].unit}".strip()
         for id, e in d.separability.smallest.items()
         if e is not None
     ]
-    if seen:
-        yield f"The smallest that would be seen (lambda = 10): {', '.join(seen)}."
+    if sizes:
+        yield f"The smallest that would be seen (lambda = 10): {', '.join(sizes)}."
     if blind:
         names = ", ".join(f"`{id}`" for id in blind)
         yield f"Not to be seen with these data at any size in its range: {names}."
@@ -195,8 +195,8 @@ def _shrinkage(d: Diagnosis) -> Iterator[str]:
         f"Held out by rule: {s.held_out}. Without an effect the error there is"
         f" {s.before_percent:.2f} %, with `{s.effect}` {s.after_percent:.2f} %: it shrinks by"
         f" {100 * s.fraction:.0f} % (90 %: {100 * s.low:.0f} to {100 * s.high:.0f} %). On tyres"
-        f" without any effect chance shrinks it by up to {100 * s.placebo_95:.0f} % (95 % quantile);"
-        f" repeatability alone leaves {s.floor_percent:.2f} %."
+        f" without any effect chance shrinks it by up to {100 * s.placebo_95:.0f} % (95 %"
+        f" quantile); repeatability alone leaves {s.floor_percent:.2f} %."
     )
 
 
@@ -227,5 +227,5 @@ def _assumptions(study: Study) -> Iterator[str]:
         yield f"`{id}` could not be evaluated: {why}."
     if study.inexpressible:
         yield f"This solver cannot express {', '.join(f'`{id}`' for id in study.inexpressible)}."
-    for words in d.problem.observations.left_out:
-        yield f"Left out: {words}."
+    for left in d.problem.observations.left_out:
+        yield f"Left out: {left}."

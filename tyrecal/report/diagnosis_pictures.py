@@ -15,6 +15,7 @@ from ..diagnose.evidence import NONE, OUTSIDE
 from ..diagnose.gap import family
 from ..diagnose.study import Study
 from ..diagnose.where import Place
+from ..modes.mode import Label
 from .figure import COLOURS, GREY, in_house_style, new_figure, save
 
 Array = np.ndarray
@@ -48,8 +49,8 @@ def draw_residuals(path: Path, d: Diagnosis) -> None:
     for panel, name in zip(axes, shown, strict=True):
         panel.axhline(0, color=GREY, lw=0.8)
         for k, p in enumerate(pressures):
-            chosen = [i for i, row in enumerate(rows)
-                      if row.pressure_kPa == p and row.run == 0 and family(row) == name]  # fmt: skip
+            mine = [row.pressure_kPa == p and not row.run and family(row) == name for row in rows]
+            chosen = np.flatnonzero(mine)
             at = np.array([_place(rows[i].label) for i in chosen])
             at = at + 0.16 * (k - (len(pressures) - 1) / 2)
             colour = COLOURS[k % len(COLOURS)]
@@ -180,9 +181,9 @@ def _after(d: Diagnosis) -> Array | None:
     return np.asarray(d.problem.observations.y - eta - shift[0] - tilt[0] @ h.fitted.d[i])
 
 
-def _place(label: object) -> float:
-    kind = getattr(label, "kind", None)
-    return {"axial": 0.0, "torsional": 1.0}.get(kind, float(getattr(label, "c", 0)))
+def _place(label: Label | None) -> float:
+    assert label is not None
+    return {"axial": 0.0, "torsional": 1.0}.get(label.kind or "", float(label.c))
 
 
 def _highest(rows: tuple) -> int:
