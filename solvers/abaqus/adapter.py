@@ -36,7 +36,7 @@ class Abaqus:
 
     name = "abaqus"
     dialect = "abaqus"
-    capabilities = frozenset({"modes", "vibration_modulus"})
+    capabilities = frozenset({"modes", "vibration_modulus", "spindle"})
     refusals = (OptionRefused, DeckError)
     failures = (RunFailed,)
 

@@ -35,7 +35,19 @@ class Bundled:
     name = "bundled"
     version = VERSION
     dialect = "abaqus"
-    capabilities = frozenset({"modes", "gradients", "footprint", "vibration_modulus"})
+    capabilities = frozenset(
+        {
+            "modes",
+            "gradients",
+            "footprint",
+            "vibration_modulus",
+            "spindle",
+            "frequency_modulus",
+            "cavity",
+            "coupled",
+            "rotation",
+        }
+    )
     refusals = (DeckError,)
     failures = (*Failures, TimedOut)
 
@@ -51,6 +63,7 @@ class Bundled:
             "harmonics": list(range(decks.request["highest_harmonic"] + 1)),
             "modes_per_harmonic": decks.request["modes_per_harmonic"],
             "sensitivities": decks.tangents(self.dialect),
+            **{k: decks.request[k] for k in ("own_frequency", "cavity") if k in decks.request},
         }
         paths.append(folder / f"{JOB}.request.json")
         paths[-1].write_text(json.dumps(request))
@@ -70,15 +83,28 @@ class Bundled:
             nodes, points = arrays["nodes"], arrays["points"]
             displacement = arrays[f"displacement_{step['step']}"]
             shapes = arrays[f"shapes_{step['step']}"] if step["modes"] else []
-        modes = [
-            {
-                "frequency_Hz": mode["frequency_Hz"],
-                "multiplicity": mode["multiplicity"],
-                "n": mode["n"],
-                "amplitude": shape,
-            }
-            for mode, shape in zip(step["modes"], shapes, strict=True)
-        ]
+        modes = []
+        doublets: dict[tuple[int, int], dict[str, Any]] = {}
+        for mode, shape in zip(step["modes"], shapes, strict=True):
+            key = mode["n"], mode.get("doublet", -1)
+            if key in doublets:  # the upper one of two that have split
+                lower = doublets[key]["frequency_Hz"]
+                doublets[key] |= {
+                    "frequency_Hz": (lower + mode["frequency_Hz"]) / 2,
+                    "multiplicity": 2,
+                    "members": [lower, mode["frequency_Hz"]],
+                }
+                continue
+            modes.append(
+                {
+                    "frequency_Hz": mode["frequency_Hz"],
+                    "multiplicity": mode["multiplicity"],
+                    "n": mode["n"],
+                    "amplitude": shape,
+                }
+            )
+            if "doublet" in mode:
+                doublets[key] = modes[-1]
         return {
             "pressure_Pa": step["pressure_Pa"],
             "mass_kg": step["mass_kg"],

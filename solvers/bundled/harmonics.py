@@ -6,19 +6,26 @@ of infinitely many sectors. A mode with n >= 1 stands for a pair turned by a qua
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Protocol
 
 import numpy as np
 from scipy.sparse import csr_array
 
-from . import eigen, mechanics
+from . import border, eigen, mechanics
+from .air import Air, Coupling, coupling
 from .band import Cholesky, Indefinite, Numbering
+from .border import Border, Bordered
 from .mechanics import Load
 from .model import Model
+from .spectrum import stiffened
+from .wheel import Wheel
 
 Array = np.ndarray
 MOST_HARMONICS = 60
+IN_THE_AIR = 0.5  # share of a mode's kinetic energy above which it is the cavity's, not the tyre's
 
 
 class Unstable(ArithmeticError):
@@ -30,29 +37,63 @@ class HarmonicModes:
     """Modes of one harmonic: omega^2 (m,) in 1/s2 and shapes (m, n, 3), u^H M u = 1.
 
     M is the mass per radian: over the whole circle the kinetic mass is 2 pi for n = 0, pi else.
+    rim (m, q), air (m, w): the amplitudes of the rim's motions (in ``shapes`` too) and of the
+    cavity's flow (see `wheel`, `air`). members (m,): None, or where each doublet has split into
+    two modes, 1 and 2 in turn; the shape is then the part of harmonic n.
     """
 
     n: int
     eigenvalues: Array
     shapes: Array
+    rim: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    air: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    members: Array | None = None
 
     def below(self, frequency_Hz: float) -> HarmonicModes:
         """Those up to a frequency."""
-        keep = self.eigenvalues <= (2 * np.pi * frequency_Hz) ** 2
-        return HarmonicModes(self.n, self.eigenvalues[keep], self.shapes[keep])
+        return self.where(self.eigenvalues <= (2 * np.pi * frequency_Hz) ** 2)
+
+    def where(self, keep: Array | slice) -> HarmonicModes:
+        """Those of a mask or slice."""
+        rim, air = (a[keep] if len(a) else a for a in (self.rim, self.air))
+        members = None if self.members is None else self.members[keep]
+        return HarmonicModes(
+            self.n, self.eigenvalues[keep], self.shapes[keep], rim, air, members
+        )
 
 
 class Vibration:
-    """The inflated tyre's small vibrations: factors per harmonic on demand."""
+    """The inflated tyre's small vibrations: factors per harmonic on demand.
+
+    wheel: the rim's motions, None = held; air: in the cavity, None = a constant pressure;
+    lowest_Hz: modes below are left out (the rigid ones of a free wheel).
+    """
 
     def __init__(
-        self, model: Model, U: Array, loads: list[Load], numbering: Numbering, shift: float
+        self,
+        model: Model,
+        U: Array,
+        loads: list[Load],
+        numbering: Numbering,
+        shift: float,
+        wheel: Wheel | None = None,
+        air: Air | None = None,
+        lowest_Hz: float = 0.0,
     ):
         self.numbering, self.shift = numbering, shift
-        parts = mechanics.tangents(model, U, loads, harmonics=True)
-        self._bands = [numbering.assemble(p) for p in parts]
+        self.wheel, self.air, self.lowest_Hz = wheel, air, lowest_Hz
+        self._model, self._U = model, U
+        # the whole, then what each law of frequency adds per unit of its ratio less 1
+        parts = [mechanics.tangents(model, U, loads, harmonics=True)]
+        parts += [mechanics.tangents(m, U, [], harmonics=True) for m in stiffened(model)]
+        self._parts = parts
+        self._bands = [[numbering.assemble(p) for p in three] for three in parts]
+        self.weights = np.array([1.0] + [0.0] * (len(parts) - 1))
         self.mass: csr_array = mechanics.mass(model)
         self._X = model.mesh.X.real
+        self._forces = mechanics.gradient(model, U, loads) if wheel else U
+        self._borders: dict[int, Border | None] = {}
+        self._couplings: dict[int, Coupling] = {}
         self._shifted_mass = None
         if shift:
             masses = [
@@ -66,9 +107,22 @@ class Vibration:
             ]
             self._shifted_mass = numbering.assemble(masses)
 
-    def factor(self, n: int) -> Cholesky:
+    def at(self, ratios: Array) -> Vibration:
+        """The same with the modulus ratios of the model's laws of frequency (l,)."""
+        other = copy.copy(self)
+        other.weights = np.concatenate([[1.0], np.asarray(ratios) - 1])
+        other._borders = {}
+        return other
+
+    def factor(self, n: int) -> Cholesky | Bordered:
         """Factor of K(n) - shift M. Raises Unstable."""
-        K0, K1, K2 = self._bands
+        three = self._bands[0]
+        if len(self.weights) > 1:
+            three = [
+                sum(w * b[i] for w, b in zip(self.weights, self._bands, strict=True))
+                for i in range(3)
+            ]
+        K0, K1, K2 = three
         if n == 0:
             band = K0.copy(order="F")
         else:
@@ -78,25 +132,92 @@ class Vibration:
         if self._shifted_mass is not None:
             band -= self.shift * self._shifted_mass
         try:
-            return Cholesky(band)
+            tyre, beside = Cholesky(band), self._border(n)
+            return Bordered(tyre, beside, self.shift) if beside else tyre
         except Indefinite:
             raise Unstable(
                 f"the inflated tyre is not stable: its stiffness for {n} waves round the"
                 " circumference is not positive definite"
             ) from None
 
-    def _times_mass(self, x: Array) -> Array:
+    @property
+    def plain(self) -> bool:
+        """The tyre alone moves: neither its rim nor air in the cavity."""
+        return self.wheel is None and self.air is None
+
+    def times_mass(self, x: Array) -> Array:
+        """The tyre's M x for (size,) or (size, b), per radian."""
         full = self.numbering.spread(x)
         image = self.mass @ full.reshape(len(full), -1)
         return self.numbering.gather(image.reshape(full.shape))
 
-    def modes(self, n: int, count: int, factor: Cholesky | None = None) -> HarmonicModes:
-        """The ``count`` lowest modes of harmonic n. Raises Unstable, eigen.NotConverged."""
-        factor = factor or self.factor(n)
+    def _border(self, n: int) -> Border | None:
+        if n not in self._borders:
+            self._borders[n] = self._new_border(n)
+        return self._borders[n]
+
+    def _new_border(self, n: int) -> Border | None:
+        moving = self.wheel is not None and self.wheel.motions(n)
+        if not moving and self.air is None:
+            return None
+        fields = np.zeros((*self._U.shape, 0), complex if n else float)
+        own = np.zeros(0), np.zeros(0)
+        if self.wheel is not None and moving:
+            real, imag = self.wheel.fields(n, self._X)
+            fields = real + 1j * imag if n else real
+            own = self.wheel.own(n, self._X, self._forces)
+        stiffness = np.zeros_like(fields)
+        for weight, three in zip(self.weights, self._parts, strict=True):
+            for factor, part in zip((1.0, 1j * n, n * n), three, strict=True):
+                if weight and factor and moving:
+                    stiffness = stiffness + weight * factor * border.apply(part, fields)
+        mass = (self.mass @ fields.reshape(len(fields), -1)).reshape(fields.shape)
+        if self.air and n not in self._couplings:
+            self._couplings[n] = coupling(self.air, self._X, self._U, n)
+        air = self._couplings.get(n)
+        return border.assemble(self.numbering, fields, own, stiffness, mass, air)
+
+    def _times_mass(self, n: int, x: Array) -> Array:
+        beside = self._border(n)
+        tyre = self.times_mass(x[: self.numbering.size])
+        return beside.times_mass(x, tyre) if beside else tyre
+
+    def modes(self, n: int, count: int, factor: Cholesky | Bordered | None = None) -> HarmonicModes:
+        """The ``count`` lowest modes of harmonic n that are the tyre's, from ``lowest_Hz`` on.
+
+        Raises Unstable, eigen.NotConverged.
+        """
+        factor, asked = factor or self.factor(n), count
+        while True:
+            found, is_tyres = self._lowest(n, asked, factor)
+            if is_tyres.sum() >= count or len(is_tyres) < asked:
+                return found.where(np.flatnonzero(is_tyres)[:count])
+            asked += count - int(is_tyres.sum())
+
+    def _lowest(
+        self, n: int, count: int, factor: Cholesky | Bordered
+    ) -> tuple[HarmonicModes, Array]:
+        """The lowest modes, and which of them are the tyre's."""
+        beside, size = self._border(n), self.numbering.size
         start = self.numbering.gather(_start_fields(self._X, n))
-        values, vectors = eigen.lowest(factor.solve, self._times_mass, start, count, self.shift)
-        shapes = self.numbering.spread(vectors)  # (nodes, 3, modes)
-        return HarmonicModes(n, values, np.moveaxis(shapes, -1, 0))
+        if beside:
+            q, w, _ = beside.widths
+            start = np.concatenate([start, np.ones((q, 3)), np.zeros((w, 3))])
+        values, vectors = eigen.lowest(
+            factor.solve, lambda x: self._times_mass(n, x), start, count, self.shift
+        )
+        shapes = self.numbering.spread(vectors[:size])  # (nodes, 3, modes)
+        rim, flow = vectors[size:size], vectors[size:size]
+        is_tyres = np.ones(len(values), bool)
+        if self.lowest_Hz:
+            is_tyres = values >= (2 * np.pi * self.lowest_Hz) ** 2
+        if beside:
+            rim, flow = vectors[size : size + q], vectors[size + q :]
+            shapes = shapes + beside.fields @ rim
+            if w:
+                energy = np.einsum("wm,wv,vm->m", flow.conj(), beside.flow_mass, flow).real
+                is_tyres &= energy < IN_THE_AIR
+        return HarmonicModes(n, values, np.moveaxis(shapes, -1, 0), rim.T, flow.T), is_tyres
 
 
 def _start_fields(X: Array, n: int) -> Array:
@@ -117,8 +238,15 @@ def _start_fields(X: Array, n: int) -> Array:
     return fields
 
 
+class HasModes(Protocol):
+    """A vibration, of one modulus or of each mode's own."""
+
+    def modes(self, n: int, count: int, factor: Cholesky | Bordered | None = None) -> HarmonicModes:
+        """The lowest modes of a harmonic."""
+
+
 def lowest_of_all(
-    vibration: Vibration, wanted: int, check: Callable[[], None]
+    vibration: HasModes, wanted: int, check: Callable[[], None]
 ) -> list[HarmonicModes]:
     """The ``wanted`` lowest modes over all harmonics, doublets counted twice.
 

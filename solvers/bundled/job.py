@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -13,20 +13,27 @@ import numpy as np
 from threadpoolctl import ThreadpoolController
 
 from . import press_job, sensitivity
+from .air import Air, read_air
+from .attached import read_attached
 from .band import Cholesky, Numbering
+from .border import Bordered
+from .coupled import attached_modes
 from .eigen import NotConverged
-from .harmonics import HarmonicModes, Unstable, Vibration, lowest_of_all
+from .harmonics import HarmonicModes, HasModes, Unstable, Vibration, lowest_of_all
 from .inflation import InflationFailed, equilibrium
-from .keywords import DeckError, Row
+from .keywords import DeckError, Keyword, Row
 from .mechanics import Load, mass
 from .model import Model, build
 from .pressing import NotPressed
 from .results import StepResult, write
+from .rotation import waves
+from .spectrum import NotSelfConsistent, SelfConsistent
 from .steps import Deck, Step, Tangent
 from .supports import numbering
+from .wheel import Wheel, read_wheel
 
 Array = np.ndarray
-Failures = (InflationFailed, Unstable, NotConverged, NotPressed)
+Failures = (InflationFailed, Unstable, NotConverged, NotSelfConsistent, NotPressed)
 
 
 class TimedOut(ArithmeticError):
@@ -38,12 +45,17 @@ class Request:
     """What the deck cannot say, from the file JOB.request.json beside it.
 
     harmonics: n to solve (None: as many as *FREQUENCY's number of modes takes);
-    modes_per_harmonic; sensitivities: variable to [job, line, field, d number / d variable] rows.
+    modes_per_harmonic; sensitivities: variable to [job, line, field, d number / d variable] rows;
+    own_frequency: rubber with a table of moduli over frequency has, in each mode, that of the
+    mode's own frequency, not of PROPERTY EVALUATION; cavity: {"material", "surfaces"} of the gas
+    inside the closed surfaces.
     """
 
     harmonics: list[int] | None = None
     modes_per_harmonic: int = 2
     sensitivities: dict[str, list[Tangent]] = field(default_factory=dict)
+    own_frequency: bool = False
+    cavity: dict[str, Any] | None = None
 
 
 def run(folder: Path, job: str, oldjob: str | None, time_limit: float = float("inf")) -> None:
@@ -85,7 +97,7 @@ class Analysis:
         self.deck, self.request, self.deadline = deck, request, deadline
         self.section, self.steps = deck.read([])
         self.road = press_job.read_road(deck.revolve)
-        self._models: dict[tuple[float | None, bool], Model] = {}
+        self._models: dict[tuple[float | None, bool, bool], Model] = {}
         self.model = self._model(None, True)
         self.U = np.zeros((len(self.model.mesh.X), 3))
         self.mass_kg = float(2 * np.pi * mass(self.model).sum().real)
@@ -118,6 +130,8 @@ class Analysis:
             wanted.append(-float(np.real(row.number(2))))
             if not wanted[-1] > max([0.0, *wanted[:-1]]):
                 raise DeckError(row.line, "loads on the road must push it to the tyre, and rise")
+            if step.centrifugal:
+                raise DeckError(step.procedure.line, "a turning tyre on a road is not honoured")
         if not wanted:
             raise DeckError(self.steps[-1].procedure.line, "no *CLOAD presses the road")
         step = self.steps[-1]
@@ -129,15 +143,22 @@ class Analysis:
         )  # fmt: skip
         return {"pressure_Pa": step.pressure, "mass_kg": self.mass_kg, **found}
 
-    def _model(self, dynamic_Hz: float | None, long_term: bool) -> Model:
-        key = dynamic_Hz, long_term
+    def _model(
+        self, dynamic_Hz: float | None, long_term: bool, own_frequency: bool = False
+    ) -> Model:
+        key = dynamic_Hz, long_term, own_frequency
         if key not in self._models:
-            self._models[key] = build(self.section, dynamic_Hz, long_term)
+            self._models[key] = build(self.section, *key)
         return self._models[key]
+
+    def _turning(self, model: Model, step: Step) -> Model:
+        """The model with the centrifugal load of a step. Raises DeckError."""
+        spin2 = _uniform(model, step, step.centrifugal, "CENTRIF")
+        return replace(model, spin2=spin2) if spin2 else model
 
     def _static(self, step: Step) -> None:
         self._check_time()
-        model = self._model(None, step.long_term)
+        model = self._turning(self._model(None, step.long_term), step)
         equations = numbering(model, step)
         found = equilibrium(model, equations, _loads(model, step), self.U, self._check_time)
         self.U = found.U
@@ -147,38 +168,76 @@ class Analysis:
         procedure = step.procedure
         dynamic_Hz = procedure.number("PROPERTY EVALUATION")
         row = procedure.rows[0] if procedure.rows else Row(procedure.line, [])
-        if row.text(1):
-            raise DeckError(row.line, "a lowest frequency of interest is not honoured")
         shift = float(np.real(row.number(3, 0.0))) * (2 * np.pi) ** 2
-        model = self._model(dynamic_Hz, step.long_term)
+        own = self.request.own_frequency
+        model = self._turning(self._model(dynamic_Hz, step.long_term, own), step)
         equations = numbering(model, step)
-        vibration = Vibration(model, self.U, _loads(model, step), equations, shift)
+        wheel, air = self._beside(self.section, model, step)
+        vibration = Vibration(
+            model, self.U, _loads(model, step), equations, shift,
+            wheel, air, float(np.real(row.number(1, 0.0))),
+        )  # fmt: skip
         factor = vibration.factor(0)
-        modes = self._modes(step, row, vibration, factor)
+        solver: HasModes = vibration
+        if model.laws:
+            solver = SelfConsistent(vibration, model.laws)
+        modes = self._modes(step, row, solver, factor)
         if row.text(2):
             modes = [m.below(float(np.real(row.number(2)))) for m in modes]
+        newton = factor.tyre if isinstance(factor, Bordered) else factor
         if self.request.sensitivities and (dynamic_Hz is not None or shift):
-            still = self._model(None, step.long_term)  # the Newton tangent is another matrix then
-            factor = Vibration(still, self.U, _loads(still, step), equations, 0.0).factor(0)
+            still = self._turning(self._model(None, step.long_term), step)  # Newton's tangent
+            plain = Vibration(still, self.U, _loads(still, step), equations, 0.0).factor(0)
+            newton = plain.tyre if isinstance(plain, Bordered) else plain
         rates: dict[str, list[Array]] = {}
         strains: sensitivity.Strains = {}
         for variable, tangents in self.request.sensitivities.items():
             rates[variable] = self._rates(
-                tangents, place, dynamic_Hz, factor, equations, modes, strains
+                tangents, place, dynamic_Hz, newton, equations, modes, strains
             )
         return self._result(step, modes, rates)
 
+    def _beside(
+        self, section: list[Keyword], model: Model, step: Step
+    ) -> tuple[Wheel | None, Air | None]:
+        """The rim that moves in a step and the gas in the cavity, where there are such."""
+        wheel = read_wheel(self.deck.revolve, model.mesh, step) if step.revolved else None
+        cavity = self.request.cavity
+        return wheel, read_air(section, model.mesh, cavity) if cavity else None
+
     def _modes(
-        self, step: Step, row: Row, vibration: Vibration, factor: Cholesky
+        self,
+        step: Step,
+        row: Row,
+        vibration: HasModes,
+        factor: Cholesky | Bordered,
     ) -> list[HarmonicModes]:
         harmonics = self.request.harmonics if step.revolved else [0]
         if harmonics is None:
             return lowest_of_all(vibration, row.integer(0), self._check_time)
         modes = []
+        count = self.request.modes_per_harmonic
+        attached = read_attached(self.deck.revolve, self.model.mesh)
+        waving = step.procedure.name == "COMPLEX FREQUENCY"
+        if (attached or waving) and not (isinstance(vibration, Vibration) and vibration.plain):
+            raise DeckError(
+                step.procedure.line,
+                "masses and springs on the tyre, or its turning, are not honoured together with a"
+                " rim that moves, air in the cavity or rubber at each mode's own frequency",
+            )
+        if waving:
+            spin = float(np.real(_uniform(self.model, step, step.spin, "ROTDYNF")))
+            _check_spin(step, spin, bool(attached))
+            for n in harmonics:
+                self._check_time()
+                modes.append(waves(vibration, spin, n, count))
+            return modes
+        if attached:
+            return attached_modes(vibration, attached, harmonics, count, self._check_time)
         for n in harmonics:
             self._check_time()
             known = factor if n == 0 else None
-            modes.append(vibration.modes(n, self.request.modes_per_harmonic, known))
+            modes.append(vibration.modes(n, count, known))
         return modes
 
     def _rates(
@@ -196,7 +255,15 @@ class Analysis:
         step = steps[place]
         still = build(section, None, step.long_term)
         V = sensitivity.state_rate(still, self.U, _loads(still, step), equations, factor)
-        moving = still if dynamic_Hz is None else build(section, dynamic_Hz, step.long_term)
+        moving = still
+        own = self.request.own_frequency
+        if dynamic_Hz is not None or own:
+            moving = build(section, dynamic_Hz, step.long_term, own)
+        wheel, air = self._beside(section, moving, step)
+        beside = None
+        if wheel or air:
+            rim, flow = [q for m in modes for q in m.rim], [w for m in modes for w in m.air]
+            beside = sensitivity.Beside(wheel, air, rim, flow)
         counts = [len(m.eigenvalues) for m in modes]
         rates = sensitivity.eigenvalue_rates(
             moving,
@@ -207,6 +274,7 @@ class Analysis:
             np.concatenate([m.shapes for m in modes]),
             np.concatenate([m.eigenvalues for m in modes]),
             strains,
+            beside,
         )
         return np.split(rates, np.cumsum(counts)[:-1])
 
@@ -220,6 +288,34 @@ class Analysis:
     def _check_time(self) -> None:
         if time.monotonic() > self.deadline:
             raise TimedOut("the time limit passed")
+
+
+def _uniform(
+    model: Model, step: Step, sets: dict[str, complex | float], kind: str
+) -> complex | float:
+    """The magnitude of a load that all of the tyre bears, 0 where there is none."""
+    if not sets:
+        return 0.0
+    line, elements = step.procedure.line, model.mesh.element_sets
+    unknown = [name for name in sets if name not in elements]
+    if unknown:
+        raise DeckError(line, f"element set {unknown[0]} of the step's *DLOAD is not defined")
+    loaded = {number for name in sets for number in elements[name]}
+    if len(set(sets.values())) > 1 or loaded != set(model.mesh.place):
+        raise DeckError(line, f"the load {kind} must be one for all elements of the tyre")
+    return next(iter(sets.values()))
+
+
+def _check_spin(step: Step, spin: float, attached: bool) -> None:
+    """The three places where a deck says how fast the tyre turns agree. Raises DeckError."""
+    line = step.procedure.line
+    if attached:
+        raise DeckError(line, "masses or springs on a turning tyre are not honoured")
+    spin2 = np.real(next(iter(step.centrifugal.values()), 0.0))
+    if not abs(spin2 - spin**2) <= 1e-9 * spin**2:
+        raise DeckError(line, f"CENTRIF {spin2:g} is not the square of ROTDYNF {spin:g}")
+    if not spin:
+        raise DeckError(line, "*COMPLEX FREQUENCY is honoured of a turning tyre: no ROTDYNF")
 
 
 def _loads(model: Model, step: Step) -> list[Load]:

@@ -1,12 +1,14 @@
-"""Materials of a deck: hyperelastic rubber with its Prony terms, elastic cords."""
+"""Materials of a deck: rubber with Prony terms or a law of frequency, elastic cords, a gas."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 
 from .keywords import DeckError, Keyword
+from .spectrum import Law
 
 Number = complex | float
 
@@ -15,7 +17,8 @@ Number = complex | float
 class Material:
     """Constants as the deck gives them; Pa, kg/m3, s.
 
-    ``instantaneous``: the moduli are those of sudden loading. ``prony``: rows (g, k, tau).
+    ``instantaneous``: the moduli are those of sudden loading. ``prony``: rows (g, k, tau);
+    ``law``: of the storage modulus over frequency, in place of a Prony series.
     """
 
     name: str
@@ -27,6 +30,8 @@ class Material:
     inverse_D1: Number = 0.0
     instantaneous: bool = False
     prony: list[tuple[Number, Number, Number]] = field(default_factory=list)
+    law: Law | None = None
+    bulk_modulus: Number | None = None
 
     def _relaxed(self) -> tuple[Number, Number]:
         """Long-term over instantaneous modulus, shear and bulk: 1 - sum g, 1 - sum k."""
@@ -46,6 +51,8 @@ class Material:
         """
         if frequency_Hz is None:
             return 1.0, 1.0
+        if self.law is not None:
+            return self.law.ratio(frequency_Hz), 1.0
         ratios: list[Number] = []
         for kind, relaxed in enumerate(self._relaxed()):
             storage = relaxed
@@ -66,7 +73,7 @@ def read_materials(keywords: list[Keyword]) -> dict[str, Material]:
             if name in materials:
                 raise DeckError(k.line, f"material {name} is defined twice")
             current = materials[name] = Material(name, k.line)
-        elif k.name in ("DENSITY", "ELASTIC", "HYPERELASTIC", "VISCOELASTIC"):
+        elif k.name in _READERS:
             if current is None:
                 raise DeckError(k.line, f"*{k.name} must follow a *MATERIAL")
             _READERS[k.name](current, k)
@@ -96,12 +103,29 @@ def _hyperelastic(m: Material, k: Keyword) -> None:
 
 
 def _viscoelastic(m: Material, k: Keyword) -> None:
+    if "FREQUENCY" in k.parameters:
+        m.law = _law(k)
+        return
     for row in k.rows:
+        if len(row.fields) > 3 and any(row.fields[3:]):
+            raise DeckError(row.line, "a term of a Prony series is g, k and tau")
         m.prony.append((row.number(0), row.number(1, 0.0), row.number(2)))
     if any(np.real(x) < 0 for term in m.prony for x in term):
         raise DeckError(k.line, "g, k and tau of a Prony series must not be negative")
     if any(np.real(r) <= 0 for r in m._relaxed()):
         raise DeckError(k.line, "the sum of g (and of k) of a Prony series must stay below 1")
+
+
+def _law(k: Keyword) -> Law:
+    """Rows of loss and storage: G''/G0, 1 - G'/G0, K''/K0, 1 - K'/K0, frequency in Hz. A
+    vibration without damping has no use for the losses."""
+    frequency = [float(np.real(row.number(4))) for row in k.rows]
+    ratios = [1 - row.number(1) for row in k.rows]
+    if len(frequency) < 2 or any(b <= a for a, b in pairwise([0.0, *frequency])):
+        raise DeckError(k.line, "a table of moduli has two rows or more, their frequencies rise")
+    if any(np.real(ratio) <= 0 for ratio in ratios) or any(row.number(3, 0.0) for row in k.rows):
+        raise DeckError(k.line, "shear moduli of a table are positive, and the bulk modulus stays")
+    return Law(tuple(frequency), tuple(ratios))
 
 
 def _positive(k: Keyword, index: int, what: str) -> Number:
@@ -111,7 +135,12 @@ def _positive(k: Keyword, index: int, what: str) -> Number:
     return value
 
 
+def _acoustic(m: Material, k: Keyword) -> None:
+    m.bulk_modulus = _positive(k, 0, "bulk modulus")
+
+
 _READERS = {
+    "ACOUSTIC MEDIUM": _acoustic,
     "DENSITY": _density,
     "ELASTIC": _elastic,
     "HYPERELASTIC": _hyperelastic,

@@ -17,6 +17,7 @@ from .model import Cords, Model, Rubber
 from .section import Lines, Solids
 
 Array = np.ndarray
+Parts = list[tuple[Array, Array]]
 
 
 @dataclass
@@ -65,11 +66,27 @@ def potential(model: Model, U: Array, loads: list[Load]) -> float:
     for load in loads:
         x, dx = surface_point(model.mesh.X, load.lines, U)
         total -= load.pressure * pressure.volume(x, dx, load.lines.weights)
+    for connectivity, M in _whirled(model):
+        x = _turning(model, U, connectivity)
+        total -= model.spin2 * np.einsum("eai,eab,ebi->", x, M, x) / 2
     return total
 
 
 def residual(model: Model, U: Array, loads: list[Load], numbering: Numbering) -> Array:
     """Out-of-balance force (size,), N per radian: gradient of the potential."""
+    return numbering.vector(_forces(model, U, loads))
+
+
+def gradient(model: Model, U: Array, loads: list[Load]) -> Array:
+    """Gradient of the potential by every component (n, 3), those that are held among them."""
+    parts = _forces(model, U, loads)
+    total = np.zeros(U.shape, np.result_type(*(v for _, v in parts)))
+    for connectivity, values in parts:
+        np.add.at(total, connectivity, values.reshape(*connectivity.shape, 3))
+    return total
+
+
+def _forces(model: Model, U: Array, loads: list[Load]) -> Parts:
     parts = []
     for r in model.rubbers:
         s = r.solids
@@ -96,10 +113,22 @@ def residual(model: Model, U: Array, loads: list[Load], numbering: Numbering) ->
         force = lines.N.T @ (weights[..., None] * by_x)
         force = force + (weights[..., None] * lines.slope).swapaxes(1, 2) @ by_dx
         parts.append((lines.connectivity, force.reshape(len(force), -1)))
-    return numbering.vector(parts)
+    for connectivity, M in _whirled(model):
+        force = -model.spin2 * M @ _turning(model, U, connectivity)
+        parts.append((connectivity, force.reshape(len(force), -1)))
+    return parts
 
 
-Parts = list[tuple[Array, Array]]
+def _whirled(model: Model) -> Parts:
+    """Element masses on which the centrifugal force acts: potential -Omega^2 M x^2 / 2."""
+    return mass_matrices(model) if model.spin2 else []
+
+
+def _turning(model: Model, U: Array, connectivity: Array) -> Array:
+    """Deformed position (e, a, 3) in the plane of the wheel."""
+    x = U[connectivity] @ pressure.IN_PLANE + np.zeros(1, model.mesh.X.dtype)
+    x[..., 0] += model.mesh.X[connectivity, 0]
+    return x
 
 
 def tangents(
@@ -120,6 +149,9 @@ def tangents(
         _cord_tangents(c, U, harmonics, tension, K0, K1, K2)
     for load in loads:
         _pressure_tangents(model.mesh.X, load, U, harmonics, K0, K1)
+    for connectivity, M in _whirled(model):
+        softening = np.einsum("eab,ij->eaibj", -model.spin2 * M, pressure.IN_PLANE)
+        K0.append((connectivity, softening.reshape(len(M), 3 * M.shape[1], -1)))
     return K0, K1, K2
 
 

@@ -169,12 +169,18 @@ def _surface(
         members = sets.get(name) or ([int(name)] if name.isdigit() else None)
         if members is None:
             raise DeckError(row.line, f"element set {name} is not defined")
-        if face not in ("S1", "S2", "S3", "S4"):
-            raise DeckError(row.line, f"face '{face}' is not one of S1, S2, S3, S4")
+        if face not in ("S1", "S2", "S3", "S4", "SPOS"):
+            raise DeckError(row.line, f"face '{face}' is not one of S1, S2, S3, S4, SPOS")
         for number in members:
             kind, position = place[number]
-            if kind not in POINTS:
-                raise DeckError(row.line, f"element {number} is not a solid")
+            if face == "SPOS" and kind not in POINTS:
+                # seen from the left of its direction, as a solid's face is from the right
+                rows.append(connectivity[kind][position][::-1])
+                continue
+            if kind not in POINTS or face == "SPOS":
+                raise DeckError(row.line, f"element {number} of type {kind} has no face {face}")
             order = shapes.FACES_QUADRATIC if NODES[kind] == 8 else shapes.FACES_LINEAR
             rows.append([connectivity[kind][position][i] for i in order[int(face[1]) - 1]])
+    if len({len(nodes) for nodes in rows}) > 1:
+        raise DeckError(k.line, "a surface with edges of two and of three nodes is not honoured")
     return geometry.lines(X, np.array(rows), 3 if len(rows[0]) == 3 else 2)

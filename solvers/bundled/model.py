@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -11,18 +11,23 @@ from .keywords import DeckError, Keyword, Row
 from .materials import Material, read_materials
 from .mesh import POINTS, Mesh, read_mesh
 from .rubber import MooneyRivlin
+from .spectrum import Law
 
 Array = np.ndarray
 
 
 @dataclass
 class Rubber:
-    """One block of solids with constants per Gauss point (e * g,) and density per element."""
+    """One block of solids with constants per Gauss point (e * g,) and density per element.
+
+    ``law`` (e * g,): place in the model's laws of frequency, -1 = none.
+    """
 
     solids: geometry.Solids
     material: MooneyRivlin
     density: Array
     hourglass_stiffness: Array
+    law: Array
 
 
 @dataclass
@@ -39,28 +44,47 @@ class Cords:
 
 @dataclass
 class Model:
-    """The tyre's section, ready for mechanics."""
+    """The tyre's section, ready for mechanics.
+
+    spin2: square of the spin about the axle, rad2/s2.
+    """
 
     mesh: Mesh
     rubbers: list[Rubber]
     cords: list[Cords]
+    laws: list[Law] = field(default_factory=list)
+    spin2: complex | float = 0.0
 
 
-def build(keywords: list[Keyword], dynamic_Hz: float | None, long_term: bool) -> Model:
+def build(
+    keywords: list[Keyword],
+    dynamic_Hz: float | None,
+    long_term: bool,
+    own_frequency: bool = False,
+) -> Model:
     """The model of a section job.
 
     ``dynamic_Hz``: evaluate the rubber's vibration modulus at this frequency, None = static;
-    ``long_term``: the static state is relaxed (else instantaneous moduli).
+    ``long_term``: the static state is relaxed (else instantaneous moduli); ``own_frequency``:
+    rubber with a law of frequency keeps its static modulus, the law is in the model's.
     Raises DeckError.
     """
     mesh = read_mesh(keywords)
-    return _properties(keywords, mesh, dynamic_Hz, long_term)
+    materials = read_materials(keywords)
+    laws: list[Law] = []
+    if own_frequency:
+        laws = list(dict.fromkeys(m.law for m in materials.values() if m.law is not None))
+    return _properties(keywords, mesh, materials, laws, dynamic_Hz, long_term)
 
 
 def _properties(
-    keywords: list[Keyword], mesh: Mesh, dynamic_Hz: float | None, long_term: bool
+    keywords: list[Keyword],
+    mesh: Mesh,
+    materials: dict[str, Material],
+    laws: list[Law],
+    dynamic_Hz: float | None,
+    long_term: bool,
 ) -> Model:
-    materials = read_materials(keywords)
     rubber_of: dict[str, list[tuple[Array, Material, complex | float]]] = {}
     cords: dict[str, list[Cords]] = {}
     stiffness = _hourglass_controls(keywords)
@@ -86,12 +110,12 @@ def _properties(
                 for row in k.rows:
                     cords.setdefault(kind, []).append(_layer(k, row, mesh, kind, rows, materials))
     rubbers = [
-        _rubber(kind, parts, mesh, dynamic_Hz, long_term) for kind, parts in rubber_of.items()
+        _rubber(kind, parts, mesh, laws, dynamic_Hz, long_term) for kind, parts in rubber_of.items()
     ]
     for kind in mesh.blocks:
         if kind in POINTS and kind not in rubber_of:
             raise DeckError(0, f"the {kind} elements have no *SOLID SECTION")
-    return Model(mesh, rubbers, [_merge(group) for group in cords.values()])
+    return Model(mesh, rubbers, [_merge(group) for group in cords.values()], laws)
 
 
 def _find(k: Keyword, materials: dict[str, Material], name: str) -> Material:
@@ -132,6 +156,7 @@ def _rubber(
     kind: str,
     parts: list[tuple[Array, Material, complex | float]],
     mesh: Mesh,
+    laws: list[Law],
     dynamic_Hz: float | None,
     long_term: bool,
 ) -> Rubber:
@@ -146,7 +171,8 @@ def _rubber(
         owner[rows] = i
         scale, bulk = material.static_scale(long_term)
         C10, C01, D = material.C10 or 0.0, material.C01, material.inverse_D1
-        ratio = material.dynamic_ratio(dynamic_Hz, long_term)
+        place = laws.index(material.law) if material.law in laws else -1
+        ratio = (1.0, 1.0) if place >= 0 else material.dynamic_ratio(dynamic_Hz, long_term)
         G = 2 * (C10 + C01) * scale
         table.append(
             [
@@ -156,11 +182,12 @@ def _rubber(
                 *ratio,
                 material.density,
                 0.005 * G if hourglass == -1.0 else hourglass,
+                place,
             ]
         )
     if (owner < 0).any():
         raise DeckError(0, f"{(owner < 0).sum()} {kind} elements have no *SOLID SECTION")
-    C10, C01, D, shear, bulk, density, hourglass = np.array(table).T[:, owner]
+    C10, C01, D, shear, bulk, density, hourglass, law_of = np.array(table).T[:, owner]
     point = lambda values: np.repeat(values, g)
     still = dynamic_Hz is None or not (np.any(shear != 1) or np.any(bulk != 1))
     law = MooneyRivlin(
@@ -170,7 +197,7 @@ def _rubber(
         None if still else point(shear),
         None if still else point(bulk),
     )
-    return Rubber(solids, law, density, hourglass)
+    return Rubber(solids, law, density, hourglass, point(law_of.real.astype(int)))
 
 
 def _layer(

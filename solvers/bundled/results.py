@@ -1,7 +1,8 @@
 """Result files of a job: JOB.json (numbers) and JOB.npz (shapes). Same deck, same bytes.
 
 JOB.json: ``steps`` [{step, pressure_Pa, mass_kg, factorisations, modes [{n, frequency_Hz,
-eigenvalue, multiplicity}], sensitivities {variable: [d f / d variable, Hz per unit]}}].
+eigenvalue, multiplicity; where doublets have split, which doublet of its harmonic from 0 on,
+and which member of it, 1 or 2}], sensitivities {variable: [d f / d variable, Hz per unit]}}].
 JOB.npz: ``nodes`` (k,), ``points`` (k, 2) R, Z in m, and per step S ``displacement_S`` (k, 3) and
 ``shapes_S`` (modes, k, 3): complex amplitudes of u = Re[U exp(i n Theta)] in r, theta, z, scaled
 to unit modal mass of the whole tyre.
@@ -51,16 +52,17 @@ def write(stem: Path, model: Model, results: list[StepResult]) -> None:
         ]
         order.sort()
         lines = []
-        for value, i, _ in order:
-            n = result.modes[i].n
-            lines.append(
-                {
-                    "n": n,
-                    "frequency_Hz": _hertz(value),
-                    "eigenvalue": value,
-                    "multiplicity": 2 if n else 1,
-                }
-            )
+        for value, i, j in order:
+            n, members = result.modes[i].n, result.modes[i].members
+            line = {
+                "n": n,
+                "frequency_Hz": _hertz(value),
+                "eigenvalue": value,
+                "multiplicity": 1 if members is not None else 2 if n else 1,
+            }
+            if members is not None:
+                line |= {"doublet": j // 2, "member": int(members[j])}
+            lines.append(line)
         rates = {
             variable: [float(per[i][j] / (8 * np.pi**2 * _hertz(value))) for value, i, j in order]
             for variable, per in result.rates.items()

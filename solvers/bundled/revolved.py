@@ -197,8 +197,13 @@ class _RubberPart(_Part):
 
 def _at_stations(law: rubber.MooneyRivlin, points: int, s: int) -> rubber.MooneyRivlin:
     """The law's constants per Gauss point, repeated for every station."""
-    spread = lambda c: np.repeat(np.broadcast_to(c, points), s)
+    spread = lambda c: _spread(np.broadcast_to(c, points) if np.ndim(c) < 2 else c, s)
     return rubber.MooneyRivlin(spread(law.C10), spread(law.C01), spread(law.inverse_D1))
+
+
+def _spread(constant: Array, s: int) -> Array:
+    """A constant per Gauss point (p,), or per Gauss point and station (p, s), as (p * s,)."""
+    return constant.ravel() if constant.ndim == 2 else np.repeat(constant, s)
 
 
 class _CordPart(_Part):
@@ -226,7 +231,7 @@ class _CordPart(_Part):
     def force(self, u: Array, du: Array) -> tuple[Array, Array, Array]:
         q = self._vectors(u, du) + self.c.direction[:, :, None]
         shape = q.shape
-        stiffness = np.repeat(self.c.stiffness, shape[2])
+        stiffness = _spread(self.c.stiffness, shape[2])
         self.D = cords.tangent(q.reshape(-1, 3), stiffness).reshape(*shape, 3)
         self._W = cords.energy(q.reshape(-1, 3), stiffness).reshape(shape[:3])
         return self._forces(cords.force(q.reshape(-1, 3), stiffness).reshape(shape))

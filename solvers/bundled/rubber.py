@@ -20,6 +20,7 @@ class MooneyRivlin:
     """C10, C01 (Pa), inverse_D1 = 1/D1 (Pa), per Gauss point.
 
     ``shear_ratio``: instantaneous-over-static modulus of a small vibration; 1 = none.
+    Not ``stressed``: the tangent without the initial stress, as that of a ratio has it.
     """
 
     C10: Array
@@ -27,6 +28,7 @@ class MooneyRivlin:
     inverse_D1: Array
     shear_ratio: Array | None = None
     bulk_ratio: Array | None = None
+    stressed: bool = True
 
 
 def determinant(F: Array) -> tuple[Array, Array]:
@@ -86,6 +88,9 @@ def tangent(F: Array, m: MooneyRivlin, weights: Array | float = 1.0) -> Array:
     """
     if m.shear_ratio is not None:
         return _dynamic_tangent(F, m, weights)
+    if not m.stressed:
+        whole = replace(m, stressed=True)
+        return _less_stress(tangent(F, whole, weights), F, stress(F, whole), weights)
     p = len(F)
     J, G = determinant(F)
     a = m.C10 * J ** (-2 / 3) * weights
@@ -117,8 +122,14 @@ def _dynamic_tangent(F: Array, m: MooneyRivlin, weights: Array | float) -> Array
         inverse_D1=m.inverse_D1 * m.bulk_ratio,
         shear_ratio=None,
     )
-    S = np.linalg.solve(F, stress(F, dynamic) - stress(F, m))  # second Piola-Kirchhoff
-    A = tangent(F, dynamic, weights).reshape(-1, 3, 3, 3, 3)
+    more = stress(F, dynamic) - stress(F, m)
+    return _less_stress(tangent(F, dynamic, weights), F, more, weights)
+
+
+def _less_stress(A: Array, F: Array, P: Array, weights: Array | float) -> Array:
+    """A (p, 9, 9) without the part of the initial stress P (p, 3, 3)."""
+    S = np.linalg.solve(F, P)  # second Piola-Kirchhoff
+    A = A.reshape(-1, 3, 3, 3, 3)
     for i in range(3):
         A[:, i, :, i, :] -= S * np.reshape(weights, (-1, 1, 1))
     return A.reshape(-1, 9, 9)

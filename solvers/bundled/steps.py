@@ -9,6 +9,7 @@ import numpy as np
 from . import grammar
 from .keywords import DeckError, Keyword, Row, read_keywords, seed
 
+PROCEDURES = ("STATIC", "FREQUENCY", "COMPLEX FREQUENCY")
 Tangent = tuple[str, int, int, float]  # job, 1-based line, 0-based field, d number / d variable
 
 
@@ -16,10 +17,11 @@ Tangent = tuple[str, int, int, float]  # job, 1-based line, 0-based field, d num
 class Step:
     """One step with what holds in it; loads and supports carry on from step to step of a job.
 
-    number: in the job, from 1; procedure: its *STATIC or *FREQUENCY; pressures: surface to the
+    number: in the job, from 1; procedure: its keyword of ``PROCEDURES``; pressures: surface to the
     deck's number (Pa); held: rows of *BOUNDARY; long_term: the static state is relaxed;
     revolved: of the second job, in three dimensions;
-    forces: rows of *CLOAD.
+    forces: rows of *CLOAD; centrifugal: element set to Omega^2 (rad2/s2) of *DLOAD's CENTRIF;
+    spin: element set to Omega (rad/s) of ROTDYNF.
     """
 
     number: int
@@ -29,6 +31,8 @@ class Step:
     long_term: bool = True
     revolved: bool = False
     forces: list[Row] = field(default_factory=list)
+    centrifugal: dict[str, complex | float] = field(default_factory=dict)
+    spin: dict[str, complex | float] = field(default_factory=dict)
 
     @property
     def pressure(self) -> float:
@@ -67,6 +71,7 @@ def _steps(model: list[Keyword], blocks: list[list[Keyword]], revolved: bool) ->
     held = [row for k in model if k.name == "BOUNDARY" for row in k.rows]
     pressures: dict[str, complex | float] = {}
     forces: list[Row] = []
+    turning: dict[str, dict[str, complex | float]] = {"CENTRIF": {}, "ROTDYNF": {}}
     long_term = True
     for number, block in enumerate(blocks, start=1):
         procedure = _procedure(block)
@@ -77,9 +82,16 @@ def _steps(model: list[Keyword], blocks: list[list[Keyword]], revolved: bool) ->
                 forces = k.rows
             elif k.name == "DSLOAD":
                 pressures = {**pressures, **_pressures(k)}
+            elif k.name == "DLOAD":
+                turning = _turning(k, turning, revolved)
         if procedure.name == "STATIC":
             long_term = "LONG TERM" in procedure.parameters
-        steps.append(Step(number, procedure, pressures, held, long_term, revolved, forces))
+        steps.append(
+            Step(
+                number, procedure, pressures, held, long_term, revolved, forces,
+                turning["CENTRIF"], turning["ROTDYNF"],
+            )
+        )  # fmt: skip
     return steps
 
 
@@ -92,10 +104,26 @@ def _pressures(k: Keyword) -> dict[str, complex | float]:
     return found
 
 
+def _turning(
+    k: Keyword, before: dict[str, dict[str, complex | float]], revolved: bool
+) -> dict[str, dict[str, complex | float]]:
+    """Loads of a tyre that turns about its axle, by kind and element set."""
+    found = {kind: dict(sets) for kind, sets in before.items()}
+    for row in k.rows:
+        kind = row.text(1).upper()
+        if kind not in (found if revolved else ("CENTRIF",)):
+            raise DeckError(row.line, f"load type '{row.text(1)}' of *DLOAD is not honoured here")
+        axis = [row.number(i, 0.0) for i in range(3, 9)]
+        if axis != ([0.0, 0.0, 0.0, 0.0, 1.0, 0.0] if revolved else [0.0] * 6):
+            raise DeckError(row.line, "the tyre turns about its axle, 0, 0, 0 along 0, 1, 0")
+        found[kind][row.text(0).upper()] = row.number(2)
+    return found
+
+
 def _procedure(block: list[Keyword]) -> Keyword:
-    found = [k for k in block if k.name in ("STATIC", "FREQUENCY")]
+    found = [k for k in block if k.name in PROCEDURES]
     if len(found) != 1:
-        raise DeckError(block[0].line, "a step needs one *STATIC or *FREQUENCY")
+        raise DeckError(block[0].line, "a step needs one *STATIC, *FREQUENCY or *COMPLEX FREQUENCY")
     if found[0].name == "STATIC" and "NLGEOM" not in block[0].parameters:
         raise DeckError(block[0].line, "a *STATIC step needs NLGEOM=YES")
     return found[0]

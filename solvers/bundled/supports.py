@@ -36,16 +36,17 @@ def _free(mesh: Mesh, step: Step) -> Array:
     for block in mesh.blocks.values():
         free[block.connectivity] = True
     for reference, tied in mesh.reference_nodes.items():
-        if not any(_holds_all(mesh, row, reference) for row in step.held):
+        moves = step.revolved and step.procedure.name == "FREQUENCY"
+        if rim_freedoms(mesh, step, reference) and not moves:
             raise DeckError(
                 step.procedure.line,
-                f"the rim's reference node {reference} must be held in 1, 6: a wheel that is free"
-                " to move is not honoured",
+                f"the rim's reference node {reference} must be held in 1, 6: a wheel moves only"
+                " in the *FREQUENCY step of a revolved tyre",
             )
         free[[mesh.index[n] for n in tied]] = False
     for row in step.held:
         name = row.text(0).upper()
-        if any(_holds_all(mesh, row, reference) for reference in mesh.reference_nodes):
+        if any(_names(mesh, row, reference) for reference in mesh.reference_nodes):
             continue
         nodes = mesh.node_sets.get(name) or ([int(name)] if name.isdigit() else [])
         if not nodes or any(n not in mesh.index for n in nodes):
@@ -55,11 +56,19 @@ def _free(mesh: Mesh, step: Step) -> Array:
     return free
 
 
-def _holds_all(mesh: Mesh, row: Row, reference: int) -> bool:
-    first, last = _range(row)
+def rim_freedoms(mesh: Mesh, step: Step, reference: int) -> set[int]:
+    """Those of the degrees of freedom 1 to 6 of a rim's reference node that are not held."""
+    held: set[int] = set()
+    for row in step.held:
+        if _names(mesh, row, reference):
+            first, last = _range(row)
+            held.update(range(first, last + 1))
+    return set(range(1, 7)) - held
+
+
+def _names(mesh: Mesh, row: Row, reference: int) -> bool:
     name = row.text(0).upper()
-    named = name == str(reference) or mesh.node_sets.get(name) == [reference]
-    return named and first == 1 and last >= 6
+    return name == str(reference) or mesh.node_sets.get(name) == [reference]
 
 
 def _range(row: Row) -> tuple[int, int]:

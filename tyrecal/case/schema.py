@@ -61,7 +61,9 @@ class Prony(Part):
 class Rubber(Part):
     """Mooney-Rivlin: C10 (I1 - 3) + C01 (I2 - 3) + (J - 1)^2 / D1, with a Prony series.
 
-    ``moduli`` says whether the constants are those of relaxed or of instantaneous rubber.
+    ``moduli`` says whether the constants are those of relaxed or of instantaneous rubber. In a
+    mode of frequency f the shear modulus is (f / reference_frequency_Hz)^frequency_exponent times
+    as large.
     """
 
     kind: Literal["rubber"]
@@ -70,6 +72,8 @@ class Rubber(Part):
     D1_per_Pa: Positive
     moduli: Moduli = "long_term"
     prony: list[Prony] = Field(default_factory=list)
+    frequency_exponent: Annotated[float, Field(ge=0, le=0.5)] = 0.0
+    reference_frequency_Hz: Positive = 60.0
     density_kg_per_m3: Positive
 
     @classmethod
@@ -137,10 +141,58 @@ class Point(Part):
     z: float
 
 
+class Spindle(Part):
+    """Compliance of what holds the wheel, at the rim's reference point; 0 = clamped."""
+
+    lateral_m_per_N: NotNegative = 0.0
+    radial_m_per_N: NotNegative = 0.0
+    torsional_rad_per_N_m: NotNegative = 0.0
+    tilt_rad_per_N_m: NotNegative = 0.0
+
+    @property
+    def gives_way(self) -> bool:
+        """Whether the wheel moves on it."""
+        return any(self.__dict__.values())
+
+
 class Rim(Part):
-    """The rigid rim; its reference point is the wheel's centre."""
+    """The rigid rim; its reference point is the wheel's centre.
+
+    In a vibration it moves on its ``spindle``, or is ``free``; its own mass and moments of
+    inertia (polar: about the axle) are then those of wheel and hub, by default of steel, 17 inch.
+    """
 
     reference_point_m: Point
+    mass_kg: Positive = 15.0
+    polar_inertia_kg_m2: Positive = 0.43
+    diametral_inertia_kg_m2: Positive = 0.27
+    spindle: Spindle = Spindle()
+    free: bool = False
+
+    @property
+    def moves(self) -> bool:
+        """Whether it moves in a vibration."""
+        return self.free or self.spindle.gives_way
+
+    @classmethod
+    def problems(cls, values: Mapping[str, Any]) -> Iterator[Problem]:
+        spindle, point = values.get("spindle"), values.get("reference_point_m")
+        soft = isinstance(spindle, Mapping) and any(number(spindle, key) for key in spindle)
+        if soft and values.get("free") is True:
+            yield "free", "must be false where the spindle has a compliance"
+        if (soft or values.get("free") is True) and isinstance(point, Mapping):
+            r = number(point, "r")
+            if r:
+                yield "reference_point_m", f"must have r = 0 where the rim moves, got {r:g}"
+
+
+class Cavity(Part):
+    """The gas in the tyre as it moves with the walls; ``share`` of its mass and stiffness, 0 =
+    a constant pressure only, 1 = the gas as it is."""
+
+    gas: Literal["air", "helium", "sulphur_hexafluoride"] = "air"
+    temperature_C: Annotated[float, Field(gt=-100, lt=300)] = 20.0
+    share: NotNegative = 0.0
 
 
 class Analysis(Part):
@@ -152,6 +204,34 @@ class Analysis(Part):
     sectors: Annotated[int, Field(ge=8, le=1000)] = 60
     highest_harmonic: Annotated[int, Field(ge=0, le=20)] = 4
     modes_per_harmonic: Annotated[int, Field(ge=1, le=10)] = 2
+
+
+class PointMass(Part):
+    """A lumped mass on the tread, at the angle 0 and the height z over the middle."""
+
+    mass_kg: NotNegative = 0.0
+    z_m: float = 0.0
+
+
+class RoadSpring(Part):
+    """A road that barely touches: springs from the tread to the ground at the angle 0, over
+    ``width_m`` about the middle; the deflection by the static load is left out."""
+
+    radial_N_per_m: NotNegative = 0.0
+    lateral_N_per_m: NotNegative = 0.0
+    tangential_N_per_m: NotNegative = 0.0
+    width_m: Positive = 0.08
+
+
+class Splice(Part):
+    """A sector about the angle 0 in which numbers of the case are larger by ``share`` of
+    themselves: materials, layers and densities, but no geometry."""
+
+    share: Annotated[float, Field(gt=-1, le=10)] = 0.0
+    width_deg: Annotated[float, Field(gt=0, le=180)] = 10.0
+    numbers: Annotated[list[Text], Field(min_length=1)] = Field(
+        default_factory=lambda: ["materials.rubber.C10_Pa"]
+    )
 
 
 class Road(Part):
@@ -277,7 +357,7 @@ def _every_effect(given: dict[str, float]) -> dict[str, float]:
 class Case(Part):
     """One tyre, its mesh and analysis, what may vary and what was measured.
 
-    ``effects``: parameters of effects that are in it, by id, in the effect's unit.
+    ``spin_rad_per_s``: the tyre turns about its axle, not touching a road. ``effects``: parameters of effects that are in it, by id, in the effect's unit.
     """
 
     format: Annotated[int, Field(ge=1, le=1)]  # Literal[1] would take true
@@ -292,6 +372,11 @@ class Case(Part):
     solids: Annotated[list[Solid], Field(min_length=1)]
     rebar_layers: dict[Name, RebarLayer] = Field(default_factory=dict)
     rim: Rim
+    cavity: Cavity = Cavity()
+    spin_rad_per_s: NotNegative = 0.0
+    point_mass: PointMass = PointMass()
+    road_spring: RoadSpring = RoadSpring()
+    splice: Splice = Splice()
     analysis: Analysis
     road: Road = Road()
     effects: Annotated[dict[str, float], AfterValidator(_every_effect)] = Field(

@@ -19,7 +19,10 @@ from .schema import Case
 from .shape import explain
 
 # numbers that stand alone: no other part of the case, and no mesh, depends on their values
-ALONE = {"pressure_kPa", "materials", "rebar_layers", "rim", "effects", "solver"}
+ALONE = {
+    "pressure_kPa", "materials", "rebar_layers", "rim", "cavity", "effects", "solver",
+    "spin_rad_per_s", "point_mass", "road_spring", "splice",
+}  # fmt: skip
 
 
 def start_values(loaded: LoadedCase) -> dict[str, float]:

@@ -6,12 +6,16 @@ from functools import lru_cache
 from typing import Any
 
 from ..case import LoadedCase
+from ..case.schema import Analysis
 from ..effects import with_effects
 from ..tyre.gauges import with_gauges
 from ..tyre.mesh import SectionMesh, build_mesh
 from ..tyre.section import Section
+from .beside import frequency_rubber, gas_material, wheel
+from .uneven import attached, turning
 
 REFERENCE_NODE, ROAD_NODE = 900001, 900002
+WELL_ELEMENT = 900001
 CLEARANCE = 0.05  # m from the section, not inflated, to the road
 
 
@@ -50,8 +54,10 @@ def context(case: LoadedCase) -> dict[str, Any]:
     c = case.case
     mesh = section_mesh(case)
     materials = [
-        {"name": deck_name(name), **_material(material)} for name, material in c.materials.items()
+        {"name": deck_name(name), **_material(material, c.analysis)}
+        for name, material in c.materials.items()
     ]
+    gas = gas_material(c)
     layers: dict[tuple[Any, ...], dict[str, Any]] = {}
     sets: list[tuple[str, str, tuple[str, ...]]] = []
     for name, layer in c.rebar_layers.items():
@@ -81,6 +87,11 @@ def context(case: LoadedCase) -> dict[str, Any]:
     return {
         "name": c.name,
         "mesh": tables,
+        "well": _well(mesh) if c.rim.moves or gas else None,
+        "wheel": wheel(c.rim) if c.rim.moves else None,
+        "gas": gas,
+        "attached": attached(c, mesh),
+        "turning": turning(c, [block["name"] for block in (*tables["solids"], *tables["lines"])]),
         "solids": [
             {"set": block["name"], "material": deck_name(c.solids[block["entry"]].material)}
             for block in tables["solids"]
@@ -109,7 +120,13 @@ def deck_name(text: str) -> str:
     return text.upper().replace("-", "_").replace(" ", "_")
 
 
-def _material(material: Any) -> dict[str, Any]:
+def _well(mesh: SectionMesh) -> dict[str, Any]:
+    """A surface element over the rim's well, which closes the cavity: its left side is inside."""
+    right, left = mesh.solids[mesh.inner[-1]][3], mesh.solids[mesh.inner[0]][0]
+    return {"element": WELL_ELEMENT, "nodes": (right, left)}
+
+
+def _material(material: Any, analysis: Analysis) -> dict[str, Any]:
     if material.kind == "cord":
         return {
             "kind": "cord",
@@ -117,12 +134,15 @@ def _material(material: Any) -> dict[str, Any]:
             "poissons_ratio": material.poissons_ratio,
             "density": material.density_kg_per_m3,
         }
+    if material.frequency_exponent:
+        return frequency_rubber(material, analysis)
     return {
         "kind": "rubber",
         "C10": material.C10_Pa,
         "C01": material.C01_Pa,
         "D1": material.D1_per_Pa,
         "moduli": material.moduli.upper().replace("_", " "),
+        "storage": [],
         "prony": [{"g": t.g, "k": t.k, "tau": t.tau_s} for t in material.prony],
         "density": material.density_kg_per_m3,
     }

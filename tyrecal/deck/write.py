@@ -8,6 +8,7 @@ from typing import Any
 
 from ..case import LoadedCase, with_values
 from ..effects import catalogue, with_effects
+from .beside import beside_the_deck
 from .calculix import calculix_context
 from .context import context
 from .environment import TemplateFailed, environment, render
@@ -40,6 +41,7 @@ class Decks:
             "highest_harmonic": analysis.highest_harmonic,
             "modes_per_harmonic": modes_per_harmonic or analysis.modes_per_harmonic,
             "loads_N": loads_N,
+            **beside_the_deck(case),
         }
 
     def texts(self, dialect: str) -> dict[str, str]:

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 # Each a module of this package; in this order they are listed, and applied to a case.
 IDS = (
     "dynamic_stiffening",
+    "frequency_stiffening",
     "tread_density",
     "tread_wear",
     "bead_filler",
@@ -28,6 +29,16 @@ IDS = (
     "pressure_offset",
     "temperature",
     "temperature_drift",
+    "cavity_air",
+    "spindle_lateral",
+    "spindle_radial",
+    "spindle_torsional",
+    "spindle_tilt",
+    "wheel_free",
+    "stiffness_splice",
+    "point_mass",
+    "road_contact",
+    "rotation",
 )
 
 __all__ = ["IDS", "Effect", "EffectRefused", "catalogue", "with_effects"]

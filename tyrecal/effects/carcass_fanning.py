@@ -45,11 +45,16 @@ EFFECT = Effect(
     title="Fanned carcass cords",
     symbol="e",
     unit="",
+    # 1 is a radial carcass without joints; crossing plies and spread cords lie between
     low=0.0,
     high=1.0,
     changes=("*REBAR LAYER",),
-    signature="",
+    signature=(
+        "all down, most those that the sidewall's tension holds: [1,0] and [0,0] axial -3"
+        " %, [4,0] -0.6 % at e = 1, more at higher pressure; A_carcass takes up all but "
+        "0.1 %"
+    ),
     toggle="count the cords per length at the crown and at the bead of a tyre that is cut open",
-    aliases=(),
+    aliases=("temperature_drift",),
     add=add,
 )

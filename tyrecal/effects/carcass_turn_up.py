@@ -23,7 +23,7 @@ def add(case: LoadedCase, value: float) -> LoadedCase:
         raise ValueError("must be at least 0")
     section, names = case.section, case.section.names
     line = carcass_line(case)
-    outside = names[min(names.index(line) + 1, len(names) - 2)]
+    outside = names[-2]
     held = [name for name, _ in section.regions if stations(section, name)[1] > rim_edge(section)]
     regions = [*lower_sidewall(case), *held]
     layers = dict(case.case.rebar_layers)
@@ -65,11 +65,15 @@ EFFECT = Effect(
     title="Carcass turn-up",
     symbol="e",
     unit="",
+    # 1: the turn-up is the same ply
     low=0.0,
     high=1.0,
     changes=("*REBAR LAYER", "*ELEMENT", "*SURFACE SECTION"),
-    signature="",
+    signature=(
+        "all up, [0,0] axial and [1,1] most: +3 % at e = 1 and a soft carcass (0.7 MN/m),"
+        " [c,0] +1 to +2 %; A_carcass takes up all but 0.4 %"
+    ),
     toggle="section a tyre of the same build and measure the height at which the turn-up ends",
-    aliases=("bead_filler", "rim_width"),
+    aliases=("rim_width",),
     add=add,
 )

@@ -90,6 +90,17 @@ def with_layers(loaded: LoadedCase, layers: Mapping[str, Any]) -> LoadedCase:
     return changed(loaded, rebar_layers={**loaded.case.rebar_layers, **layers})
 
 
+def on_spindle(loaded: LoadedCase, key: str, compliance: float) -> LoadedCase:
+    """The case with that much more compliance at the rim's reference point. Raises ValueError."""
+    rim = loaded.case.rim
+    if rim.free:
+        raise ValueError("must be 0 where the rim is free: there is no spindle")
+    if compliance < 0:
+        raise ValueError("must be at least 0")
+    spindle = with_part(rim.spindle, **{key: getattr(rim.spindle, key) + compliance})
+    return changed(loaded, rim=with_part(rim, spindle=spindle))
+
+
 def _plain(value: Any) -> Any:
     if isinstance(value, BaseModel):
         return value.model_dump(exclude_none=True)

@@ -24,10 +24,14 @@ EFFECT = Effect(
     title="Rubber temperature",
     symbol="dT",
     unit="K",
+    # of the room and of the tyre's own heat
     low=-15.0,
     high=15.0,
     changes=("*HYPERELASTIC",),
-    signature="",
+    signature=(
+        "all down, [0,0] torsional most: -1.5 % at +15 K, [2,1] and [3,1] -1 %, [0,0] "
+        "axial least; just as C10"
+    ),
     toggle="measure again with the tyre soaked at another temperature, at the same pressure",
     aliases=("dynamic_stiffening", "sidewall_gauge"),
     add=add,

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from ..case import LoadedCase, with_values
+from ..deck.beside import needs
 from ..deck.write import Decks
 from ..effects import catalogue
 from . import folders
@@ -112,8 +113,14 @@ class Door:
         for id in (id for id, value in case.case.effects.items() if value):
             if not catalogue()[id].within(self.solver.capabilities):
                 raise DeckRefused(
-                    f"solver '{self.solver.name}' cannot express the effect '{id}'; 'tyrecal effects'"
-                    " shows which one can"
+                    f"solver '{self.solver.name}' cannot express the effect '{id}';"
+                    " 'tyrecal effects' shows which one can"
+                )
+        for need, words in needs(case).items():
+            if need not in self.solver.capabilities:
+                raise DeckRefused(
+                    f"solver '{self.solver.name}' cannot express {words};"
+                    f" 'tyrecal solvers' shows which one can ({need})"
                 )
 
     def _with(self, values: Mapping[str, float]) -> LoadedCase:

@@ -40,11 +40,16 @@ class RingShape:
 
 @dataclass(frozen=True)
 class RawMode:
-    """A mode as the solver gives it: frequency (Hz), shape, how many modes it stands for."""
+    """A mode as the solver gives it: frequency (Hz), shape, how many modes it stands for.
+
+    members: where something splits a doublet, the frequencies (Hz) of its two modes, the lower
+    first; ``frequency_Hz`` is then their mean, and the shape the lower one's part of harmonic n.
+    """
 
     frequency_Hz: float
     shape: HarmonicShape | RingShape
     multiplicity: int
+    members: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True)
@@ -79,7 +84,8 @@ def evaluation(answer: dict[str, Any]) -> Evaluation:
             shape = HarmonicShape(mode["n"], nodes, points, amplitude)
         else:
             shape = RingShape(points, np.ascontiguousarray(mode["displacement"]))
-        modes.append(RawMode(frequency, shape, mode["multiplicity"]))
+        members = tuple(mode["members"]) if mode.get("members") else None
+        modes.append(RawMode(frequency, shape, mode["multiplicity"], members))
     return Evaluation(
         pressure_kPa=answer["pressure_Pa"] / 1e3,
         mass_kg=answer["mass_kg"],

@@ -14,7 +14,7 @@ class Solver(Protocol):
 
     version: of the program that runs, "unknown" where it is not found; part of every record's key.
     dialect: the template folder of its decks; capabilities: of ``modes``,
-    ``gradients``, ``footprint``;
+    ``gradients``, ``footprint``, and of what effects need (`tyrecal.deck.write.Decks.needs`);
     refusals, failures: exceptions of `write`, `run` and `read` for a deck it cannot honour and
     for no solution; a failure's attribute ``cause``, where it has one, is `EvaluationFailed`'s.
     """
@@ -37,7 +37,8 @@ class Solver(Protocol):
 
     def read(self, folder: Path) -> dict[str, Any]:
         """pressure_Pa, mass_kg, modes [{frequency_Hz, multiplicity, n, amplitude}], gradients
-        {variable: [Hz per unit]}, nodes, points, displacement.
+        {variable: [Hz per unit]}, nodes, points, displacement. A doublet that is split is one
+        mode of multiplicity 2 at the mean frequency, with ``members`` [Hz, Hz].
 
         A solver in three dimensions gives each mode {frequency_Hz, multiplicity 1, displacement
         (k, 3)} at ``points`` (k, 3), as in `RingShape`; pairs are joined by the tool.

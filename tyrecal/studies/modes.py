@@ -22,13 +22,26 @@ def modes_result(
         "load_N": 0.0,
         "mass_kg": evaluation.mass_kg,
         "variables": dict(values),
-        "modes": [mode_entry(mode) for mode in modes],
+        "modes": sorted(
+            (entry for mode in modes for entry in _entries(mode)),
+            key=lambda entry: entry["frequency_Hz"],
+        ),
     }
     return result, modes
 
 
+def _entries(mode: Mode) -> list[dict[str, Any]]:
+    """A mode, or the two members of a doublet that is split."""
+    if mode.raw.members is None:
+        return [mode_entry(mode)]
+    return [
+        {**mode_entry(mode), "frequency_Hz": hertz, "multiplicity": 1, "member": member}
+        for member, hertz in enumerate(mode.raw.members, start=1)
+    ]
+
+
 def mode_entry(mode: Mode) -> dict[str, Any]:
-    """A mode as result files hold it."""
+    """A mode as result files hold it; a doublet that is split at its mean."""
     return {
         "c": mode.label.c,
         "m": mode.label.m,

@@ -100,7 +100,10 @@ def build_mesh(
             for j in range(0, width - 1, step)
             if present[k, j : j + step + 1].all()
         }
-    crown = [j for j in range(width) if present[-2, j]] or list(range(width))
+    there = present[-2]  # the outermost line; of its runs, the one over the crown
+    middle = width // 2
+    run = [j for j in range(width) if there[min(j, middle) : max(j, middle) + 1].all()]
+    crown = run or list(range(width))
     crown_outer = [number(height - 1, j) for j in crown]
     return SectionMesh(
         quadratic,

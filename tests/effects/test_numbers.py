@@ -1,0 +1,232 @@
+"""Effects that are numbers of the case: equal cases written by hand, masses, and what must rise."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.interpolate import CubicSpline
+from scipy.spatial import cKDTree
+
+from tyrecal.case import LoadedCase, load_case, with_values
+from tyrecal.case.schema import Cord, Gauge, RebarLayer
+from tyrecal.deck.write import Decks
+from tyrecal.effects import catalogue, with_effects
+from tyrecal.evaluate.door import Door, Question
+from tyrecal.modes.mode import Label
+from tyrecal.tyre.section import fill_lines
+
+from .support import CASE, CASES, START, decks, frequencies
+
+Array = np.ndarray
+PLY = CASE.section.names.index("ply")
+RIM = int(np.flatnonzero(CASE.section.rigid)[0])
+EDGE = int(np.flatnonzero(~np.isnan(CASE.section.points[-2, :, 0]))[-1])
+FINE = load_case(CASES / "p235_75r17.yaml")
+AREAS = {
+    name: layer.area_m2 / layer.spacing_m * CASE.case.materials[layer.material].density_kg_per_m3
+    for name, layer in CASE.case.rebar_layers.items()
+}  # kg/m2
+
+
+def edited(**parts: object) -> dict[str, str]:
+    """Decks of the case with parts of it replaced by hand."""
+    case = CASE.case.model_copy(update=parts)
+    return Decks(replace(CASE, case=case)).texts("abaqus")
+
+
+def set_to(**values: float) -> dict[str, str]:
+    """Decks of the case with numbers set by path, __ for a dot."""
+    paths = {name.replace("__", "."): value for name, value in values.items()}
+    return Decks(with_values(CASE, paths)).texts("abaqus")
+
+
+def mass(**effects: float) -> float:
+    values = {f"effects.{id}": value for id, value in effects.items()}
+    return Door(CASE).evaluate(Question({**START, **values})).mass_kg
+
+
+def section(**effects: float) -> Array:
+    """Points (line, station, 2) of the section with effects."""
+    values = {f"effects.{id}": value for id, value in effects.items()}
+    return with_effects(with_values(CASE, values)).section.points
+
+
+def length(line: Array) -> Array:
+    return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
+
+
+def swept(line: Array, weight: Array | float = 1.0) -> float:
+    """Integral of ``weight`` over both halves of the surface that a line sweeps, m2."""
+    return float(np.trapezoid(2 * 2 * np.pi * line[:, 0] * weight, length(line)))
+
+
+# the same deck as a case written by hand
+
+
+def test_cap_ply_is_a_layer() -> None:
+    cord = Cord(kind="cord", youngs_modulus_Pa=3.5e9, poissons_ratio=0.3, density_kg_per_m3=1140.0)
+    layer = RebarLayer(
+        line="belt2", material="cap_ply_cord", area_m2=1e6 * 1e-3 / 3.5e9, spacing_m=1e-3,
+        angle_deg=90.0,
+    )  # fmt: skip
+    materials = {**CASE.case.materials, "cap_ply_cord": cord}
+    layers = {**CASE.case.rebar_layers, "cap_ply": layer}
+    assert decks(CASE, cap_ply=1e6) == edited(materials=materials, rebar_layers=layers)
+
+
+@pytest.mark.parametrize(
+    ("id", "value", "regions", "between", "factor"),
+    [
+        ("sidewall_gauge", 0.1, ["upper_sidewall", "lower_sidewall"], ["inner", "outer"], 1.1),
+        ("tread_wear", 0.25, ["crown"], ["belt2", "outer"], 0.75),
+    ],
+)
+def test_gauges_are_the_cases_own(
+    id: str, value: float, regions: list[str], between: list[str], factor: float
+) -> None:
+    gauge = Gauge(between=between, regions=regions, factor=factor)
+    source = CASE.case.section.model_copy(update={"gauges": [gauge]})
+    assert decks(CASE, **{id: value}) == edited(section=source)
+
+
+def test_pressures_temperatures_and_angles_are_numbers_of_the_case() -> None:
+    assert decks(CASE, pressure_offset=-7.0) == set_to(pressure_kPa=153.0)
+    assert decks(CASE, temperature=20.0) == set_to(materials__rubber__C10_Pa=0.85e6)
+    angles = {"rebar_layers__belt_1__angle_deg": 68.0, "rebar_layers__belt_2__angle_deg": 112.0}
+    assert decks(CASE, belt_angle=2.0) == set_to(**angles)
+
+
+def test_drift_is_a_temperature_that_follows_the_pressure() -> None:
+    assert decks(CASE, temperature_drift=5.0) == decks(CASE, temperature=5.0 * -0.8)
+    nominal = with_values(CASE, {"pressure_kPa": 240.0})
+    assert decks(nominal, temperature_drift=5.0) == decks(nominal)
+
+
+def test_fanned_carcass_is_an_angular_layer() -> None:
+    bead = CASE.section.points[PLY, RIM, 0]
+    layer = CASE.case.rebar_layers["carcass"].model_copy(
+        update={
+            "geometry": "angular", "spacing_m": None, "spacing_deg": float(np.degrees(1e-3 / bead))
+        }
+    )  # fmt: skip
+    layers = {**CASE.case.rebar_layers, "carcass": layer}
+    assert decks(CASE, carcass_fanning=1.0) == edited(rebar_layers=layers)
+
+
+# masses, from the station table
+
+
+def test_masses() -> None:
+    ply, plain = CASE.section.points[PLY], mass()
+    share = ply[RIM, 0] / ply[:, 0] - 1
+    fanned = AREAS["carcass"] * swept(ply, share)
+    assert mass(carcass_fanning=0.6) - plain == pytest.approx(0.6 * fanned, rel=0.01)
+    low = fill_lines(CASE.section)[-2, 128:]
+    assert mass(carcass_turn_up=0.5) - plain == pytest.approx(
+        0.5 * AREAS["carcass"] * swept(low), rel=0.01
+    )
+    at = CASE.section.points[1:-1, EDGE, 0].mean()
+    belts = AREAS["belt_1"] + AREAS["belt_2"]
+    wider = [Door(FINE).evaluate(Question({"effects.belt_width": b})).mass_kg for b in (0, 0.004)]
+    assert wider[1] - wider[0] == pytest.approx(0.004 * 2 * np.pi * at * belts, rel=0.05)
+    hoop = 1140 * 1e6 / 3.5e9
+    belt = swept(CASE.section.points[-2, : EDGE + 1])
+    assert mass(cap_ply=1e6) - plain == pytest.approx(hoop * belt, rel=0.01)
+    lighter = plain - mass(tread_density=-0.2)
+    assert lighter == pytest.approx(2 * (plain - mass(tread_density=-0.1)))
+    gauge = np.hypot(*(CASE.section.points[-1] - CASE.section.points[-2])[: EDGE + 1].T)
+    middle = (CASE.section.points[-1] + CASE.section.points[-2])[: EDGE + 1] / 2
+    assert lighter == pytest.approx(0.2 * 1100 * swept(middle, gauge), rel=0.02)
+
+
+# geometry
+
+
+def test_wider_belt_leaves_the_shape_as_it_is() -> None:
+    before, after = CASE.section.points, section(belt_width=0.008)
+    for line in (0, PLY, -1):
+        at = length(before[line])
+        curve = CubicSpline(at, before[line])(np.linspace(0, at[-1], 200_001))
+        gaps = cKDTree(curve).query(after[line])[0]
+        assert max(gaps) < 1e-5  # m; at the shoulder's corner, which a spline rounds
+    moved = length(after[PLY])[EDGE] - length(before[PLY])[EDGE]
+    assert moved == pytest.approx(0.004, rel=1e-3)
+    assert after[:, -60:] == pytest.approx(before[:, -60:], nan_ok=True)
+
+
+def test_wider_rim_bends_the_carcass_and_does_not_stretch_it() -> None:
+    before, after = CASE.section.points, section(rim_width=0.01)
+    whole = [0, PLY, -1]
+    assert after[whole, RIM:] == pytest.approx(before[whole, RIM:] + [0.0, 0.005], abs=1e-9)
+    assert (after[:, : EDGE + 1] == before[:, : EDGE + 1]).all()
+    assert np.diff(length(after[PLY])) == pytest.approx(np.diff(length(before[PLY])), rel=1e-9)
+    thickness = [np.hypot(*(points[-1] - points[0]).T) for points in (before, after)]
+    assert thickness[1] == pytest.approx(thickness[0], rel=1e-9)
+
+
+# the vibration's modulus
+
+
+def test_dynamic_stiffening_of_an_unstressed_tyre_is_a_stiffer_rubber() -> None:
+    slack = with_values(CASE, {"pressure_kPa": 0.0})
+    stiff = with_values(slack, {"C10": 1.5e6})
+    values = {"A_belt": START["A_belt"], "A_carcass": START["A_carcass"]}
+    e = Door(slack).evaluate(Question({**values, "effects.dynamic_stiffening": 0.5}))
+    s = Door(stiff).evaluate(Question(values))
+    found, expected = ([m.frequency_Hz for m in answer.modes] for answer in (e, s))
+    assert found == pytest.approx(expected, rel=1e-9)
+
+
+@pytest.mark.parametrize("moduli", ["long_term", "instantaneous"])
+def test_dynamic_stiffening_starts_from_the_cases_own_prony_series(moduli: str) -> None:
+    case = with_values(CASE, {"analysis.vibration_frequency_Hz": 3.0})
+    rubber = case.case.materials["rubber"].model_copy(update={"moduli": moduli})
+    materials = {**case.case.materials, "rubber": rubber}
+    case = replace(case, case=case.case.model_copy(update={"materials": materials}))
+    plain, barely = frequencies(case), frequencies(case, dynamic_stiffening=1e-9)
+    assert list(barely.values()) == pytest.approx(list(plain.values()), rel=1e-8)
+
+
+# which way
+
+
+RISES = {
+    "dynamic_stiffening": 0.2,
+    "tread_density": -0.1,
+    "tread_wear": 0.1,
+    "bead_filler": 0.5,
+    "rim_width": 0.005,
+    "pressure_offset": 5.0,
+    "temperature": -5.0,
+    "temperature_drift": 2.0,  # colder below the case's pressure
+}
+
+
+@pytest.mark.parametrize("id", RISES)
+def test_every_mode_rises(id: str) -> None:
+    plain, with_it = frequencies(), frequencies(**{id: RISES[id]})
+    assert all(with_it[label] > f for label, f in plain.items())
+
+
+@pytest.mark.parametrize(
+    ("id", "value"), [("cap_ply", 1e6), ("belt_width", 0.005), ("belt_angle", -1.0)]
+)
+def test_belt_bends_in_its_plane_at_higher_frequency(id: str, value: float) -> None:
+    plain, with_it = frequencies(), frequencies(**{id: value})
+    bending = [label for label in plain if label.c > 1]
+    assert len(bending) >= 5
+    assert all(with_it[label] > plain[label] for label in bending)
+
+
+@pytest.mark.parametrize("id", [e.id for e in catalogue().values() if not e.needs])
+def test_calculix_has_a_deck_of_it(id: str) -> None:
+    case: LoadedCase = with_values(CASE, {f"effects.{id}": catalogue()[id].high / 2})
+    assert Decks(case).texts("calculix") != Decks(CASE).texts("calculix")
+
+
+def test_turned_up_carcass_holds_the_belt_from_the_side() -> None:
+    plain, with_it = frequencies(), frequencies(carcass_turn_up=0.5)
+    for label in (Label(0, 0, "axial"), Label(1, 1)):
+        assert with_it[label] > 1.01 * plain[label]

@@ -1,0 +1,29 @@
+"""The air in the tyre has inertia and stiffness of its own, beside its pressure."""
+
+from __future__ import annotations
+
+from ..case import LoadedCase
+from .edit import changed, with_part
+from .effect import Effect
+
+
+def add(case: LoadedCase, value: float) -> LoadedCase:
+    """``value`` times the density and the bulk modulus of the gas; 1 = as it is."""
+    cavity = case.case.cavity
+    return changed(case, cavity=with_part(cavity, share=cavity.share + value))
+
+
+EFFECT = Effect(
+    id="cavity_air",
+    title="Air in the cavity",
+    symbol="s",
+    unit="",
+    low=0.0,
+    high=1.5,
+    changes=("*ACOUSTIC MEDIUM (in the side file of the bundled solver)",),
+    signature="SIG",
+    toggle="inflate with helium (a seventh of the mass) or sulphur hexafluoride (five times)",
+    aliases=("tread_density",),
+    add=add,
+    needs="cavity",
+)

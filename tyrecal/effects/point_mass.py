@@ -1,0 +1,31 @@
+"""Something heavy on the tread: an accelerometer, a balance weight, a stone."""
+
+from __future__ import annotations
+
+from ..case import LoadedCase
+from .edit import changed, with_part
+from .effect import Effect
+
+
+def add(case: LoadedCase, value: float) -> LoadedCase:
+    """A mass more on the middle of the tread."""
+    if value < 0:
+        raise ValueError("must be at least 0")
+    point = case.case.point_mass
+    return changed(case, point_mass=with_part(point, mass_kg=point.mass_kg + value))
+
+
+EFFECT = Effect(
+    id="point_mass",
+    title="Mass on the tread",
+    symbol="m",
+    unit="kg",
+    low=0.0,
+    high=0.1,
+    changes=("*MASS",),
+    signature="SIG",
+    toggle="measure again without it, or with twice of it",
+    aliases=("tread_density",),
+    add=add,
+    needs="coupled",
+)

@@ -1,0 +1,30 @@
+"""The tyre turns: its waves run forward and backward at different frequencies."""
+
+from __future__ import annotations
+
+from ..case import LoadedCase
+from .edit import changed
+from .effect import Effect
+
+
+def add(case: LoadedCase, value: float) -> LoadedCase:
+    """A higher speed of rotation."""
+    if value < 0:
+        raise ValueError("must be at least 0: both senses of rotation give the same frequencies")
+    return changed(case, spin_rad_per_s=case.case.spin_rad_per_s + value)
+
+
+EFFECT = Effect(
+    id="rotation",
+    title="Rotation",
+    symbol="Omega",
+    unit="rad/s",
+    low=0.0,
+    high=80.0,
+    changes=("*DLOAD", "*COMPLEX FREQUENCY"),
+    signature="SIG",
+    toggle="measure again at another speed, or at rest",
+    aliases=("pressure_offset",),
+    add=add,
+    needs="rotation",
+)

@@ -1,0 +1,39 @@
+"""A splice: plies or tread overlap in a sector, which is stiffer than the rest."""
+
+from __future__ import annotations
+
+from ..case import LoadedCase
+from ..case.schema import Rubber
+from .edit import changed, with_part
+from .effect import Effect
+
+
+def add(case: LoadedCase, value: float) -> LoadedCase:
+    """Rubber (C10, C01) and cords (E) of a sector of the case's width times 1 + value."""
+    if not value > -1:
+        raise ValueError("must be greater than -1")
+    splice = case.case.splice
+    if splice.share:
+        raise ValueError("must be 0 where the case has a splice already")
+    numbers = []
+    for name, material in case.case.materials.items():
+        rubber = isinstance(material, Rubber)
+        keys = ("C10_Pa", "C01_Pa") if rubber else ("youngs_modulus_Pa",)
+        numbers += [f"materials.{name}.{key}" for key in keys]
+    return changed(case, splice=with_part(splice, share=value, numbers=numbers))
+
+
+EFFECT = Effect(
+    id="stiffness_splice",
+    title="Stiff sector (splice)",
+    symbol="e",
+    unit="",
+    low=0.0,
+    high=1.0,
+    changes=("the section of the sector, beside the deck",),
+    signature="SIG",
+    toggle="find the sector by hand or X-ray; exciting at it and beside it shows each member alone",
+    aliases=("point_mass",),
+    add=add,
+    needs="coupled",
+)

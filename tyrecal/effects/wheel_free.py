@@ -1,0 +1,46 @@
+"""The wheel is not fixed at all: it hangs in soft cords and moves with its own mass."""
+
+from __future__ import annotations
+
+from ..case import LoadedCase
+from .edit import changed, with_part
+from .effect import Effect
+
+
+def add(case: LoadedCase, value: float) -> LoadedCase:
+    """Nothing holds the rim; its mass is 1 / ``value``, its radii of gyration are the case's.
+
+    So value -> 0 is a wheel so heavy that it stands still.
+    """
+    rim = case.case.rim
+    if value < 0:
+        raise ValueError("must be at least 0")
+    if rim.moves:
+        raise ValueError("must be 0 where the rim moves already: a free wheel has no spindle")
+    scale = 1 / (value * rim.mass_kg)
+    return changed(
+        case,
+        rim=with_part(
+            rim,
+            free=True,
+            mass_kg=rim.mass_kg * scale,
+            polar_inertia_kg_m2=rim.polar_inertia_kg_m2 * scale,
+            diametral_inertia_kg_m2=rim.diametral_inertia_kg_m2 * scale,
+        ),
+    )
+
+
+EFFECT = Effect(
+    id="wheel_free",
+    title="Free wheel",
+    symbol="1/m",
+    unit="1/kg",
+    low=0.0,
+    high=0.1,
+    changes=("*BOUNDARY", "*MASS", "*ROTARY INERTIA"),
+    signature="SIG",
+    toggle="bolt the hub to a heavy block, or hang the wheel in soft cords: the other support",
+    aliases=("spindle_lateral", "spindle_radial"),
+    add=add,
+    needs="spindle",
+)

@@ -1,0 +1,126 @@
+"""What an effect does to the modes, and what calibration would hide of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..effects import catalogue
+from ..evaluate.door import Door, Question
+from ..evaluate.failure import EvaluationFailed
+from ..evaluate.results import Evaluation
+from ..fit.problem import read_targets
+from ..modes.label import paired_labels
+from ..modes.mode import Label, Mode
+from .fitted import pressure_name
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True)
+class Signature:
+    """An effect of one size at some pressures.
+
+    before, after (pressure, label): per cent of the plain tyre's frequency, as it comes and after
+    the best linear re-fit of the case's variables to it, NaN where a mode got lost; absorbed: the
+    share alpha = 1 - |after|^2 / |before|^2 that the re-fit takes up, doublets counted twice;
+    refitted: the values of the variables that do so; mass_kg: that the effect adds.
+    """
+
+    id: str
+    value: float
+    pressures_kPa: tuple[float, ...]
+    labels: tuple[Label, ...]
+    before: Array
+    after: Array
+    absorbed: float
+    refitted: dict[str, float]
+    mass_kg: float
+
+
+class Plain:
+    """The tyre without the effect at each pressure, with slopes by the case's variables.
+
+    values: of the variables, in their own units. Raises what ``Door.evaluate`` does.
+    """
+
+    def __init__(self, door: Door, values: Mapping[str, float], pressures_kPa: Sequence[float]):
+        self.door, self.pressures_kPa = door, tuple(pressures_kPa)
+        pressure = pressure_name(door.case)
+        variables = door.case.case.variables
+        self.names = tuple(name for name in values if name != pressure)
+        self.values = dict(values)
+        self.states = [{**values, pressure: p} for p in pressures_kPa]
+        found = [door.evaluate(Question(state, self.names)) for state in self.states]
+        self.mass_kg = found[0].mass_kg
+        modes = [_modes(evaluation) for evaluation in found]
+        wanted = [t.label for t in read_targets(door.case)] or [m for m in modes[0] if m.m < 2]
+        self.labels = tuple(label for label in wanted if all(label in each for each in modes))
+        self.hertz = np.array([[m[label].frequency_Hz for label in self.labels] for m in modes])
+        self.weights = np.sqrt([[m[label].multiplicity for label in self.labels] for m in modes])
+        # a variable's step: all of it where it varies by factors, else its range
+        self.steps = np.array(
+            [
+                values[name] if v.scale == "log" else v.upper - v.lower
+                for name, v in ((name, variables[name]) for name in self.names)
+            ]
+        )
+        slopes = [
+            [[e.gradients[name][m[label].position] for name in self.names] for label in self.labels]
+            for e, m in zip(found, modes, strict=True)
+        ]
+        self.jacobian = np.array(slopes) * self.steps / self.hertz[:, :, None]
+
+    def signature(self, id: str, value: float) -> Signature:
+        """What the effect does to this tyre. Raises what ``Door.evaluate`` does."""
+        effect = {f"effects.{id}": value}
+        found = [self.door.evaluate(Question({**state, **effect})) for state in self.states]
+        lost = np.nan
+        hertz = np.array([
+            [m[label].frequency_Hz if label in m else lost for label in self.labels]
+            for m in map(_modes, found)
+        ])  # fmt: skip
+        change = np.log(hertz / self.hertz)
+        there = ~np.isnan(change)
+        if not there.any():
+            raise EvaluationFailed("lost_label", f"no mode is left under the effect {id}")
+        w = self.weights[there]
+        J = self.jacobian[there] * w[:, None]
+        step = np.linalg.lstsq(J, change[there] * w, rcond=None)[0]
+        rest = change - self.jacobian @ step
+        before, after = (float(np.sum((x[there] * w) ** 2)) for x in (change, rest))
+        return Signature(
+            id,
+            value,
+            self.pressures_kPa,
+            self.labels,
+            100 * np.expm1(change),
+            100 * np.expm1(rest),
+            1 - after / before if before else 0.0,
+            {name: self._moved(name, float(step[k]), k) for k, name in enumerate(self.names)},
+            found[0].mass_kg - self.mass_kg,
+        )
+
+    def _moved(self, name: str, step: float, place: int) -> float:
+        """The variable after a step of the logarithm, or of its range."""
+        value = self.values[name]
+        if self.door.case.case.variables[name].scale == "log":
+            return float(value * np.exp(step))
+        return float(value + step * self.steps[place])
+
+
+def stated_size(id: str) -> float:
+    """The end of an effect's range that is further from 0."""
+    effect = catalogue()[id]
+    return max(effect.high, effect.low, key=abs)
+
+
+def rms(percent: Array) -> float:
+    """Root mean square over all that is there."""
+    return float(np.sqrt(np.nanmean(percent**2)))
+
+
+def _modes(evaluation: Evaluation) -> dict[Label, Mode]:
+    return {mode.label: mode for mode in paired_labels(evaluation.modes)}
