@@ -47,10 +47,14 @@ def _cells(row) -> list[str]:
     return [f"{x:+.2f} |" for x in row]
 
 
+def _share(found: Signature) -> str:
+    return "-" if found.absorbed is None else f"{found.absorbed:.3f}"
+
+
 def _line(found: Signature, alone: Signature, values: dict[str, float]) -> str:
     moved = [f"{100 * (found.refitted[k] / v - 1):+.1f}" for k, v in values.items()]
     cells = [f"`{found.id}`", f"{found.value:g}", f"{rms(found.before):.2f}"]
-    cells += [f"{rms(found.after):.2f}", f"{found.absorbed:.3f}", f"{alone.absorbed:.3f}", *moved]
+    cells += [f"{rms(found.after):.2f}", _share(found), _share(alone), *moved]
     return "| " + " | ".join(cells) + " |"
 
 

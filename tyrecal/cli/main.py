@@ -21,6 +21,7 @@ COMMANDS = {  # name: one line of help, so that the overview imports no command
     "fit": "Calibrate the case's variables to its target frequencies.",
     "sweep-pressure": "Follow every mode over the inflation pressure.",
     "footprint": "Press the tyre on a road: contact area and pressure over load.",
+    "effects": "List and explain what a plain model leaves out, and what it does.",
     "diagnose": "Say where model and measurements part, and which effect explains it.",
     "solvers": "List the installed solvers and what they can do.",
     "store": "Look at a record of evaluations, check it, prune it.",

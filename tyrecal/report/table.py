@@ -154,11 +154,45 @@ def solvers_table(solvers: Sequence[Mapping[str, Any]]) -> Table:
     return table
 
 
+EFFECTS = ("effect", "what", "unit", "solvers")
+
+
+def effects_table(effects: Sequence[Mapping[str, Any]]) -> Table:
+    """The catalogue of effects: parameter's range, solvers that can express it."""
+    table = _table((*EFFECTS[:2], "from", "to", *EFFECTS[2:]))
+    for each in effects:
+        ends = (f"{each[end]:g}" for end in ("low", "high"))
+        _add(table, each["id"], each["title"], *ends, each["unit"], ", ".join(each["solvers"]))
+    return table
+
+
+def signatures_table(effects: Sequence[Mapping[str, Any]]) -> Table:
+    """How far each effect of effects.json moves the modes, and the variables that follow it."""
+    names = list(effects[0]["refitted"])
+    table = _table(("effect", "size", "unit", "kg", "before %", "after %", "absorbed %", *names))
+    for each in effects:
+        figures = (f"{each[key]:.2f}" for key in ("before_percent", "after_percent"))
+        absorbed = NONE if each["absorbed"] is None else f"{100 * each['absorbed']:.1f}"
+        moved = (_moved(change) for change in each["refitted"].values())
+        size = f"{each['value']:g}", each["unit"], f"{each['mass_kg']:+.2f}"
+        _add(table, each["id"], *size, *figures, absorbed, *moved)
+    table.caption = (
+        "rms change of all modes, as it comes and after the best linear re-fit of the variables;"
+        " how far that moves them"
+    )
+    return table
+
+
+def _moved(change: Mapping[str, float]) -> str:
+    before, after = change["before"], change["after"]
+    return f"{100 * (after / before - 1):+.1f} %" if before else f"{after - before:+.3g}"
+
+
 def _table(columns: tuple[str, ...]) -> Table:
     # figures never break: on a narrow terminal only names and words do
     table = Table(box=box.SIMPLE_HEAD, padding=(0, 0, 0, 1), pad_edge=False, show_edge=False)
     for name in columns:
-        figures = name not in ("mode", "motion", "curvature", "design", *SOLVER_COLUMNS)
+        figures = name not in ("mode", "motion", "curvature", "design", *SOLVER_COLUMNS, *EFFECTS)
         table.add_column(name, justify="right" if figures else "left", no_wrap=figures,
                          overflow="fold")  # fmt: skip
     return table

@@ -25,7 +25,8 @@ class Signature:
 
     before, after (pressure, label): per cent of the plain tyre's frequency, as it comes and after
     the best linear re-fit of the case's variables to it, NaN where a mode got lost; absorbed: the
-    share alpha = 1 - |after|^2 / |before|^2 that the re-fit takes up, doublets counted twice;
+    share alpha = 1 - |after|^2 / |before|^2 that the re-fit takes up, doublets counted twice,
+    None where the effect moves nothing;
     refitted: the values of the variables that do so; mass_kg: that the effect adds.
     """
 
@@ -35,7 +36,7 @@ class Signature:
     labels: tuple[Label, ...]
     before: Array
     after: Array
-    absorbed: float
+    absorbed: float | None
     refitted: dict[str, float]
     mass_kg: float
 
@@ -98,7 +99,7 @@ class Plain:
             self.labels,
             100 * np.expm1(change),
             100 * np.expm1(rest),
-            1 - after / before if before else 0.0,
+            1 - after / before if before else None,
             {name: self._moved(name, float(step[k]), k) for k, name in enumerate(self.names)},
             found[0].mass_kg - self.mass_kg,
         )

@@ -1,0 +1,138 @@
+"""tyrecal effects"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from . import options
+from .main import EXIT_SOLVER
+
+
+@click.command()
+@click.argument("name", required=False)
+@click.option("--case", "case", type=click.Path(path_type=Path), metavar="CASE",
+              help="Compute what the effect does to this tyre.")  # fmt: skip
+@options.fitted("Compute it for the design that 'tyrecal fit' found for the case.")
+@click.option("--value", type=float, metavar="V",
+              help="Size of the effect NAME (default: the end of its range).")  # fmt: skip
+@click.option("--pressures-kPa", "pressures", metavar="P1,P2,...",
+              help="Default: two thirds of the case's, the case's, four thirds.")  # fmt: skip
+@click.option("--pictures/--no-pictures", default=True, help="Draw each signature.")
+@options.every(
+    options.assignments, options.mesh, options.solver, options.output, options.store,
+    options.no_store, options.as_json, options.quiet, options.verbose,
+)  # fmt: skip
+def command(
+    name: str | None,
+    case: Path | None,
+    fitted: Path | None,
+    value: float | None,
+    pressures: str | None,
+    pictures: bool,
+    assignments: tuple[str, ...],
+    mesh: str,
+    solver: str,
+    output: Path | None,
+    store: Path | None,
+    no_store: bool,
+    as_json: bool,
+    quiet: bool,
+    verbose: bool,
+) -> int:
+    """List what a plain tyre model leaves out, or explain the effect NAME.
+
+    With --case, effects.json holds what it does to the modes of that tyre, before and after the
+    best re-fit of the case's variables, and effect_ID.png shows it.
+
+    \b
+    tyrecal effects
+    tyrecal effects bead_filler
+    tyrecal effects bead_filler --case cases/p235_75r17.yaml --fitted p235_75r17/fit.json
+    """
+    from ..case.mistakes import suggestion
+    from ..effects import IDS, catalogue
+    from ..evaluate.door import Door
+    from ..evaluate.failure import EvaluationFailed
+    from ..evaluate.solver import installed
+    from ..report.effects import effect_entry, effect_text, signature_entry
+    from ..report.signature import draw_signature
+    from ..report.table import effects_table, signatures_table
+    from ..studies.signature import Plain, stated_size
+    from .output import Run, print_json, say, show
+
+    if name is not None and name not in IDS:
+        raise click.UsageError(f"there is no effect '{name}'{suggestion(name, IDS)}")
+    if value is not None and name is None:
+        raise click.UsageError("--value needs the NAME of an effect")
+    given = {"fitted": fitted, "value": value is not None, "pressures-kPa": pressures,
+             "set": assignments, "mesh": mesh, "solver": solver, "output": output}  # fmt: skip
+    for option in (option for option, there in given.items() if there and not case):
+        raise click.UsageError(f"--{option} needs a --case")
+    solvers = installed()
+    entries = {id: effect_entry(catalogue()[id], solvers) for id in ([name] if name else IDS)}
+    if not as_json:
+        if name:
+            say(effect_text(entries[name]), as_json, quiet)
+        elif not case:
+            show(effects_table(list(entries.values())), as_json, quiet)
+    if not case:
+        if as_json:
+            print_json(list(entries.values()))
+        return 0
+
+    loaded, values = options.load(case, mesh, assignments, None)
+    door = Door(loaded, solver)
+    adapter = door.solver
+    if not door.has_gradients:
+        raise click.UsageError(f"solver '{adapter.name}' gives no slopes, which a re-fit needs")
+    if fitted:
+        values = options.fitted_values(fitted, loaded, solver)
+    run = Run(case, output, "effects", adapter)
+    door.folder, door.keep = run.runs, verbose
+    door.store = run.open_store(store, no_store)
+    plain = Plain(door, values, _pressures(loaded, pressures))
+    found, failed = [], 0
+    for id, entry in entries.items():
+        if adapter.name not in entry["solvers"]:
+            say(f"{id}: solver '{adapter.name}' cannot express it", as_json, quiet)
+            continue
+        try:
+            signature = plain.signature(id, stated_size(id) if value is None else value)
+        except EvaluationFailed as error:
+            failed += 1
+            click.secho(f"error: {id}: {error}", fg="red", err=True)
+            continue
+        found.append({**entry, **signature_entry(signature, values)})
+        if pictures:
+            draw_signature(run.folder / f"effect_{id}.png", signature)
+    run.write_json("effects.json", found)
+    run.finish(solver_runs=door.counts.runs, answered_from_record=door.counts.recorded)
+    if as_json:
+        print_json(found)
+    elif found:
+        show(signatures_table(found), as_json, quiet)
+    say(f"results in {run.folder}", as_json, quiet)
+    return EXIT_SOLVER if failed else 0
+
+
+def _pressures(loaded: Any, text: str | None) -> list[float]:
+    """Pressures in kPa. Raises click.UsageError."""
+    from math import isfinite
+
+    if text is None:
+        nominal = loaded.case.pressure_kPa
+        return [round(nominal * share / 3, 6) for share in (2, 3, 4)]
+    found = []
+    for word in text.split(","):
+        try:
+            found.append(float(word))
+        except ValueError:
+            raise click.UsageError(f"--pressures-kPa: '{word.strip()}' is no number") from None
+        if not (isfinite(found[-1]) and 0 < found[-1] < 2000) or found.count(found[-1]) > 1:
+            raise click.UsageError(
+                f"--pressures-kPa {found[-1]:g}: must be pressures between 0 and 2000, each once"
+            )
+    return found

@@ -1,0 +1,46 @@
+"""Picture of an effect's signature: bars over the modes, before and after a re-fit."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from ..effects import catalogue
+from ..studies.signature import Signature
+from .figure import COLOURS, GREY, in_house_style, new_figure, save
+
+BAR = 0.38
+
+
+@in_house_style
+def draw_signature(path: Path, found: Signature) -> None:
+    """Change of every mode in per cent, a panel per pressure."""
+    effect = catalogue()[found.id]
+    count = len(found.pressures_kPa)
+    figure = new_figure(8.0, 1.2 + 1.8 * count)
+    panels = np.atleast_1d(figure.subplots(count, 1, sharex=True, sharey=True))
+    places = np.arange(len(found.labels))
+    for k, axes in enumerate(panels):
+        for side, rows, colour, words in (
+            (-1, found.before, COLOURS[0], "as it comes"),
+            (1, found.after, COLOURS[1], "left after the variables are fitted again"),
+        ):
+            bars = axes.bar(places + side * BAR / 2, rows[k], BAR, color=colour, label=words)
+            axes.bar_label(bars, [_text(x) for x in rows[k]], fontsize=7, color="0.3", padding=1)
+        axes.axhline(0, color=GREY, lw=0.8)
+        axes.margins(y=0.15)
+        axes.set_title(f"{found.pressures_kPa[k]:g} kPa", loc="left", fontsize=9, color="0.3")
+        axes.set_ylabel("frequency, %")
+    names = [str(label).replace("[0,0] axial", "[0,0] lateral") for label in found.labels]
+    panels[-1].set_xticks(places, [name.replace(" ", "\n") for name in names])
+    size = f"{effect.symbol} = {found.value:g} {effect.unit}".strip()
+    absorbed = f": calibration absorbs {100 * found.absorbed:.1f} %" if found.absorbed else ""
+    figure.suptitle(f"{effect.title}, {size}{absorbed}", fontsize=12)
+    handles, labels = panels[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=2, frameon=False)
+    save(figure, path)
+
+
+def _text(value: float) -> str:
+    return f"{value:+.1f}" if np.isfinite(value) else "lost"
