@@ -1,4 +1,4 @@
-"""Signatures of all effects on the fitted tyre, for tests/benchmarks/EFFECTS.md.
+"""Signatures of all effects on a fitted tyre, as the tables of tests/benchmarks/EFFECTS.md.
 
 python -m tests.studies.effects cases/p235_75r17.yaml p235_75r17/fit.json
 """
@@ -8,6 +8,8 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
+import numpy as np
+
 from tyrecal.case import load_case
 from tyrecal.effects import catalogue
 from tyrecal.evaluate.door import Door
@@ -15,47 +17,62 @@ from tyrecal.studies.fitted import read_fitted
 from tyrecal.studies.signature import Plain, Signature, rms, stated_size
 
 PRESSURES_KPA = (160.0, 240.0, 320.0)
+ALIKE = 0.85  # cosine of what a re-fit leaves of two effects, without their sign
 
 
 def main(case_file: str, fit_file: str) -> None:
     case = load_case(case_file)
     values = read_fitted(Path(fit_file), case)
-    plain = Plain(Door(case), values, PRESSURES_KPA)
-    single = Plain(Door(case), values, (case.case.pressure_kPa,))
-    names = [str(label) for label in plain.labels]
-    print("| effect | size | kPa |", " | ".join(names), "| rms | kg |")
-    print("|---|" * 1 + "---|" * (len(names) + 4))
-    summary = []
-    for effect in catalogue().values():
-        size = stated_size(effect.id)
-        found = plain.signature(effect.id, size)
-        for k, pressure in enumerate(PRESSURES_KPA):
-            head = f"`{effect.id}` | {size:g} {effect.unit}" if not k else " | "
-            for which, rows in (("before", found.before), ("after", found.after)):
-                tail = f"{rms(rows[k]):.2f} | {found.mass_kg:+.2f}"
-                print(f"| {head} | {pressure:g} {which} |", *_cells(rows[k]), tail, "|")
-                head = " | "
-        summary.append((found, single.signature(effect.id, size)))
-    print(
-        "\n| effect | size | before % | after % | alpha | alpha, one pressure |", *values, sep="| "
-    )
-    for found, alone in summary:
-        print(_line(found, alone, values))
+    run = Plain(Door(case), values, PRESSURES_KPA)
+    one = Plain(Door(case), values, (case.case.pressure_kPa,))
+    known = run.door.solver.capabilities
+    sizes = {id: stated_size(id) for id, effect in catalogue().items() if effect.within(known)}
+    several = [run.signature(id, size) for id, size in sizes.items()]
+    single = [one.signature(id, size) for id, size in sizes.items()]
+    small = [[p.signature(id, 0.1 * size) for id, size in sizes.items()] for p in (run, one)]
+    print_all(several)
+    print_shares(several, single, values, small)
 
 
-def _cells(row) -> list[str]:
-    return [f"{x:+.2f} |" for x in row]
+def print_all(found: list[Signature]) -> None:
+    """Every mode at every pressure: per cent as it comes, and after the re-fit."""
+    print("| effect | size | kPa |", " | ".join(map(str, found[0].labels)), "|")
+    print("|---" * (3 + len(found[0].labels)) + "|")
+    for each in found:
+        size = f"{each.value:g} {catalogue()[each.id].unit}".strip()
+        for k, pressure in enumerate(each.pressures_kPa):
+            pairs = zip(each.before[k], each.after[k], strict=True)
+            cells = " | ".join(f"{b:+.2f} / {a:+.2f}" for b, a in pairs)
+            print(f"| `{each.id}` | {size} | {pressure:g} | {cells} |")
 
 
-def _share(found: Signature) -> str:
-    return "-" if found.absorbed is None else f"{found.absorbed:.3f}"
+def print_shares(
+    run: list[Signature],
+    one: list[Signature],
+    values: dict[str, float],
+    small: list[list[Signature]],
+) -> None:
+    """What the re-fit absorbs, with three pressures and with one, and what looks the same then."""
+    print("\n| effect | kg | before % | after % | absorbed % | with one pressure |", end="")
+    print(" | ".join(["", *values])[2:], "| left alike | with one pressure |")
+    print("|---" * (8 + len(values)) + "|")
+    for i, (each, alone) in enumerate(zip(run, one, strict=True)):
+        shares = ["-" if s is None else f"{100 * s:.1f}" for s in (each.absorbed, alone.absorbed)]
+        moved = [f"{100 * (each.refitted[k] / v - 1):+.1f}" for k, v in values.items()]
+        cells = [f"`{each.id}`", f"{each.mass_kg:+.2f}", f"{rms(each.before):.2f}"]
+        cells += [f"{rms(each.after):.2f}", *shares, *moved, *(_alike(s, i) for s in small)]
+        print("| " + " | ".join(cells) + " |")
 
 
-def _line(found: Signature, alone: Signature, values: dict[str, float]) -> str:
-    moved = [f"{100 * (found.refitted[k] / v - 1):+.1f}" for k, v in values.items()]
-    cells = [f"`{found.id}`", f"{found.value:g}", f"{rms(found.before):.2f}"]
-    cells += [f"{rms(found.after):.2f}", _share(found), _share(alone), *moved]
-    return "| " + " | ".join(cells) + " |"
+def _alike(found: list[Signature], place: int) -> str:
+    """Effects whose rest points the same way, with the cosine, the nearest first."""
+    rests = np.array([np.nan_to_num(s.after).ravel() for s in found])
+    norms = np.linalg.norm(rests, axis=1)
+    if norms[place] < 1e-9:
+        return "-"
+    cosines = rests @ rests[place] / np.maximum(norms * norms[place], 1e-12)
+    near = [j for j in np.argsort(-abs(cosines)) if j != place and abs(cosines[j]) > ALIKE]
+    return ", ".join(f"{found[j].id} {cosines[j]:+.2f}" for j in near) or "-"
 
 
 if __name__ == "__main__":

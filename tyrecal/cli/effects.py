@@ -73,14 +73,13 @@ def command(
         raise click.UsageError(f"--{option} needs a --case")
     solvers = installed()
     entries = {id: effect_entry(catalogue()[id], solvers) for id in ([name] if name else IDS)}
-    if not as_json:
-        if name:
-            say(effect_text(entries[name]), as_json, quiet)
-        elif not case:
-            show(effects_table(list(entries.values())), as_json, quiet)
     if not case:
         if as_json:
             print_json(list(entries.values()))
+        elif name:
+            say(effect_text(entries[name]), as_json, quiet)
+        else:
+            show(effects_table(list(entries.values())), as_json, quiet)
         return 0
 
     loaded, values = options.load(case, mesh, assignments, None)
@@ -88,15 +87,18 @@ def command(
     adapter = door.solver
     if not door.has_gradients:
         raise click.UsageError(f"solver '{adapter.name}' gives no slopes, which a re-fit needs")
+    kPa = _pressures(loaded, pressures)
     if fitted:
         values = options.fitted_values(fitted, loaded, solver)
     run = Run(case, output, "effects", adapter)
     door.folder, door.keep = run.runs, verbose
     door.store = run.open_store(store, no_store)
-    plain = Plain(door, values, _pressures(loaded, pressures))
+    plain = Plain(door, values, kPa)
+    if name and not as_json:
+        say(effect_text(entries[name]) + "\n", as_json, quiet)
     found, failed = [], 0
     for id, entry in entries.items():
-        if adapter.name not in entry["solvers"]:
+        if not name and adapter.name not in entry["solvers"]:
             say(f"{id}: solver '{adapter.name}' cannot express it", as_json, quiet)
             continue
         try:

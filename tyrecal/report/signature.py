@@ -21,13 +21,16 @@ def draw_signature(path: Path, found: Signature) -> None:
     figure = new_figure(8.0, 1.2 + 1.8 * count)
     panels = np.atleast_1d(figure.subplots(count, 1, sharex=True, sharey=True))
     places = np.arange(len(found.labels))
+    digits = 1 if np.nanmax(abs(found.before)) >= 1 else 2
     for k, axes in enumerate(panels):
         for side, rows, colour, words in (
             (-1, found.before, COLOURS[0], "as it comes"),
             (1, found.after, COLOURS[1], "left after the variables are fitted again"),
         ):
             bars = axes.bar(places + side * BAR / 2, rows[k], BAR, color=colour, label=words)
-            axes.bar_label(bars, [_text(x) for x in rows[k]], fontsize=7, color="0.3", padding=1)
+            axes.bar_label(
+                bars, [_text(x, digits) for x in rows[k]], fontsize=7, color="0.3", padding=1
+            )
         axes.axhline(0, color=GREY, lw=0.8)
         axes.margins(y=0.15)
         axes.set_title(f"{found.pressures_kPa[k]:g} kPa", loc="left", fontsize=9, color="0.3")
@@ -42,5 +45,5 @@ def draw_signature(path: Path, found: Signature) -> None:
     save(figure, path)
 
 
-def _text(value: float) -> str:
-    return f"{value:+.1f}" if np.isfinite(value) else "lost"
+def _text(value: float, digits: int) -> str:
+    return f"{value:+.{digits}f}" if np.isfinite(value) else "lost"
