@@ -24,6 +24,8 @@ from .where import Place, section_map
 
 Array = np.ndarray
 IN_PLAY, MOST_IN_PLAY = 8.0, 6  # ln evidence behind the best up to which a node is asked again
+ROUNDS = 2
+CLOSE = 0.02  # of a range, and of ln x: a node as near as that needs no other
 
 
 @dataclass(frozen=True)
@@ -91,8 +93,10 @@ def diagnose(
     problem = Problem(observations, expansion, response.spans, where, response.start,
                       response.spread, changes, assumed)  # fmt: skip
     hypotheses = weigh(problem)
-    if expansion.nodes:
-        problem = _asked_again(problem, response, hypotheses)
+    for _ in range(ROUNDS if expansion.nodes else 0):
+        problem, changed = _asked_again(problem, response, hypotheses)
+        if not changed:
+            break
         hypotheses = weigh(problem)
     p = probabilities(hypotheses)
     by_key = {h.key: h for h in hypotheses}
@@ -116,8 +120,10 @@ def diagnose(
     )  # fmt: skip
 
 
-def _asked_again(problem: Problem, response: Response, hypotheses: Sequence[Hypothesis]) -> Problem:
-    """The problem with the model asked where the effects in play have their re-fits."""
+def _asked_again(problem: Problem, response: Response, hypotheses: Sequence[Hypothesis]) -> tuple[Problem, bool]:
+    """The problem with the model asked where the effects in play have their re-fits, and whether
+    anything was left to ask: each is asked at its likeliest size, and where an end of its range
+    has a re-fit far from where it was asked."""
     singles = [h for h in hypotheses if h.key in problem.expansion.nodes]
     best = max(h.ln_evidence for h in hypotheses)
     play = [h for h in singles if h.ln_evidence > best - IN_PLAY]
@@ -125,12 +131,17 @@ def _asked_again(problem: Problem, response: Response, hypotheses: Sequence[Hypo
     wanted: dict[str, dict[float, Array]] = {}
     for h in play:
         assert h.fitted is not None
-        e, x = h.values[h.key], problem.expansion.x0 + h.fitted.d
-        nodes = problem.expansion.nodes[h.key].values
-        at = {float(k): x[int(np.argmin(abs(e - k)))] for k in nodes if k}
-        at[float(e[h.best])] = x[h.best]
-        wanted[h.key] = at
-    return replace(problem, expansion=moved(problem.expansion, response, wanted))
+        nodes = problem.expansion.nodes[h.key]
+        e, x = float(h.values[h.key][h.best]), problem.expansion.x0 + h.fitted.d[h.best]
+        width = nodes.reach[1] - nodes.reach[0]
+        near = abs(nodes.values - e) < CLOSE * width
+        at = {float(nodes.values[near][0]) if near.any() else e: x}
+        known = near & (nodes.values != 0) & (abs(nodes.x - x).max(1) < CLOSE)
+        if not known.any() and next(iter(at)) != 0:
+            wanted[h.key] = at
+    if not wanted:
+        return problem, False
+    return replace(problem, expansion=moved(problem.expansion, response, wanted)), True
 
 
 def _rung(verdict: Verdict, shrinkage: Shrinkage | None, problem: Problem) -> int:

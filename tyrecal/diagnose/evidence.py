@@ -23,7 +23,8 @@ from .problem import Problem
 Array = np.ndarray
 NONE, OUTSIDE = "none", "outside"
 PRIOR_NONE, PRIOR_OUTSIDE, PRIOR_PAIRS = 0.25, 0.10, 0.03  # the singles share the rest
-NODES, PAIR_NODES = 25, 15
+NODES, PAIR_NODES = 25, 15  # a parameter, and each of a pair
+SHARP, ZOOMS = 2.0, 6  # fall of ln Z from the best node to its neighbours that asks for more nodes
 STEPS = 6  # of Gauss and Newton, in a model that is quadratic and near its minimum
 PARTNERS = 4  # singles that are tried with every other
 UNKNOWN = (0.005, 0.01, 0.02, 0.04)  # shift of modes by what no catalogue holds
@@ -160,19 +161,14 @@ def probabilities(hypotheses: Sequence[Hypothesis]) -> dict[str, float]:
 
 def single(problem: Problem, id: str, prior: float, sigma: Array | None = None) -> Hypothesis:
     """One effect over its range."""
-    e, ln_weights = grid(problem.expansion.nodes[id])
-    return _hypothesis(problem, id, prior, {id: e}, ln_weights, sigma)
+    return _hypothesis(problem, id, prior, [id], NODES, sigma)
 
 
 def pair(
     problem: Problem, first: str, second: str, prior: float, sigma: Array | None = None
 ) -> Hypothesis:
     """Two effects at once; what they add is added up."""
-    grids = [grid(problem.expansion.nodes[id], PAIR_NODES) for id in (first, second)]
-    a, b = np.meshgrid(grids[0][0], grids[1][0], indexing="ij")
-    ln_weights = np.add.outer(grids[0][1], grids[1][1]).ravel()
-    values = {first: a.ravel(), second: b.ravel()}
-    return _hypothesis(problem, f"{first}+{second}", prior, values, ln_weights, sigma)
+    return _hypothesis(problem, f"{first}+{second}", prior, [first, second], PAIR_NODES, sigma)
 
 
 def _pairs(problem: Problem, singles: Sequence[Hypothesis], sigma: Array) -> Iterable[Hypothesis]:
@@ -239,20 +235,63 @@ def _swapped(problem: Problem, a: Label, b: Label) -> Array | None:
 
 
 def _hypothesis(
-    problem: Problem,
-    key: str,
-    prior: float,
-    values: dict[str, Array],
-    ln_weights: Array,
-    sigma: Array | None,
+    problem: Problem, key: str, prior: float, ids: list[str], count: int, sigma: Array | None
 ) -> Hypothesis:
-    fitted = refit(problem, values, len(ln_weights), sigma=sigma)
-    ln = float(np.logaddexp.reduce(fitted.ln_evidence + ln_weights))
-    return Hypothesis(key, prior, ln, values, ln_weights, fitted)
+    """One or two effects over their ranges; where a peak is narrow, nodes gather about it.
+
+    The nodes within two places of the best one give way to a rule of their own on the box
+    between, until ln Z falls gently from the best node to its neighbours.
+    """
+    box = [problem.expansion.nodes[id].reach for id in ids]
+    ranges = [high - low for low, high in box]
+    kept: list[tuple[Array, Array, Fitted]] = []
+    for _ in range(ZOOMS):
+        axes = [_rule(low, high, count) for low, high in box]
+        mesh = np.meshgrid(*(points for points, _ in axes), indexing="ij")
+        values = np.array([each.ravel() for each in mesh])
+        weights = np.meshgrid(
+            *(w / width for (_, w), width in zip(axes, ranges, strict=True)), indexing="ij"
+        )
+        ln_weights = np.log(np.prod(weights, axis=0)).ravel()
+        fitted = refit(problem, dict(zip(ids, values, strict=True)), values.shape[1], sigma=sigma)
+        ln = fitted.ln_evidence.reshape([count] * len(ids))
+        best = np.unravel_index(int(np.argmax(ln)), ln.shape)
+        inner = [slice(max(0, b - 1), b + 2) for b in best]
+        cross = [ln[tuple(part if i == j else b for j, b in enumerate(best))]
+                 for i, part in enumerate(inner)]  # fmt: skip
+        if max(ln[best] - each.min() for each in cross) < SHARP:
+            kept.append((values, ln_weights, fitted))
+            break
+        box = [(float(points[b - 2]) if b >= 2 else low, float(points[b + 2]) if b + 2 < count
+                else high) for (points, _), b, (low, high) in zip(axes, best, box, strict=True)]  # fmt: skip
+        outside_box = ~np.all(
+            [(v >= low) & (v <= high) for v, (low, high) in zip(values, box, strict=True)], axis=0
+        )
+        kept.append((values[:, outside_box], ln_weights[outside_box], _some(fitted, outside_box)))
+    else:
+        kept.append((values, ln_weights, fitted))
+    joined = Fitted(*(np.concatenate([getattr(f, name) for _, _, f in kept])
+                      for name in ("ln_evidence", "d", "chi2", "covariance")))  # fmt: skip
+    values = np.concatenate([v for v, _, _ in kept], axis=1)
+    ln_weights = np.concatenate([w for _, w, _ in kept])
+    total = float(np.logaddexp.reduce(joined.ln_evidence + ln_weights))
+    return Hypothesis(key, prior, total, dict(zip(ids, values, strict=True)), ln_weights, joined)
+
+
+def _some(fitted: Fitted, mask: Array) -> Fitted:
+    return Fitted(
+        fitted.ln_evidence[mask], fitted.d[mask], fitted.chi2[mask], fitted.covariance[mask]
+    )
+
+
+def _rule(low: float, high: float, count: int) -> tuple[Array, Array]:
+    """Gauss and Legendre's points and weights (count,) on an interval."""
+    points, weights = np.polynomial.legendre.leggauss(count)
+    return low + (high - low) * (points + 1) / 2, weights * (high - low) / 2
 
 
 def grid(nodes: Nodes, count: int = NODES) -> tuple[Array, Array]:
     """Parameters (count,) over the reach and ln of weight times density, which sum to 1."""
     low, high = nodes.reach
-    points, weights = np.polynomial.legendre.leggauss(count)
-    return low + (high - low) * (points + 1) / 2, np.log(weights / 2)
+    points, weights = _rule(low, high, count)
+    return points, np.log(weights / (high - low))

@@ -21,15 +21,18 @@ from .response import Answer, Point, Response, Span
 Array = np.ndarray
 ONE_SIDED = (0.25, 0.75, 1.0)  # with 0 the Lobatto points of a cubic
 TWO_SIDED = (0.5, 1.0)  # on either side
+BENDING = (0.08, 0.5)  # more of them, of the range, where the cubic is not enough
+ENOUGH = 0.003  # largest step of ln f by the last term of Newton's polynomial, below which it is
 CURVATURE_STEP = 0.05  # of a logarithm, for H from two Jacobians
 
 
 @dataclass(frozen=True)
 class Nodes:
-    """An effect where it was asked: values (k,); shift (k, n), tilt (k, n, v): a_k, B_k; split
-    (k, n); reach: the range of the parameter between nodes that have a solution."""
+    """An effect where it was asked: values (k,) at x (k, v); shift (k, n), tilt (k, n, v): a_k,
+    B_k; split (k, n); reach: the range of the parameter between nodes that have a solution."""
 
     values: Array
+    x: Array
     shift: Array
     tilt: Array
     split: Array
@@ -101,11 +104,17 @@ def expand(response: Response, x0: Array, ids: Sequence[str] | None = None) -> E
     )  # fmt: skip
     nodes, failed = {}, {}
     replies = dict(zip(asked, answers[1 + 2 * count :], strict=True))
+    found = {id: {e: replies[id, e] for e in map(float, values[id])} for id in ids}
+    more = [(id, far * f) for id in ids for far in _bent(plain, response.spans[id], found[id])
+            for f in BENDING]  # fmt: skip
+    for (id, e), answer in zip(
+        more, response.answers([Point(x0, {id: e}) for id, e in more]) if more else [], strict=True
+    ):
+        found[id][e] = answer
     for id in ids:
-        found = {e: replies[id, e] for e in map(float, values[id])}
-        made = _nodes(plain, response.spans[id], {e: (x0, a) for e, a in found.items()})
+        made = _nodes(plain, response.spans[id], {e: (x0, a) for e, a in found[id].items()})
         if made is None:
-            failed[id] = str(next(a for a in found.values() if isinstance(a, Exception)))
+            failed[id] = str(next(a for a in found[id].values() if isinstance(a, Exception)))
         else:
             nodes[id] = made
     return Expansion(x0, plain.eta, plain.jacobian, hessian, plain.split, plain.constants,
@@ -133,11 +142,13 @@ def moved(
     nodes = dict(expansion.nodes)
     for id in wanted:
         old = nodes[id]
-        rows = {float(e): (old.shift[k], old.tilt[k], old.split[k])
-                for k, e in enumerate(old.values)}  # fmt: skip
+        rows = {
+            float(e): (old.x[k], old.shift[k], old.tilt[k], old.split[k])
+            for k, e in enumerate(old.values)
+        }
         for (other, e, x), answer in zip(asked, answers, strict=True):
             if other == id and isinstance(answer, Answer):
-                rows[e] = expansion.node(x, answer)
+                rows[e] = x, *expansion.node(x, answer)
         nodes[id] = _stacked(rows, old.reach)
     return Expansion(expansion.x0, expansion.eta, expansion.jacobian, expansion.hessian,
                      expansion.split, expansion.constants, nodes, expansion.failed)  # fmt: skip
@@ -147,7 +158,7 @@ def _nodes(
     plain: Expansion, span: Span, replies: Mapping[float, tuple[Array, Answer | Exception]]
 ) -> Nodes | None:
     """Nodes from 0 outwards as far as there are solutions; None where there is none at all."""
-    zero = np.zeros_like(plain.eta), np.zeros_like(plain.jacobian), plain.split
+    zero = plain.x0, np.zeros_like(plain.eta), np.zeros_like(plain.jacobian), plain.split
     rows = {0.0: zero}
     reach = [max(0.0, span.low), min(0.0, span.high)]  # 0, or the near end of the range
     for side in (1, -1):
@@ -155,7 +166,7 @@ def _nodes(
             x, answer = replies[e]
             if not isinstance(answer, Answer):
                 break
-            rows[e] = plain.node(x, answer)
+            rows[e] = x, *plain.node(x, answer)
             reach[0 if side < 0 else 1] = e
     if len(rows) == 1:
         return None
@@ -163,10 +174,23 @@ def _nodes(
     return _stacked(rows, (low, high))
 
 
-def _stacked(rows: Mapping[float, tuple[Array, Array, Array]], reach: tuple[float, float]) -> Nodes:
+def _bent(plain: Expansion, span: Span, found: Mapping[float, Answer | Exception]) -> list[float]:
+    """The far ends of the range towards which its nodes do not follow the effect closely."""
+    made = _nodes(plain, span, {e: (plain.x0, a) for e, a in found.items()})
+    if made is None or len(made.values) < 3:
+        return []
+    middles = (made.values[1:] + made.values[:-1]) / 2
+    last = len(made.values) - 1 if made.reach[1] > 0 else 0  # without the farthest node
+    fewer = _lagrange(np.delete(made.values, last), middles) @ np.delete(made.shift, last, 0)
+    if abs(_lagrange(made.values, middles) @ made.shift - fewer).max() < ENOUGH:
+        return []
+    return [e for e in made.reach if e]
+
+
+def _stacked(rows: Mapping[float, tuple[Array, ...]], reach: tuple[float, float]) -> Nodes:
     values = np.array(sorted(rows))
-    shift, tilt, split = (np.array([rows[float(e)][part] for e in values]) for part in range(3))
-    return Nodes(values, shift, tilt, split, reach)
+    x, shift, tilt, split = (np.array([rows[float(e)][part] for e in values]) for part in range(4))
+    return Nodes(values, x, shift, tilt, split, reach)
 
 
 def _lagrange(nodes: Array, e: Array) -> Array:

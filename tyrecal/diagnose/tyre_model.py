@@ -114,7 +114,7 @@ class TyreModel:
                 return each
         at = dict(zip(self.pressures, zip(designs, found, strict=True), strict=True))
         eta, jacobian = np.zeros(len(self.rows)), np.zeros((len(self.rows), len(self.variables)))
-        slopes = np.zeros((len(self.rows), len(self.found)))
+        slopes, split = np.zeros((len(self.rows), len(self.found))), np.zeros(len(self.rows))
         for i, (label, pressure) in enumerate(self.rows):
             if label is None:
                 eta[i] = log(found[0][0].mass_kg)  # type: ignore[index]
@@ -124,6 +124,8 @@ class TyreModel:
             evaluation, modes, _ = answer  # type: ignore[misc]
             f, place = modes[label].frequency_Hz, modes[label].position
             eta[i] = log(f)
+            if members := modes[label].raw.members:
+                eta[i], split[i] = log(members[0] * members[1]) / 2, log(members[1] / members[0])
             for j, name in enumerate(self.variables):
                 jacobian[i, j] = evaluation.gradients[name][place] * self._slope(name, design) / f
             if point.constants:
@@ -133,7 +135,6 @@ class TyreModel:
                         for path, step in source.steps.items()
                         if not path.startswith(EFFECTS)
                     )
-        split = np.zeros(len(self.rows))
         return Answer(eta, jacobian, split, slopes if point.constants else None)
 
     def _slope(self, name: str, design: Mapping[str, float]) -> float:
