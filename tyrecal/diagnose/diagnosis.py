@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from .evidence import NONE, Hypothesis, probabilities, weigh
-from .expansion import Expansion, expand, moved
+from .expansion import Expansion, anchored, expand
 from .gap import Gap, find_gap, projection
 from .next_measurement import Choice, ModelRow, rank
 from .observations import Observations
@@ -25,7 +25,7 @@ from .where import Place, section_map
 Array = np.ndarray
 IN_PLAY, MOST_IN_PLAY = 8.0, 6  # ln evidence behind the best up to which a node is asked again
 ROUNDS = 2
-CLOSE = 0.02  # of a range, and of ln x: a node as near as that needs no other
+CLOSE = 0.05  # of a range, and of ln x: an effect asked as near as that, or to 0, is known
 
 
 @dataclass(frozen=True)
@@ -120,28 +120,27 @@ def diagnose(
     )  # fmt: skip
 
 
-def _asked_again(problem: Problem, response: Response, hypotheses: Sequence[Hypothesis]) -> tuple[Problem, bool]:
-    """The problem with the model asked where the effects in play have their re-fits, and whether
-    anything was left to ask: each is asked at its likeliest size, and where an end of its range
-    has a re-fit far from where it was asked."""
+def _asked_again(
+    problem: Problem, response: Response, hypotheses: Sequence[Hypothesis]
+) -> tuple[Problem, bool]:
+    """The problem with the model asked where the effects in play have their re-fits, each at its
+    likeliest size, and whether anything was left to ask."""
     singles = [h for h in hypotheses if h.key in problem.expansion.nodes]
     best = max(h.ln_evidence for h in hypotheses)
     play = [h for h in singles if h.ln_evidence > best - IN_PLAY]
     play = sorted(play, key=lambda h: -h.ln_evidence)[:MOST_IN_PLAY]
-    wanted: dict[str, dict[float, Array]] = {}
+    wanted: dict[str, tuple[float, Array]] = {}
     for h in play:
         assert h.fitted is not None
-        nodes = problem.expansion.nodes[h.key]
-        e, x = float(h.values[h.key][h.best]), problem.expansion.x0 + h.fitted.d[h.best]
-        width = nodes.reach[1] - nodes.reach[0]
-        near = abs(nodes.values - e) < CLOSE * width
-        at = {float(nodes.values[near][0]) if near.any() else e: x}
-        known = near & (nodes.values != 0) & (abs(nodes.x - x).max(1) < CLOSE)
-        if not known.any() and next(iter(at)) != 0:
-            wanted[h.key] = at
+        nodes, d = problem.expansion.nodes[h.key], h.fitted.d[h.best]
+        e, width = float(h.values[h.key][h.best]), nodes.reach[1] - nodes.reach[0]
+        last = nodes.anchor
+        known = last and abs(e - last.e) < CLOSE * width and abs(d - last.d).max() < CLOSE
+        if not known and abs(e) > CLOSE * width:
+            wanted[h.key] = e, problem.expansion.x0 + d
     if not wanted:
         return problem, False
-    return replace(problem, expansion=moved(problem.expansion, response, wanted)), True
+    return replace(problem, expansion=anchored(problem.expansion, response, wanted)), True
 
 
 def _rung(verdict: Verdict, shrinkage: Shrinkage | None, problem: Problem) -> int:

@@ -262,8 +262,10 @@ def _hypothesis(
         if max(ln[best] - each.min() for each in cross) < SHARP:
             kept.append((values, ln_weights, fitted))
             break
-        box = [(float(points[b - 2]) if b >= 2 else low, float(points[b + 2]) if b + 2 < count
-                else high) for (points, _), b, (low, high) in zip(axes, best, box, strict=True)]  # fmt: skip
+        for i, ((points, _), b) in enumerate(zip(axes, best, strict=True)):
+            low, high = box[i]
+            low = float(points[b - 2]) if b >= 2 else low
+            box[i] = low, float(points[b + 2]) if b + 2 < count else high
         outside_box = ~np.all(
             [(v >= low) & (v <= high) for v, (low, high) in zip(values, box, strict=True)], axis=0
         )

@@ -4,15 +4,16 @@ With d = x - x0, quadratic about the plain fit x0, plus what each effect adds:
 
     eta(x, e) = eta0 + J0 d + d^T H d / 2 + sum over effects i of [a_i(e_i) + B_i(e_i) d]
 
-a_i, B_i: polynomials in e_i through its nodes, 0 at e_i = 0. A node k may stand at any x_k: with
-B_k = J_k - J(x_k, 0) it is a_k = eta_k - eta(x_k, 0) - B_k (x_k - x0). So the model is exact at
-every point that was asked, and effects add up (two at a time are asked again where it matters).
+a_i, B_i: polynomials in e_i through its nodes, 0 at e_i = 0: differences of what the model says at
+x0 with and without the effect. An effect that is in play is asked once more where its re-fit lies,
+at x_a, e_a: what the expansion is off by there, eta_a and J_a, it gains (e / e_a)^3 times, being
+itself off by terms of third order. Effects add up.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -27,25 +28,38 @@ CURVATURE_STEP = 0.05  # of a logarithm, for H from two Jacobians
 
 
 @dataclass(frozen=True)
+class Anchor:
+    """Where an effect was asked again: parameter e, d = x - x0 (v,), and what the expansion is off
+    by there: shift (n,), tilt (n, v)."""
+
+    e: float
+    d: Array
+    shift: Array
+    tilt: Array
+
+
+@dataclass(frozen=True)
 class Nodes:
-    """An effect where it was asked: values (k,) at x (k, v); shift (k, n), tilt (k, n, v): a_k,
-    B_k; split (k, n); reach: the range of the parameter between nodes that have a solution."""
+    """An effect where it was asked: values (k,); shift (k, n), tilt (k, n, v): a_k, B_k; split
+    (k, n); reach: the range of the parameter between nodes that have a solution."""
 
     values: Array
-    x: Array
     shift: Array
     tilt: Array
     split: Array
     reach: tuple[float, float]
+    anchor: Anchor | None = None
 
     def at(self, e: Array) -> tuple[Array, Array, Array]:
         """a (q, n), B (q, n, v) and split (q, n) at parameters (q,)."""
         weights = _lagrange(self.values, e)
-        return (
-            weights @ self.shift,
-            np.einsum("qk,knv->qnv", weights, self.tilt),
-            np.abs(weights @ self.split),
-        )
+        shift = weights @ self.shift
+        tilt = np.einsum("qk,knv->qnv", weights, self.tilt)
+        if self.anchor:
+            grown = (e / self.anchor.e) ** 3
+            shift = shift + grown[:, None] * (self.anchor.shift - self.anchor.tilt @ self.anchor.d)
+            tilt = tilt + grown[:, None, None] * self.anchor.tilt
+        return shift, tilt, np.abs(weights @ self.split)
 
 
 @dataclass(frozen=True)
@@ -67,12 +81,6 @@ class Expansion:
         d = x - self.x0
         bent = np.einsum("nvw,w->nv", self.hessian, d)
         return self.eta + self.jacobian @ d + bent @ d / 2, self.jacobian + bent
-
-    def node(self, x: Array, answer: Answer) -> tuple[Array, Array, Array]:
-        """a, B and split of an answer at x."""
-        eta, jacobian = self.plain(x)
-        tilt = answer.jacobian - jacobian
-        return answer.eta - eta - tilt @ (x - self.x0), tilt, answer.split
 
 
 def expand(response: Response, x0: Array, ids: Sequence[str] | None = None) -> Expansion:
@@ -112,7 +120,7 @@ def expand(response: Response, x0: Array, ids: Sequence[str] | None = None) -> E
     ):
         found[id][e] = answer
     for id in ids:
-        made = _nodes(plain, response.spans[id], {e: (x0, a) for e, a in found[id].items()})
+        made = _nodes(plain, response.spans[id], found[id])
         if made is None:
             failed[id] = str(next(a for a in found[id].values() if isinstance(a, Exception)))
         else:
@@ -130,43 +138,36 @@ def node_values(span: Span) -> Array:
     return np.sort(far * np.array(ONE_SIDED))
 
 
-def moved(
-    expansion: Expansion, response: Response, wanted: Mapping[str, Mapping[float, Array]]
+def anchored(
+    expansion: Expansion, response: Response, wanted: Mapping[str, tuple[float, Array]]
 ) -> Expansion:
-    """The expansion with nodes of effects asked again at re-fitted x: {id: {value: x (v,)}}.
-
-    Values that are no nodes yet become nodes. A node without a solution there stays as it was.
-    """
-    asked = [(id, e, x) for id, places in wanted.items() for e, x in places.items()]
-    answers = response.answers([Point(x, {id: e}) for id, e, x in asked])
+    """The expansion with effects asked again at {id: (parameter, x (v,))}; one that has no
+    solution there stays as it was."""
+    answers = response.answers([Point(x, {id: e}) for id, (e, x) in wanted.items()])
     nodes = dict(expansion.nodes)
-    for id in wanted:
-        old = nodes[id]
-        rows = {
-            float(e): (old.x[k], old.shift[k], old.tilt[k], old.split[k])
-            for k, e in enumerate(old.values)
-        }
-        for (other, e, x), answer in zip(asked, answers, strict=True):
-            if other == id and isinstance(answer, Answer):
-                rows[e] = x, *expansion.node(x, answer)
-        nodes[id] = _stacked(rows, old.reach)
-    return Expansion(expansion.x0, expansion.eta, expansion.jacobian, expansion.hessian,
-                     expansion.split, expansion.constants, nodes, expansion.failed)  # fmt: skip
+    for (id, (e, x)), answer in zip(wanted.items(), answers, strict=True):
+        if isinstance(answer, Answer):
+            own, d = replace(nodes[id], anchor=None), x - expansion.x0
+            eta, jacobian = expansion.plain(x)
+            shift, tilt, _ = own.at(np.array([e]))
+            off = answer.eta - eta - shift[0] - tilt[0] @ d
+            nodes[id] = replace(own, anchor=Anchor(e, d, off, answer.jacobian - jacobian - tilt[0]))
+    return replace(expansion, nodes=nodes)
 
 
 def _nodes(
-    plain: Expansion, span: Span, replies: Mapping[float, tuple[Array, Answer | Exception]]
+    plain: Expansion, span: Span, replies: Mapping[float, Answer | Exception]
 ) -> Nodes | None:
     """Nodes from 0 outwards as far as there are solutions; None where there is none at all."""
-    zero = plain.x0, np.zeros_like(plain.eta), np.zeros_like(plain.jacobian), plain.split
+    zero = np.zeros_like(plain.eta), np.zeros_like(plain.jacobian), plain.split
     rows = {0.0: zero}
     reach = [max(0.0, span.low), min(0.0, span.high)]  # 0, or the near end of the range
     for side in (1, -1):
         for e in sorted((e for e in replies if e * side > 0), key=abs):
-            x, answer = replies[e]
+            answer = replies[e]
             if not isinstance(answer, Answer):
                 break
-            rows[e] = x, *plain.node(x, answer)
+            rows[e] = answer.eta - plain.eta, answer.jacobian - plain.jacobian, answer.split
             reach[0 if side < 0 else 1] = e
     if len(rows) == 1:
         return None
@@ -176,7 +177,7 @@ def _nodes(
 
 def _bent(plain: Expansion, span: Span, found: Mapping[float, Answer | Exception]) -> list[float]:
     """The far ends of the range towards which its nodes do not follow the effect closely."""
-    made = _nodes(plain, span, {e: (plain.x0, a) for e, a in found.items()})
+    made = _nodes(plain, span, found)
     if made is None or len(made.values) < 3:
         return []
     middles = (made.values[1:] + made.values[:-1]) / 2
@@ -189,8 +190,8 @@ def _bent(plain: Expansion, span: Span, found: Mapping[float, Answer | Exception
 
 def _stacked(rows: Mapping[float, tuple[Array, ...]], reach: tuple[float, float]) -> Nodes:
     values = np.array(sorted(rows))
-    x, shift, tilt, split = (np.array([rows[float(e)][part] for e in values]) for part in range(4))
-    return Nodes(values, x, shift, tilt, split, reach)
+    shift, tilt, split = (np.array([rows[float(e)][part] for e in values]) for part in range(3))
+    return Nodes(values, shift, tilt, split, reach)
 
 
 def _lagrange(nodes: Array, e: Array) -> Array:
