@@ -30,10 +30,11 @@ CLOSE = 0.05  # of a range, and of ln x: an effect asked as near as that, or to 
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """What was found. d (v,): the plain fit is x0 + d; parts: the section map and how many
-    combinations of its parts the data see; rung: of the ladder of proof, 1 to 4."""
+    """What was found. problem: as it was solved; bare: before effects were asked again; parts,
+    effective_rank: the section map and how many combinations of its parts the data see; rung: of the ladder of proof, 1 to 4."""
 
     problem: Problem
+    bare: Problem
     variables: tuple[str, ...]
     sources: tuple[str, ...]
     hypotheses: tuple[Hypothesis, ...]
@@ -92,7 +93,7 @@ def diagnose(
         expansion = expand(response, x0)
     problem = Problem(observations, expansion, response.spans, where, response.start,
                       response.spread, changes, assumed)  # fmt: skip
-    hypotheses = weigh(problem)
+    hypotheses, bare = weigh(problem), problem
     for _ in range(ROUNDS if expansion.nodes else 0):
         problem, changed = _asked_again(problem, response, hypotheses)
         if not changed:
@@ -104,18 +105,18 @@ def diagnose(
     assert plain is not None
     d = plain.d[0]
     verdict = decide(hypotheses, p, len(where), len(d))
-    gap = find_gap(problem, d, tuple(response.variables))
+    gap = find_gap(bare, d, tuple(response.variables))
     P, _, _ = projection(problem, d)
     means = {h.key: h.mean() for h in hypotheses if h.values}
     sizes = {key: value[key] for key, value in means.items() if key in value}
-    separability = separate(problem, P, sizes)
+    separability = separate(bare, P, sizes)
     regions = list(parts(problem.expansion.x0 + d)) if parts else []
-    found, effective_rank = section_map(problem, P, gap.residuals, regions)
+    found, effective_rank = section_map(bare, P, gap.residuals, regions)
     shrinkage = shrink(problem, verdict.key, seed) if problem.expansion.nodes else None
-    choices = rank(problem, d, p, means, response.sources, further)
+    choices = rank(bare, d, p, means, response.sources, further)
     return Diagnosis(
-        problem, tuple(response.variables), tuple(response.sources), tuple(hypotheses), p, verdict,
-        gap, separability, tuple(found), effective_rank, shrinkage,
+        problem, bare, tuple(response.variables), tuple(response.sources), tuple(hypotheses), p,
+        verdict, gap, separability, tuple(found), effective_rank, shrinkage,
         _rung(verdict, shrinkage, problem), tuple(choices),
     )  # fmt: skip
 

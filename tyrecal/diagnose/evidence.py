@@ -245,7 +245,7 @@ def _hypothesis(
     box = [problem.expansion.nodes[id].reach for id in ids]
     ranges = [high - low for low, high in box]
     kept: list[tuple[Array, Array, Fitted]] = []
-    for _ in range(ZOOMS):
+    for zoom in range(ZOOMS + 1):
         axes = [_rule(low, high, count) for low, high in box]
         mesh = np.meshgrid(*(points for points, _ in axes), indexing="ij")
         values = np.array([each.ravel() for each in mesh])
@@ -259,7 +259,7 @@ def _hypothesis(
         inner = [slice(max(0, b - 1), b + 2) for b in best]
         cross = [ln[tuple(part if i == j else b for j, b in enumerate(best))]
                  for i, part in enumerate(inner)]  # fmt: skip
-        if max(ln[best] - each.min() for each in cross) < SHARP:
+        if zoom == ZOOMS or max(ln[best] - each.min() for each in cross) < SHARP:
             kept.append((values, ln_weights, fitted))
             break
         for i, ((points, _), b) in enumerate(zip(axes, best, strict=True)):
@@ -270,8 +270,6 @@ def _hypothesis(
             [(v >= low) & (v <= high) for v, (low, high) in zip(values, box, strict=True)], axis=0
         )
         kept.append((values[:, outside_box], ln_weights[outside_box], _some(fitted, outside_box)))
-    else:
-        kept.append((values, ln_weights, fitted))
     joined = Fitted(*(np.concatenate([getattr(f, name) for _, _, f in kept])
                       for name in ("ln_evidence", "d", "chi2", "covariance")))  # fmt: skip
     values = np.concatenate([v for v, _, _ in kept], axis=1)

@@ -6,8 +6,8 @@ With d = x - x0, quadratic about the plain fit x0, plus what each effect adds:
 
 a_i, B_i: polynomials in e_i through its nodes, 0 at e_i = 0: differences of what the model says at
 x0 with and without the effect. An effect that is in play is asked once more where its re-fit lies,
-at x_a, e_a: what the expansion is off by there, eta_a and J_a, it gains (e / e_a)^3 times, being
-itself off by terms of third order. Effects add up.
+at x_a, e_a: what the expansion is off by there, eta_a and J_a, it gains (e / e_a)^3 times (once
+beyond e_a), being itself off by terms of third order. Effects add up.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ class Nodes:
         shift = weights @ self.shift
         tilt = np.einsum("qk,knv->qnv", weights, self.tilt)
         if self.anchor:
-            grown = (e / self.anchor.e) ** 3
+            grown = np.clip(e / self.anchor.e, 0, 1) ** 3
             shift = shift + grown[:, None] * (self.anchor.shift - self.anchor.tilt @ self.anchor.d)
             tilt = tilt + grown[:, None, None] * self.anchor.tilt
         return shift, tilt, np.abs(weights @ self.split)

@@ -106,9 +106,9 @@ def _parameter(diagnosis: Diagnosis, key: str | None) -> dict[str, Any] | None:
     own = diagnosis.parameter(key)
     hypothesis = diagnosis.hypothesis(key)
     effects = {id: np.array([e]) for id, e in hypothesis.mean().items()}
-    shift = diagnosis.problem.added(effects, 1)[0][0] - diagnosis.problem.added({}, 1)[0][0]
+    shift = diagnosis.bare.added(effects, 1)[0][0] - diagnosis.bare.added({}, 1)[0][0]
     assert hypothesis.fitted is not None
-    P, _, _ = projection(diagnosis.problem, hypothesis.fitted.d[hypothesis.best])
+    P, _, _ = projection(diagnosis.bare, hypothesis.fitted.d[hypothesis.best])
     return {"effect": key.split("+")[0], **own, "lambda": float(shift @ P @ shift)}
 
 
