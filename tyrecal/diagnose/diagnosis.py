@@ -31,7 +31,8 @@ CLOSE = 0.05  # of a range, and of ln x: an effect asked as near as that, or to 
 @dataclass(frozen=True)
 class Diagnosis:
     """What was found. problem: as it was solved; bare: before effects were asked again; parts,
-    effective_rank: the section map and how many combinations of its parts the data see; rung: of the ladder of proof, 1 to 4."""
+    effective_rank: the section map, and how many combinations of its parts the data see; rung: of
+    the ladder of proof, 1 to 4."""
 
     problem: Problem
     bare: Problem

@@ -21,6 +21,8 @@ from .uncertainties import EFFECTS, Source, values_of
 Array = np.ndarray
 MASS_STEP = 0.02  # of a logarithm: the mass is linear in areas and densities
 
+WORTH_A_POOL = 10  # evaluations, for processes to be started
+
 ModelRow = tuple[Label | None, float]
 
 
@@ -98,10 +100,16 @@ class TyreModel:
             effects = {EFFECTS + id: float(e) for id, e in point.effects.items()}
             known = dict(self._plain) if constants else {}
             designs.append({**self.values(point.x), **known, "pressure_kPa": pressure, **effects})
-        found = self._fit.modes(designs, (*self.variables, *paths))
+        found = self._modes(designs, (*self.variables, *paths))
         per = len(self.pressures)
         return [self._answer(p, designs[i * per : (i + 1) * per], found[i * per : (i + 1) * per])
                 for i, p in enumerate(points)]  # fmt: skip
+
+    def _modes(
+        self, designs: list[dict[str, float]], names: tuple[str, ...] = ()
+    ) -> list[fit.Found | EvaluationFailed]:
+        self._fit.jobs = self.jobs if len(designs) >= WORTH_A_POOL else 1
+        return self._fit.modes(designs, names)
 
     def _answer(
         self,
@@ -170,7 +178,7 @@ class TyreModel:
                 steps = {k: s for k, s in source.steps.items() if not k.startswith(EFFECTS)}
                 steps.pop("pressure_kPa", None)
                 designs.append({**own, **{k: own[k] + s for k, s in steps.items()}})
-            found = self._fit.modes(designs)
+            found = self._modes(designs)
             for each in found:
                 if isinstance(each, EvaluationFailed):
                     raise each
