@@ -145,10 +145,17 @@ def _where(d: Diagnosis) -> Iterator[str]:
             )
         else:
             yield "No single part of the section, softer, stiffer, heavier or lighter, explains it."
-        yield (
-            f"The data see {d.effective_rank} independent combination"
-            f"{'s' if d.effective_rank != 1 else ''} of parts; a finer map would be invented."
-        )
+        if d.effective_rank:
+            yield (
+                f"The data see {d.effective_rank} independent combination"
+                f"{'s' if d.effective_rank > 1 else ''} of parts (changes of 20 % in stiffness,"
+                " 10 % in mass, beyond their scatter); a finer map would be invented."
+            )
+        else:
+            yield (
+                "A change of 20 % in stiffness or 10 % in mass of any parts would stay within the"
+                " scatter of these data: the map is a hint at most."
+            )
 
 
 def _which(study: Study) -> Iterator[str]:

@@ -20,7 +20,7 @@ from .figure import COLOURS, GREY, in_house_style, new_figure, save
 
 Array = np.ndarray
 FAMILIES = ("[0,0]", "in-plane", "lateral")
-SHOWN = 12
+SHOWN, LEAST = 12, 0.005  # explanations, and the probability below which one is not drawn
 WARM = LinearSegmentedColormap.from_list("evidence", ["#EDEDED", "#F5C98A", "#D55E00"])
 ENOUGH = 5.0  # ln evidence that is drawn in the full colour
 
@@ -78,6 +78,7 @@ def draw_residuals(path: Path, d: Diagnosis) -> None:
 def draw_probabilities(path: Path, d: Diagnosis) -> None:
     """The likeliest explanations as bars, before (a mark) and after the data."""
     order = sorted(d.hypotheses, key=lambda h: -d.probabilities[h.key])[:SHOWN]
+    order = [h for h in order if d.probabilities[h.key] >= LEAST or h.key in (NONE, OUTSIDE)]
     figure = new_figure(7.4, 1.3 + 0.3 * len(order))
     axes = figure.add_subplot()
     place = np.arange(len(order))[::-1]
@@ -86,14 +87,14 @@ def draw_probabilities(path: Path, d: Diagnosis) -> None:
     axes.barh(place, p, color=colours, height=0.7)
     axes.plot([h.prior for h in order], place, "|", color="black", ms=13, mew=1.5,
               label="before the data")  # fmt: skip
-    for y, value in zip(place, p, strict=True):
-        axes.text(value + 0.01, y, f"{value:.2f}", va="center", fontsize=8)
+    for y, value, h in zip(place, p, order, strict=True):
+        axes.text(max(value, h.prior) + 0.01, y, f"{value:.2f}", va="center", fontsize=8)
     axes.axvline(0.7, color=GREY, lw=0.8, ls=":")
     axes.text(0.7, len(order) - 0.35, "named from here on", fontsize=8, color=GREY, ha="center")
     axes.set_yticks(place, [_short(d, h.key) for h in order])
     axes.set_xlim(0, max(1.0, 1.1 * max(p)))
     axes.set_xlabel("probability")
-    axes.legend(loc="center", bbox_to_anchor=(0.45, 0.25), frameon=False)
+    axes.legend(loc="center", bbox_to_anchor=(0.5, 0.25), frameon=False)
     save(figure, path)
 
 
@@ -132,8 +133,10 @@ def draw_section_map(
     by_name: dict[str, Place] = {}
     for place in parts:  # of several rubbers in a region the likelier one
         by_name.setdefault(place.region.split(",")[0], place)
-    figure = new_figure(9.0, 4.6)
-    axes = figure.add_subplot(aspect="equal")
+    figure = new_figure(10.0, 5.2)
+    axes, beside = figure.subplots(1, 2, width_ratios=[5, 4])
+    axes.set_aspect("equal")
+    beside.axis("off")
     regions = [name for name, _ in case.section.regions]
     rows = case.case.mesh.levels[case.case.mesh.level].rows
     groups: dict[str, list[list[Array]]] = {}
@@ -159,11 +162,11 @@ def draw_section_map(
         f"   {p.mass_percent:+4.0f} ± {p.mass_sigma:<3.0f}   {p.evidence:+5.1f}"
         for p in parts
     ]
-    axes.text(1.04, 0.98, "\n".join(table), transform=axes.transAxes, va="top", fontsize=7.5,
+    beside.text(0.0, 0.98, "\n".join(table), transform=beside.transAxes, va="top", fontsize=7.5,
               family="monospace")  # fmt: skip
     same = [f"{p.region} looks like {', '.join(p.same_as)}" for p in parts if p.same_as]
     words = [f"the data see {effective_rank} independent combination(s)", *same]
-    axes.text(1.04, 0.02, "\n".join(words), transform=axes.transAxes, va="bottom", fontsize=7.5,
+    beside.text(0.0, 0.02, "\n".join(words), transform=beside.transAxes, va="bottom", fontsize=7.5,
               color="0.3")  # fmt: skip
     axes.set_title("One part changed alone: the redder, the better it explains the gap", loc="left")
     save(figure, path)
