@@ -14,6 +14,7 @@ from .job import Failures, TimedOut, run
 from .keywords import DeckError
 
 JOB, PRESS, OLDJOB = "modes", "press", "inflate"
+ASIDE = ("own_frequency", "cavity", "sector")  # of the tool's request, as in `job.Request`
 
 
 class Decks(Protocol):
@@ -63,7 +64,7 @@ class Bundled:
             "harmonics": list(range(decks.request["highest_harmonic"] + 1)),
             "modes_per_harmonic": decks.request["modes_per_harmonic"],
             "sensitivities": decks.tangents(self.dialect),
-            **{k: decks.request[k] for k in ("own_frequency", "cavity") if k in decks.request},
+            **{k: decks.request[k] for k in ASIDE if k in decks.request},
         }
         paths.append(folder / f"{JOB}.request.json")
         paths[-1].write_text(json.dumps(request))
@@ -83,18 +84,21 @@ class Bundled:
             nodes, points = arrays["nodes"], arrays["points"]
             displacement = arrays[f"displacement_{step['step']}"]
             shapes = arrays[f"shapes_{step['step']}"] if step["modes"] else []
-        modes = []
-        doublets: dict[tuple[int, int], dict[str, Any]] = {}
-        for mode, shape in zip(step["modes"], shapes, strict=True):
+        modes: list[dict[str, Any]] = []
+        places: list[list[int]] = []  # of each mode in the file
+        doublets: dict[tuple[int, int], int] = {}
+        for place, (mode, shape) in enumerate(zip(step["modes"], shapes, strict=True)):
             key = mode["n"], mode.get("doublet", -1)
             if key in doublets:  # the upper one of two that have split
-                lower = doublets[key]["frequency_Hz"]
-                doublets[key] |= {
+                places[doublets[key]].append(place)
+                lower = modes[doublets[key]]["frequency_Hz"]
+                modes[doublets[key]] |= {
                     "frequency_Hz": (lower + mode["frequency_Hz"]) / 2,
                     "multiplicity": 2,
                     "members": [lower, mode["frequency_Hz"]],
                 }
                 continue
+            places.append([place])
             modes.append(
                 {
                     "frequency_Hz": mode["frequency_Hz"],
@@ -104,12 +108,15 @@ class Bundled:
                 }
             )
             if "doublet" in mode:
-                doublets[key] = modes[-1]
+                doublets[key] = len(modes) - 1
         return {
             "pressure_Pa": step["pressure_Pa"],
             "mass_kg": step["mass_kg"],
             "modes": modes,
-            "gradients": step["sensitivities"],
+            "gradients": {
+                name: [sum(slopes[i] for i in own) / len(own) for own in places]
+                for name, slopes in step["sensitivities"].items()
+            },
             "nodes": nodes,
             "points": points,
             "displacement": displacement,

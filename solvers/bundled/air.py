@@ -73,6 +73,15 @@ class Coupling:
         """C u + H w for u (nodes, 3) and w, real or of a complex step."""
         return np.tensordot(self.C, u, 2) + self.H[:, self.flowing] @ w
 
+    def flow(self, u: Array, eigenvalue: float) -> Array:
+        """w of a mode from its u (nodes, 3): (H^T Q^-1 H - lambda H) w = -H^T Q^-1 C u. The strain
+        of w and u is a small difference, which an iteration does not find to many digits."""
+        flow = self.H[:, self.flowing]
+        stiff = np.linalg.solve(self.Q, flow).T
+        own = stiff @ flow - eigenvalue * flow[self.flowing]
+        found: Array = np.linalg.solve(own, -stiff @ np.tensordot(self.C, u, 2))
+        return found
+
 
 def coupling(air: Air, X: Array, U: Array, n: int) -> Coupling:
     """Matrices of the inflated cavity. X (nodes, 2), U (nodes, 3); complex steps allowed."""

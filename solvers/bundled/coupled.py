@@ -15,11 +15,12 @@ from scipy.linalg import eigh
 from scipy.optimize import linear_sum_assignment
 
 from .attached import Attached
-from .harmonics import HarmonicModes, Vibration
+from .harmonics import Change, HarmonicModes, Makeup, Vibration
 
 Array = np.ndarray
 CANDIDATES = 3  # coupled modes looked at for every one wanted
 NEAR = 4  # harmonics beyond the highest wanted whose modes may lie close to wanted ones
+SLIGHT = 1e-6  # share of a mode's energy below which a harmonic does not count for its slopes
 NEGLIGIBLE = 1e-9  # share of the static response that a direction may hold to be left out
 
 
@@ -48,6 +49,15 @@ class Basis:
             for c in (1.0, 1j) if family.n else (1.0,):
                 self.place += [(f, k, c) for k in range(len(family.eigenvalues))]
         self.eigenvalues = np.array([families[f].eigenvalues[k] for f, k, _ in self.place])
+
+    def part(self, f: int, vectors: Array) -> tuple[Array, Array]:
+        """Of fields given by vectors (fields, m): the shapes (m, nodes, 3) of the f-th family,
+        unit mass as in it, and the stiffness energy (m,) of each, 2 J."""
+        rows = [i for i, place in enumerate(self.place) if place[0] == f]
+        c = np.array([self.place[i][2] for i in rows])[:, None] * vectors[rows]
+        shapes = self.families[f].shapes[[self.place[i][1] for i in rows]]
+        energy = self.eigenvalues[rows] @ vectors[rows] ** 2
+        return np.tensordot(c.T, shapes, 1), energy
 
     def at_zero(self, attached: Attached) -> Array:
         """Displacement (d, fields) of the attached components."""
@@ -80,9 +90,10 @@ def attached_modes(
         families.append(_with_response(vibration, n, own, attached))
     basis = Basis(families)
     p = basis.at_zero(attached)
-    K = np.diag(basis.eigenvalues) + p.T @ (attached.stiffness[:, None] * p)
-    M = np.eye(len(K)) + p.T @ (attached.mass[:, None] * p)
-    return named(basis, *eigh(K, M), harmonics, count)
+    K = np.diag(basis.eigenvalues) + p.T @ (attached.stiffness.real[:, None] * p)
+    M = np.eye(len(K)) + p.T @ (attached.mass.real[:, None] * p)
+    values, vectors = eigh(K, M)
+    return named(basis, values, vectors, harmonics, count, p)
 
 
 def _with_response(vibration: Vibration, n: int, count: int, attached: Attached) -> Family:
@@ -117,26 +128,71 @@ def ritz(vibration: Vibration, n: int, vectors: Array, images: Array) -> Family:
     return Family(n, values, np.moveaxis(shapes, -1, 0))
 
 
+@dataclass
+class Parts:
+    """The harmonics that attached masses and springs couple in each mode.
+
+    mode (p,), n (p,), shapes (p, nodes, 3): those that hold more than `SLIGHT` of its energy;
+    eigenvalues (m,); at (d, m): displacement of the attached components.
+    """
+
+    mode: Array
+    n: Array
+    shapes: Array
+    eigenvalues: Array
+    at: Array
+
+    def forms(self) -> tuple[Array, Array, Array]:
+        """One per part."""
+        return self.n, self.shapes, self.eigenvalues[self.mode]
+
+    def rates(self, forms: Array, change: Change) -> Array:
+        """psi^T (K' - lambda M') psi of the whole."""
+        tyre = np.bincount(self.mode, forms, len(self.eigenvalues))
+        return tyre + change.attached.rates(self.eigenvalues, self.at)
+
+    def where(self, keep: Array | slice) -> Parts:
+        """The parts of some of the modes."""
+        kept = np.arange(len(self.eigenvalues))[keep]
+        place = np.full(len(self.eigenvalues), -1)
+        place[kept] = np.arange(len(kept))
+        mine = place[self.mode] >= 0
+        return Parts(
+            place[self.mode[mine]], self.n[mine], self.shapes[mine], self.eigenvalues[kept],
+            self.at[:, kept],
+        )  # fmt: skip
+
+
 def named(
-    basis: Basis, values: Array, vectors: Array, harmonics: list[int], count: int
+    basis: Basis,
+    values: Array,
+    vectors: Array,
+    harmonics: list[int],
+    count: int,
+    p: Array,
 ) -> list[HarmonicModes]:
     """Coupled modes, eigenvalues (m,) rising and vectors (fields, m), by the plain modes of
-    which they hold most; of a doublet's two the lower comes first."""
+    which they hold most; of a doublet's two the lower comes first. p (d, fields)."""
     held: dict[tuple[int, int], Array] = {}
     for row, (f, k, _) in enumerate(basis.place):
         key = basis.families[f].n, k
         held[key] = held.get(key, 0.0) + vectors[row] ** 2
     told = tell(held, harmonics, count)
     result = []
-    for family in basis.families:
-        if family.n not in harmonics:
-            continue
-        mine = told[family.n]
-        rows = [i for i, (f, _, _) in enumerate(basis.place) if basis.families[f] is family]
-        weights = np.array([basis.place[i][2] for i in rows])
-        fields = family.shapes[[basis.place[i][1] for i in rows]]
-        shapes = np.tensordot((weights[:, None] * vectors[rows][:, mine]).T, fields, 1)
-        result.append(split(family.n, values[mine], shapes))
+    for n in harmonics:
+        mine = told[n]
+        parts = [(f.n, *basis.part(i, vectors[:, mine])) for i, f in enumerate(basis.families)]
+        shapes = next(shapes for m, shapes, _ in parts if m == n)
+        share = np.array([energy for _, _, energy in parts]).T / values[mine][:, None]
+        mode, which = np.nonzero(share > SLIGHT)
+        makeup = Parts(
+            mode,
+            np.array([parts[i][0] for i in which]),
+            np.array([parts[i][1][j] for j, i in zip(mode, which, strict=True)]),
+            values[mine],
+            p @ vectors[:, mine],
+        )
+        result.append(split(n, values[mine], shapes, makeup))
     return result
 
 
@@ -155,14 +211,12 @@ def tell(
     told: dict[int, list[int]] = {n: [] for n in harmonics}
     for n in harmonics:
         for k in range(count):
-            places = [
-                int(t) for seat, t in zip(seats, taken, strict=True) if seat == (n, k)
-            ]
+            places = [int(t) for seat, t in zip(seats, taken, strict=True) if seat == (n, k)]
             told[n] += sorted(places)
     return told
 
 
-def split(n: int, values: Array, shapes: Array) -> HarmonicModes:
+def split(n: int, values: Array, shapes: Array, makeup: Makeup | None = None) -> HarmonicModes:
     """Modes that come two by two for n >= 1."""
     members = np.tile([1, 2], len(values) // 2) if n else None
-    return HarmonicModes(n, values, shapes, members=members)
+    return HarmonicModes(n, values, shapes, members=members, makeup=makeup)

@@ -100,8 +100,6 @@ FIELDS = {  # data fields that are honoured; a further one that is not blank is 
     "SURFACE BEHAVIOR": 1,
     "FRICTION": 1,
     "CONTACT PAIR": 2,
-    "MASS": 1,
-    "SPRING": 1,
     "STATIC": 2,
     "FREQUENCY": 4,
 }

@@ -16,6 +16,7 @@ from scipy.sparse import csr_array
 
 from . import border, eigen, mechanics
 from .air import Air, Coupling, coupling
+from .attached import Attached
 from .band import Cholesky, Indefinite, Numbering
 from .border import Border, Bordered
 from .mechanics import Load
@@ -32,6 +33,29 @@ class Unstable(ArithmeticError):
     """The inflated state is not stable: a harmonic of it buckles."""
 
 
+class Makeup(Protocol):
+    """What a mode that is not one harmonic of a tyre at rest is made of."""
+
+    def forms(self) -> tuple[Array, Array, Array]:
+        """As `HarmonicModes.forms`."""
+
+    def rates(self, forms: Array, change: Change) -> Array:
+        """d lambda / dp (m,) from the forms (p,) and what else has p's tangent."""
+
+    def where(self, keep: Array | slice) -> Makeup:
+        """That of some of the modes."""
+
+
+@dataclass
+class Change:
+    """What carries the tangent of p beside the section and its loads: the model, Omega, and what
+    is attached to the tyre."""
+
+    model: Model
+    spin: complex | float
+    attached: Attached
+
+
 @dataclass
 class HarmonicModes:
     """Modes of one harmonic: omega^2 (m,) in 1/s2 and shapes (m, n, 3), u^H M u = 1.
@@ -39,7 +63,8 @@ class HarmonicModes:
     M is the mass per radian: over the whole circle the kinetic mass is 2 pi for n = 0, pi else.
     rim (m, q), air (m, w): the amplitudes of the rim's motions (in ``shapes`` too) and of the
     cavity's flow (see `wheel`, `air`). members (m,): None, or where each doublet has split into
-    two modes, 1 and 2 in turn; the shape is then the part of harmonic n.
+    two modes, 1 and 2 in turn; the shape is then the part of harmonic n. makeup: what modes that
+    are more than that are made of.
     """
 
     n: int
@@ -48,6 +73,14 @@ class HarmonicModes:
     rim: Array = field(default_factory=lambda: np.zeros((0, 0)))
     air: Array = field(default_factory=lambda: np.zeros((0, 0)))
     members: Array | None = None
+    makeup: Makeup | None = None
+
+    def forms(self) -> tuple[Array, Array, Array]:
+        """Harmonics (p,), shapes (p, nodes, 3) and lambda (p,) of the forms phi^H (K' - lambda M')
+        phi that the derivatives of the eigenvalues are made of."""
+        if self.makeup is not None:
+            return self.makeup.forms()
+        return np.full(len(self.eigenvalues), self.n), self.shapes, self.eigenvalues
 
     def below(self, frequency_Hz: float) -> HarmonicModes:
         """Those up to a frequency."""
@@ -57,8 +90,9 @@ class HarmonicModes:
         """Those of a mask or slice."""
         rim, air = (a[keep] if len(a) else a for a in (self.rim, self.air))
         members = None if self.members is None else self.members[keep]
+        makeup = self.makeup.where(keep) if self.makeup else None
         return HarmonicModes(
-            self.n, self.eigenvalues[keep], self.shapes[keep], rim, air, members
+            self.n, self.eigenvalues[keep], self.shapes[keep], rim, air, members, makeup
         )
 
 
@@ -113,6 +147,16 @@ class Vibration:
         other.weights = np.concatenate([[1.0], np.asarray(ratios) - 1])
         other._borders = {}
         return other
+
+    def forms(self, n: int, shape: Array) -> Array:
+        """phi^H dK_l phi of a shape (nodes, 3) for every law of frequency."""
+        field, found = shape[..., None], []
+        for K0, K1, K2 in self._parts[1:]:
+            image = border.apply(K0, field)
+            if n:
+                image = image + 1j * n * border.apply(K1, field) + n * n * border.apply(K2, field)
+            found.append(float(np.vdot(field, image).real))
+        return np.array(found)
 
     def factor(self, n: int) -> Cholesky | Bordered:
         """Factor of K(n) - shift M. Raises Unstable."""
@@ -215,6 +259,9 @@ class Vibration:
             rim, flow = vectors[size : size + q], vectors[size + q :]
             shapes = shapes + beside.fields @ rim
             if w:
+                air = self._couplings[n]
+                modes = zip(np.moveaxis(shapes, -1, 0), values, strict=True)
+                flow = np.stack([air.flow(u, value) for u, value in modes], -1)
                 energy = np.einsum("wm,wv,vm->m", flow.conj(), beside.flow_mass, flow).real
                 is_tyres &= energy < IN_THE_AIR
         return HarmonicModes(n, values, np.moveaxis(shapes, -1, 0), rim.T, flow.T), is_tyres

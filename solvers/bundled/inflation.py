@@ -195,7 +195,10 @@ def _newton(
 
 
 def _pressure_force(model: Model, U: Array, loads: list[Load], numbering: Numbering) -> Array:
-    """Force of the pressure alone, of at least 1 Pa: the scale of what counts as balanced."""
+    """Force of the pressure alone, of at least 1 Pa, or of the spin where there is none: the scale
+    of what counts as balanced."""
+    if model.spin2 and not loads:
+        return mechanics.residual(model, 0 * U, [], numbering)
     bare = Model(model.mesh, [], [])
     felt = [Load(load.lines, max(float(np.real(load.pressure)), 1.0)) for load in loads]
     return mechanics.residual(bare, U, felt, numbering) if felt else np.ones(1)

@@ -14,12 +14,16 @@ a forward one. A sensor that stands still at theta = Theta + Omega t sees omega 
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.linalg import eigh
 from scipy.optimize import linear_sum_assignment
 
 from .coupled import Family, ritz, split
-from .harmonics import HarmonicModes, Vibration
+from .harmonics import Change, HarmonicModes, Vibration
+from .keywords import STEP
+from .mechanics import mass_matrices
 from .pressure import SPIN
 
 Array = np.ndarray
@@ -37,23 +41,57 @@ def waves(vibration: Vibration, spin: float, n: int, count: int) -> HarmonicMode
     gyroscopic = _coriolis(vibration, spin, family)
     omega, U = _quadratic(family.eigenvalues, gyroscopic)
     held = abs(U[:count]) ** 2 / (abs(U) ** 2).sum(0)
-    values, shapes = [], []
-    signs = (1, -1) if n else (1,)
-    for sign in signs:
+    chosen: list[Array] = []
+    for sign in (1, -1) if n else (1,):
         pick = np.flatnonzero(np.sign(omega) == sign)
         pick = pick[np.argsort(abs(omega[pick]))]
         _, taken = linear_sum_assignment(held[:, pick], maximize=True)
-        chosen = pick[taken]
-        values.append((omega[chosen] - n * spin) ** 2)
-        size = np.sqrt((abs(U[:, chosen]) ** 2).sum(0))
-        shapes.append(np.tensordot((U[:, chosen] / size).T, family.shapes, 1))
-    if not n:
-        return HarmonicModes(n, values[0], shapes[0])
-    order = np.argsort(values, axis=0)
-    fixed = np.take_along_axis(np.array(values), order, 0)
-    shape = np.take_along_axis(np.array(shapes), order[..., None, None], 0)
-    whole = shape.swapaxes(0, 1).reshape(2 * count, *shape.shape[2:])
-    return split(n, fixed.T.ravel(), whole)
+        chosen.append(pick[taken])
+    both = np.array(chosen).T  # (count, 1 or 2)
+    fixed = (omega[both] - n * spin) ** 2
+    mine = np.take_along_axis(both, np.argsort(fixed, axis=1), 1).ravel()
+    x = U[:, mine] / np.sqrt((abs(U[:, mine]) ** 2).sum(0))
+    shapes = np.tensordot(x.T, family.shapes, 1)
+    turned = np.einsum("im,ij,jm->m", x.conj(), gyroscopic, x).real
+    whirl = Whirl(n, spin, omega[mine], shapes, turned)
+    return split(n, whirl.fixed**2, shapes, whirl)
+
+
+@dataclass
+class Whirl:
+    """Waves (m,) of harmonic n: omega in the turning frame, shapes (m, nodes, 3), U^H M U = 1,
+    coriolis = U^H C U."""
+
+    n: int
+    spin: float
+    omega: Array
+    shapes: Array
+    coriolis: Array
+
+    @property
+    def fixed(self) -> Array:
+        """omega - n Omega: as a sensor that stands still sees them, rad/s."""
+        return self.omega - self.n * self.spin
+
+    def forms(self) -> tuple[Array, Array, Array]:
+        """Of lambda = omega^2."""
+        return np.full(len(self.omega), self.n), self.shapes, self.omega**2
+
+    def rates(self, forms: Array, change: Change) -> Array:
+        """omega' = U^H (K' + omega C' - omega^2 M') U / (2 omega - U^H C U)."""
+        faster = np.imag(change.spin) / STEP
+        by_spin = self.coriolis * faster / self.spin
+        for connectivity, M in mass_matrices(change.model):
+            if np.iscomplexobj(M):
+                u = self.shapes[:, connectivity]
+                turned = np.einsum("meai,eab,ij,mebj->m", u.conj(), M.imag / STEP, SPIN, u)
+                by_spin = by_spin + (2j * self.spin * turned).real
+        slope = (forms + self.omega * by_spin) / (2 * self.omega - self.coriolis)
+        return np.asarray(2 * self.fixed * (slope - self.n * faster))
+
+    def where(self, keep: Array | slice) -> Whirl:
+        """Some of them."""
+        return Whirl(self.n, self.spin, self.omega[keep], self.shapes[keep], self.coriolis[keep])
 
 
 def _basis(vibration: Vibration, spin: float, n: int, count: int) -> Family:

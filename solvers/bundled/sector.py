@@ -16,9 +16,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from .circumference import Circumference
-from .coupled import NEAR, split, tell
+from .coupled import split, tell
 from .gmres import gmres
 from .harmonics import HarmonicModes, Vibration
 from .inflation import InflationFailed
@@ -27,8 +28,9 @@ from .model import Model
 from .revolved import Inverted, Revolved
 
 Array = np.ndarray
-BEYOND = 8  # harmonics of the displacements beyond the highest wanted
-TOLERANCE = 1e-9  # of the forces that the sector brings in
+NEAR = 2  # harmonics beyond the highest wanted whose modes may lie close to wanted ones
+BEYOND = 6  # harmonics of the displacements beyond the highest wanted
+TOLERANCE = 1e-9  # out-of-balance force over the rim's
 LONGEST = 20  # iterations
 LOOSE = 1e-4  # of each step of Newton's method
 INDEPENDENT = 1e-11  # of the basis' Gram matrix
@@ -62,9 +64,10 @@ def full_circle(highest: int) -> Circumference:
 
 
 def blended(model: Model, other: Model, share: Array) -> Model:
-    """``model`` with constants per Gauss point and station (p, s)."""
-    mix = lambda a, b, p: np.broadcast_to(a, p)[:, None] + np.outer(
-        np.broadcast_to(b, p) - np.broadcast_to(a, p), share
+    """``model`` with constants per Gauss point and station (p, s); an hourglass stiffness stays."""
+    mix = lambda a, b, p: (
+        np.broadcast_to(a, p)[:, None]
+        + np.outer(np.broadcast_to(b, p) - np.broadcast_to(a, p), share)
     )
     rubbers = []
     for r, o in zip(model.rubbers, other.rubbers, strict=True):
@@ -79,15 +82,31 @@ def blended(model: Model, other: Model, share: Array) -> Model:
     return replace(model, rubbers=rubbers, cords=cords)
 
 
+class Smooth(Revolved):
+    """The tyre round its circumference, nodal forces summed by an incidence matrix."""
+
+    def _nodes(self, forces: list[tuple[Array, Array, Array]]) -> Array:
+        s, n = len(self.around.weights), len(self.model.mesh.X)
+        total = np.zeros((2, n, s * 3))
+        for connectivity, *both in forces:
+            size = connectivity.size
+            ones = np.ones(size), (connectivity.ravel(), np.arange(size))
+            gather = csr_array(ones, (n, size))
+            for slot, force in enumerate(both):
+                total[slot] += gather @ force.swapaxes(1, 2).reshape(size, -1)
+        weighted = total.reshape(2, n, s, 3) * self.around.weights[:, None]
+        by_u, by_du = weighted.swapaxes(1, 2).reshape(2, s, -1)
+        result = self.around.N.T @ by_u + self.around.slope.T @ by_du
+        return np.asarray(result.reshape(-1, n, 3))
+
+
 class Round:
     """Fields (k, nodes, 3) by their values round the tyre; ``free`` (nodes, 3)."""
 
     def __init__(self, vibration: Vibration, tyre: Revolved, sector: Sector, highest: int):
         self.vibration, self.tyre, self.highest = vibration, tyre, highest
         self.factors = [vibration.factor(n) for n in range(highest + 1)]
-        self.free = np.zeros(3 * len(tyre.model.mesh.X), bool)
-        self.free[vibration.numbering.order] = True
-        self.free = self.free.reshape(-1, 3)
+        self.free = vibration.numbering.equation < vibration.numbering.size
         around = tyre.around
         share = sector.share(_angles(len(around.weights)), 2 * highest)
         self._waves = around.N.T @ ((around.weights * share)[:, None] * around.N)
@@ -113,7 +132,9 @@ class Round:
         shape = self.free.shape[0], len(field), 3
         image = (self._plain @ flat).reshape(shape)
         if self._more.nnz and abs(self._more).max():
-            image = image + np.einsum("kj,njc->nkc", self._waves, (self._more @ flat).reshape(shape))
+            image = image + np.einsum(
+                "kj,njc->nkc", self._waves, (self._more @ flat).reshape(shape)
+            )
         return np.asarray(image.swapaxes(0, 1) * self.free)
 
     def response(self, force: Array) -> Array:
@@ -149,13 +170,14 @@ def sector_modes(
     top = max(harmonics) + beyond
     around = full_circle(top)
     share = sector.share(_angles(len(around.weights)), 2 * top)
-    tyre = Revolved(blended(model, sector.model, share), loads, around)
+    tyre = Smooth(blended(model, sector.model, share), loads, around)
     fields = Round(vibration, tyre, sector, top)
     equilibrium(fields, U, check)
     near = range(min(max(harmonics) + NEAR, top) + 1)
-    start, plain = [], {}
+    start: list[Array] = []
+    plain = {}
     for n in near:
-        for k, shape in enumerate(vibration.modes(n, count + 1).shapes):
+        for k, shape in enumerate(vibration.modes(n, count).shapes):
             pair = [fields.field(n, c * shape) for c in ((1.0, 1j) if n else (1.0,))]
             plain[n, k] = range(len(start), len(start) + len(pair))
             start += pair
@@ -177,16 +199,16 @@ def equilibrium(fields: Round, U: Array, check: Callable[[], None]) -> None:
     shape = state.shape
     product = lambda x: fields.forces(x.reshape(shape)).ravel()
     response = lambda x: fields.response(x.reshape(shape)).ravel()
-    first = 0.0
+    scale = 0.0
     for _ in range(LONGEST):
         check()
         try:
-            force = (fields.tyre.residual(state) * fields.free).ravel()
+            whole = fields.tyre.residual(state)
         except Inverted as error:
             raise InflationFailed(0.0, 0.0, f"with the splice {error}") from None
-        size = float(np.linalg.norm(force))
-        first = first or size
-        if size <= TOLERANCE * first:
+        force = (whole * fields.free).ravel()
+        scale = scale or float(np.linalg.norm(whole))  # of what the rim bears
+        if np.linalg.norm(force) <= TOLERANCE * scale:
             return
         step, _, _ = gmres(product, response, -force, LOOSE, LONGEST)
         state = state + step.reshape(shape)

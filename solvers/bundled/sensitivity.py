@@ -83,6 +83,10 @@ def eigenvalue_rates(
             total += _contract(D, q)
     for load in loads:
         total += _pressure_form(model, state, load, n, real, imag)
+    for connectivity, M in mechanics.mass_matrices(model) if model.spin2 else ():
+        for part in (real, imag):
+            u = part[:, connectivity] @ pressure.IN_PLANE
+            total -= model.spin2 * np.einsum("meai,meai->m", np.matmul(M, u), u)
     for connectivity, M in mechanics.mass_matrices(model):
         if np.iscomplexobj(M) or np.iscomplexobj(real):
             for part in (real, imag):

@@ -22,8 +22,9 @@ if TYPE_CHECKING:
 Array = np.ndarray
 Number = complex | float
 START_HZ = 60.0  # amid the modes of a tyre
-TOLERANCE = 1e-10  # of lambda
-LONGEST = 20
+TOLERANCE = 1e-13  # of a frequency for a given shape
+CLOSE = 1e-4  # of a frequency, from one shape to the next: its square is what is left
+LONGEST = 40
 
 
 class NotSelfConsistent(ArithmeticError):
@@ -83,35 +84,47 @@ class SelfConsistent:
     def modes(self, n: int, count: int, factor: Cholesky | Bordered | None = None) -> HarmonicModes:
         """The ``count`` lowest modes of harmonic n, each at the modulus of its own frequency.
 
-        By the secant method on ln lambda. ``factor`` serves a constant modulus only.
-        Raises NotSelfConsistent; Unstable, eigen.NotConverged.
+        ``factor`` serves a constant modulus only. Raises NotSelfConsistent; Unstable,
+        eigen.NotConverged.
         """
-        start = 2 * np.log(2 * np.pi * START_HZ)
-        first = self._at(start, n, count)
-        return joined(
-            [
-                self._settled(n, j, start, float(np.log(first.eigenvalues[j])))
-                for j in range(len(first.eigenvalues))
-            ]
+        first = self._at(START_HZ, n, count)
+        return joined([self._settled(first, j) for j in range(len(first.eigenvalues))])
+
+    def _ratios(self, frequency_Hz: float) -> Array:
+        return np.array([np.real(law.ratio(frequency_Hz)) for law in self.laws])
+
+    def _at(self, frequency_Hz: float, n: int, count: int) -> HarmonicModes:
+        return self.vibration.at(self._ratios(frequency_Hz)).modes(n, count)
+
+    def _settled(self, found: HarmonicModes, j: int) -> HarmonicModes:
+        """Mode j, from the modes at ``START_HZ``: the frequency at which the shape has its own
+        modulus, then the shape there, until both agree."""
+        frequency = START_HZ
+        for _ in range(LONGEST):
+            before, frequency = frequency, self._own(found, j, frequency)
+            if abs(frequency / before - 1) <= CLOSE:
+                mode = found.where(slice(j, j + 1))
+                return replace(mode, eigenvalues=np.array([(2 * np.pi * frequency) ** 2]))
+            found = self._at(frequency, found.n, j + 1)
+        raise NotSelfConsistent(
+            f"the modulus of mode {j + 1} of harmonic {found.n} does not settle"
         )
 
-    def _at(self, log_value: float, n: int, count: int) -> HarmonicModes:
-        frequency = np.exp(log_value / 2) / (2 * np.pi)
-        ratios = [float(np.real(law.ratio(frequency))) for law in self.laws]
-        return self.vibration.at(np.array(ratios)).modes(n, count)
-
-    def _settled(self, n: int, j: int, before: float, x: float) -> HarmonicModes:
-        """Mode j, from the ln lambda = x that the modulus of ln lambda = ``before`` gives it."""
-        image_before = x
+    def _own(self, found: HarmonicModes, j: int, frequency_Hz: float) -> float:
+        """f with (2 pi f)^2 = lambda + sum_l (rho_l(f) - rho_l(f_0)) phi^H dK_l phi for mode j of
+        the modulus at f_0 = ``frequency_Hz``: Rayleigh's quotient, right to the square of the
+        shape's change."""
+        forms = self.vibration.forms(found.n, found.shapes[j])
+        start, value = self._ratios(frequency_Hz), float(found.eigenvalues[j])
+        f = np.sqrt(value) / (2 * np.pi)
         for _ in range(LONGEST):
-            found = self._at(x, n, j + 1)
-            image = float(np.log(found.eigenvalues[j]))
-            if abs(image - x) <= TOLERANCE:
-                return found.where(slice(j, j + 1))
-            slope = (image - image_before) / (x - before) if x != before else 0.0
-            before, image_before = x, image
-            x = (image - slope * x) / (1 - slope)
-        raise NotSelfConsistent(f"the modulus of mode {j + 1} of harmonic {n} does not settle")
+            new = np.sqrt(value + (self._ratios(f) - start) @ forms) / (2 * np.pi)
+            if abs(new / f - 1) <= TOLERANCE:
+                return float(new)
+            f = new
+        raise NotSelfConsistent(
+            f"the modulus of mode {j + 1} of harmonic {found.n} does not settle"
+        )
 
 
 def joined(modes: list[HarmonicModes]) -> HarmonicModes:

@@ -60,8 +60,8 @@ def closed(text: str, z: float = 0.0) -> str:
 
 
 @cache
-def inflated(pressure: float = 240e3, z: float = 0.0) -> Inflated:
-    tyre = support.tyre((3, 2, 2, 1))
+def inflated(pressure: float = 240e3, z: float = 0.0, quadratic: bool = True) -> Inflated:
+    tyre = support.tyre((3, 2, 2, 1) if quadratic else (6, 4, 4, 2), quadratic=quadratic)
     m = support.model_of(closed(tyre.deck, z))
     mask = support.held(m, [*tyre.rim, m.mesh.index[REFERENCE]])
     loads = [Load(m.mesh.faces[name], pressure) for name in ("CAVITY", "WELL")]

@@ -131,14 +131,14 @@ def test_slopes_carry_the_implicit_term() -> None:
     door = Door(case)
     exact = door.evaluate(Question(values, names)).gradients
     for name in names:
-        h = 1e-4 * values[name]
+        h = 1e-3 * values[name]
         up, down = (
             np.array([m.frequency_Hz for m in door.evaluate(Question(v)).modes])
             for v in ({**values, name: values[name] + h}, {**values, name: values[name] - h})
         )
         central = (up - down) / (2 * h)
         scale = abs(central).max()
-        np.testing.assert_allclose(exact[name], central, rtol=1e-6, atol=1e-6 * scale)
+        np.testing.assert_allclose(exact[name], central, rtol=3e-6, atol=3e-6 * scale)
 
 
 def test_labels_and_multiplicities_as_before() -> None:

@@ -21,12 +21,12 @@ from .support import Rubber
 Array = np.ndarray
 
 
-@pytest.mark.parametrize("z", [0.0, 0.03])
-def test_a_free_tyre_on_its_wheel_moves_rigidly(z: float) -> None:
+@pytest.mark.parametrize(("z", "quadratic"), [(0.0, True), (0.03, True), (0.0, False)])
+def test_a_free_tyre_on_its_wheel_moves_rigidly(z: float, quadratic: bool) -> None:
     """Two zeros at n = 0 (axial, spin) and two at n = 1 (radial, tilt: six motions with their
     quarter turns), with the follower pressure on the closed cavity, the reference point anywhere
     on the axle: lambda to 3e-11 of the first that bends, f to 5e-6, all of it round-off."""
-    tyre = inflated(z=z)
+    tyre = inflated(z=z, quadratic=quadratic)
     for n in (0, 1):
         values = tyre.vibration(tyre.wheel(), shift=SHIFT).modes(n, 3).eigenvalues
         assert abs(values[:2]).max() < 3e-11 * values[2]

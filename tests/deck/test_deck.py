@@ -191,7 +191,7 @@ def test_numbers_have_thirteen_digits_and_fit_abaqus_fields() -> None:
         ("modes.inp.j2", "CAVITY, P, ", "OUTSIDE, P, ", "OUTSIDE"),
         ("modes.inp.j2", "CAVITY, P, ", "CAVITY, HP, ", "only P"),
         ("modes.inp.j2", ", NORMALIZATION=MASS", ", PROPERTY EVALUATION=fast", "not a number"),
-        ("modes.inp.j2", "{{ modes }}\n", "{{ modes }}, 100.0\n", "lowest frequency"),
+        ("modes.inp.j2", "{{ modes }}\n", "{{ modes }}, , , , 7.0\n", "data '7.0'"),
         ("modes.inp.j2", "0.0, 1.0, 0.0\n", "1.0, 0.0, 0.0\n", "second axis"),
         ("inflate.inp.j2", "{{ material.density | number }}", "1100.0, 20.0", "data '20.0'"),
         ("inflate.inp.j2", ", NLGEOM=YES", "", "NLGEOM"),

@@ -230,3 +230,28 @@ def test_turned_up_carcass_holds_the_belt_from_the_side() -> None:
     plain, with_it = frequencies(), frequencies(carcass_turn_up=0.5)
     for label in (Label(0, 0, "axial"), Label(1, 1)):
         assert with_it[label] > 1.01 * plain[label]
+
+
+def test_turned_up_and_fanned_carcass_have_surface_elements_of_their_own() -> None:
+    deck = decks(CASE, carcass_turn_up=0.5, carcass_fanning=0.4)["inflate.inp"]
+    numbers = [
+        int(line.split(",")[0])
+        for block in deck.split("*ELEMENT, TYPE=")[1:]
+        for line in block.split("*")[0].splitlines()[1:]
+    ]
+    assert len(set(numbers)) == len(numbers)
+    sections = [line for line in deck.splitlines() if line.startswith("*SURFACE SECTION")]
+    sets = [line.split("ELSET=")[1] for line in sections]
+    assert sorted(sets) == ["BELT1", "BELT2", "BELT2_2", "BELT2_3", "PLY", "PLY_2"]
+    assert all(deck.count(f"ELSET={name}\n") == 2 for name in sets)  # its elements, its section
+
+
+def test_layer_ends_with_its_regions() -> None:
+    layer = CASE.case.rebar_layers["carcass"]
+    short = layer.model_copy(update={"regions": ["crown", "upper_sidewall"]})
+    layers = {**CASE.case.rebar_layers, "carcass": short}
+    long = Decks(CASE).texts("abaqus")["inflate.inp"]
+    found = edited(rebar_layers=layers)["inflate.inp"]
+    gone = set(long.splitlines()) - set(found.splitlines())
+    assert len(gone) == 2 * (3 + 1)  # the lower sidewall's and the bead's elements, both sides
+    assert set(found.splitlines()) < set(long.splitlines())

@@ -3,7 +3,7 @@
 from .load import LoadedCase, load_case, validate
 from .mistakes import CaseError, Mistake
 from .schema import Case
-from .variables import parse_assignment, start_values, with_values
+from .variables import number_at, parse_assignment, start_values, with_values
 
 __all__ = [
     "Case",
@@ -11,6 +11,7 @@ __all__ = [
     "LoadedCase",
     "Mistake",
     "load_case",
+    "number_at",
     "parse_assignment",
     "start_values",
     "validate",

@@ -141,6 +141,13 @@ class Point(Part):
     z: float
 
 
+def _values(part: Any) -> Mapping[str, Any]:
+    """The values of a part, checked or as in the file; none where it is wrong."""
+    if isinstance(part, Part):
+        return part.__dict__
+    return part if isinstance(part, Mapping) else {}
+
+
 class Spindle(Part):
     """Compliance of what holds the wheel, at the rim's reference point; 0 = clamped."""
 
@@ -176,14 +183,13 @@ class Rim(Part):
 
     @classmethod
     def problems(cls, values: Mapping[str, Any]) -> Iterator[Problem]:
-        spindle, point = values.get("spindle"), values.get("reference_point_m")
-        soft = isinstance(spindle, Mapping) and any(number(spindle, key) for key in spindle)
-        if soft and values.get("free") is True:
+        spindle, point = (_values(values.get(key)) for key in ("spindle", "reference_point_m"))
+        soft, free = any(number(spindle, key) for key in spindle), values.get("free") is True
+        if soft and free:
             yield "free", "must be false where the spindle has a compliance"
-        if (soft or values.get("free") is True) and isinstance(point, Mapping):
-            r = number(point, "r")
-            if r:
-                yield "reference_point_m", f"must have r = 0 where the rim moves, got {r:g}"
+        r = number(point, "r")
+        if (soft or free) and r:
+            yield "reference_point_m", f"must have r = 0 where the rim moves, got {r:g}"
 
 
 class Cavity(Part):
@@ -357,7 +363,8 @@ def _every_effect(given: dict[str, float]) -> dict[str, float]:
 class Case(Part):
     """One tyre, its mesh and analysis, what may vary and what was measured.
 
-    ``spin_rad_per_s``: the tyre turns about its axle, not touching a road. ``effects``: parameters of effects that are in it, by id, in the effect's unit.
+    ``spin_rad_per_s``: the tyre turns about its axle, not touching a road. ``effects``: parameters
+    of effects that are in it, by id, in the effect's unit.
     """
 
     format: Annotated[int, Field(ge=1, le=1)]  # Literal[1] would take true

@@ -78,6 +78,20 @@ def with_values(loaded: LoadedCase, values: Mapping[str, float]) -> LoadedCase:
     return changed
 
 
+def number_at(loaded: LoadedCase, path: str) -> float:
+    """The number at a dotted path of the case. Raises ValueError."""
+    try:
+        keys = find(loaded.case, path)
+    except KeyError as error:
+        raise ValueError(f"{path}: {error.args[0]}") from None
+    node: Any = loaded.case
+    for key in keys:
+        node = getattr(node, str(key)) if isinstance(node, BaseModel) else node[key]
+    if isinstance(node, bool) or not isinstance(node, int | float):
+        raise ValueError(f"{path} is not a number")
+    return node
+
+
 def _keys(loaded: LoadedCase, name: str) -> list[Keys]:
     """Where the variable or the dotted path ``name`` leads."""
     variables = loaded.case.variables

@@ -53,6 +53,9 @@ def beside_the_deck(case: LoadedCase) -> dict[str, Any]:
         request["own_frequency"] = True
     if "cavity" in asked:
         request["cavity"] = {"material": GAS, "surfaces": ["CAVITY", "WELL"]}
+    splice = with_effects(case).case.splice
+    if splice.share:
+        request["sector"] = {"job": "splice", "width_deg": splice.width_deg}
     return request
 
 

@@ -18,7 +18,7 @@ def uneven(c: Case) -> bool:
 
 def attached(c: Case, mesh: SectionMesh) -> list[dict[str, Any]]:
     """Mass and spring elements on nodes of the tread: name, keyword, elements, lines of data."""
-    groups = []
+    groups: list[tuple[str, str, list[int], tuple[int, float] | None]] = []
     number = ELEMENT
     if c.point_mass.mass_kg:
         groups.append(("POINT_MASS", "MASS", _nodes(mesh, c.point_mass.z_m, 0.0), None))

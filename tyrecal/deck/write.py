@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
-from ..case import LoadedCase, with_values
+from ..case import LoadedCase, number_at, with_values
 from ..effects import catalogue, with_effects
 from .beside import beside_the_deck
 from .calculix import calculix_context
@@ -66,7 +66,11 @@ class Decks:
             texts = [self._texts(case, dialect) for case, _ in (above, below)]
             if self.values[name] == 0:  # an effect: its keywords may be there on one side only
                 own = self.texts(dialect)
-                if any(_keywords(t[file]) != _keywords(own[file]) for t in texts for file in own):
+                if any(
+                    t.keys() != own.keys() or _keywords(t[file]) != _keywords(own[file])
+                    for t in texts
+                    for file in own
+                ):
                     raise TemplateFailed(
                         f"{name} is 0, where keywords of the deck come and go: it has no slope"
                         " there, give it another value"
@@ -82,11 +86,11 @@ class Decks:
         """The case a small step to one side of a variable, or at it where that side is none."""
         value = self.values[name]
         variable = self.case.case.variables.get(name)
-        effect = catalogue().get(name.removeprefix("effects."))
         span = 1.0
         if variable:
             span = max(abs(variable.lower), abs(variable.upper))
-        elif effect:
+        elif name.startswith("effects."):
+            effect = catalogue()[name.removeprefix("effects.")]
             span = max(abs(effect.low), abs(effect.high))
         moved = value + side * STEP * (abs(value) or span)
         try:
@@ -101,7 +105,24 @@ def _abaqus(case: LoadedCase, env: Any, request: Mapping[str, Any]) -> dict[str,
     names["modes"] = 2 * request["modes_per_harmonic"] * (request["highest_harmonic"] + 1)
     names["loads"] = request["loads_N"]
     jobs = ("inflate", "press" if names["loads"] else "modes")
-    return {f"{job}.inp": render(env, f"{job}.inp.j2", names) for job in jobs}
+    texts = {f"{job}.inp": render(env, f"{job}.inp.j2", names) for job in jobs}
+    if case.case.splice.share:
+        if names["loads"]:
+            raise TemplateFailed("splice: a tyre with a splice cannot be pressed on a road")
+        names = context(_spliced(case))
+        names["mesh_block"] = _mesh_block(env, names["mesh"])
+        texts["splice.inp"] = render(env, "inflate.inp.j2", names)
+    return texts
+
+
+def _spliced(case: LoadedCase) -> LoadedCase:
+    """The case as it is in its splice. Raises TemplateFailed."""
+    splice = case.case.splice
+    try:
+        values = {path: number_at(case, path) * (1 + splice.share) for path in splice.numbers}
+        return with_values(case, values)
+    except ValueError as error:
+        raise TemplateFailed(f"splice.numbers: {error}") from None
 
 
 def _calculix(case: LoadedCase, env: Any, request: Mapping[str, Any]) -> dict[str, str]:

@@ -41,7 +41,7 @@ def add(case: LoadedCase, value: float) -> LoadedCase:
             line=outside,
             regions=regions,
             area_m2=value * layer.area_m2,
-            angle_deg=-layer.angle_deg,
+            angle_deg=0.0 - layer.angle_deg,
         )
     return with_layers(case, layers)
 

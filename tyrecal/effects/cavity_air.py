@@ -20,10 +20,14 @@ EFFECT = Effect(
     unit="",
     low=0.0,
     high=1.5,
-    changes=("*ACOUSTIC MEDIUM (in the side file of the bundled solver)",),
-    signature="SIG",
+    changes=("*ACOUSTIC MEDIUM", "*DENSITY", "*DSLOAD"),
+    signature=(
+        "[1,0] down most, -2.3 % at s = 1.5, other [c,0] -1.0 to -1.5 %, [0,0] axial and "
+        "[c,1] -0.4 to -0.6 %, [0,0] torsional not at all; grows with the pressure; a re-fit "
+        "hides three quarters"
+    ),
     toggle="inflate with helium (a seventh of the mass) or sulphur hexafluoride (five times)",
-    aliases=("tread_density",),
+    aliases=("spindle_radial", "carcass_fanning"),
     add=add,
     needs="cavity",
 )

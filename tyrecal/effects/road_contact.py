@@ -24,7 +24,10 @@ EFFECT = Effect(
     low=0.0,
     high=3e5,
     changes=("*SPRING",),
-    signature="SIG",
+    signature=(
+        "the member of each doublet that is symmetric about the patch rises: [c,0] by 3 to 5 % at "
+        "0.3 MN/m, [c,1] by less than 1 %; the other one and both [0,0] stay"
+    ),
     toggle="lift the tyre off, or turn it between two measurements",
     aliases=("spindle_radial",),
     add=add,

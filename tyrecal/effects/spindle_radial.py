@@ -20,9 +20,12 @@ EFFECT = Effect(
     low=0.0,
     high=1e-07,
     changes=("*SPRING", "*MASS", "*ROTARY INERTIA", "*BOUNDARY"),
-    signature="SIG",
+    signature=(
+        "[1,0] down, -7 % at 1e-7 m/N and 240 kPa, the more the higher the pressure; [1,1] "
+        "hardly, no other mode; a re-fit hides two fifths"
+    ),
     toggle="press on the hub radially and read a dial gauge; or use a stiffer clamp",
-    aliases=("wheel_free",),
+    aliases=("cavity_air",),
     add=add,
     needs="spindle",
 )

@@ -20,9 +20,12 @@ EFFECT = Effect(
     low=0.0,
     high=2e-06,
     changes=("*SPRING", "*MASS", "*ROTARY INERTIA", "*BOUNDARY"),
-    signature="SIG",
+    signature=(
+        "[0,0] torsional down, -6 % at 2e-6 rad/(N m) and 240 kPa, the more the higher the "
+        "pressure; no other mode; a re-fit hides a quarter"
+    ),
     toggle="turn the locked hub with a torque wrench and read a dial gauge; or lock it elsewhere",
-    aliases=(),
+    aliases=("belt_width", "cap_ply", "temperature", "frequency_stiffening"),
     add=add,
     needs="spindle",
 )

@@ -31,7 +31,10 @@ EFFECT = Effect(
     low=0.0,
     high=1.0,
     changes=("the section of the sector, beside the deck",),
-    signature="SIG",
+    signature=(
+        "all up by 0.2 to 0.4 % at e = 1, doublets split by 0.2 to 0.4 %, [c,1] most; C10 takes up "
+        "the means, the splits remain"
+    ),
     toggle="find the sector by hand or X-ray; exciting at it and beside it shows each member alone",
     aliases=("point_mass",),
     add=add,

@@ -38,9 +38,12 @@ EFFECT = Effect(
     low=0.0,
     high=0.1,
     changes=("*BOUNDARY", "*MASS", "*ROTARY INERTIA"),
-    signature="SIG",
+    signature=(
+        "[0,0] axial +37 %, [0,0] torsional +114 %, [1,1] +105 %, [1,0] +33 % with a wheel of "
+        "10 kg, at any pressure alike; all of c >= 2 stay to the last digit"
+    ),
     toggle="bolt the hub to a heavy block, or hang the wheel in soft cords: the other support",
-    aliases=("spindle_lateral", "spindle_radial"),
+    aliases=("bead_filler",),
     add=add,
     needs="spindle",
 )

@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 from ..case import LoadedCase, with_values
 from ..deck.beside import needs
 from ..deck.write import Decks
-from ..effects import catalogue
+from ..effects import catalogue, with_effects
 from . import folders
 from .failure import DeckRefused, EvaluationFailed
 from .pool import process_pool
@@ -78,8 +78,9 @@ class Door:
 
     @property
     def has_gradients(self) -> bool:
-        """Whether the solver gives exact slopes."""
-        return "gradients" in self.solver.capabilities
+        """Whether the solver gives exact slopes: of a tyre with a splice none does."""
+        plain = not with_effects(self.case).case.splice.share
+        return plain and "gradients" in self.solver.capabilities
 
     def evaluate(self, question: Question) -> Evaluation:
         """Modes of one design, the same from the record as from a run.

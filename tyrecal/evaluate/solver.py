@@ -14,7 +14,8 @@ class Solver(Protocol):
 
     version: of the program that runs, "unknown" where it is not found; part of every record's key.
     dialect: the template folder of its decks; capabilities: of ``modes``,
-    ``gradients``, ``footprint``, and of what effects need (`tyrecal.deck.write.Decks.needs`);
+    ``gradients``, ``footprint``, and what effects need (`Effect.needs`): ``vibration_modulus``,
+    a modulus in the frequency step other than in the static one, and those of `deck.beside.WORDS`;
     refusals, failures: exceptions of `write`, `run` and `read` for a deck it cannot honour and
     for no solution; a failure's attribute ``cause``, where it has one, is `EvaluationFailed`'s.
     """

@@ -49,7 +49,9 @@ def fit_table(fit: Mapping[str, Any]) -> Table:
 def modes_table(modes: Mapping[str, Any]) -> Table:
     """The content of modes.json: one row a mode, in its order."""
     entries = modes["modes"]
-    extra = [key for key in ("symmetry", "member", "clarity") if any(key in mode for mode in entries)]
+    extra = [
+        key for key in ("symmetry", "member", "clarity") if any(key in mode for mode in entries)
+    ]
     table = _table(("mode", "motion", "Hz", *extra))
     load = f", {modes['load_N']:g} N" if modes["load_N"] else ""
     table.title = f"{modes['pressure_kPa']:g} kPa{load}, {modes['mass_kg']:.2f} kg"

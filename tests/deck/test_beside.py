@@ -1,0 +1,221 @@
+"""Decks of a rim that moves, of gas in the cavity, of rubber that follows the frequency: through
+the door; what is not honoured is refused by line."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tyrecal_solvers.bundled.job import run
+from tyrecal_solvers.bundled.keywords import DeckError
+
+from tyrecal.case import CaseError, LoadedCase, load_case, with_values
+from tyrecal.deck.write import Decks
+from tyrecal.effects import with_effects
+from tyrecal.evaluate.door import Door, Question
+from tyrecal.evaluate.failure import DeckRefused
+from tyrecal.evaluate.solver import find_solver
+
+from ..effects.support import CASE, START, decks, frequencies
+
+SOFT = {
+    "rim.spindle.lateral_m_per_N": 1e-7,
+    "rim.spindle.radial_m_per_N": 5e-8,
+    "rim.spindle.torsional_rad_per_N_m": 1e-6,
+    "rim.spindle.tilt_rad_per_N_m": 2e-6,
+}
+RIM = {
+    "rim.mass_kg": 15.0,
+    "rim.polar_inertia_kg_m2": 0.43,
+    "rim.diametral_inertia_kg_m2": 0.27,
+}
+
+
+def gradient(values: dict[str, float], name: str, step: float = 1e-3) -> tuple[np.ndarray, ...]:
+    """Exact d Hz / d ln of a number, and its central difference."""
+    door, at = Door(CASE), values[name]
+    exact = np.array(door.evaluate(Question(values, (name,))).gradients[name]) * at
+
+    def hertz(by: float) -> np.ndarray:
+        modes = door.evaluate(Question({**values, name: at * (1 + by)})).modes
+        return np.array([m.frequency_Hz for m in modes])
+
+    return exact, (hertz(step) - hertz(-step)) / (2 * step)
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        *SOFT,
+        *RIM,
+        "pressure_kPa",
+        "C10",
+        "effects.rim_width",  # moves the nodes that the rim carries
+    ],
+)
+def test_slopes_with_a_rim_on_springs(name: str) -> None:
+    values = {**START, **SOFT, "pressure_kPa": 160.0, "effects.rim_width": 0.004}
+    exact, central = gradient({name: RIM.get(name, 0.0), **values}, name)
+    assert abs(central).max() > 1e-3
+    np.testing.assert_allclose(exact, central, rtol=1e-5, atol=1e-5 * abs(central).max())
+
+
+@pytest.mark.parametrize("name", ["cavity.share", "cavity.temperature_C", "pressure_kPa", "C10"])
+def test_slopes_with_air(name: str) -> None:
+    """The gas follows the case's pressure and temperature; the wheel moves as well."""
+    air = {"cavity.share": 1.0, "cavity.temperature_C": 25.0}
+    values = {**START, **SOFT, **air, "pressure_kPa": 160.0}
+    exact, central = gradient(values, name)
+    assert abs(central).max() > 1e-3
+    np.testing.assert_allclose(exact, central, rtol=1e-5, atol=1e-5 * abs(central).max())
+
+
+def test_a_free_wheel_shows_no_rigid_motions() -> None:
+    """The deck asks for modes from 1 Hz on, about a shift below zero: as many as of a fixed one."""
+    free = frequencies(wheel_free=1 / 15)
+    assert set(free) == set(frequencies())
+    assert min(free.values()) > 30.0
+    text = decks(CASE, wheel_free=1 / 15)["modes.inp"]
+    assert re.search(r"\n20, 1, , -100\n\*BOUNDARY, OP=NEW\n\*FILE FORMAT", text)
+
+
+def test_a_heavy_free_wheel_stands_still() -> None:
+    plain, heavy = frequencies(), frequencies(wheel_free=1e-7)
+    for label, f in plain.items():
+        assert heavy[label] == pytest.approx(f, rel=1e-5)
+
+
+def test_n_2_and_more_do_not_know_the_wheel() -> None:
+    plain, soft = frequencies(), frequencies(with_values(CASE, SOFT))
+    for label, f in plain.items():
+        if label.c >= 2:
+            assert soft[label] == pytest.approx(f, rel=1e-9)
+        else:
+            assert soft[label] < 0.999 * f
+
+
+def test_other_gases() -> None:
+    """Helium is lighter, SF6 heavier, in proportion to 1/R; a pressure rise counts as absolute."""
+    text = {}
+    for gas in ("air", "helium", "sulphur_hexafluoride"):
+        cavity = CASE.case.cavity.model_copy(update={"gas": gas, "share": 1.0})
+        case = CASE.case.model_copy(update={"cavity": cavity})
+        block = Decks(LoadedCase(**{**CASE.__dict__, "case": case})).texts("abaqus")["inflate.inp"]
+        numbers = re.search(r"MEDIUM, BULK MODULUS\n(\S+)\n\*DENSITY\n(\S+)", block)
+        text[gas] = [float(x) for x in numbers.groups()]
+    bulk, density = text["air"]
+    p = 160e3 + 101325
+    assert bulk == pytest.approx(1.4 * p) and density == pytest.approx(p / 287.05 / 293.15)
+    assert np.sqrt(bulk / density) == pytest.approx(343.2, abs=0.1)
+    assert text["helium"][1] == pytest.approx(density * 4.003 / 28.97, rel=1e-3)
+    assert text["sulphur_hexafluoride"][1] == pytest.approx(density * 146.05 / 28.97, rel=2e-3)
+    assert np.sqrt(np.divide(*text["sulphur_hexafluoride"])) == pytest.approx(135, abs=1.5)
+
+
+def test_prony_level_and_exponent_make_one_table() -> None:
+    """With a vibration frequency the table's level is the Prony series' there; the inflated state
+    is that of the series' relaxed modulus, whatever the constants are given as."""
+    values = {"analysis.vibration_frequency_Hz": 100.0}
+    both = with_values(CASE, {**values, "materials.rubber.frequency_exponent": 1e-9})
+    assert frequencies(both) == pytest.approx(frequencies(with_values(CASE, values)), rel=1e-7)
+    assert "PRONY" not in Decks(both).texts("abaqus")["inflate.inp"]
+
+
+@pytest.mark.parametrize(
+    ("values", "solver", "words"),
+    [
+        ({"cavity.share": 1.0}, "abaqus", "cannot express the gas in the cavity"),
+        ({"materials.rubber.frequency_exponent": 0.1}, "abaqus", "each mode's frequency"),
+        (SOFT, "calculix", "cannot express a rim that moves"),
+    ],
+)
+def test_solvers_that_cannot(values: dict[str, float], solver: str, words: str) -> None:
+    with pytest.raises(DeckRefused, match=words):
+        Door(with_values(CASE, values), solver).evaluate(Question({}))
+
+
+def test_abaqus_has_keywords_for_a_rim_that_moves() -> None:
+    assert "spindle" in find_solver("abaqus").capabilities
+
+
+def run_deck(folder: Path, *edits: tuple[str, str]) -> None:
+    texts = Decks(with_effects(with_values(CASE, SOFT))).texts("abaqus")
+    for name, text in texts.items():
+        for old, new in edits:
+            text = text.replace(old, new)
+        (folder / name).write_text(text)
+    assert any(new in (folder / name).read_text() for name in texts for _, new in edits)
+    run(folder, "modes", "inflate")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("*BOUNDARY, OP=NEW\n", "*BOUNDARY, OP=NEW\n900001, 1, 1\n", r"1 and 3, .* free together"),
+        ("SPINDLE_RADIAL_1\n1\n", "SPINDLE_RADIAL_1\n3\n", "must be alike"),
+        ("999000001, 900001", "999000001, 1001", "not honoured together"),
+        ("*MASS, ELSET=WHEEL_MASS", "*MASS, ELSET=WHEEL", "no set of MASS elements"),
+        ("0.27, 0.43, 0.27", "0.27, 0.43, 0.26", "body of revolution"),
+        ("*MASS, ELSET=WHEEL_MASS\n15", "*MASS, ELSET=WHEEL_MASS\n-15", "not negative"),
+        ("900001, 0, 0\n", "900001, 0.01, 0\n", "stands on the axle"),
+        ("WELL, SPOS", "WELL, SNEG", "SPOS"),
+        ("*MASS, ELSET", "*MASS, ALPHA=1.0, ELSET", "ALPHA of \\*MASS is not honoured"),
+    ],
+)
+def test_decks_that_are_refused(tmp_path: Path, old: str, new: str, words: str) -> None:
+    with pytest.raises(DeckError, match=words):
+        run_deck(tmp_path, (old, new))
+
+
+@pytest.mark.parametrize(
+    ("cavity", "words"),
+    [
+        ('{"material": "RUBBER", "surfaces": ["CAVITY"]}', "no \\*ACOUSTIC MEDIUM"),
+        ('{"material": "CAVITY_GAS", "surfaces": ["HOLE"]}', "HOLE"),
+        ('{"material": "CAVITY_GAS", "surfaces": []}', "got none"),
+    ],
+)
+def test_cavities_that_are_refused(tmp_path: Path, cavity: str, words: str) -> None:
+    (tmp_path / "modes.request.json").write_text(f'{{"cavity": {cavity}}}')
+    for name, text in Decks(with_values(CASE, {"cavity.share": 1.0})).texts("abaqus").items():
+        (tmp_path / name).write_text(text)
+    with pytest.raises(DeckError, match=words):
+        run(tmp_path, "modes", "inflate")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("z: 0.0}", "z: 0.0}\n  free: true\n  spindle: {tilt_rad_per_N_m: 1e-6}", "must be false"),
+        ("{r: 0.0", "{r: 0.1", "must have r = 0"),
+        ("z: 0.0}", "z: 0.0}\n  spindle: {lateral_m_per_N: -1e-6}", "must be at least 0"),
+        ("z: 0.0}", "z: 0.0}\n  spindle: {lateral: 1e-6}", "lateral_m_per_N"),
+        ("rim:", "cavity: {gas: argon}\nrim:", "must be"),
+        ("density_kg_per_m3: 1100.0", "density_kg_per_m3: 1e3\n    frequency_exponent: 2", "0.5"),
+    ],
+)
+def test_case_files_that_are_wrong(case_folder: Path, old: str, new: str, words: str) -> None:
+    path = case_folder / "p235_75r17.yaml"
+    text = path.read_text().replace(old, new, 1)
+    if "r: 0.1" in text:
+        text = text.replace("z: 0.0}", "z: 0.0}\n  free: true")
+    path.write_text(text)
+    with pytest.raises(CaseError, match=words):
+        load_case(path)
+
+
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        ({"effects.wheel_free": 0.05, "effects.spindle_tilt": 1e-6}, "a free wheel has no spindle"),
+        ({"effects.spindle_radial": -1e-9}, "must be at least 0"),
+        ({"effects.wheel_free": -0.01}, "must be at least 0"),
+        ({"effects.cavity_air": -0.1}, "cavity_air"),
+        ({"effects.frequency_stiffening": 0.6}, "frequency_stiffening"),
+    ],
+)
+def test_effects_that_cannot_be(values: dict[str, float], words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        with_values(CASE, values)

@@ -1,0 +1,43 @@
+"""A wider rim against the same tyre whose beads are really pushed apart by the solver."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from tyrecal_solvers.bundled import inflation
+
+from tyrecal.case import LoadedCase, with_values
+from tyrecal.deck.context import section_mesh
+from tyrecal.deck.write import Decks
+
+from ..bundled import support
+from .support import CASE
+
+Array = np.ndarray
+
+
+def frequencies(case: LoadedCase, start: dict[int, tuple[float, float]] | None = None) -> Array:
+    """Hz, two modes a harmonic; start: (r, z) displacements, which held nodes keep."""
+    model = support.model_of(Decks(case).texts("abaqus")["inflate.inp"])
+    row, mesh = model.mesh.index, section_mesh(case)
+    loose = [row[n] for n in row if n not in mesh.nodes]
+    held = support.held(model, [row[n] for n in mesh.rim] + loose)
+    loads = support.cavity(model, case.case.pressure_kPa * 1e3)
+    U = np.zeros((len(row), 3))
+    for node, (r, z) in (start or {}).items():
+        U[row[node], [0, 2]] = r, z
+    numbering = support.numbering(model, held)
+    U = inflation.equilibrium(model, numbering, loads, U).U
+    values = [support.eigenvalues(model, U, loads, held, n, 2) for n in range(5)]
+    return support.hertz(np.concatenate(values))
+
+
+@pytest.mark.parametrize("value", [0.0127, -0.0127])
+def test_bent_section_is_the_mounted_one_but_for_small_stresses(value: float) -> None:
+    wide = with_values(CASE, {"effects.rim_width": value})
+    before, after = section_mesh(CASE).nodes, section_mesh(wide).nodes
+    start = {n: (after[n][0] - r, after[n][1] - z) for n, (r, z) in before.items()}
+    plain = frequencies(CASE)
+    mounted, bent = frequencies(CASE, start) / plain - 1, frequencies(wide) / plain - 1
+    assert abs(mounted).max() > 0.05
+    assert bent == pytest.approx(mounted, abs=2e-3)
