@@ -273,6 +273,44 @@ _edit(
     "[rebar_layers.belt_1.area_m2]",
 )
 _edit("sets_empty", "variables.C10.sets", "at least 1", "[materials.rubber.C10_Pa]", "[]")
+# uncertainties
+_edit("no_size", "uncertainties.pressure.percent", "or absolute", "absolute: 1.0}", "}")
+_edit(
+    "two_sizes",
+    "uncertainties.pressure.absolute",
+    "absent with percent",
+    "[pressure_kPa], absolute: 1.0}",
+    "[pressure_kPa], absolute: 1.0, percent: 1.0}",
+)
+_edit(
+    "uncertain_nothing",
+    "uncertainties.pressure.sets.0",
+    "did you mean 'pressure_kPa'",
+    "sets: [pressure_kPa]",
+    "sets: [pressure]",
+)
+_edit(
+    "uncertain_text",
+    "uncertainties.pressure.sets.0",
+    "no number",
+    "sets: [pressure_kPa]",
+    "sets: [name]",
+)
+_edit(
+    "uncertain_effect",
+    "uncertainties.rim_width.sets.0",
+    "not one of the effects",
+    "sets: [effects.rim_width]",
+    "sets: [effects.rim_widht]",
+)
+_edit(
+    "too_few_signs",
+    "uncertainties.pressure.signs",
+    "must have 1 entries",
+    "[pressure_kPa], absolute: 1.0}",
+    "[pressure_kPa], absolute: 1.0, signs: [1, -1]}",
+)
+
 # targets
 _edit("unknown_label", "targets.modes.0.kind", "'torsional'", AXIAL, AXIAL.replace("axial", "axle"))
 _edit(
@@ -293,16 +331,18 @@ _edit("same_target", "targets.modes.3", "already", "{c: 1, m: 0,", "{c: 1, m: 1,
 _edit("high_target", "targets.modes.8.c", "highest_harmonic", "{c: 4, m: 0,", "{c: 5, m: 0,")
 _edit("zero_frequency", "targets.modes.0.frequency_Hz", "greater than 0", "31.7", "0")
 _edit("negative_weight", "targets.modes.0.weight", "at least 0", "31.7}", "31.7, weight: -1}")
-FOOTPRINT = "  footprint:\n    - {load_N: 4000, contact_area_m2: 0.0158, sigma_m2: 0.0003}\nsolver:"
+FOOTPRINT = """  footprint:
+    - {load_N: 4000, contact_area_m2: 0.0158, sigma_m2: 0.0003}
+uncertainties:"""
 
 
 def _footprint(name: str, key: str, words: str, *edits: str) -> None:
-    """Edits of a good footprint target, which stands before ``solver``."""
+    """Edits of a good footprint target, which stands before ``uncertainties``."""
     text = FOOTPRINT
     for old, new in zip(edits[::2], edits[1::2], strict=True):
         assert old in text, old
         text = text.replace(old, new, 1)
-    _edit(name, f"targets.footprint{key}", words, "\nsolver:", f"\n{text}")
+    _edit(name, f"targets.footprint{key}", words, "\nuncertainties:", f"\n{text}")
 
 
 AREA, SIGMA = "contact_area_m2: 0.0158", ", sigma_m2: 0.0003"
@@ -323,8 +363,8 @@ _footprint(
     "same_footprint",
     ".1",
     "contact_area_m2 at 4000 N is a target already",
-    "\nsolver:",
-    "\n    - {load_N: 4000.0, contact_area_m2: 0.016, sigma_m2: 0.001}\nsolver:",
+    "\nuncertainties:",
+    "\n    - {load_N: 4000.0, contact_area_m2: 0.016, sigma_m2: 0.001}\nuncertainties:",
 )
 _footprint("footprint_table", "", "must be a list", "    - {load_N", "    {load_N")
 _edit("zero_sigma", "targets.modes.0.sigma_Hz", "greater than 0", "31.7}", "31.7, sigma_Hz: 0}")
@@ -339,7 +379,7 @@ _edit("list_key", "", "plain word", PRESSURE, f"{PRESSURE}\n? [a]\n: 4")
 _edit("tabs", "", "spaces, not tabs", "  stations:", "\tstations:")
 _edit("open_bracket", "", "not YAML", "prony: [{g", "prony: [[{g")
 _edit("control_character", "", "not YAML", "bundled", "bund\x01led")
-_edit("two_documents", "", "not YAML", "solver:", "---\nsolver:")
+_edit("two_documents", "", "not YAML", "solver:", "---\nuncertainties:")
 LAUGHS = [f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 9)}]" for i in range(1, 12)]
 _content("alias_bomb", "", "alias", "\n".join(["a0: &a0 [x]", *LAUGHS]))
 _content("deep_nest", "", "deep", "a: " + "[" * 5000)

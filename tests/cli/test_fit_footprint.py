@@ -23,7 +23,7 @@ from .test_cli import run
 FOOTPRINT = f"""  footprint:
     - {{load_N: 4000, contact_area_m2: {1.05 * AREA_0!r}, sigma_m2: {0.02 * AREA_0!r}}}
     - {{load_N: 3500, vertical_stiffness_N_per_m: {0.9 * STIFFNESS_0!r}, sigma_N_per_m: 5.0e+3}}
-solver:"""
+uncertainties:"""
 
 
 @pytest.fixture
@@ -37,7 +37,7 @@ def elastic(monkeypatch: pytest.MonkeyPatch) -> type[Elastic]:
 def case(case_folder: Path) -> str:
     """The main case with two footprint targets, and a sigma for one mode."""
     path = case_folder / "p235_75r17.yaml"
-    text = path.read_text().replace("\nsolver:", f"\n{FOOTPRINT}", 1)
+    text = path.read_text().replace("\nuncertainties:", f"\n{FOOTPRINT}", 1)
     path.write_text(text.replace("31.7}", "31.7, sigma_Hz: 0.5}", 1))
     return str(path)
 
@@ -127,7 +127,7 @@ def test_jobs_change_no_bit(tmp_path: Path) -> None:
         "crown: 4, upper_sidewall: 3, lower_sidewall: 3",
         "crown: 3, upper_sidewall: 2, lower_sidewall: 2",
     )
-    path.write_text(text.replace("\nsolver:", f"\n{FOOTPRINT.replace('3500', '1000')}", 1))
+    path.write_text(text.replace("\nuncertainties:", f"\n{FOOTPRINT.replace('3500', '1000')}", 1))
     path.write_text(path.read_text().replace("load_N: 4000", "load_N: 1000"))
     case = load_case(path)
     held = {"A_belt": 2.118683e-7, "A_carcass": 4.208352e-7}

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from ..tyre.section import Section
 
 # what a variable cannot set: a fit that moved its own bounds or targets would mean nothing
-FIXED = ("format", "variables", "targets", "solver")
+FIXED = ("format", "variables", "targets", "uncertainties", "solver")
 
 
 def problems(data: Mapping[str, Any], section: Section | None) -> Problems:
@@ -31,6 +31,7 @@ def problems(data: Mapping[str, Any], section: Section | None) -> Problems:
     yield from _names(data)
     yield from _targets(data)
     yield from _variables(data)
+    yield from _uncertainties(data)
     chosen = table(data, "mesh").get("level")
     known = table(data, "mesh").get("levels")
     if isinstance(chosen, str) and isinstance(known, dict) and chosen not in known:
@@ -132,6 +133,27 @@ def _variables(data: Mapping[str, Any]) -> Problems:
                     limit = number(variable, bound)
                     if limit is not None and (message := _refusal(data, parent, keys, limit)):
                         yield ("variables", name, bound), f"{path} {message}"
+
+
+def _uncertainties(data: Mapping[str, Any]) -> Problems:
+    """Sources of error name numbers that exist."""
+    for name, source in table(data, "uncertainties").items():
+        for i, path in enumerate(entries(source, "sets")):
+            here: Keys = ("uncertainties", name, "sets", i)
+            if not isinstance(path, str):
+                continue
+            if path.startswith("effects."):
+                if (id := path.removeprefix("effects.")) not in IDS:
+                    yield here, f"'{id}' is not one of the effects{suggestion(id, IDS)}"
+                continue
+            try:
+                keys = find(data, path)
+            except KeyError as error:
+                yield here, str(error.args[0])
+                continue
+            value = at(data, keys) if keys else WRONG
+            if keys and (keys[0] in FIXED or (value is not WRONG and not _is_number(value))):
+                yield here, "leads to no number of the tyre"
 
 
 def _refusal(data: Mapping[str, Any], parent: Keys, keys: Keys, value: float) -> str | None:
