@@ -165,6 +165,17 @@ def test_friction_is_within_coulombs_cone(pressed: dict[str, Any]) -> None:
     assert traction.max() > 0.05 * f["pressure_Pa"].max()
 
 
+def test_with_friction_the_way_hardly_matters(tmp_path: Path, pressed: dict[str, Any]) -> None:
+    """A load at once, in two steps or in six: nodes rub from where the road met them on."""
+    direct = run(tmp_path, (2000.0,))["footprints"][-1]
+    steps = run(tmp_path, (300.0, 700.0, 1000.0, 1300.0, 1700.0, 2000.0))["footprints"][-1]
+    for found in (direct, pressed["footprints"][-1]):
+        assert found["deflection_m"] == pytest.approx(steps["deflection_m"], rel=1e-2)
+        assert found["contact_area_m2"] == pytest.approx(steps["contact_area_m2"], rel=3e-2)
+    rubbing, after = (np.linalg.norm(f["traction_Pa"], axis=1).max() for f in (direct, steps))
+    assert rubbing == pytest.approx(after, rel=0.3)
+
+
 def test_without_friction_the_way_does_not_matter(tmp_path: Path) -> None:
     """A load at once or after a smaller one: the same state to one part in 1e5 (the linear
     equations of the stiffness are solved to 1e-3); the loads' slope is the tangent stiffness."""
