@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from ..tyre.section import Section
 
 # what a variable cannot set: a fit that moved its own bounds or targets would mean nothing
-FIXED = ("format", "variables", "targets", "solver")
+FIXED = ("format", "variables", "targets", "uncertainties", "solver")
 
 
 def problems(data: Mapping[str, Any], section: Section | None) -> Problems:
@@ -31,6 +31,7 @@ def problems(data: Mapping[str, Any], section: Section | None) -> Problems:
     yield from _names(data)
     yield from _targets(data)
     yield from _variables(data)
+    yield from _uncertainties(data)
     chosen = table(data, "mesh").get("level")
     known = table(data, "mesh").get("levels")
     if isinstance(chosen, str) and isinstance(known, dict) and chosen not in known:
@@ -132,6 +133,26 @@ def _variables(data: Mapping[str, Any]) -> Problems:
                     limit = number(variable, bound)
                     if limit is not None and (message := _refusal(data, parent, keys, limit)):
                         yield ("variables", name, bound), f"{path} {message}"
+
+
+def _uncertainties(data: Mapping[str, Any]) -> Problems:
+    """Sources of error name numbers that exist and that no design variable sets."""
+    variables = table(data, "variables").values()
+    calibrated = {path for variable in variables for path in entries(variable, "sets")}
+    for name, source in table(data, "uncertainties").items():
+        for i, path in enumerate(entries(source, "sets")):
+            here: Keys = ("uncertainties", name, "sets", i)
+            if not isinstance(path, str) or path.startswith("effects."):
+                continue
+            try:
+                keys = find(data, path)
+            except KeyError as error:
+                yield here, str(error.args[0])
+                continue
+            if path in calibrated:
+                yield here, "is set by a design variable, whose uncertainty the fit finds"
+            elif keys and (keys[0] in FIXED or not _is_number(at(data, keys))):
+                yield here, "leads to no number of the tyre"
 
 
 def _refusal(data: Mapping[str, Any], parent: Keys, keys: Keys, value: float) -> str | None:

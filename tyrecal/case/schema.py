@@ -357,6 +357,30 @@ class Targets(Part):
     footprint: list[TargetFootprint] = Field(default_factory=list)
 
 
+class Uncertainty(Part):
+    """A source of error: numbers nobody calibrates, all off together by a standard deviation.
+
+    ``percent`` of each number or ``absolute``, in its unit; ``signs``: -1 for those that fall
+    where the others rise.
+    """
+
+    sets: Annotated[list[Text], Field(min_length=1)]
+    percent: Positive | None = None
+    absolute: Positive | None = None
+    signs: list[Annotated[int, Field(ge=-1, le=1)]] | None = None
+
+    @classmethod
+    def problems(cls, values: Mapping[str, Any]) -> Iterator[Problem]:
+        percent, absolute = values.get("percent"), values.get("absolute")
+        if percent is None and absolute is None:
+            yield "percent", "must be given, or absolute"
+        elif percent is not None and absolute is not None:
+            yield "absolute", "must be absent with percent"
+        sets, signs = values.get("sets"), values.get("signs")
+        if isinstance(sets, list) and isinstance(signs, list) and len(signs) != len(sets):
+            yield "signs", f"must have {len(sets)} entries, one for each of sets"
+
+
 class Solver(Part):
     """Which solver runs, how long one run (of footprints: a load) may take, its own options."""
 
@@ -401,6 +425,7 @@ class Case(Part):
     )
     variables: dict[Name, Variable] = Field(default_factory=dict)
     targets: Targets = Targets()
+    uncertainties: dict[Name, Uncertainty] = Field(default_factory=dict)
     solver: Solver
     templates: Text | None = None
 

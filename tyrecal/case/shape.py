@@ -10,7 +10,17 @@ from pydantic import BaseModel, ValidationError
 
 from .mistakes import Keys, suggestion
 from .parts import WRONG
-from .schema import Case, Cord, RebarLayer, Road, Rubber, TargetFootprint, TargetMode, Variable
+from .schema import (
+    Case,
+    Cord,
+    RebarLayer,
+    Road,
+    Rubber,
+    TargetFootprint,
+    TargetMode,
+    Uncertainty,
+    Variable,
+)
 
 UNIONS = (Union, UnionType)
 KINDS: dict[str, type[BaseModel]] = {"rubber": Rubber, "cord": Cord}
@@ -102,6 +112,9 @@ def disagreements(data: Mapping[str, Any]) -> Iterator[tuple[Keys, str]]:
             parts.append((("materials", name), part, Rubber))
     parts += [(("rebar_layers", k), v, RebarLayer) for k, v in table(data, "rebar_layers").items()]
     parts += [(("variables", k), v, Variable) for k, v in table(data, "variables").items()]
+    parts += [
+        (("uncertainties", k), v, Uncertainty) for k, v in table(data, "uncertainties").items()
+    ]
     for key, kind in (("modes", TargetMode), ("footprint", TargetFootprint)):
         for i, target in enumerate(entries(table(data, "targets"), key)):
             parts.append((("targets", key, i), target, kind))

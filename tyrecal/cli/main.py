@@ -22,6 +22,7 @@ COMMANDS = {  # name: one line of help, so that the overview imports no command
     "sweep-pressure": "Follow every mode over the inflation pressure.",
     "footprint": "Press the tyre on a road: contact area and pressure over load.",
     "effects": "List and explain what a plain model leaves out, and what it does.",
+    "diagnose": "Say where model and measurements part, and which effect explains it.",
     "solvers": "List the installed solvers and what they can do.",
     "store": "Look at a record of evaluations, check it, prune it.",
 }
@@ -94,6 +95,8 @@ def _exit_code(error: Exception) -> int | None:
         ("tyrecal.evaluate.solver", "UnknownSolver", EXIT_INPUT),
         ("tyrecal.deck.environment", "TemplateFailed", EXIT_INPUT),
         ("tyrecal.fit.calibrate", "NothingToFit", EXIT_INPUT),
+        ("tyrecal.diagnose.measurements", "BadMeasurements", EXIT_INPUT),
+        ("tyrecal.diagnose.study", "BadChange", EXIT_INPUT),
         ("tyrecal.cli.output", "OutputRefused", EXIT_INPUT),
         ("tyrecal.cli.lock", "Locked", EXIT_INPUT),
         ("tyrecal.case", "CaseError", EXIT_INPUT),

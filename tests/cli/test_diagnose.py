@@ -1,0 +1,110 @@
+"""tyrecal diagnose: files, words, exit codes, a case with an effect added."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from tyrecal.case import load_case, start_values
+from tyrecal.evaluate.door import Door, Question
+from tyrecal.modes.label import paired_labels
+from tyrecal.modes.mode import Label
+
+from ..solvers.test_abaqus import COARSE
+from .test_cli import run
+
+HEADER = "quantity,c,m,kind,member,pressure_kPa,load_N,value,sigma"
+EFFECTS = ["--effect", "bead_filler", "--effect", "pressure_offset"]
+FILES = ("diagnosis.json", "diagnosis.md")
+PICTURES = ("residuals", "probabilities", "held_out", "section")
+
+
+@pytest.fixture
+def coarse(case_folder: Path) -> Path:
+    """The main case with a coarse mesh."""
+    path = case_folder / "p235_75r17.yaml"
+    text = path.read_text().replace("\n    default:\n", COARSE)
+    path.write_text(text.replace("level: default", "level: coarse"))
+    return path
+
+
+def measured(case: Path, path: Path, **effects: float) -> Path:
+    """The case's own frequencies with effects, at two pressures, to three digits."""
+    loaded = load_case(case)
+    lines = [HEADER]
+    for p in (180.0, 240.0):
+        values = {**start_values(loaded), "pressure_kPa": p}
+        values |= {f"effects.{id}": e for id, e in effects.items()}
+        for mode in paired_labels(Door(loaded).evaluate(Question(values)).modes):
+            label = mode.label
+            if label.m < 2 and (label.c or label.kind) and label != Label(4, 1):
+                f = mode.frequency_Hz
+                lines.append(f"frequency_Hz,{label.c},{label.m},{label.kind or ''},,{p:g},0,"
+                             f"{f:.3f},{0.001 * f:.3f}")  # fmt: skip
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def test_a_diagnosis_in_files_and_again_from_the_record(
+    coarse: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file, out = measured(coarse, tmp_path / "m.csv", bead_filler=2.0), tmp_path / "out"
+    command = ["diagnose", str(coarse), "--measured", str(file), *EFFECTS, "--output", str(out)]
+    assert run(*command, "--json") == 0
+    printed = capsys.readouterr()
+    told = json.loads(printed.out)
+    assert told == json.loads((out / "diagnosis.json").read_text())
+    assert told["verdict"] == "named" and told["effect"] == "bead_filler"
+    assert told["parameter"]["low"] < 2.0 < told["parameter"]["high"]
+    assert "cannot show a cause" in printed.err or told["rung"] == 4
+    for name in PICTURES:
+        assert (out / f"diagnosis_{name}.png").stat().st_size > 3000
+    before = {name: (out / name).read_bytes() for name in FILES}
+    assert run(*command, "--quiet", "--no-pictures", "--jobs", "2") == 0
+    assert capsys.readouterr().out == ""
+    assert {name: (out / name).read_bytes() for name in FILES} == before
+    assert json.loads((out / "run.json").read_text())["solver_runs"] == 0
+
+
+def test_an_added_effect_makes_a_case(
+    coarse: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run("diagnose", str(coarse), "--add", "bead_filler=1.5") == 0
+    new = coarse.with_name(f"{coarse.stem}_bead_filler.yaml")
+    assert load_case(new).case.effects["bead_filler"] == 1.5
+    assert run("validate", str(new)) == 0
+    assert run("diagnose", str(coarse), "--add", "bead_filler=1.5") == 2
+    assert "exists already" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ([], "--measured FILE must be given"),
+        (["--measured", "none.csv"], "none.csv"),
+        (["--measured", "M", "--effect", "magic"], "no such effect"),
+        (["--measured", "M", "--toggled", "M", "magic=0"], "what was switched"),
+        (["--measured", "M", "--solver", "calculix"], "no exact slopes"),
+        (["--measured", "BAD"], "line 2"),
+        (["--add", "magic=1"], "magic"),
+        (["--add", "bead_filler"], "NAME=VALUE"),
+        (["--add", "bead_filler=-5"], "bead_filler"),
+    ],
+)
+def test_wrong_input(
+    coarse: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    options: list[str],
+    words: str,
+) -> None:
+    good, bad = tmp_path / "m.csv", tmp_path / "bad.csv"
+    good.write_text(HEADER + "\nfrequency_Hz,2,0,,,240,0,79.5,0.2\n")
+    bad.write_text(HEADER + "\nfrequency_Hz,2,0,,,240,0,79.5,0\n")
+    names = {"M": str(good), "BAD": str(bad)}
+    given = [names.get(word, word) for word in options]
+    assert run("diagnose", str(coarse), *given, "--output", str(tmp_path / "out")) == 2
+    printed = capsys.readouterr()
+    assert words in printed.err and "Traceback" not in printed.err

@@ -1,0 +1,159 @@
+"""The whole on a tyre in closed form: held-out data, the placebo, the next measurement, anchors."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tyrecal.diagnose.diagnosis import Diagnosis, diagnose
+from tyrecal.diagnose.evidence import single
+from tyrecal.diagnose.expansion import anchored, expand
+from tyrecal.diagnose.observations import Row
+from tyrecal.diagnose.problem import Change
+from tyrecal.diagnose.regions import Region
+from tyrecal.diagnose.response import Answer, Point
+from tyrecal.diagnose.result import result
+from tyrecal.diagnose.shrinkage import held_out, shrink
+from tyrecal.modes.mode import Label
+
+from .toy import LABELS, Toy, drawn, problem
+
+
+def diagnosed(toy: Toy, effects: dict[str, float], seed: int, **keys: object) -> Diagnosis:
+    base = problem(toy)
+    y = drawn(toy, base, np.random.default_rng(seed), effects, 0.3)
+    return diagnose(toy, toy.rows, base.measured(y).observations, assumed=base.assumed, **keys)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("pressures", "held"),
+    [((160.0, 240.0, 320.0), {240.0}), ((160.0, 240.0), {160.0}), ((240.0,), set())],
+)
+def test_what_is_held_out_follows_a_rule(pressures: tuple[float, ...], held: set[float]) -> None:
+    rows = [Row("frequency_Hz", x, p) for p in pressures for x in LABELS]
+    rows.append(Row("mass_kg", None, 0.0))
+    mask, _ = held_out(rows)
+    chosen = [row for row, h in zip(rows, mask, strict=True) if h]
+    if held:
+        assert {row.pressure_kPa for row in chosen} == held
+        assert len(chosen) == len(LABELS)
+    else:
+        assert {row.label for row in chosen} == {Label(4, 0), Label(3, 1)}
+    assert all(row.label for row in chosen)
+
+
+def test_an_effect_shrinks_the_held_out_error_and_the_placebo_does_not() -> None:
+    toy = Toy(size=0.02, pressures=(160.0, 200.0, 240.0))
+    found = diagnosed(toy, {"e1": 0.9}, 1)
+    s = found.shrinkage
+    assert found.verdict.key == "e1" and s is not None and s.effect == "e1"
+    assert s.low <= s.fraction <= s.high or s.fraction > 0.5
+    assert s.fraction > s.placebo_95 and found.rung == 2
+    assert s.after_percent < s.before_percent
+    # tyres without any effect stay below the placebo's quantile, one in twenty aside
+    base, random, beyond = problem(toy), np.random.default_rng(2), 0
+    for _ in range(25):
+        there = base.measured(drawn(toy, base, random, {}, 0.0))
+        fake = shrink(there)
+        assert fake is not None
+        beyond += fake.fraction > fake.placebo_95
+    assert beyond <= 5
+
+
+def test_a_toggle_that_parts_twins_comes_first_and_does() -> None:
+    toy = Toy(twin=True, size=0.02)
+    toy.tilt["twin"] = 0.98 * toy.tilt["e0"]
+    alone = diagnosed(toy, {"e0": 0.7}, 3)
+    assert alone.verdict.kind == "undecided"
+    words = [choice.what for choice in alone.choices if choice.gain > 0][:2]
+    assert any(id in what for what in words for id in ("e0", "twin"))
+    base = problem(toy, changes=(Change("e0", 0.0),))
+    y = drawn(toy, problem(toy), np.random.default_rng(3), {"e0": 0.7}, 0.3)
+    noise = np.random.default_rng(4).normal(0, 0.001, len(y))
+    both = base.measured(np.concatenate([y, y - 0.7 * toy.g["e0"] + noise])).observations
+    after = diagnose(toy, toy.rows, both, (Change("e0", 0.0),), base.assumed)
+    assert after.verdict.kind == "named" and after.verdict.key == "e0" and after.rung == 4
+
+
+def test_an_anchor_is_exact_where_it_was_asked_and_absent_without_the_effect() -> None:
+    toy = Toy(bend=0.3)
+    bare = expand(toy, np.zeros(3))
+    x = np.array([0.4, -0.3, 0.2])
+    toy.bend = toy.bend * 1.5  # the model at hand departs from what was expanded
+    found = anchored(bare, toy, {"e0": (0.6, x)})
+    (answer,) = toy.answers([Point(x, {"e0": 0.6})])
+    assert isinstance(answer, Answer)
+    eta, J = found.plain(x)
+    for e, wanted in ((0.6, answer), (0.0, None)):
+        a, B, _ = found.nodes["e0"].at(np.array([e]))
+        if wanted:
+            assert eta + a[0] + B[0] @ x == pytest.approx(wanted.eta, abs=1e-9)
+            assert J + B[0] == pytest.approx(wanted.jacobian, abs=1e-9)
+        else:
+            assert abs(a).max() == 0 and abs(B).max() == 0
+    far, _, _ = found.nodes["e0"].at(np.array([1.0]))
+    near, _, _ = bare.nodes["e0"].at(np.array([1.0]))
+    assert abs(far - near).max() <= abs(found.nodes["e0"].anchor.shift).max() * 3  # type: ignore[union-attr]
+
+
+def test_narrow_peaks_are_integrated() -> None:
+    """An effect seen 300 times over: ln Z against 200001 points, the interval as narrow."""
+    toy = Toy(size=0.3, bend=0.0, pressures=(240.0,), effects=1)
+    toy.tilt["e0"] *= 0
+    base = problem(toy)
+    p = base.measured(toy.base + 0.4321 * toy.g["e0"])
+    found = single(p, "e0", 1.0)
+    S = np.linalg.inv(p.sigma + toy.J @ toy.J.T)
+    grid = (np.arange(200_001) + 0.5) / 200_001
+    a = toy.g["e0"] @ S @ toy.g["e0"]
+    ln = -a * (grid - 0.4321) ** 2 / 2
+    _, ln_det = np.linalg.slogdet(p.sigma + toy.J @ toy.J.T)
+    wanted = np.log(np.mean(np.exp(ln))) - (ln_det + len(p.places) * np.log(2 * np.pi)) / 2
+    assert a > 1e3
+    assert found.ln_evidence == pytest.approx(wanted, abs=0.02)
+    assert found.mean()["e0"] == pytest.approx(0.4321, abs=1e-3)
+    width = found.quantile("e0", 0.95) - found.quantile("e0", 0.05)
+    assert width == pytest.approx(2 * 1.645 / np.sqrt(a), rel=0.15)
+
+
+def test_the_section_map_finds_the_part_and_joins_what_looks_alike() -> None:
+    toy = Toy(size=0.01)
+    random = np.random.default_rng(5)
+    shape = lambda: np.tile(random.normal(0, 0.3, len(LABELS)), 3)
+    soft, other = shape(), shape()
+    parts = [
+        Region("sidewall", soft, shape() / 10, ""),
+        Region("bead", 1.01 * soft, shape() / 10, ""),
+        Region("tread", other, shape() / 10, ""),
+        Region("nowhere", 0 * soft, 0 * soft, ""),
+    ]
+    base = problem(toy)
+    y = drawn(toy, base, np.random.default_rng(6), {}, 0.3) + 0.15 * soft
+    found = diagnose(toy, toy.rows, base.measured(y).observations, assumed=base.assumed,
+                     parts=lambda x: parts)  # fmt: skip
+    best = found.parts[0]
+    assert best.region in ("sidewall", "bead") and set(best.same_as) == {"sidewall", "bead"} - {
+        best.region
+    }
+    assert best.stiffness_percent == pytest.approx(15, abs=3 * best.stiffness_sigma)
+    (nothing,) = [p for p in found.parts if p.region == "nowhere"]
+    assert nothing.evidence == 0 and nothing.stiffness_sigma == pytest.approx(20)
+    assert 2 <= found.effective_rank <= 6
+
+
+def test_the_result_is_plain_data_with_the_promised_keys() -> None:
+    import json
+
+    told = result(diagnosed(Toy(effects=3), {}, 7))
+    json.dumps(told, allow_nan=False)
+    assert {
+        "verdict", "effect", "parameter", "probabilities", "candidate_set", "groups",
+        "detectability", "gap", "section_map", "shrinkage", "rung", "bias_percent",
+        "next_measurements",
+    } <= set(told)  # fmt: skip
+    assert {"p_value", "rms_percent", "by_family", "by_harmonic", "by_pressure"} <= set(told["gap"])
+    assert set(told["gap"]["by_family"]) == {"in-plane", "lateral", "[0,0]"}
+    assert set(told["bias_percent"]) == {"A", "B", "C"}
+    assert {"held_out", "before_percent", "after_percent", "fraction", "low", "high",
+            "placebo_95"} <= set(told["shrinkage"])  # fmt: skip
+    assert sum(told["probabilities"].values()) == pytest.approx(1, abs=1e-4)

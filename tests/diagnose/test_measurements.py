@@ -1,0 +1,123 @@
+"""Measurements: what a file may hold, every mistake by its line, pairs, repeats."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tyrecal.diagnose.measurements import BadMeasurements, read_measurements
+from tyrecal.diagnose.observations import observe
+from tyrecal.modes.mode import Label
+
+HEADER = "quantity,c,m,kind,member,pressure_kPa,load_N,value,sigma\n"
+GOOD = "frequency_Hz,2,0,,,240,0,79.5,0.2"
+
+
+def read(tmp_path: Path, *lines: str, header: str = HEADER) -> list:
+    path = tmp_path / "measured.csv"
+    path.write_text(header + "\n".join(lines) + "\n")
+    return read_measurements(path)
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ("frequency_Hz,2,0,,,240,0,79500,20", "which unit?"),
+        ("frequency_Hz,2,0,,,2.4,0,79.5,0.2", "pressure_kPa is '2.4'"),
+        ("frequency_Hz,2,0,,,240,0,0.2,0.02", "which unit?"),
+        ("frequency_Hz,2,0,,,240,0,79.5,0", "greater than 0"),
+        ("frequency_Hz,2,0,,,240,0,79.5,-1", "greater than 0"),
+        ("frequency_Hz,2,0,,,240,0,79.5,", "greater than 0"),
+        ("frequency_Hz,2,0,,,240,0,nan,0.2", "must be a number"),
+        ("frequency_Hz,2,0,,,240,0,79.5,40", "more than 20%"),
+        ("frequency_Hz,2.5,0,,,240,0,79.5,0.2", "whole number"),
+        ("frequency_Hz,0,0,,,240,0,31.7,0.2", "axial or torsional"),
+        ("frequency_Hz,2,0,axial,,240,0,79.5,0.2", "must be empty"),
+        ("frequency_Hz,2,0,,3,240,0,79.5,0.2", "member is '3'"),
+        ("frequency_Hz,0,0,axial,1,240,0,31.7,0.2", "member is '1'"),
+        ("frequency_Hz,2,0,,1,240,4000,79.5,0.2", "symmetric or antisymmetric"),
+        ("frequency,2,0,,,240,0,79.5,0.2", "quantity is 'frequency'"),
+        ("mass_kg,2,0,,,,,12.5,0.05", "must be empty for mass_kg"),
+        ("frequency_Hz,2,0,,,240,0,79.5", "8 cells"),
+        (GOOD, "same as line 2"),
+        ("frequency_Hz,2,0,,1,240,0,79.5,0.2", "one value for both"),
+    ],
+)
+def test_a_wrong_line_is_named(tmp_path: Path, line: str, words: str) -> None:
+    with pytest.raises(BadMeasurements) as caught:
+        read(tmp_path, GOOD, line)
+    (sentence,) = str(caught.value).splitlines()
+    assert "line 3" in sentence and words in sentence
+
+
+def test_every_mistake_is_told_at_once(tmp_path: Path) -> None:
+    with pytest.raises(BadMeasurements) as caught:
+        read(tmp_path, "frequency_Hz,2,0,,,240,0,-1,0.2", GOOD, "area,,,,,240,0,1,1")
+    assert [line.split(":")[0][-6:] for line in str(caught.value).splitlines()] == [
+        "line 2", "line 4",
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("header", ["c,m,kind\n", HEADER.replace("sigma", "std"), ""])
+def test_wrong_columns(tmp_path: Path, header: str) -> None:
+    with pytest.raises(BadMeasurements, match="columns must be"):
+        read(tmp_path, GOOD, header=header)
+
+
+def test_the_order_of_columns_is_free(tmp_path: Path) -> None:
+    swapped = "value,sigma,quantity,c,m,kind,member,pressure_kPa,load_N\n"
+    (one,) = read(tmp_path, "79.5,0.2,frequency_Hz,2,0,,,240,0", header=swapped)
+    (other,) = read(tmp_path, GOOD)
+    assert one == other
+
+
+def test_a_pair_is_a_mean_and_a_split_whichever_comes_first(tmp_path: Path) -> None:
+    low, high = "frequency_Hz,2,0,,{},240,0,79.0,0.2", "frequency_Hz,2,0,,{},240,0,80.0,0.3"
+    one = observe(read(tmp_path, low.format(1), high.format(2)))
+    other = observe(read(tmp_path, high.format(1), low.format(2)))
+    for found in (one, other):
+        assert found.y == pytest.approx([np.log(79.0 * 80.0) / 2])
+        assert found.split == pytest.approx([np.log(80 / 79)])
+    sa, sb = 0.2 / 79, 0.3 / 80
+    assert one.scatter == pytest.approx([np.hypot(sa, sb) / 2])
+    assert one.split_scatter == pytest.approx([np.hypot(sa, sb)])
+
+
+def test_a_lone_member_carries_half_the_usual_split(tmp_path: Path) -> None:
+    line = "frequency_Hz,2,0,,1,240,0,80.0,0.2"
+    lone = observe(read(tmp_path, line), split=0.004)
+    assert lone.scatter == pytest.approx([np.hypot(0.2 / 80, 0.002)])
+    assert np.isnan(lone.split[0])
+
+
+def test_repeats_tell_the_scatter_and_what_a_run_shares() -> None:
+    """Two ways of scatter, drawn and found again within 10 % over many tyres."""
+    from tyrecal.diagnose.measurements import Reading
+
+    random = np.random.default_rng(0)
+    labels = [Label(c, m) for c in range(1, 7) for m in (0, 1)]
+    own, shared = [], []
+    for _ in range(300):
+        runs = []
+        for _ in range(3):
+            common = random.normal(0, 0.004)
+            runs.append([
+                Reading("frequency_Hz", x, "", 240.0, 0.0,
+                        50 * np.exp(common + random.normal(0, 0.002)), 5.0, 2)
+                for x in labels
+            ])  # fmt: skip
+        found = observe(runs[0], runs[1:])
+        own.append(np.mean(found.scatter**2) * 3)
+        shared.append(found.common**2 * 3)
+    assert np.sqrt(np.mean(own)) == pytest.approx(0.002, rel=0.1)
+    assert np.sqrt(np.mean(shared)) == pytest.approx(0.004, rel=0.1)
+
+
+def test_what_is_not_used_is_said(tmp_path: Path) -> None:
+    lines = [GOOD, "contact_area_m2,,,,,240,4000,0.02,0.001",
+             "frequency_Hz,1,0,,symmetric,240,4000,70,0.5"]  # fmt: skip
+    found = observe(read(tmp_path, *lines))
+    assert len(found.rows) == 1 and len(found.left_out) == 2
+    assert "contact_area_m2" in found.left_out[0] and "under load" in found.left_out[1]

@@ -1,0 +1,200 @@
+"""The real model behind the protocol: slopes against differences, the expansion against the model
+itself, parts of the section against the whole, and a diagnosis of the model's own data."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tyrecal.case import with_values
+from tyrecal.diagnose.add import NotAdded, add
+from tyrecal.diagnose.expansion import expand
+from tyrecal.diagnose.measurements import BadMeasurements
+from tyrecal.diagnose.problem import Assumed, Change
+from tyrecal.diagnose.regions import regions
+from tyrecal.diagnose.response import Answer, Point
+from tyrecal.diagnose.result import result
+from tyrecal.diagnose.study import BadChange, parse_change, spans_of, study
+from tyrecal.diagnose.tyre_model import TyreModel
+from tyrecal.diagnose.uncertainties import sources
+from tyrecal.evaluate.door import Door
+from tyrecal.modes.mode import Label
+
+from ..effects.support import coarse
+
+CASE = coarse()
+LABELS = [Label(0, 0, "axial"), Label(0, 0, "torsional"), Label(1, 1), Label(1, 0), Label(2, 1),
+          Label(2, 0), Label(3, 0), Label(3, 1), Label(4, 0)]  # fmt: skip
+EFFECTS = ("bead_filler", "pressure_offset", "tread_density")
+ROWS = [*((label, p) for p in (180.0, 240.0) for label in LABELS), (None, 0.0)]
+
+
+def model(rows: list = ROWS) -> TyreModel:
+    door = Door(CASE)
+    spans, _ = spans_of(door, EFFECTS)
+    return TyreModel(CASE, door, rows, sources(CASE)[0], spans)
+
+
+MODEL = model()
+
+
+def asked(point: Point) -> Answer:
+    (found,) = MODEL.answers([point])
+    assert isinstance(found, Answer), found
+    return found
+
+
+def test_slopes_against_differences() -> None:
+    x, step = MODEL.start + np.array((0.1, -0.2, 0.05)), 1e-4
+    own = asked(Point(x, constants=True))
+    for j, d in enumerate(step * np.eye(3)):
+        two = (asked(Point(x + d)).eta - asked(Point(x - d)).eta) / (2 * step)
+        modes = slice(0, -1)
+        assert own.jacobian[modes, j] == pytest.approx(two[modes], abs=2e-4)
+        assert own.jacobian[-1, j] == pytest.approx(two[-1], abs=1e-5)  # of a mass
+    assert own.constants is not None
+    for source in ("pressure", "rubber_density", "belt_1_angle"):
+        k = MODEL.sources.index(source)
+        ((path, size),) = MODEL.found[k].steps.items()
+        shifted = []
+        for side in (0.1, -0.1):
+            value = MODEL._plain[path] + side * size
+            there = with_values(CASE, {} if path == "pressure_kPa" else {path: value})
+            rows = ROWS
+            if path == "pressure_kPa":
+                rows = [(label, p + side * size if label else p) for label, p in ROWS]
+            other = TyreModel(there, Door(there), rows, [], {})
+            (found,) = other.answers([Point(x)])
+            assert isinstance(found, Answer)
+            shifted.append(found.eta)
+        wanted = (shifted[0] - shifted[1]) / 0.2
+        assert own.constants[:-1, k] == pytest.approx(wanted[:-1], abs=2e-5)
+        assert own.constants[-1, k] == pytest.approx(wanted[-1], rel=0.02, abs=1e-9)
+
+
+def test_the_expansion_is_the_model_at_its_nodes_and_close_between() -> None:
+    found = expand(MODEL, MODEL.start)
+    there = MODEL.start + np.array((0.15, -0.15, 0.1))
+    plain, _ = found.plain(there)
+    assert plain == pytest.approx(asked(Point(there)).eta, abs=5e-4)
+    for id in EFFECTS:
+        nodes = found.nodes[id]
+        high = nodes.reach[1]
+        for e, near in ((high, 1e-9), (0.6 * high, 3e-4), (0.1 * high, 5e-4)):
+            a, B, _ = nodes.at(np.array([e]))
+            assert found.eta + a[0] == pytest.approx(
+                asked(Point(MODEL.start, {id: e})).eta, abs=near
+            )
+            moved = asked(Point(there, {id: e})).eta
+            assert plain + a[0] + B[0] @ (there - MODEL.start) == pytest.approx(moved, abs=2e-3)
+
+
+def test_parts_of_the_section_make_the_whole() -> None:
+    """All rubber heavier together is the density; all parts and the pressure stiffer by the same
+    factor raise every frequency by half of it."""
+    parts = regions(MODEL, MODEL.start)
+    own = asked(Point(MODEL.start, constants=True))
+    assert own.constants is not None
+    rubber = [part for part in parts if not part.name.endswith("cords")]
+    assert {part.name for part in rubber} == {
+        "tread", "crown under the tread", "upper sidewall", "lower sidewall", "bead",
+    }  # fmt: skip
+    modes = slice(0, -1)
+    density = own.constants[modes, MODEL.sources.index("rubber_density")] / 0.015
+    assert sum(part.mass for part in rubber)[modes] == pytest.approx(density, rel=1e-6, abs=1e-9)
+    k = MODEL.sources.index("pressure")
+    pressure = own.constants[modes, k] * np.array([p for label, p in ROWS if label])
+    stiffness = sum(part.stiffness for part in parts)[modes]
+    assert stiffness + pressure == pytest.approx(np.full(18, 0.5), abs=1e-3)
+    mass = sum(part.mass for part in parts)[modes]
+    assert mass == pytest.approx(np.full(18, -0.5), abs=1e-3)
+
+
+def written(path: Path, eta: np.ndarray, rows: list = ROWS, noise: float = 1e-3) -> Path:
+    """A file of measurements of the model's own, with scatter."""
+    random = np.random.default_rng(3)
+    lines = ["quantity,c,m,kind,member,pressure_kPa,load_N,value,sigma"]
+    for (label, p), y in zip(rows, eta, strict=True):
+        value = float(np.exp(y + noise * random.normal()))
+        if label is None:
+            lines.append(f"mass_kg,,,,,,,{value!r},{value * noise!r}")
+        else:
+            place = f"{label.c},{label.m},{label.kind or ''}"
+            lines.append(f"frequency_Hz,{place},,{p:g},0,{value!r},{value * noise!r}")
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+X = MODEL.start + np.array((0.2, -0.1, 0.15))
+
+
+def test_an_effect_in_the_models_own_data_is_named_with_its_size(tmp_path: Path) -> None:
+    truth = 0.8 * MODEL.spans["bead_filler"].high
+    path = written(tmp_path / "a.csv", asked(Point(X, {"bead_filler": truth})).eta)
+    found = study(CASE, Door(CASE), path, effects=EFFECTS)
+    d = found.diagnosis
+    assert d.verdict.kind == "named" and d.verdict.key == "bead_filler"
+    size = d.parameter("bead_filler")
+    assert size["low"] < truth < size["high"]
+    told = result(d)
+    assert told["effect"] == "bead_filler" and told["rung"] in (1, 2)
+    assert told["shrinkage"]["fraction"] > 0.3
+    assert sum(told["probabilities"].values()) == pytest.approx(1, abs=1e-4)
+
+
+def test_a_plain_tyre_has_no_gap_and_the_mass_gives_the_hidden_away(tmp_path: Path) -> None:
+    plain = written(tmp_path / "a.csv", asked(Point(X)).eta)
+    d = study(CASE, Door(CASE), plain, effects=EFFECTS, section_map=False).diagnosis
+    assert d.verdict.kind in ("no_gap", "undecided")
+    assert d.probabilities["none"] > 0.25
+    # a denser tread hides in the design variables until the tyre is weighed
+    assert d.gap.absorbed["tread_density"] < 0.99
+    light = written(tmp_path / "b.csv", asked(Point(X)).eta[:-1], ROWS[:-1])
+    unweighed = study(CASE, Door(CASE), light, effects=EFFECTS, section_map=False).diagnosis
+    lambdas = [x.separability.full["tread_density"] for x in (d, unweighed)]
+    assert lambdas[0] > 1.5 * lambdas[1]
+
+
+def test_a_toggled_run_shows_the_cause(tmp_path: Path) -> None:
+    truth = 0.5 * MODEL.spans["bead_filler"].high
+    one = written(tmp_path / "a.csv", asked(Point(X, {"bead_filler": truth})).eta)
+    other = written(tmp_path / "b.csv", asked(Point(X)).eta)
+    d = study(CASE, Door(CASE), one, toggled=[(other, Change("bead_filler", 0.0))],
+              assumed=Assumed(), effects=EFFECTS, section_map=False).diagnosis  # fmt: skip
+    assert d.verdict.kind == "named" and d.rung == 4
+
+
+def test_a_wrong_unit_and_one_mode_alone(tmp_path: Path) -> None:
+    eta = asked(Point(X)).eta
+    thrice = written(tmp_path / "a.csv", eta + np.log(2 * np.pi))
+    with pytest.raises(BadMeasurements, match="right unit"):
+        study(CASE, Door(CASE), thrice, effects=EFFECTS)
+    one = written(tmp_path / "b.csv", eta[5:6], ROWS[5:6])
+    d = study(CASE, Door(CASE), one, effects=EFFECTS, section_map=False).diagnosis
+    assert d.verdict.kind == "undecided" and "cannot tell" in d.verdict.words
+    assert d.shrinkage is None
+    weighed = written(tmp_path / "c.csv", eta[-1:], ROWS[-1:])
+    with pytest.raises(BadMeasurements, match="no frequency"):
+        study(CASE, Door(CASE), weighed, effects=EFFECTS)
+
+
+@pytest.mark.parametrize("text", ["bead_filler", "nonsense=0", "bead_filler=x", "=1"])
+def test_a_change_that_is_none(text: str) -> None:
+    with pytest.raises(BadChange):
+        parse_change(text)
+
+
+def test_an_effect_is_added_with_the_files_comments_kept(case_folder: Path) -> None:
+    old = case_folder / "p235_75r17.yaml"
+    new = add(old, "bead_filler", 1.5)
+    added = [line for line in new.read_text().splitlines() if line not in old.read_text()]
+    assert [line.strip() for line in added if line.strip() not in ("effects:",)] == [
+        "bead_filler: 1.5"
+    ]
+    assert "# Table 1 of the paper" in new.read_text()
+    with pytest.raises(NotAdded):
+        add(old, "bead_filler", 1.5)
+    with pytest.raises(ValueError, match="no 'nothing'"):
+        add(old, "nothing", 1.5)

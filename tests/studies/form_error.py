@@ -1,0 +1,79 @@
+"""Model-form error of every mode: mesh and element of our own model, at the fitted design.
+
+    python -m tests.studies.form_error
+
+For each variant: d = ln f_variant - ln f_default of all modes at three pressures; what the three
+design variables can absorb is taken out by least squares, as a calibration would; the rest is the
+error of form. Printed: its rms over variants and pressures, per mode, in per cent, times
+sqrt(n / (n - v)) for the directions that were taken out. No measured data enter.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from tests.conftest import CASES
+from tyrecal.case import LoadedCase, load_case
+from tyrecal.case.schema import Level
+from tyrecal.diagnose.response import Answer, Point
+from tyrecal.diagnose.tyre_model import TyreModel
+from tyrecal.evaluate.door import Door
+from tyrecal.modes.mode import Label
+
+PRESSURES = (160.0, 240.0, 320.0)
+LABELS = [Label(0, 0, "axial"), Label(0, 0, "torsional")]
+LABELS += [Label(c, m) for c in range(1, 7) for m in (0, 1)]
+FITTED = {"A_belt": 2.543e-7, "A_carcass": 6.198e-8, "C10": 6.526e5}
+FLOOR = 0.1  # per cent: what two solvers differ by on one mesh (tests/benchmarks/CALCULIX.md)
+
+
+def variants(case: LoadedCase) -> dict[str, LoadedCase]:
+    """The case with the refined mesh, with coarser ones, and with linear elements."""
+    mesh = case.case.mesh
+    default = mesh.levels["default"]
+    coarse = Level(elements={k: max(1, v * 3 // 4) for k, v in default.elements.items()},
+                   rows=[1, 1, 1, 2])  # fmt: skip
+    thick = Level(elements=default.elements, rows=[1, 1, 1, 2])
+    levels = {**mesh.levels, "coarse": coarse, "thick": thick}
+    changed = {
+        "refined": {"level": "refined"},
+        "coarser": {"level": "coarse"},
+        "fewer rows": {"level": "thick"},
+        "linear elements, refined": {"level": "refined", "element": "CGAX4R"},
+    }
+    return {
+        name: replace(case, case=case.case.model_copy(
+            update={"mesh": mesh.model_copy(update={"levels": levels, **update})}))
+        for name, update in changed.items()
+    }  # fmt: skip
+
+
+def answer(case: LoadedCase) -> Answer:
+    """The model's answer at the fitted design."""
+    rows = [(label, p) for p in PRESSURES for label in LABELS]
+    model = TyreModel(case, Door(case), rows, [], {})
+    (found,) = model.answers([Point(np.log([FITTED[name] for name in model.variables]))])
+    assert isinstance(found, Answer), found
+    return found
+
+
+def main() -> None:
+    case = load_case(CASES / "p235_75r17.yaml")
+    plain = answer(case)
+    J, squares = plain.jacobian, []
+    n, v = J.shape
+    for name, variant in variants(case).items():
+        d = answer(variant).eta - plain.eta
+        rest = d - J @ np.linalg.lstsq(J, d, rcond=None)[0]
+        squares.append(rest.reshape(len(PRESSURES), -1) ** 2)
+        raw, left = (100 * np.sqrt(np.mean(x**2)) for x in (d, rest))
+        print(f"{name}: rms {raw:.2f} %, {left:.2f} % after calibration")
+    per_mode = np.sqrt(np.mean(squares, axis=(0, 1)) * n / (n - v))
+    for label, sigma in zip(LABELS, per_mode, strict=True):
+        print(f'    "{label}": {max(FLOOR, 100 * sigma):.2f},')
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,119 @@
+"""tyrecal diagnose"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from . import options
+
+file = click.Path(path_type=Path, exists=True, dir_okay=False)
+
+
+@click.command()
+@options.every(options.case_argument, options.assignments)
+@click.option("--measured", type=file, metavar="FILE", help="Measurements (CSV).")
+@click.option("--repeats", multiple=True, type=file, metavar="FILE",
+              help="The same measured again after dismounting; repeatable.")  # fmt: skip
+@click.option("--toggled", multiple=True, type=(file, str), metavar="FILE CHANGE",
+              help="A run of the same tyre with one thing switched: EFFECT=VALUE (0: absent) or"
+              " EFFECT*FACTOR; repeatable.")  # fmt: skip
+@click.option("--effect", "effects", multiple=True, metavar="EFFECT",
+              help="Consider these effects only; repeatable.")  # fmt: skip
+@click.option("--form-percent", type=click.FloatRange(0, 20), metavar="PERCENT",
+              help="Error of the model's own form in every frequency (default: on record, mode by"
+              " mode).")  # fmt: skip
+@click.option("--split-percent", type=click.FloatRange(0, 20), default=0.3, show_default=True,
+              metavar="PERCENT", help="Split of pairs that every such tyre has.")  # fmt: skip
+@click.option("--add", metavar="EFFECT=VALUE",
+              help="Write a case with the effect in it, and do nothing else.")  # fmt: skip
+@click.option("--pictures/--no-pictures", default=True, help="Draw what was found.")
+@options.every(*options.STUDY)
+def command(
+    case: Path,
+    assignments: tuple[str, ...],
+    measured: Path | None,
+    repeats: tuple[Path, ...],
+    toggled: tuple[tuple[Path, str], ...],
+    effects: tuple[str, ...],
+    form_percent: float | None,
+    split_percent: float,
+    add: str | None,
+    pictures: bool,
+    jobs: int,
+    mesh: str,
+    solver: str,
+    output: Path | None,
+    store: Path | None,
+    no_store: bool,
+    as_json: bool,
+    quiet: bool,
+    verbose: bool,
+) -> int:
+    """Find where CASE and measurements part, and which effect explains it.
+
+    Writes diagnosis.json, diagnosis.md (one page in words) and pictures. The model is calibrated
+    to the measurements first; its targets play no part.
+
+    \b
+    tyrecal diagnose cases/p235_75r17.yaml --measured cases/p235_75r17_wheeler.csv
+    tyrecal diagnose my.yaml --measured run1.csv --repeats run2.csv --repeats run3.csv --jobs 2
+    tyrecal diagnose my.yaml --measured run1.csv --toggled clamped.csv spindle_lateral=0
+    tyrecal diagnose my.yaml --add bead_filler=1.5
+    """
+    from .output import say
+
+    if add:
+        path = _added(case, add, output)
+        say(f"{path} has the effect in it; 'tyrecal fit {path}' calibrates it", as_json, quiet)
+        return 0
+    if measured is None:
+        raise click.UsageError("--measured FILE must be given, or --add EFFECT=VALUE")
+    from ..diagnose.problem import Assumed
+    from ..diagnose.result import result
+    from ..diagnose.study import parse_change, study
+    from ..effects import catalogue
+    from ..evaluate.door import Door
+    from ..report.diagnosis import page
+    from .output import Run, print_json
+
+    loaded, _ = options.load(case, mesh, assignments, None)
+    for id in effects:
+        if id not in catalogue():
+            raise click.UsageError(f"--effect {id}: no such effect, only {', '.join(catalogue())}")
+    changes = [(path, parse_change(text)) for path, text in toggled]
+    door = Door(loaded, solver)
+    run = Run(case, output, "diagnose", door.solver)
+    door.folder, door.keep = run.runs, verbose
+    door.store = run.open_store(store, no_store)
+    form = None if form_percent is None else form_percent / 100
+    assumed = Assumed(form, split_percent / 100)
+    found = study(loaded, door, measured, repeats, changes, assumed, jobs, effects or None)
+    told = result(found.diagnosis)
+    run.write_json("diagnosis.json", told)
+    words = page(found, loaded.case.name, measured.name)
+    run.write_text("diagnosis.md", words)
+    if pictures:
+        from ..report.diagnosis_pictures import draw_diagnosis
+
+        draw_diagnosis(run.folder, loaded, found)
+    run.finish(solver_runs=door.counts.runs, answered_from_record=door.counts.recorded)
+    if as_json:
+        print_json(told)
+    say(words, as_json, quiet)
+    say(f"results in {run.folder}", as_json, quiet)
+    return 0
+
+
+def _added(case: Path, assignment: str, output: Path | None) -> Path:
+    """The new case's file. Raises click.UsageError, CaseError."""
+    from ..case import load_case, parse_assignment
+    from ..diagnose.add import NotAdded, add
+
+    load_case(case)
+    try:
+        id, value = parse_assignment(assignment)
+        return add(case, id, value, output)
+    except (ValueError, NotAdded) as error:
+        raise click.UsageError(f"--add: {error}") from None

@@ -1,0 +1,157 @@
+"""The whole diagnosis: observations and a model go in, an honest answer comes out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from .evidence import NONE, Hypothesis, probabilities, weigh
+from .expansion import Expansion, anchored, expand
+from .gap import Gap, find_gap, projection
+from .next_measurement import Choice, ModelRow, rank
+from .observations import Observations
+from .plain_fit import plain_fit
+from .problem import Assumed, Change, Problem, places
+from .regions import Region
+from .response import Response
+from .separability import Separability, separate
+from .shrinkage import Shrinkage, shrink
+from .verdict import NAMED, Verdict, decide
+from .where import Place, section_map
+
+Array = np.ndarray
+IN_PLAY, MOST_IN_PLAY = 8.0, 6  # ln evidence behind the best up to which a node is asked again
+ROUNDS = 2
+CLOSE = 0.05  # of a range, and of ln x: an effect asked as near as that, or to 0, is known
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """What was found. problem: as it was solved; bare: before effects were asked again; parts,
+    effective_rank: the section map, and how many combinations of its parts the data see; rung: of
+    the ladder of proof, 1 to 4."""
+
+    problem: Problem
+    bare: Problem
+    variables: tuple[str, ...]
+    sources: tuple[str, ...]
+    hypotheses: tuple[Hypothesis, ...]
+    probabilities: Mapping[str, float]
+    verdict: Verdict
+    gap: Gap
+    separability: Separability
+    parts: tuple[Place, ...]
+    effective_rank: int
+    shrinkage: Shrinkage | None
+    rung: int
+    choices: tuple[Choice, ...]
+
+    def hypothesis(self, key: str) -> Hypothesis:
+        """The hypothesis of that key."""
+        return next(h for h in self.hypotheses if h.key == key)
+
+    @property
+    def best(self) -> str | None:
+        """The likeliest effect or pair, named or not; None where the catalogue is empty."""
+        keys = [h.key for h in self.hypotheses if h.values]
+        return max(keys, key=lambda key: self.probabilities[key], default=None)
+
+    def parameter(self, key: str) -> dict[str, Any]:
+        """Mean and 90 % interval of the first effect of ``key``, with its unit."""
+        hypothesis, id = self.hypothesis(key), key.split("+")[0]
+        return {
+            "value": hypothesis.mean()[id],
+            "low": hypothesis.quantile(id, 0.05),
+            "high": hypothesis.quantile(id, 0.95),
+            "unit": self.problem.spans[id].unit,
+        }
+
+
+def diagnose(
+    response: Response,
+    rows: Sequence[ModelRow],
+    observations: Observations,
+    changes: tuple[Change, ...] = (),
+    assumed: Assumed = Assumed(),  # noqa: B008
+    parts: Callable[[Array], Sequence[Region]] | None = None,
+    further: Callable[[list[ModelRow]], Response] | None = None,
+    expansion: Expansion | None = None,
+    seed: int = 0,
+) -> Diagnosis:
+    """Diagnose observations with a model of ``rows`` (label or None, kPa).
+
+    changes: what was switched in runs 1, 2, ...; parts: slopes by the section's parts at x;
+    further: a model of other rows, for the next measurement; expansion: of an earlier call with
+    the same model, near whose x0 the fit lies. Raises the model's failure where the plain tyre
+    has no solution.
+    """
+    where = places(observations, rows)
+    if expansion is None:
+        x0 = plain_fit(response, observations, where, assumed.form)
+        expansion = expand(response, x0)
+    problem = Problem(observations, expansion, response.spans, where, response.start,
+                      response.spread, changes, assumed)  # fmt: skip
+    hypotheses, bare = weigh(problem), problem
+    for _ in range(ROUNDS if expansion.nodes else 0):
+        problem, changed = _asked_again(problem, response, hypotheses)
+        if not changed:
+            break
+        hypotheses = weigh(problem)
+    p = probabilities(hypotheses)
+    by_key = {h.key: h for h in hypotheses}
+    plain = by_key[NONE].fitted
+    assert plain is not None
+    d = plain.d[0]
+    verdict = decide(hypotheses, p, len(where), len(d))
+    gap = find_gap(bare, d, tuple(response.variables))
+    P, _, _ = projection(problem, d)
+    means = {h.key: h.mean() for h in hypotheses if h.values}
+    sizes = {key: value[key] for key, value in means.items() if key in value}
+    separability = separate(bare, P, sizes)
+    regions = list(parts(problem.expansion.x0 + d)) if parts else []
+    found, effective_rank = section_map(bare, P, gap.residuals, regions)
+    shrinkage = shrink(problem, verdict.key, seed) if problem.expansion.nodes else None
+    choices = rank(bare, d, p, means, response.sources, further)
+    return Diagnosis(
+        problem, bare, tuple(response.variables), tuple(response.sources), tuple(hypotheses), p,
+        verdict, gap, separability, tuple(found), effective_rank, shrinkage,
+        _rung(verdict, shrinkage, problem), tuple(choices),
+    )  # fmt: skip
+
+
+def _asked_again(
+    problem: Problem, response: Response, hypotheses: Sequence[Hypothesis]
+) -> tuple[Problem, bool]:
+    """The problem with the model asked where the effects in play have their re-fits, each at its
+    likeliest size, and whether anything was left to ask."""
+    singles = [h for h in hypotheses if h.key in problem.expansion.nodes]
+    best = max(h.ln_evidence for h in hypotheses)
+    play = [h for h in singles if h.ln_evidence > best - IN_PLAY]
+    play = sorted(play, key=lambda h: -h.ln_evidence)[:MOST_IN_PLAY]
+    wanted: dict[str, tuple[float, Array]] = {}
+    for h in play:
+        assert h.fitted is not None
+        nodes, d = problem.expansion.nodes[h.key], h.fitted.d[h.best]
+        e, width = float(h.values[h.key][h.best]), nodes.reach[1] - nodes.reach[0]
+        last = nodes.anchor
+        known = last and abs(e - last.e) < CLOSE * width and abs(d - last.d).max() < CLOSE
+        if not known and abs(e) > CLOSE * width:
+            wanted[h.key] = e, problem.expansion.x0 + d
+    if not wanted:
+        return problem, False
+    return replace(problem, expansion=anchored(problem.expansion, response, wanted)), True
+
+
+def _rung(verdict: Verdict, shrinkage: Shrinkage | None, problem: Problem) -> int:
+    """1: fits in sample; 2: held-out error falls beyond the placebo's; 4: a toggled run moved the
+    frequencies as the named effect says (its posterior check holds with that run among the data).
+
+    3, agreement with an independent measurement of the parameter, is the engineer's to state.
+    """
+    if verdict.kind == NAMED and verdict.key in [change.id for change in problem.changes]:
+        return 4
+    proven = shrinkage is not None and verdict.kind == NAMED
+    return 2 if proven and shrinkage and shrinkage.fraction > shrinkage.placebo_95 else 1

@@ -1,0 +1,196 @@
+"""Is there a gap, and in which measurements does it lie?
+
+    P = S^-1 - S^-1 J (J^T S^-1 J + Sx^-1)^-1 J^T S^-1        what calibration cannot absorb
+    T = r^T P r + splits ~ chi2(n - v + n_split)               where there is no gap
+
+The residuals of the fit have covariance C = S P S; a group of them, r_G^T C_GG^-1 r_G ~ chi2.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import chi2, norm
+
+from .observations import Row
+from .problem import Problem
+
+Array = np.ndarray
+FAMILIES = {"in-plane": "in-plane", "out-of-plane": "lateral"}
+
+
+@dataclass(frozen=True)
+class Group:
+    """Residuals of some rows: rms in per cent, chi2, degrees of freedom, p-value as it is and
+    corrected for the number of groups (Holm)."""
+
+    kind: str
+    name: str
+    rms_percent: float
+    chi2: float
+    freedom: int
+    p_value: float
+    corrected: float
+
+
+@dataclass(frozen=True)
+class Contrast:
+    """A combination of residuals in per cent with its standard deviation."""
+
+    name: str
+    percent: float
+    sigma_percent: float
+
+    @property
+    def p_value(self) -> float:
+        """Two-sided."""
+        return float(2 * norm.sf(abs(self.percent) / self.sigma_percent))
+
+
+@dataclass(frozen=True)
+class Gap:
+    """chi2, freedom, p_value: of all; residuals (n,): ln measured - ln model at the plain fit;
+    spread (n,): their standard deviation without a gap; groups, contrasts; absorbed: share of
+    each effect that calibration hides; bias_percent: variable by effect, the effect at full size
+    and ignored."""
+
+    chi2: float
+    freedom: int
+    p_value: float
+    residuals: Array
+    spread: Array
+    groups: tuple[Group, ...]
+    contrasts: tuple[Contrast, ...]
+    absorbed: Mapping[str, float]
+    bias_percent: Mapping[str, Mapping[str, float]]
+
+    @property
+    def rms_percent(self) -> float:
+        """Of all residuals."""
+        return float(100 * np.sqrt(np.mean(self.residuals**2)))
+
+
+def projection(problem: Problem, d: Array) -> tuple[Array, Array, Array]:
+    """P (n, n), Sigma^-1 (n, n), and (J^T S^-1 J + Sx^-1)^-1 J^T S^-1 (v, n), at x0 + d."""
+    _, J = problem.plain(d)
+    inverse = np.linalg.inv(problem.sigma)
+    absorbing = np.linalg.solve(
+        J.T @ inverse @ J + np.diag(problem.spread**-2.0), J.T @ inverse
+    )  # fmt: skip
+    P = inverse - inverse @ J @ absorbing
+    return (P + P.T) / 2, inverse, absorbing
+
+
+def find_gap(problem: Problem, d: Array, variables: tuple[str, ...]) -> Gap:
+    """The gap at the plain fit x0 + d."""
+    P, inverse, absorbing = projection(problem, d)
+    sigma = problem.sigma
+    C = sigma @ P @ sigma
+    shift, tilt, _ = problem.added({}, 1)  # of what was switched on purpose
+    eta, _ = problem.plain(d)
+    r = problem.observations.y - eta - shift[0] - tilt[0] @ d
+    s, tau = problem.observations.split, problem.observations.split_scatter
+    seen = np.isfinite(s)
+    splits = float((s[seen] ** 2 / (tau[seen] ** 2 + problem.assumed.split**2)).sum())
+    total = float(r @ P @ r) + splits
+    freedom = max(1, len(r) - len(d) + int(seen.sum()))
+    absorbed: dict[str, float] = {}
+    bias: dict[str, dict[str, float]] = {name: {} for name in variables}
+    for id, nodes in problem.expansion.nodes.items():
+        e = np.array([max(nodes.reach, key=abs)])
+        g = problem.added({id: e}, 1)[0][0] - shift[0]
+        whole = g @ inverse @ g
+        absorbed[id] = float(1 - g @ P @ g / whole) if whole > 0 else 0.0
+        for name, change in zip(variables, absorbing @ g, strict=True):
+            bias[name][id] = float(100 * np.expm1(change))
+    rows = problem.observations.rows
+    return Gap(
+        total, freedom, float(chi2.sf(total, freedom)), r, np.sqrt(np.diag(C)),
+        tuple(_corrected(_groups(rows, r, C))), tuple(_contrasts(rows, r, C)), absorbed, bias,
+    )  # fmt: skip
+
+
+def _groups(rows: tuple[Row, ...], r: Array, C: Array) -> list[Group]:
+    kinds: dict[str, Callable[[Row], str | None]] = {
+        "family": family,
+        "harmonic": lambda row: str(row.label.c) if row.label else None,
+        "pressure": lambda row: f"{row.pressure_kPa:g}" if row.label else None,
+        "mass": lambda row: None if row.label else "mass",
+    }
+    result = []
+    for kind, name_of in kinds.items():
+        names = [name_of(row) for row in rows]
+        for name in sorted({n for n in names if n}, key=_as_number):
+            G = np.array([n == name for n in names])
+            value, freedom = _chi2(r[G], C[np.ix_(G, G)])
+            p = float(chi2.sf(value, freedom)) if freedom else 1.0
+            rms = float(100 * np.sqrt(np.mean(r[G] ** 2)))
+            result.append(Group(kind, name, rms, value, freedom, p, p))
+    return result
+
+
+def family(row: Row) -> str | None:
+    """in-plane, lateral (out-of-plane), [0,0], or None."""
+    if row.label is None:
+        return None
+    return "[0,0]" if row.label.kind else FAMILIES.get(row.label.family or "")
+
+
+def _chi2(r: Array, C: Array) -> tuple[float, int]:
+    """r^T C^+ r and the rank of C: few residuals of a fit leave directions without scatter."""
+    values, vectors = np.linalg.eigh(C)
+    keep = values > 1e-6 * values.max(initial=1e-300)
+    along = vectors[:, keep].T @ r
+    return float((along**2 / values[keep]).sum()), int(keep.sum())
+
+
+def _corrected(groups: list[Group]) -> list[Group]:
+    """Holm: the i-th smallest of m p-values times m - i + 1, never falling."""
+    order = sorted(range(len(groups)), key=lambda i: groups[i].p_value)
+    running, result = 0.0, list(groups)
+    for place, i in enumerate(order):
+        running = max(running, min(1.0, groups[i].p_value * (len(groups) - place)))
+        g = groups[i]
+        result[i] = Group(g.kind, g.name, g.rms_percent, g.chi2, g.freedom, g.p_value, running)
+    return result
+
+
+def _contrasts(rows: tuple[Row, ...], r: Array, C: Array) -> list[Contrast]:
+    modes = np.array([row.label is not None for row in rows])
+    c = np.array([row.label.c if row.label else -1 for row in rows], float)
+    lateral = np.array([family(row) == "lateral" for row in rows])
+    plane = np.array([family(row) == "in-plane" for row in rows])
+    ln_p = np.array([np.log(row.pressure_kPa) if row.label else 0.0 for row in rows])
+    weights = {
+        "all modes": _mean(modes),
+        "slope over the harmonic, c = 4 over c = 1": _slope(modes & (c > 0), c, 3.0),
+        "lateral less in-plane": _mean(lateral) - _mean(plane),
+        "c = 1 less c of 2 and more": _mean(c == 1) - _mean(c >= 2),
+        "c = 0 less the others": _mean(c == 0) - _mean(c >= 1),
+        "growth with pressure, 320 over 160 kPa": _slope(modes, ln_p, np.log(2.0)),
+    }
+    result = []
+    for name, w in weights.items():
+        if np.isfinite(w).all() and w @ C @ w > 1e-14:
+            result.append(Contrast(name, float(100 * w @ r), float(100 * np.sqrt(w @ C @ w))))
+    return result
+
+
+def _mean(mask: Array) -> Array:
+    """Weights of a mean over rows; NaN where there are none."""
+    return mask / mask.sum() if mask.any() else np.full(len(mask), np.nan)
+
+
+def _slope(mask: Array, x: Array, span: float) -> Array:
+    """Weights of the least-squares slope over x, times ``span``."""
+    off = np.where(mask, x - x[mask].mean(), 0.0) if mask.any() else np.zeros(len(x))
+    return off / (off @ off) * span if off @ off > 0 else np.full(len(x), np.nan)
+
+
+def _as_number(name: str) -> tuple[float, str]:
+    try:
+        return float(name), ""
+    except ValueError:
+        return 0.0, name

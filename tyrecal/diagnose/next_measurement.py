@@ -1,0 +1,184 @@
+"""The measurement worth making next: what each would add to telling the explanations apart.
+
+Gain of a choice: the rise of sum over explanations i, j of p_i p_j min(delta_ij^2, 40) for an hour
+of work, where delta_ij^2 = |P^1/2 (g_i - g_j)|^2, "none" having g = 0. (A distance beyond 40 is as
+good as certain.)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..modes.mode import Label
+from .covariance import covariance
+from .evidence import NONE, OUTSIDE
+from .observations import Observations, Row
+from .problem import Change, Problem
+from .response import Answer, Point, Response
+
+Array = np.ndarray
+ModelRow = tuple[Label | None, float]
+ENOUGH = 40.0
+LIKELY, MOST = 0.02, 6  # explanations below this probability, or beyond this number, do not count
+HOURS = {"toggle": 4.0, "check": 1.0, "repeat": 2.0, "pressure": 1.0, "harmonics": 1.0,
+         "weigh": 0.25}  # of a laboratory, as an orientation  # fmt: skip
+CHECKED = 0.25  # what is left of a constant's standard deviation when it is measured by itself
+REPEATED = 4  # times, each after dismounting
+PRESSURES_kPa = (160.0, 200.0, 240.0, 280.0, 320.0)
+FAR_kPa = 60.0  # from every pressure measured so far, for a new one to be offered
+MASS_PERCENT = 0.5
+
+
+@dataclass(frozen=True)
+class Choice:
+    """A measurement, its cost in hours (an orientation), and its gain per hour."""
+
+    what: str
+    hours: float
+    gain: float
+
+
+@dataclass(frozen=True)
+class _Look:
+    """What a set of rows shows: Sigma (n, n), J (n, v), shift (n,) of each explanation."""
+
+    sigma: Array
+    jacobian: Array
+    shifts: Mapping[str, Array]
+
+    def apart(self, likely: Mapping[str, float], spread: Array) -> float:
+        """sum over i, j of p_i p_j min(delta_ij^2, 40)."""
+        inverse = np.linalg.inv(self.sigma)
+        J = self.jacobian
+        inner = np.linalg.solve(J.T @ inverse @ J + np.diag(spread**-2.0), J.T @ inverse)
+        P = inverse - inverse @ J @ inner
+        keys, total = list(likely), 0.0
+        for i, a in enumerate(keys):
+            for b in keys[:i]:
+                off = self.shifts[a] - self.shifts[b]
+                total += 2 * likely[a] * likely[b] * min(float(off @ P @ off), ENOUGH)
+        return total
+
+
+def rank(
+    problem: Problem,
+    d: Array,
+    probabilities: Mapping[str, float],
+    sizes: Mapping[str, Mapping[str, float]],
+    sources: Sequence[str],
+    further: Callable[[list[ModelRow]], Response] | None = None,
+) -> list[Choice]:
+    """The menu by falling gain, at the plain fit x0 + d.
+
+    sizes: parameters by explanation and id; sources: names of the sources of error; further: a
+    model of other rows of the same tyre. Empty where one explanation stands alone.
+    """
+    likely = {key: p for key, p in probabilities.items()
+              if p > LIKELY and key != OUTSIDE and (key == NONE or key in sizes)}  # fmt: skip
+    likely = dict(sorted(likely.items(), key=lambda item: -item[1])[:MOST])
+    if len(likely) < 2:
+        return []
+    now = _look(problem, d, likely, sizes)
+    before = now.apart(likely, problem.spread)
+    offered: list[tuple[str, float, _Look]] = []
+    for k, source in enumerate(sources):
+        known = replace(problem, reduced={**problem.reduced, k: CHECKED})
+        words = f"measure by itself: {source.replace('_', ' ')}"
+        offered.append((words, HOURS["check"], _look(known, d, likely, sizes)))
+    o = problem.observations
+    factor = 1 / np.sqrt(REPEATED)
+    finer = replace(o, scatter=o.scatter * factor, common=o.common * factor)
+    offered.append((f"measure all {REPEATED} times, dismounted in between",
+                    HOURS["repeat"] * (REPEATED - 1),
+                    _look(replace(problem, observations=finer), d, likely, sizes)))  # fmt: skip
+    for id in dict.fromkeys(id for key in likely if key != NONE for id in sizes[key]):
+        span = problem.spans.get(id)
+        words = (span.toggle if span else "") or f"measure again without {id}"
+        offered.append((words, HOURS["toggle"], _look(_switched(problem, id), d, likely, sizes)))
+    if further:
+        offered += _more_rows(problem, now, likely, sizes, further)
+    choices = [
+        Choice(what, hours, (look.apart(likely, problem.spread) - before) / hours)
+        for what, hours, look in offered
+    ]
+    return sorted(choices, key=lambda choice: -choice.gain)
+
+
+def _look(
+    problem: Problem,
+    d: Array,
+    likely: Mapping[str, float],
+    sizes: Mapping[str, Mapping[str, float]],
+) -> _Look:
+    shifts = {
+        key: problem.added({id: np.array([e]) for id, e in sizes.get(key, {}).items()}, 1)[0][0]
+        for key in likely
+    }
+    return _Look(problem.sigma, problem.plain(d)[1], shifts)
+
+
+def _switched(problem: Problem, id: str) -> Problem:
+    """The problem with one run more, in which the effect is absent."""
+    run = 1 + len(problem.changes)
+    first = np.array([row.run == 0 for row in problem.observations.rows])
+    o = problem.observations
+    join = lambda values: np.concatenate([values, values[first]])
+    rows = (*o.rows, *(replace(row, run=run) for row in o.only(first).rows))
+    both = Observations(rows, join(o.y), join(o.scatter), o.common, join(o.split),
+                        join(o.split_scatter))  # fmt: skip
+    changes = (*problem.changes, Change(id, 0.0))
+    return replace(problem, observations=both, places=join(problem.places), changes=changes)
+
+
+def _more_rows(
+    problem: Problem,
+    now: _Look,
+    likely: Mapping[str, float],
+    sizes: Mapping[str, Mapping[str, float]],
+    further: Callable[[list[ModelRow]], Response],
+) -> list[tuple[str, float, _Look]]:
+    """Other pressures, higher harmonics and the mass, as far as the model has an answer."""
+    o = problem.observations
+    labels = sorted({row.label for row in o.rows if row.label}, key=str)
+    pressures = sorted({row.pressure_kPa for row in o.rows if row.label})
+    offered: list[tuple[str, float, list[ModelRow]]] = []
+    for p in PRESSURES_kPa:
+        if all(abs(p - q) >= FAR_kPa for q in pressures):
+            offered.append((f"measure the same modes at {p:g} kPa", HOURS["pressure"],
+                            [(label, p) for label in labels]))  # fmt: skip
+    top = max(label.c for label in labels)
+    higher = [Label(top + 1, 0), Label(top + 1, 1)]
+    offered.append((f"measure {higher[0]} and {higher[1]}, too", HOURS["harmonics"],
+                    [(label, p) for label in higher for p in pressures]))  # fmt: skip
+    if all(row.label for row in o.rows):
+        offered.append(("weigh the tyre", HOURS["weigh"], [(None, 0.0)]))
+    rows = list(dict.fromkeys(row for _, _, more in offered for row in more))
+    model = further(rows)
+    x0 = problem.expansion.x0
+    points = [Point(x0, constants=True), *(Point(x0, sizes.get(key, {})) for key in likely)]
+    answers = model.answers(points)
+    if not all(isinstance(answer, Answer) for answer in answers):
+        return []
+    plain, *others = [answer for answer in answers if isinstance(answer, Answer)]
+    assert plain.constants is not None
+    scatter = float(np.median(o.scatter))
+    result = []
+    for words, hours, more in offered:
+        at = [rows.index(row) for row in more]
+        new = tuple(Row("frequency_Hz" if x else "mass_kg", x, p) for x, p in more)
+        size = [scatter if label else MASS_PERCENT / 100 for label, _ in more]
+        none = np.full(len(more), np.nan)
+        both = Observations((*o.rows, *new), np.concatenate([o.y, plain.eta[at]]),
+                            np.concatenate([o.scatter, size]), o.common,
+                            np.concatenate([o.split, none]),
+                            np.concatenate([o.split_scatter, none]))  # fmt: skip
+        constants = np.vstack([problem.constants, plain.constants[at]])
+        shifts = {key: np.concatenate([now.shifts[key], (other.eta - plain.eta)[at]])
+                  for key, other in zip(likely, others, strict=True)}  # fmt: skip
+        jacobian = np.vstack([now.jacobian, plain.jacobian[at]])
+        sigma = covariance(both, constants, problem.assumed.form)
+        result.append((words, hours, _Look(sigma, jacobian, shifts)))
+    return result

@@ -1,0 +1,116 @@
+"""Observations beside the model: one set of rows, covariance and prior for every hypothesis."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from .covariance import alike, covariance
+from .expansion import Expansion
+from .observations import Observations
+from .response import Span
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True)
+class Change:
+    """What was switched in a toggled run: effect ``id`` set to ``value``, or times it."""
+
+    id: str
+    value: float
+    times: bool = False
+
+    def applied(self, effects: Mapping[str, Array], count: int) -> dict[str, Array]:
+        """Parameters (count,) of effects in the toggled run."""
+        old = effects.get(self.id, np.zeros(count))
+        new = old * self.value if self.times else np.full(count, self.value)
+        return {**effects, self.id: new}
+
+
+@dataclass(frozen=True)
+class Assumed:
+    """Numbers that the diagnosis takes for granted, all of them stated in its result.
+
+    form: relative model-form error of every mode, None = on record; split: relative split of
+    pairs that non-uniformity gives this kind of tyre; law: how far, relative to its own shift of
+    a frequency, an effect of the catalogue may be off the real one.
+    """
+
+    form: float | None = None
+    split: float = 0.003
+    law: float = 0.05
+
+
+@dataclass(frozen=True)
+class Problem:
+    """n observations, their rows' places in the model's rows (``places`` (n,)), what was switched
+    in runs 1, 2, ..., and the covariance; centre, spread (v,): of x before any measurement."""
+
+    observations: Observations
+    expansion: Expansion
+    spans: Mapping[str, Span]
+    places: Array
+    centre: Array
+    spread: Array
+    changes: tuple[Change, ...] = ()
+    assumed: Assumed = Assumed()
+    reduced: Mapping[int, float] = field(default_factory=dict)
+
+    @property
+    def constants(self) -> Array:
+        """s_k g_k (n, k) of the rows."""
+        known = self.expansion.constants[self.places].copy()
+        for k, factor in self.reduced.items():
+            known[:, k] *= factor
+        return known
+
+    @property
+    def sigma(self) -> Array:
+        """Sigma (n, n)."""
+        return covariance(self.observations, self.constants, self.assumed.form)
+
+    def only(self, keep: Array) -> Problem:
+        """The problem with the rows of a mask (n,) alone."""
+        return replace(self, observations=self.observations.only(keep), places=self.places[keep])
+
+    def measured(self, y: Array) -> Problem:
+        """The problem with other values (n,) in the same rows."""
+        return replace(self, observations=replace(self.observations, y=y))
+
+    def plain(self, d: Array) -> tuple[Array, Array]:
+        """eta (n,), J (n, v) at x0 + d without effects, whatever was switched."""
+        eta, jacobian = self.expansion.plain(self.expansion.x0 + d)
+        return eta[self.places], jacobian[self.places]
+
+    def added(self, effects: Mapping[str, Array], count: int) -> tuple[Array, Array, Array]:
+        """What effects, each (count,), add: a (q, n), B (q, n, v), split (q, n)."""
+        n, v = len(self.places), len(self.expansion.x0)
+        shift, tilt = np.zeros((count, n)), np.zeros((count, n, v))
+        split = np.tile(self.expansion.split[self.places], (count, 1))
+        runs = np.array([row.run for row in self.observations.rows])
+        for run in sorted(set(runs.tolist())):
+            rows = np.flatnonzero(runs == run)
+            here = dict(effects)
+            if run and self.changes:
+                here = self.changes[run - 1].applied(here, count)
+            for id, e in here.items():
+                if id in self.expansion.nodes:
+                    a, B, s = self.expansion.nodes[id].at(e)
+                    shift[:, rows] += a[:, self.places[rows]]
+                    tilt[:, rows] += B[:, self.places[rows]]
+                    split[:, rows] = np.hypot(split[:, rows], s[:, self.places[rows]])
+        return shift, tilt, split
+
+    def law(self, shift: Array) -> Array:
+        """Covariance (q, n, n) by which an effect's law may be off its shift (q, n)."""
+        off = self.assumed.law * shift
+        return np.asarray(off[:, :, None] * off[:, None, :] * alike(self.observations.rows))
+
+
+def places(observations: Observations, rows: Sequence[tuple]) -> Array:
+    """Where each observation stands among the model's rows (label or None, pressure)."""
+    known = {row: i for i, row in enumerate(rows)}
+    return np.array([known[row.label, row.pressure_kPa] for row in observations.rows], int)

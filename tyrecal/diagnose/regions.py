@@ -1,0 +1,108 @@
+"""Slopes of the modes by stiffness and mass of each part of the section, preload included."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..case import LoadedCase
+from ..case.schema import Rubber, Solid
+from ..evaluate.failure import EvaluationFailed
+from ..fit import problem as fit
+from .tyre_model import TyreModel
+
+Array = np.ndarray
+TREAD = "tread"
+
+
+@dataclass(frozen=True)
+class Region:
+    """A part of the section: its name; stiffness, mass (n,): d ln f by the logarithm of either;
+    material: what the split case calls it."""
+
+    name: str
+    stiffness: Array
+    mass: Array
+    material: str
+
+
+def regions(model: TyreModel, x: Array) -> list[Region]:
+    """Every region's rubber (the crown's in two: tread and what lies under it), every cord.
+
+    One evaluation a pressure, with exact slopes by the constants of each part. Raises
+    EvaluationFailed.
+    """
+    case, parts = split_by_region(model.door.case)
+    materials = case.case.materials
+    numbers = {}
+    for material in parts:
+        rubber = isinstance(materials[material], Rubber)
+        keys = ("C10_Pa", "C01_Pa", "D1_per_Pa") if rubber else ("youngs_modulus_Pa",)
+        for key in (*keys, "density_kg_per_m3"):
+            numbers[f"materials.{material}.{key}"] = float(getattr(materials[material], key))
+    door = model.door.worker()
+    door.case = case
+    problem = fit.Problem(case, door, jobs=model.jobs)
+    own = model.values(x)
+    taken = {path: own[name] for name, v in case.case.variables.items() for path in v.sets}
+    design = {**numbers, **taken}
+    found = problem.modes([{**design, "pressure_kPa": p} for p in model.pressures], tuple(numbers))
+    for each in found:
+        if isinstance(each, EvaluationFailed):
+            raise each
+    model.door.counts.add(door.counts)
+    at = dict(zip(model.pressures, found, strict=True))
+    result = []
+    for material, name in parts.items():
+        columns = np.zeros((2, len(model.rows)))
+        for i, (label, pressure) in enumerate(model.rows):
+            if label is None:
+                continue
+            evaluation, modes, _ = at[pressure]  # type: ignore[misc]
+            f, place = modes[label].frequency_Hz, modes[label].position
+            for path in (p for p in numbers if p.startswith(f"materials.{material}.")):
+                slope = evaluation.gradients[path][place] * design[path] / f
+                key = path.rpartition(".")[2]
+                sign = -1.0 if key == "D1_per_Pa" else 1.0
+                columns[int(key.startswith("density")), i] += sign * slope
+        result.append(Region(name, columns[0], columns[1], material))
+    return result
+
+
+def split_by_region(case: LoadedCase) -> tuple[LoadedCase, Mapping[str, str]]:
+    """The same tyre with a rubber of its own in every region, and names of the parts by material.
+
+    Cords keep their materials, which are parts too. Design variables set all copies.
+    """
+    lines, names = case.section.names, [name for name, _ in case.section.regions]
+    materials, solids, parts = dict(case.case.materials), [], {}
+    copies: dict[str, list[str]] = {}
+    for i, solid in enumerate(case.case.solids):
+        for region in solid.regions or names:
+            pieces: list[tuple[str, list[str] | None]] = [(region, solid.between)]
+            if region == names[0] and solid.between is None:
+                pieces = [(f"{region} under the tread", [lines[0], lines[-2]]),
+                          (TREAD, [lines[-2], lines[-1]])]  # fmt: skip
+            for words, between in pieces:
+                copy = f"part_{i}_{words.replace(' ', '_')}"
+                materials[copy] = case.case.materials[solid.material]
+                copies.setdefault(solid.material, []).append(copy)
+                solids.append(Solid(material=copy, regions=[region], between=between))
+                one = len(case.case.solids) == 1
+                parts[copy] = words.replace("_", " ") + ("" if one else f", {solid.material}")
+    for name, own in case.case.materials.items():
+        if not isinstance(own, Rubber):
+            parts[name] = name.replace("_", " ") + "s"
+    variables = {}
+    for name, variable in case.case.variables.items():
+        sets = []
+        for path in variable.sets:
+            head, _, rest = path.partition(".")
+            material, _, key = rest.partition(".")
+            same = copies.get(material, []) if head == "materials" else []
+            sets += [path, *(f"materials.{copy}.{key}" for copy in same)]
+        variables[name] = variable.model_copy(update={"sets": sets})
+    wanted = {"materials": materials, "solids": solids, "variables": variables}
+    return replace(case, case=case.case.model_copy(update=wanted)), parts

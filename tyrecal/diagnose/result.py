@@ -1,0 +1,118 @@
+"""The diagnosis as the content of diagnosis.json."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from .diagnosis import Diagnosis
+from .gap import projection
+
+
+def result(diagnosis: Diagnosis) -> dict[str, Any]:
+    """Plain data; numbers in the units of their names, None where there is none.
+
+    ``detectability`` is lambda at the sizes in ``judged_at``; ``full_size`` at the far end of each
+    range; ``smallest_visible``: the least parameter with lambda = 10. ``bias_percent``: the effect
+    at full size and ignored.
+    """
+    d, gap, s = diagnosis, diagnosis.gap, diagnosis.shrinkage
+    best = d.best
+    named = d.verdict.key
+    by = {kind: {g.name: g.rms_percent for g in gap.groups if g.kind == kind}
+          for kind in ("family", "harmonic", "pressure")}  # fmt: skip
+    return {
+        "format": 1,
+        "verdict": d.verdict.kind,
+        "words": d.verdict.words,
+        "effect": named,
+        "parameter": _parameter(d, named or best),
+        "likeliest": best,
+        "probabilities": _sorted(d.probabilities),
+        "candidate_set": list(d.verdict.candidates),
+        "fit_p_value": d.verdict.check,
+        "groups": d.separability.groups(),
+        "detectability": dict(d.separability.lambdas),
+        "judged_at": dict(d.separability.sizes),
+        "full_size": dict(d.separability.full),
+        "smallest_visible": dict(d.separability.smallest),
+        "gap": {
+            "p_value": gap.p_value,
+            "chi2": gap.chi2,
+            "freedom": gap.freedom,
+            "rms_percent": gap.rms_percent,
+            "by_family": by["family"],
+            "by_harmonic": by["harmonic"],
+            "by_pressure": by["pressure"],
+            "groups": [
+                {"kind": g.kind, "name": g.name, "p_value": g.p_value, "holm": g.corrected}
+                for g in gap.groups
+            ],
+            "contrasts": [
+                {"name": c.name, "percent": c.percent, "sigma_percent": c.sigma_percent}
+                for c in gap.contrasts
+            ],
+            "residuals": [
+                {"row": str(row), "run": row.run, "percent": 100 * r, "sigma_percent": 100 * sd}
+                for row, r, sd in zip(
+                    d.problem.observations.rows,
+                    gap.residuals.tolist(),
+                    gap.spread.tolist(),
+                    strict=True,
+                )
+            ],
+        },
+        "section_map": [
+            {
+                "region": p.region,
+                "stiffness_percent": p.stiffness_percent,
+                "stiffness_sigma": p.stiffness_sigma,
+                "mass_percent": p.mass_percent,
+                "mass_sigma": p.mass_sigma,
+                "evidence": p.evidence,
+                "same_as": list(p.same_as),
+            }
+            for p in d.parts
+        ],
+        "effective_rank": d.effective_rank,
+        "shrinkage": None if s is None else {
+            "held_out": s.held_out,
+            "effect": s.effect,
+            "before_percent": s.before_percent,
+            "after_percent": s.after_percent,
+            "fraction": s.fraction,
+            "low": s.low,
+            "high": s.high,
+            "placebo_95": s.placebo_95,
+            "floor_percent": s.floor_percent,
+            "before_sigma": s.before_sigma,
+            "after_sigma": s.after_sigma,
+        },
+        "rung": d.rung,
+        "absorbed": dict(gap.absorbed),
+        "bias_percent": {name: dict(by_effect) for name, by_effect in gap.bias_percent.items()},
+        "next_measurements": [
+            {"what": c.what, "gain": c.gain, "hours": c.hours} for c in d.choices
+        ],
+        "left_out": list(d.problem.observations.left_out),
+        "not_evaluated": dict(d.problem.expansion.failed),
+    }  # fmt: skip
+
+
+def _parameter(diagnosis: Diagnosis, key: str | None) -> dict[str, Any] | None:
+    if key is None:
+        return None
+    own = diagnosis.parameter(key)
+    hypothesis = diagnosis.hypothesis(key)
+    effects = {id: np.array([e]) for id, e in hypothesis.mean().items()}
+    shift = diagnosis.bare.added(effects, 1)[0][0] - diagnosis.bare.added({}, 1)[0][0]
+    assert hypothesis.fitted is not None
+    P, _, _ = projection(diagnosis.bare, hypothesis.fitted.d[hypothesis.best])
+    return {"effect": key.split("+")[0], **own, "lambda": float(shift @ P @ shift)}
+
+
+def _sorted(probabilities: Any) -> dict[str, float]:
+    """Likeliest first; none and outside always, others that hold a millionth."""
+    order = sorted(probabilities.items(), key=lambda item: -item[1])
+    return {key: p for key, p in order if p > 1e-6 or key in ("none", "outside")}

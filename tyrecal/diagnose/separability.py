@@ -1,0 +1,96 @@
+"""What the data can see and tell apart.
+
+    lambda_i    = |P^1/2 g_i|^2                                    detectability
+    delta_ij^2  = min over e_j of |P^1/2 (g_i - g_j(e_j))|^2       distance of two effects
+
+g_i: shift of all rows by the effect at a given size.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from .problem import Problem
+
+Array = np.ndarray
+VISIBLE, APART = 10.0, 9.0
+GRID = 81
+
+
+@dataclass(frozen=True)
+class Separability:
+    """ids (m,); sizes: the parameter that each is judged at; lambdas at those sizes, and ``full``
+    at the far end of the range; cosines (m, m); distances (m, m): delta_ij^2, row i at its size;
+    smallest: the least parameter with lambda = 10, None beyond the range."""
+
+    ids: tuple[str, ...]
+    sizes: Mapping[str, float]
+    lambdas: Mapping[str, float]
+    full: Mapping[str, float]
+    cosines: Array
+    distances: Array
+    smallest: Mapping[str, float | None]
+
+    def groups(self, among: Sequence[str] | None = None) -> list[list[str]]:
+        """Ids that these data cannot separate: linked by delta^2 < 9 from either side, both of
+        them detectable."""
+        ids = [id for id in self.ids if among is None or id in among]
+        place = {id: i for i, id in enumerate(self.ids)}
+        near = lambda a, b: (
+            min(self.distances[place[a], place[b]], self.distances[place[b], place[a]]) < APART
+        )  # fmt: skip
+        left, result = [id for id in ids if self.lambdas[id] >= APART], []
+        while left:
+            group = [left.pop(0)]
+            for member in group:
+                more = [id for id in left if near(member, id)]
+                group += more
+                left = [id for id in left if id not in more]
+            result.append(group)
+        return [group for group in result if len(group) > 1]
+
+
+def separate(problem: Problem, P: Array, sizes: Mapping[str, float]) -> Separability:
+    """Judge each effect at its size, or at full size where it would not be seen at that."""
+    ids = tuple(problem.expansion.nodes)
+    grids, shifts, ends = {}, {}, {}
+    for id in ids:
+        low, high = problem.expansion.nodes[id].reach
+        grids[id] = np.linspace(low, high, GRID)
+        shifts[id] = problem.added({id: grids[id]}, GRID)[0] - problem.added({}, 1)[0]
+        ends[id] = int(np.argmax(abs(grids[id])))
+    length = {id: np.einsum("qn,nm,qm->q", shifts[id], P, shifts[id]) for id in ids}
+    at = {}
+    for id in ids:
+        nearest = int(np.argmin(abs(grids[id] - sizes.get(id, 0.0))))
+        at[id] = nearest if length[id][nearest] >= VISIBLE else ends[id]
+    chosen = np.array([shifts[id][at[id]] for id in ids]).reshape(len(ids), len(P))
+    gram = chosen @ P @ chosen.T
+    norm = np.sqrt(np.maximum(np.diag(gram), 1e-300))
+    distances = np.zeros_like(gram)
+    for i in range(len(ids)):
+        for j, b in enumerate(ids):
+            if i != j:
+                off = shifts[b] - chosen[i]
+                distances[i, j] = np.einsum("qn,nm,qm->q", off, P, off).min()
+    return Separability(
+        ids,
+        {id: float(grids[id][at[id]]) for id in ids},
+        {id: float(length[id][at[id]]) for id in ids},
+        {id: float(length[id][ends[id]]) for id in ids},
+        gram / np.outer(norm, norm),
+        distances,
+        {id: _smallest(grids[id], length[id]) for id in ids},
+    )
+
+
+def _smallest(grid: Array, length: Array) -> float | None:
+    """The least parameter with lambda = 10, between points of the grid by its square root."""
+    seen = np.flatnonzero(length >= VISIBLE)
+    if not len(seen):
+        return None
+    best = seen[np.argmin(abs(grid[seen]))]
+    return float(grid[best] * np.sqrt(VISIBLE / length[best]))

@@ -1,0 +1,130 @@
+"""A case and its files of measurements, diagnosed: what the command does, for other programs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..case import LoadedCase
+from ..effects import catalogue
+from ..evaluate.door import Door
+from .diagnosis import Diagnosis, diagnose
+from .measurements import BadMeasurements, read_measurements
+from .observations import Observations, observe
+from .problem import Assumed, Change
+from .regions import regions
+from .response import Span
+from .tyre_model import TyreModel
+from .uncertainties import Source, sources
+
+ALIKE = 2.0  # factor between measured and computed frequency beyond which the unit is wrong
+
+
+class BadChange(ValueError):
+    """What was switched in a toggled run is not understood."""
+
+
+@dataclass(frozen=True)
+class Study:
+    """A diagnosis with what it rests on: sources of error, whether they were assumed, effects
+    that the solver cannot express, and the model."""
+
+    diagnosis: Diagnosis
+    sources: tuple[Source, ...]
+    assumed_sources: bool
+    inexpressible: tuple[str, ...]
+    model: TyreModel
+
+
+def study(
+    case: LoadedCase,
+    door: Door,
+    measured: Path,
+    repeats: Sequence[Path] = (),
+    toggled: Sequence[tuple[Path, Change]] = (),
+    assumed: Assumed = Assumed(),  # noqa: B008
+    jobs: int = 1,
+    effects: Sequence[str] | None = None,
+    section_map: bool = True,
+) -> Study:
+    """Read the files and diagnose the case with them.
+
+    effects: ids to consider, None = the whole catalogue. Raises BadMeasurements, BadChange,
+    EvaluationFailed, and what ``Door.evaluate`` raises.
+    """
+    observations = observe(
+        read_measurements(measured),
+        [read_measurements(path) for path in repeats],
+        [read_measurements(path) for path, _ in toggled],
+        assumed.split,
+    )
+    rows = list(dict.fromkeys((row.label, row.pressure_kPa) for row in observations.rows))
+    if not any(label for label, _ in rows):
+        raise BadMeasurements(f"{measured}: there is no frequency of the unloaded tyre in it")
+    spans, inexpressible = spans_of(door, effects)
+    found, assumed_sources = sources(case)
+    model = TyreModel(case, door, rows, found, spans, jobs)
+    _check_units(model, observations, measured)
+    diagnosis = diagnose(
+        model, rows, observations, tuple(change for _, change in toggled), assumed,
+        parts=(lambda x: regions(model, x)) if section_map else None,
+        further=lambda more: TyreModel(case, _same(door), more, found, spans, jobs),
+    )  # fmt: skip
+    return Study(diagnosis, tuple(found), assumed_sources, tuple(inexpressible), model)
+
+
+def spans_of(door: Door, ids: Sequence[str] | None = None) -> tuple[dict[str, Span], list[str]]:
+    """Effects that the door's solver can express, and ids of those that it cannot."""
+    able, unable = {}, []
+    for id, effect in catalogue().items():
+        if ids is not None and id not in ids:
+            continue
+        if not effect.within(door.solver.capabilities):
+            unable.append(id)
+        else:
+            able[id] = Span(effect.low, effect.high, effect.unit, effect.title, effect.toggle)
+    return able, unable
+
+
+def parse_change(text: str) -> Change:
+    """``EFFECT=VALUE`` or ``EFFECT*FACTOR``. Raises BadChange."""
+    for mark in "=*":
+        id, found, value = text.partition(mark)
+        if found:
+            break
+    id = id.strip()
+    known = catalogue()
+    if not found or id not in known:
+        raise BadChange(
+            f"'{text}' must say what was switched: EFFECT=VALUE or EFFECT*FACTOR, EFFECT one of"
+            f" {', '.join(known)}"
+        )
+    try:
+        return Change(id, float(value), mark == "*")
+    except ValueError:
+        raise BadChange(f"'{text}': '{value.strip()}' is not a number") from None
+
+
+def _same(door: Door) -> Door:
+    """The same door with the same counts, for other rows of the same tyre."""
+    other = door.worker()
+    other.counts = door.counts
+    return other
+
+
+def _check_units(model: TyreModel, observations: Observations, path: Path) -> None:
+    """Raises BadMeasurements where no frequency is near the model's start."""
+    from .response import Answer, Point
+
+    (answer,) = model.answers([Point(model.start)])
+    if not isinstance(answer, Answer):
+        raise answer
+    at = {row: eta for row, eta in zip(model.rows, answer.eta, strict=True)}
+    for row, y in zip(observations.rows, observations.y, strict=True):
+        ratio = float(2.718281828459045 ** (y - at[row.label, row.pressure_kPa]))
+        if row.label and not 1 / ALIKE < ratio < ALIKE:
+            raise BadMeasurements(
+                f"{path}: {row} was measured {ratio:.2g} times as high as the model has it; is it"
+                " the right unit, mode and pressure?"
+            )

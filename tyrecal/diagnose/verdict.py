@@ -1,0 +1,70 @@
+"""What may be said: named, undecided, no gap seen, or outside the catalogue."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from scipy.stats import chi2
+
+from .evidence import NONE, OUTSIDE, PRIOR_NONE, Hypothesis
+
+NAMED, UNDECIDED, NO_GAP = "named", "undecided", "no_gap"
+SURE, RULED_OUT, CHECK, SET = 0.7, 0.05, 0.01, 0.9
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """kind: named, undecided, no_gap or outside; key: of what is named, an id or "id1+id2";
+    candidates: keys that hold 90 % of the probability together; check: p-value of the likeliest
+    effect's own fit; words: one sentence."""
+
+    kind: str
+    key: str | None
+    candidates: tuple[str, ...]
+    check: float
+    words: str
+
+
+def decide(
+    hypotheses: Sequence[Hypothesis], probabilities: Mapping[str, float], rows: int, variables: int
+) -> Verdict:
+    """The verdict by fixed rules.
+
+    named: p >= 0.7, the fit with it has p > 0.01, p(none) < 0.05; outside: p >= 0.5 and p(none) <
+    0.05, or nothing that fits; no_gap: "none" is likelier than it was before, and likeliest.
+    """
+    order = sorted(probabilities, key=lambda key: -probabilities[key])
+    candidates, total = [], 0.0
+    for key in order:
+        candidates.append(key)
+        total += probabilities[key]
+        if total >= SET:
+            break
+    effects = [key for key in order if key not in (NONE, OUTSIDE)]
+    none = probabilities[NONE]
+    by_key = {h.key: h for h in hypotheses}
+    best = effects[0] if effects else None
+    check = _check(by_key[best], rows, variables) if best else 1.0
+    said = tuple(candidates)
+    if rows <= variables:
+        return Verdict(UNDECIDED, None, said, check, "cannot tell: there are no more data than"
+                       " design variables")  # fmt: skip
+    if best and probabilities[best] >= SURE and check > CHECK and none < RULED_OUT:
+        return Verdict(NAMED, best, said, check, f"{best} explains the gap")
+    misfit = best is not None and probabilities[best] >= SURE and check <= CHECK
+    if none < RULED_OUT and (probabilities[OUTSIDE] >= 0.5 or misfit):
+        words = by_key[OUTSIDE].words
+        return Verdict(OUTSIDE, None, said, check, f"there is a gap, and nothing in the catalogue"
+                       f" explains it: {words}")  # fmt: skip
+    if order[0] == NONE and none > PRIOR_NONE:
+        return Verdict(NO_GAP, None, said, check, "no gap is seen")
+    gap = "there is a gap" if none < RULED_OUT else "there may be a gap"
+    return Verdict(UNDECIDED, None, said, check, f"{gap}, its cause is undecided")
+
+
+def _check(hypothesis: Hypothesis, rows: int, variables: int) -> float:
+    """p-value of chi2 at the likeliest parameters."""
+    assert hypothesis.fitted is not None
+    freedom = max(1, rows - variables - len(hypothesis.values))
+    return float(chi2.sf(hypothesis.fitted.chi2[hypothesis.best], freedom))

@@ -1,0 +1,69 @@
+"""Where in the section the gap could lie: one part softer or stiffer, heavier or lighter."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from .problem import Problem
+from .regions import Region
+
+Array = np.ndarray
+STIFFNESS, MASS = 0.2, 0.1  # standard deviations of a part's relative change before the data
+SAME = 0.95  # cosine of columns beyond which two parts cannot be told apart
+
+
+@dataclass(frozen=True)
+class Place:
+    """A part of the section: the change of its stiffness, or of its mass, that fits the gap best
+    alone, in per cent with standard deviations; ln evidence over no change of the better one;
+    same_as: parts whose effect looks alike."""
+
+    region: str
+    stiffness_percent: float
+    stiffness_sigma: float
+    mass_percent: float
+    mass_sigma: float
+    evidence: float
+    same_as: tuple[str, ...]
+
+
+def section_map(
+    problem: Problem, P: Array, residuals: Array, parts: Sequence[Region]
+) -> tuple[list[Place], int]:
+    """Parts by falling evidence, and how many combinations of them the data see.
+
+    One number k with prior N(0, s^2): with a = g^T P g and b = g^T P r it is b / (a + 1/s^2), and
+    ln Z / Z0 = b^2 / (a + 1/s^2) / 2 - ln(1 + s^2 a) / 2.
+    """
+    if not parts:
+        return [], 0
+    columns = [(part.stiffness, STIFFNESS, part) for part in parts]
+    columns += [(part.mass, MASS, part) for part in parts]
+    G = np.array([g[problem.places] * s for g, s, _ in columns])
+    gram = G @ P @ G.T
+    size = np.sqrt(np.maximum(np.diag(gram), 1e-300))
+    cosine = gram / np.outer(size, size)
+    rank = int((np.linalg.eigvalsh(gram) > 1).sum())
+    a, b = np.diag(gram), G @ P @ residuals
+    change, sigma = b / (a + 1), 1 / np.sqrt(a + 1)
+    ln = b**2 / (a + 1) / 2 - np.log1p(a) / 2
+    count, result = len(parts), []
+    for i, part in enumerate(parts):
+        better = i if ln[i] >= ln[count + i] else count + i
+        same = [columns[j][2].name for j in range(2 * count)
+                if abs(cosine[better, j]) > SAME and j % count != i]  # fmt: skip
+        result.append(
+            Place(
+                part.name,
+                float(100 * STIFFNESS * change[i]),
+                float(100 * STIFFNESS * sigma[i]),
+                float(100 * MASS * change[count + i]),
+                float(100 * MASS * sigma[count + i]),
+                float(ln[better]),
+                tuple(dict.fromkeys(same)),
+            )
+        )
+    return sorted(result, key=lambda place: -place.evidence), rank

@@ -1,0 +1,238 @@
+"""A diagnosis on one page, in words for an engineer (Markdown)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from ..diagnose.covariance import BETWEEN_PRESSURES
+from ..diagnose.diagnosis import Diagnosis
+from ..diagnose.evidence import NONE, OUTSIDE
+from ..diagnose.study import Study
+from ..diagnose.verdict import NAMED, NO_GAP, UNDECIDED
+
+RUNGS = {
+    1: "consistent with the data it was fitted to; no more than that",
+    2: "predictive: it lowers the error on data that were held out by more than chance does",
+    3: "corroborated: its size agrees with an independent measurement",
+    4: "shown to be the cause: switching it moved the frequencies as predicted",
+}
+SHOWN = 6
+
+
+def page(study: Study, case: str, measured: str) -> str:
+    """The page as Markdown."""
+    d = study.diagnosis
+    parts = [
+        f"# What the model of {case} lacks",
+        f"Measurements: {measured}, {_counted(d)}.",
+        f"## {_headline(study)}",
+        *_answer(study),
+        "## Is there a gap?",
+        *_gap(d),
+        "## Where does it lie?",
+        *_where(d),
+        "## Which effect?",
+        *_which(study),
+        "## How far does it shrink?",
+        *_shrinkage(d),
+        "## What to measure next",
+        *_next(d),
+        "## What this rests on",
+        *_assumptions(study),
+    ]
+    return "\n\n".join(parts) + "\n"
+
+
+def _counted(d: Diagnosis) -> str:
+    rows = d.problem.observations.rows
+    pressures = sorted({row.pressure_kPa for row in rows if row.label})
+    modes = len({row.label for row in rows if row.label})
+    at = ", ".join(f"{p:g}" for p in pressures)
+    runs = 1 + len(d.problem.changes)
+    return f"{modes} modes at {at} kPa" + (f", {runs} runs" if runs > 1 else "")
+
+
+def _title(study: Study, key: str) -> str:
+    spans = study.diagnosis.problem.spans
+    words = {NONE: "no effect at all", OUTSIDE: "something outside the catalogue"}
+    if key in words:
+        return words[key]
+    return " and ".join(spans[id].title or id for id in key.split("+"))
+
+
+def _headline(study: Study) -> str:
+    v = study.diagnosis.verdict
+    if v.kind == NAMED and v.key:
+        return f"Named: {_title(study, v.key)}"
+    if v.kind == UNDECIDED:
+        return "Undecided"
+    return "No gap is seen" if v.kind == NO_GAP else "Outside the catalogue"
+
+
+def _answer(study: Study) -> Iterator[str]:
+    d = study.diagnosis
+    v, p = d.verdict, d.probabilities
+    if v.kind == NAMED and v.key:
+        q = d.parameter(v.key)
+        unit = f" {q['unit']}" if q["unit"] else ""
+        yield (
+            f"{_title(study, v.key)} (`{v.key}`) explains the gap with probability"
+            f" {p[v.key]:.2f}; its size is {q['value']:.3g}{unit}, 90 % between {q['low']:.3g} and"
+            f" {q['high']:.3g}."
+        )
+    else:
+        yield v.words[0].upper() + v.words[1:] + "."
+    if v.kind in (UNDECIDED, NAMED) and len(v.candidates) > 1:
+        names = ", ".join(f"`{key}`" for key in v.candidates[:SHOWN])
+        more = len(v.candidates) - SHOWN
+        tail = f" and {more} more" if more > 0 else ""
+        yield f"90 % of the probability lies with {names}{tail}."
+    if v.kind == NAMED:
+        yield f"Rung {d.rung} of 4 on the ladder of proof: {RUNGS[d.rung]}."
+        if d.rung < 4 and v.key:
+            span = d.problem.spans[v.key.split("+")[0]]
+            yield (
+                "Frequencies of one state of the tyre cannot show a cause. What would: "
+                f"{span.toggle or 'measure again without the effect'}; hand the second run over"
+                " with `--toggled`."
+            )
+
+
+def _gap(d: Diagnosis) -> Iterator[str]:
+    g = d.gap
+    seen = "larger than" if g.p_value < 0.05 else "within"
+    yield (
+        f"After calibration {g.rms_percent:.2f} % (rms) is left. That is {seen} what repeatability,"
+        f" the model's own form and the constants that nobody calibrates explain: chi2"
+        f" {g.chi2:.1f} for {g.freedom} degrees of freedom, p = {g.p_value:.2g}. (A figure for"
+        " orientation: it is weak against a single effect, so the verdict does not rest on it.)"
+    )
+    hidden = sorted((id for id, a in g.absorbed.items() if a > 0.9), key=lambda id: -g.absorbed[id])
+    for id in hidden[:3]:
+        moved = {name: bias[id] for name, bias in g.bias_percent.items()}
+        worst = max(moved, key=lambda name: abs(moved[name]))
+        if abs(moved[worst]) > 1:
+            yield (
+                f"Calibration hides {100 * g.absorbed[id]:.0f} % of `{id}`: at full size and"
+                f" ignored it would move {worst} by {moved[worst]:+.0f} %."
+            )
+
+
+def _where(d: Diagnosis) -> Iterator[str]:
+    found = [g for g in d.gap.groups if g.corrected < 0.05]
+    if found:
+        words = ", ".join(f"{g.kind} {g.name} (rms {g.rms_percent:.2f} %)" for g in found)
+        yield f"Beyond chance, corrected for looking at {len(d.gap.groups)} groups: {words}."
+    else:
+        yield f"No group of modes stands out among {len(d.gap.groups)} (corrected for that many)."
+    strange = [c for c in d.gap.contrasts if c.p_value < 0.05 / max(1, len(d.gap.contrasts))]
+    for c in strange:
+        yield f"{c.name[0].upper() + c.name[1:]}: {c.percent:+.2f} % ± {c.sigma_percent:.2f} %."
+    if d.parts:
+        best = d.parts[0]
+        heavier = abs(best.mass_percent / best.mass_sigma) > abs(
+            best.stiffness_percent / best.stiffness_sigma
+        )
+        change = (
+            f"mass {best.mass_percent:+.0f} % ± {best.mass_sigma:.0f} %" if heavier
+            else f"stiffness {best.stiffness_percent:+.0f} % ± {best.stiffness_sigma:.0f} %"
+        )  # fmt: skip
+        same = f" (looks the same as {', '.join(best.same_as)})" if best.same_as else ""
+        if best.evidence > 1:
+            yield (
+                f"In the section a change of one part that would serve best: {best.region}{same},"
+                f" {change}, ln evidence {best.evidence:+.1f}."
+            )
+        else:
+            yield "No single part of the section, softer, stiffer, heavier or lighter, explains it."
+        if d.effective_rank:
+            yield (
+                f"The data see {d.effective_rank} independent combination"
+                f"{'s' if d.effective_rank > 1 else ''} of parts (changes of 20 % in stiffness,"
+                " 10 % in mass, beyond their scatter); a finer map would be invented."
+            )
+        else:
+            yield (
+                "A change of 20 % in stiffness or 10 % in mass of any parts would stay within the"
+                " scatter of these data: the map is a hint at most."
+            )
+
+
+def _which(study: Study) -> Iterator[str]:
+    d = study.diagnosis
+    order = sorted(d.probabilities.items(), key=lambda item: -item[1])
+    rows = [
+        "| explanation | probability | size, 90 % | detectability lambda |",
+        "|---|---|---|---|",
+    ]
+    for key, p in order[:SHOWN]:
+        size, seen = "", ""
+        if key in d.problem.spans:
+            q = d.parameter(key)
+            size = f"{q['value']:.3g} ({q['low']:.3g} to {q['high']:.3g}) {q['unit']}".strip()
+            seen = f"{d.separability.lambdas[key]:.0f}"
+        rows.append(f"| {_title(study, key)} | {p:.2f} | {size} | {seen} |")
+    yield "\n".join(rows)
+    yield (
+        "lambda: squared distance from the plain model, in standard deviations, that calibration"
+        " cannot absorb; below 10 an effect can hide, from 25 on it is named as a rule."
+    )
+    for group in d.separability.groups():
+        names = ", ".join(f"`{id}`" for id in group)
+        yield f"These data cannot separate {names}."
+    blind = [id for id, e in d.separability.smallest.items() if e is None]
+    sizes = [
+        f"`{id}` {abs(e):.2g} {d.problem.spans[id].unit}".strip()
+        for id, e in d.separability.smallest.items()
+        if e is not None
+    ]
+    if sizes:
+        yield f"The smallest that would be seen (lambda = 10): {', '.join(sizes)}."
+    if blind:
+        names = ", ".join(f"`{id}`" for id in blind)
+        yield f"Not to be seen with these data at any size in its range: {names}."
+
+
+def _shrinkage(d: Diagnosis) -> Iterator[str]:
+    s = d.shrinkage
+    if s is None:
+        yield "There are too few data to hold any out."
+        return
+    yield (
+        f"Held out by rule: {s.held_out}. Without an effect the error there is"
+        f" {s.before_percent:.2f} %, with `{s.effect}` {s.after_percent:.2f} %: it shrinks by"
+        f" {100 * s.fraction:.0f} % (90 %: {100 * s.low:.0f} to {100 * s.high:.0f} %). On tyres"
+        f" without any effect chance shrinks it by up to {100 * s.placebo_95:.0f} % (95 %"
+        f" quantile); repeatability alone leaves {s.floor_percent:.2f} %."
+    )
+
+
+def _next(d: Diagnosis) -> Iterator[str]:
+    worth = [c for c in d.choices if c.gain > 0][:4]
+    if not worth:
+        yield "Nothing on the menu would tell the explanations further apart."
+        return
+    yield "\n".join(
+        f"{i}. {c.what} (about {c.hours:g} h; gain {c.gain:.2g} per hour)"
+        for i, c in enumerate(worth, 1)
+    )
+
+
+def _assumptions(study: Study) -> Iterator[str]:
+    d = study.diagnosis
+    kind = "assumed, as the case states none" if study.assumed_sources else "stated by the case"
+    words = ", ".join(source.words for source in study.sources)
+    yield f"Constants that nobody calibrates, one standard deviation each ({kind}): {words}."
+    a = d.problem.assumed
+    form = "as recorded for every mode" if a.form is None else f"{100 * a.form:g} % in every mode"
+    yield (
+        f"The model's own form: {form}, correlated {BETWEEN_PRESSURES:g} between pressures; an"
+        f" effect's law may be off by {100 * a.law:g} % of its shift; every tyre splits its pairs"
+        f" by {100 * a.split:g} %."
+    )
+    for id, why in d.problem.expansion.failed.items():
+        yield f"`{id}` could not be evaluated: {why}."
+    if study.inexpressible:
+        yield f"This solver cannot express {', '.join(f'`{id}`' for id in study.inexpressible)}."
+    for left in d.problem.observations.left_out:
+        yield f"Left out: {left}."

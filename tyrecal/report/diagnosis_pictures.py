@@ -1,0 +1,204 @@
+"""Pictures of a diagnosis: residuals, probabilities, held-out errors, the section's map."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.colors import LinearSegmentedColormap
+
+from ..case import LoadedCase
+from ..deck.context import section_mesh
+from ..diagnose.diagnosis import Diagnosis
+from ..diagnose.evidence import NONE, OUTSIDE
+from ..diagnose.gap import family
+from ..diagnose.study import Study
+from ..diagnose.where import Place
+from ..modes.mode import Label
+from .figure import COLOURS, GREY, in_house_style, new_figure, save
+
+Array = np.ndarray
+FAMILIES = ("[0,0]", "in-plane", "lateral")
+SHOWN, LEAST = 12, 0.005  # explanations, and the probability below which one is not drawn
+WARM = LinearSegmentedColormap.from_list("evidence", ["#EDEDED", "#F5C98A", "#D55E00"])
+ENOUGH = 5.0  # ln evidence that is drawn in the full colour
+
+
+def draw_diagnosis(folder: Path, case: LoadedCase, study: Study) -> None:
+    """diagnosis_residuals, _probabilities, _held_out and _section .png, as far as there is such."""
+    d = study.diagnosis
+    draw_residuals(folder / "diagnosis_residuals.png", d)
+    draw_probabilities(folder / "diagnosis_probabilities.png", d)
+    if d.shrinkage:
+        draw_held_out(folder / "diagnosis_held_out.png", d)
+    if d.parts:
+        draw_section_map(folder / "diagnosis_section.png", case, d.parts, d.effective_rank)
+
+
+@in_house_style
+def draw_residuals(path: Path, d: Diagnosis) -> None:
+    """Residuals of the plain fit over the harmonic, a column a family, a colour a pressure; hollow
+    with the likeliest effect in the model. Bars: one standard deviation without a gap."""
+    rows, gap = d.problem.observations.rows, d.gap
+    after = _after(d)
+    pressures = sorted({row.pressure_kPa for row in rows if row.label})
+    shown = [name for name in FAMILIES if any(family(row) == name for row in rows)]
+    figure = new_figure(2.0 + 2.8 * len(shown), 3.8)
+    axes = figure.subplots(1, len(shown), sharey=True, squeeze=False)[0]
+    for panel, name in zip(axes, shown, strict=True):
+        panel.axhline(0, color=GREY, lw=0.8)
+        for k, p in enumerate(pressures):
+            mine = [row.pressure_kPa == p and not row.run and family(row) == name for row in rows]
+            chosen = np.flatnonzero(mine)
+            at = np.array([_place(rows[i].label) for i in chosen])
+            at = at + 0.16 * (k - (len(pressures) - 1) / 2)
+            colour = COLOURS[k % len(COLOURS)]
+            panel.errorbar(at, 100 * gap.residuals[chosen], 100 * gap.spread[chosen], fmt="o",
+                           color=colour, ms=5, lw=1, label=f"{p:g} kPa")  # fmt: skip
+            if after is not None:
+                panel.plot(at, 100 * after[chosen], "o", mfc="white", mec=colour, ms=5, zorder=3)
+        panel.set_title(name, loc="left")
+        kinds = name == "[0,0]"
+        panel.set_xticks([0, 1] if kinds else range(1, _highest(rows) + 1))
+        if kinds:
+            panel.set_xticklabels(["lateral", "torsional"])
+            panel.set_xlim(-0.6, 1.6)
+        else:
+            panel.set_xlabel("harmonic c")
+    axes[0].set_ylabel("measured over model, %")
+    with_effect = f"; hollow: with {_short(d, d.best)}" if d.best else ""
+    figure.suptitle(f"What calibration leaves{with_effect}", x=0.02, ha="left", fontsize=11)
+    handles, labels = axes[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=len(pressures), frameon=False)
+    save(figure, path)
+
+
+@in_house_style
+def draw_probabilities(path: Path, d: Diagnosis) -> None:
+    """The likeliest explanations as bars, before (a mark) and after the data."""
+    order = sorted(d.hypotheses, key=lambda h: -d.probabilities[h.key])[:SHOWN]
+    order = [h for h in order if d.probabilities[h.key] >= LEAST or h.key in (NONE, OUTSIDE)]
+    figure = new_figure(7.4, 1.3 + 0.3 * len(order))
+    axes = figure.add_subplot()
+    place = np.arange(len(order))[::-1]
+    colours = ["0.6" if h.key in (NONE, OUTSIDE) else COLOURS[0] for h in order]
+    p = [d.probabilities[h.key] for h in order]
+    axes.barh(place, p, color=colours, height=0.7)
+    axes.plot([h.prior for h in order], place, "|", color="black", ms=13, mew=1.5,
+              label="before the data")  # fmt: skip
+    for y, value, h in zip(place, p, order, strict=True):
+        axes.text(max(value, h.prior) + 0.01, y, f"{value:.2f}", va="center", fontsize=8)
+    axes.axvline(0.7, color=GREY, lw=0.8, ls=":")
+    axes.text(0.7, len(order) - 0.35, "named from here on", fontsize=8, color=GREY, ha="center")
+    axes.set_yticks(place, [_short(d, h.key) for h in order])
+    axes.set_xlim(0, max(1.0, 1.1 * max(p)))
+    axes.set_xlabel("probability")
+    axes.legend(loc="center", bbox_to_anchor=(0.5, 0.25), frameon=False)
+    save(figure, path)
+
+
+@in_house_style
+def draw_held_out(path: Path, d: Diagnosis) -> None:
+    """The error on held-out data without and with the effect, beside the noise floor and what
+    chance does."""
+    s = d.shrinkage
+    assert s is not None
+    figure = new_figure(6.4, 3.4)
+    axes = figure.add_subplot()
+    chance = s.before_percent * (1 - s.placebo_95)
+    bars = [s.before_percent, s.after_percent]
+    axes.bar([0, 1], bars, color=["0.6", COLOURS[0]], width=0.55)
+    low, high = (s.before_percent * (1 - r) for r in (s.high, s.low))
+    axes.plot([1, 1], [low, high], color="black", lw=1.2)
+    axes.plot([1, 1], [low, high], "_", color="black", ms=10)
+    for y, words in ((chance, "as far as chance shrinks it (95 %)"),
+                     (s.floor_percent, "repeatability alone")):  # fmt: skip
+        axes.axhline(y, color=GREY, lw=0.9, ls=(0, (5, 3)))
+        axes.text(2.75, y, words, va="bottom", ha="right", fontsize=8, color="0.3")
+    axes.set_xticks([0, 1], ["without an effect", f"with {_short(d, s.effect)}"])
+    axes.set_xlim(-0.5, 2.8)
+    axes.set_ylabel("rms error, %")
+    axes.set_title(f"Held out: {s.held_out}", loc="left")
+    save(figure, path)
+
+
+@in_house_style
+def draw_section_map(
+    path: Path, case: LoadedCase, parts: tuple[Place, ...], effective_rank: int
+) -> None:
+    """Parts of the section, coloured by the evidence for a change of them alone."""
+    mesh = section_mesh(case)
+    point = {n: np.array([z, r]) * 1e3 for n, (r, z) in mesh.nodes.items()}
+    by_name: dict[str, Place] = {}
+    for place in parts:  # of several rubbers in a region the likelier one
+        by_name.setdefault(place.region.split(",")[0], place)
+    figure = new_figure(10.0, 5.2)
+    axes, beside = figure.subplots(1, 2, width_ratios=[5, 4])
+    axes.set_aspect("equal")
+    beside.axis("off")
+    regions = [name for name, _ in case.section.regions]
+    rows = case.case.mesh.levels[case.case.mesh.level].rows
+    groups: dict[str, list[list[Array]]] = {}
+    for number, (region, row) in mesh.cells.items():
+        name = region.replace("_", " ")
+        if region == regions[0] and name not in by_name:
+            name = "tread" if row >= sum(rows[:-1]) else f"{name} under the tread"
+        groups.setdefault(name, []).append([point[n] for n in mesh.solids[number][:4]])
+    for name, cells in groups.items():
+        colour = _colour(by_name.get(name))
+        axes.add_collection(PolyCollection(cells, fc=colour, ec="0.7", lw=0.3))
+    for layer in case.case.rebar_layers.values():
+        cord = by_name.get(layer.material.replace("_", " ") + "s")
+        lines = [[point[n] for n in nodes] for nodes in mesh.cords[layer.line].values()]
+        axes.add_collection(LineCollection(lines, color=_colour(cord), lw=2.2, zorder=2))
+        axes.add_collection(LineCollection(lines, color="0.3", lw=0.5, zorder=3))
+    axes.autoscale_view()
+    axes.set_xlabel("z along the axle, mm")
+    axes.set_ylabel("r from the axle, mm")
+    table = ["part                    stiffness %   mass %     ln ev."]
+    table += [
+        f"{p.region[:22]:22s}  {p.stiffness_percent:+4.0f} ± {p.stiffness_sigma:<3.0f}"
+        f"   {p.mass_percent:+4.0f} ± {p.mass_sigma:<3.0f}   {p.evidence:+5.1f}"
+        for p in parts
+    ]
+    beside.text(0.0, 0.98, "\n".join(table), transform=beside.transAxes, va="top", fontsize=7.5,
+              family="monospace")  # fmt: skip
+    same = [f"{p.region} looks like {', '.join(p.same_as)}" for p in parts if p.same_as]
+    words = [f"the data see {effective_rank} independent combination(s)", *same]
+    beside.text(0.0, 0.02, "\n".join(words), transform=beside.transAxes, va="bottom", fontsize=7.5,
+              color="0.3")  # fmt: skip
+    axes.set_title("One part changed alone: the redder, the better it explains the gap", loc="left")
+    save(figure, path)
+
+
+def _after(d: Diagnosis) -> Array | None:
+    """Residuals (n,) with the likeliest effect at its likeliest size; None without effects."""
+    if d.best is None:
+        return None
+    h = d.hypothesis(d.best)
+    assert h.fitted is not None
+    i = h.best
+    shift, tilt, _ = d.problem.added({id: e[[i]] for id, e in h.values.items()}, 1)
+    eta, _ = d.problem.plain(h.fitted.d[i])
+    return np.asarray(d.problem.observations.y - eta - shift[0] - tilt[0] @ h.fitted.d[i])
+
+
+def _place(label: Label | None) -> float:
+    assert label is not None
+    return {"axial": 0.0, "torsional": 1.0}.get(label.kind or "", float(label.c))
+
+
+def _highest(rows: tuple) -> int:
+    return max((row.label.c for row in rows if row.label), default=1)
+
+
+def _short(d: Diagnosis, key: str | None) -> str:
+    spans = d.problem.spans
+    if key in (NONE, OUTSIDE) or key is None:
+        return {NONE: "no effect", OUTSIDE: "outside the catalogue"}.get(key or "", "")
+    return " + ".join((spans[id].title or id) for id in key.split("+"))
+
+
+def _colour(place: Place | None) -> str | tuple[float, ...]:
+    return WARM(0.0) if place is None else WARM(min(max(place.evidence, 0.0) / ENOUGH, 1.0))
