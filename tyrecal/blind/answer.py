@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ..case import LoadedCase, load_case
+from ..case import LoadedCase, load_case, with_values
 from ..diagnose.diagnosis import Diagnosis, diagnose
 from ..diagnose.evidence import NONE
 from ..diagnose.measurements import read_measurements
@@ -23,7 +23,7 @@ from ..diagnose.response import Response
 from ..diagnose.result import result
 from ..diagnose.study import spans_of
 from ..diagnose.tyre_model import TyreModel
-from ..diagnose.uncertainties import sources
+from ..diagnose.uncertainties import EFFECTS, sources
 from ..evaluate.door import Door
 from ..evaluate.pool import process_pool
 from ..modes.mode import Label
@@ -44,9 +44,13 @@ def tyre_model(
     case: LoadedCase, door: Door, protocol: Protocol, jobs: int = 1,
     effects: Sequence[str] | None = None,
 ) -> TyreModel:  # fmt: skip
-    """The model of the diagnosis for every trial."""
+    """The model of the diagnosis for every trial, with the effects of which the solver has slopes."""
     spans, _ = spans_of(door, effects)
-    return TyreModel(case, door, rows_of(case, protocol), sources(case)[0], spans, jobs)
+    smooth = {
+        id: span for id, span in spans.items()
+        if Door(with_values(case, {f"{EFFECTS}{id}": span.high}), door.solver_name).has_gradients
+    }  # fmt: skip
+    return TyreModel(case, door, rows_of(case, protocol), sources(case)[0], smooth, jobs)
 
 
 def case_of(folder: Path) -> LoadedCase:

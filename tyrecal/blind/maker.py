@@ -84,7 +84,7 @@ def finer(case: LoadedCase) -> LoadedCase:
     return replace(case, case=case.case.model_copy(update={"mesh": with_part(mesh, levels=levels)}))
 
 
-def find_maker(name: str, case: LoadedCase, store: Store | None = None) -> Maker:
+def find_maker(name: str, case: LoadedCase, store: Store | None = None) -> SolverMaker:
     """``bundled``: the model of the diagnosis itself, an inverse crime; ``bundled-other``: the same
     solver with another mesh and other laws; ``calculix``: another solver, too."""
     solver = "calculix" if name == "calculix" else "bundled"

@@ -42,6 +42,8 @@ def command() -> None:
               metavar="N", help="Trials without any.")  # fmt: skip
 @click.option("--outside", type=click.IntRange(0), default=80, show_default=True, metavar="N",
               help="Trials with what the catalogue does not hold.")  # fmt: skip
+@click.option("--effect", "drawn", multiple=True, metavar="EFFECT",
+              help="Draw these effects only; repeatable (default: all that the maker can).")  # fmt: skip
 @click.option("--seed", type=int, metavar="N", help="Of all that is drawn (default: a secret one).")
 @truth
 @options.every(options.jobs, options.quiet)
@@ -52,6 +54,7 @@ def make(
     effects: int,
     plain: int,
     outside: int,
+    drawn: tuple[str, ...],
     seed: int | None,
     truth: Path | None,
     jobs: int,
@@ -61,6 +64,8 @@ def make(
 
     The same command goes on where it was stopped.
     """
+    from dataclasses import replace
+
     from ..blind.answer import rows_of, tyre_model
     from ..blind.make import make as made
     from ..blind.maker import NAMES, find_maker
@@ -78,6 +83,11 @@ def make(
     case, sealed = load_case(case_path), _sealed(folder, truth)
     store = Store((sealed / "record").resolve())
     who = find_maker(maker, case, store)
+    for id in drawn:
+        if id not in who.laws:
+            raise click.UsageError(f"--effect {id}: this maker has only {', '.join(who.laws)}")
+    if drawn:
+        who = replace(who, laws={id: who.laws[id] for id in drawn})
     counts = {"effect": effects, "none": plain, "outside": outside}
     protocol = Protocol(who.about, case.path.name, counts)
     mark = made(folder, sealed, case, protocol, who, jobs, seed, _told("made", quiet))
