@@ -10,8 +10,8 @@
 f_common: the bundled solver on the common problem (`calculix.common`) with the same mesh, which is
 not the one that the diagnosis uses; q_k: 1 and the logarithms of the design variables and of the
 pressure. Effects enter by f_common alone, the difference being smooth and small. One line of JSON
-a run in RECORD. A mode that is OUTLIER off the median of all is left out: there CalculiX found
-another state than in its other runs of the same tyre.
+a run in RECORD. A run with a mode that is OUTLIER off the median of all is left out: there CalculiX
+found another state.
 """
 
 from __future__ import annotations
@@ -183,19 +183,29 @@ def features(variables: Mapping[str, float], pressure_kPa: float) -> Array:
     return np.array([1.0, *x, np.log(pressure_kPa / 240.0)])
 
 
-def trained() -> tuple[dict[str, Array], list[str]]:
-    """a (5,) by mode, and modes that were left out, in words."""
-    runs = [entry for entry in recorded("train") if "failed" not in entry]
-    q = np.array([
-        features(e["values"], e["values"]["pressure_kPa"]) for e in runs
-    ])  # fmt: skip
-    fitted, out = {}, []
-    for key in runs[0]["calculix"]:
-        off = np.array([e["calculix"][key] - e["common"][key] for e in runs])
-        good = abs(off - np.median(off)) < OUTLIER
-        out += [f"{key} of run {i + 1}: {100 * off[i]:+.2f} %" for i in np.flatnonzero(~good)]
-        fitted[key] = np.linalg.lstsq(q[good], off[good], rcond=None)[0]
-    return fitted, out
+Runs = list[dict[str, Any]]
+
+
+def usual(runs: Runs) -> tuple[Runs, list[str]]:
+    """Runs without outliers, and those that have some, in words."""
+    runs = [entry for entry in runs if "failed" not in entry]
+    off = np.array([[e["calculix"][k] - e["common"][k] for k in runs[0]["calculix"]] for e in runs])
+    worst = abs(off - np.median(off, axis=0)).max(1)
+    out = [
+        f"run {i + 1}, {100 * worst[i]:.2f} % from the others"
+        for i in np.flatnonzero(worst > OUTLIER)
+    ]
+    return [e for e, w in zip(runs, worst, strict=True) if w <= OUTLIER], out
+
+
+def fitted(runs: Runs) -> dict[str, Array]:
+    """a (5,) by mode."""
+    q = np.array([features(e["values"], e["values"]["pressure_kPa"]) for e in runs])
+    return {
+        key: np.linalg.lstsq(q, np.array([e["calculix"][key] - e["common"][key] for e in runs]),
+                             rcond=None)[0]
+        for key in runs[0]["calculix"]
+    }  # fmt: skip
 
 
 class EmulatedCalculix:
@@ -209,7 +219,7 @@ class EmulatedCalculix:
     def __init__(self) -> None:
         self.laws: dict[str, Law] = other_laws(frozenset({"modes"}))
         self.outside = FAMILIES
-        self._fitted = trained()[0]
+        self._fitted = fitted(usual(recorded("train"))[0])
         start = start_values(base())
         sets = {n: v.sets for n, v in base().case.variables.items()}
         self._paths = {n: sets[n][0] for n in start}
@@ -226,22 +236,19 @@ class EmulatedCalculix:
 
 def table() -> None:
     """What was reached, in Markdown."""
-    fitted, out = trained()
-    runs = [entry for entry in recorded("train") if "failed" not in entry]
+    runs, out = usual(recorded("train"))
+    a = fitted(runs)
     print(f"{len(runs)} runs of training; left out: {', '.join(out) or 'none'}.\n")
-    print("| mode | mean difference, % | largest error of the emulator, % |\n|---|---|---|")
-    for key, a in fitted.items():
-        errors = []
-        for i, e in enumerate(runs):  # each left out of a fit of the others
-            others = [o for o in runs if o is not e]
-            q = np.array([features(o["values"], o["values"]["pressure_kPa"]) for o in others])
-            y = np.array([o["calculix"][key] - o["common"][key] for o in others])
-            good = abs(y - np.median(y)) < OUTLIER
-            own = e["calculix"][key] - e["common"][key]
-            if abs(own - np.median(y)) < OUTLIER:
-                b = np.linalg.lstsq(q[good], y[good], rcond=None)[0]
-                errors.append(own - features(e["values"], e["values"]["pressure_kPa"]) @ b)
-        print(f"| {key} | {100 * a[0]:+.3f} | {100 * max(map(abs, errors)):.4f} |")
+    print("| mode | mean difference, % | largest error on a run that was left out of the fit, % |")
+    print("|---|---|---|")
+    errors: dict[str, list[float]] = {key: [] for key in a}
+    for e in runs:
+        b = fitted([other for other in runs if other is not e])
+        q = features(e["values"], e["values"]["pressure_kPa"])
+        for key in a:
+            errors[key].append(float(e["calculix"][key] - e["common"][key] - q @ b[key]))
+    for key in a:
+        print(f"| {key} | {100 * a[key][0]:+.3f} | {100 * max(map(abs, errors[key])):.4f} |")
     print("\n| law | size | kPa | largest error of the emulator, % | in |\n|---|---|---|---|---|")
     for e in recorded("confirm"):
         where = f"| {e['law']} | {e['size']:.3g} | {e['pressure_kPa']:g}"
@@ -250,8 +257,8 @@ def table() -> None:
             continue
         off = {
             key: e["calculix"][key] - e["common"][key]
-            - features(e["variables"], e["pressure_kPa"]) @ a
-            for key, a in fitted.items()
+            - features(e["variables"], e["pressure_kPa"]) @ a[key]
+            for key in a
         }  # fmt: skip
         worst = max(off, key=lambda key: abs(off[key]))
         print(f"{where} | {100 * off[worst]:+.4f} | {worst} |")

@@ -52,9 +52,7 @@ class Law:
 def catalogue_laws(capabilities: frozenset[str]) -> dict[str, Law]:
     """The catalogue's own laws: of the maker whose data are an inverse crime."""
     return {
-        id: Law(e.low, e.high, e.add)
-        for id, e in catalogue().items()
-        if e.within(capabilities)
+        id: Law(e.low, e.high, e.add) for id, e in catalogue().items() if e.within(capabilities)
     }
 
 

@@ -107,9 +107,7 @@ def values(made: Made, protocol: Protocol) -> dict[float, dict[Label, tuple[floa
         places = [(label, i) for label in labels for i in range(len(here[label]))]
         gone = random.choice(len(places), int(random.integers(protocol.missing + 1)), False)
         for label, i in (places[k] for k in gone):
-            here[label] = tuple(
-                float("nan") if j == i else f for j, f in enumerate(here[label])
-            )
+            here[label] = tuple(float("nan") if j == i else f for j, f in enumerate(here[label]))
         read[pressure] = here
     if made.truth.swapped:
         _swap(read, labels, random)
