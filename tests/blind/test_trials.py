@@ -81,7 +81,7 @@ def test_draws_have_the_stated_distribution() -> None:
     assert set(counts) == set(MAKER.laws) and min(counts.values()) > 100
     z = np.array([list(t.constants.values()) for t in truths])
     assert z.shape == (600, len(found)) and abs(z.std() - 1) < 0.02 and abs(z.mean()) < 0.05
-    start = list(truths[0].variables)[0]
+    start = next(iter(truths[0].variables))
     ratios = np.array([t.variables[start] for t in truths]) / CASE.case.variables[start].start
     assert ratios.min() > 1 / 1.4 and ratios.max() < 1.4 and ratios.std() > 0.15
     assert 10 < sum(t.swapped for t in truths) < 50
@@ -91,7 +91,7 @@ def test_the_seal_holds_the_truth_and_the_answers(tmp_path: Path) -> None:
     folder, sealed = made(tmp_path, protocol(2, 2, 1))
     with pytest.raises(BadTrials, match="sealed trials already"):
         make(folder, sealed, CASE, protocol(1), MAKER, seed=3)
-    with pytest.raises(BadTrials, match="answers.json is missing"):
+    with pytest.raises(BadTrials, match=r"answers\.json is missing"):
         score(folder, sealed)
     answer(folder, SCALE, SCALE.model_rows)
     assert len(score(folder, sealed)) == 5

@@ -1,4 +1,4 @@
-"""CalculiX for the blind trials: an emulator of what it says, trained and confirmed by its own runs.
+"""CalculiX for the blind trials: an emulator, trained and confirmed by its own runs.
 
     python -m tests.studies.blind_calculix train 40       # runs CalculiX, goes on where it stopped
     python -m tests.studies.blind_calculix confirm 30     # runs with effects, by the makers' laws
@@ -44,9 +44,9 @@ from tyrecal.case import LoadedCase, load_case, number_at, start_values, with_va
 from tyrecal.deck.calculix import PLY_THICKNESS_M
 from tyrecal.deck.context import gauged_section
 from tyrecal.diagnose.uncertainties import sources
+from tyrecal.effects import with_effects
 from tyrecal.evaluate.door import Door, Question
 from tyrecal.evaluate.failure import EvaluationFailed
-from tyrecal.effects import with_effects
 from tyrecal.modes.label import label_modes
 from tyrecal.modes.match import LostLabel, match
 from tyrecal.modes.mode import Label
@@ -81,7 +81,8 @@ def training(count: int) -> list[dict[str, float]]:
     low, high = PRESSURES_kPa
     return [
         {
-            **{n: v * float(np.exp(BOX * (2 * u - 1))) for (n, v), u in zip(start.items(), p[:3], strict=True)},
+            **{name: value * float(np.exp(BOX * (2 * u - 1)))
+               for (name, value), u in zip(start.items(), p[:3], strict=True)},
             "pressure_kPa": float(low + (high - low) * p[3]),
         }
         for p in points

@@ -44,7 +44,7 @@ def tyre_model(
     case: LoadedCase, door: Door, protocol: Protocol, jobs: int = 1,
     effects: Sequence[str] | None = None,
 ) -> TyreModel:  # fmt: skip
-    """The model of the diagnosis for every trial, with the effects of which the solver has slopes."""
+    """The model of the diagnosis for all trials, with effects of which the solver has slopes."""
     spans, _ = spans_of(door, effects)
     smooth = {
         id: span for id, span in spans.items()
@@ -117,7 +117,7 @@ def one_answer(
 def predicted(
     found: Diagnosis, rows: Sequence[ModelRow], pressure_kPa: float, key: str
 ) -> dict[str, float]:
-    """Hz by label at a pressure that was not fitted, by a hypothesis at its likeliest parameters."""
+    """Hz by label at a pressure that was not fitted, by a hypothesis at its best parameters."""
     places = [i for i, (label, p) in enumerate(rows) if label and p == pressure_kPa]
     hypothesis, expansion = found.hypothesis(key), found.problem.expansion
     assert hypothesis.fitted is not None

@@ -26,7 +26,7 @@ def guesses(ruler: Ruler, y: Array, places: Array, sigma: Array) -> dict[str, st
     """Answer by baseline. y (n,): ln f of rows ``places``; sigma (n, n): repeatability."""
     inverse = np.linalg.inv(sigma)
     d = _fit(ruler, y, places, inverse)
-    eta, J = ruler.plain(d, places)
+    eta, _ = ruler.plain(d, places)
     r = y - eta
     P = ruler.projection(d, places, sigma)
     chi2 = float(r @ P @ r)

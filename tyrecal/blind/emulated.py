@@ -59,7 +59,7 @@ class Grown:
             sum(w * value for w, (value, _) in zip(weights, found, strict=True)),
             sum(w * slope for w, (_, slope) in zip(weights, found, strict=True)),
             sum(w * p.at(t)[0] for w, p in zip(weights, self.split, strict=True)),
-        )  # type: ignore[return-value]
+        )
 
 
 class Emulated:

@@ -13,7 +13,7 @@ from math import exp, radians, sin, tanh
 import numpy as np
 
 from ..case import LoadedCase
-from ..case.schema import Cord, RebarLayer
+from ..case.schema import Cord, RebarLayer, Rubber
 from ..effects import catalogue
 from ..effects.edit import changed, unused, with_gauge, with_layers, with_part, with_rubbers
 from ..effects.edit import with_rubbers_at as rubbers_at
@@ -66,16 +66,19 @@ def other_laws(capabilities: frozenset[str]) -> dict[str, Law]:
     }
 
 
+def stiffer(factor: float) -> Callable[[Rubber], Rubber]:
+    """A rubber with all moduli times a factor."""
+    return lambda m: with_part(
+        m, C10_Pa=factor * m.C10_Pa, C01_Pa=factor * m.C01_Pa, D1_per_Pa=m.D1_per_Pa / factor
+    )
+
+
 def tread_density(case: LoadedCase, e: float) -> LoadedCase:
     """Voids take stiffness with the mass: density and moduli outside the outer belt times 1 + e."""
-    f = 1 + e
-    scaled = lambda m: with_part(
-        m, density_kg_per_m3=f * m.density_kg_per_m3, C10_Pa=f * m.C10_Pa, C01_Pa=f * m.C01_Pa,
-        D1_per_Pa=m.D1_per_Pa / f,
-    )  # fmt: skip
-    return rubbers_at(
-        case, crown(case), (belt_lines(case)[-1], case.section.names[-1]), "tread", scaled
-    )
+    lines = (belt_lines(case)[-1], case.section.names[-1])
+    lighter = lambda m: with_part(m, density_kg_per_m3=(1 + e) * m.density_kg_per_m3)
+    softer = stiffer(1 + e)
+    return rubbers_at(case, crown(case), lines, "tread", lambda m: softer(lighter(m)))
 
 
 def tread_wear(case: LoadedCase, e: float) -> LoadedCase:
@@ -98,16 +101,13 @@ def tread_wear(case: LoadedCase, e: float) -> LoadedCase:
 
 def bead_filler(case: LoadedCase, e: float) -> LoadedCase:
     """Stiffness that falls with the height: 1 + e times 1.6, 1.2, 0.8, 0.4 from the bead up."""
-    parts = 4
+    names: list[str] = []
     for region in lower_sidewall(case):
-        case, names = divided(case, region, parts)
-        for share, name in zip((0.4, 0.8, 1.2, 1.6), names, strict=True):
-            f = 1 + share * e
-            case = rubbers_at(
-                case, [name], (case.section.names[0], case.section.names[-1]), f"filler_{name}",
-                lambda m, f=f: with_part(m, C10_Pa=f * m.C10_Pa, C01_Pa=f * m.C01_Pa,
-                                         D1_per_Pa=m.D1_per_Pa / f),
-            )  # fmt: skip
+        case, parts = divided(case, region, 4)
+        names += parts
+    lines = (case.section.names[0], case.section.names[-1])
+    for share, name in zip((0.4, 0.8, 1.2, 1.6) * (len(names) // 4), names, strict=True):
+        case = rubbers_at(case, [name], lines, f"filler_{name}", stiffer(1 + share * e))
     return case
 
 

@@ -173,8 +173,9 @@ def _write_trials(folder: Path, protocol: Protocol, trials: list[Made]) -> None:
                 for i, f in enumerate(members, 1):
                     if np.isfinite(f):
                         member = i if len(members) > 1 else ""
-                        lines.append(f"frequency_Hz,{label.c},{label.m},{label.kind or ''},{member},"
-                                     f"{p:.0f},0,{f:.3f},{protocol.noise * f:.3f}")  # fmt: skip
+                        mode = f"{label.c},{label.m},{label.kind or ''},{member}"
+                        reading = f"{f:.3f},{protocol.noise * f:.3f}"
+                        lines.append(f"frequency_Hz,{mode},{p:.0f},0,{reading}")
         random = np.random.default_rng(made.truth.scatter + 2)
         mass = exp(made.with_effect[protocol.given_kPa[0]].ln_mass)
         mass *= exp(protocol.mass * random.normal())

@@ -32,11 +32,19 @@ class Heard:
 
 
 class Maker(Protocol):
-    """about: in words, for the protocol; laws, outside: by id and by family."""
+    """Makes data."""
 
-    about: str
-    laws: Mapping[str, Law]
-    outside: Mapping[str, Law]
+    @property
+    def about(self) -> str:
+        """In words, for the protocol."""
+
+    @property
+    def laws(self) -> Mapping[str, Law]:
+        """Of effects, by id."""
+
+    @property
+    def outside(self) -> Mapping[str, Law]:
+        """Of families that the catalogue does not hold, by name."""
 
     def listen(self, case: LoadedCase, labels: list[Label]) -> Heard:
         """The tyre as it stands in ``case``. Raises EvaluationFailed; ValueError."""

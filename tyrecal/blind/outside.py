@@ -6,7 +6,7 @@ from ..case import LoadedCase
 from ..effects.edit import with_gauge, with_layers, with_part
 from ..effects.edit import with_rubbers_at as rubbers_at
 from ..effects.parts import belt_lines, belts, carcass, carcass_line, crown, sidewall
-from .laws import Law
+from .laws import Law, stiffer
 from .regions import divided
 
 
@@ -33,11 +33,7 @@ def aged_shoulder(case: LoadedCase, e: float) -> LoadedCase:
     """Rubber has aged in the half of the upper sidewall next to the belt: moduli times 1 + e."""
     case, (name, _) = divided(case, sidewall(case)[0], 2)
     lines = (case.section.names[0], case.section.names[-1])
-    return rubbers_at(
-        case, [name], lines, "aged",
-        lambda m: with_part(m, C10_Pa=(1 + e) * m.C10_Pa, C01_Pa=(1 + e) * m.C01_Pa,
-                            D1_per_Pa=m.D1_per_Pa / (1 + e)),
-    )  # fmt: skip
+    return rubbers_at(case, [name], lines, "aged", stiffer(1 + e))
 
 
 def thick_cushion(case: LoadedCase, e: float) -> LoadedCase:

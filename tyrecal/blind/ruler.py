@@ -29,12 +29,14 @@ STEP = 0.05  # of ln x, for the curvature
 SHARES = (0.15, 0.5, 1.0)  # of each side of a range
 GRID = 61
 BETWEEN_PRESSURES = 0.9
+NUMBERS = ("x0", "spread", "eta", "jacobian", "hessian", "constants")
+SIGNATURE = ("sizes", "shift", "tilt", "split")
 ModelRow = tuple[Label | None, float]
 
 
 @dataclass(frozen=True)
 class Signature:
-    """An effect on all rows: sizes (k,), 0 among them; shift (k, n), tilt (k, n, v), split (k, n)."""
+    """An effect on all rows: sizes (k,), with 0; shift (k, n), tilt (k, n, v), split (k, n)."""
 
     sizes: Array
     shift: Array
@@ -154,8 +156,8 @@ def measure(response: Response, rows: Sequence[ModelRow]) -> dict[str, Any]:
     signatures = {}
     for id, span in response.spans.items():
         sizes = sorted({f * end for end in (span.low, span.high) if end for f in SHARES})
-        known = [(e, a) for e, a in zip(sizes, response.answers(
-            [Point(x0, {id: e}) for e in sizes]), strict=True) if isinstance(a, Answer)]  # fmt: skip
+        asked = response.answers([Point(x0, {id: e}) for e in sizes])
+        known = [(e, a) for e, a in zip(sizes, asked, strict=True) if isinstance(a, Answer)]
         zero = (0.0, Answer(first.eta, first.jacobian, 0 * first.split))
         known = sorted([*known, zero], key=lambda pair: pair[0])
         if len(known) > 1:
@@ -189,14 +191,13 @@ def read_ruler(folder: Path, labels: Sequence[Label]) -> Ruler:
     known: dict[str, Label | None] = {str(label): label for label in labels}
     known["mass"] = None
     try:
-        return Ruler(
-            tuple((known[name], float(p)) for name, p in content["rows"]),
-            *(np.array(content[key], float)
-              for key in ("x0", "spread", "eta", "jacobian", "hessian", "constants")),
-            {id: Signature(*(np.array(each[key], float)
-                             for key in ("sizes", "shift", "tilt", "split")))
-             for id, each in content["signatures"].items()},
-        )  # fmt: skip
+        numbers = {key: np.array(content[key], float) for key in NUMBERS}
+        signatures = {
+            id: Signature(*(np.array(each[key], float) for key in SIGNATURE))
+            for id, each in content["signatures"].items()
+        }
+        rows = tuple((known[name], float(p)) for name, p in content["rows"])
+        return Ruler(rows, signatures=signatures, **numbers)
     except (KeyError, ValueError, TypeError) as error:
         raise BadTrials(f"{folder / FILE}: not a ruler of these trials ({error})") from None
 
@@ -207,7 +208,7 @@ def _words(label: Label | None) -> str:
 
 def _rounded(values: Array) -> list[Any]:
     """Nine decimals: 1e-7 % of a frequency."""
-    return np.round(values, 9).tolist()  # type: ignore[no-any-return]
+    return np.round(values, 9).tolist()
 
 
 def _parabolas(nodes: Array, e: Array) -> Array:

@@ -20,7 +20,7 @@ def clopper_pearson(right: int, count: int, level: float = 0.95) -> tuple[float,
 
 
 def calibration_error(stated: Array, right: Array) -> float:
-    """ECE: mean over trials of |share right - mean stated| in ten bins of the stated probability."""
+    """ECE: mean over trials of |share right - mean stated| in ten bins of what was stated."""
     if not len(stated):
         return 0.0
     place = np.minimum((stated * BINS).astype(int), BINS - 1)

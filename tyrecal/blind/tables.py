@@ -31,7 +31,7 @@ def summary(trials: Sequence[Scored]) -> dict[str, Any]:
                    for kind in ("effect", "none", "outside")},
         "swapped": sum(t.swapped for t in trials),
         "by_band": [
-            {"low": low, "high": None if high == float("inf") else high, **_band(effects, low, high)}
+            {"low": low, "high": high if high < 1e9 else None, **_band(effects, low, high)}
             for low, high in BANDS
         ],
         "by_lambda": [
@@ -56,8 +56,8 @@ def summary(trials: Sequence[Scored]) -> dict[str, Any]:
         },
         "baselines": _baselines(trials),
         "confusion": _confusion(trials),
-        "misses": [t.plain() for t in trials if not t.right or t.verdict == "named" and
-                   t.named not in t.group],
+        "misses": [t.plain() for t in trials if not t.right or (t.verdict == "named" and
+                   t.named not in t.group)],
     }  # fmt: skip
 
 
@@ -125,7 +125,8 @@ def _lines(f: dict[str, Any], maker: str) -> Iterator[str]:
     for key in ("false_alarms", "named_right", "outside_recognised", "outside_named",
                 "set_holds_truth", "interval_holds_parameter"):  # fmt: skip
         yield f"| {key.replace('_', ' ')} | {_rate(f[key])} |"
-    yield f"| mean probability on the true group, detectable | {_number(f['mean_probability_on_group'])} |"
+    mean = _number(f["mean_probability_on_group"])
+    yield f"| mean probability on the true group, detectable | {mean} |"
     yield (f"| calibration error (95 % quantile of a calibrated simulation) |"
            f" {f['calibration_error']:.3f} ({f['calibration_error_95']:.3f}) |")  # fmt: skip
     yield f"| Brier score | {f['brier']:.3f} |"

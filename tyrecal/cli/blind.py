@@ -31,8 +31,10 @@ def command() -> None:
 
 @command.command()
 @folder
-@click.option("--case", "case_path", type=click.Path(path_type=Path), required=True,
-              metavar="CASE", help="The plain model, its uncertainties and the modes measured.")  # fmt: skip
+@click.option(
+    "--case", "case_path", type=click.Path(path_type=Path), required=True, metavar="CASE",
+    help="The plain model, its uncertainties and the modes measured.",
+)  # fmt: skip
 @click.option("--maker", default="bundled", show_default=True, metavar="NAME",
               help="bundled: the diagnosis' own model, an inverse crime; bundled-other: another"
               " mesh and other laws of the effects; calculix: another solver, too.")  # fmt: skip
@@ -43,7 +45,7 @@ def command() -> None:
 @click.option("--outside", type=click.IntRange(0), default=80, show_default=True, metavar="N",
               help="Trials with what the catalogue does not hold.")  # fmt: skip
 @click.option("--effect", "drawn", multiple=True, metavar="EFFECT",
-              help="Draw these effects only; repeatable (default: all that the maker can).")  # fmt: skip
+              help="Draw these effects only; repeatable (default: all it can).")  # fmt: skip
 @click.option("--seed", type=int, metavar="N", help="Of all that is drawn (default: a secret one).")
 @truth
 @options.every(options.jobs, options.quiet)
@@ -101,7 +103,7 @@ def make(
 @command.command()
 @folder
 @click.option("--emulated/--asked", default=True, show_default=True,
-              help="Ask the model at some designs once and go on between them, or for each trial.")  # fmt: skip
+              help="Ask the model at some designs once, or for each trial.")  # fmt: skip
 @click.option("--effect", "effects", multiple=True, metavar="EFFECT",
               help="Consider these effects only; repeatable.")  # fmt: skip
 @options.every(options.jobs, options.store, options.quiet)
