@@ -60,9 +60,7 @@ def test_a_family_moves_frequencies(name: str) -> None:
 
 def test_a_divided_region_is_the_same_tyre() -> None:
     made, names = divided(AT, "lower_sidewall", 3)
-    assert len(names) == 3 and ln_f(made) == pytest.approx(
-        PLAIN, abs=1e-5
-    )  # its mesh is spaced anew
+    assert len(names) == 3 and ln_f(made) == pytest.approx(PLAIN, abs=1e-5)
 
 
 def test_a_finer_mesh_is_another_one() -> None:

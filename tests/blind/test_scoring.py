@@ -21,10 +21,16 @@ from tyrecal.blind.statistics import (
 )
 from tyrecal.blind.tables import summary
 from tyrecal.diagnose.response import Point
+from tyrecal.modes.mode import Label
 
 from .toy import Scale
 
 RULES = Protocol("by hand", "", {})
+
+
+@pytest.fixture(autouse=True)
+def no_error_of_form(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tyrecal.blind.ruler.form_error", lambda label: 0.0)
 
 
 @pytest.mark.parametrize("right, count", [(0, 59), (4, 200), (54, 60), (60, 60), (7, 9)])
@@ -123,7 +129,7 @@ def test_figures_of_answers_made_by_hand() -> None:
 
 def ruler() -> Ruler:
     """Four rows of one mode each, one variable that moves all alike, two effects."""
-    rows = tuple((None, float(p)) for p in (1, 2, 3, 4))  # no label: no error of form
+    rows = tuple((Label(n, 0), 240.0) for n in (1, 2, 3, 4))
     sizes = np.array([0.0, 0.5, 1.0])
     line = lambda g: Signature(
         sizes, np.outer(sizes, g), np.zeros((3, 4, 1)), np.zeros((3, 4))
@@ -151,6 +157,12 @@ def test_lambda_and_distances_in_closed_form() -> None:
     assert weak.group == ("a", "b")
 
 
+def test_the_mass_scatters_by_the_scale_s_own_measure() -> None:
+    weighed = replace(ruler(), rows=((None, 0.0), *ruler().rows[1:]))
+    sigma = weighed.sigma(np.arange(4), np.array([1, 2, 2, 2]), RULES)
+    assert np.diag(sigma) == pytest.approx([0.005**2] + 3 * [0.002**2 / 2])
+
+
 def test_splits_count_where_both_members_were_measured() -> None:
     places, split = np.arange(4), np.array([0.01, 0, 0, 0.01])
     tau2 = 2 * RULES.noise**2 + RULES.split**2
@@ -172,7 +184,7 @@ def test_the_ruler_of_a_model_is_its_own_sensitivities() -> None:
 
 def test_baselines_find_a_strong_effect_and_none_where_there_is_none() -> None:
     r, places = ruler(), np.arange(4)
-    sigma = r.sigma(places, np.full(4, 2), RULES.noise, constants=False)
+    sigma = r.sigma(places, np.full(4, 2), RULES, constants=False)
     found = guesses(r, np.array([0.02, 0, 0, 0]) + 0.1, places, sigma)
     assert set(found.values()) == {"a"}
     assert set(guesses(r, np.full(4, 0.1), places, sigma).values()) == {"none"}

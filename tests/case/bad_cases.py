@@ -273,6 +273,44 @@ _edit(
     "[rebar_layers.belt_1.area_m2]",
 )
 _edit("sets_empty", "variables.C10.sets", "at least 1", "[materials.rubber.C10_Pa]", "[]")
+# uncertainties
+_edit("no_size", "uncertainties.pressure.percent", "or absolute", "absolute: 1.0}", "}")
+_edit(
+    "two_sizes",
+    "uncertainties.pressure.absolute",
+    "absent with percent",
+    "[pressure_kPa], absolute: 1.0}",
+    "[pressure_kPa], absolute: 1.0, percent: 1.0}",
+)
+_edit(
+    "uncertain_nothing",
+    "uncertainties.pressure.sets.0",
+    "did you mean 'pressure_kPa'",
+    "sets: [pressure_kPa]",
+    "sets: [pressure]",
+)
+_edit(
+    "uncertain_text",
+    "uncertainties.pressure.sets.0",
+    "no number",
+    "sets: [pressure_kPa]",
+    "sets: [name]",
+)
+_edit(
+    "uncertain_effect",
+    "uncertainties.rim_width.sets.0",
+    "not one of the effects",
+    "sets: [effects.rim_width]",
+    "sets: [effects.rim_widht]",
+)
+_edit(
+    "too_few_signs",
+    "uncertainties.pressure.signs",
+    "must have 1 entries",
+    "[pressure_kPa], absolute: 1.0}",
+    "[pressure_kPa], absolute: 1.0, signs: [1, -1]}",
+)
+
 # targets
 _edit("unknown_label", "targets.modes.0.kind", "'torsional'", AXIAL, AXIAL.replace("axial", "axle"))
 _edit(

@@ -67,6 +67,7 @@ def test_angular_cords_templates_and_linear_variables(tmp_path: Path) -> None:
     path = put(
         tmp_path,
         ("spacing_m: 1.0e-3", "geometry: angular, spacing_deg: 0.15"),
+        ("rebar_layers.carcass.spacing_m", "rebar_layers.carcass.spacing_deg"),
         ("targets:", angle + " scale: linear}\ntargets:"),
         ("solver:", "templates: mine\nsolver:"),
     )

@@ -310,3 +310,14 @@ def test_splits_speak_for_what_splits() -> None:
     assert probabilities(weigh(apart, pairs=False))["e0"] > 0.95
     assert probabilities(weigh(joined, pairs=False))["e0"] < 0.05
     assert chi2.sf(find_gap(apart, np.zeros(3), NAMES).chi2, n - 3 + pair.sum()) < 1e-6
+
+
+def test_the_interval_of_the_parameter_covers() -> None:
+    """The 90 % interval holds the true parameter in 85 to 95 of 100 tyres, within chance."""
+    toy = flat(size=0.01, pressures=(240.0,), effects=1)
+    base, random, count, inside = problem(toy), np.random.default_rng(19), 300, 0
+    for _ in range(count):
+        e = random.uniform(0, 1)
+        found = single(base.measured(drawn(toy, base, random, {"e0": e}, 1.0)), "e0", 1.0)
+        inside += found.quantile("e0", 0.05) <= e <= found.quantile("e0", 0.95)
+    assert 0.84 * count <= inside <= 0.96 * count

@@ -67,13 +67,16 @@ class Ruler:
     constants: Array
     signatures: Mapping[str, Signature]
 
-    def sigma(self, places: Array, counts: Array, noise: float, constants: bool = True) -> Array:
+    def sigma(
+        self, places: Array, counts: Array, protocol: Protocol, constants: bool = True
+    ) -> Array:
         """Covariance (n, n) of rows that are means of ``counts`` (n,) values; constants False:
         repeatability alone."""
-        scatter = np.diag(noise**2 / counts)
-        if not constants:
-            return scatter
         rows = [self.rows[i] for i in places]
+        weighed = np.array([label is None for label, _ in rows])
+        scatter = np.diag(np.where(weighed, protocol.mass, protocol.noise) ** 2 / counts)
+        if not constants:
+            return np.asarray(scatter)
         same = np.array([[a[0] == b[0] for b in rows] for a in rows])
         alike = np.where(np.eye(len(rows), dtype=bool), 1.0, BETWEEN_PRESSURES) * same
         form = np.array([form_error(label) for label, _ in rows])
@@ -120,7 +123,7 @@ def difficulty(
 ) -> Difficulty:  # fmt: skip
     """Of a true effect that shifts the measured rows ``places`` by ``shift`` (n,), and pairs apart
     by ``split`` (n,); d: the trial's design minus x0."""
-    P = ruler.projection(d, places, ruler.sigma(places, counts, protocol.noise))
+    P = ruler.projection(d, places, ruler.sigma(places, counts, protocol))
     tau2 = 2 * protocol.noise**2 + protocol.split**2
     pairs = counts == 2
     lam = float(shift @ P @ shift + (split[pairs] ** 2).sum() / tau2)

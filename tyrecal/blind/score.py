@@ -109,7 +109,7 @@ def scored(
     if truth["kind"] == "effect" and named == key and hard.equivalent is not None:
         held = told["parameter"]["low"] <= hard.equivalent <= told["parameter"]["high"]
     out = answer["held_out"]
-    sigma = ruler.sigma(places, counts, protocol.noise, constants=False)
+    sigma = ruler.sigma(places, counts, protocol, constants=False)
     return Scored(
         truth["id"], truth["kind"], truth["law"], truth["size"], truth["swapped"], key, group,
         hard.lam, hard.band, told["verdict"], named, tuple(sorted(p, key=lambda k: -p[k])), p,
@@ -121,14 +121,11 @@ def scored(
 
 
 def _means(readings: Sequence[Reading], ruler: Ruler) -> tuple[Array, Array, Array]:
-    """ln of each row's mean of members (n,), its place in the ruler (n,), number of values (n,).
-
-    The mass is left to the diagnosis: its scatter is another.
-    """
-    found: dict[tuple[Label, float], list[float]] = {}
+    """ln of each row's mean of members (n,), its place in the ruler (n,), number of values (n,)."""
+    found: dict[tuple[Label | None, float], list[float]] = {}
     for each in readings:
-        if each.label is not None:
-            found.setdefault((each.label, each.pressure_kPa), []).append(log(each.value))
+        pressure = each.pressure_kPa if each.label else 0.0
+        found.setdefault((each.label, pressure), []).append(log(each.value))
     place = {row: i for i, row in enumerate(ruler.rows)}
     return (
         np.array([np.mean(values) for values in found.values()]),
@@ -142,15 +139,12 @@ def _true_shift(
 ) -> tuple[Array, Array]:
     """What the effect moved (n,), and how far it split pairs (n,), from runs without noise."""
     names = {str(label) for label in labels}
-    tables = [
-        {
-            (name, entry["pressure_kPa"]): pair
-            for entry in truth[key]
-            for name, pair in entry["ln_f"].items()
-            if name in names
-        }
-        for key in ("with_effect", "without")
-    ]
+    tables: list[dict[tuple[str, float], list[float]]] = []
+    for key in ("with_effect", "without"):
+        tables.append({("None", 0.0): [truth[key][0]["ln_mass"]] * 2})
+        for entry in truth[key]:
+            for name in names:
+                tables[-1][name, entry["pressure_kPa"]] = entry["ln_f"][name]
     rows = [(str(ruler.rows[i][0]), ruler.rows[i][1]) for i in places]
     after, before = (np.array([table[row] for row in rows]) for table in tables)
     apart = [pairs[:, 1] - pairs[:, 0] for pairs in (after, before)]

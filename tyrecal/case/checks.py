@@ -136,22 +136,23 @@ def _variables(data: Mapping[str, Any]) -> Problems:
 
 
 def _uncertainties(data: Mapping[str, Any]) -> Problems:
-    """Sources of error name numbers that exist and that no design variable sets."""
-    variables = table(data, "variables").values()
-    calibrated = {path for variable in variables for path in entries(variable, "sets")}
+    """Sources of error name numbers that exist."""
     for name, source in table(data, "uncertainties").items():
         for i, path in enumerate(entries(source, "sets")):
             here: Keys = ("uncertainties", name, "sets", i)
-            if not isinstance(path, str) or path.startswith("effects."):
+            if not isinstance(path, str):
+                continue
+            if path.startswith("effects."):
+                if (id := path.removeprefix("effects.")) not in IDS:
+                    yield here, f"'{id}' is not one of the effects{suggestion(id, IDS)}"
                 continue
             try:
                 keys = find(data, path)
             except KeyError as error:
                 yield here, str(error.args[0])
                 continue
-            if path in calibrated:
-                yield here, "is set by a design variable, whose uncertainty the fit finds"
-            elif keys and (keys[0] in FIXED or not _is_number(at(data, keys))):
+            value = at(data, keys) if keys else WRONG
+            if keys and (keys[0] in FIXED or (value is not WRONG and not _is_number(value))):
                 yield here, "leads to no number of the tyre"
 
 

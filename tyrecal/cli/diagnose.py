@@ -21,6 +21,8 @@ file = click.Path(path_type=Path, exists=True, dir_okay=False)
               " EFFECT*FACTOR; repeatable.")  # fmt: skip
 @click.option("--effect", "effects", multiple=True, metavar="EFFECT",
               help="Consider these effects only; repeatable.")  # fmt: skip
+@click.option("--without", multiple=True, metavar="EFFECT",
+              help="Leave out an effect that is ruled out; repeatable.")  # fmt: skip
 @click.option("--form-percent", type=click.FloatRange(0, 20), metavar="PERCENT",
               help="Error of the model's own form in every frequency (default: on record, mode by"
               " mode).")  # fmt: skip
@@ -37,6 +39,7 @@ def command(
     repeats: tuple[Path, ...],
     toggled: tuple[tuple[Path, str], ...],
     effects: tuple[str, ...],
+    without: tuple[str, ...],
     form_percent: float | None,
     split_percent: float,
     add: str | None,
@@ -79,9 +82,10 @@ def command(
     from .output import Run, print_json
 
     loaded, _ = options.load(case, mesh, assignments, None)
-    for id in effects:
+    for id in (*effects, *without):
         if id not in catalogue():
-            raise click.UsageError(f"--effect {id}: no such effect, only {', '.join(catalogue())}")
+            raise click.UsageError(f"'{id}': no such effect, only {', '.join(catalogue())}")
+    considered = [id for id in effects or catalogue() if id not in without]
     changes = [(path, parse_change(text)) for path, text in toggled]
     door = Door(loaded, solver)
     run = Run(case, output, "diagnose", door.solver)
@@ -89,7 +93,7 @@ def command(
     door.store = run.open_store(store, no_store)
     form = None if form_percent is None else form_percent / 100
     assumed = Assumed(form, split_percent / 100)
-    found = study(loaded, door, measured, repeats, changes, assumed, jobs, effects or None)
+    found = study(loaded, door, measured, repeats, changes, assumed, jobs, considered)
     told = result(found.diagnosis)
     run.write_json("diagnosis.json", told)
     words = page(found, loaded.case.name, measured.name)

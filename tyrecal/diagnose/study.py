@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import exp
 from pathlib import Path
 
 from ..case import LoadedCase
@@ -14,7 +15,7 @@ from .measurements import BadMeasurements, read_measurements
 from .observations import Observations, observe
 from .problem import Assumed, Change
 from .regions import regions
-from .response import Span
+from .response import Answer, Point, Span
 from .tyre_model import TyreModel
 from .uncertainties import Source, sources
 
@@ -114,15 +115,13 @@ def _same(door: Door) -> Door:
 
 
 def _check_units(model: TyreModel, observations: Observations, path: Path) -> None:
-    """Raises BadMeasurements where no frequency is near the model's start."""
-    from .response import Answer, Point
-
+    """Raises BadMeasurements where a frequency is not even near the model's start."""
     (answer,) = model.answers([Point(model.start)])
     if not isinstance(answer, Answer):
         raise answer
-    at = {row: eta for row, eta in zip(model.rows, answer.eta, strict=True)}
+    at = dict(zip(model.rows, answer.eta.tolist(), strict=True))
     for row, y in zip(observations.rows, observations.y, strict=True):
-        ratio = float(2.718281828459045 ** (y - at[row.label, row.pressure_kPa]))
+        ratio = exp(y - at[row.label, row.pressure_kPa])
         if row.label and not 1 / ALIKE < ratio < ALIKE:
             raise BadMeasurements(
                 f"{path}: {row} was measured {ratio:.2g} times as high as the model has it; is it"

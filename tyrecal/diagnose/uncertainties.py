@@ -26,7 +26,8 @@ class Source:
 
 
 def sources(case: LoadedCase) -> tuple[list[Source], bool]:
-    """The case's own sources, else the assumed ones; whether they are assumed.
+    """The case's own sources, else the assumed ones; whether they are assumed. A number that a
+    design variable sets is none: the fit finds it.
 
     Assumed, a standard deviation each: rubber densities 1.5 %, moduli of cords 3 %, spacings 1 %,
     gauges that the case has 3 %, cord angles 1 degree, pressure 1 kPa.
@@ -34,20 +35,23 @@ def sources(case: LoadedCase) -> tuple[list[Source], bool]:
     stated = case.case.uncertainties
     if not stated:
         return list(_assumed(case)), True
-    result = []
+    result, taken = [], _calibrated(case)
     for name, each in stated.items():
         signs = each.signs or [1] * len(each.sets)
         steps = {
             path: sign * (each.absolute or _value(case, path) * (each.percent or 0) / 100)
             for path, sign in zip(each.sets, signs, strict=True)
+            if path not in taken
         }
+        if not steps:
+            continue
         size = f"{each.percent:g} %" if each.percent else f"{each.absolute:g}"
         result.append(Source(name, steps, f"{name.replace('_', ' ')} {size}"))
     return result, False
 
 
 def _assumed(case: LoadedCase) -> Iterator[Source]:
-    taken = {path for variable in case.case.variables.values() for path in variable.sets}
+    taken = _calibrated(case)
 
     def source(name: str, path: str, percent: float = 0.0, absolute: float = 0.0) -> Source | None:
         if path in taken:
@@ -72,6 +76,10 @@ def _assumed(case: LoadedCase) -> Iterator[Source]:
         path = f"section.gauges.{i}.factor"
         found.append(source(f"gauge_{'_'.join(gauge.between)}_{i}", path, GAUGE))
     yield from (each for each in found if each)
+
+
+def _calibrated(case: LoadedCase) -> set[str]:
+    return {path for variable in case.case.variables.values() for path in variable.sets}
 
 
 def _value(case: LoadedCase, path: str) -> float:

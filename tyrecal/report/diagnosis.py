@@ -178,6 +178,8 @@ def _which(study: Study) -> Iterator[str]:
         " cannot absorb; below 10 an effect can hide, from 25 on it is named as a rule."
     )
     for group in d.separability.groups():
+        if not set(group) & {id for key in d.verdict.candidates for id in key.split("+")}:
+            continue
         names = ", ".join(f"`{id}`" for id in group)
         yield f"These data cannot separate {names}."
     blind = [id for id, e in d.separability.smallest.items() if e is None]
