@@ -125,6 +125,31 @@ def test_answering_refuses_where_the_truth_lies_open(tmp_path: Path) -> None:
         answer(folder, SCALE, SCALE.model_rows)
 
 
+def test_making_goes_on_where_it_was_stopped(tmp_path: Path) -> None:
+    whole, _ = made(tmp_path / "whole", protocol(2, 2))
+    folder, sealed = tmp_path / "t", tmp_path / "s"
+
+    class Stopped(ToyMaker):
+        left = 10
+
+        def listen(self, case, labels):  # type: ignore[no-untyped-def]
+            self.left -= 1
+            if not self.left:
+                raise KeyboardInterrupt
+            return super().listen(case, labels)
+
+    stopped = Stopped(SCALE)
+    with pytest.raises(KeyboardInterrupt):
+        make(folder, sealed, CASE, protocol(2, 2), stopped, seed=3)
+    kept = len(list((sealed / "made").iterdir()))
+    assert kept >= 1 and not (folder / SEAL).exists()
+    stopped.left = 1000
+    make(folder, sealed, CASE, protocol(2, 2), stopped)
+    assert 1000 - stopped.left <= 8 * (4 - kept)
+    for file in (whole / "trials").iterdir():
+        assert (folder / "trials" / file.name).read_bytes() == file.read_bytes()
+
+
 def test_answers_resume_to_the_same_bytes(tmp_path: Path) -> None:
     folder, _ = made(tmp_path, protocol(2, 1))
     mark = answer(folder, SCALE, SCALE.model_rows)

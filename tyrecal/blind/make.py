@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import json
 import os
 import secrets
 import shutil
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from functools import partial
+from hashlib import sha256
 from math import exp
 from pathlib import Path
 from typing import Any
@@ -64,7 +66,7 @@ def make(
     seed = _seed(sealed, seed)
     found, _ = sources(case)
     truths = draw(protocol, case, found, maker.laws, maker.outside, seed)
-    work = partial(_make, protocol, case, maker)
+    work = partial(_kept, sealed, protocol, case, maker)
     trials: list[Made] = []
     if jobs > 1:
         with process_pool(jobs) as pool:
@@ -112,6 +114,18 @@ def values(made: Made, protocol: Protocol) -> dict[float, dict[Label, tuple[floa
     if made.truth.swapped:
         _swap(read, labels, random)
     return read
+
+
+def _kept(sealed: Path, protocol: Protocol, case: LoadedCase, maker: Maker, truth: Truth) -> Made:
+    """The trial as it was made before it was stopped, or made now."""
+    asked = json.dumps([asdict(truth), asdict(protocol), maker.about], sort_keys=True)
+    path = sealed / "made" / f"{sha256(asked.encode()).hexdigest()[:16]}.json"
+    if path.exists():
+        return _read(read_json(path), labels_of(case))
+    path.parent.mkdir(exist_ok=True)
+    made = _make(protocol, case, maker, truth)
+    write_json(path, _plain(made))
+    return made
 
 
 def _make(protocol: Protocol, case: LoadedCase, maker: Maker, truth: Truth) -> Made:
@@ -187,8 +201,8 @@ def _write_trials(folder: Path, protocol: Protocol, trials: list[Made]) -> None:
         os.utime(path, (0, 0))
 
 
-def _sealed(made: Made, protocol: Protocol) -> dict[str, Any]:
-    """One trial of the truth; what was held out with its noise, too."""
+def _plain(made: Made) -> dict[str, Any]:
+    """One trial without noise, for JSON."""
 
     def table(heard: Mapping[float, Heard]) -> Lines:
         return [
@@ -200,16 +214,33 @@ def _sealed(made: Made, protocol: Protocol) -> dict[str, Any]:
             for p, h in heard.items()
         ]
 
-    read = values(made, protocol)[protocol.held_out_kPa]
     return {
         **asdict(made.truth),
         "tries": made.tries,
         "with_effect": table(made.with_effect),
         "without": table(made.without),
-        "held_out": {
-            str(label): [f for f in members if np.isfinite(f)] for label, members in read.items()
-        },
     }
+
+
+def _read(content: dict[str, Any], labels: list[Label]) -> Made:
+    """The trial that `_plain` wrote."""
+    heard: list[dict[float, Heard]] = []
+    for key in ("with_effect", "without"):
+        heard.append({})
+        for entry in content.pop(key):
+            pairs = {label: tuple(entry["ln_f"][str(label)]) for label in labels}
+            heard[-1][entry["pressure_kPa"]] = Heard(pairs, entry["ln_mass"])
+    tries = content.pop("tries")
+    return Made(Truth(**content), tries, heard[0], heard[1])
+
+
+def _sealed(made: Made, protocol: Protocol) -> dict[str, Any]:
+    """One trial of the truth, with what was held out as it was measured."""
+    read = values(made, protocol)[protocol.held_out_kPa]
+    held_out = {
+        str(label): [f for f in members if np.isfinite(f)] for label, members in read.items()
+    }
+    return {**_plain(made), "held_out": held_out}
 
 
 def _seed(sealed: Path, seed: int | None) -> int:
@@ -232,3 +263,5 @@ def _copy(case: LoadedCase, folder: Path) -> None:
     stations = case.case.section.stations
     (target / stations).parent.mkdir(parents=True, exist_ok=True)
     shutil.copyfile(case.folder / stations, target / stations)
+    if templates := case.case.templates:
+        shutil.copytree(case.folder / templates, target / templates, dirs_exist_ok=True)
