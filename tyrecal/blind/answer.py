@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ..case import LoadedCase, load_case, with_values
+from ..case import LoadedCase, load_case
 from ..diagnose.diagnosis import Diagnosis, diagnose
 from ..diagnose.evidence import NONE
 from ..diagnose.measurements import read_measurements
@@ -23,7 +23,7 @@ from ..diagnose.response import Response
 from ..diagnose.result import result
 from ..diagnose.study import spans_of
 from ..diagnose.tyre_model import TyreModel
-from ..diagnose.uncertainties import EFFECTS, sources
+from ..diagnose.uncertainties import sources
 from ..evaluate.door import Door
 from ..evaluate.pool import process_pool
 from ..modes.mode import Label
@@ -44,13 +44,9 @@ def tyre_model(
     case: LoadedCase, door: Door, protocol: Protocol, jobs: int = 1,
     effects: Sequence[str] | None = None,
 ) -> TyreModel:  # fmt: skip
-    """The model of the diagnosis for all trials, with effects of which the solver has slopes."""
+    """The model of the diagnosis for all trials."""
     spans, _ = spans_of(door, effects)
-    smooth = {
-        id: span for id, span in spans.items()
-        if Door(with_values(case, {f"{EFFECTS}{id}": span.high}), door.solver_name).has_gradients
-    }  # fmt: skip
-    return TyreModel(case, door, rows_of(case, protocol), sources(case)[0], smooth, jobs)
+    return TyreModel(case, door, rows_of(case, protocol), sources(case)[0], spans, jobs)
 
 
 def case_of(folder: Path) -> LoadedCase:
