@@ -12,7 +12,13 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
-GUIDES = ["README.md", "cases/README.md", "cases/diagnosis.md", "solvers/README.md"]
+GUIDES = [
+    "README.md",
+    "cases/README.md",
+    "cases/diagnosis.md",
+    "cases/blind.md",
+    "solvers/README.md",
+]
 OWN_SETUP = "python3 -m venv"  # the two commands that set themselves up; CI runs the second
 
 

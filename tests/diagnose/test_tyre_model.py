@@ -217,3 +217,26 @@ def test_sources_of_error_are_those_of_the_case_or_assumed_and_never_calibrated(
     variable = CASE.case.variables["C10"].model_copy(update={"sets": ["pressure_kPa"]})
     moved = CASE.case.model_copy(update={"variables": {"p": variable}})
     assert "pressure" not in {s.name for s in sources(replace(CASE, case=moved))[0]}
+
+
+def test_an_effect_without_slopes_takes_the_plain_tyres(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A solver that refuses slopes with one effect: the others keep theirs, its shift is exact."""
+    from tyrecal.evaluate.failure import DeckRefused
+    from tyrecal.fit.problem import Problem
+
+    points = [Point(X), Point(X, {"bead_filler": 1.0}), Point(X, {"tread_density": 0.05})]
+    wanted = [asked(p) for p in points]
+    modes = Problem.modes
+
+    def refusing(self: Problem, designs: list, names: tuple = ()) -> list:
+        if names and any(design.get("effects.bead_filler") for design in designs):
+            raise DeckRefused("no exact derivatives")
+        return modes(self, designs, names)
+
+    monkeypatch.setattr(Problem, "modes", refusing)
+    found = model().answers(points)
+    slopes = (wanted[0], wanted[0], wanted[2])
+    for answer, own, slope in zip(found, wanted, slopes, strict=True):
+        assert isinstance(answer, Answer)
+        assert answer.eta == pytest.approx(own.eta, abs=1e-9)
+        assert answer.jacobian[:-1] == pytest.approx(slope.jacobian[:-1], abs=1e-6)

@@ -23,6 +23,7 @@ COMMANDS = {  # name: one line of help, so that the overview imports no command
     "footprint": "Press the tyre on a road: contact area and pressure over load.",
     "effects": "List and explain what a plain model leaves out, and what it does.",
     "diagnose": "Say where model and measurements part, and which effect explains it.",
+    "blind": "Try the diagnosis on data whose effect is withheld: make, answer, score.",
     "solvers": "List the installed solvers and what they can do.",
     "store": "Look at a record of evaluations, check it, prune it.",
 }
@@ -97,6 +98,7 @@ def _exit_code(error: Exception) -> int | None:
         ("tyrecal.fit.calibrate", "NothingToFit", EXIT_INPUT),
         ("tyrecal.diagnose.measurements", "BadMeasurements", EXIT_INPUT),
         ("tyrecal.diagnose.study", "BadChange", EXIT_INPUT),
+        ("tyrecal.blind.protocol", "BadTrials", EXIT_INPUT),
         ("tyrecal.cli.output", "OutputRefused", EXIT_INPUT),
         ("tyrecal.cli.lock", "Locked", EXIT_INPUT),
         ("tyrecal.case", "CaseError", EXIT_INPUT),

@@ -65,6 +65,8 @@ class TyreModel:
         self.spread = np.array(wide) / sqrt(12)  # of a uniform distribution within the bounds
         self._plain = values_of(case, found)
         self._plain.setdefault("pressure_kPa", case.case.pressure_kPa)
+        self._slopeless: set[str] = set()
+        self._plain_slopes: dict[bytes, Answer | Exception] = {}
         self._mass: tuple[Array, Array, Array] | None = None
 
     def values(self, x: Array) -> dict[str, float]:
@@ -93,15 +95,58 @@ class TyreModel:
         return log(value) if v.scale == "log" else (value - v.lower) / (v.upper - v.lower)
 
     def _ask(self, points: Sequence[Point]) -> list[Answer | Exception]:
+        """Points that all want slopes by constants, or none of them."""
+        smooth = [p for p in points if not self._slopeless & set(p.effects)]
+        try:
+            answers = iter(self._evaluated(smooth, self.pressures) if smooth else [])
+        except DeckRefused:
+            if not self._find_slopeless(smooth):
+                raise
+            return self._ask(points)
+        return [
+            self._without_slopes(p) if self._slopeless & set(p.effects) else next(answers)
+            for p in points
+        ]
+
+    def _find_slopeless(self, points: Sequence[Point]) -> bool:
+        """Learn which effects the solver gives no slopes with; whether there are any."""
+        before = len(self._slopeless)
+        for point in {frozenset(p.effects): p for p in points if p.effects}.values():
+            try:
+                self._evaluated([point], self.pressures[:1])
+            except DeckRefused:
+                self._slopeless |= set(point.effects)
+        return len(self._slopeless) > before
+
+    def _without_slopes(self, point: Point) -> Answer | Exception:
+        """Frequencies with an effect that the solver gives no slopes with: the plain tyre's, at
+        the same x, stand for them."""
+        key = point.x.tobytes()
+        if key not in self._plain_slopes:
+            self._plain_slopes = {key: self._evaluated([Point(point.x)], self.pressures)[0]}
+        plain = self._plain_slopes[key]
+        try:
+            (answer,) = self._evaluated([point], self.pressures, exact=False)
+        except DeckRefused as refused:
+            return refused
+        if isinstance(answer, Answer) and isinstance(plain, Answer):
+            return replace(answer, jacobian=plain.jacobian)
+        return plain if isinstance(answer, Answer) else answer
+
+    def _evaluated(
+        self, points: Sequence[Point], pressures: Sequence[float], exact: bool = True
+    ) -> list[Answer | Exception]:
         constants = points[0].constants
         paths = list(self._plain) if constants else []
         designs = []
-        for point, pressure in product(points, self.pressures):
+        for point, pressure in product(points, pressures):
             effects = {EFFECTS + id: float(e) for id, e in point.effects.items()}
             known = dict(self._plain) if constants else {}
             designs.append({**self.values(point.x), **known, "pressure_kPa": pressure, **effects})
-        found = self._modes(designs, (*self.variables, *paths))
-        per = len(self.pressures)
+        found = self._modes(designs, (*self.variables, *paths) if exact else ())
+        per = len(pressures)
+        if per < len(self.pressures):  # only asked whether there are slopes
+            return []
         return [self._answer(p, designs[i * per : (i + 1) * per], found[i * per : (i + 1) * per])
                 for i, p in enumerate(points)]  # fmt: skip
 
@@ -134,7 +179,7 @@ class TyreModel:
             eta[i] = log(f)
             if members := modes[label].raw.members:
                 eta[i], split[i] = log(members[0] * members[1]) / 2, log(members[1] / members[0])
-            for j, name in enumerate(self.variables):
+            for j, name in enumerate(self.variables if evaluation.gradients else ()):
                 jacobian[i, j] = evaluation.gradients[name][place] * self._slope(name, design) / f
             if point.constants:
                 for k, source in enumerate(self.found):

@@ -1,0 +1,92 @@
+"""Makers' laws: near the catalogue's in what they do, but not the same; families outside it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tyrecal.blind.emulated import emulate
+from tyrecal.blind.laws import Law, other_laws
+from tyrecal.blind.maker import find_maker, finer
+from tyrecal.blind.outside import FAMILIES
+from tyrecal.blind.regions import divided
+from tyrecal.case import LoadedCase, with_values
+from tyrecal.diagnose.response import Answer, Point
+from tyrecal.effects import catalogue
+from tyrecal.evaluate.door import Door, Question
+from tyrecal.modes.label import paired_labels
+from tyrecal.modes.mode import Label
+
+from .toy import CASE, Scale
+
+LABELS = [Label(t.c, t.m, t.kind) for t in CASE.case.targets.modes]  # type: ignore[union-attr]
+AT = with_values(CASE, {"pressure_kPa": 160.0})
+ABLE = Door(CASE).solver.capabilities
+CHEAP = sorted(set(other_laws(frozenset({"modes"}))))
+
+
+def ln_f(case: LoadedCase) -> np.ndarray:
+    found = {
+        m.label: m.frequency_Hz for m in paired_labels(Door(case).evaluate(Question({})).modes)
+    }
+    return np.log([found[label] for label in LABELS])
+
+
+PLAIN = ln_f(AT)
+
+
+def test_calculix_can_make_at_least_twelve_effects_and_four_families() -> None:
+    assert len(CHEAP) >= 12 and len(FAMILIES) >= 4
+    assert not set(FAMILIES) & set(catalogue())
+    assert set(find_maker("calculix", CASE).laws) == set(CHEAP)
+    for id, law in other_laws(frozenset(ABLE)).items():
+        assert (law.low, law.high) == (catalogue()[id].low, catalogue()[id].high)
+
+
+@pytest.mark.parametrize("id", CHEAP)
+def test_a_law_does_what_the_catalogue_s_does_by_another_way(id: str) -> None:
+    law, size = other_laws(frozenset(ABLE))[id], 0.6 * catalogue()[id].high
+    own, theirs = ln_f(law.add(AT, size)) - PLAIN, ln_f(catalogue()[id].add(AT, size)) - PLAIN
+    assert abs(own).max() > 2e-4
+    assert abs(own - theirs).max() > 0.02 * abs(theirs).max()  # not the same law
+    if id not in ("carcass_fanning", "carcass_turn_up"):  # small, and absorbed by A_carcass
+        assert own @ theirs > 0.6 * np.linalg.norm(own) * np.linalg.norm(theirs)
+
+
+@pytest.mark.parametrize("name", sorted(FAMILIES))
+def test_a_family_moves_frequencies(name: str) -> None:
+    assert abs(ln_f(FAMILIES[name].add(AT, FAMILIES[name].high)) - PLAIN).max() > 2e-3
+
+
+def test_a_divided_region_is_the_same_tyre() -> None:
+    made, names = divided(AT, "lower_sidewall", 3)
+    assert len(names) == 3 and ln_f(made) == pytest.approx(PLAIN, abs=1e-5)
+
+
+def test_a_finer_mesh_is_another_one() -> None:
+    off = abs(ln_f(finer(AT)) - PLAIN).max()
+    assert 1e-5 < off < 0.05
+
+
+def test_sizes_are_drawn_on_both_sides() -> None:
+    random = np.random.default_rng(0)
+    drawn = [Law(-1.0, 2.0, lambda case, e: case).drawn(random, 0.2) for _ in range(200)]
+    assert min(drawn) < -0.9 and max(drawn) > 1.8
+    assert all(-1 <= e <= -0.2 or 0.4 <= e <= 2 for e in drawn)
+
+
+def test_the_emulated_model_is_the_model_between_its_designs_and_asks_it_beyond() -> None:
+    scale = Scale()
+    twin = emulate(scale)
+    random, asked = np.random.default_rng(1), scale.asked
+    for _ in range(10):
+        x = scale.start + random.uniform(-0.7, 0.7, 3)
+        point = Point(x, {"e1": float(random.uniform(0, 1))}, constants=True)
+        (got,) = twin.answers([point])
+        (want,) = scale.answers([point])
+        assert isinstance(got, Answer) and isinstance(want, Answer)
+        for name in ("eta", "jacobian", "constants"):
+            assert np.allclose(getattr(got, name), getattr(want, name), atol=1e-6)
+    assert scale.asked == asked + 10
+    twin.answers([Point(scale.start + 1.0)])
+    assert scale.asked == asked + 11

@@ -1,0 +1,126 @@
+"""Trials answered: the diagnosis with what its user would have, and nothing else.
+
+It reads the case, the measurements and the rules; a prediction for the held-out pressure is part of
+each answer, so that the scorer alone compares it with what was measured there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..case import LoadedCase, load_case
+from ..diagnose.diagnosis import Diagnosis, diagnose
+from ..diagnose.evidence import NONE
+from ..diagnose.measurements import read_measurements
+from ..diagnose.observations import observe
+from ..diagnose.problem import Assumed
+from ..diagnose.response import Response
+from ..diagnose.result import result
+from ..diagnose.study import spans_of
+from ..diagnose.tyre_model import TyreModel
+from ..diagnose.uncertainties import sources
+from ..evaluate.door import Door
+from ..evaluate.pool import process_pool
+from ..modes.mode import Label
+from .make import labels_of
+from .protocol import Protocol, read_protocol, write_json
+from .seal import refuse_open_truth, seal_answers
+
+ModelRow = tuple[Label | None, float]
+
+
+def rows_of(case: LoadedCase, protocol: Protocol) -> list[ModelRow]:
+    """All that a model is asked of: the mass, and each mode at each pressure."""
+    modes = labels_of(case)
+    return [(None, 0.0), *((label, p) for p in protocol.pressures_kPa for label in modes)]
+
+
+def tyre_model(
+    case: LoadedCase, door: Door, protocol: Protocol, jobs: int = 1,
+    effects: Sequence[str] | None = None,
+) -> TyreModel:  # fmt: skip
+    """The model of the diagnosis for all trials."""
+    spans, _ = spans_of(door, effects)
+    return TyreModel(case, door, rows_of(case, protocol), sources(case)[0], spans, jobs)
+
+
+def case_of(folder: Path) -> LoadedCase:
+    """The case that lies beside the trials. Raises BadTrials, CaseError."""
+    return load_case(folder / "case" / read_protocol(folder).case)
+
+
+def answer(
+    folder: Path,
+    response: Response,
+    rows: Sequence[ModelRow],
+    jobs: int = 1,
+    told: Callable[[int, int], None] = lambda done, all: None,
+) -> str:
+    """Answer every trial that has no answer yet; returns the sha256 of all answers.
+
+    Raises BadTrials where the truth lies among the trials.
+    """
+    refuse_open_truth(folder)
+    protocol = read_protocol(folder)
+    trials = sorted((folder / "trials").glob("*.csv"))
+    answers = folder / "answers"
+    answers.mkdir(exist_ok=True)
+    waiting = [t for t in trials if not (answers / f"{t.stem}.json").exists()]
+    work = partial(one_answer, response, list(rows), protocol)
+    done = len(trials) - len(waiting)
+
+    def keep(trial: Path, content: dict[str, Any]) -> None:
+        nonlocal done
+        write_json(answers / f"{trial.stem}.json", content)
+        done += 1
+        told(done, len(trials))
+
+    if jobs > 1 and len(waiting) > 1:
+        with process_pool(jobs) as pool:
+            for trial, content in zip(waiting, pool.map(work, waiting), strict=True):
+                keep(trial, content)
+    else:
+        for trial in waiting:
+            keep(trial, work(trial))
+    return seal_answers(folder, [answers / f"{trial.stem}.json" for trial in trials])
+
+
+def one_answer(
+    response: Response, rows: list[ModelRow], protocol: Protocol, trial: Path
+) -> dict[str, Any]:
+    """The diagnosis of one file of measurements, and what it predicts at the held-out pressure."""
+    observations = observe(read_measurements(trial), split=protocol.split)
+    found = diagnose(response, rows, observations, assumed=Assumed(split=protocol.split))
+    told = result(found)
+    told.pop("next_measurements"), told.pop("section_map")
+    key = told["effect"] or told["likeliest"]
+    return {
+        "diagnosis": told,
+        "held_out": {
+            "pressure_kPa": protocol.held_out_kPa,
+            "effect": key,
+            "plain_Hz": predicted(found, rows, protocol.held_out_kPa, NONE),
+            "with_effect_Hz": predicted(found, rows, protocol.held_out_kPa, key) if key else None,
+        },
+    }
+
+
+def predicted(
+    found: Diagnosis, rows: Sequence[ModelRow], pressure_kPa: float, key: str
+) -> dict[str, float]:
+    """Hz by label at a pressure that was not fitted, by a hypothesis at its best parameters."""
+    places = [i for i, (label, p) in enumerate(rows) if label and p == pressure_kPa]
+    hypothesis, expansion = found.hypothesis(key), found.problem.expansion
+    assert hypothesis.fitted is not None
+    best = int(np.argmax(hypothesis.posterior))
+    d = hypothesis.fitted.d[best]
+    eta = expansion.plain(expansion.x0 + d)[0]
+    for id, e in hypothesis.values.items():
+        shift, tilt, _ = expansion.nodes[id].at(e[[best]])
+        eta = eta + shift[0] + tilt[0] @ d
+    return {str(rows[i][0]): round(float(np.exp(eta[i])), 4) for i in places}

@@ -1,0 +1,71 @@
+"""What simpler ways say of the same measurements, with the ruler's sensitivities.
+
+All fit ln x first, in the ruler's quadratic model with weights by repeatability alone. Nearest
+signature: the effect whose residual, after its own fit, points most along the measured one; "none"
+where the residual is below twice what noise leaves. AIC: least chi2 + 2 x number of parameters.
+Evidence by repeatability: that of a uniform prior over each range, without the other two parts of
+the covariance. Odds before any measurement are the diagnosis' own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from .ruler import GRID, Ruler
+
+Array = np.ndarray
+STEPS = 8
+LONGEST = 0.5  # of ln x, a step
+NONE = "none"
+PRIOR_NONE = 0.25
+
+
+def guesses(ruler: Ruler, y: Array, places: Array, sigma: Array) -> dict[str, str]:
+    """Answer by baseline. y (n,): ln f of rows ``places``; sigma (n, n): repeatability."""
+    inverse = np.linalg.inv(sigma)
+    d = _fit(ruler, y, places, inverse)
+    eta, _ = ruler.plain(d, places)
+    r = y - eta
+    P = ruler.projection(d, places, sigma)
+    chi2 = float(r @ P @ r)
+    near, aic, odds = {}, {NONE: chi2 + 2 * len(d)}, {NONE: np.log(PRIOR_NONE) - chi2 / 2}
+    root = np.linalg.cholesky(P + 1e-9 * np.trace(P) / len(P) * np.eye(len(P))).T
+    residual = root @ r
+    share = np.log((1 - PRIOR_NONE) / max(1, len(ruler.signatures)))
+    for id, signature in ruler.signatures.items():
+        _, g, _ = signature.grid(d, places)
+        off = r - g
+        lengths = np.einsum("qn,nm,qm->q", off, P, off)
+        best = int(np.argmin(lengths))
+        aic[id] = float(lengths[best]) + 2 * (len(d) + 1)
+        odds[id] = float(share + np.logaddexp.reduce(-lengths / 2) - np.log(GRID))
+        along = root @ g[best]
+        near[id] = float(residual @ along / max(1e-12, np.linalg.norm(along)))
+    freedom = max(1, len(y) - len(d))
+    nearest = max(near, key=lambda id: near[id]) if near and chi2 > 4 * freedom else NONE
+    return {
+        "nearest signature": nearest,
+        "AIC": min(aic, key=lambda key: aic[key]),
+        "evidence by repeatability alone": max(odds, key=lambda key: odds[key]),
+    }
+
+
+def majority(truth: Mapping[str, str]) -> str:
+    """The commonest true key."""
+    keys = list(truth.values())
+    return max(sorted(set(keys)), key=keys.count)
+
+
+def _fit(ruler: Ruler, y: Array, places: Array, inverse: Array) -> Array:
+    """d = ln x - ln x0 by Gauss and Newton's steps."""
+    d = np.zeros(len(ruler.x0))
+    information = np.diag(ruler.spread**-2.0)
+    for _ in range(STEPS):
+        eta, J = ruler.plain(d, places)
+        step = np.linalg.solve(
+            J.T @ inverse @ J + information, J.T @ inverse @ (y - eta) - information @ d
+        )
+        d = d + step * min(1.0, LONGEST / max(abs(step).max(), 1e-300))
+    return d

@@ -1,0 +1,209 @@
+"""A model asked once for many tyres: polynomials in the design variables between its answers.
+
+About the centre x0, with t = (x - x0) / reach, |t| <= 1:
+
+    eta(x, e) = sum_k a_k q_k(t) + sum over effects of sum_j L_j(e) sum_k b_jk q_k(t)
+
+q_k: monomials, fitted by least squares to values and Jacobians at designs of a Halton sequence;
+L_j: Lagrange's polynomials of the effect's nodes, 0 among them. Changes by the sources of error
+likewise. What lies outside the box is asked of the model itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations_with_replacement
+from math import prod
+
+import numpy as np
+from scipy.stats import qmc
+
+from ..diagnose.response import Answer, Point, Response, Span
+
+Array = np.ndarray
+REACH = 0.8  # of ln x: 40 % by the draw, the rest what an ignored effect moves a fit
+PLAIN_DEGREE, EFFECT_DEGREE, SOURCE_DEGREE = 4, 3, 2
+PLAIN_DESIGNS, EFFECT_DESIGNS, SOURCE_DESIGNS = 20, 7, 12
+ONE_SIDED, TWO_SIDED = (0.1, 0.4, 0.75, 1.0), (0.5, 1.0)
+SEED = 1
+
+
+@dataclass(frozen=True)
+class Polynomial:
+    """powers (k, v); coefficients (k, n)."""
+
+    powers: Array
+    coefficients: Array
+
+    def at(self, t: Array) -> tuple[Array, Array]:
+        """Values (n,) and slopes (n, v) at t (v,)."""
+        return monomials(self.powers, t) @ self.coefficients, (
+            slopes(self.powers, t) @ self.coefficients
+        ).T
+
+
+@dataclass(frozen=True)
+class Grown:
+    """An effect: nodes (k,), 0 left out; polynomials of what it adds at each, and of the split."""
+
+    nodes: Array
+    added: tuple[Polynomial, ...]
+    split: tuple[Polynomial, ...]
+
+    def at(self, e: float, t: Array) -> tuple[Array, Array, Array]:
+        """Added eta (n,), slopes (n, v) by t, split (n,) at parameter e."""
+        weights = _lagrange(np.append(self.nodes, 0.0), e)[:-1]
+        found = [p.at(t) for p in self.added]
+        return (
+            sum(w * value for w, (value, _) in zip(weights, found, strict=True)),
+            sum(w * slope for w, (_, slope) in zip(weights, found, strict=True)),
+            sum(w * p.at(t)[0] for w, p in zip(weights, self.split, strict=True)),
+        )
+
+
+class Emulated:
+    """A `Response` that stands for ``model`` within ``reach`` of its start."""
+
+    def __init__(self, model: Response, designs: Sequence[Array], reach: float, plain: Polynomial,
+                 constants: Polynomial, effects: Mapping[str, Grown]):  # fmt: skip
+        self.model, self.reach, self.designs = model, reach, designs
+        self.variables, self.sources = model.variables, model.sources
+        self.start, self.spread = model.start, model.spread
+        self.spans: Mapping[str, Span] = {k: s for k, s in model.spans.items() if k in effects}
+        self._plain, self._constants, self._effects = plain, constants, effects
+
+    def answers(self, points: Sequence[Point]) -> list[Answer | Exception]:
+        """From the polynomials where they reach, from the model elsewhere."""
+        far = [i for i, point in enumerate(points) if not self._near(point)]
+        asked = self.model.answers([points[i] for i in far]) if far else []
+        known = dict(zip(far, asked, strict=True))
+        return [known[i] if i in known else self._answer(p) for i, p in enumerate(points)]
+
+    def _near(self, point: Point) -> bool:
+        inside = abs(point.x - self.start).max() <= self.reach
+        return bool(inside) and set(point.effects) <= set(self._effects)
+
+    def _answer(self, point: Point) -> Answer:
+        t = (point.x - self.start) / self.reach
+        eta, slope = self._plain.at(t)
+        split = np.zeros(len(eta))
+        for id, e in point.effects.items():
+            added, tilt, apart = self._effects[id].at(e, t)
+            eta, slope, split = eta + added, slope + tilt, np.hypot(split, apart)
+        constants = None
+        if point.constants:
+            constants = self._constants.at(t)[0].reshape(len(eta), -1)
+        return Answer(eta, slope / self.reach, split, constants)
+
+
+def emulate(model: Response, reach: float = REACH) -> Emulated:
+    """Ask the model at its designs, the plain tyre and every effect of its spans.
+
+    An effect without an answer at so many designs that its polynomials are not determined is
+    left out. Raises what the model says where the plain tyre has too few answers.
+    """
+    start = np.asarray(model.start, float)
+    count = len(start)
+    signs = 2 * qmc.Halton(count, seed=SEED).random(PLAIN_DESIGNS) - 1
+    signs[0] = 0.0
+    designs = [start + reach * t for t in signs]
+    asked = [Point(x, constants=i < SOURCE_DESIGNS) for i, x in enumerate(designs)]
+    plain = model.answers(asked)
+    good = [i for i, answer in enumerate(plain) if isinstance(answer, Answer)]
+    powers = monomial_powers(count, PLAIN_DEGREE)
+    if len(good) * (1 + count) < len(powers):
+        raise next(a for a in plain if isinstance(a, Exception))
+    fitted = _fit(powers, signs[good], [plain[i] for i in good], reach)  # type: ignore[misc]
+    sources = [i for i in good if i < SOURCE_DESIGNS]
+    constants = _values(
+        monomial_powers(count, SOURCE_DEGREE), signs[sources],
+        [plain[i].constants.ravel() for i in sources],  # type: ignore[union-attr]
+    )  # fmt: skip
+    grown = {}
+    for id, span in model.spans.items():
+        found = _effect(model, id, span, signs, designs, plain, reach)
+        if found is not None:
+            grown[id] = found
+    return Emulated(model, designs, reach, fitted, constants, grown)
+
+
+def monomial_powers(count: int, degree: int) -> Array:
+    """Powers (k, count) of all monomials up to a degree, the constant first."""
+    rows = [np.zeros(count, int)]
+    for d in range(1, degree + 1):
+        for chosen in combinations_with_replacement(range(count), d):
+            rows.append(np.bincount(chosen, minlength=count))
+    return np.array(rows)
+
+
+def monomials(powers: Array, t: Array) -> Array:
+    """q_k(t) (k,)."""
+    return np.prod(t[None, :] ** powers, axis=1)
+
+
+def slopes(powers: Array, t: Array) -> Array:
+    """d q_k / d t (v, k)."""
+    rows = []
+    for i in range(len(t)):
+        lower = powers.copy()
+        lower[:, i] = np.maximum(lower[:, i] - 1, 0)
+        rows.append(powers[:, i] * monomials(lower, t))
+    return np.array(rows)
+
+
+def _effect(
+    model: Response,
+    id: str,
+    span: Span,
+    signs: Array,
+    designs: Sequence[Array],
+    plain: Sequence[Answer | Exception],
+    reach: float,
+) -> Grown | None:
+    powers = monomial_powers(len(signs[0]), EFFECT_DEGREE)
+    chosen = [i for i in range(EFFECT_DESIGNS) if isinstance(plain[i], Answer)]
+    nodes, added, split = [], [], []
+    for e in _node_values(span):
+        answers = model.answers([Point(designs[i], {id: float(e)}) for i in chosen])
+        both = [(i, a) for i, a in zip(chosen, answers, strict=True) if isinstance(a, Answer)]
+        if len(both) * (1 + len(signs[0])) < len(powers):
+            continue
+        differences = [
+            Answer(a.eta - plain[i].eta, a.jacobian - plain[i].jacobian, a.split)  # type: ignore[union-attr]
+            for i, a in both
+        ]
+        where = signs[[i for i, _ in both]]
+        nodes.append(float(e))
+        added.append(_fit(powers, where, differences, reach))
+        split.append(_values(monomial_powers(len(signs[0]), 1), where, [a.split for _, a in both]))
+    if not nodes:
+        return None
+    return Grown(np.array(nodes), tuple(added), tuple(split))
+
+
+def _node_values(span: Span) -> list[float]:
+    if span.low < 0 < span.high:
+        return [f * end for end in (span.low, span.high) for f in TWO_SIDED]
+    far = max(span.low, span.high, key=abs)
+    return [f * far for f in ONE_SIDED]
+
+
+def _fit(powers: Array, t: Array, answers: Sequence[Answer], reach: float) -> Polynomial:
+    """Least squares of values and slopes by t."""
+    rows = [monomials(powers, each)[None] for each in t] + [slopes(powers, each) for each in t]
+    values = [a.eta[None] for a in answers] + [reach * a.jacobian.T for a in answers]
+    found, *_ = np.linalg.lstsq(np.concatenate(rows), np.concatenate(values), rcond=None)
+    return Polynomial(powers, found)
+
+
+def _values(powers: Array, t: Array, values: Sequence[Array]) -> Polynomial:
+    rows = np.array([monomials(powers, each) for each in t])
+    found, *_ = np.linalg.lstsq(rows, np.array(values), rcond=None)
+    return Polynomial(powers, found)
+
+
+def _lagrange(nodes: Array, e: float) -> Array:
+    """Lagrange's polynomials of the nodes (k,) at e."""
+    others = [np.delete(nodes, k) for k in range(len(nodes))]
+    return np.array([prod((e - o) / (n - o)) for n, o in zip(nodes, others, strict=True)])

@@ -1,0 +1,267 @@
+"""Trials made: tyres drawn and computed, the truth sealed, measurements written alike."""
+
+from __future__ import annotations
+
+import json
+import os
+import secrets
+import shutil
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
+from functools import partial
+from hashlib import sha256
+from math import exp
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..case import LoadedCase
+from ..diagnose.measurements import COLUMNS
+from ..diagnose.uncertainties import sources
+from ..evaluate.failure import EvaluationFailed
+from ..evaluate.pool import process_pool
+from ..files import whole
+from ..modes.mode import Label
+from .draw import NEAR, Truth, draw, tyre
+from .maker import Heard, Maker
+from .protocol import BadTrials, Protocol, read_json, write_json, write_protocol
+from .seal import SEAL, seal
+
+TRIES = 20  # tyres that a trial may draw until one has a solution
+Lines = list[dict[str, Any]]
+
+
+@dataclass(frozen=True)
+class Made:
+    """A trial: truth, tries it took, and by pressure what was heard with and without its effect."""
+
+    truth: Truth
+    tries: int
+    with_effect: dict[float, Heard]
+    without: dict[float, Heard]
+
+
+def make(
+    folder: Path,
+    sealed: Path,
+    case: LoadedCase,
+    protocol: Protocol,
+    maker: Maker,
+    jobs: int = 1,
+    seed: int | None = None,
+    told: Callable[[int, int], None] = lambda done, all: None,
+) -> str:
+    """Make trials in ``folder`` and their truth in ``sealed``; returns the seal's sha256.
+
+    seed: None = a secret one, kept in ``sealed`` so that the same call goes on where it was
+    stopped. Raises BadTrials where the folder holds trials already, or the truth would lie in it.
+    """
+    if (folder / SEAL).exists():
+        raise BadTrials(f"{folder} holds sealed trials already; make others in another folder")
+    if sealed.resolve().is_relative_to(folder.resolve()):
+        raise BadTrials(f"the truth must not lie in {folder}, which is answered")
+    folder.mkdir(parents=True, exist_ok=True)
+    sealed.mkdir(parents=True, exist_ok=True)
+    seed = _seed(sealed, seed)
+    found, _ = sources(case)
+    truths = draw(protocol, case, found, maker.laws, maker.outside, seed)
+    work = partial(_kept, sealed, protocol, case, maker)
+    trials: list[Made] = []
+    if jobs > 1:
+        with process_pool(jobs) as pool:
+            for made in pool.map(work, truths):
+                trials.append(made)
+                told(len(trials), len(truths))
+    else:
+        for truth in truths:
+            trials.append(work(truth))
+            told(len(trials), len(truths))
+    _copy(case, folder)
+    write_protocol(folder, protocol)
+    _write_trials(folder, protocol, trials)
+    return seal(folder, sealed, {"seed": seed, "trials": [_sealed(t, protocol) for t in trials]})
+
+
+def labels_of(case: LoadedCase) -> list[Label]:
+    """The modes that are measured: the case's targets. Raises BadTrials."""
+    if case.case.targets is None or not case.case.targets.modes:
+        raise BadTrials(f"{case.path}: blind trials measure the case's targets.modes, it has none")
+    return [Label(t.c, t.m, t.kind) for t in case.case.targets.modes]
+
+
+def values(made: Made, protocol: Protocol) -> dict[float, dict[Label, tuple[float, ...]]]:
+    """What the laboratory reads, Hz by pressure and label: noise, the tyre's own splits, labels.
+
+    One member for [0,0], two for doublets in an order by chance; NaN where a value is missing.
+    """
+    random = np.random.default_rng(made.truth.scatter)
+    labels = list(next(iter(made.with_effect.values())).ln_f)
+    own = {label: protocol.split * random.normal() for label in labels}
+    read: dict[float, dict[Label, tuple[float, ...]]] = {}
+    for pressure in protocol.pressures_kPa:
+        heard, here = made.with_effect[pressure], {}
+        for label in labels:
+            low, high = heard.ln_f[label]
+            pair = [low - own[label] / 2, high + own[label] / 2] if label.c else [low]
+            noisy = np.exp(pair + protocol.noise * random.normal(size=len(pair)))
+            here[label] = tuple(random.permutation(noisy).tolist())
+        places = [(label, i) for label in labels for i in range(len(here[label]))]
+        gone = random.choice(len(places), int(random.integers(protocol.missing + 1)), False)
+        for label, i in (places[k] for k in gone):
+            here[label] = tuple(float("nan") if j == i else f for j, f in enumerate(here[label]))
+        read[pressure] = here
+    if made.truth.swapped:
+        _swap(read, labels, random)
+    return read
+
+
+def _kept(sealed: Path, protocol: Protocol, case: LoadedCase, maker: Maker, truth: Truth) -> Made:
+    """The trial as it was made before it was stopped, or made now."""
+    asked = json.dumps([asdict(truth), asdict(protocol), maker.about], sort_keys=True)
+    path = sealed / "made" / f"{sha256(asked.encode()).hexdigest()[:16]}.json"
+    if path.exists():
+        return _read(read_json(path), labels_of(case))
+    path.parent.mkdir(exist_ok=True)
+    made = _make(protocol, case, maker, truth)
+    write_json(path, _plain(made))
+    return made
+
+
+def _make(protocol: Protocol, case: LoadedCase, maker: Maker, truth: Truth) -> Made:
+    """The trial, its tyre drawn again where it has no solution."""
+    found, _ = sources(case)
+    labels = labels_of(case)
+    random = np.random.default_rng(truth.scatter + 1)
+    law = {"effect": maker.laws, "outside": maker.outside, "none": {}}[truth.kind].get(truth.law)
+    for tries in range(1, TRIES + 1):
+        try:
+            both = [
+                {p: maker.listen(tyre(truth, case, found, p, each), labels)
+                 for p in protocol.pressures_kPa}
+                for each in ([law, None] if law else [None])
+            ]  # fmt: skip
+            return Made(truth, tries, both[0], both[-1])
+        except (EvaluationFailed, ValueError) as failure:
+            last = failure
+        truth = _again(truth, case, protocol, random)
+    raise BadTrials(f"no tyre with {truth.law or 'these constants'} has a solution: {last}")
+
+
+def _again(
+    truth: Truth, case: LoadedCase, protocol: Protocol, random: np.random.Generator
+) -> Truth:
+    """The same trial with other design variables and constants."""
+    other = draw(
+        Protocol(protocol.maker, protocol.case, {"none": 1}, protocol.spread), case,
+        sources(case)[0], {}, {}, int(random.integers(2**63)),
+    )[0]  # fmt: skip
+    return Truth(truth.id, truth.kind, truth.law, truth.size, other.variables, other.constants,
+                 truth.scatter, truth.swapped)  # fmt: skip
+
+
+def _swap(
+    read: Mapping[float, dict[Label, tuple[float, ...]]],
+    labels: list[Label],
+    random: np.random.Generator,
+) -> None:
+    """Two doublets of like frequency take each other's label at every pressure."""
+    first = next(iter(read.values()))
+    mean = {label: np.nanmean(first[label]) for label in labels if label.c}
+    near = [(a, b) for a in mean for b in mean
+            if a < b and abs(np.log(mean[a] / mean[b])) < NEAR]  # fmt: skip
+    if near:
+        a, b = near[int(random.integers(len(near)))]
+        for here in read.values():
+            here[a], here[b] = here[b], here[a]
+
+
+def _write_trials(folder: Path, protocol: Protocol, trials: list[Made]) -> None:
+    """One CSV a trial, all of the same form, digits and time."""
+    (folder / "trials").mkdir(exist_ok=True)
+    for made in trials:
+        lines = [",".join(COLUMNS)]
+        read = values(made, protocol)
+        for p in protocol.given_kPa:
+            for label, members in read[p].items():
+                for i, f in enumerate(members, 1):
+                    if np.isfinite(f):
+                        member = i if len(members) > 1 else ""
+                        mode = f"{label.c},{label.m},{label.kind or ''},{member}"
+                        reading = f"{f:.3f},{protocol.noise * f:.3f}"
+                        lines.append(f"frequency_Hz,{mode},{p:.0f},0,{reading}")
+        random = np.random.default_rng(made.truth.scatter + 2)
+        mass = exp(made.with_effect[protocol.given_kPa[0]].ln_mass)
+        mass *= exp(protocol.mass * random.normal())
+        lines.append(f"mass_kg,,,,,,,{mass:.3f},{protocol.mass * mass:.3f}")
+        path = folder / "trials" / f"{made.truth.id}.csv"
+        with whole(path) as partial:
+            partial.write_text("\n".join(lines) + "\n", encoding="utf-8", newline="")
+    for path in (folder / "trials").iterdir():
+        os.utime(path, (0, 0))
+
+
+def _plain(made: Made) -> dict[str, Any]:
+    """One trial without noise, for JSON."""
+
+    def table(heard: Mapping[float, Heard]) -> Lines:
+        return [
+            {
+                "pressure_kPa": p,
+                "ln_mass": h.ln_mass,
+                "ln_f": {str(label): list(pair) for label, pair in h.ln_f.items()},
+            }
+            for p, h in heard.items()
+        ]
+
+    return {
+        **asdict(made.truth),
+        "tries": made.tries,
+        "with_effect": table(made.with_effect),
+        "without": table(made.without),
+    }
+
+
+def _read(content: dict[str, Any], labels: list[Label]) -> Made:
+    """The trial that `_plain` wrote."""
+    heard: list[dict[float, Heard]] = []
+    for key in ("with_effect", "without"):
+        heard.append({})
+        for entry in content.pop(key):
+            pairs = {label: tuple(entry["ln_f"][str(label)]) for label in labels}
+            heard[-1][entry["pressure_kPa"]] = Heard(pairs, entry["ln_mass"])
+    tries = content.pop("tries")
+    return Made(Truth(**content), tries, heard[0], heard[1])
+
+
+def _sealed(made: Made, protocol: Protocol) -> dict[str, Any]:
+    """One trial of the truth, with what was held out as it was measured."""
+    read = values(made, protocol)[protocol.held_out_kPa]
+    held_out = {
+        str(label): [f for f in members if np.isfinite(f)] for label, members in read.items()
+    }
+    return {**_plain(made), "held_out": held_out}
+
+
+def _seed(sealed: Path, seed: int | None) -> int:
+    path = sealed / "seed.json"
+    if path.exists():
+        known = int(read_json(path)["seed"])
+        if seed is not None and seed != known:
+            raise BadTrials(f"{path} holds another seed; give another folder for the truth")
+        return known
+    seed = secrets.randbits(63) if seed is None else seed
+    write_json(path, {"seed": seed})
+    return seed
+
+
+def _copy(case: LoadedCase, folder: Path) -> None:
+    """The case file and what it names, for who answers."""
+    target = folder / "case"
+    target.mkdir(exist_ok=True)
+    shutil.copyfile(case.path, target / case.path.name)
+    stations = case.case.section.stations
+    (target / stations).parent.mkdir(parents=True, exist_ok=True)
+    shutil.copyfile(case.folder / stations, target / stations)
+    if templates := case.case.templates:
+        shutil.copytree(case.folder / templates, target / templates, dirs_exist_ok=True)

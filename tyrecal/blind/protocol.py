@@ -1,0 +1,82 @@
+"""The rules of a set of trials: what is drawn, what is given, what is held out. Written openly."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from ..files import whole
+
+FILE = "protocol.json"
+KINDS = ("effect", "none", "outside")
+
+
+class BadTrials(ValueError):
+    """A folder of trials that is incomplete, changed or not what it says."""
+
+
+@dataclass(frozen=True)
+class Protocol:
+    """Numbers of a study; the standard deviations of constants are the case's `uncertainties`.
+
+    maker: who made the data, in words; case: the case file beside it; counts: trials by kind;
+    spread: design variables are the case's start times exp(U(-ln(1 + spread), ln(1 + spread)));
+    given_kPa, held_out_kPa: pressures; noise: relative, of every value; mass: relative, of the
+    weighed mass; split: standard deviation of every tyre's own relative split of a doublet, the
+    same at all pressures; missing: at most so many values a pressure; swapped: share of trials in
+    which two labels are exchanged; smallest: least size as a share of an effect's range.
+    """
+
+    maker: str
+    case: str
+    counts: dict[str, int]
+    spread: float = 0.4
+    given_kPa: tuple[float, ...] = (160.0, 240.0, 320.0)
+    held_out_kPa: float = 200.0
+    noise: float = 0.002
+    mass: float = 0.005
+    split: float = 0.003
+    missing: int = 2
+    swapped: float = 0.05
+    smallest: float = 0.2
+
+    @property
+    def pressures_kPa(self) -> tuple[float, ...]:
+        """All that the maker computes, the held-out one last."""
+        return (*self.given_kPa, self.held_out_kPa)
+
+
+def write_json(path: Path, content: object) -> None:
+    """A file of JSON, whole or not at all."""
+    with whole(path) as partial:
+        partial.write_text(json.dumps(content, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+
+
+def read_json(path: Path) -> dict:
+    """A file of JSON. Raises BadTrials."""
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise BadTrials(f"{path} is missing") from None
+    except ValueError:
+        raise BadTrials(f"{path} is not JSON") from None
+    if not isinstance(content, dict):
+        raise BadTrials(f"{path} must hold an object")
+    return content
+
+
+def write_protocol(folder: Path, protocol: Protocol) -> None:
+    """Write the rules of ``folder``."""
+    write_json(folder / FILE, {"format": 1, **asdict(protocol)})
+
+
+def read_protocol(folder: Path) -> Protocol:
+    """The rules of ``folder``. Raises BadTrials."""
+    content = read_json(folder / FILE)
+    try:
+        content.pop("format")
+        content["given_kPa"] = tuple(content["given_kPa"])
+        return Protocol(**content)
+    except (KeyError, TypeError) as error:
+        raise BadTrials(f"{folder / FILE}: not the rules of trials ({error})") from None

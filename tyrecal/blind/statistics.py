@@ -1,0 +1,46 @@
+"""Exact bounds, calibration of stated probabilities, and its measure by chance alone."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from scipy.stats import beta
+
+Array = np.ndarray
+BINS, SIMULATIONS = 10, 2000
+
+
+def clopper_pearson(right: int, count: int, level: float = 0.95) -> tuple[float, float]:
+    """Two-sided exact interval of a binomial share (Clopper and Pearson 1934); (0, 1) of none."""
+    outside = (1 - level) / 2
+    low = beta.ppf(outside, right, count - right + 1) if right else 0.0
+    high = beta.ppf(1 - outside, right + 1, count - right) if right < count else 1.0
+    return float(low), float(high)
+
+
+def calibration_error(stated: Array, right: Array) -> float:
+    """ECE: mean over trials of |share right - mean stated| in ten bins of what was stated."""
+    if not len(stated):
+        return 0.0
+    place = np.minimum((stated * BINS).astype(int), BINS - 1)
+    total = sum(
+        abs(float((right[place == b] - stated[place == b]).sum())) for b in np.unique(place)
+    )
+    return total / len(stated)
+
+
+def calibration_quantile(stated: Array, quantile: float = 0.95, seed: int = 0) -> float:
+    """That quantile of the ECE of as many trials whose stated probabilities are exactly right."""
+    random = np.random.default_rng(seed)
+    drawn = random.random((SIMULATIONS, len(stated))) < stated
+    return float(np.quantile([calibration_error(stated, each) for each in drawn], quantile))
+
+
+def brier(probabilities: Sequence[Mapping[str, float]], truth: Sequence[str]) -> float:
+    """Mean over trials of sum over keys of (p - 1 or 0)^2: 0 is certain and right, 2 the worst."""
+    scores = []
+    for p, key in zip(probabilities, truth, strict=True):
+        scores.append(sum((value - (name == key)) ** 2 for name, value in p.items()))
+        scores[-1] += key not in p
+    return float(np.mean(scores)) if scores else 0.0

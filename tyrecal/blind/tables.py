@@ -1,0 +1,169 @@
+"""Scored trials as tables: rates with exact bounds, calibration, held-out errors, every miss."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from .score import Scored
+from .statistics import brier, calibration_error, calibration_quantile, clopper_pearson
+
+BANDS = ((0.0, 4.0), (4.0, 10.0), (10.0, 25.0), (25.0, float("inf")))
+DETECTED = 10.0  # band from which an effect counts as detectable
+
+
+def summary(trials: Sequence[Scored]) -> dict[str, Any]:
+    """All figures, as plain data; a rate is {"right", "count", "share", "low", "high"}."""
+    effects = [t for t in trials if t.kind == "effect"]
+    none = [t for t in trials if t.kind == "none"]
+    outside = [t for t in trials if t.kind == "outside"]
+    named = [t for t in trials if t.verdict == "named"]
+    detected = [t for t in effects if t.band >= DETECTED]
+    stated = np.array([t.probabilities[t.ranked[0]] for t in trials])
+    right = np.array([t.ranked[0] == t.truth for t in trials], float)
+    placebo = float(np.quantile([t.shrinkage for t in none], 0.95)) if none else None
+    proven = [t for t in detected if t.verdict == "named"]
+    parameters = [t.parameter_held for t in trials if t.parameter_held is not None]
+    return {
+        "trials": {kind: sum(t.kind == kind for t in trials)
+                   for kind in ("effect", "none", "outside")},
+        "swapped": sum(t.swapped for t in trials),
+        "by_band": [
+            {"low": low, "high": high if high < 1e9 else None, **_band(effects, low, high)}
+            for low, high in BANDS
+        ],
+        "by_lambda": [
+            {"low": low, "top_1_group": rate([t.right for t in effects if low <= t.lam < high])}
+            for low, high in BANDS
+        ],
+        "false_alarms": rate([t.verdict == "named" for t in none]),
+        "named_right": rate([t.named in t.group for t in named]),
+        "mean_probability_on_group": _mean([t.on_group for t in detected]),
+        "outside_recognised": rate([t.verdict == "outside" for t in outside]),
+        "outside_named": rate([t.verdict == "named" for t in outside]),
+        "calibration_error": calibration_error(stated, right),
+        "calibration_error_95": calibration_quantile(stated),
+        "brier": brier([t.probabilities for t in trials], [t.truth for t in trials]),
+        "set_holds_truth": rate([t.in_set for t in trials]),
+        "interval_holds_parameter": rate([bool(held) for held in parameters]),
+        "held_out": {
+            "count": len(proven),
+            "median_shrinkage": _median([t.shrinkage for t in proven]),
+            "placebo_95": placebo,
+            "beyond_placebo": rate([t.shrinkage > (placebo or 0.0) for t in proven]),
+        },
+        "baselines": _baselines(trials),
+        "confusion": _confusion(trials),
+        "misses": [t.plain() for t in trials if not t.right or (t.verdict == "named" and
+                   t.named not in t.group)],
+    }  # fmt: skip
+
+
+def rate(found: Sequence[bool]) -> dict[str, Any]:
+    """A share with its exact 95 % bounds."""
+    right, count = sum(found), len(found)
+    low, high = clopper_pearson(right, count)
+    return {"right": right, "count": count, "share": right / count if count else None,
+            "low": low, "high": high}  # fmt: skip
+
+
+def page(figures: dict[str, Any], maker: str) -> str:
+    """The figures as a page of Markdown."""
+    return "\n".join(_lines(figures, maker)) + "\n"
+
+
+def _band(effects: Sequence[Scored], low: float, high: float) -> dict[str, Any]:
+    here = [t for t in effects if low <= t.band < high]
+    return {
+        "top_1_group": rate([t.right for t in here]),
+        "top_1": rate([t.ranked[0] == t.truth for t in here]),
+        "top_2_group": rate([bool(set(t.ranked[:2]) & set(t.group)) for t in here]),
+    }
+
+
+def _baselines(trials: Sequence[Scored]) -> dict[str, Any]:
+    """Right by group over all trials: the diagnosis, chance, the commonest answer, and others."""
+    keys = [t.truth for t in trials]
+    commonest = max(sorted(set(keys)), key=keys.count) if keys else ""
+    known = sorted(set(keys))
+    result: dict[str, Any] = {"diagnosis": rate([t.right for t in trials])}
+    result["random"] = {"share": _mean([len(set(t.group) & set(known)) / len(known)
+                                        for t in trials])}  # fmt: skip
+    result["commonest"] = rate([commonest in t.group for t in trials])
+    for name in trials[0].baselines if trials else ():
+        result[name] = rate([t.baselines[name] in t.group for t in trials])
+        alarms = [t.baselines[name] != "none" for t in trials if t.kind == "none"]
+        result[name]["false_alarms"] = rate(alarms)
+    return result
+
+
+def _confusion(trials: Sequence[Scored]) -> dict[str, dict[str, int]]:
+    """How often each likeliest answer was given, by truth."""
+    table: dict[str, dict[str, int]] = {}
+    for t in trials:
+        row = table.setdefault(t.truth, {})
+        row[t.ranked[0]] = row.get(t.ranked[0], 0) + 1
+    return {key: dict(sorted(row.items(), key=lambda item: -item[1]))
+            for key, row in sorted(table.items())}  # fmt: skip
+
+
+def _lines(f: dict[str, Any], maker: str) -> Iterator[str]:
+    kinds = ", ".join(f"{count} {kind}" for kind, count in f["trials"].items())
+    yield f"Maker: {maker}.\nTrials: {kinds}; labels swapped in {f['swapped']}.\n"
+    yield "| min(lambda, delta^2) | trials | top 1, group | top 1 | top 2, group |"
+    yield "|---|---|---|---|---|"
+    for band in f["by_band"]:
+        span = f"{band['low']:g} to {band['high']:g}" if band["high"] else f"{band['low']:g} on"
+        cells = [_rate(band[key]) for key in ("top_1_group", "top_1", "top_2_group")]
+        yield f"| {span} | {band['top_1']['count']} | {' | '.join(cells)} |"
+    yield "\n| lambda alone, from | trials | top 1, group |\n|---|---|---|"
+    for band in f["by_lambda"]:
+        yield f"| {band['low']:g} | {band['top_1_group']['count']} | {_rate(band['top_1_group'])} |"
+    yield "\n| what | measured |\n|---|---|"
+    for key in ("false_alarms", "named_right", "outside_recognised", "outside_named",
+                "set_holds_truth", "interval_holds_parameter"):  # fmt: skip
+        yield f"| {key.replace('_', ' ')} | {_rate(f[key])} |"
+    mean = _number(f["mean_probability_on_group"])
+    yield f"| mean probability on the true group, detectable | {mean} |"
+    yield (f"| calibration error (95 % quantile of a calibrated simulation) |"
+           f" {f['calibration_error']:.3f} ({f['calibration_error_95']:.3f}) |")  # fmt: skip
+    yield f"| Brier score | {f['brier']:.3f} |"
+    out = f["held_out"]
+    yield (f"| held-out shrinkage, detectable and named: median (placebo's 95 % quantile) |"
+           f" {_number(out['median_shrinkage'])} ({_number(out['placebo_95'])}), {out['count']}"
+           " trials |")  # fmt: skip
+    yield "\n| on the same trials | right by group | false alarms |\n|---|---|---|"
+    for name, each in f["baselines"].items():
+        alarms = f["false_alarms"] if name == "diagnosis" else each.get("false_alarms")
+        shown = _rate(each) if "count" in each else _number(each["share"])
+        yield f"| {name} | {shown} | {_rate(alarms) if alarms else ''} |"
+    yield "\n| truth | likeliest answers |\n|---|---|"
+    for key, row in f["confusion"].items():
+        yield f"| {key} | {', '.join(f'{name} {count}' for name, count in row.items())} |"
+    yield "\n| missed | truth | size | band | verdict | likeliest |\n|---|---|---|---|---|---|"
+    for t in f["misses"]:
+        law = f"{t['truth']}: {t['law']}" if t["kind"] == "outside" else t["truth"]
+        law += " (swapped)" if t["swapped"] else ""
+        yield (f"| {t['id']} | {law} | {t['size']:.3g} | {t['band']:.1f} | {t['verdict']} |"
+               f" {', '.join(t['top'])} |")  # fmt: skip
+
+
+def _rate(each: dict[str, Any]) -> str:
+    if not each["count"]:
+        return "none"
+    return (f"{each['right']} of {each['count']}, {each['share']:.0%}"
+            f" ({each['low']:.0%} to {each['high']:.0%})")  # fmt: skip
+
+
+def _number(value: float | None) -> str:
+    return "none" if value is None else f"{value:.2f}"
+
+
+def _mean(values: Sequence[float]) -> float | None:
+    return float(np.mean(values)) if values else None
+
+
+def _median(values: Sequence[float]) -> float | None:
+    return float(np.median(values)) if values else None

@@ -1,0 +1,184 @@
+"""tyrecal blind make, answer, score"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from . import options
+
+folder = click.argument("folder", type=click.Path(path_type=Path, file_okay=False), metavar="DIR")
+truth = click.option(
+    "--truth",
+    type=click.Path(path_type=Path, file_okay=False),
+    metavar="DIR",
+    help="Where the sealed truth lies (default: DIR-truth, beside DIR).",
+)
+
+
+@click.group()
+def command() -> None:
+    """Try the diagnosis on data whose effect is withheld.
+
+    \b
+    tyrecal blind make trials --case cases/p235_75r17.yaml --effects 60 --none 40 --outside 20
+    tyrecal blind answer trials --jobs 2
+    tyrecal blind score trials
+    """
+
+
+@command.command()
+@folder
+@click.option(
+    "--case", "case_path", type=click.Path(path_type=Path), required=True, metavar="CASE",
+    help="The plain model, its uncertainties and the modes measured.",
+)  # fmt: skip
+@click.option("--maker", default="bundled", show_default=True, metavar="NAME",
+              help="bundled: the diagnosis' own model, an inverse crime; bundled-other: another"
+              " mesh and other laws of the effects; calculix: another solver, too.")  # fmt: skip
+@click.option("--effects", type=click.IntRange(0), default=300, show_default=True, metavar="N",
+              help="Trials with an effect of the catalogue.")  # fmt: skip
+@click.option("--none", "plain", type=click.IntRange(0), default=200, show_default=True,
+              metavar="N", help="Trials without any.")  # fmt: skip
+@click.option("--outside", type=click.IntRange(0), default=80, show_default=True, metavar="N",
+              help="Trials with what the catalogue does not hold.")  # fmt: skip
+@click.option("--effect", "drawn", multiple=True, metavar="EFFECT",
+              help="Draw these effects only; repeatable (default: all it can).")  # fmt: skip
+@click.option("--seed", type=int, metavar="N", help="Of all that is drawn (default: a secret one).")
+@truth
+@options.every(options.jobs, options.quiet)
+def make(
+    folder: Path,
+    case_path: Path,
+    maker: str,
+    effects: int,
+    plain: int,
+    outside: int,
+    drawn: tuple[str, ...],
+    seed: int | None,
+    truth: Path | None,
+    jobs: int,
+    quiet: bool,
+) -> int:
+    """Draw tyres, compute them, seal the truth and write measurements to DIR.
+
+    The same command goes on where it was stopped.
+    """
+    from dataclasses import replace
+
+    from ..blind.answer import rows_of, tyre_model
+    from ..blind.make import make as made
+    from ..blind.maker import NAMES, find_maker
+    from ..blind.protocol import Protocol
+    from ..blind.ruler import measure, write_ruler
+    from ..case import load_case
+    from ..evaluate.door import Door
+    from ..evaluate.store import Store
+    from .output import say
+
+    if maker not in NAMES:
+        raise click.UsageError(f"--maker {maker}: must be one of {', '.join(NAMES)}")
+    if not effects + plain + outside:
+        raise click.UsageError("there must be at least one trial")
+    case, sealed = load_case(case_path), _sealed(folder, truth)
+    store = Store((sealed / "record").resolve())
+    who = find_maker(maker, case, store)
+    for id in drawn:
+        if id not in who.laws:
+            raise click.UsageError(f"--effect {id}: this maker has only {', '.join(who.laws)}")
+    if drawn:
+        who = replace(who, laws={id: who.laws[id] for id in drawn})
+    counts = {"effect": effects, "none": plain, "outside": outside}
+    protocol = Protocol(who.about, case.path.name, counts)
+    mark = made(folder, sealed, case, protocol, who, jobs, seed, _told("made", quiet))
+    door = Door(case, "bundled", store=store)
+    write_ruler(folder, measure(tyre_model(case, door, protocol, jobs), rows_of(case, protocol)))
+    say(f"{sum(counts.values())} trials in {folder}; the truth is in {sealed}, sha256 {mark}",
+        False, quiet)  # fmt: skip
+    return 0
+
+
+@command.command()
+@folder
+@click.option("--emulated/--asked", default=True, show_default=True,
+              help="Ask the model at some designs once, or for each trial.")  # fmt: skip
+@click.option("--effect", "effects", multiple=True, metavar="EFFECT",
+              help="Consider these effects only; repeatable.")  # fmt: skip
+@options.every(options.jobs, options.store, options.quiet)
+def answer(
+    folder: Path,
+    emulated: bool,
+    effects: tuple[str, ...],
+    jobs: int,
+    store: Path | None,
+    quiet: bool,
+) -> int:
+    """Answer every trial of DIR with the diagnosis; needs nothing but DIR.
+
+    Answers that are there stay; the same command goes on where it was stopped.
+    """
+    from ..blind import answer as blind
+    from ..blind.emulated import emulate
+    from ..blind.protocol import read_protocol
+    from ..blind.seal import refuse_open_truth
+    from ..diagnose.response import Response
+    from ..effects import catalogue
+    from ..evaluate.door import Door
+    from ..evaluate.store import Store
+    from .output import say
+
+    for id in effects:
+        if id not in catalogue():
+            raise click.UsageError(f"--effect {id}: no such effect, only {', '.join(catalogue())}")
+    refuse_open_truth(folder)
+    protocol, case = read_protocol(folder), blind.case_of(folder)
+    door = Door(case, store=Store((store or folder / "record").resolve()))
+    model: Response = blind.tyre_model(case, door, protocol, jobs, effects or None)
+    if emulated:
+        model = emulate(model)
+    mark = blind.answer(folder, model, blind.rows_of(case, protocol), jobs,
+                        _told("answered", quiet))  # fmt: skip
+    say(f"all trials of {folder} are answered, sha256 {mark}", False, quiet)
+    return 0
+
+
+@command.command()
+@folder
+@truth
+@options.every(options.as_json, options.quiet)
+def score(folder: Path, truth: Path | None, as_json: bool, quiet: bool) -> int:
+    """Open the truth and score the answers of DIR: score.json, score.md.
+
+    The seals are checked first: the truth must be what was sealed, and answers what was hashed.
+    """
+    from ..blind.protocol import read_protocol, write_json
+    from ..blind.score import score as scored
+    from ..blind.tables import page, summary
+    from ..files import whole
+    from .output import print_json, say
+
+    figures = summary(scored(folder, _sealed(folder, truth)))
+    write_json(folder / "score.json", figures)
+    words = page(figures, read_protocol(folder).maker)
+    with whole(folder / "score.md") as partial:
+        partial.write_text(words, encoding="utf-8", newline="")
+    if as_json:
+        print_json(figures)
+    say(words, as_json, quiet)
+    return 0
+
+
+def _sealed(folder: Path, truth: Path | None) -> Path:
+    return truth or folder.with_name(f"{folder.name}-truth")
+
+
+def _told(what: str, quiet: bool) -> Any:
+    """Prints how far it is, on standard error, every tenth of the way."""
+
+    def told(done: int, all: int) -> None:
+        if not quiet and (done == all or done % max(1, all // 10) == 0):
+            click.echo(f"{what} {done} of {all}", err=True)
+
+    return told
