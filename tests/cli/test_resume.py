@@ -198,7 +198,7 @@ def test_solvers_lists_what_works_and_what_does_not(
     monkeypatch.setattr(solver, "entry_points", lambda group: entries)
     assert run("solvers", "--json") == 0
     found = {each["name"]: each for each in json.loads(capsys.readouterr().out)}
-    assert found["bundled"]["capabilities"] == ["footprint", "gradients", "modes"]
+    assert {"footprint", "gradients", "modes"} <= set(found["bundled"]["capabilities"])
     assert found["bundled"]["dialect"] == "abaqus" and found["bundled"]["problem"] is None
     assert "no_such_package" in found["broken"]["problem"]
     assert found["not_one"]["problem"]

@@ -80,6 +80,7 @@ def test_angular_spacing_fans_the_cords_out(case_folder: Path) -> None:
             "spacing_m: 1.0e-3, angle_deg: 0.0",
             f"geometry: angular, spacing_deg: {spacing:.12g}, angle_deg: 0.0",
         ),
+        ("rebar_layers.carcass.spacing_m", "rebar_layers.carcass.spacing_deg"),
     )
     assert frequencies(fanned) != pytest.approx(frequencies(CASE), rel=1e-4)
     assert frequencies(fanned) == pytest.approx(frequencies(CASE), rel=0.05)
