@@ -21,8 +21,8 @@ Array = np.ndarray
 TOLERANCE = 1e-8  # out-of-balance force over the load
 LONGEST = 40  # Newton iterations a load
 TIRED = 7  # GMRES iterations of a step, after which the preconditioner is formed anew
-FAR = 0.1  # residual over the load, beyond which one bears more iterations:
-EXHAUSTED = 15
+FAR = 0.1  # residual over the load: of a state beyond it no preconditioner is formed,
+EXHAUSTED = 15  # or only after that many iterations
 LONGEST_LINEAR = 60
 EXACT = 1e-2  # residual of the linear problem, relative
 STIFF = 1e-3  # the same of the vertical stiffness
@@ -109,6 +109,10 @@ class Press:
         force = self.fold.gather(forces + contact.nodal(U.shape))
         return force, (load - contact.force) / 2, contact
 
+    def _energy(self, contact: Contact, load: float, height: float) -> float:
+        """Potential of half the tyre, its road and its load at the last state, J."""
+        return self.tyre.potential() + contact.energy + load / 2 * height
+
     def _newton(self, load: float) -> Pressed:
         """By Tresca's friction, with the last normal forces, to where Coulomb's converges."""
         parts, height = self.parts, self.height
@@ -158,7 +162,7 @@ class Press:
             if size <= tolerance * load:
                 return parts, height, contact
             self.iterations += 1
-            energy = self.tyre.potential() + contact.energy + load / 2 * height
+            energy = self._energy(contact, load, height) if bound else 0.0
             step, rise = self._step(contact, force, lacking, size / load)
             slope = float((force * step).sum() + lacking * rise)
             length, before = 1.0, size
@@ -167,9 +171,9 @@ class Press:
                 try:
                     force, lacking, contact = self._state(*ahead, load, bound)
                     size = float(np.hypot(np.linalg.norm(force), lacking))
-                    total = self.tyre.potential() + contact.energy + load / 2 * ahead[1]
-                    lower = total <= energy + 1e-4 * length * slope
-                    if bound is None or lower or size < 0.5 * before:
+                    if bound is None or size < 0.5 * before:
+                        break
+                    if self._energy(contact, load, ahead[1]) <= energy + 1e-4 * length * slope:
                         break
                 except Inverted:
                     pass

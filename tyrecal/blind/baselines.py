@@ -9,8 +9,6 @@ the covariance. Odds before any measurement are the diagnosis' own.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 
 from .ruler import GRID, Ruler
@@ -50,12 +48,6 @@ def guesses(ruler: Ruler, y: Array, places: Array, sigma: Array) -> dict[str, st
         "AIC": min(aic, key=lambda key: aic[key]),
         "evidence by repeatability alone": max(odds, key=lambda key: odds[key]),
     }
-
-
-def majority(truth: Mapping[str, str]) -> str:
-    """The commonest true key."""
-    keys = list(truth.values())
-    return max(sorted(set(keys)), key=keys.count)
 
 
 def _fit(ruler: Ruler, y: Array, places: Array, inverse: Array) -> Array:
