@@ -12,7 +12,8 @@ from tyrecal.deck.environment import environment
 from tyrecal.deck.press import Angles, press_texts
 
 from ..deck.test_press import coarse_case
-from .footprint_calculix import area_of_gap, extrapolated, serendipity, tread_faces
+from .footprint_calculix import extrapolated
+from .tread_gap import area_of_gap, serendipity, tread_faces
 
 HALF = Angles(8.0, 24.0, 20.0, 1.5)
 
