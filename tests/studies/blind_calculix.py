@@ -3,7 +3,7 @@
     python -m tests.studies.blind_calculix train 40       # runs CalculiX, goes on where it stopped
     python -m tests.studies.blind_calculix confirm 30     # runs with effects, by the makers' laws
     python -m tests.studies.blind_calculix table > table.md
-    python -m tests.studies.blind_calculix make DIR 300 200 80 [SEED]     # the trials themselves
+    python -m tests.studies.blind_calculix make DIR 450 200 80 [SEED]     # the trials themselves
 
     ln f_CalculiX = ln f_common + sum_k a_k q_k(x, p)
 
@@ -57,6 +57,7 @@ Array = np.ndarray
 ROOT = Path(__file__).parents[2]
 RECORD = Path(__file__).parents[1] / "benchmarks" / "blind_calculix.jsonl"
 ELEMENTS = {"crown": 10, "upper_sidewall": 9, "lower_sidewall": 9, "bead": 2}  # not the default
+JOBS = 2
 BOX = 0.38  # of ln of each variable: 40 %, and what a constant is worth
 PRESSURES_kPa = (157.0, 323.0)
 
@@ -175,6 +176,9 @@ def confirm(count: int) -> None:
 
 
 OUTLIER = 0.0005  # of ln f
+# the turned-up ply is in compression at low pressure, near a limit point, where the solvers' cord
+# laws part by more than the form error on record: seen in trials made for development
+LEFT_OUT = {"carcass_turn_up"}
 
 
 def features(variables: Mapping[str, float], pressure_kPa: float) -> Array:
@@ -218,18 +222,21 @@ class EmulatedCalculix:
     )
 
     def __init__(self) -> None:
-        self.laws: dict[str, Law] = other_laws(frozenset({"modes"}))
+        known = other_laws(frozenset({"modes"}))
+        self.laws: dict[str, Law] = {id: law for id, law in known.items() if id not in LEFT_OUT}
         self.outside = FAMILIES
         self._fitted = fitted(usual(recorded("train"))[0])
-        start = start_values(base())
-        sets = {n: v.sets for n, v in base().case.variables.items()}
-        self._paths = {n: sets[n][0] for n in start}
 
     def listen(self, case: LoadedCase, labels: list[Label]) -> Heard:
-        """Raises EvaluationFailed; ValueError."""
-        case = meshed(case)
+        """``case``: of `base`, whose mesh a law may have divided. Raises EvaluationFailed."""
         known, mass = bundled(case, labels)
-        values = {n: number_at(case, path) for n, path in self._paths.items()}
+        layers = case.case.rebar_layers
+        carcass = next(layer for name, layer in layers.items() if name.startswith("carcass"))
+        values = {
+            "A_belt": layers["belt_1"].area_m2,
+            "A_carcass": carcass.area_m2,  # of the first of several, where the cords fan out
+            "C10": number_at(case, "materials.rubber.C10_Pa"),
+        }
         q = features(values, case.case.pressure_kPa)
         ln_f = {x: known[str(x)] + float(q @ self._fitted[str(x)]) for x in labels}
         return Heard({x: (f, f) for x, f in ln_f.items()}, float(np.log(mass)))
@@ -276,12 +283,13 @@ def main() -> None:
     elif what == "make":
         folder, maker = Path(rest[0]), EmulatedCalculix()
         counts = dict(zip(("effect", "none", "outside"), map(int, rest[1:4]), strict=True))
-        case = load_case(ROOT / "cases" / "p235_75r17.yaml")
+        case = base()
         protocol = Protocol(maker.about, case.path.name, counts)
         seed = int(rest[4]) if len(rest) > 4 else None
         told = lambda done, all: print(f"{done} of {all}", file=sys.stderr)
         sealed = folder.with_name(f"{folder.name}-truth")
-        print(make(folder, sealed, case, protocol, maker, 1, seed, told))
+        print(make(folder, sealed, case, protocol, maker, JOBS, seed, told))
+        case = load_case(case.path)
         model = tyre_model(case, Door(case), protocol)
         write_ruler(folder, measure(model, rows_of(case, protocol)))
 

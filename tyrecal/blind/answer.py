@@ -123,4 +123,8 @@ def predicted(
     for id, e in hypothesis.values.items():
         shift, tilt, _ = expansion.nodes[id].at(e[[best]])
         eta = eta + shift[0] + tilt[0] @ d
-    return {str(rows[i][0]): round(float(np.exp(eta[i])), 4) for i in places}
+    said = {str(rows[i][0]): round(float(np.exp(eta[i])), 4) for i in places}
+    if found.exchanged:  # the laboratory's own labels
+        a, b = map(str, found.exchanged)
+        said[a], said[b] = said[b], said[a]
+    return said

@@ -24,9 +24,10 @@ from ..diagnose.response import Answer, Point, Response, Span
 Array = np.ndarray
 REACH = 0.8  # of ln x: 40 % by the draw, the rest what an ignored effect moves a fit
 PLAIN_DEGREE, EFFECT_DEGREE, SOURCE_DEGREE = 4, 3, 2
-PLAIN_DESIGNS, EFFECT_DESIGNS, SOURCE_DESIGNS = 20, 7, 12
+PLAIN_DESIGNS, EFFECT_DESIGNS, SOURCE_DESIGNS = 20, 10, 12
 ONE_SIDED, TWO_SIDED = (0.1, 0.4, 0.75, 1.0), (0.5, 1.0)
 SEED = 1
+REWEIGHTED, FAR, SMALL = 12, 2.0, 1e-5  # times; of medians; of ln f, what no model is good to
 
 
 @dataclass(frozen=True)
@@ -190,10 +191,19 @@ def _node_values(span: Span) -> list[float]:
 
 
 def _fit(powers: Array, t: Array, answers: Sequence[Answer], reach: float) -> Polynomial:
-    """Least squares of values and slopes by t."""
+    """Least squares of values and slopes by t, equations that lie far off weighing less (Huber's
+    estimator): close to a limit point, where cords of a stiff tyre buckle, slopes grow without
+    bound."""
     rows = [monomials(powers, each)[None] for each in t] + [slopes(powers, each) for each in t]
     values = [a.eta[None] for a in answers] + [reach * a.jacobian.T for a in answers]
-    found, *_ = np.linalg.lstsq(np.concatenate(rows), np.concatenate(values), rcond=None)
+    A, b = np.concatenate(rows), np.concatenate(values)
+    found = np.linalg.lstsq(A, b, rcond=None)[0]
+    for _ in range(REWEIGHTED):
+        off = abs(b - A @ found)
+        scale = FAR * np.median(off, axis=0) + SMALL
+        weights = np.sqrt(np.minimum(1.0, scale / np.maximum(off, scale)))
+        found = np.array([np.linalg.lstsq(A * w[:, None], c * w, rcond=None)[0]
+                          for w, c in zip(weights.T, b.T, strict=True)]).T  # fmt: skip
     return Polynomial(powers, found)
 
 

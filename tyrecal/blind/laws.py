@@ -29,19 +29,23 @@ from ..effects.parts import (
     sidewall,
     stations,
 )
+from ..modes.mode import Label
 from .regions import divided, moved
 
 Array = np.ndarray
 Add = Callable[[LoadedCase, float], LoadedCase]
+Read = Mapping[float, Mapping[Label, tuple[float, float]]]
 
 
 @dataclass(frozen=True)
 class Law:
-    """Range of the parameter; add: the tyre with it (pure; ValueError where it cannot be)."""
+    """Range of the parameter; add: the tyre with it (pure; ValueError where it cannot be); read:
+    what a laboratory reads of it, ln f by pressure and label, None = what is there."""
 
     low: float
     high: float
     add: Add
+    read: Callable[[Read, float], Read] | None = None
 
     def drawn(self, random: np.random.Generator, smallest: float) -> float:
         """A parameter, uniform over ``smallest`` to 1 of the range on a side drawn by chance."""
@@ -254,23 +258,26 @@ def cavity_air(case: LoadedCase, e: float) -> LoadedCase:
     return catalogue()["cavity_air"].add(changed(case, cavity=cavity), e)
 
 
-def spindle(id: str, beside: str, share: float) -> Add:
+@dataclass(frozen=True)
+class Spindle:
     """Two springs in series, hub and stand; the stand gives way in another direction, too, and
     the wheel is 3 kg heavier than stated."""
 
-    def add(case: LoadedCase, e: float) -> LoadedCase:
+    id: str
+    beside: str
+    share: float
+
+    def __call__(self, case: LoadedCase, e: float) -> LoadedCase:
         rim = case.case.rim
         scale = 1 + 3.0 / rim.mass_kg
         heavier = with_part(
             rim, mass_kg=rim.mass_kg * scale, polar_inertia_kg_m2=rim.polar_inertia_kg_m2 * scale,
             diametral_inertia_kg_m2=rim.diametral_inertia_kg_m2 * scale,
         )  # fmt: skip
-        other = catalogue()[beside]
-        case = changed(case, rim=heavier)
-        case = catalogue()[id].add(case, e)
-        return other.add(case, share * other.high * e / catalogue()[id].high)
-
-    return add
+        known = catalogue()
+        other = known[self.beside]
+        case = known[self.id].add(changed(case, rim=heavier), e)
+        return other.add(case, self.share * other.high * e / known[self.id].high)
 
 
 def point_mass(case: LoadedCase, e: float) -> LoadedCase:
@@ -312,10 +319,10 @@ _OTHER: Mapping[str, Add] = {
     "temperature": temperature,
     "temperature_drift": temperature_drift,
     "cavity_air": cavity_air,
-    "spindle_lateral": spindle("spindle_lateral", "spindle_tilt", 0.1),
-    "spindle_radial": spindle("spindle_radial", "spindle_torsional", 0.1),
-    "spindle_torsional": spindle("spindle_torsional", "spindle_radial", 0.1),
-    "spindle_tilt": spindle("spindle_tilt", "spindle_lateral", 0.1),
+    "spindle_lateral": Spindle("spindle_lateral", "spindle_tilt", 0.1),
+    "spindle_radial": Spindle("spindle_radial", "spindle_torsional", 0.1),
+    "spindle_torsional": Spindle("spindle_torsional", "spindle_radial", 0.1),
+    "spindle_tilt": Spindle("spindle_tilt", "spindle_lateral", 0.1),
     "point_mass": point_mass,
     "road_contact": road_contact,
 }

@@ -141,6 +141,9 @@ def _make(protocol: Protocol, case: LoadedCase, maker: Maker, truth: Truth) -> M
                  for p in protocol.pressures_kPa}
                 for each in ([law, None] if law else [None])
             ]  # fmt: skip
+            if law and law.read:
+                read = law.read({p: h.ln_f for p, h in both[0].items()}, truth.size)
+                both[0] = {p: Heard(read[p], h.ln_mass) for p, h in both[0].items()}
             return Made(truth, tries, both[0], both[-1])
         except (EvaluationFailed, ValueError) as failure:
             last = failure

@@ -2,38 +2,14 @@
 
 from __future__ import annotations
 
+from math import log1p
+
 from ..case import LoadedCase
-from ..effects.edit import with_gauge, with_layers, with_part
-from ..effects.edit import with_rubbers_at as rubbers_at
-from ..effects.parts import belt_lines, belts, carcass, carcass_line, crown, sidewall
-from .laws import Law, stiffer
-from .regions import divided
-
-
-def belt_imbalance(case: LoadedCase, e: float) -> LoadedCase:
-    """The two belts differ: cord area of the inner times 1 + e, of the outer times 1 - e."""
-    first, *others = belts(case)
-    layers = case.case.rebar_layers
-    new = {first: with_part(layers[first], area_m2=(1 + e) * layers[first].area_m2)}
-    for name in others:
-        new[name] = with_part(layers[name], area_m2=(1 - e) * layers[name].area_m2)
-    return with_layers(case, new)
-
-
-def heavy_liner(case: LoadedCase, e: float) -> LoadedCase:
-    """Rubber inside the carcass of the sidewall is denser by e: a sealant, a repair."""
-    lines = (case.section.names[0], carcass_line(case))
-    return rubbers_at(
-        case, sidewall(case), lines, "liner",
-        lambda m: with_part(m, density_kg_per_m3=(1 + e) * m.density_kg_per_m3),
-    )  # fmt: skip
-
-
-def aged_shoulder(case: LoadedCase, e: float) -> LoadedCase:
-    """Rubber has aged in the half of the upper sidewall next to the belt: moduli times 1 + e."""
-    case, (name, _) = divided(case, sidewall(case)[0], 2)
-    lines = (case.section.names[0], case.section.names[-1])
-    return rubbers_at(case, [name], lines, "aged", stiffer(1 + e))
+from ..case.schema import Cord
+from ..effects.edit import changed, with_gauge, with_layers, with_part
+from ..effects.parts import belt_lines, carcass, carcass_line, crown
+from ..modes.mode import Label
+from .laws import Law, Read
 
 
 def thick_cushion(case: LoadedCase, e: float) -> LoadedCase:
@@ -51,10 +27,38 @@ def bias_carcass(case: LoadedCase, e: float) -> LoadedCase:
     )  # fmt: skip
 
 
+def tension_stiffening(case: LoadedCase, e: float) -> LoadedCase:
+    """Carcass cords whose modulus goes with their tension: times 1 + e per 100 kPa over the
+    pressure of the case file."""
+    nominal = case.file_pressure_kPa or case.case.pressure_kPa
+    factor = 1 + e * (case.case.pressure_kPa - nominal) / 100.0
+    names = {case.case.rebar_layers[name].material for name in carcass(case)}
+    materials = {
+        name: with_part(m, youngs_modulus_Pa=factor * m.youngs_modulus_Pa)
+        if isinstance(m, Cord) and name in names
+        else m
+        for name, m in case.case.materials.items()
+    }
+    return changed(case, materials=materials)
+
+
+def untouched(case: LoadedCase, e: float) -> LoadedCase:
+    """The tyre as it is: the error is the laboratory's."""
+    return case
+
+
+def stand_resonance(heard: Read, e: float) -> Read:
+    """A resonance of the test stand, 1 + e times as high as [1,0] at the middle pressure and the
+    same at all, is taken for [1,0]."""
+    vertical = Label(1, 0)
+    middle = sorted(heard)[len(heard) // 2]
+    stand = sum(heard[middle][vertical]) / 2 + log1p(e)
+    return {p: {**ln_f, vertical: (stand, stand)} for p, ln_f in heard.items()}
+
+
 FAMILIES = {
-    "belt_imbalance": Law(-0.8, 0.8, belt_imbalance),
-    "heavy_liner": Law(0.0, 3.0, heavy_liner),
-    "aged_shoulder": Law(0.0, 3.0, aged_shoulder),
-    "thick_cushion": Law(0.0, 1.5, thick_cushion),
-    "bias_carcass": Law(0.0, 12.0, bias_carcass),
+    "thick_cushion": Law(0.0, 3.0, thick_cushion),
+    "bias_carcass": Law(0.0, 20.0, bias_carcass),
+    "tension_stiffening": Law(-1.0, 1.0, tension_stiffening),
+    "stand_resonance": Law(-0.15, 0.15, untouched, stand_resonance),
 }

@@ -43,6 +43,11 @@ def summary(trials: Sequence[Scored]) -> dict[str, Any]:
         "mean_probability_on_group": _mean([t.on_group for t in detected]),
         "outside_recognised": rate([t.verdict == "outside" for t in outside]),
         "outside_named": rate([t.verdict == "named" for t in outside]),
+        "families": {
+            law: {"recognised": rate([t.verdict == "outside" for t in outside if t.law == law]),
+                  "named": rate([t.verdict == "named" for t in outside if t.law == law])}
+            for law in sorted({t.law for t in outside})
+        },
         "calibration_error": calibration_error(stated, right),
         "calibration_error_95": calibration_quantile(stated),
         "brier": brier([t.probabilities for t in trials], [t.truth for t in trials]),
@@ -134,6 +139,9 @@ def _lines(f: dict[str, Any], maker: str) -> Iterator[str]:
     yield (f"| held-out shrinkage, detectable and named: median (placebo's 95 % quantile) |"
            f" {_number(out['median_shrinkage'])} ({_number(out['placebo_95'])}), {out['count']}"
            " trials |")  # fmt: skip
+    yield "\n| outside the catalogue | recognised | named as an effect |\n|---|---|---|"
+    for law, each in f["families"].items():
+        yield f"| {law} | {_rate(each['recognised'])} | {_rate(each['named'])} |"
     yield "\n| on the same trials | right by group | false alarms |\n|---|---|---|"
     for name, each in f["baselines"].items():
         alarms = f["false_alarms"] if name == "diagnosis" else each.get("false_alarms")

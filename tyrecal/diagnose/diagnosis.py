@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ..modes.mode import Label
 from .evidence import NONE, Hypothesis, probabilities, weigh
 from .expansion import Expansion, anchored, expand
 from .gap import Gap, find_gap, projection
@@ -15,6 +16,7 @@ from .next_measurement import Choice, ModelRow, rank
 from .observations import Observations
 from .plain_fit import plain_fit
 from .problem import Assumed, Change, Problem, places
+from .reading import exchanged, with_exchanged
 from .regions import Region
 from .response import Response
 from .separability import Separability, separate
@@ -32,7 +34,7 @@ CLOSE = 0.05  # of a range, and of ln x: an effect asked as near as that, or to 
 class Diagnosis:
     """What was found. problem: as it was solved; bare: before effects were asked again; parts,
     effective_rank: the section map, and how many combinations of its parts the data see; rung: of
-    the ladder of proof, 1 to 4."""
+    the ladder of proof, 1 to 4; exchanged: labels that were put right before all else."""
 
     problem: Problem
     bare: Problem
@@ -48,6 +50,7 @@ class Diagnosis:
     shrinkage: Shrinkage | None
     rung: int
     choices: tuple[Choice, ...]
+    exchanged: tuple[Label, Label] | None = None
 
     def hypothesis(self, key: str) -> Hypothesis:
         """The hypothesis of that key."""
@@ -90,10 +93,14 @@ def diagnose(
     """
     where = places(observations, rows)
     if expansion is None:
-        x0 = plain_fit(response, observations, where, assumed.form)
-        expansion = expand(response, x0)
+        expansion = expand(response, plain_fit(response, observations, where, assumed.form))
     problem = Problem(observations, expansion, response.spans, where, response.start,
                       response.spread, changes, assumed)  # fmt: skip
+    labels = exchanged(problem) if len(where) > len(response.start) else None
+    if labels:
+        observations = with_exchanged(observations, *labels)
+        expansion = expand(response, plain_fit(response, observations, where, assumed.form))
+        problem = replace(problem, observations=observations, expansion=expansion)
     hypotheses, bare = weigh(problem), problem
     for _ in range(ROUNDS if expansion.nodes else 0):
         problem, changed = _asked_again(problem, response, hypotheses)
@@ -118,7 +125,7 @@ def diagnose(
     return Diagnosis(
         problem, bare, tuple(response.variables), tuple(response.sources), tuple(hypotheses), p,
         verdict, gap, separability, tuple(found), effective_rank, shrinkage,
-        _rung(verdict, shrinkage, problem), tuple(choices),
+        _rung(verdict, shrinkage, problem), tuple(choices), labels,
     )  # fmt: skip
 
 

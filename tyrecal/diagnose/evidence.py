@@ -15,7 +15,6 @@ from itertools import combinations
 
 import numpy as np
 
-from ..modes.mode import Label
 from .covariance import alike
 from .expansion import Nodes
 from .problem import Problem
@@ -30,7 +29,6 @@ PARTNERS = 4  # singles that are tried with every other
 UNKNOWN = (0.005, 0.01, 0.02, 0.04)  # shift of modes by what no catalogue holds
 INFLATED = (2.0, 4.0)  # all of Sigma's standard deviations
 MISREAD = 0.2  # of a frequency whose label is another mode's
-NEAR = 0.25  # relative distance of modes that could be taken for one another
 
 
 @dataclass(frozen=True)
@@ -184,54 +182,33 @@ def _pairs(problem: Problem, singles: Sequence[Hypothesis], sigma: Array) -> Ite
 
 
 def outside(problem: Problem, sigma: Array | None = None) -> Hypothesis:
-    """What the catalogue does not hold: half of it errors of reading, half unknown effects.
+    """What the catalogue does not hold: half of it unknown effects, half errors of reading.
 
     Unknown effects shift modes by a random amount each, alike at all pressures, or all of Sigma
-    is too small; errors of reading: one label is another mode's at all pressures, or the labels
-    of two neighbours are swapped. ``words`` names the likeliest.
+    is too small; an error of reading: one label is another mode's at all pressures. ``words``
+    names the likeliest.
     """
     sigma = problem.sigma if sigma is None else sigma
     rows = problem.observations.rows
     same = alike(rows) * [row.label is not None for row in rows]
-    plain: list[tuple[str, Array]] = [
+    unknown: list[tuple[str, Array]] = [
         (f"modes are off by {size:.1%} in a way of their own", size**2 * same) for size in UNKNOWN
     ]
-    plain += [(f"all scatter is {k:g} times as large", (k**2 - 1) * sigma) for k in INFLATED]
-    labels = sorted({row.label for row in rows if row.label}, key=str)
-    reading: list[tuple[str, Array | None, Array]] = []
-    for label in labels:
+    unknown += [(f"all scatter is {k:g} times as large", (k**2 - 1) * sigma) for k in INFLATED]
+    reading: list[tuple[str, Array]] = []
+    for label in sorted({row.label for row in rows if row.label}, key=str):
         hit = np.array([row.label == label for row in rows])
-        reading.append((f"{label} is misread", MISREAD**2 * np.outer(hit, hit), np.array([])))
-    y = problem.observations.y
-    for a, b in combinations(labels, 2):
-        other = _swapped(problem, a, b)
-        if other is not None:
-            reading.append((f"{a} and {b} are swapped", None, other))
+        reading.append((f"{label} is misread", MISREAD**2 * same * np.outer(hit, hit)))
     parts: list[tuple[float, str, Fitted]] = []
-    for words, extra in plain:
-        parts.append((0.5 / len(plain), words, refit(problem, {}, 1, extra, sigma)))
-    for words, more, swapped in reading:
-        there = problem.measured(swapped) if len(swapped) == len(y) else problem
-        parts.append((0.5 / len(reading), words, refit(there, {}, 1, more, sigma)))
+    for group in (unknown, reading):
+        for words, extra in group:
+            parts.append((0.5 / len(group), words, refit(problem, {}, 1, extra, sigma)))
     ln = np.array([np.log(p) + f.ln_evidence[0] for p, _, f in parts])
     best = int(np.argmax(ln))
     return Hypothesis(
         OUTSIDE, PRIOR_OUTSIDE, float(np.logaddexp.reduce(ln)), {}, np.zeros(1), parts[best][2],
         parts[best][1],
     )  # fmt: skip
-
-
-def _swapped(problem: Problem, a: Label, b: Label) -> Array | None:
-    """y with the labels a and b exchanged; None where they are far apart or not both there."""
-    rows, y = problem.observations.rows, problem.observations.y.copy()
-    where = {(row.label, row.pressure_kPa, row.run): i for i, row in enumerate(rows) if row.label}
-    both = [(i, where[b, p, run]) for (label, p, run), i in where.items()
-            if label == a and (b, p, run) in where]  # fmt: skip
-    if not both or max(abs(y[i] - y[j]) for i, j in both) > NEAR:
-        return None
-    for i, j in both:
-        y[i], y[j] = y[j], y[i]
-    return y
 
 
 def _hypothesis(

@@ -41,7 +41,7 @@ class Assumed:
 
     form: float | None = None
     split: float = 0.003
-    law: float = 0.05
+    law: float = 0.04
 
 
 @dataclass(frozen=True)

@@ -95,6 +95,7 @@ def result(diagnosis: Diagnosis) -> dict[str, Any]:
         "next_measurements": [
             {"what": c.what, "gain": c.gain, "hours": c.hours} for c in d.choices
         ],
+        "exchanged_labels": [str(label) for label in d.exchanged or ()],
         "left_out": list(d.problem.observations.left_out),
         "not_evaluated": dict(d.problem.expansion.failed),
     }  # fmt: skip

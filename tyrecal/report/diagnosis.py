@@ -72,6 +72,12 @@ def _headline(study: Study) -> str:
 def _answer(study: Study) -> Iterator[str]:
     d = study.diagnosis
     v, p = d.verdict, d.probabilities
+    if d.exchanged:
+        a, b = d.exchanged
+        yield (
+            f"The file has the labels {a} and {b} the wrong way round, as far as the model can tell"
+            " (look at the shapes again); what follows has them exchanged."
+        )
     if v.kind == NAMED and v.key:
         q = d.parameter(v.key)
         unit = f" {q['unit']}" if q["unit"] else ""
