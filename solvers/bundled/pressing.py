@@ -242,7 +242,7 @@ class Press:
         self._stale = False
         stiffness = contact.stiffness(*self.fold.shape[:2], positive=True)
         try:
-            self._factor = Touching(Factor(self.order, self.tyre.tangents(), stiffness))
+            self._factor = Touching(Factor(self.order, self.tyre.tangents(np.float32), stiffness))
         except Indefinite:
             if self._factor is None:
                 raise
