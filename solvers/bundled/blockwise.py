@@ -22,7 +22,7 @@ Array = np.ndarray
 Tangents = list[tuple[Array, Array, Array, Array]]
 SMALL = 300  # rows of a triangle that are not halved any more
 _Assembled = tuple[tuple[int, ...], Array, Array, Array]
-BIAS = 1e-2  # of what couples the parts over what does not, above which a level takes both as one
+BIAS = 2e-3  # of what couples the parts over what does not, above which a level takes both as one
 
 
 @dataclass
@@ -286,7 +286,7 @@ def _block(
     masks = fold.mask[:, :, front.nodes]
     K = masks.shape[1]
     n, m = len(front.nodes[here]) * 3, len(front.nodes[there]) * 3
-    start, first = 3 * (here.start or 0), 3 * (there.start or 0)
+    after, beyond = 3 * (here.start or 0), 3 * (there.start or 0)
     out = np.zeros((len(group) * K * n, len(group) * K * m), np.float32, order="F")
     for x, g in enumerate(group):
         for y, h in enumerate(group):
@@ -298,10 +298,8 @@ def _block(
                 (m * place.strides[0], place.strides[0], n * 4, 4),
             )
             table = tables[0 if g == h else 1]
-            whole = table.reshape(-1, 3, 3, *table.shape[1:])[
-                ..., first : first + m, start : start + n
-            ]
-            for t, part in enumerate(whole.transpose(0, 1, 3, 2, 4)):
+            parts = table[:, beyond : beyond + m, after : after + n]
+            for t, part in enumerate(parts.reshape(len(parts) // 9, 3, 3, m, n).swapaxes(2, 3)):
                 tiles[2 * t : 2 * t + 3, :, 2 * t : 2 * t + 3] += part
             if rows == cols and rows == "gone":
                 for k, i in np.argwhere(contact[:, front.nodes[here]].any((2, 3))):

@@ -9,6 +9,7 @@ Gauss station with the station's displacement and its derivative by the angle:
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from scipy.sparse import csr_matrix
@@ -20,6 +21,8 @@ from .model import Cords, Model, Rubber
 from .section import Lines
 
 Array = np.ndarray
+Precision = type[np.floating[Any]]
+Tangents = tuple[Array, Array, Array, Array]
 FLATTEST = 0.2  # volume over the reference one: nearly incompressible rubber stays near 1
 
 
@@ -81,7 +84,7 @@ class Revolved:
         np.add.at(shares, lines.connectivity, by_node)
         return np.asarray((shares * self.around.weights @ self.around.N).T)
 
-    def tangents(self, precision: type = float) -> list[tuple[Array, Array, Array, Array]]:
+    def tangents(self, precision: Precision = np.float64) -> list[Tangents]:
         """Per part: connectivity; d2W/du du, du dv and dv dv, v = du/dTheta, (s, e, 3a, 3a)."""
         return [p.tangents(precision) for p in self._parts]
 
@@ -110,7 +113,7 @@ class _Part:
     def product(self, u: Array, du: Array) -> tuple[Array, Array]:
         raise NotImplementedError
 
-    def tangents(self, precision: type) -> tuple[Array, Array, Array, Array]:
+    def tangents(self, precision: Precision) -> Tangents:
         raise NotImplementedError
 
 
@@ -179,7 +182,7 @@ class _RubberPart(_Part):
         H = self._gradient(u, du)
         return self._forces((self.A @ H[..., None])[..., 0], u)
 
-    def tangents(self, precision: type) -> tuple[Array, Array, Array, Array]:
+    def tangents(self, precision: Precision) -> Tangents:
         s, e, g, d = self.A.shape[2], self.e, self.g, self.d
         A = self.A.transpose(2, 0, 1, 3, 4).astype(precision)
         B0, B1 = self.r.solids.B0.astype(precision), self.r.solids.B1.astype(precision)
@@ -249,7 +252,7 @@ class _CordPart(_Part):
     def product(self, u: Array, du: Array) -> tuple[Array, Array]:
         return self._forces((self.D @ self._vectors(u, du)[..., None])[..., 0])
 
-    def tangents(self, precision: type) -> tuple[Array, Array, Array, Array]:
+    def tangents(self, precision: Precision) -> Tangents:
         s, e, g, d = self.D.shape[2], self.e, self.g, self.d
         D = (self.D * self.weights[..., None, None, None]).transpose(2, 0, 1, 3, 4)
         D, b0, b1 = D.astype(precision), self.b0.astype(precision), self.b1.astype(precision)
@@ -303,7 +306,7 @@ class _PressurePart(_Part):
     def product(self, u: Array, du: Array) -> tuple[Array, Array]:
         return self._forces(*pressure.change(*self.at, *self._fields(u, du)))
 
-    def tangents(self, precision: type) -> tuple[Array, Array, Array, Array]:
+    def tangents(self, precision: Precision) -> Tangents:
         """By the product with unit displacements of each element's own nodes."""
         lines = self.load.lines
         e, g, a = lines.slope.shape
