@@ -8,7 +8,7 @@ a bias the two parts of the fold are eliminated as one, elsewhere each by itself
 from __future__ import annotations
 
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import dataclass
 
 import numpy as np
@@ -56,6 +56,9 @@ class Elimination:
             chosen.append((inside, *_images(c, inside, other), place[c[inside]]))
         level = _levels([c for *_, c in chosen], fold)
         self.fronts = _fronts(chosen, level)
+        # the same threads for every factor: what one factor frees then serves the next, for the
+        # system keeps memory by threads
+        self.ahead, self.pool, self.chains = (ThreadPoolExecutor(n) for n in (1, 2, 2))
         # what a station's tangents by u u, u v, v u, v v (v = du/dTheta) are to the nodes round the
         # circumference: products of two of an element's functions or slopes (2, 2, s, 9 t)
         N, w = np.stack([around.N, around.slope]), around.weights
@@ -134,16 +137,17 @@ class Factor:
         self._steps: list[tuple[Array, Array, slice, Array, Array]] = []
         carried: list[Array] = []
         levels = self._assemble(tangents)
-        with ThreadPoolExecutor(1) as ahead, ThreadPoolExecutor(2) as pool:
-            following = ahead.submit(next, levels, None)
+        following = order.ahead.submit(next, levels, None)
+        try:
             while (level := following.result()) is not None:
-                following = ahead.submit(next, levels, None)
-                carried = self._eliminate(*level, carried, pool)
+                following = order.ahead.submit(next, levels, None)
+                carried = self._eliminate(*level, carried, order.pool)
+        finally:
+            wait([following])
         # steps of one part, of the other, and after these of both: two threads for the first two
         slots = [slot for _, _, slot, _, _ in self._steps]
         parts = [slice(0, 1), slice(1, 2), slice(0, 2)]
         self._chains = [[i for i, s in enumerate(slots) if s == part] for part in parts]
-        self._pool = ThreadPoolExecutor(2)
 
     def _assemble(self, tangents: Tangents) -> Iterator[tuple[_Front, list[_Assembled]]]:
         """Level by level its blocks, of each part or of both where the bias couples them."""
@@ -217,7 +221,7 @@ class Factor:
                         b[:, slot, :, left] -= (y.T @ X).reshape(b[:, slot, :, left].shape)
                     pieces[i] = y
 
-        list(self._pool.map(go, self._chains[:2]))
+        list(self.order.chains.map(go, self._chains[:2]))
         go(self._chains[2])
         return pieces
 
@@ -235,7 +239,7 @@ class Factor:
                 x[:, slot, :, gone] = y.T.reshape(x[:, slot, :, gone].shape)
 
         go(self._chains[2])
-        list(self._pool.map(go, self._chains[:2]))
+        list(self.order.chains.map(go, self._chains[:2]))
         return np.asarray(x * self.order.fold.mask, float)
 
 
