@@ -8,7 +8,7 @@ a bias the two parts of the fold are eliminated as one, elsewhere each by itself
 from __future__ import annotations
 
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,7 +22,7 @@ Array = np.ndarray
 Tangents = list[tuple[Array, Array, Array, Array]]
 SMALL = 300  # rows of a triangle that are not halved any more
 _Assembled = tuple[tuple[int, ...], Array, Array, Array]
-BIAS = 1e-2  # of what couples the parts over what does not, above which a level takes both as one
+BIAS = 2e-3  # of what couples the parts over what does not, above which a level takes both as one
 
 
 @dataclass
@@ -56,13 +56,17 @@ class Elimination:
             chosen.append((inside, *_images(c, inside, other), place[c[inside]]))
         level = _levels([c for *_, c in chosen], fold)
         self.fronts = _fronts(chosen, level)
-        N, D = around.N, around.slope
-        self.elements = []  # round the circumference: stations, weights (9, 4 s) of their tables
+        # the same threads for every factor: what one factor frees then serves the next, for the
+        # system keeps memory by threads
+        self.ahead, self.pool, self.chains = (ThreadPoolExecutor(n) for n in (1, 2, 2))
+        # what a station's tangents by u u, u v, v u, v v (v = du/dTheta) are to the nodes round the
+        # circumference: products of two of an element's functions or slopes (2, 2, s, 9 t)
+        N, w = np.stack([around.N, around.slope]), around.weights
+        products = np.zeros((2, 2, len(w), len(around.stations), 3, 3))
         for t, rows in enumerate(around.stations):
-            cols = slice(2 * t, 2 * t + 3)
-            n, d, w = N[rows, cols], D[rows, cols], around.weights[rows]
-            products = [np.einsum("sk,sl,s->kls", a, b, w) for a in (n, d) for b in (n, d)]
-            self.elements.append((rows, np.stack(products, 2).reshape(9, -1).astype(np.float32)))
+            own = N[:, rows, 2 * t : 2 * t + 3]
+            products[:, :, rows, t] = np.einsum("xsk,ysl,s->xyskl", own, own, w[rows])
+        self.products = products.reshape(2, 2, len(w), -1).astype(np.float32)
 
 
 def _images(c: Array, inside: Array, other: Array) -> tuple[Array, Array]:
@@ -133,29 +137,34 @@ class Factor:
         self._steps: list[tuple[Array, Array, slice, Array, Array]] = []
         carried: list[Array] = []
         levels = self._assemble(tangents)
-        with ThreadPoolExecutor(1) as ahead, ThreadPoolExecutor(2) as pool:
-            following = ahead.submit(next, levels, None)
+        following = order.ahead.submit(next, levels, None)
+        try:
             while (level := following.result()) is not None:
-                following = ahead.submit(next, levels, None)
-                carried = self._eliminate(*level, carried, pool)
+                following = order.ahead.submit(next, levels, None)
+                carried = self._eliminate(*level, carried, order.pool)
+        finally:
+            wait([following])
         # steps of one part, of the other, and after these of both: two threads for the first two
         slots = [slot for _, _, slot, _, _ in self._steps]
         parts = [slice(0, 1), slice(1, 2), slice(0, 2)]
         self._chains = [[i for i, s in enumerate(slots) if s == part] for part in parts]
-        self._pool = ThreadPoolExecutor(2)
 
     def _assemble(self, tangents: Tangents) -> Iterator[tuple[_Front, list[_Assembled]]]:
         """Level by level its blocks, of each part or of both where the bias couples them."""
         coupled = False
+        kinds = [_between_angles(kind, self.order) for kind in tangents]
         for front in self.order.fronts:
-            same, cross = _tables(front, tangents, self.order)
+            same, cross = _tables(front, kinds)
             coupled = coupled or bool(abs(cross).max() > BIAS * abs(same).max())
-            if not coupled:
+            same = np.ascontiguousarray(same)
+            if coupled:
+                cross = np.ascontiguousarray(cross)
+            else:
                 gone = front.nodes[: front.eliminated]
                 self.contact[:, gone, :3, 3:] = self.contact[:, gone, 3:, :3] = 0.0
             groups = [(0, 1)] if coupled else [(0,), (1,)]
             block = lambda group, rows, cols, t=(same, cross), f=front: _block(
-                t, f, group, self.order, self.contact, rows, cols
+                t, f, group, self.order.fold, self.contact, rows, cols
             )
             yield (
                 front,
@@ -212,7 +221,7 @@ class Factor:
                         b[:, slot, :, left] -= (y.T @ X).reshape(b[:, slot, :, left].shape)
                     pieces[i] = y
 
-        list(self._pool.map(go, self._chains[:2]))
+        list(self.order.chains.map(go, self._chains[:2]))
         go(self._chains[2])
         return pieces
 
@@ -230,43 +239,46 @@ class Factor:
                 x[:, slot, :, gone] = y.T.reshape(x[:, slot, :, gone].shape)
 
         go(self._chains[2])
-        list(self._pool.map(go, self._chains[:2]))
+        list(self.order.chains.map(go, self._chains[:2]))
         return np.asarray(x * self.order.fold.mask, float)
 
 
-def _tables(front: _Front, tangents: Tangents, order: Elimination) -> tuple[Array, Array]:
-    """Tangents at the stations over the front's nodes, (4, s, nodes, 3, nodes, 3): of W by u u,
-    u v, v u, v v with v = du/dTheta; sums of elements and their images, and differences."""
-    nf, S = len(front.nodes), len(order.around.weights)
-    same, cross = np.zeros((2, nf + 1, nf + 1, 4, S, 3, 3), np.float32)  # a spare: held nodes
-    for (elements, images, orders, places), kind in zip(front.elements, tangents, strict=True):
-        if not len(elements):
-            continue
-        own, there = _by_pairs(kind, elements), _by_pairs(kind, images)
-        e = np.arange(len(elements))[:, None, None]
-        there = there[e, orders[:, :, None], orders[:, None]] * np.multiply.outer(MIRROR, MIRROR)
-        for row, plus, minus in zip(places, own + there, own - there, strict=True):
-            pairs = np.ix_(row, row)
-            same[pairs] += plus
-            cross[pairs] += minus
-    arrange = lambda t: np.ascontiguousarray(t[:nf, :nf].transpose(2, 3, 0, 4, 1, 5))
-    return arrange(same), arrange(cross)
-
-
-def _by_pairs(kind: tuple[Array, ...], elements: Array) -> Array:
-    """Tangents of elements by pairs of nodes (e, a, a, 4, s, 3, 3)."""
+def _between_angles(kind: tuple[Array, ...], order: Elimination) -> Array:
+    """Tangents of elements between nodes round the circumference (e, 3a, 3a, 9 t)."""
     _, K0, K1, K2 = kind
-    K1 = K1[:, elements]
-    stack = np.stack([K0[:, elements], K1, K1.swapaxes(-1, -2), K2[:, elements]])
-    _, S, e, d, _ = stack.shape
-    return stack.reshape(4, S, e, d // 3, 3, d // 3, 3).transpose(2, 3, 5, 0, 1, 4, 6)
+    stations = lambda K: K.reshape(len(K), -1).T
+    total = stations(K0) @ order.products[0, 0]
+    total += stations(K1) @ order.products[0, 1]
+    total += stations(K1.swapaxes(-1, -2)) @ order.products[1, 0]
+    total += stations(K2) @ order.products[1, 1]
+    return total.reshape(*K0.shape[1:], -1)
+
+
+def _tables(front: _Front, kinds: list[Array]) -> tuple[Array, Array]:
+    """Stiffness over the front's nodes (9 t, 3 nodes, 3 nodes): sums of elements and their mirror
+    images, and differences."""
+    n = 3 * len(front.nodes)
+    same, cross = np.zeros((2, n + 3, n + 3, kinds[0].shape[-1]), np.float32)  # a spare: held nodes
+    for chosen, kind in zip(front.elements, kinds, strict=True):
+        for element, image, order, place in zip(*chosen, strict=True):
+            sign = np.tile(MIRROR, len(order)).astype(np.float32)
+            there = kind[image][np.ix_(_dofs(order), _dofs(order))]
+            there *= np.multiply.outer(sign, sign)[..., None]
+            pairs = np.ix_(_dofs(place), _dofs(place))
+            same[pairs] += kind[element] + there
+            cross[pairs] += kind[element] - there
+    return same[:n, :n].transpose(2, 0, 1), cross[:n, :n].transpose(2, 0, 1)
+
+
+def _dofs(nodes: Array) -> Array:
+    return np.asarray((3 * nodes[:, None] + np.arange(3)).ravel())
 
 
 def _block(
     tables: tuple[Array, Array],
     front: _Front,
     group: tuple[int, ...],
-    order: Elimination,
+    fold: Fold,
     contact: Array,
     rows: str,
     cols: str,
@@ -275,9 +287,10 @@ def _block(
     both, held components cut out; Fortran order."""
     chosen = {"gone": slice(0, front.eliminated), "left": slice(front.eliminated, None)}
     here, there = chosen[rows], chosen[cols]
-    masks = order.fold.mask[:, :, front.nodes]
+    masks = fold.mask[:, :, front.nodes]
     K = masks.shape[1]
     n, m = len(front.nodes[here]) * 3, len(front.nodes[there]) * 3
+    after, beyond = 3 * (here.start or 0), 3 * (there.start or 0)
     out = np.zeros((len(group) * K * n, len(group) * K * m), np.float32, order="F")
     for x, g in enumerate(group):
         for y, h in enumerate(group):
@@ -288,10 +301,9 @@ def _block(
                 (K, m, K, n),
                 (m * place.strides[0], place.strides[0], n * 4, 4),
             )
-            table = tables[0 if g == h else 1][:, :, there, :, here]
-            for t, (stations, weights) in enumerate(order.elements):
-                flat = np.ascontiguousarray(table[:, stations]).reshape(weights.shape[1], -1)
-                part = (weights @ flat).reshape(3, 3, m, n).transpose(0, 2, 1, 3)
+            table = tables[0 if g == h else 1]
+            parts = table[:, beyond : beyond + m, after : after + n]
+            for t, part in enumerate(parts.reshape(len(parts) // 9, 3, 3, m, n).swapaxes(2, 3)):
                 tiles[2 * t : 2 * t + 3, :, 2 * t : 2 * t + 3] += part
             if rows == cols and rows == "gone":
                 for k, i in np.argwhere(contact[:, front.nodes[here]].any((2, 3))):

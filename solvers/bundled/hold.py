@@ -22,11 +22,10 @@ from .road import Contact
 Array = np.ndarray
 
 
-def held(contact: Contact, height: float, areas: Array, around: Circumference) -> Contact:
-    """The contact with the stiffness that holds, the road at ``height`` (m); ``areas`` (k, c):
-    deformed ones of its nodes."""
+def held(contact: Contact, areas: Array, around: Circumference) -> Contact:
+    """The contact with the stiffness that holds; ``areas`` (k, c): deformed ones of its nodes."""
     road = contact.road
-    stiffness = road.stiffness * road.area * covered(contact, height, areas, around)
+    stiffness = road.stiffness * road.area * covered(contact, areas, around)
     K = np.zeros((*stiffness.shape, 3, 3))
     K[..., 0, 0] = stiffness
     if road.friction > 0:
@@ -34,10 +33,10 @@ def held(contact: Contact, height: float, areas: Array, around: Circumference) -
     return replace(contact, K=K)
 
 
-def covered(contact: Contact, height: float, areas: Array, around: Circumference) -> Array:
+def covered(contact: Contact, areas: Array, around: Circumference) -> Array:
     """Share (k, c) of each node's length along the road that lies in the patch, 0 to 1."""
     force, x = contact.local[..., 0], contact.positions[..., 1]
-    depth = contact.positions[..., 0] - height
+    depth = contact.positions[..., 0] - contact.height
     angles = around.angles[: len(force)]
     length = around.shares[: len(force), None] * np.gradient(x, angles, axis=0)
     begin = np.cumsum(length, axis=0) - length

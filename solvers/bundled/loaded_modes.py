@@ -80,7 +80,7 @@ def _one_parity(
     check: Callable[[], None],
 ) -> tuple[Array, Array]:
     """omega^2 (count,) and shapes (count, k, n, 3) of the modes that keep or reverse the turn."""
-    tangents = tyre.tangents()
+    tangents = tyre.tangents(np.float32)
     shape = (2, fold.shape[0], len(fold.nodes), 3)
     order = Elimination([t[0] for t in tangents], fold, tyre.around)
     check()

@@ -252,7 +252,7 @@ def _modes(
     U = work.fold.spread(found.parts)
     work.tyre.residual(U)
     area = work.tyre.surface_shares(tread)[: len(found.contact.local), work.road.nodes]
-    hold = held(found.contact, found.height, area, tyre.around)
+    hold = held(found.contact, area, tyre.around)
     vibration = Vibration(wanted.model, inflated, tyre.loads, equations, 0.0)
     start = lowest_of_all(vibration, 2 * (wanted.count + 2 * SPARE), work.check)
     work.rest()

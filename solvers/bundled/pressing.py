@@ -20,15 +20,15 @@ from .touching import Touching
 Array = np.ndarray
 TOLERANCE = 1e-8  # out-of-balance force over the load
 LONGEST = 40  # Newton iterations a load
-TIRED = 7  # GMRES iterations of a step, after which the preconditioner is formed anew
-FAR = 0.1  # residual over the load: of a state beyond it no preconditioner is formed,
-EXHAUSTED = 15  # or only after that many iterations
+EXHAUSTED = 15  # GMRES iterations of a step, after which the preconditioner is formed anew
 LONGEST_LINEAR = 60
 EXACT = 1e-2  # residual of the linear problem, relative
 STIFF = 1e-3  # the same of the vertical stiffness
-ROUGH = 5e-2  # the same as long as the contact changes much
+ROUGH = 0.3  # residual of the linear problem as long as the contact changes much
+ASTRAY = 0.5  # more is left only of a tangent that is far from a stable one
 PATIENCE = 2  # steps that may fail to halve the residual, with Coulomb's friction
-NEAR = 1e-2  # as loosely as that, before Coulomb's friction is tried
+NEAR = 1e-2  # residual over the load, before Coulomb's friction is tried
+FAR = 0.1  # the same, before the friction's bounds are taken anew
 SOFT = 1e-4  # m: an elastic slip that is no obstacle
 HARDER = 0.3  # from one elastic slip to the next smaller one
 SHORTEST = 1 / 64  # step of the line search
@@ -71,6 +71,8 @@ class Press:
         self._bound = np.zeros_like(road.area), np.zeros_like(road.area)
         self._factor: Touching | None = None
         self._used = 0
+        self._stale = False  # the preconditioner is of an earlier load
+        self._slope: tuple[Array, float] | None = None  # of parts and height by the load
         self.factorisations = self.products = self.iterations = 0
 
     def to(self, load: float) -> Pressed:
@@ -116,11 +118,16 @@ class Press:
     def _newton(self, load: float) -> Pressed:
         """By Tresca's friction, with the last normal forces, to where Coulomb's converges."""
         parts, height = self.parts, self.height
-        if not self.load:
+        self._stale = self._factor is not None
+        if self._slope:
+            parts = parts + (load - self.load) * self._slope[0]
+            height += (load - self.load) * self._slope[1]
+        else:
             height -= TOUCH * load
         bound, near = self._bound, NEAR
         for attempt in range(LONGEST):
-            parts, height, contact = self._softly(parts, height, load, bound, near)
+            reached = near if attempt else FAR
+            parts, height, contact = self._softly(parts, height, load, bound, reached)
             bound = contact.local[..., 0], self.road.share(height)[0]
             if not attempt:
                 continue  # what newly touches had no friction yet
@@ -156,6 +163,8 @@ class Press:
         Coulomb's friction it is left as soon as it does not converge."""
         force, lacking, contact = self._state(parts, height, load, bound)
         size = float(np.hypot(np.linalg.norm(force), lacking))
+        if bound is None and self._stale:
+            self._form(contact)
         setbacks = 0
         for _ in range(LONGEST):
             self.check()
@@ -163,7 +172,8 @@ class Press:
                 return parts, height, contact
             self.iterations += 1
             energy = self._energy(contact, load, height) if bound else 0.0
-            step, rise = self._step(contact, force, lacking, size / load)
+            rough = size > NEAR * load
+            step, rise = self._step(contact, force, lacking, ROUGH if rough else EXACT)
             slope = float((force * step).sum() + lacking * rise)
             length, before = 1.0, size
             while True:
@@ -187,18 +197,15 @@ class Press:
         raise NotPressed(f"Newton's method did not converge in {LONGEST} iterations")
 
     def _step(
-        self, contact: Contact, force: Array, lacking: float, rough: float
+        self, contact: Contact, force: Array, lacking: float, tolerance: float
     ) -> tuple[Array, float]:
-        """Newton's step of the parts and of the road's height. ``rough``: residual over the load;
-        where it is large a new preconditioner would be formed of a state that does not last."""
+        """Newton's step of the parts and of the road's height."""
         border = _Border(self.fold, contact)
         right = -np.append(force.ravel(), lacking * border.scale)
-        if self._used > (EXHAUSTED if rough > FAR else TIRED):
+        if self._used > EXHAUSTED:
             self._form(contact)
-        found, self._used, left = self._solve(
-            border, contact, right, ROUGH if rough > NEAR else EXACT
-        )
-        if not left <= 0.1:
+        found, self._used, left = self._solve(border, contact, right, tolerance)
+        if not left <= ASTRAY:
             raise NotPressed("the tangent is too far from a stable one")
         return found[:-1].reshape(force.shape), float(found[-1]) * border.scale
 
@@ -232,9 +239,10 @@ class Press:
     def _form(self, contact: Contact) -> Touching:
         """The preconditioner at the last state; where that is unstable, the one before stays."""
         self.factorisations += 1
+        self._stale = False
         stiffness = contact.stiffness(*self.fold.shape[:2], positive=True)
         try:
-            self._factor = Touching(Factor(self.order, self.tyre.tangents(), stiffness))
+            self._factor = Touching(Factor(self.order, self.tyre.tangents(np.float32), stiffness))
         except Indefinite:
             if self._factor is None:
                 raise
@@ -245,7 +253,9 @@ class Press:
         border = _Border(self.fold, contact)
         unit = np.append(np.zeros(self.parts.size), border.scale)
         found = self._solve(border, contact, unit, STIFF)[0]
-        return 2 / (float(found[-1]) * border.scale)
+        rise = float(found[-1]) * border.scale
+        self._slope = -found[:-1].reshape(self.parts.shape) / 2, -rise / 2
+        return 2 / rise
 
 
 class _Border:

@@ -9,6 +9,7 @@ Gauss station with the station's displacement and its derivative by the angle:
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from scipy.sparse import csr_matrix
@@ -20,6 +21,8 @@ from .model import Cords, Model, Rubber
 from .section import Lines
 
 Array = np.ndarray
+Precision = type[np.floating[Any]]
+Tangents = tuple[Array, Array, Array, Array]
 FLATTEST = 0.2  # volume over the reference one: nearly incompressible rubber stays near 1
 
 
@@ -81,9 +84,9 @@ class Revolved:
         np.add.at(shares, lines.connectivity, by_node)
         return np.asarray((shares * self.around.weights @ self.around.N).T)
 
-    def tangents(self) -> list[tuple[Array, Array, Array, Array]]:
+    def tangents(self, precision: Precision = np.float64) -> list[Tangents]:
         """Per part: connectivity; d2W/du du, du dv and dv dv, v = du/dTheta, (s, e, 3a, 3a)."""
-        return [p.tangents() for p in self._parts]
+        return [p.tangents(precision) for p in self._parts]
 
 
 class _Part:
@@ -110,7 +113,7 @@ class _Part:
     def product(self, u: Array, du: Array) -> tuple[Array, Array]:
         raise NotImplementedError
 
-    def tangents(self) -> tuple[Array, Array, Array, Array]:
+    def tangents(self, precision: Precision) -> Tangents:
         raise NotImplementedError
 
 
@@ -179,17 +182,17 @@ class _RubberPart(_Part):
         H = self._gradient(u, du)
         return self._forces((self.A @ H[..., None])[..., 0], u)
 
-    def tangents(self) -> tuple[Array, Array, Array, Array]:
+    def tangents(self, precision: Precision) -> Tangents:
         s, e, g, d = self.A.shape[2], self.e, self.g, self.d
-        A = self.A.transpose(2, 0, 1, 3, 4)
-        B0, B1 = self.r.solids.B0, self.r.solids.B1
-        B0t, B1t = self.B0.swapaxes(1, 2), self.B1.swapaxes(1, 2)
+        A = self.A.transpose(2, 0, 1, 3, 4).astype(precision)
+        B0, B1 = self.r.solids.B0.astype(precision), self.r.solids.B1.astype(precision)
+        B0t, B1t = B0.reshape(e, g * 9, d).swapaxes(1, 2), B1.reshape(e, g * 3, d).swapaxes(1, 2)
         AB1 = A[..., 1::3] @ B1
         K0 = B0t @ (A @ B0).reshape(s, e, g * 9, d)
         if self.r.solids.hourglass is not None:
             h = self.r.solids.hourglass
             hold = self.r.hourglass_stiffness[:, None, None] * h[:, :, None] * h[:, None]
-            K0 = K0 + np.einsum("eab,ij->eaibj", hold, np.eye(3)).reshape(e, d, d)
+            K0 += np.einsum("eab,ij->eaibj", hold, np.eye(3)).reshape(e, d, d)
         K1 = B0t @ AB1.reshape(s, e, g * 9, d)
         K2 = B1t @ AB1[..., 1::3, :].reshape(s, e, g * 3, d)
         return self.r.solids.connectivity, K0, K1, K2
@@ -249,12 +252,12 @@ class _CordPart(_Part):
     def product(self, u: Array, du: Array) -> tuple[Array, Array]:
         return self._forces((self.D @ self._vectors(u, du)[..., None])[..., 0])
 
-    def tangents(self) -> tuple[Array, Array, Array, Array]:
+    def tangents(self, precision: Precision) -> Tangents:
         s, e, g, d = self.D.shape[2], self.e, self.g, self.d
         D = (self.D * self.weights[..., None, None, None]).transpose(2, 0, 1, 3, 4)
-        b0, b1 = self.b0.reshape(e, g, 3, d), self.b1.reshape(e, g, 3, d)
-        D0, D1 = (D @ b0).reshape(s, e, g * 3, d), (D @ b1).reshape(s, e, g * 3, d)
-        b0t, b1t = self.b0.swapaxes(1, 2), self.b1.swapaxes(1, 2)
+        D, b0, b1 = D.astype(precision), self.b0.astype(precision), self.b1.astype(precision)
+        D0, D1 = ((D @ b.reshape(e, g, 3, d)).reshape(s, e, g * 3, d) for b in (b0, b1))
+        b0t, b1t = b0.swapaxes(1, 2), b1.swapaxes(1, 2)
         return self.c.lines.connectivity, b0t @ D0, b0t @ D1, b1t @ D1
 
 
@@ -303,12 +306,12 @@ class _PressurePart(_Part):
     def product(self, u: Array, du: Array) -> tuple[Array, Array]:
         return self._forces(*pressure.change(*self.at, *self._fields(u, du)))
 
-    def tangents(self) -> tuple[Array, Array, Array, Array]:
+    def tangents(self, precision: Precision) -> Tangents:
         """By the product with unit displacements of each element's own nodes."""
         lines = self.load.lines
         e, g, a = lines.slope.shape
         s = self.at[0].shape[2]
-        K = np.zeros((3, s, e, 3 * a, 3 * a))
+        K = np.zeros((3, s, e, 3 * a, 3 * a), precision)
         for b in range(a):
             for j in range(3):
                 unit = np.zeros((e, g, s, 3))

@@ -9,7 +9,7 @@ Columns of Y are formed when a node's contact first changes, and kept.
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Sequence
 
 import numpy as np
 from scipy.linalg import lu_factor, lu_solve
@@ -17,6 +17,7 @@ from scipy.linalg import lu_factor, lu_solve
 from .blockwise import Factor
 
 Array = np.ndarray
+AT_ONCE = 64  # columns that a thread forms at a time
 SLIGHT = 1e-3  # change of a node's contact stiffness over the stiffest contact, left to GMRES
 
 
@@ -58,9 +59,9 @@ class Touching:
         before = len(self._compliance)
         self._column[lacking] = before + np.arange(len(dofs))
         # two threads share the work the same way everywhere, so that the bits are the same too
-        with ThreadPoolExecutor(2) as pool:
-            halves = list(pool.map(self._columns, np.array_split(dofs, 2)))
-        new = [_beside(*both) for both in zip(*halves, strict=True)]
+        some = np.array_split(dofs, 2 * -(-len(dofs) // (2 * AT_ONCE)))
+        pieces = list(self.factor.order.pool.map(self._columns, some))
+        new = [_beside(each) for each in zip(*pieces, strict=True)]
         beside = [_products(block, new) for block in self._blocks]
         corner = _products(new, new)
         across = np.concatenate([*beside, corner], 0)
@@ -90,12 +91,14 @@ class Touching:
         return self.factor.backward(y).reshape(right.shape)
 
 
-def _beside(a: Array, b: Array) -> Array:
-    """Columns of both; no rows stand for zeros."""
-    rows = max(len(a), len(b))
-    whole = np.zeros((rows, a.shape[1] + b.shape[1]), np.float32)
-    whole[: len(a), : a.shape[1]] = a
-    whole[: len(b), a.shape[1] :] = b
+def _beside(pieces: Sequence[Array]) -> Array:
+    """Columns of all; no rows stand for zeros."""
+    rows = max(len(piece) for piece in pieces)
+    whole = np.zeros((rows, sum(piece.shape[1] for piece in pieces)), np.float32)
+    start = 0
+    for piece in pieces:
+        whole[: len(piece), start : start + piece.shape[1]] = piece
+        start += piece.shape[1]
     return whole
 
 

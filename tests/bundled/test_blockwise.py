@@ -36,7 +36,7 @@ class Problem:
         self.tyre = Revolved(work.model, work.loads, around)
         self.tyre.residual(np.repeat(work.U[None], k, 0))
         self.contact = np.zeros((k, len(work.U), 3, 3)) if contact is None else contact
-        tangents = self.tyre.tangents()
+        tangents = self.tyre.tangents(np.float32)
         order = Elimination([t[0] for t in tangents], self.fold, around)
         self.factor = Factor(order, tangents, self.contact)
 

@@ -76,7 +76,7 @@ def press(work: Round, load: float, friction: float = 0.5, stiffness: float = 1e
     areas = stand.tyre.surface_shares(work.model.mesh.faces["TREAD"])
     areas = areas[: len(contact.local), contact.road.nodes]
     around = stand.tyre.around
-    return State(around, U, found, hold.held(contact, found.height, areas, around), areas)
+    return State(around, U, found, hold.held(contact, areas, around), areas)
 
 
 @pytest.fixture(scope="module")
@@ -157,7 +157,7 @@ def test_a_hold_raises_every_frequency(tyre: Round, pressed: State, found: Loade
 def test_the_hold_covers_the_patch(pressed: State) -> None:
     """Shares of the nodes' areas: all inside, none outside, and about the contact area."""
     contact = pressed.pressed.contact
-    share = hold.covered(contact, pressed.pressed.height, pressed.areas, pressed.around)
+    share = hold.covered(contact, pressed.areas, pressed.around)
     assert share.min() == 0.0 and share.max() == 1.0
     inside = contact.local[..., 0] > 0
     assert (share[1:][~inside[:-1] & ~inside[1:]] == 0).all()
