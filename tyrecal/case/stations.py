@@ -80,7 +80,7 @@ def read_stations(document: Document, data: dict[str, Any], folder: Path) -> Sec
 
 def _check_table(path: Path) -> None:
     """The table is a table: a comma for a decimal point would shift its columns unseen."""
-    from ..tyre.section import SectionError
+    from ..tyre.section import GAUGE, SectionError, gauged_lines
 
     with path.open(newline="", encoding="utf-8-sig") as file:
         rows = csv.reader(file)
@@ -89,6 +89,7 @@ def _check_table(path: Path) -> None:
             raise SectionError("the station table is empty", 1)
         names = [column[: -len("_r_mm")] for column in header if column[-5:] in ("_r_mm", "_z_mm")]
         known = ["region", "rigid", *(f"{name}_{axis}_mm" for name in names for axis in "rz")]
+        known += [f"{name}{GAUGE}" for name in gauged_lines(header)]
         for column in known:
             if column not in header:
                 raise SectionError(f"column '{shortened(column)}' is missing", 1)
