@@ -72,7 +72,7 @@ def read_section(path: Path) -> Section:
             columns = [
                 (f"{n}{GAUGE}",) * 2 if n in gauged else (f"{n}_r_mm", f"{n}_z_mm") for n in names
             ]
-            points.append([[_mm(row, c, reader.line_num) for c in pair] for pair in columns])
+            points.append([[millimetres(row, c, reader.line_num) for c in pair] for pair in columns])
             labels.append(row["region"])
             if row["rigid"] not in ("0", "1"):
                 raise SectionError(f"rigid is '{row['rigid']}', must be 0 or 1", reader.line_num)
@@ -134,7 +134,8 @@ def from_gauges(line: Array, gauges: Array) -> Array:
     return points
 
 
-def _mm(row: dict[str, str], column: str, line: int) -> float:
+def millimetres(row: dict[str, str], column: str, line: int) -> float:
+    """The number in a column, NaN where it is empty. Raises SectionError."""
     text = (row[column] or "").strip()
     if not text:
         return float("nan")
