@@ -163,7 +163,8 @@ def fill_lines(section: Section) -> Array:
         for j in np.flatnonzero(~present[k]):
             near = have[np.argmin(abs(have - j))]
             below = k - 1  # already made whole
-            above = next(m for m in range(k + 1, len(section.names)) if present[m, j])
+            both = present[:, j] & present[:, near]
+            above = next(m for m in range(k + 1, len(section.names)) if both[m])
             start, end = points[below, near], points[above, near]
             span = end - start
             fraction = (points[k, near] - start) @ span / (span @ span)
