@@ -53,7 +53,9 @@ def new_case(
 
 def _text(words: str) -> str:
     """As YAML has it: plain where it stays text, else in quotes."""
-    plain = re.fullmatch(r"\w[\w ./()-]*", words) and YAML(typ="safe", pure=True).load(words) == words
+    plain = (
+        re.fullmatch(r"\w[\w ./()-]*", words) and YAML(typ="safe", pure=True).load(words) == words
+    )
     return words if plain else json.dumps(words)
 
 

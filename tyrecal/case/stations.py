@@ -68,9 +68,7 @@ def read_stations(document: Document, data: dict[str, Any], folder: Path) -> Sec
         message = shortened(str(error), 300)
         if error.line:
             value = document.places.get(keys, (1, name))[1]
-            document.mistakes.append(
-                Mistake(str(path), error.line, dotted(keys), value, message)
-            )
+            document.mistakes.append(Mistake(str(path), error.line, dotted(keys), value, message))
         else:
             document.add(keys, message)
     except UnicodeDecodeError:

@@ -104,7 +104,16 @@ def build(size: TyreSize, gauges: Gauges) -> GaugeTable:
         np.where(s <= half_belt - g.step / 2 + tiny, g.ply + g.belts, np.nan),
         total - inside,
     ])  # fmt: skip
-    return GaugeTable(LINES, "ply", line.at(s), rows, labels, s >= line.rim - tiny)
+    table = GaugeTable(LINES, "ply", line.at(s), rows, labels, s >= line.rim - tiny)
+    outside = table.section().points[-1, :, 1]
+    at = s[np.argmax(outside)]
+    if outside.max() > width / 2 + 1e-5:
+        what = "the belt is" if at < line.widest else "the rim is"
+        raise SectionError(
+            f"{size.text}: {what} too wide for a section {1e3 * width:.1f} mm wide, the tyre would"
+            f" bulge beyond it at {1e3 * at:.0f} mm along the carcass"
+        )
+    return table
 
 
 def _check(size: TyreSize, g: Gauges) -> None:

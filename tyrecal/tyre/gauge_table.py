@@ -27,19 +27,17 @@ class GaugeTable:
     rigid: Array
 
     def csv(self) -> str:
-        """The station table, in mm to the tenth of a micrometre."""
+        """The station table, in mm to the hundredth of a micrometre."""
         file = io.StringIO(newline="")
         write = csv.writer(file, lineterminator="\n").writerow
-        columns = [
-            [f"{n}_r_mm", f"{n}_z_mm"] if n == self.line else [n + GAUGE] for n in self.names
-        ]
-        write(["station", "region", *sum(columns, []), "rigid"])
+        header, columns = ["region"], []
+        for name, gauge in zip(self.names, self.gauges, strict=True):
+            own = name == self.line
+            header += [f"{name}_r_mm", f"{name}_z_mm"] if own else [name + GAUGE]
+            columns += list(self.points.T) if own else [abs(gauge)]
+        write(["station", *header, "rigid"])
         for i, label in enumerate(self.labels):
-            numbers = [
-                [*self.points[i]] if name == self.line else [abs(self.gauges[k, i])]
-                for k, name in enumerate(self.names)
-            ]
-            words = ["" if np.isnan(x) else f"{1e3 * x:.4f}" for x in sum(numbers, [])]
+            words = ["" if np.isnan(x[i]) else f"{1e3 * x[i]:.5f}" for x in columns]
             write([i, label, *words, int(self.rigid[i])])
         return file.getvalue()
 

@@ -43,7 +43,9 @@ class Meridian:
 
     def at(self, s: Array) -> Array:
         """Points (s, 2), r and z in m, at arcs s."""
-        spline = CubicSpline(self.arc, self.points, bc_type=((1, np.array([0.0, 1.0])), (2, [0, 0])))
+        spline = CubicSpline(
+            self.arc, self.points, bc_type=((1, np.array([0.0, 1.0])), (2, [0, 0]))
+        )
         found: Array = spline(s)
         return found
 
@@ -72,9 +74,9 @@ def meridian(
         cubic = (z - widest[1] + curvature / 2 * height**2) / height**3
         lean = np.arctan(curvature * height - 3 * cubic * height**2)
     if z > widest[1]:
-        raise SectionError("the rim is wider than the tyre")
+        raise SectionError(f"a rim {2e3 * rim[1]:.0f} mm wide is wider than the tyre")
     if abs(np.tan(lean)) > STEEPEST:
-        raise SectionError("the sidewall does not reach the rim: it is too narrow for the tyre")
+        raise SectionError(f"a rim {2e3 * rim[1]:.0f} mm wide is too narrow for the tyre")
     x = np.linspace(0, height, STEPS + 1)[1:]
     lower = np.stack([upper[-1, 0] - x, widest[1] - curvature / 2 * x**2 + cubic * x**3], -1)
     # held by the rim: an arc that turns upright, down to the seat

@@ -108,7 +108,7 @@ def section_of_outline(
 
 
 def _smooth(curve: Array) -> tuple[Array, Array]:
-    """Points and unit tangents at equal steps of the curve's length; no new bumps between points."""
+    """Points and unit tangents at equal steps of the curve's length, without new bumps."""
     arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(curve, axis=0).T))])
     through = PchipInterpolator(arc, curve)
     at = np.linspace(0, arc[-1], DENSE)

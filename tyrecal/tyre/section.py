@@ -67,12 +67,17 @@ def read_section(path: Path) -> Section:
                 f"at least an inner and an outer line are needed, got {', '.join(names) or 'none'}",
                 1,
             )
+        columns = [
+            (f"{n}{GAUGE}",) * 2 if n in gauged else (f"{n}_r_mm", f"{n}_z_mm") for n in names
+        ]
         points, labels, rigid = [], [], []
         for row in reader:
             columns = [
                 (f"{n}{GAUGE}",) * 2 if n in gauged else (f"{n}_r_mm", f"{n}_z_mm") for n in names
             ]
-            points.append([[millimetres(row, c, reader.line_num) for c in pair] for pair in columns])
+            points.append(
+                [[millimetres(row, c, reader.line_num) for c in pair] for pair in columns]
+            )
             labels.append(row["region"])
             if row["rigid"] not in ("0", "1"):
                 raise SectionError(f"rigid is '{row['rigid']}', must be 0 or 1", reader.line_num)
