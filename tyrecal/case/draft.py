@@ -6,11 +6,13 @@ import csv
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from ..tyre.from_size import build, usual
 from ..tyre.section import SectionError
 from ..tyre.size import INCH, TyreSize
+from .load import validate
 from .new import new_case
 from .schema import Outline, SectionSource
 from .stations import read_section_of
@@ -31,6 +33,16 @@ class Draft:
     file: str
     content: bytes
 
+    def check(self) -> None:
+        """Raises BadSection where the case is not right, a mistake a line."""
+        with TemporaryDirectory() as folder:
+            Path(folder, self.file).write_bytes(self.content)
+            path = Path(folder, "case.yaml")
+            path.write_text(self.text, encoding="utf-8")
+            mistakes = validate(path)
+        if mistakes:
+            raise BadSection("\n".join(f"{m.key} is {m.value}: {m.message}" for m in mistakes))
+
 
 def from_size(
     size: TyreSize, lengths: Mapping[str, float], pressure_kPa: float | None, stem: str
@@ -48,7 +60,7 @@ def from_size(
         f"{stem}.csv",
         f"{size.text} on a {gauges.rim / INCH:g} inch rim",
         size.text,
-        pressure_kPa or size.pressure_kPa,
+        size.pressure_kPa if pressure_kPa is None else pressure_kPa,
         f"section from the size code, crown {mm['crown']}, sidewall {mm['sidewall']},\n"
         f"# bead {mm['bead']} mm thick, belt {mm['belt']} mm wide: an estimate to start from.",
         carcass_plies=2 if size.light_truck else 1,
@@ -70,13 +82,14 @@ def from_file(
             {"outline": {"file": file.name, **keys}} if keys else {"stations": file.name}
         )
         source = SectionSource.model_validate(given)
+        usual_kPa = size.pressure_kPa if size else PRESSURE_KPA
         section = read_section_of(source, file.parent)
         text = new_case(
             section,
             file.name,
             size.text + " with a section of its own" if size else file.stem,
             size.text if size else "not given",
-            pressure_kPa or (size.pressure_kPa if size else PRESSURE_KPA),
+            usual_kPa if pressure_kPa is None else pressure_kPa,
             "",
             keys,
             2 if size and size.light_truck else 1,

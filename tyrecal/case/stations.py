@@ -58,7 +58,7 @@ def read_stations(document: Document, data: dict[str, Any], folder: Path) -> Sec
         path = inside(folder, name)
         if not path.is_file():
             raise ValueError("must be a file, there is none of this name")
-        if outline and WRONG in outline.values():
+        if outline is WRONG or (outline and WRONG in outline.values()):
             return None  # reported by the schema already
         given = {"outline": outline} if outline else {"stations": name}
         section = read_section_of(SectionSource.model_validate(given), folder)

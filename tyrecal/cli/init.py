@@ -90,7 +90,7 @@ def command(
 def _write(
     draft: Draft, file: Path | None, target: Path, picture: Path | None, force: bool, quiet: bool
 ) -> None:
-    """Write case, section and picture, none over an existing file; what does not load, goes."""
+    """Write case, section and picture, none over an existing file and only what is right."""
     from ..case import load_case
     from ..files import whole
     from .output import OutputRefused, say
@@ -101,6 +101,7 @@ def _write(
     for path in [*contents, *([picture] if picture else [])]:
         if path.exists() and not force:
             raise OutputRefused(f"'{path}' exists already; give --force to write over it")
+    draft.check()
     target.parent.mkdir(parents=True, exist_ok=True)
     for path, content in contents.items():
         with whole(path) as partial:
