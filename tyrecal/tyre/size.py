@@ -84,7 +84,8 @@ class TyreSize:
 
 def parse_size(text: str) -> TyreSize:
     """A size code in any case, with blanks or a service description. Raises UnknownSize."""
-    code = " ".join(text.upper().replace("×", "X").split())
+    text = " ".join(text.split())[:60]
+    code = text.upper().replace("×", "X")
     found = METRIC.match(code) or FLOTATION.match(code)
     if not found:
         raise UnknownSize(f"'{text}' is not a tyre size that is known{_hint(code)}")
