@@ -9,10 +9,12 @@ from the crown's centre (psi = 0) outwards, rho = T / p. The belt, of half width
 
     g(s) = g0 (1 - (s/b)^n),   g0 = 1 - rho / (r0 R)      R: the carcass' radius at the crown
 
-and nothing beyond, where cos psi = cos psi_b + (r^2 - r_b^2) / (2 rho). rho and n follow from the
-widest point. Below it, where the bead's filler bends more than it yields, a cubic of the same
-curvature leads to the rim. After Hofferberth, Kautschuk und Gummi 9 (1956) 225, and Boehm's share
-of the belt; Koutny, Geometry and Mechanics of Pneumatic Tires (2007), ch. 4.
+(a choice: any share that fades towards the edge would do) and nothing beyond, where
+cos psi = cos psi_b + (r^2 - r_b^2) / (2 rho). rho and n follow from the widest point. Below it,
+where the bead's filler bends more than it yields, a cubic of the same curvature leads to the rim.
+
+Hofferberth, Zur Festigkeit des Luftreifens, Kautschuk und Gummi 9 (1956) 225; Koutny, Geometry and
+Mechanics of Pneumatic Tires (Zlin 2007), 4.3.2 and 4.4.
 """
 
 from __future__ import annotations
@@ -43,10 +45,8 @@ class Meridian:
 
     def at(self, s: Array) -> Array:
         """Points (s, 2), r and z in m, at arcs s."""
-        spline = CubicSpline(
-            self.arc, self.points, bc_type=((1, np.array([0.0, 1.0])), (2, [0, 0]))
-        )
-        found: Array = spline(s)
+        ends = ((1, np.array([0.0, 1.0])), (2, np.zeros(2)))  # along the axle; straight
+        found: Array = CubicSpline(self.arc, self.points, bc_type=ends)(s)
         return found
 
 
@@ -63,18 +63,19 @@ def meridian(
 
     belt: half width b of the belt; widest: (r, z) of the carcass there; rim: (r, z) of the top of
     the flange, which the surface ``offset`` outside the carcass touches; seat: radius of the
-    carcass' end. All in m. Raises SectionError where no carcass runs so.
+    carcass' end. All in m. The radius of the widest point is met as nearly as n between 1 and 40
+    allows. Raises SectionError where no carcass runs so.
     """
     upper, rho = _upper(crown, crown_radius, belt, *widest)
     curvature = upper[-1, 0] / rho
     lean = 0.0
-    height = upper[-1, 0] - rim[0]
+    height = max(upper[-1, 0] - rim[0], 1e-3)
     for _ in range(20):  # the normal of the carcass at the rim leans with it
         z = rim[1] - offset * np.cos(lean)
         cubic = (z - widest[1] + curvature / 2 * height**2) / height**3
         lean = np.arctan(curvature * height - 3 * cubic * height**2)
-    if z > widest[1]:
-        raise SectionError(f"a rim {2e3 * rim[1]:.0f} mm wide is wider than the tyre")
+    if z > widest[1] or height < offset:
+        raise SectionError(f"a rim {2e3 * rim[1]:.0f} mm wide leaves the tyre no sidewall")
     if abs(np.tan(lean)) > STEEPEST:
         raise SectionError(f"a rim {2e3 * rim[1]:.0f} mm wide is too narrow for the tyre")
     x = np.linspace(0, height, STEPS + 1)[1:]
@@ -131,8 +132,10 @@ def _widest(
     """(r, z) of the widest point; z = 0 where the carcass turns inwards under the belt already."""
     rho = np.exp(log_rho)
     edge = _belt(crown, crown_radius, belt, rho, np.exp(log_n))[-1]
-    if not 0 <= edge[2] < np.pi / 2 or edge[0] ** 2 < 2 * rho * np.cos(edge[2]):
-        return 0.0, 0.0 if edge[2] > 0 else np.inf
+    if edge[2] >= np.pi / 2:
+        return 0.0, 0.0
+    if edge[2] < 0 or edge[0] ** 2 < 2 * rho * np.cos(edge[2]):  # so flat that it has none
+        return 0.0, np.inf
     r, z = _beyond(edge, rho)[-1]
     return float(r), float(z)
 
