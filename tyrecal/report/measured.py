@@ -52,13 +52,20 @@ def measured_table(runs: Sequence[Run]) -> Table:
 
 
 def sensors_words(told: Mapping[Label, Sequence[Label]]) -> str:
-    """Which labels sensors tell apart, and which look like others, in lines."""
-    right = [str(label) for label, alike in told.items() if not alike]
-    lines = [f"told apart: {', '.join(right) or 'nothing'}"]
-    for label, alike in told.items():
-        if alike:
-            lines.append(f"cannot tell {label}: looks like {', '.join(map(str, alike))}")
+    """Which labels sensors tell apart, and which look like others: a line for each c."""
+    lines = []
+    for c in sorted({label.c for label in told}):
+        mine = {label: alike for label, alike in told.items() if label.c == c}
+        right = ", ".join(str(label) for label, alike in mine.items() if not alike)
+        wrong = [f"cannot tell {label}, it looks like {_few(alike)}"
+                 for label, alike in mine.items() if alike]  # fmt: skip
+        lines.append("; ".join([f"can tell {right}"] * bool(right) + wrong))
     return "\n".join(lines)
+
+
+def _few(labels: Sequence[Label], most: int = 4) -> str:
+    more = len(labels) - most
+    return ", ".join(map(str, labels[:most])) + (f" and {more} more" if more > 0 else "")
 
 
 def draw_measured(path: Path, runs: Sequence[Run]) -> None:
@@ -112,11 +119,21 @@ def _draw_functions(axes: Axes, run: Run) -> None:
     axes.set_ylabel("response over force")
     axes.set_title(f"{Path(run.name).name}: root mean square over {len(run.functions)} functions",
                    loc="left", pad=8)  # fmt: skip
-    axes.legend(frameon=False, loc="lower right")
+    axes.legend(loc="lower right", facecolor="white", edgecolor="none", framealpha=1)
+
+
+def _shown(label: Label | None, size: Sequence[float]) -> int:
+    """The component whose waves do not change sign over the tread's width, where it was measured:
+    axial for odd m, where the belt tilts, else the larger of the others."""
+    order = np.argsort(-np.array(size))
+    if label is not None:
+        tilts = label.m % 2 == 1 or label.kind == "axial"
+        order = [2] if tilts else [k for k in order if k != 2]
+    return int(next((k for k in order if size[k] > 0), np.argmax(size)))
 
 
 def _draw_shape(axes: Axes, told: Told) -> None:
-    """The component that moves the tread most, as a radial displacement of its sensors."""
+    """One component of the tread's motion, as a radial displacement of its sensors."""
     from .figure import COLOURS, GREY
 
     R, angle, _ = told.sensors.points.T
@@ -124,7 +141,7 @@ def _draw_shape(axes: Axes, told: Told) -> None:
     along = told.sensors.directions
     rows = [np.flatnonzero(belt & (np.abs(along[:, k]) > ALONG)) for k in range(3)]
     motion = [told.shape[rows[k]] * np.sign(along[rows[k], k]) for k in range(3)]
-    k = int(np.argmax([np.mean(u**2) if len(u) else 0.0 for u in motion]))
+    k = _shown(told.judged.label, [np.mean(u**2) if len(u) else 0.0 for u in motion])
     u, at = motion[k], angle[rows[k]]
     turn = np.linspace(0, 2 * np.pi, 361)
     axes.plot(np.cos(turn), np.sin(turn), color="0.8", lw=0.8)
