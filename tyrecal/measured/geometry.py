@@ -18,6 +18,7 @@ RADII = (0.15, 1.5)  # m, of tyres
 FLAT = 0.75  # a tyre's width over its diameter is less
 OUTER = 0.8  # of the largest radius, of sensors on the tread and its shoulders
 OFF_CENTRE = 0.1  # of the radius
+CIRCLES = 3  # fitted one after the other
 AXES = "xyz"
 
 
@@ -45,12 +46,12 @@ def sensors_of(
     z = AXES.index(axle or _axle(X))
     x, y = (z + 1) % 3, (z + 2) % 3
     R, angle = np.hypot(X[:, x], X[:, y]), np.arctan2(X[:, y], X[:, x])
+    _check_centre(X[:, [x, y]], AXES[z])
     if not RADII[0] <= R.max() <= RADII[1]:
         raise BadMeasuredData(
             f"the sensors' largest radius about {AXES[z]} is {R.max():.4g} m, no tyre's"
             f" ({RADII[0]:g} to {RADII[1]:g}); is the unit of length (data set 164) right?"
         )
-    _check_centre(X[:, [x, y]], R, AXES[z])
     directions = np.zeros((len(signals), 3))
     for row, (_, direction) in enumerate(signals):
         sign, k = np.sign(direction), abs(direction) - 1
@@ -74,20 +75,26 @@ def _axle(X: Array) -> str:
     return AXES[order[0]]
 
 
-def _check_centre(places: Array, R: Array, axle: str) -> None:
+def _check_centre(places: Array, axle: str) -> None:
     """Raises where the outermost sensors lie on a circle about another centre.
 
-    The circle x^2 + y^2 = 2 a x + 2 b y + c by least squares.
+    The circle x^2 + y^2 = 2 a x + 2 b y + c by least squares, through those that stand outermost
+    about the last centre.
     """
-    outer = np.unique(np.round(places[R / R.max() > OUTER], 6), axis=0)
-    if len(outer) < 4:
-        return
-    A = np.column_stack([2 * outer, np.ones(len(outer))])
-    (a, b, c), _, rank, _ = np.linalg.lstsq(A, np.sum(outer**2, axis=1), rcond=None)
-    radius = np.sqrt(max(c + a**2 + b**2, 0.0))
-    off = np.abs(np.hypot(*(outer - (a, b)).T) / (radius or 1.0) - 1).max()
-    if rank == 3 and off < 1 - BELT and np.hypot(a, b) > OFF_CENTRE * radius:
+    places = np.unique(np.round(places, 6), axis=0)
+    middle = (places.min(0) + places.max(0)) / 2
+    for _ in range(CIRCLES):
+        distance = np.hypot(*(places - middle).T)
+        outer = places[distance / distance.max() > OUTER]
+        A = np.column_stack([2 * outer, np.ones(len(outer))])
+        solution, _, rank, _ = np.linalg.lstsq(A, np.sum(outer**2, axis=1), rcond=None)
+        if len(outer) < 4 or rank < 3:
+            return  # too few to tell
+        middle = solution[:2]
+    distance = np.hypot(*(outer - middle).T)
+    radius, off = distance.mean(), np.hypot(*middle)
+    if np.abs(distance / radius - 1).max() < 1 - BELT and off > OFF_CENTRE * radius:
         raise BadMeasuredData(
-            f"the sensors' circle about {axle} has its middle {np.hypot(a, b):.3g} m off the axle;"
+            f"the sensors' circle about {axle} has its middle {off:.3g} m off the axle;"
             " give --centre X,Y,Z"
         )

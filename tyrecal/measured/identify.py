@@ -7,9 +7,10 @@ medians. Residues, and so shapes, by least squares in the frequency domain with 
 modes below the band and one for those above.
 
 No library states how far such a frequency is off. The delete-one-group jackknife over the
-sensors does: with theta_j from all groups of points but j,
+sensors tells what noise does, and the spread s over the orders (1.48 times the median deviation)
+what the model's order does: with theta_j from all groups of points but j,
 
-    sigma^2 = (g - 1) / g sum_j (theta_j - mean theta)^2
+    sigma^2 = (g - 1) / g sum_j (theta_j - mean theta)^2 + s^2
 """
 
 from __future__ import annotations
@@ -29,6 +30,7 @@ SAME_FREQUENCY, SAME_DAMPING = 0.01, 0.2  # relative, of a pole and its like one
 SPAN = 0.01  # relative width of one mode's poles
 OFTEN = 0.4  # share of the orders in which a mode's pole has to be stable
 DAMPINGS = (0.002, 0.2)  # ratios that a tyre's mode can have
+DEVIATION = 1.4826  # standard deviation of a normal variable over its median deviation
 GROUPS = 10  # of the jackknife, at most
 FORMS = ("receptance", "mobility", "accelerance")
 
@@ -74,8 +76,9 @@ def identify(measured: Responses, low_Hz: float, high_Hz: float) -> Identified:
     poles = _modes(model.all_poles, low_Hz, high_Hz)
     if not len(poles):
         raise BadMeasuredData(f"no mode is stable between {low_Hz:g} and {high_Hz:g} Hz")
-    scatter = _jackknife(measured, poles[:, 0], low_Hz, high_Hz)
-    w, z = 2 * np.pi * poles[:, 0], poles[:, 1]
+    hertz, z, spread = poles.T
+    sigma = np.hypot(_jackknife(measured, hertz, low_Hz, high_Hz), spread)
+    w = 2 * np.pi * hertz
     chosen = SimpleNamespace(
         all_poles=[-z * w + 1j * w * np.sqrt(1 - z**2)], pole_ind=[(0, i) for i in range(len(w))]
     )
@@ -83,8 +86,8 @@ def identify(measured: Responses, low_Hz: float, high_Hz: float) -> Identified:
         warnings.simplefilter("ignore")  # the band's end is the grid's
         fitted, residues = model.get_constants(whose_poles=chosen)
     modes = tuple(
-        MeasuredMode(float(hertz), amplitude, float(ratio), float(sigma))
-        for (hertz, ratio), amplitude, sigma in zip(poles, residues.T, scatter, strict=True)
+        MeasuredMode(float(f_k), amplitude, float(z_k), float(sigma_k))
+        for f_k, z_k, amplitude, sigma_k in zip(hertz, z, residues.T, sigma, strict=True)
     )
     first = round(f[0] / (f[1] - f[0]))
     whole = np.full(measured.values.shape, np.nan, complex)
@@ -118,7 +121,8 @@ def _model(measured: Responses, rows: Array, low_Hz: float, high_Hz: float) -> S
 
 
 def _modes(poles: list[Array], low_Hz: float, high_Hz: float) -> Array:
-    """Frequency (Hz) and damping of each mode (modes, 2), by rising frequency."""
+    """Frequency (Hz), damping and spread (Hz) over the orders of each mode (modes, 3), by rising
+    frequency."""
     stable: list[tuple[float, float]] = []
     before = np.empty((0, 2))
     for each in poles:
@@ -139,9 +143,11 @@ def _modes(poles: list[Array], low_Hz: float, high_Hz: float) -> Array:
         mine = np.abs(rest[:, 0] / centre[0] - 1) < SPAN
         if mine.sum() < OFTEN * len(poles):
             break
-        modes.append(np.median(rest[mine], axis=0))
+        middle = np.median(rest[mine], axis=0)
+        spread = DEVIATION * np.median(np.abs(rest[mine, 0] - middle[0]))
+        modes.append((*middle, spread))
         rest = rest[~mine]
-    return np.array(sorted(map(tuple, modes))).reshape(-1, 2)
+    return np.array(sorted(modes)).reshape(-1, 3)
 
 
 def _jackknife(measured: Responses, frequencies: Array, low_Hz: float, high_Hz: float) -> Array:

@@ -76,6 +76,8 @@ def read_universal(path: Path) -> Universal:
     text = path.read_bytes()
     marks = [match.start() for match in MARK.finditer(text)]
     line_of = lambda mark: text.count(b"\n", 0, mark) + 1
+    if not marks:
+        raise BadMeasuredData(f"{path}: no data set in it")
     if len(marks) % 2 or text[marks[-1] :].strip() != b"-1":
         opened = marks[len(marks) // 2 * 2 - (0 if len(marks) % 2 else 2)]
         raise BadMeasuredData(
