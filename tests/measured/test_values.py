@@ -26,8 +26,8 @@ def test_sigma_covers_the_truth_from_three_runs() -> None:
                 for k in range(3) for f, label in zip(truth, LABELS, strict=True)]  # fmt: skip
         rows = {row.label: row for row in combined(runs, floor=0.0)}
         z += [(rows[x].value - f) / rows[x].sigma for x, f in zip(LABELS, truth, strict=True)]  # type: ignore[operator]
-    assert np.mean(np.abs(z) < 1) == pytest.approx(0.683, abs=0.04)
-    assert np.mean(np.abs(z) < 2) == pytest.approx(0.954, abs=0.02)
+    assert np.mean(np.abs(z) < 1) == pytest.approx(0.683, abs=0.05)
+    assert np.mean(np.abs(z) < 2) == pytest.approx(0.954, abs=0.03)
 
 
 def test_of_one_label_alone_it_is_the_textbooks() -> None:

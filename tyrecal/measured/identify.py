@@ -25,8 +25,9 @@ from .sensors import BadMeasuredData, MeasuredMode
 
 Array = np.ndarray
 
-ORDER, LINES = 40, 7  # highest order of the polynomials, in pole pairs, and lines for each pair
+ORDER, LINES = 40, 5  # highest order of the polynomials, in pole pairs, and lines for each pair
 SAME_FREQUENCY, SAME_DAMPING = 0.01, 0.2  # relative, of a pole and its like one order below
+LOW = 3  # the lowest third of the orders is too low to hold all modes, and biased
 SPAN = 0.01  # relative width of one mode's poles
 OFTEN = 0.4  # share of the orders in which a mode's pole has to be stable
 DAMPINGS = (0.002, 0.2)  # ratios that a tyre's mode can have
@@ -68,6 +69,7 @@ def identify(measured: Responses, low_Hz: float, high_Hz: float) -> Identified:
     Raises BadMeasuredData where the functions hold no mode, or lie at uneven frequencies;
     LabMissing.
     """
+    measured = _from_above_0(measured)
     f = measured.frequency_Hz
     if len(f) < 50 or not np.allclose(np.diff(f), f[1] - f[0], rtol=1e-3):
         raise BadMeasuredData("functions must hold 50 evenly spaced frequencies or more")
@@ -92,8 +94,23 @@ def identify(measured: Responses, low_Hz: float, high_Hz: float) -> Identified:
     first = round(f[0] / (f[1] - f[0]))
     whole = np.full(measured.values.shape, np.nan, complex)
     whole[:, : fitted.shape[1] - first] = fitted[:, first:]
+    whole /= _to_mobility(measured)
     whole[:, (f < low_Hz) | (f > high_Hz)] = np.nan
     return Identified(modes, whole)
+
+
+def _from_above_0(measured: Responses) -> Responses:
+    """Without the line at 0 Hz, where nothing moves or everything drifts."""
+    keep = measured.frequency_Hz > 0
+    return Responses(
+        measured.frequency_Hz[keep], measured.values[:, keep], measured.form, measured.points
+    )
+
+
+def _to_mobility(measured: Responses) -> Array:
+    """Factor (n,) to velocity over force, whose modes are about as high at all frequencies, so
+    that least squares heed them alike."""
+    return (2j * np.pi * measured.frequency_Hz) ** (1 - FORMS.index(measured.form))
 
 
 def _model(measured: Responses, rows: Array, low_Hz: float, high_Hz: float) -> SimpleNamespace:
@@ -104,7 +121,7 @@ def _model(measured: Responses, rows: Array, low_Hz: float, high_Hz: float) -> S
         raise LabMissing(
             "frequency-response functions need the package sdypy-EMA: pip install 'tyrecal[lab]'"
         ) from None
-    f, H = measured.frequency_Hz, measured.values[rows]
+    f, H = measured.frequency_Hz, measured.values[rows] * _to_mobility(measured)
     step = f[1] - f[0]
     first = round(f[0] / step)  # the library needs the grid from 0 Hz on
     f = np.arange(first + len(f)) * step
@@ -114,7 +131,7 @@ def _model(measured: Responses, rows: Array, low_Hz: float, high_Hz: float) -> S
         warnings.simplefilter("ignore")
         model = EMA.Model(
             H, f, lower=max(low_Hz, f[max(first, 1)]), upper=min(high_Hz * 1.05, f[-1]),
-            pol_order_high=int(np.clip(lines // LINES, 4, ORDER)), frf_form=measured.form,
+            pol_order_high=int(np.clip(lines // LINES, 4, ORDER)), frf_form="mobility",
         )  # fmt: skip
         model.get_poles("lscf", show_progress=False)
     return model
@@ -125,7 +142,8 @@ def _modes(poles: list[Array], low_Hz: float, high_Hz: float) -> Array:
     frequency."""
     stable: list[tuple[float, float]] = []
     before = np.empty((0, 2))
-    for each in poles:
+    high = poles[len(poles) // LOW :]
+    for each in high:
         w = np.abs(each)
         found = np.column_stack([w / (2 * np.pi), -each.real / w])
         right = (each.imag > 0) & (found[:, 0] >= low_Hz) & (found[:, 0] <= high_Hz)
@@ -141,7 +159,7 @@ def _modes(poles: list[Array], low_Hz: float, high_Hz: float) -> Array:
         near = np.abs(rest[:, None, 0] / rest[None, :, 0] - 1) < SPAN / 2
         centre = np.median(rest[near[np.argmax(near.sum(1))]], axis=0)
         mine = np.abs(rest[:, 0] / centre[0] - 1) < SPAN
-        if mine.sum() < OFTEN * len(poles):
+        if mine.sum() < OFTEN * len(high):
             break
         middle = np.median(rest[mine], axis=0)
         spread = DEVIATION * np.median(np.abs(rest[mine, 0] - middle[0]))

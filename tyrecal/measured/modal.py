@@ -154,6 +154,7 @@ def _identified(
     points = np.tile([node for node, _ in signals], len(table))
     low, high = layout.band or (f[0], f[-1])
     found = identify(Responses(f, values, form, points), low, high)
+    f, values = f[f > 0], values[:, f > 0]
     labeller = Labeller(sensors, layout.highest)
     told = []
     for mode in found.modes:
