@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tyrecal.measured.labels import LIKELY, Labeller
-from tyrecal.measured.modal import settled, Told
+from tyrecal.measured.modal import Told, settled
 from tyrecal.measured.sensors import MeasuredMode, Sensors, real_part
 from tyrecal.modes.mode import Label
 
@@ -121,7 +121,7 @@ def test_size_phase_place_of_the_origin_and_sign_of_a_sensor_do_not_matter(
     u = measured(modes()[seed % 14], sensors, nodes, rng, 0.05)
     before = Labeller(sensors, 8).judge(real_part(u)[0])
     sign = rng.choice([-1, 1], len(u))
-    turned = Sensors(sensors.points + [0, turn, 0], sensors.directions * sign[:, None])
+    turned = Sensors(sensors.points + turn * np.eye(3)[1], sensors.directions * sign[:, None])
     after = Labeller(turned, 8).judge(real_part(size * np.exp(1j * phase) * sign * u)[0])
     assert after.probabilities == pytest.approx(before.probabilities, abs=1e-6)
 
@@ -145,7 +145,8 @@ def told(frequency: float, label: Label | None) -> Told:
 def test_doublets_have_two_members_and_overtones_no_label() -> None:
     axial = Label(0, 0, "axial")
     given = [told(66.4, Label(2, 1)), told(66.1, Label(2, 1)), told(120.0, Label(2, 1)),
-             told(30.0, axial), told(30.4, axial), told(80.0, Label(2, 0)), told(85.0, None)]  # fmt: skip
+             told(30.0, axial), told(30.4, axial), told(80.0, Label(2, 0)),
+             told(85.0, None)]  # fmt: skip
     found = [(t.mode.frequency_Hz, t.judged.label, t.member) for t in settled(given)]
     assert found == [
         (30.0, axial, ""), (30.4, None, ""), (66.1, Label(2, 1), "1"), (66.4, Label(2, 1), "2"),

@@ -40,7 +40,7 @@ def read(tmp_path: Path, text: str | bytes, pressure: float | None = None) -> li
         f"[0;0] lateral,{240 / 6.894757293168!r},{31.7 * 2 * pi!r},2.5,soft\n"
         f'"(2,1)",{240 / 6.894757293168!r},{66.1 * 2 * pi!r},2.5,\n',
         "label;pressure_kPa;frequency_Hz\n[0,0] axial;240;31.7\n[2,1];240;66.1\n",
-        "\n\nc;m;kind;pressure [MPa];freq. [kHz]\n0;0;Axial;0,24;0,0317\n\n2;1;;0,24;0,0661\n;;;;\n",
+        "\n\nc;m;kind;p [MPa];freq. [kHz]\n0;0;Axial;0,24;0,0317\n\n2;1;;0,24;0,0661\n;;;;\n",
     ],
 )
 def test_one_table_in_many_spellings(tmp_path: Path, text: str | bytes) -> None:
@@ -109,7 +109,7 @@ def test_two_of_a_label_with_waves_are_a_doublet(tmp_path: Path) -> None:
         ("f [Hz],pressure [bar]\n66,2.4\n", "line 1: frequencies need the columns c and m"),
         ("c,m,f\n2,1,66\n", "line 1: no column holds the pressure; give --pressure-kPa"),
         ("c,m,f,pressure\n2,1,66,2.4\n", r"line 1: 'pressure' has no unit; write it as"),
-        ("c,m,f [V],pressure [bar]\n2,1,66,2.4\n", r"line 1: 'f \[V\]': the unit must be one of hz"),
+        ("c,m,f [V],pressure [bar]\n2,1,66,2.4\n", r"line 1: 'f \[V\]': the unit must be one"),
         ("c,m,f,freq,pressure [bar]\n2,1,6,6,2.4\n", "line 1: two columns are the frequency_Hz"),
         (PLAIN.split("\n")[0], "there is no measurement in it"),
         (PLAIN + "2,0,,240\n", "line 4: 4 cells, the headings are 5"),
@@ -128,7 +128,7 @@ def test_two_of_a_label_with_waves_are_a_doublet(tmp_path: Path) -> None:
          "line 2: the pressure differs from line to line, the frequency hardly; are the columns"),
         ("m,c,f,pressure [kPa]\n2,0,79.5,240\n3,0,97.6,240\n3,1,102.7,240\n2,1,66.1,240\n",
          "line 2: most modes have m above c; are the columns c and m swapped"),
-        ("run,c,m,f,pressure [bar]\n1,0,2,99,2.4\n1,0,2,98,2.4\n", r"line 2: \[0,2\] stands twice in"),
+        ("run,c,m,f,pressure [bar]\n1,0,2,99,2.4\n1,0,2,98,2.4\n", r"line 2: \[0,2\] stands twice"),
     ],
 )  # fmt: skip
 def test_mistakes_are_named_with_their_line(tmp_path: Path, text: str | bytes, words: str) -> None:

@@ -50,7 +50,8 @@ def layout(
     nodes += [int(np.argmax(rng.choice([-1, 1]) * Z - 5 * abs(R - r)))
               for r in rng.uniform(0.27, 0.36, side)]  # fmt: skip
     angles = np.concatenate([
-        (np.arange(n) + 0.25 * rng.standard_normal(n)) / max(n, 1) * 2 * np.pi for n in (tread, side)
+        (np.arange(n) + 0.25 * rng.standard_normal(n)) / max(n, 1) * 2 * np.pi
+        for n in (tread, side)
     ])  # fmt: skip
     rows = [(i, a, k) for i, a in zip(nodes, angles, strict=True) for k in range(3)
             if rng.uniform() > drop]  # fmt: skip

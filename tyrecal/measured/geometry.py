@@ -31,7 +31,7 @@ def sensors_of(
 ) -> Sensors:
     """Sensors of signals (node, direction 1 to 3).
 
-    nodes: coordinates in m; axle: x, y or z (default: the axis along which the sensors' places
+    nodes: coordinates in m; axle: x, y or z (default: the axis along which all nodes
     spread least); centre: of the wheel, in m; cylindrical: directions 1, 2, 3 are radial,
     tangential and axial at each sensor, else along x, y and z.
 
@@ -43,7 +43,7 @@ def sensors_of(
             f"node {lacking[0]} has no coordinates; give the file with data set 15 or 2411, too"
         )
     X = np.array([nodes[node] for node, _ in signals]) - centre
-    z = AXES.index(axle or _axle(X))
+    z = AXES.index(axle or _axle(np.array(list(nodes.values()))))
     x, y = (z + 1) % 3, (z + 2) % 3
     R, angle = np.hypot(X[:, x], X[:, y]), np.arctan2(X[:, y], X[:, x])
     _check_centre(X[:, [x, y]], AXES[z])
@@ -82,6 +82,8 @@ def _check_centre(places: Array, axle: str) -> None:
     about the last centre.
     """
     places = np.unique(np.round(places, 6), axis=0)
+    if len(places) < 4:
+        return  # too few to tell
     middle = (places.min(0) + places.max(0)) / 2
     for _ in range(CIRCLES):
         distance = np.hypot(*(places - middle).T)
@@ -89,7 +91,7 @@ def _check_centre(places: Array, axle: str) -> None:
         A = np.column_stack([2 * outer, np.ones(len(outer))])
         solution, _, rank, _ = np.linalg.lstsq(A, np.sum(outer**2, axis=1), rcond=None)
         if len(outer) < 4 or rank < 3:
-            return  # too few to tell
+            return
         middle = solution[:2]
     distance = np.hypot(*(outer - middle).T)
     radius, off = distance.mean(), np.hypot(*middle)

@@ -81,10 +81,9 @@ class Labeller:
         p /= p.sum()
         order = np.argsort(-p, kind="stable")
         probabilities = {self.labels[i]: float(p[i]) for i in order}
-        first, second = order[0], order[1]
-        if p[first] >= LIKELY:
-            return Judged(self.labels[first], probabilities)
-        return Judged(None, probabilities, self._why(first, second))
+        if p[order[0]] >= LIKELY:
+            return Judged(self.labels[order[0]], probabilities)
+        return Judged(None, probabilities, self._why(p, order))
 
     def _evidence(self, values: Array, parts: Array) -> float:
         """ln of the mean over nu of p(u | label, nu). values (k,), parts (k,): of S, of u."""
@@ -108,14 +107,21 @@ class Labeller:
         alike = np.minimum(odds, np.transpose(odds)) < ALIKE
         return {self.labels[i]: [self.labels[j] for j in np.flatnonzero(alike[i])] for i in every}
 
-    def _why(self, first: int, second: int) -> str:
+    def _why(self, p: Array, order: Array) -> str:
+        """Why no label is likely: c is open, or its order m. p: probabilities, order: sorted."""
+        c = np.array([label.c for label in self.labels])
+        first = order[0]
+        others = order[c[order] != c[first]]
+        open_waves = len(others) and p[c == c[first]].sum() < LIKELY
+        second = others[0] if open_waves else order[1]
         a, b = self.labels[first], self.labels[second]
         if min(self.odds(first, second), self.odds(second, first)) >= ALIKE:
             return f"the shape is between {a} and {b}: noise, or two modes mixed"
         if a.c != b.c:
-            angles = np.unique(np.round(np.degrees(self.sensors.points[:, 1]), 0) % 360)
+            angles = np.round(np.degrees(self.sensors.points[:, 1])) % 360
+            count = len(np.unique(angles))
             return (
-                f"aliasing: sensors at {len(angles)} angles, spaced as they are, let"
+                f"aliasing: sensors at {count} angle{'s' * (count > 1)}, spaced as they are, let"
                 f" {min(a.c, b.c)} and {max(a.c, b.c)} waves look alike"
             )
         return f"sensors let {a} and {b} look alike: {_missing(self.sensors)}"

@@ -106,6 +106,8 @@ def _lines(path: Path) -> tuple[list[tuple[int, list[str]]], bool]:
         text = raw.decode("utf-16" if wide else "utf-8-sig")
     except UnicodeDecodeError:
         text = raw.decode("cp1252", errors="replace")
+    if "\0" in text:
+        raise BadMeasuredData(f"{path}: neither text nor a universal file")
     first = 0
     if text.startswith("sep="):  # Excel's own way to name the separator
         first, text = 1, text.partition("\n")[2]
@@ -116,8 +118,8 @@ def _lines(path: Path) -> tuple[list[tuple[int, list[str]]], bool]:
     rows = csv.reader(io.StringIO(text), delimiter=separator, skipinitialspace=True)
     try:
         found = [(first + rows.line_num, [cell.strip() for cell in row]) for row in rows]
-    except csv.Error as error:
-        raise BadMeasuredData(f"{path}, line {first + rows.line_num}: not CSV: {error}") from None
+    except csv.Error:
+        raise BadMeasuredData(f"{path}, line {first + rows.line_num}: not CSV") from None
     found = [(number, row) for number, row in found if any(row)]
     if not found:
         raise BadMeasuredData(f"{path}: the file is empty")

@@ -125,11 +125,11 @@ def _draw_functions(axes: Axes, run: Run) -> None:
 def _shown(label: Label | None, size: Sequence[float]) -> int:
     """The component whose waves do not change sign over the tread's width, where it was measured:
     axial for odd m, where the belt tilts, else the larger of the others."""
-    order = np.argsort(-np.array(size))
+    order = [int(k) for k in np.argsort(-np.array(size))]
     if label is not None:
         tilts = label.m % 2 == 1 or label.kind == "axial"
         order = [2] if tilts else [k for k in order if k != 2]
-    return int(next((k for k in order if size[k] > 0), np.argmax(size)))
+    return next((k for k in order if size[k] > 0), int(np.argmax(size)))
 
 
 def _draw_shape(axes: Axes, told: Told) -> None:
