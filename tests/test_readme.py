@@ -18,6 +18,7 @@ GUIDES = [
     "cases/own_tyre.md",
     "cases/diagnosis.md",
     "cases/blind.md",
+    "cases/measured_data.md",
     "solvers/README.md",
 ]
 OWN_SETUP = "python3 -m venv"  # the two commands that set themselves up; CI runs the second

@@ -21,6 +21,12 @@ from .main import EXIT_FIT
     show_default=True,
     help="Optimiser.",
 )
+@click.option(
+    "--measured",
+    type=click.Path(path_type=Path, exists=True, dir_okay=False),
+    metavar="FILE",
+    help="Measurements (CSV) at the case's pressure in place of its targets.",
+)
 @click.option("--fix", multiple=True, metavar="NAME", help="Hold a variable at its start value.")
 @click.option(
     "--starts",
@@ -45,6 +51,7 @@ def command(
     assignments: tuple[str, ...],
     pressure_kPa: float | None,
     method: str,
+    measured: Path | None,
     fix: tuple[str, ...],
     starts: int,
     seed: int,
@@ -68,6 +75,7 @@ def command(
     \b
     tyrecal fit cases/p235_75r17.yaml
     tyrecal fit cases/p235_75r17.yaml --fix C10 --method least-squares
+    tyrecal fit cases/p235_75r17.yaml --measured measured.csv --pressure-kPa 200
     tyrecal fit cases/p235_75r17.yaml --starts 20 --seed 1 --jobs 2
     """
     from ..evaluate.door import Door
@@ -81,6 +89,11 @@ def command(
     if unknown:
         raise click.UsageError(f"--fix {unknown[0]}: no such variable, only {', '.join(values)}")
     loaded = _starting_at(loaded, values)
+    left_out: list[str] = []
+    if measured:
+        from ..fit.measured import with_measured
+
+        loaded, left_out = with_measured(loaded, measured)
     door = Door(loaded, solver)
     adapter = door.solver
     if loaded.case.targets.footprint:
@@ -107,6 +120,8 @@ def command(
         print_json(fit.result)
     else:
         show(fit_table(fit.result), as_json, quiet)
+    for each in left_out:
+        say(f"{measured}: not used: {each}", True, quiet)
     for warning in _warnings(fit.result):
         click.secho(warning, fg="yellow", err=True)
     if pictures:
