@@ -1,15 +1,47 @@
-"""Options that the commands share."""
+"""Options that the commands share, and how a command is made of them.
+
+1. A command is a module of this package with ``command``, named in ``main.COMMANDS``; heavy imports
+   stand inside the function, so that --help and completion stay quick.
+2. ``@options.talking`` gives every command --json, --quiet and --verbose as ``talk`` (`Talk`): say
+   and show for people, result for programs, detail for --verbose, warn and error.
+3. ``@options.study``, in its place, gives what evaluates designs --jobs, --mesh, --solver,
+   --output, --store and --no-store too, as ``study`` (`Study`): load, door, run.
+4. Its docstring says what it does and writes, and ends with examples after a line ``\\b``.
+5. Long work runs in ``with talk.progress("what") as bar``: ``bar.at(done, of)`` shows the time
+   left. Ctrl-C says how to go on: ``run`` knows; others set the context's RESUME (`output`).
+6. Wrong input raises click.UsageError, or an error that ``main`` knows; codes: ``main.EXIT_CODES``.
+7. What a shell can complete has ``shell_complete``, from `complete`.
+"""
 
 from __future__ import annotations
 
+import logging
+import time
 from collections.abc import Callable
+from dataclasses import dataclass
+from functools import wraps
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
-case_argument = click.argument("case", type=click.Path(path_type=Path))
-solver = click.option("--solver", default="", metavar="NAME", help="Solver (default: the case's).")
+from . import complete
+from .talk import Talk
+
+if TYPE_CHECKING:
+    from ..evaluate.door import Door
+    from .output import Run
+
+case_argument = click.argument(
+    "case", type=click.Path(path_type=Path), shell_complete=complete.cases
+)
+solver = click.option(
+    "--solver",
+    default="",
+    metavar="NAME",
+    help="Solver (default: the case's).",
+    shell_complete=complete.solvers,
+)
 output = click.option(
     "--output",
     type=click.Path(path_type=Path),
@@ -20,7 +52,8 @@ mesh = click.option(
     "--mesh",
     default="",
     metavar="LEVEL",
-    help="Mesh level of the case, e.g. refined (default: the case's).",
+    help="Mesh level of the case, e.g. coarse or refined (default: the case's).",
+    shell_complete=complete.levels,
 )
 as_json = click.option(
     "--json",
@@ -29,7 +62,7 @@ as_json = click.option(
     help="Result as JSON on standard output, all else on standard error.",
 )
 quiet = click.option("--quiet", is_flag=True, help="Print nothing but errors.")
-verbose = click.option("--verbose", is_flag=True, help="Say more; keep the run folders.")
+verbose = click.option("--verbose", is_flag=True, help="Say more; keep run folders.")
 jobs = click.option(
     "--jobs",
     type=click.IntRange(1, 256),
@@ -53,6 +86,7 @@ assignments = click.option(
     multiple=True,
     metavar="NAME=VALUE",
     help="Set a variable or any number of the case; repeatable.",
+    shell_complete=complete.assignments,
 )
 pressure = click.option(
     "--pressure-kPa",
@@ -94,7 +128,104 @@ def every(*options: Callable[[Any], Any]) -> Callable[[Any], Any]:
     return apply
 
 
-STUDY = (jobs, mesh, solver, output, store, no_store, as_json, quiet, verbose)
+TALK = (as_json, quiet, verbose)
+STUDY = (jobs, mesh, solver, output, store, no_store, *TALK)
+
+
+def talking(function: Callable[..., int]) -> Callable[..., int]:
+    """--json, --quiet and --verbose, as the argument ``talk``."""
+
+    @wraps(function)
+    def command(*args: Any, as_json: bool, quiet: bool, verbose: bool, **rest: Any) -> int:
+        return function(*args, talk=_talk(as_json, quiet, verbose), **rest)
+
+    result: Callable[..., int] = every(*TALK)(command)
+    return result
+
+
+def study(function: Callable[..., int]) -> Callable[..., int]:
+    """All that a command has which evaluates designs, as the argument ``study``."""
+    return _study(function, STUDY)
+
+
+def study_one_by_one(function: Callable[..., int]) -> Callable[..., int]:
+    """The same without --jobs."""
+    return _study(function, STUDY[1:])
+
+
+def _study(function: Callable[..., int], given: tuple[Any, ...]) -> Callable[..., int]:
+    @wraps(function)
+    def command(
+        *args: Any,
+        mesh: str,
+        solver: str,
+        output: Path | None,
+        store: Path | None,
+        no_store: bool,
+        as_json: bool,
+        quiet: bool,
+        verbose: bool,
+        jobs: int = 1,
+        **rest: Any,
+    ) -> int:
+        talk = _talk(as_json, quiet, verbose)
+        asked = Study(jobs, mesh, solver, output, store, no_store, talk)
+        return function(*args, study=asked, **rest)
+
+    result: Callable[..., int] = every(*given)(command)
+    return result
+
+
+@dataclass(frozen=True)
+class Study:
+    """How designs are evaluated, and where the results go."""
+
+    jobs: int
+    mesh: str
+    solver: str
+    output: Path | None
+    store: Path | None
+    no_store: bool
+    talk: Talk
+
+    def load(
+        self, path: Path, assigned: tuple[str, ...] = (), pressure_kPa: float | None = None
+    ) -> Any:
+        """As `load`, at the mesh level asked for."""
+        return load(path, self.mesh, assigned, pressure_kPa)
+
+    def door(self, loaded: Any) -> Door:
+        """The door to the solver asked for. Raises UnknownSolver."""
+        from ..evaluate.door import Door
+
+        door = Door(loaded, self.solver)
+        door.solver  # noqa: B018  a solver that is not there is refused before anything is written
+        return door
+
+    def run(self, case: Path, command: str, door: Door) -> Run:
+        """The command's run, with the record behind ``door``. Raises OutputRefused, Locked."""
+        from .output import Run
+
+        run = Run(case, self.output, command, door.solver)
+        door.folder, door.keep = run.runs, self.talk.verbose
+        door.store = run.open_store(self.store, self.no_store)
+        run.counts = counts = door.counts
+        words = "{0.runs} runs of the solver, {0.recorded} answers from the record"
+        context = click.get_current_context()
+        context.call_on_close(lambda: self.talk.detail(words.format(counts)))
+        return run
+
+
+def _talk(as_json: bool, quiet: bool, verbose: bool) -> Talk:
+    if quiet and verbose:
+        raise click.UsageError("give --quiet or --verbose, not both")
+    context, start = click.get_current_context(), time.monotonic()
+    talk = Talk(as_json, quiet, verbose)
+    if verbose:
+        logging.basicConfig(format="%(name)s: %(message)s", level=logging.INFO)
+        name = context.command_path
+        context.call_on_close(lambda: talk.detail(f"{name} took {time.monotonic() - start:.1f} s"))
+    return talk
 
 
 def fitted(text: str) -> Callable[[Any], Any]:

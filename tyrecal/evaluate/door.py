@@ -54,12 +54,17 @@ class Counts:
         self.runs, self.recorded = self.runs + other.runs, self.recorded + other.recorded
 
 
+def _unheard(done: int, total: int) -> None:
+    """Nobody wants to know."""
+
+
 @dataclass
 class Door:
     """Evaluates designs of a case with a solver, each in a fresh folder under ``folder``.
 
     keep: leave the folders of successful runs too (those of failures are always kept); store: the
-    record that is asked before the solver, and told what it said.
+    record that is asked before the solver, and told what it said; heard: called with how many of
+    how many designs asked at once are answered.
     """
 
     case: LoadedCase
@@ -68,6 +73,7 @@ class Door:
     keep: bool = False
     store: Store | None = None
     counts: Counts = field(default_factory=Counts)
+    heard: Callable[[int, int], None] = field(default=_unheard, repr=False)
     _solver: Solver | None = field(default=None, repr=False)
 
     @property
@@ -208,14 +214,18 @@ class Door:
         return self._each("press", [(values, loads_N, modes) for values in designs], jobs)
 
     def _each(self, ask: str, asked: Sequence[tuple[Any, ...]], jobs: int) -> Iterator[Any]:
+        self.heard(0, len(asked))
         if jobs <= 1:
-            for arguments in asked:
-                yield _answer(self, ask, arguments)
+            for done, arguments in enumerate(asked, start=1):
+                answer = _answer(self, ask, arguments)
+                self.heard(done, len(asked))
+                yield answer
             return
         with process_pool(jobs) as pool:
             tasks = partial(_answer_and_count, self.worker(), ask)
-            for answer, counts in pool.map(tasks, asked):
+            for done, (answer, counts) in enumerate(pool.map(tasks, asked), start=1):
                 self.counts.add(counts)
+                self.heard(done, len(asked))
                 yield answer
 
     def worker(self) -> Door:

@@ -67,14 +67,16 @@ def calibrate(
     seed: int = 0,
     jobs: int = 1,
     notify: Notify | None = None,
+    finished: Callable[[int, int], None] = lambda done, starts: None,
 ) -> Fit:
     """Fit the case's free variables to its targets.
 
     starts: the case's own start and ``starts - 1`` drawn uniformly in the scaled box; drawn
     starts that cannot be evaluated are counted and replaced. jobs: processes for the drawn starts,
     and for the neighbours of a point of the first one, where the solver gives no slopes or the
-    tyre is pressed. Raises NothingToFit; DeckRefused where there are footprint targets and the
-    solver has no road; EvaluationFailed when the case's own start cannot be evaluated.
+    tyre is pressed. notify is told of every design here, finished of every start. Raises
+    NothingToFit; DeckRefused where there are footprint targets and the solver has no road;
+    EvaluationFailed when the case's own start cannot be evaluated.
     """
     problem = Problem(case, door, fixed, notify, jobs)
     if not len(problem.scale):
@@ -89,7 +91,7 @@ def calibrate(
     reports = [_run(problem, problem.start(), method)]
     replaced = 0
     if starts > 1:
-        more, replaced = _more_starts(problem, starts - 1, seed, jobs, method)
+        more, replaced = _more_starts(problem, starts - 1, seed, jobs, method, finished)
         reports += more
     best = min(reports, key=lambda r: r.point.objective)
     history = _joined([r.history for r in reports])
@@ -120,11 +122,17 @@ def _tolerance(problem: Problem) -> float:
 
 
 def _more_starts(
-    problem: Problem, count: int, seed: int, jobs: int, method: str
+    problem: Problem,
+    count: int,
+    seed: int,
+    jobs: int,
+    method: str,
+    finished: Callable[[int, int], None],
 ) -> tuple[list[StartReport], int]:
     generator = np.random.default_rng(seed)
     reports: list[StartReport] = []
     replaced = 0
+    finished(1, count + 1)
     with _workers(jobs) as run_all:
         while len(reports) < count:
             drawn = [
@@ -135,6 +143,7 @@ def _more_starts(
                     replaced += 1
                 else:
                     reports.append(answer)
+                    finished(len(reports) + 1, count + 1)
             if replaced > MOST_REPLACED * count:
                 raise EvaluationFailed(
                     "no_equilibrium",
@@ -153,9 +162,9 @@ class _workers:
     def __enter__(self) -> Callable[[Problem, list[Array], str], Any]:
         return self._run_all
 
-    def __exit__(self, *_: object) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *error: object) -> None:
         if self.pool:
-            self.pool.shutdown(cancel_futures=True)
+            self.pool.__exit__(kind, *error)
 
     def _run_all(self, problem: Problem, starts: list[Array], method: str) -> Any:
         if self.pool is None:
