@@ -78,6 +78,15 @@ def with_values(loaded: LoadedCase, values: Mapping[str, float]) -> LoadedCase:
     return changed
 
 
+def with_mesh(loaded: LoadedCase, level: str) -> LoadedCase:
+    """The case on another of its meshes, by name. Raises ValueError."""
+    mesh = loaded.case.mesh
+    if level not in mesh.levels:
+        raise ValueError(f"mesh level '{level}' is not one of the case's: {', '.join(mesh.levels)}")
+    chosen = mesh.model_copy(update={"level": level})
+    return replace(loaded, case=loaded.case.model_copy(update={"mesh": chosen}))
+
+
 def number_at(loaded: LoadedCase, path: str) -> float:
     """The number at a dotted path of the case. Raises ValueError."""
     try:

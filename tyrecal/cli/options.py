@@ -239,13 +239,13 @@ def load(path: Path, mesh_level: str, assigned: tuple[str, ...], pressure_kPa: f
 
     Returns (case, values of the variables). Raises CaseError, click.UsageError.
     """
-    from ..case import load_case, parse_assignment, start_values, with_values
+    from ..case import load_case, parse_assignment, start_values, with_mesh, with_values
     from ..case.load import CaseError
 
     case = load_case(path)
-    if mesh_level:
-        case = _with_level(case, mesh_level)
     try:
+        if mesh_level:
+            case = with_mesh(case, mesh_level)
         names = set(case.case.variables)
         given = _once([parse_assignment(text) for text in assigned], pressure_kPa)
         for name, variable in case.case.variables.items():
@@ -301,15 +301,3 @@ def _once(pairs: list[tuple[str, float]], pressure_kPa: float | None) -> dict[st
         twice = next(name for name in given if sum(n == name for n, _ in pairs) > 1)
         raise click.UsageError(f"{twice} is set twice")
     return given
-
-
-def _with_level(case: Any, level: str) -> Any:
-    from dataclasses import replace
-
-    mesh = case.case.mesh
-    if level not in mesh.levels:
-        raise click.UsageError(
-            f"mesh level '{level}' is not one of the case's: {', '.join(mesh.levels)}"
-        )
-    chosen = case.case.model_copy(update={"mesh": mesh.model_copy(update={"level": level})})
-    return replace(case, case=chosen)
