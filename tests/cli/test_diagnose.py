@@ -26,7 +26,7 @@ def coarse(case_folder: Path) -> Path:
     """The main case with a coarse mesh."""
     path = case_folder / "p235_75r17.yaml"
     text = path.read_text().replace("\n    default:\n", COARSE)
-    path.write_text(text.replace("level: default", "level: coarse"))
+    path.write_text(text.replace("level: default", "level: small"))
     return path
 
 
