@@ -17,6 +17,11 @@ GUIDES = [
     "cases/README.md",
     "cases/diagnosis.md",
     "cases/blind.md",
+    "cases/own_effect.md",
+    "cases/own_solver.md",
+    "cases/own_template.md",
+    "cases/python.md",
+    "cases/theory.md",
     "solvers/README.md",
 ]
 OWN_SETUP = "python3 -m venv"  # the two commands that set themselves up; CI runs the second
@@ -41,6 +46,17 @@ def test_commands_of(guide: str, tmp_path: Path) -> None:
             command, shell=True, cwd=tmp_path, capture_output=True, text=True, env=environment
         )
         assert done.returncode == 0, f"{command}\n{done.stdout[-1500:]}{done.stderr[-1500:]}"
+
+
+@pytest.mark.parametrize("guide", ["README.md", "cases/python.md"])
+def test_python_of(guide: str, tmp_path: Path) -> None:
+    shutil.copytree(ROOT / "cases", tmp_path / "cases")
+    (program,) = re.findall(r"```python\n(.*?)```", (ROOT / guide).read_text(), re.S)
+    done = subprocess.run(
+        [sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr[-1500:]
+    assert len(done.stdout.splitlines()) >= 6
 
 
 def test_ci_runs_the_readmes_test_command_and_nothing_cleverer() -> None:

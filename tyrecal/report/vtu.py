@@ -104,10 +104,10 @@ def _array(name: str, values: np.ndarray) -> str:
     raw = values.astype(f"<{kind}", copy=False).tobytes()
     packed = zlib.compress(raw)
     sizes = np.array([1, len(raw), 0, len(packed)], "<u4").tobytes()
-    return (
-        f'<DataArray type="{TYPES[kind]}" Name="{name}" NumberOfComponents="{values.shape[1]}"'
-        f' format="binary">{(b64encode(sizes) + b64encode(packed)).decode()}</DataArray>\n'
-    )
+    width = "" if values.shape[1] == 1 else f' NumberOfComponents="{values.shape[1]}"'
+    block = (b64encode(sizes) + b64encode(packed)).decode()
+    head = f'<DataArray type="{TYPES[kind]}" Name="{name}"{width} format="binary">'
+    return f"{head}{block}</DataArray>\n"
 
 
 def _hexahedra(shape: tuple[int, int], sectors: int) -> np.ndarray:
