@@ -21,7 +21,7 @@ from ..conftest import CASES, ROOT
 from .test_cli import run
 
 CASE = str(CASES / "p235_75r17.yaml")
-COARSE = ["--set", "mesh.levels.default.rows.3=1", "--set", "mesh.levels.default.elements.crown=3"]
+COARSE = ["--mesh", "coarse"]
 TYRECAL = [sys.executable, "-m", "tyrecal"]
 
 
@@ -161,6 +161,12 @@ def test_progress_is_on_terminals_only(tmp_path: Path) -> None:
         [*TYRECAL, *command, str(tmp_path / "c")], capture_output=True, text=True, check=True
     )
     assert done.stderr == "" and "\x1b" not in done.stdout
+
+
+def test_loads_show_on_the_bar(tmp_path: Path) -> None:
+    said = on_a_terminal("footprint", CASE, "--mesh", "coarse", "--loads-N", "300,500", "--output",
+                         str(tmp_path), "--no-pictures")  # fmt: skip
+    assert "footprint, load 2 of 2" in said and "1/1" in said
 
 
 @pytest.mark.parametrize(("environment", "red"), [({}, True), ({"NO_COLOR": "1"}, False)])

@@ -17,7 +17,7 @@ def test_a_sound_installation(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     monkeypatch.chdir(tmp_path)
     assert run("doctor", "--json") == 0
     found = json.loads(capsys.readouterr().out)
-    assert found["ok"] and found["self_check"]["ok"] and found["self_check"]["seconds"] < 5
+    assert found["ok"] and found["self_check"]["ok"] and found["self_check"]["seconds"] < 60
     assert {p["name"] for p in found["packages"]} >= {"numpy", "scipy", "click"}
     assert {s["name"] for s in found["solvers"]} >= {"abaqus", "bundled", "calculix"}
     assert found["machine"]["cores"] >= 1 and found["machine"]["memory_GB"] > 0.1

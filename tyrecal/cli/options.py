@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from . import complete
-from .talk import Talk
+from .talk import SOLVERS, Talk
 
 if TYPE_CHECKING:
     from ..evaluate.door import Door
@@ -222,9 +222,11 @@ def _talk(as_json: bool, quiet: bool, verbose: bool) -> Talk:
     context, start = click.get_current_context(), time.monotonic()
     talk = Talk(as_json, quiet, verbose)
     if verbose:
-        logging.basicConfig(format="%(name)s: %(message)s", level=logging.INFO)
-        name = context.command_path
-        context.call_on_close(lambda: talk.detail(f"{name} took {time.monotonic() - start:.1f} s"))
+        logging.basicConfig(format="%(name)s: %(message)s")
+        for name in ("tyrecal", SOLVERS):
+            logging.getLogger(name).setLevel(logging.INFO)
+        path = context.command_path
+        context.call_on_close(lambda: talk.detail(f"{path} took {time.monotonic() - start:.1f} s"))
     return talk
 
 

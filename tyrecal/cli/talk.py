@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import logging
 import os
+import re
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -11,6 +13,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import click
+
+SOLVERS = "tyrecal_solvers"  # logger of the solvers that ship
 
 
 def coloured() -> bool | None:
@@ -114,14 +118,24 @@ class Talk:
             transient=True,
             speed_estimate_period=3600.0,  # an evaluation can take minutes
         ) as bar:
-            yield Progress(bar, bar.add_task(what, total=None))
+            progress = Progress(bar, bar.add_task(what, total=None), what)
+            listener = _Loads(progress)
+            log = logging.getLogger(SOLVERS)
+            level = log.level
+            log.addHandler(listener)
+            log.setLevel(logging.INFO)
+            try:
+                yield progress
+            finally:
+                log.removeHandler(listener)
+                log.setLevel(level)
 
 
 class Progress:
     """How far the work is; does nothing where nobody looks."""
 
-    def __init__(self, bar: Any = None, task: Any = None):
-        self._bar, self._task, self._total = bar, task, 0
+    def __init__(self, bar: Any = None, task: Any = None, what: str = ""):
+        self._bar, self._task, self._what, self._done, self._total = bar, task, what, 0, 0
 
     def at(self, done: int, total: int) -> None:
         """``done`` of ``total`` are finished; another total is another piece of work."""
@@ -130,9 +144,29 @@ class Progress:
         if total != self._total or not done:
             self._bar.reset(self._task, total=total)
             self._total = total
-        self._bar.update(self._task, completed=done)
+        self._done = done
+        self._bar.update(self._task, completed=done, description=self._what)
+
+    def within(self, done: int, total: int) -> None:
+        """``done`` of ``total`` parts of the next one are finished."""
+        if self._bar is not None and done < total:
+            self.words(f"{self._what}, load {done + 1} of {total}")
+            self._bar.update(self._task, completed=self._done + done / total)
 
     def words(self, text: str) -> None:
         """What is being done, in a few words."""
         if self._bar is not None:
             self._bar.update(self._task, description=f"{text:.60}")
+
+
+class _Loads(logging.Handler):
+    """Hears the loads that the solver reaches on the road, one design after the other."""
+
+    def __init__(self, progress: Progress):
+        super().__init__()
+        self.progress = progress
+
+    def emit(self, record: logging.LogRecord) -> None:
+        found = re.match(r"load (\d+) of (\d+)", record.getMessage())
+        if found:
+            self.progress.within(int(found[1]), int(found[2]))

@@ -83,9 +83,9 @@ compressor="vtkZLibDataCompressor">
 <Piece NumberOfPoints="{count}" NumberOfCells="{len(cells)}">
 <Points>{_array("Points", points.reshape(count, 3))}</Points>
 <Cells>
-{_array("connectivity", cells.reshape(-1, 1).astype("i8"))}
-{_array("offsets", np.arange(8, 8 * len(cells) + 1, 8, "i8")[:, None])}
-{_array("types", np.full((len(cells), 1), HEXAHEDRON, "u1"))}
+{_array("connectivity", cells.reshape(-1, 1))}
+{_array("offsets", 8 * np.arange(1, len(cells) + 1)[:, None])}
+{_array("types", np.full((len(cells), 1), HEXAHEDRON, np.uint8))}
 </Cells>
 <PointData>
 {"".join(data)}
