@@ -17,6 +17,7 @@ import tyrecal
 from .conftest import ROOT
 
 SETUP = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]
+ASIDE = {"__pycache__", ".mypy_cache", ".ruff_cache"}
 FOLDERS = {name: ROOT / folder for name, folder in SETUP["package-dir"].items()}
 
 
@@ -33,7 +34,7 @@ def files() -> list[Path]:
         path
         for top in FOLDERS.values()
         for path in top.rglob("*")
-        if path.is_file() and "__pycache__" not in path.parts
+        if path.is_file() and not ASIDE & set(path.parts)
     ]
 
 

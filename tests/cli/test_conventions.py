@@ -105,7 +105,7 @@ def test_ctrl_c_leaves_what_was_done_and_says_how_to_go_on(jobs: str, tmp_path: 
     while len(list(out.glob("record/*/*.record"))) < 3 and process.poll() is None:
         time.sleep(0.01)
     os.killpg(process.pid, signal.SIGINT)  # as a terminal does, to all processes
-    words = process.communicate(timeout=20)[1]
+    words = process.communicate(timeout=200)[1]
     assert process.returncode == 130, words
     assert "interrupted: " in words and "same command goes on" in words and str(out) in words
     assert "Traceback" not in words
