@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from . import case as _case
-from .case import CaseError, LoadedCase, start_values, with_mesh, with_values
+from .case import CaseError, LoadedCase, start_values, with_level, with_values
 from .diagnose.diagnosis import Diagnosis
 from .effects import Effect, catalogue
 from .evaluate.door import Door, Question
@@ -62,7 +62,7 @@ def load_case(path: Path | str, mesh: str = "") -> LoadedCase:
     200.0
     """
     loaded = _case.load_case(path)
-    return with_mesh(loaded, mesh) if mesh else loaded
+    return with_level(loaded, mesh) if mesh else loaded
 
 
 def evaluate_modes(

@@ -241,13 +241,13 @@ def load(path: Path, mesh_level: str, assigned: tuple[str, ...], pressure_kPa: f
 
     Returns (case, values of the variables). Raises CaseError, click.UsageError.
     """
-    from ..case import load_case, parse_assignment, start_values, with_mesh, with_values
+    from ..case import load_case, parse_assignment, start_values, with_level, with_values
     from ..case.load import CaseError
 
     case = load_case(path)
     try:
         if mesh_level:
-            case = with_mesh(case, mesh_level)
+            case = with_level(case, mesh_level)
         names = set(case.case.variables)
         given = _once([parse_assignment(text) for text in assigned], pressure_kPa)
         for name, variable in case.case.variables.items():
