@@ -50,6 +50,7 @@ def command(
     output: Path | None,
     store: Path | None,
     no_store: bool,
+    report: bool,
     as_json: bool,
     quiet: bool,
     verbose: bool,
@@ -79,6 +80,7 @@ def command(
     from ..effects import catalogue
     from ..evaluate.door import Door
     from ..report.diagnosis import page
+    from ..report.kept import parts_data
     from .output import Run, print_json
 
     loaded, _ = options.load(case, mesh, assignments, None)
@@ -96,6 +98,8 @@ def command(
     found = study(loaded, door, measured, repeats, changes, assumed, jobs, considered)
     told = result(found.diagnosis)
     run.write_json("diagnosis.json", told)
+    named = [part["region"] for part in told["section_map"]]
+    run.write_json("diagnosis_section.json", parts_data(loaded, named))
     words = page(found, loaded.case.name, measured.name)
     run.write_text("diagnosis.md", words)
     if pictures:
@@ -107,6 +111,7 @@ def command(
         print_json(told)
     say(words, as_json, quiet)
     say(f"results in {run.folder}", as_json, quiet)
+    run.report(report, as_json, quiet)
     return 0
 
 

@@ -35,6 +35,7 @@ def command(
     output: Path | None,
     store: Path | None,
     no_store: bool,
+    report: bool,
     as_json: bool,
     quiet: bool,
     verbose: bool,
@@ -52,6 +53,7 @@ def command(
     """
     from ..evaluate.door import Door
     from ..evaluate.pressed import Pressed
+    from ..report.kept import patches_data
     from ..report.table import footprint_csv, footprint_table
     from ..studies.footprint import footprint_result, press, progress
     from .output import Run, print_json, say, show
@@ -83,6 +85,7 @@ def command(
     result = footprint_result(designs, asked, outcomes, meshes)
     run.write_json("footprint.json", result)
     run.write_text("footprint.csv", footprint_csv(result["rows"]))
+    run.write_json("footprint_patches.json", patches_data(loaded.case.name, pressed, meshes))
     if pictures:
         from ..report.footprint import draw_footprint
 
@@ -98,6 +101,7 @@ def command(
         text = "error: not every load was reached; the loads below it are kept"
         click.secho(text, fg="red", err=True)
     say(f"results in {run.folder}", as_json, quiet)
+    run.report(report, as_json, quiet)
     return EXIT_SOLVER if result["failed"] else 0
 
 

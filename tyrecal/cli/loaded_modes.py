@@ -25,9 +25,16 @@ def wanted_loads(load_N: float | None, sweep: str | None) -> list[float]:
 
 
 def at_load(
-    door: Any, run: Any, values: Mapping[str, float], load_N: float, as_json: bool, quiet: bool
+    door: Any,
+    run: Any,
+    values: Mapping[str, float],
+    load_N: float,
+    report: bool,
+    as_json: bool,
+    quiet: bool,
 ) -> int:
-    """Modes under one load, in modes.json."""
+    """Modes under one load, in modes.json, with their shapes in modes_shapes.json."""
+    from ..report.kept import loaded_data
     from ..report.table import modes_table
     from ..studies.loaded import LoadedTyre, load_tyres
     from ..studies.loaded_result import loaded_modes_result
@@ -38,6 +45,7 @@ def at_load(
         raise outcome
     result = loaded_modes_result(values, outcome)
     run.write_json("modes.json", result)
+    run.write_json("modes_shapes.json", loaded_data(outcome, door.case))
     run.finish(solver_runs=door.counts.runs, answered_from_record=door.counts.recorded)
     if as_json:
         print_json(result)
@@ -45,6 +53,7 @@ def at_load(
         show(modes_table(result), as_json, quiet)
     for sentence in result["findings"]["words"]:
         say(sentence, as_json, quiet)
+    run.report(report, as_json, quiet)
     return 0
 
 
@@ -55,6 +64,7 @@ def over_loads(
     loads_N: Sequence[float],
     jobs: int,
     pictures: bool,
+    report: bool,
     as_json: bool,
     quiet: bool,
 ) -> int:
@@ -95,4 +105,5 @@ def over_loads(
         text = "error: not every load was reached; the loads below it are kept"
         click.secho(text, fg="red", err=True)
     say(f"results in {run.folder}", as_json, quiet)
+    run.report(report, as_json, quiet)
     return EXIT_SOLVER if result["failed"] else 0

@@ -24,6 +24,7 @@ from .loaded_modes import at_load, over_loads, wanted_loads
     options.output,
     options.store,
     options.no_store,
+    options.report,
     options.as_json,
     options.quiet,
     options.verbose,
@@ -44,6 +45,7 @@ def command(
     output: Path | None,
     store: Path | None,
     no_store: bool,
+    report: bool,
     as_json: bool,
     quiet: bool,
     verbose: bool,
@@ -62,6 +64,7 @@ def command(
     tyrecal modes cases/p235_75r17.yaml --sweep-load 0,1000,2000,4000 --fitted p235_75r17/fit.json
     """
     from ..evaluate.door import Door, Question
+    from ..report.kept import tyre_data
     from ..studies.modes import modes_result
     from .output import Run, print_json, show
 
@@ -83,12 +86,13 @@ def command(
     door.store = run.open_store(store, no_store)
     if sweep is not None:
         draw = pictures is not False
-        return over_loads(door, run, designs, loads, jobs, draw, as_json, quiet)
+        return over_loads(door, run, designs, loads, jobs, draw, report, as_json, quiet)
     if loads:
-        return at_load(door, run, values, loads[0], as_json, quiet)
+        return at_load(door, run, values, loads[0], report, as_json, quiet)
     evaluation = door.evaluate(Question(values))
     result, modes = modes_result(loaded, values, evaluation)
     run.write_json("modes.json", result)
+    run.write_json("modes_shapes.json", tyre_data(loaded, evaluation, modes))
     if pictures:
         from ..report.pictures import draw_evaluation
 
@@ -100,4 +104,5 @@ def command(
         from ..report.table import modes_table
 
         show(modes_table(result), as_json, quiet)
+    run.report(report, as_json, quiet)
     return 0

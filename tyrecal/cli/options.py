@@ -94,7 +94,12 @@ def every(*options: Callable[[Any], Any]) -> Callable[[Any], Any]:
     return apply
 
 
-STUDY = (jobs, mesh, solver, output, store, no_store, as_json, quiet, verbose)
+report = click.option(
+    "--report",
+    is_flag=True,
+    help="Write report.html, a page of all that the folder of results holds.",
+)
+STUDY = (jobs, mesh, solver, output, store, no_store, report, as_json, quiet, verbose)
 
 
 def fitted(text: str) -> Callable[[Any], Any]:

@@ -36,6 +36,7 @@ def command(
     output: Path | None,
     store: Path | None,
     no_store: bool,
+    report: bool,
     as_json: bool,
     quiet: bool,
     verbose: bool,
@@ -99,6 +100,7 @@ def command(
         text = f"error: {len(failed)} of {len(outcomes)} evaluations failed; the others are kept"
         click.secho(text, fg="red", err=True)
     say(f"results in {run.folder}", as_json, quiet)
+    run.report(report, as_json, quiet)
     return EXIT_SOLVER if failed else 0
 
 
