@@ -73,7 +73,7 @@
     const count = shown.rest.length / 3, n = corners.length / 4;
     const x = new Float32Array(count), y = new Float32Array(count), d = new Float32Array(count);
     const ct = Math.cos(turn), st = Math.sin(turn), cu = Math.cos(tilt), su = Math.sin(tilt);
-    const scale = 0.43 * Math.min(width, height);
+    const scale = 0.45 * Math.min(width, height);
     for (let i = 0; i < count; i++) {
       const px = shown.rest[3 * i] + motion * shown.motion[3 * i];
       const py = shown.rest[3 * i + 1] + motion * shown.motion[3 * i + 1];
@@ -117,8 +117,8 @@
     }
   }
 
-  function sharp(canvas) { // as many pixels as the screen has
-    const ratio = Math.min(2, window.devicePixelRatio || 1);
+  function sharp(canvas, least = 1) { // as many pixels as the screen has, more for paper
+    const ratio = Math.max(least, Math.min(2, window.devicePixelRatio || 1));
     const width = Math.round(canvas.clientWidth * ratio), height = Math.round(canvas.clientHeight * ratio);
     if (width && (canvas.width !== width || canvas.height !== height)) Object.assign(canvas, { width, height });
     return width > 0;
@@ -178,7 +178,7 @@
     });
     const thumbnails = () => buttons.forEach((button, number) => {
       const small = button.querySelector("canvas"), still = surface(data, data.modes[number]);
-      if (sharp(small)) paint(small, still, quads(still, 2), ...VIEWS.perspective, 0.14);
+      if (sharp(small, 2)) paint(small, still, quads(still, 2), ...VIEWS.perspective, 0.14);
     });
     const choose = (number) => {
       const mode = data.modes[number];

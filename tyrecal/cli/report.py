@@ -12,8 +12,12 @@ from . import options
 @click.command()
 @click.argument("folders", metavar="DIR...", nargs=-1, required=True,
                 type=click.Path(path_type=Path))  # fmt: skip
-@click.option("--output", type=click.Path(path_type=Path), metavar="FILE",
-              help="The page (default: report.html in DIR, of several in the present folder).")  # fmt: skip
+@click.option(
+    "--output",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="The page (default: report.html in DIR, of several in the present folder).",
+)
 @options.every(options.as_json, options.quiet)
 def command(folders: tuple[Path, ...], output: Path | None, as_json: bool, quiet: bool) -> int:
     """Tell the results in DIR (of fit, modes, sweep-pressure, footprint, diagnose: whatever is

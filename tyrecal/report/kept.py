@@ -65,6 +65,7 @@ def section_data(
         areas.setdefault(region, []).append(_line(place, mesh.solids[number][:4]))
     held = set(mesh.rim)
     around = outline(mesh)
+    moved = {n: place[n] + 1e3 * np.take(u, [2, 0]) for n, u in (displacement or {}).items()}
     return {
         "areas": areas,
         "cords": {
@@ -76,10 +77,8 @@ def section_data(
         },
         "rim": [_line(place, n[:4]) for n in mesh.solids.values() if held.issuperset(n)],
         "outline": _line(place, around),
-        "inflated": None if displacement is None else _rounded(
-            [place[n] + 1e3 * np.take(displacement[n], [2, 0]) for n in around], 3
-        ),
-    }  # fmt: skip
+        "inflated": None if displacement is None else _line(moved, around),
+    }
 
 
 def parts_data(case: LoadedCase, named: Iterable[str]) -> dict[str, Any]:

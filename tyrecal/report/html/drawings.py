@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from contourpy import contour_generator
@@ -16,6 +18,7 @@ ACROSS = 340.0  # pixels of a drawing's width
 PATCH = 200.0
 AIR = 12.0
 BANDS = 8  # of contact pressure
+TRACE = 1e-6  # of the highest pressure, where the lowest band begins
 ENOUGH = 5.0  # ln evidence that is drawn in the full colour
 
 
@@ -53,16 +56,12 @@ class Key:
 
 def section(found: Section, pressure_kPa: float) -> tuple[Markup, list[Key], str]:
     """The section, the key to its numbers, its size in words."""
-    outlines = [found.outline, *([sum(found.inflated, [])] if found.inflated else [])]
-    plane = _Plane(outlines)
+    plane = _Plane([found.outline, *([found.inflated] if found.inflated else [])])
     parts, numbers, key = [], [], []
     for k, (name, cells) in enumerate(found.areas.items(), 1):
         style = f"rubber r{(k - 1) % 4}"
         parts.append(plane.path(cells, style))
-        right = max(cells, key=lambda cell: (round(np.mean(cell[::2]), 6), cell[1]))
-        if k == 1:  # of the crown the middle, of the others the right side
-            right = min(cells, key=lambda cell: (abs(np.mean(cell[::2])), cell[1]))
-        numbers.append(_number(plane, right, k))
+        numbers.append(_number(plane, _spot(cells, k), k))
         key.append(Key(k, style, name.replace("_", " ")))
     if found.rim:
         parts.append(plane.path(found.rim, "held"))
@@ -73,7 +72,7 @@ def section(found: Section, pressure_kPa: float) -> tuple[Markup, list[Key], str
         words = f"{name.replace('_', ' ')}: cords {cords.angle_deg:g}° from the meridian"
         key.append(Key(0, style, words))
     if found.inflated:
-        parts.append(plane.path([sum(found.inflated, [])], "inflated"))
+        parts.append(plane.path([found.inflated], "inflated"))
         key.append(Key(0, "inflated", f"inflated to {pressure_kPa:g} kPa"))
     z, r = np.reshape(found.outline, (-1, 2)).T
     count = sum(map(len, found.areas.values()))
@@ -87,7 +86,7 @@ def section(found: Section, pressure_kPa: float) -> tuple[Markup, list[Key], str
 def section_map(found: DiagnosisSection, regions: Sequence[Region]) -> tuple[Markup, list[Key]]:
     """Parts of the section, the darker the better a change of them alone explains the gap, with
     their places in the table as numbers."""
-    place = {}
+    place: dict[str, tuple[int, float]] = {}
     for k, region in enumerate(regions, 1):  # of several rubbers in a region the likelier one
         place.setdefault(region.region.split(",")[0], (k, region.evidence))
     plane = _Plane([cell for cells in found.areas.values() for cell in cells])
@@ -96,17 +95,15 @@ def section_map(found: DiagnosisSection, regions: Sequence[Region]) -> tuple[Mar
         number, evidence = place.get(name, (0, 0.0))
         parts.append(plane.path(cells, f"part e{_grade(evidence)}"))
         if number:
-            middle = sorted(cells, key=lambda cell: (np.mean(cell[::2]), cell[1]))
-            right = [c for c in middle if np.mean(c[::2]) > 0] or middle
-            spot = right[len(right) // 2] if "crown" not in name and name != "tread" else min(
-                cells, key=lambda cell: (abs(np.mean(cell[::2])), -cell[1]))  # fmt: skip
-            numbers.append(_number(plane, spot, number))
+            numbers.append(_number(plane, _spot(cells, number), number))
             key.append(Key(number, f"part e{_grade(evidence)}", name))
     for name, lines in found.cords.items():
         number, evidence = place.get(name, (0, 0.0))
         parts.append(plane.path(lines, f"strand e{_grade(evidence)}", close=False))
         if number:
-            spot = min(lines, key=lambda line: (round(np.mean(line[::2]), 3), line[1]))
+            left = [[-z if i % 2 == 0 else z for i, z in enumerate(line)] for line in lines]
+            mirror = _spot(left, number)
+            spot = [-z if i % 2 == 0 else z for i, z in enumerate(mirror)]
             numbers.append(_number(plane, spot, number))
             key.append(Key(number, f"part e{_grade(evidence)}", name))
     words = "Parts of the section by the evidence for a change of them alone"
@@ -126,7 +123,7 @@ def levels(patches: Sequence[Patch]) -> list[float]:
 
 def patches(found: Sequence[Patch], edges: Sequence[float]) -> list[Markup]:
     """Contact pressure in the patches, all in one scale, rolling direction upwards."""
-    half = np.max([_halves(patch) for patch in found], axis=0) + 6.0
+    half = np.max([_halves(patch) for patch in found], axis=0) + 4.0
     scale = (PATCH - 2) / (2 * half[0])
     return [_patch(patch, edges, half, scale) for patch in found]
 
@@ -134,12 +131,12 @@ def patches(found: Sequence[Patch], edges: Sequence[float]) -> list[Markup]:
 def _patch(patch: Patch, edges: Sequence[float], half: np.ndarray, scale: float) -> Markup:
     x, y, p = (np.array(v) for v in (patch.across_mm, patch.along_mm, patch.pressure_kPa))
     x, y = (half[0] + x) * scale + 1, (half[1] - y) * scale + 1
-    contours = contour_generator(x, y, p)
+    contours: Any = contour_generator(x, y, p)
     width, height = 2 * scale * half + 2
     frame = Markup('<rect class="frame" x="1" y="1" width="{:.5g}" height="{:.5g}"/>')
     parts = [frame.format(width - 2, height - 2)]
     for k, edge in enumerate(edges[:-1]):
-        d = "".join(_trace(line, True) for line in contours.lines(edge or 1e-6 * edges[-1]))
+        d = "".join(_trace(line, True) for line in contours.lines(edge or TRACE * p.max()))
         # a level's lines enclose what lies above it, so the next band is painted on top
         parts.append(Markup('<path class="band b{}" d="{}"/>').format(_band(k, edges), d))
     ten = 50.0 if half[0] > 60 else 20.0
@@ -151,8 +148,9 @@ def _patch(patch: Patch, edges: Sequence[float], half: np.ndarray, scale: float)
 
 def bands(edges: Sequence[float]) -> list[tuple[int, str]]:
     """Class number and words of each band."""
-    pairs = zip(edges, edges[1:], strict=False)
-    return [(_band(k, edges), f"{low:g} to {high:g}") for k, (low, high) in enumerate(pairs)]
+    return [
+        (_band(k, edges), f"{low:g} to {high:g}") for k, (low, high) in enumerate(pairwise(edges))
+    ]
 
 
 def _band(k: int, edges: Sequence[float]) -> int:
@@ -160,13 +158,22 @@ def _band(k: int, edges: Sequence[float]) -> int:
 
 
 def _halves(patch: Patch) -> np.ndarray:
-    there = np.array(patch.pressure_kPa) > 0
-    return np.array([abs(np.array(v)[there]).max() for v in (patch.across_mm, patch.along_mm)])
+    """Largest distances from the middle across and along, as far as the lowest band is drawn."""
+    x, y, p = (np.array(v) for v in (patch.across_mm, patch.along_mm, patch.pressure_kPa))
+    contours: Any = contour_generator(x, y, p)
+    line = np.concatenate(contours.lines(TRACE * p.max()))
+    return np.asarray(abs(line).max(0))
 
 
 def _grade(evidence: float) -> int:
     """0 (none) to 4 (enough)."""
     return round(4 * min(max(evidence, 0.0) / ENOUGH, 1.0))
+
+
+def _spot(cells: Sequence[Sequence[float]], number: int) -> Sequence[float]:
+    """One of the cells with z > 0, along them farther or less far, so that numbers stay apart."""
+    right = [cell for cell in cells if np.mean(cell[::2]) > 0] or list(cells)
+    return right[int(len(right) * (0.5, 0.25, 0.75)[number % 3])]
 
 
 def _number(plane: _Plane, cell: Sequence[float], number: int) -> Markup:
@@ -180,4 +187,3 @@ def _number(plane: _Plane, cell: Sequence[float], number: int) -> Markup:
 def _trace(points: np.ndarray, close: bool) -> str:
     text = "L".join(f"{x:.1f} {y:.1f}" for x, y in points)
     return f"M{text}Z" if close else f"M{text}"
-

@@ -18,11 +18,13 @@ from ..table import FOOTPRINT, QUANTITIES
 from ..words import motion
 from . import drawings, plots
 from .markdown import html
-from .results import BadResults, Results, Shapes, read_results
+from .results import BadResults, LoadSweep, Results, Shapes, read_results
 from .shapes import packed
-from .summary import CLOSE, FAR, VERDICTS, summary
+from .summary import CLOSE, FAR, VERDICTS, design_words, summary
+from .svg import MINUS
 
 LARGEST = 5_000_000  # bytes of a page
+SHOWN, LEAST = 12, 0.005  # explanations, and the probability below which one is not shown
 MARK = '<meta name="generator" content="tyrecal report">'
 STUDIES = {
     "fit": "fit", "modes": "modes", "pressure": "sweep-pressure", "footprint": "footprint",
@@ -46,7 +48,9 @@ def write_page(path: Path, folders: Sequence[Path]) -> Page:
     text = page(results)
     size = len(text.encode("utf-8"))
     if size > LARGEST:
-        raise BadResults(f"the page would have {size / 1e6:.1f} MB, more than 5: give fewer folders")
+        raise BadResults(
+            f"the page would have {size / 1e6:.1f} MB, more than 5: give fewer folders"
+        )
     if path.is_dir():
         raise BadResults(f"'{path}' is a folder; give a file with --output")
     if path.exists() and MARK.encode() not in path.read_bytes()[:2000]:
@@ -86,7 +90,7 @@ def chapter(found: Results, prefix: str) -> dict[str, Any]:
         "section": tyre and drawings.section(tyre.section, tyre.pressure_kPa),
         "modes": found.modes,
         "pressure": found.pressure and _pressure(found),
-        "load": found.load and {"rows": found.load.rows, "panels": plots.load(found.load.rows)},
+        "load": found.load and _load(found.load),
         "footprint": found.footprint and _footprint(found),
         "diagnosis": found.diagnosis and _diagnosis(found),
     }
@@ -130,9 +134,14 @@ def _pressure(found: Results) -> dict[str, Any]:
     return {
         "rows": rows,
         "panels": plots.pressure(rows, targets, at),
+        "words": design_words(found.pressure),
         "tables": _over(rows, "pressure_kPa"),
         "targets": bool(targets),
     }
+
+
+def _load(found: LoadSweep) -> dict[str, Any]:
+    return {"rows": found.rows, "words": design_words(found), "panels": plots.load(found.rows)}
 
 
 def _over(rows: Sequence[Any], key: str) -> list[dict[str, Any]]:
@@ -181,7 +190,11 @@ def _diagnosis(found: Results) -> dict[str, Any]:
     return {
         "of": d,
         "verdict": VERDICTS[d.verdict],
-        "likeliest": list(d.probabilities.items())[:8],
+        "likeliest": [
+            (key, p)
+            for key, p in list(d.probabilities.items())[:SHOWN]
+            if p >= LEAST or key in ("none", "outside")
+        ],
         "words": html(found.diagnosis_words),
         "map": drawings.section_map(place, d.section_map) if place and d.section_map else None,
         "residuals": plots.residuals(d.gap.residuals) if d.gap.residuals else None,
@@ -202,9 +215,9 @@ def environment() -> ImmutableSandboxedEnvironment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    made.filters["fixed"] = lambda value, digits: f"{value:.{digits}f}".replace("-", "−")
-    made.filters["signed"] = lambda value, digits: f"{value:+.{digits}f}".replace("-", "−")
-    made.filters["digits"] = lambda value, count: f"{value:.{count}g}".replace("-", "−")
+    made.filters["fixed"] = lambda value, digits: f"{value:.{digits}f}".replace("-", MINUS)
+    made.filters["signed"] = lambda value, digits: f"{value:+.{digits}f}".replace("-", MINUS)
+    made.filters["digits"] = lambda value, count: f"{value:.{count}g}"
     made.filters["motion"] = lambda mode: motion(mode.c, mode.m, mode.kind)
     made.filters["label"] = plots.label
     return made

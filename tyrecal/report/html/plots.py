@@ -13,7 +13,8 @@ from ...modes.mode import FAMILIES, Label
 from .results import DesignPoint, Fit, FootprintRow, LoadRow, PressureRow, Residual
 from .svg import Panel, around
 
-NEAR = 5  # design points that are marked one by one at most, in tens
+FEW = 50  # design points are marked one by one
+DESIGNS = ("fitted", "initial")  # in the order of colours and marks
 Curve = list[tuple[float, float]]
 
 
@@ -34,8 +35,8 @@ def deviations(fit: Fit) -> Markup:
     panel.rows([name for name, *_ in pairs])
     for row, (name, before, after) in enumerate(pairs):
         panel.span((before, -row), (after, -row))
-        panel.mark((before, -row), 0, "s1 hollow", f"{name} initial {before:+.2f} %")
-        panel.mark((after, -row), 1, "s0", f"{name} fitted {after:+.2f} %")
+        panel.mark((before, -row), 1, "s1 hollow", f"{name} initial {before:+.2f} %")
+        panel.mark((after, -row), 0, "s0", f"{name} fitted {after:+.2f} %")
     return panel.svg(numbers=False)
 
 
@@ -50,10 +51,10 @@ def convergence(history: Sequence[DesignPoint], unit: str) -> list[Markup]:
         top = Panel("Objective", x, around([o for _, o in known], unit, log=True))
         best = [(k, min(o for j, o in known if j <= k)) for k, _ in known]
         top.line(best, "line s0", step=True)
-        for k, o in known if len(known) <= 10 * NEAR else ():
+        for k, o in known if len(known) <= FEW else ():
             top.mark((k, o), 0, "s1", f"point {k}: {o:.4g} {unit}")
-        for k, point in zip(numbers, history, strict=True):
-            if point.objective is None:
+        for k, tried in zip(numbers, history, strict=True):
+            if tried.objective is None:
                 top.cross((k, top.y.high), f"point {k} could not be evaluated")
         panels.append(top)
     ratios: dict[str, Curve] = {}
@@ -67,7 +68,7 @@ def convergence(history: Sequence[DesignPoint], unit: str) -> list[Markup]:
         bottom.level(1.0)
         for k, (name, curve) in enumerate(ratios.items()):
             bottom.line(curve, f"line s{k % 6}")
-            for point in curve if len(curve) <= 10 * NEAR else curve[-1:]:
+            for point in curve if len(curve) <= FEW else curve[-1:]:
                 words = f"{name}: {point[1]:.4g} at point {point[0]:g}"
                 bottom.mark(point, k, f"s{k % 6}", words)
         panels.append(bottom)
@@ -80,11 +81,6 @@ def _mark_starts(panels: Iterable[Panel], history: Sequence[DesignPoint]) -> Non
         for k in range(1, len(history)):
             if history[k].start != history[k - 1].start:
                 panel.upright(k + 0.5)
-
-
-def variables_legend(history: Sequence[DesignPoint]) -> list[str]:
-    """Names of the variables in the order of their marks."""
-    return list(history[0].values)
 
 
 def pressure(
@@ -148,7 +144,7 @@ def _families(
                 panel.mark(point, mode.c, f"{style} {'hollow' if other else ''}", words)
         last = {(mode, symmetry): curve[-1][1] for (_, mode, symmetry), curve in own.items()}
         ends = {mode: y for (mode, _), y in last.items()}
-        panel.names([(y, f"{mode.c},{mode.m}" if mode.kind is None else mode.kind[:5])
+        panel.names([(y, mode.kind or f"{mode.c},{mode.m}")
                      for mode, y in ends.items()])  # fmt: skip
         for mode in ends:
             if targets and str(mode) in targets and x.low <= target_at <= x.high:
@@ -172,7 +168,8 @@ def footprint(rows: Sequence[FootprintRow]) -> list[Markup]:
         x = around([0.0, *(x for x, _ in values)], "load, kN", zero=True)
         panel = Panel(title, x, around([0.0, *(y for _, y in values)], unit, zero=True))
         ends = []
-        for k, design in enumerate(designs):
+        for design in designs:
+            k = DESIGNS.index(design) if design in DESIGNS else len(DESIGNS)
             own = [point for row, point in zip(rows, values, strict=True) if row.design == design]
             dashed = design == "initial"
             panel.line(own, f"line s{k} {'dashed' if dashed else ''}")
@@ -190,11 +187,13 @@ def residuals(found: Sequence[Residual]) -> Markup:
     ends = [r.percent + s * r.sigma_percent for r in found for s in (-1, 1)]
     x = around([0.0, *ends], "measured over model, %")
     y = around([0.5, -len(found) + 0.5], "")
-    panel = Panel("What calibration leaves", x, y, 80 + 18 * len(found), 150)
+    panel = Panel("What calibration leaves", x, y, 80 + 18 * len(found), 166)
     panel.upright(0.0)
     panel.rows([r.row + (f", run {r.run + 1}" if r.run else "") for r in found])
     for row, r in enumerate(found):
         low, high = r.percent - r.sigma_percent, r.percent + r.sigma_percent
         panel.span((low, -row), (high, -row), "s0")
-        panel.mark((r.percent, -row), 0, "s0", f"{r.row}: {r.percent:+.2f} ± {r.sigma_percent:.2f} %")
+        panel.mark(
+            (r.percent, -row), 0, "s0", f"{r.row}: {r.percent:+.2f} ± {r.sigma_percent:.2f} %"
+        )
     return panel.svg(numbers=False)

@@ -222,7 +222,7 @@ class Section(Part):
     cords: dict[str, Cords]
     rim: list[list[float]]
     outline: list[float]
-    inflated: list[list[float]] | None
+    inflated: list[float] | None
 
 
 class Shape(Named):
@@ -388,7 +388,7 @@ class Results:
     diagnosis: Diagnosis | None = None
     diagnosis_section: DiagnosisSection | None = None
     diagnosis_words: str = ""
-    run: RunFacts = RunFacts()
+    run: RunFacts = field(default_factory=RunFacts)
 
     @property
     def case(self) -> str:

@@ -6,8 +6,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from ..words import fit_doubts, motion
-from .results import Diagnosis, Failed, Fit, FittedMode, Footprints, LoadSweep, Modes, PressureSweep
-from .results import Results
+from .results import (
+    Diagnosis,
+    Failed,
+    Fit,
+    FittedMode,
+    Footprints,
+    LoadSweep,
+    Modes,
+    PressureSweep,
+    Results,
+)
 
 CLOSE, FAR = 2.0, 5.0  # % of deviation, as the terminal colours them
 VERDICTS = {
@@ -38,13 +47,13 @@ def summary(found: Results) -> list[Told]:
         heading = "Modes on the road" if found.modes.load_N else "Modes"
         told.append(Told("modes", heading, modes_words(found.modes)))
     if found.pressure:
-        words = design_words(found.pressure)
+        words = last_words(found.pressure)
         told.append(Told("pressure", "Over pressure", words, missing(found.pressure.failed)))
     if found.footprint:
         words = [*map(sentence, found.footprint.findings.words)] or [rows_words(found.footprint)]
         told.append(Told("footprint", "Footprint", words, missing(found.footprint.failed)))
     if found.load:
-        words = design_words(found.load)
+        words = last_words(found.load)
         told.append(Told("load", "Modes over load", words, missing(found.load.failed)))
     if found.diagnosis:
         told.append(Told("diagnosis", "Diagnosis", diagnosis_words(found.diagnosis)))
@@ -82,12 +91,12 @@ def modes_words(modes: Modes) -> list[str]:
     hertz = [mode.frequency_Hz for mode in modes.modes]
     where = f"{modes.pressure_kPa:g} kPa" + (f" under {modes.load_N:g} N" if modes.load_N else "")
     words = [
-        f"{len(hertz)} frequencies from {min(hertz):.1f} to {max(hertz):.1f} Hz at {where}; the tyre"
-        f" weighs {modes.mass_kg:.2f} kg."
+        f"{len(hertz)} frequencies from {min(hertz):.1f} to {max(hertz):.1f} Hz at {where}; the"
+        f" tyre weighs {modes.mass_kg:.2f} kg."
     ]
     if modes.deflection_m is not None:
         words.append(f"The axle comes {1e3 * modes.deflection_m:.1f} mm down.")
-    return words + [*map(sentence, modes.findings.words)]
+    return [*words, *map(sentence, modes.findings.words)]
 
 
 def design_words(found: PressureSweep | LoadSweep) -> list[str]:
@@ -97,6 +106,15 @@ def design_words(found: PressureSweep | LoadSweep) -> list[str]:
         sentence(f"{each.design}: {words}" if several else words)
         for each in found.findings
         for words in each.words
+    ]
+
+
+def last_words(found: PressureSweep | LoadSweep) -> list[str]:
+    """Findings of the last design: the fitted one where there are two."""
+    several = len(found.findings) > 1
+    return [
+        (f"{each.design}: " if several else "").capitalize() + "; ".join(each.words) + "."
+        for each in found.findings[-1:]
     ]
 
 
@@ -118,9 +136,9 @@ def diagnosis_words(found: Diagnosis) -> list[str]:
     if found.shrinkage:
         s = found.shrinkage
         words.append(
-            f"On held-out data the error goes from {s.before_percent:.2f} to {s.after_percent:.2f} %"
-            f" with {s.effect}: it shrinks by {100 * s.fraction:.0f} %, chance alone reaches"
-            f" {100 * s.placebo_95:.0f} % (95 % quantile)."
+            f"On held-out data the error goes from {s.before_percent:.2f} to"
+            f" {s.after_percent:.2f} % with {s.effect}: it shrinks by {100 * s.fraction:.0f} %,"
+            f" chance alone reaches {100 * s.placebo_95:.0f} % (95 % quantile)."
         )
     if found.next_measurements:
         words.append(f"Next: {found.next_measurements[0].what}.")
@@ -140,5 +158,3 @@ def missing(failed: Sequence[Failed]) -> list[str]:
 def sentence(words: str) -> str:
     """With a capital and a full stop."""
     return words[:1].upper() + words[1:] + ("" if words.endswith((".", "!", "?")) else ".")
-
-

@@ -12,7 +12,8 @@ from ..pressure import apart
 
 Point = tuple[float, float]
 WIDTH, HEIGHT = 340, 270  # of a panel, in pixels of a telephone
-LEFT, RIGHT, TOP, BOTTOM = 46, 40, 26, 40
+LEFT, RIGHT, TOP, BOTTOM = 46, 56, 26, 40
+MINUS = "\N{MINUS SIGN}"
 LINE = 14  # height of a line of text
 MARKS = (  # one for each colour: nothing is told by colour alone
     "M-4 0a4 4 0 1 0 8 0a4 4 0 1 0-8 0",
@@ -76,13 +77,14 @@ class Panel:
 
     def __init__(self, title: str, x: Axis, y: Axis, height: int = HEIGHT, left: int = LEFT):
         self.title, self.x, self.y, self.height, self.left = title, x, y, height, left
+        self.right = WIDTH - (RIGHT if left == LEFT else LINE)
         self.parts: list[Markup] = []
 
     def place(self, point: Point) -> Point:
         """Pixels."""
         across, up = self.x.at(point[0]), self.y.at(point[1])
         return (
-            round(self.left + across * (WIDTH - self.left - RIGHT), 1),
+            round(self.left + across * (self.right - self.left), 1),
             round(self.height - BOTTOM - up * (self.height - TOP - BOTTOM), 1),
         )
 
@@ -141,7 +143,7 @@ class Panel:
         room = self.height - TOP - BOTTOM
         places = apart([self.y.at(y) for y, _ in ends], (LINE - 2) / room)
         for (_, words), up in zip(ends, places, strict=True):
-            self.text(WIDTH - RIGHT + 6, self.height - BOTTOM - up * room + 4, words)
+            self.text(self.right + 6, self.height - BOTTOM - up * room + 4, words)
 
     def rows(self, words: Sequence[str]) -> None:
         """Names of rows 0, 1, ... from above, in the place of an axis of numbers."""
@@ -151,7 +153,7 @@ class Panel:
 
     def svg(self, numbers: bool = True) -> Markup:
         """The panel; ``numbers``: on the upright axis."""
-        foot, right = self.height - BOTTOM, WIDTH - RIGHT
+        foot, right = self.height - BOTTOM, self.right
         axes = [Markup('<text class="title" x="2" y="14">{}</text>').format(self.title)]
         for value in self.x.ticks():
             x, _ = self.place((value, self.y.low))
@@ -168,11 +170,8 @@ class Panel:
             )
         )
         if numbers:
-            axes.append(
-                Markup(
-                    '<text text-anchor="middle" transform="translate(11 {:g}) rotate(-90)">{}</text>'
-                ).format((TOP + foot) / 2, self.y.label)
-            )
+            up = Markup('<text class="up" transform="translate(11 {:g}) rotate(-90)">{}</text>')
+            axes.append(up.format((TOP + foot) / 2, self.y.label))
         words = f"{self.title}: {self.y.label} over {self.x.label}" if numbers else self.title
         return drawing(WIDTH, self.height, words, [*axes, *self.parts])
 
@@ -186,5 +185,5 @@ def drawing(width: float, height: float, words: str, parts: Iterable[Markup]) ->
 
 
 def _number(x: float, y: float, value: float, anchor: str) -> Markup:
-    text = f"{value:.6g}".replace("-", "−")
+    text = f"{value:.6g}".replace("-", MINUS)
     return Markup('<text x="{:g}" y="{:g}" text-anchor="{}">{}</text>').format(x, y, anchor, text)
