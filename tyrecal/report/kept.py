@@ -65,7 +65,10 @@ def section_data(
         areas.setdefault(region, []).append(_line(place, mesh.solids[number][:4]))
     held = set(mesh.rim)
     around = outline(mesh)
-    moved = {n: place[n] + 1e3 * np.take(u, [2, 0]) for n, u in (displacement or {}).items()}
+    inflated = None
+    if displacement is not None:
+        moved = {n: place[n] + 1e3 * np.take(displacement[n], [2, 0]) for n in around}
+        inflated = _line(moved, around)
     return {
         "areas": areas,
         "cords": {
@@ -77,7 +80,7 @@ def section_data(
         },
         "rim": [_line(place, n[:4]) for n in mesh.solids.values() if held.issuperset(n)],
         "outline": _line(place, around),
-        "inflated": None if displacement is None else _line(moved, around),
+        "inflated": inflated,
     }
 
 

@@ -26,7 +26,7 @@ class _Plane:
     """z to the right and r up, mm, in pixels."""
 
     def __init__(self, flat: Iterable[Sequence[float]]):
-        points = np.concatenate([np.reshape(line, (-1, 2)) for line in flat])
+        points = np.concatenate([np.reshape(np.array(line, float), (-1, 2)) for line in flat])
         self.low, high = points.min(0), points.max(0)
         self.scale = (ACROSS - 2 * AIR) / (high - self.low)[0]
         self.height = (high - self.low)[1] * self.scale + 2 * AIR

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib.resources import files
@@ -74,10 +75,11 @@ def page(results: Sequence[Results]) -> str:
 def chapter(found: Results, prefix: str) -> dict[str, Any]:
     """What the templates ask of one folder's results."""
     shapes = [
-        _shapes("fit", found.fit_shapes, found.fit.modes) if found.fit else None,
-        _shapes("modes", found.modes_shapes, found.modes.modes) if found.modes else None,
+        _shapes("fit", found.folder, found.fit_shapes, found.fit.modes) if found.fit else None,
+        _shapes("modes", found.folder, found.modes_shapes, found.modes.modes)
+        if found.modes
+        else None,
     ]
-    tyre = next((each["of"] for each in shapes if each and each["of"] and each["of"].section), None)
     return {
         "prefix": prefix,
         "folder": found.folder.resolve().name,
@@ -87,7 +89,7 @@ def chapter(found: Results, prefix: str) -> dict[str, Any]:
         "absent": [name for key, name in STUDIES.items() if not getattr(found, key)],
         "fit": found.fit and _fit(found),
         "shapes": [each for each in shapes if each],
-        "section": tyre and drawings.section(tyre.section, tyre.pressure_kPa),
+        "section": next((each["section"] for each in shapes if each and each["section"]), None),
         "modes": found.modes,
         "pressure": found.pressure and _pressure(found),
         "load": found.load and _load(found.load),
@@ -96,8 +98,8 @@ def chapter(found: Results, prefix: str) -> dict[str, Any]:
     }
 
 
-def _shapes(what: str, shapes: Shapes | None, table: Any) -> dict[str, Any]:
-    """The viewer's data; or why there are none."""
+def _shapes(what: str, folder: Path, shapes: Shapes | None, table: Any) -> dict[str, Any]:
+    """The viewer's data, or why there are none, and the section."""
     why = ""
     if shapes is None:
         why = f"The mode shapes are not in this folder; 'tyrecal {what} --report' keeps them."
@@ -105,11 +107,16 @@ def _shapes(what: str, shapes: Shapes | None, table: Any) -> dict[str, Any]:
         why, shapes = "The mode shapes in this folder are those of another run: not shown.", None
     elif not shapes.modes:
         why = "This solver gives shapes on the crown alone, so there is no section to revolve."
-    data = packed(shapes) if shapes and shapes.modes else None
+    data = section = None
+    with _lists_of(folder / f"{what}_shapes.json"):
+        if shapes and shapes.modes:
+            data = packed(shapes)
+        if shapes and shapes.section:
+            section = drawings.section(shapes.section, shapes.pressure_kPa)
     heading = {"fit": "Shapes of the fitted tyre", "modes": "Mode shapes"}[what]
     if shapes and shapes.load_N:
         heading = f"Mode shapes under {shapes.load_N:g} N, on the tread"
-    return {"id": what, "heading": heading, "of": shapes, "data": data, "why": why}
+    return {"id": what, "heading": heading, "data": data, "why": why, "section": section}
 
 
 def _fit(found: Results) -> dict[str, Any]:
@@ -164,13 +171,9 @@ def _footprint(found: Results) -> dict[str, Any]:
     known = {(row.design, row.load_N): row for row in rows}
     kept = found.patches.patches if found.patches else []
     kept = [patch for patch in kept if (patch.design, patch.load_N) in known]
-    try:
+    with _lists_of(found.folder / "footprint_patches.json"):
         edges = drawings.levels(kept) if kept else []
         drawn = drawings.patches(kept, edges) if kept else []
-    except (ValueError, StopIteration):
-        raise BadResults(
-            f"'{found.folder / 'footprint_patches.json'}' is damaged: lists of unequal length"
-        ) from None
     return {
         "rows": rows,
         "columns": FOOTPRINT,
@@ -186,7 +189,10 @@ def _footprint(found: Results) -> dict[str, Any]:
 def _diagnosis(found: Results) -> dict[str, Any]:
     d = found.diagnosis
     assert d
-    place = found.diagnosis_section
+    place, drawn = found.diagnosis_section, None
+    if place and d.section_map:
+        with _lists_of(found.folder / "diagnosis_section.json"):
+            drawn = drawings.section_map(place, d.section_map)
     return {
         "of": d,
         "verdict": VERDICTS[d.verdict],
@@ -196,9 +202,18 @@ def _diagnosis(found: Results) -> dict[str, Any]:
             if p >= LEAST or key in ("none", "outside")
         ],
         "words": html(found.diagnosis_words),
-        "map": drawings.section_map(place, d.section_map) if place and d.section_map else None,
+        "map": drawn,
         "residuals": plots.residuals(d.gap.residuals) if d.gap.residuals else None,
     }
+
+
+@contextmanager
+def _lists_of(path: Path) -> Iterator[None]:
+    """Raises BadResults where lists of the file that belong together differ in length."""
+    try:
+        yield
+    except (ValueError, IndexError, TypeError):
+        raise BadResults(f"'{path}' is damaged: its lists do not go together") from None
 
 
 def _commands(found: Results) -> list[str]:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..words import motion
-from .results import BadResults, Shape, Shapes
+from .results import Shape, Shapes
 
 STEPS = 32767
 ANGLES = 60  # round the circumference, in the page
@@ -16,25 +16,21 @@ ANGLES = 60  # round the circumference, in the page
 
 def packed(shapes: Shapes) -> dict[str, Any]:
     """What `viewer.js` reads: points and modes; a surface round the section's outside that is
-    swept by the script, or, of the loaded tyre, as it is. Raises BadResults."""
-    try:
-        return _loaded(shapes) if shapes.load_N else _swept(shapes)
-    except ValueError:
-        raise BadResults(
-            f"the mode shapes of '{shapes.case}' are damaged: lists of unequal length"
-        ) from None
+    swept by the script, or, of the loaded tyre, as it is. Raises ValueError where lists that
+    belong together differ in length."""
+    return _loaded(shapes) if shapes.load_N else _swept(shapes)
 
 
 def _swept(shapes: Shapes) -> dict[str, Any]:
     R, Z = np.array(shapes.R_m, float), np.array(shapes.Z_m, float)
     if len(R) != len(Z) or len(R) < 2:
-        raise ValueError
+        raise ValueError("points")
     radius = float(np.hypot(R, Z).max())
     modes = []
     for mode in shapes.modes:
         both = np.array([mode.real, mode.imaginary], float)
         if both.shape != (2, len(R), 3):
-            raise ValueError
+            raise ValueError(mode.c)
         modes.append({**_named(mode), "n": mode.n, "shape": _base64(both)})
     return {
         "kind": "swept",
@@ -48,7 +44,7 @@ def _swept(shapes: Shapes) -> dict[str, Any]:
 def _loaded(shapes: Shapes) -> dict[str, Any]:
     angles, place = np.array(shapes.angles, float), np.array(shapes.surface_m, float)
     if place.ndim != 3 or place.shape[::2] != (len(angles), 3):
-        raise ValueError
+        raise ValueError("points")
     place = place.copy()
     place[..., 2] -= (place[..., 2].max() + place[..., 2].min()) / 2
     radius = float(np.linalg.norm(place, axis=-1).max())
@@ -56,7 +52,7 @@ def _loaded(shapes: Shapes) -> dict[str, Any]:
     for mode in shapes.modes:
         moved = np.array(mode.displacement, float)
         if moved.shape != place.shape:
-            raise ValueError
+            raise ValueError(mode.c)
         modes.append({**_named(mode), "shape": _base64(moved)})
     return {
         "kind": "loaded",

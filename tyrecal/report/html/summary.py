@@ -113,7 +113,7 @@ def last_words(found: PressureSweep | LoadSweep) -> list[str]:
     """Findings of the last design: the fitted one where there are two."""
     several = len(found.findings) > 1
     return [
-        (f"{each.design}: " if several else "").capitalize() + "; ".join(each.words) + "."
+        sentence((f"{each.design}: " if several else "") + "; ".join(each.words))
         for each in found.findings[-1:]
     ]
 
