@@ -3,7 +3,7 @@
 (() => {
   const TURN = 2 * Math.PI, PERIOD = 1600; // ms of a vibration
   const DISTANCE = 5; // of the eye, in radii
-  const VIEWS = { perspective: [-0.6, 0.38], front: [-Math.PI / 2, 0], side: [0, 0], top: [-Math.PI / 2, Math.PI / 2] };
+  const VIEWS = { perspective: [-0.6, 0.38], front: [0, 0], side: [-Math.PI / 2, 0], top: [0, Math.PI / 2] };
   const VIRIDIS = [[68, 1, 84], [59, 82, 139], [33, 145, 140], [94, 201, 98], [253, 231, 37]];
   const SHADES = 24, LIGHTS = 8;
   const calm = matchMedia("(prefers-reduced-motion: reduce)");
@@ -73,7 +73,7 @@
     const count = shown.rest.length / 3, n = corners.length / 4;
     const x = new Float32Array(count), y = new Float32Array(count), d = new Float32Array(count);
     const ct = Math.cos(turn), st = Math.sin(turn), cu = Math.cos(tilt), su = Math.sin(tilt);
-    const scale = 0.45 * Math.min(width, height);
+    const scale = 0.4 * Math.min(width, height);
     for (let i = 0; i < count; i++) {
       const px = shown.rest[3 * i] + motion * shown.motion[3 * i];
       const py = shown.rest[3 * i + 1] + motion * shown.motion[3 * i + 1];

@@ -45,7 +45,8 @@ def write(folder: Path, name: str = "Toy & sons", effect: str = "rim_width") -> 
         "3,1,3.6e-07,800000.0,8.6,\n"
     )
     (folder / "diagnosis.md").write_text(
-        f"# What the model of {name} lacks\n\n## Named: {effect}\n\n`{effect}` explains the gap.\n\n"
+        f"# What the model of {name} lacks\n\n"
+        f"## Named: {effect}\n\n`{effect}` explains the gap.\n\n"
         "## Which effect?\n\n| explanation | probability | size |\n|---|---|---|\n"
         "| Rim width | 0.71 | -0.009 m |\n| none | 0.02 |  |\n\n"
         "## What to measure next\n\n1. weigh the tyre\n2. <b>measure</b> again\n"
@@ -177,8 +178,9 @@ def pressure_sweep() -> dict[str, Any]:
 def load_sweep() -> dict[str, Any]:
     rows = [{"design": "initial", "load_N": load, "deflection_m": load * 5e-6,
              "modes": _members(load)} for load in (0.0, 1000.0)]  # fmt: skip
+    failed = {"design": "initial", "load_N": 9e5, "cause": "x", "words": "too much"}
     return {"format": 1, "rows": rows, "findings": [{"design": "initial", "words": ["it splits"]}],
-            "failed": [{"design": "initial", "load_N": 9e5, "cause": "x", "words": "too much"}]}  # fmt: skip
+            "failed": [failed]}  # fmt: skip
 
 
 def footprint() -> dict[str, Any]:
@@ -188,8 +190,9 @@ def footprint() -> dict[str, Any]:
          "vertical_stiffness_N_per_m": 2e5}
         for design in ("initial", "fitted") for load in (1000.0, 4000.0)
     ]  # fmt: skip
-    return {"format": 1, "rows": rows, "findings": {"words": ["the fitted tyre's area is larger"]},
-            "failed": [{"design": "fitted", "load_N": 3e4, "cause": "x", "words": "rim on road"}]}  # fmt: skip
+    failed = {"design": "fitted", "load_N": 3e4, "cause": "x", "words": "rim on road"}
+    words = ["the fitted tyre's area is larger"]
+    return {"format": 1, "rows": rows, "findings": {"words": words}, "failed": [failed]}
 
 
 def patches(name: str) -> dict[str, Any]:
@@ -209,7 +212,8 @@ def diagnosis(effect: str) -> dict[str, Any]:
             "mass_sigma": 8.0, "same_as": ["belt cords"]}  # fmt: skip
     return {
         "format": 1, "verdict": "named", "words": f"{effect} explains the gap", "effect": effect,
-        "parameter": {"effect": effect, "value": -0.009, "low": -0.012, "high": -0.005, "unit": "m"},
+        "parameter": {"effect": effect, "value": -0.009, "low": -0.012, "high": -0.005,
+                      "unit": "m"},
         "probabilities": {effect: 0.71, "road_contact": 0.2, "none": 0.02, "outside": 0.001},
         "candidate_set": [effect], "groups": [[effect, "spindle_tilt"]],
         "detectability": {effect: 12.0},
