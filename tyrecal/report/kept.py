@@ -18,7 +18,7 @@ from ..studies.loaded import LoadedTyre
 from ..studies.patch import patch_of
 from ..tyre.mesh import SectionMesh
 from .diagnosis_pictures import cord_part, rubber_parts
-from .revolve import skin
+from .revolve import placed, skin
 from .section import outline, turns
 
 Array = np.ndarray
@@ -34,7 +34,7 @@ def tyre_data(case: LoadedCase, evaluation: Evaluation, modes: Sequence[Mode]) -
     stands at Theta = 0. Modes that are not known on the section are left out.
     """
     mesh = section_mesh(case)
-    moved = dict(zip(evaluation.nodes.tolist(), evaluation.displacement, strict=True))
+    moved, modes = placed(evaluation, modes, mesh)
     nodes = skin(mesh)
     R, Z = np.array([mesh.nodes[int(n)] for n in nodes]).T
     return {
@@ -42,19 +42,15 @@ def tyre_data(case: LoadedCase, evaluation: Evaluation, modes: Sequence[Mode]) -
         "case": case.case.name,
         "pressure_kPa": evaluation.pressure_kPa,
         "variables": {name: list(v.sets) for name, v in case.case.variables.items()},
-        "section": section_data(case, mesh, moved or None),
+        "section": section_data(case, mesh, moved),
         "R_m": _rounded(R),
         "Z_m": _rounded(Z),
-        "modes": [
-            {**_name(mode), **_amplitude(mode.raw.shape, nodes)}
-            for mode in modes
-            if isinstance(mode.raw.shape, HarmonicShape)
-        ],
+        "modes": [{**_name(mode), **_amplitude(mode, nodes)} for mode in modes],
     }
 
 
 def section_data(
-    case: LoadedCase, mesh: SectionMesh, displacement: Mapping[int, Array] | None = None
+    case: LoadedCase, mesh: SectionMesh, displacement: Mapping[int, Array]
 ) -> dict[str, Any]:
     """Elements by region, cords by layer, what the rim holds, the outline before and after the
     inflation: points z, r in mm, one after the other."""
@@ -66,7 +62,7 @@ def section_data(
     held = set(mesh.rim)
     around = outline(mesh)
     inflated = None
-    if displacement is not None:
+    if displacement:
         moved = {n: place[n] + 1e3 * np.take(displacement[n], [2, 0]) for n in around}
         inflated = _line(moved, around)
     return {
@@ -160,7 +156,9 @@ def _grown(touches: Array, along: Array, across: Array) -> tuple[slice, slice]:
     return slice(rings[0], rings[-1] + 1), slice(nodes[0], nodes[-1] + 1)
 
 
-def _amplitude(shape: HarmonicShape, nodes: Array) -> dict[str, Any]:
+def _amplitude(mode: Mode, nodes: Array) -> dict[str, Any]:
+    shape = mode.raw.shape
+    assert isinstance(shape, HarmonicShape)
     row = {int(n): k for k, n in enumerate(shape.nodes)}
     A = shape.amplitude[[row[int(n)] for n in nodes]]
     if shape.n:  # r and z as real, theta as imaginary as they can be
