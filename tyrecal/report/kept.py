@@ -163,6 +163,8 @@ def _amplitude(mode: Mode, nodes: Array) -> dict[str, Any]:
     A = shape.amplitude[[row[int(n)] for n in nodes]]
     if shape.n:  # r and z as real, theta as imaginary as they can be
         A = A * np.exp(-0.5j * np.angle((A**2 * MIRROR).sum()))
+    largest = np.argmax(abs(A.real))
+    A = A * (np.sign(A.real.ravel()[largest]) or 1.0)
     return {"n": shape.n, "real": _scaled(A.real, A), "imaginary": _scaled(A.imag, A)}
 
 
