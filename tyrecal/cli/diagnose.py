@@ -72,6 +72,7 @@ def command(
     from ..diagnose.study import study as diagnosed
     from ..effects import catalogue
     from ..report.diagnosis import page
+    from ..report.kept import parts_data
 
     loaded, _ = study.load(case, assignments)
     for id in (*effects, *without):
@@ -88,6 +89,8 @@ def command(
         found = diagnosed(loaded, door, measured, repeats, changes, assumed, study.jobs, considered)
     told = result(found.diagnosis)
     run.write_json("diagnosis.json", told)
+    named = [part["region"] for part in told["section_map"]]
+    run.write_json("diagnosis_section.json", parts_data(loaded, named))
     words = page(found, loaded.case.name, measured.name)
     run.write_text("diagnosis.md", words)
     if pictures:
@@ -97,7 +100,7 @@ def command(
     run.finish()
     talk.result(told)
     talk.say(words)
-    talk.say(f"results in {run.folder}")
+    study.finish(run)
     return 0
 
 

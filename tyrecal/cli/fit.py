@@ -62,11 +62,13 @@ def command(
     \b
     tyrecal fit cases/p235_75r17.yaml
     tyrecal fit cases/p235_75r17.yaml --fix C10 --method least-squares
+    tyrecal fit cases/p235_75r17.yaml --report
     tyrecal fit cases/p235_75r17.yaml --starts 20 --seed 1 --jobs 2
     """
     from ..fit.calibrate import calibrate, history_csv
     from ..fit.problem import objective_unit
     from ..report.table import fit_csv, fit_table
+    from ..report.words import fit_doubts
 
     talk = study.talk
     loaded, values = study.load(case, assignments, pressure_kPa)
@@ -97,18 +99,24 @@ def command(
     run.write_text("fit_history.csv", history_csv(fit.history))
     talk.result(fit.result)
     talk.show(fit_table(fit.result))
-    for warning in _warnings(fit.result):
+    for warning in fit_doubts(fit.result):
         talk.warn(warning)
-    if pictures:
+    if pictures or study.report:
+        from ..case import with_values
         from ..evaluate.door import Question
-        from ..report.pictures import draw_fit
+        from ..report.kept import tyre_data
 
         values = fit.fitted.values
         modes = sorted(fit.fitted.modes.values(), key=lambda mode: mode.frequency_Hz)
         evaluation = door.evaluate(Question(values))
+        shapes = tyre_data(with_values(loaded, values), evaluation, modes)
+        run.write_json("fit_shapes.json", shapes)
+    if pictures:
+        from ..report.pictures import draw_fit
+
         draw_fit(run.folder, loaded, values, evaluation, modes, fit.history, unit)
     run.finish()
-    talk.say(f"results in {run.folder}")
+    study.finish(run)
     return 0 if fit.result["converged"] and fit.result["moved"] else EXIT_FIT
 
 
@@ -127,37 +135,6 @@ def _starting_at(loaded: Any, values: Mapping[str, float]) -> Any:
                 f" {variable.lower:g} to {variable.upper:g}"
             )
     return replace(loaded, case=loaded.case.model_copy(update={"variables": variables}))
-
-
-def _warnings(result: Mapping[str, Any]) -> list[str]:
-    """What the user must not overlook."""
-    warnings = []
-    if not result["moved"]:
-        warnings.append("THE FIT DID NOT MOVE: every variable ended where it started")
-    if not result["converged"]:
-        warnings.append(
-            f"not converged: {result['message']}; projected gradient"
-            f" {result['projected_gradient_norm']:.3g} {result['objective_unit']}"
-        )
-    for name, variable in result["variables"].items():
-        if variable["at_bound"]:
-            seen = variable["standard_error"] is not None
-            why = "the data want it beyond" if seen else "the data do not see it"
-            warnings.append(f"{name} ended at a bound: {why}")
-    if result["failed_evaluations"]:
-        warnings.append(
-            f"{result['failed_evaluations']} designs could not be evaluated; the search"
-            " stepped back from them"
-        )
-    if result["label_margin"] < 0.3:
-        warnings.append(
-            f"a mode is hard to name (margin {result['label_margin']:.2f} of 1): two modes have"
-            " met; look at their pictures"
-        )
-    values = result["singular_values"]
-    if values and values[-1] < 1e-3 * values[0]:
-        warnings.append("the data do not determine all variables: see singular_values in fit.json")
-    return warnings
 
 
 class _Points:

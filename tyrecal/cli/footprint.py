@@ -43,6 +43,7 @@ def command(
     tyrecal footprint cases/p235_75r17.yaml --loads-N 3000,5000 --set road.friction=0 --json
     """
     from ..evaluate.pressed import Pressed
+    from ..report.kept import patches_data
     from ..report.table import footprint_csv, footprint_table
     from ..studies.footprint import footprint_result, press, progress
 
@@ -70,6 +71,7 @@ def command(
     meshes = {name: _mesh(loaded, designs[name]) for name in pressed}
     result = footprint_result(designs, asked, outcomes, meshes)
     run.write_json("footprint.json", result)
+    run.write_json("footprint_patches.json", patches_data(loaded.case.name, pressed, meshes))
     run.write_text("footprint.csv", footprint_csv(result["rows"]))
     if pictures:
         from ..report.footprint import draw_footprint
@@ -82,7 +84,7 @@ def command(
         talk.say(sentence)
     if result["failed"]:
         talk.error("not every load was reached; the loads below it are kept")
-    talk.say(f"results in {run.folder}")
+    study.finish(run)
     return EXIT_SOLVER if result["failed"] else 0
 
 

@@ -9,7 +9,6 @@ import click
 
 from .main import EXIT_SOLVER
 from .options import Study
-from .talk import Talk
 
 
 def wanted_loads(load_N: float | None, sweep: str | None) -> list[float]:
@@ -26,12 +25,14 @@ def wanted_loads(load_N: float | None, sweep: str | None) -> list[float]:
     return [] if load_N is None else parse_loads(repr(load_N), "--load-N")
 
 
-def at_load(door: Any, run: Any, values: Mapping[str, float], load_N: float, talk: Talk) -> int:
-    """Modes under one load, in modes.json."""
+def at_load(door: Any, run: Any, values: Mapping[str, float], load_N: float, study: Study) -> int:
+    """Modes under one load, in modes.json, with their shapes in modes_shapes.json."""
+    from ..report.kept import loaded_data
     from ..report.table import modes_table
     from ..studies.loaded import LoadedTyre, load_tyres
     from ..studies.loaded_result import loaded_modes_result
 
+    talk = study.talk
     with talk.progress(f"modes at {load_N:g} N") as bar:
         door.heard = bar.at
         outcome = load_tyres(door, {"initial": values}, [load_N])["initial"]
@@ -39,11 +40,13 @@ def at_load(door: Any, run: Any, values: Mapping[str, float], load_N: float, tal
         raise outcome
     result = loaded_modes_result(values, outcome)
     run.write_json("modes.json", result)
+    run.write_json("modes_shapes.json", loaded_data(outcome, door.case))
     run.finish()
     talk.result(result)
     talk.show(modes_table(result))
     for sentence in result["findings"]["words"]:
         talk.say(sentence)
+    run.report(study.report, talk.as_json, talk.quiet)
     return 0
 
 
@@ -89,5 +92,5 @@ def over_loads(
             talk.say(f"{found['design']}: {sentence}")
     if result["failed"]:
         talk.error("not every load was reached; the loads below it are kept")
-    talk.say(f"results in {run.folder}")
+    study.finish(run)
     return EXIT_SOLVER if result["failed"] else 0

@@ -26,6 +26,7 @@ COMMANDS = {  # name: one line of help, so that the overview imports no command
     "effects": "List and explain what a plain model leaves out, and what it does.",
     "diagnose": "Say where model and measurements part, and which effect explains it.",
     "blind": "Try the diagnosis on data whose effect is withheld: make, answer, score.",
+    "report": "Tell the results of one or several folders on one HTML page.",
     "solvers": "List the installed solvers and what they can do.",
     "store": "Look at a record of evaluations, check it, prune it.",
     "doctor": "Check the installation: packages, solvers, machine, a known tyre.",
@@ -130,6 +131,7 @@ def _exit_code(failure: Exception) -> int | None:
         ("tyrecal.blind.protocol", "BadTrials", EXIT_INPUT),
         ("tyrecal.cli.output", "OutputRefused", EXIT_INPUT),
         ("tyrecal.cli.lock", "Locked", EXIT_INPUT),
+        ("tyrecal.report.html.results", "BadResults", EXIT_INPUT),
         ("tyrecal.case", "CaseError", EXIT_INPUT),
     ]
     for module, name, code in kinds:

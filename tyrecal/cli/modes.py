@@ -46,6 +46,7 @@ def command(
     tyrecal modes cases/p235_75r17.yaml --sweep-load 0,1000,2000,4000 --fitted p235_75r17/fit.json
     """
     from ..evaluate.door import Question
+    from ..report.kept import tyre_data
     from ..studies.modes import modes_result
 
     loads = wanted_loads(load_N, sweep)
@@ -66,10 +67,11 @@ def command(
         draw = pictures is not False
         return over_loads(door, run, designs, loads, study, draw)
     if loads:
-        return at_load(door, run, values, loads[0], talk)
+        return at_load(door, run, values, loads[0], study)
     evaluation = door.evaluate(Question(values))
     result, modes = modes_result(loaded, values, evaluation)
     run.write_json("modes.json", result)
+    run.write_json("modes_shapes.json", tyre_data(loaded, evaluation, modes))
     if pictures:
         from ..report.pictures import draw_evaluation
 
@@ -79,4 +81,5 @@ def command(
 
     talk.result(result)
     talk.show(modes_table(result))
+    run.report(study.report, talk.as_json, talk.quiet)
     return 0

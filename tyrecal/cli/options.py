@@ -5,7 +5,7 @@
 2. ``@options.talking`` gives every command --json, --quiet and --verbose as ``talk`` (`Talk`): say
    and show for people, result for programs, detail for --verbose, warn and error.
 3. ``@options.study``, in its place, gives what evaluates designs --jobs, --mesh, --solver,
-   --output, --store and --no-store too, as ``study`` (`Study`): load, door, run.
+   --output, --store, --no-store and --report too, as ``study`` (`Study`): load, door, run, finish.
 4. Its docstring says what it does and writes, and ends with examples after a line ``\\b``.
 5. Long work runs in ``with talk.progress("what") as bar``: ``bar.at(done, of)`` shows the time
    left. Ctrl-C says how to go on: ``run`` knows; others set the context's RESUME (`output`).
@@ -128,8 +128,14 @@ def every(*options: Callable[[Any], Any]) -> Callable[[Any], Any]:
     return apply
 
 
+report = click.option(
+    "--report",
+    is_flag=True,
+    help="Write report.html, a page of all that the folder of results holds.",
+)
 TALK = (as_json, quiet, verbose)
-STUDY = (jobs, mesh, solver, output, store, no_store, *TALK)
+ONE_BY_ONE = (mesh, solver, output, store, no_store, *TALK)
+STUDY = (jobs, *ONE_BY_ONE[:-3], report, *TALK)
 
 
 def talking(function: Callable[..., int]) -> Callable[..., int]:
@@ -149,8 +155,8 @@ def study(function: Callable[..., int]) -> Callable[..., int]:
 
 
 def study_one_by_one(function: Callable[..., int]) -> Callable[..., int]:
-    """The same without --jobs."""
-    return _study(function, STUDY[1:])
+    """The same without --jobs and --report."""
+    return _study(function, ONE_BY_ONE)
 
 
 def _study(function: Callable[..., int], given: tuple[Any, ...]) -> Callable[..., int]:
@@ -166,10 +172,11 @@ def _study(function: Callable[..., int], given: tuple[Any, ...]) -> Callable[...
         quiet: bool,
         verbose: bool,
         jobs: int = 1,
+        report: bool = False,
         **rest: Any,
     ) -> int:
         talk = _talk(as_json, quiet, verbose)
-        asked = Study(jobs, mesh, solver, output, store, no_store, talk)
+        asked = Study(jobs, mesh, solver, output, store, no_store, report, talk)
         return function(*args, study=asked, **rest)
 
     result: Callable[..., int] = every(*given)(command)
@@ -186,6 +193,7 @@ class Study:
     output: Path | None
     store: Path | None
     no_store: bool
+    report: bool
     talk: Talk
 
     def load(
@@ -214,6 +222,11 @@ class Study:
         context = click.get_current_context()
         context.call_on_close(lambda: self.talk.detail(words.format(counts)))
         return run
+
+    def finish(self, run: Run) -> None:
+        """Say where the results are, and write their page where it is wanted."""
+        self.talk.say(f"results in {run.folder}")
+        run.report(self.report, self.talk.as_json, self.talk.quiet)
 
 
 def _talk(as_json: bool, quiet: bool, verbose: bool) -> Talk:

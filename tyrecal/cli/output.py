@@ -112,6 +112,15 @@ class Run:
             },
         )
 
+    def report(self, wanted: bool, as_json: bool, quiet: bool) -> None:
+        """Where it is wanted, write report.html of all that the folder holds. Raises BadResults."""
+        if wanted:
+            from ..report.html.page import write_page
+
+            path = self.folder / "report.html"
+            write_page(path, [self.folder])
+            say(f"report in {path}", as_json, quiet)
+
     def _check_owner(self) -> None:
         record = self.folder / "run.json"
         if not record.exists():

@@ -86,7 +86,7 @@ def command(
             talk.say(f"{found['design']}: {sentence}")
     if failed:
         talk.error(f"{len(failed)} of {len(outcomes)} evaluations failed; the others are kept")
-    talk.say(f"results in {run.folder}")
+    study.finish(run)
     return EXIT_SOLVER if failed else 0
 
 
