@@ -24,10 +24,11 @@ COMMANDS = {  # name: one line of help, so that the overview imports no command
     "effects": "List and explain what a plain model leaves out, and what it does.",
     "diagnose": "Say where model and measurements part, and which effect explains it.",
     "blind": "Try the diagnosis on data whose effect is withheld: make, answer, score.",
+    "batch": "Study many cases at once, compare with a baseline, report to CI.",
     "solvers": "List the installed solvers and what they can do.",
     "store": "Look at a record of evaluations, check it, prune it.",
 }
-EXIT_INPUT, EXIT_SOLVER, EXIT_FIT, EXIT_INTERRUPTED = 2, 3, 4, 130
+EXIT_INPUT, EXIT_SOLVER, EXIT_FIT, EXIT_BATCH, EXIT_INTERRUPTED = 2, 3, 4, 5, 130
 
 
 class Commands(click.Group):
@@ -58,7 +59,7 @@ def cli() -> None:
     tyrecal fit cases/p235_75r17.yaml
 
     Exit codes: 0 done; 2 the input is wrong; 3 the solver failed; 4 the fit did not converge or
-    did not move; 130 interrupted.
+    did not move; 5 some cases of a batch failed or drifted; 130 interrupted.
     """
 
 
@@ -96,6 +97,8 @@ def _exit_code(error: Exception) -> int | None:
         ("tyrecal.evaluate.solver", "UnknownSolver", EXIT_INPUT),
         ("tyrecal.deck.environment", "TemplateFailed", EXIT_INPUT),
         ("tyrecal.fit.calibrate", "NothingToFit", EXIT_INPUT),
+        ("tyrecal.evaluate.queue", "BadSettings", EXIT_INPUT),
+        ("tyrecal.batch.drift", "BadBaseline", EXIT_INPUT),
         ("tyrecal.diagnose.measurements", "BadMeasurements", EXIT_INPUT),
         ("tyrecal.diagnose.study", "BadChange", EXIT_INPUT),
         ("tyrecal.blind.protocol", "BadTrials", EXIT_INPUT),

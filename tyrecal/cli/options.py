@@ -83,6 +83,22 @@ sweep_load = click.option(
 )
 
 
+_from = click.option("--from-kPa", "from_kPa", type=float, default=100.0, metavar="A",
+                     show_default=True, help="Lowest pressure of a sweep.")  # fmt: skip
+_to = click.option("--to-kPa", "to_kPa", type=float, default=320.0, metavar="B", show_default=True,
+                   help="Highest pressure of a sweep.")  # fmt: skip
+_steps = click.option("--steps", type=click.IntRange(2, 10000), default=12, metavar="N",
+                      show_default=True, help="Pressures of a sweep, both ends among them."
+                      )  # fmt: skip
+scheduler = click.option(
+    "--scheduler",
+    default="",
+    metavar="ADDRESS|FILE",
+    help="Have the workers of a Dask scheduler do it: its address, or a settings file (.yaml) for"
+    " jobs of SLURM or PBS. Needs the extra tyrecal[cluster].",
+)
+
+
 def every(*options: Callable[[Any], Any]) -> Callable[[Any], Any]:
     """Apply several options in the order given."""
 
@@ -94,6 +110,7 @@ def every(*options: Callable[[Any], Any]) -> Callable[[Any], Any]:
     return apply
 
 
+pressures = every(_from, _to, _steps)
 STUDY = (jobs, mesh, solver, output, store, no_store, as_json, quiet, verbose)
 
 
@@ -108,13 +125,13 @@ def load(path: Path, mesh_level: str, assigned: tuple[str, ...], pressure_kPa: f
 
     Returns (case, values of the variables). Raises CaseError, click.UsageError.
     """
-    from ..case import load_case, parse_assignment, start_values, with_values
+    from ..case import load_case, parse_assignment, start_values, with_level, with_values
     from ..case.load import CaseError
 
     case = load_case(path)
-    if mesh_level:
-        case = _with_level(case, mesh_level)
     try:
+        if mesh_level:
+            case = with_level(case, mesh_level)
         names = set(case.case.variables)
         given = _once([parse_assignment(text) for text in assigned], pressure_kPa)
         for name, variable in case.case.variables.items():
@@ -151,6 +168,18 @@ def parse_loads(text: str, option: str = "--loads-N", zero: bool = False) -> lis
     return loads
 
 
+def parse_pressures(low: float, high: float, steps: int) -> tuple[float, ...]:
+    """Equidistant pressures in kPa, both ends among them. Raises click.UsageError."""
+    from math import isfinite
+
+    for option, value in (("--from-kPa", low), ("--to-kPa", high)):
+        if not (isfinite(value) and value > 0):
+            raise click.UsageError(f"{option} {value:g}: must be a finite pressure above 0")
+    if low >= high:
+        raise click.UsageError(f"--from-kPa {low:g} must be less than --to-kPa {high:g}")
+    return tuple(round(low + (high - low) * i / (steps - 1), 9) for i in range(steps))
+
+
 def fitted_values(path: Path, loaded: Any, solver: str) -> dict[str, float]:
     """The design of a fit.json. Raises click.UsageError where it is not this case's."""
     from ..studies.fitted import NotThisFit, read_fitted
@@ -170,15 +199,3 @@ def _once(pairs: list[tuple[str, float]], pressure_kPa: float | None) -> dict[st
         twice = next(name for name in given if sum(n == name for n, _ in pairs) > 1)
         raise click.UsageError(f"{twice} is set twice")
     return given
-
-
-def _with_level(case: Any, level: str) -> Any:
-    from dataclasses import replace
-
-    mesh = case.case.mesh
-    if level not in mesh.levels:
-        raise click.UsageError(
-            f"mesh level '{level}' is not one of the case's: {', '.join(mesh.levels)}"
-        )
-    chosen = case.case.model_copy(update={"mesh": mesh.model_copy(update={"level": level})})
-    return replace(case, case=chosen)
