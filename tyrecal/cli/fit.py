@@ -39,6 +39,7 @@ from .main import EXIT_FIT
     help="Seed of the drawn starts.",
 )
 @click.option("--pictures/--no-pictures", default=True, help="Draw convergence, section, modes.")
+@options.scheduler
 @options.every(*options.STUDY)
 def command(
     case: Path,
@@ -49,6 +50,7 @@ def command(
     starts: int,
     seed: int,
     pictures: bool,
+    scheduler: str,
     jobs: int,
     mesh: str,
     solver: str,
@@ -69,8 +71,10 @@ def command(
     tyrecal fit cases/p235_75r17.yaml
     tyrecal fit cases/p235_75r17.yaml --fix C10 --method least-squares
     tyrecal fit cases/p235_75r17.yaml --starts 20 --seed 1 --jobs 2
+    tyrecal fit cases/p235_75r17.yaml --starts 20 --seed 1 --scheduler tcp://10.0.0.1:8786
     """
     from ..evaluate.door import Door
+    from ..evaluate.queue import reached
     from ..fit.calibrate import calibrate, history_csv
     from ..fit.problem import objective_unit
     from ..report.table import fit_csv, fit_table
@@ -89,7 +93,9 @@ def command(
     door.folder, door.keep = run.runs, verbose
     door.store = run.open_store(store, no_store)
     unit = objective_unit(loaded)
-    with _Progress(quiet, verbose, unit) as progress:
+    if scheduler and jobs > 1:
+        raise click.UsageError("--jobs is for this machine; with --scheduler its workers count")
+    with _Progress(quiet, verbose, unit) as progress, reached(scheduler) as door.scheduler:
         fit = calibrate(
             loaded,
             door,

@@ -39,7 +39,7 @@ class Cluster:
         at_worker = partial(_at_worker, function, sources())
         futures = self.client.map(at_worker, list(tasks), pure=False, key="tyrecal")
         places = {future.key: place for place, future in enumerate(futures)}
-        waiting = as_completed(futures)
+        waiting = as_completed(futures, loop=self.client.loop)
         del futures  # so that an answer is forgotten once it has been handed on
         try:
             for future in waiting:
@@ -53,7 +53,8 @@ class Cluster:
                     ) from None
                 yield places[future.key], answer
         finally:
-            self.client.cancel([*waiting.futures], force=True)
+            if waiting.futures:
+                self.client.cancel([*waiting.futures], force=True)
 
 
 def _at_worker(function: Callable[[Any], Any], expected: str, task: Any) -> Any:

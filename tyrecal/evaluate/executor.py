@@ -52,17 +52,11 @@ class Processes:
     ) -> Generator[tuple[int, Any], None, None]:
         """As in `Executor`."""
         waiting = list(enumerate(tasks))[::-1]
-        try:
-            while waiting:
-                lost = yield from _until_one_dies(function, waiting, self.jobs)
-                for suspect in lost:  # which of them killed its process? each again, alone
-                    if (yield from _until_one_dies(function, [suspect], 1)):
-                        yield suspect[0], WorkerLost("its process died, twice")
-        except BaseException as error:
-            if not isinstance(error, Exception):  # Ctrl-C, or nobody wants the rest
-                for process in multiprocessing.active_children():
-                    process.terminate()
-            raise
+        while waiting:
+            lost = yield from _until_one_dies(function, waiting, self.jobs)
+            for suspect in lost:  # which of them killed its process? each again, alone
+                if (yield from _until_one_dies(function, [suspect], 1)):
+                    yield suspect[0], WorkerLost("its process died, twice")
 
 
 def _until_one_dies(
@@ -71,7 +65,7 @@ def _until_one_dies(
     """Does tasks off the end of ``waiting``, yields answers; returns what a death left undone."""
     under_way: dict[Future[Any], Task] = {}
     lost: list[Task] = []
-    with process_pool(jobs) as pool:
+    with process_pool(jobs) as pool, _ended_at_once():
         while under_way or (waiting and not lost):
             while waiting and not lost and len(under_way) < jobs:
                 task = waiting.pop()
@@ -88,6 +82,17 @@ def _until_one_dies(
                     lost.append(task)
             yield from answers
     return lost
+
+
+@contextmanager
+def _ended_at_once() -> Iterator[None]:
+    """Ends the processes at Ctrl-C, or where nobody wants the rest; a failed task's finish."""
+    try:
+        yield
+    except (KeyboardInterrupt, GeneratorExit):
+        for process in multiprocessing.active_children():
+            process.terminate()
+        raise
 
 
 @contextmanager
