@@ -110,6 +110,7 @@ def command(
     started = run.started
     with Progress(len(tasks), quiet, verbose) as progress, reached(scheduler) as address:
         reports = run_batch(tasks, jobs, address, progress.notify)
+    _sweep(tasks)
     reports.sort(key=lambda report: str(report["name"]))
     drift = compare(reports, before) if before and not write_baseline else None
     result = summary(wanted, reports, drift)
@@ -147,13 +148,24 @@ def _studies(text: str) -> tuple[str, ...]:
 
 
 def _prepare(tasks: Sequence[Any]) -> None:
-    """Refuse folders of other cases; drop what killed processes left. Raises OutputRefused."""
-    from ..evaluate.folders import drop_unfinished
+    """Make the cases' folders ready. Raises OutputRefused where one is another case's."""
     from .output import refuse_other
 
     for task in tasks:
         refuse_other(task.folder, task.path)
+    _sweep(tasks)
+
+
+def _sweep(tasks: Sequence[Any]) -> None:
+    """Drop the run folders of processes that died."""
+    from contextlib import suppress
+
+    from ..evaluate.folders import drop_unfinished
+
+    for task in tasks:
         drop_unfinished(task.folder / "runs")
+        with suppress(OSError):  # it holds failures, or was never made
+            (task.folder / "runs").rmdir()
 
 
 def _tell(result: Mapping[str, Any], as_json: bool, quiet: bool) -> None:
