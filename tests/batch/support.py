@@ -30,7 +30,7 @@ def vary(folder: Path, count: int, coarse: bool = True) -> list[Path]:
         text = text.replace(old, new)
     paths = [folder / f"tyre_{i:02d}.yaml" for i in range(count)]
     for i, path in enumerate(paths):
-        path.write_text(text.replace("pressure_kPa: 240.0", f"pressure_kPa: {200 + i}.0"))
+        path.write_text(text.replace("pressure_kPa: 240.0", f"pressure_kPa: {240 + i / 5}"))
     return paths
 
 

@@ -103,5 +103,6 @@ def reached(scheduler: str) -> Iterator[str]:
         return
     settings = read_settings(Path(scheduler))
     with jobs_of(settings) as cluster:
-        cluster.scale(n=settings.workers)
+        jobs = -(-settings.workers // settings.cores)
+        cluster.adapt(minimum_jobs=jobs, maximum_jobs=jobs)  # one that ends is submitted anew
         yield cluster.scheduler_address
