@@ -17,6 +17,8 @@ GUIDES = [
     "cases/README.md",
     "cases/diagnosis.md",
     "cases/blind.md",
+    "cases/batch.md",
+    "cases/cluster.md",
     "solvers/README.md",
 ]
 OWN_SETUP = "python3 -m venv"  # the two commands that set themselves up; CI runs the second

@@ -152,6 +152,25 @@ def test_starts_of_a_fit_are_those_of_one_process(machines: Machines, tmp_path: 
     assert facts["solver_runs"] == len(list((tmp_path / "b").glob("record/*/*.record")))
 
 
+def slow(task: float) -> float:
+    time.sleep(task)
+    return task
+
+
+def test_a_scheduler_that_goes_away_ends_the_command(tmp_path: Path) -> None:
+    own = Machines(tmp_path)
+    try:
+        own.add_worker()
+        with (
+            executor(scheduler=own.address) as workers,
+            pytest.raises(ClusterFailed, match="went away"),
+        ):
+            for _ in workers.each(slow, [0.01, 60.0, 60.0]):
+                own.scheduler.kill()
+    finally:
+        own.stop()
+
+
 def test_order_and_exceptions(machines: Machines) -> None:
     with executor(scheduler=machines.address) as workers:
         assert list(in_order(workers.each(square, [5.0, 0.0, 7.0]))) == [25, 0, 49]

@@ -1,10 +1,10 @@
 """What a batch costs a Dask scheduler: bytes moved and stored per case, tasks per second, memory.
 
-    python tests/benchmarks/cluster.py [--cases 20] [--tasks 10000]
+    python tests/benchmarks/cluster.py [--cases 6] [--tasks 10000]
 
 Starts a scheduler and two workers; all that client and workers say to the scheduler goes through a
-counter of bytes. First a batch of real cases (coarse mesh, fit), then as many tasks that do nothing
-but return a report of the size of a real one.
+counter of bytes. First nothing for a while, then a batch of real cases (fits on the default mesh),
+then tasks that do nothing but return a report of the size of a real one.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 from tests.batch.support import vary
 from tyrecal.evaluate.executor import executor
 
+IDLE_S = 20
 MOVED: Counter[str] = Counter()  # bytes by direction
 
 
@@ -103,12 +104,22 @@ def main(cases: int, tasks: int, folder: Path) -> None:
     try:
         with executor(scheduler=address) as ready:
             list(ready.each(answer, [(i, "") for i in range(4)]))
+        before = MOVED.copy()
+        time.sleep(IDLE_S)
+        print(f"idle: {moved(before, IDLE_S * len(workers))} per worker and second")
         before, clock = MOVED.copy(), time.perf_counter()
         out = folder / "out"
-        command = [sys.executable, "-m", "tyrecal", "batch", *map(str, vary(folder / "c", cases))]
+        command = [
+            sys.executable,
+            "-m",
+            "tyrecal",
+            "batch",
+            *map(str, vary(folder / "c", cases, coarse=False)),
+        ]
         subprocess.run([*command, "--quiet", "--scheduler", address, "--output", out], check=True)
         print(f"{cases} fits in {time.perf_counter() - clock:.1f} s; network: "
               f"{moved(before, cases)} per case")  # fmt: skip
+        print(f"memory of a worker: {max(memory_MB(each.pid) for each in workers):.0f} MB")
         records, results = list(out.glob("record/*/*")), list(out.glob("tyre_*/*"))
         print(f"file system per case: {len(records) / cases:.1f} records of "
               f"{size(records) / len(records) / 1e3:.0f} kB, {len(results) / cases:.0f} results of "
@@ -132,7 +143,7 @@ def main(cases: int, tasks: int, folder: Path) -> None:
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--cases", type=int, default=20)
+    parser.add_argument("--cases", type=int, default=6)
     parser.add_argument("--tasks", type=int, default=10000)
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as place:
