@@ -22,6 +22,8 @@ GUIDES = [
     "cases/own_template.md",
     "cases/python.md",
     "cases/theory.md",
+    "cases/batch.md",
+    "cases/cluster.md",
     "solvers/README.md",
 ]
 OWN_SETUP = "python3 -m venv"  # the two commands that set themselves up; CI runs the second

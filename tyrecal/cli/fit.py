@@ -41,6 +41,7 @@ from .talk import Progress, Talk
     help="Seed of the drawn starts.",
 )
 @click.option("--pictures/--no-pictures", default=True, help="Draw convergence, section, modes.")
+@options.scheduler
 @options.study
 def command(
     case: Path,
@@ -51,6 +52,7 @@ def command(
     starts: int,
     seed: int,
     pictures: bool,
+    scheduler: str,
     study: options.Study,
 ) -> int:
     """Calibrate the variables of CASE to its targets: frequencies, and contact areas and vertical
@@ -64,7 +66,9 @@ def command(
     tyrecal fit cases/p235_75r17.yaml --fix C10 --method least-squares
     tyrecal fit cases/p235_75r17.yaml --report
     tyrecal fit cases/p235_75r17.yaml --starts 20 --seed 1 --jobs 2
+    tyrecal fit cases/p235_75r17.yaml --starts 20 --seed 1 --scheduler tcp://10.0.0.1:8786
     """
+    from ..evaluate.queue import reached
     from ..fit.calibrate import calibrate, history_csv
     from ..fit.problem import objective_unit
     from ..report.table import fit_csv, fit_table
@@ -81,7 +85,9 @@ def command(
         door.needs_road()
     run = study.run(case, "fit", door)
     unit = objective_unit(loaded)
-    with talk.progress("fit") as bar:
+    if scheduler and study.jobs > 1:
+        raise click.UsageError("--jobs is for this machine; with --scheduler its workers count")
+    with talk.progress("fit") as bar, reached(scheduler) as door.scheduler:
         points = _Points(talk, bar, unit)
         fit = calibrate(
             loaded,

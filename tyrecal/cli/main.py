@@ -27,17 +27,19 @@ COMMANDS = {  # name: one line of help, so that the overview imports no command
     "diagnose": "Say where model and measurements part, and which effect explains it.",
     "blind": "Try the diagnosis on data whose effect is withheld: make, answer, score.",
     "report": "Tell the results of one or several folders on one HTML page.",
+    "batch": "Study many cases at once, compare with a baseline, report to CI.",
     "solvers": "List the installed solvers and what they can do.",
     "store": "Look at a record of evaluations, check it, prune it.",
     "doctor": "Check the installation: packages, solvers, machine, a known tyre.",
     "completion": "Print what makes a shell complete commands, cases and names.",
 }
-EXIT_INPUT, EXIT_SOLVER, EXIT_FIT, EXIT_INTERRUPTED = 2, 3, 4, 130
+EXIT_INPUT, EXIT_SOLVER, EXIT_FIT, EXIT_BATCH, EXIT_INTERRUPTED = 2, 3, 4, 5, 130
 EXIT_CODES = {
     0: "done",
     EXIT_INPUT: "the input is wrong",
     EXIT_SOLVER: "the solver failed",
     EXIT_FIT: "the fit did not converge or did not move",
+    EXIT_BATCH: "some cases of a batch failed or drifted",
     EXIT_INTERRUPTED: "interrupted",
 }
 
@@ -126,6 +128,8 @@ def _exit_code(failure: Exception) -> int | None:
         ("tyrecal.evaluate.solver", "UnknownSolver", EXIT_INPUT),
         ("tyrecal.deck.environment", "TemplateFailed", EXIT_INPUT),
         ("tyrecal.fit.calibrate", "NothingToFit", EXIT_INPUT),
+        ("tyrecal.evaluate.queue", "BadSettings", EXIT_INPUT),
+        ("tyrecal.batch.drift", "BadBaseline", EXIT_INPUT),
         ("tyrecal.diagnose.measurements", "BadMeasurements", EXIT_INPUT),
         ("tyrecal.diagnose.study", "BadChange", EXIT_INPUT),
         ("tyrecal.blind.protocol", "BadTrials", EXIT_INPUT),

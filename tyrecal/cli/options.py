@@ -117,6 +117,22 @@ sweep_load = click.option(
 )
 
 
+_from = click.option("--from-kPa", "from_kPa", type=float, default=100.0, metavar="A",
+                     show_default=True, help="Lowest pressure of a sweep.")  # fmt: skip
+_to = click.option("--to-kPa", "to_kPa", type=float, default=320.0, metavar="B", show_default=True,
+                   help="Highest pressure of a sweep.")  # fmt: skip
+_steps = click.option("--steps", type=click.IntRange(2, 10000), default=12, metavar="N",
+                      show_default=True, help="Pressures of a sweep, both ends among them."
+                      )  # fmt: skip
+scheduler = click.option(
+    "--scheduler",
+    default="",
+    metavar="ADDRESS|FILE",
+    help="Have the workers of a Dask scheduler do it: its address, or a settings file (.yaml) for"
+    " jobs of SLURM or PBS. Needs the extra tyrecal[cluster].",
+)
+
+
 def every(*options: Callable[[Any], Any]) -> Callable[[Any], Any]:
     """Apply several options in the order given."""
 
@@ -128,6 +144,7 @@ def every(*options: Callable[[Any], Any]) -> Callable[[Any], Any]:
     return apply
 
 
+pressures = every(_from, _to, _steps)
 report = click.option(
     "--report",
     is_flag=True,
@@ -295,6 +312,18 @@ def parse_loads(text: str, option: str = "--loads-N", zero: bool = False) -> lis
         if after <= before:
             raise click.UsageError(f"{option}: {after:g} after {before:g}, loads must rise")
     return loads
+
+
+def parse_pressures(low: float, high: float, steps: int) -> tuple[float, ...]:
+    """Equidistant pressures in kPa, both ends among them. Raises click.UsageError."""
+    from math import isfinite
+
+    for option, value in (("--from-kPa", low), ("--to-kPa", high)):
+        if not (isfinite(value) and value > 0):
+            raise click.UsageError(f"{option} {value:g}: must be a finite pressure above 0")
+    if low >= high:
+        raise click.UsageError(f"--from-kPa {low:g} must be less than --to-kPa {high:g}")
+    return tuple(round(low + (high - low) * i / (steps - 1), 9) for i in range(steps))
 
 
 def fitted_values(path: Path, loaded: Any, solver: str) -> dict[str, float]:

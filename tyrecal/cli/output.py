@@ -39,16 +39,16 @@ class Run:
     def __init__(self, case: Path, output: Path | None, command: str, solver: Any = None):
         self.case, self.command, self.solver = case.resolve(), command, solver
         self.folder = output or Path(case.stem)
-        self._started = datetime.now(UTC).isoformat(timespec="seconds")
+        self.started = datetime.now(UTC).isoformat(timespec="seconds")
         self._clock = time.monotonic()
         self.store: Store | None = None
         self.counts: Counts | None = None
         if self.folder.exists() and not self.folder.is_dir():
             raise OutputRefused(f"'{self.folder}' is a file; give a folder with --output")
         self.folder.mkdir(parents=True, exist_ok=True)
-        self._lock = lock.lock(self.folder, command, self._started)
+        self._lock = lock.lock(self.folder, command, self.started)
         click.get_current_context().call_on_close(self._close)
-        self._check_owner()
+        refuse_other(self.folder, self.case)
         if self._lock and solver:
             from ..evaluate.folders import drop_unfinished
 
@@ -100,7 +100,7 @@ class Run:
                 "case": str(self.case),
                 "command": self.command,
                 "arguments": sys.argv[1:],
-                "started": self._started,
+                "started": self.started,
                 "seconds": round(time.monotonic() - self._clock, 3),
                 "host": platform.node(),
                 "python": platform.python_version(),
@@ -121,20 +121,6 @@ class Run:
             write_page(path, [self.folder])
             say(f"report in {path}", as_json, quiet)
 
-    def _check_owner(self) -> None:
-        record = self.folder / "run.json"
-        if not record.exists():
-            return
-        try:
-            owner = json.loads(record.read_text(encoding="utf-8")).get("case")
-        except ValueError:
-            owner = None
-        if owner != str(self.case):
-            raise OutputRefused(
-                f"folder '{self.folder}' holds results of {owner or 'something else'};"
-                " give another one with --output"
-            )
-
     def _close(self) -> None:
         with contextlib.suppress(OSError):  # it holds failures, or was never made
             self.runs.rmdir()
@@ -142,3 +128,19 @@ class Run:
             self.store.prune()
         if self._lock:
             self._lock.close()
+
+
+def refuse_other(folder: Path, case: Path) -> None:
+    """Raises OutputRefused where ``folder`` holds results of another case than ``case``."""
+    record = folder / "run.json"
+    if not record.exists():
+        return
+    try:
+        owner = json.loads(record.read_text(encoding="utf-8")).get("case")
+    except ValueError:
+        owner = None
+    if owner != str(case):
+        raise OutputRefused(
+            f"folder '{folder}' holds results of {owner or 'something else'};"
+            " give another one with --output"
+        )

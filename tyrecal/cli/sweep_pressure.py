@@ -13,12 +13,7 @@ from .main import EXIT_SOLVER
 
 @click.command()
 @options.every(options.case_argument, options.assignments)
-@click.option("--from-kPa", "from_kPa", type=float, default=100.0, metavar="A", show_default=True,
-              help="Lowest pressure.")  # fmt: skip
-@click.option("--to-kPa", "to_kPa", type=float, default=320.0, metavar="B", show_default=True,
-              help="Highest pressure.")  # fmt: skip
-@click.option("--steps", type=click.IntRange(2, 10000), default=12, metavar="N",
-              show_default=True, help="Pressures, both ends among them.")  # fmt: skip
+@options.pressures
 @options.fitted("Sweep the design that 'tyrecal fit' found for this case, too.")
 @click.option("--pictures/--no-pictures", default=True, help="Draw frequencies over pressure.")
 @options.study
@@ -94,10 +89,6 @@ def _pressures(
     loaded: Any, assignments: tuple[str, ...], low: float, high: float, steps: int
 ) -> list[float]:
     """The pressures of the sweep, kPa. Raises click.UsageError."""
-    from math import isfinite
-
-    import numpy as np
-
     from ..case import parse_assignment, with_values
     from ..studies.fitted import pressure_name
 
@@ -106,13 +97,10 @@ def _pressures(
         raise click.UsageError(
             f"--set {name}: the sweep sets the pressure, by --from-kPa, --to-kPa"
         )
+    pressures = options.parse_pressures(low, high, steps)
     for option, value in (("--from-kPa", low), ("--to-kPa", high)):
-        if not (isfinite(value) and value > 0):
-            raise click.UsageError(f"{option} {value:g}: must be a finite pressure above 0")
         try:
             with_values(loaded, {name: value})
         except ValueError as error:
             raise click.UsageError(f"{option} {value:g}: {error}") from None
-    if low >= high:
-        raise click.UsageError(f"--from-kPa {low:g} must be less than --to-kPa {high:g}")
-    return [round(float(p), 9) for p in np.linspace(low, high, steps)]
+    return list(pressures)

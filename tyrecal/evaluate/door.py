@@ -13,8 +13,8 @@ from ..deck.beside import needs
 from ..deck.write import Decks
 from ..effects import catalogue, with_effects
 from . import folders
+from .executor import WorkerLost, executor, in_order
 from .failure import DeckRefused, EvaluationFailed
-from .pool import process_pool
 from .pressed import Pressed, pressed
 from .results import Evaluation, evaluation
 from .solver import Solver, find_solver
@@ -64,7 +64,8 @@ class Door:
 
     keep: leave the folders of successful runs too (those of failures are always kept); store: the
     record that is asked before the solver, and told what it said; heard: called with how many of
-    how many designs asked at once are answered.
+    how many designs asked at once are answered; scheduler: address of the Dask scheduler whose
+    workers evaluate where there are several questions, else processes do.
     """
 
     case: LoadedCase
@@ -72,6 +73,7 @@ class Door:
     folder: Path | None = None
     keep: bool = False
     store: Store | None = None
+    scheduler: str = ""
     counts: Counts = field(default_factory=Counts)
     heard: Callable[[int, int], None] = field(default=_unheard, repr=False)
     _solver: Solver | None = field(default=None, repr=False)
@@ -215,22 +217,27 @@ class Door:
 
     def _each(self, ask: str, asked: Sequence[tuple[Any, ...]], jobs: int) -> Iterator[Any]:
         self.heard(0, len(asked))
-        if jobs <= 1:
+        if len(asked) <= 1 or (jobs <= 1 and not self.scheduler):
             for done, arguments in enumerate(asked, start=1):
                 answer = _answer(self, ask, arguments)
                 self.heard(done, len(asked))
                 yield answer
             return
-        with process_pool(jobs) as pool:
-            tasks = partial(_answer_and_count, self.worker(), ask)
-            for done, (answer, counts) in enumerate(pool.map(tasks, asked), start=1):
-                self.counts.add(counts)
+        with executor(jobs, self.scheduler) as workers:
+            answers = workers.each(partial(_answer_and_count, self.worker(), ask), asked)
+            for done, answer in enumerate(in_order(answers), start=1):
                 self.heard(done, len(asked))
-                yield answer
+                if isinstance(answer, WorkerLost):
+                    yield EvaluationFailed("crashed", str(answer))
+                    continue
+                found, counts = answer
+                self.counts.add(counts)
+                yield found
 
     def worker(self) -> Door:
-        """The same door for another process, with counts of its own."""
-        return Door(self.case, self.solver_name, self.folder, self.keep, self.store)
+        """The same door for another process, wherever it is, with counts of its own."""
+        folder = self.folder.absolute() if self.folder else None
+        return Door(self.case, self.solver_name, folder, self.keep, self.store)
 
     def _recall(self, key: str) -> dict[str, Any] | None:
         content = self.store.read(key) if self.store else None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,8 +12,8 @@ import numpy as np
 
 from ..case import LoadedCase
 from ..evaluate.door import Counts, Door
+from ..evaluate.executor import WorkerLost, executor, in_order
 from ..evaluate.failure import EvaluationFailed
-from ..evaluate.pool import process_pool
 from . import least_squares, slsqp
 from .problem import Point, Problem, objective_unit
 from .uncertainty import uncertainty
@@ -133,48 +133,40 @@ def _more_starts(
     reports: list[StartReport] = []
     replaced = 0
     finished(1, count + 1)
-    with _workers(jobs) as run_all:
-        while len(reports) < count:
-            drawn = [
-                generator.uniform(problem.lower, problem.upper) for _ in range(count - len(reports))
-            ]
-            for answer in run_all(problem, drawn, method):
-                if isinstance(answer, EvaluationFailed):
-                    replaced += 1
-                else:
-                    reports.append(answer)
-                    finished(len(reports) + 1, count + 1)
-            if replaced > MOST_REPLACED * count:
-                raise EvaluationFailed(
-                    "no_equilibrium",
-                    f"{replaced} drawn starts could not be"
-                    " evaluated: the bounds hold too few tyres",
-                )
+    while len(reports) < count:
+        drawn = [
+            generator.uniform(problem.lower, problem.upper) for _ in range(count - len(reports))
+        ]
+        for answer in _run_all(problem, drawn, jobs, method):
+            if isinstance(answer, EvaluationFailed):
+                replaced += 1
+            else:
+                reports.append(answer)
+                finished(len(reports) + 1, count + 1)
+        if replaced > MOST_REPLACED * count:
+            raise EvaluationFailed(
+                "no_equilibrium",
+                f"{replaced} drawn starts could not be evaluated: the bounds hold too few tyres",
+            )
     return reports, replaced
 
 
-class _workers:
-    """Runs starts one after the other, or in a process pool; answers come in order."""
-
-    def __init__(self, jobs: int):
-        self.pool = process_pool(jobs) if jobs > 1 else None
-
-    def __enter__(self) -> Callable[[Problem, list[Array], str], Any]:
-        return self._run_all
-
-    def __exit__(self, kind: type[BaseException] | None, *error: object) -> None:
-        if self.pool:
-            self.pool.__exit__(kind, *error)
-
-    def _run_all(self, problem: Problem, starts: list[Array], method: str) -> Any:
-        if self.pool is None:
-            yield from (_start_here(problem, x, method) for x in starts)
-            return
-        door = problem.door.worker()
-        tasks = [(Problem(problem.case, door, problem.fixed), x, method) for x in starts]
-        for answer, counts in self.pool.map(_start_alone, tasks):
+def _run_all(
+    problem: Problem, starts: list[Array], jobs: int, method: str
+) -> Iterator[StartReport | EvaluationFailed]:
+    """Answers in the order of the starts; ``jobs`` at a time, or by the door's scheduler."""
+    if jobs <= 1 and not problem.door.scheduler:
+        yield from (_start_here(problem, x, method) for x in starts)
+        return
+    door = problem.door.worker()
+    tasks = [(Problem(problem.case, door, problem.fixed), x, method) for x in starts]
+    with executor(jobs, problem.door.scheduler) as workers:
+        for answer in in_order(workers.each(_start_alone, tasks)):
+            if isinstance(answer, WorkerLost):
+                raise EvaluationFailed("crashed", str(answer))
+            report, counts = answer
             problem.door.counts.add(counts)
-            yield answer
+            yield report
 
 
 def _start_here(problem: Problem, start: Array, method: str) -> StartReport | EvaluationFailed:
