@@ -15,6 +15,7 @@ ROOT = Path(__file__).parents[1]
 GUIDES = [
     "README.md",
     "cases/README.md",
+    "cases/own_tyre.md",
     "cases/diagnosis.md",
     "cases/blind.md",
     "cases/own_effect.md",

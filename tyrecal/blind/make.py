@@ -260,7 +260,7 @@ def _copy(case: LoadedCase, folder: Path) -> None:
     target = folder / "case"
     target.mkdir(exist_ok=True)
     shutil.copyfile(case.path, target / case.path.name)
-    stations = case.case.section.stations
+    stations = case.case.section.file
     (target / stations).parent.mkdir(parents=True, exist_ok=True)
     shutil.copyfile(case.folder / stations, target / stations)
     if templates := case.case.templates:

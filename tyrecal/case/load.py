@@ -65,7 +65,8 @@ def _read(path: Path) -> tuple[LoadedCase | None, list[Mistake]]:
     _add(document, problems(data, section))
     meshable = not any(m.key.startswith(("mesh", "section")) for m in document.mistakes)
     if section and meshable and (message := folds(data, section)):
-        document.add(("section", "stations"), message)
+        form = "outline" if data["section"].get("outline") else "stations"
+        document.add(("section", form), message)
     if case is None or section is None or document.mistakes:
         return None, sorted(document.mistakes, key=lambda m: (m.file != str(path), m.line))
     loaded = LoadedCase(case, path, section, path.parent, raw, case.pressure_kPa)

@@ -23,11 +23,44 @@ class Gauge(Part):
     factor: Annotated[float, Field(ge=0.1, le=10)]
 
 
-class SectionSource(Part):
-    """``stations``: the station table (CSV), relative to the case file; ``gauges`` scale it."""
+class Outline(Part):
+    """The outer and the inner curve (CSV), and what they do not show.
 
-    stations: Text
+    ``belt_width_m``: of the wider belt, along the carcass; the rim holds what lies within
+    ``rim_radius_m``. Depths: inner surface to carcass, to the first belt, to the second.
+    """
+
+    file: Text
+    belt_width_m: Positive
+    rim_radius_m: Positive
+    carcass_depth_m: Positive = 1.2e-3
+    belt_depth_m: Positive = 1.2e-3
+    belt_spacing_m: Positive = 1.2e-3
+    belt_step_m: Positive = 0.010
+
+
+class SectionSource(Part):
+    """``stations``: the station table, or ``outline``: two curves; CSV, relative to the case file.
+
+    ``gauges`` scale it.
+    """
+
+    stations: Text | None = None
+    outline: Outline | None = None
     gauges: list[Gauge] | None = None
+
+    @property
+    def file(self) -> str:
+        """The CSV that the section is in."""
+        return self.outline.file if self.outline else self.stations or ""
+
+    @classmethod
+    def problems(cls, values: Mapping[str, Any]) -> Iterator[Problem]:
+        stations, outline = values.get("stations"), values.get("outline")
+        if stations is None and outline is None:
+            yield "stations", "must be given, or outline"
+        elif stations is not None and outline is not None:
+            yield "outline", "must be absent with stations"
 
 
 class Level(Part):

@@ -7,8 +7,12 @@ from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from pydantic import ValidationError
+
 from .document import MOST_BYTES, Document
-from .mistakes import Mistake, shortened
+from .mistakes import Keys, Mistake, dotted, shortened
+from .parts import WRONG
+from .schema import SectionSource
 
 if TYPE_CHECKING:
     from ..tyre.section import Section
@@ -41,30 +45,30 @@ def check_templates(document: Document, data: dict[str, Any], folder: Path) -> N
 
 def read_stations(document: Document, data: dict[str, Any], folder: Path) -> Section | None:
     """The section that the case names; None, with the mistakes recorded, where it is wrong."""
-    from ..tyre.section import SectionError, fill_lines, read_section
+    from ..tyre.section import SectionError
 
     source = data.get("section")
-    name = source.get("stations") if isinstance(source, dict) else None
+    source = source if isinstance(source, dict) else {}
+    outline = source.get("outline")
+    keys: Keys = ("section", "outline", "file") if outline else ("section", "stations")
+    name = outline.get("file") if isinstance(outline, dict) else source.get("stations")
     if not isinstance(name, str):
         return None
-    keys = ("section", "stations")
     try:
         path = inside(folder, name)
         if not path.is_file():
             raise ValueError("must be a file, there is none of this name")
-        if path.stat().st_size > MOST_BYTES:
-            raise ValueError(f"the station table is larger than {MOST_BYTES} bytes")
-        _check_table(path)
-        section = read_section(path)
-        fill_lines(section)
-        _check_section(section)
+        if outline is WRONG or (outline and WRONG in outline.values()):
+            return None  # reported by the schema already
+        given = {"outline": outline} if outline else {"stations": name}
+        section = read_section_of(SectionSource.model_validate(given), folder)
+    except ValidationError:  # this too
+        return None
     except SectionError as error:
         message = shortened(str(error), 300)
         if error.line:
             value = document.places.get(keys, (1, name))[1]
-            document.mistakes.append(
-                Mistake(str(path), error.line, "section.stations", value, message)
-            )
+            document.mistakes.append(Mistake(str(path), error.line, dotted(keys), value, message))
         else:
             document.add(keys, message)
     except UnicodeDecodeError:
@@ -78,9 +82,36 @@ def read_stations(document: Document, data: dict[str, Any], folder: Path) -> Sec
     return None
 
 
+def read_section_of(source: SectionSource, folder: Path) -> Section:
+    """The section that part of a case describes. Raises SectionError, ValueError, OSError."""
+    from ..tyre.outline import read_outline, section_of_outline
+    from ..tyre.section import fill_lines, read_section
+
+    path = inside(folder, source.file)
+    if path.stat().st_size > MOST_BYTES:
+        raise ValueError(f"the table of the section is larger than {MOST_BYTES} bytes")
+    given = source.outline
+    if not given:
+        _check_table(path)
+        section = read_section(path)
+        fill_lines(section)
+    else:
+        section = section_of_outline(
+            read_outline(path),
+            given.belt_width_m,
+            given.rim_radius_m,
+            given.carcass_depth_m,
+            given.belt_depth_m,
+            given.belt_spacing_m,
+            given.belt_step_m,
+        )
+    _check_section(section)
+    return section
+
+
 def _check_table(path: Path) -> None:
     """The table is a table: a comma for a decimal point would shift its columns unseen."""
-    from ..tyre.section import SectionError
+    from ..tyre.section import GAUGE, SectionError, gauged_lines
 
     with path.open(newline="", encoding="utf-8-sig") as file:
         rows = csv.reader(file)
@@ -89,6 +120,7 @@ def _check_table(path: Path) -> None:
             raise SectionError("the station table is empty", 1)
         names = [column[: -len("_r_mm")] for column in header if column[-5:] in ("_r_mm", "_z_mm")]
         known = ["region", "rigid", *(f"{name}_{axis}_mm" for name in names for axis in "rz")]
+        known += [f"{name}{GAUGE}" for name in gauged_lines(header)]
         for column in known:
             if column not in header:
                 raise SectionError(f"column '{shortened(column)}' is missing", 1)

@@ -17,6 +17,7 @@ from .meshable import folds
 from .mistakes import Keys, dotted, suggestion
 from .schema import Case
 from .shape import explain
+from .stations import read_section_of
 
 # numbers that stand alone: no other part of the case, and no mesh, depends on their values
 ALONE = {
@@ -77,12 +78,16 @@ def with_values(loaded: LoadedCase, values: Mapping[str, float]) -> LoadedCase:
     case = _set(loaded.case, tree, ())
     raw = _set_raw(loaded.raw, case, tree)
     touched = set(tree) - ALONE
+    section = loaded.section
+    redrawn = "outline" in tree.get("section", {})
+    if redrawn:
+        section = read_section_of(case.section, loaded.folder)
     if touched:
-        for wrong, reason in problems(raw, loaded.section):
+        for wrong, reason in problems(raw, section):
             raise ValueError(f"{dotted(wrong)} {reason}")
-    if "mesh" in touched and (message := folds(raw, loaded.section)):
+    if ("mesh" in touched or redrawn) and (message := folds(raw, section)):
         raise ValueError(message)
-    changed = replace(loaded, case=case, raw=raw)
+    changed = replace(loaded, case=case, raw=raw, section=section)
     with_effects(changed)
     return changed
 

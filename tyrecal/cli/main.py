@@ -17,6 +17,7 @@ for _name in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
 
 COMMANDS = {  # name: one line of help, so that the overview imports no command
+    "init": "Write the case of any radial tyre, from its size code or with its own section.",
     "validate": "Check a case file and report every mistake.",
     "deck": "Write the decks of a case, to read or to run elsewhere.",
     "modes": "Evaluate one design, unloaded or on a road: frequencies with their labels.",
@@ -133,6 +134,8 @@ def _exit_code(failure: Exception) -> int | None:
         ("tyrecal.diagnose.measurements", "BadMeasurements", EXIT_INPUT),
         ("tyrecal.diagnose.study", "BadChange", EXIT_INPUT),
         ("tyrecal.blind.protocol", "BadTrials", EXIT_INPUT),
+        ("tyrecal.tyre.size", "UnknownSize", EXIT_INPUT),
+        ("tyrecal.case.draft", "BadSection", EXIT_INPUT),
         ("tyrecal.cli.output", "OutputRefused", EXIT_INPUT),
         ("tyrecal.cli.lock", "Locked", EXIT_INPUT),
         ("tyrecal.report.html.results", "BadResults", EXIT_INPUT),

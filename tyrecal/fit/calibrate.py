@@ -80,7 +80,10 @@ def calibrate(
     """
     problem = Problem(case, door, fixed, notify, jobs)
     if not len(problem.scale):
-        raise NothingToFit("the case has no targets: there is nothing to fit to")
+        raise NothingToFit(
+            "the case has no targets: there is nothing to fit to; add measured modes to it, as in"
+            " targets: {modes: [{c: 2, m: 0, frequency_Hz: 79.5}, ...]}"
+        )
     if not problem.variables:
         raise NothingToFit("no variable is free: there is nothing to fit")
     if len(problem.scale) < len(problem.variables):

@@ -1,8 +1,13 @@
-"""The tyre's half section as a station table: lines through the thickness, station by station."""
+"""The tyre's half section as a station table: lines through the thickness, station by station.
+
+Every line is given by its points, or one of them is and the others by gauges: their distances
+from it along its normal. Lines given before it lie inside it, those after it outside.
+"""
 
 from __future__ import annotations
 
 import csv
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,6 +15,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 Array = np.ndarray
+GAUGE = "_gauge_mm"
 
 
 class SectionError(ValueError):
@@ -38,24 +44,39 @@ class Section:
 def read_section(path: Path) -> Section:
     """Read a station table: station, region, <line>_r_mm, <line>_z_mm ..., rigid (0 or 1).
 
-    Columns of lines stand from the inner surface to the outer. Raises SectionError, OSError.
+    Columns of lines stand from the inner surface to the outer; <line>_gauge_mm, its distance from
+    the one line that has points, takes the place of a line's two. Raises SectionError, OSError.
     """
     with path.open(newline="", encoding="utf-8-sig") as file:
         reader = csv.DictReader(file)
         header = reader.fieldnames or []
-        names = tuple(h[: -len("_r_mm")] for h in header if h.endswith("_r_mm"))
-        for needed in ["region", "rigid", *(f"{n}_z_mm" for n in names)]:
+        gauged = gauged_lines(header)
+        names = tuple(h.rsplit("_", 2)[0] for h in header if h.endswith(("_r_mm", GAUGE)))
+        drawn = [n for n in names if n not in gauged]
+        for needed in ["region", "rigid", *(f"{n}_z_mm" for n in drawn)]:
             if needed not in header:
                 raise SectionError(f"column '{needed}' is missing", 1)
+        if gauged and len(drawn) != 1:
+            raise SectionError(
+                "gauges are distances from one line, of which _r_mm and _z_mm must be given,"
+                f" got {', '.join(drawn) or 'none'}",
+                1,
+            )
         if len(names) < 2:
             raise SectionError(
                 f"at least an inner and an outer line are needed, got {', '.join(names) or 'none'}",
                 1,
             )
+        columns = [
+            (f"{n}{GAUGE}",) * 2 if n in gauged else (f"{n}_r_mm", f"{n}_z_mm") for n in names
+        ]
         points, labels, rigid = [], [], []
         for row in reader:
+            columns = [
+                (f"{n}{GAUGE}",) * 2 if n in gauged else (f"{n}_r_mm", f"{n}_z_mm") for n in names
+            ]
             points.append(
-                [[_mm(row, f"{n}_{axis}_mm", reader.line_num) for axis in "rz"] for n in names]
+                [[millimetres(row, c, reader.line_num) for c in pair] for pair in columns]
             )
             labels.append(row["region"])
             if row["rigid"] not in ("0", "1"):
@@ -64,6 +85,11 @@ def read_section(path: Path) -> Section:
     if len(points) < 3:
         raise SectionError(f"{len(points)} stations are too few, at least 3 are needed")
     table = np.array(points).swapaxes(0, 1) * 1e-3
+    if gauged:
+        line = names.index(drawn[0])
+        gauges = np.where(np.arange(len(names)) < line, -1.0, 1.0)[:, None] * table[..., 0]
+        gauges[line] = 0.0
+        table = from_gauges(table[line], gauges)
     for end in (0, -1):
         missing = np.flatnonzero(np.isnan(table[end]).any(1))
         if len(missing):
@@ -72,6 +98,12 @@ def read_section(path: Path) -> Section:
             )
     if abs(table[0, 0, 1]) > 1e-9:
         raise SectionError("the first station must lie on the centre plane, z = 0", 2)
+    regions = regions_of(labels, rigid)
+    return Section(names, table, regions, np.array(rigid))
+
+
+def regions_of(labels: list[str], rigid: list[bool]) -> tuple[tuple[str, int], ...]:
+    """Names and intervals of the regions that the stations belong to."""
     starts = [0] + [i for i in range(1, len(labels)) if labels[i] != labels[i - 1]]
     # regions share a station: the first one's last, or the first that the rim holds
     ends = [*(s if rigid[s] != rigid[s - 1] else s - 1 for s in starts[1:]), len(labels) - 1]
@@ -82,10 +114,33 @@ def read_section(path: Path) -> Section:
     regions = tuple((labels[s], c) for s, c in zip(starts, counts, strict=True))
     if len({name for name, _ in regions}) < len(regions):
         raise SectionError("the stations of a region must follow one another")
-    return Section(names, table, regions, np.array(rigid))
+    return regions
 
 
-def _mm(row: dict[str, str], column: str, line: int) -> float:
+def gauged_lines(header: Sequence[str]) -> list[str]:
+    """Lines that a station table's columns give by gauges."""
+    return [column[: -len(GAUGE)] for column in header if column.endswith(GAUGE)]
+
+
+def from_gauges(line: Array, gauges: Array) -> Array:
+    """Lines (line, station, 2) at distances ``gauges`` (line, station) outwards along the normal
+    of ``line`` (station, 2), which starts at the crown's centre, where it runs along the axle.
+
+    Raises SectionError where two stations are one point or the line has gaps.
+    """
+    step = np.hypot(*np.diff(line, axis=0).T)
+    if not (step > 0).all():  # NaN too
+        raise SectionError("the line with points must be given at every station, no point twice")
+    along = np.concatenate([[0.0], np.cumsum(step)])
+    spline = CubicSpline(along, line, bc_type=((1, np.array([0.0, 1.0])), (2, np.zeros(2))))
+    tangent = spline(along, 1)
+    normal = np.stack([tangent[:, 1], -tangent[:, 0]], -1) / np.hypot(*tangent.T)[:, None]
+    points: Array = line + gauges[..., None] * normal
+    return points
+
+
+def millimetres(row: dict[str, str], column: str, line: int) -> float:
+    """The number in a column, NaN where it is empty. Raises SectionError."""
     text = (row[column] or "").strip()
     if not text:
         return float("nan")
@@ -113,7 +168,8 @@ def fill_lines(section: Section) -> Array:
         for j in np.flatnonzero(~present[k]):
             near = have[np.argmin(abs(have - j))]
             below = k - 1  # already made whole
-            above = next(m for m in range(k + 1, len(section.names)) if present[m, j])
+            both = present[:, j] & present[:, near]
+            above = next(m for m in range(k + 1, len(section.names)) if both[m])
             start, end = points[below, near], points[above, near]
             span = end - start
             fraction = (points[k, near] - start) @ span / (span @ span)

@@ -1,0 +1,147 @@
+"""Sections from two curves, and station tables by gauges: what they must agree with."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tyrecal.tyre.from_size import build, usual
+from tyrecal.tyre.mesh import build_mesh
+from tyrecal.tyre.outline import read_outline, section_of_outline
+from tyrecal.tyre.section import SectionError, from_gauges, read_section
+from tyrecal.tyre.size import parse_size
+
+Array = np.ndarray
+SIZE = parse_size("205/60R15")
+GAUGES = usual(SIZE)
+REST = {"belt_width": GAUGES.belt, "carcass_depth": GAUGES.liner, "belt_depth": GAUGES.ply,
+        "belt_spacing": GAUGES.belts, "belt_step": GAUGES.step}  # fmt: skip
+
+
+def write_outline(path: Path, curves: dict[str, Array]) -> Path:
+    rows = [
+        f"{name},{1e3 * r:.4f},{1e3 * z:.4f}" for name, curve in curves.items() for r, z in curve
+    ]
+    path.write_text("\n".join(["curve,r_mm,z_mm", *rows]) + "\n")
+    return path
+
+
+def curves() -> dict[str, Array]:
+    points = build(SIZE, GAUGES).section().points
+    return {"outer": points[-1], "inner": points[0]}
+
+
+def test_the_outline_of_a_section_gives_the_section_again(tmp_path: Path) -> None:
+    section = build(SIZE, GAUGES).section()
+    read = read_outline(write_outline(tmp_path / "o.csv", curves()))
+    rim = float(section.points[1, section.rigid][0, 0])
+    again = section_of_outline(read, rim_radius=rim, **REST)
+    assert again.regions == section.regions
+    # the carcass' depth is the liner's all over, but at the bead; above, both are one section
+    wall = int(np.argmax(section.points[1, :, 1])) + 1
+    one, other = again.points[:, :wall], section.points[:, :wall]
+    assert np.array_equal(np.isnan(one), np.isnan(other))
+    apart = np.hypot(*np.moveaxis(one - other, 2, 0))
+    assert np.nanmax(apart) < 0.4e-3  # stations stand on normals of the inner surface
+    meshes = [build_mesh(s, [8, 1, 6, 8, 2], [1, 1, 1, 2], True) for s in (again, section)]
+    areas = [_area(mesh) for mesh in meshes]
+    assert areas[0] == pytest.approx(areas[1], rel=5e-3)
+
+
+def _area(mesh: object) -> float:
+    corners = np.array([[mesh.nodes[n] for n in s[:4]] for s in mesh.solids.values()])  # type: ignore[attr-defined]
+    r, z = np.moveaxis(corners, 2, 0)
+    return float(abs((r * np.roll(z, -1, 1) - z * np.roll(r, -1, 1)).sum()) / 2)
+
+
+def test_curves_may_run_from_the_bead_upwards(tmp_path: Path) -> None:
+    up = {name: curve[::-1] for name, curve in curves().items()}
+    one = read_outline(write_outline(tmp_path / "up.csv", up))
+    other = read_outline(write_outline(tmp_path / "down.csv", curves()))
+    for name in one:
+        assert np.array_equal(one[name], other[name])
+
+
+def test_a_ring_of_constant_thickness(tmp_path: Path) -> None:
+    """A half torus: gauges are radial, so every line is an arc whose radius is known."""
+    t = np.linspace(0, 0.8 * np.pi, 80)
+    arcs = {
+        name: np.stack([0.25 + a * np.cos(t), a * np.sin(t)], -1)
+        for name, a in (("outer", 0.06), ("inner", 0.05))
+    }
+    section = section_of_outline(
+        read_outline(write_outline(tmp_path / "o.csv", arcs)),
+        belt_width=0.08, rim_radius=0.22, carcass_depth=2e-3, belt_depth=1e-3, belt_spacing=1e-3,
+        belt_step=0.01,
+    )  # fmt: skip
+    for line, radius in zip(section.points, (0.05, 0.052, 0.053, 0.054, 0.06), strict=True):
+        found = np.hypot(*(line - [0.25, 0.0]).T)
+        assert found[~np.isnan(found)] == pytest.approx(radius, abs=3e-5)
+    ends = [np.flatnonzero(~np.isnan(section.points[k, :, 0]))[-1] for k in (2, 3)]
+    angles = [np.arctan2(*(section.points[1, e] - [0.25, 0.0])[::-1]) for e in ends]
+    assert 0.052 * np.array(angles) == pytest.approx([0.04, 0.035], abs=1e-4)
+    assert section.points[1, section.rigid][0, 0] == pytest.approx(0.22, abs=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda rows: [r.replace("outer", "tread") for r in rows], "outer or inner"),
+        (lambda rows: rows[:20], "the inner curve has 0 points"),
+        (lambda rows: [rows[0], *rows[6:]], "outer curve must begin at the crown"),
+        (lambda rows: [*rows[:3], rows[2], *rows[3:]], "a point twice"),
+        (lambda rows: [*rows[:3], "outer,300", *rows[4:]], "r_mm must"),
+        (lambda rows: [*rows[:3], "outer,300,wide", *rows[4:]], "must be a number"),
+        (lambda rows: ["curve,r,z", *rows[1:]], "column 'r_mm' is missing"),
+    ],
+)
+def test_wrong_outlines(change: object, words: str, tmp_path: Path) -> None:
+    path = write_outline(tmp_path / "o.csv", curves())
+    path.write_text("\n".join(change(path.read_text().splitlines())) + "\n")  # type: ignore[operator]
+    with pytest.raises(SectionError, match=words):
+        read_outline(path)
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "words"),
+    [
+        ("belt_width", 0.5, "the belt must be between"),
+        ("rim_radius", 0.15, "the rim holds"),
+        ("rim_radius", 0.30, "the rim holds"),
+        ("belt_depth", 0.02, "thinner than their depth"),
+    ],
+)
+def test_numbers_that_no_outline_can_have(
+    key: str, value: float, words: str, tmp_path: Path
+) -> None:
+    read = read_outline(write_outline(tmp_path / "o.csv", curves()))
+    with pytest.raises(SectionError, match=words):
+        section_of_outline(read, **{"rim_radius": 0.2074, **REST, key: value})
+
+
+def test_gauges_are_distances_along_the_normal() -> None:
+    t = np.linspace(0, 2.0, 30)
+    line = np.stack([0.25 + 0.05 * np.cos(t), 0.05 * np.sin(t)], -1)
+    gauges = np.array([-1e-3, 0.0, 8e-3])[:, None] * np.ones(len(t))
+    for points, radius in zip(from_gauges(line, gauges), (0.049, 0.05, 0.058), strict=True):
+        found = np.hypot(*(points - [0.25, 0.0]).T)
+        assert found[:-3] == pytest.approx(radius, abs=2e-6)  # the spline's end is straight
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("ply_r_mm", "ply_gauge_mm", "column|gauges are distances"),
+        ("outer_gauge_mm", "outer_r_mm", "column 'outer_z_mm' is missing"),
+        ("3,crown,1.20000", "3,crown,", "'inner' must be given"),
+        ("3,crown,1.20000", "3,crown,thick", "must be a number in mm"),
+    ],
+)
+def test_wrong_gauge_tables(old: str, new: str, words: str, tmp_path: Path) -> None:
+    text = build(SIZE, GAUGES).csv()
+    assert old in text
+    (tmp_path / "s.csv").write_text(text.replace(old, new, 1))
+    with pytest.raises(SectionError, match=words):
+        read_section(tmp_path / "s.csv")

@@ -1,0 +1,123 @@
+"""tyrecal init"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from . import options
+
+if TYPE_CHECKING:
+    from ..case.draft import Draft
+
+POSITIVE = click.FloatRange(min=0, min_open=True)
+
+
+def _length(flag: str, text: str, unit: str = "mm") -> Any:
+    return click.option(f"--{flag}-{unit}", f"{flag}_{unit}".replace("-", "_"), type=POSITIVE,
+                        metavar=unit.upper(), help=text)  # fmt: skip
+
+
+@click.command()
+@click.argument("size", required=False)
+@click.option("--section", "file", type=click.Path(path_type=Path, exists=True, dir_okay=False),
+              metavar="FILE", help="CSV of your own section: stations, or an outer and an inner"
+              " curve.")  # fmt: skip
+@_length("crown", "Thickness at the crown, grooves spread over the tread.")
+@_length("sidewall", "Thickness at the widest point.")
+@_length("bead", "Thickness at the rim's flange.")
+@_length("belt-width", "Width of the wider belt, along the carcass.")
+@_length("rim-width", "Width of the rim between its flanges.", "in")
+@options.pressure
+@click.option("--output", type=click.Path(path_type=Path), metavar="CASE.yaml",
+              help="Case file to write (default: named by the size, in this folder).")  # fmt: skip
+@click.option("--force", is_flag=True, help="Write over files that exist.")
+@click.option("--pictures/--no-pictures", default=True, help="Draw the section.")
+@options.quiet
+def command(
+    size: str | None,
+    file: Path | None,
+    crown_mm: float | None,
+    sidewall_mm: float | None,
+    bead_mm: float | None,
+    belt_width_mm: float | None,
+    rim_width_in: float | None,
+    pressure_kPa: float | None,
+    output: Path | None,
+    force: bool,
+    pictures: bool,
+    quiet: bool,
+) -> int:
+    """Write the case of a tyre: from its SIZE code, or with a section of its own.
+
+    Writes CASE.yaml with comments, its section as CSV and a picture of it. What the size code
+    leaves open has usual values by type of tyre; the section is an estimate to start from.
+
+    \b
+    tyrecal init 205/60R15
+    tyrecal init "LT315/70R17 121/118S" --crown-mm 20 --rim-width-in 9
+    tyrecal init P235/75R17 --section my_stations.csv --output my_tyre.yaml
+    tyrecal init 205/60R15 --section my_outline.csv --belt-width-mm 160 --output my_outline.yaml
+    """
+    from ..case.draft import from_file, from_size
+    from ..tyre.size import INCH, parse_size
+
+    if size is None and file is None:
+        raise click.UsageError("give a SIZE, as in 'tyrecal init 205/60R15', or --section FILE")
+    tyre = parse_size(size) if size is not None else None
+    given = {"crown": crown_mm, "sidewall": sidewall_mm, "bead": bead_mm, "belt": belt_width_mm}
+    lengths = {key: 1e-3 * value for key, value in given.items() if value is not None}
+    if rim_width_in is not None:
+        lengths["rim"] = rim_width_in * INCH
+    name = re.sub(r"\W", "_", tyre.text.lower()) if tyre else file.stem if file else ""
+    target = output or Path(f"{name}.yaml")
+    if target.suffix not in (".yaml", ".yml"):
+        raise click.UsageError(f"--output '{target}' must name a case file, as in my_tyre.yaml")
+    if file is not None:
+        if set(lengths) - {"belt"}:
+            raise click.UsageError("with --section the file holds the tyre's shape and thicknesses")
+        draft = from_file(file, tyre, lengths.get("belt"), pressure_kPa)
+    else:
+        assert tyre is not None
+        draft = from_size(tyre, lengths, pressure_kPa, target.stem)
+    _write(draft, file, target, target.with_suffix(".png") if pictures else None, force, quiet)
+    return 0
+
+
+def _write(
+    draft: Draft, file: Path | None, target: Path, picture: Path | None, force: bool, quiet: bool
+) -> None:
+    """Write case, section and picture, none over an existing file and only what is right."""
+    from ..case import load_case
+    from ..files import whole
+    from .output import OutputRefused, say
+
+    table = target.with_name(draft.file)
+    own = file is not None and file.resolve() == table.resolve()  # it is there already
+    contents = {target: draft.text.encode(), **({} if own else {table: draft.content})}
+    for path in [*contents, *([picture] if picture else [])]:
+        if path.exists() and not force:
+            raise OutputRefused(f"'{path}' exists already; give --force to write over it")
+    draft.check()
+    target.parent.mkdir(parents=True, exist_ok=True)
+    for path, content in contents.items():
+        with whole(path) as partial:
+            partial.write_bytes(content)
+    loaded = load_case(target)
+    outside = loaded.section.points[-1]
+    say(
+        f"{target}: {loaded.case.name}, outer diameter {2e3 * outside[0, 0]:.1f} mm, section width"
+        f" {2e3 * outside[:, 1].max():.1f} mm, {loaded.case.pressure_kPa:g} kPa",
+        False,
+        quiet,
+    )
+    if picture:
+        from ..deck.context import section_mesh
+        from ..report.section import draw_section
+
+        draw_section(picture, loaded, section_mesh(loaded))
+        say(f"section drawn in {picture}", False, quiet)
+    say(f"next: tyrecal modes {target}", False, quiet)
