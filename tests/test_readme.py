@@ -25,6 +25,7 @@ GUIDES = [
     "cases/theory.md",
     "cases/batch.md",
     "cases/cluster.md",
+    "cases/measured_data.md",
     "solvers/README.md",
 ]
 OWN_SETUP = "python3 -m venv"  # the two commands that set themselves up; CI runs the second

@@ -156,7 +156,7 @@ def _entry(outcome: Outcome, task: CaseTask) -> dict[str, Any]:
 def _question(task: CaseTask, loaded: LoadedCase, door: Door) -> str:
     """Hash of all that the results depend on: the case and its files, what is asked, the tool."""
     own = loaded.folder / loaded.case.templates if loaded.case.templates else None
-    files = [task.path, loaded.folder / loaded.case.section.stations]
+    files = [task.path, loaded.folder / loaded.case.section.file]
     files += sorted(path for path in own.rglob("*") if path.is_file()) if own else []
     solver = [door.solver.name, door.solver.version, sources_of(type(door.solver)), sources()]
     asked = [task.studies, asdict(task.asked), task.mesh, solver, [_digest(p) for p in files]]

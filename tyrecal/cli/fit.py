@@ -22,6 +22,12 @@ from .talk import Progress, Talk
     show_default=True,
     help="Optimiser.",
 )
+@click.option(
+    "--measured",
+    type=click.Path(path_type=Path, exists=True, dir_okay=False),
+    metavar="FILE",
+    help="Measurements (CSV) at the case's pressure in place of its targets.",
+)
 @click.option("--fix", multiple=True, metavar="NAME", shell_complete=complete.variables,
               help="Hold a variable at its start value.")  # fmt: skip
 @click.option(
@@ -48,6 +54,7 @@ def command(
     assignments: tuple[str, ...],
     pressure_kPa: float | None,
     method: str,
+    measured: Path | None,
     fix: tuple[str, ...],
     starts: int,
     seed: int,
@@ -65,6 +72,7 @@ def command(
     tyrecal fit cases/p235_75r17.yaml
     tyrecal fit cases/p235_75r17.yaml --fix C10 --method least-squares
     tyrecal fit cases/p235_75r17.yaml --report
+    tyrecal fit cases/p235_75r17.yaml --measured measured.csv --pressure-kPa 200
     tyrecal fit cases/p235_75r17.yaml --starts 20 --seed 1 --jobs 2
     tyrecal fit cases/p235_75r17.yaml --starts 20 --seed 1 --scheduler tcp://10.0.0.1:8786
     """
@@ -80,6 +88,11 @@ def command(
     if unknown:
         raise click.UsageError(f"--fix {unknown[0]}: no such variable, only {', '.join(values)}")
     loaded = _starting_at(loaded, values)
+    left_out: list[str] = []
+    if measured:
+        from ..fit.measured import with_measured
+
+        loaded, left_out = with_measured(loaded, measured)
     door = study.door(loaded)
     if loaded.case.targets.footprint:
         door.needs_road()
@@ -105,6 +118,9 @@ def command(
     run.write_text("fit_history.csv", history_csv(fit.history))
     talk.result(fit.result)
     talk.show(fit_table(fit.result))
+    for each in left_out:
+        if not talk.quiet:
+            click.echo(f"{measured}: not used: {each}", err=True)
     for warning in fit_doubts(fit.result):
         talk.warn(warning)
     if pictures or study.report:

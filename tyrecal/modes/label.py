@@ -51,7 +51,7 @@ def _columns(c_is_zero: bool) -> Array:
     return table
 
 
-_COLUMNS = (_columns(False), _columns(True))
+COLUMNS = (_columns(False), _columns(True))
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,7 @@ def belt_motion(shape: HarmonicShape | RingShape) -> BeltMotion:
         motion = shape.displacement**2
         part, whole = np.nanmean(motion[_belt(shape.points[:, 0])]), np.nanmean(motion)
     energy /= 2 * np.arange(DEGREE + 1) + 1
-    shares = np.einsum("ik,ikm->m", energy, _COLUMNS[c == 0]) / (energy.sum() or 1.0)
+    shares = np.einsum("ik,ikm->m", energy, COLUMNS[c == 0]) / (energy.sum() or 1.0)
     return BeltMotion(c, shares, float(part / (whole or 1.0)))
 
 

@@ -1,0 +1,246 @@
+"""tyrecal measured: the shipped files become measurements that fit and diagnosis read; what is
+wrong with a file is told in one sentence."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import pyuff
+
+from tyrecal.diagnose.measurements import read_measurements
+from tyrecal.diagnose.observations import observe
+from tyrecal.modes.mode import Label
+
+from ..measured.test_universal import ANGLES, function, geometry, shape, units, write
+from ..studies.measured_data import BAND, CASES, TRUTH, evaluated, write_shapes, write_table
+from .test_cli import run
+
+FOLDER = CASES / "measured"
+FUNCTIONS = sorted(FOLDER.glob("*_240kPa_*.uff"))
+SHAPES, TABLE = FOLDER / "p235_75r17_200kPa_shapes.uff", FOLDER / "p235_75r17_280kPa_table.csv"
+TEST = ["--directions", "cylindrical", "--highest-harmonic", "8"]
+
+
+def truth(pressure_kPa: float) -> dict[Label, float]:
+    modes = evaluated(pressure_kPa)
+    return {m.label: m.frequency_Hz for m in modes if BAND[0] < m.frequency_Hz < BAND[1]}
+
+
+@pytest.fixture(scope="module")
+def identified(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Measurements of the three repeats of functions at 240 kPa."""
+    path = tmp_path_factory.mktemp("measured") / "at_240.csv"
+    files = [str(file) for file in FUNCTIONS]
+    code = run("measured", "import", *files, "--pressure-kPa", "240", "--band", "28,132", *TEST,
+               "--output", str(path), "--quiet")  # fmt: skip
+    assert code == 0 and len(files) == 3
+    return path
+
+
+def test_functions_become_the_true_frequencies(identified: Path) -> None:
+    found, right = read_measurements(identified), truth(240.0)
+    assert {each.label for each in found} == set(right)
+    for each in found:
+        assert each.label is not None and abs(each.value - right[each.label]) < 2.5 * each.sigma
+        assert each.sigma < 0.002 * each.value
+    picture = identified.with_suffix(".png")
+    assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_fit_to_them_finds_the_true_design(
+    identified: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    code = run("fit", str(CASES / "p235_75r17.yaml"), "--measured", str(identified), "--output",
+               str(tmp_path / "fitted"), "--no-pictures", "--json")  # fmt: skip
+    fit = json.loads(capsys.readouterr().out)
+    assert code == 0 and fit["objective_unit"] == "sigma" and fit["objective_Hz"] < 4
+    assert {Label(m["c"], m["m"], m["kind"]) for m in fit["modes"]} == set(truth(240.0))
+    for name, value in TRUTH.items():
+        found = fit["variables"][name]
+        assert abs(found["value"] - value) < 2.5 * found["standard_error"]
+
+
+def test_several_kinds_of_files_join_and_the_diagnosis_reads_them(
+    identified: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shapes, table, joined = (tmp_path / name for name in ("s.csv", "t.csv", "j.csv"))
+    assert run("measured", "import", str(SHAPES), "--pressure-kPa", "200", *TEST,
+               "--sigma-percent", "0.2", "--output", str(shapes), "--no-pictures",
+               "--json") == 0  # fmt: skip
+    told = json.loads(capsys.readouterr().out)
+    assert all(mode["confidence"] > 0.9 and not mode["why"] for mode in told["modes"])
+    right = truth(200.0)
+    for mode in told["modes"]:
+        label = Label(mode["c"], mode["m"], mode["kind"])
+        assert mode["frequency_Hz"] == pytest.approx(right[label], rel=0.005)
+        assert mode["member"] in (("1", "2") if label.c else ("",))
+    assert run("measured", "import", str(TABLE), "--output", str(table)) == 0
+    assert run("measured", "import", str(shapes), str(identified), str(table), "--output",
+               str(joined)) == 0  # fmt: skip
+    readings = read_measurements(joined)
+    assert {each.pressure_kPa for each in readings} == {200.0, 240.0, 280.0}
+    observed = observe(readings)
+    assert len(observed.rows) == 10 + 9 + 9 and not observed.left_out
+    splits = observed.split[np.isfinite(observed.split)]
+    assert len(splits) == 8 and np.median(splits) == pytest.approx(0.004, abs=0.001)
+
+
+def test_fits_take_what_is_at_their_pressure(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from tyrecal.case import load_case
+    from tyrecal.fit.measured import with_measured
+
+    lines = ["frequency_Hz,2,1,,1,240,0,66.0,0.3", "frequency_Hz,2,1,,2,240,0,66.4,0.4",
+             "frequency_Hz,5,0,,,240.2,0,130,0.5", "frequency_Hz,2,1,,,200,0,60,0.3",
+             "frequency_Hz,2,1,,symmetric,240,4000,70,0.3", "mass_kg,,,,,,,12,0.1",
+             "vertical_stiffness_N_per_m,,,,,240,4000,2e5,4000"]  # fmt: skip
+    path = tmp_path / "m.csv"
+    head = "quantity,c,m,kind,member,pressure_kPa,load_N,value,sigma\n"
+    path.write_text(head + "\n".join(lines) + "\n")
+    loaded, left_out = with_measured(load_case(CASES / "p235_75r17.yaml"), path)
+    modes = {(t.c, t.m): (t.frequency_Hz, t.sigma_Hz) for t in loaded.case.targets.modes}
+    assert modes == {(2, 1): pytest.approx((66.2, 0.25)), (5, 0): pytest.approx((130, 0.5))}
+    (pressed,) = loaded.case.targets.footprint
+    assert (pressed.vertical_stiffness_N_per_m, pressed.sigma_N_per_m) == (2e5, 4000)
+    assert loaded.case.analysis.highest_harmonic == 5
+    assert left_out == ["1 values at 200 kPa", "1 frequencies under load", "the mass"]
+    code = run("fit", str(CASES / "p235_75r17.yaml"), "--measured", str(path),
+               "--pressure-kPa", "150", "--output", str(tmp_path / "f"))  # fmt: skip
+    assert code == 2
+    told = capsys.readouterr().err
+    assert "no target was measured at 150 kPa, only at 200, 240, 240.2 kPa" in told
+
+
+def test_sensors_are_judged_before_a_test(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run("measured", "sensors", str(SHAPES), *TEST, "--json") == 0
+    told = json.loads(capsys.readouterr().out)
+    assert len(told) == 5 + 4 * 8 and all(entry["told"] for entry in told)
+    even = {**geometry(), "x": 0.39 * np.cos(np.arange(8) * np.pi / 4),
+            "y": 0.39 * np.sin(np.arange(8) * np.pi / 4)}  # fmt: skip
+    path = write(tmp_path / "even.uff", even, shape(np.ones((8, 3), complex)))
+    assert run("measured", "sensors", str(path), *TEST) == 0
+    assert "cannot tell [3,0], it looks like" in capsys.readouterr().out
+    assert run("measured", "sensors", str(path), *TEST, "--json") == 0
+    alike = {(e["c"], e["m"]): e["looks_like"] for e in json.loads(capsys.readouterr().out)}
+    assert "[5,0]" in alike[3, 0] and "[3,0]" in alike[5, 0]
+
+
+def mode_in_plane(c: int = 2) -> np.ndarray:
+    """(8, 3), cylindrical, at the angles of test_universal."""
+    turn = c * ANGLES
+    return np.column_stack([np.cos(turn), -np.sin(turn) / c, 0 * turn]) + 0j
+
+
+def one_sensor() -> list[dict[str, Any]]:
+    lone = shape(mode_in_plane())
+    return [geometry(), {**lone, "node_nums": lone["node_nums"][:1],
+                         **{r: lone[r][:1] for r in ("r1", "r2", "r3")}}]  # fmt: skip
+
+
+F = np.arange(20.0, 80.0, 0.5)
+BAD: list[tuple[list[dict[str, Any]], list[str], str]] = [
+    (one_sensor(), [], "no mode could be told: aliasing: sensors at 1 angle,"),
+    ([geometry(scale=1e3), shape(mode_in_plane())], [], "largest radius about z is 390 m, no tyre"),
+    ([units(1e3), geometry(), shape(mode_in_plane())], [], "largest radius about z is 0.00039 m"),
+    ([shape(mode_in_plane())], [], "node 1 has no coordinates; give the file with data set 15 or"),
+    ([geometry(), {**shape(mode_in_plane()), "analysis_type": 2, "freq": -66.0}], [],
+     "data set 2 (type 55, line"),
+    ([geometry()], [], "there is neither a mode shape nor a frequency-response function"),
+    ([geometry(), shape(mode_in_plane())], ["--centre", "1,0"], "--centre 1,0: must be 3 numbers"),
+    ([geometry(), shape(mode_in_plane())], ["--band", "60,30"], "must rise from 0 or more"),
+    ([geometry(), function(np.ones(120) + 0j, F), function(np.ones(120) + 0j, F)], [],
+     "data set 3 (type 58, line"),
+    ([geometry(), function(np.ones(120) + 0j, F, ordinate_spec_data_type=0)], [],
+     "does not say whether displacement, velocity or acceleration was measured"),
+    ([geometry(), function(np.ones(120) + 0j, F), function(np.ones(120) + 0j, F + 1, 2)], [],
+     "its frequencies are not those of the first"),
+    ([geometry(), function(np.ones(120) + 0j, F), function(np.ones(120) + 0j, F, 2)],
+     ["--band", "30,70"], "no mode is stable between 30 and 70 Hz"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("sets", "given", "words"), BAD, ids=[words[:30] for *_, words in BAD])
+def test_bad_files_get_one_sentence_and_exit_code_2(
+    sets: list[dict[str, Any]],
+    given: list[str],
+    words: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    path, output = write(tmp_path / "bad.uff", *sets), tmp_path / "m.csv"
+    code = run("measured", "import", str(path), "--pressure-kPa", "240", "--sigma-percent", "0.3",
+               "--directions", "cylindrical", *given, "--output", str(output))  # fmt: skip
+    printed = capsys.readouterr().err.strip()
+    assert code == 2 and not output.exists()
+    last = printed.splitlines()[-1]
+    assert words in last and "Traceback" not in printed
+    assert given or (last.startswith(f"error: {path}") and len(printed.splitlines()) == 1)
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ([str(SHAPES)], "universal files hold no pressure; give --pressure-kPa"),
+        ([str(SHAPES), "--pressure-kPa", "240", *TEST], "may be off: give repeats, a column sigma"),
+        ([str(TABLE), "--output", str(TABLE)], "is one of the files to read"),
+        (["missing.uff"], "does not exist"),
+        ([str(CASES / "pictures/modes.png")], "neither text nor a universal file"),
+    ],
+)
+def test_what_is_lacking_is_asked_for(
+    given: list[str], words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = [] if "--output" in given else ["--output", str(tmp_path / "m.csv")]
+    assert run("measured", "import", *given, *out) == 2
+    printed = capsys.readouterr().err
+    assert words in printed and "Traceback" not in printed
+
+
+def test_without_the_package_for_functions_its_name_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setitem(sys.modules, "sdypy", None)
+    code = run("measured", "import", str(FUNCTIONS[0]), "--pressure-kPa", "240", *TEST,
+               "--output", str(tmp_path / "m.csv"))  # fmt: skip
+    assert code == 2
+    assert "need the package sdypy-EMA: pip install 'tyrecal[lab]'" in capsys.readouterr().err
+
+
+def test_help_and_tables_import_nothing_heavy() -> None:
+    for command, kept_out in (
+        (["measured", "import", "--help"], ("numpy", "pyuff", "sdypy", "matplotlib")),
+        (["measured", "import", str(TABLE), "--output", "-no-such/m.csv"], ("pyuff", "sdypy",
+                                                                            "matplotlib")),
+    ):  # fmt: skip
+        code = (
+            "import sys; sys.argv[0] = 'tyrecal'\nfrom tyrecal.cli.main import main\n"
+            f"try: main({command!r})\nexcept SystemExit: pass\n"
+            f"print([m for m in {kept_out!r} if m in sys.modules])"
+        )
+        done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+        assert done.stdout.splitlines()[-1] == "[]", done.stdout + done.stderr
+
+
+def test_the_shipped_files_are_the_scripts(tmp_path: Path) -> None:
+    write_shapes(tmp_path, np.random.default_rng((20, 1)))
+    write_table(tmp_path, np.random.default_rng((20, 2)))
+    assert (tmp_path / TABLE.name).read_bytes() == TABLE.read_bytes()
+    ours, shipped = (
+        pyuff.UFF(str(folder / SHAPES.name)).read_sets() for folder in (tmp_path, FOLDER)
+    )
+    assert len(ours) == len(shipped)
+    for one, other in zip(ours[3:], shipped[3:], strict=True):
+        assert one["eig"] == pytest.approx(other["eig"], rel=1e-4)
+        assert abs(np.vdot(one["r1"], other["r1"])) == pytest.approx(
+            np.linalg.norm(one["r1"]) * np.linalg.norm(other["r1"]), rel=1e-3
+        )
+    assert sum(file.stat().st_size for file in FOLDER.iterdir()) < 500_000

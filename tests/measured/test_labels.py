@@ -1,0 +1,155 @@
+"""Labels of measured shapes: right over random layouts, as sure as they say, refused where the
+sensors do not determine them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tyrecal.measured.labels import LIKELY, Labeller
+from tyrecal.measured.modal import Told, settled
+from tyrecal.measured.sensors import MeasuredMode, Sensors, real_part
+from tyrecal.modes.mode import Label
+
+from .tyres import HIGHEST, layout, measured, modes, noted
+
+
+def ring(count: int, across: tuple[float, ...] = (0.0,), directions: str = "rtz") -> Sensors:
+    """Evenly spaced sensors on rings of the tread."""
+    rows = [(0.39 - 0.8 * z * z, 2 * np.pi * a / count, z, "rtz".index(k))
+            for z in across for a in range(count) for k in directions]  # fmt: skip
+    return Sensors(np.array([row[:3] for row in rows]), np.eye(3)[[row[3] for row in rows]])
+
+
+def waves(sensors: Sensors, c: int, phase: float = 0.3) -> np.ndarray:
+    """A belt that moves in its plane with c waves: w = cos c Theta, v = -sin c Theta / c."""
+    turn = c * sensors.points[:, 1] + phase
+    u = np.column_stack([np.cos(turn), -np.sin(turn) / c, 0 * turn])
+    return np.sum(u * sensors.directions, axis=1)
+
+
+@pytest.mark.parametrize(("tread", "side", "noise"), [(9, 0, 0.05), (9, 5, 0.05), (12, 6, 0.2)])
+def test_random_layouts_give_the_true_labels(tread: int, side: int, noise: float) -> None:
+    told = wrong = count = 0
+    for seed in range(12):
+        rng = np.random.default_rng(seed)
+        sensors, nodes = layout(rng, tread, side)
+        labeller = Labeller(noted(sensors, rng), HIGHEST + 2)
+        for mode in modes():
+            shape, collinearity = real_part(measured(mode, sensors, nodes, rng, noise))
+            assert collinearity > 0.9
+            label = labeller.judge(shape).label
+            count += 1
+            told += label is not None
+            wrong += label is not None and label != mode.label
+    assert count == 12 * 14 and told > 0.97 * count and wrong <= 1
+
+
+def test_poor_layouts_are_as_sure_as_they_are_right() -> None:
+    sure, right = [], []
+    for seed in range(25):
+        rng = np.random.default_rng(100 + seed)
+        sensors, nodes = layout(rng, 4, 3, drop=0.35)
+        labeller = Labeller(noted(sensors, rng), HIGHEST + 2)
+        for mode in modes():
+            judged = labeller.judge(real_part(measured(mode, sensors, nodes, rng, 0.1))[0])
+            sure.append(judged.confidence)
+            right.append(next(iter(judged.probabilities)) == mode.label)
+    p, hit = np.array(sure), np.array(right)
+    assert 0.1 < np.mean(p >= LIKELY) < 0.9  # some are told, some are not
+    assert hit[p >= LIKELY].mean() > 0.95
+    middle = (p > 0.5) & (p < LIKELY)
+    assert abs(hit[middle].mean() - p[middle].mean()) < 0.15
+    assert hit[p < 0.5].mean() < 0.6
+
+
+@pytest.mark.parametrize("c", [1, 2, 3, 5, 6, 7])
+def test_even_spacing_aliases_and_says_so(c: int) -> None:
+    sensors = ring(8, across=(-0.06, 0.06))
+    judged = Labeller(sensors, 8).judge(waves(sensors, c))
+    assert judged.label is None
+    assert judged.why.startswith("aliasing: sensors at 8 angles")
+    assert f"{min(c, 8 - c)} and {max(c, 8 - c)} waves" in judged.why
+    assert judged.probabilities[Label(c, 0)] == pytest.approx(
+        judged.probabilities[Label(8 - c, 0)], abs=0.2
+    )
+
+
+@pytest.mark.parametrize("c", [1, 2, 3])
+def test_what_cannot_be_in_the_band_aliases_nothing(c: int) -> None:
+    sensors = ring(8, across=(-0.06, 0.06))
+    judged = Labeller(sensors, 3).judge(waves(sensors, c))
+    assert judged.label == Label(c, 0) and judged.confidence > 0.99
+
+
+def test_layouts_know_beforehand_what_they_cannot_tell() -> None:
+    told = Labeller(ring(8, across=(-0.06, 0.06)), 8).told_apart()
+    assert Label(5, 0) in told[Label(3, 0)] and Label(3, 0) in told[Label(5, 0)]
+    assert Label(2, 0) not in told[Label(3, 0)]
+    centre = Labeller(ring(17, directions="r"), 6).told_apart()
+    assert Label(2, 2) in centre[Label(2, 0)]  # r P0 and r P2 on the middle line
+    both = Labeller(ring(17, across=(-0.07, 0.0, 0.07)), 6).told_apart()
+    assert not both[Label(2, 0)] and not both[Label(2, 1)]
+
+
+def test_radial_sensors_on_the_middle_line_say_what_they_lack() -> None:
+    sensors = ring(17, directions="r")
+    judged = Labeller(sensors, 6).judge(waves(sensors, 2))
+    assert judged.label is None
+    assert "nothing tangential or axial was measured on the tread" in judged.why
+
+
+@pytest.mark.parametrize("mode", range(0, 14, 3))
+def test_one_sensor_tells_nothing(mode: int) -> None:
+    rng = np.random.default_rng(mode)
+    sensors, nodes = layout(rng, 1, 0, drop=0.0)
+    shape = real_part(measured(modes()[mode], sensors, nodes, rng, 0.01))[0]
+    assert Labeller(sensors).judge(shape).label is None
+
+
+@settings(max_examples=20, deadline=None)
+@given(
+    size=st.floats(1e-6, 1e6), phase=st.floats(0, 7), turn=st.floats(0, 7), seed=st.integers(0, 99)
+)
+def test_size_phase_place_of_the_origin_and_sign_of_a_sensor_do_not_matter(
+    size: float, phase: float, turn: float, seed: int
+) -> None:
+    rng = np.random.default_rng(seed)
+    sensors, nodes = layout(rng, 6, 3)
+    u = measured(modes()[seed % 14], sensors, nodes, rng, 0.05)
+    before = Labeller(sensors, 8).judge(real_part(u)[0])
+    sign = rng.choice([-1, 1], len(u))
+    turned = Sensors(sensors.points + turn * np.eye(3)[1], sensors.directions * sign[:, None])
+    after = Labeller(turned, 8).judge(real_part(size * np.exp(1j * phase) * sign * u)[0])
+    assert after.probabilities == pytest.approx(before.probabilities, abs=1e-6)
+
+
+def test_a_travelling_wave_has_no_collinearity_a_standing_one_has_all() -> None:
+    angle = 2 * np.pi * np.arange(12) / 12
+    assert real_part(np.exp(2j * angle))[1] == pytest.approx(0, abs=1e-12)
+    shape, collinearity = real_part(np.cos(2 * angle) * np.exp(0.7j))
+    assert collinearity == pytest.approx(1)
+    assert np.abs(shape) == pytest.approx(np.abs(np.cos(2 * angle)))
+
+
+def told(frequency: float, label: Label | None) -> Told:
+    sensors = ring(5)
+    judged = Labeller(sensors, 2).judge(waves(sensors, 1))
+    judged = type(judged)(label, judged.probabilities)
+    return Told(MeasuredMode(frequency, waves(sensors, 1)), sensors, waves(sensors, 1), 1.0,
+                judged, "")  # fmt: skip
+
+
+def test_doublets_have_two_members_and_overtones_no_label() -> None:
+    axial = Label(0, 0, "axial")
+    given = [told(66.4, Label(2, 1)), told(66.1, Label(2, 1)), told(120.0, Label(2, 1)),
+             told(30.0, axial), told(30.4, axial), told(80.0, Label(2, 0)),
+             told(85.0, None)]  # fmt: skip
+    found = [(t.mode.frequency_Hz, t.judged.label, t.member) for t in settled(given)]
+    assert found == [
+        (30.0, axial, ""), (30.4, None, ""), (66.1, Label(2, 1), "1"), (66.4, Label(2, 1), "2"),
+        (80.0, Label(2, 0), ""), (85.0, None, ""), (120.0, None, ""),
+    ]  # fmt: skip
+    assert "[2,1] stands at 66.10 Hz already" in settled(given)[-1].judged.why

@@ -1,0 +1,145 @@
+"""Modal tables in the spellings of laboratories and spreadsheets, and their mistakes."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from math import pi
+from pathlib import Path
+
+import pytest
+
+from tyrecal.measured.sensors import BadMeasuredData
+from tyrecal.measured.tables import read_table
+from tyrecal.measured.values import Value, combined, measurements_csv
+from tyrecal.modes.mode import Label
+
+AXIAL = Label(0, 0, "axial")
+PLAIN = "c,m,kind,pressure [kPa],frequency [Hz]\n0,0,axial,240,31.7\n2,1,,240,66.1\n"
+
+
+def read(tmp_path: Path, text: str | bytes, pressure: float | None = None) -> list[Value]:
+    path = tmp_path / "t.csv"
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    return read_table(path, pressure)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        PLAIN,
+        PLAIN.replace(",", ";"),
+        PLAIN.replace(",", "\t"),
+        "sep=;\r\n" + PLAIN.replace(",", ";").replace("\n", "\r\n"),
+        PLAIN.encode("utf-8-sig"),
+        PLAIN.replace(",", "\t").encode("utf-16"),
+        "n;m;Art;Fülldruck [bar];Eigenfrequenz (Hz)\n0;0;axial;2,4;31,7\n2;1;;2,4;66,1\n",
+        "n;m;Art;Fülldruck [bar];Eigenfrequenz (Hz)\n0;0;axial;2,4;31,7\n2;1;;2,4;66,1\n".encode(
+            "cp1252"
+        ),
+        "Mode,Inflation pressure (psi),f [rad/s],Damping [%],Remark\n"
+        f"[0;0] lateral,{240 / 6.894757293168!r},{31.7 * 2 * pi!r},2.5,soft\n"
+        f'"(2,1)",{240 / 6.894757293168!r},{66.1 * 2 * pi!r},2.5,\n',
+        "label;pressure_kPa;frequency_Hz\n[0,0] axial;240;31.7\n[2,1];240;66.1\n",
+        "\n\nc;m;kind;p [MPa];freq. [kHz]\n0;0;Axial;0,24;0,0317\n\n2;1;;0,24;0,0661\n;;;;\n",
+    ],
+)
+def test_one_table_in_many_spellings(tmp_path: Path, text: str | bytes) -> None:
+    found = read(tmp_path, text)
+    assert [(v.label, v.member) for v in found] == [(AXIAL, ""), (Label(2, 1), "")]
+    assert [v.value for v in found] == pytest.approx([31.7, 66.1])
+    assert [v.pressure_kPa for v in found] == pytest.approx([240, 240])
+
+
+def test_own_measurements_come_back(tmp_path: Path) -> None:
+    text = (Path(__file__).parents[2] / "cases/p235_75r17_wheeler.csv").read_text()
+    first = combined(read(tmp_path, text))
+    again = combined(read(tmp_path, measurements_csv(first)))
+    assert [(v.key, v.value, v.sigma) for v in again] == [(v.key, v.value, v.sigma) for v in first]
+    assert len(first) == 9 and {v.sigma for v in first} == {0.5}
+
+
+def test_other_quantities_and_loads(tmp_path: Path) -> None:
+    found = read(
+        tmp_path,
+        "load [kN];pressure [bar];contact area [cm²];vertical stiffness [N/mm];mass [lb]\n"
+        "4;2,4;180;210;\n;;;;30\n",
+    )
+    told = {v.quantity: (v.value, v.load_N) for v in found}
+    assert told["contact_area_m2"] == pytest.approx((0.018, 4000))
+    assert told["vertical_stiffness_N_per_m"] == pytest.approx((2.1e5, 4000))
+    assert told["mass_kg"] == pytest.approx((13.6078, 0), rel=1e-5)
+
+
+def test_loaded_modes_have_a_symmetry(tmp_path: Path) -> None:
+    head = "c,m,member,load [N],pressure [kPa],frequency [Hz]\n"
+    (found,) = read(tmp_path, f"{head}2,0,symmetric,4000,240,85\n")
+    assert (found.member, found.load_N) == ("symmetric", 4000)
+    with pytest.raises(BadMeasuredData, match="line 2: member is '1', must be symmetric or"):
+        read(tmp_path, f"{head}2,0,1,4000,240,85\n")
+
+
+def test_lines_that_repeat_are_runs(tmp_path: Path) -> None:
+    named = "run," + PLAIN.replace("\n0", "\n1,0").replace("\n2", "\n1,2")
+    for text in (
+        PLAIN + "0,0,axial,240,31.9\n2,1,,240,66.3\n",
+        named + "2,0,0,axial,240,31.9\n2,2,1,,240,66.3\n",
+    ):
+        found = read(tmp_path, text)
+        assert len({v.run for v in found}) == 2
+        rows = combined(found)
+        assert [(v.label, v.member) for v in rows] == [(AXIAL, ""), (Label(2, 1), "")]
+        assert [v.value for v in rows] == pytest.approx([31.8, 66.2])
+
+
+def test_two_of_a_label_with_waves_are_a_doublet(tmp_path: Path) -> None:
+    found = read(tmp_path, PLAIN + "2,1,,240,66.4\n")
+    assert [(v.label, v.member) for v in found] == [
+        (AXIAL, ""), (Label(2, 1), "1"), (Label(2, 1), "2"),
+    ]  # fmt: skip
+    with pytest.raises(BadMeasuredData, match="repeats, or the two of a doublet"):
+        read(tmp_path, "c,m,pressure [bar],f\n2,1,2.4,66.1\n2,1,2.4,66.3\n3,1,2.4,99\n")
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "the file is empty"),
+        (b"PK\x03\x04 a workbook", "save the sheet as CSV"),
+        ("a,b\n1,2\n", "line 1: no column holds a frequency"),
+        ("f [Hz],pressure [bar]\n66,2.4\n", "line 1: frequencies need the columns c and m"),
+        ("c,m,f\n2,1,66\n", "line 1: no column holds the pressure; give --pressure-kPa"),
+        ("c,m,f,pressure\n2,1,66,2.4\n", r"line 1: 'pressure' has no unit; write it as"),
+        ("c,m,f [V],pressure [bar]\n2,1,66,2.4\n", r"line 1: 'f \[V\]': the unit must be one"),
+        ("c,m,f,freq,pressure [bar]\n2,1,6,6,2.4\n", "line 1: two columns are the frequency_Hz"),
+        (PLAIN.split("\n")[0], "there is no measurement in it"),
+        (PLAIN + "2,0,,240\n", "line 4: 4 cells, the headings are 5"),
+        (PLAIN + "2,0,,240,\n", "line 4: nothing was measured"),
+        (PLAIN + "2,0,,240,79.5x\n", "line 4: frequency_Hz is '79.5x', must be a number"),
+        (PLAIN + "2,0,,240,-79.5\n", "line 4: frequency_Hz is -79.5, must be greater than 0"),
+        (PLAIN + "2,0,,240,nan\n", "line 4: frequency_Hz is 'nan', must be a number"),
+        (PLAIN + "2,0,,2.4,79.5\n", "line 4: the pressure is 2.4 kPa, must be 20 to 2000; which"),
+        (PLAIN + "2,0,,240,79500\n", "line 4: frequency_Hz is 79500: no tyre has that"),
+        (PLAIN + "2,4,,240,79.5\n", "line 4: m is '4', must be a whole number from 0 to 3"),
+        (PLAIN + "2.5,0,,240,79.5\n", "line 4: c is '2.5', must be a whole number from 0 to 20"),
+        (PLAIN + "0,0,,240,35\n", r"line 4: \[0,0\] needs a kind, axial or torsional"),
+        (PLAIN + "0,0,bouncing,240,35\n", "line 4: kind is 'bouncing', must be axial, torsional"),
+        ("label;pressure [bar];f\n2 waves;2,4;66\n", r"line 2: label is '2 waves', must be like"),
+        ("c,m,frequency,pressure [kPa]\n1,0,240,58.5\n2,0,240,79.5\n2,1,240,66.1\n3,0,240,97.6\n",
+         "line 2: the pressure differs from line to line, the frequency hardly; are the columns"),
+        ("m,c,f,pressure [kPa]\n2,0,79.5,240\n3,0,97.6,240\n3,1,102.7,240\n2,1,66.1,240\n",
+         "line 2: most modes have m above c; are the columns c and m swapped"),
+        ("run,c,m,f,pressure [bar]\n1,0,2,99,2.4\n1,0,2,98,2.4\n", r"line 2: \[0,2\] stands twice"),
+    ],
+)  # fmt: skip
+def test_mistakes_are_named_with_their_line(tmp_path: Path, text: str | bytes, words: str) -> None:
+    with pytest.raises(BadMeasuredData, match=words) as error:
+        read(tmp_path, text)
+    assert str(error.value).startswith(str(tmp_path / "t.csv")) and "\n" not in str(error.value)
+
+
+def test_every_mistake_is_told_at_once(tmp_path: Path) -> None:
+    with pytest.raises(BadMeasuredData) as error:
+        read(tmp_path, PLAIN + "2,9,,240,79.5\n2,0,,240,x\n")
+    lines = str(error.value).splitlines()
+    assert ["line 4" in lines[0], "line 5" in lines[1], len(lines)] == [True, True, 2]
+    assert all(a != b for a, b in pairwise(lines))

@@ -1,0 +1,73 @@
+"""What repeats make of values: the mean, and how far it may be off."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tyrecal.measured.sensors import BadMeasuredData
+from tyrecal.measured.values import Value, combined, measurements_csv
+from tyrecal.modes.mode import Label
+
+LABELS = [Label(c, m) for c in (1, 2, 3, 4) for m in (0, 1)]
+
+
+def value(hertz: float, run: str, label: Label = LABELS[0], member: str = "",
+          sigma: float | None = None) -> Value:  # fmt: skip
+    return Value("frequency_Hz", label, member, 240.0, 0.0, hertz, sigma, run, "here")
+
+
+def test_sigma_covers_the_truth_from_three_runs() -> None:
+    truth = np.linspace(40, 120, len(LABELS))
+    z = []
+    for seed in range(200):
+        rng = np.random.default_rng(seed)
+        runs = [value(f * (1 + 0.002 * rng.standard_normal()), str(k), label)
+                for k in range(3) for f, label in zip(truth, LABELS, strict=True)]  # fmt: skip
+        rows = {row.label: row for row in combined(runs, floor=0.0)}
+        z += [(rows[x].value - f) / rows[x].sigma for x, f in zip(LABELS, truth, strict=True)]  # type: ignore[operator]
+    assert np.mean(np.abs(z) < 1) == pytest.approx(0.683, abs=0.05)
+    assert np.mean(np.abs(z) < 2) == pytest.approx(0.954, abs=0.03)
+
+
+def test_of_one_label_alone_it_is_the_textbooks() -> None:
+    x = [66.0, 66.2, 66.4, 66.1]
+    (row,) = combined([value(f, str(k)) for k, f in enumerate(x)], floor=0.0)
+    assert row.value == pytest.approx(np.mean(x))
+    assert row.sigma == pytest.approx(np.std(x, ddof=1) / 2, rel=1e-3)
+
+
+def test_what_runs_state_counts_where_they_scatter_less() -> None:
+    (row,) = combined([value(66.0, "1", sigma=0.4), value(66.0, "2", sigma=0.3)])
+    assert row.sigma == pytest.approx(0.25)
+    (row,) = combined([value(66.0, "1"), value(66.0, "2")], assumed=0.01)
+    assert row.sigma == pytest.approx(0.66 / np.sqrt(2))
+
+
+def test_no_sigma_is_below_the_floor() -> None:
+    (row,) = combined([value(66.0, "1"), value(66.0, "2")], floor=0.002)
+    assert row.sigma == pytest.approx(0.132)
+
+
+def test_a_single_value_without_sigma_is_refused() -> None:
+    with pytest.raises(BadMeasuredData, match=r"nothing tells how far \[1,0\] may be off"):
+        combined([value(66.0, "1")])
+
+
+def test_a_doublet_is_one_value_where_a_run_saw_only_one() -> None:
+    two = [value(66.0, "1", member="1"), value(66.4, "1", member="2")]
+    rows = combined([*two, value(66.1, "2", member="1"), value(66.5, "2", member="2")])
+    assert [(row.member, row.value) for row in rows] == [
+        ("1", pytest.approx(66.05)), ("2", pytest.approx(66.45)),
+    ]  # fmt: skip
+    (row,) = combined([*two, value(66.3, "2")])
+    assert (row.member, row.value) == ("", pytest.approx(66.25))
+
+
+def test_the_csv_is_sorted_and_whole() -> None:
+    rows = combined([value(70.0, "1", LABELS[2], sigma=0.1), value(66.0, "1", sigma=0.123456)])
+    assert measurements_csv(rows).splitlines() == [
+        "quantity,c,m,kind,member,pressure_kPa,load_N,value,sigma",
+        "frequency_Hz,1,0,,,240,0,66,0.123",
+        "frequency_Hz,2,0,,,240,0,70,0.1",
+    ]

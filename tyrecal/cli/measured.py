@@ -1,0 +1,187 @@
+"""tyrecal measured import, sensors"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from . import options
+from .talk import Talk, say
+
+if TYPE_CHECKING:
+    from ..measured.modal import Layout
+
+files = click.argument(
+    "files", nargs=-1, required=True, metavar="FILE...",
+    type=click.Path(path_type=Path, exists=True, dir_okay=False),
+)  # fmt: skip
+axle = click.option(
+    "--axle", type=click.Choice(["x", "y", "z"]),
+    help="Axis of the test's coordinates along the axle (default: told by the sensors' places).",
+)  # fmt: skip
+centre = click.option(
+    "--centre", metavar="X,Y,Z", default="0,0,0", show_default=True,
+    help="The wheel's centre in the test's coordinates, m.",
+)  # fmt: skip
+directions = click.option(
+    "--directions", type=click.Choice(["cartesian", "cylindrical"]), default="cartesian",
+    show_default=True,
+    help="Directions 1, 2, 3 of a sensor: along x, y, z, or radial, tangential, axial.",
+)  # fmt: skip
+highest = click.option(
+    "--highest-harmonic", "highest", type=click.IntRange(0, 20), metavar="C",
+    help="The most waves round the circumference that a mode of the band can have (default: 12).",
+)  # fmt: skip
+
+
+@click.group()
+def command() -> None:
+    """Turn modal tables, mode shapes and frequency-response functions into measurements.
+
+    \b
+    tyrecal measured import table.csv --pressure-kPa 240 --output measured.csv
+    tyrecal measured import run1.uff run2.uff run3.uff --pressure-kPa 240 --band 25,135
+    tyrecal measured sensors run1.uff --highest-harmonic 6
+    """
+
+
+@command.command("import")
+@files
+@click.option("--output", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE",
+              default="measured.csv", show_default=True, help="The measurements CSV.")  # fmt: skip
+@click.option("--pressure-kPa", "pressure_kPa", type=float, metavar="P",
+              help="Inflation pressure of files that do not say it.")  # fmt: skip
+@click.option("--band", metavar="F1,F2",
+              help="Look for modes between these frequencies, Hz (default: all).")  # fmt: skip
+@click.option("--sigma-percent", "assumed", type=click.FloatRange(0, 20, min_open=True),
+              metavar="P",
+              help="Standard deviation of one run that states none, in per cent.")  # fmt: skip
+@click.option("--floor-percent", "floor", type=click.FloatRange(0, 20), default=0.1,
+              show_default=True, metavar="P",
+              help="No sigma below this, in per cent: what repeats do not show.")  # fmt: skip
+@options.every(axle, centre, directions, highest)
+@click.option("--response", type=click.Choice(["receptance", "mobility", "accelerance"]),
+              help="What functions are that do not say it.")  # fmt: skip
+@click.option("--pictures/--no-pictures", default=True,
+              help="Draw functions and shapes beside the CSV.")  # fmt: skip
+@options.talking
+def import_files(
+    files: tuple[Path, ...],
+    output: Path,
+    pressure_kPa: float | None,
+    band: str | None,
+    assumed: float | None,
+    floor: float,
+    axle: str | None,
+    centre: str,
+    directions: str,
+    highest: int | None,
+    response: str | None,
+    pictures: bool,
+    talk: Talk,
+) -> int:
+    """Write the measurements in FILEs to one CSV, which 'tyrecal diagnose --measured' and
+    'tyrecal fit --measured' read.
+
+    FILE: a modal table (CSV), or a universal file with mode shapes (data set 55) or
+    frequency-response functions (58) and their geometry (15, 2411). What several files, or lines
+    of a table, measure of one thing are repeats: the value is their mean, sigma that mean's
+    standard deviation. A shape that the sensors do not determine gets no label, and is left out.
+
+    \b
+    tyrecal measured import modes.csv --pressure-kPa 240 --sigma-percent 0.3
+    tyrecal measured import run1.uff run2.uff --pressure-kPa 240 --directions cylindrical
+    tyrecal measured import at_200.csv at_240.csv --output both.csv
+    """
+    from ..files import whole
+    from ..measured.gather import gather, result
+    from ..measured.values import measurements_csv
+
+    if output.resolve() in [path.resolve() for path in files]:
+        raise click.UsageError(f"--output {output}: is one of the files to read")
+    limits = _numbers("--band", band, 2) if band else None
+    if limits and not 0 <= limits[0] < limits[1]:
+        raise click.UsageError(f"--band {band}: must rise from 0 or more")
+    layout = _layout(axle, centre, directions, highest, limits, response or "")
+    found = gather(files, pressure_kPa, layout, floor / 100, assumed and assumed / 100)
+    with whole(output) as partial:
+        partial.write_text(measurements_csv(found.rows), encoding="utf-8", newline="")
+    if pictures and found.runs:
+        from ..report.measured import draw_measured
+
+        draw_measured(output.with_suffix(".png"), found.runs)
+    for note in found.notes:
+        say(note, True, talk.quiet)
+    talk.result(result(found))
+    if found.runs:
+        from ..report.measured import measured_table
+
+        talk.show(measured_table(found.runs))
+    talk.say(f"{len(found.rows)} measurements in {output}")
+    return 0
+
+
+@command.command()
+@click.argument("file", type=click.Path(path_type=Path, exists=True, dir_okay=False))
+@options.every(axle, centre, directions, highest)
+@options.talking
+def sensors(
+    file: Path,
+    axle: str | None,
+    centre: str,
+    directions: str,
+    highest: int | None,
+    talk: Talk,
+) -> int:
+    """Say which modes the sensors of a universal FILE can tell apart.
+
+    Needs no good data: run it on a first measurement, and move sensors before the others.
+
+    \b
+    tyrecal measured sensors run1.uff --directions cylindrical
+    """
+    from ..measured.modal import sensors_in
+    from ..measured.universal import read_universal
+    from ..report.measured import sensors_words
+
+    layout = _layout(axle, centre, directions, highest)
+    told = sensors_in(read_universal(file), layout).told_apart()
+    if talk.as_json:
+        talk.result([
+            {"c": label.c, "m": label.m, "kind": label.kind, "told": not alike,
+             "looks_like": [str(other) for other in alike]}
+            for label, alike in told.items()
+        ])  # fmt: skip
+    else:
+        talk.say(sensors_words(told))
+    return 0
+
+
+def _layout(
+    axle: str | None,
+    centre: str,
+    directions: str,
+    highest: int | None,
+    band: Any = None,
+    response: str = "",
+) -> Layout:
+    from ..measured.modal import Layout
+    from ..modes.label import HIGHEST_HARMONIC
+
+    x, y, z = _numbers("--centre", centre, 3)
+    most = HIGHEST_HARMONIC if highest is None else highest
+    return Layout(axle or "", (x, y, z), directions == "cylindrical", most, band, response)
+
+
+def _numbers(option: str, text: str, count: int) -> tuple[float, ...]:
+    from math import isfinite
+
+    try:
+        numbers = tuple(float(word) for word in text.split(","))
+    except ValueError:
+        numbers = ()
+    if len(numbers) != count or not all(map(isfinite, numbers)):
+        raise click.UsageError(f"{option} {text}: must be {count} numbers, separated by commas")
+    return numbers

@@ -1,0 +1,73 @@
+"""Measurements (CSV) as the targets of a case."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from math import hypot
+from pathlib import Path
+
+from ..case import LoadedCase
+from ..case.schema import MEASURED, TargetFootprint, TargetMode, Targets
+from ..diagnose.measurements import BadMeasurements, Reading, read_measurements
+from ..modes.mode import Label
+
+ALIKE_kPa = 0.5  # pressures that differ by less are one
+
+
+def with_measured(case: LoadedCase, path: Path) -> tuple[LoadedCase, list[str]]:
+    """The case with what was measured at its pressure as targets, and what was left out, why.
+
+    Frequencies of the unloaded tyre, contact areas and vertical stiffnesses, with their sigmas;
+    of a doublet with two members their mean. Raises BadMeasurements, OSError.
+    """
+    readings = read_measurements(path)
+    pressure = case.case.pressure_kPa
+    weighed = [r for r in readings if r.quantity == "mass_kg"]
+    rest = [r for r in readings if r.quantity != "mass_kg"]
+    here = [r for r in rest if abs(r.pressure_kPa - pressure) <= ALIKE_kPa]
+    modal = [r for r in here if r.label and not r.load_N]
+    loaded = [r for r in here if r.label and r.load_N]
+    pressed = [r for r in here if not r.label and r.load_N]
+    other = sorted({r.pressure_kPa for r in rest} - {r.pressure_kPa for r in here})
+    at = ", ".join(f"{p:g}" for p in other)
+    if not modal and not pressed:
+        elsewhere = f", only at {at} kPa; give --pressure-kPa" if other else ""
+        raise BadMeasurements(f"{path}: no target was measured at {pressure:g} kPa{elsewhere}")
+    targets = Targets(source=path.name, modes=_modes(modal), footprint=_footprint(pressed))
+    analysis = case.case.analysis
+    highest = max([analysis.highest_harmonic, *(target.c for target in targets.modes)])
+    wanted = {
+        "targets": targets,
+        "analysis": analysis.model_copy(update={"highest_harmonic": highest}),
+    }
+    notes = [f"{len(rest) - len(here)} values at {at} kPa"] * bool(other)
+    notes += [f"{len(loaded)} frequencies under load"] * bool(loaded)
+    notes += ["the mass"] * bool(weighed)
+    return replace(case, case=case.case.model_copy(update=wanted)), notes
+
+
+def _modes(readings: Sequence[Reading]) -> list[TargetMode]:
+    groups: dict[Label, list[Reading]] = {}
+    for each in readings:
+        assert each.label is not None
+        groups.setdefault(each.label, []).append(each)
+    return [
+        TargetMode(
+            c=label.c,
+            m=label.m,
+            kind=label.kind,  # type: ignore[arg-type]
+            frequency_Hz=sum(each.value for each in group) / len(group),
+            sigma_Hz=hypot(*(each.sigma for each in group)) / len(group),
+        )
+        for label, group in groups.items()
+    ]
+
+
+def _footprint(readings: Sequence[Reading]) -> list[TargetFootprint]:
+    return [
+        TargetFootprint.model_validate(
+            {"load_N": each.load_N, each.quantity: each.value, MEASURED[each.quantity]: each.sigma}
+        )
+        for each in readings
+    ]

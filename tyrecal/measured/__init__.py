@@ -1,0 +1,1 @@
+"""Measured data: modal tables, mode shapes and frequency-response functions, as measurements."""

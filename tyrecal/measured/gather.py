@@ -1,0 +1,122 @@
+"""Files of all kinds to one set of measurements."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+from .modal import Layout, Run, Told, read_run, values_of
+from .sensors import BadMeasuredData
+from .tables import read_table
+from .universal import Universal, is_universal, read_universal
+from .values import FLOOR, Value, combined
+
+NODES_AGREE = 1e-6  # m
+EXPLAINED = 0.98  # of the functions' mean square; less, and modes are missing
+
+
+@dataclass(frozen=True)
+class Gathered:
+    """rows: the measurements, one value each with its sigma; runs: modes of the universal files;
+    notes: what a user has to know."""
+
+    rows: list[Value]
+    runs: list[Run]
+    notes: list[str]
+
+
+def gather(
+    paths: Sequence[Path],
+    pressure_kPa: float | None = None,
+    layout: Layout | None = None,
+    floor: float = FLOOR,
+    assumed: float | None = None,
+) -> Gathered:
+    """Measurements of several files; those of the same thing are repeats.
+
+    pressure_kPa: of files that do not say theirs; floor, assumed: relative, see ``combined``.
+    Raises BadMeasuredData, LabMissing, OSError.
+    """
+    universal = [read_universal(path) for path in paths if is_universal(path)]
+    nodes = all_nodes(universal)
+    values: list[Value] = []
+    runs: list[Run] = []
+    notes: list[str] = []
+    for path in paths:
+        file = next((each for each in universal if each.path == path), None)
+        if file is None:
+            values += read_table(path, pressure_kPa)
+            continue
+        notes += [f"{path}: {count} of {what} not used" for what, count in file.skipped.items()]
+        if not file.shapes and not file.functions and file.nodes and len(universal) > 1:
+            continue  # the geometry of the others
+        if pressure_kPa is None:
+            raise BadMeasuredData(f"{path}: universal files hold no pressure; give --pressure-kPa")
+        run = read_run(file, nodes, layout or Layout())
+        runs.append(run)
+        if run.explained < EXPLAINED:
+            notes.append(
+                f"{path}: the modes make {run.explained:.0%} of the functions; one may be missing:"
+                " look at the picture, try a narrower --band"
+            )
+        values += values_of(run, pressure_kPa)
+    if not values:
+        why = next((each.judged.why for run in runs for each in run.modes), "")
+        raise BadMeasuredData(f"{paths[0]}: no mode could be told: {why}")
+    return Gathered(combined(values, floor, assumed), runs, notes)
+
+
+def all_nodes(files: Sequence[Universal]) -> dict[int, tuple[float, float, float]]:
+    """Coordinates of all files together. Raises BadMeasuredData where two differ."""
+    nodes: dict[int, tuple[float, float, float]] = {}
+    for file in files:
+        for number, place in file.nodes.items():
+            known = nodes.setdefault(number, place)
+            if max(abs(a - b) for a, b in zip(known, place, strict=True)) > NODES_AGREE:
+                raise BadMeasuredData(
+                    f"{file.path}: node {number} stands elsewhere than in the files before"
+                )
+    return nodes
+
+
+def result(gathered: Gathered) -> dict[str, Any]:
+    """What ``tyrecal measured import --json`` prints."""
+    return {
+        "format": 1,
+        "measurements": [
+            {
+                "quantity": row.quantity,
+                "c": row.label.c if row.label else None,
+                "m": row.label.m if row.label else None,
+                "kind": row.label.kind if row.label else None,
+                "member": row.member,
+                "pressure_kPa": row.pressure_kPa,
+                "load_N": row.load_N,
+                "value": row.value,
+                "sigma": row.sigma,
+            }
+            for row in gathered.rows
+        ],
+        "modes": [_entry(run, mode) for run in gathered.runs for mode in run.modes],
+    }
+
+
+def _entry(run: Run, told: Told) -> dict[str, Any]:
+    label = told.judged.label
+    finite = lambda x: x if x is not None and isfinite(x) else None
+    return {
+        "file": run.name,
+        "frequency_Hz": told.mode.frequency_Hz,
+        "sigma_Hz": finite(told.mode.sigma_Hz),
+        "damping_ratio": finite(told.mode.damping),
+        "collinearity": round(told.collinearity, 4),
+        "c": label.c if label else None,
+        "m": label.m if label else None,
+        "kind": label.kind if label else None,
+        "member": told.member,
+        "confidence": round(told.judged.confidence, 4),
+        "why": told.judged.why,
+    }

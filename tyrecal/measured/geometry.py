@@ -1,0 +1,102 @@
+"""Where sensors stand on the tyre: from a test's coordinates to R, Theta, Z about the axle.
+
+Theta is counted about the axle from the next axis in the order x, y, z, x.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from ..modes.label import BELT
+from .sensors import BadMeasuredData, Sensors
+
+Array = np.ndarray
+
+RADII = (0.15, 1.5)  # m, of tyres
+FLAT = 0.75  # a tyre's width over its diameter is less
+OUTER = 0.8  # of the largest radius, of sensors on the tread and its shoulders
+OFF_CENTRE = 0.1  # of the radius
+CIRCLES = 3  # fitted one after the other
+AXES = "xyz"
+
+
+def sensors_of(
+    signals: Sequence[tuple[int, int]],
+    nodes: Mapping[int, tuple[float, float, float]],
+    axle: str = "",
+    centre: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    cylindrical: bool = False,
+) -> Sensors:
+    """Sensors of signals (node, direction 1 to 3).
+
+    nodes: coordinates in m; axle: x, y or z (default: the axis along which all nodes
+    spread least); centre: of the wheel, in m; cylindrical: directions 1, 2, 3 are radial,
+    tangential and axial at each sensor, else along x, y and z.
+
+    Raises BadMeasuredData where a node has no place, or the places are no tyre's.
+    """
+    lacking = sorted({node for node, _ in signals if node not in nodes})
+    if lacking:
+        raise BadMeasuredData(
+            f"node {lacking[0]} has no coordinates; give the file with data set 15 or 2411, too"
+        )
+    X = np.array([nodes[node] for node, _ in signals]) - centre
+    z = AXES.index(axle or _axle(np.array(list(nodes.values()))))
+    x, y = (z + 1) % 3, (z + 2) % 3
+    R, angle = np.hypot(X[:, x], X[:, y]), np.arctan2(X[:, y], X[:, x])
+    _check_centre(X[:, [x, y]], AXES[z])
+    if not RADII[0] <= R.max() <= RADII[1]:
+        raise BadMeasuredData(
+            f"the sensors' largest radius about {AXES[z]} is {R.max():.4g} m, no tyre's"
+            f" ({RADII[0]:g} to {RADII[1]:g}); is the unit of length (data set 164) right?"
+        )
+    directions = np.zeros((len(signals), 3))
+    for row, (_, direction) in enumerate(signals):
+        sign, k = np.sign(direction), abs(direction) - 1
+        if cylindrical:
+            directions[row, k] = sign
+            continue
+        along = sign * np.eye(3)[k]
+        c, s = np.cos(angle[row]), np.sin(angle[row])
+        directions[row] = (c * along[x] + s * along[y], c * along[y] - s * along[x], along[z])
+    return Sensors(np.column_stack([R, angle, X[:, z]]), directions)
+
+
+def _axle(X: Array) -> str:
+    """The axis along which places (k, 3) spread least, if they are a tyre's."""
+    spread = np.ptp(X, axis=0)
+    order = np.argsort(spread)
+    if not spread[order[0]] < FLAT * spread[order[1]]:
+        raise BadMeasuredData(
+            "the sensors' places do not tell which axis is the axle; give --axle x, y or z"
+        )
+    return AXES[order[0]]
+
+
+def _check_centre(places: Array, axle: str) -> None:
+    """Raises where the outermost sensors lie on a circle about another centre.
+
+    The circle x^2 + y^2 = 2 a x + 2 b y + c by least squares, through those that stand outermost
+    about the last centre.
+    """
+    places = np.unique(np.round(places, 6), axis=0)
+    if len(places) < 4:
+        return  # too few to tell
+    middle = (places.min(0) + places.max(0)) / 2
+    for _ in range(CIRCLES):
+        distance = np.hypot(*(places - middle).T)
+        outer = places[distance / distance.max() > OUTER]
+        A = np.column_stack([2 * outer, np.ones(len(outer))])
+        solution, _, rank, _ = np.linalg.lstsq(A, np.sum(outer**2, axis=1), rcond=None)
+        if len(outer) < 4 or rank < 3:
+            return
+        middle = solution[:2]
+    distance = np.hypot(*(outer - middle).T)
+    radius, off = distance.mean(), np.hypot(*middle)
+    if np.abs(distance / radius - 1).max() < 1 - BELT and off > OFF_CENTRE * radius:
+        raise BadMeasuredData(
+            f"the sensors' circle about {axle} has its middle {off:.3g} m off the axle;"
+            " give --centre X,Y,Z"
+        )

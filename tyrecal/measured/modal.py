@@ -1,0 +1,251 @@
+"""The modes of one universal file, with their labels: from shapes that are in it, or from
+frequency-response functions."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..modes.label import BELT, HIGHEST_HARMONIC, TAKES_PART
+from ..modes.mode import Label
+from .geometry import sensors_of
+from .identify import FORMS, Responses, identify
+from .labels import Judged, Labeller
+from .sensors import BadMeasuredData, MeasuredMode, Sensors, real_part
+from .universal import Function, Shape, Universal
+from .values import Value
+
+Array = np.ndarray
+
+DOUBLET = 0.05  # relative distance of a doublet's members, at most
+COLLINEAR = 0.5  # modal phase collinearity below which a shape has no real part to speak of
+
+
+@dataclass(frozen=True)
+class Layout:
+    """How a test's coordinates and directions are meant, and what can be in its band.
+
+    axle: x, y, z or "" (told by the places); centre: m; cylindrical: directions 1, 2, 3 are
+    radial, tangential, axial; highest: the largest c that is possible; band: Hz, None for all;
+    form: of functions that do not say theirs.
+    """
+
+    axle: str = ""
+    centre: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    cylindrical: bool = False
+    highest: int = HIGHEST_HARMONIC
+    band: tuple[float, float] | None = None
+    form: str = ""
+
+
+@dataclass(frozen=True)
+class Told:
+    """A mode, its real shape (k,) at ``sensors`` of unit largest value, and its label; member: 1
+    or 2 where both of a doublet were found, else ""."""
+
+    mode: MeasuredMode
+    sensors: Sensors
+    shape: Array
+    collinearity: float
+    judged: Judged
+    place: str
+    member: str = ""
+
+
+@dataclass(frozen=True)
+class Run:
+    """All of one file. functions: what the modes were identified from, and fitted: what they
+    make, (k, n) over frequency_Hz (n,), NaN above the band; None where the file holds shapes."""
+
+    name: str
+    modes: tuple[Told, ...]
+    frequency_Hz: Array | None = None
+    functions: Array | None = None
+    fitted: Array | None = None
+
+    @property
+    def explained(self) -> float:
+        """Share of the functions' mean square that the modes make, in the band."""
+        if self.functions is None or self.fitted is None:
+            return 1.0
+        rest = np.nansum(np.abs(self.functions - self.fitted) ** 2)
+        return float(1 - rest / np.sum(np.abs(self.functions[np.isfinite(self.fitted)]) ** 2))
+
+
+def read_run(
+    file: Universal, nodes: Mapping[int, tuple[float, float, float]], layout: Layout
+) -> Run:
+    """Modes of a file by rising frequency; shapes in it come before functions.
+
+    Raises BadMeasuredData, LabMissing.
+    """
+    try:
+        return (
+            _from_shapes(file, nodes, layout) if file.shapes else _identified(file, nodes, layout)
+        )
+    except BadMeasuredData as error:
+        raise _named(file, error) from None
+
+
+def sensors_in(file: Universal, layout: Layout) -> Labeller:
+    """Judge of the sensors of a file. Raises BadMeasuredData."""
+    try:
+        signals = list(_signals(file.shapes[0])) if file.shapes else []
+        if file.functions and not signals:
+            signals = list(next(iter(_by_reference(file.functions).values())))
+        if not signals:
+            raise BadMeasuredData("nothing was measured in it")
+        sensors = sensors_of(signals, file.nodes, layout.axle, layout.centre, layout.cylindrical)
+    except BadMeasuredData as error:
+        raise _named(file, error) from None
+    return Labeller(sensors, layout.highest)
+
+
+def _named(file: Universal, error: BadMeasuredData) -> BadMeasuredData:
+    """The error, with its file."""
+    named = str(error).startswith(str(file.path))
+    return error if named else BadMeasuredData(f"{file.path}: {error}")
+
+
+def _signals(shape: Shape) -> tuple[tuple[int, int], ...]:
+    measured = np.isfinite(shape.values)
+    return tuple((node, k + 1) for node, row in zip(shape.nodes, measured, strict=True)
+                 for k in range(3) if row[k])  # fmt: skip
+
+
+def _from_shapes(
+    file: Universal, nodes: Mapping[int, tuple[float, float, float]], layout: Layout
+) -> Run:
+    labellers: dict[tuple[tuple[int, int], ...], Labeller] = {}
+    told = []
+    for shape in file.shapes:
+        signals = _signals(shape)
+        if signals not in labellers:
+            if not signals:
+                raise BadMeasuredData(f"{shape.place}: every value is 0")
+            sensors = sensors_of(signals, nodes, layout.axle, layout.centre, layout.cylindrical)
+            labellers[signals] = Labeller(sensors, layout.highest)
+        mode = MeasuredMode(
+            shape.frequency_Hz, shape.values[np.isfinite(shape.values)], shape.damping
+        )
+        told.append(_told(mode, labellers[signals], shape.place))
+    return Run(str(file.path), tuple(settled(told)))
+
+
+def _identified(
+    file: Universal, nodes: Mapping[int, tuple[float, float, float]], layout: Layout
+) -> Run:
+    if not file.functions:
+        raise BadMeasuredData("there is neither a mode shape nor a frequency-response function")
+    table = _by_reference(file.functions)
+    first = file.functions[0]
+    form = first.form or layout.form
+    if form not in FORMS:
+        raise BadMeasuredData(
+            f"{first.place}: does not say whether displacement, velocity or acceleration was"
+            " measured; give --response"
+        )
+    f = first.frequency_Hz
+    signals = list(next(iter(table.values())))
+    sensors = sensors_of(signals, nodes, layout.axle, layout.centre, layout.cylindrical)
+    values = np.vstack([[each.values for each in row.values()] for row in table.values()])
+    points = np.tile([node for node, _ in signals], len(table))
+    low, high = layout.band or (f[0], f[-1])
+    found = identify(Responses(f, values, form, points), low, high)
+    f, values = f[f > 0], values[:, f > 0]
+    labeller = Labeller(sensors, layout.highest)
+    told = []
+    for mode in found.modes:
+        residues = mode.amplitude.reshape(len(table), -1)
+        strongest = residues[np.argmax(np.linalg.norm(residues, axis=1))]
+        told.append(_told(replace(mode, amplitude=strongest), labeller, str(file.path)))
+    return Run(str(file.path), tuple(settled(told)), f, values, found.fitted)
+
+
+def _by_reference(
+    functions: list[Function],
+) -> dict[tuple[int, int], dict[tuple[int, int], Function]]:
+    """Functions by reference, then by signal, all with the same signals and frequencies."""
+    table: dict[tuple[int, int], dict[tuple[int, int], Function]] = {}
+    first = functions[0]
+    for each in functions:
+        row = table.setdefault(each.reference, {})
+        if each.response in row:
+            raise BadMeasuredData(
+                f"{each.place}: node {each.response[0]}, direction {each.response[1]} was measured"
+                " before in this file; give each repeat a file of its own"
+            )
+        same = len(each.frequency_Hz) == len(first.frequency_Hz)
+        if not same or not np.allclose(each.frequency_Hz, first.frequency_Hz):
+            raise BadMeasuredData(f"{each.place}: its frequencies are not those of the first")
+        if each.form != first.form:
+            raise BadMeasuredData(f"{each.place}: is a {each.form}, the first a {first.form}")
+        row[each.response] = each
+    wanted = set(next(iter(table.values())))
+    for reference, row in table.items():
+        if set(row) != wanted:
+            node, direction = min(wanted ^ set(row))
+            raise BadMeasuredData(
+                f"node {node}, direction {direction} was not measured with every reference"
+                f" ({reference[0]} is another)"
+            )
+    order = sorted(wanted)
+    return {reference: {s: row[s] for s in order} for reference, row in table.items()}
+
+
+def _told(mode: MeasuredMode, labeller: Labeller, place: str) -> Told:
+    shape, collinearity = real_part(mode.amplitude)
+    size = np.abs(shape).max()
+    judged = labeller.judge(shape / (size or 1.0))
+    R = labeller.sensors.points[:, 0]
+    belt = R / R.max() > BELT
+    part = np.mean(shape[belt] ** 2) / (np.mean(shape**2) or 1.0)
+    if judged.label and part < TAKES_PART:
+        judged = replace(judged, label=None, why="the belt hardly moves: a mode of the sidewalls")
+    if judged.label and collinearity < COLLINEAR:
+        judged = replace(
+            judged, label=None, why=f"the shape is complex (collinearity {collinearity:.2f})"
+        )
+    return Told(mode, labeller.sensors, shape / (size or 1.0), collinearity, judged, place)
+
+
+def settled(told: list[Told]) -> list[Told]:
+    """Each label once in a run, or twice where both members of a doublet were found.
+
+    As in ``modes.label``, the lowest mode on an order has its label; what comes above is an
+    overtone, which has none here.
+    """
+    result: list[Told] = []
+    order = sorted(told, key=lambda each: each.mode.frequency_Hz)
+    by_label: dict[Label | None, list[Told]] = {}
+    for each in order:
+        by_label.setdefault(each.judged.label, []).append(each)
+    for label, group in by_label.items():
+        if label is None:
+            result += group
+            continue
+        lowest = group[0].mode.frequency_Hz
+        pair = [e for e in group if e.mode.frequency_Hz <= (1 + DOUBLET) * lowest]
+        pair = pair[: 2 if label.c else 1]
+        for number, each in enumerate(pair, start=1):
+            result.append(replace(each, member=str(number) if len(pair) == 2 else ""))
+        for each in group[len(pair) :]:
+            why = f"{label} stands at {lowest:.2f} Hz already; an overtone, or another's pair"
+            result.append(replace(each, judged=replace(each.judged, label=None, why=why)))
+    return sorted(result, key=lambda each: each.mode.frequency_Hz)
+
+
+def values_of(run: Run, pressure_kPa: float) -> list[Value]:
+    """The frequencies of a run's modes that have a label."""
+    return [
+        Value("frequency_Hz", each.judged.label, each.member, pressure_kPa, 0.0,
+              each.mode.frequency_Hz, _sigma(each.mode), run.name, each.place)
+        for each in run.modes if each.judged.label
+    ]  # fmt: skip
+
+
+def _sigma(mode: MeasuredMode) -> float | None:
+    known = mode.sigma_Hz is not None and np.isfinite(mode.sigma_Hz)
+    return float(mode.sigma_Hz) if known else None  # type: ignore[arg-type]

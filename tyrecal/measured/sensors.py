@@ -1,0 +1,49 @@
+"""Sensors on a tyre, and what they measured of a mode."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+Array = np.ndarray
+
+
+class BadMeasuredData(ValueError):
+    """Measured data that cannot be used; names the file and the line or record."""
+
+
+@dataclass(frozen=True)
+class Sensors:
+    """What is measured, and where: one row a signal, several rows for a point with several.
+
+    points (k, 3): R (m), Theta (rad), Z (m) about the axle, Z = 0 in the tyre's middle plane;
+    directions (k, 3): unit vectors in r, theta, z.
+    """
+
+    points: Array
+    directions: Array
+
+
+@dataclass(frozen=True)
+class MeasuredMode:
+    """A mode as a test gives it. amplitude (k,): of each signal, complex, any scale; damping:
+    ratio to the critical one, NaN where it is not known; sigma_Hz: None likewise."""
+
+    frequency_Hz: float
+    amplitude: Array
+    damping: float = float("nan")
+    sigma_Hz: float | None = None
+
+
+def real_part(amplitude: Array) -> tuple[Array, float]:
+    """A complex shape turned to be as real as it can, (k,), and its collinearity.
+
+    u exp(-i phi) has the largest real part at phi = arg(sum u^2) / 2; the modal phase
+    collinearity |sum u^2| / sum |u|^2 is 1 for a shape that is real but for a factor, and 0 where
+    the imaginary part is as large as the real one and in quadrature.
+    """
+    square = np.sum(amplitude**2)
+    whole = float(np.sum(np.abs(amplitude) ** 2))
+    turned = (amplitude * np.exp(-0.5j * np.angle(square))).real
+    return turned, float(abs(square)) / whole if whole else 0.0

@@ -1,0 +1,165 @@
+"""Measured modes as a table, as words and as a picture."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..modes.label import BELT
+from ..modes.mode import Label
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from rich.table import Table
+
+    from ..measured.modal import Run, Told
+
+Array = np.ndarray
+
+COMPONENTS = ("radial", "tangential", "axial")
+ALONG = 0.9  # of a sensor's direction, for its motion to be drawn as that component
+AMPLITUDE = 0.35  # of the ring's radius, the largest motion drawn
+PER_ROW = 5
+MOST = 20  # shapes in a picture
+
+
+def measured_table(runs: Sequence[Run]) -> Table:
+    """Modes of each run: label, frequency, damping, and how sure the label is."""
+    from rich import box
+    from rich.table import Table
+
+    table = Table(box=box.SIMPLE_HEAD, title="modes found")
+    for name in ("label", "Hz", "sigma Hz", "damping %", "sure", ""):
+        table.add_column(name, justify="left" if name in ("label", "") else "right")
+    for run in runs:
+        table.add_section()
+        table.add_row(f"[bold]{Path(run.name).name}[/bold]")
+        for told in run.modes:
+            label, sigma = told.judged.label, told.mode.sigma_Hz
+            member = f" member {told.member}" if told.member else ""
+            table.add_row(
+                f"{label}{member}".replace("[", "\\[") if label else "-",
+                f"{told.mode.frequency_Hz:.2f}",
+                f"{sigma:.3f}" if sigma is not None and np.isfinite(sigma) else "-",
+                f"{100 * told.mode.damping:.2f}" if np.isfinite(told.mode.damping) else "-",
+                f"{told.judged.confidence:.2f}",
+                told.judged.why.replace("[", "\\["),
+            )
+    return table
+
+
+def sensors_words(told: Mapping[Label, Sequence[Label]]) -> str:
+    """Which labels sensors tell apart, and which look like others: a line for each c."""
+    lines = []
+    for c in sorted({label.c for label in told}):
+        mine = {label: alike for label, alike in told.items() if label.c == c}
+        right = ", ".join(str(label) for label, alike in mine.items() if not alike)
+        wrong = [f"cannot tell {label}, it looks like {_few(alike)}"
+                 for label, alike in mine.items() if alike]  # fmt: skip
+        lines.append("; ".join([f"can tell {right}"] * bool(right) + wrong))
+    return "\n".join(lines)
+
+
+def _few(labels: Sequence[Label], most: int = 4) -> str:
+    more = len(labels) - most
+    return ", ".join(map(str, labels[:most])) + (f" and {more} more" if more > 0 else "")
+
+
+def draw_measured(path: Path, runs: Sequence[Run]) -> None:
+    """Draw the functions of the first run that has some, with its modes, and the shapes of the
+    same run on the ring: the tread's sensors, moved by what they measured, and c waves through
+    them."""
+    from .figure import in_house_style
+
+    in_house_style(_draw)(path, runs)
+
+
+def _draw(path: Path, runs: Sequence[Run]) -> None:
+    from .figure import new_figure, save
+
+    run = next((each for each in runs if each.functions is not None), runs[0])
+    modes = run.modes[:MOST]
+    rows = -(-len(modes) // PER_ROW)
+    top = run.functions is not None
+    figure = new_figure(10.0, 3.4 * top + 2.35 * rows)
+    grid = figure.add_gridspec(top + rows, PER_ROW, height_ratios=[3.4] * top + [2.35] * rows)
+    if top:
+        _draw_functions(figure.add_subplot(grid[0, :]), run)
+    for number, told in enumerate(modes):
+        place = grid[top + number // PER_ROW, number % PER_ROW]
+        _draw_shape(figure.add_subplot(place), told)
+    save(figure, path)
+
+
+def _draw_functions(axes: Axes, run: Run) -> None:
+    """The root mean square over all signals, measured and made by the modes."""
+    from .figure import COLOURS, GREY
+
+    assert run.functions is not None and run.fitted is not None and run.frequency_Hz is not None
+    size = lambda H: np.sqrt(np.mean(np.abs(H) ** 2, axis=0))  # NaN outside the band
+    f, measured, made = run.frequency_Hz, size(run.functions), size(run.fitted)
+    axes.semilogy(f, measured, color=GREY, lw=2.6, alpha=0.6, label="measured")
+    axes.semilogy(f, made, color=COLOURS[1], lw=1.1, label="made by the modes")
+    inside = [told.mode.frequency_Hz for told in run.modes]
+    axes.set_ylim(0.5 * measured[measured > 0].min(), 6.0 * measured.max())
+    before, level = -np.inf, 0
+    for told in run.modes:
+        hertz = told.mode.frequency_Hz
+        axes.axvline(hertz, color=COLOURS[0], lw=0.7, ls=(0, (4, 3)))
+        level = level + 1 if hertz - before < 0.08 * (f[-1] - f[0]) else 0
+        axes.annotate(str(told.judged.label or "?"), (hertz, 1.0), (2, -9 - 11 * level),
+                      xycoords=("data", "axes fraction"), textcoords="offset points", fontsize=8,
+                      color=COLOURS[0])  # fmt: skip
+        before = hertz
+    axes.set_xlim(min(f[0], *inside), f[-1])
+    axes.set_xlabel("frequency, Hz")
+    axes.set_ylabel("response over force")
+    axes.set_title(f"{Path(run.name).name}: root mean square over {len(run.functions)} functions",
+                   loc="left", pad=8)  # fmt: skip
+    axes.legend(loc="lower right", facecolor="white", edgecolor="none", framealpha=1)
+
+
+def _shown(label: Label | None, size: Sequence[float]) -> int:
+    """The component whose waves do not change sign over the tread's width, where it was measured:
+    axial for odd m, where the belt tilts, else the larger of the others."""
+    order = [int(k) for k in np.argsort(-np.array(size))]
+    if label is not None:
+        tilts = label.m % 2 == 1 or label.kind == "axial"
+        order = [2] if tilts else [k for k in order if k != 2]
+    return next((k for k in order if size[k] > 0), int(np.argmax(size)))
+
+
+def _draw_shape(axes: Axes, told: Told) -> None:
+    """One component of the tread's motion, as a radial displacement of its sensors."""
+    from .figure import COLOURS, GREY
+
+    R, angle, _ = told.sensors.points.T
+    belt = R / R.max() > BELT
+    along = told.sensors.directions
+    rows = [np.flatnonzero(belt & (np.abs(along[:, k]) > ALONG)) for k in range(3)]
+    motion = [told.shape[rows[k]] * np.sign(along[rows[k], k]) for k in range(3)]
+    k = _shown(told.judged.label, [np.mean(u**2) if len(u) else 0.0 for u in motion])
+    u, at = motion[k], angle[rows[k]]
+    turn = np.linspace(0, 2 * np.pi, 361)
+    axes.plot(np.cos(turn), np.sin(turn), color="0.8", lw=0.8)
+    scale = AMPLITUDE / (np.abs(u).max() if len(u) else 1.0)
+    label = told.judged.label
+    if label is not None and len(u):
+        waves = lambda x: np.column_stack([np.cos(label.c * x), np.sin(label.c * x)])
+        line = 1 + scale * waves(turn) @ np.linalg.lstsq(waves(at), u, rcond=None)[0]
+        axes.plot(line * np.cos(turn), line * np.sin(turn), color=COLOURS[1], lw=1.2)
+    for moved, where in zip(1 + scale * u, at, strict=True):
+        axes.plot(np.array([1, moved]) * np.cos(where), np.array([1, moved]) * np.sin(where),
+                  color=GREY, lw=0.8)  # fmt: skip
+        axes.plot(moved * np.cos(where), moved * np.sin(where), "o", ms=4, color=COLOURS[0])
+    axes.set_aspect("equal")
+    axes.set_axis_off()
+    axes.set_xlim(-1.45, 1.45)
+    axes.set_ylim(-1.45, 1.45)
+    name = f"{label or 'not told'}{' ' + told.member if told.member else ''}"
+    axes.set_title(f"{name}, {told.mode.frequency_Hz:.2f} Hz", fontsize=9)
+    axes.text(0, 0, f"{COMPONENTS[k]}\n{told.judged.confidence:.2f}", ha="center", va="center",
+              fontsize=8, color=GREY)  # fmt: skip
