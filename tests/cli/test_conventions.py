@@ -52,8 +52,8 @@ def test_every_command_shows_an_example_and_has_the_options_of_all(name: str) ->
 
 
 def test_every_module_of_a_command_is_listed() -> None:
-    apart = {"complete", "loaded_modes", "lock", "main", "options", "output", "talk", "__init__"}
-    modules = {path.stem for path in (ROOT / "tyrecal/cli").glob("*.py")} - apart
+    files = (ROOT / "tyrecal/cli").glob("*.py")
+    modules = {path.stem for path in files if "\ndef command(" in path.read_text()}
     assert modules == {name.replace("-", "_") for name in COMMANDS}
 
 
