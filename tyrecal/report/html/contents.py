@@ -16,6 +16,12 @@ class Part(BaseModel):
     model_config = ConfigDict(extra="ignore", allow_inf_nan=False, frozen=True)
 
 
+class Whole(Part):
+    """A result file, not only a piece of one."""
+
+    format: Literal[1]
+
+
 Positive = Annotated[float, Field(gt=0)]
 Wave = Annotated[int, Field(ge=0, le=200)]
 
@@ -72,7 +78,7 @@ class FittedFootprint(Part):
     deviation_percent: float
 
 
-class Fit(Part):
+class Fit(Whole):
     """fit.json"""
 
     method: str
@@ -104,7 +110,7 @@ class Words(Part):
     design: str = ""
 
 
-class Modes(Part):
+class Modes(Whole):
     """modes.json"""
 
     pressure_kPa: float
@@ -134,7 +140,7 @@ class PressureRow(Part):
     modes: list[ModeEntry]
 
 
-class PressureSweep(Part):
+class PressureSweep(Whole):
     """pressure_sweep.json"""
 
     rows: Annotated[list[PressureRow], Field(min_length=1)]
@@ -151,7 +157,7 @@ class LoadRow(Part):
     modes: list[ModeEntry]
 
 
-class LoadSweep(Part):
+class LoadSweep(Whole):
     """load_sweep.json"""
 
     rows: Annotated[list[LoadRow], Field(min_length=1)]
@@ -173,7 +179,7 @@ class FootprintRow(Part):
     vertical_stiffness_N_per_m: float
 
 
-class Footprints(Part):
+class Footprints(Whole):
     """footprint.json"""
 
     rows: Annotated[list[FootprintRow], Field(min_length=1)]
@@ -191,7 +197,7 @@ class Patch(Part):
     pressure_kPa: list[list[float]]
 
 
-class Patches(Part):
+class Patches(Whole):
     """footprint_patches.json"""
 
     case: str
@@ -225,7 +231,7 @@ class Shape(Named):
     displacement: list[list[list[float]]] = []
 
 
-class Shapes(Part):
+class Shapes(Whole):
     """fit_shapes.json, modes_shapes.json"""
 
     case: str
@@ -317,7 +323,7 @@ class NextMeasurement(Part):
     hours: float
 
 
-class Diagnosis(Part):
+class Diagnosis(Whole):
     """diagnosis.json"""
 
     verdict: Literal["named", "undecided", "no_gap", "outside"]
@@ -336,7 +342,7 @@ class Diagnosis(Part):
     next_measurements: list[NextMeasurement]
 
 
-class DiagnosisSection(Part):
+class DiagnosisSection(Whole):
     """diagnosis_section.json"""
 
     case: str

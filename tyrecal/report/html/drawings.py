@@ -84,9 +84,8 @@ def section(found: Section, pressure_kPa: float) -> tuple[Markup, list[Key], str
 
 
 def section_map(found: DiagnosisSection, regions: Sequence[Region]) -> tuple[Markup, list[Key]]:
-    """Parts of the section, the stronger their colour the better a change of them alone
-    explains the gap, with
-    their places in the table as numbers."""
+    """Parts of the section, the stronger their colour the better a change of them alone explains
+    the gap, with their lines of the table as numbers."""
     place: dict[str, tuple[int, float]] = {}
     for k, region in enumerate(regions, 1):  # of several rubbers in a region the likelier one
         place.setdefault(region.region.split(",")[0], (k, region.evidence))
