@@ -16,7 +16,7 @@ from tyrecal.evaluate.door import Door, Question
 from tyrecal.evaluate.results import HarmonicShape
 from tyrecal.modes.label import paired_labels
 from tyrecal.modes.mode import Mode
-from tyrecal.report.html.results import Shapes
+from tyrecal.report.html.contents import Shapes
 from tyrecal.report.html.shapes import packed
 from tyrecal.report.kept import patches_data, section_data, tyre_data
 from tyrecal.report.revolve import motion, placed, skin, swept

@@ -190,6 +190,7 @@ def test_a_damaged_file_is_named(copy: Path, content: str) -> None:
     ("file", "old", "new"),
     [
         ("fit.json", '"objective_Hz": 8.603', '"objective_Hz": NaN'),
+        ("fit.json", '"format": 1', '"format": 2'),
         ("fit.json", '"target_Hz": 31.7', '"target_Hz": 0'),
         ("fit.json", '"fitted_Hz": 30.86', '"fitted_Hz": "fast"'),
         ("footprint.json", '"area_m2": 0.003', '"area_m2": -1'),

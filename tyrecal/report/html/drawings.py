@@ -11,7 +11,7 @@ import numpy as np
 from contourpy import contour_generator
 from markupsafe import Markup
 
-from .results import DiagnosisSection, Patch, Region, Section
+from .contents import DiagnosisSection, Patch, Region, Section
 from .svg import drawing
 
 ACROSS = 340.0  # pixels of a drawing's width
@@ -84,8 +84,8 @@ def section(found: Section, pressure_kPa: float) -> tuple[Markup, list[Key], str
 
 
 def section_map(found: DiagnosisSection, regions: Sequence[Region]) -> tuple[Markup, list[Key]]:
-    """Parts of the section, the darker the better a change of them alone explains the gap, with
-    their places in the table as numbers."""
+    """Parts of the section, the stronger their colour the better a change of them alone explains
+    the gap, with their lines of the table as numbers."""
     place: dict[str, tuple[int, float]] = {}
     for k, region in enumerate(regions, 1):  # of several rubbers in a region the likelier one
         place.setdefault(region.region.split(",")[0], (k, region.evidence))

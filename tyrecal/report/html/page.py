@@ -18,8 +18,9 @@ from ...files import whole
 from ..table import FOOTPRINT, QUANTITIES
 from ..words import motion
 from . import drawings, plots
+from .contents import LoadSweep, Shapes
 from .markdown import html
-from .results import BadResults, LoadSweep, Results, Shapes, read_results
+from .results import BadResults, Results, read_results
 from .shapes import packed
 from .summary import CLOSE, FAR, VERDICTS, design_words, summary
 from .svg import MINUS

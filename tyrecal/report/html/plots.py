@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 from markupsafe import Markup
 
 from ...modes.loaded import SYMMETRIES
 from ...modes.mode import FAMILIES, Label
-from .results import DesignPoint, Fit, FootprintRow, LoadRow, PressureRow, Residual
+from .contents import Fit, FootprintRow, LoadRow, PressureRow, Residual
+from .results import DesignPoint
 from .svg import Panel, around
 
 FEW = 50  # design points are marked one by one
@@ -44,8 +46,7 @@ def convergence(history: Sequence[DesignPoint], unit: str) -> list[Markup]:
     """The objective, and every variable over its start value, both logarithmic."""
     numbers = range(1, len(history) + 1)
     known = [(k, p.objective) for k, p in zip(numbers, history, strict=True) if p.objective]
-    x = around([1, max(2, len(history))], "design point")
-    x = type(x)(x.low, x.high, x.label, whole=True)
+    x = replace(around([1, max(2, len(history))], "design point"), whole=True)
     panels = []
     if known:
         top = Panel("Objective", x, around([o for _, o in known], unit, log=True))

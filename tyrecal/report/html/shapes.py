@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..words import motion
-from .results import Shape, Shapes
+from .contents import Shape, Shapes
 
 STEPS = 32767
 ANGLES = 60  # round the circumference, in the page

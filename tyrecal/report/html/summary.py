@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from ..words import fit_doubts, motion
-from .results import (
+from .contents import (
     Diagnosis,
     Failed,
     Fit,
@@ -15,8 +15,8 @@ from .results import (
     LoadSweep,
     Modes,
     PressureSweep,
-    Results,
 )
+from .results import Results
 
 CLOSE, FAR = 2.0, 5.0  # % of deviation, as the terminal colours them
 VERDICTS = {
