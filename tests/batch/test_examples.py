@@ -17,7 +17,10 @@ from ..conftest import CASES, ROOT
 
 WORKFLOW = CASES / "ci/tyres.yml"
 BIN = Path(sys.executable).parent
-LINES = "{extends: default, rules: {document-start: disable, line-length: {max: 120}, comments: {min-spaces-from-content: 1}}}"
+RULES = (
+    "{extends: default, rules: {document-start: disable, line-length: {max: 120},"
+    " comments: {min-spaces-from-content: 1}}}"
+)
 
 
 def steps() -> list[dict]:
@@ -27,7 +30,7 @@ def steps() -> list[dict]:
 @pytest.mark.parametrize(
     "command",
     [
-        ["yamllint", "--strict", "-d", LINES, str(CASES / "ci"), str(CASES / "cluster")],
+        ["yamllint", "--strict", "-d", RULES, str(CASES / "ci"), str(CASES / "cluster")],
         ["check-jsonschema", "--builtin-schema", "vendor.github-workflows", str(WORKFLOW)],
     ],
 )

@@ -16,9 +16,10 @@ import xmlschema
 
 from tyrecal.batch.run import names_of
 from tyrecal.batch.studies import STUDIES
-from tyrecal.cli import batch
+from tyrecal.cli import batch, progress
 from tyrecal.cli.progress import seconds_left
 
+from ..batch.data import entry, report
 from ..batch.support import poison, vary
 from ..conftest import ROOT
 from .test_cli import run
@@ -258,6 +259,17 @@ def test_the_command_names_the_librarys_studies() -> None:
     assert tuple(STUDIES) == batch.STUDIES
 
 
-def test_time_left_counts_what_ran() -> None:
+def test_time_left_counts_what_ran(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert seconds_left(10.0, 5, 20) == 40.0
     assert seconds_left(10.0, 0, 20) is None
+    monkeypatch.setattr(progress.time, "monotonic", iter([0.0, 1.0, 60.0, 70.0]).__next__)
+    with progress.Progress(4, quiet=False, verbose=False) as shown:
+        shown.notify({**report("a", fit=entry()), "facts": {"answered": True}})
+        shown.notify(report("b", fit=entry()))
+        shown.notify(report("c", fit=entry("error")))
+    assert capsys.readouterr().err.splitlines() == [
+        "2/4 b: good; 2:00 left",
+        "3/4 c: fit: error; 1 not good, 0:35 left",
+    ]
