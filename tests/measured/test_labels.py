@@ -47,6 +47,22 @@ def test_random_layouts_give_the_true_labels(tread: int, side: int, noise: float
     assert count == 12 * 14 and told > 0.97 * count and wrong <= 1
 
 
+def test_sensors_on_a_rim_at_rest_change_nothing() -> None:
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        sensors, nodes = layout(rng, 9, 3)
+        rim = np.column_stack([[0.215] * 9, np.repeat([0.4, 2.5, 4.6], 3), [0.09] * 9])
+        every = Sensors(
+            np.vstack([sensors.points, rim]), np.vstack([sensors.directions, *[np.eye(3)] * 3])
+        )
+        labeller = Labeller(every, HIGHEST + 2)
+        for mode in modes():
+            u = measured(mode, sensors, nodes, rng, 0.05)
+            still = 0.01 * np.abs(u).max() * rng.standard_normal(9)
+            judged = labeller.judge(real_part(np.concatenate([u, still]))[0])
+            assert judged.label == mode.label
+
+
 def test_poor_layouts_are_as_sure_as_they_are_right() -> None:
     sure, right = [], []
     for seed in range(25):

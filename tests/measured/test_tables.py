@@ -39,6 +39,7 @@ def read(tmp_path: Path, text: str | bytes, pressure: float | None = None) -> li
         "Mode,Inflation pressure (psi),f [rad/s],Damping [%],Remark\n"
         f"[0;0] lateral,{240 / 6.894757293168!r},{31.7 * 2 * pi!r},2.5,soft\n"
         f'"(2,1)",{240 / 6.894757293168!r},{66.1 * 2 * pi!r},2.5,\n',
+        "Mode;c;m;kind;pressure (kPa);f\n1;0;0;axial;240;31,7\n2;2;1;;240;66,1\n",
         "label;pressure_kPa;frequency_Hz\n[0,0] axial;240;31.7\n[2,1];240;66.1\n",
         "\n\nc;m;kind;p [MPa];freq. [kHz]\n0;0;Axial;0,24;0,0317\n\n2;1;;0,24;0,0661\n;;;;\n",
     ],

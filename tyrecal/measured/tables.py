@@ -239,7 +239,7 @@ def _values(
 
 def _label(text: dict[str, str]) -> Label:
     c, m, kind = text.get("c", ""), text.get("m", ""), text.get("kind", "")
-    if text.get("label"):
+    if text.get("label") and "c" not in text:  # beside c and m it is the mode's number
         match = LABEL.match(text["label"])
         if not match:
             raise ValueError(f"label is '{text['label']}', must be like [2,1] or [0,0] axial")

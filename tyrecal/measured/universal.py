@@ -22,6 +22,7 @@ Signal = tuple[int, int]  # number of a node; direction 1, 2 or 3, negative wher
 
 MARK = re.compile(rb" {4}-1(?: {74})?(?=[\r\n]|\Z)")  # binary values may stand before it
 FORMS = {8: "receptance", 11: "mobility", 12: "accelerance"}
+UNHEEDED = (151, 2400, 2412)  # titles and elements: nothing is lost without them
 RESPONSE, TIME = 4, 17  # codes of a function's type, and of what it stands over
 
 
@@ -89,6 +90,8 @@ def read_universal(path: Path) -> Universal:
     sets: list[tuple[str, dict[str, Any]]] = []
     for number, kind in enumerate(file.get_set_types()):
         place = f"{path}, data set {number + 1} (type {kind}, line {line_of(marks[2 * number])})"
+        if kind in UNHEEDED:
+            continue
         if kind not in (15, 55, 58, 82, 164, 2411):
             result.skipped[f"type {kind}"] = result.skipped.get(f"type {kind}", 0) + 1
             continue

@@ -1,0 +1,88 @@
+"""Several files together: geometry apart, more than one reference, modes that are missing."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tyrecal.measured.gather import gather, result
+from tyrecal.measured.modal import Layout
+from tyrecal.measured.sensors import BadMeasuredData
+from tyrecal.modes.mode import Label
+
+from .test_universal import function, shape, write
+
+F = np.arange(20.0, 140.0, 0.5)
+ANGLES = np.radians([3, 31, 65, 88, 124, 149, 187, 214, 246, 271, 303, 337])
+MODES = {Label(1, 0): 58.5, Label(2, 0): 79.5, Label(3, 0): 97.6, Label(4, 0): 115.9}
+LAYOUT = Layout(cylindrical=True, highest=6, band=(40.0, 130.0))
+
+
+def nodes(moved: float = 0.0) -> dict[str, Any]:
+    one = np.ones(12, int)
+    return {
+        "type": 15, "node_nums": np.arange(1, 13), "def_cs": one, "disp_cs": one, "color": one,
+        "x": 0.39 * np.cos(ANGLES) + moved, "y": 0.39 * np.sin(ANGLES),
+        "z": 0.05 * np.tile([1.0, -1.0, 0.0], 4),
+    }  # fmt: skip
+
+
+def functions(reference: int, seed: int, kept: range = range(12)) -> list[dict[str, Any]]:
+    """Mobilities, radial and tangential, of a belt that moves in its plane; the two of a doublet
+    are driven unlike by each reference."""
+    rng = np.random.default_rng(seed)
+    w, sets = 2 * np.pi * F, []
+    for node in kept:
+        for k in (1, 2):
+            H = np.zeros(len(F), complex)
+            for label, hertz in MODES.items():
+                turn = label.c * (ANGLES[node] - 0.4 * reference)
+                phi = np.cos(turn) if k == 1 else -np.sin(turn) / label.c
+                wk = 2 * np.pi * hertz
+                H += phi * 1j * w / (wk**2 - w**2 + 0.05j * w * wk)
+            H += 2e-5 * (rng.standard_normal(len(F)) + 1j * rng.standard_normal(len(F)))
+            sets.append({**function(H, F, node + 1), "rsp_dir": k, "ref_node": reference,
+                         "ordinate_spec_data_type": 11})  # fmt: skip
+    return sets
+
+
+def test_two_references_and_geometry_of_its_own(tmp_path: Path) -> None:
+    where = write(tmp_path / "where.uff", nodes())
+    files = [
+        write(tmp_path / f"{k}.uff", *functions(101, k), *functions(102, k + 9)) for k in (1, 2)
+    ]
+    found = gather([where, *files], 240.0, LAYOUT)
+    assert {row.label: row.value for row in found.rows} == pytest.approx(MODES, rel=1e-3)
+    assert len(found.runs) == 2 and not found.notes
+    assert all(run.explained > 0.99 for run in found.runs)
+    assert all(mode["confidence"] > 0.99 for mode in result(found)["modes"])
+    with pytest.raises(BadMeasuredData, match="node 1 has no coordinates"):
+        gather(files, 240.0, LAYOUT)
+
+
+def test_references_need_the_same_signals(tmp_path: Path) -> None:
+    path = write(tmp_path / "f.uff", nodes(), *functions(101, 1), *functions(102, 2, range(9)))
+    with pytest.raises(BadMeasuredData, match="node 10, direction 1 was not measured with every"):
+        gather([path], 240.0, LAYOUT)
+
+
+def test_files_must_agree_on_where_a_node_is(tmp_path: Path) -> None:
+    one = write(tmp_path / "1.uff", nodes(), shape(np.ones((8, 3)) + 0j))
+    two = write(tmp_path / "2.uff", nodes(0.01), shape(np.ones((8, 3)) + 0j))
+    with pytest.raises(BadMeasuredData, match=r"2\.uff: node 1 stands elsewhere"):
+        gather([one, two], 240.0, LAYOUT)
+
+
+def test_a_mode_that_was_missed_is_noticed(tmp_path: Path) -> None:
+    narrow = Layout(cylindrical=True, highest=6, band=(70.0, 90.0))
+    plain = write(tmp_path / "f.uff", nodes(), *functions(101, 1))
+    assert not gather([plain], 240.0, narrow).notes  # what lies outside the band is allowed for
+    sharp = functions(101, 1)
+    w, wk = 2 * np.pi * F, 2 * np.pi * 70.0
+    for each in sharp:  # a resonance that is no tyre's: too sharp to be taken for one
+        each["data"] = each["data"] + 0.2j * w / (wk**2 - w**2 + 2e-3j * w * wk)
+    (note,) = gather([write(tmp_path / "g.uff", nodes(), *sharp)], 240.0, LAYOUT).notes
+    assert "the modes make" in note and "one may be missing" in note
