@@ -18,6 +18,13 @@ GUIDES = [
     "cases/own_tyre.md",
     "cases/diagnosis.md",
     "cases/blind.md",
+    "cases/own_effect.md",
+    "cases/own_solver.md",
+    "cases/own_template.md",
+    "cases/python.md",
+    "cases/theory.md",
+    "cases/batch.md",
+    "cases/cluster.md",
     "cases/measured_data.md",
     "solvers/README.md",
 ]
@@ -45,10 +52,21 @@ def test_commands_of(guide: str, tmp_path: Path) -> None:
         assert done.returncode == 0, f"{command}\n{done.stdout[-1500:]}{done.stderr[-1500:]}"
 
 
+@pytest.mark.parametrize("guide", ["README.md", "cases/python.md"])
+def test_python_of(guide: str, tmp_path: Path) -> None:
+    shutil.copytree(ROOT / "cases", tmp_path / "cases")
+    (program,) = re.findall(r"```python\n(.*?)```", (ROOT / guide).read_text(), re.S)
+    done = subprocess.run(
+        [sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr[-1500:]
+    assert len(done.stdout.splitlines()) >= 6
+
+
 def test_ci_runs_the_readmes_test_command_and_nothing_cleverer() -> None:
     (test_command,) = [c for c in commands("README.md") if OWN_SETUP in c and "pytest" in c]
     lines = (ROOT / ".ci/run").read_text().splitlines()
-    aside = ("#", "set ", "cd ", "command -v ccx")  # the last is Debian's business
+    aside = ("#", "set ", "cd ", "command -v ccx", "command -v chromedriver")  # Debian's business
     body = [line for line in lines if line and not line.startswith(aside)]
     assert body == [test_command]
 

@@ -10,6 +10,7 @@ modes were asked for: mode_frequency_Hz (m,), mode_shape (m, ring, node, 3) at m
 from __future__ import annotations
 
 import json
+import logging
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -35,6 +36,7 @@ from .road import flat_road
 from .section import Lines
 
 Array = np.ndarray
+log = logging.getLogger("tyrecal_solvers")
 ARRAYS = ("ring", "node", "along_m", "across_m", "pressure_Pa", "area_m2", "traction_Pa")
 SMALLEST_SLIP = 1e-6  # m, before friction is full: harder sticks are not reached
 
@@ -184,6 +186,7 @@ def press(
             cause = "timed_out" if isinstance(error, give_up) else CAUSES[type(error)]
             break
         footprints.append(footprint)
+        log.info("load %d of %d is reached: %g N", len(footprints), len(wanted), load)
     rest = around.angles[1:-1][::-1]
     return {
         "free_radius_m": work.free_radius,

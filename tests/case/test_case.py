@@ -83,7 +83,7 @@ def test_every_mistake_in_one_go_with_its_line(tmp_path: Path) -> None:
         ("1100.0", "-1100.0"),
         ("material: belt_cord", "material: steel"),
         ("upper: 1.0e+7", "upper: 1.0e+4"),
-        ("level: default\n", "level: coarse\n"),
+        ("level: default\n", "level: finest\n"),
         ("{c: 1, m: 0,", "{c: 1, m: 1,"),
         ("sectors: 60", "sector: 60"),
     )

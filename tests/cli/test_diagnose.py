@@ -17,7 +17,7 @@ from .test_cli import run
 
 HEADER = "quantity,c,m,kind,member,pressure_kPa,load_N,value,sigma"
 EFFECTS = ["--effect", "bead_filler", "--effect", "pressure_offset"]
-FILES = ("diagnosis.json", "diagnosis.md")
+FILES = ("diagnosis.json", "diagnosis.md", "diagnosis_section.json")
 PICTURES = ("residuals", "probabilities", "held_out", "section")
 
 
@@ -26,7 +26,7 @@ def coarse(case_folder: Path) -> Path:
     """The main case with a coarse mesh."""
     path = case_folder / "p235_75r17.yaml"
     text = path.read_text().replace("\n    default:\n", COARSE)
-    path.write_text(text.replace("level: default", "level: coarse"))
+    path.write_text(text.replace("level: default", "level: small"))
     return path
 
 
@@ -62,10 +62,11 @@ def test_a_diagnosis_in_files_and_again_from_the_record(
     for name in PICTURES:
         assert (out / f"diagnosis_{name}.png").stat().st_size > 3000
     before = {name: (out / name).read_bytes() for name in FILES}
-    assert run(*command, "--quiet", "--no-pictures", "--jobs", "2") == 0
+    assert run(*command, "--quiet", "--no-pictures", "--jobs", "2", "--report") == 0
     assert capsys.readouterr().out == ""
     assert {name: (out / name).read_bytes() for name in FILES} == before
     assert json.loads((out / "run.json").read_text())["solver_runs"] == 0
+    assert "Bead filler" in (out / "report.html").read_text()
 
 
 def test_an_added_effect_makes_a_case(

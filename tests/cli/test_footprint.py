@@ -44,7 +44,7 @@ def test_both_designs(
         "peak_pressure_Pa", "vertical_stiffness_N_per_m",
     }  # fmt: skip
     assert {path.name for path in out.iterdir() if path.suffix} - {".lock"} == {
-        "run.json", "footprint.json", "footprint.csv", "footprint.png",
+        "run.json", "footprint.json", "footprint_patches.json", "footprint.csv", "footprint.png",
         *(f"footprint_{name}{rest}" for name in ("initial", "fitted")
           for rest in (".png", "_1000N.vtu", "_4000N.vtu")),
     }  # fmt: skip
@@ -115,7 +115,7 @@ def test_jobs_and_the_record_change_no_byte(tmp_path: Path) -> None:
     assert run(*arguments, str(out[0])) == 0
     assert run(*arguments, str(out[1]), "--jobs", "2") == 0
     names = sorted(path.name for path in out[1].glob("footprint*"))
-    assert len(names) == 2 + 3 + 2
+    assert len(names) == 3 + 3 + 2
     assert all((out[0] / name).read_bytes() == (out[1] / name).read_bytes() for name in names)
     before = {name: (out[1] / name).read_bytes() for name in names}
     assert run(*arguments, str(out[1])) == 0

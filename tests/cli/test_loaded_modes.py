@@ -28,9 +28,12 @@ def test_one_load_the_record_and_a_load_out_of_reach(
     assert len(result["modes"]) == 10
     assert {mode["multiplicity"] for mode in result["modes"]} == {1}
     assert "antisymmetric" in capsys.readouterr().out
-    assert run(*arguments, "--json") == 0
+    shapes = (out / "modes_shapes.json").read_bytes()
+    assert run(*arguments, "--json", "--report") == 0
     assert json.loads(capsys.readouterr().out) == result
     assert (out / "modes.json").read_bytes() == first
+    assert (out / "modes_shapes.json").read_bytes() == shapes
+    assert "Mode shapes under 300 N" in (out / "report.html").read_text()
     facts = json.loads((out / "run.json").read_text())
     assert (facts["solver_runs"], facts["answered_from_record"]) == (0, 2)
     sweep = ["modes", case, "--output", str(out), "--sweep-load", "0,300,300000"]

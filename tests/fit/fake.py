@@ -44,7 +44,7 @@ class FakeDoor:
     fails: designs for which the solver gives up.
     """
 
-    solver_name, folder, solver = "fake", None, None
+    solver_name, folder, solver, scheduler = "fake", None, None, ""
 
     def __init__(
         self,

@@ -21,7 +21,7 @@ from tyrecal.fit.problem import Problem
 
 STANDIN = Path(__file__).with_name("standin_abaqus.py")
 COARSE = """
-    coarse:
+    small:
       elements: {crown: 4, upper_sidewall: 3, lower_sidewall: 3, bead: 1}
       rows: [1, 1, 1, 1]
     default:
@@ -44,7 +44,7 @@ def coarse(case_folder: Path) -> Callable[..., Path]:
             ("  options: {}", f"  options: {json.dumps(options)}"),
             ("\n    default:\n", COARSE),
             ("time_limit_s: 300", f"time_limit_s: {time_limit_s}"),
-            ("level: default", "level: coarse"),
+            ("level: default", "level: small"),
             ("sectors: 60", "sectors: 24"),
         ):
             assert text.count(old) == 1

@@ -3,10 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
-import re
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -15,33 +11,15 @@ from tyrecal.case import load_case, start_values
 from tyrecal.evaluate.door import Door, Question
 
 from ..conftest import CASES, ROOT
+from ..example import install, tyrecal
 
-GUIDE = (ROOT / "solvers/OWN_SOLVER.md").read_text()
-
-
-def tyrecal(site: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "tyrecal", *arguments],
-        env={**os.environ, "PYTHONPATH": str(site)},
-        capture_output=True,
-        text=True,
-    )
+GUIDE = (ROOT / "cases/own_solver.md").read_text()
 
 
 @pytest.fixture
 def site(tmp_path: Path) -> Path:
     """A folder of packages with the example installed in it."""
-    code, registration = (
-        re.search(rf"```{language}\n(.*?)```", GUIDE, re.S) for language in ("python", "toml")
-    )
-    assert code and registration
-    (tmp_path / "my_solver.py").write_text(code[1])
-    entry = registration[1].splitlines()[1].replace('"', "")
-    info = tmp_path / "my_solver-1.0.dist-info"
-    info.mkdir()
-    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: my-solver\nVersion: 1.0\n")
-    (info / "entry_points.txt").write_text(f"[tyrecal.solvers]\n{entry}\n")
-    return tmp_path
+    return install(GUIDE, "my_solver", tmp_path)
 
 
 def test_the_example_gives_the_bundled_solvers_frequencies(site: Path, tmp_path: Path) -> None:
@@ -70,8 +48,20 @@ def test_its_fit_needs_no_gradients(site: Path, tmp_path: Path) -> None:
     """Two free variables by finite differences, one of them already at its optimum."""
     out = tmp_path / "out"
     done = tyrecal(site, "fit", str(CASES / "p235_75r17.yaml"), "--solver", "my-solver",
-                   "--fix", "A_belt", "--fix", "A_carcass", "--no-pictures",
+                   "--fix", "A_belt", "--fix", "A_carcass", "--no-pictures", "--mesh", "coarse",
                    "--output", str(out))  # fmt: skip
     assert done.returncode == 0, done.stderr
     fit = json.loads((out / "fit.json").read_text())
     assert fit["converged"] and fit["objective_Hz"] < 0.5 * fit["initial_objective_Hz"]
+
+
+def test_it_is_as_short_as_the_guide_says() -> None:
+    code = GUIDE.split("```python\n")[1].split("```")[0]
+    assert len([line for line in code.splitlines() if line.strip()]) <= 40
+
+
+def test_the_doctor_finds_it_sound(site: Path) -> None:
+    done = tyrecal(site, "doctor", "--solver", "my-solver", "--json")
+    assert done.returncode == 0, done.stderr
+    check = json.loads(done.stdout)["self_check"]
+    assert check["ok"] and all(abs(m["deviation_percent"]) < 0.01 for m in check["modes"])

@@ -3,7 +3,7 @@
     python -m tests.studies.footprint_fit DIR [--mesh LEVEL]
 
 Writes DIR/known.yaml: the main case with targets that its own model has at TRUTH, frequencies with
-a sigma of 0.5 Hz, areas and stiffnesses of 2 %, and a mesh ``coarse`` besides its own. Then fits it
+a sigma of 0.5 Hz, areas and stiffnesses of 2 %, and a mesh ``small`` besides its own. Then fits it
 with and without the footprint targets, and prints what was found and the standard errors.
 """
 
@@ -27,7 +27,7 @@ from ..conftest import CASES
 
 TRUTH = {"A_belt": 2.6e-7, "A_carcass": 2.5e-7, "C10": 7.0e5}
 COARSE = """\
-    coarse:
+    small:
       elements: {crown: 4, upper_sidewall: 4, lower_sidewall: 4, bead: 1}
       rows: [1, 1, 1, 1]
 """
@@ -44,7 +44,7 @@ def known_case(folder: Path, mesh: str) -> Path:
         .replace("    default:\n", f"{COARSE}    default:\n", 1)
     )
     text = text.replace("level: default\n", f"level: {mesh}\n", 1)
-    if mesh == "coarse":
+    if mesh == "small":
         text = text.replace("variables:", f"{ROAD}variables:", 1)
     path = folder / "known.yaml"
     path.write_text(text)
@@ -101,5 +101,5 @@ def main(folder: Path, mesh: str) -> None:
 
 
 if __name__ == "__main__":
-    level = sys.argv[sys.argv.index("--mesh") + 1] if "--mesh" in sys.argv else "coarse"
+    level = sys.argv[sys.argv.index("--mesh") + 1] if "--mesh" in sys.argv else "small"
     main(Path(sys.argv[1]), level)

@@ -3,7 +3,7 @@
 from .load import LoadedCase, load_case, validate
 from .mistakes import CaseError, Mistake
 from .schema import Case
-from .variables import number_at, parse_assignment, start_values, with_values
+from .variables import number_at, parse_assignment, start_values, with_level, with_values
 
 __all__ = [
     "Case",
@@ -15,5 +15,6 @@ __all__ = [
     "parse_assignment",
     "start_values",
     "validate",
+    "with_level",
     "with_values",
 ]

@@ -46,6 +46,15 @@ def parse_assignment(text: str) -> tuple[str, float]:
     return name, number
 
 
+def with_level(loaded: LoadedCase, level: str) -> LoadedCase:
+    """The case at another of its mesh levels. Raises ValueError where it has none of this name."""
+    mesh = loaded.case.mesh
+    if level not in mesh.levels:
+        raise ValueError(f"mesh level '{level}' is not one of the case's: {', '.join(mesh.levels)}")
+    case = loaded.case.model_copy(update={"mesh": mesh.model_copy(update={"level": level})})
+    return replace(loaded, case=case)
+
+
 def with_values(loaded: LoadedCase, values: Mapping[str, float]) -> LoadedCase:
     """A new case with variables (by name) or any of its numbers (by dotted path) set.
 

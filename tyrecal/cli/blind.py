@@ -7,7 +7,9 @@ from typing import Any
 
 import click
 
-from . import options
+from . import complete, options
+from .output import RESUME
+from .talk import Progress, Talk
 
 folder = click.argument("folder", type=click.Path(path_type=Path, file_okay=False), metavar="DIR")
 truth = click.option(
@@ -33,6 +35,7 @@ def command() -> None:
 @folder
 @click.option(
     "--case", "case_path", type=click.Path(path_type=Path), required=True, metavar="CASE",
+    shell_complete=complete.cases,
     help="The plain model, its uncertainties and the modes measured.",
 )  # fmt: skip
 @click.option("--maker", default="bundled", show_default=True, metavar="NAME",
@@ -45,10 +48,12 @@ def command() -> None:
 @click.option("--outside", type=click.IntRange(0), default=80, show_default=True, metavar="N",
               help="Trials with what the catalogue does not hold.")  # fmt: skip
 @click.option("--effect", "drawn", multiple=True, metavar="EFFECT",
+              shell_complete=complete.effects,
               help="Draw these effects only; repeatable (default: all it can).")  # fmt: skip
 @click.option("--seed", type=int, metavar="N", help="Of all that is drawn (default: a secret one).")
 @truth
-@options.every(options.jobs, options.quiet)
+@options.jobs
+@options.talking
 def make(
     folder: Path,
     case_path: Path,
@@ -60,11 +65,14 @@ def make(
     seed: int | None,
     truth: Path | None,
     jobs: int,
-    quiet: bool,
+    talk: Talk,
 ) -> int:
     """Draw tyres, compute them, seal the truth and write measurements to DIR.
 
     The same command goes on where it was stopped.
+
+    \b
+    tyrecal blind make trials --case cases/p235_75r17.yaml --effects 60 --none 40 --outside 20
     """
     from dataclasses import replace
 
@@ -76,7 +84,6 @@ def make(
     from ..case import load_case
     from ..evaluate.door import Door
     from ..evaluate.store import Store
-    from .output import say
 
     if maker not in NAMES:
         raise click.UsageError(f"--maker {maker}: must be one of {', '.join(NAMES)}")
@@ -92,11 +99,14 @@ def make(
         who = replace(who, laws={id: who.laws[id] for id in drawn})
     counts = {"effect": effects, "none": plain, "outside": outside}
     protocol = Protocol(who.about, case.path.name, counts)
-    mark = made(folder, sealed, case, protocol, who, jobs, seed, _told("made", quiet))
+    _goes_on("trials that were made are kept")
+    with talk.progress("make trials") as bar:
+        mark = made(folder, sealed, case, protocol, who, jobs, seed, _told("made", talk, bar))
     door = Door(case, "bundled", store=store)
     write_ruler(folder, measure(tyre_model(case, door, protocol, jobs), rows_of(case, protocol)))
-    say(f"{sum(counts.values())} trials in {folder}; the truth is in {sealed}, sha256 {mark}",
-        False, quiet)  # fmt: skip
+    number = sum(counts.values())
+    talk.result({"trials": number, "folder": str(folder), "truth": str(sealed), "sha256": mark})
+    talk.say(f"{number} trials in {folder}; the truth is in {sealed}, sha256 {mark}")
     return 0
 
 
@@ -105,19 +115,24 @@ def make(
 @click.option("--emulated/--asked", default=True, show_default=True,
               help="Ask the model at some designs once, or for each trial.")  # fmt: skip
 @click.option("--effect", "effects", multiple=True, metavar="EFFECT",
+              shell_complete=complete.effects,
               help="Consider these effects only; repeatable.")  # fmt: skip
-@options.every(options.jobs, options.store, options.quiet)
+@options.every(options.jobs, options.store)
+@options.talking
 def answer(
     folder: Path,
     emulated: bool,
     effects: tuple[str, ...],
     jobs: int,
     store: Path | None,
-    quiet: bool,
+    talk: Talk,
 ) -> int:
     """Answer every trial of DIR with the diagnosis; needs nothing but DIR.
 
     Answers that are there stay; the same command goes on where it was stopped.
+
+    \b
+    tyrecal blind answer trials --jobs 2
     """
     from ..blind import answer as blind
     from ..blind.emulated import emulate
@@ -127,7 +142,6 @@ def answer(
     from ..effects import catalogue
     from ..evaluate.door import Door
     from ..evaluate.store import Store
-    from .output import say
 
     for id in effects:
         if id not in catalogue():
@@ -138,35 +152,39 @@ def answer(
     model: Response = blind.tyre_model(case, door, protocol, jobs, effects or None)
     if emulated:
         model = emulate(model)
-    mark = blind.answer(folder, model, blind.rows_of(case, protocol), jobs,
-                        _told("answered", quiet))  # fmt: skip
-    say(f"all trials of {folder} are answered, sha256 {mark}", False, quiet)
+    _goes_on("answers that were given are kept")
+    with talk.progress("answer trials") as bar:
+        rows = blind.rows_of(case, protocol)
+        mark = blind.answer(folder, model, rows, jobs, _told("answered", talk, bar))
+    talk.result({"folder": str(folder), "sha256": mark})
+    talk.say(f"all trials of {folder} are answered, sha256 {mark}")
     return 0
 
 
 @command.command()
 @folder
 @truth
-@options.every(options.as_json, options.quiet)
-def score(folder: Path, truth: Path | None, as_json: bool, quiet: bool) -> int:
+@options.talking
+def score(folder: Path, truth: Path | None, talk: Talk) -> int:
     """Open the truth and score the answers of DIR: score.json, score.md.
 
     The seals are checked first: the truth must be what was sealed, and answers what was hashed.
+
+    \b
+    tyrecal blind score trials --json
     """
     from ..blind.protocol import read_protocol, write_json
     from ..blind.score import score as scored
     from ..blind.tables import page, summary
     from ..files import whole
-    from .output import print_json, say
 
     figures = summary(scored(folder, _sealed(folder, truth)))
     write_json(folder / "score.json", figures)
     words = page(figures, read_protocol(folder).maker)
     with whole(folder / "score.md") as partial:
         partial.write_text(words, encoding="utf-8", newline="")
-    if as_json:
-        print_json(figures)
-    say(words, as_json, quiet)
+    talk.result(figures)
+    talk.say(words)
     return 0
 
 
@@ -174,11 +192,17 @@ def _sealed(folder: Path, truth: Path | None) -> Path:
     return truth or folder.with_name(f"{folder.name}-truth")
 
 
-def _told(what: str, quiet: bool) -> Any:
-    """Prints how far it is, on standard error, every tenth of the way."""
+def _goes_on(words: str) -> None:
+    meta = click.get_current_context().meta
+    meta[RESUME] = f"{words}; the same command goes on from there"
+
+
+def _told(what: str, talk: Talk, bar: Progress) -> Any:
+    """Says how far it is: the bar, and a line at every tenth of the way."""
 
     def told(done: int, all: int) -> None:
-        if not quiet and (done == all or done % max(1, all // 10) == 0):
+        bar.at(done, all)
+        if not talk.quiet and (done == all or done % max(1, all // 10) == 0):
             click.echo(f"{what} {done} of {all}", err=True)
 
     return told

@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from . import options
+from .talk import Talk
 
 
 @click.command()
@@ -18,9 +19,8 @@ from . import options
     options.mesh,
     options.solver,
     options.output,
-    options.as_json,
-    options.quiet,
 )
+@options.talking
 def command(
     case: Path,
     assignments: tuple[str, ...],
@@ -29,8 +29,7 @@ def command(
     mesh: str,
     solver: str,
     output: Path | None,
-    as_json: bool,
-    quiet: bool,
+    talk: Talk,
 ) -> int:
     """Write the decks of CASE, to read or to run elsewhere.
 
@@ -41,7 +40,7 @@ def command(
     """
     from ..deck.write import Decks
     from ..evaluate.door import Door
-    from .output import Run, print_json, say
+    from .output import Run
 
     loaded, values = options.load(case, mesh, assignments, pressure_kPa)
     door = Door(loaded, solver)
@@ -56,7 +55,8 @@ def command(
     run = Run(case, output, "deck", adapter)
     paths = [str(path) for path in adapter.write(decks, run.folder)]
     run.finish()
-    if as_json:
-        print_json(paths)
-    say("\n".join(paths), as_json, quiet or as_json)
+    talk.result(paths)
+    if not talk.as_json:
+        talk.say("\n".join(paths))
+    talk.detail(f"written for solver '{adapter.name}' from the templates '{adapter.dialect}'")
     return 0

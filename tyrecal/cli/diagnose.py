@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from . import options
+from . import complete, options
 
 file = click.Path(path_type=Path, exists=True, dir_okay=False)
 
@@ -20,18 +20,19 @@ file = click.Path(path_type=Path, exists=True, dir_okay=False)
               help="A run of the same tyre with one thing switched: EFFECT=VALUE (0: absent) or"
               " EFFECT*FACTOR; repeatable.")  # fmt: skip
 @click.option("--effect", "effects", multiple=True, metavar="EFFECT",
+              shell_complete=complete.effects,
               help="Consider these effects only; repeatable.")  # fmt: skip
-@click.option("--without", multiple=True, metavar="EFFECT",
+@click.option("--without", multiple=True, metavar="EFFECT", shell_complete=complete.effects,
               help="Leave out an effect that is ruled out; repeatable.")  # fmt: skip
 @click.option("--form-percent", type=click.FloatRange(0, 20), metavar="PERCENT",
               help="Error of the model's own form in every frequency (default: on record, mode by"
               " mode).")  # fmt: skip
 @click.option("--split-percent", type=click.FloatRange(0, 20), default=0.3, show_default=True,
               metavar="PERCENT", help="Split of pairs that every such tyre has.")  # fmt: skip
-@click.option("--add", metavar="EFFECT=VALUE",
+@click.option("--add", metavar="EFFECT=VALUE", shell_complete=complete.effect_values,
               help="Write a case with the effect in it, and do nothing else.")  # fmt: skip
 @click.option("--pictures/--no-pictures", default=True, help="Draw what was found.")
-@options.every(*options.STUDY)
+@options.study
 def command(
     case: Path,
     assignments: tuple[str, ...],
@@ -44,15 +45,7 @@ def command(
     split_percent: float,
     add: str | None,
     pictures: bool,
-    jobs: int,
-    mesh: str,
-    solver: str,
-    output: Path | None,
-    store: Path | None,
-    no_store: bool,
-    as_json: bool,
-    quiet: bool,
-    verbose: bool,
+    study: options.Study,
 ) -> int:
     """Find where CASE and measurements part, and which effect explains it.
 
@@ -65,48 +58,49 @@ def command(
     tyrecal diagnose my.yaml --measured run1.csv --toggled clamped.csv spindle_lateral=0
     tyrecal diagnose my.yaml --add bead_filler=1.5
     """
-    from .output import say
-
+    talk = study.talk
     if add:
-        path = _added(case, add, output)
-        say(f"{path} has the effect in it; 'tyrecal fit {path}' calibrates it", as_json, quiet)
+        path = _added(case, add, study.output)
+        talk.result({"case": str(path)})
+        talk.say(f"{path} has the effect in it; 'tyrecal fit {path}' calibrates it")
         return 0
     if measured is None:
         raise click.UsageError("--measured FILE must be given, or --add EFFECT=VALUE")
     from ..diagnose.problem import Assumed
     from ..diagnose.result import result
-    from ..diagnose.study import parse_change, study
+    from ..diagnose.study import parse_change
+    from ..diagnose.study import study as diagnosed
     from ..effects import catalogue
-    from ..evaluate.door import Door
     from ..report.diagnosis import page
-    from .output import Run, print_json
+    from ..report.kept import parts_data
 
-    loaded, _ = options.load(case, mesh, assignments, None)
+    loaded, _ = study.load(case, assignments)
     for id in (*effects, *without):
         if id not in catalogue():
             raise click.UsageError(f"'{id}': no such effect, only {', '.join(catalogue())}")
     considered = [id for id in effects or catalogue() if id not in without]
     changes = [(path, parse_change(text)) for path, text in toggled]
-    door = Door(loaded, solver)
-    run = Run(case, output, "diagnose", door.solver)
-    door.folder, door.keep = run.runs, verbose
-    door.store = run.open_store(store, no_store)
+    door = study.door(loaded)
+    run = study.run(case, "diagnose", door)
     form = None if form_percent is None else form_percent / 100
     assumed = Assumed(form, split_percent / 100)
-    found = study(loaded, door, measured, repeats, changes, assumed, jobs, considered)
+    with talk.progress("evaluations") as bar:
+        door.heard = bar.at
+        found = diagnosed(loaded, door, measured, repeats, changes, assumed, study.jobs, considered)
     told = result(found.diagnosis)
     run.write_json("diagnosis.json", told)
+    named = [part["region"] for part in told["section_map"]]
+    run.write_json("diagnosis_section.json", parts_data(loaded, named))
     words = page(found, loaded.case.name, measured.name)
     run.write_text("diagnosis.md", words)
     if pictures:
         from ..report.diagnosis_pictures import draw_diagnosis
 
         draw_diagnosis(run.folder, loaded, found)
-    run.finish(solver_runs=door.counts.runs, answered_from_record=door.counts.recorded)
-    if as_json:
-        print_json(told)
-    say(words, as_json, quiet)
-    say(f"results in {run.folder}", as_json, quiet)
+    run.finish()
+    talk.result(told)
+    talk.say(words)
+    study.finish(run)
     return 0
 
 

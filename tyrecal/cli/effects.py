@@ -7,13 +7,14 @@ from typing import Any
 
 import click
 
-from . import options
+from . import complete, options
 from .main import EXIT_SOLVER
 
 
 @click.command()
-@click.argument("name", required=False)
+@click.argument("name", required=False, shell_complete=complete.effects)
 @click.option("--case", "case", type=click.Path(path_type=Path), metavar="CASE",
+              shell_complete=complete.cases,
               help="Compute what the effect does to this tyre.")  # fmt: skip
 @options.fitted("Compute it for the design that 'tyrecal fit' found for the case.")
 @click.option("--value", type=float, metavar="V",
@@ -21,10 +22,8 @@ from .main import EXIT_SOLVER
 @click.option("--pressures-kPa", "pressures", metavar="P1,P2,...",
               help="Default: two thirds of the case's, the case's, four thirds.")  # fmt: skip
 @click.option("--pictures/--no-pictures", default=True, help="Draw each signature.")
-@options.every(
-    options.assignments, options.mesh, options.solver, options.output, options.store,
-    options.no_store, options.as_json, options.quiet, options.verbose,
-)  # fmt: skip
+@options.assignments
+@options.study_one_by_one
 def command(
     name: str | None,
     case: Path | None,
@@ -33,14 +32,7 @@ def command(
     pressures: str | None,
     pictures: bool,
     assignments: tuple[str, ...],
-    mesh: str,
-    solver: str,
-    output: Path | None,
-    store: Path | None,
-    no_store: bool,
-    as_json: bool,
-    quiet: bool,
-    verbose: bool,
+    study: options.Study,
 ) -> int:
     """List what a plain tyre model leaves out, or explain the effect NAME.
 
@@ -54,69 +46,69 @@ def command(
     """
     from ..case.mistakes import suggestion
     from ..effects import IDS, catalogue
-    from ..evaluate.door import Door
     from ..evaluate.failure import EvaluationFailed
     from ..evaluate.solver import installed
     from ..report.effects import effect_entry, effect_text, signature_entry
     from ..report.signature import draw_signature
     from ..report.table import effects_table, signatures_table
     from ..studies.signature import Plain, stated_size
-    from .output import Run, print_json, say, show
+
+    talk = study.talk
 
     if name is not None and name not in IDS:
         raise click.UsageError(f"there is no effect '{name}'{suggestion(name, IDS)}")
     if value is not None and name is None:
         raise click.UsageError("--value needs the NAME of an effect")
     given = {"fitted": fitted, "value": value is not None, "pressures-kPa": pressures,
-             "set": assignments, "mesh": mesh, "solver": solver, "output": output}  # fmt: skip
+             "set": assignments, "mesh": study.mesh, "solver": study.solver,
+             "output": study.output}  # fmt: skip
     for option in (option for option, there in given.items() if there and not case):
         raise click.UsageError(f"--{option} needs a --case")
     solvers = installed()
     entries = {id: effect_entry(catalogue()[id], solvers) for id in ([name] if name else IDS)}
     if not case:
-        if as_json:
-            print_json(list(entries.values()))
-        elif name:
-            say(effect_text(entries[name]), as_json, quiet)
+        talk.result(list(entries.values()))
+        if name and not talk.as_json:
+            talk.say(effect_text(entries[name]))
         else:
-            show(effects_table(list(entries.values())), as_json, quiet)
+            talk.show(effects_table(list(entries.values())))
         return 0
 
-    loaded, values = options.load(case, mesh, assignments, None)
-    door = Door(loaded, solver)
+    loaded, values = study.load(case, assignments)
+    door = study.door(loaded)
     adapter = door.solver
     if not door.has_gradients:
         raise click.UsageError(f"solver '{adapter.name}' gives no slopes, which a re-fit needs")
     kPa = _pressures(loaded, pressures)
     if fitted:
-        values = options.fitted_values(fitted, loaded, solver)
-    run = Run(case, output, "effects", adapter)
-    door.folder, door.keep = run.runs, verbose
-    door.store = run.open_store(store, no_store)
+        values = options.fitted_values(fitted, loaded, study.solver)
+    run = study.run(case, "effects", door)
     plain = Plain(door, values, kPa)
-    if name and not as_json:
-        say(effect_text(entries[name]) + "\n", as_json, quiet)
+    if name and not talk.as_json:
+        talk.say(effect_text(entries[name]) + "\n")
     found, failed = [], 0
-    for id, entry in entries.items():
-        if not name and adapter.name not in entry["solvers"]:
-            say(f"{id}: solver '{adapter.name}' cannot express it", as_json, quiet)
-            continue
-        try:
-            signature = plain.signature(id, stated_size(id) if value is None else value)
-        except EvaluationFailed as error:
-            failed += 1
-            click.secho(f"error: {id}: {error}", fg="red", err=True)
-            continue
-        found.append({**entry, **signature_entry(signature, values)})
-        if pictures:
-            draw_signature(run.folder / f"effect_{id}.png", signature)
+    with talk.progress("effects") as bar:
+        for done, (id, entry) in enumerate(entries.items()):
+            bar.at(done, len(entries))
+            if not name and adapter.name not in entry["solvers"]:
+                talk.say(f"{id}: solver '{adapter.name}' cannot express it")
+                continue
+            talk.detail(f"{id} at {', '.join(f'{p:g}' for p in kPa)} kPa")
+            try:
+                signature = plain.signature(id, stated_size(id) if value is None else value)
+            except EvaluationFailed as error:
+                failed += 1
+                talk.error(f"{id}: {error}")
+                continue
+            found.append({**entry, **signature_entry(signature, values)})
+            if pictures:
+                draw_signature(run.folder / f"effect_{id}.png", signature)
     run.write_json("effects.json", found)
-    run.finish(solver_runs=door.counts.runs, answered_from_record=door.counts.recorded)
-    if as_json:
-        print_json(found)
-    elif found:
-        show(signatures_table(found), as_json, quiet)
-    say(f"results in {run.folder}", as_json, quiet)
+    run.finish()
+    talk.result(found)
+    if found:
+        talk.show(signatures_table(found))
+    talk.say(f"results in {run.folder}")
     return EXIT_SOLVER if failed else 0
 
 

@@ -8,8 +8,9 @@ from typing import Any
 
 import click
 
-from . import options
+from . import complete, options
 from .main import EXIT_FIT
+from .talk import Progress, Talk
 
 
 @click.command()
@@ -27,7 +28,8 @@ from .main import EXIT_FIT
     metavar="FILE",
     help="Measurements (CSV) at the case's pressure in place of its targets.",
 )
-@click.option("--fix", multiple=True, metavar="NAME", help="Hold a variable at its start value.")
+@click.option("--fix", multiple=True, metavar="NAME", shell_complete=complete.variables,
+              help="Hold a variable at its start value.")  # fmt: skip
 @click.option(
     "--starts",
     type=click.IntRange(1, 100000),
@@ -45,7 +47,8 @@ from .main import EXIT_FIT
     help="Seed of the drawn starts.",
 )
 @click.option("--pictures/--no-pictures", default=True, help="Draw convergence, section, modes.")
-@options.every(*options.STUDY)
+@options.scheduler
+@options.study
 def command(
     case: Path,
     assignments: tuple[str, ...],
@@ -56,15 +59,8 @@ def command(
     starts: int,
     seed: int,
     pictures: bool,
-    jobs: int,
-    mesh: str,
-    solver: str,
-    output: Path | None,
-    store: Path | None,
-    no_store: bool,
-    as_json: bool,
-    quiet: bool,
-    verbose: bool,
+    scheduler: str,
+    study: options.Study,
 ) -> int:
     """Calibrate the variables of CASE to its targets: frequencies, and contact areas and vertical
     stiffnesses on the road.
@@ -75,16 +71,19 @@ def command(
     \b
     tyrecal fit cases/p235_75r17.yaml
     tyrecal fit cases/p235_75r17.yaml --fix C10 --method least-squares
+    tyrecal fit cases/p235_75r17.yaml --report
     tyrecal fit cases/p235_75r17.yaml --measured measured.csv --pressure-kPa 200
     tyrecal fit cases/p235_75r17.yaml --starts 20 --seed 1 --jobs 2
+    tyrecal fit cases/p235_75r17.yaml --starts 20 --seed 1 --scheduler tcp://10.0.0.1:8786
     """
-    from ..evaluate.door import Door
+    from ..evaluate.queue import reached
     from ..fit.calibrate import calibrate, history_csv
     from ..fit.problem import objective_unit
     from ..report.table import fit_csv, fit_table
-    from .output import Run, print_json, say, show
+    from ..report.words import fit_doubts
 
-    loaded, values = options.load(case, mesh, assignments, pressure_kPa)
+    talk = study.talk
+    loaded, values = study.load(case, assignments, pressure_kPa)
     unknown = [name for name in fix if name not in values]
     if unknown:
         raise click.UsageError(f"--fix {unknown[0]}: no such variable, only {', '.join(values)}")
@@ -94,15 +93,15 @@ def command(
         from ..fit.measured import with_measured
 
         loaded, left_out = with_measured(loaded, measured)
-    door = Door(loaded, solver)
-    adapter = door.solver
+    door = study.door(loaded)
     if loaded.case.targets.footprint:
         door.needs_road()
-    run = Run(case, output, "fit", adapter)
-    door.folder, door.keep = run.runs, verbose
-    door.store = run.open_store(store, no_store)
+    run = study.run(case, "fit", door)
     unit = objective_unit(loaded)
-    with _Progress(quiet, verbose, unit) as progress:
+    if scheduler and study.jobs > 1:
+        raise click.UsageError("--jobs is for this machine; with --scheduler its workers count")
+    with talk.progress("fit") as bar, reached(scheduler) as door.scheduler:
+        points = _Points(talk, bar, unit)
         fit = calibrate(
             loaded,
             door,
@@ -110,30 +109,36 @@ def command(
             {name: values[name] for name in fix},
             starts,
             seed,
-            jobs,
-            progress.notify,
+            study.jobs,
+            points.notify,
+            bar.at,
         )
     run.write_json("fit.json", fit.result)
     run.write_text("fit.csv", fit_csv(fit.result))
     run.write_text("fit_history.csv", history_csv(fit.history))
-    if as_json:
-        print_json(fit.result)
-    else:
-        show(fit_table(fit.result), as_json, quiet)
+    talk.result(fit.result)
+    talk.show(fit_table(fit.result))
     for each in left_out:
-        say(f"{measured}: not used: {each}", True, quiet)
-    for warning in _warnings(fit.result):
-        click.secho(warning, fg="yellow", err=True)
-    if pictures:
+        if not talk.quiet:
+            click.echo(f"{measured}: not used: {each}", err=True)
+    for warning in fit_doubts(fit.result):
+        talk.warn(warning)
+    if pictures or study.report:
+        from ..case import with_values
         from ..evaluate.door import Question
-        from ..report.pictures import draw_fit
+        from ..report.kept import tyre_data
 
         values = fit.fitted.values
         modes = sorted(fit.fitted.modes.values(), key=lambda mode: mode.frequency_Hz)
         evaluation = door.evaluate(Question(values))
+        shapes = tyre_data(with_values(loaded, values), evaluation, modes)
+        run.write_json("fit_shapes.json", shapes)
+    if pictures:
+        from ..report.pictures import draw_fit
+
         draw_fit(run.folder, loaded, values, evaluation, modes, fit.history, unit)
-    run.finish(solver_runs=door.counts.runs, answered_from_record=door.counts.recorded)
-    say(f"results in {run.folder}", as_json, quiet)
+    run.finish()
+    study.finish(run)
     return 0 if fit.result["converged"] and fit.result["moved"] else EXIT_FIT
 
 
@@ -154,62 +159,17 @@ def _starting_at(loaded: Any, values: Mapping[str, float]) -> Any:
     return replace(loaded, case=loaded.case.model_copy(update={"variables": variables}))
 
 
-def _warnings(result: Mapping[str, Any]) -> list[str]:
-    """What the user must not overlook."""
-    warnings = []
-    if not result["moved"]:
-        warnings.append("THE FIT DID NOT MOVE: every variable ended where it started")
-    if not result["converged"]:
-        warnings.append(
-            f"not converged: {result['message']}; projected gradient"
-            f" {result['projected_gradient_norm']:.3g} {result['objective_unit']}"
-        )
-    for name, variable in result["variables"].items():
-        if variable["at_bound"]:
-            seen = variable["standard_error"] is not None
-            why = "the data want it beyond" if seen else "the data do not see it"
-            warnings.append(f"{name} ended at a bound: {why}")
-    if result["failed_evaluations"]:
-        warnings.append(
-            f"{result['failed_evaluations']} designs could not be evaluated; the search"
-            " stepped back from them"
-        )
-    if result["label_margin"] < 0.3:
-        warnings.append(
-            f"a mode is hard to name (margin {result['label_margin']:.2f} of 1): two modes have"
-            " met; look at their pictures"
-        )
-    values = result["singular_values"]
-    if values and values[-1] < 1e-3 * values[0]:
-        warnings.append("the data do not determine all variables: see singular_values in fit.json")
-    return warnings
+class _Points:
+    """Says how the fit goes: each design with --verbose, the latest and the best on a terminal."""
 
-
-class _Progress:
-    """A line that follows the fit on a terminal; silent elsewhere unless verbose."""
-
-    def __init__(self, quiet: bool, verbose: bool, unit: str):
-        import sys
-
-        self.live = sys.stderr.isatty() and not quiet
-        self.verbose = verbose and not quiet
-        self.best, self.unit = float("inf"), unit
-
-    def __enter__(self) -> _Progress:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        if self.live:
-            click.echo("\r\033[K", nl=False, err=True)
+    def __init__(self, talk: Talk, bar: Progress, unit: str):
+        self.talk, self.bar, self.unit, self.best = talk, bar, unit, float("inf")
 
     def notify(self, number: int, values: Mapping[str, float], outcome: Any) -> None:
         """One more design point."""
         objective = getattr(outcome, "objective", None)
         self.best = min(self.best, objective or float("inf"))
         state = f"{objective:.4f} {self.unit}" if objective is not None else f"failed: {outcome}"
-        if self.verbose:
-            numbers = "  ".join(f"{k}={v:.5g}" for k, v in values.items())
-            click.echo(f"point {number}: {state}  {numbers}", err=True)
-        elif self.live:
-            text = f"\r\033[Kdesign {number}: {state:.60}, best {self.best:.4f} {self.unit}"
-            click.echo(text, nl=False, err=True)
+        numbers = "  ".join(f"{k}={v:.5g}" for k, v in values.items())
+        self.talk.detail(f"point {number}: {state}  {numbers}")
+        self.bar.words(f"design {number}: {state:.30}, best {self.best:.4f}")

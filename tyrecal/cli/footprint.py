@@ -20,7 +20,7 @@ DESIGNS = ("initial", "fitted")
               help="Designs to press (default: initial, and fitted where --fitted is given)."
               )  # fmt: skip
 @click.option("--pictures/--no-pictures", default=True, help="Draw the patches; write VTU.")
-@options.every(*options.STUDY)
+@options.study
 def command(
     case: Path,
     assignments: tuple[str, ...],
@@ -29,15 +29,7 @@ def command(
     fitted: Path | None,
     compare: str | None,
     pictures: bool,
-    jobs: int,
-    mesh: str,
-    solver: str,
-    output: Path | None,
-    store: Path | None,
-    no_store: bool,
-    as_json: bool,
-    quiet: bool,
-    verbose: bool,
+    study: options.Study,
 ) -> int:
     """Press the tyre of CASE on a flat road, load after load.
 
@@ -50,54 +42,49 @@ def command(
     tyrecal footprint cases/p235_75r17.yaml --fitted p235_75r17/fit.json --jobs 2
     tyrecal footprint cases/p235_75r17.yaml --loads-N 3000,5000 --set road.friction=0 --json
     """
-    from ..evaluate.door import Door
     from ..evaluate.pressed import Pressed
+    from ..report.kept import patches_data
     from ..report.table import footprint_csv, footprint_table
     from ..studies.footprint import footprint_result, press, progress
-    from .output import Run, print_json, say, show
 
-    loaded, values = options.load(case, mesh, assignments, pressure_kPa)
+    talk = study.talk
+    loaded, values = study.load(case, assignments, pressure_kPa)
     asked = options.parse_loads(loads) if loads is not None else loaded.case.loads_N
-    door = Door(loaded, solver)
-    adapter = door.solver
+    door = study.door(loaded)
     door.needs_road()
-    fitted = _fit_compared(compare, fitted, (output or Path(case.stem)) / "fit.json")
-    designs = _designs(compare, values, fitted, loaded, solver)
-    run = Run(case, output, "footprint", adapter)
-    door.folder, door.keep = run.runs, verbose
-    door.store = run.open_store(store, no_store)
+    fitted = _fit_compared(compare, fitted, (study.output or Path(case.stem)) / "fit.json")
+    designs = _designs(compare, values, fitted, loaded, study.solver)
+    run = study.run(case, "footprint", door)
 
     def notify(design: str, outcome: Any) -> None:
         reached, failure = progress(outcome)
         if failure:
-            text = f"error: {design}, {asked[reached]:g} N: {failure}"
-            click.secho(text, fg="red", err=True)
-        elif verbose and not quiet:
-            click.echo(f"{design}: {reached} loads", err=True)
+            talk.error(f"{design}, {asked[reached]:g} N: {failure}")
+        talk.detail(f"{design}: {reached} loads")
 
-    outcomes = press(door, designs, asked, jobs, notify)
+    with talk.progress("footprint") as bar:
+        door.heard = bar.at
+        outcomes = press(door, designs, asked, study.jobs, notify)
     pressed = {name: each for name, each in outcomes.items() if isinstance(each, Pressed)}
     if not pressed:
         return EXIT_SOLVER
     meshes = {name: _mesh(loaded, designs[name]) for name in pressed}
     result = footprint_result(designs, asked, outcomes, meshes)
     run.write_json("footprint.json", result)
+    run.write_json("footprint_patches.json", patches_data(loaded.case.name, pressed, meshes))
     run.write_text("footprint.csv", footprint_csv(result["rows"]))
     if pictures:
         from ..report.footprint import draw_footprint
 
         draw_footprint(run.folder, pressed, meshes, result["rows"])
-    run.finish(solver_runs=door.counts.runs, answered_from_record=door.counts.recorded)
-    if as_json:
-        print_json(result)
-    else:
-        show(footprint_table(result["rows"]), as_json, quiet)
+    run.finish()
+    talk.result(result)
+    talk.show(footprint_table(result["rows"]))
     for sentence in result["findings"]["words"]:
-        say(sentence, as_json, quiet)
+        talk.say(sentence)
     if result["failed"]:
-        text = "error: not every load was reached; the loads below it are kept"
-        click.secho(text, fg="red", err=True)
-    say(f"results in {run.folder}", as_json, quiet)
+        talk.error("not every load was reached; the loads below it are kept")
+    study.finish(run)
     return EXIT_SOLVER if result["failed"] else 0
 
 

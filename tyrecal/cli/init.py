@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from . import options
+from .talk import Talk
 
 if TYPE_CHECKING:
     from ..case.draft import Draft
@@ -36,7 +37,7 @@ def _length(flag: str, text: str, unit: str = "mm") -> Any:
               help="Case file to write (default: named by the size, in this folder).")  # fmt: skip
 @click.option("--force", is_flag=True, help="Write over files that exist.")
 @click.option("--pictures/--no-pictures", default=True, help="Draw the section.")
-@options.quiet
+@options.talking
 def command(
     size: str | None,
     file: Path | None,
@@ -49,7 +50,7 @@ def command(
     output: Path | None,
     force: bool,
     pictures: bool,
-    quiet: bool,
+    talk: Talk,
 ) -> int:
     """Write the case of a tyre: from its SIZE code, or with a section of its own.
 
@@ -83,17 +84,17 @@ def command(
     else:
         assert tyre is not None
         draft = from_size(tyre, lengths, pressure_kPa, target.stem)
-    _write(draft, file, target, target.with_suffix(".png") if pictures else None, force, quiet)
+    _write(draft, file, target, target.with_suffix(".png") if pictures else None, force, talk)
     return 0
 
 
 def _write(
-    draft: Draft, file: Path | None, target: Path, picture: Path | None, force: bool, quiet: bool
+    draft: Draft, file: Path | None, target: Path, picture: Path | None, force: bool, talk: Talk
 ) -> None:
     """Write case, section and picture, none over an existing file and only what is right."""
     from ..case import load_case
     from ..files import whole
-    from .output import OutputRefused, say
+    from .output import OutputRefused
 
     table = target.with_name(draft.file)
     own = file is not None and file.resolve() == table.resolve()  # it is there already
@@ -108,16 +109,16 @@ def _write(
             partial.write_bytes(content)
     loaded = load_case(target)
     outside = loaded.section.points[-1]
-    say(
+    written = {"case": str(target), "section": str(table)}
+    talk.result({**written, "picture": str(picture) if picture else None})
+    talk.say(
         f"{target}: {loaded.case.name}, outer diameter {2e3 * outside[0, 0]:.1f} mm, section width"
-        f" {2e3 * outside[:, 1].max():.1f} mm, {loaded.case.pressure_kPa:g} kPa",
-        False,
-        quiet,
+        f" {2e3 * outside[:, 1].max():.1f} mm, {loaded.case.pressure_kPa:g} kPa"
     )
     if picture:
         from ..deck.context import section_mesh
         from ..report.section import draw_section
 
         draw_section(picture, loaded, section_mesh(loaded))
-        say(f"section drawn in {picture}", False, quiet)
-    say(f"next: tyrecal modes {target}", False, quiet)
+        talk.say(f"section drawn in {picture}")
+    talk.say(f"next: tyrecal modes {target}")

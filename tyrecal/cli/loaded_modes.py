@@ -8,6 +8,7 @@ from typing import Any
 import click
 
 from .main import EXIT_SOLVER
+from .options import Study
 
 
 def wanted_loads(load_N: float | None, sweep: str | None) -> list[float]:
@@ -24,27 +25,28 @@ def wanted_loads(load_N: float | None, sweep: str | None) -> list[float]:
     return [] if load_N is None else parse_loads(repr(load_N), "--load-N")
 
 
-def at_load(
-    door: Any, run: Any, values: Mapping[str, float], load_N: float, as_json: bool, quiet: bool
-) -> int:
-    """Modes under one load, in modes.json."""
+def at_load(door: Any, run: Any, values: Mapping[str, float], load_N: float, study: Study) -> int:
+    """Modes under one load, in modes.json, with their shapes in modes_shapes.json."""
+    from ..report.kept import loaded_data
     from ..report.table import modes_table
     from ..studies.loaded import LoadedTyre, load_tyres
     from ..studies.loaded_result import loaded_modes_result
-    from .output import print_json, say, show
 
-    outcome = load_tyres(door, {"initial": values}, [load_N])["initial"]
+    talk = study.talk
+    with talk.progress(f"modes at {load_N:g} N") as bar:
+        door.heard = bar.at
+        outcome = load_tyres(door, {"initial": values}, [load_N])["initial"]
     if not isinstance(outcome, LoadedTyre):
         raise outcome
     result = loaded_modes_result(values, outcome)
     run.write_json("modes.json", result)
-    run.finish(solver_runs=door.counts.runs, answered_from_record=door.counts.recorded)
-    if as_json:
-        print_json(result)
-    else:
-        show(modes_table(result), as_json, quiet)
+    run.write_json("modes_shapes.json", loaded_data(outcome, door.case))
+    run.finish()
+    talk.result(result)
+    talk.show(modes_table(result))
     for sentence in result["findings"]["words"]:
-        say(sentence, as_json, quiet)
+        talk.say(sentence)
+    run.report(study.report, talk.as_json, talk.quiet)
     return 0
 
 
@@ -53,26 +55,25 @@ def over_loads(
     run: Any,
     designs: Mapping[str, Mapping[str, float]],
     loads_N: Sequence[float],
-    jobs: int,
+    study: Study,
     pictures: bool,
-    as_json: bool,
-    quiet: bool,
 ) -> int:
     """Modes over the load, in load_sweep.json, .csv and .png."""
     from ..report.table import load_csv, load_table
     from ..studies.loaded import LoadedTyre, load_tyres, progress
     from ..studies.loaded_result import load_sweep_result
-    from .output import print_json, say, show
 
-    above = [load for load in loads_N if load]
+    talk, above = study.talk, [load for load in loads_N if load]
 
     def notify(design: str, outcome: Any) -> None:
         reached, failure = progress(outcome)
         if failure:
-            text = f"error: {design}, {above[reached]:g} N: {failure}"
-            click.secho(text, fg="red", err=True)
+            talk.error(f"{design}, {above[reached]:g} N: {failure}")
+        talk.detail(f"{design}: {reached} loads")
 
-    outcomes = load_tyres(door, designs, loads_N, jobs, notify)
+    with talk.progress("modes on the road") as bar:
+        door.heard = bar.at
+        outcomes = load_tyres(door, designs, loads_N, study.jobs, notify)
     if not any(isinstance(each, LoadedTyre) for each in outcomes.values()):
         return EXIT_SOLVER
     result = load_sweep_result(designs, loads_N, outcomes)
@@ -82,17 +83,14 @@ def over_loads(
         from ..report.load import draw_load_sweep
 
         draw_load_sweep(run.folder / "load_sweep.png", result["rows"])
-    run.finish(solver_runs=door.counts.runs, answered_from_record=door.counts.recorded)
-    if as_json:
-        print_json(result)
+    run.finish()
+    talk.result(result)
     for found in result["findings"]:
         rows = [row for row in result["rows"] if row["design"] == found["design"]]
-        if not as_json:
-            show(load_table(rows, found["design"]), as_json, quiet)
+        talk.show(load_table(rows, found["design"]))
         for sentence in found["words"]:
-            say(f"{found['design']}: {sentence}", as_json, quiet)
+            talk.say(f"{found['design']}: {sentence}")
     if result["failed"]:
-        text = "error: not every load was reached; the loads below it are kept"
-        click.secho(text, fg="red", err=True)
-    say(f"results in {run.folder}", as_json, quiet)
+        talk.error("not every load was reached; the loads below it are kept")
+    study.finish(run)
     return EXIT_SOLVER if result["failed"] else 0

@@ -9,6 +9,8 @@ from typing import Any
 
 import click
 
+from .talk import coloured, error
+
 # One BLAS thread: the tyre's matrices are small, and cores are better spent on other designs.
 # Has to be set before NumPy is imported.
 for _name in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS"):
@@ -26,10 +28,26 @@ COMMANDS = {  # name: one line of help, so that the overview imports no command
     "measured": "Turn modal tables, mode shapes and response functions into measurements.",
     "diagnose": "Say where model and measurements part, and which effect explains it.",
     "blind": "Try the diagnosis on data whose effect is withheld: make, answer, score.",
+    "report": "Tell the results of one or several folders on one HTML page.",
+    "batch": "Study many cases at once, compare with a baseline, report to CI.",
     "solvers": "List the installed solvers and what they can do.",
     "store": "Look at a record of evaluations, check it, prune it.",
+    "doctor": "Check the installation: packages, solvers, machine, a known tyre.",
+    "completion": "Print what makes a shell complete commands, cases and names.",
 }
-EXIT_INPUT, EXIT_SOLVER, EXIT_FIT, EXIT_INTERRUPTED = 2, 3, 4, 130
+EXIT_INPUT, EXIT_SOLVER, EXIT_FIT, EXIT_BATCH, EXIT_INTERRUPTED = 2, 3, 4, 5, 130
+EXIT_CODES = {
+    0: "done",
+    EXIT_INPUT: "the input is wrong",
+    EXIT_SOLVER: "the solver failed",
+    EXIT_FIT: "the fit did not converge or did not move",
+    EXIT_BATCH: "some cases of a batch failed or drifted",
+    EXIT_INTERRUPTED: "interrupted",
+}
+
+
+class Interrupted(Exception):
+    """Ctrl-C; the words say how to go on."""
 
 
 class Commands(click.Group):
@@ -44,14 +62,25 @@ class Commands(click.Group):
         command: click.Command = import_module(f"tyrecal.cli.{name.replace('-', '_')}").command
         return command
 
+    def invoke(self, ctx: click.Context) -> Any:
+        try:
+            return super().invoke(ctx)
+        except KeyboardInterrupt:
+            raise Interrupted(ctx.meta.get("tyrecal.resume", "nothing was changed")) from None
+
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         with formatter.section("Commands"):
             formatter.write_dl(list(COMMANDS.items()))
 
+    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        with formatter.section("Exit codes"):
+            formatter.write_dl([(str(code), words) for code, words in EXIT_CODES.items()])
+
 
 @click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})
-@click.version_option(package_name="tyrecal")
-def cli() -> None:
+@click.version_option(package_name="tyrecal", prog_name="tyrecal")
+@click.pass_context
+def cli(ctx: click.Context) -> None:
     """Calibrate a tyre finite element model to measured modes.
 
     \b
@@ -59,37 +88,40 @@ def cli() -> None:
     tyrecal modes cases/p235_75r17.yaml --pressure-kPa 200
     tyrecal fit cases/p235_75r17.yaml
 
-    Exit codes: 0 done; 2 the input is wrong; 3 the solver failed; 4 the fit did not converge or
-    did not move; 130 interrupted.
+    Every command has --help with examples, --json, --quiet and --verbose.
     """
+    ctx.color = coloured()
 
 
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line; never returns."""
     try:
-        code = cli.main(arguments, standalone_mode=False)
+        code = cli.main(arguments, prog_name="tyrecal", standalone_mode=False)
         sys.exit(code if isinstance(code, int) else 0)
     except click.exceptions.Exit as leave:
         sys.exit(leave.exit_code)
-    except click.ClickException as error:
-        error.show()
+    except click.ClickException as wrong:
+        wrong.show()
         sys.exit(EXIT_INPUT)
+    except Interrupted as how_to_go_on:
+        click.echo(f"\ninterrupted: {how_to_go_on}", err=True)
+        sys.exit(EXIT_INTERRUPTED)
     except (KeyboardInterrupt, click.Abort):
-        click.echo("interrupted", err=True)
+        click.echo("\ninterrupted", err=True)
         sys.exit(EXIT_INTERRUPTED)
     except BrokenPipeError:
         sys.stderr.close()
         sys.exit(0)
-    except Exception as error:
-        code = _exit_code(error)
+    except Exception as failure:
+        code = _exit_code(failure)
         if code is None:
             raise
-        for line in str(error).splitlines():
-            click.echo(f"error: {line}", err=True)
+        for line in str(failure).splitlines():
+            error(line)
         sys.exit(code)
 
 
-def _exit_code(error: Exception) -> int | None:
+def _exit_code(failure: Exception) -> int | None:
     """Exit code of a failure that is somebody's, None for a bug of ours."""
     kinds: list[tuple[str, str, int]] = [
         ("tyrecal.evaluate.failure", "EvaluationFailed", EXIT_SOLVER),
@@ -98,6 +130,8 @@ def _exit_code(error: Exception) -> int | None:
         ("tyrecal.evaluate.solver", "UnknownSolver", EXIT_INPUT),
         ("tyrecal.deck.environment", "TemplateFailed", EXIT_INPUT),
         ("tyrecal.fit.calibrate", "NothingToFit", EXIT_INPUT),
+        ("tyrecal.evaluate.queue", "BadSettings", EXIT_INPUT),
+        ("tyrecal.batch.drift", "BadBaseline", EXIT_INPUT),
         ("tyrecal.diagnose.measurements", "BadMeasurements", EXIT_INPUT),
         ("tyrecal.diagnose.study", "BadChange", EXIT_INPUT),
         ("tyrecal.measured.sensors", "BadMeasuredData", EXIT_INPUT),
@@ -107,10 +141,11 @@ def _exit_code(error: Exception) -> int | None:
         ("tyrecal.case.draft", "BadSection", EXIT_INPUT),
         ("tyrecal.cli.output", "OutputRefused", EXIT_INPUT),
         ("tyrecal.cli.lock", "Locked", EXIT_INPUT),
+        ("tyrecal.report.html.results", "BadResults", EXIT_INPUT),
         ("tyrecal.case", "CaseError", EXIT_INPUT),
     ]
     for module, name, code in kinds:
         loaded: Any = sys.modules.get(module)  # an error of a module never imported cannot occur
-        if loaded is not None and isinstance(error, getattr(loaded, name)):
+        if loaded is not None and isinstance(failure, getattr(loaded, name)):
             return code
-    return EXIT_INPUT if isinstance(error, OSError) else None
+    return EXIT_INPUT if isinstance(failure, OSError) else None

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from . import options
+from .talk import Talk, say
 
 if TYPE_CHECKING:
     from ..measured.modal import Layout
@@ -65,7 +66,7 @@ def command() -> None:
               help="What functions are that do not say it.")  # fmt: skip
 @click.option("--pictures/--no-pictures", default=True,
               help="Draw functions and shapes beside the CSV.")  # fmt: skip
-@options.every(options.as_json, options.quiet)
+@options.talking
 def import_files(
     files: tuple[Path, ...],
     output: Path,
@@ -79,8 +80,7 @@ def import_files(
     highest: int | None,
     response: str | None,
     pictures: bool,
-    as_json: bool,
-    quiet: bool,
+    talk: Talk,
 ) -> int:
     """Write the measurements in FILEs to one CSV, which 'tyrecal diagnose --measured' and
     'tyrecal fit --measured' read.
@@ -98,7 +98,6 @@ def import_files(
     from ..files import whole
     from ..measured.gather import gather, result
     from ..measured.values import measurements_csv
-    from .output import print_json, say, show
 
     if output.resolve() in [path.resolve() for path in files]:
         raise click.UsageError(f"--output {output}: is one of the files to read")
@@ -114,28 +113,27 @@ def import_files(
 
         draw_measured(output.with_suffix(".png"), found.runs)
     for note in found.notes:
-        say(note, True, quiet)
-    if as_json:
-        print_json(result(found))
-    else:
+        say(note, True, talk.quiet)
+    talk.result(result(found))
+    if found.runs:
         from ..report.measured import measured_table
 
-        if found.runs:
-            show(measured_table(found.runs), as_json, quiet)
-    say(f"{len(found.rows)} measurements in {output}", as_json, quiet)
+        talk.show(measured_table(found.runs))
+    talk.say(f"{len(found.rows)} measurements in {output}")
     return 0
 
 
 @command.command()
 @click.argument("file", type=click.Path(path_type=Path, exists=True, dir_okay=False))
-@options.every(axle, centre, directions, highest, options.as_json)
+@options.every(axle, centre, directions, highest)
+@options.talking
 def sensors(
     file: Path,
     axle: str | None,
     centre: str,
     directions: str,
     highest: int | None,
-    as_json: bool,
+    talk: Talk,
 ) -> int:
     """Say which modes the sensors of a universal FILE can tell apart.
 
@@ -147,18 +145,17 @@ def sensors(
     from ..measured.modal import sensors_in
     from ..measured.universal import read_universal
     from ..report.measured import sensors_words
-    from .output import print_json
 
     layout = _layout(axle, centre, directions, highest)
     told = sensors_in(read_universal(file), layout).told_apart()
-    if as_json:
-        print_json([
+    if talk.as_json:
+        talk.result([
             {"c": label.c, "m": label.m, "kind": label.kind, "told": not alike,
              "looks_like": [str(other) for other in alike]}
             for label, alike in told.items()
         ])  # fmt: skip
     else:
-        click.echo(sensors_words(told))
+        talk.say(sensors_words(told))
     return 0
 
 

@@ -18,19 +18,11 @@ from .loaded_modes import at_load, over_loads, wanted_loads
     options.one_load,
     options.sweep_load,
     options.fitted("With --sweep-load: the design that 'tyrecal fit' found for this case, too."),
-    options.jobs,
-    options.mesh,
-    options.solver,
-    options.output,
-    options.store,
-    options.no_store,
-    options.as_json,
-    options.quiet,
-    options.verbose,
 )
 @click.option("--pictures/--no-pictures", default=None,
               help="Draw the section and each mode (default: no); with --sweep-load the frequencies"
               " over the load (default: yes).")  # fmt: skip
+@options.study
 def command(
     case: Path,
     assignments: tuple[str, ...],
@@ -38,16 +30,8 @@ def command(
     load_N: float | None,
     sweep: str | None,
     fitted: Path | None,
-    jobs: int,
-    mesh: str,
-    solver: str,
-    output: Path | None,
-    store: Path | None,
-    no_store: bool,
-    as_json: bool,
-    quiet: bool,
-    verbose: bool,
     pictures: bool | None,
+    study: options.Study,
 ) -> int:
     """Evaluate one design of CASE: frequencies with their labels, in modes.json.
 
@@ -61,43 +45,41 @@ def command(
     tyrecal modes cases/p235_75r17.yaml --load-N 4000
     tyrecal modes cases/p235_75r17.yaml --sweep-load 0,1000,2000,4000 --fitted p235_75r17/fit.json
     """
-    from ..evaluate.door import Door, Question
+    from ..evaluate.door import Question
+    from ..report.kept import tyre_data
     from ..studies.modes import modes_result
-    from .output import Run, print_json, show
 
     loads = wanted_loads(load_N, sweep)
     if fitted and sweep is None:
         raise click.UsageError("--fitted goes with --sweep-load")
     if pictures and load_N is not None:
         raise click.UsageError("--pictures goes with --sweep-load, or without a load")
-    loaded, values = options.load(case, mesh, assignments, pressure_kPa)
-    door = Door(loaded, solver)
-    adapter = door.solver
+    talk = study.talk
+    loaded, values = study.load(case, assignments, pressure_kPa)
+    door = study.door(loaded)
     designs = {"initial": values}
     if loads:
         door.needs_road(modes=True)
     if fitted:
-        designs["fitted"] = options.fitted_values(fitted, loaded, solver)
-    run = Run(case, output, "modes", adapter)
-    door.folder, door.keep = run.runs, verbose
-    door.store = run.open_store(store, no_store)
+        designs["fitted"] = options.fitted_values(fitted, loaded, study.solver)
+    run = study.run(case, "modes", door)
     if sweep is not None:
         draw = pictures is not False
-        return over_loads(door, run, designs, loads, jobs, draw, as_json, quiet)
+        return over_loads(door, run, designs, loads, study, draw)
     if loads:
-        return at_load(door, run, values, loads[0], as_json, quiet)
+        return at_load(door, run, values, loads[0], study)
     evaluation = door.evaluate(Question(values))
     result, modes = modes_result(loaded, values, evaluation)
     run.write_json("modes.json", result)
+    run.write_json("modes_shapes.json", tyre_data(loaded, evaluation, modes))
     if pictures:
         from ..report.pictures import draw_evaluation
 
         draw_evaluation(run.folder, loaded, evaluation, modes)
-    run.finish(solver_runs=door.counts.runs, answered_from_record=door.counts.recorded)
-    if as_json:
-        print_json(result)
-    else:
-        from ..report.table import modes_table
+    run.finish()
+    from ..report.table import modes_table
 
-        show(modes_table(result), as_json, quiet)
+    talk.result(result)
+    talk.show(modes_table(result))
+    run.report(study.report, talk.as_json, talk.quiet)
     return 0

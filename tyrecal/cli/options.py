@@ -1,15 +1,47 @@
-"""Options that the commands share."""
+"""Options that the commands share, and how a command is made of them.
+
+1. A command is a module of this package with ``command``, named in ``main.COMMANDS``; heavy imports
+   stand inside the function, so that --help and completion stay quick.
+2. ``@options.talking`` gives every command --json, --quiet and --verbose as ``talk`` (`Talk`): say
+   and show for people, result for programs, detail for --verbose, warn and error.
+3. ``@options.study``, in its place, gives what evaluates designs --jobs, --mesh, --solver,
+   --output, --store, --no-store and --report too, as ``study`` (`Study`): load, door, run, finish.
+4. Its docstring says what it does and writes, and ends with examples after a line ``\\b``.
+5. Long work runs in ``with talk.progress("what") as bar``: ``bar.at(done, of)`` shows the time
+   left. Ctrl-C says how to go on: ``run`` knows; others set the context's RESUME (`output`).
+6. Wrong input raises click.UsageError, or an error that ``main`` knows; codes: ``main.EXIT_CODES``.
+7. What a shell can complete has ``shell_complete``, from `complete`.
+"""
 
 from __future__ import annotations
 
+import logging
+import time
 from collections.abc import Callable
+from dataclasses import dataclass
+from functools import wraps
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
-case_argument = click.argument("case", type=click.Path(path_type=Path))
-solver = click.option("--solver", default="", metavar="NAME", help="Solver (default: the case's).")
+from . import complete
+from .talk import SOLVERS, Talk
+
+if TYPE_CHECKING:
+    from ..evaluate.door import Door
+    from .output import Run
+
+case_argument = click.argument(
+    "case", type=click.Path(path_type=Path), shell_complete=complete.cases
+)
+solver = click.option(
+    "--solver",
+    default="",
+    metavar="NAME",
+    help="Solver (default: the case's).",
+    shell_complete=complete.solvers,
+)
 output = click.option(
     "--output",
     type=click.Path(path_type=Path),
@@ -20,7 +52,8 @@ mesh = click.option(
     "--mesh",
     default="",
     metavar="LEVEL",
-    help="Mesh level of the case, e.g. refined (default: the case's).",
+    help="Mesh level of the case, e.g. coarse or refined (default: the case's).",
+    shell_complete=complete.levels,
 )
 as_json = click.option(
     "--json",
@@ -29,7 +62,7 @@ as_json = click.option(
     help="Result as JSON on standard output, all else on standard error.",
 )
 quiet = click.option("--quiet", is_flag=True, help="Print nothing but errors.")
-verbose = click.option("--verbose", is_flag=True, help="Say more; keep the run folders.")
+verbose = click.option("--verbose", is_flag=True, help="Say more; keep run folders.")
 jobs = click.option(
     "--jobs",
     type=click.IntRange(1, 256),
@@ -53,6 +86,7 @@ assignments = click.option(
     multiple=True,
     metavar="NAME=VALUE",
     help="Set a variable or any number of the case; repeatable.",
+    shell_complete=complete.assignments,
 )
 pressure = click.option(
     "--pressure-kPa",
@@ -83,6 +117,22 @@ sweep_load = click.option(
 )
 
 
+_from = click.option("--from-kPa", "from_kPa", type=float, default=100.0, metavar="A",
+                     show_default=True, help="Lowest pressure of a sweep.")  # fmt: skip
+_to = click.option("--to-kPa", "to_kPa", type=float, default=320.0, metavar="B", show_default=True,
+                   help="Highest pressure of a sweep.")  # fmt: skip
+_steps = click.option("--steps", type=click.IntRange(2, 10000), default=12, metavar="N",
+                      show_default=True, help="Pressures of a sweep, both ends among them."
+                      )  # fmt: skip
+scheduler = click.option(
+    "--scheduler",
+    default="",
+    metavar="ADDRESS|FILE",
+    help="Have the workers of a Dask scheduler do it: its address, or a settings file (.yaml) for"
+    " jobs of SLURM or PBS. Needs the extra tyrecal[cluster].",
+)
+
+
 def every(*options: Callable[[Any], Any]) -> Callable[[Any], Any]:
     """Apply several options in the order given."""
 
@@ -94,7 +144,120 @@ def every(*options: Callable[[Any], Any]) -> Callable[[Any], Any]:
     return apply
 
 
-STUDY = (jobs, mesh, solver, output, store, no_store, as_json, quiet, verbose)
+pressures = every(_from, _to, _steps)
+report = click.option(
+    "--report",
+    is_flag=True,
+    help="Write report.html, a page of all that the folder of results holds.",
+)
+TALK = (as_json, quiet, verbose)
+ONE_BY_ONE = (mesh, solver, output, store, no_store, *TALK)
+STUDY = (jobs, *ONE_BY_ONE[:-3], report, *TALK)
+
+
+def talking(function: Callable[..., int]) -> Callable[..., int]:
+    """--json, --quiet and --verbose, as the argument ``talk``."""
+
+    @wraps(function)
+    def command(*args: Any, as_json: bool, quiet: bool, verbose: bool, **rest: Any) -> int:
+        return function(*args, talk=_talk(as_json, quiet, verbose), **rest)
+
+    result: Callable[..., int] = every(*TALK)(command)
+    return result
+
+
+def study(function: Callable[..., int]) -> Callable[..., int]:
+    """All that a command has which evaluates designs, as the argument ``study``."""
+    return _study(function, STUDY)
+
+
+def study_one_by_one(function: Callable[..., int]) -> Callable[..., int]:
+    """The same without --jobs and --report."""
+    return _study(function, ONE_BY_ONE)
+
+
+def _study(function: Callable[..., int], given: tuple[Any, ...]) -> Callable[..., int]:
+    @wraps(function)
+    def command(
+        *args: Any,
+        mesh: str,
+        solver: str,
+        output: Path | None,
+        store: Path | None,
+        no_store: bool,
+        as_json: bool,
+        quiet: bool,
+        verbose: bool,
+        jobs: int = 1,
+        report: bool = False,
+        **rest: Any,
+    ) -> int:
+        talk = _talk(as_json, quiet, verbose)
+        asked = Study(jobs, mesh, solver, output, store, no_store, report, talk)
+        return function(*args, study=asked, **rest)
+
+    result: Callable[..., int] = every(*given)(command)
+    return result
+
+
+@dataclass(frozen=True)
+class Study:
+    """How designs are evaluated, and where the results go."""
+
+    jobs: int
+    mesh: str
+    solver: str
+    output: Path | None
+    store: Path | None
+    no_store: bool
+    report: bool
+    talk: Talk
+
+    def load(
+        self, path: Path, assigned: tuple[str, ...] = (), pressure_kPa: float | None = None
+    ) -> Any:
+        """As `load`, at the mesh level asked for."""
+        return load(path, self.mesh, assigned, pressure_kPa)
+
+    def door(self, loaded: Any) -> Door:
+        """The door to the solver asked for. Raises UnknownSolver."""
+        from ..evaluate.door import Door
+
+        door = Door(loaded, self.solver)
+        door.solver  # noqa: B018  a solver that is not there is refused before anything is written
+        return door
+
+    def run(self, case: Path, command: str, door: Door) -> Run:
+        """The command's run, with the record behind ``door``. Raises OutputRefused, Locked."""
+        from .output import Run
+
+        run = Run(case, self.output, command, door.solver)
+        door.folder, door.keep = run.runs, self.talk.verbose
+        door.store = run.open_store(self.store, self.no_store)
+        run.counts = counts = door.counts
+        words = "{0.runs} runs of the solver, {0.recorded} answers from the record"
+        context = click.get_current_context()
+        context.call_on_close(lambda: self.talk.detail(words.format(counts)))
+        return run
+
+    def finish(self, run: Run) -> None:
+        """Say where the results are, and write their page where it is wanted."""
+        self.talk.say(f"results in {run.folder}")
+        run.report(self.report, self.talk.as_json, self.talk.quiet)
+
+
+def _talk(as_json: bool, quiet: bool, verbose: bool) -> Talk:
+    if quiet and verbose:
+        raise click.UsageError("give --quiet or --verbose, not both")
+    context, start = click.get_current_context(), time.monotonic()
+    talk = Talk(as_json, quiet, verbose)
+    if verbose:
+        logging.basicConfig(format="%(name)s: %(message)s")
+        for name in ("tyrecal", SOLVERS):
+            logging.getLogger(name).setLevel(logging.INFO)
+        path = context.command_path
+        context.call_on_close(lambda: talk.detail(f"{path} took {time.monotonic() - start:.1f} s"))
+    return talk
 
 
 def fitted(text: str) -> Callable[[Any], Any]:
@@ -108,13 +271,13 @@ def load(path: Path, mesh_level: str, assigned: tuple[str, ...], pressure_kPa: f
 
     Returns (case, values of the variables). Raises CaseError, click.UsageError.
     """
-    from ..case import load_case, parse_assignment, start_values, with_values
+    from ..case import load_case, parse_assignment, start_values, with_level, with_values
     from ..case.load import CaseError
 
     case = load_case(path)
-    if mesh_level:
-        case = _with_level(case, mesh_level)
     try:
+        if mesh_level:
+            case = with_level(case, mesh_level)
         names = set(case.case.variables)
         given = _once([parse_assignment(text) for text in assigned], pressure_kPa)
         for name, variable in case.case.variables.items():
@@ -151,6 +314,18 @@ def parse_loads(text: str, option: str = "--loads-N", zero: bool = False) -> lis
     return loads
 
 
+def parse_pressures(low: float, high: float, steps: int) -> tuple[float, ...]:
+    """Equidistant pressures in kPa, both ends among them. Raises click.UsageError."""
+    from math import isfinite
+
+    for option, value in (("--from-kPa", low), ("--to-kPa", high)):
+        if not (isfinite(value) and value > 0):
+            raise click.UsageError(f"{option} {value:g}: must be a finite pressure above 0")
+    if low >= high:
+        raise click.UsageError(f"--from-kPa {low:g} must be less than --to-kPa {high:g}")
+    return tuple(round(low + (high - low) * i / (steps - 1), 9) for i in range(steps))
+
+
 def fitted_values(path: Path, loaded: Any, solver: str) -> dict[str, float]:
     """The design of a fit.json. Raises click.UsageError where it is not this case's."""
     from ..studies.fitted import NotThisFit, read_fitted
@@ -170,15 +345,3 @@ def _once(pairs: list[tuple[str, float]], pressure_kPa: float | None) -> dict[st
         twice = next(name for name in given if sum(n == name for n, _ in pairs) > 1)
         raise click.UsageError(f"{twice} is set twice")
     return given
-
-
-def _with_level(case: Any, level: str) -> Any:
-    from dataclasses import replace
-
-    mesh = case.case.mesh
-    if level not in mesh.levels:
-        raise click.UsageError(
-            f"mesh level '{level}' is not one of the case's: {', '.join(mesh.levels)}"
-        )
-    chosen = case.case.model_copy(update={"mesh": mesh.model_copy(update={"level": level})})
-    return replace(case, case=chosen)

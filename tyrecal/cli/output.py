@@ -1,4 +1,4 @@
-"""The results folder, what is printed where, and the volatile facts of a run."""
+"""The results folder, and the volatile facts of a run."""
 
 from __future__ import annotations
 
@@ -15,9 +15,14 @@ import click
 
 from ..files import whole
 from . import lock
+from .talk import print_json, say, show
 
 if TYPE_CHECKING:
+    from ..evaluate.door import Counts
     from ..evaluate.store import Store
+
+__all__ = ["OutputRefused", "Run", "print_json", "say", "show"]
+RESUME = "tyrecal.resume"  # key of the context's notes: how to go on after Ctrl-C
 
 
 class OutputRefused(ValueError):
@@ -34,15 +39,16 @@ class Run:
     def __init__(self, case: Path, output: Path | None, command: str, solver: Any = None):
         self.case, self.command, self.solver = case.resolve(), command, solver
         self.folder = output or Path(case.stem)
-        self._started = datetime.now(UTC).isoformat(timespec="seconds")
+        self.started = datetime.now(UTC).isoformat(timespec="seconds")
         self._clock = time.monotonic()
         self.store: Store | None = None
+        self.counts: Counts | None = None
         if self.folder.exists() and not self.folder.is_dir():
             raise OutputRefused(f"'{self.folder}' is a file; give a folder with --output")
         self.folder.mkdir(parents=True, exist_ok=True)
-        self._lock = lock.lock(self.folder, command, self._started)
+        self._lock = lock.lock(self.folder, command, self.started)
         click.get_current_context().call_on_close(self._close)
-        self._check_owner()
+        refuse_other(self.folder, self.case)
         if self._lock and solver:
             from ..evaluate.folders import drop_unfinished
 
@@ -51,10 +57,16 @@ class Run:
 
     def open_store(self, folder: Path | None, none: bool) -> Store | None:
         """The record of evaluations: in ``folder``, or beside the results, or ``none``."""
+        words = "with --no-store nothing is on record; the same command starts from the beginning"
         if not none:
             from ..evaluate.store import Store
 
             self.store = Store((folder or self.folder / "record").resolve())
+            words = (
+                f"evaluations that had finished are on record in '{self.store.folder}'; the same"
+                " command goes on from there"
+            )
+        click.get_current_context().meta[RESUME] = words
         return self.store
 
     def write_json(self, name: str, content: Any) -> Path:
@@ -78,36 +90,36 @@ class Run:
         """Write run.json: command, times, host, versions, and what else is volatile."""
         import tyrecal
 
+        counts = self.counts and {
+            "solver_runs": self.counts.runs,
+            "answered_from_record": self.counts.recorded,
+        }
         self.write_json(
             "run.json",
             {
                 "case": str(self.case),
                 "command": self.command,
                 "arguments": sys.argv[1:],
-                "started": self._started,
+                "started": self.started,
                 "seconds": round(time.monotonic() - self._clock, 3),
                 "host": platform.node(),
                 "python": platform.python_version(),
                 "tyrecal": tyrecal.__version__,
                 "solver": f"{self.solver.name} {self.solver.version}" if self.solver else None,
                 "record": str(self.store.folder) if self.store else None,
+                **(counts or {}),
                 **facts,
             },
         )
 
-    def _check_owner(self) -> None:
-        record = self.folder / "run.json"
-        if not record.exists():
-            return
-        try:
-            owner = json.loads(record.read_text(encoding="utf-8")).get("case")
-        except ValueError:
-            owner = None
-        if owner != str(self.case):
-            raise OutputRefused(
-                f"folder '{self.folder}' holds results of {owner or 'something else'};"
-                " give another one with --output"
-            )
+    def report(self, wanted: bool, as_json: bool, quiet: bool) -> None:
+        """Where it is wanted, write report.html of all that the folder holds. Raises BadResults."""
+        if wanted:
+            from ..report.html.page import write_page
+
+            path = self.folder / "report.html"
+            write_page(path, [self.folder])
+            say(f"report in {path}", as_json, quiet)
 
     def _close(self) -> None:
         with contextlib.suppress(OSError):  # it holds failures, or was never made
@@ -118,26 +130,17 @@ class Run:
             self._lock.close()
 
 
-def say(text: str, as_json: bool, quiet: bool) -> None:
-    """A line for people: on standard output, or standard error beside JSON."""
-    if not quiet:
-        click.echo(text, err=as_json)
-
-
-def show(table: Any, as_json: bool, quiet: bool) -> None:
-    """A rich table for people, likewise."""
-    if quiet:
+def refuse_other(folder: Path, case: Path) -> None:
+    """Raises OutputRefused where ``folder`` holds results of another case than ``case``."""
+    record = folder / "run.json"
+    if not record.exists():
         return
-    from rich.console import Console
-
-    console = Console(stderr=as_json)
-    if not console.is_terminal:
-        console = Console(stderr=as_json, width=110)
-    with console.capture() as text:  # rich answers a closed pipe by leaving the process
-        console.print(table)
-    click.echo(text.get(), nl=False, err=as_json)
-
-
-def print_json(content: Any) -> None:
-    """A result on standard output, for programs."""
-    click.echo(json.dumps(content, indent=1, allow_nan=False))
+    try:
+        owner = json.loads(record.read_text(encoding="utf-8")).get("case")
+    except ValueError:
+        owner = None
+    if owner != str(case):
+        raise OutputRefused(
+            f"folder '{folder}' holds results of {owner or 'something else'};"
+            " give another one with --output"
+        )

@@ -5,12 +5,12 @@ from __future__ import annotations
 import click
 
 from . import options
+from .talk import Talk
 
 
 @click.command()
-@click.option("--json", "as_json", is_flag=True, help="As JSON.")
-@options.quiet
-def command(as_json: bool, quiet: bool) -> int:
+@options.talking
+def command(talk: Talk) -> int:
     """List the installed solvers: version, what they can do, why one cannot be used.
 
     \b
@@ -18,13 +18,9 @@ def command(as_json: bool, quiet: bool) -> int:
     tyrecal fit cases/p235_75r17.yaml --solver bundled
     """
     from ..evaluate.solver import installed
-    from .output import print_json, show
+    from ..report.table import solvers_table
 
     found = installed()
-    if as_json:
-        print_json(found)
-    else:
-        from ..report.table import solvers_table
-
-        show(solvers_table(found), as_json, quiet)
+    talk.result(found)
+    talk.show(solvers_table(found))
     return 0

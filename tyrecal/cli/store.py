@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from . import options
+from .talk import Talk
 
 
 @click.command()
@@ -23,9 +24,8 @@ from . import options
     metavar="SIZE_MB",
     help="Remove the least recently used until SIZE_MB are left.",
 )
-@click.option("--json", "as_json", is_flag=True, help="As JSON.")
-@options.quiet
-def command(folder: Path, verify: bool, prune: float | None, as_json: bool, quiet: bool) -> int:
+@options.talking
+def command(folder: Path, verify: bool, prune: float | None, talk: Talk) -> int:
     """Look at the record of evaluations in DIR, a results folder or a --store of several.
 
     Nothing else depends on a record: one that is removed is evaluated again when it is needed.
@@ -35,7 +35,6 @@ def command(folder: Path, verify: bool, prune: float | None, as_json: bool, quie
     tyrecal store p235_75r17 --verify --prune 100
     """
     from ..evaluate.store import Store
-    from .output import print_json, say
 
     own = folder / "record"
     store = Store(own if own.is_dir() else folder, opened=float("inf"))
@@ -43,8 +42,8 @@ def command(folder: Path, verify: bool, prune: float | None, as_json: bool, quie
     found = store.summary(verify)
     if removed is not None:
         found["removed"] = removed
-    if as_json:
-        print_json(found)
+    talk.result(found)
+    if talk.as_json:
         return 0
     size = found["bytes"] / 1e6
     lines = [f"{found['folder']}: {found['records']} records, {size:.1f} MB"]
@@ -54,5 +53,5 @@ def command(folder: Path, verify: bool, prune: float | None, as_json: bool, quie
     if removed is not None:
         lines.append(f"  removed: {removed}")
     lines.append(f"  damaged: {found['damaged']}" + ("" if verify else " (found so far)"))
-    say("\n".join(lines), as_json, quiet)
+    talk.say("\n".join(lines))
     return 0

@@ -13,15 +13,10 @@ from .main import EXIT_SOLVER
 
 @click.command()
 @options.every(options.case_argument, options.assignments)
-@click.option("--from-kPa", "from_kPa", type=float, default=100.0, metavar="A", show_default=True,
-              help="Lowest pressure.")  # fmt: skip
-@click.option("--to-kPa", "to_kPa", type=float, default=320.0, metavar="B", show_default=True,
-              help="Highest pressure.")  # fmt: skip
-@click.option("--steps", type=click.IntRange(2, 10000), default=12, metavar="N",
-              show_default=True, help="Pressures, both ends among them.")  # fmt: skip
+@options.pressures
 @options.fitted("Sweep the design that 'tyrecal fit' found for this case, too.")
 @click.option("--pictures/--no-pictures", default=True, help="Draw frequencies over pressure.")
-@options.every(*options.STUDY)
+@options.study
 def command(
     case: Path,
     assignments: tuple[str, ...],
@@ -30,15 +25,7 @@ def command(
     steps: int,
     fitted: Path | None,
     pictures: bool,
-    jobs: int,
-    mesh: str,
-    solver: str,
-    output: Path | None,
-    store: Path | None,
-    no_store: bool,
-    as_json: bool,
-    quiet: bool,
-    verbose: bool,
+    study: options.Study,
 ) -> int:
     """Follow every mode of CASE over the inflation pressure.
 
@@ -50,33 +37,31 @@ def command(
     tyrecal sweep-pressure cases/p235_75r17.yaml --fitted p235_75r17/fit.json --jobs 2
     tyrecal sweep-pressure cases/p235_75r17.yaml --from-kPa 180 --to-kPa 260 --steps 5 --json
     """
-    from ..evaluate.door import Door
     from ..fit.problem import read_targets
     from ..report.pressure import draw_pressure_sweep
     from ..report.table import sweep_csv, sweep_table
     from ..studies.pressure import Failure, Outcome, sweep
     from ..studies.pressure_result import sweep_result
-    from .output import Run, print_json, say, show
 
-    loaded, values = options.load(case, mesh, assignments, None)
+    talk = study.talk
+    loaded, values = study.load(case, assignments)
     pressures = _pressures(loaded, assignments, from_kPa, to_kPa, steps)
-    door = Door(loaded, solver)
-    adapter = door.solver
+    door = study.door(loaded)
     designs = {"initial": values}
     if fitted:
-        designs["fitted"] = options.fitted_values(fitted, loaded, solver)
-    run = Run(case, output, "sweep-pressure", adapter)
-    door.folder, door.keep = run.runs, verbose
-    door.store = run.open_store(store, no_store)
+        designs["fitted"] = options.fitted_values(fitted, loaded, study.solver)
+    run = study.run(case, "sweep-pressure", door)
 
     def notify(outcome: Outcome) -> None:
         place = f"{outcome.design}, {outcome.pressure_kPa:g} kPa"
         if isinstance(outcome, Failure):
-            click.secho(f"error: {place}: {outcome.failed}", fg="red", err=True)
-        elif verbose and not quiet:
-            click.echo(f"{place}: {len(outcome.modes)} modes", err=True)
+            talk.error(f"{place}: {outcome.failed}")
+        else:
+            talk.detail(f"{place}: {len(outcome.modes)} modes")
 
-    outcomes = sweep(door, designs, pressures, jobs, notify)
+    with talk.progress("sweep") as bar:
+        door.heard = bar.at
+        outcomes = sweep(door, designs, pressures, study.jobs, notify)
     failed = [each for each in outcomes if isinstance(each, Failure)]
     if len(failed) == len(outcomes):
         return EXIT_SOLVER
@@ -87,18 +72,16 @@ def command(
         targets = {each.label: each.frequency_Hz for each in read_targets(loaded)}
         picture = run.folder / "pressure_sweep.png"
         draw_pressure_sweep(picture, result["rows"], targets, loaded.case.pressure_kPa)
-    run.finish(solver_runs=door.counts.runs, answered_from_record=door.counts.recorded)
-    if as_json:
-        print_json(result)
-    for found in [] if as_json else result["findings"]:
+    run.finish()
+    talk.result(result)
+    for found in [] if talk.as_json else result["findings"]:
         rows = [row for row in result["rows"] if row["design"] == found["design"]]
-        show(sweep_table(rows, found), as_json, quiet)
+        talk.show(sweep_table(rows, found))
         for sentence in found["words"]:
-            say(f"{found['design']}: {sentence}", as_json, quiet)
+            talk.say(f"{found['design']}: {sentence}")
     if failed:
-        text = f"error: {len(failed)} of {len(outcomes)} evaluations failed; the others are kept"
-        click.secho(text, fg="red", err=True)
-    say(f"results in {run.folder}", as_json, quiet)
+        talk.error(f"{len(failed)} of {len(outcomes)} evaluations failed; the others are kept")
+    study.finish(run)
     return EXIT_SOLVER if failed else 0
 
 
@@ -106,10 +89,6 @@ def _pressures(
     loaded: Any, assignments: tuple[str, ...], low: float, high: float, steps: int
 ) -> list[float]:
     """The pressures of the sweep, kPa. Raises click.UsageError."""
-    from math import isfinite
-
-    import numpy as np
-
     from ..case import parse_assignment, with_values
     from ..studies.fitted import pressure_name
 
@@ -118,13 +97,10 @@ def _pressures(
         raise click.UsageError(
             f"--set {name}: the sweep sets the pressure, by --from-kPa, --to-kPa"
         )
+    pressures = options.parse_pressures(low, high, steps)
     for option, value in (("--from-kPa", low), ("--to-kPa", high)):
-        if not (isfinite(value) and value > 0):
-            raise click.UsageError(f"{option} {value:g}: must be a finite pressure above 0")
         try:
             with_values(loaded, {name: value})
         except ValueError as error:
             raise click.UsageError(f"{option} {value:g}: {error}") from None
-    if low >= high:
-        raise click.UsageError(f"--from-kPa {low:g} must be less than --to-kPa {high:g}")
-    return [round(float(p), 9) for p in np.linspace(low, high, steps)]
+    return list(pressures)

@@ -7,34 +7,37 @@ from pathlib import Path
 import click
 
 from . import options
+from .talk import Talk
 
 
 @click.command()
 @options.case_argument
-@options.as_json
-@options.quiet
-def command(case: Path, as_json: bool, quiet: bool) -> int:
-    """Check CASE and report every mistake: file, line, key, value, what would be right."""
+@options.talking
+def command(case: Path, talk: Talk) -> int:
+    """Check CASE and report every mistake: file, line, key, value, what would be right.
+
+    \b
+    tyrecal validate cases/p235_75r17.yaml
+    tyrecal validate my.yaml --json
+    """
     from ..case import validate
-    from .output import print_json, say
 
     mistakes = validate(case)
     for mistake in mistakes:
-        click.echo(f"error: {mistake}", err=True)
-    if as_json:
-        print_json(
-            [
-                {
-                    "file": str(m.file),
-                    "line": m.line,
-                    "key": m.key,
-                    "value": m.value,
-                    "message": m.message,
-                }
-                for m in mistakes
-            ]
-        )
+        talk.error(str(mistake))
+    talk.result(
+        [
+            {
+                "file": str(m.file),
+                "line": m.line,
+                "key": m.key,
+                "value": m.value,
+                "message": m.message,
+            }
+            for m in mistakes
+        ]
+    )
     if mistakes:
         return 2
-    say(f"{case}: no mistakes", as_json, quiet)
+    talk.say(f"{case}: no mistakes")
     return 0

@@ -43,7 +43,7 @@ def regions(model: TyreModel, x: Array) -> list[Region]:
         for key in (*keys, "density_kg_per_m3"):
             numbers[f"materials.{material}.{key}"] = float(getattr(materials[material], key))
     door = model.door.worker()
-    door.case = case
+    door.case, door.heard = case, model.door.heard
     problem = fit.Problem(case, door, jobs=model.jobs)
     own = model.values(x)
     taken = {path: own[name] for name, v in case.case.variables.items() for path in v.sets}

@@ -110,7 +110,7 @@ def parse_change(text: str) -> Change:
 def _same(door: Door) -> Door:
     """The same door with the same counts, for other rows of the same tyre."""
     other = door.worker()
-    other.counts = door.counts
+    other.counts, other.heard = door.counts, door.heard
     return other
 
 

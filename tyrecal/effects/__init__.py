@@ -1,10 +1,14 @@
-"""What a plain model leaves out: one file an effect, each with one parameter; 0 = absent."""
+"""What a plain model leaves out: one file an effect, each with one parameter; 0 = absent.
+
+Installed packages add theirs under the entry point group GROUP: the id, and where its `Effect` is.
+"""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
 from importlib import import_module
+from importlib.metadata import entry_points
 from typing import TYPE_CHECKING
 
 from .effect import Effect, EffectRefused
@@ -12,8 +16,9 @@ from .effect import Effect, EffectRefused
 if TYPE_CHECKING:
     from ..case import LoadedCase
 
+GROUP = "tyrecal.effects"
 # Each a module of this package; in this order they are listed, and applied to a case.
-IDS = (
+OWN = (
     "dynamic_stiffening",
     "frequency_stiffening",
     "tread_density",
@@ -40,6 +45,8 @@ IDS = (
     "road_contact",
     "rotation",
 )
+_ADDED = {entry.name: entry for entry in entry_points(group=GROUP) if entry.name not in OWN}
+IDS = (*OWN, *sorted(_ADDED))
 
 __all__ = ["IDS", "Effect", "EffectRefused", "catalogue", "with_effects"]
 
@@ -47,7 +54,8 @@ __all__ = ["IDS", "Effect", "EffectRefused", "catalogue", "with_effects"]
 @cache
 def catalogue() -> dict[str, Effect]:
     """Every effect by its id. (Modules are imported here: the case's schema needs the ids only.)"""
-    return {id: import_module(f".{id}", __package__).EFFECT for id in IDS}
+    own = {id: import_module(f".{id}", __package__).EFFECT for id in OWN}
+    return {**own, **{id: _ADDED[id].load() for id in sorted(_ADDED)}}
 
 
 def with_effects(case: LoadedCase) -> LoadedCase:

@@ -13,8 +13,8 @@ from ..deck.beside import needs
 from ..deck.write import Decks
 from ..effects import catalogue, with_effects
 from . import folders
+from .executor import WorkerLost, executor, in_order
 from .failure import DeckRefused, EvaluationFailed
-from .pool import process_pool
 from .pressed import Pressed, pressed
 from .results import Evaluation, evaluation
 from .solver import Solver, find_solver
@@ -54,12 +54,18 @@ class Counts:
         self.runs, self.recorded = self.runs + other.runs, self.recorded + other.recorded
 
 
+def _unheard(done: int, total: int) -> None:
+    """Nobody wants to know."""
+
+
 @dataclass
 class Door:
     """Evaluates designs of a case with a solver, each in a fresh folder under ``folder``.
 
     keep: leave the folders of successful runs too (those of failures are always kept); store: the
-    record that is asked before the solver, and told what it said.
+    record that is asked before the solver, and told what it said; heard: called with how many of
+    how many designs asked at once are answered; scheduler: address of the Dask scheduler whose
+    workers evaluate where there are several questions, else processes do.
     """
 
     case: LoadedCase
@@ -67,7 +73,9 @@ class Door:
     folder: Path | None = None
     keep: bool = False
     store: Store | None = None
+    scheduler: str = ""
     counts: Counts = field(default_factory=Counts)
+    heard: Callable[[int, int], None] = field(default=_unheard, repr=False)
     _solver: Solver | None = field(default=None, repr=False)
 
     @property
@@ -208,19 +216,28 @@ class Door:
         return self._each("press", [(values, loads_N, modes) for values in designs], jobs)
 
     def _each(self, ask: str, asked: Sequence[tuple[Any, ...]], jobs: int) -> Iterator[Any]:
-        if jobs <= 1:
-            for arguments in asked:
-                yield _answer(self, ask, arguments)
-            return
-        with process_pool(jobs) as pool:
-            tasks = partial(_answer_and_count, self.worker(), ask)
-            for answer, counts in pool.map(tasks, asked):
-                self.counts.add(counts)
+        self.heard(0, len(asked))
+        if len(asked) <= 1 or (jobs <= 1 and not self.scheduler):
+            for done, arguments in enumerate(asked, start=1):
+                answer = _answer(self, ask, arguments)
+                self.heard(done, len(asked))
                 yield answer
+            return
+        with executor(jobs, self.scheduler) as workers:
+            answers = workers.each(partial(_answer_and_count, self.worker(), ask), asked)
+            for done, answer in enumerate(in_order(answers), start=1):
+                self.heard(done, len(asked))
+                if isinstance(answer, WorkerLost):
+                    yield EvaluationFailed("crashed", str(answer))
+                    continue
+                found, counts = answer
+                self.counts.add(counts)
+                yield found
 
     def worker(self) -> Door:
-        """The same door for another process, with counts of its own."""
-        return Door(self.case, self.solver_name, self.folder, self.keep, self.store)
+        """The same door for another process, wherever it is, with counts of its own."""
+        folder = self.folder.absolute() if self.folder else None
+        return Door(self.case, self.solver_name, folder, self.keep, self.store)
 
     def _recall(self, key: str) -> dict[str, Any] | None:
         content = self.store.read(key) if self.store else None

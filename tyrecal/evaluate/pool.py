@@ -6,12 +6,23 @@ import os
 import signal
 import threading
 from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import get_context, parent_process
+from multiprocessing import active_children, get_context, parent_process
 
 
-def process_pool(jobs: int) -> ProcessPoolExecutor:
+class Pool(ProcessPoolExecutor):
+    """Worker processes that are not waited for after Ctrl-C: what they had not finished is lost."""
+
+    def __exit__(self, kind: type[BaseException] | None, *error: object) -> None:
+        if kind is not None and issubclass(kind, KeyboardInterrupt):
+            self.shutdown(wait=False, cancel_futures=True)
+            for process in active_children():
+                process.terminate()
+        self.shutdown(cancel_futures=kind is not None)
+
+
+def process_pool(jobs: int) -> Pool:
     """``jobs`` worker processes, which end when the process that asked for them is killed."""
-    return ProcessPoolExecutor(jobs, get_context("forkserver"), initializer=_end_with_parent)
+    return Pool(jobs, get_context("forkserver"), initializer=_end_with_parent)
 
 
 def _end_with_parent() -> None:

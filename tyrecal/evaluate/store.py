@@ -32,7 +32,7 @@ log = logging.getLogger("tyrecal")
 def key_of(folder: Path, solver: Solver) -> str:
     """What ``solver`` is asked by the files in ``folder``, as 64 hexadecimal digits."""
     digest = sha256()
-    parts = [FORMAT, solver.name, solver.version, _sources(type(solver))]
+    parts = [FORMAT, solver.name, solver.version, sources_of(type(solver))]
     pieces = [part.encode() for part in parts]
     for path in sorted(p for p in folder.rglob("*") if p.is_file()):
         pieces += [path.relative_to(folder).as_posix().encode(), path.read_bytes()]
@@ -45,7 +45,7 @@ def key_of(folder: Path, solver: Solver) -> str:
 _SOURCES: dict[type, str] = {}
 
 
-def _sources(adapter: type) -> str:
+def sources_of(adapter: type) -> str:
     """Hash of the adapter's package: an edit of a reader must not be forgotten in a version."""
     if adapter not in _SOURCES:
         digest = sha256()

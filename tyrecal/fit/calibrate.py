@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,8 +12,8 @@ import numpy as np
 
 from ..case import LoadedCase
 from ..evaluate.door import Counts, Door
+from ..evaluate.executor import WorkerLost, executor, in_order
 from ..evaluate.failure import EvaluationFailed
-from ..evaluate.pool import process_pool
 from . import least_squares, slsqp
 from .problem import Point, Problem, objective_unit
 from .uncertainty import uncertainty
@@ -67,14 +67,16 @@ def calibrate(
     seed: int = 0,
     jobs: int = 1,
     notify: Notify | None = None,
+    finished: Callable[[int, int], None] = lambda done, starts: None,
 ) -> Fit:
     """Fit the case's free variables to its targets.
 
     starts: the case's own start and ``starts - 1`` drawn uniformly in the scaled box; drawn
     starts that cannot be evaluated are counted and replaced. jobs: processes for the drawn starts,
     and for the neighbours of a point of the first one, where the solver gives no slopes or the
-    tyre is pressed. Raises NothingToFit; DeckRefused where there are footprint targets and the
-    solver has no road; EvaluationFailed when the case's own start cannot be evaluated.
+    tyre is pressed. notify is told of every design here, finished of every start. Raises
+    NothingToFit; DeckRefused where there are footprint targets and the solver has no road;
+    EvaluationFailed when the case's own start cannot be evaluated.
     """
     problem = Problem(case, door, fixed, notify, jobs)
     if not len(problem.scale):
@@ -92,7 +94,7 @@ def calibrate(
     reports = [_run(problem, problem.start(), method)]
     replaced = 0
     if starts > 1:
-        more, replaced = _more_starts(problem, starts - 1, seed, jobs, method)
+        more, replaced = _more_starts(problem, starts - 1, seed, jobs, method, finished)
         reports += more
     best = min(reports, key=lambda r: r.point.objective)
     history = _joined([r.history for r in reports])
@@ -123,52 +125,51 @@ def _tolerance(problem: Problem) -> float:
 
 
 def _more_starts(
-    problem: Problem, count: int, seed: int, jobs: int, method: str
+    problem: Problem,
+    count: int,
+    seed: int,
+    jobs: int,
+    method: str,
+    finished: Callable[[int, int], None],
 ) -> tuple[list[StartReport], int]:
     generator = np.random.default_rng(seed)
     reports: list[StartReport] = []
     replaced = 0
-    with _workers(jobs) as run_all:
-        while len(reports) < count:
-            drawn = [
-                generator.uniform(problem.lower, problem.upper) for _ in range(count - len(reports))
-            ]
-            for answer in run_all(problem, drawn, method):
-                if isinstance(answer, EvaluationFailed):
-                    replaced += 1
-                else:
-                    reports.append(answer)
-            if replaced > MOST_REPLACED * count:
-                raise EvaluationFailed(
-                    "no_equilibrium",
-                    f"{replaced} drawn starts could not be"
-                    " evaluated: the bounds hold too few tyres",
-                )
+    finished(1, count + 1)
+    while len(reports) < count:
+        drawn = [
+            generator.uniform(problem.lower, problem.upper) for _ in range(count - len(reports))
+        ]
+        for answer in _run_all(problem, drawn, jobs, method):
+            if isinstance(answer, EvaluationFailed):
+                replaced += 1
+            else:
+                reports.append(answer)
+                finished(len(reports) + 1, count + 1)
+        if replaced > MOST_REPLACED * count:
+            raise EvaluationFailed(
+                "no_equilibrium",
+                f"{replaced} drawn starts could not be evaluated: the bounds hold too few tyres",
+            )
     return reports, replaced
 
 
-class _workers:
-    """Runs starts one after the other, or in a process pool; answers come in order."""
-
-    def __init__(self, jobs: int):
-        self.pool = process_pool(jobs) if jobs > 1 else None
-
-    def __enter__(self) -> Callable[[Problem, list[Array], str], Any]:
-        return self._run_all
-
-    def __exit__(self, *_: object) -> None:
-        if self.pool:
-            self.pool.shutdown(cancel_futures=True)
-
-    def _run_all(self, problem: Problem, starts: list[Array], method: str) -> Any:
-        if self.pool is None:
-            yield from (_start_here(problem, x, method) for x in starts)
-            return
-        door = problem.door.worker()
-        tasks = [(Problem(problem.case, door, problem.fixed), x, method) for x in starts]
-        for answer, counts in self.pool.map(_start_alone, tasks):
+def _run_all(
+    problem: Problem, starts: list[Array], jobs: int, method: str
+) -> Iterator[StartReport | EvaluationFailed]:
+    """Answers in the order of the starts; ``jobs`` at a time, or by the door's scheduler."""
+    if jobs <= 1 and not problem.door.scheduler:
+        yield from (_start_here(problem, x, method) for x in starts)
+        return
+    door = problem.door.worker()
+    tasks = [(Problem(problem.case, door, problem.fixed), x, method) for x in starts]
+    with executor(jobs, problem.door.scheduler) as workers:
+        for answer in in_order(workers.each(_start_alone, tasks)):
+            if isinstance(answer, WorkerLost):
+                raise EvaluationFailed("crashed", str(answer))
+            report, counts = answer
             problem.door.counts.add(counts)
-            yield answer
+            yield report
 
 
 def _start_here(problem: Problem, start: Array, method: str) -> StartReport | EvaluationFailed:

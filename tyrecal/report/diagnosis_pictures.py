@@ -16,6 +16,7 @@ from ..diagnose.gap import family
 from ..diagnose.study import Study
 from ..diagnose.where import Place
 from ..modes.mode import Label
+from ..tyre.mesh import SectionMesh
 from .figure import COLOURS, GREY, in_house_style, new_figure, save
 
 Array = np.ndarray
@@ -137,19 +138,12 @@ def draw_section_map(
     axes, beside = figure.subplots(1, 2, width_ratios=[5, 4])
     axes.set_aspect("equal")
     beside.axis("off")
-    regions = [name for name, _ in case.section.regions]
-    rows = case.case.mesh.levels[case.case.mesh.level].rows
-    groups: dict[str, list[list[Array]]] = {}
-    for number, (region, row) in mesh.cells.items():
-        name = region.replace("_", " ")
-        if region == regions[0] and name not in by_name:
-            name = "tread" if row >= sum(rows[:-1]) else f"{name} under the tread"
-        groups.setdefault(name, []).append([point[n] for n in mesh.solids[number][:4]])
-    for name, cells in groups.items():
+    for name, solids in rubber_parts(case, mesh, set(by_name)).items():
+        cells = [[point[n] for n in nodes] for nodes in solids]
         colour = _colour(by_name.get(name))
         axes.add_collection(PolyCollection(cells, fc=colour, ec="0.7", lw=0.3))
     for layer in case.case.rebar_layers.values():
-        cord = by_name.get(layer.material.replace("_", " ") + "s")
+        cord = by_name.get(cord_part(layer.material))
         lines = [[point[n] for n in nodes] for nodes in mesh.cords[layer.line].values()]
         axes.add_collection(LineCollection(lines, color=_colour(cord), lw=2.2, zorder=2))
         axes.add_collection(LineCollection(lines, color="0.3", lw=0.5, zorder=3))
@@ -170,6 +164,27 @@ def draw_section_map(
               color="0.3")  # fmt: skip
     axes.set_title("One part changed alone: the redder, the better it explains the gap", loc="left")
     save(figure, path)
+
+
+def rubber_parts(
+    case: LoadedCase, mesh: SectionMesh, named: set[str]
+) -> dict[str, list[tuple[int, ...]]]:
+    """Corner nodes of the elements of each part of the section, by the part's name in a map of
+    the parts ``named``."""
+    crown = case.section.regions[0][0]
+    rows = case.case.mesh.levels[case.case.mesh.level].rows
+    found: dict[str, list[tuple[int, ...]]] = {}
+    for number, (region, row) in mesh.cells.items():
+        name = region.replace("_", " ")
+        if region == crown and name not in named:
+            name = "tread" if row >= sum(rows[:-1]) else f"{name} under the tread"
+        found.setdefault(name, []).append(mesh.solids[number][:4])
+    return found
+
+
+def cord_part(material: str) -> str:
+    """The name of the cords of a material in a map of the parts."""
+    return material.replace("_", " ") + "s"
 
 
 def _after(d: Diagnosis) -> Array | None:

@@ -8,9 +8,10 @@ from typing import Any
 
 from ..case import LoadedCase, with_values
 from ..deck.context import section_mesh
-from ..evaluate.results import Evaluation, HarmonicShape
+from ..evaluate.results import Evaluation
 from ..modes.mode import Label, Mode
 from .convergence import draw_convergence
+from .revolve import placed
 from .section import draw_section
 from .shapes import draw_mode, draw_modes_overview
 from .vtu import write_vtu
@@ -24,9 +25,8 @@ def draw_evaluation(
     Only modes known on the whole section are drawn: a 3-D solver gives them on the crown alone.
     """
     mesh = section_mesh(case)
-    moved = dict(zip(evaluation.nodes.tolist(), evaluation.displacement, strict=True))
+    moved, modes = placed(evaluation, modes, mesh)
     draw_section(folder / "section.png", case, mesh, moved or None)
-    modes = [mode for mode in modes if isinstance(mode.raw.shape, HarmonicShape)]
     if modes:
         draw_modes_overview(folder / "modes.png", modes[:9], mesh)
     for mode in modes:

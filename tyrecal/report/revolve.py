@@ -7,17 +7,47 @@ revolves the section of the deck.
 
 from __future__ import annotations
 
-import numpy as np
+from collections.abc import Sequence
+from dataclasses import replace
 
-from ..evaluate.results import HarmonicShape, RawMode
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..evaluate.results import Evaluation, HarmonicShape, RawMode
+from ..modes.mode import Mode
 from ..modes.sample import on_rings
 from ..tyre.mesh import SectionMesh
 
 Array = np.ndarray
+NEAREST = 1e-3  # m, within which a node of another mesh stands for one of ours
 
 
 class NoSectionShape(ValueError):
     """The mode's shape is not given on the nodes of the section."""
+
+
+def placed(
+    evaluation: Evaluation, modes: Sequence[Mode], mesh: SectionMesh
+) -> tuple[dict[int, Array], list[Mode]]:
+    """The inflation's displacement, r, theta, z in m, by node of the mesh, and the modes with their
+    shapes on its nodes; both empty where they are not known there.
+
+    A solver may have nodes and numbers of its own: each node takes what is known nearest to it.
+    """
+    shapes = [mode.raw.shape for mode in modes]
+    known = [shape for shape in shapes if isinstance(shape, HarmonicShape)]
+    if not known or len(known) < len(shapes):
+        return {}, []
+    nodes, places = np.array(list(mesh.nodes)), np.array(list(mesh.nodes.values()))
+    away, rows = cKDTree(known[0].points).query(places)
+    if away.max() > NEAREST:
+        return {}, []
+    moved = dict(zip(mesh.nodes, evaluation.displacement[rows], strict=True))
+    on_mesh = (HarmonicShape(s.n, nodes, places, s.amplitude[rows]) for s in known)
+    return moved, [
+        replace(mode, raw=replace(mode.raw, shape=shape))
+        for mode, shape in zip(modes, on_mesh, strict=True)
+    ]
 
 
 def corners(mesh: SectionMesh) -> Array:

@@ -40,19 +40,19 @@ def draw_section(
     """
     case = with_effects(case)
     place = {n: np.array([z, r]) * 1e3 for n, (r, z) in mesh.nodes.items()}
-    outline = _outline(mesh)
+    around = outline(mesh)
     figure = new_figure(9.0, 8.0)
     axes = figure.add_subplot(aspect="equal")
     entries = _draw(axes, case, mesh, place, 1.0)
     axes.axvline(0, color=GREY, lw=0.8, ls=(0, (12, 3, 2, 3)))
     if displacement is not None:
-        moved = [place[n] + np.take(displacement[n], [2, 0]) * 1e3 for n in outline]
+        moved = [place[n] + np.take(displacement[n], [2, 0]) * 1e3 for n in around]
         (line,) = axes.plot(*np.transpose(moved), color="black", lw=1.0, ls=(0, (5, 3)))
         entries[f"inflated to {case.case.pressure_kPa:g} kPa"] = line
     _detail(axes, case, mesh, place)
     axes.set_xlabel("z along the axle, mm")
     axes.set_ylabel("r from the axle, mm")
-    z, r = np.transpose([place[n] for n in outline])
+    z, r = np.transpose([place[n] for n in around])
     axes.set_title(case.case.name, fontsize=13, pad=22)
     facts = (f"outer diameter {2 * r.max():.1f} mm, section width {np.ptp(z):.1f} mm,"
              f" {len(mesh.solids)} elements")  # fmt: skip
@@ -62,13 +62,30 @@ def draw_section(
     save(figure, path)
 
 
-def _outline(mesh: SectionMesh) -> list[int]:
+def outline(mesh: SectionMesh) -> list[int]:
     """Numbers of the nodes round the section, closed."""
     step = 2 if mesh.quadratic else 1
     columns, rows = (step * n for n in mesh.shape)
     walk = [(0, j) for j in range(columns)] + [(i, columns) for i in range(rows)]
     walk += [(rows, j) for j in range(columns, 0, -1)] + [(i, 0) for i in range(rows, -1, -1)]
     return [1000 * (j + 1) + i + 1 for i, j in walk]
+
+
+def turns(case: LoadedCase, mesh: SectionMesh, name: str) -> list[tuple[int, ...]]:
+    """Nodes of the elements to draw a layer with: layers on one line take turns."""
+    layers = case.case.rebar_layers
+    layer = layers[name]
+    sharing = [
+        other
+        for other, its in layers.items()
+        if (its.line, its.regions) == (layer.line, layer.regions)
+    ]
+    own = [
+        nodes
+        for cord, nodes in mesh.cords[layer.line].items()
+        if not layer.regions or mesh.region_of(cord) in layer.regions
+    ]
+    return own[sharing.index(name) :: len(sharing)]
 
 
 def _draw(
@@ -78,21 +95,10 @@ def _draw(
     entries: dict[str, Artist] = {}
     layers = case.case.rebar_layers
     for k, (name, layer) in enumerate(layers.items()):
-        sharing = [
-            other
-            for other, its in layers.items()
-            if (its.line, its.regions) == (layer.line, layer.regions)
-        ]
-        # layers on one line take turns, element by element
-        turns = slice(sharing.index(name), None, len(sharing))
-        lines = [
-            [place[n] for n in nodes]
-            for cord, nodes in mesh.cords[layer.line].items()
-            if not layer.regions or mesh.region_of(cord) in layer.regions
-        ]
+        lines = [[place[n] for n in nodes] for nodes in turns(case, mesh, name)]
         colour = COLOURS[k % len(COLOURS)]
         axes.add_collection(
-            LineCollection(lines[turns], color=colour, lw=1.3 * size, capstyle="butt", zorder=3)
+            LineCollection(lines, color=colour, lw=1.3 * size, capstyle="butt", zorder=3)
         )
         words = f"{name.replace('_', ' ')}: {layer.angle_deg:g}° from the meridian"
         entries[words] = Line2D([], [], color=colour, lw=2)

@@ -1,6 +1,9 @@
-"""Modes in an engineer's words."""
+"""Modes, and doubts about a fit, in an engineer's words."""
 
 from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
 
 KNOWN = {
     (0, 0, "axial"): "lateral",
@@ -22,3 +25,34 @@ def motion(c: int, m: int, kind: str | None = None) -> str:
         return "overtone"
     order = ORDINALS[c - 2] if c - 2 < len(ORDINALS) else f"{c - 1}th"
     return f"{order} {'out-of' if m else 'in'}-plane bending"
+
+
+def fit_doubts(result: Mapping[str, Any]) -> list[str]:
+    """What the user of a fit (the content of fit.json) must not overlook."""
+    doubts = []
+    if not result["moved"]:
+        doubts.append("THE FIT DID NOT MOVE: every variable ended where it started")
+    if not result["converged"]:
+        doubts.append(
+            f"not converged: {result['message']}; projected gradient"
+            f" {result['projected_gradient_norm']:.3g} {result['objective_unit']}"
+        )
+    for name, variable in result["variables"].items():
+        if variable["at_bound"]:
+            seen = variable["standard_error"] is not None
+            why = "the data want it beyond" if seen else "the data do not see it"
+            doubts.append(f"{name} ended at a bound: {why}")
+    if result["failed_evaluations"]:
+        doubts.append(
+            f"{result['failed_evaluations']} designs could not be evaluated; the search"
+            " stepped back from them"
+        )
+    if result["label_margin"] < 0.3:
+        doubts.append(
+            f"a mode is hard to name (margin {result['label_margin']:.2f} of 1): two modes have"
+            " met; look at their pictures"
+        )
+    values = result["singular_values"]
+    if values and values[-1] < 1e-3 * values[0]:
+        doubts.append("the data do not determine all variables: see singular_values in fit.json")
+    return doubts

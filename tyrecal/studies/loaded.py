@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -27,35 +27,40 @@ DECENT = 0.5  # share of a loaded shape that the modes before must make up to na
 @dataclass(frozen=True)
 class LoadedMode:
     """A mode at a load: overlap with its unloaded member, 0 to 1, and the share of its shape that
-    the modes at the load before ``spanned``."""
+    the modes at the load before ``spanned``; under a load its shape (ring, node, 3)."""
 
     member: Member
     frequency_Hz: float
     overlap: float
     spanned: float
+    shape: np.ndarray | None = field(default=None, compare=False, repr=False)
 
 
 @dataclass(frozen=True)
 class Loaded:
     """The tyre at one load: its named modes by rising frequency; ``unnamed``: members that no
     shape could be found for; ``disputed``: members that have another name where they are followed
-    from the unloaded tyre in one stride."""
+    from the unloaded tyre in one stride; surface (ring, node, 3): where the shapes' points stand,
+    r, theta, z in m at their angles, deformed."""
 
     load_N: float
     deflection_m: float
     modes: tuple[LoadedMode, ...]
     unnamed: tuple[Member, ...] = ()
     disputed: tuple[Member, ...] = ()
+    surface: np.ndarray | None = field(default=None, compare=False, repr=False)
 
 
 @dataclass(frozen=True)
 class LoadedTyre:
-    """One design at rising loads, 0 among them where it was asked for; ``failed``: why no more."""
+    """One design at rising loads, 0 among them where it was asked for; ``failed``: why no more;
+    angles (ring,) in rad from the patch's middle."""
 
     pressure_kPa: float
     mass_kg: float
     loads: tuple[Loaded, ...]
     failed: EvaluationFailed | None = None
+    angles: np.ndarray | None = field(default=None, compare=False, repr=False)
 
 
 Outcome = LoadedTyre | EvaluationFailed
@@ -151,7 +156,9 @@ def _loaded_tyre(
     if with_zero:
         named = (LoadedMode(x, f, 1.0, 1.0) for x, f in hertz.items() if x.label in wanted)
         loads = [Loaded(0.0, 0.0, _by_frequency(named)), *loads]
-    return LoadedTyre(pressed.pressure_kPa, pressed.mass_kg, tuple(loads), pressed.failed)
+    return LoadedTyre(
+        pressed.pressure_kPa, pressed.mass_kg, tuple(loads), pressed.failed, pressed.angles
+    )
 
 
 def _followed(
@@ -165,6 +172,9 @@ def _followed(
     names = list(shapes)
     free = state(np.array(list(hertz.values())), np.array(list(shapes.values())), where)
     before, place = free, np.arange(len(names))
+    row = {int(node): i for i, node in enumerate(pressed.nodes)}
+    nodes = [row[int(node)] for node in where.nodes]
+    R, Z = pressed.points[nodes].T
     loads = []
     for footprint in pressed.footprints:
         assert footprint.mode_frequency_Hz is not None and footprint.mode_shape is not None
@@ -184,12 +194,14 @@ def _followed(
                         float(here.frequencies[place[i]]),
                         float(overlaps[i, place[i]]),
                         float(spanned[i]),
+                        here.shapes[place[i]],
                     )
                     for i in chosen
                     if place[i] >= 0
                 ),
                 tuple(names[i] for i in chosen if place[i] < 0),
                 tuple(names[i] for i in chosen if 0 <= place[i] != straight.position[i]),
+                np.stack([R, 0 * R, Z], -1) + footprint.displacement[:, nodes],
             )
         )
         before = here

@@ -1,0 +1,41 @@
+"""Variations of the shipped case on a mesh as coarse as can be."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+from ..conftest import CASES
+
+COARSE = """
+    small:
+      elements: {crown: 3, upper_sidewall: 2, lower_sidewall: 2, bead: 1}
+      rows: [1, 1, 1, 1]
+    default:
+"""
+EDITS = (
+    ("\n    default:\n", COARSE),
+    ("level: default", "level: small"),
+    ("static_increments: 10", "static_increments: 4"),
+)
+
+
+def vary(folder: Path, count: int, coarse: bool = True) -> list[Path]:
+    """``count`` cases of different pressures in ``folder``, and the station table beside them."""
+    folder.mkdir(parents=True, exist_ok=True)
+    shutil.copy(CASES / "p235_75r17.csv", folder)
+    text = (CASES / "p235_75r17.yaml").read_text()
+    for old, new in EDITS if coarse else ():
+        assert text.count(old) == 1
+        text = text.replace(old, new)
+    paths = [folder / f"tyre_{i:02d}.yaml" for i in range(count)]
+    for i, path in enumerate(paths):
+        path.write_text(text.replace("pressure_kPa: 240.0", f"pressure_kPa: {240 + i / 5}"))
+    return paths
+
+
+def poison(path: Path) -> None:
+    """Make the rubber so soft that the inflated tyre is not stable."""
+    text, old = path.read_text(), "start: 1.0e+6\n    lower: 1.0e+5"
+    assert text.count(old) == 1
+    path.write_text(text.replace(old, "start: 1.0e+4\n    lower: 1.0e+3"))

@@ -1,0 +1,113 @@
+"""Drift: what is allowed is allowed, what is not is said, whatever the numbers."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as some
+
+from tyrecal.batch.drift import DEFAULTS, BadBaseline, baseline_of, compare, read_baseline
+from tyrecal.batch.junit import drift_line
+from tyrecal.batch.summary import summary
+
+from .data import entry, report
+
+FINITE = some.floats(-1e9, 1e9)
+
+
+def one(x: float, tolerance: dict[str, float], name: str = "fit/f") -> dict:
+    """A baseline of a single number."""
+    tolerances = {"fit/f": {"relative": 0.5}, name: tolerance}
+    return {"format": 1, "tolerances": tolerances, "cases": {"a": {"fit": {"f [1,0]": x}}}}
+
+
+def reports(x: float) -> list[dict]:
+    return [report("a", fit=entry(**{"f [1,0]": x}))]
+
+
+@given(FINITE, FINITE, some.floats(0, 2), some.floats(0, 1e6))
+def test_a_number_drifts_beyond_the_larger_tolerance(
+    old: float, new: float, relative: float, absolute: float
+) -> None:
+    found = compare(reports(new), one(old, {"relative": relative, "absolute": absolute}))
+    assert found["compared"] == 1
+    assert bool(found["drifted"]) == (abs(new - old) > max(relative * abs(old), absolute))
+
+
+@given(FINITE)
+def test_the_same_number_never_drifts_even_where_nothing_is_allowed(x: float) -> None:
+    assert not compare(reports(x), one(x, {}))["drifted"]
+
+
+def test_the_name_that_says_more_wins() -> None:
+    assert compare(reports(1.1), one(1.0, {"relative": 0.01}, "fit/f [1,0]"))["drifted"]
+    assert not compare(reports(1.1), one(1.0, {"relative": 0.01}, "fit/f [2,0]"))["drifted"]
+
+
+def test_what_is_gone_missing_or_new_is_said() -> None:
+    before = [
+        report("a", fit=entry(objective=1.0, mass_kg=2.0), modes=entry(mass_kg=2.0)),
+        report("b", fit=entry(objective=1.0)),
+    ]
+    now = [
+        report("a", fit=entry(objective=1.0, **{"fitted_Hz [1,0]": 3.0}), footprint=entry()),
+        report("c", fit=entry(objective=1.0)),
+    ]
+    found = compare(now, baseline_of(before, None))
+    (gone,) = found["drifted"]
+    assert (gone["quantity"], gone["value"]) == ("mass_kg", None)
+    assert drift_line(gone) == "mass_kg: 2 is gone"
+    assert (found["missing_cases"], found["new_cases"]) == (["b"], ["c"])
+    assert (found["missing_studies"], found["new_studies"]) == (["a/modes"], ["a/footprint"])
+    assert found["new"] == 1 and found["compared"] == 2
+    verdicts = {c["name"]: c["verdict"] for c in summary(["fit"], now, found)["cases"]}
+    assert verdicts == {"a": "drifted", "c": "good"}
+
+
+def test_the_worst_stands_first_and_a_failure_is_no_drift() -> None:
+    before = [report(name, fit=entry(objective=100.0)) for name in "abc"]
+    now = [
+        report("a", fit=entry(objective=101.0)),
+        report("b", fit=entry(objective=90.0)),
+        report("c", fit=entry("failed", "not_converged", "no", objective=0.0)),
+    ]
+    found = compare(now, baseline_of(before, None))
+    assert [each["case"] for each in found["drifted"]] == ["b", "a"]
+    counts = summary(["fit"], now, found)["counts"]
+    assert counts == {"cases": 3, "error": 0, "failed": 1, "drifted": 2, "good": 0}
+
+
+def test_a_baseline_keeps_its_tolerances_and_only_what_is_good() -> None:
+    now = [report("a", fit=entry(objective=1.0), modes=entry("error", "unstable", "no")),
+           report("b", fit=entry("error", "unstable", "no"))]  # fmt: skip
+    first = baseline_of(now, None)
+    assert first["cases"] == {"a": {"fit": {"objective": 1.0}}}
+    assert first["tolerances"] == DEFAULTS
+    again = baseline_of(now, {**first, "tolerances": {"fit/objective": {"absolute": 9}}})
+    assert again["tolerances"] == {"fit/objective": {"absolute": 9}}
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("{", "is not a baseline"),
+        ("[]", "format 1"),
+        ('{"format": 2}', "format 1"),
+        ('{"format": 1, "tolerances": {}}', "cases are wanted"),
+        (json.dumps(one(1.0, {"relative": -1})), "tolerances.fit/f"),
+        (json.dumps(one(1.0, {"realtive": 1})), "tolerances.fit/f"),
+        (json.dumps(one(1.0, {"relative": float("nan")})), "tolerances.fit/f"),
+        (json.dumps({**one(1.0, {}), "tolerances": {}}), "no tolerance 'fit/f'"),
+        (json.dumps({**one(1.0, {}), "cases": {"a": {"fit": {"f": "1"}}}}), "cases.a.fit"),
+        (json.dumps({**one(1.0, {}), "cases": {"a": 1}}), "cases.a.?"),
+    ],
+)
+def test_a_wrong_baseline_is_refused_in_a_sentence(text: str, words: str, tmp_path: Path) -> None:
+    path = tmp_path / "baseline.json"
+    path.write_text(text)
+    with pytest.raises(BadBaseline) as refused:
+        read_baseline(path)
+    assert words in str(refused.value) and "\n" not in str(refused.value)

@@ -1,0 +1,240 @@
+"""What every command has in common: help with examples, options, exit codes, Ctrl-C, colours."""
+
+from __future__ import annotations
+
+import json
+import os
+import pty
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import click
+import pytest
+
+from tyrecal.cli.main import COMMANDS, EXIT_CODES, cli
+
+from ..conftest import CASES, ROOT
+from .test_cli import run
+
+CASE = str(CASES / "p235_75r17.yaml")
+COARSE = ["--mesh", "coarse"]
+TYRECAL = [sys.executable, "-m", "tyrecal"]
+
+
+def commands() -> dict[str, click.Command]:
+    """Every command by what is typed, those of groups too."""
+    context = click.Context(cli)
+    found: dict[str, click.Command] = {}
+    for name in COMMANDS:
+        command = cli.get_command(context, name)
+        assert command is not None
+        if isinstance(command, click.Group):
+            found |= {f"{name} {sub}": each for sub, each in command.commands.items()}
+        else:
+            found[name] = command
+    return found
+
+
+@pytest.mark.parametrize("name", commands())
+def test_every_command_shows_an_example_and_has_the_options_of_all(name: str) -> None:
+    command = commands()[name]
+    text = (command.help or "").replace("\b", "")
+    assert re.search(rf"^ *(eval \"\$\()?tyrecal {name}\b", text, re.M), text
+    given = {option for param in command.params for option in param.opts}
+    assert {"--json", "--quiet", "--verbose"} <= given
+    for param in command.params:
+        if isinstance(param, click.Option):
+            assert param.help, param.opts
+
+
+def test_every_module_of_a_command_is_listed() -> None:
+    files = (ROOT / "tyrecal/cli").glob("*.py")
+    modules = {path.stem for path in files if "\ndef command(" in path.read_text()}
+    assert modules == {name.replace("-", "_") for name in COMMANDS}
+
+
+@pytest.mark.parametrize(
+    ("code", "arguments"),
+    [
+        (0, ["validate", CASE]),
+        (2, ["validate", "none.yaml"]),
+        (2, ["modes", CASE, "--mesh", "finest"]),
+        (2, ["modes", CASE, "--no-such-option"]),
+        (2, ["no-such-command"]),
+        (2, ["solvers", "--quiet", "--verbose"]),
+        (3, ["modes", CASE, *COARSE, "--pressure-kPa", "1900", "--set", "A_carcass=1e-8"]),
+        (3, ["modes", CASE, *COARSE, "--solver", "abaqus"]),
+        (4, ["fit", CASE, *COARSE, "--no-pictures", "--set", "A_belt=1.1e-7", "--fix", "C10",
+             "--fix", "A_carcass"]),
+    ],
+)  # fmt: skip
+def test_exit_codes(
+    code: int, arguments: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    monkeypatch.chdir(tmp_path)
+    if code == 4:  # the objective is least at the start: nothing moves
+        from tyrecal.fit import calibrate
+
+        monkeypatch.setattr(calibrate, "UNMOVED", float("inf"))
+    assert run(*arguments) == code
+    assert "Traceback" not in capsys.readouterr().err
+    assert code in EXIT_CODES
+
+
+def test_exit_codes_are_told_alike() -> None:
+    (line,) = re.findall(
+        r"Exit codes, for scripts: (.*?\.)", (ROOT / "README.md").read_text(), re.S
+    )
+    told = [int(code) for code in re.findall(r"(?:^|; ?)\s*(\d+) ", " ".join(line.split()))]
+    assert told == list(EXIT_CODES)
+
+
+@pytest.mark.parametrize("jobs", ["1", "2"])
+def test_ctrl_c_leaves_what_was_done_and_says_how_to_go_on(jobs: str, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    command = [*TYRECAL, "sweep-pressure", CASE, *COARSE, "--steps", "12", "--jobs", jobs,
+               "--no-pictures", "--output", str(out)]  # fmt: skip
+    process = subprocess.Popen(
+        command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True, start_new_session=True
+    )
+    while len(list(out.glob("record/*/*.record"))) < 3 and process.poll() is None:
+        time.sleep(0.01)
+    os.killpg(process.pid, signal.SIGINT)  # as a terminal does, to all processes
+    words = process.communicate(timeout=200)[1]
+    assert process.returncode == 130, words
+    assert "interrupted: " in words and "same command goes on" in words and str(out) in words
+    assert "Traceback" not in words
+    before = len(list(out.glob("record/*/*.record")))
+    assert 3 <= before < 12
+    assert subprocess.run([*command, "--quiet"], check=False).returncode == 0
+    facts = json.loads((out / "run.json").read_text())
+    assert facts["answered_from_record"] == before and facts["solver_runs"] == 12 - before
+    assert not list(out.glob("runs/*"))
+
+
+def test_ctrl_c_without_a_record_says_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from tyrecal.evaluate.door import Door
+
+    def stopped(door: Door, question: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Door, "evaluate", stopped)
+    assert run("modes", CASE, "--output", str(tmp_path), "--no-store") == 130
+    assert "--no-store nothing is on record" in capsys.readouterr().err
+    assert run("modes", CASE, "--output", str(tmp_path)) == 130
+    assert "goes on from there" in capsys.readouterr().err
+
+
+def on_a_terminal(*arguments: str, **environment: str) -> str:
+    """What a command writes to standard error on a terminal."""
+    ours, theirs = pty.openpty()
+    plain = {k: v for k, v in os.environ.items() if k not in ("NO_COLOR", "FORCE_COLOR")}
+    process = subprocess.Popen(
+        [*TYRECAL, *arguments], stdout=subprocess.DEVNULL, stderr=theirs,
+        env={**plain, "TERM": "xterm-256color", "COLUMNS": "100", **environment},
+    )  # fmt: skip
+    os.close(theirs)
+    said = b""
+    try:
+        while piece := os.read(ours, 65536):
+            said += piece
+    except OSError:  # the other end is closed
+        pass
+    process.wait()
+    os.close(ours)
+    return said.decode()
+
+
+def test_progress_is_on_terminals_only(tmp_path: Path) -> None:
+    command = ["sweep-pressure", CASE, *COARSE, "--steps", "3", "--no-pictures", "--output"]
+    said = on_a_terminal(*command, str(tmp_path / "a"))
+    assert "3/3" in said and "left" in said and "\x1b[" in said
+    assert "3/3" not in on_a_terminal(*command, str(tmp_path / "b"), "--quiet")
+    done = subprocess.run(
+        [*TYRECAL, *command, str(tmp_path / "c")], capture_output=True, text=True, check=True
+    )
+    assert done.stderr == "" and "\x1b" not in done.stdout
+
+
+def test_loads_show_on_the_bar(tmp_path: Path) -> None:
+    said = on_a_terminal("footprint", CASE, "--mesh", "coarse", "--loads-N", "300,500", "--output",
+                         str(tmp_path), "--no-pictures")  # fmt: skip
+    assert "footprint, load 2 of 2" in said and "1/1" in said
+
+
+@pytest.mark.parametrize(("environment", "red"), [({}, True), ({"NO_COLOR": "1"}, False)])
+def test_colours(environment: dict[str, str], red: bool) -> None:
+    said = on_a_terminal("validate", "none.yaml", **environment)
+    assert "error: " in said and ("\x1b[31m" in said) == red
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        ("val", ["validate"]),
+        ("fit cases/p235_75r17_", ["cases/p235_75r17_narrow_rim.yaml"]),
+        ("fit cases/p235_75r17.yaml --solver b", ["bundled"]),
+        ("fit cases/p235_75r17.yaml --fix A", ["A_belt", "A_carcass"]),
+        ("fit cases/p235_75r17.yaml --mesh ref", ["refined"]),
+        ("modes cases/p235_75r17.yaml --set A_b", ["A_belt="]),
+        ("modes cases/p235_75r17.yaml --set rim.ref",
+         ["rim.reference_point_m.r=", "rim.reference_point_m.z="]),
+        ("modes cases/p235_75r17.yaml --set effects.cap", ["effects.cap_ply="]),
+        ("effects bead", ["bead_filler"]),
+        ("diagnose cases/p235_75r17.yaml --effect tread_", ["tread_density", "tread_wear"]),
+        ("diagnose cases/p235_75r17.yaml --add rim", ["rim_width="]),
+        ("modes no_such.yaml --set A", []),
+        ("completion z", ["zsh"]),
+    ],
+)  # fmt: skip
+def test_completion(
+    words: str, expected: list[str], monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    monkeypatch.chdir(ROOT)
+    monkeypatch.setenv("COMP_WORDS", f"tyrecal {words}")
+    monkeypatch.setenv("COMP_CWORD", str(len(words.split())))
+    monkeypatch.setenv("_TYRECAL_COMPLETE", "bash_complete")
+    run()
+    items = capsys.readouterr().out.split()
+    assert [item.partition(",")[2] for item in items] == expected
+    assert all(item.startswith("plain,") for item in items)
+
+
+def test_the_scripts_of_the_shells(capsys: pytest.CaptureFixture[str]) -> None:
+    for shell, mark in (("bash", "complete -o"), ("zsh", "compdef"), ("fish", "complete --no")):
+        assert run("completion", shell) == 0
+        script = capsys.readouterr().out
+        assert mark in script and "_TYRECAL_COMPLETE" in script
+    assert run("completion", "bash", "--json") == 0
+    script = json.loads(capsys.readouterr().out)["script"]
+    assert "compopt -o nospace" in script
+    assert subprocess.run(["bash", "-n"], input=script, text=True).returncode == 0
+
+
+def test_bash_completes(tmp_path: Path) -> None:
+    """The script as bash runs it: the function fills COMPREPLY."""
+    program = Path(sys.executable).parent / "tyrecal"
+    lines = f"""
+        eval "$({program} completion bash)"
+        COMP_WORDS=(tyrecal modes {CASE} --set A_belt); COMP_CWORD=4
+        compopt() {{ echo "$@"; }}
+        _tyrecal_completion {program}
+        echo "${{COMPREPLY[@]}}"
+    """
+    done = subprocess.run(["bash", "-c", lines], capture_output=True, text=True, check=True)
+    assert done.stdout.split("\n")[:2] == ["-o nospace", "A_belt="]
+
+
+def test_version() -> None:
+    import tyrecal
+
+    done = subprocess.run([*TYRECAL, "--version"], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == f"tyrecal, version {tyrecal.__version__}"

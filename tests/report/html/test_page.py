@@ -1,0 +1,277 @@
+"""The page as text: all that the folders hold, escaped, the same bytes, and nothing invented."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+
+from tyrecal.report.html import page as page_module
+from tyrecal.report.html.page import page, write_page
+from tyrecal.report.html.results import BadResults, read_results
+
+from . import toy
+
+ROOT = Path(__file__).parents[3]
+VOID = {"meta", "input", "br", "path", "polyline", "circle", "rect"}
+HOSTILE = "</script><script>window.hacked=1</script><img src=x onerror=alert(1)>\"'{{ 7*7 }}"
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return toy.write(tmp_path_factory.mktemp("toy") / "results")
+
+
+@pytest.fixture
+def copy(folder: Path, tmp_path: Path) -> Path:
+    """A folder of the same name and content, to be spoilt."""
+    return Path(shutil.copytree(folder, tmp_path / "results"))
+
+
+def text_of(*folders: Path) -> str:
+    return page([read_results(each) for each in folders])
+
+
+class Nesting(HTMLParser):
+    """Collects ids and links; fails where tags do not nest."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.ids: list[str] = []
+        self.links: list[str] = []
+        self.words: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        found = dict(attrs)
+        assert len(found) == len(attrs), (tag, attrs)
+        self.ids += [found["id"] or ""] if "id" in found else []
+        self.links += [found["href"] or ""] if "href" in found else []
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        if tag not in VOID:
+            assert self.open.pop() == tag, (tag, self.getpos())
+
+    def handle_data(self, data: str) -> None:
+        if self.open and self.open[-1] not in ("script", "style"):
+            self.words.append(data)
+
+
+def parsed(text: str) -> Nesting:
+    found = Nesting()
+    found.feed(text)
+    assert not found.open
+    return found
+
+
+def words_of(text: str) -> str:
+    return " ".join("".join(parsed(text).words).split())
+
+
+def test_tags_nest_ids_are_unique_and_links_lead_somewhere(folder: Path) -> None:
+    found = parsed(text_of(folder, folder))
+    assert len(set(found.ids)) == len(found.ids)
+    assert found.links and {link.removeprefix("#") for link in found.links} <= set(found.ids)
+
+
+def test_table_2_is_there(folder: Path) -> None:
+    """Each row of the paper's table, its figures in their order."""
+    words = words_of(text_of(folder))
+    for c, m, kind, initial, fitted, target in toy.TABLE_2:
+        off = 100 * (fitted / target - 1)
+        grade = "○" if abs(off) <= 2 else "◐" if abs(off) <= 5 else "●"
+        figures = f"{initial:.2f}{fitted:.2f}{target:.2f}{grade} {off:+.2f}".replace("-", "\u2212")
+        assert re.search(rf"\[{c},{m}\][^\[]*{re.escape(figures)}", words), (kind, figures)
+    assert "The objective (equation (1), slsqp) went from 33.13 to 8.60 Hz" in words
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        "Fit", "Shapes of the fitted tyre", "Mode shapes under 1000 N, on the tread", "Section",
+        "Frequencies over pressure", "Footprint", "Frequencies over load", "Diagnosis",
+        "Mind: C10 ended at a bound", "Mind: 1 designs could not be evaluated",
+        "Mind: not reached: fitted, 10 kPa: it buckles", "Mind: not reached: initial, 900000 N",
+        "Mind: not reached: fitted, 30000 N: rim on road", "Fitted: every mode rises; every curve",
+        "Named: rim_width explains the gap. Probability 0.71", "weigh the tyre", "upper sidewall",
+        "contact area, cm²", "A_belt sets rebar_layers.belt_1.area_m2", "Toy & sons",
+    ],
+)  # fmt: skip
+def test_what_was_found_is_told(folder: Path, words: str) -> None:
+    assert words in words_of(text_of(folder))
+
+
+def test_the_page_stands_alone(folder: Path) -> None:
+    text = text_of(folder)
+    assert not re.search(r"https?:|//[a-z]|\bsrc=|@import|fetch\(|XMLHttp|import\(", text)
+    assert set(re.findall(r"url\((.*?)\)", text)) == {"#hatch"}
+    assert "default-src 'none'" in text
+
+
+def test_what_comes_from_files_is_escaped(tmp_path: Path) -> None:
+    folder = toy.write(tmp_path / "x", HOSTILE, HOSTILE)
+    text = text_of(folder)
+    assert "<script>window" not in text and "<img" not in text and "49" not in words_of(text)[:200]
+    assert parsed(text).open == [] and HOSTILE in "".join(parsed(text).words)
+
+
+def test_the_same_results_give_the_same_bytes(copy: Path, tmp_path: Path) -> None:
+    """Wherever they stand, whenever and wherever they were computed."""
+    write_page(tmp_path / "one.html", [copy])
+    run = json.loads((copy / "run.json").read_text())
+    run |= {"started": "2031-05-05T05:05:05+00:00", "seconds": 99.0, "host": "there"}
+    (copy / "run.json").write_text(json.dumps(run))
+    moved = Path(shutil.move(copy, tmp_path / "elsewhere" / "results"))
+    write_page(tmp_path / "two.html", [moved])
+    write_page(tmp_path / "two.html", [moved])
+    assert (tmp_path / "one.html").read_bytes() == (tmp_path / "two.html").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("file", "words"),
+    [
+        ("fit.json", "Not in it: results of fit."),
+        ("fit_shapes.json", "'tyrecal fit --report' keeps them"),
+        ("fit_history.csv", "The way of the fit (fit_history.csv) is not in this folder"),
+        ("modes.json", "Not in it: results of modes."),
+        ("modes_shapes.json", "'tyrecal modes --report' keeps them"),
+        ("pressure_sweep.json", "Not in it: results of sweep-pressure."),
+        ("load_sweep.json", "Not in it: results of modes --sweep-load."),
+        ("footprint.json", "Not in it: results of footprint."),
+        ("footprint_patches.json", "The pressure in the patches"),
+        ("diagnosis.json", "Not in it: results of diagnose."),
+        ("diagnosis.md", "The page in words (diagnosis.md) is not in this folder"),
+        ("diagnosis_section.json", "One part changed alone"),
+        ("run.json", "Folder results."),
+    ],
+)
+def test_what_is_not_there_is_said(copy: Path, file: str, words: str) -> None:
+    (copy / file).unlink()
+    assert words in words_of(text_of(copy))
+
+
+def test_each_study_alone(copy: Path) -> None:
+    for file in copy.glob("*.json"):
+        if file.stem in ("fit", "modes", "pressure_sweep", "load_sweep", "footprint", "diagnosis"):
+            alone = copy / "alone" / file.stem
+            alone.mkdir(parents=True)
+            shutil.copy(file, alone)
+            parsed(text_of(alone))
+
+
+def test_shapes_of_another_run_are_not_shown(copy: Path) -> None:
+    fit = json.loads((copy / "fit.json").read_text())
+    fit["modes"][2]["frequency_Hz"] += 0.01
+    (copy / "fit.json").write_text(json.dumps(fit))
+    assert "are those of another run: not shown" in words_of(text_of(copy))
+    assert text_of(copy).count('class="viewer"') == 1
+
+
+@pytest.mark.parametrize("content", ["", "{", "[]", "null", "{}", "\ud800", '{"format": 1}', "7"])
+def test_a_damaged_file_is_named(copy: Path, content: str) -> None:
+    for file in sorted(copy.glob("*.json")):
+        if file.name == "run.json":
+            continue
+        before = file.read_bytes()
+        file.write_bytes(content.encode("utf-8", "surrogatepass"))
+        with pytest.raises(BadResults, match=re.escape(file.name)) as told:
+            text_of(copy)
+        assert "\n" not in str(told.value)
+        file.write_bytes(before)
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "new"),
+    [
+        ("fit.json", '"objective_Hz": 8.603', '"objective_Hz": NaN'),
+        ("fit.json", '"format": 1', '"format": 2'),
+        ("fit.json", '"target_Hz": 31.7', '"target_Hz": 0'),
+        ("fit.json", '"fitted_Hz": 30.86', '"fitted_Hz": "fast"'),
+        ("footprint.json", '"area_m2": 0.003', '"area_m2": -1'),
+        ("modes.json", '"c": 1', '"c": 100000'),
+        ("diagnosis.json", '"named"', '"certain"'),
+        ("fit_history.csv", "900000.0", "many"),
+        ("fit_history.csv", "start", "stop"),
+    ],
+)
+def test_a_number_that_cannot_be(copy: Path, file: str, old: str, new: str) -> None:
+    text = (copy / file).read_text()
+    assert old in text
+    (copy / file).write_text(text.replace(old, new))
+    with pytest.raises(BadResults, match=re.escape(file)):
+        text_of(copy)
+
+
+@pytest.mark.parametrize(
+    ("file", "path"),
+    [
+        ("fit_shapes.json", ("R_m",)),
+        ("fit_shapes.json", ("modes", 0, "real")),
+        ("fit_shapes.json", ("section", "outline")),
+        ("fit_shapes.json", ("section", "areas", "crown", 0)),
+        ("modes_shapes.json", ("angles",)),
+        ("modes_shapes.json", ("modes", 0, "displacement", 0)),
+        ("footprint_patches.json", ("patches", 0, "across_mm", 0)),
+        ("footprint_patches.json", ("patches", 1, "pressure_kPa")),
+        ("diagnosis_section.json", ("areas", "crown", 0)),
+    ],
+)
+def test_lists_of_unequal_length(copy: Path, file: str, path: tuple[str | int, ...]) -> None:
+    content = json.loads((copy / file).read_text())
+    place = content
+    for key in path:
+        place = place[key]
+    del place[-1]
+    (copy / file).write_text(json.dumps(content))
+    with pytest.raises(BadResults, match=re.escape(file)):
+        text_of(copy)
+
+
+def test_a_page_too_large_and_places_not_to_write_to(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    other = tmp_path / "fit.json"
+    other.write_text("precious")
+    with pytest.raises(BadResults, match="no page of tyrecal's"):
+        write_page(other, [folder])
+    assert other.read_text() == "precious"
+    with pytest.raises(BadResults, match="is a folder"):
+        write_page(tmp_path, [folder])
+    monkeypatch.setattr(page_module, "LARGEST", 1000)
+    with pytest.raises(BadResults, match="give fewer folders"):
+        write_page(tmp_path / "large.html", [folder])
+    assert not (tmp_path / "large.html").exists()
+
+
+def _luminance(colour: str) -> float:
+    """Of sRGB (WCAG 2.2)."""
+    parts = [int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5)]
+    linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in parts]
+    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+
+
+def _contrast(a: str, b: str) -> float:
+    low, high = sorted((_luminance(a), _luminance(b)))
+    return (high + 0.05) / (low + 0.05)
+
+
+def test_contrast_is_aa() -> None:
+    """Text 4.5 : 1, what is drawn 3 : 1, on paper and panels, in light, dark and print."""
+    css = (ROOT / "templates/report/style.css").read_text()
+    themes = [dict(re.findall(r"--(\w[\w-]*): (#\w{6});", block))
+              for block in re.findall(r":root \{(.*?)\}", css, re.S)]  # fmt: skip
+    assert len(themes) == 3 and themes[0].keys() == themes[1].keys() == themes[2].keys()
+    assert _contrast("#ffffff", "#000000") == pytest.approx(21)
+    for theme in themes:
+        for ground in ("paper", "panel"):
+            for ink in ("ink", "soft", "link", "mind"):
+                assert _contrast(theme[ink], theme[ground]) >= 4.5, (ink, ground, theme)
+            for drawn in ("edge", "accent", *(f"s{k}" for k in range(6))):
+                assert _contrast(theme[drawn], theme[ground]) >= 3, (drawn, ground, theme)
+        assert _contrast(theme["on-accent"], theme["accent"]) >= 4.5

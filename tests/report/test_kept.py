@@ -1,0 +1,136 @@
+"""What is kept for the page: the same shapes, section and patches, from fewer numbers."""
+
+from __future__ import annotations
+
+import json
+from base64 import b64decode
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tyrecal.case import load_case, start_values
+from tyrecal.deck.context import section_mesh
+from tyrecal.evaluate import door as door_module
+from tyrecal.evaluate.door import Door, Question
+from tyrecal.evaluate.results import HarmonicShape
+from tyrecal.modes.label import paired_labels
+from tyrecal.modes.mode import Mode
+from tyrecal.report.html.contents import Shapes
+from tyrecal.report.html.shapes import packed
+from tyrecal.report.kept import patches_data, section_data, tyre_data
+from tyrecal.report.revolve import motion, placed, skin, swept
+from tyrecal.studies.footprint import press
+from tyrecal.studies.patch import patch_of
+
+from ..studies.hertz import Hertz, coarse_case
+
+ANGLES = 2 * np.pi * np.arange(48) / 48
+
+
+@pytest.fixture(scope="module")
+def tyre(tmp_path_factory: pytest.TempPathFactory):
+    case = load_case(coarse_case(tmp_path_factory.mktemp("case")))
+    evaluation = Door(case).evaluate(Question(start_values(case)))
+    return case, evaluation, paired_labels(evaluation.modes)
+
+
+def swept_again(content: dict, mode: dict) -> tuple[np.ndarray, np.ndarray]:
+    """Points and displacement (node, angle, 3), as the page's script computes them from 16 bit."""
+    data = packed(Shapes.model_validate(json.loads(json.dumps(content))))
+    chosen = data["modes"][content["modes"].index(mode)]
+    whole = lambda text: np.frombuffer(b64decode(text), "<i2") / 32767
+    R, Z = whole(data["place"]).reshape(2, -1)
+    real, imaginary = whole(chosen["shape"]).reshape(2, -1, 3)
+    n, up = chosen["n"], np.stack([np.sin(ANGLES), 0 * ANGLES, np.cos(ANGLES)], -1)
+    round_ = np.stack([np.cos(ANGLES), 0 * ANGLES, -np.sin(ANGLES)], -1)
+    axle = np.array([0.0, 1.0, 0.0])
+    cos, sin = np.cos(n * ANGLES)[:, None], np.sin(n * ANGLES)[:, None]
+    r, t, z = np.moveaxis(real[:, None] * cos - imaginary[:, None] * sin, -1, 0)[..., None]
+    return R[:, None, None] * up + Z[:, None, None] * axle, r * up + t * round_ + z * axle
+
+
+def test_shapes_swept_again_are_the_modes(tyre) -> None:
+    """Against the pictures' own sweep: alike but for scale, the turn of a pair and of the axes."""
+    case, evaluation, modes = tyre
+    content, mesh = tyre_data(case, evaluation, modes), section_mesh(case)
+    nodes = skin(mesh)
+    # the pictures have Theta = 0 at +x, the page at the top
+    turned = np.array([[0, 0, -1], [0, 1, 0], [1, 0, 0]])
+    rest = swept(nodes, mesh, ANGLES) @ turned.T
+    assert len(content["modes"]) == len(modes) > 8
+    for mode, kept in zip(modes, content["modes"], strict=True):
+        points, u = swept_again(content, kept)
+        assert points * np.abs(rest).max() / np.abs(points).max() == pytest.approx(rest, abs=1e-4)
+        pair = [motion(mode.raw, nodes, ANGLES, phase) @ turned.T for phase in (0.0, np.pi / 2)]
+        basis = np.array([each.ravel() for each in (pair if mode.label.c else pair[:1])]).T
+        part, *_ = np.linalg.lstsq(basis, u.ravel(), rcond=None)
+        assert basis @ part == pytest.approx(u.ravel(), abs=1e-4), mode.label
+
+
+def test_a_crest_stands_at_the_top(tyre) -> None:
+    case, evaluation, modes = tyre
+    for mode in tyre_data(case, evaluation, modes)["modes"]:
+        A = np.array(mode["real"]) + 1j * np.array(mode["imaginary"])
+        assert np.abs(A).max() == pytest.approx(1.0, abs=1e-5)
+        if mode["c"]:  # r and z there are as large as anywhere round the tyre
+            most = np.linalg.norm(np.abs(A[:, [0, 2]]), axis=0).max()
+            assert np.linalg.norm(A.real[:, [0, 2]], axis=0).max() > 0.99 * most
+
+
+def test_a_solver_with_nodes_of_its_own(tyre) -> None:
+    """Other numbers and another order change nothing; places too far away are not guessed."""
+    case, evaluation, modes = tyre
+    mesh = section_mesh(case)
+    order = np.random.default_rng(1).permutation(len(evaluation.nodes))
+    other = type(evaluation)(
+        evaluation.pressure_kPa, evaluation.mass_kg, evaluation.modes, {},
+        np.arange(len(order)), evaluation.displacement[order],
+    )  # fmt: skip
+
+    def renumbered(mode: Mode, aside: float) -> Mode:
+        s = mode.raw.shape
+        assert isinstance(s, HarmonicShape)
+        own = HarmonicShape(s.n, np.arange(len(order)), s.points[order] + aside, s.amplitude[order])
+        raw = type(mode.raw)(mode.raw.frequency_Hz, own, mode.raw.multiplicity)
+        return Mode(mode.label, mode.frequency_Hz, mode.multiplicity, 1.0, mode.position, raw)
+
+    same = [renumbered(mode, 0.0) for mode in modes]
+    assert tyre_data(case, other, same) == tyre_data(case, evaluation, modes)
+    assert placed(other, [renumbered(mode, 5e-3) for mode in modes], mesh) == ({}, [])
+
+
+def test_the_section_is_whole(tyre) -> None:
+    """Areas of the polygons and of the outline agree (shoelace); cords stand once per layer."""
+    case, *_ = tyre
+    mesh = section_mesh(case)
+    found = section_data(case, mesh, {})
+
+    def area(flat: list[float]) -> float:
+        z, r = np.reshape(flat, (-1, 2)).T
+        return 0.5 * float(abs(z @ np.roll(r, 1) - r @ np.roll(z, 1)))
+
+    cells = [cell for cells in found["areas"].values() for cell in cells]
+    assert len(cells) == len(mesh.solids)
+    assert sum(map(area, cells)) == pytest.approx(area(found["outline"]), rel=0.02)
+    assert set(found["cords"]) == set(case.case.rebar_layers) and found["inflated"] is None
+
+
+def test_patches_keep_all_that_touches(tyre, monkeypatch: pytest.MonkeyPatch) -> None:
+    case, *_ = tyre
+    monkeypatch.setattr(door_module, "find_solver", lambda name: Hertz())
+    values, mesh = start_values(case), section_mesh(case)
+    pressed = press(Door(case), {"initial": values}, [1000.0, 4000.0])["initial"]
+    kept = patches_data("x", {"initial": pressed}, {"initial": mesh})["patches"]
+    for footprint, patch in zip(pressed.footprints, kept, strict=True):
+        there = patch_of(pressed, footprint, mesh)
+        p = np.array(patch["pressure_kPa"])
+        assert (p > 0).sum() == (there.pressure > 0).sum() > 4
+        assert 1e3 * p.sum() == pytest.approx(there.pressure.sum(), rel=1e-5)
+        assert (p[[0, -1]] == 0).all() and (p[:, [0, -1]] == 0).all()
+        assert p.size < there.pressure.size
+
+
+def test_kept_data_is_small(tyre, tmp_path: Path) -> None:
+    case, evaluation, modes = tyre
+    assert len(json.dumps(tyre_data(case, evaluation, modes))) < 100_000

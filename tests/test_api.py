@@ -1,0 +1,90 @@
+"""What ``import tyrecal`` offers: light, typed, and every example of it runs."""
+
+from __future__ import annotations
+
+import doctest
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import tyrecal
+from tyrecal import api
+
+from .conftest import ROOT
+
+FUNCTIONS = [name for name in tyrecal.__all__ if name[0].islower() and name != "with_values"]
+
+
+def test_the_package_is_light() -> None:
+    code = (
+        "import sys, tyrecal\n"
+        "heavy = {'numpy', 'scipy', 'pydantic', 'click', 'matplotlib', 'rich'}\n"
+        "assert not heavy & set(sys.modules), heavy & set(sys.modules)\n"
+        "assert set(tyrecal.__all__) <= set(dir(tyrecal))\n"
+        "assert callable(tyrecal.load_case) and 'numpy' in sys.modules\n"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_all_that_is_offered_is_there_and_nothing_else() -> None:
+    assert tyrecal.__all__ == api.__all__
+    for name in tyrecal.__all__:
+        assert getattr(tyrecal, name) is getattr(api, name)
+    with pytest.raises(AttributeError, match="no attribute 'fit_everything'"):
+        tyrecal.fit_everything  # noqa: B018
+
+
+@pytest.mark.parametrize("name", [*FUNCTIONS, ""])
+def test_the_example_of(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """``with_values`` is shown with ``load_case``; "": the package's own."""
+    monkeypatch.chdir(ROOT)
+    what = getattr(api, name) if name else tyrecal
+    globs = {**vars(api), "tyrecal": tyrecal}
+    finder, runner = doctest.DocTestFinder(recurse=False), doctest.DocTestRunner()
+    (test,) = finder.find(what, name or "tyrecal", module=False, globs=globs)
+    assert test.examples
+    assert runner.run(test).failed == 0
+
+
+def test_strict_types(tmp_path: Path) -> None:
+    """mypy --strict knows what every function takes and returns."""
+    program = tmp_path / "program.py"
+    program.write_text(
+        """
+from pathlib import Path
+from typing import assert_type
+
+import tyrecal
+
+case = tyrecal.load_case("cases/p235_75r17.yaml", mesh="coarse")
+assert_type(case, tyrecal.LoadedCase)
+assert_type(tyrecal.with_values(case, {"C10": 1.1e6}), tyrecal.LoadedCase)
+modes = tyrecal.evaluate_modes(case, {"C10": 1.1e6}, record=Path("record"))
+assert_type(modes, list[tyrecal.Mode])
+assert_type(modes[0].frequency_Hz, float)
+fit = tyrecal.fit_case(case, fixed={"C10": 1e6}, starts=2, jobs=2)
+assert_type(fit.fitted.objective, float)
+(state,) = tyrecal.sweep_pressure(case, [240.0])
+assert_type(state, tyrecal.State)
+assert_type(tyrecal.evaluate_footprint(case, [1e3])[0]["area_m2"], float)
+found = tyrecal.diagnose_case(case, "measured.csv", effects=["rim_width"])
+assert_type(found.verdict.words, str)
+assert_type(tyrecal.list_effects()["rim_width"].low, float)
+try:
+    tyrecal.read_results("p235_75r17")
+except (tyrecal.CaseError, tyrecal.EvaluationFailed):
+    raise
+tyrecal.fit_case(case, method=1)  # WRONG
+"""
+    )
+    done = subprocess.run(
+        [sys.executable, "-m", "mypy", "--strict", "--follow-imports=silent", str(program)],
+        cwd=ROOT, capture_output=True, text=True,
+    )  # fmt: skip
+    wrong = program.read_text().splitlines().index(
+        "tyrecal.fit_case(case, method=1)  # WRONG"
+    )  # fmt: skip
+    errors = [line for line in done.stdout.splitlines() if ": error:" in line]
+    assert len(errors) == 1 and f"program.py:{wrong + 1}: error:" in errors[0], done.stdout

@@ -1,0 +1,118 @@
+"""What ships: every package of the tree and all its files; size and licences of what it needs."""
+
+from __future__ import annotations
+
+import fnmatch
+import re
+import tomllib
+from importlib import metadata
+from pathlib import Path
+
+import pytest
+from packaging.requirements import Requirement
+from ruamel.yaml import YAML
+
+import tyrecal
+
+from .conftest import ROOT
+
+SETUP = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]
+ASIDE = {"__pycache__", ".mypy_cache", ".ruff_cache"}
+FOLDERS = {name: ROOT / folder for name, folder in SETUP["package-dir"].items()}
+
+
+def name_of(folder: Path) -> str:
+    """The package that a folder of the tree ships as."""
+    for package, top in FOLDERS.items():
+        if folder.is_relative_to(top):
+            return ".".join([package, *folder.relative_to(top).parts])
+    raise AssertionError(folder)
+
+
+def files() -> list[Path]:
+    return [
+        path
+        for top in FOLDERS.values()
+        for path in top.rglob("*")
+        if path.is_file() and not ASIDE & set(path.parts)
+    ]
+
+
+def test_every_package_of_the_tree_ships() -> None:
+    tree = {name_of(path.parent) for path in files() if path.suffix != ".md"}
+    assert sorted(tree) == sorted(SETUP["packages"])
+
+
+def test_every_file_of_a_package_ships() -> None:
+    data = SETUP["package-data"]
+    for path in files():
+        if path.suffix not in (".py", ".md"):
+            patterns = data.get(name_of(path.parent), [])
+            assert any(fnmatch.fnmatch(path.name, p) for p in patterns), path
+
+
+def core() -> list[metadata.Distribution]:
+    """What 'pip install tyrecal' installs: tyrecal, all it needs, all that those need."""
+    found: dict[str, metadata.Distribution] = {}
+    waiting = [Requirement("tyrecal")]
+    while waiting:
+        requirement = waiting.pop()
+        name = requirement.name.lower().replace("_", "-")
+        if name in found or (requirement.marker and not requirement.marker.evaluate({"extra": ""})):
+            continue
+        found[name] = metadata.distribution(requirement.name)
+        waiting += map(Requirement, found[name].requires or [])
+    return list(found.values())
+
+
+def licence(distribution: metadata.Distribution) -> str:
+    """As the package states it: an expression, else classifiers, else the first line of a text."""
+    told = distribution.metadata
+    classifiers = [c for c in told.get_all("Classifier") or [] if c.startswith("License ::")]
+    text = (told["License"] or "").strip().partition("\n")[0]
+    return told["License-Expression"] or "; ".join(classifiers) or text
+
+
+@pytest.mark.parametrize("distribution", core(), ids=lambda d: str(d.name))
+def test_no_part_of_the_core_is_under_the_gpl(distribution: metadata.Distribution) -> None:
+    said = licence(distribution)
+    assert said, distribution.name
+    assert not re.search(r"\bA?GPL|(?<!Lesser )General Public License", said), said
+
+
+def test_the_core_takes_at_most_350_megabytes() -> None:
+    """All files of the core, compiled ones too; pip and setuptools belong to the environment."""
+    size = sum(
+        path.stat().st_size
+        for distribution in core()
+        for file in distribution.files or []
+        if (path := Path(str(distribution.locate_file(file)))).is_file()
+    )
+    assert 1e8 < size < 350e6, size / 1e6
+
+
+def test_heavy_packages_of_the_tests_are_not_in_the_core() -> None:
+    names = {str(distribution.name).lower() for distribution in core()}
+    assert not names & {"meshio", "pytest", "mypy", "ruff", "hypothesis", "setuptools"}
+
+
+def test_the_citation_is_one() -> None:
+    """The fields that CFF 1.2.0 requires, and the facts of pyproject.toml."""
+    told = YAML(typ="safe").load((ROOT / "CITATION.cff").read_text())
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    assert told["cff-version"] == "1.2.0" and told["message"] and told["type"] == "software"
+    assert told["title"].startswith(project["name"] + ":")
+    assert told["version"] == project["version"] == tyrecal.__version__
+    assert told["license"] == "MIT" == project["license"]["text"]
+    assert (ROOT / "LICENSE").read_text().startswith("MIT License\n")
+    assert told["abstract"] and told["keywords"]
+    for work in [told, *told["references"]]:
+        assert work["title"] and work["authors"]
+        assert all(set(a) in ({"name"}, {"family-names"}, {"family-names", "given-names"})
+                   for a in work["authors"])  # fmt: skip
+    for work in told["references"]:
+        assert work["type"] in ("article", "conference-paper") and 1990 < work["year"] < 2100
+
+
+def test_changes_name_the_version() -> None:
+    assert f"## {tyrecal.__version__}" in (ROOT / "CHANGELOG.md").read_text()

@@ -1,0 +1,230 @@
+"""What other programs may call: one function for each thing the command line does.
+
+``solver`` is the name of an installed solver ("": the case's), ``record`` a folder that answers
+what was asked before and is told what is new (None: neither), ``jobs`` how many designs are
+evaluated at a time. Values of variables are in the units of the numbers that they set; those not
+given are the case's start values. All functions raise CaseError or ValueError where the input is
+wrong and EvaluationFailed where the solver failed.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from . import case as _case
+from .case import CaseError, LoadedCase, start_values, with_level, with_values
+from .diagnose.diagnosis import Diagnosis
+from .effects import Effect, catalogue
+from .evaluate.door import Door, Question
+from .evaluate.failure import EvaluationFailed
+from .evaluate.pressed import Pressed
+from .evaluate.store import Store
+from .fit.calibrate import Fit, calibrate
+from .modes.label import paired_labels
+from .modes.mode import Mode
+from .studies.pressure import State
+
+__all__ = [
+    "CaseError",
+    "Diagnosis",
+    "Effect",
+    "EvaluationFailed",
+    "Fit",
+    "LoadedCase",
+    "Mode",
+    "State",
+    "diagnose_case",
+    "evaluate_footprint",
+    "evaluate_modes",
+    "fit_case",
+    "list_effects",
+    "load_case",
+    "read_results",
+    "sweep_pressure",
+    "with_values",
+]
+
+
+def load_case(path: Path | str, mesh: str = "") -> LoadedCase:
+    """Read a case file; ``mesh`` is one of its mesh levels ("": the one it names).
+
+    >>> case = load_case("cases/p235_75r17.yaml", mesh="coarse")
+    >>> case.case.name, case.case.pressure_kPa
+    ('P235/75R17 on an 8 inch rim', 240.0)
+
+    `with_values` sets variables, or any number by its path:
+
+    >>> softer = with_values(case, {"pressure_kPa": 200, "rebar_layers.belt_1.angle_deg": 68})
+    >>> softer.case.pressure_kPa
+    200.0
+    """
+    loaded = _case.load_case(path)
+    return with_level(loaded, mesh) if mesh else loaded
+
+
+def evaluate_modes(
+    case: LoadedCase,
+    values: Mapping[str, float] | None = None,
+    *,
+    solver: str = "",
+    record: Path | str | None = None,
+) -> list[Mode]:
+    """Modes of one design by rising frequency, each with ``label`` [c, m], ``frequency_Hz``,
+    ``multiplicity`` and ``clarity`` of its label, 0 to 1.
+
+    >>> case = load_case("cases/p235_75r17.yaml", mesh="coarse")
+    >>> modes = evaluate_modes(case, {"C10": 1.2e6})
+    >>> f"{modes[0].label} {modes[0].frequency_Hz:.1f} Hz"
+    '[0,0] axial 37.3 Hz'
+    """
+    answer = _door(case, solver, record).evaluate(Question(_values(case, values)))
+    return sorted(paired_labels(answer.modes), key=lambda mode: mode.frequency_Hz)
+
+
+def fit_case(
+    case: LoadedCase,
+    *,
+    method: str = "slsqp",
+    fixed: Mapping[str, float] | None = None,
+    starts: int = 1,
+    seed: int = 0,
+    jobs: int = 1,
+    solver: str = "",
+    record: Path | str | None = None,
+) -> Fit:
+    """Calibrate the case's variables to its targets; ``fixed`` holds some at a value.
+
+    ``method`` is "slsqp" or "least-squares". ``result`` holds what fit.json does, ``fitted`` the
+    design: ``values``, ``objective`` in Hz, ``modes`` by label.
+
+    >>> fit = fit_case(load_case("cases/p235_75r17.yaml", mesh="coarse"), fixed={"C10": 1e6})
+    >>> fit.result["converged"], f"{fit.initial.objective:.0f} to {fit.fitted.objective:.0f} Hz"
+    (True, '33 to 6 Hz')
+    """
+    return calibrate(case, _door(case, solver, record), method, fixed, starts, seed, jobs)
+
+
+def sweep_pressure(
+    case: LoadedCase,
+    pressures_kPa: Sequence[float],
+    values: Mapping[str, float] | None = None,
+    *,
+    jobs: int = 1,
+    solver: str = "",
+    record: Path | str | None = None,
+) -> list[State]:
+    """Modes at each pressure (kPa): ``modes`` by rising frequency, ``frequencies`` by label, and
+    ``slopes`` d ln f / d ln p by label, None where the solver has none.
+
+    >>> case = load_case("cases/p235_75r17.yaml", mesh="coarse")
+    >>> for state in sweep_pressure(case, [160, 240]):
+    ...     print(f"{state.pressure_kPa:g} kPa: {state.modes[0].frequency_Hz:.1f} Hz")
+    160 kPa: 31.1 Hz
+    240 kPa: 37.0 Hz
+    """
+    from .studies.pressure import Failure, sweep
+
+    door = _door(case, solver, record)
+    states = []
+    for outcome in sweep(door, {"": _values(case, values)}, list(pressures_kPa), jobs):
+        if isinstance(outcome, Failure):
+            raise outcome.failed
+        states.append(outcome)
+    return states
+
+
+def evaluate_footprint(
+    case: LoadedCase,
+    loads_N: Sequence[float],
+    values: Mapping[str, float] | None = None,
+    *,
+    solver: str = "",
+    record: Path | str | None = None,
+) -> list[dict[str, float]]:
+    """The tyre on a flat road at rising loads (N), one entry each: ``load_N``, ``deflection_m``,
+    ``area_m2``, ``length_m``, ``width_m``, ``mean_pressure_Pa``, ``peak_pressure_Pa``,
+    ``vertical_stiffness_N_per_m``.
+
+    >>> case = load_case("cases/p235_75r17.yaml", mesh="coarse")
+    >>> (at_1_kN,) = evaluate_footprint(case, [1000])
+    >>> f"{1e4 * at_1_kN['area_m2']:.0f} cm2, {1e3 * at_1_kN['deflection_m']:.1f} mm"
+    '37 cm2, 5.3 mm'
+    """
+    from .deck.context import section_mesh
+    from .studies.footprint import footprint_row
+
+    design = _values(case, values)
+    found: Pressed = _door(case, solver, record).press(design, list(loads_N))
+    if found.failed:
+        raise found.failed
+    mesh = section_mesh(with_values(case, design))
+    return [footprint_row(found, footprint, mesh) for footprint in found.footprints]
+
+
+def diagnose_case(
+    case: LoadedCase,
+    measured: Path | str,
+    *,
+    repeats: Iterable[Path | str] = (),
+    effects: Sequence[str] | None = None,
+    jobs: int = 1,
+    solver: str = "",
+    record: Path | str | None = None,
+) -> Diagnosis:
+    """Where the case and measurements (a CSV file) part, and which effect explains it.
+
+    ``repeats`` are the same measurements after mounting anew, ``effects`` the ids to consider
+    (None: all). ``verdict`` says what can be told, in ``words`` too; ``probabilities`` are by
+    effect, "none" and "outside" among them; ``gap`` is what calibration leaves.
+
+    >>> case = load_case("cases/p235_75r17.yaml", mesh="coarse")
+    >>> found = diagnose_case(case, "cases/p235_75r17_wheeler.csv", effects=["rim_width"])
+    >>> found.verdict.kind, found.verdict.key
+    ('named', 'rim_width')
+    """
+    from .diagnose.study import study
+
+    others = [Path(path) for path in repeats]
+    door = _door(case, solver, record)
+    return study(case, door, Path(measured), others, jobs=jobs, effects=effects).diagnosis
+
+
+def list_effects() -> dict[str, Effect]:
+    """What a plain model leaves out, by id: ``title``, ``unit``, ``low`` and ``high`` of the
+    parameter, ``signature``, ``toggle``, ``aliases``. In a case it is the number ``effects.ID``.
+
+    >>> filler = list_effects()["bead_filler"]
+    >>> filler.title, filler.low, filler.high
+    ('Bead filler', 0.0, 3.0)
+    """
+    return dict(catalogue())
+
+
+def read_results(folder: Path | str) -> dict[str, Any]:
+    """The result files of a folder that the command line wrote, by name without ``.json``.
+
+    Raises FileNotFoundError where the folder holds none; ValueError for a file that is no JSON.
+
+    >>> import subprocess, sys, tempfile
+    >>> folder = tempfile.mkdtemp()
+    >>> command = "tyrecal modes cases/p235_75r17.yaml --mesh coarse --quiet --output".split()
+    >>> _ = subprocess.run([sys.executable, "-m", *command, folder], check=True)
+    >>> results = read_results(folder)
+    >>> sorted(results), results["modes"]["pressure_kPa"]
+    (['modes', 'run'], 240.0)
+    """
+    paths = sorted(Path(folder).glob("*.json"))
+    if not paths:
+        raise FileNotFoundError(f"there are no results in '{folder}'")
+    return {path.stem: json.loads(path.read_text(encoding="utf-8")) for path in paths}
+
+
+def _values(case: LoadedCase, values: Mapping[str, float] | None) -> dict[str, float]:
+    return {**start_values(case), **(values or {})}
+
+
+def _door(case: LoadedCase, solver: str, record: Path | str | None) -> Door:
+    return Door(case, solver, store=Store(Path(record).resolve()) if record else None)

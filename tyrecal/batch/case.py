@@ -1,0 +1,190 @@
+"""One case of a batch: its studies in a row, whatever fails reported and not raised.
+
+The report is plain data, small enough for any network: ``name``; ``studies``, each with
+
+* ``status``: ``good``; ``failed``, finished but not as it should (a fit that did not converge, a
+  load that was not reached); ``error``, there is no result; ``skipped``, see `studies.study`;
+* ``cause`` and ``words``, or None; ``quantities``, name to number;
+
+and ``facts``, which are volatile: seconds by study, when, where, which solver, how often it ran and
+the record answered, or ``answered``: all of it by the case's folder.
+"""
+
+from __future__ import annotations
+
+import json
+import platform
+import time
+from contextlib import suppress
+from dataclasses import asdict, dataclass
+from datetime import UTC, datetime
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+from ..case import CaseError, LoadedCase, load_case, start_values, with_level, with_values
+from ..deck.environment import TemplateFailed
+from ..evaluate.door import Door
+from ..evaluate.failure import DeckRefused, EvaluationFailed, SolverUnavailable
+from ..evaluate.solver import UnknownSolver
+from ..evaluate.sources import sources
+from ..evaluate.store import Store, sources_of
+from ..files import whole
+from ..fit.calibrate import NothingToFit
+from .studies import Asked, Outcome, Studied, study
+
+FINISHED = "finished.json"  # in a case's folder: what was asked, and the answer
+INPUT = (CaseError, DeckRefused, NothingToFit, TemplateFailed, UnknownSolver)
+AGAIN = {"crashed", "timed_out", "no_results", "licence", "unavailable", "disc", "internal"}
+Report = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class CaseTask:
+    """What a worker is sent. path, folder (of the results), record: absolute, on a file system
+    that the worker sees too; mesh: level, empty for the case's own."""
+
+    name: str
+    path: Path
+    folder: Path
+    studies: tuple[str, ...]
+    asked: Asked
+    solver: str = ""
+    mesh: str = ""
+    record: Path | None = None
+
+
+def run_case(task: CaseTask) -> Report:
+    """All studies of a case, or its report of an earlier run that was asked the same."""
+    facts: dict[str, Any] = {
+        "started": datetime.now(UTC).isoformat(timespec="seconds"),
+        "host": platform.node() or "localhost",
+    }
+    report: Report = {"name": task.name, "studies": {}, "facts": facts}
+    try:
+        loaded = _loaded(task)
+        door = Door(loaded, task.solver, task.folder / "runs")
+        question = _question(task, loaded, door)
+        facts["solver"] = f"{door.solver.name} {door.solver.version}"
+        finished = _finished(task.folder, question)
+        if finished is None:
+            finished, files = _studied(task, loaded, door, facts)
+            if not AGAIN & {each["cause"] for each in finished.values()}:
+                digests = {file: _digest(task.folder / file) for file in files}
+                _write(task.folder / FINISHED, {"question": question, "files": digests,
+                                                "studies": finished})  # fmt: skip
+        else:
+            facts.update(answered=True, seconds=dict.fromkeys(finished, 0.0))
+        report["studies"] = finished
+    except Exception as error:  # whatever it is, the other cases go on
+        report["studies"] = dict.fromkeys(task.studies, _entry(_failed(error), task))
+    return report
+
+
+def lost(task: CaseTask, words: str) -> Report:
+    """The report of a case whose worker died."""
+    entry = _entry(Outcome("error", "worker_lost", words), task)
+    return {"name": task.name, "studies": dict.fromkeys(task.studies, entry), "facts": {}}
+
+
+def _studied(
+    task: CaseTask, loaded: LoadedCase, door: Door, facts: dict[str, Any]
+) -> tuple[dict[str, Any], list[str]]:
+    """Every study's entry in the report, and the names of the result files."""
+    task.folder.mkdir(parents=True, exist_ok=True)
+    owner = {"case": str(task.path), "command": "batch"}
+    _write(task.folder / "run.json", {**owner, **facts})
+    door.store = Store(task.record) if task.record else None
+    state = Studied(loaded, door, {"initial": start_values(loaded)}, task.asked)
+    entries: dict[str, Any] = {}
+    files: list[str] = []
+    facts["seconds"] = {}
+    for name in task.studies:
+        clock = time.monotonic()
+        try:
+            outcome = study(name, state)
+        except Exception as error:  # the other studies go on
+            outcome = _failed(error)
+        for file, text in outcome.files.items():
+            _write_text(task.folder / file, text)
+            files.append(file)
+        entries[name] = _entry(outcome, task)
+        facts["seconds"][name] = round(time.monotonic() - clock, 3)
+    if door.folder:
+        with suppress(OSError):  # it holds failures, or was never made
+            door.folder.rmdir()
+    facts.update(solver_runs=door.counts.runs, answered_from_record=door.counts.recorded)
+    _write(task.folder / "run.json", {**owner, **facts})
+    return entries, files
+
+
+def _loaded(task: CaseTask) -> LoadedCase:
+    """The case at its mesh level and start values. Raises CaseError, DeckRefused."""
+    loaded = load_case(task.path)
+    try:
+        if task.mesh:
+            loaded = with_level(loaded, task.mesh)
+        return with_values(loaded, start_values(loaded))
+    except ValueError as error:
+        raise DeckRefused(str(error)) from None
+
+
+def _failed(error: Exception) -> Outcome:
+    """What an exception says of a study."""
+    if isinstance(error, EvaluationFailed):
+        return Outcome("error", error.cause, error.words)
+    if isinstance(error, SolverUnavailable):
+        return Outcome("error", "unavailable", str(error))
+    if isinstance(error, INPUT):
+        return Outcome("error", "input", str(error))
+    if isinstance(error, OSError):
+        return Outcome("error", "disc", str(error))
+    trace = error.__traceback__
+    while trace and trace.tb_next:
+        trace = trace.tb_next
+    place = f"{Path(trace.tb_frame.f_code.co_filename).name}:{trace.tb_lineno}" if trace else ""
+    return Outcome("error", "internal", f"{type(error).__name__}: {error} ({place})")
+
+
+def _entry(outcome: Outcome, task: CaseTask) -> dict[str, Any]:
+    """A study as the report has it; its words do not depend on where the case lies."""
+    words = outcome.words and outcome.words.replace(f"{task.path.parent}/", "")
+    return {"status": outcome.status, "cause": outcome.cause, "words": words,
+            "quantities": outcome.quantities}  # fmt: skip
+
+
+def _question(task: CaseTask, loaded: LoadedCase, door: Door) -> str:
+    """Hash of all that the results depend on: the case and its files, what is asked, the tool."""
+    own = loaded.folder / loaded.case.templates if loaded.case.templates else None
+    files = [task.path, loaded.folder / loaded.case.section.file]
+    files += sorted(path for path in own.rglob("*") if path.is_file()) if own else []
+    solver = [door.solver.name, door.solver.version, sources_of(type(door.solver)), sources()]
+    asked = [task.studies, asdict(task.asked), task.mesh, solver, [_digest(p) for p in files]]
+    return sha256(json.dumps(asked).encode()).hexdigest()
+
+
+def _finished(folder: Path, question: str) -> dict[str, Any] | None:
+    """The entries of an earlier run that was asked the same and whose files are as it left them."""
+    try:
+        found = json.loads((folder / FINISHED).read_text(encoding="utf-8"))
+        if found["question"] != question:
+            return None
+        if any(_digest(folder / file) != digest for file, digest in found["files"].items()):
+            return None
+        entries: dict[str, Any] = found["studies"]
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        return None
+    return entries
+
+
+def _digest(path: Path) -> str:
+    return sha256(path.read_bytes()).hexdigest()
+
+
+def _write(path: Path, content: Any) -> None:
+    _write_text(path, json.dumps(content, indent=1, allow_nan=False) + "\n")
+
+
+def _write_text(path: Path, text: str) -> None:
+    with whole(path, many_writers=True) as partial:  # a worker thought dead may still be at it
+        partial.write_text(text, encoding="utf-8", newline="")

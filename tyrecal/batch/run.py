@@ -1,0 +1,49 @@
+"""All cases of a batch through an executor."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from contextlib import closing
+from pathlib import Path
+
+from ..evaluate.executor import WorkerLost, executor
+from .case import CaseTask, Report, lost, run_case
+
+
+def names_of(paths: Sequence[Path]) -> list[str]:
+    """A name for each case file: its stem, or its path below the folder that all have in common,
+    without the suffix, where two stems are the same.
+
+    Raises ValueError where a case is given twice.
+    """
+    stems = [path.stem for path in paths]
+    if len(set(stems)) == len(stems):
+        return stems
+    whole = [path.absolute() for path in paths]
+    top = Path(os.path.commonpath([path.parent for path in whole]))
+    names = [path.relative_to(top).with_suffix("").as_posix() for path in whole]
+    for path, name in zip(paths, names, strict=True):
+        if names.count(name) > 1:
+            raise ValueError(f"case '{path}' is given twice, or twice by this name")
+    return names
+
+
+def run_batch(
+    tasks: Sequence[CaseTask],
+    jobs: int = 1,
+    scheduler: str = "",
+    notify: Callable[[Report], None] = lambda report: None,
+) -> list[Report]:
+    """Reports in the order of the tasks; ``notify`` gets each as it comes.
+
+    Raises ClusterFailed. Interrupted, it leaves whatever has finished on record.
+    """
+    reports: dict[int, Report] = {}
+    with executor(jobs, scheduler) as workers, closing(workers.each(run_case, tasks)) as answers:
+        for place, answer in answers:
+            if isinstance(answer, WorkerLost):
+                answer = lost(tasks[place], str(answer))
+            reports[place] = answer
+            notify(answer)
+    return [reports[place] for place in range(len(tasks))]

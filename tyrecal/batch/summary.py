@@ -1,0 +1,41 @@
+"""What a batch says as a whole: the content of batch.json."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from .case import Report
+
+VERDICTS = ("error", "failed", "drifted", "good")  # the worst first
+
+
+def summary(
+    studies: Sequence[str], reports: Sequence[Report], drift: Mapping[str, Any] | None
+) -> dict[str, Any]:
+    """Results only: ``studies``; ``counts`` of cases by verdict; ``cases``, each with its
+    ``verdict`` and studies; ``baseline``, as `drift.compare` says, or None."""
+    drifted = {each["case"] for each in drift["drifted"]} if drift else set()
+    cases = [
+        {
+            "name": report["name"],
+            "verdict": _verdict(report, report["name"] in drifted),
+            "studies": report["studies"],
+        }
+        for report in reports
+    ]
+    counts = Counter(case["verdict"] for case in cases)
+    return {
+        "format": 1,
+        "studies": list(studies),
+        "counts": {"cases": len(cases), **{verdict: counts[verdict] for verdict in VERDICTS}},
+        "cases": cases,
+        "baseline": drift,
+    }
+
+
+def _verdict(report: Report, drifted: bool) -> str:
+    found = {entry["status"] for entry in report["studies"].values()}
+    found |= {"drifted"} if drifted else set()
+    return next((verdict for verdict in VERDICTS if verdict in found), "good")

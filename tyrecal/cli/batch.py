@@ -1,0 +1,212 @@
+"""tyrecal batch"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import click
+
+from . import options
+from .main import EXIT_BATCH
+from .talk import Talk, show
+
+STUDIES = ("fit", "modes", "sweep-pressure", "footprint")  # without importing what they need
+FILE = click.Path(path_type=Path, dir_okay=False)
+
+
+@click.command()
+@click.argument("cases", nargs=-1, required=True,
+                type=click.Path(path_type=Path, exists=True, dir_okay=False))  # fmt: skip
+@click.option("--studies", default="fit", metavar="S1,S2,...", show_default=True,
+              help=f"Of {', '.join(STUDIES)}. After a fit, sweep and footprint study the fitted"
+              " design too.")  # fmt: skip
+@click.option("--junit", type=FILE, metavar="FILE", help="Write JUnit XML for a CI server.")
+@click.option("--baseline", type=FILE, metavar="FILE",
+              help="Numbers to compare with, and how far each may drift.")  # fmt: skip
+@click.option("--write-baseline", is_flag=True,
+              help="Write the numbers to --baseline instead; its tolerances stay.")  # fmt: skip
+@options.loads
+@options.pressures
+@click.option("--jobs", type=click.IntRange(1, 256), default=1, metavar="N", show_default=True,
+              help="Cases at a time, on this machine.")  # fmt: skip
+@options.scheduler
+@options.every(
+    options.mesh,
+    options.solver,
+    click.option("--output", type=click.Path(path_type=Path), metavar="DIR", default=Path("batch"),
+                 show_default=True, help="Folder for the results, one in it for each case."),
+    options.store,
+    options.no_store,
+)  # fmt: skip
+@options.talking
+def command(
+    cases: tuple[Path, ...],
+    studies: str,
+    junit: Path | None,
+    baseline: Path | None,
+    write_baseline: bool,
+    loads: str | None,
+    from_kPa: float,
+    to_kPa: float,
+    steps: int,
+    jobs: int,
+    scheduler: str,
+    mesh: str,
+    solver: str,
+    output: Path,
+    store: Path | None,
+    no_store: bool,
+    talk: Talk,
+) -> int:
+    """Study many CASES, each on its own: one that fails stops no other.
+
+    Writes DIR/batch.json, and the results of each case to a folder of its name in DIR. The same
+    command again goes on where it was interrupted: finished cases are answered by their folders.
+
+    \b
+    tyrecal batch cases/*.yaml --jobs 2
+    tyrecal batch cases/*.yaml --studies fit,modes,sweep-pressure --junit junit.xml
+    tyrecal batch cases/*.yaml --baseline baseline.json --write-baseline
+    tyrecal batch cases/*.yaml --baseline baseline.json
+    tyrecal batch cases/*.yaml --scheduler tcp://10.0.0.1:8786
+
+    Exit codes: 0 all cases good; 2 the input is wrong; 5 some failed or drifted; 130 interrupted.
+    """
+    from ..batch.case import CaseTask
+    from ..batch.drift import baseline_of, compare, read_baseline
+    from ..batch.junit import junit as junit_xml
+    from ..batch.run import run_batch
+    from ..batch.studies import Asked
+    from ..batch.summary import summary
+    from ..evaluate.queue import reached
+    from .output import Run
+    from .progress import Progress
+
+    names = _names(cases)
+    wanted = _studies(studies)
+    pressures = options.parse_pressures(from_kPa, to_kPa, steps)
+    asked = Asked(tuple(options.parse_loads(loads)) if loads is not None else None, pressures)
+    if write_baseline and not baseline:
+        raise click.UsageError("--write-baseline needs --baseline FILE")
+    if scheduler and jobs > 1:
+        raise click.UsageError("--jobs is for this machine; with --scheduler its workers count")
+    before = None
+    if baseline and (baseline.exists() or not write_baseline):
+        before = read_baseline(baseline)
+    run = Run(output, output, "batch")
+    record = run.open_store(store, no_store)
+    folder = output.resolve()
+    tasks = [
+        CaseTask(name, path.resolve(), folder / name, wanted, asked, solver, mesh,
+                 record.folder if record else None)
+        for name, path in zip(names, cases, strict=True)
+    ]  # fmt: skip
+    _prepare(tasks)
+    started = run.started
+    with Progress(len(tasks), talk.quiet, talk.verbose) as progress, reached(scheduler) as address:
+        reports = run_batch(tasks, jobs, address, progress.notify)
+    _sweep(tasks)
+    reports.sort(key=lambda report: str(report["name"]))
+    drift = compare(reports, before) if before and not write_baseline else None
+    result = summary(wanted, reports, drift)
+    run.write_json("batch.json", result)
+    if junit:
+        _write(junit, junit_xml(reports, drift, started))
+    if write_baseline and baseline:
+        _write(baseline, _json(baseline_of(reports, before)))
+    run.finish(cases={report["name"]: report["facts"] for report in reports}, scheduler=address)
+    talk.result(result)
+    _tell(result, talk)
+    if write_baseline:
+        talk.say(f"baseline written to {baseline}")
+    talk.say(f"results in {run.folder}")
+    return 0 if result["counts"]["good"] == len(reports) else EXIT_BATCH
+
+
+def _names(cases: Sequence[Path]) -> list[str]:
+    from ..batch.run import names_of
+
+    try:
+        return names_of(cases)
+    except ValueError as error:
+        raise click.UsageError(str(error)) from None
+
+
+def _studies(text: str) -> tuple[str, ...]:
+    """The studies asked for, in the order in which they are done. Raises click.UsageError."""
+    asked = [word.strip() for word in text.split(",")]
+    for word in asked:
+        if word not in STUDIES:
+            raise click.UsageError(f"--studies: '{word}' is none of {', '.join(STUDIES)}")
+    return tuple(name for name in STUDIES if name in asked)
+
+
+def _prepare(tasks: Sequence[Any]) -> None:
+    """Make the cases' folders ready. Raises OutputRefused where one is another case's."""
+    from .output import refuse_other
+
+    for task in tasks:
+        refuse_other(task.folder, task.path)
+    _sweep(tasks)
+
+
+def _sweep(tasks: Sequence[Any]) -> None:
+    """Drop the run folders of processes that died."""
+    from contextlib import suppress
+
+    from ..evaluate.folders import drop_unfinished
+
+    for task in tasks:
+        drop_unfinished(task.folder / "runs")
+        with suppress(OSError):  # it holds failures, or was never made
+            (task.folder / "runs").rmdir()
+
+
+def _tell(result: Mapping[str, Any], talk: Talk) -> None:
+    """What is not as it should be, what drifted, and how many."""
+    from ..report.batch import drift_table, failures_table
+
+    failures = failures_table(result)
+    if failures:
+        show(failures, talk.as_json, talk.quiet)
+    drift = result["baseline"]
+    if drift:
+        drifted = drift_table(drift)
+        if drifted:
+            show(drifted, talk.as_json, talk.quiet)
+        words = f"{len(drift['drifted'])} of {drift['compared']} numbers drifted"
+        words += f", {drift['new']} are new" if drift["new"] else ""
+        talk.say(f"{words}; see the baseline's tolerances")
+        for key, what in (
+            ("missing_cases", "in the baseline, but not in this batch"),
+            ("new_cases", "not in the baseline, so not compared"),
+            ("missing_studies", "in the baseline, but not studied"),
+            ("new_studies", "not in the baseline, so not compared"),
+        ):
+            if drift[key]:
+                talk.say(f"{what}: {_some(drift[key])}")
+    counts = dict(result["counts"])
+    total = counts.pop("cases")
+    parts = ", ".join(f"{number} {what}" for what, number in counts.items() if number)
+    talk.say(f"{total} cases: {parts}")
+
+
+def _some(names: Sequence[str], most: int = 10) -> str:
+    rest = f" and {len(names) - most} more" if len(names) > most else ""
+    return ", ".join(names[:most]) + rest
+
+
+def _json(content: Any) -> str:
+    import json
+
+    return json.dumps(content, indent=1, allow_nan=False) + "\n"
+
+
+def _write(path: Path, text: str) -> None:
+    from ..files import whole
+
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with whole(path) as partial:
+        partial.write_text(text, encoding="utf-8", newline="")

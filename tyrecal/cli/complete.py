@@ -1,0 +1,113 @@
+"""What a shell completes: cases, and the names that stand in them. Wrong or no files: nothing."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any
+
+import click
+from click.shell_completion import CompletionItem, split_arg_string
+
+Items = list[CompletionItem]
+SUFFIXES = (".yaml", ".yml")
+MOST = 200  # case files; a folder with more has the shell's own completion
+DEPTH = 3  # folders below the one typed in which cases are looked for
+
+
+def cases(ctx: click.Context, param: click.Parameter, incomplete: str) -> Items:
+    """Case files, those in folders below too; without any, what the shell says."""
+    start = Path(incomplete).parent
+    found = [str(path) for path in _yaml(start, DEPTH) if str(path).startswith(incomplete)]
+    if not found or len(found) > MOST:
+        return [CompletionItem(incomplete, type="file")]
+    return [CompletionItem(path) for path in found]
+
+
+def solvers(ctx: click.Context, param: click.Parameter, incomplete: str) -> Items:
+    """Names of the installed solvers."""
+    from importlib.metadata import entry_points
+
+    return _starting({entry.name for entry in entry_points(group="tyrecal.solvers")}, incomplete)
+
+
+def effects(ctx: click.Context, param: click.Parameter, incomplete: str) -> Items:
+    """Ids of effects."""
+    from ..effects import IDS
+
+    return _starting(IDS, incomplete)
+
+
+def effect_values(ctx: click.Context, param: click.Parameter, incomplete: str) -> Items:
+    """``EFFECT=``."""
+    from ..effects import IDS
+
+    return _starting((f"{id}=" for id in IDS), incomplete)
+
+
+def variables(ctx: click.Context, param: click.Parameter, incomplete: str) -> Items:
+    """Names of the case's variables."""
+    return _starting(_part("variables"), incomplete)
+
+
+def levels(ctx: click.Context, param: click.Parameter, incomplete: str) -> Items:
+    """Names of the case's meshes."""
+    mesh = _part("mesh")
+    named = mesh.get("levels")
+    return _starting(named if isinstance(named, dict) else (), incomplete)
+
+
+def assignments(ctx: click.Context, param: click.Parameter, incomplete: str) -> Items:
+    """``NAME=`` of the case's variables and of its other numbers, by path, and of effects."""
+    from ..effects import IDS
+
+    names = [*_part("variables"), *_numbers(_case()), *(f"effects.{id}" for id in IDS)]
+    return _starting((f"{name}=" for name in dict.fromkeys(names)), incomplete)
+
+
+def _starting(names: Iterable[str], incomplete: str) -> Items:
+    return [CompletionItem(name) for name in sorted(names) if name.startswith(incomplete)]
+
+
+def _yaml(folder: Path, depth: int) -> Iterator[Path]:
+    with contextlib.suppress(OSError):
+        for path in sorted(folder.iterdir()):
+            if path.name.startswith("."):
+                continue
+            if path.suffix in SUFFIXES:
+                yield path
+            elif depth > 1 and path.is_dir() and not path.is_symlink():
+                yield from _yaml(path, depth - 1)
+
+
+def _case() -> dict[str, Any]:
+    """The case on the command line as plain data, judged by nobody."""
+    from ruamel.yaml import YAML
+    from ruamel.yaml.error import YAMLError
+
+    for word in split_arg_string(os.environ.get("COMP_WORDS", "")):
+        if word.endswith(SUFFIXES):  # click has no arguments yet where an option lacks its value
+            with contextlib.suppress(OSError, YAMLError, UnicodeDecodeError):
+                data = YAML(typ="safe", pure=True).load(Path(word).read_text("utf-8"))
+                return data if isinstance(data, dict) else {}
+    return {}
+
+
+def _part(key: str) -> dict[str, Any]:
+    part = _case().get(key)
+    return part if isinstance(part, dict) else {}
+
+
+def _numbers(node: Any, path: str = "") -> Iterator[str]:
+    """Dotted paths of the numbers that describe the tyre."""
+    inner = node.items() if isinstance(node, dict) else enumerate(node)
+    for key, value in inner:
+        if not path and key in ("variables", "targets", "format"):
+            continue
+        place = f"{path}.{key}" if path else str(key)
+        if isinstance(value, dict | list):
+            yield from _numbers(value, place)
+        elif isinstance(value, int | float) and not isinstance(value, bool):
+            yield place

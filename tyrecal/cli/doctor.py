@@ -1,0 +1,101 @@
+"""tyrecal doctor"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from . import complete, options
+from .main import EXIT_SOLVER
+from .talk import Talk
+
+HINTS = {
+    "abaqus": "'solver: options: command:' of the case says how it is started",
+    "calculix": "on Debian 'apt-get install calculix-ccx'",
+}
+
+
+@click.command()
+@click.option("--solver", default="bundled", show_default=True, metavar="NAME",
+              shell_complete=complete.solvers, help="Solver that the known tyre is given to."
+              )  # fmt: skip
+@click.option("--store", type=click.Path(path_type=Path, file_okay=False), envvar="TYRECAL_STORE",
+              metavar="DIR", help="Record to look at (default: those of the results folders here;"
+              " also from TYRECAL_STORE).")  # fmt: skip
+@options.talking
+def command(solver: str, store: Path | None, talk: Talk) -> int:
+    """Check the installation: packages, solvers, machine, records, and a known tyre's frequencies.
+
+    The tyre takes a second or two. Exit code 3 where a package is missing or too old, or where the
+    frequencies are not the recorded ones.
+
+    \b
+    tyrecal doctor
+    tyrecal doctor --solver calculix
+    tyrecal doctor --json
+    """
+    from .. import __version__
+    from ..doctor.installation import extras, machine, packages, records
+    from ..doctor.self_check import self_check
+    from ..evaluate.solver import installed
+
+    with talk.progress("known tyre"):
+        check = self_check(solver)
+    found: dict[str, Any] = {
+        "format": 1,
+        "tyrecal": __version__,
+        "installed_in": str(Path(__file__).parents[1]),
+        "machine": machine(),
+        "packages": packages(),
+        "extras": extras(),
+        "solvers": installed(),
+        "store": str(store) if store else None,
+        "records": records(store),
+        "self_check": check,
+    }
+    found["ok"] = bool(check["ok"]) and all(each["ok"] for each in found["packages"])
+    talk.result(found)
+    if not talk.as_json:
+        talk.say("\n".join(_words(found)))
+    for package in found["packages"]:
+        if not package["ok"]:
+            there = package["version"] or "not installed"
+            talk.error(f"{package['name']} must be {package['needed']}, it is {there}")
+    if not check["ok"]:
+        talk.error(f"the known tyre: {check['problem'] or 'its figures are not the recorded ones'}")
+    return 0 if found["ok"] else EXIT_SOLVER
+
+
+def _words(found: dict[str, Any]) -> list[str]:
+    here, check = found["machine"], found["self_check"]
+    free = here["free_memory_GB"]
+    of = f"{free:g} of {here['memory_GB']:g}" if free is not None else f"{here['memory_GB']:g}"
+    lines = [f"tyrecal {found['tyrecal']} in {found['installed_in']}"]
+    lines += [f"Python {here['python']}, {here['system']}"]
+    lines += [f"{here['cores']} cores, {of} GB of memory, {here['free_disc_GB']:g} GB of disc free"]
+    lines += [
+        "",
+        "packages: " + ", ".join(f"{p['name']} {p['version']}" for p in found["packages"]),
+    ]
+    for extra in found["extras"]:
+        there = f"missing {', '.join(extra['missing'])}: {extra['install']}"
+        lines.append(f"  [{extra['name']}] " + (there if extra["missing"] else "installed"))
+    lines += ["", "solvers:"]
+    for solver in found["solvers"]:
+        state = solver["problem"] or f"version {solver['version']}"
+        hint = f"; {HINTS[solver['name']]}" if solver["problem"] and solver["name"] in HINTS else ""
+        lines.append(f"  {solver['name']}: {state}{hint}")
+    lines += ["", "records of evaluations:"]
+    for record in found["records"]:
+        lines.append(f"  {record['folder']}: {record['records']} records, {record['MB']:g} MB")
+    if not found["records"]:
+        lines.append("  none here yet; each goes beside its results, or to --store DIR")
+    lines += ["", f"a known tyre by solver '{check['solver']}', {check['seconds']:g} s:"]
+    for mode in check["modes"]:
+        hertz, off = mode["frequency_Hz"], mode["deviation_percent"]
+        now = "not found" if hertz is None else f"{hertz:.2f} Hz ({off:+.3f} %)"
+        lines.append(f"  {mode['label']:<16}recorded {mode['recorded_Hz']:.2f}, now {now}")
+    verdict = "as recorded" if check["ok"] else "NOT as recorded"
+    return [*lines, f"  {verdict}, within {check['tolerance_percent']:g} %"]

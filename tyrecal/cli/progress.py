@@ -1,0 +1,72 @@
+"""How far a batch is, and how long it will take yet."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Mapping
+from typing import Any
+
+import click
+
+BETWEEN_S = 30.0  # lines where there is no terminal
+
+
+class Progress:
+    """A bar on a terminal; elsewhere a line now and then, and one for each case that fails."""
+
+    def __init__(self, total: int, quiet: bool, verbose: bool):
+        self.total, self.quiet, self.verbose = total, quiet, verbose
+        self.done = self.run = self.bad = 0
+        self.began = self.said = time.monotonic()
+        self.bar: Any = None
+
+    def __enter__(self) -> Progress:
+        if sys.stderr.isatty() and not self.quiet:
+            from rich.console import Console
+            from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+
+            columns = (BarColumn(), MofNCompleteColumn(), TextColumn("{task.description}"))
+            self.bar = Progress(*columns, console=Console(stderr=True), transient=True)
+            self.bar.start()
+            self.bar.add_task("", total=self.total)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self.bar:
+            self.bar.stop()
+
+    def notify(self, report: Mapping[str, Any]) -> None:
+        """One more case."""
+        entries = report["studies"]
+        bad = [study for study, entry in entries.items() if entry["status"] != "good"]
+        self.done, self.bad = self.done + 1, self.bad + bool(bad)
+        self.run += not report["facts"].get("answered", False)
+        now = time.monotonic()
+        if self.bar:
+            self.bar.update(0, completed=self.done, description=self._state(now))
+        elif not self.quiet and (self.verbose or bad or now > self.said + BETWEEN_S):
+            self.said = now
+            what = ", ".join(f"{study}: {entries[study]['status']}" for study in bad) or "good"
+            click.echo(
+                f"{self.done}/{self.total} {report['name']}: {what}; {self._state(now)}", err=True
+            )
+
+    def _state(self, now: float) -> str:
+        bad = f"{self.bad} not good, " if self.bad else ""
+        left = seconds_left(now - self.began, self.run, self.total - self.done)
+        return bad + (f"{_clock(left)} left" if left is not None else "answered from results")
+
+
+def seconds_left(elapsed_s: float, run: int, left: int) -> float | None:
+    """How long ``left`` cases take, where ``run`` really ran in ``elapsed_s``; None for none.
+
+    Cases that an earlier run answers cost next to nothing, so they do not count.
+    """
+    return elapsed_s * left / run if run else None
+
+
+def _clock(seconds: float) -> str:
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02d}:{rest:02d}" if hours else f"{minutes}:{rest:02d}"

@@ -1,0 +1,42 @@
+"""tyrecal report"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from . import options
+from .talk import Talk
+
+
+@click.command()
+@click.argument("folders", metavar="DIR...", nargs=-1, required=True,
+                type=click.Path(path_type=Path))  # fmt: skip
+@click.option(
+    "--output",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="The page (default: report.html in DIR, of several in the present folder).",
+)
+@options.talking
+def command(folders: tuple[Path, ...], output: Path | None, talk: Talk) -> int:
+    """Tell the results in DIR (of fit, modes, sweep-pressure, footprint, diagnose: whatever is
+    found) on one HTML page.
+
+    The page is one file that needs no network: summary, tables, plots, and mode shapes that turn
+    and vibrate; it prints, and reads on a telephone. Every study writes it too, with --report.
+
+    \b
+    tyrecal report p235_75r17
+    tyrecal report narrow_rim wide_rim --output rims.html
+    """
+    from ..report.html.page import write_page
+
+    path = output or (folders[0] / "report.html" if len(folders) == 1 else Path("report.html"))
+    written = write_page(path, folders)
+    talk.result({"page": str(path), "bytes": written.size, "found": written.found})
+    for folder, found in written.found.items():
+        talk.say(f"{folder}: {', '.join(found)}")
+    talk.say(f"report in {path}")
+    return 0

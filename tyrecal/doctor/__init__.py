@@ -1,0 +1,1 @@
+"""Whether this installation works: packages, solvers, machine, record, and a known tyre."""

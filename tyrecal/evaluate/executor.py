@@ -1,0 +1,121 @@
+"""Where tasks are done: in this process, in worker processes, or by the workers of a scheduler."""
+
+from __future__ import annotations
+
+import multiprocessing
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from typing import Any, Protocol
+
+from .pool import process_pool
+
+Task = tuple[int, Any]  # its place among the tasks, and what its function is given
+
+
+class WorkerLost(Exception):
+    """The process that did a task died in the middle of it, each time that it was tried."""
+
+
+class Executor(Protocol):
+    """One function, many tasks; both, and the answers, can be pickled."""
+
+    def each(
+        self, function: Callable[[Any], Any], tasks: Sequence[Any]
+    ) -> Generator[tuple[int, Any], None, None]:
+        """(place of a task, ``function`` of it or WorkerLost), as they finish.
+
+        Raises what ``function`` raises. Closed early, it ends what is under way where it can.
+        """
+
+
+class Here:
+    """This process, one task after the other."""
+
+    def each(
+        self, function: Callable[[Any], Any], tasks: Sequence[Any]
+    ) -> Generator[tuple[int, Any], None, None]:
+        """As in `Executor`."""
+        for place, task in enumerate(tasks):
+            yield place, function(task)
+
+
+class Processes:
+    """``jobs`` processes of this machine. One that dies takes no other task with it."""
+
+    def __init__(self, jobs: int):
+        self.jobs = jobs
+
+    def each(
+        self, function: Callable[[Any], Any], tasks: Sequence[Any]
+    ) -> Generator[tuple[int, Any], None, None]:
+        """As in `Executor`."""
+        waiting = list(enumerate(tasks))[::-1]
+        while waiting:
+            lost = yield from _until_one_dies(function, waiting, self.jobs)
+            for suspect in lost:  # which of them killed its process? each again, alone
+                if (yield from _until_one_dies(function, [suspect], 1)):
+                    yield suspect[0], WorkerLost("its process died, twice")
+
+
+def _until_one_dies(
+    function: Callable[[Any], Any], waiting: list[Task], jobs: int
+) -> Generator[tuple[int, Any], None, list[Task]]:
+    """Does tasks off the end of ``waiting``, yields answers; returns what a death left undone."""
+    under_way: dict[Future[Any], Task] = {}
+    lost: list[Task] = []
+    with process_pool(jobs) as pool, _ended_at_once():
+        while under_way or (waiting and not lost):
+            while waiting and not lost and len(under_way) < jobs:
+                task = waiting.pop()
+                try:
+                    under_way[pool.submit(function, task[1])] = task
+                except BrokenProcessPool:
+                    lost.append(task)
+            answers = []
+            for future in wait(under_way, return_when=FIRST_COMPLETED).done:
+                task = under_way.pop(future)
+                try:
+                    answers.append((task[0], future.result()))
+                except BrokenProcessPool:
+                    lost.append(task)
+            yield from answers
+    return lost
+
+
+@contextmanager
+def _ended_at_once() -> Iterator[None]:
+    """Ends the processes at Ctrl-C, or where nobody wants the rest; a failed task's finish."""
+    try:
+        yield
+    except (KeyboardInterrupt, GeneratorExit):
+        for process in multiprocessing.active_children():
+            process.terminate()
+        raise
+
+
+@contextmanager
+def executor(jobs: int = 1, scheduler: str = "") -> Iterator[Executor]:
+    """``jobs`` at a time on this machine, or the workers of a Dask scheduler at that address.
+
+    Raises ClusterFailed where there is no such scheduler.
+    """
+    if scheduler:
+        from .cluster import connected
+
+        with connected(scheduler) as cluster:
+            yield cluster
+    else:
+        yield Processes(jobs) if jobs > 1 else Here()
+
+
+def in_order(answers: Iterable[tuple[int, Any]]) -> Iterator[Any]:
+    """The answers in the order of their tasks."""
+    early: dict[int, Any] = {}
+    following = 0
+    for place, answer in answers:
+        early[place] = answer
+        while following in early:
+            yield early.pop(following)
+            following += 1

@@ -1,0 +1,1 @@
+"""The results of one or several folders as one HTML page."""

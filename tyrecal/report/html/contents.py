@@ -1,0 +1,358 @@
+"""The contents of result files, as far as a page asks for them; numbers finite, SI or as named."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+TINY = 1e-6  # Hz
+
+
+class Part(BaseModel):
+    """A piece of a result file; what else stands there is not asked for."""
+
+    model_config = ConfigDict(extra="ignore", allow_inf_nan=False, frozen=True)
+
+
+class Whole(Part):
+    """A result file, not only a piece of one."""
+
+    format: Literal[1]
+
+
+Positive = Annotated[float, Field(gt=0)]
+Wave = Annotated[int, Field(ge=0, le=200)]
+
+
+class Named(Part):
+    """A mode's label and frequency."""
+
+    c: Wave
+    m: Wave
+    kind: str | None
+    frequency_Hz: Positive
+
+
+class ModeEntry(Named):
+    """A mode of modes.json or of a sweep."""
+
+    multiplicity: int = 1
+    symmetry: str | None = None
+    member: int | None = None
+    clarity: float | None = None
+    overlap: float | None = None
+    d_ln_f_d_ln_p: float | None = None
+
+
+class FittedMode(Named):
+    """A row of the fit's table."""
+
+    multiplicity: int
+    initial_Hz: Positive
+    fitted_Hz: Positive
+    target_Hz: Positive
+    deviation_percent: float
+
+
+class Variable(Part):
+    """A design variable of a fit."""
+
+    initial: float
+    value: float
+    lower: float
+    upper: float
+    standard_error: float | None
+    at_bound: bool
+
+
+class FittedFootprint(Part):
+    """A target on the road."""
+
+    quantity: Literal["contact_area_m2", "vertical_stiffness_N_per_m"]
+    load_N: float
+    initial: float
+    fitted: float
+    target: float
+    deviation_percent: float
+
+
+class Fit(Whole):
+    """fit.json"""
+
+    method: str
+    pressure_kPa: float
+    mass_kg: float
+    objective_Hz: float
+    initial_objective_Hz: float
+    objective_unit: str
+    evaluations: int
+    failed_evaluations: int
+    converged: bool
+    moved: bool
+    message: str
+    projected_gradient_norm: float
+    label_margin: float
+    variables: dict[str, Variable]
+    fixed: dict[str, float]
+    modes: Annotated[list[FittedMode], Field(min_length=1)]
+    footprint: list[FittedFootprint] = []
+    correlations: dict[str, dict[str, float | None]]
+    singular_values: list[float]
+    starts: list[Any]
+
+
+class Words(Part):
+    """Findings in sentences."""
+
+    words: list[str] = []
+    design: str = ""
+
+
+class Modes(Whole):
+    """modes.json"""
+
+    pressure_kPa: float
+    load_N: float
+    mass_kg: float
+    variables: dict[str, float]
+    deflection_m: float | None = None
+    modes: Annotated[list[ModeEntry], Field(min_length=1)]
+    findings: Words = Words()
+
+
+class Failed(Part):
+    """What a study could not reach."""
+
+    design: str
+    words: str = ""
+    cause: str = ""
+    load_N: float | None = None
+    pressure_kPa: float | None = None
+
+
+class PressureRow(Part):
+    """A design at a pressure."""
+
+    design: str
+    pressure_kPa: Positive
+    modes: list[ModeEntry]
+
+
+class PressureSweep(Whole):
+    """pressure_sweep.json"""
+
+    rows: Annotated[list[PressureRow], Field(min_length=1)]
+    failed: list[Failed] = []
+    findings: list[Words]
+
+
+class LoadRow(Part):
+    """A design at a load."""
+
+    design: str
+    load_N: float
+    deflection_m: float
+    modes: list[ModeEntry]
+
+
+class LoadSweep(Whole):
+    """load_sweep.json"""
+
+    rows: Annotated[list[LoadRow], Field(min_length=1)]
+    failed: list[Failed]
+    findings: list[Words]
+
+
+class FootprintRow(Part):
+    """A line of footprint.json, SI."""
+
+    design: str
+    load_N: Positive
+    deflection_m: float
+    area_m2: Positive
+    length_m: float
+    width_m: float
+    mean_pressure_Pa: float
+    peak_pressure_Pa: Positive
+    vertical_stiffness_N_per_m: float
+
+
+class Footprints(Whole):
+    """footprint.json"""
+
+    rows: Annotated[list[FootprintRow], Field(min_length=1)]
+    failed: list[Failed]
+    findings: Words
+
+
+class Patch(Part):
+    """Contact pressure on lines of nodes, (ring along, node across)."""
+
+    design: str
+    load_N: float
+    across_mm: list[list[float]]
+    along_mm: list[list[float]]
+    pressure_kPa: list[list[float]]
+
+
+class Patches(Whole):
+    """footprint_patches.json"""
+
+    case: str
+    patches: list[Patch]
+
+
+class Cords(Part):
+    """A layer as lines."""
+
+    angle_deg: float
+    lines: list[list[float]]
+
+
+class Section(Part):
+    """The section as elements and lines, mm."""
+
+    areas: dict[str, list[list[float]]]
+    cords: dict[str, Cords]
+    rim: list[list[float]]
+    outline: list[float]
+    inflated: list[float] | None
+
+
+class Shape(Named):
+    """A mode on the section, or on the surface of the loaded tyre."""
+
+    n: Wave = 0
+    real: list[list[float]] = []
+    imaginary: list[list[float]] = []
+    symmetry: str | None = None
+    displacement: list[list[list[float]]] = []
+
+
+class Shapes(Whole):
+    """fit_shapes.json, modes_shapes.json"""
+
+    case: str
+    pressure_kPa: float
+    load_N: float = 0.0
+    variables: dict[str, list[str]] = {}
+    section: Section | None = None
+    R_m: list[float] = []
+    Z_m: list[float] = []
+    angles: list[float] = []
+    surface_m: list[list[list[float]]] = []
+    modes: list[Shape]
+
+    def of(self, table: Sequence[ModeEntry | FittedMode]) -> bool:
+        """Whether these are the modes that a table lists, and not those of another run; a split
+        doublet has its mean here, both members there."""
+        for mode in self.modes:
+            hertz = [
+                each.frequency_Hz
+                for each in table
+                if (each.c, each.m, each.kind) == (mode.c, mode.m, mode.kind)
+                and getattr(each, "symmetry", None) == mode.symmetry
+            ]
+            if not hertz or not min(hertz) - TINY <= mode.frequency_Hz <= max(hertz) + TINY:
+                return False
+        return True
+
+
+class Explained(Part):
+    """The size of the effect that a diagnosis names or likes best."""
+
+    effect: str
+    value: float
+    low: float
+    high: float
+    unit: str
+
+
+class Region(Part):
+    """A line of the section's map."""
+
+    region: str
+    stiffness_percent: float
+    stiffness_sigma: float
+    mass_percent: float
+    mass_sigma: float
+    evidence: float
+    same_as: list[str]
+
+
+class Residual(Part):
+    """A measurement over the calibrated model."""
+
+    row: str
+    run: int
+    percent: float
+    sigma_percent: float
+
+
+class Gap(Part):
+    """What calibration leaves."""
+
+    p_value: float
+    chi2: float
+    freedom: int
+    rms_percent: float
+    residuals: list[Residual]
+
+
+class Shrinkage(Part):
+    """Errors on held-out data."""
+
+    held_out: str
+    effect: str
+    before_percent: float
+    after_percent: float
+    fraction: float
+    low: float
+    high: float
+    placebo_95: float
+    floor_percent: float
+
+
+class NextMeasurement(Part):
+    """Something worth to be measured."""
+
+    what: str
+    gain: float
+    hours: float
+
+
+class Diagnosis(Whole):
+    """diagnosis.json"""
+
+    verdict: Literal["named", "undecided", "no_gap", "outside"]
+    words: str
+    effect: str | None
+    parameter: Explained | None
+    probabilities: dict[str, float]
+    candidate_set: list[str]
+    groups: list[list[str]]
+    detectability: dict[str, float]
+    gap: Gap
+    section_map: list[Region]
+    effective_rank: int
+    shrinkage: Shrinkage | None
+    rung: int
+    next_measurements: list[NextMeasurement]
+
+
+class DiagnosisSection(Whole):
+    """diagnosis_section.json"""
+
+    case: str
+    areas: dict[str, list[list[float]]]
+    cords: dict[str, list[list[float]]]
+
+
+class RunFacts(Part):
+    """run.json, but for what differs from run to run."""
+
+    case: str | None = None
+    solver: str | None = None
+    tyrecal: str | None = None

@@ -1,0 +1,239 @@
+"""The page: folders read, chapters made, templates filled."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import lru_cache
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from jinja2 import FileSystemLoader, StrictUndefined
+from jinja2.sandbox import ImmutableSandboxedEnvironment
+from markupsafe import Markup
+
+from ...files import whole
+from ..table import FOOTPRINT, QUANTITIES
+from ..words import motion
+from . import drawings, plots
+from .contents import LoadSweep, Shapes
+from .markdown import html
+from .results import BadResults, Results, read_results
+from .shapes import packed
+from .summary import CLOSE, FAR, VERDICTS, design_words, summary
+from .svg import MINUS
+
+LARGEST = 5_000_000  # bytes of a page
+SHOWN, LEAST = 12, 0.005  # explanations, and the probability below which one is not shown
+MARK = '<meta name="generator" content="tyrecal report">'
+STUDIES = {
+    "fit": "fit", "modes": "modes", "pressure": "sweep-pressure", "footprint": "footprint",
+    "load": "modes --sweep-load", "diagnosis": "diagnose",
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Page:
+    """A page that was written: bytes, and the commands whose results each folder holds."""
+
+    path: Path
+    size: int
+    found: dict[str, list[str]]
+
+
+def write_page(path: Path, folders: Sequence[Path]) -> Page:
+    """Write the results of ``folders`` as one page that needs no network. The same results give
+    the same bytes. Raises BadResults; OSError."""
+    results = [read_results(folder) for folder in folders]
+    text = page(results)
+    size = len(text.encode("utf-8"))
+    if size > LARGEST:
+        raise BadResults(
+            f"the page would have {size / 1e6:.1f} MB, more than 5: give fewer folders"
+        )
+    if path.is_dir():
+        raise BadResults(f"'{path}' is a folder; give a file with --output")
+    if path.exists() and MARK.encode() not in path.read_bytes()[:2000]:
+        raise BadResults(f"'{path}' is no page of tyrecal's; give another file with --output")
+    with whole(path) as partial:
+        partial.write_text(text, encoding="utf-8", newline="")
+    found = {str(each.folder): _commands(each) for each in results}
+    return Page(path, size, found)
+
+
+def page(results: Sequence[Results]) -> str:
+    """The page as text. Raises BadResults."""
+    chapters = [chapter(each, f"f{k}-") for k, each in enumerate(results, 1)]
+    names = list(dict.fromkeys(each.case for each in results))
+    template = environment().get_template("page.html.j2")
+    return template.render(
+        mark=Markup(MARK), title=" and ".join(names), chapters=chapters, close=CLOSE, far=FAR
+    )
+
+
+def chapter(found: Results, prefix: str) -> dict[str, Any]:
+    """What the templates ask of one folder's results."""
+    shapes = [
+        _shapes("fit", found.folder, found.fit_shapes, found.fit.modes) if found.fit else None,
+        _shapes("modes", found.folder, found.modes_shapes, found.modes.modes)
+        if found.modes
+        else None,
+    ]
+    return {
+        "prefix": prefix,
+        "folder": found.folder.resolve().name,
+        "case": found.case,
+        "run": found.run,
+        "told": summary(found),
+        "absent": [name for key, name in STUDIES.items() if not getattr(found, key)],
+        "fit": found.fit and _fit(found),
+        "shapes": [each for each in shapes if each],
+        "section": next((each["section"] for each in shapes if each and each["section"]), None),
+        "modes": found.modes,
+        "pressure": found.pressure and _pressure(found),
+        "load": found.load and _load(found.load),
+        "footprint": found.footprint and _footprint(found),
+        "diagnosis": found.diagnosis and _diagnosis(found),
+    }
+
+
+def _shapes(what: str, folder: Path, shapes: Shapes | None, table: Any) -> dict[str, Any]:
+    """The viewer's data, or why there are none, and the section."""
+    why = ""
+    if shapes is None:
+        why = f"The mode shapes are not in this folder; 'tyrecal {what} --report' keeps them."
+    elif not shapes.of(table):
+        why, shapes = "The mode shapes in this folder are those of another run: not shown.", None
+    elif not shapes.modes:
+        why = "This solver gives shapes on the crown alone, so there is no section to revolve."
+    data = section = None
+    with _lists_of(folder / f"{what}_shapes.json"):
+        if shapes and shapes.modes:
+            data = packed(shapes)
+        if shapes and shapes.section:
+            section = drawings.section(shapes.section, shapes.pressure_kPa)
+    heading = {"fit": "Shapes of the fitted tyre", "modes": "Mode shapes"}[what]
+    if shapes and shapes.load_N:
+        heading = f"Mode shapes under {shapes.load_N:g} N, on the tread"
+    return {"id": what, "heading": heading, "data": data, "why": why, "section": section}
+
+
+def _fit(found: Results) -> dict[str, Any]:
+    fit = found.fit
+    assert fit
+    history = found.history
+    return {
+        "of": fit,
+        "sets": found.fit_shapes.variables if found.fit_shapes else {},
+        "deviations": plots.deviations(fit),
+        "convergence": plots.convergence(history, fit.objective_unit) if history else [],
+        "legend": list(history[0].values) if history else [],
+        "quantities": QUANTITIES,
+    }
+
+
+def _pressure(found: Results) -> dict[str, Any]:
+    assert found.pressure
+    targets = {plots.label(m): m.target_Hz for m in found.fit.modes} if found.fit else {}
+    at = found.fit.pressure_kPa if found.fit else 0.0
+    rows = found.pressure.rows
+    return {
+        "rows": rows,
+        "panels": plots.pressure(rows, targets, at),
+        "words": design_words(found.pressure),
+        "tables": _over(rows, "pressure_kPa"),
+        "targets": bool(targets),
+    }
+
+
+def _load(found: LoadSweep) -> dict[str, Any]:
+    return {"rows": found.rows, "words": design_words(found), "panels": plots.load(found.rows)}
+
+
+def _over(rows: Sequence[Any], key: str) -> list[dict[str, Any]]:
+    """A table a design: modes by rows, frequencies at each pressure by columns."""
+    tables = []
+    for design in dict.fromkeys(row.design for row in rows):
+        own = [row for row in rows if row.design == design]
+        found: dict[str, list[float | None]] = {}
+        for k, row in enumerate(own):
+            for mode in row.modes:
+                found.setdefault(plots.label(mode), [None] * len(own))[k] = mode.frequency_Hz
+        columns = [getattr(row, key) for row in own]
+        tables.append({"design": design, "columns": columns, "rows": found})
+    return tables
+
+
+def _footprint(found: Results) -> dict[str, Any]:
+    assert found.footprint
+    rows = found.footprint.rows
+    known = {(row.design, row.load_N): row for row in rows}
+    kept = found.patches.patches if found.patches else []
+    kept = [patch for patch in kept if (patch.design, patch.load_N) in known]
+    with _lists_of(found.folder / "footprint_patches.json"):
+        edges = drawings.levels(kept) if kept else []
+        drawn = drawings.patches(kept, edges) if kept else []
+    return {
+        "rows": rows,
+        "columns": FOOTPRINT,
+        "panels": plots.footprint(rows),
+        "bands": drawings.bands(edges),
+        "patches": [
+            (patch, picture, known[patch.design, patch.load_N])
+            for patch, picture in zip(kept, drawn, strict=True)
+        ],
+    }
+
+
+def _diagnosis(found: Results) -> dict[str, Any]:
+    d = found.diagnosis
+    assert d
+    place, drawn = found.diagnosis_section, None
+    if place and d.section_map:
+        with _lists_of(found.folder / "diagnosis_section.json"):
+            drawn = drawings.section_map(place, d.section_map)
+    return {
+        "of": d,
+        "verdict": VERDICTS[d.verdict],
+        "likeliest": [
+            (key, p)
+            for key, p in list(d.probabilities.items())[:SHOWN]
+            if p >= LEAST or key in ("none", "outside")
+        ],
+        "words": html(found.diagnosis_words),
+        "map": drawn,
+        "residuals": plots.residuals(d.gap.residuals) if d.gap.residuals else None,
+    }
+
+
+@contextmanager
+def _lists_of(path: Path) -> Iterator[None]:
+    """Raises BadResults where lists of the file that belong together differ in length."""
+    try:
+        yield
+    except (ValueError, IndexError, TypeError):
+        raise BadResults(f"'{path}' is damaged: its lists do not go together") from None
+
+
+def _commands(found: Results) -> list[str]:
+    return [name for key, name in STUDIES.items() if getattr(found, key)]
+
+
+@lru_cache(maxsize=1)
+def environment() -> ImmutableSandboxedEnvironment:
+    """The sandbox of the page's templates: what comes from files is escaped."""
+    made = ImmutableSandboxedEnvironment(
+        loader=FileSystemLoader(str(files("tyrecal_templates") / "report")),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    made.filters["fixed"] = lambda value, digits: f"{value:.{digits}f}".replace("-", MINUS)
+    made.filters["signed"] = lambda value, digits: f"{value:+.{digits}f}".replace("-", MINUS)
+    made.filters["digits"] = lambda value, count: f"{value:.{count}g}"
+    made.filters["motion"] = lambda mode: motion(mode.c, mode.m, mode.kind)
+    made.filters["label"] = plots.label
+    return made

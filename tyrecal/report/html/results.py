@@ -1,0 +1,144 @@
+"""Result files read back, each checked: what a page may rely on."""
+
+from __future__ import annotations
+
+import csv
+import json
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TypeVar
+
+from pydantic import ValidationError
+
+from .contents import (
+    Diagnosis,
+    DiagnosisSection,
+    Fit,
+    Footprints,
+    LoadSweep,
+    Modes,
+    Part,
+    Patches,
+    PressureSweep,
+    RunFacts,
+    Shapes,
+)
+
+LARGEST = 50_000_000  # bytes of a result file; ours are a hundredth of it
+
+
+class BadResults(ValueError):
+    """A folder without results, or a file in it that no command of ours wrote; one sentence."""
+
+
+File = TypeVar("File", bound=Part)
+
+
+@dataclass(frozen=True)
+class DesignPoint:
+    """A line of fit_history.csv; objective None: the design could not be evaluated."""
+
+    start: int
+    objective: float | None
+    values: dict[str, float]
+
+
+@dataclass(frozen=True)
+class Results:
+    """What a folder holds; None or empty: it does not."""
+
+    folder: Path
+    fit: Fit | None = None
+    fit_shapes: Shapes | None = None
+    history: list[DesignPoint] = field(default_factory=list)
+    modes: Modes | None = None
+    modes_shapes: Shapes | None = None
+    pressure: PressureSweep | None = None
+    load: LoadSweep | None = None
+    footprint: Footprints | None = None
+    patches: Patches | None = None
+    diagnosis: Diagnosis | None = None
+    diagnosis_section: DiagnosisSection | None = None
+    diagnosis_words: str = ""
+    run: RunFacts = field(default_factory=RunFacts)
+
+    @property
+    def case(self) -> str:
+        """The case's name or, in folders that do not know it, its file's."""
+        known = (self.fit_shapes, self.modes_shapes, self.patches, self.diagnosis_section)
+        for each in known:
+            if each:
+                return each.case
+        return Path(self.run.case).stem if self.run.case else self.folder.resolve().name
+
+
+def read_results(folder: Path) -> Results:
+    """What the commands left in a folder. Raises BadResults; OSError."""
+    if not folder.is_dir():
+        what = "is a file" if folder.exists() else "does not exist"
+        raise BadResults(f"'{folder}' {what}; give a folder of results")
+    found = Results(
+        folder,
+        _read(folder / "fit.json", Fit),
+        _read(folder / "fit_shapes.json", Shapes),
+        _history(folder / "fit_history.csv"),
+        _read(folder / "modes.json", Modes),
+        _read(folder / "modes_shapes.json", Shapes),
+        _read(folder / "pressure_sweep.json", PressureSweep),
+        _read(folder / "load_sweep.json", LoadSweep),
+        _read(folder / "footprint.json", Footprints),
+        _read(folder / "footprint_patches.json", Patches),
+        _read(folder / "diagnosis.json", Diagnosis),
+        _read(folder / "diagnosis_section.json", DiagnosisSection),
+        _text(folder / "diagnosis.md") or "",
+        _read(folder / "run.json", RunFacts) or RunFacts(),
+    )
+    studies = (found.fit, found.modes, found.pressure, found.load, found.footprint)
+    if not any((*studies, found.diagnosis)):
+        raise BadResults(f"'{folder}' holds no results of fit, modes, sweep-pressure, footprint or"
+                         " diagnose")  # fmt: skip
+    return found
+
+
+def _read(path: Path, kind: type[File]) -> File | None:
+    text = _text(path)
+    if text is None:
+        return None
+    try:
+        return kind.model_validate(json.loads(text))
+    except (json.JSONDecodeError, RecursionError):
+        raise BadResults(f"'{path}' is damaged: it is no JSON") from None
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(str(place) for place in first["loc"]) or "the whole"
+        raise BadResults(
+            f"'{path}' is not what tyrecal writes: {where}: {first['msg'][:1].lower()}"
+            f"{first['msg'][1:]}"
+        ) from None
+
+
+def _text(path: Path) -> str | None:
+    if not path.exists():
+        return None
+    if path.stat().st_size > LARGEST:
+        raise BadResults(f"'{path}' is not what tyrecal writes: it is larger than 50 MB")
+    try:
+        return path.read_text(encoding="utf-8")
+    except UnicodeDecodeError:
+        raise BadResults(f"'{path}' is damaged: it is no text") from None
+
+
+def _history(path: Path) -> list[DesignPoint]:
+    text = _text(path)
+    if text is None:
+        return []
+    points = []
+    try:
+        for row in csv.DictReader(text.splitlines()):
+            objective, start = row.pop("objective_Hz"), int(row.pop("start"))
+            del row["point"], row["failure"]
+            values = {name: float(value) for name, value in row.items()}
+            points.append(DesignPoint(start, float(objective) if objective else None, values))
+    except (KeyError, ValueError, TypeError):
+        raise BadResults(f"'{path}' is not what tyrecal writes: line {len(points) + 2}") from None
+    return points

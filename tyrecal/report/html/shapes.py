@@ -1,0 +1,80 @@
+"""Mode shapes packed for the page's script: 16 bit whole numbers in base64."""
+
+from __future__ import annotations
+
+from base64 import b64encode
+from typing import Any
+
+import numpy as np
+
+from ..words import motion
+from .contents import Shape, Shapes
+
+STEPS = 32767
+ANGLES = 60  # round the circumference, in the page
+
+
+def packed(shapes: Shapes) -> dict[str, Any]:
+    """What `viewer.js` reads: points and modes; a surface round the section's outside that is
+    swept by the script, or, of the loaded tyre, as it is. Raises ValueError where lists that
+    belong together differ in length."""
+    return _loaded(shapes) if shapes.load_N else _swept(shapes)
+
+
+def _swept(shapes: Shapes) -> dict[str, Any]:
+    R, Z = np.array(shapes.R_m, float), np.array(shapes.Z_m, float)
+    if len(R) != len(Z) or len(R) < 2:
+        raise ValueError("points")
+    radius = float(np.hypot(R, Z).max())
+    modes = []
+    for mode in shapes.modes:
+        both = np.array([mode.real, mode.imaginary], float)
+        if both.shape != (2, len(R), 3):
+            raise ValueError(mode.c)
+        modes.append({**_named(mode), "n": mode.n, "shape": _base64(both)})
+    return {
+        "kind": "swept",
+        "points": len(R),
+        "angles": ANGLES,
+        "place": _base64(np.stack([R, Z]) / radius),
+        "modes": modes,
+    }
+
+
+def _loaded(shapes: Shapes) -> dict[str, Any]:
+    angles, place = np.array(shapes.angles, float), np.array(shapes.surface_m, float)
+    if place.ndim != 3 or place.shape[::2] != (len(angles), 3):
+        raise ValueError("points")
+    place = place.copy()
+    place[..., 2] -= (place[..., 2].max() + place[..., 2].min()) / 2
+    radius = float(np.linalg.norm(place, axis=-1).max())
+    modes = []
+    for mode in shapes.modes:
+        moved = np.array(mode.displacement, float)
+        if moved.shape != place.shape:
+            raise ValueError(mode.c)
+        modes.append({**_named(mode), "shape": _base64(moved)})
+    return {
+        "kind": "loaded",
+        "points": place.shape[1],
+        "angles": len(angles),
+        "angle": _base64(angles / (2 * np.pi)),
+        "place": _base64(place / radius),
+        "modes": modes,
+    }
+
+
+def _named(mode: Shape) -> dict[str, str]:
+    kind = f" {mode.kind}" if mode.kind else ""
+    symmetry = f" {mode.symmetry}" if mode.symmetry else ""
+    return {
+        "name": f"[{mode.c},{mode.m}]{kind}{symmetry}",
+        "hertz": f"{mode.frequency_Hz:.2f} Hz",
+        "words": motion(mode.c, mode.m, mode.kind),
+    }
+
+
+def _base64(values: np.ndarray) -> str:
+    """Values of -1 to 1, little end first."""
+    whole = np.rint(np.clip(values, -1, 1) * STEPS).astype("<i2")
+    return b64encode(whole.tobytes()).decode("ascii")

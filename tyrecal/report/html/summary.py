@@ -1,0 +1,160 @@
+"""What a folder's results say, in sentences."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from ..words import fit_doubts, motion
+from .contents import (
+    Diagnosis,
+    Failed,
+    Fit,
+    FittedMode,
+    Footprints,
+    LoadSweep,
+    Modes,
+    PressureSweep,
+)
+from .results import Results
+
+CLOSE, FAR = 2.0, 5.0  # % of deviation, as the terminal colours them
+VERDICTS = {
+    "named": "Named",
+    "undecided": "Undecided",
+    "no_gap": "No gap is seen",
+    "outside": "Outside the catalogue",
+}
+
+
+@dataclass(frozen=True)
+class Told:
+    """One study: its heading, what it says, and what must not be overlooked."""
+
+    id: str
+    heading: str
+    words: list[str]
+    doubts: list[str] = field(default_factory=list)
+
+
+def summary(found: Results) -> list[Told]:
+    """Every study of a folder."""
+    told = []
+    if found.fit:
+        doubts = fit_doubts(found.fit.model_dump())
+        told.append(Told("fit", "Fit", fit_words(found.fit), doubts))
+    if found.modes:
+        heading = "Modes on the road" if found.modes.load_N else "Modes"
+        told.append(Told("modes", heading, modes_words(found.modes)))
+    if found.pressure:
+        words = last_words(found.pressure)
+        told.append(Told("pressure", "Over pressure", words, missing(found.pressure.failed)))
+    if found.footprint:
+        words = [*map(sentence, found.footprint.findings.words)] or [rows_words(found.footprint)]
+        told.append(Told("footprint", "Footprint", words, missing(found.footprint.failed)))
+    if found.load:
+        words = last_words(found.load)
+        told.append(Told("load", "Modes over load", words, missing(found.load.failed)))
+    if found.diagnosis:
+        told.append(Told("diagnosis", "Diagnosis", diagnosis_words(found.diagnosis)))
+    return told
+
+
+def fit_words(fit: Fit) -> list[str]:
+    """How the fit went, how near it came, where the variables went."""
+    unit = fit.objective_unit if fit.objective_unit == "Hz" else "(deviations in sigmas)"
+    equation = "equation (1), " if fit.objective_unit == "Hz" else ""
+    end = "converged" if fit.converged else "did not converge"
+    near = [m for m in fit.modes if abs(m.deviation_percent) <= CLOSE]
+    worst = max(fit.modes, key=lambda m: abs(m.deviation_percent))
+    moves = ", ".join(
+        f"{name} from {v.initial:.4g} to {v.value:.4g}"
+        + (f" ({100 * (v.value / v.initial - 1):+.0f} %)" if v.initial else "")
+        for name, v in fit.variables.items()
+    )
+    return [
+        f"The objective ({equation}{fit.method}) went from {fit.initial_objective_Hz:.2f} to"
+        f" {fit.objective_Hz:.2f} {unit} in {fit.evaluations} design points; the fit {end}.",
+        f"{len(near)} of {len(fit.modes)} frequencies come within {CLOSE:g} % of their targets;"
+        f" farthest off is {_told(worst)} with {worst.deviation_percent:+.1f} %.",
+        f"{moves}.",
+    ]
+
+
+def _told(mode: FittedMode) -> str:
+    words = motion(mode.c, mode.m, mode.kind)
+    return f"[{mode.c},{mode.m}] {words}"
+
+
+def modes_words(modes: Modes) -> list[str]:
+    """How many modes, where, of what tyre."""
+    hertz = [mode.frequency_Hz for mode in modes.modes]
+    where = f"{modes.pressure_kPa:g} kPa" + (f" under {modes.load_N:g} N" if modes.load_N else "")
+    words = [
+        f"{len(hertz)} frequencies from {min(hertz):.1f} to {max(hertz):.1f} Hz at {where}; the"
+        f" tyre weighs {modes.mass_kg:.2f} kg."
+    ]
+    if modes.deflection_m is not None:
+        words.append(f"The axle comes {1e3 * modes.deflection_m:.1f} mm down.")
+    return [*words, *map(sentence, modes.findings.words)]
+
+
+def design_words(found: PressureSweep | LoadSweep) -> list[str]:
+    """Findings, each with its design where there are two."""
+    several = len(found.findings) > 1
+    return [
+        sentence(f"{each.design}: {words}" if several else words)
+        for each in found.findings
+        for words in each.words
+    ]
+
+
+def last_words(found: PressureSweep | LoadSweep) -> list[str]:
+    """Findings of the last design: the fitted one where there are two."""
+    several = len(found.findings) > 1
+    return [
+        sentence((f"{each.design}: " if several else "") + "; ".join(each.words))
+        for each in found.findings[-1:]
+    ]
+
+
+def rows_words(found: Footprints) -> str:
+    """How many loads."""
+    loads = [row.load_N for row in found.rows]
+    return f"{len(found.rows)} footprints from {min(loads):g} to {max(loads):g} N."
+
+
+def diagnosis_words(found: Diagnosis) -> list[str]:
+    """Verdict, size, how far the error shrinks, what next."""
+    words = [sentence(f"{VERDICTS[found.verdict]}: {found.words}")]
+    if found.effect:
+        words[0] += f" Probability {found.probabilities.get(found.effect, 0.0):.2f}."
+    if found.effect and found.parameter:
+        p = found.parameter
+        words.append(f"Its size is {p.value:.3g} {p.unit}".rstrip()
+                     + f", 90 % between {p.low:.3g} and {p.high:.3g}.")  # fmt: skip
+    if found.shrinkage:
+        s = found.shrinkage
+        words.append(
+            f"On held-out data the error goes from {s.before_percent:.2f} to"
+            f" {s.after_percent:.2f} % with {s.effect}: it shrinks by {100 * s.fraction:.0f} %,"
+            f" chance alone reaches {100 * s.placebo_95:.0f} % (95 % quantile)."
+        )
+    if found.next_measurements:
+        words.append(f"Next: {found.next_measurements[0].what}.")
+    return words
+
+
+def missing(failed: Sequence[Failed]) -> list[str]:
+    """What was not reached."""
+    words = []
+    for each in failed:
+        at = f"{each.load_N:g} N" if each.load_N is not None else ""
+        at = at or (f"{each.pressure_kPa:g} kPa" if each.pressure_kPa is not None else "")
+        words.append(f"not reached: {each.design}, {at}: {each.words or each.cause}")
+    return words
+
+
+def sentence(words: str) -> str:
+    """With a capital and a full stop."""
+    return words[:1].upper() + words[1:] + ("" if words.endswith((".", "!", "?")) else ".")
