@@ -93,7 +93,7 @@ def test_the_core_takes_at_most_350_megabytes() -> None:
 
 def test_heavy_packages_of_the_tests_are_not_in_the_core() -> None:
     names = {str(distribution.name).lower() for distribution in core()}
-    assert not names & {"meshio", "pytest", "mypy", "ruff", "hypothesis", "setuptools"}
+    assert not names & {"pytest", "mypy", "ruff", "hypothesis", "setuptools"}
 
 
 def test_the_citation_is_one() -> None:

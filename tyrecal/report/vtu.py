@@ -1,14 +1,10 @@
-"""The revolved tyre for ParaView: a mode, or the tyre pressed on the road.
-
-VTK's XML format for unstructured grids, arrays compressed (docs.vtk.org, VTKFileFormats).
-"""
+"""The revolved tyre for ParaView: a mode, or the tyre pressed on the road."""
 
 from __future__ import annotations
 
-import zlib
-from base64 import b64encode
 from pathlib import Path
 
+import meshio
 import numpy as np
 
 from ..evaluate.pressed import Footprint, Pressed
@@ -17,8 +13,6 @@ from ..modes.mode import Mode
 from ..tyre.mesh import SectionMesh
 from .revolve import cartesian, corners, motion, swept
 
-HEXAHEDRON = 12  # VTK's number of it
-TYPES = {"f8": "Float64", "i8": "Int64", "u1": "UInt8"}
 WIDEST = np.radians(5.0)  # between rings of points of the pressed tyre
 
 
@@ -73,41 +67,16 @@ def _refined(angles: np.ndarray, field: np.ndarray) -> tuple[np.ndarray, np.ndar
 
 def _write(path: Path, grid: np.ndarray, points: np.ndarray, fields: dict[str, np.ndarray]) -> None:
     """Points and fields (node, angle, ...) on the grid of corner nodes swept round."""
-    count = grid.size * points.shape[1]
-    cells = _hexahedra(grid.shape, points.shape[1])
-    data = [_array(name, field.reshape(count, -1)) for name, field in fields.items()]
-    text = f"""<?xml version="1.0"?>
-<VTKFile type="UnstructuredGrid" version="0.1" byte_order="LittleEndian" header_type="UInt32" \
-compressor="vtkZLibDataCompressor">
-<UnstructuredGrid>
-<Piece NumberOfPoints="{count}" NumberOfCells="{len(cells)}">
-<Points>{_array("Points", points.reshape(count, 3))}</Points>
-<Cells>
-{_array("connectivity", cells.reshape(-1, 1))}
-{_array("offsets", 8 * np.arange(1, len(cells) + 1)[:, None])}
-{_array("types", np.full((len(cells), 1), HEXAHEDRON, np.uint8))}
-</Cells>
-<PointData>
-{"".join(data)}
-</PointData>
-</Piece>
-</UnstructuredGrid>
-</VTKFile>
-"""
+    tyre = meshio.Mesh(
+        points.reshape(-1, 3),
+        [("hexahedron", _hexahedra(grid.shape, points.shape[1]))],
+        point_data={
+            name: field.reshape(grid.size * points.shape[1], *field.shape[2:])
+            for name, field in fields.items()
+        },
+    )
     with whole(path) as partial:
-        partial.write_text(text, encoding="ascii")
-
-
-def _array(name: str, values: np.ndarray) -> str:
-    """Rows of components as one compressed block: its sizes, then its bytes, each in base 64."""
-    kind = values.dtype.str[1:]
-    raw = values.astype(f"<{kind}", copy=False).tobytes()
-    packed = zlib.compress(raw)
-    sizes = np.array([1, len(raw), 0, len(packed)], "<u4").tobytes()
-    width = "" if values.shape[1] == 1 else f' NumberOfComponents="{values.shape[1]}"'
-    block = (b64encode(sizes) + b64encode(packed)).decode()
-    head = f'<DataArray type="{TYPES[kind]}" Name="{name}"{width} format="binary">'
-    return f"{head}{block}</DataArray>\n"
+        tyre.write(partial, file_format="vtu")
 
 
 def _hexahedra(shape: tuple[int, int], sectors: int) -> np.ndarray:
