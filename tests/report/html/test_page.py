@@ -7,6 +7,7 @@ import re
 import shutil
 from html.parser import HTMLParser
 from pathlib import Path
+from random import Random
 
 import pytest
 
@@ -17,6 +18,7 @@ from tyrecal.report.html.results import BadResults, read_results
 from . import toy
 
 ROOT = Path(__file__).parents[3]
+TRIALS = 60
 VOID = {"meta", "input", "br", "path", "polyline", "circle", "rect"}
 HOSTILE = "</script><script>window.hacked=1</script><img src=x onerror=alert(1)>\"'{{ 7*7 }}"
 
@@ -231,6 +233,37 @@ def test_lists_of_unequal_length(copy: Path, file: str, path: tuple[str | int, .
     (copy / file).write_text(json.dumps(content))
     with pytest.raises(BadResults, match=re.escape(file)):
         text_of(copy)
+
+
+def test_whatever_is_spoilt_the_page_is_whole_or_refused(copy: Path, tmp_path: Path) -> None:
+    """Any leaf of any file becomes something else, or goes: no traceback, no broken page."""
+    random = Random(1)
+    odd = [None, 0, -1, 1e300, -1e-300, "", "<b>", "\ud800", [], {}, [[1.0]], True, 5, "fit"]
+    outcomes = {True: 0, False: 0}
+    files = sorted(file for file in copy.glob("*.json") if file.name != "run.json")
+    for _ in range(TRIALS):
+        file = random.choice(files)
+        before = file.read_text()
+        content = place = json.loads(before)
+        while True:
+            key = random.choice(list(place) if isinstance(place, dict) else range(len(place)))
+            if not (isinstance(place[key], dict | list) and place[key] and random.random() < 0.85):
+                break
+            place = place[key]
+        if random.random() < 0.2:
+            del place[key]
+        else:
+            place[key] = random.choice(odd)
+        file.write_text(json.dumps(content))
+        try:
+            written = write_page(tmp_path / "page.html", [copy])
+            parsed(written.path.read_text())
+            outcomes[True] += 1
+        except BadResults as error:
+            assert "\n" not in str(error)
+            outcomes[False] += 1
+        file.write_text(before)
+    assert min(outcomes.values()) > TRIALS / 10, outcomes
 
 
 def test_a_page_too_large_and_places_not_to_write_to(

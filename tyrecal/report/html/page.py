@@ -47,8 +47,11 @@ def write_page(path: Path, folders: Sequence[Path]) -> Page:
     """Write the results of ``folders`` as one page that needs no network. The same results give
     the same bytes. Raises BadResults; OSError."""
     results = [read_results(folder) for folder in folders]
-    text = page(results)
-    size = len(text.encode("utf-8"))
+    try:
+        content = page(results).encode("utf-8")
+    except UnicodeEncodeError:
+        raise BadResults("a name in the results is no text") from None
+    size = len(content)
     if size > LARGEST:
         raise BadResults(
             f"the page would have {size / 1e6:.1f} MB, more than 5: give fewer folders"
@@ -58,7 +61,7 @@ def write_page(path: Path, folders: Sequence[Path]) -> Page:
     if path.exists() and MARK.encode() not in path.read_bytes()[:2000]:
         raise BadResults(f"'{path}' is no page of tyrecal's; give another file with --output")
     with whole(path) as partial:
-        partial.write_text(text, encoding="utf-8", newline="")
+        partial.write_bytes(content)
     found = {str(each.folder): _commands(each) for each in results}
     return Page(path, size, found)
 
