@@ -35,7 +35,10 @@ def main(count: int, jobs: int, coarse: bool) -> None:
             code = subprocess.run([*command, *out], env=environment).returncode
             seconds[n] = time.perf_counter() - clock
             counts = json.loads((folder / str(n) / "batch.json").read_text())["counts"]
-            print(f"{count} cases, {n} at a time: {seconds[n]:.1f} s, exit code {code}, {counts}")
+            facts = json.loads((folder / str(n) / "run.json").read_text())["cases"].values()
+            cpu = sum(each["cpu_seconds"] for each in facts)
+            print(f"{count} cases, {n} at a time: {seconds[n]:.1f} s, {cpu:.1f} s of a core in"
+                  f" the cases, exit code {code}, {counts}", flush=True)  # fmt: skip
         texts = [(folder / str(n) / "batch.json").read_bytes() for n in seconds]
         print(f"{seconds[1] / seconds[jobs]:.2f} times as fast; same bytes: {texts[0] == texts[1]}")
 

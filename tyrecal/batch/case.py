@@ -6,8 +6,8 @@ The report is plain data, small enough for any network: ``name``; ``studies``, e
   load that was not reached); ``error``, there is no result; ``skipped``, see `studies.study`;
 * ``cause`` and ``words``, or None; ``quantities``, name to number;
 
-and ``facts``, which are volatile: seconds by study, when, where, which solver, how often it ran and
-the record answered, or ``answered``: all of it by the case's folder.
+and ``facts``, which are volatile: seconds by study and of a core, when, where, which solver, how
+often it ran and the record answered, or ``answered``: all of it by the case's folder.
 """
 
 from __future__ import annotations
@@ -98,7 +98,7 @@ def _studied(
     state = Studied(loaded, door, {"initial": start_values(loaded)}, task.asked)
     entries: dict[str, Any] = {}
     files: list[str] = []
-    facts["seconds"] = {}
+    facts["seconds"], used = {}, time.process_time()
     for name in task.studies:
         clock = time.monotonic()
         try:
@@ -113,6 +113,7 @@ def _studied(
     if door.folder:
         with suppress(OSError):  # it holds failures, or was never made
             door.folder.rmdir()
+    facts["cpu_seconds"] = round(time.process_time() - used, 3)
     facts.update(solver_runs=door.counts.runs, answered_from_record=door.counts.recorded)
     _write(task.folder / "run.json", {**owner, **facts})
     return entries, files

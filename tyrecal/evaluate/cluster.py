@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Generator, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import partial
 from typing import Any
 
@@ -53,8 +53,9 @@ class Cluster:
                     ) from None
                 yield places[future.key], answer
         finally:
-            if waiting.futures:
-                self.client.cancel([*waiting.futures], force=True)
+            with suppress(Exception):  # a dead scheduler must not hide why we are here
+                if waiting.futures:
+                    self.client.cancel([*waiting.futures], force=True)
 
 
 def _at_worker(function: Callable[[Any], Any], expected: str, task: Any) -> Any:
@@ -81,4 +82,5 @@ def connected(address: str) -> Iterator[Cluster]:
             log.warning("the scheduler at %s has no workers yet; waiting for some", address)
         yield Cluster(client, address)
     finally:
-        client.close(timeout=2)
+        with suppress(Exception):
+            client.close(timeout=2)

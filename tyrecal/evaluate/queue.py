@@ -6,9 +6,10 @@ are those of any other place.
 
 from __future__ import annotations
 
+import signal
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -67,12 +68,15 @@ def jobs_of(settings: Settings) -> Any:
 
     Raises ClusterFailed without the extra.
     """
+    handlers = {each: signal.getsignal(each) for each in (signal.SIGINT, signal.SIGTERM)}
     try:
         import dask
         from dask_jobqueue import PBSCluster, SLURMCluster
         from dask_jobqueue.local import LocalCluster
     except ImportError:
         raise ClusterFailed("clusters need the extra: pip install 'tyrecal[cluster]'") from None
+    for each, handler in handlers.items():  # dask-jobqueue makes Ctrl-C an exit with code 0
+        signal.signal(each, handler)
     given: dict[str, Any] = {
         "cores": settings.cores,
         "processes": settings.cores,
@@ -102,7 +106,11 @@ def reached(scheduler: str) -> Iterator[str]:
         yield scheduler
         return
     settings = read_settings(Path(scheduler))
-    with jobs_of(settings) as cluster:
+    cluster = jobs_of(settings)
+    try:
         jobs = -(-settings.workers // settings.cores)
         cluster.adapt(minimum_jobs=jobs, maximum_jobs=jobs)  # one that ends is submitted anew
         yield cluster.scheduler_address
+    finally:
+        with suppress(Exception):  # jobs that are gone must not hide why we are here
+            cluster.close()
