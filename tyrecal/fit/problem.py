@@ -234,12 +234,18 @@ class Problem:
         self, designs: Sequence[Mapping[str, float]], names: tuple[str, ...] = ()
     ) -> list[Found | EvaluationFailed]:
         """Of each design its evaluation, target modes and margin, or its failure."""
+        return self.modes_of([(design, names) for design in designs])
+
+    def modes_of(
+        self, wanted: Sequence[tuple[Mapping[str, float], tuple[str, ...]]]
+    ) -> list[Found | EvaluationFailed]:
+        """`modes` of designs each with the names of the slopes that are wanted of it."""
         labels = [t.label for t in self.targets]
         answers: dict[int, Found | EvaluationFailed] = {}
-        waiting = list(range(len(designs)))
+        waiting = list(range(len(wanted)))
         for count in (None, *MORE_MODES):
             asked, waiting = waiting, []
-            questions = [Question(designs[i], names, count) for i in asked]
+            questions = [Question(*wanted[i], count) for i in asked]
             jobs = min(self.jobs, len(asked))
             for i, answer in zip(asked, self.door.evaluate_all(questions, jobs), strict=True):
                 if isinstance(answer, EvaluationFailed):
@@ -253,7 +259,7 @@ class Problem:
                     waiting.append(i)
             if not waiting:
                 break
-        return [answers[i] for i in range(len(designs))]
+        return [answers[i] for i in range(len(wanted))]
 
 
 def objective_unit(case: LoadedCase) -> str:
