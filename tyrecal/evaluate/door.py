@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -14,7 +15,7 @@ from ..deck.write import Decks
 from ..effects import catalogue, with_effects
 from . import folders
 from .failure import DeckRefused, EvaluationFailed
-from .pool import process_pool
+from .pool import kept_pool
 from .pressed import Pressed, pressed
 from .results import Evaluation, evaluation
 from .solver import Solver, find_solver
@@ -82,6 +83,12 @@ class Door:
         """Whether the solver gives exact slopes: of a tyre with a splice none does."""
         plain = not with_effects(self.case).case.splice.share
         return plain and "gradients" in self.solver.capabilities
+
+    def has_gradients_at(self, values: Mapping[str, float]) -> bool:
+        """`has_gradients` of the case with values of variables or effects."""
+        other = self.worker()
+        other.case = with_values(self.case, values)
+        return other.has_gradients
 
     def evaluate(self, question: Question) -> Evaluation:
         """Modes of one design, the same from the record as from a run.
@@ -195,6 +202,12 @@ class Door:
         self, questions: Iterable[Question], jobs: int = 1
     ) -> Iterator[Evaluation | EvaluationFailed]:
         """Answers in the order of the questions, failures among them; ``jobs`` at a time."""
+        return _not_refused(self.answer_all(questions, jobs))
+
+    def answer_all(
+        self, questions: Iterable[Question], jobs: int = 1
+    ) -> Iterator[Evaluation | EvaluationFailed | DeckRefused]:
+        """`evaluate_all` with refusals among the answers, instead of raised."""
         return self._each("evaluate", [(question,) for question in questions], jobs)
 
     def press_all(
@@ -205,18 +218,22 @@ class Door:
         modes: int = 0,
     ) -> Iterator[Pressed | EvaluationFailed]:
         """`press` for each design, in their order; ``jobs`` at a time."""
-        return self._each("press", [(values, loads_N, modes) for values in designs], jobs)
+        asked = [(values, loads_N, modes) for values in designs]
+        return _not_refused(self._each("press", asked, jobs))
 
     def _each(self, ask: str, asked: Sequence[tuple[Any, ...]], jobs: int) -> Iterator[Any]:
         if jobs <= 1:
             for arguments in asked:
                 yield _answer(self, ask, arguments)
             return
-        with process_pool(jobs) as pool:
-            tasks = partial(_answer_and_count, self.worker(), ask)
-            for answer, counts in pool.map(tasks, asked):
+        tasks = partial(_answer_and_count, self.worker(), ask)
+        try:
+            for answer, counts in kept_pool(jobs).map(tasks, asked):
                 self.counts.add(counts)
                 yield answer
+        except BrokenProcessPool:
+            kept_pool.cache_clear()
+            raise
 
     def worker(self) -> Door:
         """The same door for another process, with counts of its own."""
@@ -252,11 +269,19 @@ class Door:
 
 
 def _answer(door: Door, ask: str, arguments: tuple[Any, ...]) -> Any:
-    """What the door's method ``ask`` returns, or the failure that it raises."""
+    """What the door's method ``ask`` returns, or the failure or refusal that it raises."""
     try:
         return getattr(door, ask)(*arguments)
-    except EvaluationFailed as failure:
+    except (EvaluationFailed, DeckRefused) as failure:
         return failure
+
+
+def _not_refused(answers: Iterator[Any]) -> Iterator[Any]:
+    """The answers; raises a refusal among them."""
+    for answer in answers:
+        if isinstance(answer, DeckRefused):
+            raise answer
+        yield answer
 
 
 def _answer_and_count(door: Door, ask: str, arguments: tuple[Any, ...]) -> tuple[Any, Counts]:

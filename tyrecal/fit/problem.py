@@ -21,7 +21,7 @@ import numpy as np
 
 from ..case import LoadedCase, start_values
 from ..evaluate.door import Door, Question
-from ..evaluate.failure import EvaluationFailed, SolverUnavailable
+from ..evaluate.failure import DeckRefused, EvaluationFailed, SolverUnavailable
 from ..evaluate.results import Evaluation
 from ..modes.label import paired_labels
 from ..modes.match import LostLabel, margin, match
@@ -233,22 +233,30 @@ class Problem:
     def modes(
         self, designs: Sequence[Mapping[str, float]], names: tuple[str, ...] = ()
     ) -> list[Found | EvaluationFailed]:
-        """Of each design its evaluation, target modes and margin, or its failure."""
-        return self.modes_of([(design, names) for design in designs])
+        """Of each design its evaluation, target modes and margin, or its failure.
+
+        Raises DeckRefused.
+        """
+        found: list[Found | EvaluationFailed] = []
+        for answer in self.modes_of([(design, names) for design in designs]):
+            if isinstance(answer, DeckRefused):
+                raise answer
+            found.append(answer)
+        return found
 
     def modes_of(
         self, wanted: Sequence[tuple[Mapping[str, float], tuple[str, ...]]]
-    ) -> list[Found | EvaluationFailed]:
-        """`modes` of designs each with the names of the slopes that are wanted of it."""
+    ) -> list[Found | EvaluationFailed | DeckRefused]:
+        """`modes` of designs, each with the names of its own slopes, refusals among them."""
         labels = [t.label for t in self.targets]
-        answers: dict[int, Found | EvaluationFailed] = {}
+        answers: dict[int, Found | EvaluationFailed | DeckRefused] = {}
         waiting = list(range(len(wanted)))
         for count in (None, *MORE_MODES):
             asked, waiting = waiting, []
             questions = [Question(*wanted[i], count) for i in asked]
             jobs = min(self.jobs, len(asked))
-            for i, answer in zip(asked, self.door.evaluate_all(questions, jobs), strict=True):
-                if isinstance(answer, EvaluationFailed):
+            for i, answer in zip(asked, self.door.answer_all(questions, jobs), strict=True):
+                if isinstance(answer, EvaluationFailed | DeckRefused):
                     answers[i] = answer
                     continue
                 try:
