@@ -22,6 +22,8 @@ CANDIDATES = 3  # coupled modes looked at for every one wanted
 NEAR = 4  # harmonics beyond the highest wanted whose modes may lie close to wanted ones
 SLIGHT = 1e-6  # share of a mode's energy below which a harmonic does not count for its slopes
 NEGLIGIBLE = 1e-9  # share of the static response that a direction may hold to be left out
+FAR = 9.0  # times the highest eigenvalue looked at: fields beyond it follow almost statically
+MOMENTS = 3  # responses of those, each to the last one's inertia: right to (1 / FAR)^(2 MOMENTS)
 
 
 @dataclass
@@ -50,14 +52,18 @@ class Basis:
                 self.place += [(f, k, c) for k in range(len(family.eigenvalues))]
         self.eigenvalues = np.array([families[f].eigenvalues[k] for f, k, _ in self.place])
 
-    def part(self, f: int, vectors: Array) -> tuple[Array, Array]:
+    def energy(self, vectors: Array) -> Array:
+        """Stiffness energy (families, m), 2 J, of fields given by vectors (fields, m)."""
+        whole = np.zeros((len(self.families), vectors.shape[1]))
+        np.add.at(whole, [f for f, _, _ in self.place], self.eigenvalues[:, None] * vectors**2)
+        return whole
+
+    def part(self, f: int, vectors: Array) -> Array:
         """Of fields given by vectors (fields, m): the shapes (m, nodes, 3) of the f-th family,
-        unit mass as in it, and the stiffness energy (m,) of each, 2 J."""
+        unit mass as in it."""
         rows = [i for i, place in enumerate(self.place) if place[0] == f]
         c = np.array([self.place[i][2] for i in rows])[:, None] * vectors[rows]
-        shapes = self.families[f].shapes[[self.place[i][1] for i in rows]]
-        energy = self.eigenvalues[rows] @ vectors[rows] ** 2
-        return np.tensordot(c.T, shapes, 1), energy
+        return np.tensordot(c.T, self.families[f].shapes[[self.place[i][1] for i in rows]], 1)
 
     def at_zero(self, attached: Attached) -> Array:
         """Displacement (d, fields) of the attached components."""
@@ -90,10 +96,31 @@ def attached_modes(
         families.append(_with_response(vibration, n, own, attached))
     basis = Basis(families)
     p = basis.at_zero(attached)
-    K = np.diag(basis.eigenvalues) + p.T @ (attached.stiffness.real[:, None] * p)
-    M = np.eye(len(K)) + p.T @ (attached.mass.real[:, None] * p)
+    looked = CANDIDATES * len(_seats(harmonics, count)) + 10
+    fewer = _reduced(basis.eigenvalues, p, looked)
+    at = p @ fewer
+    K = fewer.T @ (basis.eigenvalues[:, None] * fewer)
+    K += at.T @ (attached.stiffness.real[:, None] * at)
+    M = np.eye(len(K)) + at.T @ (attached.mass.real[:, None] * at)
     values, vectors = eigh(K, M)
-    return named(basis, values, vectors, harmonics, count, p)
+    return named(basis, values, fewer @ vectors, harmonics, count, p)
+
+
+def _reduced(eigenvalues: Array, p: Array, looked: int) -> Array:
+    """Orthonormal combinations (fields, k) of fields that hold the ``looked`` lowest coupled modes.
+
+    The low fields themselves; of the many high ones D^-1 p^T, D^-2 p^T, ...: Lanczos' vectors of
+    the forces that attached masses and springs exert on them.
+    """
+    limit = FAR * np.sort(eigenvalues)[: looked + 1][-1]
+    low, high = np.flatnonzero(eigenvalues <= limit), np.flatnonzero(eigenvalues > limit)
+    relative = limit / eigenvalues[high, None]
+    moments = np.hstack([relative**k * p[:, high].T for k in range(1, MOMENTS + 1)])
+    rest = np.linalg.qr(moments)[0]
+    whole = np.zeros((len(eigenvalues), len(low) + rest.shape[1]))
+    whole[low, range(len(low))] = 1.0
+    whole[high, len(low) :] = rest
+    return whole
 
 
 def _with_response(vibration: Vibration, n: int, count: int, attached: Attached) -> Family:
@@ -181,18 +208,18 @@ def named(
     result = []
     for n in harmonics:
         mine = told[n]
-        parts = [(f.n, *basis.part(i, vectors[:, mine])) for i, f in enumerate(basis.families)]
-        shapes = next(shapes for m, shapes, _ in parts if m == n)
-        share = np.array([energy for _, _, energy in parts]).T / values[mine][:, None]
+        own = next(i for i, family in enumerate(basis.families) if family.n == n)
+        share = basis.energy(vectors[:, mine]).T / values[mine][:, None]
         mode, which = np.nonzero(share > SLIGHT)
+        parts = {i: basis.part(i, vectors[:, mine]) for i in {own, *which.tolist()}}
         makeup = Parts(
             mode,
-            np.array([parts[i][0] for i in which]),
-            np.array([parts[i][1][j] for j, i in zip(mode, which, strict=True)]),
+            np.array([basis.families[i].n for i in which]),
+            np.array([parts[i][j] for j, i in zip(mode, which.tolist(), strict=True)]),
             values[mine],
             p @ vectors[:, mine],
         )
-        result.append(split(n, values[mine], shapes, makeup))
+        result.append(split(n, values[mine], parts[own], makeup))
     return result
 
 
@@ -204,7 +231,7 @@ def tell(
     held: how much of the plain mode (n, k), k-th of harmonic n, is in each coupled mode (m,)
     by rising frequency.
     """
-    seats = [(n, k) for n in harmonics for k in range(count) for _ in range(2 if n else 1)]
+    seats = _seats(harmonics, count)
     looked = CANDIDATES * len(seats) + 10
     overlap = np.array([held[seat][:looked] for seat in seats])
     _, taken = linear_sum_assignment(overlap, maximize=True)
@@ -214,6 +241,11 @@ def tell(
             places = [int(t) for seat, t in zip(seats, taken, strict=True) if seat == (n, k)]
             told[n] += sorted(places)
     return told
+
+
+def _seats(harmonics: list[int], count: int) -> list[tuple[int, int]]:
+    """Harmonic and place in it of every mode that is wanted, a doublet's twice."""
+    return [(n, k) for n in harmonics for k in range(count) for _ in range(2 if n else 1)]
 
 
 def split(n: int, values: Array, shapes: Array, makeup: Makeup | None = None) -> HarmonicModes:

@@ -201,18 +201,20 @@ def ritz_davidson(
 ) -> tuple[Array, Callable[[int], Array], Array]:
     """Eigenvalues (m,) rising, the fields of the modes, M~-normalised, by their place, and
     (len(start), m): how much of each of the ``start`` fields they hold."""
-    basis: list[Array] = []
-    forces: list[Array] = []
-    inertias: list[Array] = []
-    shape, new = start[0].shape, start
+    shape, new, used = start[0].shape, start, 0
+    room = np.empty((3, len(start) + ROUNDS * wanted, start[0].size))
     for left in reversed(range(ROUNDS + 1)):
         for field in new:
             check()
-            size = np.sqrt((field * fields.inertia(field)).sum())
-            basis.append((field / size).ravel())
-            forces.append(fields.forces(field / size).ravel())
-            inertias.append(fields.inertia(field / size).ravel())
-        V, KV, MV = np.array(basis), np.array(forces), np.array(inertias)
+            inertia = fields.inertia(field)
+            size = np.sqrt((field * inertia).sum())
+            field = field / size
+            for row, values in zip(
+                room[:, used], (field, fields.forces(field), inertia / size), strict=True
+            ):
+                row[:] = values.ravel()
+            used += 1
+        V, KV, MV = room[:, :used]
         K, M = V @ KV.T, V @ MV.T
         gram, turn = np.linalg.eigh((M + M.T) / 2)
         turn = turn[:, gram > INDEPENDENT] / np.sqrt(gram[gram > INDEPENDENT])

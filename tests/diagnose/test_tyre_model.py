@@ -20,6 +20,7 @@ from tyrecal.diagnose.study import BadChange, parse_change, spans_of, study
 from tyrecal.diagnose.tyre_model import TyreModel
 from tyrecal.diagnose.uncertainties import sources
 from tyrecal.evaluate.door import Door
+from tyrecal.evaluate.failure import DeckRefused
 from tyrecal.modes.mode import Label
 
 from ..effects.support import coarse
@@ -219,24 +220,26 @@ def test_sources_of_error_are_those_of_the_case_or_assumed_and_never_calibrated(
     assert "pressure" not in {s.name for s in sources(replace(CASE, case=moved))[0]}
 
 
-def test_an_effect_without_slopes_takes_the_plain_tyres(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A solver that refuses slopes with one effect: the others keep theirs, its shift is exact."""
-    from tyrecal.evaluate.failure import DeckRefused
-    from tyrecal.fit.problem import Problem
+def test_an_effect_without_slopes_takes_the_plain_tyres() -> None:
+    """The solver gives none with a splice: all is asked once, together, and nothing in vain."""
+    door = Door(CASE)
+    splice = Point(X, {"stiffness_splice": 1.0})
+    spans, _ = spans_of(door, ("bead_filler", "stiffness_splice"))
+    own = TyreModel(CASE, door, ROWS[:9], [], spans)
+    found = own.answers([splice, Point(X, {"bead_filler": 1.0})])
+    assert door.counts.runs == 3  # the plain one is the third
+    (plain,) = own.answers([Point(X)])
+    assert isinstance(plain, Answer) and isinstance(found[0], Answer)
+    assert found[0].jacobian == pytest.approx(plain.jacobian, abs=1e-12)
+    assert (found[0].eta > plain.eta).all() and found[0].split[-1] > 0
+    assert isinstance(found[1], Answer) and abs(found[1].jacobian - plain.jacobian).max() > 1e-3
 
-    points = [Point(X), Point(X, {"bead_filler": 1.0}), Point(X, {"tread_density": 0.05})]
-    wanted = [asked(p) for p in points]
-    modes = Problem.modes
 
-    def refusing(self: Problem, designs: list, names: tuple = ()) -> list:
-        if names and any(design.get("effects.bead_filler") for design in designs):
-            raise DeckRefused("no exact derivatives")
-        return modes(self, designs, names)
-
-    monkeypatch.setattr(Problem, "modes", refusing)
-    found = model().answers(points)
-    slopes = (wanted[0], wanted[0], wanted[2])
-    for answer, own, slope in zip(found, wanted, slopes, strict=True):
-        assert isinstance(answer, Answer)
-        assert answer.eta == pytest.approx(own.eta, abs=1e-9)
-        assert answer.jacobian[:-1] == pytest.approx(slope.jacobian[:-1], abs=1e-6)
+def test_a_refusal_with_one_effect_is_that_points_answer() -> None:
+    """Springs and air in the cavity do not go together: the others are answered all the same."""
+    both = Point(X, {"point_mass": 0.05, "cavity_air": 1.0})
+    refused, plain = MODEL.answers([both, Point(X)])
+    assert isinstance(refused, DeckRefused) and isinstance(plain, Answer)
+    with pytest.raises(DeckRefused):
+        other = with_values(CASE, {"effects.cavity_air": 1.0, "effects.point_mass": 0.05})
+        TyreModel(other, Door(other), ROWS, [], {}).answers([Point(X)])

@@ -59,7 +59,7 @@ class FakeDoor:
         self.round: Callable[[np.ndarray], np.ndarray] = lambda f: f  # to a solver's digits
         self.calls, self.jobs = 0, []  # questions; at a time, call by call
 
-    def evaluate_all(
+    def answer_all(
         self, questions: Iterable[Question], jobs: int = 1
     ) -> Iterator[Evaluation | EvaluationFailed]:
         self.jobs.append(jobs)

@@ -106,7 +106,7 @@ def context(case: LoadedCase) -> dict[str, Any]:
         "sectors": c.analysis.sectors,
         "road": {
             "reference_node": ROAD_NODE,
-            "height": max(r for r, _ in mesh.nodes.values()) + CLEARANCE,
+            "height": tables["radius"] + CLEARANCE,
             "angles": c.road.element_angles_deg + c.road.element_angles_deg[::-1],
             "stiffness": c.road.stiffness_Pa_per_m,
             "friction": c.road.friction,
@@ -218,6 +218,7 @@ def _tables(
         "rim": mesh.rim,
         "crown": mesh.crown_outer,
         "reference_node": REFERENCE_NODE,
+        "radius": max(r for r, _ in mesh.nodes.values()),
         "reference_r": reference[0],
         "reference_z": reference[1],
     }

@@ -24,6 +24,7 @@ MASS_STEP = 0.02  # of a logarithm: the mass is linear in areas and densities
 WORTH_A_POOL = 10  # evaluations, for processes to be started
 
 ModelRow = tuple[Label | None, float]
+Key = tuple[bytes, tuple[tuple[str, float], ...], bool]  # of a point
 
 
 class TyreModel:
@@ -65,8 +66,7 @@ class TyreModel:
         self.spread = np.array(wide) / sqrt(12)  # of a uniform distribution within the bounds
         self._plain = values_of(case, found)
         self._plain.setdefault("pressure_kPa", case.case.pressure_kPa)
-        self._slopeless: set[str] = set()
-        self._plain_slopes: dict[bytes, Answer | Exception] = {}
+        self._slopeless = {id for id, span in spans.items() if not self._has_slopes(id, span)}
         self._mass: tuple[Array, Array, Array] | None = None
 
     def values(self, x: Array) -> dict[str, float]:
@@ -77,93 +77,92 @@ class TyreModel:
         }
 
     def answers(self, points: Sequence[Point]) -> list[Answer | Exception]:
-        """Each point at every pressure, ``jobs`` evaluations at a time."""
-        results: list[Answer | Exception] = [None] * len(points)  # type: ignore[list-item]
-        for constants in (False, True):
-            chosen = [i for i, point in enumerate(points) if point.constants == constants]
-            if chosen:
-                for i, answer in zip(chosen, self._ask([points[i] for i in chosen]), strict=True):
-                    results[i] = answer
-        for i, point in enumerate(points):
-            answer = results[i]
-            if point.constants and isinstance(answer, Answer):
-                results[i] = self._with_finite(point, answer)
-        return results
+        """Each point at every pressure, all in one batch, ``jobs`` evaluations at a time.
+
+        A plain point that the solver refuses raises DeckRefused. With an effect that it gives no
+        slopes with, the plain tyre's at the same x stand for them. Slopes by sources that are
+        effects: one step of each, one way.
+        """
+        bare = [p for p in points if self._is_bare(p)]
+        stepped = [p for p in points if p.constants]
+        steps = [(k, path.removeprefix(EFFECTS), step) for k, source in enumerate(self.found)
+                 for path, step in source.steps.items() if path.startswith(EFFECTS)]  # fmt: skip
+        asked = dict.fromkeys(map(_key, points))
+        asked |= dict.fromkeys(_key(Point(p.x)) for p in bare)
+        asked |= dict.fromkeys(_key(Point(p.x, {id: e})) for p in stepped for _, id, e in steps)
+        known = dict(zip(asked, self._evaluated([_point(key) for key in asked]), strict=True))
+        return [self._completed(point, known, steps) for point in points]
+
+    def _completed(
+        self,
+        point: Point,
+        known: Mapping[Key, Answer | Exception],
+        steps: Sequence[tuple[int, str, float]],
+    ) -> Answer | Exception:
+        """The answer with what other points have to say about its slopes."""
+        answer = known[_key(point)]
+        if isinstance(answer, Answer) and self._is_bare(point):
+            plain = known[_key(Point(point.x))]
+            if not isinstance(plain, Answer):
+                return plain
+            answer = replace(answer, jacobian=plain.jacobian)
+        if not point.constants or not isinstance(answer, Answer):
+            return answer
+        assert answer.constants is not None
+        constants = answer.constants.copy()
+        for k, id, e in steps:
+            other = known[_key(Point(point.x, {id: e}))]
+            if not isinstance(other, Answer):
+                return other
+            constants[:, k] += other.eta - answer.eta
+        return replace(answer, constants=constants)
+
+    def _has_slopes(self, id: str, span: Span) -> bool:
+        """Whether the solver gives slopes with an effect."""
+        try:
+            return self.door.has_gradients_at({EFFECTS + id: span.high or span.low})
+        except ValueError:  # the case cannot have that much of it
+            return True
+
+    def _is_bare(self, point: Point) -> bool:
+        return not self._slopeless.isdisjoint(point.effects)
 
     def _scaled(self, name: str, value: float) -> float:
         v = self._variables[name]
         return log(value) if v.scale == "log" else (value - v.lower) / (v.upper - v.lower)
 
-    def _ask(self, points: Sequence[Point]) -> list[Answer | Exception]:
-        """Points that all want slopes by constants, or none of them."""
-        smooth = [p for p in points if not self._slopeless & set(p.effects)]
-        try:
-            answers = iter(self._evaluated(smooth, self.pressures) if smooth else [])
-        except DeckRefused:
-            if not self._find_slopeless(smooth):
-                raise
-            return self._ask(points)
-        return [
-            self._without_slopes(p) if self._slopeless & set(p.effects) else next(answers)
-            for p in points
-        ]
-
-    def _find_slopeless(self, points: Sequence[Point]) -> bool:
-        """Learn which effects the solver gives no slopes with; whether there are any."""
-        before = len(self._slopeless)
-        for point in {frozenset(p.effects): p for p in points if p.effects}.values():
-            try:
-                self._evaluated([point], self.pressures[:1])
-            except DeckRefused:
-                self._slopeless |= set(point.effects)
-        return len(self._slopeless) > before
-
-    def _without_slopes(self, point: Point) -> Answer | Exception:
-        """Frequencies with an effect that the solver gives no slopes with: the plain tyre's, at
-        the same x, stand for them."""
-        key = point.x.tobytes()
-        if key not in self._plain_slopes:
-            self._plain_slopes = {key: self._evaluated([Point(point.x)], self.pressures)[0]}
-        plain = self._plain_slopes[key]
-        try:
-            (answer,) = self._evaluated([point], self.pressures, exact=False)
-        except DeckRefused as refused:
-            return refused
-        if isinstance(answer, Answer) and isinstance(plain, Answer):
-            return replace(answer, jacobian=plain.jacobian)
-        return plain if isinstance(answer, Answer) else answer
-
-    def _evaluated(
-        self, points: Sequence[Point], pressures: Sequence[float], exact: bool = True
-    ) -> list[Answer | Exception]:
-        constants = points[0].constants
-        paths = list(self._plain) if constants else []
-        designs = []
-        for point, pressure in product(points, pressures):
+    def _evaluated(self, points: Sequence[Point]) -> list[Answer | Exception]:
+        """Distinct points, slopes with those that have them."""
+        wanted = []
+        for point, pressure in product(points, self.pressures):
             effects = {EFFECTS + id: float(e) for id, e in point.effects.items()}
-            known = dict(self._plain) if constants else {}
-            designs.append({**self.values(point.x), **known, "pressure_kPa": pressure, **effects})
-        found = self._modes(designs, (*self.variables, *paths) if exact else ())
-        per = len(pressures)
-        if per < len(self.pressures):  # only asked whether there are slopes
-            return []
-        return [self._answer(p, designs[i * per : (i + 1) * per], found[i * per : (i + 1) * per])
-                for i, p in enumerate(points)]  # fmt: skip
+            known = dict(self._plain) if point.constants else {}
+            names = () if self._is_bare(point) else (*self.variables, *known)
+            design = {**self.values(point.x), **known, "pressure_kPa": pressure, **effects}
+            wanted.append((design, names))
+        found = self._modes(wanted)
+        per, results = len(self.pressures), []
+        for i, point in enumerate(points):
+            here = slice(i * per, (i + 1) * per)
+            results.append(self._answer(point, [design for design, _ in wanted[here]], found[here]))
+        return results
 
     def _modes(
-        self, designs: list[dict[str, float]], names: tuple[str, ...] = ()
-    ) -> list[fit.Found | EvaluationFailed]:
-        self._fit.jobs = self.jobs if len(designs) >= WORTH_A_POOL else 1
-        return self._fit.modes(designs, names)
+        self, wanted: Sequence[tuple[dict[str, float], tuple[str, ...]]]
+    ) -> list[fit.Found | EvaluationFailed | DeckRefused]:
+        self._fit.jobs = self.jobs if len(wanted) >= WORTH_A_POOL else 1
+        return self._fit.modes_of(wanted)
 
     def _answer(
         self,
         point: Point,
         designs: list[dict[str, float]],
-        found: list[fit.Found | EvaluationFailed],
+        found: Sequence[fit.Found | EvaluationFailed | DeckRefused],
     ) -> Answer | Exception:
         for each in found:
-            if isinstance(each, EvaluationFailed):
+            if isinstance(each, DeckRefused) and not point.effects:
+                raise each
+            if isinstance(each, EvaluationFailed | DeckRefused):
                 return each
         at = dict(zip(self.pressures, zip(designs, found, strict=True), strict=True))
         eta, jacobian = np.zeros(len(self.rows)), np.zeros((len(self.rows), len(self.variables)))
@@ -194,22 +193,6 @@ class TyreModel:
         v = self._variables[name]
         return design[name] if v.scale == "log" else v.upper - v.lower
 
-    def _with_finite(self, point: Point, answer: Answer) -> Answer | Exception:
-        """Sources that are effects: one step of each, one way."""
-        steps = [
-            (k, path.removeprefix(EFFECTS), step)
-            for k, source in enumerate(self.found)
-            for path, step in source.steps.items()
-            if path.startswith(EFFECTS)
-        ]
-        assert answer.constants is not None
-        stepped = self.answers([Point(point.x, {id: step}) for _, id, step in steps])
-        for (k, _, _), other in zip(steps, stepped, strict=True):
-            if isinstance(other, Exception):
-                return other
-            answer.constants[:, k] += other.eta - answer.eta
-        return answer
-
     def _mass_slopes(self, x: Array) -> tuple[Array, Array]:
         """d ln mass by x (v,) and by the sources of error (k,).
 
@@ -223,9 +206,9 @@ class TyreModel:
                 steps = {k: s for k, s in source.steps.items() if not k.startswith(EFFECTS)}
                 steps.pop("pressure_kPa", None)
                 designs.append({**own, **{k: own[k] + s for k, s in steps.items()}})
-            found = self._modes(designs)
+            found = self._modes([(design, ()) for design in designs])
             for each in found:
-                if isinstance(each, EvaluationFailed):
+                if isinstance(each, EvaluationFailed | DeckRefused):
                     raise each
             mass = np.array([each[0].mass_kg for each in found])  # type: ignore[index]
             count, ratio = len(x), mass[1:] / mass[0]
@@ -241,6 +224,15 @@ class TyreModel:
         step = after - before
         log_scaled = [v.scale == "log" for v in self._variables.values()]
         return np.where(log_scaled, np.expm1(step), step)
+
+
+def _key(point: Point) -> Key:
+    """What tells two points apart."""
+    return point.x.tobytes(), tuple(point.effects.items()), point.constants
+
+
+def _point(key: Key) -> Point:
+    return Point(np.frombuffer(key[0]), dict(key[1]), key[2])
 
 
 def _asked_for(case: LoadedCase, labels: Sequence[Label]) -> LoadedCase:

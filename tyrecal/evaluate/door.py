@@ -91,6 +91,12 @@ class Door:
         plain = not with_effects(self.case).case.splice.share
         return plain and "gradients" in self.solver.capabilities
 
+    def has_gradients_at(self, values: Mapping[str, float]) -> bool:
+        """`has_gradients` of the case with values of variables or effects."""
+        other = self.worker()
+        other.case = with_values(self.case, values)
+        return other.has_gradients
+
     def evaluate(self, question: Question) -> Evaluation:
         """Modes of one design, the same from the record as from a run.
 
@@ -203,6 +209,12 @@ class Door:
         self, questions: Iterable[Question], jobs: int = 1
     ) -> Iterator[Evaluation | EvaluationFailed]:
         """Answers in the order of the questions, failures among them; ``jobs`` at a time."""
+        return _not_refused(self.answer_all(questions, jobs))
+
+    def answer_all(
+        self, questions: Iterable[Question], jobs: int = 1
+    ) -> Iterator[Evaluation | EvaluationFailed | DeckRefused]:
+        """`evaluate_all` with refusals among the answers, instead of raised."""
         return self._each("evaluate", [(question,) for question in questions], jobs)
 
     def press_all(
@@ -213,7 +225,8 @@ class Door:
         modes: int = 0,
     ) -> Iterator[Pressed | EvaluationFailed]:
         """`press` for each design, in their order; ``jobs`` at a time."""
-        return self._each("press", [(values, loads_N, modes) for values in designs], jobs)
+        asked = [(values, loads_N, modes) for values in designs]
+        return _not_refused(self._each("press", asked, jobs))
 
     def _each(self, ask: str, asked: Sequence[tuple[Any, ...]], jobs: int) -> Iterator[Any]:
         self.heard(0, len(asked))
@@ -269,11 +282,19 @@ class Door:
 
 
 def _answer(door: Door, ask: str, arguments: tuple[Any, ...]) -> Any:
-    """What the door's method ``ask`` returns, or the failure that it raises."""
+    """What the door's method ``ask`` returns, or the failure or refusal that it raises."""
     try:
         return getattr(door, ask)(*arguments)
-    except EvaluationFailed as failure:
+    except (EvaluationFailed, DeckRefused) as failure:
         return failure
+
+
+def _not_refused(answers: Iterator[Any]) -> Iterator[Any]:
+    """The answers; raises a refusal among them."""
+    for answer in answers:
+        if isinstance(answer, DeckRefused):
+            raise answer
+        yield answer
 
 
 def _answer_and_count(door: Door, ask: str, arguments: tuple[Any, ...]) -> tuple[Any, Counts]:

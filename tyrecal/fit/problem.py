@@ -21,7 +21,7 @@ import numpy as np
 
 from ..case import LoadedCase, start_values
 from ..evaluate.door import Door, Question
-from ..evaluate.failure import EvaluationFailed, SolverUnavailable
+from ..evaluate.failure import DeckRefused, EvaluationFailed, SolverUnavailable
 from ..evaluate.results import Evaluation
 from ..modes.label import paired_labels
 from ..modes.match import LostLabel, margin, match
@@ -233,16 +233,30 @@ class Problem:
     def modes(
         self, designs: Sequence[Mapping[str, float]], names: tuple[str, ...] = ()
     ) -> list[Found | EvaluationFailed]:
-        """Of each design its evaluation, target modes and margin, or its failure."""
+        """Of each design its evaluation, target modes and margin, or its failure.
+
+        Raises DeckRefused.
+        """
+        found: list[Found | EvaluationFailed] = []
+        for answer in self.modes_of([(design, names) for design in designs]):
+            if isinstance(answer, DeckRefused):
+                raise answer
+            found.append(answer)
+        return found
+
+    def modes_of(
+        self, wanted: Sequence[tuple[Mapping[str, float], tuple[str, ...]]]
+    ) -> list[Found | EvaluationFailed | DeckRefused]:
+        """`modes` of designs, each with the names of its own slopes, refusals among them."""
         labels = [t.label for t in self.targets]
-        answers: dict[int, Found | EvaluationFailed] = {}
-        waiting = list(range(len(designs)))
+        answers: dict[int, Found | EvaluationFailed | DeckRefused] = {}
+        waiting = list(range(len(wanted)))
         for count in (None, *MORE_MODES):
             asked, waiting = waiting, []
-            questions = [Question(designs[i], names, count) for i in asked]
+            questions = [Question(*wanted[i], count) for i in asked]
             jobs = min(self.jobs, len(asked))
-            for i, answer in zip(asked, self.door.evaluate_all(questions, jobs), strict=True):
-                if isinstance(answer, EvaluationFailed):
+            for i, answer in zip(asked, self.door.answer_all(questions, jobs), strict=True):
+                if isinstance(answer, EvaluationFailed | DeckRefused):
                     answers[i] = answer
                     continue
                 try:
@@ -253,7 +267,7 @@ class Problem:
                     waiting.append(i)
             if not waiting:
                 break
-        return [answers[i] for i in range(len(designs))]
+        return [answers[i] for i in range(len(wanted))]
 
 
 def objective_unit(case: LoadedCase) -> str:

@@ -1,0 +1,108 @@
+"""Time of one diagnosis, all effects and pairs, and what it asks the solver for.
+
+    OPENBLAS_NUM_THREADS=1 python -m tests.benchmarks.diagnosis            # counts, times by kind
+    OPENBLAS_NUM_THREADS=1 python -m tests.benchmarks.diagnosis --jobs 2   # wall time on two cores
+
+Without ``--measured FILE`` the measurements are the model's own at three pressures, a bead filler
+1.5 times as stiff in it. Nothing is recorded, and nothing comes from the record.
+"""
+
+from __future__ import annotations
+
+import resource
+import time
+from collections import Counter, defaultdict
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import click
+import numpy as np
+
+from tyrecal.case import LoadedCase, load_case, start_values
+from tyrecal.diagnose.study import study
+from tyrecal.evaluate.door import Door, Question
+from tyrecal.evaluate.results import Evaluation
+from tyrecal.modes.label import paired_labels
+
+CASE = Path(__file__).parents[2] / "cases" / "p235_75r17.yaml"
+PRESSURES_kPa, EFFECT, SIZE, SCATTER = (160.0, 240.0, 320.0), "bead_filler", 0.5, 0.002
+
+
+class Watched(Door):
+    """A door that notes how often what was asked in this process, and for how long."""
+
+    def __post_init__(self) -> None:
+        self.count: Counter[str] = Counter()
+        self.seconds: defaultdict[str, float] = defaultdict(float)
+
+    def evaluate(self, question: Question) -> Evaluation:
+        """As `Door.evaluate`."""
+        start = time.process_time()
+        try:
+            return super().evaluate(question)
+        finally:
+            effects = [path[8:] for path in question.values if path.startswith("effects.")]
+            kind = "+".join(sorted(effects)) or "plain"
+            kind += f", slopes by {len(question.gradients)}" if question.gradients else ""
+            highest = self.case.case.analysis.highest_harmonic
+            kind += (
+                f", up to n = {highest}" if highest > LOADED.case.analysis.highest_harmonic else ""
+            )
+            self.count[kind] += 1
+            self.seconds[kind] += time.process_time() - start
+
+    def worker(self) -> Door:
+        """Counts with this one, where it stays in this process."""
+        other = Watched(self.case, self.solver_name)
+        other.count, other.seconds = self.count, self.seconds
+        return other
+
+
+LOADED = load_case(CASE)
+HARMONICS = LOADED.case.analysis.highest_harmonic
+
+
+def made(case: LoadedCase, path: Path) -> Path:
+    """A file of measurements: the model's own with an effect and scatter."""
+    random, door = np.random.default_rng(1), Door(case)
+    wanted = {(t.c, t.m, t.kind) for t in case.case.targets.modes} if case.case.targets else set()
+    lines = ["quantity,c,m,kind,member,pressure_kPa,load_N,value,sigma"]
+    for p in PRESSURES_kPa:
+        values = {**start_values(case), "pressure_kPa": p, f"effects.{EFFECT}": SIZE}
+        for mode in paired_labels(door.evaluate(Question(values)).modes):
+            x = mode.label
+            if (x.c, x.m, x.kind) in wanted:
+                f = mode.frequency_Hz * float(np.exp(SCATTER * random.normal()))
+                place = f"{x.c},{x.m},{x.kind or ''},,{p:g}"
+                lines.append(f"frequency_Hz,{place},0,{f:.3f},{SCATTER * f:.3f}")
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+@click.command()
+@click.option("--measured", type=click.Path(path_type=Path, exists=True, dir_okay=False))
+@click.option("--jobs", default=1, show_default=True)
+def main(measured: Path | None, jobs: int) -> None:
+    """Diagnose once and print how long it took."""
+    with TemporaryDirectory() as folder:
+        measured = measured or made(LOADED, Path(folder) / "measured.csv")
+        door = Watched(LOADED) if jobs == 1 else Door(LOADED)
+        wall, start = time.perf_counter(), time.process_time()
+        found = study(LOADED, door, measured, jobs=jobs)
+        wall, own = time.perf_counter() - wall, time.process_time() - start
+    children = resource.getrusage(resource.RUSAGE_CHILDREN)
+    if isinstance(door, Watched):
+        print("| asked | evaluations | processor time, s | each, s |\n|---|---|---|---|")
+        for kind, seconds in sorted(door.seconds.items(), key=lambda item: -item[1]):
+            count = door.count[kind]
+            print(f"| {kind} | {count} | {seconds:.2f} | {seconds / count:.3f} |")
+        asked = sum(door.seconds.values())
+        print(f"| all | {sum(door.count.values())} | {asked:.1f} | |")
+        print(f"\nthe rest, mostly evidence: {own - asked:.1f} s")
+    workers = children.ru_utime + children.ru_stime
+    print(f"wall {wall:.1f} s, processor time {own:.1f} s here, {workers:.1f} s in other processes")
+    print(f"solver runs: {door.counts.runs}; verdict: {found.diagnosis.verdict.kind}")
+
+
+if __name__ == "__main__":
+    main()
