@@ -53,9 +53,18 @@ def test_a_law_does_what_the_catalogue_s_does_by_another_way(id: str) -> None:
         assert own @ theirs > 0.6 * np.linalg.norm(own) * np.linalg.norm(theirs)
 
 
-@pytest.mark.parametrize("name", sorted(FAMILIES))
+@pytest.mark.parametrize("name", sorted(name for name, law in FAMILIES.items() if not law.read))
 def test_a_family_moves_frequencies(name: str) -> None:
     assert abs(ln_f(FAMILIES[name].add(AT, FAMILIES[name].high)) - PLAIN).max() > 2e-3
+
+
+def test_a_resonance_of_the_stand_is_read_at_every_pressure() -> None:
+    law, stood, other = FAMILIES["stand_resonance"], Label(1, 0), Label(2, 0)
+    heard = {p: {stood: (np.log(p), np.log(p)), other: (5.0, 5.1)} for p in (160.0, 240.0, 320.0)}
+    assert law.add(AT, 0.1) is AT and law.read
+    read = law.read(heard, 0.1)
+    assert all(ln_f[stood] == pytest.approx([np.log(264.0)] * 2) for ln_f in read.values())
+    assert all(ln_f[other] == (5.0, 5.1) for ln_f in read.values())
 
 
 def test_a_divided_region_is_the_same_tyre() -> None:
