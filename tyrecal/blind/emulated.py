@@ -6,7 +6,7 @@ About the centre x0, with t = (x - x0) / reach, |t| <= 1:
 
 q_k: monomials, fitted by least squares to values and Jacobians at designs of a Halton sequence;
 L_j: Lagrange's polynomials of the effect's nodes, 0 among them. Changes by the sources of error
-likewise. What lies outside the box is asked of the model itself.
+likewise. Beyond the box the model goes straight on, with the slopes at its nearest point.
 """
 
 from __future__ import annotations
@@ -64,7 +64,8 @@ class Grown:
 
 
 class Emulated:
-    """A `Response` that stands for ``model`` within ``reach`` of its start."""
+    """A `Response` that stands for ``model`` within ``reach`` of its start, and for a straight one
+    beyond."""
 
     def __init__(self, model: Response, designs: Sequence[Array], reach: float, plain: Polynomial,
                  constants: Polynomial, effects: Mapping[str, Grown]):  # fmt: skip
@@ -75,18 +76,15 @@ class Emulated:
         self._plain, self._constants, self._effects = plain, constants, effects
 
     def answers(self, points: Sequence[Point]) -> list[Answer | Exception]:
-        """From the polynomials where they reach, from the model elsewhere."""
-        far = [i for i, point in enumerate(points) if not self._near(point)]
+        """From the polynomials; from the model where an effect has none."""
+        far = [i for i, point in enumerate(points) if not set(point.effects) <= set(self._effects)]
         asked = self.model.answers([points[i] for i in far]) if far else []
         known = dict(zip(far, asked, strict=True))
         return [known[i] if i in known else self._answer(p) for i, p in enumerate(points)]
 
-    def _near(self, point: Point) -> bool:
-        inside = abs(point.x - self.start).max() <= self.reach
-        return bool(inside) and set(point.effects) <= set(self._effects)
-
     def _answer(self, point: Point) -> Answer:
-        t = (point.x - self.start) / self.reach
+        there = (point.x - self.start) / self.reach
+        t = np.clip(there, -1.0, 1.0)
         eta, slope = self._plain.at(t)
         split = np.zeros(len(eta))
         for id, e in point.effects.items():
@@ -95,7 +93,7 @@ class Emulated:
         constants = None
         if point.constants:
             constants = self._constants.at(t)[0].reshape(len(eta), -1)
-        return Answer(eta, slope / self.reach, split, constants)
+        return Answer(eta + slope @ (there - t), slope / self.reach, split, constants)
 
 
 def emulate(model: Response, reach: float = REACH) -> Emulated:
