@@ -235,7 +235,7 @@ class Analysis:
             plain = Vibration(still, self.U, _loads(still, step), equations, 0.0).factor(0)
             newton = plain.tyre if isinstance(plain, Bordered) else plain
         rates: dict[str, list[Array]] = {}
-        strains: sensitivity.Strains = {}
+        strains: sensitivity.Strains = []
         for variable, tangents in self.request.sensitivities.items():
             rates[variable] = self._rates(
                 tangents, place, dynamic_Hz, newton, equations, modes, strains
@@ -350,7 +350,9 @@ class Analysis:
             rim, flow = [q for m in modes for q in m.rim], [w for m in modes for w in m.air]
             beside = sensitivity.Beside(wheel, air, rim, flow)
         asked = [m.forms() for m in modes]
-        n, shapes, eigenvalues = (np.concatenate(part) for part in zip(*asked, strict=True))
+        n, shapes, owner, eigenvalues = (np.concatenate(x) for x in zip(*asked, strict=True))
+        ends = np.cumsum([len(values) for *_, values in asked])
+        owner += np.repeat([0, *ends[:-1]], [len(own) for _, _, own, _ in asked])
         forms = sensitivity.eigenvalue_rates(
             moving,
             self.U,
@@ -361,11 +363,12 @@ class Analysis:
             eigenvalues,
             strains,
             beside,
+            owner,
         )
         attached = read_attached(self.deck.revolve, self.model.mesh)
         spin = _uniform(self.model, step, step.spin, "ROTDYNF")
         change = Change(moving, spin, attached)
-        each = np.split(forms, np.cumsum([len(part[0]) for part in asked])[:-1])
+        each = np.split(forms, ends[:-1])
         return [
             m.makeup.rates(own_forms, change) if m.makeup else own_forms
             for m, own_forms in zip(modes, each, strict=True)

@@ -9,8 +9,8 @@ with its number p + i h dp, at the state u + i h v; no second derivative is writ
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -37,7 +37,25 @@ def state_rate(
     return numbering.spread(-factor.solve(rate))
 
 
-Strains = dict[int, tuple[Array, tuple[Array, Array]]]
+Strains = list[tuple[Array, Array, Array]]
+
+
+@dataclass(frozen=True)
+class Fields:
+    """Shapes a + i b (p, nodes, 3) of harmonics n (p,): what the modes ``owner`` (p,), 0 to
+    ``count`` less 1, are sums of."""
+
+    n: Array
+    real: Array
+    imag: Array
+    owner: Array
+    count: int
+
+    def of_each_mode(self) -> Iterator[tuple[int, Array, Array, Array]]:
+        """Place of a mode; n, a and b of its parts."""
+        for j in range(self.count):
+            mine = np.flatnonzero(self.owner == j)
+            yield j, self.n[mine], self.real[mine], self.imag[mine]
 
 
 def eigenvalue_rates(
@@ -50,26 +68,30 @@ def eigenvalue_rates(
     eigenvalues: Array,
     strains: Strains | None = None,
     beside: Beside | None = None,
+    owner: Array | None = None,
 ) -> Array:
-    """d lambda/dp (m,) of modes with harmonics n (m,), shapes (m, nodes, 3), lambda (m,).
+    """d lambda/dp (m,) of modes lambda (m,), sums of shapes (p, nodes, 3) of harmonics n (p,).
 
-    ``model`` and ``loads`` carry the tangent of p, V = dU/dp. ``strains`` remembers the modes'
-    displacement gradients in the rubber from one variable to the next; empty at first.
+    ``owner`` (p,): the mode that each is part of; None: each is a mode. ``model`` and ``loads``
+    carry the tangent of p, V = dU/dp. ``strains`` remembers what the modes' gradients give from
+    one variable to the next; empty at first.
     ``beside``: the rim and the air that move along. Where the model has laws of frequency, lambda
     changes its own modulus: d lambda/dp = (d lambda/dp at that modulus) / (1 - d lambda/d rho
     d rho/d lambda).
     """
-    strains = {} if strains is None else strains
+    strains = [] if strains is None else strains
     state = U + 1j * STEP * V
     real, imag = shapes.real, shapes.imag
     if beside and beside.wheel:
         real, imag = beside.carried(model.mesh.X, n, real, imag)
-    total = np.zeros(len(n), complex)
+    owner = np.arange(len(n)) if owner is None else owner
+    fields = Fields(n, real, imag, owner, len(eigenvalues))
+    total = np.zeros(len(eigenvalues), complex)
     for r in model.rubbers:
-        total += _rubber_form(r, state, n, real, imag, strains)
+        total += _rubber_form(r, state, fields, strains)
     own = 1.0
     for law, softer in zip(model.laws, stiffened(model), strict=True):
-        form = sum(_rubber_form(r, state, n, real, imag, strains) for r in softer.rubbers)
+        form = sum(_rubber_form(r, state, fields, strains) for r in softer.rubbers)
         hertz = np.sqrt(eigenvalues) / (2 * np.pi)
         ratio = np.array([law.ratio(f) for f in hertz])
         total += (ratio - 1) * form
@@ -79,19 +101,16 @@ def eigenvalue_rates(
     for c in model.cords:
         D = cords.tangent(mechanics.cord_vectors(c, state), c.stiffness)
         D = D.reshape(*c.lines.R.shape, 3, 3) * (c.lines.weights * c.lines.R)[..., None, None]
-        for q in _gradients(c.b0, c.hoop, c.lines.connectivity, real, imag, n):
-            total += _contract(D, q)
+        total += _contract(D, _products(c.b0, c.hoop, c.lines.connectivity, fields, strains))
     for load in loads:
-        total += _pressure_form(model, state, load, n, real, imag)
-    for connectivity, M in mechanics.mass_matrices(model) if model.spin2 else ():
-        for part in (real, imag):
-            u = part[:, connectivity] @ pressure.IN_PLANE
-            total -= model.spin2 * np.einsum("meai,meai->m", np.matmul(M, u), u)
-    for connectivity, M in mechanics.mass_matrices(model):
-        if np.iscomplexobj(M) or np.iscomplexobj(real):
-            for part in (real, imag):
-                u = part[:, connectivity]
-                total -= eigenvalues * np.einsum("meai,meai->m", np.matmul(M, u), u)
+        total += _pressure_form(model, state, load, fields)
+    M = mechanics.mass(model)
+    if any(map(np.iscomplexobj, (M.data, real, model.spin2))):
+        for j, _, a, b in fields.of_each_mode():
+            u = np.moveaxis(np.concatenate([a, b]), 0, -1)  # (nodes, 3, parts)
+            energy = np.array([((M @ u[:, i]) * u[:, i]).sum() for i in range(3)])
+            in_plane = energy @ np.diag(pressure.IN_PLANE)
+            total[j] -= eigenvalues[j] * energy.sum() + model.spin2 * in_plane
     if beside:
         total += beside.forms(model, state, loads, n, real, imag, eigenvalues)
     return total.imag / STEP / own
@@ -147,27 +166,45 @@ class Beside:
         return total
 
 
-def _rubber_form(
-    r: Rubber, state: Array, n: Array, real: Array, imag: Array, strains: Strains
-) -> Array:
+def _rubber_form(r: Rubber, state: Array, fields: Fields, strains: Strains) -> Array:
     """phi^H K phi (m,) of a block of rubber."""
     s = r.solids
     A = rubber.tangent(mechanics.deformation(s, state), r.material, s.weights.ravel())
     A = A.reshape(*s.weights.shape, 9, 9)
-    key = id(s.B0)
-    if key not in strains:
-        strains[key] = s.B0, _gradients(s.B0, s.hoop, s.connectivity, real, imag, n)
-    total = sum(_contract(A, H) for H in strains[key][1])
+    total = _contract(A, _products(s.B0, s.hoop, s.connectivity, fields, strains))
     if s.hourglass is not None:
-        for part in (real, imag):
-            strain = np.einsum("ea,meai->mei", s.hourglass, part[:, s.connectivity])
-            total = total + (strain**2).sum(2) @ r.hourglass_stiffness
-    return np.asarray(total)
+        for j, _, a, b in fields.of_each_mode():
+            for part in (a, b):
+                strain = np.einsum("ea,meai->mei", s.hourglass, part[:, s.connectivity])
+                total[j] += (strain**2).sum((0, 2)) @ r.hourglass_stiffness
+    return total
 
 
-def _contract(A: Array, H: Array) -> Array:
-    """sum over Gauss points of H.A.H per mode; A (e, g, k, k), H (e, g, k, m)."""
-    return (np.matmul(A, H) * H).sum((0, 1, 2))
+def _contract(A: Array, G: Array) -> Array:
+    """sum over Gauss points of A : G per mode; A (e, g, k, k), G (m, e, g, k, k)."""
+    G, A = G.reshape(len(G), -1), A.reshape(-1)
+    if np.iscomplexobj(G):
+        return np.asarray(G @ A)
+    return np.asarray(G @ A.real + 1j * (G @ A.imag))
+
+
+def _products(
+    B0: Array, hoop: Array, connectivity: Array, fields: Fields, strains: Strains
+) -> Array:
+    """G = sum of H H^T over a mode's parts, real and imaginary (m, e, g, k, k), H its gradients:
+    the sum of all H^T A H is A : G. Operators with a tangent are one variable's, the others all's.
+    """
+    for operator, around, known in strains:
+        if operator is B0 or (np.array_equal(operator, B0) and np.array_equal(around, hoop)):
+            return known
+    e, g, k, _ = B0.shape
+    G = np.empty((fields.count, e, g, k, k), np.result_type(B0, hoop, fields.real))
+    for j, n, a, b in fields.of_each_mode():
+        H = np.concatenate(_gradients(B0, hoop, connectivity, a, b, n), -1)
+        np.matmul(H, H.swapaxes(-1, -2), out=G[j])
+    if not np.iscomplexobj(G):
+        strains.append((B0, hoop, G))
+    return G
 
 
 def _gradients(
@@ -189,25 +226,18 @@ def _gradients(
     return H_real, H_imag
 
 
-def _pressure_form(
-    model: Model, state: Array, load: Load, n: Array, real: Array, imag: Array
-) -> Array:
-    """Second variation of -p V for each shape (m,); see `pressure`."""
-    lines = load.lines
-    x, dx = mechanics.surface_point(model.mesh.X, lines, state)
-    y, d = x @ pressure.IN_PLANE, x @ pressure.SPIN.T
-    u, du = [], []
-    for part in (real, imag):
-        nodal = part[:, lines.connectivity]
-        u.append(np.einsum("ga,meai->megi", lines.N, nodal))
-        du.append(np.einsum("ega,meai->megi", lines.slope, nodal))
-    turn = n[:, None, None, None]
-    Du = [u[0] @ pressure.SPIN.T - turn * u[1], u[1] @ pressure.SPIN.T + turn * u[0]]
-    form: Any = 0.0
-    for a, da, Da in zip(u, du, Du, strict=True):
-        density = ((a @ pressure.IN_PLANE) * (pressure.cross(dx, Da) - pressure.cross(d, da))).sum(
-            -1
+def _pressure_form(model: Model, state: Array, load: Load, fields: Fields) -> Array:
+    """phi^H K phi (m,) of a follower pressure; its K0 is symmetric, its K1 antisymmetric:
+    (a - i b)^T (K0 + i n K1) (a + i b) = K0 : (a a^T + b b^T) + K1 : n (b a^T - a b^T)."""
+    alone = replace(model, rubbers=[], cords=[], spin2=0.0)
+    (_, K0), (_, K1) = (parts[0] for parts in mechanics.tangents(alone, state, [load], True)[:2])
+    rows = load.lines.connectivity
+    total = np.zeros(fields.count, complex)
+    for j, n, real, imag in fields.of_each_mode():
+        a, b = (
+            np.moveaxis(part[:, rows].reshape(len(n), *K0.shape[:2]), 0, -1)
+            for part in (real, imag)
         )
-        density = density - (da * pressure.cross(y, Da)).sum(-1)
-        form = form + (density * lines.weights).sum((1, 2))
-    return -load.pressure * form
+        at, bt = a.swapaxes(1, 2), b.swapaxes(1, 2)
+        total[j] = (K0 * (a @ at + b @ bt)).sum() + (K1 * ((n * b) @ at - (n * a) @ bt)).sum()
+    return total

@@ -144,7 +144,7 @@ def test_pressure_against_central_differences(base: Modes) -> None:
 def test_remembered_strains_change_nothing(base: Modes) -> None:
     """One memory of the modes' gradients serves all variables, a node's among them, whose
     operators differ: the same rates to the last digit as each on its own."""
-    strains: sensitivity.Strains = {}
+    strains: sensitivity.Strains = []
     for name in ("C10", "R of a node", "belt area"):
         tangents = VARIABLES[name].tangents
         shared = rates(base, tangents, PRESSURE, strains)
