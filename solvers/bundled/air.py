@@ -105,10 +105,16 @@ def coupling(air: Air, X: Array, U: Array, n: int) -> Coupling:
         rho = centre + (r - centre)[..., None] * ACROSS
         weights = -((r - centre) * dz * lines.weights)[..., None] * ACROSS_WEIGHTS * rho
         psi, slopes = _monomials(rho, z[..., None] + 0 * rho, box)
-        Q += np.einsum("egp,egpk,egpl->kl", weights, psi, psi)
-        H += np.einsum("egp,egpki,egpli->kl", weights, slopes, slopes)
-        H += np.einsum("egp,egpk,egpl->kl", n * n * weights / rho**2, psi, psi)
+        Q += _integral(weights, psi)
+        H += _integral(weights, slopes[..., 0]) + _integral(weights, slopes[..., 1])
+        H += _integral(n * n * weights / rho**2, psi)
     return Coupling(C, H / air.density, Q / air.bulk, slice(0 if n else 1, None))
+
+
+def _integral(weights: Array, f: Array) -> Array:
+    """sum over points of weights (...) times f_k f_l (k, k); f (..., k)."""
+    flat = f.reshape(weights.size, -1)
+    return np.asarray((weights.reshape(-1, 1) * flat).T @ flat)
 
 
 def _count() -> int:

@@ -169,14 +169,13 @@ class Parts:
     eigenvalues: Array
     at: Array
 
-    def forms(self) -> tuple[Array, Array, Array]:
-        """One per part."""
-        return self.n, self.shapes, self.eigenvalues[self.mode]
+    def forms(self) -> tuple[Array, Array, Array, Array]:
+        """A sum of parts for each mode."""
+        return self.n, self.shapes, self.mode, self.eigenvalues
 
     def rates(self, forms: Array, change: Change) -> Array:
         """psi^T (K' - lambda M') psi of the whole."""
-        tyre = np.bincount(self.mode, forms, len(self.eigenvalues))
-        return tyre + change.attached.rates(self.eigenvalues, self.at)
+        return forms + change.attached.rates(self.eigenvalues, self.at)
 
     def where(self, keep: Array | slice) -> Parts:
         """The parts of some of the modes."""

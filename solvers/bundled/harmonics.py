@@ -36,11 +36,11 @@ class Unstable(ArithmeticError):
 class Makeup(Protocol):
     """What a mode that is not one harmonic of a tyre at rest is made of."""
 
-    def forms(self) -> tuple[Array, Array, Array]:
+    def forms(self) -> tuple[Array, Array, Array, Array]:
         """As `HarmonicModes.forms`."""
 
     def rates(self, forms: Array, change: Change) -> Array:
-        """d lambda / dp (m,) from the forms (p,) and what else has p's tangent."""
+        """d lambda / dp (m,) from the forms (m,) and what else has p's tangent."""
 
     def where(self, keep: Array | slice) -> Makeup:
         """That of some of the modes."""
@@ -75,12 +75,13 @@ class HarmonicModes:
     members: Array | None = None
     makeup: Makeup | None = None
 
-    def forms(self) -> tuple[Array, Array, Array]:
-        """Harmonics (p,), shapes (p, nodes, 3) and lambda (p,) of the forms phi^H (K' - lambda M')
-        phi that the derivatives of the eigenvalues are made of."""
+    def forms(self) -> tuple[Array, Array, Array, Array]:
+        """Harmonics (p,), shapes (p, nodes, 3), the mode (p,) that each is part of, and lambda (m,)
+        of the forms phi^H (K' - lambda M') phi that the eigenvalues' derivatives are made of."""
         if self.makeup is not None:
             return self.makeup.forms()
-        return np.full(len(self.eigenvalues), self.n), self.shapes, self.eigenvalues
+        modes = len(self.eigenvalues)
+        return np.full(modes, self.n), self.shapes, np.arange(modes), self.eigenvalues
 
     def below(self, frequency_Hz: float) -> HarmonicModes:
         """Those up to a frequency."""

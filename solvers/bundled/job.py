@@ -235,11 +235,12 @@ class Analysis:
             plain = Vibration(still, self.U, _loads(still, step), equations, 0.0).factor(0)
             newton = plain.tyre if isinstance(plain, Bordered) else plain
         rates: dict[str, list[Array]] = {}
-        strains: sensitivity.Strains = {}
-        for variable, tangents in self.request.sensitivities.items():
-            rates[variable] = self._rates(
-                tangents, place, dynamic_Hz, newton, equations, modes, strains
-            )
+        if self.request.sensitivities:
+            fields, eigenvalues = _asked(modes)
+            for variable, tangents in self.request.sensitivities.items():
+                rates[variable] = self._rates(
+                    tangents, place, dynamic_Hz, newton, equations, modes, fields, eigenvalues
+                )
         return self._result(step, modes, rates)
 
     def _beside(
@@ -333,7 +334,8 @@ class Analysis:
         factor: Cholesky,
         equations: Numbering,
         modes: list[HarmonicModes],
-        strains: sensitivity.Strains,
+        fields: sensitivity.Fields,
+        eigenvalues: Array,
     ) -> list[Array]:
         """d lambda / d variable per harmonic, with the deck's numbers carrying its tangent."""
         section, steps = self.deck.read(tangents)
@@ -349,23 +351,13 @@ class Analysis:
         if wheel or air:
             rim, flow = [q for m in modes for q in m.rim], [w for m in modes for w in m.air]
             beside = sensitivity.Beside(wheel, air, rim, flow)
-        asked = [m.forms() for m in modes]
-        n, shapes, eigenvalues = (np.concatenate(part) for part in zip(*asked, strict=True))
         forms = sensitivity.eigenvalue_rates(
-            moving,
-            self.U,
-            V,
-            _loads(moving, step),
-            n,
-            shapes,
-            eigenvalues,
-            strains,
-            beside,
+            moving, self.U, V, _loads(moving, step), fields, eigenvalues, beside
         )
         attached = read_attached(self.deck.revolve, self.model.mesh)
         spin = _uniform(self.model, step, step.spin, "ROTDYNF")
         change = Change(moving, spin, attached)
-        each = np.split(forms, np.cumsum([len(part[0]) for part in asked])[:-1])
+        each = np.split(forms, np.cumsum([len(m.eigenvalues) for m in modes])[:-1])
         return [
             m.makeup.rates(own_forms, change) if m.makeup else own_forms
             for m, own_forms in zip(modes, each, strict=True)
@@ -381,6 +373,15 @@ class Analysis:
     def _check_time(self) -> None:
         if time.monotonic() > self.deadline:
             raise TimedOut("the time limit passed")
+
+
+def _asked(modes: list[HarmonicModes]) -> tuple[sensitivity.Fields, Array]:
+    """The fields and the eigenvalues whose derivatives are asked for."""
+    forms = [m.forms() for m in modes]
+    n, shapes, owner, eigenvalues = (np.concatenate(x) for x in zip(*forms, strict=True))
+    before = np.cumsum([0, *(len(values) for *_, values in forms[:-1])])
+    owner += np.repeat(before, [len(own) for _, _, own, _ in forms])
+    return sensitivity.Fields(n, shapes, owner), eigenvalues
 
 
 def _uniform(

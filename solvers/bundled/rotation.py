@@ -73,9 +73,10 @@ class Whirl:
         """omega - n Omega: as a sensor that stands still sees them, rad/s."""
         return self.omega - self.n * self.spin
 
-    def forms(self) -> tuple[Array, Array, Array]:
+    def forms(self) -> tuple[Array, Array, Array, Array]:
         """Of lambda = omega^2."""
-        return np.full(len(self.omega), self.n), self.shapes, self.omega**2
+        modes = len(self.omega)
+        return np.full(modes, self.n), self.shapes, np.arange(modes), self.omega**2
 
     def rates(self, forms: Array, change: Change) -> Array:
         """omega' = U^H (K' + omega C' - omega^2 M') U / (2 omega - U^H C U)."""
