@@ -7,9 +7,15 @@ import os
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import shutil
+import signal
+import threading
 from pathlib import Path
 
 import pytest
+
+# a shell starts what runs in its background with SIGINT ignored, and commands would inherit that
+if threading.current_thread() is threading.main_thread():
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 ROOT = Path(__file__).parents[1]
 CASES = ROOT / "cases"

@@ -26,7 +26,7 @@ from .support import vary
 DASK = [sys.executable, "-m", "dask"]
 
 
-def wait_for(found: Callable[[], Any], seconds: float = 90.0) -> Any:
+def wait_for(found: Callable[[], Any], seconds: float = 300.0) -> Any:
     end = time.monotonic() + seconds
     while not (answer := found()):
         assert time.monotonic() < end

@@ -84,7 +84,7 @@ def test_sizes_are_drawn_on_both_sides() -> None:
     assert all(-1 <= e <= -0.2 or 0.4 <= e <= 2 for e in drawn)
 
 
-def test_the_emulated_model_is_the_model_between_its_designs_and_asks_it_beyond() -> None:
+def test_the_emulated_model_is_the_model_between_its_designs_and_goes_straight_on_beyond() -> None:
     scale = Scale()
     twin = emulate(scale)
     random, asked = np.random.default_rng(1), scale.asked
@@ -97,5 +97,13 @@ def test_the_emulated_model_is_the_model_between_its_designs_and_asks_it_beyond(
         for name in ("eta", "jacobian", "constants"):
             assert np.allclose(getattr(got, name), getattr(want, name), atol=1e-6)
     assert scale.asked == asked + 10
-    twin.answers([Point(scale.start + 1.0)])
-    assert scale.asked == asked + 11
+    edge, beyond = (Point(scale.start + step * np.array([1.0, 0.2, 0.1])) for step in (0.8, 1.3))
+    at, after = twin.answers([edge, beyond])
+    assert isinstance(at, Answer) and isinstance(after, Answer) and scale.asked == asked + 10
+    assert np.allclose(after.jacobian[:, 0], at.jacobian[:, 0], atol=0.05)
+    middle = at.eta + at.jacobian[:, 0] * 0.5
+    rest = after.eta - middle  # what the other two, still inside, add
+    inside = twin.answers([Point(scale.start + np.array([0.8, 0.26, 0.13]))])[0]
+    assert isinstance(inside, Answer)
+    assert np.allclose(rest, inside.eta - at.eta + 0.5 * (inside.jacobian - at.jacobian)[:, 0])
+    assert np.allclose(after.jacobian, inside.jacobian)
