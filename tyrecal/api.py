@@ -214,7 +214,7 @@ def read_results(folder: Path | str) -> dict[str, Any]:
     >>> _ = subprocess.run([sys.executable, "-m", *command, folder], check=True)
     >>> results = read_results(folder)
     >>> sorted(results), results["modes"]["pressure_kPa"]
-    (['modes', 'run'], 240.0)
+    (['modes', 'modes_shapes', 'run'], 240.0)
     """
     paths = sorted(Path(folder).glob("*.json"))
     if not paths:

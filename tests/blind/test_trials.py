@@ -97,7 +97,7 @@ def test_the_seal_holds_the_truth_and_the_answers(tmp_path: Path) -> None:
     assert len(score(folder, sealed)) == 5
     one = sorted((folder / "answers").glob("*.json"))[0]
     before = one.read_text()
-    one.write_text(before.replace('"rung": 1', '"rung": 2'))
+    one.write_text(before.replace('"verdict": "', '"verdict": "not '))
     with pytest.raises(BadTrials, match="changed after they were hashed"):
         score(folder, sealed)
     one.write_text(before)

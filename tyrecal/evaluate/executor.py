@@ -6,10 +6,10 @@ import multiprocessing
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from typing import Any, Protocol
 
-from .pool import process_pool
+from .pool import Pool, process_pool
 
 Task = tuple[int, Any]  # its place among the tasks, and what its function is given
 
@@ -65,7 +65,7 @@ def _until_one_dies(
     """Does tasks off the end of ``waiting``, yields answers; returns what a death left undone."""
     under_way: dict[Future[Any], Task] = {}
     lost: list[Task] = []
-    with process_pool(jobs) as pool, _ended_at_once():
+    with _pool(jobs, lost) as pool, _ended_at_once():
         while under_way or (waiting and not lost):
             while waiting and not lost and len(under_way) < jobs:
                 task = waiting.pop()
@@ -84,12 +84,29 @@ def _until_one_dies(
     return lost
 
 
+_idle: dict[int, Pool] = {}
+
+
+@contextmanager
+def _pool(jobs: int, lost: Sequence[Task]) -> Iterator[Pool]:
+    """Worker processes, kept for the next tasks where all went well: by then they have read the
+    templates and built the mesh. ``lost``: tasks whose process died."""
+    pool = _idle.pop(jobs, None) or process_pool(jobs)
+    with ExitStack() as stack:
+        stack.enter_context(pool)
+        yield pool
+        if not lost:
+            stack.pop_all()
+            _idle[jobs] = pool
+
+
 @contextmanager
 def _ended_at_once() -> Iterator[None]:
     """Ends the processes at Ctrl-C, or where nobody wants the rest; a failed task's finish."""
     try:
         yield
     except (KeyboardInterrupt, GeneratorExit):
+        _idle.clear()
         for process in multiprocessing.active_children():
             process.terminate()
         raise
