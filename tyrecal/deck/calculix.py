@@ -56,7 +56,10 @@ def calculix_context(case: LoadedCase) -> dict[str, Any]:
         "sectors": sectors,
         "sector": sector,
         "nodes": sector.nodes,
-        "node_sets": [("SECTION", sector.section), ("BEHIND", sector.behind), ("RIM", sector.rim)],
+        "node_sets": [("SECTION", sector.section), ("BEHIND", sector.behind), ("RIM", sector.rim)]
+        + ([("BETWEEN", [node for node, _ in sector.between])] if sector.between else []),
+        "between": sector.between,
+        "half_turn": (float(np.cos(np.pi / sectors)), -float(np.sin(np.pi / sectors))),
         "inner_face": INNER_FACE,
         "solids": _solids(case, sector, numbers),
         "rubbers": _rubbers(case),

@@ -30,7 +30,8 @@ class Sector:
     nodes: (number, x, y, z) in m; bricks: section element to nodes (8 or 20); rows: its row in
     the mesh without plies, a ply's being that inside it; strips: per line, (section element,
     meridian (r, z), mean radius in m) from -z to +z; section, behind: nodes on the two faces;
-    rim: held nodes but those behind; inner: section elements.
+    between: (node halfway between the faces, node in front of it), the held ones left out; rim:
+    held nodes but those behind; inner: section elements.
     """
 
     nodes: list[tuple[int, float, float, float]]
@@ -40,6 +41,7 @@ class Sector:
     strips: dict[str, list[tuple[int, tuple[float, float], float]]]
     section: list[int]
     behind: list[int]
+    between: list[tuple[int, int]]
     rim: list[int]
     inner: list[int]
 
@@ -151,6 +153,7 @@ def _extruded(mesh: SectionMesh, angle: float, quadratic: bool) -> dict[str, Any
         "regions": {number: region for number, (region, _) in mesh.cells.items()},
         "section": list(front.values()),
         "behind": list(behind.values()),
+        "between": [(k, front[p]) for p, k in between.items() if quadratic and p not in rim],
         "rim": held,
         "inner": mesh.inner,
     }
