@@ -91,20 +91,11 @@ def training(count: int) -> list[dict[str, float]]:
 
 
 def common_problem(case: LoadedCase) -> LoadedCase:
-    """The case as `calculix.split` makes it: with effects and gauges written into its section, and
-    solids between lines that are two now; a ply lies in the rubber inside it."""
+    """The case as `calculix.split` makes it, with effects and gauges written into its section."""
     case = with_effects(case)
     c = case.case
     plain = c.model_copy(update={"section": c.section.model_copy(update={"gauges": None})})
-    case = split(replace(case, case=plain, section=gauged_section(case)), PLY_THICKNESS_M)
-    names = set(case.section.names)
-    solids = [
-        s.model_copy(update={"between": [n if n in names else n + "+" for n in s.between]})
-        if s.between
-        else s
-        for s in case.case.solids
-    ]
-    return replace(case, case=case.case.model_copy(update={"solids": solids}))
+    return split(replace(case, case=plain, section=gauged_section(case)), PLY_THICKNESS_M)
 
 
 def bundled(case: LoadedCase, labels: list[Label]) -> tuple[dict[str, float], float]:

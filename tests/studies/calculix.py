@@ -30,7 +30,7 @@ from tyrecal_solvers.bundled import cords
 from tyrecal.case import LoadedCase, load_case, with_values
 from tyrecal.deck import context
 from tyrecal.deck.calculix import PLY_THICKNESS_M
-from tyrecal.deck.sector import interleaved, with_plies
+from tyrecal.deck.sector import with_plies
 from tyrecal.evaluate.door import Door, Question
 from tyrecal.evaluate.failure import EvaluationFailed
 from tyrecal.evaluate.results import HarmonicShape
@@ -82,16 +82,29 @@ def _strain(q: np.ndarray) -> np.ndarray:
 
 
 def split(case: LoadedCase, thickness: float) -> LoadedCase:
-    """The case with each layer as two halves at +- thickness / sqrt(12) of its line."""
+    """The case with each layer as two halves at +- thickness / sqrt(12) of its line, and one more
+    line at the ply's outer face where another rubber begins there: a ply lies in that inside it."""
     c = case.case
     level = c.mesh.levels[c.mesh.level]
-    gaps = len(level.rows)
-    thin = level.model_copy(
-        update={
-            "rows": interleaved(list(level.rows), [1] * (gaps - 1)),
-            "grading": interleaved(list(level.grading or [1.0] * gaps), [1.0] * (gaps - 1)),
-        }
-    )
+    lines, outer = case.section.names, with_plies(case.section, thickness)
+    inner = with_plies(case.section, thickness / np.sqrt(3))
+    edges = {name for solid in c.solids for name in solid.between or ()}
+    faces = {name: f"{name}face" for name in lines[1:-1] if name in edges}
+    names, points = [lines[0]], [case.section.points[0]]
+    rows, grading = [level.rows[0]], [level.grading[0] if level.grading else 1.0]
+    for k, name in enumerate(lines[1:-1], start=1):
+        halves = [inner.names.index(name + sign) for sign in "-+"]
+        names += [inner.names[i] for i in halves]
+        points += [inner.points[i] for i in halves]
+        if name in faces:
+            names.append(faces[name])
+            points.append(outer.points[outer.names.index(name + "+")])
+        thin = 1 + (name in faces)
+        rows += [*[1] * thin, level.rows[k]]
+        grading += [*[1.0] * thin, level.grading[k] if level.grading else 1.0]
+    names.append(lines[-1])
+    points.append(case.section.points[-1])
+    split_level = level.model_copy(update={"rows": rows, "grading": grading})
     layers = {
         f"{name}_{side}": layer.model_copy(
             update={"line": layer.line + sign, "area_m2": layer.area_m2 / 2}
@@ -99,9 +112,16 @@ def split(case: LoadedCase, thickness: float) -> LoadedCase:
         for name, layer in c.rebar_layers.items()
         for side, sign in (("in", "-"), ("out", "+"))
     }
-    mesh = c.mesh.model_copy(update={"levels": {c.mesh.level: thin}})
-    new = c.model_copy(update={"mesh": mesh, "rebar_layers": layers, "variables": {}})
-    return replace(case, case=new, section=with_plies(case.section, thickness / np.sqrt(3)))
+    solids = [
+        s.model_copy(update={"between": [faces.get(n, n) for n in s.between]}) if s.between else s
+        for s in c.solids
+    ]
+    mesh = c.mesh.model_copy(update={"levels": {c.mesh.level: split_level}})
+    new = c.model_copy(
+        update={"mesh": mesh, "rebar_layers": layers, "variables": {}, "solids": solids}
+    )
+    section = replace(case.section, names=tuple(names), points=np.array(points))
+    return replace(case, case=new, section=section)
 
 
 def straight(*arguments: object) -> SectionMesh:

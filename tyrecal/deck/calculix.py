@@ -63,7 +63,7 @@ def calculix_context(case: LoadedCase) -> dict[str, Any]:
         "inner_face": INNER_FACE,
         "solids": _solids(case, sector, numbers),
         "rubbers": _rubbers(case),
-        "plies": _plies(case, sector, thickness),
+        "plies": _plies(case, sector),
         "cavity": [numbers[cell] for cell in sector.inner],
         "pressure": c.pressure_kPa * 1e3,
     }
@@ -111,23 +111,25 @@ def _rubbers(case: LoadedCase) -> list[dict[str, Any]]:
     return rubbers
 
 
-def _plies(case: LoadedCase, sector: Sector, thickness: float) -> list[dict[str, Any]]:
-    """One material a layer and strip: stiffness E A / (s t) along the cords, their mass."""
+def _plies(case: LoadedCase, sector: Sector) -> list[dict[str, Any]]:
+    """One material a layer and strip: stiffness E A / (s t) along the cords, their mass,
+    t being the strip's own."""
     plies, number = [], len(sector.bricks)
     for name, layer in case.case.rebar_layers.items():
         cord: Any = case.case.materials[layer.material]
         angle = np.radians(layer.angle_deg)
-        for k, (element, (r, z), radius) in enumerate(sector.strips[layer.line], start=1):
-            if layer.regions and sector.regions[element] not in layer.regions:
+        for k, strip in enumerate(sector.strips[layer.line], start=1):
+            if layer.regions and sector.regions[strip.element] not in layer.regions:
                 continue
             number += 1
-            spacing = layer.spacing_m or np.radians(layer.spacing_deg or 0.0) * radius
-            share = layer.area_m2 / (spacing * thickness)
-            along = np.array([np.cos(angle) * r, np.sin(angle), np.cos(angle) * z])
+            spacing = layer.spacing_m or np.radians(layer.spacing_deg or 0.0) * strip.radius
+            share = layer.area_m2 / (spacing * strip.thickness)
+            (r, z), across = strip.along, np.sin(angle)
+            along = np.array([np.cos(angle) * r, across, np.cos(angle) * z])
             plies.append(
                 {
                     "name": f"{deck_name(name)}_{k}",
-                    "elements": [(number, *sector.bricks[element])],
+                    "elements": [(number, *sector.bricks[strip.element])],
                     "stiffness": _tensor(cord.youngs_modulus_Pa * share, along),
                     "density": cord.density_kg_per_m3 * share,
                 }

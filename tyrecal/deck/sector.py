@@ -23,13 +23,25 @@ Point = tuple[int, ...]  # a corner of the section's mesh, or the two corners of
 INNER_FACE = "P6"  # a brick's face over side 4 of the section's element
 
 
+@dataclass(frozen=True)
+class Strip:
+    """An element of a ply. element: in the section; along: its meridian (r, z); radius: of the
+    cord line's middle in m; thickness: its volume over the cord surface's area, in m, which is less
+    than the ply's where the line has a kink."""
+
+    element: int
+    along: tuple[float, float]
+    radius: float
+    thickness: float
+
+
 @dataclass(frozen=True, eq=False)
 class Sector:
     """Bricks of one sector.
 
     nodes: (number, x, y, z) in m; bricks: section element to nodes (8 or 20); rows: its row in
-    the mesh without plies, a ply's being that inside it; strips: per line, (section element,
-    meridian (r, z), mean radius in m) from -z to +z; section, behind: nodes on the two faces;
+    the mesh without plies, a ply's being that inside it; strips: per line, from -z to +z, `Strip`;
+    section, behind: nodes on the two faces;
     between: (node halfway between the faces, node in front of it), the held ones left out; rim:
     held nodes but those behind; inner: section elements.
     """
@@ -38,7 +50,7 @@ class Sector:
     bricks: dict[int, tuple[int, ...]]
     rows: dict[int, int]
     regions: dict[int, str]
-    strips: dict[str, list[tuple[int, tuple[float, float], float]]]
+    strips: dict[str, list[Strip]]
     section: list[int]
     behind: list[int]
     between: list[tuple[int, int]]
@@ -107,11 +119,26 @@ def _normals(line: Array) -> Array:
     return normals
 
 
-def _strip(mesh: SectionMesh, number: int) -> tuple[int, tuple[float, float], float]:
+def _strip(mesh: SectionMesh, number: int) -> Strip:
     corner = np.array([mesh.nodes[n] for n in mesh.solids[number][:4]])
     start, end = (corner[0] + corner[1]) / 2, (corner[3] + corner[2]) / 2
-    along = (end - start) / np.linalg.norm(end - start)
-    return number, (float(along[0]), float(along[1])), float(start[0] + end[0]) / 2
+    length = np.linalg.norm(end - start)
+    along, radius = (end - start) / length, (start[0] + end[0]) / 2
+    return Strip(
+        number,
+        (float(along[0]), float(along[1])),
+        float(radius),
+        float(_moment(corner) / (length * radius)),
+    )
+
+
+def _moment(corner: Array) -> float:
+    """Integral of r over a quadrilateral of corners (4, 2), by its two triangles."""
+    total = 0.0
+    for a, b, c in (corner[[0, 1, 2]], corner[[0, 2, 3]]):
+        (p, q), (s, t) = b - a, c - a
+        total += (p * t - q * s) / 2 * (a[0] + b[0] + c[0]) / 3
+    return abs(total)
 
 
 def _extruded(mesh: SectionMesh, angle: float, quadratic: bool) -> dict[str, Any]:
