@@ -9,6 +9,7 @@ Without ``--measured FILE`` the measurements are the model's own at three pressu
 
 from __future__ import annotations
 
+import multiprocessing
 import resource
 import time
 from collections import Counter, defaultdict
@@ -90,6 +91,9 @@ def main(measured: Path | None, jobs: int) -> None:
         wall, start = time.perf_counter(), time.process_time()
         found = study(LOADED, door, measured, jobs=jobs)
         wall, own = time.perf_counter() - wall, time.process_time() - start
+    for worker in multiprocessing.active_children():  # kept for more; counted once they have ended
+        worker.terminate()
+        worker.join()
     children = resource.getrusage(resource.RUSAGE_CHILDREN)
     if isinstance(door, Watched):
         print("| asked | evaluations | processor time, s | each, s |\n|---|---|---|---|")
