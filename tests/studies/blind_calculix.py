@@ -2,6 +2,7 @@
 
     python -m tests.studies.blind_calculix train 40       # runs CalculiX, goes on where it stopped
     python -m tests.studies.blind_calculix confirm 30     # runs with effects, by the makers' laws
+    python -m tests.studies.blind_calculix again          # the common problem of all runs anew
     python -m tests.studies.blind_calculix table > table.md
     python -m tests.studies.blind_calculix make DIR 450 200 80 [SEED]     # the trials themselves
 
@@ -33,7 +34,7 @@ import numpy as np
 from scipy.stats import qmc
 
 from tyrecal.blind.answer import rows_of, tyre_model
-from tyrecal.blind.draw import draw, tyre
+from tyrecal.blind.draw import Truth, draw, tyre
 from tyrecal.blind.laws import Law, other_laws
 from tyrecal.blind.make import make
 from tyrecal.blind.maker import Heard
@@ -90,19 +91,38 @@ def training(count: int) -> list[dict[str, float]]:
     ]  # fmt: skip
 
 
-def common_problem(case: LoadedCase) -> LoadedCase:
+def common_problem(case: LoadedCase, faces_at: frozenset[str] = frozenset()) -> LoadedCase:
     """The case as `calculix.split` makes it, with effects and gauges written into its section."""
     case = with_effects(case)
     c = case.case
     plain = c.model_copy(update={"section": c.section.model_copy(update={"gauges": None})})
-    return split(replace(case, case=plain, section=gauged_section(case)), PLY_THICKNESS_M)
+    case = replace(case, case=plain, section=gauged_section(case))
+    return split(case, PLY_THICKNESS_M, faces_at)
 
 
 def bundled(case: LoadedCase, labels: list[Label]) -> tuple[dict[str, float], float]:
-    """ln f by label on the common problem, and the tyre's mass in kg. Raises EvaluationFailed."""
+    """ln f by label on the common problem, and the tyre's mass in kg. Raises EvaluationFailed.
+
+    The row of elements that a border of two rubbers needs at a ply is worth 0.03 %, which
+    CalculiX's mesh does not have: it is taken off as it is found with one rubber.
+    """
+    known, mass_kg = _solved(common_problem(case), labels)
+    solids = case.case.solids
+    borders = frozenset(name for solid in solids for name in solid.between or ())
+    if borders:
+        one = {"solids": [solid for solid in solids if not solid.between]}
+        plain = replace(case, case=case.case.model_copy(update=one))
+        rowless = _solved(common_problem(plain), labels)[0]
+        rowed = _solved(common_problem(plain, borders), labels)[0]
+        known = {key: value + rowless[key] - rowed[key] for key, value in known.items()}
+    return known, mass_kg
+
+
+def _solved(case: LoadedCase, labels: list[Label]) -> tuple[dict[str, float], float]:
+    """The same of ``case`` as it stands, with CalculiX's cord law and straight sides."""
     with common():
         for count in (None, 4):
-            answer = Door(common_problem(case), "bundled").evaluate(Question({}, (), count))
+            answer = Door(case, "bundled").evaluate(Question({}, (), count))
             try:
                 found = match(label_modes(answer.modes), labels)
             except LostLabel as lost:
@@ -172,6 +192,22 @@ def confirm(count: int) -> None:
         about = {"about": "confirm", "law": name, "size": truth.size, "pressure_kPa": pressure}
         about["variables"], about["constants"] = truth.variables, truth.constants
         run(tyre(truth, case, found, pressure, laws[name]), about)
+
+
+def again() -> None:
+    """Solve the common problem of every run on record anew, after a change to it."""
+    entries = [json.loads(line) for line in RECORD.read_text(encoding="utf-8").splitlines()]
+    case, laws = base(), laws_confirmed()
+    found, _ = sources(case)
+    for entry in (entry for entry in entries if "failed" not in entry):
+        if entry["about"] == "train":
+            made = with_values(case, entry["values"])
+        else:
+            truth = Truth("", "", entry["law"], entry["size"], entry["variables"],
+                          entry["constants"], 0, False)  # fmt: skip
+            made = tyre(truth, case, found, entry["pressure_kPa"], laws[entry["law"]])
+        entry["common"] = bundled(made, targets(made))[0]
+    RECORD.write_text("".join(json.dumps(e) + "\n" for e in entries), encoding="utf-8")
 
 
 OUTLIER = 0.0005  # of ln f
@@ -278,6 +314,8 @@ def main() -> None:
         train(int(rest[0]))
     elif what == "confirm":
         confirm(int(rest[0]))
+    elif what == "again":
+        again()
     elif what == "table":
         table()
     elif what == "make":

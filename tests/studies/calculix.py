@@ -81,14 +81,15 @@ def _strain(q: np.ndarray) -> np.ndarray:
     return ((q * q).sum(-1) - 1) / 2
 
 
-def split(case: LoadedCase, thickness: float) -> LoadedCase:
+def split(case: LoadedCase, thickness: float, faces_at: frozenset[str] = frozenset()) -> LoadedCase:
     """The case with each layer as two halves at +- thickness / sqrt(12) of its line, and one more
-    line at the ply's outer face where another rubber begins there: a ply lies in that inside it."""
+    line at the ply's outer face where another rubber begins there, or at ``faces_at``: a ply lies
+    in the rubber inside it."""
     c = case.case
     level = c.mesh.levels[c.mesh.level]
     lines, outer = case.section.names, with_plies(case.section, thickness)
     inner = with_plies(case.section, thickness / np.sqrt(3))
-    edges = {name for solid in c.solids for name in solid.between or ()}
+    edges = faces_at | {name for solid in c.solids for name in solid.between or ()}
     faces = {name: f"{name}face" for name in lines[1:-1] if name in edges}
     names, points = [lines[0]], [case.section.points[0]]
     rows, grading = [level.rows[0]], [level.grading[0] if level.grading else 1.0]
