@@ -34,8 +34,9 @@ def vary(folder: Path, count: int, coarse: bool = True) -> list[Path]:
     return paths
 
 
-def poison(path: Path) -> None:
-    """Make the rubber so soft that the inflated tyre is not stable."""
+def poison(path: Path, C10_Pa: float = 1e4) -> None:
+    """Make the rubber so soft that the inflated tyre is not stable; with a tenth of this C10 no
+    mesh can be inflated."""
     text, old = path.read_text(), "start: 1.0e+6\n    lower: 1.0e+5"
     assert text.count(old) == 1
-    path.write_text(text.replace(old, "start: 1.0e+4\n    lower: 1.0e+3"))
+    path.write_text(text.replace(old, f"start: {C10_Pa}\n    lower: {C10_Pa / 10}"))

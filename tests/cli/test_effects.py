@@ -60,6 +60,7 @@ def test_list_and_words_for_people(capsys: pytest.CaptureFixture[str]) -> None:
         (["--value", "1"], "--value needs the NAME"),
         (["cap_ply", "--value", "1"], "--value needs a --case"),
         (["--mesh", "refined"], "--mesh needs a --case"),
+        (["--jobs", "2"], "--jobs needs a --case"),
         (["cap_ply", "--case", "CASE", "--pressures-kPa", "200,x"], "'x' is no number"),
         (["cap_ply", "--case", "CASE", "--pressures-kPa", "200,200"], "each once"),
         (["cap_ply", "--case", "CASE", "--solver", "calculix"], "gives no slopes"),
@@ -86,6 +87,15 @@ def test_signature_in_files(
     assert all(len(row["modes"]) == 9 for row in entry["rows"])
     assert 0 < entry["after_percent"] < entry["before_percent"]
     assert (out / "effect_rim_width.png").stat().st_size > 10_000
+
+
+def test_signatures_are_the_same_bytes_from_worker_processes(coarse: str, tmp_path: Path) -> None:
+    arguments = ["effects", "rim_width", "--case", coarse, "--no-pictures", "--quiet"]
+    for jobs in ("1", "2"):
+        out = ["--output", str(tmp_path / jobs), "--jobs", jobs]
+        assert run(*arguments, "--pressures-kPa", "200,240", *out) == 0
+    one, two = ((tmp_path / jobs / "effects.json").read_bytes() for jobs in ("1", "2"))
+    assert one == two
 
 
 def test_a_failing_effect_costs_no_other(

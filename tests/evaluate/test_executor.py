@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 import time
 from collections.abc import Callable
 from contextlib import closing
@@ -37,6 +38,16 @@ def test_all_tasks_in_order(jobs: int) -> None:
         assert isinstance(workers, Here if jobs == 1 else Processes)
         assert list(in_order(workers.each(square, tasks))) == [t**2 for t in tasks]
         assert list(workers.each(square, [])) == []
+
+
+def knows(module: str) -> bool:
+    """Whether this process had imported it before anybody asked for it here."""
+    return module in sys.modules
+
+
+def test_workers_begin_with_what_they_need() -> None:
+    asked = ["tyrecal.batch.case", "tyrecal_solvers.bundled.adapter", "tyrecal.nothing"]
+    assert list(in_order(Processes(2).each(knows, asked))) == [True, True, False]
 
 
 def test_in_order_of_anything() -> None:

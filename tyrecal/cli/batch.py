@@ -74,6 +74,10 @@ def command(
 
     Exit codes: 0 all cases good; 2 the input is wrong; 5 some failed or drifted; 130 interrupted.
     """
+    from ..evaluate.pool import warm_up
+
+    if jobs > 1 and len(cases) > 1 and not scheduler:
+        warm_up()  # while we import
     from ..batch.case import CaseTask
     from ..batch.drift import baseline_of, compare, read_baseline
     from ..batch.junit import junit as junit_xml

@@ -23,6 +23,7 @@ from .main import EXIT_SOLVER
               help="Default: two thirds of the case's, the case's, four thirds.")  # fmt: skip
 @click.option("--pictures/--no-pictures", default=True, help="Draw each signature.")
 @options.assignments
+@options.jobs
 @options.study_one_by_one
 def command(
     name: str | None,
@@ -43,6 +44,7 @@ def command(
     tyrecal effects
     tyrecal effects bead_filler
     tyrecal effects bead_filler --case cases/p235_75r17.yaml --fitted p235_75r17/fit.json
+    tyrecal effects --case cases/p235_75r17.yaml --jobs 2
     """
     from ..case.mistakes import suggestion
     from ..effects import IDS, catalogue
@@ -61,7 +63,7 @@ def command(
         raise click.UsageError("--value needs the NAME of an effect")
     given = {"fitted": fitted, "value": value is not None, "pressures-kPa": pressures,
              "set": assignments, "mesh": study.mesh, "solver": study.solver,
-             "output": study.output}  # fmt: skip
+             "output": study.output, "jobs": study.jobs > 1}  # fmt: skip
     for option in (option for option, there in given.items() if there and not case):
         raise click.UsageError(f"--{option} needs a --case")
     solvers = installed()
@@ -86,21 +88,24 @@ def command(
     plain = Plain(door, values, kPa)
     if name and not talk.as_json:
         talk.say(effect_text(entries[name]) + "\n")
+    sizes: dict[str, float] = {}
+    for id, entry in entries.items():
+        if name or adapter.name in entry["solvers"]:
+            sizes[id] = stated_size(id) if value is None else value
+        else:
+            talk.say(f"{id}: solver '{adapter.name}' cannot express it")
+    talk.detail(f"each at {', '.join(f'{p:g}' for p in kPa)} kPa")
     found, failed = [], 0
     with talk.progress("effects") as bar:
-        for done, (id, entry) in enumerate(entries.items()):
-            bar.at(done, len(entries))
-            if not name and adapter.name not in entry["solvers"]:
-                talk.say(f"{id}: solver '{adapter.name}' cannot express it")
-                continue
-            talk.detail(f"{id} at {', '.join(f'{p:g}' for p in kPa)} kPa")
-            try:
-                signature = plain.signature(id, stated_size(id) if value is None else value)
-            except EvaluationFailed as error:
+        answers = zip(sizes, plain.signatures(sizes, study.jobs), strict=True)
+        for done, (id, signature) in enumerate(answers, start=1):
+            bar.at(done, len(sizes))
+            if isinstance(signature, EvaluationFailed):
                 failed += 1
-                talk.error(f"{id}: {error}")
+                talk.error(f"{id}: {signature}")
                 continue
-            found.append({**entry, **signature_entry(signature, values)})
+            talk.detail(id)
+            found.append({**entries[id], **signature_entry(signature, values)})
             if pictures:
                 draw_signature(run.folder / f"effect_{id}.png", signature)
     run.write_json("effects.json", found)

@@ -11,6 +11,7 @@ from typing import Any, Protocol
 
 from .pool import Pool, process_pool
 
+PATIENCE_S = 5.0  # for a process that was told to end
 Task = tuple[int, Any]  # its place among the tasks, and what its function is given
 
 
@@ -107,8 +108,11 @@ def _ended_at_once() -> Iterator[None]:
         yield
     except (KeyboardInterrupt, GeneratorExit):
         _idle.clear()
-        for process in multiprocessing.active_children():
+        ended = multiprocessing.active_children()
+        for process in ended:
             process.terminate()
+        for process in ended:  # those of idle pools too, which nobody else waits for
+            process.join(PATIENCE_S)
         raise
 
 

@@ -112,6 +112,7 @@ def _run(problem: Problem, start: Array, method: str) -> StartReport:
     outcome = METHODS[method](problem, start, tolerance)
     converged = slsqp.is_converged(problem, outcome.point, max(10 * TOLERANCE, tolerance))
     converged = converged or slsqp.is_at_jump(problem, outcome.point)
+    converged = converged or outcome.message == slsqp.AT_CROSSING
     values, history = dict(first.values), _history(problem)
     return StartReport(values, outcome.point, outcome.message, converged, history)
 

@@ -16,7 +16,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 from ..evaluate.failure import EvaluationFailed
-from ..modes.mode import Label
+from .crossing import MIXED, TELLING, Crossing, crossing, gap, order, pair_clarity
 from .problem import Point, Problem
 
 Array = np.ndarray
@@ -25,8 +25,11 @@ EXACT = 1e-3  # Hz, an objective below every measurement's resolution
 DAMPING = 0.1  # mu over the mean diagonal of J^T J, at first
 TRIALS = 3  # of a step, where the objective may jump
 AT_JUMP = "less is left to gain than areas and stiffnesses jump by"
-MIXED = 0.8  # labels of the two [0, 0] modes are less clear than this: they have met
-AXIAL, TORSIONAL = Label(0, 0, "axial"), Label(0, 0, "torsional")
+ROOM = 0.1  # of the gap of the [0, 0] modes, between a bounded step and where labels change places
+CREEPING = 3e-4  # of the objective, less than ROOM costs: a gain that is not worth another step
+ALONG = 0.1  # of the gradient: as much along the crossing counts as none
+AT_CROSSING = "the two [0,0] modes meet: beyond, labels change places and the objective is higher"
+CAME_BACK = "came back over the crossing of the two [0,0] modes"
 
 
 class _Jump(Exception):
@@ -35,29 +38,31 @@ class _Jump(Exception):
 
 @dataclass(frozen=True)
 class Outcome:
-    """Where an optimiser stopped, and in its own words why."""
+    """Where an optimiser stopped, in its own words why, and the crossing that bounds it."""
 
     point: Point
     message: str
+    edge: Crossing | None = None
 
 
 def minimise(problem: Problem, start: Array, tolerance: float) -> Outcome:
     """Minimise the objective from ``start`` until the projected gradient is below ``tolerance``.
 
-    Where the search ends with the two [0, 0] modes mixed, it is stuck beside their crossing, at
-    which the labels change places and the objective jumps; then the other side is searched too.
+    Where the search ends with the two [0, 0] modes mixed, it is held by their crossing, at which
+    the labels change places and the objective jumps; then the other side is searched too. Where
+    that is higher, the design is a minimum: the jump bounds it.
 
     Raises EvaluationFailed when the start itself cannot be evaluated.
     """
     best = _descend(problem, problem.evaluate(start), tolerance)
-    if _pair_clarity(best.point) < MIXED:
-        for across in _beyond_crossing(problem, best.point):
+    if pair_clarity(best.point) < MIXED:
+        for across in _beyond_crossing(problem, best.point, best.edge):
             try:
                 there = problem.evaluate(across)
             except EvaluationFailed:
                 continue
-            other = _descend(problem, there, tolerance)
-            if other.point.objective < best.point.objective:
+            other = _descend(problem, there, tolerance, best.point)
+            if other.message != CAME_BACK and other.point.objective < best.point.objective:
                 best = other
                 break
     return best
@@ -91,32 +96,57 @@ def is_at_jump(problem: Problem, point: Point, lowered: float = 0.0) -> bool:
     return gain <= point.roughness and lowered < gain / 4
 
 
-def _pair_clarity(point: Point) -> float:
-    """How clearly the two [0, 0] modes are told apart; 1 where they are not both wanted."""
-    modes = [point.modes[label] for label in (AXIAL, TORSIONAL) if label in point.modes]
-    return min((m.clarity for m in modes), default=1.0) if len(modes) == 2 else 1.0
-
-
-def _descend(problem: Problem, point: Point, tolerance: float) -> Outcome:
+def _descend(
+    problem: Problem, point: Point, tolerance: float, known: Point | None = None
+) -> Outcome:
+    """SLSQP from ``point`` to its end, or back on the side of ``known``, no lower."""
     damping, message = DAMPING, "restarts used up"
+    edge: Crossing | None = None
     for _ in range(RESTARTS):
         if is_converged(problem, point, tolerance):
             return Outcome(point, "converged")
-        reached, full_step = _restart(problem, point, damping)
+        seen, full_step = _restart(problem, point, damping, edge)
+        reached = min(seen, key=lambda p: p.objective)
+        side = order(problem, reached)
+        back = known is not None and side == order(problem, known)
+        if known and back and reached.objective >= (1 - CREEPING) * known.objective:
+            return Outcome(reached, CAME_BACK)
+        if side != order(problem, point):
+            edge = None
+        elif edge or (
+            any(order(problem, p) == -side != 0 for p in seen)
+            and min(map(pair_clarity, seen)) < MIXED
+        ):
+            edge = crossing(problem, seen, reached) or edge
+        creeping = point.objective - reached.objective <= CREEPING * point.objective
+        if edge and creeping and _is_bounded(reached, edge):
+            return Outcome(reached, AT_CROSSING, edge)
         if is_at_jump(problem, point, point.objective - reached.objective):
             return Outcome(reached, AT_JUMP)
         if reached.objective >= point.objective - 1e-9 * max(point.objective, 1e-3):
             if damping > 1e3 * DAMPING:
-                return Outcome(point, "no lower objective along the search direction")
+                return Outcome(point, "no lower objective along the search direction", edge)
             damping *= 10
             continue
         damping *= 0.3 if full_step else 2.0
         point = reached
-    return Outcome(point, message)
+    return Outcome(point, message, edge)
 
 
-def _restart(problem: Problem, point: Point, damping: float) -> tuple[Point, bool]:
-    """One SLSQP iteration; the best point seen and whether the first step was taken whole."""
+def _is_bounded(point: Point, edge: Crossing) -> bool:
+    """Whether the labels are about to change places and the gradient is normal to where they do,
+    as it is at any bound that holds."""
+    normal = edge.slopes / max(float(np.linalg.norm(edge.slopes)), 1e-300)
+    along = np.linalg.norm(point.gradient - (point.gradient @ normal) * normal)
+    near = pair_clarity(point) < TELLING
+    return near and bool(along <= ALONG * np.linalg.norm(point.gradient))
+
+
+def _restart(
+    problem: Problem, point: Point, damping: float, edge: Crossing | None
+) -> tuple[list[Point], bool]:
+    """One SLSQP iteration on this side of ``edge``; the points seen and whether the first step,
+    taken whole, was the best."""
     J, scale = point.jacobian, max(point.objective, 1e-300)
     H = J.T @ J
     H[np.diag_indices(len(H))] += damping * np.trace(H) / len(H)
@@ -135,12 +165,21 @@ def _restart(problem: Problem, point: Point, damping: float) -> tuple[Point, boo
         gradient = there.jacobian.T @ there.residuals
         return 0.5 * (there.objective / scale) ** 2, turn.T @ gradient / scale**2
 
+    matrix, held = np.empty((0, len(turn))), np.empty(0)  # the crossing's row, where it bounds
+    if edge:
+        side = np.sign(gap(point))
+        matrix = side * (edge.slopes @ turn)[None, :]
+        held = np.array([side * edge.at(point.x) - ROOM * abs(gap(point))])
     bounds = {
         "type": "ineq",
         "fun": lambda y: np.concatenate(
-            [point.x + turn @ y - problem.lower, problem.upper - point.x - turn @ y]
+            [
+                point.x + turn @ y - problem.lower,
+                problem.upper - point.x - turn @ y,
+                held + matrix @ y,
+            ]
         ),
-        "jac": lambda y: np.concatenate([turn, -turn]),
+        "jac": lambda y: np.concatenate([turn, -turn, matrix]),
     }
     with suppress(_Jump):
         minimize(
@@ -152,30 +191,27 @@ def _restart(problem: Problem, point: Point, damping: float) -> tuple[Point, boo
             options={"maxiter": 1, "ftol": 1e-15},
         )
     best = min(seen, key=lambda p: p.objective)
-    return best, len(seen) > 2 and best is seen[2]
+    return seen, len(seen) > 2 and best is seen[2]
 
 
-def _beyond_crossing(problem: Problem, point: Point) -> Iterator[Array]:
+def _beyond_crossing(
+    problem: Problem, point: Point, edge: Crossing | None = None
+) -> Iterator[Array]:
     """Designs on the other side of the [0, 0] modes' crossing, the nearest in the metric first.
 
-    Their frequency difference g is linearised, and carried to -delta with the least change of
-    the residuals: dx = -(g + delta) H^-1 grad g / (grad g . H^-1 grad g).
+    d of the crossing, see there, is carried to the other side of 0 with the least change of the
+    residuals: dx = -(d +- wanted) H^-1 grad d / (grad d . H^-1 grad d).
     """
-    labels = [t.label for t in problem.targets]
-    if AXIAL not in labels or TORSIONAL not in labels:
+    side = order(problem, point)
+    edge = edge or (crossing(problem, [point], point) if side else None)
+    if edge is None:
         return
-    i, j = labels.index(AXIAL), labels.index(TORSIONAL)
-    scale = problem.scale
-    if not (scale[i] and scale[j]):
-        return
-    slopes = point.jacobian / np.where(scale > 0, scale, 1.0)[:, None]
-    gap = point.modes[AXIAL].frequency_Hz - point.modes[TORSIONAL].frequency_Hz
-    rise = slopes[i] - slopes[j]
     H = point.jacobian.T @ point.jacobian
     H[np.diag_indices(len(H))] += 1e-3 * np.trace(H) / len(H)
-    direction = np.linalg.solve(H, rise)
-    if abs(rise @ direction) < 1e-12 * (rise @ rise + 1e-300):
+    direction = np.linalg.solve(H, edge.slopes)
+    rise = float(edge.slopes @ direction)
+    if rise < 1e-12 * (edge.slopes @ edge.slopes + 1e-300):
         return
     for wanted in (1.0, 2.0, 4.0):  # Hz beyond
-        change = -(gap + np.sign(gap) * wanted) * direction / (rise @ direction)
+        change = -(edge.at(point.x) + side * wanted) * direction / rise
         yield np.clip(point.x + change, problem.lower, problem.upper)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import islice
 
 import numpy as np
 
@@ -76,8 +77,38 @@ class Plain:
 
     def signature(self, id: str, value: float) -> Signature:
         """What the effect does to this tyre. Raises what ``Door.evaluate`` does."""
-        effect = {f"effects.{id}": value}
-        found = [self.door.evaluate(Question({**state, **effect})) for state in self.states]
+        found = next(self.signatures({id: value}))
+        if isinstance(found, EvaluationFailed):
+            raise found
+        return found
+
+    def signatures(
+        self, sizes: Mapping[str, float], jobs: int = 1
+    ) -> Iterator[Signature | EvaluationFailed]:
+        """Of each effect, in their order, its signature at that size; ``jobs`` designs at a time.
+
+        Raises what ``Door.evaluate_all`` does.
+        """
+        questions = [
+            Question({**state, f"effects.{id}": value})
+            for id, value in sizes.items()
+            for state in self.states
+        ]
+        answers = self.door.evaluate_all(questions, jobs)
+        for id, value in sizes.items():
+            found: list[Evaluation] = []
+            failed: list[EvaluationFailed] = []
+            for answer in islice(answers, len(self.states)):
+                if isinstance(answer, EvaluationFailed):
+                    failed.append(answer)
+                else:
+                    found.append(answer)
+            try:
+                yield failed[0] if failed else self._signature(id, value, found)
+            except EvaluationFailed as failure:
+                yield failure
+
+    def _signature(self, id: str, value: float, found: list[Evaluation]) -> Signature:
         lost = np.nan
         hertz = np.array([
             [m[label].frequency_Hz if label in m else lost for label in self.labels]

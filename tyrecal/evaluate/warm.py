@@ -1,0 +1,20 @@
+"""What every worker process needs, imported once, by the process that all of them are forked from.
+
+Only that process imports this module: `pool.warm_up`.
+"""
+
+import gc
+import signal
+from contextlib import suppress
+from importlib.metadata import entry_points
+
+signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's to answer, even this early
+
+from ..batch import case  # noqa: E402, F401  takes a second: the studies and all that they need
+from .solver import GROUP  # noqa: E402
+
+for entry in entry_points(group=GROUP):
+    with suppress(Exception):  # a solver that cannot be imported says so where it is asked for
+        entry.load()
+
+gc.freeze()  # so that a worker's collector leaves these pages shared
