@@ -12,10 +12,11 @@ from typing import TYPE_CHECKING, Any
 from pydantic import BaseModel, ValidationError
 
 from ..effects import IDS
+from .analysis import Analysis
+from .calibration import MEASURED
 from .meshable import Problems, levels, places
 from .mistakes import Keys, dotted, suggestion
 from .parts import WRONG, number
-from .schema import MEASURED, Analysis
 from .shape import KINDS, entries, explain, table, type_at
 
 if TYPE_CHECKING:

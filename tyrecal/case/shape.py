@@ -8,19 +8,13 @@ from typing import Annotated, Any, Union, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 
+from .analysis import Road
+from .calibration import TargetFootprint, TargetMode, Uncertainty, Variable
+from .materials import Cord, Rubber
 from .mistakes import Keys, suggestion
 from .parts import WRONG
-from .schema import (
-    Case,
-    Cord,
-    RebarLayer,
-    Road,
-    Rubber,
-    TargetFootprint,
-    TargetMode,
-    Uncertainty,
-    Variable,
-)
+from .schema import Case
+from .section import RebarLayer
 
 UNIONS = (Union, UnionType)
 KINDS: dict[str, type[BaseModel]] = {"rubber": Rubber, "cord": Cord}
