@@ -166,7 +166,7 @@ class _Points:
     def notify(self, number: int, values: Mapping[str, float], outcome: Any) -> None:
         """One more design point."""
         objective = getattr(outcome, "objective", None)
-        self.best = min(self.best, objective or float("inf"))
+        self.best = self.best if objective is None else min(self.best, objective)
         state = f"{objective:.4f} {self.unit}" if objective is not None else f"failed: {outcome}"
         numbers = "  ".join(f"{k}={v:.5g}" for k, v in values.items())
         self.talk.detail(f"point {number}: {state}  {numbers}")

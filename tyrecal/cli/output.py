@@ -121,9 +121,10 @@ def refuse_other(folder: Path, case: Path) -> None:
     if not record.exists():
         return
     try:
-        owner = json.loads(record.read_text(encoding="utf-8")).get("case")
+        facts = json.loads(record.read_text(encoding="utf-8"))
     except ValueError:
-        owner = None
+        facts = None
+    owner = facts.get("case") if isinstance(facts, dict) else None
     if owner != str(case):
         raise OutputRefused(
             f"folder '{folder}' holds results of {owner or 'something else'};"
