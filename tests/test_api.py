@@ -21,17 +21,28 @@ def test_the_package_is_light() -> None:
     code = (
         "import sys, tyrecal\n"
         "heavy = {'numpy', 'scipy', 'pydantic', 'click', 'matplotlib', 'rich'}\n"
+        "assert not hasattr(tyrecal, '__wrapped__')  # what tools look for in any module\n"
         "assert not heavy & set(sys.modules), heavy & set(sys.modules)\n"
-        "assert set(tyrecal.__all__) <= set(dir(tyrecal))\n"
         "assert callable(tyrecal.load_case) and 'numpy' in sys.modules\n"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
+def test_a_part_of_the_package_is_found_before_the_rest() -> None:
+    code = "from tyrecal import case, effects\nassert callable(case.load_case) and effects.IDS\n"
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
 def test_all_that_is_offered_is_there_and_nothing_else() -> None:
-    assert tyrecal.__all__ == api.__all__
-    for name in tyrecal.__all__:
+    offered: dict[str, object] = {}
+    exec("from tyrecal import *", offered)
+    assert set(offered) - {"__builtins__"} == set(api.__all__) <= set(dir(tyrecal))
+    for name in api.__all__:
         assert getattr(tyrecal, name) is getattr(api, name)
+    own = [
+        name for name, what in vars(api).items() if getattr(what, "__module__", "") == api.__name__
+    ]
+    assert {name for name in own if not name.startswith("_")} <= set(api.__all__)
     with pytest.raises(AttributeError, match="no attribute 'fit_everything'"):
         tyrecal.fit_everything  # noqa: B018
 
@@ -49,7 +60,7 @@ def test_the_example_of(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_strict_types(tmp_path: Path) -> None:
-    """mypy --strict knows what every function takes and returns."""
+    """mypy --strict knows what every function takes and returns, and what is not offered."""
     program = tmp_path / "program.py"
     program.write_text(
         """
@@ -77,14 +88,19 @@ try:
 except (tyrecal.CaseError, tyrecal.EvaluationFailed):
     raise
 tyrecal.fit_case(case, method=1)  # WRONG
+tyrecal.fit_everything(case)  # WRONG
 """
+        + "".join(f"reveal_type(tyrecal.{name})\n" for name in tyrecal.__all__)
     )
     done = subprocess.run(
         [sys.executable, "-m", "mypy", "--strict", "--follow-imports=silent", str(program)],
         cwd=ROOT, capture_output=True, text=True,
     )  # fmt: skip
-    wrong = program.read_text().splitlines().index(
-        "tyrecal.fit_case(case, method=1)  # WRONG"
-    )  # fmt: skip
-    errors = [line for line in done.stdout.splitlines() if ": error:" in line]
-    assert len(errors) == 1 and f"program.py:{wrong + 1}: error:" in errors[0], done.stdout
+    lines = program.read_text().splitlines()
+    wrong = [f"program.py:{i}" for i, line in enumerate(lines, 1) if line.endswith("# WRONG")]
+    told = done.stdout.splitlines()
+    assert [line.partition(": error:")[0] for line in told if ": error:" in line] == [
+        str(program.with_name(place)) for place in wrong
+    ], done.stdout
+    types = [line.partition("Revealed type is ")[2] for line in told if "Revealed" in line]
+    assert len(types) == len(tyrecal.__all__) and '"Any"' not in types

@@ -8,64 +8,27 @@
 [0,0] torsional: 38.1 Hz
 [1,1]: 43.5 Hz
 
-What is offered stands in ``tyrecal.__all__``, and is imported when it is first used.
+What is offered stands in ``tyrecal.api``, which is imported when something of it is first used.
 """
 
 from __future__ import annotations
 
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
-
-if TYPE_CHECKING:
-    from .api import (
-        CaseError,
-        Diagnosis,
-        Effect,
-        EvaluationFailed,
-        Fit,
-        LoadedCase,
-        Mode,
-        State,
-        diagnose_case,
-        evaluate_footprint,
-        evaluate_modes,
-        fit_case,
-        list_effects,
-        load_case,
-        read_results,
-        sweep_pressure,
-        with_values,
-    )
 
 __version__ = "0.1.0"
 
-__all__ = [
-    "CaseError",
-    "Diagnosis",
-    "Effect",
-    "EvaluationFailed",
-    "Fit",
-    "LoadedCase",
-    "Mode",
-    "State",
-    "diagnose_case",
-    "evaluate_footprint",
-    "evaluate_modes",
-    "fit_case",
-    "list_effects",
-    "load_case",
-    "read_results",
-    "sweep_pressure",
-    "with_values",
-]
+if TYPE_CHECKING:
+    from .api import *  # noqa: F403  the names of its __all__
+    from .api import __all__ as __all__
+else:
 
-
-def __getattr__(name: str) -> Any:
-    if name not in __all__:
+    def __getattr__(name: str) -> Any:
+        if name == "__all__" or not name.startswith("_"):  # Python itself looks for __path__ ...
+            api = import_module("tyrecal.api")
+            if name == "__all__" or name in api.__all__:
+                return getattr(api, name)
         raise AttributeError(f"module 'tyrecal' has no attribute '{name}'")
-    from . import api
 
-    return getattr(api, name)
-
-
-def __dir__() -> list[str]:
-    return [*globals(), *__all__]
+    def __dir__() -> list[str]:
+        return [*globals(), *import_module("tyrecal.api").__all__]

@@ -14,8 +14,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from . import case as _case
 from .case import CaseError, LoadedCase, start_values, with_level, with_values
+from .case import load_case as _load_case
 from .diagnose.diagnosis import Diagnosis
 from .effects import Effect, catalogue
 from .evaluate.door import Door, Question
@@ -61,7 +61,7 @@ def load_case(path: Path | str, mesh: str = "") -> LoadedCase:
     >>> softer.case.pressure_kPa
     200.0
     """
-    loaded = _case.load_case(path)
+    loaded = _load_case(path)
     return with_level(loaded, mesh) if mesh else loaded
 
 

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import secrets
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 
 @contextlib.contextmanager
@@ -25,3 +27,14 @@ def whole(path: Path, many_writers: bool = False) -> Iterator[Path]:
         if isinstance(error, OSError):
             raise OSError(error.errno, error.strerror or str(error), str(path)) from None
         raise
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write ``text`` whole or not at all, the same bytes on every system. Raises OSError."""
+    with whole(path) as partial:
+        partial.write_text(text, encoding="utf-8", newline="")
+
+
+def json_text(content: Any) -> str:
+    """A result as JSON. Raises ValueError where a number of it is not finite."""
+    return json.dumps(content, indent=1, allow_nan=False) + "\n"

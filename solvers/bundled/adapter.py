@@ -14,7 +14,7 @@ from .job import Failures, TimedOut, run
 from .keywords import DeckError
 
 JOB, PRESS, OLDJOB = "modes", "press", "inflate"
-ASIDE = ("own_frequency", "cavity", "sector")  # of the tool's request, as in `job.Request`
+ASIDE = ("own_frequency", "cavity", "sector")  # of the tool's request, as in `request.Request`
 
 
 class Decks(Protocol):

@@ -51,8 +51,9 @@ class Deck:
         self._order = [oldjob, job] if oldjob else [job]
         self._keywords = {name: read_keywords(texts[name], name) for name in self._order}
 
-    def read(self, tangents: list[Tangent]) -> tuple[list[Keyword], list[Step]]:
-        """The section's model blocks and all steps, their numbers carrying ``tangents``."""
+    def read(self, tangents: list[Tangent]) -> tuple[list[Keyword], list[Keyword], list[Step]]:
+        """Model blocks of the section job and of the one that revolves it (none: empty), and all
+        steps, their numbers carrying ``tangents``."""
         models: list[list[Keyword]] = []
         steps = []
         for place, name in enumerate(self._order):
@@ -63,8 +64,8 @@ class Deck:
             steps.append(_steps(model, blocks, place > 0))
         if len(models) > 1:
             _check_transfer(models[0], steps[0], models[1])
-        self.revolve = models[-1] if len(models) > 1 else []
-        return models[0], [step for part in steps for step in part]
+        revolve = models[1] if len(models) > 1 else []
+        return models[0], revolve, [step for part in steps for step in part]
 
 
 def _steps(model: list[Keyword], blocks: list[list[Keyword]], revolved: bool) -> list[Step]:

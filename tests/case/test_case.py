@@ -76,6 +76,18 @@ def test_angular_cords_templates_and_linear_variables(tmp_path: Path) -> None:
     assert with_values(loaded, {"angle": -60}).case.rebar_layers["belt_1"].angle_deg == -60
 
 
+def test_one_wrong_key_of_a_part_hides_no_other(tmp_path: Path) -> None:
+    """What must agree between the keys of a part is judged where another of its keys is wrong."""
+    path = put(
+        tmp_path,
+        ("stations: p235_75r17.csv", "stations: p235_75r17.csv\n  outline: {file: 7}"),
+        ("{r: 0.0, z: 0.0}", "{r: 0.1, z: 0.0}\n  free: true\n  mass_kg: heavy"),
+    )
+    keys = {mistake.key for mistake in validate(path)}
+    assert {"section.outline.file", "section.outline"} <= keys
+    assert {"rim.mass_kg", "rim.reference_point_m"} <= keys
+
+
 def test_every_mistake_in_one_go_with_its_line(tmp_path: Path) -> None:
     path = put(
         tmp_path,

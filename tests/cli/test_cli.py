@@ -176,6 +176,26 @@ def test_a_folder_of_another_case_is_refused(
     assert (tmp_path / "out" / "modes.json").read_bytes() == before
 
 
+@pytest.mark.parametrize("content", ["", "[]", "{}", '"a case"'])
+def test_a_folder_with_a_record_of_something_else_is_refused(
+    content: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "run.json").write_text(content)
+    assert run("deck", CASE, "--output", str(tmp_path)) == 2
+    assert "holds results of something else; give another" in capsys.readouterr().err
+    assert (tmp_path / "run.json").read_text() == content
+
+
+def test_a_fit_on_this_machine_and_on_others_writes_nothing(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    both = ["--jobs", "2", "--scheduler", "tcp://localhost:1"]
+    assert run("fit", CASE, *both, "--output", str(out)) == 2
+    assert "--jobs is for this machine" in capsys.readouterr().err
+    assert not out.exists()
+
+
 def test_a_template_that_runs_code_is_refused(
     case_folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -64,6 +64,10 @@ def test_list_and_words_for_people(capsys: pytest.CaptureFixture[str]) -> None:
         (["cap_ply", "--case", "CASE", "--pressures-kPa", "200,x"], "'x' is no number"),
         (["cap_ply", "--case", "CASE", "--pressures-kPa", "200,200"], "each once"),
         (["cap_ply", "--case", "CASE", "--solver", "calculix"], "gives no slopes"),
+        (
+            ["cap_ply", "--case", "CASE", "--set", "C10=1e6", "--fitted", "CASE"],
+            "--set C10: the design is that of --fitted",
+        ),
     ],
 )
 def test_wrong_input(

@@ -10,7 +10,8 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial import cKDTree
 
 from tyrecal.case import LoadedCase, load_case, with_values
-from tyrecal.case.schema import Cord, Gauge, RebarLayer
+from tyrecal.case.materials import Cord
+from tyrecal.case.section import Gauge, RebarLayer
 from tyrecal.deck.write import Decks
 from tyrecal.effects import catalogue, with_effects
 from tyrecal.evaluate.door import Door, Question

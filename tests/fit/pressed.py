@@ -11,7 +11,7 @@ import numpy as np
 from tyrecal_solvers.bundled.adapter import Bundled
 
 from tyrecal.case import LoadedCase, load_case, start_values
-from tyrecal.case.schema import TargetFootprint, TargetMode
+from tyrecal.case.calibration import TargetFootprint, TargetMode
 from tyrecal.evaluate.door import Door
 from tyrecal.evaluate.store import Store
 

@@ -49,6 +49,13 @@ def functions(reference: int, seed: int, kept: range = range(12)) -> list[dict[s
     return sets
 
 
+def test_a_file_is_no_repeat_of_itself(tmp_path: Path) -> None:
+    (tmp_path / "t.csv").write_text("c,m,pressure [kPa],frequency [Hz]\n2,1,240,66.1\n")
+    (tmp_path / "sub").mkdir()
+    with pytest.raises(BadMeasuredData, match="is given twice"):
+        gather([tmp_path / "t.csv", tmp_path / "sub" / ".." / "t.csv"])
+
+
 def test_two_references_and_geometry_of_its_own(tmp_path: Path) -> None:
     where = write(tmp_path / "where.uff", nodes())
     files = [

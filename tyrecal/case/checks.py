@@ -6,16 +6,17 @@ another one, nor causes one.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 from pydantic import BaseModel, ValidationError
 
 from ..effects import IDS
+from .analysis import Analysis
+from .calibration import MEASURED
 from .meshable import Problems, levels, places
 from .mistakes import Keys, dotted, suggestion
 from .parts import WRONG, number
-from .schema import MEASURED, Analysis
 from .shape import KINDS, entries, explain, table, type_at
 
 if TYPE_CHECKING:
@@ -106,58 +107,58 @@ def _variables(data: Mapping[str, Any]) -> Problems:
     """Variables set numbers that exist, are not whole, allow the bounds, and are set once."""
     owners: dict[Keys, str] = {}
     data = {**data, "effects": {**dict.fromkeys(IDS, 0.0), **table(data, "effects")}}
-    for name, variable in table(data, "variables").items():
-        for i, path in enumerate(entries(variable, "sets")):
-            here: Keys = ("variables", name, "sets", i)
-            if not isinstance(path, str):
-                continue
-            try:
-                keys = find(data, path)
-            except KeyError as error:
-                yield here, str(error.args[0])
-                continue
-            if not keys:
-                continue
-            parent, value = keys[:-1], at(data, keys)
-            if keys[0] in FIXED:
-                yield here, f"a variable cannot set {keys[0]}"
-            elif type_at(keys) is int:
-                yield here, "is a whole number, which cannot vary"
-            elif value is not WRONG and not _is_number(value):
-                yield here, "leads to no number"
-            elif keys in owners:
-                yield here, f"is set by '{owners[keys]}' already"
-            else:
-                owners[keys] = name
-                for bound in ("lower", "upper"):
-                    limit = number(variable, bound)
-                    if limit is not None and (message := _refusal(data, parent, keys, limit)):
-                        yield ("variables", name, bound), f"{path} {message}"
+    for name, here, path, keys, nowhere in _paths(data, "variables"):
+        if nowhere:
+            yield here, nowhere
+        elif not keys:
+            continue
+        elif keys[0] in FIXED:
+            yield here, f"a variable cannot set {keys[0]}"
+        elif type_at(keys) is int:
+            yield here, "is a whole number, which cannot vary"
+        elif not _is_number(at(data, keys)):
+            yield here, "leads to no number"
+        elif keys in owners:
+            yield here, f"is set by '{owners[keys]}' already"
+        else:
+            owners[keys] = name
+            for bound in ("lower", "upper"):
+                limit = number(data["variables"][name], bound)
+                if limit is not None and (message := _refusal(data, keys, limit)):
+                    yield ("variables", name, bound), f"{path} {message}"
 
 
 def _uncertainties(data: Mapping[str, Any]) -> Problems:
     """Sources of error name numbers that exist."""
-    for name, source in table(data, "uncertainties").items():
-        for i, path in enumerate(entries(source, "sets")):
-            here: Keys = ("uncertainties", name, "sets", i)
+    for _, here, path, keys, nowhere in _paths(data, "uncertainties"):
+        if path.startswith("effects."):
+            if (id := path.removeprefix("effects.")) not in IDS:
+                yield here, f"'{id}' is not one of the effects{suggestion(id, IDS)}"
+        elif nowhere:
+            yield here, nowhere
+        elif keys and (keys[0] in FIXED or not _is_number(at(data, keys))):
+            yield here, "leads to no number of the tyre"
+
+
+def _paths(data: Mapping[str, Any], part: str) -> Iterator[tuple[str, Keys, str, Keys, str]]:
+    """All paths that the entries of ``part`` set: name of the entry, place of the path, the path,
+    the keys that it leads to, or why there are none (empty: a WRONG value is in the way)."""
+    for name, entry in table(data, part).items():
+        for i, path in enumerate(entries(entry, "sets")):
             if not isinstance(path, str):
                 continue
-            if path.startswith("effects."):
-                if (id := path.removeprefix("effects.")) not in IDS:
-                    yield here, f"'{id}' is not one of the effects{suggestion(id, IDS)}"
-                continue
+            keys: Keys = ()
+            nowhere = ""
             try:
                 keys = find(data, path)
             except KeyError as error:
-                yield here, str(error.args[0])
-                continue
-            value = at(data, keys) if keys else WRONG
-            if keys and (keys[0] in FIXED or (value is not WRONG and not _is_number(value))):
-                yield here, "leads to no number of the tyre"
+                nowhere = str(error.args[0])
+            yield name, (part, name, "sets", i), path, keys, nowhere
 
 
-def _refusal(data: Mapping[str, Any], parent: Keys, keys: Keys, value: float) -> str | None:
+def _refusal(data: Mapping[str, Any], keys: Keys, value: float) -> str | None:
     """Why the schema would not have ``value`` at ``keys``, judged in the part that holds it."""
+    parent = keys[:-1]
     part, model = at(data, parent), type_at(parent)
     if not isinstance(part, dict):
         return None
@@ -202,9 +203,10 @@ def find(data: Mapping[str, Any] | BaseModel, path: str) -> Keys:
 def at(data: Any, keys: Keys) -> Any:
     """The value at ``keys``, which exists."""
     for key in keys:
-        data = data[key]
+        data = getattr(data, str(key)) if isinstance(data, BaseModel) else data[key]
     return data
 
 
 def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool)
+    """Whether it is one, or a wrong value that is reported already."""
+    return value is WRONG or (isinstance(value, int | float) and not isinstance(value, bool))

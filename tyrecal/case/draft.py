@@ -14,7 +14,7 @@ from ..tyre.section import SectionError
 from ..tyre.size import INCH, TyreSize
 from .load import validate
 from .new import new_case
-from .schema import Outline, SectionSource
+from .section import Outline, SectionSource
 from .stations import read_section_of
 
 FLANGE = 17.3e-3  # m, height of the rim's flange, contour J

@@ -8,22 +8,18 @@ from typing import Annotated, Any, Union, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 
+from .analysis import Road
+from .calibration import TargetFootprint, TargetMode, Uncertainty, Variable
+from .materials import Cord, Rubber
 from .mistakes import Keys, suggestion
-from .parts import WRONG
-from .schema import (
-    Case,
-    Cord,
-    RebarLayer,
-    Road,
-    Rubber,
-    TargetFootprint,
-    TargetMode,
-    Uncertainty,
-    Variable,
-)
+from .parts import WRONG, Part
+from .schema import Case
+from .section import RebarLayer, SectionSource
+from .wheel import Rim
 
 UNIONS = (Union, UnionType)
 KINDS: dict[str, type[BaseModel]] = {"rubber": Rubber, "cord": Cord}
+SINGLE: dict[str, type[Part]] = {"section": SectionSource, "rim": Rim, "road": Road}
 MESSAGES = {
     "missing": "must be given",
     "float_type": "must be a number",
@@ -118,7 +114,7 @@ def disagreements(data: Mapping[str, Any]) -> Iterator[tuple[Keys, str]]:
     for key, kind in (("modes", TargetMode), ("footprint", TargetFootprint)):
         for i, target in enumerate(entries(table(data, "targets"), key)):
             parts.append((("targets", key, i), target, kind))
-    parts.append((("road",), table(data, "road"), Road))
+    parts += [((key,), data.get(key), kind) for key, kind in SINGLE.items()]
     for keys, part, kind in parts:
         if isinstance(part, dict):
             for key, message in kind.problems(part):

@@ -12,7 +12,7 @@ from pydantic import ValidationError
 from .document import MOST_BYTES, Document
 from .mistakes import Keys, Mistake, dotted, shortened
 from .parts import WRONG
-from .schema import SectionSource
+from .section import SectionSource
 
 if TYPE_CHECKING:
     from ..tyre.section import Section

@@ -11,7 +11,7 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from ..effects import with_effects
-from .checks import find, problems
+from .checks import at, find, problems
 from .load import LoadedCase
 from .meshable import folds
 from .mistakes import Keys, dotted, suggestion
@@ -98,12 +98,10 @@ def number_at(loaded: LoadedCase, path: str) -> float:
         keys = find(loaded.case, path)
     except KeyError as error:
         raise ValueError(f"{path}: {error.args[0]}") from None
-    node: Any = loaded.case
-    for key in keys:
-        node = getattr(node, str(key)) if isinstance(node, BaseModel) else node[key]
-    if isinstance(node, bool) or not isinstance(node, int | float):
+    value = at(loaded.case, keys)
+    if isinstance(value, bool) or not isinstance(value, int | float):
         raise ValueError(f"{path} is not a number")
-    return node
+    return value
 
 
 def _keys(loaded: LoadedCase, name: str) -> list[Keys]:
@@ -121,9 +119,7 @@ def _keys(loaded: LoadedCase, name: str) -> list[Keys]:
 
 def _number(case: Case, keys: Keys, value: float) -> float:
     """``value`` as the kind of number that stands at ``keys`` of the case."""
-    old: Any = case
-    for key in keys:
-        old = getattr(old, str(key)) if isinstance(old, BaseModel) else old[key]
+    old = at(case, keys)
     if isinstance(old, bool) or not isinstance(old, int | float | None):
         raise ValueError(f"{dotted(keys)} is not a number, it cannot be {value:g}")
     return int(value) if isinstance(old, int) and value.is_integer() else value

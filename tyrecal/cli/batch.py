@@ -8,9 +8,10 @@ from typing import Any
 
 import click
 
+from ..files import json_text, write_text
 from . import options
 from .main import EXIT_BATCH
-from .talk import Talk, show
+from .talk import Talk
 
 STUDIES = ("fit", "modes", "sweep-pressure", "footprint")  # without importing what they need
 FILE = click.Path(path_type=Path, dir_okay=False)
@@ -94,8 +95,7 @@ def command(
     asked = Asked(tuple(options.parse_loads(loads)) if loads is not None else None, pressures)
     if write_baseline and not baseline:
         raise click.UsageError("--write-baseline needs --baseline FILE")
-    if scheduler and jobs > 1:
-        raise click.UsageError("--jobs is for this machine; with --scheduler its workers count")
+    options.not_both(jobs, scheduler)
     before = None
     if baseline and (baseline.exists() or not write_baseline):
         before = read_baseline(baseline)
@@ -119,7 +119,7 @@ def command(
     if junit:
         _write(junit, junit_xml(reports, drift, started))
     if write_baseline and baseline:
-        _write(baseline, _json(baseline_of(reports, before)))
+        _write(baseline, json_text(baseline_of(reports, before)))
     run.finish(cases={report["name"]: report["facts"] for report in reports}, scheduler=address)
     talk.result(result)
     _tell(result, talk)
@@ -174,12 +174,12 @@ def _tell(result: Mapping[str, Any], talk: Talk) -> None:
 
     failures = failures_table(result)
     if failures:
-        show(failures, talk.as_json, talk.quiet)
+        talk.show(failures, beside_json=True)
     drift = result["baseline"]
     if drift:
         drifted = drift_table(drift)
         if drifted:
-            show(drifted, talk.as_json, talk.quiet)
+            talk.show(drifted, beside_json=True)
         words = f"{len(drift['drifted'])} of {drift['compared']} numbers drifted"
         words += f", {drift['new']} are new" if drift["new"] else ""
         talk.say(f"{words}; see the baseline's tolerances")
@@ -202,15 +202,6 @@ def _some(names: Sequence[str], most: int = 10) -> str:
     return ", ".join(names[:most]) + rest
 
 
-def _json(content: Any) -> str:
-    import json
-
-    return json.dumps(content, indent=1, allow_nan=False) + "\n"
-
-
 def _write(path: Path, text: str) -> None:
-    from ..files import whole
-
     path.parent.mkdir(parents=True, exist_ok=True)
-    with whole(path) as partial:
-        partial.write_text(text, encoding="utf-8", newline="")
+    write_text(path, text)

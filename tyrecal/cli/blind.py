@@ -8,8 +8,7 @@ from typing import Any
 import click
 
 from . import complete, options
-from .output import RESUME
-from .talk import Progress, Talk
+from .talk import Progress, Talk, resume
 
 folder = click.argument("folder", type=click.Path(path_type=Path, file_okay=False), metavar="DIR")
 truth = click.option(
@@ -99,7 +98,7 @@ def make(
         who = replace(who, laws={id: who.laws[id] for id in drawn})
     counts = {"effect": effects, "none": plain, "outside": outside}
     protocol = Protocol(who.about, case.path.name, counts)
-    _goes_on("trials that were made are kept")
+    resume("trials that were made are kept; the same command goes on from there")
     with talk.progress("make trials") as bar:
         mark = made(folder, sealed, case, protocol, who, jobs, seed, _told("made", talk, bar))
     door = Door(case, "bundled", store=store)
@@ -152,7 +151,7 @@ def answer(
     model: Response = blind.tyre_model(case, door, protocol, jobs, effects or None)
     if emulated:
         model = emulate(model)
-    _goes_on("answers that were given are kept")
+    resume("answers that were given are kept; the same command goes on from there")
     with talk.progress("answer trials") as bar:
         rows = blind.rows_of(case, protocol)
         mark = blind.answer(folder, model, rows, jobs, _told("answered", talk, bar))
@@ -176,13 +175,12 @@ def score(folder: Path, truth: Path | None, talk: Talk) -> int:
     from ..blind.protocol import read_protocol, write_json
     from ..blind.score import score as scored
     from ..blind.tables import page, summary
-    from ..files import whole
+    from ..files import write_text
 
     figures = summary(scored(folder, _sealed(folder, truth)))
     write_json(folder / "score.json", figures)
     words = page(figures, read_protocol(folder).maker)
-    with whole(folder / "score.md") as partial:
-        partial.write_text(words, encoding="utf-8", newline="")
+    write_text(folder / "score.md", words)
     talk.result(figures)
     talk.say(words)
     return 0
@@ -192,17 +190,12 @@ def _sealed(folder: Path, truth: Path | None) -> Path:
     return truth or folder.with_name(f"{folder.name}-truth")
 
 
-def _goes_on(words: str) -> None:
-    meta = click.get_current_context().meta
-    meta[RESUME] = f"{words}; the same command goes on from there"
-
-
 def _told(what: str, talk: Talk, bar: Progress) -> Any:
     """Says how far it is: the bar, and a line at every tenth of the way."""
 
     def told(done: int, all: int) -> None:
         bar.at(done, all)
-        if not talk.quiet and (done == all or done % max(1, all // 10) == 0):
-            click.echo(f"{what} {done} of {all}", err=True)
+        if done == all or done % max(1, all // 10) == 0:
+            talk.note(f"{what} {done} of {all}")
 
     return told

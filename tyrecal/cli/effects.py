@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -77,6 +78,8 @@ def command(
         return 0
 
     loaded, values = study.load(case, assignments)
+    if fitted and (lost := _variables_in(assignments, values)):
+        raise click.UsageError(f"--set {lost[0]}: the design is that of --fitted")
     door = study.door(loaded)
     adapter = door.solver
     if not door.has_gradients:
@@ -115,6 +118,13 @@ def command(
         talk.show(signatures_table(found))
     talk.say(f"results in {run.folder}")
     return EXIT_SOLVER if failed else 0
+
+
+def _variables_in(assignments: tuple[str, ...], values: Mapping[str, float]) -> list[str]:
+    """Variables among what is set."""
+    from ..case import parse_assignment
+
+    return [name for name, _ in map(parse_assignment, assignments) if name in values]
 
 
 def _pressures(loaded: Any, text: str | None) -> list[float]:

@@ -83,6 +83,7 @@ def command(
     from ..report.words import fit_doubts
 
     talk = study.talk
+    options.not_both(study.jobs, scheduler)
     loaded, values = study.load(case, assignments, pressure_kPa)
     unknown = [name for name in fix if name not in values]
     if unknown:
@@ -98,8 +99,6 @@ def command(
         door.needs_road()
     run = study.run(case, "fit", door)
     unit = objective_unit(loaded)
-    if scheduler and study.jobs > 1:
-        raise click.UsageError("--jobs is for this machine; with --scheduler its workers count")
     with talk.progress("fit") as bar, reached(scheduler) as door.scheduler:
         points = _Points(talk, bar, unit)
         fit = calibrate(
@@ -119,8 +118,7 @@ def command(
     talk.result(fit.result)
     talk.show(fit_table(fit.result))
     for each in left_out:
-        if not talk.quiet:
-            click.echo(f"{measured}: not used: {each}", err=True)
+        talk.note(f"{measured}: not used: {each}")
     for warning in fit_doubts(fit.result):
         talk.warn(warning)
     if pictures or study.report:
@@ -168,7 +166,7 @@ class _Points:
     def notify(self, number: int, values: Mapping[str, float], outcome: Any) -> None:
         """One more design point."""
         objective = getattr(outcome, "objective", None)
-        self.best = min(self.best, objective or float("inf"))
+        self.best = self.best if objective is None else min(self.best, objective)
         state = f"{objective:.4f} {self.unit}" if objective is not None else f"failed: {outcome}"
         numbers = "  ".join(f"{k}={v:.5g}" for k, v in values.items())
         self.talk.detail(f"point {number}: {state}  {numbers}")

@@ -32,7 +32,8 @@ def _length(flag: str, text: str, unit: str = "mm") -> Any:
 @_length("bead", "Thickness at the rim's flange.")
 @_length("belt-width", "Width of the wider belt, along the carcass.")
 @_length("rim-width", "Width of the rim between its flanges.", "in")
-@options.pressure
+@click.option("--pressure-kPa", "pressure_kPa", type=float, metavar="P",
+              help="Inflation pressure (default: usual for the type of tyre).")  # fmt: skip
 @click.option("--output", type=click.Path(path_type=Path), metavar="CASE.yaml",
               help="Case file to write (default: named by the size, in this folder).")  # fmt: skip
 @click.option("--force", is_flag=True, help="Write over files that exist.")

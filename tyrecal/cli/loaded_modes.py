@@ -8,13 +8,11 @@ from typing import Any
 import click
 
 from .main import EXIT_SOLVER
-from .options import Study
+from .options import Study, parse_loads
 
 
 def wanted_loads(load_N: float | None, sweep: str | None) -> list[float]:
     """The loads asked for, N; empty: the unloaded tyre alone. Raises click.UsageError."""
-    from .options import parse_loads
-
     if load_N is not None and sweep is not None:
         raise click.UsageError("give --load-N or --sweep-load, not both")
     if sweep is not None:
@@ -46,7 +44,7 @@ def at_load(door: Any, run: Any, values: Mapping[str, float], load_N: float, stu
     talk.show(modes_table(result))
     for sentence in result["findings"]["words"]:
         talk.say(sentence)
-    run.report(study.report, talk.as_json, talk.quiet)
+    study.page(run)
     return 0
 
 

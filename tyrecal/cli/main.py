@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from .talk import coloured, error
+from .talk import RESUME, coloured, error
 
 # One BLAS thread: the tyre's matrices are small, and cores are better spent on other designs.
 # Has to be set before NumPy is imported.
@@ -66,7 +66,7 @@ class Commands(click.Group):
         try:
             return super().invoke(ctx)
         except KeyboardInterrupt:
-            raise Interrupted(ctx.meta.get("tyrecal.resume", "nothing was changed")) from None
+            raise Interrupted(ctx.meta.get(RESUME, "nothing was changed")) from None
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         with formatter.section("Commands"):

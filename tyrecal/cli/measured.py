@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from . import options
-from .talk import Talk, say
+from .talk import Talk
 
 if TYPE_CHECKING:
     from ..measured.modal import Layout
@@ -95,7 +95,7 @@ def import_files(
     tyrecal measured import run1.uff run2.uff --pressure-kPa 240 --directions cylindrical
     tyrecal measured import at_200.csv at_240.csv --output both.csv
     """
-    from ..files import whole
+    from ..files import write_text
     from ..measured.gather import gather, result
     from ..measured.values import measurements_csv
 
@@ -106,14 +106,13 @@ def import_files(
         raise click.UsageError(f"--band {band}: must rise from 0 or more")
     layout = _layout(axle, centre, directions, highest, limits, response or "")
     found = gather(files, pressure_kPa, layout, floor / 100, assumed and assumed / 100)
-    with whole(output) as partial:
-        partial.write_text(measurements_csv(found.rows), encoding="utf-8", newline="")
+    write_text(output, measurements_csv(found.rows))
     if pictures and found.runs:
         from ..report.measured import draw_measured
 
         draw_measured(output.with_suffix(".png"), found.runs)
     for note in found.notes:
-        say(note, True, talk.quiet)
+        talk.note(note)
     talk.result(result(found))
     if found.runs:
         from ..report.measured import measured_table

@@ -81,5 +81,5 @@ def command(
 
     talk.result(result)
     talk.show(modes_table(result))
-    run.report(study.report, talk.as_json, talk.quiet)
+    study.page(run)
     return 0

@@ -8,7 +8,7 @@
    --output, --store, --no-store and --report too, as ``study`` (`Study`): load, door, run, finish.
 4. Its docstring says what it does and writes, and ends with examples after a line ``\\b``.
 5. Long work runs in ``with talk.progress("what") as bar``: ``bar.at(done, of)`` shows the time
-   left. Ctrl-C says how to go on: ``run`` knows; others set the context's RESUME (`output`).
+   left. Ctrl-C says how to go on: ``run`` knows; others call `talk.resume`.
 6. Wrong input raises click.UsageError, or an error that ``main`` knows; codes: ``main.EXIT_CODES``.
 7. What a shell can complete has ``shell_complete``, from `complete`.
 """
@@ -241,9 +241,18 @@ class Study:
         return run
 
     def finish(self, run: Run) -> None:
-        """Say where the results are, and write their page where it is wanted."""
+        """Say where the results are; see `page`."""
         self.talk.say(f"results in {run.folder}")
-        run.report(self.report, self.talk.as_json, self.talk.quiet)
+        self.page(run)
+
+    def page(self, run: Run) -> None:
+        """Where it is wanted, write report.html of all that the folder holds. Raises BadResults."""
+        if self.report:
+            from ..report.html.page import write_page
+
+            path = run.folder / "report.html"
+            write_page(path, [run.folder])
+            self.talk.say(f"report in {path}")
 
 
 def _talk(as_json: bool, quiet: bool, verbose: bool) -> Talk:
@@ -292,6 +301,12 @@ def load(path: Path, mesh_level: str, assigned: tuple[str, ...], pressure_kPa: f
         raise
     except ValueError as error:
         raise click.UsageError(str(error)) from None
+
+
+def not_both(jobs: int, scheduler: str) -> None:
+    """Raises click.UsageError where this machine and a scheduler's are asked for."""
+    if scheduler and jobs > 1:
+        raise click.UsageError("--jobs is for this machine; with --scheduler its workers count")
 
 
 def parse_loads(text: str, option: str = "--loads-N", zero: bool = False) -> list[float]:

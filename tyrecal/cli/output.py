@@ -13,16 +13,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..files import whole
+from ..files import json_text, write_text
 from . import lock
-from .talk import print_json, say, show
+from .talk import resume
 
 if TYPE_CHECKING:
     from ..evaluate.door import Counts
     from ..evaluate.store import Store
-
-__all__ = ["OutputRefused", "Run", "print_json", "say", "show"]
-RESUME = "tyrecal.resume"  # key of the context's notes: how to go on after Ctrl-C
 
 
 class OutputRefused(ValueError):
@@ -66,20 +63,17 @@ class Run:
                 f"evaluations that had finished are on record in '{self.store.folder}'; the same"
                 " command goes on from there"
             )
-        click.get_current_context().meta[RESUME] = words
+        resume(words)
         return self.store
 
     def write_json(self, name: str, content: Any) -> Path:
         """Write a result file whole or not at all."""
-        text = json.dumps(content, indent=1, allow_nan=False) + "\n"
-        return self.write_text(name, text)
+        return self.write_text(name, json_text(content))
 
     def write_text(self, name: str, text: str) -> Path:
         """Write a result file whole or not at all."""
-        path = self.folder / name
-        with whole(path) as partial:
-            partial.write_text(text, encoding="utf-8", newline="")
-        return path
+        write_text(self.folder / name, text)
+        return self.folder / name
 
     @property
     def runs(self) -> Path:
@@ -112,15 +106,6 @@ class Run:
             },
         )
 
-    def report(self, wanted: bool, as_json: bool, quiet: bool) -> None:
-        """Where it is wanted, write report.html of all that the folder holds. Raises BadResults."""
-        if wanted:
-            from ..report.html.page import write_page
-
-            path = self.folder / "report.html"
-            write_page(path, [self.folder])
-            say(f"report in {path}", as_json, quiet)
-
     def _close(self) -> None:
         with contextlib.suppress(OSError):  # it holds failures, or was never made
             self.runs.rmdir()
@@ -136,9 +121,10 @@ def refuse_other(folder: Path, case: Path) -> None:
     if not record.exists():
         return
     try:
-        owner = json.loads(record.read_text(encoding="utf-8")).get("case")
+        facts = json.loads(record.read_text(encoding="utf-8"))
     except ValueError:
-        owner = None
+        facts = None
+    owner = facts.get("case") if isinstance(facts, dict) else None
     if owner != str(case):
         raise OutputRefused(
             f"folder '{folder}' holds results of {owner or 'something else'};"

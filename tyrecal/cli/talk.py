@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import logging
 import os
 import re
@@ -14,7 +13,10 @@ from typing import Any
 
 import click
 
+from ..files import json_text
+
 SOLVERS = "tyrecal_solvers"  # logger of the solvers that ship
+RESUME = "tyrecal.resume"  # key of the context's notes: how to go on after Ctrl-C
 
 
 def coloured() -> bool | None:
@@ -23,34 +25,14 @@ def coloured() -> bool | None:
     return False if unwanted else None
 
 
-def say(text: str, as_json: bool, quiet: bool) -> None:
-    """A line for people: on standard output, or standard error beside JSON."""
-    if not quiet:
-        click.echo(text, err=as_json)
-
-
-def show(table: Any, as_json: bool, quiet: bool) -> None:
-    """A rich table for people, likewise."""
-    if quiet:
-        return
-    from rich.console import Console
-
-    console = Console(stderr=as_json)
-    if not console.is_terminal:
-        console = Console(stderr=as_json, width=110)
-    with console.capture() as text:  # rich answers a closed pipe by leaving the process
-        console.print(table)
-    click.echo(text.get(), nl=False, err=as_json, color=coloured())
-
-
-def print_json(content: Any) -> None:
-    """A result on standard output, for programs."""
-    click.echo(json.dumps(content, indent=1, allow_nan=False))
-
-
 def error(text: str) -> None:
     """What went wrong, in red on a terminal."""
     click.secho(f"error: {text}", fg="red", err=True, color=coloured())
+
+
+def resume(words: str) -> None:
+    """Have Ctrl-C say how to go on."""
+    click.get_current_context().meta[RESUME] = words
 
 
 @dataclass(frozen=True)
@@ -66,17 +48,32 @@ class Talk:
     verbose: bool = False
 
     def say(self, text: str) -> None:
-        """A line of the result, for people."""
-        say(text, self.as_json, self.quiet)
+        """A line of the result, for people: on standard error beside JSON."""
+        if not self.quiet:
+            click.echo(text, err=self.as_json)
 
-    def show(self, table: Any) -> None:
-        """A table of the result, for people: not beside JSON, which holds the same."""
-        show(table, self.as_json, self.quiet or self.as_json)
+    def note(self, text: str) -> None:
+        """A remark on the result, always on standard error."""
+        if not self.quiet:
+            click.echo(text, err=True)
+
+    def show(self, table: Any, beside_json: bool = False) -> None:
+        """A table of the result, for people; beside JSON, which holds the same, only on demand."""
+        if self.quiet or (self.as_json and not beside_json):
+            return
+        from rich.console import Console
+
+        console = Console(stderr=self.as_json)
+        if not console.is_terminal:
+            console = Console(stderr=self.as_json, width=110)
+        with console.capture() as text:  # rich answers a closed pipe by leaving the process
+            console.print(table)
+        click.echo(text.get(), nl=False, err=self.as_json, color=coloured())
 
     def result(self, content: Any) -> None:
         """The result for programs, where they ask for it."""
         if self.as_json:
-            print_json(content)
+            click.echo(json_text(content), nl=False)
 
     def detail(self, text: str) -> None:
         """What only --verbose wants to know."""

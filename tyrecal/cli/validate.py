@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from . import options
+from .main import EXIT_INPUT
 from .talk import Talk
 
 
@@ -38,6 +39,6 @@ def command(case: Path, talk: Talk) -> int:
         ]
     )
     if mistakes:
-        return 2
+        return EXIT_INPUT
     talk.say(f"{case}: no mistakes")
     return 0

@@ -6,8 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from ..case import LoadedCase
-from ..case.schema import Analysis, Case, Rim, Rubber
+from ..case import Case, LoadedCase
+from ..case.analysis import Analysis
+from ..case.materials import Rubber
+from ..case.wheel import Rim
 from ..effects import with_effects
 from .uneven import uneven
 

@@ -6,7 +6,7 @@ from functools import lru_cache
 from typing import Any
 
 from ..case import LoadedCase
-from ..case.schema import Analysis
+from ..case.analysis import Analysis
 from ..effects import with_effects
 from ..tyre.gauges import with_gauges
 from ..tyre.mesh import SectionMesh, build_mesh

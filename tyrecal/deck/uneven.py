@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..case.schema import Case
+from ..case import Case
 from ..tyre.mesh import SectionMesh
 
 ELEMENT = 999_100_001  # beyond all that a revolve makes

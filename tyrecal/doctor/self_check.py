@@ -45,9 +45,7 @@ def self_check(solver: str = "bundled") -> dict[str, Any]:
                 "label": label,
                 "frequency_Hz": hertz.get(label),
                 "recorded_Hz": recorded,
-                "deviation_percent": 100 * (hertz[label] / recorded - 1)
-                if label in hertz
-                else None,
+                "deviation_percent": _percent(hertz.get(label), recorded),
             }
             for label, recorded in RECORDED_HZ.items()
         ]

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from ..case import LoadedCase
-from ..case.schema import Cord, RebarLayer
+from ..case.materials import Cord
+from ..case.section import RebarLayer
 from .edit import changed, unused, with_layers
 from .effect import Effect
 from .parts import belt_lines

@@ -5,7 +5,8 @@ from __future__ import annotations
 from math import pi
 
 from ..case import LoadedCase
-from ..case.schema import Analysis, Prony, Rubber
+from ..case.analysis import Analysis
+from ..case.materials import Prony, Rubber
 from .edit import changed, with_part, with_rubbers
 from .effect import Effect
 

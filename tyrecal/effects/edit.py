@@ -9,7 +9,9 @@ from typing import Any, TypeVar
 from pydantic import BaseModel
 
 from ..case import Case, LoadedCase
-from ..case.schema import Gauge, Part, Rubber, Solid
+from ..case.materials import Rubber
+from ..case.parts import Part
+from ..case.section import Gauge, Solid
 
 P = TypeVar("P", bound=Part)
 

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..case import LoadedCase, with_values
-from ..case.schema import MEASURED
+from ..case.calibration import MEASURED
 from ..deck.context import section_mesh
 from ..evaluate.door import Door
 from ..evaluate.failure import EvaluationFailed

@@ -8,7 +8,7 @@ from math import hypot
 from pathlib import Path
 
 from ..case import LoadedCase
-from ..case.schema import MEASURED, TargetFootprint, TargetMode, Targets
+from ..case.calibration import MEASURED, TargetFootprint, TargetMode, Targets
 from ..diagnose.measurements import BadMeasurements, Reading, read_measurements
 from ..modes.mode import Label
 

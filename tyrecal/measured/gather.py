@@ -40,6 +40,11 @@ def gather(
     pressure_kPa: of files that do not say theirs; floor, assumed: relative, see ``combined``.
     Raises BadMeasuredData, LabMissing, OSError.
     """
+    for k, path in enumerate(paths):
+        if path.resolve() in [other.resolve() for other in paths[:k]]:
+            raise BadMeasuredData(
+                f"{path}: is given twice; as its own repeat it would tell nothing"
+            )
     universal = [read_universal(path) for path in paths if is_universal(path)]
     nodes = all_nodes(universal)
     values: list[Value] = []

@@ -9,9 +9,7 @@ from typing import Any
 import numpy as np
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
-from .figure import COLOURS, GREY, in_house_style, new_figure, save
-
-MARKERS = "os^Dv<>P"
+from .figure import COLOURS, GREY, MARKERS, in_house_style, new_figure, save
 
 
 @in_house_style

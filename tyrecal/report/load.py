@@ -8,8 +8,8 @@ from typing import Any
 
 from ..modes.loaded import SYMMETRIES
 from ..modes.mode import FAMILIES, Label
-from .figure import COLOURS, in_house_style, new_figure, save
-from .pressure import GAP, MARKERS, apart
+from .figure import COLOURS, MARKERS, in_house_style, new_figure, save
+from .pressure import GAP, name_lines
 
 STYLES: dict[str, dict[str, Any]] = {  # symmetric solid, antisymmetric dashed and hollow
     SYMMETRIES[0]: {"ls": "-"},
@@ -45,7 +45,8 @@ def draw_load_sweep(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
     grid[0, 0].set_ylim(bottom=0)
     for line, curves in zip(grid, designs.values(), strict=True):
         for axes, name in zip(line, shown, strict=True):
-            _name_lines(axes, {k: c for k, c in curves.items() if k[0].family == name})
+            ends = [(c[1][-1], c[0][-1], k[0]) for k, c in curves.items() if k[0].family == name]
+            name_lines(axes, ends, GAP)
     for symmetry, style in STYLES.items():
         grid[0, 0].plot([], [], color="k", marker="o", ms=4.5, lw=1.4, label=symmetry, **style)
     grid[0, 0].legend(frameon=False, loc="lower right")
@@ -62,21 +63,3 @@ def _curves(rows: Sequence[Mapping[str, Any]], design: str) -> dict[tuple[Label,
             load.append(row["load_N"] / 1e3)
             hertz.append(mode["frequency_Hz"])
     return found
-
-
-def _name_lines(axes: Any, curves: Mapping[tuple[Label, str], Curve]) -> None:
-    """Labels right of the lines' ends, moved apart where they would touch."""
-    ends = sorted((curve[1][-1], key) for key, curve in curves.items())
-    low, high = axes.get_ylim()
-    place = apart([(y - low) / (high - low) for y, _ in ends], GAP)
-    for (y, key), height in zip(ends, place, strict=True):
-        axes.annotate(
-            str(key[0]),
-            (curves[key][0][-1], y),
-            xytext=(1.03, height),
-            textcoords="axes fraction",
-            va="center",
-            color=COLOURS[key[0].c % len(COLOURS)],
-            arrowprops={"arrowstyle": "-", "color": "0.75", "lw": 0.6, "shrinkB": 4, "shrinkA": 0},
-            annotation_clip=False,
-        )

@@ -30,23 +30,24 @@ def measured_table(runs: Sequence[Run]) -> Table:
     """Modes of each run: label, frequency, damping, and how sure the label is."""
     from rich import box
     from rich.table import Table
+    from rich.text import Text
 
     table = Table(box=box.SIMPLE_HEAD, title="modes found")
     for name in ("label", "Hz", "sigma Hz", "damping %", "sure", ""):
         table.add_column(name, justify="left" if name in ("label", "") else "right")
     for run in runs:
         table.add_section()
-        table.add_row(f"[bold]{Path(run.name).name}[/bold]")
+        table.add_row(Text(Path(run.name).name, "bold"))
         for told in run.modes:
             label, sigma = told.judged.label, told.mode.sigma_Hz
             member = f" member {told.member}" if told.member else ""
             table.add_row(
-                f"{label}{member}".replace("[", "\\[") if label else "-",
+                Text(f"{label}{member}" if label else "-"),
                 f"{told.mode.frequency_Hz:.2f}",
                 f"{sigma:.3f}" if sigma is not None and np.isfinite(sigma) else "-",
                 f"{100 * told.mode.damping:.2f}" if np.isfinite(told.mode.damping) else "-",
                 f"{told.judged.confidence:.2f}",
-                told.judged.why.replace("[", "\\["),
+                Text(told.judged.why),
             )
     return table
 

@@ -28,7 +28,7 @@ def draw_evaluation(
     moved, modes = placed(evaluation, modes, mesh)
     draw_section(folder / "section.png", case, mesh, moved or None)
     if modes:
-        draw_modes_overview(folder / "modes.png", modes[:9], mesh)
+        draw_modes_overview(folder / "modes.png", modes, mesh)
     for mode in modes:
         stem = folder / file_name(mode.label)
         draw_mode(stem.with_suffix(".png"), mode, mesh)

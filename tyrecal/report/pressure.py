@@ -10,10 +10,9 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from ..modes.mode import FAMILIES, Label
-from .figure import COLOURS, GREY, in_house_style, new_figure, save
+from .figure import COLOURS, GREY, MARKERS, in_house_style, new_figure, save
 
 LINES = {"initial": (0, (4, 2)), "fitted": "-"}
-MARKERS = "os^Dv<>P"
 GAP = 0.042  # of an axis' height between two labels' centres
 
 Curves = dict[Label, tuple[np.ndarray, np.ndarray, np.ndarray]]
@@ -64,7 +63,9 @@ def draw_pressure_sweep(
     last = designs.get("fitted") or next(iter(designs.values()))
     for axes_pair, name in zip(grid.T, shown, strict=True):
         for axes, which in zip(axes_pair, (1, 2), strict=True):
-            _name_lines(axes, {x: last[x] for x in columns[name] if x in last}, which)
+            mine = {label: last[label] for label in columns[name] if label in last}
+            ends = [(float(c[which][-1]), float(c[0][-1]), label) for label, c in mine.items()]
+            name_lines(axes, ends, GAP * (1 if which == 1 else 5 / 3))
     for design in designs:
         top.plot([], [], color="k", ls=LINES.get(design, ":"), label=design)
     if targets:
@@ -98,17 +99,18 @@ def _curves(rows: Sequence[Mapping[str, Any]], design: str) -> Curves:
     return {label: tuple(np.array(points).T) for label, points in found.items()}
 
 
-def _name_lines(axes: Axes, curves: Curves, which: int) -> None:
-    """Labels right of the lines' ends, moved apart where they would touch."""
-    ends = sorted((float(curve[which][-1]), label) for label, curve in curves.items())
-    if not np.isfinite([y for y, _ in ends]).all():
+def name_lines(axes: Axes, ends: Sequence[tuple[float, float, Label]], gap: float) -> None:
+    """Labels right of the lines' ends, (y, x, label) of each, moved apart where they would touch:
+    ``gap`` of the axis' height between two. None where a line has no end."""
+    if not np.isfinite([y for y, _, _ in ends]).all():
         return
+    ends = sorted(ends, key=lambda end: (end[0], end[2]))
     low, high = axes.get_ylim()
-    place = apart([(y - low) / (high - low) for y, _ in ends], GAP * (1 if which == 1 else 5 / 3))
-    for (y, label), height in zip(ends, place, strict=True):
+    place = apart([(y - low) / (high - low) for y, _, _ in ends], gap)
+    for (y, x, label), height in zip(ends, place, strict=True):
         axes.annotate(
             str(label),
-            (float(curves[label][0][-1]), y),
+            (x, y),
             xytext=(1.03, height),
             textcoords="axes fraction",
             va="center",

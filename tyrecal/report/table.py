@@ -11,7 +11,7 @@ from rich import box
 from rich.table import Table
 from rich.text import Text
 
-from .words import motion
+from .words import CLOSE, FAR, motion
 
 NONE = "-"
 QUANTITIES = {  # of a footprint target: words, unit over SI, decimals
@@ -253,7 +253,7 @@ def _named(mode: Mapping[str, Any]) -> tuple[str, str]:
 
 
 def _colour(deviation: float) -> str:
-    return "green" if abs(deviation) < 2 else "yellow" if abs(deviation) < 5 else "red"
+    return "green" if abs(deviation) < CLOSE else "yellow" if abs(deviation) < FAR else "red"
 
 
 def _key(mode: Mapping[str, Any]) -> tuple[int, int, str | None]:

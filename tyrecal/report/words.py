@@ -14,6 +14,8 @@ KNOWN = {
 }
 ORDINALS = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth")
 
+CLOSE, FAR = 2.0, 5.0  # % of deviation from a target
+
 
 def motion(c: int, m: int, kind: str | None = None) -> str:
     """What the tyre does in mode [c, m]: ``motion(2, 1)`` is 'first out-of-plane bending'."""

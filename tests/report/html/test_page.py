@@ -175,7 +175,8 @@ def test_shapes_of_another_run_are_not_shown(copy: Path) -> None:
     assert text_of(copy).count('class="viewer"') == 1
 
 
-@pytest.mark.parametrize("content", ["", "{", "[]", "null", "{}", "\ud800", '{"format": 1}', "7"])
+@pytest.mark.parametrize("content", ["", "{", "[]", "null", "{}", "\ud800", '{"format": 1}', "7",
+                                     '{"format": ' + "1" * 5000 + "}"])  # fmt: skip
 def test_a_damaged_file_is_named(copy: Path, content: str) -> None:
     for file in sorted(copy.glob("*.json")):
         if file.name == "run.json":

@@ -16,13 +16,13 @@ from markupsafe import Markup
 
 from ...files import whole
 from ..table import FOOTPRINT, QUANTITIES
-from ..words import motion
+from ..words import CLOSE, FAR, motion
 from . import drawings, plots
-from .contents import LoadSweep, Shapes
+from .contents import LoadSweep, PressureRow, Shapes
 from .markdown import html
 from .results import BadResults, Results, read_results
 from .shapes import packed
-from .summary import CLOSE, FAR, VERDICTS, design_words, summary
+from .summary import VERDICTS, design_words, summary
 from .svg import MINUS
 
 LARGEST = 5_000_000  # bytes of a page
@@ -146,7 +146,7 @@ def _pressure(found: Results) -> dict[str, Any]:
         "rows": rows,
         "panels": plots.pressure(rows, targets, at),
         "words": design_words(found.pressure),
-        "tables": _over(rows, "pressure_kPa"),
+        "tables": _tables(rows),
         "targets": bool(targets),
     }
 
@@ -155,7 +155,7 @@ def _load(found: LoadSweep) -> dict[str, Any]:
     return {"rows": found.rows, "words": design_words(found), "panels": plots.load(found.rows)}
 
 
-def _over(rows: Sequence[Any], key: str) -> list[dict[str, Any]]:
+def _tables(rows: Sequence[PressureRow]) -> list[dict[str, Any]]:
     """A table a design: modes by rows, frequencies at each pressure by columns."""
     tables = []
     for design in dict.fromkeys(row.design for row in rows):
@@ -164,7 +164,7 @@ def _over(rows: Sequence[Any], key: str) -> list[dict[str, Any]]:
         for k, row in enumerate(own):
             for mode in row.modes:
                 found.setdefault(plots.label(mode), [None] * len(own))[k] = mode.frequency_Hz
-        columns = [getattr(row, key) for row in own]
+        columns = [row.pressure_kPa for row in own]
         tables.append({"design": design, "columns": columns, "rows": found})
     return tables
 

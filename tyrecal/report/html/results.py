@@ -105,9 +105,11 @@ def _read(path: Path, kind: type[File]) -> File | None:
     if text is None:
         return None
     try:
-        return kind.model_validate(json.loads(text))
-    except (json.JSONDecodeError, RecursionError):
+        content = json.loads(text)
+    except (ValueError, RecursionError):  # an integer of thousands of digits is no JSONDecodeError
         raise BadResults(f"'{path}' is damaged: it is no JSON") from None
+    try:
+        return kind.model_validate(content)
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(str(place) for place in first["loc"]) or "the whole"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from ..words import fit_doubts, motion
+from ..words import CLOSE, fit_doubts, motion
 from .contents import (
     Diagnosis,
     Failed,
@@ -18,7 +18,6 @@ from .contents import (
 )
 from .results import Results
 
-CLOSE, FAR = 2.0, 5.0  # % of deviation, as the terminal colours them
 VERDICTS = {
     "named": "Named",
     "undecided": "Undecided",

@@ -1,0 +1,117 @@
+"""The calibration of a case: what may vary, what was measured, and what may be off."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Any, Literal
+
+from pydantic import Field
+
+from .parts import WRONG, NotNegative, Part, Positive, Problem, Text, number
+
+MEASURED = {"contact_area_m2": "sigma_m2", "vertical_stiffness_N_per_m": "sigma_N_per_m"}
+"""What a footprint target can hold, and the key of its standard deviation."""
+
+
+class Variable(Part):
+    """A design variable: the numbers it sets (dotted paths), its start and its bounds."""
+
+    sets: Annotated[list[str], Field(min_length=1)]
+    start: float
+    lower: float
+    upper: float
+    scale: Literal["log", "linear"] = "log"
+
+    @classmethod
+    def problems(cls, values: Mapping[str, Any]) -> Iterator[Problem]:
+        start, lower, upper = (number(values, key) for key in ("start", "lower", "upper"))
+        if lower is not None and upper is not None and not lower < upper:
+            yield "upper", f"must be greater than lower, {lower:g}"
+        elif start is not None and lower is not None and start < lower:
+            yield "start", f"must be at least lower, {lower:g}"
+        elif start is not None and upper is not None and start > upper:
+            yield "start", f"must be at most upper, {upper:g}"
+        if lower is not None and lower <= 0 and values.get("scale", "log") == "log":
+            yield "lower", "must be greater than 0, or the variable needs scale: linear"
+
+
+class TargetMode(Part):
+    """A measured mode [c, m]; ``kind`` tells the two [0, 0] apart; ``sigma_Hz``, its standard
+    deviation, counts as 1 Hz where it is not known."""
+
+    c: Annotated[int, Field(ge=0, le=20)]
+    m: Annotated[int, Field(ge=0, le=3)]  # beyond, the belt's motion has no clear order
+    kind: Literal["axial", "torsional"] | None = None
+    frequency_Hz: Positive
+    weight: NotNegative = 1.0
+    sigma_Hz: Positive | None = None
+
+    @classmethod
+    def problems(cls, values: Mapping[str, Any]) -> Iterator[Problem]:
+        c, m, kind = number(values, "c"), number(values, "m"), values.get("kind")
+        if c is None or m is None:
+            return
+        if c == m == 0 and kind is None:
+            yield "kind", "must be axial or torsional for the mode [0,0]"
+        if (c or m) and kind is not None:
+            yield "kind", f"must be absent: only [0,0] has a kind, this mode is [{c},{m}]"
+
+
+class TargetFootprint(Part):
+    """A measured contact area, or tangent vertical stiffness, at a load, with its sigma."""
+
+    load_N: Positive
+    contact_area_m2: Positive | None = None
+    sigma_m2: Positive | None = None
+    vertical_stiffness_N_per_m: Positive | None = None
+    sigma_N_per_m: Positive | None = None
+    weight: NotNegative = 1.0
+
+    @classmethod
+    def problems(cls, values: Mapping[str, Any]) -> Iterator[Problem]:
+        given = [key for key in MEASURED if values.get(key) is not None]
+        if not given and WRONG in values.values():  # a misspelt key, which is reported
+            return
+        if not given:
+            both = " or ".join(MEASURED)
+            yield "load_N", f"must come with what was measured at this load, {both}"
+        elif len(given) > 1:
+            yield given[1], f"must be a target of its own: this one holds {given[0]} already"
+        else:
+            for key, sigma in MEASURED.items():
+                if key in given and values.get(sigma) is None:
+                    yield sigma, f"must be given: the standard deviation of {key}, in its unit"
+                if key not in given and values.get(sigma) is not None:
+                    yield sigma, f"must be absent: it is of {key}, this target is {given[0]}"
+
+
+class Targets(Part):
+    """What was measured, and where it comes from."""
+
+    source: Text = ""
+    modes: list[TargetMode] = Field(default_factory=list)
+    footprint: list[TargetFootprint] = Field(default_factory=list)
+
+
+class Uncertainty(Part):
+    """A source of error: numbers nobody calibrates, all off together by a standard deviation.
+
+    ``percent`` of each number or ``absolute``, in its unit; ``signs``: -1 for those that fall
+    where the others rise.
+    """
+
+    sets: Annotated[list[Text], Field(min_length=1)]
+    percent: Positive | None = None
+    absolute: Positive | None = None
+    signs: list[Annotated[int, Field(ge=-1, le=1)]] | None = None
+
+    @classmethod
+    def problems(cls, values: Mapping[str, Any]) -> Iterator[Problem]:
+        percent, absolute = values.get("percent"), values.get("absolute")
+        if percent is None and absolute is None:
+            yield "percent", "must be given, or absolute"
+        elif percent is not None and absolute is not None:
+            yield "absolute", "must be absent with percent"
+        sets, signs = values.get("sets"), values.get("signs")
+        if isinstance(sets, list) and isinstance(signs, list) and len(signs) != len(sets):
+            yield "signs", f"must have {len(sets)} entries, one for each of sets"
