@@ -24,7 +24,7 @@ MENDED = {  # of click's scripts: a line of each, and what stands in its place
             "        local -a names=(${(M)completions:#*=})\n"
             "        completions=(${completions:#*=})\n"
             "        compadd -U -i \"$IPREFIX\" -V unsorted -S '' -a names\n"
-            "        compadd -U -i \"$IPREFIX\" -V unsorted -a completions\n",
+            '        compadd -U -i "$IPREFIX" -V unsorted -a completions\n',
         ),
     ],
     "fish": [
