@@ -89,7 +89,7 @@ def _amplitude(mode: Mode, mesh: SectionMesh) -> np.ndarray:
 
 def test_title(tyre):
     mode = replace(tyre.modes[Label(2, 1)], frequency_Hz=66.1)
-    assert title(mode) == "[2,1] 66.1 Hz - first out-of-plane bending"
+    assert title(mode) == "[2,1] 66.1 Hz: first out-of-plane bending"
 
 
 def test_section(tyre, tmp_path):

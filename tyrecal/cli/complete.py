@@ -68,6 +68,8 @@ def assignments(ctx: click.Context, param: click.Parameter, incomplete: str) -> 
 
 
 def _starting(names: Iterable[str], incomplete: str) -> Items:
+    if incomplete.endswith("="):  # a number follows
+        return []
     return [CompletionItem(name) for name in sorted(names) if name.startswith(incomplete)]
 
 

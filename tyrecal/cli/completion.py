@@ -8,10 +8,33 @@ from . import options
 from .talk import Talk
 
 SHELLS = ("bash", "zsh", "fish")
-NO_SPACE = (
-    "COMPREPLY+=($value)\n",
-    "COMPREPLY+=($value)\n            [[ $value == *= ]] && compopt -o nospace\n",
-)
+MENDED = {  # of click's scripts: a line of each, and what stands in its place
+    "bash": [
+        (  # a value follows NAME= without a space; the shell quotes what is a file
+            "COMPREPLY+=($value)\n",
+            'COMPREPLY+=("$value")\n'
+            "            [[ $value == *= ]] && compopt -o nospace\n"
+            "            [[ $value == *.y*ml ]] && compopt -o filenames\n",
+        ),
+    ],
+    "zsh": [
+        (  # NAME= likewise; of --option=value the option stays
+            "compadd -U -V unsorted -a completions\n",
+            "[[ $PREFIX == --*=* ]] && compset -P 1 '*='\n"
+            "        local -a names=(${(M)completions:#*=})\n"
+            "        completions=(${completions:#*=})\n"
+            "        compadd -U -i \"$IPREFIX\" -V unsorted -S '' -a names\n"
+            '        compadd -U -i "$IPREFIX" -V unsorted -a completions\n',
+        ),
+    ],
+    "fish": [
+        ('string split "," $completion', 'string split -m 1 "," $completion'),  # a,b.yaml
+        (
+            "echo $metadata[2];",
+            'echo (string match -rg "^(--[^=]+=)" -- (commandline -t); or echo)$metadata[2];',
+        ),
+    ],
+}
 
 
 @click.command()
@@ -32,8 +55,8 @@ def command(shell: str, talk: Talk) -> int:
     kind = get_completion_class(shell)
     assert kind is not None
     script = kind(cli, {}, "tyrecal", "_TYRECAL_COMPLETE").source()
-    if shell == "bash":  # a value follows NAME= without a space
-        script = script.replace(*NO_SPACE)
+    for line, mended in MENDED[shell]:
+        script = script.replace(line, mended)
     if talk.as_json:
         talk.result({"shell": shell, "script": script})
     else:

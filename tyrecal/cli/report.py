@@ -25,7 +25,8 @@ def command(folders: tuple[Path, ...], output: Path | None, talk: Talk) -> int:
     found) on one HTML page.
 
     The page is one file that needs no network: summary, tables, plots, and mode shapes that turn
-    and vibrate; it prints, and reads on a telephone. Every study writes it too, with --report.
+    and vibrate; it prints, and reads on a telephone. Fits and diagnoses of several folders stand
+    side by side. Every study writes it too, with --report.
 
     \b
     tyrecal report p235_75r17

@@ -5,8 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection, PolyCollection
-from matplotlib.colors import LinearSegmentedColormap
+from matplotlib.colors import LinearSegmentedColormap, Normalize
 
 from ..case import LoadedCase
 from ..deck.context import section_mesh
@@ -61,15 +62,18 @@ def draw_residuals(path: Path, d: Diagnosis) -> None:
                 panel.plot(at, 100 * after[chosen], "o", mfc="white", mec=colour, ms=5, zorder=3)
         panel.set_title(name, loc="left")
         kinds = name == "[0,0]"
-        panel.set_xticks([0, 1] if kinds else range(1, _highest(rows) + 1))
         if kinds:
-            panel.set_xticklabels(["lateral", "torsional"])
+            panel.set_xticks([0, 1], ["lateral", "torsional"])
             panel.set_xlim(-0.6, 1.6)
         else:
+            highest = max(row.label.c for row in rows if row.label and family(row) == name)
+            panel.set_xticks(range(1, highest + 1))
+            panel.set_xlim(0.4, highest + 0.6)
             panel.set_xlabel("harmonic c")
     axes[0].set_ylabel("measured over model, %")
-    with_effect = f"; hollow: with {_short(d, d.best)}" if d.best else ""
-    figure.suptitle(f"What calibration leaves{with_effect}", x=0.02, ha="left", fontsize=11)
+    words = "What calibration leaves; bars: one standard deviation of a tyre without a gap"
+    with_effect = f"; hollow: with {_within(d, d.best)}" if d.best else ""
+    figure.suptitle(f"{words}{with_effect}", x=0.02, ha="left", fontsize=11)
     handles, labels = axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=len(pressures), frameon=False)
     save(figure, path)
@@ -91,11 +95,12 @@ def draw_probabilities(path: Path, d: Diagnosis) -> None:
     for y, value, h in zip(place, p, order, strict=True):
         axes.text(max(value, h.prior) + 0.01, y, f"{value:.2f}", va="center", fontsize=8)
     axes.axvline(0.7, color=GREY, lw=0.8, ls=":")
-    axes.text(0.7, len(order) - 0.35, "named from here on", fontsize=8, color=GREY, ha="center")
+    axes.text(0.71, -0.45, "named from here on", fontsize=8, color="0.3")
     axes.set_yticks(place, [_short(d, h.key) for h in order])
     axes.set_xlim(0, max(1.0, 1.1 * max(p)))
     axes.set_xlabel("probability")
-    axes.legend(loc="center", bbox_to_anchor=(0.5, 0.25), frameon=False)
+    axes.set_title("What explains the gap", loc="left")
+    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), frameon=False, borderaxespad=0.2)
     save(figure, path)
 
 
@@ -117,7 +122,9 @@ def draw_held_out(path: Path, d: Diagnosis) -> None:
                      (s.floor_percent, "repeatability alone")):  # fmt: skip
         axes.axhline(y, color=GREY, lw=0.9, ls=(0, (5, 3)))
         axes.text(2.75, y, words, va="bottom", ha="right", fontsize=8, color="0.3")
-    axes.set_xticks([0, 1], ["without an effect", f"with {_short(d, s.effect)}"])
+    axes.set_xticks(
+        [0, 1], ["without an effect", f"with {_within(d, s.effect)}\n(line: 90 % range)"]
+    )
     axes.set_xlim(-0.5, 2.8)
     axes.set_ylabel("rms error, %")
     axes.set_title(f"Held out: {s.held_out}", loc="left")
@@ -150,10 +157,10 @@ def draw_section_map(
     axes.autoscale_view()
     axes.set_xlabel("z along the axle, mm")
     axes.set_ylabel("r from the axle, mm")
-    table = ["part                    stiffness %   mass %     ln ev."]
+    table = [f"{'part':22s}   stiffness, %     mass, %   ln evidence"]
     table += [
-        f"{p.region[:22]:22s}  {p.stiffness_percent:+4.0f} ± {p.stiffness_sigma:<3.0f}"
-        f"   {p.mass_percent:+4.0f} ± {p.mass_sigma:<3.0f}   {p.evidence:+5.1f}"
+        f"{p.region[:22]:22s}   {_spread(p.stiffness_percent, p.stiffness_sigma)}"
+        f"   {_spread(p.mass_percent, p.mass_sigma)}   {_signed(p.evidence, 1):>8s}"
         for p in parts
     ]
     beside.text(0.0, 0.98, "\n".join(table), transform=beside.transAxes, va="top", fontsize=7.5,
@@ -162,7 +169,10 @@ def draw_section_map(
     words = [f"the data see {effective_rank} independent combination(s)", *same]
     beside.text(0.0, 0.02, "\n".join(words), transform=beside.transAxes, va="bottom", fontsize=7.5,
               color="0.3")  # fmt: skip
-    axes.set_title("One part changed alone: the redder, the better it explains the gap", loc="left")
+    axes.set_title("One part changed alone: how well it explains the gap", loc="left")
+    scale = ScalarMappable(Normalize(0, ENOUGH), WARM)
+    bar = figure.colorbar(scale, ax=axes, orientation="horizontal", shrink=0.6, extend="max")
+    bar.set_label("ln evidence against no change")
     save(figure, path)
 
 
@@ -204,15 +214,27 @@ def _place(label: Label | None) -> float:
     return {"axial": 0.0, "torsional": 1.0}.get(label.kind or "", float(label.c))
 
 
-def _highest(rows: tuple) -> int:
-    return max((row.label.c for row in rows if row.label), default=1)
-
-
 def _short(d: Diagnosis, key: str | None) -> str:
     spans = d.problem.spans
     if key in (NONE, OUTSIDE) or key is None:
-        return {NONE: "no effect", OUTSIDE: "outside the catalogue"}.get(key or "", "")
+        return {NONE: "No effect", OUTSIDE: "Outside the catalogue"}.get(key or "", "")
     return " + ".join((spans[id].title or id) for id in key.split("+"))
+
+
+def _signed(value: float, digits: int) -> str:
+    """With a sign, a true minus, and no -0."""
+    text = f"{round(value, digits) + 0.0:+.{digits}f}"
+    return text.replace("-", "\N{MINUS SIGN}")
+
+
+def _spread(percent: float, sigma: float) -> str:
+    return f"{_signed(percent, 0):>5s} ± {sigma:<4.0f}"
+
+
+def _within(d: Diagnosis, key: str | None) -> str:
+    """Amid a sentence."""
+    words = _short(d, key)
+    return words[:1].lower() + words[1:]
 
 
 def _colour(place: Place | None) -> str | tuple[float, ...]:

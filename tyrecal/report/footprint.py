@@ -19,7 +19,7 @@ from .vtu import write_pressed_vtu
 COLOUR_MAP = colormaps["viridis"]
 BANDS = 12  # of colour, at most
 COLUMNS = 4
-MARGIN = 20.0  # mm round the largest patch, more than to the next node
+MARGIN = 10.0  # mm round the nodes next to the largest patch
 STYLES: dict[str, dict[str, Any]] = {
     "initial": {"ls": (0, (4, 2)), "marker": "o", "mfc": "white"},
     "fitted": {"ls": "-", "marker": "s"},
@@ -49,10 +49,7 @@ def draw_patches(path: Path, title: str, patches: Mapping[float, Patch], highest
 
     highest_Pa: upper end of the colours; dots: nodes that touch.
     """
-    halves = [
-        1e3 * np.array([abs(p.across[p.touches]).max(), abs(p.along[p.touches]).max()])
-        for p in patches.values()
-    ]
+    halves = [1e3 * np.array(_reach(patch)) for patch in patches.values()]
     width, length = 2 * (np.max(halves, axis=0) + MARGIN)
     columns = min(COLUMNS, len(patches))
     lines = -(-len(patches) // columns)
@@ -69,11 +66,26 @@ def draw_patches(path: Path, title: str, patches: Mapping[float, Patch], highest
         axes.plot(x[patch.touches], y[patch.touches], ".", color="k", ms=1.2, alpha=0.5)
         axes.set_title(f"{load:g} N", loc="left", fontsize=9)
         axes.set(xlim=(-width / 2, width / 2), ylim=(-length / 2, length / 2), aspect="equal")
-    grid[-1, 0].set_xlabel("across, mm")
-    grid[-1, 0].set_ylabel("along, mm")
-    figure.colorbar(bands, ax=list(grid.flat), shrink=0.8, ticks=levels, format="%.0f", label="kPa")
-    figure.suptitle(f"{title}: contact pressure at each load")
+    for axes in grid.flat[max(0, len(patches) - columns) : len(patches)]:  # the lowest of a column
+        axes.set_xlabel("across, mm")
+        axes.tick_params(labelbottom=True)
+    for axes in grid[:, 0]:
+        axes.set_ylabel("along, mm")
+    figure.colorbar(bands, ax=list(grid.flat), shrink=0.8, ticks=levels, format="%.0f",
+                    label="contact pressure, kPa")  # fmt: skip
+    figure.suptitle(f"{title}: contact pressure at each load; dots: nodes that touch")
     save(figure, path)
+
+
+def _reach(patch: Patch) -> tuple[float, float]:
+    """Half the width and half the length, m, to the nodes beside those that touch, where the
+    pressure is 0."""
+    near = patch.touches.copy()
+    near[1:] |= patch.touches[:-1]
+    near[:-1] |= patch.touches[1:]
+    near[:, 1:] |= patch.touches[:, :-1]
+    near[:, :-1] |= patch.touches[:, 1:]
+    return float(abs(patch.across[near]).max()), float(abs(patch.along[near]).max())
 
 
 @in_house_style

@@ -98,10 +98,10 @@ def _surface(mode: Mode, mesh: SectionMesh, scale: float | None) -> _Surface:
 
 
 def title(mode: Mode) -> str:
-    """Label, frequency and words: '[2,1] 66.1 Hz - first out-of-plane bending'."""
+    """Label, frequency and words: '[2,1] 66.1 Hz: first out-of-plane bending'."""
     label = mode.label
     return (
-        f"[{label.c},{label.m}] {mode.frequency_Hz:.1f} Hz - {words(label.c, label.m, label.kind)}"
+        f"[{label.c},{label.m}] {mode.frequency_Hz:.1f} Hz: {words(label.c, label.m, label.kind)}"
     )
 
 

@@ -46,4 +46,6 @@ def draw_signature(path: Path, found: Signature) -> None:
 
 
 def _text(value: float, digits: int) -> str:
-    return f"{value:+.{digits}f}" if np.isfinite(value) else "lost"
+    if not np.isfinite(value):
+        return "lost"
+    return f"{round(value, digits) + 0.0:+.{digits}f}".replace("-", "\N{MINUS SIGN}")

@@ -20,6 +20,11 @@ QUANTITIES = {  # of a footprint target: words, unit over SI, decimals
 }
 
 
+def percent(share: float) -> str:
+    """A standard error in %, two digits, and never 1.9e+02."""
+    return f"{abs(share):.{0 if abs(share) >= 10 else 2}{'f' if abs(share) >= 10 else 'g'}}"
+
+
 def fit_table(fit: Mapping[str, Any]) -> Table:
     """The content of fit.json like Table 2 of the paper: modes, variables, objective."""
     table = _table(("mode", "motion", "initial", "fitted", "target", "deviation %"))
@@ -45,7 +50,7 @@ def fit_table(fit: Mapping[str, Any]) -> Table:
             f"{variable['initial']:.4g}",
             f"{value:.4g}",
             f"{variable['lower']:g}..{variable['upper']:g}",
-            NONE if error is None or not value else f"{100 * error / abs(value):.2g}",
+            NONE if error is None or not value else percent(100 * error / value),
         )
     for name, value in fit.get("fixed", {}).items():
         _add(table, name, "held", f"{value:.4g}", f"{value:.4g}", NONE, NONE)

@@ -114,6 +114,20 @@ def test_no_error_no_request_and_nothing_beside_the_screen(
     assert (dark == "rgb(255, 255, 255)") == (scheme == "light")
 
 
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_side_by_side_on_a_telephone(browser: Any, tmp_path: Path, scheme: str) -> None:
+    """The table of five folders scrolls within the page, and what a row is stays in sight."""
+    folders = [toy.write(tmp_path / f"study_{k}") for k in range(5)]
+    write_page(tmp_path / "report.html", folders)
+    show(browser, (tmp_path / "report.html").as_uri(), 360, prefers_color_scheme=scheme)
+    assert browser.execute_script("return document.documentElement.scrollWidth") <= 360
+    table = "const wide = document.querySelector('#comparison .wide'); "
+    assert browser.execute_script(f"{table} return wide.scrollWidth > wide.clientWidth")
+    left = "return wide.querySelector('th[scope=row]').getBoundingClientRect().left"
+    before = browser.execute_script(f"{table} {left}")
+    assert browser.execute_script(f"{table} wide.scrollLeft = 9999; {left}") == before
+
+
 def test_modes_vibrate_until_they_are_stopped(shown: Any) -> None:
     canvas = shown.find_element("css selector", ".stage canvas")
     assert changes(lambda: canvas.screenshot_as_png, 5)

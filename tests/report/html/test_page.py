@@ -167,6 +167,37 @@ def test_each_study_alone(copy: Path) -> None:
             parsed(text_of(alone))
 
 
+def test_several_folders_stand_side_by_side(folder: Path, copy: Path) -> None:
+    """Figures of the paper's Table 2 and Table 3, those of the other folder beside them; one
+    folder, or only one with a fit or a diagnosis, has no table."""
+    fit = json.loads((copy / "fit.json").read_text())
+    fit |= {"objective_Hz": 0.7, "objective_unit": "sigma", "converged": False, "footprint": []}
+    fit["variables"] = {"D1": {**fit["variables"]["A_belt"], "standard_error": 7.2e-7}}
+    fit["modes"] = fit["modes"][:2]
+    (copy / "fit.json").write_text(json.dumps(fit))
+    (copy / "diagnosis.json").unlink()
+    both = words_of(text_of(folder, copy)).replace("\u2212", "-")
+    for words in (
+        "objective initial33.13 Hz33.13 sigmas", "objective fitted8.60 Hz0.70 sigmas",
+        "worst mode[3,1] ● +5.06 %[0,0] axial ◐ -2.65 %", "design pointsyes, 9no, 9",
+        "A_belt3.6e-07 ± 10 %–", "C108e+05, at bound–", "D1–3.6e-07 ± 200 %",
+        "angle70 held70 held", "[2,0] ovalisation○ -0.10–", "4000 N contact area◐ -3.70–",
+        "verdictNamed–", "likeliest probabilityrim_width 0.71–",
+    ):  # fmt: skip
+        assert words in both, words
+    assert "Side by side" not in words_of(text_of(folder))
+    (copy / "fit.json").unlink()
+    assert "Side by side" not in words_of(text_of(folder, copy))
+
+
+def test_a_fit_to_footprints_alone(copy: Path) -> None:
+    fit = json.loads((copy / "fit.json").read_text())
+    (copy / "fit.json").write_text(json.dumps(fit | {"modes": []}))
+    (copy / "fit_shapes.json").unlink()
+    words = words_of(text_of(copy, copy))
+    assert "4000 N contact area, cm²120.0" in words and "worst mode––" in words
+
+
 def test_shapes_of_another_run_are_not_shown(copy: Path) -> None:
     fit = json.loads((copy / "fit.json").read_text())
     fit["modes"][2]["frequency_Hz"] += 0.01

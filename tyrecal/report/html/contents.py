@@ -96,7 +96,7 @@ class Fit(Whole):
     label_margin: float
     variables: dict[str, Variable]
     fixed: dict[str, float]
-    modes: Annotated[list[FittedMode], Field(min_length=1)]
+    modes: list[FittedMode]
     footprint: list[FittedFootprint] = []
     correlations: dict[str, dict[str, float | None]]
     singular_values: list[float]

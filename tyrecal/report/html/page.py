@@ -15,9 +15,10 @@ from jinja2.sandbox import ImmutableSandboxedEnvironment
 from markupsafe import Markup
 
 from ...files import whole
-from ..table import FOOTPRINT, QUANTITIES
+from ..table import FOOTPRINT, QUANTITIES, percent
 from ..words import CLOSE, FAR, motion
 from . import drawings, plots
+from .comparison import comparison
 from .contents import LoadSweep, PressureRow, Shapes
 from .markdown import html
 from .results import BadResults, Results, read_results
@@ -72,7 +73,12 @@ def page(results: Sequence[Results]) -> str:
     names = list(dict.fromkeys(each.case for each in results))
     template = environment().get_template("page.html.j2")
     return template.render(
-        mark=Markup(MARK), title=" and ".join(names), chapters=chapters, close=CLOSE, far=FAR
+        mark=Markup(MARK),
+        title=" and ".join(names),
+        chapters=chapters,
+        comparison=comparison(results),
+        close=CLOSE,
+        far=FAR,
     )
 
 
@@ -130,7 +136,7 @@ def _fit(found: Results) -> dict[str, Any]:
     return {
         "of": fit,
         "sets": found.fit_shapes.variables if found.fit_shapes else {},
-        "deviations": plots.deviations(fit),
+        "deviations": plots.deviations(fit) if fit.modes else None,
         "convergence": plots.convergence(history, fit.objective_unit) if history else [],
         "legend": list(history[0].values) if history else [],
         "quantities": QUANTITIES,
@@ -237,6 +243,7 @@ def environment() -> ImmutableSandboxedEnvironment:
     made.filters["fixed"] = lambda value, digits: f"{value:.{digits}f}".replace("-", MINUS)
     made.filters["signed"] = lambda value, digits: f"{value:+.{digits}f}".replace("-", MINUS)
     made.filters["digits"] = lambda value, count: f"{value:.{count}g}"
+    made.filters["percent"] = percent
     made.filters["motion"] = lambda mode: motion(mode.c, mode.m, mode.kind)
     made.filters["label"] = plots.label
     return made

@@ -64,20 +64,23 @@ def fit_words(fit: Fit) -> list[str]:
     unit = fit.objective_unit if fit.objective_unit == "Hz" else "(deviations in sigmas)"
     equation = "equation (1), " if fit.objective_unit == "Hz" else ""
     end = "converged" if fit.converged else "did not converge"
-    near = [m for m in fit.modes if abs(m.deviation_percent) <= CLOSE]
-    worst = max(fit.modes, key=lambda m: abs(m.deviation_percent))
     moves = ", ".join(
         f"{name} from {v.initial:.4g} to {v.value:.4g}"
         + (f" ({100 * (v.value / v.initial - 1):+.0f} %)" if v.initial else "")
         for name, v in fit.variables.items()
     )
-    return [
+    words = [
         f"The objective ({equation}{fit.method}) went from {fit.initial_objective_Hz:.2f} to"
-        f" {fit.objective_Hz:.2f} {unit} in {fit.evaluations} design points; the fit {end}.",
-        f"{len(near)} of {len(fit.modes)} frequencies come within {CLOSE:g} % of their targets;"
-        f" farthest off is {_told(worst)} with {worst.deviation_percent:+.1f} %.",
-        f"{moves}.",
+        f" {fit.objective_Hz:.2f} {unit} in {fit.evaluations} design points; the fit {end}."
     ]
+    if fit.modes:
+        near = [m for m in fit.modes if abs(m.deviation_percent) <= CLOSE]
+        worst = max(fit.modes, key=lambda m: abs(m.deviation_percent))
+        words.append(
+            f"{len(near)} of {len(fit.modes)} frequencies come within {CLOSE:g} % of their"
+            f" targets; farthest off is {_told(worst)} with {worst.deviation_percent:+.1f} %."
+        )
+    return [*words, f"{moves}."]
 
 
 def _told(mode: FittedMode) -> str:

@@ -1,0 +1,98 @@
+"""Pictures of a diagnosis: they show its numbers, and no word is cut."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.collections import PolyCollection
+from matplotlib.figure import Figure
+from matplotlib.text import Text
+
+from tyrecal.case import load_case
+from tyrecal.diagnose.diagnosis import Diagnosis
+from tyrecal.diagnose.where import Place
+from tyrecal.report import diagnosis_pictures as pictures
+
+from ..conftest import CASES
+from ..diagnose.test_diagnosis import diagnosed
+from ..diagnose.toy import Toy
+
+NUMBER = "0123456789.\N{MINUS SIGN} "
+
+
+@pytest.fixture(scope="module")
+def found() -> Diagnosis:
+    return diagnosed(Toy(effects=3), {"e0": 0.8}, 7)
+
+
+@pytest.fixture
+def drawn(monkeypatch: pytest.MonkeyPatch) -> list[Figure]:
+    """The figures that were saved."""
+    figures: list[Figure] = []
+    save = pictures.save
+    monkeypatch.setattr(pictures, "save", lambda f, path: (figures.append(f), save(f, path)))
+    return figures
+
+
+def words(figure: Figure) -> str:
+    """All that is written; fails where a piece of it stands beyond the picture's edge."""
+    box, written = figure.bbox, []
+    for text in figure.findobj(Text):
+        assert isinstance(text, Text)
+        place = text.get_window_extent()
+        said = text.get_text()
+        if text.get_visible() and said.strip(NUMBER):  # ticks beyond an axis are not drawn
+            written.append(said)
+            assert place.x0 > -1 and place.y0 > -1, text
+            assert place.x1 < box.x1 + 1 and place.y1 < box.y1 + 1, text
+    return "\n".join(written)
+
+
+def test_residuals(found: Diagnosis, drawn: list[Figure], tmp_path: Path) -> None:
+    pictures.draw_residuals(tmp_path / "residuals.png", found)
+    (figure,) = drawn
+    panels = figure.axes
+    assert [axes.get_title("left") for axes in panels] == ["[0,0]", "in-plane", "lateral"]
+    shown = [bar.lines[0].get_ydata() for axes in panels for bar in axes.containers]
+    assert sorted(np.concatenate(shown)) == pytest.approx(sorted(100 * found.gap.residuals))
+    assert len(shown) == 3 * 3  # pressures
+    assert [list(axes.get_xticks()) for axes in panels] == [[0, 1], [1, 2, 3, 4], [1, 2, 3]]
+    for axes in panels:
+        low, high = axes.get_xlim()
+        places = np.concatenate([line.get_xdata() for bar in axes.containers for line in bar[:1]])
+        assert low + 0.2 < places.min() and places.max() < high - 0.2
+    told = words(figure)
+    assert "one standard deviation" in told and f"hollow: with {found.best}" in told
+
+
+def test_probabilities_and_held_out(found: Diagnosis, drawn: list[Figure], tmp_path: Path) -> None:
+    pictures.draw_probabilities(tmp_path / "probabilities.png", found)
+    pictures.draw_held_out(tmp_path / "held_out.png", found)
+    bars, held = drawn
+    widths = [bar.get_width() for bar in bars.axes[0].patches]
+    assert widths == sorted(widths, reverse=True)
+    assert widths[0] == pytest.approx(max(found.probabilities.values()))
+    assert "No effect" in words(bars) and "90 % range" in words(held)
+    assert found.shrinkage is not None
+    heights = [bar.get_height() for bar in held.axes[0].patches]
+    assert heights == [found.shrinkage.before_percent, found.shrinkage.after_percent]
+
+
+def test_section_map(drawn: list[Figure], tmp_path: Path) -> None:
+    """The part that explains most is the warmest, and its row stands in the table."""
+    places = (
+        Place("upper sidewall", 9.0, 20.0, 21.4, 8.0, 4.9, ("carcass cords",)),
+        Place("tread", -3.0, 20.0, -0.2, 10.0, -0.01, ()),
+    )
+    case = load_case(CASES / "p235_75r17.yaml")
+    pictures.draw_section_map(tmp_path / "section.png", case, places, 1)
+    (figure,) = drawn
+    told = words(figure)
+    assert "+21 ± 8" in told and "\N{MINUS SIGN}3 ± 20" in told and "+4.9" in told
+    assert "+0 ± 10" in told and "-0" not in told  # no negative nothing
+    assert "upper sidewall looks like carcass cords" in told and "ln evidence" in told
+    colours = {tuple(c.get_facecolor()[0].round(3)) for c in figure.axes[0].collections
+               if isinstance(c, PolyCollection)}  # fmt: skip
+    assert tuple(np.round(pictures.WARM(4.9 / 5), 3)) in colours and len(colours) == 2

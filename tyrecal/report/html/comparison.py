@@ -1,0 +1,130 @@
+"""Fits and diagnoses of several folders side by side, a column a folder."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import TypeVar
+
+from ..table import QUANTITIES, percent
+from ..words import motion
+from .contents import Diagnosis, Fit, FittedMode, Variable
+from .plots import label
+from .results import Results
+from .summary import CLOSE, FAR, VERDICTS
+from .svg import MINUS
+
+Content = TypeVar("Content")
+NOTHING, NB = "–", "\N{NO-BREAK SPACE}"
+UNITS = {"Hz": "Hz", "sigma": "sigmas"}
+
+
+@dataclass(frozen=True)
+class Row:
+    """What it is, more of it in small letters, and a cell a folder."""
+
+    name: str
+    more: str
+    cells: list[str]
+
+
+@dataclass(frozen=True)
+class Group:
+    """Rows under a heading."""
+
+    heading: str
+    rows: list[Row]
+
+
+def comparison(results: Sequence[Results]) -> list[Group]:
+    """Objective, variables, deviations of the fits, verdicts of the diagnoses; nothing where fewer
+    than two folders hold any."""
+    fits, diagnoses = [each.fit for each in results], [each.diagnosis for each in results]
+    if sum(bool(fit or diagnosis) for fit, diagnosis in zip(fits, diagnoses, strict=True)) < 2:
+        return []
+    groups = []
+    if any(fits):
+        names = dict.fromkeys(n for fit in fits if fit for n in (*fit.variables, *fit.fixed))
+        aims = dict.fromkeys(aim for fit in fits if fit for aim in _deviations(fit))
+        groups = [
+            Group("Fit", list(_whole(fits))),
+            Group("Variables ± standard error",
+                  [Row(n, "", _cells(fits, partial(_variable, name=n))) for n in names]),
+            Group(
+                "Fitted over target, %",
+                [Row(*aim, _cells(fits, partial(_graded, aim=aim))) for aim in aims],
+            ),
+        ]  # fmt: skip
+    if any(diagnoses):
+        groups.append(Group("Diagnosis", list(_verdicts(diagnoses))))
+    return groups
+
+
+def _whole(fits: Sequence[Fit | None]) -> Iterator[Row]:
+    yield Row("objective", "initial", _cells(fits, lambda fit: _objective(fit, "initial_")))
+    yield Row("objective", "fitted", _cells(fits, _objective))
+    yield Row("worst mode", "", _cells(fits, _worst))
+    yield Row("converged", "design points", _cells(fits, _end))
+    yield Row("pressure", "", _cells(fits, lambda fit: f"{fit.pressure_kPa:g} kPa"))
+    yield Row("mass", "tyre without rim", _cells(fits, lambda fit: f"{fit.mass_kg:.2f} kg"))
+
+
+def _verdicts(diagnoses: Sequence[Diagnosis | None]) -> Iterator[Row]:
+    yield Row("verdict", "", _cells(diagnoses, lambda d: VERDICTS[d.verdict]))
+    yield Row("likeliest", "probability", _cells(diagnoses, _likeliest))
+
+
+def _cells(contents: Sequence[Content | None], tell: Callable[[Content], str]) -> list[str]:
+    return [NOTHING if each is None else tell(each) for each in contents]
+
+
+def _objective(fit: Fit, when: str = "") -> str:
+    return f"{getattr(fit, f'{when}objective_Hz'):.2f} {UNITS.get(fit.objective_unit, '')}".strip()
+
+
+def _end(fit: Fit) -> str:
+    return f"{'yes' if fit.converged else 'no'}, {fit.evaluations}"
+
+
+def _worst(fit: Fit) -> str:
+    if not fit.modes:
+        return NOTHING
+    worst = max(fit.modes, key=lambda mode: abs(mode.deviation_percent))
+    return f"{label(worst)} {_graded(fit, _aim(worst))}{NB}%"
+
+
+def _aim(mode: FittedMode) -> tuple[str, str]:
+    return f"[{mode.c},{mode.m}]", motion(mode.c, mode.m, mode.kind)
+
+
+def _variable(fit: Fit, name: str) -> str:
+    if name in fit.fixed:
+        return f"{fit.fixed[name]:.4g} held"
+    known: Variable | None = fit.variables.get(name)
+    if known is None:
+        return NOTHING
+    error = known.standard_error
+    spread = f" ±{NB}{percent(100 * error / known.value)}{NB}%" if error and known.value else ""
+    return f"{known.value:.4g}{spread}{', at bound' if known.at_bound else ''}"
+
+
+def _deviations(fit: Fit) -> dict[tuple[str, str], float]:
+    """In %, by what was aimed at."""
+    return {_aim(mode): mode.deviation_percent for mode in fit.modes} | {
+        (f"{each.load_N:g} N", QUANTITIES[each.quantity][0].split(",")[0]): each.deviation_percent
+        for each in fit.footprint
+    }
+
+
+def _graded(fit: Fit, aim: tuple[str, str]) -> str:
+    off = _deviations(fit).get(aim)
+    if off is None:
+        return NOTHING
+    grade = "○" if abs(off) <= CLOSE else "◐" if abs(off) <= FAR else "●"
+    return f"{grade}{NB}{off:+.2f}".replace("-", MINUS)
+
+
+def _likeliest(diagnosis: Diagnosis) -> str:
+    name, p = max(diagnosis.probabilities.items(), key=lambda item: item[1])
+    return f"{name} {p:.2f}"
