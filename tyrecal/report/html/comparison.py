@@ -8,11 +8,11 @@ from functools import partial
 from typing import TypeVar
 
 from ..table import QUANTITIES, percent
-from ..words import motion
+from ..words import CLOSE, FAR, motion
 from .contents import Diagnosis, Fit, FittedMode, Variable
 from .plots import label
 from .results import Results
-from .summary import CLOSE, FAR, VERDICTS
+from .summary import VERDICTS
 from .svg import MINUS
 
 Content = TypeVar("Content")
