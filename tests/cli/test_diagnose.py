@@ -67,6 +67,10 @@ def test_a_diagnosis_in_files_and_again_from_the_record(
     assert {name: (out / name).read_bytes() for name in FILES} == before
     assert json.loads((out / "run.json").read_text())["solver_runs"] == 0
     assert "Bead filler" in (out / "report.html").read_text()
+    assert run(*command, "--quiet", "--no-pictures", "--set", "C10=1.1e6") == 0
+    again = json.loads((out / "diagnosis.json").read_text())
+    assert json.loads((out / "run.json").read_text())["solver_runs"] > 0  # from another start
+    assert again["verdict"] == "named" and again["effect"] == "bead_filler"
 
 
 def test_an_added_effect_makes_a_case(
@@ -89,6 +93,7 @@ def test_an_added_effect_makes_a_case(
         (["--measured", "M", "--toggled", "M", "magic=0"], "what was switched"),
         (["--measured", "M", "--solver", "calculix"], "no exact slopes"),
         (["--measured", "BAD"], "line 2"),
+        (["--measured", "M", "--set", "A_belt=1"], "must start within the bounds"),
         (["--add", "magic=1"], "magic"),
         (["--add", "bead_filler"], "NAME=VALUE"),
         (["--add", "bead_filler=-5"], "bead_filler"),

@@ -74,7 +74,8 @@ def command(
     from ..report.diagnosis import page
     from ..report.kept import parts_data
 
-    loaded, _ = study.load(case, assignments)
+    loaded, values = study.load(case, assignments)
+    loaded = options.starting_at(loaded, values)
     for id in (*effects, *without):
         if id not in catalogue():
             raise click.UsageError(f"'{id}': no such effect, only {', '.join(catalogue())}")

@@ -88,7 +88,7 @@ def command(
     unknown = [name for name in fix if name not in values]
     if unknown:
         raise click.UsageError(f"--fix {unknown[0]}: no such variable, only {', '.join(values)}")
-    loaded = _starting_at(loaded, values)
+    loaded = options.starting_at(loaded, values)
     left_out: list[str] = []
     if measured:
         from ..fit.measured import with_measured
@@ -138,23 +138,6 @@ def command(
     run.finish()
     study.finish(run)
     return 0 if fit.result["converged"] and fit.result["moved"] else EXIT_FIT
-
-
-def _starting_at(loaded: Any, values: Mapping[str, float]) -> Any:
-    """The case with its variables' start values replaced."""
-    from dataclasses import replace
-
-    variables = {
-        name: variable.model_copy(update={"start": values[name]})
-        for name, variable in loaded.case.variables.items()
-    }
-    for name, variable in variables.items():
-        if not variable.lower <= variable.start <= variable.upper:
-            raise click.UsageError(
-                f"--set {name}={variable.start:g}: a fit must start within the bounds"
-                f" {variable.lower:g} to {variable.upper:g}"
-            )
-    return replace(loaded, case=loaded.case.model_copy(update={"variables": variables}))
 
 
 class _Points:

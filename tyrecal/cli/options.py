@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import wraps
 from pathlib import Path
@@ -360,3 +360,20 @@ def _once(pairs: list[tuple[str, float]], pressure_kPa: float | None) -> dict[st
         twice = next(name for name in given if sum(n == name for n, _ in pairs) > 1)
         raise click.UsageError(f"{twice} is set twice")
     return given
+
+
+def starting_at(loaded: Any, values: Mapping[str, float]) -> Any:
+    """The case with its variables' start values replaced. Raises click.UsageError."""
+    from dataclasses import replace
+
+    variables = {
+        name: variable.model_copy(update={"start": values[name]})
+        for name, variable in loaded.case.variables.items()
+    }
+    for name, variable in variables.items():
+        if not variable.lower <= variable.start <= variable.upper:
+            raise click.UsageError(
+                f"--set {name}={variable.start:g}: a fit must start within the bounds"
+                f" {variable.lower:g} to {variable.upper:g}"
+            )
+    return replace(loaded, case=loaded.case.model_copy(update={"variables": variables}))

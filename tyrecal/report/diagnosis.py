@@ -9,6 +9,7 @@ from ..diagnose.diagnosis import Diagnosis
 from ..diagnose.evidence import NONE, OUTSIDE
 from ..diagnose.study import Study
 from ..diagnose.verdict import NAMED, NO_GAP, UNDECIDED
+from .words import map_resolution
 
 RUNGS = {
     1: "consistent with the data it was fitted to; no more than that",
@@ -151,17 +152,8 @@ def _where(d: Diagnosis) -> Iterator[str]:
             )
         else:
             yield "No single part of the section, softer, stiffer, heavier or lighter, explains it."
-        if d.effective_rank:
-            yield (
-                f"The data see {d.effective_rank} independent combination"
-                f"{'s' if d.effective_rank > 1 else ''} of parts (changes of 20 % in stiffness,"
-                " 10 % in mass, beyond their scatter); a finer map would be invented."
-            )
-        else:
-            yield (
-                "A change of 20 % in stiffness or 10 % in mass of any parts would stay within the"
-                " scatter of these data: the map is a hint at most."
-            )
+        finer = " A finer map would be invented." if d.effective_rank else ""
+        yield map_resolution(d.effective_rank) + finer
 
 
 def _which(study: Study) -> Iterator[str]:

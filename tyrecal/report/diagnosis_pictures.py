@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from textwrap import fill
 
 import numpy as np
 from matplotlib.cm import ScalarMappable
@@ -19,6 +20,7 @@ from ..diagnose.where import Place
 from ..modes.mode import Label
 from ..tyre.mesh import SectionMesh
 from .figure import COLOURS, GREY, in_house_style, new_figure, save
+from .words import map_resolution
 
 Array = np.ndarray
 FAMILIES = ("[0,0]", "in-plane", "lateral")
@@ -166,7 +168,7 @@ def draw_section_map(
     beside.text(0.0, 0.98, "\n".join(table), transform=beside.transAxes, va="top", fontsize=7.5,
               family="monospace")  # fmt: skip
     same = [f"{p.region} looks like {', '.join(p.same_as)}" for p in parts if p.same_as]
-    words = [f"the data see {effective_rank} independent combination(s)", *same]
+    words = [fill(map_resolution(effective_rank), 62), *same]
     beside.text(0.0, 0.02, "\n".join(words), transform=beside.transAxes, va="bottom", fontsize=7.5,
               color="0.3")  # fmt: skip
     axes.set_title("One part changed alone: how well it explains the gap", loc="left")

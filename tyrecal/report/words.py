@@ -58,3 +58,16 @@ def fit_doubts(result: Mapping[str, Any]) -> list[str]:
     if values and values[-1] < 1e-3 * values[0]:
         doubts.append("the data do not determine all variables: see singular_values in fit.json")
     return doubts
+
+
+def map_resolution(combinations: int) -> str:
+    """What the map on the section can show: its effective rank in words."""
+    if not combinations:
+        return (
+            "A change of 20 % in stiffness or 10 % in mass of any parts would stay within the"
+            " scatter of these data: the map is a hint at most, of a larger change of one part."
+        )
+    return (
+        f"The data see {combinations} independent combination{'s' if combinations > 1 else ''} of"
+        " parts (changes of 20 % in stiffness, 10 % in mass, beyond their scatter)."
+    )

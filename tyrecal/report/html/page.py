@@ -16,7 +16,7 @@ from markupsafe import Markup
 
 from ...files import whole
 from ..table import FOOTPRINT, QUANTITIES, percent
-from ..words import CLOSE, FAR, motion
+from ..words import CLOSE, FAR, map_resolution, motion
 from . import drawings, plots
 from .comparison import comparison
 from .contents import LoadSweep, PressureRow, Shapes
@@ -244,6 +244,7 @@ def environment() -> ImmutableSandboxedEnvironment:
     made.filters["signed"] = lambda value, digits: f"{value:+.{digits}f}".replace("-", MINUS)
     made.filters["digits"] = lambda value, count: f"{value:.{count}g}"
     made.filters["percent"] = percent
+    made.globals["map_resolution"] = map_resolution
     made.filters["motion"] = lambda mode: motion(mode.c, mode.m, mode.kind)
     made.filters["label"] = plots.label
     return made
