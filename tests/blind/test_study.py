@@ -1,4 +1,4 @@
-"""The recorded blind study, scored again from its data: seals, hashes, every figure."""
+"""The recorded blind studies, scored again from their data: seals, hashes, every figure."""
 
 from __future__ import annotations
 
@@ -14,22 +14,29 @@ from tyrecal.blind.protocol import BadTrials, read_protocol
 from tyrecal.blind.score import score
 from tyrecal.blind.tables import page, summary
 
-STUDY = Path(__file__).parents[1] / "benchmarks" / "blind_study_1"
+STUDIES = sorted((Path(__file__).parents[1] / "benchmarks").glob("blind_study_*"))
+
+
+@pytest.fixture(scope="module", params=STUDIES, ids=[study.name for study in STUDIES])
+def study(request: pytest.FixtureRequest) -> Path:
+    """Its folder."""
+    folder: Path = request.param
+    return folder
 
 
 @pytest.fixture(scope="module")
-def trials(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def trials(study: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The study as it lay before the answerer, then with answers; the truth beside it."""
     folder = tmp_path_factory.mktemp("study") / "trials"
     folder.mkdir()
     for name in ("trials", "answers"):
-        with tarfile.open(STUDY / f"{name}.tar.xz") as archive:
+        with tarfile.open(study / f"{name}.tar.xz") as archive:
             archive.extractall(folder, filter="data")
     for name in ("protocol.json", "seal.json"):
-        (folder / name).write_bytes((STUDY / name).read_bytes())
+        (folder / name).write_bytes((study / name).read_bytes())
     truth = folder.with_name("trials-truth")
     truth.mkdir()
-    (truth / "truth.json").write_bytes(lzma.decompress((STUDY / "truth.json.xz").read_bytes()))
+    (truth / "truth.json").write_bytes(lzma.decompress((study / "truth.json.xz").read_bytes()))
     return folder
 
 
@@ -49,12 +56,12 @@ def alike(found: Any, stated: Any, where: str = "") -> None:
         assert found == pytest.approx(stated, rel=1e-6, abs=1e-9), where
 
 
-def test_the_study_says_what_is_on_record(trials: Path) -> None:
+def test_the_study_says_what_is_on_record(study: Path, trials: Path) -> None:
     figures = summary(score(trials, trials.with_name("trials-truth")))
     words = page(figures, read_protocol(trials).maker)
     figures.pop("misses")
-    alike(figures, json.loads((STUDY / "score.json").read_text()))
-    recorded = (STUDY / "RESULT.md").read_text()
+    alike(figures, json.loads((study / "score.json").read_text()))
+    recorded = (study / "RESULT.md").read_text()
     assert words.splitlines()[:12] == recorded.splitlines()[:12]
 
 
