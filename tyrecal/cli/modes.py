@@ -62,7 +62,7 @@ def command(
         door.needs_road(modes=True)
     if fitted:
         designs["fitted"] = options.fitted_values(fitted, loaded, study.solver)
-    run = study.run(case, "modes", door)
+    run = study.run(case, "modes", door, "modes" if sweep is None else "sweep-load")
     if sweep is not None:
         draw = pictures is not False
         return over_loads(door, run, designs, loads, study, draw)

@@ -37,7 +37,7 @@ class Run:
         self.case, self.command, self.solver = case.resolve(), command, solver
         self.folder = output or Path(case.stem)
         self.started = datetime.now(UTC).isoformat(timespec="seconds")
-        self._clock = time.monotonic()
+        self._clock, self._finished = time.monotonic(), False
         self.store: Store | None = None
         self.counts: Counts | None = None
         if self.folder.exists() and not self.folder.is_dir():
@@ -50,7 +50,7 @@ class Run:
             from ..evaluate.folders import drop_unfinished
 
             drop_unfinished(self.runs)
-        self.finish()
+        self._write_facts()
 
     def open_store(self, folder: Path | None, none: bool) -> Store | None:
         """The record of evaluations: in ``folder``, or beside the results, or ``none``."""
@@ -82,6 +82,10 @@ class Run:
 
     def finish(self, **facts: Any) -> None:
         """Write run.json: command, times, host, versions, and what else is volatile."""
+        self._finished = True
+        self._write_facts(**facts)
+
+    def _write_facts(self, **facts: Any) -> None:
         import tyrecal
 
         counts = self.counts and {
@@ -95,6 +99,7 @@ class Run:
                 "command": self.command,
                 "arguments": sys.argv[1:],
                 "started": self.started,
+                "finished": self._finished,
                 "seconds": round(time.monotonic() - self._clock, 3),
                 "host": platform.node(),
                 "python": platform.python_version(),
@@ -107,6 +112,9 @@ class Run:
         )
 
     def _close(self) -> None:
+        if not self._finished:
+            with contextlib.suppress(OSError):  # what went wrong before is what is told
+                self._write_facts()
         with contextlib.suppress(OSError):  # it holds failures, or was never made
             self.runs.rmdir()
         if self.store:
