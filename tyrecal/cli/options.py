@@ -24,6 +24,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+from click.core import ParameterSource
 
 from . import complete
 from .talk import SOLVERS, Talk
@@ -304,6 +305,22 @@ def load(path: Path, mesh_level: str, assigned: tuple[str, ...], pressure_kPa: f
         raise
     except ValueError as error:
         raise click.UsageError(str(error)) from None
+
+
+def given() -> list[str]:
+    """The options that stand on the command line, not those of the environment."""
+    context = click.get_current_context()
+    return [
+        [*([] if context.params[option.name] else option.secondary_opts), *option.opts][0]
+        for option in context.command.params
+        if isinstance(option, click.Option)
+        and context.get_parameter_source(str(option.name)) is ParameterSource.COMMANDLINE
+    ]
+
+
+def nothing_to_share(option: str, why: str) -> click.UsageError:
+    """The error where ``option`` asks for workers that would have nothing to do."""
+    return click.UsageError(f"{option} would change nothing: {why}")
 
 
 def not_both(jobs: int, scheduler: str) -> None:
