@@ -51,6 +51,7 @@ class Run:
 
             drop_unfinished(self.runs)
         self._write_facts()
+        click.get_current_context().call_on_close(self._say_unfinished)
 
     def open_store(self, folder: Path | None, none: bool) -> Store | None:
         """The record of evaluations: in ``folder``, or beside the results, or ``none``."""
@@ -111,10 +112,12 @@ class Run:
             },
         )
 
-    def _close(self) -> None:
+    def _say_unfinished(self) -> None:
         if not self._finished:
             with contextlib.suppress(OSError):  # what went wrong before is what is told
                 self._write_facts()
+
+    def _close(self) -> None:
         with contextlib.suppress(OSError):  # it holds failures, or was never made
             self.runs.rmdir()
         if self.store:
