@@ -9,6 +9,26 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+RESULTS = {  # of a study: what a new run of it takes the place of
+    "fit": ("fit.json", "fit.csv", "fit_history.csv", "fit_shapes.json", "convergence.png"),
+    "modes": ("modes.json", "modes_shapes.json"),
+    "sweep-load": ("load_sweep.json", "load_sweep.csv", "load_sweep.png"),
+    "sweep-pressure": ("pressure_sweep.json", "pressure_sweep.csv", "pressure_sweep.png"),
+    "footprint": ("footprint.json", "footprint.csv", "footprint_patches.json", "footprint.png"),
+    "effects": ("effects.json",),
+    "diagnose": ("diagnosis.json", "diagnosis.md", "diagnosis_section.json"),
+    "batch": ("batch.json",),
+}
+
+
+def drop_results(folder: Path, study: str) -> None:
+    """Remove an earlier run's results, which must not pass for those of a run that fails.
+
+    Raises OSError.
+    """
+    for name in RESULTS[study]:
+        (folder / name).unlink(missing_ok=True)
+
 
 @contextlib.contextmanager
 def whole(path: Path, many_writers: bool = False) -> Iterator[Path]:

@@ -60,6 +60,24 @@ def test_every_outcome_has_its_element_and_its_words() -> None:
     assert suites[0].get("time") == "2.000" and suites[2].get("timestamp") == STARTED[:19]
 
 
+def test_what_only_one_side_has_is_said() -> None:
+    before = [*BEFORE, report("gone/deep", fit=entry(objective=1.0))]
+    now = [report("a", fit=entry(objective=1.0, mass_kg=1.0), footprint=entry(area_m2=1.0)),
+           report("new", fit=entry(objective=1.0))]  # fmt: skip
+    suites = parsed(junit(now, compare(now, baseline_of(before, None)), STARTED))
+    tests = {(t.get("classname"), t.get("name")): t for t in suites.iter("testcase")}
+    skipped = {key for key, test in tests.items() if test.find("skipped") is not None}
+    assert skipped == {("a", "modes"), ("gone/deep", "baseline")}
+    assert [suite.get("skipped") for suite in suites] == ["1", "0", "1"]
+    assert [suite.get("tests") for suite in suites] == ["3", "1", "1"]
+    assert [suite.findtext("system-out") for suite in suites] == [
+        "modes is in the baseline, but was not studied\n"
+        "footprint is not in the baseline, so not compared",
+        "new is not in the baseline, so not compared",
+        "gone/deep is in the baseline, but not in this batch",
+    ]
+
+
 @given(some.text(min_size=1))
 def test_any_words_give_valid_xml(words: str) -> None:
     suites = parsed(junit([report("a", fit=entry("error", "crashed", words))], None, STARTED))

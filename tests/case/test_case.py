@@ -15,6 +15,8 @@ from tyrecal.case import (
     validate,
     with_values,
 )
+from tyrecal.case.checks import at, find
+from tyrecal.case.variables import number_at
 
 from .bad_cases import CASES, CSV, GOOD, TABLE
 
@@ -145,6 +147,34 @@ def test_optional_numbers_can_be_set() -> None:
     new = with_values(P235, values)
     assert new.case.analysis.vibration_frequency_Hz == 60
     assert new.raw["mesh"]["hourglass_stiffness_Pa"] == 3e4
+
+
+@pytest.mark.parametrize("number", ["rim.mass_kg", "rim.spindle.tilt_rad_per_N_m",
+                                    "cavity.share", "road.friction",
+                                    "materials.rubber.frequency_exponent"])  # fmt: skip
+def test_a_number_that_is_not_written_can_vary(number: str, tmp_path: Path) -> None:
+    variable = f"variables:\n  x: {{sets: [{number}], start: 0.1, lower: 0.01, upper: 0.4}}\n"
+    loaded = load_case(put(tmp_path, ("\nvariables:", "\n" + variable.rstrip())))
+    with pytest.raises(KeyError):
+        find(loaded.raw, number)
+    moved = with_values(loaded, {"x": 0.2})
+    assert number_at(moved, number) == 0.2 and at(moved.raw, find(moved.raw, number)) == 0.2
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ("sets: [analysis.vibration_frequency_Hz]", "has no value, and no default"),
+        ("sets: [rim.masskg]", "did you mean 'mass_kg'"),
+        ("sets: [analysis.sectors]", "whole number"),
+        ("sets: [rim.free]", "leads to no number"),
+        ("sets: [rim.mass_kg, cavity.temperature_C]", "cavity.temperature_C must be less than 300"),
+    ],
+)
+def test_but_it_must_be_a_number(line: str, words: str, tmp_path: Path) -> None:
+    variable = f"variables:\n  x: {{{line}, start: 1, lower: 0.5, upper: 400}}\n"
+    (mistake,) = validate(put(tmp_path, ("\nvariables:", "\n" + variable.rstrip())))
+    assert words in str(mistake)
 
 
 @pytest.mark.parametrize(

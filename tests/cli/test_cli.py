@@ -196,6 +196,23 @@ def test_a_fit_on_this_machine_and_on_others_writes_nothing(
     assert not out.exists()
 
 
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["fit", CASE, "--scheduler", "tcp://localhost:1"],
+        ["fit", CASE, "--jobs", "2"],
+        ["footprint", CASE, "--jobs", "2"],
+    ],
+)
+def test_workers_that_would_have_nothing_to_do_are_refused(
+    arguments: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    assert run(*arguments, "--output", str(out)) == 2
+    assert f"{arguments[2]} would change nothing: " in capsys.readouterr().err
+    assert not out.exists()
+
+
 def test_a_template_that_runs_code_is_refused(
     case_folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

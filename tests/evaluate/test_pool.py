@@ -1,4 +1,4 @@
-"""Worker processes do not outlive the process that was killed."""
+"""Worker processes do not outlive the process that was killed, nor hold up one that is stopped."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import sys
 import time
 from pathlib import Path
 
+ROOT = Path(__file__).parents[2]
 PARENT = """
 import os, sys, time
 from pathlib import Path
@@ -18,6 +19,30 @@ if __name__ == "__main__":
     with process_pool(1) as pool:
         pool.submit(work, sys.argv[1]).result()
 """
+STOPPED = """
+import os, random, signal, sys, threading
+from tests.evaluate.test_pool import large
+from tyrecal.evaluate.executor import Processes
+from tyrecal.evaluate.pool import process_pool
+
+if __name__ == "__main__":
+    moment = random.Random(1)
+    list(Processes(2).each(large, range(2)))
+    for trial in range(20):
+        try:
+            stop = threading.Timer(0.2 * moment.random(), os.kill, (os.getpid(), signal.SIGINT))
+            stop.start()
+            if trial % 4:
+                for answer in Processes(2).each(large, range(1000)):
+                    pass
+            else:
+                with process_pool(2) as pool:
+                    for answer in pool.map(large, range(1000)):
+                        pass
+        except KeyboardInterrupt:
+            print("stopped", trial, flush=True)
+        stop.join()
+"""
 
 
 def work(place: str) -> None:
@@ -26,11 +51,26 @@ def work(place: str) -> None:
     time.sleep(60)
 
 
+def large(task: int) -> bytes:
+    """More than a pipe holds, so that most of the time a worker is in the middle of its answer."""
+    return bytes(5_000_000)
+
+
+def test_stopped_in_the_middle_of_large_answers_it_ends(tmp_path: Path) -> None:
+    (tmp_path / "stopped.py").write_text(STOPPED)
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    done = subprocess.run(
+        [sys.executable, tmp_path / "stopped.py"], env=environment, capture_output=True,
+        text=True, timeout=200, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.count("stopped") == 20 and not done.stderr
+
+
 def test_a_busy_worker_ends_with_its_parent(tmp_path: Path) -> None:
     (tmp_path / "parent.py").write_text(PARENT)
     said = tmp_path / "pid"
-    root = Path(__file__).parents[2]
-    environment = {**os.environ, "PYTHONPATH": str(root)}
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     parent = subprocess.Popen([sys.executable, tmp_path / "parent.py", said], env=environment)
     while not (said.exists() and said.read_text()) and parent.poll() is None:
         time.sleep(0.02)

@@ -101,9 +101,26 @@ def test_two_of_a_label_with_waves_are_a_doublet(tmp_path: Path) -> None:
         read(tmp_path, "c,m,pressure [bar],f\n2,1,2.4,66.1\n2,1,2.4,66.3\n3,1,2.4,99\n")
 
 
+def test_sigma_is_that_of_its_unit_or_of_all_in_percent(tmp_path: Path) -> None:
+    heading, line = "c,m,pressure [bar],f [Hz],mass [kg],sigma [{}]\n", "2,1,2.4,66,12,{}\n"
+
+    def sigmas(unit: str, sigma: str) -> dict[str, float | None]:
+        found = read(tmp_path, heading.format(unit) + line.format(sigma))
+        return {value.quantity: value.sigma for value in found}
+
+    assert sigmas("Hz", "0.5") == {"frequency_Hz": 0.5, "mass_kg": None}
+    assert sigmas("kg", "0.1") == {"frequency_Hz": None, "mass_kg": 0.1}
+    assert sigmas("%", "1") == pytest.approx({"frequency_Hz": 0.66, "mass_kg": 0.12})
+    assert sigmas("Hz", "") == {"frequency_Hz": None, "mass_kg": None}
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [
+        ("c,m,pressure [bar],f,mass [kg],sigma\n2,1,2.4,66,12,0.5\n",
+         "line 2: sigma can be that of frequency_Hz or mass_kg: write its unit"),
+        ("c,m,pressure [bar],f,sigma [kg]\n2,1,2.4,66,0.5\n",
+         "line 2: sigma has the unit of mass_kg, which has no value here"),
         ("", "the file is empty"),
         (b"PK\x03\x04 a workbook", "save the sheet as CSV"),
         ("a,b\n1,2\n", "line 1: no column holds a frequency"),

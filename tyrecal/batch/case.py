@@ -29,7 +29,7 @@ from ..evaluate.failure import DeckRefused, EvaluationFailed, SolverUnavailable
 from ..evaluate.solver import UnknownSolver
 from ..evaluate.sources import sources
 from ..evaluate.store import Store, sources_of
-from ..files import whole
+from ..files import drop_results, whole
 from ..fit.calibrate import NothingToFit
 from .studies import Asked, Outcome, Studied, study
 
@@ -77,6 +77,8 @@ def run_case(task: CaseTask) -> Report:
             facts.update(answered=True, seconds=dict.fromkeys(finished, 0.0))
         report["studies"] = finished
     except Exception as error:  # whatever it is, the other cases go on
+        with suppress(OSError):
+            _drop(task)
         report["studies"] = dict.fromkeys(task.studies, _entry(_failed(error), task))
     return report
 
@@ -93,7 +95,8 @@ def _studied(
     """Every study's entry in the report, and the names of the result files."""
     task.folder.mkdir(parents=True, exist_ok=True)
     owner = {"case": str(task.path), "command": "batch"}
-    _write(task.folder / "run.json", {**owner, **facts})
+    _write(task.folder / "run.json", {**owner, **facts, "finished": False})
+    _drop(task)
     door.store = Store(task.record) if task.record else None
     state = Studied(loaded, door, {"initial": start_values(loaded)}, task.asked)
     entries: dict[str, Any] = {}
@@ -115,8 +118,13 @@ def _studied(
             door.folder.rmdir()
     facts["cpu_seconds"] = round(time.process_time() - used, 3)
     facts.update(solver_runs=door.counts.runs, answered_from_record=door.counts.recorded)
-    _write(task.folder / "run.json", {**owner, **facts})
+    _write(task.folder / "run.json", {**owner, **facts, "finished": True})
     return entries, files
+
+
+def _drop(task: CaseTask) -> None:
+    for name in task.studies:
+        drop_results(task.folder, name)
 
 
 def _loaded(task: CaseTask) -> LoadedCase:

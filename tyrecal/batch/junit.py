@@ -1,7 +1,8 @@
 """A batch as JUnit XML, which CI servers show: a suite a case, a test a study.
 
 Valid against both schemas in use, Jenkins' and Ant's: what they disagree about is left out. A study
-without a result is an error; one that is not as it should be, or drifted, a failure.
+without a result is an error; one that is not as it should be, or drifted, a failure. What only the
+baseline has is skipped, and a suite's system-out says so, as of what only this batch has.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from .case import Report
 
+SKIPPED: dict[str, Any] = {"status": "skipped", "cause": None, "words": None, "quantities": {}}
 OUTCOMES = {"error": "error", "failed": "failure", "skipped": "skipped"}
 UNPRINTABLE = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")  # in XML 1.0
 
@@ -23,7 +25,7 @@ def junit(reports: Sequence[Report], drift: Mapping[str, Any] | None, started: s
     drifted: dict[tuple[str, str], list[Mapping[str, Any]]] = {}
     for each in drift["drifted"] if drift else ():
         drifted.setdefault((each["case"], each["study"]), []).append(each)
-    for number, report in enumerate(reports):
+    for number, report in enumerate([*reports, *_missing(drift)]):
         facts = report["facts"]
         seconds = facts.get("seconds", {})
         attributes = {
@@ -41,7 +43,8 @@ def junit(reports: Sequence[Report], drift: Mapping[str, Any] | None, started: s
                 value = {"name": name, "value": str(facts[name])}
                 SubElement(properties, "property", value)
         counts = dict.fromkeys(OUTCOMES.values(), 0)
-        for study, entry in report["studies"].items():
+        missing, said = _unlike(drift, report["name"])
+        for study, entry in {**report["studies"], **dict.fromkeys(missing, SKIPPED)}.items():
             time = _time(seconds.get(study, 0.0))
             attributes = {"classname": report["name"], "name": study, "time": time}
             test = SubElement(suite, "testcase", attributes)
@@ -53,14 +56,37 @@ def junit(reports: Sequence[Report], drift: Mapping[str, Any] | None, started: s
             elif outcome:
                 attributes = {"type": kind, "message": _clean(message)}
                 SubElement(test, outcome, attributes).text = _clean(text)
-        suite.set("tests", str(len(report["studies"])))
+        suite.set("tests", str(len(report["studies"]) + len(missing)))
         suite.set("failures", str(counts["failure"]))
         suite.set("errors", str(counts["error"]))
         suite.set("skipped", str(counts["skipped"]))
-        SubElement(suite, "system-out")
+        SubElement(suite, "system-out").text = _clean("\n".join(said)) or None
         SubElement(suite, "system-err")
     indent(suites)
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + tostring(suites, "unicode") + "\n"
+
+
+def _missing(drift: Mapping[str, Any] | None) -> list[Report]:
+    """Suites for cases that only the baseline has."""
+    names = drift["missing_cases"] if drift else ()
+    return [{"name": name, "studies": {"baseline": SKIPPED}, "facts": {}} for name in names]
+
+
+def _unlike(drift: Mapping[str, Any] | None, case: str) -> tuple[list[str], list[str]]:
+    """Studies of a case that only the baseline has, and what is to be said of the two sides."""
+    if not drift:
+        return [], []
+    missing, new = (
+        [study for of, _, study in (each.rpartition("/") for each in drift[key]) if of == case]
+        for key in ("missing_studies", "new_studies")
+    )
+    said = [f"{study} is in the baseline, but was not studied" for study in missing]
+    said += [f"{study} is not in the baseline, so not compared" for study in new]
+    if case in drift["missing_cases"]:
+        said.append(f"{case} is in the baseline, but not in this batch")
+    if case in drift["new_cases"]:
+        said.append(f"{case} is not in the baseline, so not compared")
+    return missing, said
 
 
 def _outcome(

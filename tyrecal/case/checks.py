@@ -17,7 +17,7 @@ from .calibration import MEASURED
 from .meshable import Problems, levels, places
 from .mistakes import Keys, dotted, suggestion
 from .parts import WRONG, number
-from .shape import KINDS, entries, explain, table, type_at
+from .shape import KINDS, entries, explain, table, type_at, with_defaults
 
 if TYPE_CHECKING:
     from ..tyre.section import Section
@@ -31,8 +31,9 @@ def problems(data: Mapping[str, Any], section: Section | None) -> Problems:
     yield from _effects(data)
     yield from _names(data)
     yield from _targets(data)
-    yield from _variables(data)
-    yield from _uncertainties(data)
+    full = with_defaults(data)  # a number that is not written can vary too
+    yield from _variables(full)
+    yield from _uncertainties(full)
     chosen = table(data, "mesh").get("level")
     known = table(data, "mesh").get("levels")
     if isinstance(chosen, str) and isinstance(known, dict) and chosen not in known:
@@ -116,6 +117,8 @@ def _variables(data: Mapping[str, Any]) -> Problems:
             yield here, f"a variable cannot set {keys[0]}"
         elif type_at(keys) is int:
             yield here, "is a whole number, which cannot vary"
+        elif at(data, keys) is None:
+            yield here, "has no value, and no default: write one"
         elif not _is_number(at(data, keys)):
             yield here, "leads to no number"
         elif keys in owners:

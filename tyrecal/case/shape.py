@@ -100,6 +100,27 @@ def fields_at(keys: Keys, material: type[BaseModel] | None = None) -> list[str]:
     return list(getattr(part, "model_fields", {}))
 
 
+def with_defaults(data: Any, kind: Any = Case) -> Any:
+    """Plain data of ``kind`` with what it leaves out, as the schema has it."""
+    kind = _plain(kind)
+    if get_origin(kind) is dict and isinstance(data, dict):
+        return {key: with_defaults(value, get_args(kind)[-1]) for key, value in data.items()}
+    if get_origin(kind) is list and isinstance(data, list):
+        return [with_defaults(value, get_args(kind)[0]) for value in data]
+    if get_origin(kind) in UNIONS and isinstance(data, dict):
+        kind = next((each for name, each in KINDS.items() if data.get("kind") == name), None)
+    if not (isinstance(kind, type) and issubclass(kind, BaseModel) and isinstance(data, dict)):
+        return data
+    full = dict(data)
+    for name, field in kind.model_fields.items():
+        if name in data:
+            full[name] = with_defaults(data[name], field.annotation)
+        elif not field.is_required():
+            default = field.get_default(call_default_factory=True)
+            full[name] = default.model_dump() if isinstance(default, BaseModel) else default
+    return full
+
+
 def disagreements(data: Mapping[str, Any]) -> Iterator[tuple[Keys, str]]:
     """What is wrong between the keys of one part, in data whose wrong values are WRONG."""
     parts: list[tuple[Keys, Any, type[Any]]] = []

@@ -62,11 +62,9 @@ def command(
         raise click.UsageError(f"there is no effect '{name}'{suggestion(name, IDS)}")
     if value is not None and name is None:
         raise click.UsageError("--value needs the NAME of an effect")
-    given = {"fitted": fitted, "value": value is not None, "pressures-kPa": pressures,
-             "set": assignments, "mesh": study.mesh, "solver": study.solver,
-             "output": study.output, "jobs": study.jobs > 1}  # fmt: skip
-    for option in (option for option, there in given.items() if there and not case):
-        raise click.UsageError(f"--{option} needs a --case")
+    for option in [] if case else options.given():
+        if option not in ("--json", "--quiet", "--verbose"):
+            raise click.UsageError(f"{option} needs a --case")
     solvers = installed()
     entries = {id: effect_entry(catalogue()[id], solvers) for id in ([name] if name else IDS)}
     if not case:

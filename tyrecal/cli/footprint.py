@@ -54,6 +54,9 @@ def command(
     door.needs_road()
     fitted = _fit_compared(compare, fitted, (study.output or Path(case.stem)) / "fit.json")
     designs = _designs(compare, values, fitted, loaded, study.solver)
+    if study.jobs > 1 and len(designs) == 1:
+        why = "one design is pressed alone; with --fitted there are two"
+        raise options.nothing_to_share("--jobs", why)
     run = study.run(case, "footprint", door)
 
     def notify(design: str, outcome: Any) -> None:

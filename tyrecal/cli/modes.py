@@ -54,6 +54,9 @@ def command(
         raise click.UsageError("--fitted goes with --sweep-load")
     if pictures and load_N is not None:
         raise click.UsageError("--pictures goes with --sweep-load, or without a load")
+    if study.jobs > 1 and not fitted:
+        why = "one design is evaluated alone; --sweep-load with --fitted has two"
+        raise options.nothing_to_share("--jobs", why)
     talk = study.talk
     loaded, values = study.load(case, assignments, pressure_kPa)
     door = study.door(loaded)
@@ -62,7 +65,7 @@ def command(
         door.needs_road(modes=True)
     if fitted:
         designs["fitted"] = options.fitted_values(fitted, loaded, study.solver)
-    run = study.run(case, "modes", door)
+    run = study.run(case, "modes", door, "modes" if sweep is None else "sweep-load")
     if sweep is not None:
         draw = pictures is not False
         return over_loads(door, run, designs, loads, study, draw)

@@ -24,6 +24,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+from click.core import ParameterSource
 
 from . import complete
 from .talk import SOLVERS, Talk
@@ -227,11 +228,14 @@ class Study:
         door.solver  # noqa: B018  a solver that is not there is refused before anything is written
         return door
 
-    def run(self, case: Path, command: str, door: Door) -> Run:
-        """The command's run, with the record behind ``door``. Raises OutputRefused, Locked."""
+    def run(self, case: Path, command: str, door: Door, results: str = "") -> Run:
+        """The command's run, with the record behind ``door``; ``results``: key of those that it
+        renews, where it is not ``command``. Raises OutputRefused, Locked, OSError."""
+        from ..files import drop_results
         from .output import Run
 
         run = Run(case, self.output, command, door.solver)
+        drop_results(run.folder, results or command)
         door.folder, door.keep = run.runs, self.talk.verbose
         door.store = run.open_store(self.store, self.no_store)
         run.counts = counts = door.counts
@@ -301,6 +305,22 @@ def load(path: Path, mesh_level: str, assigned: tuple[str, ...], pressure_kPa: f
         raise
     except ValueError as error:
         raise click.UsageError(str(error)) from None
+
+
+def given() -> list[str]:
+    """The options that stand on the command line, not those of the environment."""
+    context = click.get_current_context()
+    return [
+        [*([] if context.params[option.name] else option.secondary_opts), *option.opts][0]
+        for option in context.command.params
+        if isinstance(option, click.Option)
+        and context.get_parameter_source(str(option.name)) is ParameterSource.COMMANDLINE
+    ]
+
+
+def nothing_to_share(option: str, why: str) -> click.UsageError:
+    """The error where ``option`` asks for workers that would have nothing to do."""
+    return click.UsageError(f"{option} would change nothing: {why}")
 
 
 def not_both(jobs: int, scheduler: str) -> None:

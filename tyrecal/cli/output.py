@@ -37,7 +37,7 @@ class Run:
         self.case, self.command, self.solver = case.resolve(), command, solver
         self.folder = output or Path(case.stem)
         self.started = datetime.now(UTC).isoformat(timespec="seconds")
-        self._clock = time.monotonic()
+        self._clock, self._finished = time.monotonic(), False
         self.store: Store | None = None
         self.counts: Counts | None = None
         if self.folder.exists() and not self.folder.is_dir():
@@ -50,7 +50,8 @@ class Run:
             from ..evaluate.folders import drop_unfinished
 
             drop_unfinished(self.runs)
-        self.finish()
+        self._write_facts()
+        click.get_current_context().call_on_close(self._say_unfinished)
 
     def open_store(self, folder: Path | None, none: bool) -> Store | None:
         """The record of evaluations: in ``folder``, or beside the results, or ``none``."""
@@ -82,6 +83,10 @@ class Run:
 
     def finish(self, **facts: Any) -> None:
         """Write run.json: command, times, host, versions, and what else is volatile."""
+        self._finished = True
+        self._write_facts(**facts)
+
+    def _write_facts(self, **facts: Any) -> None:
         import tyrecal
 
         counts = self.counts and {
@@ -95,6 +100,7 @@ class Run:
                 "command": self.command,
                 "arguments": sys.argv[1:],
                 "started": self.started,
+                "finished": self._finished,
                 "seconds": round(time.monotonic() - self._clock, 3),
                 "host": platform.node(),
                 "python": platform.python_version(),
@@ -105,6 +111,11 @@ class Run:
                 **facts,
             },
         )
+
+    def _say_unfinished(self) -> None:
+        if not self._finished:
+            with contextlib.suppress(OSError):  # what went wrong before is what is told
+                self._write_facts()
 
     def _close(self) -> None:
         with contextlib.suppress(OSError):  # it holds failures, or was never made

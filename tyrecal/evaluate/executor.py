@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import multiprocessing
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from concurrent.futures.process import BrokenProcessPool
@@ -11,7 +10,6 @@ from typing import Any, Protocol
 
 from .pool import Pool, process_pool
 
-PATIENCE_S = 5.0  # for a process that was told to end
 Task = tuple[int, Any]  # its place among the tasks, and what its function is given
 
 
@@ -66,7 +64,7 @@ def _until_one_dies(
     """Does tasks off the end of ``waiting``, yields answers; returns what a death left undone."""
     under_way: dict[Future[Any], Task] = {}
     lost: list[Task] = []
-    with _pool(jobs, lost) as pool, _ended_at_once():
+    with _pool(jobs, lost) as pool:
         while under_way or (waiting and not lost):
             while waiting and not lost and len(under_way) < jobs:
                 task = waiting.pop()
@@ -91,29 +89,22 @@ _idle: dict[int, Pool] = {}
 @contextmanager
 def _pool(jobs: int, lost: Sequence[Task]) -> Iterator[Pool]:
     """Worker processes, kept for the next tasks where all went well: by then they have read the
-    templates and built the mesh. ``lost``: tasks whose process died."""
+    templates and built the mesh. ``lost``: tasks whose process died.
+
+    At Ctrl-C, or where nobody wants the rest, all are ended at once; a failed task's finish.
+    """
     pool = _idle.pop(jobs, None) or process_pool(jobs)
     with ExitStack() as stack:
         stack.enter_context(pool)
-        yield pool
+        try:
+            yield pool
+        except (KeyboardInterrupt, GeneratorExit):
+            while _idle:
+                _idle.popitem()[1].end()
+            raise
         if not lost:
             stack.pop_all()
             _idle[jobs] = pool
-
-
-@contextmanager
-def _ended_at_once() -> Iterator[None]:
-    """Ends the processes at Ctrl-C, or where nobody wants the rest; a failed task's finish."""
-    try:
-        yield
-    except (KeyboardInterrupt, GeneratorExit):
-        _idle.clear()
-        ended = multiprocessing.active_children()
-        for process in ended:
-            process.terminate()
-        for process in ended:  # those of idle pools too, which nobody else waits for
-            process.join(PATIENCE_S)
-        raise
 
 
 @contextmanager

@@ -5,21 +5,73 @@ from __future__ import annotations
 import os
 import signal
 import threading
-from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import active_children, forkserver, get_context, parent_process
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Future, ProcessPoolExecutor
+from contextlib import contextmanager
+from multiprocessing import forkserver, get_context, parent_process
+from typing import Any
 
 WARM = "tyrecal.evaluate.warm"
+PATIENCE_S = 5.0  # for a process that was told to end
 
 
 class Pool(ProcessPoolExecutor):
     """Worker processes that are not waited for after Ctrl-C: what they had not finished is lost."""
 
+    def submit(self, *task: Any, **named: Any) -> Future[Any]:
+        """As in the standard library; no worker is left half started, and so unknown, by Ctrl-C."""
+        with _ctrl_c_later():
+            return super().submit(*task, **named)
+
+    def map(  # type: ignore[override]
+        self, function: Callable[..., Any], *tasks: Iterable[Any]
+    ) -> Iterator[Any]:
+        """As in the standard library, but that, cut off, it cancels nothing: `end` and the end of
+        the block do, and a future that was cancelled before stops the thread that ends the pool."""
+        futures = [self.submit(function, *task) for task in zip(*tasks, strict=False)]
+        return (futures.pop(0).result() for _ in range(len(futures)))
+
+    def end(self) -> None:
+        """End the workers now, whatever they do; a second Ctrl-C has to wait until they have."""
+        with _ctrl_c_later():
+            workers = list((self._processes or {}).values())
+            answers: Any = self._result_queue
+            for worker in workers:
+                worker.terminate()
+            for worker in workers:
+                worker.join(PATIENCE_S)
+                worker.kill()
+            # One may have died in the middle of an answer. The thread that reads it is waited for
+            # here and when Python ends, and sees its end only when nobody can write the rest.
+            if answers is not None:
+                answers._writer.close()
+            self.shutdown(cancel_futures=True)
+
     def __exit__(self, kind: type[BaseException] | None, *error: object) -> None:
-        if kind is not None and issubclass(kind, KeyboardInterrupt):
-            self.shutdown(wait=False, cancel_futures=True)
-            for process in active_children():
-                process.terminate()
-        self.shutdown(cancel_futures=kind is not None)
+        if kind is not None and issubclass(kind, KeyboardInterrupt | GeneratorExit):
+            self.end()
+            return
+        try:
+            self.shutdown(cancel_futures=kind is not None)
+        except KeyboardInterrupt:
+            self.end()
+            raise
+
+
+@contextmanager
+def _ctrl_c_later() -> Iterator[None]:
+    """Ctrl-C counts when the block is done."""
+    if threading.current_thread() is not threading.main_thread():  # which alone hears of it
+        yield
+        return
+    heard: list[int] = []
+    answer = signal.signal(signal.SIGINT, lambda number, frame: heard.append(number))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, answer)
+        if heard:
+            signal.raise_signal(signal.SIGINT)
 
 
 def warm_up() -> None:

@@ -56,12 +56,16 @@ MEMBERS = {"": "", "1": "1", "2": "2", "a": "1", "b": "2", "lower": "1", "upper"
 
 @dataclass(frozen=True)
 class Column:
-    """What a column holds, its number, and the factor to our unit; 0.01 of the value for %."""
+    """What a column holds, its number, and the factor to our unit; 0.01 of the value for %.
+
+    of: the quantity that a sigma's unit belongs to, "" where it has none or is in %.
+    """
 
     meaning: str
     index: int
     factor: float
     percent: bool = False
+    of: str = ""
 
 
 def read_table(path: Path, pressure_kPa: float | None = None) -> list[Value]:
@@ -150,10 +154,10 @@ def _columns(headings: list[str], place: str, pressure_kPa: float | None) -> lis
             factor = table[unit]
         columns.append(Column(meaning, index, factor, unit == "%"))
         if meaning == "sigma" and unit and unit != "%":
-            scales = {u: f for each in units.QUANTITIES.values() for u, f in each.items()}
-            if unit not in scales:
+            of = next((q for q, each in units.QUANTITIES.items() if unit in each), "")
+            if not of:
                 raise BadMeasuredData(f"{place}: '{heading}': unknown unit")
-            columns[-1] = Column(meaning, index, scales[unit])
+            columns[-1] = Column(meaning, index, units.QUANTITIES[of][unit], of=of)
     held = {column.meaning for column in columns}
     if not own and not held & set(QUANTITIES) and not {"quantity", "value"} <= held:
         raise BadMeasuredData(
@@ -224,17 +228,25 @@ def _values(
             )
     if not quantities:
         raise ValueError("nothing was measured: the cell of the value is empty")
-    for i, quantity in enumerate(quantities):
+    sigma = factor["sigma"] if text.get("sigma") else None
+    if sigma and sigma.of and sigma.of not in quantities:
+        raise ValueError(f"sigma has the unit of {sigma.of}, which has no value here")
+    if sigma and not sigma.of and not sigma.percent and len(quantities) > 1:
+        raise ValueError(
+            f"sigma can be that of {' or '.join(quantities)}: write its unit, as in 'sigma [Hz]',"
+            " or 'sigma [%]' for all of them"
+        )
+    for quantity in quantities:
         value = number("value" if text.get("value") else quantity)
         label, member = None, ""
         if quantity == "frequency_Hz":
             label, member = _label(text), _member(text.get("member", ""), bool(load))
-        sigma = number("sigma") if text.get("sigma") and i == 0 else None
-        if sigma is not None and factor["sigma"].percent:
-            sigma *= 0.01 * value
+        own = number("sigma") if sigma and sigma.of in ("", quantity) else None
+        if own is not None and sigma and sigma.percent:
+            own *= 0.01 * value
         name = f"{run} {text['run']}" if text.get("run") else run
         at = 0.0 if quantity == "mass_kg" else pressure
-        yield Value(quantity, label, member, at, load, value, sigma, name, place)
+        yield Value(quantity, label, member, at, load, value, own, name, place)
 
 
 def _label(text: dict[str, str]) -> Label:

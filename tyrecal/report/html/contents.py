@@ -354,5 +354,7 @@ class RunFacts(Part):
     """run.json, but for what differs from run to run."""
 
     case: str | None = None
+    command: str | None = None
+    finished: bool = True
     solver: str | None = None
     tyrecal: str | None = None

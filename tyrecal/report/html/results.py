@@ -95,8 +95,10 @@ def read_results(folder: Path) -> Results:
     )
     studies = (found.fit, found.modes, found.pressure, found.load, found.footprint)
     if not any((*studies, found.diagnosis)):
+        run = found.run
+        last = "" if run.finished else f": its last run, 'tyrecal {run.command}', did not finish"
         raise BadResults(f"'{folder}' holds no results of fit, modes, sweep-pressure, footprint or"
-                         " diagnose")  # fmt: skip
+                         f" diagnose{last}")  # fmt: skip
     return found
 
 

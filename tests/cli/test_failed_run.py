@@ -1,0 +1,70 @@
+"""A run that fails leaves no results of an earlier one behind, and says that it did not finish."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from tyrecal.batch.case import CaseTask, run_case
+from tyrecal.batch.studies import Asked
+from tyrecal.evaluate.door import Door
+from tyrecal.evaluate.failure import EvaluationFailed
+from tyrecal.files import RESULTS
+
+from ..conftest import CASES
+from .test_cli import CASE, run
+
+
+@pytest.fixture(autouse=True)
+def _unable(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fails(door: Door, *question: object) -> None:
+        raise EvaluationFailed("crashed", "the licence was eaten")
+
+    monkeypatch.setattr(Door, "evaluate", fails)
+    monkeypatch.setattr(Door, "press", fails)
+
+
+def earlier(folder: Path, *studies: str) -> None:
+    """What runs of ``studies`` left."""
+    folder.mkdir()
+    for study in studies:
+        for name in RESULTS[study]:
+            (folder / name).write_text("{}")
+
+
+@pytest.mark.parametrize(
+    ("study", "arguments"),
+    [
+        ("fit", ["fit", CASE]),
+        ("modes", ["modes", CASE]),
+        ("sweep-load", ["modes", CASE, "--sweep-load", "4000"]),
+        ("sweep-pressure", ["sweep-pressure", CASE, "--steps", "2"]),
+        ("footprint", ["footprint", CASE, "--loads-N", "4000"]),
+    ],
+)
+def test_no_stale_results(
+    study: str, arguments: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    earlier(out, study, "diagnose")
+    assert run(*arguments, "--output", str(out)) == 3
+    left = {path.name for path in out.iterdir() if path.is_file()} - {".lock"}
+    assert left == {*RESULTS["diagnose"], "run.json"}
+    assert json.loads((out / "run.json").read_text())["finished"] is False
+    for name in RESULTS["diagnose"]:
+        (out / name).unlink()
+    capsys.readouterr()
+    assert run("report", str(out)) == 2
+    assert f"last run, 'tyrecal {arguments[0]}', did not finish" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("there", [True, False])
+def test_no_stale_results_of_a_case_in_a_batch(there: bool, tmp_path: Path) -> None:
+    case = CASES / "p235_75r17.yaml" if there else tmp_path / "gone.yaml"
+    out = tmp_path / "out"
+    earlier(out, "modes", "fit")
+    report = run_case(CaseTask("a", case, out, ("modes",), Asked(None, ())))
+    assert report["studies"]["modes"]["status"] == "error"
+    assert {path.name for path in out.iterdir()} - {"run.json"} == set(RESULTS["fit"])
