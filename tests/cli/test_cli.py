@@ -196,21 +196,22 @@ def test_a_fit_on_this_machine_and_on_others_writes_nothing(
     assert not out.exists()
 
 
-@pytest.mark.parametrize(
-    "arguments",
-    [
-        ["fit", CASE, "--scheduler", "tcp://localhost:1"],
-        ["fit", CASE, "--jobs", "2"],
-        ["footprint", CASE, "--jobs", "2"],
-    ],
-)
-def test_workers_that_would_have_nothing_to_do_are_refused(
-    arguments: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+def test_a_scheduler_that_would_have_nothing_to_do_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "out"
-    assert run(*arguments, "--output", str(out)) == 2
-    assert f"{arguments[2]} would change nothing: " in capsys.readouterr().err
+    assert run("fit", CASE, "--scheduler", "tcp://localhost:1", "--output", str(out)) == 2
+    assert "--scheduler changes nothing here: " in capsys.readouterr().err
     assert not out.exists()
+
+
+def test_jobs_with_nothing_to_do_are_mentioned(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Scripts give --jobs to every command."""
+    out = ["--output", str(tmp_path / "out"), "--no-pictures"]
+    assert run("modes", CASE, "--mesh", "coarse", "--jobs", "2", *out) == 0
+    assert "--jobs changes nothing here: one design" in capsys.readouterr().err
 
 
 def test_a_template_that_runs_code_is_refused(

@@ -70,8 +70,6 @@ def test_a_tyre_that_no_load_is_borne_by(
         (["--sweep-load", "much"], "'much' is not a number"),
         (["--sweep-load", "500", "--load-N", "500"], "not both"),
         (["--load-N", "500", "--fitted", CASE], "--fitted goes with --sweep-load"),
-        (["--jobs", "2"], "--jobs would change nothing: one design is evaluated alone"),
-        (["--sweep-load", "500", "--jobs", "2"], "--jobs would change nothing"),
         (["--load-N", "500", "--pictures"], "--pictures goes with"),
         (["--load-N", "500", "--solver", "calculix"], "cannot find modes of a tyre on a road"),
     ],

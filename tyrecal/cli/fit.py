@@ -97,12 +97,11 @@ def command(
     door = study.door(loaded)
     if loaded.case.targets.footprint:
         door.needs_road()
-    elif starts == 1 and door.has_gradients and (study.jobs > 1 or scheduler):
-        why = (
-            f"a fit from one start asks solver '{door.solver.name}' for one design at a time;"
-            " give --starts too"
-        )
-        raise options.nothing_to_share("--scheduler" if scheduler else "--jobs", why)
+    elif starts == 1 and door.has_gradients:
+        why = f"a fit from one start asks solver '{door.solver.name}' for one design at a time"
+        if scheduler:
+            raise click.UsageError(f"--scheduler changes nothing here: {why}; give --starts too")
+        options.say_idle(talk, study.jobs, why)
     run = study.run(case, "fit", door)
     unit = objective_unit(loaded)
     with talk.progress("fit") as bar, reached(scheduler) as door.scheduler:

@@ -54,9 +54,8 @@ def command(
     door.needs_road()
     fitted = _fit_compared(compare, fitted, (study.output or Path(case.stem)) / "fit.json")
     designs = _designs(compare, values, fitted, loaded, study.solver)
-    if study.jobs > 1 and len(designs) == 1:
-        why = "one design is pressed alone; with --fitted there are two"
-        raise options.nothing_to_share("--jobs", why)
+    if len(designs) == 1:
+        options.say_idle(talk, study.jobs, "one design is pressed alone; --fitted adds another")
     run = study.run(case, "footprint", door)
 
     def notify(design: str, outcome: Any) -> None:

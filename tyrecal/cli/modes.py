@@ -54,10 +54,10 @@ def command(
         raise click.UsageError("--fitted goes with --sweep-load")
     if pictures and load_N is not None:
         raise click.UsageError("--pictures goes with --sweep-load, or without a load")
-    if study.jobs > 1 and not fitted:
-        why = "one design is evaluated alone; --sweep-load with --fitted has two"
-        raise options.nothing_to_share("--jobs", why)
     talk = study.talk
+    if not fitted:
+        why = "one design is evaluated alone; --sweep-load with --fitted has two"
+        options.say_idle(talk, study.jobs, why)
     loaded, values = study.load(case, assignments, pressure_kPa)
     door = study.door(loaded)
     designs = {"initial": values}

@@ -318,9 +318,10 @@ def given() -> list[str]:
     ]
 
 
-def nothing_to_share(option: str, why: str) -> click.UsageError:
-    """The error where ``option`` asks for workers that would have nothing to do."""
-    return click.UsageError(f"{option} would change nothing: {why}")
+def say_idle(talk: Talk, jobs: int, why: str) -> None:
+    """Says that --jobs asks for workers who have nothing to do: scripts may give it everywhere."""
+    if jobs > 1:
+        talk.note(f"--jobs changes nothing here: {why}")
 
 
 def not_both(jobs: int, scheduler: str) -> None:
