@@ -21,13 +21,24 @@ RESULTS = {  # of a study: what a new run of it takes the place of
 }
 
 
-def drop_results(folder: Path, study: str) -> None:
-    """Remove an earlier run's results, which must not pass for those of a run that fails.
+PREVIOUS = "previous"  # folder in which results stand aside
 
-    Raises OSError.
-    """
+
+def set_aside(folder: Path, study: str) -> None:
+    """Move an earlier run's results to `PREVIOUS`: they must not pass for those of a run that
+    fails, nor be lost with it. Raises OSError."""
     for name in RESULTS[study]:
-        (folder / name).unlink(missing_ok=True)
+        if (folder / name).exists():
+            (folder / PREVIOUS).mkdir(exist_ok=True)
+            (folder / name).replace(folder / PREVIOUS / name)
+
+
+def forget_previous(folder: Path, study: str) -> None:
+    """Remove what `set_aside` moved, once a new run has taken its place. Raises OSError."""
+    for name in RESULTS[study]:
+        (folder / PREVIOUS / name).unlink(missing_ok=True)
+    with contextlib.suppress(OSError):  # it was never made, or holds another study's
+        (folder / PREVIOUS).rmdir()
 
 
 @contextlib.contextmanager

@@ -11,7 +11,7 @@ from tyrecal.batch.case import CaseTask, run_case
 from tyrecal.batch.studies import Asked
 from tyrecal.evaluate.door import Door
 from tyrecal.evaluate.failure import EvaluationFailed
-from tyrecal.files import RESULTS
+from tyrecal.files import PREVIOUS, RESULTS
 
 from ..conftest import CASES
 from .test_cli import CASE, run
@@ -52,6 +52,7 @@ def test_no_stale_results(
     assert run(*arguments, "--output", str(out)) == 3
     left = {path.name for path in out.iterdir() if path.is_file()} - {".lock"}
     assert left == {*RESULTS["diagnose"], "run.json"}
+    assert {path.name for path in (out / PREVIOUS).iterdir()} == set(RESULTS[study])
     assert json.loads((out / "run.json").read_text())["finished"] is False
     for name in RESULTS["diagnose"]:
         (out / name).unlink()
@@ -67,4 +68,16 @@ def test_no_stale_results_of_a_case_in_a_batch(there: bool, tmp_path: Path) -> N
     earlier(out, "modes", "fit")
     report = run_case(CaseTask("a", case, out, ("modes",), Asked(None, ())))
     assert report["studies"]["modes"]["status"] == "error"
-    assert {path.name for path in out.iterdir()} - {"run.json"} == set(RESULTS["fit"])
+    assert {path.name for path in out.iterdir()} - {"run.json"} == {*RESULTS["fit"], PREVIOUS}
+    assert {path.name for path in (out / PREVIOUS).iterdir()} == set(RESULTS["modes"])
+
+
+def test_results_of_a_run_that_is_done_take_the_place_of_others(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = tmp_path / "out"
+    earlier(out, "modes")
+    monkeypatch.undo()
+    assert run("modes", CASE, "--mesh", "coarse", "--no-pictures", "--output", str(out)) == 0
+    assert json.loads((out / "modes.json").read_text())["modes"]
+    assert not (out / PREVIOUS).exists()

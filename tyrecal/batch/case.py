@@ -15,6 +15,7 @@ from __future__ import annotations
 import json
 import platform
 import time
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
@@ -29,7 +30,7 @@ from ..evaluate.failure import DeckRefused, EvaluationFailed, SolverUnavailable
 from ..evaluate.solver import UnknownSolver
 from ..evaluate.sources import sources
 from ..evaluate.store import Store, sources_of
-from ..files import drop_results, whole
+from ..files import forget_previous, set_aside, whole
 from ..fit.calibrate import NothingToFit
 from .studies import Asked, Outcome, Studied, study
 
@@ -78,7 +79,7 @@ def run_case(task: CaseTask) -> Report:
         report["studies"] = finished
     except Exception as error:  # whatever it is, the other cases go on
         with suppress(OSError):
-            _drop(task)
+            _for_each(task, set_aside)
         report["studies"] = dict.fromkeys(task.studies, _entry(_failed(error), task))
     return report
 
@@ -96,7 +97,7 @@ def _studied(
     task.folder.mkdir(parents=True, exist_ok=True)
     owner = {"case": str(task.path), "command": "batch"}
     _write(task.folder / "run.json", {**owner, **facts, "finished": False})
-    _drop(task)
+    _for_each(task, set_aside)
     door.store = Store(task.record) if task.record else None
     state = Studied(loaded, door, {"initial": start_values(loaded)}, task.asked)
     entries: dict[str, Any] = {}
@@ -119,12 +120,15 @@ def _studied(
     facts["cpu_seconds"] = round(time.process_time() - used, 3)
     facts.update(solver_runs=door.counts.runs, answered_from_record=door.counts.recorded)
     _write(task.folder / "run.json", {**owner, **facts, "finished": True})
+    for name in task.studies:
+        if entries[name]["status"] != "error":
+            forget_previous(task.folder, name)
     return entries, files
 
 
-def _drop(task: CaseTask) -> None:
+def _for_each(task: CaseTask, change: Callable[[Path, str], None]) -> None:
     for name in task.studies:
-        drop_results(task.folder, name)
+        change(task.folder, name)
 
 
 def _loaded(task: CaseTask) -> LoadedCase:

@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from ..files import drop_results, json_text, write_text
+from ..files import json_text, write_text
 from . import options
 from .main import EXIT_BATCH
 from .talk import Talk
@@ -100,7 +100,7 @@ def command(
     if baseline and (baseline.exists() or not write_baseline):
         before = read_baseline(baseline)
     run = Run(output, output, "batch")
-    drop_results(run.folder, "batch")
+    run.renew("batch")
     record = run.open_store(store, no_store)
     folder = output.resolve()
     tasks = [

@@ -231,11 +231,10 @@ class Study:
     def run(self, case: Path, command: str, door: Door, results: str = "") -> Run:
         """The command's run, with the record behind ``door``; ``results``: key of those that it
         renews, where it is not ``command``. Raises OutputRefused, Locked, OSError."""
-        from ..files import drop_results
         from .output import Run
 
         run = Run(case, self.output, command, door.solver)
-        drop_results(run.folder, results or command)
+        run.renew(results or command)
         door.folder, door.keep = run.runs, self.talk.verbose
         door.store = run.open_store(self.store, self.no_store)
         run.counts = counts = door.counts

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..files import json_text, write_text
+from ..files import forget_previous, json_text, set_aside, write_text
 from . import lock
 from .talk import resume
 
@@ -37,7 +37,7 @@ class Run:
         self.case, self.command, self.solver = case.resolve(), command, solver
         self.folder = output or Path(case.stem)
         self.started = datetime.now(UTC).isoformat(timespec="seconds")
-        self._clock, self._finished = time.monotonic(), False
+        self._clock, self._finished, self._renewed = time.monotonic(), False, ""
         self.store: Store | None = None
         self.counts: Counts | None = None
         if self.folder.exists() and not self.folder.is_dir():
@@ -81,10 +81,17 @@ class Run:
         """Where the solver's run folders go."""
         return self.folder / "runs"
 
+    def renew(self, study: str) -> None:
+        """Set aside an earlier run's results of ``study`` until this is done. Raises OSError."""
+        set_aside(self.folder, study)
+        self._renewed = study
+
     def finish(self, **facts: Any) -> None:
         """Write run.json: command, times, host, versions, and what else is volatile."""
         self._finished = True
         self._write_facts(**facts)
+        if self._renewed:
+            forget_previous(self.folder, self._renewed)
 
     def _write_facts(self, **facts: Any) -> None:
         import tyrecal
