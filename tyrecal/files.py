@@ -60,9 +60,12 @@ def whole(path: Path, many_writers: bool = False) -> Iterator[Path]:
         raise
 
 
-def write_text(path: Path, text: str) -> None:
-    """Write ``text`` whole or not at all, the same bytes on every system. Raises OSError."""
-    with whole(path) as partial:
+def write_text(path: Path, text: str, many_writers: bool = False) -> None:
+    """Write ``text`` whole or not at all, the same bytes on every system; see `whole`.
+
+    Raises OSError.
+    """
+    with whole(path, many_writers) as partial:
         partial.write_text(text, encoding="utf-8", newline="")
 
 

@@ -18,6 +18,7 @@ from tyrecal.report import diagnosis_pictures as pictures
 from ..conftest import CASES
 from ..diagnose.test_diagnosis import diagnosed
 from ..diagnose.toy import Toy
+from .watched import watched
 
 NUMBER = "0123456789.\N{MINUS SIGN} "
 
@@ -30,10 +31,7 @@ def found() -> Diagnosis:
 @pytest.fixture
 def drawn(monkeypatch: pytest.MonkeyPatch) -> list[Figure]:
     """The figures that were saved."""
-    figures: list[Figure] = []
-    save = pictures.save
-    monkeypatch.setattr(pictures, "save", lambda f, path: (figures.append(f), save(f, path)))
-    return figures
+    return watched(pictures, monkeypatch)
 
 
 def words(figure: Figure) -> str:

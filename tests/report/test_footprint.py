@@ -24,6 +24,7 @@ from tyrecal.studies.footprint import footprint_result
 from ..evaluate.stand_in import CASE
 from ..studies.hertz import ANGLES, FREE, Hertz
 from .test_vtu import volume
+from .watched import watched
 
 LOADS = [500.0, 1000.0, 2000.0, 4000.0, 8000.0]
 MESH = section_mesh(CASE)
@@ -39,10 +40,7 @@ def designs() -> dict[str, Pressed]:
 @pytest.fixture
 def drawn(monkeypatch: pytest.MonkeyPatch) -> list[Figure]:
     """The figures that were saved."""
-    figures: list[Figure] = []
-    save = footprint.save
-    monkeypatch.setattr(footprint, "save", lambda f, path: (figures.append(f), save(f, path)))
-    return figures
+    return watched(footprint, monkeypatch)
 
 
 def rows(designs: dict[str, Pressed]) -> list[dict]:

@@ -30,7 +30,7 @@ from ..evaluate.failure import DeckRefused, EvaluationFailed, SolverUnavailable
 from ..evaluate.solver import UnknownSolver
 from ..evaluate.sources import sources
 from ..evaluate.store import Store, sources_of
-from ..files import forget_previous, set_aside, whole
+from ..files import forget_previous, json_text, set_aside, write_text
 from ..fit.calibrate import NothingToFit
 from .studies import Asked, Outcome, Studied, study
 
@@ -195,9 +195,8 @@ def _digest(path: Path) -> str:
 
 
 def _write(path: Path, content: Any) -> None:
-    _write_text(path, json.dumps(content, indent=1, allow_nan=False) + "\n")
+    _write_text(path, json_text(content))
 
 
 def _write_text(path: Path, text: str) -> None:
-    with whole(path, many_writers=True) as partial:  # a worker thought dead may still be at it
-        partial.write_text(text, encoding="utf-8", newline="")
+    write_text(path, text, many_writers=True)  # a worker thought dead may still be at it

@@ -6,7 +6,7 @@ import json
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from ..files import whole
+from ..files import json_text, write_text
 
 FILE = "protocol.json"
 KINDS = ("effect", "none", "outside")
@@ -49,8 +49,7 @@ class Protocol:
 
 def write_json(path: Path, content: object) -> None:
     """A file of JSON, whole or not at all."""
-    with whole(path) as partial:
-        partial.write_text(json.dumps(content, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    write_text(path, json_text(content))
 
 
 def read_json(path: Path) -> dict:

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from .parts import WRONG, NotNegative, Part, Positive, Problem, Text, number
+from .parts import WRONG, NotNegative, Part, Positive, Problem, Text, number, one_of
 
 MEASURED = {"contact_area_m2": "sigma_m2", "vertical_stiffness_N_per_m": "sigma_N_per_m"}
 """What a footprint target can hold, and the key of its standard deviation."""
@@ -107,11 +107,7 @@ class Uncertainty(Part):
 
     @classmethod
     def problems(cls, values: Mapping[str, Any]) -> Iterator[Problem]:
-        percent, absolute = values.get("percent"), values.get("absolute")
-        if percent is None and absolute is None:
-            yield "percent", "must be given, or absolute"
-        elif percent is not None and absolute is not None:
-            yield "absolute", "must be absent with percent"
+        yield from one_of(values, "percent", "absolute")
         sets, signs = values.get("sets"), values.get("signs")
         if isinstance(sets, list) and isinstance(signs, list) and len(signs) != len(sets):
             yield "signs", f"must have {len(sets)} entries, one for each of sets"

@@ -28,6 +28,14 @@ def number(values: Mapping[str, Any], key: str) -> float | None:
     return value if isinstance(value, int | float) else None
 
 
+def one_of(values: Mapping[str, Any], first: str, second: str) -> Iterator[Problem]:
+    """What is wrong where not exactly one of two keys is given."""
+    if values.get(first) is None and values.get(second) is None:
+        yield first, f"must be given, or {second}"
+    elif values.get(first) is not None and values.get(second) is not None:
+        yield second, f"must be absent with {first}"
+
+
 class Part(BaseModel):
     """A part of the case: known keys only, text is never a number, every number finite."""
 

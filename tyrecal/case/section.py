@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from .parts import Degrees, Name, Part, Positive, Problem, Text
+from .parts import Degrees, Name, Part, Positive, Problem, Text, one_of
 
 Element = Literal["CGAX8R", "CGAX8", "CGAX4R"]
 
@@ -53,11 +53,7 @@ class SectionSource(Part):
 
     @classmethod
     def problems(cls, values: Mapping[str, Any]) -> Iterator[Problem]:
-        stations, outline = values.get("stations"), values.get("outline")
-        if stations is None and outline is None:
-            yield "stations", "must be given, or outline"
-        elif stations is not None and outline is not None:
-            yield "outline", "must be absent with stations"
+        yield from one_of(values, "stations", "outline")
 
 
 class Level(Part):

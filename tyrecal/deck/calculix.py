@@ -124,8 +124,8 @@ def _plies(case: LoadedCase, sector: Sector) -> list[dict[str, Any]]:
             number += 1
             spacing = layer.spacing_m or np.radians(layer.spacing_deg or 0.0) * strip.radius
             share = layer.area_m2 / (spacing * strip.thickness)
-            (r, z), across = strip.along, np.sin(angle)
-            along = np.array([np.cos(angle) * r, across, np.cos(angle) * z])
+            r, z = strip.along
+            along = np.array([np.cos(angle) * r, np.sin(angle), np.cos(angle) * z])
             plies.append(
                 {
                     "name": f"{deck_name(name)}_{k}",

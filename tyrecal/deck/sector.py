@@ -41,9 +41,8 @@ class Sector:
 
     nodes: (number, x, y, z) in m; bricks: section element to nodes (8 or 20); rows: its row in
     the mesh without plies, a ply's being that inside it; strips: per line, from -z to +z, `Strip`;
-    section, behind: nodes on the two faces;
-    between: (node halfway between the faces, node in front of it), the held ones left out; rim:
-    held nodes but those behind; inner: section elements.
+    section, behind: nodes on the two faces; between: (node halfway between the faces, node in
+    front of it), the held ones left out; rim: held nodes but those behind; inner: section elements.
     """
 
     nodes: list[tuple[int, float, float, float]]
