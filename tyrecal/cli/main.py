@@ -9,6 +9,7 @@ from typing import Any
 
 import click
 
+from ..interrupt import ctrl_c_heard, ctrl_c_remembered
 from .talk import RESUME, coloured, error
 
 # One BLAS thread: the tyre's matrices are small, and cores are better spent on other designs.
@@ -65,7 +66,11 @@ class Commands(click.Group):
     def invoke(self, ctx: click.Context) -> Any:
         try:
             return super().invoke(ctx)
-        except KeyboardInterrupt:
+        except (KeyboardInterrupt, Exception) as error:
+            if isinstance(error, click.exceptions.Exit) or not (
+                isinstance(error, KeyboardInterrupt) or ctrl_c_heard()
+            ):
+                raise
             raise Interrupted(ctx.meta.get(RESUME, "nothing was changed")) from None
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
@@ -96,7 +101,8 @@ def cli(ctx: click.Context) -> None:
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line; never returns."""
     try:
-        code = cli.main(arguments, prog_name="tyrecal", standalone_mode=False)
+        with ctrl_c_remembered():
+            code = cli.main(arguments, prog_name="tyrecal", standalone_mode=False)
         sys.exit(code if isinstance(code, int) else 0)
     except click.exceptions.Exit as leave:
         sys.exit(leave.exit_code)

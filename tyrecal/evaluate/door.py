@@ -12,6 +12,7 @@ from ..case import LoadedCase, with_values
 from ..deck.beside import needs
 from ..deck.write import Decks
 from ..effects import catalogue, with_effects
+from ..interrupt import raise_ctrl_c
 from . import folders
 from .executor import WorkerLost, executor, in_order
 from .failure import DeckRefused, EvaluationFailed
@@ -156,6 +157,7 @@ class Door:
     def _ask(self, decks: Decks, typed: Callable[[dict[str, Any], Path | None], T]) -> T:
         """The solver's answer, or the record's, ``typed``, which is told where a run that ended
         early is kept."""
+        raise_ctrl_c()
         folder = folders.fresh(self.folder)
         solver, key = self.solver, ""
         kept: Path | None = None

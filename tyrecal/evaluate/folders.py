@@ -7,6 +7,8 @@ import shutil
 import tempfile
 from pathlib import Path
 
+from ..interrupt import ctrl_c_put_off
+
 OUTCOME = "outcome.txt"  # in every kept folder; one without it was cut off in the middle
 
 
@@ -27,7 +29,8 @@ def keep(folder: Path, outcome: str) -> Path:
 
 def drop(folder: Path) -> None:
     """Remove the folder."""
-    shutil.rmtree(folder, ignore_errors=True)
+    with ctrl_c_put_off():  # it would close a file twice, and say that instead
+        shutil.rmtree(folder, ignore_errors=True)
 
 
 def drop_unfinished(parent: Path) -> None:

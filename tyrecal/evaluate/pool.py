@@ -7,9 +7,10 @@ import signal
 import threading
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ProcessPoolExecutor
-from contextlib import contextmanager
 from multiprocessing import forkserver, get_context, parent_process
 from typing import Any
+
+from ..interrupt import ctrl_c_put_off
 
 WARM = "tyrecal.evaluate.warm"
 PATIENCE_S = 5.0  # for a process that was told to end
@@ -20,7 +21,7 @@ class Pool(ProcessPoolExecutor):
 
     def submit(self, *task: Any, **named: Any) -> Future[Any]:
         """As in the standard library; no worker is left half started, and so unknown, by Ctrl-C."""
-        with _ctrl_c_later():
+        with ctrl_c_put_off():
             return super().submit(*task, **named)
 
     def map(  # type: ignore[override]
@@ -33,7 +34,7 @@ class Pool(ProcessPoolExecutor):
 
     def end(self) -> None:
         """End the workers now, whatever they do; a second Ctrl-C has to wait until they have."""
-        with _ctrl_c_later():
+        with ctrl_c_put_off():
             workers = list((self._processes or {}).values())
             answers: Any = self._result_queue
             for worker in workers:
@@ -58,36 +59,22 @@ class Pool(ProcessPoolExecutor):
             raise
 
 
-@contextmanager
-def _ctrl_c_later() -> Iterator[None]:
-    """Ctrl-C counts when the block is done."""
-    if threading.current_thread() is not threading.main_thread():  # which alone hears of it
-        yield
-        return
-    heard: list[int] = []
-    answer = signal.signal(signal.SIGINT, lambda number, frame: heard.append(number))
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, answer)
-        if heard:
-            signal.raise_signal(signal.SIGINT)
-
-
 def warm_up() -> None:
     """Start the process that workers are forked from, if there is none; waits for nothing.
 
     It imports what they need while its parent does the same for itself, so that a worker begins
     at once: two seconds of a core less for two of them.
     """
-    get_context("forkserver").set_forkserver_preload([WARM])
-    forkserver.ensure_running()
+    with ctrl_c_put_off():
+        get_context("forkserver").set_forkserver_preload([WARM])
+        forkserver.ensure_running()
 
 
 def process_pool(jobs: int) -> Pool:
     """``jobs`` worker processes, which end when the process that asked for them is killed."""
-    warm_up()
-    return Pool(jobs, get_context("forkserver"), initializer=_end_with_parent)
+    with ctrl_c_put_off():  # half made, it would leave semaphores behind
+        warm_up()
+        return Pool(jobs, get_context("forkserver"), initializer=_end_with_parent)
 
 
 def _end_with_parent() -> None:
