@@ -1,0 +1,115 @@
+"""Ctrl-C at the worst moments: what it meets neither tears, nor loses it, nor calls it else."""
+
+from __future__ import annotations
+
+import contextlib
+import gc
+import os
+import signal
+from collections.abc import Iterator
+from multiprocessing import resource_tracker
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tyrecal.evaluate import folders
+from tyrecal.evaluate.pool import process_pool
+from tyrecal.interrupt import ctrl_c_heard, ctrl_c_put_off, ctrl_c_remembered, raise_ctrl_c
+
+from .cli.test_conventions import CASE, COARSE, run
+
+
+@pytest.fixture(autouse=True)
+def answered_by_python() -> Iterator[None]:
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+def then_ctrl_c(function: Any) -> Any:
+    """The function, and Ctrl-C just before it returns, each time."""
+
+    def interrupted(*arguments: Any, **named: Any) -> Any:
+        answer = function(*arguments, **named)
+        signal.raise_signal(signal.SIGINT)
+        return answer
+
+    return interrupted
+
+
+def test_put_off_it_counts_when_the_block_is_done() -> None:
+    done = []
+    with pytest.raises(KeyboardInterrupt), ctrl_c_put_off():
+        with ctrl_c_put_off():
+            signal.raise_signal(signal.SIGINT)
+        done.append("all")
+    assert done
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_a_folder_is_removed_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "run" / "files").mkdir(parents=True)
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "close", then_ctrl_c(os.close))
+        with pytest.raises(KeyboardInterrupt):
+            folders.drop(tmp_path / "run")
+    assert not (tmp_path / "run").exists()
+
+
+def test_a_pool_is_made_whole(monkeypatch: pytest.MonkeyPatch) -> None:
+    known, forgotten = [], []
+    with monkeypatch.context() as patch:
+        patch.setattr(
+            "multiprocessing.synchronize.SemLock._cleanup",
+            lambda name: forgotten.append(name) or resource_tracker.unregister(name, "semaphore"),
+        )
+        register = resource_tracker.register
+        patch.setattr(
+            resource_tracker,
+            "register",
+            then_ctrl_c(lambda name, kind: known.append(name) or register(name, kind)),
+        )
+        with pytest.raises(KeyboardInterrupt):
+            process_pool(1)
+        gc.collect()
+    assert known and sorted(known) == sorted(forgotten)
+
+
+def test_one_that_was_swallowed_is_raised_again() -> None:
+    with ctrl_c_remembered():
+        raise_ctrl_c()
+        with contextlib.suppress(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+        assert ctrl_c_heard()
+        with pytest.raises(KeyboardInterrupt):
+            raise_ctrl_c()
+    assert not ctrl_c_heard()
+
+
+def test_where_it_is_ignored_it_stays_so() -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    with ctrl_c_remembered():
+        signal.raise_signal(signal.SIGINT)
+        raise_ctrl_c()
+
+
+@pytest.mark.parametrize("met", ["swallowed", "another error"])
+def test_the_command_ends_as_interrupted(
+    met: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from tyrecal.evaluate.store import Store
+
+    def read(store: Store, key: str) -> None:
+        try:
+            signal.raise_signal(signal.SIGINT)
+        except KeyboardInterrupt:
+            if met == "another error":
+                raise OSError(9, "Bad file descriptor") from None
+
+    monkeypatch.setattr(Store, "read", read)
+    command = ["sweep-pressure", CASE, *COARSE, "--steps", "3", "--output", str(tmp_path)]
+    assert run(*command) == 130
+    said = capsys.readouterr().err
+    assert "interrupted: " in said and "same command goes on" in said and "error" not in said
+    assert len(list(tmp_path.glob("record/*/*.record"))) == (met == "swallowed")
