@@ -177,7 +177,7 @@ def test_a_footprint_in_a_batch(tmp_path: Path) -> None:
 
 
 def test_interrupted_and_resumed(tmp_path: Path) -> None:
-    cases = vary(tmp_path / "c", 4)
+    cases = vary(tmp_path / "c", 10)
     command = [sys.executable, "-m", "tyrecal", "batch", *map(str, cases), "--studies", "modes"]
     plain = tmp_path / "plain"
     assert subprocess.run([*command, "--quiet", "--output", plain]).returncode == 0
@@ -197,7 +197,7 @@ def test_interrupted_and_resumed(tmp_path: Path) -> None:
     assert finished and not (out / "batch.json").exists()
     assert subprocess.run([*command, "--quiet", "--output", out]).returncode == 0
     assert (out / "batch.json").read_bytes() == (plain / "batch.json").read_bytes()
-    assert {f"tyre_0{i}" for i in range(4) if facts(out, f"tyre_0{i}").get("answered")} == finished
+    assert {f"tyre_0{i}" for i in range(10) if facts(out, f"tyre_0{i}").get("answered")} == finished
 
 
 @pytest.mark.parametrize(

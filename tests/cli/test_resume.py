@@ -70,7 +70,9 @@ def test_two_at_once_in_one_folder(
     first = subprocess.Popen([*COMMAND, str(tmp_path)])
     while not (tmp_path / "run.json").exists() and first.poll() is None:
         time.sleep(0.005)
+    first.send_signal(signal.SIGSTOP)  # so that it cannot be done before the second begins
     assert run("fit", CASE, "--output", str(tmp_path), "--no-pictures") == 2
+    first.send_signal(signal.SIGCONT)
     message = capsys.readouterr().err
     assert f"process {first.pid}" in message and "tyrecal fit" in message
     assert message.count("\n") == 1 and "--output" in message

@@ -186,7 +186,7 @@ def test_a_job_that_queues_until_its_time_is_over(
     coarse: Callable[..., Path], tmp_path: Path
 ) -> None:
     words = "import time; print('Queued for 5 Abaqus licenses', flush=True); time.sleep(60)"
-    case = load_case(coarse([sys.executable, "-c", words], time_limit_s=1))
+    case = load_case(coarse([sys.executable, "-c", words], time_limit_s=4))
     with pytest.raises(EvaluationFailed, match="Queued for 5") as failure:
         Door(case, "abaqus", tmp_path / "runs").evaluate(Question({}))
     assert failure.value.cause == "licence"
