@@ -9,36 +9,40 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-RESULTS = {  # of a study: what a new run of it takes the place of
-    "fit": ("fit.json", "fit.csv", "fit_history.csv", "fit_shapes.json", "convergence.png"),
-    "modes": ("modes.json", "modes_shapes.json"),
+TYRE = ("section.png", "modes.png", "mode_[0-9]*_[0-9]*.png", "mode_[0-9]*_[0-9]*.vtu")
+RESULTS = {  # of a study, by pattern: what a new run of it takes the place of
+    "fit": ("fit.json", "fit.csv", "fit_history.csv", "fit_shapes.json", "convergence.png", *TYRE),
+    "modes": ("modes.json", "modes_shapes.json", *TYRE),
     "sweep-load": ("load_sweep.json", "load_sweep.csv", "load_sweep.png"),
     "sweep-pressure": ("pressure_sweep.json", "pressure_sweep.csv", "pressure_sweep.png"),
-    "footprint": ("footprint.json", "footprint.csv", "footprint_patches.json", "footprint.png"),
-    "effects": ("effects.json",),
-    "diagnose": ("diagnosis.json", "diagnosis.md", "diagnosis_section.json"),
+    "footprint": ("footprint.json", "footprint.csv", "footprint_patches.json", "footprint.png",
+                  "footprint_initial*.png", "footprint_fitted*.png", "footprint_*N.vtu"),
+    "effects": ("effects.json", "effect_*.png"),
+    "diagnose": ("diagnosis.json", "diagnosis.md", "diagnosis_*.json", "diagnosis_*.png"),
     "batch": ("batch.json",),
-}
-
-
+}  # fmt: skip
 PREVIOUS = "previous"  # folder in which results stand aside
 
 
 def set_aside(folder: Path, study: str) -> None:
     """Move an earlier run's results to `PREVIOUS`: they must not pass for those of a run that
     fails, nor be lost with it. Raises OSError."""
-    for name in RESULTS[study]:
-        if (folder / name).exists():
-            (folder / PREVIOUS).mkdir(exist_ok=True)
-            (folder / name).replace(folder / PREVIOUS / name)
+    for file in _results(folder, study):
+        (folder / PREVIOUS).mkdir(exist_ok=True)
+        file.replace(folder / PREVIOUS / file.name)
 
 
 def forget_previous(folder: Path, study: str) -> None:
-    """Remove what `set_aside` moved, once a new run has taken its place. Raises OSError."""
-    for name in RESULTS[study]:
-        (folder / PREVIOUS / name).unlink(missing_ok=True)
-    with contextlib.suppress(OSError):  # it was never made, or holds another study's
+    """Remove what `set_aside` moved and a new run has written again. Raises OSError."""
+    for file in _results(folder / PREVIOUS, study):
+        if (folder / file.name).exists():
+            file.unlink(missing_ok=True)
+    with contextlib.suppress(OSError):  # it was never made, or holds more
         (folder / PREVIOUS).rmdir()
+
+
+def _results(folder: Path, study: str) -> list[Path]:
+    return [file for pattern in RESULTS[study] for file in folder.glob(pattern)]
 
 
 @contextlib.contextmanager

@@ -13,6 +13,7 @@ from tyrecal.evaluate.door import Door
 from tyrecal.evaluate.failure import EvaluationFailed
 from tyrecal.files import PREVIOUS, RESULTS
 
+from ..batch.support import vary
 from ..conftest import CASES
 from .test_cli import CASE, run
 
@@ -26,11 +27,16 @@ def _unable(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Door, "press", fails)
 
 
+def names(study: str) -> set[str]:
+    """Files that a run of ``study`` may write, one of each kind."""
+    return {name.replace("[0-9]*", "1").replace("*", "2") for name in RESULTS[study]}
+
+
 def earlier(folder: Path, *studies: str) -> None:
     """What runs of ``studies`` left."""
     folder.mkdir()
     for study in studies:
-        for name in RESULTS[study]:
+        for name in names(study):
             (folder / name).write_text("{}")
 
 
@@ -51,10 +57,10 @@ def test_no_stale_results(
     earlier(out, study, "diagnose")
     assert run(*arguments, "--output", str(out)) == 3
     left = {path.name for path in out.iterdir() if path.is_file()} - {".lock"}
-    assert left == {*RESULTS["diagnose"], "run.json"}
-    assert {path.name for path in (out / PREVIOUS).iterdir()} == set(RESULTS[study])
+    assert left == names("diagnose") | {"run.json"}
+    assert {path.name for path in (out / PREVIOUS).iterdir()} == names(study)
     assert json.loads((out / "run.json").read_text())["finished"] is False
-    for name in RESULTS["diagnose"]:
+    for name in names("diagnose"):
         (out / name).unlink()
     capsys.readouterr()
     assert run("report", str(out)) == 2
@@ -68,8 +74,9 @@ def test_no_stale_results_of_a_case_in_a_batch(there: bool, tmp_path: Path) -> N
     earlier(out, "modes", "fit")
     report = run_case(CaseTask("a", case, out, ("modes",), Asked(None, ())))
     assert report["studies"]["modes"]["status"] == "error"
-    assert {path.name for path in out.iterdir()} - {"run.json"} == {*RESULTS["fit"], PREVIOUS}
-    assert {path.name for path in (out / PREVIOUS).iterdir()} == set(RESULTS["modes"])
+    left = {path.name for path in out.iterdir()} - {"run.json"}
+    assert left == (names("fit") - names("modes")) | {PREVIOUS}
+    assert {path.name for path in (out / PREVIOUS).iterdir()} == names("modes")
 
 
 def test_results_of_a_run_that_is_done_take_the_place_of_others(
@@ -80,4 +87,29 @@ def test_results_of_a_run_that_is_done_take_the_place_of_others(
     monkeypatch.undo()
     assert run("modes", CASE, "--mesh", "coarse", "--no-pictures", "--output", str(out)) == 0
     assert json.loads((out / "modes.json").read_text())["modes"]
-    assert not (out / PREVIOUS).exists()
+    assert {path.name for path in (out / PREVIOUS).iterdir()} == set(
+        names("modes") - {"modes.json", "modes_shapes.json"}
+    )
+
+
+@pytest.mark.parametrize(
+    ("study", "more"),
+    [
+        ("fit", []),
+        ("modes", ["--pictures"]),
+        ("sweep-pressure", ["--steps", "2"]),
+        ("footprint", ["--loads-N", "300"]),
+    ],
+)
+def test_all_that_a_study_writes_is_known(
+    study: str, more: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.undo()
+    case, out = vary(tmp_path / "case", 1)[0], tmp_path / "out"
+    command = [study, str(case), *more, "--output", str(out)]
+    for _ in range(2):  # again, and what was set aside is written again
+        assert run(*command) == 0
+        assert not (out / PREVIOUS).exists()
+    files = {path for path in out.iterdir() if path.is_file()} - {out / "run.json", out / ".lock"}
+    assert files == {file for pattern in RESULTS[study] for file in out.glob(pattern)}
+    assert all(list(out.glob(pattern)) for pattern in RESULTS[study] if "fitted" not in pattern)
