@@ -14,7 +14,8 @@ from tyrecal.blind.draw import draw
 from tyrecal.blind.make import make
 from tyrecal.blind.maker import find_maker
 from tyrecal.blind.protocol import BadTrials, Protocol, read_json, write_json
-from tyrecal.blind.ruler import measure, write_ruler
+from tyrecal.blind.ruler import FILE as RULER
+from tyrecal.blind.ruler import measure
 from tyrecal.blind.score import score
 from tyrecal.blind.seal import ANSWERS, SEAL, TRUTH
 from tyrecal.blind.tables import page, summary
@@ -27,10 +28,13 @@ SCALE = Scale()
 MAKER = ToyMaker(SCALE)
 
 
+def ruler() -> dict:
+    return measure(SCALE, SCALE.model_rows)
+
+
 def made(tmp_path: Path, rules: Protocol, seed: int = 3) -> tuple[Path, Path]:
     folder, sealed = tmp_path / "trials", tmp_path / "truth"
-    make(folder, sealed, CASE, rules, MAKER, seed=seed)
-    write_ruler(folder, measure(SCALE, SCALE.model_rows))
+    make(folder, sealed, CASE, rules, MAKER, ruler, seed=seed)
     return folder, sealed
 
 
@@ -90,7 +94,7 @@ def test_draws_have_the_stated_distribution() -> None:
 def test_the_seal_holds_the_truth_and_the_answers(tmp_path: Path) -> None:
     folder, sealed = made(tmp_path, protocol(2, 2, 1))
     with pytest.raises(BadTrials, match="sealed trials already"):
-        make(folder, sealed, CASE, protocol(1), MAKER, seed=3)
+        make(folder, sealed, CASE, protocol(1), MAKER, ruler, seed=3)
     with pytest.raises(BadTrials, match=r"answers\.json is missing"):
         score(folder, sealed)
     answer(folder, SCALE, SCALE.model_rows)
@@ -118,7 +122,7 @@ def test_the_same_seed_gives_another_seal_but_the_same_trials(tmp_path: Path) ->
 def test_answering_refuses_where_the_truth_lies_open(tmp_path: Path) -> None:
     folder, sealed = made(tmp_path, protocol(none=1))
     with pytest.raises(BadTrials, match="must not lie in"):
-        make(folder / "x", folder / "x" / "truth", CASE, protocol(1), MAKER)
+        make(folder / "x", folder / "x" / "truth", CASE, protocol(1), MAKER, ruler)
     (folder / "notes").mkdir()
     (folder / "notes" / TRUTH).write_bytes((sealed / TRUTH).read_bytes())
     with pytest.raises(BadTrials, match="lies open among the trials"):
@@ -140,11 +144,11 @@ def test_making_goes_on_where_it_was_stopped(tmp_path: Path) -> None:
 
     stopped = Stopped(SCALE)
     with pytest.raises(KeyboardInterrupt):
-        make(folder, sealed, CASE, protocol(2, 2), stopped, seed=3)
+        make(folder, sealed, CASE, protocol(2, 2), stopped, ruler, seed=3)
     kept = len(list((sealed / "made").iterdir()))
-    assert kept >= 1 and not (folder / SEAL).exists()
+    assert kept >= 1 and (folder / RULER).exists() and not (folder / SEAL).exists()
     stopped.left = 1000
-    make(folder, sealed, CASE, protocol(2, 2), stopped)
+    make(folder, sealed, CASE, protocol(2, 2), stopped, ruler)
     assert 1000 - stopped.left <= 8 * (4 - kept)
     for file in (whole / "trials").iterdir():
         assert (folder / "trials" / file.name).read_bytes() == file.read_bytes()
@@ -181,7 +185,7 @@ def test_the_bundled_maker_s_trial_is_one_that_a_diagnosis_can_read(tmp_path: Pa
     assert "inverse crime" in maker.about and len(maker.laws) >= 20
     folder, sealed = tmp_path / "trials", tmp_path / "truth"
     rules = protocol(1, 1, swapped=0.0)
-    make(folder, sealed, CASE, rules, maker, seed=4)
+    make(folder, sealed, CASE, rules, maker, ruler, seed=4)
     for trial in read_json(sealed / TRUTH)["trials"]:
         readings = read_measurements(folder / "trials" / f"{trial['id']}.csv")
         mass = next(r.value for r in readings if r.quantity == "mass_kg")
@@ -198,4 +202,4 @@ def test_a_stated_seed_must_be_the_one_that_was_begun_with(tmp_path: Path) -> No
     sealed.mkdir()
     write_json(sealed / "seed.json", {"seed": 7})
     with pytest.raises(BadTrials, match="another seed"):
-        make(tmp_path / "t", sealed, CASE, protocol(none=1), MAKER, seed=8)
+        make(tmp_path / "t", sealed, CASE, protocol(none=1), MAKER, ruler, seed=8)

@@ -40,7 +40,7 @@ from tyrecal.blind.make import make
 from tyrecal.blind.maker import Heard
 from tyrecal.blind.outside import FAMILIES
 from tyrecal.blind.protocol import Protocol
-from tyrecal.blind.ruler import measure, write_ruler
+from tyrecal.blind.ruler import measure
 from tyrecal.case import LoadedCase, load_case, number_at, start_values, with_values
 from tyrecal.deck.calculix import PLY_THICKNESS_M
 from tyrecal.deck.context import gauged_section
@@ -326,10 +326,9 @@ def main() -> None:
         seed = int(rest[4]) if len(rest) > 4 else None
         told = lambda done, all: print(f"{done} of {all}", file=sys.stderr)
         sealed = folder.with_name(f"{folder.name}-truth")
-        print(make(folder, sealed, case, protocol, maker, JOBS, seed, told))
-        case = load_case(case.path)
-        model = tyre_model(case, Door(case), protocol)
-        write_ruler(folder, measure(model, rows_of(case, protocol)))
+        plain = load_case(case.path)
+        ruler = lambda: measure(tyre_model(plain, Door(plain), protocol), rows_of(plain, protocol))
+        print(make(folder, sealed, case, protocol, maker, ruler, JOBS, seed, told))
 
 
 if __name__ == "__main__":

@@ -16,7 +16,7 @@ import numpy as np
 
 from tests.conftest import CASES
 from tyrecal.case import LoadedCase, load_case
-from tyrecal.case.schema import Level
+from tyrecal.case.section import Level
 from tyrecal.diagnose.response import Answer, Point
 from tyrecal.diagnose.tyre_model import TyreModel
 from tyrecal.evaluate.door import Door

@@ -26,6 +26,7 @@ from ..modes.mode import Label
 from .draw import NEAR, Truth, draw, tyre
 from .maker import Heard, Maker
 from .protocol import BadTrials, Protocol, read_json, write_json, write_protocol
+from .ruler import write_ruler
 from .seal import SEAL, seal
 
 TRIES = 20  # tyres that a trial may draw until one has a solution
@@ -48,12 +49,14 @@ def make(
     case: LoadedCase,
     protocol: Protocol,
     maker: Maker,
+    ruler: Callable[[], Mapping[str, Any]],
     jobs: int = 1,
     seed: int | None = None,
     told: Callable[[int, int], None] = lambda done, all: None,
 ) -> str:
     """Make trials in ``folder`` and their truth in ``sealed``; returns the seal's sha256.
 
+    ruler: measures what tells how hard a trial is (`ruler.measure`), before anything is drawn;
     seed: None = a secret one, kept in ``sealed`` so that the same call goes on where it was
     stopped. Raises BadTrials where the folder holds trials already, or the truth would lie in it.
     """
@@ -63,6 +66,7 @@ def make(
         raise BadTrials(f"the truth must not lie in {folder}, which is answered")
     folder.mkdir(parents=True, exist_ok=True)
     sealed.mkdir(parents=True, exist_ok=True)
+    write_ruler(folder, ruler())
     seed = _seed(sealed, seed)
     found, _ = sources(case)
     truths = draw(protocol, case, found, maker.laws, maker.outside, seed)

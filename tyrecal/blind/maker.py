@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 from ..case import LoadedCase
-from ..case.schema import TargetMode, Targets
+from ..case.calibration import TargetMode, Targets
 from ..effects.edit import with_part
 from ..evaluate.door import Door
 from ..evaluate.failure import EvaluationFailed

@@ -8,11 +8,9 @@ from pydantic import AfterValidator, Field
 
 from ..effects import IDS
 from .analysis import Analysis, Road, Solver
-from .calibration import TargetMode as TargetMode  # for `blind` and `diagnose`
 from .calibration import Targets, Uncertainty, Variable
 from .materials import Cord, Rubber
 from .parts import Name, NotNegative, Part, Text
-from .section import Level as Level  # for the studies of the tests
 from .section import Mesh, RebarLayer, SectionSource, Solid
 from .uneven import PointMass, RoadSpring, Splice
 from .wheel import Cavity, Rim

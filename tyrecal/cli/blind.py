@@ -79,7 +79,7 @@ def make(
     from ..blind.make import make as made
     from ..blind.maker import NAMES, find_maker
     from ..blind.protocol import Protocol
-    from ..blind.ruler import measure, write_ruler
+    from ..blind.ruler import measure
     from ..case import load_case
     from ..evaluate.door import Door
     from ..evaluate.store import Store
@@ -99,10 +99,11 @@ def make(
     counts = {"effect": effects, "none": plain, "outside": outside}
     protocol = Protocol(who.about, case.path.name, counts)
     resume("trials that were made are kept; the same command goes on from there")
-    with talk.progress("make trials") as bar:
-        mark = made(folder, sealed, case, protocol, who, jobs, seed, _told("made", talk, bar))
     door = Door(case, "bundled", store=store)
-    write_ruler(folder, measure(tyre_model(case, door, protocol, jobs), rows_of(case, protocol)))
+    ruler = lambda: measure(tyre_model(case, door, protocol, jobs), rows_of(case, protocol))
+    with talk.progress("make trials") as bar:
+        told = _told("made", talk, bar)
+        mark = made(folder, sealed, case, protocol, who, ruler, jobs, seed, told)
     number = sum(counts.values())
     talk.result({"trials": number, "folder": str(folder), "truth": str(sealed), "sha256": mark})
     talk.say(f"{number} trials in {folder}; the truth is in {sealed}, sha256 {mark}")

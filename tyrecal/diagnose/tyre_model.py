@@ -10,7 +10,7 @@ from math import exp, log, sqrt
 import numpy as np
 
 from ..case import LoadedCase, start_values
-from ..case.schema import TargetMode, Targets
+from ..case.calibration import TargetMode, Targets
 from ..evaluate.door import Door
 from ..evaluate.failure import DeckRefused, EvaluationFailed
 from ..fit import problem as fit
