@@ -11,6 +11,7 @@ from multiprocessing import resource_tracker
 from pathlib import Path
 from typing import Any
 
+import click
 import pytest
 
 from tyrecal.evaluate import folders
@@ -113,3 +114,26 @@ def test_the_command_ends_as_interrupted(
     said = capsys.readouterr().err
     assert "interrupted: " in said and "same command goes on" in said and "error" not in said
     assert len(list(tmp_path.glob("record/*/*.record"))) == (met == "swallowed")
+
+
+def test_what_was_under_way_has_ended_by_then(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Ctrl-C that met the caller of a generator, between two of its answers."""
+    ended = []
+
+    def answers() -> Iterator[int]:
+        try:
+            yield from range(10)
+        finally:
+            ended.append(len(capsys.readouterr().err))
+
+    def command() -> None:
+        under_way = answers()
+        next(under_way)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("tyrecal.cli.solvers.command", click.Command("solvers", callback=command))
+    assert run("solvers") == 130
+    assert ended == [0]  # nothing had been said
+    assert "interrupted" in capsys.readouterr().err

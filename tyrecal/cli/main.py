@@ -71,7 +71,8 @@ class Commands(click.Group):
                 isinstance(error, KeyboardInterrupt) or ctrl_c_heard()
             ):
                 raise
-            raise Interrupted(ctx.meta.get(RESUME, "nothing was changed")) from None
+        # the error is forgotten by now, and with it what was under way: its processes have ended
+        raise Interrupted(ctx.meta.get(RESUME, "nothing was changed"))
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         with formatter.section("Commands"):
