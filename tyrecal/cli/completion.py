@@ -10,6 +10,21 @@ from .talk import Talk
 SHELLS = ("bash", "zsh", "fish")
 MENDED = {  # of click's scripts: a line of each, and what stands in its place
     "bash": [
+        (  # bash takes words apart at '=': NAME=value and --option=value are one
+            '    response=$(env COMP_WORDS="${COMP_WORDS[*]}" COMP_CWORD=$COMP_CWORD ',
+            "    local words=() word before cword=$COMP_CWORD place\n"
+            '    for place in "${!COMP_WORDS[@]}"; do\n'
+            "        word=${COMP_WORDS[place]}\n"
+            "        if [[ $place -gt 1 && ( $word == = || $before == = ) ]]; then\n"
+            "            words[${#words[@]} - 1]+=$word\n"
+            "            ((place <= COMP_CWORD && cword--))\n"
+            "        else\n"
+            '            words+=("$word")\n'
+            "        fi\n"
+            "        before=$word\n"
+            "    done\n"
+            '    response=$(env COMP_WORDS="${words[*]}" COMP_CWORD=$cword ',
+        ),
         (  # a value follows NAME= without a space; the shell quotes what is a file
             "COMPREPLY+=($value)\n",
             'COMPREPLY+=("$value")\n'
