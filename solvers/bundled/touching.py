@@ -59,7 +59,7 @@ class Touching:
         before = len(self._compliance)
         self._column[lacking] = before + np.arange(len(dofs))
         # two threads share the work the same way everywhere, so that the bits are the same too
-        some = np.array_split(dofs, 2 * -(-len(dofs) // (2 * AT_ONCE)))
+        some = np.array_split(dofs, min(len(dofs), 2 * -(-len(dofs) // (2 * AT_ONCE))))
         pieces = list(self.factor.order.pool.map(self._columns, some))
         new = [_beside(each) for each in zip(*pieces, strict=True)]
         beside = [_products(block, new) for block in self._blocks]

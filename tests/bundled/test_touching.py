@@ -28,6 +28,17 @@ def test_follows_the_contact(inflated: Inflated) -> None:
         assert used <= conjugate_gradients(problem.product, problem.factor.solve, b)[1] + 3
 
 
+def test_one_node_in_the_middle_of_the_patch(inflated: Inflated) -> None:
+    """Both symmetries hold it but for its way down: a single column."""
+    blocks, X = np.zeros_like(road_blocks(inflated, 1e6, 0.0)), inflated.model.mesh.X
+    blocks[0, np.lexsort((abs(X[:, 1]), -X[:, 0].round(9)))[0]] = np.diag([1e6, 0.0, 0.0])
+    touching, problem = Touching(Problem(inflated).factor), Problem(inflated, contact=blocks)
+    touching.to(blocks)
+    x = problem.random()[0]
+    expected = problem.factor.solve(x)
+    np.testing.assert_allclose(touching.solve(x), expected, atol=1e-3 * abs(expected).max())
+
+
 def test_releases_what_the_factor_holds(inflated: Inflated) -> None:
     """Nodes on one side let go, others left: to the same inverse as the factor without them."""
     before = road_blocks(inflated, 1e6, 0.1)

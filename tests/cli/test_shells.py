@@ -43,7 +43,7 @@ TYPED = {
     "tyrecal modes a,b.yaml --set rim.ref": "tyrecal modes a,b.yaml --set rim.reference_point_m.",
     "tyrecal fit a,b.yaml --mesh=ref": "tyrecal fit a,b.yaml --mesh=refined ",
     "tyrecal modes a,b.yaml --set=A_b": "tyrecal modes a,b.yaml --set=A_belt=",
-    "tyrecal fit --set C10=1e6 --mesh=coarse a": "tyrecal fit --set C10=1e6 --mesh=coarse a,b.yaml ",
+    "tyrecal fit --set C10=1 --mesh=coarse a": "tyrecal fit --set C10=1 --mesh=coarse a,b.yaml ",
     "tyrecal effects bead": "tyrecal effects bead_filler ",
     "tyrecal report dee": "tyrecal report deep/",
 }
