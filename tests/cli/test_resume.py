@@ -180,7 +180,7 @@ def test_store_verifies_and_prunes(tmp_path: Path, capsys: pytest.CaptureFixture
     assert (found["records"], found["damaged"]) == (2, 1)
     assert run("store", str(tmp_path), "--prune", "0.4") == 0
     said = capsys.readouterr().out
-    assert "1 records" in said and "removed: 1" in said and "damaged: 0" in said
+    assert "1 record," in said and "removed: 1" in said and "damaged: 0" in said
     assert run("store") == 2 and run("store", str(tmp_path / "none")) == 2
     assert "Traceback" not in capsys.readouterr().err
 

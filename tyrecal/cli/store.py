@@ -46,7 +46,8 @@ def command(folder: Path, verify: bool, prune: float | None, talk: Talk) -> int:
     if talk.as_json:
         return 0
     size = found["bytes"] / 1e6
-    lines = [f"{found['folder']}: {found['records']} records, {size:.1f} MB"]
+    records = "1 record" if found["records"] == 1 else f"{found['records']} records"
+    lines = [f"{found['folder']}: {records}, {size:.1f} MB"]
     lines += [f"  {solver}: {count}" for solver, count in found["solvers"].items()]
     if found["failures"]:
         lines.append(f"  of them failures of the design itself: {found['failures']}")

@@ -44,11 +44,9 @@ def fit_doubts(result: Mapping[str, Any]) -> list[str]:
             seen = variable["standard_error"] is not None
             why = "the data want it beyond" if seen else "the data do not see it"
             doubts.append(f"{name} ended at a bound: {why}")
-    if result["failed_evaluations"]:
-        doubts.append(
-            f"{result['failed_evaluations']} designs could not be evaluated; the search"
-            " stepped back from them"
-        )
+    if failed := result["failed_evaluations"]:
+        designs = "1 design" if failed == 1 else f"{failed} designs"
+        doubts.append(f"{designs} could not be evaluated; the search stepped back")
     if result["label_margin"] < 0.3:
         doubts.append(
             f"a mode is hard to name (margin {result['label_margin']:.2f} of 1): two modes have"

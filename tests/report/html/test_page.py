@@ -98,7 +98,7 @@ def test_table_2_is_there(folder: Path) -> None:
     [
         "Fit", "Shapes of the fitted tyre", "Mode shapes under 1000 N, on the tread", "Section",
         "Frequencies over pressure", "Footprint", "Frequencies over load", "Diagnosis",
-        "Mind: C10 ended at a bound", "Mind: 1 designs could not be evaluated",
+        "Mind: C10 ended at a bound", "Mind: 1 design could not be evaluated",
         "Mind: not reached: fitted, 10 kPa: it buckles", "Mind: not reached: initial, 900000 N",
         "Mind: not reached: fitted, 30000 N: rim on road", "Fitted: every mode rises; every curve",
         "Named: rim_width explains the gap. Probability 0.71", "weigh the tyre", "upper sidewall",
