@@ -73,6 +73,36 @@ def test_a_diagnosis_in_files_and_again_from_the_record(
     assert again["verdict"] == "named" and again["effect"] == "bead_filler"
 
 
+def test_what_was_measured_under_load_is_compared(
+    coarse: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Areas and stiffnesses of the tyre with the effect: the calibrated one misses them, the one
+    with the effect that frequencies alone have named does not."""
+    file, out = measured(coarse, tmp_path / "m.csv", bead_filler=2.0), tmp_path / "out"
+    loaded, loads = load_case(coarse), [200.0, 500.0]
+    pressed = Door(loaded).press({**start_values(loaded), "effects.bead_filler": 2.0}, loads)
+    with file.open("a") as lines:
+        for each in pressed.footprints:
+            f = each.stiffness_N_per_m
+            at = f",,,,,240,{each.load_N:g},"
+            lines.write(f"vertical_stiffness_N_per_m{at}{f:.0f},{0.01 * f:.0f}\n")
+            area = each.contact_area_m2
+            lines.write(f"contact_area_m2{at}{area:.8f},{0.01 * area:.8f}\n")
+    command = ["diagnose", str(coarse), "--measured", str(file), *EFFECTS, "--output", str(out)]
+    assert run(*command, "--no-pictures", "--report") == 0
+    told = json.loads((out / "diagnosis.json").read_text())
+    road = told["under_load"]
+    assert told["effect"] == road["effect"] == "bead_filler" and not told["left_out"]
+    assert [row["load_N"] for row in road["rows"]] == [200, 200, 500, 500] and not road["failed"]
+    assert road["effect_rms_percent"] < 0.3 * road["calibrated_rms_percent"]
+    assert set(told["gap"]["by_load"]) == {"200", "500"}
+    words = (out / "diagnosis.md").read_text()
+    assert "Under load nothing was fitted" in words
+    off = road["rows"][1]["calibrated_percent"]
+    stiffness = road["rows"][1]["measured"] / 1000
+    assert f"| 240 | 200 | vertical stiffness {stiffness:.1f} N/mm ± 1.0 % | {off:+.1f} |" in words
+
+
 def test_an_added_effect_makes_a_case(
     coarse: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

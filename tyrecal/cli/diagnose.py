@@ -88,7 +88,7 @@ def command(
     with talk.progress("evaluations") as bar:
         door.heard = bar.at
         found = diagnosed(loaded, door, measured, repeats, changes, assumed, study.jobs, considered)
-    told = result(found.diagnosis)
+    told = result(found.diagnosis, found.under_load)
     run.write_json("diagnosis.json", told)
     named = [part["region"] for part in told["section_map"]]
     run.write_json("diagnosis_section.json", parts_data(loaded, named))

@@ -110,6 +110,8 @@ def _mistakes(cells: dict[str, str]) -> Iterator[str]:
     load = _number(cells["load_N"] or "0")
     if load is None or load < 0:
         yield f"load_N is '{cells['load_N']}', must be a number of at least 0, or empty"
+    elif not load and quantity in ("contact_area_m2", "vertical_stiffness_N_per_m"):
+        yield f"load_N is '{cells['load_N']}', must be greater than 0 for {quantity}"
     if quantity == "frequency_Hz":
         yield from _mode_mistakes(cells, bool(load))
     elif any(cells[name] for name in ("c", "m", "kind", "member")):

@@ -67,10 +67,12 @@ def observe(
 
     repeats: the same measured again after dismounting, whose mean is used, and whose scatter
     takes the place of the stated sigma; toggled: runs 1, 2, ...; split: the relative split that
-    this kind of tyre has by non-uniformity, which a lone member of a pair is off by half of.
+    this kind of tyre has by non-uniformity, which a lone member of a pair is off by half of. What
+    was measured under load is left out of toggled runs; of others it is `under_load`'s.
     """
     left_out: list[str] = []
-    used = [_used(run, left_out) for run in (readings, *repeats, *toggled)]
+    unloaded = [[r for r in run if not r.load_N] for run in (readings, *repeats)]
+    used = [_used(run, left_out) for run in (*unloaded, *toggled)]
     scattered, common = _scatter(used[: 1 + len(repeats)])
     runs = [scattered, *(_stated(run) for run in used[1 + len(repeats) :])]
     rows, numbers = [], []

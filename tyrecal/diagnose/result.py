@@ -7,10 +7,12 @@ from typing import Any
 import numpy as np
 
 from .diagnosis import Diagnosis
+from .evidence import NONE
 from .gap import projection
+from .under_load import UnderLoad
 
 
-def result(diagnosis: Diagnosis) -> dict[str, Any]:
+def result(diagnosis: Diagnosis, under_load: UnderLoad | None = None) -> dict[str, Any]:
     """Plain data; numbers in the units of their names, None where there is none.
 
     ``detectability`` is lambda at the sizes in ``judged_at``; ``full_size`` at the far end of each
@@ -45,6 +47,7 @@ def result(diagnosis: Diagnosis) -> dict[str, Any]:
             "by_family": by["family"],
             "by_harmonic": by["harmonic"],
             "by_pressure": by["pressure"],
+            "by_load": _by_load(under_load),
             "groups": [
                 {"kind": g.kind, "name": g.name, "p_value": g.p_value, "holm": g.corrected}
                 for g in gap.groups
@@ -63,6 +66,7 @@ def result(diagnosis: Diagnosis) -> dict[str, Any]:
                 )
             ],
         },
+        "under_load": _under_load(under_load),
         "section_map": [
             {
                 "region": p.region,
@@ -99,6 +103,40 @@ def result(diagnosis: Diagnosis) -> dict[str, Any]:
         "left_out": list(d.problem.observations.left_out),
         "not_evaluated": dict(d.problem.expansion.failed),
     }  # fmt: skip
+
+
+def _by_load(found: UnderLoad | None) -> dict[str, float]:
+    """rms of the calibrated tyre's deviations, per cent, by load in N."""
+    if found is None:
+        return {}
+    rms = {row.load_N: found.rms_percent(NONE, row.load_N) for row in found.rows}
+    return {f"{load:g}": value for load, value in sorted(rms.items()) if value is not None}
+
+
+def _under_load(found: UnderLoad | None) -> dict[str, Any] | None:
+    if found is None:
+        return None
+    effect = found.tyres[1] if len(found.tyres) > 1 else None
+    off = lambda row, tyre: 100 * row.off[tyre] if tyre in row.off else None
+    return {
+        "effect": effect,
+        "rows": [
+            {
+                "quantity": row.quantity,
+                "mode": str(row.member) if row.member else None,
+                "pressure_kPa": row.pressure_kPa,
+                "load_N": row.load_N,
+                "measured": row.value,
+                "sigma": row.sigma,
+                "calibrated_percent": off(row, NONE),
+                "effect_percent": off(row, effect),
+            }
+            for row in found.rows
+        ],
+        "calibrated_rms_percent": found.rms_percent(NONE),
+        "effect_rms_percent": found.rms_percent(effect) if effect else None,
+        "failed": list(found.failed),
+    }
 
 
 def _parameter(diagnosis: Diagnosis, key: str | None) -> dict[str, Any] | None:

@@ -11,13 +11,16 @@ from ..case import LoadedCase
 from ..effects import catalogue
 from ..evaluate.door import Door
 from .diagnosis import Diagnosis, diagnose
-from .measurements import BadMeasurements, read_measurements
+from .evidence import NONE
+from .measurements import BadMeasurements, Reading, read_measurements
 from .observations import Observations, observe
 from .problem import Assumed, Change
 from .regions import regions
 from .response import Answer, Point, Span
 from .tyre_model import TyreModel
-from .uncertainties import Source, sources
+from .uncertainties import EFFECTS, Source, sources
+from .under_load import UnderLoad, Values, compare
+from .verdict import NO_GAP
 
 ALIKE = 2.0  # factor between measured and computed frequency beyond which the unit is wrong
 
@@ -29,13 +32,14 @@ class BadChange(ValueError):
 @dataclass(frozen=True)
 class Study:
     """A diagnosis with what it rests on: sources of error, whether they were assumed, effects
-    that the solver cannot express, and the model."""
+    that the solver cannot express, the model, and what was measured under load, None without."""
 
     diagnosis: Diagnosis
     sources: tuple[Source, ...]
     assumed_sources: bool
     inexpressible: tuple[str, ...]
     model: TyreModel
+    under_load: UnderLoad | None = None
 
 
 def study(
@@ -54,9 +58,10 @@ def study(
     effects: ids to consider, None = the whole catalogue. Raises BadMeasurements, BadChange,
     EvaluationFailed, and what ``Door.evaluate`` raises.
     """
+    runs = [read_measurements(path) for path in (measured, *repeats)]
     observations = observe(
-        read_measurements(measured),
-        [read_measurements(path) for path in repeats],
+        runs[0],
+        runs[1:],
         [read_measurements(path) for path, _ in toggled],
         assumed.split,
     )
@@ -72,7 +77,32 @@ def study(
         parts=(lambda x: regions(model, x)) if section_map else None,
         further=lambda more: TyreModel(case, _same(door), more, found, spans, jobs),
     )  # fmt: skip
-    return Study(diagnosis, tuple(found), assumed_sources, tuple(inexpressible), model)
+    loaded = _under_load(case, _same(door), runs, diagnosis, model)
+    return Study(diagnosis, tuple(found), assumed_sources, tuple(inexpressible), model, loaded)
+
+
+def _under_load(
+    case: LoadedCase,
+    door: Door,
+    runs: Sequence[Sequence[Reading]],
+    diagnosis: Diagnosis,
+    model: TyreModel,
+) -> UnderLoad | None:
+    """What was measured on a road, against the calibrated tyre and the one with the effect that is
+    named or, where there is a gap, likeliest."""
+    readings = [each for run in runs for each in run if each.load_N]
+    if not readings:
+        return None
+    verdict = diagnosis.verdict
+    keys = [NONE, verdict.key or (diagnosis.best if verdict.kind != NO_GAP else None)]
+    tyres: dict[str, Values] = {}
+    for key in filter(None, keys):
+        found = diagnosis.hypothesis(key)
+        assert found.fitted is not None
+        x = diagnosis.problem.expansion.x0 + found.fitted.d[found.best]
+        effects = {EFFECTS + id: float(e[found.best]) for id, e in found.values.items()}
+        tyres[key] = {**model.values(x), **effects}
+    return compare(case, door, readings, tyres)
 
 
 def spans_of(door: Door, ids: Sequence[str] | None = None) -> tuple[dict[str, Span], list[str]]:

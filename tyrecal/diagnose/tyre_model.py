@@ -52,7 +52,7 @@ class TyreModel:
         self.spans: Mapping[str, Span] = spans
         self.pressures = sorted({p for label, p in rows if label}) or [case.case.pressure_kPa]
         labels = sorted({label for label, _ in rows if label}, key=str)
-        case = _asked_for(case, labels)
+        case = asked_for(case, labels)
         self.door = door
         door.case = case
         self._fit = fit.Problem(case, door, jobs=jobs)
@@ -235,7 +235,7 @@ def _point(key: Key) -> Point:
     return Point(np.frombuffer(key[0]), dict(key[1]), key[2])
 
 
-def _asked_for(case: LoadedCase, labels: Sequence[Label]) -> LoadedCase:
+def asked_for(case: LoadedCase, labels: Sequence[Label]) -> LoadedCase:
     """The case with the measured modes as targets, and enough harmonics for them."""
     modes = [TargetMode(c=x.c, m=x.m, kind=x.kind, frequency_Hz=1.0) for x in labels]  # type: ignore[arg-type]
     analysis = case.case.analysis

@@ -8,6 +8,7 @@ from ..diagnose.covariance import BETWEEN_PRESSURES
 from ..diagnose.diagnosis import Diagnosis
 from ..diagnose.evidence import NONE, OUTSIDE
 from ..diagnose.study import Study
+from ..diagnose.under_load import LoadedRow
 from ..diagnose.verdict import NAMED, NO_GAP, UNDECIDED
 from .words import map_resolution
 
@@ -32,6 +33,7 @@ def page(study: Study, case: str, measured: str) -> str:
         *_gap(d),
         "## Where does it lie?",
         *_where(d),
+        *_under_load(study),
         "## Which effect?",
         *_which(study),
         "## How far does it shrink?",
@@ -154,6 +156,39 @@ def _where(d: Diagnosis) -> Iterator[str]:
             yield "No single part of the section, softer, stiffer, heavier or lighter, explains it."
         finer = " A finer map would be invented." if d.effective_rank else ""
         yield map_resolution(d.effective_rank) + finer
+
+
+def _under_load(study: Study) -> Iterator[str]:
+    found = study.under_load
+    if not found:
+        return
+    heads = {key: f"with `{key}`" if key != NONE else "calibrated" for key in found.tyres}
+    rms = {key: found.rms_percent(key) for key in found.tyres}
+    off = [f"{heads[key]} {each:.1f} %" for key, each in rms.items() if each is not None]
+    if off:
+        yield (
+            "Under load nothing was fitted. How far what was measured there is from the tyre, rms:"
+            f" {', '.join(off)}."
+        )
+        rows = [f"| kPa | N | measured | {' | '.join(f'{head}, %' for head in heads.values())} |"]
+        rows.append("|" + "---|" * (3 + len(heads)))
+        for row in found.rows:
+            percent = [f"{100 * row.off[key]:+.1f}" if key in row.off else "" for key in heads]
+            cells = [f"{row.pressure_kPa:g}", f"{row.load_N:g}", _measured(row), *percent]
+            rows.append(f"| {' | '.join(cells)} |")
+        yield "\n".join(rows)
+    for why in found.failed:
+        key, _, words = why.partition(", ")
+        yield f"Under load not computed, {heads[key]}, {words}."
+
+
+def _measured(row: LoadedRow) -> str:
+    percent = f" ± {100 * row.sigma / row.value:.1f} %"
+    if row.member:
+        return f"{row.member} {row.value:.2f} Hz{percent}"
+    if row.quantity == "contact_area_m2":
+        return f"contact area {1e4 * row.value:.1f} cm²{percent}"
+    return f"vertical stiffness {1e-3 * row.value:.1f} N/mm{percent}"
 
 
 def _which(study: Study) -> Iterator[str]:

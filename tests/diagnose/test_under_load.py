@@ -1,0 +1,100 @@
+"""What was measured on the road, against tyres that were fitted without it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tyrecal.case import LoadedCase, load_case, start_values
+from tyrecal.deck.context import section_mesh
+from tyrecal.diagnose.measurements import Reading
+from tyrecal.diagnose.under_load import LoadedRow, UnderLoad, compare
+from tyrecal.evaluate.door import Door
+from tyrecal.modes.loaded import Member
+from tyrecal.modes.mode import Label
+from tyrecal.studies.footprint import footprint_row
+from tyrecal.studies.loaded import LoadedTyre, load_tyres
+
+from ..studies.loaded import coarse_case
+
+LOADS = [100.0, 300.0]
+SOFTER = 0.9
+AREA, STIFFNESS = "contact_area_m2", "vertical_stiffness_N_per_m"
+
+
+@pytest.fixture(scope="module")
+def case(tmp_path_factory: pytest.TempPathFactory) -> LoadedCase:
+    return load_case(coarse_case(tmp_path_factory.mktemp("coarse")))
+
+
+def true_values(case: LoadedCase) -> dict[str, float]:
+    """What the tyre that is measured has."""
+    return {**start_values(case), "C10": SOFTER * start_values(case)["C10"], "pressure_kPa": 220.0}
+
+
+@pytest.fixture(scope="module")
+def readings(case: LoadedCase) -> list[Reading]:
+    """Areas and a stiffness of that tyre; the first area as the mean of two."""
+    pressed = Door(case).press(true_values(case), LOADS)
+    low, high = (footprint_row(pressed, each, section_mesh(case)) for each in pressed.footprints)
+    (first, last), area = LOADS, low["area_m2"]
+    found = [(AREA, first, 1.01 * area), (AREA, first, 0.99 * area),
+             (AREA, last, high["area_m2"]), (STIFFNESS, last, high[STIFFNESS])]  # fmt: skip
+    return [Reading(q, None, "", 220.0, load, x, 0.02 * x, 2) for q, load, x in found]
+
+
+def test_the_tyre_itself_is_found(case: LoadedCase, readings: list[Reading]) -> None:
+    tyres = {"none": start_values(case), "it": true_values(case)}
+    found = compare(case, Door(case), readings, tyres)
+    assert not found.failed
+    assert [(row.quantity, row.load_N) for row in found.rows] == [
+        (AREA, LOADS[0]), (AREA, LOADS[1]), (STIFFNESS, LOADS[1]),
+    ]  # fmt: skip
+    assert found.rms_percent("it") == pytest.approx(0, abs=1e-6)
+    at_last = found.rms_percent("none", LOADS[1])
+    assert at_last and at_last > 0.5
+    stiffness = found.rows[-1]
+    assert stiffness.off["none"] < 0  # what was measured is softer
+    assert found.rows[0].sigma == pytest.approx(0.02 / np.sqrt(2) * found.rows[0].value, rel=1e-3)
+
+
+def test_modes_under_load(case: LoadedCase) -> None:
+    """Named by the doublet's member; one that the tyre does not have stays without a value."""
+    values = {**start_values(case), "pressure_kPa": 220.0}
+    (tyre,) = load_tyres(Door(case), {"": values}, LOADS[:1]).values()
+    assert isinstance(tyre, LoadedTyre)
+    hertz = {mode.member: mode.frequency_Hz for mode in tyre.loads[-1].modes}
+    wanted = [Member(Label(1, 1), "symmetric"), Member(Label(2, 0), "antisymmetric"),
+              Member(Label(0, 0, "axial"), "antisymmetric")]  # fmt: skip
+    read = [
+        Reading("frequency_Hz", m.label, m.symmetry, 220.0, LOADS[0], hertz.get(m, 37.0), 0.1, 2)
+        for m in wanted
+    ]
+    found = compare(case, Door(case), read, {"none": start_values(case)})
+    off = {row.member: row.off for row in found.rows}
+    assert [off[m]["none"] for m in wanted[:2]] == pytest.approx([0, 0], abs=1e-6)
+    assert not off[wanted[2]]
+
+
+def test_what_cannot_be_pressed_is_said(case: LoadedCase, readings: list[Reading]) -> None:
+    """A splice does not go with a road; no tyre bears 1 MN, but what lies below stays."""
+    beyond = replace(readings[0], load_N=1e6)
+    spliced = {**true_values(case), "effects.stiffness_splice": 0.1}
+    tyres = {"none": start_values(case), "it": spliced}
+    found = compare(case, Door(case), [*readings[:2], beyond], tyres)
+    first, second = found.rows
+    assert set(first.off) == {"none"} and not second.off
+    assert found.rms_percent("it") is None and found.rms_percent("none")
+    splice, load = sorted(found.failed)
+    assert "it, 220 kPa: " in splice and "splice" in splice
+    assert "none, 220 kPa: " in load and "no equilibrium" in load
+
+
+def test_tyres_are_compared_on_the_same_rows() -> None:
+    rows = [LoadedRow(AREA, None, 240.0, load, 0.01, 1e-4, off)
+            for load, off in ((1e3, {"a": 0.03, "b": 0.01}), (2e3, {"a": 0.5}))]  # fmt: skip
+    found = UnderLoad(tuple(rows), ("a", "b"), ("b, 240 kPa: no",))
+    assert found.rms_percent("a") == pytest.approx(3) and found.rms_percent("b") == pytest.approx(1)
+    assert found.rms_percent("a", 2e3) is None
