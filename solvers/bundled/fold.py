@@ -26,6 +26,13 @@ class NotSymmetric(ValueError):
     """The section is not its own mirror image."""
 
 
+def mirror_images(mesh: Mesh) -> Array:
+    """Each node's mirror image (n,) in the middle plane, -1 where there is none."""
+    X = np.round(mesh.X.real / SAME_PLACE).astype(int)
+    places = {(r, z): i for i, (r, z) in enumerate(X.tolist())}
+    return np.array([places.get((r, -z), -1) for r, z in X.tolist()])
+
+
 class Fold:
     """Fields (k, n, 3) on half the circumference as parts (2, k, q, 3) on the nodes z >= 0.
 
@@ -35,8 +42,7 @@ class Fold:
 
     def __init__(self, mesh: Mesh, free: Array, angles: int, parity: int = 1):
         X = mesh.X.real
-        places = {tuple(p): i for i, p in enumerate(np.round(X / SAME_PLACE).astype(int))}
-        other = np.array([places.get((r, -z), -1) for r, z in np.round(X / SAME_PLACE).astype(int)])
+        other = mirror_images(mesh)
         if (other < 0).any() or (free != free[other]).any():
             raise NotSymmetric("the section or its supports differ between z and -z")
         self.other = other

@@ -10,7 +10,7 @@ Without ``--measured FILE`` the measurements are the model's own at three pressu
 from __future__ import annotations
 
 import multiprocessing
-import resource
+import os
 import time
 from collections import Counter, defaultdict
 from pathlib import Path
@@ -32,7 +32,8 @@ PRESSURES_kPa, EFFECT, SIZE, SCATTER = (160.0, 240.0, 320.0), "bead_filler", 0.5
 class Watched(Door):
     """A door that notes how often what was asked in this process, and for how long."""
 
-    def __post_init__(self) -> None:
+    def __init__(self, case: LoadedCase, solver_name: str = "") -> None:
+        super().__init__(case, solver_name)
         self.count: Counter[str] = Counter()
         self.seconds: defaultdict[str, float] = defaultdict(float)
 
@@ -57,6 +58,12 @@ class Watched(Door):
         other = Watched(self.case, self.solver_name)
         other.count, other.seconds = self.count, self.seconds
         return other
+
+
+def processor_s(process: multiprocessing.process.BaseProcess) -> float:
+    """What a process has used so far: fields 14 and 15 of its status on Linux."""
+    fields = Path(f"/proc/{process.pid}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
 LOADED = load_case(CASE)
@@ -91,10 +98,7 @@ def main(measured: Path | None, jobs: int) -> None:
         wall, start = time.perf_counter(), time.process_time()
         found = study(LOADED, door, measured, jobs=jobs)
         wall, own = time.perf_counter() - wall, time.process_time() - start
-    for worker in multiprocessing.active_children():  # kept for more; counted once they have ended
-        worker.terminate()
-        worker.join()
-    children = resource.getrusage(resource.RUSAGE_CHILDREN)
+    workers = sum(map(processor_s, multiprocessing.active_children()))  # kept for more
     if isinstance(door, Watched):
         print("| asked | evaluations | processor time, s | each, s |\n|---|---|---|---|")
         for kind, seconds in sorted(door.seconds.items(), key=lambda item: -item[1]):
@@ -103,7 +107,6 @@ def main(measured: Path | None, jobs: int) -> None:
         asked = sum(door.seconds.values())
         print(f"| all | {sum(door.count.values())} | {asked:.1f} | |")
         print(f"\nthe rest, mostly evidence: {own - asked:.1f} s")
-    workers = children.ru_utime + children.ru_stime
     print(f"wall {wall:.1f} s, processor time {own:.1f} s here, {workers:.1f} s in other processes")
     print(f"solver runs: {door.counts.runs}; verdict: {found.diagnosis.verdict.kind}")
 
