@@ -11,6 +11,7 @@ import numpy as np
 
 from ..case import LoadedCase, start_values
 from ..case.calibration import TargetMode, Targets
+from ..effects import catalogue
 from ..evaluate.door import Door
 from ..evaluate.failure import DeckRefused, EvaluationFailed
 from ..fit import problem as fit
@@ -151,7 +152,18 @@ class TyreModel:
         self, wanted: Sequence[tuple[dict[str, float], tuple[str, ...]]]
     ) -> list[fit.Found | EvaluationFailed | DeckRefused]:
         self._fit.jobs = self.jobs if len(wanted) >= WORTH_A_POOL else 1
-        return self._fit.modes_of(wanted)
+        # the longest first, so that the last ones end together
+        order = sorted(range(len(wanted)), key=lambda i: -self._effort(wanted[i][0]))
+        found = self._fit.modes_of([wanted[i] for i in order])
+        return [found[place] for place in np.argsort(order)]
+
+    def _effort(self, design: Mapping[str, float]) -> int:
+        """How long an evaluation takes, by its effects: 2 without slopes, 1 where it needs more
+        than a plain tyre's modes."""
+        ids = {name.removeprefix(EFFECTS) for name in design if name.startswith(EFFECTS)}
+        if not self._slopeless.isdisjoint(ids):
+            return 2
+        return int(any(catalogue()[id].needs for id in ids))
 
     def _answer(
         self,
