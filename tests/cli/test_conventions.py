@@ -88,7 +88,7 @@ def test_exit_codes(
 
 @pytest.mark.parametrize("asked", [[], ["--json"]])
 def test_a_reader_that_leaves_early_costs_no_result(asked: list[str], tmp_path: Path) -> None:
-    """As `tyrecal fit CASE | head -3` does: pictures are drawn and the run finishes all the same."""
+    """As with `tyrecal fit CASE | head -3`: pictures are drawn, the run finishes all the same."""
     reader, writer = os.pipe()
     os.close(reader)
     fit = ["fit", CASE, *COARSE, "--output", str(tmp_path), *asked]
