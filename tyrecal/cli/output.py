@@ -143,8 +143,14 @@ def refuse_other(folder: Path, case: Path) -> None:
     except ValueError:
         facts = None
     owner = facts.get("case") if isinstance(facts, dict) else None
-    if owner != str(case):
+    if owner != str(case) and not _moved(owner, case):
         raise OutputRefused(
             f"folder '{folder}' holds results of {owner or 'something else'};"
             " give another one with --output"
         )
+
+
+def _moved(owner: Any, case: Path) -> bool:
+    """Whether ``case`` is what was at ``owner``: of the same name, and nothing is there any more,
+    as after a project's folder was renamed."""
+    return isinstance(owner, str) and Path(owner).name == case.name and not Path(owner).exists()
