@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -421,6 +422,10 @@ def _row(number: int, row: str) -> str:
     return "\n".join([*ROW[:number], row, *ROW[number + 1 :]]) + "\n"
 
 
+_table("semicolons", "separated by commas", TABLE.replace(",", ";"))
+_table("tabulators", "separated by commas", TABLE.replace(",", "\t"))
+METRES = re.sub(r"(\d+\.\d+)", lambda mm: f"{float(mm[1]) / 1000:.8f}", TABLE)
+_table("metres", "must be in mm", METRES)
 _table("column_missing", "'ply_z_mm' is missing", TABLE.replace("ply_z_mm", "ply_x_mm", 1))
 _table("line_missing", "'ply_r_mm' is missing", TABLE.replace("ply_r_mm", "ply_rmm", 1))
 _table("column_twice", "given 2 times", TABLE.replace("station,", "region,", 1))
