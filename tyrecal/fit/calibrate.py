@@ -235,8 +235,8 @@ def _result(
         variables[v.name] = {
             "initial": initial.values[v.name],
             "value": value,
-            "lower": v.lower,
-            "upper": v.upper,
+            "lower": problem.case.case.variables[v.name].lower,
+            "upper": problem.case.case.variables[v.name].upper,
             "standard_error": known.standard_errors[i],
             "at_bound": at_bound,
         }
