@@ -176,6 +176,22 @@ def test_a_folder_of_another_case_is_refused(
     assert (tmp_path / "out" / "modes.json").read_bytes() == before
 
 
+def test_a_number_that_a_variable_sets_is_said_not_to_count(
+    case_folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Edited alone it would change nothing, unseen."""
+    path, out = case_folder / "p235_75r17.yaml", tmp_path / "out"
+    path.write_text(path.read_text().replace("C10_Pa: 1.0e+6", "C10_Pa: 2.0e+6", 1))
+    words = "materials.rubber.C10_Pa is 2e+06 in the case, but does not count: its variable 'C10'"
+    for arguments in (["validate"], ["modes", "--mesh", "coarse"], ["deck"]):
+        where = ["--output", str(out)] if arguments != ["validate"] else []
+        assert run(arguments[0], str(path), *arguments[1:], *where) == 0
+        assert f"{words} starts at 1e+06\n" in capsys.readouterr().err, arguments
+    assert run("deck", str(path), "--output", str(out), "--set", "C10=3e6") == 0
+    assert run("validate", CASE) == 0
+    assert capsys.readouterr().err == ""
+
+
 def test_results_go_on_where_their_project_was_moved(case_folder: Path, tmp_path: Path) -> None:
     asked = ["--mesh", "coarse", "--quiet", "--output"]
     out = case_folder / "out"
