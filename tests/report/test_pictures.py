@@ -62,6 +62,11 @@ def test_modes_overview_takes_the_nine_lowest(tyre, tmp_path):
     assert 0.25 < ink(tmp_path / "modes.png", 1350, 1455, 600_000) < 0.6
 
 
+def test_modes_overview_is_no_larger_than_its_modes(tyre, tmp_path):
+    draw_modes_overview(tmp_path / "modes.png", list(tyre.modes.values())[:5], tyre.mesh)
+    assert 0.2 < ink(tmp_path / "modes.png", 1350, 975, 400_000) < 0.6
+
+
 def test_the_largest_motion_is_12_percent_and_stands_at_the_top(tyre):
     surface = shapes._surface(tyre.modes[Label(2, 0)], tyre.mesh, None)
     motion = np.linalg.norm(surface.moved - surface.rest, axis=-1)
