@@ -6,14 +6,16 @@ import doctest
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 import tyrecal
 from tyrecal import api
 
-from .conftest import ROOT
+from .conftest import CASES, ROOT
 
+CASE, DATA = CASES / "p235_75r17.yaml", CASES / "p235_75r17_wheeler.csv"
 FUNCTIONS = [name for name in tyrecal.__all__ if name[0].islower() and name != "with_values"]
 
 
@@ -57,6 +59,32 @@ def test_the_example_of(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     (test,) = finder.find(what, name or "tyrecal", module=False, globs=globs)
     assert test.examples
     assert runner.run(test).failed == 0
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda case: tyrecal.load_case(CASE, mesh="fine"), "mesh level 'fine'"),
+        (lambda case: tyrecal.evaluate_modes(case, {"C11": 1e6}), "did you mean 'C10'"),
+        (lambda case: tyrecal.evaluate_modes(case, {"C10": "1e6"}), "must be a number"),
+        (lambda case: tyrecal.evaluate_modes(case, {"C10": -1.0}), "must be greater than"),
+        (lambda case: tyrecal.fit_case(case, method="bfgs"), "none of slsqp, least-squares"),
+        (lambda case: tyrecal.fit_case(case, starts=0), "starts must be at least 1, got 0"),
+        (lambda case: tyrecal.fit_case(case, fixed={"X": 1.0}), "no variable 'X'"),
+        (lambda case: tyrecal.sweep_pressure(case, [200, 24000]), "less than 2000"),
+        (lambda case: tyrecal.evaluate_footprint(case, []), "loads_N must be above 0 and rise"),
+        (lambda case: tyrecal.evaluate_footprint(case, [2e3, 1e3]), r"got \[2000.0, 1000.0\]"),
+        (lambda case: tyrecal.evaluate_footprint(case, [float("nan")]), "above 0 and rise"),
+        (lambda case: tyrecal.diagnose_case(case, DATA, effects=["rim_with"]), "'rim_width'"),
+        (lambda case: tyrecal.diagnose_case(case, DATA, effects="rim_width"), "not one of the eff"),
+    ],
+)
+def test_wrong_input_is_a_value_error_in_a_sentence(call: Any, words: str) -> None:
+    """Not a failure of the solver, and never silently another question."""
+    case = tyrecal.load_case(CASE, mesh="coarse")
+    with pytest.raises(ValueError, match=words) as error:
+        call(case)
+    assert "\n" not in str(error.value)
 
 
 def test_strict_types(tmp_path: Path) -> None:

@@ -11,6 +11,8 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Mapping, Sequence
+from itertools import pairwise
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +24,7 @@ from .evaluate.door import Door, Question
 from .evaluate.failure import EvaluationFailed
 from .evaluate.pressed import Pressed
 from .evaluate.store import Store
-from .fit.calibrate import Fit, calibrate
+from .fit.calibrate import METHODS, Fit, calibrate
 from .modes.label import paired_labels
 from .modes.mode import Mode
 from .studies.pressure import State
@@ -104,6 +106,11 @@ def fit_case(
     >>> fit.result["converged"], f"{fit.initial.objective:.0f} to {fit.fitted.objective:.0f} Hz"
     (True, '33 to 6 Hz')
     """
+    if method not in METHODS:
+        raise ValueError(f"method '{method}' is none of {', '.join(METHODS)}")
+    if starts < 1:
+        raise ValueError(f"starts must be at least 1, got {starts}")
+    _values(case, fixed)
     return calibrate(case, _door(case, solver, record), method, fixed, starts, seed, jobs)
 
 
@@ -125,11 +132,15 @@ def sweep_pressure(
     160 kPa: 31.1 Hz
     240 kPa: 37.0 Hz
     """
+    from .studies.fitted import pressure_name
     from .studies.pressure import Failure, sweep
 
+    design = _values(case, values)
+    for pressure in pressures_kPa:
+        with_values(case, {**design, pressure_name(case): pressure})
     door = _door(case, solver, record)
     states = []
-    for outcome in sweep(door, {"": _values(case, values)}, list(pressures_kPa), jobs):
+    for outcome in sweep(door, {"": design}, list(pressures_kPa), jobs):
         if isinstance(outcome, Failure):
             raise outcome.failed
         states.append(outcome)
@@ -157,6 +168,9 @@ def evaluate_footprint(
     from .studies.footprint import footprint_row
 
     design = _values(case, values)
+    rise = [after - before for before, after in pairwise([0.0, *loads_N])]
+    if not rise or not all(0 < each < inf for each in rise):
+        raise ValueError(f"loads_N must be above 0 and rise, got {list(loads_N)}")
     found: Pressed = _door(case, solver, record).press(design, list(loads_N))
     if found.failed:
         raise found.failed
@@ -223,7 +237,10 @@ def read_results(folder: Path | str) -> dict[str, Any]:
 
 
 def _values(case: LoadedCase, values: Mapping[str, float] | None) -> dict[str, float]:
-    return {**start_values(case), **(values or {})}
+    """The whole design. Raises ValueError where the case cannot have it."""
+    design = {**start_values(case), **(values or {})}
+    with_values(case, design)
+    return design
 
 
 def _door(case: LoadedCase, solver: str, record: Path | str | None) -> Door:

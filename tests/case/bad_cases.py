@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -375,6 +376,7 @@ _edit("anchor_tag", "", "tag", PRESSURE, "pressure_kPa: !!float 240.0")
 _edit("alias", "", "alias", "crown: 16", "crown: &a 16", "upper_sidewall: 16", "upper_sidewall: *a")
 _edit("merge_key", "", "plain word", PRESSURE, f"{PRESSURE}\n<<: {{a: 1}}")
 _edit("number_key", "", "plain word", PRESSURE, f"{PRESSURE}\n3: 4")
+_edit("comma_in_braces", "", "'frequency_Hz' before it a comma", "31.7}", "31,7}")
 _edit("list_key", "", "plain word", PRESSURE, f"{PRESSURE}\n? [a]\n: 4")
 _edit("tabs", "", "spaces, not tabs", "  stations:", "\tstations:")
 _edit("open_bracket", "", "not YAML", "prony: [{g", "prony: [[{g")
@@ -421,6 +423,10 @@ def _row(number: int, row: str) -> str:
     return "\n".join([*ROW[:number], row, *ROW[number + 1 :]]) + "\n"
 
 
+_table("semicolons", "separated by commas", TABLE.replace(",", ";"))
+_table("tabulators", "separated by commas", TABLE.replace(",", "\t"))
+METRES = re.sub(r"(\d+\.\d+)", lambda mm: f"{float(mm[1]) / 1000:.8f}", TABLE)
+_table("metres", "must be in mm", METRES)
 _table("column_missing", "'ply_z_mm' is missing", TABLE.replace("ply_z_mm", "ply_x_mm", 1))
 _table("line_missing", "'ply_r_mm' is missing", TABLE.replace("ply_r_mm", "ply_rmm", 1))
 _table("column_twice", "given 2 times", TABLE.replace("station,", "region,", 1))

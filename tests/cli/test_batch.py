@@ -232,6 +232,15 @@ def test_a_folder_of_another_case_is_refused(tmp_path: Path) -> None:
         assert batched(vary(tmp_path / name, 1), tmp_path / "out", *modes) == code
 
 
+def test_a_renamed_batch_goes_on(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    cases, modes = vary(tmp_path / "a", 1), ["--studies", "modes"]
+    assert batched(cases, tmp_path / "out", *modes) == 0
+    assert "1 case: 1 good\n" in capsys.readouterr().out
+    (tmp_path / "out").rename(tmp_path / "kept")
+    assert batched(cases, tmp_path / "kept", *modes) == 0
+    assert facts(tmp_path / "kept", "tyre_00")["answered"]
+
+
 def test_wrong_cases_are_errors_of_theirs(tmp_path: Path) -> None:
     first, second, third = vary(tmp_path / "c", 3)
     first.write_text("format: 9\n")

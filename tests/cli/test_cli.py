@@ -176,13 +176,40 @@ def test_a_folder_of_another_case_is_refused(
     assert (tmp_path / "out" / "modes.json").read_bytes() == before
 
 
-@pytest.mark.parametrize("content", ["", "[]", "{}", '"a case"'])
+def test_a_number_that_a_variable_sets_is_said_not_to_count(
+    case_folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Edited alone it would change nothing, unseen."""
+    path, out = case_folder / "p235_75r17.yaml", tmp_path / "out"
+    path.write_text(path.read_text().replace("C10_Pa: 1.0e+6", "C10_Pa: 2.0e+6", 1))
+    words = "materials.rubber.C10_Pa is 2e+06 in the case, but does not count: its variable 'C10'"
+    for arguments in (["validate"], ["modes", "--mesh", "coarse"], ["deck"]):
+        where = ["--output", str(out)] if arguments != ["validate"] else []
+        assert run(arguments[0], str(path), *arguments[1:], *where) == 0
+        assert f"{words} starts at 1e+06\n" in capsys.readouterr().err, arguments
+    assert run("deck", str(path), "--output", str(out), "--set", "C10=3e6") == 0
+    assert run("validate", CASE) == 0
+    assert capsys.readouterr().err == ""
+
+
+def test_results_go_on_where_their_project_was_moved(case_folder: Path, tmp_path: Path) -> None:
+    asked = ["--mesh", "coarse", "--quiet", "--output"]
+    out = case_folder / "out"
+    assert run("modes", str(case_folder / "p235_75r17.yaml"), *asked, str(out)) == 0
+    moved = case_folder.rename(tmp_path / "moved")
+    assert run("modes", str(moved / "p235_75r17.yaml"), *asked, str(moved / "out")) == 0
+    facts = json.loads((moved / "out" / "run.json").read_text())
+    assert facts["case"] == str(moved / "p235_75r17.yaml") and facts["solver_runs"] == 0
+
+
+@pytest.mark.parametrize("content", ["", "[]", "{}", '"a case"', '{"case": "/gone/other.yaml"}'])
 def test_a_folder_with_a_record_of_something_else_is_refused(
     content: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "run.json").write_text(content)
     assert run("deck", CASE, "--output", str(tmp_path)) == 2
-    assert "holds results of something else; give another" in capsys.readouterr().err
+    error = capsys.readouterr().err
+    assert "holds results of " in error and "; give another one with --output" in error
     assert (tmp_path / "run.json").read_text() == content
 
 

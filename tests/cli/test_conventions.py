@@ -86,6 +86,19 @@ def test_exit_codes(
     assert code in EXIT_CODES
 
 
+@pytest.mark.parametrize("asked", [[], ["--json"]])
+def test_a_reader_that_leaves_early_costs_no_result(asked: list[str], tmp_path: Path) -> None:
+    """As with `tyrecal fit CASE | head -3`: pictures are drawn, the run finishes all the same."""
+    reader, writer = os.pipe()
+    os.close(reader)
+    fit = ["fit", CASE, *COARSE, "--output", str(tmp_path), *asked]
+    done = subprocess.run([*TYRECAL, *fit], stdout=writer, stderr=subprocess.PIPE, text=True)
+    os.close(writer)
+    assert done.returncode == 0 and "Error" not in done.stderr, done.stderr
+    assert json.loads((tmp_path / "run.json").read_text())["finished"] is True
+    assert (tmp_path / "fit_shapes.json").exists() and (tmp_path / "modes.png").exists()
+
+
 def test_exit_codes_are_told_alike() -> None:
     (line,) = re.findall(
         r"Exit codes, for scripts: (.*?\.)", (ROOT / "README.md").read_text(), re.S

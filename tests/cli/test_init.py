@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 import shutil
 from pathlib import Path
 
@@ -88,6 +89,12 @@ def test_gauges_that_the_engineer_knows(here: Path) -> None:
     widest, rim = int(np.argmax(points[1, :, 1])), int(np.flatnonzero(case.section.rigid)[0])
     assert thickness[[0, widest, rim]] == pytest.approx([0.015, 0.007, 0.014], abs=1e-6)
     assert 2 * points[-1, :, 1].max() == pytest.approx(0.2086 + 0.2 * 0.0254, abs=1e-4)
+
+
+def test_what_to_do_next_can_be_typed(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("init", "205/60R15", "--no-pictures", "--output", "my tyres/Größe 1.yaml") == 0
+    (line,) = [x for x in capsys.readouterr().out.splitlines() if x.startswith("next: tyrecal ")]
+    assert run(*shlex.split(line.removeprefix("next: tyrecal ")), *QUICK) == 0
 
 
 def test_light_trucks_have_two_plies_of_carcass(here: Path) -> None:

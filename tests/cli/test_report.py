@@ -66,6 +66,7 @@ def test_several_folders(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> 
         (["file"], "'file' is a file; give a folder of results"),
         (["empty"], "'empty' holds no results of fit, modes, sweep-pressure"),
         (["toy", "empty"], "'empty' holds no results"),
+        (["batch"], "it is a batch's: give the folders of its cases"),
         (["broken"], "'broken/fit.json' is damaged: it is no JSON"),
         (["toy", "--output", "file"], "'file' is no page of tyrecal's"),
         (["toy", "--output", "empty"], "'empty' is a folder; give a file"),
@@ -84,6 +85,8 @@ def test_wrong_input(
     toy.write(Path("broken"))
     Path("broken/fit.json").write_text("{")
     Path("empty").mkdir()
+    Path("batch").mkdir()
+    Path("batch/batch.json").write_text("{}")
     Path("file").write_text("")
     assert run("report", *arguments) == 2
     printed = capsys.readouterr()

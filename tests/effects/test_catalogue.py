@@ -13,8 +13,9 @@ from tyrecal.deck.write import Decks
 from tyrecal.effects import IDS, Effect, catalogue, with_effects
 from tyrecal.evaluate.door import Door, Question
 from tyrecal.evaluate.failure import DeckRefused, EvaluationFailed
+from tyrecal.fit.calibrate import calibrate
 
-from .support import CASE, CASES, START, coarse, decks, slopes
+from .support import CASE, CASES, START, coarse, decks, frequencies, slopes
 
 EFFECTS = list(catalogue().values())
 each = pytest.mark.parametrize("effect", EFFECTS, ids=[effect.id for effect in EFFECTS])
@@ -65,6 +66,35 @@ def test_slopes_are_those_of_the_frequencies(effect: Effect) -> None:
     exact = slopes(CASE, effect.id, at)
     assert abs(central).max() * effect.high > 1e-3 * f[1 + STEP].min()  # it does something
     assert exact == pytest.approx(central, rel=1e-4, abs=1e-4 * abs(central).max())
+
+
+@pytest.mark.parametrize("id", ["bead_filler", "tread_density", "belt_angle", "cap_ply"])
+def test_slope_next_to_nothing(id: str) -> None:
+    """The deck's digits do not show a share of next to nothing, but the slope is still there."""
+    low, high = (slopes(CASE, id, share * catalogue()[id].high) for share in (1e-12, 1e-4))
+    assert low == pytest.approx(high, rel=1e-2, abs=1e-3 * abs(high).max())
+
+
+@pytest.mark.parametrize("method", ["slsqp", "least-squares"])
+def test_a_fit_ends_where_an_effect_is_absent(method: str) -> None:
+    """Frequencies lower than the plain tyre's want a filler softer than none: the bound 0."""
+    modes = [
+        t.model_copy(update={"frequency_Hz": 0.95 * f})
+        for t in CASE.case.targets.modes
+        for label, f in frequencies().items()
+        if (label.c, label.m, label.kind) == (t.c, t.m, t.kind)
+    ]
+    filler = CASE.case.variables["C10"].model_copy(
+        update={"sets": ["effects.bead_filler"], "start": 1.0, "lower": 0.0, "upper": 3.0,
+                "scale": "linear"}
+    )  # fmt: skip
+    targets = CASE.case.targets.model_copy(update={"modes": modes})
+    changed = CASE.case.model_copy(update={"targets": targets, "variables": {"filler": filler}})
+    case = replace(CASE, case=changed)
+    result = calibrate(case, Door(case), method).result
+    found = result["variables"]["filler"]
+    assert result["converged"] and found["at_bound"] and 0 <= found["value"] < 1e-3
+    assert (found["lower"], found["upper"]) == (0.0, 3.0)
 
 
 @each

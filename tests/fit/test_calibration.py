@@ -240,6 +240,27 @@ def test_standard_errors_are_those_of_the_fit_that_was_made(weights: list[float]
     assert np.std(found, axis=0) == pytest.approx(np.mean(stated, axis=0), rel=0.15)
 
 
+def test_targets_that_do_not_count_are_none() -> None:
+    with pytest.raises(NothingToFit, match="every target has the weight 0"):
+        calibrate(with_targets(weight=[0.0] * 9), door())  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("held", [False, True])
+def test_a_pressure_that_varies_is_told_as_it_was_fitted(held: bool) -> None:
+    """With the frequencies and the mass that belong to it, not as the case has it."""
+    pressure = CASE.case.variables["C10"].model_copy(
+        update={"sets": ["pressure_kPa"], "start": 200.0, "lower": 100.0, "upper": 400.0}
+    )
+    variables = {"C10": CASE.case.variables["C10"], "pressure": pressure}
+    case = replace(CASE, case=CASE.case.model_copy(update={"variables": variables}))
+    powers = {"C10": POWERS["C10"], "pressure": POWERS["A_belt"]}
+    start = {"C10": START["C10"], "pressure": 200.0}
+    tyre = FakeDoor({label: 1.05 * f for label, f in TARGETS.items()}, powers, start)
+    fixed = {"pressure": 250.0} if held else {}
+    fit = calibrate(case, tyre, fixed=fixed)  # type: ignore[arg-type]
+    assert fit.result["pressure_kPa"] == fit.fitted.values["pressure"] != 240.0
+
+
 def test_as_many_variables_as_data_tell_nothing_of_the_noise() -> None:
     weights = [1.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0]
     result = calibrate(with_targets(weight=weights), door()).result  # type: ignore[arg-type]

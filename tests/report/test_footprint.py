@@ -90,6 +90,16 @@ def test_one_design_and_one_load(tmp_path: Path) -> None:
     assert len(list(tmp_path.iterdir())) == 3
 
 
+def test_marks_of_one_load_are_whole(drawn: list[Figure], tmp_path: Path) -> None:
+    """Of designs that hardly differ, too."""
+    row = {"load_N": 2e3, "area_m2": 8.3e-3, "deflection_m": 0.011}
+    other = {**row, "design": "fitted", "area_m2": 8.45e-3, "deflection_m": 0.0112}
+    draw_curves(tmp_path / "footprint.png", [{**row, "design": "initial"}, other])
+    for axes in drawn[0].axes:
+        marks = [line.get_ydata()[0] for line in axes.lines]
+        assert len(marks) == 2 and max(marks) < 0.97 * axes.get_ylim()[1]
+
+
 def test_the_deformed_tyre(designs: dict[str, Pressed], tmp_path: Path) -> None:
     """Flat on the road at +x, whole, with the solver's own numbers on its rings."""
     pressed = designs["initial"]

@@ -15,7 +15,7 @@ from tyrecal.evaluate.door import Door, Question
 from tyrecal.evaluate.results import Evaluation
 from tyrecal.modes.label import label_modes
 from tyrecal.modes.mode import Label, Mode
-from tyrecal.report import shapes
+from tyrecal.report import convergence, shapes
 from tyrecal.report.convergence import draw_convergence
 from tyrecal.report.section import draw_section
 from tyrecal.report.shapes import draw_mode, draw_modes_overview, title
@@ -60,6 +60,11 @@ def test_modes_overview_takes_the_nine_lowest(tyre, tmp_path):
     assert len(tyre.modes) > 9
     draw_modes_overview(tmp_path / "modes.png", list(tyre.modes.values()), tyre.mesh)
     assert 0.25 < ink(tmp_path / "modes.png", 1350, 1455, 600_000) < 0.6
+
+
+def test_modes_overview_is_no_larger_than_its_modes(tyre, tmp_path):
+    draw_modes_overview(tmp_path / "modes.png", list(tyre.modes.values())[:5], tyre.mesh)
+    assert 0.2 < ink(tmp_path / "modes.png", 1350, 975, 400_000) < 0.6
 
 
 def test_the_largest_motion_is_12_percent_and_stands_at_the_top(tyre):
@@ -116,3 +121,25 @@ def test_convergence(tmp_path, failed):
     ]  # fmt: skip
     draw_convergence(tmp_path / "fit.png", history)
     assert 0.01 < ink(tmp_path / "fit.png", 1200, 840, 100_000) < 0.2
+
+
+@pytest.mark.parametrize("spread", [1.0, 1e-4, 0.04, 0.4, 3.0, 30.0])
+def test_convergence_has_numbers_on_its_axes(spread, tmp_path, monkeypatch):
+    drawn = []
+    monkeypatch.setattr(convergence, "save", lambda figure, path: drawn.append(figure))
+    history = [
+        {"point": k, "objective_Hz": 47 * (1 + spread * (k == 1)), "start": 1,
+         "values": {"C10": 1e6 * (1 + spread * (k > 1))}}
+        for k in range(1, 5)
+    ]  # fmt: skip
+    draw_convergence(tmp_path / "fit.png", history)
+    drawn[0].canvas.draw()
+    for axes in drawn[0].axes:
+        low, high = axes.get_ylim()
+        numbers = {
+            float(tick.get_text())
+            for tick in axes.get_yticklabels()
+            if low <= tick.get_position()[1] <= high
+        }
+        assert 2 <= len(numbers) <= 8, numbers
+        assert all(low * (1 - 1e-3) <= n <= high * (1 + 1e-3) for n in numbers)

@@ -95,6 +95,7 @@ def test_a_ring_of_constant_thickness(tmp_path: Path) -> None:
         (lambda rows: [*rows[:3], "outer,300", *rows[4:]], "r_mm must"),
         (lambda rows: [*rows[:3], "outer,300,wide", *rows[4:]], "must be a number"),
         (lambda rows: ["curve,r,z", *rows[1:]], "column 'r_mm' is missing"),
+        (lambda rows: [row.replace(",", ";") for row in rows], "separated by commas"),
     ],
 )
 def test_wrong_outlines(change: object, words: str, tmp_path: Path) -> None:

@@ -3,7 +3,7 @@
 from .load import LoadedCase, load_case, validate
 from .mistakes import CaseError, Mistake
 from .schema import Case
-from .variables import number_at, parse_assignment, start_values, with_level, with_values
+from .variables import number_at, overruled, parse_assignment, start_values, with_level, with_values
 
 __all__ = [
     "Case",
@@ -12,6 +12,7 @@ __all__ = [
     "Mistake",
     "load_case",
     "number_at",
+    "overruled",
     "parse_assignment",
     "start_values",
     "validate",

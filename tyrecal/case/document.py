@@ -149,7 +149,11 @@ class _Reader:
             line = name.start_mark.line
             key = name.value if isinstance(name, ScalarNode) else "?"
             if not isinstance(name, ScalarNode) or _kind(name) != "str":
-                self.document.refuse(line + 1, f"the key {shortened(key)} must be a plain word")
+                comma = node.flow_style and data and _kind(name) == "int"
+                hint = f": has '{[*data][-1]}' before it a comma for a point?" if comma else ""
+                self.document.refuse(
+                    line + 1, f"the key {shortened(key)} must be a plain word{hint}"
+                )
             elif key in data:
                 first = self.document.places[(*keys, key)][0]
                 self.document.mistakes.append(

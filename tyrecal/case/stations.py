@@ -17,6 +17,8 @@ from .section import SectionSource
 if TYPE_CHECKING:
     from ..tyre.section import Section
 
+SMALLEST_MM, LARGEST_MM = 50, 5000  # outer radius of a tyre
+
 
 def inside(folder: Path, name: str) -> Path:
     """The path of ``name`` in ``folder``; ValueError when it leads outside, links included."""
@@ -111,13 +113,14 @@ def read_section_of(source: SectionSource, folder: Path) -> Section:
 
 def _check_table(path: Path) -> None:
     """The table is a table: a comma for a decimal point would shift its columns unseen."""
-    from ..tyre.section import GAUGE, SectionError, gauged_lines
+    from ..tyre.section import GAUGE, SectionError, gauged_lines, refuse_separators
 
     with path.open(newline="", encoding="utf-8-sig") as file:
         rows = csv.reader(file)
         header = next(rows, [])
         if not header:
             raise SectionError("the station table is empty", 1)
+        refuse_separators(header)
         names = [column[: -len("_r_mm")] for column in header if column[-5:] in ("_r_mm", "_z_mm")]
         known = ["region", "rigid", *(f"{name}_{axis}_mm" for name in names for axis in "rz")]
         known += [f"{name}{GAUGE}" for name in gauged_lines(header)]
@@ -146,5 +149,11 @@ def _check_section(section: Section) -> None:
     for name, count in section.regions:
         if count < 1:
             raise SectionError(f"region '{name}' needs at least two stations")
+    reach = 1e3 * section.points[-1, 0, 0]  # mm; a tyre of inches, cm or m would pass else
+    if not SMALLEST_MM < reach < LARGEST_MM:
+        raise SectionError(
+            f"the tyre's outer radius is {reach:.3g} mm: r and z must be in mm, and a tyre's radius"
+            f" between {SMALLEST_MM} and {LARGEST_MM} mm"
+        )
     if not section.rigid.any():
         raise SectionError("no station is held by the rim, rigid must be 1 somewhere")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 from math import isfinite
 from numbers import Real
@@ -29,6 +29,25 @@ ALONE = {
 def start_values(loaded: LoadedCase) -> dict[str, float]:
     """The start value of every variable by name, in the unit of the numbers it sets."""
     return {name: variable.start for name, variable in loaded.case.variables.items()}
+
+
+def overruled(loaded: LoadedCase, given: Collection[str] = ()) -> list[str]:
+    """A sentence for every number in the case file that its variable's start, which is what
+    counts, differs from: who edits that number alone changes nothing. Variables whose values are
+    ``given`` are left out."""
+    sentences = []
+    for name, variable in loaded.case.variables.items():
+        for path in [] if name in given else variable.sets:
+            try:
+                written = at(loaded.raw, find(loaded.raw, path))
+            except KeyError:  # left to its default
+                continue
+            if written is not None and written != variable.start:
+                sentences.append(
+                    f"{path} is {written:g} in the case, but does not count: its variable '{name}'"
+                    f" starts at {variable.start:g}"
+                )
+    return sentences
 
 
 def parse_assignment(text: str) -> tuple[str, float]:

@@ -195,7 +195,7 @@ def _tell(result: Mapping[str, Any], talk: Talk) -> None:
     counts = dict(result["counts"])
     total = counts.pop("cases")
     parts = ", ".join(f"{number} {what}" for what, number in counts.items() if number)
-    talk.say(f"{total} cases: {parts}")
+    talk.say(f"{total} case{'s' * (total > 1)}: {parts}")
 
 
 def _some(names: Sequence[str], most: int = 10) -> str:

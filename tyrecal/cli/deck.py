@@ -42,7 +42,7 @@ def command(
     from ..evaluate.door import Door
     from .output import Run
 
-    loaded, values = options.load(case, mesh, assignments, pressure_kPa)
+    loaded, values = options.load(case, mesh, assignments, pressure_kPa, talk)
     door = Door(loaded, solver)
     adapter = door.solver
     door.needs_effects_of(loaded)

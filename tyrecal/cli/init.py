@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -122,4 +123,4 @@ def _write(
 
         draw_section(picture, loaded, section_mesh(loaded))
         talk.say(f"section drawn in {picture}")
-    talk.say(f"next: tyrecal modes {target}")
+    talk.say(f"next: tyrecal modes {shlex.quote(str(target))}")

@@ -218,7 +218,7 @@ class Study:
         self, path: Path, assigned: tuple[str, ...] = (), pressure_kPa: float | None = None
     ) -> Any:
         """As `load`, at the mesh level asked for."""
-        return load(path, self.mesh, assigned, pressure_kPa)
+        return load(path, self.mesh, assigned, pressure_kPa, self.talk)
 
     def door(self, loaded: Any) -> Door:
         """The door to the solver asked for. Raises UnknownSolver."""
@@ -278,12 +278,26 @@ def fitted(text: str) -> Callable[[Any], Any]:
     return click.option("--fitted", type=path, metavar="fit.json", help=text)
 
 
-def load(path: Path, mesh_level: str, assigned: tuple[str, ...], pressure_kPa: float | None) -> Any:
+def load(
+    path: Path,
+    mesh_level: str,
+    assigned: tuple[str, ...],
+    pressure_kPa: float | None,
+    talk: Talk,
+) -> Any:
     """The case with its start values, mesh level, assignments and pressure applied.
 
-    Returns (case, values of the variables). Raises CaseError, click.UsageError.
+    Says which numbers of the file do not count. Returns (case, values of the variables). Raises
+    CaseError, click.UsageError.
     """
-    from ..case import load_case, parse_assignment, start_values, with_level, with_values
+    from ..case import (
+        load_case,
+        overruled,
+        parse_assignment,
+        start_values,
+        with_level,
+        with_values,
+    )
     from ..case.load import CaseError
 
     case = load_case(path)
@@ -297,6 +311,8 @@ def load(path: Path, mesh_level: str, assigned: tuple[str, ...], pressure_kPa: f
                 raise click.UsageError(
                     f"{number} is set by the variable '{name}'; give --set {name}=VALUE instead"
                 )
+        for sentence in overruled(case, given):
+            talk.note(sentence)
         case = with_values(case, {k: v for k, v in given.items() if k not in names})
         values = {**start_values(case), **{k: v for k, v in given.items() if k in names}}
         return with_values(case, values), values

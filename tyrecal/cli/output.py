@@ -142,9 +142,19 @@ def refuse_other(folder: Path, case: Path) -> None:
         facts = json.loads(record.read_text(encoding="utf-8"))
     except ValueError:
         facts = None
-    owner = facts.get("case") if isinstance(facts, dict) else None
-    if owner != str(case):
+    facts = facts if isinstance(facts, dict) else {}
+    owner = facts.get("case")
+    if owner != str(case) and not _moved(facts, case):
         raise OutputRefused(
             f"folder '{folder}' holds results of {owner or 'something else'};"
             " give another one with --output"
         )
+
+
+def _moved(facts: dict[str, Any], case: Path) -> bool:
+    """Whether ``case`` is what ``facts`` are of: nothing is at the old place any more, and it has
+    the same name, as after a project's folder was renamed, or is a batch's folder itself."""
+    owner = facts.get("case")
+    if not isinstance(owner, str) or Path(owner).exists():
+        return False
+    return Path(owner).name == case.name or ("cases" in facts and case.is_dir())

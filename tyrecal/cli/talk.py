@@ -27,7 +27,17 @@ def coloured() -> bool | None:
 
 def error(text: str) -> None:
     """What went wrong, in red on a terminal."""
-    click.secho(f"error: {text}", fg="red", err=True, color=coloured())
+    _echo(click.style(f"error: {text}", fg="red"), err=True, color=coloured())
+
+
+def _echo(text: str, err: bool = False, **how: Any) -> None:
+    """Print; a reader that has closed the pipe (`| head`) misses the rest, and costs no result."""
+    try:
+        click.echo(text, err=err, **how)
+    except BrokenPipeError:
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, (sys.stderr if err else sys.stdout).fileno())
+        os.close(nowhere)
 
 
 def resume(words: str) -> None:
@@ -50,12 +60,12 @@ class Talk:
     def say(self, text: str) -> None:
         """A line of the result, for people: on standard error beside JSON."""
         if not self.quiet:
-            click.echo(text, err=self.as_json)
+            _echo(text, err=self.as_json)
 
     def note(self, text: str) -> None:
         """A remark on the result, always on standard error."""
         if not self.quiet:
-            click.echo(text, err=True)
+            _echo(text, err=True)
 
     def show(self, table: Any, beside_json: bool = False) -> None:
         """A table of the result, for people; beside JSON, which holds the same, only on demand."""
@@ -68,21 +78,21 @@ class Talk:
             console = Console(stderr=self.as_json, width=110)
         with console.capture() as text:  # rich answers a closed pipe by leaving the process
             console.print(table)
-        click.echo(text.get(), nl=False, err=self.as_json, color=coloured())
+        _echo(text.get(), nl=False, err=self.as_json, color=coloured())
 
     def result(self, content: Any) -> None:
         """The result for programs, where they ask for it."""
         if self.as_json:
-            click.echo(json_text(content), nl=False)
+            _echo(json_text(content), nl=False)
 
     def detail(self, text: str) -> None:
         """What only --verbose wants to know."""
         if self.verbose:
-            click.echo(text, err=True)
+            _echo(text, err=True)
 
     def warn(self, text: str) -> None:
         """What must not be overlooked."""
-        click.secho(text, fg="yellow", err=True, color=coloured())
+        _echo(click.style(text, fg="yellow"), err=True, color=coloured())
 
     def error(self, text: str) -> None:
         """What went wrong and does not end the command."""

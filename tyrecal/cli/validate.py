@@ -21,7 +21,7 @@ def command(case: Path, talk: Talk) -> int:
     tyrecal validate cases/p235_75r17.yaml
     tyrecal validate my.yaml --json
     """
-    from ..case import validate
+    from ..case import load_case, overruled, validate
 
     mistakes = validate(case)
     for mistake in mistakes:
@@ -40,5 +40,7 @@ def command(case: Path, talk: Talk) -> int:
     )
     if mistakes:
         return EXIT_INPUT
+    for sentence in overruled(load_case(case)):
+        talk.warn(sentence)
     talk.say(f"{case}: no mistakes")
     return 0

@@ -16,6 +16,7 @@ from .context import context
 from .environment import TemplateFailed, environment, render
 
 ELEMENTS_A_WAVE = 7.5  # of quadratic ones: the frequencies are right to 0.4 %
+NEAR_ZERO = 1e-4  # of a variable's span: below, steps are shares of this
 STEP = 1e-4  # of a variable, to see which numbers of the deck it moves and how fast
 
 Tangents = dict[str, list[tuple[str, int, int, float]]]
@@ -88,16 +89,24 @@ class Decks:
         return result
 
     def _beside(self, name: str, side: int) -> tuple[LoadedCase, float]:
-        """The case a small step to one side of a variable, or at it where that side is none."""
+        """The case a small step to one side of a variable, or at it where that side is none.
+
+        The step is a share of the value or, where that is next to nothing beside the variable's
+        span, of the span, as the deck's digits would not show it else; it leads to no other sign.
+        """
         value = self.values[name]
         variable = self.case.case.variables.get(name)
-        span = 1.0
+        span, least = 1.0, 0.0
         if variable:
             span = max(abs(variable.lower), abs(variable.upper))
+            least = 0.0 if variable.scale == "log" else NEAR_ZERO * span
         elif name.startswith("effects."):
             effect = catalogue()[name.removeprefix("effects.")]
             span = max(abs(effect.low), abs(effect.high))
-        moved = value + side * STEP * (abs(value) or span)
+            least = NEAR_ZERO * span
+        moved = value + side * STEP * (max(abs(value), least) if value else span)
+        if moved * value < 0:
+            moved = value
         try:
             return with_values(self.case, {name: moved}), moved
         except ValueError:

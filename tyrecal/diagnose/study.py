@@ -8,6 +8,7 @@ from math import exp
 from pathlib import Path
 
 from ..case import LoadedCase
+from ..case.mistakes import suggestion
 from ..effects import catalogue
 from ..evaluate.door import Door
 from .diagnosis import Diagnosis, diagnose
@@ -106,8 +107,14 @@ def _under_load(
 
 
 def spans_of(door: Door, ids: Sequence[str] | None = None) -> tuple[dict[str, Span], list[str]]:
-    """Effects that the door's solver can express, and ids of those that it cannot."""
+    """Effects that the door's solver can express, and ids of those that it cannot.
+
+    Raises ValueError where one of ``ids`` is no effect.
+    """
     able, unable = {}, []
+    for id in ids or ():
+        if id not in catalogue():
+            raise ValueError(f"'{id}' is not one of the effects{suggestion(id, catalogue())}")
     for id, effect in catalogue().items():
         if ids is not None and id not in ids:
             continue

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..case import LoadedCase
+from ..case import LoadedCase, with_values
 from ..evaluate.door import Counts, Door
 from ..evaluate.executor import WorkerLost, executor, in_order
 from ..evaluate.failure import EvaluationFailed
@@ -34,7 +34,7 @@ Notify = Callable[[int, Mapping[str, float], Point | EvaluationFailed], None]
 
 
 class NothingToFit(ValueError):
-    """The case has no targets or fewer than free variables, or no variable is left free."""
+    """The case has no targets that count, or fewer than free variables, or no variable is free."""
 
 
 @dataclass
@@ -84,6 +84,8 @@ def calibrate(
             "the case has no targets: there is nothing to fit to; add measured modes to it, as in"
             " targets: {modes: [{c: 2, m: 0, frequency_Hz: 79.5}, ...]}"
         )
+    if not problem.scale.any():
+        raise NothingToFit("every target has the weight 0: there is nothing to fit to")
     if not problem.variables:
         raise NothingToFit("no variable is free: there is nothing to fit")
     if len(problem.scale) < len(problem.variables):
@@ -233,8 +235,8 @@ def _result(
         variables[v.name] = {
             "initial": initial.values[v.name],
             "value": value,
-            "lower": v.lower,
-            "upper": v.upper,
+            "lower": problem.case.case.variables[v.name].lower,
+            "upper": problem.case.case.variables[v.name].upper,
             "standard_error": known.standard_errors[i],
             "at_bound": at_bound,
         }
@@ -270,7 +272,7 @@ def _result(
     return {
         "format": 1,
         "method": method,
-        "pressure_kPa": problem.case.case.pressure_kPa,
+        "pressure_kPa": with_values(problem.case, point.values).case.pressure_kPa,
         "mass_kg": point.mass_kg,
         "objective_Hz": point.objective,
         "objective_unit": objective_unit(problem.case),

@@ -19,7 +19,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..case import LoadedCase, start_values
+from ..case import LoadedCase
+from ..case.calibration import Variable as CaseVariable
+from ..deck.write import NEAR_ZERO
 from ..evaluate.door import Door, Question
 from ..evaluate.failure import DeckRefused, EvaluationFailed, SolverUnavailable
 from ..evaluate.results import Evaluation
@@ -138,11 +140,8 @@ class Problem:
     ):
         self.case, self.door, self.notify, self.jobs = case, door, notify, jobs
         self.fixed = dict(fixed or {})
-        starts = start_values(case)
         self.variables = [
-            Variable(name, starts[name], v.lower, v.upper, v.scale == "log")
-            for name, v in case.case.variables.items()
-            if name not in self.fixed
+            _variable(name, v) for name, v in case.case.variables.items() if name not in self.fixed
         ]
         self.targets, self.footprint = read_targets(case), read_footprint_targets(case)
         modal, pressed = ([t.scale for t in each] for each in (self.targets, self.footprint))
@@ -268,6 +267,15 @@ class Problem:
             if not waiting:
                 break
         return [answers[i] for i in range(len(wanted))]
+
+
+def _variable(name: str, v: CaseVariable) -> Variable:
+    """A variable as the optimiser has it: next to 0 where it moves effects and a bound is 0, as
+    most have no slope there, where their keywords leave the deck."""
+    effect = all(path.startswith("effects.") for path in v.sets)
+    least = NEAR_ZERO * max(abs(v.lower), abs(v.upper)) if effect else 0.0
+    lower, upper = v.lower or least, v.upper or -least
+    return Variable(name, v.start, lower, upper, v.scale == "log")
 
 
 def objective_unit(case: LoadedCase) -> str:

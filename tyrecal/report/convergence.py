@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter, NullLocator
 
 from .figure import COLOURS, GREY, MARKERS, in_house_style, new_figure, save
 
@@ -62,7 +62,10 @@ def draw_convergence(path: Path, history: Sequence[Mapping[str, Any]], unit: str
         axes.legend(frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))
         axes.grid(True, which="major", color="0.9", lw=0.6)
         low, high = axes.get_ylim()
-        if high / low < 100:  # powers of ten alone would leave the axis without numbers
+        if high / low < 5:  # few or none of these would lie in so short a range
+            axes.yaxis.set_major_locator(MaxNLocator(5))
+            axes.yaxis.set_minor_locator(NullLocator())
+        elif high / low < 100:  # powers of ten alone would leave the axis without numbers
             axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 3, 5)))
         axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         axes.yaxis.set_minor_formatter(NullFormatter())

@@ -101,7 +101,8 @@ def draw_curves(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
         left.plot(load, [1e4 * row["area_m2"] for row in own], **style)
         right.plot(load, [1e3 * row["deflection_m"] for row in own], **style)
     for axes, what in ((left, "contact area, cm²"), (right, "deflection, mm")):
-        axes.set(xlabel="load, kN", ylabel=what, xlim=(0, None), ylim=(0, None))
+        top = 1.05 * axes.dataLim.ymax  # of one load or of equal designs no mark is cut
+        axes.set(xlabel="load, kN", ylabel=what, xlim=(0, None), ylim=(0, top))
         axes.grid(True, color="0.92", lw=0.6)
         axes.tick_params(color=GREY)
     left.legend(frameon=False, loc="upper left")

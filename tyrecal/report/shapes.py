@@ -61,12 +61,13 @@ def draw_mode(path: Path, mode: Mode, mesh: SectionMesh, scale: float | None = N
 @in_house_style
 def draw_modes_overview(path: Path, modes: Sequence[Mode], mesh: SectionMesh) -> None:
     """Draw up to nine modes, lowest first, in perspective on one sheet. Raises NoSectionShape."""
-    figure = new_figure(9.0, 9.7, None)
     lowest = sorted(modes, key=lambda mode: mode.frequency_Hz)[:9]
+    height = 0.1 + 3.2 * -(-len(lowest) // 3)
+    figure = new_figure(9.0, height, None)
     for k, mode in enumerate(lowest):
-        x, y = 1.5 + 3 * (k % 3), 7.9 - 3.2 * (k // 3)
+        x, y = 1.5 + 3 * (k % 3), height - 1.8 - 3.2 * (k // 3)
         _view(figure, _surface(mode, mesh, None), (x, y), 1.45, *PERSPECTIVE)
-        figure.text(x / 9.0, (y + 1.38) / 9.7, title(mode).replace(" - ", "\n"), ha="center")
+        figure.text(x / 9.0, (y + 1.38) / height, title(mode).replace(" - ", "\n"), ha="center")
     save(figure, path)
 
 

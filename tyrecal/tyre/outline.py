@@ -9,7 +9,7 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from .from_size import LINES, STATIONS
-from .section import Section, SectionError, millimetres
+from .section import Section, SectionError, millimetres, refuse_separators
 
 Array = np.ndarray
 DENSE = 600  # points of a curve between which it is straight
@@ -25,6 +25,7 @@ def read_outline(path: Path) -> dict[str, Array]:
     curves: dict[str, list[list[float]]] = {"outer": [], "inner": []}
     with path.open(newline="", encoding="utf-8-sig") as file:
         reader = csv.DictReader(file)
+        refuse_separators(reader.fieldnames or [])
         for column in ("curve", "r_mm", "z_mm"):
             if column not in (reader.fieldnames or []):
                 raise SectionError(f"column '{column}' is missing", 1)

@@ -139,6 +139,12 @@ def from_gauges(line: Array, gauges: Array) -> Array:
     return points
 
 
+def refuse_separators(header: Sequence[str]) -> None:
+    """Raises SectionError where columns are not separated by commas, as some spreadsheets do."""
+    if len(header) == 1 and (";" in header[0] or "\t" in header[0]):
+        raise SectionError("columns must be separated by commas, and numbers have points", 1)
+
+
 def millimetres(row: dict[str, str], column: str, line: int) -> float:
     """The number in a column, NaN where it is empty. Raises SectionError."""
     text = (row[column] or "").strip()

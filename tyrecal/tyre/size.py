@@ -85,13 +85,14 @@ class TyreSize:
 def parse_size(text: str) -> TyreSize:
     """A size code in any case, with blanks or a service description. Raises UnknownSize."""
     text = " ".join(text.split())[:60]
-    code = text.upper().replace("×", "X")
+    code = re.sub(r"(?<=\d)XL\b", " XL", text.upper().replace("×", "X"))
+    code = re.sub(r"^(LT.+R ?\d{2}) ?(?=[B-F]\b)", r"\1/", code)  # LT245/75R16E: load range E
     found = METRIC.match(code) or FLOTATION.match(code)
     if not found:
         raise UnknownSize(f"'{text}' is not a tyre size that is known{_hint(code)}")
     parts = found.groupdict()
     name = found.group(0).replace(" ", "")
-    service = re.sub(r"LOAD RANGE ?|/(?=[B-H]$)|LR ", "LR", code[found.end() :])
+    service = re.sub(r"LOAD RANGE ?|/(?=[B-H]\b)|LR ", "LR", code[found.end() :])
     service = re.sub(r"EXTRA LOAD|REINFORCED|REINF\b", "XL", service)
     for word in service.split():
         if not SERVICE.fullmatch(word):

@@ -97,6 +97,8 @@ def read_results(folder: Path) -> Results:
     if not any((*studies, found.diagnosis)):
         run = found.run
         last = "" if run.finished else f": its last run, 'tyrecal {run.command}', did not finish"
+        if (folder / "batch.json").exists():
+            last = "; it is a batch's: give the folders of its cases, which stand in it"
         raise BadResults(f"'{folder}' holds no results of fit, modes, sweep-pressure, footprint or"
                          f" diagnose{last}")  # fmt: skip
     return found
