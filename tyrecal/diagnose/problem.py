@@ -17,17 +17,19 @@ Array = np.ndarray
 
 @dataclass(frozen=True)
 class Change:
-    """What was switched in a toggled run: effect ``id`` set to ``value``, or times it."""
+    """What was switched in a toggled run: effect ``id`` set to ``value``, or times it; base: what
+    the case has of it, which the parameter counts from."""
 
     id: str
     value: float
     times: bool = False
+    base: float = 0.0
 
     def applied(self, effects: Mapping[str, Array], count: int) -> dict[str, Array]:
         """Parameters (count,) of effects in the toggled run."""
         old = effects.get(self.id, np.zeros(count))
-        new = old * self.value if self.times else np.full(count, self.value)
-        return {**effects, self.id: new}
+        new = (self.base + old) * self.value if self.times else np.full(count, self.value)
+        return {**effects, self.id: new - self.base}
 
 
 @dataclass(frozen=True)

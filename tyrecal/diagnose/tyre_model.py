@@ -50,6 +50,7 @@ class TyreModel:
             )
         self.rows, self.found, self.jobs = list(rows), found, jobs
         self.spans: Mapping[str, Span] = spans
+        self._present = case.case.effects
         self.pressures = sorted({p for label, p in rows if label}) or [case.case.pressure_kPa]
         labels = sorted({label for label, _ in rows if label}, key=str)
         case = _asked_for(case, labels)
@@ -120,7 +121,8 @@ class TyreModel:
     def _has_slopes(self, id: str, span: Span) -> bool:
         """Whether the solver gives slopes with an effect."""
         try:
-            return self.door.has_gradients_at({EFFECTS + id: span.high or span.low})
+            far = span.base + span.high or span.base + span.low
+            return self.door.has_gradients_at({EFFECTS + id: far})
         except ValueError:  # the case cannot have that much of it
             return True
 
@@ -135,7 +137,8 @@ class TyreModel:
         """Distinct points, slopes with those that have them."""
         wanted = []
         for point, pressure in product(points, self.pressures):
-            effects = {EFFECTS + id: float(e) for id, e in point.effects.items()}
+            effects = {EFFECTS + id: self._present.get(id, 0.0) + float(e)
+                       for id, e in point.effects.items()}  # fmt: skip
             known = dict(self._plain) if point.constants else {}
             names = () if self._is_bare(point) else (*self.variables, *known)
             design = {**self.values(point.x), **known, "pressure_kPa": pressure, **effects}

@@ -35,7 +35,7 @@ def sources(case: LoadedCase) -> tuple[list[Source], bool]:
     stated = case.case.uncertainties
     if not stated:
         return list(_assumed(case)), True
-    result, taken = [], _calibrated(case)
+    result, taken = [], calibrated(case)
     for name, each in stated.items():
         signs = each.signs or [1] * len(each.sets)
         steps = {
@@ -51,7 +51,7 @@ def sources(case: LoadedCase) -> tuple[list[Source], bool]:
 
 
 def _assumed(case: LoadedCase) -> Iterator[Source]:
-    taken = _calibrated(case)
+    taken = calibrated(case)
 
     def source(name: str, path: str, percent: float = 0.0, absolute: float = 0.0) -> Source | None:
         if path in taken:
@@ -78,14 +78,15 @@ def _assumed(case: LoadedCase) -> Iterator[Source]:
     yield from (each for each in found if each)
 
 
-def _calibrated(case: LoadedCase) -> set[str]:
+def calibrated(case: LoadedCase) -> set[str]:
+    """Paths that the design variables set."""
     return {path for variable in case.case.variables.values() for path in variable.sets}
 
 
 def _value(case: LoadedCase, path: str) -> float:
     """The number at a dotted path; 0 for an effect that the case does not name."""
     if path.startswith(EFFECTS):
-        return 0.0
+        return case.case.effects.get(path.removeprefix(EFFECTS), 0.0)
     here: object = case.case
     for key in find(case.case, path):
         here = getattr(here, str(key)) if isinstance(here, BaseModel) else here[key]  # type: ignore[index]
