@@ -12,13 +12,15 @@ import pytest
 from tyrecal.case import with_values
 from tyrecal.diagnose.expansion import expand
 from tyrecal.diagnose.measurements import BadMeasurements
-from tyrecal.diagnose.problem import Change
+from tyrecal.diagnose.observations import Observations, Row
+from tyrecal.diagnose.problem import Change, Problem
 from tyrecal.diagnose.response import Answer, Point
 from tyrecal.diagnose.result import result
 from tyrecal.diagnose.study import BadChange, spans_of, study
 from tyrecal.diagnose.tyre_model import TyreModel
 from tyrecal.diagnose.uncertainties import sources
 from tyrecal.evaluate.door import Door
+from tyrecal.evaluate.failure import DeckRefused
 from tyrecal.report.diagnosis import page
 
 from .test_tyre_model import CASE, EFFECTS, MODEL, ROWS, X, asked, written
@@ -40,6 +42,31 @@ def test_parameters_count_from_what_the_case_has() -> None:
     more, _, _ = nodes.at(np.array([1.2 - HELD]))
     wanted = asked(Point(X, {"bead_filler": 1.2})).eta - as_it_is.eta
     assert more[0] == pytest.approx(wanted, abs=5e-4)
+
+
+def test_splits_count_from_what_the_case_has() -> None:
+    """A mass on the tread splits pairs by itself, a wider rim does not: neither is added twice."""
+    rows = ROWS[:-1]
+    case = with_values(CASE, {"effects.point_mass": 0.04})
+    door = Door(case)
+    spans, _ = spans_of(door, ("point_mass", "rim_width"))
+    own = TyreModel(case, door, rows, [], spans)
+    none = np.full(len(rows), np.nan)
+    told = tuple(Row("frequency_Hz", label, p) for label, p in rows)
+    observations = Observations(told, np.zeros(len(rows)), none, 0.0, none, none)
+    problem = Problem(observations, expand(own, X), spans, np.arange(len(rows)), X, X)
+    for id, e in (("point_mass", 0.03), ("point_mass", -0.04), ("rim_width", 5e-3)):
+        (there,) = own.answers([Point(X, {id: e})])
+        assert isinstance(there, Answer)
+        _, _, split = problem.added({id: np.array([e])}, 1)
+        assert split[0] == pytest.approx(abs(there.split), abs=5e-5)
+    assert split.max() > 3e-3
+
+
+def test_a_splice_in_the_case_is_refused_in_words_that_help() -> None:
+    case = with_values(CASE, {"effects.stiffness_splice": 0.5})
+    with pytest.raises(DeckRefused, match=r"\(a splice\) .* take it out of the case"):
+        TyreModel(case, Door(case), ROWS, [], {})
 
 
 def test_a_source_of_error_steps_from_what_the_case_has() -> None:

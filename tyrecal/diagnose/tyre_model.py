@@ -43,6 +43,11 @@ class TyreModel:
         spans: Mapping[str, Span],
         jobs: int = 1,
     ):
+        if not door.has_gradients and "gradients" in door.solver.capabilities:
+            raise DeckRefused(
+                "with what the case has in it (a splice) the solver gives no exact slopes, which a"
+                " diagnosis needs: take it out of the case, the diagnosis weighs it as an effect"
+            )
         if not door.has_gradients:
             raise DeckRefused(
                 f"solver '{door.solver.name}' gives no exact slopes, which a diagnosis needs:"
