@@ -10,9 +10,11 @@ from pydantic import BaseModel
 from ..case import LoadedCase
 from ..case.checks import find
 from ..case.schema import Cord, Rubber
+from ..effects import catalogue
 
 DENSITY, MODULUS, SPACING, GAUGE, ANGLE_deg, PRESSURE_kPa = 1.5, 3.0, 1.0, 3.0, 1.0, 1.0
 EFFECTS = "effects."
+UNITS = {"kPa": "kPa", "Pa": "Pa", "deg": "degrees", "m": "m", "m2": "m2", "m3": "kg/m3"}  # of keys
 
 
 @dataclass(frozen=True)
@@ -45,7 +47,11 @@ def sources(case: LoadedCase) -> tuple[list[Source], bool]:
         }
         if not steps:
             continue
-        size = f"{each.percent:g} %" if each.percent else f"{each.absolute:g}"
+        size = (
+            f"{each.percent:g} %"
+            if each.percent
+            else f"{each.absolute:g}{_unit(next(iter(steps)))}"
+        )
         result.append(Source(name, steps, f"{name.replace('_', ' ')} {size}"))
     return result, False
 
@@ -57,7 +63,7 @@ def _assumed(case: LoadedCase) -> Iterator[Source]:
         if path in taken:
             return None
         step = absolute or _value(case, path) * percent / 100
-        size = f"{percent:g} %" if percent else f"{absolute:g}"
+        size = f"{percent:g} %" if percent else f"{absolute:g}{_unit(path)}"
         return Source(name, {path: step}, f"{name.replace('_', ' ')} {size}")
 
     found = [source("pressure", "pressure_kPa", absolute=PRESSURE_kPa)]
@@ -76,6 +82,15 @@ def _assumed(case: LoadedCase) -> Iterator[Source]:
         path = f"section.gauges.{i}.factor"
         found.append(source(f"gauge_{'_'.join(gauge.between)}_{i}", path, GAUGE))
     yield from (each for each in found if each)
+
+
+def _unit(path: str) -> str:
+    """The unit of the number at a dotted path, with a blank before it; "" where it has none."""
+    if path.startswith(EFFECTS):
+        unit = catalogue()[path.removeprefix(EFFECTS)].unit
+    else:
+        unit = UNITS.get(path.rpartition("_")[2], "")
+    return f" {unit}" if unit else ""
 
 
 def calibrated(case: LoadedCase) -> set[str]:

@@ -122,7 +122,9 @@ def _gap(d: Diagnosis) -> Iterator[str]:
     g = d.gap
     seen = "larger than" if g.p_value < 0.05 else "within"
     yield (
-        f"After calibration {g.rms_percent:.2f} % (rms) is left. That is {seen} what repeatability,"
+        f"After calibration {g.rms_percent:.2f} % (rms) is left (weighed by all that is uncertain,"
+        " while `tyrecal fit` knows the scatter only and can come nearer, by variables that are"
+        f" further off). That is {seen} what repeatability,"
         f" the model's own form and the constants that nobody calibrates explain: chi2"
         f" {g.chi2:.1f} for {g.freedom} degrees of freedom, p = {g.p_value:.2g}. (A figure for"
         " orientation: it is weak against a single effect, so the verdict does not rest on it.)"
