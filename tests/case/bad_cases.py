@@ -305,6 +305,20 @@ _edit(
     "sets: [effects.rim_widht]",
 )
 _edit(
+    "percent_of_an_effect",
+    "uncertainties.rim_width.sets.0",
+    "state 'absolute'",
+    "sets: [effects.rim_width], absolute: 1.0e-3",
+    "sets: [effects.rim_width], percent: 3.0",
+)
+_edit(
+    "percent_of_nothing",
+    "uncertainties.carcass_angle.sets.0",
+    "state 'absolute'",
+    "[rebar_layers.carcass.angle_deg], absolute: 1.0",
+    "[rebar_layers.carcass.angle_deg], percent: 3.0",
+)
+_edit(
     "too_few_signs",
     "uncertainties.pressure.signs",
     "must have 1 entries",

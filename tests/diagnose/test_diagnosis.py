@@ -14,7 +14,9 @@ from tyrecal.diagnose.regions import Region
 from tyrecal.diagnose.response import Answer, Point
 from tyrecal.diagnose.result import result
 from tyrecal.diagnose.shrinkage import held_out, shrink
+from tyrecal.diagnose.study import Study
 from tyrecal.modes.mode import Label
+from tyrecal.report.diagnosis import page
 
 from .toy import LABELS, Toy, drawn, problem
 
@@ -139,6 +141,19 @@ def test_the_section_map_finds_the_part_and_joins_what_looks_alike() -> None:
     (nothing,) = [p for p in found.parts if p.region == "nowhere"]
     assert nothing.evidence == 0 and nothing.stiffness_sigma == pytest.approx(20)
     assert 2 <= found.effective_rank <= 6
+
+
+def test_a_pair_is_told_with_both_sizes() -> None:
+    d = diagnosed(Toy(effects=3), {"e0": 0.8, "e1": 0.6}, 7)
+    told = result(d)
+    assert told["effect"] == "e0+e1" and set(told["parameters"]) == {"e0", "e1"}
+    for id, truth in (("e0", 0.8), ("e1", 0.6)):
+        size = told["parameters"][id]
+        assert size["low"] < truth < size["high"]
+    words = page(Study(d, (), False, (), (), None), "tyre", "a.csv")  # type: ignore[arg-type]
+    for size in told["parameters"].values():
+        number = f"{size['value']:.3g}"
+        assert f"is {number}, 90 %" in words and f"{number} ({size['low']:.3g}" in words
 
 
 def test_the_result_is_plain_data_with_the_promised_keys() -> None:

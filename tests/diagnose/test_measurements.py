@@ -63,7 +63,7 @@ def test_every_mistake_is_told_at_once(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("header", ["c,m,kind\n", HEADER.replace("sigma", "std"), ""])
 def test_wrong_columns(tmp_path: Path, header: str) -> None:
-    with pytest.raises(BadMeasurements, match="columns must be"):
+    with pytest.raises(BadMeasurements, match=r"columns must be .* measured import"):
         read(tmp_path, GOOD, header=header)
 
 
@@ -123,3 +123,19 @@ def test_what_is_not_used_is_said(tmp_path: Path) -> None:
     found = observe(run, [], [run])  # of the first run it is compared, not left out
     assert len(found.rows) == 2 and len(found.left_out) == 2
     assert "contact_area_m2" in found.left_out[0] and "under load" in found.left_out[1]
+    assert all(words.startswith("measured.csv, line ") for words in found.left_out)
+
+
+def test_repeats_that_cannot_be_used_are_said(tmp_path: Path) -> None:
+    both = [GOOD, "frequency_Hz,3,0,,,240,0,98,0.2", "frequency_Hz,4,0,,,240,0,116,0.2"]
+    again = ["frequency_Hz,3,0,,,240,0,98.4,0.2", "frequency_Hz,4,0,,,240,0,116.3,0.2",
+             "frequency_Hz,1,0,,,240,0,58,0.2"]  # fmt: skip
+    found = observe(read(tmp_path, *both), [read(tmp_path, *again)])
+    assert len(found.rows) == 3 and found.y[0] == pytest.approx(np.log(79.5))
+    assert found.left_out == (
+        "repeats of [2,0] at 240 kPa: not in every file, the first one's value and sigma hold",
+        "[1,0] at 240 kPa: in repeats only",
+    )
+    alone = observe(read(tmp_path, *both), [read(tmp_path, again[0])])
+    assert any(words.startswith("all repeats: fewer than two") for words in alone.left_out)
+    assert not observe(read(tmp_path, *both), [read(tmp_path, *both)]).left_out

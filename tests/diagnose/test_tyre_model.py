@@ -210,6 +210,10 @@ def test_sources_of_error_are_those_of_the_case_or_assumed_and_never_calibrated(
     assert tied.steps == pytest.approx({
         "rebar_layers.belt_1.spacing_m": 1.16e-5, "rebar_layers.belt_2.spacing_m": 1.16e-5,
     })  # fmt: skip
+    words = {s.name: s.words for s in stated}
+    assert words["pressure"] == "pressure 1 kPa" and words["rim_width"] == "rim width 0.001 m"
+    assert words["belt_1_angle"] == "belt 1 angle 1 degrees"
+    assert words["sidewall_gauge"] == "sidewall gauge 0.03"
     bare = replace(CASE, case=CASE.case.model_copy(update={"uncertainties": {}}))
     found, assumed = sources(bare)
     assert assumed and "rubber_density" in {s.name for s in found}

@@ -64,6 +64,23 @@ def test_a_doublet_is_one_value_where_a_run_saw_only_one() -> None:
     assert (row.member, row.value) == ("", pytest.approx(66.25))
 
 
+def test_a_lone_member_stays_one() -> None:
+    """A diagnosis gives it half the usual split more, so it must not pass for the pair's value."""
+    (row,) = combined([value(66.0, "1", member="1"), value(66.2, "2", member="1")])
+    assert (row.member, row.value) == ("1", pytest.approx(66.1))
+    (row,) = combined([value(66.0, "1", member="2", sigma=0.1)])
+    assert row.member == "2"
+    (row,) = combined([value(66.0, "1", member="1"), value(66.4, "2", member="2")])
+    assert row.member == ""
+
+
+@pytest.mark.parametrize("runs", [[value(66.0, "1", sigma=40.0)],
+                                  [value(30.0, "1"), value(90.0, "2")]])  # fmt: skip
+def test_a_sigma_that_no_fit_would_read_is_refused(runs: list[Value]) -> None:
+    with pytest.raises(BadMeasuredData, match=r"sigma of \[1,0\] comes to .* more than 20%"):
+        combined(runs)
+
+
 def test_the_csv_is_sorted_and_whole() -> None:
     rows = combined([value(70.0, "1", LABELS[2], sigma=0.1), value(66.0, "1", sigma=0.123456)])
     assert measurements_csv(rows).splitlines() == [

@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.table import Table
 
 from tyrecal.report.table import fit_csv, fit_table, modes_table
-from tyrecal.report.words import motion
+from tyrecal.report.words import fit_doubts, motion
 
 # c, m, kind, initial, optimised, target: Table 2 of Bekakos et al. 2016
 TABLE_2 = [
@@ -118,3 +118,13 @@ def test_words(label, words):
 def test_tables_load_no_drawing_packages():
     code = "import sys, tyrecal.report.table; sys.exit(not {'matplotlib', 'meshio'}.isdisjoint(sys.modules))"  # noqa: E501
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+@pytest.mark.parametrize(("off", "said"), [((-80.0, -70.0, 2.0), True), ((-80.0, 3.0, 2.0), False)])
+def test_a_fit_that_is_far_off_most_modes_asks_for_the_unit(
+    off: tuple[float, ...], said: bool
+) -> None:
+    modes = [{"deviation_percent": percent} for percent in off]
+    result = {"moved": True, "converged": True, "variables": {}, "failed_evaluations": 0,
+              "label_margin": 1.0, "modes": modes, "singular_values": [1.0]}  # fmt: skip
+    assert any("in Hz" in doubt for doubt in fit_doubts(result)) is said

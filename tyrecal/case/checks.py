@@ -132,15 +132,18 @@ def _variables(data: Mapping[str, Any]) -> Problems:
 
 
 def _uncertainties(data: Mapping[str, Any]) -> Problems:
-    """Sources of error name numbers that exist."""
-    for _, here, path, keys, nowhere in _paths(data, "uncertainties"):
-        if path.startswith("effects."):
-            if (id := path.removeprefix("effects.")) not in IDS:
-                yield here, f"'{id}' is not one of the effects{suggestion(id, IDS)}"
+    """Sources of error name numbers that exist, and make a difference to them."""
+    data = {**data, "effects": {**dict.fromkeys(IDS, 0.0), **table(data, "effects")}}
+    for name, here, path, keys, nowhere in _paths(data, "uncertainties"):
+        id = path.removeprefix("effects.")
+        if path.startswith("effects.") and id not in IDS:
+            yield here, f"'{id}' is not one of the effects{suggestion(id, IDS)}"
         elif nowhere:
             yield here, nowhere
         elif keys and (keys[0] in FIXED or not _is_number(at(data, keys))):
             yield here, "leads to no number of the tyre"
+        elif keys and at(data, keys) == 0 and number(data["uncertainties"][name], "percent"):
+            yield here, "is 0, of which per cent are nothing: state 'absolute'"
 
 
 def _paths(data: Mapping[str, Any], part: str) -> Iterator[tuple[str, Keys, str, Keys, str]]:

@@ -60,6 +60,8 @@ def command(
     """
     talk = study.talk
     if add:
+        if assignments or measured:
+            raise click.UsageError("--add writes a case and nothing else: no --set, no --measured")
         path = _added(case, add, study.output)
         talk.result({"case": str(path)})
         talk.say(f"{path} has the effect in it; 'tyrecal fit {path}' calibrates it")
@@ -80,6 +82,8 @@ def command(
         if id not in catalogue():
             raise click.UsageError(f"'{id}': no such effect, only {', '.join(catalogue())}")
     considered = [id for id in effects or catalogue() if id not in without]
+    if not considered:
+        raise click.UsageError("--without leaves no effect to consider")
     changes = [(path, parse_change(text)) for path, text in toggled]
     door = study.door(loaded)
     run = study.run(case, "diagnose", door)

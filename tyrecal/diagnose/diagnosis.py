@@ -62,14 +62,16 @@ class Diagnosis:
         keys = [h.key for h in self.hypotheses if h.values]
         return max(keys, key=lambda key: self.probabilities[key], default=None)
 
-    def parameter(self, key: str) -> dict[str, Any]:
-        """Mean and 90 % interval of the first effect of ``key``, with its unit."""
-        hypothesis, id = self.hypothesis(key), key.split("+")[0]
+    def parameter(self, key: str, id: str = "") -> dict[str, Any]:
+        """Mean and 90 % interval of the effect ``id`` of ``key``, the first by default, with its
+        unit; what the case has of it is counted in."""
+        hypothesis, id = self.hypothesis(key), id or key.split("+")[0]
+        span = self.problem.spans[id]
         return {
-            "value": hypothesis.mean()[id],
-            "low": hypothesis.quantile(id, 0.05),
-            "high": hypothesis.quantile(id, 0.95),
-            "unit": self.problem.spans[id].unit,
+            "value": span.base + hypothesis.mean()[id],
+            "low": span.base + hypothesis.quantile(id, 0.05),
+            "high": span.base + hypothesis.quantile(id, 0.95),
+            "unit": span.unit,
         }
 
 

@@ -133,9 +133,9 @@ def node_values(span: Span) -> Array:
     """Where an effect is asked: parameters other than 0, rising."""
     if span.low < 0 < span.high:
         sides = [-f * -span.low for f in reversed(TWO_SIDED)] + [f * span.high for f in TWO_SIDED]
-        return np.array(sides)
+        return np.sort([*sides, *span.also])
     far = span.high if abs(span.high) >= abs(span.low) else span.low
-    return np.sort(far * np.array(ONE_SIDED))
+    return np.sort([*(far * np.array(ONE_SIDED)), *span.also])
 
 
 def anchored(
@@ -168,7 +168,8 @@ def _nodes(
             if not isinstance(answer, Answer):
                 break
             rows[e] = answer.eta - plain.eta, answer.jacobian - plain.jacobian, answer.split
-            reach[0 if side < 0 else 1] = e
+            if span.low <= e <= span.high:
+                reach[0 if side < 0 else 1] = e
     if len(rows) == 1:
         return None
     low, high = sorted(reach)

@@ -44,6 +44,12 @@ class Reading:
     value: float
     sigma: float
     line: int
+    file: str = ""
+
+    @property
+    def place(self) -> str:
+        """Where it stands, in words."""
+        return f"{self.file}, line {self.line}" if self.file else f"line {self.line}"
 
 
 def read_measurements(path: Path) -> list[Reading]:
@@ -61,7 +67,10 @@ def read_measurements(path: Path) -> list[Reading]:
         raise BadMeasurements(f"{path}, line {rows.line_num}: not CSV: {error}") from None
     missing = [name for name in COLUMNS if name not in header]
     if missing or len(header) != len(COLUMNS):
-        raise BadMeasurements(f"{path}, line 1: the columns must be {','.join(COLUMNS)}")
+        raise BadMeasurements(
+            f"{path}, line 1: the columns must be {','.join(COLUMNS)}, with commas between;"
+            " 'tyrecal measured import' makes such a file of other tables"
+        )
     if not lines:
         raise BadMeasurements(f"{path}: there is no measurement in it")
     if len(lines) > MOST_ROWS:
@@ -75,7 +84,7 @@ def read_measurements(path: Path) -> list[Reading]:
         found = list(_mistakes(cells))
         mistakes += [f"{path}, line {number}: {mistake}" for mistake in found]
         if not found:
-            readings.append(_reading(cells, number))
+            readings.append(_reading(cells, number, path.name))
     if not mistakes:
         mistakes = [f"{path}, line {n}: {words}" for n, words in _together(readings)]
     if mistakes:
@@ -137,7 +146,7 @@ def _mode_mistakes(cells: dict[str, str], loaded: bool) -> Iterator[str]:
         yield f"member is '{member}', must be {words} here"
 
 
-def _reading(cells: dict[str, str], line: int) -> Reading:
+def _reading(cells: dict[str, str], line: int, file: str) -> Reading:
     label = None
     if cells["quantity"] == "frequency_Hz":
         label = Label(int(cells["c"]), int(cells["m"]), cells["kind"] or None)
@@ -150,6 +159,7 @@ def _reading(cells: dict[str, str], line: int) -> Reading:
         float(cells["value"]),
         float(cells["sigma"]),
         line,
+        file,
     )
 
 

@@ -129,7 +129,8 @@ def _switched(problem: Problem, id: str) -> Problem:
     rows = (*o.rows, *(replace(row, run=run) for row in o.only(first).rows))
     both = Observations(rows, join(o.y), join(o.scatter), o.common, join(o.split),
                         join(o.split_scatter))  # fmt: skip
-    changes = (*problem.changes, Change(id, 0.0))
+    base = problem.spans[id].base if id in problem.spans else 0.0
+    changes = (*problem.changes, Change(id, 0.0, base=base))
     return replace(problem, observations=both, places=join(problem.places), changes=changes)
 
 

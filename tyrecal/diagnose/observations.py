@@ -6,7 +6,7 @@ s = |ln f_a - ln f_b|, whose scatter is tau^2 = s_a^2 + s_b^2; s_a, s_b are rela
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -73,6 +73,7 @@ def observe(
     left_out: list[str] = []
     unloaded = [[r for r in run if not r.load_N] for run in (readings, *repeats)]
     used = [_used(run, left_out) for run in (*unloaded, *toggled)]
+    left_out += _unrepeated(used[: 1 + len(repeats)])
     scattered, common = _scatter(used[: 1 + len(repeats)])
     runs = [scattered, *(_stated(run) for run in used[1 + len(repeats) :])]
     rows, numbers = [], []
@@ -92,7 +93,7 @@ def _used(run: Sequence[Reading], left_out: list[str]) -> dict[tuple[str, ...], 
     for each in run:
         if each.load_N or each.quantity not in ("frequency_Hz", "mass_kg"):
             what = f"{each.label} under load" if each.load_N and each.label else each.quantity
-            left_out.append(f"line {each.line}, {what}: not used by the diagnosis")
+            left_out.append(f"{each.place}, {what}: not used by the diagnosis")
             continue
         pressure = each.pressure_kPa if each.label else 0.0
         found[each.quantity, each.label, pressure, each.member] = each
@@ -101,6 +102,23 @@ def _used(run: Sequence[Reading], left_out: list[str]) -> dict[tuple[str, ...], 
         if twin in found and found[twin].value < found[key].value:
             found[key], found[twin] = found[twin], found[key]
     return found
+
+
+def _unrepeated(runs: Sequence[dict]) -> Iterator[str]:
+    """What `_scatter` cannot use of repeats, a value of which has to stand in every file."""
+    keys = dict.fromkeys(key for run in runs for key in run)
+    some = [key for key in keys if not all(key in run for run in runs)]
+    first, later = [k for k in some if k in runs[0]], [k for k in some if k not in runs[0]]
+    if first:
+        yield f"repeats of {_names(first)}: not in every file, the first one's value and sigma hold"
+    if later:
+        yield f"{_names(later)}: in repeats only"
+    if len(runs) > 1 and len(keys) - len(some) < 2:
+        yield "all repeats: fewer than two values stand in every file"
+
+
+def _names(keys: Sequence[Key]) -> str:
+    return ", ".join(dict.fromkeys(str(Row(key[0], key[1], key[2])) for key in keys))
 
 
 def _stated(run: dict) -> dict:

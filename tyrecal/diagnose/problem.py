@@ -17,17 +17,19 @@ Array = np.ndarray
 
 @dataclass(frozen=True)
 class Change:
-    """What was switched in a toggled run: effect ``id`` set to ``value``, or times it."""
+    """What was switched in a toggled run: effect ``id`` set to ``value``, or times it; base: what
+    the case has of it, which the parameter counts from."""
 
     id: str
     value: float
     times: bool = False
+    base: float = 0.0
 
     def applied(self, effects: Mapping[str, Array], count: int) -> dict[str, Array]:
         """Parameters (count,) of effects in the toggled run."""
         old = effects.get(self.id, np.zeros(count))
-        new = old * self.value if self.times else np.full(count, self.value)
-        return {**effects, self.id: new}
+        new = (self.base + old) * self.value if self.times else np.full(count, self.value)
+        return {**effects, self.id: new - self.base}
 
 
 @dataclass(frozen=True)
@@ -86,10 +88,14 @@ class Problem:
         return eta[self.places], jacobian[self.places]
 
     def added(self, effects: Mapping[str, Array], count: int) -> tuple[Array, Array, Array]:
-        """What effects, each (count,), add: a (q, n), B (q, n, v), split (q, n)."""
+        """What effects, each (count,), add: a (q, n), B (q, n, v); the split with them (q, n).
+
+        Squares of splits add up, each counted from the plain tyre's.
+        """
         n, v = len(self.places), len(self.expansion.x0)
         shift, tilt = np.zeros((count, n)), np.zeros((count, n, v))
-        split = np.tile(self.expansion.split[self.places], (count, 1))
+        own = self.expansion.split[self.places] ** 2
+        square = np.tile(own, (count, 1))
         runs = np.array([row.run for row in self.observations.rows])
         for run in sorted(set(runs.tolist())):
             rows = np.flatnonzero(runs == run)
@@ -101,8 +107,8 @@ class Problem:
                     a, B, s = self.expansion.nodes[id].at(e)
                     shift[:, rows] += a[:, self.places[rows]]
                     tilt[:, rows] += B[:, self.places[rows]]
-                    split[:, rows] = np.hypot(split[:, rows], s[:, self.places[rows]])
-        return shift, tilt, split
+                    square[:, rows] += s[:, self.places[rows]] ** 2 - own[rows]
+        return shift, tilt, np.sqrt(np.maximum(square, 0.0))
 
     def law(self, shift: Array) -> Array:
         """Covariance (q, n, n) by which an effect's law may be off its shift (q, n)."""

@@ -18,13 +18,19 @@ Array = np.ndarray
 
 @dataclass(frozen=True)
 class Span:
-    """An effect that can be asked for: the range of its parameter, and its unit."""
+    """An effect that can be asked for: the range of its parameter, and its unit.
+
+    base: what the case has of it already; low, high and all parameters count from there. also:
+    parameters beyond the range that toggled runs were measured at.
+    """
 
     low: float
     high: float
     unit: str = ""
     title: str = ""
     toggle: str = ""
+    base: float = 0.0
+    also: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)

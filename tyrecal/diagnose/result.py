@@ -16,8 +16,9 @@ def result(diagnosis: Diagnosis, under_load: UnderLoad | None = None) -> dict[st
     """Plain data; numbers in the units of their names, None where there is none.
 
     ``detectability`` is lambda at the sizes in ``judged_at``; ``full_size`` at the far end of each
-    range; ``smallest_visible``: the least parameter with lambda = 10. ``bias_percent``: the effect
-    at full size and ignored.
+    range; ``smallest_visible``: the least change from the case with lambda = 10. ``bias_percent``:
+    the effect at full size and ignored. ``parameters``: of every effect of a pair. Sizes count in
+    what the case has of an effect.
     """
     d, gap, s = diagnosis, diagnosis.gap, diagnosis.shrinkage
     best = d.best
@@ -30,13 +31,16 @@ def result(diagnosis: Diagnosis, under_load: UnderLoad | None = None) -> dict[st
         "words": d.verdict.words,
         "effect": named,
         "parameter": _parameter(d, named or best),
+        "parameters": {
+            id: d.parameter(key, id) for key in [named or best] if key for id in key.split("+")
+        },
         "likeliest": best,
         "probabilities": _sorted(d.probabilities),
         "candidate_set": list(d.verdict.candidates),
         "fit_p_value": d.verdict.check,
         "groups": d.separability.groups(),
         "detectability": dict(d.separability.lambdas),
-        "judged_at": dict(d.separability.sizes),
+        "judged_at": {id: d.problem.spans[id].base + e for id, e in d.separability.sizes.items()},
         "full_size": dict(d.separability.full),
         "smallest_visible": dict(d.separability.smallest),
         "gap": {

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from math import exp
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import exp, isfinite, nan
 from pathlib import Path
 
 from ..case import LoadedCase
@@ -19,11 +19,12 @@ from .problem import Assumed, Change
 from .regions import regions
 from .response import Answer, Point, Span
 from .tyre_model import TyreModel
-from .uncertainties import EFFECTS, Source, sources
+from .uncertainties import EFFECTS, Source, calibrated, sources
 from .under_load import UnderLoad, Values, compare
 from .verdict import NO_GAP
 
 ALIKE = 2.0  # factor between measured and computed frequency beyond which the unit is wrong
+ALIKE_MASS = 1.5  # as the mass: a rim weighs as much as its tyre
 
 
 class BadChange(ValueError):
@@ -33,14 +34,22 @@ class BadChange(ValueError):
 @dataclass(frozen=True)
 class Study:
     """A diagnosis with what it rests on: sources of error, whether they were assumed, effects
-    that the solver cannot express, the model, and what was measured under load, None without."""
+    that the solver cannot express, those that variables of the case calibrate, the model, and what
+    was measured under load, None without."""
 
     diagnosis: Diagnosis
     sources: tuple[Source, ...]
     assumed_sources: bool
     inexpressible: tuple[str, ...]
+    calibrated: tuple[str, ...]
     model: TyreModel
     under_load: UnderLoad | None = None
+
+    @property
+    def asked_for(self) -> tuple[str, ...] | None:
+        """The effects considered, where they are not all of the catalogue."""
+        known = {*self.diagnosis.problem.spans, *self.inexpressible, *self.calibrated}
+        return None if known == set(catalogue()) else tuple(self.diagnosis.problem.spans)
 
 
 def study(
@@ -56,30 +65,44 @@ def study(
 ) -> Study:
     """Read the files and diagnose the case with them.
 
-    effects: ids to consider, None = the whole catalogue. Raises BadMeasurements, BadChange,
-    EvaluationFailed, and what ``Door.evaluate`` raises.
+    effects: ids to consider, None = the whole catalogue; one that a variable of the case sets is
+    none. Raises BadMeasurements, BadChange, EvaluationFailed, and what ``Door.evaluate`` raises.
     """
-    runs = [read_measurements(path) for path in (measured, *repeats)]
+    switched = [path for path, _ in toggled]
+    runs = {path: read_measurements(path) for path in (measured, *repeats, *switched)}
+    _check_copies([measured, *repeats, *switched], runs)
     observations = observe(
-        runs[0],
-        runs[1:],
-        [read_measurements(path) for path, _ in toggled],
+        runs[measured], [runs[path] for path in repeats], [runs[path] for path in switched],
         assumed.split,
-    )
+    )  # fmt: skip
     rows = list(dict.fromkeys((row.label, row.pressure_kPa) for row in observations.rows))
     if not any(label for label, _ in rows):
         raise BadMeasurements(f"{measured}: there is no frequency of the unloaded tyre in it")
-    spans, inexpressible = spans_of(door, effects)
+    ids = list(catalogue()) if effects is None else list(effects)
+    fitted = tuple(id for id in ids if EFFECTS + id in calibrated(case))
+    if "pressure_kPa" in calibrated(case):
+        raise BadMeasurements(
+            "a variable of the case sets pressure_kPa, which a diagnosis takes from the"
+            " measurements: consider the effect pressure_offset instead"
+        )
+    spans, inexpressible = spans_of(door, [id for id in ids if id not in fitted])
+    changes = tuple(_counted_from(change, spans) for _, change in toggled)
+    for change in changes:
+        spans[change.id] = _reaching(spans[change.id], change)
     found, assumed_sources = sources(case)
     model = TyreModel(case, door, rows, found, spans, jobs)
-    _check_units(model, observations, measured)
+    _check_units(model, observations, [measured, *switched], changes)
     diagnosis = diagnose(
-        model, rows, observations, tuple(change for _, change in toggled), assumed,
+        model, rows, observations, changes, assumed,
         parts=(lambda x: regions(model, x)) if section_map else None,
         further=lambda more: TyreModel(case, _same(door), more, found, spans, jobs),
     )  # fmt: skip
-    loaded = _under_load(case, _same(door), runs, diagnosis, model)
-    return Study(diagnosis, tuple(found), assumed_sources, tuple(inexpressible), model, loaded)
+    loaded = _under_load(
+        case, _same(door), [runs[path] for path in (measured, *repeats)], diagnosis, model
+    )
+    return Study(
+        diagnosis, tuple(found), assumed_sources, tuple(inexpressible), fitted, model, loaded
+    )
 
 
 def _under_load(
@@ -101,8 +124,8 @@ def _under_load(
         found = diagnosis.hypothesis(key)
         assert found.fitted is not None
         x = diagnosis.problem.expansion.x0 + found.fitted.d[found.best]
-        effects = {EFFECTS + id: float(e[found.best]) for id, e in found.values.items()}
-        tyres[key] = {**model.values(x), **effects}
+        effects = {id: float(e[found.best]) for id, e in found.values.items()}
+        tyres[key] = model.design(Point(x, effects))
     return compare(case, door, readings, tyres)
 
 
@@ -121,7 +144,9 @@ def spans_of(door: Door, ids: Sequence[str] | None = None) -> tuple[dict[str, Sp
         if not effect.within(door.solver.capabilities):
             unable.append(id)
         else:
-            able[id] = Span(effect.low, effect.high, effect.unit, effect.title, effect.toggle)
+            base = door.case.case.effects.get(id, 0.0)
+            able[id] = Span(effect.low - base, effect.high - base, effect.unit, effect.title,
+                            effect.toggle, base)  # fmt: skip
     return able, unable
 
 
@@ -139,9 +164,14 @@ def parse_change(text: str) -> Change:
             f" {', '.join(known)}"
         )
     try:
-        return Change(id, float(value), mark == "*")
+        number = float(value)
     except ValueError:
-        raise BadChange(f"'{text}': '{value.strip()}' is not a number") from None
+        number = nan
+    if not isfinite(number):
+        raise BadChange(f"'{text}': '{value.strip()}' is not a number")
+    if mark == "*" and number == 1:
+        raise BadChange(f"'{text}': a factor of 1 switches nothing")
+    return Change(id, number, mark == "*")
 
 
 def _same(door: Door) -> Door:
@@ -151,16 +181,62 @@ def _same(door: Door) -> Door:
     return other
 
 
-def _check_units(model: TyreModel, observations: Observations, path: Path) -> None:
-    """Raises BadMeasurements where a frequency is not even near the model's start."""
-    (answer,) = model.answers([Point(model.start)])
+def _counted_from(change: Change, spans: Mapping[str, Span]) -> Change:
+    """The change, from what the case has of its effect. Raises BadChange."""
+    if change.id not in spans:
+        raise BadChange(
+            f"'{change.id}' was switched in a toggled run, but is not among the effects that are"
+            " considered: add it with --effect, or leave --without; the solver has to express it,"
+            " and no variable may set it"
+        )
+    return replace(change, base=spans[change.id].base)
+
+
+def _reaching(span: Span, change: Change) -> Span:
+    """The span with a node where the toggled run was measured, beyond the range if need be."""
+    e = change.value - change.base
+    if change.times or span.low <= e <= span.high or e in (0.0, *span.also):
+        return span
+    return replace(span, also=(*span.also, e))
+
+
+def _check_copies(paths: Sequence[Path], runs: Mapping[Path, Sequence[Reading]]) -> None:
+    """Raises BadMeasurements where two runs are the same to the last digit."""
+    told = [
+        [(r.quantity, r.label, r.member, r.pressure_kPa, r.load_N, r.value) for r in runs[path]]
+        for path in paths
+    ]
+    for k, path in enumerate(paths):
+        if told[k] in told[:k]:
+            first = paths[told.index(told[k])]
+            raise BadMeasurements(
+                f"{path}: holds the same values as {first}; a copy is no measurement of its own"
+            )
+
+
+def _check_units(
+    model: TyreModel, observations: Observations, paths: Sequence[Path], changes: Sequence[Change]
+) -> None:
+    """Raises BadMeasurements where a value is not even near the model's start, paths being the
+    runs'; BadChange where the model has no answer with what was switched."""
+    set_to = [c for c in changes if not c.times and c.value != c.base]
+    points = [Point(model.start, {c.id: c.value - c.base}) for c in set_to]
+    answer, *others = model.answers([Point(model.start), *points])
     if not isinstance(answer, Answer):
         raise answer
+    for change, other in zip(set_to, others, strict=True):
+        if isinstance(other, Exception):
+            raise BadChange(f"'{change.id}={change.value:g}' cannot be evaluated: {other}")
     at = dict(zip(model.rows, answer.eta.tolist(), strict=True))
     for row, y in zip(observations.rows, observations.y, strict=True):
         ratio = exp(y - at[row.label, row.pressure_kPa])
         if row.label and not 1 / ALIKE < ratio < ALIKE:
             raise BadMeasurements(
-                f"{path}: {row} was measured {ratio:.2g} times as high as the model has it; is it"
-                " the right unit, mode and pressure?"
+                f"{paths[row.run]}: {row} was measured {ratio:.2g} times as high as the model has"
+                " it; is it the right unit, mode and pressure?"
+            )
+        if not row.label and not 1 / ALIKE_MASS < ratio < ALIKE_MASS:
+            raise BadMeasurements(
+                f"{paths[row.run]}: the mass is {ratio:.2g} times the model's; is it in kg, and of"
+                " the tyre without its rim?"
             )

@@ -44,6 +44,11 @@ class TyreModel:
         spans: Mapping[str, Span],
         jobs: int = 1,
     ):
+        if not door.has_gradients and "gradients" in door.solver.capabilities:
+            raise DeckRefused(
+                "with what the case has in it (a splice) the solver gives no exact slopes, which a"
+                " diagnosis needs: take it out of the case, the diagnosis weighs it as an effect"
+            )
         if not door.has_gradients:
             raise DeckRefused(
                 f"solver '{door.solver.name}' gives no exact slopes, which a diagnosis needs:"
@@ -51,6 +56,7 @@ class TyreModel:
             )
         self.rows, self.found, self.jobs = list(rows), found, jobs
         self.spans: Mapping[str, Span] = spans
+        self._present = case.case.effects
         self.pressures = sorted({p for label, p in rows if label}) or [case.case.pressure_kPa]
         labels = sorted({label for label, _ in rows if label}, key=str)
         case = asked_for(case, labels)
@@ -76,6 +82,12 @@ class TyreModel:
             name: exp(xi) if v.scale == "log" else v.lower + xi * (v.upper - v.lower)
             for (name, v), xi in zip(self._variables.items(), map(float, x), strict=True)
         }
+
+    def design(self, point: Point) -> dict[str, float]:
+        """Numbers of the case at a point: variables, and effects on top of those that it has."""
+        effects = {EFFECTS + id: self._present.get(id, 0.0) + float(e)
+                   for id, e in point.effects.items()}  # fmt: skip
+        return {**self.values(point.x), **effects}
 
     def answers(self, points: Sequence[Point]) -> list[Answer | Exception]:
         """Each point at every pressure, all in one batch, ``jobs`` evaluations at a time.
@@ -121,7 +133,8 @@ class TyreModel:
     def _has_slopes(self, id: str, span: Span) -> bool:
         """Whether the solver gives slopes with an effect."""
         try:
-            return self.door.has_gradients_at({EFFECTS + id: span.high or span.low})
+            far = span.base + span.high or span.base + span.low
+            return self.door.has_gradients_at({EFFECTS + id: far})
         except ValueError:  # the case cannot have that much of it
             return True
 
@@ -136,10 +149,9 @@ class TyreModel:
         """Distinct points, slopes with those that have them."""
         wanted = []
         for point, pressure in product(points, self.pressures):
-            effects = {EFFECTS + id: float(e) for id, e in point.effects.items()}
             known = dict(self._plain) if point.constants else {}
             names = () if self._is_bare(point) else (*self.variables, *known)
-            design = {**self.values(point.x), **known, "pressure_kPa": pressure, **effects}
+            design = {**known, "pressure_kPa": pressure, **self.design(point)}
             wanted.append((design, names))
         found = self._modes(wanted)
         per, results = len(self.pressures), []

@@ -10,9 +10,11 @@ from pydantic import BaseModel
 from ..case import LoadedCase
 from ..case.checks import find
 from ..case.schema import Cord, Rubber
+from ..effects import catalogue
 
 DENSITY, MODULUS, SPACING, GAUGE, ANGLE_deg, PRESSURE_kPa = 1.5, 3.0, 1.0, 3.0, 1.0, 1.0
 EFFECTS = "effects."
+UNITS = {"kPa": "kPa", "Pa": "Pa", "deg": "degrees", "m": "m", "m2": "m2", "m3": "kg/m3"}  # of keys
 
 
 @dataclass(frozen=True)
@@ -35,7 +37,7 @@ def sources(case: LoadedCase) -> tuple[list[Source], bool]:
     stated = case.case.uncertainties
     if not stated:
         return list(_assumed(case)), True
-    result, taken = [], _calibrated(case)
+    result, taken = [], calibrated(case)
     for name, each in stated.items():
         signs = each.signs or [1] * len(each.sets)
         steps = {
@@ -45,19 +47,23 @@ def sources(case: LoadedCase) -> tuple[list[Source], bool]:
         }
         if not steps:
             continue
-        size = f"{each.percent:g} %" if each.percent else f"{each.absolute:g}"
+        size = (
+            f"{each.percent:g} %"
+            if each.percent
+            else f"{each.absolute:g}{_unit(next(iter(steps)))}"
+        )
         result.append(Source(name, steps, f"{name.replace('_', ' ')} {size}"))
     return result, False
 
 
 def _assumed(case: LoadedCase) -> Iterator[Source]:
-    taken = _calibrated(case)
+    taken = calibrated(case)
 
     def source(name: str, path: str, percent: float = 0.0, absolute: float = 0.0) -> Source | None:
         if path in taken:
             return None
         step = absolute or _value(case, path) * percent / 100
-        size = f"{percent:g} %" if percent else f"{absolute:g}"
+        size = f"{percent:g} %" if percent else f"{absolute:g}{_unit(path)}"
         return Source(name, {path: step}, f"{name.replace('_', ' ')} {size}")
 
     found = [source("pressure", "pressure_kPa", absolute=PRESSURE_kPa)]
@@ -78,14 +84,24 @@ def _assumed(case: LoadedCase) -> Iterator[Source]:
     yield from (each for each in found if each)
 
 
-def _calibrated(case: LoadedCase) -> set[str]:
+def _unit(path: str) -> str:
+    """The unit of the number at a dotted path, with a blank before it; "" where it has none."""
+    if path.startswith(EFFECTS):
+        unit = catalogue()[path.removeprefix(EFFECTS)].unit
+    else:
+        unit = UNITS.get(path.rpartition("_")[2], "")
+    return f" {unit}" if unit else ""
+
+
+def calibrated(case: LoadedCase) -> set[str]:
+    """Paths that the design variables set."""
     return {path for variable in case.case.variables.values() for path in variable.sets}
 
 
 def _value(case: LoadedCase, path: str) -> float:
     """The number at a dotted path; 0 for an effect that the case does not name."""
     if path.startswith(EFFECTS):
-        return 0.0
+        return case.case.effects.get(path.removeprefix(EFFECTS), 0.0)
     here: object = case.case
     for key in find(case.case, path):
         here = getattr(here, str(key)) if isinstance(here, BaseModel) else here[key]  # type: ignore[index]

@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..diagnose.measurements import COLUMNS, PLAUSIBLE, PRESSURES_kPa
+from ..diagnose.measurements import COLUMNS, LARGEST_SIGMA, PLAUSIBLE, PRESSURES_kPa
 from ..diagnose.observations import PRIOR_REPEATS
 from ..modes.mode import Label
 from .sensors import BadMeasuredData
@@ -73,7 +73,8 @@ def combined(
     """One value a key, the mean of its runs, with the standard deviation of that mean.
 
     floor, assumed: relative; ``assumed`` is the standard deviation of one run that states none.
-    Raises BadMeasuredData where neither repeats nor anything else tell a standard deviation.
+    Raises BadMeasuredData where neither repeats nor anything else tell a standard deviation, or
+    it is so large that no fit would read it.
     """
     groups: dict[Key, list[Value]] = {}
     for each in _one_for_both(values):
@@ -95,6 +96,11 @@ def combined(
                 " a column sigma, or --sigma-percent"
             )
         sigma = max(float(np.sqrt(max(variances))), floor * mean)
+        if sigma > LARGEST_SIGMA * mean:
+            raise BadMeasuredData(
+                f"{runs[0].place}: sigma of {_name(runs[0])} comes to {sigma:.3g}, more than"
+                f" {LARGEST_SIGMA:.0%} of the value {mean:.4g}: is it a mistake, or another mode?"
+            )
         rows.append(replace(runs[0], value=mean, sigma=sigma))
     return sorted(rows, key=_order)
 
@@ -111,7 +117,8 @@ def _pooled(groups: dict[Key, list[Value]], quantity: str) -> float | None:
 
 
 def _one_for_both(values: Sequence[Value]) -> list[Value]:
-    """The two members of a doublet as one, their mean, where some run tells only one."""
+    """The two members of a doublet as one, their mean, where some runs tell other members than
+    others do."""
     places: dict[tuple[object, ...], dict[str, list[Value]]] = {}
     for each in values:
         place = (each.quantity, each.label, each.pressure_kPa, each.load_N)
@@ -120,7 +127,7 @@ def _one_for_both(values: Sequence[Value]) -> list[Value]:
     for runs in places.values():
         told = [{each.member for each in run} for run in runs.values()]
         for run in runs.values():
-            if run[0].load_N or all(members == {"1", "2"} for members in told):
+            if run[0].load_N or all(members == told[0] for members in told):
                 result += run
             elif {each.member for each in run} == {"1", "2"}:
                 mean = sum(each.value for each in run) / len(run)

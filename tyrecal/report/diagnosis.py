@@ -75,6 +75,9 @@ def _headline(study: Study) -> str:
 def _answer(study: Study) -> Iterator[str]:
     d = study.diagnosis
     v, p = d.verdict, d.probabilities
+    if study.asked_for is not None:
+        names = ", ".join(f"`{id}`" for id in study.asked_for) or "nothing"
+        yield f"Considered, as asked: only {names} of the catalogue, no other effect."
     if d.exchanged:
         a, b = d.exchanged
         yield (
@@ -82,12 +85,12 @@ def _answer(study: Study) -> Iterator[str]:
             " (look at the shapes again); what follows has them exchanged."
         )
     if v.kind == NAMED and v.key:
-        q = d.parameter(v.key)
-        unit = f" {q['unit']}" if q["unit"] else ""
+        ids = v.key.split("+")
+        sizes = "; ".join(_sized(d, v.key, id) for id in ids)
+        explain = "explain" if len(ids) > 1 else "explains"
         yield (
-            f"{_title(study, v.key)} (`{v.key}`) explains the gap with probability"
-            f" {p[v.key]:.2f}; its size is {q['value']:.3g}{unit}, 90 % between {q['low']:.3g} and"
-            f" {q['high']:.3g}."
+            f"{_title(study, v.key)} (`{v.key}`) {explain} the gap with probability"
+            f" {p[v.key]:.2f}; {sizes}."
         )
     else:
         yield v.words[0].upper() + v.words[1:] + "."
@@ -99,19 +102,31 @@ def _answer(study: Study) -> Iterator[str]:
     if v.kind == NAMED:
         yield f"Rung {d.rung} of 4 on the ladder of proof: {RUNGS[d.rung]}."
         if d.rung < 4 and v.key:
-            span = d.problem.spans[v.key.split("+")[0]]
+            ways = [d.problem.spans[id].toggle or f"measure again without {id}" for id in ids]
             yield (
                 "Frequencies of one state of the tyre cannot show a cause. What would: "
-                f"{span.toggle or 'measure again without the effect'}; hand the second run over"
-                " with `--toggled`."
+                f"{'; and '.join(ways)}; hand the second run over with `--toggled`."
             )
+
+
+def _sized(d: Diagnosis, key: str, id: str) -> str:
+    """The size of the effect ``id`` of ``key`` amid a sentence."""
+    q, base = d.parameter(key, id), d.problem.spans[id].base
+    whose = f"the size of `{id}`" if "+" in key else "its size"
+    unit = f" {q['unit']}" if q["unit"] else ""
+    held = f", counting the {base:g} that the case has already" if base else ""
+    return (
+        f"{whose} is {q['value']:.3g}{unit}, 90 % between {q['low']:.3g} and {q['high']:.3g}{held}"
+    )
 
 
 def _gap(d: Diagnosis) -> Iterator[str]:
     g = d.gap
     seen = "larger than" if g.p_value < 0.05 else "within"
     yield (
-        f"After calibration {g.rms_percent:.2f} % (rms) is left. That is {seen} what repeatability,"
+        f"After calibration {g.rms_percent:.2f} % (rms) is left (weighed by all that is uncertain,"
+        " while `tyrecal fit` knows the scatter only and can come nearer, by variables that are"
+        f" further off). That is {seen} what repeatability,"
         f" the model's own form and the constants that nobody calibrates explain: chi2"
         f" {g.chi2:.1f} for {g.freedom} degrees of freedom, p = {g.p_value:.2g}. (A figure for"
         " orientation: it is weak against a single effect, so the verdict does not rest on it.)"
@@ -200,9 +215,13 @@ def _which(study: Study) -> Iterator[str]:
     ]
     for key, p in order[:SHOWN]:
         size, seen = "", ""
+        if key not in (NONE, OUTSIDE):
+            both = [d.parameter(key, id) for id in key.split("+")]
+            size = " and ".join(
+                f"{q['value']:.3g} ({q['low']:.3g} to {q['high']:.3g}) {q['unit']}".strip()
+                for q in both
+            )
         if key in d.problem.spans:
-            q = d.parameter(key)
-            size = f"{q['value']:.3g} ({q['low']:.3g} to {q['high']:.3g}) {q['unit']}".strip()
             seen = f"{d.separability.lambdas[key]:.0f}"
         rows.append(f"| {_title(study, key)} | {p:.2f} | {size} | {seen} |")
     yield "\n".join(rows)
@@ -215,6 +234,12 @@ def _which(study: Study) -> Iterator[str]:
             continue
         names = ", ".join(f"`{id}`" for id in group)
         yield f"These data cannot separate {names}."
+    held = [f"`{id}` {span.base:g}" for id, span in d.problem.spans.items() if span.base]
+    if held:
+        yield (
+            f"The case has {', '.join(held)} already: sizes count that in, the smallest that would"
+            " be seen is a change from it."
+        )
     blind = [id for id, e in d.separability.smallest.items() if e is None]
     sizes = [
         f"`{id}` {abs(e):.2g} {d.problem.spans[id].unit}".strip()
@@ -256,7 +281,7 @@ def _next(d: Diagnosis) -> Iterator[str]:
 def _assumptions(study: Study) -> Iterator[str]:
     d = study.diagnosis
     kind = "assumed, as the case states none" if study.assumed_sources else "stated by the case"
-    words = ", ".join(source.words for source in study.sources)
+    words = ", ".join(source.words for source in study.sources) or "none"
     yield f"Constants that nobody calibrates, one standard deviation each ({kind}): {words}."
     a = d.problem.assumed
     form = "as recorded for every mode" if a.form is None else f"{100 * a.form:g} % in every mode"
@@ -269,5 +294,8 @@ def _assumptions(study: Study) -> Iterator[str]:
         yield f"`{id}` could not be evaluated: {why}."
     if study.inexpressible:
         yield f"This solver cannot express {', '.join(f'`{id}`' for id in study.inexpressible)}."
+    if study.calibrated:
+        names = ", ".join(f"`{id}`" for id in study.calibrated)
+        yield f"Not considered, being calibrated by a variable of the case: {names}."
     for left in d.problem.observations.left_out:
         yield f"Left out: {left}."

@@ -15,6 +15,7 @@ KNOWN = {
 ORDINALS = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth")
 
 CLOSE, FAR = 2.0, 5.0  # % of deviation from a target
+FAR_OFF = 30.0  # % after a fit: no tyre is that far from its model
 
 
 def motion(c: int, m: int, kind: str | None = None) -> str:
@@ -51,6 +52,12 @@ def fit_doubts(result: Mapping[str, Any]) -> list[str]:
         doubts.append(
             f"a mode is hard to name (margin {result['label_margin']:.2f} of 1): two modes have"
             " met; look at their pictures"
+        )
+    far = [mode for mode in result["modes"] if abs(mode["deviation_percent"] or 0) > FAR_OFF]
+    if 2 * len(far) > len(result["modes"]):
+        doubts.append(
+            f"most modes are still more than {FAR_OFF:g} % off: are the targets in Hz, with the"
+            " right labels, at this pressure?"
         )
     values = result["singular_values"]
     if values and values[-1] < 1e-3 * values[0]:

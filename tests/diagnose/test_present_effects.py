@@ -1,0 +1,173 @@
+"""Effects that are in the case, calibrated by it, or switched in a run: none is counted twice, and
+nothing that was given is ignored."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tyrecal.case import with_values
+from tyrecal.diagnose.expansion import expand
+from tyrecal.diagnose.measurements import BadMeasurements
+from tyrecal.diagnose.observations import Observations, Row
+from tyrecal.diagnose.problem import Change, Problem
+from tyrecal.diagnose.response import Answer, Point
+from tyrecal.diagnose.result import result
+from tyrecal.diagnose.study import BadChange, spans_of, study
+from tyrecal.diagnose.tyre_model import TyreModel
+from tyrecal.diagnose.uncertainties import sources
+from tyrecal.evaluate.door import Door
+from tyrecal.evaluate.failure import DeckRefused
+from tyrecal.report.diagnosis import page
+
+from .test_tyre_model import CASE, EFFECTS, MODEL, ROWS, X, asked, written
+
+HELD = 0.9
+WITH_FILLER = with_values(CASE, {"effects.bead_filler": HELD})
+
+
+def test_parameters_count_from_what_the_case_has() -> None:
+    door = Door(WITH_FILLER)
+    spans, _ = spans_of(door, EFFECTS)
+    assert spans["bead_filler"].low == pytest.approx(-HELD)
+    own = TyreModel(WITH_FILLER, door, ROWS, sources(WITH_FILLER)[0], spans)
+    less, as_it_is = own.answers([Point(X, {"bead_filler": -HELD}), Point(X)])
+    assert isinstance(less, Answer) and isinstance(as_it_is, Answer)
+    assert less.eta == pytest.approx(asked(Point(X)).eta, abs=1e-9)
+    assert as_it_is.eta == pytest.approx(asked(Point(X, {"bead_filler": HELD})).eta, abs=1e-9)
+    nodes = expand(own, X).nodes["bead_filler"]
+    more, _, _ = nodes.at(np.array([1.2 - HELD]))
+    wanted = asked(Point(X, {"bead_filler": 1.2})).eta - as_it_is.eta
+    assert more[0] == pytest.approx(wanted, abs=5e-4)
+
+
+def test_splits_count_from_what_the_case_has() -> None:
+    """A mass on the tread splits pairs by itself, a wider rim does not: neither is added twice."""
+    rows = ROWS[:-1]
+    case = with_values(CASE, {"effects.point_mass": 0.04})
+    door = Door(case)
+    spans, _ = spans_of(door, ("point_mass", "rim_width"))
+    own = TyreModel(case, door, rows, [], spans)
+    none = np.full(len(rows), np.nan)
+    told = tuple(Row("frequency_Hz", label, p) for label, p in rows)
+    observations = Observations(told, np.zeros(len(rows)), none, 0.0, none, none)
+    problem = Problem(observations, expand(own, X), spans, np.arange(len(rows)), X, X)
+    for id, e in (("point_mass", 0.03), ("point_mass", -0.04), ("rim_width", 5e-3)):
+        (there,) = own.answers([Point(X, {id: e})])
+        assert isinstance(there, Answer)
+        _, _, split = problem.added({id: np.array([e])}, 1)
+        assert split[0] == pytest.approx(abs(there.split), abs=5e-5)
+    assert split.max() > 3e-3
+
+
+def test_a_splice_in_the_case_is_refused_in_words_that_help() -> None:
+    case = with_values(CASE, {"effects.stiffness_splice": 0.5})
+    with pytest.raises(DeckRefused, match=r"\(a splice\) .* take it out of the case"):
+        TyreModel(case, Door(case), ROWS, [], {})
+
+
+def test_a_source_of_error_steps_from_what_the_case_has() -> None:
+    wide = with_values(CASE, {"effects.rim_width": 4e-3})
+    columns = []
+    for case in (CASE, wide):
+        own = TyreModel(case, Door(case), ROWS, sources(case)[0], {})
+        (found,) = own.answers([Point(X, constants=True)])
+        assert isinstance(found, Answer) and found.constants is not None
+        columns.append(found.constants[:, own.sources.index("rim_width")])
+    assert columns[1] == pytest.approx(columns[0], rel=0.3, abs=2e-4)
+    assert columns[0] @ columns[1] > 0
+
+
+def test_a_part_of_an_effect_in_the_case_leaves_the_rest_to_be_found(tmp_path: Path) -> None:
+    truth = 0.8 * MODEL.spans["bead_filler"].high
+    path = written(tmp_path / "a.csv", asked(Point(X, {"bead_filler": truth})).eta)
+    none = study(CASE, Door(CASE), path, effects=EFFECTS, section_map=False)
+    some = study(WITH_FILLER, Door(WITH_FILLER), path, effects=EFFECTS, section_map=False)
+    sizes = [each.diagnosis.parameter("bead_filler") for each in (none, some)]
+    assert sizes[1]["low"] < truth < sizes[1]["high"]
+    assert sizes[1]["value"] == pytest.approx(sizes[0]["value"], rel=0.1)
+    seen = [result(each.diagnosis)["smallest_visible"]["bead_filler"] for each in (none, some)]
+    assert abs(seen[1]) == pytest.approx(seen[0], rel=0.8)  # nearest to the case, up or down
+    words = page(some, "tyre", "a.csv")
+    assert "counting the 0.9 that the case has already" in words
+    assert "that the case has already" not in page(none, "tyre", "a.csv")
+
+
+def test_a_toggled_run_is_set_to_what_it_says_whatever_the_case_has(tmp_path: Path) -> None:
+    truth = 1.5
+    one = written(tmp_path / "a.csv", asked(Point(X, {"bead_filler": truth})).eta)
+    other = written(tmp_path / "b.csv", asked(Point(X)).eta)
+    for change in (Change("bead_filler", 0.0), Change("bead_filler", 0.0, times=True)):
+        d = study(WITH_FILLER, Door(WITH_FILLER), one, toggled=[(other, change)], effects=EFFECTS,
+                  section_map=False).diagnosis  # fmt: skip
+        size = d.parameter("bead_filler")
+        assert d.rung == 4 and size["low"] < truth < size["high"]
+
+
+def test_a_run_switched_beyond_the_range_is_asked_there(tmp_path: Path) -> None:
+    """The range is where the effect may be, not how far a laboratory can go with it."""
+    far = 1.5 * MODEL.spans["bead_filler"].high
+    one = written(tmp_path / "a.csv", asked(Point(X)).eta)
+    other = written(tmp_path / "b.csv", asked(Point(X, {"bead_filler": far})).eta)
+    found = study(CASE, Door(CASE), one, toggled=[(other, Change("bead_filler", far))],
+                  effects=EFFECTS, section_map=False)  # fmt: skip
+    d = found.diagnosis
+    nodes, own = d.bare.expansion.nodes["bead_filler"], d.bare.expansion
+    assert nodes.reach[1] == MODEL.spans["bead_filler"].high
+    shift, _, _ = nodes.at(np.array([far]))
+    (there,) = found.model.answers([Point(own.x0, {"bead_filler": far})])
+    assert isinstance(there, Answer)
+    assert shift[0] == pytest.approx(there.eta - own.eta, abs=1e-9)
+    assert d.verdict.kind in ("no_gap", "undecided") and d.probabilities["none"] > 0.25
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [(Change("point_mass", 0.05), "not among the effects"),
+     (Change("bead_filler", -40.0), "cannot be evaluated")],
+)  # fmt: skip
+def test_a_change_that_the_diagnosis_cannot_follow(
+    tmp_path: Path, change: Change, words: str
+) -> None:
+    one = written(tmp_path / "a.csv", asked(Point(X)).eta)
+    other = written(tmp_path / "b.csv", asked(Point(X)).eta, noise=2e-3)
+    with pytest.raises(BadChange, match=words):
+        study(CASE, Door(CASE), one, toggled=[(other, change)], effects=EFFECTS)
+
+
+def test_an_effect_that_a_variable_sets_is_no_candidate(tmp_path: Path) -> None:
+    variable = CASE.case.variables["C10"].model_copy(
+        update={"sets": ["effects.bead_filler"], "start": 0.5, "lower": 0.1, "upper": 3.0}
+    )
+    variables = {**CASE.case.variables, "filler": variable}
+    case = replace(CASE, case=CASE.case.model_copy(update={"variables": variables}))
+    path = written(tmp_path / "a.csv", asked(Point(X)).eta)
+    found = study(case, Door(case), path, effects=EFFECTS, section_map=False)
+    assert found.calibrated == ("bead_filler",)
+    assert not found.diagnosis.problem.expansion.failed
+    assert "bead_filler" not in found.diagnosis.probabilities
+    words = page(found, "tyre", "a.csv")
+    assert "Not considered, being calibrated by a variable of the case: `bead_filler`." in words
+    assert "Considered, as asked: only `tread_density`, `pressure_offset` of the catalogue" in words
+    variable = variable.model_copy(update={"sets": ["pressure_kPa"], "start": 200.0,
+                                           "lower": 100.0, "upper": 400.0})  # fmt: skip
+    case = replace(CASE, case=CASE.case.model_copy(update={"variables": {"p": variable}}))
+    with pytest.raises(BadMeasurements, match="sets pressure_kPa"):
+        study(case, Door(case), path, effects=EFFECTS)
+
+
+def test_what_is_wrong_with_a_file_names_that_file(tmp_path: Path) -> None:
+    one = written(tmp_path / "a.csv", asked(Point(X)).eta)
+    copy = tmp_path / "copy.csv"
+    copy.write_text(one.read_text())
+    with pytest.raises(BadMeasurements, match=r"copy.csv: holds the same values as .*a.csv"):
+        study(CASE, Door(CASE), one, [copy], effects=EFFECTS)
+    high = written(tmp_path / "high.csv", asked(Point(X)).eta[:-1] + 1.0, ROWS[:-1])
+    with pytest.raises(BadMeasurements, match=r"high.csv: .* right unit"):
+        study(CASE, Door(CASE), one, [], [(high, Change("bead_filler", 0.0))], effects=EFFECTS)
+    on_rim = written(tmp_path / "rim.csv", asked(Point(X)).eta + 0.6 * (np.arange(19) == 18))
+    with pytest.raises(BadMeasurements, match=r"rim.csv: the mass is 1.8 times .* without its rim"):
+        study(CASE, Door(CASE), on_rim, effects=EFFECTS)
