@@ -75,8 +75,8 @@ def test_slope_next_to_nothing(id: str) -> None:
     assert low == pytest.approx(high, rel=1e-2, abs=1e-3 * abs(high).max())
 
 
-@pytest.mark.parametrize("method", ["slsqp", "least-squares"])
-def test_a_fit_ends_where_an_effect_is_absent(method: str) -> None:
+@pytest.mark.parametrize(("method", "start"), [("slsqp", 0.0), ("least-squares", 1.0)])
+def test_a_fit_ends_where_an_effect_is_absent(method: str, start: float) -> None:
     """Frequencies lower than the plain tyre's want a filler softer than none: the bound 0."""
     modes = [
         t.model_copy(update={"frequency_Hz": 0.95 * f})
@@ -85,7 +85,7 @@ def test_a_fit_ends_where_an_effect_is_absent(method: str) -> None:
         if (label.c, label.m, label.kind) == (t.c, t.m, t.kind)
     ]
     filler = CASE.case.variables["C10"].model_copy(
-        update={"sets": ["effects.bead_filler"], "start": 1.0, "lower": 0.0, "upper": 3.0,
+        update={"sets": ["effects.bead_filler"], "start": start, "lower": 0.0, "upper": 3.0,
                 "scale": "linear"}
     )  # fmt: skip
     targets = CASE.case.targets.model_copy(update={"modes": modes})
@@ -94,6 +94,7 @@ def test_a_fit_ends_where_an_effect_is_absent(method: str) -> None:
     result = calibrate(case, Door(case), method).result
     found = result["variables"]["filler"]
     assert result["converged"] and found["at_bound"] and 0 <= found["value"] < 1e-3
+    assert result["moved"] == (start > 0)
     assert (found["lower"], found["upper"]) == (0.0, 3.0)
 
 

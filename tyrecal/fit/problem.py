@@ -275,7 +275,7 @@ def _variable(name: str, v: CaseVariable) -> Variable:
     effect = all(path.startswith("effects.") for path in v.sets)
     least = NEAR_ZERO * max(abs(v.lower), abs(v.upper)) if effect else 0.0
     lower, upper = v.lower or least, v.upper or -least
-    return Variable(name, v.start, lower, upper, v.scale == "log")
+    return Variable(name, min(max(v.start, lower), upper), lower, upper, v.scale == "log")
 
 
 def objective_unit(case: LoadedCase) -> str:
