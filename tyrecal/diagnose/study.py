@@ -97,12 +97,11 @@ def study(
         parts=(lambda x: regions(model, x)) if section_map else None,
         further=lambda more: TyreModel(case, _same(door), more, found, spans, jobs),
     )  # fmt: skip
-    loaded = _under_load(
-        case, _same(door), [runs[path] for path in (measured, *repeats)], diagnosis, model
-    )
+    own = [runs[path] for path in (measured, *repeats)]
     return Study(
-        diagnosis, tuple(found), assumed_sources, tuple(inexpressible), fitted, model, loaded
-    )
+        diagnosis, tuple(found), assumed_sources, tuple(inexpressible), fitted, model,
+        _under_load(case, _same(door), own, diagnosis, model),
+    )  # fmt: skip
 
 
 def _under_load(
@@ -228,7 +227,8 @@ def _check_units(
         if isinstance(other, Exception):
             raise BadChange(f"'{change.id}={change.value:g}' cannot be evaluated: {other}")
     at = dict(zip(model.rows, answer.eta.tolist(), strict=True))
-    for row, y in zip(observations.rows, observations.y, strict=True):
+    values = zip(observations.rows, observations.y, strict=True)
+    for row, y in sorted(values, key=lambda each: each[0].label is None):  # frequencies first
         ratio = exp(y - at[row.label, row.pressure_kPa])
         if row.label and not 1 / ALIKE < ratio < ALIKE:
             raise BadMeasurements(

@@ -261,7 +261,8 @@ def _shrinkage(d: Diagnosis) -> Iterator[str]:
     yield (
         f"Held out by rule: {s.held_out}. Without an effect the error there is"
         f" {s.before_percent:.2f} %, with `{s.effect}` {s.after_percent:.2f} %: it shrinks by"
-        f" {100 * s.fraction:.0f} % (90 %: {100 * s.low:.0f} to {100 * s.high:.0f} %). On tyres"
+        f" {100 * s.fraction:.0f} % at its likeliest size ({100 * s.low:.0f} to {100 * s.high:.0f}"
+        " % over 90 % of the sizes and designs that the other data leave open). On tyres"
         f" without any effect chance shrinks it by up to {100 * s.placebo_95:.0f} % (95 %"
         f" quantile); repeatability alone leaves {s.floor_percent:.2f} %."
     )
