@@ -187,7 +187,8 @@ def _check_units(
         if isinstance(other, Exception):
             raise BadChange(f"'{change.id}={change.value:g}' cannot be evaluated: {other}")
     at = dict(zip(model.rows, answer.eta.tolist(), strict=True))
-    for row, y in zip(observations.rows, observations.y, strict=True):
+    values = zip(observations.rows, observations.y.tolist(), strict=True)
+    for row, y in sorted(values, key=lambda value: value[0].label is None):
         ratio = exp(y - at[row.label, row.pressure_kPa])
         if row.label and not 1 / ALIKE < ratio < ALIKE:
             raise BadMeasurements(
