@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 import json
-import lzma
-import tarfile
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from tyrecal.blind.protocol import BadTrials, read_protocol
 from tyrecal.blind.score import score
 from tyrecal.blind.tables import page, summary
 
-STUDIES = sorted((Path(__file__).parents[1] / "benchmarks").glob("blind_study_*"))
+from ..studies.blind_least_squares import STUDIES, errors, unpacked
+
+LEAST_SQUARES = {  # errors held out without and with the effect, %, shrinkage, by chance
+    "blind_study_1": (1.70, 0.47, 0.74, 0.68),
+    "blind_study_2": (1.66, 0.43, 0.76, 0.64),
+    "blind_study_2_second_maker": (1.51, 0.39, 0.72, 0.48),
+}
 
 
 @pytest.fixture(scope="module", params=STUDIES, ids=[study.name for study in STUDIES])
@@ -28,16 +33,16 @@ def study(request: pytest.FixtureRequest) -> Path:
 def trials(study: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The study as it lay before the answerer, then with answers; the truth beside it."""
     folder = tmp_path_factory.mktemp("study") / "trials"
-    folder.mkdir()
-    for name in ("trials", "answers"):
-        with tarfile.open(study / f"{name}.tar.xz") as archive:
-            archive.extractall(folder, filter="data")
-    for name in ("protocol.json", "seal.json"):
-        (folder / name).write_bytes((study / name).read_bytes())
-    truth = folder.with_name("trials-truth")
-    truth.mkdir()
-    (truth / "truth.json").write_bytes(lzma.decompress((study / "truth.json.xz").read_bytes()))
+    unpacked(study, folder)
     return folder
+
+
+def test_calibrated_as_usual_the_error_shrinks_too(study: Path, trials: Path) -> None:
+    found = errors(trials)
+    before, after = 100 * np.median(found["effect"], 0)
+    shrinks, chance = (1 - found[kind][:, 1] / found[kind][:, 0] for kind in ("effect", "none"))
+    got = before, after, np.median(shrinks), np.quantile(chance, 0.95)
+    assert got == pytest.approx(LEAST_SQUARES[study.name], abs=0.006)
 
 
 def alike(found: Any, stated: Any, where: str = "") -> None:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.optimize import least_squares
 
 from tyrecal.diagnose.diagnosis import Diagnosis, diagnose
-from tyrecal.diagnose.evidence import single
+from tyrecal.diagnose.evidence import single, weigh
 from tyrecal.diagnose.expansion import anchored, expand
 from tyrecal.diagnose.observations import Row
 from tyrecal.diagnose.problem import Change
@@ -60,6 +61,30 @@ def test_an_effect_shrinks_the_held_out_error_and_the_placebo_does_not() -> None
         assert fake is not None
         beyond += fake.fraction > fake.placebo_95
     assert beyond <= 5
+
+
+@pytest.mark.parametrize("without", [True, False])
+def test_a_calibration_as_usual_stands_beside(without: bool) -> None:
+    """Least squares of the other rows, by SciPy on the tyre itself, without and with the effect."""
+    toy = Toy(size=0.02, pressures=(160.0, 200.0, 240.0))
+    base = problem(toy)
+    y = drawn(toy, base, np.random.default_rng(1), {"e1": 0.9}, 0.3)
+    there = base.measured(y)
+    s = shrink(there, "e1")
+    assert s is not None
+    hold, _ = held_out(there.observations.rows)
+    (h,) = (h for h in weigh(there.only(~hold)) if h.key == "e1")
+    effects = {} if without else h.mean()
+
+    def off(x: np.ndarray) -> np.ndarray:
+        return toy._answer(Point(x, effects)).eta - y
+
+    weighed = lambda x: np.concatenate([off(x)[~hold] / 0.002, (x - toy.start) / toy.spread])
+    best = least_squares(weighed, toy.start, xtol=1e-14, ftol=1e-14).x
+    expected = 100 * np.sqrt(np.mean(off(best)[hold] ** 2))
+    got = s.least_squares_before_percent if without else s.least_squares_after_percent
+    assert got == pytest.approx(expected, rel=1e-6)
+    assert s.least_squares_after_percent < s.least_squares_before_percent
 
 
 def test_a_toggle_that_parts_twins_comes_first_and_does() -> None:

@@ -95,7 +95,7 @@ def scored(
     labels: Sequence[Label],
 ) -> Scored:
     """One trial."""
-    y, places, counts = _means(readings, ruler)
+    y, places, counts = means(readings, ruler)
     d = np.array([log(v) for v in truth["variables"].values()]) - ruler.x0
     key = truth["law"] if truth["kind"] == "effect" else truth["kind"]
     hard = Difficulty(0.0, 0.0, (key,), None)
@@ -120,7 +120,7 @@ def scored(
     )  # fmt: skip
 
 
-def _means(readings: Sequence[Reading], ruler: Ruler) -> tuple[Array, Array, Array]:
+def means(readings: Sequence[Reading], ruler: Ruler) -> tuple[Array, Array, Array]:
     """ln of each row's mean of members (n,), its place in the ruler (n,), number of values (n,)."""
     found: dict[tuple[Label | None, float], list[float]] = {}
     for each in readings:

@@ -96,6 +96,8 @@ def result(diagnosis: Diagnosis, under_load: UnderLoad | None = None) -> dict[st
             "floor_percent": s.floor_percent,
             "before_sigma": s.before_sigma,
             "after_sigma": s.after_sigma,
+            "least_squares_before_percent": s.least_squares_before_percent,
+            "least_squares_after_percent": s.least_squares_after_percent,
         },
         "rung": d.rung,
         "absorbed": dict(gap.absorbed),

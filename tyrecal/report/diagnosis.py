@@ -266,6 +266,11 @@ def _shrinkage(d: Diagnosis) -> Iterator[str]:
         f" without any effect chance shrinks it by up to {100 * s.placebo_95:.0f} % (95 %"
         f" quantile); repeatability alone leaves {s.floor_percent:.2f} %."
     )
+    yield (
+        "These fits leave to the uncalibrated constants what is theirs. Calibrated as usual, by"
+        f" least squares, the error there is {s.least_squares_before_percent:.2f} % without the"
+        f" effect and {s.least_squares_after_percent:.2f} % with it."
+    )
 
 
 def _next(d: Diagnosis) -> Iterator[str]:

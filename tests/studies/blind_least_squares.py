@@ -1,0 +1,115 @@
+"""The blind studies once more: how far an ordinary calibration's error shrinks with the effect.
+
+    python -m tests.studies.blind_least_squares
+
+Made after the studies, without anything to choose: least squares of the given modes' ln f in the
+ruler's model of the plain tyre, then with the named effect (the likeliest, on tyres without any) at
+the size that the answer states; both against the truth at the held-out pressure. Trials with
+exchanged labels are left out, an ordinary calibration would be misled by them.
+"""
+
+from __future__ import annotations
+
+import json
+import lzma
+import tarfile
+from collections.abc import Mapping
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+
+from tyrecal.blind.protocol import read_protocol
+from tyrecal.blind.ruler import Ruler, Signature, read_ruler
+from tyrecal.blind.score import case_of, labels_of, means, score
+from tyrecal.blind.seal import open_truth
+from tyrecal.blind.tables import DETECTED
+from tyrecal.diagnose.measurements import read_measurements
+
+Array = np.ndarray
+STUDIES = sorted((Path(__file__).parents[1] / "benchmarks").glob("blind_study_*"))
+STEPS, LONGEST = 20, 0.5
+
+
+def unpacked(study: Path, folder: Path) -> None:
+    """The study as it lay after the answers in ``folder``, its truth beside it."""
+    folder.mkdir()
+    for name in ("trials", "answers"):
+        with tarfile.open(study / f"{name}.tar.xz") as archive:
+            archive.extractall(folder, filter="data")
+    for name in ("protocol.json", "seal.json"):
+        (folder / name).write_bytes((study / name).read_bytes())
+    truth = folder.with_name("trials-truth")
+    truth.mkdir()
+    (truth / "truth.json").write_bytes(lzma.decompress((study / "truth.json.xz").read_bytes()))
+
+
+def errors(folder: Path) -> dict[str, Array]:
+    """By kind of trial, "effect" (detectable and named) and "none": rms errors held out, in ln f,
+    (trials, 2), of calibrations without and with the effect."""
+    protocol, labels = read_protocol(folder), labels_of(case_of(folder))
+    ruler = read_ruler(folder, labels)
+    scored = {each.id: each for each in score(folder, folder.with_name("trials-truth"))}
+    found: dict[str, list[list[float]]] = {"effect": [], "none": []}
+    for truth in open_truth(folder, folder.with_name("trials-truth"))["trials"]:
+        own = scored[truth["id"]]
+        proven = own.verdict == "named" and own.band >= DETECTED
+        if own.swapped or own.kind not in found or (own.kind == "effect" and not proven):
+            continue
+        told = json.loads((folder / "answers" / f"{own.id}.json").read_text())["diagnosis"]
+        key = (told["effect"] or told["likeliest"]).split("+")[0]
+        y, places, _ = means(read_measurements(folder / "trials" / f"{own.id}.csv"), ruler)
+        modal = np.array([ruler.rows[i][0] is not None for i in places])
+        out = {
+            ruler.rows.index((label, protocol.held_out_kPa)): np.log(hertz).mean()
+            for label in labels
+            if (hertz := truth["held_out"].get(str(label)))
+        }
+        found[own.kind].append([
+            _rms(ruler, y[modal], places[modal], out, effects)
+            for effects in ({}, {key: told["parameter"]["value"]})
+        ])  # fmt: skip
+    return {kind: np.array(rows) for kind, rows in found.items()}
+
+
+def _rms(
+    ruler: Ruler, y: Array, places: Array, out: Mapping[int, Any], effects: Mapping[str, float]
+) -> float:
+    d, spread = np.zeros(len(ruler.x0)), np.diag(ruler.spread**-2.0) * 0.002**2
+    for _ in range(STEPS):
+        eta, J = ruler.plain(d, places)
+        off = y - eta - _shift(ruler, d, places, effects)
+        step = np.linalg.solve(J.T @ J + spread, J.T @ off - spread @ d)
+        d = d + step * min(1.0, LONGEST / max(abs(step).max(), 1e-300))
+    held = np.array(list(out))
+    said = ruler.plain(d, held)[0] + _shift(ruler, d, held, effects)
+    return float(np.sqrt(np.mean((np.array(list(out.values())) - said) ** 2)))
+
+
+def _shift(ruler: Ruler, d: Array, places: Array, effects: Mapping[str, float]) -> Array:
+    total = np.zeros(len(places))
+    for id, e in effects.items():
+        signature: Signature = ruler.signatures[id]
+        sizes, shift, _ = signature.grid(d, places)
+        total += [np.interp(e, sizes, column) for column in shift.T]
+    return total
+
+
+def main() -> None:
+    print("| study | trials | error without, % | with, % | shrinks by, median | placebo's 95 % |")
+    print("|---|---|---|---|---|---|")
+    for study in STUDIES:
+        with TemporaryDirectory() as place:
+            unpacked(study, Path(place) / "trials")
+            found = errors(Path(place) / "trials")
+        before, after = 100 * np.median(found["effect"], 0)
+        shrinks, chance = (1 - found[kind][:, 1] / found[kind][:, 0] for kind in ("effect", "none"))
+        print(
+            f"| {study.name} | {len(shrinks)} | {before:.2f} | {after:.2f} |"
+            f" {np.median(shrinks):.2f} | {np.quantile(chance, 0.95):.2f} |"
+        )
+
+
+if __name__ == "__main__":
+    main()
