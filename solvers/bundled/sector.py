@@ -6,21 +6,20 @@ all that products of two of them see. On 2 N + 1 nodes round the tyre displaceme
 trigonometric polynomials, and sums over the stations exact integrals.
 
 The state under pressure is found again, because a stiffer sector also takes up other forces; then
-Davidson's method from the axisymmetric tyre's modes, with its K per harmonic.
+Ritz's method on the axisymmetric tyre's modes and on the responses K^-1 r to what is left of each,
+r = (K~ - lambda M~) u, the axisymmetric K per harmonic (Davidson, J. Comp. Physics 17, 1975).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from .circumference import Circumference
 from .coupled import split, tell
-from .fold import HALF_TURN, mirror_images
 from .gmres import gmres
-from .half_turns import davidson, part
 from .harmonics import HarmonicModes, Vibration
 from .inflation import InflationFailed
 from .mechanics import Load, mass
@@ -33,7 +32,8 @@ BEYOND = 6  # harmonics of the displacements beyond the highest wanted
 TOLERANCE = 1e-9  # out-of-balance force over the rim's
 LONGEST = 20  # iterations
 LOOSE = 1e-4  # of each step of Newton's method
-SAME = 1e-9  # of a field's image before and after a half turn
+INDEPENDENT = 1e-11  # of the basis' Gram matrix
+ROUNDS = 2  # of responses
 
 
 @dataclass(frozen=True)
@@ -88,7 +88,6 @@ class Round:
         self.vibration, self.tyre, self.highest = vibration, tyre, highest
         self.factors = [vibration.factor(n) for n in range(highest + 1)]
         self.free = vibration.numbering.equation < vibration.numbering.size
-        self.shape = len(tyre.around.angles), *self.free.shape
         around = tyre.around
         share = sector.share(_angles(len(around.weights)), 2 * highest)
         self._waves = around.N.T @ ((around.weights * share)[:, None] * around.N)
@@ -118,21 +117,6 @@ class Round:
                 "kj,njc->nkc", self._waves, (self._more @ flat).reshape(shape)
             )
         return np.asarray(image.swapaxes(0, 1) * self.free)
-
-    def half_turn(self) -> Callable[[Array], Array] | None:
-        """Fields turned, (Theta, Z) -> (-Theta, -Z), where that keeps the tyre, as one field tells:
-        its section is its own mirror image, whatever the cords' angles."""
-        other, k = mirror_images(self.tyre.model.mesh), len(self.tyre.around.angles)
-        if (other < 0).any() or (self.free != self.free[other]).any():
-            return None
-        back = -np.arange(k) % k
-        turned = lambda field: HALF_TURN * field[back][:, other]
-        field = np.random.default_rng(0).normal(size=(k, *self.free.shape)) * self.free
-        for image in (self.forces, self.inertia):
-            straight, round = image(field), turned(image(turned(field)))
-            if np.linalg.norm(straight - round) > SAME * np.linalg.norm(straight):
-                return None
-        return turned
 
     def response(self, force: Array) -> Array:
         """K^-1 of the plain tyre times forces, harmonic by harmonic."""
@@ -170,53 +154,24 @@ def sector_modes(
     tyre = Revolved(blended(model, sector.model, share), loads, around)
     fields = Round(vibration, tyre, sector, top)
     equilibrium(fields, U, check)
-    turned = fields.half_turn()
-    start: list[list[Array]] = [[], []] if turned else [[]]
-    places: dict[tuple[int, int], list[tuple[int, int]]] = {}  # of plain modes among them
-    for n in range(min(max(harmonics) + NEAR, top) + 1):
+    near = range(min(max(harmonics) + NEAR, top) + 1)
+    start: list[Array] = []
+    plain = {}
+    for n in near:
         for k, shape in enumerate(vibration.modes(n, count).shapes):
             pair = [fields.field(n, c * shape) for c in ((1.0, 1j) if n else (1.0,))]
-            places[n, k] = []
-            for kind, field in _by_kind(pair, turned):
-                places[n, k].append((kind, len(start[kind])))
-                start[kind].append(field)
-    each = len(harmonics) * count  # of a doublet one is kept, one reversed
-    doublets = sum((2 if n else 1) * count for n in harmonics)
-    wanted = [each + 2] * 2 if turned else [doublets + 2]
-    spaces = davidson(fields, start, wanted, turned, check)
-    values = np.concatenate([space.values for space in spaces])
-    order = np.argsort(values, kind="stable")
-    owner = [(kind, j) for kind, space in enumerate(spaces) for j in range(len(space.values))]
-    shares = [space.held(len(mine)) ** 2 for space, mine in zip(spaces, start, strict=True)]
-    held = {
-        key: np.array([sum(shares[kind][i, j] for kind, i in mine if kind == own)
-                       for own, j in (owner[o] for o in order)])
-        for key, mine in places.items()
-    }  # fmt: skip
+            plain[n, k] = range(len(start), len(start) + len(pair))
+            start += pair
+    wanted = sum((2 if n else 1) * count for n in harmonics)
+    values, modes, first = ritz_davidson(fields, start, wanted + 2, check)
+    held = {key: sum(first[i] ** 2 for i in places) for key, places in plain.items()}
     told = tell(held, harmonics, count)
     result = []
     for n in harmonics:
         size = np.sqrt(np.pi if n else 2 * np.pi)  # from the whole circle's unit mass
-        own = [owner[order[j]] for j in told[n]]
-        modes = [spaces[kind].mode(j).reshape(fields.shape) for kind, j in own]
-        shapes = np.array([size * fields.wave(mode, n) for mode in modes])
-        result.append(split(n, values[order[told[n]]], shapes))
+        shapes = np.array([size * fields.wave(modes(j), n) for j in told[n]])
+        result.append(split(n, values[told[n]], shapes))
     return result
-
-
-def _by_kind(
-    pair: list[Array], turned: Callable[[Array], Array] | None
-) -> Iterator[tuple[int, Array]]:
-    """The same modes as fields that the half turn keeps (0) and reverses (1), of a doublet one
-    each; without a half turn as they are."""
-    if turned is None:
-        yield from ((0, field) for field in pair)
-        return
-    kinds = [max((part(f, turned, kind) for f in pair), key=np.linalg.norm) for kind in (0, 1)]
-    sizes = [float(np.linalg.norm(field)) for field in kinds]
-    for kind, field in enumerate(kinds):
-        if len(pair) > 1 or sizes[kind] == max(sizes):
-            yield kind, field
 
 
 def equilibrium(fields: Round, U: Array, check: Callable[[], None]) -> None:
@@ -239,3 +194,34 @@ def equilibrium(fields: Round, U: Array, check: Callable[[], None]) -> None:
         step, _, _ = gmres(product, response, -force, LOOSE, LONGEST)
         state = state + step.reshape(shape)
     raise InflationFailed(0.0, 0.0, "Newton's method did not converge with the splice")
+
+
+def ritz_davidson(
+    fields: Round, start: list[Array], wanted: int, check: Callable[[], None]
+) -> tuple[Array, Callable[[int], Array], Array]:
+    """Eigenvalues (m,) rising, the fields of the modes, M~-normalised, by their place, and
+    (len(start), m): how much of each of the ``start`` fields they hold."""
+    shape, new, used = start[0].shape, start, 0
+    room = np.empty((3, len(start) + ROUNDS * wanted, start[0].size))
+    for left in reversed(range(ROUNDS + 1)):
+        for field in new:
+            check()
+            inertia = fields.inertia(field)
+            size = np.sqrt((field * inertia).sum())
+            field = field / size
+            for row, values in zip(
+                room[:, used], (field, fields.forces(field), inertia / size), strict=True
+            ):
+                row[:] = values.ravel()
+            used += 1
+        V, KV, MV = room[:, :used]
+        K, M = V @ KV.T, V @ MV.T
+        gram, turn = np.linalg.eigh((M + M.T) / 2)
+        turn = turn[:, gram > INDEPENDENT] / np.sqrt(gram[gram > INDEPENDENT])
+        values, inner = np.linalg.eigh(turn.T @ ((K + K.T) / 2) @ turn)
+        x = turn @ inner
+        if left:
+            lowest = x[:, :wanted].T
+            rest = lowest @ KV - values[:wanted, None] * (lowest @ MV)
+            new = [fields.response(force.reshape(shape)) for force in rest]
+    return values, lambda j: (x[:, j] @ V).reshape(shape), M[: len(start)] @ x

@@ -173,50 +173,6 @@ def test_no_share_is_the_plain_tyre(vibration: Vibration, inflated: Inflated) ->
     np.testing.assert_allclose(frequencies(got), plain(vibration), rtol=1e-8)
 
 
-@pytest.mark.parametrize("both_sides", [True, False])
-def test_half_turns_change_nothing(
-    vibration: Vibration, inflated: Inflated, monkeypatch: pytest.MonkeyPatch, both_sides: bool
-) -> None:
-    """A sector stiffer on both sides is kept by the half turn: two smaller problems, and half the
-    products, give the modes of the one. One that is stiffer on one side only is not."""
-    other = stiffer(inflated.model, 0.3)
-    if not both_sides:
-        rubbers = []
-        for r in other.rubbers:
-            z = inflated.model.mesh.X.real[r.solids.connectivity, 1].mean(1)
-            more = np.repeat(np.where(z > 0, 1.5, 1.0), r.solids.weights.shape[1])
-            law = replace(r.material, C10=r.material.C10 * more)
-            rubbers.append(replace(r, material=law))
-        other = replace(other, rubbers=rubbers)
-    found, products = [], []
-    half_turn, forces = sector.Round.half_turn, sector.Round.forces
-    turns: list[bool] = []
-
-    def watched(fields: sector.Round) -> object:
-        turned = half_turn(fields)
-        turns.append(turned is not None)
-        return turned
-
-    for each in (watched, lambda fields: None):
-        count = [0]
-
-        def counted(fields: sector.Round, field: Array, count: list[int] = count) -> Array:
-            count[0] += 1
-            return forces(fields, field)
-
-        monkeypatch.setattr(sector.Round, "half_turn", each)
-        monkeypatch.setattr(sector.Round, "forces", counted)
-        found.append(sector.sector_modes(
-            vibration, inflated.U, inflated.loads, inflated.model, Sector(0.3, other), WAVES,
-            COUNT, beyond=2,
-        ))  # fmt: skip
-        products.append(count[0])
-    assert turns == [both_sides]
-    np.testing.assert_allclose(frequencies(found[0]), frequencies(found[1]), rtol=3e-7)
-    assert abs(frequencies(found[0]) / plain(vibration) - 1).max() > 1e-3
-    assert (products[0] < 0.75 * products[1]) == both_sides
-
-
 class Bricks:
     """A tyre in three dimensions, independently: finite elements round the whole circle (spans of
     1, cos, sin), the first one about Theta = 0, with sparse matrices over all free components."""
