@@ -65,9 +65,13 @@ def warm_up() -> None:
     It imports what they need while its parent does the same for itself, so that a worker begins
     at once: two seconds of a core less for two of them.
     """
-    with ctrl_c_put_off():
-        get_context("forkserver").set_forkserver_preload([WARM])
+    get_context("forkserver").set_forkserver_preload([WARM])
+    # it inherits the mask: Ctrl-C is its parent's to answer, from its first moment on
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+    try:
         forkserver.ensure_running()
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def process_pool(jobs: int) -> Pool:
