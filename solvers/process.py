@@ -6,8 +6,19 @@ import os
 import shutil
 import signal
 import subprocess
+import sys
+import time
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
+from typing import Any
+
+GRACE_S = 2.0  # for a group that was asked to end
+OWN_GROUP: dict[str, Any] = {"start_new_session": True}
+if sys.platform == "win32":
+    OWN_GROUP = {"creationflags": subprocess.CREATE_NEW_PROCESS_GROUP}
+
+_running: list[subprocess.Popen[bytes]] = []
 
 
 class RunFailed(RuntimeError):
@@ -32,8 +43,9 @@ def run_command(
     """Run ``command`` (an argument list, no shell) in ``folder``; its exit code.
 
     All output goes to the file ``log`` there. The command gets a process group of its own, which
-    is ended as a whole when the time is over or this process is interrupted. Where this process
-    is killed outright, Linux ends the command, but not what the command has started.
+    is ended as a whole when the time is over or this process is interrupted: asked first, and
+    killed if it has not ended after `GRACE_S`. Where this process is killed outright, Linux ends
+    the command, but not what the command has started.
     Raises RunFailed (``timed_out``, or ``crashed`` where the command cannot be started).
     """
     with (folder / log).open("wb") as output:
@@ -45,10 +57,11 @@ def run_command(
                 stdout=output,
                 stderr=subprocess.STDOUT,
                 env={**os.environ, **(environment or {})},
-                start_new_session=True,
+                **OWN_GROUP,
             )
         except OSError as error:
             raise RunFailed("crashed", f"cannot start '{command[0]}'", str(error)) from None
+        _running.append(process)
         try:
             return process.wait(time_limit_s)
         except subprocess.TimeoutExpired:
@@ -60,6 +73,13 @@ def run_command(
         finally:
             if process.poll() is None:
                 _end(process)
+            _running.remove(process)
+
+
+def end_commands() -> None:
+    """End all commands that `run_command` runs in other threads, which hear of no interruption."""
+    for process in list(_running):
+        _end(process)
 
 
 def _leash(program: str) -> list[str]:
@@ -73,16 +93,42 @@ def _leash(program: str) -> list[str]:
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:
-    """End the whole group: children that the command started too."""
-    for sign, patience in ((signal.SIGTERM, 2.0), (signal.SIGKILL, 10.0)):
-        try:
-            os.killpg(process.pid, sign)
-            process.wait(patience)
-            return
-        except ProcessLookupError:
-            return
-        except subprocess.TimeoutExpired:
-            continue
+    """End the whole group: children that the command started too, whatever they ignore."""
+    if not hasattr(os, "killpg"):
+        _end_tree(process)
+        return
+    try:
+        os.killpg(process.pid, signal.SIGTERM)
+        end = time.monotonic() + GRACE_S
+        while _is_alive(process) and time.monotonic() < end:
+            time.sleep(0.02)
+    except OSError:  # there is none any more
+        pass
+    finally:  # at once, where patience is interrupted
+        with suppress(OSError):
+            os.killpg(process.pid, signal.SIGKILL)
+        with suppress(subprocess.TimeoutExpired):  # one that the kernel does not let go
+            process.wait(10.0)
+
+
+def _is_alive(process: subprocess.Popen[bytes]) -> bool:
+    """Whether any of the group is; its number is not given away as long as one is."""
+    process.poll()
+    try:
+        os.killpg(process.pid, 0)
+    except OSError:
+        return False
+    return True
+
+
+def _end_tree(process: subprocess.Popen[bytes]) -> None:
+    """As Windows has it, which knows what started what as long as it lives."""
+    taskkill = shutil.which("taskkill")
+    if taskkill:
+        command = [taskkill, "/T", "/F", "/PID", str(process.pid)]
+        subprocess.run(command, capture_output=True, check=False)
+    process.kill()
+    process.wait()
 
 
 def last_words(log: Path, lines: int = 3) -> str:

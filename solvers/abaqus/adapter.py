@@ -32,7 +32,10 @@ class Decks(Protocol):
 
 
 class Abaqus:
-    """Adapter of ABAQUS/Standard (see the tool's solver contract). Unconfirmed on an ABAQUS."""
+    """Adapter of ABAQUS/Standard (see the tool's solver contract). Unconfirmed on an ABAQUS.
+
+    ``command``: words that start it.
+    """
 
     name = "abaqus"
     dialect = "abaqus"
@@ -40,12 +43,15 @@ class Abaqus:
     refusals = (OptionRefused, DeckError)
     failures = (RunFailed,)
 
+    def __init__(self) -> None:
+        self.command = ["abaqus"]
+
     @cached_property
     def version(self) -> str:
-        """Release of the ``abaqus`` on the path, "unknown" where there is none."""
+        """Release of the program, "unknown" where there is none."""
         try:
             said = subprocess.run(
-                ["abaqus", "information=release"],
+                [*self.command, "information=release"],
                 capture_output=True,
                 text=True,
                 timeout=60,
@@ -58,18 +64,19 @@ class Abaqus:
 
     def write(self, decks: Decks, folder: Path) -> list[Path]:
         """Write the decks and, beside them, the case's options. Raises ``refusals``."""
-        paths = [read_options(decks.case.case.solver.options).save(folder)]
+        program = self.command if self.version == "unknown" else []
+        paths = [read_options(decks.case.case.solver.options).save(folder, program)]
         for name, text in decks.texts(self.dialect).items():
             paths.append(folder / name)
-            paths[-1].write_text(text)
+            paths[-1].write_text(text, encoding="utf-8", newline="")
         read_question(folder / f"{JOB}.inp")  # refused before it runs, not after
         return paths
 
     def run(self, folder: Path, time_limit_s: float) -> None:
         """Run both jobs, ``time_limit_s`` for the two together. Raises ``failures``."""
         options = load(folder)
-        spent = run_job(OLDJOB, None, options, folder, time_limit_s)
-        run_job(JOB, OLDJOB, options, folder, max(time_limit_s - spent, 0.0))
+        spent = run_job(OLDJOB, None, self.command, options, folder, time_limit_s)
+        run_job(JOB, OLDJOB, self.command, options, folder, max(time_limit_s - spent, 0.0))
 
     def read(self, folder: Path) -> dict[str, Any]:
         """Results as plain data: each mode a real shape on the crown's nodes.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 from ..process import RunFailed, last_words, run_command
@@ -19,15 +20,21 @@ TAIL = 200_000  # bytes of a file that are searched for messages: they stand nea
 
 
 def run_job(
-    job: str, oldjob: str | None, options: Options, folder: Path, time_limit_s: float
+    job: str,
+    oldjob: str | None,
+    program: Sequence[str],
+    options: Options,
+    folder: Path,
+    time_limit_s: float,
 ) -> float:
-    """Run ``job`` (on top of ``oldjob``) in ``folder``; the seconds that its last attempt took.
+    """Run ``job`` (on top of ``oldjob``) by ``program`` in ``folder``; the seconds that its last
+    attempt took.
 
     Output goes to JOB.out. A denied licence is asked for again, after waits that double, until
     ``options.licence_wait_s`` are over; waiting does not count towards ``time_limit_s``.
     Raises RunFailed: ``licence``, ``timed_out``, ``no_equilibrium`` or ``crashed``.
     """
-    command = [*options.command, f"job={job}", *([f"oldjob={oldjob}"] if oldjob else [])]
+    command = [*program, f"job={job}", *([f"oldjob={oldjob}"] if oldjob else [])]
     waited, wait = 0.0, options.licence_first_wait_s
     while True:
         _clear(job, folder)

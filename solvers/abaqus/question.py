@@ -20,7 +20,7 @@ def read_question(path: Path) -> Question:
     """The question of a deck. Raises DeckError."""
     modes, pressure = None, 0.0
     procedures = 0
-    for k in read_keywords(path.read_text(), path.stem):
+    for k in read_keywords(path.read_text(encoding="utf-8"), path.stem):
         if k.name == "FREQUENCY":
             procedures += 1
             row = k.only_row()

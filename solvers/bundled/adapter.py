@@ -58,7 +58,7 @@ class Bundled:
         paths = []
         for name, text in decks.texts(self.dialect).items():
             paths.append(folder / name)
-            paths[-1].write_text(text)
+            paths[-1].write_text(text, encoding="utf-8", newline="")
         if decks.loads_N:
             return paths
         request = {
@@ -68,7 +68,7 @@ class Bundled:
             **{k: decks.request[k] for k in ASIDE if k in decks.request},
         }
         paths.append(folder / f"{JOB}.request.json")
-        paths[-1].write_text(json.dumps(request))
+        paths[-1].write_text(json.dumps(request), encoding="utf-8", newline="")
         return paths
 
     def run(self, folder: Path, time_limit_s: float) -> None:
@@ -80,7 +80,7 @@ class Bundled:
         """Results as plain data: the last frequency step of the job, or the footprints."""
         if (folder / f"{PRESS}.inp").exists():
             return press_job.read(folder / PRESS)
-        step = json.loads((folder / f"{JOB}.json").read_text())["steps"][-1]
+        step = json.loads((folder / f"{JOB}.json").read_text(encoding="utf-8"))["steps"][-1]
         with np.load(folder / f"{JOB}.npz", allow_pickle=False) as arrays:
             nodes, points = arrays["nodes"], arrays["points"]
             displacement = arrays[f"displacement_{step['step']}"]

@@ -12,7 +12,7 @@ from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg.lapack import spotrf, strtri
+from scipy.linalg.lapack import spotrf, strtrs
 
 from .band import Indefinite
 from .circumference import Circumference
@@ -348,7 +348,8 @@ def _cholesky(A: Array, pool: ThreadPoolExecutor) -> None:
         L, info = spotrf(A, lower=1)
         if info:
             raise Indefinite("the tangent stiffness is not positive definite")
-        A[:] = np.tril(strtri(L, lower=1)[0])
+        # not by strtri, which ends the process with OpenBLAS's Prescott kernel
+        A[:] = np.tril(strtrs(L, np.eye(len(A), dtype=L.dtype, order="F"), lower=1)[0])
         return
     h = len(A) // 2
     _cholesky(A[:h, :h], pool)

@@ -51,7 +51,7 @@ STEPS: dict[str, dict[str, Values]] = {
         "SIM": ("NO",),
     },
     "BOUNDARY": {"OP": ("MOD", "NEW")},
-    "COMPLEX FREQUENCY": {},
+    "COMPLEX FREQUENCY": {"PROPERTY EVALUATION": None},
     "DLOAD": {"OP": ("MOD",)},
     "DSLOAD": {"OP": ("MOD",)},
     "CLOAD": {"OP": ("MOD",)},
@@ -126,6 +126,12 @@ def check(keywords: list[Keyword], revolve: bool) -> tuple[list[Keyword], list[l
             inside = False
     if inside:
         raise DeckError(steps[-1][0].line, "*STEP without *END STEP: the deck is cut off")
+    formats = [keyword for keyword in keywords if keyword.name == "FILE FORMAT"]
+    if len(formats) > 1:
+        raise DeckError(
+            formats[1].line,
+            f"*FILE FORMAT may stand once in a job, it is given at line {formats[0].line} already",
+        )
     return model, steps
 
 

@@ -18,7 +18,7 @@ from .frequency import frequency_step
 from .harmonics import HarmonicModes, Unstable
 from .inflated import Inflated, Models
 from .inflation import InflationFailed, equilibrium
-from .keywords import DeckError, Keyword
+from .keywords import DeckError, Keyword, read_deck
 from .loads import pressures, turning
 from .mechanics import mass
 from .model import build
@@ -43,14 +43,18 @@ def run(folder: Path, job: str, oldjob: str | None, time_limit: float = float("i
     """
     deadline = time.monotonic() + time_limit
     with _threads().limit(limits=1, user_api="blas"):
-        texts = {name: (folder / f"{name}.inp").read_text() for name in (job, oldjob) if name}
-        request = read_request(folder / f"{job}.request.json")
+        texts = {name: read_deck(folder / f"{name}.inp") for name in (job, oldjob) if name}
+        deck = Deck(texts, job, oldjob)
+        request = read_request(folder / f"{job}.request.json", list(texts))
         sector = read_sector(folder, request.sector) if request.sector else []
-        analysis = Analysis(Deck(texts, job, oldjob), request, deadline, sector)
-        if analysis.road is not None:
-            press_job.write(folder / job, analysis.model, analysis.press())
-        else:
-            write(folder / job, analysis.model, analysis.run())
+        analysis = Analysis(deck, request, deadline, sector)
+        try:
+            if analysis.road is not None:
+                press_job.write(folder / job, analysis.model, analysis.press())
+            else:
+                write(folder / job, analysis.model, analysis.run())
+        except (np.linalg.LinAlgError, OverflowError, ZeroDivisionError) as error:
+            raise NotConverged(f"the deck's numbers are too far apart: {error}") from None
 
 
 @cache

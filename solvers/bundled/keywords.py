@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from pathlib import Path
+
+LARGEST = 100_000_000  # bytes of a deck
 
 
 class Line(int):
@@ -29,6 +32,21 @@ class DeckError(ValueError):
         where = f"{job}.inp" if job else "deck"
         super().__init__(f"{where}, line {line}: {message}" if line else f"{where}: {message}")
         self.line = line
+
+
+def read_deck(path: Path) -> str:
+    """The text of a deck, or of what stands beside it. Raises DeckError where it is no file of
+    text, or too large; OSError."""
+    if path.exists() and not path.is_file():
+        raise DeckError(0, f"{path.name} is not a regular file")
+    with path.open("rb") as file:
+        content = file.read(LARGEST + 1)
+    if len(content) > LARGEST:
+        raise DeckError(0, f"{path.name} is larger than {LARGEST / 1e6:g} MB")
+    try:
+        return content.decode("utf-8").replace("\r\n", "\n").replace("\r", "\n")
+    except UnicodeDecodeError:
+        raise DeckError(0, f"{path.name} is not text in UTF-8") from None
 
 
 @dataclass
@@ -191,6 +209,11 @@ def seed(keywords: list[Keyword], tangents: list[tuple[int, int, float]]) -> lis
         numbers = {line for line, _ in keyword.lines} if inside else set()
         own = {line: by_line.pop(line) for line in inside if line in numbers}
         copy = Keyword(keyword.name, keyword.line, keyword.parameters, keyword.lines, own)
+        for row in copy.rows if own else ():
+            if any(index >= len(row.fields) for index in row.tangents):
+                raise DeckError(
+                    row.line, "a sensitivity is asked for, but the line has no such field"
+                )
         result.append(copy if own else keyword)
     if by_line:
         raise DeckError(min(by_line), "a sensitivity is asked for, but the line holds no data")

@@ -87,19 +87,23 @@ def _properties(
 ) -> Model:
     rubber_of: dict[str, list[tuple[Array, Material, complex | float]]] = {}
     cords: dict[str, list[Cords]] = {}
-    stiffness = _hourglass_controls(keywords)
+    controls = {k.need("NAME") for k in keywords if k.name == "SECTION CONTROLS"}
     layers: Keyword | None = None
-    for k in keywords:
+    for before, k, after in zip([None, *keywords], keywords, [*keywords[1:], None], strict=False):
         if k.name == "SOLID SECTION":
             material = _find(k, materials, k.need("MATERIAL"))
             if material.C10 is None:
                 raise DeckError(k.line, f"material {material.name} of a solid is not hyperelastic")
             control = k.get("CONTROLS")
-            if control and control not in stiffness:
+            if control and control not in controls:
                 raise DeckError(k.line, f"section controls {control} are not defined")
             for kind, rows in _by_type(k, mesh, POINTS).items():
-                rubber_of.setdefault(kind, []).append(
-                    (rows, material, stiffness.get(control, -1.0))
+                rubber_of.setdefault(kind, []).append((rows, material, _hourglass(after)))
+        elif k.name == "HOURGLASS STIFFNESS":
+            if before is None or before.name != "SOLID SECTION":
+                raise DeckError(
+                    k.line,
+                    "*HOURGLASS STIFFNESS must stand right under the *SOLID SECTION that it is of",
                 )
         elif k.name == "SURFACE SECTION":
             layers = k
@@ -137,19 +141,11 @@ def _by_type(k: Keyword, mesh: Mesh, kinds: object) -> dict[str, Array]:
     return {kind: np.array(r) for kind, r in rows.items()}
 
 
-def _hourglass_controls(keywords: list[Keyword]) -> dict[str, complex | float]:
-    """Hourglass shear stiffness (Pa) by name of section controls; -1 = the default 0.005 G."""
-    controls: dict[str, complex | float] = {}
-    name = ""
-    for k in keywords:
-        if k.name == "SECTION CONTROLS":
-            name = k.need("NAME")
-            controls[name] = -1.0
-        elif k.name == "HOURGLASS STIFFNESS":
-            if not name:
-                raise DeckError(k.line, "*HOURGLASS STIFFNESS must follow *SECTION CONTROLS")
-            controls[name] = k.only_row().number(0)
-    return controls
+def _hourglass(after: Keyword | None) -> complex | float:
+    """Hourglass shear stiffness (Pa) from the keyword after a section; -1 = the default 0.005 G."""
+    if after is None or after.name != "HOURGLASS STIFFNESS":
+        return -1.0
+    return after.only_row().number(0)
 
 
 def _rubber(

@@ -44,6 +44,7 @@ CAUSES: dict[type[Exception], str] = {
     NotPressed: "no_equilibrium",
     Unstable: "unstable",
     NotConverged: "crashed",
+    np.linalg.LinAlgError: "crashed",
 }
 OF_MODES = ("mode_frequency_Hz", "mode_node", "mode_shape")
 
@@ -179,9 +180,11 @@ def press(
             footprint = _footprint(work, found, load, tread)
             if load in vibrations:
                 footprint |= _modes(work, found, vibrations[load], tread, equations, U)
-        except (NotPressed, Unstable, NotConverged, give_up) as error:
+        except (NotPressed, Unstable, NotConverged, np.linalg.LinAlgError, give_up) as error:
+            if isinstance(error, give_up) and work.load:
+                error = give_up(f"{error} after {work.load:.4g} N{work.depth()}")
             if not footprints:
-                raise
+                raise error from None
             failure = str(error)
             cause = "timed_out" if isinstance(error, give_up) else CAUSES[type(error)]
             break
@@ -293,12 +296,14 @@ def write(stem: Path, model: Model, result: dict[str, Any]) -> None:
         np.savez(file, **arrays)
     plain = {k: v for k, v in result.items() if k != "angles"}
     text = json.dumps({"format": 1, **plain, "footprints": lines}, indent=1)
-    stem.with_name(stem.name + ".json").write_text(text + "\n")
+    stem.with_name(stem.name + ".json").write_text(text + "\n", encoding="utf-8", newline="")
 
 
 def read(stem: Path) -> dict[str, Any]:
     """What `write` wrote, as plain data."""
-    answer: dict[str, Any] = json.loads(stem.with_name(stem.name + ".json").read_text())
+    answer: dict[str, Any] = json.loads(
+        stem.with_name(stem.name + ".json").read_text(encoding="utf-8")
+    )
     with np.load(stem.with_name(stem.name + ".npz"), allow_pickle=False) as arrays:
         for name in ("nodes", "points", "angles"):
             answer[name] = arrays[name]

@@ -4,6 +4,7 @@ height at a given load, preconditioned GMRES inside, loads one after the other.
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -18,6 +19,7 @@ from .road import Contact, Road
 from .touching import Touching
 
 Array = np.ndarray
+log = logging.getLogger("tyrecal_solvers")
 TOLERANCE = 1e-8  # out-of-balance force over the load
 LONGEST = 40  # Newton iterations a load
 EXHAUSTED = 15  # GMRES iterations of a step, after which the preconditioner is formed anew
@@ -34,6 +36,7 @@ HARDER = 0.3  # from one elastic slip to the next smaller one
 SHORTEST = 1 / 64  # step of the line search
 TOUCH = 1e-6  # m/N of deflection to begin with: it must touch, and stay small
 SOFTEST = 1 / 16  # share of a load's increase, below which it counts as unreachable
+FURTHEST = 0.1  # of the section's height that a stiff tyre (`TOUCH`) goes down in one step
 
 
 Bound = tuple[Array, Array]
@@ -62,6 +65,7 @@ class Press:
     def __init__(self, tyre: Revolved, fold: Fold, road: Road, U: Array, check: Callable[[], None]):
         self.tyre, self.fold, self.check = tyre, fold, check
         self.free_radius = float(road.positions(U)[..., 0].max())
+        self.flat = self._flat_height(tyre.model.mesh.X, np.flatnonzero(~fold.free.any(1)))
         self.road = road.settled(road.forces(U, self.free_radius))
         tyre.residual(U)
         self.order = Elimination([t[0] for t in tyre.tangents()], fold, tyre.around)
@@ -76,8 +80,9 @@ class Press:
         self.factorisations = self.products = self.iterations = 0
 
     def to(self, load: float) -> Pressed:
-        """The equilibrium at ``load`` (N), in smaller steps where need be. Raises NotPressed."""
-        step = load - self.load
+        """The equilibrium at ``load`` (N), in smaller steps where need be. Raises NotPressed, also
+        where the road has come to the rim."""
+        step = min(load - self.load, FURTHEST * (self.free_radius - self.flat) / TOUCH)
         smallest = SOFTEST * step
         while True:
             self.check()
@@ -89,13 +94,30 @@ class Press:
                 self._factor = None
                 if step < smallest:
                     raise NotPressed(
-                        f"no equilibrium between {self.load:.4g} and {target:.4g} N: {error}"
+                        f"no equilibrium between {self.load:.4g} and {target:.4g} N"
+                        f"{self.depth()}: {error}"
                     ) from None
                 continue
             self.parts, self.height, self.load = found.parts, found.height, target
+            if self.height <= self.flat:
+                raise NotPressed(f"the tyre is flat on its rim at {target:.4g} N{self.depth()}")
             self.road = self.road.settled(found.contact)
             if target == load:
                 return found
+            log.info("%g of %g N are reached%s", target, load, self.depth())
+
+    def depth(self) -> str:
+        """In words, how far down the last load reached has pressed the tyre; "" before any."""
+        down, most = self.free_radius - self.height, self.free_radius - self.flat
+        return f" ({1e3 * down:.0f} of {1e3 * most:.0f} mm down to the rim)" if self.load else ""
+
+    @staticmethod
+    def _flat_height(X: Array, held: Array) -> float:
+        """The road's height, m, at which the crown lies on the rim: points X (n, 3) at rest; the
+        rim's are those with the indices ``held``."""
+        rim = float(X[held, 0].max(initial=0.0))
+        z = np.where(X[:, 0] > rim, np.abs(X[:, 1]), np.inf)
+        return rim + float(np.ptp(X[z <= z.min() + 1e-9, 0]))
 
     def rest(self) -> None:
         """Let go of the memory that is only of use while the load stays."""

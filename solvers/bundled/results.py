@@ -87,7 +87,7 @@ def write(stem: Path, model: Model, results: list[StepResult]) -> None:
     with stem.with_name(stem.name + ".npz").open("wb") as file:
         np.savez(file, **arrays)  # type: ignore[arg-type]
     text = json.dumps({"format": 1, "solver": f"bundled {VERSION}", "steps": steps}, indent=1)
-    stem.with_name(stem.name + ".json").write_text(text + "\n")
+    stem.with_name(stem.name + ".json").write_text(text + "\n", encoding="utf-8", newline="")
 
 
 def _hertz(eigenvalue: float) -> float:

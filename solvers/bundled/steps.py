@@ -50,6 +50,9 @@ class Deck:
     def __init__(self, texts: dict[str, str], job: str, oldjob: str | None):
         self._order = [oldjob, job] if oldjob else [job]
         self._keywords = {name: read_keywords(texts[name], name) for name in self._order}
+        for k in [] if oldjob else self._keywords[job]:
+            if k.name == "SYMMETRIC MODEL GENERATION":
+                raise DeckError(k.line, "this job revolves a section job: name that with --oldjob")
 
     def read(self, tangents: list[Tangent]) -> tuple[list[Keyword], list[Keyword], list[Step]]:
         """Model blocks of the section job and of the one that revolves it (none: empty), and all

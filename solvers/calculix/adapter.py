@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import shlex
 import shutil
 import subprocess
 import time
@@ -16,7 +15,7 @@ from typing import Any, Protocol
 import numpy as np
 from scipy.spatial import KDTree
 
-from ..process import RunFailed
+from ..process import RunFailed, end_commands
 from .results import Fields, pairs, read_eigenvalues, read_fields, read_mass
 from .runner import clear, run_job
 
@@ -24,7 +23,6 @@ Array = np.ndarray
 SECTOR, SETTINGS, INFLATE = "sector.inp", "calculix.json", "inflate"
 REVOLVED = 1e-3  # of the largest displacement; 2e-4 moves no frequency by 0.001 %, 9e-3 one by 5 %
 OPTIONS: dict[str, Any] = {
-    "command": "ccx",
     "parallel": 1,
     "element": "C3D20R",
     "ply_thickness_m": 2e-4,
@@ -47,9 +45,9 @@ class Decks(Protocol):
 class CalculiX:
     """Adapter of CalculiX (see the tool's solver contract).
 
-    Options: ``command``; ``parallel``, decks of one evaluation at a time; ``element``, C3D20R or
-    C3D8, and ``ply_thickness_m`` are the deck's. A difference in ln of a variable needs
-    ``difference_step``, since frequencies have seven digits.
+    ``command``: words that start ccx. Options: ``parallel``, decks of one evaluation at a time;
+    ``element``, C3D20R or C3D8, and ``ply_thickness_m`` are the deck's. A difference in ln of a
+    variable needs ``difference_step``, since frequencies have seven digits.
     """
 
     name = "calculix"
@@ -59,30 +57,34 @@ class CalculiX:
     failures = (RunFailed,)
     difference_step = 1e-3
 
+    def __init__(self) -> None:
+        self.command = ["ccx"]
+
     @property
     def version(self) -> str:
         """As ``ccx -v`` has it; "unknown" where there is no ccx."""
-        return _version(OPTIONS["command"])
+        return _version(tuple(self.command))
 
     def write(self, decks: Decks, folder: Path) -> list[Path]:
         """Write the decks and, beside them, how to run them. Raises Refused."""
         settings = _settings(decks.case.case)
+        if self.version == "unknown":  # else the version tells this program's answers from others'
+            settings["command"] = self.command
         paths = []
         for name, text in decks.texts(self.dialect).items():
             paths.append(folder / name)
-            paths[-1].write_text(text)
+            paths[-1].write_text(text, encoding="utf-8", newline="")
         paths.append(folder / SETTINGS)
-        paths[-1].write_text(json.dumps(settings))
+        paths[-1].write_text(json.dumps(settings), encoding="utf-8", newline="")
         return paths
 
     def run(self, folder: Path, time_limit_s: float) -> None:
         """Run every deck; ``time_limit_s`` is for all of them together. Raises RunFailed."""
-        settings = json.loads((folder / SETTINGS).read_text())
-        command = shlex.split(settings["command"])
+        settings = json.loads((folder / SETTINGS).read_text(encoding="utf-8"))
         end = time.monotonic() + time_limit_s
 
         def run_one(job: str, *inputs: str) -> None:
-            run_job(folder, job, inputs, command, max(0.0, end - time.monotonic()))
+            run_job(folder, job, inputs, self.command, max(0.0, end - time.monotonic()))
 
         def run_modes(job: str) -> None:
             start, ended = f"{job}.rin", f"{job}.rout"
@@ -105,6 +107,9 @@ class CalculiX:
             pool = ThreadPoolExecutor(settings["parallel"])
             try:
                 list(pool.map(run_modes, jobs))
+            except KeyboardInterrupt:
+                end_commands()
+                raise
             finally:
                 pool.shutdown(cancel_futures=True)  # what has not begun, after a failure
         state.unlink()
@@ -173,9 +178,9 @@ def _inflated(path: Path) -> tuple[Fields, Array]:
 
 
 @lru_cache
-def _version(command: str) -> str:
+def _version(command: tuple[str, ...]) -> str:
     try:
-        said = subprocess.run([command, "-v"], capture_output=True, text=True, timeout=20).stdout
+        said = subprocess.run([*command, "-v"], capture_output=True, text=True, timeout=20).stdout
     except (OSError, subprocess.TimeoutExpired):
         return "unknown"
     found = re.search(r"Version (\S+)", said)
@@ -213,7 +218,7 @@ def _jobs(folder: Path) -> list[tuple[int, str]]:
 def _check_rubber(path: Path) -> None:
     """ccx gives frequencies of rubber that is none: it looks for eigenvalues next to zero, and
     does not see the negative ones. Raises RunFailed (``unstable``)."""
-    for row in re.findall(r"\*HYPERELASTIC[^\n]*\n([^\n*]*)", path.read_text()):
+    for row in re.findall(r"\*HYPERELASTIC[^\n]*\n([^\n*]*)", path.read_text(encoding="utf-8")):
         try:
             *shear, D1 = (float(value) for value in row.split(","))
         except ValueError:
@@ -226,7 +231,7 @@ def _check_rubber(path: Path) -> None:
 
 
 def _find(pattern: str, path: Path) -> str:
-    found = re.search(pattern, path.read_text(), re.I)
+    found = re.search(pattern, path.read_text(encoding="utf-8"), re.I)
     if not found:
         raise RunFailed("no_results", f"{path.name} has no {pattern.split(' *')[0]}")
     return found[1]
@@ -243,8 +248,6 @@ def _settings(case: Any) -> dict[str, Any]:
             " rubber at a frequency"
         )
     settings = {**OPTIONS, **given}
-    if not isinstance(settings["command"], str) or not settings["command"].strip():
-        raise Refused(f"solver.options.command is '{settings['command']}', must be a command")
     if type(settings["parallel"]) is not int or settings["parallel"] < 1:
         raise Refused(f"solver.options.parallel is '{settings['parallel']}', must be 1 or more")
-    return {name: settings[name] for name in ("command", "parallel")}
+    return {"parallel": settings["parallel"]}

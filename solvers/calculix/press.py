@@ -57,9 +57,12 @@ def read_press(folder: Path) -> list[Pressed]:
     path = folder / f"{JOB}.dat"
     if not path.exists():
         raise RunFailed("no_results", f"CalculiX left no {path.name}")
-    deck, text = (folder / f"{JOB}.inp").read_text(), path.read_text(errors="replace")
+    deck, text = (
+        (folder / f"{JOB}.inp").read_text(encoding="utf-8"),
+        path.read_text(encoding="utf-8", errors="replace"),
+    )
     asked = [float(value) for value in re.findall(r"^\*\* deflection (\S+) m", deck, re.M)]
-    halves = 2 if "*EQUATION" in (folder / WHEEL).read_text() else 1
+    halves = 2 if "*EQUATION" in (folder / WHEEL).read_text(encoding="utf-8") else 1
     patterns = (REACTION.replace("NAME", "ROAD"), REACTION.replace("NAME", "RIM"), CONTACT)
     tables = [_rows(pattern, text, path.name) for pattern in patterns]
     times = [float(k) for k in range(1, len(asked) + 1)]
@@ -101,7 +104,7 @@ def read_pressures(folder: Path) -> list[np.ndarray]:
     Of half the patch where half the tyre ran. Raises RunFailed (``no_results``).
     """
     path = folder / f"{JOB}.frd"
-    fields, found = read_fields(path), PATCH.findall(path.read_text())
+    fields, found = read_fields(path), PATCH.findall(path.read_text(encoding="utf-8"))
     if len(found) != len(fields.blocks):
         raise RunFailed("no_results", f"{path.name} has {len(found)} patches")
     patches = []

@@ -126,4 +126,4 @@ def _number(text: str, path: Path) -> float:
 def _text(path: Path) -> str:
     if not path.exists() or not path.stat().st_size:
         raise RunFailed("no_results", f"CalculiX left no {path.name}")
-    return path.read_text(errors="replace")
+    return path.read_text(encoding="utf-8", errors="replace")

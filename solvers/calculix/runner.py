@@ -11,6 +11,7 @@ from pathlib import Path
 from ..process import RunFailed, last_words, run_command
 
 RESULTS = ("dat", "frd", "sta", "cvg", "12d", "rout")
+LONGEST_LINE = 10_000  # characters of a log
 LONGEST_PATH = 100  # ccx keeps 132 characters of a file's path, the file's name included
 NO_EQUILIBRIUM = re.compile(r"increment size smaller|too many cutbacks|max\. # of increments", re.I)
 
@@ -56,27 +57,33 @@ def _run(folder: Path, job: str, command: Sequence[str], time_limit_s: float) ->
     log = folder / f"{job}.log"
     threads = {"OMP_NUM_THREADS": "1", "CCX_NPROC_STIFFNESS": "1", "CCX_NPROC_RESULTS": "1"}
     code = run_command([*command, job], folder, time_limit_s, log.name, threads)
-    said = log.read_text(errors="replace")
-    error = _error(said)
+    error, lost, finished = _said(log)
     words = error or last_words(log)
-    if NO_EQUILIBRIUM.search(said):
+    if lost:
         raise RunFailed("no_equilibrium", f"CalculiX found no inflated state ({job})", words)
     if code != 0:
         raise RunFailed("crashed", f"CalculiX ended with code {code} ({job})", words)
     if error:
         raise RunFailed("crashed", f"CalculiX reported an error ({job})", words)
-    if "Job finished" not in said:
+    if not finished:
         raise RunFailed("crashed", f"CalculiX stopped before its end ({job})", words)
 
 
-def _error(said: str) -> str:
-    """The first ``*ERROR`` of a log with the two lines that follow it; empty where none is.
+def _said(log: Path) -> tuple[str, bool, bool]:
+    """Of a log of any length: the first ``*ERROR`` with the two lines that follow it, or "";
+    whether there was no equilibrium; whether the job finished.
 
     A card that ccx skips, or of which it skips a parameter, is an error too: it only warns.
     """
-    lines = [line.strip() for line in said.splitlines() if line.strip()]
-    for i, line in enumerate(lines):
-        skipped = line.startswith("*WARNING reading") and line.endswith("Card image:")
-        if skipped or line.upper().startswith("*ERROR"):
-            return " ".join(lines[i : i + 3])
-    return ""
+    error: list[str] = []
+    lost = finished = False
+    with log.open(encoding="utf-8", errors="replace") as file:
+        for line in iter(lambda: file.readline(LONGEST_LINE), ""):
+            lost = lost or bool(NO_EQUILIBRIUM.search(line))
+            finished = finished or "Job finished" in line
+            line = line.strip()
+            skipped = line.startswith("*WARNING reading") and line.endswith("Card image:")
+            begins = skipped or line.upper().startswith("*ERROR")
+            if line and len(error) < 3 and (error or begins):
+                error.append(line)
+    return " ".join(error), lost, finished

@@ -11,6 +11,7 @@ from threadpoolctl import threadpool_limits
 from tyrecal_solvers.bundled.mechanics import Load
 from tyrecal_solvers.bundled.model import Model
 
+from ..chance import generator
 from . import support
 
 Array = np.ndarray
@@ -44,4 +45,4 @@ def inflated() -> Inflated:
 
 @pytest.fixture
 def random() -> np.random.Generator:
-    return np.random.default_rng(7)
+    return generator(7)

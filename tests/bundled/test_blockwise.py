@@ -12,9 +12,12 @@ from tyrecal_solvers.bundled.circumference import half_circle
 from tyrecal_solvers.bundled.fold import Fold
 from tyrecal_solvers.bundled.revolved import Revolved
 
+from ..chance import generator
 from . import support
 from .conftest import Inflated
 from .contact import ring
+
+pytestmark = pytest.mark.numbers
 
 Array = np.ndarray
 LENGTHS = np.array([0.05, 0.05, 0.1, 0.3, 0.6, 0.9, np.pi - 2.0])
@@ -46,7 +49,7 @@ class Problem:
         return self.fold.gather(self.tyre.product(U) + contact)
 
     def random(self) -> Array:
-        x = np.random.default_rng(5).normal(size=(2, *self.fold.mask.shape))
+        x = generator(5).normal(size=(2, *self.fold.mask.shape))
         return x * self.fold.mask
 
 

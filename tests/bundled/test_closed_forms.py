@@ -76,7 +76,7 @@ def test_spin_of_an_inflated_ring() -> None:
 
 def test_ring_of_the_calculix_study() -> None:
     """Inner radius 0.30 m, 15 mm, 240 kPa: the thin-ring formula gives 55.94 Hz for n = 2 and
-    CalculiX C3D20R 55.98 (facts/calculix.md). (h/R)^2 = 0.24 % is left out by the formula, so it
+    CalculiX C3D20R 55.98. (h/R)^2 = 0.24 % is left out by the formula, so it
     fixes the frequency no better than that; it is converged in the mesh to 1e-5."""
     coarse, fine = (support.hertz(ring((0.3, 0.315, k), STIFF, 240e3, (2,))[2][0]) for k in (1, 4))
     assert fine == pytest.approx(55.94, rel=1e-3)

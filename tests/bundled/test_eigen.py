@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from scipy.linalg import eigh, qr
-from tyrecal_solvers.bundled import eigen
+from tyrecal_solvers.bundled import eigen, job
 from tyrecal_solvers.bundled.band import Cholesky, Indefinite, Numbering
+
+from ..chance import generator
+
+pytestmark = pytest.mark.numbers
 
 Array = np.ndarray
 KIND = pytest.mark.parametrize("kind", [float, complex])
@@ -174,6 +180,21 @@ def test_spread_gather_and_vector(random: np.random.Generator) -> None:
 def test_bandwidth_is_that_of_a_good_order() -> None:
     """A chain whose nodes are numbered at random has a small band after reordering: two-node
     elements reach 3 + 2 sub-diagonals."""
-    places = qr(np.random.default_rng(1).normal(size=(40, 40)), pivoting=True)[2]
+    places = qr(generator(1).normal(size=(40, 40)), pivoting=True)[2]
     table = np.stack([places[:-1], places[1:]], -1)
     assert Numbering([table], np.ones((40, 3), bool)).bandwidth == 5
+
+
+def test_numbers_that_are_too_far_apart_end_as_a_failure_of_the_solver(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def lapack(analysis: job.Analysis) -> None:
+        raise np.linalg.LinAlgError("Eigenvalues did not converge")
+
+    monkeypatch.setattr(
+        job.Analysis, "__init__", lambda a, *_: a.__dict__.update(road=None, model=None)
+    )
+    monkeypatch.setattr(job.Analysis, "run", lapack)
+    (tmp_path / "modes.inp").write_text("*HEADING\n")
+    with pytest.raises(job.Failures, match="too far apart: Eigenvalues did not converge"):
+        job.run(tmp_path, "modes", None)

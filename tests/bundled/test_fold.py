@@ -12,6 +12,8 @@ from . import support
 from .conftest import Inflated
 from .contact import ring
 
+pytestmark = pytest.mark.numbers
+
 Array = np.ndarray
 ANGLES = 7
 

@@ -10,6 +10,8 @@ from tyrecal_solvers.bundled import harmonics, mechanics
 from . import support
 from .conftest import Inflated
 
+pytestmark = pytest.mark.numbers
+
 
 @pytest.mark.parametrize("n", [0, 1, 2, 3, 4])
 def test_modes_are_the_lowest(inflated: Inflated, n: int) -> None:

@@ -154,6 +154,7 @@ def test_cylinder_with_friction() -> None:
     assert 1e-3 < rough.traction < 0.1
 
 
+@pytest.mark.slow
 def test_ball() -> None:
     """Curved both ways, three elements in the patch's radius, free to move across; with five
     (tests/studies/hertz_cylinder.py) peak and radius are within 1.1 %."""

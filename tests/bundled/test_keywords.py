@@ -78,9 +78,18 @@ def test_square_is_a_model() -> None:
     assert m.mesh.faces["CAVITY"].connectivity.tolist() == [[3, 0]]
 
 
+def test_hourglass_stiffness_is_of_the_section_above_it() -> None:
+    """G = 2 C10: 0.005 G where none is given, else the number under the section."""
+    default = support.model_of(SQUARE).rubbers[0].hourglass_stiffness
+    given = changed("MATERIAL=GUM\n", "MATERIAL=GUM\n*HOURGLASS STIFFNESS\n3E4\n")
+    assert default == pytest.approx([0.005 * 2e6])
+    assert support.model_of(given).rubbers[0].hourglass_stiffness == pytest.approx([3e4])
+
+
 @pytest.mark.parametrize(
     ("old", "new", "line", "words"),
     [
+        ("*DENSITY\n", "*HOURGLASS STIFFNESS\n3E4\n*DENSITY\n", 17, "right under the *SOLID"),
         ("*DENSITY", "*DAMPING", 17, "DAMPING"),
         ("*NODE, NSET=ALL", "*NODE, NSET=ALL, SYSTEM=C", 4, "SYSTEM"),
         ("TYPE=CGAX4R", "TYPE=CGAX4H", 9, "CGAX4H"),
@@ -103,6 +112,35 @@ def test_square_is_a_model() -> None:
         ("*MATERIAL, NAME=GUM", "*MATERIAL, NAME=GUM, NAME=GLUE", 14, "twice"),
         ("1100.\n", "1100.\n*STEP\n*STATIC\n", 19, "END STEP"),
         ("1100.\n", "1100.\n*NSET, NSET=A,\n", 19, "comma"),
+        ("1100.\n", "1100.\n*STEP, NLGEOM=YES\n*STEP\n", 20, "*STEP inside a step"),
+        ("*SURFACE", "*NSET, NSET=A\n1, B\n*SURFACE", 12, "set B is not defined"),
+        ("*SURFACE", "*NSET, NSET=A\n1, 9\n*SURFACE", 11, "member 9 of the set"),
+        ("*SURFACE", "*ELSET, ELSET=A, GENERATE\n1, 2\n*SURFACE", 11, "member 2 of the set"),
+        ("RUBBER, S4", "RUBBER, SPOS", 12, "of type CGAX4R has no face SPOS"),
+        ("ELSET=RUBBER, MATERIAL=GUM", "MATERIAL=GUM", 13, "*SOLID SECTION needs ELSET="),
+        ("MATERIAL=GUM\n", "MATERIAL=GUM, CONTROLS=C\n", 13, "section controls C are not"),
+        ("*SOLID SECTION, ELSET=RUBBER, MATERIAL=GUM\n", "", 0, "CGAX4R elements have no *SOLID"),
+        (
+            "*SURFACE",
+            "*ELEMENT, TYPE=SFMGAX1, ELSET=RUBBER\n2, 1, 4\n*SURFACE",
+            14,
+            "element 2 of type SFMGAX1 has no face S4",
+        ),
+        ("*SURFACE", "*ELEMENT, TYPE=CGAX4R\n2, 1, 2, 3, 4\n*SURFACE", 0, "1 CGAX4R elements have"),
+        (
+            "*HYPERELASTIC, MOONEY-RIVLIN\n1E6, 0., 5.085D-8",
+            "*ELASTIC\n1E6, 0.3",
+            13,
+            "material GUM of a solid is not hyperelastic",
+        ),
+        ("*MATERIAL, NAME=GUM\n", "", 14, "*HYPERELASTIC must follow a *MATERIAL"),
+        ("1100.\n", "1100.\n*MATERIAL, NAME=GUM\n", 19, "material GUM is defined twice"),
+        ("MOONEY-RIVLIN\n", "MOONEY-RIVLIN, MODULI=FAST\n", 15, "MODULI=FAST of *HYPERELASTIC"),
+        ("5.085D-8\n", "5.085D-8\n1E6, 0., 1.\n", 15, "takes one data line, got 2"),
+        ("1E6, 0., 5.085D-8", "1E6, 0.", 16, "number 3 of the line is missing"),
+        ("1100.\n", "1100.\n*VISCOELASTIC, TIME=PRONY\n-0.1, 0., 0.1\n", 19, "not be negative"),
+        ("1100.\n", "1100.\n*VISCOELASTIC, TIME=PRONY\n1., 0., 0.1\n", 19, "must stay below 1"),
+        ("1100.\n", "1100.\n*VISCOELASTIC, TIME=PRONY\n0., 1., 0.1\n", 19, "must stay below 1"),
     ],
 )
 def test_refusals_name_the_line(old: str, new: str, line: int, words: str) -> None:
@@ -110,7 +148,89 @@ def test_refusals_name_the_line(old: str, new: str, line: int, words: str) -> No
     error = refused(changed(old, new))
     assert error.line == line
     assert words in str(error)
-    assert f"line {line}" in str(error)
+    assert f"line {line}:" in str(error) or not line
+
+
+LAYER = """*ELEMENT, TYPE=SFMGAX1, ELSET=PLY
+2, 1, 4
+*SURFACE SECTION, ELSET=PLY
+*REBAR LAYER
+PLY, 4E-7, 1E-3, 0.0, CORD, 90.0
+*MATERIAL, NAME=CORD
+*ELASTIC
+1E9, 0.3
+"""
+
+
+def test_a_layer_is_smeared() -> None:
+    """E A / spacing along a ring of cords, N/m; without *DENSITY no mass."""
+    (cords,) = support.model_of(SQUARE + LAYER).cords
+    assert cords.stiffness == pytest.approx(1e9 * 4e-7 / 1e-3, rel=1e-14)
+    assert (cords.mass == 0.0).all()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line", "words"),
+    [
+        ("1E-3, 0.0", "1E-3, 0.1", 23, "position of a layer in a surface element is 0.0"),
+        ("4E-7", "0.0", 23, "area and spacing of a layer must be positive"),
+        ("1E-3", "-1E-3", 23, "area and spacing of a layer must be positive"),
+        ("CORD, 90.0", "GUM, 90.0", 23, "material GUM of a rebar layer is not *ELASTIC"),
+        ("CORD, 90.0", "GLUE, 90.0", 22, "material GLUE is not defined"),
+        ("*SURFACE SECTION, ELSET=PLY\n", "", 21, "*REBAR LAYER must follow a *SURFACE SECTION"),
+        ("SECTION, ELSET=PLY", "SECTION, ELSET=BELT", 21, "element set BELT is not defined"),
+        ("SECTION, ELSET=PLY", "SECTION, ELSET=RUBBER", 21, "of type CGAX4R cannot have *SURFACE"),
+        ("1E9", "-1E9", 25, "Young's modulus"),
+    ],
+)
+def test_layers_that_are_refused(old: str, new: str, line: int, words: str) -> None:
+    assert LAYER.count(old) == 1
+    error = refused(SQUARE + LAYER.replace(old, new))
+    assert words in str(error)
+    assert error.line == line
+
+
+def test_sets_are_numbers_ranges_and_other_sets() -> None:
+    """Blank fields say nothing; a range has its last member, and a stride."""
+    sets = "*NSET, NSET=A\n1, , 3\n*NSET, NSET=B\n4, a\n*NSET, NSET=ODD, GENERATE\n1, 3, 2\n"
+    sets += "*NSET, NSET=ROW, GENERATE\n2, 4\n*ELSET, ELSET=TWICE\nRUBBER, 1\n"
+    mesh = support.model_of(changed("*SURFACE", sets + "*SURFACE")).mesh
+    assert (mesh.node_sets["A"], mesh.node_sets["B"]) == ([1, 3], [4, 1, 3])
+    assert (mesh.node_sets["ODD"], mesh.node_sets["ROW"]) == ([1, 3], [2, 3, 4])
+    assert mesh.element_sets["TWICE"] == [1, 1] and mesh.node_sets["ALL"] == [1, 2, 3, 4]
+
+
+DATA = {  # keyword: where it stands, and a line of all data that are honoured
+    "DENSITY": ("section", "1100."), "ELASTIC": ("section", "1E9, 0.3"),
+    "HYPERELASTIC": ("section", "1E6, 0., 5E-8"), "ACOUSTIC MEDIUM": ("section", "4.8E5"),
+    "VISCOELASTIC": ("section", "0.1, 0.1, 0.1, 0.1, 20."),
+    "HOURGLASS STIFFNESS": ("section", "1."),
+    "REBAR LAYER": ("section", "PLY, 4E-7, 1E-3, 0., CORD, 90."),
+    "SPRING": ("revolve", "1E6"), "MASS": ("revolve", "15."),
+    "ROTARY INERTIA": ("revolve", "0.3, 0.4, 0.3"), "SURFACE BEHAVIOR": ("revolve", "1E9"),
+    "FRICTION": ("revolve", "0.5"), "CONTACT PAIR": ("revolve", "TREAD, ROAD"),
+    "BOUNDARY": ("step", "RIM, 1, 6, 0."), "DSLOAD": ("step", "CAVITY, P, 240E3"),
+    "DLOAD": ("step", "ALL, CENTRIF, 1., 0., 0., 0., 0., 1., 0."),
+    "CLOAD": ("step", "9, 1, -4000."), "STATIC": ("step", "0.1, 1."),
+    "FREQUENCY": ("step", "20, 1., 200., -10."), "COMPLEX FREQUENCY": ("step", "20"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", grammar.FIELDS)
+def test_a_datum_that_is_not_honoured_is_refused(name: str) -> None:
+    """ABAQUS would heed one more on the line: temperature, amplitude, a limit. A blank is none."""
+    where, data = DATA[name]
+
+    def check(line: str) -> None:
+        text = f"*{name}\n{line}\n"
+        if where == "step":
+            text = f"*STEP, NLGEOM=YES\n{text}*END STEP\n"
+        grammar.check(read_keywords(text), where != "section")
+
+    check(data)
+    check(f"{data}, ,")
+    with pytest.raises(DeckError, match=f"data '7.' of \\*{name} is not honoured"):
+        check(f"{data}, 7.")
 
 
 @pytest.mark.parametrize("nodes", ["1, 4, 3, 2", "1, 3, 2, 4"])

@@ -8,6 +8,7 @@ from tyrecal_solvers.bundled import mechanics
 from tyrecal_solvers.bundled.circumference import Circumference, functions, half_circle
 from tyrecal_solvers.bundled.revolved import Inverted, Revolved
 
+from ..chance import generator
 from . import support
 from .conftest import Inflated
 from .contact import ring
@@ -71,7 +72,7 @@ def small(request) -> tuple[Revolved, Array]:
     tyre = support.tyre((2, 2, 2, 1), quadratic=request.param)
     m = support.model_of(tyre.deck)
     work = Revolved(m, support.cavity(m, 240e3), half_circle(np.array([0.4, 1.0, np.pi - 1.4])))
-    return work, fields(work, np.random.default_rng(3), 2e-5)
+    return work, fields(work, generator(3), 2e-5)
 
 
 def test_residual_is_the_potentials_gradient(
@@ -174,7 +175,7 @@ def test_rigid_bodies_cost_nothing(quadratic: bool) -> None:
     still = turned(around, np.eye(3), none, m.mesh.X)
     assert abs(still).max() < 1e-12
     tyre.residual(still)
-    stiff = fields(tyre, np.random.default_rng(1), 1.0)
+    stiff = fields(tyre, generator(1), 1.0)
     scale = np.linalg.norm(tyre.product(stiff)) / np.linalg.norm(stiff)
     for motion in range(6):
         if motion < 3:

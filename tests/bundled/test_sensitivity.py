@@ -12,6 +12,8 @@ from tyrecal_solvers.bundled.mechanics import Load
 
 from . import support
 
+pytestmark = pytest.mark.numbers
+
 Array = np.ndarray
 HARMONICS, COUNT, PRESSURE = (0, 1, 2, 3), 2, 240e3
 TYRE = support.tyre((3, 2, 2, 1))
@@ -158,7 +160,7 @@ def test_remembered_strains_change_nothing(base: Modes) -> None:
 
 def test_preload_matters(base: Modes) -> None:
     """With the state frozen the derivative by the carcass' area comes out wrong by more than its
-    own size: the change of the preload is part of the answer (facts/mechanics.md)."""
+    own size: the change of the preload is part of the answer."""
     tangents = VARIABLES["carcass area"].tangents
     whole = rates(base, tangents, PRESSURE)
     seeded = model.build(keywords.seed(keywords.read_keywords(TYRE.deck), tangents), None, True)
@@ -182,3 +184,43 @@ def test_euler_identity(base: Modes) -> None:
     tangents = [t for place in places for t in place.tangents]
     total = total + rates(base, tangents, PRESSURE)
     assert abs(total).max() <= 1e-9 * base.eigenvalues.max()
+
+
+def test_four_node_elements() -> None:
+    """Likewise by C10, which their hourglass stiffness goes with, and by a node's radius, at modes
+    high enough to hold hourglass patterns."""
+    tyre = support.tyre((3, 2, 2, 1), quadratic=False)
+    lines = tyre.deck.splitlines()
+    gum = next(i for i, text in enumerate(lines) if text.startswith("1000000.0,"))
+    inner = next(i for i, text in enumerate(lines) if text.startswith("10,"))
+
+    def solved(text: str) -> tuple[Modes, harmonics.Vibration]:
+        m = support.model_of(text)
+        mask, loads = support.held(m, tyre.rim), support.cavity(m, PRESSURE)
+        U = support.inflate(m, mask, loads)
+        vibration = harmonics.Vibration(m, U, loads, support.numbering(m, mask), 0.0)
+        found = [vibration.modes(n, 8) for n in (0, 2)]
+        shapes = np.concatenate([f.shapes for f in found])
+        values = np.concatenate([f.eigenvalues for f in found])
+        return Modes(U, vibration, np.repeat((0, 2), 8), shapes, values), vibration
+
+    base, vibration = solved(tyre.deck)
+    for place, field, scale in ((gum, 0, 1e6), (inner, 1, 0.003)):
+
+        def at(s: float, place: int = place, field: int = field, scale: float = scale) -> Array:
+            row = lines[place].split(",")
+            row[field] = repr(float(row[field]) + s * scale)
+            return solved("\n".join([*lines[:place], ",".join(row), *lines[place + 1 :]]))[
+                0
+            ].eigenvalues
+
+        tangents = [(place + 1, field, scale)]
+        seeded = model.build(keywords.seed(keywords.read_keywords(tyre.deck), tangents), None, True)
+        loads = support.cavity(seeded, PRESSURE)
+        factor = vibration.factor(0)
+        V = sensitivity.state_rate(seeded, base.state, loads, vibration.numbering, factor)
+        got = sensitivity.eigenvalue_rates(
+            seeded, base.state, V, loads, fields_of(base), base.eigenvalues
+        )
+        wanted = difference(at)
+        assert abs(got - wanted).max() <= 1e-5 * abs(wanted).max()

@@ -16,9 +16,12 @@ from tyrecal.effects import catalogue
 from tyrecal.evaluate.door import Door, Question
 from tyrecal.modes.label import paired_labels
 
+from ..chance import generator
 from ..effects.support import CASE, START, frequencies
 from . import support
 from .support import Rubber
+
+pytestmark = pytest.mark.numbers
 
 Array = np.ndarray
 BETA, REFERENCE = 0.15, 60.0
@@ -40,7 +43,7 @@ def test_constant_beyond_the_table() -> None:
 
 def test_the_tangent_is_linear_in_the_ratio() -> None:
     """A(rho) = A(1) + (rho - 1) dA, dA without the initial stress."""
-    rng = np.random.default_rng(0)
+    rng = generator(0)
     F = np.eye(3) + 0.2 * rng.standard_normal((5, 3, 3))
     full = lambda x: np.full(5, x)
     m = rubber.MooneyRivlin(full(1e6), full(2e5), full(2e7))

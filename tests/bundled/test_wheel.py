@@ -149,6 +149,26 @@ def test_reference_point_matters_only_to_the_springs() -> None:
     np.testing.assert_allclose(values[0], values[1], rtol=1e-8)
 
 
+@pytest.mark.parametrize("motion", MOTIONS)
+def test_a_wheel_that_is_pushed_away_is_not_stable(motion: str) -> None:
+    """A spring of negative stiffness, far beyond what the tyre holds."""
+    tyre = inflated()
+    n = 0 if motion in ("axial", "spin") else 1
+    wheel = tyre.wheel((motion,), **{motion: -1e9})
+    with pytest.raises(harmonics.Unstable, match=f"for {n} waves"):
+        tyre.vibration(wheel).factor(n)
+
+
+@pytest.mark.parametrize("n", [0, 1, 2])
+def test_a_gas_that_gives_way_is_not_stable(n: int) -> None:
+    """A negative bulk modulus, with and without a wheel beside; a positive one is stable."""
+    tyre = inflated()
+    for wheel in (None, tyre.wheel(axial=1e6, radial=1e6, spin=1e5, tilt=1e5)):
+        tyre.vibration(wheel, tyre.air()).factor(n)
+        with pytest.raises(harmonics.Unstable, match=f"for {n} waves"):
+            tyre.vibration(wheel, tyre.air(bulk=-4.78e5)).factor(n)
+
+
 def test_loads_and_rows_of_the_well() -> None:
     """The well's left side faces the cavity: with it the enclosed volume is that of the shoelace
     formula over the whole outline."""

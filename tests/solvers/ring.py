@@ -93,5 +93,5 @@ def write_ring(folder: Path, **changed: str) -> Path:
     folder.mkdir(parents=True, exist_ok=True)
     for name, text in {"sector": sector(), "inflate": INFLATE, "modes_2": MODES, **changed}.items():
         (folder / f"{name}.inp").write_text(text)
-    (folder / "calculix.json").write_text('{"command": "ccx", "parallel": 1}')
+    (folder / "calculix.json").write_text('{"parallel": 1}')
     return folder

@@ -230,14 +230,10 @@ def test_a_job_that_still_queues() -> None:
 
 
 def test_options() -> None:
-    assert read_options({}).command == ["abaqus"]
-    assert read_options({"command": "my 'abq 2023' x"}).command == ["my", "abq 2023", "x"]
     assert read_options({"licence_wait_s": 0}).licence_wait_s == 0
     for bad in (
         {"comand": "abaqus"},
-        {"command": ""},
-        {"command": [1]},
-        {"command": "'"},
+        {"command": "abaqus"},
         {"licence_wait_s": -1},
         {"licence_wait_s": "long"},
         {"licence_wait_s": float("nan")},

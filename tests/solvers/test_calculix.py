@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import shutil
 import sys
 from pathlib import Path
 
@@ -27,10 +26,6 @@ from tyrecal.modes.label import label_modes
 from ..conftest import CASES
 from ..studies.blind_calculix import common_problem
 from ..studies.calculix import common
-
-needs_ccx = pytest.mark.skipif(
-    shutil.which("ccx") is None, reason="CalculiX (ccx, Debian: calculix-ccx) is not installed"
-)
 
 # a folder of one deck of diameter 1, and what ccx 2.20 would leave there
 INFLATE = "*STEP, NLGEOM\n*DLOAD\nCAVITY, P6, 240000\n"
@@ -94,6 +89,8 @@ code = 0
 said = "CalculiX Version 2.20\\n Job finished\\n"
 if fault == "crash": sys.exit(139)
 if fault == "code": code, said = 201, "*ERROR reading *NODE:\\n  a node is wrong\\n"
+if fault == "together" and job != "inflate":  # ends when another runs as well
+    while len((here / "jobs").read_text().split()) < 3: time.sleep(0.02)
 if fault == "hang": print("Newton goes on", flush=True); time.sleep(60)
 if fault == "silent": dat = frd = None
 if fault == "no shapes": frd = None
@@ -137,13 +134,14 @@ def folder_for(tmp_path: Path, fault: str) -> Path:
     (folder / "sector.inp").write_text(SECTOR)
     (folder / "inflate.inp").write_text(INFLATE)
     (folder / "modes_1.inp").write_text(DECK)
-    command = f"'{sys.executable}' '{tools / 'ccx.py'}' '{fault}'"
-    (folder / "calculix.json").write_text(json.dumps({"command": command, "parallel": 1}))
+    (folder / "calculix.json").write_text(json.dumps({"parallel": 1, "fault": fault}))
     return folder
 
 
 def evaluate(folder: Path, time_limit_s: float = 30.0) -> dict:
     solver = CalculiX()
+    fault = json.loads((folder / "calculix.json").read_text())["fault"]
+    solver.command = [sys.executable, str(folder.with_name("tools") / "ccx.py"), fault]
     solver.run(folder, time_limit_s)
     return solver.read(folder)
 
@@ -214,6 +212,40 @@ def test_a_failure_is_typed_and_never_a_number(
     assert failure.value.cause == cause
 
 
+def with_two_diameters(tmp_path: Path, fault: str, parallel: int) -> Path:
+    """`folder_for` with a deck of diameter 2 as well."""
+    folder = folder_for(tmp_path, fault)
+    (folder / "modes_2.inp").write_text(DECK)
+    for suffix in ("dat", "frd"):
+        text = LEFT[f"modes_1.{suffix}"]
+        other = text.replace(
+            "    1PHID                          1", "    1PHID                          2"
+        )
+        (tmp_path / "tools" / f"modes_2.{suffix}").write_text(
+            other.replace("    1     ", "    2     ")
+        )
+    settings = json.loads((folder / "calculix.json").read_text())
+    (folder / "calculix.json").write_text(json.dumps({**settings, "parallel": parallel}))
+    return folder
+
+
+def test_decks_run_at_the_same_time_and_tell_the_same(tmp_path: Path) -> None:
+    """Each of two waits until the other has begun; with one at a time neither would end."""
+    together = evaluate(with_two_diameters(tmp_path / "two", "together", 2))
+    alone = evaluate(with_two_diameters(tmp_path / "one", "none", 1))
+    assert [mode["n"] for mode in together["modes"]] == [1, 2]
+    for mode, other in zip(together["modes"], alone["modes"], strict=True):
+        assert mode["frequency_Hz"] == other["frequency_Hz"]
+        np.testing.assert_array_equal(mode["amplitude"], other["amplitude"])
+    assert not list(tmp_path.glob("*/run/*.rin")) and not list(tmp_path.glob("*/run/*.rout"))
+
+
+@pytest.mark.parametrize("parallel", [1, 2])
+def test_one_deck_of_several_that_fails_fails_all(tmp_path: Path, parallel: int) -> None:
+    with pytest.raises(RunFailed, match="a is wrong"):
+        evaluate(with_two_diameters(tmp_path, "error", parallel))
+
+
 @pytest.mark.parametrize("fault", ["crash", "cutbacks", "no state"])
 def test_no_modes_about_a_state_that_was_not_found(tmp_path: Path, fault: str) -> None:
     folder = folder_for(tmp_path, f"inflation: {fault}")
@@ -233,10 +265,10 @@ def test_a_run_that_hangs_is_ended(tmp_path: Path) -> None:
 
 
 def test_a_command_that_is_not_there(tmp_path: Path) -> None:
-    folder = folder_for(tmp_path, "none")
-    (folder / "calculix.json").write_text('{"command": "no-such-ccx", "parallel": 2}')
+    solver = CalculiX()
+    solver.command = ["no-such-ccx"]
     with pytest.raises(RunFailed, match="cannot start 'no-such-ccx'"):
-        evaluate(folder)
+        solver.run(folder_for(tmp_path, "none"), 30.0)
 
 
 def main_case(**options: object) -> LoadedCase:
@@ -253,7 +285,7 @@ def main_case(**options: object) -> LoadedCase:
     ("options", "words"),
     [
         ({"comand": "ccx"}, "no 'comand'"),
-        ({"command": ""}, "must be a command"),
+        ({"command": "ccx"}, "has no 'command'"),
         ({"parallel": 0}, "must be 1 or more"),
         ({"parallel": True}, "must be 1 or more"),
     ],
@@ -347,7 +379,7 @@ def coarse_case(folder: Path) -> Path:
     return path
 
 
-@needs_ccx
+@pytest.mark.ccx
 def test_masses_agree_where_cord_lines_have_kinks(case_folder: Path) -> None:
     """And where one rubber borders on another at a ply: 1e-6 of the tyre's."""
     case = load_case(coarse_case(case_folder))
@@ -361,7 +393,7 @@ def test_masses_agree_where_cord_lines_have_kinks(case_folder: Path) -> None:
     assert mass_kg == pytest.approx(ours.mass_kg, rel=1e-6)
 
 
-@needs_ccx
+@pytest.mark.ccx
 def test_calculix_agrees_with_the_bundled_solver(case_folder: Path) -> None:
     """In a folder with a blank, of which ccx itself cannot write to the absolute path."""
     case = load_case(coarse_case(case_folder))
@@ -376,7 +408,7 @@ def test_calculix_agrees_with_the_bundled_solver(case_folder: Path) -> None:
     assert found == pytest.approx(known, rel=0.01)
 
 
-@needs_ccx
+@pytest.mark.ccx
 @pytest.mark.parametrize(
     ("template", "old", "new", "cause"),
     [

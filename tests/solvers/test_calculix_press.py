@@ -14,7 +14,6 @@ from tyrecal.deck.environment import environment
 from tyrecal.deck.press import Angles, press_texts
 
 from ..deck.test_press import coarse_case
-from .test_calculix import needs_ccx
 
 DECK = "** deflection 0.006 m\n1, -0.005\n** deflection 0.01 m\n2, -0.009\n"
 DAT = """
@@ -121,7 +120,7 @@ def test_pressures_stand_where_their_nodes_have_moved(tmp_path: Path) -> None:
         read_pressures(tmp_path)
 
 
-@needs_ccx
+@pytest.mark.ccx
 def test_road_and_rim_balance(tmp_path: Path) -> None:
     """Without pressure, which CalculiX would count in part as the rim's reaction."""
     case = coarse_case("C3D8")

@@ -17,9 +17,7 @@ from tyrecal_solvers.process import RunFailed
 
 from .ring import INFLATE, MODES, sector, write_ring
 
-pytestmark = pytest.mark.skipif(
-    shutil.which("ccx") is None, reason="CalculiX (ccx, Debian: calculix-ccx) is not installed"
-)
+pytestmark = pytest.mark.ccx
 N2_HZ = 55.94  # of the ring in closed form, which one element meets within 0.06 %
 MASS_KG = 1100 * np.pi * (0.315**2 - 0.30**2) * 0.02
 

@@ -21,10 +21,12 @@ def test_exit_code_and_output(tmp_path: Path) -> None:
 
 
 def test_a_hanging_command_is_ended_with_its_children(tmp_path: Path) -> None:
-    child = "import time, os; open('child', 'w').write(str(os.getpid())); time.sleep(60)"
-    parent = f"""import subprocess, sys, time
-print('starting', flush=True)
-subprocess.Popen([sys.executable, '-c', {child!r}])
+    """Its child is a fork, so that a busy machine has it at once."""
+    parent = """import os, time
+pid = os.fork()
+if pid:
+    open('child', 'w').write(str(pid))
+    print('starting', flush=True)
 time.sleep(60)"""
     start = time.monotonic()
     with pytest.raises(RunFailed, match=r"time limit of 5 s: starting") as failure:
@@ -32,6 +34,38 @@ time.sleep(60)"""
     assert failure.value.cause == "timed_out"
     assert time.monotonic() - start < 20
     assert _ends(int((tmp_path / "child").read_text()))
+
+
+def test_children_that_ignore_the_end_are_killed(tmp_path: Path) -> None:
+    """Their parent does as it is told, and is not there any more to ask."""
+    parent = """import signal, subprocess, time
+deaf = 'trap "" TERM; echo $$ > child; sleep 60; true'
+subprocess.Popen(['sh', '-c', deaf])
+time.sleep(60)"""
+    with pytest.raises(RunFailed):
+        run_command([sys.executable, "-c", parent], tmp_path, 3, "log")
+    assert _ends(int((tmp_path / "child").read_text()))
+
+
+def test_without_process_groups_the_tree_is_ended(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Windows' way, with a stand-in for its taskkill."""
+    taskkill = tmp_path / "taskkill"
+    taskkill.write_text(f"#!/bin/sh\necho $* > {tmp_path}/asked\n")
+    taskkill.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{tmp_path}{os.pathsep}{os.environ['PATH']}")
+    monkeypatch.delattr(os, "killpg")
+    command = [
+        sys.executable,
+        "-c",
+        "import os, time; print(os.getpid(), flush=True); time.sleep(60)",
+    ]
+    with pytest.raises(RunFailed, match="time limit") as failure:
+        run_command(command, tmp_path, 2, "log")
+    pid = (tmp_path / "log").read_text().strip()
+    assert (tmp_path / "asked").read_text() == f"/T /F /PID {pid}\n" and pid in str(failure.value)
+    assert _ends(int(pid))
 
 
 @pytest.mark.skipif(shutil.which("setpriv") is None, reason="needs Linux with util-linux")

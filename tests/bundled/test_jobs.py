@@ -1,0 +1,160 @@
+"""Pairs of jobs as the tool writes them, edited: what is refused, held, or above a limit."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+from tyrecal_solvers.bundled.job import Analysis
+from tyrecal_solvers.bundled.keywords import DeckError
+from tyrecal_solvers.bundled.request import Request
+from tyrecal_solvers.bundled.results import StepResult
+from tyrecal_solvers.bundled.steps import Deck
+
+from ..effects.support import CASE, decks
+
+PLAIN: tuple[tuple[str, float], ...] = ()
+WHEEL, TURNING, MASS = (("wheel_free", 0.1),), (("rotation", 5.0),), (("point_mass", 0.1),)
+SPRING = (("wheel_free", 0.1), ("spindle_lateral", 1e6))
+
+
+@cache
+def texts(effects: tuple[tuple[str, float], ...]) -> dict[str, str]:
+    """inflate and modes."""
+    written = decks(CASE, **dict(effects))
+    return {name: written[f"{name}.inp"] for name in ("inflate", "modes")}
+
+
+def run(effects: tuple[tuple[str, float], ...], *edits: tuple[str, str], **request: Any) -> list:
+    """Results of the pair with (old, new) edits, the revolve job's where it stands in both."""
+    pair = dict(texts(effects))
+    for old, new in edits:
+        name = "modes" if old in pair["modes"] else "inflate"
+        assert old in pair[name]
+        pair[name] = pair[name].replace(old, new, 1)
+    return Analysis(Deck(pair, "modes", "inflate"), Request(**request)).run()
+
+
+FREQUENCY = "*FREQUENCY, EIGENSOLVER=LANCZOS, NORMALIZATION=MASS\n20\n"
+RELEASED = "*BOUNDARY, OP=NEW\n"
+SPRING_ON = "*ELEMENT, TYPE=SPRING1, ELSET=K\n999000009, 900001\n*SPRING, ELSET=K\n"
+STEP = "*STEP, NAME=EQUILIBRIUM"
+
+
+@pytest.mark.parametrize(
+    ("effects", "old", "new", "words"),
+    [
+        (PLAIN, "*SYMMETRIC RESULTS TRANSFER, STEP=1, INC=10\n", "", "needs *SYMMETRIC RESULTS"),
+        (PLAIN, "*FREQUENCY", "*STATIC\n1., 1.\n*FREQUENCY", "a step needs one *STATIC, *FREQ"),
+        (PLAIN, "CAVITY, P, 160000\n*END STEP\n*STEP, NAME=MODES\n",
+         "CAVITY, P, 160000\n*END STEP\n*STEP, NAME=MODES, PERTURBATION\n*STATIC\n",
+         "a step needs one"),
+        (PLAIN, "DIRECT\n0.1, 1.0\n", "DIRECT\n0.1, 1.0\n0.1, 1.0\n", "takes one data line"),
+        (PLAIN, STEP, f"*BOUNDARY\nNOWHERE, 1\n{STEP}", "node set NOWHERE is not defined"),
+        (PLAIN, STEP, f"*BOUNDARY\n77, 1\n{STEP}", "node set 77 is not defined"),
+        (PLAIN, STEP, f"*BOUNDARY\nCROWN, 2, 2, 0.1\n{STEP}", "only zero displacements"),
+        (PLAIN, STEP, f"*BOUNDARY\nCROWN, 4, 6\n{STEP}", "freedom 4 to 6 of a set cannot"),
+        (PLAIN, STEP, f"*BOUNDARY\nCROWN, 1\n{STEP}", "freedom 1 to 1 of a set cannot"),
+        (PLAIN, "TIE NSET=RIM\n*STEP", "TIE NSET=BEAD\n*STEP", "it must be restated"),
+        (PLAIN, "REF NODE=900001, TIE NSET=RIM\n*SOLID", "REF NODE=5, TIE NSET=RIM\n*SOLID",
+         "node 5 or node set RIM is not defined"),
+        (PLAIN, "*END STEP\n*STEP, NAME=MODES\n*FREQUENCY",
+         "*END STEP\n*STEP, NAME=MODES\n*COMPLEX FREQUENCY", "not honoured"),
+        (PLAIN, FREQUENCY, "*COMPLEX FREQUENCY\n20\n", "no ROTDYNF"),
+        (TURNING, "CENTRIF, 25", "CENTRIF, 26", "must be one for all elements"),
+        (TURNING, "ROTDYNF, 5,", "ROTDYNF, 6,", "must be one for all elements"),
+        (TURNING, "SOLID_1, CENTRIF, 25, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0\n", "", "is left out of"),
+        (TURNING, "PLY, CENTRIF", "PLIES, CENTRIF", "element set PLIES of the step's *DLOAD"),
+        (TURNING, "PLY, CENTRIF", "PLY, GRAV", "load type 'GRAV' of *DLOAD"),
+        (TURNING, "25, 0.0, 0.0, 0.0, 0.0, 1.0", "25, 0.0, 0.0, 0.0, 1.0, 0.0", "about its axle"),
+        (WHEEL, "999000001, 900001", "999000001, 5", "node 5 is no node of the tyre"),
+        (WHEEL, "*MASS, ELSET=WHEEL_MASS", "*MASS, ELSET=WHEEL_INERTIA", "no set of MASS"),
+        (WHEEL, "0.18, 0.2866666666667, 0.18", "0.18, 0.28, 0.19", "body of revolution"),
+        (WHEEL, RELEASED, f"{RELEASED}900001, 1\n", "are free together"),
+        (WHEEL, "REFERENCE\n900001, 0, 0\n", "REFERENCE\n900001, 0.1, 0\n", "stands on the axle"),
+        (WHEEL, STEP, f"{SPRING_ON}1\n{STEP}", "*SPRING takes two lines"),
+        (WHEEL, STEP, f"{SPRING_ON}1\n1E6\n{STEP}", "degrees of freedom (1, 3) of the rim"),
+        (WHEEL, STEP, f"{SPRING_ON}2\n-1E6\n{STEP}", "are not negative"),
+        (WHEEL, STEP, f"{SPRING_ON}7\n1E6\n{STEP}", "degrees of freedom 1 to 6"),
+        (MASS, "ELSET=POINT_MASS\n0.1", "ELSET=POINT_MASS\n-0.1", "*MASS must be positive"),
+        (MASS, "ELSET=POINT_MASS\n0.1", "ELSET=POINT_MASS\n0.1\n0.1", "*MASS takes 1 data line"),
+    ],
+)  # fmt: skip
+def test_a_pair_that_means_something_else_is_refused(
+    effects: tuple[tuple[str, float], ...], old: str, new: str, words: str
+) -> None:
+    with pytest.raises(DeckError) as error:
+        run(effects, (old, new))
+    assert words in str(error.value)
+
+
+def crown_held(rows: str) -> StepResult:
+    held = f"*BOUNDARY\n{rows}*FILE FORMAT"
+    (result,) = run(PLAIN, ("*FILE FORMAT", held), harmonics=[1, 2])
+    return result
+
+
+def motion_at_the_crown(result: StepResult) -> np.ndarray:
+    """Largest motion (3,) of the set CROWN over all modes, of that of all nodes."""
+    mesh = Analysis(Deck(texts(PLAIN), "modes", "inflate"), Request()).model.mesh
+    rows = [mesh.index[node] for node in mesh.node_sets["CROWN"]]
+    shapes = np.concatenate([m.shapes for m in result.modes])
+    return abs(shapes[:, rows]).max((0, 1)) / abs(shapes).max()
+
+
+def test_a_set_is_held_in_the_components_that_are_named() -> None:
+    """2 alone: along the axle; 1 to 3: wholly; else every component of the crown moves."""
+    assert (motion_at_the_crown(crown_held("RIM, 1, 3\n")) > 0.05).all()
+    axial = motion_at_the_crown(crown_held("CROWN, 2\n"))
+    assert axial[2] == 0.0 and (axial[:2] > 0.05).all()
+    assert (motion_at_the_crown(crown_held("CROWN, 1, 3\n")) == 0.0).all()
+
+
+@pytest.mark.parametrize("effects", [PLAIN, MASS, TURNING])
+def test_modes_above_the_limit_are_left_out(effects: tuple[tuple[str, float], ...]) -> None:
+    """The third number of *FREQUENCY; what stays is what it was, with and without a doublet that
+    has split. A turning tyre's waves are asked for by another step, which has no limit."""
+    whole = run(effects, harmonics=[0, 1, 2])[0].modes
+    hertz = np.sort(np.sqrt(np.concatenate([m.eigenvalues for m in whole]))) / (2 * np.pi)
+    limit = (hertz[2] + hertz[3]) / 2
+    cut = run(effects, (FREQUENCY, f"{FREQUENCY[:-1]}, , {float(limit)!r}\n"), harmonics=[0, 1, 2])
+    left = cut[0].modes
+    for few, many in zip(left, whole, strict=True):
+        below = np.sqrt(many.eigenvalues) < 2 * np.pi * limit
+        np.testing.assert_array_equal(few.eigenvalues, many.eigenvalues[below])
+        np.testing.assert_array_equal(few.shapes, many.shapes[below])
+    assert sum(len(m.eigenvalues) for m in left) == 3
+
+
+@pytest.mark.parametrize("effects", [PLAIN, TURNING, WHEEL], ids=["plain", "turning", "wheel"])
+def test_slopes_by_density_and_shape_against_differences(
+    effects: tuple[tuple[str, float], ...],
+) -> None:
+    """d lambda/dp of all modes of a pair by the rubber's density and the radius of a node of the
+    inner surface, which move masses and, turning, forces: within 1e-5 of the largest."""
+    lines = texts(effects)["inflate"].splitlines()
+    density = lines.index("*DENSITY") + 1
+    node = next(i for i, line in enumerate(lines) if line.startswith("21001,"))
+    for line, field, scale in ((density, 0, 1100.0), (node, 1, 0.003)):
+
+        def at(step: float, line: int = line, field: int = field, scale: float = scale) -> Any:
+            fields = lines[line].split(",")
+            fields[field] = repr(float(fields[field]) + step * scale)
+            (result, *waves) = run(
+                effects,
+                (
+                    f"\n{lines[line - 1]}\n{lines[line]}\n",
+                    f"\n{lines[line - 1]}\n{','.join(fields)}\n",
+                ),
+                harmonics=[0, 1, 2],
+            )
+            return np.concatenate([m.eigenvalues for m in (waves or [result])[0].modes])
+
+        asked = {"p": [("inflate", line + 1, field, scale)]}
+        result = run(effects, harmonics=[0, 1, 2], sensitivities=asked)[-1]
+        h = 5e-3
+        wanted = (8 * (at(h) - at(-h)) - at(2 * h) + at(-2 * h)) / (12 * h)
+        got = np.concatenate(result.rates["p"])
+        assert abs(got - wanted).max() <= 1e-5 * abs(wanted).max()

@@ -1,0 +1,118 @@
+"""The side file of a job: whatever is wrong in it is told with its key; what the command says."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from tyrecal_solvers.bundled.__main__ import main
+from tyrecal_solvers.bundled.request import Request, read_request
+
+from tyrecal.case import load_case, with_level
+from tyrecal.deck.write import Decks
+
+from ..conftest import CASES
+
+ROW = ["inflate", 30, 0, 1.0]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The decks of a coarse tyre."""
+    path = tmp_path_factory.mktemp("decks")
+    case = with_level(load_case(CASES / "p235_75r17.yaml"), "coarse")
+    for name, text in Decks(case).texts("abaqus").items():
+        (path / name).write_text(text)
+    return path
+
+
+def told(folder: Path, request: Any, capsys: pytest.CaptureFixture[str]) -> str:
+    """What the command says of a request that it refuses."""
+    text = request if isinstance(request, str) else json.dumps(request)
+    (folder / "modes.request.json").write_text(text)
+    assert main([str(folder / "modes.inp"), "--oldjob", "inflate"]) == 2
+    captured = capsys.readouterr()
+    assert not captured.out and captured.err.count("\n") == 1
+    return captured.err
+
+
+@pytest.mark.parametrize(
+    ("request_", "words"),
+    [
+        ("{", "is not JSON"),
+        ("[" * 100_000, "is not JSON"),
+        ([1], "the request is [1], must be an object"),
+        ({"harmonic": [1]}, "harmonic is [1], no such key; there are harmonics, modes_per"),
+        ({"harmonics": ["x"]}, 'harmonics[0] is "x", must be a whole number from 0'),
+        ({"harmonics": [0, float("nan")]}, "harmonics[1] is NaN"),
+        ({"harmonics": [1.0]}, "harmonics[0] is 1.0"),
+        ({"harmonics": [-1]}, "harmonics[0] is -1"),
+        ({"harmonics": [10**400]}, "harmonics[0] is 1000"),
+        ({"harmonics": [2, 2]}, "harmonics[1] is 2, must stand there once"),
+        ({"harmonics": []}, "harmonics is [], must be a list of harmonics"),
+        ({"harmonics": 3}, "harmonics is 3, must be a list"),
+        ({"modes_per_harmonic": "x"}, 'modes_per_harmonic is "x", must be a whole number from 1'),
+        ({"modes_per_harmonic": 0}, "modes_per_harmonic is 0"),
+        ({"modes_per_harmonic": True}, "modes_per_harmonic is true"),
+        ({"sensitivities": []}, "sensitivities is [], must be an object"),
+        ({"sensitivities": {"A": 1}}, "sensitivities.A is 1, must be a list of rows"),
+        ({"sensitivities": {"A": [1]}}, "sensitivities.A[0] is 1, must be a row [job, line,"),
+        ({"sensitivities": {"A": [ROW[:3]]}}, "sensitivities.A[0] is"),
+        ({"sensitivities": {"A": [["nix", *ROW[1:]]]}}, '[0][0] is "nix", must be a job: modes or'),
+        ({"sensitivities": {"A": [["inflate", "1", 0, 1.0]]}}, 'sensitivities.A[0][1] is "1"'),
+        ({"sensitivities": {"A": [["inflate", 30, -1, 1.0]]}}, "sensitivities.A[0][2] is -1"),
+        ({"sensitivities": {"A": [["inflate", 30, 0, None]]}}, "sensitivities.A[0][3] is null"),
+        ({"sensitivities": {"A": [["inflate", 30, 99, 1.0]]}}, "line 30: a sensitivity is asked"),
+        ({"sensitivities": {"A": [["inflate", 10**9, 0, 1.0]]}}, "the line holds no data"),
+        ({"own_frequency": "yes"}, 'own_frequency is "yes", must be true or false'),
+        ({"cavity": True}, "cavity is true, must be an object with material and surfaces"),
+        ({"cavity": {"material": 1, "surfaces": ["A"]}}, "cavity.material is 1, must be a name"),
+        ({"cavity": {"material": "A", "surfaces": 1}}, "cavity.surfaces is 1, must be a list"),
+        ({"cavity": {"material": "A", "surfaces": [None]}}, "cavity.surfaces[0] is null"),
+        ({"sector": {"job": "inflate"}}, "sector is"),
+        ({"sector": {"job": "nix", "width_deg": 1}}, 'sector.job is "nix", has no deck beside it'),
+        ({"sector": {"job": "../inflate", "width_deg": 1}}, "must be a job in the same folder"),
+        ({"sector": {"job": "inflate", "width_deg": "x"}}, 'sector.width_deg is "x"'),
+        ({"sector": {"job": "inflate", "width_deg": 400}}, "must be above 0 and at most 360"),
+    ],
+)
+def test_a_wrong_request_is_one_sentence(
+    folder: Path, request_: Any, words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    said = told(folder, request_, capsys)
+    assert words in said
+    assert said.startswith(("error: modes.request.json: ", "error: inflate.inp, ", "error: deck"))
+
+
+def test_a_request_that_is_no_file(tmp_path: Path) -> None:
+    (tmp_path / "modes.request.json").mkdir()
+    with pytest.raises(ValueError, match="is no file"):
+        read_request(tmp_path / "modes.request.json", ["modes"])
+    assert read_request(tmp_path / "none", ["modes"]) == Request()
+
+
+def test_the_command_says_what_it_found(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (folder / "modes.request.json").write_text('{"harmonics": [2], "modes_per_harmonic": 1}')
+    assert main([str(folder / "modes"), "--oldjob", "inflate.inp"]) == 0
+    said = capsys.readouterr().out
+    (mode,) = json.loads((folder / "modes.json").read_text())["steps"][-1]["modes"]
+    assert f"harmonic 2: {mode['frequency_Hz']:.2f} Hz\n" in said and "240 kPa" in said
+    assert f"results in {folder / 'modes.json'} and {folder / 'modes.npz'}" in said
+    assert main([str(folder / "modes")]) == 2
+    deck = (folder / "modes.inp").read_text().splitlines()
+    (line,) = (i for i, text in enumerate(deck, 1) if text.startswith("*SYMMETRIC MODEL"))
+    words = f"line {line}: this job revolves a section job: name that with --oldjob"
+    assert words in capsys.readouterr().err
+
+
+def test_ctrl_c_has_no_traceback(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def run(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("tyrecal_solvers.bundled.__main__.run", run)
+    assert main([str(folder / "modes")]) == 130
+    assert capsys.readouterr().err == "interrupted\n"
