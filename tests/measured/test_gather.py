@@ -13,7 +13,10 @@ from tyrecal.measured.modal import Layout
 from tyrecal.measured.sensors import BadMeasuredData
 from tyrecal.modes.mode import Label
 
+from ..chance import generator
 from .test_universal import function, shape, write
+
+pytestmark = pytest.mark.numbers
 
 F = np.arange(20.0, 140.0, 0.5)
 ANGLES = np.radians([3, 31, 65, 88, 124, 149, 187, 214, 246, 271, 303, 337])
@@ -33,7 +36,7 @@ def nodes(moved: float = 0.0) -> dict[str, Any]:
 def functions(reference: int, seed: int, kept: range = range(12)) -> list[dict[str, Any]]:
     """Mobilities, radial and tangential, of a belt that moves in its plane; the two of a doublet
     are driven unlike by each reference."""
-    rng = np.random.default_rng(seed)
+    rng = generator(seed)
     w, sets = 2 * np.pi * F, []
     for node in kept:
         for k in (1, 2):

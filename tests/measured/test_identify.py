@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from tyrecal.measured import identify as module
 from tyrecal.measured.identify import Responses, identify
 from tyrecal.measured.sensors import BadMeasuredData
+
+from ..chance import Chance, generator
+from ..studies.identification import OFF, drawn, found
+
+pytestmark = pytest.mark.numbers
 
 HERTZ = np.array([36.5, 38.3, 66.3, 73.3, 87.8, 105.3])
 RATIOS = np.array([0.025, 0.031, 0.028, 0.021, 0.022, 0.027])
@@ -19,8 +27,8 @@ def functions(
 ) -> tuple[Responses, np.ndarray]:
     """sum over modes of phi_i phi_j (i w)^k / (w_k^2 - w^2 + 2 i zeta w w_k), a triaxial sensor a
     point; and the residues by mode."""
-    rng = np.random.default_rng(seed)
-    phi = np.random.default_rng(1000 + seed).standard_normal((signals, len(HERTZ)))
+    rng = generator(seed)
+    phi = generator(1000 + seed).standard_normal((signals, len(HERTZ)))
     w, wk = 2 * np.pi * F, 2 * np.pi * HERTZ[:, None]
     H = phi @ (1 / (wk**2 - w**2 + 2j * RATIOS[:, None] * w * wk)) * (1j * w) ** OMEGA[form]
     size = noise * np.sqrt(np.mean(np.abs(H) ** 2) / 2)
@@ -28,19 +36,22 @@ def functions(
     return Responses(F, H, form, np.repeat(np.arange(signals // 3), 3)), phi
 
 
-def test_frequencies_are_off_by_what_they_state() -> None:
+def test_frequencies_are_off_by_what_they_state(chance: Chance) -> None:
+    """All modes, within two sigma in 19 of 20; the mean square of error over sigma is above a
+    twentieth: a bound that says nothing would cover, too.
+
+    False failures: 1e-7.
+    """
     standardised = []
-    for seed in range(6):
-        found = identify(functions(seed)[0], 28.0, 125.0).modes
+    for _ in range(8):
+        found = identify(functions(int(chance.random.integers(1 << 30)))[0], 28.0, 125.0).modes
         assert len(found) == len(HERTZ)
         hertz = np.array([mode.frequency_Hz for mode in found])
         sigma = np.array([mode.sigma_Hz for mode in found])
         assert hertz == pytest.approx(HERTZ, rel=2e-3)
-        assert (sigma < 5e-3 * HERTZ).all()  # a bound that says nothing would cover, too
         standardised.append((hertz - HERTZ) / sigma)
-    z = np.abs(standardised)
-    assert np.mean(z < 2) > 0.9 and np.mean(z < 3) > 0.97
-    assert 0.2 < np.sqrt(np.mean(np.square(standardised))) < 1.5
+    chance.often(np.ravel(np.abs(standardised) < 2), 0.95)
+    assert np.mean(np.square(standardised)) > 0.05
 
 
 @pytest.mark.parametrize("form", list(OMEGA))
@@ -67,13 +78,33 @@ def test_more_noise_is_more_sigma() -> None:
     assert much > 2 * little
 
 
-def test_noise_alone_is_no_mode() -> None:
-    rng = np.random.default_rng(0)
-    H = rng.standard_normal((12, len(F))) + 1j * rng.standard_normal((12, len(F)))
-    try:
-        assert len(identify(Responses(F, H, "accelerance", np.arange(12)), 28, 125).modes) <= 1
-    except BadMeasuredData as error:
-        assert "no mode is stable between 28 and 125 Hz" in str(error)
+def test_noise_alone_is_no_mode(chance: Chance) -> None:
+    """A mode is found in 1 of 10 files at most.
+
+    False failures: 1e-7.
+    """
+    modes = []
+    for _ in range(10):
+        H = chance.random.standard_normal((2, 12, len(F)))
+        try:
+            noise = Responses(F, H[0] + 1j * H[1], "accelerance", np.arange(12))
+            modes.append(len(identify(noise, 28, 125).modes))
+        except BadMeasuredData as error:
+            assert "no mode is stable between 28 and 125 Hz" in str(error)
+            modes.append(0)
+    chance.often(np.array(modes) > 0, 0.0, 0.1)
+
+
+def test_nothing_hangs_on_rounding() -> None:
+    """Any file, its band wide or narrow, every value off by half a million times rounding."""
+    for key in range(8):
+        measured, low, high = drawn(generator("rounding", key))
+        shaken = generator("shaken", key).standard_normal(measured.values.shape)
+        other = replace(measured, values=measured.values * (1 + OFF * shaken))
+        before, after = found(measured, low, high), found(other, low, high)
+        assert len(before) == len(after)
+        for (f, _, z), (g, _, other_z) in zip(before, after, strict=True):
+            assert g == pytest.approx(f, rel=1e-7) and other_z == pytest.approx(z, rel=1e-4)
 
 
 def test_uneven_or_few_frequencies_are_refused() -> None:
@@ -88,3 +119,21 @@ def test_two_sensors_leave_sigma_unknown() -> None:
     measured, _ = functions(0, 0.002, signals=6)
     found = identify(measured, 28.0, 125.0).modes
     assert found and all(np.isnan(mode.sigma_Hz) for mode in found)
+
+
+def test_the_lines_at_both_ends_belong_to_the_band(monkeypatch: pytest.MonkeyPatch) -> None:
+    """150 lines with both ends give an order of 30, one for every 5; one line fewer 29."""
+    asked = set()
+
+    def triangle(H: np.ndarray, order: int) -> np.ndarray:
+        asked.add(order)
+        return plain(H, order)
+
+    plain = module._triangle
+    monkeypatch.setattr(module, "_triangle", triangle)
+    for high, order in ((F[160], 30), (F[157], 30), (F[156], 29)):
+        asked.clear()
+        found = identify(functions(0, 0.002)[0], F[8], high)
+        assert asked == {order}
+        fitted = np.isfinite(found.fitted[0])
+        np.testing.assert_array_equal(fitted, (F[8] <= F) & (high >= F))

@@ -161,3 +161,10 @@ def test_every_mistake_is_told_at_once(tmp_path: Path) -> None:
     lines = str(error.value).splitlines()
     assert ["line 4" in lines[0], "line 5" in lines[1], len(lines)] == [True, True, 2]
     assert all(a != b for a, b in pairwise(lines))
+
+
+def test_a_table_may_be_as_long_as_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tyrecal.measured.tables.MOST_LINES", 3)
+    assert len(read(tmp_path, PLAIN)) == 2
+    with pytest.raises(BadMeasuredData, match="more than 3 lines"):
+        read(tmp_path, PLAIN + "3,1,,240,102.7\n")

@@ -13,6 +13,10 @@ from tyrecal.measured.geometry import sensors_of
 from tyrecal.measured.sensors import BadMeasuredData
 from tyrecal.measured.universal import is_universal, read_universal
 
+from ..chance import generator
+
+pytestmark = pytest.mark.numbers
+
 NODES = np.arange(1, 9)
 ANGLES = np.radians([7, 41, 88, 123, 169, 205, 251, 290])
 
@@ -59,7 +63,7 @@ def write(path: Path, *sets: dict[str, Any], double: bool = True) -> Path:
 
 
 def some(rows: int, seed: int = 0) -> np.ndarray:
-    rng = np.random.default_rng(seed)
+    rng = generator(seed)
     return rng.standard_normal((rows, 3)) + 1j * rng.standard_normal((rows, 3))
 
 
@@ -138,7 +142,7 @@ def test_a_file_cut_off_anywhere_is_refused_with_its_line(tmp_path: Path, binary
     whole = write(tmp_path / "w.uff", *sets).read_bytes()
     marks = {whole.find(b"    -1", k) + 6 for k in range(len(whole))}
     path = tmp_path / "cut.uff"
-    for end in np.random.default_rng(0).integers(40, len(whole) - 8, 60):
+    for end in generator(0).integers(40, len(whole) - 8, 60):
         path.write_bytes(whole[: int(end)])
         if any(end - 1 <= mark <= end for mark in marks):
             continue  # between two sets: a whole file of fewer sets

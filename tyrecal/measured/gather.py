@@ -38,7 +38,7 @@ def gather(
     """Measurements of several files; those of the same thing are repeats.
 
     pressure_kPa: of files that do not say theirs; floor, assumed: relative, see ``combined``.
-    Raises BadMeasuredData, LabMissing, OSError.
+    Raises BadMeasuredData, OSError.
     """
     for k, path in enumerate(paths):
         if path.resolve() in [other.resolve() for other in paths[:k]]:

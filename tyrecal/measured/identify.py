@@ -1,12 +1,19 @@
 """Frequency-response functions to modes, with the standard deviation of each frequency.
 
-Poles by least squares in the complex frequency domain (LSCF, a common-denominator model in z, by
-sdypy-EMA) for rising polynomial orders. A pole that comes again from one order to the next is
-stable; stable poles within 1 % of each other are one mode, whose frequency and damping are their
-medians. Residues, and so shapes, by least squares in the frequency domain with one term for the
-modes below the band and one for those above.
+Poles by least squares in the complex frequency domain (LSCF): H(z) D(z) = N(z) with a common
+denominator D for all signals, for rising orders of D. A pole that comes again from one order to
+the next is stable; stable poles within 1 % of each other are one mode, whose frequency and damping
+are their medians. Residues, and so shapes, by least squares in the frequency domain with one term
+for the modes below the band and one for those above.
 
-No library states how far such a frequency is off. The delete-one-group jackknife over the
+Powers of z = exp(-i w T) with real coefficients, from 0 Hz on, are nearly dependent over a narrow
+band: over 70 to 90 Hz rounding decided which mode was found. So the band alone, shifted, is laid
+round three quarters of the unit circle, with complex coefficients (the condition of 40 powers is
+then about cos(pi / 8)^-40 = 24); the denominator comes from the data by QR, not from normal
+equations, which would square the condition; and SLIGHT of the data's size bounds what rounding can
+do where the order is higher than the data have modes.
+
+No formula states how far such a frequency is off. The delete-one-group jackknife over the
 sensors tells what noise does, and the spread s over the orders (1.48 times the median deviation)
 what the model's order does: with theta_j from all groups of points but j,
 
@@ -17,15 +24,17 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import dataclass
-from types import SimpleNamespace
 
 import numpy as np
+from scipy.linalg import solve_triangular
 
 from .sensors import BadMeasuredData, MeasuredMode
 
 Array = np.ndarray
 
-ORDER, LINES = 40, 5  # highest order of the polynomials, in pole pairs, and lines for each pair
+ORDER, LINES = 40, 5  # highest order of the denominators, and lines for each order
+ARC, SLIGHT = 0.75, 1e-8  # share of the unit circle that the band takes; ridge, relative
+MARGIN = 1.05  # lines up to here times the band's end are used
 SAME_FREQUENCY, SAME_DAMPING = 0.01, 0.2  # relative, of a pole and its like one order below
 LOW = 3  # the lowest third of the orders is too low to hold all modes, and biased
 SPAN = 0.01  # relative width of one mode's poles
@@ -34,10 +43,6 @@ DAMPINGS = (0.002, 0.2)  # ratios that a tyre's mode can have
 DEVIATION = 1.4826  # standard deviation of a normal variable over its median deviation
 GROUPS = 10  # of the jackknife, at most
 FORMS = ("receptance", "mobility", "accelerance")
-
-
-class LabMissing(RuntimeError):
-    """The optional package that identifies modes is not installed."""
 
 
 @dataclass(frozen=True)
@@ -66,37 +71,35 @@ class Identified:
 def identify(measured: Responses, low_Hz: float, high_Hz: float) -> Identified:
     """Modes between two frequencies.
 
-    Raises BadMeasuredData where the functions hold no mode, or lie at uneven frequencies;
-    LabMissing.
+    Raises BadMeasuredData where the functions hold no mode, or lie at uneven frequencies.
     """
     measured = _from_above_0(measured)
-    f = measured.frequency_Hz
+    f, mobility = measured.frequency_Hz, measured.values * _to_mobility(measured)
     if len(f) < 50 or not np.allclose(np.diff(f), f[1] - f[0], rtol=1e-3):
         raise BadMeasuredData("functions must hold 50 evenly spaced frequencies or more")
-    every = np.arange(len(measured.values))
-    model = _model(measured, every, low_Hz, high_Hz)
-    poles = _modes(model.all_poles, low_Hz, high_Hz)
-    if not len(poles):
+    used = (f >= low_Hz) & (f <= MARGIN * high_Hz)
+    order = int(np.clip(np.sum(used & (f <= high_Hz)) // LINES, 4, ORDER))
+    points = np.unique(measured.points)
+    count = min(GROUPS, len(points))
+    triangles = np.array([
+        _triangle(mobility[np.isin(measured.points, points[j::count])][:, used], order)
+        for j in range(count)
+    ])  # fmt: skip
+    modes = _modes(_poles(triangles, f[used]), low_Hz, high_Hz)
+    if not len(modes):
         raise BadMeasuredData(f"no mode is stable between {low_Hz:g} and {high_Hz:g} Hz")
-    hertz, z, spread = poles.T
-    sigma = np.hypot(_jackknife(measured, hertz, low_Hz, high_Hz), spread)
-    w = 2 * np.pi * hertz
-    chosen = SimpleNamespace(
-        all_poles=[-z * w + 1j * w * np.sqrt(1 - z**2)], pole_ind=[(0, i) for i in range(len(w))]
+    hertz, z, spread = modes.T
+    others = [np.delete(triangles, j, axis=0) for j in range(count if count > 2 else 0)]
+    again = [_modes(_poles(each, f[used]), low_Hz, high_Hz) for each in others]
+    sigma = np.hypot(_jackknife(again, hertz), spread)
+    inside = (f >= low_Hz) & (f <= high_Hz)
+    residues, fitted = _residues(f, mobility, inside, _pole(hertz, z))
+    fitted[:, ~inside] = np.nan
+    found = zip(hertz, z, residues, sigma, strict=True)
+    return Identified(
+        tuple(MeasuredMode(float(h), u, float(zk), float(s)) for h, zk, u, s in found),
+        fitted / _to_mobility(measured),
     )
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # the band's end is the grid's
-        fitted, residues = model.get_constants(whose_poles=chosen)
-    modes = tuple(
-        MeasuredMode(float(f_k), amplitude, float(z_k), float(sigma_k))
-        for f_k, z_k, amplitude, sigma_k in zip(hertz, z, residues.T, sigma, strict=True)
-    )
-    first = round(f[0] / (f[1] - f[0]))
-    whole = np.full(measured.values.shape, np.nan, complex)
-    whole[:, : fitted.shape[1] - first] = fitted[:, first:]
-    whole /= _to_mobility(measured)
-    whole[:, (f < low_Hz) | (f > high_Hz)] = np.nan
-    return Identified(modes, whole)
 
 
 def _from_above_0(measured: Responses) -> Responses:
@@ -113,28 +116,55 @@ def _to_mobility(measured: Responses) -> Array:
     return (2j * np.pi * measured.frequency_Hz) ** (1 - FORMS.index(measured.form))
 
 
-def _model(measured: Responses, rows: Array, low_Hz: float, high_Hz: float) -> SimpleNamespace:
-    """The library's model of some signals, with poles of all orders."""
-    try:
-        from sdypy import EMA
-    except ImportError:
-        raise LabMissing(
-            "frequency-response functions need the package sdypy-EMA: pip install 'tyrecal[lab]'"
-        ) from None
-    f, H = measured.frequency_Hz, measured.values[rows] * _to_mobility(measured)
-    step = f[1] - f[0]
-    first = round(f[0] / step)  # the library needs the grid from 0 Hz on
-    f = np.arange(first + len(f)) * step
-    H = np.hstack([np.zeros((len(H), first)), H])
-    lines = np.sum((f >= low_Hz) & (f <= high_Hz))
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        model = EMA.Model(
-            H, f, lower=max(low_Hz, f[max(first, 1)]), upper=min(high_Hz * 1.05, f[-1]),
-            pol_order_high=int(np.clip(lines // LINES, 4, ORDER)), frf_form="mobility",
-        )  # fmt: skip
-        model.get_poles("lscf", show_progress=False)
-    return model
+def _triangle(H: Array, order: int) -> Array:
+    """Triangle (order + 1, order + 1) of the least squares for D's coefficients, |triangle a|
+    smallest, of some signals (k, n) evenly spaced in frequency: N, free for each signal, is
+    eliminated."""
+    z = np.exp(-2j * np.pi * ARC * np.arange(H.shape[1]) / H.shape[1])
+    powers = z[:, None] ** np.arange(order + 1)
+    basis = np.linalg.qr(powers)[0]
+    triangle = np.zeros((0, order + 1))
+    for h in H:
+        rows = h[:, None] * powers
+        rows -= basis @ (basis.conj().T @ rows)
+        triangle = np.asarray(np.linalg.qr(np.vstack([triangle, rows]), mode="r"))
+    return triangle
+
+
+def _poles(triangles: Array, f: Array) -> list[Array]:
+    """Poles, rad/s, of each order from 1 on; the highest coefficient is 1, so that those which
+    only follow the noise are unstable."""
+    size = triangles.shape[-1]
+    ridge = SLIGHT * np.linalg.norm(triangles) / np.sqrt(size) * np.eye(size)
+    R = np.asarray(np.linalg.qr(np.vstack([*triangles, ridge]), mode="r"))
+    T = ARC / (len(f) * (f[1] - f[0]))
+    result = []
+    for j in range(1, size):
+        below = solve_triangular(R[:j, :j], -R[:j, j])
+        s = -np.log(np.roots(np.append(1.0, below[::-1]))) / T
+        turns = np.where(s.imag * T < -np.pi * (1 - ARC), 2 * np.pi / T, 0)  # round the circle
+        result.append(s + 1j * (turns + 2 * np.pi * f[0]))
+    return result
+
+
+def _pole(hertz: Array, damping: Array) -> Array:
+    """Poles, rad/s, of frequencies and damping ratios."""
+    return 2 * np.pi * hertz * (-damping + 1j * np.sqrt(1 - damping**2))
+
+
+def _residues(f: Array, mobility: Array, inside: Array, poles: Array) -> tuple[Array, Array]:
+    """Residues (modes, k) of the displacement, from mobilities (k, n) at the lines inside, and the
+    mobilities that they and what lies outside the band make, at all lines."""
+    s = 2j * np.pi * f[:, None]
+    one, other = s / (s - poles), s / (s - poles.conj())
+    beyond = np.hstack([1 / s, 1j / s, s, 1j * s])  # rigid below, flexible above
+    terms = np.hstack([one + other, 1j * (one - other), beyond])
+    size = np.linalg.norm(terms[inside], axis=0)
+    tall = lambda a: np.vstack([a.real, a.imag])
+    x = np.linalg.lstsq(tall(terms[inside] / size), tall(mobility.T[inside]), rcond=None)[0]
+    x /= size[:, None]
+    count = len(poles)
+    return x[:count] + 1j * x[count : 2 * count], (terms @ x).T
 
 
 def _modes(poles: list[Array], low_Hz: float, high_Hz: float) -> Array:
@@ -168,14 +198,11 @@ def _modes(poles: list[Array], low_Hz: float, high_Hz: float) -> Array:
     return np.array(sorted(modes)).reshape(-1, 3)
 
 
-def _jackknife(measured: Responses, frequencies: Array, low_Hz: float, high_Hz: float) -> Array:
-    """Standard deviation of each frequency, Hz; NaN where fewer than three groups saw it."""
-    points = np.unique(measured.points)
-    count = min(GROUPS, len(points))
-    found = np.full((count, len(frequencies)), np.nan)
-    for j in range(count if count > 2 else 0):
-        rows = np.flatnonzero(~np.isin(measured.points, points[j::count]))
-        modes = _modes(_model(measured, rows, low_Hz, high_Hz).all_poles, low_Hz, high_Hz)
+def _jackknife(again: list[Array], frequencies: Array) -> Array:
+    """Standard deviation of each frequency, Hz, from the modes found without one group each; NaN
+    where fewer than three saw it."""
+    found = np.full((len(again), len(frequencies)), np.nan)
+    for j, modes in enumerate(again):
         for i, hertz in enumerate(frequencies):
             change = np.abs(modes[:, 0] / hertz - 1)
             if len(change) and change.min() < 2 * SPAN:

@@ -79,7 +79,7 @@ def read_run(
 ) -> Run:
     """Modes of a file by rising frequency; shapes in it come before functions.
 
-    Raises BadMeasuredData, LabMissing.
+    Raises BadMeasuredData.
     """
     try:
         return (

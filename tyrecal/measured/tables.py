@@ -17,9 +17,10 @@ from dataclasses import dataclass, replace
 from math import isfinite, nan
 from pathlib import Path
 
+from .. import units
 from ..diagnose.measurements import COLUMNS, QUANTITIES
+from ..files import read_bytes
 from ..modes.mode import Label
-from . import units
 from .sensors import BadMeasuredData
 from .values import Value, implausible
 
@@ -48,6 +49,7 @@ HEADINGS = {
 }
 MEANING = {name: meaning for meaning, names in HEADINGS.items() for name in names.split()}
 LABEL = re.compile(r"^[\[(]?\s*(\d+)\s*[,;/ ]\s*(\d+)\s*[\])]?\s*(.*)$")
+LONGEST = 300  # characters of a cell
 KINDS = {"axial": "axial", "lateral": "axial", "torsional": "torsional", "torsion": "torsional",
          "rotational": "torsional", "": None}  # fmt: skip
 MEMBERS = {"": "", "1": "1", "2": "2", "a": "1", "b": "2", "lower": "1", "upper": "2",
@@ -102,7 +104,7 @@ def read_table(path: Path, pressure_kPa: float | None = None) -> list[Value]:
 
 def _lines(path: Path) -> tuple[list[tuple[int, list[str]]], bool]:
     """Lines that are not empty, with their numbers; whether a comma can be a decimal one."""
-    raw = path.read_bytes()
+    raw = read_bytes(path)
     if raw[:2] == b"PK":
         raise BadMeasuredData(f"{path}: a workbook; save the sheet as CSV")
     wide = raw[:2] in (b"\xff\xfe", b"\xfe\xff")
@@ -125,6 +127,9 @@ def _lines(path: Path) -> tuple[list[tuple[int, list[str]]], bool]:
     except csv.Error:
         raise BadMeasuredData(f"{path}, line {first + rows.line_num}: not CSV") from None
     found = [(number, row) for number, row in found if any(row)]
+    for number, row in found:
+        if (long := max(map(len, row))) > LONGEST:  # patterns tried on it would take for ever
+            raise BadMeasuredData(f"{path}, line {number}: a cell of {long} characters")
     if not found:
         raise BadMeasuredData(f"{path}: the file is empty")
     return found, separator != ","
@@ -147,17 +152,19 @@ def _columns(headings: list[str], place: str, pressure_kPa: float | None) -> lis
                 f"{place}: '{heading}' has no unit; write it as '{heading} [{next(iter(table))}]'"
             )
         if table and unit:
-            if unit not in table:
+            known = units.factor(table, unit)
+            if known is None:
                 raise BadMeasuredData(
                     f"{place}: '{heading}': the unit must be one of {', '.join(table)}"
                 )
-            factor = table[unit]
+            factor = known
         columns.append(Column(meaning, index, factor, unit == "%"))
         if meaning == "sigma" and unit and unit != "%":
-            of = next((q for q, each in units.QUANTITIES.items() if unit in each), "")
-            if not of:
+            found = ((q, units.factor(each, unit)) for q, each in units.QUANTITIES.items())
+            of, known = next((each for each in found if each[1]), ("", None))
+            if known is None:
                 raise BadMeasuredData(f"{place}: '{heading}': unknown unit")
-            columns[-1] = Column(meaning, index, units.QUANTITIES[of][unit], of=of)
+            columns[-1] = Column(meaning, index, known, of=of)
     held = {column.meaning for column in columns}
     if not own and not held & set(QUANTITIES) and not {"quantity", "value"} <= held:
         raise BadMeasuredData(

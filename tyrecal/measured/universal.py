@@ -15,11 +15,13 @@ from typing import Any
 
 import numpy as np
 
+from ..files import open_file, read_bytes
 from .sensors import BadMeasuredData
 
 Array = np.ndarray
 Signal = tuple[int, int]  # number of a node; direction 1, 2 or 3, negative where it is reversed
 
+LARGEST = 1_000_000_000  # bytes; response functions of many points are long
 MARK = re.compile(rb" {4}-1(?: {74})?(?=[\r\n]|\Z)")  # binary values may stand before it
 FORMS = {8: "receptance", 11: "mobility", 12: "accelerance"}
 UNHEEDED = (151, 2400, 2412)  # titles and elements: nothing is lost without them
@@ -66,7 +68,7 @@ class Universal:
 
 def is_universal(path: Path) -> bool:
     """Whether a file begins like a universal file. Raises OSError."""
-    with path.open("rb") as file:
+    with open_file(path) as file:
         return file.read(200).lstrip(b"\r\n").startswith(b"    -1")
 
 
@@ -74,7 +76,7 @@ def read_universal(path: Path) -> Universal:
     """Raises BadMeasuredData naming the set and its line; OSError."""
     import pyuff
 
-    text = path.read_bytes()
+    text = read_bytes(path, LARGEST)
     marks = [match.start() for match in MARK.finditer(text)]
     line_of = lambda mark: text.count(b"\n", 0, mark) + 1
     if not marks:

@@ -17,7 +17,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..diagnose.measurements import COLUMNS, LARGEST_SIGMA, PLAUSIBLE, PRESSURES_kPa
+from ..case.usual import LARGEST_SIGMA, MEASURED
+from ..diagnose.measurements import COLUMNS, PRESSURES_kPa
 from ..diagnose.observations import PRIOR_REPEATS
 from ..modes.mode import Label
 from .sensors import BadMeasuredData
@@ -49,14 +50,10 @@ class Value:
 
 def implausible(value: Value) -> str | None:
     """A sentence, where no tyre has such a value."""
-    low, high = PLAUSIBLE[value.quantity]
     if not value.value > 0:
         return f"{value.quantity} is {value.value:g}, must be greater than 0"
-    if not low <= value.value <= high:
-        return (
-            f"{value.quantity} is {value.value:g}: no tyre has that ({low:g} to {high:g});"
-            " which unit?"
-        )
+    if refusal := MEASURED[value.quantity].refusal(value.value):
+        return f"{value.quantity} is {value.value:g}: no tyre has that, {refusal}"
     low, high = PRESSURES_kPa
     if value.quantity != "mass_kg" and not low <= value.pressure_kPa <= high:
         return (

@@ -1,0 +1,52 @@
+"""Units: those that numbers come in, as factors to the tool's keys and columns, and those that
+engineers say; files and formulas have SI."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import pi
+
+INCH, POUND, POUND_FORCE = 0.0254, 0.45359237, 4.4482216152605  # m, kg, N
+QUANTITIES: dict[str, dict[str, float]] = {
+    "frequency_Hz": {"Hz": 1.0, "1/s": 1.0, "cps": 1.0, "kHz": 1e3, "rad/s": 0.5 / pi,
+                     "1/min": 1 / 60, "rpm": 1 / 60},
+    "contact_area_m2": {"m2": 1.0, "cm2": 1e-4, "mm2": 1e-6, "in2": INCH**2, "sq.in": INCH**2},
+    "vertical_stiffness_N_per_m": {"N/m": 1.0, "N_per_m": 1.0, "N/mm": 1e3, "kN/m": 1e3,
+                                   "kN/mm": 1e6, "lbf/in": POUND_FORCE / INCH,
+                                   "lb/in": POUND_FORCE / INCH, "kgf/mm": 9806.65},
+    "mass_kg": {"kg": 1.0, "g": 1e-3, "lb": POUND, "lbs": POUND},
+}  # fmt: skip
+PRESSURE = {"kPa": 1.0, "bar": 100.0, "mbar": 0.1, "MPa": 1e3, "Pa": 1e-3, "psi": 6.894757293168,
+            "atm": 101.325, "kgf/cm2": 98.0665}  # fmt: skip
+LOAD = {"N": 1.0, "kN": 1e3, "daN": 10.0, "kgf": 9.80665, "kg": 9.80665, "lbf": POUND_FORCE,
+        "lb": POUND_FORCE, "lbs": POUND_FORCE}  # fmt: skip
+SAID = {  # SI unit: what people say, and how many of it one is
+    "m": ("mm", 1e3),
+    "m2": ("mm2", 1e6),
+    "Pa": ("MPa", 1e-6),
+    "m/N": ("mm/kN", 1e6),
+    "N/m": ("N/mm", 1e-3),
+    "rad/(N m)": ("mrad/(kN m)", 1e6),
+}
+
+
+def plain(unit: str) -> str:
+    """A unit as it is compared: 'N/mm', 'cm^2', 'cm²' become 'n/mm', 'cm2'."""
+    text = unit.lower().replace("²", "2").replace("^", "").replace(" ", "")
+    return text.removesuffix("(g)").removesuffix("gauge")
+
+
+def factor(table: Mapping[str, float], unit: str) -> float | None:
+    """The factor of a `plain` unit, None where ``table`` does not have it."""
+    return next((each for name, each in table.items() if plain(name) == unit), None)
+
+
+def said(unit: str) -> tuple[str, float]:
+    """The unit that people say for one of the catalogue or the case, and the factor to it."""
+    return SAID.get(unit, (unit, 1.0))
+
+
+def in_engineers_units(value: float, unit: str, digits: int = 6) -> str:
+    """``in_engineers_units(-0.00934, "m", 3)`` is '-9.34 mm'."""
+    name, factor = said(unit)
+    return f"{value * factor:.{digits}g} {name}".rstrip()
