@@ -25,4 +25,5 @@ def test_wrong_case(name: str, tmp_path: Path) -> None:
     assert any(m.key == BAD[name].key and BAD[name].words in m.message for m in mistakes), told
     for mistake in mistakes:
         assert str(mistake).isprintable() and len(mistake.message) < 400
-        assert mistake.line >= 1 and mistake.file.startswith(str(tmp_path))
+        found = path.is_file()  # else no line is to blame
+        assert mistake.line >= found and mistake.file.startswith(str(tmp_path))

@@ -206,9 +206,9 @@ def test_with_values_is_fast() -> None:
     start = start_values(P235)
     durations = []
     for _ in range(50):
-        began = time.perf_counter()
+        began = time.process_time()
         with_values(P235, start)
-        durations.append(time.perf_counter() - began)
+        durations.append(time.process_time() - began)
     assert min(durations) < 1e-3
 
 

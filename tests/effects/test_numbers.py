@@ -18,7 +18,7 @@ from tyrecal.evaluate.door import Door, Question
 from tyrecal.modes.mode import Label
 from tyrecal.tyre.section import fill_lines
 
-from .support import CASE, CASES, START, decks, frequencies
+from .support import CASE, CASES, START, data, decks, frequencies
 
 Array = np.ndarray
 PLY = CASE.section.names.index("ply")
@@ -34,13 +34,13 @@ AREAS = {
 def edited(**parts: object) -> dict[str, str]:
     """Decks of the case with parts of it replaced by hand."""
     case = CASE.case.model_copy(update=parts)
-    return Decks(replace(CASE, case=case)).texts("abaqus")
+    return data(Decks(replace(CASE, case=case)))
 
 
 def set_to(**values: float) -> dict[str, str]:
     """Decks of the case with numbers set by path, __ for a dot."""
     paths = {name.replace("__", "."): value for name, value in values.items()}
-    return Decks(with_values(CASE, paths)).texts("abaqus")
+    return data(Decks(with_values(CASE, paths)))
 
 
 def mass(**effects: float) -> float:
@@ -251,7 +251,7 @@ def test_layer_ends_with_its_regions() -> None:
     layer = CASE.case.rebar_layers["carcass"]
     short = layer.model_copy(update={"regions": ["crown", "upper_sidewall"]})
     layers = {**CASE.case.rebar_layers, "carcass": short}
-    long = Decks(CASE).texts("abaqus")["inflate.inp"]
+    long = data(Decks(CASE))["inflate.inp"]
     found = edited(rebar_layers=layers)["inflate.inp"]
     gone = set(long.splitlines()) - set(found.splitlines())
     assert len(gone) == 2 * (3 + 1)  # the lower sidewall's and the bead's elements, both sides

@@ -28,6 +28,7 @@ def modes(site: Path, *arguments: str) -> dict[str, float]:
             for m in json.loads(done.stdout)["modes"]}  # fmt: skip
 
 
+@pytest.mark.slow
 def test_it_is_the_change_that_it_says(site: Path) -> None:
     modulus = "materials.belt_cord.youngs_modulus_Pa"
     plain, absent = modes(site), modes(site, "--set", "effects.belt_softening=0")

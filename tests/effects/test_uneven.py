@@ -20,7 +20,7 @@ from tyrecal.evaluate.store import Store
 from tyrecal.modes.mode import Label
 from tyrecal.studies.modes import modes_result
 
-from .support import CASE, CASES, START, decks
+from .support import CASE, CASES, START, data, decks
 
 SMALL = {"point_mass": 0.02, "road_contact": 2e4, "rotation": 10.0, "stiffness_splice": 0.2}
 each = pytest.mark.parametrize("id", SMALL)
@@ -153,8 +153,8 @@ def test_splice_in_the_case_file(case_folder) -> None:
     text = path.read_text()
     splice = "splice: {share: 1.0, width_deg: 4, numbers: [rebar_layers.carcass.area_m2]}\n"
     path.write_text(text + splice)
-    written = Decks(load_case(path)).texts("abaqus")
-    plain = Decks(load_case(CASES / path.name)).texts("abaqus")
+    written = data(Decks(load_case(path)))
+    plain = data(Decks(load_case(CASES / path.name)))
     assert {name: written[name] for name in plain} == plain
     differ = [
         (a, b)

@@ -3,7 +3,16 @@
 from .load import LoadedCase, load_case, validate
 from .mistakes import CaseError, Mistake
 from .schema import Case
-from .variables import number_at, overruled, parse_assignment, start_values, with_level, with_values
+from .variables import (
+    number_at,
+    overridden,
+    overruled,
+    parse_assignment,
+    start_values,
+    unusual_value,
+    with_level,
+    with_values,
+)
 
 __all__ = [
     "Case",
@@ -12,9 +21,11 @@ __all__ = [
     "Mistake",
     "load_case",
     "number_at",
+    "overridden",
     "overruled",
     "parse_assignment",
     "start_values",
+    "unusual_value",
     "validate",
     "with_level",
     "with_values",

@@ -9,7 +9,10 @@ from typing import Annotated, Any
 from pydantic import Field
 
 from .materials import Moduli
-from .parts import Name, NotNegative, Part, Positive, Problem
+from .parts import Frequency, Name, NotNegative, Part, Positive, Problem
+
+LEAST_LOAD_N, LARGEST_LOAD_N = 1.0, 1e6  # outside, no tyre finds its balance on a road
+Load = Annotated[Positive, Field(ge=LEAST_LOAD_N, le=LARGEST_LOAD_N)]
 
 
 class Analysis(Part):
@@ -17,7 +20,7 @@ class Analysis(Part):
 
     static_moduli: Moduli = "long_term"
     static_increments: Annotated[int, Field(ge=1, le=1000)] = 10
-    vibration_frequency_Hz: Positive | None = None
+    vibration_frequency_Hz: Frequency | None = None
     sectors: Annotated[int, Field(ge=8, le=1000)] = 60
     highest_harmonic: Annotated[int, Field(ge=0, le=20)] = 4
     modes_per_harmonic: Annotated[int, Field(ge=1, le=10)] = 2
@@ -36,7 +39,7 @@ class Road(Part):
     element_angles_deg: Annotated[list[Positive], Field(min_length=1, max_length=200)] = Field(
         default_factory=lambda: [4.0] * 3 + [5.0, 8.0, 17.0, 45.0, 93.0]
     )
-    loads_N: Annotated[list[Positive], Field(min_length=1, max_length=100)] = Field(
+    loads_N: Annotated[list[Load], Field(min_length=1, max_length=100)] = Field(
         default_factory=lambda: [500.0, *(1000.0 * kN for kN in (1, 2, 3, 4, 5, 6, 8))]
     )
 

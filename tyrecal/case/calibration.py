@@ -2,24 +2,51 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from .parts import WRONG, NotNegative, Part, Positive, Problem, Text, number, one_of
+from .analysis import Load
+from .parts import (
+    WRONG,
+    Frequency,
+    NotNegative,
+    Number,
+    Part,
+    Positive,
+    Problem,
+    Text,
+    number,
+    one_of,
+)
 
 MEASURED = {"contact_area_m2": "sigma_m2", "vertical_stiffness_N_per_m": "sigma_N_per_m"}
 """What a footprint target can hold, and the key of its standard deviation."""
+Weight = Annotated[NotNegative, Field(le=1e6)]
+
+
+def cannot_fit(weights: Sequence[float], free: int) -> str | None:
+    """Why targets of these weights are none to fit ``free`` variables to; None where they are."""
+    count = sum(weight > 0 for weight in weights)
+    if not count:
+        return "every target has the weight 0: there is nothing to fit to"
+    if count < free:
+        targets = "1 target" if count == 1 else f"{count} targets"
+        return (
+            f"{targets} cannot determine {free} free variables: give more, or hold variables with"
+            " --fix"
+        )
+    return None
 
 
 class Variable(Part):
     """A design variable: the numbers it sets (dotted paths), its start and its bounds."""
 
     sets: Annotated[list[str], Field(min_length=1)]
-    start: float
-    lower: float
-    upper: float
+    start: Number
+    lower: Number
+    upper: Number
     scale: Literal["log", "linear"] = "log"
 
     @classmethod
@@ -42,8 +69,8 @@ class TargetMode(Part):
     c: Annotated[int, Field(ge=0, le=20)]
     m: Annotated[int, Field(ge=0, le=3)]  # beyond, the belt's motion has no clear order
     kind: Literal["axial", "torsional"] | None = None
-    frequency_Hz: Positive
-    weight: NotNegative = 1.0
+    frequency_Hz: Frequency
+    weight: Weight = 1.0
     sigma_Hz: Positive | None = None
 
     @classmethod
@@ -60,12 +87,12 @@ class TargetMode(Part):
 class TargetFootprint(Part):
     """A measured contact area, or tangent vertical stiffness, at a load, with its sigma."""
 
-    load_N: Positive
+    load_N: Load
     contact_area_m2: Positive | None = None
     sigma_m2: Positive | None = None
     vertical_stiffness_N_per_m: Positive | None = None
     sigma_N_per_m: Positive | None = None
-    weight: NotNegative = 1.0
+    weight: Weight = 1.0
 
     @classmethod
     def problems(cls, values: Mapping[str, Any]) -> Iterator[Problem]:
@@ -91,6 +118,16 @@ class Targets(Part):
     source: Text = ""
     modes: list[TargetMode] = Field(default_factory=list)
     footprint: list[TargetFootprint] = Field(default_factory=list)
+
+    @property
+    def loads_N(self) -> list[float]:
+        """Loads at which something was measured, rising."""
+        return sorted({target.load_N for target in self.footprint})
+
+    @property
+    def weights(self) -> list[float]:
+        """The weight of each."""
+        return [t.weight for t in self.modes] + [t.weight for t in self.footprint]
 
 
 class Uncertainty(Part):

@@ -29,6 +29,7 @@ FIXED = ("format", "variables", "targets", "uncertainties", "solver")
 def problems(data: Mapping[str, Any], section: Section | None) -> Problems:
     """Every disagreement in ``data``; those with the section only where there is one."""
     yield from _effects(data)
+    yield from _programs(data)
     yield from _names(data)
     yield from _targets(data)
     full = with_defaults(data)  # a number that is not written can vary too
@@ -49,8 +50,22 @@ def _effects(data: Mapping[str, Any]) -> Problems:
             yield ("effects", id), f"is not one of the effects{suggestion(id, IDS)}"
 
 
+def _programs(data: Mapping[str, Any]) -> Problems:
+    """A case may come from anybody, so it does not say which program runs."""
+    for key in table(table(data, "solver"), "options"):
+        if key == "command":
+            yield (
+                ("solver", "options", "command"),
+                "a case cannot say which program runs: that is the user's to say, by"
+                " --solver-command, TYRECAL_SOLVER_COMMAND or 'commands' of the settings file that"
+                " 'tyrecal solvers' names",
+            )
+
+
 def _names(data: Mapping[str, Any]) -> Problems:
     """Materials exist and have the right kind; names differ by more than upper and lower case."""
+    if str(data.get("name")).lstrip().startswith("*"):
+        yield ("name",), "must not begin with *, which starts a keyword in the decks"
     for part in ("materials", "rebar_layers"):
         seen: dict[str, str] = {}
         for name in table(data, part):

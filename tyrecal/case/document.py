@@ -13,10 +13,12 @@ from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.events import AliasEvent, CollectionEndEvent, CollectionStartEvent
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
-from .mistakes import Keys, Mistake, dotted, shortened
+from .mistakes import Keys, Mistake, dotted, shortened, suggestion
 from .parts import WRONG
 
-MOST_BYTES = 1_000_000
+MOST_BYTES = 1_000_000  # of a table beside a case
+LONGEST = 100_000  # bytes of YAML; shipped cases have 5000, and it is read at 30 kB/s
+MOST_EVENTS = 20_000
 DEEPEST = 20
 
 
@@ -72,20 +74,20 @@ def read_document(path: Path) -> Document:
 def _text(path: Path, document: Document) -> str | None:
     try:
         if path.is_dir():
-            document.refuse(1, "is a directory, must be a case file")
+            document.refuse(0, f"is a folder, must be a case file{_case_beside(path)}")
             return None
         if path.exists() and not path.is_file():
-            document.refuse(1, "is not a regular file")
+            document.refuse(0, "is not a regular file")
             return None
         with path.open("rb") as file:
-            content = file.read(MOST_BYTES + 1)
+            content = file.read(LONGEST + 1)
     except FileNotFoundError:
-        document.refuse(1, "there is no such file")
+        document.refuse(0, f"there is no such file{_case_beside(path)}")
     except (OSError, ValueError) as error:
-        document.refuse(1, f"cannot be read: {getattr(error, 'strerror', None) or error}")
+        document.refuse(0, f"cannot be read: {getattr(error, 'strerror', None) or error}")
     else:
-        if len(content) > MOST_BYTES:
-            document.refuse(1, f"the file is larger than {MOST_BYTES} bytes")
+        if len(content) > LONGEST:
+            document.refuse(1, f"the file is larger than {LONGEST} bytes")
         elif not content.strip():
             document.refuse(1, "the file is empty")
         else:
@@ -97,11 +99,27 @@ def _text(path: Path, document: Document) -> str | None:
     return None
 
 
+def _case_beside(path: Path) -> str:
+    """The case file that was probably meant, where one lies beside ``path``."""
+    with suppress(OSError, ValueError):
+        beside = [str(found) for found in path.parent.glob("*.yaml") if found.is_file()]
+        return suggestion(f"{path}.yaml" if path.suffix != ".yaml" else str(path), beside, "")
+    return ""
+
+
 def _harmless(yaml: YAML, text: str, document: Document) -> bool:
-    """No alias, tag or deep nest, judged from the events: nothing is expanded or built."""
+    """No alias, tag, directive or deep nest, not too much of anything, judged from the events:
+    nothing is expanded or built."""
     depth = 0
-    for event in yaml.parse(text):
+    for number, event in enumerate(yaml.parse(text)):
         line = event.start_mark.line + 1
+        if number > MOST_EVENTS:
+            document.refuse(line, f"there are more than {MOST_EVENTS} keys and values")
+            return False
+        if getattr(event, "version", None) or getattr(event, "tags", None):
+            line = 1 + [row[:1] for row in text.split("\n")].index("%")
+            document.refuse(line, "a directive, as %YAML, must go: a case is plain YAML 1.2")
+            return False
         depth += isinstance(event, CollectionStartEvent) - isinstance(event, CollectionEndEvent)
         if depth > DEEPEST:
             document.refuse(line, f"keys are nested more than {DEEPEST} deep")

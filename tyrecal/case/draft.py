@@ -9,6 +9,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from ..files import read_bytes
 from ..tyre.from_size import build, usual
 from ..tyre.section import SectionError
 from ..tyre.size import INCH, TyreSize
@@ -33,13 +34,13 @@ class Draft:
     file: str
     content: bytes
 
-    def check(self) -> None:
+    def check(self, allow_unusual: bool = False) -> None:
         """Raises BadSection where the case is not right, a mistake a line."""
         with TemporaryDirectory() as folder:
             Path(folder, self.file).write_bytes(self.content)
             path = Path(folder, "case.yaml")
             path.write_text(self.text, encoding="utf-8")
-            mistakes = validate(path)
+            mistakes = validate(path, allow_unusual)
         if mistakes:
             raise BadSection("\n".join(f"{m.key} is {m.value}: {m.message}" for m in mistakes))
 
@@ -73,6 +74,7 @@ def from_file(
 ) -> Draft:
     """A case with the section in ``file``: a station table, or two curves with a belt of width
     ``belt``, m. Raises BadSection, OSError."""
+    content = read_bytes(file)  # before others open it: it may be a pipe
     try:
         outline = _is_outline(file)
         if belt is not None and not outline:
@@ -94,7 +96,7 @@ def from_file(
             keys,
             2 if size and size.light_truck else 1,
         )
-        return Draft(text, file.name, file.read_bytes())
+        return Draft(text, file.name, content)
     except SectionError as error:
         line = f", line {error.line}" if error.line else ""
         raise BadSection(f"{file}{line}: {error}") from None

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from copy import deepcopy
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pydantic import ValidationError
 
 from ..effects import EffectRefused, with_effects
+from .calibration import cannot_fit
 from .checks import problems
 from .document import Document, read_document
+from .guard import unusual
 from .meshable import folds
 from .mistakes import CaseError, Keys, Mistake, dotted
 from .schema import Case
@@ -28,7 +30,8 @@ class LoadedCase:
     """A valid case: typed (``case``), as plain data (``raw``), with its section and its place.
 
     path: the case file; folder: where it lies, to which its own paths are relative;
-    file_pressure_kPa: the pressure in the file, whatever is set later.
+    file_pressure_kPa: the pressure in the file, whatever is set later; overrides: what the user
+    has set since, by name or path, for results to say.
     """
 
     case: Case
@@ -37,22 +40,34 @@ class LoadedCase:
     folder: Path
     raw: dict[str, Any]
     file_pressure_kPa: float | None = None
+    overrides: Mapping[str, float] = field(default_factory=dict)
 
 
-def load_case(path: Path | str) -> LoadedCase:
-    """Read a case file. Raises CaseError with every mistake in it."""
-    loaded, mistakes = _read(Path(path))
+def load_case(path: Path | str, allow_unusual: bool = False) -> LoadedCase:
+    """Read a case file. Raises CaseError with every mistake in it, numbers among them that no tyre
+    has, unless they are allowed."""
+    loaded, mistakes = _read(Path(path), allow_unusual)
     if loaded is None:
         raise CaseError(mistakes)
     return loaded
 
 
-def validate(path: Path | str) -> list[Mistake]:
-    """Every mistake in a case file and the files it names, by line; empty when it is right."""
-    return _read(Path(path))[1]
+def validate(path: Path | str, allow_unusual: bool = False) -> list[Mistake]:
+    """Every mistake in a case file and the files it names, by line; empty when it is right.
+
+    Targets that no fit can use are mistakes here, though other studies do without.
+    """
+    loaded, mistakes = _read(Path(path), allow_unusual)
+    if loaded and loaded.case.targets.weights and loaded.case.variables:
+        reason = cannot_fit(loaded.case.targets.weights, len(loaded.case.variables))
+        if reason:
+            document = read_document(Path(path))
+            document.add(("targets",), reason)
+            return document.mistakes
+    return mistakes
 
 
-def _read(path: Path) -> tuple[LoadedCase | None, list[Mistake]]:
+def _read(path: Path, allow_unusual: bool) -> tuple[LoadedCase | None, list[Mistake]]:
     document = read_document(path)
     data = document.data
     if data is None:
@@ -67,6 +82,8 @@ def _read(path: Path) -> tuple[LoadedCase | None, list[Mistake]]:
     if section and meshable and (message := folds(data, section)):
         form = "outline" if data["section"].get("outline") else "stations"
         document.add(("section", form), message)
+    if not allow_unusual:
+        _add(document, unusual(data, section))
     if case is None or section is None or document.mistakes:
         return None, sorted(document.mistakes, key=lambda m: (m.file != str(path), m.line))
     loaded = LoadedCase(case, path, section, path.parent, raw, case.pressure_kPa)

@@ -7,9 +7,10 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from .parts import WRONG, Part, Positive, Problem, number
+from .parts import WRONG, Frequency, Number, Part, Positive, Problem, number
 
 Moduli = Literal["long_term", "instantaneous"]
+MOST_RELAXED = 0.999  # of a modulus: what is left must be a tyre's
 
 
 class Prony(Part):
@@ -17,7 +18,7 @@ class Prony(Part):
 
     g: Annotated[float, Field(ge=0, lt=1)]
     k: Annotated[float, Field(ge=0, lt=1)]
-    tau_s: Positive
+    tau_s: Annotated[Positive, Field(ge=1e-9, le=1e9)]
 
 
 class Rubber(Part):
@@ -29,13 +30,13 @@ class Rubber(Part):
     """
 
     kind: Literal["rubber"]
-    C10_Pa: float
-    C01_Pa: float
+    C10_Pa: Number
+    C01_Pa: Number
     D1_per_Pa: Positive
     moduli: Moduli = "long_term"
     prony: list[Prony] = Field(default_factory=list)
     frequency_exponent: Annotated[float, Field(ge=0, le=0.5)] = 0.0
-    reference_frequency_Hz: Positive = 60.0
+    reference_frequency_Hz: Frequency = 60.0
     density_kg_per_m3: Positive
 
     @classmethod
@@ -47,8 +48,9 @@ class Rubber(Part):
             terms = values.get("prony")
             terms = terms if isinstance(terms, list) else []
             total = sum(number(dict(term), share) or 0 for term in terms if term is not WRONG)
-            if total >= 1:
-                yield "prony", f"must have a sum of all {share} less than 1, got {total:g}"
+            if total > MOST_RELAXED:
+                least = f"must have a sum of all {share} of at most {MOST_RELAXED:g}"
+                yield "prony", f"{least}, got {total:.9g}"
 
 
 class Cord(Part):

@@ -6,6 +6,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from difflib import get_close_matches
 
+from ..files import printable
+
 Keys = tuple[str | int, ...]
 """Keys and list indices that lead to a value of the case."""
 
@@ -14,7 +16,7 @@ Keys = tuple[str | int, ...]
 class Mistake:
     """One mistake: the file, its line (from 1), the dotted key, its value, what would be right.
 
-    ``key`` is empty where the file as a whole is wrong.
+    ``key`` is empty where the file as a whole is wrong, ``line`` 0 where it has none.
     """
 
     file: str
@@ -25,7 +27,8 @@ class Mistake:
 
     def __str__(self) -> str:
         what = f"{self.key} is {self.value}: " if self.key else ""
-        return printable(f"{self.file}, line {self.line}: {what}{self.message}")
+        where = f"{self.file}, line {self.line}" if self.line else self.file
+        return printable(f"{where}: {what}{self.message}")
 
 
 class CaseError(ValueError):
@@ -41,21 +44,16 @@ def dotted(keys: Keys) -> str:
     return ".".join(map(str, keys))
 
 
-def printable(text: str) -> str:
-    """``text`` on one line, without control characters."""
-    return "".join(c if c.isprintable() else " " for c in text)
-
-
 def shortened(text: str, length: int = 40) -> str:
     """``text`` on one line, cut to ``length`` characters."""
     text = printable(text)
     return text if len(text) <= length else text[: length - 3] + "..."
 
 
-def suggestion(name: str, known: Iterable[str]) -> str:
-    """``; did you mean 'x'?``, or ``; known: ...`` when nothing is close."""
+def suggestion(name: str, known: Iterable[str], otherwise: str | None = None) -> str:
+    """``; did you mean 'x'?``; where nothing is close ``otherwise``, or what is known."""
     names = list(known)
     close = get_close_matches(name, names, 1)
     if close:
         return f"; did you mean '{close[0]}'?"
-    return f"; known: {', '.join(map(str, names)) or 'none'}"
+    return f"; known: {', '.join(map(str, names)) or 'none'}" if otherwise is None else otherwise

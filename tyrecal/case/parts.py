@@ -5,11 +5,29 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, Self
 
-from pydantic import BaseModel, ConfigDict, Field, StringConstraints, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    StringConstraints,
+    model_validator,
+)
 from pydantic_core import PydanticCustomError
 
-Positive = Annotated[float, Field(gt=0)]
-NotNegative = Annotated[float, Field(ge=0)]
+LEAST, LARGEST = 1e-30, 1e15  # beyond, products of numbers leave what a computer holds
+
+
+def _can_be_computed_with(value: float) -> float:
+    if value and not LEAST <= abs(value) <= LARGEST:
+        raise PydanticCustomError("size", f"must be 0, or from {LEAST:g} to {LARGEST:g} in size")
+    return value
+
+
+Number = Annotated[float, AfterValidator(_can_be_computed_with)]
+Positive = Annotated[Number, Field(gt=0)]
+NotNegative = Annotated[Number, Field(ge=0)]
+Frequency = Annotated[Positive, Field(ge=1e-3, le=1e5)]  # Hz
 Degrees = Annotated[float, Field(ge=-180, le=180)]
 # names end in decks, paths of keys and file names: one word of plain letters is safe in all
 Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z][A-Za-z0-9_\-]*$", max_length=60)]

@@ -10,7 +10,7 @@ from ..effects import IDS
 from .analysis import Analysis, Road, Solver
 from .calibration import Targets, Uncertainty, Variable
 from .materials import Cord, Rubber
-from .parts import Name, NotNegative, Part, Text
+from .parts import Name, NotNegative, Number, Part, Text
 from .section import Mesh, RebarLayer, SectionSource, Solid
 from .uneven import PointMass, RoadSpring, Splice
 from .wheel import Cavity, Rim
@@ -31,7 +31,7 @@ class Case(Part):
     format: Annotated[int, Field(ge=1, le=1)]  # Literal[1] would take true
     name: Text
     size: Text
-    pressure_kPa: Annotated[float, Field(ge=0, lt=2000)]
+    pressure_kPa: Annotated[Number, Field(ge=0, lt=2000)]
     section: SectionSource
     mesh: Mesh
     materials: Annotated[
@@ -41,13 +41,13 @@ class Case(Part):
     rebar_layers: dict[Name, RebarLayer] = Field(default_factory=dict)
     rim: Rim
     cavity: Cavity = Cavity()
-    spin_rad_per_s: NotNegative = 0.0
+    spin_rad_per_s: Annotated[NotNegative, Field(le=1e4)] = 0.0
     point_mass: PointMass = PointMass()
     road_spring: RoadSpring = RoadSpring()
     splice: Splice = Splice()
     analysis: Analysis
     road: Road = Road()
-    effects: Annotated[dict[str, float], AfterValidator(_every_effect)] = Field(
+    effects: Annotated[dict[str, Number], AfterValidator(_every_effect)] = Field(
         default_factory=lambda: dict.fromkeys(IDS, 0.0)
     )
     variables: dict[Name, Variable] = Field(default_factory=dict)
@@ -59,4 +59,4 @@ class Case(Part):
     @property
     def loads_N(self) -> list[float]:
         """Loads at which the tyre is pressed, rising: the road's and those with a target."""
-        return sorted({*self.road.loads_N, *(target.load_N for target in self.targets.footprint)})
+        return sorted({*self.road.loads_N, *self.targets.loads_N})

@@ -6,14 +6,14 @@ from typing import Annotated
 
 from pydantic import Field
 
-from .parts import NotNegative, Part, Positive, Text
+from .parts import NotNegative, Number, Part, Positive, Text
 
 
 class PointMass(Part):
     """A lumped mass on the tread, at the angle 0 and the height z over the middle."""
 
     mass_kg: NotNegative = 0.0
-    z_m: float = 0.0
+    z_m: Number = 0.0
 
 
 class RoadSpring(Part):

@@ -12,6 +12,7 @@ from pydantic import BaseModel, ValidationError
 
 from ..effects import with_effects
 from .checks import at, find, problems
+from .guard import refusal
 from .load import LoadedCase
 from .meshable import folds
 from .mistakes import Keys, dotted, suggestion
@@ -109,6 +110,20 @@ def with_values(loaded: LoadedCase, values: Mapping[str, float]) -> LoadedCase:
     changed = replace(loaded, case=case, raw=raw, section=section)
     with_effects(changed)
     return changed
+
+
+def overridden(loaded: LoadedCase, values: Mapping[str, float]) -> LoadedCase:
+    """`with_values` of what the user sets, noted among the case's ``overrides``."""
+    changed = with_values(loaded, values)
+    given = {name: float(value) for name, value in values.items()}
+    return replace(changed, overrides={**loaded.overrides, **given})
+
+
+def unusual_value(loaded: LoadedCase, name: str, value: float) -> str | None:
+    """Why no user states ``value`` of a variable, or of the number at a dotted path: what is usual,
+    what was probably meant; None where it is usual. Raises ValueError for an unknown name."""
+    found = (refusal(loaded.raw, loaded.section, keys, value) for keys in _keys(loaded, name))
+    return next((message for message in found if message), None)
 
 
 def number_at(loaded: LoadedCase, path: str) -> float:

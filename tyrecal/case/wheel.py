@@ -7,14 +7,14 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from .parts import NotNegative, Part, Positive, Problem, number
+from .parts import NotNegative, Number, Part, Positive, Problem, number
 
 
 class Point(Part):
     """A point of the section's plane, m."""
 
-    r: float
-    z: float
+    r: Number
+    z: Number
 
 
 def _values(part: Any) -> Mapping[str, Any]:
@@ -74,4 +74,4 @@ class Cavity(Part):
 
     gas: Literal["air", "helium", "sulphur_hexafluoride"] = "air"
     temperature_C: Annotated[float, Field(gt=-100, lt=300)] = 20.0
-    share: NotNegative = 0.0
+    share: Annotated[NotNegative, Field(le=100)] = 0.0

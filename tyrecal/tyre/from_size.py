@@ -121,14 +121,14 @@ def _check(size: TyreSize, g: Gauges) -> None:
     width = size.section_width(g.rim)
     least = g.liner + g.ply + g.belts + 1e-3
     for name, value, low, high in (
+        ("rim width", g.rim, 0.5 * size.width, 1.1 * size.width),
         ("crown", g.crown, least / SHOULDER, 0.25 * size.section_height),
         ("sidewall", g.sidewall, g.liner + 1e-3, 0.15 * width),
         ("bead", g.bead, g.liner + 2e-3, 0.2 * g.rim),
         ("belt width", g.belt, 0.4 * width, 0.95 * width),
-        ("rim width", g.rim, 0.5 * size.width, 1.1 * size.width),
     ):
         if not low <= value <= high:
             raise SectionError(
                 f"{size.text}: the {name} must be between {1e3 * low:.1f} and {1e3 * high:.1f} mm,"
-                f" got {1e3 * value:.1f}"
+                f" got {1e3 * value:.4g}"
             )

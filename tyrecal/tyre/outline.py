@@ -105,7 +105,8 @@ def section_of_outline(
     lines = inner + distances[..., None] * rays
     points = np.stack([np.stack([np.interp(s, arc, x) for x in line.T], -1) for line in lines])
     points[2, s > edge + 1e-9] = points[3, s > edge - belt_step / 2 + 1e-9] = np.nan
-    return Section(LINES, points, tuple(STATIONS.items()), s >= rim - 1e-9)
+    drawn = curves["outer"], curves["inner"]
+    return Section(LINES, points, tuple(STATIONS.items()), s >= rim - 1e-9, drawn)
 
 
 def _smooth(curve: Array) -> tuple[Array, Array]:

@@ -32,13 +32,15 @@ class Section:
 
     names: the lines from the inner surface to the outer, e.g. inner, ply, belt1, belt2, outer;
     points (line, station, 2): r and z in m, NaN where a line is absent;
-    regions: name and number of stations' intervals, in order; rigid (station,): held by the rim.
+    regions: name and number of stations' intervals, in order; rigid (station,): held by the rim;
+    outline: the outer and the inner curve (point, 2), m, where it was drawn between such.
     """
 
     names: tuple[str, ...]
     points: Array
     regions: tuple[tuple[str, int], ...]
     rigid: Array
+    outline: tuple[Array, ...] = ()
 
 
 def read_section(path: Path) -> Section:

@@ -16,14 +16,23 @@ import re
 from dataclasses import dataclass
 
 INCH = 0.0254
+TRUCK_RIM = r"(17|19|22|24)\.5"
 RIM_CODES = (10, *range(12, 25))
-NOMINAL_WIDTHS, ASPECTS = range(125, 400, 5), range(25, 90, 5)
-PRESSURES_KPA = {"": 250.0, "P": 240.0, "XL": 290.0, "LT": 350.0, "C": 400.0, "T": 420.0}
+NOMINAL_WIDTHS, ASPECTS = range(125, 400, 10), range(25, 90, 5)  # of cars: widths end in 5
+PRESSURES_KPA = {
+    "": 250.0,
+    "P": 240.0,
+    "XL": 290.0,
+    "LT": 350.0,
+    "C": 400.0,
+    "T": 420.0,
+    "HL": 290.0,
+}
 LOAD_RANGES_KPA = {"B": 240.0, "C": 350.0, "D": 450.0, "E": 550.0, "F": 660.0}
 """Standard cold pressures by kind of tyre and, of LT tyres, by load range (50, 65, 80, 95 psi)."""
 
 METRIC = re.compile(
-    r"(?P<kind>P|LT|T|) ?(?P<width>\d{3}) ?/ ?(?P<aspect>\d{2,3})"
+    r"(?P<kind>P|LT|T|HL|) ?(?P<width>\d{3}) ?/ ?(?P<aspect>\d{2,3})"
     r" ?(?P<build>-|[A-Z]{1,3}) ?(?P<rim>\d{2}(?:\.\d+)?) ?(?P<suffix>LT|C|)(?![A-Z\d.])"
 )
 FLOTATION = re.compile(
@@ -88,6 +97,8 @@ def parse_size(text: str) -> TyreSize:
     code = re.sub(r"(?<=\d)XL\b", " XL", text.upper().replace("×", "X"))
     code = re.sub(r"^(LT.+R ?\d{2}) ?(?=[B-F]\b)", r"\1/", code)  # LT245/75R16E: load range E
     found = METRIC.match(code) or FLOTATION.match(code)
+    if not found and re.match(rf"\d{{1,3}}(\.\d+)? ?R ?{TRUCK_RIM}", code):
+        raise UnknownSize(_truck(text))
     if not found:
         raise UnknownSize(f"'{text}' is not a tyre size that is known{_hint(code)}")
     parts = found.groupdict()
@@ -100,6 +111,8 @@ def parse_size(text: str) -> TyreSize:
                 f"'{text}': '{word}' after the size is no service description, as 91V is"
             )
     _check_build(name, parts["build"])
+    if re.fullmatch(TRUCK_RIM, parts["rim"]):
+        raise UnknownSize(_truck(name))
     if not parts["rim"].isdigit() or int(parts["rim"]) not in RIM_CODES:
         raise UnknownSize(
             f"'{name}': no rim of code {parts['rim']}, known are {RIM_CODES[0]}"
@@ -112,7 +125,12 @@ def parse_size(text: str) -> TyreSize:
 def _metric(name: str, parts: dict[str, str]) -> TyreSize:
     width, aspect = int(parts["width"]), int(parts["aspect"])
     if width not in NOMINAL_WIDTHS:
-        raise UnknownSize(f"'{name}': section widths are 125 to 395 mm in steps of 5, not {width}")
+        if 70 <= width <= 240 and width % 10 == 0:
+            raise UnknownSize(
+                f"'{name}' is a motorcycle tyre's, whose widths end in 0: only passenger car and"
+                " light truck tyres are built from a size"
+            )
+        raise UnknownSize(f"'{name}': section widths are 125 to 395 mm in steps of 10, not {width}")
     if aspect not in ASPECTS:
         raise UnknownSize(f"'{name}': aspect ratios are 25 to 85 % in steps of 5, not {aspect}")
     kind = parts["suffix"] or parts["kind"]
@@ -156,10 +174,17 @@ def _check_build(name: str, build: str) -> None:
         raise UnknownSize(f"'{name}' is a bias-ply tyre: only radial ones (R) can be built")
     if build.endswith("RF"):
         raise UnknownSize(
-            f"'{name}' has self-supporting sidewalls: give the size with R, and their --sidewall"
+            f"'{name}' has self-supporting sidewalls: give the size with R, and their --sidewall-mm"
         )
     if not re.fullmatch(r"[A-Z]?R", build):
         raise UnknownSize(f"'{name}': '{build}' is no construction, R is for radial tyres")
+
+
+def _truck(name: str) -> str:
+    return (
+        f"'{name}' is a truck tyre, on a 15 degree rim: only passenger car and light truck tyres"
+        " are built from a size; give its section with --section"
+    )
 
 
 def _hint(code: str) -> str:

@@ -1,0 +1,260 @@
+"""Slips of unit are refused with what was probably meant, and taken as they are where allowed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from tyrecal.case import load_case, unusual_value, validate
+from tyrecal.case.guard import refusal
+from tyrecal.case.shape import with_defaults
+from tyrecal.case.usual import USUAL
+from tyrecal.cli.main import cli
+
+from .wrong import CASES, CSV, GOOD, PRESSURE, TABLE
+
+BELT = "cord:\n    kind: cord\n    youngs_modulus_Pa: "
+SLIPS = {  # name: text of the good case, text in its place, key, what was meant
+    "bar": (PRESSURE, "pressure_kPa: 2.4", "pressure_kPa", "2.4 bar, 240 kPa"),
+    "psi": (PRESSURE, "pressure_kPa: 35", "pressure_kPa", "35 psi, 241.3 kPa"),
+    "MPa of pressure": (PRESSURE, "pressure_kPa: 0.24", "pressure_kPa", "0.24 MPa, 240 kPa"),
+    "MPa of rubber": ("C10_Pa: 1.0e+6", "C10_Pa: 1.0", "materials.rubber.C10_Pa", "1 MPa, 1e+06"),
+    "MPa of C01": ("C01_Pa: 0.0", "C01_Pa: 0.25", "materials.rubber.C01_Pa", "0.25 MPa, 2.5e+05"),
+    "MPa of the start": (
+        "start: 1.0e+6\n    lower: 1.0e+5", "start: 1.0\n    lower: 0.1",
+        "variables.C10.start", "materials.rubber.C10_Pa: usual is -1e+07 to 2e+07 Pa"),
+    "1/MPa": ("5.085e-8", "5.085e-2", "materials.rubber.D1_per_Pa", "0.05085 1/MPa, 5.085e-08"),
+    "bulk modulus": ("5.085e-8", "3.9e7", "materials.rubber.D1_per_Pa", "bulk modulus K, D1 = 2/K"),
+    "g/cm3": ("1100.0", "1.1", "materials.rubber.density_kg_per_m3", "1.1 g/cm3, 1100 kg/m3"),
+    "t/mm3": ("5900.0", "5.9e-9", "materials.belt_cord.density_kg_per_m3", "t/mm3, 5900 kg/m3"),
+    "GPa": ("172.2e+9", "172.2", "materials.belt_cord.youngs_modulus_Pa", "172.2 GPa, 1.722e+11"),
+    "MPa of cords": (
+        "9.87e+9", "9870", "materials.carcass_cord.youngs_modulus_Pa", "9870 MPa, 9.87e+09 Pa"),
+    "mm2": ("area_m2: 2.118683e-7", "area_m2: 0.2118683", "rebar_layers.belt_1.area_m2",
+            "0.211868 mm2, 2.119e-07 m2"),
+    "mm of spacing": ("spacing_m: 1.16e-3", "spacing_m: 1.16", "rebar_layers.belt_1.spacing_m",
+                      "1.16 mm, 0.00116 m"),
+    "cords counted": ("spacing_m: 1.16e-3", "spacing_m: 86", "rebar_layers.belt_1.spacing_m",
+                      "86 cords per decimetre, 0.001163 m"),
+    "carcass from the circumference": (
+        "angle_deg: 0.0", "angle_deg: 90.0", "rebar_layers.carcass.angle_deg",
+        "90 degrees from the circumference, 0 degrees from the meridian"),
+    "belt from the circumference": (
+        "angle_deg: 70.0", "angle_deg: 20.0", "rebar_layers.belt_1.angle_deg",
+        "20 degrees from the circumference, 70 degrees from the meridian"),
+    "radians": ("angle_deg: 70.0", "angle_deg: 1.2217", "rebar_layers.belt_1.angle_deg",
+                "1.2217 rad, 70 degrees"),
+    "kN": ("solver:\n", "road: {loads_N: [4.5]}\nsolver:\n", "road.loads_N.0", "4.5 kN, 4500 N"),
+    "a zero too many": ("solver:\n", "road: {loads_N: [40000]}\nsolver:\n", "road.loads_N.0",
+                        "34000 N, where this size lies flat on its rim"),
+    "per cent of an effect": ("solver:\n", "effects: {bead_filler: 30}\nsolver:\n",
+                              "effects.bead_filler", "30 %, 0.3"),
+    "too wide a rim": ("solver:\n", "effects: {rim_width: 0.03}\nsolver:\n", "effects.rim_width",
+                        "usual is -0.0127 to 0.0127 m"),
+    "stiffness for compliance": (
+        "solver:\n", "effects: {spindle_radial: 2.0e+7}\nsolver:\n", "effects.spindle_radial",
+        "2e+07 N/m of stiffness, 5e-08 m/N"),
+    "mHz": ("79.5", "79500", "targets.modes.5.frequency_Hz", "79500 mHz, 79.5 Hz"),
+    "kHz": ("79.5", "0.0795", "targets.modes.5.frequency_Hz", "0.0795 kHz, 79.5 Hz"),
+    "sigma": ("79.5}", "79.5, sigma_Hz: 50}", "targets.modes.5.sigma_Hz", "to 15.9 Hz"),
+    "cm2 of a patch": (
+        "  modes:\n",
+        "  footprint: [{load_N: 4000, contact_area_m2: 160, sigma_m2: 3}]\n  modes:\n",
+        "targets.footprint.0.contact_area_m2", "160 cm2, 0.016 m2"),
+    "N/mm": (
+        "  modes:\n", "  footprint: [{load_N: 4000, vertical_stiffness_N_per_m: 220, "
+        "sigma_N_per_m: 5}]\n  modes:\n",
+        "targets.footprint.0.vertical_stiffness_N_per_m", "220 N/mm, 2.2e+05 N/m"),
+    "rpm": ("solver:\n", "spin_rad_per_s: 800\nsolver:\n", "spin_rad_per_s", "800 rpm, 83.78"),
+    "K": ("solver:\n", "cavity: {temperature_C: 293.15}\nsolver:\n", "cavity.temperature_C",
+          "293.15 K, 20 degrees Celsius"),
+    "g of mass": ("solver:\n", "point_mass: {mass_kg: 50}\nsolver:\n", "point_mass.mass_kg",
+                  "50 g, 0.05 kg"),
+    "mm of an uncertainty": (
+        "absolute: 1.0e-3", "absolute: 1.0", "uncertainties.belt_width.absolute", "1 mm, 0.001 m"),
+}  # fmt: skip
+
+
+def case(folder: Path, old: str, new: str) -> Path:
+    assert old in GOOD, old
+    (folder / CSV).write_text(TABLE)
+    path = folder / "case.yaml"
+    path.write_text(GOOD.replace(old, new, 1))
+    return path
+
+
+def test_there_are_enough_kinds() -> None:
+    assert len(SLIPS) >= 25
+
+
+@pytest.mark.parametrize("name", SLIPS)
+def test_a_slip_of_unit_is_refused_unless_it_is_allowed(name: str, tmp_path: Path) -> None:
+    old, new, key, words = SLIPS[name]
+    path = case(tmp_path, old, new)
+    (mistake,) = validate(path)
+    assert mistake.key == key and words in mistake.message, mistake
+    assert "--allow-unusual" in mistake.message
+    assert str(mistake).startswith(f"{path}, line ") and f"{key} is " in str(mistake)
+    assert validate(path, allow_unusual=True) == []
+    refused = CliRunner().invoke(cli, ["modes", str(path)], standalone_mode=False)
+    assert words in str(refused.exception)
+
+
+SETTINGS = [  # arguments after the case, and what was meant
+    (["modes", "--pressure-kPa", "2.4"], "--pressure-kPa 2.4: usual is 50 to 1200 kPa"),
+    (["modes", "--set", "C10=1.0"], "--set C10=1: usual is"),
+    (["modes", "--set", "materials.rubber.density_kg_per_m3=1.1"], "1.1 g/cm3, 1100 kg/m3"),
+    (["modes", "--load-N", "4"], "--load-N 4: usual is 100 to 34000 N"),
+    (["modes", "--load-N", "400000"], "where this size lies flat on its rim"),
+    (["modes", "--sweep-load", "0,2,4"], "--sweep-load 2: usual is"),
+    (["footprint", "--loads-N", "4,5"], "4 kN, 4000 N"),
+    (["deck", "--loads-N", "4,5"], "4 kN, 4000 N"),
+    (["sweep-pressure", "--from-kPa", "1.6", "--to-kPa", "3.2"], "1.6 bar, 160 kPa"),
+    (["sweep-pressure", "--to-kPa", "1990"], "--to-kPa 1990: usual is 50 to 1200 kPa"),
+    (["fit", "--set", "rebar_layers.carcass.angle_deg=90"], "from the circumference"),
+    (["diagnose", "--add", "bead_filler=30"], "--add bead_filler=30: usual is 0 to 3"),
+    (["effects", "cap_ply", "--value", "-5", "--case"], "--value -5: usual is 0 to 2e+06 N/m"),
+    (["batch", "--from-kPa", "1.6"], "1.6 bar, 160 kPa"),
+]
+
+
+@pytest.mark.parametrize(("arguments", "words"), SETTINGS, ids=lambda each: str(each)[:40])
+def test_what_stands_on_the_command_line_is_judged_too(
+    arguments: list[str], words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    asked = [*arguments, str(CASES / "p235_75r17.yaml")]
+    done = CliRunner().invoke(cli, asked, standalone_mode=False)
+    assert words in str(done.exception) and "--allow-unusual" in str(done.exception)
+    assert not list(tmp_path.iterdir())  # before anything is made
+
+
+INITS = [
+    (["--pressure-kPa", "2.5"], "2.5 bar, 250 kPa"),
+    (["--crown-mm", "0.012"], "0.012 m, 12 mm"),
+    (["--rim-width-in", "205"], "205 mm, 8.071 inches"),
+]
+
+
+@pytest.mark.parametrize(("arguments", "words"), INITS)
+def test_init_judges_its_numbers(
+    arguments: list[str], words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    done = CliRunner().invoke(cli, ["init", "225/40R18", *arguments], standalone_mode=False)
+    assert words in str(done.exception) and not list(tmp_path.iterdir())
+
+
+def test_init_writes_an_unusual_case_where_it_is_allowed(tmp_path: Path) -> None:
+    path = tmp_path / "a.yaml"
+    asked = ["init", "225/40R18", "--pressure-kPa", "40", "--output", str(path), "--no-pictures"]
+    assert CliRunner().invoke(cli, [*asked, "--allow-unusual"]).exit_code == 0
+    assert [mistake.key for mistake in validate(path)] == ["pressure_kPa"]
+
+
+SIZES = ["145/80R13", "205/60R15", "225/40R18", "315/35R21", "P235/75R17", "195/75R16C",
+         "LT315/70R17", "31x10.50R15LT", "275/25R24"]  # fmt: skip
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_cases_of_any_size_are_usual(size: str, tmp_path: Path) -> None:
+    path = tmp_path / "a.yaml"
+    asked = ["init", size, "--output", str(path), "--no-pictures"]
+    assert CliRunner().invoke(cli, asked).exit_code == 0
+    assert validate(path) == []
+
+
+def test_usual_loads_follow_size_and_pressure() -> None:
+    loaded = load_case(CASES / "p235_75r17.yaml")
+    assert unusual_value(loaded, "road.loads_N.0", 20e3) is None
+    assert unusual_value(loaded, "road.loads_N.0", 40e3)
+    at_600 = {**loaded.raw, "pressure_kPa": 600.0}
+    assert refusal(at_600, loaded.section, ("road", "loads_N", 0), 40e3) is None
+    assert refusal(at_600, loaded.section, ("road", "loads_N", 0), 61e3)
+
+
+def test_every_range_is_of_a_number_that_a_case_can_have() -> None:
+    """And holds what the shipped cases and the schema's defaults say."""
+    reached = set()
+    for path in CASES.glob("*.yaml"):
+        loaded = load_case(path)
+        data = with_defaults(loaded.raw)
+        for pattern in USUAL:
+            words = pattern.split(".")
+            found = [((), data)]
+            for word in words:
+                found = [
+                    ((*keys, key), value)
+                    for keys, part in found
+                    for key, value in (
+                        part.items() if isinstance(part, dict)
+                        else enumerate(part) if isinstance(part, list) else ()
+                    )
+                    if word in ("*", key)
+                ]  # fmt: skip
+            for keys, value in found:
+                reached.add(pattern)
+                if isinstance(value, float | int):
+                    assert USUAL[pattern].holds(value), (keys, value)
+    rest = {pattern for pattern in USUAL if pattern not in reached}
+    assert {pattern.split(".")[1] for pattern in rest} <= {"outline", "footprint", "*"}, rest
+
+
+def test_a_search_may_try_what_it_likes() -> None:
+    """A range holds for what is stated; what evaluates designs is not told of it."""
+    from tyrecal.case import with_values
+
+    loaded = load_case(CASES / "p235_75r17.yaml")
+    assert unusual_value(loaded, "C10", 5e2)
+    assert with_values(loaded, {"C10": 5e2}).case.materials["rubber"].C10_Pa == 5e2  # type: ignore[union-attr]
+
+
+HUGE = [
+    ("79.5", "1.0e+300", "targets.modes.5.frequency_Hz"),
+    ("79.5}", "79.5, sigma_Hz: 1.0e-300}", "targets.modes.5.sigma_Hz"),
+    ("79.5}", "79.5, weight: 1.0e+300}", "targets.modes.5.weight"),
+    ("tau_s: 0.1", "tau_s: 1.0e+308", "materials.rubber.prony.0.tau_s"),
+    ("g: 0.3", "g: 0.9999999999", "materials.rubber.prony"),
+    ("upper: 1.0e+7", "upper: 1.0e+308", "variables.C10.upper"),
+    (PRESSURE, "pressure_kPa: 1.0e-300", "pressure_kPa"),
+    ("solver:\n", "cavity: {share: 1.0e+9}\nsolver:\n", "cavity.share"),
+    ("solver:\n", "road: {loads_N: [1.0e+300]}\nsolver:\n", "road.loads_N.0"),
+    ("solver:\n", "road: {loads_N: [1.0e-9]}\nsolver:\n", "road.loads_N.0"),
+    ("solver:\n", "effects: {spindle_radial: 1.0e+30}\nsolver:\n", "effects.spindle_radial"),
+]
+
+
+@pytest.mark.parametrize(("old", "new", "key"), HUGE)
+def test_what_no_computer_holds_is_never_allowed(
+    old: str, new: str, key: str, tmp_path: Path
+) -> None:
+    (mistake,) = validate(case(tmp_path, old, new), allow_unusual=True)
+    assert mistake.key == key
+
+
+@pytest.mark.parametrize(
+    "setting",
+    ["materials.rubber.density_kg_per_m3=1.1", "pressure_kPa=24", "effects.rim_width=0.02"],
+)
+def test_an_unusual_tyre_is_computed_where_it_is_allowed(setting: str, tmp_path: Path) -> None:
+    asked = ["modes", str(CASES / "p235_75r17.yaml"), "--mesh", "coarse", "--no-store", "--json"]
+    asked += ["--set", setting, "--output", str(tmp_path)]
+    assert CliRunner().invoke(cli, asked).exit_code == 2
+    done = CliRunner().invoke(cli, [*asked, "--allow-unusual"], standalone_mode=False)
+    assert done.exit_code == 0 and done.return_value == 0, done.output
+    assert (tmp_path / "modes.json").exists()
+
+
+def test_targets_that_no_fit_can_use_are_told(tmp_path: Path) -> None:
+    start = GOOD.index("    - {c: 1, m: 1, freq")
+    end = GOOD.index("uncertainties:")
+    path = case(tmp_path, GOOD[start:end], "\n")
+    (mistake,) = validate(path)
+    assert (mistake.key, mistake.value) == ("targets", "a table")
+    assert "2 targets cannot determine 3 free variables" in mistake.message
+    assert load_case(path).case.targets.weights == [1.0, 1.0]  # other studies do without
+    weightless = GOOD[start:end].replace("}", ", weight: 0}")
+    (mistake,) = validate(case(tmp_path, GOOD[start:end], weightless))
+    assert "2 targets cannot determine" in mistake.message

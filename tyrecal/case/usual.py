@@ -1,0 +1,167 @@
+"""Usual values of what a user states, from passenger cars' tyres to trucks', and usual slips.
+
+A number outside its range stands most often in another unit. The ranges are wide: they hold what is
+built and tested, not what is good. `guard` applies them to a case.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from math import pi
+
+from ..units import INCH, LOAD, PRESSURE, QUANTITIES
+
+ALIKE = 0.05  # readings that differ by less are one: bar and atm
+Slips = Mapping[str, float | Callable[[float], float]]
+"""What may have been written instead, and the factor, or the function, to the right unit."""
+
+
+@dataclass(frozen=True)
+class Usual:
+    """A number from ``low`` to ``high``, in ``unit``; those smaller than ``least`` are 0. reason:
+    what ``high`` is."""
+
+    low: float
+    high: float
+    unit: str = ""
+    slips: Slips = field(default_factory=dict)
+    least: float = 0.0
+    reason: str = ""
+
+    def holds(self, value: float) -> bool:
+        """Whether ``value`` is usual."""
+        return self.low <= value <= self.high and (value == 0 or abs(value) >= self.least)
+
+    def refusal(self, value: float) -> str | None:
+        """What is usual instead of ``value``, and what was probably meant; None where it is."""
+        if self.holds(value):
+            return None
+        low = f"0, or {self.least:g}" if self.least and self.low == 0 else f"{self.low:g}"
+        unit = f" {self.unit}" if self.unit else ""
+        least = f", of a size of at least {self.least:g} or 0" if self.low < 0 < self.least else ""
+        found = self._meant(value, unit)
+        asked = f"; did you mean {' or '.join(found)}?" if found else ""
+        return f"usual is {low} to {self.high:g}{unit}{least}{self.reason}{asked}"
+
+    def _meant(self, value: float, unit: str) -> list[str]:
+        """At most two readings of ``value`` that would be usual, in words; of those that are almost
+        the same, the first."""
+        found: dict[float, str] = {}
+        for name, slip in self.slips.items():
+            right = slip(value) if callable(slip) else slip * value
+            alike = any(abs(right - other) <= ALIKE * abs(other) for other in found)
+            if value and self.holds(right) and not alike:
+                found[right] = f"{value:g} {name}, {right:.4g}{unit}"
+        return list(found.values())[:2]
+
+
+def inverse(of: float) -> Callable[[float], float]:
+    """``of`` / value: what is counted instead of spaced, stiff instead of compliant."""
+    return lambda value: of / value if value else 0.0
+
+
+AREA, FREQUENCY = QUANTITIES["contact_area_m2"], {**QUANTITIES["frequency_Hz"], "mHz": 1e-3}
+STIFFNESS = QUANTITIES["vertical_stiffness_N_per_m"]
+LENGTH = {"mm": 1e-3, "cm": 1e-2, "inch": INCH}
+STRESS = {"MPa": 1e6, "GPa": 1e9, "kPa": 1e3, "bar": 1e5, "psi": 6894.757}
+DENSITY = {"g/cm3": 1e3, "t/mm3": 1e12, "kg/mm3": 1e9, "lb/in3": 27679.9, "lb/ft3": 16.0185}
+MASS = {"g": 1e-3, "t": 1e3}
+INERTIA = {"kg mm2": 1e-6, "kg cm2": 1e-4, "t mm2": 1e-3}
+COMPLIANCE: Slips = {"N/m of stiffness": inverse(1.0), "N/mm of stiffness": inverse(1e-3),
+                     "mm/N": 1e-3, "m/kN": 1e-3, "mm/kN": 1e-6}  # fmt: skip
+TURNING: Slips = {"N m/rad of stiffness": inverse(1.0), "rad/(kN m)": 1e-3, "rad/(N mm)": 1e3,
+                  "degrees/(N m)": pi / 180}  # fmt: skip
+ANGLE = {"rad": 180 / pi}
+FROM_CIRCUMFERENCE: Slips = {**ANGLE, "degrees from the circumference": lambda a: 90 - a}
+SHARE = {"%": 0.01}
+SPIN = {"rpm": pi / 30, "degrees/s": pi / 180}
+CELSIUS: Slips = {"K": lambda T: T - 273.15, "degrees Fahrenheit": lambda T: (T - 32) / 1.8}
+
+# of measured values, in the units of the measurements CSV
+MEASURED = {
+    "frequency_Hz": Usual(2, 1000, "Hz", FREQUENCY),
+    "contact_area_m2": Usual(1e-4, 0.5, "m2", AREA),
+    "vertical_stiffness_N_per_m": Usual(1e4, 1e7, "N/m", STIFFNESS),
+    "mass_kg": Usual(0.5, 500, "kg", QUANTITIES["mass_kg"]),
+}
+LARGEST_SIGMA = 0.2  # of the value: such a number tells nothing
+SMALLEST_SIGMA = 1e-5  # of the value: nothing is measured so well
+
+# of the numbers of a case, by path; * is any name or place in a list
+USUAL: dict[str, Usual] = {
+    "pressure_kPa": Usual(50, 1200, "kPa", PRESSURE),
+    "section.outline.belt_width_m": Usual(0.05, 0.5, "m", LENGTH),
+    "section.outline.rim_radius_m": Usual(0.1, 0.35, "m", LENGTH),
+    "section.outline.carcass_depth_m": Usual(1e-4, 0.02, "m", LENGTH),
+    "section.outline.belt_depth_m": Usual(1e-4, 0.02, "m", LENGTH),
+    "section.outline.belt_spacing_m": Usual(1e-4, 0.02, "m", LENGTH),
+    "section.outline.belt_step_m": Usual(1e-4, 0.05, "m", LENGTH),
+    "mesh.hourglass_stiffness_Pa": Usual(1e2, 1e9, "Pa", STRESS),
+    # rubber: shear modulus 2 (C10 + C01) of 0.3 to 40 MPa, bulk modulus 2 / D1
+    "materials.*.C10_Pa": Usual(-1e7, 2e7, "Pa", STRESS, least=1e3),
+    "materials.*.C01_Pa": Usual(-1e7, 2e7, "Pa", STRESS, least=1e2),
+    "materials.*.D1_per_Pa": Usual(1e-10, 2e-6, "1/Pa", {
+        "1/MPa": 1e-6, "1/GPa": 1e-9, "Pa of bulk modulus K, D1 = 2/K": inverse(2.0),
+        "MPa of bulk modulus K, D1 = 2/K": inverse(2e-6)}),
+    "materials.*.prony.*.g": Usual(0, 0.95, "", SHARE),
+    "materials.*.prony.*.k": Usual(0, 0.95, "", SHARE),
+    "materials.*.prony.*.tau_s": Usual(1e-7, 1e5, "s", {"ms": 1e-3}),
+    "materials.*.reference_frequency_Hz": Usual(0.1, 1000, "Hz", FREQUENCY),
+    # textile cords 1 to 25 GPa, aramid 60 to 130, steel 150 to 210
+    "materials.*.youngs_modulus_Pa": Usual(5e7, 3e11, "Pa", STRESS),
+    "materials.*.density_kg_per_m3": Usual(500, 9000, "kg/m3", DENSITY),
+    "rebar_layers.*.area_m2": Usual(5e-9, 2e-5, "m2", {
+        **AREA, "m of diameter": lambda d: pi * d**2 / 4}),
+    "rebar_layers.*.spacing_m": Usual(2e-4, 0.02, "m", {
+        "mm": 1e-3, "cords per decimetre": inverse(0.1), "cords per inch": inverse(INCH)}),
+    "rebar_layers.*.spacing_deg": Usual(0.01, 5, "degrees", ANGLE),
+    "rim.reference_point_m.r": Usual(-1, 1, "m", LENGTH),
+    "rim.reference_point_m.z": Usual(-1, 1, "m", LENGTH),
+    "rim.mass_kg": Usual(1, 200, "kg", MASS),
+    "rim.polar_inertia_kg_m2": Usual(0.01, 30, "kg m2", INERTIA),
+    "rim.diametral_inertia_kg_m2": Usual(0.01, 30, "kg m2", INERTIA),
+    "rim.spindle.lateral_m_per_N": Usual(0, 1e-5, "m/N", COMPLIANCE, least=1e-10),
+    "rim.spindle.radial_m_per_N": Usual(0, 1e-5, "m/N", COMPLIANCE, least=1e-10),
+    "rim.spindle.torsional_rad_per_N_m": Usual(0, 1e-3, "rad/(N m)", TURNING, least=1e-9),
+    "rim.spindle.tilt_rad_per_N_m": Usual(0, 1e-3, "rad/(N m)", TURNING, least=1e-9),
+    "cavity.temperature_C": Usual(-50, 150, "degrees Celsius", CELSIUS),
+    "cavity.share": Usual(0, 2, "", SHARE),
+    "spin_rad_per_s": Usual(0, 300, "rad/s", SPIN),
+    "point_mass.mass_kg": Usual(0, 2, "kg", MASS),
+    "point_mass.z_m": Usual(-0.3, 0.3, "m", LENGTH),
+    "road_spring.radial_N_per_m": Usual(0, 5e6, "N/m", STIFFNESS, least=100),
+    "road_spring.lateral_N_per_m": Usual(0, 5e6, "N/m", STIFFNESS, least=100),
+    "road_spring.tangential_N_per_m": Usual(0, 5e6, "N/m", STIFFNESS, least=100),
+    "road_spring.width_m": Usual(0.005, 0.4, "m", LENGTH),
+    "splice.share": Usual(-0.9, 2, "", SHARE),
+    "analysis.vibration_frequency_Hz": Usual(0.1, 1000, "Hz", FREQUENCY),
+    "road.friction": Usual(0, 2, "", SHARE),
+    "road.stiffness_Pa_per_m": Usual(1e8, 1e13, "Pa/m", {"MPa/mm, or N/mm3": 1e9}),
+    "road.elastic_slip_m": Usual(1e-6, 1e-2, "m", LENGTH),
+    "road.loads_N.*": Usual(100, 6e4, "N", LOAD),
+    "targets.modes.*.frequency_Hz": MEASURED["frequency_Hz"],
+    "targets.modes.*.weight": Usual(0, 1e4, "", least=1e-4),
+    "targets.footprint.*.load_N": Usual(100, 6e4, "N", LOAD),
+    "targets.footprint.*.contact_area_m2": MEASURED["contact_area_m2"],
+    "targets.footprint.*.vertical_stiffness_N_per_m": MEASURED["vertical_stiffness_N_per_m"],
+    "targets.footprint.*.weight": Usual(0, 1e4, "", least=1e-4),
+    "uncertainties.*.percent": Usual(0.001, 100, "%"),
+    "solver.time_limit_s": Usual(1, 1e6, "s"),
+}  # fmt: skip
+# cords' angles, from the meridian, in a half turn: of a radial tyre
+CARCASS_ANGLE = Usual(-30, 30, "degrees from the meridian", FROM_CIRCUMFERENCE)
+BELT_ANGLE = Usual(25, 155, "degrees from the meridian", FROM_CIRCUMFERENCE)
+# slips of effects' parameters, whose ranges the catalogue has, by their unit
+OF_EFFECTS: dict[str, Slips] = {
+    "": SHARE, "m": LENGTH, "kg": MASS, "N/m": STIFFNESS, "kPa": PRESSURE, "rad/s": SPIN,
+    "m/N": COMPLIANCE, "rad/(N m)": TURNING, "degrees": ANGLE, "1/kg": {"kg": inverse(1.0)},
+}  # fmt: skip
+# of 'tyrecal init', in the units of its options
+GAUGES = {
+    "crown_mm": Usual(3, 50, "mm", {"m": 1e3, "cm": 10, "inch": 25.4}),
+    "sidewall_mm": Usual(1, 40, "mm", {"m": 1e3, "cm": 10, "inch": 25.4}),
+    "bead_mm": Usual(2, 60, "mm", {"m": 1e3, "cm": 10, "inch": 25.4}),
+    "belt_width_mm": Usual(50, 500, "mm", {"m": 1e3, "cm": 10, "inch": 25.4}),
+    "rim_width_in": Usual(2, 20, "inches", {"mm": 1 / 25.4, "cm": 1 / 2.54}),
+}
