@@ -1,5 +1,10 @@
-"""``python -m tyrecal`` is the command line."""
+"""The command ``tyrecal``, as ``python -m tyrecal`` too: interruptions count from here on."""
 
-from .cli.main import main
+from .interrupt import leave_when_interrupted
 
-main()
+leave_when_interrupted()
+
+from .cli.main import main  # noqa: E402  takes a tenth of a second
+
+if __name__ == "__main__":
+    main()

@@ -5,28 +5,41 @@ what was asked before and is told what is new (None: neither), ``jobs`` how many
 evaluated at a time. Values of variables are in the units of the numbers that they set; those not
 given are the case's start values. All functions raise CaseError or ValueError where the input is
 wrong and EvaluationFailed where the solver failed.
+
+Numbers that no tyre has, most often slips of unit, are wrong input of `load_case`, `with_values`,
+`sweep_pressure` and `evaluate_footprint`, unless ``allow_unusual``. Values of designs to evaluate
+are free: a search may try what it likes.
 """
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import pairwise
 from math import inf
 from pathlib import Path
 from typing import Any
 
-from .case import CaseError, LoadedCase, start_values, with_level, with_values
+from .case import (
+    CaseError,
+    LoadedCase,
+    overridden,
+    start_values,
+    unusual_value,
+    with_level,
+)
 from .case import load_case as _load_case
+from .case import with_values as _with_values
 from .diagnose.diagnosis import Diagnosis
 from .effects import Effect, catalogue
 from .evaluate.door import Door, Question
 from .evaluate.failure import EvaluationFailed
 from .evaluate.pressed import Pressed
 from .evaluate.store import Store
+from .files import read_json
 from .fit.calibrate import METHODS, Fit, calibrate
 from .modes.label import paired_labels
 from .modes.mode import Mode
+from .provenance import provenance, stamped
 from .studies.pressure import State
 
 __all__ = [
@@ -50,7 +63,7 @@ __all__ = [
 ]
 
 
-def load_case(path: Path | str, mesh: str = "") -> LoadedCase:
+def load_case(path: Path | str, mesh: str = "", allow_unusual: bool = False) -> LoadedCase:
     """Read a case file; ``mesh`` is one of its mesh levels ("": the one it names).
 
     >>> case = load_case("cases/p235_75r17.yaml", mesh="coarse")
@@ -63,8 +76,28 @@ def load_case(path: Path | str, mesh: str = "") -> LoadedCase:
     >>> softer.case.pressure_kPa
     200.0
     """
-    loaded = _load_case(path)
+    loaded = _load_case(path, allow_unusual)
     return with_level(loaded, mesh) if mesh else loaded
+
+
+def with_values(
+    case: LoadedCase, values: Mapping[str, float], allow_unusual: bool = False
+) -> LoadedCase:
+    """The case with variables, or any of its numbers by path, set; ``overrides`` and the
+    provenance of results say so. Raises ValueError for an unknown name, an impossible value, or
+    one that no tyre has.
+
+    >>> case = load_case("cases/p235_75r17.yaml", mesh="coarse")
+    >>> with_values(case, {"rebar_layers.belt_1.angle_deg": 68}).overrides
+    {'rebar_layers.belt_1.angle_deg': 68.0}
+    >>> with_values(case, {"pressure_kPa": 2.2})  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ValueError: pressure_kPa is 2.2: usual is 50 to 1200 kPa; did you mean 2.2 bar, 220 kPa? ...
+    """
+    changed = overridden(case, values)
+    for name, value in values.items():
+        _refuse_unusual(changed, name, name, value, allow_unusual)
+    return changed
 
 
 def evaluate_modes(
@@ -99,8 +132,8 @@ def fit_case(
 ) -> Fit:
     """Calibrate the case's variables to its targets; ``fixed`` holds some at a value.
 
-    ``method`` is "slsqp" or "least-squares". ``result`` holds what fit.json does, ``fitted`` the
-    design: ``values``, ``objective`` in Hz, ``modes`` by label.
+    ``method`` is "slsqp" or "least-squares". ``result`` holds what fit.json does, ``provenance``
+    too, ``fitted`` the design: ``values``, ``objective`` in Hz, ``modes`` by label.
 
     >>> fit = fit_case(load_case("cases/p235_75r17.yaml", mesh="coarse"), fixed={"C10": 1e6})
     >>> fit.result["converged"], f"{fit.initial.objective:.0f} to {fit.fitted.objective:.0f} Hz"
@@ -111,7 +144,11 @@ def fit_case(
     if starts < 1:
         raise ValueError(f"starts must be at least 1, got {starts}")
     _values(case, fixed)
-    return calibrate(case, _door(case, solver, record), method, fixed, starts, seed, jobs)
+    door = _door(case, solver, record)
+    fit = calibrate(case, door, method, fixed, starts, seed, jobs)
+    of = provenance(case, door.solver, load_N=case.case.targets.loads_N or 0.0)
+    fit.result = stamped(fit.result, of)
+    return fit
 
 
 def sweep_pressure(
@@ -119,6 +156,7 @@ def sweep_pressure(
     pressures_kPa: Sequence[float],
     values: Mapping[str, float] | None = None,
     *,
+    allow_unusual: bool = False,
     jobs: int = 1,
     solver: str = "",
     record: Path | str | None = None,
@@ -137,7 +175,8 @@ def sweep_pressure(
 
     design = _values(case, values)
     for pressure in pressures_kPa:
-        with_values(case, {**design, pressure_name(case): pressure})
+        _with_values(case, {**design, pressure_name(case): pressure})
+        _refuse_unusual(case, "pressures_kPa", pressure_name(case), pressure, allow_unusual)
     door = _door(case, solver, record)
     states = []
     for outcome in sweep(door, {"": design}, list(pressures_kPa), jobs):
@@ -152,6 +191,7 @@ def evaluate_footprint(
     loads_N: Sequence[float],
     values: Mapping[str, float] | None = None,
     *,
+    allow_unusual: bool = False,
     solver: str = "",
     record: Path | str | None = None,
 ) -> list[dict[str, float]]:
@@ -171,10 +211,12 @@ def evaluate_footprint(
     rise = [after - before for before, after in pairwise([0.0, *loads_N])]
     if not rise or not all(0 < each < inf for each in rise):
         raise ValueError(f"loads_N must be above 0 and rise, got {list(loads_N)}")
+    for load in loads_N:
+        _refuse_unusual(case, "loads_N", "road.loads_N.0", load, allow_unusual)
     found: Pressed = _door(case, solver, record).press(design, list(loads_N))
     if found.failed:
         raise found.failed
-    mesh = section_mesh(with_values(case, design))
+    mesh = section_mesh(_with_values(case, design))
     return [footprint_row(found, footprint, mesh) for footprint in found.footprints]
 
 
@@ -233,14 +275,22 @@ def read_results(folder: Path | str) -> dict[str, Any]:
     paths = sorted(Path(folder).glob("*.json"))
     if not paths:
         raise FileNotFoundError(f"there are no results in '{folder}'")
-    return {path.stem: json.loads(path.read_text(encoding="utf-8")) for path in paths}
+    return {path.stem: read_json(path, follow=False) for path in paths}
 
 
 def _values(case: LoadedCase, values: Mapping[str, float] | None) -> dict[str, float]:
     """The whole design. Raises ValueError where the case cannot have it."""
     design = {**start_values(case), **(values or {})}
-    with_values(case, design)
+    _with_values(case, design)
     return design
+
+
+def _refuse_unusual(
+    case: LoadedCase, what: str, name: str, value: float, allowed: bool = False
+) -> None:
+    """Raises ValueError where no tyre has such a value of ``name``, told as ``what``."""
+    if not allowed and (message := unusual_value(case, name, value)):
+        raise ValueError(f"{what} is {value:g}: {message}")
 
 
 def _door(case: LoadedCase, solver: str, record: Path | str | None) -> Door:

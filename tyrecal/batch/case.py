@@ -1,6 +1,7 @@
 """One case of a batch: its studies in a row, whatever fails reported and not raised.
 
-The report is plain data, small enough for any network: ``name``; ``studies``, each with
+The report is plain data, small enough for any network: ``name``; ``provenance``, None where the
+case could not be read; ``studies``, each with
 
 * ``status``: ``good``; ``failed``, finished but not as it should (a fit that did not converge, a
   load that was not reached); ``error``, there is no result; ``skipped``, see `studies.study`;
@@ -13,9 +14,10 @@ often it ran and the record answered, or ``answered``: all of it by the case's f
 from __future__ import annotations
 
 import json
+import os
 import platform
 import time
-from collections.abc import Callable
+from collections.abc import Collection
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
@@ -23,19 +25,37 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-from ..case import CaseError, LoadedCase, load_case, start_values, with_level, with_values
+from ..case import (
+    CaseError,
+    LoadedCase,
+    load_case,
+    start_values,
+    unusual_value,
+    with_level,
+    with_values,
+)
 from ..deck.environment import TemplateFailed
 from ..evaluate.door import Door
 from ..evaluate.failure import DeckRefused, EvaluationFailed, SolverUnavailable
 from ..evaluate.solver import UnknownSolver
 from ..evaluate.sources import sources
 from ..evaluate.store import Store, sources_of
-from ..files import forget_previous, json_text, set_aside, write_text
+from ..files import (
+    json_text,
+    own_folder,
+    read_bytes,
+    read_json,
+    set_aside,
+    write_runs,
+    write_text,
+)
 from ..fit.calibrate import NothingToFit
+from ..provenance import provenance
 from .studies import Asked, Outcome, Studied, study
 
 FINISHED = "finished.json"  # in a case's folder: what was asked, and the answer
 INPUT = (CaseError, DeckRefused, NothingToFit, TemplateFailed, UnknownSolver)
+ENDED = ("good", "failed")
 AGAIN = {"crashed", "timed_out", "no_results", "licence", "unavailable", "disc", "internal"}
 Report = dict[str, Any]
 
@@ -43,7 +63,7 @@ Report = dict[str, Any]
 @dataclass(frozen=True)
 class CaseTask:
     """What a worker is sent. path, folder (of the results), record: absolute, on a file system
-    that the worker sees too; mesh: level, empty for the case's own."""
+    that the worker sees too; mesh: level, empty for the case's own; command: of the solver."""
 
     name: str
     path: Path
@@ -53,6 +73,8 @@ class CaseTask:
     solver: str = ""
     mesh: str = ""
     record: Path | None = None
+    command: tuple[str, ...] = ()
+    allow_unusual: bool = False
 
 
 def run_case(task: CaseTask) -> Report:
@@ -61,11 +83,12 @@ def run_case(task: CaseTask) -> Report:
         "started": datetime.now(UTC).isoformat(timespec="seconds"),
         "host": platform.node() or "localhost",
     }
-    report: Report = {"name": task.name, "studies": {}, "facts": facts}
+    report: Report = {"name": task.name, "provenance": None, "studies": {}, "facts": facts}
     try:
         loaded = _loaded(task)
-        door = Door(loaded, task.solver, task.folder / "runs")
+        door = Door(loaded, task.solver, task.folder / "runs", command=task.command)
         question = _question(task, loaded, door)
+        report["provenance"] = provenance(loaded, door.solver)
         facts["solver"] = f"{door.solver.name} {door.solver.version}"
         finished = _finished(task.folder, question)
         if finished is None:
@@ -79,7 +102,8 @@ def run_case(task: CaseTask) -> Report:
         report["studies"] = finished
     except Exception as error:  # whatever it is, the other cases go on
         with suppress(OSError):
-            _for_each(task, set_aside)
+            if task.folder.exists():
+                _write_runs(task, facts, ())
         report["studies"] = dict.fromkeys(task.studies, _entry(_failed(error), task))
     return report
 
@@ -87,17 +111,16 @@ def run_case(task: CaseTask) -> Report:
 def lost(task: CaseTask, words: str) -> Report:
     """The report of a case whose worker died."""
     entry = _entry(Outcome("error", "worker_lost", words), task)
-    return {"name": task.name, "studies": dict.fromkeys(task.studies, entry), "facts": {}}
+    studies = dict.fromkeys(task.studies, entry)
+    return {"name": task.name, "provenance": None, "studies": studies, "facts": {}}
 
 
 def _studied(
     task: CaseTask, loaded: LoadedCase, door: Door, facts: dict[str, Any]
 ) -> tuple[dict[str, Any], list[str]]:
     """Every study's entry in the report, and the names of the result files."""
-    task.folder.mkdir(parents=True, exist_ok=True)
-    owner = {"case": str(task.path), "command": "batch"}
-    _write(task.folder / "run.json", {**owner, **facts, "finished": False})
-    _for_each(task, set_aside)
+    own_folder(task.folder)
+    _write_runs(task, facts, ())
     door.store = Store(task.record) if task.record else None
     state = Studied(loaded, door, {"initial": start_values(loaded)}, task.asked)
     entries: dict[str, Any] = {}
@@ -112,6 +135,8 @@ def _studied(
         for file, text in outcome.files.items():
             _write_text(task.folder / file, text)
             files.append(file)
+        if outcome.files:
+            set_aside(task.folder, name, outcome.files)
         entries[name] = _entry(outcome, task)
         facts["seconds"][name] = round(time.monotonic() - clock, 3)
     if door.folder:
@@ -119,25 +144,28 @@ def _studied(
             door.folder.rmdir()
     facts["cpu_seconds"] = round(time.process_time() - used, 3)
     facts.update(solver_runs=door.counts.runs, answered_from_record=door.counts.recorded)
-    _write(task.folder / "run.json", {**owner, **facts, "finished": True})
-    for name in task.studies:
-        if entries[name]["status"] != "error":
-            forget_previous(task.folder, name)
+    _write_runs(task, facts, [name for name in task.studies if entries[name]["status"] in ENDED])
     return entries, files
 
 
-def _for_each(task: CaseTask, change: Callable[[Path, str], None]) -> None:
-    for name in task.studies:
-        change(task.folder, name)
+def _write_runs(task: CaseTask, facts: dict[str, Any], ended: Collection[str]) -> None:
+    """The studies' entries in run.json; results of those that have not ended are earlier ones."""
+    entry = {"case": str(task.path), "command": "batch", **facts}
+    new = {name: {**entry, "finished": name in ended} for name in task.studies}
+    write_runs(task.folder, new, many_writers=True)
 
 
 def _loaded(task: CaseTask) -> LoadedCase:
     """The case at its mesh level and start values. Raises CaseError, DeckRefused."""
-    loaded = load_case(task.path)
+    loaded = load_case(task.path, task.allow_unusual)
     try:
         if task.mesh:
             loaded = with_level(loaded, task.mesh)
-        return with_values(loaded, start_values(loaded))
+        loaded = with_values(loaded, start_values(loaded))
+        for load in () if task.allow_unusual else task.asked.loads_N or ():
+            if message := unusual_value(loaded, "road.loads_N.0", load):
+                raise DeckRefused(f"a load of {load:g} N: {message}")
+        return loaded
     except ValueError as error:
         raise DeckRefused(str(error)) from None
 
@@ -161,7 +189,7 @@ def _failed(error: Exception) -> Outcome:
 
 def _entry(outcome: Outcome, task: CaseTask) -> dict[str, Any]:
     """A study as the report has it; its words do not depend on where the case lies."""
-    words = outcome.words and outcome.words.replace(f"{task.path.parent}/", "")
+    words = outcome.words and outcome.words.replace(f"{task.path.parent}{os.sep}", "")
     return {"status": outcome.status, "cause": outcome.cause, "words": words,
             "quantities": outcome.quantities}  # fmt: skip
 
@@ -179,7 +207,7 @@ def _question(task: CaseTask, loaded: LoadedCase, door: Door) -> str:
 def _finished(folder: Path, question: str) -> dict[str, Any] | None:
     """The entries of an earlier run that was asked the same and whose files are as it left them."""
     try:
-        found = json.loads((folder / FINISHED).read_text(encoding="utf-8"))
+        found = read_json(folder / FINISHED, follow=False)
         if found["question"] != question:
             return None
         if any(_digest(folder / file) != digest for file, digest in found["files"].items()):
@@ -191,7 +219,7 @@ def _finished(folder: Path, question: str) -> dict[str, Any] | None:
 
 
 def _digest(path: Path) -> str:
-    return sha256(path.read_bytes()).hexdigest()
+    return sha256(read_bytes(path)).hexdigest()
 
 
 def _write(path: Path, content: Any) -> None:

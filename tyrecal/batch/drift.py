@@ -15,6 +15,7 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
+from ..files import read_json
 from .case import Report
 
 DEFAULTS = {  # of a baseline that is written for the first time; people edit them
@@ -64,7 +65,7 @@ def baseline_of(reports: Sequence[Report], before: Mapping[str, Any] | None) -> 
 def read_baseline(path: Path) -> dict[str, Any]:
     """A baseline from its file. Raises BadBaseline, in one sentence; OSError."""
     try:
-        found = json.loads(path.read_text(encoding="utf-8"))
+        found = read_json(path)
     except ValueError as error:
         raise BadBaseline(f"'{path}' is not a baseline: {error}") from None
     if not isinstance(found, dict) or found.get("format") != 1:

@@ -8,6 +8,7 @@ from contextlib import closing
 from pathlib import Path
 
 from ..evaluate.executor import WorkerLost, executor
+from ..files import printable
 from .case import CaseTask, Report, lost, run_case
 
 
@@ -15,8 +16,11 @@ def names_of(paths: Sequence[Path]) -> list[str]:
     """A name for each case file: its stem, or its path below the folder that all have in common,
     without the suffix, where two stems are the same.
 
-    Raises ValueError where a case is given twice.
+    Raises ValueError where a case is given twice, or a path cannot be printed.
     """
+    for path in paths:
+        if not str(path).isprintable():
+            raise ValueError(f"case '{printable(str(path))}': its path has control characters")
     stems = [path.stem for path in paths]
     if len(set(stems)) == len(stems):
         return stems

@@ -9,7 +9,6 @@ The numbers are named ``KIND`` or ``KIND WHERE``: ``mass_kg``, ``fitted_Hz [2,1]
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -18,7 +17,9 @@ from ..case import LoadedCase, with_values
 from ..deck.context import section_mesh
 from ..evaluate.door import Door, Question
 from ..evaluate.pressed import Pressed
+from ..files import json_text
 from ..fit.calibrate import calibrate, history_csv
+from ..provenance import provenance, stamped
 from ..report.table import fit_csv, footprint_csv, sweep_csv
 from ..studies.footprint import footprint_result, press
 from ..studies.modes import modes_result
@@ -73,7 +74,7 @@ def fit(state: Studied) -> Outcome:
     for each in result.get("footprint", ()):
         numbers[f"fitted_{each['quantity']} {each['load_N']:g} N"] = each["fitted"]
     files = {
-        "fit.json": _json(result),
+        "fit.json": _json(state, result, load_N=state.case.case.targets.loads_N or 0.0),
         "fit.csv": fit_csv(result),
         "fit_history.csv": history_csv(found.history),
     }
@@ -89,7 +90,7 @@ def modes(state: Studied) -> Outcome:
     result, _ = modes_result(state.case, values, state.door.evaluate(Question(values)))
     numbers = {"mass_kg": result["mass_kg"]}
     numbers |= {f"frequency_Hz {_label(mode)}": mode["frequency_Hz"] for mode in result["modes"]}
-    return Outcome(quantities=numbers, files={"modes.json": _json(result)})
+    return Outcome(quantities=numbers, files={"modes.json": _json(state, result)})
 
 
 def sweep_pressure(state: Studied) -> Outcome:
@@ -107,7 +108,7 @@ def sweep_pressure(state: Studied) -> Outcome:
         for mode in row["modes"]
     }
     files = {
-        "pressure_sweep.json": _json(result),
+        "pressure_sweep.json": _json(state, result, pressure_kPa=state.asked.pressures_kPa),
         "pressure_sweep.csv": sweep_csv(result["rows"]),
     }
     places = [f"{each['design']}, {each['pressure_kPa']:g} kPa" for each in result["failed"]]
@@ -131,7 +132,10 @@ def footprint(state: Studied) -> Outcome:
         for kind, value in row.items()
         if kind not in ("design", "load_N")
     }
-    files = {"footprint.json": _json(result), "footprint.csv": footprint_csv(result["rows"])}
+    files = {
+        "footprint.json": _json(state, result, load_N=loads),
+        "footprint.csv": footprint_csv(result["rows"]),
+    }
     places = [f"{each['design']}, {each['load_N']:g} N" for each in result["failed"]]
     return _with_failed(result, places, numbers, files)
 
@@ -171,5 +175,6 @@ def _label(mode: Mapping[str, Any]) -> str:
     return " ".join(word for word in words if word)
 
 
-def _json(content: Any) -> str:
-    return json.dumps(content, indent=1, allow_nan=False) + "\n"
+def _json(state: Studied, result: dict[str, Any], **of: Any) -> str:
+    """A result file with its provenance, whose state is the case's but for ``of``."""
+    return json_text(stamped(result, provenance(state.case, state.door.solver, **of)))

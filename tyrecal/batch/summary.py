@@ -15,12 +15,13 @@ def summary(
     studies: Sequence[str], reports: Sequence[Report], drift: Mapping[str, Any] | None
 ) -> dict[str, Any]:
     """Results only: ``studies``; ``counts`` of cases by verdict; ``cases``, each with its
-    ``verdict`` and studies; ``baseline``, as `drift.compare` says, or None."""
+    ``verdict``, provenance and studies; ``baseline``, as `drift.compare` says, or None."""
     drifted = {each["case"] for each in drift["drifted"]} if drift else set()
     cases = [
         {
             "name": report["name"],
             "verdict": _verdict(report, report["name"] in drifted),
+            "provenance": report["provenance"],
             "studies": report["studies"],
         }
         for report in reports

@@ -26,6 +26,7 @@ from ..diagnose.tyre_model import TyreModel
 from ..diagnose.uncertainties import sources
 from ..evaluate.door import Door
 from ..evaluate.pool import process_pool
+from ..files import own_folder
 from ..modes.mode import Label
 from .make import labels_of
 from .protocol import Protocol, read_protocol, write_json
@@ -51,7 +52,7 @@ def tyre_model(
 
 def case_of(folder: Path) -> LoadedCase:
     """The case that lies beside the trials. Raises BadTrials, CaseError."""
-    return load_case(folder / "case" / read_protocol(folder).case)
+    return load_case(folder / "case" / read_protocol(folder).case, allow_unusual=True)
 
 
 def answer(
@@ -69,7 +70,7 @@ def answer(
     protocol = read_protocol(folder)
     trials = sorted((folder / "trials").glob("*.csv"))
     answers = folder / "answers"
-    answers.mkdir(exist_ok=True)
+    own_folder(answers)
     waiting = [t for t in trials if not (answers / f"{t.stem}.json").exists()]
     work = partial(one_answer, response, list(rows), protocol)
     done = len(trials) - len(waiting)

@@ -21,7 +21,7 @@ from ..diagnose.measurements import COLUMNS
 from ..diagnose.uncertainties import sources
 from ..evaluate.failure import EvaluationFailed
 from ..evaluate.pool import process_pool
-from ..files import whole
+from ..files import refuse_link, whole
 from ..modes.mode import Label
 from .draw import NEAR, Truth, draw, tyre
 from .maker import Heard, Maker
@@ -66,6 +66,8 @@ def make(
         raise BadTrials(f"the truth must not lie in {folder}, which is answered")
     folder.mkdir(parents=True, exist_ok=True)
     sealed.mkdir(parents=True, exist_ok=True)
+    for path in (*folder.rglob("*"), sealed / "made", sealed / "record"):
+        refuse_link(path)
     write_ruler(folder, ruler())
     seed = _seed(sealed, seed)
     found, _ = sources(case)

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from ..files import json_text, write_text
+from ..files import read_json as read_file
 
 FILE = "protocol.json"
 KINDS = ("effect", "none", "outside")
@@ -55,7 +55,7 @@ def write_json(path: Path, content: object) -> None:
 def read_json(path: Path) -> dict:
     """A file of JSON. Raises BadTrials."""
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
+        content = read_file(path, follow=False)
     except FileNotFoundError:
         raise BadTrials(f"{path} is missing") from None
     except ValueError:

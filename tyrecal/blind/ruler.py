@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -43,13 +44,18 @@ class Signature:
     tilt: Array
     split: Array
 
+    @cached_property
+    def _weights(self) -> tuple[Array, Array]:
+        """Sizes (q,) from end to end, and the weights (q, k) of the given ones there."""
+        e = np.linspace(self.sizes[0], self.sizes[-1], GRID)
+        if len(self.sizes) > 2:  # a parabola through three of them is smoother than lines
+            return e, _parabolas(self.sizes, e)
+        return e, np.array([np.interp(e, self.sizes, unit) for unit in np.eye(len(self.sizes))]).T
+
     def grid(self, d: Array, places: Array) -> tuple[Array, Array, Array]:
         """Sizes (q,), shift (q, n) at x0 + d, split (q, n), rows ``places`` alone."""
-        e = np.linspace(self.sizes[0], self.sizes[-1], GRID)
-        weights = np.array([np.interp(e, self.sizes, unit) for unit in np.eye(len(self.sizes))]).T
+        e, weights = self._weights
         shift = self.shift + self.tilt @ d
-        if len(self.sizes) > 2:  # a parabola through three of them is smoother than lines
-            weights = _parabolas(self.sizes, e)
         return e, (weights @ shift)[:, places], (weights @ self.split)[:, places]
 
 

@@ -13,7 +13,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-from ..files import whole
+from ..files import read_bytes, whole
 from .protocol import BadTrials, read_json, write_json
 
 SEAL, TRUTH, ANSWERS = "seal.json", "truth.json", "answers.json"
@@ -71,4 +71,4 @@ def _of_all(files: list[Path]) -> str:
 
 
 def _sha256(path: Path) -> str:
-    return sha256(path.read_bytes()).hexdigest()
+    return sha256(read_bytes(path, follow=False)).hexdigest()

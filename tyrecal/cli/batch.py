@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from ..files import json_text, write_text
+from ..files import json_text, refuse_link, write_text
 from . import options
 from .main import EXIT_BATCH
 from .talk import Talk
@@ -36,10 +36,12 @@ FILE = click.Path(path_type=Path, dir_okay=False)
 @options.every(
     options.mesh,
     options.solver,
-    click.option("--output", type=click.Path(path_type=Path), metavar="DIR", default=Path("batch"),
-                 show_default=True, help="Folder for the results, one in it for each case."),
+    options.solver_command,
+    click.option("--output", type=click.Path(path_type=Path), metavar="DIR",
+                 help="Folder for the results, one in it for each case (default: batch)."),
     options.store,
     options.no_store,
+    options.allow_unusual,
 )  # fmt: skip
 @options.talking
 def command(
@@ -56,9 +58,11 @@ def command(
     scheduler: str,
     mesh: str,
     solver: str,
-    output: Path,
+    solver_command: tuple[str, ...],
+    output: Path | None,
     store: Path | None,
     no_store: bool,
+    allow_unusual: bool,
     talk: Talk,
 ) -> int:
     """Study many CASES, each on its own: one that fails stops no other.
@@ -73,7 +77,8 @@ def command(
     tyrecal batch cases/*.yaml --baseline baseline.json
     tyrecal batch cases/*.yaml --scheduler tcp://10.0.0.1:8786
 
-    Exit codes: 0 all cases good; 2 the input is wrong; 5 some failed or drifted; 130 interrupted.
+    Exit codes: 0 all cases good; 2 the input is wrong; 5 some failed or drifted; 130, 143,
+    129 interrupted, terminated, hung up.
     """
     from ..evaluate.pool import warm_up
 
@@ -86,12 +91,13 @@ def command(
     from ..batch.studies import Asked
     from ..batch.summary import summary
     from ..evaluate.queue import reached
+    from ..settings import root
     from .output import Run
     from .progress import Progress
 
     names = _names(cases)
     wanted = _studies(studies)
-    pressures = options.parse_pressures(from_kPa, to_kPa, steps)
+    pressures = options.parse_pressures(from_kPa, to_kPa, steps, allow_unusual)
     asked = Asked(tuple(options.parse_loads(loads)) if loads is not None else None, pressures)
     if write_baseline and not baseline:
         raise click.UsageError("--write-baseline needs --baseline FILE")
@@ -99,24 +105,30 @@ def command(
     before = None
     if baseline and (baseline.exists() or not write_baseline):
         before = read_baseline(baseline)
+    output = output or root() / "batch"
     run = Run(output, output, "batch")
-    run.renew("batch")
     record = run.open_store(store, no_store)
     folder = output.resolve()
     tasks = [
         CaseTask(name, path.resolve(), folder / name, wanted, asked, solver, mesh,
-                 record.folder if record else None)
+                 record.folder if record else None, solver_command, allow_unusual)
         for name, path in zip(names, cases, strict=True)
     ]  # fmt: skip
-    _prepare(tasks)
+    _prepare(tasks, folder)
     started = run.started
-    with Progress(len(tasks), talk.quiet, talk.verbose) as progress, reached(scheduler) as address:
-        reports = run_batch(tasks, jobs, address, progress.notify)
+    progress = Progress(len(tasks), talk.quiet, talk.verbose)
+    try:
+        with progress, reached(scheduler) as address:
+            reports = run_batch(tasks, jobs, address, progress.notify)
+    except BaseException:
+        if not scheduler:  # whose workers finish what is under way
+            _sweep(tasks)
+        raise
     _sweep(tasks)
     reports.sort(key=lambda report: str(report["name"]))
     drift = compare(reports, before) if before and not write_baseline else None
     result = summary(wanted, reports, drift)
-    run.write_json("batch.json", result)
+    result = run.write_json("batch.json", result)
     if junit:
         _write(junit, junit_xml(reports, drift, started))
     if write_baseline and baseline:
@@ -148,11 +160,16 @@ def _studies(text: str) -> tuple[str, ...]:
     return tuple(name for name in STUDIES if name in asked)
 
 
-def _prepare(tasks: Sequence[Any]) -> None:
-    """Make the cases' folders ready. Raises OutputRefused where one is another case's."""
+def _prepare(tasks: Sequence[Any], folder: Path) -> None:
+    """Make the cases' folders in ``folder`` ready. Raises OutputRefused where one is another
+    case's; OSError where one is a link."""
     from .output import refuse_other
 
     for task in tasks:
+        inside = task.folder.relative_to(folder)
+        for part in (inside, *inside.parents):
+            if part != Path():
+                refuse_link(folder / part)
         refuse_other(task.folder, task.path)
     _sweep(tasks)
 

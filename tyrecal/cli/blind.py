@@ -51,7 +51,7 @@ def command() -> None:
               help="Draw these effects only; repeatable (default: all it can).")  # fmt: skip
 @click.option("--seed", type=int, metavar="N", help="Of all that is drawn (default: a secret one).")
 @truth
-@options.jobs
+@options.every(options.jobs, options.allow_unusual)
 @options.talking
 def make(
     folder: Path,
@@ -64,6 +64,7 @@ def make(
     seed: int | None,
     truth: Path | None,
     jobs: int,
+    allow_unusual: bool,
     talk: Talk,
 ) -> int:
     """Draw tyres, compute them, seal the truth and write measurements to DIR.
@@ -88,7 +89,8 @@ def make(
         raise click.UsageError(f"--maker {maker}: must be one of {', '.join(NAMES)}")
     if not effects + plain + outside:
         raise click.UsageError("there must be at least one trial")
-    case, sealed = load_case(case_path), _sealed(folder, truth)
+    case, sealed = load_case(case_path, allow_unusual), _sealed(folder, truth)
+    resume("trials that were made are kept; the same command goes on from there")
     store = Store((sealed / "record").resolve())
     who = find_maker(maker, case, store)
     for id in drawn:
@@ -98,7 +100,6 @@ def make(
         who = replace(who, laws={id: who.laws[id] for id in drawn})
     counts = {"effect": effects, "none": plain, "outside": outside}
     protocol = Protocol(who.about, case.path.name, counts)
-    resume("trials that were made are kept; the same command goes on from there")
     door = Door(case, "bundled", store=store)
     ruler = lambda: measure(tyre_model(case, door, protocol, jobs), rows_of(case, protocol))
     with talk.progress("make trials") as bar:
@@ -148,11 +149,11 @@ def answer(
             raise click.UsageError(f"--effect {id}: no such effect, only {', '.join(catalogue())}")
     refuse_open_truth(folder)
     protocol, case = read_protocol(folder), blind.case_of(folder)
+    resume("answers that were given are kept; the same command goes on from there")
     door = Door(case, store=Store((store or folder / "record").resolve()))
     model: Response = blind.tyre_model(case, door, protocol, jobs, effects or None)
     if emulated:
         model = emulate(model)
-    resume("answers that were given are kept; the same command goes on from there")
     with talk.progress("answer trials") as bar:
         rows = blind.rows_of(case, protocol)
         mark = blind.answer(folder, model, rows, jobs, _told("answered", talk, bar))

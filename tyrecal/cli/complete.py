@@ -86,14 +86,11 @@ def _yaml(folder: Path, depth: int) -> Iterator[Path]:
 
 def _case() -> dict[str, Any]:
     """The case on the command line as plain data, judged by nobody."""
-    from ruamel.yaml import YAML
-    from ruamel.yaml.error import YAMLError
+    from ..case.document import read_document
 
     for word in split_arg_string(os.environ.get("COMP_WORDS", "")):
         if word.endswith(SUFFIXES):  # click has no arguments yet where an option lacks its value
-            with contextlib.suppress(OSError, YAMLError, UnicodeDecodeError):
-                data = YAML(typ="safe", pure=True).load(Path(word).read_text("utf-8"))
-                return data if isinstance(data, dict) else {}
+            return read_document(Path(word)).data or {}
     return {}
 
 

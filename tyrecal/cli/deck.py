@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import click
 
@@ -19,6 +21,7 @@ from .talk import Talk
     options.mesh,
     options.solver,
     options.output,
+    options.allow_unusual,
 )
 @options.talking
 def command(
@@ -29,6 +32,7 @@ def command(
     mesh: str,
     solver: str,
     output: Path | None,
+    allow_unusual: bool,
     talk: Talk,
 ) -> int:
     """Write the decks of CASE, to read or to run elsewhere.
@@ -40,20 +44,28 @@ def command(
     """
     from ..deck.write import Decks
     from ..evaluate.door import Door
+    from ..files import whole
     from .output import Run
 
-    loaded, values = options.load(case, mesh, assignments, pressure_kPa, talk)
+    loaded, values = options.load(case, mesh, assignments, pressure_kPa, talk, allow_unusual)
     door = Door(loaded, solver)
     adapter = door.solver
     door.needs_effects_of(loaded)
     if loads is not None:
         door.needs_road()
-        decks = Decks(loaded, values, loads_N=tuple(options.parse_loads(loads)))
+        asked = options.parse_loads(loads)
+        options.refuse_unusual_loads(loaded, "--loads-N", asked, allow_unusual)
+        decks = Decks(loaded, values, loads_N=tuple(asked))
     else:
         decks = Decks(loaded, values, tuple(values) if door.has_gradients else ())
     decks.texts(adapter.dialect)  # a template that fails leaves the folder untouched
     run = Run(case, output, "deck", adapter)
-    paths = [str(path) for path in adapter.write(decks, run.folder)]
+    paths = []
+    with TemporaryDirectory() as fresh:  # an adapter's plain writing must meet no link
+        for path in adapter.write(decks, Path(fresh)):
+            paths.append(str(run.folder / path.name))
+            with whole(run.folder / path.name) as partial:
+                shutil.copyfile(path, partial)
     run.finish()
     talk.result(paths)
     if not talk.as_json:

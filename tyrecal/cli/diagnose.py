@@ -62,12 +62,14 @@ def command(
     if add:
         if assignments or measured:
             raise click.UsageError("--add writes a case and nothing else: no --set, no --measured")
-        path = _added(case, add, study.output)
+        path = _added(case, add, study.output, study.allow_unusual)
         talk.result({"case": str(path)})
         talk.say(f"{path} has the effect in it; 'tyrecal fit {path}' calibrates it")
         return 0
     if measured is None:
         raise click.UsageError("--measured FILE must be given, or --add EFFECT=VALUE")
+    from ..diagnose.diagnosis import STAGES
+    from ..diagnose.measurements import read_measurements
     from ..diagnose.problem import Assumed
     from ..diagnose.result import result
     from ..diagnose.study import parse_change
@@ -85,15 +87,27 @@ def command(
     if not considered:
         raise click.UsageError("--without leaves no effect to consider")
     changes = [(path, parse_change(text)) for path, text in toggled]
+    for _, change in [] if study.allow_unusual else changes:
+        if not change.times:
+            option, name = f"--toggled {change.id}={change.value:g}", f"effects.{change.id}"
+            options.refuse_unusual(loaded, option, name, change.value, False)
     door = study.door(loaded)
-    run = study.run(case, "diagnose", door)
+    files = [measured, *repeats, *(path for path, _ in changes)]
+    readings = [each for path in files for each in read_measurements(path)]
+    pressures, at = ({each.pressure_kPa for each in readings}, {each.load_N for each in readings})
+    run = study.run(
+        case, "diagnose", door, measured=files, pressure_kPa=sorted(pressures), load_N=sorted(at)
+    )
     form = None if form_percent is None else form_percent / 100
     assumed = Assumed(form, split_percent / 100)
-    with talk.progress("evaluations") as bar:
+    with talk.progress("diagnose", STAGES) as bar:
         door.heard = bar.at
-        found = diagnosed(loaded, door, measured, repeats, changes, assumed, study.jobs, considered)
-    told = result(found.diagnosis, found.under_load)
-    run.write_json("diagnosis.json", told)
+        found = diagnosed(
+            loaded, door, measured, repeats, changes, assumed, study.jobs, considered,
+            stage=bar.begin,
+        )  # fmt: skip
+    told = result(found.diagnosis, found.under_load, found.variables)
+    told = run.write_json("diagnosis.json", told)
     named = [part["region"] for part in told["section_map"]]
     run.write_json("diagnosis_section.json", parts_data(loaded, named))
     words = page(found, loaded.case.name, measured.name)
@@ -101,7 +115,7 @@ def command(
     if pictures:
         from ..report.diagnosis_pictures import draw_diagnosis
 
-        draw_diagnosis(run.folder, loaded, found)
+        draw_diagnosis(run.new, loaded, found)
     run.finish()
     talk.result(told)
     talk.say(words)
@@ -109,14 +123,15 @@ def command(
     return 0
 
 
-def _added(case: Path, assignment: str, output: Path | None) -> Path:
+def _added(case: Path, assignment: str, output: Path | None, allowed: bool) -> Path:
     """The new case's file. Raises click.UsageError, CaseError."""
     from ..case import load_case, parse_assignment
     from ..diagnose.add import NotAdded, add
 
-    load_case(case)
+    loaded = load_case(case, allowed)
     try:
         id, value = parse_assignment(assignment)
+        options.refuse_unusual(loaded, f"--add {assignment}", f"effects.{id}", value, allowed)
         return add(case, id, value, output)
     except (ValueError, NotAdded) as error:
         raise click.UsageError(f"--add: {error}") from None

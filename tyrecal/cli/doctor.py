@@ -9,10 +9,11 @@ import click
 
 from . import complete, options
 from .main import EXIT_SOLVER
+from .solvers import command_words, settings_file, settings_words
 from .talk import Talk
 
 HINTS = {
-    "abaqus": "'solver: options: command:' of the case says how it is started",
+    "abaqus": "'commands: {abaqus: ...}' of your settings says how it is started",
     "calculix": "on Debian 'apt-get install calculix-ccx'",
 }
 
@@ -50,6 +51,7 @@ def command(solver: str, store: Path | None, talk: Talk) -> int:
         "machine": machine(),
         "packages": packages(),
         "extras": extras(),
+        "settings": settings_file(),
         "solvers": installed(),
         "store": str(store) if store else None,
         "records": records(store),
@@ -70,8 +72,8 @@ def command(solver: str, store: Path | None, talk: Talk) -> int:
 
 def _words(found: dict[str, Any]) -> list[str]:
     here, check = found["machine"], found["self_check"]
-    free = here["free_memory_GB"]
-    of = f"{free:g} of {here['memory_GB']:g}" if free is not None else f"{here['memory_GB']:g}"
+    known = [here[key] for key in ("free_memory_GB", "memory_GB") if here[key] is not None]
+    of = " of ".join(f"{each:g}" for each in known) or "unknown"
     lines = [f"tyrecal {found['tyrecal']} in {found['installed_in']}"]
     lines += [f"Python {here['python']}, {here['system']}"]
     lines += [f"{here['cores']} cores, {of} GB of memory, {here['free_disc_GB']:g} GB of disc free"]
@@ -82,11 +84,11 @@ def _words(found: dict[str, Any]) -> list[str]:
     for extra in found["extras"]:
         there = f"missing {', '.join(extra['missing'])}: {extra['install']}"
         lines.append(f"  [{extra['name']}] " + (there if extra["missing"] else "installed"))
-    lines += ["", "solvers:"]
+    lines += ["", f"settings: {settings_words(found['settings'])}", "", "solvers:"]
     for solver in found["solvers"]:
         state = solver["problem"] or f"version {solver['version']}"
         hint = f"; {HINTS[solver['name']]}" if solver["problem"] and solver["name"] in HINTS else ""
-        lines.append(f"  {solver['name']}: {state}{hint}")
+        lines.append(f"  {solver['name']}: {state}{command_words(solver)}{hint}")
     lines += ["", "records of evaluations:"]
     for record in found["records"]:
         lines.append(f"  {record['folder']}: {record['records']} records, {record['MB']:g} MB")

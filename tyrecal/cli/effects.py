@@ -78,14 +78,17 @@ def command(
     loaded, values = study.load(case, assignments)
     if fitted and (lost := _variables_in(assignments, values)):
         raise click.UsageError(f"--set {lost[0]}: the design is that of --fitted")
+    if name and value is not None:
+        path = f"effects.{name}"
+        options.refuse_unusual(loaded, f"--value {value:g}", path, value, study.allow_unusual)
     door = study.door(loaded)
     adapter = door.solver
     if not door.has_gradients:
         raise click.UsageError(f"solver '{adapter.name}' gives no slopes, which a re-fit needs")
-    kPa = _pressures(loaded, pressures)
+    kPa = _pressures(loaded, pressures, study.allow_unusual)
     if fitted:
-        values = options.fitted_values(fitted, loaded, study.solver)
-    run = study.run(case, "effects", door)
+        values = options.fitted_values(fitted, loaded, talk)
+    run = study.run(case, "effects", door, pressure_kPa=kPa)
     plain = Plain(door, values, kPa)
     if name and not talk.as_json:
         talk.say(effect_text(entries[name]) + "\n")
@@ -108,8 +111,8 @@ def command(
             talk.detail(id)
             found.append({**entries[id], **signature_entry(signature, values)})
             if pictures:
-                draw_signature(run.folder / f"effect_{id}.png", signature)
-    run.write_json("effects.json", found)
+                draw_signature(run.new / f"effect_{id}.png", signature)
+    found = run.write_json("effects.json", found)
     run.finish()
     talk.result(found)
     if found:
@@ -125,7 +128,7 @@ def _variables_in(assignments: tuple[str, ...], values: Mapping[str, float]) -> 
     return [name for name, _ in map(parse_assignment, assignments) if name in values]
 
 
-def _pressures(loaded: Any, text: str | None) -> list[float]:
+def _pressures(loaded: Any, text: str | None, allowed: bool) -> list[float]:
     """Pressures in kPa. Raises click.UsageError."""
     from math import isfinite
 
@@ -142,4 +145,6 @@ def _pressures(loaded: Any, text: str | None) -> list[float]:
             raise click.UsageError(
                 f"--pressures-kPa {found[-1]:g}: must be pressures between 0 and 2000, each once"
             )
+        option = f"--pressures-kPa {found[-1]:g}"
+        options.refuse_unusual(loaded, option, "pressure_kPa", found[-1], allowed)
     return found

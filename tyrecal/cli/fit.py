@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,8 @@ import click
 from . import complete, options
 from .main import EXIT_FIT
 from .talk import Progress, Talk
+
+NOT_CONVERGED = "not_converged"  # folder of a fit that may not take a better one's place
 
 
 @click.command()
@@ -77,10 +80,11 @@ def command(
     tyrecal fit cases/p235_75r17.yaml --starts 20 --seed 1 --scheduler tcp://10.0.0.1:8786
     """
     from ..evaluate.queue import reached
-    from ..fit.calibrate import calibrate, history_csv
-    from ..fit.problem import objective_unit
+    from ..fit.calibrate import calibrate, check, history_csv
+    from ..fit.problem import Problem, objective_unit
     from ..report.table import fit_csv, fit_table
-    from ..report.words import fit_doubts
+    from ..report.words import fit_doubts, fit_verdict, tyre_doubts
+    from ..studies.fitted import has_good, is_good
 
     talk = study.talk
     options.not_both(study.jobs, scheduler)
@@ -95,14 +99,15 @@ def command(
 
         loaded, left_out = with_measured(loaded, measured)
     door = study.door(loaded)
-    if loaded.case.targets.footprint:
-        door.needs_road()
-    elif starts == 1 and door.has_gradients:
+    fixed = {name: values[name] for name in fix}
+    check(Problem(loaded, door, fixed))
+    if not loaded.case.targets.footprint and starts == 1 and door.has_gradients:
         why = f"a fit from one start asks solver '{door.solver.name}' for one design at a time"
         if scheduler:
             raise click.UsageError(f"--scheduler changes nothing here: {why}; give --starts too")
         options.say_idle(talk, study.jobs, why)
-    run = study.run(case, "fit", door)
+    files = [measured] if measured else []
+    run = study.run(case, "fit", door, measured=files, load_N=loaded.case.targets.loads_N or 0.0)
     unit = objective_unit(loaded)
     with talk.progress("fit") as bar, reached(scheduler) as door.scheduler:
         points = _Points(talk, bar, unit)
@@ -110,21 +115,22 @@ def command(
             loaded,
             door,
             method,
-            {name: values[name] for name in fix},
+            fixed,
             starts,
             seed,
             study.jobs,
             points.notify,
             bar.at,
         )
-    run.write_json("fit.json", fit.result)
+    result = run.write_json("fit.json", fit.result)
     run.write_text("fit.csv", fit_csv(fit.result))
     run.write_text("fit_history.csv", history_csv(fit.history))
-    talk.result(fit.result)
-    talk.show(fit_table(fit.result))
+    talk.result(result)
+    talk.show(fit_table(result))
+    talk.say("\n".join(fit_verdict(fit.result)))
     for each in left_out:
         talk.note(f"{measured}: not used: {each}")
-    for warning in fit_doubts(fit.result):
+    for warning in (*tyre_doubts(fit.result), *fit_doubts(fit.result)):
         talk.warn(warning)
     if pictures or study.report:
         from ..case import with_values
@@ -139,10 +145,17 @@ def command(
     if pictures:
         from ..report.pictures import draw_fit
 
-        draw_fit(run.folder, loaded, values, evaluation, modes, fit.history, unit)
-    run.finish()
+        draw_fit(run.new, loaded, values, evaluation, modes, fit.history, unit)
+    good = is_good(result)
+    earlier = not good and has_good(run.folder / "fit.json")
+    run.finish(aside=NOT_CONVERGED if earlier else "")
+    if earlier:
+        talk.warn(f"the fit in '{run.folder}' had converged: it stays")
     study.finish(run)
-    return 0 if fit.result["converged"] and fit.result["moved"] else EXIT_FIT
+    file = shlex.quote(str(measured)) if measured else "FILE"
+    next_ = f"tyrecal diagnose {shlex.quote(str(case))} --measured {file}"
+    talk.say(f"next: {next_} says what the model lacks")
+    return 0 if good else EXIT_FIT
 
 
 class _Points:

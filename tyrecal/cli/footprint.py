@@ -9,12 +9,14 @@ import click
 
 from . import options
 from .main import EXIT_SOLVER
+from .taken import taken
+from .talk import Talk
 
 DESIGNS = ("initial", "fitted")
 
 
 @click.command()
-@options.every(options.case_argument, options.assignments, options.pressure, options.loads)
+@options.every(options.case_or_last, options.assignments, options.pressure, options.loads)
 @options.fitted("Press the design that 'tyrecal fit' found for this case, too.")
 @click.option("--compare", metavar="initial,fitted",
               help="Designs to press (default: initial, and fitted where --fitted is given)."
@@ -22,7 +24,7 @@ DESIGNS = ("initial", "fitted")
 @click.option("--pictures/--no-pictures", default=True, help="Draw the patches; write VTU.")
 @options.study
 def command(
-    case: Path,
+    case: Path | None,
     assignments: tuple[str, ...],
     pressure_kPa: float | None,
     loads: str | None,
@@ -36,8 +38,10 @@ def command(
     Writes footprint.json, .csv and .png: contact area, length, width, mean and peak pressure,
     deflection and vertical stiffness; the pressure in the patch as a picture, the deformed tyre as
     VTU. --set NAME=VALUE on a variable changes the initial design, on any other number both.
+    Without CASE it is that of the last fit here, whose design is pressed too, or the only one here.
 
     \b
+    tyrecal footprint
     tyrecal footprint cases/p235_75r17.yaml
     tyrecal footprint cases/p235_75r17.yaml --fitted p235_75r17/fit.json --jobs 2
     tyrecal footprint cases/p235_75r17.yaml --loads-N 3000,5000 --set road.friction=0 --json
@@ -48,15 +52,19 @@ def command(
     from ..studies.footprint import footprint_result, press, progress
 
     talk = study.talk
+    case, fitted, study = taken(case, fitted, study)
     loaded, values = study.load(case, assignments, pressure_kPa)
-    asked = options.parse_loads(loads) if loads is not None else loaded.case.loads_N
+    asked = loaded.case.loads_N
+    if loads is not None:
+        asked = options.parse_loads(loads)
+        options.refuse_unusual_loads(loaded, "--loads-N", asked, study.allow_unusual)
     door = study.door(loaded)
     door.needs_road()
     fitted = _fit_compared(compare, fitted, (study.output or Path(case.stem)) / "fit.json")
-    designs = _designs(compare, values, fitted, loaded, study.solver)
+    designs = _designs(compare, values, fitted, loaded, talk)
     if len(designs) == 1:
         options.say_idle(talk, study.jobs, "one design is pressed alone; --fitted adds another")
-    run = study.run(case, "footprint", door)
+    run = study.run(case, "footprint", door, load_N=asked)
 
     def notify(design: str, outcome: Any) -> None:
         reached, failure = progress(outcome)
@@ -72,13 +80,13 @@ def command(
         return EXIT_SOLVER
     meshes = {name: _mesh(loaded, designs[name]) for name in pressed}
     result = footprint_result(designs, asked, outcomes, meshes)
-    run.write_json("footprint.json", result)
+    result = run.write_json("footprint.json", result)
     run.write_json("footprint_patches.json", patches_data(loaded.case.name, pressed, meshes))
     run.write_text("footprint.csv", footprint_csv(result["rows"]))
     if pictures:
         from ..report.footprint import draw_footprint
 
-        draw_footprint(run.folder, pressed, meshes, result["rows"])
+        draw_footprint(run.new, pressed, meshes, result["rows"])
     run.finish()
     talk.result(result)
     talk.show(footprint_table(result["rows"]))
@@ -100,7 +108,7 @@ def _fit_compared(compare: str | None, fitted: Path | None, own: Path) -> Path |
 
 
 def _designs(
-    compare: str | None, values: dict[str, float], fitted: Path | None, loaded: Any, solver: str
+    compare: str | None, values: dict[str, float], fitted: Path | None, loaded: Any, talk: Talk
 ) -> dict[str, dict[str, float]]:
     """Values of the variables by design. Raises click.UsageError."""
     names = DESIGNS[: 2 if fitted else 1] if compare is None else tuple(compare.split(","))
@@ -111,7 +119,7 @@ def _designs(
         raise click.UsageError("--compare: a design is named twice")
     designs = {"initial": values}
     if fitted and "fitted" in names:
-        designs["fitted"] = options.fitted_values(fitted, loaded, solver)
+        designs["fitted"] = options.fitted_values(fitted, loaded, talk)
     return {name: designs[name] for name in names}
 
 

@@ -38,6 +38,7 @@ def _length(flag: str, text: str, unit: str = "mm") -> Any:
 @click.option("--output", type=click.Path(path_type=Path), metavar="CASE.yaml",
               help="Case file to write (default: named by the size, in this folder).")  # fmt: skip
 @click.option("--force", is_flag=True, help="Write over files that exist.")
+@options.allow_unusual
 @click.option("--pictures/--no-pictures", default=True, help="Draw the section.")
 @options.talking
 def command(
@@ -51,6 +52,7 @@ def command(
     pressure_kPa: float | None,
     output: Path | None,
     force: bool,
+    allow_unusual: bool,
     pictures: bool,
     talk: Talk,
 ) -> int:
@@ -66,10 +68,18 @@ def command(
     tyrecal init 205/60R15 --section my_outline.csv --belt-width-mm 160 --output my_outline.yaml
     """
     from ..case.draft import from_file, from_size
+    from ..case.guard import ALL_THE_SAME
+    from ..case.usual import GAUGES, USUAL
     from ..tyre.size import INCH, parse_size
 
     if size is None and file is None:
         raise click.UsageError("give a SIZE, as in 'tyrecal init 205/60R15', or --section FILE")
+    usual = {**GAUGES, "pressure_kPa": USUAL["pressure_kPa"]}
+    stated = click.get_current_context().params
+    for name, each in [] if allow_unusual else usual.items():
+        if stated[name] is not None and (message := each.refusal(stated[name])):
+            option = name.replace("_", "-")
+            raise click.UsageError(f"--{option} {stated[name]:g}: {message}{ALL_THE_SAME}")
     tyre = parse_size(size) if size is not None else None
     given = {"crown": crown_mm, "sidewall": sidewall_mm, "bead": bead_mm, "belt": belt_width_mm}
     lengths = {key: 1e-3 * value for key, value in given.items() if value is not None}
@@ -86,6 +96,7 @@ def command(
     else:
         assert tyre is not None
         draft = from_size(tyre, lengths, pressure_kPa, target.stem)
+    draft.check(allow_unusual)
     _write(draft, file, target, target.with_suffix(".png") if pictures else None, force, talk)
     return 0
 
@@ -104,12 +115,11 @@ def _write(
     for path in [*contents, *([picture] if picture else [])]:
         if path.exists() and not force:
             raise OutputRefused(f"'{path}' exists already; give --force to write over it")
-    draft.check()
     target.parent.mkdir(parents=True, exist_ok=True)
     for path, content in contents.items():
         with whole(path) as partial:
             partial.write_bytes(content)
-    loaded = load_case(target)
+    loaded = load_case(target, allow_unusual=True)
     outside = loaded.section.points[-1]
     written = {"case": str(target), "section": str(table)}
     talk.result({**written, "picture": str(picture) if picture else None})

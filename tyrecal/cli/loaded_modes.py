@@ -37,7 +37,7 @@ def at_load(door: Any, run: Any, values: Mapping[str, float], load_N: float, stu
     if not isinstance(outcome, LoadedTyre):
         raise outcome
     result = loaded_modes_result(values, outcome)
-    run.write_json("modes.json", result)
+    result = run.write_json("modes.json", result)
     run.write_json("modes_shapes.json", loaded_data(outcome, door.case))
     run.finish()
     talk.result(result)
@@ -75,12 +75,12 @@ def over_loads(
     if not any(isinstance(each, LoadedTyre) for each in outcomes.values()):
         return EXIT_SOLVER
     result = load_sweep_result(designs, loads_N, outcomes)
-    run.write_json("load_sweep.json", result)
+    result = run.write_json("load_sweep.json", result)
     run.write_text("load_sweep.csv", load_csv(result["rows"]))
     if pictures:
         from ..report.load import draw_load_sweep
 
-        draw_load_sweep(run.folder / "load_sweep.png", result["rows"])
+        draw_load_sweep(run.new / "load_sweep.png", result["rows"])
     run.finish()
     talk.result(result)
     for found in result["findings"]:

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import os
+import signal
 import sys
 from importlib import import_module
 from typing import Any
 
 import click
 
-from ..interrupt import ctrl_c_heard, ctrl_c_remembered
-from .talk import RESUME, coloured, error
+from ..files import CHANGED
+from ..interrupt import SIGNALS, exit_code, interrupt_heard, interrupts_remembered
+from .talk import RESUME, coloured, error, say
 
 # One BLAS thread: the tyre's matrices are small, and cores are better spent on other designs.
 # Has to be set before NumPy is imported.
@@ -36,19 +38,26 @@ COMMANDS = {  # name: one line of help, so that the overview imports no command
     "doctor": "Check the installation: packages, solvers, machine, a known tyre.",
     "completion": "Print what makes a shell complete commands, cases and names.",
 }
-EXIT_INPUT, EXIT_SOLVER, EXIT_FIT, EXIT_BATCH, EXIT_INTERRUPTED = 2, 3, 4, 5, 130
+EXIT_INPUT, EXIT_SOLVER, EXIT_FIT, EXIT_BATCH = 2, 3, 4, 5
 EXIT_CODES = {
     0: "done",
-    EXIT_INPUT: "the input is wrong",
+    EXIT_INPUT: "the input is wrong, or a file cannot be read or written",
     EXIT_SOLVER: "the solver failed",
     EXIT_FIT: "the fit did not converge or did not move",
     EXIT_BATCH: "some cases of a batch failed or drifted",
-    EXIT_INTERRUPTED: "interrupted",
+    130: "interrupted (Ctrl-C)",
+    143: "terminated (SIGTERM)",
+    129: "hung up (SIGHUP)",
 }
 
 
 class Interrupted(Exception):
-    """Ctrl-C; the words say how to go on."""
+    """A signal ended the command; the words say which, and how to go on; code: to exit with."""
+
+    def __init__(self, how_to_go_on: str = ""):
+        number = interrupt_heard() or signal.SIGINT
+        super().__init__(": ".join(filter(None, (SIGNALS[number], how_to_go_on))))
+        self.code = exit_code(number)
 
 
 class Commands(click.Group):
@@ -63,16 +72,32 @@ class Commands(click.Group):
         command: click.Command = import_module(f"tyrecal.cli.{name.replace('-', '_')}").command
         return command
 
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        if args[0] == "help":  # `tyrecal help fit`, as `git help`, is `tyrecal fit --help`
+            args = [*args[1:2], "--help"]
+            if len(args) == 1:
+                click.echo(ctx.get_help())
+                ctx.exit()
+        if args[0] not in COMMANDS and not args[0].startswith("-"):
+            raise click.UsageError(f"no command '{args[0]}'{_meant(args[0])}", ctx)
+        return super().resolve_command(ctx, args)
+
     def invoke(self, ctx: click.Context) -> Any:
+        CHANGED.clear()
         try:
             return super().invoke(ctx)
         except (KeyboardInterrupt, Exception) as error:
             if isinstance(error, click.exceptions.Exit) or not (
-                isinstance(error, KeyboardInterrupt) or ctrl_c_heard()
+                isinstance(error, KeyboardInterrupt) or interrupt_heard()
             ):
                 raise
         # the error is forgotten by now, and with it what was under way: its processes have ended
-        raise Interrupted(ctx.meta.get(RESUME, "nothing was changed"))
+        changed = "each file is whole or absent; the same command writes them again"
+        raise Interrupted(
+            ctx.meta.get(RESUME, changed if CHANGED.is_set() else "nothing was changed")
+        )
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         with formatter.section("Commands"):
@@ -81,6 +106,18 @@ class Commands(click.Group):
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         with formatter.section("Exit codes"):
             formatter.write_dl([(str(code), words) for code, words in EXIT_CODES.items()])
+
+
+def _meant(name: str) -> str:
+    """The command that a misspelt one stands for; else all of them."""
+    from ..case.mistakes import suggestion
+
+    begun = [command for command in COMMANDS if command.startswith(name.lower())]
+    parts = [command for command in COMMANDS if name.lower() in command.split("-")]
+    for likely in (begun, parts):
+        if len(likely) == 1:
+            return f"; did you mean '{likely[0]}'?"
+    return suggestion(name.lower(), COMMANDS)
 
 
 @click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})
@@ -97,25 +134,47 @@ def cli(ctx: click.Context) -> None:
     Every command has --help with examples, --json, --quiet and --verbose.
     """
     ctx.color = coloured()
+    ctx.default_map = _defaults(ctx.invoked_subcommand)
+
+
+def _defaults(command: str | None) -> dict[str, Any]:
+    """What the user's settings say in place of an option. Raises BadSettings, but not where the
+    installation is looked at."""
+    from ..settings import BadSettings, settings
+
+    try:
+        found = settings()
+    except BadSettings:
+        if command in ("doctor", "solvers"):
+            return {}
+        raise
+    given = {k: v for k in ("jobs", "solver") if (v := getattr(found, k)) is not None}
+    parts = {part: given for part in ("make", "answer")}  # of blind
+    return {name: {**given, **parts} for name in COMMANDS if name != "doctor"}
 
 
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line; never returns."""
     try:
-        with ctrl_c_remembered():
-            code = cli.main(arguments, prog_name="tyrecal", standalone_mode=False)
+        with interrupts_remembered():
+            try:
+                code = cli.main(arguments, prog_name="tyrecal", standalone_mode=False)
+            except (KeyboardInterrupt, click.Abort):  # just before or after the command
+                raise Interrupted from None
         sys.exit(code if isinstance(code, int) else 0)
     except click.exceptions.Exit as leave:
         sys.exit(leave.exit_code)
-    except click.ClickException as wrong:
-        wrong.show()
+    except click.exceptions.NoArgsIsHelpError as overview:
+        overview.show()
         sys.exit(EXIT_INPUT)
-    except Interrupted as how_to_go_on:
-        click.echo(f"\ninterrupted: {how_to_go_on}", err=True)
-        sys.exit(EXIT_INTERRUPTED)
-    except (KeyboardInterrupt, click.Abort):
-        click.echo("\ninterrupted", err=True)
-        sys.exit(EXIT_INTERRUPTED)
+    except click.ClickException as wrong:
+        context = getattr(wrong, "ctx", None)
+        where = f" (see '{context.command_path} --help')" if context is not None else ""
+        error(f"{wrong.format_message()}{where}")
+        sys.exit(EXIT_INPUT)
+    except Interrupted as interrupted:
+        say(f"\n{interrupted}", err=True)
+        sys.exit(interrupted.code)
     except Exception as failure:
         code = _exit_code(failure)
         if code is None:
@@ -134,12 +193,11 @@ def _exit_code(failure: Exception) -> int | None:
         ("tyrecal.evaluate.solver", "UnknownSolver", EXIT_INPUT),
         ("tyrecal.deck.environment", "TemplateFailed", EXIT_INPUT),
         ("tyrecal.fit.calibrate", "NothingToFit", EXIT_INPUT),
-        ("tyrecal.evaluate.queue", "BadSettings", EXIT_INPUT),
+        ("tyrecal.settings", "BadSettings", EXIT_INPUT),
         ("tyrecal.batch.drift", "BadBaseline", EXIT_INPUT),
         ("tyrecal.diagnose.measurements", "BadMeasurements", EXIT_INPUT),
         ("tyrecal.diagnose.study", "BadChange", EXIT_INPUT),
         ("tyrecal.measured.sensors", "BadMeasuredData", EXIT_INPUT),
-        ("tyrecal.measured.identify", "LabMissing", EXIT_INPUT),
         ("tyrecal.blind.protocol", "BadTrials", EXIT_INPUT),
         ("tyrecal.tyre.size", "UnknownSize", EXIT_INPUT),
         ("tyrecal.case.draft", "BadSection", EXIT_INPUT),

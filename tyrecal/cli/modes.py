@@ -61,28 +61,34 @@ def command(
     loaded, values = study.load(case, assignments, pressure_kPa)
     door = study.door(loaded)
     designs = {"initial": values}
+    option = "--load-N" if sweep is None else "--sweep-load"
+    options.refuse_unusual_loads(loaded, option, loads, study.allow_unusual)
     if loads:
         door.needs_road(modes=True)
     if fitted:
-        designs["fitted"] = options.fitted_values(fitted, loaded, study.solver)
-    run = study.run(case, "modes", door, "modes" if sweep is None else "sweep-load")
+        designs["fitted"] = options.fitted_values(fitted, loaded, talk)
     if sweep is not None:
+        run = study.run(case, "modes", door, "sweep-load", load_N=loads)
         draw = pictures is not False
         return over_loads(door, run, designs, loads, study, draw)
+    run = study.run(case, "modes", door, load_N=loads[0] if loads else 0.0)
     if loads:
         return at_load(door, run, values, loads[0], study)
     evaluation = door.evaluate(Question(values))
     result, modes = modes_result(loaded, values, evaluation)
-    run.write_json("modes.json", result)
+    result = run.write_json("modes.json", result)
     run.write_json("modes_shapes.json", tyre_data(loaded, evaluation, modes))
     if pictures:
         from ..report.pictures import draw_evaluation
 
-        draw_evaluation(run.folder, loaded, evaluation, modes)
+        draw_evaluation(run.new, "modes", loaded, evaluation, modes)
     run.finish()
     from ..report.table import modes_table
+    from ..report.words import tyre_doubts
 
     talk.result(result)
     talk.show(modes_table(result))
+    for doubt in tyre_doubts(result):
+        talk.warn(doubt)
     study.page(run)
     return 0

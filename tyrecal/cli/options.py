@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import wraps
 from pathlib import Path
@@ -36,18 +36,28 @@ if TYPE_CHECKING:
 case_argument = click.argument(
     "case", type=click.Path(path_type=Path), shell_complete=complete.cases
 )
+case_or_last = click.argument(
+    "case", type=click.Path(path_type=Path), required=False, shell_complete=complete.cases
+)
 solver = click.option(
     "--solver",
     default="",
     metavar="NAME",
-    help="Solver (default: the case's).",
+    help="Solver (default: your settings', else the case's).",
     shell_complete=complete.solvers,
+)
+solver_command = click.option(
+    "--solver-command",
+    callback=lambda ctx, param, value: _words(value),
+    metavar="COMMAND",
+    help="Program that the solver starts (default: TYRECAL_SOLVER_COMMAND, your settings file's,"
+    " the solver's own; see tyrecal solvers).",
 )
 output = click.option(
     "--output",
     type=click.Path(path_type=Path),
     metavar="DIR",
-    help="Folder for the results (default: ./NAME-of-case).",
+    help="Folder for the results (default: NAME-of-case, here or in your settings' output).",
 )
 mesh = click.option(
     "--mesh",
@@ -81,6 +91,11 @@ store = click.option(
     " of the results; also from TYRECAL_STORE).",
 )
 no_store = click.option("--no-store", is_flag=True, help="Neither ask nor keep a record.")
+allow_unusual = click.option(
+    "--allow-unusual",
+    is_flag=True,
+    help="Compute with numbers that no tyre has, too: those outside their usual ranges.",
+)
 assignments = click.option(
     "--set",
     "assignments",
@@ -152,7 +167,7 @@ report = click.option(
     help="Write report.html, a page of all that the folder of results holds.",
 )
 TALK = (as_json, quiet, verbose)
-ONE_BY_ONE = (mesh, solver, output, store, no_store, *TALK)
+ONE_BY_ONE = (mesh, solver, solver_command, output, store, no_store, allow_unusual, *TALK)
 STUDY = (jobs, *ONE_BY_ONE[:-3], report, *TALK)
 
 
@@ -183,9 +198,11 @@ def _study(function: Callable[..., int], given: tuple[Any, ...]) -> Callable[...
         *args: Any,
         mesh: str,
         solver: str,
+        solver_command: tuple[str, ...],
         output: Path | None,
         store: Path | None,
         no_store: bool,
+        allow_unusual: bool,
         as_json: bool,
         quiet: bool,
         verbose: bool,
@@ -194,7 +211,9 @@ def _study(function: Callable[..., int], given: tuple[Any, ...]) -> Callable[...
         **rest: Any,
     ) -> int:
         talk = _talk(as_json, quiet, verbose)
-        asked = Study(jobs, mesh, solver, output, store, no_store, report, talk)
+        asked = Study(
+            jobs, mesh, solver, solver_command, output, store, no_store, report, allow_unusual, talk
+        )
         return function(*args, study=asked, **rest)
 
     result: Callable[..., int] = every(*given)(command)
@@ -208,44 +227,64 @@ class Study:
     jobs: int
     mesh: str
     solver: str
+    solver_command: tuple[str, ...]
     output: Path | None
     store: Path | None
     no_store: bool
     report: bool
+    allow_unusual: bool
     talk: Talk
 
     def load(
         self, path: Path, assigned: tuple[str, ...] = (), pressure_kPa: float | None = None
     ) -> Any:
         """As `load`, at the mesh level asked for."""
-        return load(path, self.mesh, assigned, pressure_kPa, self.talk)
+        return load(path, self.mesh, assigned, pressure_kPa, self.talk, self.allow_unusual)
 
     def door(self, loaded: Any) -> Door:
         """The door to the solver asked for. Raises UnknownSolver."""
         from ..evaluate.door import Door
 
-        door = Door(loaded, self.solver)
+        door = Door(loaded, self.solver, command=self.solver_command)
         door.solver  # noqa: B018  a solver that is not there is refused before anything is written
         return door
 
-    def run(self, case: Path, command: str, door: Door, results: str = "") -> Run:
-        """The command's run, with the record behind ``door``; ``results``: key of those that it
-        renews, where it is not ``command``. Raises OutputRefused, Locked, OSError."""
+    def run(
+        self,
+        case: Path,
+        command: str,
+        door: Door,
+        study: str = "",
+        measured: Sequence[Path] = (),
+        **state: Any,
+    ) -> Run:
+        """The command's run, with the record behind ``door``; ``study``: where it is not
+        ``command``; measured, state: of the results' `provenance`. Raises OutputRefused, Locked,
+        OSError."""
+        from ..provenance import provenance
         from .output import Run
 
-        run = Run(case, self.output, command, door.solver)
-        run.renew(results or command)
+        block = provenance(door.case, door.solver, measured, **state)
+        run = Run(case, self.output, command, door.solver, study, block)
         door.folder, door.keep = run.runs, self.talk.verbose
         door.store = run.open_store(self.store, self.no_store)
         run.counts = counts = door.counts
         words = "{0.runs} runs of the solver, {0.recorded} answers from the record"
         context = click.get_current_context()
         context.call_on_close(lambda: self.talk.detail(words.format(counts)))
+        context.call_on_close(lambda: self._say_earlier(run))
         return run
+
+    def _say_earlier(self, run: Run) -> None:
+        """Say whose results are in the folder after a run that failed."""
+        if run.has_earlier:
+            self.talk.note(
+                f"results of '{run.study}' in '{run.folder}' are those of an earlier run"
+            )
 
     def finish(self, run: Run) -> None:
         """Say where the results are; see `page`."""
-        self.talk.say(f"results in {run.folder}")
+        self.talk.say(f"results in {run.placed}")
         self.page(run)
 
     def page(self, run: Run) -> None:
@@ -253,8 +292,8 @@ class Study:
         if self.report:
             from ..report.html.page import write_page
 
-            path = run.folder / "report.html"
-            write_page(path, [run.folder])
+            path = run.placed / "report.html"
+            write_page(path, [run.placed])
             self.talk.say(f"report in {path}")
 
 
@@ -274,8 +313,8 @@ def _talk(as_json: bool, quiet: bool, verbose: bool) -> Talk:
 
 def fitted(text: str) -> Callable[[Any], Any]:
     """A finished fit whose design is studied too; ``text``: the option's help."""
-    path = click.Path(path_type=Path, exists=True, dir_okay=False)
-    return click.option("--fitted", type=path, metavar="fit.json", help=text)
+    path = click.Path(path_type=Path, exists=True)
+    return click.option("--fitted", type=path, metavar="fit.json|DIR", help=text)
 
 
 def load(
@@ -284,14 +323,16 @@ def load(
     assigned: tuple[str, ...],
     pressure_kPa: float | None,
     talk: Talk,
+    allow_unusual: bool = False,
 ) -> Any:
     """The case with its start values, mesh level, assignments and pressure applied.
 
     Says which numbers of the file do not count. Returns (case, values of the variables). Raises
-    CaseError, click.UsageError.
+    CaseError, click.UsageError; both for numbers that no tyre has, too, unless they are allowed.
     """
     from ..case import (
         load_case,
+        overridden,
         overruled,
         parse_assignment,
         start_values,
@@ -300,7 +341,7 @@ def load(
     )
     from ..case.load import CaseError
 
-    case = load_case(path)
+    case = load_case(path, allow_unusual)
     try:
         if mesh_level:
             case = with_level(case, mesh_level)
@@ -313,13 +354,28 @@ def load(
                 )
         for sentence in overruled(case, given):
             talk.note(sentence)
-        case = with_values(case, {k: v for k, v in given.items() if k not in names})
+        case = overridden(case, given)
         values = {**start_values(case), **{k: v for k, v in given.items() if k in names}}
-        return with_values(case, values), values
+        case = with_values(case, values)
+        for name, value in given.items():
+            option = f"--set {name}={value:g}"
+            if name == "pressure_kPa" and value == pressure_kPa:
+                option = f"--pressure-kPa {value:g}"
+            refuse_unusual(case, option, name, value, allow_unusual)
+        return case, values
     except CaseError:
         raise
     except ValueError as error:
         raise click.UsageError(str(error)) from None
+
+
+def refuse_unusual(loaded: Any, option: str, name: str, value: float, allowed: bool) -> None:
+    """Raises click.UsageError where nobody states such a value of the variable, or number by its
+    path, ``name``, unless it is ``allowed``. option: where it is stated."""
+    from ..case import unusual_value
+
+    if not allowed and (message := unusual_value(loaded, name, value)):
+        raise click.UsageError(f"{option}: {message}")
 
 
 def given() -> list[str]:
@@ -335,20 +391,36 @@ def given() -> list[str]:
 
 def say_idle(talk: Talk, jobs: int, why: str) -> None:
     """Says that --jobs asks for workers who have nothing to do: scripts may give it everywhere."""
-    if jobs > 1:
+    if jobs > 1 and not _by_settings("jobs"):
         talk.note(f"--jobs changes nothing here: {why}")
+
+
+def _by_settings(option: str) -> bool:
+    """Whether nobody gave an option but the user's settings."""
+    source = click.get_current_context().get_parameter_source(option)
+    return source is ParameterSource.DEFAULT_MAP
+
+
+def _words(command: str | None) -> tuple[str, ...]:
+    """The words of --solver-command. Raises BadSettings."""
+    if command is None:
+        return ()
+    from ..settings import words
+
+    return tuple(words(command, "--solver-command"))
 
 
 def not_both(jobs: int, scheduler: str) -> None:
     """Raises click.UsageError where this machine and a scheduler's are asked for."""
-    if scheduler and jobs > 1:
+    if scheduler and jobs > 1 and not _by_settings("jobs"):
         raise click.UsageError("--jobs is for this machine; with --scheduler its workers count")
 
 
 def parse_loads(text: str, option: str = "--loads-N", zero: bool = False) -> list[float]:
     """Loads in N; ``zero``: 0 may be the first. Raises click.UsageError."""
     from itertools import pairwise
-    from math import isfinite
+
+    from ..case.analysis import LARGEST_LOAD_N, LEAST_LOAD_N
 
     loads: list[float] = []
     for word in text.split(","):
@@ -356,35 +428,58 @@ def parse_loads(text: str, option: str = "--loads-N", zero: bool = False) -> lis
             loads.append(float(word))
         except ValueError:
             raise click.UsageError(f"{option}: '{word.strip()}' is not a number") from None
-        allowed = loads[-1] > 0 or (zero and loads == [0.0])
-        if not (isfinite(loads[-1]) and allowed):
-            raise click.UsageError(f"{option} {loads[-1]:g}: must be a finite load above 0")
+        if not (LEAST_LOAD_N <= loads[-1] <= LARGEST_LOAD_N or (zero and loads == [0.0])):
+            raise click.UsageError(
+                f"{option} {loads[-1]:g}: must be a finite load above 0, of {LEAST_LOAD_N:g} to"
+                f" {LARGEST_LOAD_N:g} N"
+            )
     for before, after in pairwise(loads):
         if after <= before:
             raise click.UsageError(f"{option}: {after:g} after {before:g}, loads must rise")
     return loads
 
 
-def parse_pressures(low: float, high: float, steps: int) -> tuple[float, ...]:
-    """Equidistant pressures in kPa, both ends among them. Raises click.UsageError."""
+def refuse_unusual_loads(loaded: Any, option: str, loads: Sequence[float], allowed: bool) -> None:
+    """`refuse_unusual` of loads, N, by the tyre's size and pressure; 0 is no load."""
+    for load in loads:
+        if load:
+            refuse_unusual(loaded, f"{option} {load:g}", "road.loads_N.0", load, allowed)
+
+
+def parse_pressures(low: float, high: float, steps: int, allowed: bool) -> tuple[float, ...]:
+    """Equidistant pressures in kPa, both ends among them; ``allowed``: unusual ones too. Raises
+    click.UsageError."""
     from math import isfinite
+
+    from ..case.guard import ALL_THE_SAME
+    from ..case.usual import USUAL
 
     for option, value in (("--from-kPa", low), ("--to-kPa", high)):
         if not (isfinite(value) and value > 0):
             raise click.UsageError(f"{option} {value:g}: must be a finite pressure above 0")
+        if not allowed and (message := USUAL["pressure_kPa"].refusal(value)):
+            raise click.UsageError(f"{option} {value:g}: {message}{ALL_THE_SAME}")
     if low >= high:
         raise click.UsageError(f"--from-kPa {low:g} must be less than --to-kPa {high:g}")
     return tuple(round(low + (high - low) * i / (steps - 1), 9) for i in range(steps))
 
 
-def fitted_values(path: Path, loaded: Any, solver: str) -> dict[str, float]:
-    """The design of a fit.json. Raises click.UsageError where it is not this case's."""
+def fitted_values(path: Path, loaded: Any, talk: Talk) -> dict[str, float]:
+    """The design of a fit.json, or of the one in a results folder; says how the fit was made
+    otherwise. Raises click.UsageError where it is not this case's."""
     from ..studies.fitted import NotThisFit, read_fitted
 
+    if path.is_dir():
+        folder, path = path, path / "fit.json"
+        if not path.is_file():
+            raise click.UsageError(f"--fitted: there is no fit.json in the folder '{folder}'")
     try:
-        return read_fitted(path, loaded, solver)
+        values, otherwise = read_fitted(path, loaded)
     except NotThisFit as error:
         raise click.UsageError(f"--fitted: {error}") from None
+    for sentence in otherwise:
+        talk.note(f"--fitted: {sentence}")
+    return values
 
 
 def _once(pairs: list[tuple[str, float]], pressure_kPa: float | None) -> dict[str, float]:

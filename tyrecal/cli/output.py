@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import contextlib
-import json
+import os
 import platform
+import shutil
 import sys
+import tempfile
 import time
 from datetime import UTC, datetime
 from pathlib import Path
@@ -13,7 +15,22 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..files import forget_previous, json_text, set_aside, write_text
+from ..files import (
+    PREVIOUS,
+    RESULTS,
+    RUN,
+    json_text,
+    own_folder,
+    read_runs,
+    refuse_link,
+    results,
+    take_place,
+    write_runs,
+    write_text,
+)
+from ..interrupt import interrupts_put_off
+from ..provenance import stamped
+from ..settings import root
 from . import lock
 from .talk import resume
 
@@ -22,34 +39,54 @@ if TYPE_CHECKING:
     from ..evaluate.store import Store
 
 
+NEW = ".new-"  # folder of a run's results until all are there
+
+
 class OutputRefused(ValueError):
     """The results folder belongs to another case."""
 
 
 class Run:
-    """One command's run: its folder, locked until the command ends, and run.json, which holds
-    all that differs between runs.
+    """One command's run: its folder, locked until the command ends, and its study's entry in
+    run.json, which holds all that differs between runs.
 
-    Raises OutputRefused where the folder holds another case's results; Locked; OSError.
+    Results are written to a folder of their own, ``new``; those of the study's last run stay in
+    their place until all new ones are there (`finish`), and where the run fails. Raises
+    OutputRefused where the folder holds another case's results; Locked; OSError.
     """
 
-    def __init__(self, case: Path, output: Path | None, command: str, solver: Any = None):
+    def __init__(
+        self,
+        case: Path,
+        output: Path | None,
+        command: str,
+        solver: Any = None,
+        study: str = "",
+        provenance: dict[str, Any] | None = None,
+    ):
         self.case, self.command, self.solver = case.resolve(), command, solver
-        self.folder = output or Path(case.stem)
+        self.study, self.provenance = study or command, provenance
+        self.folder = self.placed = output or root() / case.stem
         self.started = datetime.now(UTC).isoformat(timespec="seconds")
-        self._clock, self._finished, self._renewed = time.monotonic(), False, ""
+        self._clock, self._finished = time.monotonic(), False
         self.store: Store | None = None
         self.counts: Counts | None = None
+        resume("nothing was computed; the same command starts from the beginning")
         if self.folder.exists() and not self.folder.is_dir():
             raise OutputRefused(f"'{self.folder}' is a file; give a folder with --output")
         self.folder.mkdir(parents=True, exist_ok=True)
         self._lock = lock.lock(self.folder, command, self.started)
         click.get_current_context().call_on_close(self._close)
+        for own in (self.runs, self.folder / PREVIOUS):
+            refuse_link(own)
         refuse_other(self.folder, self.case)
-        if self._lock and solver:
-            from ..evaluate.folders import drop_unfinished
+        if self._lock:
+            drop_new(self.folder)
+            if solver:
+                from ..evaluate.folders import drop_unfinished
 
-            drop_unfinished(self.runs)
+                drop_unfinished(self.runs)
+        self.new = Path(tempfile.mkdtemp(prefix=NEW, dir=self.folder))
         self._write_facts()
         click.get_current_context().call_on_close(self._say_unfinished)
 
@@ -59,6 +96,8 @@ class Run:
         if not none:
             from ..evaluate.store import Store
 
+            if not folder:
+                refuse_link(self.folder / "record")
             self.store = Store((folder or self.folder / "record").resolve())
             words = (
                 f"evaluations that had finished are on record in '{self.store.folder}'; the same"
@@ -67,31 +106,38 @@ class Run:
         resume(words)
         return self.store
 
-    def write_json(self, name: str, content: Any) -> Path:
-        """Write a result file whole or not at all."""
-        return self.write_text(name, json_text(content))
+    def write_json(self, name: str, content: Any) -> Any:
+        """Write a result file with its provenance; returns what stands in it."""
+        if self.provenance:
+            content = stamped(content, self.provenance)
+        self.write_text(name, json_text(content))
+        return content
 
-    def write_text(self, name: str, text: str) -> Path:
-        """Write a result file whole or not at all."""
-        write_text(self.folder / name, text)
-        return self.folder / name
+    def write_text(self, name: str, text: str) -> None:
+        """Write a result file."""
+        write_text(self.new / name, text)
 
     @property
     def runs(self) -> Path:
         """Where the solver's run folders go."""
         return self.folder / "runs"
 
-    def renew(self, study: str) -> None:
-        """Set aside an earlier run's results of ``study`` until this is done. Raises OSError."""
-        set_aside(self.folder, study)
-        self._renewed = study
+    @property
+    def has_earlier(self) -> bool:
+        """Whether an earlier run of the study has left results, and this one none."""
+        return not self._finished and any(results(self.folder, self.study))
 
-    def finish(self, **facts: Any) -> None:
-        """Write run.json: command, times, host, versions, and what else is volatile."""
-        self._finished = True
-        self._write_facts(**facts)
-        if self._renewed:
-            forget_previous(self.folder, self._renewed)
+    def finish(self, aside: str = "", **facts: Any) -> None:
+        """Have the results take their place, or stand in the folder ``aside`` of the results, and
+        write run.json: command, times, host, versions, and what else is volatile."""
+        if aside:
+            self.placed = self.folder / aside
+            own_folder(self.placed)
+        with interrupts_put_off():
+            if self.study in RESULTS:
+                take_place(self.new, self.placed, self.study)
+            self._finished = True
+            self._write_facts(**({"results": aside} if aside else {}), **facts)
 
     def _write_facts(self, **facts: Any) -> None:
         import tyrecal
@@ -100,24 +146,22 @@ class Run:
             "solver_runs": self.counts.runs,
             "answered_from_record": self.counts.recorded,
         }
-        self.write_json(
-            "run.json",
-            {
-                "case": str(self.case),
-                "command": self.command,
-                "arguments": sys.argv[1:],
-                "started": self.started,
-                "finished": self._finished,
-                "seconds": round(time.monotonic() - self._clock, 3),
-                "host": platform.node(),
-                "python": platform.python_version(),
-                "tyrecal": tyrecal.__version__,
-                "solver": f"{self.solver.name} {self.solver.version}" if self.solver else None,
-                "record": str(self.store.folder) if self.store else None,
-                **(counts or {}),
-                **facts,
-            },
-        )
+        entry = {
+            "case": str(self.case),
+            "command": self.command,
+            "arguments": sys.argv[1:],
+            "started": self.started,
+            "finished": self._finished,
+            "seconds": round(time.monotonic() - self._clock, 3),
+            "host": platform.node(),
+            "python": platform.python_version(),
+            "tyrecal": tyrecal.__version__,
+            "solver": f"{self.solver.name} {self.solver.version}" if self.solver else None,
+            "record": str(self.store.folder) if self.store else None,
+            **(counts or {}),
+            **facts,
+        }
+        write_runs(self.folder, {self.study: entry})
 
     def _say_unfinished(self) -> None:
         if not self._finished:
@@ -125,26 +169,31 @@ class Run:
                 self._write_facts()
 
     def _close(self) -> None:
-        with contextlib.suppress(OSError):  # it holds failures, or was never made
-            self.runs.rmdir()
+        with interrupts_put_off():
+            if hasattr(self, "new"):
+                shutil.rmtree(self.new, ignore_errors=True)
+            with contextlib.suppress(OSError):  # it holds failures, or was never made
+                self.runs.rmdir()
         if self.store:
             self.store.prune()
         if self._lock:
             self._lock.close()
 
 
+def drop_new(folder: Path) -> None:
+    """Remove what a killed run had written so far; call it where none can be at work."""
+    for left in folder.glob(f"{NEW}*"):
+        shutil.rmtree(left, ignore_errors=True)  # which leaves a link alone
+
+
 def refuse_other(folder: Path, case: Path) -> None:
-    """Raises OutputRefused where ``folder`` holds results of another case than ``case``."""
-    record = folder / "run.json"
-    if not record.exists():
+    """Raises OutputRefused where ``folder`` holds results of another case than ``case``;
+    OSError where its run.json is no file."""
+    if not os.path.lexists(folder / RUN):
         return
-    try:
-        facts = json.loads(record.read_text(encoding="utf-8"))
-    except ValueError:
-        facts = None
-    facts = facts if isinstance(facts, dict) else {}
-    owner = facts.get("case")
-    if owner != str(case) and not _moved(facts, case):
+    found = list(read_runs(folder).values())
+    if not any(facts.get("case") == str(case) or _moved(facts, case) for facts in found):
+        owner = next((facts.get("case") for facts in found), None)
         raise OutputRefused(
             f"folder '{folder}' holds results of {owner or 'something else'};"
             " give another one with --output"

@@ -55,7 +55,7 @@ class Progress:
     def _state(self, now: float) -> str:
         bad = f"{self.bad} not good, " if self.bad else ""
         left = seconds_left(now - self.began, self.run, self.total - self.done)
-        return bad + (f"{_clock(left)} left" if left is not None else "answered from results")
+        return bad + (f"{clock(left)} left" if left is not None else "answered from results")
 
 
 def seconds_left(elapsed_s: float, run: int, left: int) -> float | None:
@@ -66,7 +66,8 @@ def seconds_left(elapsed_s: float, run: int, left: int) -> float | None:
     return elapsed_s * left / run if run else None
 
 
-def _clock(seconds: float) -> str:
+def clock(seconds: float) -> str:
+    """Minutes and seconds, with hours where there are some."""
     minutes, rest = divmod(round(seconds), 60)
     hours, minutes = divmod(minutes, 60)
     return f"{hours}:{minutes:02d}:{rest:02d}" if hours else f"{minutes}:{rest:02d}"

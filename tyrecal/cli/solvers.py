@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import shlex
+from typing import Any
+
 import click
 
 from . import options
@@ -11,7 +14,8 @@ from .talk import Talk
 @click.command()
 @options.talking
 def command(talk: Talk) -> int:
-    """List the installed solvers: version, what they can do, why one cannot be used.
+    """List the installed solvers: version, what they can do, why one cannot be used, which program
+    each starts, and the settings file that says so.
 
     \b
     tyrecal solvers
@@ -23,4 +27,38 @@ def command(talk: Talk) -> int:
     found = installed()
     talk.result(found)
     talk.show(solvers_table(found))
+    if not talk.as_json:
+        for solver in found:
+            if solver["command"]:
+                talk.say(f"{solver['name']}{command_words(solver)}")
+        talk.say(f"settings: {settings_words(settings_file())}")
     return 0
+
+
+def settings_file() -> dict[str, Any]:
+    """``file`` of the user's settings, or None; ``there``: whether it is; ``problem``, or None."""
+    from ..settings import BadSettings, place, settings
+
+    path, problem = place(), None
+    try:
+        settings()
+    except BadSettings as error:
+        problem = str(error)
+    there = path is not None and path.exists()
+    return {"file": str(path) if path else None, "there": there, "problem": problem}
+
+
+def settings_words(found: dict[str, Any]) -> str:
+    """The same in words."""
+    if found["file"] is None:
+        return "none (TYRECAL_SETTINGS is empty)"
+    return found["problem"] or found["file"] + ("" if found["there"] else " (not there)")
+
+
+def command_words(solver: dict[str, Any]) -> str:
+    """The program that a solver of `installed` starts, and who says so."""
+    if not solver["command"]:
+        return ""
+    origin = solver["command_from"]
+    whose = "its default" if origin == "default" else f"from {origin}"
+    return f" starts '{shlex.join(solver['command'])}', {whose}"

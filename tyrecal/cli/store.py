@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from . import options
-from .talk import Talk
+from .talk import Talk, resume
 
 
 @click.command()
@@ -35,8 +35,12 @@ def command(folder: Path, verify: bool, prune: float | None, talk: Talk) -> int:
     tyrecal store p235_75r17 --verify --prune 100
     """
     from ..evaluate.store import Store
+    from ..files import refuse_link
 
+    if verify or prune is not None:
+        resume("what was removed by then is evaluated anew when it is needed")
     own = folder / "record"
+    refuse_link(own)
     store = Store(own if own.is_dir() else folder, opened=float("inf"))
     removed = None if prune is None else store.prune(round(1e6 * prune))
     found = store.summary(verify)

@@ -9,16 +9,17 @@ import click
 
 from . import options
 from .main import EXIT_SOLVER
+from .taken import taken
 
 
 @click.command()
-@options.every(options.case_argument, options.assignments)
+@options.every(options.case_or_last, options.assignments)
 @options.pressures
 @options.fitted("Sweep the design that 'tyrecal fit' found for this case, too.")
 @click.option("--pictures/--no-pictures", default=True, help="Draw frequencies over pressure.")
 @options.study
 def command(
-    case: Path,
+    case: Path | None,
     assignments: tuple[str, ...],
     from_kPa: float,
     to_kPa: float,
@@ -31,8 +32,10 @@ def command(
 
     Writes pressure_sweep.json, .csv and .png: frequencies, their slopes d ln f / d ln p, and what
     they say. --set NAME=VALUE on a variable changes the initial design, on any other number both.
+    Without CASE it is that of the last fit here, whose design is swept too, or the only one here.
 
     \b
+    tyrecal sweep-pressure
     tyrecal sweep-pressure cases/p235_75r17.yaml
     tyrecal sweep-pressure cases/p235_75r17.yaml --fitted p235_75r17/fit.json --jobs 2
     tyrecal sweep-pressure cases/p235_75r17.yaml --from-kPa 180 --to-kPa 260 --steps 5 --json
@@ -44,13 +47,14 @@ def command(
     from ..studies.pressure_result import sweep_result
 
     talk = study.talk
+    case, fitted, study = taken(case, fitted, study)
     loaded, values = study.load(case, assignments)
-    pressures = _pressures(loaded, assignments, from_kPa, to_kPa, steps)
+    pressures = _pressures(loaded, assignments, from_kPa, to_kPa, steps, study.allow_unusual)
     door = study.door(loaded)
     designs = {"initial": values}
     if fitted:
-        designs["fitted"] = options.fitted_values(fitted, loaded, study.solver)
-    run = study.run(case, "sweep-pressure", door)
+        designs["fitted"] = options.fitted_values(fitted, loaded, talk)
+    run = study.run(case, "sweep-pressure", door, pressure_kPa=pressures)
 
     def notify(outcome: Outcome) -> None:
         place = f"{outcome.design}, {outcome.pressure_kPa:g} kPa"
@@ -66,11 +70,11 @@ def command(
     if len(failed) == len(outcomes):
         return EXIT_SOLVER
     result = sweep_result(loaded, designs, outcomes)
-    run.write_json("pressure_sweep.json", result)
+    result = run.write_json("pressure_sweep.json", result)
     run.write_text("pressure_sweep.csv", sweep_csv(result["rows"]))
     if pictures:
         targets = {each.label: each.frequency_Hz for each in read_targets(loaded)}
-        picture = run.folder / "pressure_sweep.png"
+        picture = run.new / "pressure_sweep.png"
         draw_pressure_sweep(picture, result["rows"], targets, loaded.case.pressure_kPa)
     run.finish()
     talk.result(result)
@@ -86,7 +90,12 @@ def command(
 
 
 def _pressures(
-    loaded: Any, assignments: tuple[str, ...], low: float, high: float, steps: int
+    loaded: Any,
+    assignments: tuple[str, ...],
+    low: float,
+    high: float,
+    steps: int,
+    allow_unusual: bool,
 ) -> list[float]:
     """The pressures of the sweep, kPa. Raises click.UsageError."""
     from ..case import parse_assignment, with_values
@@ -97,7 +106,7 @@ def _pressures(
         raise click.UsageError(
             f"--set {name}: the sweep sets the pressure, by --from-kPa, --to-kPa"
         )
-    pressures = options.parse_pressures(low, high, steps)
+    pressures = options.parse_pressures(low, high, steps, allow_unusual)
     for option, value in (("--from-kPa", low), ("--to-kPa", high)):
         try:
             with_values(loaded, {name: value})

@@ -6,14 +6,16 @@ import logging
 import os
 import re
 import sys
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
 import click
 
-from ..files import json_text
+from ..files import json_text, printable
+from .progress import BETWEEN_S, clock
 
 SOLVERS = "tyrecal_solvers"  # logger of the solvers that ship
 RESUME = "tyrecal.resume"  # key of the context's notes: how to go on after Ctrl-C
@@ -27,17 +29,32 @@ def coloured() -> bool | None:
 
 def error(text: str) -> None:
     """What went wrong, in red on a terminal."""
-    _echo(click.style(f"error: {text}", fg="red"), err=True, color=coloured())
+    say(click.style(f"error: {_plain(text)}", fg="red"), err=True, color=coloured())
 
 
-def _echo(text: str, err: bool = False, **how: Any) -> None:
-    """Print; a reader that has closed the pipe (`| head`) misses the rest, and costs no result."""
-    try:
+def _plain(text: str) -> str:
+    """Lines without control characters: names and words may come from a stranger's files."""
+    return "\n".join(map(printable, text.split("\n")))
+
+
+def say(text: str, err: bool = False, **how: Any) -> None:
+    """Print. Raises OSError where standard output is a file on a full disc."""
+    with _reaching(err):
         click.echo(text, err=err, **how)
-    except BrokenPipeError:
+
+
+@contextmanager
+def _reaching(err: bool) -> Iterator[None]:
+    """A reader that has closed the pipe (`| head`) misses the rest, and costs no result. Where
+    standard error is full, or its terminal gone, nobody can be told."""
+    try:
+        yield
+    except OSError as error:
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, (sys.stderr if err else sys.stdout).fileno())
         os.close(nowhere)
+        if not err and not isinstance(error, BrokenPipeError):
+            raise OSError(error.errno, error.strerror, "standard output") from None
 
 
 def resume(words: str) -> None:
@@ -60,12 +77,12 @@ class Talk:
     def say(self, text: str) -> None:
         """A line of the result, for people: on standard error beside JSON."""
         if not self.quiet:
-            _echo(text, err=self.as_json)
+            say(_plain(text), err=self.as_json)
 
     def note(self, text: str) -> None:
         """A remark on the result, always on standard error."""
         if not self.quiet:
-            _echo(text, err=True)
+            say(_plain(text), err=True)
 
     def show(self, table: Any, beside_json: bool = False) -> None:
         """A table of the result, for people; beside JSON, which holds the same, only on demand."""
@@ -76,94 +93,150 @@ class Talk:
         console = Console(stderr=self.as_json)
         if not console.is_terminal:
             console = Console(stderr=self.as_json, width=110)
-        with console.capture() as text:  # rich answers a closed pipe by leaving the process
+        with (
+            _reaching(self.as_json),
+            console.capture() as text,
+        ):  # rich answers a closed pipe by leaving the process
             console.print(table)
-        _echo(text.get(), nl=False, err=self.as_json, color=coloured())
+        say(text.get(), nl=False, err=self.as_json, color=coloured())
 
     def result(self, content: Any) -> None:
         """The result for programs, where they ask for it."""
         if self.as_json:
-            _echo(json_text(content), nl=False)
+            say(json_text(content), nl=False)
 
     def detail(self, text: str) -> None:
         """What only --verbose wants to know."""
         if self.verbose:
-            _echo(text, err=True)
+            say(_plain(text), err=True)
 
     def warn(self, text: str) -> None:
         """What must not be overlooked."""
-        _echo(click.style(text, fg="yellow"), err=True, color=coloured())
+        say(click.style(_plain(text), fg="yellow"), err=True, color=coloured())
 
     def error(self, text: str) -> None:
         """What went wrong and does not end the command."""
         error(text)
 
     @contextmanager
-    def progress(self, what: str) -> Iterator[Progress]:
-        """A bar with the time left, while it lasts: on standard error, only on a terminal."""
-        if self.quiet or not sys.stderr.isatty() or os.environ.get("TERM") == "dumb":
-            yield Progress()
+    def progress(self, what: str, stages: Sequence[str] = ()) -> Iterator[Progress]:
+        """How far ``what`` is while it lasts, on standard error: a bar on a terminal, elsewhere a
+        line for each of its ``stages`` and now and then one more; nothing with --quiet."""
+        if self.quiet:
+            yield Progress(what)
+            return
+        if not sys.stderr.isatty() or os.environ.get("TERM") == "dumb":
+            with _listening(Progress(what, stages, self.note)) as progress:
+                progress.begin("")
+                yield progress
             return
         from rich.console import Console
-        from rich.progress import (
-            BarColumn,
-            MofNCompleteColumn,
-            TextColumn,
-            TimeElapsedColumn,
-            TimeRemainingColumn,
-        )
+        from rich.progress import BarColumn, MofNCompleteColumn, ProgressColumn, TextColumn
         from rich.progress import Progress as Bar
+        from rich.text import Text
 
-        with Bar(
-            TextColumn("{task.description}", markup=False),
-            BarColumn(bar_width=20),
-            MofNCompleteColumn(),
-            TimeElapsedColumn(),
-            TextColumn("left"),
-            TimeRemainingColumn(),
-            console=Console(stderr=True),
-            transient=True,
-            speed_estimate_period=3600.0,  # an evaluation can take minutes
-        ) as bar:
-            progress = Progress(bar, bar.add_task(what, total=None), what)
-            listener = _Loads(progress)
-            log = logging.getLogger(SOLVERS)
-            level = log.level
-            log.addHandler(listener)
-            log.setLevel(logging.INFO)
-            try:
-                yield progress
-            finally:
-                log.removeHandler(listener)
-                log.setLevel(level)
+        class Clock(ProgressColumn):
+            """Goes on between two designs."""
+
+            def render(self, task: Any) -> Text:
+                return Text(shown.clock(time.monotonic()))
+
+        shown = Progress(what, stages)
+        with (
+            Bar(
+                TextColumn("{task.description}", markup=False),
+                BarColumn(bar_width=20),
+                MofNCompleteColumn(),
+                Clock(),
+                console=Console(stderr=True),
+                transient=True,
+            ) as bar,
+            _listening(shown),
+        ):
+            shown.show_on(bar)
+            yield shown
+
+
+@contextmanager
+def _listening(progress: Progress) -> Iterator[Progress]:
+    listener = _Loads(progress)
+    log = logging.getLogger(SOLVERS)
+    level = log.level
+    log.addHandler(listener)
+    log.setLevel(logging.INFO)
+    try:
+        yield progress
+    finally:
+        log.removeHandler(listener)
+        log.setLevel(level)
 
 
 class Progress:
-    """How far the work is; does nothing where nobody looks."""
+    """How far the work is: on a ``bar``, or by lines that ``say`` gets; else does nothing."""
 
-    def __init__(self, bar: Any = None, task: Any = None, what: str = ""):
-        self._bar, self._task, self._what, self._done, self._total = bar, task, what, 0, 0
+    def __init__(
+        self,
+        what: str,
+        stages: Sequence[str] = (),
+        say: Callable[[str], None] | None = None,
+    ):
+        self._what, self._stages, self._say = what, stages, say
+        self._bar: Any = None
+        self._task: Any = None
+        self._done, self._total, self._began = 0.0, 0, time.monotonic()
+        self._of_stage = self._said = self._began
+
+    def show_on(self, bar: Any) -> None:
+        """From here on, on a rich bar."""
+        self._bar, self._task = bar, bar.add_task(self._what, total=None)
+
+    def begin(self, stage: str) -> None:
+        """A stage begins, one of ``stages``; without any, the whole."""
+        if stage in self._stages:
+            place = f"stage {self._stages.index(stage) + 1} of {len(self._stages)}"
+            self._what = f"{place}, {stage}"
+        if self._say and (stage or not self._stages):
+            self._said = time.monotonic()
+            self._say(f"{self._what} ...")
+        self._reset(0)
 
     def at(self, done: int, total: int) -> None:
         """``done`` of ``total`` are finished; another total is another piece of work."""
-        if self._bar is None:
-            return
         if total != self._total or not done:
-            self._bar.reset(self._task, total=total)
-            self._total = total
-        self._done = done
-        self._bar.update(self._task, completed=done, description=self._what)
+            self._reset(total)
+        self._show(done, self._what)
 
     def within(self, done: int, total: int) -> None:
         """``done`` of ``total`` parts of the next one are finished."""
-        if self._bar is not None and done < total:
-            self.words(f"{self._what}, load {done + 1} of {total}")
-            self._bar.update(self._task, completed=self._done + done / total)
+        if done < total:
+            whole = int(self._done)
+            self._show(whole + done / total, f"{self._what}, load {done + 1} of {total}")
 
     def words(self, text: str) -> None:
         """What is being done, in a few words."""
-        if self._bar is not None:
-            self._bar.update(self._task, description=f"{text:.60}")
+        self._show(self._done, f"{text:.60}")
+
+    def _reset(self, total: int) -> None:
+        self._done, self._total, self._of_stage = 0.0, total, time.monotonic()
+        if self._bar:
+            self._bar.reset(self._task, total=total or None)
+
+    def _show(self, done: float, words: str) -> None:
+        self._done, now = done, time.monotonic()
+        if self._bar:
+            self._bar.update(self._task, completed=done, description=words)
+        elif self._say and now > self._said + BETWEEN_S:
+            self._said = now
+            count = f", {int(done)} of {self._total} done" if self._total else ""
+            self._say(f"{words}{count}, {self.clock(now)}")
+
+    def clock(self, now: float) -> str:
+        """What has elapsed of all and, once something is done, is left of this stage."""
+        elapsed = f"{clock(now - self._began)} elapsed"
+        if not 0 < self._done < self._total:
+            return elapsed
+        left = (now - self._of_stage) * (self._total / self._done - 1)
+        return f"{elapsed}, {clock(left)} left" + (" in this stage" if self._stages else "")
 
 
 class _Loads(logging.Handler):
@@ -177,3 +250,5 @@ class _Loads(logging.Handler):
         found = re.match(r"load (\d+) of (\d+)", record.getMessage())
         if found:
             self.progress.within(int(found[1]), int(found[2]))
+        elif " N are reached" in record.getMessage():  # on the way to a load
+            self.progress.words(record.getMessage())

@@ -13,9 +13,12 @@ from .talk import Talk
 
 @click.command()
 @options.case_argument
+@options.allow_unusual
 @options.talking
-def command(case: Path, talk: Talk) -> int:
+def command(case: Path, allow_unusual: bool, talk: Talk) -> int:
     """Check CASE and report every mistake: file, line, key, value, what would be right.
+
+    Numbers that no tyre has are mistakes, too: most often they stand in another unit.
 
     \b
     tyrecal validate cases/p235_75r17.yaml
@@ -23,7 +26,7 @@ def command(case: Path, talk: Talk) -> int:
     """
     from ..case import load_case, overruled, validate
 
-    mistakes = validate(case)
+    mistakes = validate(case, allow_unusual)
     for mistake in mistakes:
         talk.error(str(mistake))
     talk.result(
@@ -40,7 +43,10 @@ def command(case: Path, talk: Talk) -> int:
     )
     if mistakes:
         return EXIT_INPUT
-    for sentence in overruled(load_case(case)):
+    loaded = load_case(case, allow_unusual)
+    for sentence in overruled(loaded):
         talk.warn(sentence)
     talk.say(f"{case}: no mistakes")
+    if not loaded.case.targets.weights:
+        talk.note("it has no targets: 'tyrecal fit' needs some, or --measured FILE")
     return 0

@@ -6,7 +6,7 @@ import math
 from functools import lru_cache
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from jinja2 import BaseLoader, ChoiceLoader, Environment, FileSystemLoader, StrictUndefined
 from jinja2.exceptions import SecurityError, TemplateSyntaxError
@@ -56,8 +56,17 @@ def environment(dialect: str, own_folder: Path | None) -> Environment:
     return made
 
 
-def render(env: Environment, template: str, names: dict[str, Any]) -> str:
+class Templates(Protocol):
+    """Templates that are rendered elsewhere, see `apart`."""
+
+    def render(self, template: str, names: dict[str, Any]) -> str:
+        """The text of a template. Raises TemplateFailed."""
+
+
+def render(env: Environment | Templates, template: str, names: dict[str, Any]) -> str:
     """The text of a template. Raises TemplateFailed."""
+    if not isinstance(env, Environment):
+        return env.render(template, names)
     try:
         return env.get_template(template).render(names)
     except TemplateFailed as error:

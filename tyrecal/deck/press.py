@@ -16,6 +16,7 @@ from typing import Any
 from ..case import LoadedCase
 from .calculix import calculix_context
 from .environment import render
+from .header import header
 from .sector import Sector
 
 OUTER_FACE = "S4"  # a brick's face over side 2 of the section's element
@@ -79,7 +80,8 @@ def press_texts(
     names["corners"] = [(x, y, z) for x in (radius, 1.1 * radius) for y, z in square]
     names["travels"] = [(d, inflated_radius_m - d - radius) for d in deflections_m]
     names["road"], names["largest_increment"] = asdict(road or Road()), largest_increment
-    return {f"{name}.inp": render(env, f"{name}.inp.j2", names) for name in ("wheel", "press")}
+    jobs = ("wheel", "press")
+    return {f"{name}.inp": header(case) + render(env, f"{name}.inp.j2", names) for name in jobs}
 
 
 def around(names: dict[str, Any], angles: Angles) -> dict[str, Any]:

@@ -10,15 +10,21 @@ from typing import Any
 
 from ..case import LoadedCase, number_at, with_values
 from ..effects import catalogue, with_effects
+from .apart import Apart
 from .beside import beside_the_deck
 from .calculix import calculix_context
 from .context import context
 from .environment import TemplateFailed, environment, render
+from .header import header
 
 ELEMENTS_A_WAVE = 7.5  # of quadratic ones: the frequencies are right to 0.4 %
 NEAR_ZERO = 1e-4  # of a variable's span: below, steps are shares of this
 STEP = 1e-4  # of a variable, to see which numbers of the deck it moves and how fast
 
+OUTSIDE = re.compile(  # but for comments: an absolute path or one upwards, code of one's own
+    r"^(?!\*\*).*=[ \t]*[\"']?(?:[/\\~@]|\.\.|[a-z]:[/\\]).*|^\*[ \t]*USER[ \t]*SUBROUTINE.*",
+    re.MULTILINE | re.IGNORECASE,
+)
 Tangents = dict[str, list[tuple[str, int, int, float]]]
 
 
@@ -41,6 +47,7 @@ class Decks:
     ):
         self.case, self.values, self.gradients = case, dict(values or {}), gradients
         self.loads_N, self.loaded_modes = loads_N, loaded_modes
+        self.header = header(case)  # of all its texts: slopes come of their data
         analysis = case.case.analysis
         self.request: dict[str, Any] = {
             "highest_harmonic": analysis.highest_harmonic,
@@ -51,13 +58,17 @@ class Decks:
         }
 
     def texts(self, dialect: str) -> dict[str, str]:
-        """File name to text. Raises TemplateFailed."""
+        """File name to text, which begins with `header`. Raises TemplateFailed."""
         return self._texts(self.case, dialect)
 
     def _texts(self, case: LoadedCase, dialect: str) -> dict[str, str]:
         own = case.case.templates
-        env = environment(dialect, case.folder / own if own else None)
-        return DIALECTS[dialect](with_effects(case), env, self.request)
+        env = Apart(dialect, case.folder / own) if own else environment(dialect, None)
+        texts = DIALECTS[dialect](with_effects(case), env, self.request)
+        if own:
+            for file, text in texts.items():
+                _refuse_outside(file, text)
+        return {file: self.header + text for file, text in texts.items()}
 
     def tangents(self, dialect: str) -> Tangents:
         """Per variable, rows [job, 1-based line, 0-based field, d number / d variable].
@@ -182,6 +193,16 @@ def _mesh_block(env: Any, mesh: dict[str, Any]) -> str:
         text = render(env, "mesh.inp.j2", {"mesh": mesh}).rstrip("\n")
         _BLOCKS[key] = env, mesh, text  # holding both keeps their ids from being reused
     return _BLOCKS[key][2]
+
+
+def _refuse_outside(file: str, text: str) -> None:
+    """Raises TemplateFailed where a deck of somebody's own templates would have the solver read or
+    write elsewhere than in its run folder, compile a program or load a library."""
+    for found in OUTSIDE.finditer(text):
+        line = text.count("\n", 0, found.start()) + 1
+        raise TemplateFailed(
+            f"{file}, line {line}: '{found[0].strip():.60}' leads out of the run's folder"
+        )
 
 
 def _keywords(text: str) -> tuple[int, list[str]]:

@@ -23,7 +23,7 @@ def add(path: Path, id: str, value: float, folder: Path | None = None) -> Path:
     ``folder`` where that is the same. Raises NotAdded, ValueError for an unknown effect or a
     parameter that cannot be, OSError.
     """
-    loaded = load_case(path)
+    loaded = load_case(path, allow_unusual=True)  # of the old case its user was told
     with_values(loaded, {f"effects.{id}": value})
     target = path.with_name(f"{path.stem}_{id}{path.suffix}")
     if folder is not None and folder.resolve() != path.parent.resolve():
@@ -43,7 +43,7 @@ def add(path: Path, id: str, value: float, folder: Path | None = None) -> Path:
         data.insert(place, "effects", {**effects, id: value})
     with whole(target) as partial, partial.open("w", encoding="utf-8") as file:
         yaml.dump(data, file)
-    load_case(target)
+    load_case(target, allow_unusual=True)
     return target
 
 

@@ -21,12 +21,14 @@ from .regions import Region
 from .response import Response
 from .separability import Separability, separate
 from .shrinkage import Shrinkage, shrink
-from .verdict import NAMED, Verdict, decide
+from .verdict import NAMED, NO_GAP, Verdict, decide
 from .where import Place, section_map
 
 Array = np.ndarray
 IN_PLAY, MOST_IN_PLAY = 8.0, 6  # ln evidence behind the best up to which a node is asked again
 ROUNDS = 2
+STAGES = ("calibrate and ask each effect", "ask the likeliest effects again",
+          "parts of the section", "the next measurements")  # fmt: skip
 CLOSE = 0.05  # of a range, and of ln x: an effect asked as near as that, or to 0, is known
 
 
@@ -62,6 +64,11 @@ class Diagnosis:
         keys = [h.key for h in self.hypotheses if h.values]
         return max(keys, key=lambda key: self.probabilities[key], default=None)
 
+    @property
+    def leading(self) -> str | None:
+        """The effect or pair that is named or, where there may be a gap, likeliest; else None."""
+        return self.verdict.key or (self.best if self.verdict.kind != NO_GAP else None)
+
     def parameter(self, key: str, id: str = "") -> dict[str, Any]:
         """Mean and 90 % interval of the effect ``id`` of ``key``, the first by default, with its
         unit; what the case has of it is counted in."""
@@ -85,15 +92,17 @@ def diagnose(
     further: Callable[[list[ModelRow]], Response] | None = None,
     expansion: Expansion | None = None,
     seed: int = 0,
+    stage: Callable[[str], None] = lambda stage: None,
 ) -> Diagnosis:
     """Diagnose observations with a model of ``rows`` (label or None, kPa).
 
     changes: what was switched in runs 1, 2, ...; parts: slopes by the section's parts at x;
     further: a model of other rows, for the next measurement; expansion: of an earlier call with
-    the same model, near whose x0 the fit lies. Raises the model's failure where the plain tyre
-    has no solution.
+    the same model, near whose x0 the fit lies; stage: hears of each of ``STAGES``. Raises the
+    model's failure where the plain tyre has no solution.
     """
     where = places(observations, rows)
+    stage(STAGES[0])
     if expansion is None:
         expansion = expand(response, plain_fit(response, observations, where, assumed.form))
     problem = Problem(observations, expansion, response.spans, where, response.start,
@@ -104,6 +113,7 @@ def diagnose(
         expansion = expand(response, plain_fit(response, observations, where, assumed.form))
         problem = replace(problem, observations=observations, expansion=expansion)
     hypotheses, bare = weigh(problem), problem
+    stage(STAGES[1])
     for _ in range(ROUNDS if expansion.nodes else 0):
         problem, changed = _asked_again(problem, response, hypotheses)
         if not changed:
@@ -120,9 +130,11 @@ def diagnose(
     means = {h.key: h.mean() for h in hypotheses if h.values}
     sizes = {key: value[key] for key, value in means.items() if key in value}
     separability = separate(bare, P, sizes)
+    stage(STAGES[2])
     regions = list(parts(problem.expansion.x0 + d)) if parts else []
     found, effective_rank = section_map(bare, P, gap.residuals, regions)
     shrinkage = shrink(problem, verdict.key, seed) if problem.expansion.nodes else None
+    stage(STAGES[3])
     choices = rank(bare, d, p, means, response.sources, further)
     return Diagnosis(
         problem, bare, tuple(response.variables), tuple(response.sources), tuple(hypotheses), p,

@@ -9,20 +9,15 @@ from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
 
+from ..case.usual import LARGEST_SIGMA, MEASURED
+from ..files import read_bytes
 from ..modes.mode import Label
 
 COLUMNS = (
     "quantity", "c", "m", "kind", "member", "pressure_kPa", "load_N", "value", "sigma",
 )  # fmt: skip
 QUANTITIES = ("frequency_Hz", "contact_area_m2", "vertical_stiffness_N_per_m", "mass_kg")
-PLAUSIBLE = {  # a value beyond stands in another unit
-    "frequency_Hz": (2.0, 1000.0),
-    "contact_area_m2": (1e-4, 0.5),
-    "vertical_stiffness_N_per_m": (1e4, 1e7),
-    "mass_kg": (0.5, 500.0),
-}
 PRESSURES_kPa = (20.0, 2000.0)
-LARGEST_SIGMA = 0.2  # of the value: such a number tells nothing
 MOST_ROWS = 10_000
 
 
@@ -54,11 +49,10 @@ class Reading:
 
 def read_measurements(path: Path) -> list[Reading]:
     """Readings of a CSV file. Raises BadMeasurements with every mistake, OSError."""
-    with path.open("rb") as file:
-        try:
-            text = file.read().decode("utf-8-sig")
-        except UnicodeDecodeError:
-            raise BadMeasurements(f"{path}: the text must be in UTF-8") from None
+    try:
+        text = read_bytes(path).decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise BadMeasurements(f"{path}: the text must be in UTF-8") from None
     rows = csv.reader(io.StringIO(text))
     try:
         header = [name.strip() for name in next(rows, [])]
@@ -99,11 +93,10 @@ def _mistakes(cells: dict[str, str]) -> Iterator[str]:
         yield f"quantity is '{quantity}', must be one of {', '.join(QUANTITIES)}"
         return
     value, sigma = _number(cells["value"]), _number(cells["sigma"])
-    low, high = PLAUSIBLE[quantity]
     if value is None or value <= 0:
         yield f"value is '{cells['value']}', must be a number greater than 0"
-    elif not low <= value <= high:
-        yield f"value is {value:g}: no tyre has that {quantity} ({low:g} to {high:g}); which unit?"
+    elif refusal := MEASURED[quantity].refusal(value):
+        yield f"value is {value:g}: no tyre has that {quantity}, {refusal}"
     if sigma is None or sigma <= 0:
         yield f"sigma is '{cells['sigma']}', must be the standard deviation, greater than 0"
     elif value and sigma > LARGEST_SIGMA * value > 0:

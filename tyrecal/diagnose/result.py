@@ -12,13 +12,17 @@ from .gap import projection
 from .under_load import UnderLoad
 
 
-def result(diagnosis: Diagnosis, under_load: UnderLoad | None = None) -> dict[str, Any]:
+def result(
+    diagnosis: Diagnosis,
+    under_load: UnderLoad | None = None,
+    calibrated: dict[str, Any] | None = None,
+) -> dict[str, Any]:
     """Plain data; numbers in the units of their names, None where there is none.
 
     ``detectability`` is lambda at the sizes in ``judged_at``; ``full_size`` at the far end of each
     range; ``smallest_visible``: the least change from the case with lambda = 10. ``bias_percent``:
     the effect at full size and ignored. ``parameters``: of every effect of a pair. Sizes count in
-    what the case has of an effect.
+    what the case has of an effect. ``calibrated``: see `calibrated_variables`.
     """
     d, gap, s = diagnosis, diagnosis.gap, diagnosis.shrinkage
     best = d.best
@@ -35,6 +39,7 @@ def result(diagnosis: Diagnosis, under_load: UnderLoad | None = None) -> dict[st
             id: d.parameter(key, id) for key in [named or best] if key for id in key.split("+")
         },
         "likeliest": best,
+        **({"calibrated": calibrated} if calibrated else {}),
         "probabilities": _sorted(d.probabilities),
         "candidate_set": list(d.verdict.candidates),
         "fit_p_value": d.verdict.check,

@@ -142,7 +142,10 @@ def _samples(out: Problem, hypothesis: Hypothesis, random: np.random.Generator) 
     fitted = hypothesis.fitted
     assert fitted is not None
     places = random.choice(len(hypothesis.posterior), DRAWS, p=hypothesis.posterior)
-    d = np.array([random.multivariate_normal(fitted.d[i], fitted.covariance[i]) for i in places])
+    d = np.array([
+        random.multivariate_normal(fitted.d[i], fitted.covariance[i], method="cholesky")
+        for i in places
+    ])  # fmt: skip
     return _predicted_errors(out, {id: e[places] for id, e in hypothesis.values.items()}, d)
 
 
@@ -150,7 +153,8 @@ def _placebo(problem: Problem, hold: Array, random: np.random.Generator) -> floa
     """The 95 % quantile of R on tyres without any effect, linear in x about the plain fit."""
     keep = ~hold
     n, sigma, count = len(hold), problem.sigma, len(problem.centre)
-    noise = random.multivariate_normal(np.zeros(n), sigma, PLACEBOS)
+    # by Cholesky's factor: the vectors of an SVD, the default, depend on the BLAS kernel
+    noise = random.multivariate_normal(np.zeros(n), sigma, PLACEBOS, method="cholesky")
     _, J = problem.plain(np.zeros(count))
     best_ln, best = np.full(PLACEBOS, -np.inf), np.zeros((PLACEBOS, int(hold.sum())))
     information = np.diag(problem.spread**-2.0)

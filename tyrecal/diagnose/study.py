@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import exp, isfinite, nan
 from pathlib import Path
+from typing import Any
 
 from ..case import LoadedCase
 from ..case.mistakes import suggestion
 from ..effects import catalogue
 from ..evaluate.door import Door
+from .calibrated import calibrated_variables
 from .diagnosis import Diagnosis, diagnose
 from .evidence import NONE
 from .measurements import BadMeasurements, Reading, read_measurements
@@ -21,7 +23,6 @@ from .response import Answer, Point, Span
 from .tyre_model import TyreModel
 from .uncertainties import EFFECTS, Source, calibrated, sources
 from .under_load import UnderLoad, Values, compare
-from .verdict import NO_GAP
 
 ALIKE = 2.0  # factor between measured and computed frequency beyond which the unit is wrong
 ALIKE_MASS = 1.5  # as the mass: a rim weighs as much as its tyre
@@ -46,6 +47,11 @@ class Study:
     under_load: UnderLoad | None = None
 
     @property
+    def variables(self) -> dict[str, Any]:
+        """See `calibrated_variables`."""
+        return calibrated_variables(self.diagnosis, self.model)
+
+    @property
     def asked_for(self) -> tuple[str, ...] | None:
         """The effects considered, where they are not all of the catalogue."""
         known = {*self.diagnosis.problem.spans, *self.inexpressible, *self.calibrated}
@@ -62,11 +68,13 @@ def study(
     jobs: int = 1,
     effects: Sequence[str] | None = None,
     section_map: bool = True,
+    stage: Callable[[str], None] = lambda stage: None,
 ) -> Study:
     """Read the files and diagnose the case with them.
 
     effects: ids to consider, None = the whole catalogue; one that a variable of the case sets is
-    none. Raises BadMeasurements, BadChange, EvaluationFailed, and what ``Door.evaluate`` raises.
+    none; stage: hears of each of ``diagnosis.STAGES``. Raises BadMeasurements, BadChange,
+    EvaluationFailed, and what ``Door.evaluate`` raises.
     """
     switched = [path for path, _ in toggled]
     runs = {path: read_measurements(path) for path in (measured, *repeats, *switched)}
@@ -95,12 +103,13 @@ def study(
     diagnosis = diagnose(
         model, rows, observations, changes, assumed,
         parts=(lambda x: regions(model, x)) if section_map else None,
-        further=lambda more: TyreModel(case, _same(door), more, found, spans, jobs),
+        further=lambda more: TyreModel(case, door.for_case(case), more, found, spans, jobs),
+        stage=stage,
     )  # fmt: skip
     own = [runs[path] for path in (measured, *repeats)]
     return Study(
         diagnosis, tuple(found), assumed_sources, tuple(inexpressible), fitted, model,
-        _under_load(case, _same(door), own, diagnosis, model),
+        _under_load(case, door, own, diagnosis, model),
     )  # fmt: skip
 
 
@@ -116,10 +125,8 @@ def _under_load(
     readings = [each for run in runs for each in run if each.load_N]
     if not readings:
         return None
-    verdict = diagnosis.verdict
-    keys = [NONE, verdict.key or (diagnosis.best if verdict.kind != NO_GAP else None)]
     tyres: dict[str, Values] = {}
-    for key in filter(None, keys):
+    for key in filter(None, (NONE, diagnosis.leading)):
         found = diagnosis.hypothesis(key)
         assert found.fitted is not None
         x = diagnosis.problem.expansion.x0 + found.fitted.d[found.best]
@@ -171,13 +178,6 @@ def parse_change(text: str) -> Change:
     if mark == "*" and number == 1:
         raise BadChange(f"'{text}': a factor of 1 switches nothing")
     return Change(id, number, mark == "*")
-
-
-def _same(door: Door) -> Door:
-    """The same door with the same counts, for other rows of the same tyre."""
-    other = door.worker()
-    other.counts, other.heard = door.counts, door.heard
-    return other
 
 
 def _counted_from(change: Change, spans: Mapping[str, Span]) -> Change:

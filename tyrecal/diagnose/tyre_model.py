@@ -17,7 +17,7 @@ from ..evaluate.failure import DeckRefused, EvaluationFailed
 from ..fit import problem as fit
 from ..modes.mode import Label
 from .response import Answer, Point, Span
-from .uncertainties import EFFECTS, Source, values_of
+from .uncertainties import EFFECTS, Source, unit_of, values_of
 
 Array = np.ndarray
 MASS_STEP = 0.02  # of a logarithm: the mass is linear in areas and densities
@@ -82,6 +82,10 @@ class TyreModel:
             name: exp(xi) if v.scale == "log" else v.lower + xi * (v.upper - v.lower)
             for (name, v), xi in zip(self._variables.items(), map(float, x), strict=True)
         }
+
+    def unit(self, variable: str) -> str:
+        """The unit of a design variable, "" where it has none."""
+        return unit_of(self._variables[variable].sets[0])
 
     def design(self, point: Point) -> dict[str, float]:
         """Numbers of the case at a point: variables, and effects on top of those that it has."""

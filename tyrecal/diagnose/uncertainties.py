@@ -11,10 +11,15 @@ from ..case import LoadedCase
 from ..case.checks import find
 from ..case.schema import Cord, Rubber
 from ..effects import catalogue
+from ..units import in_engineers_units
 
 DENSITY, MODULUS, SPACING, GAUGE, ANGLE_deg, PRESSURE_kPa = 1.5, 3.0, 1.0, 3.0, 1.0, 1.0
 EFFECTS = "effects."
-UNITS = {"kPa": "kPa", "Pa": "Pa", "deg": "degrees", "m": "m", "m2": "m2", "m3": "kg/m3"}  # of keys
+UNITS = {  # by a key's end, the longer first
+    "kg_per_m3": "kg/m3", "kg_m2": "kg m2", "m_per_N": "m/N", "Pa_per_m": "Pa/m", "N_per_m": "N/m",
+    "rad_per_N_m": "rad/(N m)", "rad_per_s": "rad/s", "kPa": "kPa", "Pa": "Pa",
+    "deg": "degrees", "m": "m", "m2": "m2", "kg": "kg", "Hz": "Hz", "C": "C",
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -50,7 +55,7 @@ def sources(case: LoadedCase) -> tuple[list[Source], bool]:
         size = (
             f"{each.percent:g} %"
             if each.percent
-            else f"{each.absolute:g}{_unit(next(iter(steps)))}"
+            else f"{in_engineers_units(each.absolute or 0.0, unit_of(next(iter(steps))))}"
         )
         result.append(Source(name, steps, f"{name.replace('_', ' ')} {size}"))
     return result, False
@@ -63,7 +68,7 @@ def _assumed(case: LoadedCase) -> Iterator[Source]:
         if path in taken:
             return None
         step = absolute or _value(case, path) * percent / 100
-        size = f"{percent:g} %" if percent else f"{absolute:g}{_unit(path)}"
+        size = f"{percent:g} %" if percent else f"{in_engineers_units(absolute, unit_of(path))}"
         return Source(name, {path: step}, f"{name.replace('_', ' ')} {size}")
 
     found = [source("pressure", "pressure_kPa", absolute=PRESSURE_kPa)]
@@ -84,13 +89,11 @@ def _assumed(case: LoadedCase) -> Iterator[Source]:
     yield from (each for each in found if each)
 
 
-def _unit(path: str) -> str:
-    """The unit of the number at a dotted path, with a blank before it; "" where it has none."""
+def unit_of(path: str) -> str:
+    """The unit of the number at a dotted path, "" where it has none."""
     if path.startswith(EFFECTS):
-        unit = catalogue()[path.removeprefix(EFFECTS)].unit
-    else:
-        unit = UNITS.get(path.rpartition("_")[2], "")
-    return f" {unit}" if unit else ""
+        return catalogue()[path.removeprefix(EFFECTS)].unit
+    return next((unit for end, unit in UNITS.items() if path.endswith(f"_{end}")), "")
 
 
 def calibrated(case: LoadedCase) -> set[str]:

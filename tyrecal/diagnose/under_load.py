@@ -118,7 +118,7 @@ def _footprints(
     loads = sorted({load for _, _, load in wanted})
     if not loads:
         return
-    pressed = _at(case, door).press(values, loads)
+    pressed = door.for_case(case).press(values, loads)
     mesh = section_mesh(with_values(case, values))
     rows = {each.load_N: footprint_row(pressed, each, mesh) for each in pressed.footprints}
     for quantity, member, load in wanted:
@@ -136,7 +136,7 @@ def _modes(
     if not loads:
         return
     labels: list[Label] = sorted({member.label for _, member, _ in wanted if member}, key=str)
-    (outcome,) = load_tyres(_at(asked_for(case, labels), door), {"": values}, loads).values()
+    (outcome,) = load_tyres(door.for_case(asked_for(case, labels)), {"": values}, loads).values()
     if isinstance(outcome, EvaluationFailed):
         raise outcome
     at = {
@@ -149,10 +149,3 @@ def _modes(
             yield (quantity, member, load), at[load, member]
     if outcome.failed:
         raise outcome.failed
-
-
-def _at(case: LoadedCase, door: Door) -> Door:
-    """The same door with the same counts, for this case."""
-    other = door.worker()
-    other.case, other.counts = case, door.counts
-    return other

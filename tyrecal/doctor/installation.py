@@ -35,14 +35,14 @@ def extras() -> list[dict[str, Any]]:
 
 def machine() -> dict[str, Any]:
     """``python``, ``system``, ``cores`` that this process may use, ``memory_GB``, of which
-    ``free_memory_GB`` (None where the system does not say), ``free_disc_GB`` here, ``threads``."""
-    total = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / GB
+    ``free_memory_GB`` (both None where the system does not say), ``free_disc_GB`` here,
+    ``threads``."""
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     return {
         "python": platform.python_version(),
         "system": platform.platform(),
         "cores": cores,
-        "memory_GB": round(total, 1),
+        "memory_GB": _memory(),
         "free_memory_GB": _free_memory(),
         "free_disc_GB": round(shutil.disk_usage(".").free / GB, 1),
         "threads": {name: os.environ.get(name) for name in THREADS},
@@ -85,11 +85,18 @@ def _found(requirement: Requirement) -> dict[str, Any]:
     return {"name": requirement.name, "needed": needed, "version": there, "ok": fits}
 
 
+def _memory() -> float | None:
+    try:
+        return round(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / GB, 1)
+    except (AttributeError, OSError, ValueError):  # Windows has no such question
+        return None
+
+
 def _free_memory() -> float | None:
     try:
         (line,) = (
             line
-            for line in Path("/proc/meminfo").read_text().splitlines()
+            for line in Path("/proc/meminfo").read_text(encoding="utf-8").splitlines()
             if line.startswith("MemAvailable")
         )
         return round(1024 * int(line.split()[1]) / GB, 1)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
+from math import isclose
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -12,7 +13,8 @@ from ..case import LoadedCase, with_values
 from ..deck.beside import needs
 from ..deck.write import Decks
 from ..effects import catalogue, with_effects
-from ..interrupt import raise_ctrl_c
+from ..files import printable
+from ..interrupt import raise_interrupt
 from . import folders
 from .executor import WorkerLost, executor, in_order
 from .failure import DeckRefused, EvaluationFailed
@@ -66,7 +68,8 @@ class Door:
     keep: leave the folders of successful runs too (those of failures are always kept); store: the
     record that is asked before the solver, and told what it said; heard: called with how many of
     how many designs asked at once are answered; scheduler: address of the Dask scheduler whose
-    workers evaluate where there are several questions, else processes do.
+    workers evaluate where there are several questions, else processes do; command: words that
+    start the solver's program, else as the user has set it where the solver runs.
     """
 
     case: LoadedCase
@@ -75,6 +78,7 @@ class Door:
     keep: bool = False
     store: Store | None = None
     scheduler: str = ""
+    command: tuple[str, ...] = ()
     counts: Counts = field(default_factory=Counts)
     heard: Callable[[int, int], None] = field(default=_unheard, repr=False)
     _solver: Solver | None = field(default=None, repr=False)
@@ -83,7 +87,8 @@ class Door:
     def solver(self) -> Solver:
         """The adapter. Raises UnknownSolver."""
         if self._solver is None:
-            self._solver = find_solver(self.solver_name or self.case.case.solver.name)
+            name = self.solver_name or self.case.case.solver.name
+            self._solver = find_solver(name, self.command)
         return self._solver
 
     @property
@@ -157,7 +162,7 @@ class Door:
     def _ask(self, decks: Decks, typed: Callable[[dict[str, Any], Path | None], T]) -> T:
         """The solver's answer, or the record's, ``typed``, which is told where a run that ended
         early is kept."""
-        raise_ctrl_c()
+        raise_interrupt()
         folder = folders.fresh(self.folder)
         solver, key = self.solver, ""
         kept: Path | None = None
@@ -165,7 +170,7 @@ class Door:
             solver.write(decks, folder)
             if self.store:
                 key = key_of(folder, solver)
-            answer = self._recall(key)
+            answer = self._recall(key, with_effects(decks.case).case.pressure_kPa)
             if answer is not None:
                 result = typed(answer, None)
             else:
@@ -252,18 +257,39 @@ class Door:
     def worker(self) -> Door:
         """The same door for another process, wherever it is, with counts of its own."""
         folder = self.folder.absolute() if self.folder else None
-        return Door(self.case, self.solver_name, folder, self.keep, self.store)
+        return Door(
+            self.case, self.solver_name, folder, self.keep, self.store, command=self.command
+        )
 
-    def _recall(self, key: str) -> dict[str, Any] | None:
+    def for_case(self, case: LoadedCase) -> Door:
+        """The same door, counts and listener too, for another case."""
+        other = self.worker()
+        other.case, other.counts, other.heard = case, self.counts, self.heard
+        return other
+
+    def _recall(self, key: str, pressure_kPa: float) -> dict[str, Any] | None:
         content = self.store.read(key) if self.store else None
-        if content is None:
+        if not self.store or content is None:
             return None
-        self.counts.recorded += 1
         if "answer" in content:
             answer: dict[str, Any] = content["answer"]
+            found_kPa = answer["pressure_Pa"] / 1e3
+            if not isclose(found_kPa, pressure_kPa, rel_tol=1e-6, abs_tol=1e-9):
+                self.store.set_aside(self.store.path(key), f"it is of {found_kPa:g} kPa")
+                return None
+            self.counts.recorded += 1
             return answer
-        kept = content["folder"]
-        raise EvaluationFailed(content["cause"], content["words"], Path(kept) if kept else None)
+        self.counts.recorded += 1
+        raise EvaluationFailed(
+            content["cause"], printable(content["words"]), self._known(content["folder"])
+        )
+
+    def _known(self, folder: str | None) -> Path | None:
+        """A folder that a record names, where it is a run of ours that failed."""
+        if folder is None or self.folder is None or "\0" in folder:
+            return None
+        path, parent = Path(folder), self.folder.resolve()
+        return path if path.parent == parent and (path / folders.OUTCOME).is_file() else None
 
     def _run(self, folder: Path, time_limit_s: float) -> dict[str, Any]:
         self.counts.runs += 1

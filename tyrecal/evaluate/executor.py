@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, wait
+from concurrent.futures import Future
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import ExitStack, contextmanager
 from typing import Any, Protocol
 
-from .pool import Pool, process_pool
+from .pool import Pool, first_done, process_pool
 
 Task = tuple[int, Any]  # its place among the tasks, and what its function is given
 
@@ -73,7 +73,7 @@ def _until_one_dies(
                 except BrokenProcessPool:
                     lost.append(task)
             answers = []
-            for future in wait(under_way, return_when=FIRST_COMPLETED).done:
+            for future in first_done(under_way):
                 task = under_way.pop(future)
                 try:
                     answers.append((task[0], future.result()))

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from ..files import printable
+
 
 class EvaluationFailed(Exception):
     """The solver could not evaluate a design.
 
     cause: ``no_equilibrium``, ``unstable``, ``timed_out``, ``crashed``, ``no_results``,
     ``licence``, ``lost_label`` or ``refused`` (values that the case cannot have);
-    words: the solver's own last words; folder: where the run is kept, or None.
+    words: the solver's own last words, on one line; folder: where the run is kept, or None.
     """
 
     def __init__(self, cause: str, words: str, folder: Path | None = None):
+        words = printable(words)  # they may be a stranger's, and go to a terminal
         super().__init__(words + (f" (run kept in {folder})" if folder else ""))
         self.cause, self.words, self.folder = cause, words, folder
 

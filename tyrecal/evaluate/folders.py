@@ -7,7 +7,8 @@ import shutil
 import tempfile
 from pathlib import Path
 
-from ..interrupt import ctrl_c_put_off
+from ..files import own_folder, refuse_link
+from ..interrupt import interrupts_put_off
 
 OUTCOME = "outcome.txt"  # in every kept folder; one without it was cut off in the middle
 
@@ -16,8 +17,7 @@ def fresh(parent: Path | None) -> Path:
     """An empty folder under ``parent``, or among the system's temporary ones. Raises OSError."""
     if parent is None:
         return Path(tempfile.mkdtemp(prefix="tyrecal-"))
-    parent.mkdir(parents=True, exist_ok=True)
-    return Path(tempfile.mkdtemp(prefix="run-", dir=parent))
+    return Path(tempfile.mkdtemp(prefix="run-", dir=own_folder(parent)))
 
 
 def keep(folder: Path, outcome: str) -> Path:
@@ -29,12 +29,16 @@ def keep(folder: Path, outcome: str) -> Path:
 
 def drop(folder: Path) -> None:
     """Remove the folder."""
-    with ctrl_c_put_off():  # it would close a file twice, and say that instead
+    with interrupts_put_off():  # it would close a file twice, and say that instead
         shutil.rmtree(folder, ignore_errors=True)
 
 
 def drop_unfinished(parent: Path) -> None:
-    """Remove folders of processes that were killed; call it where none can be at work."""
+    """Remove folders of processes that were killed; call it where none can be at work.
+
+    Raises NotAFile where ``parent`` is a link.
+    """
+    refuse_link(parent)
     for folder in parent.glob("run-*"):
         if not (folder / OUTCOME).exists():
             drop(folder)

@@ -13,16 +13,12 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field
 
-from ..case.document import read_document
+from ..settings import typed
 from .cluster import ClusterFailed
 
 THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS")
-
-
-class BadSettings(ValueError):
-    """The settings file is wrong."""
 
 
 class Settings(BaseModel):
@@ -52,15 +48,7 @@ class Settings(BaseModel):
 
 def read_settings(path: Path) -> Settings:
     """Settings from their file. Raises BadSettings, in one sentence a mistake."""
-    document = read_document(path)
-    if document.data is None or document.mistakes:
-        raise BadSettings("\n".join(str(each) for each in document.mistakes))
-    try:
-        return Settings.model_validate(document.data)
-    except ValidationError as error:
-        for each in error.errors():
-            document.add(each["loc"], each["msg"])
-        raise BadSettings("\n".join(str(each) for each in document.mistakes)) from None
+    return typed(path, Settings)
 
 
 def jobs_of(settings: Settings) -> Any:

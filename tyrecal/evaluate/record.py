@@ -5,7 +5,9 @@ from __future__ import annotations
 import io
 import json
 from hashlib import sha256
+from math import prod
 from typing import Any
+from zipfile import ZIP_STORED, ZipFile
 
 import numpy as np
 
@@ -17,15 +19,16 @@ class Damaged(ValueError):
     """The bytes are not those that were written."""
 
 
-def pack(about: dict[str, Any], content: Any) -> bytes:
-    """``content``: dicts with text keys, lists, text, numbers, None and arrays, all kept to the
-    last bit (tuples become lists, arrays of no dimension numbers). ``about``: plain JSON, for
-    whoever lists records.
+def pack(key: str, about: dict[str, Any], content: Any) -> bytes:
+    """``content``, the answer to the question ``key``: dicts with text keys, lists, text, finite
+    numbers, None and arrays, all kept to the last bit (tuples become lists, arrays of no dimension
+    numbers). ``about``: plain JSON, for whoever lists records.
 
-    Raises TypeError for anything else.
+    Raises TypeError for anything else, ValueError for a number that is not finite.
     """
     arrays: list[np.ndarray] = []  # one that stands in several places is kept once
-    line = json.dumps({"about": about, "content": _plain(content, arrays)}) + "\n"
+    told = {"key": key, "about": about, "content": _plain(content, arrays)}
+    line = json.dumps(told, allow_nan=False) + "\n"
     stored = io.BytesIO()
     if arrays:
         np.savez(stored, *arrays)
@@ -33,15 +36,51 @@ def pack(about: dict[str, Any], content: Any) -> bytes:
     return sha256(body).hexdigest().encode() + b"\n" + body
 
 
-def unpack(data: bytes) -> tuple[dict[str, Any], Any]:
-    """(about, content) of `pack`. Raises Damaged."""
+def unpack(data: bytes, key: str) -> tuple[dict[str, Any], Any]:
+    """(about, content) of `pack`. Raises Damaged, also for the answer to another question."""
     digest, body = data[: DIGEST - 1], data[DIGEST:]
     if sha256(body).hexdigest().encode() != digest:
         raise Damaged("its checksum does not match")
-    line, _, stored = body.partition(b"\n")
-    parsed = json.loads(line)
-    arrays = dict(np.load(io.BytesIO(stored), allow_pickle=False)) if stored else {}
-    return parsed["about"], _filled(parsed["content"], arrays)
+    try:
+        line, _, stored = body.partition(b"\n")
+        told = json.loads(line, parse_constant=_not_finite)
+        about, content = told["about"], _filled(told["content"], _arrays(stored))
+    except Damaged:
+        raise
+    except Exception as error:  # whatever is in it, it is none that we wrote
+        raise Damaged(f"it is not what tyrecal writes ({type(error).__name__})") from None
+    if told.get("key") != key:
+        raise Damaged("it does not answer the question that it is named by")
+    if not isinstance(about, dict):
+        raise Damaged("it does not say which solver answered")
+    return about, content
+
+
+def _not_finite(word: str) -> None:
+    raise Damaged(f"{word} stands for a number")
+
+
+def _arrays(stored: bytes) -> dict[str, np.ndarray]:
+    """The arrays by name, as many bytes as stand there: nothing is unpacked. Raises Damaged."""
+    found: dict[str, np.ndarray] = {}
+    if not stored:
+        return found
+    with ZipFile(io.BytesIO(stored)) as archive:
+        members = archive.infolist()
+        packed = any(each.compress_type != ZIP_STORED for each in members)
+        if packed or sum(each.file_size for each in members) > len(stored):
+            raise Damaged("its arrays are larger than the file")
+        for each in members:
+            with archive.open(each) as file:
+                if np.lib.format.read_magic(file) != (1, 0):
+                    raise Damaged("an array has another format")
+                shape, _, dtype = np.lib.format.read_array_header_1_0(file)
+                if dtype.hasobject or prod(shape) * dtype.itemsize != each.file_size - file.tell():
+                    raise Damaged("an array has another size than it says")
+            with archive.open(each) as file:
+                array = np.lib.format.read_array(file, allow_pickle=False)
+            found[each.filename.removesuffix(".npy")] = array
+    return found
 
 
 def _plain(value: Any, arrays: list[np.ndarray]) -> Any:

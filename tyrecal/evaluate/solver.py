@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import Any, Protocol
+
+from ..settings import BadSettings, command_of
 
 GROUP = "tyrecal.solvers"
 
@@ -17,6 +20,8 @@ class Solver(Protocol):
     ``gradients``, ``footprint``, ``loaded_modes``, and what effects need (`Effect.needs`):
     ``vibration_modulus``, a modulus in the frequency step other than in the static one, and those
     of `deck.beside.WORDS`;
+    A solver that starts a program has ``command`` too, a list of its words, which is the user's to
+    set (`tyrecal.settings`), never the case's;
     refusals, failures: exceptions of `write`, `run` and `read` for a deck it cannot honour and
     for no solution; a failure's attribute ``cause``, where it has one, is `EvaluationFailed`'s.
     """
@@ -56,18 +61,30 @@ class UnknownSolver(ValueError):
     """No solver of that name is installed."""
 
 
-def find_solver(name: str) -> Solver:
-    """The installed solver of that name. Raises UnknownSolver."""
+def find_solver(name: str, command: Sequence[str] = ()) -> Solver:
+    """The installed solver of that name, with the program that the user has set, or ``command``.
+
+    Raises UnknownSolver; BadSettings.
+    """
     found = {entry.name: entry for entry in entry_points(group=GROUP)}
     if name not in found:
         raise UnknownSolver(f"solver '{name}' is not installed, only {', '.join(sorted(found))}")
     solver: Solver = found[name].load()()
+    if command and not hasattr(solver, "command"):
+        raise UnknownSolver(f"solver '{name}' starts no program: it takes no --solver-command")
+    _set_command(solver, list(command) or command_of(name)[0])
     return solver
 
 
+def _set_command(solver: Any, command: list[str]) -> None:
+    if command and hasattr(solver, "command"):
+        solver.command = command
+
+
 def installed() -> list[dict[str, Any]]:
-    """Every registered solver: ``name``, ``version``, ``dialect``, ``capabilities``, and
-    ``problem``: why it cannot be used, or None. Raises nothing."""
+    """Every registered solver: ``name``, ``version``, ``dialect``, ``capabilities``, ``problem``:
+    why it cannot be used, or None; ``command`` that it starts, or None, and ``command_from``: where
+    that is set. Raises nothing."""
     return [_described(entry) for entry in sorted(entry_points(group=GROUP))]
 
 
@@ -78,13 +95,21 @@ def _described(entry: EntryPoint) -> dict[str, Any]:
         "dialect": None,
         "capabilities": [],
         "problem": None,
+        "command": None,
+        "command_from": None,
     }
     try:
-        solver: Solver = entry.load()()
+        solver: Any = entry.load()()
+        if hasattr(solver, "command"):
+            command, origin = command_of(entry.name)
+            _set_command(solver, command)
+            facts["command"], facts["command_from"] = solver.command, origin or "default"
         facts["dialect"], facts["capabilities"] = solver.dialect, sorted(solver.capabilities)
         facts["version"] = solver.version
         if solver.version == "unknown":
             facts["problem"] = "its program was not found"
+    except BadSettings as error:
+        facts["problem"] = str(error)
     except Exception as error:  # whatever a stranger's code raises when it is imported
         facts["problem"] = f"{type(error).__name__}: {error}"
     return facts

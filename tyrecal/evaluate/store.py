@@ -11,6 +11,7 @@ import inspect
 import json
 import logging
 import os
+import stat
 import time
 from collections import Counter
 from collections.abc import Iterator
@@ -19,12 +20,14 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-from ..files import whole
+from ..files import NotAFile, open_file, own_folder, read_bytes, refuse_link, whole
 from .record import DIGEST, Damaged, pack, unpack
+from .recorded import check
 from .solver import Solver
 
-FORMAT = "1"
+FORMAT = "2"
 MOST_BYTES = 2_000_000_000
+LARGEST = 500_000_000  # bytes of one record
 LEFTOVER_S = 3600.0  # age of a half-written file whose writer must be dead
 log = logging.getLogger("tyrecal")
 
@@ -60,13 +63,23 @@ def sources_of(adapter: type) -> str:
 class Store:
     """Answers by key under ``folder``; any number of processes may read and write at once.
 
-    A record that does not match its checksum is moved aside, reported and otherwise absent.
+    A record that does not match its checksum or its name is moved aside, reported and otherwise
+    absent.
     Writing never raises: an evaluation that succeeded is not lost to a full disc.
     """
 
     folder: Path
     opened: float = field(default_factory=lambda: time.time() - 1)  # file times lag behind
     _warned: bool = False
+
+    def __post_init__(self) -> None:
+        with contextlib.suppress(OSError):  # it is not there yet
+            if os.name == "posix" and self.folder.stat().st_mode & stat.S_IWOTH:
+                log.warning(
+                    "record '%s' can be written by everybody on this machine: whoever does decides"
+                    " on your numbers ('chmod o-w' ends that)",
+                    self.folder,
+                )
 
     def path(self, key: str) -> Path:
         """Where the record of a key stands."""
@@ -76,11 +89,12 @@ class Store:
         """What was recorded, or None."""
         path = self.path(key)
         try:
-            content = unpack(path.read_bytes())[1]
-        except OSError:
-            return None
+            refuse_link(path.parent)
+            content = _read(path)[1]
         except Damaged as error:
-            self._set_aside(path, str(error))
+            self.set_aside(path, str(error))
+            return None
+        except OSError:
             return None
         with contextlib.suppress(OSError):  # a store that may only be read
             os.utime(path)  # the time of last use, for `prune`
@@ -90,11 +104,14 @@ class Store:
         """Record ``content`` (see `pack`) whole or not at all; warns once where it cannot."""
         path = self.path(key)
         try:
-            data = pack(about, content)
-            path.parent.mkdir(parents=True, exist_ok=True)
+            data = pack(key, about, content)
+            if len(data) > LARGEST:
+                raise ValueError(f"an answer of {len(data) / 1e6:.0f} MB is too large")
+            self.folder.mkdir(parents=True, exist_ok=True)
+            own_folder(path.parent)
             with whole(path, many_writers=True) as partial:
                 partial.write_bytes(data)
-        except (OSError, TypeError) as error:
+        except (OSError, TypeError, ValueError) as error:
             if not self._warned:
                 log.warning("evaluations are not recorded in '%s': %s", self.folder, error)
             self._warned = True
@@ -130,16 +147,16 @@ class Store:
             if path.suffix != ".record":
                 continue
             try:
-                about = unpack(path.read_bytes())[0] if verify else _about(path)
+                about = _read(path)[0] if verify else _about(path)
+                solvers[f"{about['solver']} {about['version']}"] += 1
             except Damaged as error:
                 damaged += 1
-                self._set_aside(path, str(error))
+                self.set_aside(path, str(error))
                 continue
-            except (OSError, ValueError, KeyError):
+            except (OSError, ValueError, KeyError, TypeError, RecursionError):
                 damaged += 1
                 continue
             records, size = records + 1, size + status.st_size
-            solvers[f"{about['solver']} {about['version']}"] += 1
             failures += bool(about.get("cause"))
         return {
             "folder": str(self.folder),
@@ -151,12 +168,14 @@ class Store:
         }
 
     def _files(self) -> Iterator[tuple[Path, os.stat_result]]:
-        for path in self.folder.glob("??/*"):
+        folders = [path for path in self.folder.glob("??") if not path.is_symlink()]
+        for path in (path for folder in folders for path in folder.glob("*")):
             if path.suffix in (".record", ".damaged", ".partial"):
                 with contextlib.suppress(OSError):
-                    yield path, path.stat()
+                    yield path, path.lstat()
 
-    def _set_aside(self, path: Path, why: str) -> None:
+    def set_aside(self, path: Path, why: str) -> None:
+        """Have a record be absent, and say why."""
         log.warning("record '%s' is damaged and not used: %s", path, why)
         with contextlib.suppress(OSError):
             path.replace(path.with_suffix(".damaged"))
@@ -169,7 +188,22 @@ def _remove(path: Path) -> None:
 
 def _about(path: Path) -> dict[str, Any]:
     """The record's first facts, without its arrays."""
-    with path.open("rb") as file:
+    with open_file(path, follow=False) as file:
         file.seek(DIGEST)
-        about: dict[str, Any] = json.loads(file.readline())["about"]
+        about: dict[str, Any] = json.loads(file.readline(LARGEST))["about"]
         return about
+
+
+def _read(path: Path) -> tuple[dict[str, Any], Any]:
+    """What stands in a record, whole, of the question it is named by, and what such an answer is.
+
+    Raises Damaged; OSError where there is none, or it may not be read.
+    """
+    try:
+        about, content = unpack(read_bytes(path, LARGEST, follow=False), path.stem)
+    except NotAFile as error:
+        raise Damaged(f"it {error.strerror}") from None
+    check(content)
+    if not {"solver", "version"} <= about.keys():
+        raise Damaged("it does not say which solver answered")
+    return about, content

@@ -4,11 +4,12 @@ Only that process imports this module: `pool.warm_up`.
 """
 
 import gc
-import signal
 from contextlib import suppress
 from importlib.metadata import entry_points
 
-signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's to answer, even this early
+from .pool import leave_interrupts_to_parent
+
+leave_interrupts_to_parent()
 
 from ..batch import case  # noqa: E402, F401  takes a second: the studies and all that they need
 from .solver import GROUP  # noqa: E402

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..case import LoadedCase, with_values
+from ..case.calibration import cannot_fit
 from ..evaluate.door import Counts, Door
 from ..evaluate.executor import WorkerLost, executor, in_order
 from ..evaluate.failure import EvaluationFailed
@@ -23,7 +24,6 @@ METHODS: dict[str, Callable[[Problem, Array, float], slsqp.Outcome]] = {
     "slsqp": slsqp.minimise,
     "least-squares": least_squares.minimise,
 }
-FEW = "{} targets cannot determine {} free variables: give more, or hold variables with --fix"
 TOLERANCE = 1e-3  # projected gradient, Hz per unit of a logarithm: 1e-5 Hz for a change of 1 %
 SLOPE_NOISE_HZ = 50.0  # differences of a step that suits the digits: this times the step
 SLOPE_ERROR = 1e-4  # of d ln q / d x of areas and stiffnesses, by the curvature within a step
@@ -75,24 +75,13 @@ def calibrate(
     starts that cannot be evaluated are counted and replaced. jobs: processes for the drawn starts,
     and for the neighbours of a point of the first one, where the solver gives no slopes or the
     tyre is pressed. notify is told of every design here, finished of every start. Raises
-    NothingToFit; DeckRefused where there are footprint targets and the solver has no road;
-    EvaluationFailed when the case's own start cannot be evaluated.
+    what `check` does; EvaluationFailed when the case's own start cannot be evaluated.
     """
     problem = Problem(case, door, fixed, notify, jobs)
-    if not len(problem.scale):
-        raise NothingToFit(
-            "the case has no targets: there is nothing to fit to; add measured modes to it, as in"
-            " targets: {modes: [{c: 2, m: 0, frequency_Hz: 79.5}, ...]}"
-        )
-    if not problem.scale.any():
-        raise NothingToFit("every target has the weight 0: there is nothing to fit to")
-    if not problem.variables:
-        raise NothingToFit("no variable is free: there is nothing to fit")
-    if len(problem.scale) < len(problem.variables):
-        raise NothingToFit(FEW.format(len(problem.scale), len(problem.variables)))
-    if problem.footprint:
-        door.needs_road()
+    check(problem)
     initial = problem.evaluate(problem.start())
+    if not np.isfinite(initial.objective):
+        raise NothingToFit("the targets' weights and standard deviations leave no finite objective")
     reports = [_run(problem, problem.start(), method)]
     replaced = 0
     if starts > 1:
@@ -106,6 +95,23 @@ def calibrate(
         initial,
         best.point,
     )
+
+
+def check(problem: Problem) -> None:
+    """Raises NothingToFit; DeckRefused where there are footprint targets and the solver has no
+    road."""
+    if not len(problem.scale):
+        raise NothingToFit(
+            "the case has no targets: there is nothing to fit to; add measured modes to it, as in"
+            " targets: {modes: [{c: 2, m: 0, frequency_Hz: 79.5}, ...]}"
+        )
+    if not problem.variables:
+        raise NothingToFit("no variable is free: there is nothing to fit")
+    weights = [t.weight for t in problem.targets] + [t.weight for t in problem.footprint]
+    if reason := cannot_fit(weights, len(problem.variables)):
+        raise NothingToFit(reason)
+    if problem.footprint:
+        problem.door.needs_road()
 
 
 def _run(problem: Problem, start: Array, method: str) -> StartReport:

@@ -30,6 +30,11 @@ class Label:
             return {"torsional": FAMILIES[0], "axial": FAMILIES[1]}.get(self.kind or "")
         return FAMILIES[self.m] if self.m < 2 else None
 
+    @property
+    def said(self) -> str:
+        """As people say it; files and options have the label itself: ``axial`` is lateral."""
+        return str(self).replace("axial", "lateral")
+
     def __str__(self) -> str:
         return f"[{self.c},{self.m}]" + (f" {self.kind}" if self.kind else "")
 

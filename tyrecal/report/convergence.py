@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter, NullLocator
 
-from .figure import COLOURS, GREY, MARKERS, in_house_style, new_figure, save
+from .figure import COLOURS, GREY, MARKERS, headline, in_house_style, new_figure, save
 
 
 @in_house_style
@@ -25,7 +25,7 @@ def draw_convergence(path: Path, history: Sequence[Mapping[str, Any]], unit: str
     failed = np.isnan(objective)
     figure = new_figure(8.0, 5.6)
     top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=[3, 2])
-    top.set_title(_summary(objective, unit))
+    headline(figure, _summary(objective, unit))
 
     many = len(point) > 60
     best = np.fmin.accumulate(objective)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from typing import Any
 
 from ..diagnose.covariance import BETWEEN_PRESSURES
 from ..diagnose.diagnosis import Diagnosis
@@ -10,6 +11,7 @@ from ..diagnose.evidence import NONE, OUTSIDE
 from ..diagnose.study import Study
 from ..diagnose.under_load import LoadedRow
 from ..diagnose.verdict import NAMED, NO_GAP, UNDECIDED
+from ..units import in_engineers_units, said
 from .words import map_resolution
 
 RUNGS = {
@@ -25,7 +27,9 @@ def page(study: Study, case: str, measured: str) -> str:
     """The page as Markdown."""
     d = study.diagnosis
     parts = [
-        f"# What the model of {case} lacks",
+        f"# The model of {case} against its measurements"
+        if d.verdict.kind == NO_GAP
+        else f"# What the model of {case} lacks",
         f"Measurements: {measured}, {_counted(d)}.",
         f"## {_headline(study)}",
         *_answer(study),
@@ -38,6 +42,8 @@ def page(study: Study, case: str, measured: str) -> str:
         *_which(study),
         "## How far does it shrink?",
         *_shrinkage(d),
+        "## The calibrated variables",
+        *_variables(study),
         "## What to measure next",
         *_next(d),
         "## What this rests on",
@@ -92,6 +98,11 @@ def _answer(study: Study) -> Iterator[str]:
             f"{_title(study, v.key)} (`{v.key}`) {explain} the gap with probability"
             f" {p[v.key]:.2f}; {sizes}."
         )
+    elif v.kind == NO_GAP:
+        yield (
+            "What calibration leaves is no more than repeatability, the model's own form and the"
+            " constants that nobody calibrates explain."
+        )
     else:
         yield v.words[0].upper() + v.words[1:] + "."
     if v.kind in (UNDECIDED, NAMED) and len(v.candidates) > 1:
@@ -113,11 +124,11 @@ def _sized(d: Diagnosis, key: str, id: str) -> str:
     """The size of the effect ``id`` of ``key`` amid a sentence."""
     q, base = d.parameter(key, id), d.problem.spans[id].base
     whose = f"the size of `{id}`" if "+" in key else "its size"
-    unit = f" {q['unit']}" if q["unit"] else ""
-    held = f", counting the {base:g} that the case has already" if base else ""
-    return (
-        f"{whose} is {q['value']:.3g}{unit}, 90 % between {q['low']:.3g} and {q['high']:.3g}{held}"
-    )
+    has = in_engineers_units(base, q["unit"])
+    held = f", counting the {has} that the case has already" if base else ""
+    unit, factor = said(q["unit"])
+    value, low, high = (f"{factor * q[key]:.3g}" for key in ("value", "low", "high"))
+    return f"{whose} is {f'{value} {unit}'.rstrip()}, 90 % between {low} and {high}{held}"
 
 
 def _gap(d: Diagnosis) -> Iterator[str]:
@@ -217,10 +228,7 @@ def _which(study: Study) -> Iterator[str]:
         size, seen = "", ""
         if key not in (NONE, OUTSIDE):
             both = [d.parameter(key, id) for id in key.split("+")]
-            size = " and ".join(
-                f"{q['value']:.3g} ({q['low']:.3g} to {q['high']:.3g}) {q['unit']}".strip()
-                for q in both
-            )
+            size = " and ".join(map(_ranged, both))
         if key in d.problem.spans:
             seen = f"{d.separability.lambdas[key]:.0f}"
         rows.append(f"| {_title(study, key)} | {p:.2f} | {size} | {seen} |")
@@ -234,7 +242,11 @@ def _which(study: Study) -> Iterator[str]:
             continue
         names = ", ".join(f"`{id}`" for id in group)
         yield f"These data cannot separate {names}."
-    held = [f"`{id}` {span.base:g}" for id, span in d.problem.spans.items() if span.base]
+    held = [
+        f"`{id}` {in_engineers_units(span.base, span.unit)}"
+        for id, span in d.problem.spans.items()
+        if span.base
+    ]
     if held:
         yield (
             f"The case has {', '.join(held)} already: sizes count that in, the smallest that would"
@@ -242,7 +254,7 @@ def _which(study: Study) -> Iterator[str]:
         )
     blind = [id for id, e in d.separability.smallest.items() if e is None]
     sizes = [
-        f"`{id}` {abs(e):.2g} {d.problem.spans[id].unit}".strip()
+        f"`{id}` {in_engineers_units(abs(e), d.problem.spans[id].unit, 2)}"
         for id, e in d.separability.smallest.items()
         if e is not None
     ]
@@ -253,10 +265,23 @@ def _which(study: Study) -> Iterator[str]:
         yield f"Not to be seen with these data at any size in its range: {names}."
 
 
+def _ranged(q: Mapping[str, Any]) -> str:
+    unit, factor = said(q["unit"])
+    value, low, high = (f"{factor * q[key]:.3g}" for key in ("value", "low", "high"))
+    return f"{value} ({low} to {high}) {unit}".rstrip()
+
+
 def _shrinkage(d: Diagnosis) -> Iterator[str]:
     s = d.shrinkage
     if s is None:
         yield "There are too few data to hold any out."
+        return
+    if d.leading is None:
+        yield (
+            f"Held out by rule: {s.held_out}. The error there is {s.before_percent:.2f} %, of which"
+            f" repeatability alone leaves {s.floor_percent:.2f} %. There is no gap for an effect to"
+            f" close; `{s.effect}`, the likeliest, would make it {s.after_percent:.2f} %."
+        )
         return
     yield (
         f"Held out by rule: {s.held_out}. Without an effect the error there is"
@@ -271,6 +296,29 @@ def _shrinkage(d: Diagnosis) -> Iterator[str]:
         f" least squares, the error there is {s.least_squares_before_percent:.2f} % without the"
         f" effect and {s.least_squares_after_percent:.2f} % with it."
     )
+
+
+def _variables(study: Study) -> Iterator[str]:
+    """What was calibrated, without and with what the diagnosis leads to."""
+    found, key = study.variables, study.diagnosis.leading
+    heads = {"without": "without an effect", "with": f"with `{key}`"}
+    shown = {head: found[side] for side, head in heads.items() if found[side]}
+    rows = [f"| variable | {' | '.join(shown)} |", "|---|" + "---|" * len(shown)]
+    rows += [
+        f"| {name} | {' | '.join(_calibrated(side[name]) for side in shown.values())} |"
+        for name in found["without"]
+    ]
+    yield "\n".join(rows)
+    yield (
+        "Values, and one standard error of each by all that is uncertain; `tyrecal fit` weighs by"
+        " the scatter of its targets only."
+    )
+
+
+def _calibrated(variable: Mapping[str, Any]) -> str:
+    value, error = variable["value"], variable["standard_error"]
+    share = f" \N{PLUS-MINUS SIGN} {100 * error / abs(value):.2g} %" if value else ""
+    return in_engineers_units(value, variable["unit"], 4) + share
 
 
 def _next(d: Diagnosis) -> Iterator[str]:

@@ -19,13 +19,14 @@ from ..diagnose.study import Study
 from ..diagnose.where import Place
 from ..modes.mode import Label
 from ..tyre.mesh import SectionMesh
-from .figure import COLOURS, GREY, in_house_style, new_figure, save
+from .figure import COLOURS, GREY, headline, in_house_style, new_figure, save
 from .words import map_resolution
 
 Array = np.ndarray
 FAMILIES = ("[0,0]", "in-plane", "lateral")
 SHOWN, LEAST = 12, 0.005  # explanations, and the probability below which one is not drawn
 WARM = LinearSegmentedColormap.from_list("evidence", ["#EDEDED", "#F5C98A", "#D55E00"])
+WORDS = 24  # letters of a bar's name in a line
 ENOUGH = 5.0  # ln evidence that is drawn in the full colour
 
 
@@ -45,7 +46,7 @@ def draw_residuals(path: Path, d: Diagnosis) -> None:
     """Residuals of the plain fit over the harmonic, a column a family, a colour a pressure; hollow
     with the likeliest effect in the model. Bars: one standard deviation without a gap."""
     rows, gap = d.problem.observations.rows, d.gap
-    after = _after(d)
+    after = _after(d) if d.leading else None
     pressures = sorted({row.pressure_kPa for row in rows if row.label})
     shown = [name for name in FAMILIES if any(family(row) == name for row in rows)]
     figure = new_figure(2.0 + 2.8 * len(shown), 3.8)
@@ -74,8 +75,8 @@ def draw_residuals(path: Path, d: Diagnosis) -> None:
             panel.set_xlabel("harmonic c")
     axes[0].set_ylabel("measured over model, %")
     words = "What calibration leaves; bars: one standard deviation of a tyre without a gap"
-    with_effect = f"; hollow: with {_within(d, d.best)}" if d.best else ""
-    figure.suptitle(f"{words}{with_effect}", x=0.02, ha="left", fontsize=11)
+    with_effect = f"; hollow: with {_within(d, d.leading)}" if d.leading else ""
+    headline(figure, f"{words}{with_effect}")
     handles, labels = axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=len(pressures), frameon=False)
     save(figure, path)
@@ -86,7 +87,7 @@ def draw_probabilities(path: Path, d: Diagnosis) -> None:
     """The likeliest explanations as bars, before (a mark) and after the data."""
     order = sorted(d.hypotheses, key=lambda h: -d.probabilities[h.key])[:SHOWN]
     order = [h for h in order if d.probabilities[h.key] >= LEAST or h.key in (NONE, OUTSIDE)]
-    figure = new_figure(7.4, 1.3 + 0.3 * len(order))
+    figure = new_figure(7.4, 1.4 + 0.34 * len(order))
     axes = figure.add_subplot()
     place = np.arange(len(order))[::-1]
     colours = ["0.6" if h.key in (NONE, OUTSIDE) else COLOURS[0] for h in order]
@@ -98,38 +99,42 @@ def draw_probabilities(path: Path, d: Diagnosis) -> None:
         axes.text(max(value, h.prior) + 0.01, y, f"{value:.2f}", va="center", fontsize=8)
     axes.axvline(0.7, color=GREY, lw=0.8, ls=":")
     axes.text(0.71, -0.45, "named from here on", fontsize=8, color="0.3")
-    axes.set_yticks(place, [_short(d, h.key) for h in order])
+    axes.set_yticks(place, [fill(_short(d, h.key), 2 * WORDS) for h in order])
     axes.set_xlim(0, max(1.0, 1.1 * max(p)))
     axes.set_xlabel("probability")
-    axes.set_title("What explains the gap", loc="left")
+    words = "What explains the gap" if d.leading else "No gap is seen: how likely each effect is"
+    axes.set_title(words, loc="left")
     axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), frameon=False, borderaxespad=0.2)
     save(figure, path)
 
 
 @in_house_style
 def draw_held_out(path: Path, d: Diagnosis) -> None:
-    """The error on held-out data without and with the effect, beside the noise floor and what
-    chance does."""
+    """The error on held-out data without and, where there is a gap, with the effect, beside the
+    noise floor and what chance does."""
     s = d.shrinkage
     assert s is not None
     figure = new_figure(6.4, 3.4)
     axes = figure.add_subplot()
-    chance = s.before_percent * (1 - s.placebo_95)
-    bars = [s.before_percent, s.after_percent]
-    axes.bar([0, 1], bars, color=["0.6", COLOURS[0]], width=0.55)
-    low, high = (s.before_percent * (1 - r) for r in (s.high, s.low))
-    axes.plot([1, 1], [low, high], color="black", lw=1.2)
-    axes.plot([1, 1], [low, high], "_", color="black", ms=10)
-    for y, words in ((chance, "as far as chance shrinks it (95 %)"),
-                     (s.floor_percent, "repeatability alone")):  # fmt: skip
-        axes.axhline(y, color=GREY, lw=0.9, ls=(0, (5, 3)))
-        axes.text(2.75, y, words, va="bottom", ha="right", fontsize=8, color="0.3")
-    axes.set_xticks(
-        [0, 1], ["without an effect", f"with {_within(d, s.effect)}\n(line: 90 % range)"]
-    )
-    axes.set_xlim(-0.5, 2.8)
+    names = ["without an effect"]
+    axes.bar([0], [s.before_percent], color="0.6", width=0.55)
+    if d.leading:
+        names.append(f"{fill(f'with {_within(d, s.effect)}', WORDS)}\n(line: 90 % range)")
+        axes.bar([1], [s.after_percent], color=COLOURS[0], width=0.55)
+        low, high = (s.before_percent * (1 - r) for r in (s.high, s.low))
+        axes.plot([1, 1], [low, high], color="black", lw=1.2)
+        axes.plot([1, 1], [low, high], "_", color="black", ms=10)
+        chance = s.before_percent * (1 - s.placebo_95)
+        axes.axhline(
+            chance, color=GREY, lw=1.2, ls=(0, (5, 3)), label="as far as chance\nshrinks it (95 %)"
+        )
+    axes.axhline(s.floor_percent, color=GREY, lw=1.2, ls=":", label="repeatability alone")
+    axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False)
+    axes.set_xticks(range(len(names)), names)
+    axes.set_xlim(-0.5, 1.5)
+    axes.set_ylim(bottom=0)
     axes.set_ylabel("rms error, %")
-    axes.set_title(f"Held out: {s.held_out}", loc="left")
+    headline(figure, f"Held out: {s.held_out}")
     save(figure, path)
 
 
@@ -171,7 +176,7 @@ def draw_section_map(
     words = [fill(map_resolution(effective_rank), 62), *same]
     beside.text(0.0, 0.02, "\n".join(words), transform=beside.transAxes, va="bottom", fontsize=7.5,
               color="0.3")  # fmt: skip
-    axes.set_title("One part changed alone: how well it explains the gap", loc="left")
+    headline(figure, "One part changed alone: how well it explains what calibration leaves")
     scale = ScalarMappable(Normalize(0, ENOUGH), WARM)
     bar = figure.colorbar(scale, ax=axes, orientation="horizontal", shrink=0.6, extend="max")
     bar.set_label("ln evidence against no change")
@@ -200,10 +205,10 @@ def cord_part(material: str) -> str:
 
 
 def _after(d: Diagnosis) -> Array | None:
-    """Residuals (n,) with the likeliest effect at its likeliest size; None without effects."""
-    if d.best is None:
+    """Residuals (n,) with the leading effect at its likeliest size; None without one."""
+    if d.leading is None:
         return None
-    h = d.hypothesis(d.best)
+    h = d.hypothesis(d.leading)
     assert h.fitted is not None
     i = h.best
     shift, tilt, _ = d.problem.added({id: e[[i]] for id, e in h.values.items()}, 1)

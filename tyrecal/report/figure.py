@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from textwrap import fill
 
 import numpy as np
 from matplotlib import rc_context
@@ -30,6 +31,18 @@ def new_figure(width: float, height: float, layout: str | None = "constrained") 
     figure = Figure((width, height), dpi=DPI, layout=layout)  # type: ignore[arg-type]
     FigureCanvasAgg(figure)
     return figure
+
+
+def headline(figure: Figure, words: str) -> None:
+    """A title above all panels, from the left edge, in as many lines as the width asks for."""
+    margin = 0.15 / figure.get_figwidth()
+    title = figure.suptitle(words, x=margin, ha="left", fontsize=11)
+    renderer = figure.canvas.get_renderer()  # type: ignore[attr-defined]
+    room = (1 - 2 * margin) * figure.bbox.width
+    for line in range(len(words), 10, -1):
+        title.set_text(fill(words, line))
+        if title.get_window_extent(renderer).width <= room:
+            return
 
 
 def save(figure: Figure, path: Path) -> None:

@@ -13,7 +13,7 @@ from matplotlib.ticker import MaxNLocator
 from ..evaluate.pressed import Pressed
 from ..studies.patch import Patch, patch_of
 from ..tyre.mesh import SectionMesh
-from .figure import COLOURS, GREY, in_house_style, new_figure, save
+from .figure import COLOURS, GREY, headline, in_house_style, new_figure, save
 from .vtu import write_pressed_vtu
 
 COLOUR_MAP = colormaps["viridis"]
@@ -73,7 +73,7 @@ def draw_patches(path: Path, title: str, patches: Mapping[float, Patch], highest
         axes.set_ylabel("along, mm")
     figure.colorbar(bands, ax=list(grid.flat), shrink=0.8, ticks=levels, format="%.0f",
                     label="contact pressure, kPa")  # fmt: skip
-    figure.suptitle(f"{title}: contact pressure at each load; dots: nodes that touch")
+    headline(figure, f"{title}: contact pressure at each load; dots: nodes that touch")
     save(figure, path)
 
 

@@ -56,9 +56,9 @@ def section_data(
     inflation: points z, r in mm, one after the other."""
     case = with_effects(case)
     place = {n: np.array([z, r]) * 1e3 for n, (r, z) in mesh.nodes.items()}
-    areas: dict[str, list[list[float]]] = {}
+    areas: dict[str, list[list[float]]] = {name: [] for name, _ in case.section.regions}
     for number, (region, _) in mesh.cells.items():
-        areas.setdefault(region, []).append(_line(place, mesh.solids[number][:4]))
+        areas[region].append(_line(place, mesh.solids[number][:4]))
     held = set(mesh.rim)
     around = outline(mesh)
     inflated = None

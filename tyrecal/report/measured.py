@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from textwrap import fill
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -42,7 +43,7 @@ def measured_table(runs: Sequence[Run]) -> Table:
             label, sigma = told.judged.label, told.mode.sigma_Hz
             member = f" member {told.member}" if told.member else ""
             table.add_row(
-                Text(f"{label}{member}" if label else "-"),
+                Text(f"{label.said}{member}" if label else "-"),
                 f"{told.mode.frequency_Hz:.2f}",
                 f"{sigma:.3f}" if sigma is not None and np.isfinite(sigma) else "-",
                 f"{100 * told.mode.damping:.2f}" if np.isfinite(told.mode.damping) else "-",
@@ -57,8 +58,8 @@ def sensors_words(told: Mapping[Label, Sequence[Label]]) -> str:
     lines = []
     for c in sorted({label.c for label in told}):
         mine = {label: alike for label, alike in told.items() if label.c == c}
-        right = ", ".join(str(label) for label, alike in mine.items() if not alike)
-        wrong = [f"cannot tell {label}, it looks like {_few(alike)}"
+        right = ", ".join(label.said for label, alike in mine.items() if not alike)
+        wrong = [f"cannot tell {label.said}, it looks like {_few(alike)}"
                  for label, alike in mine.items() if alike]  # fmt: skip
         lines.append("; ".join([f"can tell {right}"] * bool(right) + wrong))
     return "\n".join(lines)
@@ -66,7 +67,9 @@ def sensors_words(told: Mapping[Label, Sequence[Label]]) -> str:
 
 def _few(labels: Sequence[Label], most: int = 4) -> str:
     more = len(labels) - most
-    return ", ".join(map(str, labels[:most])) + (f" and {more} more" if more > 0 else "")
+    return ", ".join(label.said for label in labels[:most]) + (
+        f" and {more} more" if more > 0 else ""
+    )
 
 
 def draw_measured(path: Path, runs: Sequence[Run]) -> None:
@@ -111,15 +114,16 @@ def _draw_functions(axes: Axes, run: Run) -> None:
         hertz = told.mode.frequency_Hz
         axes.axvline(hertz, color=COLOURS[0], lw=0.7, ls=(0, (4, 3)))
         level = level + 1 if hertz - before < 0.08 * (f[-1] - f[0]) else 0
-        axes.annotate(str(told.judged.label or "?"), (hertz, 1.0), (2, -9 - 11 * level),
+        name = told.judged.label.said if told.judged.label else "?"
+        axes.annotate(name, (hertz, 1.0), (2, -9 - 13 * level),
                       xycoords=("data", "axes fraction"), textcoords="offset points", fontsize=8,
-                      color=COLOURS[0])  # fmt: skip
+                      color=COLOURS[0], bbox={"fc": "white", "ec": "none", "pad": 0.8})  # fmt: skip
         before = hertz
     axes.set_xlim(min(f[0], *inside), f[-1])
     axes.set_xlabel("frequency, Hz")
     axes.set_ylabel("response over force")
-    axes.set_title(f"{Path(run.name).name}: root mean square over {len(run.functions)} functions",
-                   loc="left", pad=8)  # fmt: skip
+    words = f"{Path(run.name).name}: root mean square over {len(run.functions)} functions"
+    axes.set_title(fill(words, 90), loc="left", pad=8)  # fmt: skip
     axes.legend(loc="lower right", facecolor="white", edgecolor="none", framealpha=1)
 
 
@@ -160,7 +164,7 @@ def _draw_shape(axes: Axes, told: Told) -> None:
     axes.set_axis_off()
     axes.set_xlim(-1.45, 1.45)
     axes.set_ylim(-1.45, 1.45)
-    name = f"{label or 'not told'}{' ' + told.member if told.member else ''}"
+    name = f"{label.said if label else 'not told'}{' ' + told.member if told.member else ''}"
     axes.set_title(f"{name}, {told.mode.frequency_Hz:.2f} Hz", fontsize=9)
     axes.text(0, 0, f"{COMPONENTS[k]}\n{told.judged.confidence:.2f}", ha="center", va="center",
               fontsize=8, color=GREY)  # fmt: skip

@@ -18,19 +18,21 @@ from .vtu import write_vtu
 
 
 def draw_evaluation(
-    folder: Path, case: LoadedCase, evaluation: Evaluation, modes: Sequence[Mode]
+    folder: Path, study: str, case: LoadedCase, evaluation: Evaluation, modes: Sequence[Mode]
 ) -> None:
-    """section.png, modes.png (at most nine of them) and, per mode, mode_C_M[_KIND].png and .vtu.
+    """STUDY_section.png, all modes (at most nine of them) in modes.png or STUDY_modes.png and, per
+    mode, STUDY_mode_C_M[_KIND].png and .vtu.
 
     Only modes known on the whole section are drawn: a 3-D solver gives them on the crown alone.
     """
     mesh = section_mesh(case)
     moved, modes = placed(evaluation, modes, mesh)
-    draw_section(folder / "section.png", case, mesh, moved or None)
+    draw_section(folder / f"{study}_section.png", case, mesh, moved or None)
     if modes:
-        draw_modes_overview(folder / "modes.png", modes, mesh)
+        overview = "modes.png" if study == "modes" else f"{study}_modes.png"
+        draw_modes_overview(folder / overview, modes, mesh)
     for mode in modes:
-        stem = folder / file_name(mode.label)
+        stem = folder / f"{study}_{file_name(mode.label)}"
         draw_mode(stem.with_suffix(".png"), mode, mesh)
         write_vtu(stem.with_suffix(".vtu"), mode, mesh)
 
@@ -45,7 +47,7 @@ def draw_fit(
     unit: str = "Hz",
 ) -> None:
     """The pictures of the fitted design, and convergence.png; ``unit``: of the objective."""
-    draw_evaluation(folder, with_values(case, values), evaluation, modes)
+    draw_evaluation(folder, "fit", with_values(case, values), evaluation, modes)
     draw_convergence(folder / "convergence.png", history, unit)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 Array = np.ndarray
 
 RUBBER = ("#E3E3E3", "#C9DCEB", "#F5E6C0", "#D3C3B3", "#E2D3E8", "#CFE5CB")  # pale: cords stand out
+LETTERS = 110  # of all columns of the legend
 DETAIL = 4.0  # magnification of the belt's edge
 
 
@@ -53,11 +55,12 @@ def draw_section(
     axes.set_xlabel("z along the axle, mm")
     axes.set_ylabel("r from the axle, mm")
     z, r = np.transpose([place[n] for n in around])
-    axes.set_title(case.case.name, fontsize=13, pad=22)
+    figure.suptitle(fill(case.case.name, 64), fontsize=13)
     facts = (f"outer diameter {2 * r.max():.1f} mm, section width {np.ptp(z):.1f} mm,"
              f" {len(mesh.solids)} elements")  # fmt: skip
-    axes.text(0.5, 1.02, facts, transform=axes.transAxes, ha="center", color="0.3")
-    figure.legend(entries.values(), entries.keys(), loc="outside lower center", ncols=3,
+    axes.set_title(facts, fontsize=9, color="0.3")
+    columns = max(1, min(3, LETTERS // max(map(len, entries))))
+    figure.legend(entries.values(), entries.keys(), loc="outside lower center", ncols=columns,
                   frameon=False)  # fmt: skip
     save(figure, path)
 

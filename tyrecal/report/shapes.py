@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.cm import ScalarMappable
+from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d import Axes3D
 from mpl_toolkits.mplot3d.art3d import (
@@ -18,7 +19,7 @@ from mpl_toolkits.mplot3d.art3d import (
 
 from ..modes.mode import Mode
 from ..tyre.mesh import SectionMesh
-from .figure import in_house_style, new_figure, save
+from .figure import COLOURS, in_house_style, new_figure, save
 from .revolve import motion, skin, swept
 from .words import motion as words
 
@@ -26,6 +27,7 @@ Array = np.ndarray
 
 ANGLES = 72
 LARGEST = 0.12  # displacement in the picture over the tyre's radius
+NEARER = 0.03  # of the radius: bold lines over the surface that they lie on
 VIEW = 1.15  # half a view's width over the tyre's radius
 COLOUR_MAP = colormaps["viridis"]
 PERSPECTIVE = (22.0, -55.0)
@@ -49,12 +51,7 @@ def draw_mode(path: Path, mode: Mode, mesh: SectionMesh, scale: float | None = N
         _view(figure, surface, (x, y), half, elevation, azimuth)
         figure.text(x / 9.2, (y - below) / 5.7, name, ha="center", va="center", color="0.3")
     figure.suptitle(title(mode), x=0.5)
-    bar = figure.add_axes((5.9 / 9.2, 0.3 / 5.7, 2.4 / 9.2, 0.08 / 5.7))
-    figure.colorbar(
-        ScalarMappable(cmap=COLOUR_MAP), bar, orientation="horizontal", ticks=[0, 0.5, 1]
-    )
-    bar.set_title("displacement over the largest", fontsize=8, color="0.3")
-    bar.tick_params(labelsize=8)
+    _key(figure, [mode], (5.6, 5.2))
     save(figure, path)
 
 
@@ -62,22 +59,46 @@ def draw_mode(path: Path, mode: Mode, mesh: SectionMesh, scale: float | None = N
 def draw_modes_overview(path: Path, modes: Sequence[Mode], mesh: SectionMesh) -> None:
     """Draw up to nine modes, lowest first, in perspective on one sheet. Raises NoSectionShape."""
     lowest = sorted(modes, key=lambda mode: mode.frequency_Hz)[:9]
-    height = 0.1 + 3.2 * -(-len(lowest) // 3)
+    height = 0.9 + 3.2 * -(-len(lowest) // 3)
     figure = new_figure(9.0, height, None)
     for k, mode in enumerate(lowest):
         x, y = 1.5 + 3 * (k % 3), height - 1.8 - 3.2 * (k // 3)
         _view(figure, _surface(mode, mesh, None), (x, y), 1.45, *PERSPECTIVE)
         figure.text(x / 9.0, (y + 1.38) / height, title(mode).replace(" - ", "\n"), ha="center")
+    _key(figure, lowest, (0.3, 0.3))
     save(figure, path)
+
+
+def _key(figure: Figure, modes: Sequence[Mode], words_at: tuple[float, float]) -> None:
+    """What the colours are, at the foot, and the lines, at inches from the lower left corner."""
+    width, height = figure.get_size_inches()
+    bar = figure.add_axes((5.9 / width, 0.3 / height, 2.4 / width, 0.08 / height))
+    figure.colorbar(
+        ScalarMappable(cmap=COLOUR_MAP), bar, orientation="horizontal", ticks=[0, 0.5, 1]
+    )
+    bar.set_title("displacement over the largest", fontsize=8, color="0.3")
+    bar.tick_params(labelsize=8)
+    words = ["grey: outline at rest"]
+    if any(_twists(mode) for mode in modes):
+        words.append("orange: meridians at rest")
+    x, y = words_at
+    figure.text(x / width, y / height, "; ".join(words), fontsize=8, color="0.3")
+
+
+def _twists(mode: Mode) -> bool:
+    """Whether the tyre turns about its axle, so that its outline stays where it is."""
+    return mode.label.kind == "torsional"
 
 
 @dataclass(frozen=True)
 class _Surface:
-    """rest, moved (k, angle, 3); share (k, angle): of the largest displacement."""
+    """rest, moved (k, angle, 3); share (k, angle): of the largest displacement; twists: the
+    meridians at rest are drawn."""
 
     rest: Array
     moved: Array
     share: Array
+    twists: bool = False
 
 
 def _surface(mode: Mode, mesh: SectionMesh, scale: float | None) -> _Surface:
@@ -95,7 +116,7 @@ def _surface(mode: Mode, mesh: SectionMesh, scale: float | None) -> _Surface:
         u = np.cos(phase) * u + np.sin(phase) * quarter
     size = np.linalg.norm(u, axis=-1)
     scale = LARGEST * np.abs(rest).max() / size.max() if scale is None else scale
-    return _Surface(rest, rest + scale * u, size / size.max())
+    return _Surface(rest, rest + scale * u, size / size.max(), _twists(mode))
 
 
 def title(mode: Mode) -> str:
@@ -127,23 +148,34 @@ def _view(
     reach = VIEW * np.abs(surface.rest).max()
     axes.set(xlim=(-reach, reach), ylim=(-reach, reach), zlim=(-reach, reach))
     axes.set_box_aspect((1, 1, 1), zoom=1.5)
-    axes.add_collection3d(_faces(surface))
+    axes.add_collection3d(_faces(surface, elevation, azimuth))
     axes.add_collection3d(_outline(surface.rest, elevation, azimuth))
 
 
-def _faces(surface: _Surface) -> Poly3DCollection:
+def _viewer(elevation: float, azimuth: float) -> Array:
+    """Unit vector towards the viewer."""
+    up, round_ = np.radians([elevation, azimuth])
+    return np.array([np.cos(up) * np.cos(round_), np.cos(up) * np.sin(round_), np.sin(up)])
+
+
+def _faces(surface: _Surface, elevation: float, azimuth: float) -> Poly3DCollection:
     p, share = surface.moved, surface.share
     quads = np.stack([p[:-1, :-1], p[1:, :-1], p[1:, 1:], p[:-1, 1:]], 2).reshape(-1, 4, 3)
     mean = (share[:-1, :-1] + share[1:, :-1] + share[1:, 1:] + share[:-1, 1:]).ravel() / 4
-    # meridians in bold, as faces without area so that nearer faces hide them: they show a twist
-    bold = p[:, : -1 : ANGLES // 12]
-    lines = np.stack([bold[:-1], bold[1:], bold[1:], bold[:-1]], 2).reshape(-1, 4, 3)
-    thin = np.arange(len(quads) + len(lines)) < len(quads)
+    # meridians in bold, as faces without area so that nearer faces hide them: they show a twist;
+    # towards the viewer by a little, which moves nothing in the picture, so that their own do not
+    nearer = NEARER * np.abs(surface.rest).max() * _viewer(elevation, azimuth)
+    lines = []
+    for points in (p, surface.rest) if surface.twists else (p,):
+        bold = points[:, : -1 : ANGLES // 12] + nearer
+        lines.append(np.stack([bold[:-1], bold[1:], bold[1:], bold[:-1]], 2).reshape(-1, 4, 3))
+    kinds = np.repeat(np.arange(1 + len(lines)), [len(quads), *map(len, lines)])
+    edges = np.array([(0, 0, 0, 0.12), (0, 0, 0, 1), to_rgba(COLOURS[1])])
     return Poly3DCollection(
-        np.concatenate([quads, lines]),
-        facecolors=COLOUR_MAP(np.append(mean, np.zeros(len(lines)))),
-        edgecolors=np.where(thin[:, None], (0, 0, 0, 0.12), (0, 0, 0, 1)),
-        linewidths=0.5,
+        np.concatenate([quads, *lines]),
+        facecolors=COLOUR_MAP(np.append(mean, np.zeros(len(kinds) - len(quads)))),
+        edgecolors=edges[kinds],
+        linewidths=0.6,
     )
 
 
@@ -154,8 +186,7 @@ def _outline(rest: Array, elevation: float, azimuth: float) -> Line3DCollection:
     """
     widest = np.sort([np.argmin(rest[:, 0, 1]), np.argmax(rest[:, 0, 1])])
     rest = rest[max(widest[0] - 1, 0) : widest[1] + 2]
-    up, round_ = np.radians([elevation, azimuth])
-    viewer = [np.cos(up) * np.cos(round_), np.cos(up) * np.sin(round_), np.sin(up)]
+    viewer = _viewer(elevation, azimuth)
     along, around = rest[1:, :-1] - rest[:-1, :-1], rest[:-1, 1:] - rest[:-1, :-1]
     towards = np.cross(along, around) @ viewer > 0
     rings = np.argwhere(towards[1:] != towards[:-1])

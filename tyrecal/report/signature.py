@@ -8,7 +8,7 @@ import numpy as np
 
 from ..effects import catalogue
 from ..studies.signature import Signature
-from .figure import COLOURS, GREY, in_house_style, new_figure, save
+from .figure import COLOURS, GREY, headline, in_house_style, new_figure, save
 
 BAR = 0.38
 
@@ -34,12 +34,11 @@ def draw_signature(path: Path, found: Signature) -> None:
         axes.axhline(0, color=GREY, lw=0.8)
         axes.margins(y=0.15)
         axes.set_title(f"{found.pressures_kPa[k]:g} kPa", loc="left", fontsize=9, color="0.3")
-        axes.set_ylabel("frequency, %")
-    names = [str(label).replace("[0,0] axial", "[0,0] lateral") for label in found.labels]
-    panels[-1].set_xticks(places, [name.replace(" ", "\n") for name in names])
+    figure.supylabel("change of frequency, %", fontsize=9)
+    panels[-1].set_xticks(places, [label.said.replace(" ", "\n") for label in found.labels])
     size = f"{effect.symbol} = {found.value:g} {effect.unit}".strip()
     absorbed = f": calibration absorbs {100 * found.absorbed:.1f} %" if found.absorbed else ""
-    figure.suptitle(f"{effect.title}, {size}{absorbed}", fontsize=12)
+    headline(figure, f"{effect.title}, {size}{absorbed}")
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=2, frameon=False)
     save(figure, path)

@@ -59,7 +59,7 @@ def fit_table(fit: Mapping[str, Any]) -> Table:
     in_hertz = fit.get("objective_unit", "Hz") == "Hz"
     words = "equation (1)" if in_hertz else "deviations in sigmas"
     _add(table, Text("objective", "bold"), words, *objective, "", "")
-    table.caption = f"frequencies{' and objective' * in_hertz} in Hz"
+    table.caption = f"frequencies{' and objective' * in_hertz} in Hz; {_of(fit)}".rstrip("; ")
     return table
 
 
@@ -71,6 +71,7 @@ def modes_table(modes: Mapping[str, Any]) -> Table:
     table = _table(("mode", "motion", "Hz", *extra))
     load = f", {modes['load_N']:g} N" if modes["load_N"] else ""
     table.title = f"{modes['pressure_kPa']:g} kPa{load}, {modes['mass_kg']:.2f} kg"
+    table.caption = _of(modes)
     for mode in entries:
         cells = [mode.get(key, NONE) for key in extra]
         _add(
@@ -80,6 +81,16 @@ def modes_table(modes: Mapping[str, Any]) -> Table:
             *(f"{cell:.2f}" if isinstance(cell, float) else str(cell) for cell in cells),
         )
     return table
+
+
+def _of(result: Mapping[str, Any]) -> str:
+    """Tyre, what was set, mesh and solver of a result, in a line."""
+    of = result.get("provenance")
+    if not of:
+        return ""
+    given = [f"{name}={value:g}" for name, value in of["overrides"].items()]
+    tyre = f"tyre {of['tyre_sha256'][:8]}"
+    return ", ".join([tyre, *given, f"mesh {of['mesh']}", f"{of['solver']} {of['solver_version']}"])
 
 
 def load_table(rows: Sequence[Mapping[str, Any]], design: str) -> Table:

@@ -2,37 +2,34 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from math import isfinite
 from pathlib import Path
 from typing import Any
 
 from ..case import LoadedCase, start_values, with_values
-from ..evaluate.door import Door, Question
-from ..modes.label import paired_labels
-from ..modes.mode import Label
-
-ALIKE = 0.01  # of a frequency: meshes and solvers differ by less, other tyres by more
+from ..case.identity import is_of_tyre, tyre_sha256
+from ..files import read_json
 
 
 class NotThisFit(ValueError):
     """The file is no result of a fit of this case."""
 
 
-def read_fitted(path: Path, case: LoadedCase, solver: str = "") -> dict[str, float]:
-    """Fitted values of the case's variables (in the units of the numbers they set) in fit.json.
+def read_fitted(path: Path, case: LoadedCase) -> tuple[dict[str, float], list[str]]:
+    """Fitted values of the case's variables (in the units of the numbers they set) in fit.json,
+    and in which ways the fit was made otherwise, in sentences: on another mesh.
 
-    One evaluation makes sure that the fit is this case's: its frequencies have to come out again
-    within 1 %, as far as the case's own number of modes reaches. Raises NotThisFit in one
-    sentence; OSError; EvaluationFailed and what else ``Door.evaluate`` raises.
+    The fit has to be of the same tyre, whatever its targets, state, mesh or solver. Raises
+    NotThisFit in one sentence; OSError.
     """
     try:
-        fit = json.loads(path.read_text(encoding="utf-8"))
+        fit = read_json(path)
         found = {name: v["value"] for name, v in fit["variables"].items()} | fit["fixed"]
-        told = {_label(mode): float(mode["fitted_Hz"]) for mode in fit["modes"]}
         pressure = float(fit["pressure_kPa"])
-    except (ValueError, KeyError, TypeError, AttributeError):
+        of = fit.get("provenance", {})
+        tyre, theirs = of.get("tyre_sha256"), dict(of.get("overrides", {}))
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
         raise NotThisFit(f"'{path}' is not the fit.json that 'tyrecal fit' writes") from None
     names = set(start_values(case))
     for name in [*sorted(names - set(found)), *sorted(set(found) - names)]:
@@ -41,6 +38,13 @@ def read_fitted(path: Path, case: LoadedCase, solver: str = "") -> dict[str, flo
             f"variable '{name}' {where} '{path}'; give a fit of this case, which has"
             f" {', '.join(sorted(names))}"
         )
+    if tyre is None:
+        raise NotThisFit(
+            f"'{path}' does not say which tyre it is of, as an older tyrecal wrote it; run"
+            f" 'tyrecal fit {case.path}' again"
+        )
+    if tyre != tyre_sha256(case):
+        raise NotThisFit(f"'{path}' is a fit of another tyre: {_difference(theirs, case)}")
     for name, value in found.items():
         if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
             raise NotThisFit(f"variable '{name}' is {value!r} in '{path}', must be a finite number")
@@ -52,16 +56,41 @@ def read_fitted(path: Path, case: LoadedCase, solver: str = "") -> dict[str, flo
         with_values(case, design)
     except ValueError as error:
         raise NotThisFit(f"'{path}' holds a design that this case cannot have: {error}") from None
-    evaluation = Door(case, solver).evaluate(Question(design))
-    ours = {mode.label: mode.frequency_Hz for mode in paired_labels(evaluation.modes)}
-    for label, frequency in told.items():
-        if label in ours and not abs(ours[label] - frequency) <= ALIKE * frequency:
-            raise NotThisFit(
-                f"'{path}' is a fit of another case: {label} has {frequency:.2f} Hz there, here"
-                f" {ours[label]:.2f} Hz with the same variables; give the case, --set and --mesh"
-                " that it was fitted with"
-            )
-    return values
+    return values, _made_otherwise(of, case)
+
+
+def _difference(theirs: Mapping[str, Any], case: LoadedCase) -> str:
+    """What sets the tyre of the fit and that of the case apart, as far as can be told."""
+    ours = case.overrides
+    told = [
+        f"{name} is {theirs.get(name, 'as in the case')} there, {ours.get(name, 'as in the case')}"
+        " here"
+        for name in sorted({*theirs, *ours})
+        if is_of_tyre(name) and theirs.get(name) != ours.get(name)
+    ]
+    return "; ".join(told) or (
+        f"'{case.path}', or its section, has been edited since; run 'tyrecal fit' again"
+    )
+
+
+def _made_otherwise(of: Mapping[str, Any], case: LoadedCase) -> list[str]:
+    mesh = case.case.mesh.level
+    if of.get("mesh") == mesh:
+        return []
+    return [f"the fit was made on the mesh '{of.get('mesh')}', this study takes '{mesh}'"]
+
+
+def is_good(fit: Mapping[str, Any]) -> bool:
+    """Whether a fit, the content of fit.json, converged and moved."""
+    return bool(fit["converged"] and fit["moved"])
+
+
+def has_good(path: Path) -> bool:
+    """Whether the file is a fit.json that `is_good`."""
+    try:
+        return is_good(read_json(path, follow=False))
+    except (OSError, ValueError, KeyError, TypeError):
+        return False
 
 
 def pressure_name(case: LoadedCase) -> str:
@@ -70,7 +99,3 @@ def pressure_name(case: LoadedCase) -> str:
         if "pressure_kPa" in variable.sets:
             return name
     return "pressure_kPa"
-
-
-def _label(mode: Mapping[str, Any]) -> Label:
-    return Label(mode["c"], mode["m"], mode["kind"])

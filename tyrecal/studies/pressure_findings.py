@@ -78,17 +78,19 @@ def _family(name: str, rises: Mapping[Label, float]) -> dict[str, Any]:
 
 
 def _words(found: Mapping[str, Any], labels: Sequence[Label]) -> list[str]:
-    modes = list(zip(map(str, labels), found["modes"], strict=True))
+    said = {str(label): label.said for label in labels}
+    modes = list(zip(said.values(), found["modes"], strict=True))
     span = f"from {found['from_kPa']:g} to {found['to_kPa']:g} kPa"
     falling = [name for name, mode in modes if not mode["rises"]]
     words = [f"{_all_but('every mode rises', falling)} {span}"]
     for each in found["families"]:
         if len(each["members"]) > 1:
             first, *_, last = (
-                f"{name} rises {hertz:.1f} Hz"
+                f"{said[name]} rises {hertz:.1f} Hz"
                 for name, hertz in zip(each["members"], each["rise_Hz"], strict=True)
             )
-            grows = _all_but(f"{each['family']}, the rise grows with c", each["exceptions"])
+            others = [said.get(name, name) for name in each["exceptions"]]
+            grows = _all_but(f"{each['family']}, the rise grows with c", others)
             words.append(f"{grows}: {first}, {last}")
     bent = {name: mode["curvature"] for name, mode in modes if mode["curvature"] != "neither"}
     if bent:
@@ -103,7 +105,8 @@ def _words(found: Mapping[str, Any], labels: Sequence[Label]) -> list[str]:
     for odd_step in found["disagreements"]:
         words.append(
             f"from {odd_step['from_kPa']:g} to {odd_step['to_kPa']:g} kPa the shape of"
-            f" {odd_step['label']} goes on under the label {odd_step['followed_to']}"
+            f" {said.get(odd_step['label'], odd_step['label'])} goes on under the label"
+            f" {said.get(odd_step['followed_to'], odd_step['followed_to'])}"
             f" (MAC {odd_step['mac']:.2f})"
         )
     return words

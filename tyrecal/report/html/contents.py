@@ -16,10 +16,35 @@ class Part(BaseModel):
     model_config = ConfigDict(extra="ignore", allow_inf_nan=False, frozen=True)
 
 
+class State(Part):
+    """What a study asked for, several values where it has several; how the rim is held."""
+
+    pressure_kPa: float | list[float]
+    load_N: float | list[float]
+    rim: str
+
+
+class Provenance(Part):
+    """What a result file is of."""
+
+    tyrecal: str
+    solver: str
+    solver_version: str
+    name: str
+    size: str
+    tyre_sha256: str
+    overrides: dict[str, float]
+    state: State
+    mesh: str
+    targets: str | None = None
+    measured_sha256: str | None = None
+
+
 class Whole(Part):
-    """A result file, not only a piece of one."""
+    """A result file, not only a piece of one; older ones do not say what they are of."""
 
     format: Literal[1]
+    provenance: Provenance | None = None
 
 
 Positive = Annotated[float, Field(gt=0)]
@@ -351,10 +376,9 @@ class DiagnosisSection(Whole):
 
 
 class RunFacts(Part):
-    """run.json, but for what differs from run to run."""
+    """A study's entry in run.json, but for what differs from run to run."""
 
     case: str | None = None
     command: str | None = None
     finished: bool = True
-    solver: str | None = None
-    tyrecal: str | None = None
+    started: str = ""

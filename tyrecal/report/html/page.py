@@ -14,7 +14,7 @@ from jinja2 import FileSystemLoader, StrictUndefined
 from jinja2.sandbox import ImmutableSandboxedEnvironment
 from markupsafe import Markup
 
-from ...files import whole
+from ...files import open_file, whole
 from ..table import FOOTPRINT, QUANTITIES, percent
 from ..words import CLOSE, FAR, map_resolution, motion
 from . import drawings, plots
@@ -59,7 +59,12 @@ def write_page(path: Path, folders: Sequence[Path]) -> Page:
         )
     if path.is_dir():
         raise BadResults(f"'{path}' is a folder; give a file with --output")
-    if path.exists() and MARK.encode() not in path.read_bytes()[:2000]:
+    try:
+        with open_file(path, follow=False) as file:
+            ours = MARK.encode() in file.read(2000)
+    except FileNotFoundError:
+        ours = True
+    if not ours:
         raise BadResults(f"'{path}' is no page of tyrecal's; give another file with --output")
     with whole(path) as partial:
         partial.write_bytes(content)
@@ -94,8 +99,14 @@ def chapter(found: Results, prefix: str) -> dict[str, Any]:
         "prefix": prefix,
         "folder": found.folder.resolve().name,
         "case": found.case,
-        "run": found.run,
         "told": summary(found),
+        "of": list(found.provenances.items()),
+        "mixed": len({each.tyre_sha256 for each in found.provenances.values()}) > 1,
+        "stale": [
+            study
+            for study, run in found.runs.items()
+            if study in found.provenances and not run.finished
+        ],
         "absent": [name for key, name in STUDIES.items() if not getattr(found, key)],
         "fit": found.fit and _fit(found),
         "shapes": [each for each in shapes if each],
@@ -126,6 +137,9 @@ def _shapes(what: str, folder: Path, shapes: Shapes | None, table: Any) -> dict[
     heading = {"fit": "Shapes of the fitted tyre", "modes": "Mode shapes"}[what]
     if shapes and shapes.load_N:
         heading = f"Mode shapes under {shapes.load_N:g} N, on the tread"
+    if shapes and shapes.provenance and shapes.provenance.overrides:
+        changes = (f"{name} = {value:g}" for name, value in shapes.provenance.overrides.items())
+        heading += f", with {', '.join(changes)}"
     return {"id": what, "heading": heading, "data": data, "why": why, "section": section}
 
 
@@ -154,11 +168,17 @@ def _pressure(found: Results) -> dict[str, Any]:
         "words": design_words(found.pressure),
         "tables": _tables(rows),
         "targets": bool(targets),
+        "waves": max(mode.c for row in rows for mode in row.modes),
     }
 
 
 def _load(found: LoadSweep) -> dict[str, Any]:
-    return {"rows": found.rows, "words": design_words(found), "panels": plots.load(found.rows)}
+    return {
+        "rows": found.rows,
+        "words": design_words(found),
+        "panels": plots.load(found.rows),
+        "waves": max(mode.c for row in found.rows for mode in row.modes),
+    }
 
 
 def _tables(rows: Sequence[PressureRow]) -> list[dict[str, Any]]:
@@ -230,6 +250,13 @@ def _commands(found: Results) -> list[str]:
     return [name for key, name in STUDIES.items() if getattr(found, key)]
 
 
+def _range(value: float | list[float]) -> str:
+    """A number, or the ends of several."""
+    values = value if isinstance(value, list) else [value]
+    ends = dict.fromkeys(f"{each:.6g}" for each in (min(values), max(values))) if values else ()
+    return " to ".join(ends)
+
+
 @lru_cache(maxsize=1)
 def environment() -> ImmutableSandboxedEnvironment:
     """The sandbox of the page's templates: what comes from files is escaped."""
@@ -244,6 +271,7 @@ def environment() -> ImmutableSandboxedEnvironment:
     made.filters["signed"] = lambda value, digits: f"{value:+.{digits}f}".replace("-", MINUS)
     made.filters["digits"] = lambda value, count: f"{value:.{count}g}"
     made.filters["percent"] = percent
+    made.filters["range"] = _range
     made.globals["map_resolution"] = map_resolution
     made.filters["motion"] = lambda mode: motion(mode.c, mode.m, mode.kind)
     made.filters["label"] = plots.label

@@ -21,8 +21,8 @@ Curve = list[tuple[float, float]]
 
 
 def label(mode: Any) -> str:
-    """[2,1], [0,0] axial"""
-    return str(Label(mode.c, mode.m, mode.kind))
+    """[2,1], [0,0] lateral"""
+    return Label(mode.c, mode.m, mode.kind).said
 
 
 def deviations(fit: Fit) -> Markup:
@@ -141,16 +141,15 @@ def _families(
             style = f"s{mode.c % 6}"
             panel.line(curve, f"line {style} {'dashed' if other else ''}")
             for point in curve:
-                words = f"{mode} {symmetry or design}: {point[1]:.4g} at {point[0]:g}"
+                words = f"{mode.said} {symmetry or design}: {point[1]:.4g} at {point[0]:g}"
                 panel.mark(point, mode.c, f"{style} {'hollow' if other else ''}", words)
         last = {(mode, symmetry): curve[-1][1] for (_, mode, symmetry), curve in own.items()}
         ends = {mode: y for (mode, _), y in last.items()}
-        panel.names([(y, mode.kind or f"{mode.c},{mode.m}")
-                     for mode, y in ends.items()])  # fmt: skip
+        panel.names([(y, mode.said.split()[-1]) for mode, y in ends.items()])
         for mode in ends:
-            if targets and str(mode) in targets and x.low <= target_at <= x.high:
-                value = targets[str(mode)]
-                panel.cross((target_at, value), f"{mode} target {value:g} Hz")
+            if targets and mode.said in targets and x.low <= target_at <= x.high:
+                value = targets[mode.said]
+                panel.cross((target_at, value), f"{mode.said} target {value:g} Hz")
         panels.append(panel.svg())
     return panels
 
@@ -190,7 +189,9 @@ def residuals(found: Sequence[Residual]) -> Markup:
     y = around([0.5, -len(found) + 0.5], "")
     panel = Panel("What calibration leaves", x, y, 80 + 18 * len(found), 166)
     panel.upright(0.0)
-    panel.rows([r.row + (f", run {r.run + 1}" if r.run else "") for r in found])
+    panel.rows(
+        [r.row.replace("axial", "lateral") + (f", run {r.run + 1}" if r.run else "") for r in found]
+    )
     for row, r in enumerate(found):
         low, high = r.percent - r.sigma_percent, r.percent + r.sigma_percent
         panel.span((low, -row), (high, -row), "s0")

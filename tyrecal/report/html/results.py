@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import json
 from dataclasses import dataclass, field
@@ -10,6 +11,7 @@ from typing import TypeVar
 
 from pydantic import ValidationError
 
+from ...files import NotAFile, read_runs, read_text
 from .contents import (
     Diagnosis,
     DiagnosisSection,
@@ -20,11 +22,11 @@ from .contents import (
     Part,
     Patches,
     PressureSweep,
+    Provenance,
     RunFacts,
     Shapes,
+    Whole,
 )
-
-LARGEST = 50_000_000  # bytes of a result file; ours are a hundredth of it
 
 
 class BadResults(ValueError):
@@ -60,16 +62,28 @@ class Results:
     diagnosis: Diagnosis | None = None
     diagnosis_section: DiagnosisSection | None = None
     diagnosis_words: str = ""
-    run: RunFacts = field(default_factory=RunFacts)
+    runs: dict[str, RunFacts] = field(default_factory=dict)
+
+    @property
+    def provenances(self) -> dict[str, Provenance]:
+        """What the results of each study are of, where they say so."""
+        known: dict[str, Whole | None] = {
+            "fit": self.fit, "modes": self.modes, "sweep-pressure": self.pressure,
+            "footprint": self.footprint, "sweep-load": self.load, "diagnose": self.diagnosis,
+        }  # fmt: skip
+        return {name: each.provenance for name, each in known.items() if each and each.provenance}
 
     @property
     def case(self) -> str:
         """The case's name or, in folders that do not know it, its file's."""
+        for of in self.provenances.values():
+            return of.name
         known = (self.fit_shapes, self.modes_shapes, self.patches, self.diagnosis_section)
         for each in known:
             if each:
                 return each.case
-        return Path(self.run.case).stem if self.run.case else self.folder.resolve().name
+        owner = next((run.case for run in self.runs.values() if run.case), None)
+        return Path(owner).stem if owner else self.folder.resolve().name
 
 
 def read_results(folder: Path) -> Results:
@@ -91,11 +105,11 @@ def read_results(folder: Path) -> Results:
         _read(folder / "diagnosis.json", Diagnosis),
         _read(folder / "diagnosis_section.json", DiagnosisSection),
         _text(folder / "diagnosis.md") or "",
-        _read(folder / "run.json", RunFacts) or RunFacts(),
+        _runs(folder),
     )
     studies = (found.fit, found.modes, found.pressure, found.load, found.footprint)
     if not any((*studies, found.diagnosis)):
-        run = found.run
+        run = max(found.runs.values(), key=lambda each: each.started, default=RunFacts())
         last = "" if run.finished else f": its last run, 'tyrecal {run.command}', did not finish"
         if (folder / "batch.json").exists():
             last = "; it is a batch's: give the folders of its cases, which stand in it"
@@ -123,13 +137,22 @@ def _read(path: Path, kind: type[File]) -> File | None:
         ) from None
 
 
+def _runs(folder: Path) -> dict[str, RunFacts]:
+    """The studies' entries in run.json, but for those that are none."""
+    runs = {}
+    for study, facts in read_runs(folder).items():
+        with contextlib.suppress(ValidationError):
+            runs[study] = RunFacts.model_validate(facts)
+    return runs
+
+
 def _text(path: Path) -> str | None:
-    if not path.exists():
-        return None
-    if path.stat().st_size > LARGEST:
-        raise BadResults(f"'{path}' is not what tyrecal writes: it is larger than 50 MB")
     try:
-        return path.read_text(encoding="utf-8")
+        return read_text(path, follow=False)
+    except FileNotFoundError:
+        return None
+    except NotAFile as error:
+        raise BadResults(f"'{path}' is not what tyrecal writes: it {error.strerror}") from None
     except UnicodeDecodeError:
         raise BadResults(f"'{path}' is damaged: it is no text") from None
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ...modes.mode import Label
 from ..words import motion
 from .contents import Shape, Shapes
 
@@ -65,10 +66,9 @@ def _loaded(shapes: Shapes) -> dict[str, Any]:
 
 
 def _named(mode: Shape) -> dict[str, str]:
-    kind = f" {mode.kind}" if mode.kind else ""
     symmetry = f" {mode.symmetry}" if mode.symmetry else ""
     return {
-        "name": f"[{mode.c},{mode.m}]{kind}{symmetry}",
+        "name": Label(mode.c, mode.m, mode.kind).said + symmetry,
         "hertz": f"{mode.frequency_Hz:.2f} Hz",
         "words": motion(mode.c, mode.m, mode.kind),
     }

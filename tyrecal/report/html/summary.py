@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from ..words import CLOSE, fit_doubts, motion
+from ...units import said
+from ..words import fit_doubts, nearness
 from .contents import (
     Diagnosis,
     Failed,
     Fit,
-    FittedMode,
     Footprints,
     LoadSweep,
     Modes,
@@ -74,18 +74,8 @@ def fit_words(fit: Fit) -> list[str]:
         f" {fit.objective_Hz:.2f} {unit} in {fit.evaluations} design points; the fit {end}."
     ]
     if fit.modes:
-        near = [m for m in fit.modes if abs(m.deviation_percent) <= CLOSE]
-        worst = max(fit.modes, key=lambda m: abs(m.deviation_percent))
-        words.append(
-            f"{len(near)} of {len(fit.modes)} frequencies come within {CLOSE:g} % of their"
-            f" targets; farthest off is {_told(worst)} with {worst.deviation_percent:+.1f} %."
-        )
+        words.append(f"{nearness(fit.model_dump()['modes'])}.")
     return [*words, f"{moves}."]
-
-
-def _told(mode: FittedMode) -> str:
-    words = motion(mode.c, mode.m, mode.kind)
-    return f"[{mode.c},{mode.m}] {words}"
 
 
 def modes_words(modes: Modes) -> list[str]:
@@ -128,14 +118,16 @@ def rows_words(found: Footprints) -> str:
 
 def diagnosis_words(found: Diagnosis) -> list[str]:
     """Verdict, size, how far the error shrinks, what next."""
-    words = [sentence(f"{VERDICTS[found.verdict]}: {found.words}")]
+    gap = found.verdict != "no_gap"
+    words = [sentence(VERDICTS[found.verdict] + (f": {found.words}" if gap else ""))]
     if found.effect:
         words[0] += f" Probability {found.probabilities.get(found.effect, 0.0):.2f}."
     if found.effect and found.parameter:
         p = found.parameter
-        words.append(f"Its size is {p.value:.3g} {p.unit}".rstrip()
-                     + f", 90 % between {p.low:.3g} and {p.high:.3g}.")  # fmt: skip
-    if found.shrinkage:
+        unit, factor = said(p.unit)
+        value, low, high = (f"{factor * x:.3g}" for x in (p.value, p.low, p.high))
+        words.append(f"Its size is {value} {unit}".rstrip() + f", 90 % between {low} and {high}.")
+    if found.shrinkage and gap:
         s = found.shrinkage
         words.append(
             f"On held-out data the error goes from {s.before_percent:.2f} to"

@@ -1,0 +1,45 @@
+"""Design variables as a diagnosis calibrates them, without an effect and with the one it likes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from .diagnosis import Diagnosis
+from .evidence import NONE
+from .tyre_model import TyreModel
+
+STEP = 1e-6  # of x, for the slope of a variable in its own unit
+
+
+def calibrated_variables(diagnosis: Diagnosis, model: TyreModel) -> dict[str, Any]:
+    """``without`` and ``with`` (None where there is no gap): {variable: value, standard_error, both
+    in ``unit``}.
+
+    Values at the effect's likeliest size; standard errors over all sizes that are left open.
+    """
+    key = diagnosis.leading
+    return {
+        "without": _calibrated(diagnosis, model, NONE),
+        "with": _calibrated(diagnosis, model, key) if key else None,
+    }
+
+
+def _calibrated(diagnosis: Diagnosis, model: TyreModel, key: str) -> dict[str, dict[str, Any]]:
+    found = diagnosis.hypothesis(key)
+    assert found.fitted is not None
+    p, d = found.posterior, found.fitted.d
+    apart = d - p @ d
+    covariance = np.tensordot(p, found.fitted.covariance, 1) + (p[:, None] * apart).T @ apart
+    x = diagnosis.problem.expansion.x0 + d[found.best]
+    values, above, below = model.values(x), model.values(x + STEP), model.values(x - STEP)
+    scatter = np.sqrt(np.diag(covariance)).tolist()
+    return {
+        name: {
+            "value": values[name],
+            "standard_error": scatter[i] * (above[name] - below[name]) / (2 * STEP),
+            "unit": model.unit(name),
+        }
+        for i, name in enumerate(values)
+    }

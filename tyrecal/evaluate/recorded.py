@@ -1,0 +1,162 @@
+"""What a record may hold: a solver's answer, or a failure. Checked before it is believed."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal, Self
+
+import numpy as np
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from .record import Damaged
+
+REAL = "fiu"  # NumPy's letters for kinds of number
+
+
+def _shaped(
+    kinds: str, *shape: int | None, least: float = -np.inf, nan: bool = False
+) -> AfterValidator:
+    """A number, or an array or list of them, of ``shape`` (None: any length), finite unless
+    ``nan``, above ``least``."""
+
+    def check(value: Any) -> Any:
+        array = np.asarray(value)
+        if array.dtype.kind not in kinds or array.ndim != len(shape):
+            raise ValueError("is not such a number or array")
+        if not all(n in (None, m) for n, m in zip(shape, array.shape, strict=True)):
+            raise ValueError(f"has the shape {array.shape}")
+        if not (nan or np.isfinite(array).all()):
+            raise ValueError("holds a number that is not finite")
+        if least > -np.inf and not (array > least).all():
+            raise ValueError(f"must be above {least:g}")
+        return value
+
+    return AfterValidator(check)
+
+
+Number = Annotated[Any, _shaped(REAL)]
+Positive = Annotated[Any, _shaped(REAL, least=0.0)]
+Points = Annotated[Any, _shaped(REAL, None, 3)]
+Row = Annotated[Any, _shaped(REAL, None)]
+Numbers = Annotated[Any, _shaped("iu", None)]
+Field3D = Annotated[Any, _shaped(REAL, None, None, 3)]
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(strict=True)
+
+
+class _Failure(_Part):
+    cause: Literal["no_equilibrium", "unstable"]  # the deck's own doing, see `door.SETTLED`
+    words: Annotated[str, Field(max_length=100_000)]
+    folder: Annotated[str, Field(max_length=4096)] | None
+
+
+class _Mode(_Part):
+    """As `Solver.read` gives it: on the section (n, amplitude) or in three dimensions."""
+
+    frequency_Hz: Positive
+    multiplicity: Annotated[Any, _shaped("iu", least=0)]
+    n: Annotated[Any, _shaped("iu", least=-1)] = 0
+    amplitude: Annotated[Any, _shaped("c" + REAL, None, 3)] = None
+    displacement: Annotated[Any, _shaped(REAL, None, 3, nan=True)] = None
+    members: Annotated[Any, _shaped(REAL, 2, least=0.0)] | None = None
+
+    @property
+    def points(self) -> int:
+        """Number of points that the shape is known at."""
+        shape = self.displacement if self.amplitude is None else self.amplitude
+        return -1 if shape is None else len(shape)
+
+
+class _Tyre(_Part):
+    pressure_Pa: Annotated[Any, _shaped(REAL, least=-1e-9)]
+    mass_kg: Positive
+    nodes: Numbers
+    points: Annotated[Any, _shaped(REAL, None, None)]
+
+
+class _Modes(_Tyre):
+    modes: list[_Mode]
+    gradients: dict[str, Row]
+    displacement: Points
+
+    @model_validator(mode="after")
+    def _go_together(self) -> Self:
+        count = len(self.points)
+        flat = any(mode.amplitude is not None for mode in self.modes)
+        if any(mode.points != count for mode in self.modes):
+            raise ValueError("a mode's shape has not as many points as there are")
+        if np.shape(self.points)[1] not in (2, 3) or (flat and len(self.nodes) != count):
+            raise ValueError("nodes and points do not go together")
+        if len(self.displacement) not in (0, count):
+            raise ValueError("the inflation has not as many points as there are")
+        if any(len(slopes) != len(self.modes) for slopes in self.gradients.values()):
+            raise ValueError("not every mode has a slope")
+        return self
+
+
+class _Footprint(_Part):
+    """The fields of `pressed.Footprint`."""
+
+    model_config = ConfigDict(extra="forbid")
+    load_N: Positive
+    road_N: Number
+    rim_N: Annotated[Any, _shaped(REAL, 3)]
+    deflection_m: Number
+    stiffness_N_per_m: Number
+    ring: Numbers
+    node: Numbers
+    along_m: Row
+    across_m: Row
+    pressure_Pa: Row
+    area_m2: Row
+    traction_Pa: Annotated[Any, _shaped(REAL, None, 2)]
+    displacement: Field3D
+    contact_area_m2: Positive | None = None
+    mode_frequency_Hz: Row | None = None
+    mode_node: Numbers | None = None
+    mode_shape: Annotated[Any, _shaped(REAL, None, None, None, 3)] | None = None
+
+
+class _Pressed(_Tyre):
+    angles: Row
+    free_radius_m: Positive
+    footprints: Annotated[list[_Footprint], Field(min_length=1)]
+    failure: Annotated[str, Field(max_length=100_000)]
+    cause: Literal["no_equilibrium", "unstable"] = "no_equilibrium"
+
+    @model_validator(mode="after")
+    def _go_together(self) -> Self:
+        rings, nodes = len(self.angles), len(self.points)
+        for each in self.footprints:
+            rows = ("node", "along_m", "across_m", "pressure_Pa", "area_m2", "traction_Pa")
+            if any(len(getattr(each, name)) != len(each.ring) for name in rows):
+                raise ValueError("a patch's lists do not go together")
+            if np.shape(each.displacement)[:2] != (rings, nodes) or not (
+                set(map(int, each.ring)) <= set(range(rings))
+                and set(map(int, each.node)) <= set(map(int, self.nodes))
+            ):
+                raise ValueError("a patch is not on this tyre")
+            told = (each.mode_frequency_Hz, each.mode_node, each.mode_shape)
+            if any(part is not None for part in told):
+                if any(part is None for part in told):
+                    raise ValueError("of modes under load a part is missing")
+                if np.shape(told[2])[:3] != (np.size(told[0]), rings, np.size(told[1])):  # type: ignore[arg-type]
+                    raise ValueError("modes under load do not go together")
+        return self
+
+
+def check(content: Any) -> None:
+    """Whether ``content`` is what `Door` records. Raises Damaged."""
+    kind: type[_Part] = _Failure
+    if isinstance(content, dict) and "answer" in content:
+        content = content["answer"]
+        kind = _Pressed if isinstance(content, dict) and "footprints" in content else _Modes
+    try:
+        kind.model_validate(content)
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = ".".join(map(str, first["loc"])) or "the whole"
+        raise Damaged(f"{place}: {first['msg'].removeprefix('Value error, ')}") from None
+    except (TypeError, ValueError) as error:  # NumPy's of what it cannot make an array of
+        raise Damaged(str(error)) from None
