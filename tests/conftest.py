@@ -1,21 +1,30 @@
-"""Shared by all tests: where the cases are, one BLAS thread, loaded cases."""
+"""Shared by all tests: where the cases are, one BLAS thread, nothing of the user's own settings."""
 
 from __future__ import annotations
 
 import os
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+os.environ["TYRECAL_SETTINGS"] = ""  # not those of whoever runs the tests
+os.environ.pop("TYRECAL_SOLVER_COMMAND", None)
+os.environ.pop("TYRECAL_STORE", None)
 
 import shutil
 import signal
 import threading
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
+from . import chance as chances
+from . import selection
+
 # a shell starts what runs in its background with SIGINT ignored, and commands would inherit that
 if threading.current_thread() is threading.main_thread():
     signal.signal(signal.SIGINT, signal.default_int_handler)
+    if hasattr(signal, "SIGHUP"):  # which nohup has ignored
+        signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 ROOT = Path(__file__).parents[1]
 CASES = ROOT / "cases"
@@ -29,3 +38,22 @@ def case_folder(tmp_path: Path) -> Path:
     for name in ("p235_75r17.yaml", "p235_75r17.csv"):
         shutil.copy(CASES / name, folder)
     return folder
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--seed", type=int, default=0, help="of all that tests draw at random")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    chances.seed = config.option.seed
+    config.pluginmanager.register(selection)
+
+
+@pytest.fixture
+def chance(request: pytest.FixtureRequest) -> Iterator[chances.Chance]:
+    """Draws, and claims about them whose false failures the test's docstring states."""
+    here = chances.Chance(request.node.name)
+    yield here
+    request.node.user_properties.append(("seen", here.seen))  # for tests/studies/chance.py
+    stated = chances.stated(request.function.__doc__)
+    assert here.spent <= 1.001 * stated, f"claims fail falsely at {here.spent:g}, not {stated:g}"

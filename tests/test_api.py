@@ -87,6 +87,7 @@ def test_wrong_input_is_a_value_error_in_a_sentence(call: Any, words: str) -> No
     assert "\n" not in str(error.value)
 
 
+@pytest.mark.lint
 def test_strict_types(tmp_path: Path) -> None:
     """mypy --strict knows what every function takes and returns, and what is not offered."""
     program = tmp_path / "program.py"

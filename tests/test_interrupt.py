@@ -6,7 +6,9 @@ import contextlib
 import gc
 import os
 import signal
+import threading
 from collections.abc import Iterator
+from concurrent.futures import Future
 from multiprocessing import resource_tracker
 from pathlib import Path
 from typing import Any
@@ -15,8 +17,13 @@ import click
 import pytest
 
 from tyrecal.evaluate import folders
-from tyrecal.evaluate.pool import process_pool
-from tyrecal.interrupt import ctrl_c_heard, ctrl_c_put_off, ctrl_c_remembered, raise_ctrl_c
+from tyrecal.evaluate.pool import first_done, process_pool
+from tyrecal.interrupt import (
+    interrupt_heard,
+    interrupts_put_off,
+    interrupts_remembered,
+    raise_interrupt,
+)
 
 from .cli.test_conventions import CASE, COARSE, run
 
@@ -41,8 +48,8 @@ def then_ctrl_c(function: Any) -> Any:
 
 def test_put_off_it_counts_when_the_block_is_done() -> None:
     done = []
-    with pytest.raises(KeyboardInterrupt), ctrl_c_put_off():
-        with ctrl_c_put_off():
+    with pytest.raises(KeyboardInterrupt), interrupts_put_off():
+        with interrupts_put_off():
             signal.raise_signal(signal.SIGINT)
         done.append("all")
     assert done
@@ -77,22 +84,36 @@ def test_a_pool_is_made_whole(monkeypatch: pytest.MonkeyPatch) -> None:
     assert known and sorted(known) == sorted(forgotten)
 
 
+def test_locks_that_a_thread_shares_are_not_torn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Met between giving a lock back and taking it again, it would give it back twice."""
+    plain = threading.Condition._release_save
+
+    def release(lock: threading.Condition) -> Any:
+        state = plain(lock)
+        signal.raise_signal(signal.SIGINT)
+        return state
+
+    monkeypatch.setattr(threading.Condition, "_release_save", release)
+    with pytest.raises(KeyboardInterrupt):
+        first_done([Future()])
+
+
 def test_one_that_was_swallowed_is_raised_again() -> None:
-    with ctrl_c_remembered():
-        raise_ctrl_c()
+    with interrupts_remembered():
+        raise_interrupt()
         with contextlib.suppress(KeyboardInterrupt):
             signal.raise_signal(signal.SIGINT)
-        assert ctrl_c_heard()
+        assert interrupt_heard()
         with pytest.raises(KeyboardInterrupt):
-            raise_ctrl_c()
-    assert not ctrl_c_heard()
+            raise_interrupt()
+    assert not interrupt_heard()
 
 
 def test_where_it_is_ignored_it_stays_so() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    with ctrl_c_remembered():
+    with interrupts_remembered():
         signal.raise_signal(signal.SIGINT)
-        raise_ctrl_c()
+        raise_interrupt()
 
 
 @pytest.mark.parametrize("met", ["swallowed", "another error"])

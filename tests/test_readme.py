@@ -1,4 +1,7 @@
-"""Every command of the README and the guides runs, in the order in which it stands there."""
+"""Every command of the README and the guides runs, on what the commands above it have made.
+
+One ```sh block is one test.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +10,7 @@ import re
 import shutil
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -30,47 +34,121 @@ GUIDES = [
 ]
 PACKAGED = ("ccx", "chromedriver", "fish")  # by Debian: CI installs them, tests do without
 OWN_SETUP = "python3 -m venv"  # the two commands that set themselves up; CI runs the second
+MAKERS = {  # first words of blocks whose files those below them read
+    "README.md": ["tyrecal fit cases/p235_75r17.yaml\n"],
+    "cases/own_template.md": ["mkdir -p cases/my_templates"],
+    "cases/measured_data.md": ["tyrecal measured import "],
+}
+QUICK = [  # first words of blocks of the README that the quick set runs, one an area
+    "tyrecal validate", "tyrecal init", "tyrecal fit cases/p235_75r17.yaml\n",
+    "tyrecal sweep-pressure", "tyrecal measured import", "tyrecal report", "tyrecal store",
+]  # fmt: skip
 
 
-def commands(guide: str) -> list[str]:
-    """Lines of the guide's ```sh blocks, continued lines joined."""
-    blocks = re.findall(r"```sh\n(.*?)```", (ROOT / guide).read_text(), re.S)
-    lines = "".join(blocks).replace("\\\n", " ").splitlines()
-    return [line for line in lines if line.strip() and not line.startswith("#")]
+def blocks(guide: str) -> list[str]:
+    """The guide's ```sh blocks, but for those that set themselves up."""
+    found = re.findall(r"```sh\n(.*?)```", (ROOT / guide).read_text(), re.S)
+    return [block for block in found if OWN_SETUP not in block]
 
 
-@pytest.mark.parametrize("guide", GUIDES)
-def test_commands_of(guide: str, tmp_path: Path) -> None:
-    for name in ("cases", "tests/benchmarks"):
-        shutil.copytree(ROOT / name, tmp_path / name)
-    environment = {**os.environ, "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}"}
-    for command in commands(guide):
-        if OWN_SETUP in command:
-            continue
-        done = subprocess.run(
-            command, shell=True, cwd=tmp_path, capture_output=True, text=True, env=environment
+def makes(guide: str, block: str) -> bool:
+    return block.startswith(tuple(MAKERS.get(guide, ())))
+
+
+def marks(guide: str, block: str) -> list[pytest.MarkDecorator]:
+    needs = {"calculix": pytest.mark.ccx, "--scheduler cases": pytest.mark.cluster}
+    found = [mark for word, mark in needs.items() if word in block]
+    quick = guide == "README.md" and block.startswith(tuple(QUICK))
+    return [*found, *([] if quick else [pytest.mark.guide])]
+
+
+def parameters() -> list[object]:
+    return [
+        pytest.param(
+            guide, number, marks=marks(guide, block), id=f"{guide}-{number}-{block.split()[1]}"
         )
-        assert done.returncode == 0, f"{command}\n{done.stdout[-1500:]}{done.stderr[-1500:]}"
+        for guide in GUIDES
+        for number, block in enumerate(blocks(guide))
+    ]
+
+
+def execute(block: str, folder: Path) -> None:
+    """The block in a shell that stops at the first command that fails."""
+    environment = {**os.environ, "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}"}
+    done = subprocess.run(
+        ["sh", "-e", "-c", block], cwd=folder, capture_output=True, text=True, env=environment
+    )
+    assert done.returncode == 0, f"{block}\n{done.stdout[-1500:]}{done.stderr[-1500:]}"
+
+
+Clone = Callable[[str, int], Path]
+
+
+@pytest.fixture(scope="module")
+def clone(tmp_path_factory: pytest.TempPathFactory) -> Clone:
+    """The folder as the makers among a guide's first ``count`` blocks leave it, each run once.
+
+    It is always the same one, since results know the path of their case.
+    """
+    top = tmp_path_factory.mktemp("guide")
+    folder, kept = top / "clone", {"": top / "fresh"}
+    shutil.copytree(ROOT / "cases", kept[""] / "cases")
+
+    def after(blocks: list[str]) -> Path:
+        name = "".join(blocks)
+        if name not in kept:
+            execute(blocks[-1], after(blocks[:-1]))
+            kept[name] = Path(shutil.copytree(folder, top / f"after {len(kept)} blocks"))
+        shutil.rmtree(folder, ignore_errors=True)
+        return Path(shutil.copytree(kept[name], folder))
+
+    return lambda guide, count: after(
+        [block for block in blocks(guide)[:count] if makes(guide, block)]
+    )
+
+
+@pytest.mark.parametrize(("guide", "number"), parameters())
+def test_commands_of(guide: str, number: int, clone: Clone) -> None:
+    block = blocks(guide)[number]
+    if makes(guide, block):
+        clone(guide, number + 1)
+    else:
+        execute(block, clone(guide, number))
+
+
+@pytest.mark.parametrize("guide", MAKERS)
+def test_what_makes_files_for_others_is_in_the_guide(guide: str) -> None:
+    for words in MAKERS[guide]:
+        assert any(block.startswith(words) for block in blocks(guide)[:-1]), words
+
+
+def test_the_quick_blocks_are_in_the_readme() -> None:
+    for words in QUICK:
+        assert any(block.startswith(words) for block in blocks("README.md")), words
 
 
 @pytest.mark.parametrize("guide", ["README.md", "cases/python.md"])
-def test_python_of(guide: str, tmp_path: Path) -> None:
-    shutil.copytree(ROOT / "cases", tmp_path / "cases")
+def test_python_of(guide: str, clone: Clone) -> None:
     (program,) = re.findall(r"```python\n(.*?)```", (ROOT / guide).read_text(), re.S)
     done = subprocess.run(
-        [sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True
+        [sys.executable, "-c", program], cwd=clone(guide, 0), capture_output=True, text=True
     )
     assert done.returncode == 0, done.stderr[-1500:]
     assert len(done.stdout.splitlines()) >= 6
 
 
-def test_ci_runs_the_readmes_test_command_and_nothing_cleverer() -> None:
-    (test_command,) = [c for c in commands("README.md") if OWN_SETUP in c and "pytest" in c]
-    lines = (ROOT / ".ci/run").read_text().splitlines()
+def test_ci_runs_the_readmes_test_command_then_what_it_leaves_out() -> None:
+    lines = (ROOT / "README.md").read_text().splitlines()
+    (test_command,) = [line for line in lines if OWN_SETUP in line and "pytest" in line]
+    script = (ROOT / ".ci/run").read_text().splitlines()
     debians = tuple(f"command -v {program} >/dev/null ||" for program in PACKAGED)
-    aside = ("#", "set ", "cd ", *debians)
-    body = [line for line in lines if line and not line.startswith(aside)]
-    assert body == [test_command]
+    aside = ("#", "set ", "cd ", "export PYTEST_ADDOPTS=--durations=25", *debians)
+    assert [line for line in script if line and not line.startswith(aside)] == [
+        f"{test_command} || failed=1",
+        '.venv-test/bin/pytest -n 2 -m "not quick" || failed=1',
+        ".venv-test/bin/python -m tests.kernels || failed=1",
+        "exit ${failed:-0}",
+    ]
 
 
 def test_files_named_in_the_guides_exist() -> None:

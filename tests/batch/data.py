@@ -21,4 +21,4 @@ def report(name: str, **studies: dict[str, Any]) -> dict[str, Any]:
         "solver_runs": 9,
         "answered_from_record": 0,
     }
-    return {"name": name, "studies": studies, "facts": facts}
+    return {"name": name, "provenance": {}, "studies": studies, "facts": facts}

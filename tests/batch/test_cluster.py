@@ -97,6 +97,7 @@ def square(task: float) -> float:
     return task**2
 
 
+@pytest.mark.cluster
 def test_one_of_four_workers_killed_in_the_middle(machines: Machines, tmp_path: Path) -> None:
     cases = list(map(str, vary(tmp_path / "cases", 5)))
     plain, out = tmp_path / "plain", tmp_path / "out"
@@ -127,6 +128,7 @@ def test_one_of_four_workers_killed_in_the_middle(machines: Machines, tmp_path: 
     assert not list(out.rglob("run-*"))
 
 
+@pytest.mark.cluster
 def test_a_task_that_kills_workers_is_given_up(tmp_path: Path) -> None:
     own = Machines(tmp_path, DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES="1")
     try:
@@ -141,6 +143,7 @@ def test_a_task_that_kills_workers_is_given_up(tmp_path: Path) -> None:
         own.stop()
 
 
+@pytest.mark.cluster
 def test_starts_of_a_fit_are_those_of_one_process(machines: Machines, tmp_path: Path) -> None:
     (case,) = map(str, vary(tmp_path / "cases", 1))
     starts = ["--starts", "2", "--seed", "1", "--no-pictures", "--quiet", "--output"]
@@ -148,7 +151,7 @@ def test_starts_of_a_fit_are_those_of_one_process(machines: Machines, tmp_path: 
     scheduler = ["--scheduler", machines.address]
     assert run("fit", case, *starts, str(tmp_path / "b"), *scheduler) == 0
     assert (tmp_path / "a/fit.json").read_bytes() == (tmp_path / "b/fit.json").read_bytes()
-    facts = json.loads((tmp_path / "b/run.json").read_text())
+    facts = json.loads((tmp_path / "b/run.json").read_text())["fit"]
     assert facts["solver_runs"] == len(list((tmp_path / "b").glob("record/*/*.record")))
 
 
@@ -157,6 +160,7 @@ def slow(task: float) -> float:
     return task
 
 
+@pytest.mark.cluster
 def test_a_scheduler_that_goes_away_ends_the_command(tmp_path: Path) -> None:
     own = Machines(tmp_path)
     try:
@@ -171,6 +175,7 @@ def test_a_scheduler_that_goes_away_ends_the_command(tmp_path: Path) -> None:
         own.stop()
 
 
+@pytest.mark.cluster
 def test_order_and_exceptions(machines: Machines) -> None:
     with executor(scheduler=machines.address) as workers:
         assert list(in_order(workers.each(square, [5.0, 0.0, 7.0]))) == [25, 0, 49]
@@ -178,6 +183,7 @@ def test_order_and_exceptions(machines: Machines) -> None:
             list(workers.each(square, [1.0, -1.0]))
 
 
+@pytest.mark.cluster
 def test_another_edition_at_a_worker_is_refused(
     machines: Machines, monkeypatch: pytest.MonkeyPatch
 ) -> None:

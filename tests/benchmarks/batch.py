@@ -38,7 +38,8 @@ def main(count: int, jobs: int, coarse: bool) -> None:
             code, seconds[n], waited = run([*command, *out], environment)
             quiet[n] = seconds[n] - waited
             counts = json.loads((folder / str(n) / "batch.json").read_text())["counts"]
-            facts = json.loads((folder / str(n) / "run.json").read_text())["cases"].values()
+            facts = json.loads((folder / str(n) / "run.json").read_text())["batch"]
+            facts = facts["cases"].values()
             cpu = sum(each["cpu_seconds"] for each in facts)
             print(f"{count} cases, {n} at a time: {seconds[n]:.1f} s, without waiting for a core"
                   f" {quiet[n]:.1f} s; {cpu:.1f} s of a core in the cases, exit code {code},"

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from tyrecal.blind.protocol import BadTrials, read_protocol
-from tyrecal.blind.score import score
+from tyrecal.blind.score import Scored, score
 from tyrecal.blind.tables import page, summary
 
 from ..studies.blind_least_squares import STUDIES, errors, unpacked
@@ -37,8 +37,16 @@ def trials(study: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_calibrated_as_usual_the_error_shrinks_too(study: Path, trials: Path) -> None:
-    found = errors(trials)
+@pytest.fixture(scope="module")
+def scored(trials: Path) -> list[Scored]:
+    return score(trials, trials.with_name("trials-truth"))
+
+
+@pytest.mark.slow
+def test_calibrated_as_usual_the_error_shrinks_too(
+    study: Path, trials: Path, scored: list[Scored]
+) -> None:
+    found = errors(trials, scored)
     before, after = 100 * np.median(found["effect"], 0)
     shrinks, chance = (1 - found[kind][:, 1] / found[kind][:, 0] for kind in ("effect", "none"))
     got = before, after, np.median(shrinks), np.quantile(chance, 0.95)
@@ -61,8 +69,9 @@ def alike(found: Any, stated: Any, where: str = "") -> None:
         assert found == pytest.approx(stated, rel=1e-6, abs=1e-9), where
 
 
-def test_the_study_says_what_is_on_record(study: Path, trials: Path) -> None:
-    figures = summary(score(trials, trials.with_name("trials-truth")))
+@pytest.mark.slow
+def test_the_study_says_what_is_on_record(study: Path, trials: Path, scored: list[Scored]) -> None:
+    figures = summary(scored)
     words = page(figures, read_protocol(trials).maker)
     figures.pop("misses")
     alike(figures, json.loads((study / "score.json").read_text()))

@@ -165,6 +165,7 @@ def test_answers_resume_to_the_same_bytes(tmp_path: Path) -> None:
     assert files[1].stat().st_mtime_ns == kept
 
 
+@pytest.mark.slow
 def test_a_whole_study_of_the_toy(tmp_path: Path) -> None:
     folder, sealed = made(tmp_path, protocol(16, 8, 4, swapped=0.0))
     answer(folder, SCALE, SCALE.model_rows)

@@ -40,6 +40,7 @@ def test_steps_out_of_order_are_refused(
         assert words in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_study_from_end_to_end(
     coarse: Path,  # noqa: F811
     tmp_path: Path,

@@ -71,16 +71,17 @@ def test_fit_writes_the_same_bytes_twice(
     assert fit["objective_Hz"] == pytest.approx(3.115, abs=0.01)
     assert fit["evaluations_to_0.05_Hz"] <= 12
     assert set(fit["variables"]) == {"A_belt", "A_carcass", "C10"}
-    run_facts = json.loads((tmp_path / "one" / "run.json").read_text())
+    run_facts = json.loads((tmp_path / "one" / "run.json").read_text())["fit"]
     assert run_facts["command"] == "fit" and run_facts["solver"].startswith("bundled ")
 
 
+@pytest.mark.slow
 def test_fit_with_pictures(tmp_path: Path) -> None:
     assert run("fit", CASE, "--output", str(tmp_path), "--quiet", "--fix", "C10") == 0
     names = {path.name for path in tmp_path.iterdir()}
-    assert {"fit.json", "convergence.png", "section.png", "modes.png"} <= names
+    assert {"fit.json", "convergence.png", "fit_section.png", "fit_modes.png"} <= names
     for kind in (".png", ".vtu"):
-        assert len([n for n in names if n.startswith("mode_") and n.endswith(kind)]) == 9
+        assert len([n for n in names if n.startswith("fit_mode_") and n.endswith(kind)]) == 9
     assert "C10" not in json.loads((tmp_path / "fit.json").read_text())["variables"]
 
 
@@ -103,7 +104,15 @@ def test_a_failed_solver_run_is_kept_and_quoted(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "out"
-    arguments = ["--pressure-kPa", "1900", "--set", "A_carcass=1e-8", "--set", "C10=1e5"]
+    arguments = [
+        "--allow-unusual",
+        "--pressure-kPa",
+        "1900",
+        "--set",
+        "A_carcass=1e-8",
+        "--set",
+        "C10=1e5",
+    ]
     assert run("modes", CASE, "--output", str(out), *arguments) == 3
     message = capsys.readouterr().err
     assert "inflation stopped at" in message and "of 1900 kPa" in message
@@ -158,7 +167,7 @@ def test_wrong_options_of_fit(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     out = ["--output", str(tmp_path / "out"), "--no-pictures"]
     assert run("fit", CASE, *out, "--fix", "A_bolt") == 2
     assert "A_belt" in capsys.readouterr().err
-    assert run("fit", CASE, *out, "--set", "A_belt=1e-3") == 2
+    assert run("fit", CASE, *out, "--set", "A_belt=1.5e-5") == 2
     assert "bounds" in capsys.readouterr().err
     assert run("fit", CASE, *out, "--fix", "A_belt", "--fix", "A_carcass", "--fix", "C10") == 2
     assert "no variable is free" in capsys.readouterr().err
@@ -198,7 +207,7 @@ def test_results_go_on_where_their_project_was_moved(case_folder: Path, tmp_path
     assert run("modes", str(case_folder / "p235_75r17.yaml"), *asked, str(out)) == 0
     moved = case_folder.rename(tmp_path / "moved")
     assert run("modes", str(moved / "p235_75r17.yaml"), *asked, str(moved / "out")) == 0
-    facts = json.loads((moved / "out" / "run.json").read_text())
+    facts = json.loads((moved / "out" / "run.json").read_text())["modes"]
     assert facts["case"] == str(moved / "p235_75r17.yaml") and facts["solver_runs"] == 0
 
 
@@ -284,7 +293,8 @@ def test_variables_that_start_at_zero(
         )
     )  # fmt: skip
     path.write_text(text.replace("\ntargets:", f"\n{extra}\ntargets:"))
-    assert run("deck", str(path), "--output", str(case_folder / "out"), "--quiet") == 0
+    assert run("deck", str(path), "--output", str(case_folder / "out"), "--quiet",
+               "--allow-unusual") == 0  # fmt: skip
     request = json.loads((case_folder / "out" / "modes.request.json").read_text())
     slopes = {name: [row[3] for row in rows] for name, rows in request["sensitivities"].items()}
     assert slopes["p"] == pytest.approx([1e3, 1e3])

@@ -21,7 +21,7 @@ TWO = ["--loads-N", "1000,4000"]
 @pytest.fixture
 def hertz(monkeypatch: pytest.MonkeyPatch) -> type[Hertz]:
     """Footprints by a formula, for what is not the solver's business."""
-    monkeypatch.setattr(door_module, "find_solver", lambda name: Hertz())
+    monkeypatch.setattr(door_module, "find_solver", lambda name, *command: Hertz())
     return Hertz
 
 
@@ -49,8 +49,8 @@ def test_both_designs(
           for rest in (".png", "_1000N.vtu", "_4000N.vtu")),
     }  # fmt: skip
     printed = capsys.readouterr()
-    assert "the fitted tyre's area is larger" in printed.out and printed.err == ""
-    facts = json.loads((out / "run.json").read_text())
+    assert "the fitted tyre's area is larger" in printed.out and printed.err == "footprint ...\n"
+    facts = json.loads((out / "run.json").read_text())["footprint"]
     assert (facts["command"], facts["solver_runs"]) == ("footprint", 2)
 
 
@@ -63,7 +63,7 @@ def test_json_record_and_pictures(
     assert json.loads(capsys.readouterr().out) == json.loads(first)
     assert run(*arguments) == 0
     assert (tmp_path / "footprint.json").read_bytes() == first
-    facts = json.loads((tmp_path / "run.json").read_text())
+    facts = json.loads((tmp_path / "run.json").read_text())["footprint"]
     assert (facts["solver_runs"], facts["answered_from_record"]) == (0, 1)
     assert not list(tmp_path.glob("*.png")) and not list(tmp_path.glob("*.vtu"))
 
@@ -87,7 +87,8 @@ def test_which_designs_and_loads(hertz: type[Hertz], tmp_path: Path) -> None:
 def test_a_load_out_of_reach_keeps_those_below(
     hertz: type[Hertz], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert run("footprint", CASE, "--output", str(tmp_path), "--loads-N", "4000,30000,40000") == 3
+    assert run("footprint", CASE, "--output", str(tmp_path), "--loads-N", "4000,30000,40000",
+               "--allow-unusual") == 3  # fmt: skip
     printed, found = capsys.readouterr(), result(tmp_path)
     assert [row["load_N"] for row in found["rows"]] == [4000]
     (failed,) = found["failed"]
@@ -106,6 +107,7 @@ def test_nothing_is_written_where_no_load_is_reached(
     assert not list(tmp_path.glob("footprint*"))
 
 
+@pytest.mark.slow
 def test_jobs_and_the_record_change_no_byte(tmp_path: Path) -> None:
     """The bundled solver, both designs."""
     case, out = str(coarse_case(tmp_path)), [tmp_path / "one", tmp_path / "two"]
@@ -120,21 +122,23 @@ def test_jobs_and_the_record_change_no_byte(tmp_path: Path) -> None:
     before = {name: (out[1] / name).read_bytes() for name in names}
     assert run(*arguments, str(out[1])) == 0
     assert {name: (out[1] / name).read_bytes() for name in names} == before
-    facts = json.loads((out[1] / "run.json").read_text())
+    facts = json.loads((out[1] / "run.json").read_text())["footprint"]
     assert (facts["solver_runs"], facts["answered_from_record"]) == (0, 2)
     initial, fitted = result(out[1])["rows"]
     assert initial["area_m2"] != fitted["area_m2"]
     assert 80e-4 < initial["area_m2"] < 140e-4
 
 
+@pytest.mark.slow
 def test_more_than_the_tyre_can_bear(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The bundled solver's sentence, and the load that it had reached."""
     out = tmp_path / "out"
     case = str(coarse_case(tmp_path))
-    loads = ["--loads-N", "2000,200000", "--no-pictures"]
+    loads = ["--loads-N", "2000,200000", "--no-pictures", "--allow-unusual"]
     assert run("footprint", case, "--output", str(out), *loads) == 3
     assert [row["load_N"] for row in result(out)["rows"]] == [2000]
-    assert "error: initial, 200000 N: no equilibrium between" in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert "error: initial, 200000 N: " in said and "mm down to the rim)" in said
 
 
 @pytest.mark.parametrize(

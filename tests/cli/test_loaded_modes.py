@@ -14,6 +14,7 @@ from ..studies.loaded import coarse_case
 from .test_cli import CASE, run
 
 
+@pytest.mark.slow
 def test_one_load_the_record_and_a_load_out_of_reach(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -34,11 +35,12 @@ def test_one_load_the_record_and_a_load_out_of_reach(
     assert (out / "modes.json").read_bytes() == first
     assert (out / "modes_shapes.json").read_bytes() == shapes
     assert "Mode shapes under 300 N" in (out / "report.html").read_text()
-    facts = json.loads((out / "run.json").read_text())
+    facts = json.loads((out / "run.json").read_text())["modes"]
     assert (facts["solver_runs"], facts["answered_from_record"]) == (0, 2)
-    sweep = ["modes", case, "--output", str(out), "--sweep-load", "0,300,300000"]
+    sweep = ["modes", case, "--output", str(out), "--sweep-load", "0,300,300000", "--allow-unusual"]
     assert run(*sweep) == 3
-    assert "error: initial, 300000 N: no equilibrium between" in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert "error: initial, 300000 N: " in said and "mm down to the rim)" in said
     found = json.loads((out / "load_sweep.json").read_text())
     assert [row["load_N"] for row in found["rows"]] == [0, 300]
     assert found["failed"][0]["load_N"] == 300000
@@ -47,14 +49,15 @@ def test_one_load_the_record_and_a_load_out_of_reach(
     assert (out / "load_sweep.png").stat().st_size > 10000
 
 
+@pytest.mark.slow
 def test_a_tyre_that_no_load_is_borne_by(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "out"
     arguments = ["modes", str(coarse_case(tmp_path)), "--output", str(out), "--load-N", "300000"]
-    assert run(*arguments) == 3
+    assert run(*arguments, "--allow-unusual") == 3
     printed = capsys.readouterr()
-    assert "no equilibrium between" in printed.err and "Traceback" not in printed.err
+    assert "mm down to the rim)" in printed.err and "Traceback" not in printed.err
     assert not (out / "modes.json").exists()
 
 

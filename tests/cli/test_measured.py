@@ -205,21 +205,10 @@ def test_what_is_lacking_is_asked_for(
     assert words in printed and "Traceback" not in printed
 
 
-def test_without_the_package_for_functions_its_name_is_told(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setitem(sys.modules, "sdypy", None)
-    code = run("measured", "import", str(FUNCTIONS[0]), "--pressure-kPa", "240", *TEST,
-               "--output", str(tmp_path / "m.csv"))  # fmt: skip
-    assert code == 2
-    assert "need the package sdypy-EMA: pip install 'tyrecal[lab]'" in capsys.readouterr().err
-
-
 def test_help_and_tables_import_nothing_heavy() -> None:
     for command, kept_out in (
-        (["measured", "import", "--help"], ("numpy", "pyuff", "sdypy", "matplotlib")),
-        (["measured", "import", str(TABLE), "--output", "-no-such/m.csv"], ("pyuff", "sdypy",
-                                                                            "matplotlib")),
+        (["measured", "import", "--help"], ("numpy", "pyuff", "matplotlib")),
+        (["measured", "import", str(TABLE), "--output", "-no-such/m.csv"], ("pyuff", "matplotlib")),
     ):  # fmt: skip
         code = (
             "import sys; sys.argv[0] = 'tyrecal'\nfrom tyrecal.cli.main import main\n"

@@ -26,7 +26,7 @@ def test_studies_write_it_and_the_command_writes_the_same(
     first = (out / "report.html").read_text()
     assert "P235/75R17 on an 8 inch rim" in first and "Shapes of the fitted tyre" in first
     assert run("sweep-pressure", case, *options, *fitted, "--steps", "2") == 0
-    monkeypatch.setattr(door_module, "find_solver", lambda name: Hertz())
+    monkeypatch.setattr(door_module, "find_solver", lambda name, *command: Hertz())
     assert run("footprint", case, *options, *fitted, "--loads-N", "1000,4000") == 0
     page = (out / "report.html").read_bytes()
     assert page.count(b'<svg class="swatch"') > 4 and len(page) < 1_000_000

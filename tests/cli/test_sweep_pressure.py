@@ -10,6 +10,8 @@ from typing import Any
 
 import pytest
 
+from tyrecal.case import load_case
+from tyrecal.case.identity import tyre_sha256
 from tyrecal.evaluate.door import Door, Question
 from tyrecal.evaluate.failure import EvaluationFailed
 from tyrecal.evaluate.results import Evaluation
@@ -32,7 +34,7 @@ def result(out: Path) -> dict[str, Any]:
     return json.loads((out / "pressure_sweep.json").read_text())
 
 
-def fit_of(point: dict[str, Any], path: Path) -> str:
+def fit_of(point: dict[str, Any], path: Path, case: Path | str = CASE) -> str:
     """A fit.json that ended at a point of the reference, with the reference's frequencies."""
     modes = []
     for text, frequency in point["modes"].items():
@@ -40,7 +42,9 @@ def fit_of(point: dict[str, Any], path: Path) -> str:
         modes.append({"c": int(c), "m": int(m), "kind": kind[0] if kind else None,
                       "fitted_Hz": frequency})  # fmt: skip
     fit = {"variables": {v: {"value": point[v]} for v in VARIABLES}, "fixed": {},
-           "modes": modes, "pressure_kPa": point["pressure_kPa"]}  # fmt: skip
+           "modes": modes, "pressure_kPa": point["pressure_kPa"],
+           "provenance": {"tyre_sha256": tyre_sha256(load_case(case)), "mesh": "default"}
+           }  # fmt: skip
     path.write_text(json.dumps(fit))
     return str(path)
 
@@ -50,7 +54,7 @@ def test_both_designs_against_the_reference(
     name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Every mode at 100, 160, 200, 240, 320 kPa (fitted: 240) within 0.2 % (0.5 % asked for)."""
-    fit = fit_of(REFERENCE[name][1], tmp_path / "fit.json")
+    fit = fit_of(REFERENCE[name][1], tmp_path / "fit.json", CASES / f"{name}.yaml")
     out = tmp_path / "out"
     assert run("sweep-pressure", str(CASES / f"{name}.yaml"), "--output", str(out),
                "--fitted", fit) == 0  # fmt: skip
@@ -97,6 +101,7 @@ def test_exact_slopes_are_those_of_the_frequencies(
         assert mode["d_ln_f_d_ln_p"] == pytest.approx(rise / math.log(201 / 199), rel=1e-5), text
 
 
+@pytest.mark.slow
 def test_a_solver_in_three_dimensions_without_slopes(
     coarse: Callable[..., Path], tmp_path: Path
 ) -> None:
@@ -128,21 +133,21 @@ def test_jobs_and_the_record_change_no_byte(tmp_path: Path) -> None:
     first = {name: (one / name).read_bytes() for name in RESULTS}
     assert {name: (two / name).read_bytes() for name in RESULTS} == first
     for out in (one, two):
-        facts = json.loads((out / "run.json").read_text())
+        facts = json.loads((out / "run.json").read_text())["sweep-pressure"]
         assert (facts["solver_runs"], facts["answered_from_record"]) == (6, 0)
         assert facts["command"] == "sweep-pressure" and not (out / "runs").exists()
     lost = next(one.glob("record/*/*.record"))
     lost.unlink()  # as if the first run had been killed before it
     assert run(*arguments, str(one), "--jobs", "2") == 0
     assert {name: (one / name).read_bytes() for name in RESULTS} == first
-    facts = json.loads((one / "run.json").read_text())
+    facts = json.loads((one / "run.json").read_text())["sweep-pressure"]
     assert (facts["solver_runs"], facts["answered_from_record"]) == (1, 5)
 
 
 SOFT = ["--set", "A_carcass=1e-8", "--set", "C10=1e5"]  # has no equilibrium beyond 353 kPa
 
 
-@pytest.mark.parametrize("jobs", ["1", "2"])
+@pytest.mark.parametrize("jobs", [pytest.param("1", marks=pytest.mark.slow), "2"])
 def test_a_pressure_that_fails_costs_no_other(
     jobs: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -184,7 +189,7 @@ def test_nothing_is_written_where_every_pressure_fails(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "out"
-    ends = ["--from-kPa", "400", "--to-kPa", "450", "--steps", "2"]
+    ends = ["--from-kPa", "400", "--to-kPa", "450", "--steps", "2", "--mesh", "coarse"]
     assert run("sweep-pressure", CASE, "--output", str(out), *SOFT, *ends) == 3
     assert capsys.readouterr().err.count("inflation stopped at") == 2
     assert not [name for name in RESULTS if (out / name).exists()]
@@ -199,7 +204,7 @@ def test_nothing_is_written_where_every_pressure_fails(
         (["--from-kPa", "0"], "above 0"),
         (["--from-kPa", "nan"], "finite"),
         (["--to-kPa", "inf"], "finite"),
-        (["--to-kPa", "5000"], "2000"),
+        (["--to-kPa", "5000"], "usual is 50 to 1200 kPa"),
         (["--to-kPa", "high"], "not a valid float"),
         (["--steps", "1"], "2<=x"),
         (["--steps", "2.5"], "not a valid int"),
@@ -224,16 +229,17 @@ def test_wrong_options(
 def test_a_fit_of_another_case_is_refused(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    fit = fit_of(REFERENCE["p235_75r17_narrow_rim"][1], tmp_path / "fit.json")
+    other = "p235_75r17_narrow_rim"
+    fit = fit_of(REFERENCE[other][1], tmp_path / "fit.json", CASES / f"{other}.yaml")
     out = tmp_path / "out"
     assert run("sweep-pressure", CASE, "--output", str(out), "--fitted", fit) == 2
-    assert "is a fit of another case" in capsys.readouterr().err
+    assert "is a fit of another tyre" in capsys.readouterr().err
     assert not out.exists()
 
 
 def test_a_fit_is_taken_as_it_is_written(tmp_path: Path) -> None:
     """The real fit.json, in the same folder; the sweep passes through its frequencies."""
-    out = ["--output", str(tmp_path), "--quiet"]
+    out = ["--output", str(tmp_path), "--quiet", "--mesh", "coarse"]
     assert run("fit", CASE, *out, "--fix", "A_belt", "--no-pictures") == 0
     assert run("sweep-pressure", CASE, *out, "--fitted", str(tmp_path / "fit.json"),
                "--from-kPa", "220", "--to-kPa", "240", "--steps", "2") == 0  # fmt: skip

@@ -153,6 +153,62 @@ def test_a_template_may_not_leave_its_sandbox(case_folder: Path, edit: str, word
     assert "\n" not in str(failure.value)
 
 
+LOOP = "{% for i in range(100000) %}{% for j in range(100000) %}{% endfor %}{% endfor %}"
+DOUBLED = (
+    "{% set ns = namespace(a=['aaaaaaaa']) %}"
+    "{% for i in range(60) %}{% set ns.a = [ns.a, ns.a] %}{% endfor %}{{ ns.a }}"
+)
+
+
+@pytest.mark.parametrize(
+    "edit",
+    [
+        pytest.param(LOOP, marks=pytest.mark.slow),
+        pytest.param("{{ 7 ** (7 ** 11) }}", marks=pytest.mark.slow),
+        pytest.param(DOUBLED, marks=pytest.mark.slow),
+        "{{ 'a' * 3000000000 }}",
+        "{{ '%3000000000d' % 1 }}",
+        "{{ '{:>3000000000}'.format(1) }}",
+        "{{ 'a' | center(3000000000) }}",
+        "{{ 'a' * 60000000 }}",
+    ],
+)
+def test_a_template_has_an_end(case_folder: Path, edit: str) -> None:
+    case = case_with_template(case_folder, "inflate.inp.j2", "*HEADING\n", f"*HEADING\n{edit}\n")
+    with pytest.raises(TemplateFailed, match=r"inflate.*(MemoryError|was stopped)"):
+        Decks(case).texts("abaqus")
+    own = case_folder / "my templates" / "inflate.inp.j2"
+    own.write_text(own.read_text().replace(edit, "right"))
+    assert "\nright\n" in Decks(case).texts("abaqus")["inflate.inp"]
+
+
+def test_own_templates_give_the_same_bytes(
+    case_folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Rendered apart, and where a module in the present folder has the name of one of ours."""
+    (case_folder / "jinja2.py").write_text("raise SystemExit('a stranger was imported')")
+    monkeypatch.chdir(case_folder)
+    plain = Decks(load_case(CASES / "p235_75r17.yaml")).texts("abaqus")
+    own = case_with_template(case_folder, "inflate.inp.j2", "*HEADING\n", "*HEADING\n")
+    assert Decks(own).texts("abaqus") == plain
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "*INCLUDE, INPUT=/etc/passwd",
+        "*INCLUDE, INPUT=../secret.inp",
+        "*Include,\n input = 'C:\\secret.inp'",
+        "*USER SUBROUTINES",
+        "*MATERIAL, NAME=@LIBRARY_FUNCTION",
+    ],
+)
+def test_a_deck_of_own_templates_stays_in_its_folder(case_folder: Path, line: str) -> None:
+    case = case_with_template(case_folder, "inflate.inp.j2", "*RESTART, WRITE\n", f"{line}\n")
+    with pytest.raises(TemplateFailed, match=r"inflate\.inp, line \d+: .* leads out"):
+        Decks(case).texts("abaqus")
+
+
 def test_a_link_out_of_the_template_folder_is_refused(case_folder: Path, tmp_path: Path) -> None:
     case = case_with_template(
         case_folder, "inflate.inp.j2", "*HEADING\n", "*HEADING\n{% include 'link.txt' %}\n"
@@ -166,7 +222,7 @@ def test_a_link_out_of_the_template_folder_is_refused(case_folder: Path, tmp_pat
 @pytest.mark.parametrize("keyword", ["*TIE, NAME=X", "*NODE, SYSTEM=C", "*INCLUDE, INPUT=x.inp"])
 def test_an_unknown_keyword_is_refused_by_name_and_line(case_folder: Path, keyword: str) -> None:
     case = case_with_template(case_folder, "inflate.inp.j2", "*RESTART, WRITE\n", f"{keyword}\n")
-    with pytest.raises(DeckRefused, match=r"inflate\.inp, line 4: .* is not honoured"):
+    with pytest.raises(DeckRefused, match=r"inflate\.inp, line 6: .* is not honoured"):
         Door(case).evaluate(Question({}))
 
 

@@ -9,6 +9,7 @@ from scipy.optimize import least_squares
 from tyrecal.diagnose.diagnosis import Diagnosis, diagnose
 from tyrecal.diagnose.evidence import single, weigh
 from tyrecal.diagnose.expansion import anchored, expand
+from tyrecal.diagnose.next_measurement import rank
 from tyrecal.diagnose.observations import Row
 from tyrecal.diagnose.problem import Change
 from tyrecal.diagnose.regions import Region
@@ -19,12 +20,15 @@ from tyrecal.diagnose.study import Study
 from tyrecal.modes.mode import Label
 from tyrecal.report.diagnosis import page
 
+from ..chance import Chance, generator
 from .toy import LABELS, Toy, drawn, problem
+
+pytestmark = pytest.mark.numbers
 
 
 def diagnosed(toy: Toy, effects: dict[str, float], seed: int, **keys: object) -> Diagnosis:
     base = problem(toy)
-    y = drawn(toy, base, np.random.default_rng(seed), effects, 0.3)
+    y = drawn(toy, base, generator(seed), effects, 0.3)
     return diagnose(toy, toy.rows, base.measured(y).observations, assumed=base.assumed, **keys)  # type: ignore[arg-type]
 
 
@@ -45,22 +49,46 @@ def test_what_is_held_out_follows_a_rule(pressures: tuple[float, ...], held: set
     assert all(row.label for row in chosen)
 
 
-def test_an_effect_shrinks_the_held_out_error_and_the_placebo_does_not() -> None:
+def test_an_effect_shrinks_the_held_out_error(chance: Chance) -> None:
+    """Beyond the placebo's quantile, and least squares' error too, in 17 of 20 tyres.
+
+    False failures: 2e-7.
+    """
     toy = Toy(size=0.02, pressures=(160.0, 200.0, 240.0))
-    found = diagnosed(toy, {"e1": 0.9}, 1)
+    base, shrunk, usual = problem(toy), [], []
+    for _ in range(12):
+        there = base.measured(drawn(toy, base, chance.random, {"e1": 0.9}, 0.3))
+        s = shrink(there)
+        assert s is not None and s.low <= s.high
+        shrunk.append(s.effect == "e1" and s.fraction > s.placebo_95)
+        usual.append(s.least_squares_after_percent < s.least_squares_before_percent)
+    chance.often(shrunk, 0.85)
+    chance.often(usual, 0.85)
+
+
+def test_an_effect_is_told_with_the_rung_that_its_shrinkage_gives() -> None:
+    found = diagnosed(Toy(size=0.02, pressures=(160.0, 200.0, 240.0)), {"e1": 0.9}, 1)
     s = found.shrinkage
-    assert found.verdict.key == "e1" and s is not None and s.effect == "e1"
-    assert s.low <= s.fraction <= s.high or s.fraction > 0.5
-    assert s.fraction > s.placebo_95 and found.rung == 2
-    assert s.after_percent < s.before_percent
-    # tyres without any effect stay below the placebo's quantile, one in twenty aside
-    base, random, beyond = problem(toy), np.random.default_rng(2), 0
-    for _ in range(25):
-        there = base.measured(drawn(toy, base, random, {}, 0.0))
+    assert s is not None
+    named = found.verdict.kind == "named"
+    assert found.rung == 2 or not (named and s.effect == "e1" and s.fraction > s.placebo_95)
+
+
+def test_without_an_effect_the_error_shrinks_beyond_the_placebo_in_one_of_twenty(
+    chance: Chance,
+) -> None:
+    """The placebo's quantile is of 200 draws, and of a model linear in x: 3 to 8 of 100.
+
+    False failures: 1e-7.
+    """
+    toy = Toy(size=0.02, pressures=(160.0, 200.0, 240.0))
+    base, beyond = problem(toy), []
+    for _ in range(16):
+        there = base.measured(drawn(toy, base, chance.random, {}, 0.0))
         fake = shrink(there)
         assert fake is not None
-        beyond += fake.fraction > fake.placebo_95
-    assert beyond <= 5
+        beyond.append(fake.fraction > fake.placebo_95)
+    chance.often(beyond, 0.03, 0.08)
 
 
 @pytest.mark.parametrize("without", [True, False])
@@ -68,7 +96,7 @@ def test_a_calibration_as_usual_stands_beside(without: bool) -> None:
     """Least squares of the other rows, by SciPy on the tyre itself, without and with the effect."""
     toy = Toy(size=0.02, pressures=(160.0, 200.0, 240.0))
     base = problem(toy)
-    y = drawn(toy, base, np.random.default_rng(1), {"e1": 0.9}, 0.3)
+    y = drawn(toy, base, generator(1), {"e1": 0.9}, 0.3)
     there = base.measured(y)
     s = shrink(there, "e1")
     assert s is not None
@@ -84,9 +112,9 @@ def test_a_calibration_as_usual_stands_beside(without: bool) -> None:
     expected = 100 * np.sqrt(np.mean(off(best)[hold] ** 2))
     got = s.least_squares_before_percent if without else s.least_squares_after_percent
     assert got == pytest.approx(expected, rel=1e-6)
-    assert s.least_squares_after_percent < s.least_squares_before_percent
 
 
+@pytest.mark.slow
 def test_a_toggle_that_parts_twins_comes_first_and_does() -> None:
     toy = Toy(twin=True, size=0.02)
     toy.tilt["twin"] = 0.98 * toy.tilt["e0"]
@@ -95,11 +123,34 @@ def test_a_toggle_that_parts_twins_comes_first_and_does() -> None:
     words = [choice.what for choice in alone.choices if choice.gain > 0][:2]
     assert any(id in what for what in words for id in ("e0", "twin"))
     base = problem(toy, changes=(Change("e0", 0.0),))
-    y = drawn(toy, problem(toy), np.random.default_rng(3), {"e0": 0.7}, 0.3)
-    noise = np.random.default_rng(4).normal(0, 0.001, len(y))
+    y = drawn(toy, problem(toy), generator(3), {"e0": 0.7}, 0.3)
+    noise = generator(4).normal(0, 0.001, len(y))
     both = base.measured(np.concatenate([y, y - 0.7 * toy.g["e0"] + noise])).observations
     after = diagnose(toy, toy.rows, both, (Change("e0", 0.0),), base.assumed)
     assert after.verdict.kind == "named" and after.verdict.key == "e0" and after.rung == 4
+
+
+@pytest.mark.parametrize("size", [0.003, 0.012])
+def test_four_measurements_gain_what_half_the_scatter_does(size: float) -> None:
+    """The gain of measuring all again, by the formula that the module states, without its code;
+    of large effects what is beyond a distance of 40 gains nothing."""
+    toy = Toy(effects=2, size=size)
+    p = problem(toy, noise=0.01)
+    sizes = {id: {id: 1.0} for id in ("e0", "e1")}
+    likely = {"e0": 0.5, "e1": 0.3}
+
+    def apart(noise: float) -> float:
+        S = problem(toy, noise=noise).sigma
+        inverse = np.linalg.inv(S)
+        J = toy.J
+        fit = np.linalg.solve(J.T @ inverse @ J + np.diag(toy.spread**-2.0), J.T @ inverse)
+        off = toy.g["e0"] - toy.g["e1"]
+        return float(2 * 0.5 * 0.3 * min(off @ (inverse - inverse @ J @ fit) @ off, 40.0))
+
+    (again,) = [c for c in rank(p, np.zeros(3), likely, sizes, ()) if "all 4 times" in c.what]
+    assert again.hours == 6.0 and 0.1 < apart(0.01) < apart(0.005)
+    assert (apart(0.005) == 12.0) == (size > 0.01)
+    assert again.gain == pytest.approx((apart(0.005) - apart(0.01)) / 6.0, rel=1e-3)
 
 
 def test_an_anchor_is_exact_where_it_was_asked_and_absent_without_the_effect() -> None:
@@ -143,9 +194,13 @@ def test_narrow_peaks_are_integrated() -> None:
     assert width == pytest.approx(2 * 1.645 / np.sqrt(a), rel=0.15)
 
 
-def test_the_section_map_finds_the_part_and_joins_what_looks_alike() -> None:
+def test_the_section_map_finds_the_part_and_joins_what_looks_alike(chance: Chance) -> None:
+    """With its softness within its sigma.
+
+    False failures: 1e-7.
+    """
     toy = Toy(size=0.01)
-    random = np.random.default_rng(5)
+    random = np.random.default_rng(5)  # the tyre is one, its data are drawn
     shape = lambda: np.tile(random.normal(0, 0.3, len(LABELS)), 3)
     soft, other = shape(), shape()
     parts = [
@@ -155,30 +210,50 @@ def test_the_section_map_finds_the_part_and_joins_what_looks_alike() -> None:
         Region("nowhere", 0 * soft, 0 * soft, ""),
     ]
     base = problem(toy)
-    y = drawn(toy, base, np.random.default_rng(6), {}, 0.3) + 0.15 * soft
+    y = drawn(toy, base, chance.random, {}, 0.3) + 0.05 * soft
     found = diagnose(toy, toy.rows, base.measured(y).observations, assumed=base.assumed,
                      parts=lambda x: parts)  # fmt: skip
     best = found.parts[0]
     assert best.region in ("sidewall", "bead") and set(best.same_as) == {"sidewall", "bead"} - {
         best.region
     }
-    assert best.stiffness_percent == pytest.approx(15, abs=3 * best.stiffness_sigma)
+    chance.normal([(best.stiffness_percent - 5) / best.stiffness_sigma])
     (nothing,) = [p for p in found.parts if p.region == "nowhere"]
     assert nothing.evidence == 0 and nothing.stiffness_sigma == pytest.approx(20)
     assert 2 <= found.effective_rank <= 6
 
 
 def test_a_pair_is_told_with_both_sizes() -> None:
-    d = diagnosed(Toy(effects=3), {"e0": 0.8, "e1": 0.6}, 7)
+    toy = Toy(effects=3, size=0.05)
+    d = diagnosed(toy, {"e0": 0.8, "e1": 0.6}, 7)
     told = result(d)
     assert told["effect"] == "e0+e1" and set(told["parameters"]) == {"e0", "e1"}
-    for id, truth in (("e0", 0.8), ("e1", 0.6)):
-        size = told["parameters"][id]
-        assert size["low"] < truth < size["high"]
-    words = page(Study(d, (), False, (), (), None), "tyre", "a.csv")  # type: ignore[arg-type]
+    words = page(Study(d, (), False, (), (), toy), "tyre", "a.csv")  # type: ignore[arg-type]
     for size in told["parameters"].values():
+        assert size["low"] < size["value"] < size["high"]
         number = f"{size['value']:.3g}"
         assert f"is {number}, 90 %" in words and f"{number} ({size['low']:.3g}" in words
+
+
+def test_the_intervals_of_a_pair_cover(chance: Chance) -> None:
+    """Each 90 % interval holds the truth, drawn from its prior, in 88 to 92 of 100 tyres.
+
+    False failures: 2e-7.
+    """
+    toy = Toy(effects=2, bend=0.0)
+    for id in toy.tilt:
+        toy.tilt[id] = 0 * toy.tilt[id]
+    base = problem(toy)
+    inside: dict[str, list[bool]] = {"e0": [], "e1": []}
+    for _ in range(30):
+        truth = {id: chance.random.uniform(0, 1) for id in inside}
+        there = base.measured(drawn(toy, base, chance.random, truth, 1.0))
+        (pair,) = (h for h in weigh(there) if h.key == "e0+e1")
+        for id, hits in inside.items():
+            low, high = (pair.quantile(id, share) for share in (0.05, 0.95))
+            hits.append(low <= truth[id] <= high)
+    for hits in inside.values():
+        chance.often(hits, 0.88, 0.92)
 
 
 def test_the_result_is_plain_data_with_the_promised_keys() -> None:

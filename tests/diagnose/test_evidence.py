@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.stats import chi2, kstest, multivariate_normal
+from numpy.polynomial.hermite import hermgauss
+from scipy.stats import chi2, multivariate_normal, ncx2
 
 from tyrecal.diagnose.covariance import covariance
 from tyrecal.diagnose.evidence import (
@@ -22,10 +23,14 @@ from tyrecal.diagnose.evidence import (
 from tyrecal.diagnose.gap import find_gap, projection
 from tyrecal.diagnose.problem import Assumed, Change
 from tyrecal.diagnose.reading import exchanged, with_exchanged
+from tyrecal.diagnose.response import Answer, Point, Span
 from tyrecal.diagnose.separability import separate
 from tyrecal.diagnose.verdict import decide
 
+from ..chance import Chance, generator
 from .toy import LABELS, Toy, drawn, problem
+
+pytestmark = pytest.mark.numbers
 
 NAMES = ("A", "B", "C")
 
@@ -42,7 +47,7 @@ def test_evidence_against_the_marginal_in_closed_form() -> None:
     """Linear and Gaussian: y ~ N(eta0 + e g, Sigma + J J^T), its integral over e by 4001 points."""
     toy = flat(pressures=(240.0,), effects=2)
     base = problem(toy)
-    y = drawn(toy, base, np.random.default_rng(1), {"e0": 0.5}, 0.3)
+    y = drawn(toy, base, generator(1), {"e0": 0.5}, 0.3)
     p = base.measured(y)
     S = p.sigma + toy.J @ np.diag(toy.spread**2) @ toy.J.T
     ln = lambda e: multivariate_normal(toy.base + e * toy.g["e0"], S).logpdf(y)
@@ -52,114 +57,126 @@ def test_evidence_against_the_marginal_in_closed_form() -> None:
     assert single(p, "e0", 1.0).ln_evidence == pytest.approx(wanted, abs=1e-5)
 
 
-def test_evidence_against_sampling_where_the_model_bends() -> None:
-    """Laplace in x against an average over 400000 draws of x from its prior."""
+@pytest.mark.parametrize("far", [(0, 0, 0), (2, 2, 2), (-2, 2, 0), (3, 0, -3)])
+def test_evidence_against_quadrature_where_the_model_bends(far: tuple[int, int, int]) -> None:
+    """Laplace in x against Gauss and Hermite's rule, 24 nodes each way, at and far from x0."""
     toy = Toy(pressures=(240.0,), effects=1, bend=0.1)
     toy.spread = np.full(3, 0.05)
     base = problem(toy, noise=0.01)
-    y = drawn(toy, base, np.random.default_rng(2), {}, 0.05)
-    p = base.measured(y)
-    random = np.random.default_rng(3)
-    x = random.normal(0, toy.spread, (400_000, 3))
+    (answer,) = toy.answers([Point(toy.spread * far)])
+    assert isinstance(answer, Answer)
+    p = base.measured(answer.eta)
+    fitted = refit(p, {}, 1)
+    nodes, weights = hermgauss(24)
+    grid = np.stack(np.meshgrid(*[np.sqrt(2) * nodes] * 3), -1).reshape(-1, 3)
+    L = np.linalg.cholesky(fitted.covariance[0])
+    x = fitted.d[0] + grid @ L.T
     eta = toy.base + x @ toy.J.T + np.outer((x**2).sum(1), toy.bend)
-    ln = multivariate_normal(np.zeros(len(y)), p.sigma).logpdf(y - eta)
-    wanted = np.log(np.mean(np.exp(ln - ln.max()))) + ln.max()
-    assert refit(p, {}, 1).ln_evidence[0] == pytest.approx(wanted, abs=0.03)
+    ln = multivariate_normal(np.zeros(len(p.places)), p.sigma).logpdf(answer.eta - eta)
+    ln += multivariate_normal(np.zeros(3), np.diag(toy.spread**2)).logpdf(x)
+    ln += np.log(np.einsum("i,j,k->ijk", *[weights] * 3).ravel()) + (grid**2).sum(1) / 2
+    wanted = np.logaddexp.reduce(ln) + 1.5 * np.log(2) + np.linalg.slogdet(L)[1]
+    assert fitted.ln_evidence[0] == pytest.approx(wanted, abs=0.03)
 
 
-def test_the_gap_is_chi2_where_there_is_none() -> None:
-    """p-values of the whole, of every group, and of contrasts are uniform on effect-free tyres."""
+def test_the_gap_is_chi2_where_there_is_none(chance: Chance) -> None:
+    """p-values of the whole, of every group, and of contrasts are uniform on effect-free tyres.
+
+    False failures: 1.8e-6.
+    """
     toy = flat()
     base = problem(toy)
-    random = np.random.default_rng(4)
     whole, groups, contrasts = [], [], []
-    for _ in range(400):
-        p = base.measured(drawn(toy, base, random, {}, 1.0))
+    for _ in range(200):
+        p = base.measured(drawn(toy, base, chance.random, {}, 1.0))
         gap = find_gap(p, refit(p, {}, 1).d[0], NAMES)
         whole.append(gap.p_value)
         groups.append([g.p_value for g in gap.groups])
         contrasts.append([c.p_value for c in gap.contrasts])
     for values in (whole, *np.transpose(groups), *np.transpose(contrasts)):
-        assert kstest(values, "uniform").pvalue > 1e-3
+        chance.distributed(values, "uniform")
 
 
-def test_lambda_is_the_noncentrality() -> None:
-    """r^T P r with an effect has mean n - v + lambda; its distribution is noncentral chi2."""
-    toy = flat(size=0.006)
+def test_lambda_is_the_noncentrality(chance: Chance) -> None:
+    """r^T P r with an effect is noncentral chi2 with n - v degrees of freedom and lambda; without
+    lambda it is not.
+
+    False failures: 1e-7.
+    """
+    toy = flat(size=0.01)
     base = problem(toy)
     P, _, _ = projection(base, np.zeros(3))
     wanted = separate(base, P, {"e0": 1.0}).full["e0"]
-    random = np.random.default_rng(5)
     values = []
-    for _ in range(400):
-        p = base.measured(drawn(toy, base, random, {"e0": 1.0}, 1.0))
+    for _ in range(200):
+        p = base.measured(drawn(toy, base, chance.random, {"e0": 1.0}, 1.0))
         values.append(find_gap(p, refit(p, {}, 1).d[0], NAMES).chi2)
     freedom = len(base.places) - 3
-    assert np.mean(values) == pytest.approx(freedom + wanted, rel=0.05)
-    # a run of 400 with the wrong lambda would be seen
-    assert abs(wanted) > 5
+    chance.distributed(values, ncx2(freedom, wanted).cdf)
+    assert wanted > 25  # with none, half of the values would lie beyond 0.99 of the distribution
+    assert np.mean(np.array(values) > chi2(freedom).ppf(0.99)) > 0.5
 
 
-def test_probabilities_are_calibrated_where_the_truth_is_drawn_from_the_prior() -> None:
-    """Of all that is given a probability p, the share p is true (ECE below that of chance)."""
+def test_probabilities_are_calibrated_where_the_truth_is_drawn_from_the_prior(
+    chance: Chance,
+) -> None:
+    """Of all that is given a probability p, the share p is true, in each of ten bins; and the truth
+    is given more than beforehand in 7 of 10 tyres at least.
+
+    False failures: 1.1e-6.
+    """
     toy = flat(size=0.004, effects=5, pressures=(240.0,))
-    base = problem(toy)
-    random = np.random.default_rng(6)
+    base, random = problem(toy), chance.random
     ids = list(toy.spans)
+    before = {NONE: PRIOR_NONE / 0.9} | {id: 0.65 / 0.9 / len(ids) for id in ids}
     given, true = [], []
-    for _ in range(400):
-        none = random.random() < PRIOR_NONE / (1 - 0.10)
-        id = None if none else ids[random.integers(len(ids))]
-        effects = {} if id is None else {id: random.uniform(0, 1)}
+    for _ in range(200):
+        id = random.choice(list(before), p=list(before.values()))
+        effects = {} if id == NONE else {id: random.uniform(0, 1)}
         there = base.measured(drawn(toy, base, random, effects, 1.0))
         plain = refit(there, {}, 1)  # none, and singles: no truth is outside here
         none = Hypothesis(NONE, PRIOR_NONE, plain.ln_evidence[0], {}, np.zeros(1), plain)
         p = probabilities([none, *(single(there, id, 0.65 / len(ids)) for id in ids)])
-        for key in (NONE, *ids):
-            given.append(p[key])
-            true.append(key == (id or NONE))
-    p, hit = np.array(given), np.array(true, float)
-    assert ece(p, hit) <= np.quantile(
-        [ece(p, random.random(len(p)) < p) for _ in range(200)], 0.99
-    )  # fmt: skip
-    brier, constant = np.mean((p - hit) ** 2), np.mean((hit.mean() - hit) ** 2)
-    assert brier < 0.8 * constant
+        given.append([p[key] for key in before])
+        true.append([key == id for key in before])
+    p, hit = np.array(given), np.array(true)
+    for k in range(10):  # whether the truth is among a bin's: once a tyre, with the sum of its p
+        here = np.minimum((10 * p).astype(int), 9) == k
+        share = (p * here).sum(1)
+        chance.zero_on_average((hit * here).sum(1) - share, 1.0, np.sum(share * (1 - share)))
+    chance.often((p * hit).sum(1) > hit @ list(before.values()), 0.7)
 
 
-def ece(p: np.ndarray, hit: np.ndarray) -> float:
-    """Expected calibration error over ten bins."""
-    place = np.minimum((10 * p).astype(int), 9)
-    return sum(abs((p - hit)[place == k].sum()) for k in range(10)) / len(p)
+def test_false_alarms_and_hits(chance: Chance) -> None:
+    """Effect-free: named in 1 of 50 at most. Effects with lambda from 25 on: the most probable in
+    93 of 100.
 
-
-def test_false_alarms_and_hits() -> None:
-    """Effect-free: hardly ever named. Effects with lambda from 25 on: nearly always, and right."""
+    False failures: 2e-7.
+    """
     toy = Toy(effects=8, size=0.01, pressures=(160.0, 320.0))
-    base = problem(toy)
-    random = np.random.default_rng(7)
-    count, alarms, right, visible = 40, 0, 0, 0
-    for _ in range(count):
+    base, random = problem(toy), chance.random
+    P, _, _ = projection(base, np.zeros(3))
+    alarms, right = [], []
+    for _ in range(40):
         found = weigh(base.measured(drawn(toy, base, random, {}, 0.3)), pairs=False)
         verdict = decide(found, probabilities(found), len(base.places), 3)
-        alarms += verdict.kind == "named"
+        alarms.append(verdict.kind == "named")
         id, e = f"e{random.integers(8)}", random.uniform(0.2, 1)
-        P, _, _ = projection(base, np.zeros(3))
-        if separate(base, P, {id: e}).lambdas[id] < 25:
-            continue
-        visible += 1
+        while separate(base, P, {id: e}).lambdas[id] < 25:
+            id, e = f"e{random.integers(8)}", random.uniform(0.2, 1)
         found = weigh(base.measured(drawn(toy, base, random, {id: e}, 0.3)), pairs=False)
         p = probabilities(found)
-        right += max(p, key=lambda key: p[key]) == id
-    assert alarms <= 1
-    assert visible > 20 and right >= 0.9 * visible
+        right.append(max(p, key=lambda key: p[key]) == id)
+    chance.often(alarms, 0.0, 0.02)
+    chance.often(right, 0.93)
 
 
 def test_nothing_depends_on_units_or_order() -> None:
     toy = Toy()
     base = problem(toy)
-    y = drawn(toy, base, np.random.default_rng(8), {"e2": 0.5}, 0.3)
+    y = drawn(toy, base, generator(8), {"e2": 0.5}, 0.3)
     p = base.measured(y)
-    order = np.random.default_rng(9).permutation(len(y))
+    order = generator(9).permutation(len(y))
     shuffled = replace(
         p,
         places=p.places[order],
@@ -178,75 +195,130 @@ def test_nothing_depends_on_units_or_order() -> None:
     assert probabilities(weigh(again)) == pytest.approx(one, abs=1e-9)
 
 
-def test_twins_share_their_probability_and_are_a_group() -> None:
+def test_twins_that_nothing_tells_apart_share_their_probability() -> None:
+    """0.98 times an effect, its change with x included: the evidences are integrals of one function
+    over 0 to 0.98 and 0 to 1, of the same density, whatever was drawn."""
     toy = Toy(twin=True)
+    toy.tilt["twin"] = 0.98 * toy.tilt["e0"]
     base = problem(toy)
-    y = drawn(toy, base, np.random.default_rng(10), {"e0": 0.6}, 0.3)
-    p = base.measured(y)
-    found = probabilities(weigh(p, pairs=False))
-    assert found["e0"] == pytest.approx(found["twin"], rel=0.25)
-    assert found["e0"] + found["twin"] > 0.8
+    p = base.measured(drawn(toy, base, generator(10), {"e0": 0.6}, 0.3))
+    found = weigh(p, pairs=False)
+    share = probabilities(found)
+    assert share["twin"] / share["e0"] == pytest.approx(1 / 0.98, rel=1e-3)
     P, _, _ = projection(p, np.zeros(3))
     groups = separate(p, P, {"e0": 0.6, "twin": 0.6}).groups(["e0", "twin", "e1"])
     assert ["e0", "twin"] in groups
-    verdict = decide(weigh(p, pairs=False), found, len(y), 3)
+    verdict = decide(found, share, len(p.places), 3)
     assert verdict.kind == "undecided" and {"e0", "twin"} <= set(verdict.candidates)
 
 
-def test_missing_values_only_widen_the_answer() -> None:
-    toy = Toy()
+def test_near_twins_have_the_probability_together(chance: Chance) -> None:
+    """Twins that change a little otherwise with x are told apart by some tyres and not by others;
+    the sum is sure in 19 of 20, and whichever is named is one of the two.
+
+    False failures: 2e-7.
+    """
+    toy = Toy(twin=True)
     base = problem(toy)
-    y = drawn(toy, base, np.random.default_rng(11), {"e1": 0.7}, 0.3)
-    p = base.measured(y)
-    keep = np.random.default_rng(12).random(len(y)) > 0.15
+    together, one = [], []
+    for _ in range(20):
+        p = base.measured(drawn(toy, base, chance.random, {"e0": 0.6}, 0.3))
+        found = weigh(p, pairs=False)
+        share = probabilities(found)
+        together.append(share["e0"] + share["twin"] > 0.8)
+        verdict = decide(found, share, len(p.places), 3)
+        one.append({verdict.key, *verdict.candidates[:1]} & {"e0", "twin"})
+    chance.often(together, 0.95)
+    chance.often([bool(each) for each in one], 0.95)
+
+
+def test_fewer_values_only_widen_the_answer() -> None:
+    """Where the model is linear, and the range of the effect is no limit, a posterior's width is
+    the data's information alone, whatever was drawn."""
+    toy = flat()
+    toy.spans["e1"] = Span(-5.0, 5.0)
+    base = problem(toy)
+    keep = np.arange(len(base.places)) % 3 > 0
     width = lambda q: np.diff([single(q, "e1", 1.0).quantile("e1", s) for s in (0.05, 0.95)])[0]
-    assert width(p.only(keep)) > width(p)
-    assert max(probabilities(weigh(p.only(keep))).items(), key=lambda x: x[1])[0] == "e1"
+    for key in range(5):
+        p = base.measured(drawn(toy, base, generator("fewer", key), {"e1": 0.7}, 0.3))
+        assert width(p.only(keep)) > 1.05 * width(p)
 
 
-def test_a_misread_label_is_outside_and_named() -> None:
+def test_an_effect_is_found_with_values_missing(chance: Chance) -> None:
+    """15 % of the values are gone, any of them: it is the most probable all the same, in 19 of 20.
+
+    False failures: 1e-7.
+    """
     toy = Toy()
-    base = problem(toy)
-    y = drawn(toy, base, np.random.default_rng(13), {}, 0.03)
-    for start in range(0, len(y), len(LABELS)):
-        y[start + 6] += 0.08
-    found = weigh(base.measured(y))
-    verdict = decide(found, probabilities(found), len(y), 3)
-    assert verdict.kind == "outside"
-    assert f"{LABELS[6]} is misread" in verdict.words
+    base, found = problem(toy), []
+    for _ in range(20):
+        p = base.measured(drawn(toy, base, chance.random, {"e1": 0.7}, 0.3))
+        p = p.only(chance.random.random(len(p.places)) > 0.15)
+        share = probabilities(weigh(p, pairs=False))
+        found.append(max(share, key=lambda key: share[key]) == "e1")
+    chance.often(found, 0.95)
 
 
-@pytest.mark.parametrize("effects", [{}, {"e1": 0.9}])
-def test_exchanged_labels_are_found_whatever_else_is_there(effects: dict[str, float]) -> None:
+def test_a_misread_label_is_outside_and_named(chance: Chance) -> None:
+    """In 19 of 20 tyres.
+
+    False failures: 1e-7.
+    """
     toy = Toy()
-    base = problem(toy)
-    y = drawn(toy, base, np.random.default_rng(13), effects, 0.03)
-    assert exchanged(base.measured(y)) is None
-    swapped = base.measured(y)
-    swapped = replace(swapped, observations=with_exchanged(swapped.observations, *LABELS[6:8]))
-    assert abs(swapped.observations.y - y).max() > 0.02  # [3,0] and [3,1]: 5 % apart
-    assert exchanged(swapped) == tuple(sorted(LABELS[6:8], key=str))
-    back = with_exchanged(swapped.observations, *LABELS[6:8])
-    assert np.array_equal(back.y, y)
-
-
-def test_a_shift_of_modes_in_no_catalogue_is_not_named() -> None:
-    toy = Toy(size=0.01)
-    base = problem(toy)
-    random = np.random.default_rng(14)
-    outside = 0
-    for _ in range(10):
-        strange = np.tile(random.normal(0, 0.02, len(LABELS)), 3)
-        y = drawn(toy, base, random, {}, 0.3) + strange
-        found = weigh(base.measured(y))
+    base, told = problem(toy), []
+    for _ in range(20):
+        y = drawn(toy, base, chance.random, {}, 0.03)
+        y[6 :: len(LABELS)] += 0.08
+        found = weigh(base.measured(y), pairs=False)
         verdict = decide(found, probabilities(found), len(y), 3)
-        assert verdict.kind != "no_gap"
-        outside += verdict.kind == "outside"
-    assert outside >= 8
+        told.append(verdict.kind == "outside" and f"{LABELS[6]} is misread" in verdict.words)
+    chance.often(told, 0.95)
 
 
-def test_a_toggled_run_cancels_what_both_share() -> None:
-    """A tyre whose constants hide the effect: lambda rises by the switched run alone."""
+def test_exchanged_labels_are_found_whatever_else_is_there(chance: Chance) -> None:
+    """With an effect and without, and none where none are exchanged, in 99 of 100 tyres.
+
+    False failures: 2e-7.
+    """
+    toy = Toy()
+    base, quiet, found = problem(toy), [], []
+    for effects in ({}, {"e1": 0.9}) * 10:
+        plain = base.measured(drawn(toy, base, chance.random, effects, 0.03))
+        y = plain.observations.y
+        swapped = replace(plain, observations=with_exchanged(plain.observations, *LABELS[6:8]))
+        quiet.append(exchanged(plain) is None)
+        found.append(exchanged(swapped) == tuple(sorted(LABELS[6:8], key=str)))
+        back = with_exchanged(swapped.observations, *LABELS[6:8])
+        assert np.array_equal(back.y, y)
+    chance.often(quiet, 0.99)
+    chance.often(found, 0.99)
+
+
+def test_a_shift_of_modes_in_no_catalogue_is_not_named(chance: Chance) -> None:
+    """Seen in 99 of 100 tyres, called outside in 8 of 10.
+
+    False failures: 2e-7.
+    """
+    toy = Toy(size=0.01)
+    base, seen, outside = problem(toy), [], []
+    for _ in range(40):
+        strange = np.tile(chance.random.normal(0, 0.02, len(LABELS)), 3)
+        y = drawn(toy, base, chance.random, {}, 0.3) + strange
+        found = weigh(base.measured(y), pairs=False)
+        verdict = decide(found, probabilities(found), len(y), 3)
+        seen.append(verdict.kind != "no_gap")
+        outside.append(verdict.kind == "outside")
+    chance.often(seen, 0.99)
+    chance.often(outside, 0.8)
+
+
+def test_a_toggled_run_cancels_what_both_share(chance: Chance) -> None:
+    """A tyre whose constants hide the effect: lambda rises by the switched run alone, and the 90 %
+    interval then holds the truth in 9 of 10 (the e's are drawn from their prior).
+
+    False failures: 2e-7.
+    """
     toy = flat(size=0.01)
     toy.constants = np.stack([toy.g["e0"], toy.g["e1"]], 1)  # gauges that look like effects
     alone = problem(toy)
@@ -256,25 +328,35 @@ def test_a_toggled_run_cancels_what_both_share() -> None:
         P, _, _ = projection(p, np.zeros(3))
         lambdas.append(separate(p, P, {"e0": 1.0}).full["e0"])
     assert lambdas[0] < 1 and lambdas[1] > 100
-    y = drawn(toy, alone, np.random.default_rng(15), {}, 0.3)
-    noise = np.random.default_rng(16).normal(0, 0.001, len(y))
-    twice = np.concatenate([y + 0.8 * toy.g["e0"], y + noise])
-    p = both.measured(twice)
-    found = single(p, "e0", 1.0)
-    assert found.mean()["e0"] == pytest.approx(0.8, abs=0.1)
-    assert probabilities(weigh(p))["e0"] > 0.7
+    inside, close = [], []
+    for _ in range(100):
+        e = chance.random.uniform(0, 1)
+        y = drawn(toy, both, chance.random, {}, 1.0)
+        y[: len(toy.base)] += e * toy.g["e0"]
+        found = single(both.measured(y), "e0", 1.0)
+        inside.append(found.quantile("e0", 0.05) <= e <= found.quantile("e0", 0.95))
+        close.append(abs(found.mean()["e0"] - e) < 0.1)
+    chance.often(inside, 0.88, 0.92)
+    chance.often(close, 0.8)
 
 
-def test_a_known_change_is_in_every_hypothesis() -> None:
-    """The switched run has e1 = 0.5 on purpose: without any effect there is no gap."""
+def test_a_known_change_is_in_every_hypothesis(chance: Chance) -> None:
+    """The switched run has e1 = 0.5 on purpose: without any effect there is no gap.
+
+    False failures: 2e-7.
+    """
     toy = flat(size=0.02)
-    p = problem(toy, changes=(Change("e1", 0.5),))
-    random = np.random.default_rng(17)
-    y = drawn(toy, p, random, {}, 0.3)
-    y[len(toy.base) :] += 0.5 * toy.g["e1"]
-    p = p.measured(y)
-    assert find_gap(p, refit(p, {}, 1).d[0], NAMES).p_value > 1e-3
-    assert probabilities(weigh(p))[NONE] > 0.3
+    switched = problem(toy, changes=(Change("e1", 0.5),))
+    p_values, none = [], []
+    for _ in range(20):
+        y = drawn(toy, switched, chance.random, {}, 1.0)
+        y[len(toy.base) :] += 0.5 * toy.g["e1"]
+        p = switched.measured(y)
+        p_values.append(find_gap(p, refit(p, {}, 1).d[0], NAMES).p_value)
+        share = probabilities(weigh(p, pairs=False))
+        none.append(max(share, key=lambda key: share[key]) == NONE)
+    chance.distributed(p_values, "uniform")
+    chance.often(none, 0.9)
 
 
 def test_covariance_is_what_it_says() -> None:
@@ -289,19 +371,25 @@ def test_covariance_is_what_it_says() -> None:
     assert S[0, 1] == 0 and np.linalg.eigvalsh(S).min() > 0
 
 
-def test_an_effects_law_that_is_off_is_still_the_effect() -> None:
+def test_an_effects_law_that_is_off_is_still_the_effect(chance: Chance) -> None:
     """A real effect 10 % off the catalogue's, far beyond the scatter: named with the stated
-    looseness of laws, judged outside without it."""
+    looseness of laws in 9 of 10, judged outside without it in 9 of 10.
+
+    False failures: 2e-7.
+    """
     toy = Toy(size=0.15)
-    random = np.random.default_rng(18)
     strict = problem(toy, assumed=Assumed(form=0.001, law=0.0))
-    real = np.tile(1 + 0.1 * random.normal(size=len(LABELS)), 3)
-    y = toy.base + real * toy.g["e0"]
-    said = []
-    for law in (0.0, 0.1):
-        found = weigh(replace(strict, assumed=Assumed(form=0.001, law=law)).measured(y))
-        said.append(decide(found, probabilities(found), len(y), 3))
-    assert [v.kind for v in said] == ["outside", "named"] and said[1].key == "e0"
+    outside, named = [], []
+    for _ in range(20):
+        real = np.tile(1 + 0.1 * chance.random.normal(size=len(LABELS)), 3)
+        y = toy.base + real * toy.g["e0"]
+        for law, told in ((0.0, outside), (0.1, named)):
+            p = replace(strict, assumed=Assumed(form=0.001, law=law)).measured(y)
+            found = weigh(p, pairs=False)
+            verdict = decide(found, probabilities(found), len(y), 3)
+            told.append((verdict.kind, verdict.key))
+    chance.often([kind == "outside" for kind, _ in outside], 0.9)
+    chance.often([each == ("named", "e0") for each in named], 0.9)
 
 
 def test_splits_speak_for_what_splits() -> None:
@@ -320,12 +408,16 @@ def test_splits_speak_for_what_splits() -> None:
     assert chi2.sf(find_gap(apart, np.zeros(3), NAMES).chi2, n - 3 + pair.sum()) < 1e-6
 
 
-def test_the_interval_of_the_parameter_covers() -> None:
-    """The 90 % interval holds the true parameter in 85 to 95 of 100 tyres, within chance."""
+def test_the_interval_of_the_parameter_covers(chance: Chance) -> None:
+    """The 90 % interval holds the true parameter, drawn from its prior, in 90 of 100 tyres, and one
+    at most for the grid.
+
+    False failures: 1e-7.
+    """
     toy = flat(size=0.01, pressures=(240.0,), effects=1)
-    base, random, count, inside = problem(toy), np.random.default_rng(19), 300, 0
-    for _ in range(count):
-        e = random.uniform(0, 1)
-        found = single(base.measured(drawn(toy, base, random, {"e0": e}, 1.0)), "e0", 1.0)
-        inside += found.quantile("e0", 0.05) <= e <= found.quantile("e0", 0.95)
-    assert 0.84 * count <= inside <= 0.96 * count
+    base, inside = problem(toy), []
+    for _ in range(300):
+        e = chance.random.uniform(0, 1)
+        found = single(base.measured(drawn(toy, base, chance.random, {"e0": e}, 1.0)), "e0", 1.0)
+        inside.append(found.quantile("e0", 0.05) <= e <= found.quantile("e0", 0.95))
+    chance.often(inside, 0.89, 0.91)

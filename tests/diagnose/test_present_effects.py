@@ -29,6 +29,7 @@ HELD = 0.9
 WITH_FILLER = with_values(CASE, {"effects.bead_filler": HELD})
 
 
+@pytest.mark.slow
 def test_parameters_count_from_what_the_case_has() -> None:
     door = Door(WITH_FILLER)
     spans, _ = spans_of(door, EFFECTS)
@@ -44,6 +45,7 @@ def test_parameters_count_from_what_the_case_has() -> None:
     assert more[0] == pytest.approx(wanted, abs=5e-4)
 
 
+@pytest.mark.slow
 def test_splits_count_from_what_the_case_has() -> None:
     """A mass on the tread splits pairs by itself, a wider rim does not: neither is added twice."""
     rows = ROWS[:-1]
@@ -81,6 +83,7 @@ def test_a_source_of_error_steps_from_what_the_case_has() -> None:
     assert columns[0] @ columns[1] > 0
 
 
+@pytest.mark.slow
 def test_a_part_of_an_effect_in_the_case_leaves_the_rest_to_be_found(tmp_path: Path) -> None:
     truth = 0.8 * MODEL.spans["bead_filler"].high
     path = written(tmp_path / "a.csv", asked(Point(X, {"bead_filler": truth})).eta)
@@ -96,6 +99,7 @@ def test_a_part_of_an_effect_in_the_case_leaves_the_rest_to_be_found(tmp_path: P
     assert "that the case has already" not in page(none, "tyre", "a.csv")
 
 
+@pytest.mark.slow
 def test_a_toggled_run_is_set_to_what_it_says_whatever_the_case_has(tmp_path: Path) -> None:
     truth = 1.5
     one = written(tmp_path / "a.csv", asked(Point(X, {"bead_filler": truth})).eta)

@@ -60,6 +60,13 @@ class Toy:
         self.splits = {id: np.zeros(n) for id in self.g}
         self.asked = 0
 
+    def values(self, x: Array) -> dict[str, float]:
+        """The variables, of a logarithmic scale about 2."""
+        return {name: 2.0 * float(np.exp(xi)) for name, xi in zip(self.variables, x, strict=True)}
+
+    def unit(self, variable: str) -> str:
+        return "Pa"
+
     def answers(self, points: Sequence[Point]) -> list[Answer | Exception]:
         self.asked += len(points)
         return [self._answer(point) for point in points]
@@ -108,6 +115,5 @@ def drawn(
     x = random.normal(0, spread, 3)
     (answer,) = toy.answers([Point(x, effects)])
     assert isinstance(answer, Answer)
-    return answer.eta[base.places] + random.multivariate_normal(
-        np.zeros(len(base.places)), base.sigma
-    )
+    # by Cholesky's factor: an SVD's vectors, the default, depend on the BLAS kernel
+    return random.multivariate_normal(answer.eta[base.places], base.sigma, method="cholesky")

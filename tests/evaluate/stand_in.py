@@ -62,7 +62,7 @@ class StandIn:
                     "amplitude": (np.ones((3, 3)) * (1 / 3 + 1j * np.pi)).astype(np.complex64),
                 }
             ],
-            "gradients": {"C10": [1e-300, 0.1 + 0.2]},
+            "gradients": {"C10": [1e-300], "A_belt": [0.1 + 0.2]},
             "nodes": nodes,
             "points": np.asfortranarray(np.full((3, 2), 1 / 7)),
             "displacement": np.zeros((3, 3)),

@@ -70,11 +70,11 @@ def test_what_a_task_raises_is_raised(make: Callable[[], Processes]) -> None:
 
 def test_closed_early_it_ends_what_is_under_way(tmp_path: Path) -> None:
     place = tmp_path / "began"
-    began = time.monotonic()
     with closing(Processes(2).each(work, [str(place), 1])) as answers:
         assert next(answers)[0] == 1
         while not place.exists():
             time.sleep(0.01)
+        began = time.monotonic()
     assert time.monotonic() - began < 30
     assert not active_children()
 

@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import sys
 import time
 from pathlib import Path
+
+import pytest
+
+from tyrecal.evaluate.pool import process_pool
 
 ROOT = Path(__file__).parents[2]
 PARENT = """
@@ -43,6 +48,20 @@ if __name__ == "__main__":
             print("stopped", trial, flush=True)
         stop.join()
 """
+SCRIPT = """
+import tyrecal.__main__  # as the command does, which every worker imports anew
+from tests.evaluate.test_pool import answers_term
+from tyrecal.evaluate.pool import process_pool
+
+if __name__ == "__main__":
+    with process_pool(1) as pool:
+        print([pool.submit(answers_term).result() for task in range(2)])
+"""
+
+
+def answers_term() -> bool:
+    """Whether this process would clear up before it ends."""
+    return getattr(signal.getsignal(signal.SIGTERM), "__name__", "") == "_remember"
 
 
 def work(place: str) -> None:
@@ -54,6 +73,22 @@ def work(place: str) -> None:
 def large(task: int) -> bytes:
     """More than a pipe holds, so that most of the time a worker is in the middle of its answer."""
     return bytes(5_000_000)
+
+
+def test_an_orderly_end_waits_for_all_that_was_asked() -> None:
+    with process_pool(2) as pool:
+        later = [pool.submit(large, i) for i in range(3)]
+        assert list(pool.map(abs, [-1, 2, -3])) == [1, 2, 3]
+    assert all(len(task.result(0)) == 5_000_000 for task in later)
+    with pytest.raises(RuntimeError, match="shutdown"):
+        pool.submit(abs, 1)
+
+
+def test_an_error_in_the_block_comes_out_and_what_had_not_begun_is_dropped() -> None:
+    with pytest.raises(ZeroDivisionError), process_pool(1) as pool:
+        later = [pool.submit(large, i) for i in range(50)]
+        1 / 0  # noqa: B018
+    assert all(task.done() for task in later) and any(task.cancelled() for task in later)
 
 
 def test_stopped_in_the_middle_of_large_answers_it_ends(tmp_path: Path) -> None:
@@ -82,3 +117,12 @@ def test_a_busy_worker_ends_with_its_parent(tmp_path: Path) -> None:
             return
         time.sleep(0.1)
     raise AssertionError("the worker outlived its parent")
+
+
+def test_workers_of_the_command_answer_when_they_are_told_to_end(tmp_path: Path) -> None:
+    (tmp_path / "script.py").write_text(SCRIPT)
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    done = subprocess.run(
+        [sys.executable, tmp_path / "script.py"], env=environment, capture_output=True, text=True
+    )
+    assert (done.stdout, done.stderr) == ("[True, True]\n", "")

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tyrecal.evaluate.door import Door
-from tyrecal.evaluate.failure import EvaluationFailed
+from tyrecal.evaluate.failure import DeckRefused, EvaluationFailed
 from tyrecal.evaluate.store import Store
 
 from ..studies.hertz import Hertz
@@ -65,6 +65,8 @@ def test_time_that_ran_out_is_not_on_record(tmp_path: Path) -> None:
         (lambda answer: answer["footprints"].reverse(), "footprints at"),
         (lambda answer: answer.update(failure="no more"), "footprints at"),
         (lambda answer: answer["footprints"][0].update(road_N=400.0), "bears 400 N of 500 N"),
+        (lambda answer: answer["footprints"][0].update(road_N=494.0), "bears 494 N of 500 N"),
+        (lambda answer: answer["footprints"][1].update(road_N=4045.0), "bears 4045 N of 4000"),
         (lambda answer: answer["footprints"][0].update(road_N=float("nan")), "bears nan N"),
     ],
 )
@@ -92,3 +94,14 @@ def test_each_load_has_the_time_of_a_run(tmp_path: Path) -> None:
     asked.press({}, LOADS)
     asked.press({}, LOADS[:1])
     assert limits == [600.0, 300.0] == [n * CASE.case.solver.time_limit_s for n in (2, 1)]
+
+
+def test_modes_on_a_road_are_another_capability_than_a_footprint(tmp_path: Path) -> None:
+    plain = door(tmp_path, capabilities=frozenset({"modes", "footprint"}))
+    plain.needs_road()
+    with pytest.raises(DeckRefused, match=r"find modes of a tyre on a road.*\(loaded_modes\)"):
+        plain.needs_road(modes=True)
+    none = door(tmp_path, capabilities=frozenset({"modes", "loaded_modes"}))
+    none.needs_road(modes=True)
+    with pytest.raises(DeckRefused, match=r"press a tyre on a road.*\(footprint\)"):
+        none.needs_road()

@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 
 from tyrecal.evaluate.executor import executor
-from tyrecal.evaluate.queue import BadSettings, jobs_of, reached, read_settings
+from tyrecal.evaluate.queue import jobs_of, reached, read_settings
+from tyrecal.settings import BadSettings
 
 SETTINGS = """
 queueing_system: {system}
@@ -90,6 +91,7 @@ def kill_the_job(place: str) -> str:
     raise AssertionError
 
 
+@pytest.mark.cluster
 def test_a_job_that_ends_is_submitted_anew_and_its_task_done(tmp_path: Path) -> None:
     path = tmp_path / "here.yaml"
     path.write_text("queueing_system: local\nworkers: 1\nmemory: 1GB\n")

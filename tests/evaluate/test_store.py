@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import logging
 import os
 import time
@@ -19,6 +20,8 @@ from tyrecal.evaluate.results import Evaluation, HarmonicShape
 from tyrecal.evaluate.store import Store
 
 from .stand_in import CASE, StandIn, ask, door
+
+ABOUT = {"solver": "s", "version": "1"}
 
 
 def same(one: Evaluation, other: Evaluation) -> None:
@@ -46,7 +49,7 @@ def test_plain_data_survives_exactly() -> None:
         "arrays": [np.arange(6.0).reshape(2, 3).T, np.array(["a", "bc"]), np.zeros(1)],
         "scalars": [np.float32(0.1), np.int64(7), 2 + 3j],
     }
-    about, back = unpack(pack({"solver": "s"}, content))
+    about, back = unpack(pack("k", {"solver": "s"}, content), "k")
     assert about == {"solver": "s"}
     assert back["numbers"] == content["numbers"] and str(back["numbers"][2]) == "-0.0"
     assert back["scalars"] == content["scalars"] and hash(back["scalars"][1]) == hash(7)
@@ -58,20 +61,28 @@ def test_plain_data_survives_exactly() -> None:
 @pytest.mark.parametrize("content", [{1: 2}, {"x": object()}, [np.array([object()])]])
 def test_what_json_and_npz_cannot_hold_is_refused(content: object) -> None:
     with pytest.raises(TypeError):
-        pack({}, content)
+        pack("k", {}, content)
+
+
+@pytest.mark.parametrize("value", [float("nan"), float("inf"), -float("inf")])
+def test_a_number_that_is_not_finite_is_refused(value: float) -> None:
+    with pytest.raises(ValueError):
+        pack("k", {}, {"x": [1.0, value]})
+    with pytest.raises(ValueError):
+        pack("k", {"seconds": value}, {})
 
 
 def test_any_changed_or_missing_byte_is_seen() -> None:
-    data = pack({}, {"x": np.arange(50.0), "y": [1.5, "word"]})
+    data = pack("k", {}, {"x": np.arange(50.0), "y": [1.5, "word"]})
     for place in range(0, len(data), 7):
         changed = bytearray(data)
         changed[place] ^= 1
         with pytest.raises(Damaged):
-            unpack(bytes(changed))
+            unpack(bytes(changed), "k")
         with pytest.raises(Damaged):
-            unpack(data[:place])
+            unpack(data[:place], "k")
     with pytest.raises(Damaged):
-        unpack(data + data)
+        unpack(data + data, "k")
 
 
 def test_the_record_answers_like_the_solver(tmp_path: Path) -> None:
@@ -173,13 +184,31 @@ def test_another_version_or_reader_is_another_question(
     assert found["solvers"] == {"stand-in 1": 1, "stand-in 2": 2} and found["records"] == 3
 
 
+def test_an_adapter_is_known_by_the_text_of_its_package(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of any module of it, not of the adapter's alone."""
+    (tmp_path / "reader.py").write_text("FACTOR = 1\n")
+    (tmp_path / "an_adapter.py").write_text("class Adapter:\n    pass\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    adapter = importlib.import_module("an_adapter").Adapter
+    known = [store_module.sources_of(adapter)]
+    for name in ("reader", "an_adapter"):
+        path = tmp_path / f"{name}.py"
+        path.write_text(path.read_text() + "# edited\n")
+        monkeypatch.delitem(store_module._SOURCES, adapter)
+        known.append(store_module.sources_of(adapter))
+    assert len(set(known)) == 3
+    monkeypatch.delitem(store_module._SOURCES, adapter)
+
+
 def _write(folder: Path, number: int) -> None:
     store = Store(folder)
-    content = {"x": np.full(20000, 1 / 3), "failed": None}
+    content = {"answer": {**StandIn().read(folder), "more": np.full(20000, 1 / 3)}}
     for _ in range(20):
-        store.write("ab" * 32, {"solver": "s", "version": "1"}, content)
+        store.write("ab" * 32, ABOUT, content)
         back = store.read("ab" * 32)
-        assert back["x"].tobytes() == content["x"].tobytes()
+        assert back["answer"]["more"].tobytes() == content["answer"]["more"].tobytes()
 
 
 def test_many_writers_of_one_record(tmp_path: Path) -> None:
@@ -197,14 +226,15 @@ def test_many_writers_of_one_record(tmp_path: Path) -> None:
 
 def test_the_least_recently_used_go_first_and_none_of_this_run(tmp_path: Path) -> None:
     old = Store(tmp_path)
+    content = {"answer": StandIn().read(tmp_path)}
     keys = [f"{i:02d}" * 32 for i in range(6)]
     for age, key in enumerate(keys):
-        old.write(key, {}, {"x": np.zeros(1000)})
+        old.write(key, ABOUT, content)
         os.utime(old.path(key), times=(time.time() - 9000 - age,) * 2)
     size = old.path(keys[0]).stat().st_size
     store = Store(tmp_path)
     store.read(keys[5])  # the oldest, used again
-    store.write("66" * 32, {}, {"x": np.zeros(1000)})
+    store.write("66" * 32, ABOUT, content)
     (tmp_path / "66" / "x.damaged").write_bytes(b"x" * 100)
     assert store.prune(4 * size) == 3
     left = {p.name[:2] for p in tmp_path.glob("*/*")}

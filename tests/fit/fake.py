@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 import numpy as np
 
 from tyrecal.evaluate.door import Question
-from tyrecal.evaluate.failure import EvaluationFailed
+from tyrecal.evaluate.failure import DeckRefused, EvaluationFailed
 from tyrecal.evaluate.results import Evaluation, HarmonicShape, RawMode
 from tyrecal.modes.mode import Label
 
@@ -61,12 +61,12 @@ class FakeDoor:
 
     def answer_all(
         self, questions: Iterable[Question], jobs: int = 1
-    ) -> Iterator[Evaluation | EvaluationFailed]:
+    ) -> Iterator[Evaluation | EvaluationFailed | DeckRefused]:
         self.jobs.append(jobs)
         for question in questions:
             try:
                 yield self.evaluate(question)
-            except EvaluationFailed as failure:
+            except (EvaluationFailed, DeckRefused) as failure:
                 yield failure
 
     def evaluate(self, question: Question) -> Evaluation:

@@ -12,13 +12,14 @@ from tyrecal_solvers.bundled.adapter import Bundled
 
 from tyrecal.case import LoadedCase, load_case, start_values
 from tyrecal.case.calibration import TargetFootprint, TargetMode
+from tyrecal.case.variables import with_level
 from tyrecal.evaluate.door import Door
 from tyrecal.evaluate.store import Store
 
 from ..conftest import CASES
 from ..studies.hertz import Hertz
 
-CASE = load_case(CASES / "p235_75r17.yaml")
+CASE = with_level(load_case(CASES / "p235_75r17.yaml"), "coarse")
 START = start_values(CASE)
 AREA = {"A_belt": -0.05, "A_carcass": -0.2, "C10": -0.1}
 STIFFNESS = {"A_belt": 0.1, "A_carcass": 0.15, "C10": 0.3}

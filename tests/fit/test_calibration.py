@@ -9,12 +9,15 @@ import numpy as np
 import pytest
 
 from tyrecal.case import LoadedCase, load_case, start_values
-from tyrecal.evaluate.door import Door
-from tyrecal.evaluate.failure import EvaluationFailed
+from tyrecal.evaluate.door import Door, Question
+from tyrecal.evaluate.failure import DeckRefused, EvaluationFailed
+from tyrecal.evaluate.results import Evaluation
 from tyrecal.fit.calibrate import NothingToFit, calibrate
+from tyrecal.fit.crossing import crossing, gap
 from tyrecal.fit.problem import Problem, Target, objective, read_targets
 from tyrecal.fit.slsqp import _beyond_crossing
 
+from ..chance import Chance
 from ..conftest import CASES
 from .fake import LABELS, FakeDoor
 
@@ -55,7 +58,7 @@ def test_objective_by_hand_from_the_papers_table_2() -> None:
 @pytest.mark.parametrize("has_gradients", [True, False])
 def test_finds_the_truth(method: str, has_gradients: bool) -> None:
     fit = calibrate(CASE, door(has_gradients=has_gradients), method)  # type: ignore[arg-type]
-    assert fit.result["converged"] and fit.result["moved"]
+    assert fit.result["converged"] and fit.result["moved"] and "footprint" not in fit.result
     assert fit.result["objective_Hz"] < 0.02
     for name, value in TRUTH.items():
         assert fit.result["variables"][name]["value"] == pytest.approx(value, rel=1e-2)
@@ -71,10 +74,10 @@ def test_steps_back_from_designs_that_fail(
     """The truth lies just before a cliff, beyond which there is no equilibrium."""
     fails = lambda values: side * (values[name] / TRUTH[name] - 1) > margin
     fit = calibrate(CASE, door(fails=fails), method)  # type: ignore[arg-type]
-    assert fit.result["failed_evaluations"] > 0
     assert fit.result["objective_Hz"] < 0.05
     failed = [row for row in fit.history if row["objective_Hz"] is None]
     assert all("inflation stopped" in row["failure"] for row in failed)
+    assert fit.result["failed_evaluations"] == len(failed) > 0
 
 
 @pytest.mark.parametrize("method", ["slsqp", "least-squares"])
@@ -93,6 +96,21 @@ def test_converges_on_eigenvalues_of_seven_digits(method: str) -> None:
 def test_a_start_that_fails_is_a_failure_not_a_number() -> None:
     with pytest.raises(EvaluationFailed, match="12 of 240 kPa"):
         calibrate(CASE, door(fails=lambda values: True))  # type: ignore[arg-type]
+
+
+def test_a_design_whose_deck_is_refused_ends_the_fit_and_is_no_point_of_it() -> None:
+    """A refusal is a mistake of the case, not of the design."""
+    refusing = door()
+    answer = refusing.evaluate
+
+    def evaluate(question: Question) -> Evaluation:
+        if question.values["C10"] != START["C10"]:
+            raise DeckRefused("not honoured")
+        return answer(question)
+
+    refusing.evaluate = evaluate  # type: ignore[method-assign]
+    with pytest.raises(DeckRefused, match="not honoured"):
+        calibrate(CASE, refusing)  # type: ignore[arg-type]
 
 
 def test_a_neighbour_that_fails_gives_way_to_the_one_on_the_other_side() -> None:
@@ -187,9 +205,9 @@ def test_starts_are_drawn_replaced_and_reproducible() -> None:
     ("name", "level", "expected", "tolerance"),
     [
         ("p235_75r17", "default", 3.115, 0.01),
-        ("p235_75r17", "refined", 3.08, 0.1),
+        pytest.param("p235_75r17", "refined", 3.08, 0.1, marks=pytest.mark.slow),
         ("p235_75r17_narrow_rim", "default", 1.794, 0.01),
-        ("p235_75r17_narrow_rim", "refined", 1.79, 0.1),
+        pytest.param("p235_75r17_narrow_rim", "refined", 1.79, 0.1, marks=pytest.mark.slow),
     ],
 )
 def test_the_papers_case(name: str, level: str, expected: float, tolerance: float) -> None:
@@ -224,20 +242,24 @@ def with_targets(**changes: list) -> LoadedCase:
     return replace(CASE, case=CASE.case.model_copy(update={"targets": targets}))
 
 
-@pytest.mark.parametrize("weights", [[1.0] * 9, [100.0, 1.0, 1.0, 0.0, 1.0, 5.0, 1.0, 0.2, 1.0]])
-def test_standard_errors_are_those_of_the_fit_that_was_made(weights: list[float]) -> None:
-    """Unequal sigmas and weights: the scatter of 300 fits to noisy targets is the stated error."""
-    generator = np.random.default_rng(2)
+@pytest.mark.slow
+def test_standard_errors_are_those_of_the_fit_that_was_made(chance: Chance) -> None:
+    """Unequal sigmas and weights: the scatter of 200 fits to noisy targets is the stated error.
+
+    False failures: 6e-7.
+    """
     sigma = np.array([0.05, 0.3, 0.1, 0.2, 0.1, 0.3, 0.05, 0.2, 0.4])
     exact = [t.frequency_Hz for t in CASE.case.targets.modes]
-    found, stated = [], []
-    for _ in range(300):
-        noisy = list(exact + sigma * generator.normal(size=9))
-        case = with_targets(frequency_Hz=noisy, sigma_Hz=list(sigma), weight=weights)
-        result = calibrate(case, door()).result  # type: ignore[arg-type]
-        found.append([np.log(v["value"]) for v in result["variables"].values()])
-        stated.append([v["standard_error"] / v["value"] for v in result["variables"].values()])
-    assert np.std(found, axis=0) == pytest.approx(np.mean(stated, axis=0), rel=0.15)
+    for weights in ([1.0] * 9, [100.0, 1.0, 1.0, 0.0, 1.0, 5.0, 1.0, 0.2, 1.0]):
+        found, stated = [], []
+        for _ in range(200):
+            noisy = list(exact + sigma * chance.random.normal(size=9))
+            case = with_targets(frequency_Hz=noisy, sigma_Hz=list(sigma), weight=weights)
+            variables = calibrate(case, door()).result["variables"].values()  # type: ignore[arg-type]
+            found.append([np.log(v["value"]) for v in variables])
+            stated.append([v["standard_error"] / v["value"] for v in variables])
+        for values, error in zip(np.transpose(found), np.mean(stated, axis=0), strict=True):
+            chance.scatter(values, error)
 
 
 def test_targets_that_do_not_count_are_none() -> None:
@@ -270,9 +292,8 @@ def test_as_many_variables_as_data_tell_nothing_of_the_noise() -> None:
 
 def test_fewer_data_than_variables_are_said_to_be_too_few() -> None:
     one = [1.0] + [0.0] * 8
-    result = calibrate(with_targets(weight=one), door()).result  # type: ignore[arg-type]
-    assert len(result["singular_values"]) == 3
-    assert result["singular_values"][0] > 0 and result["singular_values"][1:] == [0.0, 0.0]
+    with pytest.raises(NothingToFit, match="1 target cannot determine 3 free variables"):
+        calibrate(with_targets(weight=one), door())  # type: ignore[arg-type]
 
 
 def test_a_design_that_the_case_cannot_have_is_stepped_back_from() -> None:
@@ -284,8 +305,9 @@ def test_a_design_that_the_case_cannot_have_is_stepped_back_from() -> None:
     variables = {"A_belt": CASE.case.variables["A_belt"], "C01": variable}
     rubber = CASE.case.materials["rubber"].model_copy(update={"C10_Pa": 5e5})
     materials = {**CASE.case.materials, "rubber": rubber}
-    changed = CASE.case.model_copy(update={"variables": variables, "materials": materials})
-    case = replace(CASE, case=changed)
+    changed = {"variables": variables, "materials": materials}
+    changed["mesh"] = CASE.case.mesh.model_copy(update={"level": "coarse"})
+    case = replace(CASE, case=CASE.case.model_copy(update=changed))
     result = calibrate(case, Door(case), starts=4, seed=0).result
     assert result["replaced_starts"] > 0
     assert len(result["starts"]) == 4
@@ -294,3 +316,27 @@ def test_a_design_that_the_case_cannot_have_is_stepped_back_from() -> None:
 def test_no_crossing_is_looked_for_where_the_pair_has_no_weight() -> None:
     problem = Problem(with_targets(weight=[0.0, 0.0] + [1.0] * 7), door())  # type: ignore[arg-type]
     assert list(_beyond_crossing(problem, problem.evaluate(problem.start()))) == []
+
+
+def test_an_objective_that_no_computer_holds_is_refused() -> None:
+    targets = CASE.case.targets
+    heavy = [mode.model_copy(update={"sigma_Hz": 1e-300}) for mode in targets.modes]
+    update = {"targets": targets.model_copy(update={"modes": heavy})}
+    case = replace(CASE, case=CASE.case.model_copy(update=update))
+    with np.errstate(over="ignore"), pytest.raises(NothingToFit, match="no finite objective"):
+        calibrate(case, door())
+
+
+@pytest.mark.parametrize("weights", [[1.0] * 9, [4.0, 0.25, *[1.0] * 7]])
+def test_slopes_at_a_crossing_are_those_of_the_difference(weights: list[float]) -> None:
+    """Of axial less torsional frequency in Hz, whatever the targets weigh, on distinct modes."""
+    problem = Problem(with_targets(weight=weights), door())  # type: ignore[arg-type]
+    far, point = problem.evaluate(START_X + 0.2), problem.evaluate(START_X)
+    found = crossing(problem, [far, point], point)
+    assert found is not None and found.x is point.x
+    assert found.value == pytest.approx(gap(point), rel=1e-6)
+    h = 1e-4
+    for k, e in enumerate(h * np.eye(len(START_X))):
+        wanted = gap(problem.evaluate(START_X + e)) - gap(problem.evaluate(START_X - e))
+        assert found.slopes[k] == pytest.approx(wanted / (2 * h), rel=1e-5)
+    assert found.at(point.x + e) == pytest.approx(gap(problem.evaluate(point.x + e)), abs=1e-6)

@@ -16,6 +16,8 @@ from tyrecal.fit.slsqp import AT_CROSSING
 from .fake import LABELS, POINTS, FakeDoor, shape
 from .test_calibration import CASE, START, door
 
+pytestmark = pytest.mark.numbers
+
 COUPLING = 0.02  # Hz, half the least gap
 
 

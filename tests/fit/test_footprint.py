@@ -230,9 +230,10 @@ def test_loads_out_of_reach_are_stepped_back_from(method: str) -> None:
 
     solver.write = write  # type: ignore[method-assign]
     fit = calibrate(case, tyre, method)
-    assert fit.result["failed_evaluations"] > 0 and fit.result["objective_Hz"] < 0.05
+    assert fit.result["objective_Hz"] < 0.05
     failed = [row for row in fit.history if row["objective_Hz"] is None]
     assert all("the rim is on the road" in row["failure"] for row in failed)
+    assert fit.result["failed_evaluations"] == len(failed) > 0
 
 
 def test_a_later_load_out_of_reach_fails_and_one_without_a_target_is_not_pressed() -> None:

@@ -65,6 +65,7 @@ def test_four_modes_do_not_determine_the_belt(case: LoadedCase) -> None:
     assert result["singular_values"][-1] < 1 < result["singular_values"][-2]
 
 
+@pytest.mark.slow
 def test_the_deflection_is_predicted(case: LoadedCase, fitted: Fit) -> None:
     pressed = Door(case).press(fitted.fitted.values, [3000.0])
     (footprint,) = pressed.footprints

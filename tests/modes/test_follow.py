@@ -8,10 +8,14 @@ from tyrecal.modes.follow import follow
 from tyrecal.modes.mode import Label, Mode
 from tyrecal.modes.sample import harmonic_of, on_rings
 
+from ..chance import generator
+
+pytestmark = pytest.mark.numbers
+
 ANGLES = np.arange(24) / 24 * 2 * np.pi
 NODES = np.arange(4)
 POINTS = np.array([[0.30, -0.1], [0.39, -0.05], [0.39, 0.05], [0.30, 0.1]])
-RNG = np.random.default_rng(2)
+RNG = generator(2)
 
 
 def shape(n):

@@ -11,6 +11,7 @@ from tyrecal.modes.loaded import (
     Member,
     Rings,
     State,
+    _nearest_orthonormal,
     follow,
     members,
     rings,
@@ -135,3 +136,15 @@ def test_a_mode_that_left_is_not_named() -> None:
     found = follow(before, after, WIDE)
     assert found.position[0] == 0 and found.position[2] == -1
     assert found.spanned[0] == pytest.approx(1) and found.spanned[1] < 0.1
+
+
+def test_the_nearest_orthonormal_columns_do_not_depend_on_sizes() -> None:
+    """They are orthonormal, and as near to the directions as an independent formula has them:
+    v (v^T v)^-1/2 of columns of length 1."""
+    v = np.linalg.qr(np.random.default_rng(2).standard_normal((9, 3)))[0]
+    v = v + 0.2 * np.roll(v, 1, axis=1)
+    found = _nearest_orthonormal(v * [1.0, 30.0, 0.01])
+    np.testing.assert_allclose(found.T @ found, np.eye(3), atol=1e-12)
+    unit = v / np.linalg.norm(v, axis=0)
+    values, vectors = np.linalg.eigh(unit.T @ unit)
+    np.testing.assert_allclose(found, unit @ (vectors / np.sqrt(values)) @ vectors.T, atol=1e-12)

@@ -7,14 +7,18 @@ from tyrecal.evaluate.results import HarmonicShape, RingShape
 from tyrecal.modes.sample import on_rings
 from tyrecal.modes.subspace import mac, subspace_mac
 
-RNG = np.random.default_rng(0)
+from ..chance import generator
+
+pytestmark = pytest.mark.numbers
+
+RNG = generator(0)
 NODES = np.array([5, 7, 9, 11])
 POINTS = np.column_stack([RNG.uniform(0.2, 0.4, 4), RNG.uniform(-0.1, 0.1, 4)])
 ANGLES = np.arange(24) / 24 * 2 * np.pi
 
 
 def shape(n=2, seed=1):
-    rng = np.random.default_rng(seed)
+    rng = generator(seed)
     return HarmonicShape(
         n, NODES, POINTS, rng.standard_normal((4, 3)) + 1j * rng.standard_normal((4, 3))
     )

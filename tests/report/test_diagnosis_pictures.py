@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ from tyrecal.diagnose.where import Place
 from tyrecal.report import diagnosis_pictures as pictures
 
 from ..conftest import CASES
+from ..diagnose.test_calibrated import exact
 from ..diagnose.test_diagnosis import diagnosed
 from ..diagnose.toy import Toy
 from .watched import watched
@@ -76,6 +78,35 @@ def test_probabilities_and_held_out(found: Diagnosis, drawn: list[Figure], tmp_p
     assert found.shrinkage is not None
     heights = [bar.get_height() for bar in held.axes[0].patches]
     assert heights == [found.shrinkage.before_percent, found.shrinkage.after_percent]
+
+
+def test_long_names_are_laid_out(found: Diagnosis, tmp_path: Path) -> None:
+    """Of one family, of one pressure, with the catalogue's longest name; see `conftest`."""
+    long = "temperature drift over the run of pressures, as the longest of titles"
+    spans = {id: replace(span, title=long) for id, span in found.problem.spans.items()}
+    d = replace(found, problem=replace(found.problem, spans=spans))
+    few = [row.label is not None and row.label.m == 1 for row in d.problem.observations.rows]
+    alone = replace(
+        d,
+        problem=d.problem.only(np.array(few)),
+        gap=replace(d.gap, residuals=d.gap.residuals[few], spread=d.gap.spread[few]),
+    )
+    pictures.draw_residuals(tmp_path / "residuals.png", d)
+    pictures.draw_residuals(tmp_path / "alone.png", alone)
+    pictures.draw_probabilities(tmp_path / "probabilities.png", d)
+    pictures.draw_held_out(tmp_path / "held_out.png", d)
+
+
+def test_no_gap_has_nothing_that_explains_it(drawn: list[Figure], tmp_path: Path) -> None:
+    d = exact(Toy(effects=3), {})
+    assert d.verdict.kind == "no_gap" and d.shrinkage
+    pictures.draw_residuals(tmp_path / "residuals.png", d)
+    pictures.draw_probabilities(tmp_path / "probabilities.png", d)
+    pictures.draw_held_out(tmp_path / "held_out.png", d)
+    residuals, probabilities, held = map(words, drawn)
+    assert "hollow" not in residuals and "explains" not in probabilities
+    assert "No gap is seen" in probabilities
+    assert "with " not in held and len(drawn[2].axes[0].patches) == 1
 
 
 def test_section_map(drawn: list[Figure], tmp_path: Path) -> None:

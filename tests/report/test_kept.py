@@ -23,6 +23,7 @@ from tyrecal.report.revolve import motion, placed, skin, swept
 from tyrecal.studies.footprint import press
 from tyrecal.studies.patch import patch_of
 
+from ..chance import generator
 from ..studies.hertz import Hertz, coarse_case
 
 ANGLES = 2 * np.pi * np.arange(48) / 48
@@ -82,7 +83,7 @@ def test_a_solver_with_nodes_of_its_own(tyre) -> None:
     """Other numbers and another order change nothing; places too far away are not guessed."""
     case, evaluation, modes = tyre
     mesh = section_mesh(case)
-    order = np.random.default_rng(1).permutation(len(evaluation.nodes))
+    order = generator(1).permutation(len(evaluation.nodes))
     other = type(evaluation)(
         evaluation.pressure_kPa, evaluation.mass_kg, evaluation.modes, {},
         np.arange(len(order)), evaluation.displacement[order],
@@ -118,7 +119,7 @@ def test_the_section_is_whole(tyre) -> None:
 
 def test_patches_keep_all_that_touches(tyre, monkeypatch: pytest.MonkeyPatch) -> None:
     case, *_ = tyre
-    monkeypatch.setattr(door_module, "find_solver", lambda name: Hertz())
+    monkeypatch.setattr(door_module, "find_solver", lambda name, *command: Hertz())
     values, mesh = start_values(case), section_mesh(case)
     pressed = press(Door(case), {"initial": values}, [1000.0, 4000.0])["initial"]
     kept = patches_data("x", {"initial": pressed}, {"initial": mesh})["patches"]

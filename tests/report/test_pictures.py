@@ -56,15 +56,31 @@ def test_mode(tyre, tmp_path, label):
     assert 0.25 < ink(tmp_path / "mode.png", 1380, 855, 300_000) < 0.6
 
 
+def test_a_twist_is_told_from_rest(tyre, tmp_path, written):
+    """The outline stays where it is: the meridians at rest stand beside those that moved, in a
+    colour that nothing else has, and only there; what colours and lines are is said."""
+    orange = {}
+    for kind in ("torsional", "axial"):
+        written.clear()
+        draw_mode(tmp_path / f"{kind}.png", tyre.modes[Label(0, 0, kind)], tyre.mesh)
+        assert "displacement over the largest" in written
+        assert any("outline at rest" in text for text in written)
+        with Image.open(tmp_path / f"{kind}.png") as image:
+            red, green, blue = np.moveaxis(np.asarray(image.convert("RGB"), int), -1, 0)
+        orange[kind] = int(((red > 180) & (blue < 60) & (red - green > 60)).sum())
+        assert any("orange: meridians" in text for text in written) == (kind == "torsional")
+    assert orange["torsional"] > 500 + orange["axial"]
+
+
 def test_modes_overview_takes_the_nine_lowest(tyre, tmp_path):
     assert len(tyre.modes) > 9
     draw_modes_overview(tmp_path / "modes.png", list(tyre.modes.values()), tyre.mesh)
-    assert 0.25 < ink(tmp_path / "modes.png", 1350, 1455, 600_000) < 0.6
+    assert 0.25 < ink(tmp_path / "modes.png", 1350, 1575, 600_000) < 0.6
 
 
 def test_modes_overview_is_no_larger_than_its_modes(tyre, tmp_path):
     draw_modes_overview(tmp_path / "modes.png", list(tyre.modes.values())[:5], tyre.mesh)
-    assert 0.2 < ink(tmp_path / "modes.png", 1350, 975, 400_000) < 0.6
+    assert 0.2 < ink(tmp_path / "modes.png", 1350, 1095, 400_000) < 0.6
 
 
 def test_the_largest_motion_is_12_percent_and_stands_at_the_top(tyre):

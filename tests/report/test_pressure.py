@@ -53,7 +53,7 @@ def test_each_mode_is_drawn_in_its_family_and_named_once(drawn, tmp_path):
     inner, outer = figure.axes[:2]
     assert (inner.get_title("left"), outer.get_title("left")) == ("in-plane", "out-of-plane")
     assert {t.get_text() for t in inner.texts} == {"[0,0] torsional", "[1,0]", "[2,0]"}
-    assert {t.get_text() for t in outer.texts} == {"[0,0] axial", "[1,1]"}
+    assert {t.get_text() for t in outer.texts} == {"[0,0] lateral", "[1,1]"}
     assert sum(len(line.get_xdata()) == 3 for line in inner.lines) == 6
     dashed = [x for x in inner.lines if len(x.get_xdata()) == 3 and x.get_linestyle() == "--"]
     assert len(dashed) == 3

@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.table import Table
 
 from tyrecal.report.table import fit_csv, fit_table, modes_table
-from tyrecal.report.words import fit_doubts, motion
+from tyrecal.report.words import fit_doubts, motion, tyre_doubts
 
 # c, m, kind, initial, optimised, target: Table 2 of Bekakos et al. 2016
 TABLE_2 = [
@@ -128,3 +128,9 @@ def test_a_fit_that_is_far_off_most_modes_asks_for_the_unit(
     result = {"moved": True, "converged": True, "variables": {}, "failed_evaluations": 0,
               "label_margin": 1.0, "modes": modes, "singular_values": [1.0]}  # fmt: skip
     assert any("in Hz" in doubt for doubt in fit_doubts(result)) is said
+
+
+def test_a_tyre_that_is_none_is_doubted() -> None:
+    assert tyre_doubts({"mass_kg": 12.8, "modes": [{"frequency_Hz": 31.7}]}) == []
+    heavy, slow = tyre_doubts({"mass_kg": 173e3, "modes": [{"frequency_Hz": 4.6e-5}]})
+    assert "1.73e+05 kg, usual is 0.5 to 500 kg" in heavy and "4.6e-05 Hz" in slow

@@ -13,7 +13,7 @@ from __future__ import annotations
 import json
 import lzma
 import tarfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -22,7 +22,7 @@ import numpy as np
 
 from tyrecal.blind.protocol import read_protocol
 from tyrecal.blind.ruler import Ruler, Signature, read_ruler
-from tyrecal.blind.score import case_of, labels_of, means, score
+from tyrecal.blind.score import Scored, case_of, labels_of, means, score
 from tyrecal.blind.seal import open_truth
 from tyrecal.blind.tables import DETECTED
 from tyrecal.diagnose.measurements import read_measurements
@@ -45,12 +45,12 @@ def unpacked(study: Path, folder: Path) -> None:
     (truth / "truth.json").write_bytes(lzma.decompress((study / "truth.json.xz").read_bytes()))
 
 
-def errors(folder: Path) -> dict[str, Array]:
+def errors(folder: Path, trials: Sequence[Scored]) -> dict[str, Array]:
     """By kind of trial, "effect" (detectable and named) and "none": rms errors held out, in ln f,
-    (trials, 2), of calibrations without and with the effect."""
+    (trials, 2), of calibrations without and with the effect. ``trials``: as they were scored."""
     protocol, labels = read_protocol(folder), labels_of(case_of(folder))
     ruler = read_ruler(folder, labels)
-    scored = {each.id: each for each in score(folder, folder.with_name("trials-truth"))}
+    scored = {each.id: each for each in trials}
     found: dict[str, list[list[float]]] = {"effect": [], "none": []}
     for truth in open_truth(folder, folder.with_name("trials-truth"))["trials"]:
         own = scored[truth["id"]]
@@ -102,7 +102,8 @@ def main() -> None:
     for study in STUDIES:
         with TemporaryDirectory() as place:
             unpacked(study, Path(place) / "trials")
-            found = errors(Path(place) / "trials")
+            folder = Path(place) / "trials"
+            found = errors(folder, score(folder, folder.with_name("trials-truth")))
         before, after = 100 * np.median(found["effect"], 0)
         shrinks, chance = (1 - found[kind][:, 1] / found[kind][:, 0] for kind in ("effect", "none"))
         print(

@@ -22,7 +22,7 @@ ALIKE = 0.85  # cosine of what a re-fit leaves of two effects, without their sig
 
 def main(case_file: str, fit_file: str) -> None:
     case = load_case(case_file)
-    values = read_fitted(Path(fit_file), case)
+    values, _ = read_fitted(Path(fit_file), case)
     run = Plain(Door(case), values, PRESSURES_KPA)
     one = Plain(Door(case), values, (case.case.pressure_kPa,))
     known = run.door.solver.capabilities

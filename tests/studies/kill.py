@@ -1,17 +1,21 @@
-"""A fit that is killed, or hears Ctrl-C, at random moments; then the same command again.
+"""A fit that a signal meets at random moments; then the same command again.
 
-    python tests/studies/kill.py [rounds] [seed] [KILL|INT]
+    python tests/studies/kill.py [rounds] [seed] [KILL|INT|TERM|HUP]
 
 Every round is a fit from nothing in a folder of its own, signalled once at a moment drawn over the
 whole run (drawn again where the fit had ended by then), and run again. Checked: result files byte
-for byte those of an undisturbed run, and every evaluation that had finished is answered from the
-record. With INT, to all processes as a terminal sends it, the fit searches from three starts, in
-two processes every other round; checked too: exit code 130 and one sentence, how to go on, alone.
+for byte those of an undisturbed run, every evaluation that had finished is answered from the
+record, and no process of the first fit is left. With other signals than KILL the fit searches from
+three starts, in two processes every other round; checked too: the exit code, one sentence, how to
+go on, alone, and neither run folders nor half-written files by then. INT goes to all processes, as
+a terminal sends it; TERM and HUP in every other pair of rounds, else to the command alone. A signal
+that comes before the tool's first own line is Python's, or the system's: nothing was changed.
 Exit code 1 where one is not.
 """
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import random
@@ -28,9 +32,9 @@ CASE = Path(__file__).parents[2] / "cases" / "p235_75r17.yaml"
 COMMAND = [sys.executable, "-m", "tyrecal", "fit", str(CASE), "--no-pictures", "--quiet"]
 STARTS = ["--mesh", "coarse", "--starts", "3", "--seed", "1"]
 RESULTS = ("fit.json", "fit.csv", "fit_history.csv")
-STARTED_S = 0.5  # Python itself answers Ctrl-C before it has imported us
-SAID = re.compile(r"\ninterrupted: (nothing was changed|.*same command goes on.*)\n")
-INTERRUPTED = (130, -signal.SIGINT)  # alike to a shell; Python's own imports make one of the other
+WORDS = {signal.SIGINT: "interrupted", signal.SIGTERM: "terminated", signal.SIGHUP: "hung up"}
+SAID = r"\n{}: (nothing was c.*|nothing was computed.*|.*same command goes on.*)\n"
+GONE_S = 5.0  # within which the processes of one that was killed outright have ended
 
 
 def fit(out: Path, arguments: list[str]) -> subprocess.Popen[str]:
@@ -44,51 +48,79 @@ def finished(out: Path) -> int:
     return len(list(out.glob("record/*/*.record")))
 
 
+def left(session: int) -> list[str]:
+    """Processes of a session that are still there."""
+    found = []
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        with contextlib.suppress(OSError):  # it has ended
+            state, _, _, own = path.read_text().rpartition(")")[2].split()[:4]
+            if int(own) == session and state != "Z":
+                found.append(path.with_name("cmdline").read_text().replace("\0", " "))
+    return found
+
+
+def rubbish(out: Path) -> bool:
+    """Whether run folders or half-written files are there."""
+    left = (".new-*", "runs", "*.partial")
+    return any(found for each in left for found in out.rglob(each))
+
+
 def stopped(
-    out: Path, arguments: list[str], how: int, chance: random.Random, seconds: float
-) -> tuple[float, str]:
+    out: Path, arguments: list[str], how: int, all_of_them: bool, chance: random.Random,
+    seconds: float,
+) -> tuple[float, str]:  # fmt: skip
     """Start a fit and signal it within ``seconds``; the moment, and what it did wrong."""
     while True:
         shutil.rmtree(out, ignore_errors=True)
         process = fit(out, arguments)
-        moment = chance.uniform(STARTED_S if how == signal.SIGINT else 0, seconds)
+        moment = chance.uniform(0, seconds)
         time.sleep(moment)
         alive = process.poll() is None
         if alive:
-            os.killpg(process.pid, how)
+            (os.killpg if all_of_them else os.kill)(process.pid, how)
         words = process.communicate()[1]
         if not alive or (out / "fit.json").exists():
             continue
-        right = process.returncode in INTERRUPTED and SAID.fullmatch(words)
-        return moment, "" if how == signal.SIGKILL or right else f"{process.returncode}: {words}"
+        end = time.monotonic() + GONE_S
+        while left(process.pid) and time.monotonic() < end:
+            time.sleep(0.05)
+        wrong = [f"LEFT {each}" for each in left(process.pid)]
+        code = process.returncode
+        early = code == -how and not out.exists() and "tyrecal" not in words
+        if how in WORDS and not early:
+            if code != 128 + how or not re.fullmatch(SAID.format(WORDS[how]), words):
+                wrong.append(f"{code}: {words}")
+            wrong += ["LEFTOVERS"] if rubbish(out) else []
+        return moment, ", ".join(wrong)
 
 
 def main(rounds: int, seed: int, how: int) -> int:
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background ignores it
     chance, bad = random.Random(seed), 0
-    searching = STARTS if how == signal.SIGINT else []
+    searching = STARTS if how in WORDS else []
     with tempfile.TemporaryDirectory() as place:
         plain = Path(place) / "plain"
         start = time.monotonic()
         fit(plain, searching).communicate()
         seconds = time.monotonic() - start
-        total = json.loads((plain / "run.json").read_text())["solver_runs"]
+        total = json.loads((plain / "run.json").read_text())["fit"]["solver_runs"]
         print(f"undisturbed: {seconds:.1f} s, {total} evaluations", flush=True)
         for number in range(1, rounds + 1):
             out = Path(place) / f"{number}"
             arguments = [*searching, *(["--jobs", "2"] if searching and number % 2 else [])]
-            moment, wrong = stopped(out, arguments, how, chance, seconds)
+            to_all = how == signal.SIGINT or number // 2 % 2 == 0
+            moment, wrong = stopped(out, arguments, how, to_all, chance, seconds)
             before = finished(out)
             fit(out, arguments).communicate()
-            facts = json.loads((out / "run.json").read_text())
+            facts = json.loads((out / "run.json").read_text())["fit"]
             same = all((out / n).read_bytes() == (plain / n).read_bytes() for n in RESULTS)
             once = facts["solver_runs"] == total - before == total - facts["answered_from_record"]
-            rubbish = (out / "runs").exists() or any(out.rglob("*.partial"))
-            bad += not (same and once) or rubbish or bool(wrong)
+            bad += not (same and once) or rubbish(out) or bool(wrong)
             print(
                 f"{number:3d}: stopped at {moment:.2f} s with {before}"
                 f" finished; then {facts['solver_runs']} runs, {facts['answered_from_record']} from"
                 f" the record; {'same bytes' if same else 'OTHER BYTES'}"
-                f"{'' if once else ', RUN TWICE'}{', LEFTOVERS' if rubbish else ''}"
+                f"{'' if once else ', RUN TWICE'}{', LEFTOVERS' if rubbish(out) else ''}"
                 f"{f', {wrong}' if wrong else ''}",
                 flush=True,
             )

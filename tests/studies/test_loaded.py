@@ -36,6 +36,7 @@ def hertz(each: Loaded) -> dict[Member, float]:
     return {mode.member: mode.frequency_Hz for mode in each.modes}
 
 
+@pytest.mark.slow
 def test_every_family_at_every_load(tyre: LoadedTyre) -> None:
     """Both [0,0] once, every doublet's two members, by rising frequency, no load out of place."""
     assert [each.load_N for each in tyre.loads] == LOADS and tyre.failed is None
@@ -52,6 +53,7 @@ def test_every_family_at_every_load(tyre: LoadedTyre) -> None:
         assert all(0 <= mode.overlap <= 1 + 1e-9 for mode in each.modes)
 
 
+@pytest.mark.slow
 def test_the_light_load_is_nearer_to_none(tyre: LoadedTyre) -> None:
     """Frequencies rise from those of the unloaded tyre, doublets split more and more."""
     none, light, heavy = (hertz(each) for each in tyre.loads)
@@ -65,12 +67,14 @@ def test_the_light_load_is_nearer_to_none(tyre: LoadedTyre) -> None:
     assert first < then
 
 
+@pytest.mark.slow
 def test_members_share_the_unloaded_frequency(tyre: LoadedTyre) -> None:
     none = hertz(tyre.loads[0])
     for label in {member.label for member in none if member.label.c}:
         assert len({none[Member(label, symmetry)] for symmetry in SYMMETRIES}) == 1
 
 
+@pytest.mark.slow
 def test_results_as_files_hold_them(tyre: LoadedTyre) -> None:
     one = loaded_modes_result({"A": 1.0}, tyre)
     assert (one["load_N"], one["variables"]) == (1000.0, {"A": 1.0}) and one["mass_kg"] > 10
@@ -113,6 +117,7 @@ def test_findings_in_words() -> None:
     assert "at 900 N no shape could be told to be [3,0] symmetric" in findings([lost])["words"][-1]
 
 
+@pytest.mark.slow
 def test_failures_keep_what_was_computed(tyre: LoadedTyre) -> None:
     failed = EvaluationFailed("no_equilibrium", "too much")
     cut = LoadedTyre(tyre.pressure_kPa, tyre.mass_kg, tyre.loads[:2], failed)
@@ -126,6 +131,7 @@ def test_a_solver_without_modes_on_the_road_is_refused() -> None:
         load_tyres(Door(CASE, _solver=StandIn()), {"initial": {}}, [1000.0])
 
 
+@pytest.mark.slow
 def test_an_unloaded_tyre_that_fails_is_the_outcome(tmp_path: Path) -> None:
     """Far too much pressure: no modes without a load either."""
     case = load_case(coarse_case(tmp_path))

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from tyrecal.case import load_case, start_values
+from tyrecal.case.identity import tyre_sha256
 from tyrecal.evaluate.door import Door
 from tyrecal.evaluate.results import HarmonicShape, RawMode
 from tyrecal.modes.label import label_modes
@@ -77,7 +78,7 @@ def test_findings_name_every_exception():
     text = "\n".join(found["words"])
     assert "every mode rises, but for [0,0] torsional from 100 to 320 kPa" in text
     assert "the rise grows with c, but for [3,0]" in text
-    assert "but for [0,0] axial (convex), [0,0] torsional (neither)" in text
+    assert "but for [0,0] lateral (convex), [0,0] torsional (neither)" in text
     assert found["disagreements"] == [] and found["least_mac"] == pytest.approx(1.0)
     assert "labels stay with the shapes" in text
 
@@ -145,7 +146,6 @@ def test_a_variable_that_sets_the_pressure_is_what_is_swept(case_folder: Path) -
 FIT = {
     "variables": {"A_belt": {"value": 2e-7}, "A_carcass": {"value": 4e-7}},
     "fixed": {"C10": 1e6},
-    "modes": [{"c": 2, "m": 0, "kind": None, "fitted_Hz": 88.1}],
     "pressure_kPa": 240.0,
 }
 
@@ -160,18 +160,19 @@ FIT = {
         ({"fixed": {"C10": True}}, "'C10' is True"),
         ({"fixed": {"C10": -1e6}}, "C10_Pa"),
         ({"variables": [1, 2]}, "not the fit.json"),
-        ({"modes": None}, "not the fit.json"),
         ({"pressure_kPa": None}, "not the fit.json"),
-        ({"modes": [{"c": 2, "m": 0, "kind": None, "fitted_Hz": 90.0}]}, "a fit of another case"),
-        ({"modes": [{"c": 2, "m": 0, "kind": None, "fitted_Hz": float("nan")}]}, "another case"),
+        ({"provenance": None}, "not the fit.json"),
+        ({"provenance": {}}, "does not say which tyre it is of"),
+        ({"provenance": {"tyre_sha256": "0"}}, "of another tyre: .* has been edited since"),
     ],
 )
 def test_a_file_that_is_no_fit_of_this_case(change: dict, words: str, tmp_path: Path) -> None:
     case = load_case(CASES / "p235_75r17.yaml")
     path = tmp_path / "fit.json"
-    path.write_text(json.dumps(FIT | change))
+    right = FIT | {"provenance": {"tyre_sha256": tyre_sha256(case), "mesh": "default"}}
+    path.write_text(json.dumps(right | change))
     with pytest.raises(NotThisFit, match=words) as refused:
         read_fitted(path, case)
     assert "\n" not in str(refused.value)
-    path.write_text(json.dumps(FIT))
-    assert read_fitted(path, case) == {"A_belt": 2e-7, "A_carcass": 4e-7, "C10": 1e6}
+    path.write_text(json.dumps(right))
+    assert read_fitted(path, case) == ({"A_belt": 2e-7, "A_carcass": 4e-7, "C10": 1e6}, [])

@@ -39,10 +39,10 @@ def test_design_dimensions_are_those_of_the_tables(code: str) -> None:
 
 
 @given(
-    st.integers(25, 79).map(lambda n: 5 * n),
+    st.integers(12, 39).map(lambda n: 10 * n + 5),
     st.sampled_from(ASPECTS),
     st.sampled_from(RIM_CODES),
-    st.sampled_from(["", "P", "LT"]),
+    st.sampled_from(["", "P", "LT", "HL"]),
 )
 def test_any_metric_size_means_what_it_says(width: int, aspect: int, rim: int, kind: str) -> None:
     size = parse_size(f"{kind}{width}/{aspect}R{rim}")
@@ -81,6 +81,7 @@ def test_the_service_description_sets_the_pressure() -> None:
         ("LT245/75R16/E 120/116S", 550), ("LT245/75R16E", 550), ("LT245/75R16C 120/116S", 350),
         ("37x12.50R17LT/D 124R", 450), ("225/45R17XL 94Y", 290),
         ("31x10.50R15LT C", 350), ("35x12.50R17LT 121R Load Range E", 550), ("205/65R16C", 400),
+        ("HL265/35R21", 290),
     ]:  # fmt: skip
         assert parse_size(text).pressure_kPa == kPa, text
 
@@ -92,14 +93,20 @@ def test_the_service_description_sets_the_pressure() -> None:
         ("205/60D15", "bias-ply"),
         ("T125/80B15", "bias-ply"),
         ("31x10.50-15LT", "bias-ply"),
-        ("225/45RF17", "--sidewall"),
+        ("225/45RF17", "--sidewall-mm"),
         ("225/45X17", "no construction"),
         ("155R13", "aspect ratio is missing"),
         ("6.00-16", "diameter too"),
         ("205/62R15", "aspect ratios are"),
         ("999/60R15", "section widths are"),
         ("205/60R99", "no rim"),
-        ("295/80R22.5", "no rim"),
+        ("205/60R16.5", "no rim"),
+        ("295/80R22.5", "truck tyre.*--section"),
+        ("11R22.5", "truck tyre.*--section"),
+        ("12.00 R 24.5", "truck tyre.*--section"),
+        ("180/55ZR17", "motorcycle"),
+        ("120/70ZR17", "motorcycle"),
+        ("400/60R15", "section widths are"),
         ("12x10.50R15LT", "no tyre"),
         ("60x10.50R15LT", "no tyre"),
         ("31x40R15LT", "8 to 16 inches"),

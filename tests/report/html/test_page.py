@@ -127,7 +127,7 @@ def test_the_same_results_give_the_same_bytes(copy: Path, tmp_path: Path) -> Non
     """Wherever they stand, whenever and wherever they were computed."""
     write_page(tmp_path / "one.html", [copy])
     run = json.loads((copy / "run.json").read_text())
-    run |= {"started": "2031-05-05T05:05:05+00:00", "seconds": 99.0, "host": "there"}
+    run["fit"] |= {"started": "2031-05-05T05:05:05+00:00", "seconds": 99.0, "host": "there"}
     (copy / "run.json").write_text(json.dumps(run))
     moved = Path(shutil.move(copy, tmp_path / "elsewhere" / "results"))
     write_page(tmp_path / "two.html", [moved])
@@ -179,7 +179,7 @@ def test_several_folders_stand_side_by_side(folder: Path, copy: Path) -> None:
     both = words_of(text_of(folder, copy)).replace("\u2212", "-")
     for words in (
         "objective initial33.13 Hz33.13 sigmas", "objective fitted8.60 Hz0.70 sigmas",
-        "worst mode[3,1] ● +5.06 %[0,0] axial ◐ -2.65 %", "design pointsyes, 9no, 9",
+        "worst mode[3,1] ● +5.06 %[0,0] lateral ◐ -2.65 %", "design pointsyes, 9no, 9",
         "A_belt3.6e-07 ± 10 %–", "C108e+05, at bound–", "D1–3.6e-07 ± 200 %",
         "angle70 held70 held", "[2,0] ovalisation○ -0.10–", "4000 N contact area◐ -3.70–",
         "verdictNamed–", "likeliest probabilityrim_width 0.71–",
@@ -340,3 +340,20 @@ def test_contrast_is_aa() -> None:
             for drawn in ("edge", "accent", *(f"s{k}" for k in range(6))):
                 assert _contrast(theme[drawn], theme[ground]) >= 3, (drawn, ground, theme)
         assert _contrast(theme["on-accent"], theme["accent"]) >= 4.5
+
+
+def test_the_page_says_what_its_results_are_of(copy: Path) -> None:
+    words = words_of(text_of(copy))
+    for told in ("01234567", "rim.mass_kg = 12.5", "200", "1000 to 4000", "coarse", "ring 1.0",
+                 "tyrecal 0.1.0", "a drum", "fedcba98"):  # fmt: skip
+        assert told in words, told
+    assert "not all of one tyre" not in words and "did not finish" not in words
+    modes = json.loads((copy / "modes.json").read_text())
+    modes["provenance"]["tyre_sha256"] = "f" * 64
+    (copy / "modes.json").write_text(json.dumps(modes))
+    runs = json.loads((copy / "run.json").read_text())
+    runs["modes"] = {**runs["fit"], "finished": False}
+    (copy / "run.json").write_text(json.dumps(runs))
+    words = words_of(text_of(copy))
+    assert "not all of one tyre" in words and "ffffffff" in words
+    assert "The last run of modes did not finish" in words

@@ -24,8 +24,9 @@ def write(folder: Path, name: str = "Toy & sons", effect: str = "rim_width") -> 
     """Write the folder; ``name`` of the case and ``effect`` may be as hostile as one likes."""
     folder.mkdir(parents=True, exist_ok=True)
     files: dict[str, Any] = {
-        "run.json": {"case": "/somewhere/toy.yaml", "tyrecal": "0.1.0", "solver": "ring 1.0",
-                     "started": "2026-01-01T00:00:00+00:00", "seconds": 1.5, "host": "here"},
+        "run.json": {"fit": {
+            "case": "/somewhere/toy.yaml", "tyrecal": "0.1.0", "solver": "ring 1.0",
+            "started": "2026-01-01T00:00:00+00:00", "seconds": 1.5, "host": "here"}},
         "fit.json": fit(),
         "fit_shapes.json": shapes(name),
         "modes.json": loaded_modes(),
@@ -37,6 +38,8 @@ def write(folder: Path, name: str = "Toy & sons", effect: str = "rim_width") -> 
         "diagnosis.json": diagnosis(effect),
         "diagnosis_section.json": {"format": 1, "case": name, **parts()},
     }  # fmt: skip
+    for file in ("fit.json", "modes.json", "diagnosis.json"):
+        files[file]["provenance"] = provenance(name)
     for file, content in files.items():
         (folder / file).write_text(json.dumps(content))
     (folder / "fit_history.csv").write_text(
@@ -52,6 +55,15 @@ def write(folder: Path, name: str = "Toy & sons", effect: str = "rim_width") -> 
         "## What to measure next\n\n1. weigh the tyre\n2. <b>measure</b> again\n"
     )
     return folder
+
+
+def provenance(name: str) -> dict[str, Any]:
+    return {
+        "tyrecal": "0.1.0", "solver": "ring", "solver_version": "1.0", "name": name, "size": "toy",
+        "tyre_sha256": "0123456789abcdef" * 4, "overrides": {"rim.mass_kg": 12.5}, "mesh": "coarse",
+        "state": {"pressure_kPa": 200.0, "load_N": [1e3, 4e3], "rim": "fixed"},
+        "targets": "a drum", "measured_sha256": "fedcba9876543210" * 4,
+    }  # fmt: skip
 
 
 def fit() -> dict[str, Any]:

@@ -1,0 +1,160 @@
+"""Whatever fails after a good fit, in its folder: every file of the fit stays, byte for byte."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from tyrecal.evaluate.door import Door
+from tyrecal.evaluate.failure import EvaluationFailed
+from tyrecal.files import results
+
+from ..conftest import CASES
+from .test_cli import run
+
+HEADER = "quantity,c,m,kind,member,pressure_kPa,load_N,value,sigma\n"
+TWO_MODES = HEADER + "frequency_Hz,2,0,,,240,0,79.5,0.4\nfrequency_Hz,2,1,,,240,0,66.1,0.4\n"
+ROAD = HEADER + "contact_area_m2,,,,,240,4000,0.02,0.001\n"
+
+
+@pytest.fixture(scope="module")
+def good(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A project with a case and the results of its fit."""
+    project = tmp_path_factory.mktemp("project")
+    for name in ("p235_75r17.yaml", "p235_75r17.csv"):
+        shutil.copy(CASES / name, project)
+    case = project / "p235_75r17.yaml"
+    text = case.read_text().replace("level: default", "level: coarse")
+    case.write_text(text.replace("static_increments: 10", "static_increments: 5"))
+    (project / "two.csv").write_text(TWO_MODES)
+    (project / "wrong.csv").write_text(HEADER + "frequency_Hz,2,0,,,240,0,79500,0.4\n")
+    (project / "other.csv").write_text(TWO_MODES.replace("240", "200"))
+    (project / "road.csv").write_text(ROAD)
+    (project / "broken.yaml").write_text(text.replace("C10_Pa", "C10_MPa"))
+    (project / "old.json").write_text('{"variables": {}, "fixed": {"A_belt": 1}}')
+    out = ["--output", str(project / "out"), "--quiet"]
+    assert run("fit", str(case), "--fix", "A_carcass", *out) == 0
+    assert (project / "out/fit_modes.png").exists()
+    return project
+
+
+Break = Callable[[pytest.MonkeyPatch], None]
+
+
+def nothing(patch: pytest.MonkeyPatch) -> None:
+    """The command line alone is wrong."""
+
+
+def crash(patch: pytest.MonkeyPatch) -> None:
+    """The solver dies."""
+
+    def fails(door: Door, *question: object) -> None:
+        raise EvaluationFailed("crashed", "the licence was eaten")
+
+    patch.setattr(Door, "evaluate", fails)
+
+
+def interrupt(patch: pytest.MonkeyPatch) -> None:
+    """Ctrl-C in the middle."""
+
+    def stops(door: Door, *question: object) -> None:
+        raise KeyboardInterrupt
+
+    patch.setattr(Door, "evaluate", stops)
+
+
+def full_disc(patch: pytest.MonkeyPatch) -> None:
+    """The last result cannot be written."""
+
+    def fails(*arguments: object) -> None:
+        raise OSError(28, "No space left on device", "fit_history.csv")
+
+    patch.setattr("tyrecal.fit.calibrate.history_csv", fails)
+
+
+def no_picture(patch: pytest.MonkeyPatch) -> None:
+    """Pictures fail when all else is written."""
+
+    def fails(*arguments: object) -> None:
+        raise OSError(28, "No space left on device", "convergence.png")
+
+    patch.setattr("tyrecal.report.pictures.draw_convergence", fails)
+
+
+def unmoved(patch: pytest.MonkeyPatch) -> None:
+    """The optimiser gives up where it starts."""
+    from tyrecal.fit import calibrate, slsqp
+
+    def stays(problem: object, start: object, tolerance: float) -> slsqp.Outcome:
+        return slsqp.Outcome(problem.evaluate(start), "gave up")  # type: ignore[attr-defined]
+
+    patch.setitem(calibrate.METHODS, "slsqp", stays)
+
+
+KINDS: dict[str, tuple[list[str], int, Break]] = {
+    "too few targets": (["fit", "--measured", "two.csv"], 2, nothing),
+    "nothing free": (["fit", *(w for v in ("A_belt", "A_carcass", "C10") for w in ("--fix", v))],
+                     2, nothing),
+    "no such variable": (["fit", "--fix", "C11"], 2, nothing),
+    "start out of bounds": (["fit", "--set", "C10=1e9"], 2, nothing),
+    "no such number": (["fit", "--set", "materials.rubber.C10=1"], 2, nothing),
+    "an impossible number": (["fit", "--set", "materials.rubber.density_kg_per_m3=-1"], 2, nothing),
+    "no such mesh": (["fit", "--mesh", "fine"], 2, nothing),
+    "no such solver": (["fit", "--solver", "nastran"], 2, nothing),
+    "measured in another unit": (["fit", "--measured", "wrong.csv"], 2, nothing),
+    "measured elsewhere": (["fit", "--measured", "other.csv"], 2, nothing),
+    "two options that exclude": (["fit", "--jobs", "2", "--scheduler", "x"], 2, nothing),
+    "a broken case": (["fit", "broken.yaml"], 2, nothing),
+    "another case": (["fit", str(CASES / "205_60r15.yaml")], 2, nothing),
+    "the solver dies": (["fit"], 3, crash),
+    "an old fit": (["sweep-pressure", "--fitted", "old.json"], 2, nothing),
+    "another tyre": (["footprint", "--compare", "fitted", "--loads-N", "500",
+                      "--set", "rebar_layers.belt_1.angle_deg=70.07"], 2, nothing),
+    "modes of no tyre": (["modes", "--pictures"], 3, crash),
+    "a sweep of no tyre": (["sweep-pressure", "--steps", "2"], 3, crash),
+    "a diagnosis of a road": (["diagnose", "--measured", "road.csv"], 2, nothing),
+    "interrupted": (["fit"], 130, interrupt),
+    "a full disc": (["fit"], 2, full_disc),
+    "a full disc under a picture": (["fit"], 2, no_picture),
+    "a fit that stays where it starts": (["fit"], 4, unmoved),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_good_fit_stays(
+    kind: str,
+    good: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    words, code, spoil = KINDS[kind]
+    monkeypatch.chdir(good)
+    before = contents(good / "out")
+    assert {"fit.json", "fit_modes.png", "fit_mode_2_1.vtu", "fit_shapes.json"} <= set(before)
+    spoil(monkeypatch)
+    command, *rest = words
+    case = [] if rest and rest[0].endswith(".yaml") else ["p235_75r17.yaml"]
+    assert run(command, *case, *rest, "--output", "out") == code, capsys.readouterr()
+    assert contents(good / "out") == before
+    assert "Traceback" not in capsys.readouterr().err
+    assert not list((good / "out").glob(".new-*")) and not (good / "out/previous").exists()
+    facts = json.loads((good / "out/run.json").read_text())
+    if code == 2 and spoil is nothing:  # a mistake is found before anything is begun
+        assert facts["fit"]["finished"] and facts["fit"].get("results") is None
+    elif command == "fit":
+        assert facts["fit"]["finished"] == (code == 4)
+    if code == 4:
+        assert facts["fit"]["results"] == "not_converged"
+        assert json.loads((good / "out/not_converged/fit.json").read_text())["moved"] is False
+    facts["fit"] |= {"finished": True}  # for the next kind
+    facts["fit"].pop("results", None)
+    (good / "out/run.json").write_text(json.dumps(facts))
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    """The files of the fit."""
+    return {path.name: path.read_bytes() for path in results(folder, "fit")}

@@ -1,0 +1,117 @@
+"""What ABAQUS' manual asks of where keywords stand: held by decks of every kind, and by the bundled
+solver, which refuses them elsewhere."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from tyrecal_solvers.bundled.job import run
+from tyrecal_solvers.bundled.keywords import DeckError, Keyword, read_keywords
+
+from tyrecal.case import load_case, with_values
+from tyrecal.deck.write import Decks
+
+from ..conftest import CASES
+from ..effects.support import CASE as COARSE
+from ..effects.support import frequencies
+
+CASE = load_case(CASES / "p235_75r17.yaml")
+FOUR_NODES = replace(  # of a kind that needs hourglass control
+    CASE,
+    case=CASE.case.model_copy(
+        update={"mesh": CASE.case.mesh.model_copy(update={"element": "CGAX4R"})}
+    ),
+    raw={**CASE.raw, "mesh": {**CASE.raw["mesh"], "element": "CGAX4R"}},
+)
+HOURGLASS = {"mesh.hourglass_stiffness_Pa": 3e4}
+VALUES: dict[str, dict[str, float]] = {
+    "plain": {},
+    "at a frequency": {"analysis.vibration_frequency_Hz": 60.0},
+    "turning": {"effects.rotation": 12.0},
+    "turning, at a frequency": {
+        "effects.rotation": 12.0,
+        "analysis.vibration_frequency_Hz": 60.0,
+    },
+    "hourglass control": HOURGLASS,
+    "splice, hourglass control": {"effects.stiffness_splice": 0.2, **HOURGLASS},
+    "rim on springs, mass on the tread": {
+        "effects.spindle_lateral": 1e-7,
+        "effects.point_mass": 0.02,
+    },
+}
+LOADS: dict[str, dict[str, Any]] = {
+    "modes": {},
+    "a load": {"loads_N": (500.0,)},
+    "loads": {"loads_N": (500.0, 1000.0, 1500.0)},
+    "loads with modes": {"loads_N": (500.0, 1000.0), "loaded_modes": 12},
+}
+
+
+def jobs(values: str, loads: str) -> dict[str, list[Keyword]]:
+    case = FOUR_NODES if "hourglass" in values else CASE
+    texts = Decks(with_values(case, VALUES[values]), **LOADS[loads]).texts("abaqus")
+    return {name: read_keywords(text, name) for name, text in texts.items()}
+
+
+@pytest.mark.parametrize(  # a tyre with a splice cannot be pressed
+    ("values", "loads"),
+    [(v, loads) for v in VALUES for loads in LOADS if "splice" not in v or loads == "modes"],
+)
+def test_keywords_stand_where_the_manual_wants_them(values: str, loads: str) -> None:
+    """`*FILE FORMAT` once in a job and before all that is written; the same PROPERTY EVALUATION in
+    every step of modes; `*HOURGLASS STIFFNESS` right under each section that it is of."""
+    for name, keywords in jobs(values, loads).items():
+        names = [k.name for k in keywords]
+        written = [i for i, n in enumerate(names) if n.endswith(" FILE")]
+        formats = [i for i, n in enumerate(names) if n == "FILE FORMAT"]
+        assert len(formats) == (1 if written else 0), name
+        assert not written or formats[0] < written[0]
+        modes = [k for k in keywords if k.name in ("FREQUENCY", "COMPLEX FREQUENCY")]
+        wanted = "60" if "frequency" in values else ""
+        assert {k.get("PROPERTY EVALUATION") for k in modes} <= {wanted}
+        sections = [i for i, n in enumerate(names) if n == "SOLID SECTION"]
+        below = [i + 1 for i in sections] if "hourglass" in values else []
+        assert [i for i, n in enumerate(names) if n == "HOURGLASS STIFFNESS"] == below
+
+
+def test_a_turning_tyre_is_as_stiff_as_the_frequency_says() -> None:
+    """At next to no speed the frequencies are those of the tyre that does not turn, its rubber
+    evaluated at the same frequency, not those of its static modulus."""
+    stiff = with_values(COARSE, {"analysis.vibration_frequency_Hz": 60.0})
+    rest, slow = frequencies(stiff), frequencies(stiff, rotation=1e-3)
+    assert rest.keys() == slow.keys()
+    for label, hertz in rest.items():
+        assert slow[label] == pytest.approx(hertz, rel=1e-4)
+    assert max(rest[k] / f for k, f in frequencies(COARSE).items()) > 1.02  # the modulus matters
+
+
+@pytest.mark.parametrize(
+    ("job", "old", "new", "words"),
+    [
+        (
+            "modes",
+            "*MODAL FILE\n",
+            "*FILE FORMAT, ASCII\n*MODAL FILE\n",
+            r"modes.inp, line \d+: \*FILE FORMAT may stand once in a job",
+        ),
+        (
+            "inflate",
+            "HOURGLASS=STIFFNESS\n",
+            "HOURGLASS=STIFFNESS\n*HOURGLASS STIFFNESS\n3e4\n",
+            r"inflate.inp, line \d+: \*HOURGLASS STIFFNESS must stand right under the \*SOLID SEC",
+        ),
+    ],
+)
+def test_the_bundled_solver_refuses_them_elsewhere(
+    tmp_path: Path, job: str, old: str, new: str, words: str
+) -> None:
+    for name, text in Decks(FOUR_NODES).texts("abaqus").items():
+        if name == f"{job}.inp":
+            assert text.count(old) == 1
+            text = text.replace(old, new)
+        (tmp_path / name).write_text(text)
+    with pytest.raises(DeckError, match=words):
+        run(tmp_path, "modes", "inflate")

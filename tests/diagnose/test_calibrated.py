@@ -1,0 +1,95 @@
+"""What a diagnosis says of the calibrated variables, and what it says where there is no gap."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+
+from tyrecal.diagnose.calibrated import calibrated_variables
+from tyrecal.diagnose.diagnosis import Diagnosis, diagnose
+from tyrecal.diagnose.response import Answer, Point
+from tyrecal.diagnose.result import result
+from tyrecal.diagnose.study import Study
+from tyrecal.report.diagnosis import page
+from tyrecal.units import in_engineers_units
+
+from .toy import Toy, problem
+
+X = np.array((0.3, -0.2, 0.1))
+
+
+def exact(toy: Toy, effects: dict[str, float]) -> Diagnosis:
+    """Of data at X without scatter."""
+    base, (answer,) = problem(toy), toy.answers([Point(X, effects)])
+    assert isinstance(answer, Answer)
+    seen = base.measured(answer.eta[base.places]).observations
+    return diagnose(toy, toy.rows, seen, assumed=base.assumed)
+
+
+def told(d: Diagnosis, toy: Toy) -> str:
+    return page(Study(d, (), False, (), (), toy), "tyre", "a.csv")  # type: ignore[arg-type]
+
+
+@pytest.fixture(scope="module")
+def toy() -> Toy:
+    return Toy(effects=3, size=0.03)
+
+
+@pytest.fixture(scope="module")
+def named(toy: Toy) -> Diagnosis:
+    return exact(toy, {"e0": 0.8})
+
+
+@pytest.fixture(scope="module")
+def plain(toy: Toy) -> Diagnosis:
+    return exact(toy, {})
+
+
+def test_the_variables_with_the_effect_are_the_truth(toy: Toy, named: Diagnosis) -> None:
+    """As near as a standard error: the data have no scatter, the prior and the grid of sizes pull
+    a little; a logarithm's scatter is the variable's share."""
+    found = calibrated_variables(named, toy)  # type: ignore[arg-type]
+    assert named.leading == "e0" and set(found) == {"without", "with"}
+    for variable, truth in zip(found["with"].values(), 2 * np.exp(X), strict=True):
+        assert variable["unit"] == "Pa" and 0 < variable["standard_error"] < 0.05 * truth
+        assert abs(variable["value"] - truth) < variable["standard_error"]
+    assert found["without"].keys() == found["with"].keys() == set(toy.variables)
+    assert result(named, None, found)["calibrated"] == found
+
+
+def test_the_page_has_them_with_units(toy: Toy, named: Diagnosis) -> None:
+    words = told(named, toy)
+    assert words.startswith("# What the model of tyre lacks")
+    assert "| variable | without an effect | with `e0` |" in words
+    rows = re.findall(r"^\| ([ABC]) \| (\S+) MPa ± \S+ % \| (\S+) MPa ± \S+ % \|$", words, re.M)
+    assert [name for name, *_ in rows] == list(toy.variables)
+    found = calibrated_variables(named, toy)  # type: ignore[arg-type]
+    for name, _, value in rows:
+        assert float(value) == pytest.approx(1e-6 * found["with"][name]["value"], rel=1e-3)
+
+
+def test_where_there_is_no_gap_nothing_explains_it(toy: Toy, plain: Diagnosis) -> None:
+    """Said once, no effect beside the calibrated variables, none that shrinks an error."""
+    assert plain.verdict.kind == "no_gap" and plain.leading is None
+    words = told(plain, toy)
+    assert words.lower().count("no gap is seen") == 1
+    assert "lacks" not in words and "it shrinks by" not in words
+    assert "| variable | without an effect |\n" in words
+    assert calibrated_variables(plain, toy)["with"] is None  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "words"),
+    [
+        (-0.00934, "m", "-9.34 mm"),
+        (2.1e-7, "m2", "0.21 mm2"),
+        (1.26e6, "Pa", "1.26 MPa"),
+        (3e-7, "m/N", "0.3 mm/kN"),
+        (0.25, "", "0.25"),
+        (-3.0, "degrees", "-3 degrees"),
+    ],
+)
+def test_sizes_in_the_units_people_say_them_in(value: float, unit: str, words: str) -> None:
+    assert in_engineers_units(value, unit, 3) == words

@@ -1,0 +1,33 @@
+"""Groups of effects that data cannot tell apart."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tyrecal.diagnose.separability import APART, Separability
+
+
+def judged(distances: np.ndarray, **lambdas: float) -> Separability:
+    sizes = dict.fromkeys(lambdas, 1.0)
+    return Separability(
+        tuple(lambdas), sizes, lambdas, lambdas, np.eye(len(lambdas)), distances, {}
+    )
+
+
+def test_effects_are_linked_by_what_stands_between_them() -> None:
+    """a is near b, b near c, c near d, each from one side alone: one group; e is by itself, and f,
+    which nothing shows, links nothing."""
+    far = np.full((6, 6), 5 * APART)
+    for i, j in ((1, 0), (1, 2), (3, 2), (4, 5), (5, 0)):
+        far[i, j] = 0.5 * APART
+    found = judged(far, a=20.0, b=20.0, c=20.0, d=20.0, e=20.0, f=0.5 * APART)
+    assert [sorted(group) for group in found.groups()] == [["a", "b", "c", "d"]]
+    assert found.groups(["a", "c", "d", "e"]) == [["c", "d"]]
+    assert found.groups(["a", "e", "f"]) == []
+
+
+def test_at_the_limits() -> None:
+    """delta^2 = 9 is apart, lambda = 9 is seen."""
+    just = np.array([[0.0, APART], [APART, 0.0]])
+    assert judged(just, a=APART, b=APART).groups() == []
+    assert judged(np.nextafter(just, 0), a=APART, b=APART).groups() == [["a", "b"]]

@@ -1,0 +1,27 @@
+"""What is told of each registered solver."""
+
+from __future__ import annotations
+
+import pytest
+
+from tyrecal.evaluate import solver
+
+
+@pytest.mark.parametrize(
+    ("told", "wanted"),
+    [
+        (([], ""), ("ccx", "default")),
+        ((["ccx_2.21", "-i"], "settings.toml"), (["ccx_2.21", "-i"], "settings.toml")),
+    ],
+)
+def test_a_command_and_who_set_it(
+    told: tuple[list[str], str], wanted: tuple[object, str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(solver, "command_of", lambda name: told)
+    facts = {each["name"]: each for each in solver.installed()}
+    calculix, bundled = facts["calculix"], facts["bundled"]
+    command = calculix["command"]
+    assert calculix["command_from"] == wanted[1]
+    assert command == wanted[0] or command == [wanted[0]]
+    assert bundled["command"] is None and bundled["command_from"] is None
+    assert bundled["problem"] is None and "modes" in bundled["capabilities"]

@@ -1,0 +1,81 @@
+"""Runs what is quick and marked ``numbers`` under every BLAS kernel that this processor can run.
+
+    python -m tests.kernels [pytest's arguments]
+
+Each kernel with one thread, and the solver's tests with two; as many runs at a time as there are
+cores. A kernel that the processor cannot run, or for which the libraries have another's, is said.
+Exits with 1 where a run failed.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+KERNELS = ("Prescott", "Haswell", "Zen", "SkylakeX")
+THREADS = (1, 2)
+ASK = """
+import numpy, scipy.linalg, threadpoolctl
+a = numpy.random.default_rng(0).normal(size=(200, 200))
+for linalg in (numpy.linalg, scipy.linalg):  # each has its own library
+    linalg.eigh(a @ a.T), linalg.svd(a), linalg.solve(a, a)
+print(*sorted({x["architecture"] for x in threadpoolctl.threadpool_info()}))
+"""
+
+
+def run(words: list[str], kernel: str, threads: int = 1) -> subprocess.CompletedProcess[str]:
+    env = {**os.environ, "OPENBLAS_CORETYPE": kernel, "OPENBLAS_NUM_THREADS": str(threads)}
+    root = Path(__file__).parents[1]
+    return subprocess.run([sys.executable, *words], env=env, cwd=root, capture_output=True,
+                          text=True)  # fmt: skip
+
+
+def kernels() -> dict[str, str]:
+    """What to run under, and what the libraries call it; says what is not run, and why."""
+    usual = run(["-c", ASK], "").stdout.strip()
+    taken: dict[str, str] = {}
+    for name in KERNELS:
+        asked = run(["-c", ASK], name)
+        core = asked.stdout.strip()
+        if asked.returncode:
+            print(f"{name}: not run, this processor cannot: {asked.stderr.strip()[-200:]}")
+        elif core in taken.values():
+            print(f"{name}: not run again, the libraries take {core} for it")
+        else:
+            taken[name] = core
+    if usual not in taken.values():
+        print(f"what this processor takes by itself, {usual}, is none of them: run too")
+        taken[""] = usual
+    return taken
+
+
+def tested(kernel: str, core: str, threads: int, more: list[str]) -> bool:
+    start = time.monotonic()
+    marked = [
+        path
+        for path in Path(__file__).parent.rglob("test_*.py")
+        if "mark.numbers" in path.read_text() and (threads == 1 or path.parent.name == "bundled")
+    ]  # the others take long to be collected
+    chosen = ["-m", "numbers and quick", "-p", "no:cacheprovider", *map(str, marked)]
+    words = ["-m", "pytest", *chosen, *more]
+    done = run(words, kernel, threads)
+    last = (done.stdout.strip().splitlines() or [""])[-1]
+    name = f"{kernel or 'by itself'} ({core})"
+    print(f"{name}, {threads} thread(s): {last} [{time.monotonic() - start:.0f} s]", flush=True)
+    if done.returncode:
+        print(done.stdout, done.stderr, flush=True)
+    return done.returncode == 0
+
+
+def main(more: list[str]) -> int:
+    jobs = [(name, core, n, more) for name, core in kernels().items() for n in THREADS]
+    with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
+        return not all([*pool.map(lambda job: tested(*job), jobs)])  # a failure stops no other
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

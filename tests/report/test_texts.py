@@ -1,0 +1,116 @@
+"""No picture cuts a text or prints one over another, however long its words are: what `conftest`
+checks of every picture that a test of this folder draws, here of hard cases."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from tyrecal.case import load_case
+from tyrecal.deck.context import section_mesh
+from tyrecal.effects import catalogue
+from tyrecal.modes.mode import Label
+from tyrecal.report.convergence import draw_convergence
+from tyrecal.report.figure import headline, new_figure, save
+from tyrecal.report.load import draw_load_sweep
+from tyrecal.report.pressure import draw_pressure_sweep
+from tyrecal.report.section import draw_section
+from tyrecal.report.signature import draw_signature
+from tyrecal.studies.signature import Signature
+
+from ..conftest import CASES
+
+LABELS = [
+    Label(0, 0, "axial"), Label(0, 0, "torsional"), Label(1, 1), Label(1, 0), Label(2, 1),
+    Label(2, 0), Label(3, 0), Label(3, 1), Label(4, 0),
+]  # fmt: skip
+
+
+def test_a_cut_text_and_an_overprinted_one_are_seen(tmp_path: Path) -> None:
+    """The check itself fails where it should."""
+
+    def drawn(*texts: tuple[float, float, str]) -> Figure:
+        figure = new_figure(3.0, 2.0, None)
+        for x, y, words in texts:
+            figure.text(x, y, words)
+        return figure
+
+    save(drawn((0.1, 0.5, "one"), (0.1, 0.2, "other")), tmp_path / "good.png")
+    with pytest.raises(AssertionError, match=r"cut by .* pixels: 'one that is too long'"):
+        save(drawn((0.8, 0.5, "one that is too long")), tmp_path / "cut.png")
+    with pytest.raises(AssertionError, match="'one' and 'other' overlap"):
+        save(drawn((0.1, 0.5, "one"), (0.12, 0.52, "other")), tmp_path / "over.png")
+
+
+@pytest.mark.parametrize("width", [2.5, 4.0, 8.0])
+def test_a_headline_takes_the_lines_that_it_needs(width: float, tmp_path: Path) -> None:
+    words = "what calibration leaves; bars: one standard deviation; hollow: with an effect"
+    figure = new_figure(width, 3.0)
+    figure.add_subplot()
+    headline(figure, words)
+    save(figure, tmp_path / "headline.png")
+    said = figure.get_suptitle()
+    assert said.split() == words.split()
+    assert ("\n" in said) == (width < 8)
+
+
+@pytest.mark.parametrize("pressures", [(240.0,), (160.0, 240.0, 320.0)])
+@pytest.mark.parametrize("id", ["temperature_drift", "spindle_torsional", "carcass_fanning"])
+def test_signatures(id: str, pressures: tuple[float, ...], tmp_path: Path) -> None:
+    assert id in catalogue()
+    shape = len(pressures), len(LABELS)
+    before = np.linspace(-27.5, 24.2, shape[0] * shape[1]).reshape(shape)
+    found = Signature(
+        id, -1.234567e-6, pressures, tuple(LABELS), before, before / 3, 0.886, {}, 0.0
+    )
+    draw_signature(tmp_path / "effect.png", found)
+
+
+@pytest.mark.parametrize("designs", [("initial",), ("initial", "fitted")])
+def test_crowded_lines_over_the_load(designs: tuple[str, ...], tmp_path: Path) -> None:
+    """All modes within 12 Hz, both members of each."""
+    rows = [
+        {
+            "design": design,
+            "load_N": load,
+            "modes": [
+                {"c": x.c, "m": x.m, "kind": x.kind, "symmetry": symmetry,
+                 "frequency_Hz": 100.0 + k + load / 4000}
+                for k, (x, symmetry) in enumerate(product(LABELS, ("symmetric", "antisymmetric")))
+            ],
+        }
+        for design, load in product(designs, (0.0, 4000.0))
+    ]  # fmt: skip
+    draw_load_sweep(tmp_path / "load.png", rows)
+
+
+def test_crowded_lines_over_the_pressure(tmp_path: Path) -> None:
+    rows = [
+        {
+            "design": design,
+            "pressure_kPa": kPa,
+            "modes": [
+                {"c": x.c, "m": x.m, "kind": x.kind, "frequency_Hz": 90 + kPa / 10 + k / 3,
+                 "d_ln_f_d_ln_p": 0.4 + k / 1000}
+                for k, x in enumerate([*LABELS, Label(1, 2)])
+            ],
+        }
+        for design, kPa in product(("initial", "fitted"), (100.0, 320.0))
+    ]  # fmt: skip
+    draw_pressure_sweep(tmp_path / "pressure.png", rows, {Label(2, 0): 95.0}, 240.0)
+
+
+def test_long_names_of_cases_and_variables(tmp_path: Path) -> None:
+    case = load_case(CASES / "p235_75r17.yaml")
+    name = "LT315/70R17 of the long term test, second batch, on a rim of 9 inches, after run-in"
+    layers = {f"{k}_with_a_long_name": v for k, v in case.case.rebar_layers.items()}
+    named = case.case.model_copy(update={"name": name, "rebar_layers": layers})
+    draw_section(tmp_path / "section.png", replace(case, case=named), section_mesh(case))
+    values = {"stiffness_of_the_belt_cords_in_the_shoulder": 2.0, "C10": 3.0}
+    history = [{"point": k, "objective_Hz": 3 + 30 / k, "values": values} for k in range(1, 9)]
+    draw_convergence(tmp_path / "fit.png", history, "deviations in standard deviations")

@@ -1,0 +1,71 @@
+"""What a fit amounts to, in sentences: each follows from the numbers that it is about."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from tyrecal.report.words import fit_doubts, fit_verdict
+
+
+def fit(**changes: Any) -> dict[str, Any]:
+    """The content of a fit.json, as far as its verdict goes."""
+    mode = {"c": 2, "m": 1, "kind": None, "multiplicity": 2, "deviation_percent": 1.0}
+    lateral = {"c": 0, "m": 0, "kind": "axial", "multiplicity": 1, "deviation_percent": -4.0}
+    variable = {"initial": 1.0, "value": 2.0, "standard_error": 0.2, "at_bound": False}
+    found: dict[str, Any] = {
+        "pressure_kPa": 240.0, "mass_kg": 12.4, "objective_Hz": 3.0, "objective_unit": "Hz",
+        "converged": True, "moved": True, "failed_evaluations": 0, "label_margin": 1.0,
+        "variables": {"A": dict(variable), "B": dict(variable)}, "singular_values": [1.0, 0.5],
+        "modes": [dict(mode), lateral], "starts": [start()],
+    }  # fmt: skip
+    return {**found, **changes}
+
+
+def start(objective: float = 3.0, A: float = 2.0) -> dict[str, Any]:
+    return {"objective_Hz": objective, "values": {"A": A, "B": 2.0}}
+
+
+def test_how_near_it_came() -> None:
+    """The doublet counts twice: sqrt((2 * 1 + 16) / 3) = 2.4 %."""
+    words = fit_verdict(fit())
+    assert words[0] == "Converged at 240 kPa, 12.40 kg."
+    assert words[1] == (
+        "1 of 2 frequencies come within 2 % of their targets (rms 2.4 %); farthest off is [0,0]"
+        " lateral with -4.0 %."
+    )
+    assert len(words) == 2 and not fit_doubts(fit())
+
+
+@pytest.mark.parametrize(
+    ("starts", "words"),
+    [
+        ([start(), start(3.001)], "All 2 starts end here."),
+        ([start(), start(3.001), start(9.0)], "2 of 3 starts end here, the others at 9.00 Hz or"),
+        ([start(), start(3.001, 3.0)], "2 of 2 starts reach this objective, but with A up to 50 %"),
+    ],
+)
+def test_whether_starts_agree(starts: list[dict[str, Any]], words: str) -> None:
+    assert fit_verdict(fit(starts=starts))[-1].startswith(words)
+
+
+@pytest.mark.parametrize(("objective", "words"), [(1.0, "is 1:"), (22.157, "is 491:")])
+def test_sigmas_are_judged_per_degree_of_freedom(objective: float, words: str) -> None:
+    """Three frequencies, two variables: one degree of freedom."""
+    told = fit_verdict(fit(objective_unit="sigma", objective_Hz=objective))
+    assert f"chi2 per degree of freedom {words}" in told[-1]
+    full = fit(objective_unit="sigma", variables={name: {"value": 0.0} for name in "ABC"})
+    assert not any("chi2" in each for each in fit_verdict(full))
+
+
+@pytest.mark.parametrize(
+    ("error", "words"),
+    [(0.9, None), (4.0, "hardly determine A: its standard error is 200 %"),
+     (None, "do not determine A: fix it")],
+)  # fmt: skip
+def test_variables_that_the_data_do_not_determine(error: float | None, words: str | None) -> None:
+    result = fit()
+    result["variables"]["A"]["standard_error"] = error
+    doubts = fit_doubts(result)
+    assert len(doubts) == (words is not None) and all(words in doubt for doubt in doubts if words)

@@ -1,0 +1,85 @@
+"""Studies where there is no fcntl, no fork, no process group and no signal mask.
+
+Windows and macOS were not at hand: what they lack is taken away here, from the processes that a
+command starts too. What they have instead (other locks, other ways to end processes) is not tried.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from .conftest import CASES
+
+BLOCKED = """
+import multiprocessing.reduction, os, signal, sys
+for name in ("fcntl", "grp", "pwd", "resource", "termios", "multiprocessing.forkserver"):
+    sys.modules[name] = None
+multiprocessing.reduction.HAVE_SEND_HANDLE = False  # what a fork server needs
+for name in ("fork", "forkpty", "getpgid", "getuid", "killpg", "mkfifo", "sched_getaffinity",
+             "setpgid", "setsid", "sysconf"):
+    delattr(os, name)
+for name in ("SIGHUP", "pthread_kill", "pthread_sigmask", "sigwait"):
+    delattr(signal, name)
+with open(os.environ["BLOCKED"], "a") as file:
+    print(os.getpid(), file=file)
+"""
+CASE = str(CASES / "p235_75r17.yaml")
+OTHER = str(CASES / "205_60r15.yaml")
+COARSE = ["--mesh", "coarse"]
+TWO = ["--jobs", "2"]
+WHEELER = str(CASES / "p235_75r17_wheeler.csv")
+VOLATILE = {"run.json", ".lock", ".lock.json"}
+slow = pytest.mark.slow
+
+
+def results(folder: Path) -> dict[str, bytes]:
+    """Result files by their path in ``folder``, and records without when they were made."""
+    return {
+        path.relative_to(folder).as_posix(): path.read_bytes()
+        for path in sorted(folder.rglob("*"))
+        if path.is_file() and path.name not in VOLATILE and path.suffix != ".record"
+    }
+
+
+@pytest.mark.parametrize(
+    ("command", "processes"),
+    [
+        (["modes", CASE, *COARSE, "--no-pictures", "--report"], 1),
+        pytest.param(["batch", CASE, OTHER, "--studies", "modes", *COARSE, *TWO], 3, marks=slow),
+        pytest.param(
+            ["fit", CASE, *COARSE, *TWO, "--starts", "2", "--seed", "1", "--report"], 3, marks=slow
+        ),
+        pytest.param(["sweep-pressure", CASE, *COARSE, *TWO, "--steps", "3"], 3, marks=slow),
+        pytest.param(["footprint", CASE, *COARSE, "--loads-N", "300"], 1, marks=slow),
+        pytest.param(["effects", "bead_filler", "--case", CASE, *COARSE, *TWO], 3, marks=slow),
+        pytest.param(
+            ["diagnose", CASE, *COARSE, *TWO, "--measured", WHEELER, "--effect", "rim_width",
+             "--effect", "bead_filler", "--no-pictures"], 3, marks=slow,
+        ),
+    ],
+    ids=lambda each: each[0] if isinstance(each, list) else "",
+)  # fmt: skip
+def test_studies_with_what_windows_has(command: list[str], processes: int, tmp_path: Path) -> None:
+    for name in ("plain", "blocked", "site"):
+        (tmp_path / name).mkdir()
+    (tmp_path / "site" / "sitecustomize.py").write_text(BLOCKED)
+    started = tmp_path / "started"
+    blocked = {"PYTHONPATH": str(tmp_path / "site"), "BLOCKED": str(started)}
+    said = []
+    for name, environment in (("plain", {}), ("blocked", blocked)):
+        done = subprocess.run(
+            [sys.executable, "-m", "tyrecal", *command, "--output", "out"],
+            env={**os.environ, **environment}, cwd=tmp_path / name, capture_output=True, text=True,
+        )  # fmt: skip
+        assert done.returncode == 0, done.stderr
+        assert "Traceback" not in done.stderr
+        said.append(done.stdout)
+    assert said[0] == said[1]
+    found = results(tmp_path / "blocked" / "out")
+    assert found == results(tmp_path / "plain" / "out") and len(found) >= 2
+    assert len(started.read_text().split()) >= processes  # all of them went without

@@ -1,0 +1,99 @@
+"""What `pytest` runs where nothing is chosen, and that it says what it left out, and why."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from .conftest import ROOT
+from .selection import LEFT_OUT
+
+FILE = "import pytest\ndef test_quick(): pass\n" + "".join(
+    f"@pytest.mark.{marker}\ndef test_{marker}(): pass\n" for marker in LEFT_OUT
+)
+FILE += "@pytest.mark.slow\n@pytest.mark.guide\ndef test_both(): pass\n"
+OTHERS = {f"test_{marker}" for marker in LEFT_OUT} | {"test_both"}
+
+
+@pytest.fixture(scope="module")
+def tests(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder of tests, one a marker."""
+    folder = tmp_path_factory.mktemp("selection") / "tests"
+    folder.mkdir()
+    (folder / "test_all.py").write_text(FILE)
+    return folder
+
+
+def pytest_of(folder: Path, *arguments: str, **environment: str) -> tuple[set[str], str]:
+    """The tests that ran or were skipped, and the last lines."""
+    given = {k: v for k, v in os.environ.items() if not k.startswith("PYTEST_")}
+    given |= {"PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1", "PYTHONPATH": str(ROOT)} | environment
+    command = [sys.executable, "-m", "pytest", "-c", ROOT / "pyproject.toml", "--rootdir", folder]
+    command += ["-p", "tests.selection", "-p", "xdist", "-v", "-v", *arguments]
+    done = subprocess.run(command, cwd=folder, env=given, capture_output=True, text=True)
+    assert done.returncode in (0, pytest.ExitCode.NO_TESTS_COLLECTED), done.stdout + done.stderr
+    ran = re.findall(r"::(\w+)\S* (?:PASSED|SKIPPED)|(?:PASSED|SKIPPED)\S* \S+::(\w+)", done.stdout)
+    return {first or second for first, second in ran}, done.stdout.partition("left out of")[2]
+
+
+@pytest.mark.parametrize("workers", [[], ["-n", "2"]])
+def test_the_quick_set_is_run_and_the_rest_is_said(tests: Path, workers: list[str]) -> None:
+    ran, said = pytest_of(tests, *workers, str(tests), PATH="")
+    assert ran == {"test_quick"}
+    lines = said.splitlines()
+    counts = dict(re.findall(r"^ +(\d+ \w+): (.*)$", said, re.M))
+    assert list(counts) == [f"{1 + (m == 'guide')} {m}" for m in LEFT_OUT], said
+    assert "CalculiX is not installed here (apt-get install calculix-ccx)" in counts["1 ccx"]
+    assert "Chromium is not installed here" in counts["1 browser"]
+    assert counts["1 slow"] == f"{LEFT_OUT['slow'].reason}; pytest -m slow"
+    assert "1 passed" in lines[-1]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        (["-m", "slow"], {"test_slow", "test_both"}),
+        (["-m", "not quick"], OTHERS),
+        (["-m", "quick"], {"test_quick"}),
+        (["test_all.py::test_slow"], {"test_slow"}),
+        (["test_all.py"], OTHERS | {"test_quick"}),
+    ],
+)
+def test_what_is_chosen_is_run(tests: Path, arguments: list[str], expected: set[str]) -> None:
+    ran, said = pytest_of(tests, *arguments)
+    assert ran == expected and not said
+
+
+def test_words_choose_in_the_quick_set(tests: Path) -> None:
+    ran, said = pytest_of(tests, "-k", "quick or slow")
+    assert ran == {"test_quick"} and " 1 slow: " in said and "lint" not in said
+
+
+def test_what_is_missing_is_said_where_it_is_asked_for(tests: Path) -> None:
+    assert pytest_of(tests, "-m", "ccx", PATH="")[0] == {"test_ccx"}
+
+
+def test_each_marker_has_its_reason() -> None:
+    """Every marker that is registered keeps tests out, or runs in the quick set by design."""
+    registered = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["pytest"]
+    names = {line.partition(":")[0] for line in registered["ini_options"]["markers"]}
+    assert names == {*LEFT_OUT, "quick", "numbers"}
+    told = set(re.findall(r"^\| `(\w+)` \|", (ROOT / "tests/README.md").read_text(), re.M))
+    assert told == {*LEFT_OUT, "numbers"}
+    assert all(why.reason for why in LEFT_OUT.values())
+
+
+def test_every_area_is_in_the_quick_set(request: pytest.FixtureRequest) -> None:
+    if request.config.args != request.config.getini("testpaths") or request.config.option.keyword:
+        pytest.skip("only a run of the whole quick set tells whether every area is in it")
+    top = ROOT / "tests"
+    areas = {path.relative_to(top).parts[0] for path in top.rglob("test_*.py")}
+    quick = {item.path.relative_to(top).parts[0] for item in request.session.items
+             if item.get_closest_marker("quick")}  # fmt: skip
+    assert quick == areas
