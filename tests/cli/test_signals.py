@@ -90,6 +90,18 @@ def test_workers_that_have_done_some_clear_up_too(tmp_path: Path) -> None:
     assert not (out / "runs").exists()
 
 
+def test_what_a_worker_that_had_to_be_killed_leaves_goes_too(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def meanwhile(*_: object) -> None:
+        (tmp_path / "out" / "runs" / "run-left").mkdir(parents=True)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("tyrecal.studies.pressure._outcome", meanwhile)
+    assert run(*SWEEP[1:], "--steps", "2", "--output", str(tmp_path / "out")) == 130
+    assert not (tmp_path / "out" / "runs").exists()
+
+
 @pytest.mark.parametrize("how", ["nohup", "hang up"])
 def test_a_terminal_that_closes(how: str, tmp_path: Path) -> None:
     """It ends the command; under nohup it does not, which reads nothing from it."""

@@ -12,7 +12,14 @@ from pathlib import Path
 
 import pytest
 
-from tyrecal.evaluate.executor import Here, Processes, WorkerLost, executor, in_order
+from tyrecal.evaluate.executor import (
+    Here,
+    Processes,
+    WorkerLost,
+    end_workers,
+    executor,
+    in_order,
+)
 
 
 def square(task: float) -> float:
@@ -66,6 +73,15 @@ def test_a_task_that_kills_its_process_is_found_and_the_others_are_done() -> Non
 def test_what_a_task_raises_is_raised(make: Callable[[], Processes]) -> None:
     with pytest.raises(ValueError, match="negative"):
         list(make().each(square, [1.0, -1.0]))
+
+
+def test_a_loop_that_somebody_still_holds_can_be_ended() -> None:
+    answers = Processes(2).each(time.sleep, [0, 300, 300])
+    next(answers)
+    assert active_children()
+    end_workers()
+    assert not active_children()
+    answers.close()
 
 
 def test_closed_early_it_ends_what_is_under_way(tmp_path: Path) -> None:

@@ -83,9 +83,7 @@ class Run:
         if self._lock:
             drop_new(self.folder)
             if solver:
-                from ..evaluate.folders import drop_unfinished
-
-                drop_unfinished(self.runs)
+                self._drop_unfinished()
         self.new = Path(tempfile.mkdtemp(prefix=NEW, dir=self.folder))
         self._write_facts()
         click.get_current_context().call_on_close(self._say_unfinished)
@@ -168,10 +166,20 @@ class Run:
             with contextlib.suppress(OSError):  # what went wrong before is what is told
                 self._write_facts()
 
+    def _drop_unfinished(self) -> None:
+        """What processes that were ended, now or in an earlier run, left of their runs."""
+        from ..evaluate.executor import end_workers
+        from ..evaluate.folders import drop_unfinished
+
+        end_workers()
+        drop_unfinished(self.runs)
+
     def _close(self) -> None:
         with interrupts_put_off():
             if hasattr(self, "new"):
                 shutil.rmtree(self.new, ignore_errors=True)
+            if self.solver and self._lock and not self._finished:
+                self._drop_unfinished()
             with contextlib.suppress(OSError):  # it holds failures, or was never made
                 self.runs.rmdir()
         if self.store:

@@ -14,7 +14,7 @@ from ..deck.beside import needs
 from ..deck.write import Decks
 from ..effects import catalogue, with_effects
 from ..files import printable
-from ..interrupt import raise_interrupt
+from ..interrupt import interrupts_put_off, raise_interrupt
 from . import folders
 from .executor import WorkerLost, executor, in_order
 from .failure import DeckRefused, EvaluationFailed
@@ -163,7 +163,20 @@ class Door:
         """The solver's answer, or the record's, ``typed``, which is told where a run that ended
         early is kept."""
         raise_interrupt()
-        folder = folders.fresh(self.folder)
+        folder: Path | None = None
+        try:
+            with interrupts_put_off():  # it must not come between the folder and its name
+                folder = folders.fresh(self.folder)
+            return self._ask_in(folder, decks, typed)
+        except KeyboardInterrupt:
+            if folder:
+                folders.drop(folder)
+            raise
+
+    def _ask_in(
+        self, folder: Path, decks: Decks, typed: Callable[[dict[str, Any], Path | None], T]
+    ) -> T:
+        """`_ask` in a fresh ``folder``, which is dropped where the run went well."""
         solver, key = self.solver, ""
         kept: Path | None = None
         try:

@@ -84,6 +84,15 @@ def _until_one_dies(
 
 
 _idle: dict[int, Pool] = {}
+_at_work: set[Pool] = set()
+
+
+def end_workers() -> None:
+    """End the processes of loops that were cut off: an error that is told later holds such a loop,
+    and with it its workers, until it is collected."""
+    for pool in [*_at_work, *_idle.values()]:
+        pool.end()
+    _idle.clear()
 
 
 @contextmanager
@@ -94,16 +103,18 @@ def _pool(jobs: int, lost: Sequence[Task]) -> Iterator[Pool]:
     At Ctrl-C, or where nobody wants the rest, all are ended at once; a failed task's finish.
     """
     pool = _idle.pop(jobs, None) or process_pool(jobs)
+    _at_work.add(pool)
     with ExitStack() as stack:
         stack.enter_context(pool)
+        stack.callback(_at_work.discard, pool)
         try:
             yield pool
         except (KeyboardInterrupt, GeneratorExit):
-            while _idle:
-                _idle.popitem()[1].end()
+            end_workers()
             raise
         if not lost:
             stack.pop_all()
+            _at_work.discard(pool)
             _idle[jobs] = pool
 
 
