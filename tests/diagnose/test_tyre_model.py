@@ -3,6 +3,7 @@ itself, parts of the section against the whole, and a diagnosis of the model's o
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,20 +11,26 @@ import pytest
 
 from tyrecal.case import with_values
 from tyrecal.diagnose.add import NotAdded, add
+from tyrecal.diagnose.diagnosis import diagnose
+from tyrecal.diagnose.evidence import probabilities, weigh
 from tyrecal.diagnose.expansion import expand
-from tyrecal.diagnose.measurements import BadMeasurements
-from tyrecal.diagnose.problem import Assumed, Change
+from tyrecal.diagnose.gap import find_gap, projection
+from tyrecal.diagnose.measurements import BadMeasurements, read_measurements
+from tyrecal.diagnose.observations import observe
+from tyrecal.diagnose.problem import Assumed, Change, Problem, places
 from tyrecal.diagnose.regions import regions
 from tyrecal.diagnose.response import Answer, Point
 from tyrecal.diagnose.result import result
+from tyrecal.diagnose.separability import separate
 from tyrecal.diagnose.study import BadChange, parse_change, spans_of, study
 from tyrecal.diagnose.tyre_model import TyreModel
 from tyrecal.diagnose.uncertainties import DENSITY, PRESSURE_kPa, sources
+from tyrecal.diagnose.verdict import decide
 from tyrecal.evaluate.door import Door
 from tyrecal.evaluate.failure import DeckRefused
 from tyrecal.modes.mode import Label
 
-from ..chance import generator
+from ..chance import Chance, generator
 from ..effects.support import coarse
 
 CASE = coarse()
@@ -40,12 +47,39 @@ def model(rows: list = ROWS) -> TyreModel:
 
 
 MODEL = model()
+X = MODEL.start + np.array((0.2, -0.1, 0.15))
 
 
 def asked(point: Point) -> Answer:
     (found,) = MODEL.answers([point])
     assert isinstance(found, Answer), found
     return found
+
+
+def written(path: Path, eta: np.ndarray, rows: list = ROWS, noise: float = 1e-3) -> Path:
+    """A file of measurements of the model's own, with scatter."""
+    random = generator(3)
+    lines = ["quantity,c,m,kind,member,pressure_kPa,load_N,value,sigma"]
+    for (label, p), y in zip(rows, eta, strict=True):
+        value = float(np.exp(y + noise * random.normal()))
+        if label is None:
+            lines.append(f"mass_kg,,,,,,,{value!r},{value * noise!r}")
+        else:
+            place = f"{label.c},{label.m},{label.kind or ''}"
+            lines.append(f"frequency_Hz,{place},,{p:g},0,{value!r},{value * noise!r}")
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+@pytest.fixture(scope="module")
+def plain(tmp_path_factory: pytest.TempPathFactory) -> Problem:
+    """The tyre at X, weighed, measured without a mistake."""
+    expansion = expand(MODEL, X)
+    path = written(tmp_path_factory.mktemp("plain") / "a.csv", expansion.eta)
+    observations = observe(read_measurements(path))
+    where = places(observations, ROWS)
+    return Problem(replace(observations, y=expansion.eta[where]), expansion, MODEL.spans, where,
+                   MODEL.start, MODEL.spread)  # fmt: skip
 
 
 def test_slopes_against_differences() -> None:
@@ -76,21 +110,19 @@ def test_slopes_against_differences() -> None:
         assert own.constants[-1, k] == pytest.approx(wanted[-1], rel=0.02, abs=1e-9)
 
 
-def test_the_expansion_is_the_model_at_its_nodes_and_close_between() -> None:
-    found = expand(MODEL, MODEL.start)
-    there = MODEL.start + np.array((0.15, -0.15, 0.1))
-    plain, _ = found.plain(there)
-    assert plain == pytest.approx(asked(Point(there)).eta, abs=5e-4)
+def test_the_expansion_is_the_model_at_its_nodes_and_close_between(plain: Problem) -> None:
+    found = plain.expansion
+    there = X + np.array((0.15, -0.15, 0.1))
+    eta, _ = found.plain(there)
+    assert eta == pytest.approx(asked(Point(there)).eta, abs=5e-4)
     for id in EFFECTS:
         nodes = found.nodes[id]
         high = nodes.reach[1]
         for e, near in ((high, 1e-9), (0.6 * high, 3e-4), (0.1 * high, 5e-4)):
             a, B, _ = nodes.at(np.array([e]))
-            assert found.eta + a[0] == pytest.approx(
-                asked(Point(MODEL.start, {id: e})).eta, abs=near
-            )
+            assert found.eta + a[0] == pytest.approx(asked(Point(X, {id: e})).eta, abs=near)
             moved = asked(Point(there, {id: e})).eta
-            assert plain + a[0] + B[0] @ (there - MODEL.start) == pytest.approx(moved, abs=2e-3)
+            assert eta + a[0] + B[0] @ (there - X) == pytest.approx(moved, abs=2e-3)
 
 
 def test_parts_of_the_section_make_the_whole() -> None:
@@ -114,24 +146,6 @@ def test_parts_of_the_section_make_the_whole() -> None:
     assert mass == pytest.approx(np.full(18, -0.5), abs=1e-3)
 
 
-def written(path: Path, eta: np.ndarray, rows: list = ROWS, noise: float = 1e-3) -> Path:
-    """A file of measurements of the model's own, with scatter."""
-    random = generator(3)
-    lines = ["quantity,c,m,kind,member,pressure_kPa,load_N,value,sigma"]
-    for (label, p), y in zip(rows, eta, strict=True):
-        value = float(np.exp(y + noise * random.normal()))
-        if label is None:
-            lines.append(f"mass_kg,,,,,,,{value!r},{value * noise!r}")
-        else:
-            place = f"{label.c},{label.m},{label.kind or ''}"
-            lines.append(f"frequency_Hz,{place},,{p:g},0,{value!r},{value * noise!r}")
-    path.write_text("\n".join(lines) + "\n")
-    return path
-
-
-X = MODEL.start + np.array((0.2, -0.1, 0.15))
-
-
 def test_an_effect_in_the_models_own_data_is_named_with_its_size(tmp_path: Path) -> None:
     truth = 0.8 * MODEL.spans["bead_filler"].high
     path = written(tmp_path / "a.csv", asked(Point(X, {"bead_filler": truth})).eta)
@@ -146,18 +160,47 @@ def test_an_effect_in_the_models_own_data_is_named_with_its_size(tmp_path: Path)
     assert sum(told["probabilities"].values()) == pytest.approx(1, abs=1e-4)
 
 
-@pytest.mark.slow
-def test_a_plain_tyre_has_no_gap_and_the_mass_gives_the_hidden_away(tmp_path: Path) -> None:
-    plain = written(tmp_path / "a.csv", asked(Point(X)).eta)
-    d = study(CASE, Door(CASE), plain, effects=EFFECTS, section_map=False).diagnosis
-    assert d.verdict.kind in ("no_gap", "undecided")
-    assert d.probabilities["none"] > 0.25
+def test_a_plain_tyre_has_no_gap(plain: Problem, chance: Chance) -> None:
+    """Measured with all that its covariance allows, nothing is named in 49 of 50, and "none" has a
+    quarter in 17 of 20 (0.94 of 300 draws); without a mistake it is said.
+
+    False failures: 2e-7.
+    """
+    d = diagnose(MODEL, ROWS, plain.observations, expansion=plain.expansion)
+    assert d.verdict.kind == "no_gap"
+    factor, named, quarter = np.linalg.cholesky(plain.sigma), [], []
+    for _ in range(80):
+        y = plain.observations.y + factor @ chance.random.normal(size=len(ROWS))
+        found = weigh(plain.measured(y))
+        p = probabilities(found)
+        named.append(decide(found, p, len(ROWS), len(X)).kind not in ("no_gap", "undecided"))
+        quarter.append(p["none"] > 0.25)
+    chance.often(named, 0.0, 0.02)
+    chance.often(quarter, 0.85)
+
+
+def test_the_mass_gives_the_hidden_away(plain: Problem) -> None:
+    """One more row raises lambda by the square of what its shift is off from what the other rows
+    tell of it, over its variance given them (exact: information adds up). At one design no draw is
+    in that; a fit's own design, which draws move, changes lambda by more than the mass does."""
+    light = np.array([row.label is not None for row in plain.observations.rows])
+    lambdas = [
+        separate(problem, projection(problem, np.zeros(len(X)))[0], {}).full
+        for problem in (plain, plain.only(light))
+    ]
+    _, J = plain.plain(np.zeros(len(X)))
+    whole = plain.sigma + J * plain.spread**2 @ J.T  # of measurements, were nothing calibrated
+    told = np.linalg.solve(whole[light][:, light], whole[light][:, ~light])[:, 0]
+    variance = (whole[~light][:, ~light] - told @ whole[light][:, ~light]).item()
+    gained = {id: lambdas[0][id] - lambdas[1][id] for id in EFFECTS}
+    for id in EFFECTS:
+        full = np.array([max(plain.expansion.nodes[id].reach, key=abs)])
+        shift = plain.added({id: full}, 1)[0][0]
+        surprise = (shift[~light] - told @ shift[light]).item()
+        assert gained[id] == pytest.approx(surprise**2 / variance, rel=1e-6)
     # a denser tread hides in the design variables until the tyre is weighed
-    assert d.gap.absorbed["tread_density"] < 0.99
-    light = written(tmp_path / "b.csv", asked(Point(X)).eta[:-1], ROWS[:-1])
-    unweighed = study(CASE, Door(CASE), light, effects=EFFECTS, section_map=False).diagnosis
-    lambdas = [x.separability.full["tread_density"] for x in (d, unweighed)]
-    assert lambdas[0] > lambdas[1]  # by 0.2 to 0.3, 0.04 from draw to draw
+    assert gained["tread_density"] > 0.25
+    assert find_gap(plain, np.zeros(len(X)), MODEL.variables).absorbed["tread_density"] < 0.99
 
 
 def test_a_toggled_run_shows_the_cause(tmp_path: Path) -> None:
@@ -218,8 +261,6 @@ def test_an_effect_is_added_with_the_files_comments_kept(case_folder: Path) -> N
 
 
 def test_sources_of_error_are_those_of_the_case_or_assumed_and_never_calibrated() -> None:
-    from dataclasses import replace
-
     stated, assumed = sources(CASE)
     assert not assumed and {"pressure", "belt_spacing", "rim_width"} <= {s.name for s in stated}
     tied = next(s for s in stated if s.name == "belt_spacing")
