@@ -12,6 +12,7 @@ from ruamel.yaml import YAML
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.events import AliasEvent, CollectionEndEvent, CollectionStartEvent
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
+from ruamel.yaml.parser import Parser
 
 from .mistakes import Keys, Mistake, dotted, shortened, suggestion
 from .parts import WRONG
@@ -55,13 +56,16 @@ def read_document(path: Path) -> Document:
     if text is None:
         return document
     yaml = YAML(typ="safe", pure=True)
+    yaml.Parser = _Harmless
     try:
-        if _harmless(yaml, text, document):
-            root = yaml.compose(text)
-            if isinstance(root, MappingNode):
-                document.data = _Reader(document, yaml.constructor).mapping(root, ())
-            else:
-                document.refuse(1, "the file must hold keys and values, as in 'format: 1'")
+        root = yaml.compose(text)
+        if isinstance(root, MappingNode):
+            document.data = _Reader(document, yaml.constructor).mapping(root, ())
+        else:
+            document.refuse(1, "the file must hold keys and values, as in 'format: 1'")
+    except _Harmful as harmful:
+        at_percent = 1 + [row[:1] for row in [*text.split("\n"), "%"]].index("%")
+        document.refuse(harmful.line or at_percent, harmful.message)
     except MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         document.refuse(mark.line + 1 if mark else 1, f"not YAML: {_sentence(error)}")
@@ -107,31 +111,38 @@ def _case_beside(path: Path) -> str:
     return ""
 
 
-def _harmless(yaml: YAML, text: str, document: Document) -> bool:
-    """No alias, tag, directive or deep nest, not too much of anything, judged from the events:
-    nothing is expanded or built."""
-    depth = 0
-    for number, event in enumerate(yaml.parse(text)):
+class _Harmful(YAMLError):
+    """What YAML allows and a case does not need; line 0: where the first % begins one."""
+
+    def __init__(self, line: int, message: str):
+        super().__init__(message)
+        self.line, self.message = line, message
+
+
+class _Harmless(Parser):
+    """No alias, tag, directive or deep nest, not too much of anything, judged from each event
+    before anything is expanded or built from it."""
+
+    events, depth = 0, 0
+
+    def get_event(self) -> Any:
+        """The next event. Raises _Harmful."""
+        event = super().get_event()
         line = event.start_mark.line + 1
-        if number > MOST_EVENTS:
-            document.refuse(line, f"there are more than {MOST_EVENTS} keys and values")
-            return False
+        self.events += 1
+        if self.events > MOST_EVENTS:
+            raise _Harmful(line, f"there are more than {MOST_EVENTS} keys and values")
         if getattr(event, "version", None) or getattr(event, "tags", None):
-            line = 1 + [row[:1] for row in text.split("\n")].index("%")
-            document.refuse(line, "a directive, as %YAML, must go: a case is plain YAML 1.2")
-            return False
-        depth += isinstance(event, CollectionStartEvent) - isinstance(event, CollectionEndEvent)
-        if depth > DEEPEST:
-            document.refuse(line, f"keys are nested more than {DEEPEST} deep")
-            return False
+            raise _Harmful(0, "a directive, as %YAML, must go: a case is plain YAML 1.2")
+        self.depth += isinstance(event, CollectionStartEvent)
+        self.depth -= isinstance(event, CollectionEndEvent)
+        if self.depth > DEEPEST:
+            raise _Harmful(line, f"keys are nested more than {DEEPEST} deep")
         if isinstance(event, AliasEvent):
-            document.refuse(line, f"the alias *{event.anchor} must be written out in full")
-            return False
-        tag = getattr(event, "tag", None)
-        if tag:
-            document.refuse(line, f"the tag {tag} is not allowed, only plain values are")
-            return False
-    return True
+            raise _Harmful(line, f"the alias *{event.anchor} must be written out in full")
+        if getattr(event, "tag", None):
+            raise _Harmful(line, f"the tag {event.tag} is not allowed, only plain values are")
+        return event
 
 
 def _sentence(error: MarkedYAMLError) -> str:
