@@ -10,7 +10,7 @@ import pytest
 
 from tyrecal.case import load_case, overridden, start_values, with_level, with_values
 from tyrecal.case.identity import tyre_sha256
-from tyrecal.deck.header import LONGEST_NAME, header
+from tyrecal.deck.header import LONGEST_NAME, header, without_header
 from tyrecal.deck.write import Decks
 
 from ..cli.test_cli import run
@@ -32,6 +32,8 @@ def test_every_deck_says_what_it_is_of(dialect: str, more: dict) -> None:
         for words in (case.case.name, tyre_sha256(case), "mesh coarse", "m, kg, s, Pa"):
             assert words in first
         assert not re.search(r"\d\d:\d\d|202\d|/(?!75R17)", first)
+        assert without_header(text.encode()).decode() == text.removeprefix(first)
+    assert without_header(b"1, 2, 3\n** Written by tyrecal: not a deck\n").startswith(b"1, 2")
 
 
 def test_the_comment_moves_no_slope() -> None:

@@ -1,7 +1,8 @@
 """The record of evaluations: a folder of files named by what was asked of which solver.
 
-A key is the hash of every file that was written for a run (names and contents), of the solver's
-name and version, and of the adapter's own sources, since they read the results.
+A key is the hash of every file that was written for a run (names and contents, but for the comment
+that a deck begins with), of the solver's name and version, and of the adapter's own sources, since
+they read the results.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
+from ..deck.header import without_header
 from ..files import NotAFile, open_file, own_folder, read_bytes, refuse_link, whole
 from .record import DIGEST, Damaged, pack, unpack
 from .recorded import check
@@ -38,7 +40,8 @@ def key_of(folder: Path, solver: Solver) -> str:
     parts = [FORMAT, solver.name, solver.version, sources_of(type(solver))]
     pieces = [part.encode() for part in parts]
     for path in sorted(p for p in folder.rglob("*") if p.is_file()):
-        pieces += [path.relative_to(folder).as_posix().encode(), path.read_bytes()]
+        name = path.relative_to(folder).as_posix().encode()
+        pieces += [name, without_header(path.read_bytes())]
     for piece in pieces:  # with its length, so that no two lists of pieces run together
         digest.update(b"%d:" % len(piece))
         digest.update(piece)
