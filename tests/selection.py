@@ -6,9 +6,7 @@ that are named run what they name.
 
 from __future__ import annotations
 
-import os
 import shutil
-import time
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -43,7 +41,7 @@ LEFT_OUT = {  # a test with two of them counts with the first
     "cluster": LeftOut("start Dask schedulers and workers"),
     "lint": LeftOut("ruff and mypy over all files"),
     "guide": LeftOut("command blocks of the guides"),
-    "slow": LeftOut("more than about 5 s of processor time each"),
+    "slow": LeftOut("more than about 2 s each"),
 }  # fmt: skip
 COUNTS: pytest.StashKey[dict[str, int]] = pytest.StashKey()
 
@@ -87,12 +85,6 @@ def pytest_testnodedown(node: Any) -> None:
     """Each worker collected the same tests: any of them may tell."""
     if told := getattr(node, "workeroutput", {}).get("left_out"):
         node.config.stash[COUNTS] = told
-
-
-def pytest_runtest_setup(item: pytest.Item) -> None:
-    """Leave out what begins after TESTS_END (time.time() of the machine), and say so."""
-    if time.time() > float(os.environ.get("TESTS_END", "inf")):
-        pytest.skip("no time was left")
 
 
 def pytest_terminal_summary(

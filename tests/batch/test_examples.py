@@ -39,6 +39,7 @@ def test_linted(command: list[str]) -> None:
     assert done.returncode == 0, done.stdout + done.stderr
 
 
+@pytest.mark.slow
 def test_the_workflows_commands_pass_on_the_shipped_cases(tmp_path: Path) -> None:
     shutil.copytree(CASES, tmp_path / "cases")
     environment = {**os.environ, "PATH": f"{BIN}:{os.environ['PATH']}"}

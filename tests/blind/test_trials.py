@@ -61,6 +61,7 @@ def test_files_say_nothing_of_the_kind(tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.slow
 def test_members_stand_in_an_order_by_chance_and_values_go_missing(tmp_path: Path) -> None:
     folder, _ = made(tmp_path, protocol(none=40))
     rising, gone = [], Counter[int]()

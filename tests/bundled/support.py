@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import pytest
 from tyrecal_solvers.bundled import (
     grammar,
     harmonics,
@@ -18,12 +19,26 @@ from tyrecal_solvers.bundled import (
 from tyrecal_solvers.bundled.band import Numbering
 from tyrecal_solvers.bundled.mechanics import Load
 from tyrecal_solvers.bundled.model import Model
+from tyrecal_solvers.bundled.pressing import NotPressed, Press, Pressed
 
 from tyrecal.tyre.mesh import build_mesh
 from tyrecal.tyre.section import read_section
 
 Array = np.ndarray
 SECTION = Path(__file__).parents[2] / "cases" / "p235_75r17.csv"
+
+
+def bears(patch: pytest.MonkeyPatch, most_N: float) -> None:
+    """Newton's method finds no tyre on a road above ``most_N``: the long way down to a real rim is
+    gone once, by `tests/cli/test_footprint.py`."""
+    newton = Press._newton
+
+    def at_most(press: Press, load: float) -> Pressed:
+        if load > most_N:
+            raise NotPressed("too much")
+        return newton(press, load)
+
+    patch.setattr(Press, "_newton", at_most)
 
 
 @dataclass(frozen=True)

@@ -94,7 +94,14 @@ def test_few_iterations_on_the_inflated_tyre(inflated: Inflated, parity: int) ->
     assert used <= 8
 
 
-@pytest.mark.parametrize(("stiffness", "sideways"), [(1e5, 0.1), (1e7, 0.1), (1e7, 0.5)])
+@pytest.mark.parametrize(
+    ("stiffness", "sideways"),
+    [
+        (1e5, 0.1),
+        pytest.param(1e7, 0.1, marks=pytest.mark.slow),
+        pytest.param(1e7, 0.5, marks=pytest.mark.slow),
+    ],
+)
 def test_contact_is_part_of_it(inflated: Inflated, stiffness: float, sideways: float) -> None:
     """Nodes of one side and the middle, more stiffly held than the tyre is; a factor without them
     takes many times as long."""

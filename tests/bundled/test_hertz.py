@@ -114,12 +114,15 @@ def _press(
     )
 
 
+QUARTERED = pytest.param(0.5, 0.009, marks=pytest.mark.slow)
+
+
 @cache
 def cylinder_without_friction(degrees: float) -> Found:
     return cylinder(0.1, degrees)
 
 
-@pytest.mark.parametrize(("degrees", "close"), [(2.0, 0.03), (1.0, 0.012), (0.5, 0.009)])
+@pytest.mark.parametrize(("degrees", "close"), [(2.0, 0.03), (1.0, 0.012), QUARTERED])
 def test_cylinder(degrees: float, close: float) -> None:
     """a/R = 0.1 with 3, 6 and 12 elements in the half width."""
     found = cylinder_without_friction(degrees)
@@ -145,6 +148,7 @@ def test_small_cylinder_patches_come_nearer() -> None:
     assert small.radius == pytest.approx(1.0, abs=0.01)
 
 
+@pytest.mark.slow
 def test_cylinder_with_friction() -> None:
     """Friction on the rigid road changes the pressure by a few percent at most, and by the less
     the nearer nu is to one half (Johnson, ch. 5; here Dundurs' beta is 0.05); but it does pull."""

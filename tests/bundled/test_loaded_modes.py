@@ -272,6 +272,7 @@ def test_what_is_not_honoured(tmp_path: Path, pattern: str, new: str, words: str
     assert words in refused(tmp_path, edit)
 
 
+@pytest.mark.slow
 def test_results_hold_the_half_turn(tyre: Round, pressed: State, found: LoadedModes) -> None:
     """Shapes on the whole tyre, as the job writes them: each kept or reversed by the half turn."""
     work = tyre.press(LENGTHS, 1e9, 0.5)

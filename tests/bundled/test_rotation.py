@@ -79,7 +79,7 @@ def test_free_ring_stands_still_in_the_ground_frame() -> None:
     assert np.linalg.norm(K0 @ axial) < 1e-12 * np.linalg.norm(K) * np.linalg.norm(axial)
 
 
-@pytest.mark.parametrize("n", [0, 2])
+@pytest.mark.parametrize("n", [0, pytest.param(2, marks=pytest.mark.slow)])
 def test_waves_are_the_lowest(inflated: Inflated, n: int) -> None:
     """K + omega C - omega^2 M has as many negative eigenvalues as there are waves between 0 and
     omega (K is positive definite, and every wave crosses once): counted by LAPACK just below and

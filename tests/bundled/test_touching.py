@@ -12,6 +12,7 @@ from .test_blockwise import Problem, conjugate_gradients, road_blocks
 Array = np.ndarray
 
 
+@pytest.mark.slow
 def test_follows_the_contact(inflated: Inflated) -> None:
     """On, stiffer, and off again: as few iterations as with a factor formed there."""
     touching = Touching(Problem(inflated).factor)

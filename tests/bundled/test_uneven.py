@@ -266,6 +266,7 @@ def small() -> Inflated:
     return Inflated(tyre, model, held, loads, support.inflate(model, held, loads))
 
 
+@pytest.mark.slow
 def test_against_bricks(small: Inflated) -> None:
     """Frequency by frequency, the change that a stiff sector of 30 degrees, or 0.1 kg spread
     over it, makes in a tyre of finite elements round the circumference, its inflated state found

@@ -59,6 +59,7 @@ def test_modes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert heavier["mass_kg"] > 1.5 * printed["mass_kg"]
 
 
+@pytest.mark.slow
 def test_fit_writes_the_same_bytes_twice(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

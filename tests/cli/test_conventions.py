@@ -109,6 +109,7 @@ def test_exit_codes_are_told_alike() -> None:
     assert told == list(EXIT_CODES)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("jobs", [pytest.param("1", marks=pytest.mark.slow), "2"])
 def test_ctrl_c_leaves_what_was_done_and_says_how_to_go_on(jobs: str, tmp_path: Path) -> None:
     out = tmp_path / "out"
@@ -167,6 +168,7 @@ def on_a_terminal(*arguments: str, **environment: str) -> str:
     return said.decode()
 
 
+@pytest.mark.slow
 def test_progress_is_on_terminals_only(tmp_path: Path) -> None:
     command = ["sweep-pressure", CASE, *COARSE, "--steps", "3", "--no-pictures", "--output"]
     said = on_a_terminal(*command, str(tmp_path / "a"))

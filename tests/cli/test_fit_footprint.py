@@ -83,6 +83,7 @@ def test_what_it_writes(
         assert rows[design, 3500]["vertical_stiffness_N_per_m"] == stiffness[design]
 
 
+@pytest.mark.slow
 def test_run_again_from_the_record(elastic: type[Elastic], case: str, tmp_path: Path) -> None:
     arguments = ["fit", case, "--output", str(tmp_path), "--no-pictures", "--quiet"]
     assert run(*arguments) == 0
@@ -118,6 +119,7 @@ def test_too_few_targets(
     assert run(*arguments, "--fix", "A_belt", "--quiet") == 0
 
 
+@pytest.mark.slow
 def test_jobs_change_no_bit(tmp_path: Path) -> None:
     """The bundled solver; a design and its neighbours, one after the other and two at a time."""
     path = coarse_case(tmp_path)

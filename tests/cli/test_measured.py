@@ -53,6 +53,7 @@ def test_functions_become_the_true_frequencies(identified: Path) -> None:
     assert picture.read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.slow
 def test_a_fit_to_them_finds_the_true_design(
     identified: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -67,6 +67,7 @@ def test_killed_four_times_and_run_again(undisturbed: Path, tmp_path: Path) -> N
     assert not list(out.rglob("*.partial"))
 
 
+@pytest.mark.slow
 def test_two_at_once_in_one_folder(
     undisturbed: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -148,7 +149,7 @@ def test_a_file_system_without_locks_is_told(
     ("most_bytes", "command"),
     [
         (20_000, "modes"),  # the decks do not fit
-        (200_000, "modes"),  # the solver's results do not fit
+        pytest.param(200_000, "modes", marks=pytest.mark.slow),  # the solver's results do not fit
         (2_000, "fit"),
     ],
 )

@@ -85,7 +85,10 @@ def asked(end: int, keys: bytes, answer: Path) -> str:
     return text
 
 
-@pytest.mark.parametrize("shell", START)
+@pytest.mark.parametrize(
+    "shell",
+    [pytest.param(shell, marks=() if shell == "bash" else pytest.mark.slow) for shell in START],
+)
 def test_lines_are_completed(shell: str, tmp_path: Path) -> None:
     if not shutil.which(shell):
         pytest.skip(f"no {shell} here")

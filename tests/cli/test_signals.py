@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import time
+from itertools import product
 from pathlib import Path
 
 import pytest
@@ -24,6 +25,7 @@ SCRIPT = str(Path(sys.executable).parent / "tyrecal")  # which workers import an
 SWEEP = [SCRIPT, "sweep-pressure", CASE, "--mesh", "coarse",
          "--no-pictures", "--quiet"]  # fmt: skip
 ENDS = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP]
+QUICK = [("SIGTERM", 2), ("SIGHUP", 1)]
 PIECE = 'echo $$ >> "$PIDS"; trap "" TERM; '  # says who it is, and is deaf
 
 
@@ -53,8 +55,13 @@ def alive(pid: int) -> bool:
     return state != "Z"
 
 
-@pytest.mark.parametrize("jobs", [1, 2])
-@pytest.mark.parametrize("how", ENDS, ids=lambda how: how.name)
+@pytest.mark.parametrize(
+    ("how", "jobs"),
+    [
+        pytest.param(how, jobs, marks=() if (how.name, jobs) in QUICK else pytest.mark.slow)
+        for how, jobs in product(ENDS, (1, 2))
+    ],
+)
 def test_the_solver_ends_with_all_that_it_started(
     how: signal.Signals, jobs: int, tmp_path: Path
 ) -> None:
@@ -102,7 +109,7 @@ def test_what_a_worker_that_had_to_be_killed_leaves_goes_too(
     assert not (tmp_path / "out" / "runs").exists()
 
 
-@pytest.mark.parametrize("how", ["nohup", "hang up"])
+@pytest.mark.parametrize("how", [pytest.param("nohup", marks=pytest.mark.slow), "hang up"])
 def test_a_terminal_that_closes(how: str, tmp_path: Path) -> None:
     """It ends the command; under nohup it does not, which reads nothing from it."""
     ours, theirs = pty.openpty()

@@ -49,7 +49,13 @@ def fit_of(point: dict[str, Any], path: Path, case: Path | str = CASE) -> str:
     return str(path)
 
 
-@pytest.mark.parametrize("name", sorted(REFERENCE))
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=() if name == "p235_75r17" else pytest.mark.slow)
+        for name in sorted(REFERENCE)
+    ],
+)
 def test_both_designs_against_the_reference(
     name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -124,6 +130,7 @@ def test_a_solver_in_three_dimensions_without_slopes(
     assert findings["disagreements"] == [] and findings["least_mac"] > 0.99
 
 
+@pytest.mark.slow
 def test_jobs_and_the_record_change_no_byte(tmp_path: Path) -> None:
     fit = fit_of(REFERENCE["p235_75r17"][1], tmp_path / "fit.json")
     arguments = ["sweep-pressure", CASE, "--fitted", fit, "--steps", "3", "--quiet", "--output"]
@@ -147,6 +154,7 @@ def test_jobs_and_the_record_change_no_byte(tmp_path: Path) -> None:
 SOFT = ["--set", "A_carcass=1e-8", "--set", "C10=1e5"]  # has no equilibrium beyond 353 kPa
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("jobs", [pytest.param("1", marks=pytest.mark.slow), "2"])
 def test_a_pressure_that_fails_costs_no_other(
     jobs: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
@@ -185,6 +193,7 @@ def test_a_failure_amid_the_sweep(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     assert {mode["curvature"] for mode in found["findings"][0]["modes"]} == {"concave"}
 
 
+@pytest.mark.slow
 def test_nothing_is_written_where_every_pressure_fails(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -90,7 +90,7 @@ def test_numbers_have_no_gaps(element: str, angles: Angles) -> None:
     assert used == set(nodes)
 
 
-@pytest.mark.parametrize("element", ["C3D8", "C3D20R"])
+@pytest.mark.parametrize("element", ["C3D8", pytest.param("C3D20R", marks=pytest.mark.slow)])
 def test_the_section_is_carried_around(element: str) -> None:
     """Pappus, for chords: a wedge of d degrees holds area times mean radius times sin d."""
     case = coarse_case(element)

@@ -71,6 +71,7 @@ def test_a_splice_in_the_case_is_refused_in_words_that_help() -> None:
         TyreModel(case, Door(case), ROWS, [], {})
 
 
+@pytest.mark.slow
 def test_a_source_of_error_steps_from_what_the_case_has() -> None:
     wide = with_values(CASE, {"effects.rim_width": 4e-3})
     columns = []
@@ -111,6 +112,7 @@ def test_a_toggled_run_is_set_to_what_it_says_whatever_the_case_has(tmp_path: Pa
         assert d.rung == 4 and size["low"] < truth < size["high"]
 
 
+@pytest.mark.slow
 def test_a_run_switched_beyond_the_range_is_asked_there(tmp_path: Path) -> None:
     """The range is where the effect may be, not how far a laboratory can go with it."""
     far = 1.5 * MODEL.spans["bead_filler"].high
@@ -142,6 +144,7 @@ def test_a_change_that_the_diagnosis_cannot_follow(
         study(CASE, Door(CASE), one, toggled=[(other, change)], effects=EFFECTS)
 
 
+@pytest.mark.slow
 def test_an_effect_that_a_variable_sets_is_no_candidate(tmp_path: Path) -> None:
     variable = CASE.case.variables["C10"].model_copy(
         update={"sets": ["effects.bead_filler"], "start": 0.5, "lower": 0.1, "upper": 3.0}

@@ -82,6 +82,7 @@ def plain(tmp_path_factory: pytest.TempPathFactory) -> Problem:
                    MODEL.start, MODEL.spread)  # fmt: skip
 
 
+@pytest.mark.slow
 def test_slopes_against_differences() -> None:
     x, step = MODEL.start + np.array((0.1, -0.2, 0.05)), 1e-4
     own = asked(Point(x, constants=True))
@@ -110,6 +111,7 @@ def test_slopes_against_differences() -> None:
         assert own.constants[-1, k] == pytest.approx(wanted[-1], rel=0.02, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_the_expansion_is_the_model_at_its_nodes_and_close_between(plain: Problem) -> None:
     found = plain.expansion
     there = X + np.array((0.15, -0.15, 0.1))
@@ -205,6 +207,7 @@ def test_the_mass_gives_the_hidden_away(plain: Problem) -> None:
     )
 
 
+@pytest.mark.slow
 def test_a_toggled_run_shows_the_cause(tmp_path: Path) -> None:
     truth = 0.5 * MODEL.spans["bead_filler"].high
     one = written(tmp_path / "a.csv", asked(Point(X, {"bead_filler": truth})).eta)
@@ -214,6 +217,7 @@ def test_a_toggled_run_shows_the_cause(tmp_path: Path) -> None:
     assert d.verdict.kind == "named" and d.rung == 4
 
 
+@pytest.mark.slow
 def test_a_wrong_unit_and_one_mode_alone(tmp_path: Path) -> None:
     eta = asked(Point(X)).eta
     thrice = written(tmp_path / "a.csv", eta + np.log(2 * np.pi))

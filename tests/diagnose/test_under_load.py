@@ -60,6 +60,7 @@ def test_the_tyre_itself_is_found(case: LoadedCase, readings: list[Reading]) -> 
     assert found.rows[0].sigma == pytest.approx(0.02 / np.sqrt(2) * found.rows[0].value, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_modes_under_load(case: LoadedCase) -> None:
     """Named by the doublet's member; one that the tyre does not have stays without a value."""
     values = {**start_values(case), "pressure_kPa": 220.0}
@@ -78,6 +79,7 @@ def test_modes_under_load(case: LoadedCase) -> None:
     assert not off[wanted[2]]
 
 
+@pytest.mark.slow
 def test_what_cannot_be_pressed_is_said(case: LoadedCase, readings: list[Reading]) -> None:
     """A splice does not go with a road; no tyre bears 1 MN, but what lies below stays."""
     beyond = replace(readings[0], load_N=1e6)

@@ -39,6 +39,7 @@ def test_it_is_the_change_that_it_says(site: Path) -> None:
     assert softened["4,0,None"] < 0.999 * plain["4,0,None"]
 
 
+@pytest.mark.slow
 def test_the_catalogue_has_it_and_refuses_what_cannot_be(site: Path) -> None:
     done = tyrecal(site, "effects", "belt_softening", "--json")
     (entry,) = json.loads(done.stdout)

@@ -120,6 +120,7 @@ def test_no_pressure_no_strain() -> None:
     assert min(mode.frequency_Hz for mode in answer.modes) > 1.0
 
 
+@pytest.mark.slow
 def test_an_honest_failure_tells_the_pressure_that_was_reached(tmp_path: Path) -> None:
     case = replace(CASE, case=CASE.case.model_copy(update={"pressure_kPa": 1900.0}))
     with pytest.raises(EvaluationFailed, match=r"inflation stopped at \d.* of 1900 kPa") as failure:
@@ -128,6 +129,7 @@ def test_an_honest_failure_tells_the_pressure_that_was_reached(tmp_path: Path) -
     assert failure.value.folder is not None and (failure.value.folder / "modes.inp").exists()
 
 
+@pytest.mark.slow
 def test_answers_in_order_from_a_process_pool() -> None:
     questions = [Question({"A_belt": a}) for a in (2e-7, 3e-7, 4e-7)]
     questions.insert(1, Question({"A_carcass": 1e-8, "C10": 1e5, "pressure_kPa": 1900.0}))

@@ -91,6 +91,7 @@ def test_an_error_in_the_block_comes_out_and_what_had_not_begun_is_dropped() -> 
     assert all(task.done() for task in later) and any(task.cancelled() for task in later)
 
 
+@pytest.mark.slow
 def test_stopped_in_the_middle_of_large_answers_it_ends(tmp_path: Path) -> None:
     (tmp_path / "stopped.py").write_text(STOPPED)
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}

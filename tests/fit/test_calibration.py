@@ -224,6 +224,7 @@ def test_the_papers_case(name: str, level: str, expected: float, tolerance: floa
     assert max(abs(m["deviation_percent"]) for m in result["modes"]) < 5.06
 
 
+@pytest.mark.slow
 def test_both_methods_agree_on_the_real_tyre() -> None:
     slsqp = calibrate(CASE, Door(CASE)).result
     other = calibrate(CASE, Door(CASE), "least-squares").result
@@ -296,6 +297,7 @@ def test_fewer_data_than_variables_are_said_to_be_too_few() -> None:
         calibrate(with_targets(weight=one), door())  # type: ignore[arg-type]
 
 
+@pytest.mark.slow
 def test_a_design_that_the_case_cannot_have_is_stepped_back_from() -> None:
     """C10 + C01 must be positive, which the bounds of C01 alone do not say."""
     variable = CASE.case.variables["C10"].model_copy(

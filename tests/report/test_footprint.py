@@ -47,6 +47,7 @@ def rows(designs: dict[str, Pressed]) -> list[dict]:
     return footprint_result({}, LOADS, designs, BOTH)["rows"]
 
 
+@pytest.mark.slow
 def test_every_load_of_every_design_in_one_scale(
     drawn: list[Figure], designs: dict[str, Pressed], tmp_path: Path
 ) -> None:

@@ -131,7 +131,7 @@ FAULTS = [
     ("other_dat", "no_results", "disagree on mode 1"),
     ("no_mass", "no_results", "no TOTAL MASS"),
 ]
-QUICK = ("crash", "doubled")  # one that the solver tells, one that its files do
+QUICK = ("crash",)
 
 
 @pytest.mark.parametrize(
@@ -156,6 +156,7 @@ def test_no_fault_becomes_a_number(
     assert failure.value.folder and (failure.value.folder / "modes.inp").exists()
 
 
+@pytest.mark.slow
 def test_results_of_an_earlier_run_are_removed_first(
     coarse: Callable[..., Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -169,6 +170,7 @@ def test_results_of_an_earlier_run_are_removed_first(
     assert not (folder / "inflate.sta").exists()
 
 
+@pytest.mark.slow
 def test_a_licence_is_waited_for(
     coarse: Callable[..., Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -179,6 +181,7 @@ def test_a_licence_is_waited_for(
     assert len((folder / "denials").read_text()) == 4  # two denied, two granted
 
 
+@pytest.mark.slow
 def test_a_licence_that_never_comes(
     coarse: Callable[..., Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -194,6 +197,7 @@ def test_a_licence_that_never_comes(
     assert len((failure.value.folder / "denials").read_text()) == 4
 
 
+@pytest.mark.slow
 def test_a_job_that_queues_until_its_time_is_over(
     coarse: Callable[..., Path], tmp_path: Path
 ) -> None:

@@ -258,6 +258,7 @@ def test_no_modes_about_a_state_that_was_not_found(tmp_path: Path, fault: str) -
         CalculiX().read(folder)
 
 
+@pytest.mark.slow
 def test_a_run_that_hangs_is_ended(tmp_path: Path) -> None:
     with pytest.raises(RunFailed, match=r"time limit.*Newton goes on") as failure:
         evaluate(folder_for(tmp_path, "hang"), 4.0)

@@ -33,6 +33,7 @@ def test_the_example_gives_the_bundled_solvers_frequencies(site: Path, tmp_path:
     assert found == pytest.approx(sorted(m.frequency_Hz for m in expected), rel=1e-12)
 
 
+@pytest.mark.slow
 def test_its_failure_is_typed_and_kept(site: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     done = tyrecal(site, "modes", str(CASES / "p235_75r17.yaml"), "--solver", "my-solver",

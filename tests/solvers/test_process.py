@@ -20,6 +20,7 @@ def test_exit_code_and_output(tmp_path: Path) -> None:
     assert last_words(tmp_path / "no such log") == ""
 
 
+@pytest.mark.slow
 def test_a_hanging_command_is_ended_with_its_children(tmp_path: Path) -> None:
     """Its child is a fork, so that a busy machine has it at once."""
     parent = """import os, time
@@ -36,6 +37,7 @@ time.sleep(60)"""
     assert _ends(int((tmp_path / "child").read_text()))
 
 
+@pytest.mark.slow
 def test_children_that_ignore_the_end_are_killed(tmp_path: Path) -> None:
     """Their parent does as it is told, and is not there any more to ask."""
     parent = """import signal, subprocess, time

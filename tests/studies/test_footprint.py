@@ -128,6 +128,7 @@ def test_a_solver_without_a_road_says_so() -> None:
         Door(CASE, _solver=StandIn()).press(START, LOADS)  # type: ignore[arg-type]
 
 
+@pytest.mark.slow
 def test_the_bundled_solvers_own_footprints(tmp_path: Path) -> None:
     """Its loads are borne, by rim and road; it says where it touches; it is the same after half a
     turn; forces over deflections are the tangents' mean."""
