@@ -276,6 +276,19 @@ class Late:
             raise job.TimedOut("the time limit passed")
 
 
+def test_nothing_pickled_is_read(tmp_path: Path) -> None:
+    """Whatever lies where results should: objects are refused, not made."""
+    (tmp_path / "press.json").write_text('{"format": 1, "footprints": [], "cause": ""}')
+    plain = {name: np.arange(3.0) for name in ("nodes", "points", "angles")}
+    np.savez(tmp_path / "press.npz", allow_pickle=True, **plain)
+    assert set(press_job.read(tmp_path / "press")) == {"footprints", *plain}
+    for name in plain:
+        objects = {**plain, name: np.array([Path("made"), None])}
+        np.savez(tmp_path / "press.npz", allow_pickle=True, **objects)
+        with pytest.raises(ValueError, match="allow_pickle"):
+            press_job.read(tmp_path / "press")
+
+
 @pytest.fixture(scope="module")
 def solid() -> Round:
     return ring((0.05, 0.08, 0.1), 0.02, 2, support.Rubber())

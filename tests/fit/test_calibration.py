@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import pickle
+from contextlib import nullcontext
 from dataclasses import replace
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from tyrecal.case import LoadedCase, load_case, start_values
+from tyrecal.case.variables import with_level
 from tyrecal.evaluate.door import Door, Question
+from tyrecal.evaluate.executor import Here
 from tyrecal.evaluate.failure import DeckRefused, EvaluationFailed
 from tyrecal.evaluate.results import Evaluation
+from tyrecal.fit import calibrate as calibrate_module
 from tyrecal.fit.calibrate import NothingToFit, calibrate
 from tyrecal.fit.crossing import crossing, gap
 from tyrecal.fit.problem import Problem, Target, objective, read_targets
@@ -186,6 +192,40 @@ def test_fixed_variables_stay_and_others_move() -> None:
     without = replace(CASE, case=CASE.case.model_copy(update={"targets": None}))
     with pytest.raises(NothingToFit):
         calibrate(without, door())  # type: ignore[arg-type]
+
+
+def test_bounds_that_hold_too_few_tyres_end_the_drawing_of_starts() -> None:
+    """Twenty are replaced for each that is asked for."""
+    asked: list[tuple[int, int]] = []
+    with pytest.raises(EvaluationFailed, match="the bounds hold too few") as failure:
+        calibrate(
+            CASE,
+            door(fails=lambda values: values != START),  # type: ignore[arg-type]
+            starts=4,
+            finished=lambda *done: asked.append(done),
+        )
+    assert failure.value.words.startswith("63 drawn starts") and asked == [(1, 4)]
+
+
+def test_starts_of_other_processes_tell_how_often_the_solver_ran(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Each has counts of its own, which are added."""
+
+    class Elsewhere(Here):
+        def each(self, function: Any, tasks: Any) -> Any:
+            return super().each(function, [pickle.loads(pickle.dumps(task)) for task in tasks])
+
+    monkeypatch.setattr(calibrate_module, "executor", lambda *asked: nullcontext(Elsewhere()))
+    changed = {"variables": {"C10": CASE.case.variables["C10"]}}
+    case = with_level(replace(CASE, case=CASE.case.model_copy(update=changed)), "coarse")
+    told: list[tuple[int, int]] = []
+    one, other = Door(case), Door(case)
+    alone = calibrate(case, one, starts=3, finished=lambda *done: told.append(done))
+    shared = calibrate(case, other, starts=3, jobs=2, finished=lambda *done: told.append(done))
+    assert shared.result == alone.result
+    assert other.counts == one.counts and one.counts.runs == len(shared.history)
+    assert told == [(1, 3), (2, 3), (3, 3)] * 2
 
 
 def test_starts_are_drawn_replaced_and_reproducible() -> None:

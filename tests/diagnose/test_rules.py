@@ -1,0 +1,406 @@
+"""Rules of the diagnosis at their limits, and small formulas by hand."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.stats import chi2
+
+from tyrecal.diagnose.evidence import (
+    INFLATED,
+    UNKNOWN,
+    Fitted,
+    Hypothesis,
+    ln_splits,
+    outside,
+    refit,
+    weigh,
+)
+from tyrecal.diagnose.expansion import Expansion, Nodes, _nodes, expand, node_values
+from tyrecal.diagnose.gap import Group, _chi2, _corrected, find_gap
+from tyrecal.diagnose.next_measurement import rank
+from tyrecal.diagnose.observations import Observations, Row
+from tyrecal.diagnose.plain_fit import plain_fit
+from tyrecal.diagnose.problem import Change
+from tyrecal.diagnose.reading import _near
+from tyrecal.diagnose.regions import Region
+from tyrecal.diagnose.response import Answer, Point, Span
+from tyrecal.diagnose.verdict import decide
+from tyrecal.diagnose.where import section_map
+
+from ..chance import generator
+from .toy import LABELS, Toy, drawn, problem
+
+pytestmark = pytest.mark.numbers
+
+Array = np.ndarray
+
+
+def explained(p_value: float, rows: int, variables: int, parameters: int = 1) -> Hypothesis:
+    """The effect "a" whose best fit has that p-value with so many degrees of freedom; a fit beside
+    the best one is far worse."""
+    value = float(chi2.isf(p_value, max(1, rows - variables - parameters)))
+    ln, none = np.array([-3.0, -1.0, -2.0]), np.zeros((3, 1))
+    fitted = Fitted(ln, none, np.array([1e4, value, 1e4]), none[:, :, None])
+    return Hypothesis("a", 0.5, -1.0, {f"a{i}": ln for i in range(parameters)}, ln, fitted)
+
+
+def judged(a: float, none: float, outside: float = 0.0, p_value: float = 0.5, **of: int) -> Any:
+    """What is decided where the effects a and b, none and outside have these probabilities."""
+    rows, variables = of.get("rows", 20), of.get("variables", 3)
+    h = explained(p_value, rows, variables, of.get("parameters", 1))
+    other = Hypothesis("outside", 0.1, 0.0, {}, np.zeros(1), None, "strange")
+    share = {"a": a, "none": none, "outside": outside, "b": 1 - a - none - outside}
+    return decide([h, replace(h, key="b"), other], share, rows, variables)
+
+
+def test_named_is_what_is_sure_and_fits_and_nothing_rules_out() -> None:
+    """p >= 0.7, a fit of p > 0.01, none below 0.05."""
+    assert judged(0.7, 0.04).kind == "named" and judged(0.7, 0.04).key == "a"
+    assert judged(0.69, 0.04).kind == "undecided" and judged(0.7, 0.05).kind == "undecided"
+    assert judged(0.9, 0.04, p_value=0.011).kind == "named"
+    assert judged(0.9, 0.04, p_value=0.009).kind == "outside"
+    assert judged(0.69, 0.04, p_value=0.009).kind == "undecided"
+    for parameters in (1, 2):  # freedom: rows less variables less parameters, one at least
+        for rows in (4, 20):
+            verdict = judged(0.9, 0.0, p_value=0.3, rows=rows, parameters=parameters)
+            assert verdict.check == pytest.approx(0.3)
+
+
+def test_outside_is_what_is_as_likely_as_all_else() -> None:
+    """p >= 0.5, none below 0.05; its words are the likeliest reason's."""
+    assert judged(0.2, 0.04, 0.5).kind == "outside" and "strange" in judged(0.2, 0.04, 0.5).words
+    assert judged(0.2, 0.04, 0.49).kind == judged(0.2, 0.05, 0.5).kind == "undecided"
+
+
+def test_no_gap_is_seen_where_none_is_likeliest_and_likelier_than_before() -> None:
+    assert judged(0.2, 0.26).kind == "undecided"  # b is likelier
+    assert judged(0.2, 0.6).kind == "no_gap"
+    many = {f"e{i}": 0.75 / 9 for i in range(9)} | {"none": 0.25, "outside": 0.0}
+    h = replace(explained(0.5, 20, 3), key="e0")
+    assert decide([h], many, 20, 3).kind == "undecided"
+    assert decide([h], {**many, "none": 0.251}, 20, 3).kind == "no_gap"
+
+
+def test_words_say_whether_there_is_a_gap() -> None:
+    assert judged(0.5, 0.049).words.startswith("there is a gap")
+    assert judged(0.5, 0.05).words.startswith("there may be a gap")
+
+
+def test_candidates_hold_nine_tenths() -> None:
+    assert judged(0.5, 0.4, 0.0).candidates == ("a", "none")
+    assert judged(0.5, 0.39, 0.0).candidates == ("a", "none", "b")
+
+
+def test_no_more_data_than_variables_tell_nothing() -> None:
+    assert "no more data" in judged(0.9, 0.0, rows=3).words
+    assert judged(0.9, 0.0, rows=4).kind == "named"
+    empty = decide([], {"none": 0.9, "outside": 0.1}, 20, 3)
+    assert empty.kind == "no_gap" and empty.check == 1.0
+
+
+def test_holms_correction_by_hand() -> None:
+    """p-values 0.01, 0.04, 0.03, 0.5: times 4, 2, 3 and 1 by their order, never falling."""
+    groups = [Group("k", str(p), 0.0, 0.0, 1, p, p) for p in (0.01, 0.04, 0.03, 0.5)]
+    assert [g.corrected for g in _corrected(groups)] == pytest.approx([0.04, 0.09, 0.09, 0.5])
+    high = [Group("k", str(p), 0.0, 0.0, 1, p, p) for p in (0.6, 0.9)]
+    assert [g.corrected for g in _corrected(high)] == [1.0, 1.0]
+
+
+def test_residuals_without_scatter_in_a_direction_count_in_the_others() -> None:
+    C = np.diag([4.0, 1.0, 0.9e-6 * 4, 1.1e-6 * 4])
+    value, freedom = _chi2(np.array([2.0, 3.0, 5.0, 0.0]), C)
+    assert freedom == 3 and value == pytest.approx(1 + 9)
+    assert _chi2(np.zeros(2), np.zeros((2, 2)))[1] == 0
+
+
+def test_a_gap_by_its_formula() -> None:
+    """r^T P r with splits, what calibration absorbs of an effect, and what it makes of x."""
+    toy = Toy(effects=2, bend=0.0, pressures=(240.0, 320.0))
+    toy.tilt = {id: 0 * tilt for id, tilt in toy.tilt.items()}
+    toy.spans["e1"] = Span(-2.0, 1.0)
+    base = problem(toy)
+    y = drawn(toy, base, generator("gap"), {"e0": 0.5}, 0.3)
+    p = base.measured(y)
+    pairs = np.where(np.arange(len(y)) % 2, 0.005, np.nan)
+    p = replace(p, observations=replace(p.observations, split=pairs, split_scatter=0.8 * pairs))
+    d = refit(p, {}, 1).d[0]
+    gap = find_gap(p, d, ("A", "B", "C"))
+    marginal = np.linalg.inv(p.sigma + toy.J @ np.diag(toy.spread**2) @ toy.J.T)
+    r = y - toy.base - toy.J @ d
+    splits = np.isfinite(pairs).sum() * 0.005**2 / (0.004**2 + 0.003**2)
+    assert gap.chi2 == pytest.approx(r @ marginal @ r + splits)
+    assert gap.freedom == len(y) - 3 + np.isfinite(pairs).sum()
+    assert gap.p_value == pytest.approx(chi2.sf(gap.chi2, gap.freedom))
+    assert gap.residuals == pytest.approx(r)
+    assert gap.rms_percent == pytest.approx(100 * np.sqrt(np.mean(r**2)))
+    for id, e in (("e0", 1.0), ("e1", -2.0)):
+        g, S = e * toy.g[id], np.linalg.inv(p.sigma)
+        assert gap.absorbed[id] == pytest.approx(1 - g @ marginal @ g / (g @ S @ g))
+        information = toy.J.T @ S @ toy.J + np.diag(toy.spread**-2.0)
+        x = np.linalg.solve(information, toy.J.T @ S @ g)
+        assert [gap.bias_percent[n][id] for n in "ABC"] == pytest.approx(100 * np.expm1(x))
+
+
+def test_a_part_of_the_section_by_its_formula() -> None:
+    """change = b / (a + 1 / s^2) for g by unit change, with s = 20 % of stiffness, 10 % of mass."""
+    toy = Toy(effects=1)
+    p = problem(toy)
+    n, random = len(p.places), generator("where")
+    P, r = np.diag(random.uniform(1e4, 4e4, n)), random.normal(0, 0.01, n)
+    k, m = random.normal(0, 0.05, (2, n))
+    parts = [Region("a", k, 0 * m, ""), Region("b", 0 * k, m, ""), Region("c", 3 * k, 1e-9 * m, "")]
+    found, rank_ = section_map(p, P, r, parts)
+    at = {place.region: place for place in found}
+    for g, s, part in ((k, 0.2, "a"), (m, 0.1, "b")):
+        a, b = g @ P @ g, g @ P @ r
+        change = b / (a + 1 / s**2)
+        ln = b**2 / (a + 1 / s**2) / 2 - np.log(1 + s**2 * a) / 2
+        kind = "stiffness" if part == "a" else "mass"
+        assert getattr(at[part], f"{kind}_percent") == pytest.approx(100 * change)
+        sigma = 100 / np.sqrt(a + 1 / s**2)
+        assert getattr(at[part], f"{kind}_sigma") == pytest.approx(sigma)
+        assert at[part].evidence == pytest.approx(max(ln, 0.0))
+    assert at["a"].mass_percent == at["b"].stiffness_percent == 0.0
+    assert [place.evidence for place in found] == sorted((q.evidence for q in found), reverse=True)
+    assert section_map(p, P, r, []) == ([], 0)
+    assert rank_ == 2  # a and c are one direction, b the other
+
+
+def test_parts_look_alike_from_a_cosine_of_095_on() -> None:
+    toy = Toy(effects=1)
+    p = problem(toy)
+    n = len(p.places)
+    one, other = np.eye(n)[:2]
+    near = lambda cosine: cosine * one + np.sqrt(1 - cosine**2) * other
+    for cosine, same in ((0.96, True), (0.94, False), (-0.96, True)):
+        parts = [Region("a", one, 0 * one, ""), Region("b", near(cosine), 0 * one, "")]
+        found, _ = section_map(p, 1e4 * np.eye(n), one, parts)
+        assert [bool(place.same_as) for place in found] == [same, same]
+
+
+def test_splits_are_folded_normal() -> None:
+    """s = |N(apart, tau^2)|: both signs, tau with the usual split of 0.3 %; it integrates to 1."""
+    toy = Toy(effects=1, pressures=(240.0,))
+    p = problem(toy)
+    n = len(p.places)
+
+    def ln(s: float, apart: float) -> float:
+        one = np.where(np.arange(n) == 4, s, np.nan)
+        seen = replace(p.observations, split=one, split_scatter=np.full(n, 0.004))
+        return float(ln_splits(replace(p, observations=seen), np.full((1, n), apart))[0])
+
+    tau = 0.005
+    for s, apart in ((0.0, 0.0), (0.01, 0.004), (0.003, 0.012)):
+        density = sum(np.exp(-(((s - x) / tau) ** 2) / 2) for x in (apart, -apart))
+        assert ln(s, apart) == pytest.approx(np.log(density / tau / np.sqrt(2 * np.pi)))
+    grid = np.linspace(0, 0.06, 2001)
+    total = np.trapezoid([np.exp(ln(s, 0.004)) for s in grid], grid)
+    assert total == pytest.approx(1, abs=1e-3)
+
+
+def test_outside_is_half_unknown_effects_and_half_errors_of_reading() -> None:
+    """ln of the mean evidence of each kind; what it names is the likeliest."""
+    toy = Toy(effects=1, pressures=(160.0, 240.0))
+    base = problem(toy)
+    p = base.measured(drawn(toy, base, generator("outside"), {}, 0.3))
+    rows, S = p.observations.rows, p.sigma
+    same = np.array([[(a.label == b.label) * (0.9 if a.pressure_kPa != b.pressure_kPa else 1.0)
+                      for b in rows] for a in rows])  # fmt: skip
+    ln = lambda extra: refit(p, {}, 1, extra).ln_evidence[0]
+    unknown = [ln(size**2 * same) for size in UNKNOWN] + [ln((k**2 - 1) * S) for k in INFLATED]
+    misread = []
+    for label in LABELS:
+        hit = np.array([row.label == label for row in rows])
+        misread.append(ln(0.04 * same * np.outer(hit, hit)))
+    kinds = [np.logaddexp.reduce(each) - np.log(len(each)) for each in (unknown, misread)]
+    found = outside(p)
+    assert found.prior == 0.1
+    assert found.ln_evidence == pytest.approx(np.logaddexp(*kinds) - np.log(2), abs=1e-9)
+    assert (UNKNOWN, INFLATED) == ((0.005, 0.01, 0.02, 0.04), (2.0, 4.0))
+
+
+def test_prior_probabilities_are_one_together() -> None:
+    """A quarter for none, a tenth for what is outside, 3 % for all pairs, tried or not."""
+    toy = Toy(effects=6, pressures=(240.0,))
+    base = problem(toy)
+    found = {h.key: h for h in weigh(base.measured(drawn(toy, base, generator(1), {}, 0.3)))}
+    assert found["none"].prior == 0.25 and found["outside"].prior == 0.1
+    singles = [h for key, h in found.items() if key in toy.spans]
+    pairs = [h for key, h in found.items() if "+" in key]
+    assert sum(h.prior for h in singles) == pytest.approx(0.62)
+    assert [h.prior for h in pairs] == pytest.approx([0.03 / 15] * 14)
+    best = sorted(singles, key=lambda h: -h.ln_evidence)[:4]
+    left = {h.key for h in singles} - {h.key for h in best}  # of these two no pair is tried
+    assert "+".join(sorted(left)) not in found
+    alone = {h.key: h.prior for h in weigh(base, pairs=False)}
+    assert sum(alone.values()) == pytest.approx(1)
+    assert {h.key: h.prior for h in weigh(base, ["e3"])}["e3"] == pytest.approx(0.65)
+
+
+def test_where_an_effect_is_asked() -> None:
+    """At Lobatto's points of a cubic to the farther end, or at two places on either side."""
+    assert node_values(Span(0.0, 2.0)) == pytest.approx([0.5, 1.5, 2.0])
+    assert node_values(Span(-2.0, 0.0)) == pytest.approx([-2.0, -1.5, -0.5])
+    assert node_values(Span(-3.0, -1.0)) == pytest.approx([-3.0, -2.25, -0.75])
+    assert node_values(Span(-2.0, 4.0)) == pytest.approx([-2.0, -1.0, 2.0, 4.0])
+    assert node_values(Span(0.0, 2.0, also=(3.0,))) == pytest.approx([0.5, 1.5, 2.0, 3.0])
+
+
+def test_an_effect_reaches_as_far_as_there_are_solutions() -> None:
+    """Nodes from 0 outwards to the first that fails; those beyond the range do not widen it."""
+    n, none = 4, np.zeros((4, 2))
+    answer = lambda e: Answer(np.full(n, e), np.full((n, 2), 3 * e), np.full(n, abs(e)))
+    plain = Expansion(np.zeros(2), np.zeros(n), none, np.zeros((n, 2, 2)), np.zeros(n), none, {})
+    failed = ValueError("no such tyre")
+    span = Span(-1.0, 1.0)
+    asked = {-1.0: answer(-1), -0.5: failed, 0.5: answer(0.5), 1.0: answer(1), 1.5: answer(1.5)}
+    made = _nodes(plain, span, asked)
+    assert made and made.values.tolist() == [0.0, 0.5, 1.0, 1.5] and made.reach == (0.0, 1.0)
+    shift, tilt, split = made.at(np.array([0.25, 1.25]))
+    assert shift[:, 0] == pytest.approx([0.25, 1.25])
+    assert tilt[:, 0, 0] == pytest.approx([0.75, 3.75])
+    assert split[:, 0] == pytest.approx([0.25, 1.25])
+    assert _nodes(plain, span, dict.fromkeys(asked, failed)) is None
+    assert isinstance(made, Nodes)
+
+
+def test_more_nodes_where_a_cubic_is_not_enough() -> None:
+    """At 8 % and at half of the range, where Newton's last term is 0.3 % and more."""
+    last = 0.875 * 0.625 * 0.125  # the bend's own part half way between the last two nodes
+    for size, more in ((0.0, False), (0.0029 / last, False), (0.0031 / last, True)):
+        toy = Toy(effects=1, size=1e-3, pressures=(240.0,))
+        plain = toy._answer
+
+        def bent(point: Point, size: float = size, plain: Any = plain) -> Answer:
+            found = plain(point)
+            e = point.effects.get("e0", 0.0)
+            return replace(found, eta=found.eta + size * e * (e - 0.25) * (e - 0.75))
+
+        toy._answer = bent  # type: ignore[method-assign]
+        nodes = expand(toy, np.zeros(3)).nodes["e0"].values
+        wanted = [0, 0.08, 0.25, 0.5, 0.75, 1] if more else [0, 0.25, 0.75, 1]
+        assert nodes.tolist() == pytest.approx(wanted)
+
+
+def test_curvature_is_that_of_two_slopes() -> None:
+    toy = Toy(effects=0, bend=0.1)
+    found = expand(toy, np.array([0.2, -0.1, 0.3]))
+    assert found.hessian == pytest.approx(2 * toy.bend[:, None, None] * np.eye(3), abs=1e-9)
+
+
+def test_the_plain_fit_ends_near_the_minimum_and_takes_no_leaps() -> None:
+    """Of a model that bends, from afar; no step beyond 0.7 in any x."""
+    toy = Toy(effects=0, bend=0.02)
+    p = problem(toy)
+    (there,) = toy.answers([Point(np.array([1.5, -1.2, 0.8]))])
+    assert isinstance(there, Answer)
+    asked: list[Array] = []
+    answers = toy.answers
+    toy.answers = lambda points: [asked.append(q.x) for q in points] and answers(points)  # type: ignore[func-returns-value, method-assign, assignment]
+    x = plain_fit(toy, p.measured(there.eta).observations, p.places, 0.001)
+    steps = np.abs(np.diff(asked, axis=0)).max(1)
+    assert steps[0] == pytest.approx(0.7) and steps.max() < 0.7 + 1e-9 and len(asked) <= 10
+    value = lambda x: float(np.sum((toy._answer(Point(x)).eta - there.eta) ** 2))
+    assert abs(x - [1.5, -1.2, 0.8]).max() < 0.05 and value(x) < value(asked[-1]) / 2
+
+
+def test_the_plain_fit_steps_back_from_what_has_no_solution() -> None:
+    toy = Toy(effects=0, bend=0.0)
+    p = problem(toy)
+    (there,) = toy.answers([Point(np.array([0.6, 0.0, 0.0]))])
+    assert isinstance(there, Answer)
+    answer = toy._answer
+
+    def walled(point: Point) -> Answer:
+        return ValueError("wall") if point.x[0] > 0.1 else answer(point)  # type: ignore[return-value]
+
+    toy._answer = walled  # type: ignore[method-assign]
+    x = plain_fit(toy, p.measured(there.eta).observations, p.places, 0.001)
+    assert 0.05 < x[0] <= 0.1
+
+
+def test_the_menu_of_measurements() -> None:
+    """What is offered, at which price: pressures far from those measured, the next harmonics, the
+    mass where it is not known; a likely effect switched off, sources by themselves."""
+    toy = Toy(effects=3, pressures=(200.0, 250.0))
+    p = problem(toy)
+    sizes = {id: {id: 0.5} for id in toy.spans}
+    likely = {"none": 0.4, "e0": 0.3, "e1": 0.279, "e2": 0.021, "outside": 0.0}
+    toy.spans["e0"] = Span(0, 1, toggle="take e0 out")
+    p = replace(p, spans=toy.spans)
+    rows: list = []
+
+    def further(wanted: list) -> Any:
+        rows.extend(wanted)
+        count, random = len(wanted), generator("further")
+        zero, J = np.zeros(count), random.normal(size=(count, 3))
+        answer = Answer(zero, J, zero, np.zeros((count, 2)))
+        by = lambda point: 0.1 * len(point.effects) * random.normal(size=count)
+        moved = lambda point: replace(answer, eta=by(point))
+        return SimpleNamespace(answers=lambda points: [answer, *map(moved, points[1:])])
+
+    found = rank(p, np.zeros(3), likely, sizes, ("rubber_density",), further)
+    assert {c.what: c.hours for c in found} == {
+        "measure by itself: rubber density": 1.0,
+        "measure all 4 times, dismounted in between": 6.0,
+        "take e0 out": 4.0,
+        "measure again without e1": 4.0,
+        "measure again without e2": 4.0,
+        "measure the same modes at 320 kPa": 1.0,
+        "measure [5,0] and [5,1], too": 1.0,
+        "weigh the tyre": 0.25,
+    }
+    assert [c.gain for c in found] == sorted((c.gain for c in found), reverse=True)
+    assert all(c.gain > -1e-9 for c in found)
+    few = rank(p, np.zeros(3), {**likely, "e1": 0.28, "e2": 0.02}, sizes, ())
+    assert not any("e2" in c.what for c in few)
+    assert rank(p, np.zeros(3), {"e0": 0.99, "none": 0.01}, sizes, ()) == []
+    assert rank(p, np.zeros(3), {"e0": 0.5, "strange": 0.5}, sizes, ()) == []
+
+
+def test_the_gains_of_what_is_switched_and_checked_by_their_formula() -> None:
+    """A run more without e0, and a source of error at a quarter of its deviation."""
+    toy = Toy(effects=2, size=0.003, bend=0.0, pressures=(240.0,))
+    toy.tilt = {id: 0 * tilt for id, tilt in toy.tilt.items()}
+    p = problem(toy)
+    sizes, likely = {id: {id: 1.0} for id in ("e0", "e1")}, {"e0": 0.5, "e1": 0.3}
+    found = {c.what: c for c in rank(p, np.zeros(3), likely, sizes, toy.sources)}
+
+    def apart(S: Array, J: Array, off: Array) -> float:
+        whole = S + J @ np.diag(toy.spread**2) @ J.T
+        return float(2 * 0.5 * 0.3 * off @ np.linalg.inv(whole) @ off)
+
+    off = toy.g["e0"] - toy.g["e1"]
+    now = apart(p.sigma, toy.J, off)
+    reduced = 0.0625 * np.outer(toy.constants[:, 1], toy.constants[:, 1])
+    S = p.sigma - 15 * reduced
+    checked = found["measure by itself: gauge"]
+    assert checked.gain == pytest.approx(apart(S, toy.J, off) - now, rel=1e-6)
+    both = problem(toy, changes=(Change("e0", 0.0),))
+    twice = np.vstack([toy.J, toy.J])
+    moved = np.concatenate([off, -toy.g["e1"]])
+    switched = found["measure again without e0"]
+    assert switched.gain == pytest.approx((apart(both.sigma, twice, moved) - now) / 4, rel=1e-6)
+
+
+def test_a_change_counts_from_what_the_case_has() -> None:
+    """Set to a value, or times one."""
+    e = {"a": np.array([0.0, 0.5]), "b": np.array([1.0, 2.0])}
+    assert Change("a", 0.3, base=0.2).applied(e, 2)["a"] == pytest.approx([0.1, 0.1])
+    assert Change("a", 3.0, True, 0.2).applied(e, 2)["a"] == pytest.approx([0.4, 1.9])
+    assert Change("c", 3.0, True, 0.2).applied(e, 2)["c"] == pytest.approx([0.4, 0.4])
+    assert Change("a", 0.3).applied(e, 2)["b"] is e["b"]
+
+
+def test_labels_far_apart_are_not_taken_for_each_other() -> None:
+    """Only what lies within 30 % of each other wherever both were measured."""
+    rows = tuple(Row("frequency_Hz", x, p) for x in LABELS[2:5] for p in (160.0, 240.0))
+    y = np.array([0.0, 0.0, 0.29, -0.29, 0.1, 0.31])
+    none = np.full(6, np.nan)
+    pairs = set(_near(Observations(rows, y, none, 0.0, none, none)))
+    assert pairs == {(LABELS[3], LABELS[2])}

@@ -1,0 +1,284 @@
+"""The steps of both methods, where residuals are linear and every answer is known by hand."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.optimize import lsq_linear
+
+from tyrecal.evaluate.failure import EvaluationFailed
+from tyrecal.fit import least_squares, slsqp
+from tyrecal.fit.calibrate import _tolerance
+from tyrecal.fit.crossing import AXIAL, TORSIONAL, Crossing, crossing
+from tyrecal.fit.problem import Point, Target
+
+from ..chance import generator
+
+Array = np.ndarray
+MINIMISE = {"slsqp": slsqp.minimise, "least-squares": least_squares.minimise}
+
+
+def pair(difference: float, clarity: float) -> dict:
+    """The two [0, 0] modes, the axial one ``difference`` Hz above."""
+    hertz = {AXIAL: 40.0 + difference, TORSIONAL: 40.0}
+    return {k: SimpleNamespace(frequency_Hz=f, clarity=clarity) for k, f in hertz.items()}
+
+
+def point(x: Any, r: Any, J: Any, modes: dict | None = None, roughness: float = 0.0) -> Point:
+    x, r, J = (np.array(each, float) for each in (x, r, J))
+    return Point({}, x, r, J, modes or {}, 1.0, 1.0, np.empty(0), roughness)
+
+
+class Linear:
+    """Residuals J x - y within a box; ``wall``: x that have no solution."""
+
+    targets: tuple[Target, ...] = ()
+
+    def __init__(self, J: Array, y: Array, box: float = 10.0):
+        self.J, self.y = J, y
+        self.asked: list[Array] = []
+        self.lower, self.upper = np.full(J.shape[1], -box), np.full(J.shape[1], box)
+        self.wall = lambda x: False
+        self.added = lambda x: 0.0  # to the residuals, and to no slope
+
+    def evaluate(self, x: Array) -> Point:
+        self.asked.append(x)
+        assert (x >= self.lower).all() and (x <= self.upper).all()
+        if self.wall(x):
+            raise EvaluationFailed("no_equilibrium", "beyond the wall")
+        return point(x, self.J @ x - self.y + self.added(x), self.J)
+
+
+def linear(key: object = 0, box: float = 10.0, rows: int = 7, columns: int = 3) -> Any:
+    random = generator("linear", key)
+    J = random.normal(size=(rows, columns))
+    return Linear(J, J @ random.normal(size=columns) + 0.3 * random.normal(size=rows), box)
+
+
+@pytest.mark.parametrize("method", MINIMISE)
+@pytest.mark.parametrize("box", [10.0, 0.3])
+def test_a_linear_problem_in_a_box_is_solved_in_a_few_steps(method: str, box: float) -> None:
+    """At the least sum of squares in the box, whether its sides hold or not."""
+    counts = []
+    for key in range(5):
+        problem = linear(key, box)
+        found = MINIMISE[method](problem, np.zeros(3), 1e-3)
+        exact = lsq_linear(problem.J, problem.y, (problem.lower, problem.upper), method="bvls").x
+        assert found.message == "converged"
+        assert found.point.x == pytest.approx(exact, abs=2e-3)
+        lowest = np.linalg.norm(problem.J @ exact - problem.y)
+        assert found.point.objective == pytest.approx(lowest, abs=1e-6)
+        assert slsqp.projected_gradient(problem, found.point) <= 1e-3
+        counts.append(len(problem.asked))
+    assert max(counts) <= 15, counts
+
+
+@pytest.mark.parametrize("method", MINIMISE)
+def test_an_exact_fit_is_enough(method: str) -> None:
+    """An objective of 1e-3 Hz is below every resolution: no step is taken from there."""
+    for size, steps in ((0.99e-3, False), (1.01e-3, True)):
+        problem: Any = Linear(np.eye(3), np.array([size, 0, 0]))
+        MINIMISE[method](problem, np.zeros(3), 1e-12)
+        assert (len(problem.asked) > 1) == steps
+
+
+@pytest.mark.parametrize("method", MINIMISE)
+def test_where_nothing_is_lower_the_search_ends_and_says_so(method: str) -> None:
+    """Slopes that promise what no step holds: it stops before its steps are used up, where it
+    began."""
+    problem = linear()
+    problem.added = lambda x: 1e3 * bool(x.any())
+    found = MINIMISE[method](problem, np.zeros(3), 1e-6)
+    assert "no lower objective along" in found.message
+    assert not found.point.x.any()
+    assert min(np.linalg.norm(x) for x in problem.asked if x.any()) < 1e-3  # however short
+
+
+@pytest.mark.parametrize("method", MINIMISE)
+def test_a_step_beyond_what_has_a_solution_is_taken_back(method: str) -> None:
+    """To its sixteenth at least: the wall stands at a tenth of the way."""
+    problem: Any = Linear(np.eye(3), np.array([0.8, 0.4, 0.2]))
+    problem.wall = lambda x: x[0] > 0.08
+    found = MINIMISE[method](problem, np.zeros(3), 1e-6)
+    assert 0 < found.point.x[0] <= 0.08
+    assert found.point.objective < np.linalg.norm(problem.y) - 0.04
+
+
+def test_a_damped_step_is_that_of_its_equations() -> None:
+    """min |r + J d|^2 + mu |d|^2 tr(J^T J) / v, in the box: where a side holds, the slope pushes
+    against it, and vanishes along all others."""
+    mu = 0.7
+    for key in range(3):
+        problem = linear(key)
+        x = generator("damped", key).uniform(-0.1, 0.1, 3)
+        at, weight = problem.evaluate(x), mu * np.sum(problem.J**2) / 3
+        free = np.linalg.solve(
+            problem.J.T @ problem.J + weight * np.eye(3), -problem.J.T @ at.residuals
+        )
+        assert least_squares._step(problem, at, mu) == pytest.approx(free, rel=1e-6)
+        problem.lower, problem.upper = x - 0.5 * abs(free).max(), x + 0.5 * abs(free).max()
+        d = least_squares._step(problem, at, mu)
+        slope = problem.J.T @ (at.residuals + problem.J @ d) + weight * d
+        low, high = x + d <= problem.lower + 1e-9, x + d >= problem.upper - 1e-9
+        assert (low | high).any()
+        assert abs(slope[~low & ~high]).max(initial=0) < 1e-6
+        assert (slope[low] > 0).all() and (slope[high] < 0).all()
+
+
+def test_damping_falls_with_success_so_that_steps_become_whole() -> None:
+    """Each leaves a smaller share of what is left than the one before: 11, 5, 1.3 and 0.3 %."""
+    J = np.vstack([np.diag([1.0, 2.0, 3.0]), np.ones(3)])
+    problem: Any = Linear(J, np.array([1.0, -1.0, 2.0, 0.5]))
+    least_squares.minimise(problem, np.full(3, 9.0), 1e-3)
+    exact = np.linalg.lstsq(problem.J, problem.y, rcond=None)[0]
+    off = [np.linalg.norm(x - exact) for x in problem.asked]
+    left = [b / a for a, b in pairwise(off)]
+    assert len(left) >= 4 and all(b < 0.5 * a for a, b in pairwise(left))
+
+
+def test_the_first_step_is_gauss_and_newtons_damped() -> None:
+    problem = linear()
+    at = problem.evaluate(np.zeros(3))
+    for damping in (0.1, 3.0):
+        seen, whole = slsqp._restart(problem, at, damping, None)
+        H = problem.J.T @ problem.J
+        H += damping * np.trace(H) / 3 * np.eye(3)
+        assert seen[0] is at and whole
+        assert seen[2].x == pytest.approx(np.linalg.solve(H, problem.J.T @ problem.y), abs=1e-6)
+
+
+def test_a_step_that_had_to_be_shortened_is_not_whole() -> None:
+    """Were it taken whole, it would be far worse than a part of it."""
+    problem: Any = Linear(np.eye(1), np.array([1.0]))
+    problem.added = lambda x: 20 * x * abs(x)
+    seen, whole = slsqp._restart(problem, problem.evaluate(np.zeros(1)), 0.1, None)
+    best = min(seen, key=lambda p: p.objective)
+    assert not whole and 0 < best.x[0] < 0.3 and best.objective < 1
+
+
+def test_where_the_objective_may_jump_few_trials_are_made_of_a_step() -> None:
+    """Three, each of which presses several tyres; elsewhere as many as the line search likes."""
+    counts = []
+    for roughness in (0.0, 1e-9):
+        problem = linear()
+        problem.added = lambda x: 1e3 * bool(x.any())
+        at = point(np.zeros(3), -problem.y, problem.J, roughness=roughness)
+        seen, _ = slsqp._restart(problem, at, 0.1, None)
+        counts.append(sum(bool(p.x.any()) for p in seen))
+    assert counts[1] == slsqp.TRIALS == 3 < counts[0]
+
+
+def test_what_pushes_against_a_bound_does_not_count() -> None:
+    """At a bound, to 1e-9 of a coordinate, the gradient counts where it leads inside alone."""
+    problem: Any = SimpleNamespace(lower=np.full(2, -1.0), upper=np.full(2, 1.0))
+    norm = lambda x, g: slsqp.projected_gradient(problem, point(x, [1.0], [g]))
+    assert norm([0.0, 0.0], [3.0, 4.0]) == pytest.approx(5.0)
+    for side in (-1.0, 1.0):
+        held = side * (1 - 0.9e-9), 0.0
+        assert norm(held, [-3.0 * side, 4.0]) == pytest.approx(4.0)  # lower only outside
+        assert norm(held, [3.0 * side, 4.0]) == pytest.approx(5.0)
+        assert norm((side * (1 - 1.1e-8), 0.0), [-3.0 * side, 4.0]) == pytest.approx(5.0)
+
+
+def test_what_is_left_to_gain_is_compared_with_the_jumps() -> None:
+    """Residuals that J can make vanish leave half the objective to gain, F - F/2 of the quadratic
+    that touches F at the point: here 5 / 2."""
+    problem: Any = SimpleNamespace(lower=np.full(2, -1.0), upper=np.full(2, 1.0))
+    J = np.array([[2.0, 1.0], [0.0, 3.0]])
+
+    def at_jump(roughness: float, lowered: float = 0.0, x: Any = (0.0, 0.0)) -> bool:
+        return slsqp.is_at_jump(problem, point(x, [3.0, 4.0], J, roughness=roughness), lowered)
+
+    assert not at_jump(0.0) and not at_jump(2.49) and at_jump(2.51)
+    assert at_jump(2.51, 0.62) and not at_jump(2.51, 0.63)
+    # at the lower bound the gradient (6, 15) / 5 pushes outwards: the first variable is held
+    left = 0.5 * (15 / 5) * 15 / 10
+    for wanted, x in ((2.5, (1.0, 0.0)), (left, (-1.0, 0.0)), (left, (0.9e-9 - 1, 0.0))):
+        assert at_jump(1.01 * wanted, 0.0, x) and not at_jump(0.99 * wanted, 0.0, x)
+    mirrored = SimpleNamespace(lower=np.full(2, -1.0), upper=np.full(2, 1.0))
+    there = lambda q, x: slsqp.is_at_jump(mirrored, point(x, [-3.0, -4.0], J, roughness=q))  # type: ignore[arg-type]
+    assert there(1.01 * left, (1.0, 0.0)) and not there(0.99 * left, (1 - 0.9e-9, 0.0))
+    assert there(2.51, (-1.0, 0.0)) and not there(2.49, (-1.0, 0.0))
+
+
+def test_a_crossing_bounds_where_the_gradient_is_normal_to_it() -> None:
+    """To a tenth, and where the labels are mixed."""
+    edge = Crossing(np.zeros(2), 0.0, np.array([3.0, 4.0]))
+    normal, along = np.array([0.6, 0.8]), np.array([-0.8, 0.6])
+
+    def bounded(share: float, clarity: float) -> bool:
+        g = np.sqrt(1 - share**2) * normal + share * along
+        return slsqp._is_bounded(point([0, 0], [7.0], [7.0 * g], pair(0.1, clarity)), edge)
+
+    assert bounded(0.09, 0.29) and bounded(-0.09, 0.0)
+    assert not bounded(0.11, 0.29) and not bounded(-0.11, 0.29) and not bounded(0.09, 0.31)
+
+
+class Paired(Linear):
+    """With both [0, 0] modes among the targets."""
+
+    targets = (Target(AXIAL, 40.0), Target(TORSIONAL, 40.0))
+
+
+def test_a_step_that_meets_the_crossing_leaves_it_some_room() -> None:
+    """A tenth of the gap of the point that it starts from, on whichever side that is."""
+    for side in (1.0, -1.0):
+        problem: Any = Paired(np.eye(2), np.array([-4.0 * side, 1.0]))
+        at = point([side, 0.0], problem.J @ [side, 0.0] - problem.y, problem.J, pair(2 * side, 0.1))
+        edge = Crossing(at.x, 2 * side, np.array([2.0, 0.0]))
+        seen, _ = slsqp._restart(problem, at, 1e-6, edge)
+        assert min(side * edge.at(p.x) for p in seen) == pytest.approx(0.1 * 2, abs=1e-6)
+        free, _ = slsqp._restart(problem, at, 1e-6, None)
+        assert side * free[2].x[0] == pytest.approx(-4, rel=1e-3)
+
+
+def test_designs_beyond_a_crossing_are_reached_by_the_least_change_of_the_residuals() -> None:
+    """d = -1, -2 and -4 Hz; the change is J^T J's steepest along d: (J^T J) dx is parallel to its
+    slopes."""
+    for side in (1.0, -1.0):
+        problem: Any = Paired(linear().J, np.zeros(7))
+        at = point([0.1, 0.2, 0.3], np.ones(7), problem.J, pair(3 * side, 0.1))
+        edge = Crossing(np.zeros(3), 2.5 * side, np.array([1.0, -2.0, 3.0]))
+        found = list(slsqp._beyond_crossing(problem, at, edge))
+        assert [side * edge.at(x) for x in found] == pytest.approx([-1.0, -2.0, -4.0])
+        for x in found:
+            push = problem.J.T @ problem.J @ (x - at.x)
+            cosine = push @ edge.slopes / np.linalg.norm(push) / np.linalg.norm(edge.slopes)
+            assert abs(cosine) > 1 - 1e-4
+        problem.upper = problem.lower + 10.3
+        assert all((x <= problem.upper).all() for x in slsqp._beyond_crossing(problem, at, edge))
+    nowhere = Crossing(np.zeros(3), 2.5, np.zeros(3))
+    assert list(slsqp._beyond_crossing(problem, at, nowhere)) == []
+
+
+def test_slopes_are_taken_from_where_labels_are_clear() -> None:
+    """From 0.3 on: the nearest such point, or none."""
+    problem: Any = Paired(np.eye(2), np.zeros(2))
+    problem.scale = np.ones(2)
+    near, far, farther = (
+        point([x, 0.0], [0.0, 0.0], [[x, 1.0], [0.0, 2.0]], pair(1.0, clarity))
+        for x, clarity in ((0.1, 0.29), (0.5, 0.31), (-0.7, 0.9))
+    )
+    assert crossing(problem, [near], near) is None
+    found = crossing(problem, [farther, near, far], near)
+    assert found and found.x is far.x and found.value == pytest.approx(0.31)
+    assert found.slopes == pytest.approx(np.array([0.5, -1.0]) / 0.31)
+
+
+def test_the_tolerance_is_what_slopes_can_tell() -> None:
+    """1e-3 where they are exact; of differences 50 Hz times the step over the least sigma; of
+    areas and stiffnesses 1e-4 of their weighted size."""
+    modal = [Target(AXIAL, 40.0), Target(TORSIONAL, 40.0, sigma_Hz=0.5)]
+    pressed = [SimpleNamespace(scale=100.0, value=v) for v in (3.0, 4.0)]
+    of = lambda step, targets, footprint=(): _tolerance(
+        SimpleNamespace(difference_step=step, targets=targets, footprint=footprint)  # type: ignore[arg-type]
+    )
+    assert of(None, modal) == of(1e-6, modal) == 1e-3
+    assert of(1e-3, modal) == pytest.approx(0.1) and of(1e-3, modal[:1]) == pytest.approx(0.05)
+    assert of(1e-3, []) == pytest.approx(0.05)
+    assert of(None, [], pressed) == pytest.approx(0.05)
+    assert of(1e-3, modal, pressed) == pytest.approx(0.15)
