@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import pickle
 from contextlib import nullcontext
+from copy import copy, deepcopy
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -12,8 +12,7 @@ import numpy as np
 import pytest
 
 from tyrecal.case import LoadedCase, load_case, start_values
-from tyrecal.case.variables import with_level
-from tyrecal.evaluate.door import Door, Question
+from tyrecal.evaluate.door import Counts, Door, Question
 from tyrecal.evaluate.executor import Here
 from tyrecal.evaluate.failure import DeckRefused, EvaluationFailed
 from tyrecal.evaluate.results import Evaluation
@@ -207,6 +206,21 @@ def test_bounds_that_hold_too_few_tyres_end_the_drawing_of_starts() -> None:
     assert failure.value.words.startswith("63 drawn starts") and asked == [(1, 4)]
 
 
+class Counting(FakeDoor):
+    """With counts of its own, wherever it is copied to."""
+
+    counts = Counts()
+
+    def evaluate(self, question: Question) -> Evaluation:
+        self.counts.add(Counts(1, 0))
+        return super().evaluate(question)
+
+    def worker(self) -> Counting:
+        other = copy(self)
+        other.counts = Counts()
+        return other
+
+
 def test_starts_of_other_processes_tell_how_often_the_solver_ran(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -214,18 +228,24 @@ def test_starts_of_other_processes_tell_how_often_the_solver_ran(
 
     class Elsewhere(Here):
         def each(self, function: Any, tasks: Any) -> Any:
-            return super().each(function, [pickle.loads(pickle.dumps(task)) for task in tasks])
+            return super().each(function, map(deepcopy, tasks))  # type: ignore[arg-type]
 
     monkeypatch.setattr(calibrate_module, "executor", lambda *asked: nullcontext(Elsewhere()))
-    changed = {"variables": {"C10": CASE.case.variables["C10"]}}
-    case = with_level(replace(CASE, case=CASE.case.model_copy(update=changed)), "coarse")
     told: list[tuple[int, int]] = []
-    one, other = Door(case), Door(case)
-    alone = calibrate(case, one, starts=3, finished=lambda *done: told.append(done))
-    shared = calibrate(case, other, starts=3, jobs=2, finished=lambda *done: told.append(done))
-    assert shared.result == alone.result
-    assert other.counts == one.counts and one.counts.runs == len(shared.history)
-    assert told == [(1, 3), (2, 3), (3, 3)] * 2
+    results, counts = [], []
+    for jobs in (1, 2):
+        tyre = Counting(door().base, POWERS, START).worker()
+        fit = calibrate(
+            CASE,
+            tyre,  # type: ignore[arg-type]
+            starts=3,
+            jobs=jobs,
+            finished=lambda *done: told.append(done),
+        )
+        results.append(fit.result)
+        counts.append(tyre.counts)
+    assert results[0] == results[1] and counts[0] == counts[1]
+    assert counts[0].runs == len(fit.history) and told == [(1, 3), (2, 3), (3, 3)] * 2
 
 
 def test_starts_are_drawn_replaced_and_reproducible() -> None:

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tyrecal_solvers.calculix.adapter import CalculiX, Refused
-from tyrecal_solvers.calculix.results import read_mass
-from tyrecal_solvers.calculix.runner import run_job
+from tyrecal_solvers.calculix.adapter import CalculiX, Refused, _check_rubber, _inflated, _shapes
+from tyrecal_solvers.calculix.results import Fields, pairs, read_mass
+from tyrecal_solvers.calculix.runner import _is_safe, _said, run_job
 from tyrecal_solvers.process import RunFailed
 
 from tyrecal.blind.laws import tread_density
@@ -270,6 +270,125 @@ def test_a_command_that_is_not_there(tmp_path: Path) -> None:
     solver.command = ["no-such-ccx"]
     with pytest.raises(RunFailed, match="cannot start 'no-such-ccx'"):
         solver.run(folder_for(tmp_path, "none"), 30.0)
+
+
+@pytest.mark.parametrize(("off", "whole"), [(0.98, True), (1.02, False)])
+def test_how_far_an_inflated_tyre_may_be_from_a_body_of_revolution(
+    tmp_path: Path, off: float, whole: bool
+) -> None:
+    """A thousandth of the largest displacement."""
+    moved = [STATIC[0], STATIC[1], (3, (0.0, 0.0, off * 1e-6))]
+    (tmp_path / "inflate.frd").write_text(frd(block("DISP", moved, 0)))
+    if whole:
+        fields, front = _inflated(tmp_path / "inflate.frd")
+        assert fields.nodes[front].tolist() == [1, 2]
+    else:
+        with pytest.raises(RunFailed, match="no body of revolution"):
+            _inflated(tmp_path / "inflate.frd")
+
+
+def test_displacements_turn_with_their_nodes(tmp_path: Path) -> None:
+    """A radial growth and a twist, the same at every angle, are a body of revolution's."""
+    points = [(1, (0.3, 0.0, 0.1))]
+    for n, angle in ((2, 0.1), (3, -0.4)):
+        points.append((n, (0.3 * np.cos(angle), 0.3 * np.sin(angle), 0.1)))
+    grown = []
+    for n, (x, y, _) in points:
+        c, s = x / 0.3, y / 0.3
+        grown.append((n, (2e-3 * c - 1e-3 * s, 2e-3 * s + 1e-3 * c, 5e-4)))
+    text = "    1C\n    2C\n" + rows(points) + " -3\n" + block("DISP", grown, 0) + " 9999\n"
+    (tmp_path / "inflate.frd").write_text(text)
+    fields, front = _inflated(tmp_path / "inflate.frd")
+    assert front.tolist() == [0] and fields.blocks[0][2][0] == pytest.approx([2e-3, 1e-3, 5e-4])
+    behind = text.replace(rows(points[:1]), rows([(1, (0.3, 1e-9, 0.1))]))
+    (tmp_path / "inflate.frd").write_text(behind)
+    with pytest.raises(RunFailed, match="no nodes at Theta = 0"):
+        _inflated(tmp_path / "inflate.frd")
+
+
+def test_pairs_are_as_equal_as_digits_allow() -> None:
+    """A ten thousandth; of a pair their mean."""
+    values = np.array([1.0, 1.00009, 4.0, 4.0])
+    assert pairs(values, "a") == pytest.approx([1.000045, 4.0], abs=1e-12)
+    for wrong in ([1.0, 1.00011], [1.00011, 1.0], [1.0, 1.0, 4.0]):
+        with pytest.raises(RunFailed, match="do not come in pairs"):
+            pairs(np.array(wrong), "a")
+
+
+@pytest.mark.parametrize(("n", "multiplicity"), [(0, 1), (1, 2)])
+def test_shapes_have_the_tyres_modal_mass(n: int, multiplicity: int) -> None:
+    """ccx's have one sector's; a shape without any motion is refused."""
+    shape = np.array([[3.0, 0.0, 0.0], [0.0, 4.0, 0.0]])
+    fields = lambda size: Fields(
+        np.array([1, 2]), np.zeros((2, 3)), [(1, "DISP", 0 * shape), (1, "DISPI", size * shape)]
+    )
+    (found,) = _shapes(fields(1.0), 1, n, 60, "modes")
+    assert found == pytest.approx(shape * np.sqrt(multiplicity / 60))
+    with pytest.raises(RunFailed, match="mode 1 is no shape"):
+        _shapes(fields(0.0), 1, n, 60, "modes")
+
+
+@pytest.mark.parametrize(
+    ("row", "stable"),
+    [
+        ("1e5, -0.9e5, 1e-8", True),
+        ("1e5, -1e5, 1e-8", False),
+        ("1e5, 1e5, 0.0", False),
+        ("1e5, 1e5, -1e-8", False),
+        ("-1e5, 2e5, 1e-8", True),
+        ("1e5, x, 1e-8", True),  # ccx complains of it
+    ],
+)
+def test_rubber_that_is_none_is_not_left_to_ccx(tmp_path: Path, row: str, stable: bool) -> None:
+    path = tmp_path / "sector.inp"
+    good = "*HYPERELASTIC, MOONEY-RIVLIN\n5e5, 1e5, 1e-8\n"
+    path.write_text(f"{good}*HYPERELASTIC, MOONEY-RIVLIN\n{row}\n*DENSITY\n1100\n")
+    if stable:
+        _check_rubber(path)
+    else:
+        with pytest.raises(RunFailed, match="is unstable") as failure:
+            _check_rubber(path)
+        assert failure.value.cause == "unstable"
+
+
+def test_of_an_error_three_lines_are_told(tmp_path: Path) -> None:
+    log = tmp_path / "a.log"
+    log.write_text("first\n *ERROR in e_c3d:\n\n one\n two\n three\n *ERROR again\nJob finished\n")
+    assert _said(log) == ("*ERROR in e_c3d: one two", False, True)
+    log.write_text("*WARNING reading *STEP.\n*WARNING in x: Card image:\nToo many cutbacks\n")
+    assert _said(log) == ("", True, False)
+
+
+def test_paths_that_ccx_copes_with() -> None:
+    """Of 100 characters at most, without a blank, in ASCII."""
+    assert _is_safe(Path("/" + 99 * "x")) and not _is_safe(Path("/" + 100 * "x"))
+    assert not _is_safe(Path("/a b")) and not _is_safe(Path("/\u00fc"))
+
+
+def test_the_program_is_known_by_its_version(tmp_path: Path) -> None:
+    """Where it has none the settings hold the command, and with them the record's key."""
+    solver = CalculiX()
+    for said, version in (("This is Version 2.20", "2.20"), ("who knows", "unknown")):
+        solver.command = [sys.executable, "-c", f"print('{said}')"]
+        assert solver.version == version
+        (tmp_path / version).mkdir()
+        solver.write(Decks(main_case()), tmp_path / version)
+        settings = json.loads((tmp_path / version / "calculix.json").read_text())
+        assert settings.get("command") == (solver.command if version == "unknown" else None)
+        assert settings["parallel"] == 1
+    solver.command = ["no-such-ccx"]
+    assert solver.version == "unknown"
+
+
+def test_folders_without_decks_have_no_results(tmp_path: Path) -> None:
+    with pytest.raises(RunFailed, match="no decks") as failure:
+        CalculiX().read(tmp_path)
+    assert failure.value.cause == "no_results"
+    folder = folder_for(tmp_path, "none")
+    (folder / "sector.inp").write_text("*NODE\n")
+    with pytest.raises(RunFailed, match=r"sector.inp has no .*CYCLIC") as failure:
+        evaluate(folder)
+    assert failure.value.cause == "no_results"
 
 
 def main_case(**options: object) -> LoadedCase:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import sys
 from pathlib import Path
 
 import pytest
@@ -118,6 +119,48 @@ def test_pressures_stand_where_their_nodes_have_moved(tmp_path: Path) -> None:
     (tmp_path / "press.frd").write_text(text.replace("CONTACT", "STRESS "))
     with pytest.raises(RunFailed, match="0 patches"):
         read_pressures(tmp_path)
+
+
+@pytest.mark.parametrize(("share", "whole"), [(0.019, True), (0.021, False)])
+@pytest.mark.parametrize("side", [1, -1])
+def test_how_well_road_and_rim_must_balance(
+    tmp_path: Path, share: float, whole: bool, side: int
+) -> None:
+    """Within 2 % of the road's force."""
+    text = BOTH.replace("6.187689E+02", f"{623.6171 * (1 + side * share):.6E}")
+    text = text.replace("6.247689E+02", f"{623.6171 * (1 + side * share):.6E}")
+    folder_with(tmp_path, text.replace("6.246171", "6.236171"))
+    if whole:
+        assert len(read_press(tmp_path)) == 2
+    else:
+        with pytest.raises(RunFailed, match="the road bears"):
+            read_press(tmp_path)
+
+
+def test_the_job_runs_with_its_wheel(tmp_path: Path) -> None:
+    """Wherever ccx has to run, and what it left is read."""
+    left = tmp_path / "left.py"
+    left.write_text(
+        "import sys; from pathlib import Path\n"
+        "assert Path('wheel.inp').read_text() and sys.argv[1:] == ['press']\n"
+        f"Path('press.dat').write_text({BOTH!r})\n"
+        "print('Job finished')\n"
+    )
+    for place in ("plain", "with blanks"):
+        (tmp_path / place).mkdir()
+        folder = folder_with(tmp_path / place, "an older run's")
+        run_press(folder, [sys.executable, str(left)], 30.0)
+        assert len(read_press(folder)) == 2
+
+
+def test_the_radius_is_the_last_states(tmp_path: Path) -> None:
+    points = lines((1, [0.3, -0.1, -0.2]), (2, [0.31, 0.0, 0.1]))
+    state = lambda moved: f" -4  DISP        4    1\n{moved} -3\n"
+    first = state(lines((1, [0.05, 0, 0]), (2, [0.05, 0, 0])))
+    last = state(lines((1, [0.02, 0, 0]), (2, [0.005, 0, 0])))
+    text = f"    1C\n    2C\n{points} -3\n{first}{last} 9999\n"
+    (tmp_path / "press.frd").write_text(text)
+    assert read_radius(tmp_path) == pytest.approx(0.32)
 
 
 @pytest.mark.ccx
