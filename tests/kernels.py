@@ -2,8 +2,7 @@
 
     python -m tests.kernels [pytest's arguments]
 
-Each kernel with one thread, and the solver's tests with two; as many runs at a time as there are
-cores. A kernel that the processor cannot run, or for which the libraries have another's, is said.
+Each kernel with one thread and with two; as many runs at a time as there are cores. A kernel that the processor cannot run, or for which the libraries have another's, is said.
 Exits with 1 where a run failed.
 """
 
@@ -58,7 +57,7 @@ def tested(kernel: str, core: str, threads: int, more: list[str]) -> bool:
     marked = [
         path
         for path in Path(__file__).parent.rglob("test_*.py")
-        if "mark.numbers" in path.read_text() and (threads == 1 or path.parent.name == "bundled")
+        if "mark.numbers" in path.read_text()
     ]  # the others take long to be collected
     chosen = ["-m", "numbers and quick", "-p", "no:cacheprovider", *map(str, marked)]
     words = ["-m", "pytest", *chosen, *more]
