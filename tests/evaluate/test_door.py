@@ -1,0 +1,332 @@
+"""The door itself, with a stand-in behind it: what is kept, counted, told, limited and believed."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable
+from contextlib import nullcontext
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tyrecal.evaluate import door as door_module
+from tyrecal.evaluate import queue
+from tyrecal.evaluate.cluster import ClusterFailed, _at_worker
+from tyrecal.evaluate.door import Counts, Door, Question
+from tyrecal.evaluate.executor import Here, WorkerLost
+from tyrecal.evaluate.failure import EvaluationFailed
+from tyrecal.evaluate.folders import drop_unfinished
+from tyrecal.evaluate.pressed import pressed
+from tyrecal.evaluate.record import Damaged
+from tyrecal.evaluate.recorded import check
+from tyrecal.evaluate.sources import sources
+from tyrecal.evaluate.store import Store
+
+from ..studies.hertz import Hertz
+from .stand_in import CASE, StandIn, ask, door
+
+Edit = Callable[[dict[str, Any]], Any]
+
+
+def test_a_run_that_went_well_is_kept_where_that_is_asked(tmp_path: Path) -> None:
+    """With a word on what came of it, as those of failures always are."""
+    asked = door(tmp_path)
+    ask(asked)
+    assert not list((tmp_path / "runs").iterdir())
+    asked.keep = True
+    ask(asked, 2e6)
+    (kept,) = (tmp_path / "runs").iterdir()
+    assert (kept / "outcome.txt").read_text() == "finished\n" and (kept / "deck.inp").exists()
+    failing = door(tmp_path, StandIn("unstable"))
+    with pytest.raises(EvaluationFailed):
+        ask(failing, 3e6)
+    (other,) = set((tmp_path / "runs").iterdir()) - {kept}
+    assert (other / "outcome.txt").read_text() == "said: unstable\n"
+    (tmp_path / "runs" / "run-cut-off").mkdir()
+    drop_unfinished(tmp_path / "runs")
+    assert set((tmp_path / "runs").iterdir()) == {kept, other}
+
+
+def test_a_failure_without_a_folder_of_runs_leaves_none() -> None:
+    with pytest.raises(EvaluationFailed) as failure:
+        Door(CASE, _solver=StandIn("crashed")).evaluate(Question({"C10": 1e6}))
+    assert failure.value.folder is None
+
+
+@pytest.mark.parametrize("place", ["here", "gone", "elsewhere", "below", "none", "a NUL"])
+def test_a_record_names_a_folder_of_ours_or_none(tmp_path: Path, place: str) -> None:
+    """Where the failure's run is kept: a folder beside the others, in which an outcome stands."""
+    runs = tmp_path / "runs"
+    at = {"elsewhere": tmp_path / "run-1", "below": runs / "a" / "run-1"}.get(place, runs / "run-1")
+    at.mkdir(parents=True)
+    if place != "gone":
+        (at / "outcome.txt").write_text("failed")
+    named = {"none": None, "a NUL": "a\0b"}.get(place, str(at))
+    assert door(tmp_path)._known(named) == (at if place == "here" else None)
+    assert Door(CASE)._known(str(at)) is None
+
+
+def test_time_limits_grow_with_loads_and_modes(tmp_path: Path) -> None:
+    solver = Hertz()
+    solver.capabilities = solver.capabilities | {"loaded_modes"}  # type: ignore[misc]
+    limits: list[float] = []
+    solver.run = lambda folder, limit: limits.append(limit)  # type: ignore[method-assign]
+    asked = Door(CASE, folder=tmp_path, _solver=solver)
+    one = CASE.case.solver.time_limit_s
+    asked.press({}, [500.0, 900.0])
+    with pytest.raises(EvaluationFailed, match="not 2 modes"):
+        asked.press({}, [500.0, 900.0], modes=2)
+    assert limits == [2 * one, 6 * one]
+    alone = StandIn()
+    alone.run = lambda folder, limit: limits.append(limit)  # type: ignore[method-assign]
+    ask(door(tmp_path, alone))
+    assert limits[2:] == [one]
+
+
+def test_a_record_of_another_pressure_is_not_this_ones(tmp_path: Path) -> None:
+    """To a millionth."""
+    for off, runs in ((0.9e-6, 0), (1.1e-6, 1)):
+        ask(door(tmp_path))
+        again = door(tmp_path)
+        read = again.store.read  # type: ignore[union-attr]
+
+        def changed(key: str, off: float = off, read: Any = read) -> Any:
+            content = read(key)
+            content["answer"]["pressure_Pa"] *= 1 + off
+            return content
+
+        again.store.read = changed  # type: ignore[union-attr, method-assign]
+        ask(again)
+        assert again.counts == Counts(runs, 1 - runs)
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_of_several_questions_each_is_heard_counted_and_may_fail(
+    tmp_path: Path, jobs: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Here, or by workers, one of which dies; a single question needs none."""
+    given: list[tuple[Any, ...]] = []
+
+    class Workers(Here):
+        def each(self, function: Any, tasks: Any) -> Any:
+            for place, task in enumerate(tasks):
+                given.append(task)
+                yield place, WorkerLost("it died") if place == 2 else function(task)
+
+    monkeypatch.setattr(door_module, "executor", lambda *asked: nullcontext(Workers()))
+    told: list[tuple[int, int]] = []
+    asked = replace(door(tmp_path), heard=lambda *done: told.append(done))
+
+    def worker() -> Door:
+        other = Door.worker(asked)
+        other._solver = asked.solver
+        return other
+
+    asked.worker = worker  # type: ignore[method-assign]
+    questions = [Question({"C10": value}) for value in (1e6, 2e6, 3e6)]
+    answers = list(asked.answer_all(questions, jobs))
+    assert told == [(0, 3), (1, 3), (2, 3), (3, 3)]
+    lost = [isinstance(answer, EvaluationFailed) for answer in answers]
+    assert lost == [False, False, jobs == 2] and len(given) == (3 if jobs == 2 else 0)
+    if jobs == 2:
+        assert answers[2].cause == "crashed"  # type: ignore[union-attr]
+    assert asked.counts.runs >= (2 if jobs == 2 else 3)
+    list(asked.answer_all(questions[:1], jobs))
+    assert asked.counts.recorded == 1 and len(given) == (3 if jobs == 2 else 0)
+
+
+def test_a_worker_has_counts_of_its_own_another_case_has_not(tmp_path: Path) -> None:
+    asked = door(tmp_path)
+    asked.keep, asked.command, asked.scheduler = True, ("a",), "tcp://there"
+    other = asked.worker()
+    assert other.counts is not asked.counts and other.folder == asked.folder and other.keep
+    assert other.store is asked.store and other.command == ("a",) and not other.scheduler
+    same = asked.for_case(CASE)
+    assert same.counts is asked.counts and same.heard is asked.heard
+
+
+def footprint(load: float, **changes: Any) -> dict[str, Any]:
+    """What a solver tells of one load, of a patch of two nodes."""
+    two = np.ones(2)
+    told: dict[str, Any] = {
+        "load_N": load, "road_N": load, "rim_N": np.array([load, 0.0, 0.0]), "deflection_m": 0.01,
+        "stiffness_N_per_m": 2e5, "ring": np.array([0, 1]), "node": np.array([0, 2]),
+        "along_m": two, "across_m": two, "pressure_Pa": two, "area_m2": two,
+        "traction_Pa": np.ones((2, 2)), "displacement": np.zeros((4, 3, 3)),
+    }  # fmt: skip
+    return {**told, **changes}
+
+
+def modes_told(count: int, lowest: float = 30.0) -> dict[str, Any]:
+    return {"mode_frequency_Hz": lowest + np.arange(count), "mode_node": np.array([0, 1]),
+            "mode_shape": np.zeros((count, 4, 2, 3))}  # fmt: skip
+
+
+def road(*footprints: dict[str, Any], **changes: Any) -> dict[str, Any]:
+    """A solver's answer of a tyre of 4 rings of 3 nodes."""
+    told = {"pressure_Pa": 240e3, "mass_kg": 12.0, "nodes": np.arange(3), "points": np.ones((3, 2)),
+            "angles": np.arange(4.0), "free_radius_m": 0.3, "footprints": list(footprints),
+            "failure": ""}  # fmt: skip
+    return {**told, **changes}
+
+
+def test_loads_are_those_that_were_asked_for() -> None:
+    """To 1e-9 of themselves, borne to 1 %."""
+    for off, whole in ((0.9e-9, True), (1e-7, False)):
+        if whole:
+            assert pressed(road(footprint(500 * (1 + off))), [500.0], None).failed is None
+        else:
+            with pytest.raises(EvaluationFailed, match="footprints at"):
+                pressed(road(footprint(500 * (1 + off))), [500.0], None)
+    for bears, whole in ((495.5, True), (504.5, True), (494.5, False), (505.5, False)):
+        answer = road(footprint(500.0, road_N=bears))
+        if whole:
+            assert pressed(answer, [500.0], None).footprints[0].road_N == bears
+        else:
+            with pytest.raises(EvaluationFailed, match="the road bears"):
+                pressed(answer, [500.0], None)
+
+
+def test_modes_on_the_road_are_as_many_as_were_asked_for() -> None:
+    asked = lambda told, modes: pressed(road(footprint(500.0, **told)), [500.0], None, modes)
+    assert asked(modes_told(3), 3).footprints[0].mode_frequency_Hz is not None
+    assert asked(modes_told(4), 3) and asked({}, 0)
+    for told in (modes_told(2), modes_told(3, 0.0), modes_told(3, -1.0), {}):
+        with pytest.raises(EvaluationFailed, match="not 3 modes at 500 N"):
+            asked(told, 3)
+
+
+PLAIN: dict[str, tuple[Edit, str]] = {
+    "as it is": (lambda a: None, ""),
+    "no pressure": (lambda a: a.update(pressure_Pa=0.0), ""),
+    "suction": (lambda a: a.update(pressure_Pa=-1.0), "above"),
+    "no mass": (lambda a: a.update(mass_kg=0.0), "above"),
+    "no waves": (lambda a: a["modes"][0].update(n=0), ""),
+    "fewer waves than none": (lambda a: a["modes"][0].update(n=-1), "above"),
+    "half a wave": (lambda a: a["modes"][0].update(n=0.5), "not such a number"),
+    "not even one": (lambda a: a["modes"][0].update(multiplicity=0), "above"),
+    "two members": (lambda a: a["modes"][0].update(members=[1.0, 2.0]), ""),
+    "a member of 0 Hz": (lambda a: a["modes"][0].update(members=[0.0, 2.0]), "above"),
+    "a flat shape": (lambda a: a["modes"][0].update(amplitude=np.ones((3, 2))), "has the shape"),
+    "few points of a shape": (
+        lambda a: a["modes"][0].update(amplitude=np.ones((2, 3))), "not as many points"),
+    "a shape of infinity": (
+        lambda a: a["modes"][0].update(amplitude=np.full((3, 3), np.inf)), "not finite"),
+    "in three dimensions": (lambda a: solid(a), ""),
+    "in three, of other nodes": (lambda a: solid(a, nodes=np.arange(7)), ""),
+    "in three, not measured all over": (
+        lambda a: solid(a, displacement=np.full((3, 3), np.nan)), ""),
+    "in four": (lambda a: solid(a, points=np.ones((3, 4))), "do not go together"),
+    "on a line": (lambda a: solid(a, points=np.ones((3, 1))), "do not go together"),
+    "a section of other nodes": (lambda a: a.update(nodes=np.arange(7)), "do not go together"),
+    "nodes in fractions": (lambda a: a.update(nodes=np.arange(3.0)), "not such a number"),
+    "no inflation": (lambda a: a.update(displacement=np.zeros((0, 3))), ""),
+    "half an inflation": (lambda a: a.update(displacement=np.zeros((2, 3))), "inflation"),
+    "two slopes of a mode": (lambda a: a.update(gradients={"a": [1.0, 2.0]}), "not every mode"),
+}  # fmt: skip
+
+
+def solid(answer: dict[str, Any], displacement: Any = None, **more: Any) -> None:
+    shape = np.ones((3, 3)) if displacement is None else displacement
+    told = {"frequency_Hz": 50.0, "multiplicity": 1, "displacement": shape}
+    answer.update({"modes": [told], "points": np.ones((3, 3)), "gradients": {}, **more})
+
+
+@pytest.mark.parametrize("kind", PLAIN)
+def test_what_a_record_of_modes_may_hold(kind: str, tmp_path: Path) -> None:
+    edit, words = PLAIN[kind]
+    answer = StandIn().read(tmp_path)
+    edit(answer)
+    if words:
+        with pytest.raises(Damaged, match=words):
+            check({"answer": answer})
+    else:
+        check({"answer": answer})
+
+
+PRESSED: dict[str, tuple[dict[str, Any], str]] = {
+    "whole": (road(footprint(500.0)), ""),
+    "with modes": (road(footprint(500.0, **modes_told(2))), ""),
+    "with an area": (road(footprint(500.0, contact_area_m2=0.01)), ""),
+    "of no area": (road(footprint(500.0, contact_area_m2=0.0)), "above"),
+    "of no load": (road(footprint(0.0)), "above"),
+    "none": (road(), "at least 1"),
+    "ended early": (road(footprint(500.0), failure="no", cause="unstable"), ""),
+    "ended otherwise": (road(footprint(500.0), failure="no", cause="timed_out"), "no_equilibrium"),
+    "a free radius of 0": (road(footprint(500.0), free_radius_m=0.0), "above"),
+    "a ring too many": (road(footprint(500.0, ring=np.array([0, 4]))), "not on this tyre"),
+    "a node that is not there": (road(footprint(500.0, node=np.array([0, 3]))), "not on this tyre"),
+    "moved rings too few": (road(footprint(500.0, displacement=np.zeros((3, 3, 3)))), "not on"),
+    "moved nodes too few": (road(footprint(500.0, displacement=np.zeros((4, 2, 3)))), "not on"),
+    "a place too many": (road(footprint(500.0, along_m=np.ones(3))), "lists do not go together"),
+    "tractions too few": (road(footprint(500.0, traction_Pa=np.ones((1, 2)))), "lists do not go"),
+    "an unknown field": (road(footprint(500.0, more=1.0)), "Extra inputs"),
+    "modes without nodes": (
+        road(footprint(500.0, **{**modes_told(2), "mode_node": None})), "a part is missing"),
+    "modes without frequencies": (
+        road(footprint(500.0, **{**modes_told(2), "mode_frequency_Hz": None})), "a part is"),
+    "a shape too few": (
+        road(footprint(500.0, **{**modes_told(2), "mode_shape": np.zeros((1, 4, 2, 3))})),
+        "modes under load do not go"),
+    "a ring of shapes too few": (
+        road(footprint(500.0, **{**modes_told(2), "mode_shape": np.zeros((2, 3, 2, 3))})),
+        "modes under load do not go"),
+    "a node of shapes too many": (
+        road(footprint(500.0, **{**modes_told(2), "mode_shape": np.zeros((2, 4, 3, 3))})),
+        "modes under load do not go"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", PRESSED)
+def test_what_a_record_of_a_road_may_hold(kind: str) -> None:
+    answer, words = PRESSED[kind]
+    if words:
+        with pytest.raises(Damaged, match=words):
+            check({"answer": answer})
+    else:
+        check({"answer": answer})
+
+
+def test_leftovers_of_killed_writers_go_after_an_hour(tmp_path: Path) -> None:
+    store = Store(tmp_path)
+    store.write("ab" * 32, {"solver": "s", "version": "1"}, {"x": 1})
+    for name, age in (("young", 3500.0), ("old", 3700.0)):
+        path = tmp_path / "ab" / f"{name}.partial"
+        path.write_text("half")
+        os.utime(path, times=(time.time() - age,) * 2)
+    assert store.prune() == 0
+    assert sorted(p.suffix for p in tmp_path.glob("*/*")) == [".partial", ".record"]
+    assert (tmp_path / "ab" / "young.partial").exists()
+
+
+@pytest.mark.parametrize(("workers", "cores", "jobs"), [(8, 4, 2), (9, 4, 3), (1, 1, 1)])
+def test_as_many_jobs_as_the_workers_need(
+    workers: int, cores: int, jobs: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """And they are ended, whatever happens."""
+    path = tmp_path / "here.yaml"
+    path.write_text(f"queueing_system: local\nworkers: {workers}\ncores: {cores}\n")
+    done: list[Any] = []
+    cluster = SimpleNamespace(
+        adapt=lambda **bounds: done.append(bounds),
+        scheduler_address="tcp://there",
+        close=lambda: done.append("closed"),
+    )
+    monkeypatch.setattr(queue, "jobs_of", lambda settings: cluster)
+    with pytest.raises(ZeroDivisionError), queue.reached(str(path)) as address:
+        assert address == "tcp://there"
+        1 / 0  # noqa: B018
+    assert done == [{"minimum_jobs": jobs, "maximum_jobs": jobs}, "closed"]
+    with queue.reached("tcp://elsewhere") as address:
+        assert address == "tcp://elsewhere"
+
+
+def test_workers_of_another_edition_are_refused() -> None:
+    assert _at_worker(abs, sources(), -3) == 3
+    with pytest.raises(ClusterFailed, match="another edition"):
+        _at_worker(abs, "0" * 64, -3)
