@@ -22,6 +22,7 @@ from tyrecal.cli.progress import seconds_left
 from ..batch.data import entry, report
 from ..batch.support import poison, vary
 from ..conftest import ROOT
+from .test_after_a_good_fit import contents, unmoved
 from .test_cli import run
 
 SCHEMA = xmlschema.XMLSchema(ROOT / "tests/data/junit.xsd")
@@ -136,6 +137,31 @@ def test_what_changed_is_studied_again(tmp_path: Path) -> None:
     (out / "tyre_00/finished.json").write_text("{}")
     assert batched([case], out, *modes) == 0
     assert "answered" not in facts(out, "tyre_00")
+
+
+def test_a_fit_that_converged_stays(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """One that gives up stands in a folder of its own, and answers a second time, too."""
+    (case,) = vary(tmp_path / "c", 1)
+    out = tmp_path / "out"
+    fit = ["--studies", "fit", "--quiet"]
+    assert batched([case], out, *fit) == 0
+    good = contents(out / "tyre_00")
+    assert set(good) == {"fit.json", "fit.csv", "fit_history.csv"}
+    case.write_text(case.read_text().replace("frequency_Hz: 31.7", "frequency_Hz: 31.8"))
+    for answered in (False, True):
+        with monkeypatch.context() as patch:
+            unmoved(patch)
+            assert batched([case], out, *fit) == 5
+        assert contents(out / "tyre_00") == good
+        ran = json.loads((out / "tyre_00/run.json").read_text())["fit"]
+        assert ran["results"] == "not_converged" and ran["finished"]
+        told = json.loads((out / "tyre_00/not_converged/fit.json").read_text())
+        assert told["moved"] is False
+        assert ("answered" in facts(out, "tyre_00")) == answered
+    (out / "tyre_00/finished.json").unlink()
+    assert batched([case], out, *fit) == 0
+    assert contents(out / "tyre_00") != good
+    assert "results" not in json.loads((out / "tyre_00/run.json").read_text())["fit"]
 
 
 def test_drift_is_said_and_ends_in_5(

@@ -17,7 +17,7 @@ import json
 import os
 import platform
 import time
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
@@ -51,6 +51,7 @@ from ..files import (
 )
 from ..fit.calibrate import NothingToFit
 from ..provenance import provenance
+from ..studies.fitted import NOT_CONVERGED, has_good
 from .studies import Asked, Outcome, Studied, study
 
 FINISHED = "finished.json"  # in a case's folder: what was asked, and the answer
@@ -103,7 +104,7 @@ def run_case(task: CaseTask) -> Report:
     except Exception as error:  # whatever it is, the other cases go on
         with suppress(OSError):
             if task.folder.exists():
-                _write_runs(task, facts, ())
+                _write_runs(task, facts, (), {})
         report["studies"] = dict.fromkeys(task.studies, _entry(_failed(error), task))
     return report
 
@@ -120,11 +121,12 @@ def _studied(
 ) -> tuple[dict[str, Any], list[str]]:
     """Every study's entry in the report, and the names of the result files."""
     own_folder(task.folder)
-    _write_runs(task, facts, ())
+    _write_runs(task, facts, (), {})
     door.store = Store(task.record) if task.record else None
     state = Studied(loaded, door, {"initial": start_values(loaded)}, task.asked)
     entries: dict[str, Any] = {}
     files: list[str] = []
+    aside: dict[str, str] = {}
     facts["seconds"], used = {}, time.process_time()
     for name in task.studies:
         clock = time.monotonic()
@@ -132,11 +134,14 @@ def _studied(
             outcome = study(name, state)
         except Exception as error:  # the other studies go on
             outcome = _failed(error)
+        place = task.folder
+        if outcome.cause == NOT_CONVERGED and has_good(place / "fit.json"):
+            place, aside[name] = own_folder(place / NOT_CONVERGED), NOT_CONVERGED
         for file, text in outcome.files.items():
-            _write_text(task.folder / file, text)
-            files.append(file)
+            _write_text(place / file, text)
+            files.append((place / file).relative_to(task.folder).as_posix())
         if outcome.files:
-            set_aside(task.folder, name, outcome.files)
+            set_aside(place, name, outcome.files)
         entries[name] = _entry(outcome, task)
         facts["seconds"][name] = round(time.monotonic() - clock, 3)
     if door.folder:
@@ -144,14 +149,23 @@ def _studied(
             door.folder.rmdir()
     facts["cpu_seconds"] = round(time.process_time() - used, 3)
     facts.update(solver_runs=door.counts.runs, answered_from_record=door.counts.recorded)
-    _write_runs(task, facts, [name for name in task.studies if entries[name]["status"] in ENDED])
+    ended = [name for name in task.studies if entries[name]["status"] in ENDED]
+    _write_runs(task, facts, ended, aside)
     return entries, files
 
 
-def _write_runs(task: CaseTask, facts: dict[str, Any], ended: Collection[str]) -> None:
-    """The studies' entries in run.json; results of those that have not ended are earlier ones."""
+def _write_runs(
+    task: CaseTask,
+    facts: dict[str, Any],
+    ended: Collection[str],
+    aside: Mapping[str, str],
+) -> None:
+    """The studies' entries in run.json; results of those that have not ended are earlier ones.
+    aside: folders of results that did not take the place of earlier ones, by study."""
     entry = {"case": str(task.path), "command": "batch", **facts}
-    new = {name: {**entry, "finished": name in ended} for name in task.studies}
+    new: dict[str, Any] = {name: {**entry, "finished": name in ended} for name in task.studies}
+    for name, place in aside.items():
+        new[name]["results"] = place
     write_runs(task.folder, new, many_writers=True)
 
 

@@ -21,6 +21,7 @@ from ..files import json_text
 from ..fit.calibrate import calibrate, history_csv
 from ..provenance import provenance, stamped
 from ..report.table import fit_csv, footprint_csv, sweep_csv
+from ..studies.fitted import NOT_CONVERGED
 from ..studies.footprint import footprint_result, press
 from ..studies.modes import modes_result
 from ..studies.pressure import Failure, sweep
@@ -81,7 +82,7 @@ def fit(state: Studied) -> Outcome:
     if result["converged"] and result["moved"]:
         return Outcome(quantities=numbers, files=files)
     words = result["message"] if result["moved"] else "the fit did not move"
-    return Outcome("failed", "not_converged", f"not converged: {words}", numbers, files)
+    return Outcome("failed", NOT_CONVERGED, f"not converged: {words}", numbers, files)
 
 
 def modes(state: Studied) -> Outcome:

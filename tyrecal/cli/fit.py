@@ -13,8 +13,6 @@ from . import complete, options
 from .main import EXIT_FIT
 from .talk import Progress, Talk
 
-NOT_CONVERGED = "not_converged"  # folder of a fit that may not take a better one's place
-
 
 @click.command()
 @options.every(options.case_argument, options.assignments, options.pressure)
@@ -84,7 +82,7 @@ def command(
     from ..fit.problem import Problem, objective_unit
     from ..report.table import fit_csv, fit_table
     from ..report.words import fit_doubts, fit_verdict, tyre_doubts
-    from ..studies.fitted import has_good, is_good
+    from ..studies.fitted import NOT_CONVERGED, has_good, is_good
 
     talk = study.talk
     options.not_both(study.jobs, scheduler)
