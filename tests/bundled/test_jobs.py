@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from functools import cache
 from typing import Any
 
 import numpy as np
 import pytest
+from tyrecal_solvers.bundled.attached import read_attached
 from tyrecal_solvers.bundled.job import Analysis
 from tyrecal_solvers.bundled.keywords import DeckError
 from tyrecal_solvers.bundled.request import Request
@@ -88,6 +90,101 @@ def test_a_pair_that_means_something_else_is_refused(
     with pytest.raises(DeckError) as error:
         run(effects, (old, new))
     assert words in str(error.value)
+
+
+SECTION_ROWS = "*STATIC, LONG TERM, DIRECT\n0.1, 1.0\n*BOUNDARY\n900001, 1, 6\n"
+LAW = "*VISCOELASTIC, FREQUENCY=TABULAR\n"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("STEP=1, INC=10", "STEP=2, INC=10", "ends with STEP=1, INC=10"),
+        ("STEP=1, INC=10", "STEP=1, INC=9", "ends with STEP=1, INC=10"),
+        ("DIRECT\n0.1, 1.0", "DIRECT\n0.3, 1.0", "ends with STEP=1, INC=4"),
+        ("DIRECT\n0.1, 1.0", "DIRECT\n0.1, 1.05", "ends with STEP=1, INC=11"),
+        ("LONG TERM, DIRECT", "LONG TERM", "must be fixed (DIRECT)"),
+        ("360.0, 60", "359.9, 60", "revolved by 360 degrees"),
+        ("360.0, 60", "180.0, 30, 1.0, G\n180.1, 30", "revolved by 360 degrees"),
+        ("0.0, 0.0, 0.0, 0.0, 1.0, 0.0", "0.1, 0.0, 0.0, 0.0, 1.0, 0.0", "about the second axis"),
+        ("0.0, 0.0, 0.0, 0.0, 1.0, 0.0", "0.0, 0.0, 0.0, 0.1, 1.0, 0.0", "about the second axis"),
+        ("0.0, 0.0, 0.0, 0.0, 1.0, 0.0", "0.0, 0.0, 0.0, 0.0, 1.0, 0.1", "about the second axis"),
+        ("0.0, 0.0, 0.0, 0.0, 1.0, 0.0", "0.0, 0.0, 0.0, 0.0, 0.0, 0.0", "about the second axis"),
+        ("0.0, 0.0, 0.0, 0.0, 1.0, 0.0", "0.0, 0.0, 0.0, 0.0, -1.0, 0.0", "about the second axis"),
+        (SECTION_ROWS, f"*FREQUENCY\n3\n{SECTION_ROWS[41:]}".replace("0.1, 1.0\n", ""), "one step"),
+        ("INFLATE, NLGEOM=YES", "INFLATE", "needs NLGEOM=YES"),
+        ("INFLATE, NLGEOM=YES", "INFLATE, NLGEOM=YES, PERTURBATION", "no linear PERTURBATION"),
+        ("CAVITY, P, 160000\n*END STEP\n*STEP", "CAVITY, HP, 160000\n*END STEP\n*STEP", "only P"),
+        ("900001, 1, 6\n*DSLOAD\nCAVITY, P, 160000\n*END STEP\n*STEP",
+         "900001, 1, 5\n*DSLOAD\nCAVITY, P, 160000\n*END STEP\n*STEP", "must be held in 1, 6"),
+        ("*VISCOELASTIC, TIME=PRONY\n0.3, 0, 0.1\n", f"{LAW}0., 0.3, 0., 0., 10.\n", "two rows"),
+        ("*VISCOELASTIC, TIME=PRONY\n0.3, 0, 0.1\n",
+         f"{LAW}0., 0.3, 0., 0., 10.\n0., 0.2, 0., 0., 10.\n", "their frequencies rise"),
+        ("*VISCOELASTIC, TIME=PRONY\n0.3, 0, 0.1\n",
+         f"{LAW}0., 0.3, 0., 0., 0.\n0., 0.2, 0., 0., 10.\n", "their frequencies rise"),
+        ("*VISCOELASTIC, TIME=PRONY\n0.3, 0, 0.1\n",
+         f"{LAW}0., 1.0, 0., 0., 1.\n0., 0.2, 0., 0., 10.\n", "are positive"),
+        ("*VISCOELASTIC, TIME=PRONY\n0.3, 0, 0.1\n",
+         f"{LAW}0., 0.3, 0., 0.1, 1.\n0., 0.2, 0., 0., 10.\n", "the bulk modulus stays"),
+        ("0.3, 0, 0.1\n", "0.3, 0, 0.1, 0.2\n", "a term of a Prony series is g, k and tau"),
+    ],
+)  # fmt: skip
+def test_what_a_transfer_or_a_table_may_not_be(old: str, new: str, words: str) -> None:
+    """Read alone, without a solution: what stands there would mean another state."""
+    with pytest.raises(DeckError, match=re.escape(words)):
+        run(PLAIN, (old, new))
+
+
+def test_increments_are_counted_whole() -> None:
+    """A tenth ten times is ten increments, whatever rounding says; of 0.3 there are four."""
+    for increment, count in ((0.1, 10), (0.3, 4), (0.5, 2), (1.0, 1), (0.07, 15)):
+        pair = dict(texts(PLAIN))
+        pair["inflate"] = pair["inflate"].replace("DIRECT\n0.1,", f"DIRECT\n{increment},")
+        pair["modes"] = pair["modes"].replace("INC=10", f"INC={count}")
+        _, _, steps = Deck(pair, "modes", "inflate").read([])
+        assert [step.procedure.name for step in steps] == ["STATIC", "STATIC", "FREQUENCY"]
+        assert [step.revolved for step in steps] == [False, True, True]
+        assert steps[0].long_term and steps[0].pressure == 160000.0
+        assert [step.output for step in steps] == ["", "", "CROWN"]
+
+
+def test_a_revolve_job_alone_is_refused() -> None:
+    pair = dict(texts(PLAIN))
+    with pytest.raises(DeckError, match="name that with --oldjob"):
+        Deck({"modes": pair["modes"]}, "modes", None)
+
+
+def test_masses_and_springs_stand_in_their_components() -> None:
+    """A mass in all three; springs along 1, 2 and 3 radially, along the axle, round it; two on one
+    node add up; the mean over a sector of one of 60."""
+    pair = dict(texts(MASS))
+    springs = (
+        "*ELEMENT, TYPE=SPRING1, ELSET=K{0}\n99910001{0}, {1}\n*SPRING, ELSET=K{0}\n{0}\n{2}\n"
+    )
+    more = "".join(
+        springs.format(i, n, k) for i, n, k in ((1, 21009, 1e3), (2, 21009, 2e3), (3, 19009, 3e3))
+    )
+    pair["modes"] = pair["modes"].replace("*STEP, NAME=EQ", more + "*STEP, NAME=EQ")
+    deck = Deck(pair, "modes", "inflate")
+    model = Analysis(deck, Request()).model
+    _, revolve, _ = deck.read([])
+    found = read_attached(revolve, model.mesh)
+    at = {(int(r), int(c)): (m, k) for r, c, m, k in
+          zip(found.rows, found.components, found.mass, found.stiffness, strict=True)}  # fmt: skip
+    one, other = model.mesh.index[21009], model.mesh.index[19009]
+    assert at == {(one, 0): (0.1, 1e3), (one, 1): (0.1, 0.0), (one, 2): (0.1, 2e3),
+                  (other, 1): (0.0, 3e3)}  # fmt: skip
+    assert found.total_kg == pytest.approx(0.1) and found.sectors == found.highest == 60
+    angle = np.linspace(-np.pi / 60, np.pi / 60, 2001)
+    for n in (0, 1, 7):
+        assert found.share(n) == pytest.approx(np.mean(np.cos(n * angle)), rel=1e-3)
+    for n in (0, 1):
+        assert found.share(n) == pytest.approx(np.trapezoid(np.cos(n * angle), angle) * 30 / np.pi)
+    bad = springs.format(4, 21009, 1e3)
+    pair["modes"] = pair["modes"].replace("*STEP, NAME=EQ", bad + "*STEP, NAME=EQ")
+    _, revolve, _ = Deck(pair, "modes", "inflate").read([])
+    with pytest.raises(DeckError, match="a spring acts along 1, 2 or 3, got 4"):
+        read_attached(revolve, model.mesh)
 
 
 def crown_held(rows: str) -> StepResult:
