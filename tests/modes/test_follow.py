@@ -65,3 +65,13 @@ def test_a_mode_without_a_partner_ends():
     before = [mode(Label(2, 0), a), mode(Label(2, 1), b), mode(Label(4, 0), shape(4))]
     (step,) = follow(before, [mode(Label(2, 3), b)])
     assert (step.before, step.after) == (Label(2, 1), Label(2, 3))
+
+
+def test_rings_are_told_apart_to_ten_micrometres():
+    """Points that were measured a micrometre off their ring are of it."""
+    ring = on_rings(shape(2), NODES, ANGLES)
+    near = ring.points + 1e-6 * RNG.choice([-1, 1], ring.points.shape) * [1, 0, 1]
+    assert len(harmonic_of(type(ring)(near, ring.displacement), 2).points) == 4
+    apart = ring.points.copy()
+    apart[: len(ANGLES) // 2, 0] += 3e-5
+    assert len(harmonic_of(type(ring)(apart, ring.displacement), 2).points) == 5

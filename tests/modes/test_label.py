@@ -247,3 +247,66 @@ def test_labels_cost_little():
         label_modes(modes)
         best = min(best, time.process_time() - start)
     assert best < 2e-3
+
+
+def weights_for(share):
+    """Of the orders 0 and 1, so that the first has that share of the belt's energy."""
+    low, high = 0.0, 1.0
+    for _ in range(60):
+        middle = (low + high) / 2
+        part = belt_motion(shape(3, [ORDERS[0], ORDERS[1]], (middle, 1 - middle))).shares[0]
+        low, high = (middle, high) if part < share else (low, middle)
+    return low, 1 - low
+
+
+@pytest.mark.parametrize("share, label", [(0.19, Label(3, 3)), (0.21, Label(3, 0))])
+def test_an_order_is_claimed_with_a_fifth_of_the_motion(share, label):
+    """The other one is taken by a lower mode; with less it is an overtone of that."""
+    lower, upper = (
+        mode(50.0, 3, [ORDERS[1]]),
+        mode(60.0, 3, [ORDERS[0], ORDERS[1]], weights_for(share)),
+    )
+    assert labels([lower, upper]) == [Label(3, 1), label]
+
+
+@pytest.mark.parametrize("part, label", [(0.09, Label(3, 2)), (0.11, Label(3, 0))])
+def test_an_order_is_claimed_with_a_tenth_of_the_belts_part(part, label):
+    """Of the mean square motion; below that a mode of the sidewalls claims nothing."""
+    belt = POINTS[:, 0] > 0.94 * POINTS[:, 0].max()
+    u = np.where(belt[:, None], [1.0, 0.6j, 0.0], 0.0)
+    u[~belt, 2] = np.sqrt(1.36 * (1 / part - belt.mean()) / (1 - belt.mean()))
+    made = HarmonicShape(3, NODES, POINTS, u)
+    assert belt_motion(made).participation == pytest.approx(part)
+    assert labels([RawMode(50.0, made, 2)]) == [label]
+
+
+def test_halves_are_joined_to_half_a_per_cent():
+    a, b = rings(shape(2, [ORDERS[0]]), generator(0))
+    for split, count in ((0.0049, 1), (0.0051, 2)):
+        assert len(pair_rings([RawMode(80.0, a, 1), RawMode(80.0 * (1 + split), b, 1)])) == count
+
+
+def test_harmonics_are_looked_for_up_to_twelve():
+    angles = np.arange(40) / 40 * 2 * np.pi
+    for c, found in ((11, 11), (12, 12)):
+        half = rings(shape(c, [ORDERS[0]]), generator(0), angles=angles)[0]
+        assert belt_motion(half).c == found
+    beyond = rings(shape(13, [ORDERS[0]]), generator(0), angles=angles)[0]
+    assert belt_motion(beyond).c <= 12
+
+
+def test_clarity_is_the_lead_over_the_next_order():
+    weights = weights_for(0.7)
+    (found,) = label_modes([mode(50.0, 3, [ORDERS[0], ORDERS[1]], weights)])
+    shares = sorted(belt_motion(shape(3, [ORDERS[0], ORDERS[1]], weights)).shares)
+    assert found.label == Label(3, 0) and found.clarity == pytest.approx(shares[-1] - shares[-2])
+
+
+def test_the_next_free_overtone_of_its_parity_is_taken():
+    """Without waves odd ones from 1, even ones from 2; with waves from 2 and 3."""
+    many = [mode(50.0 + i, 0, [{"r": [0, 1.0]}]) for i in range(3)]
+    assert labels(many) == [Label(0, 1), Label(0, 3), Label(0, 5)]
+    many = [mode(50.0 + i, 0, [{"t": [1.0]}]) for i in range(3)]
+    assert labels(many) == [TORSIONAL, Label(0, 2), Label(0, 4)]
+    many = [mode(50.0 + i, 2, [ORDERS[m]]) for i, m in enumerate((0, 0, 0, 1, 1))]
+    assert labels(many) == [Label(2, 0), Label(2, 2), Label(2, 4), Label(2, 1), Label(2, 3)]
