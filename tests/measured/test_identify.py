@@ -137,3 +137,66 @@ def test_the_lines_at_both_ends_belong_to_the_band(monkeypatch: pytest.MonkeyPat
         assert asked == {order}
         fitted = np.isfinite(found.fitted[0])
         np.testing.assert_array_equal(fitted, (F[8] <= F) & (high >= F))
+
+
+def orders(*lines: tuple[float, float, range], count: int = 30) -> list[np.ndarray]:
+    """Poles of the orders 1 to ``count``: of each line its frequency and damping, and in which of
+    the upper two thirds of the orders it is seen."""
+    return [
+        np.array([module._pole(np.array(f), np.array(z)) for f, z, seen in lines if j - 10 in seen])
+        for j in range(count)
+    ]
+
+
+ALWAYS = range(20)
+
+
+def hertz_of(poles: list[np.ndarray], low: float = 20.0, high: float = 130.0) -> list[float]:
+    return [float(f) for f, _, _ in module._modes(poles, low, high)]
+
+
+def test_a_mode_is_seen_in_two_fifths_of_the_orders() -> None:
+    """Each time beside its like one order below: the first sight of it is none."""
+    assert hertz_of(orders((80.0, 0.02, range(9)))) == pytest.approx([80.0])
+    assert hertz_of(orders((80.0, 0.02, range(8)))) == []
+    assert hertz_of(orders((80.0, 0.02, ALWAYS), (50.0, 0.02, ALWAYS))) == pytest.approx([50, 80])
+
+
+def test_a_tyres_mode_has_damping_in_the_band_and_decays() -> None:
+    for damping, seen in ((0.0019, 0), (0.0021, 1), (0.199, 1), (0.201, 0), (-0.02, 0)):
+        assert len(hertz_of(orders((80.0, damping, ALWAYS)))) == seen
+    for low, high, seen in ((80.0, 130.0, 1), (20.0, 80.0, 1), (80.1, 130.0, 0), (20.0, 79.9, 0)):
+        assert len(hertz_of(orders((80.0, 0.02, ALWAYS)), low - 1e-9, high + 1e-9)) == seen
+    mirrored = [each.conj() for each in orders((80.0, 0.02, ALWAYS))]
+    assert hertz_of(mirrored) == []
+
+
+def test_a_pole_comes_again_within_a_hundredth_and_a_fifth_of_its_damping() -> None:
+    """From one order to the next; those that wander farther are none."""
+    for ratio, change, seen in ((1.009, 1.0, 1), (1.011, 1.0, 0), (1.0, 1.19, 1), (1.0, 1.27, 0)):
+        even, odd = range(0, 20, 2), range(1, 20, 2)
+        poles = orders((80.0, 0.02, even), (80.0 * ratio, 0.02 * change, odd))
+        assert len(hertz_of(poles)) == seen
+
+
+def test_poles_within_a_hundredth_are_one_mode_with_their_median_and_spread() -> None:
+    """The spread over the orders is 1.48 times the median deviation."""
+    drift = [(80.0 * (1 + 1e-4 * j), 0.02, range(j, j + 1)) for j in range(20)]
+    ((f, z, spread),) = module._modes(orders(*drift), 20.0, 130.0)
+    assert f == pytest.approx(80.0 * (1 + 1e-4 * 10)) and z == pytest.approx(0.02)
+    assert spread == pytest.approx(1.4826 * 80.0 * 1e-4 * 5)
+    near = orders((80.0, 0.02, ALWAYS), (80.79, 0.02, ALWAYS))
+    apart = orders((80.0, 0.02, ALWAYS), (80.9, 0.02, ALWAYS))
+    assert len(hertz_of(near)) == 1 and len(hertz_of(apart)) == 2
+
+
+def test_the_jackknifes_deviation_by_its_formula() -> None:
+    """(g - 1) / g times the sum of squares, of the groups that saw the mode within 2 %; of two
+    groups it says nothing."""
+    again = [np.array([[f, 0.02, 0.0], [50.0, 0.02, 0.0]]) for f in (79.9, 80.1, 80.3, 81.7, 79.7)]
+    (found, other) = module._jackknife(again, np.array([80.0, 60.0]))
+    kept = np.array([79.9, 80.1, 80.3, 79.7])
+    assert found == pytest.approx(np.sqrt(3 / 4 * np.sum((kept - kept.mean()) ** 2)))
+    assert np.isnan(other)
+    assert np.isnan(module._jackknife(again[:2], np.array([80.0]))).all()
+    assert np.isfinite(module._jackknife(again[:3], np.array([80.0]))).all()
