@@ -7,8 +7,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tyrecal_solvers.bundled.__main__ import main
-from tyrecal_solvers.bundled.request import Request, read_request
+from tyrecal_solvers.bundled.__main__ import _words, main
+from tyrecal_solvers.bundled.harmonics import Unstable
+from tyrecal_solvers.bundled.job import TimedOut
+from tyrecal_solvers.bundled.keywords import DeckError
+from tyrecal_solvers.bundled.request import BadRequest, Request, read_request
 
 from tyrecal.case import load_case, with_level
 from tyrecal.deck.write import Decks
@@ -84,6 +87,94 @@ def test_a_wrong_request_is_one_sentence(
     said = told(folder, request_, capsys)
     assert words in said
     assert said.startswith(("error: modes.request.json: ", "error: inflate.inp, ", "error: deck"))
+
+
+@pytest.mark.parametrize(
+    ("request_", "fine"),
+    [
+        ({"harmonics": [0, 999]}, True),
+        ({"harmonics": [1000]}, False),
+        ({"harmonics": None}, True),
+        ({"modes_per_harmonic": 1}, True),
+        ({"modes_per_harmonic": 999}, True),
+        ({"modes_per_harmonic": 1000}, False),
+        ({"sensitivities": {"A": [["modes", 1, 0, 0]]}}, True),
+        ({"sensitivities": {"A": [["modes", 0, 0, 0]]}}, False),
+        ({"sensitivities": {"A": [["modes", 1, 0, -1e300]]}}, True),
+        ({"sensitivities": {"A": [["modes", 1, 0, 1.1e300]]}}, False),
+        ({"sensitivities": {"A": [["modes", 1, 0, True]]}}, False),
+        ({"sensitivities": {"A": [["modes", 1, 0, 1.0, 1.0]]}}, False),
+        ({"own_frequency": True}, True),
+        ({"cavity": None}, True),
+        ({"cavity": {"material": "AIR", "surfaces": ["A", "B"]}}, True),
+        ({"cavity": {"material": "AIR", "surfaces": []}}, False),
+        ({"cavity": {"material": "AIR", "surfaces": ["A"], "more": 1}}, False),
+        ({"cavity": {"material": "", "surfaces": ["A"]}}, False),
+        ({"sector": None}, True),
+        ({"sector": {"job": "other", "width_deg": 360}}, True),
+        ({"sector": {"job": "other", "width_deg": 1e-9}}, True),
+        ({"sector": {"job": "other", "width_deg": 0}}, False),
+        ({"sector": {"job": "other", "width_deg": 360.1}}, False),
+    ],
+)
+def test_requests_at_their_limits(tmp_path: Path, request_: dict[str, Any], fine: bool) -> None:
+    (tmp_path / "other.inp").write_text("*HEADING\n")
+    path = tmp_path / "modes.request.json"
+    path.write_text(json.dumps(request_))
+    if fine:
+        found = read_request(path, ["modes"])
+        assert all(getattr(found, key) == value for key, value in request_.items())
+    else:
+        with pytest.raises(BadRequest):
+            read_request(path, ["modes"])
+
+
+def test_rows_may_be_of_the_sectors_job(tmp_path: Path) -> None:
+    (tmp_path / "other.inp").write_text("*HEADING\n")
+    path = tmp_path / "modes.request.json"
+    for sector, fine in (({"job": "other", "width_deg": 9}, True), (None, False)):
+        rows = {"A": [["other", 1, 0, 1.0]]}
+        path.write_text(json.dumps({"sector": sector, "sensitivities": rows}))
+        if fine:
+            assert read_request(path, ["modes"]).sensitivities == rows
+        else:
+            with pytest.raises(BadRequest, match="must be a job: modes"):
+                read_request(path, ["modes"])
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "words"),
+    [
+        (TimedOut("later\x1b[31m"), 3, "failed: later [31m\n"),
+        (Unstable("soft"), 3, "failed: soft\n"),
+        (DeckError(3, "wrong"), 2, "error: deck, line 3: wrong\n"),
+        (OSError("no\ndisc"), 2, "error: no disc\n"),
+    ],
+)
+def test_how_the_command_ends(
+    error: Exception, code: int, words: str, folder: Path,
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    def run(*_: object) -> None:
+        raise error
+
+    monkeypatch.setattr("tyrecal_solvers.bundled.__main__.run", run)
+    assert main([str(folder / "modes")]) == code
+    assert capsys.readouterr().err == words
+
+
+def test_words_of_steps_and_footprints() -> None:
+    mode = lambda n, f: {"n": n, "frequency_Hz": f}
+    step = {"step": 2, "pressure_Pa": 240e3, "mass_kg": 12.804,
+            "modes": [mode(2, 73.116), mode(0, 36.7), mode(2, 88.2)]}  # fmt: skip
+    pressed = {"load_N": 4000.0, "deflection_m": 0.020344, "contact_area_m2": 0.018216}
+    assert _words({"steps": [step]}) == [
+        "step 2: 240 kPa, 12.80 kg", "  harmonic 0: 36.70 Hz", "  harmonic 2: 73.12, 88.20 Hz",
+    ]  # fmt: skip
+    assert _words({"footprints": [pressed], "failure": "no more"}) == [
+        "4000 N: deflection 20.34 mm, contact area 182.2 cm2", "no more",
+    ]  # fmt: skip
+    assert _words({"footprints": [], "failure": ""}) == []
 
 
 def test_a_request_that_is_no_file(tmp_path: Path) -> None:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from tyrecal_solvers.bundled.circumference import Circumference, half_circle
 from tyrecal_solvers.bundled.gmres import gmres
+from tyrecal_solvers.bundled.keywords import DeckError, read_keywords
+from tyrecal_solvers.bundled.press_job import read_road
 from tyrecal_solvers.bundled.road import Contact, Road
 
 from . import support
@@ -261,3 +264,77 @@ def test_gmres_ends_where_it_is_told(random: np.random.Generator) -> None:
     np.testing.assert_allclose(x, b / 3)
     few = np.where(np.arange(40) % 2, 2.0, 5.0)  # two different eigenvalues: two iterations
     assert gmres(lambda v: few * v, identity, random.normal(size=40), 1e-10, 20)[1] == 2
+
+
+ROAD = """*SYMMETRIC MODEL GENERATION, REVOLVE
+0., 0., 0., 0., 1., 0.
+1., 0., 0.
+90., 2, 1., C
+90., 1, 1., C
+90., 1, 1., C
+90., 2, 1., C
+*RIGID BODY, REF NODE=900002, ANALYTICAL SURFACE=ROAD
+*SURFACE, NAME=ROAD, TYPE=CYLINDER
+0.4, 0., 0., 0.4, 1., 0.
+0.4, 0., -1.
+START, -1., 0.
+LINE, 1., 0.
+*SURFACE INTERACTION, NAME=GRIP
+*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR
+1E10
+*FRICTION, ELASTIC SLIP=1E-6
+0.5
+*CONTACT PAIR, INTERACTION=GRIP, TYPE=NODE TO SURFACE
+TREAD, ROAD
+"""
+
+
+def test_a_road_is_read() -> None:
+    data = read_road(read_keywords(ROAD))
+    assert data and (data.node, data.tread) == ("900002", "TREAD")
+    assert (data.stiffness, data.friction, data.elastic_slip) == (1e10, 0.5, 1e-6)
+    assert np.degrees(data.lengths) == pytest.approx([45, 45, 90])
+    assert read_road(read_keywords(ROAD[: ROAD.index("*CONTACT PAIR")])) is None
+    smooth = read_road(read_keywords(ROAD.replace("1E-6\n0.5", "1E-6\n0.")))
+    assert smooth and smooth.friction == 0.0
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("TREAD, ROAD\n", "TREAD, ROAD\n*CONTACT PAIR\nTREAD, ROAD\n", "one *CONTACT PAIR"),
+        ("SURFACE=ROAD", "SURFACE=RODE", "ROAD is no analytical surface"),
+        ("*SURFACE, NAME=ROAD", "*SURFACE, NAME=RODE", "ROAD is no analytical surface"),
+        ("*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR\n1E10\n", "", "needs a *SURFACE BEH"),
+        ("*FRICTION, ELASTIC SLIP=1E-6\n0.5\n", "", "and a *FRICTION"),
+        ("1E10", "0.", "stiffness must be positive"),
+        ("0.5\n", "-0.1\n", "friction not negative"),
+        ("SLIP=1E-6", "SLIP=0.9E-6", "elastic slip at least 1e-06 m"),
+        (", ELASTIC SLIP=1E-6", "", "elastic slip at least"),
+        ("TYPE=CYLINDER", "TYPE=REVOLUTION", "of TYPE=CYLINDER"),
+        ("LINE, 1., 0.\n", "LINE, 1., 0.\nLINE, 2., 0.\n", "of TYPE=CYLINDER"),
+        ("0.4, 0., 0., 0.4", "0.4, 0., 0., 0.3", "only a flat road"),
+        ("0.4, 1., 0.", "0.4, 1., 0.1", "only a flat road"),
+        ("0.4, 0., -1.", "0.4, 0., 1.", "only a flat road"),
+        ("0.4, 0., 0., 0.4, 1., 0.\n0.4,", "-0.4, 0., 0., -0.4, 1., 0.\n-0.4,", "only a flat"),
+        ("START, -1., 0.", "LINE, -1., 0.", "only a flat road"),
+        ("START, -1., 0.", "START, -1., 0.1", "only a flat road"),
+        ("LINE, 1., 0.", "LINE, 1., 0.1", "only a flat road"),
+        ("LINE, 1., 0.", "CIRCL, 1., 0.", "only a flat road"),
+        ("90., 2, 1., C\n*", "90., 2, 1.1, C\n*", "bias"),
+        ("90., 2, 1., C\n*", "90., 1, 1., C\n*", "mirror at 180 degrees"),
+        ("90., 2, 1., C\n*", "90., 3, 1., C\n*", "mirror at 180 degrees"),
+        ("90., 2, 1., C\n90., 1, 1., C\n90., 1, 1., C\n90., 2, 1., C\n", "360., 2, 1., C\n",
+         "four elements"),
+    ],
+)  # fmt: skip
+def test_roads_that_mean_something_else(old: str, new: str, words: str) -> None:
+    assert ROAD.count(old) == 1
+    with pytest.raises(DeckError, match=re.escape(words)):
+        read_road(read_keywords(ROAD.replace(old, new)))
+
+
+def test_four_elements_are_enough() -> None:
+    some = ROAD.replace("90., 2, 1., C", "90., 1, 1., C")
+    data = read_road(read_keywords(some))
+    assert data and np.degrees(data.lengths) == pytest.approx([90, 90])
