@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import re
+import time
 from functools import cache
 from typing import Any
 
 import numpy as np
 import pytest
 from tyrecal_solvers.bundled.attached import read_attached
-from tyrecal_solvers.bundled.job import Analysis
+from tyrecal_solvers.bundled.job import Analysis, TimedOut
 from tyrecal_solvers.bundled.keywords import DeckError
 from tyrecal_solvers.bundled.request import Request
 from tyrecal_solvers.bundled.results import StepResult
@@ -185,6 +186,27 @@ def test_masses_and_springs_stand_in_their_components() -> None:
     _, revolve, _ = Deck(pair, "modes", "inflate").read([])
     with pytest.raises(DeckError, match="a spring acts along 1, 2 or 3, got 4"):
         read_attached(revolve, model.mesh)
+
+
+def test_the_mass_is_the_sections_and_what_is_attached() -> None:
+    """Volume by Pappus's rule times density, the plies' thickness being none, and 0.1 kg."""
+    plain, more = (Analysis(Deck(texts(e), "modes", "inflate"), Request()) for e in (PLAIN, MASS))
+    rubber = sum((r.solids.mass_weights.sum(1) * r.density).sum() for r in plain.model.rubbers)
+    cords = sum((c.lines.weights * c.lines.R * c.mass).sum() for c in plain.model.cords)
+    assert plain.mass_kg == pytest.approx(2 * np.pi * (rubber + cords), rel=1e-9)
+    assert 10 < plain.mass_kg < 16
+    assert more.mass_kg - plain.mass_kg == pytest.approx(0.1)
+
+
+def test_a_job_without_a_frequency_step_ends_with_its_static_state() -> None:
+    """And one whose time has passed does not begin."""
+    text = texts(PLAIN)["inflate"]
+    (found,) = Analysis(Deck({"inflate": text}, "inflate", None), Request()).run()
+    assert (found.step, found.pressure_Pa, found.modes) == (1, 160000.0, [])
+    assert 1e-4 < abs(found.U).max() < 0.02 and found.factorisations > 1
+    late = Analysis(Deck({"inflate": text}, "inflate", None), Request(), time.monotonic() - 1e-3)
+    with pytest.raises(TimedOut, match="the time limit passed"):
+        late.run()
 
 
 def crown_held(rows: str) -> StepResult:
