@@ -2,7 +2,8 @@
 
     python -m tests.kernels [pytest's arguments]
 
-Each kernel with one thread and with two; as many runs at a time as there are cores. A kernel that the processor cannot run, or for which the libraries have another's, is said.
+Each kernel with one thread and with two; as many runs at a time as there are cores. A kernel that
+the processor cannot run, or for which the libraries have another's, is said.
 Exits with 1 where a run failed.
 """
 
