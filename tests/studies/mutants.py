@@ -12,8 +12,9 @@ imported and collected everything, with the changed function's code exchanged; w
 import, and tests that start processes, need a mutated copy.
 
 Every mutant is a line of mutants.jsonl; where that has the commit, seed and number already, `run`
-goes on behind; with a larger budget those that survived a smaller one meet more tests, and their
-last line counts. What survived is judged by hand: the keys `verdict` and `because` of its line.
+goes on behind; with a larger budget those that survived a smaller one meet more tests, with --slow
+those too that are not quick, as far as `cover` knows them, and their last line counts. What
+survived is judged by hand: the keys `verdict` and `because` of its line.
 """
 
 from __future__ import annotations
@@ -62,6 +63,7 @@ PROCESSES = {  # tests whose work happens in processes that `cover` does not see
     "tyrecal/evaluate/queue": ["tests/evaluate/test_queue.py"],
 }
 QUICK = "not (slow or guide or ccx or browser or cluster or lint)"
+SLOW = QUICK.replace("slow or ", "")
 STEPS_S = (0.1, 0.5, 2.0)  # of processor time, between cheap tests and dear ones
 UNKNOWN_S = 0.7  # of a test that `cover` has not met
 LONGEST_S = 600.0  # the clock's; a busy machine is slow
@@ -207,8 +209,12 @@ class Runner:
         data = self.imports.get_data()
         self.imported = {str(Path(file).resolve().relative_to(self.tree.resolve())):
                          set(data.lines(file) or ()) for file in data.measured_files()}  # fmt: skip
-        self.items = {item.nodeid: item for item in session.items}
         cover = Cover(self.tree)
+        self.items = {
+            item.nodeid: item
+            for item in session.items
+            if item.nodeid in cover.seconds or not item.get_closest_marker("slow")
+        }
         self.functions = functions(OURS)
         gc.collect()
         gc.freeze()  # forks share what nobody touches
@@ -394,6 +400,7 @@ def main() -> int:
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--only", default="", help="numbers of mutants")
     parser.add_argument("--budget", type=float, default=60.0, help="processor time of one, s")
+    parser.add_argument("--slow", action="store_true", help="tests that are not quick, too")
     parser.add_argument("--record", type=Path, default=RECORD)
     parser.add_argument("--commit", default="HEAD")
     given = parser.parse_args()
@@ -414,7 +421,8 @@ def main() -> int:
     runner = Runner(given, tree.parent.name, tree)
     enter(tree)
     runner.imports.start()
-    return int(pytest.main([*OPTIONS, "-m", QUICK, *given.tests], [runner]))
+    marks = SLOW if given.slow else QUICK
+    return int(pytest.main([*OPTIONS, "-m", marks, *given.tests], [runner]))
 
 
 if __name__ == "__main__":
