@@ -19,8 +19,9 @@ def snapshot(folder: Path) -> dict[str, bytes]:
 def test_a_wrong_case(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = bad_cases.write(name, tmp_path)
     before, here = snapshot(tmp_path), set(os.listdir())  # noqa: PTH208
-    for command in (["validate", str(path)], ["fit", str(path)], ["modes", str(path)]):
-        assert run(*command) == 2
+    study = ("fit", "modes")[sorted(bad_cases.BAD).index(name) % 2]  # both read as any study does
+    for command in ("validate", study):
+        assert run(command, str(path)) == 2
         printed = capsys.readouterr()
         assert printed.out == ""
         lines = printed.err.splitlines()
