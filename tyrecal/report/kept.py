@@ -23,7 +23,6 @@ from .section import outline, turns
 
 Array = np.ndarray
 DIGITS = 6  # of a shape, over its largest component
-MARGIN = 25e-3  # m round a patch that is kept with it
 
 
 def tyre_data(case: LoadedCase, evaluation: Evaluation, modes: Sequence[Mode]) -> dict[str, Any]:
@@ -132,7 +131,7 @@ def patches_data(
     for design, pressed in designs.items():
         for footprint in pressed.footprints:
             patch = patch_of(pressed, footprint, meshes[design])
-            near = _grown(patch.touches, patch.along, patch.across)
+            near = _grown(patch.touches)
             patches.append({
                 "design": design,
                 "load_N": footprint.load_N,
@@ -143,17 +142,12 @@ def patches_data(
     return {"format": 1, "case": name, "patches": patches}
 
 
-def _grown(touches: Array, along: Array, across: Array) -> tuple[slice, slice]:
-    """Rows and columns of the rectangle within MARGIN of what touches."""
-    rings, nodes = np.flatnonzero(touches.any(1)), np.flatnonzero(touches.any(0))
-    middle = along[:, along.shape[1] // 2]
-    line = across[across.shape[0] // 2]
-    rings = np.flatnonzero(
-        (abs(middle) < abs(along[touches]).max() + MARGIN)
-        & (abs(np.arange(len(middle)) - rings.mean()) <= np.ptp(rings) / 2 + 5)
-    )
-    nodes = np.flatnonzero(abs(line) < abs(across[touches]).max() + MARGIN)
-    return slice(rings[0], rings[-1] + 1), slice(nodes[0], nodes[-1] + 1)
+def _grown(touches: Array) -> tuple[slice, slice]:
+    """Rows and columns of what touches and of the next beside it, which bear nothing: between them
+    contours close."""
+    found = [np.flatnonzero(touches.any(axis)) for axis in (1, 0)]
+    rings, nodes = (slice(max(0, each[0] - 1), each[-1] + 2) for each in found)
+    return rings, nodes
 
 
 def _amplitude(mode: Mode, nodes: Array) -> dict[str, Any]:
