@@ -15,13 +15,16 @@ from tyrecal.evaluate.door import Door, Question
 from tyrecal.evaluate.results import Evaluation
 from tyrecal.modes.label import label_modes
 from tyrecal.modes.mode import Label, Mode
-from tyrecal.report import convergence, shapes
+from tyrecal.report import convergence, section, shapes
 from tyrecal.report.convergence import draw_convergence
 from tyrecal.report.section import draw_section
 from tyrecal.report.shapes import draw_mode, draw_modes_overview, title
 from tyrecal.tyre.mesh import SectionMesh, build_mesh
 
 from ..conftest import CASES
+from .watched import watched
+
+LINE = 40  # pixels: a line of text and its distance
 
 
 @dataclass
@@ -113,19 +116,35 @@ def test_title(tyre):
     assert title(mode) == "[2,1] 66.1 Hz: first out-of-plane bending"
 
 
-def test_section(tyre, tmp_path):
+def test_section(tyre, tmp_path, monkeypatch, written):
+    """As high as its content: nothing between the drawing, its title and its legend but a line."""
+    figures = watched(section, monkeypatch)
     inflation = dict(zip(tyre.evaluation.nodes, tyre.evaluation.displacement, strict=True))
     draw_section(tmp_path / "inflated.png", tyre.case, tyre.mesh, inflation)
+    long = replace(tyre.case, case=tyre.case.case.model_copy(update={"name": "A tyre " * 30}))
+    draw_section(tmp_path / "long.png", long, tyre.mesh)
+    low = load_case(CASES / "205_60r15.yaml")
+    draw_section(tmp_path / "low.png", low, section_mesh(low))
     draw_section(tmp_path / "plain.png", tyre.case, tyre.mesh)
-    for name in ("inflated", "plain"):
-        assert 0.05 < ink(tmp_path / f"{name}.png", 1350, 1200, 200_000) < 0.3
+    for figure, name in zip(figures, ("inflated", "long", "low", "plain"), strict=True):
+        (axes,), (legend,), render = figure.axes, figure.legends, figure.canvas.get_renderer()
+        size = map(int, figure.bbox.size)
+        assert 0.05 < ink(tmp_path / f"{name}.png", *size, 200_000) < 0.3
+        facts, label = (
+            axes.title.get_window_extent(render),
+            axes.xaxis.label.get_window_extent(render),
+        )
+        assert figure._suptitle.get_window_extent(render).y0 - facts.y1 < LINE
+        assert label.y0 - legend.get_window_extent(render).y1 < LINE
     assert (tmp_path / "inflated.png").read_bytes() != (tmp_path / "plain.png").read_bytes()
 
 
-def test_section_of_linear_elements(tyre, tmp_path):
+def test_section_of_linear_elements(tyre, tmp_path, monkeypatch):
+    figures = watched(section, monkeypatch)
     mesh = build_mesh(tyre.case.section, [4, 4, 4, 1], [1, 1, 1, 2], False)
     draw_section(tmp_path / "section.png", tyre.case, mesh)
-    assert 0.05 < ink(tmp_path / "section.png", 1350, 1200, 200_000) < 0.3
+    size = map(int, figures[0].bbox.size)
+    assert 0.05 < ink(tmp_path / "section.png", *size, 200_000) < 0.3
 
 
 @pytest.mark.parametrize("failed", [(), (3,), range(1, 9)], ids=["none", "one", "all"])

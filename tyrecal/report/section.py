@@ -25,6 +25,7 @@ Array = np.ndarray
 
 RUBBER = ("#E3E3E3", "#C9DCEB", "#F5E6C0", "#D3C3B3", "#E2D3E8", "#CFE5CB")  # pale: cords stand out
 LETTERS = 110  # of all columns of the legend
+AXES_WIDTH, LINE, REST = 8.4, 0.2, 1.05  # inches: of the drawing, of a line of text, of all else
 DETAIL = 4.0  # magnification of the belt's edge
 
 
@@ -44,7 +45,7 @@ def draw_section(
     place = {n: np.array([z, r]) * 1e3 for n, (r, z) in mesh.nodes.items()}
     around = outline(mesh)
     figure = new_figure(9.0, 8.0)
-    axes = figure.add_subplot(aspect="equal")
+    axes = figure.add_subplot(aspect="equal", anchor="N")
     entries = _draw(axes, case, mesh, place, 1.0)
     axes.axvline(0, color=GREY, lw=0.8, ls=(0, (12, 3, 2, 3)))
     if displacement is not None:
@@ -55,13 +56,18 @@ def draw_section(
     axes.set_xlabel("z along the axle, mm")
     axes.set_ylabel("r from the axle, mm")
     z, r = np.transpose([place[n] for n in around])
-    figure.suptitle(fill(case.case.name, 64), fontsize=13)
+    name = fill(case.case.name, 64)
+    figure.suptitle(name, fontsize=13)
     facts = (f"outer diameter {2 * r.max():.1f} mm, section width {np.ptp(z):.1f} mm,"
              f" {len(mesh.solids)} elements")  # fmt: skip
     axes.set_title(facts, fontsize=9, color="0.3")
     columns = max(1, min(3, LETTERS // max(map(len, entries))))
     figure.legend(entries.values(), entries.keys(), loc="outside lower center", ncols=columns,
                   frameon=False)  # fmt: skip
+    (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
+    lines = name.count("\n") - (-len(entries) // columns)
+    height = AXES_WIDTH * (high - low) / (right - left)
+    figure.set_figheight(height + REST + LINE * lines)
     save(figure, path)
 
 

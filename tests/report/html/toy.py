@@ -62,7 +62,8 @@ def provenance(name: str) -> dict[str, Any]:
         "tyrecal": "0.1.0", "solver": "ring", "solver_version": "1.0", "name": name, "size": "toy",
         "tyre_sha256": "0123456789abcdef" * 4, "overrides": {"rim.mass_kg": 12.5}, "mesh": "coarse",
         "state": {"pressure_kPa": 200.0, "load_N": [1e3, 4e3], "rim": "fixed"},
-        "targets": "a drum", "measured_sha256": "fedcba9876543210" * 4,
+        "targets": "a drum, as measured in 1888 and printed in a book since",
+        "measured_sha256": "fedcba9876543210" * 4,
     }  # fmt: skip
 
 
