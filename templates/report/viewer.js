@@ -29,14 +29,15 @@
     out[at + 2] = r * c - t * s;
   }
 
-  // Points at rest and their largest displacement, x y z after x y z, angle after angle.
-  function surface(data, mode) {
+  // Points at rest and their largest displacement, x y z after x y z, angle after angle; the second
+  // of a pair is the first, a quarter of a wave farther round.
+  function surface(data, mode, second = false) {
     const K = data.points, A = data.angles, place = numbers(data.place), shape = numbers(mode.shape);
     const rest = new Float32Array(3 * K * A), motion = new Float32Array(3 * K * A);
     const angles = data.kind === "loaded" ? numbers(data.angle) : null;
     for (let j = 0; j < A; j++) {
       const angle = TURN * (angles ? angles[j] : j / A);
-      const c = Math.cos(mode.n * angle), s = Math.sin(mode.n * angle);
+      const wave = mode.n * angle + (second ? Math.PI / 2 : 0), c = Math.cos(wave), s = Math.sin(wave);
       for (let k = 0; k < K; k++) {
         const at = 3 * (j * K + k);
         if (angles) {
@@ -68,12 +69,12 @@
     return new Uint32Array(found);
   }
 
-  function paint(canvas, shown, corners, turn, tilt, motion) {
+  function paint(canvas, shown, corners, turn, tilt, motion, zoom = 1) {
     const context = canvas.getContext("2d"), { width, height } = canvas;
     const count = shown.rest.length / 3, n = corners.length / 4;
     const x = new Float32Array(count), y = new Float32Array(count), d = new Float32Array(count);
     const ct = Math.cos(turn), st = Math.sin(turn), cu = Math.cos(tilt), su = Math.sin(tilt);
-    const scale = 0.4 * Math.min(width, height);
+    const scale = 0.4 * zoom * Math.min(width, height);
     for (let i = 0; i < count; i++) {
       const px = shown.rest[3 * i] + motion * shown.motion[3 * i];
       const py = shown.rest[3 * i + 1] + motion * shown.motion[3 * i + 1];
@@ -127,12 +128,13 @@
   function viewer(figure) {
     const data = JSON.parse(document.getElementById(figure.dataset.shapes).textContent);
     const find = (what) => figure.querySelector(what);
-    const canvas = find(".stage canvas"), play = find(".play"), range = find("input"), title = find(".shown");
-    let [turn, tilt] = VIEWS.perspective, phase = 0.25, before = 0, slow = 0, step = 1;
+    const canvas = find(".stage canvas"), play = find(".play"), title = find(".shown");
+    const range = find(".most"), zoom = find(".zoom"), second = find(".second");
+    let [turn, tilt] = VIEWS.perspective, phase = 0.25, before = 0, slow = 0, step = 1, chosen = 0;
     let playing = !calm.matches, seen = false, shown, corners;
 
     const draw = () => {
-      if (sharp(canvas)) paint(canvas, shown, corners, turn, tilt, range.value / 100 * Math.sin(TURN * phase));
+      if (sharp(canvas)) paint(canvas, shown, corners, turn, tilt, range.value / 100 * Math.sin(TURN * phase), zoom.value / 100);
     };
     const frame = (now) => {
       if (!playing || !seen) { before = 0; return; }
@@ -182,15 +184,24 @@
     });
     const choose = (number) => {
       const mode = data.modes[number];
-      shown = surface(data, mode);
+      const isSecond = second.getAttribute("aria-pressed") === "true";
+      chosen = number;
+      second.hidden = !mode.n;
+      shown = surface(data, mode, isSecond);
       corners = quads(shown, step);
-      title.textContent = `${mode.name} ${mode.hertz}, ${mode.words}`;
+      title.textContent = `${mode.name} ${mode.hertz}, ${mode.words}${mode.n && isSecond ? ", second of the pair" : ""}`;
       buttons.forEach((button, k) => button.setAttribute("aria-pressed", String(k === number)));
       draw();
     };
 
     play.addEventListener("click", () => state(!playing));
     range.addEventListener("input", draw);
+    zoom.addEventListener("input", draw);
+    const nearer = (by) => { zoom.value = zoom.value * by; draw(); };
+    second.addEventListener("click", () => {
+      second.setAttribute("aria-pressed", String(second.getAttribute("aria-pressed") !== "true"));
+      choose(chosen);
+    });
     for (const button of figure.querySelectorAll("[data-view]")) {
       button.addEventListener("click", () => look(button.dataset.view));
     }
@@ -208,6 +219,7 @@
     canvas.addEventListener("keydown", (event) => {
       const by = { ArrowLeft: [0.12, 0], ArrowRight: [-0.12, 0], ArrowUp: [0, -0.12], ArrowDown: [0, 0.12] }[event.key];
       if (by) rotate(...by);
+      else if (event.key === "+" || event.key === "-") nearer(event.key === "+" ? 1.2 : 1 / 1.2);
       else if (event.key === " ") state(!playing);
       else return;
       event.preventDefault();

@@ -173,12 +173,40 @@ def test_an_oval_is_one(shown: Any) -> None:
     chosen = next(i for i, name in enumerate(names) if name.startswith("[2,0] 79.42"))
     shown.find_elements("css selector", ".gallery button")[chosen].click()
     press(shown, "[data-view=front]")
-    motion = "const range = document.querySelector('.viewer input'); range.value = {};"
+    motion = "const range = document.querySelector('.viewer .most'); range.value = {};"
     tell = "range.dispatchEvent(new Event('input'));"
     shown.execute_script(motion.format(0) + tell)
     assert shown.execute_script(FORM) == pytest.approx(1.0, abs=0.01)
     shown.execute_script(motion.format(20) + tell)
     assert shown.execute_script(FORM) == pytest.approx(1.2 / 0.8, abs=0.08)
+
+
+def test_zoom_and_the_second_of_a_pair(shown: Any) -> None:
+    """By slider and keys; the second [2,0] is the first turned by an eighth: as high as wide."""
+    from selenium.webdriver import Keys
+
+    paused(shown)
+    picture = lambda: shown.execute_script(PICTURE)
+    canvas = shown.find_element("css selector", ".stage canvas")
+    names = [x.text for x in shown.find_elements("css selector", ".gallery strong")]
+    chosen = next(i for i, name in enumerate(names) if name.startswith("[2,0] 79.42"))
+    shown.find_elements("css selector", ".gallery button")[chosen].click()
+    press(shown, "[data-view=front]")
+    first = picture()
+    press(shown, ".second")
+    assert "second of the pair" in shown.find_element("css selector", ".shown").text
+    assert shown.execute_script(FORM) == pytest.approx(1.0, abs=0.01) and picture() != first
+    press(shown, ".second")
+    assert picture() == first
+    canvas.send_keys("+")
+    larger = picture()
+    assert larger != first
+    canvas.send_keys("-")
+    canvas.send_keys(Keys.ARROW_LEFT)
+    assert picture() != larger
+    alone = next(i for i, name in enumerate(names) if name.startswith("[0,0] torsional"))
+    shown.find_elements("css selector", ".gallery button")[alone].click()
+    assert not shown.find_element("css selector", ".second").is_displayed()
 
 
 def test_who_prefers_less_motion_gets_none(browser: Any, address: str) -> None:
