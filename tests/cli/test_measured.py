@@ -156,6 +156,8 @@ BAD: list[tuple[list[dict[str, Any]], list[str], str]] = [
     ([geometry(), {**shape(mode_in_plane()), "analysis_type": 2, "freq": -66.0}], [],
      "data set 2 (type 55, line"),
     ([geometry()], [], "there is neither a mode shape nor a frequency-response function"),
+    ([function(np.ones(120) + 0j, F, k, func_type=t) for k, t in ((1, 1), (2, 1), (3, 9))], [],
+     "function, only 2 x time response, 1 x power spectral density"),
     ([geometry(), shape(mode_in_plane())], ["--centre", "1,0"], "--centre 1,0: must be 3 numbers"),
     ([geometry(), shape(mode_in_plane())], ["--band", "60,30"], "must rise from 0 or more"),
     ([geometry(), function(np.ones(120) + 0j, F), function(np.ones(120) + 0j, F)], [],

@@ -183,4 +183,4 @@ def test_a_set_that_holds_less_than_it_says_is_refused(tmp_path: Path) -> None:
 def test_other_sets_are_passed_over_and_counted(tmp_path: Path) -> None:
     coherence = function(np.ones(80), np.arange(80.0), func_type=6)
     file = read_universal(write(tmp_path / "f.uff", coherence, geometry()))
-    assert file.skipped == {"function of type 6": 1} and not file.functions
+    assert file.skipped == {"coherence": 1} and not file.functions

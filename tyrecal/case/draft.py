@@ -11,7 +11,7 @@ from typing import Any
 
 from ..files import read_bytes
 from ..tyre.from_size import build, usual
-from ..tyre.section import SectionError
+from ..tyre.section import SectionError, refuse_separators
 from ..tyre.size import INCH, TyreSize
 from .load import validate
 from .new import new_case
@@ -108,7 +108,9 @@ def from_file(
 
 def _is_outline(file: Path) -> bool:
     with file.open(newline="", encoding="utf-8-sig") as lines:
-        return "curve" in next(csv.reader(lines), [])
+        header = next(csv.reader(lines), [])
+    refuse_separators(header)
+    return "curve" in header
 
 
 def _outline_keys(file: Path, size: TyreSize | None, belt: float | None) -> dict[str, float]:

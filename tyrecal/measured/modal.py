@@ -138,7 +138,11 @@ def _identified(
     file: Universal, nodes: Mapping[int, tuple[float, float, float]], layout: Layout
 ) -> Run:
     if not file.functions:
-        raise BadMeasuredData("there is neither a mode shape nor a frequency-response function")
+        others = ", ".join(f"{count} x {what}" for what, count in file.skipped.items())
+        raise BadMeasuredData(
+            "there is neither a mode shape nor a frequency-response function"
+            + (f", only {others}" if others else "")
+        )
     table = _by_reference(file.functions)
     first = file.functions[0]
     form = first.form or layout.form

@@ -49,6 +49,7 @@ HEADINGS = {
 }
 MEANING = {name: meaning for meaning, names in HEADINGS.items() for name in names.split()}
 LABEL = re.compile(r"^[\[(]?\s*(\d+)\s*[,;/ ]\s*(\d+)\s*[\])]?\s*(.*)$")
+BRACKET = re.compile(r"^[\[(]\s*\d+$")  # a label that its comma has parted
 LONGEST = 300  # characters of a cell
 KINDS = {"axial": "axial", "lateral": "axial", "torsional": "torsional", "torsion": "torsional",
          "rotational": "torsional", "": None}  # fmt: skip
@@ -88,7 +89,12 @@ def read_table(path: Path, pressure_kPa: float | None = None) -> list[Value]:
         place = f"{path}, line {number}"
         try:
             if len(cells) != len(headings):
-                raise ValueError(f"{len(cells)} cells, the headings are {len(headings)}")
+                words = f"{len(cells)} cells, the headings are {len(headings)}"
+                if any(BRACKET.match(cell) for cell in cells):
+                    words += (
+                        '; write a label with a comma in quotes, "[1,1]", or in columns c and m'
+                    )
+                raise ValueError(words)
             found = list(_values(cells, columns, comma, pressure_kPa, f"{path}", place))
             wrong = [words for value in found if (words := implausible(value))]
             if wrong:
@@ -196,8 +202,8 @@ def _heading(text: str) -> tuple[str, str]:
             "_kn",
             "_percent",
         ):
-            if name.endswith(end) and name != end:
-                name, unit = name.removesuffix(end), end[1:]
+            if re.sub(r"\s", "_", name).endswith(end) and name != end:
+                name, unit = name[: -len(end)], end[1:]
     unit = "%" if unit == "percent" else unit
     return re.sub(r"[\s\-_.]+", "_", name).strip("_"), units.plain(unit)
 
@@ -261,17 +267,19 @@ def _label(text: dict[str, str]) -> Label:
     if text.get("label") and "c" not in text:  # beside c and m it is the mode's number
         match = LABEL.match(text["label"])
         if not match:
-            raise ValueError(f"label is '{text['label']}', must be like [2,1] or [0,0] axial")
+            raise ValueError(
+                f"label is '{text['label']}', must be like [2,1], or [0,0] lateral or torsional"
+            )
         c, m, kind = match.group(1), match.group(2), kind or match.group(3)
     for name, cell, most in (("c", c, 20), ("m", m, 3)):
         if not (cell.isdecimal() and int(cell) <= most):
             raise ValueError(f"{name} is '{cell}', must be a whole number from 0 to {most}")
     word = kind.strip().lower()
     if word not in KINDS:
-        raise ValueError(f"kind is '{kind}', must be axial, torsional or empty")
+        raise ValueError(f"kind is '{kind}', must be lateral (axial), torsional or empty")
     zero = int(c) == int(m) == 0
     if zero and not word:
-        raise ValueError("[0,0] needs a kind, axial or torsional")
+        raise ValueError("[0,0] needs a kind, lateral (axial) or torsional")
     return Label(int(c), int(m), KINDS[word] if zero else None)
 
 

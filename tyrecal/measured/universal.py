@@ -25,6 +25,9 @@ LARGEST = 1_000_000_000  # bytes; response functions of many points are long
 MARK = re.compile(rb" {4}-1(?: {74})?(?=[\r\n]|\Z)")  # binary values may stand before it
 FORMS = {8: "receptance", 11: "mobility", 12: "accelerance"}
 UNHEEDED = (151, 2400, 2412)  # titles and elements: nothing is lost without them
+FUNCTIONS = {1: "time response", 2: "auto-spectrum", 3: "cross-spectrum", 5: "transmissibility",
+             6: "coherence", 7: "auto-correlation", 8: "cross-correlation",
+             9: "power spectral density", 12: "spectrum"}  # fmt: skip
 RESPONSE, TIME = 4, 17  # codes of a function's type, and of what it stands over
 
 
@@ -127,12 +130,14 @@ def _take(result: Universal, place: str, each: dict[str, Any], length: float) ->
         if each["analysis_type"] in (2, 3, 7) and each.get("n_data_per_node") in (3, 6):
             result.shapes.append(_shape(place, each))
         else:
-            result.skipped["no mode shape"] = result.skipped.get("no mode shape", 0) + 1
+            name = "data at nodes that are no mode shape"
+            result.skipped[name] = result.skipped.get(name, 0) + 1
     elif each["type"] == 58:
         if each["func_type"] == RESPONSE:
             result.functions.append(_function(place, each))
         else:
-            name = f"function of type {each['func_type']}"
+            code = each["func_type"]
+            name = FUNCTIONS.get(code, f"function of type {code}")
             result.skipped[name] = result.skipped.get(name, 0) + 1
 
 
