@@ -89,12 +89,9 @@ def read_table(path: Path, pressure_kPa: float | None = None) -> list[Value]:
         place = f"{path}, line {number}"
         try:
             if len(cells) != len(headings):
-                words = f"{len(cells)} cells, the headings are {len(headings)}"
-                if any(BRACKET.match(cell) for cell in cells):
-                    words += (
-                        '; write a label with a comma in quotes, "[1,1]", or in columns c and m'
-                    )
-                raise ValueError(words)
+                parted = any(BRACKET.match(cell) for cell in cells)
+                hint = '; write labels in quotes, "[1,1]", or in columns c and m' if parted else ""
+                raise ValueError(f"{len(cells)} cells, the headings are {len(headings)}{hint}")
             found = list(_values(cells, columns, comma, pressure_kPa, f"{path}", place))
             wrong = [words for value in found if (words := implausible(value))]
             if wrong:
