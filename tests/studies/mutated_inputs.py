@@ -3,11 +3,14 @@
     python -m tests.studies.mutated_inputs --count 1000 --seed 1 --output mutated.jsonl
 
 ``count`` inputs of each kind: records of evaluations, cases with their tables, results folders,
-decks, requests to the bundled solver. Each is drawn from (seed, kind, number) alone, so the same
-command goes on where it was stopped, and ``--kind KIND --only NUMBER`` repeats one. Wrong are: an
-exception that ends in a traceback, an exit code that is not documented, one above 0 without a word,
-a control character on the terminal, more than 10 s of processor time (or 120 s without an end), and
-any file beside the mutated folder that was changed. Exit code 1 where something was wrong.
+decks, requests to the bundled solver; or, where ``--kind`` names them, fits and footprints of cases
+with one or two extreme numbers that ``validate`` lets pass. Each is drawn from (seed, kind, number)
+alone, so the same command goes on where it was stopped, and ``--kind KIND --only NUMBER`` repeats
+one. Wrong are: an exception that ends in a traceback, an exit code that is not documented, one
+above 0 without a word, a control character on the terminal, more than 10 s of processor time (60 of
+fits and footprints; or 120 s without an end), any file beside the mutated folder that was changed,
+and a result of no tyre (beyond 1 t, below 1 Hz, not finite) without a word of warning. Exit code 1
+where something was wrong.
 """
 
 from __future__ import annotations
@@ -17,6 +20,7 @@ import contextlib
 import io
 import json
 import os
+import re
 import resource
 import shutil
 import signal
@@ -40,6 +44,7 @@ from tyrecal.modes.label import paired_labels
 
 CASES = Path(__file__).parents[2] / "cases"
 CPU_S, WALL_S = 10, 120
+LONG_S = 60  # of processor time: a fit, a footprint
 MEMORY = 4_000_000_000  # bytes of address space
 CODES = {0, 2, 3, 4, 5}
 BATCH = 20  # trials of one forked process
@@ -50,6 +55,16 @@ WORDS = ["", "~", "\x1b]0;x\x07", "\u202e", "é", "\x00", "../x", "/etc/passwd",
 VALUES: list[Any] = [None, True, 0, -1, 1e300, float("nan"), float("inf"), 10**400, "", "x",
                      "\x1b[31m", [], {}, [[]], [None], {"a": {}}, "9" * 3000, -0.0, 1e-320,
                      [1e300] * 3]  # fmt: skip
+
+
+NUMBER = re.compile(r"(?<=[ \[])-?\d+(?:\.\d*)?(?:[eE][+-]?\d+)?(?=[ ,\]}\n])")
+WITH_MORE = (  # numbers that count, and no others
+    (r" *#.*", ""), (r"^(name|  source): .*", r"\1: none"), (r"^uncertainties:(?s:.*?)^(?=\S)", ""),
+    (r"(frequency_Hz: [\d.]+)}", r"\1, sigma_Hz: 0.4, weight: 1.5}"),
+    (r"(vibration_frequency_Hz:) null", r"\1 60.0"),
+    (r"\Z", "\nroad: {friction: 0.8, elastic_slip_m: 2.0e-4, loads_N: [2000.0, 4000.0]}"
+             "\neffects: {bead_filler: 0.5, tread_density: 0.1, rim_width: 1.0e-3}\n"),
+)  # fmt: skip
 
 
 class Slow(BaseException):
@@ -101,6 +116,30 @@ def mutated_json(content: Any, chance: Random) -> Any:
     else:
         parent[key] = chance.choice(VALUES)
     return content
+
+
+def extreme(text: str, chance: Random) -> str:
+    """A case with one or two of its numbers at an end of what can be."""
+    for _ in range(chance.choice([1, 1, 2])):
+        old = chance.choice([found for found in NUMBER.finditer(text) if float(found[0])])
+        power = chance.choice([1, 1, 2, 3, 6, 12, 30, 100, 300]) * chance.choice([1, -1])
+        new = chance.choice(
+            [repr(float(old[0]) * 10.0**power), f"1.0e{power}", f"-{old[0]}", "0.0"]
+        )
+        text = text[: old.start()] + new + text[old.end() :]
+    return text
+
+
+def sane(result: Any) -> None:
+    """Raises ValueError where a result holds what no tyre has."""
+    told = json.dumps(result)
+    for name, low, high in (("mass_kg", 0.1, 1e3), ("frequency_Hz", 1.0, 1e5),
+                            ("area_m2", 1e-6, 1.0), ("deflection_m", 0.0, 1.0)):  # fmt: skip
+        for value in map(float, re.findall(rf'"{name}": ([^,}}\n]+)', told)):
+            if not low <= value <= high:
+                raise ValueError(f"silent nonsense: {name} = {value:g}")
+    if re.search("NaN|Infinity", told):
+        raise ValueError("silent nonsense: not finite")
 
 
 def odd(path: Path, outside: Path, chance: Random) -> None:
@@ -223,6 +262,41 @@ class Kinds:
             return run(tyrecal, "report", str(folder))
         return run(tyrecal, "deck", str(self.base / "cases" / "case.yaml"), "--output", str(folder))
 
+    def fits(self, here: Path, chance: Random) -> int:
+        """A fit with numbers that are valid, but of no tyre."""
+        return self._extreme(here, chance, "fit")
+
+    def footprints(self, here: Path, chance: Random) -> int:
+        """A tyre of such numbers on the road."""
+        return self._extreme(here, chance, "footprint")
+
+    def _extreme(self, here: Path, chance: Random, study: str) -> int:
+        folder = Path(shutil.copytree(self.base / "cases", here / "cases"))
+        case = folder / "case.yaml"
+        usual = case.read_text()
+        for what, instead in WITH_MORE:
+            usual = re.sub(what, instead, usual, flags=re.M)
+        unusual = ["--allow-unusual"] * (chance.random() < 0.5)
+        for _ in range(100):  # until one is valid
+            case.write_text(extreme(usual, chance))
+            with contextlib.redirect_stderr(io.StringIO()) as refused:
+                code = run(tyrecal, "validate", str(case), *unusual)
+            if not code:
+                break
+        else:
+            print(refused.getvalue(), file=sys.stderr)
+            return code
+        pairs = zip(usual.splitlines(), case.read_text().splitlines(), strict=True)
+        print(*unusual, *(new.strip() for old, new in pairs if old != new), sep="; ")
+        out = here / "out"
+        warned = io.StringIO()
+        with contextlib.redirect_stderr(warned):
+            code = run(tyrecal, study, str(case), *unusual, "--no-pictures", "--output", str(out))
+        print(warned.getvalue(), file=sys.stderr)
+        if not code and "warning" not in warned.getvalue():
+            sane(json.loads((out / f"{study}.json").read_text()))
+        return code
+
     def decks(self, here: Path, chance: Random) -> int:
         """A deck given to the bundled solver."""
         folder = Path(shutil.copytree(self.base / "decks", here / "decks"))
@@ -251,6 +325,7 @@ class Kinds:
 
 
 NAMES = ("records", "cases", "folders", "decks", "requests")
+LONG = ("fits", "footprints")
 
 
 def trial(kinds: Kinds, kind: str, number: int, seed: int) -> dict[str, Any]:
@@ -258,13 +333,14 @@ def trial(kinds: Kinds, kind: str, number: int, seed: int) -> dict[str, Any]:
     chance, fault, code = Random(f"{seed}/{kind}/{number}"), "", 0
     out, err = io.StringIO(), io.StringIO()
     before, used = kinds.state(), time.process_time()
-    signal.setitimer(signal.ITIMER_PROF, CPU_S)
+    limit = LONG_S if kind in LONG else CPU_S
+    signal.setitimer(signal.ITIMER_PROF, limit)
     with tempfile.TemporaryDirectory(dir=kinds.base.parent) as here:
         try:
             with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
                 code = getattr(kinds, kind)(Path(here), chance)
         except Slow:
-            fault = f"more than {CPU_S} s"
+            fault = f"more than {limit} s"
         except BaseException as error:
             place = traceback.extract_tb(error.__traceback__)[-1]
             where = f"{Path(place.filename).name}:{place.lineno}"
@@ -281,7 +357,14 @@ def trial(kinds: Kinds, kind: str, number: int, seed: int) -> dict[str, Any]:
     if kinds.state() != before:
         fault = "FILES OUTSIDE WERE CHANGED " + fault
     seconds = round(time.process_time() - used, 2)
-    return {"kind": kind, "number": number, "code": code, "seconds": seconds, "fault": fault[:300]}
+    return {
+        "kind": kind,
+        "number": number,
+        "code": code,
+        "seconds": seconds,
+        "fault": fault[:300],
+        **({"said": (out.getvalue()[:300], said[-600:])} if kind in LONG else {}),
+    }
 
 
 def _raise_slow(*_: object) -> None:
@@ -320,7 +403,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--count", type=int, default=1000)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--kind", choices=NAMES, action="append")
+    parser.add_argument("--kind", choices=NAMES + LONG, action="append")
     parser.add_argument("--only", type=int)
     parser.add_argument("--output", type=Path, default=Path("mutated.jsonl"))
     given = parser.parse_args()
@@ -340,7 +423,7 @@ def main() -> int:
                     print(json.dumps(found), file=file, flush=True)
                     if found["fault"] or given.only is not None:
                         print(json.dumps(found), flush=True)
-    for kind in NAMES:
+    for kind in given.kind or NAMES:
         own = [each for each in done if each["kind"] == kind]
         codes = Counter(each["code"] for each in own)
         slowest = max((each["seconds"] for each in own), default=0.0)
