@@ -5,16 +5,18 @@ from __future__ import annotations
 import re
 import time
 from functools import cache
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 from tyrecal_solvers.bundled.attached import read_attached
 from tyrecal_solvers.bundled.job import Analysis, TimedOut
-from tyrecal_solvers.bundled.keywords import DeckError
+from tyrecal_solvers.bundled.keywords import DeckError, Row
 from tyrecal_solvers.bundled.request import Request
 from tyrecal_solvers.bundled.results import StepResult
 from tyrecal_solvers.bundled.steps import Deck
+from tyrecal_solvers.bundled.supports import rim_freedoms
 
 from ..effects.support import CASE, decks
 
@@ -186,6 +188,19 @@ def test_masses_and_springs_stand_in_their_components() -> None:
     _, revolve, _ = Deck(pair, "modes", "inflate").read([])
     with pytest.raises(DeckError, match="a spring acts along 1, 2 or 3, got 4"):
         read_attached(revolve, model.mesh)
+
+
+def test_what_holds_other_nodes_does_not_hold_the_rim() -> None:
+    """Named by its number or by a set of it alone; a row without an end is of one freedom."""
+    mesh: Any = SimpleNamespace(node_sets={"RIM_REFERENCE": [9], "CROWN": [1, 9], "ONE": [1]})
+
+    def free(*rows: str) -> set[int]:
+        held = [Row(1, [f.strip() for f in row.split(",")]) for row in rows]
+        return rim_freedoms(mesh, SimpleNamespace(held=held), 9)  # type: ignore[arg-type]
+
+    assert free("9, 1, 6") == set() and free() == {1, 2, 3, 4, 5, 6}
+    assert free("9, 1, 3", "CROWN, 1, 6", "ONE, 1, 6", "1, 1, 6") == {4, 5, 6}
+    assert free("9, 2", "Rim_Reference, 4, 5") == {1, 3, 6}
 
 
 def test_the_mass_is_the_sections_and_what_is_attached() -> None:

@@ -151,6 +151,23 @@ def test_refusals_name_the_line(old: str, new: str, line: int, words: str) -> No
     assert f"line {line}:" in str(error) or not line
 
 
+@pytest.mark.parametrize("given", ["LONG TERM", "INSTANTANEOUS"])
+def test_a_static_step_has_relaxed_or_sudden_moduli(given: str) -> None:
+    """1 - sum g of the shear moduli, 1 - sum k of the bulk modulus, of those that a deck gives."""
+    deck = changed("MOONEY-RIVLIN\n", f"MOONEY-RIVLIN, MODULI={given}\n").replace(
+        "0., 5.", "2E5, 5."
+    )
+    deck += "*VISCOELASTIC, TIME=PRONY\n0.3, 0.2, 0.1\n0.1, 0., 1.\n"
+    for long_term in (True, False):
+        law = model.build(read_keywords(deck), None, long_term).rubbers[0].material
+        share = (0.6, 0.8) if long_term and given == "INSTANTANEOUS" else (1.0, 1.0)
+        share = (1 / 0.6, 1 / 0.8) if not long_term and given == "LONG TERM" else share
+        assert pytest.approx(1e6 * share[0]) == law.C10 and pytest.approx(2e5 * share[0]) == law.C01
+        assert law.inverse_D1 == pytest.approx(share[1] / 5.085e-8)
+        stiffness = model.build(read_keywords(deck), None, long_term).rubbers[0].hourglass_stiffness
+        assert stiffness == pytest.approx(0.005 * 2 * 1.2e6 * share[0])
+
+
 LAYER = """*ELEMENT, TYPE=SFMGAX1, ELSET=PLY
 2, 1, 4
 *SURFACE SECTION, ELSET=PLY

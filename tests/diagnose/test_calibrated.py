@@ -56,6 +56,7 @@ def test_the_variables_with_the_effect_are_the_truth(toy: Toy, named: Diagnosis)
         assert variable["unit"] == "Pa" and 0 < variable["standard_error"] < 0.05 * truth
         assert abs(variable["value"] - truth) < variable["standard_error"]
     assert found["without"].keys() == found["with"].keys() == set(toy.variables)
+    assert "calibrated" not in result(named)
     assert result(named, None, found)["calibrated"] == found
 
 

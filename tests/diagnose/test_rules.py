@@ -17,6 +17,7 @@ from tyrecal.diagnose.evidence import (
     Hypothesis,
     ln_splits,
     outside,
+    pair,
     refit,
     weigh,
 )
@@ -222,6 +223,28 @@ def test_outside_is_half_unknown_effects_and_half_errors_of_reading() -> None:
     assert found.prior == 0.1
     assert found.ln_evidence == pytest.approx(np.logaddexp(*kinds) - np.log(2), abs=1e-9)
     assert (UNKNOWN, INFLATED) == ((0.005, 0.01, 0.02, 0.04), (2.0, 4.0))
+
+
+def test_peaks_of_a_pair_are_integrated() -> None:
+    """ln Z against a fine grid, where the model is linear in both sizes: one of them is seen to a
+    few hundredths of its range, the other not at all, so that the peak is a ridge."""
+    toy = Toy(effects=2, size=0.03, bend=0.0, pressures=(240.0,))
+    toy.tilt = {id: 0 * tilt for id, tilt in toy.tilt.items()}
+    toy.g["e1"] = 0.03 * toy.g["e1"]
+    base = problem(toy)
+    G = np.stack([toy.g["e0"], toy.g["e1"]], 1)
+    p = base.measured(toy.base + G @ [0.4321, 0.5])
+    whole = p.sigma + toy.J @ np.diag(toy.spread**2) @ toy.J.T
+    A, n = G.T @ np.linalg.inv(whole) @ G, len(p.places)
+    assert 500 < A[0, 0] < 1000 and A[1, 1] < 1
+    points = (np.arange(2000) + 0.5) / 2000 - 0.4321, (np.arange(100) + 0.5) / 100 - 0.5
+    off = np.stack(np.meshgrid(*points, indexing="ij"))
+    ln = -np.einsum("iab,ij,jab->ab", off, A, off) / 2
+    scale = -(np.linalg.slogdet(whole)[1] + n * np.log(2 * np.pi)) / 2
+    wanted = np.log(np.mean(np.exp(ln))) + scale
+    found = pair(p, "e0", "e1", 1.0)
+    assert found.ln_evidence == pytest.approx(wanted, abs=0.2)
+    assert found.mean()["e0"] == pytest.approx(0.4321, abs=0.01)
 
 
 def test_prior_probabilities_are_one_together() -> None:

@@ -13,7 +13,7 @@ import pytest
 
 from tyrecal.case import LoadedCase, load_case, start_values
 from tyrecal.evaluate.door import Counts, Door, Question
-from tyrecal.evaluate.executor import Here
+from tyrecal.evaluate.executor import Here, WorkerLost
 from tyrecal.evaluate.failure import DeckRefused, EvaluationFailed
 from tyrecal.evaluate.results import Evaluation
 from tyrecal.fit import calibrate as calibrate_module
@@ -246,6 +246,18 @@ def test_starts_of_other_processes_tell_how_often_the_solver_ran(
         counts.append(tyre.counts)
     assert results[0] == results[1] and counts[0] == counts[1]
     assert counts[0].runs == len(fit.history) and told == [(1, 3), (2, 3), (3, 3)] * 2
+
+
+def test_a_start_whose_process_dies_ends_the_fit(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Dying(Here):
+        def each(self, function: Any, tasks: Any) -> Any:
+            yield from ((i, WorkerLost("its process died, twice")) for i in range(len(tasks)))
+
+    monkeypatch.setattr(calibrate_module, "executor", lambda *asked: nullcontext(Dying()))
+    tyre = Counting(door().base, POWERS, START)
+    with pytest.raises(EvaluationFailed, match="its process died, twice") as failure:
+        calibrate(CASE, tyre, starts=3, jobs=2)  # type: ignore[arg-type]
+    assert failure.value.cause == "crashed"
 
 
 def test_starts_are_drawn_replaced_and_reproducible() -> None:

@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
+from tyrecal.deck.write import NEAR_ZERO
 from tyrecal.evaluate.failure import EvaluationFailed
 from tyrecal.fit import least_squares, slsqp
 from tyrecal.fit.calibrate import _tolerance
 from tyrecal.fit.crossing import AXIAL, TORSIONAL, Crossing, crossing
-from tyrecal.fit.problem import Point, Target
+from tyrecal.fit.problem import Point, Target, Variable, _variable
 
 from ..chance import generator
 
@@ -96,6 +97,15 @@ def test_where_nothing_is_lower_the_search_ends_and_says_so(method: str) -> None
     assert "no lower objective along" in found.message
     assert not found.point.x.any()
     assert min(np.linalg.norm(x) for x in problem.asked if x.any()) < 1e-3  # however short
+
+
+@pytest.mark.parametrize("method", MINIMISE)
+def test_what_is_as_high_as_before_is_not_lower(method: str) -> None:
+    """Residuals that stay what they are, whatever their slopes promise."""
+    problem = linear()
+    problem.added = lambda x: -problem.J @ x
+    found = MINIMISE[method](problem, np.zeros(3), 1e-6)
+    assert "no lower objective along" in found.message and not found.point.x.any()
 
 
 @pytest.mark.parametrize("method", MINIMISE)
@@ -282,3 +292,21 @@ def test_the_tolerance_is_what_slopes_can_tell() -> None:
     assert of(1e-3, []) == pytest.approx(0.05)
     assert of(None, [], pressed) == pytest.approx(0.05)
     assert of(1e-3, modal, pressed) == pytest.approx(0.15)
+
+
+def test_a_variable_stays_next_to_0_where_it_moves_effects_alone() -> None:
+    """Most effects leave the deck at 0, and have no slope there; other numbers have one."""
+
+    def made(sets: list[str], lower: float, upper: float, start: float = 0.0) -> Variable:
+        told = {"sets": sets, "lower": lower, "upper": upper, "start": start, "scale": "linear"}
+        return _variable("x", SimpleNamespace(**told))  # type: ignore[arg-type]
+
+    both, other = ["effects.a", "effects.b"], ["effects.a", "pressure_kPa"]
+    near = made(both, 0.0, 2.0)
+    assert near.lower == near.start == 2 * NEAR_ZERO > 0 and near.upper == 2.0
+    near = made(both, -3.0, 0.0)
+    assert near.upper == near.start == -3 * NEAR_ZERO and near.lower == -3.0
+    far = made(both, -3.0, 2.0, 0.5)
+    assert (far.lower, far.start, far.upper) == (-3.0, 0.5, 2.0)
+    for sets in (other, other[::-1], other[1:]):
+        assert made(sets, 0.0, 2.0).lower == made(sets, 0.0, 2.0).start == 0.0

@@ -315,6 +315,17 @@ def test_pairs_are_as_equal_as_digits_allow() -> None:
             pairs(np.array(wrong), "a")
 
 
+def test_modes_without_waves_are_single(tmp_path: Path) -> None:
+    folder = folder_for(tmp_path, "none")
+    (folder / "modes_1.inp").rename(folder / "modes_0.inp")
+    for suffix in ("dat", "frd"):
+        text = LEFT[f"modes_1.{suffix}"].replace("\n    1     ", "\n    0     ")
+        (tmp_path / "tools" / f"modes_0.{suffix}").write_text(text)
+    (mode,) = evaluate(folder)["modes"]
+    assert (mode["n"], mode["multiplicity"]) == (0, 1)
+    assert abs(mode["amplitude"]).max() == pytest.approx(4.0 / np.sqrt(60))
+
+
 @pytest.mark.parametrize(("n", "multiplicity"), [(0, 1), (1, 2)])
 def test_shapes_have_the_tyres_modal_mass(n: int, multiplicity: int) -> None:
     """ccx's have one sector's; a shape without any motion is refused."""
