@@ -39,3 +39,20 @@ def test_a_buckling_harmonic_is_named(inflated: Inflated) -> None:
     vibration = harmonics.Vibration(inflated.model, 0 * inflated.U, loads, number, 0.0)
     with pytest.raises(harmonics.Unstable, match="3 waves"):
         vibration.modes(3, 2)
+
+
+@pytest.mark.parametrize("n", [0, 1, 3])
+def test_the_iteration_starts_from_smooth_motions(n: int) -> None:
+    """Axial shift, tilt, and a spin or bending that does not stretch the circumference; three that
+    do not depend on each other, lopsided where a symmetry would keep it from half of the modes."""
+    X = np.column_stack([np.linspace(0.3, 0.4, 9), np.linspace(-0.1, 0.1, 9)])
+    shift, tilt, third = np.moveaxis(harmonics._start_fields(X, n), -1, 0)
+    assert not shift[:, :2].any() and (shift[:, 2] > 0).all()
+    assert not tilt[:, 1:].any() and np.ptp(tilt[:, 0]) == pytest.approx(1.0)
+    assert not third[:, 2].any() and abs(third[:, 0] + 1j * n * third[:, 1]).max() < 1e-12
+    if n:
+        assert (third[:, 0] == 1.0).all()
+        return
+    assert (third[:, 1] > 0).all()
+    for field in (shift[:, 2], tilt[:, 0], third[:, 1]):
+        assert abs(field - field[::-1]).max() > 0.1 and abs(field + field[::-1]).max() > 0.1

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
-from tyrecal.diagnose.separability import APART, Separability
+from tyrecal.diagnose.separability import APART, Separability, _smallest
 
 
 def judged(distances: np.ndarray, **lambdas: float) -> Separability:
@@ -31,3 +32,15 @@ def test_at_the_limits() -> None:
     just = np.array([[0.0, APART], [APART, 0.0]])
     assert judged(just, a=APART, b=APART).groups() == []
     assert judged(np.nextafter(just, 0), a=APART, b=APART).groups() == [["a", "b"]]
+
+
+def test_the_smallest_that_is_seen() -> None:
+    """lambda grows as the square: 10 is reached at sqrt(10 / a), nearest to 0 on either side; None
+    where the whole range stays below."""
+    grid = np.linspace(0.0, 2.0, 81)
+    assert _smallest(grid, 1000 * grid**2) == pytest.approx(0.1)
+    assert _smallest(grid, 40 * grid**2) == pytest.approx(0.5)
+    assert _smallest(grid, 2.4 * grid**2) is None
+    assert _smallest(grid, 2.5 * grid**2) == pytest.approx(2.0)
+    both = np.linspace(-2.0, 2.0, 81)
+    assert _smallest(both, np.where(both < 0, 90, 40) * both**2) == pytest.approx(-1 / 3)

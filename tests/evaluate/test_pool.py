@@ -8,10 +8,12 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
-from tyrecal.evaluate.pool import process_pool
+from tyrecal.evaluate.pool import PATIENCE_S, Pool, process_pool
 
 ROOT = Path(__file__).parents[2]
 PARENT = """
@@ -82,6 +84,34 @@ def test_an_orderly_end_waits_for_all_that_was_asked() -> None:
     assert all(len(task.result(0)) == 5_000_000 for task in later)
     with pytest.raises(RuntimeError, match="shutdown"):
         pool.submit(abs, 1)
+
+
+def test_workers_that_are_told_to_end_have_so_long_all_together() -> None:
+    """Then they are killed."""
+    heard: list[tuple[str, Any]] = []
+
+    class Deaf:
+        pid = 1
+
+        def terminate(self) -> None:
+            heard.append(("terminate", None))
+
+        def join(self, timeout: float) -> None:
+            heard.append(("join", timeout))
+            time.sleep(0.05)
+
+        def kill(self) -> None:
+            heard.append(("kill", None))
+
+    ended = lambda **how: heard.append(("shutdown", how))
+    workers = {i: Deaf() for i in range(2)}
+    pool: Any = SimpleNamespace(_processes=workers, _result_queue=None, shutdown=ended)
+    Pool.end(pool)
+    names = ["terminate", "terminate", "join", "kill", "join", "kill", "shutdown"]
+    assert [name for name, _ in heard] == names
+    first, second = (left for name, left in heard if name == "join")
+    assert PATIENCE_S - 0.05 < first <= PATIENCE_S and 0 < second <= first - 0.05
+    assert heard[-1] == ("shutdown", {"cancel_futures": True})
 
 
 def test_an_error_in_the_block_comes_out_and_what_had_not_begun_is_dropped() -> None:

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from tyrecal.measured.gather import gather, result
+from tyrecal.measured.gather import _entry, gather, result
+from tyrecal.measured.labels import Judged
 from tyrecal.measured.modal import Layout
-from tyrecal.measured.sensors import BadMeasuredData
+from tyrecal.measured.sensors import BadMeasuredData, MeasuredMode
 from tyrecal.modes.mode import Label
 
 from ..chance import generator
@@ -96,3 +98,16 @@ def test_a_mode_that_was_missed_is_noticed(tmp_path: Path) -> None:
         each["data"] = each["data"] + 0.2j * w / (wk**2 - w**2 + 2e-3j * w * wk)
     (note,) = gather([write(tmp_path / "g.uff", nodes(), *sharp)], 240.0, LAYOUT).notes
     assert "the modes make" in note and "one may be missing" in note
+
+
+def test_a_mode_is_told_with_digits_that_mean_something() -> None:
+    """And None where a number is not known."""
+    mode = MeasuredMode(66.1234567, np.ones(3), sigma_Hz=None)
+    judged = Judged(None, {Label(1, 0): 0.87654321}, "mixed")
+    told: Any = SimpleNamespace(mode=mode, judged=judged, collinearity=0.12345678, member="1")
+    run: Any = SimpleNamespace(name="a.uff")
+    assert _entry(run, told) == {
+        "file": "a.uff", "frequency_Hz": 66.1234567, "sigma_Hz": None, "damping_ratio": None,
+        "collinearity": 0.1235, "c": None, "m": None, "kind": None, "member": "1",
+        "confidence": 0.8765, "why": "mixed",
+    }  # fmt: skip

@@ -91,6 +91,10 @@ if fault == "crash": sys.exit(139)
 if fault == "code": code, said = 201, "*ERROR reading *NODE:\\n  a node is wrong\\n"
 if fault == "together" and job != "inflate":  # ends when another runs as well
     while len((here / "jobs").read_text().split()) < 3: time.sleep(0.02)
+if fault == "one of two" and job == "modes_1":  # fails while another runs
+    while "modes_2" not in (here / "jobs").read_text(): time.sleep(0.02)
+    sys.exit(139)
+if fault == "one of two" and job == "modes_2": time.sleep(0.7); (here / "ended").touch()
 if fault == "hang": print("Newton goes on", flush=True); time.sleep(60)
 if fault == "silent": dat = frd = None
 if fault == "no shapes": frd = None
@@ -244,6 +248,13 @@ def test_decks_run_at_the_same_time_and_tell_the_same(tmp_path: Path) -> None:
 def test_one_deck_of_several_that_fails_fails_all(tmp_path: Path, parallel: int) -> None:
     with pytest.raises(RunFailed, match="a is wrong"):
         evaluate(with_two_diameters(tmp_path, "error", parallel))
+
+
+def test_after_a_failure_nothing_runs_on(tmp_path: Path) -> None:
+    """The folder may go: a deck that had begun has ended."""
+    with pytest.raises(RunFailed, match="code 139"):
+        evaluate(with_two_diameters(tmp_path, "one of two", 2))
+    assert (tmp_path / "tools" / "ended").exists()
 
 
 @pytest.mark.parametrize("fault", ["crash", "cutbacks", "no state"])
