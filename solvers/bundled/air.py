@@ -26,12 +26,11 @@ import numpy as np
 
 from . import mechanics, pressure, section
 from .keywords import DeckError, Keyword
-from .materials import read_materials
+from .materials import Number, read_materials
 from .mesh import Mesh
 from .section import Lines
 
 Array = np.ndarray
-Number = complex | float
 DEGREE = 4
 ALONG = 6  # points of a line of the wall; the well is one line
 GAUSS = np.polynomial.legendre.leggauss(7)

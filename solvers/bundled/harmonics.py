@@ -20,8 +20,7 @@ from .attached import Attached
 from .band import Cholesky, Indefinite, Numbering
 from .border import Border, Bordered
 from .mechanics import Load
-from .model import Model
-from .spectrum import stiffened
+from .model import Model, stiffened
 from .wheel import Wheel
 
 Array = np.ndarray

@@ -8,9 +8,36 @@ from itertools import pairwise
 import numpy as np
 
 from .keywords import DeckError, Keyword
-from .spectrum import Law
 
-Number = complex | float
+Number = complex | float  # complex where it carries the tangent of a slope (`sensitivity`)
+
+
+@dataclass(frozen=True)
+class Law:
+    """Rows of the table: frequency (Hz, rising) and storage over static shear modulus."""
+
+    frequency_Hz: tuple[float, ...]
+    ratios: tuple[Number, ...]
+
+    def ratio(self, frequency_Hz: float) -> Number:
+        """rho, constant beyond the table's ends; complex where the table carries a tangent."""
+        i, share = self._place(frequency_Hz)
+        low, high = self.ratios[i : i + 2]
+        return low * (high / low) ** share
+
+    def slope(self, frequency_Hz: float) -> float:
+        """d ln rho / d ln f."""
+        i, share = self._place(frequency_Hz)
+        if not 0.0 < share < 1.0:
+            return 0.0
+        low, high = np.real(self.ratios[i : i + 2])
+        return float(np.log(high / low) / np.log(self.frequency_Hz[i + 1] / self.frequency_Hz[i]))
+
+    def _place(self, frequency_Hz: float) -> tuple[int, float]:
+        """The row before a frequency, and the share of the way to the next one."""
+        table, f = np.log(self.frequency_Hz), np.log(max(frequency_Hz, 1e-12))
+        i = int(np.clip(np.searchsorted(table, f) - 1, 0, len(table) - 2))
+        return i, float(np.clip((f - table[i]) / (table[i + 1] - table[i]), 0.0, 1.0))
 
 
 @dataclass

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from . import section as geometry
 from .keywords import DeckError, Keyword, Row
-from .materials import Material, read_materials
+from .materials import Law, Material, read_materials
 from .mesh import POINTS, Mesh, read_mesh
 from .rubber import MooneyRivlin
-from .spectrum import Law
 
 Array = np.ndarray
 
@@ -255,3 +254,19 @@ def _merge(parts: list[Cords]) -> Cords:
         join(lambda p: p.stiffness),
         join(lambda p: p.mass),
     )
+
+
+def stiffened(model: Model) -> list[Model]:
+    """Per law a model with the tangent dK_l: the rubber's own, without its initial stress."""
+    models = []
+    for law in range(len(model.laws)):
+        rubbers = []
+        for r in model.rubbers:
+            own, m = r.law == law, r.material
+            shear = replace(
+                m, C10=m.C10 * own, C01=m.C01 * own, inverse_D1=0.0 * m.inverse_D1,
+                shear_ratio=None, bulk_ratio=None, stressed=False,
+            )  # fmt: skip
+            rubbers.append(replace(r, material=shear, hourglass_stiffness=0 * r.density))
+        models.append(replace(model, rubbers=rubbers, cords=[]))
+    return models

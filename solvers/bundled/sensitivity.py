@@ -20,8 +20,7 @@ from .air import Air, coupling
 from .band import Cholesky, Numbering
 from .keywords import STEP
 from .mechanics import Load
-from .model import Model, Rubber
-from .spectrum import stiffened
+from .model import Model, Rubber, stiffened
 from .wheel import Wheel
 
 Array = np.ndarray

@@ -8,19 +8,16 @@ in the logarithms of both. The j-th mode of a harmonic is the fixed point of the
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from dataclasses import replace
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from .band import Cholesky
-    from .border import Bordered
-    from .harmonics import HarmonicModes, Vibration
-    from .model import Model
+from .band import Cholesky
+from .border import Bordered
+from .harmonics import HarmonicModes, Vibration
+from .materials import Law
 
 Array = np.ndarray
-Number = complex | float
 START_HZ = 60.0  # amid the modes of a tyre
 TOLERANCE = 1e-13  # of a frequency for a given shape
 CLOSE = 1e-4  # of a frequency, from one shape to the next: its square is what is left
@@ -29,50 +26,6 @@ LONGEST = 40
 
 class NotSelfConsistent(ArithmeticError):
     """No frequency was found at which a mode has the modulus of that frequency."""
-
-
-@dataclass(frozen=True)
-class Law:
-    """Rows of the table: frequency (Hz, rising) and storage over static shear modulus."""
-
-    frequency_Hz: tuple[float, ...]
-    ratios: tuple[Number, ...]
-
-    def ratio(self, frequency_Hz: float) -> Number:
-        """rho, constant beyond the table's ends; complex where the table carries a tangent."""
-        i, share = self._place(frequency_Hz)
-        low, high = self.ratios[i : i + 2]
-        return low * (high / low) ** share
-
-    def slope(self, frequency_Hz: float) -> float:
-        """d ln rho / d ln f."""
-        i, share = self._place(frequency_Hz)
-        if not 0.0 < share < 1.0:
-            return 0.0
-        low, high = np.real(self.ratios[i : i + 2])
-        return float(np.log(high / low) / np.log(self.frequency_Hz[i + 1] / self.frequency_Hz[i]))
-
-    def _place(self, frequency_Hz: float) -> tuple[int, float]:
-        """The row before a frequency, and the share of the way to the next one."""
-        table, f = np.log(self.frequency_Hz), np.log(max(frequency_Hz, 1e-12))
-        i = int(np.clip(np.searchsorted(table, f) - 1, 0, len(table) - 2))
-        return i, float(np.clip((f - table[i]) / (table[i + 1] - table[i]), 0.0, 1.0))
-
-
-def stiffened(model: Model) -> list[Model]:
-    """Per law a model with the tangent dK_l: the rubber's own, without its initial stress."""
-    models = []
-    for law in range(len(model.laws)):
-        rubbers = []
-        for r in model.rubbers:
-            own, m = r.law == law, r.material
-            shear = replace(
-                m, C10=m.C10 * own, C01=m.C01 * own, inverse_D1=0.0 * m.inverse_D1,
-                shear_ratio=None, bulk_ratio=None, stressed=False,
-            )  # fmt: skip
-            rubbers.append(replace(r, material=shear, hourglass_stiffness=0 * r.density))
-        models.append(replace(model, rubbers=rubbers, cords=[]))
-    return models
 
 
 class SelfConsistent:

@@ -17,12 +17,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from .keywords import DeckError, Keyword
+from .materials import Number
 from .mesh import Mesh
 from .steps import Step
 from .supports import rim_freedoms
 
 Array = np.ndarray
-Number = complex | float
 FREEDOMS = {"axial": (2,), "spin": (5,), "radial": (1, 3), "tilt": (4, 6)}  # 2: along the axle
 OF_HARMONIC = {0: ("axial", "spin"), 1: ("radial", "tilt")}
 

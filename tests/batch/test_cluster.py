@@ -17,7 +17,8 @@ from typing import Any
 import pytest
 
 from tyrecal.evaluate.cluster import ClusterFailed, connected
-from tyrecal.evaluate.executor import WorkerLost, executor, in_order
+from tyrecal.evaluate.executor import executor, in_order
+from tyrecal.evaluate.failure import WorkerLost
 
 from ..cli.test_cli import run
 from ..conftest import ROOT

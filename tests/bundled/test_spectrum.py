@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from tyrecal_solvers.bundled import harmonics, rubber
 from tyrecal_solvers.bundled.keywords import DeckError, read_keywords
-from tyrecal_solvers.bundled.materials import read_materials
-from tyrecal_solvers.bundled.spectrum import Law, NotSelfConsistent, SelfConsistent, stiffened
+from tyrecal_solvers.bundled.materials import Law, read_materials
+from tyrecal_solvers.bundled.model import stiffened
+from tyrecal_solvers.bundled.spectrum import NotSelfConsistent, SelfConsistent
 
 from tyrecal.case import with_values
 from tyrecal.effects import catalogue

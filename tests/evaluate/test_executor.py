@@ -15,11 +15,11 @@ import pytest
 from tyrecal.evaluate.executor import (
     Here,
     Processes,
-    WorkerLost,
     end_workers,
     executor,
     in_order,
 )
+from tyrecal.evaluate.failure import WorkerLost
 
 
 def square(task: float) -> float:

@@ -12,7 +12,8 @@ from tyrecal.evaluate.door import Door, Question
 from tyrecal.evaluate.failure import DeckRefused, EvaluationFailed
 from tyrecal.fit.calibrate import NothingToFit, calibrate
 from tyrecal.fit.differences import differences
-from tyrecal.fit.problem import Problem, Target, Variable, objective, objective_unit
+from tyrecal.fit.problem import Problem, Target, objective, objective_unit
+from tyrecal.fit.variable import Variable
 from tyrecal.modes.label import paired_labels
 from tyrecal.modes.mode import Label
 from tyrecal.studies.footprint import footprint_result, press

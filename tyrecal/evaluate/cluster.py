@@ -10,8 +10,7 @@ from typing import Any
 
 from threadpoolctl import threadpool_limits
 
-from .executor import WorkerLost
-from .failure import SolverUnavailable
+from .failure import SolverUnavailable, WorkerLost
 from .sources import sources
 
 PATIENCE_S = 20.0  # for a scheduler to answer

@@ -16,8 +16,8 @@ from ..effects import catalogue, with_effects
 from ..files import printable
 from ..interrupt import interrupts_put_off, raise_interrupt
 from . import folders
-from .executor import WorkerLost, executor, in_order
-from .failure import DeckRefused, EvaluationFailed
+from .executor import executor, in_order
+from .failure import DeckRefused, EvaluationFailed, WorkerLost
 from .pressed import Pressed, pressed
 from .results import Evaluation, evaluation
 from .solver import Solver, find_solver

@@ -8,13 +8,10 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import ExitStack, contextmanager
 from typing import Any, Protocol
 
+from .failure import WorkerLost
 from .pool import Pool, first_done, process_pool
 
 Task = tuple[int, Any]  # its place among the tasks, and what its function is given
-
-
-class WorkerLost(Exception):
-    """The process that did a task died in the middle of it, each time that it was tried."""
 
 
 class Executor(Protocol):

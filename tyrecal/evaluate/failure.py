@@ -30,3 +30,7 @@ class SolverUnavailable(Exception):
 
 class DeckRefused(ValueError):
     """The solver refuses the deck: the case, or the user's template, asks for what it lacks."""
+
+
+class WorkerLost(Exception):
+    """The process that did a task died in the middle of it, each time that it was tried."""

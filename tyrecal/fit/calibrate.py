@@ -13,8 +13,8 @@ import numpy as np
 from ..case import LoadedCase, with_values
 from ..case.calibration import cannot_fit
 from ..evaluate.door import Counts, Door
-from ..evaluate.executor import WorkerLost, executor, in_order
-from ..evaluate.failure import EvaluationFailed
+from ..evaluate.executor import executor, in_order
+from ..evaluate.failure import EvaluationFailed, WorkerLost
 from . import least_squares, slsqp
 from .problem import Point, Problem, objective_unit
 from .uncertainty import uncertainty

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..evaluate.failure import EvaluationFailed
-
-if TYPE_CHECKING:
-    from .problem import Variable
+from .variable import Variable
 
 Array = np.ndarray
 Design = Mapping[str, float]

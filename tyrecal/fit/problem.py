@@ -20,8 +20,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..case import LoadedCase
-from ..case.calibration import Variable as CaseVariable
-from ..deck.write import NEAR_ZERO
 from ..evaluate.door import Door, Question
 from ..evaluate.failure import DeckRefused, EvaluationFailed, SolverUnavailable
 from ..evaluate.results import Evaluation
@@ -30,36 +28,11 @@ from ..modes.match import LostLabel, margin, match
 from ..modes.mode import Label, Mode
 from .differences import STEP, differences
 from .footprint import PRESS_STEP, STEEPEST, press, read_footprint_targets
+from .variable import read_variable
 
 Array = np.ndarray
 MORE_MODES = (4, 8)  # per harmonic, when a label is not among the modes first asked for
 Found = tuple[Evaluation, dict[Label, Mode], float]
-
-
-@dataclass(frozen=True)
-class Variable:
-    """A design variable: bounds in its own unit; ``log`` scaled inside the optimiser or not."""
-
-    name: str
-    start: float
-    lower: float
-    upper: float
-    log: bool = True
-
-    def scaled(self, value: float) -> float:
-        """The optimiser's coordinate of a value."""
-        return math.log(value) if self.log else (value - self.lower) / (self.upper - self.lower)
-
-    def value(self, x: float) -> float:
-        """The value at an optimiser's coordinate, inside the bounds to the last bit."""
-        if x == self.scaled(self.start):
-            return self.start
-        raw = math.exp(x) if self.log else self.lower + x * (self.upper - self.lower)
-        return min(max(raw, self.lower), self.upper)
-
-    def slope(self, value: float) -> float:
-        """d value / d coordinate."""
-        return value if self.log else self.upper - self.lower
 
 
 @dataclass(frozen=True)
@@ -141,7 +114,9 @@ class Problem:
         self.case, self.door, self.notify, self.jobs = case, door, notify, jobs
         self.fixed = dict(fixed or {})
         self.variables = [
-            _variable(name, v) for name, v in case.case.variables.items() if name not in self.fixed
+            read_variable(name, v)
+            for name, v in case.case.variables.items()
+            if name not in self.fixed
         ]
         self.targets, self.footprint = read_targets(case), read_footprint_targets(case)
         modal, pressed = ([t.scale for t in each] for each in (self.targets, self.footprint))
@@ -267,15 +242,6 @@ class Problem:
             if not waiting:
                 break
         return [answers[i] for i in range(len(wanted))]
-
-
-def _variable(name: str, v: CaseVariable) -> Variable:
-    """A variable as the optimiser has it: next to 0 where it moves effects and a bound is 0, as
-    most have no slope there, where their keywords leave the deck."""
-    effect = all(path.startswith("effects.") for path in v.sets)
-    least = NEAR_ZERO * max(abs(v.lower), abs(v.upper)) if effect else 0.0
-    lower, upper = v.lower or least, v.upper or -least
-    return Variable(name, min(max(v.start, lower), upper), lower, upper, v.scale == "log")
 
 
 def objective_unit(case: LoadedCase) -> str:
