@@ -10,8 +10,9 @@ from pathlib import Path
 import pytest
 
 from tyrecal import settings
-from tyrecal.evaluate.solver import UnknownSolver, find_solver
-from tyrecal.settings import BadSettings, command_of, place, root
+from tyrecal.errors import InputError
+from tyrecal.evaluate.solver import find_solver
+from tyrecal.settings import SettingsError, command_of, place, root
 
 from .cli.test_cli import CASE, run
 from .conftest import CASES
@@ -73,7 +74,7 @@ def test_a_batch_takes_the_option_too(tmp_path: Path) -> None:
 def test_a_solver_without_a_program_takes_no_command(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    with pytest.raises(UnknownSolver, match="starts no program"):
+    with pytest.raises(InputError, match="starts no program"):
         find_solver("bundled", ["x"])
     monkeypatch.setenv("TYRECAL_SOLVER_COMMAND", "x")  # of another solver, perhaps
     assert find_solver("bundled").name == "bundled"
@@ -87,7 +88,7 @@ def test_a_relative_path_is_not_that_of_the_run_folder(
     assert command_of("calculix")[0] == [str(tmp_path / "bin/ccx"), "-x"]
     monkeypatch.delenv("TYRECAL_SOLVER_COMMAND")
     file.write_text("commands: {calculix: bin/ccx}\n")
-    with pytest.raises(BadSettings, match="a name or a whole path"):
+    with pytest.raises(SettingsError, match="a name or a whole path"):
         command_of("calculix")
 
 

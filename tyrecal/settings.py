@@ -13,6 +13,8 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
+from .errors import InputError
+
 if TYPE_CHECKING:
     from pydantic import BaseModel
 
@@ -21,7 +23,7 @@ COMMAND = "TYRECAL_SOLVER_COMMAND"  # of whichever solver is used
 Model = TypeVar("Model", bound="BaseModel")
 
 
-class BadSettings(ValueError):
+class SettingsError(InputError):
     """A settings file, or a command of the user's, is wrong."""
 
 
@@ -35,25 +37,25 @@ def place() -> Path | None:
 
 
 def typed(path: Path, kind: type[Model]) -> Model:
-    """A YAML file as a model of pydantic. Raises BadSettings, a sentence a mistake, with lines."""
+    """A YAML file as a model of pydantic. Raises SettingsError: a sentence a mistake, its line."""
     from pydantic import ValidationError
 
     from .case.document import read_document
 
     document = read_document(path)
     if document.data is None or document.mistakes:
-        raise BadSettings("\n".join(str(each) for each in document.mistakes))
+        raise SettingsError("\n".join(str(each) for each in document.mistakes))
     try:
         return kind.model_validate(document.data)
     except ValidationError as error:
         for each in error.errors():
             document.add(each["loc"], each["msg"])
-        raise BadSettings("\n".join(str(each) for each in document.mistakes)) from None
+        raise SettingsError("\n".join(str(each) for each in document.mistakes)) from None
 
 
 def settings() -> Any:
     """The user's settings: ``commands`` {solver: words}; ``jobs``, ``solver``, ``output``, None
-    where they are not set. Raises BadSettings."""
+    where they are not set. Raises SettingsError."""
     path = place()
     if path is None or (FILE not in os.environ and not path.exists()):
         return _read(None, 0.0)
@@ -78,30 +80,32 @@ def _read(path: Path | None, changed: float) -> Any:
     for solver, command in found.commands.items():
         words(command, f"{path}: commands.{solver}", here=False)
     if found.output is not None and not Path(found.output).expanduser().is_absolute():
-        raise BadSettings(f"{path}: output is {found.output}: must be a whole path or begin with ~")
+        raise SettingsError(
+            f"{path}: output is {found.output}: must be a whole path or begin with ~"
+        )
     return found
 
 
 def root() -> Path:
     """The folder in which folders of results are made: the present one, unless the user has set
-    another. Raises BadSettings."""
+    another. Raises SettingsError."""
     folder = settings().output
     return Path(folder).expanduser() if folder else Path()
 
 
 def words(command: str | Sequence[str], origin: str, here: bool = True) -> list[str]:
     """A command's words; no shell is used. ``here``: a relative path starts in the present folder,
-    never in the one that the solver runs in, else it is refused. Raises BadSettings."""
+    never in the one that the solver runs in, else it is refused. Raises SettingsError."""
     try:
         found = shlex.split(command) if isinstance(command, str) else list(command)
     except ValueError:
         found = []
     if not found or not all(isinstance(word, str) and word for word in found):
-        raise BadSettings(f"{origin} is {command!r}: must be a command, or a list of its words")
+        raise SettingsError(f"{origin} is {command!r}: must be a command, or a list of its words")
     program = Path(found[0]).expanduser()
     if len(program.parts) > 1 and not program.is_absolute():
         if not here:
-            raise BadSettings(f"{origin} is {command!r}: must be a name or a whole path")
+            raise SettingsError(f"{origin} is {command!r}: must be a name or a whole path")
         program = program.absolute()
     return [str(program), *found[1:]]
 
@@ -109,7 +113,7 @@ def words(command: str | Sequence[str], origin: str, here: bool = True) -> list[
 def command_of(solver: str) -> tuple[list[str], str]:
     """The command that the user has set for ``solver``, and where; empty where nowhere.
 
-    Raises BadSettings."""
+    Raises SettingsError."""
     if given := os.environ.get(COMMAND):
         return words(given, COMMAND), COMMAND
     if solver in (commands := settings().commands):

@@ -16,9 +16,9 @@ from typing import Any
 
 import pytest
 
-from tyrecal.evaluate.cluster import ClusterFailed, connected
+from tyrecal.evaluate.cluster import connected
 from tyrecal.evaluate.executor import executor, in_order
-from tyrecal.evaluate.failure import WorkerLost
+from tyrecal.evaluate.failure import SolverUnavailable, WorkerLost
 
 from ..cli.test_cli import run
 from ..conftest import ROOT
@@ -168,7 +168,7 @@ def test_a_scheduler_that_goes_away_ends_the_command(tmp_path: Path) -> None:
         own.add_worker()
         with (
             executor(scheduler=own.address) as workers,
-            pytest.raises(ClusterFailed, match="went away"),
+            pytest.raises(SolverUnavailable, match="went away"),
         ):
             for _ in workers.each(slow, [0.01, 60.0, 60.0]):
                 own.scheduler.kill()
@@ -193,7 +193,7 @@ def test_another_edition_at_a_worker_is_refused(
     monkeypatch.setattr(cluster, "sources", lambda: "another")
     with (
         executor(scheduler=machines.address) as workers,
-        pytest.raises(ClusterFailed, match="another edition"),
+        pytest.raises(SolverUnavailable, match="another edition"),
     ):
         list(workers.each(square, [1.0]))
 
@@ -210,11 +210,11 @@ def test_no_scheduler_there(
     message = capsys.readouterr().err
     assert "no Dask scheduler answers at 'tcp://127.0.0.1:1'" in message
     assert "Traceback" not in message
-    with pytest.raises(ClusterFailed), connected("nonsense://x"):
+    with pytest.raises(SolverUnavailable), connected("nonsense://x"):
         pass
 
 
 def test_without_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)
-    with pytest.raises(ClusterFailed, match=r"tyrecal\[cluster\]"), connected("tcp://x:1"):
+    with pytest.raises(SolverUnavailable, match=r"tyrecal\[cluster\]"), connected("tcp://x:1"):
         pass

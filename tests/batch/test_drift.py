@@ -9,9 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as some
 
-from tyrecal.batch.drift import DEFAULTS, BadBaseline, baseline_of, compare, read_baseline
+from tyrecal.batch.drift import DEFAULTS, baseline_of, compare, read_baseline
 from tyrecal.batch.junit import drift_line
 from tyrecal.batch.summary import summary
+from tyrecal.errors import InputError
 
 from .data import entry, report
 
@@ -108,6 +109,6 @@ def test_a_baseline_keeps_its_tolerances_and_only_what_is_good() -> None:
 def test_a_wrong_baseline_is_refused_in_a_sentence(text: str, words: str, tmp_path: Path) -> None:
     path = tmp_path / "baseline.json"
     path.write_text(text)
-    with pytest.raises(BadBaseline) as refused:
+    with pytest.raises(InputError) as refused:
         read_baseline(path)
     assert words in str(refused.value) and "\n" not in str(refused.value)

@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tyrecal.blind.protocol import BadTrials, read_protocol
+from tyrecal.blind.protocol import read_protocol
 from tyrecal.blind.score import Scored, score
 from tyrecal.blind.tables import page, summary
+from tyrecal.errors import InputError
 
 from ..studies.blind_least_squares import STUDIES, errors, unpacked
 
@@ -83,6 +84,6 @@ def test_another_answer_breaks_the_hash(trials: Path) -> None:
     path = sorted((trials / "answers").glob("*.json"))[0]
     kept = path.read_text()
     path.write_text(kept.replace('"no_gap"', '"named"').replace('"undecided"', '"named"') + " ")
-    with pytest.raises(BadTrials, match="changed after they were hashed"):
+    with pytest.raises(InputError, match="changed after they were hashed"):
         score(trials, trials.with_name("trials-truth"))
     path.write_text(kept)

@@ -13,7 +13,7 @@ from tyrecal.blind.answer import answer
 from tyrecal.blind.draw import draw
 from tyrecal.blind.make import make
 from tyrecal.blind.maker import find_maker
-from tyrecal.blind.protocol import BadTrials, Protocol, read_json, write_json
+from tyrecal.blind.protocol import Protocol, read_json, write_json
 from tyrecal.blind.ruler import FILE as RULER
 from tyrecal.blind.ruler import measure
 from tyrecal.blind.score import score
@@ -21,6 +21,7 @@ from tyrecal.blind.seal import ANSWERS, SEAL, TRUTH
 from tyrecal.blind.tables import page, summary
 from tyrecal.diagnose.measurements import read_measurements
 from tyrecal.diagnose.uncertainties import sources
+from tyrecal.errors import InputError
 
 from .toy import CASE, Scale, ToyMaker, protocol
 
@@ -94,21 +95,21 @@ def test_draws_have_the_stated_distribution() -> None:
 
 def test_the_seal_holds_the_truth_and_the_answers(tmp_path: Path) -> None:
     folder, sealed = made(tmp_path, protocol(2, 2, 1))
-    with pytest.raises(BadTrials, match="sealed trials already"):
+    with pytest.raises(InputError, match="sealed trials already"):
         make(folder, sealed, CASE, protocol(1), MAKER, ruler, seed=3)
-    with pytest.raises(BadTrials, match=r"answers\.json is missing"):
+    with pytest.raises(InputError, match=r"answers\.json is missing"):
         score(folder, sealed)
     answer(folder, SCALE, SCALE.model_rows)
     assert len(score(folder, sealed)) == 5
     one = sorted((folder / "answers").glob("*.json"))[0]
     before = one.read_text()
     one.write_text(before.replace('"verdict": "', '"verdict": "not '))
-    with pytest.raises(BadTrials, match="changed after they were hashed"):
+    with pytest.raises(InputError, match="changed after they were hashed"):
         score(folder, sealed)
     one.write_text(before)
     text = (sealed / TRUTH).read_text()
     (sealed / TRUTH).write_text(text.replace('"kind": "none"', '"kind": "outside"', 1))
-    with pytest.raises(BadTrials, match="is not the truth that"):
+    with pytest.raises(InputError, match="is not the truth that"):
         score(folder, sealed)
 
 
@@ -122,11 +123,11 @@ def test_the_same_seed_gives_another_seal_but_the_same_trials(tmp_path: Path) ->
 
 def test_answering_refuses_where_the_truth_lies_open(tmp_path: Path) -> None:
     folder, sealed = made(tmp_path, protocol(none=1))
-    with pytest.raises(BadTrials, match="must not lie in"):
+    with pytest.raises(InputError, match="must not lie in"):
         make(folder / "x", folder / "x" / "truth", CASE, protocol(1), MAKER, ruler)
     (folder / "notes").mkdir()
     (folder / "notes" / TRUTH).write_bytes((sealed / TRUTH).read_bytes())
-    with pytest.raises(BadTrials, match="lies open among the trials"):
+    with pytest.raises(InputError, match="lies open among the trials"):
         answer(folder, SCALE, SCALE.model_rows)
 
 
@@ -203,5 +204,5 @@ def test_a_stated_seed_must_be_the_one_that_was_begun_with(tmp_path: Path) -> No
     sealed = tmp_path / "truth"
     sealed.mkdir()
     write_json(sealed / "seed.json", {"seed": 7})
-    with pytest.raises(BadTrials, match="another seed"):
+    with pytest.raises(InputError, match="another seed"):
         make(tmp_path / "t", sealed, CASE, protocol(none=1), MAKER, ruler, seed=8)

@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tyrecal.diagnose.measurements import BadMeasurements, read_measurements
+from tyrecal.diagnose.measurements import read_measurements
 from tyrecal.diagnose.observations import observe
+from tyrecal.errors import InputError
 from tyrecal.modes.mode import Label
 
 from ..chance import Chance
@@ -51,7 +52,7 @@ def read(tmp_path: Path, *lines: str, header: str = HEADER) -> list:
     ],
 )
 def test_a_wrong_line_is_named(tmp_path: Path, line: str, words: str) -> None:
-    with pytest.raises(BadMeasurements) as caught:
+    with pytest.raises(InputError) as caught:
         read(tmp_path, GOOD, line)
     (sentence,) = str(caught.value).splitlines()
     assert "line 3" in sentence and words in sentence
@@ -65,7 +66,7 @@ def test_what_is_left_empty_is_none(tmp_path: Path) -> None:
 
 
 def test_every_mistake_is_told_at_once(tmp_path: Path) -> None:
-    with pytest.raises(BadMeasurements) as caught:
+    with pytest.raises(InputError) as caught:
         read(tmp_path, "frequency_Hz,2,0,,,240,0,-1,0.2", GOOD, "area,,,,,240,0,1,1")
     assert [line.split(":")[0][-6:] for line in str(caught.value).splitlines()] == [
         "line 2", "line 4",
@@ -74,7 +75,7 @@ def test_every_mistake_is_told_at_once(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("header", ["c,m,kind\n", HEADER.replace("sigma", "std"), ""])
 def test_wrong_columns(tmp_path: Path, header: str) -> None:
-    with pytest.raises(BadMeasurements, match=r"columns must be .* measured import"):
+    with pytest.raises(InputError, match=r"columns must be .* measured import"):
         read(tmp_path, GOOD, header=header)
 
 

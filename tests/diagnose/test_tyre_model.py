@@ -15,17 +15,18 @@ from tyrecal.diagnose.diagnosis import diagnose
 from tyrecal.diagnose.evidence import probabilities, weigh
 from tyrecal.diagnose.expansion import expand
 from tyrecal.diagnose.gap import find_gap, projection
-from tyrecal.diagnose.measurements import BadMeasurements, read_measurements
+from tyrecal.diagnose.measurements import read_measurements
 from tyrecal.diagnose.observations import observe
 from tyrecal.diagnose.problem import Assumed, Change, Problem, places
 from tyrecal.diagnose.regions import regions
 from tyrecal.diagnose.response import Answer, Point
 from tyrecal.diagnose.result import result
 from tyrecal.diagnose.separability import separate
-from tyrecal.diagnose.study import BadChange, parse_change, spans_of, study
+from tyrecal.diagnose.study import parse_change, spans_of, study
 from tyrecal.diagnose.tyre_model import TyreModel
 from tyrecal.diagnose.uncertainties import DENSITY, PRESSURE_kPa, sources
 from tyrecal.diagnose.verdict import decide
+from tyrecal.errors import InputError
 from tyrecal.evaluate.door import Door
 from tyrecal.evaluate.failure import DeckRefused
 from tyrecal.modes.mode import Label
@@ -221,14 +222,14 @@ def test_a_toggled_run_shows_the_cause(tmp_path: Path) -> None:
 def test_a_wrong_unit_and_one_mode_alone(tmp_path: Path) -> None:
     eta = asked(Point(X)).eta
     thrice = written(tmp_path / "a.csv", eta + np.log(2 * np.pi))
-    with pytest.raises(BadMeasurements, match="right unit"):
+    with pytest.raises(InputError, match="right unit"):
         study(CASE, Door(CASE), thrice, effects=EFFECTS)
     one = written(tmp_path / "b.csv", eta[5:6], ROWS[5:6])
     d = study(CASE, Door(CASE), one, effects=EFFECTS, section_map=False).diagnosis
     assert d.verdict.kind == "undecided" and "cannot tell" in d.verdict.words
     assert d.shrinkage is None
     weighed = written(tmp_path / "c.csv", eta[-1:], ROWS[-1:])
-    with pytest.raises(BadMeasurements, match="no frequency"):
+    with pytest.raises(InputError, match="no frequency"):
         study(CASE, Door(CASE), weighed, effects=EFFECTS)
 
 
@@ -248,7 +249,7 @@ def test_a_change_is_a_value_or_a_factor(text: str, change: Change) -> None:
     "text", ["bead_filler", "nonsense=0", "bead_filler=x", "=1", "bead_filler*1", "bead_filler=inf"]
 )
 def test_a_change_that_is_none(text: str) -> None:
-    with pytest.raises(BadChange):
+    with pytest.raises(InputError):
         parse_change(text)
 
 

@@ -16,10 +16,10 @@ import pytest
 
 from tyrecal.evaluate import door as door_module
 from tyrecal.evaluate import queue
-from tyrecal.evaluate.cluster import ClusterFailed, _at_worker
+from tyrecal.evaluate.cluster import _at_worker
 from tyrecal.evaluate.door import Counts, Door, Question
 from tyrecal.evaluate.executor import Here, WorkerLost
-from tyrecal.evaluate.failure import EvaluationFailed
+from tyrecal.evaluate.failure import EvaluationFailed, SolverUnavailable
 from tyrecal.evaluate.folders import drop_unfinished
 from tyrecal.evaluate.pressed import pressed
 from tyrecal.evaluate.record import Damaged
@@ -328,5 +328,5 @@ def test_as_many_jobs_as_the_workers_need(
 
 def test_workers_of_another_edition_are_refused() -> None:
     assert _at_worker(abs, sources(), -3) == 3
-    with pytest.raises(ClusterFailed, match="another edition"):
+    with pytest.raises(SolverUnavailable, match="another edition"):
         _at_worker(abs, "0" * 64, -3)

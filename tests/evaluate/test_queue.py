@@ -10,7 +10,7 @@ import pytest
 
 from tyrecal.evaluate.executor import executor
 from tyrecal.evaluate.queue import jobs_of, reached, read_settings
-from tyrecal.settings import BadSettings
+from tyrecal.settings import SettingsError
 
 SETTINGS = """
 queueing_system: {system}
@@ -75,7 +75,7 @@ def common(lines: list[str]) -> None:
 def test_wrong_settings_are_named(edit: tuple[str, str], words: list[str], tmp_path: Path) -> None:
     path = tmp_path / "cluster.yaml"
     path.write_text(SETTINGS.format(system="slurm").replace(*edit))
-    with pytest.raises(BadSettings) as refused:
+    with pytest.raises(SettingsError) as refused:
         read_settings(path)
     for word in words:
         assert word in str(refused.value)

@@ -12,12 +12,13 @@ import numpy as np
 import pytest
 
 from tyrecal.case import LoadedCase, load_case, start_values
+from tyrecal.errors import InputError
 from tyrecal.evaluate.door import Counts, Door, Question
 from tyrecal.evaluate.executor import Here, WorkerLost
 from tyrecal.evaluate.failure import DeckRefused, EvaluationFailed
 from tyrecal.evaluate.results import Evaluation
 from tyrecal.fit import calibrate as calibrate_module
-from tyrecal.fit.calibrate import NothingToFit, calibrate
+from tyrecal.fit.calibrate import calibrate
 from tyrecal.fit.crossing import crossing, gap
 from tyrecal.fit.problem import Problem, Target, objective, read_targets
 from tyrecal.fit.slsqp import _beyond_crossing
@@ -186,10 +187,10 @@ def test_fixed_variables_stay_and_others_move() -> None:
     fit = calibrate(CASE, door(), fixed={"C10": START["C10"]})  # type: ignore[arg-type]
     assert set(fit.result["variables"]) == {"A_belt", "A_carcass"}
     assert fit.result["fixed"] == {"C10": START["C10"]}
-    with pytest.raises(NothingToFit):
+    with pytest.raises(InputError):
         calibrate(CASE, door(), fixed=START)  # type: ignore[arg-type]
     without = replace(CASE, case=CASE.case.model_copy(update={"targets": None}))
-    with pytest.raises(NothingToFit):
+    with pytest.raises(InputError):
         calibrate(without, door())  # type: ignore[arg-type]
 
 
@@ -336,7 +337,7 @@ def test_standard_errors_are_those_of_the_fit_that_was_made(chance: Chance) -> N
 
 
 def test_targets_that_do_not_count_are_none() -> None:
-    with pytest.raises(NothingToFit, match="every target has the weight 0"):
+    with pytest.raises(InputError, match="every target has the weight 0"):
         calibrate(with_targets(weight=[0.0] * 9), door())  # type: ignore[arg-type]
 
 
@@ -365,7 +366,7 @@ def test_as_many_variables_as_data_tell_nothing_of_the_noise() -> None:
 
 def test_fewer_data_than_variables_are_said_to_be_too_few() -> None:
     one = [1.0] + [0.0] * 8
-    with pytest.raises(NothingToFit, match="1 target cannot determine 3 free variables"):
+    with pytest.raises(InputError, match="1 target cannot determine 3 free variables"):
         calibrate(with_targets(weight=one), door())  # type: ignore[arg-type]
 
 
@@ -397,7 +398,7 @@ def test_an_objective_that_no_computer_holds_is_refused() -> None:
     heavy = [mode.model_copy(update={"sigma_Hz": 1e-300}) for mode in targets.modes]
     update = {"targets": targets.model_copy(update={"modes": heavy})}
     case = replace(CASE, case=CASE.case.model_copy(update=update))
-    with np.errstate(over="ignore"), pytest.raises(NothingToFit, match="no finite objective"):
+    with np.errstate(over="ignore"), pytest.raises(InputError, match="no finite objective"):
         calibrate(case, door())
 
 

@@ -8,9 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tyrecal.errors import InputError
 from tyrecal.evaluate.door import Door, Question
 from tyrecal.evaluate.failure import DeckRefused, EvaluationFailed
-from tyrecal.fit.calibrate import NothingToFit, calibrate
+from tyrecal.fit.calibrate import calibrate
 from tyrecal.fit.differences import differences
 from tyrecal.fit.problem import Problem, Target, objective, objective_unit
 from tyrecal.fit.variable import Variable
@@ -137,7 +138,7 @@ def test_footprints_alone_determine_as_many_variables_as_there_are() -> None:
     assert result["converged"] and result["modes"] == [] and result["noise_Hz"] is None
     for name in ("A_carcass", "C10"):
         assert result["variables"][name]["value"] == pytest.approx(TRUTH[name], rel=1e-3)
-    with pytest.raises(NothingToFit, match="2 targets cannot determine 3 free variables"):
+    with pytest.raises(InputError, match="2 targets cannot determine 3 free variables"):
         calibrate(case, door(case))
 
 

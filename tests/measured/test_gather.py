@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tyrecal.errors import InputError
 from tyrecal.measured.gather import _entry, gather, result
 from tyrecal.measured.labels import Judged
 from tyrecal.measured.modal import Layout
-from tyrecal.measured.sensors import BadMeasuredData, MeasuredMode
+from tyrecal.measured.sensors import MeasuredMode
 from tyrecal.modes.mode import Label
 
 from ..chance import generator
@@ -57,7 +58,7 @@ def functions(reference: int, seed: int, kept: range = range(12)) -> list[dict[s
 def test_a_file_is_no_repeat_of_itself(tmp_path: Path) -> None:
     (tmp_path / "t.csv").write_text("c,m,pressure [kPa],frequency [Hz]\n2,1,240,66.1\n")
     (tmp_path / "sub").mkdir()
-    with pytest.raises(BadMeasuredData, match="is given twice"):
+    with pytest.raises(InputError, match="is given twice"):
         gather([tmp_path / "t.csv", tmp_path / "sub" / ".." / "t.csv"])
 
 
@@ -71,20 +72,20 @@ def test_two_references_and_geometry_of_its_own(tmp_path: Path) -> None:
     assert len(found.runs) == 2 and not found.notes
     assert all(run.explained > 0.99 for run in found.runs)
     assert all(mode["confidence"] > 0.99 for mode in result(found)["modes"])
-    with pytest.raises(BadMeasuredData, match="node 1 has no coordinates"):
+    with pytest.raises(InputError, match="node 1 has no coordinates"):
         gather(files, 240.0, LAYOUT)
 
 
 def test_references_need_the_same_signals(tmp_path: Path) -> None:
     path = write(tmp_path / "f.uff", nodes(), *functions(101, 1), *functions(102, 2, range(9)))
-    with pytest.raises(BadMeasuredData, match="node 10, direction 1 was not measured with every"):
+    with pytest.raises(InputError, match="node 10, direction 1 was not measured with every"):
         gather([path], 240.0, LAYOUT)
 
 
 def test_files_must_agree_on_where_a_node_is(tmp_path: Path) -> None:
     one = write(tmp_path / "1.uff", nodes(), shape(np.ones((8, 3)) + 0j))
     two = write(tmp_path / "2.uff", nodes(0.01), shape(np.ones((8, 3)) + 0j))
-    with pytest.raises(BadMeasuredData, match=r"2\.uff: node 1 stands elsewhere"):
+    with pytest.raises(InputError, match=r"2\.uff: node 1 stands elsewhere"):
         gather([one, two], 240.0, LAYOUT)
 
 

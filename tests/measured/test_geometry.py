@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tyrecal.errors import InputError
 from tyrecal.measured.geometry import _axle, sensors_of
-from tyrecal.measured.sensors import BadMeasuredData, real_part
+from tyrecal.measured.sensors import real_part
 
 ANGLES = np.radians([3, 31, 65, 88, 124, 149, 187, 214, 246, 271, 303, 337])
 
@@ -52,7 +53,7 @@ def test_directions_may_be_the_sensors_own_and_turned_round() -> None:
 def test_places_as_wide_as_high_do_not_tell_the_axle() -> None:
     """A tyre is less than three quarters as wide as high."""
     assert _axle(np.array([[0.0, 0, 0], [1.0, 1.1, 0.74]])) == "z"
-    with pytest.raises(BadMeasuredData, match="give --axle"):
+    with pytest.raises(InputError, match="give --axle"):
         _axle(np.array([[0.0, 0, 0], [1.0, 1.1, 0.76]]))
     assert sensors_of([(1, 1)], ring(0.3, 0.3), axle="z").points[0, 0] == pytest.approx(0.3)
 
@@ -62,7 +63,7 @@ def test_radii_are_a_tyres(radius: float, tyre: int) -> None:
     if tyre:
         assert len(sensors_of(SIGNALS, ring(radius)).points) == 36
     else:
-        with pytest.raises(BadMeasuredData, match="no tyre's"):
+        with pytest.raises(InputError, match="no tyre's"):
             sensors_of(SIGNALS, ring(radius))
 
 
@@ -72,7 +73,7 @@ def test_a_circle_stands_about_the_axle(off: float, fine: bool) -> None:
     if fine:
         assert sensors_of(SIGNALS, ring(off=off))
     else:
-        with pytest.raises(BadMeasuredData, match=f"middle {off:g} m off the axle"):
+        with pytest.raises(InputError, match=f"middle {off:g} m off the axle"):
             sensors_of(SIGNALS, ring(off=off))
     assert sensors_of(SIGNALS, ring(off=off), centre=(off, 0, 0)).points[:, 0] == pytest.approx(
         0.35
@@ -83,7 +84,7 @@ def test_few_sensors_or_none_on_a_circle_do_not_tell_a_centre() -> None:
     """Three, a row, or places that lie on no circle within 6 %."""
     moved = ring(off=0.1)
     assert sensors_of([(1, 1), (5, 1), (9, 1)], moved)
-    with pytest.raises(BadMeasuredData, match="off the axle"):
+    with pytest.raises(InputError, match="off the axle"):
         sensors_of([(1, 1), (4, 1), (7, 1), (10, 1)], moved)
     row = {k: (0.3, 0.02 * k, 0.01 * k) for k in range(1, 7)}
     assert sensors_of([(k, 1) for k in row], row, axle="z")
@@ -93,14 +94,14 @@ def test_few_sensors_or_none_on_a_circle_do_not_tell_a_centre() -> None:
             r = 0.35 * (1 + size * (-1) ** k)
             nodes[k + 1] = (r * np.cos(angle) + 0.1, r * np.sin(angle), 0.05 * (-1) ** (k // 2))
         if circle:
-            with pytest.raises(BadMeasuredData, match="off the axle"):
+            with pytest.raises(InputError, match="off the axle"):
                 sensors_of(SIGNALS, nodes)
         else:
             assert sensors_of(SIGNALS, nodes)
 
 
 def test_a_node_without_a_place_is_named() -> None:
-    with pytest.raises(BadMeasuredData, match="node 13 has no coordinates"):
+    with pytest.raises(InputError, match="node 13 has no coordinates"):
         sensors_of([(1, 1), (14, 1), (13, 1)], ring())
 
 

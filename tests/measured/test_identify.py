@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tyrecal.errors import InputError
 from tyrecal.measured import identify as module
 from tyrecal.measured.identify import Responses, identify
-from tyrecal.measured.sensors import BadMeasuredData
 
 from ..chance import Chance, generator
 from ..studies.identification import OFF, drawn, found
@@ -89,7 +89,7 @@ def test_noise_alone_is_no_mode(chance: Chance) -> None:
         try:
             noise = Responses(F, H[0] + 1j * H[1], "accelerance", np.arange(12))
             modes.append(len(identify(noise, 28, 125).modes))
-        except BadMeasuredData as error:
+        except InputError as error:
             assert "no mode is stable between 28 and 125 Hz" in str(error)
             modes.append(0)
     chance.often(np.array(modes) > 0, 0.0, 0.1)
@@ -111,7 +111,7 @@ def test_uneven_or_few_frequencies_are_refused() -> None:
     measured, _ = functions(0)
     for f in (F**1.01, F[:40]):
         bad = Responses(f, measured.values[:, : len(f)], "accelerance", measured.points)
-        with pytest.raises(BadMeasuredData, match="50 evenly spaced frequencies"):
+        with pytest.raises(InputError, match="50 evenly spaced frequencies"):
             identify(bad, 28.0, 125.0)
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tyrecal.measured.sensors import BadMeasuredData
+from tyrecal.errors import InputError
 from tyrecal.measured.tables import read_table
 from tyrecal.measured.values import Value, combined, measurements_csv
 from tyrecal.modes.mode import Label
@@ -76,7 +76,7 @@ def test_loaded_modes_have_a_symmetry(tmp_path: Path) -> None:
     head = "c,m,member,load [N],pressure [kPa],frequency [Hz]\n"
     (found,) = read(tmp_path, f"{head}2,0,symmetric,4000,240,85\n")
     assert (found.member, found.load_N) == ("symmetric", 4000)
-    with pytest.raises(BadMeasuredData, match="line 2: member is '1', must be symmetric or"):
+    with pytest.raises(InputError, match="line 2: member is '1', must be symmetric or"):
         read(tmp_path, f"{head}2,0,1,4000,240,85\n")
 
 
@@ -98,7 +98,7 @@ def test_two_of_a_label_with_waves_are_a_doublet(tmp_path: Path) -> None:
     assert [(v.label, v.member) for v in found] == [
         (AXIAL, ""), (Label(2, 1), "1"), (Label(2, 1), "2"),
     ]  # fmt: skip
-    with pytest.raises(BadMeasuredData, match="repeats, or the two of a doublet"):
+    with pytest.raises(InputError, match="repeats, or the two of a doublet"):
         read(tmp_path, "c,m,pressure [bar],f\n2,1,2.4,66.1\n2,1,2.4,66.3\n3,1,2.4,99\n")
 
 
@@ -153,13 +153,13 @@ def test_sigma_is_that_of_its_unit_or_of_all_in_percent(tmp_path: Path) -> None:
     ],
 )  # fmt: skip
 def test_mistakes_are_named_with_their_line(tmp_path: Path, text: str | bytes, words: str) -> None:
-    with pytest.raises(BadMeasuredData, match=words) as error:
+    with pytest.raises(InputError, match=words) as error:
         read(tmp_path, text)
     assert str(error.value).startswith(str(tmp_path / "t.csv")) and "\n" not in str(error.value)
 
 
 def test_every_mistake_is_told_at_once(tmp_path: Path) -> None:
-    with pytest.raises(BadMeasuredData) as error:
+    with pytest.raises(InputError) as error:
         read(tmp_path, PLAIN + "2,9,,240,79.5\n2,0,,240,x\n")
     lines = str(error.value).splitlines()
     assert ["line 4" in lines[0], "line 5" in lines[1], len(lines)] == [True, True, 2]
@@ -169,5 +169,5 @@ def test_every_mistake_is_told_at_once(tmp_path: Path) -> None:
 def test_a_table_may_be_as_long_as_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("tyrecal.measured.tables.MOST_LINES", 3)
     assert len(read(tmp_path, PLAIN)) == 2
-    with pytest.raises(BadMeasuredData, match="more than 3 lines"):
+    with pytest.raises(InputError, match="more than 3 lines"):
         read(tmp_path, PLAIN + "3,1,,240,102.7\n")

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 import pyuff
 
+from tyrecal.errors import InputError
 from tyrecal.measured.geometry import sensors_of
-from tyrecal.measured.sensors import BadMeasuredData
 from tyrecal.measured.universal import is_universal, read_universal
 
 from ..chance import generator
@@ -123,14 +123,14 @@ def test_the_axle_is_told_by_the_places_or_asked_for() -> None:
         n: (0.3 * x, 0.3 * y, 0.3 * z)
         for n, (x, y, z) in enumerate(np.vstack([np.eye(3), -np.eye(3)]))
     }
-    with pytest.raises(BadMeasuredData, match="give --axle"):
+    with pytest.raises(InputError, match="give --axle"):
         sensors_of([(n, 1) for n in ball], ball)
 
 
 def test_another_centre_is_noticed() -> None:
     nodes = {n: (0.39 * np.cos(a) + 1.0, 0.39 * np.sin(a), 0.0) for n, a in enumerate(ANGLES)}
     signals = [(n, 3) for n in nodes]
-    with pytest.raises(BadMeasuredData, match=r"off the axle; give --centre"):
+    with pytest.raises(InputError, match=r"off the axle; give --centre"):
         sensors_of(signals, nodes, "z", (0.5, 0.0, 0.0))
     assert sensors_of(signals, nodes, "z", (1.0, 0.0, 0.0)).points[:, 0] == pytest.approx(0.39)
 
@@ -146,7 +146,7 @@ def test_a_file_cut_off_anywhere_is_refused_with_its_line(tmp_path: Path, binary
         path.write_bytes(whole[: int(end)])
         if any(end - 1 <= mark <= end for mark in marks):
             continue  # between two sets: a whole file of fewer sets
-        with pytest.raises(BadMeasuredData, match=r"cut\.uff, (line \d+: )?data set \d"):
+        with pytest.raises(InputError, match=r"cut\.uff, (line \d+: )?data set \d"):
             read_universal(path)
 
 
@@ -166,7 +166,7 @@ def test_wrong_sets_are_named(tmp_path: Path, sets: list[dict[str, Any]], words:
     for each in sets:
         if each["type"] == 55 and abs(each["eig"]) and words.endswith("-37.8 Hz"):
             each |= {"analysis_type": 2, "freq": -37.8}
-    with pytest.raises(BadMeasuredData, match=words) as error:
+    with pytest.raises(InputError, match=words) as error:
         read_universal(write(tmp_path / "bad.uff", *sets))
     assert str(error.value).startswith(f"{tmp_path / 'bad.uff'}, data set ")
     assert "\n" not in str(error.value)
@@ -176,7 +176,7 @@ def test_a_set_that_holds_less_than_it_says_is_refused(tmp_path: Path) -> None:
     path = write(tmp_path / "f.uff", function(some(80)[:, 0], np.arange(80.0)))
     lines = path.read_text().splitlines(keepends=True)
     path.write_text("".join(lines[:20] + lines[25:]))
-    with pytest.raises(BadMeasuredData, match="70 values, the set says 80; it is cut off"):
+    with pytest.raises(InputError, match="70 values, the set says 80; it is cut off"):
         read_universal(path)
 
 

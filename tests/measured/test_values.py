@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import t
 
-from tyrecal.measured.sensors import BadMeasuredData
+from tyrecal.errors import InputError
 from tyrecal.measured.values import Value, combined, measurements_csv
 from tyrecal.modes.mode import Label
 
@@ -61,7 +61,7 @@ def test_no_sigma_is_below_the_floor() -> None:
 
 
 def test_a_single_value_without_sigma_is_refused() -> None:
-    with pytest.raises(BadMeasuredData, match=r"nothing tells how far \[1,0\] may be off"):
+    with pytest.raises(InputError, match=r"nothing tells how far \[1,0\] may be off"):
         combined([value(66.0, "1")])
 
 
@@ -88,7 +88,7 @@ def test_a_lone_member_stays_one() -> None:
 @pytest.mark.parametrize("runs", [[value(66.0, "1", sigma=40.0)],
                                   [value(30.0, "1"), value(90.0, "2")]])  # fmt: skip
 def test_a_sigma_that_no_fit_would_read_is_refused(runs: list[Value]) -> None:
-    with pytest.raises(BadMeasuredData, match=r"sigma of \[1,0\] comes to .* more than 20%"):
+    with pytest.raises(InputError, match=r"sigma of \[1,0\] comes to .* more than 20%"):
         combined(runs)
 
 

@@ -8,9 +8,9 @@ import meshio
 import numpy as np
 import pytest
 
+from tyrecal.errors import InputError
 from tyrecal.evaluate.results import HarmonicShape, RawMode, RingShape
 from tyrecal.modes.mode import Label, Mode
-from tyrecal.report.revolve import NoSectionShape
 from tyrecal.report.vtu import write_vtu
 from tyrecal.tyre.mesh import SectionMesh, build_mesh
 from tyrecal.tyre.section import read_section
@@ -100,5 +100,5 @@ def test_a_pair_moves_along_x_and_a_quarter_turn_on_along_z(tmp_path, mesh):
 
 def test_shapes_on_rings_are_refused(tmp_path, mesh):
     rings = RawMode(50.0, RingShape(np.ones((9, 3)), np.ones((9, 3))), 2)
-    with pytest.raises(NoSectionShape, match="section"):
+    with pytest.raises(InputError, match="section"):
         write_vtu(tmp_path / "mode.vtu", Mode(Label(2, 0), 50.0, 2, 1.0, 0, rings), mesh)

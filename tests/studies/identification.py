@@ -20,8 +20,8 @@ from pathlib import Path
 import numpy as np
 
 from tests.kernels import KERNELS, THREADS, run
+from tyrecal.errors import InputError
 from tyrecal.measured.identify import Responses, identify
-from tyrecal.measured.sensors import BadMeasuredData
 
 Array = np.ndarray
 OFF = 1e-10
@@ -55,7 +55,7 @@ def found(values: Responses, low: float, high: float) -> list[list[float]]:
     """Frequency and sigma of each mode."""
     try:
         modes = identify(values, low, high).modes
-    except BadMeasuredData:
+    except InputError:
         return []
     return [[m.frequency_Hz, float(m.sigma_Hz or np.nan), float(m.damping or 0)] for m in modes]
 

@@ -6,7 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tyrecal.tyre.size import ASPECTS, INCH, RIM_CODES, UnknownSize, parse_size
+from tyrecal.errors import InputError
+from tyrecal.tyre.size import ASPECTS, INCH, RIM_CODES, parse_size
 
 # overall diameter and design section width, mm, measuring rim, inch: tables of the European Tyre
 # and Rim Technical Organisation and the Tire and Rim Association, which round the rim's diameter
@@ -119,6 +120,6 @@ def test_the_service_description_sets_the_pressure() -> None:
     ],
 )
 def test_what_is_no_radial_tyre(text: str, words: str) -> None:
-    with pytest.raises(UnknownSize, match=words) as error:
+    with pytest.raises(InputError, match=words) as error:
         parse_size(text)
     assert "\n" not in str(error.value)

@@ -35,9 +35,9 @@ from ..case import (
     with_values,
 )
 from ..deck.environment import TemplateFailed
+from ..errors import InputError
 from ..evaluate.door import Door
 from ..evaluate.failure import DeckRefused, EvaluationFailed, SolverUnavailable
-from ..evaluate.solver import UnknownSolver
 from ..evaluate.sources import sources
 from ..evaluate.store import Store, sources_of
 from ..files import (
@@ -49,13 +49,12 @@ from ..files import (
     write_runs,
     write_text,
 )
-from ..fit.calibrate import NothingToFit
 from ..provenance import provenance
 from ..studies.fitted import NOT_CONVERGED, has_good
 from .studies import Asked, Outcome, Studied, study
 
 FINISHED = "finished.json"  # in a case's folder: what was asked, and the answer
-INPUT = (CaseError, DeckRefused, NothingToFit, TemplateFailed, UnknownSolver)
+INPUT = (CaseError, DeckRefused, InputError, TemplateFailed, InputError)
 ENDED = ("good", "failed")
 AGAIN = {"crashed", "timed_out", "no_results", "licence", "unavailable", "disc", "internal"}
 Report = dict[str, Any]

@@ -15,6 +15,7 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
+from ..errors import InputError
 from ..files import read_json
 from .case import Report
 
@@ -39,10 +40,6 @@ DEFAULTS = {  # of a baseline that is written for the first time; people edit th
 Numbers = dict[str, dict[str, dict[str, float]]]  # by case, study, quantity
 
 
-class BadBaseline(ValueError):
-    """The file is no baseline, or names a tolerance that cannot be."""
-
-
 def numbers_of(reports: Sequence[Report]) -> Numbers:
     """What a baseline keeps of reports: the quantities of all studies that are good."""
     kept = {
@@ -63,31 +60,31 @@ def baseline_of(reports: Sequence[Report], before: Mapping[str, Any] | None) -> 
 
 
 def read_baseline(path: Path) -> dict[str, Any]:
-    """A baseline from its file. Raises BadBaseline, in one sentence; OSError."""
+    """A baseline from its file. Raises InputError, in one sentence; OSError."""
     try:
         found = read_json(path)
     except ValueError as error:
-        raise BadBaseline(f"'{path}' is not a baseline: {error}") from None
+        raise InputError(f"'{path}' is not a baseline: {error}") from None
     if not isinstance(found, dict) or found.get("format") != 1:
-        raise BadBaseline(f"'{path}' is not a baseline of format 1")
+        raise InputError(f"'{path}' is not a baseline of format 1")
     tolerances, cases = found.get("tolerances"), found.get("cases")
     if not isinstance(tolerances, dict) or not isinstance(cases, dict):
-        raise BadBaseline(f"'{path}' is not a baseline: tolerances and cases are wanted")
+        raise InputError(f"'{path}' is not a baseline: tolerances and cases are wanted")
     for name, tolerance in tolerances.items():
         known = isinstance(tolerance, dict) and set(tolerance) <= {"relative", "absolute"}
         if not known or not all(_number(x) and x >= 0 for x in tolerance.values()):
-            raise BadBaseline(
+            raise InputError(
                 f"'{path}': tolerances.{name} must be {{'relative': r, 'absolute': a}} with finite"
                 f" numbers of 0 or more, got {json.dumps(tolerance)}"
             )
     for case, studies in cases.items():
         for study, quantities in studies.items() if isinstance(studies, dict) else [("?", None)]:
             if not isinstance(quantities, dict) or not all(map(_number, quantities.values())):
-                raise BadBaseline(f"'{path}': cases.{case}.{study} must be names with numbers")
+                raise InputError(f"'{path}': cases.{case}.{study} must be names with numbers")
             for quantity in quantities:
                 if not _named(tolerances, study, quantity):
                     kind = f"{study}/{quantity.partition(' ')[0]}"
-                    raise BadBaseline(f"'{path}': no tolerance '{kind}' for cases.{case}")
+                    raise InputError(f"'{path}': no tolerance '{kind}' for cases.{case}")
     return found
 
 

@@ -41,7 +41,7 @@ def run_batch(
 ) -> list[Report]:
     """Reports in the order of the tasks; ``notify`` gets each as it comes.
 
-    Raises ClusterFailed. Interrupted, it leaves whatever has finished on record.
+    Raises SolverUnavailable. Interrupted, it leaves whatever has finished on record.
     """
     reports: dict[int, Report] = {}
     with executor(jobs, scheduler) as workers, closing(workers.each(run_case, tasks)) as answers:

@@ -51,7 +51,7 @@ def tyre_model(
 
 
 def case_of(folder: Path) -> LoadedCase:
-    """The case that lies beside the trials. Raises BadTrials, CaseError."""
+    """The case that lies beside the trials. Raises InputError, CaseError."""
     return load_case(folder / "case" / read_protocol(folder).case, allow_unusual=True)
 
 
@@ -64,7 +64,7 @@ def answer(
 ) -> str:
     """Answer every trial that has no answer yet; returns the sha256 of all answers.
 
-    Raises BadTrials where the truth lies among the trials.
+    Raises InputError where the truth lies among the trials.
     """
     refuse_open_truth(folder)
     protocol = read_protocol(folder)

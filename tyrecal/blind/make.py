@@ -19,13 +19,14 @@ import numpy as np
 from ..case import LoadedCase
 from ..diagnose.measurements import COLUMNS
 from ..diagnose.uncertainties import sources
+from ..errors import InputError
 from ..evaluate.failure import EvaluationFailed
 from ..evaluate.pool import process_pool
 from ..files import refuse_link, whole
 from ..modes.mode import Label
 from .draw import NEAR, Truth, draw, tyre
 from .maker import Heard, Maker
-from .protocol import BadTrials, Protocol, read_json, write_json, write_protocol
+from .protocol import Protocol, read_json, write_json, write_protocol
 from .ruler import write_ruler
 from .seal import SEAL, seal
 
@@ -58,12 +59,12 @@ def make(
 
     ruler: measures what tells how hard a trial is (`ruler.measure`), before anything is drawn;
     seed: None = a secret one, kept in ``sealed`` so that the same call goes on where it was
-    stopped. Raises BadTrials where the folder holds trials already, or the truth would lie in it.
+    stopped. Raises InputError where the folder holds trials already, or the truth would lie in it.
     """
     if (folder / SEAL).exists():
-        raise BadTrials(f"{folder} holds sealed trials already; make others in another folder")
+        raise InputError(f"{folder} holds sealed trials already; make others in another folder")
     if sealed.resolve().is_relative_to(folder.resolve()):
-        raise BadTrials(f"the truth must not lie in {folder}, which is answered")
+        raise InputError(f"the truth must not lie in {folder}, which is answered")
     folder.mkdir(parents=True, exist_ok=True)
     sealed.mkdir(parents=True, exist_ok=True)
     for path in (*folder.rglob("*"), sealed / "made", sealed / "record"):
@@ -90,9 +91,9 @@ def make(
 
 
 def labels_of(case: LoadedCase) -> list[Label]:
-    """The modes that are measured: the case's targets. Raises BadTrials."""
+    """The modes that are measured: the case's targets. Raises InputError."""
     if case.case.targets is None or not case.case.targets.modes:
-        raise BadTrials(f"{case.path}: blind trials measure the case's targets.modes, it has none")
+        raise InputError(f"{case.path}: blind trials measure the case's targets.modes, it has none")
     return [Label(t.c, t.m, t.kind) for t in case.case.targets.modes]
 
 
@@ -154,7 +155,7 @@ def _make(protocol: Protocol, case: LoadedCase, maker: Maker, truth: Truth) -> M
         except (EvaluationFailed, ValueError) as failure:
             last = failure
         truth = _again(truth, case, protocol, random)
-    raise BadTrials(f"no tyre with {truth.law or 'these constants'} has a solution: {last}")
+    raise InputError(f"no tyre with {truth.law or 'these constants'} has a solution: {last}")
 
 
 def _again(
@@ -257,7 +258,7 @@ def _seed(sealed: Path, seed: int | None) -> int:
     if path.exists():
         known = int(read_json(path)["seed"])
         if seed is not None and seed != known:
-            raise BadTrials(f"{path} holds another seed; give another folder for the truth")
+            raise InputError(f"{path} holds another seed; give another folder for the truth")
         return known
     seed = secrets.randbits(63) if seed is None else seed
     write_json(path, {"seed": seed})

@@ -5,15 +5,12 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+from ..errors import InputError
 from ..files import json_text, write_text
 from ..files import read_json as read_file
 
 FILE = "protocol.json"
 KINDS = ("effect", "none", "outside")
-
-
-class BadTrials(ValueError):
-    """A folder of trials that is incomplete, changed or not what it says."""
 
 
 @dataclass(frozen=True)
@@ -53,15 +50,15 @@ def write_json(path: Path, content: object) -> None:
 
 
 def read_json(path: Path) -> dict:
-    """A file of JSON. Raises BadTrials."""
+    """A file of JSON. Raises InputError."""
     try:
         content = read_file(path, follow=False)
     except FileNotFoundError:
-        raise BadTrials(f"{path} is missing") from None
+        raise InputError(f"{path} is missing") from None
     except ValueError:
-        raise BadTrials(f"{path} is not JSON") from None
+        raise InputError(f"{path} is not JSON") from None
     if not isinstance(content, dict):
-        raise BadTrials(f"{path} must hold an object")
+        raise InputError(f"{path} must hold an object")
     return content
 
 
@@ -71,11 +68,11 @@ def write_protocol(folder: Path, protocol: Protocol) -> None:
 
 
 def read_protocol(folder: Path) -> Protocol:
-    """The rules of ``folder``. Raises BadTrials."""
+    """The rules of ``folder``. Raises InputError."""
     content = read_json(folder / FILE)
     try:
         content.pop("format")
         content["given_kPa"] = tuple(content["given_kPa"])
         return Protocol(**content)
     except (KeyError, TypeError) as error:
-        raise BadTrials(f"{folder / FILE}: not the rules of trials ({error})") from None
+        raise InputError(f"{folder / FILE}: not the rules of trials ({error})") from None

@@ -21,8 +21,9 @@ import numpy as np
 
 from ..diagnose.form_error import form_error
 from ..diagnose.response import Answer, Point, Response
+from ..errors import InputError
 from ..modes.mode import Label
-from .protocol import BadTrials, Protocol, read_json, write_json
+from .protocol import Protocol, read_json, write_json
 
 Array = np.ndarray
 FILE = "ruler.json"
@@ -195,7 +196,7 @@ def write_ruler(folder: Path, content: Mapping[str, Any]) -> None:
 
 
 def read_ruler(folder: Path, labels: Sequence[Label]) -> Ruler:
-    """The ruler of ``folder``. Raises BadTrials."""
+    """The ruler of ``folder``. Raises InputError."""
     content = read_json(folder / FILE)
     known: dict[str, Label | None] = {str(label): label for label in labels}
     known["mass"] = None
@@ -208,7 +209,7 @@ def read_ruler(folder: Path, labels: Sequence[Label]) -> Ruler:
         rows = tuple((known[name], float(p)) for name, p in content["rows"])
         return Ruler(rows, signatures=signatures, **numbers)
     except (KeyError, ValueError, TypeError) as error:
-        raise BadTrials(f"{folder / FILE}: not a ruler of these trials ({error})") from None
+        raise InputError(f"{folder / FILE}: not a ruler of these trials ({error})") from None
 
 
 def _words(label: Label | None) -> str:

@@ -72,7 +72,7 @@ class Scored:
 
 
 def score(folder: Path, sealed: Path) -> list[Scored]:
-    """Every trial, scored. Raises BadTrials."""
+    """Every trial, scored. Raises InputError."""
     content = open_truth(folder, sealed)
     protocol = read_protocol(folder)
     labels = labels_of(case_of(folder))

@@ -13,8 +13,9 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
+from ..errors import InputError
 from ..files import read_bytes, whole
-from .protocol import BadTrials, read_json, write_json
+from .protocol import read_json, write_json
 
 SEAL, TRUTH, ANSWERS = "seal.json", "truth.json", "answers.json"
 
@@ -30,19 +31,19 @@ def seal(folder: Path, sealed: Path, content: dict[str, Any]) -> str:
 
 
 def open_truth(folder: Path, sealed: Path) -> dict[str, Any]:
-    """The truth, if it is the sealed one and the answers are in. Raises BadTrials."""
+    """The truth, if it is the sealed one and the answers are in. Raises InputError."""
     check_answers(folder)
     content = read_json(sealed / TRUTH)
     if _sha256(sealed / TRUTH) != read_json(folder / SEAL).get("sha256"):
-        raise BadTrials(f"{sealed / TRUTH} is not the truth that {folder / SEAL} seals")
+        raise InputError(f"{sealed / TRUTH} is not the truth that {folder / SEAL} seals")
     return content
 
 
 def refuse_open_truth(folder: Path) -> None:
-    """Raises BadTrials where the truth can be read from the folder that is answered."""
+    """Raises InputError where the truth can be read from the folder that is answered."""
     found = sorted(folder.rglob(TRUTH))
     if found:
-        raise BadTrials(f"{found[0]} lies open among the trials; move it elsewhere")
+        raise InputError(f"{found[0]} lies open among the trials; move it elsewhere")
     read_json(folder / SEAL)
 
 
@@ -54,14 +55,14 @@ def seal_answers(folder: Path, files: list[Path]) -> str:
 
 
 def check_answers(folder: Path) -> list[Path]:
-    """The answers, if all are in and none was changed since. Raises BadTrials."""
+    """The answers, if all are in and none was changed since. Raises InputError."""
     stated = read_json(folder / ANSWERS)
     files = sorted((folder / "answers").glob("*.json"))
     names = {path.stem for path in (folder / "trials").glob("*.csv")}
     if {path.stem for path in files} != names:
-        raise BadTrials(f"{folder}: not every trial has one answer; 'tyrecal blind answer' first")
+        raise InputError(f"{folder}: not every trial has one answer; 'tyrecal blind answer' first")
     if stated.get("sha256") != _of_all(files):
-        raise BadTrials(f"{folder}: answers were changed after they were hashed")
+        raise InputError(f"{folder}: answers were changed after they were hashed")
     return files
 
 

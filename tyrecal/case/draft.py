@@ -9,6 +9,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from ..errors import InputError
 from ..files import read_bytes
 from ..tyre.from_size import build, usual
 from ..tyre.section import SectionError, refuse_separators
@@ -22,10 +23,6 @@ FLANGE = 17.3e-3  # m, height of the rim's flange, contour J
 PRESSURE_KPA = 250.0  # where nothing says more
 
 
-class BadSection(ValueError):
-    """A file that is no section, or gauges that a size cannot have; one sentence."""
-
-
 @dataclass(frozen=True)
 class Draft:
     """A case's text and the file that its section is in: name beside the case, and content."""
@@ -35,26 +32,26 @@ class Draft:
     content: bytes
 
     def check(self, allow_unusual: bool = False) -> None:
-        """Raises BadSection where the case is not right, a mistake a line."""
+        """Raises InputError where the case is not right, a mistake a line."""
         with TemporaryDirectory() as folder:
             Path(folder, self.file).write_bytes(self.content)
             path = Path(folder, "case.yaml")
             path.write_text(self.text, encoding="utf-8")
             mistakes = validate(path, allow_unusual)
         if mistakes:
-            raise BadSection("\n".join(f"{m.key} is {m.value}: {m.message}" for m in mistakes))
+            raise InputError("\n".join(f"{m.key} is {m.value}: {m.message}" for m in mistakes))
 
 
 def from_size(
     size: TyreSize, lengths: Mapping[str, float], pressure_kPa: float | None, stem: str
 ) -> Draft:
     """A case with a section built from a size; ``lengths``: fields of Gauges that differ from the
-    usual, m. Raises BadSection."""
+    usual, m. Raises InputError."""
     try:
         gauges = replace(usual(size, lengths.get("rim")), **lengths)
         table = build(size, gauges)
     except SectionError as error:
-        raise BadSection(str(error)) from None
+        raise InputError(str(error)) from None
     mm = {k: f"{1e3 * getattr(gauges, k):.1f}" for k in ("crown", "sidewall", "bead", "belt")}
     text = new_case(
         table.section(),
@@ -73,12 +70,12 @@ def from_file(
     file: Path, size: TyreSize | None, belt: float | None, pressure_kPa: float | None
 ) -> Draft:
     """A case with the section in ``file``: a station table, or two curves with a belt of width
-    ``belt``, m. Raises BadSection, OSError."""
+    ``belt``, m. Raises InputError, OSError."""
     content = read_bytes(file)  # before others open it: it may be a pipe
     try:
         outline = _is_outline(file)
         if belt is not None and not outline:
-            raise BadSection("--belt-width-mm goes with an outline: a station table has its belts")
+            raise InputError("--belt-width-mm goes with an outline: a station table has its belts")
         keys = _outline_keys(file, size, belt) if outline else None
         given: dict[str, Any] = (
             {"outline": {"file": file.name, **keys}} if keys else {"stations": file.name}
@@ -99,11 +96,11 @@ def from_file(
         return Draft(text, file.name, content)
     except SectionError as error:
         line = f", line {error.line}" if error.line else ""
-        raise BadSection(f"{file}{line}: {error}") from None
+        raise InputError(f"{file}{line}: {error}") from None
     except UnicodeDecodeError:
-        raise BadSection(f"{file}: must be text in UTF-8") from None
+        raise InputError(f"{file}: must be text in UTF-8") from None
     except csv.Error as error:
-        raise BadSection(f"{file}: {error}") from None
+        raise InputError(f"{file}: {error}") from None
 
 
 def _is_outline(file: Path) -> bool:

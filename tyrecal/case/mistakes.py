@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from difflib import get_close_matches
 
+from ..errors import InputError
 from ..files import printable
 
 Keys = tuple[str | int, ...]
@@ -31,7 +32,7 @@ class Mistake:
         return printable(f"{where}: {what}{self.message}")
 
 
-class CaseError(ValueError):
+class CaseError(InputError):
     """A case that cannot be used; ``mistakes`` holds all that is wrong with it."""
 
     def __init__(self, mistakes: list[Mistake]):

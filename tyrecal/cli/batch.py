@@ -161,7 +161,7 @@ def _studies(text: str) -> tuple[str, ...]:
 
 
 def _prepare(tasks: Sequence[Any], folder: Path) -> None:
-    """Make the cases' folders in ``folder`` ready. Raises OutputRefused where one is another
+    """Make the cases' folders in ``folder`` ready. Raises InputError where one is another
     case's; OSError where one is a link."""
     from .output import refuse_other
 

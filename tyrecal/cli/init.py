@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from ..errors import InputError
 from . import options
 from .talk import Talk
 
@@ -107,14 +108,13 @@ def _write(
     """Write case, section and picture, none over an existing file and only what is right."""
     from ..case import load_case
     from ..files import whole
-    from .output import OutputRefused
 
     table = target.with_name(draft.file)
     own = file is not None and file.resolve() == table.resolve()  # it is there already
     contents = {target: draft.text.encode(), **({} if own else {table: draft.content})}
     for path in [*contents, *([picture] if picture else [])]:
         if path.exists() and not force:
-            raise OutputRefused(f"'{path}' exists already; give --force to write over it")
+            raise InputError(f"'{path}' exists already; give --force to write over it")
     target.parent.mkdir(parents=True, exist_ok=True)
     for path, content in contents.items():
         with whole(path) as partial:

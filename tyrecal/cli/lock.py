@@ -10,6 +10,7 @@ import platform
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ..errors import InputError
 from ..files import open_file, read_json, write_text
 
 if TYPE_CHECKING:
@@ -17,10 +18,6 @@ if TYPE_CHECKING:
 
 FILE, OWNER = ".lock", ".lock.json"  # what is locked; who holds it, which Windows reads meanwhile
 log = logging.getLogger("tyrecal")
-
-
-class Locked(ValueError):
-    """Another process works in the folder."""
 
 
 class Lock:
@@ -38,7 +35,7 @@ class Lock:
 def lock(folder: Path, command: str, started: str) -> Lock | None:
     """Lock ``folder``; None, with a warning, where the file system has no locks.
 
-    Raises Locked, naming the other process; NotAFile for what is no lock; OSError.
+    Raises InputError, naming the other process; NotAFile for what is no lock; OSError.
     """
     from filelock import FileLock, SoftFileLock, Timeout
 
@@ -51,7 +48,7 @@ def lock(folder: Path, command: str, started: str) -> Lock | None:
             raise NotImplementedError("this Python has none")
         held.acquire(timeout=0)
     except Timeout:
-        raise Locked(
+        raise InputError(
             f"folder '{folder}' is in use by {_owner(folder / OWNER)}: wait for it, or give"
             " another folder with --output"
         ) from None

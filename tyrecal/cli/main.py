@@ -10,6 +10,7 @@ from typing import Any
 
 import click
 
+from ..errors import TyrecalError
 from ..files import CHANGED
 from ..interrupt import SIGNALS, exit_code, interrupt_heard, interrupts_remembered
 from .talk import RESUME, coloured, error, say
@@ -138,13 +139,13 @@ def cli(ctx: click.Context) -> None:
 
 
 def _defaults(command: str | None) -> dict[str, Any]:
-    """What the user's settings say in place of an option. Raises BadSettings, but not where the
+    """What the user's settings say in place of an option. Raises SettingsError, but not where the
     installation is looked at."""
-    from ..settings import BadSettings, settings
+    from ..settings import SettingsError, settings
 
     try:
         found = settings()
-    except BadSettings:
+    except SettingsError:
         if command in ("doctor", "solvers"):
             return {}
         raise
@@ -186,28 +187,6 @@ def main(arguments: list[str] | None = None) -> None:
 
 def _exit_code(failure: Exception) -> int | None:
     """Exit code of a failure that is somebody's, None for a bug of ours."""
-    kinds: list[tuple[str, str, int]] = [
-        ("tyrecal.evaluate.failure", "EvaluationFailed", EXIT_SOLVER),
-        ("tyrecal.evaluate.failure", "SolverUnavailable", EXIT_SOLVER),
-        ("tyrecal.evaluate.failure", "DeckRefused", EXIT_INPUT),
-        ("tyrecal.evaluate.solver", "UnknownSolver", EXIT_INPUT),
-        ("tyrecal.deck.environment", "TemplateFailed", EXIT_INPUT),
-        ("tyrecal.fit.calibrate", "NothingToFit", EXIT_INPUT),
-        ("tyrecal.settings", "BadSettings", EXIT_INPUT),
-        ("tyrecal.batch.drift", "BadBaseline", EXIT_INPUT),
-        ("tyrecal.diagnose.measurements", "BadMeasurements", EXIT_INPUT),
-        ("tyrecal.diagnose.study", "BadChange", EXIT_INPUT),
-        ("tyrecal.measured.sensors", "BadMeasuredData", EXIT_INPUT),
-        ("tyrecal.blind.protocol", "BadTrials", EXIT_INPUT),
-        ("tyrecal.tyre.size", "UnknownSize", EXIT_INPUT),
-        ("tyrecal.case.draft", "BadSection", EXIT_INPUT),
-        ("tyrecal.cli.output", "OutputRefused", EXIT_INPUT),
-        ("tyrecal.cli.lock", "Locked", EXIT_INPUT),
-        ("tyrecal.report.html.results", "BadResults", EXIT_INPUT),
-        ("tyrecal.case", "CaseError", EXIT_INPUT),
-    ]
-    for module, name, code in kinds:
-        loaded: Any = sys.modules.get(module)  # an error of a module never imported cannot occur
-        if loaded is not None and isinstance(failure, getattr(loaded, name)):
-            return code
+    if isinstance(failure, TyrecalError):
+        return failure.exit_code
     return EXIT_INPUT if isinstance(failure, OSError) else None

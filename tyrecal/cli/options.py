@@ -242,7 +242,7 @@ class Study:
         return load(path, self.mesh, assigned, pressure_kPa, self.talk, self.allow_unusual)
 
     def door(self, loaded: Any) -> Door:
-        """The door to the solver asked for. Raises UnknownSolver."""
+        """The door to the solver asked for. Raises InputError."""
         from ..evaluate.door import Door
 
         door = Door(loaded, self.solver, command=self.solver_command)
@@ -259,7 +259,7 @@ class Study:
         **state: Any,
     ) -> Run:
         """The command's run, with the record behind ``door``; ``study``: where it is not
-        ``command``; measured, state: of the results' `provenance`. Raises OutputRefused, Locked,
+        ``command``; measured, state: of the results' `provenance`. Raises InputError,
         OSError."""
         from ..provenance import provenance
         from .output import Run
@@ -288,7 +288,7 @@ class Study:
         self.page(run)
 
     def page(self, run: Run) -> None:
-        """Where it is wanted, write report.html of all that the folder holds. Raises BadResults."""
+        """Where it is wanted, write report.html of all that the folder holds. Raises InputError."""
         if self.report:
             from ..report.html.page import write_page
 
@@ -402,7 +402,7 @@ def _by_settings(option: str) -> bool:
 
 
 def _words(command: str | None) -> tuple[str, ...]:
-    """The words of --solver-command. Raises BadSettings."""
+    """The words of --solver-command. Raises SettingsError."""
     if command is None:
         return ()
     from ..settings import words

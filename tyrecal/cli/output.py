@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from ..errors import InputError
 from ..files import (
     PREVIOUS,
     RESULTS,
@@ -42,17 +43,13 @@ if TYPE_CHECKING:
 NEW = ".new-"  # folder of a run's results until all are there
 
 
-class OutputRefused(ValueError):
-    """The results folder belongs to another case."""
-
-
 class Run:
     """One command's run: its folder, locked until the command ends, and its study's entry in
     run.json, which holds all that differs between runs.
 
     Results are written to a folder of their own, ``new``; those of the study's last run stay in
     their place until all new ones are there (`finish`), and where the run fails. Raises
-    OutputRefused where the folder holds another case's results; Locked; OSError.
+    InputError where the folder holds another case's results; InputError; OSError.
     """
 
     def __init__(
@@ -73,7 +70,7 @@ class Run:
         self.counts: Counts | None = None
         resume("nothing was computed; the same command starts from the beginning")
         if self.folder.exists() and not self.folder.is_dir():
-            raise OutputRefused(f"'{self.folder}' is a file; give a folder with --output")
+            raise InputError(f"'{self.folder}' is a file; give a folder with --output")
         self.folder.mkdir(parents=True, exist_ok=True)
         self._lock = lock.lock(self.folder, command, self.started)
         click.get_current_context().call_on_close(self._close)
@@ -195,14 +192,14 @@ def drop_new(folder: Path) -> None:
 
 
 def refuse_other(folder: Path, case: Path) -> None:
-    """Raises OutputRefused where ``folder`` holds results of another case than ``case``;
+    """Raises InputError where ``folder`` holds results of another case than ``case``;
     OSError where its run.json is no file."""
     if not os.path.lexists(folder / RUN):
         return
     found = list(read_runs(folder).values())
     if not any(facts.get("case") == str(case) or _moved(facts, case) for facts in found):
         owner = next((facts.get("case") for facts in found), None)
-        raise OutputRefused(
+        raise InputError(
             f"folder '{folder}' holds results of {owner or 'something else'};"
             " give another one with --output"
         )

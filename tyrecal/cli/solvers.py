@@ -37,12 +37,12 @@ def command(talk: Talk) -> int:
 
 def settings_file() -> dict[str, Any]:
     """``file`` of the user's settings, or None; ``there``: whether it is; ``problem``, or None."""
-    from ..settings import BadSettings, place, settings
+    from ..settings import SettingsError, place, settings
 
     path, problem = place(), None
     try:
         settings()
-    except BadSettings as error:
+    except SettingsError as error:
         problem = str(error)
     there = path is not None and path.exists()
     return {"file": str(path) if path else None, "there": there, "problem": problem}

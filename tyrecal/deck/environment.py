@@ -12,8 +12,10 @@ from jinja2 import BaseLoader, ChoiceLoader, Environment, FileSystemLoader, Stri
 from jinja2.exceptions import SecurityError, TemplateSyntaxError
 from jinja2.sandbox import ImmutableSandboxedEnvironment
 
+from ..errors import InputError
 
-class TemplateFailed(ValueError):
+
+class TemplateFailed(InputError):
     """A deck template is wrong or does what templates may not; one sentence with its place."""
 
 

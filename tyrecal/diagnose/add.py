@@ -9,10 +9,11 @@ from ruamel.yaml.nodes import ScalarNode
 from ruamel.yaml.representer import RoundTripRepresenter
 
 from ..case import load_case, with_values
+from ..errors import InputError
 from ..files import whole
 
 
-class NotAdded(ValueError):
+class NotAdded(InputError):
     """The new case cannot be written."""
 
 

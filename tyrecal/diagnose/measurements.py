@@ -10,6 +10,7 @@ from math import isfinite
 from pathlib import Path
 
 from ..case.usual import LARGEST_SIGMA, MEASURED
+from ..errors import InputError
 from ..files import read_bytes
 from ..modes.mode import Label
 
@@ -19,10 +20,6 @@ COLUMNS = (
 QUANTITIES = ("frequency_Hz", "contact_area_m2", "vertical_stiffness_N_per_m", "mass_kg")
 PRESSURES_kPa = (20.0, 2000.0)
 MOST_ROWS = 10_000
-
-
-class BadMeasurements(ValueError):
-    """A file of measurements that cannot be used; one line for each mistake."""
 
 
 @dataclass(frozen=True)
@@ -48,27 +45,27 @@ class Reading:
 
 
 def read_measurements(path: Path) -> list[Reading]:
-    """Readings of a CSV file. Raises BadMeasurements with every mistake, OSError."""
+    """Readings of a CSV file. Raises InputError with every mistake, OSError."""
     try:
         text = read_bytes(path).decode("utf-8-sig")
     except UnicodeDecodeError:
-        raise BadMeasurements(f"{path}: the text must be in UTF-8") from None
+        raise InputError(f"{path}: the text must be in UTF-8") from None
     rows = csv.reader(io.StringIO(text))
     try:
         header = [name.strip() for name in next(rows, [])]
         lines = [(rows.line_num, row) for row in rows if any(cell.strip() for cell in row)]
     except csv.Error as error:
-        raise BadMeasurements(f"{path}, line {rows.line_num}: not CSV: {error}") from None
+        raise InputError(f"{path}, line {rows.line_num}: not CSV: {error}") from None
     missing = [name for name in COLUMNS if name not in header]
     if missing or len(header) != len(COLUMNS):
-        raise BadMeasurements(
+        raise InputError(
             f"{path}, line 1: the columns must be {','.join(COLUMNS)}, with commas between;"
             " 'tyrecal measured import' makes such a file of other tables"
         )
     if not lines:
-        raise BadMeasurements(f"{path}: there is no measurement in it")
+        raise InputError(f"{path}: there is no measurement in it")
     if len(lines) > MOST_ROWS:
-        raise BadMeasurements(f"{path}: more than {MOST_ROWS} lines")
+        raise InputError(f"{path}: more than {MOST_ROWS} lines")
     readings, mistakes = [], []
     for number, row in lines:
         if len(row) != len(header):
@@ -82,7 +79,7 @@ def read_measurements(path: Path) -> list[Reading]:
     if not mistakes:
         mistakes = [f"{path}, line {n}: {words}" for n, words in _together(readings)]
     if mistakes:
-        raise BadMeasurements("\n".join(mistakes))
+        raise InputError("\n".join(mistakes))
     return readings
 
 

@@ -11,11 +11,12 @@ from typing import Any
 from ..case import LoadedCase
 from ..case.mistakes import suggestion
 from ..effects import catalogue
+from ..errors import InputError
 from ..evaluate.door import Door
 from .calibrated import calibrated_variables
 from .diagnosis import Diagnosis, diagnose
 from .evidence import NONE
-from .measurements import BadMeasurements, Reading, read_measurements
+from .measurements import Reading, read_measurements
 from .observations import Observations, observe
 from .problem import Assumed, Change
 from .regions import regions
@@ -26,10 +27,6 @@ from .under_load import UnderLoad, Values, compare
 
 ALIKE = 2.0  # factor between measured and computed frequency beyond which the unit is wrong
 ALIKE_MASS = 1.5  # as the mass: a rim weighs as much as its tyre
-
-
-class BadChange(ValueError):
-    """What was switched in a toggled run is not understood."""
 
 
 @dataclass(frozen=True)
@@ -73,7 +70,7 @@ def study(
     """Read the files and diagnose the case with them.
 
     effects: ids to consider, None = the whole catalogue; one that a variable of the case sets is
-    none; stage: hears of each of ``diagnosis.STAGES``. Raises BadMeasurements, BadChange,
+    none; stage: hears of each of ``diagnosis.STAGES``. Raises InputError,
     EvaluationFailed, and what ``Door.evaluate`` raises.
     """
     switched = [path for path, _ in toggled]
@@ -85,11 +82,11 @@ def study(
     )  # fmt: skip
     rows = list(dict.fromkeys((row.label, row.pressure_kPa) for row in observations.rows))
     if not any(label for label, _ in rows):
-        raise BadMeasurements(f"{measured}: there is no frequency of the unloaded tyre in it")
+        raise InputError(f"{measured}: there is no frequency of the unloaded tyre in it")
     ids = list(catalogue()) if effects is None else list(effects)
     fitted = tuple(id for id in ids if EFFECTS + id in calibrated(case))
     if "pressure_kPa" in calibrated(case):
-        raise BadMeasurements(
+        raise InputError(
             "a variable of the case sets pressure_kPa, which a diagnosis takes from the"
             " measurements: consider the effect pressure_offset instead"
         )
@@ -157,7 +154,7 @@ def spans_of(door: Door, ids: Sequence[str] | None = None) -> tuple[dict[str, Sp
 
 
 def parse_change(text: str) -> Change:
-    """``EFFECT=VALUE`` or ``EFFECT*FACTOR``. Raises BadChange."""
+    """``EFFECT=VALUE`` or ``EFFECT*FACTOR``. Raises InputError."""
     for mark in "=*":
         id, found, value = text.partition(mark)
         if found:
@@ -165,7 +162,7 @@ def parse_change(text: str) -> Change:
     id = id.strip()
     known = catalogue()
     if not found or id not in known:
-        raise BadChange(
+        raise InputError(
             f"'{text}' must say what was switched: EFFECT=VALUE or EFFECT*FACTOR, EFFECT one of"
             f" {', '.join(known)}"
         )
@@ -174,16 +171,16 @@ def parse_change(text: str) -> Change:
     except ValueError:
         number = nan
     if not isfinite(number):
-        raise BadChange(f"'{text}': '{value.strip()}' is not a number")
+        raise InputError(f"'{text}': '{value.strip()}' is not a number")
     if mark == "*" and number == 1:
-        raise BadChange(f"'{text}': a factor of 1 switches nothing")
+        raise InputError(f"'{text}': a factor of 1 switches nothing")
     return Change(id, number, mark == "*")
 
 
 def _counted_from(change: Change, spans: Mapping[str, Span]) -> Change:
-    """The change, from what the case has of its effect. Raises BadChange."""
+    """The change, from what the case has of its effect. Raises InputError."""
     if change.id not in spans:
-        raise BadChange(
+        raise InputError(
             f"'{change.id}' was switched in a toggled run, but is not among the effects that are"
             " considered: add it with --effect, or leave --without; the solver has to express it,"
             " and no variable may set it"
@@ -200,7 +197,7 @@ def _reaching(span: Span, change: Change) -> Span:
 
 
 def _check_copies(paths: Sequence[Path], runs: Mapping[Path, Sequence[Reading]]) -> None:
-    """Raises BadMeasurements where two runs are the same to the last digit."""
+    """Raises InputError where two runs are the same to the last digit."""
     told = [
         [(r.quantity, r.label, r.member, r.pressure_kPa, r.load_N, r.value) for r in runs[path]]
         for path in paths
@@ -208,7 +205,7 @@ def _check_copies(paths: Sequence[Path], runs: Mapping[Path, Sequence[Reading]])
     for k, path in enumerate(paths):
         if told[k] in told[:k]:
             first = paths[told.index(told[k])]
-            raise BadMeasurements(
+            raise InputError(
                 f"{path}: holds the same values as {first}; a copy is no measurement of its own"
             )
 
@@ -216,8 +213,8 @@ def _check_copies(paths: Sequence[Path], runs: Mapping[Path, Sequence[Reading]])
 def _check_units(
     model: TyreModel, observations: Observations, paths: Sequence[Path], changes: Sequence[Change]
 ) -> None:
-    """Raises BadMeasurements where a value is not even near the model's start, paths being the
-    runs'; BadChange where the model has no answer with what was switched."""
+    """Raises InputError where a value is not even near the model's start, paths being the
+    runs'; InputError where the model has no answer with what was switched."""
     set_to = [c for c in changes if not c.times and c.value != c.base]
     points = [Point(model.start, {c.id: c.value - c.base}) for c in set_to]
     answer, *others = model.answers([Point(model.start), *points])
@@ -225,18 +222,18 @@ def _check_units(
         raise answer
     for change, other in zip(set_to, others, strict=True):
         if isinstance(other, Exception):
-            raise BadChange(f"'{change.id}={change.value:g}' cannot be evaluated: {other}")
+            raise InputError(f"'{change.id}={change.value:g}' cannot be evaluated: {other}")
     at = dict(zip(model.rows, answer.eta.tolist(), strict=True))
     values = zip(observations.rows, observations.y, strict=True)
     for row, y in sorted(values, key=lambda each: each[0].label is None):  # frequencies first
         ratio = exp(y - at[row.label, row.pressure_kPa])
         if row.label and not 1 / ALIKE < ratio < ALIKE:
-            raise BadMeasurements(
+            raise InputError(
                 f"{paths[row.run]}: {row} was measured {ratio:.2g} times as high as the model has"
                 " it; is it the right unit, mode and pressure?"
             )
         if not row.label and not 1 / ALIKE_MASS < ratio < ALIKE_MASS:
-            raise BadMeasurements(
+            raise InputError(
                 f"{paths[row.run]}: the mass is {ratio:.2g} times the model's; is it in kg, and of"
                 " the tyre without its rim?"
             )

@@ -25,7 +25,7 @@ OTHERS_PERCENT = 2.5  # of solvers with other elements and laws of the cords
 def self_check(solver: str = "bundled") -> dict[str, Any]:
     """The known tyre by a solver: ``solver``, ``ok``, ``seconds``, ``tolerance_percent``,
     ``mass_kg``, ``modes`` [{label, frequency_Hz, recorded_Hz, deviation_percent}] and ``problem``,
-    None or why there are no figures. Raises UnknownSolver.
+    None or why there are no figures. Raises InputError.
     """
     from ..case import load_case
     from ..evaluate.door import Door, Question

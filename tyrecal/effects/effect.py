@@ -6,6 +6,8 @@ from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from ..errors import InputError
+
 if TYPE_CHECKING:
     from ..case import LoadedCase
 
@@ -41,7 +43,7 @@ class Effect:
         return not self.needs or self.needs in capabilities
 
 
-class EffectRefused(ValueError):
+class EffectRefused(InputError):
     """A parameter with which the effect, or the case, cannot be."""
 
     def __init__(self, id: str, reason: str, value: float):

@@ -17,10 +17,6 @@ PATIENCE_S = 20.0  # for a scheduler to answer
 log = logging.getLogger("tyrecal")
 
 
-class ClusterFailed(SolverUnavailable):
-    """There is no such scheduler, it went away, or its workers are of another edition."""
-
-
 class Cluster:
     """The workers of a scheduler; those that die are replaced by the others."""
 
@@ -47,7 +43,7 @@ class Cluster:
                 except KilledWorker as error:
                     answer = WorkerLost(f"{error.allowed_failures + 1} workers died with it")
                 except FutureCancelledError:
-                    raise ClusterFailed(
+                    raise SolverUnavailable(
                         f"the scheduler at {self.address} went away; the same command resumes"
                     ) from None
                 yield places[future.key], answer
@@ -60,22 +56,22 @@ class Cluster:
 def _at_worker(function: Callable[[Any], Any], expected: str, task: Any) -> Any:
     """``function`` as it runs elsewhere too: the same sources, one BLAS thread."""
     if sources() != expected:
-        raise ClusterFailed("a worker has another edition of tyrecal: install the same on all")
+        raise SolverUnavailable("a worker has another edition of tyrecal: install the same on all")
     with threadpool_limits(1):
         return function(task)
 
 
 @contextmanager
 def connected(address: str) -> Iterator[Cluster]:
-    """The workers of the scheduler at ``address``. Raises ClusterFailed."""
+    """The workers of the scheduler at ``address``. Raises SolverUnavailable."""
     try:
         from distributed import Client
     except ImportError:
-        raise ClusterFailed("clusters need the extra: pip install 'tyrecal[cluster]'") from None
+        raise SolverUnavailable("clusters need the extra: pip install 'tyrecal[cluster]'") from None
     try:
         client = Client(address, timeout=PATIENCE_S, set_as_default=False)
     except (OSError, ValueError) as error:
-        raise ClusterFailed(f"no Dask scheduler answers at '{address}': {error}") from None
+        raise SolverUnavailable(f"no Dask scheduler answers at '{address}': {error}") from None
     try:
         if not client.scheduler_info(n_workers=-1)["workers"]:
             log.warning("the scheduler at %s has no workers yet; waiting for some", address)

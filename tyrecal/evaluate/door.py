@@ -85,7 +85,7 @@ class Door:
 
     @property
     def solver(self) -> Solver:
-        """The adapter. Raises UnknownSolver."""
+        """The adapter. Raises InputError."""
         if self._solver is None:
             name = self.solver_name or self.case.case.solver.name
             self._solver = find_solver(name, self.command)

@@ -119,7 +119,7 @@ def _pool(jobs: int, lost: Sequence[Task]) -> Iterator[Pool]:
 def executor(jobs: int = 1, scheduler: str = "") -> Iterator[Executor]:
     """``jobs`` at a time on this machine, or the workers of a Dask scheduler at that address.
 
-    Raises ClusterFailed where there is no such scheduler.
+    Raises SolverUnavailable where there is no such scheduler.
     """
     if scheduler:
         from .cluster import connected

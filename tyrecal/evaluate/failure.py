@@ -4,16 +4,19 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from ..errors import InputError, TyrecalError
 from ..files import printable
 
 
-class EvaluationFailed(Exception):
+class EvaluationFailed(TyrecalError):
     """The solver could not evaluate a design.
 
     cause: ``no_equilibrium``, ``unstable``, ``timed_out``, ``crashed``, ``no_results``,
     ``licence``, ``lost_label`` or ``refused`` (values that the case cannot have);
     words: the solver's own last words, on one line; folder: where the run is kept, or None.
     """
+
+    exit_code = 3
 
     def __init__(self, cause: str, words: str, folder: Path | None = None):
         words = printable(words)  # they may be a stranger's, and go to a terminal
@@ -24,11 +27,13 @@ class EvaluationFailed(Exception):
         return type(self), (self.cause, self.words, self.folder)
 
 
-class SolverUnavailable(Exception):
-    """The solver cannot be had at all, so that no design can be evaluated: the study ends."""
+class SolverUnavailable(TyrecalError):
+    """The solver, or what runs it elsewhere, cannot be had: the study ends."""
+
+    exit_code = 3
 
 
-class DeckRefused(ValueError):
+class DeckRefused(InputError):
     """The solver refuses the deck: the case, or the user's template, asks for what it lacks."""
 
 

@@ -16,7 +16,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from ..settings import typed
-from .cluster import ClusterFailed
+from .failure import SolverUnavailable
 
 THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS")
 
@@ -47,14 +47,14 @@ class Settings(BaseModel):
 
 
 def read_settings(path: Path) -> Settings:
-    """Settings from their file. Raises BadSettings, in one sentence a mistake."""
+    """Settings from their file. Raises SettingsError, in one sentence a mistake."""
     return typed(path, Settings)
 
 
 def jobs_of(settings: Settings) -> Any:
     """A cluster of dask-jobqueue, its scheduler in this process, no jobs yet.
 
-    Raises ClusterFailed without the extra.
+    Raises SolverUnavailable without the extra.
     """
     handlers = {each: signal.getsignal(each) for each in (signal.SIGINT, signal.SIGTERM)}
     try:
@@ -62,7 +62,7 @@ def jobs_of(settings: Settings) -> Any:
         from dask_jobqueue import PBSCluster, SLURMCluster
         from dask_jobqueue.local import LocalCluster
     except ImportError:
-        raise ClusterFailed("clusters need the extra: pip install 'tyrecal[cluster]'") from None
+        raise SolverUnavailable("clusters need the extra: pip install 'tyrecal[cluster]'") from None
     for each, handler in handlers.items():  # dask-jobqueue makes Ctrl-C an exit with code 0
         signal.signal(each, handler)
     given: dict[str, Any] = {
@@ -89,7 +89,7 @@ def jobs_of(settings: Settings) -> Any:
 @contextmanager
 def reached(scheduler: str) -> Iterator[str]:
     """The address of a scheduler: as given, or of one that a settings file (``.yaml``) starts, with
-    its jobs, for as long as the block lasts. Raises BadSettings, ClusterFailed."""
+    its jobs, for as long as the block lasts. Raises SettingsError, SolverUnavailable."""
     if not scheduler.endswith((".yaml", ".yml")):
         yield scheduler
         return

@@ -7,7 +7,8 @@ from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import Any, Protocol
 
-from ..settings import BadSettings, command_of
+from ..errors import InputError
+from ..settings import SettingsError, command_of
 
 GROUP = "tyrecal.solvers"
 
@@ -57,21 +58,17 @@ class Solver(Protocol):
         """
 
 
-class UnknownSolver(ValueError):
-    """No solver of that name is installed."""
-
-
 def find_solver(name: str, command: Sequence[str] = ()) -> Solver:
     """The installed solver of that name, with the program that the user has set, or ``command``.
 
-    Raises UnknownSolver; BadSettings.
+    Raises InputError; SettingsError.
     """
     found = {entry.name: entry for entry in entry_points(group=GROUP)}
     if name not in found:
-        raise UnknownSolver(f"solver '{name}' is not installed, only {', '.join(sorted(found))}")
+        raise InputError(f"solver '{name}' is not installed, only {', '.join(sorted(found))}")
     solver: Solver = found[name].load()()
     if command and not hasattr(solver, "command"):
-        raise UnknownSolver(f"solver '{name}' starts no program: it takes no --solver-command")
+        raise InputError(f"solver '{name}' starts no program: it takes no --solver-command")
     _set_command(solver, list(command) or command_of(name)[0])
     return solver
 
@@ -108,7 +105,7 @@ def _described(entry: EntryPoint) -> dict[str, Any]:
         facts["version"] = solver.version
         if solver.version == "unknown":
             facts["problem"] = "its program was not found"
-    except BadSettings as error:
+    except SettingsError as error:
         facts["problem"] = str(error)
     except Exception as error:  # whatever a stranger's code raises when it is imported
         facts["problem"] = f"{type(error).__name__}: {error}"

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..case import LoadedCase, with_values
 from ..case.calibration import cannot_fit
+from ..errors import InputError
 from ..evaluate.door import Counts, Door
 from ..evaluate.executor import executor, in_order
 from ..evaluate.failure import EvaluationFailed, WorkerLost
@@ -31,10 +32,6 @@ UNMOVED = 1e-6  # largest change of a scaled variable below which the fit did no
 MOST_REPLACED = 20  # replaced starts per start asked for
 
 Notify = Callable[[int, Mapping[str, float], Point | EvaluationFailed], None]
-
-
-class NothingToFit(ValueError):
-    """The case has no targets that count, or fewer than free variables, or no variable is free."""
 
 
 @dataclass
@@ -81,7 +78,7 @@ def calibrate(
     check(problem)
     initial = problem.evaluate(problem.start())
     if not np.isfinite(initial.objective):
-        raise NothingToFit("the targets' weights and standard deviations leave no finite objective")
+        raise InputError("the targets' weights and standard deviations leave no finite objective")
     reports = [_run(problem, problem.start(), method)]
     replaced = 0
     if starts > 1:
@@ -98,18 +95,18 @@ def calibrate(
 
 
 def check(problem: Problem) -> None:
-    """Raises NothingToFit; DeckRefused where there are footprint targets and the solver has no
+    """Raises InputError; DeckRefused where there are footprint targets and the solver has no
     road."""
     if not len(problem.scale):
-        raise NothingToFit(
+        raise InputError(
             "the case has no targets: there is nothing to fit to; add measured modes to it, as in"
             " targets: {modes: [{c: 2, m: 0, frequency_Hz: 79.5}, ...]}"
         )
     if not problem.variables:
-        raise NothingToFit("no variable is free: there is nothing to fit")
+        raise InputError("no variable is free: there is nothing to fit")
     weights = [t.weight for t in problem.targets] + [t.weight for t in problem.footprint]
     if reason := cannot_fit(weights, len(problem.variables)):
-        raise NothingToFit(reason)
+        raise InputError(reason)
     if problem.footprint:
         problem.door.needs_road()
 

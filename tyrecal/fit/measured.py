@@ -9,7 +9,8 @@ from pathlib import Path
 
 from ..case import LoadedCase
 from ..case.calibration import MEASURED, TargetFootprint, TargetMode, Targets
-from ..diagnose.measurements import BadMeasurements, Reading, read_measurements
+from ..diagnose.measurements import Reading, read_measurements
+from ..errors import InputError
 from ..modes.mode import Label
 
 ALIKE_kPa = 0.5  # pressures that differ by less are one
@@ -19,7 +20,7 @@ def with_measured(case: LoadedCase, path: Path) -> tuple[LoadedCase, list[str]]:
     """The case with what was measured at its pressure as targets, and what was left out, why.
 
     Frequencies of the unloaded tyre, contact areas and vertical stiffnesses, with their sigmas;
-    of a doublet with two members their mean. Raises BadMeasurements, OSError.
+    of a doublet with two members their mean. Raises InputError, OSError.
     """
     readings = read_measurements(path)
     pressure = case.case.pressure_kPa
@@ -33,7 +34,7 @@ def with_measured(case: LoadedCase, path: Path) -> tuple[LoadedCase, list[str]]:
     at = ", ".join(f"{p:g}" for p in other)
     if not modal and not pressed:
         elsewhere = f", only at {at} kPa; give --pressure-kPa" if other else ""
-        raise BadMeasurements(f"{path}: no target was measured at {pressure:g} kPa{elsewhere}")
+        raise InputError(f"{path}: no target was measured at {pressure:g} kPa{elsewhere}")
     targets = Targets(source=path.name, modes=_modes(modal), footprint=_footprint(pressed))
     analysis = case.case.analysis
     highest = max([analysis.highest_harmonic, *(target.c for target in targets.modes)])

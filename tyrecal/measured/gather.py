@@ -8,8 +8,8 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
+from ..errors import InputError
 from .modal import Layout, Run, Told, read_run, values_of
-from .sensors import BadMeasuredData
 from .tables import read_table
 from .universal import Universal, is_universal, read_universal
 from .values import FLOOR, Value, combined
@@ -38,13 +38,11 @@ def gather(
     """Measurements of several files; those of the same thing are repeats.
 
     pressure_kPa: of files that do not say theirs; floor, assumed: relative, see ``combined``.
-    Raises BadMeasuredData, OSError.
+    Raises InputError, OSError.
     """
     for k, path in enumerate(paths):
         if path.resolve() in [other.resolve() for other in paths[:k]]:
-            raise BadMeasuredData(
-                f"{path}: is given twice; as its own repeat it would tell nothing"
-            )
+            raise InputError(f"{path}: is given twice; as its own repeat it would tell nothing")
     universal = [read_universal(path) for path in paths if is_universal(path)]
     nodes = all_nodes(universal)
     values: list[Value] = []
@@ -59,7 +57,7 @@ def gather(
         if not file.shapes and not file.functions and file.nodes and len(universal) > 1:
             continue  # the geometry of the others
         if pressure_kPa is None:
-            raise BadMeasuredData(f"{path}: universal files hold no pressure; give --pressure-kPa")
+            raise InputError(f"{path}: universal files hold no pressure; give --pressure-kPa")
         run = read_run(file, nodes, layout or Layout())
         runs.append(run)
         if run.explained < EXPLAINED:
@@ -70,18 +68,18 @@ def gather(
         values += values_of(run, pressure_kPa)
     if not values:
         why = next((each.judged.why for run in runs for each in run.modes), "")
-        raise BadMeasuredData(f"{paths[0]}: no mode could be told: {why}")
+        raise InputError(f"{paths[0]}: no mode could be told: {why}")
     return Gathered(combined(values, floor, assumed), runs, notes)
 
 
 def all_nodes(files: Sequence[Universal]) -> dict[int, tuple[float, float, float]]:
-    """Coordinates of all files together. Raises BadMeasuredData where two differ."""
+    """Coordinates of all files together. Raises InputError where two differ."""
     nodes: dict[int, tuple[float, float, float]] = {}
     for file in files:
         for number, place in file.nodes.items():
             known = nodes.setdefault(number, place)
             if max(abs(a - b) for a, b in zip(known, place, strict=True)) > NODES_AGREE:
-                raise BadMeasuredData(
+                raise InputError(
                     f"{file.path}: node {number} stands elsewhere than in the files before"
                 )
     return nodes

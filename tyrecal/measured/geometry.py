@@ -9,8 +9,9 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from ..errors import InputError
 from ..modes.label import BELT
-from .sensors import BadMeasuredData, Sensors
+from .sensors import Sensors
 
 Array = np.ndarray
 
@@ -35,11 +36,11 @@ def sensors_of(
     spread least); centre: of the wheel, in m; cylindrical: directions 1, 2, 3 are radial,
     tangential and axial at each sensor, else along x, y and z.
 
-    Raises BadMeasuredData where a node has no place, or the places are no tyre's.
+    Raises InputError where a node has no place, or the places are no tyre's.
     """
     lacking = sorted({node for node, _ in signals if node not in nodes})
     if lacking:
-        raise BadMeasuredData(
+        raise InputError(
             f"node {lacking[0]} has no coordinates; give the file with data set 15 or 2411, too"
         )
     X = np.array([nodes[node] for node, _ in signals]) - centre
@@ -48,7 +49,7 @@ def sensors_of(
     R, angle = np.hypot(X[:, x], X[:, y]), np.arctan2(X[:, y], X[:, x])
     _check_centre(X[:, [x, y]], AXES[z])
     if not RADII[0] <= R.max() <= RADII[1]:
-        raise BadMeasuredData(
+        raise InputError(
             f"the sensors' largest radius about {AXES[z]} is {R.max():.4g} m, no tyre's"
             f" ({RADII[0]:g} to {RADII[1]:g}); is the unit of length (data set 164) right?"
         )
@@ -69,7 +70,7 @@ def _axle(X: Array) -> str:
     spread = np.ptp(X, axis=0)
     order = np.argsort(spread)
     if not spread[order[0]] < FLAT * spread[order[1]]:
-        raise BadMeasuredData(
+        raise InputError(
             "the sensors' places do not tell which axis is the axle; give --axle x, y or z"
         )
     return AXES[order[0]]
@@ -96,7 +97,7 @@ def _check_centre(places: Array, axle: str) -> None:
     distance = np.hypot(*(outer - middle).T)
     radius, off = distance.mean(), np.hypot(*middle)
     if np.abs(distance / radius - 1).max() < 1 - BELT and off > OFF_CENTRE * radius:
-        raise BadMeasuredData(
+        raise InputError(
             f"the sensors' circle about {axle} has its middle {off:.3g} m off the axle;"
             " give --centre X,Y,Z"
         )

@@ -28,7 +28,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from .sensors import BadMeasuredData, MeasuredMode
+from ..errors import InputError
+from .sensors import MeasuredMode
 
 Array = np.ndarray
 
@@ -71,12 +72,12 @@ class Identified:
 def identify(measured: Responses, low_Hz: float, high_Hz: float) -> Identified:
     """Modes between two frequencies.
 
-    Raises BadMeasuredData where the functions hold no mode, or lie at uneven frequencies.
+    Raises InputError where the functions hold no mode, or lie at uneven frequencies.
     """
     measured = _from_above_0(measured)
     f, mobility = measured.frequency_Hz, measured.values * _to_mobility(measured)
     if len(f) < 50 or not np.allclose(np.diff(f), f[1] - f[0], rtol=1e-3):
-        raise BadMeasuredData("functions must hold 50 evenly spaced frequencies or more")
+        raise InputError("functions must hold 50 evenly spaced frequencies or more")
     used = (f >= low_Hz) & (f <= MARGIN * high_Hz)
     order = int(np.clip(np.sum(used & (f <= high_Hz)) // LINES, 4, ORDER))
     points = np.unique(measured.points)
@@ -87,7 +88,7 @@ def identify(measured: Responses, low_Hz: float, high_Hz: float) -> Identified:
     ])  # fmt: skip
     modes = _modes(_poles(triangles, f[used]), low_Hz, high_Hz)
     if not len(modes):
-        raise BadMeasuredData(f"no mode is stable between {low_Hz:g} and {high_Hz:g} Hz")
+        raise InputError(f"no mode is stable between {low_Hz:g} and {high_Hz:g} Hz")
     hertz, z, spread = modes.T
     others = [np.delete(triangles, j, axis=0) for j in range(count if count > 2 else 0)]
     again = [_modes(_poles(each, f[used]), low_Hz, high_Hz) for each in others]

@@ -8,12 +8,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..errors import InputError
 from ..modes.label import BELT, HIGHEST_HARMONIC, TAKES_PART
 from ..modes.mode import Label
 from .geometry import sensors_of
 from .identify import FORMS, Responses, identify
 from .labels import Judged, Labeller
-from .sensors import BadMeasuredData, MeasuredMode, Sensors, real_part
+from .sensors import MeasuredMode, Sensors, real_part
 from .universal import Function, Shape, Universal
 from .values import Value
 
@@ -79,34 +80,34 @@ def read_run(
 ) -> Run:
     """Modes of a file by rising frequency; shapes in it come before functions.
 
-    Raises BadMeasuredData.
+    Raises InputError.
     """
     try:
         return (
             _from_shapes(file, nodes, layout) if file.shapes else _identified(file, nodes, layout)
         )
-    except BadMeasuredData as error:
+    except InputError as error:
         raise _named(file, error) from None
 
 
 def sensors_in(file: Universal, layout: Layout) -> Labeller:
-    """Judge of the sensors of a file. Raises BadMeasuredData."""
+    """Judge of the sensors of a file. Raises InputError."""
     try:
         signals = list(_signals(file.shapes[0])) if file.shapes else []
         if file.functions and not signals:
             signals = list(next(iter(_by_reference(file.functions).values())))
         if not signals:
-            raise BadMeasuredData("nothing was measured in it")
+            raise InputError("nothing was measured in it")
         sensors = sensors_of(signals, file.nodes, layout.axle, layout.centre, layout.cylindrical)
-    except BadMeasuredData as error:
+    except InputError as error:
         raise _named(file, error) from None
     return Labeller(sensors, layout.highest)
 
 
-def _named(file: Universal, error: BadMeasuredData) -> BadMeasuredData:
+def _named(file: Universal, error: InputError) -> InputError:
     """The error, with its file."""
     named = str(error).startswith(str(file.path))
-    return error if named else BadMeasuredData(f"{file.path}: {error}")
+    return error if named else InputError(f"{file.path}: {error}")
 
 
 def _signals(shape: Shape) -> tuple[tuple[int, int], ...]:
@@ -124,7 +125,7 @@ def _from_shapes(
         signals = _signals(shape)
         if signals not in labellers:
             if not signals:
-                raise BadMeasuredData(f"{shape.place}: every value is 0")
+                raise InputError(f"{shape.place}: every value is 0")
             sensors = sensors_of(signals, nodes, layout.axle, layout.centre, layout.cylindrical)
             labellers[signals] = Labeller(sensors, layout.highest)
         mode = MeasuredMode(
@@ -139,7 +140,7 @@ def _identified(
 ) -> Run:
     if not file.functions:
         others = ", ".join(f"{count} x {what}" for what, count in file.skipped.items())
-        raise BadMeasuredData(
+        raise InputError(
             "there is neither a mode shape nor a frequency-response function"
             + (f", only {others}" if others else "")
         )
@@ -147,7 +148,7 @@ def _identified(
     first = file.functions[0]
     form = first.form or layout.form
     if form not in FORMS:
-        raise BadMeasuredData(
+        raise InputError(
             f"{first.place}: does not say whether displacement, velocity or acceleration was"
             " measured; give --response"
         )
@@ -177,21 +178,21 @@ def _by_reference(
     for each in functions:
         row = table.setdefault(each.reference, {})
         if each.response in row:
-            raise BadMeasuredData(
+            raise InputError(
                 f"{each.place}: node {each.response[0]}, direction {each.response[1]} was measured"
                 " before in this file; give each repeat a file of its own"
             )
         same = len(each.frequency_Hz) == len(first.frequency_Hz)
         if not same or not np.allclose(each.frequency_Hz, first.frequency_Hz):
-            raise BadMeasuredData(f"{each.place}: its frequencies are not those of the first")
+            raise InputError(f"{each.place}: its frequencies are not those of the first")
         if each.form != first.form:
-            raise BadMeasuredData(f"{each.place}: is a {each.form}, the first a {first.form}")
+            raise InputError(f"{each.place}: is a {each.form}, the first a {first.form}")
         row[each.response] = each
     wanted = set(next(iter(table.values())))
     for reference, row in table.items():
         if set(row) != wanted:
             node, direction = min(wanted ^ set(row))
-            raise BadMeasuredData(
+            raise InputError(
                 f"node {node}, direction {direction} was not measured with every reference"
                 f" ({reference[0]} is another)"
             )

@@ -9,10 +9,6 @@ import numpy as np
 Array = np.ndarray
 
 
-class BadMeasuredData(ValueError):
-    """Measured data that cannot be used; names the file and the line or record."""
-
-
 @dataclass(frozen=True)
 class Sensors:
     """What is measured, and where: one row a signal, several rows for a point with several.

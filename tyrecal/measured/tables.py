@@ -19,9 +19,9 @@ from pathlib import Path
 
 from .. import units
 from ..diagnose.measurements import COLUMNS, QUANTITIES
+from ..errors import InputError
 from ..files import read_bytes
 from ..modes.mode import Label
-from .sensors import BadMeasuredData
 from .values import Value, implausible
 
 MOST_LINES = 10_000
@@ -74,15 +74,15 @@ class Column:
 def read_table(path: Path, pressure_kPa: float | None = None) -> list[Value]:
     """Values of a modal table; ``pressure_kPa`` where the table has no column for it.
 
-    Raises BadMeasuredData with every mistake, each with file and line; OSError.
+    Raises InputError with every mistake, each with file and line; OSError.
     """
     lines, comma = _lines(path)
     number, headings = lines[0]
     columns = _columns(headings, f"{path}, line {number}", pressure_kPa)
     if len(lines) == 1:
-        raise BadMeasuredData(f"{path}: there is no measurement in it")
+        raise InputError(f"{path}: there is no measurement in it")
     if len(lines) > MOST_LINES:
-        raise BadMeasuredData(f"{path}: more than {MOST_LINES} lines")
+        raise InputError(f"{path}: more than {MOST_LINES} lines")
     values: list[Value] = []
     mistakes: list[str] = []
     for number, cells in lines[1:]:
@@ -101,7 +101,7 @@ def read_table(path: Path, pressure_kPa: float | None = None) -> list[Value]:
             mistakes.append(f"{place}: {error}")
     mistakes += [] if mistakes else _swapped(values)
     if mistakes:
-        raise BadMeasuredData("\n".join(mistakes))
+        raise InputError("\n".join(mistakes))
     return _runs(values, any(column.meaning == "run" for column in columns))
 
 
@@ -109,14 +109,14 @@ def _lines(path: Path) -> tuple[list[tuple[int, list[str]]], bool]:
     """Lines that are not empty, with their numbers; whether a comma can be a decimal one."""
     raw = read_bytes(path)
     if raw[:2] == b"PK":
-        raise BadMeasuredData(f"{path}: a workbook; save the sheet as CSV")
+        raise InputError(f"{path}: a workbook; save the sheet as CSV")
     wide = raw[:2] in (b"\xff\xfe", b"\xfe\xff")
     try:
         text = raw.decode("utf-16" if wide else "utf-8-sig")
     except UnicodeDecodeError:
         text = raw.decode("cp1252", errors="replace")
     if "\0" in text:
-        raise BadMeasuredData(f"{path}: neither text nor a universal file")
+        raise InputError(f"{path}: neither text nor a universal file")
     first = 0
     if text.startswith("sep="):  # Excel's own way to name the separator
         first, text = 1, text.partition("\n")[2]
@@ -128,13 +128,13 @@ def _lines(path: Path) -> tuple[list[tuple[int, list[str]]], bool]:
     try:
         found = [(first + rows.line_num, [cell.strip() for cell in row]) for row in rows]
     except csv.Error:
-        raise BadMeasuredData(f"{path}, line {first + rows.line_num}: not CSV") from None
+        raise InputError(f"{path}, line {first + rows.line_num}: not CSV") from None
     found = [(number, row) for number, row in found if any(row)]
     for number, row in found:
         if (long := max(map(len, row))) > LONGEST:  # patterns tried on it would take for ever
-            raise BadMeasuredData(f"{path}, line {number}: a cell of {long} characters")
+            raise InputError(f"{path}, line {number}: a cell of {long} characters")
     if not found:
-        raise BadMeasuredData(f"{path}: the file is empty")
+        raise InputError(f"{path}: the file is empty")
     return found, separator != ","
 
 
@@ -147,17 +147,17 @@ def _columns(headings: list[str], place: str, pressure_kPa: float | None) -> lis
         if meaning is None:
             continue  # damping, remarks and the like
         if any(column.meaning == meaning for column in columns):
-            raise BadMeasuredData(f"{place}: two columns are the {meaning}; rename one")
+            raise InputError(f"{place}: two columns are the {meaning}; rename one")
         factor = 1.0
         table = {"pressure": units.PRESSURE, "load": units.LOAD, **units.QUANTITIES}.get(meaning)
         if table and not unit and meaning != "frequency_Hz":
-            raise BadMeasuredData(
+            raise InputError(
                 f"{place}: '{heading}' has no unit; write it as '{heading} [{next(iter(table))}]'"
             )
         if table and unit:
             known = units.factor(table, unit)
             if known is None:
-                raise BadMeasuredData(
+                raise InputError(
                     f"{place}: '{heading}': the unit must be one of {', '.join(table)}"
                 )
             factor = known
@@ -166,18 +166,18 @@ def _columns(headings: list[str], place: str, pressure_kPa: float | None) -> lis
             found = ((q, units.factor(each, unit)) for q, each in units.QUANTITIES.items())
             of, known = next((each for each in found if each[1]), ("", None))
             if known is None:
-                raise BadMeasuredData(f"{place}: '{heading}': unknown unit")
+                raise InputError(f"{place}: '{heading}': unknown unit")
             columns[-1] = Column(meaning, index, known, of=of)
     held = {column.meaning for column in columns}
     if not own and not held & set(QUANTITIES) and not {"quantity", "value"} <= held:
-        raise BadMeasuredData(
+        raise InputError(
             f"{place}: no column holds a frequency; headings must be like"
             " 'c; m; pressure [bar]; frequency [Hz]'"
         )
     if "frequency_Hz" in held and "label" not in held and not {"c", "m"} <= held:
-        raise BadMeasuredData(f"{place}: frequencies need the columns c and m, or a column label")
+        raise InputError(f"{place}: frequencies need the columns c and m, or a column label")
     if "pressure" not in held and pressure_kPa is None and held & {"frequency_Hz", "quantity"}:
-        raise BadMeasuredData(f"{place}: no column holds the pressure; give --pressure-kPa")
+        raise InputError(f"{place}: no column holds the pressure; give --pressure-kPa")
     return columns
 
 
@@ -325,9 +325,9 @@ def _runs(values: list[Value], named: bool) -> list[Value]:
     flat = any(key[1] is not None and not key[1].c for key in once)
     doubled = next(v for v in values if times[(v.run, v.key)] > 1)
     if named and not (worst == 2 and waves):
-        raise BadMeasuredData(f"{doubled.place}: {doubled.label} stands twice in one run")
+        raise InputError(f"{doubled.place}: {doubled.label} stands twice in one run")
     if worst == 2 and waves and not (flat or named):
-        raise BadMeasuredData(
+        raise InputError(
             f"{doubled.place}: {doubled.label} stands twice; repeats, or the two of a doublet?"
             " Say it in a column run or member"
         )

@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
+from ..errors import InputError
 from ..files import open_file, read_bytes
-from .sensors import BadMeasuredData
 
 Array = np.ndarray
 Signal = tuple[int, int]  # number of a node; direction 1, 2 or 3, negative where it is reversed
@@ -76,17 +76,17 @@ def is_universal(path: Path) -> bool:
 
 
 def read_universal(path: Path) -> Universal:
-    """Raises BadMeasuredData naming the set and its line; OSError."""
+    """Raises InputError naming the set and its line; OSError."""
     import pyuff
 
     text = read_bytes(path, LARGEST)
     marks = [match.start() for match in MARK.finditer(text)]
     line_of = lambda mark: text.count(b"\n", 0, mark) + 1
     if not marks:
-        raise BadMeasuredData(f"{path}: no data set in it")
+        raise InputError(f"{path}: no data set in it")
     if len(marks) % 2 or text[marks[-1] :].strip() != b"-1":
         opened = marks[len(marks) // 2 * 2 - (0 if len(marks) % 2 else 2)]
-        raise BadMeasuredData(
+        raise InputError(
             f"{path}, line {line_of(opened)}: data set {(len(marks) + 1) // 2} does not end; the"
             " file is cut off"
         )
@@ -103,13 +103,13 @@ def read_universal(path: Path) -> Universal:
         try:
             sets.append((place, file.read_sets(number)))
         except Exception:  # pyuff raises nothing else
-            raise BadMeasuredData(f"{place}: cannot be read; it is damaged or cut off") from None
+            raise InputError(f"{place}: cannot be read; it is damaged or cut off") from None
     length = 1.0
     for place, each in sets:
         if each["type"] == 164:
             length = each["length"]
             if not (isfinite(length) and length > 0):
-                raise BadMeasuredData(f"{place}: the factor of the length is {length}")
+                raise InputError(f"{place}: the factor of the length is {length}")
     for place, each in sets:
         _take(result, place, each, length)
     _unmeasured(result.shapes)
@@ -121,7 +121,7 @@ def _take(result: Universal, place: str, each: dict[str, Any], length: float) ->
     if each["type"] in (15, 2411):
         columns = [np.asarray(each[name], float) / length for name in "xyz"]
         if len({len(each["node_nums"]), *map(len, columns)}) > 1:
-            raise BadMeasuredData(f"{place}: a node lacks coordinates")
+            raise InputError(f"{place}: a node lacks coordinates")
         for node, *xyz in zip(each["node_nums"], *columns, strict=True):
             result.nodes[int(node)] = (float(xyz[0]), float(xyz[1]), float(xyz[2]))
     elif each["type"] == 82:
@@ -148,13 +148,13 @@ def _shape(place: str, each: dict[str, Any]) -> Shape:
         pole = each["eig"]
         hertz, damping = abs(pole) / (2 * pi), -pole.real / (abs(pole) or 1.0)
     if not (isfinite(hertz) and hertz > 0):
-        raise BadMeasuredData(
+        raise InputError(
             f"{place}: mode {each.get('mode_n', '')} has {hertz:g} Hz, must be above 0"
         )
     values = np.column_stack([np.asarray(each[r], complex) for r in ("r1", "r2", "r3")])
     nodes = tuple(int(node) for node in each["node_nums"])
     if len(nodes) != len(values) or not len(nodes) or not np.isfinite(values).all():
-        raise BadMeasuredData(f"{place}: a node lacks its values")
+        raise InputError(f"{place}: a node lacks its values")
     return Shape(float(hertz), float(damping), nodes, values, place)
 
 
@@ -171,19 +171,19 @@ def _unmeasured(shapes: list[Shape]) -> None:
 
 def _function(place: str, each: dict[str, Any]) -> Function:
     if each["abscissa_spec_data_type"] == TIME:
-        raise BadMeasuredData(f"{place}: the function is over time, must be over frequency")
+        raise InputError(f"{place}: the function is over time, must be over frequency")
     f, values = np.asarray(each["x"], float), np.asarray(each["data"], complex)
     if len(f) != each["num_pts"] or len(values) != len(f):
-        raise BadMeasuredData(
+        raise InputError(
             f"{place}: {len(values)} values, the set says {each['num_pts']}; it is cut off"
         )
     if not (np.isfinite(f).all() and np.isfinite(values).all()):
-        raise BadMeasuredData(f"{place}: a value is not a number")
+        raise InputError(f"{place}: a value is not a number")
     if f[0] < 0 or np.any(np.diff(f) <= 0):
-        raise BadMeasuredData(f"{place}: frequencies must rise from 0 or more, got {f[0]:g} Hz")
+        raise InputError(f"{place}: frequencies must rise from 0 or more, got {f[0]:g} Hz")
     response = int(each["rsp_node"]), int(each["rsp_dir"])
     if abs(response[1]) not in (1, 2, 3):
-        raise BadMeasuredData(f"{place}: the response's direction is {response[1]}, must be 1 to 3")
+        raise InputError(f"{place}: the response's direction is {response[1]}, must be 1 to 3")
     form = FORMS.get(each["ordinate_spec_data_type"])
     reference = int(each["ref_node"]), int(each["ref_dir"])
     return Function(f, values, form, response, reference, place)

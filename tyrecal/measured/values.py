@@ -20,8 +20,8 @@ import numpy as np
 from ..case.usual import LARGEST_SIGMA, MEASURED
 from ..diagnose.measurements import COLUMNS, PRESSURES_kPa
 from ..diagnose.observations import PRIOR_REPEATS
+from ..errors import InputError
 from ..modes.mode import Label
-from .sensors import BadMeasuredData
 
 FLOOR = 0.001  # of the value
 Key = tuple[str, Label | None, str, float, float]
@@ -70,7 +70,7 @@ def combined(
     """One value a key, the mean of its runs, with the standard deviation of that mean.
 
     floor, assumed: relative; ``assumed`` is the standard deviation of one run that states none.
-    Raises BadMeasuredData where neither repeats nor anything else tell a standard deviation, or
+    Raises InputError where neither repeats nor anything else tell a standard deviation, or
     it is so large that no fit would read it.
     """
     groups: dict[Key, list[Value]] = {}
@@ -88,13 +88,13 @@ def combined(
             own = np.sum((x - mean) ** 2)
             variances.append((PRIOR_REPEATS * every * mean**2 + own) / (PRIOR_REPEATS + n - 1) / n)
         if n == 1 and not stated[0]:
-            raise BadMeasuredData(
+            raise InputError(
                 f"{runs[0].place}: nothing tells how far {_name(runs[0])} may be off: give repeats,"
                 " a column sigma, or --sigma-percent"
             )
         sigma = max(float(np.sqrt(max(variances))), floor * mean)
         if sigma > LARGEST_SIGMA * mean:
-            raise BadMeasuredData(
+            raise InputError(
                 f"{runs[0].place}: sigma of {_name(runs[0])} comes to {sigma:.3g}, more than"
                 f" {LARGEST_SIGMA:.0%} of the value {mean:.4g}: is it a mistake, or another mode?"
             )

@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import cKDTree
 
+from ..errors import InputError
 from ..evaluate.results import Evaluation, HarmonicShape, RawMode
 from ..modes.mode import Mode
 from ..modes.sample import on_rings
@@ -20,10 +21,6 @@ from ..tyre.mesh import SectionMesh
 
 Array = np.ndarray
 NEAREST = 1e-3  # m, within which a node of another mesh stands for one of ours
-
-
-class NoSectionShape(ValueError):
-    """The mode's shape is not given on the nodes of the section."""
 
 
 def placed(
@@ -73,10 +70,10 @@ def swept(nodes: Array, mesh: SectionMesh, angles: Array) -> Array:
 def motion(mode: RawMode, nodes: Array, angles: Array, phase: float = 0.0) -> Array:
     """Displacement (node, angle, 3) of Re[amplitude exp(i (n Theta + phase))].
 
-    Raises NoSectionShape.
+    Raises InputError.
     """
     if not isinstance(mode.shape, HarmonicShape):
-        raise NoSectionShape("only modes known on the section's nodes can be swept")
+        raise InputError("only modes known on the section's nodes can be swept")
     rings = on_rings(mode.shape, nodes, angles, phase)
     return cartesian(rings.points, rings.displacement).reshape(len(nodes), len(angles), 3)
 

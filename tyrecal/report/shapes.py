@@ -38,7 +38,7 @@ def draw_mode(path: Path, mode: Mode, mesh: SectionMesh, scale: float | None = N
     """Draw a mode from the front (along the axle), the side, above, and in perspective.
 
     scale: m in the picture per unit of the shape; by default the largest motion is drawn as 12 %
-    of the radius. Raises NoSectionShape.
+    of the radius. Raises InputError.
     """
     surface = _surface(mode, mesh, scale)
     figure = new_figure(9.2, 5.7, None)
@@ -57,7 +57,7 @@ def draw_mode(path: Path, mode: Mode, mesh: SectionMesh, scale: float | None = N
 
 @in_house_style
 def draw_modes_overview(path: Path, modes: Sequence[Mode], mesh: SectionMesh) -> None:
-    """Draw up to nine modes, lowest first, in perspective on one sheet. Raises NoSectionShape."""
+    """Draw up to nine modes, lowest first, in perspective on one sheet. Raises InputError."""
     lowest = sorted(modes, key=lambda mode: mode.frequency_Hz)[:9]
     height = 0.9 + 3.2 * -(-len(lowest) // 3)
     figure = new_figure(9.0, height, None)

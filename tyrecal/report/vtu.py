@@ -23,7 +23,7 @@ def write_vtu(path: Path, mode: Mode, mesh: SectionMesh, sectors: int = 60) -> N
     system right-handed and is where ABAQUS revolves the deck's section to. Points in m, ring
     after ring of ``sectors`` points; point data in x, y, z as the solver scaled them (the bundled
     one: unit modal mass, 1/sqrt(kg)): ``mode`` and, of a pair, ``second_of_pair``, a quarter of a
-    wave further. Raises NoSectionShape; OSError.
+    wave further. Raises InputError; OSError.
     """
     grid = corners(mesh)
     nodes, angles = grid.ravel(), 2 * np.pi * np.arange(sectors) / sectors

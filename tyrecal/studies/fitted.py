@@ -9,12 +9,13 @@ from typing import Any
 
 from ..case import LoadedCase, start_values, with_values
 from ..case.identity import is_of_tyre, tyre_sha256
+from ..errors import InputError
 from ..files import read_json
 
 NOT_CONVERGED = "not_converged"  # folder of a fit that may not take a better one's place
 
 
-class NotThisFit(ValueError):
+class NotThisFit(InputError):
     """The file is no result of a fit of this case."""
 
 

@@ -14,11 +14,13 @@ from pathlib import Path
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from ..errors import InputError
+
 Array = np.ndarray
 GAUGE = "_gauge_mm"
 
 
-class SectionError(ValueError):
+class SectionError(InputError):
     """A station table that is not a section; ``line`` is the 1-based line of the file or 0."""
 
     def __init__(self, message: str, line: int = 0):

@@ -15,6 +15,8 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
+from ..errors import InputError
+
 INCH = 0.0254
 TRUCK_RIM = r"(17|19|22|24)\.5"
 RIM_CODES = (10, *range(12, 25))
@@ -42,10 +44,6 @@ FLOTATION = re.compile(
 SERVICE = re.compile(  # load index and speed symbol, load range, strength, tubeless, mud and snow
     r"\(?\d{2,3}(/\d{2,3})?([A-Z]\d?)?\)?|\(?[A-Z]\)?|LR ?[A-H]|XL|SL|TL|M\+S|3PMSF"
 )
-
-
-class UnknownSize(ValueError):
-    """Not the size code of a radial passenger or light truck tyre; one sentence says why."""
 
 
 @dataclass(frozen=True)
@@ -92,29 +90,29 @@ class TyreSize:
 
 
 def parse_size(text: str) -> TyreSize:
-    """A size code in any case, with blanks or a service description. Raises UnknownSize."""
+    """A size code in any case, with blanks or a service description. Raises InputError."""
     text = " ".join(text.split())[:60]
     code = re.sub(r"(?<=\d)XL\b", " XL", text.upper().replace("×", "X"))
     code = re.sub(r"^(LT.+R ?\d{2}) ?(?=[B-F]\b)", r"\1/", code)  # LT245/75R16E: load range E
     found = METRIC.match(code) or FLOTATION.match(code)
     if not found and re.match(rf"\d{{1,3}}(\.\d+)? ?R ?{TRUCK_RIM}", code):
-        raise UnknownSize(_truck(text))
+        raise InputError(_truck(text))
     if not found:
-        raise UnknownSize(f"'{text}' is not a tyre size that is known{_hint(code)}")
+        raise InputError(f"'{text}' is not a tyre size that is known{_hint(code)}")
     parts = found.groupdict()
     name = found.group(0).replace(" ", "")
     service = re.sub(r"LOAD RANGE ?|/(?=[B-H]\b)|LR ", "LR", code[found.end() :])
     service = re.sub(r"EXTRA LOAD|REINFORCED|REINF\b", "XL", service)
     for word in service.split():
         if not SERVICE.fullmatch(word):
-            raise UnknownSize(
+            raise InputError(
                 f"'{text}': '{word}' after the size is no service description, as 91V is"
             )
     _check_build(name, parts["build"])
     if re.fullmatch(TRUCK_RIM, parts["rim"]):
-        raise UnknownSize(_truck(name))
+        raise InputError(_truck(name))
     if not parts["rim"].isdigit() or int(parts["rim"]) not in RIM_CODES:
-        raise UnknownSize(
+        raise InputError(
             f"'{name}': no rim of code {parts['rim']}, known are {RIM_CODES[0]}"
             f" to {RIM_CODES[-1]} inches, 5 degree drop centre"
         )
@@ -126,13 +124,13 @@ def _metric(name: str, parts: dict[str, str]) -> TyreSize:
     width, aspect = int(parts["width"]), int(parts["aspect"])
     if width not in NOMINAL_WIDTHS:
         if 70 <= width <= 240 and width % 10 == 0:
-            raise UnknownSize(
+            raise InputError(
                 f"'{name}' is a motorcycle tyre's, whose widths end in 0: only passenger car and"
                 " light truck tyres are built from a size"
             )
-        raise UnknownSize(f"'{name}': section widths are 125 to 395 mm in steps of 10, not {width}")
+        raise InputError(f"'{name}': section widths are 125 to 395 mm in steps of 10, not {width}")
     if aspect not in ASPECTS:
-        raise UnknownSize(f"'{name}': aspect ratios are 25 to 85 % in steps of 5, not {aspect}")
+        raise InputError(f"'{name}': aspect ratios are 25 to 85 % in steps of 5, not {aspect}")
     kind = parts["suffix"] or parts["kind"]
     theoretical = 0.70 if aspect >= 50 else 0.85 if aspect >= 40 else 0.90
     shares = ((75, 0.70), (60, 0.75), (50, 0.80), (45, 0.85), (30, 0.90), (0, 0.92))
@@ -145,10 +143,10 @@ def _metric(name: str, parts: dict[str, str]) -> TyreSize:
 def _flotation(name: str, parts: dict[str, str]) -> TyreSize:
     diameter, width, rim = float(parts["diameter"]), float(parts["width"]), int(parts["rim"])
     if not 8 <= width <= 16:
-        raise UnknownSize(f"'{name}': flotation tyres are 8 to 16 inches wide, not {width:g}")
+        raise InputError(f"'{name}': flotation tyres are 8 to 16 inches wide, not {width:g}")
     height = (diameter - 0.5 - rim) / 2
     if not 0.4 * width <= height <= width:
-        raise UnknownSize(
+        raise InputError(
             f"'{name}': from a {rim} inch rim to {diameter:g} inches leaves sidewalls of"
             f" {height:.3g} inches, which is no tyre {width:g} inches wide"
         )
@@ -163,7 +161,7 @@ def _with_pressure(size: TyreSize, service: str) -> TyreSize:
         stated = re.search(r"(?:^|\s)(?P<a>[B-F])$", service)
     letter = stated["a"] if stated else ""
     if letter and letter not in LOAD_RANGES_KPA:
-        raise UnknownSize(f"'{size.text}': load range {letter} is not known, B to F are")
+        raise InputError(f"'{size.text}': load range {letter} is not known, B to F are")
     pressure = LOAD_RANGES_KPA.get(letter) or PRESSURES_KPA["XL" if "XL" in service else size.kind]
     return TyreSize(**{**size.__dict__, "pressure_kPa": pressure})
 
@@ -171,13 +169,13 @@ def _with_pressure(size: TyreSize, service: str) -> TyreSize:
 def _check_build(name: str, build: str) -> None:
     """Radial, whatever speed symbol stands before the R."""
     if build in ("D", "-", "B"):
-        raise UnknownSize(f"'{name}' is a bias-ply tyre: only radial ones (R) can be built")
+        raise InputError(f"'{name}' is a bias-ply tyre: only radial ones (R) can be built")
     if build.endswith("RF"):
-        raise UnknownSize(
+        raise InputError(
             f"'{name}' has self-supporting sidewalls: give the size with R, and their --sidewall-mm"
         )
     if not re.fullmatch(r"[A-Z]?R", build):
-        raise UnknownSize(f"'{name}': '{build}' is no construction, R is for radial tyres")
+        raise InputError(f"'{name}': '{build}' is no construction, R is for radial tyres")
 
 
 def _truck(name: str) -> str:

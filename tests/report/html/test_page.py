@@ -11,9 +11,10 @@ from random import Random
 
 import pytest
 
+from tyrecal.errors import InputError
 from tyrecal.report.html import page as page_module
 from tyrecal.report.html.page import page, write_page
-from tyrecal.report.html.results import BadResults, read_results
+from tyrecal.report.html.results import read_results
 
 from . import toy
 
@@ -214,7 +215,7 @@ def test_a_damaged_file_is_named(copy: Path, content: str) -> None:
             continue
         before = file.read_bytes()
         file.write_bytes(content.encode("utf-8", "surrogatepass"))
-        with pytest.raises(BadResults, match=re.escape(file.name)) as told:
+        with pytest.raises(InputError, match=re.escape(file.name)) as told:
             text_of(copy)
         assert "\n" not in str(told.value)
         file.write_bytes(before)
@@ -238,7 +239,7 @@ def test_a_number_that_cannot_be(copy: Path, file: str, old: str, new: str) -> N
     text = (copy / file).read_text()
     assert old in text
     (copy / file).write_text(text.replace(old, new))
-    with pytest.raises(BadResults, match=re.escape(file)):
+    with pytest.raises(InputError, match=re.escape(file)):
         text_of(copy)
 
 
@@ -263,7 +264,7 @@ def test_lists_of_unequal_length(copy: Path, file: str, path: tuple[str | int, .
         place = place[key]
     del place[-1]
     (copy / file).write_text(json.dumps(content))
-    with pytest.raises(BadResults, match=re.escape(file)):
+    with pytest.raises(InputError, match=re.escape(file)):
         text_of(copy)
 
 
@@ -291,7 +292,7 @@ def test_whatever_is_spoilt_the_page_is_whole_or_refused(copy: Path, tmp_path: P
             written = write_page(tmp_path / "page.html", [copy])
             parsed(written.path.read_text())
             outcomes[True] += 1
-        except BadResults as error:
+        except InputError as error:
             assert "\n" not in str(error)
             outcomes[False] += 1
         file.write_text(before)
@@ -303,13 +304,13 @@ def test_a_page_too_large_and_places_not_to_write_to(
 ) -> None:
     other = tmp_path / "fit.json"
     other.write_text("precious")
-    with pytest.raises(BadResults, match="no page of tyrecal's"):
+    with pytest.raises(InputError, match="no page of tyrecal's"):
         write_page(other, [folder])
     assert other.read_text() == "precious"
-    with pytest.raises(BadResults, match="is a folder"):
+    with pytest.raises(InputError, match="is a folder"):
         write_page(tmp_path, [folder])
     monkeypatch.setattr(page_module, "LARGEST", 1000)
-    with pytest.raises(BadResults, match="give fewer folders"):
+    with pytest.raises(InputError, match="give fewer folders"):
         write_page(tmp_path / "large.html", [folder])
     assert not (tmp_path / "large.html").exists()
 

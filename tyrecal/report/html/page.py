@@ -14,6 +14,7 @@ from jinja2 import FileSystemLoader, StrictUndefined
 from jinja2.sandbox import ImmutableSandboxedEnvironment
 from markupsafe import Markup
 
+from ...errors import InputError
 from ...files import open_file, whole
 from ..table import FOOTPRINT, QUANTITIES, percent
 from ..words import CLOSE, FAR, map_resolution, motion
@@ -21,7 +22,7 @@ from . import drawings, plots
 from .comparison import comparison
 from .contents import LoadSweep, PressureRow, Shapes
 from .markdown import html
-from .results import BadResults, Results, read_results
+from .results import Results, read_results
 from .shapes import packed
 from .summary import VERDICTS, design_words, summary
 from .svg import MINUS
@@ -46,26 +47,26 @@ class Page:
 
 def write_page(path: Path, folders: Sequence[Path]) -> Page:
     """Write the results of ``folders`` as one page that needs no network. The same results give
-    the same bytes. Raises BadResults; OSError."""
+    the same bytes. Raises InputError; OSError."""
     results = [read_results(folder) for folder in folders]
     try:
         content = page(results).encode("utf-8")
     except UnicodeEncodeError:
-        raise BadResults("a name in the results is no text") from None
+        raise InputError("a name in the results is no text") from None
     size = len(content)
     if size > LARGEST:
-        raise BadResults(
+        raise InputError(
             f"the page would have {size / 1e6:.1f} MB, more than 5: give fewer folders"
         )
     if path.is_dir():
-        raise BadResults(f"'{path}' is a folder; give a file with --output")
+        raise InputError(f"'{path}' is a folder; give a file with --output")
     try:
         with open_file(path, follow=False) as file:
             ours = MARK.encode() in file.read(2000)
     except FileNotFoundError:
         ours = True
     if not ours:
-        raise BadResults(f"'{path}' is no page of tyrecal's; give another file with --output")
+        raise InputError(f"'{path}' is no page of tyrecal's; give another file with --output")
     with whole(path) as partial:
         partial.write_bytes(content)
     found = {str(each.folder): _commands(each) for each in results}
@@ -73,7 +74,7 @@ def write_page(path: Path, folders: Sequence[Path]) -> Page:
 
 
 def page(results: Sequence[Results]) -> str:
-    """The page as text. Raises BadResults."""
+    """The page as text. Raises InputError."""
     chapters = [chapter(each, f"f{k}-") for k, each in enumerate(results, 1)]
     names = list(dict.fromkeys(each.case for each in results))
     template = environment().get_template("page.html.j2")
@@ -239,11 +240,11 @@ def _diagnosis(found: Results) -> dict[str, Any]:
 
 @contextmanager
 def _lists_of(path: Path) -> Iterator[None]:
-    """Raises BadResults where lists of the file that belong together differ in length."""
+    """Raises InputError where lists of the file that belong together differ in length."""
     try:
         yield
     except (ValueError, IndexError, TypeError):
-        raise BadResults(f"'{path}' is damaged: its lists do not go together") from None
+        raise InputError(f"'{path}' is damaged: its lists do not go together") from None
 
 
 def _commands(found: Results) -> list[str]:

@@ -11,6 +11,7 @@ from typing import TypeVar
 
 from pydantic import ValidationError
 
+from ...errors import InputError
 from ...files import NotAFile, read_runs, read_text
 from .contents import (
     Diagnosis,
@@ -27,11 +28,6 @@ from .contents import (
     Shapes,
     Whole,
 )
-
-
-class BadResults(ValueError):
-    """A folder without results, or a file in it that no command of ours wrote; one sentence."""
-
 
 File = TypeVar("File", bound=Part)
 
@@ -87,10 +83,10 @@ class Results:
 
 
 def read_results(folder: Path) -> Results:
-    """What the commands left in a folder. Raises BadResults; OSError."""
+    """What the commands left in a folder. Raises InputError; OSError."""
     if not folder.is_dir():
         what = "is a file" if folder.exists() else "does not exist"
-        raise BadResults(f"'{folder}' {what}; give a folder of results")
+        raise InputError(f"'{folder}' {what}; give a folder of results")
     found = Results(
         folder,
         _read(folder / "fit.json", Fit),
@@ -113,7 +109,7 @@ def read_results(folder: Path) -> Results:
         last = "" if run.finished else f": its last run, 'tyrecal {run.command}', did not finish"
         if (folder / "batch.json").exists():
             last = "; it is a batch's: give the folders of its cases, which stand in it"
-        raise BadResults(f"'{folder}' holds no results of fit, modes, sweep-pressure, footprint or"
+        raise InputError(f"'{folder}' holds no results of fit, modes, sweep-pressure, footprint or"
                          f" diagnose{last}")  # fmt: skip
     return found
 
@@ -125,13 +121,13 @@ def _read(path: Path, kind: type[File]) -> File | None:
     try:
         content = json.loads(text)
     except (ValueError, RecursionError):  # an integer of thousands of digits is no JSONDecodeError
-        raise BadResults(f"'{path}' is damaged: it is no JSON") from None
+        raise InputError(f"'{path}' is damaged: it is no JSON") from None
     try:
         return kind.model_validate(content)
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(str(place) for place in first["loc"]) or "the whole"
-        raise BadResults(
+        raise InputError(
             f"'{path}' is not what tyrecal writes: {where}: {first['msg'][:1].lower()}"
             f"{first['msg'][1:]}"
         ) from None
@@ -152,9 +148,9 @@ def _text(path: Path) -> str | None:
     except FileNotFoundError:
         return None
     except NotAFile as error:
-        raise BadResults(f"'{path}' is not what tyrecal writes: it {error.strerror}") from None
+        raise InputError(f"'{path}' is not what tyrecal writes: it {error.strerror}") from None
     except UnicodeDecodeError:
-        raise BadResults(f"'{path}' is damaged: it is no text") from None
+        raise InputError(f"'{path}' is damaged: it is no text") from None
 
 
 def _history(path: Path) -> list[DesignPoint]:
@@ -169,5 +165,5 @@ def _history(path: Path) -> list[DesignPoint]:
             values = {name: float(value) for name, value in row.items()}
             points.append(DesignPoint(start, float(objective) if objective else None, values))
     except (KeyError, ValueError, TypeError):
-        raise BadResults(f"'{path}' is not what tyrecal writes: line {len(points) + 2}") from None
+        raise InputError(f"'{path}' is not what tyrecal writes: line {len(points) + 2}") from None
     return points

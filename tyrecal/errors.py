@@ -1,0 +1,30 @@
+"""What is told to the user in one sentence: one tree, an exit code in each class.
+
+    TyrecalError
+        InputError, 2               what was given is wrong: a file, a folder, a name, a number
+            CaseError               a case file, with every mistake in it
+            SectionError            a table of stations, with its line
+            EffectRefused           an effect's parameter
+            TemplateFailed          a deck template
+            DeckRefused             a deck that the solver refuses
+            SettingsError           the user's settings file, or a command in it
+            NotThisFit              a fit of another tyre
+            NotAdded                an effect that no case can be written with
+        EvaluationFailed, 3         one run of the solver, with its cause and folder
+        SolverUnavailable, 3        no run at all can be made
+
+What is not here and comes out of a command is a fault of the tool's, and has a traceback; what the
+system refuses, as a full disc, is an OSError and ends with 2.
+"""
+
+from __future__ import annotations
+
+
+class TyrecalError(Exception):
+    """Anything that is told in one sentence; ``exit_code``: of the command that it ends."""
+
+    exit_code = 2
+
+
+class InputError(TyrecalError, ValueError):
+    """What was given cannot be used; the sentence says where, and what would be right."""
