@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from scipy.stats import beta
+from scipy.stats import binomtest
 
 Array = np.ndarray
 BINS, SIMULATIONS = 10, 2000
@@ -13,10 +13,10 @@ BINS, SIMULATIONS = 10, 2000
 
 def clopper_pearson(right: int, count: int, level: float = 0.95) -> tuple[float, float]:
     """Two-sided exact interval of a binomial share (Clopper and Pearson 1934); (0, 1) of none."""
-    outside = (1 - level) / 2
-    low = beta.ppf(outside, right, count - right + 1) if right else 0.0
-    high = beta.ppf(1 - outside, right + 1, count - right) if right < count else 1.0
-    return float(low), float(high)
+    if not count:
+        return 0.0, 1.0
+    interval = binomtest(right, count).proportion_ci(level)
+    return float(interval.low), float(interval.high)
 
 
 def calibration_error(stated: Array, right: Array) -> float:
