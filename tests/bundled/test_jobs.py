@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import re
 import time
 from functools import cache
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -14,7 +16,7 @@ from tyrecal_solvers.bundled.attached import read_attached
 from tyrecal_solvers.bundled.job import Analysis, TimedOut
 from tyrecal_solvers.bundled.keywords import DeckError, Row
 from tyrecal_solvers.bundled.request import Request
-from tyrecal_solvers.bundled.results import StepResult
+from tyrecal_solvers.bundled.results import StepResult, write
 from tyrecal_solvers.bundled.steps import Deck
 from tyrecal_solvers.bundled.supports import rim_freedoms
 
@@ -222,6 +224,44 @@ def test_a_job_without_a_frequency_step_ends_with_its_static_state() -> None:
     late = Analysis(Deck({"inflate": text}, "inflate", None), Request(), time.monotonic() - 1e-3)
     with pytest.raises(TimedOut, match="the time limit passed"):
         late.run()
+
+
+@pytest.mark.parametrize("effects", [PLAIN, TURNING], ids=["plain", "turning"])
+def test_time_is_looked_at_between_harmonics(
+    effects: tuple[tuple[str, float], ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    looks: list[int] = []
+    monkeypatch.setattr(Analysis, "_check_time", lambda self: looks.append(1))
+    counts = []
+    for harmonics in ([1], [1, 2, 3]):
+        looks.clear()
+        run(effects, harmonics=harmonics)
+        counts.append(len(looks))
+    assert counts[1] >= counts[0] + 2 * len(run(effects, harmonics=[1]))
+
+
+def test_modes_are_written_by_rising_frequency(tmp_path: Path) -> None:
+    """With their shapes and slopes, whatever their harmonics."""
+    lines = texts(PLAIN)["inflate"].splitlines()
+    density = lines.index("*DENSITY") + 2
+    deck = Deck(texts(PLAIN), "modes", "inflate")
+    asked = {"rho": [("inflate", density, 0, 1.0)]}
+    analysis = Analysis(deck, Request(harmonics=[2, 0, 1], sensitivities=asked))
+    (result,) = analysis.run()
+    write(tmp_path / "modes", analysis.model, [result])
+    (step,) = json.loads((tmp_path / "modes.json").read_text())["steps"]
+    hertz = [mode["frequency_Hz"] for mode in step["modes"]]
+    assert hertz == sorted(hertz) and len(hertz) == 6
+    shapes = np.load(tmp_path / "modes.npz")["shapes_2"]
+    for mode, slope, shape in zip(step["modes"], step["sensitivities"]["rho"], shapes, strict=True):
+        place = [m.n for m in result.modes].index(mode["n"])
+        own = result.modes[place]
+        j = int(np.argmin(abs(own.eigenvalues - mode["eigenvalue"])))
+        assert own.eigenvalues[j] == mode["eigenvalue"]
+        circle = np.pi if mode["n"] else 2 * np.pi
+        assert shape == pytest.approx(own.shapes[j] / np.sqrt(circle), rel=1e-5, abs=1e-6)
+        rate = result.rates["rho"][place][j]
+        assert slope == pytest.approx(rate / (8 * np.pi**2 * mode["frequency_Hz"]))
 
 
 def crown_held(rows: str) -> StepResult:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -264,6 +266,26 @@ def small() -> Inflated:
     model = support.model_of(tyre.deck)
     held, loads = support.held(model, tyre.rim), support.cavity(model, 240e3)
     return Inflated(tyre, model, held, loads, support.inflate(model, held, loads))
+
+
+def test_the_iteration_finds_the_lowest_and_looks_at_the_time() -> None:
+    """Of a diagonal problem, K over M known; the first fields' shares in the modes are theirs; time
+    is looked at for every field."""
+    k, m = np.arange(1.0, 41.0).reshape(4, 5, 2) ** 2, np.linspace(1, 2, 40).reshape(4, 5, 2)
+    fields: Any = SimpleNamespace(
+        inertia=lambda f: m * f, forces=lambda f: k * f, response=lambda f: f / k
+    )
+    start = list(np.eye(40)[:6].reshape(6, 4, 5, 2) + 0.05)
+    looks: list[int] = []
+    values, modes, first = sector.ritz_davidson(fields, start, 4, lambda: looks.append(1))
+    wanted = np.sort((k / m).ravel())[:4]
+    assert values[:4] == pytest.approx(wanted, rel=1e-4)
+    assert len(looks) >= len(start) + 4
+    for j in range(4):
+        assert (modes(j) * m * modes(j)).sum() == pytest.approx(1.0)
+        for i, field in enumerate(start):
+            size = np.sqrt((field * m * field).sum())
+            assert first[i, j] == pytest.approx((field * m * modes(j)).sum() / size)
 
 
 @pytest.mark.slow

@@ -26,14 +26,16 @@ from tyrecal.diagnose.gap import Group, _chi2, _corrected, find_gap
 from tyrecal.diagnose.next_measurement import rank
 from tyrecal.diagnose.observations import Observations, Row
 from tyrecal.diagnose.plain_fit import plain_fit
-from tyrecal.diagnose.problem import Change
+from tyrecal.diagnose.problem import Assumed, Change
 from tyrecal.diagnose.reading import _near
 from tyrecal.diagnose.regions import Region
 from tyrecal.diagnose.response import Answer, Point, Span
+from tyrecal.diagnose.separability import separate
 from tyrecal.diagnose.verdict import decide
 from tyrecal.diagnose.where import section_map
 
 from ..chance import generator
+from ..conftest import CASES
 from .toy import LABELS, Toy, drawn, problem
 
 pytestmark = pytest.mark.numbers
@@ -145,6 +147,18 @@ def test_a_gap_by_its_formula() -> None:
         information = toy.J.T @ S @ toy.J + np.diag(toy.spread**-2.0)
         x = np.linalg.solve(information, toy.J.T @ S @ g)
         assert [gap.bias_percent[n][id] for n in "ABC"] == pytest.approx(100 * np.expm1(x))
+
+
+def test_what_was_switched_on_purpose_is_no_part_of_another_effect() -> None:
+    """A second run with e1 = 0.5: what calibration hides of e0 is what it hides of two runs."""
+    toy = Toy(effects=2, bend=0.0, pressures=(240.0,))
+    toy.tilt = {id: 0 * tilt for id, tilt in toy.tilt.items()}
+    p = problem(toy, changes=(Change("e1", 0.5),))
+    gap = find_gap(p, np.zeros(3), ("A", "B", "C"))
+    J, g = np.vstack([toy.J, toy.J]), np.concatenate([toy.g["e0"], toy.g["e0"]])
+    marginal = np.linalg.inv(p.sigma + J @ np.diag(toy.spread**2) @ J.T)
+    share = 1 - g @ marginal @ g / (g @ np.linalg.inv(p.sigma) @ g)
+    assert gap.absorbed["e0"] == pytest.approx(share)
 
 
 def test_a_part_of_the_section_by_its_formula() -> None:
@@ -427,3 +441,36 @@ def test_labels_far_apart_are_not_taken_for_each_other() -> None:
     none = np.full(6, np.nan)
     pairs = set(_near(Observations(rows, y, none, 0.0, none, none)))
     assert pairs == {(LABELS[3], LABELS[2])}
+
+
+def test_the_guide_says_what_is_assumed() -> None:
+    """Of an effect's law, of splits, and that the form's error is the one on record."""
+    guide = (CASES / "diagnosis.md").read_text()
+    assumed = Assumed()
+    assert f"may be off by {100 * assumed.law:g} % of its own shift" in guide
+    assert assumed.form is None and assumed.split == 0.003
+
+
+def test_cosines_and_distances_by_their_formula() -> None:
+    """Of shifts at the sizes that effects are judged at, in the metric P."""
+    toy = Toy(effects=3, size=0.02, bend=0.0, pressures=(240.0,))
+    toy.tilt = {id: 0 * tilt for id, tilt in toy.tilt.items()}
+    p = problem(toy)
+    P = np.diag(generator("metric").uniform(1e5, 4e5, len(p.places)))
+    sizes = {"e0": 0.5, "e1": 0.75}  # e2 has none: it is judged at full size
+    found = separate(p, P, sizes)
+    at = {**sizes, "e2": 1.0}
+    g = np.array([at[id] * toy.g[id] for id in found.ids])
+    gram = g @ P @ g.T
+    assert found.sizes == pytest.approx(at)
+    assert [found.lambdas[id] for id in found.ids] == pytest.approx(np.diag(gram))
+    whole = [toy.g[id] @ P @ toy.g[id] for id in found.ids]
+    assert [found.full[id] for id in found.ids] == pytest.approx(whole)
+    root = np.sqrt(np.diag(gram))
+    assert found.cosines == pytest.approx(gram / np.outer(root, root))
+    grid = np.linspace(0, 1, 81)
+    for i, a in enumerate(found.ids):
+        for j, b in enumerate(found.ids):
+            off = grid[:, None] * toy.g[b] - at[a] * toy.g[a]
+            wanted = np.einsum("qn,nm,qm->q", off, P, off).min() if i != j else 0.0
+            assert found.distances[i, j] == pytest.approx(wanted)

@@ -16,6 +16,7 @@ from tyrecal.fit import least_squares, slsqp
 from tyrecal.fit.calibrate import _tolerance
 from tyrecal.fit.crossing import AXIAL, TORSIONAL, Crossing, crossing
 from tyrecal.fit.problem import Point, Target, Variable, _variable
+from tyrecal.fit.uncertainty import uncertainty
 
 from ..chance import generator
 
@@ -310,3 +311,62 @@ def test_a_variable_stays_next_to_0_where_it_moves_effects_alone() -> None:
     assert (far.lower, far.start, far.upper) == (-3.0, 0.5, 2.0)
     for sets in (other, other[::-1], other[1:]):
         assert made(sets, 0.0, 2.0).lower == made(sets, 0.0, 2.0).start == 0.0
+
+
+def test_uncertainty_by_its_formula() -> None:
+    """B diag(sigma^2) B^T with B = (J^T J)^-1 J^T W^(1/2), unequal weights and sigmas; the noise is
+    the root mean square of the frequencies' sigmas."""
+    random = generator("uncertainty")
+    slopes, scale = random.normal(size=(5, 2)), np.array([1.0, 4.0, 0.5, 0.0, 2.0])
+    sigmas = np.array([0.1, 0.4, 0.2, 0.3])
+    targets = [SimpleNamespace(sigma_Hz=s) for s in sigmas]
+    variables = [Variable("a", 3.0, 1.0, 9.0), Variable("b", 0.0, -1.0, 3.0, log=False)]
+    problem: Any = SimpleNamespace(scale=scale, targets=targets, variables=variables,
+                                   footprint=[SimpleNamespace(sigma=0.05)])  # fmt: skip
+    J, y = scale[:, None] * slopes, random.normal(size=5)
+    at = Point({"a": 3.0, "b": 0.5}, np.zeros(2), scale * y, J, {}, 1.0, 1.0, np.empty(0), 0.0)
+    found = uncertainty(problem, at)
+    B = np.linalg.inv(J.T @ J) @ J.T * scale
+    covariance = (B * np.append(sigmas, 0.05) ** 2) @ B.T
+    spread = np.sqrt(np.diag(covariance))
+    assert found.standard_errors == pytest.approx(spread * [3.0, 4.0])
+    assert found.correlations == pytest.approx(covariance / np.outer(spread, spread))
+    assert found.singular_values == pytest.approx(np.linalg.svd(J, compute_uv=False))
+    assert found.noise_Hz == pytest.approx(np.sqrt(np.mean(sigmas[:3] ** 2)))
+
+
+def test_noise_is_what_is_left_over_the_freedom_that_is_left() -> None:
+    """Of four frequencies without sigma and two variables: two degrees; a fifth, known one takes
+    its leverage."""
+    random = generator("noise")
+    J, y = random.normal(size=(5, 2)), random.normal(size=5)
+    variables = [Variable("a", 3.0, 1.0, 9.0), Variable("b", 3.0, 1.0, 9.0)]
+    point_of = lambda n: Point({"a": 3.0, "b": 3.0}, np.zeros(2), y[:n], J[:n], {}, 1.0, 1.0,
+                               np.empty(0), 0.0)  # fmt: skip
+    none = [SimpleNamespace(sigma_Hz=None)] * 4
+    told: dict[str, Any] = {"variables": variables, "footprint": []}
+    problem: Any = SimpleNamespace(scale=np.ones(4), targets=none, **told)
+    found = uncertainty(problem, point_of(4))
+    assert found.noise_Hz == pytest.approx(np.linalg.norm(y[:4]) / np.sqrt(2))
+    known = [*none, SimpleNamespace(sigma_Hz=0.3)]
+    problem = SimpleNamespace(scale=np.ones(5), targets=known, **told)
+    leverage = J[4] @ np.linalg.inv(J.T @ J) @ J[4]
+    noise = np.linalg.norm(y[:4]) / np.sqrt(4 - (2 - leverage))
+    sigma = np.sqrt((4 * noise**2 + 0.3**2) / 5)
+    assert uncertainty(problem, point_of(5)).noise_Hz == pytest.approx(sigma)
+
+
+@pytest.mark.parametrize("log", [True, False])
+def test_a_variables_coordinate_and_back(log: bool) -> None:
+    """A logarithm, or the share of the way between the bounds; values stay within them, and the
+    start is met to the last bit."""
+    v = Variable("x", 0.7, 0.3, 2.3, log)
+    for value in (0.3, 0.5, 0.7, 1.9, 2.3):
+        x = v.scaled(value)
+        assert x == pytest.approx(np.log(value) if log else (value - 0.3) / 2.0)
+        assert v.value(x) == pytest.approx(value, rel=1e-14)
+        rise = (v.value(x + 1e-6) - v.value(x - 1e-6)) / 2e-6
+        if 0.3 < value < 2.3:
+            assert v.slope(value) == pytest.approx(rise, rel=1e-6)
+    assert v.value(v.scaled(0.7)) == 0.7
+    assert v.value(v.scaled(2.3) + 1) == 2.3 and v.value(v.scaled(0.3) - 1) == 0.3
