@@ -240,6 +240,8 @@ class Press:
         # two right-hand sides at once cost little more than one: all wait for the factor's memory
         answer, first = factor.solve(np.stack([border.by_height, right[:-1].reshape(shape)]))
         schur = border.stiffness - float((border.of_force * answer).sum())
+        if not schur:
+            raise NotPressed("no force answers to the road's height")
 
         def product(v: Array) -> Array:
             self.products += 1

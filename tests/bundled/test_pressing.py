@@ -359,6 +359,14 @@ def test_two_presses_give_the_same_bits(solid: Round, friction: float) -> None:
     assert runs[0].height == runs[1].height
 
 
+def test_off_the_road_there_is_no_step(solid: Round) -> None:
+    """Newton's step has overshot to where nothing touches: a smaller load is tried."""
+    press = solid.press(LENGTHS, 1e10)
+    force, lacking, contact = press._state(press.parts, press.height + 0.01, 100.0, None)
+    with pytest.raises(NotPressed, match="no force answers"):
+        press._step(contact, force, lacking, 1e-6)
+
+
 def test_nearly_the_same_load_again(solid: Round) -> None:
     """A start that is in equilibrium already needs no step, and has its stiffness all the same."""
     press = solid.press(LENGTHS, 1e10)
