@@ -68,7 +68,7 @@ def test_members_of_a_doublet_stand_by_the_patch() -> None:
 def test_single_modes(shape: tuple[Array, ...], symmetry: str) -> None:
     """[0,0]: along the axle is symmetric about the patch, about the axle is not."""
     ((member, field),) = members(mode(0, *shape, kind="axial"), WHERE).items()
-    assert member.symmetry == symmetry and str(member) == f"[0,0] axial {symmetry}"
+    assert member.symmetry == symmetry and str(member) == f"[0,0] lateral {symmetry}"
     assert abs(field).max() == pytest.approx(1.0)  # the part that moves, not the other
 
 

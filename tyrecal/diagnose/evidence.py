@@ -198,7 +198,7 @@ def outside(problem: Problem, sigma: Array | None = None) -> Hypothesis:
     reading: list[tuple[str, Array]] = []
     for label in sorted({row.label for row in rows if row.label}, key=str):
         hit = np.array([row.label == label for row in rows])
-        reading.append((f"{label} is misread", MISREAD**2 * same * np.outer(hit, hit)))
+        reading.append((f"{label.said} is misread", MISREAD**2 * same * np.outer(hit, hit)))
     parts: list[tuple[float, str, Fitted]] = []
     for group in (unknown, reading):
         for words, extra in group:

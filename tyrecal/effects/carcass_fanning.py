@@ -50,7 +50,7 @@ EFFECT = Effect(
     high=1.0,
     changes=("*REBAR LAYER",),
     signature=(
-        "all down, most those that the sidewall's tension holds: [1,0] and [0,0] axial -3"
+        "all down, most those that the sidewall's tension holds: [1,0] and [0,0] lateral -3"
         " %, [4,0] -0.6 % at e = 1, more at higher pressure; A_carcass takes up all but "
         "0.1 %"
     ),

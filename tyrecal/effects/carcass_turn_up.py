@@ -70,7 +70,7 @@ EFFECT = Effect(
     high=1.0,
     changes=("*REBAR LAYER", "*ELEMENT", "*SURFACE SECTION"),
     signature=(
-        "all up, [0,0] axial and [1,1] most: +3 % at e = 1 and a soft carcass (0.7 MN/m),"
+        "all up, [0,0] lateral and [1,1] most: +3 % at e = 1 and a soft carcass (0.7 MN/m),"
         " [c,0] +1 to +2 %; A_carcass takes up all but 0.4 %"
     ),
     toggle="section a tyre of the same build and measure the height at which the turn-up ends",

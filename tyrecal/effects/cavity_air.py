@@ -22,7 +22,7 @@ EFFECT = Effect(
     high=1.5,
     changes=("*ACOUSTIC MEDIUM", "*DENSITY", "*DSLOAD"),
     signature=(
-        "[1,0] down most, -2.3 % at s = 1.5, other [c,0] -1.0 to -1.5 %, [0,0] axial and "
+        "[1,0] down most, -2.3 % at s = 1.5, other [c,0] -1.0 to -1.5 %, [0,0] lateral and "
         "[c,1] -0.4 to -0.6 %, [0,0] torsional not at all; grows with the pressure; a re-fit "
         "hides three quarters"
     ),

@@ -65,7 +65,7 @@ EFFECT = Effect(
     high=1.0,
     changes=("*VISCOELASTIC", "*FREQUENCY"),
     signature=(
-        "all up, [0,0] torsional most: +12 % at e = 1, [2,1] and [3,1] +7 %, [0,0] axial "
+        "all up, [0,0] torsional most: +12 % at e = 1, [2,1] and [3,1] +7 %, [0,0] lateral "
         "least, +3 %; a little less at higher pressure; C10 takes up all but 0.4 %"
     ),
     toggle="excite ten times harder: the modulus of filled rubber falls with strain amplitude",

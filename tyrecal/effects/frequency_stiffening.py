@@ -26,7 +26,7 @@ EFFECT = Effect(
     high=0.2,
     changes=("*VISCOELASTIC, FREQUENCY=TABULAR",),
     signature=(
-        "a tilt, no level: [0,0] torsional -1.5 %, [0,0] axial and [1,1] -0.4 %, [1,0] 0, "
+        "a tilt, no level: [0,0] torsional -1.5 %, [0,0] lateral and [1,1] -0.4 %, [1,0] 0, "
         "[2,1] +0.2 %, [4,0] +0.7 %, [3,1] +1.0 % at beta = 0.2; a re-fit hides a tenth of it"
     ),
     toggle="a dynamic test of the compound from 20 to 150 Hz at small strain",

@@ -85,7 +85,7 @@ EFFECT = Effect(
     high=0.0127,
     changes=("*NODE",),
     signature=(
-        "[0,0] axial and [1,1] up 7 %, [2,1] up 4 %, [3,1] up 3 % at +12.7 mm, in-plane "
+        "[0,0] lateral and [1,1] up 7 %, [2,1] up 4 %, [3,1] up 3 % at +12.7 mm, in-plane "
         "modes up 1 to 2 %; half of it is left after a re-fit"
     ),
     toggle="measure the rim between its flanges; mount the tyre on the next wider rim",

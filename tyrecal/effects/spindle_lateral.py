@@ -21,7 +21,7 @@ EFFECT = Effect(
     high=4e-07,
     changes=("*SPRING", "*MASS", "*ROTARY INERTIA", "*BOUNDARY"),
     signature=(
-        "[0,0] axial down, -10 % at 4e-7 m/N and 240 kPa, the more the higher the pressure; "
+        "[0,0] lateral down, -10 % at 4e-7 m/N and 240 kPa, the more the higher the pressure; "
         "no other mode; a re-fit hides a quarter"
     ),
     toggle="press on the hub along the axle and read a dial gauge; or use a stiffer clamp",

@@ -30,7 +30,7 @@ EFFECT = Effect(
     changes=("*HYPERELASTIC",),
     signature=(
         "all down, [0,0] torsional most: -1.5 % at +15 K, [2,1] and [3,1] -1 %, [0,0] "
-        "axial least; just as C10"
+        "lateral least; just as C10"
     ),
     toggle="measure again with the tyre soaked at another temperature, at the same pressure",
     aliases=("dynamic_stiffening", "sidewall_gauge"),

@@ -39,7 +39,7 @@ EFFECT = Effect(
     high=0.1,
     changes=("*BOUNDARY", "*MASS", "*ROTARY INERTIA"),
     signature=(
-        "[0,0] axial +37 %, [0,0] torsional +114 %, [1,1] +105 %, [1,0] +33 % with a wheel of "
+        "[0,0] lateral +37 %, [0,0] torsional +114 %, [1,1] +105 %, [1,0] +33 % with a wheel of "
         "10 kg, at any pressure alike; all of c >= 2 stay to the last digit"
     ),
     toggle="bolt the hub to a heavy block, or hang the wheel in soft cords: the other support",

@@ -116,7 +116,7 @@ class Labeller:
         second = others[0] if open_waves else order[1]
         a, b = self.labels[first], self.labels[second]
         if min(self.odds(first, second), self.odds(second, first)) >= ALIKE:
-            return f"the shape is between {a} and {b}: noise, or two modes mixed"
+            return f"the shape is between {a.said} and {b.said}: noise, or two modes mixed"
         if a.c != b.c:
             angles = np.round(np.degrees(self.sensors.points[:, 1])) % 360
             count = len(np.unique(angles))
@@ -124,7 +124,7 @@ class Labeller:
                 f"aliasing: sensors at {count} angle{'s' * (count > 1)}, spaced as they are, let"
                 f" {min(a.c, b.c)} and {max(a.c, b.c)} waves look alike"
             )
-        return f"sensors let {a} and {b} look alike: {_missing(self.sensors)}"
+        return f"sensors let {a.said} and {b.said} look alike: {_missing(self.sensors)}"
 
 
 def _label(c: int, column: int) -> Label:

@@ -237,7 +237,7 @@ def settled(told: list[Told]) -> list[Told]:
         for number, each in enumerate(pair, start=1):
             result.append(replace(each, member=str(number) if len(pair) == 2 else ""))
         for each in group[len(pair) :]:
-            why = f"{label} stands at {lowest:.2f} Hz already; an overtone, or another's pair"
+            why = f"{label.said} stands at {lowest:.2f} Hz already; an overtone, or another's pair"
             result.append(replace(each, judged=replace(each.judged, label=None, why=why)))
     return sorted(result, key=lambda each: each.mode.frequency_Hz)
 

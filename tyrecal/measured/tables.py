@@ -324,11 +324,12 @@ def _runs(values: list[Value], named: bool) -> list[Value]:
     waves = all(key[1] is not None and key[1].c and not key[2] and not key[4] for key in twice)
     flat = any(key[1] is not None and not key[1].c for key in once)
     doubled = next(v for v in values if times[(v.run, v.key)] > 1)
+    name = doubled.label.said if doubled.label else None
     if named and not (worst == 2 and waves):
-        raise InputError(f"{doubled.place}: {doubled.label} stands twice in one run")
+        raise InputError(f"{doubled.place}: {name} stands twice in one run")
     if worst == 2 and waves and not (flat or named):
         raise InputError(
-            f"{doubled.place}: {doubled.label} stands twice; repeats, or the two of a doublet?"
+            f"{doubled.place}: {name} stands twice; repeats, or the two of a doublet?"
             " Say it in a column run or member"
         )
     members = worst == 2 and waves

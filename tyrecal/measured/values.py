@@ -155,7 +155,7 @@ def measurements_csv(rows: Sequence[Value]) -> str:
 
 
 def _name(value: Value) -> str:
-    return str(value.label) if value.label else value.quantity
+    return value.label.said if value.label else value.quantity
 
 
 def _order(row: Value) -> tuple[object, ...]:

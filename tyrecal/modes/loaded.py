@@ -36,7 +36,7 @@ class Member:
     symmetry: str
 
     def __str__(self) -> str:
-        return f"{self.label} {self.symmetry}"
+        return f"{self.label.said} {self.symmetry}"
 
 
 @dataclass(frozen=True)

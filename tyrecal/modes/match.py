@@ -18,10 +18,11 @@ class LostLabel(Exception):
         ordered = sorted(modes, key=lambda mode: mode.frequency_Hz)
         self.found = tuple((mode.label, mode.frequency_Hz) for mode in ordered)
         waves = {label.c for label in labels}
-        near = [f"{label} at {f:.2f} Hz" for label, f in self.found if label.c in waves]
+        near = [f"{label.said} at {f:.2f} Hz" for label, f in self.found if label.c in waves]
         super().__init__(
-            f"no mode is {', '.join(map(str, labels))}; with {_listed(sorted(waves))} waves round"
-            f" the circumference there {'are ' + ', '.join(near) if near else 'is none'}"
+            f"no mode is {', '.join(label.said for label in labels)}; with"
+            f" {_listed(sorted(waves))} waves round the circumference there"
+            f" {'are ' + ', '.join(near) if near else 'is none'}"
         )
 
     def __reduce__(self) -> tuple[object, ...]:

@@ -87,8 +87,8 @@ def _answer(study: Study) -> Iterator[str]:
     if d.exchanged:
         a, b = d.exchanged
         yield (
-            f"The file has the labels {a} and {b} the wrong way round, as far as the model can tell"
-            " (look at the shapes again); what follows has them exchanged."
+            f"The file has the labels {a.said} and {b.said} the wrong way round, as far as the"
+            " model can tell (look at the shapes again); what follows has them exchanged."
         )
     if v.kind == NAMED and v.key:
         ids = v.key.split("+")
