@@ -80,7 +80,10 @@ def test_findings_name_every_exception():
     assert "the rise grows with c, but for [3,0]" in text
     assert "but for [0,0] lateral (convex), [0,0] torsional (neither)" in text
     assert found["disagreements"] == [] and found["least_mac"] == pytest.approx(1.0)
-    assert "labels stay with the shapes" in text
+    assert "labels stay with the shapes" in text and "three pressures" not in text
+    two = findings(states(curves)[:2], list(curves))
+    assert {m["curvature"] for m in two["modes"]} == {"unknown"}
+    assert "how the curves bend takes three pressures to tell" in two["words"]
 
 
 def test_modes_that_cross_keep_their_labels_and_modes_that_mix_are_told():

@@ -63,6 +63,9 @@ def fit_table(fit: Mapping[str, Any]) -> Table:
     return table
 
 
+USUAL = "concave", "unknown"  # curvatures over the pressure
+
+
 def modes_table(modes: Mapping[str, Any]) -> Table:
     """The content of modes.json: one row a mode, in its order."""
     entries = modes["modes"]
@@ -152,7 +155,9 @@ def sweep_table(rows: Sequence[Mapping[str, Any]], findings: Mapping[str, Any]) 
             f"{mode['rise_Hz']:+.2f}",
             f"{mode['rise_percent']:+.1f}",
             *(NONE if e["d_ln_f_d_ln_p"] is None else f"{e['d_ln_f_d_ln_p']:.3f}" for e in ends),
-            Text(mode["curvature"], "" if mode["curvature"] == "concave" else "yellow"),
+            Text(
+                mode["curvature"], "" if mode["curvature"] in ("concave", "unknown") else "yellow"
+            ),
         )
     return table
 

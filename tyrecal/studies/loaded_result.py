@@ -95,8 +95,10 @@ def findings(loads: Sequence[Loaded]) -> dict[str, Any]:
     if least:
         words.append(
             f"least overlap of a loaded shape with the unloaded one of its name:"
-            f" {least.overlap:.2f}, {least.member} at {_load_of(loads, least):g} N; the modes at"
-            f" the load before make up {min(m.spanned for m in loaded):.2f} of each shape or more"
+            f" {least.overlap:.2f}, {least.member} at {_load_of(loads, least):g} N (a low one says"
+            " that the load has changed the shape, not that its name is doubtful: names are"
+            " followed load by load); the modes at the load before make up"
+            f" {min(m.spanned for m in loaded):.2f} of each shape or more"
         )
     return {
         "splits": splits,

@@ -13,6 +13,7 @@ from ..modes.follow import follow
 from ..modes.mode import FAMILIES, Label
 from .pressure import State
 
+BENT = "concave", "convex"
 STRAIGHT = 1e-6  # of a frequency: solvers that print them give seven digits
 
 
@@ -48,16 +49,18 @@ def findings(states: Sequence[State], labels: Sequence[Label]) -> dict[str, Any]
 
 
 def _curve(p: np.ndarray, f: np.ndarray) -> dict[str, Any]:
-    """Of one mode: its rise, whether it rises at every step, and how it bends."""
+    """Of one mode: its rise, whether it rises at every step, and how it bends; of two pressures
+    nobody can tell."""
     weight = (p[2:] - p[1:-1]) / (p[2:] - p[:-2])
     bow = f[1:-1] - (weight * f[:-2] + (1 - weight) * f[2:])  # above the neighbours' chord
+    straight = "neither" if len(bow) else "unknown"
     up, down = bow > STRAIGHT * f[1:-1], bow < -STRAIGHT * f[1:-1]
     return {
         "rise_Hz": float(f[-1] - f[0]),
         "rise_percent": float(100 * (f[-1] / f[0] - 1)),
         "rises": bool((np.diff(f) > 0).all()),
         "curvature": {(True, False): "concave", (False, True): "convex"}.get(
-            (bool(up.any()), bool(down.any())), "neither"
+            (bool(up.any()), bool(down.any())), straight
         ),
         "convex_at_kPa": [float(x) for x in p[1:-1][down]],
     }
@@ -92,7 +95,9 @@ def _words(found: Mapping[str, Any], labels: Sequence[Label]) -> list[str]:
             others = [said.get(name, name) for name in each["exceptions"]]
             grows = _all_but(f"{each['family']}, the rise grows with c", others)
             words.append(f"{grows}: {first}, {last}")
-    bent = {name: mode["curvature"] for name, mode in modes if mode["curvature"] != "neither"}
+    bent = {name: mode["curvature"] for name, mode in modes if mode["curvature"] in BENT}
+    if any(mode["curvature"] == "unknown" for _, mode in modes):
+        words.append("how the curves bend takes three pressures to tell")
     if bent:
         odd = [f"{name} ({bent.get(name, 'neither')})" for name, _ in modes
                if bent.get(name) != "concave"]  # fmt: skip
