@@ -185,7 +185,7 @@ def test_nothing_was_changed_only_where_that_is_so(
     def at_once(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("tyrecal.cli.options.load", at_once)
+    monkeypatch.setattr("tyrecal.cli.arguments.load", at_once)
     monkeypatch.setattr("tyrecal.case.draft.from_size", at_once)
     assert run(*words) == 130
     assert "interrupted: nothing was changed" in capsys.readouterr().err

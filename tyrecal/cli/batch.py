@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from ..files import json_text, refuse_link, write_text
-from . import options
+from . import arguments, options
 from .main import EXIT_BATCH
 from .talk import Talk
 
@@ -97,8 +97,8 @@ def command(
 
     names = _names(cases)
     wanted = _studies(studies)
-    pressures = options.parse_pressures(from_kPa, to_kPa, steps, allow_unusual)
-    asked = Asked(tuple(options.parse_loads(loads)) if loads is not None else None, pressures)
+    pressures = arguments.parse_pressures(from_kPa, to_kPa, steps, allow_unusual)
+    asked = Asked(tuple(arguments.parse_loads(loads)) if loads is not None else None, pressures)
     if write_baseline and not baseline:
         raise click.UsageError("--write-baseline needs --baseline FILE")
     options.not_both(jobs, scheduler)

@@ -8,7 +8,7 @@ from tempfile import TemporaryDirectory
 
 import click
 
-from . import options
+from . import arguments, options
 from .talk import Talk
 
 
@@ -47,14 +47,14 @@ def command(
     from ..files import whole
     from .output import Run
 
-    loaded, values = options.load(case, mesh, assignments, pressure_kPa, talk, allow_unusual)
+    loaded, values = arguments.load(case, mesh, assignments, pressure_kPa, talk, allow_unusual)
     door = Door(loaded, solver)
     adapter = door.solver
     door.needs_effects_of(loaded)
     if loads is not None:
         door.needs_road()
-        asked = options.parse_loads(loads)
-        options.refuse_unusual_loads(loaded, "--loads-N", asked, allow_unusual)
+        asked = arguments.parse_loads(loads)
+        arguments.refuse_unusual_loads(loaded, "--loads-N", asked, allow_unusual)
         decks = Decks(loaded, values, loads_N=tuple(asked))
     else:
         decks = Decks(loaded, values, tuple(values) if door.has_gradients else ())

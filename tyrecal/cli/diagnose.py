@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from . import complete, options
+from . import arguments, complete, options
 
 file = click.Path(path_type=Path, exists=True, dir_okay=False)
 
@@ -79,7 +79,7 @@ def command(
     from ..report.kept import parts_data
 
     loaded, values = study.load(case, assignments)
-    loaded = options.starting_at(loaded, values)
+    loaded = arguments.starting_at(loaded, values)
     for id in (*effects, *without):
         if id not in catalogue():
             raise click.UsageError(f"'{id}': no such effect, only {', '.join(catalogue())}")
@@ -90,7 +90,7 @@ def command(
     for _, change in [] if study.allow_unusual else changes:
         if not change.times:
             option, name = f"--toggled {change.id}={change.value:g}", f"effects.{change.id}"
-            options.refuse_unusual(loaded, option, name, change.value, False)
+            arguments.refuse_unusual(loaded, option, name, change.value, False)
     door = study.door(loaded)
     files = [measured, *repeats, *(path for path, _ in changes)]
     readings = [each for path in files for each in read_measurements(path)]
@@ -131,7 +131,7 @@ def _added(case: Path, assignment: str, output: Path | None, allowed: bool) -> P
     loaded = load_case(case, allowed)
     try:
         id, value = parse_assignment(assignment)
-        options.refuse_unusual(loaded, f"--add {assignment}", f"effects.{id}", value, allowed)
+        arguments.refuse_unusual(loaded, f"--add {assignment}", f"effects.{id}", value, allowed)
         return add(case, id, value, output)
     except (ValueError, NotAdded) as error:
         raise click.UsageError(f"--add: {error}") from None

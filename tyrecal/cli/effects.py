@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from . import complete, options
+from . import arguments, complete, options
 from .main import EXIT_SOLVER
 
 
@@ -80,14 +80,14 @@ def command(
         raise click.UsageError(f"--set {lost[0]}: the design is that of --fitted")
     if name and value is not None:
         path = f"effects.{name}"
-        options.refuse_unusual(loaded, f"--value {value:g}", path, value, study.allow_unusual)
+        arguments.refuse_unusual(loaded, f"--value {value:g}", path, value, study.allow_unusual)
     door = study.door(loaded)
     adapter = door.solver
     if not door.has_gradients:
         raise click.UsageError(f"solver '{adapter.name}' gives no slopes, which a re-fit needs")
     kPa = _pressures(loaded, pressures, study.allow_unusual)
     if fitted:
-        values = options.fitted_values(fitted, loaded, talk)
+        values = arguments.fitted_values(fitted, loaded, talk)
     run = study.run(case, "effects", door, pressure_kPa=kPa)
     plain = Plain(door, values, kPa)
     if name and not talk.as_json:
@@ -146,5 +146,5 @@ def _pressures(loaded: Any, text: str | None, allowed: bool) -> list[float]:
                 f"--pressures-kPa {found[-1]:g}: must be pressures between 0 and 2000, each once"
             )
         option = f"--pressures-kPa {found[-1]:g}"
-        options.refuse_unusual(loaded, option, "pressure_kPa", found[-1], allowed)
+        arguments.refuse_unusual(loaded, option, "pressure_kPa", found[-1], allowed)
     return found

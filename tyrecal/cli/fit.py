@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from . import complete, options
+from . import arguments, complete, options
 from .main import EXIT_FIT
 from .talk import Progress, Talk
 
@@ -90,7 +90,7 @@ def command(
     unknown = [name for name in fix if name not in values]
     if unknown:
         raise click.UsageError(f"--fix {unknown[0]}: no such variable, only {', '.join(values)}")
-    loaded = options.starting_at(loaded, values)
+    loaded = arguments.starting_at(loaded, values)
     left_out: list[str] = []
     if measured:
         from ..fit.measured import with_measured

@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from . import options
+from . import arguments, options
 from .main import EXIT_SOLVER
 from .taken import taken
 from .talk import Talk
@@ -56,8 +56,8 @@ def command(
     loaded, values = study.load(case, assignments, pressure_kPa)
     asked = loaded.case.loads_N
     if loads is not None:
-        asked = options.parse_loads(loads)
-        options.refuse_unusual_loads(loaded, "--loads-N", asked, study.allow_unusual)
+        asked = arguments.parse_loads(loads)
+        arguments.refuse_unusual_loads(loaded, "--loads-N", asked, study.allow_unusual)
     door = study.door(loaded)
     door.needs_road()
     fitted = _fit_compared(compare, fitted, (study.output or Path(case.stem)) / "fit.json")
@@ -119,7 +119,7 @@ def _designs(
         raise click.UsageError("--compare: a design is named twice")
     designs = {"initial": values}
     if fitted and "fitted" in names:
-        designs["fitted"] = options.fitted_values(fitted, loaded, talk)
+        designs["fitted"] = arguments.fitted_values(fitted, loaded, talk)
     return {name: designs[name] for name in names}
 
 

@@ -7,8 +7,9 @@ from typing import Any
 
 import click
 
+from .arguments import parse_loads
 from .main import EXIT_SOLVER
-from .options import Study, parse_loads
+from .options import Study
 
 
 def wanted_loads(load_N: float | None, sweep: str | None) -> list[float]:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from . import options
+from . import arguments, options
 from .loaded_modes import at_load, over_loads, wanted_loads
 
 
@@ -62,11 +62,11 @@ def command(
     door = study.door(loaded)
     designs = {"initial": values}
     option = "--load-N" if sweep is None else "--sweep-load"
-    options.refuse_unusual_loads(loaded, option, loads, study.allow_unusual)
+    arguments.refuse_unusual_loads(loaded, option, loads, study.allow_unusual)
     if loads:
         door.needs_road(modes=True)
     if fitted:
-        designs["fitted"] = options.fitted_values(fitted, loaded, talk)
+        designs["fitted"] = arguments.fitted_values(fitted, loaded, talk)
     if sweep is not None:
         run = study.run(case, "modes", door, "sweep-load", load_N=loads)
         draw = pictures is not False

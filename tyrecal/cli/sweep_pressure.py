@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from . import options
+from . import arguments, options
 from .main import EXIT_SOLVER
 from .taken import taken
 
@@ -53,7 +53,7 @@ def command(
     door = study.door(loaded)
     designs = {"initial": values}
     if fitted:
-        designs["fitted"] = options.fitted_values(fitted, loaded, talk)
+        designs["fitted"] = arguments.fitted_values(fitted, loaded, talk)
     run = study.run(case, "sweep-pressure", door, pressure_kPa=pressures)
 
     def notify(outcome: Outcome) -> None:
@@ -106,7 +106,7 @@ def _pressures(
         raise click.UsageError(
             f"--set {name}: the sweep sets the pressure, by --from-kPa, --to-kPa"
         )
-    pressures = options.parse_pressures(low, high, steps, allow_unusual)
+    pressures = arguments.parse_pressures(low, high, steps, allow_unusual)
     for option, value in (("--from-kPa", low), ("--to-kPa", high)):
         try:
             with_values(loaded, {name: value})
