@@ -1,4 +1,4 @@
-"""What the words of a command line mean: a case with what was set in it, loads, pressures, a fit."""
+"""What the words of a command line mean: the case with what was set in it, loads, a fit."""
 
 from __future__ import annotations
 
