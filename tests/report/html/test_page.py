@@ -148,6 +148,7 @@ def test_the_same_results_give_the_same_bytes(copy: Path, tmp_path: Path) -> Non
         ("load_sweep.json", "Not in it: results of modes --sweep-load."),
         ("footprint.json", "Not in it: results of footprint."),
         ("footprint_patches.json", "The pressure in the patches"),
+        ("effects.json", "Not in it: results of effects."),
         ("diagnosis.json", "Not in it: results of diagnose."),
         ("diagnosis.md", "The page in words (diagnosis.md) is not in this folder"),
         ("diagnosis_section.json", "One part changed alone"),
@@ -159,9 +160,27 @@ def test_what_is_not_there_is_said(copy: Path, file: str, words: str) -> None:
     assert words in words_of(text_of(copy))
 
 
+def test_effects_stand_with_what_calibration_leaves_of_them(copy: Path) -> None:
+    words = words_of(text_of(copy))
+    assert "Change of frequency, %, at 200 kPa" in words
+    assert "Filler of Toy & sons e = 3 K+5.0+1.5\N{MINUS SIGN}2.5+1.589 " in words
+    assert "Heat e = 3 K+5.0–––– " in words
+    assert "Filler of Toy & sons, e = 3 K: 4.5 % (rms), 1.5 % once the variables" in words
+    (copy / "effects.json").write_text("[]")
+    assert "Not in it: results of effects." in words_of(text_of(copy))
+
+
 def test_each_study_alone(copy: Path) -> None:
     for file in copy.glob("*.json"):
-        if file.stem in ("fit", "modes", "pressure_sweep", "load_sweep", "footprint", "diagnosis"):
+        if file.stem in (
+            "fit",
+            "modes",
+            "pressure_sweep",
+            "load_sweep",
+            "footprint",
+            "effects",
+            "diagnosis",
+        ):
             alone = copy / "alone" / file.stem
             alone.mkdir(parents=True)
             shutil.copy(file, alone)
@@ -211,8 +230,8 @@ def test_shapes_of_another_run_are_not_shown(copy: Path) -> None:
                                      '{"format": ' + "1" * 5000 + "}"])  # fmt: skip
 def test_a_damaged_file_is_named(copy: Path, content: str) -> None:
     for file in sorted(copy.glob("*.json")):
-        if file.name == "run.json":
-            continue
+        if file.name == "run.json" or (file.name, content) == ("effects.json", "[]"):
+            continue  # an empty list is whole: no effect had an answer
         before = file.read_bytes()
         file.write_bytes(content.encode("utf-8", "surrogatepass"))
         with pytest.raises(InputError, match=re.escape(file.name)) as told:

@@ -35,6 +35,7 @@ def write(folder: Path, name: str = "Toy & sons", effect: str = "rim_width") -> 
         "load_sweep.json": load_sweep(),
         "footprint.json": footprint(),
         "footprint_patches.json": patches(name),
+        "effects.json": effects(name),
         "diagnosis.json": diagnosis(effect),
         "diagnosis_section.json": {"format": 1, "case": name, **parts()},
     }  # fmt: skip
@@ -218,6 +219,23 @@ def patches(name: str) -> dict[str, Any]:
             found.append({"design": design, "load_N": load, "across_mm": x.tolist(),
                           "along_mm": y.tolist(), "pressure_kPa": p.tolist()})  # fmt: skip
     return {"format": 1, "case": name, "patches": found}
+
+
+def effects(name: str) -> list[dict[str, Any]]:
+    """One with a re-fit, one whose mode is lost at the middle pressure."""
+    both = []
+    for title, after, lost in (("Filler of " + name, 1.5, False), ("Heat", None, True)):
+        rows = [
+            {"pressure_kPa": p, "modes": [
+                {"c": 0, "m": 0, "kind": "axial", "before_percent": p / 40, "after_percent": after},
+                {"c": 2, "m": 1, "kind": None, "after_percent": after,
+                 "before_percent": None if lost and p == 200 else -p / 80}]}
+            for p in (160.0, 200.0, 240.0)
+        ]  # fmt: skip
+        both.append({"title": title, "symbol": "e", "unit": "K", "value": 3.0, "rows": rows,
+                     "before_percent": 4.5, "after_percent": after, "provenance": provenance(name),
+                     "absorbed": None if lost else 0.886})  # fmt: skip
+    return both
 
 
 def diagnosis(effect: str) -> dict[str, Any]:

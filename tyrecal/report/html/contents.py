@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 TINY = 1e-6  # Hz
 
@@ -382,3 +382,50 @@ class RunFacts(Part):
     command: str | None = None
     finished: bool = True
     started: str = ""
+
+
+class EffectMode(Part):
+    """Change of a mode's frequency by an effect, as it comes and after the re-fit."""
+
+    c: Wave
+    m: Wave
+    kind: str | None
+    before_percent: float | None
+    after_percent: float | None
+
+
+class EffectRow(Part):
+    """An effect at one pressure."""
+
+    pressure_kPa: Positive
+    modes: list[EffectMode]
+
+
+class Effect(Part):
+    """An entry of effects.json."""
+
+    title: str
+    symbol: str
+    unit: str
+    value: float
+    before_percent: float | None
+    after_percent: float | None
+    absorbed: float | None
+    rows: Annotated[list[EffectRow], Field(min_length=1)]
+    provenance: Provenance | None = None
+
+
+class Effects(Part):
+    """effects.json, which is a list; empty where no effect had an answer."""
+
+    entries: list[Effect]
+
+    @model_validator(mode="before")
+    @classmethod
+    def _of_list(cls, content: Any) -> Any:
+        return {"entries": content}
+
+    @property
+    def provenance(self) -> Provenance | None:
+        """Of the first, as of all."""
+        return self.entries[0].provenance if self.entries else None

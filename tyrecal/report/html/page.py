@@ -16,11 +16,12 @@ from markupsafe import Markup
 
 from ...errors import InputError
 from ...files import open_file, whole
+from ...modes.mode import Label
 from ..table import FOOTPRINT, QUANTITIES, percent
 from ..words import CLOSE, FAR, map_resolution, motion
 from . import drawings, plots
 from .comparison import comparison
-from .contents import LoadSweep, PressureRow, Shapes
+from .contents import Effects, LoadSweep, PressureRow, Shapes
 from .markdown import html
 from .results import Results, read_results
 from .shapes import packed
@@ -32,7 +33,7 @@ SHOWN, LEAST = 12, 0.005  # explanations, and the probability below which one is
 MARK = '<meta name="generator" content="tyrecal report">'
 STUDIES = {
     "fit": "fit", "modes": "modes", "pressure": "sweep-pressure", "footprint": "footprint",
-    "load": "modes --sweep-load", "diagnosis": "diagnose",
+    "effects": "effects", "load": "modes --sweep-load", "diagnosis": "diagnose",
 }  # fmt: skip
 
 
@@ -116,8 +117,25 @@ def chapter(found: Results, prefix: str) -> dict[str, Any]:
         "pressure": found.pressure and _pressure(found),
         "load": found.load and _load(found.load),
         "footprint": found.footprint and _footprint(found),
+        "effects": found.effects and _effects(found.effects),
         "diagnosis": found.diagnosis and _diagnosis(found),
     }
+
+
+def _effects(found: Effects) -> dict[str, Any]:
+    """One row an effect, at the pressure in the middle."""
+    first = found.entries[0].rows
+    middle = first[len(first) // 2].pressure_kPa
+    labels = list(dict.fromkeys(
+        (m.c, m.m, m.kind) for each in found.entries for row in each.rows for m in row.modes
+    ))  # fmt: skip
+    rows = []
+    for each in found.entries:
+        modes = [m for row in each.rows if row.pressure_kPa == middle for m in row.modes]
+        known = {(m.c, m.m, m.kind): (m.before_percent, m.after_percent) for m in modes}
+        rows.append((each, [known.get(label, (None, None)) for label in labels]))
+    names = [Label(*label).said for label in labels]
+    return {"pressure_kPa": middle, "names": names, "rows": rows}
 
 
 def _shapes(what: str, folder: Path, shapes: Shapes | None, table: Any) -> dict[str, Any]:

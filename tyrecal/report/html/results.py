@@ -16,6 +16,7 @@ from ...files import NotAFile, read_runs, read_text
 from .contents import (
     Diagnosis,
     DiagnosisSection,
+    Effects,
     Fit,
     Footprints,
     LoadSweep,
@@ -55,6 +56,7 @@ class Results:
     load: LoadSweep | None = None
     footprint: Footprints | None = None
     patches: Patches | None = None
+    effects: Effects | None = None
     diagnosis: Diagnosis | None = None
     diagnosis_section: DiagnosisSection | None = None
     diagnosis_words: str = ""
@@ -63,9 +65,10 @@ class Results:
     @property
     def provenances(self) -> dict[str, Provenance]:
         """What the results of each study are of, where they say so."""
-        known: dict[str, Whole | None] = {
+        known: dict[str, Whole | Effects | None] = {
             "fit": self.fit, "modes": self.modes, "sweep-pressure": self.pressure,
-            "footprint": self.footprint, "sweep-load": self.load, "diagnose": self.diagnosis,
+            "footprint": self.footprint, "effects": self.effects, "sweep-load": self.load,
+            "diagnose": self.diagnosis,
         }  # fmt: skip
         return {name: each.provenance for name, each in known.items() if each and each.provenance}
 
@@ -87,6 +90,7 @@ def read_results(folder: Path) -> Results:
     if not folder.is_dir():
         what = "is a file" if folder.exists() else "does not exist"
         raise InputError(f"'{folder}' {what}; give a folder of results")
+    effects = _read(folder / "effects.json", Effects)
     found = Results(
         folder,
         _read(folder / "fit.json", Fit),
@@ -98,19 +102,20 @@ def read_results(folder: Path) -> Results:
         _read(folder / "load_sweep.json", LoadSweep),
         _read(folder / "footprint.json", Footprints),
         _read(folder / "footprint_patches.json", Patches),
+        effects if effects and effects.entries else None,
         _read(folder / "diagnosis.json", Diagnosis),
         _read(folder / "diagnosis_section.json", DiagnosisSection),
         _text(folder / "diagnosis.md") or "",
         _runs(folder),
     )
     studies = (found.fit, found.modes, found.pressure, found.load, found.footprint)
-    if not any((*studies, found.diagnosis)):
+    if not any((*studies, found.effects, found.diagnosis)):
         run = max(found.runs.values(), key=lambda each: each.started, default=RunFacts())
         last = "" if run.finished else f": its last run, 'tyrecal {run.command}', did not finish"
         if (folder / "batch.json").exists():
             last = "; it is a batch's: give the folders of its cases, which stand in it"
-        raise InputError(f"'{folder}' holds no results of fit, modes, sweep-pressure, footprint or"
-                         f" diagnose{last}")  # fmt: skip
+        raise InputError(f"'{folder}' holds no results of fit, modes, sweep-pressure, footprint,"
+                         f" effects or diagnose{last}")  # fmt: skip
     return found
 
 

@@ -9,6 +9,7 @@ from ...units import said
 from ..words import fit_doubts, nearness
 from .contents import (
     Diagnosis,
+    Effect,
     Failed,
     Fit,
     Footprints,
@@ -51,6 +52,8 @@ def summary(found: Results) -> list[Told]:
     if found.footprint:
         words = [*map(sentence, found.footprint.findings.words)] or [rows_words(found.footprint)]
         told.append(Told("footprint", "Footprint", words, missing(found.footprint.failed)))
+    if found.effects:
+        told.append(Told("effects", "Effects", [effect_words(e) for e in found.effects.entries]))
     if found.load:
         words = last_words(found.load)
         told.append(Told("load", "Modes over load", words, missing(found.load.failed)))
@@ -137,6 +140,17 @@ def diagnosis_words(found: Diagnosis) -> list[str]:
     if found.next_measurements:
         words.append(f"Next: {found.next_measurements[0].what}.")
     return words
+
+
+def effect_words(effect: Effect) -> str:
+    """How large, and how much of it calibration hides."""
+    words = f"{effect.title}, {effect.symbol} = {effect.value:g} {effect.unit}".rstrip()
+    if effect.before_percent is None:
+        return f"{words}: no mode is known with it."
+    words += f": {effect.before_percent:.1f} % (rms)"
+    if effect.after_percent is not None:
+        words += f", {effect.after_percent:.1f} % once the variables are fitted again"
+    return f"{words}."
 
 
 def missing(failed: Sequence[Failed]) -> list[str]:
