@@ -15,8 +15,9 @@ from tyrecal.evaluate.failure import EvaluationFailed
 from tyrecal.fit import least_squares, slsqp
 from tyrecal.fit.calibrate import _tolerance
 from tyrecal.fit.crossing import AXIAL, TORSIONAL, Crossing, crossing
-from tyrecal.fit.problem import Point, Target, Variable, _variable
+from tyrecal.fit.problem import Point, Target
 from tyrecal.fit.uncertainty import uncertainty
+from tyrecal.fit.variable import Variable, read_variable
 
 from ..chance import generator
 
@@ -300,7 +301,7 @@ def test_a_variable_stays_next_to_0_where_it_moves_effects_alone() -> None:
 
     def made(sets: list[str], lower: float, upper: float, start: float = 0.0) -> Variable:
         told = {"sets": sets, "lower": lower, "upper": upper, "start": start, "scale": "linear"}
-        return _variable("x", SimpleNamespace(**told))  # type: ignore[arg-type]
+        return read_variable("x", SimpleNamespace(**told))  # type: ignore[arg-type]
 
     both, other = ["effects.a", "effects.b"], ["effects.a", "pressure_kPa"]
     near = made(both, 0.0, 2.0)
