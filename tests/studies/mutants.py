@@ -45,7 +45,8 @@ import coverage
 import pytest
 
 ROOT = Path(__file__).parents[2]
-sys.path[0] = str(ROOT)
+# worker processes of tests import this file anew, and then the tree that is tested
+sys.path[0] = os.environ.get("MUTANTS_TREE", str(ROOT))
 from tests.studies.mutation import Mutant, exchange, functions, mutants_of  # noqa: E402
 
 RECORD = ROOT / "tests" / "benchmarks" / "mutants.jsonl"
@@ -299,7 +300,7 @@ class Runner:
             for name in [name for name in sys.modules if name.partition(".")[0] in OURS]:
                 del sys.modules[name]
             os.chdir(slot)
-            os.environ["PYTHONPATH"] = sys.path[0] = str(slot)
+            os.environ["MUTANTS_TREE"] = os.environ["PYTHONPATH"] = sys.path[0] = str(slot)
             importlib.invalidate_caches()
             pytest.main([*OPTIONS, "-x", *paths], [watch])
         finally:
@@ -362,7 +363,7 @@ def copy_of(commit: str) -> Path:
 
 def enter(tree: Path) -> None:
     """Make this process, and those that it starts, import the copy."""
-    os.environ |= {"OPENBLAS_NUM_THREADS": "1", "PYTHONPATH": str(tree)}
+    os.environ |= {"OPENBLAS_NUM_THREADS": "1", "PYTHONPATH": str(tree), "MUTANTS_TREE": str(tree)}
     os.chdir(tree)
     for name in [name for name in sys.modules if name.partition(".")[0] in OURS]:
         del sys.modules[name]
