@@ -30,6 +30,7 @@ from tyrecal.diagnose.measurements import read_measurements
 Array = np.ndarray
 STUDIES = sorted((Path(__file__).parents[1] / "benchmarks").glob("blind_study_*"))
 STEPS, LONGEST = 20, 0.5
+SAFE: Any = {"filter": "data"} if hasattr(tarfile, "data_filter") else {}  # from 3.11.4 on
 
 
 def unpacked(study: Path, folder: Path) -> None:
@@ -37,7 +38,7 @@ def unpacked(study: Path, folder: Path) -> None:
     folder.mkdir()
     for name in ("trials", "answers"):
         with tarfile.open(study / f"{name}.tar.xz") as archive:
-            archive.extractall(folder, filter="data")
+            archive.extractall(folder, **SAFE)
     for name in ("protocol.json", "seal.json"):
         (folder / name).write_bytes((study / name).read_bytes())
     truth = folder.with_name("trials-truth")
