@@ -124,7 +124,12 @@ KINDS: dict[str, tuple[list[str], int, Break]] = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("kind", KINDS)
+DRAWN = ("a full disc under a picture", "a fit that stays where it starts")
+
+
+@pytest.mark.parametrize(
+    "kind", [pytest.param(kind, marks=pytest.mark.slow if kind in DRAWN else ()) for kind in KINDS]
+)
 def test_the_good_fit_stays(
     kind: str,
     good: Path,
