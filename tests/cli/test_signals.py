@@ -151,6 +151,20 @@ def test_while_the_tool_is_imported(
     assert done.stderr == f"\n{WORDS[how.name]}: nothing was changed\n" and not done.stdout
 
 
+def test_in_the_middle_of_code_that_is_made_as_text(tmp_path: Path) -> None:
+    """As dataclasses are: Python remembers that, and ``python -m`` would end with the signal."""
+    program = f"""
+from tyrecal.cli import arguments, main
+def load(*_): exec("import signal; signal.raise_signal(signal.SIGTERM)")
+arguments.load = load
+main.main(["modes", {CASE!r}])"""
+    (tmp_path / "program.py").write_text(program)
+    command = [sys.executable, "-m", "program"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+    assert (done.returncode, done.stdout) == (143, "")
+    assert done.stderr == "\nterminated: nothing was changed\n"
+
+
 def test_when_the_command_is_done_nothing_counts_any_more(tmp_path: Path) -> None:
     (tmp_path / "sitecustomize.py").write_text(
         "import atexit, signal\natexit.register(signal.raise_signal, signal.SIGTERM)\n"

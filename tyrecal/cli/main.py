@@ -175,6 +175,7 @@ def main(arguments: list[str] | None = None) -> None:
         sys.exit(EXIT_INPUT)
     except Interrupted as interrupted:
         say(f"\n{interrupted}", err=True)
+        exec("")  # forgets one that has passed through exec(): Python would die of it at its end
         sys.exit(interrupted.code)
     except Exception as failure:
         code = _exit_code(failure)
