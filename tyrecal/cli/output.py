@@ -49,7 +49,7 @@ class Run:
 
     Results are written to a folder of their own, ``new``; those of the study's last run stay in
     their place until all new ones are there (`finish`), and where the run fails. Raises
-    InputError where the folder holds another case's results; InputError; OSError.
+    InputError where it holds another case's results or another command works in it; OSError.
     """
 
     def __init__(
@@ -165,10 +165,8 @@ class Run:
 
     def _drop_unfinished(self) -> None:
         """What processes that were ended, now or in an earlier run, left of their runs."""
-        from ..evaluate.executor import end_workers
         from ..evaluate.folders import drop_unfinished
 
-        end_workers()
         drop_unfinished(self.runs)
 
     def _close(self) -> None:
@@ -176,6 +174,9 @@ class Run:
             if hasattr(self, "new"):
                 shutil.rmtree(self.new, ignore_errors=True)
             if self.solver and self._lock and not self._finished:
+                from ..evaluate.executor import end_workers
+
+                end_workers()
                 self._drop_unfinished()
             with contextlib.suppress(OSError):  # it holds failures, or was never made
                 self.runs.rmdir()
