@@ -41,6 +41,19 @@ def test_a_slip(
     assert not list(tmp_path.iterdir())
 
 
+def test_a_long_folder_makes_no_two_names_alike(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """What lies beside is compared by its name, however much of the path is the same."""
+    folder = tmp_path / ("a" * 60)
+    (folder / "cases").mkdir(parents=True)
+    (folder / ".pre-commit-config.yaml").write_text("repos: []\n")
+    assert run("modes", f"{folder / 'cases'}") == 2
+    assert (
+        capsys.readouterr().err == f"error: {folder / 'cases'}: is a folder, must be a case file\n"
+    )
+
+
 @pytest.mark.parametrize("typed", [["help"], ["help", "fit"]])
 def test_help_is_help(typed: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     assert run(*typed) == 0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import dataclass, field
+from difflib import get_close_matches
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,7 @@ from ruamel.yaml.events import AliasEvent, CollectionEndEvent, CollectionStartEv
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 from ruamel.yaml.parser import Parser
 
-from .mistakes import Keys, Mistake, dotted, shortened, suggestion
+from .mistakes import Keys, Mistake, dotted, shortened
 from .parts import WRONG
 
 MOST_BYTES = 1_000_000  # of a table beside a case
@@ -106,8 +107,11 @@ def _text(path: Path, document: Document) -> str | None:
 def _case_beside(path: Path) -> str:
     """The case file that was probably meant, where one lies beside ``path``."""
     with suppress(OSError, ValueError):
-        beside = [str(found) for found in path.parent.glob("*.yaml") if found.is_file()]
-        return suggestion(f"{path}.yaml" if path.suffix != ".yaml" else str(path), beside, "")
+        # Names alone are compared: any two paths in one long folder look alike.
+        name = path.name if path.suffix == ".yaml" else f"{path.name}.yaml"
+        beside = [found.name for found in path.parent.glob("*.yaml") if found.is_file()]
+        for close in get_close_matches(name, beside, 1):
+            return f"; did you mean '{path.with_name(close)}'?"
     return ""
 
 
