@@ -30,8 +30,9 @@ print(*sorted({x["architecture"] for x in threadpoolctl.threadpool_info()}))
 def run(words: list[str], kernel: str, threads: int = 1) -> subprocess.CompletedProcess[str]:
     env = {**os.environ, "OPENBLAS_CORETYPE": kernel, "OPENBLAS_NUM_THREADS": str(threads)}
     root = Path(__file__).parents[1]
-    return subprocess.run([sys.executable, *words], env=env, cwd=root, capture_output=True,
-                          text=True)  # fmt: skip
+    return subprocess.run(
+        [sys.executable, *words], env=env, cwd=root, capture_output=True, text=True
+    )
 
 
 def kernels() -> dict[str, str]:

@@ -36,13 +36,15 @@ LEFT_OUT = {  # a test with two of them counts with the first
     "ccx": LeftOut("run CalculiX", ("ccx",), "CalculiX", "calculix-ccx"),
     "browser": LeftOut(
         "look at the report's page in a browser",
-        ("chromium", "chromedriver"), "Chromium", "chromium chromium-driver",
+        ("chromium", "chromedriver"),
+        "Chromium",
+        "chromium chromium-driver",
     ),
     "cluster": LeftOut("start Dask schedulers and workers"),
     "lint": LeftOut("ruff and mypy over all files"),
     "guide": LeftOut("command blocks of the guides"),
     "slow": LeftOut("more than about 2 s each"),
-}  # fmt: skip
+}
 COUNTS: pytest.StashKey[dict[str, int]] = pytest.StashKey()
 
 

@@ -123,8 +123,10 @@ tyrecal.fit_everything(case)  # WRONG
     )
     done = subprocess.run(
         [sys.executable, "-m", "mypy", "--strict", "--follow-imports=silent", str(program)],
-        cwd=ROOT, capture_output=True, text=True,
-    )  # fmt: skip
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+    )
     lines = program.read_text().splitlines()
     wrong = [f"program.py:{i}" for i, line in enumerate(lines, 1) if line.endswith("# WRONG")]
     told = done.stdout.splitlines()

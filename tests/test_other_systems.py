@@ -58,12 +58,25 @@ def results(folder: Path) -> dict[str, bytes]:
         pytest.param(["footprint", CASE, *COARSE, "--loads-N", "300"], 1, marks=slow),
         pytest.param(["effects", "bead_filler", "--case", CASE, *COARSE, *TWO], 3, marks=slow),
         pytest.param(
-            ["diagnose", CASE, *COARSE, *TWO, "--measured", WHEELER, "--effect", "rim_width",
-             "--effect", "bead_filler", "--no-pictures"], 3, marks=slow,
+            [
+                "diagnose",
+                CASE,
+                *COARSE,
+                *TWO,
+                "--measured",
+                WHEELER,
+                "--effect",
+                "rim_width",
+                "--effect",
+                "bead_filler",
+                "--no-pictures",
+            ],
+            3,
+            marks=slow,
         ),
     ],
     ids=lambda each: each[0] if isinstance(each, list) else "",
-)  # fmt: skip
+)
 def test_studies_with_what_windows_has(command: list[str], processes: int, tmp_path: Path) -> None:
     for name in ("plain", "blocked", "site"):
         (tmp_path / name).mkdir()
@@ -74,8 +87,11 @@ def test_studies_with_what_windows_has(command: list[str], processes: int, tmp_p
     for name, environment in (("plain", {}), ("blocked", blocked)):
         done = subprocess.run(
             [sys.executable, "-m", "tyrecal", *command, "--output", "out"],
-            env={**os.environ, **environment}, cwd=tmp_path / name, capture_output=True, text=True,
-        )  # fmt: skip
+            env={**os.environ, **environment},
+            cwd=tmp_path / name,
+            capture_output=True,
+            text=True,
+        )
         assert done.returncode == 0, done.stderr
         assert "Traceback" not in done.stderr
         said.append(done.stdout)

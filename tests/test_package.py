@@ -108,8 +108,10 @@ def test_the_citation_is_one() -> None:
     assert told["abstract"] and told["keywords"]
     for work in [told, *told["references"]]:
         assert work["title"] and work["authors"]
-        assert all(set(a) in ({"name"}, {"family-names"}, {"family-names", "given-names"})
-                   for a in work["authors"])  # fmt: skip
+        assert all(
+            set(a) in ({"name"}, {"family-names"}, {"family-names", "given-names"})
+            for a in work["authors"]
+        )
     for work in told["references"]:
         assert work["type"] in ("article", "conference-paper") and 1990 < work["year"] < 2100
 

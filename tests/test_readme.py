@@ -40,9 +40,13 @@ MAKERS = {  # first words of blocks whose files those below them read
     "cases/measured_data.md": ["tyrecal measured import "],
 }
 QUICK = [  # first words of blocks of the README that the quick set runs, one an area
-    "tyrecal validate", "tyrecal init", "tyrecal fit cases/p235_75r17.yaml\n",
-    "tyrecal measured import", "tyrecal report", "tyrecal store",
-]  # fmt: skip
+    "tyrecal validate",
+    "tyrecal init",
+    "tyrecal fit cases/p235_75r17.yaml\n",
+    "tyrecal measured import",
+    "tyrecal report",
+    "tyrecal store",
+]
 
 
 def blocks(guide: str) -> list[str]:

@@ -94,6 +94,9 @@ def test_every_area_is_in_the_quick_set(request: pytest.FixtureRequest) -> None:
         pytest.skip("only a run of the whole quick set tells whether every area is in it")
     top = ROOT / "tests"
     areas = {path.relative_to(top).parts[0] for path in top.rglob("test_*.py")}
-    quick = {item.path.relative_to(top).parts[0] for item in request.session.items
-             if item.get_closest_marker("quick")}  # fmt: skip
+    quick = {
+        item.path.relative_to(top).parts[0]
+        for item in request.session.items
+        if item.get_closest_marker("quick")
+    }
     assert quick == areas

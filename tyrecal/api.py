@@ -19,14 +19,7 @@ from math import inf
 from pathlib import Path
 from typing import Any
 
-from .case import (
-    CaseError,
-    LoadedCase,
-    overridden,
-    start_values,
-    unusual_value,
-    with_level,
-)
+from .case import CaseError, LoadedCase, overridden, start_values, unusual_value, with_level
 from .case import load_case as _load_case
 from .case import with_values as _with_values
 from .diagnose.diagnosis import Diagnosis

@@ -29,17 +29,30 @@ def _tyre(study: str, overview: str) -> tuple[str, ...]:
 
 
 RESULTS = {  # of a study, by pattern: what a new run of it takes the place of
-    "fit": ("fit.json", "fit.csv", "fit_history.csv", "fit_shapes.json", "convergence.png",
-            *_tyre("fit", "fit_modes.png")),
+    "fit": (
+        "fit.json",
+        "fit.csv",
+        "fit_history.csv",
+        "fit_shapes.json",
+        "convergence.png",
+        *_tyre("fit", "fit_modes.png"),
+    ),
     "modes": ("modes.json", "modes_shapes.json", *_tyre("modes", "modes.png")),
     "sweep-load": ("load_sweep.json", "load_sweep.csv", "load_sweep.png"),
     "sweep-pressure": ("pressure_sweep.json", "pressure_sweep.csv", "pressure_sweep.png"),
-    "footprint": ("footprint.json", "footprint.csv", "footprint_patches.json", "footprint.png",
-                  "footprint_initial*.png", "footprint_fitted*.png", "footprint_*N.vtu"),
+    "footprint": (
+        "footprint.json",
+        "footprint.csv",
+        "footprint_patches.json",
+        "footprint.png",
+        "footprint_initial*.png",
+        "footprint_fitted*.png",
+        "footprint_*N.vtu",
+    ),
     "effects": ("effects.json", "effect_*.png"),
     "diagnose": ("diagnosis.json", "diagnosis.md", "diagnosis_*.json", "diagnosis_*.png"),
     "batch": ("batch.json",),
-}  # fmt: skip
+}
 CHANGED = threading.Event()  # set once this process writes a file with `whole`
 RUN = "run.json"  # what differs from run to run, an entry a study
 PREVIOUS = "previous"  # folder for what a new run of the same study did not write again

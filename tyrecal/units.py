@@ -8,18 +8,48 @@ from math import pi
 
 INCH, POUND, POUND_FORCE = 0.0254, 0.45359237, 4.4482216152605  # m, kg, N
 QUANTITIES: dict[str, dict[str, float]] = {
-    "frequency_Hz": {"Hz": 1.0, "1/s": 1.0, "cps": 1.0, "kHz": 1e3, "rad/s": 0.5 / pi,
-                     "1/min": 1 / 60, "rpm": 1 / 60},
+    "frequency_Hz": {
+        "Hz": 1.0,
+        "1/s": 1.0,
+        "cps": 1.0,
+        "kHz": 1e3,
+        "rad/s": 0.5 / pi,
+        "1/min": 1 / 60,
+        "rpm": 1 / 60,
+    },
     "contact_area_m2": {"m2": 1.0, "cm2": 1e-4, "mm2": 1e-6, "in2": INCH**2, "sq.in": INCH**2},
-    "vertical_stiffness_N_per_m": {"N/m": 1.0, "N_per_m": 1.0, "N/mm": 1e3, "kN/m": 1e3,
-                                   "kN/mm": 1e6, "lbf/in": POUND_FORCE / INCH,
-                                   "lb/in": POUND_FORCE / INCH, "kgf/mm": 9806.65},
+    "vertical_stiffness_N_per_m": {
+        "N/m": 1.0,
+        "N_per_m": 1.0,
+        "N/mm": 1e3,
+        "kN/m": 1e3,
+        "kN/mm": 1e6,
+        "lbf/in": POUND_FORCE / INCH,
+        "lb/in": POUND_FORCE / INCH,
+        "kgf/mm": 9806.65,
+    },
     "mass_kg": {"kg": 1.0, "g": 1e-3, "lb": POUND, "lbs": POUND},
-}  # fmt: skip
-PRESSURE = {"kPa": 1.0, "bar": 100.0, "mbar": 0.1, "MPa": 1e3, "Pa": 1e-3, "psi": 6.894757293168,
-            "atm": 101.325, "kgf/cm2": 98.0665}  # fmt: skip
-LOAD = {"N": 1.0, "kN": 1e3, "daN": 10.0, "kgf": 9.80665, "kg": 9.80665, "lbf": POUND_FORCE,
-        "lb": POUND_FORCE, "lbs": POUND_FORCE}  # fmt: skip
+}
+PRESSURE = {
+    "kPa": 1.0,
+    "bar": 100.0,
+    "mbar": 0.1,
+    "MPa": 1e3,
+    "Pa": 1e-3,
+    "psi": 6.894757293168,
+    "atm": 101.325,
+    "kgf/cm2": 98.0665,
+}
+LOAD = {
+    "N": 1.0,
+    "kN": 1e3,
+    "daN": 10.0,
+    "kgf": 9.80665,
+    "kg": 9.80665,
+    "lbf": POUND_FORCE,
+    "lb": POUND_FORCE,
+    "lbs": POUND_FORCE,
+}
 SAID = {  # SI unit: what people say, and how many of it one is
     "m": ("mm", 1e3),
     "m2": ("mm2", 1e6),

@@ -29,8 +29,7 @@ def read_dat(path: Path) -> Table:
     headers = list(_HEADER.finditer(text))
     masses = _MASS.findall(text)
     return Table(
-        _rows(text[headers[-1].end() :]) if headers else {},
-        _number(masses[-1]) if masses else None,
+        _rows(text[headers[-1].end() :]) if headers else {}, _number(masses[-1]) if masses else None
     )
 
 

@@ -26,8 +26,14 @@ def main(arguments: list[str] | None = None) -> int:
     try:
         run(job.parent, job.name, oldjob and oldjob.name, options.time_limit)
         results = [job.with_name(f"{job.name}.{suffix}") for suffix in ("json", "npz")]
-        print("\n".join([*_words(json.loads(results[0].read_text(encoding="utf-8"))),
-                         f"results in {results[0]} and {results[1]}"]))  # fmt: skip
+        print(
+            "\n".join(
+                [
+                    *_words(json.loads(results[0].read_text(encoding="utf-8"))),
+                    f"results in {results[0]} and {results[1]}",
+                ]
+            )
+        )
     except (DeckError, OSError) as error:
         print(f"error: {_printable(error)}", file=sys.stderr)
         return 2

@@ -297,9 +297,7 @@ def _block(
             # its transpose, in C order: (angle, column, angle, row)
             place = out[x * K * n : (x + 1) * K * n, y * K * m : (y + 1) * K * m].T
             tiles = np.lib.stride_tricks.as_strided(
-                place,
-                (K, m, K, n),
-                (m * place.strides[0], place.strides[0], n * 4, 4),
+                place, (K, m, K, n), (m * place.strides[0], place.strides[0], n * 4, 4)
             )
             table = tables[0 if g == h else 1]
             parts = table[:, beyond : beyond + m, after : after + n]

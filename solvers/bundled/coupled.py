@@ -184,18 +184,16 @@ class Parts:
         place[kept] = np.arange(len(kept))
         mine = place[self.mode] >= 0
         return Parts(
-            place[self.mode[mine]], self.n[mine], self.shapes[mine], self.eigenvalues[kept],
+            place[self.mode[mine]],
+            self.n[mine],
+            self.shapes[mine],
+            self.eigenvalues[kept],
             self.at[:, kept],
-        )  # fmt: skip
+        )
 
 
 def named(
-    basis: Basis,
-    values: Array,
-    vectors: Array,
-    harmonics: list[int],
-    count: int,
-    p: Array,
+    basis: Basis, values: Array, vectors: Array, harmonics: list[int], count: int, p: Array
 ) -> list[HarmonicModes]:
     """Coupled modes, eigenvalues (m,) rising and vectors (fields, m), by the plain modes of
     which they hold most; of a doublet's two the lower comes first. p (d, fields)."""

@@ -39,9 +39,15 @@ def frequency_step(
     equations = numbering(model, step)
     wheel, air = tyre.beside(model, step)
     vibration = Vibration(
-        model, tyre.U, pressures(model, step), equations, shift,
-        wheel, air, float(np.real(row.number(1, 0.0))),
-    )  # fmt: skip
+        model,
+        tyre.U,
+        pressures(model, step),
+        equations,
+        shift,
+        wheel,
+        air,
+        float(np.real(row.number(1, 0.0))),
+    )
     factor = vibration.factor(0)
     solver: HasModes = vibration
     if model.laws:

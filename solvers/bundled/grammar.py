@@ -15,10 +15,7 @@ SECTION_JOB: dict[str, dict[str, Values]] = {
     "HEADING": {},
     "RESTART": {"WRITE": ("",), "FREQUENCY": None},
     "NODE": {"NSET": None},
-    "ELEMENT": {
-        "TYPE": ("CGAX8R", "CGAX8", "CGAX4R", "SFMGAX2", "SFMGAX1"),
-        "ELSET": None,
-    },
+    "ELEMENT": {"TYPE": ("CGAX8R", "CGAX8", "CGAX4R", "SFMGAX2", "SFMGAX1"), "ELSET": None},
     "NSET": {"NSET": None, "GENERATE": ("",)},
     "ELSET": {"ELSET": None, "GENERATE": ("",)},
     "RIGID BODY": {"REF NODE": None, "TIE NSET": None},
@@ -150,6 +147,5 @@ def _check_one(keyword: Keyword, allowed: dict[str, dict[str, Values]], where: s
         if values is not None and " ".join(value.upper().split()) not in values:
             expected = " or ".join(v or "no value" for v in values)
             raise DeckError(
-                keyword.line,
-                f"{name}={value} of *{keyword.name} is not honoured, only {expected}",
+                keyword.line, f"{name}={value} of *{keyword.name} is not honoured, only {expected}"
             )

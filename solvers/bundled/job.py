@@ -125,9 +125,16 @@ class Analysis:
         step = [each for each in self.steps if each.procedure.name == "STATIC"][-1]
         model = self.models(None, step.long_term, False)
         found = press_job.press(
-            model, numbering(model, step), pressures(model, step), self.U, self.road, wanted,
-            self._check_time, TimedOut, vibrations,
-        )  # fmt: skip
+            model,
+            numbering(model, step),
+            pressures(model, step),
+            self.U,
+            self.road,
+            wanted,
+            self._check_time,
+            TimedOut,
+            vibrations,
+        )
         return {"pressure_Pa": step.pressure, "mass_kg": self.mass_kg, **found}
 
     def _vibrating(self, step: Step) -> press_job.Vibrating:
@@ -157,9 +164,15 @@ class Analysis:
 
     def _frequency(self, place: int, step: Step) -> StepResult:
         tyre = Inflated(
-            self.deck, self.request, self.section, self.revolve, self.sector, self.models, self.U,
+            self.deck,
+            self.request,
+            self.section,
+            self.revolve,
+            self.sector,
+            self.models,
+            self.U,
             self._check_time,
-        )  # fmt: skip
+        )
         return self._result(step, *frequency_step(tyre, place, step))
 
     def _result(

@@ -56,10 +56,7 @@ class Model:
 
 
 def build(
-    keywords: list[Keyword],
-    dynamic_Hz: float | None,
-    long_term: bool,
-    own_frequency: bool = False,
+    keywords: list[Keyword], dynamic_Hz: float | None, long_term: bool, own_frequency: bool = False
 ) -> Model:
     """The model of a section job.
 
@@ -264,9 +261,14 @@ def stiffened(model: Model) -> list[Model]:
         for r in model.rubbers:
             own, m = r.law == law, r.material
             shear = replace(
-                m, C10=m.C10 * own, C01=m.C01 * own, inverse_D1=0.0 * m.inverse_D1,
-                shear_ratio=None, bulk_ratio=None, stressed=False,
-            )  # fmt: skip
+                m,
+                C10=m.C10 * own,
+                C01=m.C01 * own,
+                inverse_D1=0.0 * m.inverse_D1,
+                shear_ratio=None,
+                bulk_ratio=None,
+                stressed=False,
+            )
             rubbers.append(replace(r, material=shear, hourglass_stiffness=0 * r.density))
         models.append(replace(model, rubbers=rubbers, cords=[]))
     return models

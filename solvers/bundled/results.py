@@ -39,10 +39,7 @@ class StepResult:
 def write(stem: Path, model: Model, results: list[StepResult]) -> None:
     """Write STEM.json and STEM.npz."""
     mesh = model.mesh
-    arrays: dict[str, Array] = {
-        "nodes": np.array(list(mesh.index)),
-        "points": mesh.X,
-    }
+    arrays: dict[str, Array] = {"nodes": np.array(list(mesh.index)), "points": mesh.X}
     steps = []
     for result in results:
         order = [

@@ -94,10 +94,18 @@ def _steps(model: list[Keyword], blocks: list[list[Keyword]], revolved: bool) ->
         output = next((k.get("NSET") for k in block if k.name == "NODE FILE"), "")
         steps.append(
             Step(
-                number, procedure, pressures, held, long_term, revolved, forces, output,
-                turning["CENTRIF"], turning["ROTDYNF"],
+                number,
+                procedure,
+                pressures,
+                held,
+                long_term,
+                revolved,
+                forces,
+                output,
+                turning["CENTRIF"],
+                turning["ROTDYNF"],
             )
-        )  # fmt: skip
+        )
     return steps
 
 

@@ -22,11 +22,7 @@ from .runner import clear, run_job
 Array = np.ndarray
 SECTOR, SETTINGS, INFLATE = "sector.inp", "calculix.json", "inflate"
 REVOLVED = 1e-3  # of the largest displacement; 2e-4 moves no frequency by 0.001 %, 9e-3 one by 5 %
-OPTIONS: dict[str, Any] = {
-    "parallel": 1,
-    "element": "C3D20R",
-    "ply_thickness_m": 2e-4,
-}
+OPTIONS: dict[str, Any] = {"parallel": 1, "element": "C3D20R", "ply_thickness_m": 2e-4}
 
 
 class Refused(ValueError):

@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 
-def entry(status: str = "good", cause: str | None = None, words: str | None = None,
-          **quantities: float) -> dict[str, Any]:  # fmt: skip
+def entry(
+    status: str = "good", cause: str | None = None, words: str | None = None, **quantities: float
+) -> dict[str, Any]:
     """A study's entry."""
     return {"status": status, "cause": cause, "words": words, "quantities": quantities}
 

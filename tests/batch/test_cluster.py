@@ -64,8 +64,9 @@ class Machines:
 
     def _start(self, *command: str) -> subprocess.Popen[bytes]:
         with (self.folder / f"{len(self.workers)}-{command[0]}.log").open("wb") as log:
-            return subprocess.Popen([*DASK, *command], env=self.environment, cwd=self.folder,
-                                    stdout=log, stderr=log)  # fmt: skip
+            return subprocess.Popen(
+                [*DASK, *command], env=self.environment, cwd=self.folder, stdout=log, stderr=log
+            )
 
     def runs(self) -> list[tuple[int, str]]:
         lines = self.log.read_text().splitlines()

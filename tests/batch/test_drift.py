@@ -82,8 +82,10 @@ def test_the_worst_stands_first_and_a_failure_is_no_drift() -> None:
 
 
 def test_a_baseline_keeps_its_tolerances_and_only_what_is_good() -> None:
-    now = [report("a", fit=entry(objective=1.0), modes=entry("error", "unstable", "no")),
-           report("b", fit=entry("error", "unstable", "no"))]  # fmt: skip
+    now = [
+        report("a", fit=entry(objective=1.0), modes=entry("error", "unstable", "no")),
+        report("b", fit=entry("error", "unstable", "no")),
+    ]
     first = baseline_of(now, None)
     assert first["cases"] == {"a": {"fit": {"objective": 1.0}}}
     assert first["tolerances"] == DEFAULTS

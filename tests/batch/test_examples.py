@@ -47,8 +47,13 @@ def test_the_workflows_commands_pass_on_the_shipped_cases(tmp_path: Path) -> Non
     install, *rest = commands
     assert install.startswith("pip install .") and len(rest) == 2
     for command in rest:
-        done = subprocess.run(["bash", "-e", "-c", command], cwd=tmp_path, env=environment,
-                              capture_output=True, text=True)  # fmt: skip
+        done = subprocess.run(
+            ["bash", "-e", "-c", command],
+            cwd=tmp_path,
+            env=environment,
+            capture_output=True,
+            text=True,
+        )
         assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-2000:]
     assert " 0 of " in f" {done.stdout}" and "new" not in done.stdout
     kept = next(step for step in steps() if "upload-artifact" in step.get("uses", ""))

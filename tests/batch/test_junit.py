@@ -52,8 +52,9 @@ def test_every_outcome_has_its_element_and_its_words() -> None:
     failure = tests["b/deep", "modes"].find("failure")
     assert failure is not None and failure.get("type") == "timed_out"
     assert tests["c", "fit"].find("error").get("type") == "worker_lost"  # type: ignore[union-attr]
-    counts = [[suite.get(k) for k in ("tests", "failures", "errors", "skipped")]
-              for suite in suites]  # fmt: skip
+    counts = [
+        [suite.get(k) for k in ("tests", "failures", "errors", "skipped")] for suite in suites
+    ]
     assert counts == [["2", "1", "0", "0"], ["3", "1", "1", "1"], ["1", "0", "1", "0"]]
     facts = {p.get("name"): p.get("value") for p in suites[0].iter("property")}
     assert facts["solver"] == "bundled 1.0.0" and facts["solver_runs"] == "9"
@@ -62,8 +63,10 @@ def test_every_outcome_has_its_element_and_its_words() -> None:
 
 def test_what_only_one_side_has_is_said() -> None:
     before = [*BEFORE, report("gone/deep", fit=entry(objective=1.0))]
-    now = [report("a", fit=entry(objective=1.0, mass_kg=1.0), footprint=entry(area_m2=1.0)),
-           report("new", fit=entry(objective=1.0))]  # fmt: skip
+    now = [
+        report("a", fit=entry(objective=1.0, mass_kg=1.0), footprint=entry(area_m2=1.0)),
+        report("new", fit=entry(objective=1.0)),
+    ]
     suites = parsed(junit(now, compare(now, baseline_of(before, None)), STARTED))
     tests = {(t.get("classname"), t.get("name")): t for t in suites.iter("testcase")}
     skipped = {key for key, test in tests.items() if test.find("skipped") is not None}

@@ -41,12 +41,17 @@ def main(count: int, jobs: int, coarse: bool) -> None:
             facts = json.loads((folder / str(n) / "run.json").read_text())["batch"]
             facts = facts["cases"].values()
             cpu = sum(each["cpu_seconds"] for each in facts)
-            print(f"{count} cases, {n} at a time: {seconds[n]:.1f} s, without waiting for a core"
-                  f" {quiet[n]:.1f} s; {cpu:.1f} s of a core in the cases, exit code {code},"
-                  f" {counts}", flush=True)  # fmt: skip
+            print(
+                f"{count} cases, {n} at a time: {seconds[n]:.1f} s, without waiting for a core"
+                f" {quiet[n]:.1f} s; {cpu:.1f} s of a core in the cases, exit code {code},"
+                f" {counts}",
+                flush=True,
+            )
         texts = [(folder / str(n) / "batch.json").read_bytes() for n in seconds]
-        print(f"{seconds[1] / seconds[jobs]:.2f} times as fast, without waiting"
-              f" {quiet[1] / quiet[jobs]:.2f}; same bytes: {texts[0] == texts[1]}")  # fmt: skip
+        print(
+            f"{seconds[1] / seconds[jobs]:.2f} times as fast, without waiting"
+            f" {quiet[1] / quiet[jobs]:.2f}; same bytes: {texts[0] == texts[1]}"
+        )
 
 
 def run(command: Sequence[str], environment: Mapping[str, str]) -> tuple[int, float, float]:

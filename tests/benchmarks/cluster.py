@@ -117,14 +117,18 @@ def main(cases: int, tasks: int, folder: Path) -> None:
             *map(str, vary(folder / "c", cases, coarse=False)),
         ]
         subprocess.run([*command, "--quiet", "--scheduler", address, "--output", out], check=True)
-        print(f"{cases} fits in {time.perf_counter() - clock:.1f} s; network: "
-              f"{moved(before, cases)} per case")  # fmt: skip
+        print(
+            f"{cases} fits in {time.perf_counter() - clock:.1f} s; network: "
+            f"{moved(before, cases)} per case"
+        )
         print(f"memory of a worker: {max(memory_MB(each.pid) for each in workers):.0f} MB")
         records, results = list(out.glob("record/*/*")), list(out.glob("tyre_*/*"))
-        print(f"file system per case: {len(records) / cases:.1f} records of "
-              f"{size(records) / len(records) / 1e3:.0f} kB, {len(results) / cases:.0f} results of "
-              f"{size(results) / cases / 1e3:.1f} kB in all; batch.json "
-              f"{size([out / 'batch.json']) / cases / 1e3:.2f} kB per case")  # fmt: skip
+        print(
+            f"file system per case: {len(records) / cases:.1f} records of "
+            f"{size(records) / len(records) / 1e3:.0f} kB, {len(results) / cases:.0f} results of "
+            f"{size(results) / cases / 1e3:.1f} kB in all; batch.json "
+            f"{size([out / 'batch.json']) / cases / 1e3:.2f} kB per case"
+        )
         report = json.dumps(json.loads((out / "batch.json").read_text())["cases"][0])
         before, clock = MOVED.copy(), time.perf_counter()
         used, start_MB, most_MB = cpu_s(scheduler.pid), memory_MB(scheduler.pid), 0.0
@@ -132,10 +136,12 @@ def main(cases: int, tasks: int, folder: Path) -> None:
             for _ in ready.each(answer, [(i, report) for i in range(tasks)]):
                 most_MB = max(most_MB, memory_MB(scheduler.pid))
         seconds = time.perf_counter() - clock
-        print(f"{tasks} empty tasks in {seconds:.1f} s, {tasks / seconds:.0f} a second; scheduler: "
-              f"{1e3 * (cpu_s(scheduler.pid) - used) / tasks:.2f} ms of a core per task, "
-              f"{start_MB:.0f} MB before, at most {most_MB:.0f} MB; network: "
-              f"{moved(before, tasks)} per task")  # fmt: skip
+        print(
+            f"{tasks} empty tasks in {seconds:.1f} s, {tasks / seconds:.0f} a second; scheduler: "
+            f"{1e3 * (cpu_s(scheduler.pid) - used) / tasks:.2f} ms of a core per task, "
+            f"{start_MB:.0f} MB before, at most {most_MB:.0f} MB; network: "
+            f"{moved(before, tasks)} per task"
+        )
     finally:
         for process in [*workers, scheduler]:
             process.kill()

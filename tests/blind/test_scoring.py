@@ -13,12 +13,7 @@ from tyrecal.blind.baselines import guesses
 from tyrecal.blind.protocol import Protocol
 from tyrecal.blind.ruler import Ruler, Signature, difficulty, measure
 from tyrecal.blind.score import Scored
-from tyrecal.blind.statistics import (
-    brier,
-    calibration_error,
-    calibration_quantile,
-    clopper_pearson,
-)
+from tyrecal.blind.statistics import brier, calibration_error, calibration_quantile, clopper_pearson
 from tyrecal.blind.tables import summary
 from tyrecal.diagnose.response import Point
 from tyrecal.modes.mode import Label
@@ -99,12 +94,27 @@ def trial(kind: str, law: str, p: dict[str, float], **more: object) -> Scored:
     )
     group = (truth,)
     made = Scored(
-        id=f"{kind}{law}", kind=kind, law=law, size=1.0, swapped=False, truth=truth, group=group,
-        lam=30.0, band=30.0, verdict=verdict, named=ranked[0] if sure else None, ranked=ranked,
-        probabilities=p, on_truth=p.get(truth, 0.0), on_group=p.get(truth, 0.0),
-        in_set=truth in ranked[:1], parameter_held=None, before=0.01, after=0.002,
+        id=f"{kind}{law}",
+        kind=kind,
+        law=law,
+        size=1.0,
+        swapped=False,
+        truth=truth,
+        group=group,
+        lam=30.0,
+        band=30.0,
+        verdict=verdict,
+        named=ranked[0] if sure else None,
+        ranked=ranked,
+        probabilities=p,
+        on_truth=p.get(truth, 0.0),
+        on_group=p.get(truth, 0.0),
+        in_set=truth in ranked[:1],
+        parameter_held=None,
+        before=0.01,
+        after=0.002,
         baselines={"AIC": "a"},
-    )  # fmt: skip
+    )
     return replace(made, **more)  # type: ignore[arg-type]
 
 
@@ -142,14 +152,17 @@ def ruler() -> Ruler:
     """Four rows of one mode each, one variable that moves all alike, two effects."""
     rows = tuple((Label(n, 0), 240.0) for n in (1, 2, 3, 4))
     sizes = np.array([0.0, 0.5, 1.0])
-    line = lambda g: Signature(
-        sizes, np.outer(sizes, g), np.zeros((3, 4, 1)), np.zeros((3, 4))
-    )  # fmt: skip
+    line = lambda g: Signature(sizes, np.outer(sizes, g), np.zeros((3, 4, 1)), np.zeros((3, 4)))
     return Ruler(
-        rows, np.zeros(1), np.array([100.0]), np.zeros(4), np.ones((4, 1)), np.zeros((4, 1, 1)),
+        rows,
+        np.zeros(1),
+        np.array([100.0]),
+        np.zeros(4),
+        np.ones((4, 1)),
+        np.zeros((4, 1, 1)),
         np.zeros((4, 1)),
         {"a": line(np.array([0.02, 0, 0, 0])), "b": line(np.array([0, 0.02, 0, 0]))},
-    )  # fmt: skip
+    )
 
 
 def test_lambda_and_distances_in_closed_form() -> None:

@@ -20,9 +20,7 @@ from ..effects.support import coarse
 
 CASE = coarse()
 PRESSURES = (160.0, 240.0, 320.0, 200.0)
-NUMBERS = (
-    "rebar_layers.belt_1.area_m2", "rebar_layers.carcass.area_m2", "materials.rubber.C10_Pa",
-)  # fmt: skip
+NUMBERS = ("rebar_layers.belt_1.area_m2", "rebar_layers.carcass.area_m2", "materials.rubber.C10_Pa")
 KG = 12.0
 
 

@@ -8,14 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tyrecal_solvers.bundled import (
-    grammar,
-    harmonics,
-    inflation,
-    keywords,
-    mechanics,
-    model,
-)
+from tyrecal_solvers.bundled import grammar, harmonics, inflation, keywords, mechanics, model
 from tyrecal_solvers.bundled.band import Numbering
 from tyrecal_solvers.bundled.mechanics import Load
 from tyrecal_solvers.bundled.model import Model
@@ -109,11 +102,7 @@ def block(r: tuple[float, float, int], z: tuple[float, float, int], quadratic: b
 
 
 def deck(
-    X: Array,
-    solids: Array,
-    rubber: Rubber,
-    layers: Sequence[Layer] = (),
-    inner: Sequence[int] = (),
+    X: Array, solids: Array, rubber: Rubber, layers: Sequence[Layer] = (), inner: Sequence[int] = ()
 ) -> str:
     """Deck of solids 1, 2, ... with face S4 of ``inner`` as surface CAVITY; node = row + 1."""
     kind = {8: "CGAX8R", 4: "CGAX4R", 0: ""}[solids.shape[1] if len(solids) else 0]

@@ -57,36 +57,71 @@ def radii(first: float, core: float, growth: float) -> Array:
 
 
 def cylinder(
-    share: float, degrees: float, friction: float = 0.0, steps: int = 1,
-    stiffness: float = 1e11, first: float = 5e-3, growth: float = 2.0,
-) -> Found:  # fmt: skip
+    share: float,
+    degrees: float,
+    friction: float = 0.0,
+    steps: int = 1,
+    stiffness: float = 1e11,
+    first: float = 5e-3,
+    growth: float = 2.0,
+) -> Found:
     """In plane strain, a = ``share`` R."""
     a, E = share * R, RUBBER.plane_strain
     F = np.pi * a**2 * E / (4 * R)
     work = contact.ring(radii(first, 0.2 * R, growth), WIDTH / 2, 2, RUBBER, plane=True)
     around = lengths(share, degrees, np.pi)
-    return _press(work, around, F * WIDTH, a, np.sqrt(F * E / (np.pi * R)), F / (2 * a),
-                  friction, steps, stiffness)  # fmt: skip
+    return _press(
+        work,
+        around,
+        F * WIDTH,
+        a,
+        np.sqrt(F * E / (np.pi * R)),
+        F / (2 * a),
+        friction,
+        steps,
+        stiffness,
+    )
 
 
 def ball(
-    share: float, degrees: float, friction: float = 0.0, steps: int = 1,
-    stiffness: float = 1e11, first: float = 3e-3, growth: float = 1.8,
-) -> Found:  # fmt: skip
+    share: float,
+    degrees: float,
+    friction: float = 0.0,
+    steps: int = 1,
+    stiffness: float = 1e11,
+    first: float = 3e-3,
+    growth: float = 1.8,
+) -> Found:
     """Meridian and circumference alike."""
     a, E = share * R, RUBBER.plane_strain
     F = a**3 * 4 * E / (3 * R)
     latitudes = np.concatenate([[0.0], np.cumsum(lengths(share, degrees, np.radians(45.0)))])
     work = contact.ball(radii(first * share / 0.1, 0.3 * R, growth), latitudes, RUBBER)
     around = lengths(share, degrees, np.pi)
-    return _press(work, around, F, a, 3 * F / (2 * np.pi * a**2), F / (np.pi * a**2),
-                  friction, steps, stiffness)  # fmt: skip
+    return _press(
+        work,
+        around,
+        F,
+        a,
+        3 * F / (2 * np.pi * a**2),
+        F / (np.pi * a**2),
+        friction,
+        steps,
+        stiffness,
+    )
 
 
 def _press(
-    work: Round, around: Array, F: float, a: float, p0: float, mean: float,
-    friction: float, steps: int, stiffness: float,
-) -> Found:  # fmt: skip
+    work: Round,
+    around: Array,
+    F: float,
+    a: float,
+    p0: float,
+    mean: float,
+    friction: float,
+    steps: int,
+    stiffness: float,
+) -> Found:
     press = work.press(around, stiffness, friction, 1e-6)
     for i in range(steps):
         found = press.to(F * (i + 1) / steps)

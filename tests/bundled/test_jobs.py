@@ -55,9 +55,12 @@ STEP = "*STEP, NAME=EQUILIBRIUM"
     [
         (PLAIN, "*SYMMETRIC RESULTS TRANSFER, STEP=1, INC=10\n", "", "needs *SYMMETRIC RESULTS"),
         (PLAIN, "*FREQUENCY", "*STATIC\n1., 1.\n*FREQUENCY", "a step needs one *STATIC, *FREQ"),
-        (PLAIN, "CAVITY, P, 160000\n*END STEP\n*STEP, NAME=MODES\n",
-         "CAVITY, P, 160000\n*END STEP\n*STEP, NAME=MODES, PERTURBATION\n*STATIC\n",
-         "a step needs one"),
+        (
+            PLAIN,
+            "CAVITY, P, 160000\n*END STEP\n*STEP, NAME=MODES\n",
+            "CAVITY, P, 160000\n*END STEP\n*STEP, NAME=MODES, PERTURBATION\n*STATIC\n",
+            "a step needs one",
+        ),
         (PLAIN, "DIRECT\n0.1, 1.0\n", "DIRECT\n0.1, 1.0\n0.1, 1.0\n", "takes one data line"),
         (PLAIN, STEP, f"*BOUNDARY\nNOWHERE, 1\n{STEP}", "node set NOWHERE is not defined"),
         (PLAIN, STEP, f"*BOUNDARY\n77, 1\n{STEP}", "node set 77 is not defined"),
@@ -65,10 +68,18 @@ STEP = "*STEP, NAME=EQUILIBRIUM"
         (PLAIN, STEP, f"*BOUNDARY\nCROWN, 4, 6\n{STEP}", "freedom 4 to 6 of a set cannot"),
         (PLAIN, STEP, f"*BOUNDARY\nCROWN, 1\n{STEP}", "freedom 1 to 1 of a set cannot"),
         (PLAIN, "TIE NSET=RIM\n*STEP", "TIE NSET=BEAD\n*STEP", "it must be restated"),
-        (PLAIN, "REF NODE=900001, TIE NSET=RIM\n*SOLID", "REF NODE=5, TIE NSET=RIM\n*SOLID",
-         "node 5 or node set RIM is not defined"),
-        (PLAIN, "*END STEP\n*STEP, NAME=MODES\n*FREQUENCY",
-         "*END STEP\n*STEP, NAME=MODES\n*COMPLEX FREQUENCY", "not honoured"),
+        (
+            PLAIN,
+            "REF NODE=900001, TIE NSET=RIM\n*SOLID",
+            "REF NODE=5, TIE NSET=RIM\n*SOLID",
+            "node 5 or node set RIM is not defined",
+        ),
+        (
+            PLAIN,
+            "*END STEP\n*STEP, NAME=MODES\n*FREQUENCY",
+            "*END STEP\n*STEP, NAME=MODES\n*COMPLEX FREQUENCY",
+            "not honoured",
+        ),
         (PLAIN, FREQUENCY, "*COMPLEX FREQUENCY\n20\n", "no ROTDYNF"),
         (TURNING, "CENTRIF, 25", "CENTRIF, 26", "must be one for all elements"),
         (TURNING, "ROTDYNF, 5,", "ROTDYNF, 6,", "must be one for all elements"),
@@ -88,7 +99,7 @@ STEP = "*STEP, NAME=EQUILIBRIUM"
         (MASS, "ELSET=POINT_MASS\n0.1", "ELSET=POINT_MASS\n-0.1", "*MASS must be positive"),
         (MASS, "ELSET=POINT_MASS\n0.1", "ELSET=POINT_MASS\n0.1\n0.1", "*MASS takes 1 data line"),
     ],
-)  # fmt: skip
+)
 def test_a_pair_that_means_something_else_is_refused(
     effects: tuple[tuple[str, float], ...], old: str, new: str, words: str
 ) -> None:
@@ -120,20 +131,35 @@ LAW = "*VISCOELASTIC, FREQUENCY=TABULAR\n"
         ("INFLATE, NLGEOM=YES", "INFLATE", "needs NLGEOM=YES"),
         ("INFLATE, NLGEOM=YES", "INFLATE, NLGEOM=YES, PERTURBATION", "no linear PERTURBATION"),
         ("CAVITY, P, 160000\n*END STEP\n*STEP", "CAVITY, HP, 160000\n*END STEP\n*STEP", "only P"),
-        ("900001, 1, 6\n*DSLOAD\nCAVITY, P, 160000\n*END STEP\n*STEP",
-         "900001, 1, 5\n*DSLOAD\nCAVITY, P, 160000\n*END STEP\n*STEP", "must be held in 1, 6"),
+        (
+            "900001, 1, 6\n*DSLOAD\nCAVITY, P, 160000\n*END STEP\n*STEP",
+            "900001, 1, 5\n*DSLOAD\nCAVITY, P, 160000\n*END STEP\n*STEP",
+            "must be held in 1, 6",
+        ),
         ("*VISCOELASTIC, TIME=PRONY\n0.3, 0, 0.1\n", f"{LAW}0., 0.3, 0., 0., 10.\n", "two rows"),
-        ("*VISCOELASTIC, TIME=PRONY\n0.3, 0, 0.1\n",
-         f"{LAW}0., 0.3, 0., 0., 10.\n0., 0.2, 0., 0., 10.\n", "their frequencies rise"),
-        ("*VISCOELASTIC, TIME=PRONY\n0.3, 0, 0.1\n",
-         f"{LAW}0., 0.3, 0., 0., 0.\n0., 0.2, 0., 0., 10.\n", "their frequencies rise"),
-        ("*VISCOELASTIC, TIME=PRONY\n0.3, 0, 0.1\n",
-         f"{LAW}0., 1.0, 0., 0., 1.\n0., 0.2, 0., 0., 10.\n", "are positive"),
-        ("*VISCOELASTIC, TIME=PRONY\n0.3, 0, 0.1\n",
-         f"{LAW}0., 0.3, 0., 0.1, 1.\n0., 0.2, 0., 0., 10.\n", "the bulk modulus stays"),
+        (
+            "*VISCOELASTIC, TIME=PRONY\n0.3, 0, 0.1\n",
+            f"{LAW}0., 0.3, 0., 0., 10.\n0., 0.2, 0., 0., 10.\n",
+            "their frequencies rise",
+        ),
+        (
+            "*VISCOELASTIC, TIME=PRONY\n0.3, 0, 0.1\n",
+            f"{LAW}0., 0.3, 0., 0., 0.\n0., 0.2, 0., 0., 10.\n",
+            "their frequencies rise",
+        ),
+        (
+            "*VISCOELASTIC, TIME=PRONY\n0.3, 0, 0.1\n",
+            f"{LAW}0., 1.0, 0., 0., 1.\n0., 0.2, 0., 0., 10.\n",
+            "are positive",
+        ),
+        (
+            "*VISCOELASTIC, TIME=PRONY\n0.3, 0, 0.1\n",
+            f"{LAW}0., 0.3, 0., 0.1, 1.\n0., 0.2, 0., 0., 10.\n",
+            "the bulk modulus stays",
+        ),
         ("0.3, 0, 0.1\n", "0.3, 0, 0.1, 0.2\n", "a term of a Prony series is g, k and tau"),
     ],
-)  # fmt: skip
+)
 def test_what_a_transfer_or_a_table_may_not_be(old: str, new: str, words: str) -> None:
     """Read alone, without a solution: what stands there would mean another state."""
     with pytest.raises(DeckError, match=re.escape(words)):
@@ -174,11 +200,19 @@ def test_masses_and_springs_stand_in_their_components() -> None:
     model = Analysis(deck, Request()).model
     _, revolve, _ = deck.read([])
     found = read_attached(revolve, model.mesh)
-    at = {(int(r), int(c)): (m, k) for r, c, m, k in
-          zip(found.rows, found.components, found.mass, found.stiffness, strict=True)}  # fmt: skip
+    at = {
+        (int(r), int(c)): (m, k)
+        for r, c, m, k in zip(
+            found.rows, found.components, found.mass, found.stiffness, strict=True
+        )
+    }
     one, other = model.mesh.index[21009], model.mesh.index[19009]
-    assert at == {(one, 0): (0.1, 1e3), (one, 1): (0.1, 0.0), (one, 2): (0.1, 2e3),
-                  (other, 1): (0.0, 3e3)}  # fmt: skip
+    assert at == {
+        (one, 0): (0.1, 1e3),
+        (one, 1): (0.1, 0.0),
+        (one, 2): (0.1, 2e3),
+        (other, 1): (0.0, 3e3),
+    }
     assert found.total_kg == pytest.approx(0.1) and found.sectors == found.highest == 60
     angle = np.linspace(-np.pi / 60, np.pi / 60, 2001)
     for n in (0, 1, 7):

@@ -218,19 +218,27 @@ def test_sets_are_numbers_ranges_and_other_sets() -> None:
 
 
 DATA = {  # keyword: where it stands, and a line of all data that are honoured
-    "DENSITY": ("section", "1100."), "ELASTIC": ("section", "1E9, 0.3"),
-    "HYPERELASTIC": ("section", "1E6, 0., 5E-8"), "ACOUSTIC MEDIUM": ("section", "4.8E5"),
+    "DENSITY": ("section", "1100."),
+    "ELASTIC": ("section", "1E9, 0.3"),
+    "HYPERELASTIC": ("section", "1E6, 0., 5E-8"),
+    "ACOUSTIC MEDIUM": ("section", "4.8E5"),
     "VISCOELASTIC": ("section", "0.1, 0.1, 0.1, 0.1, 20."),
     "HOURGLASS STIFFNESS": ("section", "1."),
     "REBAR LAYER": ("section", "PLY, 4E-7, 1E-3, 0., CORD, 90."),
-    "SPRING": ("revolve", "1E6"), "MASS": ("revolve", "15."),
-    "ROTARY INERTIA": ("revolve", "0.3, 0.4, 0.3"), "SURFACE BEHAVIOR": ("revolve", "1E9"),
-    "FRICTION": ("revolve", "0.5"), "CONTACT PAIR": ("revolve", "TREAD, ROAD"),
-    "BOUNDARY": ("step", "RIM, 1, 6, 0."), "DSLOAD": ("step", "CAVITY, P, 240E3"),
+    "SPRING": ("revolve", "1E6"),
+    "MASS": ("revolve", "15."),
+    "ROTARY INERTIA": ("revolve", "0.3, 0.4, 0.3"),
+    "SURFACE BEHAVIOR": ("revolve", "1E9"),
+    "FRICTION": ("revolve", "0.5"),
+    "CONTACT PAIR": ("revolve", "TREAD, ROAD"),
+    "BOUNDARY": ("step", "RIM, 1, 6, 0."),
+    "DSLOAD": ("step", "CAVITY, P, 240E3"),
     "DLOAD": ("step", "ALL, CENTRIF, 1., 0., 0., 0., 0., 1., 0."),
-    "CLOAD": ("step", "9, 1, -4000."), "STATIC": ("step", "0.1, 1."),
-    "FREQUENCY": ("step", "20, 1., 200., -10."), "COMPLEX FREQUENCY": ("step", "20"),
-}  # fmt: skip
+    "CLOAD": ("step", "9, 1, -4000."),
+    "STATIC": ("step", "0.1, 1."),
+    "FREQUENCY": ("step", "20, 1., 200., -10."),
+    "COMPLEX FREQUENCY": ("step", "20"),
+}
 
 
 @pytest.mark.parametrize("name", grammar.FIELDS)

@@ -152,9 +152,13 @@ def test_rows_may_be_of_the_sectors_job(tmp_path: Path) -> None:
     ],
 )
 def test_how_the_command_ends(
-    error: Exception, code: int, words: str, folder: Path,
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
-) -> None:  # fmt: skip
+    error: Exception,
+    code: int,
+    words: str,
+    folder: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     def run(*_: object) -> None:
         raise error
 
@@ -165,15 +169,22 @@ def test_how_the_command_ends(
 
 def test_words_of_steps_and_footprints() -> None:
     mode = lambda n, f: {"n": n, "frequency_Hz": f}
-    step = {"step": 2, "pressure_Pa": 240e3, "mass_kg": 12.804,
-            "modes": [mode(2, 73.116), mode(0, 36.7), mode(2, 88.2)]}  # fmt: skip
+    step = {
+        "step": 2,
+        "pressure_Pa": 240e3,
+        "mass_kg": 12.804,
+        "modes": [mode(2, 73.116), mode(0, 36.7), mode(2, 88.2)],
+    }
     pressed = {"load_N": 4000.0, "deflection_m": 0.020344, "contact_area_m2": 0.018216}
     assert _words({"steps": [step]}) == [
-        "step 2: 240 kPa, 12.80 kg", "  harmonic 0: 36.70 Hz", "  harmonic 2: 73.12, 88.20 Hz",
-    ]  # fmt: skip
+        "step 2: 240 kPa, 12.80 kg",
+        "  harmonic 0: 36.70 Hz",
+        "  harmonic 2: 73.12, 88.20 Hz",
+    ]
     assert _words({"footprints": [pressed], "failure": "no more"}) == [
-        "4000 N: deflection 20.34 mm, contact area 182.2 cm2", "no more",
-    ]  # fmt: skip
+        "4000 N: deflection 20.34 mm, contact area 182.2 cm2",
+        "no more",
+    ]
     assert _words({"footprints": [], "failure": ""}) == []
 
 

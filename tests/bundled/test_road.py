@@ -324,10 +324,13 @@ def test_a_road_is_read() -> None:
         ("90., 2, 1., C\n*", "90., 2, 1.1, C\n*", "bias"),
         ("90., 2, 1., C\n*", "90., 1, 1., C\n*", "mirror at 180 degrees"),
         ("90., 2, 1., C\n*", "90., 3, 1., C\n*", "mirror at 180 degrees"),
-        ("90., 2, 1., C\n90., 1, 1., C\n90., 1, 1., C\n90., 2, 1., C\n", "360., 2, 1., C\n",
-         "four elements"),
+        (
+            "90., 2, 1., C\n90., 1, 1., C\n90., 1, 1., C\n90., 2, 1., C\n",
+            "360., 2, 1., C\n",
+            "four elements",
+        ),
     ],
-)  # fmt: skip
+)
 def test_roads_that_mean_something_else(old: str, new: str, words: str) -> None:
     assert ROAD.count(old) == 1
     with pytest.raises(DeckError, match=re.escape(words)):

@@ -96,9 +96,14 @@ def test_against_central_differences(name: str, with_air: bool) -> None:
     assert isinstance(factor, Bordered)
     V = sensitivity.state_rate(seeded, U, loads, vibration.numbering, factor.tyre)
     got = sensitivity.eigenvalue_rates(
-        seeded, U, V, loads, sensitivity.Fields(np.repeat(HARMONICS, COUNT), shapes),
-        np.concatenate([m.eigenvalues for m in modes]), sensitivity.Beside(wheel, air, rim, flow),
-    )  # fmt: skip
+        seeded,
+        U,
+        V,
+        loads,
+        sensitivity.Fields(np.repeat(HARMONICS, COUNT), shapes),
+        np.concatenate([m.eigenvalues for m in modes]),
+        sensitivity.Beside(wheel, air, rim, flow),
+    )
     h = 5e-3
     at = {k: eigenvalues(variable.deck(k * h), with_air) for k in (-2, -1, 1, 2)}
     wanted = (8 * (at[1] - at[-1]) - at[2] + at[-2]) / (12 * h)

@@ -34,9 +34,7 @@ def on_crown(inflated: Inflated, mass: float = 0.0, spring: float = 0.0) -> Atta
     """Mass (kg) in all three directions and a radial spring (N/m) on the node furthest out."""
     crown = int(np.argmax(inflated.model.mesh.X[:, 0]))
     stiffness = np.array([spring, 0.0, 0.0], complex)
-    return Attached(
-        np.full(3, crown), np.arange(3), np.full(3, mass, complex), stiffness, SECTORS
-    )  # fmt: skip
+    return Attached(np.full(3, crown), np.arange(3), np.full(3, mass, complex), stiffness, SECTORS)
 
 
 def frequencies(modes: list[harmonics.HarmonicModes]) -> Array:
@@ -154,9 +152,15 @@ def test_a_sector_of_360_degrees_is_another_tyre(vibration: Vibration, inflated:
     other = stiffer(inflated.model, 0.05)
     waves = [0, 1, 2]
     got = sector.sector_modes(
-        vibration, inflated.U, inflated.loads, inflated.model, Sector(2 * np.pi, other),
-        waves, COUNT, beyond=1,
-    )  # fmt: skip
+        vibration,
+        inflated.U,
+        inflated.loads,
+        inflated.model,
+        Sector(2 * np.pi, other),
+        waves,
+        COUNT,
+        beyond=1,
+    )
     U = support.inflate(other, inflated.held, inflated.loads)
     number = support.numbering(other, inflated.held)
     there = Vibration(other, U, inflated.loads, number, 0.0)
@@ -169,9 +173,15 @@ def test_a_sector_of_360_degrees_is_another_tyre(vibration: Vibration, inflated:
 
 def test_no_share_is_the_plain_tyre(vibration: Vibration, inflated: Inflated) -> None:
     got = sector.sector_modes(
-        vibration, inflated.U, inflated.loads, inflated.model, Sector(0.2, inflated.model),
-        WAVES, COUNT, beyond=1,
-    )  # fmt: skip
+        vibration,
+        inflated.U,
+        inflated.loads,
+        inflated.model,
+        Sector(0.2, inflated.model),
+        WAVES,
+        COUNT,
+        beyond=1,
+    )
     np.testing.assert_allclose(frequencies(got), plain(vibration), rtol=1e-8)
 
 

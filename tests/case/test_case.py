@@ -7,14 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tyrecal.case import (
-    CaseError,
-    load_case,
-    parse_assignment,
-    start_values,
-    validate,
-    with_values,
-)
+from tyrecal.case import CaseError, load_case, parse_assignment, start_values, validate, with_values
 from tyrecal.case.checks import at, find
 from tyrecal.case.variables import number_at
 
@@ -149,9 +142,16 @@ def test_optional_numbers_can_be_set() -> None:
     assert new.raw["mesh"]["hourglass_stiffness_Pa"] == 3e4
 
 
-@pytest.mark.parametrize("number", ["rim.mass_kg", "rim.spindle.tilt_rad_per_N_m",
-                                    "cavity.share", "road.friction",
-                                    "materials.rubber.frequency_exponent"])  # fmt: skip
+@pytest.mark.parametrize(
+    "number",
+    [
+        "rim.mass_kg",
+        "rim.spindle.tilt_rad_per_N_m",
+        "cavity.share",
+        "road.friction",
+        "materials.rubber.frequency_exponent",
+    ],
+)
 def test_a_number_that_is_not_written_can_vary(number: str, tmp_path: Path) -> None:
     variable = f"variables:\n  x: {{sets: [{number}], start: 0.1, lower: 0.01, upper: 0.4}}\n"
     loaded = load_case(put(tmp_path, ("\nvariables:", "\n" + variable.rstrip())))

@@ -23,58 +23,119 @@ SLIPS = {  # name: text of the good case, text in its place, key, what was meant
     "MPa of rubber": ("C10_Pa: 1.0e+6", "C10_Pa: 1.0", "materials.rubber.C10_Pa", "1 MPa, 1e+06"),
     "MPa of C01": ("C01_Pa: 0.0", "C01_Pa: 0.25", "materials.rubber.C01_Pa", "0.25 MPa, 2.5e+05"),
     "MPa of the start": (
-        "start: 1.0e+6\n    lower: 1.0e+5", "start: 1.0\n    lower: 0.1",
-        "variables.C10.start", "materials.rubber.C10_Pa: usual is -1e+07 to 2e+07 Pa"),
+        "start: 1.0e+6\n    lower: 1.0e+5",
+        "start: 1.0\n    lower: 0.1",
+        "variables.C10.start",
+        "materials.rubber.C10_Pa: usual is -1e+07 to 2e+07 Pa",
+    ),
     "1/MPa": ("5.085e-8", "5.085e-2", "materials.rubber.D1_per_Pa", "0.05085 1/MPa, 5.085e-08"),
     "bulk modulus": ("5.085e-8", "3.9e7", "materials.rubber.D1_per_Pa", "bulk modulus K, D1 = 2/K"),
     "g/cm3": ("1100.0", "1.1", "materials.rubber.density_kg_per_m3", "1.1 g/cm3, 1100 kg/m3"),
     "t/mm3": ("5900.0", "5.9e-9", "materials.belt_cord.density_kg_per_m3", "t/mm3, 5900 kg/m3"),
     "GPa": ("172.2e+9", "172.2", "materials.belt_cord.youngs_modulus_Pa", "172.2 GPa, 1.722e+11"),
     "MPa of cords": (
-        "9.87e+9", "9870", "materials.carcass_cord.youngs_modulus_Pa", "9870 MPa, 9.87e+09 Pa"),
-    "mm2": ("area_m2: 2.118683e-7", "area_m2: 0.2118683", "rebar_layers.belt_1.area_m2",
-            "0.211868 mm2, 2.119e-07 m2"),
-    "mm of spacing": ("spacing_m: 1.16e-3", "spacing_m: 1.16", "rebar_layers.belt_1.spacing_m",
-                      "1.16 mm, 0.00116 m"),
-    "cords counted": ("spacing_m: 1.16e-3", "spacing_m: 86", "rebar_layers.belt_1.spacing_m",
-                      "86 cords per decimetre, 0.001163 m"),
+        "9.87e+9",
+        "9870",
+        "materials.carcass_cord.youngs_modulus_Pa",
+        "9870 MPa, 9.87e+09 Pa",
+    ),
+    "mm2": (
+        "area_m2: 2.118683e-7",
+        "area_m2: 0.2118683",
+        "rebar_layers.belt_1.area_m2",
+        "0.211868 mm2, 2.119e-07 m2",
+    ),
+    "mm of spacing": (
+        "spacing_m: 1.16e-3",
+        "spacing_m: 1.16",
+        "rebar_layers.belt_1.spacing_m",
+        "1.16 mm, 0.00116 m",
+    ),
+    "cords counted": (
+        "spacing_m: 1.16e-3",
+        "spacing_m: 86",
+        "rebar_layers.belt_1.spacing_m",
+        "86 cords per decimetre, 0.001163 m",
+    ),
     "carcass from the circumference": (
-        "angle_deg: 0.0", "angle_deg: 90.0", "rebar_layers.carcass.angle_deg",
-        "90 degrees from the circumference, 0 degrees from the meridian"),
+        "angle_deg: 0.0",
+        "angle_deg: 90.0",
+        "rebar_layers.carcass.angle_deg",
+        "90 degrees from the circumference, 0 degrees from the meridian",
+    ),
     "belt from the circumference": (
-        "angle_deg: 70.0", "angle_deg: 20.0", "rebar_layers.belt_1.angle_deg",
-        "20 degrees from the circumference, 70 degrees from the meridian"),
-    "radians": ("angle_deg: 70.0", "angle_deg: 1.2217", "rebar_layers.belt_1.angle_deg",
-                "1.2217 rad, 70 degrees"),
+        "angle_deg: 70.0",
+        "angle_deg: 20.0",
+        "rebar_layers.belt_1.angle_deg",
+        "20 degrees from the circumference, 70 degrees from the meridian",
+    ),
+    "radians": (
+        "angle_deg: 70.0",
+        "angle_deg: 1.2217",
+        "rebar_layers.belt_1.angle_deg",
+        "1.2217 rad, 70 degrees",
+    ),
     "kN": ("solver:\n", "road: {loads_N: [4.5]}\nsolver:\n", "road.loads_N.0", "4.5 kN, 4500 N"),
-    "a zero too many": ("solver:\n", "road: {loads_N: [40000]}\nsolver:\n", "road.loads_N.0",
-                        "34000 N, where this size lies flat on its rim"),
-    "per cent of an effect": ("solver:\n", "effects: {bead_filler: 30}\nsolver:\n",
-                              "effects.bead_filler", "30 %, 0.3"),
-    "too wide a rim": ("solver:\n", "effects: {rim_width: 0.03}\nsolver:\n", "effects.rim_width",
-                        "usual is -0.0127 to 0.0127 m"),
+    "a zero too many": (
+        "solver:\n",
+        "road: {loads_N: [40000]}\nsolver:\n",
+        "road.loads_N.0",
+        "34000 N, where this size lies flat on its rim",
+    ),
+    "per cent of an effect": (
+        "solver:\n",
+        "effects: {bead_filler: 30}\nsolver:\n",
+        "effects.bead_filler",
+        "30 %, 0.3",
+    ),
+    "too wide a rim": (
+        "solver:\n",
+        "effects: {rim_width: 0.03}\nsolver:\n",
+        "effects.rim_width",
+        "usual is -0.0127 to 0.0127 m",
+    ),
     "stiffness for compliance": (
-        "solver:\n", "effects: {spindle_radial: 2.0e+7}\nsolver:\n", "effects.spindle_radial",
-        "2e+07 N/m of stiffness, 5e-08 m/N"),
+        "solver:\n",
+        "effects: {spindle_radial: 2.0e+7}\nsolver:\n",
+        "effects.spindle_radial",
+        "2e+07 N/m of stiffness, 5e-08 m/N",
+    ),
     "mHz": ("79.5", "79500", "targets.modes.5.frequency_Hz", "79500 mHz, 79.5 Hz"),
     "kHz": ("79.5", "0.0795", "targets.modes.5.frequency_Hz", "0.0795 kHz, 79.5 Hz"),
     "sigma": ("79.5}", "79.5, sigma_Hz: 50}", "targets.modes.5.sigma_Hz", "to 15.9 Hz"),
     "cm2 of a patch": (
         "  modes:\n",
         "  footprint: [{load_N: 4000, contact_area_m2: 160, sigma_m2: 3}]\n  modes:\n",
-        "targets.footprint.0.contact_area_m2", "160 cm2, 0.016 m2"),
+        "targets.footprint.0.contact_area_m2",
+        "160 cm2, 0.016 m2",
+    ),
     "N/mm": (
-        "  modes:\n", "  footprint: [{load_N: 4000, vertical_stiffness_N_per_m: 220, "
+        "  modes:\n",
+        "  footprint: [{load_N: 4000, vertical_stiffness_N_per_m: 220, "
         "sigma_N_per_m: 5}]\n  modes:\n",
-        "targets.footprint.0.vertical_stiffness_N_per_m", "220 N/mm, 2.2e+05 N/m"),
+        "targets.footprint.0.vertical_stiffness_N_per_m",
+        "220 N/mm, 2.2e+05 N/m",
+    ),
     "rpm": ("solver:\n", "spin_rad_per_s: 800\nsolver:\n", "spin_rad_per_s", "800 rpm, 83.78"),
-    "K": ("solver:\n", "cavity: {temperature_C: 293.15}\nsolver:\n", "cavity.temperature_C",
-          "293.15 K, 20 degrees Celsius"),
-    "g of mass": ("solver:\n", "point_mass: {mass_kg: 50}\nsolver:\n", "point_mass.mass_kg",
-                  "50 g, 0.05 kg"),
+    "K": (
+        "solver:\n",
+        "cavity: {temperature_C: 293.15}\nsolver:\n",
+        "cavity.temperature_C",
+        "293.15 K, 20 degrees Celsius",
+    ),
+    "g of mass": (
+        "solver:\n",
+        "point_mass: {mass_kg: 50}\nsolver:\n",
+        "point_mass.mass_kg",
+        "50 g, 0.05 kg",
+    ),
     "mm of an uncertainty": (
-        "absolute: 1.0e-3", "absolute: 1.0", "uncertainties.belt_width.absolute", "1 mm, 0.001 m"),
-}  # fmt: skip
+        "absolute: 1.0e-3",
+        "absolute: 1.0",
+        "uncertainties.belt_width.absolute",
+        "1 mm, 0.001 m",
+    ),
+}
 
 
 def case(folder: Path, old: str, new: str) -> Path:
@@ -154,8 +215,17 @@ def test_init_writes_an_unusual_case_where_it_is_allowed(tmp_path: Path) -> None
     assert [mistake.key for mistake in validate(path)] == ["pressure_kPa"]
 
 
-SIZES = ["145/80R13", "205/60R15", "225/40R18", "315/35R21", "P235/75R17", "195/75R16C",
-         "LT315/70R17", "31x10.50R15LT", "275/25R24"]  # fmt: skip
+SIZES = [
+    "145/80R13",
+    "205/60R15",
+    "225/40R18",
+    "315/35R21",
+    "P235/75R17",
+    "195/75R16C",
+    "LT315/70R17",
+    "31x10.50R15LT",
+    "275/25R24",
+]
 
 
 @pytest.mark.parametrize("size", SIZES)
@@ -189,11 +259,14 @@ def test_every_range_is_of_a_number_that_a_case_can_have() -> None:
                     ((*keys, key), value)
                     for keys, part in found
                     for key, value in (
-                        part.items() if isinstance(part, dict)
-                        else enumerate(part) if isinstance(part, list) else ()
+                        part.items()
+                        if isinstance(part, dict)
+                        else enumerate(part)
+                        if isinstance(part, list)
+                        else ()
                     )
                     if word in ("*", key)
-                ]  # fmt: skip
+                ]
             for keys, value in found:
                 reached.add(pattern)
                 if isinstance(value, float | int):

@@ -9,13 +9,7 @@ from typing import Any
 import pytest
 from ruamel.yaml import YAML
 
-from tyrecal.case import (
-    LoadedCase,
-    load_case,
-    number_at,
-    with_level,
-    with_values,
-)
+from tyrecal.case import LoadedCase, load_case, number_at, with_level, with_values
 from tyrecal.case.identity import is_of_tyre, tyre_sha256
 from tyrecal.effects import catalogue
 
@@ -23,10 +17,19 @@ from ..conftest import CASES
 
 CASE, DRAWN = CASES / "p235_75r17.yaml", CASES / "205_60r15.yaml"
 NOT_THE_TYRE = (
-    "format", "pressure_kPa", "mesh", "analysis.static_increments", "analysis.sectors",
-    "analysis.highest_harmonic", "analysis.modes_per_harmonic", "targets", "uncertainties",
-    "solver", "road.", "variables",
-)  # fmt: skip
+    "format",
+    "pressure_kPa",
+    "mesh",
+    "analysis.static_increments",
+    "analysis.sectors",
+    "analysis.highest_harmonic",
+    "analysis.modes_per_harmonic",
+    "targets",
+    "uncertainties",
+    "solver",
+    "road.",
+    "variables",
+)
 
 
 @pytest.fixture(scope="module")
@@ -62,15 +65,27 @@ def full(data: dict[str, Any]) -> None:
     """Put something beyond its default into every part of a tyre."""
     data["materials"]["rubber"] |= {"frequency_exponent": 0.05, "reference_frequency_Hz": 50.0}
     data["section"]["gauges"] = [{"between": ["belt2", "outer"], "factor": 1.1}]
-    spindle = {"lateral_m_per_N": 1e-9, "radial_m_per_N": 2e-9, "torsional_rad_per_N_m": 3e-9,
-               "tilt_rad_per_N_m": 4e-9}  # fmt: skip
-    data["rim"] |= {"mass_kg": 12.0, "polar_inertia_kg_m2": 0.4, "diametral_inertia_kg_m2": 0.3,
-                    "spindle": spindle}  # fmt: skip
+    spindle = {
+        "lateral_m_per_N": 1e-9,
+        "radial_m_per_N": 2e-9,
+        "torsional_rad_per_N_m": 3e-9,
+        "tilt_rad_per_N_m": 4e-9,
+    }
+    data["rim"] |= {
+        "mass_kg": 12.0,
+        "polar_inertia_kg_m2": 0.4,
+        "diametral_inertia_kg_m2": 0.3,
+        "spindle": spindle,
+    }
     data["cavity"] = {"temperature_C": 30.0, "share": 0.5}
     data["spin_rad_per_s"] = 1.0
     data["point_mass"] = {"mass_kg": 0.01, "z_m": 0.02}
-    data["road_spring"] = {"radial_N_per_m": 1e4, "lateral_N_per_m": 2e4, "tangential_N_per_m": 3e4,
-                           "width_m": 0.09}  # fmt: skip
+    data["road_spring"] = {
+        "radial_N_per_m": 1e4,
+        "lateral_N_per_m": 2e4,
+        "tangential_N_per_m": 3e4,
+        "width_m": 0.09,
+    }
     data["splice"] = {"share": 0.1, "width_deg": 12.0}
     data["effects"] = {"tread_wear": 0.1, "pressure_offset": 2.0}
     data["analysis"]["vibration_frequency_Hz"] = 60.0
@@ -168,7 +183,11 @@ def test_what_varies_counts_by_name_and_path(tmp_path: Path, case: LoadedCase) -
 
     def default(data: dict[str, Any]) -> None:
         data["variables"]["mass"] = {
-            "sets": ["rim.mass_kg"], "start": 10.0, "lower": 5.0, "upper": 20.0}  # fmt: skip
+            "sets": ["rim.mass_kg"],
+            "start": 10.0,
+            "lower": 5.0,
+            "upper": 20.0,
+        }
 
     def stated(data: dict[str, Any]) -> None:
         default(data)
@@ -188,8 +207,13 @@ def test_an_effect_of_0_is_absent(id: str, case: LoadedCase) -> None:
 
 def test_an_effect_that_varies(tmp_path: Path) -> None:
     def free(data: dict[str, Any]) -> None:
-        data["variables"]["filler"] = {"sets": ["effects.bead_filler"], "start": 1.0, "lower": 0.0,
-                                       "upper": 3.0, "scale": "linear"}  # fmt: skip
+        data["variables"]["filler"] = {
+            "sets": ["effects.bead_filler"],
+            "start": 1.0,
+            "lower": 0.0,
+            "upper": 3.0,
+            "scale": "linear",
+        }
 
     varied = written(tmp_path, free)
     hashes = {tyre_sha256(with_values(varied, {"filler": value})) for value in (0.0, 1.0, 3.0)}
@@ -200,10 +224,15 @@ def test_a_section_from_an_outline(tmp_path: Path) -> None:
     """What its curves and numbers say counts, not what is drawn from them while one varies."""
 
     def outlined(data: dict[str, Any]) -> None:
-        data["section"] = {"outline": {
-            "file": "curves.csv", "belt_width_m": 0.148, "rim_radius_m": 0.2}}  # fmt: skip
-        data["variables"]["depth"] = {"sets": ["section.outline.belt_depth_m"], "start": 1.2e-3,
-                                      "lower": 1e-3, "upper": 2e-3}  # fmt: skip
+        data["section"] = {
+            "outline": {"file": "curves.csv", "belt_width_m": 0.148, "rim_radius_m": 0.2}
+        }
+        data["variables"]["depth"] = {
+            "sets": ["section.outline.belt_depth_m"],
+            "start": 1.2e-3,
+            "lower": 1e-3,
+            "upper": 2e-3,
+        }
 
     curves = (CASES / "205_60r15_outline.csv").read_text()
     (tmp_path / "curves.csv").write_text(curves)

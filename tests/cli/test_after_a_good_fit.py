@@ -97,8 +97,11 @@ def unmoved(patch: pytest.MonkeyPatch) -> None:
 
 KINDS: dict[str, tuple[list[str], int, Break]] = {
     "too few targets": (["fit", "--measured", "two.csv"], 2, nothing),
-    "nothing free": (["fit", *(w for v in ("A_belt", "A_carcass", "C10") for w in ("--fix", v))],
-                     2, nothing),
+    "nothing free": (
+        ["fit", *(w for v in ("A_belt", "A_carcass", "C10") for w in ("--fix", v))],
+        2,
+        nothing,
+    ),
     "no such variable": (["fit", "--fix", "C11"], 2, nothing),
     "start out of bounds": (["fit", "--set", "C10=1e9"], 2, nothing),
     "no such number": (["fit", "--set", "materials.rubber.C10=1"], 2, nothing),
@@ -112,8 +115,19 @@ KINDS: dict[str, tuple[list[str], int, Break]] = {
     "another case": (["fit", str(CASES / "205_60r15.yaml")], 2, nothing),
     "the solver dies": (["fit"], 3, crash),
     "an old fit": (["sweep-pressure", "--fitted", "old.json"], 2, nothing),
-    "another tyre": (["footprint", "--compare", "fitted", "--loads-N", "500",
-                      "--set", "rebar_layers.belt_1.angle_deg=70.07"], 2, nothing),
+    "another tyre": (
+        [
+            "footprint",
+            "--compare",
+            "fitted",
+            "--loads-N",
+            "500",
+            "--set",
+            "rebar_layers.belt_1.angle_deg=70.07",
+        ],
+        2,
+        nothing,
+    ),
     "modes of no tyre": (["modes", "--pictures"], 3, crash),
     "a sweep of no tyre": (["sweep-pressure", "--steps", "2"], 3, crash),
     "a diagnosis of a road": (["diagnose", "--measured", "road.csv"], 2, nothing),
@@ -121,7 +135,7 @@ KINDS: dict[str, tuple[list[str], int, Break]] = {
     "a full disc": (["fit"], 2, full_disc),
     "a full disc under a picture": (["fit"], 2, no_picture),
     "a fit that stays where it starts": (["fit"], 4, unmoved),
-}  # fmt: skip
+}
 
 
 DRAWN = ("a full disc under a picture", "a fit that stays where it starts")
@@ -131,10 +145,7 @@ DRAWN = ("a full disc under a picture", "a fit that stays where it starts")
     "kind", [pytest.param(kind, marks=pytest.mark.slow if kind in DRAWN else ()) for kind in KINDS]
 )
 def test_the_good_fit_stays(
-    kind: str,
-    good: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    kind: str, good: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     words, code, spoil = KINDS[kind]
     monkeypatch.chdir(good)

@@ -80,8 +80,14 @@ def test_each_case_has_the_results_of_the_commands(
     assert run("modes", str(cases[0]), *own) == 0
     fitted = ["--fitted", str(tmp_path / "fit.json")]
     assert run("sweep-pressure", str(cases[0]), *own, *fitted, *SWEEP) == 0
-    for file in ("fit.json", "fit.csv", "fit_history.csv", "modes.json", "pressure_sweep.json",
-                 "pressure_sweep.csv"):  # fmt: skip
+    for file in (
+        "fit.json",
+        "fit.csv",
+        "fit_history.csv",
+        "modes.json",
+        "pressure_sweep.json",
+        "pressure_sweep.csv",
+    ):
         assert (done / "tyre_00" / file).read_bytes() == (tmp_path / file).read_bytes(), file
     assert run("modes", str(cases[0]), "--output", str(done / "tyre_00"), "--quiet") == 0  # its own
 
@@ -244,9 +250,13 @@ def test_interrupted_and_resumed(tmp_path: Path) -> None:
     ],
 )
 def test_wrong_input_ends_in_2_and_a_sentence(
-    arguments: list[str], words: str, cases: list[Path], tmp_path: Path,
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch,
-) -> None:  # fmt: skip
+    arguments: list[str],
+    words: str,
+    cases: list[Path],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     monkeypatch.chdir(tmp_path)
     given = [str(cases[0]) if word == "CASE" else word for word in arguments]
     assert run("batch", *given) == 2

@@ -30,12 +30,14 @@ def test_steps_out_of_order_are_refused(
         (["answer", out], "seal.json is missing"),
         (["score", out], "answers.json is missing"),
         (["make", out, "--case", case, "--maker", "nobody"], "must be one of bundled"),
-        (["make", out, "--case", case, "--effects", "0", "--none", "0", "--outside", "0"],
-         "at least one trial"),
+        (
+            ["make", out, "--case", case, "--effects", "0", "--none", "0", "--outside", "0"],
+            "at least one trial",
+        ),
         (["make", out, "--case", case, "--effect", "luck"], "this maker has only"),
         (["make", out, "--case", case, *COUNTS, "--truth", out + "/truth"], "must not lie in"),
         (["answer", out, "--effect", "luck"], "no such effect"),
-    ):  # fmt: skip
+    ):
         assert refused(*command), command
         assert words in capsys.readouterr().err
 
@@ -47,15 +49,32 @@ def test_a_study_from_end_to_end(
     capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    few = {"PLAIN_DEGREE": 2, "PLAIN_DESIGNS": 4, "SOURCE_DEGREE": 1, "SOURCE_DESIGNS": 4,
-           "EFFECT_DEGREE": 1, "EFFECT_DESIGNS": 2, "ONE_SIDED": (0.5, 1.0)}  # fmt: skip
+    few = {
+        "PLAIN_DEGREE": 2,
+        "PLAIN_DESIGNS": 4,
+        "SOURCE_DEGREE": 1,
+        "SOURCE_DESIGNS": 4,
+        "EFFECT_DEGREE": 1,
+        "EFFECT_DESIGNS": 2,
+        "ONE_SIDED": (0.5, 1.0),
+    }
     for name, value in few.items():
         monkeypatch.setattr(f"tyrecal.blind.emulated.{name}", value)
     only = lambda door, ids=None: spans_of(door, ["spindle_lateral"])
     monkeypatch.setattr("tyrecal.blind.answer.spans_of", only)  # the ruler's, too
     out = tmp_path / "t"
-    make = ["make", str(out), "--case", str(coarse), *COUNTS, "--effect", "spindle_lateral",
-            "--seed", "3", "--quiet"]  # fmt: skip
+    make = [
+        "make",
+        str(out),
+        "--case",
+        str(coarse),
+        *COUNTS,
+        "--effect",
+        "spindle_lateral",
+        "--seed",
+        "3",
+        "--quiet",
+    ]
     assert run("blind", *make) == 0
     assert (out / SEAL).exists() and not list(out.rglob(TRUTH))
     assert run("blind", "answer", str(out), "--effect", "spindle_lateral", "--quiet") == 0

@@ -292,10 +292,12 @@ def test_variables_that_start_at_zero(
             ("p", "pressure_kPa", 300),
             ("k", "materials.rubber.prony.0.k", 0.5),
         )
-    )  # fmt: skip
+    )
     path.write_text(text.replace("\ntargets:", f"\n{extra}\ntargets:"))
-    assert run("deck", str(path), "--output", str(case_folder / "out"), "--quiet",
-               "--allow-unusual") == 0  # fmt: skip
+    assert (
+        run("deck", str(path), "--output", str(case_folder / "out"), "--quiet", "--allow-unusual")
+        == 0
+    )
     request = json.loads((case_folder / "out" / "modes.request.json").read_text())
     slopes = {name: [row[3] for row in rows] for name, rows in request["sensitivities"].items()}
     assert slopes["p"] == pytest.approx([1e3, 1e3])

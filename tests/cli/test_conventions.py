@@ -66,17 +66,44 @@ def test_every_module_of_a_command_is_listed() -> None:
         (2, ["modes", CASE, "--no-such-option"]),
         (2, ["no-such-command"]),
         (2, ["solvers", "--quiet", "--verbose"]),
-        (3, ["modes", CASE, *COARSE, "--pressure-kPa", "1900", "--set", "A_carcass=1e-8",
-             "--allow-unusual"]),
+        (
+            3,
+            [
+                "modes",
+                CASE,
+                *COARSE,
+                "--pressure-kPa",
+                "1900",
+                "--set",
+                "A_carcass=1e-8",
+                "--allow-unusual",
+            ],
+        ),
         (3, ["modes", CASE, *COARSE, "--solver", "abaqus"]),
-        (4, ["fit", CASE, *COARSE, "--no-pictures", "--set", "A_belt=1.1e-7", "--fix", "C10",
-             "--fix", "A_carcass"]),
+        (
+            4,
+            [
+                "fit",
+                CASE,
+                *COARSE,
+                "--no-pictures",
+                "--set",
+                "A_belt=1.1e-7",
+                "--fix",
+                "C10",
+                "--fix",
+                "A_carcass",
+            ],
+        ),
     ],
-)  # fmt: skip
+)
 def test_exit_codes(
-    code: int, arguments: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    code: int,
+    arguments: list[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
-) -> None:  # fmt: skip
+) -> None:
     monkeypatch.chdir(tmp_path)
     if code == 4:  # the objective is least at the start: nothing moves
         from tyrecal.fit import calibrate
@@ -113,8 +140,19 @@ def test_exit_codes_are_told_alike() -> None:
 @pytest.mark.parametrize("jobs", [pytest.param("1", marks=pytest.mark.slow), "2"])
 def test_ctrl_c_leaves_what_was_done_and_says_how_to_go_on(jobs: str, tmp_path: Path) -> None:
     out = tmp_path / "out"
-    command = [*TYRECAL, "sweep-pressure", CASE, *COARSE, "--steps", "40", "--jobs", jobs,
-               "--no-pictures", "--output", str(out)]  # fmt: skip
+    command = [
+        *TYRECAL,
+        "sweep-pressure",
+        CASE,
+        *COARSE,
+        "--steps",
+        "40",
+        "--jobs",
+        jobs,
+        "--no-pictures",
+        "--output",
+        str(out),
+    ]
     process = subprocess.Popen(
         command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True, start_new_session=True
     )
@@ -153,9 +191,11 @@ def on_a_terminal(*arguments: str, **environment: str) -> str:
     ours, theirs = pty.openpty()
     plain = {k: v for k, v in os.environ.items() if k not in ("NO_COLOR", "FORCE_COLOR")}
     process = subprocess.Popen(
-        [*TYRECAL, *arguments], stdout=subprocess.DEVNULL, stderr=theirs,
+        [*TYRECAL, *arguments],
+        stdout=subprocess.DEVNULL,
+        stderr=theirs,
         env={**plain, "TERM": "xterm-256color", "COLUMNS": "100", **environment},
-    )  # fmt: skip
+    )
     os.close(theirs)
     said = b""
     try:
@@ -187,8 +227,17 @@ def test_progress_is_on_terminals_only(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_loads_show_on_the_bar(tmp_path: Path) -> None:
-    said = on_a_terminal("footprint", CASE, "--mesh", "coarse", "--loads-N", "300,500", "--output",
-                         str(tmp_path), "--no-pictures")  # fmt: skip
+    said = on_a_terminal(
+        "footprint",
+        CASE,
+        "--mesh",
+        "coarse",
+        "--loads-N",
+        "300,500",
+        "--output",
+        str(tmp_path),
+        "--no-pictures",
+    )
     assert "footprint, load 2 of 2" in said and "1/1" in said
 
 
@@ -207,8 +256,10 @@ def test_colours(environment: dict[str, str], red: bool) -> None:
         ("fit cases/p235_75r17.yaml --fix A", ["A_belt", "A_carcass"]),
         ("fit cases/p235_75r17.yaml --mesh ref", ["refined"]),
         ("modes cases/p235_75r17.yaml --set A_b", ["A_belt="]),
-        ("modes cases/p235_75r17.yaml --set rim.ref",
-         ["rim.reference_point_m.r=", "rim.reference_point_m.z="]),
+        (
+            "modes cases/p235_75r17.yaml --set rim.ref",
+            ["rim.reference_point_m.r=", "rim.reference_point_m.z="],
+        ),
         ("modes cases/p235_75r17.yaml --set effects.cap", ["effects.cap_ply="]),
         ("effects bead", ["bead_filler"]),
         ("diagnose cases/p235_75r17.yaml --effect tread_", ["tread_density", "tread_wear"]),
@@ -216,11 +267,13 @@ def test_colours(environment: dict[str, str], red: bool) -> None:
         ("modes no_such.yaml --set A", []),
         ("completion z", ["zsh"]),
     ],
-)  # fmt: skip
+)
 def test_completion(
-    words: str, expected: list[str], monkeypatch: pytest.MonkeyPatch,
+    words: str,
+    expected: list[str],
+    monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
-) -> None:  # fmt: skip
+) -> None:
     monkeypatch.chdir(ROOT)
     monkeypatch.setenv("COMP_WORDS", f"tyrecal {words}")
     monkeypatch.setenv("COMP_CWORD", str(len(words.split())))

@@ -41,8 +41,10 @@ def measured(case: Path, path: Path, **effects: float) -> Path:
             label = mode.label
             if label.m < 2 and (label.c or label.kind) and label != Label(4, 1):
                 f = mode.frequency_Hz
-                lines.append(f"frequency_Hz,{label.c},{label.m},{label.kind or ''},,{p:g},0,"
-                             f"{f:.3f},{0.001 * f:.3f}")  # fmt: skip
+                lines.append(
+                    f"frequency_Hz,{label.c},{label.m},{label.kind or ''},,{p:g},0,"
+                    f"{f:.3f},{0.001 * f:.3f}"
+                )
     path.write_text("\n".join(lines) + "\n")
     return path
 
@@ -139,11 +141,7 @@ def test_an_added_effect_makes_a_case(
     ],
 )
 def test_wrong_input(
-    coarse: Path,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    options: list[str],
-    words: str,
+    coarse: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], options: list[str], words: str
 ) -> None:
     good, bad = tmp_path / "m.csv", tmp_path / "bad.csv"
     good.write_text(HEADER + "\nfrequency_Hz,2,0,,,240,0,79.5,0.2\n")

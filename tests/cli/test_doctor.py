@@ -12,8 +12,9 @@ from tyrecal.doctor import installation, self_check
 from .test_cli import run
 
 
-def test_a_sound_installation(tmp_path: Path, capsys: pytest.CaptureFixture[str],
-                              monkeypatch: pytest.MonkeyPatch) -> None:  # fmt: skip
+def test_a_sound_installation(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.chdir(tmp_path)
     assert run("doctor", "--json") == 0
     found = json.loads(capsys.readouterr().out)

@@ -60,11 +60,18 @@ def test_what_it_writes(
     assert drawn[0][-1] == "sigma" and (out / "convergence.png").stat().st_size > 10_000
     printed, result = capsys.readouterr().out, found(out)
     assert [(row["load_N"], row["quantity"]) for row in result["footprint"]] == [
-        (4000, "contact_area_m2"), (3500, "vertical_stiffness_N_per_m")
-    ]  # fmt: skip
+        (4000, "contact_area_m2"),
+        (3500, "vertical_stiffness_N_per_m"),
+    ]
     assert set(result["footprint"][0]) == {
-        "load_N", "quantity", "initial", "fitted", "target", "sigma", "deviation_percent"
-    }  # fmt: skip
+        "load_N",
+        "quantity",
+        "initial",
+        "fitted",
+        "target",
+        "sigma",
+        "deviation_percent",
+    }
     assert "4000 N" in printed and "contact area, cm²" in printed and "131.9" in printed
     assert "3500 N" in printed and "vertical stiffness, N/mm" in printed and "270.0" in printed
     assert "deviations in sigmas" in printed and "equation (1)" not in printed

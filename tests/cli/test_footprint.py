@@ -37,17 +37,34 @@ def test_both_designs(
     assert run("footprint", CASE, "--output", str(out), *TWO, "--fitted", fit) == 0
     found = result(out)
     assert [(row["design"], row["load_N"]) for row in found["rows"]] == [
-        ("initial", 1000), ("initial", 4000), ("fitted", 1000), ("fitted", 4000)
-    ]  # fmt: skip
+        ("initial", 1000),
+        ("initial", 4000),
+        ("fitted", 1000),
+        ("fitted", 4000),
+    ]
     assert set(found["rows"][0]) == {
-        "design", "load_N", "deflection_m", "area_m2", "length_m", "width_m", "mean_pressure_Pa",
-        "peak_pressure_Pa", "vertical_stiffness_N_per_m",
-    }  # fmt: skip
+        "design",
+        "load_N",
+        "deflection_m",
+        "area_m2",
+        "length_m",
+        "width_m",
+        "mean_pressure_Pa",
+        "peak_pressure_Pa",
+        "vertical_stiffness_N_per_m",
+    }
     assert {path.name for path in out.iterdir() if path.suffix} - {".lock"} == {
-        "run.json", "footprint.json", "footprint_patches.json", "footprint.csv", "footprint.png",
-        *(f"footprint_{name}{rest}" for name in ("initial", "fitted")
-          for rest in (".png", "_1000N.vtu", "_4000N.vtu")),
-    }  # fmt: skip
+        "run.json",
+        "footprint.json",
+        "footprint_patches.json",
+        "footprint.csv",
+        "footprint.png",
+        *(
+            f"footprint_{name}{rest}"
+            for name in ("initial", "fitted")
+            for rest in (".png", "_1000N.vtu", "_4000N.vtu")
+        ),
+    }
     printed = capsys.readouterr()
     assert "the fitted tyre's area is larger" in printed.out and printed.err == "footprint ...\n"
     facts = json.loads((out / "run.json").read_text())["footprint"]
@@ -87,8 +104,18 @@ def test_which_designs_and_loads(hertz: type[Hertz], tmp_path: Path) -> None:
 def test_a_load_out_of_reach_keeps_those_below(
     hertz: type[Hertz], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert run("footprint", CASE, "--output", str(tmp_path), "--loads-N", "4000,30000,40000",
-               "--allow-unusual") == 3  # fmt: skip
+    assert (
+        run(
+            "footprint",
+            CASE,
+            "--output",
+            str(tmp_path),
+            "--loads-N",
+            "4000,30000,40000",
+            "--allow-unusual",
+        )
+        == 3
+    )
     printed, found = capsys.readouterr(), result(tmp_path)
     assert [row["load_N"] for row in found["rows"]] == [4000]
     (failed,) = found["failed"]
@@ -112,8 +139,16 @@ def test_jobs_and_the_record_change_no_byte(tmp_path: Path) -> None:
     """The bundled solver, both designs."""
     case, out = str(coarse_case(tmp_path)), [tmp_path / "one", tmp_path / "two"]
     assert run("fit", case, "--output", str(out[0]), "--no-pictures", "--quiet") in (0, 4)
-    arguments = ["footprint", case, "--fitted", str(out[0] / "fit.json"), "--loads-N", "3000",
-                 "--quiet", "--output"]  # fmt: skip
+    arguments = [
+        "footprint",
+        case,
+        "--fitted",
+        str(out[0] / "fit.json"),
+        "--loads-N",
+        "3000",
+        "--quiet",
+        "--output",
+    ]
     assert run(*arguments, str(out[0])) == 0
     assert run(*arguments, str(out[1]), "--jobs", "2") == 0
     names = sorted(path.name for path in out[1].glob("footprint*"))

@@ -91,8 +91,15 @@ def test_wrong_options(
 
 def test_a_picture_of_both_designs(tmp_path: Path) -> None:
     """Overtones, one load only, members that are missing: drawn all the same."""
-    mode = {"c": 2, "m": 0, "kind": None, "frequency_Hz": 80.0, "symmetry": "symmetric",
-            "overlap": 1.0, "spanned": 1.0}  # fmt: skip
+    mode = {
+        "c": 2,
+        "m": 0,
+        "kind": None,
+        "frequency_Hz": 80.0,
+        "symmetry": "symmetric",
+        "overlap": 1.0,
+        "spanned": 1.0,
+    }
     rows = [
         {"design": "initial", "load_N": 0.0, "deflection_m": 0.0, "modes": [mode]},
         {"design": "fitted", "load_N": 9.0, "deflection_m": 0.0, "modes": [mode, mode | {"m": 2}]},

@@ -37,8 +37,19 @@ def identified(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Measurements of the three repeats of functions at 240 kPa."""
     path = tmp_path_factory.mktemp("measured") / "at_240.csv"
     files = [str(file) for file in FUNCTIONS]
-    code = run("measured", "import", *files, "--pressure-kPa", "240", "--band", "28,132", *TEST,
-               "--output", str(path), "--quiet")  # fmt: skip
+    code = run(
+        "measured",
+        "import",
+        *files,
+        "--pressure-kPa",
+        "240",
+        "--band",
+        "28,132",
+        *TEST,
+        "--output",
+        str(path),
+        "--quiet",
+    )
     assert code == 0 and len(files) == 3
     return path
 
@@ -57,8 +68,16 @@ def test_functions_become_the_true_frequencies(identified: Path) -> None:
 def test_a_fit_to_them_finds_the_true_design(
     identified: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    code = run("fit", str(CASES / "p235_75r17.yaml"), "--measured", str(identified), "--output",
-               str(tmp_path / "fitted"), "--no-pictures", "--json")  # fmt: skip
+    code = run(
+        "fit",
+        str(CASES / "p235_75r17.yaml"),
+        "--measured",
+        str(identified),
+        "--output",
+        str(tmp_path / "fitted"),
+        "--no-pictures",
+        "--json",
+    )
     fit = json.loads(capsys.readouterr().out)
     assert code == 0 and fit["objective_unit"] == "sigma" and fit["objective_Hz"] < 4
     assert {Label(m["c"], m["m"], m["kind"]) for m in fit["modes"]} == set(truth(240.0))
@@ -71,9 +90,23 @@ def test_several_kinds_of_files_join_and_the_diagnosis_reads_them(
     identified: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     shapes, table, joined = (tmp_path / name for name in ("s.csv", "t.csv", "j.csv"))
-    assert run("measured", "import", str(SHAPES), "--pressure-kPa", "200", *TEST,
-               "--sigma-percent", "0.2", "--output", str(shapes), "--no-pictures",
-               "--json") == 0  # fmt: skip
+    assert (
+        run(
+            "measured",
+            "import",
+            str(SHAPES),
+            "--pressure-kPa",
+            "200",
+            *TEST,
+            "--sigma-percent",
+            "0.2",
+            "--output",
+            str(shapes),
+            "--no-pictures",
+            "--json",
+        )
+        == 0
+    )
     told = json.loads(capsys.readouterr().out)
     assert all(mode["confidence"] > 0.9 and not mode["why"] for mode in told["modes"])
     right = truth(200.0)
@@ -82,8 +115,10 @@ def test_several_kinds_of_files_join_and_the_diagnosis_reads_them(
         assert mode["frequency_Hz"] == pytest.approx(right[label], rel=0.005)
         assert mode["member"] in (("1", "2") if label.c else ("",))
     assert run("measured", "import", str(TABLE), "--output", str(table)) == 0
-    assert run("measured", "import", str(shapes), str(identified), str(table), "--output",
-               str(joined)) == 0  # fmt: skip
+    assert (
+        run("measured", "import", str(shapes), str(identified), str(table), "--output", str(joined))
+        == 0
+    )
     readings = read_measurements(joined)
     assert {each.pressure_kPa for each in readings} == {200.0, 240.0, 280.0}
     observed = observe(readings)
@@ -98,10 +133,15 @@ def test_fits_take_what_is_at_their_pressure(
     from tyrecal.case import load_case
     from tyrecal.fit.measured import with_measured
 
-    lines = ["frequency_Hz,2,1,,1,240,0,66.0,0.3", "frequency_Hz,2,1,,2,240,0,66.4,0.4",
-             "frequency_Hz,5,0,,,240.2,0,130,0.5", "frequency_Hz,2,1,,,200,0,60,0.3",
-             "frequency_Hz,2,1,,symmetric,240,4000,70,0.3", "mass_kg,,,,,,,12,0.1",
-             "vertical_stiffness_N_per_m,,,,,240,4000,2e5,4000"]  # fmt: skip
+    lines = [
+        "frequency_Hz,2,1,,1,240,0,66.0,0.3",
+        "frequency_Hz,2,1,,2,240,0,66.4,0.4",
+        "frequency_Hz,5,0,,,240.2,0,130,0.5",
+        "frequency_Hz,2,1,,,200,0,60,0.3",
+        "frequency_Hz,2,1,,symmetric,240,4000,70,0.3",
+        "mass_kg,,,,,,,12,0.1",
+        "vertical_stiffness_N_per_m,,,,,240,4000,2e5,4000",
+    ]
     path = tmp_path / "m.csv"
     head = "quantity,c,m,kind,member,pressure_kPa,load_N,value,sigma\n"
     path.write_text(head + "\n".join(lines) + "\n")
@@ -112,8 +152,16 @@ def test_fits_take_what_is_at_their_pressure(
     assert (pressed.vertical_stiffness_N_per_m, pressed.sigma_N_per_m) == (2e5, 4000)
     assert loaded.case.analysis.highest_harmonic == 5
     assert left_out == ["1 values at 200 kPa", "1 frequencies under load", "the mass"]
-    code = run("fit", str(CASES / "p235_75r17.yaml"), "--measured", str(path),
-               "--pressure-kPa", "150", "--output", str(tmp_path / "f"))  # fmt: skip
+    code = run(
+        "fit",
+        str(CASES / "p235_75r17.yaml"),
+        "--measured",
+        str(path),
+        "--pressure-kPa",
+        "150",
+        "--output",
+        str(tmp_path / "f"),
+    )
     assert code == 2
     told = capsys.readouterr().err
     assert "no target was measured at 150 kPa, only at 200, 240, 240.2 kPa" in told
@@ -125,8 +173,11 @@ def test_sensors_are_judged_before_a_test(
     assert run("measured", "sensors", str(SHAPES), *TEST, "--json") == 0
     told = json.loads(capsys.readouterr().out)
     assert len(told) == 5 + 4 * 8 and all(entry["told"] for entry in told)
-    even = {**geometry(), "x": 0.39 * np.cos(np.arange(8) * np.pi / 4),
-            "y": 0.39 * np.sin(np.arange(8) * np.pi / 4)}  # fmt: skip
+    even = {
+        **geometry(),
+        "x": 0.39 * np.cos(np.arange(8) * np.pi / 4),
+        "y": 0.39 * np.sin(np.arange(8) * np.pi / 4),
+    }
     path = write(tmp_path / "even.uff", even, shape(np.ones((8, 3), complex)))
     assert run("measured", "sensors", str(path), *TEST) == 0
     assert "cannot tell [3,0], it looks like" in capsys.readouterr().out
@@ -143,8 +194,14 @@ def mode_in_plane(c: int = 2) -> np.ndarray:
 
 def one_sensor() -> list[dict[str, Any]]:
     lone = shape(mode_in_plane())
-    return [geometry(), {**lone, "node_nums": lone["node_nums"][:1],
-                         **{r: lone[r][:1] for r in ("r1", "r2", "r3")}}]  # fmt: skip
+    return [
+        geometry(),
+        {
+            **lone,
+            "node_nums": lone["node_nums"][:1],
+            **{r: lone[r][:1] for r in ("r1", "r2", "r3")},
+        },
+    ]
 
 
 F = np.arange(20.0, 80.0, 0.5)
@@ -153,22 +210,40 @@ BAD: list[tuple[list[dict[str, Any]], list[str], str]] = [
     ([geometry(scale=1e3), shape(mode_in_plane())], [], "largest radius about z is 390 m, no tyre"),
     ([units(1e3), geometry(), shape(mode_in_plane())], [], "largest radius about z is 0.00039 m"),
     ([shape(mode_in_plane())], [], "node 1 has no coordinates; give the file with data set 15 or"),
-    ([geometry(), {**shape(mode_in_plane()), "analysis_type": 2, "freq": -66.0}], [],
-     "data set 2 (type 55, line"),
+    (
+        [geometry(), {**shape(mode_in_plane()), "analysis_type": 2, "freq": -66.0}],
+        [],
+        "data set 2 (type 55, line",
+    ),
     ([geometry()], [], "there is neither a mode shape nor a frequency-response function"),
-    ([function(np.ones(120) + 0j, F, k, func_type=t) for k, t in ((1, 1), (2, 1), (3, 9))], [],
-     "function, only 2 x time response, 1 x power spectral density"),
+    (
+        [function(np.ones(120) + 0j, F, k, func_type=t) for k, t in ((1, 1), (2, 1), (3, 9))],
+        [],
+        "function, only 2 x time response, 1 x power spectral density",
+    ),
     ([geometry(), shape(mode_in_plane())], ["--centre", "1,0"], "--centre 1,0: must be 3 numbers"),
     ([geometry(), shape(mode_in_plane())], ["--band", "60,30"], "must rise from 0 or more"),
-    ([geometry(), function(np.ones(120) + 0j, F), function(np.ones(120) + 0j, F)], [],
-     "data set 3 (type 58, line"),
-    ([geometry(), function(np.ones(120) + 0j, F, ordinate_spec_data_type=0)], [],
-     "does not say whether displacement, velocity or acceleration was measured"),
-    ([geometry(), function(np.ones(120) + 0j, F), function(np.ones(120) + 0j, F + 1, 2)], [],
-     "its frequencies are not those of the first"),
-    ([geometry(), function(np.ones(120) + 0j, F), function(np.ones(120) + 0j, F, 2)],
-     ["--band", "30,70"], "no mode is stable between 30 and 70 Hz"),
-]  # fmt: skip
+    (
+        [geometry(), function(np.ones(120) + 0j, F), function(np.ones(120) + 0j, F)],
+        [],
+        "data set 3 (type 58, line",
+    ),
+    (
+        [geometry(), function(np.ones(120) + 0j, F, ordinate_spec_data_type=0)],
+        [],
+        "does not say whether displacement, velocity or acceleration was measured",
+    ),
+    (
+        [geometry(), function(np.ones(120) + 0j, F), function(np.ones(120) + 0j, F + 1, 2)],
+        [],
+        "its frequencies are not those of the first",
+    ),
+    (
+        [geometry(), function(np.ones(120) + 0j, F), function(np.ones(120) + 0j, F, 2)],
+        ["--band", "30,70"],
+        "no mode is stable between 30 and 70 Hz",
+    ),
+]
 
 
 @pytest.mark.parametrize(("sets", "given", "words"), BAD, ids=[words[:30] for *_, words in BAD])
@@ -180,8 +255,20 @@ def test_bad_files_get_one_sentence_and_exit_code_2(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     path, output = write(tmp_path / "bad.uff", *sets), tmp_path / "m.csv"
-    code = run("measured", "import", str(path), "--pressure-kPa", "240", "--sigma-percent", "0.3",
-               "--directions", "cylindrical", *given, "--output", str(output))  # fmt: skip
+    code = run(
+        "measured",
+        "import",
+        str(path),
+        "--pressure-kPa",
+        "240",
+        "--sigma-percent",
+        "0.3",
+        "--directions",
+        "cylindrical",
+        *given,
+        "--output",
+        str(output),
+    )
     printed = capsys.readouterr().err.strip()
     assert code == 2 and not output.exists()
     last = printed.splitlines()[-1]
@@ -212,7 +299,7 @@ def test_help_and_tables_import_nothing_heavy() -> None:
     for command, kept_out in (
         (["measured", "import", "--help"], ("numpy", "pyuff", "matplotlib")),
         (["measured", "import", str(TABLE), "--output", "-no-such/m.csv"], ("pyuff", "matplotlib")),
-    ):  # fmt: skip
+    ):
         code = (
             "import sys; sys.argv[0] = 'tyrecal'\nfrom tyrecal.cli.main import main\n"
             f"try: main({command!r})\nexcept SystemExit: pass\n"

@@ -17,9 +17,18 @@ from ..studies.loaded import coarse_case
 from .test_cli import run
 
 KEYS = {
-    "tyrecal", "solver", "solver_version", "name", "size", "tyre_sha256", "overrides", "state",
-    "mesh", "targets", "measured_sha256",
-}  # fmt: skip
+    "tyrecal",
+    "solver",
+    "solver_version",
+    "name",
+    "size",
+    "tyre_sha256",
+    "overrides",
+    "state",
+    "mesh",
+    "targets",
+    "measured_sha256",
+}
 MEASURED = """quantity,c,m,kind,member,pressure_kPa,load_N,value,sigma
 frequency_Hz,2,0,,,240,0,79.5,0.4
 frequency_Hz,2,1,,,240,0,66.1,0.4
@@ -56,9 +65,13 @@ def test_every_result_file_carries_it(project: Path) -> None:
     assert set(runs) == {"fit", "modes", "sweep-pressure", "effects"}
     assert all(facts["finished"] for facts in runs.values())
     assert {*files} == {
-        "fit.json", "fit_shapes.json", "modes.json", "modes_shapes.json", "pressure_sweep.json",
+        "fit.json",
+        "fit_shapes.json",
+        "modes.json",
+        "modes_shapes.json",
+        "pressure_sweep.json",
         "effects.json",
-    }  # fmt: skip
+    }
     for name, content in files.items():
         for each in content if isinstance(content, list) else [content]:
             of = each["provenance"]
@@ -94,26 +107,49 @@ def test_several_measured_files_have_one_hash(tmp_path: Path) -> None:
     [
         ("angle_deg: 70.0", "angle_deg: 70.07", [], "or its section, has been edited since"),
         ("D1_per_Pa: 5.085e-8", "D1_per_Pa: 5.09e-8", [], "has been edited since"),
-        ("name", "name", ["--set", f"{TURNED}=70.07"],
-         f"{TURNED} is as in the case there, 70.07 here"),
+        (
+            "name",
+            "name",
+            ["--set", f"{TURNED}=70.07"],
+            f"{TURNED} is as in the case there, 70.07 here",
+        ),
         ("frequency_Hz: 31.7", "frequency_Hz: 35.7", [], ""),
         ("upper: 1.0e-5", "upper: 2.0e-5", [], ""),
         ("percent: 3.0", "percent: 4.0", [], ""),
         ("time_limit_s: 300", "time_limit_s: 200", [], ""),
         ("pressure_kPa: 240.0", "pressure_kPa: 230", [], ""),
     ],
-)  # fmt: skip
+)
 def test_a_fit_is_of_its_tyre(
-    old: str, new: str, more: list[str], words: str, project: Path, tmp_path: Path,
+    old: str,
+    new: str,
+    more: list[str],
+    words: str,
+    project: Path,
+    tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
-) -> None:  # fmt: skip
+) -> None:
     case = coarse_case(tmp_path)
     text = case.read_text()
     assert old in text
     case.write_text(text.replace(old, new, 1))
-    sweep = ["sweep-pressure", str(case), "--from-kPa", "238", "--to-kPa", "240", "--steps", "2",
-             "--no-pictures", "--output", str(tmp_path / "out"), "--store", str(project / "record"),
-             "--fitted", str(project / "out/fit.json")]  # fmt: skip
+    sweep = [
+        "sweep-pressure",
+        str(case),
+        "--from-kPa",
+        "238",
+        "--to-kPa",
+        "240",
+        "--steps",
+        "2",
+        "--no-pictures",
+        "--output",
+        str(tmp_path / "out"),
+        "--store",
+        str(project / "record"),
+        "--fitted",
+        str(project / "out/fit.json"),
+    ]
     assert run(*sweep, *more) == (2 if words else 0)
     told = capsys.readouterr().err
     assert ("is a fit of another tyre" in told) == bool(words) and words in told
@@ -126,9 +162,23 @@ def test_another_mesh_is_taken_and_said(
     fit = read(project / "out/fit.json")
     fit["provenance"]["mesh"] = "another"
     (tmp_path / "fit.json").write_text(json.dumps(fit))
-    sweep = ["sweep-pressure", str(case), "--from-kPa", "238", "--to-kPa", "240", "--steps", "2",
-             "--no-pictures", "--output", str(tmp_path / "out"), "--store", str(project / "record"),
-             "--fitted", str(tmp_path / "fit.json")]  # fmt: skip
+    sweep = [
+        "sweep-pressure",
+        str(case),
+        "--from-kPa",
+        "238",
+        "--to-kPa",
+        "240",
+        "--steps",
+        "2",
+        "--no-pictures",
+        "--output",
+        str(tmp_path / "out"),
+        "--store",
+        str(project / "record"),
+        "--fitted",
+        str(tmp_path / "fit.json"),
+    ]
     assert run(*sweep) == 0
     level = load_case(case).case.mesh.level
     words = f"the fit was made on the mesh 'another', this study takes '{level}'"
@@ -142,8 +192,18 @@ def test_a_fit_with_other_numbers_set_says_which(
     fit = read(project / "out/fit.json")
     turned = read(project / "out/modes.json")["provenance"]
     (tmp_path / "fit.json").write_text(json.dumps(fit | {"provenance": turned}))
-    again = ["footprint", str(case), "--loads-N", "500", "--output", str(tmp_path / "out"),
-             "--set", "road.friction=0.4", "--fitted", str(tmp_path / "fit.json")]  # fmt: skip
+    again = [
+        "footprint",
+        str(case),
+        "--loads-N",
+        "500",
+        "--output",
+        str(tmp_path / "out"),
+        "--set",
+        "road.friction=0.4",
+        "--fitted",
+        str(tmp_path / "fit.json"),
+    ]
     assert run(*again) == 2
     told = capsys.readouterr().err
     assert f"{TURNED} is 68.0 there, as in the case here" in told and "friction" not in told

@@ -56,10 +56,15 @@ def terminal(shell: str, folder: Path) -> Iterator[int]:
     there = {"HOME": str(folder), "XDG_CONFIG_HOME": str(folder), "XDG_DATA_HOME": str(folder)}
     path = f"{Path(sys.executable).parent}:{os.environ['PATH']}"
     process = subprocess.Popen(
-        START[shell], stdin=theirs, stdout=theirs, stderr=theirs, cwd=folder,
-        env={**os.environ, **there, "PATH": path, "TERM": "xterm"}, start_new_session=True,
+        START[shell],
+        stdin=theirs,
+        stdout=theirs,
+        stderr=theirs,
+        cwd=folder,
+        env={**os.environ, **there, "PATH": path, "TERM": "xterm"},
+        start_new_session=True,
         preexec_fn=lambda: fcntl.ioctl(0, termios.TIOCSCTTY, 0),
-    )  # fmt: skip
+    )
     os.close(theirs)
     os.set_blocking(ours, False)
     try:

@@ -22,8 +22,7 @@ from .test_cli import run
 
 CASE = str(CASES / "p235_75r17.yaml")
 SCRIPT = str(Path(sys.executable).parent / "tyrecal")  # which workers import anew
-SWEEP = [SCRIPT, "sweep-pressure", CASE, "--mesh", "coarse",
-         "--no-pictures", "--quiet"]  # fmt: skip
+SWEEP = [SCRIPT, "sweep-pressure", CASE, "--mesh", "coarse", "--no-pictures", "--quiet"]
 ENDS = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP]
 QUICK = [("SIGTERM", 2), ("SIGHUP", 1)]
 PIECE = 'echo $$ >> "$PIDS"; trap "" TERM; '  # says who it is, and is deaf
@@ -66,8 +65,17 @@ def test_the_solver_ends_with_all_that_it_started(
     how: signal.Signals, jobs: int, tmp_path: Path
 ) -> None:
     environment = stubborn_ccx(tmp_path)
-    command = [*SWEEP, "--solver", "calculix", "--steps", "2", "--jobs", str(jobs), "--output",
-               str(tmp_path / "out")]  # fmt: skip
+    command = [
+        *SWEEP,
+        "--solver",
+        "calculix",
+        "--steps",
+        "2",
+        "--jobs",
+        str(jobs),
+        "--output",
+        str(tmp_path / "out"),
+    ]
     process = subprocess.Popen(
         command, env=environment, stderr=subprocess.PIPE, text=True, start_new_session=True
     )
@@ -144,9 +152,11 @@ def test_while_the_tool_is_imported(
     if command == ["the script"]:
         command = [SCRIPT]
     done = subprocess.run(
-        [sys.executable, *command, "validate", CASE], capture_output=True, text=True,
+        [sys.executable, *command, "validate", CASE],
+        capture_output=True,
+        text=True,
         env={**os.environ, "PYTHONPATH": str(tmp_path)},
-    )  # fmt: skip
+    )
     assert done.returncode == 128 + how
     assert done.stderr == f"\n{WORDS[how.name]}: nothing was changed\n" and not done.stdout
 
@@ -177,9 +187,11 @@ def test_when_the_command_is_done_nothing_counts_any_more(tmp_path: Path) -> Non
 
 @pytest.mark.parametrize("command", ["modes", "modes --no-store", "deck", "init 205/60R15"])
 def test_nothing_was_changed_only_where_that_is_so(
-    command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    command: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
-) -> None:  # fmt: skip
+) -> None:
     """Ctrl-C when the first file is in its place, and before."""
     words = command.split()
     words += ["--no-pictures"] if "init" in words else [CASE, "--mesh", "coarse"]
@@ -231,8 +243,19 @@ def test_a_batch_whose_workers_are_jobs(tmp_path: Path) -> None:
     settings = tmp_path / "here.yaml"
     settings.write_text("queueing_system: local\nworkers: 1\nmemory: 1GB\n")
     cases = [CASE, str(CASES / "p235_75r17_narrow_rim.yaml")]
-    command = [sys.executable, "-m", "tyrecal", "batch", *cases, "--studies", "fit,sweep-pressure",
-               "--scheduler", str(settings), "--output", str(tmp_path / "out")]  # fmt: skip
+    command = [
+        sys.executable,
+        "-m",
+        "tyrecal",
+        "batch",
+        *cases,
+        "--studies",
+        "fit,sweep-pressure",
+        "--scheduler",
+        str(settings),
+        "--output",
+        str(tmp_path / "out"),
+    ]
     mark = f"MARK={tmp_path}"
     process = subprocess.Popen(
         command, env={**os.environ, "MARK": str(tmp_path)}, stderr=subprocess.PIPE, text=True

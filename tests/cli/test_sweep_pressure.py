@@ -39,12 +39,16 @@ def fit_of(point: dict[str, Any], path: Path, case: Path | str = CASE) -> str:
     modes = []
     for text, frequency in point["modes"].items():
         c, m, *kind = text.split(",")
-        modes.append({"c": int(c), "m": int(m), "kind": kind[0] if kind else None,
-                      "fitted_Hz": frequency})  # fmt: skip
-    fit = {"variables": {v: {"value": point[v]} for v in VARIABLES}, "fixed": {},
-           "modes": modes, "pressure_kPa": point["pressure_kPa"],
-           "provenance": {"tyre_sha256": tyre_sha256(load_case(case)), "mesh": "default"}
-           }  # fmt: skip
+        modes.append(
+            {"c": int(c), "m": int(m), "kind": kind[0] if kind else None, "fitted_Hz": frequency}
+        )
+    fit = {
+        "variables": {v: {"value": point[v]} for v in VARIABLES},
+        "fixed": {},
+        "modes": modes,
+        "pressure_kPa": point["pressure_kPa"],
+        "provenance": {"tyre_sha256": tyre_sha256(load_case(case)), "mesh": "default"},
+    }
     path.write_text(json.dumps(fit))
     return str(path)
 
@@ -62,8 +66,10 @@ def test_both_designs_against_the_reference(
     """Every mode at 100, 160, 200, 240, 320 kPa (fitted: 240) within 0.2 % (0.5 % asked for)."""
     fit = fit_of(REFERENCE[name][1], tmp_path / "fit.json", CASES / f"{name}.yaml")
     out = tmp_path / "out"
-    assert run("sweep-pressure", str(CASES / f"{name}.yaml"), "--output", str(out),
-               "--fitted", fit) == 0  # fmt: skip
+    assert (
+        run("sweep-pressure", str(CASES / f"{name}.yaml"), "--output", str(out), "--fitted", fit)
+        == 0
+    )
     found = result(out)
     assert [row["pressure_kPa"] for row in found["rows"]] == [*range(100, 321, 20)] * 2
     compared = 0
@@ -115,8 +121,24 @@ def test_a_solver_in_three_dimensions_without_slopes(
     case, found = str(coarse()), {}
     for solver in ("abaqus", "bundled"):
         out = tmp_path / solver
-        assert run("sweep-pressure", case, "--solver", solver, "--output", str(out), "--quiet",
-                   "--from-kPa", "200", "--to-kPa", "240", "--steps", "3") == 0  # fmt: skip
+        assert (
+            run(
+                "sweep-pressure",
+                case,
+                "--solver",
+                solver,
+                "--output",
+                str(out),
+                "--quiet",
+                "--from-kPa",
+                "200",
+                "--to-kPa",
+                "240",
+                "--steps",
+                "3",
+            )
+            == 0
+        )
         found[solver] = result(out)
     assert (found["abaqus"]["slopes"], found["bundled"]["slopes"]) == ("differences", "exact")
     for theirs, ours in zip(found["abaqus"]["rows"], found["bundled"]["rows"], strict=True):
@@ -188,8 +210,9 @@ def test_a_failure_amid_the_sweep(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     assert run("sweep-pressure", CASE, *arguments) == 3
     found = result(tmp_path)
     assert [row["pressure_kPa"] for row in found["rows"]] == [100, 120, 160, 180]
-    assert found["failed"] == [{"design": "initial", "pressure_kPa": 140, "cause": "timed_out",
-                                "words": "ran out of time"}]  # fmt: skip
+    assert found["failed"] == [
+        {"design": "initial", "pressure_kPa": 140, "cause": "timed_out", "words": "ran out of time"}
+    ]
     assert {mode["curvature"] for mode in found["findings"][0]["modes"]} == {"concave"}
 
 
@@ -250,8 +273,22 @@ def test_a_fit_is_taken_as_it_is_written(tmp_path: Path) -> None:
     """The real fit.json, in the same folder; the sweep passes through its frequencies."""
     out = ["--output", str(tmp_path), "--quiet", "--mesh", "coarse"]
     assert run("fit", CASE, *out, "--fix", "A_belt", "--no-pictures") == 0
-    assert run("sweep-pressure", CASE, *out, "--fitted", str(tmp_path / "fit.json"),
-               "--from-kPa", "220", "--to-kPa", "240", "--steps", "2") == 0  # fmt: skip
+    assert (
+        run(
+            "sweep-pressure",
+            CASE,
+            *out,
+            "--fitted",
+            str(tmp_path / "fit.json"),
+            "--from-kPa",
+            "220",
+            "--to-kPa",
+            "240",
+            "--steps",
+            "2",
+        )
+        == 0
+    )
     fit = json.loads((tmp_path / "fit.json").read_text())
     last = result(tmp_path)["rows"][-1]
     found = {key(mode): mode["frequency_Hz"] for mode in last["modes"]}

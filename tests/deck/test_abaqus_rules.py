@@ -31,10 +31,7 @@ VALUES: dict[str, dict[str, float]] = {
     "plain": {},
     "at a frequency": {"analysis.vibration_frequency_Hz": 60.0},
     "turning": {"effects.rotation": 12.0},
-    "turning, at a frequency": {
-        "effects.rotation": 12.0,
-        "analysis.vibration_frequency_Hz": 60.0,
-    },
+    "turning, at a frequency": {"effects.rotation": 12.0, "analysis.vibration_frequency_Hz": 60.0},
     "hourglass control": HOURGLASS,
     "splice, hourglass control": {"effects.stiffness_splice": 0.2, **HOURGLASS},
     "rim on springs, mass on the tread": {

@@ -26,11 +26,7 @@ SOFT = {
     "rim.spindle.torsional_rad_per_N_m": 1e-6,
     "rim.spindle.tilt_rad_per_N_m": 2e-6,
 }
-RIM = {
-    "rim.mass_kg": 15.0,
-    "rim.polar_inertia_kg_m2": 0.43,
-    "rim.diametral_inertia_kg_m2": 0.27,
-}
+RIM = {"rim.mass_kg": 15.0, "rim.polar_inertia_kg_m2": 0.43, "rim.diametral_inertia_kg_m2": 0.27}
 
 
 def gradient(values: dict[str, float], name: str, step: float = 1e-3) -> tuple[np.ndarray, ...]:

@@ -239,8 +239,12 @@ def test_numbers_have_thirteen_digits_and_fit_abaqus_fields() -> None:
 @pytest.mark.parametrize(
     ("template", "old", "new", "words"),
     [
-        ("modes.inp.j2", "*RIGID BODY, REF NODE={{ mesh.reference_node }}, TIE NSET=RIM\n", "",
-         "must be restated"),
+        (
+            "modes.inp.j2",
+            "*RIGID BODY, REF NODE={{ mesh.reference_node }}, TIE NSET=RIM\n",
+            "",
+            "must be restated",
+        ),
         ("modes.inp.j2", "*BOUNDARY\n{{ mesh.reference_node }}, 1, 6\n", "", "must be held"),
         ("modes.inp.j2", "INC={{ increments }}", "INC=3", "INC=10"),
         ("modes.inp.j2", "360.0, {{ sectors }}", "180.0, {{ sectors }}", "360 degrees"),
@@ -257,7 +261,7 @@ def test_numbers_have_thirteen_digits_and_fit_abaqus_fields() -> None:
         ("inflate.inp.j2", "{{ cord.spacing | number }}", "0.0", "positive"),
         ("mesh.inp.j2", "INNER_ROW, S4", "INNER_ROW, S5", "S1, S2, S3, S4"),
     ],
-)  # fmt: skip
+)
 def test_a_deck_that_would_mean_another_tyre_is_refused(
     case_folder: Path, template: str, old: str, new: str, words: str
 ) -> None:
@@ -270,8 +274,9 @@ def test_a_deck_that_would_mean_another_tyre_is_refused(
 
 def test_without_its_load_the_second_job_is_not_inflated(case_folder: Path) -> None:
     """ABAQUS drops the first job's loads at the transfer, so a deck without *DSLOAD is flat."""
-    case = case_with_template(case_folder, "modes.inp.j2",
-                              "*DSLOAD\nCAVITY, P, {{ pressure | number }}\n", "")  # fmt: skip
+    case = case_with_template(
+        case_folder, "modes.inp.j2", "*DSLOAD\nCAVITY, P, {{ pressure | number }}\n", ""
+    )
     answer = Door(case).evaluate(Question({}))
     assert answer.pressure_kPa == 0.0
     assert abs(answer.displacement).max() < 1e-6

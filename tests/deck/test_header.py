@@ -19,8 +19,9 @@ from ..conftest import CASES
 CASE = CASES / "p235_75r17.yaml"
 
 
-@pytest.mark.parametrize(("dialect", "more"), [("abaqus", {}), ("abaqus", {"loads_N": (4e3,)}),
-                                               ("calculix", {})])  # fmt: skip
+@pytest.mark.parametrize(
+    ("dialect", "more"), [("abaqus", {}), ("abaqus", {"loads_N": (4e3,)}), ("calculix", {})]
+)
 def test_every_deck_says_what_it_is_of(dialect: str, more: dict) -> None:
     case = with_level(load_case(CASE), "coarse")
     case = overridden(case, {"rebar_layers.belt_1.angle_deg": 68.0, "C10": 1.2e6})

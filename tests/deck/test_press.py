@@ -39,8 +39,18 @@ def volumes(names: dict, block: dict) -> np.ndarray:
     """Volumes of a block's bricks, m3, between their corners: Gauss, 2 x 2 x 2 points."""
     place = {n: xyz for n, *xyz in names["nodes"]}
     corners = np.array([[place[n] for n in row[1:9]] for row in block["elements"]])
-    a = np.array([(-1, -1, -1), (1, -1, -1), (1, 1, -1), (-1, 1, -1),
-                  (-1, -1, 1), (1, -1, 1), (1, 1, 1), (-1, 1, 1)])  # fmt: skip
+    a = np.array(
+        [
+            (-1, -1, -1),
+            (1, -1, -1),
+            (1, 1, -1),
+            (-1, 1, -1),
+            (-1, -1, 1),
+            (1, -1, 1),
+            (1, 1, 1),
+            (-1, 1, 1),
+        ]
+    )
     total = np.zeros(len(corners))
     for at in a / np.sqrt(3):
         f = 1 + a * at
@@ -141,9 +151,10 @@ def test_the_road_meets_the_tread(element: str) -> None:
     kinds = set(re.findall(r"^\*ELEMENT, TYPE=(\w+)", texts["wheel.inp"], re.M))
     assert kinds == {element}
     press = texts["press.inp"]
-    assert "*FRICTION" not in press and "*FRICTION" in press_texts(
-        case, env, [0.006], HALF, 0.3925
-    )["press.inp"]  # fmt: skip
+    assert (
+        "*FRICTION" not in press
+        and "*FRICTION" in press_texts(case, env, [0.006], HALF, 0.3925)["press.inp"]
+    )
     faces = re.findall(r"^\*NODE, NSET=ROAD\n((?:\d.*\n){8})", press, re.M)[0].split("\n")[:8]
     assert min(float(row.split(",")[1]) for row in faces) == pytest.approx(radius)
     travels = re.findall(r"^\*\* deflection (\S+) m\n\d, (\S+)$", press, re.M)

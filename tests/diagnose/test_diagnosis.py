@@ -211,8 +211,9 @@ def test_the_section_map_finds_the_part_and_joins_what_looks_alike(chance: Chanc
     ]
     base = problem(toy)
     y = drawn(toy, base, chance.random, {}, 0.3) + 0.05 * soft
-    found = diagnose(toy, toy.rows, base.measured(y).observations, assumed=base.assumed,
-                     parts=lambda x: parts)  # fmt: skip
+    found = diagnose(
+        toy, toy.rows, base.measured(y).observations, assumed=base.assumed, parts=lambda x: parts
+    )
     best = found.parts[0]
     assert best.region in ("sidewall", "bead") and set(best.same_as) == {"sidewall", "bead"} - {
         best.region
@@ -262,13 +263,30 @@ def test_the_result_is_plain_data_with_the_promised_keys() -> None:
     told = result(diagnosed(Toy(effects=3), {}, 7))
     json.dumps(told, allow_nan=False)
     assert {
-        "verdict", "effect", "parameter", "probabilities", "candidate_set", "groups",
-        "detectability", "gap", "section_map", "shrinkage", "rung", "bias_percent",
+        "verdict",
+        "effect",
+        "parameter",
+        "probabilities",
+        "candidate_set",
+        "groups",
+        "detectability",
+        "gap",
+        "section_map",
+        "shrinkage",
+        "rung",
+        "bias_percent",
         "next_measurements",
-    } <= set(told)  # fmt: skip
+    } <= set(told)
     assert {"p_value", "rms_percent", "by_family", "by_harmonic", "by_pressure"} <= set(told["gap"])
     assert set(told["gap"]["by_family"]) == {"in-plane", "lateral", "[0,0]"}
     assert set(told["bias_percent"]) == {"A", "B", "C"}
-    assert {"held_out", "before_percent", "after_percent", "fraction", "low", "high",
-            "placebo_95"} <= set(told["shrinkage"])  # fmt: skip
+    assert {
+        "held_out",
+        "before_percent",
+        "after_percent",
+        "fraction",
+        "low",
+        "high",
+        "placebo_95",
+    } <= set(told["shrinkage"])
     assert sum(told["probabilities"].values()) == pytest.approx(1, abs=1e-4)

@@ -181,9 +181,7 @@ def test_nothing_depends_on_units_or_order() -> None:
         p,
         places=p.places[order],
         observations=replace(
-            p.observations,
-            rows=tuple(p.observations.rows[i] for i in order),
-            y=y[order],
+            p.observations, rows=tuple(p.observations.rows[i] for i in order), y=y[order]
         ),
     )
     one, other = probabilities(weigh(p)), probabilities(weigh(shuffled))

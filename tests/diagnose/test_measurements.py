@@ -69,8 +69,9 @@ def test_every_mistake_is_told_at_once(tmp_path: Path) -> None:
     with pytest.raises(InputError) as caught:
         read(tmp_path, "frequency_Hz,2,0,,,240,0,-1,0.2", GOOD, "area,,,,,240,0,1,1")
     assert [line.split(":")[0][-6:] for line in str(caught.value).splitlines()] == [
-        "line 2", "line 4",
-    ]  # fmt: skip
+        "line 2",
+        "line 4",
+    ]
 
 
 @pytest.mark.parametrize("header", ["c,m,kind\n", HEADER.replace("sigma", "std"), ""])
@@ -119,11 +120,21 @@ def test_repeats_tell_the_scatter_and_what_a_run_shares(chance: Chance) -> None:
         runs = []
         for _ in range(3):
             common = random.normal(0, 0.004)
-            runs.append([
-                Reading("frequency_Hz", x, "", 240.0, 0.0,
-                        50 * np.exp(common + random.normal(0, 0.002)), 5.0, 2)
-                for x in labels
-            ])  # fmt: skip
+            runs.append(
+                [
+                    Reading(
+                        "frequency_Hz",
+                        x,
+                        "",
+                        240.0,
+                        0.0,
+                        50 * np.exp(common + random.normal(0, 0.002)),
+                        5.0,
+                        2,
+                    )
+                    for x in labels
+                ]
+            )
         found = observe(runs[0], runs[1:])
         own.append(np.mean(found.scatter**2) * 3 / 0.002**2)
         shared.append(found.common**2 * 3 / 0.004**2)
@@ -132,8 +143,11 @@ def test_repeats_tell_the_scatter_and_what_a_run_shares(chance: Chance) -> None:
 
 
 def test_what_is_not_used_is_said(tmp_path: Path) -> None:
-    lines = [GOOD, "contact_area_m2,,,,,240,4000,0.02,0.001",
-             "frequency_Hz,1,0,,symmetric,240,4000,70,0.5"]  # fmt: skip
+    lines = [
+        GOOD,
+        "contact_area_m2,,,,,240,4000,0.02,0.001",
+        "frequency_Hz,1,0,,symmetric,240,4000,70,0.5",
+    ]
     run = read(tmp_path, *lines)
     found = observe(run, [], [run])  # of the first run it is compared, not left out
     assert len(found.rows) == 2 and len(found.left_out) == 2
@@ -143,8 +157,11 @@ def test_what_is_not_used_is_said(tmp_path: Path) -> None:
 
 def test_repeats_that_cannot_be_used_are_said(tmp_path: Path) -> None:
     both = [GOOD, "frequency_Hz,3,0,,,240,0,98,0.2", "frequency_Hz,4,0,,,240,0,116,0.2"]
-    again = ["frequency_Hz,3,0,,,240,0,98.4,0.2", "frequency_Hz,4,0,,,240,0,116.3,0.2",
-             "frequency_Hz,1,0,,,240,0,58,0.2"]  # fmt: skip
+    again = [
+        "frequency_Hz,3,0,,,240,0,98.4,0.2",
+        "frequency_Hz,4,0,,,240,0,116.3,0.2",
+        "frequency_Hz,1,0,,,240,0,58,0.2",
+    ]
     found = observe(read(tmp_path, *both), [read(tmp_path, *again)])
     assert len(found.rows) == 3 and found.y[0] == pytest.approx(np.log(79.5))
     assert found.left_out == (

@@ -106,8 +106,14 @@ def test_a_toggled_run_is_set_to_what_it_says_whatever_the_case_has(tmp_path: Pa
     one = written(tmp_path / "a.csv", asked(Point(X, {"bead_filler": truth})).eta)
     other = written(tmp_path / "b.csv", asked(Point(X)).eta)
     for change in (Change("bead_filler", 0.0), Change("bead_filler", 0.0, times=True)):
-        d = study(WITH_FILLER, Door(WITH_FILLER), one, toggled=[(other, change)], effects=EFFECTS,
-                  section_map=False).diagnosis  # fmt: skip
+        d = study(
+            WITH_FILLER,
+            Door(WITH_FILLER),
+            one,
+            toggled=[(other, change)],
+            effects=EFFECTS,
+            section_map=False,
+        ).diagnosis
         size = d.parameter("bead_filler")
         assert d.rung == 4 and size["low"] < truth < size["high"]
 
@@ -118,8 +124,14 @@ def test_a_run_switched_beyond_the_range_is_asked_there(tmp_path: Path) -> None:
     far = 1.5 * MODEL.spans["bead_filler"].high
     one = written(tmp_path / "a.csv", asked(Point(X)).eta)
     other = written(tmp_path / "b.csv", asked(Point(X, {"bead_filler": far})).eta)
-    found = study(CASE, Door(CASE), one, toggled=[(other, Change("bead_filler", far))],
-                  effects=EFFECTS, section_map=False)  # fmt: skip
+    found = study(
+        CASE,
+        Door(CASE),
+        one,
+        toggled=[(other, Change("bead_filler", far))],
+        effects=EFFECTS,
+        section_map=False,
+    )
     d = found.diagnosis
     nodes, own = d.bare.expansion.nodes["bead_filler"], d.bare.expansion
     assert nodes.reach[1] == MODEL.spans["bead_filler"].high
@@ -132,9 +144,11 @@ def test_a_run_switched_beyond_the_range_is_asked_there(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("change", "words"),
-    [(Change("point_mass", 0.05), "not among the effects"),
-     (Change("bead_filler", -40.0), "cannot be evaluated")],
-)  # fmt: skip
+    [
+        (Change("point_mass", 0.05), "not among the effects"),
+        (Change("bead_filler", -40.0), "cannot be evaluated"),
+    ],
+)
 def test_a_change_that_the_diagnosis_cannot_follow(
     tmp_path: Path, change: Change, words: str
 ) -> None:
@@ -159,8 +173,9 @@ def test_an_effect_that_a_variable_sets_is_no_candidate(tmp_path: Path) -> None:
     words = page(found, "tyre", "a.csv")
     assert "Not considered, being calibrated by a variable of the case: `bead_filler`." in words
     assert "Considered, as asked: only `tread_density`, `pressure_offset` of the catalogue" in words
-    variable = variable.model_copy(update={"sets": ["pressure_kPa"], "start": 200.0,
-                                           "lower": 100.0, "upper": 400.0})  # fmt: skip
+    variable = variable.model_copy(
+        update={"sets": ["pressure_kPa"], "start": 200.0, "lower": 100.0, "upper": 400.0}
+    )
     case = replace(CASE, case=CASE.case.model_copy(update={"variables": {"p": variable}}))
     with pytest.raises(InputError, match="sets pressure_kPa"):
         study(case, Door(case), path, effects=EFFECTS)

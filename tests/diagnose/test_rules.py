@@ -224,8 +224,15 @@ def test_outside_is_half_unknown_effects_and_half_errors_of_reading() -> None:
     base = problem(toy)
     p = base.measured(drawn(toy, base, generator("outside"), {}, 0.3))
     rows, S = p.observations.rows, p.sigma
-    same = np.array([[(a.label == b.label) * (0.9 if a.pressure_kPa != b.pressure_kPa else 1.0)
-                      for b in rows] for a in rows])  # fmt: skip
+    same = np.array(
+        [
+            [
+                (a.label == b.label) * (0.9 if a.pressure_kPa != b.pressure_kPa else 1.0)
+                for b in rows
+            ]
+            for a in rows
+        ]
+    )
     ln = lambda extra: refit(p, {}, 1, extra).ln_evidence[0]
     unknown = [ln(size**2 * same) for size in UNKNOWN] + [ln((k**2 - 1) * S) for k in INFLATED]
     misread = []

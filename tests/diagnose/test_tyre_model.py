@@ -35,8 +35,17 @@ from ..chance import Chance, generator
 from ..effects.support import coarse
 
 CASE = coarse()
-LABELS = [Label(0, 0, "axial"), Label(0, 0, "torsional"), Label(1, 1), Label(1, 0), Label(2, 1),
-          Label(2, 0), Label(3, 0), Label(3, 1), Label(4, 0)]  # fmt: skip
+LABELS = [
+    Label(0, 0, "axial"),
+    Label(0, 0, "torsional"),
+    Label(1, 1),
+    Label(1, 0),
+    Label(2, 1),
+    Label(2, 0),
+    Label(3, 0),
+    Label(3, 1),
+    Label(4, 0),
+]
 EFFECTS = ("bead_filler", "pressure_offset", "tread_density")
 ROWS = [*((label, p) for p in (180.0, 240.0) for label in LABELS), (None, 0.0)]
 
@@ -79,8 +88,14 @@ def plain(tmp_path_factory: pytest.TempPathFactory) -> Problem:
     path = written(tmp_path_factory.mktemp("plain") / "a.csv", expansion.eta)
     observations = observe(read_measurements(path))
     where = places(observations, ROWS)
-    return Problem(replace(observations, y=expansion.eta[where]), expansion, MODEL.spans, where,
-                   MODEL.start, MODEL.spread)  # fmt: skip
+    return Problem(
+        replace(observations, y=expansion.eta[where]),
+        expansion,
+        MODEL.spans,
+        where,
+        MODEL.start,
+        MODEL.spread,
+    )
 
 
 @pytest.mark.slow
@@ -136,8 +151,12 @@ def test_parts_of_the_section_make_the_whole() -> None:
     assert own.constants is not None
     rubber = [part for part in parts if not part.name.endswith("cords")]
     assert {part.name for part in rubber} == {
-        "tread", "crown under the tread", "upper sidewall", "lower sidewall", "bead",
-    }  # fmt: skip
+        "tread",
+        "crown under the tread",
+        "upper sidewall",
+        "lower sidewall",
+        "bead",
+    }
     modes = slice(0, -1)
     density = own.constants[modes, MODEL.sources.index("rubber_density")] / 0.015
     assert sum(part.mass for part in rubber)[modes] == pytest.approx(density, rel=1e-6, abs=1e-9)
@@ -213,8 +232,15 @@ def test_a_toggled_run_shows_the_cause(tmp_path: Path) -> None:
     truth = 0.5 * MODEL.spans["bead_filler"].high
     one = written(tmp_path / "a.csv", asked(Point(X, {"bead_filler": truth})).eta)
     other = written(tmp_path / "b.csv", asked(Point(X)).eta)
-    d = study(CASE, Door(CASE), one, toggled=[(other, Change("bead_filler", 0.0))],
-              assumed=Assumed(), effects=EFFECTS, section_map=False).diagnosis  # fmt: skip
+    d = study(
+        CASE,
+        Door(CASE),
+        one,
+        toggled=[(other, Change("bead_filler", 0.0))],
+        assumed=Assumed(),
+        effects=EFFECTS,
+        section_map=False,
+    ).diagnosis
     assert d.verdict.kind == "named" and d.rung == 4
 
 
@@ -271,9 +297,9 @@ def test_sources_of_error_are_those_of_the_case_or_assumed_and_never_calibrated(
     stated, assumed = sources(CASE)
     assert not assumed and {"pressure", "belt_spacing", "rim_width"} <= {s.name for s in stated}
     tied = next(s for s in stated if s.name == "belt_spacing")
-    assert tied.steps == pytest.approx({
-        "rebar_layers.belt_1.spacing_m": 1.16e-5, "rebar_layers.belt_2.spacing_m": 1.16e-5,
-    })  # fmt: skip
+    assert tied.steps == pytest.approx(
+        {"rebar_layers.belt_1.spacing_m": 1.16e-5, "rebar_layers.belt_2.spacing_m": 1.16e-5}
+    )
     words = {s.name: s.words for s in stated}
     assert words["pressure"] == "pressure 1 kPa" and words["rim_width"] == "rim width 1 mm"
     assert words["belt_1_angle"] == "belt 1 angle 1 degrees"
@@ -283,9 +309,12 @@ def test_sources_of_error_are_those_of_the_case_or_assumed_and_never_calibrated(
     assumed_words = {s.name: s.words for s in found}
     assert assumed and assumed_words["rubber_density"] == f"rubber density {DENSITY:g} %"
     assert set(assumed_words) == {
-        "pressure", "rubber_density", "belt_cord_modulus", "carcass_cord_modulus",
+        "pressure",
+        "rubber_density",
+        "belt_cord_modulus",
+        "carcass_cord_modulus",
         *(f"{layer}_{what}" for layer in CASE.case.rebar_layers for what in ("spacing", "angle")),
-    }  # fmt: skip
+    }
     assert assumed_words["pressure"] == f"pressure {PRESSURE_kPa:g} kPa"
     paths = {path for s in (*found, *stated) for path in s.steps}
     assert not paths & {path for v in CASE.case.variables.values() for path in v.sets}

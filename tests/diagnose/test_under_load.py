@@ -40,8 +40,12 @@ def readings(case: LoadedCase) -> list[Reading]:
     pressed = Door(case).press(true_values(case), LOADS)
     low, high = (footprint_row(pressed, each, section_mesh(case)) for each in pressed.footprints)
     (first, last), area = LOADS, low["area_m2"]
-    found = [(AREA, first, 1.01 * area), (AREA, first, 0.99 * area),
-             (AREA, last, high["area_m2"]), (STIFFNESS, last, high[STIFFNESS])]  # fmt: skip
+    found = [
+        (AREA, first, 1.01 * area),
+        (AREA, first, 0.99 * area),
+        (AREA, last, high["area_m2"]),
+        (STIFFNESS, last, high[STIFFNESS]),
+    ]
     return [Reading(q, None, "", 220.0, load, x, 0.02 * x, 2) for q, load, x in found]
 
 
@@ -50,8 +54,10 @@ def test_the_tyre_itself_is_found(case: LoadedCase, readings: list[Reading]) -> 
     found = compare(case, Door(case), readings, tyres)
     assert not found.failed
     assert [(row.quantity, row.load_N) for row in found.rows] == [
-        (AREA, LOADS[0]), (AREA, LOADS[1]), (STIFFNESS, LOADS[1]),
-    ]  # fmt: skip
+        (AREA, LOADS[0]),
+        (AREA, LOADS[1]),
+        (STIFFNESS, LOADS[1]),
+    ]
     assert found.rms_percent("it") == pytest.approx(0, abs=1e-6)
     at_last = found.rms_percent("none", LOADS[1])
     assert at_last and at_last > 0.5
@@ -67,8 +73,11 @@ def test_modes_under_load(case: LoadedCase) -> None:
     (tyre,) = load_tyres(Door(case), {"": values}, LOADS[:1]).values()
     assert isinstance(tyre, LoadedTyre)
     hertz = {mode.member: mode.frequency_Hz for mode in tyre.loads[-1].modes}
-    wanted = [Member(Label(1, 1), "symmetric"), Member(Label(2, 0), "antisymmetric"),
-              Member(Label(0, 0, "axial"), "antisymmetric")]  # fmt: skip
+    wanted = [
+        Member(Label(1, 1), "symmetric"),
+        Member(Label(2, 0), "antisymmetric"),
+        Member(Label(0, 0, "axial"), "antisymmetric"),
+    ]
     read = [
         Reading("frequency_Hz", m.label, m.symmetry, 220.0, LOADS[0], hertz.get(m, 37.0), 0.1, 2)
         for m in wanted
@@ -95,8 +104,10 @@ def test_what_cannot_be_pressed_is_said(case: LoadedCase, readings: list[Reading
 
 
 def test_tyres_are_compared_on_the_same_rows() -> None:
-    rows = [LoadedRow(AREA, None, 240.0, load, 0.01, 1e-4, off)
-            for load, off in ((1e3, {"a": 0.03, "b": 0.01}), (2e3, {"a": 0.5}))]  # fmt: skip
+    rows = [
+        LoadedRow(AREA, None, 240.0, load, 0.01, 1e-4, off)
+        for load, off in ((1e3, {"a": 0.03, "b": 0.01}), (2e3, {"a": 0.5}))
+    ]
     found = UnderLoad(tuple(rows), ("a", "b"), ("b, 240 kPa: no",))
     assert found.rms_percent("a") == pytest.approx(3) and found.rms_percent("b") == pytest.approx(1)
     assert found.rms_percent("a", 2e3) is None

@@ -14,9 +14,16 @@ from tyrecal.modes.mode import Label
 
 Array = np.ndarray
 LABELS = [
-    Label(0, 0, "axial"), Label(0, 0, "torsional"), Label(1, 1), Label(1, 0), Label(2, 1),
-    Label(2, 0), Label(3, 0), Label(3, 1), Label(4, 0),
-]  # fmt: skip
+    Label(0, 0, "axial"),
+    Label(0, 0, "torsional"),
+    Label(1, 1),
+    Label(1, 0),
+    Label(2, 1),
+    Label(2, 0),
+    Label(3, 0),
+    Label(3, 1),
+    Label(4, 0),
+]
 HERTZ = [31.7, 35.0, 37.8, 58.5, 66.1, 79.5, 97.6, 102.7, 115.9]
 
 
@@ -43,9 +50,12 @@ class Toy:
         self.start, self.spread = np.zeros(3), np.full(3, 1.0)
         self.sources = ("density", "gauge")
         by_mode = lambda scale: np.concatenate(
-            [m + random.normal(0, scale / 5, len(LABELS))
-             for m in [random.normal(0, scale, len(LABELS))] for _ in pressures]
-        )  # fmt: skip
+            [
+                m + random.normal(0, scale / 5, len(LABELS))
+                for m in [random.normal(0, scale, len(LABELS))]
+                for _ in pressures
+            ]
+        )
         self.base = np.log(np.tile(HERTZ, len(pressures))) + 0.4 * np.log(
             np.repeat(pressures, len(LABELS)) / 240.0
         )
@@ -103,9 +113,15 @@ def problem(
     none = np.full(n, np.nan)
     observations = Observations(rows, y, np.full(n, noise), 0.0, none, none)
     return Problem(
-        observations, expansion, toy.spans, places(observations, toy.rows), toy.start,
-        toy.spread, changes, assumed,
-    )  # fmt: skip
+        observations,
+        expansion,
+        toy.spans,
+        places(observations, toy.rows),
+        toy.start,
+        toy.spread,
+        changes,
+        assumed,
+    )
 
 
 def drawn(

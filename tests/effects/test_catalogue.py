@@ -85,9 +85,14 @@ def test_a_fit_ends_where_an_effect_is_absent(method: str, start: float) -> None
         if (label.c, label.m, label.kind) == (t.c, t.m, t.kind)
     ]
     filler = CASE.case.variables["C10"].model_copy(
-        update={"sets": ["effects.bead_filler"], "start": start, "lower": 0.0, "upper": 3.0,
-                "scale": "linear"}
-    )  # fmt: skip
+        update={
+            "sets": ["effects.bead_filler"],
+            "start": start,
+            "lower": 0.0,
+            "upper": 3.0,
+            "scale": "linear",
+        }
+    )
     targets = CASE.case.targets.model_copy(update={"modes": modes})
     changed = CASE.case.model_copy(update={"targets": targets, "variables": {"filler": filler}})
     case = replace(CASE, case=changed)

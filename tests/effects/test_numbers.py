@@ -69,9 +69,12 @@ def swept(line: Array, weight: Array | float = 1.0) -> float:
 def test_cap_ply_is_a_layer() -> None:
     cord = Cord(kind="cord", youngs_modulus_Pa=3.5e9, poissons_ratio=0.3, density_kg_per_m3=1140.0)
     layer = RebarLayer(
-        line="belt2", material="cap_ply_cord", area_m2=1e6 * 1e-3 / 3.5e9, spacing_m=1e-3,
+        line="belt2",
+        material="cap_ply_cord",
+        area_m2=1e6 * 1e-3 / 3.5e9,
+        spacing_m=1e-3,
         angle_deg=90.0,
-    )  # fmt: skip
+    )
     materials = {**CASE.case.materials, "cap_ply_cord": cord}
     layers = {**CASE.case.rebar_layers, "cap_ply": layer}
     assert decks(CASE, cap_ply=1e6) == edited(materials=materials, rebar_layers=layers)
@@ -109,9 +112,11 @@ def test_fanned_carcass_is_an_angular_layer() -> None:
     bead = CASE.section.points[PLY, RIM, 0]
     layer = CASE.case.rebar_layers["carcass"].model_copy(
         update={
-            "geometry": "angular", "spacing_m": None, "spacing_deg": float(np.degrees(1e-3 / bead))
+            "geometry": "angular",
+            "spacing_m": None,
+            "spacing_deg": float(np.degrees(1e-3 / bead)),
         }
-    )  # fmt: skip
+    )
     layers = {**CASE.case.rebar_layers, "carcass": layer}
     assert decks(CASE, carcass_fanning=1.0) == edited(rebar_layers=layers)
 

@@ -21,11 +21,14 @@ def site(tmp_path: Path) -> Path:
 
 def modes(site: Path, *arguments: str) -> dict[str, float]:
     """Frequencies in Hz by label on the coarse mesh."""
-    done = tyrecal(site, "modes", CASE, "--mesh", "coarse", "--json", "--output",
-                   str(site / "out"), *arguments)  # fmt: skip
+    done = tyrecal(
+        site, "modes", CASE, "--mesh", "coarse", "--json", "--output", str(site / "out"), *arguments
+    )
     assert done.returncode == 0, done.stderr
-    return {f"{m['c']},{m['m']},{m['kind']}": m["frequency_Hz"]
-            for m in json.loads(done.stdout)["modes"]}  # fmt: skip
+    return {
+        f"{m['c']},{m['m']},{m['kind']}": m["frequency_Hz"]
+        for m in json.loads(done.stdout)["modes"]
+    }
 
 
 @pytest.mark.slow
@@ -45,7 +48,8 @@ def test_the_catalogue_has_it_and_refuses_what_cannot_be(site: Path) -> None:
     (entry,) = json.loads(done.stdout)
     assert entry["title"] == "Softer belt cords" and "bundled" in entry["solvers"]
     assert entry["about"][0].startswith("The belts' cords have lost stiffness")
-    done = tyrecal(site, "modes", CASE, "--set", "effects.belt_softening=1.5",
-                   "--output", str(site / "out"))  # fmt: skip
+    done = tyrecal(
+        site, "modes", CASE, "--set", "effects.belt_softening=1.5", "--output", str(site / "out")
+    )
     assert done.returncode == 2 and "less than 1" in done.stderr
     assert "Traceback" not in done.stderr

@@ -154,24 +154,43 @@ def footprint(load: float, **changes: Any) -> dict[str, Any]:
     """What a solver tells of one load, of a patch of two nodes."""
     two = np.ones(2)
     told: dict[str, Any] = {
-        "load_N": load, "road_N": load, "rim_N": np.array([load, 0.0, 0.0]), "deflection_m": 0.01,
-        "stiffness_N_per_m": 2e5, "ring": np.array([0, 1]), "node": np.array([0, 2]),
-        "along_m": two, "across_m": two, "pressure_Pa": two, "area_m2": two,
-        "traction_Pa": np.ones((2, 2)), "displacement": np.zeros((4, 3, 3)),
-    }  # fmt: skip
+        "load_N": load,
+        "road_N": load,
+        "rim_N": np.array([load, 0.0, 0.0]),
+        "deflection_m": 0.01,
+        "stiffness_N_per_m": 2e5,
+        "ring": np.array([0, 1]),
+        "node": np.array([0, 2]),
+        "along_m": two,
+        "across_m": two,
+        "pressure_Pa": two,
+        "area_m2": two,
+        "traction_Pa": np.ones((2, 2)),
+        "displacement": np.zeros((4, 3, 3)),
+    }
     return {**told, **changes}
 
 
 def modes_told(count: int, lowest: float = 30.0) -> dict[str, Any]:
-    return {"mode_frequency_Hz": lowest + np.arange(count), "mode_node": np.array([0, 1]),
-            "mode_shape": np.zeros((count, 4, 2, 3))}  # fmt: skip
+    return {
+        "mode_frequency_Hz": lowest + np.arange(count),
+        "mode_node": np.array([0, 1]),
+        "mode_shape": np.zeros((count, 4, 2, 3)),
+    }
 
 
 def road(*footprints: dict[str, Any], **changes: Any) -> dict[str, Any]:
     """A solver's answer of a tyre of 4 rings of 3 nodes."""
-    told = {"pressure_Pa": 240e3, "mass_kg": 12.0, "nodes": np.arange(3), "points": np.ones((3, 2)),
-            "angles": np.arange(4.0), "free_radius_m": 0.3, "footprints": list(footprints),
-            "failure": ""}  # fmt: skip
+    told = {
+        "pressure_Pa": 240e3,
+        "mass_kg": 12.0,
+        "nodes": np.arange(3),
+        "points": np.ones((3, 2)),
+        "angles": np.arange(4.0),
+        "free_radius_m": 0.3,
+        "footprints": list(footprints),
+        "failure": "",
+    }
     return {**told, **changes}
 
 
@@ -214,13 +233,19 @@ PLAIN: dict[str, tuple[Edit, str]] = {
     "a member of 0 Hz": (lambda a: a["modes"][0].update(members=[0.0, 2.0]), "above"),
     "a flat shape": (lambda a: a["modes"][0].update(amplitude=np.ones((3, 2))), "has the shape"),
     "few points of a shape": (
-        lambda a: a["modes"][0].update(amplitude=np.ones((2, 3))), "not as many points"),
+        lambda a: a["modes"][0].update(amplitude=np.ones((2, 3))),
+        "not as many points",
+    ),
     "a shape of infinity": (
-        lambda a: a["modes"][0].update(amplitude=np.full((3, 3), np.inf)), "not finite"),
+        lambda a: a["modes"][0].update(amplitude=np.full((3, 3), np.inf)),
+        "not finite",
+    ),
     "in three dimensions": (lambda a: solid(a), ""),
     "in three, of other nodes": (lambda a: solid(a, nodes=np.arange(7)), ""),
     "in three, not measured all over": (
-        lambda a: solid(a, displacement=np.full((3, 3), np.nan)), ""),
+        lambda a: solid(a, displacement=np.full((3, 3), np.nan)),
+        "",
+    ),
     "in four": (lambda a: solid(a, points=np.ones((3, 4))), "do not go together"),
     "on a line": (lambda a: solid(a, points=np.ones((3, 1))), "do not go together"),
     "a section of other nodes": (lambda a: a.update(nodes=np.arange(7)), "do not go together"),
@@ -228,7 +253,7 @@ PLAIN: dict[str, tuple[Edit, str]] = {
     "no inflation": (lambda a: a.update(displacement=np.zeros((0, 3))), ""),
     "half an inflation": (lambda a: a.update(displacement=np.zeros((2, 3))), "inflation"),
     "two slopes of a mode": (lambda a: a.update(gradients={"a": [1.0, 2.0]}), "not every mode"),
-}  # fmt: skip
+}
 
 
 def solid(answer: dict[str, Any], displacement: Any = None, **more: Any) -> None:
@@ -267,19 +292,26 @@ PRESSED: dict[str, tuple[dict[str, Any], str]] = {
     "tractions too few": (road(footprint(500.0, traction_Pa=np.ones((1, 2)))), "lists do not go"),
     "an unknown field": (road(footprint(500.0, more=1.0)), "Extra inputs"),
     "modes without nodes": (
-        road(footprint(500.0, **{**modes_told(2), "mode_node": None})), "a part is missing"),
+        road(footprint(500.0, **{**modes_told(2), "mode_node": None})),
+        "a part is missing",
+    ),
     "modes without frequencies": (
-        road(footprint(500.0, **{**modes_told(2), "mode_frequency_Hz": None})), "a part is"),
+        road(footprint(500.0, **{**modes_told(2), "mode_frequency_Hz": None})),
+        "a part is",
+    ),
     "a shape too few": (
         road(footprint(500.0, **{**modes_told(2), "mode_shape": np.zeros((1, 4, 2, 3))})),
-        "modes under load do not go"),
+        "modes under load do not go",
+    ),
     "a ring of shapes too few": (
         road(footprint(500.0, **{**modes_told(2), "mode_shape": np.zeros((2, 3, 2, 3))})),
-        "modes under load do not go"),
+        "modes under load do not go",
+    ),
     "a node of shapes too many": (
         road(footprint(500.0, **{**modes_told(2), "mode_shape": np.zeros((2, 4, 3, 3))})),
-        "modes under load do not go"),
-}  # fmt: skip
+        "modes under load do not go",
+    ),
+}
 
 
 @pytest.mark.parametrize("kind", PRESSED)

@@ -12,13 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from tyrecal.evaluate.executor import (
-    Here,
-    Processes,
-    end_workers,
-    executor,
-    in_order,
-)
+from tyrecal.evaluate.executor import Here, Processes, end_workers, executor, in_order
 from tyrecal.evaluate.failure import WorkerLost
 
 

@@ -126,9 +126,13 @@ def test_stopped_in_the_middle_of_large_answers_it_ends(tmp_path: Path) -> None:
     (tmp_path / "stopped.py").write_text(STOPPED)
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     done = subprocess.run(
-        [sys.executable, tmp_path / "stopped.py"], env=environment, capture_output=True,
-        text=True, timeout=200, check=False,
-    )  # fmt: skip
+        [sys.executable, tmp_path / "stopped.py"],
+        env=environment,
+        capture_output=True,
+        text=True,
+        timeout=200,
+        check=False,
+    )
     assert done.returncode == 0, done.stderr
     assert done.stdout.count("stopped") == 20 and not done.stderr
 

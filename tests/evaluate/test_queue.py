@@ -37,16 +37,30 @@ def script(system: str, folder: Path) -> list[str]:
 
 def test_a_job_of_slurm(tmp_path: Path) -> None:
     lines = script("slurm", tmp_path)
-    for line in ("-p express", "-A tyres", "--cpus-per-task=4", "--mem=6G", "-t 02:30:00",
-                 "--constraint=avx512", "-n 1", "-J tyrecal"):  # fmt: skip
+    for line in (
+        "-p express",
+        "-A tyres",
+        "--cpus-per-task=4",
+        "--mem=6G",
+        "-t 02:30:00",
+        "--constraint=avx512",
+        "-n 1",
+        "-J tyrecal",
+    ):
         assert f"#SBATCH {line}" in lines
     common(lines)
 
 
 def test_a_job_of_pbs(tmp_path: Path) -> None:
     lines = script("pbs", tmp_path)
-    for line in ("-q express", "-A tyres", "-l select=1:ncpus=4:mem=5723MB", "-l walltime=02:30:00",
-                 "--constraint=avx512", "-N tyrecal"):  # fmt: skip
+    for line in (
+        "-q express",
+        "-A tyres",
+        "-l select=1:ncpus=4:mem=5723MB",
+        "-l walltime=02:30:00",
+        "--constraint=avx512",
+        "-N tyrecal",
+    ):
         assert f"#PBS {line}" in lines
     common(lines)
 

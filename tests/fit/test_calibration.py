@@ -374,9 +374,14 @@ def test_fewer_data_than_variables_are_said_to_be_too_few() -> None:
 def test_a_design_that_the_case_cannot_have_is_stepped_back_from() -> None:
     """C10 + C01 must be positive, which the bounds of C01 alone do not say."""
     variable = CASE.case.variables["C10"].model_copy(
-        update={"sets": ["materials.rubber.C01_Pa"], "scale": "linear", "start": 0.0,
-                "lower": -9e5, "upper": 9e5}
-    )  # fmt: skip
+        update={
+            "sets": ["materials.rubber.C01_Pa"],
+            "scale": "linear",
+            "start": 0.0,
+            "lower": -9e5,
+            "upper": 9e5,
+        }
+    )
     variables = {"A_belt": CASE.case.variables["A_belt"], "C01": variable}
     rubber = CASE.case.materials["rubber"].model_copy(update={"C10_Pa": 5e5})
     materials = {**CASE.case.materials, "rubber": rubber}

@@ -78,6 +78,9 @@ def test_a_fit_that_ends_at_the_crossing_says_so_soon(factors: tuple[float, floa
     lowest = differential_evolution(
         lambda x: problem.evaluate(x).objective,
         [(x - 0.1, x + 0.1) for x in fit.fitted.x],
-        popsize=10, maxiter=40, polish=False, seed=1,
-    ).fun  # fmt: skip
+        popsize=10,
+        maxiter=40,
+        polish=False,
+        seed=1,
+    ).fun
     assert result["objective_Hz"] == pytest.approx(lowest, rel=2e-3)

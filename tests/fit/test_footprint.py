@@ -189,8 +189,10 @@ def test_numbers_are_those_of_a_footprint_at_the_cases_loads() -> None:
         "rows"
     ]
     assert list(point.footprint) == [
-        rows[0]["area_m2"], rows[0]["vertical_stiffness_N_per_m"], rows[1]["area_m2"]
-    ]  # fmt: skip
+        rows[0]["area_m2"],
+        rows[0]["vertical_stiffness_N_per_m"],
+        rows[1]["area_m2"],
+    ]
 
 
 def test_a_jump_between_neighbours_does_not_spoil_the_slope() -> None:
@@ -252,8 +254,9 @@ def test_the_record_answers_a_second_fit_to_the_last_bit(tmp_path: Path) -> None
     results = [json.dumps(calibrate(case, each).result) for each in (first, second)]
     assert results[0] == results[1]
     assert first.counts.runs > 0 and (second.counts.runs, second.counts.recorded) == (
-        0, first.counts.runs + first.counts.recorded
-    )  # fmt: skip
+        0,
+        first.counts.runs + first.counts.recorded,
+    )
 
 
 def test_a_solver_without_a_road_is_refused_before_anything_runs() -> None:

@@ -322,8 +322,9 @@ def test_uncertainty_by_its_formula() -> None:
     sigmas = np.array([0.1, 0.4, 0.2, 0.3])
     targets = [SimpleNamespace(sigma_Hz=s) for s in sigmas]
     variables = [Variable("a", 3.0, 1.0, 9.0), Variable("b", 0.0, -1.0, 3.0, log=False)]
-    problem: Any = SimpleNamespace(scale=scale, targets=targets, variables=variables,
-                                   footprint=[SimpleNamespace(sigma=0.05)])  # fmt: skip
+    problem: Any = SimpleNamespace(
+        scale=scale, targets=targets, variables=variables, footprint=[SimpleNamespace(sigma=0.05)]
+    )
     J, y = scale[:, None] * slopes, random.normal(size=5)
     at = Point({"a": 3.0, "b": 0.5}, np.zeros(2), scale * y, J, {}, 1.0, 1.0, np.empty(0), 0.0)
     found = uncertainty(problem, at)
@@ -342,8 +343,9 @@ def test_noise_is_what_is_left_over_the_freedom_that_is_left() -> None:
     random = generator("noise")
     J, y = random.normal(size=(5, 2)), random.normal(size=5)
     variables = [Variable("a", 3.0, 1.0, 9.0), Variable("b", 3.0, 1.0, 9.0)]
-    point_of = lambda n: Point({"a": 3.0, "b": 3.0}, np.zeros(2), y[:n], J[:n], {}, 1.0, 1.0,
-                               np.empty(0), 0.0)  # fmt: skip
+    point_of = lambda n: Point(
+        {"a": 3.0, "b": 3.0}, np.zeros(2), y[:n], J[:n], {}, 1.0, 1.0, np.empty(0), 0.0
+    )
     none = [SimpleNamespace(sigma_Hz=None)] * 4
     told: dict[str, Any] = {"variables": variables, "footprint": []}
     problem: Any = SimpleNamespace(scale=np.ones(4), targets=none, **told)

@@ -30,10 +30,15 @@ LAYOUT = Layout(cylindrical=True, highest=6, band=(40.0, 130.0))
 def nodes(moved: float = 0.0) -> dict[str, Any]:
     one = np.ones(12, int)
     return {
-        "type": 15, "node_nums": np.arange(1, 13), "def_cs": one, "disp_cs": one, "color": one,
-        "x": 0.39 * np.cos(ANGLES) + moved, "y": 0.39 * np.sin(ANGLES),
+        "type": 15,
+        "node_nums": np.arange(1, 13),
+        "def_cs": one,
+        "disp_cs": one,
+        "color": one,
+        "x": 0.39 * np.cos(ANGLES) + moved,
+        "y": 0.39 * np.sin(ANGLES),
         "z": 0.05 * np.tile([1.0, -1.0, 0.0], 4),
-    }  # fmt: skip
+    }
 
 
 def functions(reference: int, seed: int, kept: range = range(12)) -> list[dict[str, Any]]:
@@ -50,8 +55,14 @@ def functions(reference: int, seed: int, kept: range = range(12)) -> list[dict[s
                 wk = 2 * np.pi * hertz
                 H += phi * 1j * w / (wk**2 - w**2 + 0.05j * w * wk)
             H += 2e-5 * (rng.standard_normal(len(F)) + 1j * rng.standard_normal(len(F)))
-            sets.append({**function(H, F, node + 1), "rsp_dir": k, "ref_node": reference,
-                         "ordinate_spec_data_type": 11})  # fmt: skip
+            sets.append(
+                {
+                    **function(H, F, node + 1),
+                    "rsp_dir": k,
+                    "ref_node": reference,
+                    "ordinate_spec_data_type": 11,
+                }
+            )
     return sets
 
 
@@ -108,7 +119,15 @@ def test_a_mode_is_told_with_digits_that_mean_something() -> None:
     told: Any = SimpleNamespace(mode=mode, judged=judged, collinearity=0.12345678, member="1")
     run: Any = SimpleNamespace(name="a.uff")
     assert _entry(run, told) == {
-        "file": "a.uff", "frequency_Hz": 66.1234567, "sigma_Hz": None, "damping_ratio": None,
-        "collinearity": 0.1235, "c": None, "m": None, "kind": None, "member": "1",
-        "confidence": 0.8765, "why": "mixed",
-    }  # fmt: skip
+        "file": "a.uff",
+        "frequency_Hz": 66.1234567,
+        "sigma_Hz": None,
+        "damping_ratio": None,
+        "collinearity": 0.1235,
+        "c": None,
+        "m": None,
+        "kind": None,
+        "member": "1",
+        "confidence": 0.8765,
+        "why": "mixed",
+    }

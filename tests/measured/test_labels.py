@@ -21,8 +21,12 @@ pytestmark = pytest.mark.numbers
 
 def ring(count: int, across: tuple[float, ...] = (0.0,), directions: str = "rtz") -> Sensors:
     """Evenly spaced sensors on rings of the tread."""
-    rows = [(0.39 - 0.8 * z * z, 2 * np.pi * a / count, z, "rtz".index(k))
-            for z in across for a in range(count) for k in directions]  # fmt: skip
+    rows = [
+        (0.39 - 0.8 * z * z, 2 * np.pi * a / count, z, "rtz".index(k))
+        for z in across
+        for a in range(count)
+        for k in directions
+    ]
     return Sensors(np.array([row[:3] for row in rows]), np.eye(3)[[row[3] for row in rows]])
 
 
@@ -121,8 +125,13 @@ def test_motions_that_are_not_the_labels_are_smaller_still_of_the_other_parity(m
     r P_k, theta P_k, z P_k-1, and of the sidewalls' over their height, alike on both sides (even
     m: r and theta; odd m: z) or opposite."""
     tread = ring(9, across=tuple(np.linspace(-0.09, 0.09, 7)))
-    rows = [(R, 2 * np.pi * a / 9, z, d) for R in (0.24, 0.27, 0.30) for z in (-0.1, 0.1)
-            for a in range(9) for d in range(3)]  # fmt: skip
+    rows = [
+        (R, 2 * np.pi * a / 9, z, d)
+        for R in (0.24, 0.27, 0.30)
+        for z in (-0.1, 0.1)
+        for a in range(9)
+        for d in range(3)
+    ]
     walls = np.array([row[:3] for row in rows])
     sensors = Sensors(
         np.vstack([tread.points, walls]),
@@ -137,15 +146,18 @@ def test_motions_that_are_not_the_labels_are_smaller_still_of_the_other_parity(m
     sides = [(j, side, d) for d in range(3) for side in (0, 1) for j in range(3)]
     wave = np.cos(2 * angle)
     terms = [across[:, k] * wave * sensors.directions[:, d] for k, _, d in motions]
-    terms += [up[:, j] * np.sign(Z) ** side * wave * sensors.directions[:, d]
-              for j, side, d in sides]  # fmt: skip
+    terms += [
+        up[:, j] * np.sign(Z) ** side * wave * sensors.directions[:, d] for j, side, d in sides
+    ]
     inverse = np.linalg.pinv(np.transpose(terms))
     S = labeller.covariance[labeller.labels.index(Label(2, m))]
     energy = np.diag(inverse @ S @ inverse.T) / (
         [2 * k + 1 for k, *_ in motions] + [1] * len(sides)
     )
-    shares = [1.0 if order == m else OTHER_PARITY if (order - m) % 2 else SAME_PARITY
-              for _, order, _ in motions]  # fmt: skip
+    shares = [
+        1.0 if order == m else OTHER_PARITY if (order - m) % 2 else SAME_PARITY
+        for _, order, _ in motions
+    ]
     shares += [
         SIDEWALL * (OTHER_PARITY if (side + m + (d == 2)) % 2 else 1) for _, side, d in sides
     ]
@@ -207,18 +219,30 @@ def told(frequency: float, label: Label | None) -> Told:
     sensors = ring(5)
     judged = Labeller(sensors, 2).judge(waves(sensors, 1))
     judged = type(judged)(label, judged.probabilities)
-    return Told(MeasuredMode(frequency, waves(sensors, 1)), sensors, waves(sensors, 1), 1.0,
-                judged, "")  # fmt: skip
+    return Told(
+        MeasuredMode(frequency, waves(sensors, 1)), sensors, waves(sensors, 1), 1.0, judged, ""
+    )
 
 
 def test_doublets_have_two_members_and_overtones_no_label() -> None:
     axial = Label(0, 0, "axial")
-    given = [told(66.4, Label(2, 1)), told(66.1, Label(2, 1)), told(120.0, Label(2, 1)),
-             told(30.0, axial), told(30.4, axial), told(80.0, Label(2, 0)),
-             told(85.0, None)]  # fmt: skip
+    given = [
+        told(66.4, Label(2, 1)),
+        told(66.1, Label(2, 1)),
+        told(120.0, Label(2, 1)),
+        told(30.0, axial),
+        told(30.4, axial),
+        told(80.0, Label(2, 0)),
+        told(85.0, None),
+    ]
     found = [(t.mode.frequency_Hz, t.judged.label, t.member) for t in settled(given)]
     assert found == [
-        (30.0, axial, ""), (30.4, None, ""), (66.1, Label(2, 1), "1"), (66.4, Label(2, 1), "2"),
-        (80.0, Label(2, 0), ""), (85.0, None, ""), (120.0, None, ""),
-    ]  # fmt: skip
+        (30.0, axial, ""),
+        (30.4, None, ""),
+        (66.1, Label(2, 1), "1"),
+        (66.4, Label(2, 1), "2"),
+        (80.0, Label(2, 0), ""),
+        (85.0, None, ""),
+        (120.0, None, ""),
+    ]
     assert "[2,1] stands at 66.10 Hz already" in settled(given)[-1].judged.why

@@ -96,8 +96,10 @@ def test_lines_that_repeat_are_runs(tmp_path: Path) -> None:
 def test_two_of_a_label_with_waves_are_a_doublet(tmp_path: Path) -> None:
     found = read(tmp_path, PLAIN + "2,1,,240,66.4\n")
     assert [(v.label, v.member) for v in found] == [
-        (AXIAL, ""), (Label(2, 1), "1"), (Label(2, 1), "2"),
-    ]  # fmt: skip
+        (AXIAL, ""),
+        (Label(2, 1), "1"),
+        (Label(2, 1), "2"),
+    ]
     with pytest.raises(InputError, match="repeats, or the two of a doublet"):
         read(tmp_path, "c,m,pressure [bar],f\n2,1,2.4,66.1\n2,1,2.4,66.3\n3,1,2.4,99\n")
 
@@ -118,10 +120,14 @@ def test_sigma_is_that_of_its_unit_or_of_all_in_percent(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("c,m,pressure [bar],f,mass [kg],sigma\n2,1,2.4,66,12,0.5\n",
-         "line 2: sigma can be that of frequency_Hz or mass_kg: write its unit"),
-        ("c,m,pressure [bar],f,sigma [kg]\n2,1,2.4,66,0.5\n",
-         "line 2: sigma has the unit of mass_kg, which has no value here"),
+        (
+            "c,m,pressure [bar],f,mass [kg],sigma\n2,1,2.4,66,12,0.5\n",
+            "line 2: sigma can be that of frequency_Hz or mass_kg: write its unit",
+        ),
+        (
+            "c,m,pressure [bar],f,sigma [kg]\n2,1,2.4,66,0.5\n",
+            "line 2: sigma has the unit of mass_kg, which has no value here",
+        ),
         ("", "the file is empty"),
         (b"PK\x03\x04 a workbook", "save the sheet as CSV"),
         ("a,b\n1,2\n", "line 1: no column holds a frequency"),
@@ -145,13 +151,18 @@ def test_sigma_is_that_of_its_unit_or_of_all_in_percent(tmp_path: Path) -> None:
         (PLAIN + "0,0,,240,35\n", r"line 4: \[0,0\] needs a kind, lateral"),
         (PLAIN + "0,0,bouncing,240,35\n", "line 4: kind is 'bouncing', must be lateral"),
         ("label;pressure [bar];f\n2 waves;2,4;66\n", r"line 2: label is '2 waves', must be like"),
-        ("c,m,frequency,pressure [kPa]\n1,0,240,58.5\n2,0,240,79.5\n2,1,240,66.1\n3,0,240,97.6\n",
-         "line 2: the pressure differs from line to line, the frequency hardly; are the columns"),
-        ("m,c,f,pressure [kPa]\n2,0,79.5,240\n3,0,97.6,240\n3,1,102.7,240\n2,1,66.1,240\n",
-         "line 2: most modes have m above c; are the columns c and m swapped"),
+        (
+            "c,m,frequency,pressure [kPa]\n1,0,240,58.5\n2,0,240,79.5\n2,1,240,66.1\n"
+            "3,0,240,97.6\n",
+            "line 2: the pressure differs from line to line, the frequency hardly; are the columns",
+        ),
+        (
+            "m,c,f,pressure [kPa]\n2,0,79.5,240\n3,0,97.6,240\n3,1,102.7,240\n2,1,66.1,240\n",
+            "line 2: most modes have m above c; are the columns c and m swapped",
+        ),
         ("run,c,m,f,pressure [bar]\n1,0,2,99,2.4\n1,0,2,98,2.4\n", r"line 2: \[0,2\] stands twice"),
     ],
-)  # fmt: skip
+)
 def test_mistakes_are_named_with_their_line(tmp_path: Path, text: str | bytes, words: str) -> None:
     with pytest.raises(InputError, match=words) as error:
         read(tmp_path, text)

@@ -25,35 +25,67 @@ def geometry(kind: int = 2411, scale: float = 1.0) -> dict[str, Any]:
     """Eight nodes on a tread, the axle along z."""
     one = np.ones(8, int)
     return {
-        "type": kind, "node_nums": NODES, "def_cs": one, "disp_cs": one, "color": one,
-        "x": scale * 0.39 * np.cos(ANGLES), "y": scale * 0.39 * np.sin(ANGLES),
+        "type": kind,
+        "node_nums": NODES,
+        "def_cs": one,
+        "disp_cs": one,
+        "color": one,
+        "x": scale * 0.39 * np.cos(ANGLES),
+        "y": scale * 0.39 * np.sin(ANGLES),
         "z": scale * 0.06 * np.tile([1.0, -1.0], 4),
-    }  # fmt: skip
+    }
 
 
 def units(length: float = 1.0) -> dict[str, Any]:
-    return {"type": 164, "units_code": 9, "length": length, "force": 1.0, "temp": 1.0,
-            "temp_offset": 273.15}  # fmt: skip
+    return {
+        "type": 164,
+        "units_code": 9,
+        "length": length,
+        "force": 1.0,
+        "temp": 1.0,
+        "temp_offset": 273.15,
+    }
 
 
 def shape(values: np.ndarray, hertz: float = 66.1, number: int = 1) -> dict[str, Any]:
     """A data set 55: complex values (8, 3)."""
     w = 2 * np.pi * hertz
     return {
-        "type": 55, "model_type": 1, "analysis_type": 3, "data_ch": 2, "spec_data_type": 12,
-        "load_case": 1, "mode_n": number, "data_type": 5, "n_data_per_node": 3,
-        "eig": w * (-0.02 + 1j * np.sqrt(1 - 0.02**2)), "node_nums": NODES,
-        "r1": values[:, 0], "r2": values[:, 1], "r3": values[:, 2],
-    }  # fmt: skip
+        "type": 55,
+        "model_type": 1,
+        "analysis_type": 3,
+        "data_ch": 2,
+        "spec_data_type": 12,
+        "load_case": 1,
+        "mode_n": number,
+        "data_type": 5,
+        "n_data_per_node": 3,
+        "eig": w * (-0.02 + 1j * np.sqrt(1 - 0.02**2)),
+        "node_nums": NODES,
+        "r1": values[:, 0],
+        "r2": values[:, 1],
+        "r3": values[:, 2],
+    }
 
 
 def function(data: np.ndarray, f: np.ndarray, node: int = 1, **other: Any) -> dict[str, Any]:
     return {
-        "type": 58, "binary": 0, "func_type": 4, "rsp_node": node, "rsp_dir": 3, "ref_node": 9,
-        "ref_dir": -1, "data": data, "x": f, "ord_data_type": 6, "abscissa_spacing": 1,
-        "abscissa_spec_data_type": 18, "ordinate_spec_data_type": 12,
-        "orddenom_spec_data_type": 13, **other,
-    }  # fmt: skip
+        "type": 58,
+        "binary": 0,
+        "func_type": 4,
+        "rsp_node": node,
+        "rsp_dir": 3,
+        "ref_node": 9,
+        "ref_dir": -1,
+        "data": data,
+        "x": f,
+        "ord_data_type": 6,
+        "abscissa_spacing": 1,
+        "abscissa_spec_data_type": 18,
+        "ordinate_spec_data_type": 12,
+        "orddenom_spec_data_type": 13,
+        **other,
+    }
 
 
 def write(path: Path, *sets: dict[str, Any], double: bool = True) -> Path:
@@ -113,8 +145,9 @@ def test_lengths_are_in_the_unit_of_data_set_164(tmp_path: Path, kind: int) -> N
 
 
 def test_the_axle_is_told_by_the_places_or_asked_for() -> None:
-    nodes = {n: (0.1 * (-1) ** n, 0.39 * np.sin(a), 0.39 * np.cos(a))
-             for n, a in enumerate(ANGLES, 1)}  # fmt: skip
+    nodes = {
+        n: (0.1 * (-1) ** n, 0.39 * np.sin(a), 0.39 * np.cos(a)) for n, a in enumerate(ANGLES, 1)
+    }
     signals = [(n, 1) for n in nodes]
     sensors = sensors_of(signals, nodes)
     assert sensors.directions == pytest.approx(np.tile([0.0, 0.0, 1.0], (8, 1)))
@@ -161,7 +194,7 @@ def test_a_file_cut_off_anywhere_is_refused_with_its_line(tmp_path: Path, binary
         ([function(some(80)[:, 0], np.arange(80.0) - 9)], "must rise from 0 or more, got -9 Hz"),
         ([function(some(80)[:, 0], np.arange(80.0), rsp_dir=5)], "direction is 5, must be 1 to 3"),
     ],
-)  # fmt: skip
+)
 def test_wrong_sets_are_named(tmp_path: Path, sets: list[dict[str, Any]], words: str) -> None:
     for each in sets:
         if each["type"] == 55 and abs(each["eig"]) and words.endswith("-37.8 Hz"):

@@ -17,8 +17,9 @@ pytestmark = pytest.mark.numbers
 LABELS = [Label(c, m) for c in (1, 2, 3, 4) for m in (0, 1)]
 
 
-def value(hertz: float, run: str, label: Label = LABELS[0], member: str = "",
-          sigma: float | None = None) -> Value:  # fmt: skip
+def value(
+    hertz: float, run: str, label: Label = LABELS[0], member: str = "", sigma: float | None = None
+) -> Value:
     return Value("frequency_Hz", label, member, 240.0, 0.0, hertz, sigma, run, "here")
 
 
@@ -31,8 +32,11 @@ def test_sigma_covers_the_truth_from_three_runs(chance: Chance) -> None:
     truth = np.linspace(40, 120, len(LABELS))
     within = []
     for _ in range(200):
-        runs = [value(f * (1 + 0.002 * chance.random.standard_normal()), str(k), label)
-                for k in range(3) for f, label in zip(truth, LABELS, strict=True)]  # fmt: skip
+        runs = [
+            value(f * (1 + 0.002 * chance.random.standard_normal()), str(k), label)
+            for k in range(3)
+            for f, label in zip(truth, LABELS, strict=True)
+        ]
         rows = {row.label: row for row in combined(runs, floor=0.0)}
         z = [(rows[x].value - f) / rows[x].sigma for x, f in zip(LABELS, truth, strict=True)]  # type: ignore[operator]
         within.append([np.mean(np.abs(z) < k) for k in (1, 2)])
@@ -69,8 +73,9 @@ def test_a_doublet_is_one_value_where_a_run_saw_only_one() -> None:
     two = [value(66.0, "1", member="1"), value(66.4, "1", member="2")]
     rows = combined([*two, value(66.1, "2", member="1"), value(66.5, "2", member="2")])
     assert [(row.member, row.value) for row in rows] == [
-        ("1", pytest.approx(66.05)), ("2", pytest.approx(66.45)),
-    ]  # fmt: skip
+        ("1", pytest.approx(66.05)),
+        ("2", pytest.approx(66.45)),
+    ]
     (row,) = combined([*two, value(66.3, "2")])
     assert (row.member, row.value) == ("", pytest.approx(66.25))
 
@@ -85,8 +90,9 @@ def test_a_lone_member_stays_one() -> None:
     assert row.member == ""
 
 
-@pytest.mark.parametrize("runs", [[value(66.0, "1", sigma=40.0)],
-                                  [value(30.0, "1"), value(90.0, "2")]])  # fmt: skip
+@pytest.mark.parametrize(
+    "runs", [[value(66.0, "1", sigma=40.0)], [value(30.0, "1"), value(90.0, "2")]]
+)
 def test_a_sigma_that_no_fit_would_read_is_refused(runs: list[Value]) -> None:
     with pytest.raises(InputError, match=r"sigma of \[1,0\] comes to .* more than 20%"):
         combined(runs)

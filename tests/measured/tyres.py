@@ -23,11 +23,16 @@ HIGHEST = 6
 def modes() -> tuple[Mode, ...]:
     """[0,0] twice, [c,0] and [c,1] to c = 6."""
     case = load_case(CASES / "p235_75r17.yaml")
-    case = with_values(case, {
-        "analysis.highest_harmonic": HIGHEST,
-        **{f"mesh.levels.default.elements.{name}": 3
-           for name in ("crown", "upper_sidewall", "lower_sidewall")},
-    })  # fmt: skip
+    case = with_values(
+        case,
+        {
+            "analysis.highest_harmonic": HIGHEST,
+            **{
+                f"mesh.levels.default.elements.{name}": 3
+                for name in ("crown", "upper_sidewall", "lower_sidewall")
+            },
+        },
+    )
     starts = {name: v.start for name, v in case.case.variables.items()}
     found = paired_labels(Door(case).evaluate(Question(starts)).modes)
     return tuple(m for m in found if m.label.m < 2)
@@ -47,14 +52,22 @@ def layout(
     points = _shape(modes()[0]).points
     R, Z = points.T
     nodes = [int(np.argmax(R - 5 * abs(Z - z))) for z in rng.uniform(-0.075, 0.075, tread)]
-    nodes += [int(np.argmax(rng.choice([-1, 1]) * Z - 5 * abs(R - r)))
-              for r in rng.uniform(0.27, 0.36, side)]  # fmt: skip
-    angles = np.concatenate([
-        (np.arange(n) + 0.25 * rng.standard_normal(n)) / max(n, 1) * 2 * np.pi
-        for n in (tread, side)
-    ])  # fmt: skip
-    rows = [(i, a, k) for i, a in zip(nodes, angles, strict=True) for k in range(3)
-            if rng.uniform() > drop]  # fmt: skip
+    nodes += [
+        int(np.argmax(rng.choice([-1, 1]) * Z - 5 * abs(R - r)))
+        for r in rng.uniform(0.27, 0.36, side)
+    ]
+    angles = np.concatenate(
+        [
+            (np.arange(n) + 0.25 * rng.standard_normal(n)) / max(n, 1) * 2 * np.pi
+            for n in (tread, side)
+        ]
+    )
+    rows = [
+        (i, a, k)
+        for i, a in zip(nodes, angles, strict=True)
+        for k in range(3)
+        if rng.uniform() > drop
+    ]
     where = np.array([[R[i], a, Z[i]] for i, a, _ in rows])
     return Sensors(where, np.eye(3)[[k for *_, k in rows]]), np.array([i for i, *_ in rows])
 

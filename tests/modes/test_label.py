@@ -101,12 +101,7 @@ def test_without_waves_only_a_rigid_belt_is_0_0(motion, label):
 
 
 @settings(max_examples=30, deadline=None)
-@given(
-    c=st.integers(0, 6),
-    m=st.integers(0, 3),
-    phase=st.floats(0, 6.3),
-    size=st.floats(1e-6, 1e6),
-)
+@given(c=st.integers(0, 6), m=st.integers(0, 3), phase=st.floats(0, 6.3), size=st.floats(1e-6, 1e6))
 def test_phase_and_size_of_a_shape_do_not_matter(c, m, phase, size):
     made = shape(c, [ORDERS[m]])
     turned = HarmonicShape(c, NODES, POINTS, made.amplitude * size * np.exp(1j * phase))
@@ -148,10 +143,7 @@ def test_an_overtone_does_not_steal_the_label_however_pure_it_is(order):
 
 
 def test_a_sidewall_mode_below_the_belts_does_not_take_the_label():
-    modes = [
-        mode(40.0, 3, [ORDERS[0]], (0.05,), sidewall=1.0),
-        mode(90.0, 3, [ORDERS[0]]),
-    ]
+    modes = [mode(40.0, 3, [ORDERS[0]], (0.05,), sidewall=1.0), mode(90.0, 3, [ORDERS[0]])]
     assert labels(modes) == [Label(3, 2), Label(3, 0)]
 
 

@@ -122,6 +122,9 @@ def test_section_map(drawn: list[Figure], tmp_path: Path) -> None:
     assert "+21 ± 8" in told and "\N{MINUS SIGN}3 ± 20" in told and "+4.9" in told
     assert "+0 ± 10" in told and "-0" not in told  # no negative nothing
     assert "upper sidewall looks like carcass cords" in told and "ln evidence" in told
-    colours = {tuple(c.get_facecolor()[0].round(3)) for c in figure.axes[0].collections
-               if isinstance(c, PolyCollection)}  # fmt: skip
+    colours = {
+        tuple(c.get_facecolor()[0].round(3))
+        for c in figure.axes[0].collections
+        if isinstance(c, PolyCollection)
+    }
     assert tuple(np.round(pictures.WARM(4.9 / 5), 3)) in colours and len(colours) == 2

@@ -140,8 +140,10 @@ def test_between_rings_far_apart_points_are_added(
 def test_table_and_csv(designs: dict[str, Pressed]) -> None:
     table = rows(designs)
     lines = footprint_csv(table).splitlines()
-    assert lines[0] == ("design,load_N,deflection_m,area_m2,length_m,width_m,mean_pressure_Pa,"
-                        "peak_pressure_Pa,vertical_stiffness_N_per_m")  # fmt: skip
+    assert lines[0] == (
+        "design,load_N,deflection_m,area_m2,length_m,width_m,mean_pressure_Pa,"
+        "peak_pressure_Pa,vertical_stiffness_N_per_m"
+    )
     assert len(lines) == 1 + 9
     assert [float(x) for x in lines[4].split(",")[1:]] == list(table[3].values())[1:]
     console = Console(width=110)

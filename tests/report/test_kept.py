@@ -85,9 +85,13 @@ def test_a_solver_with_nodes_of_its_own(tyre) -> None:
     mesh = section_mesh(case)
     order = generator(1).permutation(len(evaluation.nodes))
     other = type(evaluation)(
-        evaluation.pressure_kPa, evaluation.mass_kg, evaluation.modes, {},
-        np.arange(len(order)), evaluation.displacement[order],
-    )  # fmt: skip
+        evaluation.pressure_kPa,
+        evaluation.mass_kg,
+        evaluation.modes,
+        {},
+        np.arange(len(order)),
+        evaluation.displacement[order],
+    )
 
     def renumbered(mode: Mode, aside: float) -> Mode:
         s = mode.raw.shape

@@ -150,10 +150,14 @@ def test_section_of_linear_elements(tyre, tmp_path, monkeypatch):
 @pytest.mark.parametrize("failed", [(), (3,), range(1, 9)], ids=["none", "one", "all"])
 def test_convergence(tmp_path, failed):
     history = [
-        {"point": k, "objective_Hz": None if k in failed else 3 + 30 / k**2, "start": 1 + k // 5,
-         "values": {"A_belt": 2e-7 * k, "angle": 3.0 - k, "zero": 0.0}}
+        {
+            "point": k,
+            "objective_Hz": None if k in failed else 3 + 30 / k**2,
+            "start": 1 + k // 5,
+            "values": {"A_belt": 2e-7 * k, "angle": 3.0 - k, "zero": 0.0},
+        }
         for k in range(1, 9)
-    ]  # fmt: skip
+    ]
     draw_convergence(tmp_path / "fit.png", history)
     assert 0.01 < ink(tmp_path / "fit.png", 1200, 840, 100_000) < 0.2
 
@@ -163,10 +167,14 @@ def test_convergence_has_numbers_on_its_axes(spread, tmp_path, monkeypatch):
     drawn = []
     monkeypatch.setattr(convergence, "save", lambda figure, path: drawn.append(figure))
     history = [
-        {"point": k, "objective_Hz": 47 * (1 + spread * (k == 1)), "start": 1,
-         "values": {"C10": 1e6 * (1 + spread * (k > 1))}}
+        {
+            "point": k,
+            "objective_Hz": 47 * (1 + spread * (k == 1)),
+            "start": 1,
+            "values": {"C10": 1e6 * (1 + spread * (k > 1))},
+        }
         for k in range(1, 5)
-    ]  # fmt: skip
+    ]
     draw_convergence(tmp_path / "fit.png", history)
     drawn[0].canvas.draw()
     for axes in drawn[0].axes:

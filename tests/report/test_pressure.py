@@ -22,15 +22,20 @@ def rows(labels=LABELS, designs=("initial", "fitted"), pressures=(100.0, 200.0, 
             "design": design,
             "pressure_kPa": p,
             "modes": [
-                {"c": c, "m": m, "kind": kind, "multiplicity": 2 if c else 1,
-                 "frequency_Hz": (30 + 20 * c - 9 * m + k) * (p / 200) ** 0.4,
-                 "d_ln_f_d_ln_p": slope}
+                {
+                    "c": c,
+                    "m": m,
+                    "kind": kind,
+                    "multiplicity": 2 if c else 1,
+                    "frequency_Hz": (30 + 20 * c - 9 * m + k) * (p / 200) ** 0.4,
+                    "d_ln_f_d_ln_p": slope,
+                }
                 for c, m, kind in labels
             ],
         }
         for k, design in enumerate(designs)
         for p in pressures
-    ]  # fmt: skip
+    ]
 
 
 @pytest.fixture
@@ -91,10 +96,21 @@ def test_names_that_would_touch_are_moved_apart():
 def test_table_and_csv():
     given = rows(designs=("initial",))
     found = {
-        "design": "initial", "from_kPa": 100.0, "to_kPa": 320.0,
-        "modes": [{"c": c, "m": m, "kind": kind, "rise_Hz": 12.345, "rise_percent": 59.2,
-                   "curvature": "concave"} for c, m, kind in LABELS],
-    }  # fmt: skip
+        "design": "initial",
+        "from_kPa": 100.0,
+        "to_kPa": 320.0,
+        "modes": [
+            {
+                "c": c,
+                "m": m,
+                "kind": kind,
+                "rise_Hz": 12.345,
+                "rise_percent": 59.2,
+                "curvature": "concave",
+            }
+            for c, m, kind in LABELS
+        ],
+    }
     console = Console(width=110, record=True)
     console.print(sweep_table(given, found))
     text = console.export_text()

@@ -25,19 +25,39 @@ FIT = {
     "initial_objective_Hz": 33.1349,
     "objective_Hz": 8.6031,
     "modes": [
-        {"c": c, "m": m, "kind": kind, "multiplicity": 2 if c else 1, "frequency_Hz": fitted,
-         "initial_Hz": initial, "fitted_Hz": fitted, "target_Hz": target,
-         "deviation_percent": round(100 * (fitted / target - 1), 4)}
+        {
+            "c": c,
+            "m": m,
+            "kind": kind,
+            "multiplicity": 2 if c else 1,
+            "frequency_Hz": fitted,
+            "initial_Hz": initial,
+            "fitted_Hz": fitted,
+            "target_Hz": target,
+            "deviation_percent": round(100 * (fitted / target - 1), 4),
+        }
         for c, m, kind, initial, fitted, target in TABLE_2
     ],
     "variables": {
-        "A_belt": {"initial": 2.11868e-7, "value": 3.64826e-7, "lower": 1e-7, "upper": 1e-5,
-                   "standard_error": 3.64826e-8, "at_bound": False},
-        "odd[bold]name": {"initial": 4.2e-7, "value": 1e-8, "lower": 1e-8, "upper": 1e-5,
-                          "standard_error": None, "at_bound": True},
+        "A_belt": {
+            "initial": 2.11868e-7,
+            "value": 3.64826e-7,
+            "lower": 1e-7,
+            "upper": 1e-5,
+            "standard_error": 3.64826e-8,
+            "at_bound": False,
+        },
+        "odd[bold]name": {
+            "initial": 4.2e-7,
+            "value": 1e-8,
+            "lower": 1e-8,
+            "upper": 1e-5,
+            "standard_error": None,
+            "at_bound": True,
+        },
     },
     "fixed": {"C10": 1e6},
-}  # fmt: skip
+}
 
 
 def lines(table: Table, width: int = 110, terminal: bool = False) -> list[str]:
@@ -92,8 +112,14 @@ def test_csv_to_the_byte():
 
 
 def test_modes_under_load_show_their_symmetry():
-    mode = {"c": 1, "m": 0, "kind": None, "frequency_Hz": 58.754, "multiplicity": 1,
-            "symmetry": "antisymmetric"}  # fmt: skip
+    mode = {
+        "c": 1,
+        "m": 0,
+        "kind": None,
+        "frequency_Hz": 58.754,
+        "multiplicity": 1,
+        "symmetry": "antisymmetric",
+    }
     table = modes_table({"pressure_kPa": 240.0, "load_N": 4000.0, "mass_kg": 12.8, "modes": [mode]})
     text = lines(table)
     assert text[0].strip() == "240 kPa, 4000 N, 12.80 kg"
@@ -125,8 +151,15 @@ def test_a_fit_that_is_far_off_most_modes_asks_for_the_unit(
     off: tuple[float, ...], said: bool
 ) -> None:
     modes = [{"deviation_percent": percent} for percent in off]
-    result = {"moved": True, "converged": True, "variables": {}, "failed_evaluations": 0,
-              "label_margin": 1.0, "modes": modes, "singular_values": [1.0]}  # fmt: skip
+    result = {
+        "moved": True,
+        "converged": True,
+        "variables": {},
+        "failed_evaluations": 0,
+        "label_margin": 1.0,
+        "modes": modes,
+        "singular_values": [1.0],
+    }
     assert any("in Hz" in doubt for doubt in fit_doubts(result)) is said
 
 

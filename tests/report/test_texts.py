@@ -26,9 +26,16 @@ from tyrecal.studies.signature import Signature
 from ..conftest import CASES
 
 LABELS = [
-    Label(0, 0, "axial"), Label(0, 0, "torsional"), Label(1, 1), Label(1, 0), Label(2, 1),
-    Label(2, 0), Label(3, 0), Label(3, 1), Label(4, 0),
-]  # fmt: skip
+    Label(0, 0, "axial"),
+    Label(0, 0, "torsional"),
+    Label(1, 1),
+    Label(1, 0),
+    Label(2, 1),
+    Label(2, 0),
+    Label(3, 0),
+    Label(3, 1),
+    Label(4, 0),
+]
 
 
 def test_a_cut_text_and_an_overprinted_one_are_seen(tmp_path: Path) -> None:
@@ -79,13 +86,18 @@ def test_crowded_lines_over_the_load(designs: tuple[str, ...], tmp_path: Path) -
             "design": design,
             "load_N": load,
             "modes": [
-                {"c": x.c, "m": x.m, "kind": x.kind, "symmetry": symmetry,
-                 "frequency_Hz": 100.0 + k + load / 4000}
+                {
+                    "c": x.c,
+                    "m": x.m,
+                    "kind": x.kind,
+                    "symmetry": symmetry,
+                    "frequency_Hz": 100.0 + k + load / 4000,
+                }
                 for k, (x, symmetry) in enumerate(product(LABELS, ("symmetric", "antisymmetric")))
             ],
         }
         for design, load in product(designs, (0.0, 4000.0))
-    ]  # fmt: skip
+    ]
     draw_load_sweep(tmp_path / "load.png", rows)
 
 
@@ -95,13 +107,18 @@ def test_crowded_lines_over_the_pressure(tmp_path: Path) -> None:
             "design": design,
             "pressure_kPa": kPa,
             "modes": [
-                {"c": x.c, "m": x.m, "kind": x.kind, "frequency_Hz": 90 + kPa / 10 + k / 3,
-                 "d_ln_f_d_ln_p": 0.4 + k / 1000}
+                {
+                    "c": x.c,
+                    "m": x.m,
+                    "kind": x.kind,
+                    "frequency_Hz": 90 + kPa / 10 + k / 3,
+                    "d_ln_f_d_ln_p": 0.4 + k / 1000,
+                }
                 for k, x in enumerate([*LABELS, Label(1, 2)])
             ],
         }
         for design, kPa in product(("initial", "fitted"), (100.0, 320.0))
-    ]  # fmt: skip
+    ]
     draw_pressure_sweep(tmp_path / "pressure.png", rows, {Label(2, 0): 95.0}, 240.0)
 
 

@@ -15,11 +15,19 @@ def fit(**changes: Any) -> dict[str, Any]:
     lateral = {"c": 0, "m": 0, "kind": "axial", "multiplicity": 1, "deviation_percent": -4.0}
     variable = {"initial": 1.0, "value": 2.0, "standard_error": 0.2, "at_bound": False}
     found: dict[str, Any] = {
-        "pressure_kPa": 240.0, "mass_kg": 12.4, "objective_Hz": 3.0, "objective_unit": "Hz",
-        "converged": True, "moved": True, "failed_evaluations": 0, "label_margin": 1.0,
-        "variables": {"A": dict(variable), "B": dict(variable)}, "singular_values": [1.0, 0.5],
-        "modes": [dict(mode), lateral], "starts": [start()],
-    }  # fmt: skip
+        "pressure_kPa": 240.0,
+        "mass_kg": 12.4,
+        "objective_Hz": 3.0,
+        "objective_unit": "Hz",
+        "converged": True,
+        "moved": True,
+        "failed_evaluations": 0,
+        "label_margin": 1.0,
+        "variables": {"A": dict(variable), "B": dict(variable)},
+        "singular_values": [1.0, 0.5],
+        "modes": [dict(mode), lateral],
+        "starts": [start()],
+    }
     return {**found, **changes}
 
 
@@ -61,9 +69,12 @@ def test_sigmas_are_judged_per_degree_of_freedom(objective: float, words: str) -
 
 @pytest.mark.parametrize(
     ("error", "words"),
-    [(0.9, None), (4.0, "hardly determine A: its standard error is 200 %"),
-     (None, "do not determine A: fix it")],
-)  # fmt: skip
+    [
+        (0.9, None),
+        (4.0, "hardly determine A: its standard error is 200 %"),
+        (None, "do not determine A: fix it"),
+    ],
+)
 def test_variables_that_the_data_do_not_determine(error: float | None, words: str | None) -> None:
     result = fit()
     result["variables"]["A"]["standard_error"] = error

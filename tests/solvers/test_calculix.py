@@ -71,9 +71,12 @@ def frd(*blocks: str) -> str:
 
 
 LEFT = {  # file: its content after a run that went well
-    "inflate.dat": MASS, "inflate.frd": frd(block("DISP", STATIC, 0)), "inflate.rout": "state",
-    "modes_1.dat": DAT, "modes_1.frd": frd(block("DISP", REAL, 1), block("DISPI", IMAGINARY, 1)),
-}  # fmt: skip
+    "inflate.dat": MASS,
+    "inflate.frd": frd(block("DISP", STATIC, 0)),
+    "inflate.rout": "state",
+    "modes_1.dat": DAT,
+    "modes_1.frd": frd(block("DISP", REAL, 1), block("DISPI", IMAGINARY, 1)),
+}
 
 STAND_IN = """import sys, time
 from pathlib import Path
@@ -419,8 +422,11 @@ def main_case(**options: object) -> LoadedCase:
     solver = loaded.case.solver.model_copy(update={"name": "calculix", "options": options})
     return LoadedCase(
         loaded.case.model_copy(update={"solver": solver}),
-        loaded.path, loaded.section, loaded.folder, loaded.raw,
-    )  # fmt: skip
+        loaded.path,
+        loaded.section,
+        loaded.folder,
+        loaded.raw,
+    )
 
 
 @pytest.mark.parametrize(
@@ -455,8 +461,11 @@ def test_a_vibration_frequency_is_refused(tmp_path: Path) -> None:
     analysis = case.case.analysis.model_copy(update={"vibration_frequency_Hz": 50.0})
     case = LoadedCase(
         case.case.model_copy(update={"analysis": analysis}),
-        case.path, case.section, case.folder, case.raw,
-    )  # fmt: skip
+        case.path,
+        case.section,
+        case.folder,
+        case.raw,
+    )
     with pytest.raises(DeckRefused, match="vibration_frequency_Hz must be null"):
         Door(case, "calculix", folder=tmp_path).evaluate(Question({}))
 
@@ -505,14 +514,16 @@ def coarse_case(folder: Path) -> Path:
     """A small model of the paper's tyre: half the elements, two diameters."""
     text = (CASES / "p235_75r17.yaml").read_text()
     for old, new in (
-        ("{crown: 8, upper_sidewall: 8, lower_sidewall: 8, bead: 2}",
-         "{crown: 6, upper_sidewall: 6, lower_sidewall: 6, bead: 1}"),
+        (
+            "{crown: 8, upper_sidewall: 8, lower_sidewall: 8, bead: 2}",
+            "{crown: 6, upper_sidewall: 6, lower_sidewall: 6, bead: 1}",
+        ),
         ("rows: [1, 1, 1, 3]", "rows: [1, 1, 1, 1]"),
         ("grading: [1.0, 1.0, 1.0, 0.7]", "grading: null"),
         ("highest_harmonic: 4", "highest_harmonic: 1"),
         ("pressure_kPa: 240.0", "pressure_kPa: 100.0"),
         ("modes_per_harmonic: 2", "modes_per_harmonic: 2"),
-    ):  # fmt: skip
+    ):
         assert old in text
         text = text.replace(old, new)
     text = text[: text.index("targets:")] + text[text.index("solver:") :]
@@ -555,13 +566,17 @@ def test_calculix_agrees_with_the_bundled_solver(case_folder: Path) -> None:
     ("template", "old", "new", "cause"),
     [
         ("sector.inp.j2", "*TIE, NAME", "*NO_SUCH_KEYWORD, NAME", "crashed"),
-        ("sector.inp.j2", "*SOLID SECTION, ELSET={{ solid.set }}, MATERIAL={{ solid.material }}",
-         "*SOLID SECTION, ELSET={{ solid.set }}, MATERIAL=NO_SUCH", "crashed"),
+        (
+            "sector.inp.j2",
+            "*SOLID SECTION, ELSET={{ solid.set }}, MATERIAL={{ solid.material }}",
+            "*SOLID SECTION, ELSET={{ solid.set }}, MATERIAL=NO_SUCH",
+            "crashed",
+        ),
         ("sector.inp.j2", "{{ rubber.C10 | number }}", "nan", "crashed"),
         ("inflate.inp.j2", "PARAMETERS=FIELD", "PARAMETER=FIELD", "crashed"),
         ("diameter.inp.j2", "U\n*END STEP\n", "U\n", "no_results"),
     ],
-)  # fmt: skip
+)
 def test_decks_that_ccx_rejects(
     case_folder: Path, template: str, old: str, new: str, cause: str
 ) -> None:

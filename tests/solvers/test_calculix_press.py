@@ -108,11 +108,17 @@ def test_pressures_stand_where_their_nodes_have_moved(tmp_path: Path) -> None:
         f" -5  {name:8s}    1\n" for name in ("COPEN", "CSLIP1", "CSLIP2", "CPRESS", "CSHEAR1")
     ]
     text = (
-        "    1C\n    2C\n" + lines((1, [0.3, -0.1, -0.2]), (2, [0.3, 0.0, 0.1])) + " -3\n"
-        + " -4  DISP        4    1\n" + lines((1, [0, 0.01, 0.0]), (2, [0, 0, 0.02])) + " -3\n"
-        + " -4  CONTACT     6    1\n" + "".join(heads)
-        + lines((1, [-1e-5, -0.1, -0.2, 3e5, 0]), (2, [0.0, 0, 0, 0, 0])) + " -3\n 9999\n"
-    )  # fmt: skip
+        "    1C\n    2C\n"
+        + lines((1, [0.3, -0.1, -0.2]), (2, [0.3, 0.0, 0.1]))
+        + " -3\n"
+        + " -4  DISP        4    1\n"
+        + lines((1, [0, 0.01, 0.0]), (2, [0, 0, 0.02]))
+        + " -3\n"
+        + " -4  CONTACT     6    1\n"
+        + "".join(heads)
+        + lines((1, [-1e-5, -0.1, -0.2, 3e5, 0]), (2, [0.0, 0, 0, 0, 0]))
+        + " -3\n 9999\n"
+    )
     (tmp_path / "press.frd").write_text(text)
     (patch,) = read_pressures(tmp_path)
     assert patch.tolist() == [[pytest.approx(-0.09), pytest.approx(-0.2), 3e5]]

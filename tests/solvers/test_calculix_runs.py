@@ -52,8 +52,14 @@ CUT_INFLATION, CUT_MODES = INFLATE[: INFLATE.index("*DLOAD")], MODES[: MODES.ind
         ({"modes_2": CUT_MODES}, "no_results", "left no modes_2.dat"),
         ({"modes_2": MODES.replace("*END STEP\n", "")}, "no_results", "left no modes_2.dat"),
         ({"modes_2": MODES.replace("\n2\n", "\n5000\n")}, "crashed", "converged eigenvalues=0"),
-        ({"inflate": INFLATE.replace("240000", "-240000"),
-          "modes_2": MODES.replace("120000", "-120000")}, "unstable", "is unstable"),
+        (
+            {
+                "inflate": INFLATE.replace("240000", "-240000"),
+                "modes_2": MODES.replace("120000", "-120000"),
+            },
+            "unstable",
+            "is unstable",
+        ),
         ({"sector": "*NO SUCH KEYWORD\n" + sector()}, "crashed", "NOSUCHKEYWORD"),
         ({"sector": "*NODE, NO=1\n" + sector()}, "crashed", "NO=1"),
         ({"sector": sector().replace("MATERIAL=RUBBER", "MATERIAL=R")}, "crashed", "code 201"),
@@ -65,7 +71,7 @@ CUT_INFLATION, CUT_MODES = INFLATE[: INFLATE.index("*DLOAD")], MODES[: MODES.ind
         ({"sector": sector(C10=-1e8)}, "unstable", "rubber of C10"),
         ({"modes_2": MODES.replace("STEP=1", "STEP=3")}, "crashed", "code 201"),
     ],
-)  # fmt: skip
+)
 def test_wrong_decks_are_typed_failures(
     tmp_path: Path, changed: dict[str, str], cause: str, words: str
 ) -> None:

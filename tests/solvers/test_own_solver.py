@@ -24,8 +24,16 @@ def site(tmp_path: Path) -> Path:
 
 def test_the_example_gives_the_bundled_solvers_frequencies(site: Path, tmp_path: Path) -> None:
     path = CASES / "p235_75r17.yaml"
-    done = tyrecal(site, "modes", str(path), "--solver", "my-solver", "--json",
-                   "--output", str(tmp_path / "out"))  # fmt: skip
+    done = tyrecal(
+        site,
+        "modes",
+        str(path),
+        "--solver",
+        "my-solver",
+        "--json",
+        "--output",
+        str(tmp_path / "out"),
+    )
     assert done.returncode == 0, done.stderr
     found = [mode["frequency_Hz"] for mode in json.loads(done.stdout)["modes"]]
     case = load_case(path)
@@ -36,9 +44,24 @@ def test_the_example_gives_the_bundled_solvers_frequencies(site: Path, tmp_path:
 @pytest.mark.slow
 def test_its_failure_is_typed_and_kept(site: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
-    done = tyrecal(site, "modes", str(CASES / "p235_75r17.yaml"), "--solver", "my-solver",
-                   "--output", str(out), "--pressure-kPa", "1900", "--set", "A_carcass=1e-8",
-                   "--set", "C10=1e5", "--mesh", "coarse", "--allow-unusual")  # fmt: skip
+    done = tyrecal(
+        site,
+        "modes",
+        str(CASES / "p235_75r17.yaml"),
+        "--solver",
+        "my-solver",
+        "--output",
+        str(out),
+        "--pressure-kPa",
+        "1900",
+        "--set",
+        "A_carcass=1e-8",
+        "--set",
+        "C10=1e5",
+        "--mesh",
+        "coarse",
+        "--allow-unusual",
+    )
     assert done.returncode == 3
     assert "inflation stopped at" in done.stderr and "Traceback" not in done.stderr
     (kept,) = (out / "runs").iterdir()
@@ -49,9 +72,22 @@ def test_its_failure_is_typed_and_kept(site: Path, tmp_path: Path) -> None:
 def test_its_fit_needs_no_gradients(site: Path, tmp_path: Path) -> None:
     """Two free variables by finite differences, one of them already at its optimum."""
     out = tmp_path / "out"
-    done = tyrecal(site, "fit", str(CASES / "p235_75r17.yaml"), "--solver", "my-solver",
-                   "--fix", "A_belt", "--fix", "A_carcass", "--no-pictures", "--mesh", "coarse",
-                   "--output", str(out))  # fmt: skip
+    done = tyrecal(
+        site,
+        "fit",
+        str(CASES / "p235_75r17.yaml"),
+        "--solver",
+        "my-solver",
+        "--fix",
+        "A_belt",
+        "--fix",
+        "A_carcass",
+        "--no-pictures",
+        "--mesh",
+        "coarse",
+        "--output",
+        str(out),
+    )
     assert done.returncode == 0, done.stderr
     fit = json.loads((out / "fit.json").read_text())
     assert fit["converged"] and fit["objective_Hz"] < 0.5 * fit["initial_objective_Hz"]

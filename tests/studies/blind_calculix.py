@@ -83,12 +83,14 @@ def training(count: int) -> list[dict[str, float]]:
     low, high = PRESSURES_kPa
     return [
         {
-            **{name: value * float(np.exp(BOX * (2 * u - 1)))
-               for (name, value), u in zip(start.items(), p[:3], strict=True)},
+            **{
+                name: value * float(np.exp(BOX * (2 * u - 1)))
+                for (name, value), u in zip(start.items(), p[:3], strict=True)
+            },
             "pressure_kPa": float(low + (high - low) * p[3]),
         }
         for p in points
-    ]  # fmt: skip
+    ]
 
 
 def common_problem(case: LoadedCase, faces_at: frozenset[str] = frozenset()) -> LoadedCase:
@@ -203,8 +205,16 @@ def again() -> None:
         if entry["about"] == "train":
             made = with_values(case, entry["values"])
         else:
-            truth = Truth("", "", entry["law"], entry["size"], entry["variables"],
-                          entry["constants"], 0, False)  # fmt: skip
+            truth = Truth(
+                "",
+                "",
+                entry["law"],
+                entry["size"],
+                entry["variables"],
+                entry["constants"],
+                0,
+                False,
+            )
             made = tyre(truth, case, found, entry["pressure_kPa"], laws[entry["law"]])
         entry["common"] = bundled(made, targets(made))[0]
     RECORD.write_text("".join(json.dumps(e) + "\n" for e in entries), encoding="utf-8")
@@ -242,10 +252,11 @@ def fitted(runs: Runs) -> dict[str, Array]:
     """a (5,) by mode."""
     q = np.array([features(e["values"], e["values"]["pressure_kPa"]) for e in runs])
     return {
-        key: np.linalg.lstsq(q, np.array([e["calculix"][key] - e["common"][key] for e in runs]),
-                             rcond=None)[0]
+        key: np.linalg.lstsq(
+            q, np.array([e["calculix"][key] - e["common"][key] for e in runs]), rcond=None
+        )[0]
         for key in runs[0]["calculix"]
-    }  # fmt: skip
+    }
 
 
 class EmulatedCalculix:
@@ -300,10 +311,11 @@ def table() -> None:
             print(f"{where} | {e['failed']} | |")
             continue
         off = {
-            key: e["calculix"][key] - e["common"][key]
+            key: e["calculix"][key]
+            - e["common"][key]
             - features(e["variables"], e["pressure_kPa"]) @ a[key]
             for key in a
-        }  # fmt: skip
+        }
         worst = max(off, key=lambda key: abs(off[key]))
         print(f"{where} | {100 * off[worst]:+.4f} | {worst} |")
 

@@ -67,10 +67,12 @@ def errors(folder: Path, trials: Sequence[Scored]) -> dict[str, Array]:
             for label in labels
             if (hertz := truth["held_out"].get(str(label)))
         }
-        found[own.kind].append([
-            _rms(ruler, y[modal], places[modal], out, effects)
-            for effects in ({}, {key: told["parameter"]["value"]})
-        ])  # fmt: skip
+        found[own.kind].append(
+            [
+                _rms(ruler, y[modal], places[modal], out, effects)
+                for effects in ({}, {key: told["parameter"]["value"]})
+            ]
+        )
     return {kind: np.array(rows) for kind, rows in found.items()}
 
 

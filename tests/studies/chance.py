@@ -56,13 +56,20 @@ def main(seeds: int, first: int, only: list[str]) -> int:
             print(out.getvalue(), file=sys.stderr, flush=True)
     print(f"| test | of {seeds} runs failed | claimed | seen |\n|---|---|---|---|")
     for name in names:
-        claims = [(low, high, *total) for (n, _, low, high), total in record.seen.items()
-                  if n == name]  # fmt: skip
+        claims = [
+            (low, high, *total) for (n, _, low, high), total in record.seen.items() if n == name
+        ]
         bounds = [clopper_pearson(hit, count) for _, _, hit, count in claims]
-        print(f"| {name} | {len(set(record.failed[name]))} |",
-              "; ".join(f"{low:g} to {high:g}" for low, high, *_ in claims), "|",
-              "; ".join(f"{hit} of {count}: {a:.4f} to {b:.4f}" for (_, _, hit, count), (a, b)
-                        in zip(claims, bounds, strict=True)), "|")  # fmt: skip
+        print(
+            f"| {name} | {len(set(record.failed[name]))} |",
+            "; ".join(f"{low:g} to {high:g}" for low, high, *_ in claims),
+            "|",
+            "; ".join(
+                f"{hit} of {count}: {a:.4f} to {b:.4f}"
+                for (_, _, hit, count), (a, b) in zip(claims, bounds, strict=True)
+            ),
+            "|",
+        )
     failures, runs = (
         sum(len(set(each)) for each in record.failed.values()),
         sum(record.runs.values()),

@@ -33,8 +33,9 @@ def variants(case: LoadedCase) -> dict[str, LoadedCase]:
     """The case with the refined mesh, with coarser ones, and with linear elements."""
     mesh = case.case.mesh
     default = mesh.levels["default"]
-    coarse = Level(elements={k: max(1, v * 3 // 4) for k, v in default.elements.items()},
-                   rows=[1, 1, 1, 2])  # fmt: skip
+    coarse = Level(
+        elements={k: max(1, v * 3 // 4) for k, v in default.elements.items()}, rows=[1, 1, 1, 2]
+    )
     thick = Level(elements=default.elements, rows=[1, 1, 1, 2])
     levels = {**mesh.levels, "coarse": coarse, "thick": thick}
     changed = {
@@ -44,10 +45,14 @@ def variants(case: LoadedCase) -> dict[str, LoadedCase]:
         "linear elements, refined": {"level": "refined", "element": "CGAX4R"},
     }
     return {
-        name: replace(case, case=case.case.model_copy(
-            update={"mesh": mesh.model_copy(update={"levels": levels, **update})}))
+        name: replace(
+            case,
+            case=case.case.model_copy(
+                update={"mesh": mesh.model_copy(update={"levels": levels, **update})}
+            ),
+        )
         for name, update in changed.items()
-    }  # fmt: skip
+    }
 
 
 def answer(case: LoadedCase) -> Answer:

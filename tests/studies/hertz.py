@@ -27,12 +27,14 @@ def coarse_case(folder: Path) -> Path:
     """The main case on a mesh that the bundled solver presses in seconds."""
     text = (CASES / "p235_75r17.yaml").read_text()
     for old, new in (
-        ("{crown: 8, upper_sidewall: 8, lower_sidewall: 8, bead: 2}",
-         "{crown: 4, upper_sidewall: 3, lower_sidewall: 3, bead: 1}"),
+        (
+            "{crown: 8, upper_sidewall: 8, lower_sidewall: 8, bead: 2}",
+            "{crown: 4, upper_sidewall: 3, lower_sidewall: 3, bead: 1}",
+        ),
         ("rows: [1, 1, 1, 3] ", "rows: [1, 1, 1, 1] "),
         ("grading: [1.0, 1.0, 1.0, 0.7]", "grading: [1.0, 1.0, 1.0, 1.0]"),
         ("\nvariables:", "\nroad: {element_angles_deg: [6, 6, 6, 12, 30, 120]}\n\nvariables:"),
-    ):  # fmt: skip
+    ):
         assert text.count(old) == 1
         text = text.replace(old, new)
     shutil.copy(CASES / "p235_75r17.csv", folder)

@@ -82,12 +82,18 @@ def main(files: int, seed: int) -> int:
     with tempfile.TemporaryDirectory() as name:
         for i in range(files):
             values, low, high = drawn(np.random.default_rng([seed, i]))
-            np.savez(Path(name) / f"{i:04}", f=values.frequency_Hz, H=values.values,
-                     points=values.points, band=[low, high])  # fmt: skip
+            np.savez(
+                Path(name) / f"{i:04}",
+                f=values.frequency_Hz,
+                H=values.values,
+                points=values.points,
+                band=[low, high],
+            )
         first = None
         for kernel, threads, shaken in [
-            *((k, n, "") for k in KERNELS for n in THREADS), (KERNELS[1], 1, "shaken")
-        ]:  # fmt: skip
+            *((k, n, "") for k in KERNELS for n in THREADS),
+            (KERNELS[1], 1, "shaken"),
+        ]:
             done = run([__file__, "--child", name, shaken], kernel, threads)
             if done.returncode:
                 print(f"{kernel}: {done.stderr.strip()[-300:]}")
@@ -97,9 +103,12 @@ def main(files: int, seed: int) -> int:
             count, off = compared(first, here)
             differ += count
             modes = sum(map(len, here))
-            print(f"{kernel:9} {threads} {shaken:6}: {modes} modes in {files} files,"
-                  f" {sum(not each for each in here)} refused; {count} files differ,"
-                  f" frequencies by {off:.1e} sigma at most", flush=True)  # fmt: skip
+            print(
+                f"{kernel:9} {threads} {shaken:6}: {modes} modes in {files} files,"
+                f" {sum(not each for each in here)} refused; {count} files differ,"
+                f" frequencies by {off:.1e} sigma at most",
+                flush=True,
+            )
     return differ
 
 

@@ -66,9 +66,13 @@ def rubbish(out: Path) -> bool:
 
 
 def stopped(
-    out: Path, arguments: list[str], how: int, all_of_them: bool, chance: random.Random,
+    out: Path,
+    arguments: list[str],
+    how: int,
+    all_of_them: bool,
+    chance: random.Random,
     seconds: float,
-) -> tuple[float, str]:  # fmt: skip
+) -> tuple[float, str]:
     """Start a fit and signal it within ``seconds``; the moment, and what it did wrong."""
     while True:
         shutil.rmtree(out, ignore_errors=True)

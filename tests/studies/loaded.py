@@ -15,10 +15,12 @@ def coarse_case(folder: Path) -> Path:
     text = "\n".join(kept) + "\n"
     for old, new in (
         ("highest_harmonic: 4", "highest_harmonic: 2"),
-        ("{crown: 4, upper_sidewall: 3, lower_sidewall: 3, bead: 1}",
-         "{crown: 3, upper_sidewall: 2, lower_sidewall: 2, bead: 1}"),
+        (
+            "{crown: 4, upper_sidewall: 3, lower_sidewall: 3, bead: 1}",
+            "{crown: 3, upper_sidewall: 2, lower_sidewall: 2, bead: 1}",
+        ),
         ("[6, 6, 6, 12, 30, 120]", "[6, 6, 8, 160]"),
-    ):  # fmt: skip
+    ):
         assert text.count(old) == 1
         text = text.replace(old, new)
     path.write_text(text)

@@ -121,8 +121,9 @@ def accelerances(
     for mode, ratio in zip(modes, ratios, strict=True):
         wk = 2 * np.pi * mode.frequency_Hz * common * (1 + REPEAT * rng.standard_normal())
         force = members(mode, driven, angle) @ direction
-        phi = np.array([s.directions[k] @ members(mode, s.node, s.point[1]).T @ force
-                        for s, k in signals])  # fmt: skip
+        phi = np.array(
+            [s.directions[k] @ members(mode, s.node, s.point[1]).T @ force for s, k in signals]
+        )
         H += np.outer(phi, -(w**2) / (wk**2 - w**2 + 2j * ratio * w * wk))
     H *= 1 + GAIN * rng.standard_normal((len(signals), 1))
     size = NOISE * np.sqrt(np.mean(np.abs(H) ** 2) / 2)
@@ -136,24 +137,51 @@ def geometry(places: list[Sensor]) -> list[dict]:
     numbers = np.array([s.number for s in places])
     whole = np.ones(len(places), int)
     return [
-        pyuff.prepare_164(units_code=5, units_description="mm (milli newton)", temp_mode=1,
-                          length=1e3, force=1e3, temp=1.0, temp_offset=273.15),
-        {"type": 2411, "node_nums": numbers, "def_cs": whole, "disp_cs": whole, "color": whole,
-         "x": 1e3 * R * np.sin(angle), "y": 1e3 * Z, "z": 1e3 * R * np.cos(angle)},
-        pyuff.prepare_82(trace_num=1, n_nodes=9, color=1, id="tread",
-                         nodes=np.array([1, 2, 3, 4, 5, 6, 7, 8, 1])),
-    ]  # fmt: skip
+        pyuff.prepare_164(
+            units_code=5,
+            units_description="mm (milli newton)",
+            temp_mode=1,
+            length=1e3,
+            force=1e3,
+            temp=1.0,
+            temp_offset=273.15,
+        ),
+        {
+            "type": 2411,
+            "node_nums": numbers,
+            "def_cs": whole,
+            "disp_cs": whole,
+            "color": whole,
+            "x": 1e3 * R * np.sin(angle),
+            "y": 1e3 * Z,
+            "z": 1e3 * R * np.cos(angle),
+        },
+        pyuff.prepare_82(
+            trace_num=1, n_nodes=9, color=1, id="tread", nodes=np.array([1, 2, 3, 4, 5, 6, 7, 8, 1])
+        ),
+    ]
 
 
 def function(response: tuple[int, int], values: Array, title: str) -> dict:
     """A data set 58: an accelerance in single precision."""
     return {
-        "type": 58, "binary": 0, "func_type": 4, "rsp_node": response[0], "rsp_dir": response[1],
-        "ref_node": 99, "ref_dir": 1, "data": values, "x": FREQUENCIES, "ord_data_type": 5,
-        "id1": title, "id2": "synthetic: no such test took place",
-        "abscissa_spacing": 1, "abscissa_spec_data_type": 18, "ordinate_spec_data_type": 12,
+        "type": 58,
+        "binary": 0,
+        "func_type": 4,
+        "rsp_node": response[0],
+        "rsp_dir": response[1],
+        "ref_node": 99,
+        "ref_dir": 1,
+        "data": values,
+        "x": FREQUENCIES,
+        "ord_data_type": 5,
+        "id1": title,
+        "id2": "synthetic: no such test took place",
+        "abscissa_spacing": 1,
+        "abscissa_spec_data_type": 18,
+        "ordinate_spec_data_type": 12,
         "orddenom_spec_data_type": 13,
-    }  # fmt: skip
+    }
 
 
 def write_functions(folder: Path, rng: np.random.Generator) -> None:
@@ -193,14 +221,26 @@ def write_shapes(folder: Path, rng: np.random.Generator) -> None:
             hertz = mode.frequency_Hz * (1 + SPLIT * (half - 0.5 * (mode.label.c > 0)))
             hertz *= 1 + REPEAT * rng.standard_normal()
             w = 2 * np.pi * hertz
-            sets.append({
-                "type": 55, "model_type": 1, "analysis_type": 3, "data_ch": 2, "load_case": 1,
-                "spec_data_type": 12, "mode_n": number, "data_type": 5, "n_data_per_node": 3,
-                "eig": -ratio * w + 1j * w * np.sqrt(1 - ratio**2),
-                "node_nums": np.array([s.number for s in places]),
-                "r1": u[:, 0], "r2": u[:, 1], "r3": u[:, 2],
-                "id1": "P235/75R17, 200 kPa", "id2": "synthetic: no such test took place",
-            })  # fmt: skip
+            sets.append(
+                {
+                    "type": 55,
+                    "model_type": 1,
+                    "analysis_type": 3,
+                    "data_ch": 2,
+                    "load_case": 1,
+                    "spec_data_type": 12,
+                    "mode_n": number,
+                    "data_type": 5,
+                    "n_data_per_node": 3,
+                    "eig": -ratio * w + 1j * w * np.sqrt(1 - ratio**2),
+                    "node_nums": np.array([s.number for s in places]),
+                    "r1": u[:, 0],
+                    "r2": u[:, 1],
+                    "r3": u[:, 2],
+                    "id1": "P235/75R17, 200 kPa",
+                    "id2": "synthetic: no such test took place",
+                }
+            )
     path = folder / "p235_75r17_200kPa_shapes.uff"
     path.unlink(missing_ok=True)
     pyuff.UFF(str(path)).write_sets(sets, mode="overwrite")

@@ -52,9 +52,14 @@ from tests.studies.mutation import Mutant, exchange, functions, mutants_of  # no
 RECORD = ROOT / "tests" / "benchmarks" / "mutants.jsonl"
 PLACE = Path(tempfile.gettempdir()) / "mutants"
 QUOTA = {  # lines of every 200
-    "solvers/bundled": 97, "solvers/calculix": 13, "tyrecal/fit": 23, "tyrecal/diagnose": 26,
-    "tyrecal/modes": 13, "tyrecal/evaluate": 13, "tyrecal/measured": 15,
-}  # fmt: skip
+    "solvers/bundled": 97,
+    "solvers/calculix": 13,
+    "tyrecal/fit": 23,
+    "tyrecal/diagnose": 26,
+    "tyrecal/modes": 13,
+    "tyrecal/evaluate": 13,
+    "tyrecal/measured": 15,
+}
 NEW = {"solvers/calculix": "tests/solvers/"}  # where an area's tests are; else tests/AREA/
 PROCESSES = {  # tests whose work happens in processes that `cover` does not see into
     "solvers/calculix/": ["tests/solvers/test_calculix_runs.py"],
@@ -208,8 +213,10 @@ class Runner:
     def pytest_runtestloop(self, session: pytest.Session) -> bool:
         self.imports.stop()
         data = self.imports.get_data()
-        self.imported = {str(Path(file).resolve().relative_to(self.tree.resolve())):
-                         set(data.lines(file) or ()) for file in data.measured_files()}  # fmt: skip
+        self.imported = {
+            str(Path(file).resolve().relative_to(self.tree.resolve())): set(data.lines(file) or ())
+            for file in data.measured_files()
+        }
         cover = Cover(self.tree)
         self.items = {
             item.nodeid: item
@@ -248,11 +255,18 @@ class Runner:
                     ended, code = os.waitpid(process, os.WNOHANG)
                     if ended:
                         del busy[process]
-                        row = {"commit": self.commit, "seed": self.given.seed, "number": number,
-                               "file": mutant.file, "line": mutant.line, "kind": mutant.kind,
-                               "old": mutant.old[:200], "new": mutant.new[:200],
-                               "budget": self.given.budget,
-                               **outcome(slot, process, code, began)}  # fmt: skip
+                        row = {
+                            "commit": self.commit,
+                            "seed": self.given.seed,
+                            "number": number,
+                            "file": mutant.file,
+                            "line": mutant.line,
+                            "kind": mutant.kind,
+                            "old": mutant.old[:200],
+                            "new": mutant.new[:200],
+                            "budget": self.given.budget,
+                            **outcome(slot, process, code, began),
+                        }
                         with self.given.record.open("a") as out:
                             out.write(json.dumps(row) + "\n")
                         told = number, mutant.file, mutant.line, row["outcome"], row["by"]

@@ -49,22 +49,69 @@ MEMORY = 4_000_000_000  # bytes of address space
 CODES = {0, 2, 3, 4, 5}
 BATCH = 20  # trials of one forked process
 NUMBERS = ["0", "-1", "1e300", "-1e-300", "1e999", "NaN", ".inf", "9" * 400, "1:30", "0x1F", "1_0"]
-WORDS = ["", "~", "\x1b]0;x\x07", "\u202e", "é", "\x00", "../x", "/etc/passwd", "a" * 5000, "%YAML",
-         "*alias", "&anchor", "!!python/object:os.system", "{{ 1 }}", "\r\n", "\t", "[" * 300,
-         "*INCLUDE, INPUT=/etc/passwd", "null", "true", "''", "- ", ": ", ","]  # fmt: skip
-VALUES: list[Any] = [None, True, 0, -1, 1e300, float("nan"), float("inf"), 10**400, "", "x",
-                     "\x1b[31m", [], {}, [[]], [None], {"a": {}}, "9" * 3000, -0.0, 1e-320,
-                     [1e300] * 3]  # fmt: skip
+WORDS = [
+    "",
+    "~",
+    "\x1b]0;x\x07",
+    "\u202e",
+    "é",
+    "\x00",
+    "../x",
+    "/etc/passwd",
+    "a" * 5000,
+    "%YAML",
+    "*alias",
+    "&anchor",
+    "!!python/object:os.system",
+    "{{ 1 }}",
+    "\r\n",
+    "\t",
+    "[" * 300,
+    "*INCLUDE, INPUT=/etc/passwd",
+    "null",
+    "true",
+    "''",
+    "- ",
+    ": ",
+    ",",
+]
+VALUES: list[Any] = [
+    None,
+    True,
+    0,
+    -1,
+    1e300,
+    float("nan"),
+    float("inf"),
+    10**400,
+    "",
+    "x",
+    "\x1b[31m",
+    [],
+    {},
+    [[]],
+    [None],
+    {"a": {}},
+    "9" * 3000,
+    -0.0,
+    1e-320,
+    [1e300] * 3,
+]
 
 
 NUMBER = re.compile(r"(?<=[ \[])-?\d+(?:\.\d*)?(?:[eE][+-]?\d+)?(?=[ ,\]}\n])")
 WITH_MORE = (  # numbers that count, and no others
-    (r" *#.*", ""), (r"^(name|  source): .*", r"\1: none"), (r"^uncertainties:(?s:.*?)^(?=\S)", ""),
+    (r" *#.*", ""),
+    (r"^(name|  source): .*", r"\1: none"),
+    (r"^uncertainties:(?s:.*?)^(?=\S)", ""),
     (r"(frequency_Hz: [\d.]+)}", r"\1, sigma_Hz: 0.4, weight: 1.5}"),
     (r"(vibration_frequency_Hz:) null", r"\1 60.0"),
-    (r"\Z", "\nroad: {friction: 0.8, elastic_slip_m: 2.0e-4, loads_N: [2000.0, 4000.0]}"
-             "\neffects: {bead_filler: 0.5, tread_density: 0.1, rim_width: 1.0e-3}\n"),
-)  # fmt: skip
+    (
+        r"\Z",
+        "\nroad: {friction: 0.8, elastic_slip_m: 2.0e-4, loads_N: [2000.0, 4000.0]}"
+        "\neffects: {bead_filler: 0.5, tread_density: 0.1, rim_width: 1.0e-3}\n",
+    ),
+)
 
 
 class Slow(BaseException):
@@ -133,8 +180,12 @@ def extreme(text: str, chance: Random) -> str:
 def sane(result: Any) -> None:
     """Raises ValueError where a result holds what no tyre has."""
     told = json.dumps(result)
-    for name, low, high in (("mass_kg", 0.1, 1e3), ("frequency_Hz", 1.0, 1e5),
-                            ("area_m2", 1e-6, 1.0), ("deflection_m", 0.0, 1.0)):  # fmt: skip
+    for name, low, high in (
+        ("mass_kg", 0.1, 1e3),
+        ("frequency_Hz", 1.0, 1e5),
+        ("area_m2", 1e-6, 1.0),
+        ("deflection_m", 0.0, 1.0),
+    ):
         for value in map(float, re.findall(rf'"{name}": ([^,}}\n]+)', told)):
             if not low <= value <= high:
                 raise ValueError(f"silent nonsense: {name} = {value:g}")
@@ -251,9 +302,19 @@ class Kinds:
         """A results folder told on a page, or written to by a study."""
         folder = Path(shutil.copytree(self.base / "folders", here / "out"))
         if chance.random() < 0.25:
-            names = ("runs", "previous", "record", ".new-x", ".lock", "modes.inp", "report.html",
-                     ".report.html.partial", "diagnosis.md", "diagnosis.json",
-                     "footprint.json")  # fmt: skip
+            names = (
+                "runs",
+                "previous",
+                "record",
+                ".new-x",
+                ".lock",
+                "modes.inp",
+                "report.html",
+                ".report.html.partial",
+                "diagnosis.md",
+                "diagnosis.json",
+                "footprint.json",
+            )
             odd(folder / chance.choice(names), self.outside, chance)
         else:
             files = sorted(path for path in folder.iterdir() if path.is_file())
@@ -394,8 +455,13 @@ def trials(kinds: Kinds, kind: str, numbers: list[int], seed: int) -> Iterator[d
                 yield json.loads(line)
         _, status = os.waitpid(process, 0)
         if status:  # killed in the middle of one
-            yield {"kind": kind, "number": waiting.pop(0), "code": -1, "seconds": WALL_S,
-                   "fault": f"killed, status {status}"}  # fmt: skip
+            yield {
+                "kind": kind,
+                "number": waiting.pop(0),
+                "code": -1,
+                "seconds": WALL_S,
+                "fault": f"killed, status {status}",
+            }
 
 
 def main() -> int:
@@ -428,8 +494,10 @@ def main() -> int:
         codes = Counter(each["code"] for each in own)
         slowest = max((each["seconds"] for each in own), default=0.0)
         faults = sum(bool(each["fault"]) for each in own)
-        print(f"{kind}: {len(own)}, codes {dict(sorted(codes.items()))}, slowest {slowest:g} s,"
-              f" wrong {faults}")  # fmt: skip
+        print(
+            f"{kind}: {len(own)}, codes {dict(sorted(codes.items()))}, slowest {slowest:g} s,"
+            f" wrong {faults}"
+        )
     return int(any(each["fault"] for each in done))
 
 

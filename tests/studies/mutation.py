@@ -11,13 +11,29 @@ from dataclasses import dataclass
 from types import CodeType, FunctionType
 from typing import Any
 
-OPERATORS = {ast.Add: "-", ast.Sub: "+", ast.Mult: "/", ast.Div: "*", ast.Pow: "*",
-             ast.FloorDiv: "/", ast.Mod: "//", ast.BitAnd: "|", ast.BitOr: "&"}  # fmt: skip
+OPERATORS = {
+    ast.Add: "-",
+    ast.Sub: "+",
+    ast.Mult: "/",
+    ast.Div: "*",
+    ast.Pow: "*",
+    ast.FloorDiv: "/",
+    ast.Mod: "//",
+    ast.BitAnd: "|",
+    ast.BitOr: "&",
+}
 COMPARISONS = {
-    ast.Lt: ("<=", ">"), ast.LtE: ("<", ">"), ast.Gt: (">=", "<"), ast.GtE: (">", "<"),
-    ast.Eq: ("!=",), ast.NotEq: ("==",), ast.Is: ("is not",), ast.IsNot: ("is",),
-    ast.In: ("not in",), ast.NotIn: ("in",),
-}  # fmt: skip
+    ast.Lt: ("<=", ">"),
+    ast.LtE: ("<", ">"),
+    ast.Gt: (">=", "<"),
+    ast.GtE: (">", "<"),
+    ast.Eq: ("!=",),
+    ast.NotEq: ("==",),
+    ast.Is: ("is not",),
+    ast.IsNot: ("is",),
+    ast.In: ("not in",),
+    ast.NotIn: ("in",),
+}
 PAIRS = "min max, minimum maximum, any all, sin cos, real imag, argmin argmax, floor ceil"
 NAMES = {a: b for pair in PAIRS.split(", ") for a, b in (pair.split(), pair.split()[::-1])}
 
@@ -143,8 +159,9 @@ def exchange(known: list[FunctionType], before: bytes, after: bytes) -> bool:
     """Give the functions of an imported module, wherever they are referred to, the code of
     another source; False where there was none to exchange."""
     old, new = (functions_of(compile(text, "", "exec")) for text in (before, after))
-    place = {(name, code.co_firstlineno): i for name, some in old.items()
-             for i, code in enumerate(some)}  # fmt: skip
+    place = {
+        (name, code.co_firstlineno): i for name, some in old.items() for i, code in enumerate(some)
+    }
     exchanged = False
     for function in known:
         name, code = function.__code__.co_qualname, function.__code__

@@ -77,8 +77,11 @@ def test_both_designs_and_what_they_say() -> None:
     assert told == ["initial", "fitted"]
     result = footprint_result(designs, LOADS, outcomes, {name: MESH for name in designs})
     assert [(row["design"], row["load_N"]) for row in result["rows"]] == [
-        ("initial", 500), ("initial", 4000), ("fitted", 500), ("fitted", 4000)
-    ]  # fmt: skip
+        ("initial", 500),
+        ("initial", 4000),
+        ("fitted", 500),
+        ("fitted", 4000),
+    ]
     assert result["failed"] == [] and result["pressure_kPa"] == {"initial": 240, "fitted": 240}
     found = result["findings"]
     ratio = 2 ** (2 * 0.05)
@@ -93,9 +96,11 @@ def test_both_designs_and_what_they_say() -> None:
 
 @pytest.mark.parametrize(
     ("areas", "words"),
-    [((1.1, 0.9, 1.2), "at all loads but 2000 N: +10.0 % at 1000 N, -10.0 % at 2000 N"),
-     ((1.0, 0.9, 0.8), "at no load: +0.0 % at 1000 N")],
-)  # fmt: skip
+    [
+        ((1.1, 0.9, 1.2), "at all loads but 2000 N: +10.0 % at 1000 N, -10.0 % at 2000 N"),
+        ((1.0, 0.9, 0.8), "at no load: +0.0 % at 1000 N"),
+    ],
+)
 def test_areas_that_do_not_grow_are_said(areas: tuple[float, ...], words: str) -> None:
     rows = [
         {"design": design, "load_N": load, "area_m2": area, "mean_pressure_Pa": 240e3}
@@ -107,8 +112,10 @@ def test_areas_that_do_not_grow_are_said(areas: tuple[float, ...], words: str) -
     assert found["words"][1].endswith("1.00 of the inflation pressure, within the usual 0.8 to 1.6")
     assert "outside the usual 0.8 to 1.6 at 1000 N (2.00), 2000 N" in found["words"][2]
     assert findings(rows[:3], {"initial": 0.0}) == {
-        "fitted_over_initial": [], "mean_over_inflation": {}, "words": []
-    }  # fmt: skip
+        "fitted_over_initial": [],
+        "mean_over_inflation": {},
+        "words": [],
+    }
 
 
 def test_a_load_out_of_reach_keeps_those_below() -> None:
@@ -117,8 +124,14 @@ def test_a_load_out_of_reach_keeps_those_below() -> None:
     assert isinstance(pressed, Pressed) and pressed.failed is not None
     assert len(pressed.footprints) == 1 and pressed.failed.cause == "no_equilibrium"
     result = footprint_result({"initial": START}, LOADS, outcomes, {"initial": MESH})
-    assert result["failed"] == [{"design": "initial", "load_N": 4000, "cause": "no_equilibrium",
-                                 "words": "the rim is on the road at 3000 N"}]  # fmt: skip
+    assert result["failed"] == [
+        {
+            "design": "initial",
+            "load_N": 4000,
+            "cause": "no_equilibrium",
+            "words": "the rim is on the road at 3000 N",
+        }
+    ]
     (failed,) = press(door(100.0), {"initial": START}, LOADS).values()
     assert isinstance(failed, EvaluationFailed) and "rim" in failed.words
 

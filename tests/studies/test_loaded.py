@@ -60,10 +60,13 @@ def test_the_light_load_is_nearer_to_none(tyre: LoadedTyre) -> None:
     for member in none:
         assert none[member] < light[member] * 1.003 and light[member] < heavy[member] * 1.005
     first, then = (
-        sum(abs(table[Member(Label(c, 1), s)] - none[Member(Label(c, 1), s)])
-            for c in (1, 2) for s in SYMMETRIES)
+        sum(
+            abs(table[Member(Label(c, 1), s)] - none[Member(Label(c, 1), s)])
+            for c in (1, 2)
+            for s in SYMMETRIES
+        )
         for table in (light, heavy)
-    )  # fmt: skip
+    )
     assert first < then
 
 

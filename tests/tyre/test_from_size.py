@@ -21,11 +21,28 @@ from tyrecal.tyre.section import Section, SectionError, fill_lines, read_section
 from tyrecal.tyre.size import parse_size
 
 TEN = [
-    "145/80R13", "175/65R14", "195/65R15", "205/60R15", "205/55R16", "225/45R17", "255/40R17",
-    "P235/75R17", "31x10.50R15LT", "LT315/70R17",
-]  # fmt: skip
-SIXTEEN = {(0, 0, "axial"), (0, 0, "torsional"), (1, 0, None), (1, 1, None), (2, 0, None),
-           (2, 1, None), (3, 0, None), (3, 1, None), (4, 0, None)}  # fmt: skip
+    "145/80R13",
+    "175/65R14",
+    "195/65R15",
+    "205/60R15",
+    "205/55R16",
+    "225/45R17",
+    "255/40R17",
+    "P235/75R17",
+    "31x10.50R15LT",
+    "LT315/70R17",
+]
+SIXTEEN = {
+    (0, 0, "axial"),
+    (0, 0, "torsional"),
+    (1, 0, None),
+    (1, 1, None),
+    (2, 0, None),
+    (2, 1, None),
+    (3, 0, None),
+    (3, 1, None),
+    (4, 0, None),
+}
 # kg; the published 205/60R15 of the guide, and the paper's tyre as weighed by its makers
 MASSES = {"205/60R15": 9.3, "P235/75R17": 15.5}
 BEAD_WIRES = 0.05  # of a tyre's mass, which the section leaves out

@@ -16,8 +16,13 @@ from tyrecal.tyre.size import parse_size
 Array = np.ndarray
 SIZE = parse_size("205/60R15")
 GAUGES = usual(SIZE)
-REST = {"belt_width": GAUGES.belt, "carcass_depth": GAUGES.liner, "belt_depth": GAUGES.ply,
-        "belt_spacing": GAUGES.belts, "belt_step": GAUGES.step}  # fmt: skip
+REST = {
+    "belt_width": GAUGES.belt,
+    "carcass_depth": GAUGES.liner,
+    "belt_depth": GAUGES.ply,
+    "belt_spacing": GAUGES.belts,
+    "belt_step": GAUGES.step,
+}
 
 
 def write_outline(path: Path, curves: dict[str, Array]) -> Path:
@@ -73,9 +78,13 @@ def test_a_ring_of_constant_thickness(tmp_path: Path) -> None:
     }
     section = section_of_outline(
         read_outline(write_outline(tmp_path / "o.csv", arcs)),
-        belt_width=0.08, rim_radius=0.22, carcass_depth=2e-3, belt_depth=1e-3, belt_spacing=1e-3,
+        belt_width=0.08,
+        rim_radius=0.22,
+        carcass_depth=2e-3,
+        belt_depth=1e-3,
+        belt_spacing=1e-3,
         belt_step=0.01,
-    )  # fmt: skip
+    )
     for line, radius in zip(section.points, (0.05, 0.052, 0.053, 0.054, 0.06), strict=True):
         found = np.hypot(*(line - [0.25, 0.0]).T)
         assert found[~np.isnan(found)] == pytest.approx(radius, abs=3e-5)

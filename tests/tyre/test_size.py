@@ -71,19 +71,32 @@ def test_any_metric_size_means_what_it_says(width: int, aspect: int, rim: int, k
 def test_ways_to_write_a_size(text: str, same: str) -> None:
     one, other = parse_size(text), parse_size(same)
     assert (one.width, one.overall_diameter, one.rim_code, one.kind, one.pressure_kPa) == (
-        other.width, other.overall_diameter, other.rim_code, other.kind, other.pressure_kPa,
-    )  # fmt: skip
+        other.width,
+        other.overall_diameter,
+        other.rim_code,
+        other.kind,
+        other.pressure_kPa,
+    )
 
 
 def test_the_service_description_sets_the_pressure() -> None:
     for text, kPa in [
-        ("205/60R15", 250), ("225/45R17 94Y XL", 290), ("P235/75R17", 240),
-        ("LT245/75R16", 350), ("LT245/75R16/E", 550), ("LT245/75R16 120/116S LRD", 450),
-        ("LT245/75R16/E 120/116S", 550), ("LT245/75R16E", 550), ("LT245/75R16C 120/116S", 350),
-        ("37x12.50R17LT/D 124R", 450), ("225/45R17XL 94Y", 290),
-        ("31x10.50R15LT C", 350), ("35x12.50R17LT 121R Load Range E", 550), ("205/65R16C", 400),
+        ("205/60R15", 250),
+        ("225/45R17 94Y XL", 290),
+        ("P235/75R17", 240),
+        ("LT245/75R16", 350),
+        ("LT245/75R16/E", 550),
+        ("LT245/75R16 120/116S LRD", 450),
+        ("LT245/75R16/E 120/116S", 550),
+        ("LT245/75R16E", 550),
+        ("LT245/75R16C 120/116S", 350),
+        ("37x12.50R17LT/D 124R", 450),
+        ("225/45R17XL 94Y", 290),
+        ("31x10.50R15LT C", 350),
+        ("35x12.50R17LT 121R Load Range E", 550),
+        ("205/65R16C", 400),
         ("HL265/35R21", 290),
-    ]:  # fmt: skip
+    ]:
         assert parse_size(text).pressure_kPa == kPa, text
 
 

@@ -40,15 +40,7 @@ from ..evaluate.door import Door
 from ..evaluate.failure import DeckRefused, EvaluationFailed, SolverUnavailable
 from ..evaluate.sources import sources
 from ..evaluate.store import Store, sources_of
-from ..files import (
-    json_text,
-    own_folder,
-    read_bytes,
-    read_json,
-    set_aside,
-    write_runs,
-    write_text,
-)
+from ..files import json_text, own_folder, read_bytes, read_json, set_aside, write_runs, write_text
 from ..provenance import provenance
 from ..studies.fitted import NOT_CONVERGED, has_good
 from .studies import Asked, Outcome, Studied, study
@@ -95,8 +87,10 @@ def run_case(task: CaseTask) -> Report:
             finished, files = _studied(task, loaded, door, facts)
             if not AGAIN & {each["cause"] for each in finished.values()}:
                 digests = {file: _digest(task.folder / file) for file in files}
-                _write(task.folder / FINISHED, {"question": question, "files": digests,
-                                                "studies": finished})  # fmt: skip
+                _write(
+                    task.folder / FINISHED,
+                    {"question": question, "files": digests, "studies": finished},
+                )
         else:
             facts.update(answered=True, seconds=dict.fromkeys(finished, 0.0))
         report["studies"] = finished
@@ -154,10 +148,7 @@ def _studied(
 
 
 def _write_runs(
-    task: CaseTask,
-    facts: dict[str, Any],
-    ended: Collection[str],
-    aside: Mapping[str, str],
+    task: CaseTask, facts: dict[str, Any], ended: Collection[str], aside: Mapping[str, str]
 ) -> None:
     """The studies' entries in run.json; results of those that have not ended are earlier ones.
     aside: folders of results that did not take the place of earlier ones, by study."""
@@ -203,8 +194,12 @@ def _failed(error: Exception) -> Outcome:
 def _entry(outcome: Outcome, task: CaseTask) -> dict[str, Any]:
     """A study as the report has it; its words do not depend on where the case lies."""
     words = outcome.words and outcome.words.replace(f"{task.path.parent}{os.sep}", "")
-    return {"status": outcome.status, "cause": outcome.cause, "words": words,
-            "quantities": outcome.quantities}  # fmt: skip
+    return {
+        "status": outcome.status,
+        "cause": outcome.cause,
+        "words": words,
+        "quantities": outcome.quantities,
+    }
 
 
 def _question(task: CaseTask, loaded: LoadedCase, door: Door) -> str:

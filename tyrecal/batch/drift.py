@@ -115,9 +115,16 @@ def compare(reports: Sequence[Report], baseline: Mapping[str, Any]) -> dict[str,
                 tolerance = baseline["tolerances"][_named(baseline["tolerances"], study, quantity)]
                 allowed = max(tolerance.get("relative", 0) * abs(old), tolerance.get("absolute", 0))
                 if value is None or not abs(value - old) <= allowed:
-                    drifted.append({"case": report["name"], "study": study, "quantity": quantity,
-                                    "baseline": old, "value": value,
-                                    "allowed": allowed})  # fmt: skip
+                    drifted.append(
+                        {
+                            "case": report["name"],
+                            "study": study,
+                            "quantity": quantity,
+                            "baseline": old,
+                            "value": value,
+                            "allowed": allowed,
+                        }
+                    )
     names = {report["name"] for report in reports}
     return {
         "compared": compared,

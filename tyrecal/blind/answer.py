@@ -42,9 +42,12 @@ def rows_of(case: LoadedCase, protocol: Protocol) -> list[ModelRow]:
 
 
 def tyre_model(
-    case: LoadedCase, door: Door, protocol: Protocol, jobs: int = 1,
+    case: LoadedCase,
+    door: Door,
+    protocol: Protocol,
+    jobs: int = 1,
     effects: Sequence[str] | None = None,
-) -> TyreModel:  # fmt: skip
+) -> TyreModel:
     """The model of the diagnosis for all trials."""
     spans, _ = spans_of(door, effects)
     return TyreModel(case, door, rows_of(case, protocol), sources(case)[0], spans, jobs)

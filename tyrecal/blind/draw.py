@@ -73,11 +73,7 @@ def draw(
 
 
 def tyre(
-    truth: Truth,
-    case: LoadedCase,
-    sources: Sequence[Source],
-    pressure_kPa: float,
-    law: Law | None,
+    truth: Truth, case: LoadedCase, sources: Sequence[Source], pressure_kPa: float, law: Law | None
 ) -> LoadedCase:
     """The case as this tyre is at a stated pressure, with ``law``'s effect or without.
 

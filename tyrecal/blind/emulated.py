@@ -67,8 +67,15 @@ class Emulated:
     """A `Response` that stands for ``model`` within ``reach`` of its start, and for a straight one
     beyond."""
 
-    def __init__(self, model: Response, designs: Sequence[Array], reach: float, plain: Polynomial,
-                 constants: Polynomial, effects: Mapping[str, Grown]):  # fmt: skip
+    def __init__(
+        self,
+        model: Response,
+        designs: Sequence[Array],
+        reach: float,
+        plain: Polynomial,
+        constants: Polynomial,
+        effects: Mapping[str, Grown],
+    ):
         self.model, self.reach, self.designs = model, reach, designs
         self.variables, self.sources = model.variables, model.sources
         self.start, self.spread = model.start, model.spread
@@ -116,9 +123,10 @@ def emulate(model: Response, reach: float = REACH) -> Emulated:
     fitted = _fit(powers, signs[good], [plain[i] for i in good], reach)  # type: ignore[misc]
     sources = [i for i in good if i < SOURCE_DESIGNS]
     constants = _values(
-        monomial_powers(count, SOURCE_DEGREE), signs[sources],
+        monomial_powers(count, SOURCE_DEGREE),
+        signs[sources],
         [plain[i].constants.ravel() for i in sources],  # type: ignore[union-attr]
-    )  # fmt: skip
+    )
     grown = {}
     for id, span in model.spans.items():
         found = _effect(model, id, span, signs, designs, plain, reach)
@@ -200,8 +208,12 @@ def _fit(powers: Array, t: Array, answers: Sequence[Answer], reach: float) -> Po
         off = abs(b - A @ found)
         scale = FAR * np.median(off, axis=0) + SMALL
         weights = np.sqrt(np.minimum(1.0, scale / np.maximum(off, scale)))
-        found = np.array([np.linalg.lstsq(A * w[:, None], c * w, rcond=None)[0]
-                          for w, c in zip(weights.T, b.T, strict=True)]).T  # fmt: skip
+        found = np.array(
+            [
+                np.linalg.lstsq(A * w[:, None], c * w, rcond=None)[0]
+                for w, c in zip(weights.T, b.T, strict=True)
+            ]
+        ).T
     return Polynomial(powers, found)
 
 

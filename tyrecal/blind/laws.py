@@ -123,11 +123,14 @@ def cap_ply(case: LoadedCase, e: float) -> LoadedCase:
     spacing = 1.5e-3
     layers = {
         f"cover_{i}": RebarLayer(
-            line=belt_lines(case)[-1], material=material, angle_deg=90.0 + side * 5.0,
-            area_m2=e / 2 * spacing / cord.youngs_modulus_Pa, spacing_m=spacing,
+            line=belt_lines(case)[-1],
+            material=material,
+            angle_deg=90.0 + side * 5.0,
+            area_m2=e / 2 * spacing / cord.youngs_modulus_Pa,
+            spacing_m=spacing,
         )
         for i, side in ((1, -1), (2, 1))
-    }  # fmt: skip
+    }
     return with_layers(case, layers)
 
 
@@ -271,9 +274,11 @@ class Spindle:
         rim = case.case.rim
         scale = 1 + 3.0 / rim.mass_kg
         heavier = with_part(
-            rim, mass_kg=rim.mass_kg * scale, polar_inertia_kg_m2=rim.polar_inertia_kg_m2 * scale,
+            rim,
+            mass_kg=rim.mass_kg * scale,
+            polar_inertia_kg_m2=rim.polar_inertia_kg_m2 * scale,
             diametral_inertia_kg_m2=rim.diametral_inertia_kg_m2 * scale,
-        )  # fmt: skip
+        )
         known = catalogue()
         other = known[self.beside]
         case = known[self.id].add(changed(case, rim=heavier), e)

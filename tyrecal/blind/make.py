@@ -144,10 +144,12 @@ def _make(protocol: Protocol, case: LoadedCase, maker: Maker, truth: Truth) -> M
     for tries in range(1, TRIES + 1):
         try:
             both = [
-                {p: maker.listen(tyre(truth, case, found, p, each), labels)
-                 for p in protocol.pressures_kPa}
+                {
+                    p: maker.listen(tyre(truth, case, found, p, each), labels)
+                    for p in protocol.pressures_kPa
+                }
                 for each in ([law, None] if law else [None])
-            ]  # fmt: skip
+            ]
             if law and law.read:
                 read = law.read({p: h.ln_f for p, h in both[0].items()}, truth.size)
                 both[0] = {p: Heard(read[p], h.ln_mass) for p, h in both[0].items()}
@@ -163,11 +165,23 @@ def _again(
 ) -> Truth:
     """The same trial with other design variables and constants."""
     other = draw(
-        Protocol(protocol.maker, protocol.case, {"none": 1}, protocol.spread), case,
-        sources(case)[0], {}, {}, int(random.integers(2**63)),
-    )[0]  # fmt: skip
-    return Truth(truth.id, truth.kind, truth.law, truth.size, other.variables, other.constants,
-                 truth.scatter, truth.swapped)  # fmt: skip
+        Protocol(protocol.maker, protocol.case, {"none": 1}, protocol.spread),
+        case,
+        sources(case)[0],
+        {},
+        {},
+        int(random.integers(2**63)),
+    )[0]
+    return Truth(
+        truth.id,
+        truth.kind,
+        truth.law,
+        truth.size,
+        other.variables,
+        other.constants,
+        truth.scatter,
+        truth.swapped,
+    )
 
 
 def _swap(
@@ -178,8 +192,7 @@ def _swap(
     """Two doublets of like frequency take each other's label at every pressure."""
     first = next(iter(read.values()))
     mean = {label: np.nanmean(first[label]) for label in labels if label.c}
-    near = [(a, b) for a in mean for b in mean
-            if a < b and abs(np.log(mean[a] / mean[b])) < NEAR]  # fmt: skip
+    near = [(a, b) for a in mean for b in mean if a < b and abs(np.log(mean[a] / mean[b])) < NEAR]
     if near:
         a, b = near[int(random.integers(len(near)))]
         for here in read.values():

@@ -22,9 +22,11 @@ def bias_carcass(case: LoadedCase, e: float) -> LoadedCase:
     layers = case.case.rebar_layers
     return with_layers(
         case,
-        {name: with_part(layers[name], angle_deg=layers[name].angle_deg + e)
-         for name in carcass(case)},
-    )  # fmt: skip
+        {
+            name: with_part(layers[name], angle_deg=layers[name].angle_deg + e)
+            for name in carcass(case)
+        },
+    )
 
 
 def tension_stiffening(case: LoadedCase, e: float) -> LoadedCase:

@@ -39,8 +39,9 @@ def divided(loaded: LoadedCase, region: str, parts: int) -> tuple[LoadedCase, li
         name: with_part(layer, regions=_named(layer.regions, region, names))
         for name, layer in c.rebar_layers.items()
     }
-    gauges = [with_part(g, regions=_named(g.regions, region, names))
-              for g in c.section.gauges or []]  # fmt: skip
+    gauges = [
+        with_part(g, regions=_named(g.regions, region, names)) for g in c.section.gauges or []
+    ]
     made = changed(
         loaded,
         mesh=with_part(c.mesh, levels=levels),

@@ -125,9 +125,15 @@ APART = 9.0
 
 
 def difficulty(
-    ruler: Ruler, protocol: Protocol, law: str, d: Array, places: Array, counts: Array,
-    shift: Array, split: Array,
-) -> Difficulty:  # fmt: skip
+    ruler: Ruler,
+    protocol: Protocol,
+    law: str,
+    d: Array,
+    places: Array,
+    counts: Array,
+    shift: Array,
+    split: Array,
+) -> Difficulty:
     """Of a true effect that shifts the measured rows ``places`` by ``shift`` (n,), and pairs apart
     by ``split`` (n,); d: the trial's design minus x0."""
     P = ruler.projection(d, places, ruler.sigma(places, counts, protocol))

@@ -79,11 +79,15 @@ def score(folder: Path, sealed: Path) -> list[Scored]:
     ruler = read_ruler(folder, labels)
     return [
         scored(
-            truth, read_json(folder / "answers" / f"{truth['id']}.json"),
-            read_measurements(folder / "trials" / f"{truth['id']}.csv"), ruler, protocol, labels,
+            truth,
+            read_json(folder / "answers" / f"{truth['id']}.json"),
+            read_measurements(folder / "trials" / f"{truth['id']}.csv"),
+            ruler,
+            protocol,
+            labels,
         )
         for truth in content["trials"]
-    ]  # fmt: skip
+    ]
 
 
 def scored(
@@ -111,13 +115,27 @@ def scored(
     out = answer["held_out"]
     sigma = ruler.sigma(places, counts, protocol, constants=False)
     return Scored(
-        truth["id"], truth["kind"], truth["law"], truth["size"], truth["swapped"], key, group,
-        hard.lam, hard.band, told["verdict"], named, tuple(sorted(p, key=lambda k: -p[k])), p,
-        p.get(key, 0.0), sum(p.get(k, 0.0) for k in group), key in told["candidate_set"], held,
+        truth["id"],
+        truth["kind"],
+        truth["law"],
+        truth["size"],
+        truth["swapped"],
+        key,
+        group,
+        hard.lam,
+        hard.band,
+        told["verdict"],
+        named,
+        tuple(sorted(p, key=lambda k: -p[k])),
+        p,
+        p.get(key, 0.0),
+        sum(p.get(k, 0.0) for k in group),
+        key in told["candidate_set"],
+        held,
         _rms(truth["held_out"], out["plain_Hz"]),
         _rms(truth["held_out"], out["with_effect_Hz"] or out["plain_Hz"]),
         guesses(ruler, y, places, sigma),
-    )  # fmt: skip
+    )
 
 
 def means(readings: Sequence[Reading], ruler: Ruler) -> tuple[Array, Array, Array]:

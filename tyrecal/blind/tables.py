@@ -27,8 +27,9 @@ def summary(trials: Sequence[Scored]) -> dict[str, Any]:
     proven = [t for t in detected if t.verdict == "named"]
     parameters = [t.parameter_held for t in trials if t.parameter_held is not None]
     return {
-        "trials": {kind: sum(t.kind == kind for t in trials)
-                   for kind in ("effect", "none", "outside")},
+        "trials": {
+            kind: sum(t.kind == kind for t in trials) for kind in ("effect", "none", "outside")
+        },
         "swapped": sum(t.swapped for t in trials),
         "by_band": [
             {"low": low, "high": high if high < 1e9 else None, **_band(effects, low, high)}
@@ -44,8 +45,10 @@ def summary(trials: Sequence[Scored]) -> dict[str, Any]:
         "outside_recognised": rate([t.verdict == "outside" for t in outside]),
         "outside_named": rate([t.verdict == "named" for t in outside]),
         "families": {
-            law: {"recognised": rate([t.verdict == "outside" for t in outside if t.law == law]),
-                  "named": rate([t.verdict == "named" for t in outside if t.law == law])}
+            law: {
+                "recognised": rate([t.verdict == "outside" for t in outside if t.law == law]),
+                "named": rate([t.verdict == "named" for t in outside if t.law == law]),
+            }
             for law in sorted({t.law for t in outside})
         },
         "calibration_error": calibration_error(stated, right),
@@ -61,17 +64,25 @@ def summary(trials: Sequence[Scored]) -> dict[str, Any]:
         },
         "baselines": _baselines(trials),
         "confusion": _confusion(trials),
-        "misses": [t.plain() for t in trials if not t.right or (t.verdict == "named" and
-                   t.named not in t.group)],
-    }  # fmt: skip
+        "misses": [
+            t.plain()
+            for t in trials
+            if not t.right or (t.verdict == "named" and t.named not in t.group)
+        ],
+    }
 
 
 def rate(found: Sequence[bool]) -> dict[str, Any]:
     """A share with its exact 95 % bounds."""
     right, count = sum(found), len(found)
     low, high = clopper_pearson(right, count)
-    return {"right": right, "count": count, "share": right / count if count else None,
-            "low": low, "high": high}  # fmt: skip
+    return {
+        "right": right,
+        "count": count,
+        "share": right / count if count else None,
+        "low": low,
+        "high": high,
+    }
 
 
 def page(figures: dict[str, Any], maker: str) -> str:
@@ -94,8 +105,9 @@ def _baselines(trials: Sequence[Scored]) -> dict[str, Any]:
     commonest = max(sorted(set(keys)), key=keys.count) if keys else ""
     known = sorted(set(keys))
     result: dict[str, Any] = {"diagnosis": rate([t.right for t in trials])}
-    result["random"] = {"share": _mean([len(set(t.group) & set(known)) / len(known)
-                                        for t in trials])}  # fmt: skip
+    result["random"] = {
+        "share": _mean([len(set(t.group) & set(known)) / len(known) for t in trials])
+    }
     result["commonest"] = rate([commonest in t.group for t in trials])
     for name in trials[0].baselines if trials else ():
         result[name] = rate([t.baselines[name] in t.group for t in trials])
@@ -110,8 +122,10 @@ def _confusion(trials: Sequence[Scored]) -> dict[str, dict[str, int]]:
     for t in trials:
         row = table.setdefault(t.truth, {})
         row[t.ranked[0]] = row.get(t.ranked[0], 0) + 1
-    return {key: dict(sorted(row.items(), key=lambda item: -item[1]))
-            for key, row in sorted(table.items())}  # fmt: skip
+    return {
+        key: dict(sorted(row.items(), key=lambda item: -item[1]))
+        for key, row in sorted(table.items())
+    }
 
 
 def _lines(f: dict[str, Any], maker: str) -> Iterator[str]:
@@ -127,18 +141,28 @@ def _lines(f: dict[str, Any], maker: str) -> Iterator[str]:
     for band in f["by_lambda"]:
         yield f"| {band['low']:g} | {band['top_1_group']['count']} | {_rate(band['top_1_group'])} |"
     yield "\n| what | measured |\n|---|---|"
-    for key in ("false_alarms", "named_right", "outside_recognised", "outside_named",
-                "set_holds_truth", "interval_holds_parameter"):  # fmt: skip
+    for key in (
+        "false_alarms",
+        "named_right",
+        "outside_recognised",
+        "outside_named",
+        "set_holds_truth",
+        "interval_holds_parameter",
+    ):
         yield f"| {key.replace('_', ' ')} | {_rate(f[key])} |"
     mean = _number(f["mean_probability_on_group"])
     yield f"| mean probability on the true group, detectable | {mean} |"
-    yield (f"| calibration error (95 % quantile of a calibrated simulation) |"
-           f" {f['calibration_error']:.3f} ({f['calibration_error_95']:.3f}) |")  # fmt: skip
+    yield (
+        f"| calibration error (95 % quantile of a calibrated simulation) |"
+        f" {f['calibration_error']:.3f} ({f['calibration_error_95']:.3f}) |"
+    )
     yield f"| Brier score | {f['brier']:.3f} |"
     out = f["held_out"]
-    yield (f"| held-out shrinkage, detectable and named: median (placebo's 95 % quantile) |"
-           f" {_number(out['median_shrinkage'])} ({_number(out['placebo_95'])}), {out['count']}"
-           " trials |")  # fmt: skip
+    yield (
+        f"| held-out shrinkage, detectable and named: median (placebo's 95 % quantile) |"
+        f" {_number(out['median_shrinkage'])} ({_number(out['placebo_95'])}), {out['count']}"
+        " trials |"
+    )
     yield "\n| outside the catalogue | recognised | named as an effect |\n|---|---|---|"
     for law, each in f["families"].items():
         yield f"| {law} | {_rate(each['recognised'])} | {_rate(each['named'])} |"
@@ -154,15 +178,19 @@ def _lines(f: dict[str, Any], maker: str) -> Iterator[str]:
     for t in f["misses"]:
         law = f"{t['truth']}: {t['law']}" if t["kind"] == "outside" else t["truth"]
         law += " (swapped)" if t["swapped"] else ""
-        yield (f"| {t['id']} | {law} | {t['size']:.3g} | {t['band']:.1f} | {t['verdict']} |"
-               f" {', '.join(t['top'])} |")  # fmt: skip
+        yield (
+            f"| {t['id']} | {law} | {t['size']:.3g} | {t['band']:.1f} | {t['verdict']} |"
+            f" {', '.join(t['top'])} |"
+        )
 
 
 def _rate(each: dict[str, Any]) -> str:
     if not each["count"]:
         return "none"
-    return (f"{each['right']} of {each['count']}, {each['share']:.0%}"
-            f" ({each['low']:.0%} to {each['high']:.0%})")  # fmt: skip
+    return (
+        f"{each['right']} of {each['count']}, {each['share']:.0%}"
+        f" ({each['low']:.0%} to {each['high']:.0%})"
+    )
 
 
 def _number(value: float | None) -> str:

@@ -190,9 +190,14 @@ class _Reader:
             elif key in data:
                 first = self.document.places[(*keys, key)][0]
                 self.document.mistakes.append(
-                    Mistake(self.document.file, line + 1, dotted((*keys, key)), "given twice",
-                            f"it stands on line {first} already, one of the two must go")
-                )  # fmt: skip
+                    Mistake(
+                        self.document.file,
+                        line + 1,
+                        dotted((*keys, key)),
+                        "given twice",
+                        f"it stands on line {first} already, one of the two must go",
+                    )
+                )
             else:
                 data[key] = self.item(content, (*keys, key), line)
         return data

@@ -117,8 +117,10 @@ def _outline_keys(file: Path, size: TyreSize | None, belt: float | None) -> dict
     curves = read_outline(file)
     if not size:
         width = 2 * float(curves["outer"][:, 1].max())
-        keys = {"belt_width_m": belt or 0.75 * width,
-                "rim_radius_m": float(curves["inner"][-1, 0]) + FLANGE}  # fmt: skip
+        keys = {
+            "belt_width_m": belt or 0.75 * width,
+            "rim_radius_m": float(curves["inner"][-1, 0]) + FLANGE,
+        }
         defaults = {k: f.default for k, f in Outline.model_fields.items() if not f.is_required()}
         return {k: round(v, 5) for k, v in {**keys, **defaults}.items()}
     g = usual(size)

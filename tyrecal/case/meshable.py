@@ -61,8 +61,13 @@ def places(data: Mapping[str, Any], section: Section) -> Problems:
         bare -= {(r, gap) for r in where or regions for gap in range(low, high)}
     if bare and whole and isinstance(data.get("solids"), list):
         region, gap = min(bare, key=lambda place: (regions.index(place[0]), place[1]))
-        yield ("solids",), (f"must cover the section: region '{region}' has no material"
-                            f" between '{lines[gap]}' and '{lines[gap + 1]}'")  # fmt: skip
+        yield (
+            ("solids",),
+            (
+                f"must cover the section: region '{region}' has no material"
+                f" between '{lines[gap]}' and '{lines[gap + 1]}'"
+            ),
+        )
 
 
 def levels(data: Mapping[str, Any], section: Section) -> Problems:

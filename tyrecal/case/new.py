@@ -38,16 +38,24 @@ def new_case(
     plies = [line for line, present in inside if present.all() for _ in range(carcass_plies)]
     belts = [line for line, present in inside if present[0] and not present.all()]
     if not plies:
-        raise SectionError("no line between the surfaces runs from the crown to the bead: the"
-                           " carcass needs one")  # fmt: skip
+        raise SectionError(
+            "no line between the surfaces runs from the crown to the bead: the carcass needs one"
+        )
     env = environment("case", None)
     env.filters["text"] = _text
     names: dict[str, Any] = {
-        "file": file, "name": name, "size": size, "pressure_kPa": pressure_kPa, "origin": origin,
-        "outline": outline, "lines": section.names, "regions": [r for r, _ in section.regions],
+        "file": file,
+        "name": name,
+        "size": size,
+        "pressure_kPa": pressure_kPa,
+        "origin": origin,
+        "outline": outline,
+        "lines": section.names,
+        "regions": [r for r, _ in section.regions],
         "levels": {level: _level(section, level) for level in ELEMENTS},
-        "carcass": _numbered("carcass", plies), "belts": _numbered("belt", belts, always=True),
-    }  # fmt: skip
+        "carcass": _numbered("carcass", plies),
+        "belts": _numbered("belt", belts, always=True),
+    }
     return render(env, "case.yaml.j2", names)
 
 

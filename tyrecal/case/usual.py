@@ -68,10 +68,19 @@ STRESS = {"MPa": 1e6, "GPa": 1e9, "kPa": 1e3, "bar": 1e5, "psi": 6894.757}
 DENSITY = {"g/cm3": 1e3, "t/mm3": 1e12, "kg/mm3": 1e9, "lb/in3": 27679.9, "lb/ft3": 16.0185}
 MASS = {"g": 1e-3, "t": 1e3}
 INERTIA = {"kg mm2": 1e-6, "kg cm2": 1e-4, "t mm2": 1e-3}
-COMPLIANCE: Slips = {"N/m of stiffness": inverse(1.0), "N/mm of stiffness": inverse(1e-3),
-                     "mm/N": 1e-3, "m/kN": 1e-3, "mm/kN": 1e-6}  # fmt: skip
-TURNING: Slips = {"N m/rad of stiffness": inverse(1.0), "rad/(kN m)": 1e-3, "rad/(N mm)": 1e3,
-                  "degrees/(N m)": pi / 180}  # fmt: skip
+COMPLIANCE: Slips = {
+    "N/m of stiffness": inverse(1.0),
+    "N/mm of stiffness": inverse(1e-3),
+    "mm/N": 1e-3,
+    "m/kN": 1e-3,
+    "mm/kN": 1e-6,
+}
+TURNING: Slips = {
+    "N m/rad of stiffness": inverse(1.0),
+    "rad/(kN m)": 1e-3,
+    "rad/(N mm)": 1e3,
+    "degrees/(N m)": pi / 180,
+}
 ANGLE = {"rad": 180 / pi}
 FROM_CIRCUMFERENCE: Slips = {**ANGLE, "degrees from the circumference": lambda a: 90 - a}
 SHARE = {"%": 0.01}
@@ -101,9 +110,17 @@ USUAL: dict[str, Usual] = {
     # rubber: shear modulus 2 (C10 + C01) of 0.3 to 40 MPa, bulk modulus 2 / D1
     "materials.*.C10_Pa": Usual(-1e7, 2e7, "Pa", STRESS, least=1e3),
     "materials.*.C01_Pa": Usual(-1e7, 2e7, "Pa", STRESS, least=1e2),
-    "materials.*.D1_per_Pa": Usual(1e-10, 2e-6, "1/Pa", {
-        "1/MPa": 1e-6, "1/GPa": 1e-9, "Pa of bulk modulus K, D1 = 2/K": inverse(2.0),
-        "MPa of bulk modulus K, D1 = 2/K": inverse(2e-6)}),
+    "materials.*.D1_per_Pa": Usual(
+        1e-10,
+        2e-6,
+        "1/Pa",
+        {
+            "1/MPa": 1e-6,
+            "1/GPa": 1e-9,
+            "Pa of bulk modulus K, D1 = 2/K": inverse(2.0),
+            "MPa of bulk modulus K, D1 = 2/K": inverse(2e-6),
+        },
+    ),
     "materials.*.prony.*.g": Usual(0, 0.95, "", SHARE),
     "materials.*.prony.*.k": Usual(0, 0.95, "", SHARE),
     "materials.*.prony.*.tau_s": Usual(1e-7, 1e5, "s", {"ms": 1e-3}),
@@ -111,10 +128,15 @@ USUAL: dict[str, Usual] = {
     # textile cords 1 to 25 GPa, aramid 60 to 130, steel 150 to 210
     "materials.*.youngs_modulus_Pa": Usual(5e7, 3e11, "Pa", STRESS),
     "materials.*.density_kg_per_m3": Usual(500, 9000, "kg/m3", DENSITY),
-    "rebar_layers.*.area_m2": Usual(5e-9, 2e-5, "m2", {
-        **AREA, "m of diameter": lambda d: pi * d**2 / 4}),
-    "rebar_layers.*.spacing_m": Usual(2e-4, 0.02, "m", {
-        "mm": 1e-3, "cords per decimetre": inverse(0.1), "cords per inch": inverse(INCH)}),
+    "rebar_layers.*.area_m2": Usual(
+        5e-9, 2e-5, "m2", {**AREA, "m of diameter": lambda d: pi * d**2 / 4}
+    ),
+    "rebar_layers.*.spacing_m": Usual(
+        2e-4,
+        0.02,
+        "m",
+        {"mm": 1e-3, "cords per decimetre": inverse(0.1), "cords per inch": inverse(INCH)},
+    ),
     "rebar_layers.*.spacing_deg": Usual(0.01, 5, "degrees", ANGLE),
     "rim.reference_point_m.r": Usual(-1, 1, "m", LENGTH),
     "rim.reference_point_m.z": Usual(-1, 1, "m", LENGTH),
@@ -148,15 +170,23 @@ USUAL: dict[str, Usual] = {
     "targets.footprint.*.weight": Usual(0, 1e4, "", least=1e-4),
     "uncertainties.*.percent": Usual(0.001, 100, "%"),
     "solver.time_limit_s": Usual(1, 1e6, "s"),
-}  # fmt: skip
+}
 # cords' angles, from the meridian, in a half turn: of a radial tyre
 CARCASS_ANGLE = Usual(-30, 30, "degrees from the meridian", FROM_CIRCUMFERENCE)
 BELT_ANGLE = Usual(25, 155, "degrees from the meridian", FROM_CIRCUMFERENCE)
 # slips of effects' parameters, whose ranges the catalogue has, by their unit
 OF_EFFECTS: dict[str, Slips] = {
-    "": SHARE, "m": LENGTH, "kg": MASS, "N/m": STIFFNESS, "kPa": PRESSURE, "rad/s": SPIN,
-    "m/N": COMPLIANCE, "rad/(N m)": TURNING, "degrees": ANGLE, "1/kg": {"kg": inverse(1.0)},
-}  # fmt: skip
+    "": SHARE,
+    "m": LENGTH,
+    "kg": MASS,
+    "N/m": STIFFNESS,
+    "kPa": PRESSURE,
+    "rad/s": SPIN,
+    "m/N": COMPLIANCE,
+    "rad/(N m)": TURNING,
+    "degrees": ANGLE,
+    "1/kg": {"kg": inverse(1.0)},
+}
 # of 'tyrecal init', in the units of its options
 GAUGES = {
     "crown_mm": Usual(3, 50, "mm", {"m": 1e3, "cm": 10, "inch": 25.4}),

@@ -22,9 +22,18 @@ from .stations import read_section_of
 
 # numbers that stand alone: no other part of the case, and no mesh, depends on their values
 ALONE = {
-    "pressure_kPa", "materials", "rebar_layers", "rim", "cavity", "effects", "solver",
-    "spin_rad_per_s", "point_mass", "road_spring", "splice",
-}  # fmt: skip
+    "pressure_kPa",
+    "materials",
+    "rebar_layers",
+    "rim",
+    "cavity",
+    "effects",
+    "solver",
+    "spin_rad_per_s",
+    "point_mass",
+    "road_spring",
+    "splice",
+}
 
 
 def start_values(loaded: LoadedCase) -> dict[str, float]:

@@ -18,31 +18,53 @@ FILE = click.Path(path_type=Path, dir_okay=False)
 
 
 @click.command()
-@click.argument("cases", nargs=-1, required=True,
-                type=click.Path(path_type=Path, exists=True, dir_okay=False))  # fmt: skip
-@click.option("--studies", default="fit", metavar="S1,S2,...", show_default=True,
-              help=f"Of {', '.join(STUDIES)}. After a fit, sweep and footprint study the fitted"
-              " design too.")  # fmt: skip
+@click.argument(
+    "cases", nargs=-1, required=True, type=click.Path(path_type=Path, exists=True, dir_okay=False)
+)
+@click.option(
+    "--studies",
+    default="fit",
+    metavar="S1,S2,...",
+    show_default=True,
+    help=f"Of {', '.join(STUDIES)}. After a fit, sweep and footprint study the fitted design too.",
+)
 @click.option("--junit", type=FILE, metavar="FILE", help="Write JUnit XML for a CI server.")
-@click.option("--baseline", type=FILE, metavar="FILE",
-              help="Numbers to compare with, and how far each may drift.")  # fmt: skip
-@click.option("--write-baseline", is_flag=True,
-              help="Write the numbers to --baseline instead; its tolerances stay.")  # fmt: skip
+@click.option(
+    "--baseline",
+    type=FILE,
+    metavar="FILE",
+    help="Numbers to compare with, and how far each may drift.",
+)
+@click.option(
+    "--write-baseline",
+    is_flag=True,
+    help="Write the numbers to --baseline instead; its tolerances stay.",
+)
 @options.loads
 @options.pressures
-@click.option("--jobs", type=click.IntRange(1, 256), default=1, metavar="N", show_default=True,
-              help="Cases at a time, on this machine.")  # fmt: skip
+@click.option(
+    "--jobs",
+    type=click.IntRange(1, 256),
+    default=1,
+    metavar="N",
+    show_default=True,
+    help="Cases at a time, on this machine.",
+)
 @options.scheduler
 @options.every(
     options.mesh,
     options.solver,
     options.solver_command,
-    click.option("--output", type=click.Path(path_type=Path), metavar="DIR",
-                 help="Folder for the results, one in it for each case (default: batch)."),
+    click.option(
+        "--output",
+        type=click.Path(path_type=Path),
+        metavar="DIR",
+        help="Folder for the results, one in it for each case (default: batch).",
+    ),
     options.store,
     options.no_store,
     options.allow_unusual,
-)  # fmt: skip
+)
 @options.talking
 def command(
     cases: tuple[Path, ...],
@@ -110,10 +132,20 @@ def command(
     record = run.open_store(store, no_store)
     folder = output.resolve()
     tasks = [
-        CaseTask(name, path.resolve(), folder / name, wanted, asked, solver, mesh,
-                 record.folder if record else None, solver_command, allow_unusual)
+        CaseTask(
+            name,
+            path.resolve(),
+            folder / name,
+            wanted,
+            asked,
+            solver,
+            mesh,
+            record.folder if record else None,
+            solver_command,
+            allow_unusual,
+        )
         for name, path in zip(names, cases, strict=True)
-    ]  # fmt: skip
+    ]
     _prepare(tasks, folder)
     started = run.started
     progress = Progress(len(tasks), talk.quiet, talk.verbose)

@@ -33,22 +33,55 @@ def command() -> None:
 @command.command()
 @folder
 @click.option(
-    "--case", "case_path", type=click.Path(path_type=Path), required=True, metavar="CASE",
+    "--case",
+    "case_path",
+    type=click.Path(path_type=Path),
+    required=True,
+    metavar="CASE",
     shell_complete=complete.cases,
     help="The plain model, its uncertainties and the modes measured.",
-)  # fmt: skip
-@click.option("--maker", default="bundled", show_default=True, metavar="NAME",
-              help="bundled: the diagnosis' own model, an inverse crime; bundled-other: another"
-              " mesh and other laws of the effects; calculix: another solver, too.")  # fmt: skip
-@click.option("--effects", type=click.IntRange(0), default=300, show_default=True, metavar="N",
-              help="Trials with an effect of the catalogue.")  # fmt: skip
-@click.option("--none", "plain", type=click.IntRange(0), default=200, show_default=True,
-              metavar="N", help="Trials without any.")  # fmt: skip
-@click.option("--outside", type=click.IntRange(0), default=80, show_default=True, metavar="N",
-              help="Trials with what the catalogue does not hold.")  # fmt: skip
-@click.option("--effect", "drawn", multiple=True, metavar="EFFECT",
-              shell_complete=complete.effects,
-              help="Draw these effects only; repeatable (default: all it can).")  # fmt: skip
+)
+@click.option(
+    "--maker",
+    default="bundled",
+    show_default=True,
+    metavar="NAME",
+    help="bundled: the diagnosis' own model, an inverse crime; bundled-other: another"
+    " mesh and other laws of the effects; calculix: another solver, too.",
+)
+@click.option(
+    "--effects",
+    type=click.IntRange(0),
+    default=300,
+    show_default=True,
+    metavar="N",
+    help="Trials with an effect of the catalogue.",
+)
+@click.option(
+    "--none",
+    "plain",
+    type=click.IntRange(0),
+    default=200,
+    show_default=True,
+    metavar="N",
+    help="Trials without any.",
+)
+@click.option(
+    "--outside",
+    type=click.IntRange(0),
+    default=80,
+    show_default=True,
+    metavar="N",
+    help="Trials with what the catalogue does not hold.",
+)
+@click.option(
+    "--effect",
+    "drawn",
+    multiple=True,
+    metavar="EFFECT",
+    shell_complete=complete.effects,
+    help="Draw these effects only; repeatable (default: all it can).",
+)
 @click.option("--seed", type=int, metavar="N", help="Of all that is drawn (default: a secret one).")
 @truth
 @options.every(options.jobs, options.allow_unusual)
@@ -113,11 +146,20 @@ def make(
 
 @command.command()
 @folder
-@click.option("--emulated/--asked", default=True, show_default=True,
-              help="Ask the model at some designs once, or for each trial.")  # fmt: skip
-@click.option("--effect", "effects", multiple=True, metavar="EFFECT",
-              shell_complete=complete.effects,
-              help="Consider these effects only; repeatable.")  # fmt: skip
+@click.option(
+    "--emulated/--asked",
+    default=True,
+    show_default=True,
+    help="Ask the model at some designs once, or for each trial.",
+)
+@click.option(
+    "--effect",
+    "effects",
+    multiple=True,
+    metavar="EFFECT",
+    shell_complete=complete.effects,
+    help="Consider these effects only; repeatable.",
+)
 @options.every(options.jobs, options.store)
 @options.talking
 def answer(

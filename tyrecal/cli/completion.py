@@ -40,7 +40,7 @@ MENDED = {  # of click's scripts: a line of each, and what stands in its place
             "        completions=(${completions:#*=})\n"
             "        compadd -U -i \"$IPREFIX\" -V unsorted -S '' -a names\n"
             '        compadd -U -i "$IPREFIX" -V unsorted -a completions\n',
-        ),
+        )
     ],
     "fish": [
         ('string split "," $completion', 'string split -m 1 "," $completion'),  # a,b.yaml

@@ -14,23 +14,56 @@ file = click.Path(path_type=Path, exists=True, dir_okay=False)
 @click.command()
 @options.every(options.case_argument, options.assignments)
 @click.option("--measured", type=file, metavar="FILE", help="Measurements (CSV).")
-@click.option("--repeats", multiple=True, type=file, metavar="FILE",
-              help="The same measured again after dismounting; repeatable.")  # fmt: skip
-@click.option("--toggled", multiple=True, type=(file, str), metavar="FILE CHANGE",
-              help="A run of the same tyre with one thing switched: EFFECT=VALUE (0: absent) or"
-              " EFFECT*FACTOR; repeatable.")  # fmt: skip
-@click.option("--effect", "effects", multiple=True, metavar="EFFECT",
-              shell_complete=complete.effects,
-              help="Consider these effects only; repeatable.")  # fmt: skip
-@click.option("--without", multiple=True, metavar="EFFECT", shell_complete=complete.effects,
-              help="Leave out an effect that is ruled out; repeatable.")  # fmt: skip
-@click.option("--form-percent", type=click.FloatRange(0, 20), metavar="PERCENT",
-              help="Error of the model's own form in every frequency (default: on record, mode by"
-              " mode).")  # fmt: skip
-@click.option("--split-percent", type=click.FloatRange(0, 20), default=0.3, show_default=True,
-              metavar="PERCENT", help="Split of pairs that every such tyre has.")  # fmt: skip
-@click.option("--add", metavar="EFFECT=VALUE", shell_complete=complete.effect_values,
-              help="Write a case with the effect in it, and do nothing else.")  # fmt: skip
+@click.option(
+    "--repeats",
+    multiple=True,
+    type=file,
+    metavar="FILE",
+    help="The same measured again after dismounting; repeatable.",
+)
+@click.option(
+    "--toggled",
+    multiple=True,
+    type=(file, str),
+    metavar="FILE CHANGE",
+    help="A run of the same tyre with one thing switched: EFFECT=VALUE (0: absent) or"
+    " EFFECT*FACTOR; repeatable.",
+)
+@click.option(
+    "--effect",
+    "effects",
+    multiple=True,
+    metavar="EFFECT",
+    shell_complete=complete.effects,
+    help="Consider these effects only; repeatable.",
+)
+@click.option(
+    "--without",
+    multiple=True,
+    metavar="EFFECT",
+    shell_complete=complete.effects,
+    help="Leave out an effect that is ruled out; repeatable.",
+)
+@click.option(
+    "--form-percent",
+    type=click.FloatRange(0, 20),
+    metavar="PERCENT",
+    help="Error of the model's own form in every frequency (default: on record, mode by mode).",
+)
+@click.option(
+    "--split-percent",
+    type=click.FloatRange(0, 20),
+    default=0.3,
+    show_default=True,
+    metavar="PERCENT",
+    help="Split of pairs that every such tyre has.",
+)
+@click.option(
+    "--add",
+    metavar="EFFECT=VALUE",
+    shell_complete=complete.effect_values,
+    help="Write a case with the effect in it, and do nothing else.",
+)
 @click.option("--pictures/--no-pictures", default=True, help="Draw what was found.")
 @options.study
 def command(
@@ -103,9 +136,16 @@ def command(
     with talk.progress("diagnose", STAGES) as bar:
         door.heard = bar.at
         found = diagnosed(
-            loaded, door, measured, repeats, changes, assumed, study.jobs, considered,
+            loaded,
+            door,
+            measured,
+            repeats,
+            changes,
+            assumed,
+            study.jobs,
+            considered,
             stage=bar.begin,
-        )  # fmt: skip
+        )
     told = result(found.diagnosis, found.under_load, found.variables)
     told = run.write_json("diagnosis.json", told)
     named = [part["region"] for part in told["section_map"]]

@@ -19,12 +19,21 @@ HINTS = {
 
 
 @click.command()
-@click.option("--solver", default="bundled", show_default=True, metavar="NAME",
-              shell_complete=complete.solvers, help="Solver that the known tyre is given to."
-              )  # fmt: skip
-@click.option("--store", type=click.Path(path_type=Path, file_okay=False), envvar="TYRECAL_STORE",
-              metavar="DIR", help="Record to look at (default: those of the results folders here;"
-              " also from TYRECAL_STORE).")  # fmt: skip
+@click.option(
+    "--solver",
+    default="bundled",
+    show_default=True,
+    metavar="NAME",
+    shell_complete=complete.solvers,
+    help="Solver that the known tyre is given to.",
+)
+@click.option(
+    "--store",
+    type=click.Path(path_type=Path, file_okay=False),
+    envvar="TYRECAL_STORE",
+    metavar="DIR",
+    help="Record to look at (default: those of the results folders here; also from TYRECAL_STORE).",
+)
 @options.talking
 def command(solver: str, store: Path | None, talk: Talk) -> int:
     """Check the installation: packages, solvers, machine, records, and a known tyre's frequencies.

@@ -14,14 +14,27 @@ from .main import EXIT_SOLVER
 
 @click.command()
 @click.argument("name", required=False, shell_complete=complete.effects)
-@click.option("--case", "case", type=click.Path(path_type=Path), metavar="CASE",
-              shell_complete=complete.cases,
-              help="Compute what the effect does to this tyre.")  # fmt: skip
+@click.option(
+    "--case",
+    "case",
+    type=click.Path(path_type=Path),
+    metavar="CASE",
+    shell_complete=complete.cases,
+    help="Compute what the effect does to this tyre.",
+)
 @options.fitted("Compute it for the design that 'tyrecal fit' found for the case.")
-@click.option("--value", type=float, metavar="V",
-              help="Size of the effect NAME (default: the end of its range).")  # fmt: skip
-@click.option("--pressures-kPa", "pressures", metavar="P1,P2,...",
-              help="Default: two thirds of the case's, the case's, four thirds.")  # fmt: skip
+@click.option(
+    "--value",
+    type=float,
+    metavar="V",
+    help="Size of the effect NAME (default: the end of its range).",
+)
+@click.option(
+    "--pressures-kPa",
+    "pressures",
+    metavar="P1,P2,...",
+    help="Default: two thirds of the case's, the case's, four thirds.",
+)
 @click.option("--pictures/--no-pictures", default=True, help="Draw each signature.")
 @options.assignments
 @options.jobs

@@ -29,8 +29,13 @@ from .talk import Progress, Talk
     metavar="FILE",
     help="Measurements (CSV) at the case's pressure in place of its targets.",
 )
-@click.option("--fix", multiple=True, metavar="NAME", shell_complete=complete.variables,
-              help="Hold a variable at its start value.")  # fmt: skip
+@click.option(
+    "--fix",
+    multiple=True,
+    metavar="NAME",
+    shell_complete=complete.variables,
+    help="Hold a variable at its start value.",
+)
 @click.option(
     "--starts",
     type=click.IntRange(1, 100000),
@@ -110,15 +115,7 @@ def command(
     with talk.progress("fit") as bar, reached(scheduler) as door.scheduler:
         points = _Points(talk, bar, unit)
         fit = calibrate(
-            loaded,
-            door,
-            method,
-            fixed,
-            starts,
-            seed,
-            study.jobs,
-            points.notify,
-            bar.at,
+            loaded, door, method, fixed, starts, seed, study.jobs, points.notify, bar.at
         )
     result = run.write_json("fit.json", fit.result)
     run.write_text("fit.csv", fit_csv(fit.result))

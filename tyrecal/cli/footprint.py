@@ -18,9 +18,11 @@ DESIGNS = ("initial", "fitted")
 @click.command()
 @options.every(options.case_or_last, options.assignments, options.pressure, options.loads)
 @options.fitted("Press the design that 'tyrecal fit' found for this case, too.")
-@click.option("--compare", metavar="initial,fitted",
-              help="Designs to press (default: initial, and fitted where --fitted is given)."
-              )  # fmt: skip
+@click.option(
+    "--compare",
+    metavar="initial,fitted",
+    help="Designs to press (default: initial, and fitted where --fitted is given).",
+)
 @click.option("--pictures/--no-pictures", default=True, help="Draw the patches; write VTU.")
 @options.study
 def command(

@@ -20,24 +20,42 @@ POSITIVE = click.FloatRange(min=0, min_open=True)
 
 
 def _length(flag: str, text: str, unit: str = "mm") -> Any:
-    return click.option(f"--{flag}-{unit}", f"{flag}_{unit}".replace("-", "_"), type=POSITIVE,
-                        metavar=unit.upper(), help=text)  # fmt: skip
+    return click.option(
+        f"--{flag}-{unit}",
+        f"{flag}_{unit}".replace("-", "_"),
+        type=POSITIVE,
+        metavar=unit.upper(),
+        help=text,
+    )
 
 
 @click.command()
 @click.argument("size", required=False)
-@click.option("--section", "file", type=click.Path(path_type=Path, exists=True, dir_okay=False),
-              metavar="FILE", help="CSV of your own section: stations, or an outer and an inner"
-              " curve.")  # fmt: skip
+@click.option(
+    "--section",
+    "file",
+    type=click.Path(path_type=Path, exists=True, dir_okay=False),
+    metavar="FILE",
+    help="CSV of your own section: stations, or an outer and an inner curve.",
+)
 @_length("crown", "Thickness at the crown, grooves spread over the tread.")
 @_length("sidewall", "Thickness at the widest point.")
 @_length("bead", "Thickness at the rim's flange.")
 @_length("belt-width", "Width of the wider belt, along the carcass.")
 @_length("rim-width", "Width of the rim between its flanges.", "in")
-@click.option("--pressure-kPa", "pressure_kPa", type=float, metavar="P",
-              help="Inflation pressure (default: usual for the type of tyre).")  # fmt: skip
-@click.option("--output", type=click.Path(path_type=Path), metavar="CASE.yaml",
-              help="Case file to write (default: named by the size, in this folder).")  # fmt: skip
+@click.option(
+    "--pressure-kPa",
+    "pressure_kPa",
+    type=float,
+    metavar="P",
+    help="Inflation pressure (default: usual for the type of tyre).",
+)
+@click.option(
+    "--output",
+    type=click.Path(path_type=Path),
+    metavar="CASE.yaml",
+    help="Case file to write (default: named by the size, in this folder).",
+)
 @click.option("--force", is_flag=True, help="Write over files that exist.")
 @options.allow_unusual
 @click.option("--pictures/--no-pictures", default=True, help="Draw the section.")

@@ -14,26 +14,38 @@ if TYPE_CHECKING:
     from ..measured.modal import Layout
 
 files = click.argument(
-    "files", nargs=-1, required=True, metavar="FILE...",
+    "files",
+    nargs=-1,
+    required=True,
+    metavar="FILE...",
     type=click.Path(path_type=Path, exists=True, dir_okay=False),
-)  # fmt: skip
+)
 axle = click.option(
-    "--axle", type=click.Choice(["x", "y", "z"]),
+    "--axle",
+    type=click.Choice(["x", "y", "z"]),
     help="Axis of the test's coordinates along the axle (default: told by the sensors' places).",
-)  # fmt: skip
+)
 centre = click.option(
-    "--centre", metavar="X,Y,Z", default="0,0,0", show_default=True,
+    "--centre",
+    metavar="X,Y,Z",
+    default="0,0,0",
+    show_default=True,
     help="The wheel's centre in the test's coordinates, m.",
-)  # fmt: skip
+)
 directions = click.option(
-    "--directions", type=click.Choice(["cartesian", "cylindrical"]), default="cartesian",
+    "--directions",
+    type=click.Choice(["cartesian", "cylindrical"]),
+    default="cartesian",
     show_default=True,
     help="Directions 1, 2, 3 of a sensor: along x, y, z, or radial, tangential, axial.",
-)  # fmt: skip
+)
 highest = click.option(
-    "--highest-harmonic", "highest", type=click.IntRange(0, 20), metavar="C",
+    "--highest-harmonic",
+    "highest",
+    type=click.IntRange(0, 20),
+    metavar="C",
     help="The most waves round the circumference that a mode of the band can have (default: 12).",
-)  # fmt: skip
+)
 
 
 @click.group()
@@ -49,23 +61,49 @@ def command() -> None:
 
 @command.command("import")
 @files
-@click.option("--output", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE",
-              default="measured.csv", show_default=True, help="The measurements CSV.")  # fmt: skip
-@click.option("--pressure-kPa", "pressure_kPa", type=float, metavar="P",
-              help="Inflation pressure of files that do not say it.")  # fmt: skip
-@click.option("--band", metavar="F1,F2",
-              help="Look for modes between these frequencies, Hz (default: all).")  # fmt: skip
-@click.option("--sigma-percent", "assumed", type=click.FloatRange(0, 20, min_open=True),
-              metavar="P",
-              help="Standard deviation of one run that states none, in per cent.")  # fmt: skip
-@click.option("--floor-percent", "floor", type=click.FloatRange(0, 20), default=0.1,
-              show_default=True, metavar="P",
-              help="No sigma below this, in per cent: what repeats do not show.")  # fmt: skip
+@click.option(
+    "--output",
+    type=click.Path(path_type=Path, dir_okay=False),
+    metavar="FILE",
+    default="measured.csv",
+    show_default=True,
+    help="The measurements CSV.",
+)
+@click.option(
+    "--pressure-kPa",
+    "pressure_kPa",
+    type=float,
+    metavar="P",
+    help="Inflation pressure of files that do not say it.",
+)
+@click.option(
+    "--band", metavar="F1,F2", help="Look for modes between these frequencies, Hz (default: all)."
+)
+@click.option(
+    "--sigma-percent",
+    "assumed",
+    type=click.FloatRange(0, 20, min_open=True),
+    metavar="P",
+    help="Standard deviation of one run that states none, in per cent.",
+)
+@click.option(
+    "--floor-percent",
+    "floor",
+    type=click.FloatRange(0, 20),
+    default=0.1,
+    show_default=True,
+    metavar="P",
+    help="No sigma below this, in per cent: what repeats do not show.",
+)
 @options.every(axle, centre, directions, highest)
-@click.option("--response", type=click.Choice(["receptance", "mobility", "accelerance"]),
-              help="What functions are that do not say it.")  # fmt: skip
-@click.option("--pictures/--no-pictures", default=True,
-              help="Draw functions and shapes beside the CSV.")  # fmt: skip
+@click.option(
+    "--response",
+    type=click.Choice(["receptance", "mobility", "accelerance"]),
+    help="What functions are that do not say it.",
+)
+@click.option(
+    "--pictures/--no-pictures", default=True, help="Draw functions and shapes beside the CSV."
+)
 @options.talking
 def import_files(
     files: tuple[Path, ...],
@@ -127,12 +165,7 @@ def import_files(
 @options.every(axle, centre, directions, highest)
 @options.talking
 def sensors(
-    file: Path,
-    axle: str | None,
-    centre: str,
-    directions: str,
-    highest: int | None,
-    talk: Talk,
+    file: Path, axle: str | None, centre: str, directions: str, highest: int | None, talk: Talk
 ) -> int:
     """Say which modes the sensors of a universal FILE can tell apart.
 
@@ -148,11 +181,18 @@ def sensors(
     layout = _layout(axle, centre, directions, highest)
     told = sensors_in(read_universal(file), layout).told_apart()
     if talk.as_json:
-        talk.result([
-            {"c": label.c, "m": label.m, "kind": label.kind, "told": not alike,
-             "looks_like": [str(other) for other in alike]}
-            for label, alike in told.items()
-        ])  # fmt: skip
+        talk.result(
+            [
+                {
+                    "c": label.c,
+                    "m": label.m,
+                    "kind": label.kind,
+                    "told": not alike,
+                    "looks_like": [str(other) for other in alike],
+                }
+                for label, alike in told.items()
+            ]
+        )
     else:
         talk.say(sensors_words(told))
     return 0

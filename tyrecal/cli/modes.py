@@ -19,9 +19,12 @@ from .loaded_modes import at_load, over_loads, wanted_loads
     options.sweep_load,
     options.fitted("With --sweep-load: the design that 'tyrecal fit' found for this case, too."),
 )
-@click.option("--pictures/--no-pictures", default=None,
-              help="Draw the section and each mode (default: no); with --sweep-load the frequencies"
-              " over the load (default: yes).")  # fmt: skip
+@click.option(
+    "--pictures/--no-pictures",
+    default=None,
+    help="Draw the section and each mode (default: no); with --sweep-load the frequencies"
+    " over the load (default: yes).",
+)
 @options.study
 def command(
     case: Path,

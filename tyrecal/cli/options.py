@@ -133,13 +133,32 @@ sweep_load = click.option(
 )
 
 
-_from = click.option("--from-kPa", "from_kPa", type=float, default=100.0, metavar="A",
-                     show_default=True, help="Lowest pressure of a sweep.")  # fmt: skip
-_to = click.option("--to-kPa", "to_kPa", type=float, default=320.0, metavar="B", show_default=True,
-                   help="Highest pressure of a sweep.")  # fmt: skip
-_steps = click.option("--steps", type=click.IntRange(2, 10000), default=12, metavar="N",
-                      show_default=True, help="Pressures of a sweep, both ends among them."
-                      )  # fmt: skip
+_from = click.option(
+    "--from-kPa",
+    "from_kPa",
+    type=float,
+    default=100.0,
+    metavar="A",
+    show_default=True,
+    help="Lowest pressure of a sweep.",
+)
+_to = click.option(
+    "--to-kPa",
+    "to_kPa",
+    type=float,
+    default=320.0,
+    metavar="B",
+    show_default=True,
+    help="Highest pressure of a sweep.",
+)
+_steps = click.option(
+    "--steps",
+    type=click.IntRange(2, 10000),
+    default=12,
+    metavar="N",
+    show_default=True,
+    help="Pressures of a sweep, both ends among them.",
+)
 scheduler = click.option(
     "--scheduler",
     default="",

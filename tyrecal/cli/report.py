@@ -11,8 +11,9 @@ from .talk import Talk
 
 
 @click.command()
-@click.argument("folders", metavar="DIR...", nargs=-1, required=True,
-                type=click.Path(path_type=Path))  # fmt: skip
+@click.argument(
+    "folders", metavar="DIR...", nargs=-1, required=True, type=click.Path(path_type=Path)
+)
 @click.option(
     "--output",
     type=click.Path(path_type=Path),

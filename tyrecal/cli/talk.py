@@ -175,10 +175,7 @@ class Progress:
     """How far the work is: on a ``bar``, or by lines that ``say`` gets; else does nothing."""
 
     def __init__(
-        self,
-        what: str,
-        stages: Sequence[str] = (),
-        say: Callable[[str], None] | None = None,
+        self, what: str, stages: Sequence[str] = (), say: Callable[[str], None] | None = None
     ):
         self._what, self._stages, self._say = what, stages, say
         self._bar: Any = None

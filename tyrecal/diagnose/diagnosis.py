@@ -27,8 +27,12 @@ from .where import Place, section_map
 Array = np.ndarray
 IN_PLAY, MOST_IN_PLAY = 8.0, 6  # ln evidence behind the best up to which a node is asked again
 ROUNDS = 2
-STAGES = ("calibrate and ask each effect", "ask the likeliest effects again",
-          "parts of the section", "the next measurements")  # fmt: skip
+STAGES = (
+    "calibrate and ask each effect",
+    "ask the likeliest effects again",
+    "parts of the section",
+    "the next measurements",
+)
 CLOSE = 0.05  # of a range, and of ln x: an effect asked as near as that, or to 0, is known
 
 
@@ -105,8 +109,16 @@ def diagnose(
     stage(STAGES[0])
     if expansion is None:
         expansion = expand(response, plain_fit(response, observations, where, assumed.form))
-    problem = Problem(observations, expansion, response.spans, where, response.start,
-                      response.spread, changes, assumed)  # fmt: skip
+    problem = Problem(
+        observations,
+        expansion,
+        response.spans,
+        where,
+        response.start,
+        response.spread,
+        changes,
+        assumed,
+    )
     labels = exchanged(problem) if len(where) > len(response.start) else None
     if labels:
         observations = with_exchanged(observations, *labels)
@@ -137,10 +149,22 @@ def diagnose(
     stage(STAGES[3])
     choices = rank(bare, d, p, means, response.sources, further)
     return Diagnosis(
-        problem, bare, tuple(response.variables), tuple(response.sources), tuple(hypotheses), p,
-        verdict, gap, separability, tuple(found), effective_rank, shrinkage,
-        _rung(verdict, shrinkage, problem), tuple(choices), labels,
-    )  # fmt: skip
+        problem,
+        bare,
+        tuple(response.variables),
+        tuple(response.sources),
+        tuple(hypotheses),
+        p,
+        verdict,
+        gap,
+        separability,
+        tuple(found),
+        effective_rank,
+        shrinkage,
+        _rung(verdict, shrinkage, problem),
+        tuple(choices),
+        labels,
+    )
 
 
 def _asked_again(

@@ -206,9 +206,14 @@ def outside(problem: Problem, sigma: Array | None = None) -> Hypothesis:
     ln = np.array([np.log(p) + f.ln_evidence[0] for p, _, f in parts])
     best = int(np.argmax(ln))
     return Hypothesis(
-        OUTSIDE, PRIOR_OUTSIDE, float(np.logaddexp.reduce(ln)), {}, np.zeros(1), parts[best][2],
+        OUTSIDE,
+        PRIOR_OUTSIDE,
+        float(np.logaddexp.reduce(ln)),
+        {},
+        np.zeros(1),
+        parts[best][2],
         parts[best][1],
-    )  # fmt: skip
+    )
 
 
 def _hypothesis(
@@ -234,8 +239,10 @@ def _hypothesis(
         ln = fitted.ln_evidence.reshape([count] * len(ids))
         best = np.unravel_index(int(np.argmax(ln)), ln.shape)
         inner = [slice(max(0, b - 1), b + 2) for b in best]
-        cross = [ln[tuple(part if i == j else b for j, b in enumerate(best))]
-                 for i, part in enumerate(inner)]  # fmt: skip
+        cross = [
+            ln[tuple(part if i == j else b for j, b in enumerate(best))]
+            for i, part in enumerate(inner)
+        ]
         if zoom == ZOOMS or max(ln[best] - each.min() for each in cross) < SHARP:
             kept.append((values, ln_weights, fitted))
             break
@@ -247,8 +254,12 @@ def _hypothesis(
             [(v >= low) & (v <= high) for v, (low, high) in zip(values, box, strict=True)], axis=0
         )
         kept.append((values[:, outside_box], ln_weights[outside_box], _some(fitted, outside_box)))
-    joined = Fitted(*(np.concatenate([getattr(f, name) for _, _, f in kept])
-                      for name in ("ln_evidence", "d", "chi2", "covariance")))  # fmt: skip
+    joined = Fitted(
+        *(
+            np.concatenate([getattr(f, name) for _, _, f in kept])
+            for name in ("ln_evidence", "d", "chi2", "covariance")
+        )
+    )
     values = np.concatenate([v for v, _, _ in kept], axis=1)
     ln_weights = np.concatenate([w for _, w, _ in kept])
     total = float(np.logaddexp.reduce(joined.ln_evidence + ln_weights))

@@ -107,14 +107,16 @@ def expand(response: Response, x0: Array, ids: Sequence[str] | None = None) -> E
             hessian[:, :, i] = (above.jacobian - below.jacobian) / (2 * CURVATURE_STEP)
     hessian = (hessian + hessian.transpose(0, 2, 1)) / 2
     assert first.constants is not None
-    plain = Expansion(
-        x0, first.eta, first.jacobian, hessian, first.split, first.constants, {}, {}
-    )  # fmt: skip
+    plain = Expansion(x0, first.eta, first.jacobian, hessian, first.split, first.constants, {}, {})
     nodes, failed = {}, {}
     replies = dict(zip(asked, answers[1 + 2 * count :], strict=True))
     found = {id: {e: replies[id, e] for e in map(float, values[id])} for id in ids}
-    more = [(id, far * f) for id in ids for far in _bent(plain, response.spans[id], found[id])
-            for f in BENDING]  # fmt: skip
+    more = [
+        (id, far * f)
+        for id in ids
+        for far in _bent(plain, response.spans[id], found[id])
+        for f in BENDING
+    ]
     for (id, e), answer in zip(
         more, response.answers([Point(x0, {id: e}) for id, e in more]) if more else [], strict=True
     ):
@@ -125,8 +127,9 @@ def expand(response: Response, x0: Array, ids: Sequence[str] | None = None) -> E
             failed[id] = str(next(a for a in found[id].values() if isinstance(a, Exception)))
         else:
             nodes[id] = made
-    return Expansion(x0, plain.eta, plain.jacobian, hessian, plain.split, plain.constants,
-                     nodes, failed)  # fmt: skip
+    return Expansion(
+        x0, plain.eta, plain.jacobian, hessian, plain.split, plain.constants, nodes, failed
+    )
 
 
 def node_values(span: Span) -> Array:

@@ -76,9 +76,7 @@ def projection(problem: Problem, d: Array) -> tuple[Array, Array, Array]:
     """P (n, n), Sigma^-1 (n, n), and (J^T S^-1 J + Sx^-1)^-1 J^T S^-1 (v, n), at x0 + d."""
     _, J = problem.plain(d)
     inverse = np.linalg.inv(problem.sigma)
-    absorbing = np.linalg.solve(
-        J.T @ inverse @ J + np.diag(problem.spread**-2.0), J.T @ inverse
-    )  # fmt: skip
+    absorbing = np.linalg.solve(J.T @ inverse @ J + np.diag(problem.spread**-2.0), J.T @ inverse)
     P = inverse - inverse @ J @ absorbing
     return (P + P.T) / 2, inverse, absorbing
 
@@ -107,9 +105,16 @@ def find_gap(problem: Problem, d: Array, variables: tuple[str, ...]) -> Gap:
             bias[name][id] = float(100 * np.expm1(change))
     rows = problem.observations.rows
     return Gap(
-        total, freedom, float(chi2.sf(total, freedom)), r, np.sqrt(np.diag(C)),
-        tuple(_corrected(_groups(rows, r, C))), tuple(_contrasts(rows, r, C)), absorbed, bias,
-    )  # fmt: skip
+        total,
+        freedom,
+        float(chi2.sf(total, freedom)),
+        r,
+        np.sqrt(np.diag(C)),
+        tuple(_corrected(_groups(rows, r, C))),
+        tuple(_contrasts(rows, r, C)),
+        absorbed,
+        bias,
+    )
 
 
 def _groups(rows: tuple[Row, ...], r: Array, C: Array) -> list[Group]:

@@ -14,9 +14,7 @@ from ..errors import InputError
 from ..files import read_bytes
 from ..modes.mode import Label
 
-COLUMNS = (
-    "quantity", "c", "m", "kind", "member", "pressure_kPa", "load_N", "value", "sigma",
-)  # fmt: skip
+COLUMNS = ("quantity", "c", "m", "kind", "member", "pressure_kPa", "load_N", "value", "sigma")
 QUANTITIES = ("frequency_Hz", "contact_area_m2", "vertical_stiffness_N_per_m", "mass_kg")
 PRESSURES_kPa = (20.0, 2000.0)
 MOST_ROWS = 10_000

@@ -23,8 +23,14 @@ Array = np.ndarray
 ModelRow = tuple[Label | None, float]
 ENOUGH = 40.0
 LIKELY, MOST = 0.02, 6  # explanations below this probability, or beyond this number, do not count
-HOURS = {"toggle": 4.0, "check": 1.0, "repeat": 2.0, "pressure": 1.0, "harmonics": 1.0,
-         "weigh": 0.25}  # of a laboratory, as an orientation  # fmt: skip
+HOURS = {
+    "toggle": 4.0,
+    "check": 1.0,
+    "repeat": 2.0,
+    "pressure": 1.0,
+    "harmonics": 1.0,
+    "weigh": 0.25,
+}  # of a laboratory, as an orientation
 CHECKED = 0.25  # what is left of a constant's standard deviation when it is measured by itself
 REPEATED = 4  # times, each after dismounting
 PRESSURES_kPa = (160.0, 200.0, 240.0, 280.0, 320.0)
@@ -76,8 +82,11 @@ def rank(
     sizes: parameters by explanation and id; sources: names of the sources of error; further: a
     model of other rows of the same tyre. Empty where one explanation stands alone.
     """
-    likely = {key: p for key, p in probabilities.items()
-              if p > LIKELY and key != OUTSIDE and (key == NONE or key in sizes)}  # fmt: skip
+    likely = {
+        key: p
+        for key, p in probabilities.items()
+        if p > LIKELY and key != OUTSIDE and (key == NONE or key in sizes)
+    }
     likely = dict(sorted(likely.items(), key=lambda item: -item[1])[:MOST])
     if len(likely) < 2:
         return []
@@ -91,9 +100,13 @@ def rank(
     o = problem.observations
     factor = 1 / np.sqrt(REPEATED)
     finer = replace(o, scatter=o.scatter * factor, common=o.common * factor)
-    offered.append((f"measure all {REPEATED} times, dismounted in between",
-                    HOURS["repeat"] * (REPEATED - 1),
-                    _look(replace(problem, observations=finer), d, likely, sizes)))  # fmt: skip
+    offered.append(
+        (
+            f"measure all {REPEATED} times, dismounted in between",
+            HOURS["repeat"] * (REPEATED - 1),
+            _look(replace(problem, observations=finer), d, likely, sizes),
+        )
+    )
     for id in dict.fromkeys(id for key in likely if key != NONE for id in sizes[key]):
         span = problem.spans.get(id)
         words = (span.toggle if span else "") or f"measure again without {id}"
@@ -127,8 +140,9 @@ def _switched(problem: Problem, id: str) -> Problem:
     o = problem.observations
     join = lambda values: np.concatenate([values, values[first]])
     rows = (*o.rows, *(replace(row, run=run) for row in o.only(first).rows))
-    both = Observations(rows, join(o.y), join(o.scatter), o.common, join(o.split),
-                        join(o.split_scatter))  # fmt: skip
+    both = Observations(
+        rows, join(o.y), join(o.scatter), o.common, join(o.split), join(o.split_scatter)
+    )
     base = problem.spans[id].base if id in problem.spans else 0.0
     changes = (*problem.changes, Change(id, 0.0, base=base))
     return replace(problem, observations=both, places=join(problem.places), changes=changes)
@@ -148,12 +162,22 @@ def _more_rows(
     offered: list[tuple[str, float, list[ModelRow]]] = []
     for p in PRESSURES_kPa:
         if all(abs(p - q) >= FAR_kPa for q in pressures):
-            offered.append((f"measure the same modes at {p:g} kPa", HOURS["pressure"],
-                            [(label, p) for label in labels]))  # fmt: skip
+            offered.append(
+                (
+                    f"measure the same modes at {p:g} kPa",
+                    HOURS["pressure"],
+                    [(label, p) for label in labels],
+                )
+            )
     top = max(label.c for label in labels)
     higher = [Label(top + 1, 0), Label(top + 1, 1)]
-    offered.append((f"measure {higher[0]} and {higher[1]}, too", HOURS["harmonics"],
-                    [(label, p) for label in higher for p in pressures]))  # fmt: skip
+    offered.append(
+        (
+            f"measure {higher[0]} and {higher[1]}, too",
+            HOURS["harmonics"],
+            [(label, p) for label in higher for p in pressures],
+        )
+    )
     if all(row.label for row in o.rows):
         offered.append(("weigh the tyre", HOURS["weigh"], [(None, 0.0)]))
     rows = list(dict.fromkeys(row for _, _, more in offered for row in more))
@@ -172,13 +196,19 @@ def _more_rows(
         new = tuple(Row("frequency_Hz" if x else "mass_kg", x, p) for x, p in more)
         size = [scatter if label else MASS_PERCENT / 100 for label, _ in more]
         none = np.full(len(more), np.nan)
-        both = Observations((*o.rows, *new), np.concatenate([o.y, plain.eta[at]]),
-                            np.concatenate([o.scatter, size]), o.common,
-                            np.concatenate([o.split, none]),
-                            np.concatenate([o.split_scatter, none]))  # fmt: skip
+        both = Observations(
+            (*o.rows, *new),
+            np.concatenate([o.y, plain.eta[at]]),
+            np.concatenate([o.scatter, size]),
+            o.common,
+            np.concatenate([o.split, none]),
+            np.concatenate([o.split_scatter, none]),
+        )
         constants = np.vstack([problem.constants, plain.constants[at]])
-        shifts = {key: np.concatenate([now.shifts[key], (other.eta - plain.eta)[at]])
-                  for key, other in zip(likely, others, strict=True)}  # fmt: skip
+        shifts = {
+            key: np.concatenate([now.shifts[key], (other.eta - plain.eta)[at]])
+            for key, other in zip(likely, others, strict=True)
+        }
         jacobian = np.vstack([now.jacobian, plain.jacobian[at]])
         sigma = covariance(both, constants, problem.assumed.form)
         result.append((words, hours, _Look(sigma, jacobian, shifts)))

@@ -52,9 +52,13 @@ class Observations:
         """The rows of a mask (n,) alone."""
         return Observations(
             tuple(row for row, k in zip(self.rows, keep, strict=True) if k),
-            self.y[keep], self.scatter[keep], self.common, self.split[keep],
-            self.split_scatter[keep], self.left_out,
-        )  # fmt: skip
+            self.y[keep],
+            self.scatter[keep],
+            self.common,
+            self.split[keep],
+            self.split_scatter[keep],
+            self.left_out,
+        )
 
 
 def observe(

@@ -56,9 +56,12 @@ def with_exchanged(observations: Observations, a: Label, b: Label) -> Observatio
             j = where[b, pressure, run]
             order[i], order[j] = j, i
     return replace(
-        observations, y=observations.y[order], scatter=observations.scatter[order],
-        split=observations.split[order], split_scatter=observations.split_scatter[order],
-    )  # fmt: skip
+        observations,
+        y=observations.y[order],
+        scatter=observations.scatter[order],
+        split=observations.split[order],
+        split_scatter=observations.split_scatter[order],
+    )
 
 
 def _near(observations: Observations) -> Iterator[tuple[Label, Label]]:

@@ -83,8 +83,10 @@ def split_by_region(case: LoadedCase) -> tuple[LoadedCase, Mapping[str, str]]:
         for region in solid.regions or names:
             pieces: list[tuple[str, list[str] | None]] = [(region, solid.between)]
             if region == names[0] and solid.between is None:
-                pieces = [(f"{region} under the tread", [lines[0], lines[-2]]),
-                          (TREAD, [lines[-2], lines[-1]])]  # fmt: skip
+                pieces = [
+                    (f"{region} under the tread", [lines[0], lines[-2]]),
+                    (TREAD, [lines[-2], lines[-1]]),
+                ]
             for words, between in pieces:
                 copy = f"part_{i}_{words.replace(' ', '_')}"
                 materials[copy] = case.case.materials[solid.material]

@@ -27,8 +27,10 @@ def result(
     d, gap, s = diagnosis, diagnosis.gap, diagnosis.shrinkage
     best = d.best
     named = d.verdict.key
-    by = {kind: {g.name: g.rms_percent for g in gap.groups if g.kind == kind}
-          for kind in ("family", "harmonic", "pressure")}  # fmt: skip
+    by = {
+        kind: {g.name: g.rms_percent for g in gap.groups if g.kind == kind}
+        for kind in ("family", "harmonic", "pressure")
+    }
     return {
         "format": 1,
         "verdict": d.verdict.kind,
@@ -89,7 +91,9 @@ def result(
             for p in d.parts
         ],
         "effective_rank": d.effective_rank,
-        "shrinkage": None if s is None else {
+        "shrinkage": None
+        if s is None
+        else {
             "held_out": s.held_out,
             "effect": s.effect,
             "before_percent": s.before_percent,
@@ -113,7 +117,7 @@ def result(
         "exchanged_labels": [str(label) for label in d.exchanged or ()],
         "left_out": list(d.problem.observations.left_out),
         "not_evaluated": dict(d.problem.expansion.failed),
-    }  # fmt: skip
+    }
 
 
 def _by_load(found: UnderLoad | None) -> dict[str, float]:

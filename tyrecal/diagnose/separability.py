@@ -41,7 +41,7 @@ class Separability:
         place = {id: i for i, id in enumerate(self.ids)}
         near = lambda a, b: (
             min(self.distances[place[a], place[b]], self.distances[place[b], place[a]]) < APART
-        )  # fmt: skip
+        )
         left, result = [id for id in ids if self.lambdas[id] >= APART], []
         while left:
             group = [left.pop(0)]

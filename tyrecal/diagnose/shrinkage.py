@@ -94,13 +94,20 @@ def shrink(problem: Problem, key: str | None = None, seed: int = 0) -> Shrinkage
     ratios = 1 - rms(samples) / rms(before)
     low, high = np.quantile(ratios, [0.05, 0.95])
     return Shrinkage(
-        words, chosen.key, float(100 * rms(before)), float(100 * rms(after)),
-        float(1 - rms(after) / rms(before)), float(low), float(high),
-        _placebo(problem, hold, random), float(100 * rms(out.observations.scatter)),
-        float(rms(before / spread)), float(rms(after / spread)),
+        words,
+        chosen.key,
+        float(100 * rms(before)),
+        float(100 * rms(after)),
+        float(1 - rms(after) / rms(before)),
+        float(low),
+        float(high),
+        _placebo(problem, hold, random),
+        float(100 * rms(out.observations.scatter)),
+        float(rms(before / spread)),
+        float(rms(after / spread)),
         float(100 * rms(_least_squares(problem, hold, {}))),
         float(100 * rms(_least_squares(problem, hold, chosen.mean()))),
-    )  # fmt: skip
+    )
 
 
 def _least_squares(problem: Problem, hold: Array, sizes: Mapping[str, float]) -> Array:
@@ -142,10 +149,12 @@ def _samples(out: Problem, hypothesis: Hypothesis, random: np.random.Generator) 
     fitted = hypothesis.fitted
     assert fitted is not None
     places = random.choice(len(hypothesis.posterior), DRAWS, p=hypothesis.posterior)
-    d = np.array([
-        random.multivariate_normal(fitted.d[i], fitted.covariance[i], method="cholesky")
-        for i in places
-    ])  # fmt: skip
+    d = np.array(
+        [
+            random.multivariate_normal(fitted.d[i], fitted.covariance[i], method="cholesky")
+            for i in places
+        ]
+    )
     return _predicted_errors(out, {id: e[places] for id, e in hypothesis.values.items()}, d)
 
 

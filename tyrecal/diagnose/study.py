@@ -77,9 +77,11 @@ def study(
     runs = {path: read_measurements(path) for path in (measured, *repeats, *switched)}
     _check_copies([measured, *repeats, *switched], runs)
     observations = observe(
-        runs[measured], [runs[path] for path in repeats], [runs[path] for path in switched],
+        runs[measured],
+        [runs[path] for path in repeats],
+        [runs[path] for path in switched],
         assumed.split,
-    )  # fmt: skip
+    )
     rows = list(dict.fromkeys((row.label, row.pressure_kPa) for row in observations.rows))
     if not any(label for label, _ in rows):
         raise InputError(f"{measured}: there is no frequency of the unloaded tyre in it")
@@ -98,16 +100,25 @@ def study(
     model = TyreModel(case, door, rows, found, spans, jobs)
     _check_units(model, observations, [measured, *switched], changes)
     diagnosis = diagnose(
-        model, rows, observations, changes, assumed,
+        model,
+        rows,
+        observations,
+        changes,
+        assumed,
         parts=(lambda x: regions(model, x)) if section_map else None,
         further=lambda more: TyreModel(case, door.for_case(case), more, found, spans, jobs),
         stage=stage,
-    )  # fmt: skip
+    )
     own = [runs[path] for path in (measured, *repeats)]
     return Study(
-        diagnosis, tuple(found), assumed_sources, tuple(inexpressible), fitted, model,
+        diagnosis,
+        tuple(found),
+        assumed_sources,
+        tuple(inexpressible),
+        fitted,
+        model,
         _under_load(case, door, own, diagnosis, model),
-    )  # fmt: skip
+    )
 
 
 def _under_load(
@@ -148,8 +159,14 @@ def spans_of(door: Door, ids: Sequence[str] | None = None) -> tuple[dict[str, Sp
             unable.append(id)
         else:
             base = door.case.case.effects.get(id, 0.0)
-            able[id] = Span(effect.low - base, effect.high - base, effect.unit, effect.title,
-                            effect.toggle, base)  # fmt: skip
+            able[id] = Span(
+                effect.low - base,
+                effect.high - base,
+                effect.unit,
+                effect.title,
+                effect.toggle,
+                base,
+            )
     return able, unable
 
 

@@ -89,8 +89,9 @@ class TyreModel:
 
     def design(self, point: Point) -> dict[str, float]:
         """Numbers of the case at a point: variables, and effects on top of those that it has."""
-        effects = {EFFECTS + id: self._present.get(id, 0.0) + float(e)
-                   for id, e in point.effects.items()}  # fmt: skip
+        effects = {
+            EFFECTS + id: self._present.get(id, 0.0) + float(e) for id, e in point.effects.items()
+        }
         return {**self.values(point.x), **effects}
 
     def answers(self, points: Sequence[Point]) -> list[Answer | Exception]:
@@ -102,8 +103,12 @@ class TyreModel:
         """
         bare = [p for p in points if self._is_bare(p)]
         stepped = [p for p in points if p.constants]
-        steps = [(k, path.removeprefix(EFFECTS), step) for k, source in enumerate(self.found)
-                 for path, step in source.steps.items() if path.startswith(EFFECTS)]  # fmt: skip
+        steps = [
+            (k, path.removeprefix(EFFECTS), step)
+            for k, source in enumerate(self.found)
+            for path, step in source.steps.items()
+            if path.startswith(EFFECTS)
+        ]
         asked = dict.fromkeys(map(_key, points))
         asked |= dict.fromkeys(_key(Point(p.x)) for p in bare)
         asked |= dict.fromkeys(_key(Point(p.x, {id: e})) for p in stepped for _, id, e in steps)

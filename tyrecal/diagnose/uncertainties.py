@@ -16,10 +16,22 @@ from ..units import in_engineers_units
 DENSITY, MODULUS, SPACING, GAUGE, ANGLE_deg, PRESSURE_kPa = 1.5, 3.0, 1.0, 3.0, 1.0, 1.0
 EFFECTS = "effects."
 UNITS = {  # by a key's end, the longer first
-    "kg_per_m3": "kg/m3", "kg_m2": "kg m2", "m_per_N": "m/N", "Pa_per_m": "Pa/m", "N_per_m": "N/m",
-    "rad_per_N_m": "rad/(N m)", "rad_per_s": "rad/s", "kPa": "kPa", "Pa": "Pa",
-    "deg": "degrees", "m": "m", "m2": "m2", "kg": "kg", "Hz": "Hz", "C": "C",
-}  # fmt: skip
+    "kg_per_m3": "kg/m3",
+    "kg_m2": "kg m2",
+    "m_per_N": "m/N",
+    "Pa_per_m": "Pa/m",
+    "N_per_m": "N/m",
+    "rad_per_N_m": "rad/(N m)",
+    "rad_per_s": "rad/s",
+    "kPa": "kPa",
+    "Pa": "Pa",
+    "deg": "degrees",
+    "m": "m",
+    "m2": "m2",
+    "kg": "kg",
+    "Hz": "Hz",
+    "C": "C",
+}
 
 
 @dataclass(frozen=True)

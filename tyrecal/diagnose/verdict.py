@@ -48,15 +48,25 @@ def decide(
     check = _check(by_key[best], rows, variables) if best else 1.0
     said = tuple(candidates)
     if rows <= variables:
-        return Verdict(UNDECIDED, None, said, check, "cannot tell: there are no more data than"
-                       " design variables")  # fmt: skip
+        return Verdict(
+            UNDECIDED,
+            None,
+            said,
+            check,
+            "cannot tell: there are no more data than design variables",
+        )
     if best and probabilities[best] >= SURE and check > CHECK and none < RULED_OUT:
         return Verdict(NAMED, best, said, check, f"{best} explains the gap")
     misfit = best is not None and probabilities[best] >= SURE and check <= CHECK
     if none < RULED_OUT and (probabilities[OUTSIDE] >= 0.5 or misfit):
         words = by_key[OUTSIDE].words
-        return Verdict(OUTSIDE, None, said, check, f"there is a gap, and nothing in the catalogue"
-                       f" explains it: {words}")  # fmt: skip
+        return Verdict(
+            OUTSIDE,
+            None,
+            said,
+            check,
+            f"there is a gap, and nothing in the catalogue explains it: {words}",
+        )
     if order[0] == NONE and none > PRIOR_NONE:
         return Verdict(NO_GAP, None, said, check, "no gap is seen")
     gap = "there is a gap" if none < RULED_OUT else "there may be a gap"

@@ -53,8 +53,11 @@ def section_map(
     count, result = len(parts), []
     for i, part in enumerate(parts):
         better = i if ln[i] >= ln[count + i] else count + i
-        same = [columns[j][2].name for j in range(2 * count)
-                if abs(cosine[better, j]) > SAME and j % count != i]  # fmt: skip
+        same = [
+            columns[j][2].name
+            for j in range(2 * count)
+            if abs(cosine[better, j]) > SAME and j % count != i
+        ]
         result.append(
             Place(
                 part.name,

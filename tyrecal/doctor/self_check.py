@@ -34,8 +34,14 @@ def self_check(solver: str = "bundled") -> dict[str, Any]:
 
     started = time.monotonic()
     tolerance = TOLERANCE_PERCENT.get(solver, OTHERS_PERCENT)
-    found: dict[str, Any] = {"solver": solver, "ok": False, "tolerance_percent": tolerance,
-                             "mass_kg": None, "modes": [], "problem": None}  # fmt: skip
+    found: dict[str, Any] = {
+        "solver": solver,
+        "ok": False,
+        "tolerance_percent": tolerance,
+        "mass_kg": None,
+        "modes": [],
+        "problem": None,
+    }
     try:
         answer = Door(load_case(CASE), solver).evaluate(Question({}))
         hertz = {str(m.label): m.frequency_Hz for m in paired_labels(answer.modes)}

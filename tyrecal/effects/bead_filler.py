@@ -19,10 +19,7 @@ def add(case: LoadedCase, value: float) -> LoadedCase:
         (case.section.names[0], case.section.names[-1]),
         "filler",
         lambda m: with_part(
-            m,
-            C10_Pa=factor * m.C10_Pa,
-            C01_Pa=factor * m.C01_Pa,
-            D1_per_Pa=m.D1_per_Pa / factor,
+            m, C10_Pa=factor * m.C10_Pa, C01_Pa=factor * m.C01_Pa, D1_per_Pa=m.D1_per_Pa / factor
         ),
     )
 

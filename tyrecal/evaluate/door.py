@@ -23,11 +23,7 @@ from .results import Evaluation, evaluation
 from .solver import Solver, find_solver
 from .store import Store, key_of
 
-CAUSES = {
-    "InflationFailed": "no_equilibrium",
-    "Unstable": "unstable",
-    "TimedOut": "timed_out",
-}
+CAUSES = {"InflationFailed": "no_equilibrium", "Unstable": "unstable", "TimedOut": "timed_out"}
 SETTLED = ("no_equilibrium", "unstable")  # the deck's own doing: another run would say the same
 MODES_ON_TOP = 3  # times the time limit of a load, where modes are sought there too
 T = TypeVar("T")

@@ -186,9 +186,7 @@ def _start_here(problem: Problem, start: Array, method: str) -> StartReport | Ev
         return failure
 
 
-def _start_alone(
-    task: tuple[Problem, Array, str],
-) -> tuple[StartReport | EvaluationFailed, Counts]:
+def _start_alone(task: tuple[Problem, Array, str]) -> tuple[StartReport | EvaluationFailed, Counts]:
     problem, start, method = task
     return _start_here(problem, start, method), problem.door.counts
 

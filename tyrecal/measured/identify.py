@@ -82,10 +82,12 @@ def identify(measured: Responses, low_Hz: float, high_Hz: float) -> Identified:
     order = int(np.clip(np.sum(used & (f <= high_Hz)) // LINES, 4, ORDER))
     points = np.unique(measured.points)
     count = min(GROUPS, len(points))
-    triangles = np.array([
-        _triangle(mobility[np.isin(measured.points, points[j::count])][:, used], order)
-        for j in range(count)
-    ])  # fmt: skip
+    triangles = np.array(
+        [
+            _triangle(mobility[np.isin(measured.points, points[j::count])][:, used], order)
+            for j in range(count)
+        ]
+    )
     modes = _modes(_poles(triangles, f[used]), low_Hz, high_Hz)
     if not len(modes):
         raise InputError(f"no mode is stable between {low_Hz:g} and {high_Hz:g} Hz")

@@ -75,8 +75,9 @@ class Labeller:
 
     def judge(self, shape: Array) -> Judged:
         """The label of a real shape (k,), a signal each, with its probability."""
-        evidence = np.array([self._evidence(values, vectors.T @ shape)
-                             for values, vectors in self._spectra])  # fmt: skip
+        evidence = np.array(
+            [self._evidence(values, vectors.T @ shape) for values, vectors in self._spectra]
+        )
         p = np.exp(evidence - evidence.max())
         p /= p.sum()
         order = np.argsort(-p, kind="stable")
@@ -138,8 +139,11 @@ def _missing(sensors: Sensors) -> str:
     names = ("radial", "tangential", "axial")
     R, _, Z = sensors.points.T
     belt = R / R.max() > BELT
-    lacking = [name for k, name in enumerate(names)
-               if not np.any(np.abs(sensors.directions[belt, k]) > 0.5)]  # fmt: skip
+    lacking = [
+        name
+        for k, name in enumerate(names)
+        if not np.any(np.abs(sensors.directions[belt, k]) > 0.5)
+    ]
     if lacking:
         return f"nothing {' or '.join(lacking)} was measured on the tread"
     if np.ptp(Z[belt]) < WIDTH * R.max():

@@ -112,8 +112,12 @@ def _named(file: Universal, error: InputError) -> InputError:
 
 def _signals(shape: Shape) -> tuple[tuple[int, int], ...]:
     measured = np.isfinite(shape.values)
-    return tuple((node, k + 1) for node, row in zip(shape.nodes, measured, strict=True)
-                 for k in range(3) if row[k])  # fmt: skip
+    return tuple(
+        (node, k + 1)
+        for node, row in zip(shape.nodes, measured, strict=True)
+        for k in range(3)
+        if row[k]
+    )
 
 
 def _from_shapes(
@@ -245,10 +249,20 @@ def settled(told: list[Told]) -> list[Told]:
 def values_of(run: Run, pressure_kPa: float) -> list[Value]:
     """The frequencies of a run's modes that have a label."""
     return [
-        Value("frequency_Hz", each.judged.label, each.member, pressure_kPa, 0.0,
-              each.mode.frequency_Hz, _sigma(each.mode), run.name, each.place)
-        for each in run.modes if each.judged.label
-    ]  # fmt: skip
+        Value(
+            "frequency_Hz",
+            each.judged.label,
+            each.member,
+            pressure_kPa,
+            0.0,
+            each.mode.frequency_Hz,
+            _sigma(each.mode),
+            run.name,
+            each.place,
+        )
+        for each in run.modes
+        if each.judged.label
+    ]
 
 
 def _sigma(mode: MeasuredMode) -> float | None:

@@ -51,10 +51,25 @@ MEANING = {name: meaning for meaning, names in HEADINGS.items() for name in name
 LABEL = re.compile(r"^[\[(]?\s*(\d+)\s*[,;/ ]\s*(\d+)\s*[\])]?\s*(.*)$")
 BRACKET = re.compile(r"^[\[(]\s*\d+$")  # a label that its comma has parted
 LONGEST = 300  # characters of a cell
-KINDS = {"axial": "axial", "lateral": "axial", "torsional": "torsional", "torsion": "torsional",
-         "rotational": "torsional", "": None}  # fmt: skip
-MEMBERS = {"": "", "1": "1", "2": "2", "a": "1", "b": "2", "lower": "1", "upper": "2",
-           "symmetric": "symmetric", "antisymmetric": "antisymmetric"}  # fmt: skip
+KINDS = {
+    "axial": "axial",
+    "lateral": "axial",
+    "torsional": "torsional",
+    "torsion": "torsional",
+    "rotational": "torsional",
+    "": None,
+}
+MEMBERS = {
+    "": "",
+    "1": "1",
+    "2": "2",
+    "a": "1",
+    "b": "2",
+    "lower": "1",
+    "upper": "2",
+    "symmetric": "symmetric",
+    "antisymmetric": "antisymmetric",
+}
 
 
 @dataclass(frozen=True)
@@ -206,9 +221,13 @@ def _heading(text: str) -> tuple[str, str]:
 
 
 def _values(
-    cells: list[str], columns: list[Column], comma: bool, pressure_kPa: float | None, run: str,
+    cells: list[str],
+    columns: list[Column],
+    comma: bool,
+    pressure_kPa: float | None,
+    run: str,
     place: str,
-) -> Iterator[Value]:  # fmt: skip
+) -> Iterator[Value]:
     """Values of one line. Raises ValueError with what is wrong."""
     text = {column.meaning: cells[column.index] for column in columns}
     factor = {column.meaning: column for column in columns}

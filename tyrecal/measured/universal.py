@@ -25,9 +25,17 @@ LARGEST = 1_000_000_000  # bytes; response functions of many points are long
 MARK = re.compile(rb" {4}-1(?: {74})?(?=[\r\n]|\Z)")  # binary values may stand before it
 FORMS = {8: "receptance", 11: "mobility", 12: "accelerance"}
 UNHEEDED = (151, 2400, 2412)  # titles and elements: nothing is lost without them
-FUNCTIONS = {1: "time response", 2: "auto-spectrum", 3: "cross-spectrum", 5: "transmissibility",
-             6: "coherence", 7: "auto-correlation", 8: "cross-correlation",
-             9: "power spectral density", 12: "spectrum"}  # fmt: skip
+FUNCTIONS = {
+    1: "time response",
+    2: "auto-spectrum",
+    3: "cross-spectrum",
+    5: "transmissibility",
+    6: "coherence",
+    7: "auto-correlation",
+    8: "cross-correlation",
+    9: "power spectral density",
+    12: "spectrum",
+}
 RESPONSE, TIME = 4, 17  # codes of a function's type, and of what it stands over
 
 

@@ -160,5 +160,13 @@ def _name(value: Value) -> str:
 
 def _order(row: Value) -> tuple[object, ...]:
     label = row.label or Label(99, 0)
-    return (row.quantity != "frequency_Hz", row.quantity, row.pressure_kPa, row.load_N, label.c,
-            label.m, label.kind or "", row.member)  # fmt: skip
+    return (
+        row.quantity != "frequency_Hz",
+        row.quantity,
+        row.pressure_kPa,
+        row.load_N,
+        label.c,
+        label.m,
+        label.kind or "",
+        row.member,
+    )

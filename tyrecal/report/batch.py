@@ -50,8 +50,9 @@ def _table(*columns: str) -> Table:
     table = Table(box=box.SIMPLE_HEAD, padding=(0, 0, 0, 1), pad_edge=False, show_edge=False)
     for name in columns:
         figures = name in FIGURES
-        table.add_column(name, justify="right" if figures else "left", no_wrap=figures,
-                         overflow="fold")  # fmt: skip
+        table.add_column(
+            name, justify="right" if figures else "left", no_wrap=figures, overflow="fold"
+        )
     return table
 
 

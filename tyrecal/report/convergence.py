@@ -30,11 +30,25 @@ def draw_convergence(path: Path, history: Sequence[Mapping[str, Any]], unit: str
     many = len(point) > 60
     best = np.fmin.accumulate(objective)
     top.step(point, best, where="post", color=COLOURS[0], lw=1.8, label="best so far")
-    top.semilogy(point, objective, "o", color=COLOURS[1], ms=2.5 if many else 5, mec="white",
-                 mew=0 if many else 0.5, label="design point")  # fmt: skip
+    top.semilogy(
+        point,
+        objective,
+        "o",
+        color=COLOURS[1],
+        ms=2.5 if many else 5,
+        mec="white",
+        mew=0 if many else 0.5,
+        label="design point",
+    )
     if failed.any():
-        top.plot(point[failed], np.full(failed.sum(), 0.96), "kx", ms=3 if many else 6,
-                 transform=top.get_xaxis_transform(), label="could not be evaluated")  # fmt: skip
+        top.plot(
+            point[failed],
+            np.full(failed.sum(), 0.96),
+            "kx",
+            ms=3 if many else 6,
+            transform=top.get_xaxis_transform(),
+            label="could not be evaluated",
+        )
     top.set_ylabel(f"objective, {unit}")
 
     for k, (name, start) in enumerate(history[0]["values"].items()):

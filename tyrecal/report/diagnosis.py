@@ -169,9 +169,10 @@ def _where(d: Diagnosis) -> Iterator[str]:
             best.stiffness_percent / best.stiffness_sigma
         )
         change = (
-            f"mass {best.mass_percent:+.0f} % ± {best.mass_sigma:.0f} %" if heavier
+            f"mass {best.mass_percent:+.0f} % ± {best.mass_sigma:.0f} %"
+            if heavier
             else f"stiffness {best.stiffness_percent:+.0f} % ± {best.stiffness_sigma:.0f} %"
-        )  # fmt: skip
+        )
         same = f" (looks the same as {', '.join(best.same_as)})" if best.same_as else ""
         if best.evidence > 1:
             yield (

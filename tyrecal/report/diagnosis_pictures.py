@@ -59,8 +59,16 @@ def draw_residuals(path: Path, d: Diagnosis) -> None:
             at = np.array([_place(rows[i].label) for i in chosen])
             at = at + 0.16 * (k - (len(pressures) - 1) / 2)
             colour = COLOURS[k % len(COLOURS)]
-            panel.errorbar(at, 100 * gap.residuals[chosen], 100 * gap.spread[chosen], fmt="o",
-                           color=colour, ms=5, lw=1, label=f"{p:g} kPa")  # fmt: skip
+            panel.errorbar(
+                at,
+                100 * gap.residuals[chosen],
+                100 * gap.spread[chosen],
+                fmt="o",
+                color=colour,
+                ms=5,
+                lw=1,
+                label=f"{p:g} kPa",
+            )
             if after is not None:
                 panel.plot(at, 100 * after[chosen], "o", mfc="white", mec=colour, ms=5, zorder=3)
         panel.set_title(name, loc="left")
@@ -93,8 +101,9 @@ def draw_probabilities(path: Path, d: Diagnosis) -> None:
     colours = ["0.6" if h.key in (NONE, OUTSIDE) else COLOURS[0] for h in order]
     p = [d.probabilities[h.key] for h in order]
     axes.barh(place, p, color=colours, height=0.7)
-    axes.plot([h.prior for h in order], place, "|", color="black", ms=13, mew=1.5,
-              label="before the data")  # fmt: skip
+    axes.plot(
+        [h.prior for h in order], place, "|", color="black", ms=13, mew=1.5, label="before the data"
+    )
     for y, value, h in zip(place, p, order, strict=True):
         axes.text(max(value, h.prior) + 0.01, y, f"{value:.2f}", va="center", fontsize=8)
     axes.axvline(0.7, color=GREY, lw=0.8, ls=":")
@@ -170,12 +179,26 @@ def draw_section_map(
         f"   {_spread(p.mass_percent, p.mass_sigma)}   {_signed(p.evidence, 1):>8s}"
         for p in parts
     ]
-    beside.text(0.0, 0.98, "\n".join(table), transform=beside.transAxes, va="top", fontsize=7.5,
-              family="monospace")  # fmt: skip
+    beside.text(
+        0.0,
+        0.98,
+        "\n".join(table),
+        transform=beside.transAxes,
+        va="top",
+        fontsize=7.5,
+        family="monospace",
+    )
     same = [f"{p.region} looks like {', '.join(p.same_as)}" for p in parts if p.same_as]
     words = [fill(map_resolution(effective_rank), 62), *same]
-    beside.text(0.0, 0.02, "\n".join(words), transform=beside.transAxes, va="bottom", fontsize=7.5,
-              color="0.3")  # fmt: skip
+    beside.text(
+        0.0,
+        0.02,
+        "\n".join(words),
+        transform=beside.transAxes,
+        va="bottom",
+        fontsize=7.5,
+        color="0.3",
+    )
     headline(figure, "One part changed alone: how well it explains what calibration leaves")
     scale = ScalarMappable(Normalize(0, ENOUGH), WARM)
     bar = figure.colorbar(scale, ax=axes, orientation="horizontal", shrink=0.6, extend="max")

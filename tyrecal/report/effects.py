@@ -59,8 +59,9 @@ def effect_text(entry: Mapping[str, Any]) -> str:
 
 
 def _filled(words: str, head: str) -> str:
-    return fill(words, WIDTH, initial_indent=head, subsequent_indent=" " * len(head),
-                break_long_words=False)  # fmt: skip
+    return fill(
+        words, WIDTH, initial_indent=head, subsequent_indent=" " * len(head), break_long_words=False
+    )
 
 
 def signature_entry(found: Signature, values: Mapping[str, float]) -> dict[str, Any]:

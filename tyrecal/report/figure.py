@@ -20,10 +20,16 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 
 MARKERS = "os^Dv<>P"
 
-in_house_style = rc_context({
-    "font.size": 9, "axes.titlesize": 11, "axes.spines.top": False, "axes.spines.right": False,
-    "figure.dpi": DPI, "hatch.linewidth": 0.6,
-})  # fmt: skip
+in_house_style = rc_context(
+    {
+        "font.size": 9,
+        "axes.titlesize": 11,
+        "axes.spines.top": False,
+        "axes.spines.right": False,
+        "figure.dpi": DPI,
+        "hatch.linewidth": 0.6,
+    }
+)
 
 
 def new_figure(width: float, height: float, layout: str | None = "constrained") -> Figure:

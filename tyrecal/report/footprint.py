@@ -71,8 +71,14 @@ def draw_patches(path: Path, title: str, patches: Mapping[float, Patch], highest
         axes.tick_params(labelbottom=True)
     for axes in grid[:, 0]:
         axes.set_ylabel("along, mm")
-    figure.colorbar(bands, ax=list(grid.flat), shrink=0.8, ticks=levels, format="%.0f",
-                    label="contact pressure, kPa")  # fmt: skip
+    figure.colorbar(
+        bands,
+        ax=list(grid.flat),
+        shrink=0.8,
+        ticks=levels,
+        format="%.0f",
+        label="contact pressure, kPa",
+    )
     headline(figure, f"{title}: contact pressure at each load; dots: nodes that touch")
     save(figure, path)
 

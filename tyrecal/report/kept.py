@@ -132,13 +132,15 @@ def patches_data(
         for footprint in pressed.footprints:
             patch = patch_of(pressed, footprint, meshes[design])
             near = _grown(patch.touches)
-            patches.append({
-                "design": design,
-                "load_N": footprint.load_N,
-                "across_mm": _rounded(1e3 * patch.across[near], 3),
-                "along_mm": _rounded(1e3 * patch.along[near], 3),
-                "pressure_kPa": _rounded(1e-3 * patch.pressure[near], 3),
-            })  # fmt: skip
+            patches.append(
+                {
+                    "design": design,
+                    "load_N": footprint.load_N,
+                    "across_mm": _rounded(1e3 * patch.across[near], 3),
+                    "along_mm": _rounded(1e3 * patch.along[near], 3),
+                    "pressure_kPa": _rounded(1e-3 * patch.pressure[near], 3),
+                }
+            )
     return {"format": 1, "case": name, "patches": patches}
 
 

@@ -34,8 +34,15 @@ def draw_load_sweep(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
         for axes, name in zip(line, shown, strict=True):
             own = {k: curve for k, curve in curves.items() if k[0].family == name}
             for (label, symmetry), (load, hertz) in own.items():
-                axes.plot(load, hertz, color=COLOURS[label.c % len(COLOURS)], lw=1.4, ms=4.5,
-                          marker=MARKERS[label.c % len(MARKERS)], **STYLES[symmetry])  # fmt: skip
+                axes.plot(
+                    load,
+                    hertz,
+                    color=COLOURS[label.c % len(COLOURS)],
+                    lw=1.4,
+                    ms=4.5,
+                    marker=MARKERS[label.c % len(MARKERS)],
+                    **STYLES[symmetry],
+                )
             axes.set_title(f"{design}, {name or 'overtones'}", loc="left")
             axes.grid(True, color="0.92", lw=0.6)
         line[0].set_ylabel("frequency, Hz")

@@ -59,8 +59,11 @@ def sensors_words(told: Mapping[Label, Sequence[Label]]) -> str:
     for c in sorted({label.c for label in told}):
         mine = {label: alike for label, alike in told.items() if label.c == c}
         right = ", ".join(label.said for label, alike in mine.items() if not alike)
-        wrong = [f"cannot tell {label.said}, it looks like {_few(alike)}"
-                 for label, alike in mine.items() if alike]  # fmt: skip
+        wrong = [
+            f"cannot tell {label.said}, it looks like {_few(alike)}"
+            for label, alike in mine.items()
+            if alike
+        ]
         lines.append("; ".join([f"can tell {right}"] * bool(right) + wrong))
     return "\n".join(lines)
 
@@ -115,15 +118,22 @@ def _draw_functions(axes: Axes, run: Run) -> None:
         axes.axvline(hertz, color=COLOURS[0], lw=0.7, ls=(0, (4, 3)))
         level = level + 1 if hertz - before < 0.08 * (f[-1] - f[0]) else 0
         name = told.judged.label.said if told.judged.label else "?"
-        axes.annotate(name, (hertz, 1.0), (2, -9 - 13 * level),
-                      xycoords=("data", "axes fraction"), textcoords="offset points", fontsize=8,
-                      color=COLOURS[0], bbox={"fc": "white", "ec": "none", "pad": 0.8})  # fmt: skip
+        axes.annotate(
+            name,
+            (hertz, 1.0),
+            (2, -9 - 13 * level),
+            xycoords=("data", "axes fraction"),
+            textcoords="offset points",
+            fontsize=8,
+            color=COLOURS[0],
+            bbox={"fc": "white", "ec": "none", "pad": 0.8},
+        )
         before = hertz
     axes.set_xlim(min(f[0], *inside), f[-1])
     axes.set_xlabel("frequency, Hz")
     axes.set_ylabel("response over force")
     words = f"{Path(run.name).name}: root mean square over {len(run.functions)} functions"
-    axes.set_title(fill(words, 90), loc="left", pad=8)  # fmt: skip
+    axes.set_title(fill(words, 90), loc="left", pad=8)
     axes.legend(loc="lower right", facecolor="white", edgecolor="none", framealpha=1)
 
 
@@ -157,8 +167,12 @@ def _draw_shape(axes: Axes, told: Told) -> None:
         line = 1 + scale * waves(turn) @ np.linalg.lstsq(waves(at), u, rcond=None)[0]
         axes.plot(line * np.cos(turn), line * np.sin(turn), color=COLOURS[1], lw=1.2)
     for moved, where in zip(1 + scale * u, at, strict=True):
-        axes.plot(np.array([1, moved]) * np.cos(where), np.array([1, moved]) * np.sin(where),
-                  color=GREY, lw=0.8)  # fmt: skip
+        axes.plot(
+            np.array([1, moved]) * np.cos(where),
+            np.array([1, moved]) * np.sin(where),
+            color=GREY,
+            lw=0.8,
+        )
         axes.plot(moved * np.cos(where), moved * np.sin(where), "o", ms=4, color=COLOURS[0])
     axes.set_aspect("equal")
     axes.set_axis_off()
@@ -166,5 +180,12 @@ def _draw_shape(axes: Axes, told: Told) -> None:
     axes.set_ylim(-1.45, 1.45)
     name = f"{label.said if label else 'not told'}{' ' + told.member if told.member else ''}"
     axes.set_title(f"{name}, {told.mode.frequency_Hz:.2f} Hz", fontsize=9)
-    axes.text(0, 0, f"{COMPONENTS[k]}\n{told.judged.confidence:.2f}", ha="center", va="center",
-              fontsize=8, color=GREY)  # fmt: skip
+    axes.text(
+        0,
+        0,
+        f"{COMPONENTS[k]}\n{told.judged.confidence:.2f}",
+        ha="center",
+        va="center",
+        fontsize=8,
+        color=GREY,
+    )

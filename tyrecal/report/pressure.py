@@ -38,8 +38,9 @@ def draw_pressure_sweep(
     columns = {name: [x for x in labels if x.family == name] for name in (*FAMILIES, None)}
     shown = [name for name in columns if columns[name]]
     figure = new_figure(1.2 + 4.2 * len(shown), 7.6)
-    grid = figure.subplots(2, len(shown), sharex=True, sharey="row", height_ratios=[5, 3],
-                           squeeze=False)  # fmt: skip
+    grid = figure.subplots(
+        2, len(shown), sharex=True, sharey="row", height_ratios=[5, 3], squeeze=False
+    )
     for (top, bottom), name in zip(grid.T, shown, strict=True):
         top.set_title(name or "overtones, belt bends across", loc="left")
         for design, curves in designs.items():
@@ -54,8 +55,15 @@ def draw_pressure_sweep(
     top, bottom = grid[:, 0]
     top.set_ylabel("frequency, Hz")
     bottom.set_ylabel("d ln f / d ln p")
-    bottom.text(0.01, 0.5, "membrane: f ~ √p", color=GREY, va="bottom", fontsize=8,
-                transform=bottom.get_yaxis_transform())  # fmt: skip
+    bottom.text(
+        0.01,
+        0.5,
+        "membrane: f ~ √p",
+        color=GREY,
+        va="bottom",
+        fontsize=8,
+        transform=bottom.get_yaxis_transform(),
+    )
     top.set_ylim(bottom=0)
     bottom.set_ylim(top=max(0.54, bottom.get_ylim()[1]))
     for axes in grid.flat:

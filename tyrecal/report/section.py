@@ -31,10 +31,7 @@ DETAIL = 4.0  # magnification of the belt's edge
 
 @in_house_style
 def draw_section(
-    path: Path,
-    case: LoadedCase,
-    mesh: SectionMesh,
-    displacement: Mapping[int, Array] | None = None,
+    path: Path, case: LoadedCase, mesh: SectionMesh, displacement: Mapping[int, Array] | None = None
 ) -> None:
     """Draw rubber by region, elements, the cords of each layer and what the rim holds, in mm.
 
@@ -58,12 +55,15 @@ def draw_section(
     z, r = np.transpose([place[n] for n in around])
     name = fill(case.case.name, 64)
     figure.suptitle(name, fontsize=13)
-    facts = (f"outer diameter {2 * r.max():.1f} mm, section width {np.ptp(z):.1f} mm,"
-             f" {len(mesh.solids)} elements")  # fmt: skip
+    facts = (
+        f"outer diameter {2 * r.max():.1f} mm, section width {np.ptp(z):.1f} mm,"
+        f" {len(mesh.solids)} elements"
+    )
     axes.set_title(facts, fontsize=9, color="0.3")
     columns = max(1, min(3, LETTERS // max(map(len, entries))))
-    figure.legend(entries.values(), entries.keys(), loc="outside lower center", ncols=columns,
-                  frameon=False)  # fmt: skip
+    figure.legend(
+        entries.values(), entries.keys(), loc="outside lower center", ncols=columns, frameon=False
+    )
     (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
     lines = name.count("\n") - (-len(entries) // columns)
     height = AXES_WIDTH * (high - low) / (right - left)
@@ -142,14 +142,20 @@ def _detail(axes: Axes, case: LoadedCase, mesh: SectionMesh, place: dict[int, Ar
     inner = np.array([place[n] for k in mesh.inner for n in mesh.solids[k][:1]])
     half_width, height = abs(inner[0, 0]) * 0.9, np.ptp(inner[:, 1]) * 0.6
     top = inner[:, 1].max() - 0.16 * np.ptp(inner[:, 1])
-    inset = axes.inset_axes((-half_width, top - height, 2 * half_width, height),
-                            transform=axes.transData)  # fmt: skip
+    inset = axes.inset_axes(
+        (-half_width, top - height, 2 * half_width, height), transform=axes.transData
+    )
     _draw(inset, case, mesh, place, 2.0)
     z, r = np.mean(ends, axis=0) if ends else inner[len(inner) // 2]
     across, up = half_width / DETAIL, height / DETAIL / 2
     inset.set(xlim=(z - across, z + across), ylim=(r - up, r + up), xticks=[], yticks=[])
     for spine in inset.spines.values():
         spine.set(visible=True, color=GREY)
-    inset.text(0.02, 0.03, f"belt edge, {DETAIL:g} : 1" if ends else f"{DETAIL:g} : 1",
-               transform=inset.transAxes, color="0.3")  # fmt: skip
+    inset.text(
+        0.02,
+        0.03,
+        f"belt edge, {DETAIL:g} : 1" if ends else f"{DETAIL:g} : 1",
+        transform=inset.transAxes,
+        color="0.3",
+    )
     axes.indicate_inset_zoom(inset, edgecolor=GREY, alpha=1.0)

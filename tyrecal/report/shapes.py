@@ -12,10 +12,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d import Axes3D
-from mpl_toolkits.mplot3d.art3d import (
-    Line3DCollection,
-    Poly3DCollection,
-)
+from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 
 from ..modes.mode import Mode
 from ..tyre.mesh import SectionMesh

@@ -102,8 +102,10 @@ def load_table(rows: Sequence[Mapping[str, Any]], design: str) -> Table:
     table.title = f"{design}, Hz"
     found = [{(*_key(m), m["symmetry"]): m for m in row["modes"]} for row in rows]
     members = {key: mode for modes in reversed(found) for key, mode in modes.items()}
-    lowest = {_key(m): min(x["frequency_Hz"] for k, x in members.items() if k[:3] == _key(m))
-              for m in members.values()}  # fmt: skip
+    lowest = {
+        _key(m): min(x["frequency_Hz"] for k, x in members.items() if k[:3] == _key(m))
+        for m in members.values()
+    }
     for key in sorted(members, key=lambda k: (lowest[k[:3]], str(k[:3]), k[3] != "symmetric")):
         hertz = (f"{m[key]['frequency_Hz']:.2f}" if key in m else NONE for m in found)
         _add(table, *_named(members[key]), key[3], *hertz)
@@ -126,8 +128,16 @@ def load_csv(rows: Sequence[Mapping[str, Any]]) -> str:
 def fit_csv(fit: Mapping[str, Any]) -> str:
     """The modes of fit.json as CSV, all digits; where there are footprint targets, they follow in
     columns of their own."""
-    keys = ["c", "m", "kind", "multiplicity", "initial_Hz", "fitted_Hz", "target_Hz",
-            "deviation_percent"]  # fmt: skip
+    keys = [
+        "c",
+        "m",
+        "kind",
+        "multiplicity",
+        "initial_Hz",
+        "fitted_Hz",
+        "target_Hz",
+        "deviation_percent",
+    ]
     footprint = fit.get("footprint", [])
     if footprint:
         keys += ["load_N", "quantity", "initial", "fitted", "target", "sigma"]
@@ -142,8 +152,19 @@ def sweep_table(rows: Sequence[Mapping[str, Any]], findings: Mapping[str, Any]) 
     """One design's modes: Hz at both ends of the sweep, rise, slopes at both ends, curvature."""
     first, last = ({_key(mode): mode for mode in row["modes"]} for row in (rows[0], rows[-1]))
     low, high = findings["from_kPa"], findings["to_kPa"]
-    table = _table(("mode", "motion", f"Hz, {low:g} kPa", f"{high:g} kPa", "rise Hz", "rise %",
-                    "slope", f"{high:g} kPa", "curvature"))  # fmt: skip
+    table = _table(
+        (
+            "mode",
+            "motion",
+            f"Hz, {low:g} kPa",
+            f"{high:g} kPa",
+            "rise Hz",
+            "rise %",
+            "slope",
+            f"{high:g} kPa",
+            "curvature",
+        )
+    )
     table.title = findings["design"]
     table.caption = f"slope: d ln f / d ln p, at {low:g} and {high:g} kPa"
     for mode in findings["modes"]:
@@ -258,8 +279,9 @@ def _table(columns: tuple[str, ...]) -> Table:
     for name in columns:
         words = ("mode", "motion", "symmetry", "curvature", "design", *SOLVER_COLUMNS, *EFFECTS)
         figures = name not in words
-        table.add_column(name, justify="right" if figures else "left", no_wrap=figures,
-                         overflow="fold")  # fmt: skip
+        table.add_column(
+            name, justify="right" if figures else "left", no_wrap=figures, overflow="fold"
+        )
     return table
 
 

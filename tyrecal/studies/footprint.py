@@ -60,8 +60,14 @@ def footprint_result(
     for name, outcome in outcomes.items():
         reached, failure = progress(outcome)
         if failure:
-            failed.append({"design": name, "load_N": loads_N[reached],
-                           "cause": failure.cause, "words": failure.words})  # fmt: skip
+            failed.append(
+                {
+                    "design": name,
+                    "load_N": loads_N[reached],
+                    "cause": failure.cause,
+                    "words": failure.words,
+                }
+            )
     pressures = {name: each.pressure_kPa for name, each in pressed.items()}
     return {
         "format": 1,

@@ -132,10 +132,7 @@ def _unloaded(door: Door, values: Mapping[str, float]) -> Evaluation | Evaluatio
 
 
 def _loaded_tyre(
-    case: LoadedCase,
-    evaluation: Evaluation,
-    pressed: Pressed | EvaluationFailed,
-    with_zero: bool,
+    case: LoadedCase, evaluation: Evaluation, pressed: Pressed | EvaluationFailed, with_zero: bool
 ) -> Outcome:
     if isinstance(pressed, EvaluationFailed):
         return pressed

@@ -44,8 +44,14 @@ def load_sweep_result(
     for name, outcome in outcomes.items():
         reached, failure = progress(outcome)
         if failure:
-            failed.append({"design": name, "load_N": above[reached],
-                           "cause": failure.cause, "words": failure.words})  # fmt: skip
+            failed.append(
+                {
+                    "design": name,
+                    "load_N": above[reached],
+                    "cause": failure.cause,
+                    "words": failure.words,
+                }
+            )
     return {
         "format": 1,
         "pressure_kPa": {name: tyre.pressure_kPa for name, tyre in tyres.items()},

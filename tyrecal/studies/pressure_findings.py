@@ -38,12 +38,17 @@ def findings(states: Sequence[State], labels: Sequence[Label]) -> dict[str, Any]
         "families": [each for each in families if each["members"]],
         "least_mac": min((step.mac for _, _, step in steps), default=1.0),
         "disagreements": [
-            {"from_kPa": low, "to_kPa": high, "label": str(step.before),
-             "followed_to": str(step.after), "mac": step.mac}
+            {
+                "from_kPa": low,
+                "to_kPa": high,
+                "label": str(step.before),
+                "followed_to": str(step.after),
+                "mac": step.mac,
+            }
             for low, high, step in steps
             if step.before != step.after
         ],
-    }  # fmt: skip
+    }
     result["words"] = _words(result, labels)
     return result
 
@@ -99,8 +104,11 @@ def _words(found: Mapping[str, Any], labels: Sequence[Label]) -> list[str]:
     if any(mode["curvature"] == "unknown" for _, mode in modes):
         words.append("how the curves bend takes three pressures to tell")
     if bent:
-        odd = [f"{name} ({bent.get(name, 'neither')})" for name, _ in modes
-               if bent.get(name) != "concave"]  # fmt: skip
+        odd = [
+            f"{name} ({bent.get(name, 'neither')})"
+            for name, _ in modes
+            if bent.get(name) != "concave"
+        ]
         words.append(_all_but("every curve is concave, steeper at low pressure", odd))
     if not found["disagreements"]:
         words.append(

@@ -32,13 +32,17 @@ def sweep_result(
         "designs": {name: dict(values) for name, values in designs.items()},
         "rows": [row for each in by_design for row in _rows(each, labels)],
         "failed": [
-            {"design": each.design, "pressure_kPa": each.pressure_kPa,
-             "cause": each.failed.cause, "words": each.failed.words}
+            {
+                "design": each.design,
+                "pressure_kPa": each.pressure_kPa,
+                "cause": each.failed.cause,
+                "words": each.failed.words,
+            }
             for each in outcomes
             if isinstance(each, Failure)
         ],
         "findings": [findings(each, labels) for each in by_design if len(each) > 1],
-    }  # fmt: skip
+    }
 
 
 def _swept_labels(case: LoadedCase, states: Sequence[State]) -> list[Label]:

@@ -110,10 +110,12 @@ class Plain:
 
     def _signature(self, id: str, value: float, found: list[Evaluation]) -> Signature:
         lost = np.nan
-        hertz = np.array([
-            [m[label].frequency_Hz if label in m else lost for label in self.labels]
-            for m in map(_modes, found)
-        ])  # fmt: skip
+        hertz = np.array(
+            [
+                [m[label].frequency_Hz if label in m else lost for label in self.labels]
+                for m in map(_modes, found)
+            ]
+        )
         change = np.log(hertz / self.hertz)
         there = ~np.isnan(change)
         if not there.any():

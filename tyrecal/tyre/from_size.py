@@ -54,14 +54,24 @@ def usual(size: TyreSize, rim: float | None = None) -> Gauges:
             crown=9.5e-3 + 0.03 * size.width,
             sidewall=4.5e-3 + 0.015 * size.width,
             bead=11e-3 + 0.02 * size.width,
-            belt=belt, rim=rim, liner=1.8e-3, ply=1.6e-3, belts=1.5e-3, step=0.015,
-        )  # fmt: skip
+            belt=belt,
+            rim=rim,
+            liner=1.8e-3,
+            ply=1.6e-3,
+            belts=1.5e-3,
+            step=0.015,
+        )
     return Gauges(
         crown=7e-3 + 0.03 * size.width,
         sidewall=3e-3 + 0.01 * size.width,
         bead=8e-3 + 0.02 * size.width,
-        belt=belt, rim=rim, liner=1.2e-3, ply=1.2e-3, belts=1.2e-3, step=0.010,
-    )  # fmt: skip
+        belt=belt,
+        rim=rim,
+        liner=1.2e-3,
+        ply=1.2e-3,
+        belts=1.2e-3,
+        step=0.010,
+    )
 
 
 def build(size: TyreSize, gauges: Gauges) -> GaugeTable:
@@ -97,13 +107,15 @@ def build(size: TyreSize, gauges: Gauges) -> GaugeTable:
         [0, line.widest, line.rim, line.end], [g.liner, g.liner, inside_bead, inside_bead]
     )(s)
     tiny = 1e-9
-    rows = np.stack([
-        -inside,
-        np.zeros_like(s),
-        np.where(s <= half_belt + tiny, g.ply, np.nan),
-        np.where(s <= half_belt - g.step / 2 + tiny, g.ply + g.belts, np.nan),
-        total - inside,
-    ])  # fmt: skip
+    rows = np.stack(
+        [
+            -inside,
+            np.zeros_like(s),
+            np.where(s <= half_belt + tiny, g.ply, np.nan),
+            np.where(s <= half_belt - g.step / 2 + tiny, g.ply + g.belts, np.nan),
+            total - inside,
+        ]
+    )
     table = GaugeTable(LINES, "ply", line.at(s), rows, labels, s >= line.rim - tiny)
     outside = table.section().points[-1, :, 1]
     at = s[np.argmax(outside)]

@@ -92,14 +92,25 @@ def section_of_outline(
             f"the belt must be between {1e3 * belt_step:.1f} and {2e3 * arc[widest]:.1f} mm wide,"
             f" got {1e3 * belt_width:.1f}"
         )
-    rim = float(np.interp(rim_radius, carcass[below[0] - 1 : below[0] + 1][::-1, 0],
-                          arc[below[0] - 1 : below[0] + 1][::-1]))  # fmt: skip
+    rim = float(
+        np.interp(
+            rim_radius,
+            carcass[below[0] - 1 : below[0] + 1][::-1, 0],
+            arc[below[0] - 1 : below[0] + 1][::-1],
+        )
+    )
     ends = [0.0, edge - belt_step / 2, edge, arc[widest], rim, arc[-1]]
     parts = zip(STATIONS.values(), ends, ends[1:], strict=False)
     s = np.concatenate([[0.0], *(np.linspace(a, b, n + 1)[1:] for n, a, b in parts)])
-    distances = np.stack([
-        np.zeros_like(arc), depth, depth + belt_depth, depth + belt_depth + belt_spacing, thickness,
-    ])  # fmt: skip
+    distances = np.stack(
+        [
+            np.zeros_like(arc),
+            depth,
+            depth + belt_depth,
+            depth + belt_depth + belt_spacing,
+            thickness,
+        ]
+    )
     if (distances[3] >= thickness)[arc <= edge].any():
         raise SectionError("the belts do not lie inside the tyre: it is thinner than their depth")
     lines = inner + distances[..., None] * rays

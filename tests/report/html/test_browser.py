@@ -20,9 +20,18 @@ from .test_page import HOSTILE
 selenium = pytest.importorskip("selenium")
 BROWSER, DRIVER = shutil.which("chromium"), shutil.which("chromedriver")
 pytestmark = pytest.mark.browser
-FLAGS = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
-         "--hide-scrollbars", "--disable-background-networking", "--disable-component-update",
-         "--disable-sync", "--disable-dev-shm-usage"]  # fmt: skip
+FLAGS = [
+    "--headless",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--hide-scrollbars",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--disable-dev-shm-usage",
+]
 OF_CANVAS = "return document.querySelector('.stage canvas')"
 PICTURE = f"{OF_CANVAS}.toDataURL()"
 # height over width of what is painted
@@ -221,8 +230,10 @@ def test_it_prints_on_a4_every_mode(browser: Any, address: str) -> None:
     show(browser, address, 768, prefers_color_scheme="dark")
     answer = browser.execute_cdp_cmd("Page.printToPDF", {"preferCSSPageSize": True})
     pdf = base64.b64decode(answer["data"])
-    sizes = {tuple(map(float, box.split()))
-             for box in re.findall(r"/MediaBox \[([\d. ]+)\]", pdf.decode("latin-1"))}  # fmt: skip
+    sizes = {
+        tuple(map(float, box.split()))
+        for box in re.findall(r"/MediaBox \[([\d. ]+)\]", pdf.decode("latin-1"))
+    }
     assert sizes and all(abs(w - 595) < 2 and abs(h - 842) < 2 for _, _, w, h in sizes)
     small = "return [...document.querySelectorAll('.gallery canvas')].map((c) => c.toDataURL())"
     pictures = browser.execute_script(small)

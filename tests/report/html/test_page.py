@@ -97,15 +97,28 @@ def test_table_2_is_there(folder: Path) -> None:
 @pytest.mark.parametrize(
     "words",
     [
-        "Fit", "Shapes of the fitted tyre", "Mode shapes under 1000 N, on the tread", "Section",
-        "Frequencies over pressure", "Footprint", "Frequencies over load", "Diagnosis",
-        "Mind: C10 ended at a bound", "Mind: 1 design could not be evaluated",
-        "Mind: not reached: fitted, 10 kPa: it buckles", "Mind: not reached: initial, 900000 N",
-        "Mind: not reached: fitted, 30000 N: rim on road", "Fitted: every mode rises; every curve",
-        "Named: rim_width explains the gap. Probability 0.71", "weigh the tyre", "upper sidewall",
-        "contact area, cm²", "A_belt sets rebar_layers.belt_1.area_m2", "Toy & sons",
+        "Fit",
+        "Shapes of the fitted tyre",
+        "Mode shapes under 1000 N, on the tread",
+        "Section",
+        "Frequencies over pressure",
+        "Footprint",
+        "Frequencies over load",
+        "Diagnosis",
+        "Mind: C10 ended at a bound",
+        "Mind: 1 design could not be evaluated",
+        "Mind: not reached: fitted, 10 kPa: it buckles",
+        "Mind: not reached: initial, 900000 N",
+        "Mind: not reached: fitted, 30000 N: rim on road",
+        "Fitted: every mode rises; every curve",
+        "Named: rim_width explains the gap. Probability 0.71",
+        "weigh the tyre",
+        "upper sidewall",
+        "contact area, cm²",
+        "A_belt sets rebar_layers.belt_1.area_m2",
+        "Toy & sons",
     ],
-)  # fmt: skip
+)
 def test_what_was_found_is_told(folder: Path, words: str) -> None:
     assert words in words_of(text_of(folder))
 
@@ -198,12 +211,19 @@ def test_several_folders_stand_side_by_side(folder: Path, copy: Path) -> None:
     (copy / "diagnosis.json").unlink()
     both = words_of(text_of(folder, copy)).replace("\u2212", "-")
     for words in (
-        "objective initial33.13 Hz33.13 sigmas", "objective fitted8.60 Hz0.70 sigmas",
-        "worst mode[3,1] ● +5.06 %[0,0] lateral ◐ -2.65 %", "design pointsyes, 9no, 9",
-        "A_belt3.6e-07 ± 10 %–", "C108e+05, at bound–", "D1–3.6e-07 ± 200 %",
-        "angle70 held70 held", "[2,0] ovalisation○ -0.10–", "4000 N contact area◐ -3.70–",
-        "verdictNamed–", "likeliest probabilityrim_width 0.71–",
-    ):  # fmt: skip
+        "objective initial33.13 Hz33.13 sigmas",
+        "objective fitted8.60 Hz0.70 sigmas",
+        "worst mode[3,1] ● +5.06 %[0,0] lateral ◐ -2.65 %",
+        "design pointsyes, 9no, 9",
+        "A_belt3.6e-07 ± 10 %–",
+        "C108e+05, at bound–",
+        "D1–3.6e-07 ± 200 %",
+        "angle70 held70 held",
+        "[2,0] ovalisation○ -0.10–",
+        "4000 N contact area◐ -3.70–",
+        "verdictNamed–",
+        "likeliest probabilityrim_width 0.71–",
+    ):
         assert words in both, words
     assert "Side by side" not in words_of(text_of(folder))
     (copy / "fit.json").unlink()
@@ -226,8 +246,10 @@ def test_shapes_of_another_run_are_not_shown(copy: Path) -> None:
     assert text_of(copy).count('class="viewer"') == 1
 
 
-@pytest.mark.parametrize("content", ["", "{", "[]", "null", "{}", "\ud800", '{"format": 1}', "7",
-                                     '{"format": ' + "1" * 5000 + "}"])  # fmt: skip
+@pytest.mark.parametrize(
+    "content",
+    ["", "{", "[]", "null", "{}", "\ud800", '{"format": 1}', "7", '{"format": ' + "1" * 5000 + "}"],
+)
 def test_a_damaged_file_is_named(copy: Path, content: str) -> None:
     for file in sorted(copy.glob("*.json")):
         if file.name == "run.json" or (file.name, content) == ("effects.json", "[]"):
@@ -349,8 +371,10 @@ def _contrast(a: str, b: str) -> float:
 def test_contrast_is_aa() -> None:
     """Text 4.5 : 1, what is drawn 3 : 1, on paper and panels, in light, dark and print."""
     css = (ROOT / "templates/report/style.css").read_text()
-    themes = [dict(re.findall(r"--(\w[\w-]*): (#\w{6});", block))
-              for block in re.findall(r":root \{(.*?)\}", css, re.S)]  # fmt: skip
+    themes = [
+        dict(re.findall(r"--(\w[\w-]*): (#\w{6});", block))
+        for block in re.findall(r":root \{(.*?)\}", css, re.S)
+    ]
     assert len(themes) == 3 and themes[0].keys() == themes[1].keys() == themes[2].keys()
     assert _contrast("#ffffff", "#000000") == pytest.approx(21)
     for theme in themes:
@@ -364,8 +388,17 @@ def test_contrast_is_aa() -> None:
 
 def test_the_page_says_what_its_results_are_of(copy: Path) -> None:
     words = words_of(text_of(copy))
-    for told in ("01234567", "rim.mass_kg = 12.5", "200", "1000 to 4000", "coarse", "ring 1.0",
-                 "tyrecal 0.1.0", "a drum", "fedcba98"):  # fmt: skip
+    for told in (
+        "01234567",
+        "rim.mass_kg = 12.5",
+        "200",
+        "1000 to 4000",
+        "coarse",
+        "ring 1.0",
+        "tyrecal 0.1.0",
+        "a drum",
+        "fedcba98",
+    ):
         assert told in words, told
     assert "not all of one tyre" not in words and "did not finish" not in words
     modes = json.loads((copy / "modes.json").read_text())

@@ -49,13 +49,15 @@ def comparison(results: Sequence[Results]) -> list[Group]:
         aims = dict.fromkeys(aim for fit in fits if fit for aim in _deviations(fit))
         groups = [
             Group("Fit", list(_whole(fits))),
-            Group("Variables ± standard error",
-                  [Row(n, "", _cells(fits, partial(_variable, name=n))) for n in names]),
+            Group(
+                "Variables ± standard error",
+                [Row(n, "", _cells(fits, partial(_variable, name=n))) for n in names],
+            ),
             Group(
                 "Fitted over target, %",
                 [Row(*aim, _cells(fits, partial(_graded, aim=aim))) for aim in aims],
             ),
-        ]  # fmt: skip
+        ]
     if any(diagnoses):
         groups.append(Group("Diagnosis", list(_verdicts(diagnoses))))
     return groups

@@ -35,8 +35,9 @@ class _Plane:
     def place(self, flat: Sequence[float]) -> np.ndarray:
         """Pixels (n, 2) of z, r, one after the other."""
         z, r = np.reshape(flat, (-1, 2)).T
-        return np.stack([AIR + (z - self.low[0]) * self.scale,
-                         AIR + (self.top - r) * self.scale], 1)  # fmt: skip
+        return np.stack(
+            [AIR + (z - self.low[0]) * self.scale, AIR + (self.top - r) * self.scale], 1
+        )
 
     def path(self, lines: Iterable[Sequence[float]], style: str, close: bool = True) -> Markup:
         """Polygons, or open lines, as one path."""

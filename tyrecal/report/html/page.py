@@ -32,9 +32,14 @@ LARGEST = 5_000_000  # bytes of a page
 SHOWN, LEAST = 12, 0.005  # explanations, and the probability below which one is not shown
 MARK = '<meta name="generator" content="tyrecal report">'
 STUDIES = {
-    "fit": "fit", "modes": "modes", "pressure": "sweep-pressure", "footprint": "footprint",
-    "effects": "effects", "load": "modes --sweep-load", "diagnosis": "diagnose",
-}  # fmt: skip
+    "fit": "fit",
+    "modes": "modes",
+    "pressure": "sweep-pressure",
+    "footprint": "footprint",
+    "effects": "effects",
+    "load": "modes --sweep-load",
+    "diagnosis": "diagnose",
+}
 
 
 @dataclass(frozen=True)
@@ -126,9 +131,11 @@ def _effects(found: Effects) -> dict[str, Any]:
     """One row an effect, at the pressure in the middle."""
     first = found.entries[0].rows
     middle = first[len(first) // 2].pressure_kPa
-    labels = list(dict.fromkeys(
-        (m.c, m.m, m.kind) for each in found.entries for row in each.rows for m in row.modes
-    ))  # fmt: skip
+    labels = list(
+        dict.fromkeys(
+            (m.c, m.m, m.kind) for each in found.entries for row in each.rows for m in row.modes
+        )
+    )
     rows = []
     for each in found.entries:
         modes = [m for row in each.rows if row.pressure_kPa == middle for m in row.modes]

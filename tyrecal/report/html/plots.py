@@ -134,8 +134,11 @@ def _families(
             continue
         x = around([x for curve in own.values() for x, _ in curve], across)
         title = f"{family or 'across the belt'}, {' and '.join(sorted(designs, reverse=True))}"
-        panel = Panel(title if zero else f"slopes, {family or 'across the belt'}",
-                      x, around(every, up, zero=zero))  # fmt: skip
+        panel = Panel(
+            title if zero else f"slopes, {family or 'across the belt'}",
+            x,
+            around(every, up, zero=zero),
+        )
         for (design, mode, symmetry), curve in own.items():
             other = symmetry == SYMMETRIES[1] or (not symmetry and design == "initial")
             style = f"s{mode.c % 6}"

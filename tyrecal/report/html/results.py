@@ -66,10 +66,14 @@ class Results:
     def provenances(self) -> dict[str, Provenance]:
         """What the results of each study are of, where they say so."""
         known: dict[str, Whole | Effects | None] = {
-            "fit": self.fit, "modes": self.modes, "sweep-pressure": self.pressure,
-            "footprint": self.footprint, "effects": self.effects, "sweep-load": self.load,
+            "fit": self.fit,
+            "modes": self.modes,
+            "sweep-pressure": self.pressure,
+            "footprint": self.footprint,
+            "effects": self.effects,
+            "sweep-load": self.load,
             "diagnose": self.diagnosis,
-        }  # fmt: skip
+        }
         return {name: each.provenance for name, each in known.items() if each and each.provenance}
 
     @property
@@ -114,8 +118,10 @@ def read_results(folder: Path) -> Results:
         last = "" if run.finished else f": its last run, 'tyrecal {run.command}', did not finish"
         if (folder / "batch.json").exists():
             last = "; it is a batch's: give the folders of its cases, which stand in it"
-        raise InputError(f"'{folder}' holds no results of fit, modes, sweep-pressure, footprint,"
-                         f" effects or diagnose{last}")  # fmt: skip
+        raise InputError(
+            f"'{folder}' holds no results of fit, modes, sweep-pressure, footprint,"
+            f" effects or diagnose{last}"
+        )
     return found
 
 

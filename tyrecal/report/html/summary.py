@@ -7,16 +7,7 @@ from dataclasses import dataclass, field
 
 from ...units import said
 from ..words import fit_doubts, nearness
-from .contents import (
-    Diagnosis,
-    Effect,
-    Failed,
-    Fit,
-    Footprints,
-    LoadSweep,
-    Modes,
-    PressureSweep,
-)
+from .contents import Diagnosis, Effect, Failed, Fit, Footprints, LoadSweep, Modes, PressureSweep
 from .results import Results
 
 VERDICTS = {

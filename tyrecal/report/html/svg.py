@@ -92,8 +92,11 @@ class Panel:
         """A polyline; ``step``: a staircase. Points that are not finite are gaps."""
         there = [self.place(p) for p in points if math.isfinite(p[1])]
         if step:
-            there = [p for a, b in zip(there, [*there[1:], there[-1]], strict=True)
-                     for p in (a, (b[0], a[1]))]  # fmt: skip
+            there = [
+                p
+                for a, b in zip(there, [*there[1:], there[-1]], strict=True)
+                for p in (a, (b[0], a[1]))
+            ]
         text = " ".join(f"{x:g},{y:g}" for x, y in there)
         self.parts.append(Markup('<polyline class="{}" points="{}"/>').format(style, text))
 
@@ -101,18 +104,21 @@ class Panel:
         """A mark, and what it says under the mouse."""
         x, y = self.place(point)
         self.parts.append(
-            Markup('<path class="mark {}" d="{}" transform="translate({:g} {:g})">'
-                   "<title>{}</title></path>").format(
-                style, MARKS[kind % len(MARKS)], x, y, words)
-        )  # fmt: skip
+            Markup(
+                '<path class="mark {}" d="{}" transform="translate({:g} {:g})">'
+                "<title>{}</title></path>"
+            ).format(style, MARKS[kind % len(MARKS)], x, y, words)
+        )
 
     def cross(self, point: Point, words: str) -> None:
         """A measured value."""
         x, y = self.place(point)
         self.parts.append(
-            Markup('<path class="target" d="M-5-5L5 5M-5 5L5-5" transform="translate({:g} {:g})">'
-                   "<title>{}</title></path>").format(x, y, words)
-        )  # fmt: skip
+            Markup(
+                '<path class="target" d="M-5-5L5 5M-5 5L5-5" transform="translate({:g} {:g})">'
+                "<title>{}</title></path>"
+            ).format(x, y, words)
+        )
 
     def level(self, value: float, words: str = "") -> None:
         """A line across at a value of y."""
