@@ -29,18 +29,17 @@ from typing import Any
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
-from tyrecal_solvers.calculix.press import read_press, read_radius, run_press
 from tyrecal_solvers.calculix.results import read_fields
 from tyrecal_solvers.calculix.runner import run_job
 from tyrecal_solvers.process import RunFailed
 
 from tyrecal.case import LoadedCase, load_case, with_values
-from tyrecal.deck.environment import environment
-from tyrecal.deck.press import Angles, Road, press_texts
 from tyrecal.deck.write import Decks
 from tyrecal.evaluate.door import Door
 from tyrecal.evaluate.failure import EvaluationFailed
 
+from ..solvers.press_deck import Angles, Road, press_texts
+from ..solvers.press_results import read_press, read_radius, run_press
 from .calculix import common
 from .tread_gap import area_of_gap, areas_of_gap, outside, sunk_in
 
@@ -154,9 +153,8 @@ def meshed(along: Sequence[int], rows: Sequence[int]) -> LoadedCase:
 def deck(run: Run, deflections_m: Sequence[float], radius_m: float, folder: Path) -> None:
     """Write the run's deck."""
     folder.mkdir(parents=True, exist_ok=True)
-    env = environment("calculix", None)
     texts = press_texts(
-        case_of(run), env, deflections_m, run.mesh.angles, radius_m, run.road, run.largest_increment
+        case_of(run), deflections_m, run.mesh.angles, radius_m, run.road, run.largest_increment
     )
     for name, text in texts.items():
         (folder / name).write_text(text)

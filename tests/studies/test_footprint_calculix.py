@@ -8,10 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tyrecal.deck.environment import environment
-from tyrecal.deck.press import Angles, press_texts
-
-from ..deck.test_press import coarse_case
+from ..solvers.press_deck import Angles, press_texts
+from ..solvers.test_press_deck import coarse_case
 from .footprint_calculix import extrapolated
 from .tread_gap import area_of_gap, serendipity, tread_faces
 
@@ -48,8 +46,7 @@ def test_functions_of_a_face() -> None:
 
 @pytest.mark.parametrize("element", ["C3D8", "C3D20"])
 def test_faces_lie_on_the_tread(element: str, tmp_path: Path) -> None:
-    env = environment("calculix", None)
-    texts = press_texts(coarse_case(element), env, [0.01], HALF, 0.3925)
+    texts = press_texts(coarse_case(element), [0.01], HALF, 0.3925)
     (tmp_path / "wheel.inp").write_text(texts["wheel.inp"])
     faces = tread_faces(tmp_path)
     assert {len(face) for face in faces} == {8 if element == "C3D20" else 4}

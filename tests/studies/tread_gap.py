@@ -9,11 +9,12 @@ from pathlib import Path
 
 import numpy as np
 from scipy.integrate import trapezoid
-from tyrecal_solvers.calculix.press import read_press
 from tyrecal_solvers.calculix.results import read_fields
 
-from tyrecal.deck.press import OUTER_NODES
 from tyrecal.evaluate.pressed import Footprint, Pressed
+
+from ..solvers.press_deck import OUTER_NODES
+from ..solvers.press_results import read_press
 
 Array = np.ndarray
 CROWN_M = 0.09  # half of what can touch, from the middle

@@ -11,10 +11,9 @@ import pytest
 from tyrecal.case import LoadedCase, load_case
 from tyrecal.deck.calculix import calculix_context
 from tyrecal.deck.context import section_mesh
-from tyrecal.deck.environment import environment
-from tyrecal.deck.press import Angles, Road, around, press_texts
 
 from ..conftest import CASES
+from .press_deck import Angles, Road, around, press_texts
 
 WHOLE = Angles(6.0, 24.0, 20.0, 1.5, whole=True)
 HALF = replace(WHOLE, whole=False)
@@ -83,7 +82,7 @@ def test_sizes_once_around(angles: Angles) -> None:
 def test_numbers_have_no_gaps(element: str, angles: Angles) -> None:
     """CalculiX reserves memory up to the largest number."""
     case = coarse_case(element)
-    texts = press_texts(case, environment("calculix", None), [0.01], angles, 0.3925)
+    texts = press_texts(case, [0.01], angles, 0.3925)
     text = texts["wheel.inp"] + texts["press.inp"]
     blocks = re.findall(r"^(\*(?:NODE, NSET|ELEMENT,).*)\n((?:[^*].*\n)+)", text, re.M)
     nodes, elements, used = [], [], set()
@@ -140,8 +139,7 @@ def test_the_half_turned_about_x_is_the_other_half(element: str) -> None:
 def test_the_road_meets_the_tread(element: str) -> None:
     """Its face lies at the outer radius, its travel ends at inflated radius less deflection."""
     case = coarse_case(element)
-    env = environment("calculix", None)
-    texts = press_texts(case, env, [0.006, 0.01], HALF, 0.3925, Road(friction=0.0))
+    texts = press_texts(case, [0.006, 0.01], HALF, 0.3925, Road(friction=0.0))
     tyre = around(calculix_context(case), HALF)
     place = {n: np.array(xyz) for n, *xyz in tyre["nodes"]}
     outer = [place[n] for n in dict(tyre["node_sets"])["TREAD_NODES"]]
@@ -153,7 +151,7 @@ def test_the_road_meets_the_tread(element: str) -> None:
     press = texts["press.inp"]
     assert (
         "*FRICTION" not in press
-        and "*FRICTION" in press_texts(case, env, [0.006], HALF, 0.3925)["press.inp"]
+        and "*FRICTION" in press_texts(case, [0.006], HALF, 0.3925)["press.inp"]
     )
     faces = re.findall(r"^\*NODE, NSET=ROAD\n((?:\d.*\n){8})", press, re.M)[0].split("\n")[:8]
     assert min(float(row.split(",")[1]) for row in faces) == pytest.approx(radius)

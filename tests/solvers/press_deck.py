@@ -11,14 +11,16 @@ import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from itertools import accumulate
+from pathlib import Path
 from typing import Any
 
-from ..case import LoadedCase
-from .calculix import calculix_context
-from .environment import render
-from .header import header
-from .sector import Sector
+from tyrecal.case import LoadedCase
+from tyrecal.deck.calculix import calculix_context
+from tyrecal.deck.environment import environment, render
+from tyrecal.deck.header import header
+from tyrecal.deck.sector import Sector
 
+TEMPLATES = Path(__file__).parent / "templates"
 OUTER_FACE = "S4"  # a brick's face over side 2 of the section's element
 OUTER_NODES = (1, 2, 5, 6, 9, 13, 17, 18)  # that face's among a brick's nodes
 Row = tuple[int, ...]  # an element's number and its nodes'
@@ -60,7 +62,6 @@ class Road:
 
 def press_texts(
     case: LoadedCase,
-    env: Any,
     deflections_m: Sequence[float],
     angles: Angles,
     inflated_radius_m: float,
@@ -80,7 +81,7 @@ def press_texts(
     names["corners"] = [(x, y, z) for x in (radius, 1.1 * radius) for y, z in square]
     names["travels"] = [(d, inflated_radius_m - d - radius) for d in deflections_m]
     names["road"], names["largest_increment"] = asdict(road or Road()), largest_increment
-    jobs = ("wheel", "press")
+    env, jobs = environment("calculix", TEMPLATES), ("wheel", "press")
     return {f"{name}.inp": header(case) + render(env, f"{name}.inp.j2", names) for name in jobs}
 
 

@@ -8,13 +8,11 @@ import sys
 from pathlib import Path
 
 import pytest
-from tyrecal_solvers.calculix.press import read_press, read_pressures, read_radius, run_press
 from tyrecal_solvers.process import RunFailed
 
-from tyrecal.deck.environment import environment
-from tyrecal.deck.press import Angles, press_texts
-
-from ..deck.test_press import coarse_case
+from .press_deck import Angles, press_texts
+from .press_results import read_press, read_pressures, read_radius, run_press
+from .test_press_deck import coarse_case
 
 DECK = "** deflection 0.006 m\n1, -0.005\n** deflection 0.01 m\n2, -0.009\n"
 DAT = """
@@ -174,7 +172,7 @@ def test_road_and_rim_balance(tmp_path: Path) -> None:
     """Without pressure, which CalculiX would count in part as the rim's reaction."""
     case = coarse_case("C3D8")
     angles = Angles(8.0, 16.0, 32.0, 2.0)
-    texts = press_texts(case, environment("calculix", None), [0.004], angles, 0.39215)
+    texts = press_texts(case, [0.004], angles, 0.39215)
     pressureless = re.sub(r"^(CAVITY, P6, ).*$", r"\g<1>0.0", texts["press.inp"], flags=re.M)
     (tmp_path / "wheel.inp").write_text(texts["wheel.inp"])
     (tmp_path / "press.inp").write_text(pressureless)

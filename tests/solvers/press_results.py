@@ -8,10 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-
-from ..process import RunFailed
-from .results import read_fields
-from .runner import run_job
+from tyrecal_solvers.calculix.results import read_fields
+from tyrecal_solvers.calculix.runner import run_job
+from tyrecal_solvers.process import RunFailed
 
 JOB, WHEEL = "press", "wheel.inp"
 BALANCE = 0.02  # of the force: CalculiX counts pressure on held nodes as the rim's reaction
