@@ -17,7 +17,8 @@ if TYPE_CHECKING:
     from ..case import LoadedCase
 
 GROUP = "tyrecal.effects"
-# Each a module of this package; in this order they are listed, and applied to a case.
+SPINDLE = ("spindle_lateral", "spindle_radial", "spindle_torsional", "spindle_tilt")
+# Each in a module of its own name, or in SPINDLE's; listed, and applied to a case, in this order.
 OWN = (
     "dynamic_stiffening",
     "frequency_stiffening",
@@ -35,10 +36,7 @@ OWN = (
     "temperature",
     "temperature_drift",
     "cavity_air",
-    "spindle_lateral",
-    "spindle_radial",
-    "spindle_torsional",
-    "spindle_tilt",
+    *SPINDLE,
     "wheel_free",
     "stiffness_splice",
     "point_mass",
@@ -57,7 +55,8 @@ __all__ = ["IDS", "Effect", "EffectRefused", "catalogue", "with_effects"]
 @cache
 def catalogue() -> dict[str, Effect]:
     """Every effect by its id. (Modules are imported here: the case's schema needs the ids only.)"""
-    own = {id: import_module(f".{id}", __package__).EFFECT for id in OWN}
+    spindle = {effect.id: effect for effect in import_module(".spindle", __package__).EFFECTS}
+    own = {id: spindle.get(id) or import_module(f".{id}", __package__).EFFECT for id in OWN}
     return {**own, **{id: _ADDED[id].load() for id in sorted(_ADDED)}}
 
 

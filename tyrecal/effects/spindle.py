@@ -1,0 +1,82 @@
+"""What holds the wheel gives way: the rim moves with its own mass."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ..case import LoadedCase
+from .edit import on_spindle
+from .effect import Effect
+
+
+def _spindle(direction: str, key: str, along: str, **entry: Any) -> Effect:
+    """The compliance ``key`` of the case's `rim.spindle`."""
+
+    def add(case: LoadedCase, value: float) -> LoadedCase:
+        return on_spindle(case, key, value)
+
+    add.__doc__ = (
+        f"Compliance ``value`` more {along}; the wheel's mass and inertia are the case's (`rim`)."
+    )
+    return Effect(
+        id=f"spindle_{direction}",
+        title=f"{direction.capitalize()} compliance of the spindle",
+        low=0.0,
+        changes=("*SPRING", "*MASS", "*ROTARY INERTIA", "*BOUNDARY"),
+        add=add,
+        needs="spindle",
+        **entry,
+    )
+
+
+EFFECTS = (
+    _spindle(
+        "lateral",
+        "lateral_m_per_N",
+        "along the axle",
+        symbol="c_y",
+        unit="m/N",
+        high=4e-07,
+        signature="[0,0] lateral down, -10 % at 4e-7 m/N and 240 kPa, the more the higher the"
+        " pressure; no other mode; a re-fit hides a quarter",
+        toggle="press on the hub along the axle and read a dial gauge; or use a stiffer clamp",
+        aliases=(),
+    ),
+    _spindle(
+        "radial",
+        "radial_m_per_N",
+        "along any radius",
+        symbol="c_r",
+        unit="m/N",
+        high=1e-07,
+        signature="[1,0] down, -7 % at 1e-7 m/N and 240 kPa, the more the higher the pressure;"
+        " [1,1] hardly, no other mode; a re-fit hides two fifths",
+        toggle="press on the hub radially and read a dial gauge; or use a stiffer clamp",
+        aliases=("cavity_air",),
+    ),
+    _spindle(
+        "torsional",
+        "torsional_rad_per_N_m",
+        "about the axle",
+        symbol="c_t",
+        unit="rad/(N m)",
+        high=2e-06,
+        signature="[0,0] torsional down, -6 % at 2e-6 rad/(N m) and 240 kPa, the more the higher"
+        " the pressure; no other mode; a re-fit hides a quarter",
+        toggle="turn the locked hub with a torque wrench and read a dial gauge;"
+        " or lock it elsewhere",
+        aliases=("belt_width", "cap_ply", "temperature", "frequency_stiffening"),
+    ),
+    _spindle(
+        "tilt",
+        "tilt_rad_per_N_m",
+        "about any diameter",
+        symbol="c_d",
+        unit="rad/(N m)",
+        high=4e-06,
+        signature="[1,1] down, -9 % at 4e-6 rad/(N m) and 240 kPa, the more the higher the"
+        " pressure; [1,0] hardly, no other mode; a re-fit hides a quarter",
+        toggle="press on the flange sideways and read two dial gauges; or use a stiffer clamp",
+        aliases=(),
+    ),
+)
