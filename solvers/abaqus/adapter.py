@@ -10,7 +10,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ..bundled.keywords import DeckError
+from ..bundled.deck.keywords import DeckError
 from ..process import RunFailed
 from .dat import read_dat
 from .evidence import checked_modes

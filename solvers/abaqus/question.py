@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..bundled.keywords import DeckError, read_keywords
+from ..bundled.deck.keywords import DeckError, read_keywords
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from .deck.keywords import DeckError
 from .job import Failures, TimedOut, run
-from .keywords import DeckError
 
 
 def main(arguments: list[str] | None = None) -> int:

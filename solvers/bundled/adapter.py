@@ -9,9 +9,10 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from . import VERSION, press_job
+from . import VERSION
+from .deck.keywords import DeckError
 from .job import Failures, TimedOut, run
-from .keywords import DeckError
+from .road import footprint_job
 
 JOB, PRESS, OLDJOB = "modes", "press", "inflate"
 ASIDE = ("own_frequency", "cavity", "sector")  # of the tool's request, as in `request.Request`
@@ -79,7 +80,7 @@ class Bundled:
     def read(self, folder: Path) -> dict[str, Any]:
         """Results as plain data: the last frequency step of the job, or the footprints."""
         if (folder / f"{PRESS}.inp").exists():
-            return press_job.read(folder / PRESS)
+            return footprint_job.read(folder / PRESS)
         step = json.loads((folder / f"{JOB}.json").read_text(encoding="utf-8"))["steps"][-1]
         with np.load(folder / f"{JOB}.npz", allow_pickle=False) as arrays:
             nodes, points = arrays["nodes"], arrays["points"]

@@ -11,23 +11,23 @@ from typing import Any
 import numpy as np
 from threadpoolctl import ThreadpoolController
 
-from . import press_job
-from .attached import read_attached
-from .eigen import NotConverged
-from .frequency import frequency_step
-from .harmonics import HarmonicModes, Unstable
-from .inflated import Inflated, Models
-from .inflation import InflationFailed, equilibrium
-from .keywords import DeckError, Keyword, read_deck
-from .loads import pressures, turning
-from .mechanics import mass
-from .model import build
-from .pressing import NotPressed
-from .request import Request, read_request, read_sector
+from .deck.keywords import DeckError, Keyword, read_deck
+from .deck.request import Request, read_request, read_sector
+from .deck.steps import Deck, Step
+from .frequency_step import frequency_step
+from .modes.frequency_dependent import NotSelfConsistent
+from .modes.harmonics import HarmonicModes, Unstable
+from .modes.inflated import Inflated, Models
+from .modes.lanczos import NotConverged
 from .results import StepResult, write
-from .spectrum import NotSelfConsistent
-from .steps import Deck, Step
-from .supports import numbering
+from .road import footprint_job
+from .road.contact_newton import NotPressed
+from .section.boundary import numbering
+from .section.inflation import InflationFailed, equilibrium
+from .section.loads import pressures, turning
+from .section.mechanics import mass
+from .section.model import build
+from .section.point_elements import read_attached
 
 Failures = (InflationFailed, Unstable, NotConverged, NotSelfConsistent, NotPressed)
 
@@ -50,7 +50,7 @@ def run(folder: Path, job: str, oldjob: str | None, time_limit: float = float("i
         analysis = Analysis(deck, request, deadline, sector)
         try:
             if analysis.road is not None:
-                press_job.write(folder / job, analysis.model, analysis.press())
+                footprint_job.write(folder / job, analysis.model, analysis.press())
             else:
                 write(folder / job, analysis.model, analysis.run())
         except (np.linalg.LinAlgError, OverflowError, ZeroDivisionError) as error:
@@ -76,7 +76,7 @@ class Analysis:
         self.sector = list(sector)
         self.deck, self.request, self.deadline = deck, request, deadline
         self.section, self.revolve, self.steps = deck.read([])
-        self.road = press_job.read_road(self.revolve)
+        self.road = footprint_job.read_road(self.revolve)
         self.models: Models = cache(partial(build, self.section))
         self.model = self.models(None, True, False)
         self.U = np.zeros((len(self.model.mesh.X), 3))
@@ -98,7 +98,7 @@ class Analysis:
         """Footprints of a job with a road, one per step with a force on it, and modes there."""
         assert self.road is not None
         wanted: list[float] = []
-        vibrations: dict[float, press_job.Vibrating] = {}
+        vibrations: dict[float, footprint_job.Vibrating] = {}
         for step in self.steps:
             if step.centrifugal:
                 raise DeckError(step.procedure.line, "a turning tyre on a road is not honoured")
@@ -124,7 +124,7 @@ class Analysis:
             raise DeckError(self.steps[-1].procedure.line, "no *CLOAD presses the road")
         step = [each for each in self.steps if each.procedure.name == "STATIC"][-1]
         model = self.models(None, step.long_term, False)
-        found = press_job.press(
+        found = footprint_job.press(
             model,
             numbering(model, step),
             pressures(model, step),
@@ -137,7 +137,7 @@ class Analysis:
         )
         return {"pressure_Pa": step.pressure, "mass_kg": self.mass_kg, **found}
 
-    def _vibrating(self, step: Step) -> press_job.Vibrating:
+    def _vibrating(self, step: Step) -> footprint_job.Vibrating:
         """What a *FREQUENCY step on the road asks for."""
         assert self.road is not None
         line, row = step.procedure.line, step.procedure.only_row()
@@ -152,7 +152,7 @@ class Analysis:
         numbers = self.model.mesh.node_sets[step.output]
         nodes = np.array([self.model.mesh.index[n] for n in numbers])
         model = self.models(step.procedure.number("PROPERTY EVALUATION"), step.long_term, False)
-        return press_job.Vibrating(model, row.integer(0), nodes)
+        return footprint_job.Vibrating(model, row.integer(0), nodes)
 
     def _static(self, step: Step) -> None:
         self._check_time()

@@ -17,8 +17,8 @@ from pathlib import Path
 import numpy as np
 
 from . import VERSION
-from .harmonics import HarmonicModes
-from .model import Model
+from .modes.harmonics import HarmonicModes
+from .section.model import Model
 
 Array = np.ndarray
 

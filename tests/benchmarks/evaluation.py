@@ -20,7 +20,9 @@ from collections import defaultdict
 from pathlib import Path
 
 import numpy as np
-from tyrecal_solvers.bundled import adapter, band, eigen, inflation, mechanics, sensitivity
+from tyrecal_solvers.bundled import adapter
+from tyrecal_solvers.bundled.modes import lanczos, sensitivity
+from tyrecal_solvers.bundled.section import band, inflation, mechanics
 
 from tyrecal.case import load_case, start_values
 from tyrecal.evaluate.door import Door, Question
@@ -43,7 +45,7 @@ def record(door: Door, question: Question) -> list[tuple[np.ndarray, list[np.nda
             self.log.append(right.copy(order="F"))
             return super().solve(right)
 
-    from tyrecal_solvers.bundled import harmonics
+    from tyrecal_solvers.bundled.modes import harmonics
 
     users = (band, inflation, harmonics)
     for module in users:
@@ -73,7 +75,7 @@ def timed_parts(door: Door, question: Question) -> dict[str, float]:
     places = [
         (inflation, "_newton", "inflation"),
         (mechanics, "mass", "mass"),
-        (eigen, "lowest", "eigenproblems"),
+        (lanczos, "lowest", "eigenproblems"),
         (sensitivity, "state_rate", "sensitivities"),
         (sensitivity, "eigenvalue_rates", "sensitivities"),
         (adapter.Bundled, "write", "writing decks"),

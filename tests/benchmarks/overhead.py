@@ -20,9 +20,9 @@ from pathlib import Path
 
 from threadpoolctl import threadpool_limits
 from tyrecal_solvers.bundled.adapter import JOB, OLDJOB
+from tyrecal_solvers.bundled.deck.request import read_request
+from tyrecal_solvers.bundled.deck.steps import Deck
 from tyrecal_solvers.bundled.job import Analysis
-from tyrecal_solvers.bundled.request import read_request
-from tyrecal_solvers.bundled.steps import Deck
 
 from tyrecal.case import load_case, start_values
 from tyrecal.evaluate.door import Door, Question

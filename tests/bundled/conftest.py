@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 from threadpoolctl import threadpool_limits
-from tyrecal_solvers.bundled.mechanics import Load
-from tyrecal_solvers.bundled.model import Model
+from tyrecal_solvers.bundled.section.mechanics import Load
+from tyrecal_solvers.bundled.section.model import Model
 
 from ..chance import generator
 from . import support

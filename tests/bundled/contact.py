@@ -6,13 +6,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from tyrecal_solvers.bundled.circumference import Circumference, half_circle
-from tyrecal_solvers.bundled.fold import Fold
-from tyrecal_solvers.bundled.mechanics import Load
-from tyrecal_solvers.bundled.model import Model
-from tyrecal_solvers.bundled.pressing import Press
-from tyrecal_solvers.bundled.revolved import Revolved
-from tyrecal_solvers.bundled.road import Road, flat_road
+from tyrecal_solvers.bundled.road.contact import Road, flat_road
+from tyrecal_solvers.bundled.road.contact_newton import Press
+from tyrecal_solvers.bundled.road.half_turn_symmetry import Fold
+from tyrecal_solvers.bundled.section.mechanics import Load
+from tyrecal_solvers.bundled.section.model import Model
+from tyrecal_solvers.bundled.solid3d.circumference import Circumference, half_circle
+from tyrecal_solvers.bundled.solid3d.revolved import Revolved
 
 from . import support
 from .support import Rubber

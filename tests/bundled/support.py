@@ -8,11 +8,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tyrecal_solvers.bundled import grammar, harmonics, inflation, keywords, mechanics, model
-from tyrecal_solvers.bundled.band import Numbering
-from tyrecal_solvers.bundled.mechanics import Load
-from tyrecal_solvers.bundled.model import Model
-from tyrecal_solvers.bundled.pressing import NotPressed, Press, Pressed
+from tyrecal_solvers.bundled.deck import grammar, keywords
+from tyrecal_solvers.bundled.modes import harmonics
+from tyrecal_solvers.bundled.road.contact_newton import NotPressed, Press, Pressed
+from tyrecal_solvers.bundled.section import inflation, mechanics, model
+from tyrecal_solvers.bundled.section.band import Numbering
+from tyrecal_solvers.bundled.section.mechanics import Load
+from tyrecal_solvers.bundled.section.model import Model
 
 from tyrecal.tyre.mesh import build_mesh
 from tyrecal.tyre.section import read_section

@@ -7,8 +7,8 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import eigh
 from scipy.optimize import brentq
-from tyrecal_solvers.bundled import mechanics, section
-from tyrecal_solvers.bundled.mechanics import Load
+from tyrecal_solvers.bundled.section import elements, mechanics
+from tyrecal_solvers.bundled.section.mechanics import Load
 
 from . import support
 from .support import Layer, Rubber
@@ -140,17 +140,17 @@ def test_prestressed_net(n: int, linear: bool, wanted: float) -> None:
         exact += list(np.linalg.eigvalsh(K) / m)
     exact = np.sort(exact)[:6]
     errors = []
-    for elements in (32, 64) if linear else (16, 32):
+    for count in (32, 64) if linear else (16, 32):
         X = np.stack(
-            [0 * (z := np.linspace(0, L, (elements if linear else 2 * elements) + 1)) + R, z], -1
+            [0 * (z := np.linspace(0, L, (count if linear else 2 * count) + 1)) + R, z], -1
         )
         step = 1 if linear else 2
-        lines = np.arange(step, -1, -1) + step * np.arange(elements)[:, None]  # normal outwards
+        lines = np.arange(step, -1, -1) + step * np.arange(count)[:, None]  # normal outwards
         layers = [Layer(lines, A, s, EA, rho, a) for a in (0.0, 90.0)]
         model = support.model_of(support.deck(X, np.empty((0, 0), int), Rubber(), layers))
         U = np.stack([X[:, 0] * (l_t - 1), 0 * z, X[:, 1] * (l_z - 1)], -1)
         p = t_t / (l_z * R)
-        loads = [Load(section.lines(X, lines, 3), p)]
+        loads = [Load(elements.lines(X, lines, 3), p)]
         mask = np.zeros((len(X), 3), bool)
         mask[[0, -1], :2] = True
         free = ~mask.ravel()
@@ -202,8 +202,8 @@ def test_thick_cylinder_inflated_by_a_fifth() -> None:
     assert lack[1] < 1e-3
     assert lack[0] / lack[1] == pytest.approx(2.0, abs=0.02)
     errors = []
-    for elements in (2, 4, 8):
-        m_block = support.block((A, B, elements), (0.0, 0.02, 1), True)
+    for count in (2, 4, 8):
+        m_block = support.block((A, B, count), (0.0, 0.02, 1), True)
         rubber = Rubber(C10=G / 2, D1=2 / (200 * G))
         m = support.model_of(support.deck(m_block.X, m_block.solids, rubber, (), m_block.inner))
         mask = support.held(m, axial=True)

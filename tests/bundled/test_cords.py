@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.linalg import qr
-from tyrecal_solvers.bundled import cords
+from tyrecal_solvers.bundled.section.parts import cords
 
 Array = np.ndarray
 H = 1e-30

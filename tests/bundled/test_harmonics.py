@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.linalg import eigh
-from tyrecal_solvers.bundled import harmonics, mechanics
+from tyrecal_solvers.bundled.modes import harmonics
+from tyrecal_solvers.bundled.section import mechanics
 
 from . import support
 from .conftest import Inflated

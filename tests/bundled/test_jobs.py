@@ -12,13 +12,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tyrecal_solvers.bundled.attached import read_attached
+from tyrecal_solvers.bundled.deck.keywords import DeckError, Row
+from tyrecal_solvers.bundled.deck.request import Request
+from tyrecal_solvers.bundled.deck.steps import Deck
 from tyrecal_solvers.bundled.job import Analysis, TimedOut
-from tyrecal_solvers.bundled.keywords import DeckError, Row
-from tyrecal_solvers.bundled.request import Request
 from tyrecal_solvers.bundled.results import StepResult, write
-from tyrecal_solvers.bundled.steps import Deck
-from tyrecal_solvers.bundled.supports import rim_freedoms
+from tyrecal_solvers.bundled.section.boundary import rim_freedoms
+from tyrecal_solvers.bundled.section.point_elements import read_attached
 
 from ..effects.support import CASE, decks
 

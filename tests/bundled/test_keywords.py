@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from tyrecal_solvers.bundled import grammar, model
-from tyrecal_solvers.bundled.keywords import STEP, DeckError, read_keywords, seed
+from tyrecal_solvers.bundled.deck import grammar
+from tyrecal_solvers.bundled.deck.keywords import STEP, DeckError, read_keywords, seed
+from tyrecal_solvers.bundled.section import model
 
 from . import support
 

@@ -11,24 +11,25 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.linalg import eigh
-from tyrecal_solvers.bundled import davidson, hold, job, press_job
-from tyrecal_solvers.bundled.circumference import Circumference, half_circle
-from tyrecal_solvers.bundled.eigen import NotConverged
-from tyrecal_solvers.bundled.fold import HALF_TURN
-from tyrecal_solvers.bundled.harmonics import HarmonicModes, Unstable, Vibration
-from tyrecal_solvers.bundled.keywords import DeckError
-from tyrecal_solvers.bundled.loaded_modes import Inertia, LoadedModes, loaded_modes
-from tyrecal_solvers.bundled.mechanics import mass
-from tyrecal_solvers.bundled.pressing import Pressed
-from tyrecal_solvers.bundled.revolved import Revolved
-from tyrecal_solvers.bundled.road import Contact
+from tyrecal_solvers.bundled import job
+from tyrecal_solvers.bundled.deck.keywords import DeckError
+from tyrecal_solvers.bundled.modes.harmonics import HarmonicModes, Unstable, Vibration
+from tyrecal_solvers.bundled.modes.lanczos import NotConverged
+from tyrecal_solvers.bundled.road import davidson, footprint_job, stick
+from tyrecal_solvers.bundled.road.contact import Contact
+from tyrecal_solvers.bundled.road.contact_newton import Pressed
+from tyrecal_solvers.bundled.road.half_turn_symmetry import HALF_TURN
+from tyrecal_solvers.bundled.road.loaded_modes import Inertia, LoadedModes, loaded_modes
+from tyrecal_solvers.bundled.section.mechanics import mass
+from tyrecal_solvers.bundled.solid3d.circumference import Circumference, half_circle
+from tyrecal_solvers.bundled.solid3d.revolved import Revolved
 
 from tyrecal.deck.write import Decks
 
 from ..chance import generator
 from . import support
 from .contact import Round, ring
-from .test_pressing import coarse_case
+from .test_contact_newton import coarse_case
 
 pytestmark = pytest.mark.numbers
 
@@ -79,7 +80,7 @@ def press(work: Round, load: float, friction: float = 0.5, stiffness: float = 1e
     areas = stand.tyre.surface_shares(work.model.mesh.faces["TREAD"])
     areas = areas[: len(contact.local), contact.road.nodes]
     around = stand.tyre.around
-    return State(around, U, found, hold.held(contact, areas, around), areas)
+    return State(around, U, found, stick.held(contact, areas, around), areas)
 
 
 @pytest.fixture(scope="module")
@@ -160,12 +161,12 @@ def test_a_hold_raises_every_frequency(tyre: Round, pressed: State, found: Loade
 def test_the_hold_covers_the_patch(pressed: State) -> None:
     """Shares of the nodes' areas: all inside, none outside, and about the contact area."""
     contact = pressed.pressed.contact
-    share = hold.covered(contact, pressed.areas, pressed.around)
+    share = stick.covered(contact, pressed.areas, pressed.around)
     assert share.min() == 0.0 and share.max() == 1.0
     inside = contact.local[..., 0] > 0
     assert (share[1:][~inside[:-1] & ~inside[1:]] == 0).all()
     assert (share[:-1][inside[1:]] == 1).all()
-    area = press_job.contact_area(contact, pressed.areas, pressed.around)
+    area = footprint_job.contact_area(contact, pressed.areas, pressed.around)
     assert 2 * (share * pressed.areas).sum() == pytest.approx(area, rel=0.15)
 
 
@@ -277,11 +278,11 @@ def test_results_hold_the_half_turn(tyre: Round, pressed: State, found: LoadedMo
     """Shapes on the whole tyre, as the job writes them: each kept or reversed by the half turn."""
     work = tyre.press(LENGTHS, 1e9, 0.5)
     rows = np.arange(len(tyre.U))
-    wanted = press_job.Vibrating(tyre.model, 6, rows)
+    wanted = footprint_job.Vibrating(tyre.model, 6, rows)
     state = work.to(10.0)
     equations = support.numbering(tyre.model, ~tyre.free)
     tread = tyre.model.mesh.faces["TREAD"]
-    written = press_job._modes(work, state, wanted, tread, equations, tyre.U)
+    written = footprint_job._modes(work, state, wanted, tread, equations, tyre.U)
     shapes = written["mode_shape"]
     back = (-np.arange(shapes.shape[1])) % shapes.shape[1]
     image = HALF_TURN * shapes[:, back][:, :, work.fold.other]

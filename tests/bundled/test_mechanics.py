@@ -7,8 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tyrecal_solvers.bundled import cords, harmonics, mechanics, rubber, shapes
-from tyrecal_solvers.bundled.model import Model
+from tyrecal_solvers.bundled.modes import harmonics
+from tyrecal_solvers.bundled.section import mechanics, shapes
+from tyrecal_solvers.bundled.section.model import Model
+from tyrecal_solvers.bundled.section.parts import cords, rubber
 
 from . import support
 from .conftest import Inflated

@@ -6,9 +6,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from tyrecal_solvers.bundled import mechanics, pressure, section
-from tyrecal_solvers.bundled.mechanics import Load
-from tyrecal_solvers.bundled.model import Model
+from tyrecal_solvers.bundled.section import elements, mechanics
+from tyrecal_solvers.bundled.section.mechanics import Load
+from tyrecal_solvers.bundled.section.model import Model
+from tyrecal_solvers.bundled.section.parts import pressure
 
 from . import support
 
@@ -24,7 +25,7 @@ def arc(elements: int, nodes: int) -> tuple[Array, Array]:
     return X, np.arange(nodes) + (nodes - 1) * np.arange(elements)[:, None]
 
 
-def revolved_volume(X: Array, lines: section.Lines, fields: list[tuple[int, Array]]) -> float:
+def revolved_volume(X: Array, lines: elements.Lines, fields: list[tuple[int, Array]]) -> float:
     """1/2 of the flux of (x, y, 0) through the surface, in Cartesian components, for
     u = sum of Re[U exp(i n Theta)]: independent of the solver's frame and formulas."""
     total = 0.0
@@ -58,7 +59,7 @@ def test_volume_of_a_torus() -> None:
 def test_volume_of_a_cylinder_and_a_cone() -> None:
     """V = pi r^2 L and pi L (r^2 + r s + s^2) / 3; 2 pi of the solver's volume per radian."""
     for r, s in ((0.3, 0.3), (0.2, 0.35)):
-        lines = section.lines(np.array([[s, 0.5], [r, 0.0]]), np.array([[0, 1]]))
+        lines = elements.lines(np.array([[s, 0.5], [r, 0.0]]), np.array([[0, 1]]))
         x = np.einsum("ga,ai->gi", lines.N, [[s, 0, 0.5], [r, 0, 0.0]])
         dx = np.einsum("ga,ai->gi", lines.slope[0], [[s, 0, 0.5], [r, 0, 0.0]])
         V = 2 * np.pi * pressure.volume(x, dx, lines.weights[0])
@@ -87,7 +88,7 @@ def test_second_variation(n: int, nodes: int, random: np.random.Generator) -> No
     at p = -1, about a deformed and twisted state, with free open ends. V is cubic in u, so the
     central second difference is exact. K(n) is Hermitian."""
     X, table = arc(5, nodes)
-    lines = section.lines(X, table, 3)
+    lines = elements.lines(X, table, 3)
     U0 = 0.02 * random.normal(size=(len(X), 3))
     phi = random.normal(size=(2, len(X), 3)).T @ [1, 1j if n else 0]
     phi = 0.1 * phi.T
@@ -104,7 +105,7 @@ def test_second_variation(n: int, nodes: int, random: np.random.Generator) -> No
 def test_pressure_force_is_minus_p_times_the_first_variation(random: np.random.Generator) -> None:
     """r = -p dV/du, against a central difference of the three-dimensional volume."""
     X, table = arc(5, 3)
-    lines = section.lines(X, table, 3)
+    lines = elements.lines(X, table, 3)
     U0, phi = 0.02 * random.normal(size=(2, len(X), 3))
     model = Model(SimpleNamespace(X=X), [], [])
     e = 1e-4

@@ -8,10 +8,10 @@ from typing import Any
 
 import pytest
 from tyrecal_solvers.bundled.__main__ import _words, main
-from tyrecal_solvers.bundled.harmonics import Unstable
+from tyrecal_solvers.bundled.deck.keywords import DeckError
+from tyrecal_solvers.bundled.deck.request import BadRequest, Request, read_request
 from tyrecal_solvers.bundled.job import TimedOut
-from tyrecal_solvers.bundled.keywords import DeckError
-from tyrecal_solvers.bundled.request import BadRequest, Request, read_request
+from tyrecal_solvers.bundled.modes.harmonics import Unstable
 
 from tyrecal.case import load_case, with_level
 from tyrecal.deck.write import Decks

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from tyrecal_solvers.bundled import mechanics
-from tyrecal_solvers.bundled.circumference import Circumference, functions, half_circle
-from tyrecal_solvers.bundled.revolved import Inverted, Revolved
+from tyrecal_solvers.bundled.section import mechanics
+from tyrecal_solvers.bundled.solid3d.circumference import Circumference, functions, half_circle
+from tyrecal_solvers.bundled.solid3d.revolved import Inverted, Revolved
 
 from ..chance import generator
 from . import support

@@ -7,10 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.linalg import eigvalsh
-from tyrecal_solvers.bundled import mechanics, rotation
-from tyrecal_solvers.bundled.harmonics import Vibration
-from tyrecal_solvers.bundled.model import Model
-from tyrecal_solvers.bundled.pressure import SPIN
+from tyrecal_solvers.bundled.modes.harmonics import Vibration
+from tyrecal_solvers.bundled.nonuniform import rotation
+from tyrecal_solvers.bundled.section import mechanics
+from tyrecal_solvers.bundled.section.model import Model
+from tyrecal_solvers.bundled.section.parts.pressure import SPIN
 
 from . import support
 from .conftest import Inflated

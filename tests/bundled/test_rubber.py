@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.linalg import qr
-from tyrecal_solvers.bundled import rubber
-from tyrecal_solvers.bundled.rubber import MooneyRivlin
+from tyrecal_solvers.bundled.section.parts import rubber
+from tyrecal_solvers.bundled.section.parts.rubber import MooneyRivlin
 
 Array = np.ndarray
 H = 1e-30

@@ -7,8 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from tyrecal_solvers.bundled import harmonics, keywords, model, sensitivity
-from tyrecal_solvers.bundled.mechanics import Load
+from tyrecal_solvers.bundled.deck import keywords
+from tyrecal_solvers.bundled.modes import harmonics, sensitivity
+from tyrecal_solvers.bundled.section import model
+from tyrecal_solvers.bundled.section.mechanics import Load
 
 from . import support
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from tyrecal_solvers.bundled import shapes
+from tyrecal_solvers.bundled.section import shapes
 
 Array = np.ndarray
 MIDSIDES = np.array([[0.0, -1.0], [1.0, 0.0], [0.0, 1.0], [-1.0, 0.0]])

@@ -9,14 +9,15 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 from scipy.special import jv, jvp, yv, yvp
-from tyrecal_solvers.bundled import harmonics, mechanics
-from tyrecal_solvers.bundled.air import coupling
-from tyrecal_solvers.bundled.mechanics import Load
-from tyrecal_solvers.bundled.wheel import Wheel
+from tyrecal_solvers.bundled.modes import harmonics
+from tyrecal_solvers.bundled.modes.cavity import coupling
+from tyrecal_solvers.bundled.modes.wheel import Wheel
+from tyrecal_solvers.bundled.section import mechanics
+from tyrecal_solvers.bundled.section.mechanics import Load
 
 from . import support
-from .beside import MOTIONS, REFERENCE, SHIFT, STEEL, inflated
 from .support import Rubber
+from .wheel_and_gas import MOTIONS, REFERENCE, SHIFT, STEEL, inflated
 
 Array = np.ndarray
 

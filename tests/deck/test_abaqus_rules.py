@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from tyrecal_solvers.bundled.deck.keywords import DeckError, Keyword, read_keywords
 from tyrecal_solvers.bundled.job import run
-from tyrecal_solvers.bundled.keywords import DeckError, Keyword, read_keywords
 
 from tyrecal.case import load_case, with_values
 from tyrecal.deck.write import Decks

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tyrecal_solvers.bundled.deck.keywords import DeckError
 from tyrecal_solvers.bundled.job import run
-from tyrecal_solvers.bundled.keywords import DeckError
 
 from tyrecal.case import CaseError, LoadedCase, load_case, with_values
 from tyrecal.deck.write import Decks

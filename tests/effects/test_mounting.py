@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from tyrecal_solvers.bundled import inflation
+from tyrecal_solvers.bundled.section import inflation
 
 from tyrecal.case import LoadedCase, with_values
 from tyrecal.deck.context import section_mesh

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tyrecal_solvers.bundled.deck.keywords import DeckError
 from tyrecal_solvers.bundled.job import run
-from tyrecal_solvers.bundled.keywords import DeckError
 
 from tyrecal.case import LoadedCase, load_case, with_values
 from tyrecal.deck.environment import TemplateFailed

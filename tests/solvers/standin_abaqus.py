@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 from tyrecal_solvers.bundled import job as bundled
-from tyrecal_solvers.bundled.keywords import Keyword, read_keywords
+from tyrecal_solvers.bundled.deck.keywords import Keyword, read_keywords
 
 FAULT, _, AMOUNT = os.environ.get("STANDIN_FAULT", "").partition(":")
 DENIED = "Abaqus Error: Abaqus/Standard license check out failed: FLEXnet error -4,132."

@@ -25,7 +25,7 @@ from pathlib import Path
 from unittest.mock import patch
 
 import numpy as np
-from tyrecal_solvers.bundled import cords
+from tyrecal_solvers.bundled.section.parts import cords
 
 from tyrecal.case import LoadedCase, load_case, with_values
 from tyrecal.deck import context

@@ -76,13 +76,19 @@ LONGEST_S = 600.0  # the clock's; a busy machine is slow
 OURS = {"tyrecal", "tyrecal_solvers", "tyrecal_templates", "tests"}
 
 
+def area_of(file: str) -> str:
+    """The area of QUOTA that a file is in, else its folder."""
+    return next((a for a in QUOTA if file.startswith(f"{a}/")), file.rpartition("/")[0])
+
+
 def drawn(tree: Path, seed: int, count: int) -> list[Mutant]:
     """``count`` mutants, the areas in the proportions of QUOTA, mixed."""
     chance, found = random.Random(seed), []
     for area, share in QUOTA.items():
         lines: dict[tuple[str, int], list[Mutant]] = defaultdict(list)
-        for path in sorted((tree / area).glob("*.py")):
-            for mutant in mutants_of(f"{area}/{path.name}", path.read_bytes()):
+        for path in sorted((tree / area).rglob("*.py")):
+            file = path.relative_to(tree).as_posix()
+            for mutant in mutants_of(file, path.read_bytes()):
                 lines[mutant.file, mutant.line].append(mutant)
         wanted = round(share * count / sum(QUOTA.values()))
         for place in chance.sample(sorted(lines), wanted):
@@ -125,7 +131,7 @@ class Cover:
 
     def chosen(self, mutant: Mutant, known: Iterable[str], budget_s: float) -> list[str]:
         """Node ids of ``known``, the cheap ones first, and of those its module's, file by file."""
-        who, area = self._who(mutant), mutant.file.rpartition("/")[0]
+        who, area = self._who(mutant), area_of(mutant.file)
         home = NEW.get(area, f"tests/{area.rpartition('/')[2]}/")
         own = f"test_{Path(mutant.file).stem}.py"
 
@@ -394,7 +400,7 @@ def table(record: Path) -> None:
     rows = [json.loads(line) for line in read(record)]
     last = {(row["commit"], row["seed"], row["number"]): row for row in rows}
     for row in last.values():
-        for area in (row["file"].rpartition("/")[0], "all"):
+        for area in (area_of(row["file"]), "all"):
             count = counts[row["commit"], row["seed"], area]
             count["drawn"] += 1
             count["killed" if row["outcome"] == "killed" else row.get("verdict", "not judged")] += 1

@@ -1,0 +1,142 @@
+"""Unknowns of a harmonic beside the tyre's own: motions q of the rim, flow w of the cavity's air.
+
+    [K   Kx  .   C^T] [u]   [b]        q: see `wheel`; u of the rim's nodes is T q
+    [Kx* Kq  .   Cq*] [q] = [b]        w, s: see `cavity`; s = Q^-1 (C u + H w) stands in so that
+    [.   .   .   H^T] [w]   [b]        the air's stiffness, a full matrix on all nodes of its
+    [C   Cq  H   -Q ] [s]   [0]        wall, leaves the band as it is
+
+K is the band; what stands beside it is eliminated by its Schur complement.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..section.band import Cholesky, Indefinite, Numbering
+from ..section.mechanics import Parts
+from .cavity import Coupling
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True)
+class Border:
+    """Columns beside the band, for q and w: ``fields`` T (nodes, 3, q); stiffness (size, q) and
+    (q, q), mass likewise; air: C on the band (s, size), on q (s, q), and its matrices."""
+
+    fields: Array
+    stiffness: tuple[Array, Array]
+    mass: tuple[Array, Array]
+    wall: Array
+    wall_rim: Array
+    air: Coupling | None
+
+    @property
+    def widths(self) -> tuple[int, int, int]:
+        """Numbers of q, of w, and of s."""
+        if self.air is None:
+            return self.fields.shape[2], 0, 0
+        flow = self.air.H[:, self.air.flowing]
+        return self.fields.shape[2], flow.shape[1], flow.shape[0]
+
+    @property
+    def flow_mass(self) -> Array:
+        """H of w (w, w), kg per radian."""
+        if self.air is None:
+            return np.zeros((0, 0))
+        flow: Array = self.air.H[self.air.flowing, self.air.flowing]
+        return flow
+
+    def columns(self, shift: float) -> tuple[Array, Array]:
+        """E (size, q + w + s) and D beside the band of K - shift M."""
+        q, w, s = self.widths
+        k = q + w
+        E = np.zeros((len(self.stiffness[0]), k + s), self.fields.dtype)
+        D = np.zeros((k + s, k + s), self.fields.dtype)
+        E[:, :q] = self.stiffness[0] - shift * self.mass[0]
+        D[:q, :q] = self.stiffness[1] - shift * self.mass[1]
+        if self.air is not None:
+            flow = self.air.H[:, self.air.flowing]
+            E[:, k:] = self.wall.T
+            D[k:, :q], D[k:, q:k], D[k:, k:] = self.wall_rim, flow, -self.air.Q
+            D[:k, k:] = D[k:, :k].conj().T
+            D[q:k, q:k] = -shift * self.flow_mass
+        return E, D
+
+    def times_mass(self, x: Array, tyre: Array) -> Array:
+        """M x for x (size + q + w, ...), ``tyre`` being M u of its first part."""
+        q, w, _ = self.widths
+        size = len(tyre)
+        u, rim, flow = x[:size], x[size : size + q], x[size + q :]
+        beside, own = self.mass
+        parts = [tyre + beside @ rim, beside.conj().T @ u + own @ rim]
+        if w:
+            parts.append(self.flow_mass @ flow)
+        return np.concatenate(parts)
+
+
+class Bordered:
+    """Factor of a band with its border; ``tyre``: that of the band alone. Raises Indefinite."""
+
+    def __init__(self, tyre: Cholesky, border: Border, shift: float):
+        self.tyre = tyre
+        self._columns, D = border.columns(shift)
+        self._inner = tyre.solve(self._columns) if D.size else self._columns
+        self._schur = D - self._columns.conj().T @ self._inner
+        q, w, s = border.widths
+        self._size, self._extra = len(self._columns), q + w
+        own = self._schur[: q + w, : q + w]
+        if s:  # s is negative definite by itself
+            beside = self._schur[q + w :, : q + w]
+            own = own - beside.conj().T @ np.linalg.solve(self._schur[q + w :, q + w :], beside)
+        scale = np.sqrt(abs(np.diag(own)))
+        try:
+            np.linalg.cholesky(own / np.outer(scale, scale))
+        except np.linalg.LinAlgError:
+            raise Indefinite("the wheel or the air has no stiffness") from None
+
+    def solve(self, right: Array) -> Array:
+        """For (size + q + w, b)."""
+        x = self.tyre.solve(right[: self._size])
+        if not self._schur.size:
+            return x
+        rest = np.zeros((len(self._schur), *right.shape[1:]), x.dtype)
+        rest[: self._extra] = right[self._size :]
+        d = np.linalg.solve(self._schur, rest - self._columns.conj().T @ x)
+        return np.concatenate([x - self._inner @ d, d[: self._extra]])
+
+
+def assemble(
+    numbering: Numbering,
+    fields: Array,
+    own: tuple[Array, Array],
+    stiffness: Array,
+    mass: Array,
+    air: Coupling | None,
+) -> Border:
+    """From the rim's ``fields`` T (nodes, 3, q), K T and M T (nodes, 3, q), and the wheel's own
+    stiffness and mass (q,)."""
+    across = lambda image: np.tensordot(fields.conj(), image, ((0, 1), (0, 1)))
+    none = np.zeros((0, numbering.size))
+    return Border(
+        fields,
+        (numbering.gather(stiffness), across(stiffness) + np.diag(own[0])),
+        (numbering.gather(mass), across(mass) + np.diag(own[1])),
+        numbering.gather(np.moveaxis(air.C, 0, -1)).T if air else none,
+        np.tensordot(air.C, fields, 2) if air else none[:, : fields.shape[2]],
+        air,
+    )
+
+
+def apply(parts: Parts, fields: Array) -> Array:
+    """Element matrices on ``fields`` (nodes, 3, k), zero at most nodes."""
+    touched: Array = np.asarray(fields.any((1, 2)))
+    image = np.zeros_like(fields)
+    for connectivity, matrices in parts:
+        near = touched[connectivity].any(1)
+        c = connectivity[near]
+        local = matrices[near] @ fields[c].reshape(len(c), 3 * c.shape[1], -1)
+        np.add.at(image, c, local.reshape(*c.shape, 3, -1))
+    return image

@@ -1,0 +1,92 @@
+"""Rubber whose modulus grows with frequency: each mode at the modulus of its own frequency.
+
+    K(f) = K + sum_l (rho_l(f) - 1) dK_l,    K(f_j) phi_j = lambda_j M phi_j,  lambda = (2 pi f)^2
+
+rho_l: storage over static shear modulus of law l, from the deck's table, linear between its rows
+in the logarithms of both. The j-th mode of a harmonic is the fixed point of the j-th eigenvalue.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..section.band import Cholesky
+from ..section.materials import Law
+from .bordered import Bordered
+from .harmonics import HarmonicModes, Vibration
+
+Array = np.ndarray
+START_HZ = 60.0  # amid the modes of a tyre
+TOLERANCE = 1e-13  # of a frequency for a given shape
+CLOSE = 1e-4  # of a frequency, from one shape to the next: its square is what is left
+LONGEST = 40
+
+
+class NotSelfConsistent(ArithmeticError):
+    """No frequency was found at which a mode has the modulus of that frequency."""
+
+
+class SelfConsistent:
+    """Modes of a vibration whose rubber follows the ``laws``."""
+
+    def __init__(self, vibration: Vibration, laws: list[Law]):
+        self.vibration, self.laws = vibration, laws
+
+    def modes(self, n: int, count: int, factor: Cholesky | Bordered | None = None) -> HarmonicModes:
+        """The ``count`` lowest modes of harmonic n, each at the modulus of its own frequency.
+
+        ``factor`` serves a constant modulus only. Raises NotSelfConsistent; Unstable,
+        lanczos.NotConverged.
+        """
+        first = self._at(START_HZ, n, count)
+        return joined([self._settled(first, j) for j in range(len(first.eigenvalues))])
+
+    def _ratios(self, frequency_Hz: float) -> Array:
+        return np.array([np.real(law.ratio(frequency_Hz)) for law in self.laws])
+
+    def _at(self, frequency_Hz: float, n: int, count: int) -> HarmonicModes:
+        return self.vibration.at(self._ratios(frequency_Hz)).modes(n, count)
+
+    def _settled(self, found: HarmonicModes, j: int) -> HarmonicModes:
+        """Mode j, from the modes at ``START_HZ``: the frequency at which the shape has its own
+        modulus, then the shape there, until both agree."""
+        frequency = START_HZ
+        for _ in range(LONGEST):
+            before, frequency = frequency, self._own(found, j, frequency)
+            if abs(frequency / before - 1) <= CLOSE:
+                mode = found.where(slice(j, j + 1))
+                return replace(mode, eigenvalues=np.array([(2 * np.pi * frequency) ** 2]))
+            found = self._at(frequency, found.n, j + 1)
+        raise NotSelfConsistent(
+            f"the modulus of mode {j + 1} of harmonic {found.n} does not settle"
+        )
+
+    def _own(self, found: HarmonicModes, j: int, frequency_Hz: float) -> float:
+        """f with (2 pi f)^2 = lambda + sum_l (rho_l(f) - rho_l(f_0)) phi^H dK_l phi for mode j of
+        the modulus at f_0 = ``frequency_Hz``: Rayleigh's quotient, right to the square of the
+        shape's change."""
+        forms = self.vibration.forms(found.n, found.shapes[j])
+        start, value = self._ratios(frequency_Hz), float(found.eigenvalues[j])
+        f = np.sqrt(value) / (2 * np.pi)
+        for _ in range(LONGEST):
+            new = np.sqrt(value + (self._ratios(f) - start) @ forms) / (2 * np.pi)
+            if abs(new / f - 1) <= TOLERANCE:
+                return float(new)
+            f = new
+        raise NotSelfConsistent(
+            f"the modulus of mode {j + 1} of harmonic {found.n} does not settle"
+        )
+
+
+def joined(modes: list[HarmonicModes]) -> HarmonicModes:
+    """Modes of one harmonic in one."""
+    join = lambda name: np.concatenate([getattr(m, name) for m in modes])
+    return replace(
+        modes[0],
+        eigenvalues=join("eigenvalues"),
+        shapes=join("shapes"),
+        rim=join("rim"),
+        air=join("air"),
+    )

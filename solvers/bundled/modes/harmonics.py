@@ -1,0 +1,324 @@
+"""Modes of the revolved tyre, one Hermitian problem per circumferential harmonic n.
+
+u = Re[U(R, Z) exp(i n Theta)], U complex (n, 3): K(n) = K0 + i n K1 + n^2 K2 exactly, the limit
+of infinitely many sectors. A mode with n >= 1 stands for a pair turned by a quarter wave.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+from scipy.sparse import csr_array
+
+from ..section import mechanics
+from ..section.band import Cholesky, Indefinite, Numbering
+from ..section.mechanics import Load
+from ..section.model import Model, stiffened
+from ..section.point_elements import Attached
+from . import bordered, lanczos
+from .bordered import Border, Bordered
+from .cavity import Air, Coupling, coupling
+from .wheel import Wheel
+
+Array = np.ndarray
+MOST_HARMONICS = 60
+IN_THE_AIR = 0.5  # share of a mode's kinetic energy above which it is the cavity's, not the tyre's
+
+
+class Unstable(ArithmeticError):
+    """The inflated state is not stable: a harmonic of it buckles."""
+
+
+class Makeup(Protocol):
+    """What a mode that is not one harmonic of a tyre at rest is made of."""
+
+    def forms(self) -> tuple[Array, Array, Array, Array]:
+        """As `HarmonicModes.forms`."""
+
+    def rates(self, forms: Array, change: Change) -> Array:
+        """d lambda / dp (m,) from the forms (m,) and what else has p's tangent."""
+
+    def where(self, keep: Array | slice) -> Makeup:
+        """That of some of the modes."""
+
+
+@dataclass
+class Change:
+    """What carries the tangent of p beside the section and its loads: the model, Omega, and what
+    is attached to the tyre."""
+
+    model: Model
+    spin: complex | float
+    attached: Attached
+
+
+@dataclass
+class HarmonicModes:
+    """Modes of one harmonic: omega^2 (m,) in 1/s2 and shapes (m, n, 3), u^H M u = 1.
+
+    M is the mass per radian: over the whole circle the kinetic mass is 2 pi for n = 0, pi else.
+    rim (m, q), air (m, w): the amplitudes of the rim's motions (in ``shapes`` too) and of the
+    cavity's flow (see `wheel`, `cavity`). members (m,): None, or where each doublet has split into
+    two modes, 1 and 2 in turn; the shape is then the part of harmonic n. makeup: what modes that
+    are more than that are made of.
+    """
+
+    n: int
+    eigenvalues: Array
+    shapes: Array
+    rim: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    air: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    members: Array | None = None
+    makeup: Makeup | None = None
+
+    def forms(self) -> tuple[Array, Array, Array, Array]:
+        """Harmonics (p,), shapes (p, nodes, 3), the mode (p,) that each is part of, and lambda (m,)
+        of the forms phi^H (K' - lambda M') phi that the eigenvalues' derivatives are made of."""
+        if self.makeup is not None:
+            return self.makeup.forms()
+        modes = len(self.eigenvalues)
+        return np.full(modes, self.n), self.shapes, np.arange(modes), self.eigenvalues
+
+    def below(self, frequency_Hz: float) -> HarmonicModes:
+        """Those up to a frequency."""
+        return self.where(self.eigenvalues <= (2 * np.pi * frequency_Hz) ** 2)
+
+    def where(self, keep: Array | slice) -> HarmonicModes:
+        """Those of a mask or slice."""
+        rim, air = (a[keep] if len(a) else a for a in (self.rim, self.air))
+        members = None if self.members is None else self.members[keep]
+        makeup = self.makeup.where(keep) if self.makeup else None
+        return HarmonicModes(
+            self.n, self.eigenvalues[keep], self.shapes[keep], rim, air, members, makeup
+        )
+
+
+class Vibration:
+    """The inflated tyre's small vibrations: factors per harmonic on demand.
+
+    wheel: the rim's motions, None = held; air: in the cavity, None = a constant pressure;
+    lowest_Hz: modes below are left out (the rigid ones of a free wheel).
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        U: Array,
+        loads: list[Load],
+        numbering: Numbering,
+        shift: float,
+        wheel: Wheel | None = None,
+        air: Air | None = None,
+        lowest_Hz: float = 0.0,
+    ):
+        self.numbering, self.shift = numbering, shift
+        self.wheel, self.air, self.lowest_Hz = wheel, air, lowest_Hz
+        self._model, self._U = model, U
+        # the whole, then what each law of frequency adds per unit of its ratio less 1
+        parts = [mechanics.tangents(model, U, loads, harmonics=True)]
+        parts += [mechanics.tangents(m, U, [], harmonics=True) for m in stiffened(model)]
+        self._parts = parts
+        self._bands = [[numbering.assemble(p) for p in three] for three in parts]
+        self.weights = np.array([1.0] + [0.0] * (len(parts) - 1))
+        self.mass: csr_array = mechanics.mass(model)
+        self._X = model.mesh.X.real
+        self._forces = mechanics.gradient(model, U, loads) if wheel else U
+        self._borders: dict[int, Border | None] = {}
+        self._couplings: dict[int, Coupling] = {}
+        self._shifted_mass = None
+        if shift:
+            masses = [
+                (
+                    c,
+                    np.einsum("eab,ij->eaibj", m.real, np.eye(3)).reshape(
+                        len(m), 3 * m.shape[1], -1
+                    ),
+                )
+                for c, m in mechanics.mass_matrices(model)
+            ]
+            self._shifted_mass = numbering.assemble(masses)
+
+    def at(self, ratios: Array) -> Vibration:
+        """The same with the modulus ratios of the model's laws of frequency (l,)."""
+        other = copy.copy(self)
+        other.weights = np.concatenate([[1.0], np.asarray(ratios) - 1])
+        other._borders = {}
+        return other
+
+    def forms(self, n: int, shape: Array) -> Array:
+        """phi^H dK_l phi of a shape (nodes, 3) for every law of frequency."""
+        field, found = shape[..., None], []
+        for K0, K1, K2 in self._parts[1:]:
+            image = bordered.apply(K0, field)
+            if n:
+                image = (
+                    image + 1j * n * bordered.apply(K1, field) + n * n * bordered.apply(K2, field)
+                )
+            found.append(float(np.vdot(field, image).real))
+        return np.array(found)
+
+    def factor(self, n: int) -> Cholesky | Bordered:
+        """Factor of K(n) - shift M. Raises Unstable."""
+        three = self._bands[0]
+        if len(self.weights) > 1:
+            three = [
+                sum(w * b[i] for w, b in zip(self.weights, self._bands, strict=True))
+                for i in range(3)
+            ]
+        K0, K1, K2 = three
+        if n == 0:
+            band = K0.copy(order="F")
+        else:
+            band = np.empty(K0.shape, complex, order="F")
+            band.real = K0 + n * n * K2
+            band.imag = n * K1
+        if self._shifted_mass is not None:
+            band -= self.shift * self._shifted_mass
+        try:
+            tyre, beside = Cholesky(band), self._border(n)
+            return Bordered(tyre, beside, self.shift) if beside else tyre
+        except Indefinite:
+            raise Unstable(
+                f"the inflated tyre is not stable: its stiffness for {n} waves round the"
+                " circumference is not positive definite"
+            ) from None
+
+    @property
+    def plain(self) -> bool:
+        """The tyre alone moves: neither its rim nor air in the cavity."""
+        return self.wheel is None and self.air is None
+
+    def times_mass(self, x: Array) -> Array:
+        """The tyre's M x for (size,) or (size, b), per radian."""
+        full = self.numbering.spread(x)
+        image = self.mass @ full.reshape(len(full), -1)
+        return self.numbering.gather(image.reshape(full.shape))
+
+    def _border(self, n: int) -> Border | None:
+        if n not in self._borders:
+            self._borders[n] = self._new_border(n)
+        return self._borders[n]
+
+    def _new_border(self, n: int) -> Border | None:
+        moving = self.wheel is not None and self.wheel.motions(n)
+        if not moving and self.air is None:
+            return None
+        fields = np.zeros((*self._U.shape, 0), complex if n else float)
+        own = np.zeros(0), np.zeros(0)
+        if self.wheel is not None and moving:
+            real, imag = self.wheel.fields(n, self._X)
+            fields = real + 1j * imag if n else real
+            own = self.wheel.own(n, self._X, self._forces)
+        stiffness = np.zeros_like(fields)
+        for weight, three in zip(self.weights, self._parts, strict=True):
+            for factor, part in zip((1.0, 1j * n, n * n), three, strict=True):
+                if weight and factor and moving:
+                    stiffness = stiffness + weight * factor * bordered.apply(part, fields)
+        mass = (self.mass @ fields.reshape(len(fields), -1)).reshape(fields.shape)
+        if self.air and n not in self._couplings:
+            self._couplings[n] = coupling(self.air, self._X, self._U, n)
+        air = self._couplings.get(n)
+        return bordered.assemble(self.numbering, fields, own, stiffness, mass, air)
+
+    def _times_mass(self, n: int, x: Array) -> Array:
+        beside = self._border(n)
+        tyre = self.times_mass(x[: self.numbering.size])
+        return beside.times_mass(x, tyre) if beside else tyre
+
+    def modes(self, n: int, count: int, factor: Cholesky | Bordered | None = None) -> HarmonicModes:
+        """The ``count`` lowest modes of harmonic n that are the tyre's, from ``lowest_Hz`` on.
+
+        Raises Unstable, lanczos.NotConverged.
+        """
+        factor, asked = factor or self.factor(n), count
+        while True:
+            found, is_tyres = self._lowest(n, asked, factor)
+            if is_tyres.sum() >= count or len(is_tyres) < asked:
+                return found.where(np.flatnonzero(is_tyres)[:count])
+            asked += count - int(is_tyres.sum())
+
+    def _lowest(
+        self, n: int, count: int, factor: Cholesky | Bordered
+    ) -> tuple[HarmonicModes, Array]:
+        """The lowest modes, and which of them are the tyre's."""
+        beside, size = self._border(n), self.numbering.size
+        start = self.numbering.gather(_start_fields(self._X, n))
+        if beside:
+            q, w, _ = beside.widths
+            start = np.concatenate([start, np.ones((q, 3)), np.zeros((w, 3))])
+        values, vectors = lanczos.lowest(
+            factor.solve, lambda x: self._times_mass(n, x), start, count, self.shift
+        )
+        shapes = self.numbering.spread(vectors[:size])  # (nodes, 3, modes)
+        rim, flow = vectors[size:size], vectors[size:size]
+        is_tyres = np.ones(len(values), bool)
+        if self.lowest_Hz:
+            is_tyres = values >= (2 * np.pi * self.lowest_Hz) ** 2
+        if beside:
+            rim, flow = vectors[size : size + q], vectors[size + q :]
+            shapes = shapes + beside.fields @ rim
+            if w:
+                air = self._couplings[n]
+                modes = zip(np.moveaxis(shapes, -1, 0), values, strict=True)
+                flow = np.stack([air.flow(u, value) for u, value in modes], -1)
+                energy = np.einsum("wm,wv,vm->m", flow.conj(), beside.flow_mass, flow).real
+                is_tyres &= energy < IN_THE_AIR
+        return HarmonicModes(n, values, np.moveaxis(shapes, -1, 0), rim.T, flow.T), is_tyres
+
+
+def _start_fields(X: Array, n: int) -> Array:
+    """Smooth fields (nodes, 3, 3) that hold much of the lowest modes of harmonic n.
+
+    Axial shift and tilt; spin for n = 0, else bending without stretching the circumference,
+    u_r + i n u_theta = 0.
+    """
+    tilt = X[:, 1] / np.ptp(X[:, 1])
+    lop = (
+        0.0 if n else 0.3
+    )  # lopsided, for all three are odd under z -> -z, theta -> -theta at n = 0
+    fields = np.zeros((len(X), 3, 3), complex if n else float)
+    fields[:, 2, 0] = 1.0 + lop * tilt
+    fields[:, 0, 1] = tilt + lop
+    fields[:, 0, 2] = 1.0 if n else 0.0
+    fields[:, 1, 2] = 1j / n if n else X[:, 0] / X[:, 0].max() * (1.0 + lop * tilt)
+    return fields
+
+
+class HasModes(Protocol):
+    """A vibration, of one modulus or of each mode's own."""
+
+    def modes(self, n: int, count: int, factor: Cholesky | Bordered | None = None) -> HarmonicModes:
+        """The lowest modes of a harmonic."""
+
+
+def lowest_of_all(
+    vibration: HasModes, wanted: int, check: Callable[[], None]
+) -> list[HarmonicModes]:
+    """The ``wanted`` lowest modes over all harmonics, doublets counted twice.
+
+    Harmonics are added until one starts above the highest mode kept; ``check`` may raise to stop.
+    """
+    found: list[HarmonicModes] = []
+    for n in range(MOST_HARMONICS):
+        check()
+        count = 2
+        while True:
+            count = min(2 * count, wanted)
+            modes = vibration.modes(n, count)
+            limit = _highest_kept([*found, modes], wanted)
+            if modes.eigenvalues[-1] > limit or count == wanted:
+                break
+        found.append(modes)
+        if n >= 2 and modes.eigenvalues[0] > limit:
+            break
+    limit = _highest_kept(found, wanted)
+    return [m.below(np.sqrt(limit) / (2 * np.pi) * (1 + 1e-12)) for m in found]
+
+
+def _highest_kept(found: list[HarmonicModes], wanted: int) -> float:
+    values = np.sort(np.concatenate([np.repeat(m.eigenvalues, 2 if m.n else 1) for m in found]))
+    return float(values[wanted - 1]) if len(values) >= wanted else float("inf")

@@ -1,0 +1,51 @@
+"""The tyre at the end of its static steps, as a frequency step finds it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..deck.keywords import Keyword
+from ..deck.request import Request
+from ..deck.steps import Deck, Step
+from ..section.model import Model
+from ..section.point_elements import Attached, read_attached
+from .cavity import Air, read_air
+from .wheel import Wheel, read_wheel
+
+Array = np.ndarray
+Models = Callable[[float | None, bool, bool], Model]
+"""The section's model by `model.build`'s arguments dynamic_Hz, long_term, own_frequency."""
+
+
+@dataclass
+class Inflated:
+    """Its deck and what else is asked; the model blocks of the section's job, of the job that
+    revolves it (empty: none) and of the section in a ``sector`` (empty: none); its models;
+    displacement U (nodes, 3) in m; ``check`` raises where the time is over."""
+
+    deck: Deck
+    request: Request
+    section: list[Keyword]
+    revolve: list[Keyword]
+    sector: list[Keyword]
+    models: Models
+    U: Array
+    check: Callable[[], None]
+
+    @property
+    def model(self) -> Model:
+        """The section at its relaxed static moduli."""
+        return self.models(None, True, False)
+
+    def attached(self) -> Attached:
+        """Masses and springs on the tyre. Raises DeckError."""
+        return read_attached(self.revolve, self.model.mesh)
+
+    def beside(self, model: Model, step: Step) -> tuple[Wheel | None, Air | None]:
+        """The rim that moves in a step and the gas in the cavity, where there are such."""
+        wheel = read_wheel(self.revolve, model.mesh, step) if step.revolved else None
+        cavity = self.request.cavity
+        return wheel, read_air(self.section, model.mesh, cavity) if cavity else None

@@ -1,0 +1,157 @@
+"""The rim as a rigid body that moves in a vibration: its motions, springs, mass and inertia.
+
+Amplitudes q of u = Re[T q exp(i n Theta)] at the rim's nodes, d = x - reference point:
+
+    n = 0   axial   T = (0, 0, 1)          spin about the axle      T = (0, r, 0)
+    n = 1   radial  T = (1, i, 0)          tilt about a diameter    T = (d_z, i d_z, -r)
+
+Higher harmonics leave it at rest. A rotation w moves a node by w x d + w x (w x d) / 2; the second
+part works against the forces f (N per radian) that hold the rim in the inflated state, which adds
+the stiffness -sum r f_r to the spin and -sum (r f_r + 2 d_z f_z) to the tilt.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..deck.keywords import DeckError, Keyword
+from ..deck.steps import Step
+from ..section.boundary import rim_freedoms
+from ..section.materials import Number
+from ..section.mesh import Mesh
+
+Array = np.ndarray
+FREEDOMS = {"axial": (2,), "spin": (5,), "radial": (1, 3), "tilt": (4, 6)}  # 2: along the axle
+OF_HARMONIC = {0: ("axial", "spin"), 1: ("radial", "tilt")}
+
+
+@dataclass(frozen=True)
+class Wheel:
+    """What moves: ``free`` motions of the rim's nodes ``rim`` (k,), rows of the mesh's X.
+
+    stiffness, inertia: per motion, N/m and kg or N m/rad and kg m2; absent = 0.
+    """
+
+    reference: int
+    rim: Array
+    free: frozenset[str]
+    stiffness: dict[str, Number]
+    inertia: dict[str, Number]
+
+    def motions(self, n: int) -> list[str]:
+        """Those of harmonic n that are free."""
+        return [name for name in OF_HARMONIC.get(n, ()) if name in self.free]
+
+    def fields(self, n: int, X: Array) -> tuple[Array, Array]:
+        """Real and imaginary part of T (nodes, 3, motions); X (nodes, 2) may be complex."""
+        names = self.motions(n)
+        real = np.zeros((len(X), 3, len(names)), X.dtype)
+        imag = np.zeros_like(real)
+        r, d_z = X[self.rim, 0], X[self.rim, 1] - X[self.reference, 1]
+        for k, name in enumerate(names):
+            if name == "axial":
+                real[self.rim, 2, k] = 1.0
+            elif name == "spin":
+                real[self.rim, 1, k] = r
+            elif name == "radial":
+                real[self.rim, 0, k] = imag[self.rim, 1, k] = 1.0
+            else:
+                real[self.rim, 0, k] = imag[self.rim, 1, k] = d_z
+                real[self.rim, 2, k] = -r
+        return real, imag
+
+    def own(self, n: int, X: Array, forces: Array) -> tuple[Array, Array]:
+        """Stiffness and mass (motions,) per radian beside the tyre's; ``forces`` (nodes, 3):
+        gradient of the potential in the inflated state, N per radian."""
+        circle = np.pi if n else 2 * np.pi  # an amplitude's energy over it, as in `harmonics`
+        r, d_z = X[self.rim, 0], X[self.rim, 1] - X[self.reference, 1]
+        f_r, f_z = forces[self.rim, 0], forces[self.rim, 2]
+        turned = {"spin": -(r * f_r).sum(), "tilt": -(r * f_r + 2 * d_z * f_z).sum()}
+        names = self.motions(n)
+        stiffness = [self.stiffness.get(m, 0.0) / circle + turned.get(m, 0.0) for m in names]
+        return np.array(stiffness), np.array([self.inertia.get(m, 0.0) / circle for m in names])
+
+
+def read_wheel(keywords: list[Keyword], mesh: Mesh, step: Step) -> Wheel | None:
+    """The rim that ``step`` releases, with the point elements of the revolve job's model.
+
+    None where every rim is held. Raises DeckError.
+    """
+    elements = _point_elements(keywords, mesh)
+    wheels = []
+    for reference, tied in mesh.reference_nodes.items():
+        freedoms = rim_freedoms(mesh, step, reference)
+        free = frozenset(m for m, dofs in FREEDOMS.items() if freedoms.issuperset(dofs))
+        if freedoms != {dof for motion in free for dof in FREEDOMS[motion]}:
+            raise DeckError(
+                step.procedure.line,
+                "the rim's translations 1 and 3, and its rotations 4 and 6, are free together",
+            )
+        row = mesh.index[reference]
+        if not free:
+            continue
+        if mesh.X[row, 0] != 0.0:
+            raise DeckError(
+                step.procedure.line, "the reference point of a rim that moves stands on the axle"
+            )
+        rim = np.unique([mesh.index[node] for node in tied])
+        wheels.append(Wheel(row, rim, free, *_properties(keywords, elements, reference)))
+    if len(wheels) > 1:
+        raise DeckError(step.procedure.line, "one rim that moves is honoured")
+    return wheels[0] if wheels else None
+
+
+def _point_elements(keywords: list[Keyword], mesh: Mesh) -> dict[str, tuple[str, list[int]]]:
+    """Element set to type and nodes of the job's point elements on a rim's reference node; those
+    on the tyre are `point_elements`' ."""
+    sets: dict[str, tuple[str, list[int]]] = {}
+    for k in keywords:
+        if k.name == "ELEMENT":
+            nodes = [row.integer(1) for row in k.rows]
+            missing = [node for node in nodes if node not in mesh.reference_nodes]
+            if missing and all(node in mesh.index for node in missing):
+                continue
+            if missing:
+                raise DeckError(k.line, f"node {missing[0]} is not the rim's reference node")
+            sets[k.need("ELSET")] = k.need("TYPE"), nodes
+    return sets
+
+
+def _properties(
+    keywords: list[Keyword], elements: dict[str, tuple[str, list[int]]], reference: int
+) -> tuple[dict[str, Number], dict[str, Number]]:
+    """Stiffness and inertia per motion."""
+    springs: dict[int, Number] = {}
+    inertia: dict[str, Number] = {}
+    needed = {"SPRING": "SPRING1", "MASS": "MASS", "ROTARY INERTIA": "ROTARYI"}
+    for k in keywords:
+        if k.name not in needed or k.get("ELSET") not in elements:
+            continue
+        kind, nodes = elements.get(k.need("ELSET"), ("", []))
+        if kind != needed[k.name]:
+            raise DeckError(k.line, f"{k.get('ELSET')} is no set of {needed[k.name]} elements")
+        if reference not in nodes:
+            continue
+        if k.name == "SPRING":
+            if len(k.rows) != 2:
+                raise DeckError(k.line, "*SPRING takes two lines: degree of freedom, stiffness")
+            dof, value = k.rows[0].integer(0), k.rows[1].number(0)
+            springs[dof] = springs.get(dof, 0.0) + value
+        elif k.name == "MASS":
+            inertia["axial"] = inertia["radial"] = k.only_row().number(0)
+        else:
+            across, inertia["spin"], other = (k.only_row().number(i) for i in range(3))
+            inertia["tilt"] = across
+            if across != other:
+                raise DeckError(k.line, "the rim's inertia is that of a body of revolution")
+    stiffness: dict[str, Number] = {}
+    for motion, dofs in FREEDOMS.items():
+        values = [springs.pop(dof, 0.0) for dof in dofs]
+        if any(value != values[0] for value in values):
+            raise DeckError(0, f"springs on the degrees of freedom {dofs} of the rim must be alike")
+        stiffness[motion] = values[0]
+    if springs or any(np.real(v) < 0 for v in (*stiffness.values(), *inertia.values())):
+        raise DeckError(0, "springs act on the degrees of freedom 1 to 6 and are not negative")
+    return stiffness, inertia

@@ -1,0 +1,251 @@
+"""Modes of a tyre that is not quite axisymmetric: its harmonics are coupled.
+
+Ritz's method on fields sum over n of Re[c_n U_n(R, Z) exp(i n Theta)]: the axisymmetric tyre's
+own modes, and its static response to what breaks the symmetry. What was a doublet splits into two
+modes of different frequency; each is told by the doublet that it holds most of.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import eigh
+from scipy.optimize import linear_sum_assignment
+
+from ..modes.harmonics import Change, HarmonicModes, Makeup, Vibration
+from ..section.point_elements import Attached
+
+Array = np.ndarray
+CANDIDATES = 3  # coupled modes looked at for every one wanted
+NEAR = 4  # harmonics beyond the highest wanted whose modes may lie close to wanted ones
+SLIGHT = 1e-6  # share of a mode's energy below which a harmonic does not count for its slopes
+NEGLIGIBLE = 1e-9  # share of the static response that a direction may hold to be left out
+FAR = 9.0  # times the highest eigenvalue looked at: fields beyond it follow almost statically
+MOMENTS = 3  # responses of those, each to the last one's inertia: right to (1 / FAR)^(2 MOMENTS)
+
+
+@dataclass
+class Family:
+    """Fields of harmonic n that diagonalise K(n) and M: eigenvalues (k,), shapes (k, nodes, 3),
+    u^H M u = 1 per radian, the lowest first."""
+
+    n: int
+    eigenvalues: Array
+    shapes: Array
+
+    @property
+    def whole(self) -> float:
+        """Square of the factor from unit mass per radian to unit mass of the whole circle."""
+        return 1 / np.pi if self.n else 1 / (2 * np.pi)
+
+
+class Basis:
+    """Real fields: for each family c = 1, and for n >= 1 then c = i."""
+
+    def __init__(self, families: list[Family]):
+        self.families = families
+        self.place = []  # (family, index in it, c)
+        for f, family in enumerate(families):
+            for c in (1.0, 1j) if family.n else (1.0,):
+                self.place += [(f, k, c) for k in range(len(family.eigenvalues))]
+        self.eigenvalues = np.array([families[f].eigenvalues[k] for f, k, _ in self.place])
+
+    def energy(self, vectors: Array) -> Array:
+        """Stiffness energy (families, m), 2 J, of fields given by vectors (fields, m)."""
+        whole = np.zeros((len(self.families), vectors.shape[1]))
+        np.add.at(whole, [f for f, _, _ in self.place], self.eigenvalues[:, None] * vectors**2)
+        return whole
+
+    def part(self, f: int, vectors: Array) -> Array:
+        """Of fields given by vectors (fields, m): the shapes (m, nodes, 3) of the f-th family,
+        unit mass as in it."""
+        rows = [i for i, place in enumerate(self.place) if place[0] == f]
+        c = np.array([self.place[i][2] for i in rows])[:, None] * vectors[rows]
+        return np.tensordot(c.T, self.families[f].shapes[[self.place[i][1] for i in rows]], 1)
+
+    def at_zero(self, attached: Attached) -> Array:
+        """Displacement (d, fields) of the attached components."""
+        columns = []
+        for family in self.families:
+            pick = family.shapes[:, attached.rows, attached.components].T
+            pick = pick * np.sqrt(family.whole) * attached.share(family.n)
+            columns += [pick.real, -pick.imag] if family.n else [pick.real]
+        return np.hstack(columns)
+
+
+def attached_modes(
+    vibration: Vibration,
+    attached: Attached,
+    harmonics: list[int],
+    count: int,
+    check: Callable[[], None] = lambda: None,
+    highest: int | None = None,
+) -> list[HarmonicModes]:
+    """The ``count`` lowest modes of each harmonic with masses and springs on the tyre.
+
+    K + k p p^T and M + m p p^T, p the displacement that carries k or m; ``highest``: harmonic of
+    the sum, as a rule the highest one that the sectors carry. Raises Unstable, NotConverged.
+    """
+    families = []
+    top = attached.highest if highest is None else highest
+    for n in range(max([top, *harmonics]) + 1):
+        check()
+        own = count + 1 if n <= max(harmonics) + NEAR else 0
+        families.append(_with_response(vibration, n, own, attached))
+    basis = Basis(families)
+    p = basis.at_zero(attached)
+    looked = CANDIDATES * len(_seats(harmonics, count)) + 10
+    fewer = _reduced(basis.eigenvalues, p, looked)
+    at = p @ fewer
+    K = fewer.T @ (basis.eigenvalues[:, None] * fewer)
+    K += at.T @ (attached.stiffness.real[:, None] * at)
+    M = np.eye(len(K)) + at.T @ (attached.mass.real[:, None] * at)
+    values, vectors = eigh(K, M)
+    return named(basis, values, fewer @ vectors, harmonics, count, p)
+
+
+def _reduced(eigenvalues: Array, p: Array, looked: int) -> Array:
+    """Orthonormal combinations (fields, k) of fields that hold the ``looked`` lowest coupled modes.
+
+    The low fields themselves; of the many high ones D^-1 p^T, D^-2 p^T, ...: Lanczos' vectors of
+    the forces that attached masses and springs exert on them.
+    """
+    limit = FAR * np.sort(eigenvalues)[: looked + 1][-1]
+    low, high = np.flatnonzero(eigenvalues <= limit), np.flatnonzero(eigenvalues > limit)
+    relative = limit / eigenvalues[high, None]
+    moments = np.hstack([relative**k * p[:, high].T for k in range(1, MOMENTS + 1)])
+    rest = np.linalg.qr(moments)[0]
+    whole = np.zeros((len(eigenvalues), len(low) + rest.shape[1]))
+    whole[low, range(len(low))] = 1.0
+    whole[high, len(low) :] = rest
+    return whole
+
+
+def _with_response(vibration: Vibration, n: int, count: int, attached: Attached) -> Family:
+    """Modes of harmonic n and the static response to unit forces on the attached components."""
+    factor, numbering = vibration.factor(n), vibration.numbering
+    force = np.zeros((*numbering.equation.shape, len(attached.rows)), complex if n else float)
+    force[attached.rows, attached.components, range(len(attached.rows))] = 1.0
+    force = numbering.gather(force)
+    response = factor.solve(force)
+    gives, directions = np.linalg.eigh(force.conj().T @ response)
+    directions = directions[:, gives > NEGLIGIBLE * gives[-1]]
+    vectors = response @ directions
+    images = force @ directions + vibration.shift * vibration.times_mass(vectors)
+    if count:
+        modes = vibration.modes(n, count, factor)
+        own = numbering.gather(np.moveaxis(modes.shapes, 0, -1))
+        vectors = np.hstack([own, vectors])
+        images = np.hstack([vibration.times_mass(own) * modes.eigenvalues, images])
+    return ritz(vibration, n, vectors, images)
+
+
+def ritz(vibration: Vibration, n: int, vectors: Array, images: Array) -> Family:
+    """Fields spanned by ``vectors`` (size, k), K(n) times which is ``images``, made diagonal."""
+    masses = vibration.times_mass(vectors)
+    size = np.sqrt(np.einsum("ik,ik->k", vectors.conj(), masses).real)
+    vectors, masses, images = vectors / size, masses / size, images / size
+    gram, turn = np.linalg.eigh(vectors.conj().T @ masses)
+    turn = turn[:, gram > 1e-12] / np.sqrt(gram[gram > 1e-12])
+    K = turn.conj().T @ (vectors.conj().T @ images) @ turn
+    values, inner = np.linalg.eigh((K + K.conj().T) / 2)
+    shapes = vibration.numbering.spread(vectors @ (turn @ inner))
+    return Family(n, values, np.moveaxis(shapes, -1, 0))
+
+
+@dataclass
+class Parts:
+    """The harmonics that attached masses and springs couple in each mode.
+
+    mode (p,), n (p,), shapes (p, nodes, 3): those that hold more than `SLIGHT` of its energy;
+    eigenvalues (m,); at (d, m): displacement of the attached components.
+    """
+
+    mode: Array
+    n: Array
+    shapes: Array
+    eigenvalues: Array
+    at: Array
+
+    def forms(self) -> tuple[Array, Array, Array, Array]:
+        """A sum of parts for each mode."""
+        return self.n, self.shapes, self.mode, self.eigenvalues
+
+    def rates(self, forms: Array, change: Change) -> Array:
+        """psi^T (K' - lambda M') psi of the whole."""
+        return forms + change.attached.rates(self.eigenvalues, self.at)
+
+    def where(self, keep: Array | slice) -> Parts:
+        """The parts of some of the modes."""
+        kept = np.arange(len(self.eigenvalues))[keep]
+        place = np.full(len(self.eigenvalues), -1)
+        place[kept] = np.arange(len(kept))
+        mine = place[self.mode] >= 0
+        return Parts(
+            place[self.mode[mine]],
+            self.n[mine],
+            self.shapes[mine],
+            self.eigenvalues[kept],
+            self.at[:, kept],
+        )
+
+
+def named(
+    basis: Basis, values: Array, vectors: Array, harmonics: list[int], count: int, p: Array
+) -> list[HarmonicModes]:
+    """Coupled modes, eigenvalues (m,) rising and vectors (fields, m), by the plain modes of
+    which they hold most; of a doublet's two the lower comes first. p (d, fields)."""
+    held: dict[tuple[int, int], Array] = {}
+    for row, (f, k, _) in enumerate(basis.place):
+        key = basis.families[f].n, k
+        held[key] = held.get(key, 0.0) + vectors[row] ** 2
+    told = tell(held, harmonics, count)
+    result = []
+    for n in harmonics:
+        mine = told[n]
+        own = next(i for i, family in enumerate(basis.families) if family.n == n)
+        share = basis.energy(vectors[:, mine]).T / values[mine][:, None]
+        mode, which = np.nonzero(share > SLIGHT)
+        parts = {i: basis.part(i, vectors[:, mine]) for i in {own, *which.tolist()}}
+        makeup = Parts(
+            mode,
+            np.array([basis.families[i].n for i in which]),
+            np.array([parts[i][j] for j, i in zip(mode, which.tolist(), strict=True)]),
+            values[mine],
+            p @ vectors[:, mine],
+        )
+        result.append(split(n, values[mine], parts[own], makeup))
+    return result
+
+
+def tell(
+    held: dict[tuple[int, int], Array], harmonics: list[int], count: int
+) -> dict[int, list[int]]:
+    """Per harmonic the places of its coupled modes, two for each of its ``count`` doublets.
+
+    held: how much of the plain mode (n, k), k-th of harmonic n, is in each coupled mode (m,)
+    by rising frequency.
+    """
+    seats = _seats(harmonics, count)
+    looked = CANDIDATES * len(seats) + 10
+    overlap = np.array([held[seat][:looked] for seat in seats])
+    _, taken = linear_sum_assignment(overlap, maximize=True)
+    told: dict[int, list[int]] = {n: [] for n in harmonics}
+    for n in harmonics:
+        for k in range(count):
+            places = [int(t) for seat, t in zip(seats, taken, strict=True) if seat == (n, k)]
+            told[n] += sorted(places)
+    return told
+
+
+def _seats(harmonics: list[int], count: int) -> list[tuple[int, int]]:
+    """Harmonic and place in it of every mode that is wanted, a doublet's twice."""
+    return [(n, k) for n in harmonics for k in range(count) for _ in range(2 if n else 1)]
+
+
+def split(n: int, values: Array, shapes: Array, makeup: Makeup | None = None) -> HarmonicModes:
+    """Modes that come two by two for n >= 1."""
+    members = np.tile([1, 2], len(values) // 2) if n else None
+    return HarmonicModes(n, values, shapes, members=members, makeup=makeup)

@@ -1,0 +1,137 @@
+"""Waves of the turning tyre: forward and backward ones have different frequencies.
+
+In the frame that turns with the tyre at Omega about its axle, with S = e_z x,
+
+    M u'' + 2 Omega M S u' + K u = 0,    u = Re[U exp(i (n Theta + omega t))]
+    (K(n) + omega C - omega^2 M) U = 0,  C = 2 i Omega M S  (Hermitian),
+
+where K holds the centrifugal tension of the inflated state and, as -Omega^2 M in the plane of the
+wheel, the softening by the spin. omega > 0 is a wave that travels backward in the tyre, omega < 0
+a forward one. A sensor that stands still at theta = Theta + Omega t sees omega - n Omega.
+(Geradin and Kill, Engineering Computations 1, 1984; Huang and Soedel, J. Sound and Vibration 115,
+1987.)
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import eigh
+from scipy.optimize import linear_sum_assignment
+
+from ..deck.keywords import STEP
+from ..modes.harmonics import Change, HarmonicModes, Vibration
+from ..section.mechanics import mass_matrices
+from ..section.parts.pressure import SPIN
+from .coupled import Family, ritz, split
+
+Array = np.ndarray
+MORE = 4  # modes in the basis beyond those wanted
+ROUNDS = 2  # of responses to the Coriolis force added to the basis
+
+
+def waves(vibration: Vibration, spin: float, n: int, count: int) -> HarmonicModes:
+    """The two waves of each of the ``count`` lowest modes of harmonic n, as a fixed sensor sees
+    them: eigenvalues are (omega - n Omega)^2, the lower of two first; for n = 0 the one mode.
+
+    spin: Omega, rad/s; ``vibration``: with the centrifugal terms. Raises as `Vibration.modes`.
+    """
+    family = _basis(vibration, spin, n, count + MORE)
+    gyroscopic = _coriolis(vibration, spin, family)
+    omega, U = _quadratic(family.eigenvalues, gyroscopic)
+    held = abs(U[:count]) ** 2 / (abs(U) ** 2).sum(0)
+    chosen: list[Array] = []
+    for sign in (1, -1) if n else (1,):
+        pick = np.flatnonzero(np.sign(omega) == sign)
+        pick = pick[np.argsort(abs(omega[pick]))]
+        _, taken = linear_sum_assignment(held[:, pick], maximize=True)
+        chosen.append(pick[taken])
+    both = np.array(chosen).T  # (count, 1 or 2)
+    fixed = (omega[both] - n * spin) ** 2
+    mine = np.take_along_axis(both, np.argsort(fixed, axis=1), 1).ravel()
+    x = U[:, mine] / np.sqrt((abs(U[:, mine]) ** 2).sum(0))
+    shapes = np.tensordot(x.T, family.shapes, 1)
+    turned = np.einsum("im,ij,jm->m", x.conj(), gyroscopic, x).real
+    whirl = Whirl(n, spin, omega[mine], shapes, turned)
+    return split(n, whirl.fixed**2, shapes, whirl)
+
+
+@dataclass
+class Whirl:
+    """Waves (m,) of harmonic n: omega in the turning frame, shapes (m, nodes, 3), U^H M U = 1,
+    coriolis = U^H C U."""
+
+    n: int
+    spin: float
+    omega: Array
+    shapes: Array
+    coriolis: Array
+
+    @property
+    def fixed(self) -> Array:
+        """omega - n Omega: as a sensor that stands still sees them, rad/s."""
+        return self.omega - self.n * self.spin
+
+    def forms(self) -> tuple[Array, Array, Array, Array]:
+        """Of lambda = omega^2."""
+        modes = len(self.omega)
+        return np.full(modes, self.n), self.shapes, np.arange(modes), self.omega**2
+
+    def rates(self, forms: Array, change: Change) -> Array:
+        """omega' = U^H (K' + omega C' - omega^2 M') U / (2 omega - U^H C U)."""
+        faster = np.imag(change.spin) / STEP
+        by_spin = self.coriolis * faster / self.spin
+        for connectivity, M in mass_matrices(change.model):
+            if np.iscomplexobj(M):
+                u = self.shapes[:, connectivity]
+                turned = np.einsum("meai,eab,ij,mebj->m", u.conj(), M.imag / STEP, SPIN, u)
+                by_spin = by_spin + (2j * self.spin * turned).real
+        slope = (forms + self.omega * by_spin) / (2 * self.omega - self.coriolis)
+        return np.asarray(2 * self.fixed * (slope - self.n * faster))
+
+    def where(self, keep: Array | slice) -> Whirl:
+        """Some of them."""
+        return Whirl(self.n, self.spin, self.omega[keep], self.shapes[keep], self.coriolis[keep])
+
+
+def _basis(vibration: Vibration, spin: float, n: int, count: int) -> Family:
+    """Modes at rest in the turning frame, and responses to the Coriolis forces of each other."""
+    factor, numbering = vibration.factor(n), vibration.numbering
+    modes = vibration.modes(n, count, factor)
+    vectors = numbering.gather(np.moveaxis(modes.shapes, 0, -1))
+    images = vibration.times_mass(vectors) * modes.eigenvalues
+    newest = vectors
+    for _ in range(ROUNDS):
+        forces = [vibration.times_mass(_turned(vibration, newest))]
+        if newest is not vectors:
+            forces.append(vibration.times_mass(newest))
+        right = np.hstack(forces)
+        newest = factor.solve(right)
+        size = np.linalg.norm(newest, axis=0)
+        newest, right = newest / size, right / size
+        vectors, images = np.hstack([vectors, newest]), np.hstack([images, right])
+    return ritz(vibration, n, vectors, images)
+
+
+def _turned(vibration: Vibration, x: Array) -> Array:
+    """e_z x u for (size, b)."""
+    full = vibration.numbering.spread(x)
+    return vibration.numbering.gather(np.einsum("ij,njb->nib", SPIN, full))
+
+
+def _coriolis(vibration: Vibration, spin: float, family: Family) -> Array:
+    """C = 2 i Omega M S on the basis."""
+    x = vibration.numbering.gather(np.moveaxis(family.shapes, 0, -1))
+    return 2j * spin * (x.conj().T @ vibration.times_mass(_turned(vibration, x)))
+
+
+def _quadratic(K: Array, C: Array) -> tuple[Array, Array]:
+    """omega (2k,) and U (k, 2k) of (K + omega C - omega^2) U = 0, K (k,) diagonal, as
+
+    [[-C, 1], [1, 0]] x = (1 / omega) [[K, 0], [0, 1]] x,   x = (U, omega U).
+    """
+    one = np.eye(len(K))
+    left = np.block([[-C, one], [one, 0 * one]])
+    inverse, x = eigh(left, np.diag(np.concatenate([K, np.ones(len(K))])))
+    return 1 / inverse, x[: len(K)]

@@ -1,0 +1,227 @@
+"""A tyre one sector of which is of other stuff: a splice.
+
+The section's constants at the angle Theta are C + chi(Theta) (C' - C), chi = 1 in the sector, 0
+elsewhere, by its Fourier series up to twice the highest harmonic N of the displacements, which is
+all that products of two of them see. On 2 N + 1 nodes round the tyre displacements are exact
+trigonometric polynomials, and sums over the stations exact integrals.
+
+The state under pressure is found again, because a stiffer sector also takes up other forces; then
+Ritz's method on the axisymmetric tyre's modes and on the responses K^-1 r to what is left of each,
+r = (K~ - lambda M~) u, the axisymmetric K per harmonic (Davidson, J. Comp. Physics 17, 1975).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..modes.harmonics import HarmonicModes, Vibration
+from ..section.inflation import InflationFailed
+from ..section.mechanics import Load, mass
+from ..section.model import Model
+from ..solid3d.circumference import Circumference
+from ..solid3d.gmres import gmres
+from ..solid3d.revolved import Inverted, Revolved
+from .coupled import split, tell
+
+Array = np.ndarray
+NEAR = 2  # harmonics beyond the highest wanted whose modes may lie close to wanted ones
+BEYOND = 6  # harmonics of the displacements beyond the highest wanted
+TOLERANCE = 1e-9  # out-of-balance force over the rim's
+LONGEST = 20  # iterations
+LOOSE = 1e-4  # of each step of Newton's method
+INDEPENDENT = 1e-11  # of the basis' Gram matrix
+ROUNDS = 2  # of responses
+
+
+@dataclass(frozen=True)
+class Sector:
+    """Its width (rad), about Theta = 0, and the section as it is there."""
+
+    width: float
+    model: Model
+
+    def share(self, angles: Array, highest: int) -> Array:
+        """chi at angles (k,), harmonics up to ``highest``."""
+        h = np.arange(1, highest + 1)
+        wave = 2 * np.sin(h * self.width / 2) / (np.pi * h)
+        return self.width / (2 * np.pi) + np.cos(np.outer(angles, h)) @ wave
+
+
+def full_circle(highest: int) -> Circumference:
+    """Trigonometric polynomials up to a harmonic by their values at 2 N + 1 angles."""
+    k, s = 2 * highest + 1, 4 * highest + 1
+    angles, stations = _angles(k), _angles(s)
+    away = stations[:, None] - angles
+    n = np.arange(1, highest + 1)
+    N = (1 + 2 * np.cos(away[..., None] * n).sum(-1)) / k
+    slope = -2 * (n * np.sin(away[..., None] * n)).sum(-1) / k
+    weights = np.full(s, 2 * np.pi / s)
+    return Circumference(angles, N, slope, weights, weights @ N, (slice(0, s),))
+
+
+def blended(model: Model, other: Model, share: Array) -> Model:
+    """``model`` with constants per Gauss point and station (p, s); an hourglass stiffness stays."""
+    mix = lambda a, b, p: (
+        np.broadcast_to(a, p)[:, None]
+        + np.outer(np.broadcast_to(b, p) - np.broadcast_to(a, p), share)
+    )
+    rubbers = []
+    for r, o in zip(model.rubbers, other.rubbers, strict=True):
+        a, b, p = r.material, o.material, r.solids.weights.size
+        pick = lambda name, a=a, b=b, p=p: mix(getattr(a, name), getattr(b, name), p)
+        law = replace(a, C10=pick("C10"), C01=pick("C01"), inverse_D1=pick("inverse_D1"))
+        rubbers.append(replace(r, material=law))
+    cords = [
+        replace(c, stiffness=mix(c.stiffness, o.stiffness, c.stiffness.size))
+        for c, o in zip(model.cords, other.cords, strict=True)
+    ]
+    return replace(model, rubbers=rubbers, cords=cords)
+
+
+class Round:
+    """Fields (k, nodes, 3) by their values round the tyre; ``free`` (nodes, 3)."""
+
+    def __init__(self, vibration: Vibration, tyre: Revolved, sector: Sector, highest: int):
+        self.vibration, self.tyre, self.highest = vibration, tyre, highest
+        self.factors = [vibration.factor(n) for n in range(highest + 1)]
+        self.free = vibration.numbering.equation < vibration.numbering.size
+        around = tyre.around
+        share = sector.share(_angles(len(around.weights)), 2 * highest)
+        self._waves = around.N.T @ ((around.weights * share)[:, None] * around.N)
+        self._plain = vibration.mass * (2 * np.pi / len(around.angles))
+        self._more = mass(sector.model) - vibration.mass
+
+    def field(self, n: int, shape: Array) -> Array:
+        """Re[shape exp(i n Theta)]."""
+        turned = np.exp(1j * n * self.tyre.around.angles)[:, None, None] * shape
+        return np.asarray(turned.real)
+
+    def wave(self, field: Array, n: int) -> Array:
+        """The amplitude (nodes, 3) of harmonic n in a field."""
+        return np.asarray(np.fft.rfft(field, axis=0)[n] / len(field) * (2 if n else 1))
+
+    def forces(self, field: Array) -> Array:
+        """K~ u, N."""
+        return self.tyre.product(field) * self.free
+
+    def inertia(self, field: Array) -> Array:
+        """M~ u, kg m."""
+        flat = field.swapaxes(0, 1).reshape(self.free.shape[0], -1)
+        shape = self.free.shape[0], len(field), 3
+        image = (self._plain @ flat).reshape(shape)
+        if self._more.nnz and abs(self._more).max():
+            image = image + np.einsum(
+                "kj,njc->nkc", self._waves, (self._more @ flat).reshape(shape)
+            )
+        return np.asarray(image.swapaxes(0, 1) * self.free)
+
+    def response(self, force: Array) -> Array:
+        """K^-1 of the plain tyre times forces, harmonic by harmonic."""
+        numbering = self.vibration.numbering
+        waves = np.fft.rfft(force, axis=0) * len(force) / (2 * np.pi)  # N per radian
+        for n, factor in enumerate(self.factors):
+            right = numbering.gather(waves[n])
+            waves[n] = numbering.spread(factor.solve(right if n else right.real))
+        return np.fft.irfft(waves, len(force), axis=0)
+
+
+def _angles(k: int) -> Array:
+    return 2 * np.pi * np.arange(k) / k
+
+
+def sector_modes(
+    vibration: Vibration,
+    U: Array,
+    loads: list[Load],
+    model: Model,
+    sector: Sector,
+    harmonics: list[int],
+    count: int,
+    check: Callable[[], None] = lambda: None,
+    beyond: int = BEYOND,
+) -> list[HarmonicModes]:
+    """The ``count`` lowest modes of each harmonic of a tyre with a sector of other stuff.
+
+    U: the plain tyre's state under ``loads``; model: the plain one; ``beyond``: harmonics of the
+    displacements above the highest wanted. Raises InflationFailed, Unstable, NotConverged.
+    """
+    top = max(harmonics) + beyond
+    around = full_circle(top)
+    share = sector.share(_angles(len(around.weights)), 2 * top)
+    tyre = Revolved(blended(model, sector.model, share), loads, around)
+    fields = Round(vibration, tyre, sector, top)
+    equilibrium(fields, U, check)
+    near = range(min(max(harmonics) + NEAR, top) + 1)
+    start: list[Array] = []
+    plain = {}
+    for n in near:
+        for k, shape in enumerate(vibration.modes(n, count).shapes):
+            pair = [fields.field(n, c * shape) for c in ((1.0, 1j) if n else (1.0,))]
+            plain[n, k] = range(len(start), len(start) + len(pair))
+            start += pair
+    wanted = sum((2 if n else 1) * count for n in harmonics)
+    values, modes, first = ritz_davidson(fields, start, wanted + 2, check)
+    held = {key: sum(first[i] ** 2 for i in places) for key, places in plain.items()}
+    told = tell(held, harmonics, count)
+    result = []
+    for n in harmonics:
+        size = np.sqrt(np.pi if n else 2 * np.pi)  # from the whole circle's unit mass
+        shapes = np.array([size * fields.wave(modes(j), n) for j in told[n]])
+        result.append(split(n, values[told[n]], shapes))
+    return result
+
+
+def equilibrium(fields: Round, U: Array, check: Callable[[], None]) -> None:
+    """Newton's method from the plain tyre's state. Raises InflationFailed."""
+    state = np.repeat(U[None], len(fields.tyre.around.angles), 0)
+    shape = state.shape
+    product = lambda x: fields.forces(x.reshape(shape)).ravel()
+    response = lambda x: fields.response(x.reshape(shape)).ravel()
+    scale = 0.0
+    for _ in range(LONGEST):
+        check()
+        try:
+            whole = fields.tyre.residual(state)
+        except Inverted as error:
+            raise InflationFailed(0.0, 0.0, f"with the splice {error}") from None
+        force = (whole * fields.free).ravel()
+        scale = scale or float(np.linalg.norm(whole))  # of what the rim bears
+        if np.linalg.norm(force) <= TOLERANCE * scale:
+            return
+        step, _, _ = gmres(product, response, -force, LOOSE, LONGEST)
+        state = state + step.reshape(shape)
+    raise InflationFailed(0.0, 0.0, "Newton's method did not converge with the splice")
+
+
+def ritz_davidson(
+    fields: Round, start: list[Array], wanted: int, check: Callable[[], None]
+) -> tuple[Array, Callable[[int], Array], Array]:
+    """Eigenvalues (m,) rising, the fields of the modes, M~-normalised, by their place, and
+    (len(start), m): how much of each of the ``start`` fields they hold."""
+    shape, new, used = start[0].shape, start, 0
+    room = np.empty((3, len(start) + ROUNDS * wanted, start[0].size))
+    for left in reversed(range(ROUNDS + 1)):
+        for field in new:
+            check()
+            inertia = fields.inertia(field)
+            size = np.sqrt((field * inertia).sum())
+            field = field / size
+            for row, values in zip(
+                room[:, used], (field, fields.forces(field), inertia / size), strict=True
+            ):
+                row[:] = values.ravel()
+            used += 1
+        V, KV, MV = room[:, :used]
+        K, M = V @ KV.T, V @ MV.T
+        gram, turn = np.linalg.eigh((M + M.T) / 2)
+        turn = turn[:, gram > INDEPENDENT] / np.sqrt(gram[gram > INDEPENDENT])
+        values, inner = np.linalg.eigh(turn.T @ ((K + K.T) / 2) @ turn)
+        x = turn @ inner
+        if left:
+            lowest = x[:, :wanted].T
+            rest = lowest @ KV - values[:wanted, None] * (lowest @ MV)
+            new = [fields.response(force.reshape(shape)) for force in rest]
+    return values, lambda j: (x[:, j] @ V).reshape(shape), M[: len(start)] @ x

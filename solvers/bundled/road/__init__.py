@@ -1,0 +1,1 @@
+"""The tyre pressed on the road: contact, footprints, and modes there."""

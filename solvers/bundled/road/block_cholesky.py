@@ -1,0 +1,394 @@
+"""Preconditioner of the tyre in three dimensions: block Cholesky along the section's meridian.
+
+Nodes in levels from the bead to the middle of the tread couple only with their neighbours; all
+angles of a level are eliminated together, as dense blocks in single precision. Where cords run at
+a bias the two parts of the fold are eliminated as one, elsewhere each by itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor, wait
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg.lapack import spotrf, strtrs
+
+from ..section.band import Indefinite
+from ..solid3d.circumference import Circumference
+from .half_turn_symmetry import MIRROR, Fold, NotSymmetric
+
+Array = np.ndarray
+Tangents = list[tuple[Array, Array, Array, Array]]
+SMALL = 300  # rows of a triangle that are not halved any more
+_Assembled = tuple[tuple[int, ...], Array, Array, Array]
+BIAS = 2e-3  # of what couples the parts over what does not, above which a level takes both as one
+
+
+@dataclass
+class _Front:
+    """One level: rows of its nodes in the quarter, those to eliminate first, then the rest.
+
+    elements: per kind, its elements here and their mirror images with their nodes' places.
+    """
+
+    nodes: Array
+    eliminated: int
+    elements: list[tuple[Array, Array, Array, Array]]
+
+
+class Elimination:
+    """The order of elimination, from the elements' connectivities."""
+
+    def __init__(self, connectivities: list[Array], fold: Fold, around: Circumference):
+        self.fold, self.around = fold, around
+        place = np.full(fold.shape[1], -1)
+        place[fold.nodes] = np.arange(len(fold.nodes))
+        other = fold.other
+        # elements on z >= 0, their images, and their nodes' places in the quarter
+        chosen: list[tuple[Array, ...]] = []
+        beyond = ~np.isin(np.arange(fold.shape[1]), fold.nodes)
+        inner = (place >= 0) & (other != np.arange(fold.shape[1]))
+        for c in connectivities:
+            if (beyond[c].any(1) & inner[c].any(1)).any():
+                raise NotSymmetric("an element straddles the middle plane")
+            inside = np.flatnonzero((place[c] >= 0).all(1))
+            chosen.append((inside, *_images(c, inside, other), place[c[inside]]))
+        level = _levels([c for *_, c in chosen], fold)
+        self.fronts = _fronts(chosen, level)
+        # the same threads for every factor: what one factor frees then serves the next, for the
+        # system keeps memory by threads
+        self.ahead, self.pool, self.chains = (ThreadPoolExecutor(n) for n in (1, 2, 2))
+        # what a station's tangents by u u, u v, v u, v v (v = du/dTheta) are to the nodes round the
+        # circumference: products of two of an element's functions or slopes (2, 2, s, 9 t)
+        N, w = np.stack([around.N, around.slope]), around.weights
+        products = np.zeros((2, 2, len(w), len(around.stations), 3, 3))
+        for t, rows in enumerate(around.stations):
+            own = N[:, rows, 2 * t : 2 * t + 3]
+            products[:, :, rows, t] = np.einsum("xsk,ysl,s->xyskl", own, own, w[rows])
+        self.products = products.reshape(2, 2, len(w), -1).astype(np.float32)
+
+
+def _images(c: Array, inside: Array, other: Array) -> tuple[Array, Array]:
+    """Mirror images of elements, and where in the image each node's own image stands (e, a)."""
+    known: dict[tuple[int, ...], list[int]] = {}
+    for element, nodes in enumerate(c):
+        known.setdefault(tuple(sorted(nodes)), []).append(element)
+    images, orders = [], []
+    for element in inside:
+        own = known[tuple(sorted(c[element]))]  # layers on one line have the same nodes
+        mirrored = other[c[element]]
+        image = known[tuple(sorted(mirrored))][own.index(element)]
+        images.append(image)
+        orders.append([list(c[image]).index(n) for n in mirrored])
+    return np.array(images, int), np.array(orders, int).reshape(len(images), c.shape[1])
+
+
+def _levels(connectivities: list[Array], fold: Fold) -> Array:
+    """Steps from the nodes that are farthest from the tread's middle; -1 for held ones."""
+    free = np.asarray(fold.mask.any((0, 1, 3)))
+    from_middle = _steps(connectivities, fold.nodes == fold.beyond, free)
+    return _steps(connectivities, from_middle == from_middle.max(), free)
+
+
+def _steps(connectivities: list[Array], start: Array, free: Array) -> Array:
+    level = np.where(start & free, 0, -1)
+    current = 0
+    while (level == current).any():
+        near = [c[(level[c] == current).any(1)].ravel() for c in connectivities]
+        following = np.unique(np.concatenate(near))
+        current += 1
+        level[following[(level[following] == -1) & free[following]]] = current
+    return level
+
+
+def _fronts(chosen: list[tuple[Array, ...]], level: Array) -> list[_Front]:
+    highest = [level[c].max(1, initial=-1) for *_, c in chosen]
+    fronts, before = [], np.zeros(0, int)
+    for i in range(level.max() + 1):
+        onward = np.zeros(len(level), bool)
+        for (*_, c), high in zip(chosen, highest, strict=True):
+            onward[c[high == i + 1]] = True
+        own = np.flatnonzero(level == i)
+        exposed = own[onward[own]]
+        nodes = np.concatenate([before, own[~onward[own]], exposed])
+        position = np.full(len(level), len(nodes))  # a spare place for held ones
+        position[nodes] = np.arange(len(nodes))
+        elements = [
+            (inside[high == i], image[high == i], order[high == i], position[c[high == i]])
+            for (inside, image, order, c), high in zip(chosen, highest, strict=True)
+        ]
+        if not i or len(nodes) > len(exposed):
+            fronts.append(_Front(nodes, len(nodes) - len(exposed), elements))
+        before = exposed
+    return fronts
+
+
+class Factor:
+    """Approximate inverse of the tangent stiffness on the two parts.
+
+    tangents: at the stations (`Revolved.tangents`); contact (k, n, 3, 3): stiffness at the
+    nodes, N/m. Raises Indefinite.
+    """
+
+    def __init__(self, order: Elimination, tangents: Tangents, contact: Array):
+        self.order = order
+        self.contact = order.fold.blocks(contact)
+        self._steps: list[tuple[Array, Array, slice, Array, Array]] = []
+        carried: list[Array] = []
+        levels = self._assemble(tangents)
+        following = order.ahead.submit(next, levels, None)
+        try:
+            while (level := following.result()) is not None:
+                following = order.ahead.submit(next, levels, None)
+                carried = self._eliminate(*level, carried, order.pool)
+        finally:
+            wait([following])
+        # steps of one part, of the other, and after these of both: two threads for the first two
+        slots = [slot for _, _, slot, _, _ in self._steps]
+        parts = [slice(0, 1), slice(1, 2), slice(0, 2)]
+        self._chains = [[i for i, s in enumerate(slots) if s == part] for part in parts]
+
+    def _assemble(self, tangents: Tangents) -> Iterator[tuple[_Front, list[_Assembled]]]:
+        """Level by level its blocks, of each part or of both where the bias couples them."""
+        coupled = False
+        kinds = [_between_angles(kind, self.order) for kind in tangents]
+        for front in self.order.fronts:
+            same, cross = _tables(front, kinds)
+            coupled = coupled or bool(abs(cross).max() > BIAS * abs(same).max())
+            same = np.ascontiguousarray(same)
+            if coupled:
+                cross = np.ascontiguousarray(cross)
+            else:
+                gone = front.nodes[: front.eliminated]
+                self.contact[:, gone, :3, 3:] = self.contact[:, gone, 3:, :3] = 0.0
+            groups = [(0, 1)] if coupled else [(0,), (1,)]
+            block = lambda group, rows, cols, t=(same, cross), f=front: _block(
+                t, f, group, self.order.fold, self.contact, rows, cols
+            )
+            yield (
+                front,
+                [
+                    (
+                        g,
+                        block(g, "gone", "gone"),
+                        block(g, "gone", "left"),
+                        block(g, "left", "left"),
+                    )
+                    for g in groups
+                ],
+            )
+
+    def _eliminate(
+        self,
+        front: _Front,
+        blocks: list[_Assembled],
+        carried: list[Array],
+        pool: ThreadPoolExecutor,
+    ) -> list[Array]:
+        """What a level leaves to the next one, of each part or of both."""
+        gone, left = front.nodes[: front.eliminated], front.nodes[front.eliminated :]
+        rests = []
+        for group, first, beside, rest in blocks:
+            if len(gone):
+                before = [carried[h] for h in group if h < len(carried)]
+                _add_carried(first, before, len(group), self.order.fold.shape[0])
+                _eliminate(first, beside, rest, pool)
+                self._steps.append((gone, left, slice(group[0], group[-1] + 1), first, beside))
+            rests.append(rest)
+        return rests
+
+    def solve(self, right: Array) -> Array:
+        """K^-1 right for parts (..., 2, k, q, 3)."""
+        rows = right.reshape(-1, *right.shape[-4:])
+        return self.backward(self.forward(rows)).reshape(right.shape)
+
+    def forward(self, right: Array) -> list[Array]:
+        """L^-1 right for parts (v, 2, k, q, 3): by step, (rows, v); without rows up to the first
+        level where ``right`` is not zero."""
+        b = np.array(right, np.float32, order="C")
+        pieces = [np.zeros((0, len(b)), np.float32)] * len(self._steps)
+
+        def go(steps: list[int]) -> None:
+            begun = False
+            for i in steps:
+                gone, left, slot, L, X = self._steps[i]
+                y = b[:, slot, :, gone].reshape(len(b), -1).T
+                begun = begun or bool(y.any())
+                if begun:
+                    _divide(L, y)
+                    if len(left):
+                        b[:, slot, :, left] -= (y.T @ X).reshape(b[:, slot, :, left].shape)
+                    pieces[i] = y
+
+        list(self.order.chains.map(go, self._chains[:2]))
+        go(self._chains[2])
+        return pieces
+
+    def backward(self, pieces: list[Array]) -> Array:
+        """L^-T of what `forward` gave, as parts (v, 2, k, q, 3)."""
+        x = np.zeros((pieces[-1].shape[1], *self.order.fold.mask.shape), np.float32)
+
+        def go(steps: list[int]) -> None:
+            for i in steps[::-1]:
+                gone, left, slot, L, X = self._steps[i]
+                y = pieces[i] if len(pieces[i]) else np.zeros((len(L), len(x)), np.float32)
+                if len(left):
+                    y = y - X @ x[:, slot, :, left].reshape(len(x), -1).T
+                _divide_transposed(L, y)
+                x[:, slot, :, gone] = y.T.reshape(x[:, slot, :, gone].shape)
+
+        go(self._chains[2])
+        list(self.order.chains.map(go, self._chains[:2]))
+        return np.asarray(x * self.order.fold.mask, float)
+
+
+def _between_angles(kind: tuple[Array, ...], order: Elimination) -> Array:
+    """Tangents of elements between nodes round the circumference (e, 3a, 3a, 9 t)."""
+    _, K0, K1, K2 = kind
+    stations = lambda K: K.reshape(len(K), -1).T
+    total = stations(K0) @ order.products[0, 0]
+    total += stations(K1) @ order.products[0, 1]
+    total += stations(K1.swapaxes(-1, -2)) @ order.products[1, 0]
+    total += stations(K2) @ order.products[1, 1]
+    return total.reshape(*K0.shape[1:], -1)
+
+
+def _tables(front: _Front, kinds: list[Array]) -> tuple[Array, Array]:
+    """Stiffness over the front's nodes (9 t, 3 nodes, 3 nodes): sums of elements and their mirror
+    images, and differences."""
+    n = 3 * len(front.nodes)
+    same, cross = np.zeros((2, n + 3, n + 3, kinds[0].shape[-1]), np.float32)  # a spare: held nodes
+    for chosen, kind in zip(front.elements, kinds, strict=True):
+        for element, image, order, place in zip(*chosen, strict=True):
+            sign = np.tile(MIRROR, len(order)).astype(np.float32)
+            there = kind[image][np.ix_(_dofs(order), _dofs(order))]
+            there *= np.multiply.outer(sign, sign)[..., None]
+            pairs = np.ix_(_dofs(place), _dofs(place))
+            same[pairs] += kind[element] + there
+            cross[pairs] += kind[element] - there
+    return same[:n, :n].transpose(2, 0, 1), cross[:n, :n].transpose(2, 0, 1)
+
+
+def _dofs(nodes: Array) -> Array:
+    return np.asarray((3 * nodes[:, None] + np.arange(3)).ravel())
+
+
+def _block(
+    tables: tuple[Array, Array],
+    front: _Front,
+    group: tuple[int, ...],
+    fold: Fold,
+    contact: Array,
+    rows: str,
+    cols: str,
+) -> Array:
+    """Stiffness over (part, angle, node, component) of nodes ``gone`` or ``left``, of one part or
+    both, held components cut out; Fortran order."""
+    chosen = {"gone": slice(0, front.eliminated), "left": slice(front.eliminated, None)}
+    here, there = chosen[rows], chosen[cols]
+    masks = fold.mask[:, :, front.nodes]
+    K = masks.shape[1]
+    n, m = len(front.nodes[here]) * 3, len(front.nodes[there]) * 3
+    after, beyond = 3 * (here.start or 0), 3 * (there.start or 0)
+    out = np.zeros((len(group) * K * n, len(group) * K * m), np.float32, order="F")
+    for x, g in enumerate(group):
+        for y, h in enumerate(group):
+            # its transpose, in C order: (angle, column, angle, row)
+            place = out[x * K * n : (x + 1) * K * n, y * K * m : (y + 1) * K * m].T
+            tiles = np.lib.stride_tricks.as_strided(
+                place, (K, m, K, n), (m * place.strides[0], place.strides[0], n * 4, 4)
+            )
+            table = tables[0 if g == h else 1]
+            parts = table[:, beyond : beyond + m, after : after + n]
+            for t, part in enumerate(parts.reshape(len(parts) // 9, 3, 3, m, n).swapaxes(2, 3)):
+                tiles[2 * t : 2 * t + 3, :, 2 * t : 2 * t + 3] += part
+            if rows == cols and rows == "gone":
+                for k, i in np.argwhere(contact[:, front.nodes[here]].any((2, 3))):
+                    a = slice(3 * i, 3 * i + 3)
+                    block = contact[k, front.nodes[i], 3 * g : 3 * g + 3, 3 * h : 3 * h + 3]
+                    tiles[k, a, k, a] += block.T
+            place[~masks[h][:, there].ravel()] = 0.0
+            place[:, ~masks[g][:, here].ravel()] = 0.0
+    if rows == cols:
+        diagonal = np.einsum("ii->i", out)
+        diagonal += np.concatenate([~masks[g][:, here].ravel() for g in group])
+    return out
+
+
+def _add_carried(first: Array, carried: list[Array], parts: int, angles: int) -> None:
+    """Add to the first block what earlier levels left of its nodes, of each part or of both."""
+    whole = first.T.reshape(parts, angles, -1, parts, angles, len(first) // (parts * angles))
+    blocks = parts // max(len(carried), 1)
+    for h, more in enumerate(carried):
+        add = more.T.reshape(blocks, angles, -1, blocks, angles, len(more) // (blocks * angles))
+        m = add.shape[2]
+        whole[h : h + blocks, :, :m, h : h + blocks, :, :m] += add
+
+
+def _eliminate(first: Array, beside: Array, rest: Array, pool: ThreadPoolExecutor) -> None:
+    """L of the first block, X = L^-1 beside and rest - X^T X in their places; lower triangles."""
+    _cholesky(first, pool)
+    if beside.shape[1]:
+        _divide_both(first, beside, pool)
+        _subtract_square(rest, beside, pool)
+
+
+# Triangles are halved down to small ones, of which the inverses are kept. All that takes time is
+# thus in NumPy's products, which leave the interpreter to the other thread, as SciPy's triangular
+# solvers do not. Threads share the work the same way everywhere, so that the bits are the same too.
+
+
+def _cholesky(A: Array, pool: ThreadPoolExecutor) -> None:
+    """The lower triangle of A becomes its Cholesky factor L, but the inverse in L's small triangles
+    on the diagonal. Raises Indefinite."""
+    if len(A) <= SMALL:
+        L, info = spotrf(A, lower=1)
+        if info:
+            raise Indefinite("the tangent stiffness is not positive definite")
+        # not by strtri, which ends the process with OpenBLAS's Prescott kernel
+        A[:] = np.tril(strtrs(L, np.eye(len(A), dtype=L.dtype, order="F"), lower=1)[0])
+        return
+    h = len(A) // 2
+    _cholesky(A[:h, :h], pool)
+    across = np.asfortranarray(A[h:, :h].T)
+    _divide_both(A[:h, :h], across, pool)
+    A[h:, :h] = across.T
+    _subtract_square(A[h:, h:], across, pool)
+    _cholesky(A[h:, h:], pool)
+
+
+def _divide_both(L: Array, B: Array, pool: ThreadPoolExecutor) -> None:
+    """B becomes L^-1 B."""
+    list(pool.map(lambda columns: _divide(L, columns), np.array_split(B, 2, 1)))
+
+
+def _divide(L: Array, B: Array) -> None:
+    if len(L) <= SMALL:
+        B[:] = L @ B
+        return
+    h = len(L) // 2
+    _divide(L[:h, :h], B[:h])
+    B[h:] -= L[h:, :h] @ B[:h]
+    _divide(L[h:, h:], B[h:])
+
+
+def _divide_transposed(L: Array, B: Array) -> None:
+    """B becomes L^-T B."""
+    if len(L) <= SMALL:
+        B[:] = L.T @ B
+        return
+    h = len(L) // 2
+    _divide_transposed(L[h:, h:], B[h:])
+    B[:h] -= L[h:, :h].T @ B[h:]
+    _divide_transposed(L[:h, :h], B[:h])
+
+
+def _subtract_square(A: Array, X: Array, pool: ThreadPoolExecutor) -> None:
+    """The lower triangle of A becomes that of A - X^T X."""
+    cut = int(len(A) * 0.7)  # about half of the triangle
+
+    def subtract(rows: slice) -> None:
+        A[rows, : rows.stop] -= (X[:, : rows.stop].T @ X[:, rows]).T
+
+    list(pool.map(subtract, [slice(0, cut), slice(cut, len(A))]))

@@ -1,0 +1,295 @@
+"""The inflated tyre pressed on the road: Newton's method for its displacements and the road's
+height at a given load, preconditioned GMRES inside, loads one after the other.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..section.band import Indefinite
+from ..solid3d.gmres import gmres
+from ..solid3d.revolved import Inverted, Revolved
+from .block_cholesky import Elimination, Factor
+from .contact import Contact, Road
+from .contact_update import Touching
+from .half_turn_symmetry import Fold
+
+Array = np.ndarray
+log = logging.getLogger("tyrecal_solvers")
+TOLERANCE = 1e-8  # out-of-balance force over the load
+LONGEST = 40  # Newton iterations a load
+EXHAUSTED = 15  # GMRES iterations of a step, after which the preconditioner is formed anew
+LONGEST_LINEAR = 60
+EXACT = 1e-2  # residual of the linear problem, relative
+STIFF = 1e-3  # the same of the vertical stiffness
+ROUGH = 0.3  # residual of the linear problem as long as the contact changes much
+ASTRAY = 0.5  # more is left only of a tangent that is far from a stable one
+PATIENCE = 2  # steps that may fail to halve the residual, with Coulomb's friction
+NEAR = 1e-2  # residual over the load, before Coulomb's friction is tried
+FAR = 0.1  # the same, before the friction's bounds are taken anew
+SOFT = 1e-4  # m: an elastic slip that is no obstacle
+HARDER = 0.3  # from one elastic slip to the next smaller one
+SHORTEST = 1 / 64  # step of the line search
+TOUCH = 1e-6  # m/N of deflection to begin with: it must touch, and stay small
+SOFTEST = 1 / 16  # share of a load's increase, below which it counts as unreachable
+FURTHEST = 0.1  # of the section's height that a stiff tyre (`TOUCH`) goes down in one step
+
+
+Bound = tuple[Array, Array]
+
+
+class NotPressed(ArithmeticError):
+    """No equilibrium with the road at a load."""
+
+    cause = "no_equilibrium"
+
+
+@dataclass
+class Pressed:
+    """An equilibrium: parts (2, k, q, 3) of the displacements, the road's height (m), contact,
+    and the tangent vertical stiffness dF / d(deflection), N/m."""
+
+    parts: Array
+    height: float
+    contact: Contact
+    stiffness: float
+
+
+class Press:
+    """Presses a tyre from its inflated state ``U`` (k, n, 3) to rising loads."""
+
+    def __init__(self, tyre: Revolved, fold: Fold, road: Road, U: Array, check: Callable[[], None]):
+        self.tyre, self.fold, self.check = tyre, fold, check
+        self.free_radius = float(road.positions(U)[..., 0].max())
+        self.flat = self._flat_height(tyre.model.mesh.X, np.flatnonzero(~fold.free.any(1)))
+        self.road = road.settled(road.forces(U, self.free_radius))
+        tyre.residual(U)
+        self.order = Elimination([t[0] for t in tyre.tangents()], fold, tyre.around)
+        self.parts = fold.parts(U)
+        self.height = self.free_radius
+        self.load = 0.0
+        self._bound = np.zeros_like(road.area), np.zeros_like(road.area)
+        self._factor: Touching | None = None
+        self._used = 0
+        self._stale = False  # the preconditioner is of an earlier load
+        self._slope: tuple[Array, float] | None = None  # of parts and height by the load
+        self.factorisations = self.products = self.iterations = 0
+
+    def to(self, load: float) -> Pressed:
+        """The equilibrium at ``load`` (N), in smaller steps where need be. Raises NotPressed, also
+        where the road has come to the rim."""
+        step = min(load - self.load, FURTHEST * (self.free_radius - self.flat) / TOUCH)
+        smallest = SOFTEST * step
+        while True:
+            self.check()
+            target = min(self.load + step, load)
+            try:
+                found = self._newton(target)
+            except (NotPressed, Indefinite, Inverted) as error:
+                step /= 2
+                self._factor = None
+                if step < smallest:
+                    raise NotPressed(
+                        f"no equilibrium between {self.load:.4g} and {target:.4g} N"
+                        f"{self.depth()}: {error}"
+                    ) from None
+                continue
+            self.parts, self.height, self.load = found.parts, found.height, target
+            if self.height <= self.flat:
+                raise NotPressed(f"the tyre is flat on its rim at {target:.4g} N{self.depth()}")
+            self.road = self.road.settled(found.contact)
+            if target == load:
+                return found
+            log.info("%g of %g N are reached%s", target, load, self.depth())
+
+    def depth(self) -> str:
+        """In words, how far down the last load reached has pressed the tyre; "" before any."""
+        down, most = self.free_radius - self.height, self.free_radius - self.flat
+        return f" ({1e3 * down:.0f} of {1e3 * most:.0f} mm down to the rim)" if self.load else ""
+
+    @staticmethod
+    def _flat_height(X: Array, held: Array) -> float:
+        """The road's height, m, at which the crown lies on the rim: points X (n, 3) at rest; the
+        rim's are those with the indices ``held``."""
+        rim = float(X[held, 0].max(initial=0.0))
+        z = np.where(X[:, 0] > rim, np.abs(X[:, 1]), np.inf)
+        return rim + float(np.ptp(X[z <= z.min() + 1e-9, 0]))
+
+    def rest(self) -> None:
+        """Let go of the memory that is only of use while the load stays."""
+        self._factor = None
+
+    def _state(
+        self, parts: Array, height: float, load: float, bound: Bound | None
+    ) -> tuple[Array, float, Contact]:
+        """Residuals: forces on the parts, and half the load less the contact's."""
+        U = self.fold.spread(parts)
+        forces = self.tyre.residual(U)
+        contact = self.road.forces(U, height, bound)
+        force = self.fold.gather(forces + contact.nodal(U.shape))
+        return force, (load - contact.force) / 2, contact
+
+    def _energy(self, contact: Contact, load: float, height: float) -> float:
+        """Potential of half the tyre, its road and its load at the last state, J."""
+        return self.tyre.potential() + contact.energy + load / 2 * height
+
+    def _newton(self, load: float) -> Pressed:
+        """By Tresca's friction, with the last normal forces, to where Coulomb's converges."""
+        parts, height = self.parts, self.height
+        self._stale = self._factor is not None
+        if self._slope:
+            parts = parts + (load - self.load) * self._slope[0]
+            height += (load - self.load) * self._slope[1]
+        else:
+            height -= TOUCH * load
+        bound, near = self._bound, NEAR
+        for attempt in range(LONGEST):
+            reached = near if attempt else FAR
+            parts, height, contact = self._softly(parts, height, load, bound, reached)
+            bound = contact.local[..., 0], self.road.share(height)[0]
+            if not attempt:
+                continue  # what newly touches had no friction yet
+            try:
+                parts, height, contact = self._settle(parts, height, load, None, TOLERANCE)
+            except NotPressed:
+                near = max(0.1 * near, TOLERANCE)
+                continue
+            self._bound = contact.local[..., 0], np.ones_like(self.road.area)
+            return Pressed(parts, height, contact, self._stiffness(contact))
+        raise NotPressed("the friction did not settle")
+
+    def _softly(
+        self, parts: Array, height: float, load: float, bound: Bound, tolerance: float
+    ) -> tuple[Array, float, Contact]:
+        """By Tresca's friction; a hard stick is approached by softer ones."""
+        road = self.road
+        slips = [road.elastic_slip]
+        while slips[0] < SOFT:
+            slips.insert(0, slips[0] / HARDER)
+        try:
+            for slip in slips:
+                self.road = replace(road, elastic_slip=slip)
+                parts, height, contact = self._settle(parts, height, load, bound, tolerance)
+        finally:
+            self.road = road
+        return parts, height, contact
+
+    def _settle(
+        self, parts: Array, height: float, load: float, bound: Bound | None, tolerance: float
+    ) -> tuple[Array, float, Contact]:
+        """Newton's method, with an energy line search where the friction is bounded; with
+        Coulomb's friction it is left as soon as it does not converge."""
+        force, lacking, contact = self._state(parts, height, load, bound)
+        size = float(np.hypot(np.linalg.norm(force), lacking))
+        if bound is None and self._stale:
+            self._form(contact)
+        setbacks = 0
+        for _ in range(LONGEST):
+            self.check()
+            if size <= tolerance * load:
+                return parts, height, contact
+            self.iterations += 1
+            energy = self._energy(contact, load, height) if bound else 0.0
+            rough = size > NEAR * load
+            step, rise = self._step(contact, force, lacking, ROUGH if rough else EXACT)
+            slope = float((force * step).sum() + lacking * rise)
+            length, before = 1.0, size
+            while True:
+                ahead = parts + length * step, height + length * rise
+                try:
+                    force, lacking, contact = self._state(*ahead, load, bound)
+                    size = float(np.hypot(np.linalg.norm(force), lacking))
+                    if bound is None or size < 0.5 * before:
+                        break
+                    if self._energy(contact, load, ahead[1]) <= energy + 1e-4 * length * slope:
+                        break
+                except Inverted:
+                    pass
+                length /= 2
+                if length < SHORTEST:
+                    raise NotPressed("the line search found no lower energy")
+            parts, height = ahead
+            setbacks += size > 0.5 * before
+            if bound is None and setbacks > PATIENCE:
+                break
+        raise NotPressed(f"Newton's method did not converge in {LONGEST} iterations")
+
+    def _step(
+        self, contact: Contact, force: Array, lacking: float, tolerance: float
+    ) -> tuple[Array, float]:
+        """Newton's step of the parts and of the road's height."""
+        border = _Border(self.fold, contact)
+        right = -np.append(force.ravel(), lacking * border.scale)
+        if self._used > EXHAUSTED:
+            self._form(contact)
+        found, self._used, left = self._solve(border, contact, right, tolerance)
+        if not left <= ASTRAY:
+            raise NotPressed("the tangent is too far from a stable one")
+        return found[:-1].reshape(force.shape), float(found[-1]) * border.scale
+
+    def _solve(
+        self, border: _Border, contact: Contact, right: Array, tolerance: float
+    ) -> tuple[Array, int, float]:
+        factor = self._factor or self._form(contact)
+        shape, scale = self.parts.shape, border.scale
+        factor.to(contact.stiffness(*self.fold.shape[:2], positive=False))
+        # two right-hand sides at once cost little more than one: all wait for the factor's memory
+        answer, first = factor.solve(np.stack([border.by_height, right[:-1].reshape(shape)]))
+        schur = border.stiffness - float((border.of_force * answer).sum())
+        if not schur:
+            raise NotPressed("no force answers to the road's height")
+
+        def product(v: Array) -> Array:
+            self.products += 1
+            parts, rise = v[:-1].reshape(shape), v[-1] * scale
+            V = self.fold.spread(parts)
+            image = self.fold.gather(self.tyre.product(V) + contact.product(V))
+            image += border.by_height * rise
+            more = float((border.of_force * parts).sum()) + border.stiffness * rise
+            return np.append(image.ravel(), more * scale)
+
+        def precondition(v: Array, y: Array | None = None) -> Array:
+            y = factor.solve(v[:-1].reshape(shape)) if y is None else y
+            rise = (v[-1] / scale - float((border.of_force * y).sum())) / schur
+            return np.append((y - answer * rise).ravel(), rise / scale)
+
+        begin = precondition(right, first) / float(np.linalg.norm(right))
+        return gmres(product, precondition, right, tolerance, LONGEST_LINEAR, begin)
+
+    def _form(self, contact: Contact) -> Touching:
+        """The preconditioner at the last state; where that is unstable, the one before stays."""
+        self.factorisations += 1
+        self._stale = False
+        stiffness = contact.stiffness(*self.fold.shape[:2], positive=True)
+        try:
+            self._factor = Touching(Factor(self.order, self.tyre.tangents(np.float32), stiffness))
+        except Indefinite:
+            if self._factor is None:
+                raise
+        return self._factor
+
+    def _stiffness(self, contact: Contact) -> float:
+        """dF / d(deflection): the whole tyre's force against the road's rise, tyre following."""
+        border = _Border(self.fold, contact)
+        unit = np.append(np.zeros(self.parts.size), border.scale)
+        found = self._solve(border, contact, unit, STIFF)[0]
+        rise = float(found[-1]) * border.scale
+        self._slope = -found[:-1].reshape(self.parts.shape) / 2, -rise / 2
+        return 2 / rise
+
+
+class _Border:
+    """The road's height as one more unknown: its row and column of the tangent, of half the
+    tyre. ``scale`` brings it to the size of the displacements."""
+
+    def __init__(self, fold: Fold, contact: Contact):
+        of_force = np.zeros_like(contact.by_height)
+        of_force[..., 0] = contact.by_height[..., 0]
+        self.by_height = fold.gather(contact.nodal(fold.shape, contact.by_height))
+        self.of_force = fold.gather(contact.nodal(fold.shape, of_force))
+        self.stiffness = float(contact.K[..., 0, 0].sum())
+        self.scale = max(self.stiffness, 1.0) ** -0.5

@@ -1,0 +1,111 @@
+"""The preconditioner with another contact than it was formed with.
+
+Woodbury: with the factor's K = L L^T, and a change D of the contact stiffness at the dofs E,
+
+    (K + E D E^T)^-1 = L^-T (1 - Y (1 + D Y^T Y)^-1 D Y^T) L^-1,   Y = L^-1 E
+
+Columns of Y are formed when a node's contact first changes, and kept.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.linalg import lu_factor, lu_solve
+
+from .block_cholesky import Factor
+
+Array = np.ndarray
+AT_ONCE = 64  # columns that a thread forms at a time
+SLIGHT = 1e-3  # change of a node's contact stiffness over the stiffest contact, left to GMRES
+
+
+class Touching:
+    """Approximate inverse of the tangent stiffness as the contact changes."""
+
+    def __init__(self, factor: Factor):
+        self.factor = factor
+        mask = factor.order.fold.mask
+        self._column = np.full(mask.shape, -1)  # of each dof in Y
+        self._blocks: list[list[Array]] = []  # Y by the times of forming, by the factor's pieces
+        self._compliance = np.zeros((0, 0))
+        self._active = np.zeros(0, int)
+
+    def to(self, contact: Array) -> None:
+        """Take ``contact`` (k, n, 3, 3), N/m, not necessarily symmetric, in place of the last."""
+        blocks = self.factor.order.fold.blocks(contact)
+        change = blocks - self.factor.contact
+        moved = abs(change).max((2, 3)) > SLIGHT * abs(blocks).max(initial=0.0)
+        self._form(moved)
+        columns = self._column.transpose(1, 2, 0, 3)[moved].reshape(-1, 6)
+        self._active = np.unique(columns[columns >= 0])
+        place = np.searchsorted(self._active, columns)
+        size = len(self._active)
+        D = np.zeros((size + 1, size + 1))  # a spare for held dofs
+        place[columns < 0] = size
+        np.add.at(D, (place[:, :, None], place[:, None]), change[moved])
+        self._D = D[:size, :size]
+        if size:
+            compliance = self._compliance[np.ix_(self._active, self._active)]
+            self._small = lu_factor(np.eye(size) + self._D @ compliance, check_finite=False)
+
+    def _form(self, moved: Array) -> None:
+        """Columns of Y for the places (k, q) that lack them, and their part of Y^T Y."""
+        lacking = moved[..., None] & self.factor.order.fold.mask & (self._column < 0)
+        dofs = np.argwhere(lacking)
+        if not len(dofs):
+            return
+        before = len(self._compliance)
+        self._column[lacking] = before + np.arange(len(dofs))
+        # two threads share the work the same way everywhere, so that the bits are the same too
+        some = np.array_split(dofs, min(len(dofs), 2 * -(-len(dofs) // (2 * AT_ONCE))))
+        pieces = list(self.factor.order.pool.map(self._columns, some))
+        new = [_beside(each) for each in zip(*pieces, strict=True)]
+        beside = [_products(block, new) for block in self._blocks]
+        corner = _products(new, new)
+        across = np.concatenate([*beside, corner], 0)
+        self._compliance = np.block([[self._compliance, across[:before]], [across.T]])
+        self._blocks.append(new)
+
+    def _columns(self, dofs: Array) -> list[Array]:
+        right = np.zeros((len(dofs), *self._column.shape), np.float32)
+        right[(np.arange(len(dofs)), *dofs.T)] = 1.0
+        return self.factor.forward(right)
+
+    def solve(self, right: Array) -> Array:
+        """The inverse times parts (..., 2, k, q, 3)."""
+        rows = right.reshape(-1, *right.shape[-4:])
+        y = self.factor.forward(rows)
+        if len(self._active):
+            image = np.concatenate([_products(block, y) for block in self._blocks])[self._active]
+            share = np.zeros((len(self._compliance), len(rows)), np.float32)
+            share[self._active] = lu_solve(self._small, self._D @ image, check_finite=False)
+            start = 0
+            for block in self._blocks:
+                part = share[start : start + block[-1].shape[1]]
+                start += len(part)
+                for i, Y in enumerate(block):
+                    if len(Y):
+                        y[i] = y[i] - Y @ part if len(y[i]) else -Y @ part
+        return self.factor.backward(y).reshape(right.shape)
+
+
+def _beside(pieces: Sequence[Array]) -> Array:
+    """Columns of all; no rows stand for zeros."""
+    rows = max(len(piece) for piece in pieces)
+    whole = np.zeros((rows, sum(piece.shape[1] for piece in pieces)), np.float32)
+    start = 0
+    for piece in pieces:
+        whole[: len(piece), start : start + piece.shape[1]] = piece
+        start += piece.shape[1]
+    return whole
+
+
+def _products(left: list[Array], right: list[Array]) -> Array:
+    """left^T right, summed over the pieces."""
+    total = np.zeros((left[0].shape[1], right[0].shape[1]))
+    for a, b in zip(left, right, strict=True):
+        if len(a) and len(b):
+            total += a.T @ b
+    return total

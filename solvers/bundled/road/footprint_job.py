@@ -1,0 +1,318 @@
+"""The job that presses the inflated tyre on the road: what its deck asks, its steps, its results.
+
+JOB.json: pressure_Pa, mass_kg, free_radius_m, failure, cause, ``footprints`` [load_N, road_N, rim_N
+(x down, y, z), deflection_m, stiffness_N_per_m, contact_area_m2]. JOB.npz: nodes, points, angles of
+the whole tyre, and per footprint i the arrays of its patch and the displacement, as NAME_i; where
+modes were asked for: mode_frequency_Hz (m,), mode_shape (m, ring, node, 3) at mode_node, modal mass
+1 kg.
+"""
+
+from __future__ import annotations
+
+import json
+import logging
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from ..deck.keywords import DeckError, Keyword
+from ..modes.harmonics import Unstable, Vibration, lowest_of_all
+from ..modes.lanczos import NotConverged
+from ..section.band import Numbering
+from ..section.elements import Lines
+from ..section.mechanics import Load
+from ..section.model import Model
+from ..solid3d.circumference import half_circle
+from ..solid3d.revolved import Revolved
+from .contact import flat_road
+from .contact_newton import NotPressed, Press, Pressed
+from .half_turn_symmetry import HALF_TURN, Fold, NotSymmetric
+from .loaded_modes import SPARE, loaded_modes
+from .patch import contact_area
+from .stick import held
+
+Array = np.ndarray
+log = logging.getLogger("tyrecal_solvers")
+ARRAYS = ("ring", "node", "along_m", "across_m", "pressure_Pa", "area_m2", "traction_Pa")
+SMALLEST_SLIP = 1e-6  # m, before friction is full: harder sticks are not reached
+
+CAUSES: dict[type[Exception], str] = {
+    NotPressed: "no_equilibrium",
+    Unstable: "unstable",
+    NotConverged: "crashed",
+    np.linalg.LinAlgError: "crashed",
+}
+OF_MODES = ("mode_frequency_Hz", "mode_node", "mode_shape")
+
+
+@dataclass(frozen=True)
+class RoadData:
+    """What a deck says of the road: its reference node, the tread's surface, stiffness of the
+    overclosure (Pa/m), friction, elastic slip (m), and the elements round half the tyre (rad)."""
+
+    node: str
+    tread: str
+    stiffness: float
+    friction: float
+    elastic_slip: float
+    lengths: Array
+
+
+@dataclass(frozen=True)
+class Vibrating:
+    """Modes wanted at a load: of ``model``, how many, and at which nodes (rows) their shapes."""
+
+    model: Model
+    count: int
+    nodes: Array
+
+
+def read_road(model: list[Keyword]) -> RoadData | None:
+    """The road of a revolve job's model, or None where it has none. Raises DeckError."""
+    pairs = [k for k in model if k.name == "CONTACT PAIR"]
+    if not pairs:
+        return None
+    pair = pairs[0]
+    if len(pairs) > 1:
+        raise DeckError(pairs[1].line, "one *CONTACT PAIR is honoured, of the tread and the road")
+    tread, surface = (pair.only_row().text(i).upper() for i in (0, 1))
+    bodies = [k for k in model if k.name == "RIGID BODY" and k.get("ANALYTICAL SURFACE") == surface]
+    roads = [k for k in model if k.name == "SURFACE" and k.get("NAME") == surface]
+    if not bodies or not roads:
+        raise DeckError(pair.line, f"{surface} is no analytical surface of a *RIGID BODY")
+    _check_flat(roads[0])
+    found = {k.name: k for k in model if k.name in ("SURFACE BEHAVIOR", "FRICTION")}
+    if len(found) < 2:
+        raise DeckError(pair.line, "the contact needs a *SURFACE BEHAVIOR and a *FRICTION")
+    stiffness = float(np.real(found["SURFACE BEHAVIOR"].only_row().number(0)))
+    friction = float(np.real(found["FRICTION"].only_row().number(0)))
+    slip = float(np.real(found["FRICTION"].number("ELASTIC SLIP") or 0.0))
+    if not (stiffness > 0 and friction >= 0 and slip >= SMALLEST_SLIP):
+        raise DeckError(
+            found["FRICTION"].line,
+            "the contact's stiffness must be positive, friction not negative, the elastic slip at"
+            f" least {SMALLEST_SLIP:g} m",
+        )
+    return RoadData(
+        bodies[0].need("REF NODE"), tread, stiffness, friction, slip, _half_lengths(model)
+    )
+
+
+def _check_flat(surface: Keyword) -> None:
+    """A line along the axle, swept along the rolling direction, at one distance from the axle."""
+    rows = surface.rows
+    if surface.get("TYPE") != "CYLINDER" or len(rows) != 4:
+        raise DeckError(surface.line, "the road is an analytical surface of TYPE=CYLINDER")
+    axes = [float(np.real(rows[0].number(i))) for i in range(6)]
+    sweep = [float(np.real(rows[1].number(i))) for i in range(3)]
+    H = axes[0]
+    flat = axes == [H, 0.0, 0.0, H, 1.0, 0.0] and sweep == [H, 0.0, -1.0] and H > 0
+    straight = [rows[2].text(0).upper(), rows[3].text(0).upper()] == ["START", "LINE"]
+    level = not (rows[2].number(2) or rows[3].number(2))
+    if not (flat and straight and level):
+        raise DeckError(surface.line, "only a flat road across the first axis is honoured")
+
+
+def _half_lengths(model: list[Keyword]) -> Array:
+    """Lengths (rad) of the elements from the road's side to the top."""
+    generation = next(k for k in model if k.name == "SYMMETRIC MODEL GENERATION")
+    lengths: list[float] = []
+    for row in generation.rows[2:]:
+        count = row.integer(1)
+        if row.number(2, 1.0) != 1.0:
+            raise DeckError(row.line, "a bias of the elements' lengths is not honoured")
+        lengths += [float(np.real(row.number(0))) / count] * count
+    half = np.array(lengths[: len(lengths) // 2])
+    if len(lengths) % 2 or not np.allclose(half, lengths[: len(half) - 1 : -1]):
+        raise DeckError(
+            generation.line, "the elements round a pressed tyre must mirror at 180 degrees"
+        )
+    if len(half) < 2:
+        raise DeckError(
+            generation.line, "a pressed tyre needs four elements round its circumference at least"
+        )
+    return np.radians(half)
+
+
+def press(
+    model: Model,
+    equations: Numbering,
+    loads: list[Load],
+    U: Array,
+    data: RoadData,
+    wanted: list[float],
+    check: Callable[[], None],
+    give_up: type[Exception],
+    vibrations: Mapping[float, Vibrating] = MappingProxyType({}),
+) -> dict[str, Any]:
+    """Footprints at the ``wanted`` loads (N) of a tyre inflated to ``U`` (n, 3), with modes where
+    there are ``vibrations``.
+
+    Raises DeckError; NotPressed, Unstable, NotConverged where not even the first load is reached.
+    """
+    around = half_circle(data.lengths)
+    k = len(around.angles)
+    if data.tread not in model.mesh.faces:
+        raise DeckError(0, f"surface {data.tread} is not defined in the section's job")
+    if any(r.solids.hourglass is not None for r in model.rubbers):
+        raise DeckError(
+            0,
+            "CGAX4R cannot be pressed on a road, its hourglass stiffness does not hold short waves"
+            " round the circumference: take CGAX8R",
+        )
+    tread = model.mesh.faces[data.tread]
+    road = flat_road(model.mesh.X, tread, around, data.stiffness, data.friction, data.elastic_slip)
+    tyre = Revolved(model, loads, around)
+    try:
+        fold = Fold(model.mesh, equations.equation < equations.size, k)
+        work = Press(tyre, fold, road, np.repeat(U[None], k, 0), check)
+    except NotSymmetric as error:
+        raise DeckError(0, f"a pressed tyre must be symmetric: {error}") from None
+    footprints: list[dict[str, Any]] = []
+    failure = cause = ""
+    for load in wanted:
+        try:
+            found = work.to(load)
+            footprint = _footprint(work, found, load, tread)
+            if load in vibrations:
+                footprint |= _modes(work, found, vibrations[load], tread, equations, U)
+        except (NotPressed, Unstable, NotConverged, np.linalg.LinAlgError, give_up) as error:
+            if isinstance(error, give_up) and work.load:
+                error = give_up(f"{error} after {work.load:.4g} N{work.depth()}")
+            if not footprints:
+                raise error from None
+            failure = str(error)
+            cause = "timed_out" if isinstance(error, give_up) else CAUSES[type(error)]
+            break
+        footprints.append(footprint)
+        log.info("load %d of %d is reached: %g N", len(footprints), len(wanted), load)
+    rest = around.angles[1:-1][::-1]
+    return {
+        "free_radius_m": work.free_radius,
+        "angles": np.concatenate([around.angles, 2 * np.pi - rest]),
+        "footprints": footprints,
+        "failure": failure,
+        "cause": cause,
+    }
+
+
+def _footprint(work: Press, found: Pressed, load: float, tread: Any) -> dict[str, Any]:
+    """One load's results on the whole tyre, whose other half is this one's half turn."""
+    fold, around = work.fold, work.tyre.around
+    U = fold.spread(found.parts)
+    contact = found.contact
+    other = fold.other
+    turned = np.empty_like(U)
+    turned[:, other] = U * HALF_TURN
+    area = work.tyre.surface_shares(tread)[: len(contact.local), contact.road.nodes]
+    rings, columns = np.nonzero(contact.local[..., 0] > 0)
+    force, place = contact.local[rings, columns], contact.positions[rings, columns, 1:]
+    share, nodes = area[rings, columns], contact.road.nodes[columns]
+    # ring 0 belongs to both halves: each node there meets its own image
+    share = np.where(
+        rings == 0, share + area[rings, _images(contact.road.nodes, other)[columns]], share
+    )
+    force = force * np.where(rings == 0, 2.0, 1.0)[:, None]
+    again = rings > 0
+    ring = np.concatenate([rings, (2 * (len(around.angles) - 1) - rings)[again]])
+    both = lambda a, sign=1.0: np.concatenate([a, sign * a[again]])
+    size = both(share)
+    residual = work.tyre.residual(U)
+    held = ~fold.free
+    c, s = np.cos(around.angles)[:, None], np.sin(around.angles)[:, None]
+    at_rim = residual * held
+    # the half turn cancels what the two halves bear along and across
+    down = float((c * at_rim[..., 0] - s * at_rim[..., 1]).sum())
+    return {
+        "load_N": load,
+        "road_N": contact.force,
+        "rim_N": np.array([2 * down, 0.0, 0.0]),
+        "deflection_m": work.free_radius - found.height,
+        "stiffness_N_per_m": found.stiffness,
+        "ring": ring,
+        "node": np.concatenate([nodes, other[nodes][again]]),
+        "along_m": both(place[:, 0], -1.0),
+        "across_m": both(place[:, 1], -1.0),
+        "area_m2": size,
+        "contact_area_m2": contact_area(contact, area, around),
+        "pressure_Pa": both(force[:, 0]) / size,
+        "traction_Pa": both(force[:, 1:], -1.0) / size[:, None],
+        "displacement": np.concatenate([U, turned[1:-1][::-1]]),
+    }
+
+
+def _modes(
+    work: Press,
+    found: Pressed,
+    wanted: Vibrating,
+    tread: Lines,
+    equations: Numbering,
+    inflated: Array,
+) -> dict[str, Array]:
+    """The whole tyre's modes about one load, their shapes at the wanted nodes."""
+    tyre = Revolved(wanted.model, work.tyre.loads, work.tyre.around)
+    U = work.fold.spread(found.parts)
+    work.tyre.residual(U)
+    area = work.tyre.surface_shares(tread)[: len(found.contact.local), work.road.nodes]
+    hold = held(found.contact, area, tyre.around)
+    vibration = Vibration(wanted.model, inflated, tyre.loads, equations, 0.0)
+    start = lowest_of_all(vibration, 2 * (wanted.count + 2 * SPARE), work.check)
+    work.rest()
+    modes = loaded_modes(tyre, work.fold.free, U, hold, start, wanted.count, work.check)
+    shapes, other = modes.shapes, work.fold.other
+    turned = modes.parity[:, None, None, None] * (HALF_TURN * shapes)[:, :, other]
+    whole = np.concatenate([shapes, turned[:, 1:-1][:, ::-1]], 1)
+    return {
+        "mode_frequency_Hz": np.sqrt(modes.eigenvalues) / (2 * np.pi),
+        "mode_node": wanted.nodes,
+        "mode_shape": whole[:, :, wanted.nodes],
+    }
+
+
+def _images(nodes: Array, other: Array) -> Array:
+    """Where among ``nodes`` the mirror image of each stands."""
+    place = {n: i for i, n in enumerate(nodes)}
+    return np.array([place[other[n]] for n in nodes])
+
+
+def write(stem: Path, model: Model, result: dict[str, Any]) -> None:
+    """Write STEM.json and STEM.npz."""
+    numbers = np.array(list(model.mesh.index))
+    arrays = {"nodes": numbers, "points": model.mesh.X, "angles": result["angles"]}
+    lines = []
+    for i, footprint in enumerate(result["footprints"]):
+        footprint = {**footprint, "node": numbers[footprint["node"]]}
+        if "mode_node" in footprint:
+            footprint["mode_node"] = numbers[footprint["mode_node"]]
+        for name in (*ARRAYS, "displacement", *OF_MODES):
+            if name in footprint:
+                arrays[f"{name}_{i}"] = footprint.pop(name)
+        lines.append({**footprint, "rim_N": footprint["rim_N"].tolist()})
+    with stem.with_name(stem.name + ".npz").open("wb") as file:
+        np.savez(file, **arrays)
+    plain = {k: v for k, v in result.items() if k != "angles"}
+    text = json.dumps({"format": 1, **plain, "footprints": lines}, indent=1)
+    stem.with_name(stem.name + ".json").write_text(text + "\n", encoding="utf-8", newline="")
+
+
+def read(stem: Path) -> dict[str, Any]:
+    """What `write` wrote, as plain data."""
+    answer: dict[str, Any] = json.loads(
+        stem.with_name(stem.name + ".json").read_text(encoding="utf-8")
+    )
+    with np.load(stem.with_name(stem.name + ".npz"), allow_pickle=False) as arrays:
+        for name in ("nodes", "points", "angles"):
+            answer[name] = arrays[name]
+        for i, footprint in enumerate(answer["footprints"]):
+            footprint["rim_N"] = np.array(footprint["rim_N"])
+            for name in (*ARRAYS, "displacement", *OF_MODES):
+                if f"{name}_{i}" in arrays:
+                    footprint[name] = arrays[f"{name}_{i}"]
+    del answer["format"]
+    if not answer["cause"]:
+        del answer["cause"]
+    return answer

@@ -1,0 +1,89 @@
+"""Which displacement components are free: *BOUNDARY rows and the rigid rim as a mask."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..deck.keywords import DeckError, Row
+from ..deck.steps import Step
+from .band import Numbering
+from .mesh import Mesh
+from .model import Model
+
+Array = np.ndarray
+SECTION = {1: 0, 2: 2, 5: 1}  # ABAQUS's r, z, twist to our components r, theta, z
+REVOLVED = {2: 2}  # the axle is the revolved model's second axis
+REVOLVED_ALL = {1: 0, 2: 1, 3: 2}
+
+
+def numbering(model: Model, step: Step) -> Numbering:
+    """Equations of the components that ``step`` leaves free, remembered with the mesh.
+
+    Raises DeckError.
+    """
+    mesh = model.mesh
+    free = _free(mesh, step)
+    key = free.tobytes()
+    if key not in mesh.numberings:
+        groups = [block.connectivity for block in mesh.blocks.values()]
+        groups += [layers.lines.connectivity for layers in model.cords]
+        mesh.numberings[key] = Numbering(groups, free)
+    return mesh.numberings[key]
+
+
+def _free(mesh: Mesh, step: Step) -> Array:
+    free = np.zeros((len(mesh.X), 3), bool)
+    for block in mesh.blocks.values():
+        free[block.connectivity] = True
+    for reference, tied in mesh.reference_nodes.items():
+        moves = step.revolved and step.procedure.name == "FREQUENCY"
+        if rim_freedoms(mesh, step, reference) and not moves:
+            raise DeckError(
+                step.procedure.line,
+                f"the rim's reference node {reference} must be held in 1, 6: a wheel moves only"
+                " in the *FREQUENCY step of a revolved tyre",
+            )
+        free[[mesh.index[n] for n in tied]] = False
+    for row in step.held:
+        name = row.text(0).upper()
+        if any(_names(mesh, row, reference) for reference in mesh.reference_nodes):
+            continue
+        nodes = mesh.node_sets.get(name) or ([int(name)] if name.isdigit() else [])
+        if not nodes or any(n not in mesh.index for n in nodes):
+            raise DeckError(row.line, f"node or node set {name} is not defined")
+        for component in _components(row, step.revolved):
+            free[[mesh.index[n] for n in nodes], component] = False
+    return free
+
+
+def rim_freedoms(mesh: Mesh, step: Step, reference: int) -> set[int]:
+    """Those of the degrees of freedom 1 to 6 of a rim's reference node that are not held."""
+    held: set[int] = set()
+    for row in step.held:
+        if _names(mesh, row, reference):
+            first, last = _range(row)
+            held.update(range(first, last + 1))
+    return set(range(1, 7)) - held
+
+
+def _names(mesh: Mesh, row: Row, reference: int) -> bool:
+    name = row.text(0).upper()
+    return name == str(reference) or mesh.node_sets.get(name) == [reference]
+
+
+def _range(row: Row) -> tuple[int, int]:
+    first = row.integer(1)
+    return first, row.integer(2) if row.text(2) else first
+
+
+def _components(row: Row, revolved: bool) -> list[int]:
+    first, last = _range(row)
+    if row.text(3) and row.number(3) != 0.0:
+        raise DeckError(row.line, "only zero displacements are honoured")
+    known = (REVOLVED_ALL if first == 1 and last >= 3 else REVOLVED) if revolved else SECTION
+    chosen = [known[d] for d in range(first, last + 1) if d in known]
+    if not chosen:
+        raise DeckError(
+            row.line, f"degrees of freedom {first} to {last} of a set cannot be held here"
+        )
+    return chosen

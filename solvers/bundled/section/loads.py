@@ -1,0 +1,65 @@
+"""The loads of a step on the model: pressure, and the forces of a tyre that turns."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..deck.keywords import DeckError
+from ..deck.steps import Step
+from .elements import Solids
+from .mechanics import Load
+from .model import Model
+
+
+def pressures(model: Model, step: Step) -> list[Load]:
+    """The pressure on each surface. Raises DeckError."""
+    for surface in step.pressures:
+        if surface not in model.mesh.faces:
+            raise DeckError(step.procedure.line, f"surface {surface} of the step is not defined")
+    return [Load(model.mesh.faces[s], value) for s, value in step.pressures.items()]
+
+
+def turning(model: Model, step: Step) -> Model:
+    """The model with the centrifugal load of a step. Raises DeckError."""
+    spin2 = _uniform(model, step, step.centrifugal, "CENTRIF")
+    return replace(model, spin2=spin2) if spin2 else model
+
+
+def spin(model: Model, step: Step) -> complex | float:
+    """Omega, rad/s, of the step's Coriolis load, 0 where there is none. Raises DeckError."""
+    return _uniform(model, step, step.spin, "ROTDYNF")
+
+
+def agreed_spin(model: Model, step: Step) -> float:
+    """Omega, rad/s, on which the step's loads agree. Raises DeckError."""
+    line, omega = step.procedure.line, float(np.real(spin(model, step)))
+    spin2 = float(np.real(_uniform(model, step, step.centrifugal, "CENTRIF")))
+    if not omega:
+        raise DeckError(line, "*COMPLEX FREQUENCY is honoured of a turning tyre: no ROTDYNF")
+    if not abs(spin2 - omega**2) <= 1e-9 * omega**2:
+        raise DeckError(line, f"CENTRIF {spin2:g} is not the square of ROTDYNF {omega:g}")
+    return omega
+
+
+def _uniform(
+    model: Model, step: Step, sets: dict[str, complex | float], load: str
+) -> complex | float:
+    """The magnitude of a load that all of the tyre bears, 0 where there is none."""
+    if not sets:
+        return 0.0
+    line, elements = step.procedure.line, model.mesh.element_sets
+    unknown = [name for name in sets if name not in elements]
+    if unknown:
+        raise DeckError(line, f"element set {unknown[0]} of the step's *DLOAD is not defined")
+    loaded = {number for name in sets for number in elements[name]}
+    cords = {tuple(row) for c in model.cords for row in c.lines.connectivity.tolist()}
+    for number in set(model.mesh.place) - loaded:
+        kind, row = model.mesh.place[number]
+        block = model.mesh.blocks[kind]
+        if isinstance(block, Solids) or tuple(block.connectivity[row].tolist()) in cords:
+            raise DeckError(line, f"element {number} has mass, but is left out of the load {load}")
+    if len(set(sets.values())) > 1:
+        raise DeckError(line, f"the load {load} must be one for all elements of the tyre")
+    return next(iter(sets.values()))

@@ -1,0 +1,175 @@
+"""Materials of a deck: rubber with Prony terms or a law of frequency, elastic cords, a gas."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+import numpy as np
+
+from ..deck.keywords import DeckError, Keyword
+
+Number = complex | float  # complex where it carries the tangent of a slope (`sensitivity`)
+
+
+@dataclass(frozen=True)
+class Law:
+    """Rows of the table: frequency (Hz, rising) and storage over static shear modulus."""
+
+    frequency_Hz: tuple[float, ...]
+    ratios: tuple[Number, ...]
+
+    def ratio(self, frequency_Hz: float) -> Number:
+        """rho, constant beyond the table's ends; complex where the table carries a tangent."""
+        i, share = self._place(frequency_Hz)
+        low, high = self.ratios[i : i + 2]
+        return low * (high / low) ** share
+
+    def slope(self, frequency_Hz: float) -> float:
+        """d ln rho / d ln f."""
+        i, share = self._place(frequency_Hz)
+        if not 0.0 < share < 1.0:
+            return 0.0
+        low, high = np.real(self.ratios[i : i + 2])
+        return float(np.log(high / low) / np.log(self.frequency_Hz[i + 1] / self.frequency_Hz[i]))
+
+    def _place(self, frequency_Hz: float) -> tuple[int, float]:
+        """The row before a frequency, and the share of the way to the next one."""
+        table, f = np.log(self.frequency_Hz), np.log(max(frequency_Hz, 1e-12))
+        i = int(np.clip(np.searchsorted(table, f) - 1, 0, len(table) - 2))
+        return i, float(np.clip((f - table[i]) / (table[i + 1] - table[i]), 0.0, 1.0))
+
+
+@dataclass
+class Material:
+    """Constants as the deck gives them; Pa, kg/m3, s.
+
+    ``instantaneous``: the moduli are those of sudden loading. ``prony``: rows (g, k, tau);
+    ``law``: of the storage modulus over frequency, in place of a Prony series.
+    """
+
+    name: str
+    line: int
+    density: Number = 0.0
+    youngs_modulus: Number | None = None
+    C10: Number | None = None
+    C01: Number = 0.0
+    inverse_D1: Number = 0.0
+    instantaneous: bool = False
+    prony: list[tuple[Number, Number, Number]] = field(default_factory=list)
+    law: Law | None = None
+    bulk_modulus: Number | None = None
+
+    def _relaxed(self) -> tuple[Number, Number]:
+        """Long-term over instantaneous modulus, shear and bulk: 1 - sum g, 1 - sum k."""
+        return 1 - sum(g for g, _, _ in self.prony), 1 - sum(k for _, k, _ in self.prony)
+
+    def static_scale(self, long_term: bool) -> tuple[Number, Number]:
+        """Factors on the given shear and bulk moduli in a static step."""
+        shear, bulk = self._relaxed()
+        if self.instantaneous == (not long_term):
+            return 1.0, 1.0
+        return (shear, bulk) if long_term else (1 / shear, 1 / bulk)
+
+    def dynamic_ratio(self, frequency_Hz: float | None, long_term: bool) -> tuple[Number, Number]:
+        """Storage modulus at a frequency over the static step's, shear and bulk.
+
+        G'(w)/G0 = 1 - sum g + sum g w^2 tau^2 / (1 + w^2 tau^2) (Ferry, ch. 3).
+        """
+        if frequency_Hz is None:
+            return 1.0, 1.0
+        if self.law is not None:
+            return self.law.ratio(frequency_Hz), 1.0
+        ratios: list[Number] = []
+        for kind, relaxed in enumerate(self._relaxed()):
+            storage = relaxed
+            for term in self.prony:
+                x2 = (2 * np.pi * frequency_Hz * term[2]) ** 2
+                storage = storage + term[kind] * x2 / (1 + x2)
+            ratios.append(storage / (relaxed if long_term else 1.0))
+        return ratios[0], ratios[1]
+
+
+def read_materials(keywords: list[Keyword]) -> dict[str, Material]:
+    """All materials by upper-case name. Raises DeckError."""
+    materials: dict[str, Material] = {}
+    current: Material | None = None
+    for k in keywords:
+        if k.name == "MATERIAL":
+            name = k.need("NAME")
+            if name in materials:
+                raise DeckError(k.line, f"material {name} is defined twice")
+            current = materials[name] = Material(name, k.line)
+        elif k.name in _READERS:
+            if current is None:
+                raise DeckError(k.line, f"*{k.name} must follow a *MATERIAL")
+            _READERS[k.name](current, k)
+    return materials
+
+
+def _density(m: Material, k: Keyword) -> None:
+    m.density = _positive(k, 0, "density")
+
+
+def _elastic(m: Material, k: Keyword) -> None:
+    m.youngs_modulus = _positive(k, 0, "Young's modulus")
+
+
+def _hyperelastic(m: Material, k: Keyword) -> None:
+    row = k.only_row()
+    m.C10 = row.number(0)
+    neo = "NEO HOOKE" in k.parameters
+    m.C01 = 0.0 if neo else row.number(1)
+    D1 = row.number(1 if neo else 2)
+    if np.real(D1) <= 0:
+        raise DeckError(row.line, "D1 must be positive: fully incompressible rubber would lock")
+    if np.real(m.C10 + m.C01) <= 0:
+        raise DeckError(row.line, "C10 + C01, half the shear modulus, must be positive")
+    m.inverse_D1 = 1 / D1
+    m.instantaneous = k.get("MODULI") == "INSTANTANEOUS"
+
+
+def _viscoelastic(m: Material, k: Keyword) -> None:
+    if "FREQUENCY" in k.parameters:
+        m.law = _law(k)
+        return
+    for row in k.rows:
+        if len(row.fields) > 3 and any(row.fields[3:]):
+            raise DeckError(row.line, "a term of a Prony series is g, k and tau")
+        m.prony.append((row.number(0), row.number(1, 0.0), row.number(2)))
+    if any(np.real(x) < 0 for term in m.prony for x in term):
+        raise DeckError(k.line, "g, k and tau of a Prony series must not be negative")
+    if any(np.real(r) <= 0 for r in m._relaxed()):
+        raise DeckError(k.line, "the sum of g (and of k) of a Prony series must stay below 1")
+
+
+def _law(k: Keyword) -> Law:
+    """Rows of loss and storage: G''/G0, 1 - G'/G0, K''/K0, 1 - K'/K0, frequency in Hz. A
+    vibration without damping has no use for the losses."""
+    frequency = [float(np.real(row.number(4))) for row in k.rows]
+    ratios = [1 - row.number(1) for row in k.rows]
+    if len(frequency) < 2 or any(b <= a for a, b in pairwise([0.0, *frequency])):
+        raise DeckError(k.line, "a table of moduli has two rows or more, their frequencies rise")
+    if any(np.real(ratio) <= 0 for ratio in ratios) or any(row.number(3, 0.0) for row in k.rows):
+        raise DeckError(k.line, "shear moduli of a table are positive, and the bulk modulus stays")
+    return Law(tuple(frequency), tuple(ratios))
+
+
+def _positive(k: Keyword, index: int, what: str) -> Number:
+    value = k.only_row().number(index)
+    if not np.real(value) > 0:
+        raise DeckError(k.line, f"the {what} must be positive, got {np.real(value):g}")
+    return value
+
+
+def _acoustic(m: Material, k: Keyword) -> None:
+    m.bulk_modulus = _positive(k, 0, "bulk modulus")
+
+
+_READERS = {
+    "ACOUSTIC MEDIUM": _acoustic,
+    "DENSITY": _density,
+    "ELASTIC": _elastic,
+    "HYPERELASTIC": _hyperelastic,
+    "VISCOELASTIC": _viscoelastic,
+}

@@ -1,0 +1,185 @@
+"""The section's mesh from a deck: nodes, elements, sets, surfaces, with their operators."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..deck.keywords import DeckError, Keyword
+from . import elements, shapes
+from .band import Numbering
+
+Array = np.ndarray
+POINTS = {"CGAX8R": 2, "CGAX8": 3, "CGAX4R": 1}
+NODES = {"CGAX8R": 8, "CGAX8": 8, "CGAX4R": 4, "SFMGAX2": 3, "SFMGAX1": 2}
+
+
+@dataclass
+class Mesh:
+    """Nodes, elements, sets and operators: all that the materials do not touch.
+
+    X (n, 2) in m; ``index``: node number to row; ``blocks``: element type to operators;
+    ``place``: element number to (type, row of its block); ``faces``: surface name to lines.
+    """
+
+    X: Array
+    index: dict[int, int]
+    blocks: dict[str, elements.Solids | elements.Lines]
+    place: dict[int, tuple[str, int]]
+    node_sets: dict[str, list[int]]
+    element_sets: dict[str, list[int]]
+    faces: dict[str, elements.Lines]
+    reference_nodes: dict[int, list[int]]
+    numberings: dict[bytes, Numbering] = field(default_factory=dict)
+
+
+_MESHES: OrderedDict[tuple[object, ...], Mesh] = OrderedDict()
+_TOPOLOGY = {"NODE", "ELEMENT", "NSET", "ELSET", "SURFACE", "RIGID BODY"}
+
+
+def read_mesh(keywords: list[Keyword]) -> Mesh:
+    """The mesh of a section job, remembered while its blocks stay the same. Raises DeckError."""
+    topology = [k for k in keywords if k.name in _TOPOLOGY]
+    if any(k.tangents for k in topology):
+        return _mesh(topology)
+    key = tuple(k.identity for k in topology)
+    known = _MESHES.get(key)
+    _MESHES[key] = mesh = known if known is not None else _mesh(topology)
+    _MESHES.move_to_end(key)
+    while len(_MESHES) > 8:
+        _MESHES.popitem(last=False)
+    return mesh
+
+
+def _mesh(keywords: list[Keyword]) -> Mesh:
+    index: dict[int, int] = {}
+    coordinates: list[tuple[complex | float, complex | float]] = []
+    node_sets: dict[str, list[int]] = {}
+    element_sets: dict[str, list[int]] = {}
+    connectivity: dict[str, list[list[int]]] = {}
+    place: dict[int, tuple[str, int]] = {}
+    for k in keywords:
+        if k.name == "NODE":
+            numbers = []
+            for row in k.rows:
+                number = row.integer(0)
+                if number in index:
+                    raise DeckError(row.line, f"node {number} is defined twice")
+                index[number] = len(coordinates)
+                coordinates.append((row.number(1), row.number(2, 0.0)))
+                numbers.append(number)
+            if k.get("NSET"):
+                node_sets.setdefault(k.get("NSET"), []).extend(numbers)
+        elif k.name == "ELEMENT":
+            _elements(k, index, connectivity, place, element_sets)
+        elif k.name == "NSET":
+            node_sets.setdefault(k.need("NSET"), []).extend(_members(k, node_sets, index))
+        elif k.name == "ELSET":
+            element_sets.setdefault(k.need("ELSET"), []).extend(_members(k, element_sets, place))
+    X = np.array(coordinates)
+    blocks: dict[str, elements.Solids | elements.Lines] = {}
+    for kind, rows in connectivity.items():
+        table = np.array(rows)
+        if kind in POINTS:
+            try:
+                blocks[kind] = elements.solids(X, table, POINTS[kind])
+            except elements.FoldedElement as error:
+                number = next(e for e, p in place.items() if p == (kind, error.index))
+                raise DeckError(
+                    0,
+                    f"element {number} has no positive area: it folds over"
+                    " or its nodes run clockwise",
+                ) from None
+        else:
+            blocks[kind] = elements.lines(X, table)
+    faces = {
+        k.need("NAME"): _surface(k, X, connectivity, place, element_sets)
+        for k in keywords
+        if k.name == "SURFACE"
+    }
+    bodies = {}
+    for k in keywords:
+        if k.name == "RIGID BODY":
+            reference, tied = int(k.number("REF NODE") or 0), k.need("TIE NSET")
+            if reference not in index or tied not in node_sets:
+                raise DeckError(k.line, f"node {reference} or node set {tied} is not defined")
+            bodies[reference] = node_sets[tied]
+    return Mesh(X, index, blocks, place, node_sets, element_sets, faces, bodies)
+
+
+def _elements(
+    k: Keyword,
+    index: dict[int, int],
+    connectivity: dict[str, list[list[int]]],
+    place: dict[int, tuple[str, int]],
+    sets: dict[str, list[int]],
+) -> None:
+    kind = k.need("TYPE")
+    table = connectivity.setdefault(kind, [])
+    for row in k.rows:
+        number, nodes = row.integer(0), [row.integer(i + 1) for i in range(NODES[kind])]
+        if len(row.fields) != NODES[kind] + 1:
+            raise DeckError(row.line, f"a {kind} element has {NODES[kind]} nodes")
+        if number in place:
+            raise DeckError(row.line, f"element {number} is defined twice")
+        missing = [n for n in nodes if n not in index]
+        if missing:
+            raise DeckError(row.line, f"node {missing[0]} of element {number} is not defined")
+        place[number] = kind, len(table)
+        table.append([index[n] for n in nodes])
+        if k.get("ELSET"):
+            sets.setdefault(k.get("ELSET"), []).append(number)
+
+
+def _members(k: Keyword, sets: dict[str, list[int]], known: dict) -> list[int]:
+    members: list[int] = []
+    for row in k.rows:
+        if "GENERATE" in k.parameters:
+            first, last = row.integer(0), row.integer(1)
+            members += range(first, last + 1, row.integer(2) if row.text(2) else 1)
+            continue
+        for position, text in enumerate(row.fields):
+            if not text:
+                continue
+            if text.lstrip("-").isdigit():
+                members.append(row.integer(position))
+            elif text.upper() in sets:
+                members += sets[text.upper()]
+            else:
+                raise DeckError(row.line, f"set {text} is not defined")
+    unknown = [m for m in members if m not in known]
+    if unknown:
+        raise DeckError(k.line, f"member {unknown[0]} of the set is not defined")
+    return members
+
+
+def _surface(
+    k: Keyword,
+    X: Array,
+    connectivity: dict[str, list[list[int]]],
+    place: dict[int, tuple[str, int]],
+    sets: dict[str, list[int]],
+) -> elements.Lines:
+    rows: list[list[int]] = []
+    for row in k.rows:
+        name, face = row.text(0).upper(), row.text(1).upper()
+        members = sets.get(name) or ([int(name)] if name.isdigit() else None)
+        if members is None:
+            raise DeckError(row.line, f"element set {name} is not defined")
+        if face not in ("S1", "S2", "S3", "S4", "SPOS"):
+            raise DeckError(row.line, f"face '{face}' is not one of S1, S2, S3, S4, SPOS")
+        for number in members:
+            kind, position = place[number]
+            if face == "SPOS" and kind not in POINTS:
+                # seen from the left of its direction, as a solid's face is from the right
+                rows.append(connectivity[kind][position][::-1])
+                continue
+            if kind not in POINTS or face == "SPOS":
+                raise DeckError(row.line, f"element {number} of type {kind} has no face {face}")
+            order = shapes.FACES_QUADRATIC if NODES[kind] == 8 else shapes.FACES_LINEAR
+            rows.append([connectivity[kind][position][i] for i in order[int(face[1]) - 1]])
+    if len({len(nodes) for nodes in rows}) > 1:
+        raise DeckError(k.line, "a surface with edges of two and of three nodes is not honoured")
+    return elements.lines(X, np.array(rows), 3 if len(rows[0]) == 3 else 2)

@@ -1,0 +1,107 @@
+"""Masses and springs to the ground on nodes of the revolved tyre, in its plane Theta = 0.
+
+The revolved mesh keeps the section's node numbers in that plane. A node there stands for one
+sector of the mesh, so a mass or a spring moves with the mean of the displacement over the angle
+beta = 360 degrees / sectors: a harmonic n counts by sin(n beta/2) / (n beta/2). The bare point
+would give way without bound as harmonics are added.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..deck.keywords import STEP, DeckError, Keyword
+from .mesh import Mesh
+
+Array = np.ndarray
+AXES = {1: 0, 2: 2, 3: 1}  # of the revolved model at Theta = 0: radial, axial, tangential
+
+
+@dataclass(frozen=True)
+class Attached:
+    """Displacement components that carry something: rows (d,) of the mesh's nodes, components
+    (d,) 0, 1, 2 of r, theta, z; mass (d,) in kg, stiffness (d,) in N/m, complex by ``STEP`` times
+    a tangent; sectors of the mesh."""
+
+    rows: Array
+    components: Array
+    mass: Array
+    stiffness: Array
+    sectors: int
+
+    def __bool__(self) -> bool:
+        return bool(self.mass.any() or self.stiffness.any())
+
+    def rates(self, eigenvalues: Array, at: Array) -> Array:
+        """sum of (k' - lambda m') p^2 per mode (m,), ' by what the numbers' tangent is of;
+        at (d, m): p of each component and mode."""
+        k, m = np.imag(self.stiffness) / STEP, np.imag(self.mass) / STEP
+        return np.asarray(k @ at**2 - eigenvalues * (m @ at**2))
+
+    @property
+    def total_kg(self) -> float:
+        """The sum of the masses, each of which is in three components."""
+        return float(self.mass.real.sum()) / 3
+
+    @property
+    def highest(self) -> int:
+        """Harmonic at which the mean over a sector first vanishes: the sum ends there."""
+        return self.sectors
+
+    def share(self, n: int) -> float:
+        """Mean of cos(n Theta) over the sector."""
+        return float(np.sinc(n / self.sectors))
+
+
+def read_attached(revolve: list[Keyword], mesh: Mesh) -> Attached:
+    """The *MASS and *SPRING elements of a revolve job. Raises DeckError."""
+    nodes: dict[str, tuple[str, list[int]]] = {}
+    rims: set[str] = set()  # element sets on a rim's reference node are `wheel`'s
+    mass = np.zeros((len(mesh.X), 3), complex)
+    stiffness = np.zeros((len(mesh.X), 3), complex)
+    for k in revolve:
+        if k.name == "ELEMENT":
+            if all(row.integer(1) in mesh.reference_nodes for row in k.rows):
+                rims.add(k.need("ELSET"))
+                continue
+            _, members = nodes.setdefault(k.need("ELSET"), (k.need("TYPE"), []))
+            members += [_row(row.integer(1), row.line, mesh) for row in k.rows]
+        elif k.name in ("MASS", "SPRING") and k.need("ELSET") not in rims:
+            kind, members = nodes.get(k.need("ELSET"), ("", []))
+            needed = "MASS" if k.name == "MASS" else "SPRING1"
+            if kind != needed:
+                raise DeckError(k.line, f"{k.get('ELSET')} is no set of {needed} elements")
+            value = _positive(k, 0 if k.name == "MASS" else 1)
+            if k.name == "MASS":
+                mass[members] += value
+            elif (axis := k.rows[0].integer(0)) in AXES:
+                stiffness[members, AXES[axis]] += value
+            else:
+                raise DeckError(k.line, f"a spring acts along 1, 2 or 3, got {axis}")
+    rows, components = np.nonzero(mass.real + stiffness.real)
+    pick = rows, components
+    return Attached(rows, components, mass[pick], stiffness[pick], _sectors(revolve))
+
+
+def _row(number: int, line: int, mesh: Mesh) -> int:
+    if number not in mesh.index or number in mesh.reference_nodes:
+        raise DeckError(line, f"node {number} is no node of the tyre's section")
+    return mesh.index[number]
+
+
+def _positive(k: Keyword, line: int) -> complex | float:
+    if len(k.rows) != line + 1:
+        raise DeckError(k.line, f"*{k.name} takes {line + 1} data line{'s' * line}")
+    value = k.rows[line].number(0)
+    if not np.real(value) > 0:
+        raise DeckError(k.rows[line].line, f"*{k.name} must be positive, got {np.real(value):g}")
+    return value
+
+
+def _sectors(revolve: list[Keyword]) -> int:
+    for k in revolve:
+        if k.name == "SYMMETRIC MODEL GENERATION":
+            return sum(int(np.real(row.number(1, 1.0))) for row in k.rows[2:])
+    return 0

@@ -1,0 +1,1 @@
+"""The tyre in three dimensions, its section revolved on elements round the circumference."""

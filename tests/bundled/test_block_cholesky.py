@@ -1,0 +1,180 @@
+"""The preconditioner: how near it is to the inverse of the tangent stiffness."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from tyrecal_solvers.bundled.road.block_cholesky import Elimination, Factor
+from tyrecal_solvers.bundled.road.half_turn_symmetry import Fold
+from tyrecal_solvers.bundled.section.band import Indefinite
+from tyrecal_solvers.bundled.solid3d.circumference import half_circle
+from tyrecal_solvers.bundled.solid3d.revolved import Revolved
+
+from ..chance import generator
+from . import support
+from .conftest import Inflated
+from .contact import ring
+
+pytestmark = pytest.mark.numbers
+
+Array = np.ndarray
+LENGTHS = np.array([0.05, 0.05, 0.1, 0.3, 0.6, 0.9, np.pi - 2.0])
+
+
+class Problem:
+    """The tangent on the parts at an axisymmetric state, with or without contact blocks."""
+
+    def __init__(
+        self,
+        work: Inflated,
+        parity: int = 1,
+        contact: Array | None = None,
+        lengths: Array = LENGTHS,
+    ):
+        around = half_circle(lengths)
+        k = len(around.angles)
+        self.fold = Fold(work.model.mesh, ~work.held, k, parity)
+        self.tyre = Revolved(work.model, work.loads, around)
+        self.tyre.residual(np.repeat(work.U[None], k, 0))
+        self.contact = np.zeros((k, len(work.U), 3, 3)) if contact is None else contact
+        tangents = self.tyre.tangents(np.float32)
+        order = Elimination([t[0] for t in tangents], self.fold, around)
+        self.factor = Factor(order, tangents, self.contact)
+
+    def product(self, x: Array) -> Array:
+        U = self.fold.spread(x)
+        contact = np.einsum("knij,knj->kni", self.contact, U)
+        return self.fold.gather(self.tyre.product(U) + contact)
+
+    def random(self) -> Array:
+        x = generator(5).normal(size=(2, *self.fold.mask.shape))
+        return x * self.fold.mask
+
+
+def conjugate_gradients(
+    product: Callable[[Array], Array], inverse: Callable[[Array], Array], b: Array
+) -> tuple[Array, int]:
+    """Until the residual is 1e-6 of the right side."""
+    precondition = lambda r: inverse(r).astype(float)  # parts are added up in double precision
+    x, r = np.zeros_like(b), b.copy()
+    z = precondition(r)
+    p, before = z, (r * z).sum()
+    for used in range(1, 60):
+        Ap = product(p)
+        length = before / (p * Ap).sum()
+        x, r = x + length * p, r - length * Ap
+        if np.linalg.norm(r) <= 1e-6 * np.linalg.norm(b):
+            return x, used
+        z = precondition(r)
+        now = (r * z).sum()
+        p, before = z + now / before * p, now
+    return x, 60
+
+
+def road_blocks(work: Inflated, stiffness: float, sideways: float) -> Array:
+    """Stiffness (N/m) of the outermost nodes at the first angles, of the middle and one side:
+    down, turned a little along, and a tenth of it across."""
+    k, X = 2 * len(LENGTHS) + 1, work.model.mesh.X
+    blocks = np.zeros((k, len(X), 3, 3))
+    outside = np.flatnonzero((X[:, 0] > 0.97 * X[:, 0].max()) & (X[:, 1] > -0.02))
+    down = np.array([1.0, -sideways, 0.0])
+    blocks[:5, outside] = stiffness * (np.outer(down, down) + np.diag([0.0, 0.1, 0.1]))
+    return blocks
+
+
+@pytest.mark.parametrize("parity", [1, -1], ids=["kept", "reversed"])
+def test_few_iterations_on_the_inflated_tyre(inflated: Inflated, parity: int) -> None:
+    """Single precision and the dropped couplings cost at most eight iterations to 1e-6."""
+    problem = Problem(inflated, parity)
+    b = problem.random()[0]
+    x, used = conjugate_gradients(problem.product, problem.factor.solve, b)
+    assert np.linalg.norm(problem.product(x) - b) <= 2e-6 * np.linalg.norm(b)
+    assert used <= 8
+
+
+@pytest.mark.parametrize(
+    ("stiffness", "sideways"),
+    [
+        (1e5, 0.1),
+        pytest.param(1e7, 0.1, marks=pytest.mark.slow),
+        pytest.param(1e7, 0.5, marks=pytest.mark.slow),
+    ],
+)
+def test_contact_is_part_of_it(inflated: Inflated, stiffness: float, sideways: float) -> None:
+    """Nodes of one side and the middle, more stiffly held than the tyre is; a factor without them
+    takes many times as long."""
+    problem = Problem(inflated, contact=road_blocks(inflated, stiffness, sideways))
+    b = problem.random()[0]
+    used = conjugate_gradients(problem.product, problem.factor.solve, b)[1]
+    assert used <= 12
+    without = Problem(inflated).factor
+    assert conjugate_gradients(problem.product, without.solve, b)[1] > used + 10
+
+
+def test_approximate_inverse_is_symmetric(inflated: Inflated) -> None:
+    """To single precision, and positive; what is held stays at rest."""
+    for contact in (None, road_blocks(inflated, 1e6, 0.1)):
+        problem = Problem(inflated, contact=contact)
+        x, y = problem.random()
+        Mx, My = problem.factor.solve(x), problem.factor.solve(y)
+        assert (y * Mx).sum() == pytest.approx(
+            (x * My).sum(), abs=1e-4 * np.linalg.norm(Mx) * np.linalg.norm(y)
+        )
+        assert (x * Mx).sum() > 0
+        assert not Mx[~problem.fold.mask].any()
+
+
+@pytest.mark.parametrize("quadratic", [True, False], ids=["Q8", "Q4"])
+def test_exact_without_cords(quadratic: bool) -> None:
+    """A section without a bias has no coupling to drop: the inverse, to single precision, also
+    with a road under both sides and the middle."""
+    work = ring((0.2, 0.21, 0.23), 0.02, 4, support.Rubber(), 2e3, quadratic=quadratic)
+    plain = Inflated(None, work.model, ~work.free, work.loads, work.U)  # type: ignore[arg-type]
+    blocks = np.zeros((2 * len(LENGTHS) + 1, len(work.U), 3, 3))
+    down = np.array([1.0, -0.3, 0.0])
+    outside = work.model.mesh.X[:, 0] > 0.2299
+    blocks[:5, outside] = 1e6 * (np.outer(down, down) + np.diag([0.0, 0.1, 0.1]))
+    blocks[0, outside, 0, 1] = blocks[0, outside, 1, 0] = 0.0
+    for contact in (None, blocks):
+        problem = Problem(plain, contact=contact)
+        x = problem.random()[0]
+        back = problem.factor.solve(problem.product(x))
+        np.testing.assert_allclose(back, x, atol=2e-3 * abs(x).max())
+
+
+def test_linear_elements_with_cords(inflated: Inflated) -> None:
+    """Four-node rubber with hourglass stiffness, two-node cords; long elements round the tyre, for
+    so coarse a section in these is unstable in short waves (harmonics n >= 28)."""
+    tyre = support.tyre(quadratic=False)
+    m = support.model_of(tyre.deck)
+    held, loads = support.held(m, tyre.rim), support.cavity(m, 240e3)
+    U = support.inflate(m, held, loads)
+    problem = Problem(Inflated(tyre, m, held, loads, U), lengths=np.full(8, np.pi / 8))
+    b = problem.random()[0]
+    assert conjugate_gradients(problem.product, problem.factor.solve, b)[1] <= 8
+
+
+def test_two_layers_on_one_line() -> None:
+    """Layers that share their nodes, at +20 and -20 degrees, of different stiffness: each image
+    in the mirror is the same layer's."""
+    b = support.block((0.3, 0.31, 2), (-0.05, 0.05, 4), True)
+    line = b.columns[1]
+    layers = [
+        support.Layer(line, 2e-7, 1e-3, modulus, 5000.0, angle)
+        for modulus, angle in ((1e11, 70.0), (3e11, 110.0))
+    ]
+    m = support.model_of(support.deck(b.X, b.solids, support.Rubber(), layers, b.inner))
+    held = support.held(m, list(np.flatnonzero(abs(b.X[:, 1]) > 0.0499)))
+    loads = support.cavity(m, 1e5)
+    U = support.inflate(m, held, loads)
+    problem = Problem(Inflated(None, m, held, loads, U))  # type: ignore[arg-type]
+    right = problem.random()[0]
+    assert conjugate_gradients(problem.product, problem.factor.solve, right)[1] <= 8
+
+
+def test_an_unstable_state_is_told(inflated: Inflated) -> None:
+    """A road that pulls harder than the tyre is stiff."""
+    with pytest.raises(Indefinite):
+        Problem(inflated, contact=-road_blocks(inflated, 1e7, 0.1))

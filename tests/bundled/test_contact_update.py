@@ -1,0 +1,92 @@
+"""The preconditioner follows the contact without being formed anew."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from tyrecal_solvers.bundled.road.contact_update import Touching
+
+from .conftest import Inflated
+from .test_block_cholesky import Problem, conjugate_gradients, road_blocks
+
+Array = np.ndarray
+
+
+@pytest.mark.slow
+def test_follows_the_contact(inflated: Inflated) -> None:
+    """On, stiffer, and off again: as few iterations as with a factor formed there."""
+    touching = Touching(Problem(inflated).factor)
+    for blocks in (
+        road_blocks(inflated, 1e6, 0.1),
+        road_blocks(inflated, 1e7, 0.5),
+        0 * road_blocks(inflated, 1e6, 0.1),
+    ):
+        problem = Problem(inflated, contact=blocks)
+        touching.to(blocks)
+        b = problem.random()[0]
+        x, used = conjugate_gradients(problem.product, touching.solve, b)
+        assert np.linalg.norm(problem.product(x) - b) <= 2e-6 * np.linalg.norm(b)
+        assert used <= conjugate_gradients(problem.product, problem.factor.solve, b)[1] + 3
+
+
+def test_one_node_in_the_middle_of_the_patch(inflated: Inflated) -> None:
+    """Both symmetries hold it but for its way down: a single column."""
+    blocks, X = np.zeros_like(road_blocks(inflated, 1e6, 0.0)), inflated.model.mesh.X
+    blocks[0, np.lexsort((abs(X[:, 1]), -X[:, 0].round(9)))[0]] = np.diag([1e6, 0.0, 0.0])
+    touching, problem = Touching(Problem(inflated).factor), Problem(inflated, contact=blocks)
+    touching.to(blocks)
+    x = problem.random()[0]
+    expected = problem.factor.solve(x)
+    np.testing.assert_allclose(touching.solve(x), expected, atol=1e-3 * abs(expected).max())
+
+
+def test_releases_what_the_factor_holds(inflated: Inflated) -> None:
+    """Nodes on one side let go, others left: to the same inverse as the factor without them."""
+    before = road_blocks(inflated, 1e6, 0.1)
+    after = before.copy()
+    after[2:] = 0.0
+    touching = Touching(Problem(inflated, contact=before).factor)
+    touching.to(after)
+    problem = Problem(inflated, contact=after)
+    x = problem.random()[0]
+    expected = problem.factor.solve(x)
+    # what the factor drops where the parts are eliminated singly, it no longer drops
+    np.testing.assert_allclose(touching.solve(x), expected, atol=2e-2 * abs(expected).max())
+
+
+def test_friction_is_not_symmetric(inflated: Inflated) -> None:
+    """Traction that grows with the pressure: solved at once, where the symmetric part is not."""
+    normal = road_blocks(inflated, 1e6, 0.0)
+    whole = normal.copy()
+    whole[..., 1, 0] += 0.5 * normal[..., 0, 0]
+    whole[0, :, 1] = 0.0
+    problem = Problem(inflated, contact=normal)
+    touching = Touching(problem.factor)
+    problem.contact = whole
+    x = problem.random()[0]
+    image = problem.product(x)
+    error = {}
+    for name, blocks in (("symmetric", normal), ("whole", whole)):
+        touching.to(blocks)
+        error[name] = np.linalg.norm(touching.solve(image) - x) / np.linalg.norm(x)
+    assert error["whole"] < 0.3 * error["symmetric"]
+
+
+def test_places_are_formed_once(inflated: Inflated) -> None:
+    """Columns for the same nodes again cost nothing, and stay in place for more nodes."""
+    blocks = road_blocks(inflated, 1e6, 0.1)
+    some = blocks.copy()
+    some[1:] = 0.0
+    touching = Touching(Problem(inflated).factor)
+    x = Problem(inflated).random()[0]
+    touching.to(some)
+    first = touching.solve(x)
+    touching.to(blocks)
+    assert not np.allclose(touching.solve(x), first, atol=1e-3 * abs(first).max())
+    touching.to(some)
+    np.testing.assert_array_equal(touching.solve(x), first)
+    fresh = Touching(Problem(inflated).factor)
+    fresh.to(blocks)
+    touching.to(blocks)
+    expected = fresh.solve(x)
+    assert touching.solve(x) == pytest.approx(expected, abs=1e-4 * abs(expected).max())

@@ -1,0 +1,169 @@
+"""Rubber that stiffens with frequency: laws, tangents, self-consistent modes, slopes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from tyrecal_solvers.bundled.deck.keywords import DeckError, read_keywords
+from tyrecal_solvers.bundled.modes import harmonics
+from tyrecal_solvers.bundled.modes.frequency_dependent import NotSelfConsistent, SelfConsistent
+from tyrecal_solvers.bundled.section.materials import Law, read_materials
+from tyrecal_solvers.bundled.section.model import stiffened
+from tyrecal_solvers.bundled.section.parts import rubber
+
+from tyrecal.case import with_values
+from tyrecal.effects import catalogue
+from tyrecal.evaluate.door import Door, Question
+from tyrecal.modes.label import paired_labels
+
+from ..chance import generator
+from ..effects.support import CASE, START, frequencies
+from . import support
+from .support import Rubber
+
+pytestmark = pytest.mark.numbers
+
+Array = np.ndarray
+BETA, REFERENCE = 0.15, 60.0
+TABLE = np.array([1.0, 8.0, 1000.0])
+POWER = Law(tuple(TABLE), tuple((TABLE / REFERENCE) ** BETA))
+
+
+@pytest.mark.parametrize("f", [1.0, 3.7, 8.0, 60.0, 999.0])
+def test_a_table_of_a_power_law_is_the_power_law(f: float) -> None:
+    assert POWER.ratio(f) == pytest.approx((f / REFERENCE) ** BETA, rel=1e-14)
+    if f not in TABLE:
+        assert POWER.slope(f) == pytest.approx(BETA, rel=1e-12)
+
+
+def test_constant_beyond_the_table() -> None:
+    assert POWER.ratio(0.1) == POWER.ratio(1.0) and POWER.slope(0.1) == 0.0
+    assert POWER.ratio(1e5) == POWER.ratio(1e3) and POWER.slope(1e5) == 0.0
+
+
+def test_the_tangent_is_linear_in_the_ratio() -> None:
+    """A(rho) = A(1) + (rho - 1) dA, dA without the initial stress."""
+    rng = generator(0)
+    F = np.eye(3) + 0.2 * rng.standard_normal((5, 3, 3))
+    full = lambda x: np.full(5, x)
+    m = rubber.MooneyRivlin(full(1e6), full(2e5), full(2e7))
+    shear = replace(m, inverse_D1=full(0.0), stressed=False)
+    for rho in (0.7, 2.0):
+        stiff = replace(m, shear_ratio=full(rho), bulk_ratio=full(1.0))
+        wanted = rubber.tangent(F, m) + (rho - 1) * rubber.tangent(F, shear)
+        np.testing.assert_allclose(rubber.tangent(F, stiff), wanted, rtol=1e-9, atol=1e-3)
+
+
+def tube(law: Law | None) -> harmonics.HasModes:
+    """Rubber between a fixed hub and a free outside, that can only turn: K is G times a matrix."""
+    b = support.block((0.1, 0.3, 6), (0.0, 0.05, 1), True)
+    m = support.model_of(support.deck(b.X, b.solids, Rubber(C10=2e5)))
+    if law:
+        laws = [replace(r, law=np.zeros_like(r.law)) for r in m.rubbers]
+        m = replace(m, rubbers=laws, laws=[law])
+    mask = np.ones((len(b.X), 3), bool)
+    mask[:, 1] = b.where(0, 0.1)
+    vibration = harmonics.Vibration(m, 0 * mask, [], support.numbering(m, mask), 0.0)
+    return SelfConsistent(vibration, [law]) if law else vibration
+
+
+def test_one_spring_in_closed_form() -> None:
+    """omega^2 = omega0^2 (f / f_ref)^beta: f = (f0 f_ref^(-beta/2))^(1 / (1 - beta/2)), for
+    every mode, to 1e-10."""
+    f0 = support.hertz(tube(None).modes(0, 4).eigenvalues)
+    found = support.hertz(tube(POWER).modes(0, 4).eigenvalues)
+    exact = (f0 * REFERENCE ** (-BETA / 2)) ** (1 / (1 - BETA / 2))
+    assert f0[0] < REFERENCE < f0[-1] < 1000.0
+    np.testing.assert_allclose(found, exact, rtol=1e-10)
+
+
+def test_a_law_that_settles_nowhere_is_a_failure() -> None:
+    """A modulus that jumps down faster than the frequency rises has no fixed point to find."""
+    f0 = float(support.hertz(tube(None).modes(0, 1).eigenvalues)[0])
+    wild = Law((1.0, 0.999 * f0, f0, 1.001 * f0, 1e4), (1.0, 4.0, 1.0, 0.25, 0.25))
+    with pytest.raises(NotSelfConsistent):
+        for start in (1.0, 2.0, 4.0):
+            law = Law(wild.frequency_Hz, tuple(r * start for r in wild.ratios))
+            tube(law).modes(0, 1)
+
+
+def test_nothing_where_the_ratio_is_one() -> None:
+    flat = Law((1.0, 1000.0), (1.0, 1.0))
+    np.testing.assert_allclose(
+        tube(flat).modes(0, 3).eigenvalues, tube(None).modes(0, 3).eigenvalues, rtol=1e-12
+    )
+
+
+def test_the_inflated_state_and_the_other_rubbers_stay() -> None:
+    """dK acts only where the law does."""
+    m = support.model_of(support.tyre((3, 2, 2, 1)).deck)
+    none = replace(m, laws=[POWER])
+    (soft,) = stiffened(none)
+    assert not any(r.material.C10.any() or r.material.inverse_D1.any() for r in soft.rubbers)
+    assert not soft.cords
+
+
+def test_self_consistent_as_by_hand_through_the_door() -> None:
+    """Each mode of beta = 0.15 about 20 Hz is that of one modulus for all modes, (f / 20)^beta
+    times the static one, once f is the mode's own: an independent loop through decks."""
+    beta, reference = 0.15, 20.0
+    value = {"materials.rubber.reference_frequency_Hz": reference}
+    case = with_values(CASE, value)
+    direct = frequencies(case, frequency_stiffening=beta)
+    for label in list(direct)[::3]:
+        f = direct[label] * 1.01
+        for _ in range(12):
+            last, f = f, frequencies(CASE, dynamic_stiffening=(f / reference) ** beta - 1)[label]
+            if abs(f - last) < 1e-9 * f:
+                break
+        assert direct[label] == pytest.approx(f, rel=1e-8)
+
+
+def test_a_tilt_about_the_reference_and_no_level() -> None:
+    plain, tilted = frequencies(), frequencies(frequency_stiffening=0.1)
+    assert list(plain) == list(tilted)  # labels, in order
+    for label, f in plain.items():
+        assert (tilted[label] > f) == (f > REFERENCE)
+
+
+def test_slopes_carry_the_implicit_term() -> None:
+    """d f / d C10, where the modulus follows the frequency that C10 moves, and by the exponent."""
+    case = with_values(CASE, {"effects.frequency_stiffening": 0.2})
+    names = ("C10", "A_belt", "effects.frequency_stiffening")
+    values = {**START, names[2]: 0.2}
+    door = Door(case)
+    exact = door.evaluate(Question(values, names)).gradients
+    for name in names:
+        h = 1e-3 * values[name]
+        up, down = (
+            np.array([m.frequency_Hz for m in door.evaluate(Question(v)).modes])
+            for v in ({**values, name: values[name] + h}, {**values, name: values[name] - h})
+        )
+        central = (up - down) / (2 * h)
+        scale = abs(central).max()
+        np.testing.assert_allclose(exact[name], central, rtol=3e-6, atol=3e-6 * scale)
+
+
+def test_labels_and_multiplicities_as_before() -> None:
+    answer = Door(CASE).evaluate(Question({**START, "effects.frequency_stiffening": 0.1}))
+    modes = paired_labels(answer.modes)
+    assert {(m.label.c > 0) + 1 for m in modes} == {1, 2}
+    assert all(m.multiplicity == (2 if m.label.c else 1) for m in modes)
+    assert catalogue()["frequency_stiffening"].needs == "frequency_modulus"
+
+
+@pytest.mark.parametrize(
+    ("rows", "words"),
+    [
+        ("0, -0.1, 0, 0, 10", "two rows"),
+        ("0, -0.1, 0, 0, 10\n0, -0.2, 0, 0, 10", "rise"),
+        ("0, 1.1, 0, 0, 10\n0, -0.2, 0, 0, 20", "positive"),
+        ("0, -0.1, 0, 0.5, 10\n0, -0.2, 0, 0, 20", "bulk"),
+    ],
+)
+def test_tables_that_are_none(rows: str, words: str) -> None:
+    text = f"*MATERIAL, NAME=GUM\n*VISCOELASTIC, FREQUENCY=TABULAR\n{rows}\n"
+    with pytest.raises(DeckError, match=words):
+        read_materials(read_keywords(text))
