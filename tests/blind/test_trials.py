@@ -19,9 +19,9 @@ from tyrecal.blind.ruler import measure
 from tyrecal.blind.score import score
 from tyrecal.blind.seal import ANSWERS, SEAL, TRUTH
 from tyrecal.blind.tables import page, summary
-from tyrecal.diagnose.measurements import read_measurements
 from tyrecal.diagnose.uncertainties import sources
 from tyrecal.errors import InputError
+from tyrecal.measured.tables import read_measurements
 
 from .toy import CASE, Scale, ToyMaker, protocol
 

@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 import pyuff
 
-from tyrecal.diagnose.measurements import read_measurements
 from tyrecal.diagnose.observations import observe
+from tyrecal.measured.tables import read_measurements
 from tyrecal.modes.mode import Label
 
 from ..measured.test_universal import ANGLES, function, geometry, shape, units, write
@@ -131,7 +131,7 @@ def test_fits_take_what_is_at_their_pressure(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     from tyrecal.case import load_case
-    from tyrecal.fit.measured import with_measured
+    from tyrecal.measured.targets import with_measured
 
     lines = [
         "frequency_Hz,2,1,,1,240,0,66.0,0.3",

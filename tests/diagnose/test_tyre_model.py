@@ -15,7 +15,6 @@ from tyrecal.diagnose.diagnosis import diagnose
 from tyrecal.diagnose.evidence import probabilities, weigh
 from tyrecal.diagnose.expansion import expand
 from tyrecal.diagnose.gap import find_gap, projection
-from tyrecal.diagnose.measurements import read_measurements
 from tyrecal.diagnose.observations import observe
 from tyrecal.diagnose.problem import Assumed, Change, Problem, places
 from tyrecal.diagnose.regions import regions
@@ -29,6 +28,7 @@ from tyrecal.diagnose.verdict import decide
 from tyrecal.errors import InputError
 from tyrecal.evaluate.door import Door
 from tyrecal.evaluate.failure import DeckRefused
+from tyrecal.measured.tables import read_measurements
 from tyrecal.modes.mode import Label
 
 from ..chance import Chance, generator

@@ -9,9 +9,9 @@ import pytest
 
 from tyrecal.case import LoadedCase, load_case, start_values
 from tyrecal.deck.context import section_mesh
-from tyrecal.diagnose.measurements import Reading
 from tyrecal.diagnose.under_load import LoadedRow, UnderLoad, compare
 from tyrecal.evaluate.door import Door
+from tyrecal.measured.measurement import Measurement
 from tyrecal.modes.loaded import Member
 from tyrecal.modes.mode import Label
 from tyrecal.studies.footprint import footprint_row
@@ -35,7 +35,7 @@ def true_values(case: LoadedCase) -> dict[str, float]:
 
 
 @pytest.fixture(scope="module")
-def readings(case: LoadedCase) -> list[Reading]:
+def readings(case: LoadedCase) -> list[Measurement]:
     """Areas and a stiffness of that tyre; the first area as the mean of two."""
     pressed = Door(case).press(true_values(case), LOADS)
     low, high = (footprint_row(pressed, each, section_mesh(case)) for each in pressed.footprints)
@@ -46,10 +46,10 @@ def readings(case: LoadedCase) -> list[Reading]:
         (AREA, last, high["area_m2"]),
         (STIFFNESS, last, high[STIFFNESS]),
     ]
-    return [Reading(q, None, "", 220.0, load, x, 0.02 * x, 2) for q, load, x in found]
+    return [Measurement(q, None, "", 220.0, load, x, 0.02 * x) for q, load, x in found]
 
 
-def test_the_tyre_itself_is_found(case: LoadedCase, readings: list[Reading]) -> None:
+def test_the_tyre_itself_is_found(case: LoadedCase, readings: list[Measurement]) -> None:
     tyres = {"none": start_values(case), "it": true_values(case)}
     found = compare(case, Door(case), readings, tyres)
     assert not found.failed
@@ -79,7 +79,9 @@ def test_modes_under_load(case: LoadedCase) -> None:
         Member(Label(0, 0, "axial"), "antisymmetric"),
     ]
     read = [
-        Reading("frequency_Hz", m.label, m.symmetry, 220.0, LOADS[0], hertz.get(m, 37.0), 0.1, 2)
+        Measurement(
+            "frequency_Hz", m.label, m.symmetry, 220.0, LOADS[0], hertz.get(m, 37.0), 0.1, 2
+        )
         for m in wanted
     ]
     found = compare(case, Door(case), read, {"none": start_values(case)})
@@ -89,7 +91,7 @@ def test_modes_under_load(case: LoadedCase) -> None:
 
 
 @pytest.mark.slow
-def test_what_cannot_be_pressed_is_said(case: LoadedCase, readings: list[Reading]) -> None:
+def test_what_cannot_be_pressed_is_said(case: LoadedCase, readings: list[Measurement]) -> None:
     """A splice does not go with a road; no tyre bears 1 MN, but what lies below stays."""
     beyond = replace(readings[0], load_N=1e6)
     spliced = {**true_values(case), "effects.stiffness_splice": 0.1}

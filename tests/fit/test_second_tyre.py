@@ -8,9 +8,9 @@ from dataclasses import replace
 import pytest
 
 from tyrecal.case import LoadedCase, load_case
-from tyrecal.diagnose.measurements import read_measurements
 from tyrecal.evaluate.door import Door
 from tyrecal.fit.calibrate import Fit, calibrate
+from tyrecal.measured.tables import read_measurements
 
 from ..conftest import CASES
 

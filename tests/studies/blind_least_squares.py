@@ -25,7 +25,7 @@ from tyrecal.blind.ruler import Ruler, Signature, read_ruler
 from tyrecal.blind.score import Scored, case_of, labels_of, means, score
 from tyrecal.blind.seal import open_truth
 from tyrecal.blind.tables import DETECTED
-from tyrecal.diagnose.measurements import read_measurements
+from tyrecal.measured.tables import read_measurements
 
 Array = np.ndarray
 STUDIES = sorted((Path(__file__).parents[1] / "benchmarks").glob("blind_study_*"))

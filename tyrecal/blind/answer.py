@@ -16,7 +16,6 @@ import numpy as np
 from ..case import LoadedCase, load_case
 from ..diagnose.diagnosis import Diagnosis, diagnose
 from ..diagnose.evidence import NONE
-from ..diagnose.measurements import read_measurements
 from ..diagnose.observations import observe
 from ..diagnose.problem import Assumed
 from ..diagnose.response import Response
@@ -27,6 +26,7 @@ from ..diagnose.uncertainties import sources
 from ..evaluate.door import Door
 from ..evaluate.pool import process_pool
 from ..files import own_folder
+from ..measured.tables import read_measurements
 from ..modes.mode import Label
 from .make import labels_of
 from .protocol import Protocol, read_protocol, write_json

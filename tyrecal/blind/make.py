@@ -17,12 +17,12 @@ from typing import Any
 import numpy as np
 
 from ..case import LoadedCase
-from ..diagnose.measurements import COLUMNS
 from ..diagnose.uncertainties import sources
 from ..errors import InputError
 from ..evaluate.failure import EvaluationFailed
 from ..evaluate.pool import process_pool
 from ..files import refuse_link, whole
+from ..measured.measurement import COLUMNS
 from ..modes.mode import Label
 from .draw import NEAR, Truth, draw, tyre
 from .maker import Heard, Maker

@@ -13,7 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from ..diagnose.measurements import Reading, read_measurements
+from ..measured.measurement import Measurement
+from ..measured.tables import read_measurements
 from ..modes.mode import Label
 from .answer import case_of
 from .baselines import guesses
@@ -93,7 +94,7 @@ def score(folder: Path, sealed: Path) -> list[Scored]:
 def scored(
     truth: Mapping[str, Any],
     answer: Mapping[str, Any],
-    readings: Sequence[Reading],
+    readings: Sequence[Measurement],
     ruler: Ruler,
     protocol: Protocol,
     labels: Sequence[Label],
@@ -138,7 +139,7 @@ def scored(
     )
 
 
-def means(readings: Sequence[Reading], ruler: Ruler) -> tuple[Array, Array, Array]:
+def means(readings: Sequence[Measurement], ruler: Ruler) -> tuple[Array, Array, Array]:
     """ln of each row's mean of members (n,), its place in the ruler (n,), number of values (n,)."""
     found: dict[tuple[Label | None, float], list[float]] = {}
     for each in readings:

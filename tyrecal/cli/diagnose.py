@@ -102,12 +102,12 @@ def command(
     if measured is None:
         raise click.UsageError("--measured FILE must be given, or --add EFFECT=VALUE")
     from ..diagnose.diagnosis import STAGES
-    from ..diagnose.measurements import read_measurements
     from ..diagnose.problem import Assumed
     from ..diagnose.result import result
     from ..diagnose.study import parse_change
     from ..diagnose.study import study as diagnosed
     from ..effects import catalogue
+    from ..measured.tables import read_measurements
     from ..report.diagnosis import page
     from ..report.kept import parts_data
 

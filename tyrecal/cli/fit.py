@@ -98,7 +98,7 @@ def command(
     loaded = arguments.starting_at(loaded, values)
     left_out: list[str] = []
     if measured:
-        from ..fit.measured import with_measured
+        from ..measured.targets import with_measured
 
         loaded, left_out = with_measured(loaded, measured)
     door = study.door(loaded)

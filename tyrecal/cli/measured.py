@@ -135,7 +135,7 @@ def import_files(
     """
     from ..files import write_text
     from ..measured.gather import gather, result
-    from ..measured.values import measurements_csv
+    from ..measured.measurement import measurements_csv
 
     if output.resolve() in [path.resolve() for path in files]:
         raise click.UsageError(f"--output {output}: is one of the files to read")
@@ -143,7 +143,7 @@ def import_files(
     if limits and not 0 <= limits[0] < limits[1]:
         raise click.UsageError(f"--band {band}: must rise from 0 or more")
     layout = _layout(axle, centre, directions, highest, limits, response or "")
-    found = gather(files, pressure_kPa, layout, floor / 100, assumed and assumed / 100)
+    found = gather(files, pressure_kPa, layout, floor / 100, (assumed or 0.0) / 100)
     write_text(output, measurements_csv(found.rows))
     if pictures and found.runs:
         from ..report.measured import draw_measured

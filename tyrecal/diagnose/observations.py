@@ -8,14 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
+from ..measured.measurement import Measurement
+from ..measured.repeats import PRIOR_REPEATS
 from ..modes.mode import Label
-from .measurements import Reading
 
 Array = np.ndarray
-PRIOR_REPEATS = 4.0  # repeats that the scatter of all values is worth for that of one value
 Key = tuple[str, Label | None, float]
 
 
@@ -62,9 +63,9 @@ class Observations:
 
 
 def observe(
-    readings: Sequence[Reading],
-    repeats: Sequence[Sequence[Reading]] = (),
-    toggled: Sequence[Sequence[Reading]] = (),
+    readings: Sequence[Measurement],
+    repeats: Sequence[Sequence[Measurement]] = (),
+    toggled: Sequence[Sequence[Measurement]] = (),
     split: float = 0.0,
 ) -> Observations:
     """Observations of a tyre.
@@ -91,13 +92,13 @@ def observe(
     )
 
 
-def _used(run: Sequence[Reading], left_out: list[str]) -> dict[tuple[str, ...], Reading]:
+def _used(run: Sequence[Measurement], left_out: list[str]) -> dict[tuple[str, ...], Measurement]:
     """Readings by (quantity, label, pressure, member); of two members, 1 is the lower."""
-    found: dict[tuple, Reading] = {}
+    found: dict[tuple, Measurement] = {}
     for each in run:
         if each.load_N or each.quantity not in ("frequency_Hz", "mass_kg"):
             what = f"{each.label} under load" if each.load_N and each.label else each.quantity
-            left_out.append(f"{each.place}, {what}: not used by the diagnosis")
+            left_out.append(f"{Path(each.place).name}, {what}: not used by the diagnosis")
             continue
         pressure = each.pressure_kPa if each.label else 0.0
         found[each.quantity, each.label, pressure, each.member] = each

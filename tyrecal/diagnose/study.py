@@ -13,10 +13,11 @@ from ..case.mistakes import suggestion
 from ..effects import catalogue
 from ..errors import InputError
 from ..evaluate.door import Door
+from ..measured.measurement import Measurement
+from ..measured.tables import read_measurements
 from .calibrated import calibrated_variables
 from .diagnosis import Diagnosis, diagnose
 from .evidence import NONE
-from .measurements import Reading, read_measurements
 from .observations import Observations, observe
 from .problem import Assumed, Change
 from .regions import regions
@@ -124,7 +125,7 @@ def study(
 def _under_load(
     case: LoadedCase,
     door: Door,
-    runs: Sequence[Sequence[Reading]],
+    runs: Sequence[Sequence[Measurement]],
     diagnosis: Diagnosis,
     model: TyreModel,
 ) -> UnderLoad | None:
@@ -213,7 +214,7 @@ def _reaching(span: Span, change: Change) -> Span:
     return replace(span, also=(*span.also, e))
 
 
-def _check_copies(paths: Sequence[Path], runs: Mapping[Path, Sequence[Reading]]) -> None:
+def _check_copies(paths: Sequence[Path], runs: Mapping[Path, Sequence[Measurement]]) -> None:
     """Raises InputError where two runs are the same to the last digit."""
     told = [
         [(r.quantity, r.label, r.member, r.pressure_kPa, r.load_N, r.value) for r in runs[path]]

@@ -13,11 +13,11 @@ from ..deck.environment import TemplateFailed
 from ..evaluate.door import Door
 from ..evaluate.failure import DeckRefused, EvaluationFailed
 from ..fit.footprint import ROW
+from ..measured.measurement import Measurement
 from ..modes.loaded import Member
 from ..modes.mode import Label
 from ..studies.footprint import footprint_row
 from ..studies.loaded import load_tyres
-from .measurements import Reading
 from .tyre_model import asked_for
 
 Place = tuple[str, Member | None, float]  # quantity, mode, load in N
@@ -58,7 +58,7 @@ class UnderLoad:
 
 
 def compare(
-    case: LoadedCase, door: Door, readings: Sequence[Reading], tyres: Mapping[str, Values]
+    case: LoadedCase, door: Door, readings: Sequence[Measurement], tyres: Mapping[str, Values]
 ) -> UnderLoad:
     """Each tyre (name to values of the case's numbers) pressed at the measured pressures and loads.
 
@@ -90,10 +90,10 @@ def compare(
 
 
 def _grouped(
-    readings: Sequence[Reading],
+    readings: Sequence[Measurement],
 ) -> Iterator[tuple[float, dict[Place, tuple[float, float]]]]:
     """By pressure: mean and its standard deviation by place."""
-    every: defaultdict[float, defaultdict[Place, list[Reading]]]
+    every: defaultdict[float, defaultdict[Place, list[Measurement]]]
     every = defaultdict(lambda: defaultdict(list))
     for each in readings:
         member = Member(each.label, each.member) if each.label else None

@@ -9,10 +9,11 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
-from .modal import Layout, Run, Told, read_run, values_of
+from .measurement import Measurement
+from .modal import Layout, Run, Told, measurements_of, read_run
+from .repeats import FLOOR, combined
 from .tables import read_table
 from .universal import Universal, is_universal, read_universal
-from .values import FLOOR, Value, combined
 
 NODES_AGREE = 1e-6  # m
 EXPLAINED = 0.98  # of the functions' mean square; less, and modes are missing
@@ -23,7 +24,7 @@ class Gathered:
     """rows: the measurements, one value each with its sigma; runs: modes of the universal files;
     notes: what a user has to know."""
 
-    rows: list[Value]
+    rows: list[Measurement]
     runs: list[Run]
     notes: list[str]
 
@@ -33,7 +34,7 @@ def gather(
     pressure_kPa: float | None = None,
     layout: Layout | None = None,
     floor: float = FLOOR,
-    assumed: float | None = None,
+    assumed: float = 0.0,
 ) -> Gathered:
     """Measurements of several files; those of the same thing are repeats.
 
@@ -45,7 +46,7 @@ def gather(
             raise InputError(f"{path}: is given twice; as its own repeat it would tell nothing")
     universal = [read_universal(path) for path in paths if is_universal(path)]
     nodes = all_nodes(universal)
-    values: list[Value] = []
+    values: list[Measurement] = []
     runs: list[Run] = []
     notes: list[str] = []
     for path in paths:
@@ -65,7 +66,7 @@ def gather(
                 f"{path}: the modes make {run.explained:.0%} of the functions; one may be missing:"
                 " look at the picture, try a narrower --band"
             )
-        values += values_of(run, pressure_kPa)
+        values += measurements_of(run, pressure_kPa)
     if not values:
         why = next((each.judged.why for run in runs for each in run.modes), "")
         raise InputError(f"{paths[0]}: no mode could be told: {why}")
@@ -109,7 +110,7 @@ def result(gathered: Gathered) -> dict[str, Any]:
 
 def _entry(run: Run, told: Told) -> dict[str, Any]:
     label = told.judged.label
-    finite = lambda x: x if x is not None and isfinite(x) else None
+    finite = lambda x: x if isfinite(x) else None
     return {
         "file": run.name,
         "frequency_Hz": told.mode.frequency_Hz,

@@ -14,9 +14,9 @@ from ..modes.mode import Label
 from .geometry import sensors_of
 from .identify import FORMS, Responses, identify
 from .labels import Judged, Labeller
+from .measurement import Measurement
 from .sensors import MeasuredMode, Sensors, real_part
 from .universal import Function, Shape, Universal
-from .values import Value
 
 Array = np.ndarray
 
@@ -246,25 +246,20 @@ def settled(told: list[Told]) -> list[Told]:
     return sorted(result, key=lambda each: each.mode.frequency_Hz)
 
 
-def values_of(run: Run, pressure_kPa: float) -> list[Value]:
+def measurements_of(run: Run, pressure_kPa: float) -> list[Measurement]:
     """The frequencies of a run's modes that have a label."""
     return [
-        Value(
+        Measurement(
             "frequency_Hz",
             each.judged.label,
             each.member,
             pressure_kPa,
             0.0,
             each.mode.frequency_Hz,
-            _sigma(each.mode),
+            each.mode.sigma_Hz,
             run.name,
             each.place,
         )
         for each in run.modes
         if each.judged.label
     ]
-
-
-def _sigma(mode: MeasuredMode) -> float | None:
-    known = mode.sigma_Hz is not None and np.isfinite(mode.sigma_Hz)
-    return float(mode.sigma_Hz) if known else None  # type: ignore[arg-type]

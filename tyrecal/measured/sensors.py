@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import nan
 
 import numpy as np
 
@@ -23,13 +24,12 @@ class Sensors:
 
 @dataclass(frozen=True)
 class MeasuredMode:
-    """A mode as a test gives it. amplitude (k,): of each signal, complex, any scale; damping:
-    ratio to the critical one, NaN where it is not known; sigma_Hz: None likewise."""
+    """A mode as a test gives it; NaN is what it does not."""
 
     frequency_Hz: float
-    amplitude: Array
-    damping: float = float("nan")
-    sigma_Hz: float | None = None
+    amplitude: Array  # (k,) of each signal, complex, any scale
+    damping: float = nan  # ratio to the critical one
+    sigma_Hz: float = nan  # standard deviation of the frequency
 
 
 def real_part(amplitude: Array) -> tuple[Array, float]:

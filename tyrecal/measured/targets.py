@@ -9,9 +9,10 @@ from pathlib import Path
 
 from ..case import LoadedCase
 from ..case.calibration import MEASURED, TargetFootprint, TargetMode, Targets
-from ..diagnose.measurements import Reading, read_measurements
 from ..errors import InputError
 from ..modes.mode import Label
+from .measurement import Measurement
+from .tables import read_measurements
 
 ALIKE_kPa = 0.5  # pressures that differ by less are one
 
@@ -48,8 +49,8 @@ def with_measured(case: LoadedCase, path: Path) -> tuple[LoadedCase, list[str]]:
     return replace(case, case=case.case.model_copy(update=wanted)), notes
 
 
-def _modes(readings: Sequence[Reading]) -> list[TargetMode]:
-    groups: dict[Label, list[Reading]] = {}
+def _modes(readings: Sequence[Measurement]) -> list[TargetMode]:
+    groups: dict[Label, list[Measurement]] = {}
     for each in readings:
         assert each.label is not None
         groups.setdefault(each.label, []).append(each)
@@ -65,7 +66,7 @@ def _modes(readings: Sequence[Reading]) -> list[TargetMode]:
     ]
 
 
-def _footprint(readings: Sequence[Reading]) -> list[TargetFootprint]:
+def _footprint(readings: Sequence[Measurement]) -> list[TargetFootprint]:
     return [
         TargetFootprint.model_validate(
             {"load_N": each.load_N, each.quantity: each.value, MEASURED[each.quantity]: each.sigma}

@@ -1,4 +1,4 @@
-"""Measurements: what a file may hold, every mistake by its line, pairs, repeats."""
+"""Observations: pairs as mean and split, repeats, and what is left out."""
 
 from __future__ import annotations
 
@@ -7,84 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tyrecal.diagnose.measurements import read_measurements
 from tyrecal.diagnose.observations import observe
-from tyrecal.errors import InputError
+from tyrecal.measured.measurement import Measurement
 from tyrecal.modes.mode import Label
 
 from ..chance import Chance
+from ..measured.test_measurements import GOOD, read
 
 pytestmark = pytest.mark.numbers
-
-HEADER = "quantity,c,m,kind,member,pressure_kPa,load_N,value,sigma\n"
-GOOD = "frequency_Hz,2,0,,,240,0,79.5,0.2"
-
-
-def read(tmp_path: Path, *lines: str, header: str = HEADER) -> list:
-    path = tmp_path / "measured.csv"
-    path.write_text(header + "\n".join(lines) + "\n")
-    return read_measurements(path)
-
-
-@pytest.mark.parametrize(
-    ("line", "words"),
-    [
-        ("frequency_Hz,2,0,,,240,0,79500,20", "did you mean 79500 mHz, 79.5 Hz?"),
-        ("frequency_Hz,2,0,,,2.4,0,79.5,0.2", "pressure_kPa is '2.4'"),
-        ("frequency_Hz,2,0,,,240,0,0.2,0.02", "no tyre has that frequency_Hz, usual is"),
-        ("frequency_Hz,2,0,,,240,0,79.5,0", "greater than 0"),
-        ("frequency_Hz,2,0,,,240,0,79.5,-1", "greater than 0"),
-        ("frequency_Hz,2,0,,,240,0,79.5,", "greater than 0"),
-        ("frequency_Hz,2,0,,,240,0,nan,0.2", "must be a number"),
-        ("frequency_Hz,2,0,,,240,0,79.5,40", "more than 20%"),
-        ("frequency_Hz,2.5,0,,,240,0,79.5,0.2", "whole number"),
-        ("frequency_Hz,0,0,,,240,0,31.7,0.2", "axial or torsional"),
-        ("frequency_Hz,2,0,axial,,240,0,79.5,0.2", "must be empty"),
-        ("frequency_Hz,2,0,,3,240,0,79.5,0.2", "member is '3'"),
-        ("frequency_Hz,0,0,axial,1,240,0,31.7,0.2", "member is '1'"),
-        ("frequency_Hz,2,0,,1,240,4000,79.5,0.2", "symmetric or antisymmetric"),
-        ("frequency,2,0,,,240,0,79.5,0.2", "quantity is 'frequency'"),
-        ("contact_area_m2,,,,,240,,0.02,0.001", "load_N is '', must be greater than 0"),
-        ("mass_kg,2,0,,,,,12.5,0.05", "must be empty for mass_kg"),
-        ("frequency_Hz,2,0,,,240,0,79.5", "8 cells"),
-        (GOOD, "same as line 2"),
-        ("frequency_Hz,2,0,,1,240,0,79.5,0.2", "one value for both"),
-    ],
-)
-def test_a_wrong_line_is_named(tmp_path: Path, line: str, words: str) -> None:
-    with pytest.raises(InputError) as caught:
-        read(tmp_path, GOOD, line)
-    (sentence,) = str(caught.value).splitlines()
-    assert "line 3" in sentence and words in sentence
-
-
-def test_what_is_left_empty_is_none(tmp_path: Path) -> None:
-    """No load and, of the mass, no pressure: 0; and no label."""
-    mode, mass = read(tmp_path, "frequency_Hz,2,0,,,240,,79.5,0.2", "mass_kg,,,,,,,12.5,0.05")
-    assert (mode.pressure_kPa, mode.load_N, mode.value, mode.sigma) == (240.0, 0.0, 79.5, 0.2)
-    assert (mass.pressure_kPa, mass.load_N, mass.label) == (0.0, 0.0, None)
-
-
-def test_every_mistake_is_told_at_once(tmp_path: Path) -> None:
-    with pytest.raises(InputError) as caught:
-        read(tmp_path, "frequency_Hz,2,0,,,240,0,-1,0.2", GOOD, "area,,,,,240,0,1,1")
-    assert [line.split(":")[0][-6:] for line in str(caught.value).splitlines()] == [
-        "line 2",
-        "line 4",
-    ]
-
-
-@pytest.mark.parametrize("header", ["c,m,kind\n", HEADER.replace("sigma", "std"), ""])
-def test_wrong_columns(tmp_path: Path, header: str) -> None:
-    with pytest.raises(InputError, match=r"columns must be .* measured import"):
-        read(tmp_path, GOOD, header=header)
-
-
-def test_the_order_of_columns_is_free(tmp_path: Path) -> None:
-    swapped = "value,sigma,quantity,c,m,kind,member,pressure_kPa,load_N\n"
-    (one,) = read(tmp_path, "79.5,0.2,frequency_Hz,2,0,,,240,0", header=swapped)
-    (other,) = read(tmp_path, GOOD)
-    assert one == other
 
 
 def test_a_pair_is_a_mean_and_a_split_whichever_comes_first(tmp_path: Path) -> None:
@@ -111,8 +41,6 @@ def test_repeats_tell_the_scatter_and_what_a_run_shares(chance: Chance) -> None:
 
     False failures: 2e-7.
     """
-    from tyrecal.diagnose.measurements import Reading
-
     random = chance.random
     labels = [Label(c, m) for c in range(1, 7) for m in (0, 1)]
     own, shared = [], []
@@ -122,7 +50,7 @@ def test_repeats_tell_the_scatter_and_what_a_run_shares(chance: Chance) -> None:
             common = random.normal(0, 0.004)
             runs.append(
                 [
-                    Reading(
+                    Measurement(
                         "frequency_Hz",
                         x,
                         "",
@@ -130,7 +58,6 @@ def test_repeats_tell_the_scatter_and_what_a_run_shares(chance: Chance) -> None:
                         0.0,
                         50 * np.exp(common + random.normal(0, 0.002)),
                         5.0,
-                        2,
                     )
                     for x in labels
                 ]

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from math import nan
+
 import numpy as np
 import pytest
 from scipy.stats import t
 
 from tyrecal.errors import InputError
-from tyrecal.measured.values import Value, combined, measurements_csv
+from tyrecal.measured.measurement import Measurement, measurements_csv
+from tyrecal.measured.repeats import combined
 from tyrecal.modes.mode import Label
 
 from ..chance import Chance
@@ -18,9 +21,9 @@ LABELS = [Label(c, m) for c in (1, 2, 3, 4) for m in (0, 1)]
 
 
 def value(
-    hertz: float, run: str, label: Label = LABELS[0], member: str = "", sigma: float | None = None
-) -> Value:
-    return Value("frequency_Hz", label, member, 240.0, 0.0, hertz, sigma, run, "here")
+    hertz: float, run: str, label: Label = LABELS[0], member: str = "", sigma: float = nan
+) -> Measurement:
+    return Measurement("frequency_Hz", label, member, 240.0, 0.0, hertz, sigma, run, "here")
 
 
 def test_sigma_covers_the_truth_from_three_runs(chance: Chance) -> None:
@@ -93,7 +96,7 @@ def test_a_lone_member_stays_one() -> None:
 @pytest.mark.parametrize(
     "runs", [[value(66.0, "1", sigma=40.0)], [value(30.0, "1"), value(90.0, "2")]]
 )
-def test_a_sigma_that_no_fit_would_read_is_refused(runs: list[Value]) -> None:
+def test_a_sigma_that_no_fit_would_read_is_refused(runs: list[Measurement]) -> None:
     with pytest.raises(InputError, match=r"sigma of \[1,0\] comes to .* more than 20%"):
         combined(runs)
 

@@ -1,4 +1,4 @@
-"""Single measured values, and what repeats make of them: a value with its standard deviation.
+"""What repeats make of single values: their mean with its standard deviation.
 
 The value is the mean over n runs, and sigma that of the mean:
 
@@ -13,67 +13,30 @@ floor is for what repeats do not show: another bench, another day, the sensors' 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from math import isnan
 
 import numpy as np
 
-from ..case.usual import LARGEST_SIGMA, MEASURED
-from ..diagnose.measurements import COLUMNS, PRESSURES_kPa
-from ..diagnose.observations import PRIOR_REPEATS
+from ..case.usual import LARGEST_SIGMA
 from ..errors import InputError
 from ..modes.mode import Label
+from .measurement import Key, Measurement
 
 FLOOR = 0.001  # of the value
-Key = tuple[str, Label | None, str, float, float]
-
-
-@dataclass(frozen=True)
-class Value:
-    """One value of one run, in the unit of ``quantity``; member as in the measurements CSV;
-    sigma: standard deviation, None where the run does not state it; place: file and line."""
-
-    quantity: str
-    label: Label | None
-    member: str
-    pressure_kPa: float
-    load_N: float
-    value: float
-    sigma: float | None
-    run: str
-    place: str
-
-    @property
-    def key(self) -> Key:
-        """What is measured."""
-        return (self.quantity, self.label, self.member, self.pressure_kPa, self.load_N)
-
-
-def implausible(value: Value) -> str | None:
-    """A sentence, where no tyre has such a value."""
-    if not value.value > 0:
-        return f"{value.quantity} is {value.value:g}, must be greater than 0"
-    if refusal := MEASURED[value.quantity].refusal(value.value):
-        return f"{value.quantity} is {value.value:g}: no tyre has that, {refusal}"
-    low, high = PRESSURES_kPa
-    if value.quantity != "mass_kg" and not low <= value.pressure_kPa <= high:
-        return (
-            f"the pressure is {value.pressure_kPa:g} kPa, must be {low:g} to {high:g}; which unit?"
-        )
-    if value.sigma is not None and not value.sigma > 0:
-        return f"sigma is {value.sigma:g}, must be greater than 0"
-    return None
+PRIOR_REPEATS = 4.0  # repeats that the scatter of all values is worth for that of one value
 
 
 def combined(
-    values: Sequence[Value], floor: float = FLOOR, assumed: float | None = None
-) -> list[Value]:
+    values: Sequence[Measurement], floor: float = FLOOR, assumed: float = 0.0
+) -> list[Measurement]:
     """One value a key, the mean of its runs, with the standard deviation of that mean.
 
     floor, assumed: relative; ``assumed`` is the standard deviation of one run that states none.
     Raises InputError where neither repeats nor anything else tell a standard deviation, or
     it is so large that no fit would read it.
     """
-    groups: dict[Key, list[Value]] = {}
+    groups: dict[Key, list[Measurement]] = {}
     for each in _one_for_both(values):
         groups.setdefault(each.key, []).append(each)
     pooled = {q: _pooled(groups, q) for q in {key[0] for key in groups}}
@@ -81,7 +44,7 @@ def combined(
     for runs in groups.values():
         x = np.array([each.value for each in runs])
         mean, n = float(x.mean()), len(x)
-        stated = [each.sigma or (assumed or 0.0) * each.value for each in runs]
+        stated = [assumed * each.value if isnan(each.sigma) else each.sigma for each in runs]
         variances = [np.sum(np.square(stated)) / n**2]
         every = pooled[runs[0].quantity]
         if n > 1 and every is not None:
@@ -89,20 +52,20 @@ def combined(
             variances.append((PRIOR_REPEATS * every * mean**2 + own) / (PRIOR_REPEATS + n - 1) / n)
         if n == 1 and not stated[0]:
             raise InputError(
-                f"{runs[0].place}: nothing tells how far {_name(runs[0])} may be off: give repeats,"
+                f"{runs[0].place}: nothing tells how far {runs[0].name} may be off: give repeats,"
                 " a column sigma, or --sigma-percent"
             )
         sigma = max(float(np.sqrt(max(variances))), floor * mean)
         if sigma > LARGEST_SIGMA * mean:
             raise InputError(
-                f"{runs[0].place}: sigma of {_name(runs[0])} comes to {sigma:.3g}, more than"
+                f"{runs[0].place}: sigma of {runs[0].name} comes to {sigma:.3g}, more than"
                 f" {LARGEST_SIGMA:.0%} of the value {mean:.4g}: is it a mistake, or another mode?"
             )
         rows.append(replace(runs[0], value=mean, sigma=sigma))
     return sorted(rows, key=_order)
 
 
-def _pooled(groups: dict[Key, list[Value]], quantity: str) -> float | None:
+def _pooled(groups: dict[Key, list[Measurement]], quantity: str) -> float | None:
     """Relative variance of one run, over all that was repeated; None where nothing was."""
     total, freedom = 0.0, 0
     for key, runs in groups.items():
@@ -113,10 +76,10 @@ def _pooled(groups: dict[Key, list[Value]], quantity: str) -> float | None:
     return total / freedom if freedom else None
 
 
-def _one_for_both(values: Sequence[Value]) -> list[Value]:
+def _one_for_both(values: Sequence[Measurement]) -> list[Measurement]:
     """The two members of a doublet as one, their mean, where some runs tell other members than
     others do."""
-    places: dict[tuple[object, ...], dict[str, list[Value]]] = {}
+    places: dict[tuple[object, ...], dict[str, list[Measurement]]] = {}
     for each in values:
         place = (each.quantity, each.label, each.pressure_kPa, each.load_N)
         places.setdefault(place, {}).setdefault(each.run, []).append(each)
@@ -134,39 +97,7 @@ def _one_for_both(values: Sequence[Value]) -> list[Value]:
     return result
 
 
-def measurements_csv(rows: Sequence[Value]) -> str:
-    """The measurements CSV of ``rows``."""
-    lines = [",".join(COLUMNS)]
-    for row in rows:
-        label = row.label
-        cells = (
-            row.quantity,
-            "" if label is None else label.c,
-            "" if label is None else label.m,
-            (label.kind or "") if label else "",
-            row.member,
-            "" if row.quantity == "mass_kg" else f"{row.pressure_kPa:g}",
-            f"{row.load_N:g}",
-            f"{row.value:.6g}",
-            f"{row.sigma:.3g}",
-        )
-        lines.append(",".join(map(str, cells)))
-    return "\n".join(lines) + "\n"
-
-
-def _name(value: Value) -> str:
-    return value.label.said if value.label else value.quantity
-
-
-def _order(row: Value) -> tuple[object, ...]:
+def _order(row: Measurement) -> tuple[object, ...]:
     label = row.label or Label(99, 0)
-    return (
-        row.quantity != "frequency_Hz",
-        row.quantity,
-        row.pressure_kPa,
-        row.load_N,
-        label.c,
-        label.m,
-        label.kind or "",
-        row.member,
-    )
+    mode = (label.c, label.m, label.kind or "", row.member)
+    return (row.quantity != "frequency_Hz", row.quantity, row.pressure_kPa, row.load_N, *mode)

@@ -1,0 +1,107 @@
+"""What the columns of a table hold, told by their headings, with the units in them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from .. import units
+from ..errors import InputError
+
+HEADINGS = {
+    "frequency_Hz": "frequency freq f fn eigenfrequency natural_frequency resonance_frequency"
+    " frequenz eigenfrequenz frequence frequence_propre",
+    "contact_area_m2": "contact_area area footprint_area kontaktflache aufstandsflache",
+    "vertical_stiffness_N_per_m": "vertical_stiffness radial_stiffness stiffness kz"
+    " vertikalsteifigkeit federrate",
+    "mass_kg": "mass tyre_mass tire_mass weight masse gewicht",
+    "label": "label mode mode_shape shape form eigenform modenform",
+    "c": "c n circumferential circumferential_order circumferential_harmonic waves harmonic"
+    " wave_number umfangsordnung",
+    "m": "m meridional meridional_order lateral_order querordnung",
+    "kind": "kind type art",
+    "member": "member half doublet",
+    "pressure": "pressure inflation inflation_pressure p druck innendruck fulldruck reifendruck"
+    " luftdruck pression",
+    "load": "load vertical_load wheel_load fz last radlast charge",
+    "sigma": "sigma std stdev stddev sd std_dev standard_deviation uncertainty unsicherheit"
+    " standardabweichung",
+    "run": "run repeat repetition test messung wiederholung",
+    "quantity": "quantity",
+    "value": "value",
+}
+MEANING = {name: meaning for meaning, names in HEADINGS.items() for name in names.split()}
+BRACKETED = re.compile(r"^(.*?)\s*(?:[\[(](.*?)[\])]\s*)?$")  # name [unit]
+ENDING = re.compile(r"^(.+)[\s_](hz|kpa|bar|psi|n|m2|n[\s_]per[\s_]m|kg|kn|percent)$")
+TABLES = {"pressure": units.PRESSURE, "load": units.LOAD, **units.QUANTITIES}
+
+
+@dataclass(frozen=True)
+class Column:
+    """Where a meaning stands in a line."""
+
+    index: int
+    factor: float = 1.0  # to our unit
+    percent: bool = False  # of the value
+    of: str = ""  # the quantity that a sigma's unit belongs to; "" where it has none or is in %
+
+
+def read_columns(
+    headings: Sequence[str], place: str, pressure_kPa: float | None
+) -> dict[str, Column]:
+    """Columns by meaning, of those that have one; ``pressure_kPa``: where none says it.
+
+    Raises InputError at ``place``.
+    """
+    columns: dict[str, Column] = {}
+    for index, heading in enumerate(headings):
+        name, unit = _heading(heading)
+        meaning = MEANING.get(name)
+        if meaning is None:
+            continue  # damping, remarks and the like
+        if meaning in columns:
+            raise InputError(f"{place}: two columns are the {meaning}; rename one")
+        try:
+            columns[meaning] = _column(index, heading, meaning, unit)
+        except ValueError as error:
+            raise InputError(f"{place}: '{heading}'{error}") from None
+    held = columns.keys()
+    if not held & units.QUANTITIES.keys() and not {"quantity", "value"} <= held:
+        raise InputError(
+            f"{place}: no column holds a frequency; headings must be like"
+            " 'c; m; pressure [bar]; frequency [Hz]'"
+        )
+    if "frequency_Hz" in held and "label" not in held and not {"c", "m"} <= held:
+        raise InputError(f"{place}: frequencies need the columns c and m, or a column label")
+    if "pressure" not in held and pressure_kPa is None and held & {"frequency_Hz", "quantity"}:
+        raise InputError(f"{place}: no column holds the pressure; give --pressure-kPa")
+    return columns
+
+
+def _column(index: int, heading: str, meaning: str, unit: str) -> Column:
+    """Raises ValueError with what is wrong with the unit."""
+    if table := TABLES.get(meaning):
+        if not unit and meaning != "frequency_Hz":
+            raise ValueError(f" has no unit; write it as '{heading} [{next(iter(table))}]'")
+        factor = units.factor(table, unit) if unit else 1.0
+        if factor is None:
+            raise ValueError(f": the unit must be one of {', '.join(table)}")
+        return Column(index, factor)
+    if meaning == "sigma" and unit and unit != "%":
+        for quantity, table in units.QUANTITIES.items():
+            if factor := units.factor(table, unit):
+                return Column(index, factor, of=quantity)
+        raise ValueError(": unknown unit")
+    return Column(index, percent=unit == "%")
+
+
+def _heading(text: str) -> tuple[str, str]:
+    """Name and unit of a heading: 'Frequency [Hz]' and 'frequency_Hz' -> 'frequency', 'hz'."""
+    match = BRACKETED.match(text.strip())
+    name, unit = (match[1], match[2] or "") if match else (text, "")
+    name = name.lower().translate(str.maketrans("éèêüäö", "eeeuao")).strip(" .:")
+    if not unit and (match := ENDING.match(name)):
+        name, unit = match[1], re.sub(r"\s", "_", match[2])
+    unit = "%" if unit == "percent" else unit
+    return re.sub(r"[\s\-_.]+", "_", name).strip("_"), units.plain(unit)

@@ -1,0 +1,127 @@
+"""What one line of a table measures."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from math import isfinite, nan
+
+from ..modes.mode import Label
+from ..units import QUANTITIES
+from .columns import Column
+from .measurement import Measurement
+
+LABEL = re.compile(r"^[\[(]?\s*(\d+)\s*[,;/ ]\s*(\d+)\s*[\])]?\s*(.*)$")
+MAX_ORDERS = {"c": 20, "m": 3}
+KINDS = {
+    "axial": "axial",
+    "lateral": "axial",
+    "torsional": "torsional",
+    "torsion": "torsional",
+    "rotational": "torsional",
+    "": None,
+}
+DOUBLET = {"": "", "1": "1", "2": "2", "a": "1", "b": "2", "lower": "1", "upper": "2"}
+SYMMETRIES = ("symmetric", "antisymmetric")
+
+
+@dataclass(frozen=True)
+class Line:
+    """A line of a table. Its methods raise ValueError with what is wrong."""
+
+    place: str  # file and line
+    cells: Mapping[str, str]  # by meaning
+    columns: Mapping[str, Column]
+    comma: bool  # whether it can be a decimal one
+
+    def cell(self, meaning: str) -> str:
+        """Empty where there is no such column."""
+        return self.cells.get(meaning, "")
+
+    def number(self, meaning: str, default: float | None = None) -> float:
+        """In our unit; ``default`` for an empty cell."""
+        cell = self.cell(meaning)
+        if not cell and default is not None:
+            return default
+        try:
+            value = float(cell.replace(",", ".") if self.comma else cell)
+        except ValueError:
+            value = nan
+        if not isfinite(value):
+            raise ValueError(f"{meaning} is '{cell}', must be a number")
+        return value * self.columns[meaning].factor
+
+    def measurements(self, pressure_kPa: float, run: str) -> Iterator[Measurement]:
+        """One for each quantity; ``pressure_kPa`` where the line does not say it."""
+        pressure, load = self.number("pressure", pressure_kPa), self.number("load", 0.0)
+        if load < 0:
+            raise ValueError(f"load is {load:g}, must be at least 0")
+        quantities = self._quantities()
+        sigma = self.columns["sigma"] if self.cell("sigma") else None
+        if sigma and sigma.of and sigma.of not in quantities:
+            raise ValueError(f"sigma has the unit of {sigma.of}, which has no value here")
+        if sigma and not sigma.of and not sigma.percent and len(quantities) > 1:
+            raise ValueError(
+                f"sigma can be that of {' or '.join(quantities)}: write its unit, as in"
+                " 'sigma [Hz]', or 'sigma [%]' for all of them"
+            )
+        for quantity in quantities:
+            value = self.number("value" if self.cell("value") else quantity)
+            label, member = None, ""
+            if quantity == "frequency_Hz":
+                label = self._label()
+                member = self._member(label, bool(load))
+            own = self.number("sigma") if sigma and sigma.of in ("", quantity) else nan
+            if sigma and sigma.percent:
+                own *= 0.01 * value
+            at = 0.0 if quantity == "mass_kg" else pressure
+            name = f"{run} {self.cell('run')}".rstrip()
+            yield Measurement(quantity, label, member, at, load, value, own, name, self.place)
+
+    def _quantities(self) -> list[str]:
+        if not self.cell("value"):
+            if found := [quantity for quantity in QUANTITIES if self.cell(quantity)]:
+                return found
+            raise ValueError("nothing was measured: the cell of the value is empty")
+        quantity = self.cell("quantity")
+        if quantity not in QUANTITIES:
+            raise ValueError(f"quantity is '{quantity}', must be one of {', '.join(QUANTITIES)}")
+        if quantity != "frequency_Hz" and any(map(self.cell, ("c", "m", "kind", "member"))):
+            raise ValueError(f"c, m, kind and member must be empty for {quantity}")
+        return [quantity]
+
+    def _label(self) -> Label:
+        c, m, kind = self.cell("c"), self.cell("m"), self.cell("kind")
+        if self.cell("label") and "c" not in self.cells:  # beside c and m it is the mode's number
+            match = LABEL.match(self.cell("label"))
+            if not match:
+                raise ValueError(
+                    f"label is '{self.cell('label')}', must be like [2,1], or [0,0] lateral or"
+                    " torsional"
+                )
+            c, m, kind = match[1], match[2], kind or match[3]
+        for name, cell in (("c", c), ("m", m)):
+            if not (cell.isdecimal() and int(cell) <= MAX_ORDERS[name]):
+                raise ValueError(
+                    f"{name} is '{cell}', must be a whole number from 0 to {MAX_ORDERS[name]}"
+                )
+        word = kind.strip().lower()
+        if word not in KINDS:
+            raise ValueError(f"kind is '{kind}', must be lateral (axial), torsional or empty")
+        zero = int(c) == int(m) == 0
+        if zero and not word:
+            raise ValueError("[0,0] needs a kind, lateral (axial) or torsional")
+        if word and not zero and self.cell("value"):
+            raise ValueError(f"kind is '{kind}', must be empty: only [0,0] has one")
+        return Label(int(c), int(m), KINDS[word] if zero else None)
+
+    def _member(self, label: Label, loaded: bool) -> str:
+        word = self.cell("member").lower()
+        if loaded and word in SYMMETRIES:
+            return word
+        if not loaded and word in DOUBLET and (label.c or not word):
+            return DOUBLET[word]
+        wanted = "1, 2 or empty" if label.c else f"empty for {label}"
+        wanted = "symmetric or antisymmetric under load" if loaded else wanted
+        raise ValueError(f"member is '{self.cell('member')}', must be {wanted}")

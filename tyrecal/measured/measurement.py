@@ -1,0 +1,68 @@
+"""One measured value, and the measurements CSV, which holds several."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import nan
+
+from ..case.usual import MEASURED
+from ..modes.mode import Label
+
+COLUMNS = ("quantity", "c", "m", "kind", "member", "pressure_kPa", "load_N", "value", "sigma")
+PRESSURES_kPa = (20.0, 2000.0)
+Key = tuple[str, Label | None, str, float, float]
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """A value that was measured, or the mean of several, in the unit of ``quantity``."""
+
+    quantity: str  # one of MEASURED
+    label: Label | None  # None of what is no frequency
+    member: str  # 1 or 2 of a doublet, symmetric or antisymmetric under load; "": one for both
+    pressure_kPa: float  # 0 of the mass
+    load_N: float
+    value: float
+    sigma: float = nan  # standard deviation, NaN where it is not stated
+    run: str = ""  # what was mounted and measured once
+    place: str = ""  # file and line
+
+    @property
+    def key(self) -> Key:
+        """What is measured."""
+        return (self.quantity, self.label, self.member, self.pressure_kPa, self.load_N)
+
+    @property
+    def name(self) -> str:
+        """What is measured, in words."""
+        return self.label.said if self.label else self.quantity
+
+    @property
+    def mistake(self) -> str | None:
+        """A sentence, where no tyre has such a value."""
+        low, high = PRESSURES_kPa
+        if not self.value > 0:
+            return f"{self.quantity} is {self.value:g}, must be greater than 0"
+        if refusal := MEASURED[self.quantity].refusal(self.value):
+            return f"{self.quantity} is {self.value:g}: no tyre has that, {refusal}"
+        if self.quantity != "mass_kg" and not low <= self.pressure_kPa <= high:
+            said = f"the pressure is {self.pressure_kPa:g} kPa, must be {low:g} to {high:g}"
+            return f"{said}; which unit?"
+        if self.quantity in ("contact_area_m2", "vertical_stiffness_N_per_m") and not self.load_N:
+            return f"the load is 0, must be greater than 0 for {self.quantity}"
+        if self.sigma <= 0:
+            return f"sigma is {self.sigma:g}, must be greater than 0"
+        return None
+
+
+def measurements_csv(measurements: Sequence[Measurement]) -> str:
+    """The measurements CSV."""
+    lines = [",".join(COLUMNS)]
+    for each in measurements:
+        label = each.label
+        mode = f"{label.c},{label.m},{label.kind or ''}" if label else ",,"
+        pressure = f"{each.pressure_kPa:g}" if each.quantity != "mass_kg" else ""
+        state = f"{each.member},{pressure},{each.load_N:g}"
+        lines.append(f"{each.quantity},{mode},{state},{each.value:.6g},{each.sigma:.3g}")
+    return "\n".join(lines) + "\n"
