@@ -7,10 +7,8 @@ import pytest
 from scipy.stats import uniform
 
 from tyrecal.blind.emulated import emulate
-from tyrecal.blind.laws import Law, other_laws
-from tyrecal.blind.maker import find_maker, finer
+from tyrecal.blind.laws import Law
 from tyrecal.blind.outside import FAMILIES
-from tyrecal.blind.regions import divided
 from tyrecal.case import LoadedCase, with_values
 from tyrecal.diagnose.response import Answer, Point
 from tyrecal.effects import catalogue
@@ -19,6 +17,9 @@ from tyrecal.modes.label import paired_labels
 from tyrecal.modes.mode import Label
 
 from ..chance import Chance, generator
+from .laws import other_laws
+from .makers import finer, other_maker
+from .regions import divided
 from .toy import CASE, Scale
 
 LABELS = [Label(t.c, t.m, t.kind) for t in CASE.case.targets.modes]  # type: ignore[union-attr]
@@ -40,7 +41,7 @@ PLAIN = ln_f(AT)
 def test_calculix_can_make_at_least_twelve_effects_and_four_families() -> None:
     assert len(CHEAP) >= 12 and len(FAMILIES) >= 4
     assert not set(FAMILIES) & set(catalogue())
-    assert set(find_maker("calculix", CASE).laws) == set(CHEAP)
+    assert set(other_maker("calculix", CASE).laws) == set(CHEAP)
     for id, law in other_laws(frozenset(ABLE)).items():
         assert (law.low, law.high) == (catalogue()[id].low, catalogue()[id].high)
 

@@ -12,7 +12,7 @@ import pytest
 from tyrecal.blind.answer import answer
 from tyrecal.blind.draw import draw
 from tyrecal.blind.make import make
-from tyrecal.blind.maker import find_maker
+from tyrecal.blind.maker import bundled_maker
 from tyrecal.blind.protocol import Protocol, read_json, write_json
 from tyrecal.blind.ruler import FILE as RULER
 from tyrecal.blind.ruler import measure
@@ -138,11 +138,11 @@ def test_making_goes_on_where_it_was_stopped(tmp_path: Path) -> None:
     class Stopped(ToyMaker):
         left = 10
 
-        def listen(self, case, labels):  # type: ignore[no-untyped-def]
+        def compute(self, case, labels):  # type: ignore[no-untyped-def]
             self.left -= 1
             if not self.left:
                 raise KeyboardInterrupt
-            return super().listen(case, labels)
+            return super().compute(case, labels)
 
     stopped = Stopped(SCALE)
     with pytest.raises(KeyboardInterrupt):
@@ -184,7 +184,7 @@ def test_a_whole_study_of_the_toy(tmp_path: Path) -> None:
 
 
 def test_the_bundled_maker_s_trial_is_one_that_a_diagnosis_can_read(tmp_path: Path) -> None:
-    maker = find_maker("bundled", CASE)
+    maker = bundled_maker(CASE)
     assert "inverse crime" in maker.about and len(maker.laws) >= 20
     folder, sealed = tmp_path / "trials", tmp_path / "truth"
     rules = protocol(1, 1, swapped=0.0)

@@ -8,7 +8,7 @@ from math import log
 import numpy as np
 
 from tyrecal.blind.laws import Law
-from tyrecal.blind.maker import Heard
+from tyrecal.blind.maker import Computed
 from tyrecal.blind.protocol import Protocol
 from tyrecal.case import LoadedCase, number_at, start_values
 from tyrecal.diagnose.response import Answer, Point
@@ -58,7 +58,7 @@ class ToyMaker:
         self.laws = {id: Law(0.0, 1.0, _named(id)) for id in scale.g}
         self.outside = {"odd_mode": Law(0.0, 1.0, _named("odd_mode"))}
 
-    def listen(self, case: LoadedCase, labels: list[Label]) -> Heard:
+    def compute(self, case: LoadedCase, labels: list[Label]) -> Computed:
         x = np.array([log(number_at(case, path)) for path in NUMBERS])
         id, _, e = case.case.name.partition(" ")
         effects = {id: float(e)} if id in self.scale.g else {}
@@ -71,7 +71,7 @@ class ToyMaker:
             f = answer.eta[self.scale.model_rows.index((label, pressure))]
             f += odd if label == Label(2, 1) else 0.0
             ln_f[label] = f, f
-        return Heard(ln_f, float(answer.eta[0]))
+        return Computed(ln_f, float(answer.eta[0]))
 
 
 def _named(id: str):  # type: ignore[no-untyped-def]

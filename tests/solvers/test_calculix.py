@@ -14,7 +14,6 @@ from tyrecal_solvers.calculix.results import Fields, pairs, read_mass
 from tyrecal_solvers.calculix.runner import _is_safe, _said, run_job
 from tyrecal_solvers.process import RunFailed
 
-from tyrecal.blind.laws import tread_density
 from tyrecal.blind.outside import thick_cushion
 from tyrecal.case import LoadedCase, load_case, start_values, with_values
 from tyrecal.deck.environment import TemplateFailed
@@ -23,6 +22,7 @@ from tyrecal.evaluate.door import Door, Question
 from tyrecal.evaluate.failure import DeckRefused, EvaluationFailed
 from tyrecal.modes.label import label_modes
 
+from ..blind.laws import tread_density
 from ..conftest import CASES
 from ..studies.blind_calculix import common_problem
 from ..studies.calculix import common

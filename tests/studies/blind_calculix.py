@@ -35,9 +35,9 @@ from scipy.stats import qmc
 
 from tyrecal.blind.answer import rows_of, tyre_model
 from tyrecal.blind.draw import Truth, draw, tyre
-from tyrecal.blind.laws import Law, other_laws
+from tyrecal.blind.laws import Law
 from tyrecal.blind.make import make
-from tyrecal.blind.maker import Heard
+from tyrecal.blind.maker import Computed
 from tyrecal.blind.outside import FAMILIES
 from tyrecal.blind.protocol import Protocol
 from tyrecal.blind.ruler import measure
@@ -52,6 +52,7 @@ from tyrecal.modes.label import label_modes
 from tyrecal.modes.match import LostLabel, match
 from tyrecal.modes.mode import Label
 
+from ..blind.laws import other_laws
 from .calculix import common, modes_of, split
 
 Array = np.ndarray
@@ -273,7 +274,7 @@ class EmulatedCalculix:
         self.outside = FAMILIES
         self._fitted = fitted(usual(recorded("train"))[0])
 
-    def listen(self, case: LoadedCase, labels: list[Label]) -> Heard:
+    def compute(self, case: LoadedCase, labels: list[Label]) -> Computed:
         """``case``: of `base`, whose mesh a law may have divided. Raises EvaluationFailed."""
         known, mass = bundled(case, labels)
         layers = case.case.rebar_layers
@@ -285,7 +286,7 @@ class EmulatedCalculix:
         }
         q = features(values, case.case.pressure_kPa)
         ln_f = {x: known[str(x)] + float(q @ self._fitted[str(x)]) for x in labels}
-        return Heard({x: (f, f) for x, f in ln_f.items()}, float(np.log(mass)))
+        return Computed({x: (f, f) for x, f in ln_f.items()}, float(np.log(mass)))
 
 
 def table() -> None:

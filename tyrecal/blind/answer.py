@@ -7,6 +7,7 @@ each answer, so that the scorer alone compares it with what was measured there.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import nullcontext
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -63,7 +64,7 @@ def answer(
     response: Response,
     rows: Sequence[ModelRow],
     jobs: int = 1,
-    told: Callable[[int, int], None] = lambda done, all: None,
+    on_progress: Callable[[int, int], None] = lambda done, all: None,
 ) -> str:
     """Answer every trial that has no answer yet; returns the sha256 of all answers.
 
@@ -76,21 +77,12 @@ def answer(
     own_folder(answers)
     waiting = [t for t in trials if not (answers / f"{t.stem}.json").exists()]
     work = partial(one_answer, response, list(rows), protocol)
-    done = len(trials) - len(waiting)
-
-    def keep(trial: Path, content: dict[str, Any]) -> None:
-        nonlocal done
-        write_json(answers / f"{trial.stem}.json", content)
-        done += 1
-        told(done, len(trials))
-
-    if jobs > 1 and len(waiting) > 1:
-        with process_pool(jobs) as pool:
-            for trial, content in zip(waiting, pool.map(work, waiting), strict=True):
-                keep(trial, content)
-    else:
-        for trial in waiting:
-            keep(trial, work(trial))
+    before = len(trials) - len(waiting)
+    with process_pool(jobs) if jobs > 1 and len(waiting) > 1 else nullcontext() as pool:
+        contents = (pool.map if pool else map)(work, waiting)
+        for done, (trial, content) in enumerate(zip(waiting, contents, strict=True), before + 1):
+            write_json(answers / f"{trial.stem}.json", content)
+            on_progress(done, len(trials))
     return seal_answers(folder, [answers / f"{trial.stem}.json" for trial in trials])
 
 

@@ -7,7 +7,8 @@ import os
 import secrets
 import shutil
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
+from contextlib import nullcontext
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from hashlib import sha256
 from math import exp
@@ -25,23 +26,22 @@ from ..files import refuse_link, whole
 from ..measured.measurement import COLUMNS
 from ..modes.mode import Label
 from .draw import NEAR, Truth, draw, tyre
-from .maker import Heard, Maker
+from .maker import Computed, Maker
 from .protocol import Protocol, read_json, write_json, write_protocol
 from .ruler import write_ruler
 from .seal import SEAL, seal
 
-TRIES = 20  # tyres that a trial may draw until one has a solution
-Lines = list[dict[str, Any]]
+MAX_TRIES = 20  # tyres that a trial may draw until one has a solution
 
 
 @dataclass(frozen=True)
-class Made:
-    """A trial: truth, tries it took, and by pressure what was heard with and without its effect."""
+class Trial:
+    """A tyre as the maker computed it, without noise."""
 
     truth: Truth
-    tries: int
-    with_effect: dict[float, Heard]
-    without: dict[float, Heard]
+    tries: int  # tyres drawn until one had a solution
+    with_effect: dict[float, Computed]  # by pressure
+    without: dict[float, Computed]
 
 
 def make(
@@ -53,7 +53,7 @@ def make(
     ruler: Callable[[], Mapping[str, Any]],
     jobs: int = 1,
     seed: int | None = None,
-    told: Callable[[int, int], None] = lambda done, all: None,
+    on_progress: Callable[[int, int], None] = lambda done, all: None,
 ) -> str:
     """Make trials in ``folder`` and their truth in ``sealed``; returns the seal's sha256.
 
@@ -73,17 +73,12 @@ def make(
     seed = _seed(sealed, seed)
     found, _ = sources(case)
     truths = draw(protocol, case, found, maker.laws, maker.outside, seed)
-    work = partial(_kept, sealed, protocol, case, maker)
-    trials: list[Made] = []
-    if jobs > 1:
-        with process_pool(jobs) as pool:
-            for made in pool.map(work, truths):
-                trials.append(made)
-                told(len(trials), len(truths))
-    else:
-        for truth in truths:
-            trials.append(work(truth))
-            told(len(trials), len(truths))
+    work = partial(_resumed, sealed, protocol, case, maker)
+    trials: list[Trial] = []
+    with process_pool(jobs) if jobs > 1 else nullcontext() as pool:
+        for trial in (pool.map if pool else map)(work, truths):
+            trials.append(trial)
+            on_progress(len(trials), len(truths))
     _copy(case, folder)
     write_protocol(folder, protocol)
     _write_trials(folder, protocol, trials)
@@ -97,19 +92,19 @@ def labels_of(case: LoadedCase) -> list[Label]:
     return [Label(t.c, t.m, t.kind) for t in case.case.targets.modes]
 
 
-def values(made: Made, protocol: Protocol) -> dict[float, dict[Label, tuple[float, ...]]]:
+def values(trial: Trial, protocol: Protocol) -> dict[float, dict[Label, tuple[float, ...]]]:
     """What the laboratory reads, Hz by pressure and label: noise, the tyre's own splits, labels.
 
     One member for [0,0], two for doublets in an order by chance; NaN where a value is missing.
     """
-    random = np.random.default_rng(made.truth.scatter)
-    labels = list(next(iter(made.with_effect.values())).ln_f)
+    random = np.random.default_rng(trial.truth.scatter)
+    labels = list(next(iter(trial.with_effect.values())).ln_f)
     own = {label: protocol.split * random.normal() for label in labels}
     read: dict[float, dict[Label, tuple[float, ...]]] = {}
     for pressure in protocol.pressures_kPa:
-        heard, here = made.with_effect[pressure], {}
+        computed, here = trial.with_effect[pressure], {}
         for label in labels:
-            low, high = heard.ln_f[label]
+            low, high = computed.ln_f[label]
             pair = [low - own[label] / 2, high + own[label] / 2] if label.c else [low]
             noisy = np.exp(pair + protocol.noise * random.normal(size=len(pair)))
             here[label] = tuple(random.permutation(noisy).tolist())
@@ -118,42 +113,44 @@ def values(made: Made, protocol: Protocol) -> dict[float, dict[Label, tuple[floa
         for label, i in (places[k] for k in gone):
             here[label] = tuple(float("nan") if j == i else f for j, f in enumerate(here[label]))
         read[pressure] = here
-    if made.truth.swapped:
+    if trial.truth.swapped:
         _swap(read, labels, random)
     return read
 
 
-def _kept(sealed: Path, protocol: Protocol, case: LoadedCase, maker: Maker, truth: Truth) -> Made:
+def _resumed(
+    sealed: Path, protocol: Protocol, case: LoadedCase, maker: Maker, truth: Truth
+) -> Trial:
     """The trial as it was made before it was stopped, or made now."""
     asked = json.dumps([asdict(truth), asdict(protocol), maker.about], sort_keys=True)
     path = sealed / "made" / f"{sha256(asked.encode()).hexdigest()[:16]}.json"
     if path.exists():
         return _read(read_json(path), labels_of(case))
     path.parent.mkdir(exist_ok=True)
-    made = _make(protocol, case, maker, truth)
-    write_json(path, _plain(made))
-    return made
+    trial = _make(protocol, case, maker, truth)
+    write_json(path, _plain(trial))
+    return trial
 
 
-def _make(protocol: Protocol, case: LoadedCase, maker: Maker, truth: Truth) -> Made:
+def _make(protocol: Protocol, case: LoadedCase, maker: Maker, truth: Truth) -> Trial:
     """The trial, its tyre drawn again where it has no solution."""
     found, _ = sources(case)
     labels = labels_of(case)
     random = np.random.default_rng(truth.scatter + 1)
     law = {"effect": maker.laws, "outside": maker.outside, "none": {}}[truth.kind].get(truth.law)
-    for tries in range(1, TRIES + 1):
+    for tries in range(1, MAX_TRIES + 1):
         try:
             both = [
                 {
-                    p: maker.listen(tyre(truth, case, found, p, each), labels)
+                    p: maker.compute(tyre(truth, case, found, p, each), labels)
                     for p in protocol.pressures_kPa
                 }
                 for each in ([law, None] if law else [None])
             ]
             if law and law.read:
                 read = law.read({p: h.ln_f for p, h in both[0].items()}, truth.size)
-                both[0] = {p: Heard(read[p], h.ln_mass) for p, h in both[0].items()}
-            return Made(truth, tries, both[0], both[-1])
+                both[0] = {p: Computed(read[p], h.ln_mass) for p, h in both[0].items()}
+            return Trial(truth, tries, both[0], both[-1])
         except (EvaluationFailed, ValueError) as failure:
             last = failure
         truth = _again(truth, case, protocol, random)
@@ -172,16 +169,7 @@ def _again(
         {},
         int(random.integers(2**63)),
     )[0]
-    return Truth(
-        truth.id,
-        truth.kind,
-        truth.law,
-        truth.size,
-        other.variables,
-        other.constants,
-        truth.scatter,
-        truth.swapped,
-    )
+    return replace(truth, variables=other.variables, constants=other.constants)
 
 
 def _swap(
@@ -199,12 +187,12 @@ def _swap(
             here[a], here[b] = here[b], here[a]
 
 
-def _write_trials(folder: Path, protocol: Protocol, trials: list[Made]) -> None:
+def _write_trials(folder: Path, protocol: Protocol, trials: list[Trial]) -> None:
     """One CSV a trial, all of the same form, digits and time."""
     (folder / "trials").mkdir(exist_ok=True)
-    for made in trials:
+    for trial in trials:
         lines = [",".join(COLUMNS)]
-        read = values(made, protocol)
+        read = values(trial, protocol)
         for p in protocol.given_kPa:
             for label, members in read[p].items():
                 for i, f in enumerate(members, 1):
@@ -213,57 +201,51 @@ def _write_trials(folder: Path, protocol: Protocol, trials: list[Made]) -> None:
                         mode = f"{label.c},{label.m},{label.kind or ''},{member}"
                         reading = f"{f:.3f},{protocol.noise * f:.3f}"
                         lines.append(f"frequency_Hz,{mode},{p:.0f},0,{reading}")
-        random = np.random.default_rng(made.truth.scatter + 2)
-        mass = exp(made.with_effect[protocol.given_kPa[0]].ln_mass)
+        random = np.random.default_rng(trial.truth.scatter + 2)
+        mass = exp(trial.with_effect[protocol.given_kPa[0]].ln_mass)
         mass *= exp(protocol.mass * random.normal())
         lines.append(f"mass_kg,,,,,,,{mass:.3f},{protocol.mass * mass:.3f}")
-        path = folder / "trials" / f"{made.truth.id}.csv"
+        path = folder / "trials" / f"{trial.truth.id}.csv"
         with whole(path) as partial:
             partial.write_text("\n".join(lines) + "\n", encoding="utf-8", newline="")
     for path in (folder / "trials").iterdir():
         os.utime(path, (0, 0))
 
 
-def _plain(made: Made) -> dict[str, Any]:
+def _plain(trial: Trial) -> dict[str, Any]:
     """One trial without noise, for JSON."""
 
-    def table(heard: Mapping[float, Heard]) -> Lines:
-        return [
+    tables = {}
+    for key, computed in (("with_effect", trial.with_effect), ("without", trial.without)):
+        tables[key] = [
             {
                 "pressure_kPa": p,
-                "ln_mass": h.ln_mass,
-                "ln_f": {str(label): list(pair) for label, pair in h.ln_f.items()},
+                "ln_mass": each.ln_mass,
+                "ln_f": {str(label): list(pair) for label, pair in each.ln_f.items()},
             }
-            for p, h in heard.items()
+            for p, each in computed.items()
         ]
-
-    return {
-        **asdict(made.truth),
-        "tries": made.tries,
-        "with_effect": table(made.with_effect),
-        "without": table(made.without),
-    }
+    return {**asdict(trial.truth), "tries": trial.tries, **tables}
 
 
-def _read(content: dict[str, Any], labels: list[Label]) -> Made:
+def _read(content: dict[str, Any], labels: list[Label]) -> Trial:
     """The trial that `_plain` wrote."""
-    heard: list[dict[float, Heard]] = []
-    for key in ("with_effect", "without"):
-        heard.append({})
+    tables: dict[str, dict[float, Computed]] = {"with_effect": {}, "without": {}}
+    for key, table in tables.items():
         for entry in content.pop(key):
-            pairs = {label: tuple(entry["ln_f"][str(label)]) for label in labels}
-            heard[-1][entry["pressure_kPa"]] = Heard(pairs, entry["ln_mass"])
+            ln_f = {label: tuple(entry["ln_f"][str(label)]) for label in labels}
+            table[entry["pressure_kPa"]] = Computed(ln_f, entry["ln_mass"])
     tries = content.pop("tries")
-    return Made(Truth(**content), tries, heard[0], heard[1])
+    return Trial(Truth(**content), tries, **tables)
 
 
-def _sealed(made: Made, protocol: Protocol) -> dict[str, Any]:
+def _sealed(trial: Trial, protocol: Protocol) -> dict[str, Any]:
     """One trial of the truth, with what was held out as it was measured."""
-    read = values(made, protocol)[protocol.held_out_kPa]
+    read = values(trial, protocol)[protocol.held_out_kPa]
     held_out = {
         str(label): [f for f in members if np.isfinite(f)] for label, members in read.items()
     }
-    return {**_plain(made), "held_out": held_out}
+    return {**_plain(trial), "held_out": held_out}
 
 
 def _seed(sealed: Path, seed: int | None) -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from math import log1p
 
 from ..case import LoadedCase
@@ -9,7 +10,7 @@ from ..case.schema import Cord
 from ..effects.edit import changed, with_gauge, with_layers, with_part
 from ..effects.parts import belt_lines, carcass, carcass_line, crown
 from ..modes.mode import Label
-from .laws import Law, Read
+from .laws import Frequencies, Law
 
 
 def thick_cushion(case: LoadedCase, e: float) -> LoadedCase:
@@ -49,13 +50,13 @@ def untouched(case: LoadedCase, e: float) -> LoadedCase:
     return case
 
 
-def stand_resonance(heard: Read, e: float) -> Read:
+def stand_resonance(computed: Mapping[float, Frequencies], e: float) -> Mapping[float, Frequencies]:
     """A resonance of the test stand, 1 + e times as high as [1,0] at the middle pressure and the
     same at all, is taken for [1,0]."""
     vertical = Label(1, 0)
-    middle = sorted(heard)[len(heard) // 2]
-    stand = sum(heard[middle][vertical]) / 2 + log1p(e)
-    return {p: {**ln_f, vertical: (stand, stand)} for p, ln_f in heard.items()}
+    middle = sorted(computed)[len(computed) // 2]
+    stand = sum(computed[middle][vertical]) / 2 + log1p(e)
+    return {p: {**ln_f, vertical: (stand, stand)} for p, ln_f in computed.items()}
 
 
 FAMILIES = {

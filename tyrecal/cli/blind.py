@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,15 @@ truth = click.option(
     metavar="DIR",
     help="Where the sealed truth lies (default: DIR-truth, beside DIR).",
 )
+
+
+def trials(option: str, name: str, default: int, what: str) -> Any:
+    """How many trials of a kind are made."""
+    number = click.IntRange(0)
+    help = f"Trials {what}."
+    return click.option(
+        option, name, type=number, default=default, show_default=True, metavar="N", help=help
+    )
 
 
 @click.group()
@@ -41,39 +51,9 @@ def command() -> None:
     shell_complete=complete.cases,
     help="The plain model, its uncertainties and the modes measured.",
 )
-@click.option(
-    "--maker",
-    default="bundled",
-    show_default=True,
-    metavar="NAME",
-    help="bundled: the diagnosis' own model, an inverse crime; bundled-other: another"
-    " mesh and other laws of the effects; calculix: another solver, too.",
-)
-@click.option(
-    "--effects",
-    type=click.IntRange(0),
-    default=300,
-    show_default=True,
-    metavar="N",
-    help="Trials with an effect of the catalogue.",
-)
-@click.option(
-    "--none",
-    "plain",
-    type=click.IntRange(0),
-    default=200,
-    show_default=True,
-    metavar="N",
-    help="Trials without any.",
-)
-@click.option(
-    "--outside",
-    type=click.IntRange(0),
-    default=80,
-    show_default=True,
-    metavar="N",
-    help="Trials with what the catalogue does not hold.",
-)
+@trials("--effects", "effects", 300, "with an effect of the catalogue")
+@trials("--none", "plain", 200, "without any")
+@trials("--outside", "outside", 80, "with what the catalogue does not hold")
 @click.option(
     "--effect",
     "drawn",
@@ -89,7 +69,6 @@ def command() -> None:
 def make(
     folder: Path,
     case_path: Path,
-    maker: str,
     effects: int,
     plain: int,
     outside: int,
@@ -102,6 +81,9 @@ def make(
 ) -> int:
     """Draw tyres, compute them, seal the truth and write measurements to DIR.
 
+    They are the model's own, by its own laws of the effects: an inverse crime, which shows what the
+    case's measurements can tell at best.
+
     The same command goes on where it was stopped.
 
     \b
@@ -111,33 +93,31 @@ def make(
 
     from ..blind.answer import rows_of, tyre_model
     from ..blind.make import make as made
-    from ..blind.maker import NAMES, find_maker
+    from ..blind.maker import bundled_maker
     from ..blind.protocol import Protocol
     from ..blind.ruler import measure
     from ..case import load_case
     from ..evaluate.door import Door
     from ..evaluate.store import Store
 
-    if maker not in NAMES:
-        raise click.UsageError(f"--maker {maker}: must be one of {', '.join(NAMES)}")
     if not effects + plain + outside:
         raise click.UsageError("there must be at least one trial")
     case, sealed = load_case(case_path, allow_unusual), _sealed(folder, truth)
     resume("trials that were made are kept; the same command goes on from there")
     store = Store((sealed / "record").resolve())
-    who = find_maker(maker, case, store)
+    maker = bundled_maker(case, store)
     for id in drawn:
-        if id not in who.laws:
-            raise click.UsageError(f"--effect {id}: this maker has only {', '.join(who.laws)}")
+        if id not in maker.laws:
+            raise click.UsageError(f"--effect {id}: this maker has only {', '.join(maker.laws)}")
     if drawn:
-        who = replace(who, laws={id: who.laws[id] for id in drawn})
+        maker = replace(maker, laws={id: maker.laws[id] for id in drawn})
     counts = {"effect": effects, "none": plain, "outside": outside}
-    protocol = Protocol(who.about, case.path.name, counts)
+    protocol = Protocol(maker.about, case.path.name, counts)
     door = Door(case, "bundled", store=store)
     ruler = lambda: measure(tyre_model(case, door, protocol, jobs), rows_of(case, protocol))
     with talk.progress("make trials") as bar:
-        told = _told("made", talk, bar)
-        mark = made(folder, sealed, case, protocol, who, ruler, jobs, seed, told)
+        progress = _progress("made", talk, bar)
+        mark = made(folder, sealed, case, protocol, maker, ruler, jobs, seed, progress)
     number = sum(counts.values())
     talk.result({"trials": number, "folder": str(folder), "truth": str(sealed), "sha256": mark})
     talk.say(f"{number} trials in {folder}; the truth is in {sealed}, sha256 {mark}")
@@ -198,7 +178,7 @@ def answer(
         model = emulate(model)
     with talk.progress("answer trials") as bar:
         rows = blind.rows_of(case, protocol)
-        mark = blind.answer(folder, model, rows, jobs, _told("answered", talk, bar))
+        mark = blind.answer(folder, model, rows, jobs, _progress("answered", talk, bar))
     talk.result({"folder": str(folder), "sha256": mark})
     talk.say(f"all trials of {folder} are answered, sha256 {mark}")
     return 0
@@ -234,12 +214,12 @@ def _sealed(folder: Path, truth: Path | None) -> Path:
     return truth or folder.with_name(f"{folder.name}-truth")
 
 
-def _told(what: str, talk: Talk, bar: Progress) -> Any:
-    """Says how far it is: the bar, and a line at every tenth of the way."""
+def _progress(what: str, talk: Talk, bar: Progress) -> Callable[[int, int], None]:
+    """Moves the bar, and writes a line at every tenth of the way."""
 
-    def told(done: int, all: int) -> None:
-        bar.at(done, all)
-        if done == all or done % max(1, all // 10) == 0:
-            talk.note(f"{what} {done} of {all}")
+    def on_progress(done: int, total: int) -> None:
+        bar.at(done, total)
+        if done == total or done % max(1, total // 10) == 0:
+            talk.note(f"{what} {done} of {total}")
 
-    return told
+    return on_progress

@@ -1,0 +1,41 @@
+"""Makers that are no inverse crime: another mesh, other laws, and another solver."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+from tyrecal.blind.maker import Computed, SolverMaker
+from tyrecal.blind.outside import FAMILIES
+from tyrecal.case import LoadedCase
+from tyrecal.effects.edit import with_part
+from tyrecal.evaluate.door import Door
+from tyrecal.evaluate.store import Store
+from tyrecal.modes.mode import Label
+
+from .laws import other_laws
+
+FINER = 1.2  # times as many elements along the section as the case's own mesh
+
+
+class OtherMaker(SolverMaker):
+    """A solver on a finer mesh, with other laws than the catalogue's."""
+
+    def compute(self, case: LoadedCase, labels: list[Label]) -> Computed:
+        return super().compute(finer(case), labels)
+
+
+def finer(case: LoadedCase) -> LoadedCase:
+    """The case with another mesh, a fifth finer along the section."""
+    mesh = case.case.mesh
+    level = mesh.levels[mesh.level]
+    elements = {name: math.ceil(FINER * n) for name, n in level.elements.items()}
+    levels = {**mesh.levels, mesh.level: with_part(level, elements=elements)}
+    return replace(case, case=case.case.model_copy(update={"mesh": with_part(mesh, levels=levels)}))
+
+
+def other_maker(solver: str, case: LoadedCase, store: Store | None = None) -> OtherMaker:
+    """``bundled``: for what CalculiX's sector cannot express; ``calculix``: the honest one."""
+    laws = other_laws(frozenset(Door(case, solver).solver.capabilities))
+    about = f"{solver} solver on another mesh, effects by other laws than the catalogue's"
+    return OtherMaker(about, solver, laws, FAMILIES, store)
