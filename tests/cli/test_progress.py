@@ -92,3 +92,15 @@ def test_what_is_reached_on_the_way_to_a_load_is_told(
         clock.now = 100.0
         logging.getLogger(talk.SOLVERS).info("28000 of 400000 N are reached (90 of 142 mm)")
     assert "28000 of 400000 N are reached" in capsys.readouterr().err
+
+
+def test_a_load_that_the_solver_reaches_moves_the_bar(
+    clock: Clock, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with Talk().progress("footprint") as bar:
+        bar.at(0, 2)
+        clock.now = 100.0
+        logging.getLogger(talk.SOLVERS).info("1 of 4", extra={"loads": (1, 4)})
+    assert (
+        "footprint, load 2 of 4, 0 of 2 done, 1:40 elapsed, 11:40 left" in capsys.readouterr().err
+    )

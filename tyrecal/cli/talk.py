@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 import os
-import re
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -237,15 +236,14 @@ class Progress:
 
 
 class _Loads(logging.Handler):
-    """Hears the loads that the solver reaches on the road, one design after the other."""
+    """Passes on what the solver reaches on the road: ``loads``, (done, total), of its records."""
 
     def __init__(self, progress: Progress):
         super().__init__()
         self.progress = progress
 
     def emit(self, record: logging.LogRecord) -> None:
-        found = re.match(r"load (\d+) of (\d+)", record.getMessage())
-        if found:
-            self.progress.within(int(found[1]), int(found[2]))
-        elif " N are reached" in record.getMessage():  # on the way to a load
+        if loads := getattr(record, "loads", None):
+            self.progress.within(*loads)
+        else:  # on the way to a load
             self.progress.words(record.getMessage())

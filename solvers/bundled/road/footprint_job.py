@@ -189,7 +189,8 @@ def press(
             cause = "timed_out" if isinstance(error, give_up) else CAUSES[type(error)]
             break
         footprints.append(footprint)
-        log.info("load %d of %d is reached: %g N", len(footprints), len(wanted), load)
+        reached = len(footprints), len(wanted)
+        log.info("load %d of %d is reached: %g N", *reached, load, extra={"loads": reached})
     rest = around.angles[1:-1][::-1]
     return {
         "free_radius_m": work.free_radius,
