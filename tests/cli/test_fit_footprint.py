@@ -15,6 +15,7 @@ from tyrecal.evaluate.door import Door
 from tyrecal.fit.problem import Problem
 from tyrecal.report import pictures
 from tyrecal.report.convergence import draw_convergence
+from tyrecal.report.figure import save
 
 from ..fit.pressed import AREA_0, STIFFNESS_0, Elastic
 from ..studies.hertz import coarse_case
@@ -56,7 +57,7 @@ def test_what_it_writes(
     out, drawn = tmp_path / "out", []
     monkeypatch.setattr(pictures, "draw_fit", lambda *arguments: drawn.append(arguments))
     assert run("fit", case, "--output", str(out)) == 0
-    draw_convergence(out / "convergence.png", *drawn[0][-2:])
+    save(draw_convergence(*drawn[0][-2:]), out / "convergence.png")
     assert drawn[0][-1] == "sigma" and (out / "convergence.png").stat().st_size > 10_000
     printed, result = capsys.readouterr().out, found(out)
     assert [(row["load_N"], row["quantity"]) for row in result["footprint"]] == [

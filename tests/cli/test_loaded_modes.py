@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from tyrecal.report.figure import save
 from tyrecal.report.load import draw_load_sweep
 from tyrecal.report.table import load_csv
 
@@ -104,7 +105,7 @@ def test_a_picture_of_both_designs(tmp_path: Path) -> None:
         {"design": "initial", "load_N": 0.0, "deflection_m": 0.0, "modes": [mode]},
         {"design": "fitted", "load_N": 9.0, "deflection_m": 0.0, "modes": [mode, mode | {"m": 2}]},
     ]
-    draw_load_sweep(tmp_path / "both.png", rows)
+    save(draw_load_sweep(rows), tmp_path / "both.png")
     assert (tmp_path / "both.png").read_bytes()[:4] == b"\x89PNG"
     assert len(load_csv(rows).splitlines()) == 4
 

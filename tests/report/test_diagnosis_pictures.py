@@ -15,12 +15,14 @@ from tyrecal.case import load_case
 from tyrecal.diagnose.diagnosis import Diagnosis
 from tyrecal.diagnose.where import Place
 from tyrecal.report import diagnosis_pictures as pictures
+from tyrecal.report.figure import save
+from tyrecal.report.section import WARM, draw_section_map
+from tyrecal.report.shape_data import DiagnosisSection, parts_data
 
 from ..conftest import CASES
 from ..diagnose.test_calibrated import exact
 from ..diagnose.test_diagnosis import diagnosed
 from ..diagnose.toy import Toy
-from .watched import watched
 
 NUMBER = "0123456789.\N{MINUS SIGN} "
 
@@ -30,10 +32,13 @@ def found() -> Diagnosis:
     return diagnosed(Toy(effects=3), {"e0": 0.8}, 7)
 
 
-@pytest.fixture
-def drawn(monkeypatch: pytest.MonkeyPatch) -> list[Figure]:
-    """The figures that were saved."""
-    return watched(pictures, monkeypatch)
+def drawn(d: Diagnosis, folder: Path) -> list[Figure]:
+    """The figures, which were saved."""
+    figures = pictures.draw_diagnosis(d, DiagnosisSection(format=1, case="", areas={}, cords={}))
+    figures.pop("section", None)
+    for name, figure in figures.items():
+        save(figure, folder / f"{name}.png")
+    return list(figures.values())
 
 
 def words(figure: Figure) -> str:
@@ -50,9 +55,8 @@ def words(figure: Figure) -> str:
     return "\n".join(written)
 
 
-def test_residuals(found: Diagnosis, drawn: list[Figure], tmp_path: Path) -> None:
-    pictures.draw_residuals(tmp_path / "residuals.png", found)
-    (figure,) = drawn
+def test_residuals(found: Diagnosis, tmp_path: Path) -> None:
+    figure = drawn(found, tmp_path)[0]
     panels = figure.axes
     assert [axes.get_title("left") for axes in panels] == ["[0,0]", "in-plane", "lateral"]
     shown = [bar.lines[0].get_ydata() for axes in panels for bar in axes.containers]
@@ -67,10 +71,8 @@ def test_residuals(found: Diagnosis, drawn: list[Figure], tmp_path: Path) -> Non
     assert "one standard deviation" in told and f"hollow: with {found.best}" in told
 
 
-def test_probabilities_and_held_out(found: Diagnosis, drawn: list[Figure], tmp_path: Path) -> None:
-    pictures.draw_probabilities(tmp_path / "probabilities.png", found)
-    pictures.draw_held_out(tmp_path / "held_out.png", found)
-    bars, held = drawn
+def test_probabilities_and_held_out(found: Diagnosis, tmp_path: Path) -> None:
+    _, bars, held = drawn(found, tmp_path)
     widths = [bar.get_width() for bar in bars.axes[0].patches]
     assert widths == sorted(widths, reverse=True)
     assert widths[0] == pytest.approx(max(found.probabilities.values()))
@@ -91,33 +93,31 @@ def test_long_names_are_laid_out(found: Diagnosis, tmp_path: Path) -> None:
         problem=d.problem.only(np.array(few)),
         gap=replace(d.gap, residuals=d.gap.residuals[few], spread=d.gap.spread[few]),
     )
-    pictures.draw_residuals(tmp_path / "residuals.png", d)
-    pictures.draw_residuals(tmp_path / "alone.png", alone)
-    pictures.draw_probabilities(tmp_path / "probabilities.png", d)
-    pictures.draw_held_out(tmp_path / "held_out.png", d)
+    rows, gap = alone.problem.observations.rows, alone.gap
+    drawn(d, tmp_path)
+    figure = pictures.draw_residuals(rows, gap.residuals, gap.spread, gap.residuals, long)
+    save(figure, tmp_path / "alone.png")
 
 
-def test_no_gap_has_nothing_that_explains_it(drawn: list[Figure], tmp_path: Path) -> None:
+def test_no_gap_has_nothing_that_explains_it(tmp_path: Path) -> None:
     d = exact(Toy(effects=3), {})
     assert d.verdict.kind == "no_gap" and d.shrinkage
-    pictures.draw_residuals(tmp_path / "residuals.png", d)
-    pictures.draw_probabilities(tmp_path / "probabilities.png", d)
-    pictures.draw_held_out(tmp_path / "held_out.png", d)
-    residuals, probabilities, held = map(words, drawn)
+    figures = drawn(d, tmp_path)
+    residuals, probabilities, held = map(words, figures)
     assert "hollow" not in residuals and "explains" not in probabilities
     assert "No gap is seen" in probabilities
-    assert "with " not in held and len(drawn[2].axes[0].patches) == 1
+    assert "with " not in held and len(figures[2].axes[0].patches) == 1
 
 
-def test_section_map(drawn: list[Figure], tmp_path: Path) -> None:
+def test_section_map(tmp_path: Path) -> None:
     """The part that explains most is the warmest, and its row stands in the table."""
     places = (
         Place("upper sidewall", 9.0, 20.0, 21.4, 8.0, 4.9, ("carcass cords",)),
         Place("tread", -3.0, 20.0, -0.2, 10.0, -0.01, ()),
     )
     case = load_case(CASES / "p235_75r17.yaml")
-    pictures.draw_section_map(tmp_path / "section.png", case, places, 1)
-    (figure,) = drawn
+    figure = draw_section_map(parts_data(case, [place.region for place in places]), places, 1)
+    save(figure, tmp_path / "section.png")
     told = words(figure)
     assert "+21 ± 8" in told and "\N{MINUS SIGN}3 ± 20" in told and "+4.9" in told
     assert "+0 ± 10" in told and "-0" not in told  # no negative nothing
@@ -127,4 +127,4 @@ def test_section_map(drawn: list[Figure], tmp_path: Path) -> None:
         for c in figure.axes[0].collections
         if isinstance(c, PolyCollection)
     }
-    assert tuple(np.round(pictures.WARM(4.9 / 5), 3)) in colours and len(colours) == 2
+    assert tuple(np.round(WARM(4.9 / 5), 3)) in colours and len(colours) == 2

@@ -15,8 +15,11 @@ from rich.console import Console
 from tyrecal.deck.context import section_mesh
 from tyrecal.evaluate.door import Door
 from tyrecal.evaluate.pressed import Pressed
-from tyrecal.report import footprint
-from tyrecal.report.footprint import draw_curves, draw_footprint
+from tyrecal.report import pictures
+from tyrecal.report.figure import save
+from tyrecal.report.footprint import draw_curves
+from tyrecal.report.pictures import draw_footprint
+from tyrecal.report.shape_data import patches_data
 from tyrecal.report.table import footprint_csv, footprint_table
 from tyrecal.report.vtu import write_pressed_vtu
 from tyrecal.studies.footprint import footprint_result
@@ -40,7 +43,7 @@ def designs() -> dict[str, Pressed]:
 @pytest.fixture
 def drawn(monkeypatch: pytest.MonkeyPatch) -> list[Figure]:
     """The figures that were saved."""
-    return watched(footprint, monkeypatch)
+    return watched(pictures, monkeypatch)
 
 
 def rows(designs: dict[str, Pressed]) -> list[dict]:
@@ -51,7 +54,7 @@ def rows(designs: dict[str, Pressed]) -> list[dict]:
 def test_every_load_of_every_design_in_one_scale(
     drawn: list[Figure], designs: dict[str, Pressed], tmp_path: Path
 ) -> None:
-    draw_footprint(tmp_path, designs, BOTH, rows(designs))
+    draw_footprint(tmp_path, designs, BOTH, rows(designs), patches_data("", designs, BOTH).patches)
     names = {path.name for path in tmp_path.iterdir()}
     assert {"footprint.png", "footprint_initial.png", "footprint_fitted.png"} < names
     assert {f"footprint_initial_{load:g}N.vtu" for load in LOADS} < names
@@ -72,12 +75,11 @@ def test_every_load_of_every_design_in_one_scale(
         assert 0.05 < (np.asarray(image.convert("L")) < 245).mean() < 0.5
 
 
-def test_area_and_deflection_of_both_designs(
-    drawn: list[Figure], designs: dict[str, Pressed], tmp_path: Path
-) -> None:
+def test_area_and_deflection_of_both_designs(designs: dict[str, Pressed], tmp_path: Path) -> None:
     table = rows(designs)
-    draw_curves(tmp_path / "footprint.png", table)
-    left, right = drawn[0].axes
+    figure = draw_curves(table)
+    save(figure, tmp_path / "footprint.png")
+    left, right, *_ = figure.axes
     assert [text.get_text() for text in left.get_legend().get_texts()] == ["initial", "fitted"]
     assert [line.get_linestyle() for line in left.lines] == ["--", "-"]
     assert list(left.lines[1].get_xdata()) == [0.5, 1, 2, 4]
@@ -86,17 +88,17 @@ def test_area_and_deflection_of_both_designs(
 
 
 def test_one_design_and_one_load(tmp_path: Path) -> None:
-    pressed = Door(CASE, _solver=Hertz()).press({}, [3000.0])
-    draw_footprint(tmp_path, {"initial": pressed}, BOTH, rows({"initial": pressed}))
+    designs = {"initial": Door(CASE, _solver=Hertz()).press({}, [3000.0])}
+    draw_footprint(tmp_path, designs, BOTH, rows(designs), patches_data("", designs, BOTH).patches)
     assert len(list(tmp_path.iterdir())) == 3
 
 
-def test_marks_of_one_load_are_whole(drawn: list[Figure], tmp_path: Path) -> None:
+def test_marks_of_one_load_are_whole() -> None:
     """Of designs that hardly differ, too."""
     row = {"load_N": 2e3, "area_m2": 8.3e-3, "deflection_m": 0.011}
+    row |= {"vertical_stiffness_N_per_m": 2e5, "mean_pressure_Pa": 3e5}
     other = {**row, "design": "fitted", "area_m2": 8.45e-3, "deflection_m": 0.0112}
-    draw_curves(tmp_path / "footprint.png", [{**row, "design": "initial"}, other])
-    for axes in drawn[0].axes:
+    for axes in draw_curves([{**row, "design": "initial"}, other]).axes:
         marks = [line.get_ydata()[0] for line in axes.lines]
         assert len(marks) == 2 and max(marks) < 0.97 * axes.get_ylim()[1]
 

@@ -15,14 +15,15 @@ from tyrecal.evaluate.door import Door, Question
 from tyrecal.evaluate.results import Evaluation
 from tyrecal.modes.label import label_modes
 from tyrecal.modes.mode import Label, Mode
-from tyrecal.report import convergence, section, shapes
+from tyrecal.report import shapes
 from tyrecal.report.convergence import draw_convergence
+from tyrecal.report.figure import save
 from tyrecal.report.section import draw_section
+from tyrecal.report.shape_data import section_data
 from tyrecal.report.shapes import draw_mode, draw_modes_overview, title
 from tyrecal.tyre.mesh import SectionMesh, build_mesh
 
 from ..conftest import CASES
-from .watched import watched
 
 LINE = 40  # pixels: a line of text and its distance
 
@@ -116,17 +117,20 @@ def test_title(tyre):
     assert title(mode) == "[2,1] 66.1 Hz: first out-of-plane bending"
 
 
-def test_section(tyre, tmp_path, monkeypatch, written):
+def test_section(tyre, tmp_path, written):
     """As high as its content: nothing between the drawing, its title and its legend but a line."""
-    figures = watched(section, monkeypatch)
     inflation = dict(zip(tyre.evaluation.nodes, tyre.evaluation.displacement, strict=True))
-    draw_section(tmp_path / "inflated.png", tyre.case, tyre.mesh, inflation)
-    long = replace(tyre.case, case=tyre.case.case.model_copy(update={"name": "A tyre " * 30}))
-    draw_section(tmp_path / "long.png", long, tyre.mesh)
+    inflated = section_data(tyre.case, tyre.mesh, inflation)
+    plain = section_data(tyre.case, tyre.mesh, {})
     low = load_case(CASES / "205_60r15.yaml")
-    draw_section(tmp_path / "low.png", low, section_mesh(low))
-    draw_section(tmp_path / "plain.png", tyre.case, tyre.mesh)
-    for figure, name in zip(figures, ("inflated", "long", "low", "plain"), strict=True):
+    for name, section, words in (
+        ("inflated", inflated, tyre.case.case.name),
+        ("long", plain, "A tyre " * 30),
+        ("low", section_data(low, section_mesh(low), {}), low.case.name),
+        ("plain", plain, tyre.case.case.name),
+    ):
+        figure = draw_section(section, words, 240.0)
+        save(figure, tmp_path / f"{name}.png")
         (axes,), (legend,), render = figure.axes, figure.legends, figure.canvas.get_renderer()
         size = map(int, figure.bbox.size)
         assert 0.05 < ink(tmp_path / f"{name}.png", *size, 200_000) < 0.3
@@ -139,11 +143,11 @@ def test_section(tyre, tmp_path, monkeypatch, written):
     assert (tmp_path / "inflated.png").read_bytes() != (tmp_path / "plain.png").read_bytes()
 
 
-def test_section_of_linear_elements(tyre, tmp_path, monkeypatch):
-    figures = watched(section, monkeypatch)
+def test_section_of_linear_elements(tyre, tmp_path):
     mesh = build_mesh(tyre.case.section, [4, 4, 4, 1], [1, 1, 1, 2], False)
-    draw_section(tmp_path / "section.png", tyre.case, mesh)
-    size = map(int, figures[0].bbox.size)
+    figure = draw_section(section_data(tyre.case, mesh, {}), "linear", 240.0)
+    save(figure, tmp_path / "section.png")
+    size = map(int, figure.bbox.size)
     assert 0.05 < ink(tmp_path / "section.png", *size, 200_000) < 0.3
 
 
@@ -158,14 +162,12 @@ def test_convergence(tmp_path, failed):
         }
         for k in range(1, 9)
     ]
-    draw_convergence(tmp_path / "fit.png", history)
+    save(draw_convergence(history), tmp_path / "fit.png")
     assert 0.01 < ink(tmp_path / "fit.png", 1200, 840, 100_000) < 0.2
 
 
 @pytest.mark.parametrize("spread", [1.0, 1e-4, 0.04, 0.4, 3.0, 30.0])
-def test_convergence_has_numbers_on_its_axes(spread, tmp_path, monkeypatch):
-    drawn = []
-    monkeypatch.setattr(convergence, "save", lambda figure, path: drawn.append(figure))
+def test_convergence_has_numbers_on_its_axes(spread):
     history = [
         {
             "point": k,
@@ -175,9 +177,9 @@ def test_convergence_has_numbers_on_its_axes(spread, tmp_path, monkeypatch):
         }
         for k in range(1, 5)
     ]
-    draw_convergence(tmp_path / "fit.png", history)
-    drawn[0].canvas.draw()
-    for axes in drawn[0].axes:
+    figure = draw_convergence(history)
+    figure.canvas.draw()
+    for axes in figure.axes:
         low, high = axes.get_ylim()
         numbers = {
             float(tick.get_text())

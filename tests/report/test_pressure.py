@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
 from PIL import Image
 from rich.console import Console
 
 from tyrecal.modes.mode import Label
 from tyrecal.report import pressure
+from tyrecal.report.figure import save
 from tyrecal.report.pressure import draw_pressure_sweep
 from tyrecal.report.table import sweep_csv, sweep_table
 
@@ -38,23 +38,14 @@ def rows(labels=LABELS, designs=("initial", "fitted"), pressures=(100.0, 200.0, 
     ]
 
 
-@pytest.fixture
-def drawn(monkeypatch):
-    """The figures that were saved."""
-    figures: list[Figure] = []
-    save = pressure.save
-    monkeypatch.setattr(pressure, "save", lambda f, path: (figures.append(f), save(f, path)))
-    return figures
-
-
-def test_each_mode_is_drawn_in_its_family_and_named_once(drawn, tmp_path):
+def test_each_mode_is_drawn_in_its_family_and_named_once(tmp_path):
     path = tmp_path / "sweep.png"
-    draw_pressure_sweep(path, rows(), {Label(2, 0): 79.5}, 240.0)
+    figure = draw_pressure_sweep(rows(), {Label(2, 0): 79.5}, 240.0)
+    save(figure, path)
     with Image.open(path) as image:
         assert image.format == "PNG" and image.size == (1440, 1140)
         assert 0.02 < (np.asarray(image.convert("L")) < 245).mean() < 0.2
     assert path.stat().st_size < 150_000
-    (figure,) = drawn
     inner, outer = figure.axes[:2]
     assert (inner.get_title("left"), outer.get_title("left")) == ("in-plane", "out-of-plane")
     assert {t.get_text() for t in inner.texts} == {"[0,0] torsional", "[1,0]", "[2,0]"}
@@ -66,9 +57,9 @@ def test_each_mode_is_drawn_in_its_family_and_named_once(drawn, tmp_path):
     assert list(cross.get_ydata()) == [79.5]
 
 
-def test_targets_of_another_pressure_do_not_stretch_the_axis(drawn, tmp_path):
-    draw_pressure_sweep(tmp_path / "sweep.png", rows(), {Label(2, 0): 79.5}, 500.0)
-    (figure,) = drawn
+def test_targets_of_another_pressure_do_not_stretch_the_axis(tmp_path):
+    figure = draw_pressure_sweep(rows(), {Label(2, 0): 79.5}, 500.0)
+    save(figure, tmp_path / "sweep.png")
     assert figure.axes[0].get_xlim()[1] < 340
     assert "target" not in [t.get_text() for t in figure.axes[0].get_legend().get_texts()]
 
@@ -82,9 +73,9 @@ def test_targets_of_another_pressure_do_not_stretch_the_axis(drawn, tmp_path):
     ],
     ids=["one pressure", "overtones", "failed pressures"],
 )
-def test_whatever_was_found_is_drawn(given, drawn, tmp_path):
-    draw_pressure_sweep(tmp_path / "sweep.png", given)
-    assert (tmp_path / "sweep.png").exists() and drawn
+def test_whatever_was_found_is_drawn(given, tmp_path):
+    save(draw_pressure_sweep(given), tmp_path / "sweep.png")
+    assert (tmp_path / "sweep.png").exists()
 
 
 def test_names_that_would_touch_are_moved_apart():

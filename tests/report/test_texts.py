@@ -20,6 +20,7 @@ from tyrecal.report.figure import headline, new_figure, save
 from tyrecal.report.load import draw_load_sweep
 from tyrecal.report.pressure import draw_pressure_sweep
 from tyrecal.report.section import draw_section
+from tyrecal.report.shape_data import section_data
 from tyrecal.report.signature import draw_signature
 from tyrecal.studies.signature import Signature
 
@@ -75,7 +76,7 @@ def test_signatures(id: str, pressures: tuple[float, ...], tmp_path: Path) -> No
     found = Signature(
         id, -1.234567e-6, pressures, tuple(LABELS), before, before / 3, 0.886, {}, 0.0
     )
-    draw_signature(tmp_path / "effect.png", found)
+    save(draw_signature(found), tmp_path / "effect.png")
 
 
 @pytest.mark.parametrize("designs", [("initial",), ("initial", "fitted")])
@@ -98,7 +99,7 @@ def test_crowded_lines_over_the_load(designs: tuple[str, ...], tmp_path: Path) -
         }
         for design, load in product(designs, (0.0, 4000.0))
     ]
-    draw_load_sweep(tmp_path / "load.png", rows)
+    save(draw_load_sweep(rows), tmp_path / "load.png")
 
 
 def test_crowded_lines_over_the_pressure(tmp_path: Path) -> None:
@@ -119,7 +120,8 @@ def test_crowded_lines_over_the_pressure(tmp_path: Path) -> None:
         }
         for design, kPa in product(("initial", "fitted"), (100.0, 320.0))
     ]
-    draw_pressure_sweep(tmp_path / "pressure.png", rows, {Label(2, 0): 95.0}, 240.0)
+    figure = draw_pressure_sweep(rows, {Label(2, 0): 95.0}, 240.0)
+    save(figure, tmp_path / "pressure.png")
 
 
 def test_long_names_of_cases_and_variables(tmp_path: Path) -> None:
@@ -127,7 +129,9 @@ def test_long_names_of_cases_and_variables(tmp_path: Path) -> None:
     name = "LT315/70R17 of the long term test, second batch, on a rim of 9 inches, after run-in"
     layers = {f"{k}_with_a_long_name": v for k, v in case.case.rebar_layers.items()}
     named = case.case.model_copy(update={"name": name, "rebar_layers": layers})
-    draw_section(tmp_path / "section.png", replace(case, case=named), section_mesh(case))
+    section = section_data(replace(case, case=named), section_mesh(case), {})
+    save(draw_section(section, name, 240.0), tmp_path / "section.png")
     values = {"stiffness_of_the_belt_cords_in_the_shoulder": 2.0, "C10": 3.0}
     history = [{"point": k, "objective_Hz": 3 + 30 / k, "values": values} for k in range(1, 9)]
-    draw_convergence(tmp_path / "fit.png", history, "deviations in standard deviations")
+    figure = draw_convergence(history, "deviations in standard deviations")
+    save(figure, tmp_path / "fit.png")

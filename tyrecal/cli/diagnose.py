@@ -109,7 +109,7 @@ def command(
     from ..effects import catalogue
     from ..measured.tables import read_measurements
     from ..report.diagnosis import page
-    from ..report.kept import parts_data
+    from ..report.shape_data import parts_data
 
     loaded, values = study.load(case, assignments)
     loaded = arguments.starting_at(loaded, values)
@@ -149,13 +149,16 @@ def command(
     told = result(found.diagnosis, found.under_load, found.variables)
     told = run.write_json("diagnosis.json", told)
     named = [part["region"] for part in told["section_map"]]
-    run.write_json("diagnosis_section.json", parts_data(loaded, named))
+    parts = parts_data(loaded, named)
+    run.write_json("diagnosis_section.json", parts)
     words = page(found, loaded.case.name, measured.name)
     run.write_text("diagnosis.md", words)
     if pictures:
         from ..report.diagnosis_pictures import draw_diagnosis
+        from ..report.figure import save
 
-        draw_diagnosis(run.new, loaded, found)
+        for name, figure in draw_diagnosis(found.diagnosis, parts).items():
+            save(figure, run.new / f"diagnosis_{name}.png")
     run.finish()
     talk.result(told)
     talk.say(words)

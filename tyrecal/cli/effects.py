@@ -65,6 +65,7 @@ def command(
     from ..evaluate.failure import EvaluationFailed
     from ..evaluate.solver import installed
     from ..report.effects import effect_entry, effect_text, signature_entry
+    from ..report.figure import save
     from ..report.signature import draw_signature
     from ..report.table import effects_table, signatures_table
     from ..studies.signature import Plain, stated_size
@@ -124,7 +125,7 @@ def command(
             talk.detail(id)
             found.append({**entries[id], **signature_entry(signature, values)})
             if pictures:
-                draw_signature(run.new / f"effect_{id}.png", signature)
+                save(draw_signature(signature), run.new / f"effect_{id}.png")
     found = run.write_json("effects.json", found)
     run.finish()
     talk.result(found)

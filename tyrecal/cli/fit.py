@@ -130,7 +130,7 @@ def command(
     if pictures or study.report:
         from ..case import with_values
         from ..evaluate.door import Question
-        from ..report.kept import tyre_data
+        from ..report.shape_data import tyre_data
 
         values = fit.fitted.values
         modes = sorted(fit.fitted.modes.values(), key=lambda mode: mode.frequency_Hz)

@@ -49,7 +49,7 @@ def command(
     tyrecal footprint cases/p235_75r17.yaml --loads-N 3000,5000 --set road.friction=0 --json
     """
     from ..evaluate.pressed import Pressed
-    from ..report.kept import patches_data
+    from ..report.shape_data import patches_data
     from ..report.table import footprint_csv, footprint_table
     from ..studies.footprint import footprint_result, press, progress
 
@@ -83,12 +83,13 @@ def command(
     meshes = {name: _mesh(loaded, designs[name]) for name in pressed}
     result = footprint_result(designs, asked, outcomes, meshes)
     result = run.write_json("footprint.json", result)
-    run.write_json("footprint_patches.json", patches_data(loaded.case.name, pressed, meshes))
+    patches = patches_data(loaded.case.name, pressed, meshes)
+    run.write_json("footprint_patches.json", patches)
     run.write_text("footprint.csv", footprint_csv(result["rows"]))
     if pictures:
-        from ..report.footprint import draw_footprint
+        from ..report.pictures import draw_footprint
 
-        draw_footprint(run.new, pressed, meshes, result["rows"])
+        draw_footprint(run.new, pressed, meshes, result["rows"], patches.patches)
     run.finish()
     talk.result(result)
     talk.show(footprint_table(result["rows"]))

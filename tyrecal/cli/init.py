@@ -147,8 +147,11 @@ def _write(
     )
     if picture:
         from ..deck.context import section_mesh
+        from ..report.figure import save
         from ..report.section import draw_section
+        from ..report.shape_data import section_data
 
-        draw_section(picture, loaded, section_mesh(loaded))
+        section = section_data(loaded, section_mesh(loaded), {})
+        save(draw_section(section, loaded.case.name, loaded.case.pressure_kPa), picture)
         talk.say(f"section drawn in {picture}")
     talk.say(f"next: tyrecal modes {shlex.quote(str(target))}")

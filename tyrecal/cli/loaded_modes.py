@@ -26,7 +26,7 @@ def wanted_loads(load_N: float | None, sweep: str | None) -> list[float]:
 
 def at_load(door: Any, run: Any, values: Mapping[str, float], load_N: float, study: Study) -> int:
     """Modes under one load, in modes.json, with their shapes in modes_shapes.json."""
-    from ..report.kept import loaded_data
+    from ..report.shape_data import loaded_data
     from ..report.table import modes_table
     from ..studies.loaded import LoadedTyre, load_tyres
     from ..studies.loaded_result import loaded_modes_result
@@ -79,9 +79,10 @@ def over_loads(
     result = run.write_json("load_sweep.json", result)
     run.write_text("load_sweep.csv", load_csv(result["rows"]))
     if pictures:
+        from ..report.figure import save
         from ..report.load import draw_load_sweep
 
-        draw_load_sweep(run.new / "load_sweep.png", result["rows"])
+        save(draw_load_sweep(result["rows"]), run.new / "load_sweep.png")
     run.finish()
     talk.result(result)
     for found in result["findings"]:

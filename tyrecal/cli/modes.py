@@ -49,7 +49,7 @@ def command(
     tyrecal modes cases/p235_75r17.yaml --sweep-load 0,1000,2000,4000 --fitted p235_75r17/fit.json
     """
     from ..evaluate.door import Question
-    from ..report.kept import tyre_data
+    from ..report.shape_data import tyre_data
     from ..studies.modes import modes_result
 
     loads = wanted_loads(load_N, sweep)

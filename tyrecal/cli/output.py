@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+from pydantic import BaseModel
 
 from ..errors import InputError
 from ..files import (
@@ -103,6 +104,8 @@ class Run:
 
     def write_json(self, name: str, content: Any) -> Any:
         """Write a result file with its provenance; returns what stands in it."""
+        if isinstance(content, BaseModel):
+            content = content.model_dump(exclude_unset=True)
         if self.provenance:
             content = stamped(content, self.provenance)
         self.write_text(name, json_text(content))

@@ -41,6 +41,7 @@ def command(
     tyrecal sweep-pressure cases/p235_75r17.yaml --from-kPa 180 --to-kPa 260 --steps 5 --json
     """
     from ..fit.problem import read_targets
+    from ..report.figure import save
     from ..report.pressure import draw_pressure_sweep
     from ..report.table import sweep_csv, sweep_table
     from ..studies.pressure import Failure, Outcome, sweep
@@ -74,8 +75,8 @@ def command(
     run.write_text("pressure_sweep.csv", sweep_csv(result["rows"]))
     if pictures:
         targets = {each.label: each.frequency_Hz for each in read_targets(loaded)}
-        picture = run.new / "pressure_sweep.png"
-        draw_pressure_sweep(picture, result["rows"], targets, loaded.case.pressure_kPa)
+        figure = draw_pressure_sweep(result["rows"], targets, loaded.case.pressure_kPa)
+        save(figure, run.new / "pressure_sweep.png")
     run.finish()
     talk.result(result)
     for found in [] if talk.as_json else result["findings"]:

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter, NullLocator
 
-from .figure import COLOURS, GREY, MARKERS, headline, in_house_style, new_figure, save
+from ..modes.mode import Label
+from .figure import COLOURS, GREY, MARKERS, headline, in_house_style, new_figure
 
 
 @in_house_style
-def draw_convergence(path: Path, history: Sequence[Mapping[str, Any]], unit: str = "Hz") -> None:
-    """Draw the objective and, below, every variable over its start value, both logarithmic.
+def draw_convergence(history: Sequence[Mapping[str, Any]], unit: str = "Hz") -> Figure:
+    """The objective and, below, every variable over its start value, both logarithmic.
 
     history: ``point``, ``objective_Hz`` (None: the design failed), ``values``, in order; where
     there is a ``start``, new starts are marked; ``unit`` is the objective's. Variables that start
@@ -83,7 +84,7 @@ def draw_convergence(path: Path, history: Sequence[Mapping[str, Any]], unit: str
             axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 3, 5)))
         axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         axes.yaxis.set_minor_formatter(NullFormatter())
-    save(figure, path)
+    return figure
 
 
 def _summary(objective: np.ndarray, unit: str) -> str:
@@ -91,3 +92,22 @@ def _summary(objective: np.ndarray, unit: str) -> str:
         return f"none of {len(objective)} design points could be evaluated"
     first, best = objective[~np.isnan(objective)][0], np.nanmin(objective)
     return f"objective {first:.2f} {unit} to {best:.2f} {unit} in {len(objective)} design points"
+
+
+@in_house_style
+def draw_deviations(modes: Sequence[Mapping[str, Any]]) -> Figure:
+    """Frequencies over their targets before and after the fit, a line a mode of fit.json."""
+    figure = new_figure(5.2, 0.9 + 0.26 * len(modes))
+    axes = figure.add_subplot()
+    after = [mode["deviation_percent"] for mode in modes]
+    before = [100 * (mode["initial_Hz"] / mode["target_Hz"] - 1) for mode in modes]
+    rows = range(len(modes))
+    axes.axvline(0, color=GREY, lw=0.8)
+    axes.hlines(rows, before, after, color=GREY, lw=1.2)
+    axes.plot(before, rows, "s", color=COLOURS[1], mfc="white", ms=5, label="initial")
+    axes.plot(after, rows, "o", color=COLOURS[0], ms=5, label="fitted")
+    axes.set_yticks(rows, [Label(mode["c"], mode["m"], mode["kind"]).said for mode in modes])
+    axes.invert_yaxis()
+    axes.set_xlabel("deviation from target, %")
+    axes.legend(frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))
+    return figure

@@ -1,11 +1,15 @@
-"""What all pictures share: canvas, type, colours."""
+"""What all pictures share: canvas, type, colours; and how they are written, PNG or SVG."""
 
 from __future__ import annotations
 
+import io
+import re
+from collections.abc import Mapping
 from pathlib import Path
 from textwrap import fill
 
 import numpy as np
+from markupsafe import Markup
 from matplotlib import rc_context
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
@@ -18,7 +22,12 @@ GREY = "0.45"
 # Okabe and Ito: told apart by colour-blind readers; their yellow is left out, pale on paper
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 
+RUBBER = ("#E3E3E3", "#C9DCEB", "#F5E6C0", "#D3C3B3", "#E2D3E8", "#CFE5CB")  # pale: cords stand out
 MARKERS = "os^Dv<>P"
+# a page's style sheet has its own shade of each, light, dark and for print
+THEMED = {colour.lower(): f"var(--s{k})" for k, colour in enumerate(COLOURS)}
+THEMED |= {colour.lower(): f"var(--r{k})" for k, colour in enumerate(RUBBER)}
+GREYS = {0x28: "ink", 0x60: "soft", 0xB0: "edge", 0xFE: "line", 0xFF: "panel"}  # up to a level
 
 in_house_style = rc_context(
     {
@@ -28,6 +37,10 @@ in_house_style = rc_context(
         "axes.spines.right": False,
         "figure.dpi": DPI,
         "hatch.linewidth": 0.6,
+        "font.sans-serif": ["DejaVu Sans", "Verdana"],
+        "font.monospace": ["DejaVu Sans Mono"],
+        "svg.fonttype": "none",
+        "text.parse_math": False,  # a name may have a $
     }
 )
 
@@ -60,3 +73,38 @@ def save(figure: Figure, path: Path) -> None:
     small = image.quantize(256, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
     with whole(path) as partial:
         small.save(partial, "PNG")
+
+
+@in_house_style
+def svg(figure: Figure, words: str, key: str) -> Markup:
+    """The figure as part of a page, told in ``words`` to who does not see it. The same figure gives
+    the same text; ``key``: what its ids begin with, another one for each figure of a page."""
+    file = io.StringIO()
+    nothing = dict.fromkeys(("Date", "Creator", "Format", "Type"))
+    figure.savefig(file, format="svg", transparent=True, metadata=nothing)
+    text = file.getvalue()
+    body = re.sub(r">\s+<", "><", text[text.index('<g id="figure_1">') :])
+    used = dict.fromkeys(re.findall(r'(?:url\(|href=")#([\w-]+)', body))
+    ids = {id: f"{key}-{number}" for number, id in enumerate(used)}
+    width, height = 72 * figure.get_size_inches()
+    head = Markup(
+        '<svg viewBox="0 0 {:g} {:g}" role="img" aria-label="{}"'
+        ' style="min-width:{:.0f}px;max-width:{:.0f}px">'
+    ).format(width, height, words, width, width * 4 / 3)
+    return head + Markup(re.sub(r"<[^>]*>", lambda tag: _themed(tag[0], ids), body))
+
+
+def _themed(tag: str, ids: Mapping[str, str]) -> str:
+    """A tag with the page's ids and colours, to hundredths of a point."""
+    tag = " ".join(tag.replace("xlink:", "").split())
+    tag = re.sub(r' id="([^"]+)"', lambda m: f' id="{ids[m[1]]}"' if m[1] in ids else "", tag)
+    tag = re.sub(r'(url\(|href=")#([\w-]+)', lambda m: f"{m[1]}#{ids[m[2]]}", tag)
+    tag = re.sub(r"#[0-9a-f]{6}\b", lambda m: _shade(m[0]), tag)
+    return re.sub(r"-?\d+\.\d{3,}", lambda m: f"{float(m[0]):.2f}", tag)
+
+
+def _shade(colour: str) -> str:
+    if colour in THEMED or colour != f"#{3 * colour[1:3]}":
+        return THEMED.get(colour, colour)
+    level = int(colour[1:3], 16)
+    return f"var(--{next(name for highest, name in GREYS.items() if level <= highest)})"

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
+
+from matplotlib.figure import Figure
 
 from ..modes.loaded import SYMMETRIES
 from ..modes.mode import FAMILIES, Label
-from .figure import COLOURS, MARKERS, in_house_style, new_figure, save
+from .figure import COLOURS, MARKERS, in_house_style, new_figure
 from .pressure import GAP, name_lines
 
 STYLES: dict[str, dict[str, Any]] = {  # symmetric solid, antisymmetric dashed and hollow
@@ -19,8 +20,8 @@ Curve = tuple[list[float], list[float]]
 
 
 @in_house_style
-def draw_load_sweep(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
-    """Draw frequency over load, a column a family and a line a design; c has a colour and a marker,
+def draw_load_sweep(rows: Sequence[Mapping[str, Any]]) -> Figure:
+    """Frequency over load, a column a family and a line a design; c has a colour and a marker,
     the two members of a doublet share them.
 
     rows: of load_sweep.json; a load of 0 is the unloaded tyre.
@@ -41,7 +42,7 @@ def draw_load_sweep(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
                     lw=1.4,
                     ms=4.5,
                     marker=MARKERS[label.c % len(MARKERS)],
-                    **STYLES[symmetry],
+                    **STYLES.get(symmetry, {}),
                 )
             axes.set_title(f"{design}, {name or 'overtones'}", loc="left")
             axes.grid(True, color="0.92", lw=0.6)
@@ -57,7 +58,7 @@ def draw_load_sweep(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
     for symmetry, style in STYLES.items():
         grid[0, 0].plot([], [], color="k", marker="o", ms=4.5, lw=1.4, label=symmetry, **style)
     grid[0, 0].legend(frameon=False, loc="lower right")
-    save(figure, path)
+    return figure
 
 
 def _curves(rows: Sequence[Mapping[str, Any]], design: str) -> dict[tuple[Label, str], Curve]:

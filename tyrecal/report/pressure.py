@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from ..modes.mode import FAMILIES, Label
-from .figure import COLOURS, GREY, MARKERS, in_house_style, new_figure, save
+from .figure import COLOURS, GREY, MARKERS, in_house_style, new_figure
 
 LINES = {"initial": (0, (4, 2)), "fitted": "-"}
 GAP = 0.042  # of an axis' height between two labels' centres
@@ -20,12 +20,11 @@ Curves = dict[Label, tuple[np.ndarray, np.ndarray, np.ndarray]]
 
 @in_house_style
 def draw_pressure_sweep(
-    path: Path,
     rows: Sequence[Mapping[str, Any]],
     targets: Mapping[Label, float] | None = None,
     target_kPa: float = 0.0,
-) -> None:
-    """Draw frequency over pressure, one column a family, and below the slopes d ln f / d ln p.
+) -> Figure:
+    """Frequency over pressure, one column a family, and below the slopes d ln f / d ln p.
 
     rows: of pressure_sweep.json; a design "initial" is dashed, "fitted" solid; c has a colour and
     a marker. targets: measured Hz by label at ``target_kPa``, crosses where that was swept.
@@ -79,7 +78,7 @@ def draw_pressure_sweep(
     if targets:
         top.plot([], [], "kx", ms=7, mew=1.5, label="target")
     top.legend(frameon=False, loc="upper left")
-    save(figure, path)
+    return figure
 
 
 def _draw(top: Axes, bottom: Axes, curve: Any, design: str, c: int) -> None:

@@ -1,65 +1,56 @@
-"""The section as a drawing."""
+"""The section as a drawing: its layers, or a map of its parts."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from pathlib import Path
+from collections.abc import Iterable, Sequence
 from textwrap import fill
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.colors import LinearSegmentedColormap, Normalize
+from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from ..effects import with_effects
-from ..tyre.mesh import SectionMesh
-from .figure import COLOURS, GREY, in_house_style, new_figure, save
-
-if TYPE_CHECKING:
-    from ..case import LoadedCase
+from ..diagnose.where import Place
+from .figure import COLOURS, GREY, RUBBER, headline, in_house_style, new_figure
+from .shape_data import DiagnosisSection, Flat, Section
+from .words import MINUS, map_resolution
 
 Array = np.ndarray
 
-RUBBER = ("#E3E3E3", "#C9DCEB", "#F5E6C0", "#D3C3B3", "#E2D3E8", "#CFE5CB")  # pale: cords stand out
 LETTERS = 110  # of all columns of the legend
 AXES_WIDTH, LINE, REST = 8.4, 0.2, 1.05  # inches: of the drawing, of a line of text, of all else
 DETAIL = 4.0  # magnification of the belt's edge
+# of 40 steps: a colour bar of 50 or more would be a bitmap
+WARM = LinearSegmentedColormap.from_list("evidence", ["#EDEDED", "#F5C98A", "#D55E00"], 40)
+FULL_COLOUR = 5.0  # ln evidence
+AXES = {"xlabel": "z along the axle, mm", "ylabel": "r from the axle, mm"}
 
 
 @in_house_style
-def draw_section(
-    path: Path, case: LoadedCase, mesh: SectionMesh, displacement: Mapping[int, Array] | None = None
-) -> None:
-    """Draw rubber by region, elements, the cords of each layer and what the rim holds, in mm.
+def draw_section(section: Section, name: str, pressure_kPa: float) -> Figure:
+    """Rubber by region, elements, the cords of each layer and what the rim holds, in mm.
 
-    The belt's edge is repeated four times as large. displacement: node number to (r, theta, z)
-    of the inflation, m; with it the inflated outline is dashed, at true scale.
+    The belt's edge is repeated four times as large. Where the inflation is known, the inflated
+    outline is dashed, at true scale.
     """
-    case = with_effects(case)
-    place = {n: np.array([z, r]) * 1e3 for n, (r, z) in mesh.nodes.items()}
-    around = outline(mesh)
     figure = new_figure(9.0, 8.0)
-    axes = figure.add_subplot(aspect="equal", anchor="N")
-    entries = _draw(axes, case, mesh, place, 1.0)
+    axes = figure.add_subplot(aspect="equal", anchor="N", **AXES)
+    entries = _draw(axes, section, 1.0)
     axes.axvline(0, color=GREY, lw=0.8, ls=(0, (12, 3, 2, 3)))
-    if displacement is not None:
-        moved = [place[n] + np.take(displacement[n], [2, 0]) * 1e3 for n in around]
-        (line,) = axes.plot(*np.transpose(moved), color="black", lw=1.0, ls=(0, (5, 3)))
-        entries[f"inflated to {case.case.pressure_kPa:g} kPa"] = line
-    _detail(axes, case, mesh, place)
-    axes.set_xlabel("z along the axle, mm")
-    axes.set_ylabel("r from the axle, mm")
-    z, r = np.transpose([place[n] for n in around])
-    name = fill(case.case.name, 64)
+    if section.inflated:
+        z, r = _points(section.inflated).T
+        (line,) = axes.plot(z, r, color="black", lw=1.0, ls=(0, (5, 3)))
+        entries[f"inflated to {pressure_kPa:g} kPa"] = line
+    _detail(axes, section)
+    name = fill(name, 64)
     figure.suptitle(name, fontsize=13)
-    facts = (
-        f"outer diameter {2 * r.max():.1f} mm, section width {np.ptp(z):.1f} mm,"
-        f" {len(mesh.solids)} elements"
-    )
-    axes.set_title(facts, fontsize=9, color="0.3")
+    axes.set_title(size_words(section), fontsize=9, color="0.3")
     columns = max(1, min(3, LETTERS // max(map(len, entries))))
     figure.legend(
         entries.values(), entries.keys(), loc="outside lower center", ncols=columns, frameon=False
@@ -68,85 +59,53 @@ def draw_section(
     lines = name.count("\n") - (-len(entries) // columns)
     height = AXES_WIDTH * (high - low) / (right - left)
     figure.set_figheight(height + REST + LINE * lines)
-    save(figure, path)
+    return figure
 
 
-def outline(mesh: SectionMesh) -> list[int]:
-    """Numbers of the nodes round the section, closed."""
-    step = 2 if mesh.quadratic else 1
-    columns, rows = (step * n for n in mesh.shape)
-    walk = [(0, j) for j in range(columns)] + [(i, columns) for i in range(rows)]
-    walk += [(rows, j) for j in range(columns, 0, -1)] + [(i, 0) for i in range(rows, -1, -1)]
-    return [1000 * (j + 1) + i + 1 for i, j in walk]
+def size_words(section: Section) -> str:
+    """The section's size."""
+    z, r = _points(section.outline).T
+    return (
+        f"outer diameter {2 * r.max():.1f} mm, section width {np.ptp(z):.1f} mm,"
+        f" {sum(map(len, section.areas.values()))} elements"
+    )
 
 
-def turns(case: LoadedCase, mesh: SectionMesh, name: str) -> list[tuple[int, ...]]:
-    """Nodes of the elements to draw a layer with: layers on one line take turns."""
-    layers = case.case.rebar_layers
-    layer = layers[name]
-    sharing = [
-        other
-        for other, its in layers.items()
-        if (its.line, its.regions) == (layer.line, layer.regions)
-    ]
-    own = [
-        nodes
-        for cord, nodes in mesh.cords[layer.line].items()
-        if not layer.regions or mesh.region_of(cord) in layer.regions
-    ]
-    return own[sharing.index(name) :: len(sharing)]
-
-
-def _draw(
-    axes: Axes, case: LoadedCase, mesh: SectionMesh, place: dict[int, Array], size: float
-) -> dict[str, Artist]:
+def _draw(axes: Axes, section: Section, size: float) -> dict[str, Artist]:
     """Fill ``axes``, lines ``size`` times as thick; returns the legend's entries."""
     entries: dict[str, Artist] = {}
-    layers = case.case.rebar_layers
-    for k, (name, layer) in enumerate(layers.items()):
-        lines = [[place[n] for n in nodes] for nodes in turns(case, mesh, name)]
+    for k, (name, layer) in enumerate(section.cords.items()):
         colour = COLOURS[k % len(COLOURS)]
-        axes.add_collection(
-            LineCollection(lines, color=colour, lw=1.3 * size, capstyle="butt", zorder=3)
+        lines = LineCollection(
+            _all(layer.lines), color=colour, lw=1.3 * size, capstyle="butt", zorder=3
         )
+        axes.add_collection(lines)
         words = f"{name.replace('_', ' ')}: {layer.angle_deg:g}° from the meridian"
         entries[words] = Line2D([], [], color=colour, lw=2)
-
-    names = [name for name, _ in case.section.regions]
-    colours = dict(zip(names, RUBBER * 9, strict=False))
-    cells = {number: [place[n] for n in _round(nodes)] for number, nodes in mesh.solids.items()}
-    for region, colour in colours.items():
-        own = [cells[k] for k, (name, _) in mesh.cells.items() if name == region]
-        axes.add_collection(PolyCollection(own, fc=colour, ec="0.62", lw=0.3 * size))
-        entries[region.replace("_", " ")] = Patch(fc=colour, ec="0.62")
-    held = set(mesh.rim)
-    rim = [cells[k] for k, nodes in mesh.solids.items() if held.issuperset(nodes)]
-    look: dict[str, Any] = {"fc": "none", "ec": "0.25", "hatch": "/////", "lw": 0.0}
-    axes.add_collection(PolyCollection(rim, **look))
+    for k, (region, cells) in enumerate(section.areas.items()):
+        look: dict[str, Any] = {"fc": RUBBER[k % len(RUBBER)], "ec": "0.62"}
+        axes.add_collection(PolyCollection(_all(cells), lw=0.3 * size, **look))
+        entries[region.replace("_", " ")] = Patch(**look)
+    look = {"fc": "none", "ec": "0.25", "hatch": "/////", "lw": 0.0}
+    axes.add_collection(PolyCollection(_all(section.rim), **look))
     entries["held by the rim"] = Patch(**look)
     return entries
 
 
-def _round(nodes: tuple[int, ...]) -> list[int]:
-    """An element's nodes in the order in which they lie round it."""
-    if len(nodes) == 4:
-        return list(nodes)
-    return [n for pair in zip(nodes[:4], nodes[4:], strict=True) for n in pair]
-
-
-def _detail(axes: Axes, case: LoadedCase, mesh: SectionMesh, place: dict[int, Array]) -> None:
+def _detail(axes: Axes, section: Section) -> None:
     """The edge of the belt, or the crown of a tyre without one, enlarged inside the cavity."""
-    held = set(mesh.rim)
-    lasts = [list(elements.values())[-1][-1] for elements in mesh.cords.values()]
-    ends = [place[n] for n in lasts if n not in held]
-    inner = np.array([place[n] for k in mesh.inner for n in mesh.solids[k][:1]])
-    half_width, height = abs(inner[0, 0]) * 0.9, np.ptp(inner[:, 1]) * 0.6
-    top = inner[:, 1].max() - 0.16 * np.ptp(inner[:, 1])
+    held = {tuple(point) for cell in section.rim for point in _points(cell)}
+    lasts = [_points(layer.lines[-1])[-1] for layer in section.cords.values() if layer.lines]
+    ends = [point for point in lasts if tuple(point) not in held]
+    around = _points(section.outline)
+    crown = _inner_crown(around)
+    half_width, height = abs(around[0, 0]) * 0.9, (crown - around[0, 1]) * 0.6
+    top = crown - 0.16 * (crown - around[0, 1])
     inset = axes.inset_axes(
         (-half_width, top - height, 2 * half_width, height), transform=axes.transData
     )
-    _draw(inset, case, mesh, place, 2.0)
-    z, r = np.mean(ends, axis=0) if ends else inner[len(inner) // 2]
+    _draw(inset, section, 2.0)
+    z, r = np.mean(ends, axis=0) if ends else (0.0, crown)
     across, up = half_width / DETAIL, height / DETAIL / 2
     inset.set(xlim=(z - across, z + across), ylim=(r - up, r + up), xticks=[], yticks=[])
     for spine in inset.spines.values():
@@ -159,3 +118,78 @@ def _detail(axes: Axes, case: LoadedCase, mesh: SectionMesh, place: dict[int, Ar
         color="0.3",
     )
     axes.indicate_inset_zoom(inset, edgecolor=GREY, alpha=1.0)
+
+
+def _inner_crown(around: Array) -> float:
+    """r of the inner surface amid the outline's points, which begin on it."""
+    z, r = around.T
+    return float(r[np.argmax(np.sign(z) != np.sign(z[0]))])
+
+
+@in_house_style
+def draw_section_map(
+    parts: DiagnosisSection, places: Sequence[Place], effective_rank: int | None = None
+) -> Figure:
+    """Parts of the section, coloured by the evidence for a change of them alone; with an
+    ``effective_rank`` a table of them beside, and what the data see."""
+    by_name: dict[str, Place] = {}
+    for place in places:  # of several rubbers in a region the likelier one
+        by_name.setdefault(place.region.split(",")[0], place)
+    table = effective_rank is not None
+    figure = new_figure(10.0 if table else 6.0, 5.2)
+    widths = [5, 4] if table else [1]
+    axes, *beside = figure.subplots(1, len(widths), squeeze=False, width_ratios=widths)[0]
+    axes.set(aspect="equal", **AXES)
+    for name, cells in parts.areas.items():
+        look: dict[str, Any] = {"fc": _colour(by_name.get(name)), "ec": "0.7", "lw": 0.3}
+        axes.add_collection(PolyCollection(_all(cells), **look))
+    for name, flat in parts.cords.items():
+        lines, colour = _all(flat), _colour(by_name.get(name))
+        axes.add_collection(LineCollection(lines, color=colour, lw=2.2, zorder=2))
+        axes.add_collection(LineCollection(lines, color="0.3", lw=0.5, zorder=3))
+    axes.autoscale_view()
+    if effective_rank is not None:
+        _write_table(beside[0], places, effective_rank)
+    headline(figure, "One part changed alone: how well it explains what calibration leaves")
+    scale = ScalarMappable(Normalize(0, FULL_COLOUR), WARM)
+    bar = figure.colorbar(scale, ax=axes, orientation="horizontal", shrink=0.6, extend="max")
+    bar.set_label("ln evidence against no change")
+    return figure
+
+
+def _write_table(axes: Axes, places: Sequence[Place], effective_rank: int) -> None:
+    """Parts as lines of text, and what can be told from them."""
+    axes.axis("off")
+    table = [f"{'part':22s}   stiffness, %     mass, %   ln evidence"]
+    table += [
+        f"{p.region[:22]:22s}   {_spread(p.stiffness_percent, p.stiffness_sigma)}"
+        f"   {_spread(p.mass_percent, p.mass_sigma)}   {_signed(p.evidence, 1):>8s}"
+        for p in places
+    ]
+    same = [f"{p.region} looks like {', '.join(p.same_as)}" for p in places if p.same_as]
+    words = [fill(map_resolution(effective_rank), 62), *same]
+    small: dict[str, Any] = {"transform": axes.transAxes, "fontsize": 7.5}
+    axes.text(0.0, 0.98, "\n".join(table), va="top", family="monospace", **small)
+    axes.text(0.0, 0.02, "\n".join(words), va="bottom", color="0.3", **small)
+
+
+def _colour(place: Place | None) -> tuple[float, ...]:
+    return WARM(0.0 if place is None else min(max(place.evidence, 0.0) / FULL_COLOUR, 1.0))
+
+
+def _signed(value: float, digits: int) -> str:
+    """With a sign, a true minus, and no -0."""
+    text = f"{round(value, digits) + 0.0:+.{digits}f}"
+    return text.replace("-", MINUS)
+
+
+def _spread(percent: float, sigma: float) -> str:
+    return f"{_signed(percent, 0):>5s} ± {sigma:<4.0f}"
+
+
+def _points(flat: Sequence[float]) -> Array:
+    return np.reshape(flat, (-1, 2))
+
+
+def _all(lines: Iterable[Flat]) -> list[Array]:
+    return [_points(line) for line in lines]

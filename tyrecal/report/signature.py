@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
+from matplotlib.figure import Figure
 
 from ..effects import catalogue
 from ..studies.signature import Signature
-from .figure import COLOURS, GREY, headline, in_house_style, new_figure, save
+from .figure import COLOURS, GREY, headline, in_house_style, new_figure
+from .words import MINUS
 
 BAR = 0.38
 
 
 @in_house_style
-def draw_signature(path: Path, found: Signature) -> None:
+def draw_signature(found: Signature) -> Figure:
     """Change of every mode in per cent, a panel per pressure."""
     effect = catalogue()[found.id]
     count = len(found.pressures_kPa)
@@ -41,10 +41,10 @@ def draw_signature(path: Path, found: Signature) -> None:
     headline(figure, f"{effect.title}, {size}{absorbed}")
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=2, frameon=False)
-    save(figure, path)
+    return figure
 
 
 def _text(value: float, digits: int) -> str:
     if not np.isfinite(value):
         return "lost"
-    return f"{round(value, digits) + 0.0:+.{digits}f}".replace("-", "\N{MINUS SIGN}")
+    return f"{round(value, digits) + 0.0:+.{digits}f}".replace("-", MINUS)

@@ -17,6 +17,7 @@ KNOWN = {
 ORDINALS = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth")
 
 CLOSE, FAR = 2.0, 5.0  # % of deviation from a target
+MINUS = "\N{MINUS SIGN}"
 HARDLY = 0.5  # standard error over the value, above which a variable is not determined
 SAME = 1.02  # of an objective, or a variable, up to which two fits are one
 FAR_OFF = 30.0  # % after a fit: no tyre is that far from its model

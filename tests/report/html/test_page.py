@@ -20,7 +20,7 @@ from . import toy
 
 ROOT = Path(__file__).parents[3]
 TRIALS = 60
-VOID = {"meta", "input", "br", "path", "polyline", "circle", "rect"}
+VOID = {"meta", "input", "br", "path", "rect", "use"}
 HOSTILE = "</script><script>window.hacked=1</script><img src=x onerror=alert(1)>\"'{{ 7*7 }}"
 
 
@@ -126,7 +126,7 @@ def test_what_was_found_is_told(folder: Path, words: str) -> None:
 def test_the_page_stands_alone(folder: Path) -> None:
     text = text_of(folder)
     assert not re.search(r"https?:|//[a-z]|\bsrc=|@import|fetch\(|XMLHttp|import\(", text)
-    assert set(re.findall(r"url\((.*?)\)", text)) == {"#hatch"}
+    assert all(url.startswith("#") for url in re.findall(r"url\((.*?)\)", text))
     assert "default-src 'none'" in text
 
 

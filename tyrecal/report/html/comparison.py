@@ -8,12 +8,10 @@ from functools import partial
 from typing import TypeVar
 
 from ..table import QUANTITIES, percent
-from ..words import CLOSE, FAR, motion
+from ..words import CLOSE, FAR, MINUS, motion
 from .contents import Diagnosis, Fit, FittedMode, Variable
-from .plots import label
 from .results import Results
 from .summary import VERDICTS
-from .svg import MINUS
 
 Content = TypeVar("Content")
 NOTHING, NB = "–", "\N{NO-BREAK SPACE}"
@@ -93,7 +91,7 @@ def _worst(fit: Fit) -> str:
     if not fit.modes:
         return NOTHING
     worst = max(fit.modes, key=lambda mode: abs(mode.deviation_percent))
-    return f"{label(worst)} {_graded(fit, _aim(worst))}{NB}%"
+    return f"{worst.label.said} {_graded(fit, _aim(worst))}{NB}%"
 
 
 def _aim(mode: FittedMode) -> tuple[str, str]:

@@ -2,62 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
-TINY = 1e-6  # Hz
+from ...diagnose.observations import Row
+from ...modes.mode import Label
+from ...studies.result import Named, Part, Positive, Provenance, Result, Wave
 
-
-class Part(BaseModel):
-    """A piece of a result file; what else stands there is not asked for."""
-
-    model_config = ConfigDict(extra="ignore", allow_inf_nan=False, frozen=True)
-
-
-class State(Part):
-    """What a study asked for, several values where it has several; how the rim is held."""
-
-    pressure_kPa: float | list[float]
-    load_N: float | list[float]
-    rim: str
-
-
-class Provenance(Part):
-    """What a result file is of."""
-
-    tyrecal: str
-    solver: str
-    solver_version: str
-    name: str
-    size: str
-    tyre_sha256: str
-    overrides: dict[str, float]
-    state: State
-    mesh: str
-    targets: str | None = None
-    measured_sha256: str | None = None
-
-
-class Whole(Part):
-    """A result file, not only a piece of one; older ones do not say what they are of."""
-
-    format: Literal[1]
-    provenance: Provenance | None = None
-
-
-Positive = Annotated[float, Field(gt=0)]
-Wave = Annotated[int, Field(ge=0, le=200)]
-
-
-class Named(Part):
-    """A mode's label and frequency."""
-
-    c: Wave
-    m: Wave
-    kind: str | None
-    frequency_Hz: Positive
+ROW = re.compile(r"\[(\d{1,3}),(\d{1,3})\](?: (axial|torsional))? at ([\d.]{1,9}) kPa")
 
 
 class ModeEntry(Named):
@@ -103,7 +57,7 @@ class FittedFootprint(Part):
     deviation_percent: float
 
 
-class Fit(Whole):
+class Fit(Result):
     """fit.json"""
 
     method: str
@@ -122,7 +76,7 @@ class Fit(Whole):
     variables: dict[str, Variable]
     fixed: dict[str, float]
     modes: list[FittedMode]
-    footprint: list[FittedFootprint] = []
+    footprint: list[FittedFootprint] = Field(default=[])
     correlations: dict[str, dict[str, float | None]]
     singular_values: list[float]
     starts: list[Any]
@@ -131,11 +85,11 @@ class Fit(Whole):
 class Words(Part):
     """Findings in sentences."""
 
-    words: list[str] = []
+    words: list[str] = Field(default=[])
     design: str = ""
 
 
-class Modes(Whole):
+class Modes(Result):
     """modes.json"""
 
     pressure_kPa: float
@@ -165,11 +119,11 @@ class PressureRow(Part):
     modes: list[ModeEntry]
 
 
-class PressureSweep(Whole):
+class PressureSweep(Result):
     """pressure_sweep.json"""
 
     rows: Annotated[list[PressureRow], Field(min_length=1)]
-    failed: list[Failed] = []
+    failed: list[Failed] = Field(default=[])
     findings: list[Words]
 
 
@@ -182,7 +136,7 @@ class LoadRow(Part):
     modes: list[ModeEntry]
 
 
-class LoadSweep(Whole):
+class LoadSweep(Result):
     """load_sweep.json"""
 
     rows: Annotated[list[LoadRow], Field(min_length=1)]
@@ -204,85 +158,12 @@ class FootprintRow(Part):
     vertical_stiffness_N_per_m: float
 
 
-class Footprints(Whole):
+class Footprints(Result):
     """footprint.json"""
 
     rows: Annotated[list[FootprintRow], Field(min_length=1)]
     failed: list[Failed]
     findings: Words
-
-
-class Patch(Part):
-    """Contact pressure on lines of nodes, (ring along, node across)."""
-
-    design: str
-    load_N: float
-    across_mm: list[list[float]]
-    along_mm: list[list[float]]
-    pressure_kPa: list[list[float]]
-
-
-class Patches(Whole):
-    """footprint_patches.json"""
-
-    case: str
-    patches: list[Patch]
-
-
-class Cords(Part):
-    """A layer as lines."""
-
-    angle_deg: float
-    lines: list[list[float]]
-
-
-class Section(Part):
-    """The section as elements and lines, mm."""
-
-    areas: dict[str, list[list[float]]]
-    cords: dict[str, Cords]
-    rim: list[list[float]]
-    outline: list[float]
-    inflated: list[float] | None
-
-
-class Shape(Named):
-    """A mode on the section, or on the surface of the loaded tyre."""
-
-    n: Wave = 0
-    real: list[list[float]] = []
-    imaginary: list[list[float]] = []
-    symmetry: str | None = None
-    displacement: list[list[list[float]]] = []
-
-
-class Shapes(Whole):
-    """fit_shapes.json, modes_shapes.json"""
-
-    case: str
-    pressure_kPa: float
-    load_N: float = 0.0
-    variables: dict[str, list[str]] = {}
-    section: Section | None = None
-    R_m: list[float] = []
-    Z_m: list[float] = []
-    angles: list[float] = []
-    surface_m: list[list[list[float]]] = []
-    modes: list[Shape]
-
-    def of(self, table: Sequence[ModeEntry | FittedMode]) -> bool:
-        """Whether these are the modes that a table lists, and not those of another run; a split
-        doublet has its mean here, both members there."""
-        for mode in self.modes:
-            hertz = [
-                each.frequency_Hz
-                for each in table
-                if (each.c, each.m, each.kind) == (mode.c, mode.m, mode.kind)
-                and getattr(each, "symmetry", None) == mode.symmetry
-            ]
-            if not hertz or not min(hertz) - TINY <= mode.frequency_Hz <= max(hertz) + TINY:
-                return False
-        return True
 
 
 class Explained(Part):
@@ -314,6 +195,15 @@ class Residual(Part):
     run: int
     percent: float
     sigma_percent: float
+
+    @property
+    def of(self) -> Row | None:
+        """What was measured, where it is a frequency."""
+        found = ROW.fullmatch(self.row)
+        if not found:
+            return None
+        c, m, kind, pressure = found.groups()
+        return Row("frequency", Label(int(c), int(m), kind), float(pressure), self.run)
 
 
 class Gap(Part):
@@ -348,7 +238,7 @@ class NextMeasurement(Part):
     hours: float
 
 
-class Diagnosis(Whole):
+class Diagnosis(Result):
     """diagnosis.json"""
 
     verdict: Literal["named", "undecided", "no_gap", "outside"]
@@ -365,14 +255,6 @@ class Diagnosis(Whole):
     shrinkage: Shrinkage | None
     rung: int
     next_measurements: list[NextMeasurement]
-
-
-class DiagnosisSection(Whole):
-    """diagnosis_section.json"""
-
-    case: str
-    areas: dict[str, list[list[float]]]
-    cords: dict[str, list[list[float]]]
 
 
 class RunFacts(Part):

@@ -2,31 +2,41 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from jinja2 import FileSystemLoader, StrictUndefined
 from jinja2.sandbox import ImmutableSandboxedEnvironment
 from markupsafe import Markup
+from matplotlib.figure import Figure
 
+from ...diagnose.where import Place
 from ...errors import InputError
 from ...files import open_file, whole
 from ...modes.mode import Label
+from ...studies.result import Named
+from ..convergence import draw_convergence, draw_deviations
+from ..diagnosis_pictures import draw_residuals
+from ..figure import svg
+from ..footprint import draw_curves, draw_patches
+from ..load import draw_load_sweep
+from ..pressure import draw_pressure_sweep
+from ..section import draw_section, draw_section_map
+from ..shape_data import Patch, Shapes
 from ..table import FOOTPRINT, QUANTITIES, percent
-from ..words import CLOSE, FAR, map_resolution, motion
-from . import drawings, plots
+from ..words import CLOSE, FAR, MINUS, map_resolution, motion
 from .comparison import comparison
-from .contents import Effects, LoadSweep, PressureRow, Shapes
+from .contents import Effects, LoadSweep, PressureRow
 from .markdown import html
 from .results import Results, read_results
 from .shapes import packed
 from .summary import VERDICTS, design_words, summary
-from .svg import MINUS
 
 LARGEST = 5_000_000  # bytes of a page
 SHOWN, LEAST = 12, 0.005  # explanations, and the probability below which one is not shown
@@ -49,6 +59,9 @@ class Page:
     path: Path
     size: int
     found: dict[str, list[str]]
+
+
+Draw = Callable[[str, str, str, Callable[[], Figure]], Markup]  # see `_picture`
 
 
 def write_page(path: Path, folders: Sequence[Path]) -> Page:
@@ -96,12 +109,12 @@ def page(results: Sequence[Results]) -> str:
 
 def chapter(found: Results, prefix: str) -> dict[str, Any]:
     """What the templates ask of one folder's results."""
-    shapes = [
-        _shapes("fit", found.folder, found.fit_shapes, found.fit.modes) if found.fit else None,
-        _shapes("modes", found.folder, found.modes_shapes, found.modes.modes)
-        if found.modes
-        else None,
-    ]
+    shapes = []
+    if found.fit:
+        shapes.append(_shapes(found, "fit", found.fit_shapes, found.fit.modes))
+    if found.modes:
+        shapes.append(_shapes(found, "modes", found.modes_shapes, found.modes.modes))
+    draw = partial(_picture, found, prefix)
     return {
         "prefix": prefix,
         "folder": found.folder.resolve().name,
@@ -115,15 +128,15 @@ def chapter(found: Results, prefix: str) -> dict[str, Any]:
             if study in found.provenances and not run.finished
         ],
         "absent": [name for key, name in STUDIES.items() if not getattr(found, key)],
-        "fit": found.fit and _fit(found),
-        "shapes": [each for each in shapes if each],
-        "section": next((each["section"] for each in shapes if each and each["section"]), None),
+        "fit": found.fit and _fit(found, draw),
+        "shapes": shapes,
+        "section": _section(found, draw),
         "modes": found.modes,
-        "pressure": found.pressure and _pressure(found),
-        "load": found.load and _load(found.load),
-        "footprint": found.footprint and _footprint(found),
+        "pressure": found.pressure and _pressure(found, draw),
+        "load": found.load and _load(found.load, draw),
+        "footprint": found.footprint and _footprint(found, draw),
         "effects": found.effects and _effects(found.effects),
-        "diagnosis": found.diagnosis and _diagnosis(found),
+        "diagnosis": found.diagnosis and _diagnosis(found, draw),
     }
 
 
@@ -145,8 +158,18 @@ def _effects(found: Effects) -> dict[str, Any]:
     return {"pressure_kPa": middle, "names": names, "rows": rows}
 
 
-def _shapes(what: str, folder: Path, shapes: Shapes | None, table: Any) -> dict[str, Any]:
-    """The viewer's data, or why there are none, and the section."""
+def _picture(
+    found: Results, prefix: str, name: str, words: str, file: str, draw: Callable[[], Figure]
+) -> Markup:
+    """A figure of what stands in ``file``, told in words. Raises InputError."""
+    with _lists_of(found.folder / file):
+        return svg(draw(), words, f"{prefix}{name}")
+
+
+def _shapes(
+    found: Results, what: str, shapes: Shapes | None, table: Sequence[Named]
+) -> dict[str, Any]:
+    """The viewer's data, or why there are none."""
     why = ""
     if shapes is None:
         why = f"The mode shapes are not in this folder; 'tyrecal {what} --report' keeps them."
@@ -154,56 +177,75 @@ def _shapes(what: str, folder: Path, shapes: Shapes | None, table: Any) -> dict[
         why, shapes = "The mode shapes in this folder are those of another run: not shown.", None
     elif not shapes.modes:
         why = "This solver gives shapes on the crown alone, so there is no section to revolve."
-    data = section = None
-    with _lists_of(folder / f"{what}_shapes.json"):
+    data = None
+    with _lists_of(found.folder / f"{what}_shapes.json"):
         if shapes and shapes.modes:
             data = packed(shapes)
-        if shapes and shapes.section:
-            section = drawings.section(shapes.section, shapes.pressure_kPa)
     heading = {"fit": "Shapes of the fitted tyre", "modes": "Mode shapes"}[what]
     if shapes and shapes.load_N:
         heading = f"Mode shapes under {shapes.load_N:g} N, on the tread"
     if shapes and shapes.provenance and shapes.provenance.overrides:
         changes = (f"{name} = {value:g}" for name, value in shapes.provenance.overrides.items())
         heading += f", with {', '.join(changes)}"
-    return {"id": what, "heading": heading, "data": data, "why": why, "section": section}
+    return {"id": what, "heading": heading, "data": data, "why": why}
 
 
-def _fit(found: Results) -> dict[str, Any]:
-    fit = found.fit
+def _section(found: Results, draw: Draw) -> Markup | None:
+    """The section of the fitted tyre, or of that whose modes are known."""
+    for what, shapes, result in (
+        ("fit", found.fit_shapes, found.fit),
+        ("modes", found.modes_shapes, found.modes),
+    ):
+        if shapes and shapes.section and result and shapes.of(result.modes):
+            args = shapes.section, shapes.case, shapes.pressure_kPa
+            file = f"{what}_shapes.json"
+            return draw("section", "The section", file, partial(draw_section, *args))
+    return None
+
+
+def _fit(found: Results, draw: Draw) -> dict[str, Any]:
+    fit, history = found.fit, found.history
     assert fit
-    history = found.history
+    modes = [mode.model_dump() for mode in fit.modes]
+    convergence = partial(draw_convergence, history, fit.objective_unit)
+    words = "The objective and the variables, design point by design point"
     return {
         "of": fit,
         "sets": found.fit_shapes.variables if found.fit_shapes else {},
-        "deviations": plots.deviations(fit) if fit.modes else None,
-        "convergence": plots.convergence(history, fit.objective_unit) if history else [],
-        "legend": list(history[0].values) if history else [],
+        "deviations": draw(
+            "deviations",
+            "Frequencies over their targets before and after the fit",
+            "fit.json",
+            partial(draw_deviations, modes),
+        )
+        if modes
+        else None,
+        "convergence": draw("convergence", words, "fit_history.csv", convergence)
+        if history
+        else None,
         "quantities": QUANTITIES,
     }
 
 
-def _pressure(found: Results) -> dict[str, Any]:
+def _pressure(found: Results, draw: Draw) -> dict[str, Any]:
     assert found.pressure
-    targets = {plots.label(m): m.target_Hz for m in found.fit.modes} if found.fit else {}
-    at = found.fit.pressure_kPa if found.fit else 0.0
-    rows = found.pressure.rows
+    fit, rows = found.fit, found.pressure.rows
+    targets = {m.label: m.target_Hz for m in fit.modes} if fit else {}
+    told = found.pressure.model_dump()["rows"]
+    sweep = partial(draw_pressure_sweep, told, targets, fit.pressure_kPa if fit else 0.0)
     return {
-        "rows": rows,
-        "panels": plots.pressure(rows, targets, at),
+        "picture": draw("pressure", "Frequencies over the pressure", "pressure_sweep.json", sweep),
         "words": design_words(found.pressure),
         "tables": _tables(rows),
-        "targets": bool(targets),
-        "waves": max(mode.c for row in rows for mode in row.modes),
     }
 
 
-def _load(found: LoadSweep) -> dict[str, Any]:
+def _load(found: LoadSweep, draw: Draw) -> dict[str, Any]:
+    sweep = partial(draw_load_sweep, found.model_dump()["rows"])
     return {
         "rows": found.rows,
         "words": design_words(found),
-        "panels": plots.load(found.rows),
-        "waves": max(mode.c for row in found.rows for mode in row.modes),
+        "picture": draw("load", "Frequencies over the load", "load_sweep.json", sweep),
     }
 
 
@@ -215,40 +257,53 @@ def _tables(rows: Sequence[PressureRow]) -> list[dict[str, Any]]:
         found: dict[str, list[float | None]] = {}
         for k, row in enumerate(own):
             for mode in row.modes:
-                found.setdefault(plots.label(mode), [None] * len(own))[k] = mode.frequency_Hz
+                found.setdefault(mode.label.said, [None] * len(own))[k] = mode.frequency_Hz
         columns = [row.pressure_kPa for row in own]
         tables.append({"design": design, "columns": columns, "rows": found})
     return tables
 
 
-def _footprint(found: Results) -> dict[str, Any]:
+def _footprint(found: Results, draw: Draw) -> dict[str, Any]:
     assert found.footprint
     rows = found.footprint.rows
-    known = {(row.design, row.load_N): row for row in rows}
-    kept = found.patches.patches if found.patches else []
-    kept = [patch for patch in kept if (patch.design, patch.load_N) in known]
-    with _lists_of(found.folder / "footprint_patches.json"):
-        edges = drawings.levels(kept) if kept else []
-        drawn = drawings.patches(kept, edges) if kept else []
+    known = {(row.design, row.load_N) for row in rows}
+    designs: dict[str, list[Patch]] = {}
+    for patch in found.patches.patches if found.patches else []:
+        if (patch.design, patch.load_N) in known:
+            designs.setdefault(patch.design, []).append(patch)
+    highest = max(row.peak_pressure_Pa for row in rows) / 1e3
     return {
         "rows": rows,
         "columns": FOOTPRINT,
-        "panels": plots.footprint(rows),
-        "bands": drawings.bands(edges),
+        "curves": draw(
+            "curves",
+            "Contact area, deflection, stiffness and mean contact pressure over the load",
+            "footprint.json",
+            partial(draw_curves, found.footprint.model_dump()["rows"]),
+        ),
         "patches": [
-            (patch, picture, known[patch.design, patch.load_N])
-            for patch, picture in zip(kept, drawn, strict=True)
+            draw(
+                f"patches-{k}",
+                f"Contact pressure, {design}",
+                "footprint_patches.json",
+                partial(draw_patches, patches, highest),
+            )
+            for k, (design, patches) in enumerate(designs.items())
         ],
     }
 
 
-def _diagnosis(found: Results) -> dict[str, Any]:
+def _diagnosis(found: Results, draw: Draw) -> dict[str, Any]:
     d = found.diagnosis
     assert d
     place, drawn = found.diagnosis_section, None
     if place and d.section_map:
-        with _lists_of(found.folder / "diagnosis_section.json"):
-            drawn = drawings.section_map(place, d.section_map)
+        told = "Parts of the section by the evidence for a change of them alone"
+        places = [Place(**region.model_dump()) for region in d.section_map]
+        drawing = partial(draw_section_map, place, places)
+        drawn = draw("map", told, "diagnosis_section.json", drawing)
+    known = [(row, each) for each in d.gap.residuals if not each.run and (row := each.of)]
+    percent = np.array([[each.percent, each.sigma_percent] for _, each in known]).T / 100
     return {
         "of": d,
         "verdict": VERDICTS[d.verdict],
@@ -259,7 +314,14 @@ def _diagnosis(found: Results) -> dict[str, Any]:
         ],
         "words": html(found.diagnosis_words),
         "map": drawn,
-        "residuals": plots.residuals(d.gap.residuals) if d.gap.residuals else None,
+        "residuals": draw(
+            "residuals",
+            "What calibration leaves of each measurement",
+            "diagnosis.json",
+            partial(draw_residuals, [row for row, _ in known], *percent),
+        )
+        if known
+        else None,
     }
 
 
@@ -300,5 +362,5 @@ def environment() -> ImmutableSandboxedEnvironment:
     made.filters["range"] = _range
     made.globals["map_resolution"] = map_resolution
     made.filters["motion"] = lambda mode: motion(mode.c, mode.m, mode.kind)
-    made.filters["label"] = plots.label
+    made.filters["label"] = lambda mode: mode.label.said
     return made

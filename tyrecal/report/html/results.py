@@ -7,39 +7,17 @@ import csv
 import json
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from pydantic import ValidationError
 
 from ...errors import InputError
 from ...files import NotAFile, read_runs, read_text
-from .contents import (
-    Diagnosis,
-    DiagnosisSection,
-    Effects,
-    Fit,
-    Footprints,
-    LoadSweep,
-    Modes,
-    Part,
-    Patches,
-    PressureSweep,
-    Provenance,
-    RunFacts,
-    Shapes,
-    Whole,
-)
+from ...studies.result import Part, Provenance, Result
+from ..shape_data import DiagnosisSection, Patches, Shapes
+from .contents import Diagnosis, Effects, Fit, Footprints, LoadSweep, Modes, PressureSweep, RunFacts
 
 File = TypeVar("File", bound=Part)
-
-
-@dataclass(frozen=True)
-class DesignPoint:
-    """A line of fit_history.csv; objective None: the design could not be evaluated."""
-
-    start: int
-    objective: float | None
-    values: dict[str, float]
 
 
 @dataclass(frozen=True)
@@ -49,7 +27,7 @@ class Results:
     folder: Path
     fit: Fit | None = None
     fit_shapes: Shapes | None = None
-    history: list[DesignPoint] = field(default_factory=list)
+    history: list[dict[str, Any]] = field(default_factory=list)
     modes: Modes | None = None
     modes_shapes: Shapes | None = None
     pressure: PressureSweep | None = None
@@ -65,7 +43,7 @@ class Results:
     @property
     def provenances(self) -> dict[str, Provenance]:
         """What the results of each study are of, where they say so."""
-        known: dict[str, Whole | Effects | None] = {
+        known: dict[str, Result | Effects | None] = {
             "fit": self.fit,
             "modes": self.modes,
             "sweep-pressure": self.pressure,
@@ -164,17 +142,23 @@ def _text(path: Path) -> str | None:
         raise InputError(f"'{path}' is damaged: it is no text") from None
 
 
-def _history(path: Path) -> list[DesignPoint]:
+def _history(path: Path) -> list[dict[str, Any]]:
     text = _text(path)
     if text is None:
         return []
-    points = []
+    points: list[dict[str, Any]] = []
     try:
         for row in csv.DictReader(text.splitlines()):
             objective, start = row.pop("objective_Hz"), int(row.pop("start"))
             del row["point"], row["failure"]
-            values = {name: float(value) for name, value in row.items()}
-            points.append(DesignPoint(start, float(objective) if objective else None, values))
+            points.append(
+                {
+                    "point": len(points) + 1,
+                    "start": start,
+                    "objective_Hz": float(objective) if objective else None,
+                    "values": {name: float(value) for name, value in row.items()},
+                }
+            )
     except (KeyError, ValueError, TypeError):
         raise InputError(f"'{path}' is not what tyrecal writes: line {len(points) + 2}") from None
     return points

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from ...modes.mode import Label
+from ..shape_data import Shape, Shapes
 from ..words import motion
-from .contents import Shape, Shapes
 
 STEPS = 32767
 ANGLES = 60  # round the circumference, in the page

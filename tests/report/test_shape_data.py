@@ -16,10 +16,9 @@ from tyrecal.evaluate.door import Door, Question
 from tyrecal.evaluate.results import HarmonicShape
 from tyrecal.modes.label import paired_labels
 from tyrecal.modes.mode import Mode
-from tyrecal.report.html.contents import Shapes
 from tyrecal.report.html.shapes import packed
-from tyrecal.report.kept import patches_data, section_data, tyre_data
 from tyrecal.report.revolve import motion, placed, skin, swept
+from tyrecal.report.shape_data import Shapes, patches_data, section_data, tyre_data
 from tyrecal.studies.footprint import press
 from tyrecal.studies.patch import patch_of
 
@@ -115,10 +114,10 @@ def test_the_section_is_whole(tyre) -> None:
         z, r = np.reshape(flat, (-1, 2)).T
         return 0.5 * float(abs(z @ np.roll(r, 1) - r @ np.roll(z, 1)))
 
-    cells = [cell for cells in found["areas"].values() for cell in cells]
+    cells = [cell for cells in found.areas.values() for cell in cells]
     assert len(cells) == len(mesh.solids)
-    assert sum(map(area, cells)) == pytest.approx(area(found["outline"]), rel=0.02)
-    assert set(found["cords"]) == set(case.case.rebar_layers) and found["inflated"] is None
+    assert sum(map(area, cells)) == pytest.approx(area(found.outline), rel=0.02)
+    assert set(found.cords) == set(case.case.rebar_layers) and found.inflated is None
 
 
 def test_patches_keep_all_that_touches(tyre, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -128,10 +127,10 @@ def test_patches_keep_all_that_touches(tyre, monkeypatch: pytest.MonkeyPatch) ->
     values, mesh = start_values(case), section_mesh(case)
     loads = [1000.0, 4000.0, 65e3]  # the last up to where the rings of nodes stand far apart
     pressed = press(Door(case), {"initial": values}, loads)["initial"]
-    kept = patches_data("x", {"initial": pressed}, {"initial": mesh})["patches"]
+    kept = patches_data("x", {"initial": pressed}, {"initial": mesh}).patches
     for footprint, patch in zip(pressed.footprints, kept, strict=True):
         there = patch_of(pressed, footprint, mesh)
-        p = np.array(patch["pressure_kPa"])
+        p = np.array(patch.pressure_kPa)
         assert (p > 0).sum() == (there.pressure > 0).sum() > 4
         assert 1e3 * p.sum() == pytest.approx(there.pressure.sum(), rel=1e-5)
         assert (p[[0, -1]] == 0).all() and (p[:, [0, -1]] == 0).all()

@@ -1,0 +1,37 @@
+"""A figure as part of a page: its words as text, colours of the page, ids of its own."""
+
+from __future__ import annotations
+
+import re
+
+from matplotlib.figure import Figure
+
+from tyrecal.report.figure import COLOURS, GREY, in_house_style, new_figure, svg
+
+NAME = "$x$ & <sons>"
+
+
+@in_house_style
+def drawn() -> Figure:
+    figure = new_figure(3.0, 2.0)
+    axes = figure.add_subplot()
+    axes.plot([0, 1, 2], [3, 4, 3], "o-", color=COLOURS[1], mfc="white")
+    axes.fill_between([0, 1], [3, 3], [4, 4], fc="none", hatch="//", ec=GREY)
+    axes.set_title(NAME)
+    return figure
+
+
+def test_the_same_figure_gives_the_same_text_but_for_its_ids() -> None:
+    one, again, other = (str(svg(drawn(), "a line", key)) for key in ("a", "a", "b"))
+    assert one == again
+    ids = re.findall(r' id="(.*?)"', one)
+    assert ids and len(set(ids)) == len(ids) and all(id.startswith("a-") for id in ids)
+    assert set(re.findall(r'(?:url\(|href=")#([\w-]+)', one)) == set(ids)
+    assert other == re.sub(r'((?: id="|url\(#|href="#))a-', r"\1b-", one)
+
+
+def test_words_are_text_and_colours_the_page_s() -> None:
+    text = svg(drawn(), NAME, "a")
+    assert text.count("$x$ &amp; &lt;sons&gt;") == 2  # one of them for who does not see it
+    assert "var(--s1)" in text and "var(--edge)" in text and "var(--panel)" in text
+    assert not re.search(r"#[0-9a-f]{6}|https?:|data:|<style|\d\.\d{3}", text)

@@ -1,0 +1,306 @@
+"""What a page draws, as data: the section, mode shapes, pressure in the patch."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from pydantic import Field
+
+from ..case import LoadedCase
+from ..deck.context import section_mesh
+from ..effects import with_effects
+from ..evaluate.pressed import Pressed
+from ..evaluate.results import Evaluation, HarmonicShape
+from ..modes.loaded import MIRROR
+from ..modes.mode import Mode
+from ..studies.loaded import LoadedTyre
+from ..studies.patch import patch_of
+from ..studies.result import Named, Part, Result, Wave
+from ..tyre.mesh import SectionMesh
+from .revolve import placed, skin
+
+Array = np.ndarray
+Flat = list[float]  # points z, r in mm, one after the other
+DIGITS = 6  # of a shape, over its largest component
+TOLERANCE_HZ = 1e-6  # of a table's frequencies against the shapes'
+
+
+class Patch(Part):
+    """Contact pressure on lines of nodes, (ring along, node across)."""
+
+    design: str
+    load_N: float
+    across_mm: list[list[float]]
+    along_mm: list[list[float]]
+    pressure_kPa: list[list[float]]
+
+
+class Patches(Result):
+    """footprint_patches.json"""
+
+    case: str
+    patches: list[Patch]
+
+
+class Cords(Part):
+    """A layer as lines."""
+
+    angle_deg: float
+    lines: list[Flat]
+
+
+class Section(Part):
+    """The section as elements by region, cords by layer, what the rim holds, and its outline
+    before and after the inflation."""
+
+    areas: dict[str, list[Flat]]
+    cords: dict[str, Cords]
+    rim: list[Flat]
+    outline: Flat
+    inflated: Flat | None
+
+
+class Shape(Named):
+    """A mode on the section, or on the surface of the loaded tyre."""
+
+    n: Wave = 0
+    real: list[list[float]] = Field(default=[])
+    imaginary: list[list[float]] = Field(default=[])
+    symmetry: str | None = None
+    displacement: list[list[list[float]]] = Field(default=[])
+
+
+class Shapes(Result):
+    """fit_shapes.json, modes_shapes.json"""
+
+    case: str
+    pressure_kPa: float
+    load_N: float = 0.0
+    variables: dict[str, list[str]] = Field(default={})
+    section: Section | None = None
+    R_m: list[float] = Field(default=[])
+    Z_m: list[float] = Field(default=[])
+    angles: list[float] = Field(default=[])
+    surface_m: list[list[list[float]]] = Field(default=[])
+    modes: list[Shape]
+
+    def of(self, table: Sequence[Named]) -> bool:
+        """Whether these are the modes that a table lists, and not those of another run; a split
+        doublet has its mean here, both members there."""
+        for mode in self.modes:
+            hertz = [
+                each.frequency_Hz
+                for each in table
+                if (each.c, each.m, each.kind) == (mode.c, mode.m, mode.kind)
+                and getattr(each, "symmetry", None) == mode.symmetry
+            ]
+            low, high = min(hertz, default=np.inf), max(hertz, default=-np.inf)
+            if not low - TOLERANCE_HZ <= mode.frequency_Hz <= high + TOLERANCE_HZ:
+                return False
+        return True
+
+
+class DiagnosisSection(Result):
+    """diagnosis_section.json"""
+
+    case: str
+    areas: dict[str, list[Flat]]
+    cords: dict[str, list[Flat]]
+
+
+def tyre_data(case: LoadedCase, evaluation: Evaluation, modes: Sequence[Mode]) -> dict[str, Any]:
+    """The content of fit_shapes.json and modes_shapes.json: the section, and the modes' shapes on
+    its outer surface, from one edge of the bead to the other.
+
+    A shape is u = Re[amplitude exp(i n Theta)], in r, theta, z; of a pair the member whose crest
+    stands at Theta = 0. Modes that are not known on the section are left out.
+    """
+    mesh = section_mesh(case)
+    moved, modes = placed(evaluation, modes, mesh)
+    nodes = skin(mesh)
+    R, Z = np.array([mesh.nodes[int(n)] for n in nodes]).T
+    return {
+        "format": 1,
+        "case": case.case.name,
+        "pressure_kPa": evaluation.pressure_kPa,
+        "variables": {name: list(v.sets) for name, v in case.case.variables.items()},
+        "section": section_data(case, mesh, moved).model_dump(),
+        "R_m": _rounded(R),
+        "Z_m": _rounded(Z),
+        "modes": [{**_name(mode), **_amplitude(mode, nodes)} for mode in modes],
+    }
+
+
+def section_data(case: LoadedCase, mesh: SectionMesh, displacement: Mapping[int, Array]) -> Section:
+    """The section on ``mesh``; displacement: node number to (r, theta, z) of the inflation, m;
+    empty: unknown."""
+    case = with_effects(case)
+    place = {n: np.array([z, r]) * 1e3 for n, (r, z) in mesh.nodes.items()}
+    areas: dict[str, list[Flat]] = {name: [] for name, _ in case.section.regions}
+    for number, (region, _) in mesh.cells.items():
+        areas[region].append(_line(place, mesh.solids[number][:4]))
+    held = set(mesh.rim)
+    around = outline(mesh)
+    inflated = None
+    if displacement:
+        moved = {n: place[n] + 1e3 * np.take(displacement[n], [2, 0]) for n in around}
+        inflated = _line(moved, around)
+    cords = {
+        name: Cords(
+            angle_deg=layer.angle_deg, lines=[_line(place, n) for n in turns(case, mesh, name)]
+        )
+        for name, layer in case.case.rebar_layers.items()
+    }
+    return Section(
+        areas=areas,
+        cords=cords,
+        rim=[_line(place, n[:4]) for n in mesh.solids.values() if held.issuperset(n)],
+        outline=_line(place, around),
+        inflated=inflated,
+    )
+
+
+def parts_data(case: LoadedCase, named: Iterable[str]) -> DiagnosisSection:
+    """The section's parts under the names that they have in the map of parts ``named``."""
+    mesh = section_mesh(case)
+    place = {n: np.array([z, r]) * 1e3 for n, (r, z) in mesh.nodes.items()}
+    parts = rubber_parts(case, mesh, {name.split(",")[0] for name in named})
+    cords: dict[str, list[Flat]] = {}
+    for layer in case.case.rebar_layers.values():
+        lines = mesh.cords[layer.line].values()
+        name = f"{layer.material.replace('_', ' ')}s"
+        cords.setdefault(name, []).extend(_line(place, x) for x in lines)
+    areas = {name: [_line(place, nodes) for nodes in solids] for name, solids in parts.items()}
+    return DiagnosisSection(format=1, case=case.case.name, areas=areas, cords=cords)
+
+
+def outline(mesh: SectionMesh) -> list[int]:
+    """Numbers of the nodes round the section, closed."""
+    step = 2 if mesh.quadratic else 1
+    columns, rows = (step * n for n in mesh.shape)
+    walk = [(0, j) for j in range(columns)] + [(i, columns) for i in range(rows)]
+    walk += [(rows, j) for j in range(columns, 0, -1)] + [(i, 0) for i in range(rows, -1, -1)]
+    return [1000 * (j + 1) + i + 1 for i, j in walk]
+
+
+def turns(case: LoadedCase, mesh: SectionMesh, name: str) -> list[tuple[int, ...]]:
+    """Nodes of the elements to draw a layer with: layers on one line take turns."""
+    layers = case.case.rebar_layers
+    layer = layers[name]
+    sharing = [
+        other
+        for other, its in layers.items()
+        if (its.line, its.regions) == (layer.line, layer.regions)
+    ]
+    own = [
+        nodes
+        for cord, nodes in mesh.cords[layer.line].items()
+        if not layer.regions or mesh.region_of(cord) in layer.regions
+    ]
+    return own[sharing.index(name) :: len(sharing)]
+
+
+def rubber_parts(
+    case: LoadedCase, mesh: SectionMesh, named: set[str]
+) -> dict[str, list[tuple[int, ...]]]:
+    """Corner nodes of the elements of each part of the section, by the part's name in a map of
+    the parts ``named``."""
+    crown = case.section.regions[0][0]
+    rows = case.case.mesh.levels[case.case.mesh.level].rows
+    found: dict[str, list[tuple[int, ...]]] = {}
+    for number, (region, row) in mesh.cells.items():
+        name = region.replace("_", " ")
+        if region == crown and name not in named:
+            name = "tread" if row >= sum(rows[:-1]) else f"{name} under the tread"
+        found.setdefault(name, []).append(mesh.solids[number][:4])
+    return found
+
+
+def loaded_data(tyre: LoadedTyre, case: LoadedCase) -> dict[str, Any]:
+    """The content of modes_shapes.json for the tyre on the road, at its last load: points of the
+    outer surface, deformed, and the modes' displacement there (ring, node, 3), in r, theta, z.
+    Angles in rad from the patch's middle."""
+    last = tyre.loads[-1]
+    assert tyre.angles is not None and last.surface is not None
+    order = np.argsort(last.surface[0, :, 2])
+    return {
+        "format": 1,
+        "case": case.case.name,
+        "pressure_kPa": tyre.pressure_kPa,
+        "load_N": last.load_N,
+        "angles": _rounded(tyre.angles),
+        "surface_m": _rounded(last.surface[:, order]),
+        "modes": [
+            {
+                "c": mode.member.label.c,
+                "m": mode.member.label.m,
+                "kind": mode.member.label.kind,
+                "symmetry": mode.member.symmetry,
+                "frequency_Hz": mode.frequency_Hz,
+                "displacement": _scaled(mode.shape[:, order]),
+            }
+            for mode in last.modes
+            if mode.shape is not None
+        ],
+    }
+
+
+def patches_data(
+    name: str, designs: Mapping[str, Pressed], meshes: Mapping[str, SectionMesh]
+) -> Patches:
+    """The contact pressure of every design and load on the lines of nodes in and round the
+    patch."""
+    patches = []
+    for design, pressed in designs.items():
+        for footprint in pressed.footprints:
+            patch = patch_of(pressed, footprint, meshes[design])
+            near = _grown(patch.touches)
+            patches.append(
+                Patch(
+                    design=design,
+                    load_N=footprint.load_N,
+                    across_mm=_rounded(1e3 * patch.across[near], 3),
+                    along_mm=_rounded(1e3 * patch.along[near], 3),
+                    pressure_kPa=_rounded(1e-3 * patch.pressure[near], 3),
+                )
+            )
+    return Patches(format=1, case=name, patches=patches)
+
+
+def _grown(touches: Array) -> tuple[slice, slice]:
+    """Rows and columns of what touches and of the next beside it, which bear nothing: between them
+    contours close."""
+    found = [np.flatnonzero(touches.any(axis)) for axis in (1, 0)]
+    rings, nodes = (slice(max(0, each[0] - 1), each[-1] + 2) for each in found)
+    return rings, nodes
+
+
+def _amplitude(mode: Mode, nodes: Array) -> dict[str, Any]:
+    shape = mode.raw.shape
+    assert isinstance(shape, HarmonicShape)
+    row = {int(n): k for k, n in enumerate(shape.nodes)}
+    A = shape.amplitude[[row[int(n)] for n in nodes]]
+    if shape.n:  # r and z as real, theta as imaginary as they can be
+        A = A * np.exp(-0.5j * np.angle((A**2 * MIRROR).sum()))
+    largest = np.argmax(abs(A.real))
+    A = A * (np.sign(A.real.ravel()[largest]) or 1.0)
+    return {"n": shape.n, "real": _scaled(A.real, A), "imaginary": _scaled(A.imag, A)}
+
+
+def _name(mode: Mode) -> dict[str, Any]:
+    label = mode.label
+    return {"c": label.c, "m": label.m, "kind": label.kind, "frequency_Hz": mode.frequency_Hz}
+
+
+def _scaled(values: Array, over: Array | None = None) -> Any:
+    return _rounded(values / np.abs(values if over is None else over).max())
+
+
+def _line(place: Mapping[int, Array], nodes: Iterable[int]) -> list[float]:
+    return _rounded(np.concatenate([place[n] for n in nodes]), 3)
+
+
+def _rounded(values: Any, digits: int = DIGITS) -> Any:
+    return (np.round(np.asarray(values, float), digits) + 0.0).tolist()  # no minus zero
