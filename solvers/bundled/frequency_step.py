@@ -50,8 +50,8 @@ def frequency_step(
     )
     factor = vibration.factor(0)
     solver: HasModes = vibration
-    if model.laws:
-        solver = SelfConsistent(vibration, model.laws)
+    if model.tables:
+        solver = SelfConsistent(vibration, model.tables)
     modes = _modes(tyre, step, row, solver, factor)
     if row.text(2):
         modes = [m.below(float(np.real(row.number(2)))) for m in modes]

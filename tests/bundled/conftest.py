@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 from threadpoolctl import threadpool_limits
-from tyrecal_solvers.bundled.section.mechanics import Load
 from tyrecal_solvers.bundled.section.model import Model
+from tyrecal_solvers.bundled.section.parts.pressure import Pressure
 
 from ..chance import generator
 from . import support
@@ -24,7 +24,7 @@ class Inflated:
     tyre: support.Tyre
     model: Model
     held: Array
-    loads: list[Load]
+    loads: list[Pressure]
     U: Array
 
 

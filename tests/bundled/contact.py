@@ -9,8 +9,8 @@ import numpy as np
 from tyrecal_solvers.bundled.road.contact import Road, flat_road
 from tyrecal_solvers.bundled.road.contact_newton import Press
 from tyrecal_solvers.bundled.road.half_turn_symmetry import Fold
-from tyrecal_solvers.bundled.section.mechanics import Load
 from tyrecal_solvers.bundled.section.model import Model
+from tyrecal_solvers.bundled.section.parts.pressure import Pressure
 from tyrecal_solvers.bundled.solid3d.circumference import Circumference, half_circle
 from tyrecal_solvers.bundled.solid3d.revolved import Revolved
 
@@ -26,7 +26,7 @@ class Round:
 
     model: Model
     free: Array
-    loads: list[Load]
+    loads: list[Pressure]
     U: Array
 
     def tyre(self, around: Circumference) -> Revolved:

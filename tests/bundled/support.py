@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -13,8 +13,9 @@ from tyrecal_solvers.bundled.modes import harmonics
 from tyrecal_solvers.bundled.road.contact_newton import NotPressed, Press, Pressed
 from tyrecal_solvers.bundled.section import inflation, mechanics, model
 from tyrecal_solvers.bundled.section.band import Numbering
-from tyrecal_solvers.bundled.section.mechanics import Load
 from tyrecal_solvers.bundled.section.model import Model
+from tyrecal_solvers.bundled.section.parts.pressure import Pressure
+from tyrecal_solvers.bundled.section.parts.spin import spinning
 
 from tyrecal.tyre.mesh import build_mesh
 from tyrecal.tyre.section import read_section
@@ -186,9 +187,12 @@ def model_of(text: str) -> Model:
 def numbering(m: Model, held: Array | None = None) -> Numbering:
     """Equations with the components ``held`` (n, 3) or none taken out."""
     free = np.ones((len(m.mesh.X), 3), bool) if held is None else ~held
-    connectivities = [r.solids.connectivity for r in m.rubbers]
-    connectivities += [c.lines.connectivity for c in m.cords]
-    return Numbering(connectivities, free)
+    return Numbering([part.connectivity for part in m.parts], free)
+
+
+def turning(m: Model, spin: float) -> Model:
+    """The model with the forces of a spin about the axle, rad/s."""
+    return replace(m, parts=m.parts + spinning(m.parts, m.mesh.X, spin**2))
 
 
 def held(m: Model, rows: Array | list[int] = (), axial: bool = False) -> Array:
@@ -199,17 +203,17 @@ def held(m: Model, rows: Array | list[int] = (), axial: bool = False) -> Array:
     return mask
 
 
-def cavity(m: Model, pressure: float) -> list[Load]:
-    return [Load(m.mesh.faces["CAVITY"], pressure)]
+def cavity(m: Model, pressure: float) -> list[Pressure]:
+    return [Pressure(m.mesh.faces["CAVITY"], pressure)]
 
 
-def inflate(m: Model, mask: Array, loads: list[Load]) -> Array:
+def inflate(m: Model, mask: Array, loads: list[Pressure]) -> Array:
     """Equilibrium displacements (n, 3)."""
     return inflation.equilibrium(m, numbering(m, mask), loads, np.zeros((len(m.mesh.X), 3))).U
 
 
 def eigenvalues(
-    m: Model, U: Array, loads: list[Load], mask: Array, n: int, count: int, shift: float = -1e3
+    m: Model, U: Array, loads: list[Pressure], mask: Array, n: int, count: int, shift: float = -1e3
 ) -> Array:
     """Lowest omega^2 (count,) of a harmonic; the shift below zero allows for rigid modes."""
     vibration = harmonics.Vibration(m, U, loads, numbering(m, mask), shift)
@@ -221,7 +225,7 @@ def hertz(omega2: Array) -> Array:
     return np.sign(omega2) * np.sqrt(abs(omega2)) / (2 * np.pi)
 
 
-def matrices(m: Model, U: Array, loads: list[Load]) -> tuple[Array, Array, Array]:
+def matrices(m: Model, U: Array, loads: list[Pressure]) -> tuple[Array, Array, Array]:
     """Dense K0, K1, K2 (3n, 3n) over all components."""
     return tuple(dense(part, len(U)) for part in mechanics.tangents(m, U, loads, True))
 

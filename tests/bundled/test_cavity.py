@@ -12,6 +12,7 @@ from tyrecal_solvers.bundled.modes import cavity
 from tyrecal_solvers.bundled.modes.cavity import Air, coupling
 from tyrecal_solvers.bundled.section import elements, mechanics
 from tyrecal_solvers.bundled.section.parts import pressure
+from tyrecal_solvers.bundled.section.parts.pressure import surface_point
 
 from . import support
 from .wheel_and_gas import SHIFT, STEEL, inflated
@@ -57,7 +58,7 @@ def test_volume_and_slow_compression() -> None:
     u = np.stack([np.cos(9 * X[:, 1]), 0 * X[:, 0], np.sin(7 * X[:, 0])], -1)
 
     def volume(U: Array) -> complex:
-        points = [mechanics.surface_point(X, s, U) for s in gas.surfaces]
+        points = [surface_point(s, U) for s in gas.surfaces]
         weights = [s.weights for s in gas.surfaces]
         return sum(complex(pressure.volume(*p, w)) for p, w in zip(points, weights, strict=True))
 

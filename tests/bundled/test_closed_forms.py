@@ -8,7 +8,7 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import eigh
 from scipy.optimize import brentq
 from tyrecal_solvers.bundled.section import elements, mechanics
-from tyrecal_solvers.bundled.section.mechanics import Load
+from tyrecal_solvers.bundled.section.parts.pressure import Pressure
 
 from . import support
 from .support import Layer, Rubber
@@ -150,7 +150,7 @@ def test_prestressed_net(n: int, linear: bool, wanted: float) -> None:
         model = support.model_of(support.deck(X, np.empty((0, 0), int), Rubber(), layers))
         U = np.stack([X[:, 0] * (l_t - 1), 0 * z, X[:, 1] * (l_z - 1)], -1)
         p = t_t / (l_z * R)
-        loads = [Load(elements.lines(X, lines, 3), p)]
+        loads = [Pressure(elements.lines(X, lines, 3), p)]
         mask = np.zeros((len(X), 3), bool)
         mask[[0, -1], :2] = True
         free = ~mask.ravel()

@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.linalg import qr
-from tyrecal_solvers.bundled.section.parts import cords
+from tyrecal_solvers.bundled.section.parts.cords import LogarithmicCord
 
 Array = np.ndarray
 H = 1e-30
 STIFFNESS = np.array([1e5, 2e6, 3e7, 4e6])
+CORD = LogarithmicCord(STIFFNESS)
 
 
 @pytest.fixture
@@ -24,19 +25,19 @@ def close(got: Array, wanted: Array, tolerance: float = 1e-13) -> None:
 def test_force_and_tangent_by_complex_step(q: Array) -> None:
     """f = dW/dq and D = df/dq, D symmetric."""
     steps = np.eye(3) * 1j * H
-    force = np.stack([cords.energy(q + s, STIFFNESS).imag / H for s in steps], -1)
-    close(cords.force(q, STIFFNESS), force)
-    D = np.stack([cords.force(q + s, STIFFNESS).imag / H for s in steps], -1)
-    close(cords.tangent(q, STIFFNESS), D)
-    close(cords.tangent(q, STIFFNESS), D.swapaxes(1, 2))
+    force = np.stack([CORD.energy(q + s).imag / H for s in steps], -1)
+    close(CORD.force(q), force)
+    D = np.stack([CORD.force(q + s).imag / H for s in steps], -1)
+    close(CORD.tangent(q), D)
+    close(CORD.tangent(q), D.swapaxes(1, 2))
 
 
 def test_frame_indifference(q: Array, random: np.random.Generator) -> None:
     """W(Qq) = W(q), f(Qq) = Q f(q), D(Qq) = Q D(q) Q^T for a rotation Q."""
     Q = qr(random.normal(size=(3, 3)))[0]
-    close(cords.energy(q @ Q.T, STIFFNESS), cords.energy(q, STIFFNESS))
-    close(cords.force(q @ Q.T, STIFFNESS), cords.force(q, STIFFNESS) @ Q.T)
-    close(cords.tangent(q @ Q.T, STIFFNESS), Q @ cords.tangent(q, STIFFNESS) @ Q.T)
+    close(CORD.energy(q @ Q.T), CORD.energy(q))
+    close(CORD.force(q @ Q.T), CORD.force(q) @ Q.T)
+    close(CORD.tangent(q @ Q.T), Q @ CORD.tangent(q) @ Q.T)
 
 
 @pytest.mark.parametrize("stretch", [0.9, 1.0, 1.2])
@@ -46,8 +47,8 @@ def test_uniaxial_stretch(stretch: float) -> None:
     a = np.array([0.6, 0.0, 0.8])
     q = np.tile(stretch * a, (4, 1))
     log = np.log(stretch)
-    np.testing.assert_allclose(cords.force(q, STIFFNESS) @ a, STIFFNESS * log / stretch, rtol=1e-13)
-    D = cords.tangent(q, STIFFNESS)
+    np.testing.assert_allclose(CORD.force(q) @ a, STIFFNESS * log / stretch, rtol=1e-13)
+    D = CORD.tangent(q)
     across = np.array([0.0, 1.0, 0.0])
     np.testing.assert_allclose(a @ (D @ a).T, STIFFNESS * (1 - log) / stretch**2, rtol=1e-13)
     np.testing.assert_allclose((D @ across) @ across, STIFFNESS * log / stretch**2, rtol=1e-13)

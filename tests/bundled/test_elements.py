@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from tyrecal_solvers.bundled.section import elements
+from tyrecal_solvers.bundled.section.parts.cords import cord_rows
+from tyrecal_solvers.bundled.section.parts.elastic import on_diagonals
 
 Array = np.ndarray
 ANGLES = np.arange(8) * 2 * np.pi / 8
@@ -64,7 +66,7 @@ def test_patch(A: Array, nodes: int, points: int, patch: tuple[Array, Array]) ->
         for n, U in fields.items():
             u = U[s.connectivity].reshape(len(table), 1, -1, 1)
             part = (s.B0 @ u)[..., 0]
-            part[..., 1::3] += 1j * n * (s.B1 @ u)[..., 0]
+            part[..., 1::3] += 1j * n * (on_diagonals(s.hoop) @ u)[..., 0]
             H = H + (part * np.exp(1j * n * angle)).real
         wanted = (Q.T @ A @ Q).ravel()
         assert abs(H - wanted).max() <= 1e-12
@@ -80,7 +82,8 @@ def test_cord_patch(A: Array, nodes: int, random: np.random.Generator) -> None:
     table = np.arange(nodes) + (nodes - 1) * np.arange(6 // (nodes - 1))[:, None]
     lines = elements.lines(X, table)
     angle = np.radians(70.0)
-    a, b0, hoop = elements.cord_operators(lines, np.cos(angle), np.sin(angle))
+    rows = cord_rows(lines, np.cos(angle), np.sin(angle))
+    a, b0, hoop = rows.rest, rows.B0, rows.hoop
     np.testing.assert_allclose((a * a).sum(-1), 1.0, rtol=1e-14)
     np.testing.assert_allclose(a[..., 1], np.sin(angle), rtol=1e-14)
     Theta = 0.7

@@ -9,9 +9,8 @@ import pytest
 from tyrecal_solvers.bundled.deck.keywords import DeckError, read_keywords
 from tyrecal_solvers.bundled.modes import harmonics
 from tyrecal_solvers.bundled.modes.frequency_dependent import NotSelfConsistent, SelfConsistent
-from tyrecal_solvers.bundled.section.materials import Law, read_materials
-from tyrecal_solvers.bundled.section.model import stiffened
-from tyrecal_solvers.bundled.section.parts import rubber
+from tyrecal_solvers.bundled.section.materials import ModulusTable, read_materials
+from tyrecal_solvers.bundled.section.parts.rubber import MooneyRivlin
 
 from tyrecal.case import with_values
 from tyrecal.effects import catalogue
@@ -28,7 +27,7 @@ pytestmark = pytest.mark.numbers
 Array = np.ndarray
 BETA, REFERENCE = 0.15, 60.0
 TABLE = np.array([1.0, 8.0, 1000.0])
-POWER = Law(tuple(TABLE), tuple((TABLE / REFERENCE) ** BETA))
+POWER = ModulusTable(tuple(TABLE), tuple((TABLE / REFERENCE) ** BETA))
 
 
 @pytest.mark.parametrize("f", [1.0, 3.7, 8.0, 60.0, 999.0])
@@ -48,21 +47,21 @@ def test_the_tangent_is_linear_in_the_ratio() -> None:
     rng = generator(0)
     F = np.eye(3) + 0.2 * rng.standard_normal((5, 3, 3))
     full = lambda x: np.full(5, x)
-    m = rubber.MooneyRivlin(full(1e6), full(2e5), full(2e7))
+    m = MooneyRivlin(full(1e6), full(2e5), full(2e7))
     shear = replace(m, inverse_D1=full(0.0), stressed=False)
     for rho in (0.7, 2.0):
         stiff = replace(m, shear_ratio=full(rho), bulk_ratio=full(1.0))
-        wanted = rubber.tangent(F, m) + (rho - 1) * rubber.tangent(F, shear)
-        np.testing.assert_allclose(rubber.tangent(F, stiff), wanted, rtol=1e-9, atol=1e-3)
+        wanted = m.tangent(F) + (rho - 1) * shear.tangent(F)
+        np.testing.assert_allclose(stiff.tangent(F), wanted, rtol=1e-9, atol=1e-3)
 
 
-def tube(law: Law | None) -> harmonics.HasModes:
+def tube(law: ModulusTable | None) -> harmonics.HasModes:
     """Rubber between a fixed hub and a free outside, that can only turn: K is G times a matrix."""
     b = support.block((0.1, 0.3, 6), (0.0, 0.05, 1), True)
     m = support.model_of(support.deck(b.X, b.solids, Rubber(C10=2e5)))
     if law:
-        laws = [replace(r, law=np.zeros_like(r.law)) for r in m.rubbers]
-        m = replace(m, rubbers=laws, laws=[law])
+        zero = np.zeros(m.parts[0].rows.weights.size, int)
+        m = replace(m.with_laws(lambda own: replace(own, table=zero)), tables=[law])
     mask = np.ones((len(b.X), 3), bool)
     mask[:, 1] = b.where(0, 0.1)
     vibration = harmonics.Vibration(m, 0 * mask, [], support.numbering(m, mask), 0.0)
@@ -82,15 +81,15 @@ def test_one_spring_in_closed_form() -> None:
 def test_a_law_that_settles_nowhere_is_a_failure() -> None:
     """A modulus that jumps down faster than the frequency rises has no fixed point to find."""
     f0 = float(support.hertz(tube(None).modes(0, 1).eigenvalues)[0])
-    wild = Law((1.0, 0.999 * f0, f0, 1.001 * f0, 1e4), (1.0, 4.0, 1.0, 0.25, 0.25))
+    wild = ModulusTable((1.0, 0.999 * f0, f0, 1.001 * f0, 1e4), (1.0, 4.0, 1.0, 0.25, 0.25))
     with pytest.raises(NotSelfConsistent):
         for start in (1.0, 2.0, 4.0):
-            law = Law(wild.frequency_Hz, tuple(r * start for r in wild.ratios))
+            law = ModulusTable(wild.frequency_Hz, tuple(r * start for r in wild.ratios))
             tube(law).modes(0, 1)
 
 
 def test_nothing_where_the_ratio_is_one() -> None:
-    flat = Law((1.0, 1000.0), (1.0, 1.0))
+    flat = ModulusTable((1.0, 1000.0), (1.0, 1.0))
     np.testing.assert_allclose(
         tube(flat).modes(0, 3).eigenvalues, tube(None).modes(0, 3).eigenvalues, rtol=1e-12
     )
@@ -99,10 +98,10 @@ def test_nothing_where_the_ratio_is_one() -> None:
 def test_the_inflated_state_and_the_other_rubbers_stay() -> None:
     """dK acts only where the law does."""
     m = support.model_of(support.tyre((3, 2, 2, 1)).deck)
-    none = replace(m, laws=[POWER])
-    (soft,) = stiffened(none)
-    assert not any(r.material.C10.any() or r.material.inverse_D1.any() for r in soft.rubbers)
-    assert not soft.cords
+    (soft,) = replace(m, tables=[POWER]).growing()
+    laws = [part.law for part in soft.parts]
+    assert laws and all(isinstance(law, MooneyRivlin) for law in laws)
+    assert not any(law.C10.any() or law.inverse_D1.any() for law in laws)
 
 
 def test_self_consistent_as_by_hand_through_the_door() -> None:

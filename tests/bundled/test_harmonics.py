@@ -35,7 +35,7 @@ def test_modes_are_the_lowest(inflated: Inflated, n: int) -> None:
 
 def test_a_buckling_harmonic_is_named(inflated: Inflated) -> None:
     """Ten times the pressure pushing inwards: K(n) is indefinite, said as Unstable with its n."""
-    loads = [support.Load(inflated.loads[0].lines, -2.4e6)]
+    loads = [support.Pressure(inflated.loads[0].lines, -2.4e6)]
     number = support.numbering(inflated.model, inflated.held)
     vibration = harmonics.Vibration(inflated.model, 0 * inflated.U, loads, number, 0.0)
     with pytest.raises(harmonics.Unstable, match="3 waves"):

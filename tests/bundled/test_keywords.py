@@ -74,17 +74,16 @@ def test_square_is_a_model() -> None:
     volume per radian, times the density."""
     m = support.model_of(SQUARE)
     mass = 1100.0 * (0.3**2 - 0.2**2) / 2 * 0.1
-    r = m.rubbers[0]
-    assert (r.solids.mass_weights.sum(1) * r.density).sum() == pytest.approx(mass, rel=1e-14)
+    assert m.parts[0].mass.sum() == pytest.approx(mass, rel=1e-14)
     assert m.mesh.faces["CAVITY"].connectivity.tolist() == [[3, 0]]
 
 
 def test_hourglass_stiffness_is_of_the_section_above_it() -> None:
     """G = 2 C10: 0.005 G where none is given, else the number under the section."""
-    default = support.model_of(SQUARE).rubbers[0].hourglass_stiffness
+    default = support.model_of(SQUARE).parts[1].law.stiffness
     given = changed("MATERIAL=GUM\n", "MATERIAL=GUM\n*HOURGLASS STIFFNESS\n3E4\n")
     assert default == pytest.approx([0.005 * 2e6])
-    assert support.model_of(given).rubbers[0].hourglass_stiffness == pytest.approx([3e4])
+    assert support.model_of(given).parts[1].law.stiffness == pytest.approx([3e4])
 
 
 @pytest.mark.parametrize(
@@ -160,13 +159,13 @@ def test_a_static_step_has_relaxed_or_sudden_moduli(given: str) -> None:
     )
     deck += "*VISCOELASTIC, TIME=PRONY\n0.3, 0.2, 0.1\n0.1, 0., 1.\n"
     for long_term in (True, False):
-        law = model.build(read_keywords(deck), None, long_term).rubbers[0].material
+        gum, control = model.build(read_keywords(deck), None, long_term).parts
+        law = gum.law
         share = (0.6, 0.8) if long_term and given == "INSTANTANEOUS" else (1.0, 1.0)
         share = (1 / 0.6, 1 / 0.8) if not long_term and given == "LONG TERM" else share
         assert pytest.approx(1e6 * share[0]) == law.C10 and pytest.approx(2e5 * share[0]) == law.C01
         assert law.inverse_D1 == pytest.approx(share[1] / 5.085e-8)
-        stiffness = model.build(read_keywords(deck), None, long_term).rubbers[0].hourglass_stiffness
-        assert stiffness == pytest.approx(0.005 * 2 * 1.2e6 * share[0])
+        assert control.law.stiffness == pytest.approx(0.005 * 2 * 1.2e6 * share[0])
 
 
 LAYER = """*ELEMENT, TYPE=SFMGAX1, ELSET=PLY
@@ -182,8 +181,8 @@ PLY, 4E-7, 1E-3, 0.0, CORD, 90.0
 
 def test_a_layer_is_smeared() -> None:
     """E A / spacing along a ring of cords, N/m; without *DENSITY no mass."""
-    (cords,) = support.model_of(SQUARE + LAYER).cords
-    assert cords.stiffness == pytest.approx(1e9 * 4e-7 / 1e-3, rel=1e-14)
+    *_, cords = support.model_of(SQUARE + LAYER).parts
+    assert cords.law.stiffness == pytest.approx(1e9 * 4e-7 / 1e-3, rel=1e-14)
     assert (cords.mass == 0.0).all()
 
 
@@ -276,7 +275,7 @@ def test_seed_turns_a_number_complex() -> None:
     assert node[0].number(1) == complex(0.2, 2 * STEP) and isinstance(node[1].number(1), float)
     assert all(not k.tangents for k in deck)
     m = model.build(marked, None, True)
-    assert np.iscomplexobj(m.rubbers[0].density) and np.iscomplexobj(m.mesh.X)
+    assert np.iscomplexobj(m.parts[0].mass) and np.iscomplexobj(m.mesh.X)
 
 
 @pytest.mark.parametrize("line", [1, 99])

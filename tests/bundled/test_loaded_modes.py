@@ -295,10 +295,9 @@ def test_results_hold_the_half_turn(tyre: Round, pressed: State, found: LoadedMo
 def test_the_vibration_modulus_counts(tyre: Round, pressed: State) -> None:
     """Twice the shear and bulk moduli for vibrations: K of the rubber, all there is, doubles but
     for the pressure's part."""
-    (rubber,) = tyre.model.rubbers
-    points = np.ones(rubber.solids.weights.size)
-    law = replace(rubber.material, shear_ratio=2.0 * points, bulk_ratio=2.0 * points)
-    moving = replace(tyre.model, rubbers=[replace(rubber, material=law)])
+    (rubber,) = tyre.model.parts
+    twice = np.full(rubber.rows.weights.size, 2.0)
+    moving = tyre.model.with_laws(lambda law: replace(law, shear_ratio=twice, bulk_ratio=twice))
     works = [Revolved(m, [], pressed.around) for m in (tyre.model, moving)]
     x = generator(1).normal(size=pressed.U.shape)
     small = np.zeros_like(pressed.U)

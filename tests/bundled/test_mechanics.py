@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 import pytest
 from tyrecal_solvers.bundled.modes import harmonics
-from tyrecal_solvers.bundled.section import mechanics, shapes
+from tyrecal_solvers.bundled.section import elements, mechanics, shapes
 from tyrecal_solvers.bundled.section.model import Model
-from tyrecal_solvers.bundled.section.parts import cords, rubber
 
 from . import support
 from .conftest import Inflated
@@ -74,7 +72,7 @@ def test_residual_and_tangent_are_gradients(
     """r . phi = d/de potential(U + e phi) and K0 phi = d/de r(U + e phi), by complex step, for
     rough fields (hourglass patterns included) at a state out of balance, under pressure, and
     turning so fast (rad/s) that its own forces are as large."""
-    m, loads = replace(free_tyre, spin2=spin**2), support.cavity(free_tyre, 240e3)
+    m, loads = support.turning(free_tyre, spin), support.cavity(free_tyre, 240e3)
     X, h = m.mesh.X, 1e-30
     U, phi = 1e-5 * random.normal(size=(2, len(X), 3))
     number = support.numbering(m)
@@ -106,26 +104,25 @@ def energy_3d(m: Model, p: float, fields: list[tuple[int, Array]], step: Array) 
             u = u + scale * (U * np.exp(1j * n * angle)).real
             turn = turn + scale * (1j * n * U * np.exp(1j * n * angle)).real
         around = turn + np.stack([-u[:, 1], u[:, 0], 0 * u[:, 2]], -1)  # + e_z x u
-        for r in m.rubbers:
-            c = r.solids.connectivity
-            rule = shapes.quad(c.shape[1], round(np.sqrt(r.solids.weights.shape[1])))
+        for part in m.parts[:-1]:
+            c = part.connectivity
+            rule = shapes.quad(c.shape[1], round(np.sqrt(part.rows.weights.shape[1])))
             J = np.einsum("gak,eaj->egjk", rule.dN, X[c])
             dN = np.einsum("gak,egkj->egaj", rule.dN, np.linalg.inv(J))
             R = X[c, 0] @ rule.N.T
             H = np.empty((*R.shape, 3, 3), np.result_type(u, float))
             H[..., 0::2] = np.einsum("egaj,eai->egij", dN, u[c])
             H[..., 1] = np.einsum("ga,eai->egi", rule.N, around[c]) / R[..., None]
-            W = rubber.energy((np.eye(3) + H).reshape(-1, 3, 3), r.material)
+            W = part.law.energy((np.eye(3) + H).reshape(-1, 9))
             total += (W * (rule.weights * np.linalg.det(J) * R).ravel()).sum()
-        for c in m.cords:
-            lines = c.lines
-            nodes = lines.connectivity
-            along = np.einsum("ega,eai->egi", lines.slope, u[nodes])
-            hoop = np.einsum("ga,eai->egi", lines.N, around[nodes]) / lines.R[..., None]
-            sin = c.direction[..., 1:2]
-            cos = (c.direction[..., ::2] * lines.tangent).sum(-1)[..., None]
-            q = (c.direction + cos * along + sin * hoop).reshape(-1, 3)
-            total += (cords.energy(q, c.stiffness) * (lines.R * lines.weights).ravel()).sum()
+        layers, direction = m.parts[-1], m.parts[-1].rows.rest
+        lines = elements.lines(X, layers.connectivity)
+        along = np.einsum("ega,eai->egi", lines.slope, u[lines.connectivity])
+        hoop = np.einsum("ga,eai->egi", lines.N, around[lines.connectivity]) / lines.R[..., None]
+        sin = direction[..., 1:2]
+        cos = (direction[..., ::2] * lines.tangent).sum(-1)[..., None]
+        q = (direction + cos * along + sin * hoop).reshape(-1, 3)
+        total += (layers.law.energy(q) * (lines.R * lines.weights).ravel()).sum()
         x = np.insert(X, 1, 0.0, 1) + u
         y = turn + np.stack([-x[:, 1], x[:, 0], 0 * x[:, 2]], -1)
         at = lambda v: np.einsum("ga,eai->egi", inner.N, v[inner.connectivity])
@@ -168,9 +165,10 @@ def test_mass_of_a_tyre_by_pappus(inflated: Inflated) -> None:
         moment += (rule.weights * X[:, 0] ** 2 * dX[:, 1]).sum() / 2
     total = 1100.0 * moment
     per_area = {"ply": 4.2e-7 * 1500 / 1e-3, "belt": 2.1e-7 * 5900 / 1.16e-3}
-    sin = m.cords[0].direction[..., 1]
+    cords = m.parts[-1]
+    sin = cords.rows.rest[..., 1]
     smeared = np.where(sin < 0.5, per_area["ply"], per_area["belt"])
-    total += (smeared * m.cords[0].lines.R * m.cords[0].lines.weights).sum()
+    total += (smeared * cords.rows.weights).sum()
     assert mechanics.mass(m).sum() == pytest.approx(total, rel=1e-12)
 
 

@@ -129,23 +129,10 @@ def test_full_circle_is_exact_for_waves() -> None:
 
 def stiffer(model: support.Model, share: float) -> support.Model:
     """Rubber and cords (1 + share) times as stiff, and cords as heavy too."""
-    rubbers = [
-        replace(
-            r,
-            material=replace(
-                r.material,
-                C10=r.material.C10 * (1 + share),
-                C01=r.material.C01 * (1 + share),
-                inverse_D1=r.material.inverse_D1 * (1 + share),
-            ),
-        )
-        for r in model.rubbers
-    ]
-    cords = [
-        replace(c, stiffness=c.stiffness * (1 + share), mass=c.mass * (1 + share))
-        for c in model.cords
-    ]
-    return replace(model, rubbers=rubbers, cords=cords)
+    *rubbers, cords = model.with_laws(lambda law: law.stiffened(1 + share)).parts
+    law = replace(cords.law, stiffness=cords.law.stiffness * (1 + share))
+    cords = replace(cords, law=law, mass=cords.mass * (1 + share))
+    return replace(model, parts=[*rubbers, cords])
 
 
 def test_a_sector_of_360_degrees_is_another_tyre(vibration: Vibration, inflated: Inflated) -> None:

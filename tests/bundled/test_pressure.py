@@ -7,9 +7,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from tyrecal_solvers.bundled.section import elements, mechanics
-from tyrecal_solvers.bundled.section.mechanics import Load
 from tyrecal_solvers.bundled.section.model import Model
 from tyrecal_solvers.bundled.section.parts import pressure
+from tyrecal_solvers.bundled.section.parts.pressure import Pressure
 
 from . import support
 
@@ -94,8 +94,8 @@ def test_second_variation(n: int, nodes: int, random: np.random.Generator) -> No
     phi = 0.1 * phi.T
     V = [revolved_volume(X, lines, [(0, U0), (n, e * phi)]) for e in (1.0, 0.0, -1.0)]
     wanted = V[0] - 2 * V[1] + V[2]
-    model = Model(SimpleNamespace(X=X), [], [])
-    K0, K1, K2 = support.matrices(model, U0, [Load(lines, -1.0)])
+    model = Model(SimpleNamespace(X=X), [])
+    K0, K1, K2 = support.matrices(model, U0, [Pressure(lines, -1.0)])
     K = K0 + 1j * n * K1 + n * n * K2
     assert abs(K - K.conj().T).max() <= 1e-13 * abs(K).max()
     form = np.pi * (1 if n else 2) * (phi.ravel().conj() @ K @ phi.ravel())
@@ -107,10 +107,10 @@ def test_pressure_force_is_minus_p_times_the_first_variation(random: np.random.G
     X, table = arc(5, 3)
     lines = elements.lines(X, table, 3)
     U0, phi = 0.02 * random.normal(size=(2, len(X), 3))
-    model = Model(SimpleNamespace(X=X), [], [])
+    model = Model(SimpleNamespace(X=X), [])
     e = 1e-4
     V = [revolved_volume(X, lines, [(0, U0 + s * e * phi)]) for s in (2, 1, -1, -2)]
     slope = (8 * (V[1] - V[2]) - V[0] + V[3]) / (12 * e)  # exact for a cubic
     number = mechanics.Numbering([table], np.ones((len(X), 3), bool))
-    force = number.spread(mechanics.residual(model, U0, [Load(lines, 7.0)], number))
+    force = number.spread(mechanics.residual(model, U0, [Pressure(lines, 7.0)], number))
     assert (force * phi).sum() * 2 * np.pi == pytest.approx(-7.0 * slope, rel=1e-10)

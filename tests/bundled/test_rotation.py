@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from scipy.linalg import eigvalsh
@@ -23,7 +21,7 @@ STIFF = Rubber(C10=1e8, D1=5.085e-10)
 
 def turning(m: Model, mask: Array, loads: list, spin: float) -> tuple[Model, Array, Vibration]:
     """The model at a speed, its state and its vibrations; ``mask`` without rigid spin."""
-    m = replace(m, spin2=spin**2)
+    m = support.turning(m, spin)
     held = mask.copy()
     held[0, 1] = True
     U = support.inflate(m, held, loads)
@@ -86,7 +84,7 @@ def test_waves_are_the_lowest(inflated: Inflated, n: int) -> None:
     omega (K is positive definite, and every wave crosses once): counted by LAPACK just below and
     just above each wave found, in both directions, none is missed and all are right to 1e-6."""
     spin = 60.0
-    m = replace(inflated.model, spin2=spin**2)
+    m = support.turning(inflated.model, spin)
     U = support.inflate(m, inflated.held, inflated.loads)
     vibration = Vibration(m, U, inflated.loads, support.numbering(m, inflated.held), 0.0)
     got = rotation.waves(vibration, spin, n, 2)
@@ -109,7 +107,7 @@ def test_slow_spin_by_first_order_perturbation(inflated: Inflated) -> None:
     """At 1e-3 rad/s the members lie at omega0 -+ (n - g) Omega, g = U^H i M S U of the mode at
     rest: g = 2 n / (n^2 + 1) for an inextensible ring in its plane, 0 for axial motion."""
     spin = 1e-3
-    m = replace(inflated.model, spin2=spin**2)
+    m = support.turning(inflated.model, spin)
     number = support.numbering(m, inflated.held)
     vibration = Vibration(m, inflated.U, inflated.loads, number, 0.0)
     for n in (1, 2, 3, 4):

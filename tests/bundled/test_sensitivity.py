@@ -10,7 +10,7 @@ import pytest
 from tyrecal_solvers.bundled.deck import keywords
 from tyrecal_solvers.bundled.modes import harmonics, sensitivity
 from tyrecal_solvers.bundled.section import model
-from tyrecal_solvers.bundled.section.mechanics import Load
+from tyrecal_solvers.bundled.section.parts.pressure import Pressure
 
 from . import support
 
@@ -109,7 +109,7 @@ def rates(
 ) -> Array:
     """d lambda by the solver's complex step, for tangents on the deck and on the pressure."""
     seeded = model.build(keywords.seed(keywords.read_keywords(TYRE.deck), tangents), None, True)
-    loads = [Load(seeded.mesh.faces["CAVITY"], pressure)]
+    loads = [Pressure(seeded.mesh.faces["CAVITY"], pressure)]
     factor = base.vibration.factor(0)
     number = base.vibration.numbering
     V = sensitivity.state_rate(seeded, base.state, loads, number, factor)

@@ -13,7 +13,7 @@ from tyrecal_solvers.bundled.modes.cavity import Air
 from tyrecal_solvers.bundled.modes.harmonics import Vibration
 from tyrecal_solvers.bundled.modes.wheel import Wheel
 from tyrecal_solvers.bundled.section import model
-from tyrecal_solvers.bundled.section.mechanics import Load
+from tyrecal_solvers.bundled.section.parts.pressure import Pressure
 
 from . import support
 from .wheel_and_gas import MOTIONS, REFERENCE, STEEL, closed
@@ -58,9 +58,9 @@ VARIABLES = {
 }
 
 
-def beside(m: model.Model, with_air: bool) -> tuple[Wheel, Air | None, list[Load]]:
+def beside(m: model.Model, with_air: bool) -> tuple[Wheel, Air | None, list[Pressure]]:
     """The wheel on its springs, the air, and the loads on cavity and well."""
-    loads = [Load(m.mesh.faces[name], PRESSURE) for name in ("CAVITY", "WELL")]
+    loads = [Pressure(m.mesh.faces[name], PRESSURE) for name in ("CAVITY", "WELL")]
     row = m.mesh.index[REFERENCE]
     wheel = Wheel(row, np.array(TYRE.rim), frozenset(MOTIONS), SPRINGS, STEEL)
     return wheel, Air(4.06, 4.78e5, [load.lines for load in loads]) if with_air else None, loads

@@ -13,7 +13,7 @@ from tyrecal_solvers.bundled.modes import harmonics
 from tyrecal_solvers.bundled.modes.cavity import coupling
 from tyrecal_solvers.bundled.modes.wheel import Wheel
 from tyrecal_solvers.bundled.section import mechanics
-from tyrecal_solvers.bundled.section.mechanics import Load
+from tyrecal_solvers.bundled.section.parts.pressure import Pressure
 
 from . import support
 from .support import Rubber
@@ -174,7 +174,7 @@ def test_loads_and_rows_of_the_well() -> None:
     """The well's left side faces the cavity: with it the enclosed volume is that of the shoelace
     formula over the whole outline."""
     tyre = inflated()
-    lines = Load(tyre.model.mesh.faces["WELL"], 1.0).lines
+    lines = Pressure(tyre.model.mesh.faces["WELL"], 1.0).lines
     X = tyre.model.mesh.X
     assert REFERENCE in tyre.model.mesh.index
     start, end = X[lines.connectivity[0]]

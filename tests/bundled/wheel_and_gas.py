@@ -10,8 +10,8 @@ from tyrecal_solvers.bundled.modes import harmonics
 from tyrecal_solvers.bundled.modes.cavity import Air
 from tyrecal_solvers.bundled.modes.wheel import Wheel
 from tyrecal_solvers.bundled.section.band import Numbering
-from tyrecal_solvers.bundled.section.mechanics import Load
 from tyrecal_solvers.bundled.section.model import Model
+from tyrecal_solvers.bundled.section.parts.pressure import Pressure
 
 from . import support
 
@@ -28,7 +28,7 @@ class Inflated:
 
     model: Model
     U: Array
-    loads: list[Load]
+    loads: list[Pressure]
     numbering: Numbering
     rim: Array
 
@@ -64,6 +64,6 @@ def inflated(pressure: float = 240e3, z: float = 0.0, quadratic: bool = True) ->
     tyre = support.tyre((3, 2, 2, 1) if quadratic else (6, 4, 4, 2), quadratic=quadratic)
     m = support.model_of(closed(tyre.deck, z))
     mask = support.held(m, [*tyre.rim, m.mesh.index[REFERENCE]])
-    loads = [Load(m.mesh.faces[name], pressure) for name in ("CAVITY", "WELL")]
+    loads = [Pressure(m.mesh.faces[name], pressure) for name in ("CAVITY", "WELL")]
     U = support.inflate(m, mask, loads[:1])
     return Inflated(m, U, loads, support.numbering(m, mask), np.array(tyre.rim))

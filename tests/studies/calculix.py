@@ -61,20 +61,19 @@ POINTS = [
 IN_FULL = 240.0  # kPa, where all nine frequencies are listed
 
 
-def energy(q: np.ndarray, stiffness: np.ndarray) -> np.ndarray:
-    """St Venant-Kirchhoff cords in place of `cords.energy`."""
-    return stiffness * _strain(q) ** 2 / 2
+class StVenantKirchhoff(cords.LogarithmicCord):
+    """Cords with W = EA / (2 s) E^2, E = (lambda^2 - 1) / 2."""
 
+    def energy(self, z: np.ndarray) -> np.ndarray:
+        return self.stiffness * _strain(z) ** 2 / 2
 
-def force(q: np.ndarray, stiffness: np.ndarray) -> np.ndarray:
-    """dW/dq."""
-    return (stiffness * _strain(q))[:, None] * q
+    def force(self, z: np.ndarray) -> np.ndarray:
+        return (self.stiffness * _strain(z))[:, None] * z
 
-
-def tangent(q: np.ndarray, stiffness: np.ndarray) -> np.ndarray:
-    """d2W/dqdq."""
-    along = stiffness[:, None, None] * q[:, :, None] * q[:, None, :]
-    return along + (stiffness * _strain(q))[:, None, None] * np.eye(3)
+    def tangent(self, z: np.ndarray, weights: np.ndarray | float = 1.0) -> np.ndarray:
+        D = self.stiffness[:, None, None] * z[:, :, None] * z[:, None, :]
+        D = D + (self.stiffness * _strain(z) + self.tension)[:, None, None] * np.eye(3)
+        return D * np.reshape(weights, (-1, 1, 1))
 
 
 def _strain(q: np.ndarray) -> np.ndarray:
@@ -137,11 +136,10 @@ def straight(*arguments: object) -> SectionMesh:
 @contextmanager
 def common(law: bool = True, sides: bool = True) -> Iterator[None]:
     """The bundled solver with CalculiX's cord law, sides, or both, in this process."""
-    laws = {"energy": energy, "force": force, "tangent": tangent}
     context._mesh.cache_clear()
     with ExitStack() as switched:
         if law:
-            switched.enter_context(patch.multiple(cords, **laws))
+            switched.enter_context(patch.object(cords, "LogarithmicCord", StVenantKirchhoff))
         if sides:
             switched.enter_context(patch.object(context, "build_mesh", straight))
         yield

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..section.band import Cholesky, Indefinite, Numbering
-from ..section.mechanics import Parts
+from ..section.mechanics import OfElements
 from .cavity import Coupling
 
 Array = np.ndarray
@@ -130,7 +130,7 @@ def assemble(
     )
 
 
-def apply(parts: Parts, fields: Array) -> Array:
+def apply(parts: OfElements, fields: Array) -> Array:
     """Element matrices on ``fields`` (nodes, 3, k), zero at most nodes."""
     touched: Array = np.asarray(fields.any((1, 2)))
     image = np.zeros_like(fields)

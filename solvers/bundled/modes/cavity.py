@@ -25,11 +25,12 @@ from typing import Any
 import numpy as np
 
 from ..deck.keywords import DeckError, Keyword
-from ..section import elements, mechanics
+from ..section import elements
 from ..section.elements import Lines
 from ..section.materials import Number, read_materials
 from ..section.mesh import Mesh
-from ..section.parts import pressure
+from ..section.parts.frame import SPIN, cross
+from ..section.parts.pressure import surface_point
 
 Array = np.ndarray
 DEGREE = 4
@@ -87,7 +88,7 @@ def coupling(air: Air, X: Array, U: Array, n: int) -> Coupling:
     """Matrices of the inflated cavity. X (nodes, 2), U (nodes, 3); complex steps allowed."""
     kind = np.result_type(X, U)
     walls = [elements.lines(X, surface.connectivity, ALONG) for surface in air.surfaces]
-    wall = [(lines, *mechanics.surface_point(X, lines, U)) for lines in walls]
+    wall = [(lines, *surface_point(lines, U)) for lines in walls]
     radii = [np.sqrt(x[..., 0] ** 2 + x[..., 1] ** 2) for _, x, _ in wall]
     box = [_middle(radii), _middle([x[..., 2] for _, x, _ in wall])]
     centre = box[0][0]
@@ -97,7 +98,7 @@ def coupling(air: Air, X: Array, U: Array, n: int) -> Coupling:
     for (lines, x, dx), r in zip(wall, radii, strict=True):
         z, dz = x[..., 2], dx[..., 2]
         psi, _ = _monomials(r, z, box)
-        swept = pressure.cross(dx, x @ pressure.SPIN.T) * lines.weights[..., None]  # n dA
+        swept = cross(dx, x @ SPIN.T) * lines.weights[..., None]  # n dA
         parts = np.einsum("egk,egi,ga->keai", psi, swept, lines.N)
         for k, part in enumerate(parts):
             np.add.at(C[k], lines.connectivity, part)

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..section.band import Cholesky
-from ..section.materials import Law
+from ..section.materials import ModulusTable
 from .bordered import Bordered
 from .harmonics import HarmonicModes, Vibration
 
@@ -29,10 +29,10 @@ class NotSelfConsistent(ArithmeticError):
 
 
 class SelfConsistent:
-    """Modes of a vibration whose rubber follows the ``laws``."""
+    """Modes of a vibration whose rubber follows the ``tables``."""
 
-    def __init__(self, vibration: Vibration, laws: list[Law]):
-        self.vibration, self.laws = vibration, laws
+    def __init__(self, vibration: Vibration, tables: list[ModulusTable]):
+        self.vibration, self.tables = vibration, tables
 
     def modes(self, n: int, count: int, factor: Cholesky | Bordered | None = None) -> HarmonicModes:
         """The ``count`` lowest modes of harmonic n, each at the modulus of its own frequency.
@@ -44,7 +44,7 @@ class SelfConsistent:
         return joined([self._settled(first, j) for j in range(len(first.eigenvalues))])
 
     def _ratios(self, frequency_Hz: float) -> Array:
-        return np.array([np.real(law.ratio(frequency_Hz)) for law in self.laws])
+        return np.array([np.real(table.ratio(frequency_Hz)) for table in self.tables])
 
     def _at(self, frequency_Hz: float, n: int, count: int) -> HarmonicModes:
         return self.vibration.at(self._ratios(frequency_Hz)).modes(n, count)

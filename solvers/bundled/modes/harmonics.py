@@ -7,7 +7,7 @@ of infinitely many sectors. A mode with n >= 1 stands for a pair turned by a qua
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -16,8 +16,8 @@ from scipy.sparse import csr_array
 
 from ..section import mechanics
 from ..section.band import Cholesky, Indefinite, Numbering
-from ..section.mechanics import Load
-from ..section.model import Model, stiffened
+from ..section.model import Model
+from ..section.parts.part import Part
 from ..section.point_elements import Attached
 from . import bordered, lanczos
 from .bordered import Border, Bordered
@@ -108,7 +108,7 @@ class Vibration:
         self,
         model: Model,
         U: Array,
-        loads: list[Load],
+        loads: Sequence[Part],
         numbering: Numbering,
         shift: float,
         wheel: Wheel | None = None,
@@ -120,7 +120,7 @@ class Vibration:
         self._model, self._U = model, U
         # the whole, then what each law of frequency adds per unit of its ratio less 1
         parts = [mechanics.tangents(model, U, loads, harmonics=True)]
-        parts += [mechanics.tangents(m, U, [], harmonics=True) for m in stiffened(model)]
+        parts += [mechanics.tangents(m, U, [], harmonics=True) for m in model.growing()]
         self._parts = parts
         self._bands = [[numbering.assemble(p) for p in three] for three in parts]
         self.weights = np.array([1.0] + [0.0] * (len(parts) - 1))

@@ -9,8 +9,8 @@ with its number p + i h dp, at the state u + i h v; no second derivative is writ
 
 from __future__ import annotations
 
-import copy
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -18,9 +18,9 @@ from scipy.sparse import csr_array
 from ..deck.keywords import STEP
 from ..section import mechanics
 from ..section.band import Cholesky, Numbering
-from ..section.mechanics import Load
-from ..section.model import Model, Rubber, stiffened
-from ..section.parts import cords, pressure, rubber
+from ..section.model import Model
+from ..section.parts.fields import Fields
+from ..section.parts.part import Part
 from .cavity import Air, coupling
 from .wheel import Wheel
 
@@ -28,7 +28,7 @@ Array = np.ndarray
 
 
 def state_rate(
-    model: Model, U: Array, loads: list[Load], numbering: Numbering, factor: Cholesky
+    model: Model, U: Array, loads: Sequence[Part], numbering: Numbering, factor: Cholesky
 ) -> Array:
     """v = dU/dp (n, 3) of the equilibrium U; ``model``, ``loads`` carry p's tangent.
 
@@ -38,40 +38,11 @@ def state_rate(
     return numbering.spread(-factor.solve(rate))
 
 
-class Fields:
-    """Modes as sums of shapes a + i b (p, nodes, 3) of harmonics n (p,).
-
-    ``owner`` (p,): the mode, from 0 on, that each is part of; None: each is a mode. What the
-    modes' gradients give is remembered from one variable to the next.
-    """
-
-    def __init__(self, n: Array, shapes: Array, owner: Array | None = None):
-        self.n, self.shapes = n, shapes
-        self.owner = np.arange(len(n)) if owner is None else owner
-        self._set(shapes.real, shapes.imag)
-
-    def _set(self, real: Array, imag: Array) -> None:
-        self.tangent = np.iscomplexobj(real)
-        self.modes = []
-        for j in range(self.owner.max() + 1):
-            mine = self.owner == j
-            self.modes.append((self.n[mine], real[mine], imag[mine]))
-        self.known: list[tuple[Array, Array, Array]] = []
-
-    def carried(self, beside: Beside | None, X: Array) -> Fields:
-        """The shapes with the rim's nodes where p's tangent takes them."""
-        if beside is None or beside.wheel is None or not np.iscomplexobj(X):
-            return self
-        moved = copy.copy(self)
-        moved._set(*beside.carried(X, self.n, self.shapes.real, self.shapes.imag))
-        return moved
-
-
 def eigenvalue_rates(
     model: Model,
     U: Array,
     V: Array,
-    loads: list[Load],
+    loads: Sequence[Part],
     fields: Fields,
     eigenvalues: Array,
     beside: Beside | None = None,
@@ -83,29 +54,22 @@ def eigenvalue_rates(
     d lambda/dp = (d lambda/dp at that modulus) / (1 - d lambda/d rho d rho/d lambda).
     """
     state = U + 1j * STEP * V
-    fields = fields.carried(beside, model.mesh.X)
+    if beside:
+        fields = beside.carried(model.mesh.X, fields)
     total = np.zeros(len(eigenvalues), complex)
-    for r in model.rubbers:
-        total += _rubber_form(r, state, fields)
     own = 1.0
-    for law, softer in zip(model.laws, stiffened(model), strict=True):
-        form = sum(_rubber_form(r, state, fields) for r in softer.rubbers)
-        hertz = np.sqrt(eigenvalues) / (2 * np.pi)
-        ratio = np.array([law.ratio(f) for f in hertz])
-        total += (ratio - 1) * form
-        # d rho / d lambda = rho (d ln rho / d ln f) / (2 lambda)
-        slope = np.array([law.slope(f) for f in hertz])
-        own = own - form.real * ratio.real * slope / (2 * eigenvalues)
-    for c in model.cords:
-        D = cords.tangent(mechanics.cord_vectors(c, state), c.stiffness)
-        D = D.reshape(*c.lines.R.shape, 3, 3) * (c.lines.weights * c.lines.R)[..., None, None]
-        total += _contract(D, _products(c.b0, c.hoop, c.lines.connectivity, fields))
-    for load in loads:
-        total += _pressure_form(model, state, load, fields)
-    M = mechanics.mass(model)
-    total -= eigenvalues * _energies(M, fields).sum(1)
-    if model.spin2:
-        total -= _energies(model.spin2 * M, fields) @ np.diag(pressure.IN_PLANE)
+    for part in (*model.parts, *loads):
+        total += part.form(state, fields)
+        for i, table in enumerate(model.tables):
+            if (grown := part.growing(i)) is not None:
+                form = grown.form(state, fields)
+                hertz = np.sqrt(eigenvalues) / (2 * np.pi)
+                ratio = np.array([table.ratio(f) for f in hertz])
+                total += (ratio - 1) * form
+                # d rho / d lambda = rho (d ln rho / d ln f) / (2 lambda)
+                slope = np.array([table.slope(f) for f in hertz])
+                own = own - form.real * ratio.real * slope / (2 * eigenvalues)
+    total -= eigenvalues * _energies(mechanics.mass(model), fields)
     if beside:
         total += beside.forms(model, state, loads, fields, eigenvalues)
     return total.imag / STEP / own
@@ -121,18 +85,19 @@ class Beside:
     rim: list[Array]
     flow: list[Array]
 
-    def carried(self, X: Array, n: Array, real: Array, imag: Array) -> tuple[Array, Array]:
-        """The shapes with the rim's nodes where p's tangent takes them."""
-        assert self.wheel
-        real, imag = real.astype(complex), imag.astype(complex)
+    def carried(self, X: Array, fields: Fields) -> Fields:
+        """The modes with the rim's nodes where p's tangent takes them."""
+        if self.wheel is None or not np.iscomplexobj(X):
+            return fields
+        real, imag = fields.shapes.real.astype(complex), fields.shapes.imag.astype(complex)
         for j, q in enumerate(self.rim):
-            a, b = (part[self.wheel.rim] for part in self.wheel.fields(int(n[j]), X))
+            a, b = (part[self.wheel.rim] for part in self.wheel.fields(int(fields.n[j]), X))
             real[j, self.wheel.rim] = a @ q.real - b @ q.imag
             imag[j, self.wheel.rim] = a @ q.imag + b @ q.real
-        return real, imag
+        return fields.replaced(real, imag)
 
     def forms(
-        self, model: Model, state: Array, loads: list[Load], fields: Fields, eigenvalues: Array
+        self, model: Model, state: Array, loads: Sequence[Part], fields: Fields, eigenvalues: Array
     ) -> Array:
         """Their part of phi^H (K - lambda M) phi per mode, with the tangent of p."""
         total = np.zeros(len(eigenvalues), complex)
@@ -153,90 +118,15 @@ class Beside:
         return total
 
 
-def _rubber_form(r: Rubber, state: Array, fields: Fields) -> Array:
-    """phi^H K phi (m,) of a block of rubber."""
-    s = r.solids
-    A = rubber.tangent(mechanics.deformation(s, state), r.material, s.weights.ravel())
-    A = A.reshape(*s.weights.shape, 9, 9)
-    total = _contract(A, _products(s.B0, s.hoop, s.connectivity, fields))
-    if s.hourglass is not None:
-        for j, (_, a, b) in enumerate(fields.modes):
-            for part in (a, b):
-                strain = np.einsum("ea,meai->mei", s.hourglass, part[:, s.connectivity])
-                total[j] += (strain**2).sum((0, 2)) @ r.hourglass_stiffness
-    return total
-
-
 def _energies(M: csr_array, fields: Fields) -> Array:
-    """u^T M u (m, 3) per mode and component; of real shapes only p's tangent, imaginary."""
+    """u^T M u (m,) per mode; of real shapes only p's tangent, imaginary."""
     energy = np.zeros((len(fields.modes), 3), complex)
-    if not (fields.tangent or np.iscomplexobj(M.data)):
-        return energy
-    if not fields.tangent:
+    if not (fields.complex or np.iscomplexobj(M.data)):
+        return energy.sum(1)
+    if not fields.complex:
         M = csr_array((M.data.imag, M.indices, M.indptr), M.shape)
         M.eliminate_zeros()
     for j, (_, a, b) in enumerate(fields.modes):
         u = np.moveaxis(np.concatenate([a, b]), 0, -1)  # (nodes, 3, parts)
         energy[j] = ((M @ u.reshape(len(u), -1)).reshape(u.shape) * u).sum((0, 2))
-    return energy if fields.tangent else 1j * energy
-
-
-def _contract(A: Array, G: Array) -> Array:
-    """sum over Gauss points of A : G per mode; A (e, g, k, k), G (m, e, g, k, k)."""
-    G, A = G.reshape(len(G), -1), A.reshape(-1)
-    if np.iscomplexobj(G):
-        return np.asarray(G @ A)
-    return np.asarray(G @ A.real + 1j * (G @ A.imag))
-
-
-def _products(B0: Array, hoop: Array, connectivity: Array, fields: Fields) -> Array:
-    """G = sum of H H^T over a mode's parts, real and imaginary (m, e, g, k, k), H its gradients:
-    the sum of all H^T A H is A : G. Operators with a tangent are one variable's, the others all's.
-    """
-    for operator, around, known in fields.known:
-        if operator is B0 or (np.array_equal(operator, B0) and np.array_equal(around, hoop)):
-            return known
-    e, g, k, _ = B0.shape
-    G = np.empty((len(fields.modes), e, g, k, k), np.result_type(B0, hoop, fields.modes[0][1]))
-    for j, (n, a, b) in enumerate(fields.modes):
-        H = np.concatenate(_gradients(B0, hoop, connectivity, a, b, n), -1)
-        np.matmul(H, H.swapaxes(-1, -2), out=G[j])
-    if not np.iscomplexobj(G):
-        fields.known.append((B0, hoop, G))
-    return G
-
-
-def _gradients(
-    B0: Array, hoop: Array, connectivity: Array, real: Array, imag: Array, n: Array
-) -> tuple[Array, Array]:
-    """Real and imaginary part of (B0 + i n B1)(a + i b), each (e, g, k, m); k = 9 or 3."""
-    e, g, k, d = B0.shape
-    B = B0.reshape(e, g * k, d)
-    fields = []
-    for part in (real, imag):
-        u = np.moveaxis(part[:, connectivity], 0, -1)  # (e, a, 3, m)
-        H = (B @ u.reshape(e, d, -1)).reshape(e, g, k, -1)
-        around = np.einsum("ega,eaim->egim", hoop, u) * n  # n u_i / R
-        fields.append((H, around))
-    rows = slice(1, None, 3) if k == 9 else slice(None)
-    (H_real, around_real), (H_imag, around_imag) = fields
-    H_real[:, :, rows] -= around_imag
-    H_imag[:, :, rows] += around_real
-    return H_real, H_imag
-
-
-def _pressure_form(model: Model, state: Array, load: Load, fields: Fields) -> Array:
-    """phi^H K phi (m,) of a follower pressure; its K0 is symmetric, its K1 antisymmetric:
-    (a - i b)^T (K0 + i n K1) (a + i b) = K0 : (a a^T + b b^T) + K1 : n (b a^T - a b^T)."""
-    alone = replace(model, rubbers=[], cords=[], spin2=0.0)
-    (_, K0), (_, K1) = (parts[0] for parts in mechanics.tangents(alone, state, [load], True)[:2])
-    rows = load.lines.connectivity
-    total = np.zeros(len(fields.modes), complex)
-    for j, (n, real, imag) in enumerate(fields.modes):
-        a, b = (
-            np.moveaxis(part[:, rows].reshape(len(n), *K0.shape[:2]), 0, -1)
-            for part in (real, imag)
-        )
-        at, bt = a.swapaxes(1, 2), b.swapaxes(1, 2)
-        total[j] = (K0 * (a @ at + b @ bt)).sum() + (K1 * ((n * b) @ at - (n * a) @ bt)).sum()
-    return total
+    return (energy if fields.complex else 1j * energy).sum(1)

@@ -23,7 +23,7 @@ from scipy.optimize import linear_sum_assignment
 from ..deck.keywords import STEP
 from ..modes.harmonics import Change, HarmonicModes, Vibration
 from ..section.mechanics import mass_matrices
-from ..section.parts.pressure import SPIN
+from ..section.parts.frame import SPIN
 from .coupled import Family, ritz, split
 
 Array = np.ndarray

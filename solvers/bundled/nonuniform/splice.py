@@ -12,18 +12,21 @@ r = (K~ - lambda M~) u, the axisymmetric K per harmonic (Davidson, J. Comp. Phys
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..modes.harmonics import HarmonicModes, Vibration
 from ..section.inflation import InflationFailed
-from ..section.mechanics import Load, mass
+from ..section.mechanics import mass
 from ..section.model import Model
+from ..section.parts.elastic import Elastic
+from ..section.parts.law import Inverted
+from ..section.parts.part import Part
 from ..solid3d.circumference import Circumference
 from ..solid3d.gmres import gmres
-from ..solid3d.revolved import Inverted, Revolved
+from ..solid3d.revolved import Revolved
 from .coupled import split, tell
 
 Array = np.ndarray
@@ -63,22 +66,12 @@ def full_circle(highest: int) -> Circumference:
 
 
 def blended(model: Model, other: Model, share: Array) -> Model:
-    """``model`` with constants per Gauss point and station (p, s); an hourglass stiffness stays."""
-    mix = lambda a, b, p: (
-        np.broadcast_to(a, p)[:, None]
-        + np.outer(np.broadcast_to(b, p) - np.broadcast_to(a, p), share)
-    )
-    rubbers = []
-    for r, o in zip(model.rubbers, other.rubbers, strict=True):
-        a, b, p = r.material, o.material, r.solids.weights.size
-        pick = lambda name, a=a, b=b, p=p: mix(getattr(a, name), getattr(b, name), p)
-        law = replace(a, C10=pick("C10"), C01=pick("C01"), inverse_D1=pick("inverse_D1"))
-        rubbers.append(replace(r, material=law))
-    cords = [
-        replace(c, stiffness=mix(c.stiffness, o.stiffness, c.stiffness.size))
-        for c, o in zip(model.cords, other.cords, strict=True)
-    ]
-    return replace(model, rubbers=rubbers, cords=cords)
+    """``model`` with constants per Gauss point and station (p, s): ``share`` (s,) of ``other``."""
+    parts: list[Part] = []
+    for part, its in zip(model.parts, other.parts, strict=True):
+        assert isinstance(part, Elastic) and isinstance(its, Elastic)
+        parts.append(replace(part, law=part.law.blended(its.law, share)))
+    return replace(model, parts=parts)
 
 
 class Round:
@@ -135,7 +128,7 @@ def _angles(k: int) -> Array:
 def sector_modes(
     vibration: Vibration,
     U: Array,
-    loads: list[Load],
+    loads: Sequence[Part],
     model: Model,
     sector: Sector,
     harmonics: list[int],

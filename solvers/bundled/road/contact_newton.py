@@ -11,8 +11,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..section.band import Indefinite
+from ..section.parts.law import Inverted
 from ..solid3d.gmres import gmres
-from ..solid3d.revolved import Inverted, Revolved
+from ..solid3d.revolved import Revolved
 from .block_cholesky import Elimination, Factor
 from .contact import Contact, Road
 from .contact_update import Touching

@@ -24,8 +24,10 @@ from ..modes.harmonics import Unstable, Vibration, lowest_of_all
 from ..modes.lanczos import NotConverged
 from ..section.band import Numbering
 from ..section.elements import Lines
-from ..section.mechanics import Load
 from ..section.model import Model
+from ..section.parts.elastic import Elastic
+from ..section.parts.hourglass import Hourglass
+from ..section.parts.pressure import Pressure
 from ..solid3d.circumference import half_circle
 from ..solid3d.revolved import Revolved
 from .contact import flat_road
@@ -141,7 +143,7 @@ def _half_lengths(model: list[Keyword]) -> Array:
 def press(
     model: Model,
     equations: Numbering,
-    loads: list[Load],
+    loads: list[Pressure],
     U: Array,
     data: RoadData,
     wanted: list[float],
@@ -158,7 +160,7 @@ def press(
     k = len(around.angles)
     if data.tread not in model.mesh.faces:
         raise DeckError(0, f"surface {data.tread} is not defined in the section's job")
-    if any(r.solids.hourglass is not None for r in model.rubbers):
+    if any(isinstance(p, Elastic) and isinstance(p.law, Hourglass) for p in model.parts):
         raise DeckError(
             0,
             "CGAX4R cannot be pressed on a road, its hourglass stiffness does not hold short waves"

@@ -26,7 +26,6 @@ def numbering(model: Model, step: Step) -> Numbering:
     key = free.tobytes()
     if key not in mesh.numberings:
         groups = [block.connectivity for block in mesh.blocks.values()]
-        groups += [layers.lines.connectivity for layers in model.cords]
         mesh.numberings[key] = Numbering(groups, free)
     return mesh.numberings[key]
 

@@ -10,7 +10,7 @@ operators serves the axisymmetric state and all harmonics u exp(i n Theta):
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -29,30 +29,16 @@ class FoldedElement(ValueError):
 
 @dataclass(frozen=True)
 class Solids:
-    """Rubber elements of one type.
+    """Quadrilaterals of one type, at Gauss points; B1 is as in `parts.elastic`."""
 
-    connectivity (e, a); N (g, a); weights (e, g): w det(dX/dxi) R, m2 per radian;
-    B0 (e, g, 9, 3a); hoop (e, g, a): N/R, the only rows of B1; hourglass (e, a) or None;
-    mass_N (g', a), mass_weights (e, g'): a rule that integrates the mass in full.
-    """
-
-    connectivity: Array
-    N: Array
-    weights: Array
-    B0: Array
-    hoop: Array
-    hourglass: Array | None
-    mass_N: Array
-    mass_weights: Array
-
-    @property
-    def B1(self) -> Array:
-        """The rows (r, theta, z; Theta) of B1, (e, g, 3, 3a)."""
-        e, g, a = self.hoop.shape
-        B1 = np.zeros((e, g, 3, a, 3), self.hoop.dtype)
-        for i in range(3):
-            B1[:, :, i, :, i] = self.hoop
-        return B1.reshape(e, g, 3, 3 * a)
+    connectivity: Array  # (e, a)
+    weights: Array  # (e, g): w det(dX/dxi) R, m2 per radian
+    B0: Array  # (e, g, 9, 3a)
+    hoop: Array  # (e, g, a): N / R, the only rows of B1
+    hourglass: Array | None  # (e, a), of elements with one Gauss point
+    # a rule that integrates the mass in full
+    mass_N: Array  # (g', a)
+    mass_weights: Array  # (e, g')
 
 
 def solids(X: Array, connectivity: Array, points: int) -> Solids:
@@ -76,7 +62,6 @@ def solids(X: Array, connectivity: Array, points: int) -> Solids:
     _, mass_weights, _ = _map(X, connectivity, mass_rule)
     return Solids(
         connectivity,
-        rule.N,
         weights,
         B0.reshape(e, g, 9, 3 * a),
         hoop,
@@ -115,47 +100,34 @@ def _hourglass(corners: Array, gradient: Array, weights: Array) -> Array:
 
 @dataclass(frozen=True)
 class Lines:
-    """Rebar or pressure lines: connectivity (e, a) and, at Gauss points, N (g, a),
-    slope (e, g, a) = dN/ds, R (e, g), tangent (e, g, 2), weights (e, g) = w ds (m)."""
+    """Rebar or pressure lines, at Gauss points."""
 
-    connectivity: Array
-    N: Array
-    slope: Array
-    R: Array
-    tangent: Array
-    weights: Array
+    connectivity: Array  # (e, a)
+    X: Array  # (e, a, 2): R, Z of the nodes, m
+    N: Array  # (g, a)
+    slope: Array  # (e, g, a): dN/ds, 1/m
+    R: Array  # (e, g), m
+    tangent: Array  # (e, g, 2): dX/ds
+    weights: Array  # (e, g): w ds, m
+
+    def pick(self, rows: Array) -> Lines:
+        """Some of the elements."""
+        own = {each.name: getattr(self, each.name) for each in fields(self)}
+        return Lines(**{name: v if name == "N" else v[rows] for name, v in own.items()})
 
 
 def lines(X: Array, connectivity: Array, points: int = 2) -> Lines:
     """Operators along two- or three-node lines in the section."""
     rule = shapes.line(connectivity.shape[1], points)
-    corners = X[connectivity]
-    dX = np.einsum("ga,eaj->egj", rule.dN[..., 0], corners)
+    ends = X[connectivity]
+    dX = np.einsum("ga,eaj->egj", rule.dN[..., 0], ends)
     length = np.sqrt((dX * dX).sum(-1))
     return Lines(
         connectivity,
+        ends,
         rule.N,
         rule.dN[..., 0] / length[..., None],
-        np.einsum("ga,ea->eg", rule.N, corners[..., 0]),
+        np.einsum("ga,ea->eg", rule.N, ends[..., 0]),
         dX / length[..., None],
         rule.weights * length,
     )
-
-
-def cord_operators(lines: Lines, cos: Array, sin: Array) -> tuple[Array, Array, Array]:
-    """a (e, g, 3), b0 (e, g, 3, 3a), hoop (e, g, a): q = a + b0 u, and i n hoop u per component.
-
-    cos, sin: of the cord's angle from the meridian, per element (e,) or scalar.
-    """
-    e, g, a = lines.slope.shape
-    cos = np.broadcast_to(np.asarray(cos).reshape(-1, 1), (e, g))
-    sin = np.broadcast_to(np.asarray(sin).reshape(-1, 1), (e, g))
-    direction = np.stack([cos * lines.tangent[..., 0], sin, cos * lines.tangent[..., 1]], -1)
-    along = cos[..., None] * lines.slope
-    hoop = sin[..., None] * lines.N / lines.R[..., None]
-    b0 = np.zeros((e, g, 3, a, 3), np.result_type(along, hoop))
-    for i in range(3):
-        b0[:, :, i, :, i] = along
-    b0[:, :, 0, :, 1] = -hoop
-    b0[:, :, 1, :, 0] = hoop
-    return direction, b0.reshape(e, g, 3, 3 * a), hoop

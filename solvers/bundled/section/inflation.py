@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from operator import methodcaller
 
 import numpy as np
 
 from . import mechanics
 from .band import Cholesky, Indefinite, Numbering
-from .mechanics import Load
 from .model import Model
+from .parts.part import Part
+from .parts.pressure import Pressure
+from .parts.spin import Spin
 
 Array = np.ndarray
 TOLERANCE = 1e-9  # out-of-balance force over pressure force; the next step is at round-off
@@ -45,7 +48,7 @@ class State:
 def equilibrium(
     model: Model,
     numbering: Numbering,
-    loads: list[Load],
+    loads: list[Pressure],
     start: Array,
     check: Callable[[], None] = lambda: None,
 ) -> State:
@@ -71,7 +74,7 @@ def equilibrium(
 class _Solver:
     """Newton solutions at a share of the load and a multiple of the rubber's stiffness."""
 
-    def __init__(self, model: Model, numbering: Numbering, loads: list[Load]):
+    def __init__(self, model: Model, numbering: Numbering, loads: list[Pressure]):
         self.model, self.numbering, self.loads = model, numbering, loads
         self.full = max((abs(load.pressure) for load in loads), default=0.0)
         # a slack membrane has no stiffness against pressure yet, so the first tangents from rest
@@ -84,8 +87,8 @@ class _Solver:
 
     def __call__(self, U: Array, share: float, stiffness: float, longest: int) -> Array | None:
         """Displacements from the start U, or None and ``why``."""
-        model = self.model if stiffness == 1.0 else _stiffened(self.model, stiffness)
-        loads = [Load(load.lines, load.pressure * share) for load in self.loads]
+        model = self.model.with_laws(methodcaller("stiffened", stiffness))
+        loads = [Pressure(load.lines, load.pressure * share) for load in self.loads]
         tension = 0.0 if U.any() else share * self.tension
         found, used, self.why = _newton(
             model, self.numbering, loads, self.mass, U, tension, longest
@@ -128,32 +131,16 @@ def _by_pressure(solve: _Solver, start: Array, check: Callable[[], None]) -> Arr
     return U
 
 
-def _stiffened(model: Model, factor: float) -> Model:
-    rubbers = [
-        replace(
-            r,
-            material=replace(
-                r.material,
-                C10=factor * r.material.C10,
-                C01=factor * r.material.C01,
-                inverse_D1=factor * r.material.inverse_D1,
-            ),
-        )
-        for r in model.rubbers
-    ]
-    return replace(model, rubbers=rubbers)
-
-
 def _newton(
     model: Model,
     numbering: Numbering,
-    loads: list[Load],
+    loads: list[Pressure],
     mass: Array,
     U: Array,
     tension: float,
     longest: int,
 ) -> tuple[Array | None, int, str]:
-    scale = np.linalg.norm(_pressure_force(model, U, loads, numbering))
+    scale = np.linalg.norm(_load_force(model, U, loads, numbering))
     energy = mechanics.potential(model, U, loads)
     force = mechanics.residual(model, U, loads, numbering)
     smallest, used, inertia, before = 1e-3 * tension, 0, 0.0, float("inf")
@@ -162,8 +149,8 @@ def _newton(
         if size <= TOLERANCE * scale or (size <= LOOSE * scale and size > 0.5 * before):
             return U, used, ""
         before = size
-        K0, _, _ = mechanics.tangents(model, U, loads, harmonics=False, tension=tension)
-        band = numbering.assemble(K0)
+        taut = model.with_laws(methodcaller("tautened", tension))
+        band = numbering.assemble(mechanics.tangents(taut, U, loads, harmonics=False)[0])
         while True:
             used += 1
             held = band.copy(order="F")
@@ -194,11 +181,11 @@ def _newton(
     return None, used, f"Newton's method did not converge in {longest} iterations"
 
 
-def _pressure_force(model: Model, U: Array, loads: list[Load], numbering: Numbering) -> Array:
+def _load_force(model: Model, U: Array, loads: list[Pressure], numbering: Numbering) -> Array:
     """Force of the pressure alone, of at least 1 Pa, or of the spin where there is none: the scale
     of what counts as balanced."""
-    if model.spin2 and not loads:
-        return mechanics.residual(model, 0 * U, [], numbering)
-    bare = Model(model.mesh, [], [])
-    felt = [Load(load.lines, max(float(np.real(load.pressure)), 1.0)) for load in loads]
-    return mechanics.residual(bare, U, felt, numbering) if felt else np.ones(1)
+    acting: list[Part] = [p for p in model.parts if isinstance(p, Spin)]
+    if loads:
+        felt = [max(float(np.real(load.pressure)), 1.0) for load in loads]
+        acting = [Pressure(each.lines, p) for each, p in zip(loads, felt, strict=True)]
+    return mechanics.residual(Model(model.mesh, []), U, acting, numbering) if acting else np.ones(1)

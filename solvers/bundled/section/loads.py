@@ -8,23 +8,25 @@ import numpy as np
 
 from ..deck.keywords import DeckError
 from ..deck.steps import Step
-from .elements import Solids
-from .mechanics import Load
 from .model import Model
+from .parts.pressure import Pressure
+from .parts.spin import spinning
 
 
-def pressures(model: Model, step: Step) -> list[Load]:
+def pressures(model: Model, step: Step) -> list[Pressure]:
     """The pressure on each surface. Raises DeckError."""
     for surface in step.pressures:
         if surface not in model.mesh.faces:
             raise DeckError(step.procedure.line, f"surface {surface} of the step is not defined")
-    return [Load(model.mesh.faces[s], value) for s, value in step.pressures.items()]
+    return [Pressure(model.mesh.faces[s], value) for s, value in step.pressures.items()]
 
 
 def turning(model: Model, step: Step) -> Model:
     """The model with the centrifugal load of a step. Raises DeckError."""
     spin2 = _uniform(model, step, step.centrifugal, "CENTRIF")
-    return replace(model, spin2=spin2) if spin2 else model
+    if not spin2:
+        return model
+    return replace(model, parts=model.parts + spinning(model.parts, model.mesh.X, spin2))
 
 
 def spin(model: Model, step: Step) -> complex | float:
@@ -54,11 +56,12 @@ def _uniform(
     if unknown:
         raise DeckError(line, f"element set {unknown[0]} of the step's *DLOAD is not defined")
     loaded = {number for name in sets for number in elements[name]}
-    cords = {tuple(row) for c in model.cords for row in c.lines.connectivity.tolist()}
+    massive = {
+        tuple(row) for p in model.parts if p.mass is not None for row in p.connectivity.tolist()
+    }
     for number in set(model.mesh.place) - loaded:
         kind, row = model.mesh.place[number]
-        block = model.mesh.blocks[kind]
-        if isinstance(block, Solids) or tuple(block.connectivity[row].tolist()) in cords:
+        if tuple(model.mesh.blocks[kind].connectivity[row].tolist()) in massive:
             raise DeckError(line, f"element {number} has mass, but is left out of the load {load}")
     if len(set(sets.values())) > 1:
         raise DeckError(line, f"the load {load} must be one for all elements of the tyre")

@@ -1,4 +1,4 @@
-"""Materials of a deck: rubber with Prony terms or a law of frequency, elastic cords, a gas."""
+"""Materials of a deck: rubber with Prony terms or a table of moduli, elastic cords, a gas."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ Number = complex | float  # complex where it carries the tangent of a slope (`se
 
 
 @dataclass(frozen=True)
-class Law:
-    """Rows of the table: frequency (Hz, rising) and storage over static shear modulus."""
+class ModulusTable:
+    """Storage over static shear modulus by frequency."""
 
-    frequency_Hz: tuple[float, ...]
+    frequency_Hz: tuple[float, ...]  # rising
     ratios: tuple[Number, ...]
 
     def ratio(self, frequency_Hz: float) -> Number:
@@ -42,23 +42,19 @@ class Law:
 
 @dataclass
 class Material:
-    """Constants as the deck gives them; Pa, kg/m3, s.
-
-    ``instantaneous``: the moduli are those of sudden loading. ``prony``: rows (g, k, tau);
-    ``law``: of the storage modulus over frequency, in place of a Prony series.
-    """
+    """Constants as the deck gives them."""
 
     name: str
     line: int
-    density: Number = 0.0
-    youngs_modulus: Number | None = None
-    C10: Number | None = None
-    C01: Number = 0.0
-    inverse_D1: Number = 0.0
-    instantaneous: bool = False
-    prony: list[tuple[Number, Number, Number]] = field(default_factory=list)
-    law: Law | None = None
-    bulk_modulus: Number | None = None
+    density: Number = 0.0  # kg/m3
+    youngs_modulus: Number | None = None  # Pa
+    C10: Number | None = None  # Pa
+    C01: Number = 0.0  # Pa
+    inverse_D1: Number = 0.0  # Pa
+    instantaneous: bool = False  # the moduli are those of sudden loading
+    prony: list[tuple[Number, Number, Number]] = field(default_factory=list)  # g, k, tau in s
+    table: ModulusTable | None = None  # in place of a Prony series
+    bulk_modulus: Number | None = None  # Pa, of a gas
 
     def _relaxed(self) -> tuple[Number, Number]:
         """Long-term over instantaneous modulus, shear and bulk: 1 - sum g, 1 - sum k."""
@@ -78,8 +74,8 @@ class Material:
         """
         if frequency_Hz is None:
             return 1.0, 1.0
-        if self.law is not None:
-            return self.law.ratio(frequency_Hz), 1.0
+        if self.table is not None:
+            return self.table.ratio(frequency_Hz), 1.0
         ratios: list[Number] = []
         for kind, relaxed in enumerate(self._relaxed()):
             storage = relaxed
@@ -131,7 +127,7 @@ def _hyperelastic(m: Material, k: Keyword) -> None:
 
 def _viscoelastic(m: Material, k: Keyword) -> None:
     if "FREQUENCY" in k.parameters:
-        m.law = _law(k)
+        m.table = _modulus_table(k)
         return
     for row in k.rows:
         if len(row.fields) > 3 and any(row.fields[3:]):
@@ -143,7 +139,7 @@ def _viscoelastic(m: Material, k: Keyword) -> None:
         raise DeckError(k.line, "the sum of g (and of k) of a Prony series must stay below 1")
 
 
-def _law(k: Keyword) -> Law:
+def _modulus_table(k: Keyword) -> ModulusTable:
     """Rows of loss and storage: G''/G0, 1 - G'/G0, K''/K0, 1 - K'/K0, frequency in Hz. A
     vibration without damping has no use for the losses."""
     frequency = [float(np.real(row.number(4))) for row in k.rows]
@@ -152,7 +148,7 @@ def _law(k: Keyword) -> Law:
         raise DeckError(k.line, "a table of moduli has two rows or more, their frequencies rise")
     if any(np.real(ratio) <= 0 for ratio in ratios) or any(row.number(3, 0.0) for row in k.rows):
         raise DeckError(k.line, "shear moduli of a table are positive, and the bulk modulus stays")
-    return Law(tuple(frequency), tuple(ratios))
+    return ModulusTable(tuple(frequency), tuple(ratios))
 
 
 def _positive(k: Keyword, index: int, what: str) -> Number:

@@ -1,4 +1,4 @@
-"""Cords of a rebar layer, one-dimensional in logarithmic strain.
+"""Cords of rebar layers, one-dimensional in logarithmic strain.
 
 A cord along the reference unit vector a is carried to q = F a, its stretch is lambda = |q|:
 
@@ -8,32 +8,127 @@ A cord along the reference unit vector a is carried to q = F a, its stretch is l
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+from typing import Self
+
 import numpy as np
 
+from ...deck.keywords import DeckError, Keyword, Row
+from ..elements import Lines
+from .elastic import Elastic, Rows, on_diagonals
+from .law import Law
+from .part import Part, consistent_mass
+from .section_job import SectionJob
+
 Array = np.ndarray
+SURFACES = ("SFMGAX1", "SFMGAX2")
+
+
+@dataclass(frozen=True)
+class LogarithmicCord(Law):
+    """Constants per Gauss point."""
+
+    stiffness: Array  # E A / s, N/m
+    tension: float = 0.0  # artificial, N/m: no energy, but a tangent
+
+    def energy(self, z: Array) -> Array:
+        return self.stiffness * np.log(stretch(z)) ** 2 / 2
+
+    def force(self, z: Array) -> Array:
+        length = stretch(z)
+        return np.asarray((self.stiffness * np.log(length) / length**2)[:, None] * z)
+
+    def tangent(self, z: Array, weights: Array | float = 1.0) -> Array:
+        length = stretch(z)
+        log = np.log(length)
+        along = self.stiffness * (1 - 2 * log) / length**4
+        D = along[:, None, None] * z[:, :, None] * z[:, None, :]
+        D += (self.stiffness * log / length**2)[:, None, None] * np.eye(3)
+        if self.tension:
+            D[:, range(3), range(3)] += self.tension
+        return D * np.reshape(weights, (-1, 1, 1))
+
+    def tautened(self, tension: float) -> Self:
+        return replace(self, tension=tension)
 
 
 def stretch(q: Array) -> Array:
-    """lambda (p,) of the cord vectors q (p, 3); complex q allowed."""
+    """lambda (p,) of the cord vectors q (p, 3)."""
     return np.sqrt((q * q).sum(-1))
 
 
-def energy(q: Array, stiffness: Array) -> Array:
-    """W (p,) for ``stiffness`` = E A / s (N/m)."""
-    return stiffness * np.log(stretch(q)) ** 2 / 2
+def cord_rows(lines: Lines, cos: Array | float, sin: Array | float) -> Rows:
+    """q = a + B0 u + B1 du/dTheta of cords at an angle from the meridian, given by its ``cos`` and
+    ``sin``, per element (e,) or one for all."""
+    cos, sin = (np.broadcast_to(np.asarray(x).reshape(-1, 1), lines.R.shape) for x in (cos, sin))
+    direction = np.stack([cos * lines.tangent[..., 0], sin, cos * lines.tangent[..., 1]], -1)
+    along = cos[..., None] * lines.slope
+    hoop = sin[..., None] * lines.N / lines.R[..., None]
+    B0 = on_diagonals(along.astype(np.result_type(along, hoop)))
+    B0[:, :, 0, 1::3] = -hoop
+    B0[:, :, 1, 0::3] = hoop
+    return Rows(B0, hoop, slice(0, 3), direction, lines.weights * lines.R)
 
 
-def force(q: Array, stiffness: Array) -> Array:
-    """dW/dq (p, 3), N/m."""
-    length = stretch(q)
-    return (stiffness * np.log(length) / length**2)[:, None] * q
+def read(job: SectionJob) -> list[Part]:
+    """The cords of each element type, of all its rebar layers. Raises DeckError."""
+    layers: dict[str, list[_Layer]] = {}
+    surface: Keyword | None = None
+    for k in job.keywords:
+        if k.name == "SURFACE SECTION":
+            surface = k
+        elif k.name == "REBAR LAYER":
+            if surface is None:
+                raise DeckError(k.line, "*REBAR LAYER must follow a *SURFACE SECTION")
+            for kind, rows in job.by_type(surface, SURFACES).items():
+                block = job.mesh.blocks[kind]
+                assert isinstance(block, Lines)
+                own = layers.setdefault(kind, [])
+                own += [_layer(job, k, row, block.pick(rows)) for row in k.rows]
+    return [_cords(each) for each in layers.values()]
 
 
-def tangent(q: Array, stiffness: Array) -> Array:
-    """d2W/dqdq (p, 3, 3), N/m."""
-    length = stretch(q)
-    log = np.log(length)
-    along = stiffness * (1 - 2 * log) / length**4
-    D = along[:, None, None] * q[:, :, None] * q[:, None, :]
-    D += (stiffness * log / length**2)[:, None, None] * np.eye(3)
-    return D
+@dataclass(frozen=True)
+class _Layer:
+    lines: Lines
+    rows: Rows
+    stiffness: Array  # E A / s (e, g), N/m
+    mass: Array  # A rho / s (e, g), kg/m2
+
+
+def _layer(job: SectionJob, k: Keyword, row: Row, lines: Lines) -> _Layer:
+    """Data line: name, area, spacing, position, material, angle from the meridian (degrees)."""
+    area, spacing = row.number(1), row.number(2)
+    material = job.material(k, row.text(4).upper())
+    if row.number(3, 0.0) != 0.0:
+        raise DeckError(row.line, "the position of a layer in a surface element is 0.0")
+    if material.youngs_modulus is None:
+        raise DeckError(row.line, f"material {material.name} of a rebar layer is not *ELASTIC")
+    if not (np.real(area) > 0 and np.real(spacing) > 0):
+        raise DeckError(row.line, "area and spacing of a layer must be positive")
+    angle = row.number(5, 0.0) * np.pi / 180
+    width = spacing * np.ones_like(lines.R)
+    if k.get("GEOMETRY") == "ANGULAR":  # spacing in degrees: the cords fan out with the radius
+        width = spacing * np.pi / 180 * lines.R
+    smeared = area / width
+    rows = cord_rows(lines, np.cos(angle), np.sin(angle))
+    return _Layer(lines, rows, material.youngs_modulus * smeared, material.density * smeared)
+
+
+def _cords(layers: list[_Layer]) -> Elastic:
+    """All layers as one part: what is added up once is added up in one order."""
+    join = lambda pick: np.concatenate([pick(layer) for layer in layers])
+    rows = Rows(
+        join(lambda layer: layer.rows.B0),
+        join(lambda layer: layer.rows.hoop),
+        layers[0].rows.around,
+        join(lambda layer: layer.rows.rest),
+        join(lambda layer: layer.rows.weights),
+    )
+    per_radian = join(lambda layer: layer.mass * layer.lines.R * layer.lines.weights)
+    return Elastic(
+        join(lambda layer: layer.lines.connectivity),
+        rows,
+        LogarithmicCord(join(lambda layer: layer.stiffness).ravel()),
+        consistent_mass(layers[0].lines.N, per_radian),
+    )

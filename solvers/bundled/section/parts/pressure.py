@@ -10,12 +10,68 @@ The gauge (x_r, x_theta, 0)/2 makes the second variation symmetric also at open 
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
+from typing import Any
+
 import numpy as np
+
+from ..elements import Lines
+from .frame import IN_PLANE, SPIN, cross
+from .part import AtStations, Part, Precision, Tangents
 
 Array = np.ndarray
 
-IN_PLANE = np.diag([1.0, 1.0, 0.0])
-SPIN = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])  # e_z x
+
+@dataclass
+class Pressure(Part):
+    """A pressure (Pa) on the faces of a surface."""
+
+    lines: Lines
+    pressure: complex | float
+    connectivity: Array = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.connectivity = self.lines.connectivity
+
+    def energy(self, U: Array) -> Any:
+        return -self.pressure * volume(*surface_point(self.lines, U), self.lines.weights)
+
+    def force(self, U: Array) -> Array:
+        by_x, by_dx = first(*surface_point(self.lines, U))
+        weights = -self.pressure * self.lines.weights
+        force = self.lines.N.T @ (weights[..., None] * by_x)
+        force = force + (weights[..., None] * self.lines.slope).swapaxes(1, 2) @ by_dx
+        return np.asarray(force.reshape(len(force), -1))
+
+    def tangents(self, U: Array, harmonics: bool) -> Tangents:
+        lines = self.lines
+        e, g, a = lines.slope.shape
+        xx, xd, linear = second(*surface_point(lines, U))
+        weights = -self.pressure * lines.weights / 2
+        N = np.broadcast_to(lines.N, (e, g, a))
+
+        def blocks(left: Array, middle: Array, right: Array) -> Array:
+            """sum over Gauss points of weights left_a middle_ij right_b as (e, 3a, 3a)."""
+            pairs = (weights[..., None] * left)[..., :, None] * right[..., None, :]
+            sums = pairs.reshape(e, g, a * a).swapaxes(1, 2) @ middle.reshape(e, g, 9)
+            return sums.reshape(e, a, a, 3, 3).swapaxes(2, 3).reshape(e, 3 * a, 3 * a)
+
+        Q = blocks(N, xx, N) + blocks(N, xd, lines.slope)
+        K0 = Q + Q.swapaxes(1, 2)
+        if not harmonics:
+            return K0, None, None
+        Q = blocks(N, linear[..., 0, :, :], N) + blocks(lines.slope, linear[..., 1, :, :], N)
+        return K0, Q - Q.swapaxes(1, 2), None
+
+    def at_stations(self, nodes: int) -> PressureAtStations:
+        return PressureAtStations(self, nodes)
+
+
+def surface_point(lines: Lines, U: Array) -> tuple[Array, Array]:
+    """Deformed position x and its slope x' = dx/ds (e, g, 3) on a surface."""
+    x = U[lines.connectivity] + np.zeros(1, lines.X.dtype)
+    x[..., 0::2] += lines.X
+    return lines.N @ x, lines.slope @ x
 
 
 def _cross(a: Array) -> Array:
@@ -25,13 +81,6 @@ def _cross(a: Array) -> Array:
         X[..., i, j] = -a[..., k]
         X[..., j, i] = a[..., k]
     return X
-
-
-def cross(a: Array, b: Array) -> Array:
-    """a x b over the last axis; np.cross spends ten times as long on its arguments."""
-    ax, ay, az = a[..., 0], a[..., 1], a[..., 2]
-    bx, by, bz = b[..., 0], b[..., 1], b[..., 2]
-    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], -1)
 
 
 def volume(x: Array, dx: Array, weights: Array) -> Array:
@@ -82,3 +131,64 @@ def change(
     by_around = cross(v, dx) + cross(y, du)
     by_x = (cross(du, d) + cross(dx, e)) @ IN_PLANE + by_around @ SPIN
     return by_x / 2, (cross(e, y) + cross(d, v)) / 2, by_around / 2
+
+
+class PressureAtStations(AtStations):
+    """V = 1/2 int (x_r, x_theta, 0) . (x' x (dx/dTheta + e_z x x)) at every station."""
+
+    def __init__(self, part: Pressure, nodes: int):
+        super().__init__(part.connectivity, nodes)
+        self.lines = lines = part.lines
+        self.X = np.insert(lines.X, 1, 0.0, -1)
+        self.N = np.broadcast_to(lines.N, lines.slope.shape)
+        self.weights = -part.pressure * lines.weights
+
+    def _fields(self, u: Array, du: Array) -> tuple[Array, Array, Array]:
+        """u, u', du (e, g, s, 3) on the surface."""
+        lines, (e, g, a) = self.lines, self.N.shape
+        at = lambda w, rows: (rows @ w[self.dofs].reshape(e, a, -1)).reshape(e, g, 3, -1)
+        fields = at(u, self.N), at(u, lines.slope), at(du, self.N)
+        return tuple(np.ascontiguousarray(f.swapaxes(2, 3)) for f in fields)  # type: ignore[return-value]
+
+    def _forces(self, by_x: Array, by_dx: Array, by_around: Array) -> tuple[Array, Array]:
+        lines = self.lines
+        e, g, s, _ = by_x.shape
+        w = self.weights[..., None, None]
+        at = lambda rows, f: (
+            rows.swapaxes(1, 2) @ (w * f).swapaxes(2, 3).reshape(e, g, 3 * s)
+        ).reshape(e, -1, s)
+        return at(self.N, by_x) + at(lines.slope, by_dx), at(self.N, by_around)
+
+    def place(self, u: Array, du: Array) -> tuple[Array, Array, Array]:
+        """Deformed x, x', dx/dTheta (e, g, s, 3) on the surface."""
+        x, dx, around = self._fields(u, du)
+        x = x + (self.N @ self.X)[:, :, None]
+        return x, dx + (self.lines.slope @ self.X)[:, :, None], around
+
+    def force(self, u: Array, du: Array) -> tuple[Array, Array]:
+        self.at = self.place(u, du)
+        return self._forces(*first_around(*self.at))
+
+    def energy(self) -> Array:
+        return np.asarray((density(*self.at) * self.weights[..., None]).sum((0, 1)))
+
+    def product(self, u: Array, du: Array) -> tuple[Array, Array]:
+        return self._forces(*change(*self.at, *self._fields(u, du)))
+
+    def tangents(self, precision: Precision) -> tuple[Array, Array, Array]:
+        """By the product with unit displacements of each element's own nodes."""
+        lines = self.lines
+        e, g, a = lines.slope.shape
+        s = self.at[0].shape[2]
+        K = np.zeros((3, s, e, 3 * a, 3 * a), precision)
+        for b in range(a):
+            for j in range(3):
+                unit = np.zeros((e, g, s, 3))
+                unit[..., j] = 1.0
+                N, slope = self.N[:, :, b, None, None], lines.slope[:, :, b, None, None]
+                zero = np.zeros_like(unit)
+                by_u, _ = self._forces(*change(*self.at, unit * N, unit * slope, zero))
+                mixed, _ = self._forces(*change(*self.at, zero, zero, unit * N))
+                K[0, ..., 3 * b + j] = by_u.transpose(2, 0, 1)
+                K[1, ..., 3 * b + j] = mixed.transpose(2, 0, 1)
+        return K[0], K[1], K[2]

@@ -1,0 +1,170 @@
+"""Parts that store an energy W(z) in rows that are linear in the displacements at Gauss points,
+
+    z = z0 + B0 u + B1 du/dTheta.
+
+Rubber's rows are the deformation gradient, a cord's its vector. With u exp(i n Theta) and A =
+d2W/dzdz, summed over Gauss points, K(n) = K0 + i n K1 + n^2 K2 has
+
+    K0 = B0^T A B0,   K1 = B0^T A B1 - transposed,   K2 = B1^T A B1
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from .fields import Fields, contract
+from .law import Inverted, Law
+from .part import AtStations, Part, Precision, Tangents
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True)
+class Rows:
+    """z at Gauss points of elements of one kind."""
+
+    B0: Array  # (e, g, k, 3a)
+    hoop: Array  # (e, g, a): B1 (e, g, 3, 3a) is this on its three diagonals
+    around: slice  # the three of the k rows that B1 has
+    rest: Array  # z0, (k,) or (e, g, k)
+    weights: Array  # (e, g): of the integral per radian
+
+    @cached_property
+    def B1(self) -> Array:
+        """What du/dTheta adds to the rows ``around``."""
+        return on_diagonals(self.hoop)
+
+
+def on_diagonals(values: Array) -> Array:
+    """Rows (e, g, 3, 3a), each component of u times ``values`` (e, g, a)."""
+    e, g, a = values.shape
+    rows = np.zeros((e, g, 3, a, 3), values.dtype)
+    for i in range(3):
+        rows[:, :, i, :, i] = values
+    return rows.reshape(e, g, 3, 3 * a)
+
+
+@dataclass(frozen=True)
+class Elastic(Part):
+    """Elements of one kind with their rows, their law and their mass."""
+
+    connectivity: Array
+    rows: Rows
+    law: Law
+    mass: Array | None = None
+
+    def at(self, U: Array) -> Array:
+        """z (e * g, k)."""
+        e, g, k, d = self.rows.B0.shape
+        u = U[self.connectivity].reshape(e, d, 1)
+        z = (self.rows.B0.reshape(e, g * k, d) @ u).reshape(e, g, k)
+        return (z + self.rows.rest).reshape(e * g, k)
+
+    def energy(self, U: Array) -> Any:
+        return (self.law.energy(self.at(U)) * self.rows.weights.ravel()).sum()
+
+    def force(self, U: Array) -> Array:
+        e, g, k, d = self.rows.B0.shape
+        P = self.law.force(self.at(U)).reshape(e, g, k) * self.rows.weights[..., None]
+        return np.asarray((P.reshape(e, 1, g * k) @ self.rows.B0.reshape(e, g * k, d))[:, 0])
+
+    def tangents(self, U: Array, harmonics: bool) -> Tangents:
+        B0, B1, around = self.rows.B0, self.rows.B1, self.rows.around
+        e, g, k, d = B0.shape
+        A = self._tangent(U)
+        transposed = B0.reshape(e, g * k, d).swapaxes(1, 2)
+        K0 = transposed @ (A @ B0).reshape(e, g * k, d)
+        if not harmonics:
+            return K0, None, None
+        AB1 = A[..., around] @ B1
+        half = transposed @ AB1.reshape(e, g * k, d)
+        K2 = B1.reshape(e, g * 3, d).swapaxes(1, 2) @ AB1[:, :, around].reshape(e, g * 3, d)
+        return K0, half - half.swapaxes(1, 2), K2
+
+    def _tangent(self, U: Array) -> Array:
+        """A (e, g, k, k) times the weights."""
+        e, g, k, _ = self.rows.B0.shape
+        A = self.law.tangent(self.at(U), self.rows.weights.ravel())
+        return A.reshape(e, g, k, k)
+
+    def form(self, U: Array, fields: Fields) -> Array:
+        return contract(self._tangent(U), fields.products(self.connectivity, self.rows))
+
+    def growing(self, table: int) -> Part | None:
+        law = self.law.growing(table)
+        return None if law is None else replace(self, law=law)
+
+    def at_stations(self, nodes: int) -> AtStations:
+        return ElasticAtStations(self, nodes)
+
+
+class ElasticAtStations(AtStations):
+    """The rows at every station: z (e, g, s, k)."""
+
+    def __init__(self, part: Elastic, nodes: int):
+        super().__init__(part.connectivity, nodes)
+        self.rows, self._law = part.rows, part.law
+        self.e, self.g, self.k, self.d = self.rows.B0.shape
+        self.B0 = self.rows.B0.reshape(self.e, self.g * self.k, self.d)
+        self.B1 = self.rows.B1.reshape(self.e, self.g * 3, self.d)
+        self._A: Array | None = None
+
+    def _change(self, u: Array, du: Array) -> Array:
+        """B0 u + B1 du (e, g, s, k)."""
+        z = (self.B0 @ u[self.dofs]).reshape(self.e, self.g, self.k, -1)
+        z[:, :, self.rows.around] += (self.B1 @ du[self.dofs]).reshape(self.e, self.g, 3, -1)
+        return z.swapaxes(2, 3)
+
+    def _forces(self, P: Array) -> tuple[Array, Array]:
+        """From dW/dz times weights (e, g, s, k)."""
+        P = P.swapaxes(2, 3)
+        by_u = self.B0.swapaxes(1, 2) @ P.reshape(self.e, self.g * self.k, -1)
+        P = P[:, :, self.rows.around]
+        return by_u, self.B1.swapaxes(1, 2) @ P.reshape(self.e, self.g * 3, -1)
+
+    def force(self, u: Array, du: Array) -> tuple[Array, Array]:
+        z = self._change(u, du) + (
+            self.rows.rest if self.rows.rest.ndim == 1 else self.rows.rest[:, :, None]
+        )
+        self.z, self._A = z.reshape(-1, self.k), None
+        self.law = self._law.at_stations(self.e * self.g, z.shape[2])
+        if not self.law.bears(self.z):
+            raise Inverted
+        return self._forces(self.law.force(self.z).reshape(z.shape) * self._weights)
+
+    @property
+    def _weights(self) -> Array:
+        return self.rows.weights[..., None, None]
+
+    def energy(self) -> Array:
+        W = self.law.energy(self.z).reshape(self.e, self.g, -1)
+        return np.asarray((W * self._weights[..., 0]).sum((0, 1)))
+
+    @property
+    def A(self) -> Array:
+        """d2W/dzdz (e, g, s, k, k), times the weights where the law does that."""
+        if self._A is None:
+            stations = len(self.z) // (self.e * self.g)
+            weights = np.repeat(self.rows.weights.ravel(), stations)
+            A = self.law.tangent(self.z, weights if self.law.weighted_tangent else 1.0)
+            self._A = A.reshape(self.e, self.g, stations, self.k, self.k)
+        return self._A
+
+    def product(self, u: Array, du: Array) -> tuple[Array, Array]:
+        P = (self.A @ self._change(u, du)[..., None])[..., 0]
+        return self._forces(P if self.law.weighted_tangent else P * self._weights)
+
+    def tangents(self, precision: Precision) -> tuple[Array, Array, Array]:
+        A = self.A if self.law.weighted_tangent else self.A * self._weights[..., None]
+        s, e, g, k, d = A.shape[2], self.e, self.g, self.k, self.d
+        A = A.transpose(2, 0, 1, 3, 4).astype(precision)
+        B0, B1 = self.rows.B0.astype(precision), self.rows.B1.astype(precision)
+        B0t, B1t = B0.reshape(e, g * k, d).swapaxes(1, 2), B1.reshape(e, g * 3, d).swapaxes(1, 2)
+        AB1 = A[..., self.rows.around] @ B1
+        K0 = B0t @ (A @ B0).reshape(s, e, g * k, d)
+        K1 = B0t @ AB1.reshape(s, e, g * k, d)
+        return K0, K1, B1t @ AB1[..., self.rows.around, :].reshape(s, e, g * 3, d)

@@ -1,0 +1,104 @@
+"""What every part of the tyre has: energy, force, tangents, mass and form, and the same in 3-D.
+
+All that a step, a vibration or a slope needs of the tyre is a sum over its parts. State U (n, 3)
+in m: displacements in the frame of the reference angle (see `elements`); energies per radian.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import Any
+
+import numpy as np
+from scipy.sparse import csr_matrix
+
+from .fields import Fields
+
+Array = np.ndarray
+Precision = type[np.floating[Any]]
+Tangents = tuple[Array, Array | None, Array | None]
+
+
+class Part(ABC):
+    """Rubber, cords, a pressure, ...; a new one is a subclass, or an `elastic.Elastic`."""
+
+    connectivity: Array  # (e, a): nodes of each element
+    mass: Array | None = None  # (e, a, a): consistent, kg per radian, of each component
+
+    @abstractmethod
+    def energy(self, U: Array) -> Any:
+        """Its share of the potential, J."""
+
+    @abstractmethod
+    def force(self, U: Array) -> Array:
+        """Gradient of the energy by the elements' displacements (e, 3a), N."""
+
+    @abstractmethod
+    def tangents(self, U: Array, harmonics: bool) -> Tangents:
+        """K0, K1, K2 (e, 3a, 3a) of K(n) = K0 + i n K1 + n^2 K2; None where one is zero or, but
+        for K0, not asked for."""
+
+    @abstractmethod
+    def at_stations(self, nodes: int) -> AtStations:
+        """The part in three dimensions, in a section of so many nodes."""
+
+    def growing(self, table: int) -> Part | None:
+        """What grows of its stiffness with the modulus table of that place; None: nothing."""
+        return None
+
+    def form(self, U: Array, fields: Fields) -> Array:
+        """phi^H K phi (m,) of the modes phi. K0 and K2 are symmetric, K1 antisymmetric, so that
+        (a - i b)^T K(n) (a + i b) = (K0 + n^2 K2) : (a a^T + b b^T) + K1 : n (b a^T - a b^T)."""
+        K0, K1, K2 = self.tangents(U, True)
+        total = np.zeros(len(fields.modes), complex)
+        for j, (n, real, imag) in enumerate(fields.modes):
+            a, b = (
+                np.moveaxis(part[:, self.connectivity].reshape(len(n), *K0.shape[:2]), 0, -1)
+                for part in (real, imag)
+            )
+            at, bt = a.swapaxes(1, 2), b.swapaxes(1, 2)
+            total[j] = (K0 * (a @ at + b @ bt)).sum()
+            if K1 is not None:
+                total[j] += (K1 * ((n * b) @ at - (n * a) @ bt)).sum()
+            if K2 is not None:
+                total[j] += (K2 * ((n * n * a) @ at + (n * n * b) @ bt)).sum()
+        return total
+
+
+class AtStations(ABC):
+    """A part at Gauss stations s round the tyre, about the last state that `force` was given.
+
+    u, du (3n, s): displacements and their derivative by the angle at the stations.
+    """
+
+    def __init__(self, connectivity: Array, nodes: int):
+        self.connectivity = connectivity
+        self.dofs = (3 * connectivity[..., None] + np.arange(3)).reshape(len(connectivity), -1)
+        size = self.dofs.size
+        ones = (np.ones(size), (self.dofs.ravel(), np.arange(size)))
+        self._assembly = csr_matrix(ones, shape=(3 * nodes, size))
+
+    def gather(self, forces: Array) -> Array:
+        """Sums (3n, s) at the nodes of the elements' forces (e, 3a, s)."""
+        return np.asarray(self._assembly @ forces.reshape(self.dofs.size, -1))
+
+    @abstractmethod
+    def force(self, u: Array, du: Array) -> tuple[Array, Array]:
+        """Gradients of the energy by u and by du (e, 3a, s). Raises Inverted."""
+
+    @abstractmethod
+    def energy(self) -> Array:
+        """(s,), J per radian."""
+
+    @abstractmethod
+    def product(self, u: Array, du: Array) -> tuple[Array, Array]:
+        """Change of the forces with small u and du."""
+
+    @abstractmethod
+    def tangents(self, precision: Precision) -> tuple[Array, Array, Array]:
+        """Second derivatives by u u, u du and du du (s, e, 3a, 3a)."""
+
+
+def consistent_mass(N: Array, weights: Array) -> Array:
+    """Element masses (e, a, a) from N (g, a) and weights (e, g), kg per radian."""
+    return np.tensordot(weights, N[:, :, None] * N[:, None, :], 1)
