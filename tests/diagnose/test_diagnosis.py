@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import least_squares
 
 from tyrecal.diagnose.diagnosis import Diagnosis, diagnose
-from tyrecal.diagnose.evidence import single, weigh
+from tyrecal.diagnose.evidence import explain, weigh
 from tyrecal.diagnose.expansion import anchored, expand
 from tyrecal.diagnose.next_measurement import rank
 from tyrecal.diagnose.observations import Row
@@ -180,7 +180,7 @@ def test_narrow_peaks_are_integrated() -> None:
     toy.tilt["e0"] *= 0
     base = problem(toy)
     p = base.measured(toy.base + 0.4321 * toy.g["e0"])
-    found = single(p, "e0", 1.0)
+    found = explain(p, ["e0"], 1.0)
     S = np.linalg.inv(p.sigma + toy.J @ toy.J.T)
     grid = (np.arange(200_001) + 0.5) / 200_001
     a = toy.g["e0"] @ S @ toy.g["e0"]

@@ -15,9 +15,9 @@ from tyrecal.diagnose.evidence import (
     NONE,
     PRIOR_NONE,
     Hypothesis,
+    explain,
     probabilities,
     refit,
-    single,
     weigh,
 )
 from tyrecal.diagnose.gap import find_gap, projection
@@ -54,7 +54,7 @@ def test_evidence_against_the_marginal_in_closed_form() -> None:
     assert refit(p, {}, 1).ln_evidence[0] == pytest.approx(ln(0.0), abs=1e-7)
     grid = (np.arange(4001) + 0.5) / 4001
     wanted = np.log(np.mean(np.exp([ln(e) for e in grid])))
-    assert single(p, "e0", 1.0).ln_evidence == pytest.approx(wanted, abs=1e-5)
+    assert explain(p, ["e0"], 1.0).ln_evidence == pytest.approx(wanted, abs=1e-5)
 
 
 @pytest.mark.parametrize("far", [(0, 0, 0), (2, 2, 2), (-2, 2, 0), (3, 0, -3)])
@@ -136,7 +136,7 @@ def test_probabilities_are_calibrated_where_the_truth_is_drawn_from_the_prior(
         there = base.measured(drawn(toy, base, random, effects, 1.0))
         plain = refit(there, {}, 1)  # none, and singles: no truth is outside here
         none = Hypothesis(NONE, PRIOR_NONE, plain.ln_evidence[0], {}, np.zeros(1), plain)
-        p = probabilities([none, *(single(there, id, 0.65 / len(ids)) for id in ids)])
+        p = probabilities([none, *(explain(there, [id], 0.65 / len(ids)) for id in ids)])
         given.append([p[key] for key in before])
         true.append([key == id for key in before])
     p, hit = np.array(given), np.array(true)
@@ -237,7 +237,7 @@ def test_fewer_values_only_widen_the_answer() -> None:
     toy.spans["e1"] = Span(-5.0, 5.0)
     base = problem(toy)
     keep = np.arange(len(base.places)) % 3 > 0
-    width = lambda q: np.diff([single(q, "e1", 1.0).quantile("e1", s) for s in (0.05, 0.95)])[0]
+    width = lambda q: np.diff([explain(q, ["e1"], 1.0).quantile("e1", s) for s in (0.05, 0.95)])[0]
     for key in range(5):
         p = base.measured(drawn(toy, base, generator("fewer", key), {"e1": 0.7}, 0.3))
         assert width(p.only(keep)) > 1.05 * width(p)
@@ -331,7 +331,7 @@ def test_a_toggled_run_cancels_what_both_share(chance: Chance) -> None:
         e = chance.random.uniform(0, 1)
         y = drawn(toy, both, chance.random, {}, 1.0)
         y[: len(toy.base)] += e * toy.g["e0"]
-        found = single(both.measured(y), "e0", 1.0)
+        found = explain(both.measured(y), ["e0"], 1.0)
         inside.append(found.quantile("e0", 0.05) <= e <= found.quantile("e0", 0.95))
         close.append(abs(found.mean()["e0"] - e) < 0.1)
     chance.often(inside, 0.88, 0.92)
@@ -416,6 +416,6 @@ def test_the_interval_of_the_parameter_covers(chance: Chance) -> None:
     base, inside = problem(toy), []
     for _ in range(300):
         e = chance.random.uniform(0, 1)
-        found = single(base.measured(drawn(toy, base, chance.random, {"e0": e}, 1.0)), "e0", 1.0)
+        found = explain(base.measured(drawn(toy, base, chance.random, {"e0": e}, 1.0)), ["e0"], 1.0)
         inside.append(found.quantile("e0", 0.05) <= e <= found.quantile("e0", 0.95))
     chance.often(inside, 0.89, 0.91)

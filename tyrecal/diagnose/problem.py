@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -69,7 +70,7 @@ class Problem:
             known[:, k] *= factor
         return known
 
-    @property
+    @cached_property
     def sigma(self) -> Array:
         """Sigma (n, n)."""
         return covariance(self.observations, self.constants, self.assumed.form)
