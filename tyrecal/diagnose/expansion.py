@@ -12,7 +12,7 @@ beyond e_a), being itself off by terms of third order. Effects add up.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -23,31 +23,29 @@ Array = np.ndarray
 ONE_SIDED = (0.25, 0.75, 1.0)  # with 0 the Lobatto points of a cubic
 TWO_SIDED = (0.5, 1.0)  # on either side
 BENDING = (0.08, 0.5)  # more of them, of the range, where the cubic is not enough
-ENOUGH = 0.003  # largest step of ln f by the last term of Newton's polynomial, below which it is
+MAX_LAST_TERM = 0.003  # of ln f, by Newton's polynomial, where the cubic is enough
 CURVATURE_STEP = 0.05  # of a logarithm, for H from two Jacobians
 
 
 @dataclass(frozen=True)
 class Anchor:
-    """Where an effect was asked again: parameter e, d = x - x0 (v,), and what the expansion is off
-    by there: shift (n,), tilt (n, v)."""
+    """Where an effect was asked again, and what the expansion is off by there."""
 
     e: float
-    d: Array
-    shift: Array
-    tilt: Array
+    d: Array  # (v,) x - x0
+    shift: Array  # (n,)
+    tilt: Array  # (n, v)
 
 
 @dataclass(frozen=True)
 class Nodes:
-    """An effect where it was asked: values (k,); shift (k, n), tilt (k, n, v): a_k, B_k; split
-    (k, n); reach: the range of the parameter between nodes that have a solution."""
+    """An effect where it was asked."""
 
-    values: Array
-    shift: Array
-    tilt: Array
-    split: Array
-    reach: tuple[float, float]
+    values: Array  # (k,) of its parameter
+    shift: Array  # (k, n) a_k
+    tilt: Array  # (k, n, v) B_k
+    split: Array  # (k, n)
+    reach: tuple[float, float]  # of the parameter, between nodes that have a solution
     anchor: Anchor | None = None
 
     def at(self, e: Array) -> tuple[Array, Array, Array]:
@@ -64,17 +62,16 @@ class Nodes:
 
 @dataclass(frozen=True)
 class Expansion:
-    """x0 (v,); eta (n,), jacobian (n, v), hessian (n, v, v), split (n,) there without effects;
-    constants (n, k); failed: why effects, by id, have no nodes."""
+    """The model about x0, there without effects."""
 
-    x0: Array
-    eta: Array
-    jacobian: Array
-    hessian: Array
-    split: Array
-    constants: Array
-    nodes: Mapping[str, Nodes]
-    failed: Mapping[str, str] = field(default_factory=dict)
+    x0: Array  # (v,)
+    eta: Array  # (n,)
+    jacobian: Array  # (n, v)
+    hessian: Array  # (n, v, v)
+    split: Array  # (n,)
+    constants: Array  # (n, k)
+    nodes: Mapping[str, Nodes]  # of effects by id
+    failed: Mapping[str, str] = field(default_factory=dict)  # why effects, by id, have no nodes
 
     def plain(self, x: Array) -> tuple[Array, Array]:
         """eta (n,) and Jacobian (n, v) without effects."""
@@ -83,13 +80,12 @@ class Expansion:
         return self.eta + self.jacobian @ d + bent @ d / 2, self.jacobian + bent
 
 
-def expand(response: Response, x0: Array, ids: Sequence[str] | None = None) -> Expansion:
+def expand(response: Response, x0: Array) -> Expansion:
     """Ask the model about x0: curvature by x, sources of error, every effect at its nodes.
 
     Raises what the model answered where it has no solution at x0 itself.
     """
-    ids = list(response.spans) if ids is None else list(ids)
-    count = len(x0)
+    ids, count = list(response.spans), len(x0)
     steps = CURVATURE_STEP * np.eye(count)
     values = {id: node_values(response.spans[id]) for id in ids}
     points = [Point(x0, constants=True)]
@@ -107,7 +103,7 @@ def expand(response: Response, x0: Array, ids: Sequence[str] | None = None) -> E
             hessian[:, :, i] = (above.jacobian - below.jacobian) / (2 * CURVATURE_STEP)
     hessian = (hessian + hessian.transpose(0, 2, 1)) / 2
     assert first.constants is not None
-    plain = Expansion(x0, first.eta, first.jacobian, hessian, first.split, first.constants, {}, {})
+    plain = Expansion(x0, first.eta, first.jacobian, hessian, first.split, first.constants, {})
     nodes, failed = {}, {}
     replies = dict(zip(asked, answers[1 + 2 * count :], strict=True))
     found = {id: {e: replies[id, e] for e in map(float, values[id])} for id in ids}
@@ -117,9 +113,8 @@ def expand(response: Response, x0: Array, ids: Sequence[str] | None = None) -> E
         for far in _bent(plain, response.spans[id], found[id])
         for f in BENDING
     ]
-    for (id, e), answer in zip(
-        more, response.answers([Point(x0, {id: e}) for id, e in more]) if more else [], strict=True
-    ):
+    again = response.answers([Point(x0, {id: e}) for id, e in more]) if more else []
+    for (id, e), answer in zip(more, again, strict=True):
         found[id][e] = answer
     for id in ids:
         made = _nodes(plain, response.spans[id], found[id])
@@ -127,9 +122,7 @@ def expand(response: Response, x0: Array, ids: Sequence[str] | None = None) -> E
             failed[id] = str(next(a for a in found[id].values() if isinstance(a, Exception)))
         else:
             nodes[id] = made
-    return Expansion(
-        x0, plain.eta, plain.jacobian, hessian, plain.split, plain.constants, nodes, failed
-    )
+    return replace(plain, nodes=nodes, failed=failed)
 
 
 def node_values(span: Span) -> Array:
@@ -162,8 +155,7 @@ def _nodes(
     plain: Expansion, span: Span, replies: Mapping[float, Answer | Exception]
 ) -> Nodes | None:
     """Nodes from 0 outwards as far as there are solutions; None where there is none at all."""
-    zero = np.zeros_like(plain.eta), np.zeros_like(plain.jacobian), plain.split
-    rows = {0.0: zero}
+    rows = {0.0: (np.zeros_like(plain.eta), np.zeros_like(plain.jacobian), plain.split)}
     reach = [max(0.0, span.low), min(0.0, span.high)]  # 0, or the near end of the range
     for side in (1, -1):
         for e in sorted((e for e in replies if e * side > 0), key=abs):
@@ -176,7 +168,9 @@ def _nodes(
     if len(rows) == 1:
         return None
     low, high = sorted(reach)
-    return _stacked(rows, (low, high))
+    values = np.array(sorted(rows))
+    shift, tilt, split = (np.array([rows[float(e)][part] for e in values]) for part in range(3))
+    return Nodes(values, shift, tilt, split, (low, high))
 
 
 def _bent(plain: Expansion, span: Span, found: Mapping[float, Answer | Exception]) -> list[float]:
@@ -187,15 +181,9 @@ def _bent(plain: Expansion, span: Span, found: Mapping[float, Answer | Exception
     middles = (made.values[1:] + made.values[:-1]) / 2
     last = len(made.values) - 1 if made.reach[1] > 0 else 0  # without the farthest node
     fewer = _lagrange(np.delete(made.values, last), middles) @ np.delete(made.shift, last, 0)
-    if abs(_lagrange(made.values, middles) @ made.shift - fewer).max() < ENOUGH:
+    if abs(_lagrange(made.values, middles) @ made.shift - fewer).max() < MAX_LAST_TERM:
         return []
     return [e for e in made.reach if e]
-
-
-def _stacked(rows: Mapping[float, tuple[Array, ...]], reach: tuple[float, float]) -> Nodes:
-    values = np.array(sorted(rows))
-    shift, tilt, split = (np.array([rows[float(e)][part] for e in values]) for part in range(3))
-    return Nodes(values, shift, tilt, split, reach)
 
 
 def _lagrange(nodes: Array, e: Array) -> Array:

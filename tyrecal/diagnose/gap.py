@@ -8,8 +8,8 @@ The residuals of the fit have covariance C = S P S; a group of them, r_G^T C_GG^
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import chi2, norm
@@ -23,16 +23,15 @@ FAMILIES = {"in-plane": "in-plane", "out-of-plane": "lateral"}
 
 @dataclass(frozen=True)
 class Group:
-    """Residuals of some rows: rms in per cent, chi2, degrees of freedom, p-value as it is and
-    corrected for the number of groups (Holm)."""
+    """Residuals of some rows."""
 
-    kind: str
+    kind: str  # family, harmonic, pressure or mass
     name: str
     rms_percent: float
     chi2: float
-    freedom: int
+    freedom: int  # of chi2
     p_value: float
-    corrected: float
+    corrected: float  # p-value for so many groups (Holm)
 
 
 @dataclass(frozen=True)
@@ -51,20 +50,17 @@ class Contrast:
 
 @dataclass(frozen=True)
 class Gap:
-    """chi2, freedom, p_value: of all; residuals (n,): ln measured - ln model at the plain fit;
-    spread (n,): their standard deviation without a gap; groups, contrasts; absorbed: share of
-    each effect that calibration hides; bias_percent: variable by effect, the effect at full size
-    and ignored."""
+    """What the plain fit leaves."""
 
     chi2: float
     freedom: int
     p_value: float
-    residuals: Array
-    spread: Array
+    residuals: Array  # (n,) ln measured - ln model
+    spread: Array  # (n,) their standard deviation without a gap
     groups: tuple[Group, ...]
     contrasts: tuple[Contrast, ...]
-    absorbed: Mapping[str, float]
-    bias_percent: Mapping[str, Mapping[str, float]]
+    absorbed: Mapping[str, float]  # share of each effect that calibration hides
+    bias_percent: Mapping[str, Mapping[str, float]]  # of variables, by effect at full size
 
     @property
     def rms_percent(self) -> float:
@@ -118,15 +114,14 @@ def find_gap(problem: Problem, d: Array, variables: tuple[str, ...]) -> Gap:
 
 
 def _groups(rows: tuple[Row, ...], r: Array, C: Array) -> list[Group]:
-    kinds: dict[str, Callable[[Row], str | None]] = {
-        "family": family,
-        "harmonic": lambda row: str(row.label.c) if row.label else None,
-        "pressure": lambda row: f"{row.pressure_kPa:g}" if row.label else None,
-        "mass": lambda row: None if row.label else "mass",
+    kinds = {
+        "family": [family(row) for row in rows],
+        "harmonic": [str(row.label.c) if row.label else None for row in rows],
+        "pressure": [f"{row.pressure_kPa:g}" if row.label else None for row in rows],
+        "mass": [None if row.label else "mass" for row in rows],
     }
     result = []
-    for kind, name_of in kinds.items():
-        names = [name_of(row) for row in rows]
+    for kind, names in kinds.items():
         for name in sorted({n for n in names if n}, key=_as_number):
             G = np.array([n == name for n in names])
             value, freedom = _chi2(r[G], C[np.ix_(G, G)])
@@ -157,8 +152,7 @@ def _corrected(groups: list[Group]) -> list[Group]:
     running, result = 0.0, list(groups)
     for place, i in enumerate(order):
         running = max(running, min(1.0, groups[i].p_value * (len(groups) - place)))
-        g = groups[i]
-        result[i] = Group(g.kind, g.name, g.rms_percent, g.chi2, g.freedom, g.p_value, running)
+        result[i] = replace(groups[i], corrected=running)
     return result
 
 

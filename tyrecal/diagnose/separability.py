@@ -22,26 +22,23 @@ GRID = 81
 
 @dataclass(frozen=True)
 class Separability:
-    """ids (m,); sizes: the parameter that each is judged at; lambdas at those sizes, and ``full``
-    at the far end of the range; cosines (m, m); distances (m, m): delta_ij^2, row i at its size;
-    smallest: the least parameter with lambda = 10, None beyond the range."""
+    """Of the effects ``ids`` (m,)."""
 
     ids: tuple[str, ...]
-    sizes: Mapping[str, float]
-    lambdas: Mapping[str, float]
-    full: Mapping[str, float]
-    cosines: Array
-    distances: Array
-    smallest: Mapping[str, float | None]
+    sizes: Mapping[str, float]  # the parameter that each is judged at
+    lambdas: Mapping[str, float]  # at those sizes
+    full: Mapping[str, float]  # lambda at the far end of the range
+    cosines: Array  # (m, m)
+    distances: Array  # (m, m) delta_ij^2, row i at its size
+    smallest: Mapping[str, float | None]  # the parameter with lambda = 10; None beyond the range
 
     def groups(self, among: Sequence[str] | None = None) -> list[list[str]]:
         """Ids that these data cannot separate: linked by delta^2 < 9 from either side, both of
         them detectable."""
         ids = [id for id in self.ids if among is None or id in among]
         place = {id: i for i, id in enumerate(self.ids)}
-        near = lambda a, b: (
-            min(self.distances[place[a], place[b]], self.distances[place[b], place[a]]) < APART
-        )
+        distances = np.minimum(self.distances, self.distances.T)
+        near = lambda a, b: distances[place[a], place[b]] < APART
         left, result = [id for id in ids if self.lambdas[id] >= APART], []
         while left:
             group = [left.pop(0)]

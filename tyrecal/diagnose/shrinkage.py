@@ -22,29 +22,25 @@ from .problem import Problem
 
 Array = np.ndarray
 PLACEBOS, DRAWS = 200, 200
-STEPS, LONGEST = 8, 0.7  # of least squares, and in any x
+LEAST_SQUARES_STEPS, MAX_STEP = 8, 0.7  # the longest in any x
 
 
 @dataclass(frozen=True)
 class Shrinkage:
-    """held_out: in words; before_percent, after_percent: rms of the held-out errors; fraction: R,
-    low, high: its 90 % interval over the posterior; placebo_95: the 95 % quantile of R on tyres
-    without any effect; floor_percent: what repeatability alone leaves; effect: the key whose fit
-    is ``after``; before_sigma, after_sigma: rms of errors over their own standard deviation;
-    least_squares_before_percent, least_squares_after_percent: of calibrations as usual."""
+    """Errors on the held-out rows, rms, before and after the effect's fit."""
 
-    held_out: str
-    effect: str
+    held_out: str  # in words
+    effect: str  # its key
     before_percent: float
     after_percent: float
-    fraction: float
-    low: float
+    fraction: float  # R
+    low: float  # 90 % interval of R over the posterior
     high: float
-    placebo_95: float
-    floor_percent: float
-    before_sigma: float
+    placebo_95: float  # the 95 % quantile of R on tyres without any effect
+    floor_percent: float  # what repeatability alone leaves
+    before_sigma: float  # errors over their own standard deviation
     after_sigma: float
-    least_squares_before_percent: float
+    least_squares_before_percent: float  # of calibrations as usual
     least_squares_after_percent: float
 
 
@@ -119,7 +115,7 @@ def _least_squares(problem: Problem, hold: Array, sizes: Mapping[str, float]) ->
     effects = {id: np.array([e]) for id, e in sizes.items()}
     d, fitted = np.zeros(len(problem.centre)), problem.only(used)
     weight = 1 / np.sqrt(np.mean(fitted.observations.scatter**2))
-    for _ in range(STEPS):
+    for _ in range(LEAST_SQUARES_STEPS):
         J = fitted.plain(d)[1] + fitted.added(effects, 1)[1][0]
         errors = _predicted_errors(fitted, effects, d[None])[0]
         tall = np.vstack([weight * J, np.diag(1 / problem.spread)])
@@ -127,7 +123,7 @@ def _least_squares(problem: Problem, hold: Array, sizes: Mapping[str, float]) ->
             [weight * errors, (problem.centre - problem.expansion.x0 - d) / problem.spread]
         )
         step = np.linalg.lstsq(tall, right, rcond=None)[0]
-        d = d + step * min(1.0, LONGEST / max(abs(step).max(), 1e-300))
+        d = d + step * min(1.0, MAX_STEP / max(abs(step).max(), 1e-300))
     return _predicted_errors(out, effects, d[None])[0]
 
 

@@ -5,10 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from pydantic import BaseModel
-
-from ..case import LoadedCase
-from ..case.checks import find
+from ..case import LoadedCase, number_at
 from ..case.schema import Cord, Rubber
 from ..effects import catalogue
 from ..units import in_engineers_units
@@ -36,12 +33,11 @@ UNITS = {  # by a key's end, the longer first
 
 @dataclass(frozen=True)
 class Source:
-    """steps: by path of a number, its change (in its unit) at one standard deviation of the
-    source; words: the same for people."""
+    """Something that is uncertain."""
 
     name: str
-    steps: dict[str, float]
-    words: str
+    steps: dict[str, float]  # of a number by its path, in its unit, at one standard deviation
+    words: str  # the same for people
 
 
 def sources(case: LoadedCase) -> tuple[list[Source], bool]:
@@ -51,54 +47,52 @@ def sources(case: LoadedCase) -> tuple[list[Source], bool]:
     Assumed, a standard deviation each: rubber densities 1.5 %, moduli of cords 3 %, spacings 1 %,
     gauges that the case has 3 %, cord angles 1 degree, pressure 1 kPa.
     """
-    stated = case.case.uncertainties
+    stated, taken = case.case.uncertainties, calibrated(case)
     if not stated:
-        return list(_assumed(case)), True
-    result, taken = [], calibrated(case)
+        return list(_assumed(case, taken)), True
+    result = []
     for name, each in stated.items():
         signs = each.signs or [1] * len(each.sets)
         steps = {
-            path: sign * (each.absolute or _value(case, path) * (each.percent or 0) / 100)
+            path: sign * (each.absolute or number_at(case, path) * (each.percent or 0) / 100)
             for path, sign in zip(each.sets, signs, strict=True)
             if path not in taken
         }
-        if not steps:
-            continue
-        size = (
-            f"{each.percent:g} %"
-            if each.percent
-            else f"{in_engineers_units(each.absolute or 0.0, unit_of(next(iter(steps))))}"
-        )
-        result.append(Source(name, steps, f"{name.replace('_', ' ')} {size}"))
+        if steps:
+            result.append(_source(name, steps, each.percent or 0.0, each.absolute or 0.0))
     return result, False
 
 
-def _assumed(case: LoadedCase) -> Iterator[Source]:
-    taken = calibrated(case)
+def _assumed(case: LoadedCase, taken: set[str]) -> Iterator[Source]:
+    for name, path, percent, absolute in _usual(case):
+        if path not in taken:
+            step = absolute or number_at(case, path) * percent / 100
+            yield _source(name, {path: step}, percent, absolute)
 
-    def source(name: str, path: str, percent: float = 0.0, absolute: float = 0.0) -> Source | None:
-        if path in taken:
-            return None
-        step = absolute or _value(case, path) * percent / 100
-        size = f"{percent:g} %" if percent else f"{in_engineers_units(absolute, unit_of(path))}"
-        return Source(name, {path: step}, f"{name.replace('_', ' ')} {size}")
 
-    found = [source("pressure", "pressure_kPa", absolute=PRESSURE_kPa)]
+def _usual(case: LoadedCase) -> Iterator[tuple[str, str, float, float]]:
+    """Name, path, and standard deviation, per cent or absolute."""
+    yield "pressure", "pressure_kPa", 0.0, PRESSURE_kPa
     for name, material in case.case.materials.items():
         path = f"materials.{name}."
         if isinstance(material, Rubber):
-            found.append(source(f"{name}_density", path + "density_kg_per_m3", DENSITY))
+            yield f"{name}_density", path + "density_kg_per_m3", DENSITY, 0.0
         elif isinstance(material, Cord):
-            found.append(source(f"{name}_modulus", path + "youngs_modulus_Pa", MODULUS))
+            yield f"{name}_modulus", path + "youngs_modulus_Pa", MODULUS, 0.0
     for name, layer in case.case.rebar_layers.items():
         path = f"rebar_layers.{name}."
         spacing = "spacing_m" if layer.spacing_m is not None else "spacing_deg"
-        found.append(source(f"{name}_spacing", path + spacing, SPACING))
-        found.append(source(f"{name}_angle", path + "angle_deg", absolute=ANGLE_deg))
+        yield f"{name}_spacing", path + spacing, SPACING, 0.0
+        yield f"{name}_angle", path + "angle_deg", 0.0, ANGLE_deg
     for i, gauge in enumerate(case.case.section.gauges or []):
-        path = f"section.gauges.{i}.factor"
-        found.append(source(f"gauge_{'_'.join(gauge.between)}_{i}", path, GAUGE))
-    yield from (each for each in found if each)
+        name = f"gauge_{'_'.join(gauge.between)}_{i}"
+        yield name, f"section.gauges.{i}.factor", GAUGE, 0.0
+
+
+def _source(name: str, steps: dict[str, float], percent: float, absolute: float) -> Source:
+    unit = unit_of(next(iter(steps)))
+    size = f"{percent:g} %" if percent else in_engineers_units(absolute, unit)
+    return Source(name, steps, f"{name.replace('_', ' ')} {size}")
 
 
 def unit_of(path: str) -> str:
@@ -113,18 +107,7 @@ def calibrated(case: LoadedCase) -> set[str]:
     return {path for variable in case.case.variables.values() for path in variable.sets}
 
 
-def _value(case: LoadedCase, path: str) -> float:
-    """The number at a dotted path; 0 for an effect that the case does not name."""
-    if path.startswith(EFFECTS):
-        return case.case.effects.get(path.removeprefix(EFFECTS), 0.0)
-    here: object = case.case
-    for key in find(case.case, path):
-        here = getattr(here, str(key)) if isinstance(here, BaseModel) else here[key]  # type: ignore[index]
-    assert isinstance(here, int | float)
-    return float(here)
-
-
 def values_of(case: LoadedCase, found: list[Source]) -> dict[str, float]:
     """The case's own numbers at every path of the sources, effects aside."""
     paths = [path for source in found for path in source.steps if not path.startswith(EFFECTS)]
-    return {path: _value(case, path) for path in paths}
+    return {path: float(number_at(case, path)) for path in paths}

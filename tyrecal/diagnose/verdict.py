@@ -15,15 +15,13 @@ SURE, RULED_OUT, CHECK, SET = 0.7, 0.05, 0.01, 0.9
 
 @dataclass(frozen=True)
 class Verdict:
-    """kind: named, undecided, no_gap or outside; key: of what is named, an id or "id1+id2";
-    candidates: keys that hold 90 % of the probability together; check: p-value of the likeliest
-    effect's own fit; words: one sentence."""
+    """What may be said."""
 
-    kind: str
-    key: str | None
-    candidates: tuple[str, ...]
-    check: float
-    words: str
+    kind: str  # named, undecided, no_gap or outside
+    key: str | None  # of what is named, an id or "id1+id2"
+    candidates: tuple[str, ...]  # keys that hold 90 % of the probability together
+    check: float  # p-value of the likeliest effect's own fit
+    words: str  # one sentence
 
 
 def decide(
@@ -46,31 +44,22 @@ def decide(
     by_key = {h.key: h for h in hypotheses}
     best = effects[0] if effects else None
     check = _check(by_key[best], rows, variables) if best else 1.0
-    said = tuple(candidates)
+
+    def verdict(kind: str, words: str) -> Verdict:
+        return Verdict(kind, best if kind == NAMED else None, tuple(candidates), check, words)
+
     if rows <= variables:
-        return Verdict(
-            UNDECIDED,
-            None,
-            said,
-            check,
-            "cannot tell: there are no more data than design variables",
-        )
-    if best and probabilities[best] >= SURE and check > CHECK and none < RULED_OUT:
-        return Verdict(NAMED, best, said, check, f"{best} explains the gap")
-    misfit = best is not None and probabilities[best] >= SURE and check <= CHECK
-    if none < RULED_OUT and (probabilities[OUTSIDE] >= 0.5 or misfit):
-        words = by_key[OUTSIDE].words
-        return Verdict(
-            OUTSIDE,
-            None,
-            said,
-            check,
-            f"there is a gap, and nothing in the catalogue explains it: {words}",
-        )
+        return verdict(UNDECIDED, "cannot tell: there are no more data than design variables")
+    sure = best is not None and probabilities[best] >= SURE
+    if sure and check > CHECK and none < RULED_OUT:
+        return verdict(NAMED, f"{best} explains the gap")
+    if none < RULED_OUT and (probabilities[OUTSIDE] >= 0.5 or (sure and check <= CHECK)):
+        gap = "there is a gap, and nothing in the catalogue explains it"
+        return verdict(OUTSIDE, f"{gap}: {by_key[OUTSIDE].words}")
     if order[0] == NONE and none > PRIOR_NONE:
-        return Verdict(NO_GAP, None, said, check, "no gap is seen")
+        return verdict(NO_GAP, "no gap is seen")
     gap = "there is a gap" if none < RULED_OUT else "there may be a gap"
-    return Verdict(UNDECIDED, None, said, check, f"{gap}, its cause is undecided")
+    return verdict(UNDECIDED, f"{gap}, its cause is undecided")
 
 
 def _check(hypothesis: Hypothesis, rows: int, variables: int) -> float:

@@ -17,17 +17,16 @@ SAME = 0.95  # cosine of columns beyond which two parts cannot be told apart
 
 @dataclass(frozen=True)
 class Place:
-    """A part of the section: the change of its stiffness, or of its mass, that fits the gap best
-    alone, in per cent with standard deviations; ln evidence over no change of the better one;
-    same_as: parts whose effect looks alike."""
+    """A part of the section: the change of its stiffness, or of its mass, that alone fits the gap
+    best."""
 
     region: str
     stiffness_percent: float
-    stiffness_sigma: float
+    stiffness_sigma: float  # standard deviation, per cent
     mass_percent: float
     mass_sigma: float
-    evidence: float
-    same_as: tuple[str, ...]
+    evidence: float  # ln, over no change, of the better one
+    same_as: tuple[str, ...]  # parts whose effect looks alike
 
 
 def section_map(
@@ -58,15 +57,10 @@ def section_map(
             for j in range(2 * count)
             if abs(cosine[better, j]) > SAME and j % count != i
         ]
-        result.append(
-            Place(
-                part.name,
-                float(100 * STIFFNESS * change[i]),
-                float(100 * STIFFNESS * sigma[i]),
-                float(100 * MASS * change[count + i]),
-                float(100 * MASS * sigma[count + i]),
-                float(ln[better]),
-                tuple(dict.fromkeys(same)),
-            )
+        stiffness, mass = (
+            (float(100 * size * change[j]), float(100 * size * sigma[j]))
+            for j, size in ((i, STIFFNESS), (count + i, MASS))
         )
+        found = tuple(dict.fromkeys(same))
+        result.append(Place(part.name, *stiffness, *mass, float(ln[better]), found))
     return sorted(result, key=lambda place: -place.evidence), rank
