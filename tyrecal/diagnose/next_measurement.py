@@ -21,16 +21,10 @@ from .response import Answer, Point, Response
 
 Array = np.ndarray
 ModelRow = tuple[Label | None, float]
-ENOUGH = 40.0
-LIKELY, MOST = 0.02, 6  # explanations below this probability, or beyond this number, do not count
-HOURS = {
-    "toggle": 4.0,
-    "check": 1.0,
-    "repeat": 2.0,
-    "pressure": 1.0,
-    "harmonics": 1.0,
-    "weigh": 0.25,
-}  # of a laboratory, as an orientation
+MAX_DISTANCE = 40.0
+MIN_PROBABILITY, MAX_EXPLANATIONS = 0.02, 6  # others do not count
+HOURS = dict(toggle=4.0, check=1.0, repeat=2.0, pressure=1.0, harmonics=1.0, weigh=0.25)
+"""Of a laboratory, as an orientation."""
 CHECKED = 0.25  # what is left of a constant's standard deviation when it is measured by itself
 REPEATED = 4  # times, each after dismounting
 PRESSURES_kPa = (160.0, 200.0, 240.0, 280.0, 320.0)
@@ -40,20 +34,20 @@ MASS_PERCENT = 0.5
 
 @dataclass(frozen=True)
 class Choice:
-    """A measurement, its cost in hours (an orientation), and its gain per hour."""
+    """A measurement that could be made."""
 
     what: str
-    hours: float
-    gain: float
+    hours: float  # an orientation
+    gain: float  # per hour
 
 
 @dataclass(frozen=True)
 class _Look:
-    """What a set of rows shows: Sigma (n, n), J (n, v), shift (n,) of each explanation."""
+    """What a set of rows shows."""
 
-    sigma: Array
-    jacobian: Array
-    shifts: Mapping[str, Array]
+    sigma: Array  # (n, n)
+    jacobian: Array  # (n, v)
+    shifts: Mapping[str, Array]  # (n,) of each explanation
 
     def apart(self, likely: Mapping[str, float], spread: Array) -> float:
         """sum over i, j of p_i p_j min(delta_ij^2, 40)."""
@@ -65,7 +59,7 @@ class _Look:
         for i, a in enumerate(keys):
             for b in keys[:i]:
                 off = self.shifts[a] - self.shifts[b]
-                total += 2 * likely[a] * likely[b] * min(float(off @ P @ off), ENOUGH)
+                total += 2 * likely[a] * likely[b] * min(float(off @ P @ off), MAX_DISTANCE)
         return total
 
 
@@ -85,32 +79,27 @@ def rank(
     likely = {
         key: p
         for key, p in probabilities.items()
-        if p > LIKELY and key != OUTSIDE and (key == NONE or key in sizes)
+        if p > MIN_PROBABILITY and key != OUTSIDE and (key == NONE or key in sizes)
     }
-    likely = dict(sorted(likely.items(), key=lambda item: -item[1])[:MOST])
+    likely = dict(sorted(likely.items(), key=lambda item: -item[1])[:MAX_EXPLANATIONS])
     if len(likely) < 2:
         return []
     now = _look(problem, d, likely, sizes)
     before = now.apart(likely, problem.spread)
-    offered: list[tuple[str, float, _Look]] = []
+    menu: list[tuple[str, float, Problem]] = []
     for k, source in enumerate(sources):
         known = replace(problem, reduced={**problem.reduced, k: CHECKED})
-        words = f"measure by itself: {source.replace('_', ' ')}"
-        offered.append((words, HOURS["check"], _look(known, d, likely, sizes)))
-    o = problem.observations
-    factor = 1 / np.sqrt(REPEATED)
+        menu.append((f"measure by itself: {source.replace('_', ' ')}", HOURS["check"], known))
+    o, factor = problem.observations, 1 / np.sqrt(REPEATED)
     finer = replace(o, scatter=o.scatter * factor, common=o.common * factor)
-    offered.append(
-        (
-            f"measure all {REPEATED} times, dismounted in between",
-            HOURS["repeat"] * (REPEATED - 1),
-            _look(replace(problem, observations=finer), d, likely, sizes),
-        )
-    )
+    words = f"measure all {REPEATED} times, dismounted in between"
+    repeated = replace(problem, observations=finer)
+    menu.append((words, HOURS["repeat"] * (REPEATED - 1), repeated))
     for id in dict.fromkeys(id for key in likely if key != NONE for id in sizes[key]):
         span = problem.spans.get(id)
         words = (span.toggle if span else "") or f"measure again without {id}"
-        offered.append((words, HOURS["toggle"], _look(_switched(problem, id), d, likely, sizes)))
+        menu.append((words, HOURS["toggle"], _switched(problem, id)))
+    offered = [(words, hours, _look(other, d, likely, sizes)) for words, hours, other in menu]
     if further:
         offered += _more_rows(problem, now, likely, sizes, further)
     choices = [
@@ -140,9 +129,8 @@ def _switched(problem: Problem, id: str) -> Problem:
     o = problem.observations
     join = lambda values: np.concatenate([values, values[first]])
     rows = (*o.rows, *(replace(row, run=run) for row in o.only(first).rows))
-    both = Observations(
-        rows, join(o.y), join(o.scatter), o.common, join(o.split), join(o.split_scatter)
-    )
+    numbers = (join(o.y), join(o.scatter), o.common, join(o.split), join(o.split_scatter))
+    both = Observations(rows, *numbers)
     base = problem.spans[id].base if id in problem.spans else 0.0
     changes = (*problem.changes, Change(id, 0.0, base=base))
     return replace(problem, observations=both, places=join(problem.places), changes=changes)
@@ -162,22 +150,12 @@ def _more_rows(
     offered: list[tuple[str, float, list[ModelRow]]] = []
     for p in PRESSURES_kPa:
         if all(abs(p - q) >= FAR_kPa for q in pressures):
-            offered.append(
-                (
-                    f"measure the same modes at {p:g} kPa",
-                    HOURS["pressure"],
-                    [(label, p) for label in labels],
-                )
-            )
+            more: list[ModelRow] = [(label, p) for label in labels]
+            offered.append((f"measure the same modes at {p:g} kPa", HOURS["pressure"], more))
     top = max(label.c for label in labels)
     higher = [Label(top + 1, 0), Label(top + 1, 1)]
-    offered.append(
-        (
-            f"measure {higher[0]} and {higher[1]}, too",
-            HOURS["harmonics"],
-            [(label, p) for label in higher for p in pressures],
-        )
-    )
+    more = [(label, p) for label in higher for p in pressures]
+    offered.append((f"measure {higher[0]} and {higher[1]}, too", HOURS["harmonics"], more))
     if all(row.label for row in o.rows):
         offered.append(("weigh the tyre", HOURS["weigh"], [(None, 0.0)]))
     rows = list(dict.fromkeys(row for _, _, more in offered for row in more))
@@ -194,15 +172,15 @@ def _more_rows(
     for words, hours, more in offered:
         at = [rows.index(row) for row in more]
         new = tuple(Row("frequency_Hz" if x else "mass_kg", x, p) for x, p in more)
-        size = [scatter if label else MASS_PERCENT / 100 for label, _ in more]
-        none = np.full(len(more), np.nan)
+        size = np.array([scatter if label else MASS_PERCENT / 100 for label, _ in more])
+        none, join = np.full(len(more), np.nan), lambda *parts: np.concatenate(parts)
         both = Observations(
             (*o.rows, *new),
-            np.concatenate([o.y, plain.eta[at]]),
-            np.concatenate([o.scatter, size]),
+            join(o.y, plain.eta[at]),
+            join(o.scatter, size),
             o.common,
-            np.concatenate([o.split, none]),
-            np.concatenate([o.split_scatter, none]),
+            join(o.split, none),
+            join(o.split_scatter, none),
         )
         constants = np.vstack([problem.constants, plain.constants[at]])
         shifts = {

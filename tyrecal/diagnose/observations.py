@@ -7,7 +7,7 @@ s = |ln f_a - ln f_b|, whose scatter is tau^2 = s_a^2 + s_b^2; s_a, s_b are rela
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -22,13 +22,12 @@ Key = tuple[str, Label | None, float]
 
 @dataclass(frozen=True)
 class Row:
-    """What one number is: its mode (None: the mass), pressure in kPa, and run; run 0 is the tyre
-    as it is, runs 1, 2, ... are those in which something was switched."""
+    """What one number is."""
 
     quantity: str
-    label: Label | None
+    label: Label | None  # of the mode; None: the mass
     pressure_kPa: float
-    run: int = 0
+    run: int = 0  # 0 is the tyre as it is, in 1, 2, ... something was switched
 
     def __str__(self) -> str:
         name = str(self.label) if self.label else "mass"
@@ -37,29 +36,25 @@ class Row:
 
 @dataclass(frozen=True)
 class Observations:
-    """rows (n,); y (n,): ln value; scatter (n,): standard deviation of y by repeatability, and
-    ``common``: the part that all frequencies of one run share; split (n,), split_scatter (n,):
-    of pairs with both members measured, else NaN; left_out: readings that are not used, why."""
+    """All that was measured of one tyre."""
 
     rows: tuple[Row, ...]
-    y: Array
-    scatter: Array
-    common: float
-    split: Array
-    split_scatter: Array
-    left_out: tuple[str, ...] = ()
+    y: Array  # (n,) ln value
+    scatter: Array  # (n,) standard deviation of y by repeatability
+    common: float  # the part of it that all frequencies of one run share
+    split: Array  # (n,) of pairs with both members measured, else NaN
+    split_scatter: Array  # (n,) likewise
+    left_out: tuple[str, ...] = ()  # measurements that are not used, why
+
+    def at(self, places: Array) -> Observations:
+        """The numbers at these places, the rows as they are."""
+        names = ("y", "scatter", "split", "split_scatter")
+        return replace(self, **{name: getattr(self, name)[places] for name in names})
 
     def only(self, keep: Array) -> Observations:
         """The rows of a mask (n,) alone."""
-        return Observations(
-            tuple(row for row, k in zip(self.rows, keep, strict=True) if k),
-            self.y[keep],
-            self.scatter[keep],
-            self.common,
-            self.split[keep],
-            self.split_scatter[keep],
-            self.left_out,
-        )
+        rows = tuple(row for row, k in zip(self.rows, keep, strict=True) if k)
+        return replace(self.at(keep), rows=rows)
 
 
 def observe(

@@ -18,13 +18,12 @@ Array = np.ndarray
 
 @dataclass(frozen=True)
 class Change:
-    """What was switched in a toggled run: effect ``id`` set to ``value``, or times it; base: what
-    the case has of it, which the parameter counts from."""
+    """What was switched in a toggled run."""
 
-    id: str
-    value: float
+    id: str  # of the effect
+    value: float  # that it was set to, or times which it was
     times: bool = False
-    base: float = 0.0
+    base: float = 0.0  # what the case has of it, from which the parameter counts
 
     def applied(self, effects: Mapping[str, Array], count: int) -> dict[str, Array]:
         """Parameters (count,) of effects in the toggled run."""
@@ -35,32 +34,26 @@ class Change:
 
 @dataclass(frozen=True)
 class Assumed:
-    """Numbers that the diagnosis takes for granted, all of them stated in its result.
+    """Numbers, all of them relative, that the diagnosis takes for granted and states."""
 
-    form: relative model-form error of every mode, None = on record; split: relative split of
-    pairs that non-uniformity gives this kind of tyre; law: how far, relative to its own shift of
-    a frequency, an effect of the catalogue may be off the real one.
-    """
-
-    form: float | None = None
-    split: float = 0.003
-    law: float = 0.04
+    form: float | None = None  # model-form error of every mode; None: on record
+    split: float = 0.003  # of pairs, by the non-uniformity of this kind of tyre
+    law: float = 0.04  # of an effect's shift of a frequency, by which the real one may be off
 
 
 @dataclass(frozen=True)
 class Problem:
-    """n observations, their rows' places in the model's rows (``places`` (n,)), what was switched
-    in runs 1, 2, ..., and the covariance; centre, spread (v,): of x before any measurement."""
+    """n observations beside the model."""
 
     observations: Observations
     expansion: Expansion
     spans: Mapping[str, Span]
-    places: Array
-    centre: Array
-    spread: Array
-    changes: tuple[Change, ...] = ()
+    places: Array  # (n,) of the observations among the model's rows
+    centre: Array  # (v,) of x before any measurement
+    spread: Array  # (v,) likewise
+    changes: tuple[Change, ...] = ()  # what was switched in runs 1, 2, ...
     assumed: Assumed = Assumed()
-    reduced: Mapping[int, float] = field(default_factory=dict)
+    reduced: Mapping[int, float] = field(default_factory=dict)  # factors of sources of error
 
     @property
     def constants(self) -> Array:

@@ -55,13 +55,7 @@ def with_exchanged(observations: Observations, a: Label, b: Label) -> Observatio
         if label == a and (b, pressure, run) in where:
             j = where[b, pressure, run]
             order[i], order[j] = j, i
-    return replace(
-        observations,
-        y=observations.y[order],
-        scatter=observations.scatter[order],
-        split=observations.split[order],
-        split_scatter=observations.split_scatter[order],
-    )
+    return observations.at(order)
 
 
 def _near(observations: Observations) -> Iterator[tuple[Label, Label]]:

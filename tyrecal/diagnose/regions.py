@@ -19,13 +19,12 @@ TREAD = "tread"
 
 @dataclass(frozen=True)
 class Region:
-    """A part of the section: its name; stiffness, mass (n,): d ln f by the logarithm of either;
-    material: what the split case calls it."""
+    """A part of the section."""
 
     name: str
-    stiffness: Array
-    mass: Array
-    material: str
+    stiffness: Array  # (n,) d ln f by its logarithm
+    mass: Array  # likewise
+    material: str  # what the split case calls it
 
 
 def regions(model: TyreModel, x: Array) -> list[Region]:

@@ -18,54 +18,44 @@ Array = np.ndarray
 
 @dataclass(frozen=True)
 class Span:
-    """An effect that can be asked for: the range of its parameter, and its unit.
-
-    base: what the case has of it already; low, high and all parameters count from there. also:
-    parameters beyond the range that toggled runs were measured at.
-    """
+    """An effect that can be asked for: the range of its parameter."""
 
     low: float
     high: float
     unit: str = ""
     title: str = ""
     toggle: str = ""
-    base: float = 0.0
-    also: tuple[float, ...] = ()
+    base: float = 0.0  # what the case has of it; low, high and all parameters count from there
+    also: tuple[float, ...] = ()  # beyond the range, at which toggled runs were measured
 
 
 @dataclass(frozen=True)
 class Point:
-    """One question. x (v,); effects: parameter by id, absent = 0; constants: also their slopes."""
+    """Where the model is asked."""
 
-    x: Array
-    effects: Mapping[str, float] = field(default_factory=dict)
-    constants: bool = False
+    x: Array  # (v,)
+    effects: Mapping[str, float] = field(default_factory=dict)  # parameter by id, absent: 0
+    constants: bool = False  # whether for slopes by the sources of error, too
 
 
 @dataclass(frozen=True)
 class Answer:
-    """eta (n,): ln f or ln mass; jacobian (n, v): d eta / d x; split (n,): ln of the ratio of a
-    pair's frequencies; constants (n, k): change of eta by one standard deviation of each source
-    of error, or None where it was not asked for."""
+    """What the model says there."""
 
-    eta: Array
-    jacobian: Array
-    split: Array
-    constants: Array | None = None
+    eta: Array  # (n,) ln f or ln mass
+    jacobian: Array  # (n, v) d eta / d x
+    split: Array  # (n,) ln of the ratio of a pair's frequencies
+    constants: Array | None = None  # (n, k) change by one standard deviation of each source
 
 
 class Response(Protocol):
-    """A model that can be asked.
+    """A model that can be asked."""
 
-    variables: names of x; start (v,), spread (v,): centre and standard deviation of what x can
-    be; sources: names of the sources of error behind `Answer.constants`; spans: effects by id.
-    """
-
-    variables: Sequence[str]
-    start: Array
-    spread: Array
-    sources: Sequence[str]
-    spans: Mapping[str, Span]
+    variables: Sequence[str]  # names of x
+    start: Array  # (v,) centre of what x can be
+    spread: Array  # (v,) its standard deviation
+    sources: Sequence[str]  # names of the sources of error
+    spans: Mapping[str, Span]  # effects by id
 
     def answers(self, points: Sequence[Point]) -> list[Answer | Exception]:
         """An answer for each point in order, or why there is none; rows as it was made for."""
