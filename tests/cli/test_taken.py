@@ -16,7 +16,7 @@ from tyrecal.cli.talk import Talk
 from ..conftest import CASES
 from .test_cli import run
 
-STUDY = Study(1, "", "", (), None, None, False, False, False, Talk())
+STUDY = Study(Talk(), "", "", (), None, None, no_store=False, allow_unusual=False)
 
 
 @pytest.fixture

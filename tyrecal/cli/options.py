@@ -18,7 +18,7 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -194,8 +194,8 @@ def talking(function: Callable[..., int]) -> Callable[..., int]:
     """--json, --quiet and --verbose, as the argument ``talk``."""
 
     @wraps(function)
-    def command(*args: Any, as_json: bool, quiet: bool, verbose: bool, **rest: Any) -> int:
-        return function(*args, talk=_talk(as_json, quiet, verbose), **rest)
+    def command(*args: Any, **values: Any) -> int:
+        return function(*args, talk=_talk(values), **values)
 
     result: Callable[..., int] = every(*TALK)(command)
     return result
@@ -213,27 +213,11 @@ def study_one_by_one(function: Callable[..., int]) -> Callable[..., int]:
 
 def _study(function: Callable[..., int], given: tuple[Any, ...]) -> Callable[..., int]:
     @wraps(function)
-    def command(
-        *args: Any,
-        mesh: str,
-        solver: str,
-        solver_command: tuple[str, ...],
-        output: Path | None,
-        store: Path | None,
-        no_store: bool,
-        allow_unusual: bool,
-        as_json: bool,
-        quiet: bool,
-        verbose: bool,
-        jobs: int = 1,
-        report: bool = False,
-        **rest: Any,
-    ) -> int:
-        talk = _talk(as_json, quiet, verbose)
-        asked = Study(
-            jobs, mesh, solver, solver_command, output, store, no_store, report, allow_unusual, talk
-        )
-        return function(*args, study=asked, **rest)
+    def command(*args: Any, **values: Any) -> int:
+        talk = _talk(values)
+        own = [field.name for field in fields(Study) if field.name in values]
+        asked = Study(talk, **{name: values.pop(name) for name in own})
+        return function(*args, study=asked, **values)
 
     result: Callable[..., int] = every(*given)(command)
     return result
@@ -241,18 +225,18 @@ def _study(function: Callable[..., int], given: tuple[Any, ...]) -> Callable[...
 
 @dataclass(frozen=True)
 class Study:
-    """How designs are evaluated, and where the results go."""
+    """How designs are evaluated, and where the results go: the options of their names."""
 
-    jobs: int
+    talk: Talk
     mesh: str
     solver: str
     solver_command: tuple[str, ...]
     output: Path | None
     store: Path | None
     no_store: bool
-    report: bool
     allow_unusual: bool
-    talk: Talk
+    jobs: int = 1
+    report: bool = False
 
     def load(
         self, path: Path, assigned: tuple[str, ...] = (), pressure_kPa: float | None = None
@@ -318,12 +302,13 @@ class Study:
             self.talk.say(f"report in {path}")
 
 
-def _talk(as_json: bool, quiet: bool, verbose: bool) -> Talk:
-    if quiet and verbose:
+def _talk(values: dict[str, Any]) -> Talk:
+    """Takes the options of `TALK` out of a command's values."""
+    talk = Talk(*(values.pop(name) for name in ("as_json", "quiet", "verbose")))
+    if talk.quiet and talk.verbose:
         raise click.UsageError("give --quiet or --verbose, not both")
     context, start = click.get_current_context(), time.monotonic()
-    talk = Talk(as_json, quiet, verbose)
-    if verbose:
+    if talk.verbose:
         logging.basicConfig(format="%(name)s: %(message)s")
         for name in ("tyrecal", SOLVERS):
             logging.getLogger(name).setLevel(logging.INFO)
@@ -350,7 +335,7 @@ def given() -> list[str]:
 
 
 def say_idle(talk: Talk, jobs: int, why: str) -> None:
-    """Says that --jobs asks for workers who have nothing to do: scripts may give it everywhere."""
+    """Note that --jobs has no effect here, which is no error: scripts may give it everywhere."""
     if jobs > 1 and not _by_settings("jobs"):
         talk.note(f"--jobs changes nothing here: {why}")
 
