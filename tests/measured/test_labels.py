@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tyrecal.measured.labels import LIKELY, OTHER_PARITY, SAME_PARITY, SIDEWALL, Labeller
-from tyrecal.measured.modal import Told, settled
+from tyrecal.measured.modal import LabelledMode, settled
 from tyrecal.measured.sensors import MeasuredMode, Sensors, real_part
 from tyrecal.modes.mode import Label
 
@@ -215,11 +215,11 @@ def test_a_travelling_wave_has_no_collinearity_a_standing_one_has_all() -> None:
     assert np.abs(shape) == pytest.approx(np.abs(np.cos(2 * angle)))
 
 
-def told(frequency: float, label: Label | None) -> Told:
+def told(frequency: float, label: Label | None) -> LabelledMode:
     sensors = ring(5)
     judged = Labeller(sensors, 2).judge(waves(sensors, 1))
     judged = type(judged)(label, judged.probabilities)
-    return Told(
+    return LabelledMode(
         MeasuredMode(frequency, waves(sensors, 1)), sensors, waves(sensors, 1), 1.0, judged, ""
     )
 

@@ -174,6 +174,7 @@ def sensors(
     \b
     tyrecal measured sensors run1.uff --directions cylindrical
     """
+    from ..measured.gather import label_entry
     from ..measured.modal import sensors_in
     from ..measured.universal import read_universal
     from ..report.measured import sensors_words
@@ -181,18 +182,11 @@ def sensors(
     layout = _layout(axle, centre, directions, highest)
     told = sensors_in(read_universal(file), layout).told_apart()
     if talk.as_json:
-        talk.result(
-            [
-                {
-                    "c": label.c,
-                    "m": label.m,
-                    "kind": label.kind,
-                    "told": not alike,
-                    "looks_like": [str(other) for other in alike],
-                }
-                for label, alike in told.items()
-            ]
-        )
+        told_apart = [
+            {**label_entry(label), "told": not alike, "looks_like": [str(x) for x in alike]}
+            for label, alike in told.items()
+        ]
+        talk.result(told_apart)
     else:
         talk.say(sensors_words(told))
     return 0

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from math import isfinite
 from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
+from ..modes.mode import Label
 from .measurement import Measurement
-from .modal import Layout, Run, Told, measurements_of, read_run
+from .modal import LabelledMode, Layout, ModalTest, measurements_of, read_modal_test
 from .repeats import FLOOR, combined
 from .tables import read_table
-from .universal import Universal, is_universal, read_universal
+from .universal import Place, Universal, is_universal, read_universal
 
 NODES_AGREE = 1e-6  # m
 EXPLAINED = 0.98  # of the functions' mean square; less, and modes are missing
@@ -21,12 +22,11 @@ EXPLAINED = 0.98  # of the functions' mean square; less, and modes are missing
 
 @dataclass(frozen=True)
 class Gathered:
-    """rows: the measurements, one value each with its sigma; runs: modes of the universal files;
-    notes: what a user has to know."""
+    """What several files measure together."""
 
-    rows: list[Measurement]
-    runs: list[Run]
-    notes: list[str]
+    rows: list[Measurement]  # one value each with its sigma
+    runs: list[ModalTest]  # of the universal files
+    notes: list[str]  # what a user has to know
 
 
 def gather(
@@ -47,7 +47,7 @@ def gather(
     universal = [read_universal(path) for path in paths if is_universal(path)]
     nodes = all_nodes(universal)
     values: list[Measurement] = []
-    runs: list[Run] = []
+    runs: list[ModalTest] = []
     notes: list[str] = []
     for path in paths:
         file = next((each for each in universal if each.path == path), None)
@@ -59,7 +59,7 @@ def gather(
             continue  # the geometry of the others
         if pressure_kPa is None:
             raise InputError(f"{path}: universal files hold no pressure; give --pressure-kPa")
-        run = read_run(file, nodes, layout or Layout())
+        run = read_modal_test(file, nodes, layout or Layout())
         runs.append(run)
         if run.explained < EXPLAINED:
             notes.append(
@@ -73,9 +73,9 @@ def gather(
     return Gathered(combined(values, floor, assumed), runs, notes)
 
 
-def all_nodes(files: Sequence[Universal]) -> dict[int, tuple[float, float, float]]:
+def all_nodes(files: Sequence[Universal]) -> dict[int, Place]:
     """Coordinates of all files together. Raises InputError where two differ."""
-    nodes: dict[int, tuple[float, float, float]] = {}
+    nodes: dict[int, Place] = {}
     for file in files:
         for number, place in file.nodes.items():
             known = nodes.setdefault(number, place)
@@ -93,9 +93,7 @@ def result(gathered: Gathered) -> dict[str, Any]:
         "measurements": [
             {
                 "quantity": row.quantity,
-                "c": row.label.c if row.label else None,
-                "m": row.label.m if row.label else None,
-                "kind": row.label.kind if row.label else None,
+                **label_entry(row.label),
                 "member": row.member,
                 "pressure_kPa": row.pressure_kPa,
                 "load_N": row.load_N,
@@ -108,8 +106,12 @@ def result(gathered: Gathered) -> dict[str, Any]:
     }
 
 
-def _entry(run: Run, told: Told) -> dict[str, Any]:
-    label = told.judged.label
+def label_entry(label: Label | None) -> dict[str, Any]:
+    """c, m and kind, None where there is no label."""
+    return asdict(label) if label else dict.fromkeys(("c", "m", "kind"))
+
+
+def _entry(run: ModalTest, told: LabelledMode) -> dict[str, Any]:
     finite = lambda x: x if isfinite(x) else None
     return {
         "file": run.name,
@@ -117,9 +119,7 @@ def _entry(run: Run, told: Told) -> dict[str, Any]:
         "sigma_Hz": finite(told.mode.sigma_Hz),
         "damping_ratio": finite(told.mode.damping),
         "collinearity": round(told.collinearity, 4),
-        "c": label.c if label else None,
-        "m": label.m if label else None,
-        "kind": label.kind if label else None,
+        **label_entry(told.judged.label),
         "member": told.member,
         "confidence": round(told.judged.confidence, 4),
         "why": told.judged.why,

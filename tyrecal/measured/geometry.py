@@ -12,6 +12,7 @@ import numpy as np
 from ..errors import InputError
 from ..modes.label import BELT
 from .sensors import Sensors
+from .universal import Place, Signal
 
 Array = np.ndarray
 
@@ -24,10 +25,10 @@ AXES = "xyz"
 
 
 def sensors_of(
-    signals: Sequence[tuple[int, int]],
-    nodes: Mapping[int, tuple[float, float, float]],
+    signals: Sequence[Signal],
+    nodes: Mapping[int, Place],
     axle: str = "",
-    centre: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    centre: Place = (0.0, 0.0, 0.0),
     cylindrical: bool = False,
 ) -> Sensors:
     """Sensors of signals (node, direction 1 to 3).

@@ -48,25 +48,20 @@ FORMS = ("receptance", "mobility", "accelerance")
 
 @dataclass(frozen=True)
 class Responses:
-    """Frequency-response functions of one excitation.
+    """Frequency-response functions of one excitation."""
 
-    frequency_Hz (n,): evenly spaced; values (k, n) complex, a signal each; form: receptance,
-    mobility or accelerance; points (k,): of each signal, the number of its point.
-    """
-
-    frequency_Hz: Array
-    values: Array
-    form: str
-    points: Array
+    frequency_Hz: Array  # (n,) evenly spaced
+    values: Array  # (k, n) complex, a signal each
+    form: str  # receptance, mobility or accelerance
+    points: Array  # (k,) of each signal, the number of its point
 
 
 @dataclass(frozen=True)
 class Identified:
-    """modes: by rising frequency, their amplitudes (k,) the residues; fitted (k, n): the
-    functions that they make, NaN outside the band."""
+    """What functions are made of."""
 
-    modes: tuple[MeasuredMode, ...]
-    fitted: Array
+    modes: tuple[MeasuredMode, ...]  # by rising frequency, their amplitudes the residues
+    fitted: Array  # (k, n) the functions that they make, NaN outside the band
 
 
 def identify(measured: Responses, low_Hz: float, high_Hz: float) -> Identified:

@@ -41,12 +41,11 @@ HEIGHTS = 2  # highest polynomial over a sidewall's height
 
 @dataclass(frozen=True)
 class Judged:
-    """label: the most probable one, None where it is not told; why: a sentence for that;
-    probabilities: of all labels, the largest first."""
+    """How a shape was judged."""
 
-    label: Label | None
-    probabilities: dict[Label, float]
-    why: str = ""
+    label: Label | None  # the most probable one, None where it is not told
+    probabilities: dict[Label, float]  # of all labels, the largest first
+    why: str = ""  # it is not told, in a sentence
 
     @property
     def confidence(self) -> float:
@@ -139,11 +138,8 @@ def _missing(sensors: Sensors) -> str:
     names = ("radial", "tangential", "axial")
     R, _, Z = sensors.points.T
     belt = R / R.max() > BELT
-    lacking = [
-        name
-        for k, name in enumerate(names)
-        if not np.any(np.abs(sensors.directions[belt, k]) > 0.5)
-    ]
+    measured = np.any(np.abs(sensors.directions[belt]) > 0.5, axis=0)
+    lacking = [name for name, seen in zip(names, measured, strict=True) if not seen]
     if lacking:
         return f"nothing {' or '.join(lacking)} was measured on the tread"
     if np.ptp(Z[belt]) < WIDTH * R.max():

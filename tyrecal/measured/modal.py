@@ -16,7 +16,7 @@ from .identify import FORMS, Responses, identify
 from .labels import Judged, Labeller
 from .measurement import Measurement
 from .sensors import MeasuredMode, Sensors, real_part
-from .universal import Function, Shape, Universal
+from .universal import Function, Place, Shape, Signal, Universal
 
 Array = np.ndarray
 
@@ -26,45 +26,38 @@ COLLINEAR = 0.5  # modal phase collinearity below which a shape has no real part
 
 @dataclass(frozen=True)
 class Layout:
-    """How a test's coordinates and directions are meant, and what can be in its band.
+    """How a test's coordinates and directions are meant, and what can be in its band."""
 
-    axle: x, y, z or "" (told by the places); centre: m; cylindrical: directions 1, 2, 3 are
-    radial, tangential, axial; highest: the largest c that is possible; band: Hz, None for all;
-    form: of functions that do not say theirs.
-    """
-
-    axle: str = ""
-    centre: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    cylindrical: bool = False
-    highest: int = HIGHEST_HARMONIC
-    band: tuple[float, float] | None = None
-    form: str = ""
+    axle: str = ""  # x, y or z; "": told by the sensors' places
+    centre: Place = (0.0, 0.0, 0.0)  # m
+    cylindrical: bool = False  # directions 1, 2, 3 are radial, tangential, axial
+    highest: int = HIGHEST_HARMONIC  # the largest c that is possible
+    band: tuple[float, float] | None = None  # Hz; None: all
+    form: str = ""  # of functions that do not say theirs
 
 
 @dataclass(frozen=True)
-class Told:
-    """A mode, its real shape (k,) at ``sensors`` of unit largest value, and its label; member: 1
-    or 2 where both of a doublet were found, else ""."""
+class LabelledMode:
+    """A measured mode with its label."""
 
     mode: MeasuredMode
     sensors: Sensors
-    shape: Array
+    shape: Array  # (k,) real, of unit largest value
     collinearity: float
     judged: Judged
-    place: str
-    member: str = ""
+    place: str  # file and data set
+    member: str = ""  # 1 or 2 where both of a doublet were found
 
 
 @dataclass(frozen=True)
-class Run:
-    """All of one file. functions: what the modes were identified from, and fitted: what they
-    make, (k, n) over frequency_Hz (n,), NaN above the band; None where the file holds shapes."""
+class ModalTest:
+    """All of one file; the functions are None where it holds shapes."""
 
     name: str
-    modes: tuple[Told, ...]
-    frequency_Hz: Array | None = None
-    functions: Array | None = None
-    fitted: Array | None = None
+    modes: tuple[LabelledMode, ...]
+    frequency_Hz: Array | None = None  # (n,)
+    functions: Array | None = None  # (k, n) from which the modes were identified
+    fitted: Array | None = None  # (k, n) what the modes make, NaN outside the band
 
     @property
     def explained(self) -> float:
@@ -75,17 +68,13 @@ class Run:
         return float(1 - rest / np.sum(np.abs(self.functions[np.isfinite(self.fitted)]) ** 2))
 
 
-def read_run(
-    file: Universal, nodes: Mapping[int, tuple[float, float, float]], layout: Layout
-) -> Run:
+def read_modal_test(file: Universal, nodes: Mapping[int, Place], layout: Layout) -> ModalTest:
     """Modes of a file by rising frequency; shapes in it come before functions.
 
     Raises InputError.
     """
     try:
-        return (
-            _from_shapes(file, nodes, layout) if file.shapes else _identified(file, nodes, layout)
-        )
+        return (_from_shapes if file.shapes else _identified)(file, nodes, layout)
     except InputError as error:
         raise _named(file, error) from None
 
@@ -110,20 +99,13 @@ def _named(file: Universal, error: InputError) -> InputError:
     return error if named else InputError(f"{file.path}: {error}")
 
 
-def _signals(shape: Shape) -> tuple[tuple[int, int], ...]:
-    measured = np.isfinite(shape.values)
-    return tuple(
-        (node, k + 1)
-        for node, row in zip(shape.nodes, measured, strict=True)
-        for k in range(3)
-        if row[k]
-    )
+def _signals(shape: Shape) -> tuple[Signal, ...]:
+    rows, columns = np.nonzero(np.isfinite(shape.values))
+    return tuple((shape.nodes[i], int(k) + 1) for i, k in zip(rows, columns, strict=True))
 
 
-def _from_shapes(
-    file: Universal, nodes: Mapping[int, tuple[float, float, float]], layout: Layout
-) -> Run:
-    labellers: dict[tuple[tuple[int, int], ...], Labeller] = {}
+def _from_shapes(file: Universal, nodes: Mapping[int, Place], layout: Layout) -> ModalTest:
+    labellers: dict[tuple[Signal, ...], Labeller] = {}
     told = []
     for shape in file.shapes:
         signals = _signals(shape)
@@ -132,16 +114,13 @@ def _from_shapes(
                 raise InputError(f"{shape.place}: every value is 0")
             sensors = sensors_of(signals, nodes, layout.axle, layout.centre, layout.cylindrical)
             labellers[signals] = Labeller(sensors, layout.highest)
-        mode = MeasuredMode(
-            shape.frequency_Hz, shape.values[np.isfinite(shape.values)], shape.damping
-        )
-        told.append(_told(mode, labellers[signals], shape.place))
-    return Run(str(file.path), tuple(settled(told)))
+        amplitude = shape.values[np.isfinite(shape.values)]
+        mode = MeasuredMode(shape.frequency_Hz, amplitude, shape.damping)
+        told.append(_labelled(mode, labellers[signals], shape.place))
+    return ModalTest(str(file.path), tuple(settled(told)))
 
 
-def _identified(
-    file: Universal, nodes: Mapping[int, tuple[float, float, float]], layout: Layout
-) -> Run:
+def _identified(file: Universal, nodes: Mapping[int, Place], layout: Layout) -> ModalTest:
     if not file.functions:
         others = ", ".join(f"{count} x {what}" for what, count in file.skipped.items())
         raise InputError(
@@ -169,15 +148,13 @@ def _identified(
     for mode in found.modes:
         residues = mode.amplitude.reshape(len(table), -1)
         strongest = residues[np.argmax(np.linalg.norm(residues, axis=1))]
-        told.append(_told(replace(mode, amplitude=strongest), labeller, str(file.path)))
-    return Run(str(file.path), tuple(settled(told)), f, values, found.fitted)
+        told.append(_labelled(replace(mode, amplitude=strongest), labeller, str(file.path)))
+    return ModalTest(str(file.path), tuple(settled(told)), f, values, found.fitted)
 
 
-def _by_reference(
-    functions: list[Function],
-) -> dict[tuple[int, int], dict[tuple[int, int], Function]]:
+def _by_reference(functions: list[Function]) -> dict[Signal, dict[Signal, Function]]:
     """Functions by reference, then by signal, all with the same signals and frequencies."""
-    table: dict[tuple[int, int], dict[tuple[int, int], Function]] = {}
+    table: dict[Signal, dict[Signal, Function]] = {}
     first = functions[0]
     for each in functions:
         row = table.setdefault(each.reference, {})
@@ -204,7 +181,7 @@ def _by_reference(
     return {reference: {s: row[s] for s in order} for reference, row in table.items()}
 
 
-def _told(mode: MeasuredMode, labeller: Labeller, place: str) -> Told:
+def _labelled(mode: MeasuredMode, labeller: Labeller, place: str) -> LabelledMode:
     shape, collinearity = real_part(mode.amplitude)
     size = np.abs(shape).max()
     judged = labeller.judge(shape / (size or 1.0))
@@ -214,40 +191,39 @@ def _told(mode: MeasuredMode, labeller: Labeller, place: str) -> Told:
     if judged.label and part < TAKES_PART:
         judged = replace(judged, label=None, why="the belt hardly moves: a mode of the sidewalls")
     if judged.label and collinearity < COLLINEAR:
-        judged = replace(
-            judged, label=None, why=f"the shape is complex (collinearity {collinearity:.2f})"
-        )
-    return Told(mode, labeller.sensors, shape / (size or 1.0), collinearity, judged, place)
+        why = f"the shape is complex (collinearity {collinearity:.2f})"
+        judged = replace(judged, label=None, why=why)
+    return LabelledMode(mode, labeller.sensors, shape / (size or 1.0), collinearity, judged, place)
 
 
-def settled(told: list[Told]) -> list[Told]:
+def settled(told: list[LabelledMode]) -> list[LabelledMode]:
     """Each label once in a run, or twice where both members of a doublet were found.
 
     As in ``modes.label``, the lowest mode on an order has its label; what comes above is an
     overtone, which has none here.
     """
-    result: list[Told] = []
-    order = sorted(told, key=lambda each: each.mode.frequency_Hz)
-    by_label: dict[Label | None, list[Told]] = {}
-    for each in order:
+    hertz = lambda each: each.mode.frequency_Hz
+    result: list[LabelledMode] = []
+    by_label: dict[Label | None, list[LabelledMode]] = {}
+    for each in sorted(told, key=hertz):
         by_label.setdefault(each.judged.label, []).append(each)
     for label, group in by_label.items():
         if label is None:
             result += group
             continue
-        lowest = group[0].mode.frequency_Hz
-        pair = [e for e in group if e.mode.frequency_Hz <= (1 + DOUBLET) * lowest]
+        lowest = hertz(group[0])
+        pair = [each for each in group if hertz(each) <= (1 + DOUBLET) * lowest]
         pair = pair[: 2 if label.c else 1]
         for number, each in enumerate(pair, start=1):
             result.append(replace(each, member=str(number) if len(pair) == 2 else ""))
         for each in group[len(pair) :]:
             why = f"{label.said} stands at {lowest:.2f} Hz already; an overtone, or another's pair"
             result.append(replace(each, judged=replace(each.judged, label=None, why=why)))
-    return sorted(result, key=lambda each: each.mode.frequency_Hz)
+    return sorted(result, key=hertz)
 
 
-def measurements_of(run: Run, pressure_kPa: float) -> list[Measurement]:
-    """The frequencies of a run's modes that have a label."""
+def measurements_of(test: ModalTest, pressure_kPa: float) -> list[Measurement]:
+    """The frequencies of the modes that have a label."""
     return [
         Measurement(
             "frequency_Hz",
@@ -257,9 +233,9 @@ def measurements_of(run: Run, pressure_kPa: float) -> list[Measurement]:
             0.0,
             each.mode.frequency_Hz,
             each.mode.sigma_Hz,
-            run.name,
+            test.name,
             each.place,
         )
-        for each in run.modes
+        for each in test.modes
         if each.judged.label
     ]

@@ -12,14 +12,10 @@ Array = np.ndarray
 
 @dataclass(frozen=True)
 class Sensors:
-    """What is measured, and where: one row a signal, several rows for a point with several.
+    """What is measured, and where: one row a signal, several rows for a point with several."""
 
-    points (k, 3): R (m), Theta (rad), Z (m) about the axle, Z = 0 in the tyre's middle plane;
-    directions (k, 3): unit vectors in r, theta, z.
-    """
-
-    points: Array
-    directions: Array
+    points: Array  # (k, 3) R (m), Theta (rad), Z (m) about the axle, from the middle plane
+    directions: Array  # (k, 3) unit vectors in r, theta, z
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ it says, is refused with the set's number and line.
 from __future__ import annotations
 
 import re
+from collections import Counter, defaultdict
 from dataclasses import dataclass, field
 from math import isfinite, pi
 from pathlib import Path
@@ -20,8 +21,9 @@ from ..files import open_file, read_bytes
 
 Array = np.ndarray
 Signal = tuple[int, int]  # number of a node; direction 1, 2 or 3, negative where it is reversed
+Place = tuple[float, float, float]  # m
 
-LARGEST = 1_000_000_000  # bytes; response functions of many points are long
+MAX_BYTES = 1_000_000_000  # response functions of many points are long
 MARK = re.compile(rb" {4}-1(?: {74})?(?=[\r\n]|\Z)")  # binary values may stand before it
 FORMS = {8: "receptance", 11: "mobility", 12: "accelerance"}
 UNHEEDED = (151, 2400, 2412)  # titles and elements: nothing is lost without them
@@ -41,14 +43,12 @@ RESPONSE, TIME = 4, 17  # codes of a function's type, and of what it stands over
 
 @dataclass(frozen=True)
 class Shape:
-    """A data set 55: frequency (Hz), damping ratio (NaN where not stated), complex values (k, 3)
-    at ``nodes``, in each node's own directions 1 to 3; components that are 0 in every mode of the
-    file were not measured, and are NaN."""
+    """A data set 55."""
 
     frequency_Hz: float
-    damping: float
+    damping: float  # ratio; NaN where not stated
     nodes: tuple[int, ...]
-    values: Array
+    values: Array  # (k, 3) complex, in each node's own directions; NaN: 0 in every mode of the file
     place: str
 
 
@@ -66,15 +66,14 @@ class Function:
 
 @dataclass(frozen=True)
 class Universal:
-    """What a universal file holds; nodes: coordinates in m by number; skipped: what was not used,
-    how often."""
+    """What a universal file holds."""
 
     path: Path
-    nodes: dict[int, tuple[float, float, float]]
+    nodes: dict[int, Place]
     shapes: list[Shape]
     functions: list[Function]
     lines: list[tuple[int, ...]] = field(default_factory=list)
-    skipped: dict[str, int] = field(default_factory=dict)
+    skipped: Counter[str] = field(default_factory=Counter)  # what was not used, how often
 
 
 def is_universal(path: Path) -> bool:
@@ -87,7 +86,7 @@ def read_universal(path: Path) -> Universal:
     """Raises InputError naming the set and its line; OSError."""
     import pyuff
 
-    text = read_bytes(path, LARGEST)
+    text = read_bytes(path, MAX_BYTES)
     marks = [match.start() for match in MARK.finditer(text)]
     line_of = lambda mark: text.count(b"\n", 0, mark) + 1
     if not marks:
@@ -106,7 +105,7 @@ def read_universal(path: Path) -> Universal:
         if kind in UNHEEDED:
             continue
         if kind not in (15, 55, 58, 82, 164, 2411):
-            result.skipped[f"type {kind}"] = result.skipped.get(f"type {kind}", 0) + 1
+            result.skipped[f"type {kind}"] += 1
             continue
         try:
             sets.append((place, file.read_sets(number)))
@@ -138,15 +137,13 @@ def _take(result: Universal, place: str, each: dict[str, Any], length: float) ->
         if each["analysis_type"] in (2, 3, 7) and each.get("n_data_per_node") in (3, 6):
             result.shapes.append(_shape(place, each))
         else:
-            name = "data at nodes that are no mode shape"
-            result.skipped[name] = result.skipped.get(name, 0) + 1
+            result.skipped["data at nodes that are no mode shape"] += 1
     elif each["type"] == 58:
         if each["func_type"] == RESPONSE:
             result.functions.append(_function(place, each))
         else:
             code = each["func_type"]
-            name = FUNCTIONS.get(code, f"function of type {code}")
-            result.skipped[name] = result.skipped.get(name, 0) + 1
+            result.skipped[FUNCTIONS.get(code, f"function of type {code}")] += 1
 
 
 def _shape(place: str, each: dict[str, Any]) -> Shape:
@@ -168,10 +165,10 @@ def _shape(place: str, each: dict[str, Any]) -> Shape:
 
 def _unmeasured(shapes: list[Shape]) -> None:
     """Set what is 0 in every mode to NaN: the format has no other word for not measured."""
-    sums: dict[int, Array] = {}
+    sums: defaultdict[int, Array] = defaultdict(lambda: np.zeros(3))
     for shape in shapes:
         for node, value in zip(shape.nodes, np.abs(shape.values), strict=True):
-            sums[node] = sums.get(node, np.zeros(3)) + value
+            sums[node] = sums[node] + value
     for shape in shapes:
         for row, node in enumerate(shape.nodes):
             shape.values[row, sums[node] == 0] = np.nan

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from rich.table import Table
 
-    from ..measured.modal import Run, Told
+    from ..measured.modal import LabelledMode, ModalTest
 
 Array = np.ndarray
 
@@ -27,7 +27,7 @@ PER_ROW = 5
 MOST = 20  # shapes in a picture
 
 
-def measured_table(runs: Sequence[Run]) -> Table:
+def measured_table(runs: Sequence[ModalTest]) -> Table:
     """Modes of each run: label, frequency, damping, and how sure the label is."""
     from rich import box
     from rich.table import Table
@@ -45,7 +45,7 @@ def measured_table(runs: Sequence[Run]) -> Table:
             table.add_row(
                 Text(f"{label.said}{member}" if label else "-"),
                 f"{told.mode.frequency_Hz:.2f}",
-                f"{sigma:.3f}" if sigma is not None and np.isfinite(sigma) else "-",
+                f"{sigma:.3f}" if np.isfinite(sigma) else "-",
                 f"{100 * told.mode.damping:.2f}" if np.isfinite(told.mode.damping) else "-",
                 f"{told.judged.confidence:.2f}",
                 Text(told.judged.why),
@@ -75,7 +75,7 @@ def _few(labels: Sequence[Label], most: int = 4) -> str:
     )
 
 
-def draw_measured(path: Path, runs: Sequence[Run]) -> None:
+def draw_measured(path: Path, runs: Sequence[ModalTest]) -> None:
     """Draw the functions of the first run that has some, with its modes, and the shapes of the
     same run on the ring: the tread's sensors, moved by what they measured, and c waves through
     them."""
@@ -84,7 +84,7 @@ def draw_measured(path: Path, runs: Sequence[Run]) -> None:
     in_house_style(_draw)(path, runs)
 
 
-def _draw(path: Path, runs: Sequence[Run]) -> None:
+def _draw(path: Path, runs: Sequence[ModalTest]) -> None:
     from .figure import new_figure, save
 
     run = next((each for each in runs if each.functions is not None), runs[0])
@@ -101,7 +101,7 @@ def _draw(path: Path, runs: Sequence[Run]) -> None:
     save(figure, path)
 
 
-def _draw_functions(axes: Axes, run: Run) -> None:
+def _draw_functions(axes: Axes, run: ModalTest) -> None:
     """The root mean square over all signals, measured and made by the modes."""
     from .figure import COLOURS, GREY
 
@@ -147,7 +147,7 @@ def _shown(label: Label | None, size: Sequence[float]) -> int:
     return next((k for k in order if size[k] > 0), int(np.argmax(size)))
 
 
-def _draw_shape(axes: Axes, told: Told) -> None:
+def _draw_shape(axes: Axes, told: LabelledMode) -> None:
     """One component of the tread's motion, as a radial displacement of its sensors."""
     from .figure import COLOURS, GREY
 
