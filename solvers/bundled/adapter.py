@@ -15,7 +15,8 @@ from .job import Failures, TimedOut, run
 from .road import footprint_job
 
 JOB, PRESS, OLDJOB = "modes", "press", "inflate"
-ASIDE = ("own_frequency", "cavity", "sector")  # of the tool's request, as in `request.Request`
+# of the tool's request, as in `request.Request`
+REQUEST_KEYS = ("own_frequency", "cavity", "sector")
 
 
 class Decks(Protocol):
@@ -66,7 +67,7 @@ class Bundled:
             "harmonics": list(range(decks.request["highest_harmonic"] + 1)),
             "modes_per_harmonic": decks.request["modes_per_harmonic"],
             "sensitivities": decks.tangents(self.dialect),
-            **{k: decks.request[k] for k in ASIDE if k in decks.request},
+            **{k: decks.request[k] for k in REQUEST_KEYS if k in decks.request},
         }
         paths.append(folder / f"{JOB}.request.json")
         paths[-1].write_text(json.dumps(request), encoding="utf-8", newline="")

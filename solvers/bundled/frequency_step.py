@@ -6,14 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from .deck.keywords import Row
-from .deck.steps import Step, Tangent
+from .deck.keywords import DataLine
+from .deck.steps import DeckStep, Tangent
 from .modes import sensitivity
 from .modes.bordered import Bordered
 from .modes.frequency_dependent import SelfConsistent
-from .modes.harmonics import Change, HarmonicModes, HasModes, Vibration, lowest_of_all
+from .modes.harmonics import HarmonicModes, HasModes, SeededTyre, Vibration, lowest_of_all
 from .modes.inflated import Inflated
-from .nonuniform.select import is_uneven, uneven_modes
+from .nonuniform.select import is_nonuniform, nonuniform_modes
 from .section.band import Cholesky, Numbering
 from .section.boundary import numbering
 from .section.loads import pressures, spin, turning
@@ -23,7 +23,7 @@ Array = np.ndarray
 
 
 def frequency_step(
-    tyre: Inflated, place: int, step: Step
+    tyre: Inflated, place: int, step: DeckStep
 ) -> tuple[list[HarmonicModes], dict[str, list[Array]]]:
     """Modes by harmonic, and d lambda / d variable by variable and harmonic.
 
@@ -32,12 +32,12 @@ def frequency_step(
     """
     procedure = step.procedure
     dynamic_Hz = procedure.number("PROPERTY EVALUATION")
-    row = procedure.rows[0] if procedure.rows else Row(procedure.line, [])
+    row = procedure.rows[0] if procedure.rows else DataLine(procedure.line, [])
     shift = float(np.real(row.number(3, 0.0))) * (2 * np.pi) ** 2
     own = tyre.request.own_frequency
     model = turning(tyre.models(dynamic_Hz, step.long_term, own), step)
     equations = numbering(model, step)
-    wheel, air = tyre.beside(model, step)
+    wheel, air = tyre.wheel_and_cavity(model, step)
     vibration = Vibration(
         model,
         tyre.U,
@@ -71,18 +71,18 @@ def frequency_step(
 
 
 def _modes(
-    tyre: Inflated, step: Step, row: Row, vibration: HasModes, factor: Cholesky | Bordered
+    tyre: Inflated, step: DeckStep, row: DataLine, vibration: HasModes, factor: Cholesky | Bordered
 ) -> list[HarmonicModes]:
     harmonics = tyre.request.harmonics if step.revolved else [0]
     count = tyre.request.modes_per_harmonic
-    uneven = is_uneven(tyre, step)
+    uneven = is_nonuniform(tyre, step)
     if harmonics is None:
         lowest = lowest_of_all(vibration, row.integer(0), tyre.check)
         if not uneven:
             return lowest
         harmonics, count = [m.n for m in lowest], max(len(m.eigenvalues) for m in lowest)
     if uneven:
-        return uneven_modes(tyre, step, vibration, harmonics, count)
+        return nonuniform_modes(tyre, step, vibration, harmonics, count)
     modes = []
     for n in harmonics:
         tyre.check()
@@ -91,13 +91,13 @@ def _modes(
     return modes
 
 
-def _asked(modes: list[HarmonicModes]) -> tuple[sensitivity.Fields, Array]:
+def _asked(modes: list[HarmonicModes]) -> tuple[sensitivity.ModeShapes, Array]:
     """The fields and the eigenvalues whose derivatives are asked for."""
     forms = [m.forms() for m in modes]
     n, shapes, owner, eigenvalues = (np.concatenate(x) for x in zip(*forms, strict=True))
     before = np.cumsum([0, *(len(values) for *_, values in forms[:-1])])
     owner += np.repeat(before, [len(own) for _, _, own, _ in forms])
-    return sensitivity.Fields(n, shapes, owner), eigenvalues
+    return sensitivity.ModeShapes(n, shapes, owner), eigenvalues
 
 
 def _rates(
@@ -108,7 +108,7 @@ def _rates(
     factor: Cholesky,
     equations: Numbering,
     modes: list[HarmonicModes],
-    fields: sensitivity.Fields,
+    fields: sensitivity.ModeShapes,
     eigenvalues: Array,
 ) -> list[Array]:
     """d lambda / d variable per harmonic, with the deck's numbers carrying its tangent."""
@@ -120,15 +120,15 @@ def _rates(
     moving = still
     if dynamic_Hz is not None or own:
         moving = turning(build(section, dynamic_Hz, step.long_term, own), step)
-    wheel, air = seeded.beside(moving, step)
-    beside = None
+    wheel, air = seeded.wheel_and_cavity(moving, step)
+    rim_and_air = None
     if wheel or air:
         rim, flow = [q for m in modes for q in m.rim], [w for m in modes for w in m.air]
-        beside = sensitivity.Beside(wheel, air, rim, flow)
+        rim_and_air = sensitivity.RimAndAir(wheel, air, rim, flow)
     forms = sensitivity.eigenvalue_rates(
-        moving, tyre.U, V, pressures(moving, step), fields, eigenvalues, beside
+        moving, tyre.U, V, pressures(moving, step), fields, eigenvalues, rim_and_air
     )
-    change = Change(moving, spin(tyre.model, step), seeded.attached())
+    change = SeededTyre(moving, spin(tyre.model, step), seeded.attached())
     each = np.split(forms, np.cumsum([len(m.eigenvalues) for m in modes])[:-1])
     return [
         m.makeup.rates(own_forms, change) if m.makeup else own_forms

@@ -13,7 +13,7 @@ from threadpoolctl import ThreadpoolController
 
 from .deck.keywords import DeckError, Keyword, read_deck
 from .deck.request import Request, read_request, read_sector
-from .deck.steps import Deck, Step
+from .deck.steps import Deck, DeckStep
 from .frequency_step import frequency_step
 from .modes.frequency_dependent import NotSelfConsistent
 from .modes.harmonics import HarmonicModes, Unstable
@@ -27,7 +27,7 @@ from .section.inflation import InflationFailed, equilibrium
 from .section.loads import pressures, turning
 from .section.mechanics import mass
 from .section.model import build
-from .section.point_elements import read_attached
+from .section.point_elements import read_point_elements
 
 Failures = (InflationFailed, Unstable, NotConverged, NotSelfConsistent, NotPressed)
 
@@ -47,7 +47,7 @@ def run(folder: Path, job: str, oldjob: str | None, time_limit: float = float("i
         deck = Deck(texts, job, oldjob)
         request = read_request(folder / f"{job}.request.json", list(texts))
         sector = read_sector(folder, request.sector) if request.sector else []
-        analysis = Analysis(deck, request, deadline, sector)
+        analysis = Job(deck, request, deadline, sector)
         try:
             if analysis.road is not None:
                 footprint_job.write(folder / job, analysis.model, analysis.press())
@@ -63,7 +63,7 @@ def _threads() -> ThreadpoolController:
     return ThreadpoolController()
 
 
-class Analysis:
+class Job:
     """The steps of a deck, carried out one after the other from the state at rest."""
 
     def __init__(
@@ -81,7 +81,7 @@ class Analysis:
         self.model = self.models(None, True, False)
         self.U = np.zeros((len(self.model.mesh.X), 3))
         self.mass_kg = float(2 * np.pi * mass(self.model).sum().real)
-        self.mass_kg += read_attached(self.revolve, self.model.mesh).total_kg
+        self.mass_kg += read_point_elements(self.revolve, self.model.mesh).total_kg
         self.factorisations = 0
 
     def run(self) -> list[StepResult]:
@@ -98,7 +98,7 @@ class Analysis:
         """Footprints of a job with a road, one per step with a force on it, and modes there."""
         assert self.road is not None
         wanted: list[float] = []
-        vibrations: dict[float, footprint_job.Vibrating] = {}
+        vibrations: dict[float, footprint_job.ModesAtLoad] = {}
         for step in self.steps:
             if step.centrifugal:
                 raise DeckError(step.procedure.line, "a turning tyre on a road is not honoured")
@@ -137,7 +137,7 @@ class Analysis:
         )
         return {"pressure_Pa": step.pressure, "mass_kg": self.mass_kg, **found}
 
-    def _vibrating(self, step: Step) -> footprint_job.Vibrating:
+    def _vibrating(self, step: DeckStep) -> footprint_job.ModesAtLoad:
         """What a *FREQUENCY step on the road asks for."""
         assert self.road is not None
         line, row = step.procedure.line, step.procedure.only_row()
@@ -152,9 +152,9 @@ class Analysis:
         numbers = self.model.mesh.node_sets[step.output]
         nodes = np.array([self.model.mesh.index[n] for n in numbers])
         model = self.models(step.procedure.number("PROPERTY EVALUATION"), step.long_term, False)
-        return footprint_job.Vibrating(model, row.integer(0), nodes)
+        return footprint_job.ModesAtLoad(model, row.integer(0), nodes)
 
-    def _static(self, step: Step) -> None:
+    def _static(self, step: DeckStep) -> None:
         self._check_time()
         model = turning(self.models(None, step.long_term, False), step)
         equations = numbering(model, step)
@@ -162,7 +162,7 @@ class Analysis:
         self.U = found.U
         self.factorisations += found.factorisations
 
-    def _frequency(self, place: int, step: Step) -> StepResult:
+    def _frequency(self, place: int, step: DeckStep) -> StepResult:
         tyre = Inflated(
             self.deck,
             self.request,
@@ -176,7 +176,7 @@ class Analysis:
         return self._result(step, *frequency_step(tyre, place, step))
 
     def _result(
-        self, step: Step, modes: list[HarmonicModes], rates: dict[str, list[np.ndarray]]
+        self, step: DeckStep, modes: list[HarmonicModes], rates: dict[str, list[np.ndarray]]
     ) -> StepResult:
         return StepResult(
             step.number, step.pressure, self.mass_kg, modes, rates, self.U, self.factorisations

@@ -22,7 +22,7 @@ from threadpoolctl import threadpool_limits
 from tyrecal_solvers.bundled.adapter import JOB, OLDJOB
 from tyrecal_solvers.bundled.deck.request import read_request
 from tyrecal_solvers.bundled.deck.steps import Deck
-from tyrecal_solvers.bundled.job import Analysis
+from tyrecal_solvers.bundled.job import Job
 
 from tyrecal.case import load_case, start_values
 from tyrecal.evaluate.door import Door, Question
@@ -47,7 +47,7 @@ def main(rounds: int) -> None:
         for number in range(rounds):
             with threadpool_limits(1, "blas"):
                 start = time.perf_counter()
-                Analysis(Deck(texts, JOB, OLDJOB), request).run()
+                Job(Deck(texts, JOB, OLDJOB), request).run()
                 work.append(time.perf_counter() - start)
             question = Question({**values, "C10": values["C10"] * (1 + 1e-6 * (number + 1))}, names)
             for seconds in (whole, again):

@@ -6,9 +6,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from tyrecal_solvers.bundled.road.contact import Road, flat_road
-from tyrecal_solvers.bundled.road.contact_newton import Press
-from tyrecal_solvers.bundled.road.half_turn_symmetry import Fold
+from tyrecal_solvers.bundled.road.contact import FlatRoad, flat_road
+from tyrecal_solvers.bundled.road.contact_newton import ContactNewton
+from tyrecal_solvers.bundled.road.half_turn_symmetry import HalfTurn
 from tyrecal_solvers.bundled.section.model import Model
 from tyrecal_solvers.bundled.section.parts.pressure import Pressure
 from tyrecal_solvers.bundled.solid3d.circumference import Circumference, half_circle
@@ -32,12 +32,12 @@ class Round:
     def tyre(self, around: Circumference) -> Revolved:
         return Revolved(self.model, self.loads, around)
 
-    def fold(self, around: Circumference, parity: int = 1) -> Fold:
-        return Fold(self.model.mesh, self.free, len(around.angles), parity)
+    def symmetry(self, around: Circumference, parity: int = 1) -> HalfTurn:
+        return HalfTurn(self.model.mesh, self.free, len(around.angles), parity)
 
     def road(
         self, around: Circumference, stiffness: float, friction: float = 0.0, slip: float = 1e-5
-    ) -> Road:
+    ) -> FlatRoad:
         mesh = self.model.mesh
         return flat_road(mesh.X, mesh.faces["TREAD"], around, stiffness, friction, slip)
 
@@ -52,10 +52,12 @@ class Round:
         friction: float = 0.0,
         slip: float = 1e-5,
         check: Callable[[], None] = lambda: None,
-    ) -> Press:
+    ) -> ContactNewton:
         around = half_circle(lengths)
         road = self.road(around, stiffness, friction, slip)
-        return Press(self.tyre(around), self.fold(around), road, self.everywhere(around), check)
+        return ContactNewton(
+            self.tyre(around), self.symmetry(around), road, self.everywhere(around), check
+        )
 
 
 def ring(

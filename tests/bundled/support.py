@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from tyrecal_solvers.bundled.deck import grammar, keywords
 from tyrecal_solvers.bundled.modes import harmonics
-from tyrecal_solvers.bundled.road.contact_newton import NotPressed, Press, Pressed
+from tyrecal_solvers.bundled.road.contact_newton import ContactNewton, NotPressed, PressedState
 from tyrecal_solvers.bundled.section import inflation, mechanics, model
 from tyrecal_solvers.bundled.section.band import Numbering
 from tyrecal_solvers.bundled.section.model import Model
@@ -27,14 +27,14 @@ SECTION = Path(__file__).parents[2] / "cases" / "p235_75r17.csv"
 def bears(patch: pytest.MonkeyPatch, most_N: float) -> None:
     """Newton's method finds no tyre on a road above ``most_N``: the long way down to a real rim is
     gone once, by `tests/cli/test_footprint.py`."""
-    newton = Press._newton
+    newton = ContactNewton._newton
 
-    def at_most(press: Press, load: float) -> Pressed:
+    def at_most(press: ContactNewton, load: float) -> PressedState:
         if load > most_N:
             raise NotPressed("too much")
         return newton(press, load)
 
-    patch.setattr(Press, "_newton", at_most)
+    patch.setattr(ContactNewton, "_newton", at_most)
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from tyrecal_solvers.bundled.road.block_cholesky import Elimination, Factor
-from tyrecal_solvers.bundled.road.half_turn_symmetry import Fold
+from tyrecal_solvers.bundled.road.half_turn_symmetry import HalfTurn
 from tyrecal_solvers.bundled.section.band import Indefinite
 from tyrecal_solvers.bundled.solid3d.circumference import half_circle
 from tyrecal_solvers.bundled.solid3d.revolved import Revolved
@@ -35,22 +35,22 @@ class Problem:
     ):
         around = half_circle(lengths)
         k = len(around.angles)
-        self.fold = Fold(work.model.mesh, ~work.held, k, parity)
+        self.symmetry = HalfTurn(work.model.mesh, ~work.held, k, parity)
         self.tyre = Revolved(work.model, work.loads, around)
         self.tyre.residual(np.repeat(work.U[None], k, 0))
         self.contact = np.zeros((k, len(work.U), 3, 3)) if contact is None else contact
         tangents = self.tyre.tangents(np.float32)
-        order = Elimination([t[0] for t in tangents], self.fold, around)
+        order = Elimination([t[0] for t in tangents], self.symmetry, around)
         self.factor = Factor(order, tangents, self.contact)
 
     def product(self, x: Array) -> Array:
-        U = self.fold.spread(x)
+        U = self.symmetry.spread(x)
         contact = np.einsum("knij,knj->kni", self.contact, U)
-        return self.fold.gather(self.tyre.product(U) + contact)
+        return self.symmetry.gather(self.tyre.product(U) + contact)
 
     def random(self) -> Array:
-        x = generator(5).normal(size=(2, *self.fold.mask.shape))
-        return x * self.fold.mask
+        x = generator(5).normal(size=(2, *self.symmetry.mask.shape))
+        return x * self.symmetry.mask
 
 
 def conjugate_gradients(
@@ -123,7 +123,7 @@ def test_approximate_inverse_is_symmetric(inflated: Inflated) -> None:
             (x * My).sum(), abs=1e-4 * np.linalg.norm(Mx) * np.linalg.norm(y)
         )
         assert (x * Mx).sum() > 0
-        assert not Mx[~problem.fold.mask].any()
+        assert not Mx[~problem.symmetry.mask].any()
 
 
 @pytest.mark.parametrize("quadratic", [True, False], ids=["Q8", "Q4"])

@@ -7,9 +7,9 @@ import pytest
 from scipy.linalg import eigh
 from scipy.optimize import brentq
 from scipy.special import jvp, yvp
-from tyrecal_solvers.bundled.deck.keywords import STEP
+from tyrecal_solvers.bundled.deck.keywords import COMPLEX_STEP
 from tyrecal_solvers.bundled.modes import cavity
-from tyrecal_solvers.bundled.modes.cavity import Air, coupling
+from tyrecal_solvers.bundled.modes.cavity import Cavity, coupling
 from tyrecal_solvers.bundled.section import elements, mechanics
 from tyrecal_solvers.bundled.section.parts import pressure
 from tyrecal_solvers.bundled.section.parts.pressure import surface_point
@@ -22,11 +22,11 @@ RHO, BULK = 4.06, 4.78e5
 C = np.sqrt(BULK / RHO)  # m/s
 
 
-def rectangle(a: float, b: float, height: float) -> tuple[Array, Air]:
+def rectangle(a: float, b: float, height: float) -> tuple[Array, Cavity]:
     """A rigid duct a < r < b round the axle."""
     X = np.array([[b, 0.0], [b, height], [a, height], [a, 0.0]])
     lines = elements.lines(X, np.array([[1, 0], [2, 1], [3, 2], [0, 3]]), 3)
-    return X, Air(RHO, BULK, [lines])
+    return X, Cavity(RHO, BULK, [lines])
 
 
 def resonances(a: float, b: float, n: int) -> Array:
@@ -62,7 +62,7 @@ def test_volume_and_slow_compression() -> None:
         weights = [s.weights for s in gas.surfaces]
         return sum(complex(pressure.volume(*p, w)) for p, w in zip(points, weights, strict=True))
 
-    V, dV = volume(tyre.U).real, volume(tyre.U + 1j * STEP * u).imag / STEP
+    V, dV = volume(tyre.U).real, volume(tyre.U + 1j * COMPLEX_STEP * u).imag / COMPLEX_STEP
     K = coupling(gas, X, tyre.U, 0)
     assert K.Q[0, 0] == pytest.approx(V / BULK, rel=1e-12)
     assert K.C[0].ravel() @ u.ravel() == pytest.approx(dV, rel=1e-9)

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from tyrecal_solvers.bundled.deck.keywords import DeckError, read_keywords
-from tyrecal_solvers.bundled.road.contact import Contact, Road
+from tyrecal_solvers.bundled.road.contact import Contact, FlatRoad
 from tyrecal_solvers.bundled.road.footprint_job import read_road
 from tyrecal_solvers.bundled.solid3d.circumference import Circumference, half_circle
 from tyrecal_solvers.bundled.solid3d.gmres import gmres
@@ -35,7 +35,7 @@ def lowered(around: Circumference, nodes: int, shift: Array) -> Array:
     return np.repeat(u[:, None], nodes, 1)
 
 
-def settled(work: Round, friction: float, depth: float = 2e-4) -> tuple[Road, Array]:
+def settled(work: Round, friction: float, depth: float = 2e-4) -> tuple[FlatRoad, Array]:
     """A road that a shift of the ring by ``depth`` has touched, and that state."""
     road = work.road(AROUND, STIFFNESS, friction, SLIP)
     U = lowered(AROUND, len(work.U), np.array([depth, 0.0, 0.0]))

@@ -14,7 +14,7 @@ import pytest
 from tyrecal_solvers.bundled import job
 from tyrecal_solvers.bundled.deck.keywords import DeckError
 from tyrecal_solvers.bundled.road import footprint_job
-from tyrecal_solvers.bundled.road.contact_newton import NotPressed, Press
+from tyrecal_solvers.bundled.road.contact_newton import ContactNewton, NotPressed
 
 from tyrecal.case import LoadedCase, load_case
 from tyrecal.deck.write import Decks
@@ -304,7 +304,7 @@ def test_a_first_load_out_of_reach_fails(solid: Round) -> None:
 
 
 def test_a_clock_that_runs_out_between_loads(solid: Round) -> None:
-    """What was reached before stays; the same from `Press` and from the job."""
+    """What was reached before stays; the same from `ContactNewton` and from the job."""
     press = solid.press(LENGTHS, 1e10)
     first = press.to(50.0)
     press.check = Late(1)
@@ -351,7 +351,7 @@ def test_nodes_of_the_middle_plane_count_for_both_halves(solid: Round) -> None:
 
 @pytest.mark.parametrize("friction", [0.0, 0.5])
 def test_two_presses_give_the_same_bits(solid: Round, friction: float) -> None:
-    runs: list[Press] = []
+    runs: list[ContactNewton] = []
     for _ in range(2):
         runs.append(solid.press(LENGTHS, 1e10, friction))
         for load in (50.0, 100.0):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from tyrecal_solvers.bundled.road.contact_update import Touching
+from tyrecal_solvers.bundled.road.contact_update import ContactUpdate
 
 from .conftest import Inflated
 from .test_block_cholesky import Problem, conjugate_gradients, road_blocks
@@ -15,7 +15,7 @@ Array = np.ndarray
 @pytest.mark.slow
 def test_follows_the_contact(inflated: Inflated) -> None:
     """On, stiffer, and off again: as few iterations as with a factor formed there."""
-    touching = Touching(Problem(inflated).factor)
+    touching = ContactUpdate(Problem(inflated).factor)
     for blocks in (
         road_blocks(inflated, 1e6, 0.1),
         road_blocks(inflated, 1e7, 0.5),
@@ -33,7 +33,7 @@ def test_one_node_in_the_middle_of_the_patch(inflated: Inflated) -> None:
     """Both symmetries hold it but for its way down: a single column."""
     blocks, X = np.zeros_like(road_blocks(inflated, 1e6, 0.0)), inflated.model.mesh.X
     blocks[0, np.lexsort((abs(X[:, 1]), -X[:, 0].round(9)))[0]] = np.diag([1e6, 0.0, 0.0])
-    touching, problem = Touching(Problem(inflated).factor), Problem(inflated, contact=blocks)
+    touching, problem = ContactUpdate(Problem(inflated).factor), Problem(inflated, contact=blocks)
     touching.to(blocks)
     x = problem.random()[0]
     expected = problem.factor.solve(x)
@@ -45,7 +45,7 @@ def test_releases_what_the_factor_holds(inflated: Inflated) -> None:
     before = road_blocks(inflated, 1e6, 0.1)
     after = before.copy()
     after[2:] = 0.0
-    touching = Touching(Problem(inflated, contact=before).factor)
+    touching = ContactUpdate(Problem(inflated, contact=before).factor)
     touching.to(after)
     problem = Problem(inflated, contact=after)
     x = problem.random()[0]
@@ -61,7 +61,7 @@ def test_friction_is_not_symmetric(inflated: Inflated) -> None:
     whole[..., 1, 0] += 0.5 * normal[..., 0, 0]
     whole[0, :, 1] = 0.0
     problem = Problem(inflated, contact=normal)
-    touching = Touching(problem.factor)
+    touching = ContactUpdate(problem.factor)
     problem.contact = whole
     x = problem.random()[0]
     image = problem.product(x)
@@ -77,7 +77,7 @@ def test_places_are_formed_once(inflated: Inflated) -> None:
     blocks = road_blocks(inflated, 1e6, 0.1)
     some = blocks.copy()
     some[1:] = 0.0
-    touching = Touching(Problem(inflated).factor)
+    touching = ContactUpdate(Problem(inflated).factor)
     x = Problem(inflated).random()[0]
     touching.to(some)
     first = touching.solve(x)
@@ -85,7 +85,7 @@ def test_places_are_formed_once(inflated: Inflated) -> None:
     assert not np.allclose(touching.solve(x), first, atol=1e-3 * abs(first).max())
     touching.to(some)
     np.testing.assert_array_equal(touching.solve(x), first)
-    fresh = Touching(Problem(inflated).factor)
+    fresh = ContactUpdate(Problem(inflated).factor)
     fresh.to(blocks)
     touching.to(blocks)
     expected = fresh.solve(x)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from tyrecal_solvers.bundled.road.half_turn_symmetry import MIRROR, Fold, NotSymmetric
+from tyrecal_solvers.bundled.road.half_turn_symmetry import MIRROR, HalfTurn, NotSymmetric
 from tyrecal_solvers.bundled.solid3d.circumference import half_circle
 from tyrecal_solvers.bundled.solid3d.revolved import Revolved
 
@@ -19,47 +19,49 @@ ANGLES = 7
 
 
 @pytest.fixture(scope="module", params=[1, -1], ids=["kept", "reversed"])
-def fold(request, inflated: Inflated) -> Fold:
-    return Fold(inflated.model.mesh, ~inflated.held, ANGLES, request.param)
+def symmetry(request, inflated: Inflated) -> HalfTurn:
+    return HalfTurn(inflated.model.mesh, ~inflated.held, ANGLES, request.param)
 
 
-def masked(fold: Fold, random: np.random.Generator) -> Array:
-    return random.normal(size=fold.mask.shape) * fold.mask
+def masked(symmetry: HalfTurn, random: np.random.Generator) -> Array:
+    return random.normal(size=symmetry.mask.shape) * symmetry.mask
 
 
-def test_parts_of_what_was_spread(fold: Fold, random: np.random.Generator) -> None:
-    x = masked(fold, random)
-    np.testing.assert_allclose(fold.parts(fold.spread(x)), x, atol=1e-14)
+def test_parts_of_what_was_spread(symmetry: HalfTurn, random: np.random.Generator) -> None:
+    x = masked(symmetry, random)
+    np.testing.assert_allclose(symmetry.parts(symmetry.spread(x)), x, atol=1e-14)
 
 
-def test_gather_is_the_transpose_of_spread(fold: Fold, random: np.random.Generator) -> None:
+def test_gather_is_the_transpose_of_spread(symmetry: HalfTurn, random: np.random.Generator) -> None:
     """F . spread(x) = gather(F) . x, so energies and forces on the parts belong together; what
     is held gets no force."""
-    x, F = masked(fold, random), random.normal(size=fold.shape)
-    assert (F * fold.spread(x)).sum() == pytest.approx((fold.gather(F) * x).sum(), rel=1e-12)
-    assert not fold.gather(F)[~fold.mask].any()
+    x, F = masked(symmetry, random), random.normal(size=symmetry.shape)
+    assert (F * symmetry.spread(x)).sum() == pytest.approx(
+        (symmetry.gather(F) * x).sum(), rel=1e-12
+    )
+    assert not symmetry.gather(F)[~symmetry.mask].any()
 
 
-def test_a_turned_tyre_is_the_same(fold: Fold, random: np.random.Generator) -> None:
+def test_a_turned_tyre_is_the_same(symmetry: HalfTurn, random: np.random.Generator) -> None:
     """In the planes theta = 0 and pi a field is its own image under (theta, z) -> (-theta, -z),
     u_r kept, u_theta and u_z reversed, times the parity; held components are nil."""
-    U = fold.spread(masked(fold, random))
+    U = symmetry.spread(masked(symmetry, random))
     image = np.empty_like(U)
-    image[:, fold.beyond] = U[:, fold.nodes] * [1, -1, -1]
-    image[:, fold.nodes] = U[:, fold.beyond] * [1, -1, -1]
+    image[:, symmetry.beyond] = U[:, symmetry.nodes] * [1, -1, -1]
+    image[:, symmetry.nodes] = U[:, symmetry.beyond] * [1, -1, -1]
     for plane in (0, -1):
-        np.testing.assert_allclose(U[plane], fold.parity * image[plane], atol=1e-14)
-    assert not U[:, ~fold.free].any()
+        np.testing.assert_allclose(U[plane], symmetry.parity * image[plane], atol=1e-14)
+    assert not U[:, ~symmetry.free].any()
 
 
-def test_dimension(fold: Fold, inflated: Inflated) -> None:
+def test_dimension(symmetry: HalfTurn, inflated: Inflated) -> None:
     """As many unknowns as the turned half has: all free components between the planes, and in each
     plane half of them, of the nodes at z = 0 those that the turn keeps (u_r) or reverses."""
     X, free = inflated.model.mesh.X, ~inflated.held
     middle = free[abs(X[:, 1]) < 1e-9].all(1).sum()
     pairs = (free.all(1).sum() - middle) // 2
-    in_plane = 3 * pairs + (1 if fold.parity == 1 else 2) * middle
-    assert fold.mask.sum() == (ANGLES - 2) * free.sum() + 2 * in_plane
+    in_plane = 3 * pairs + (1 if symmetry.parity == 1 else 2) * middle
+    assert symmetry.mask.sum() == (ANGLES - 2) * free.sum() + 2 * in_plane
     assert free.sum() == 3 * (2 * pairs + middle)
 
 
@@ -69,12 +71,12 @@ def test_the_half_turn_maps_forces_to_forces(
     """The tyre with belts at +-20 degrees keeps the half turn: where a field has the symmetry so
     have its forces in the planes, although not the mirror images'."""
     around = half_circle(np.full(3, np.pi / 3))
-    fold = Fold(inflated.model.mesh, ~inflated.held, 7)
+    symmetry = HalfTurn(inflated.model.mesh, ~inflated.held, 7)
     tyre = Revolved(inflated.model, inflated.loads, around)
-    x = masked(fold, random)
+    x = masked(symmetry, random)
     tyre.residual(np.repeat(inflated.U[None], 7, 0))
-    one, other = masked(fold, random), masked(fold, random)
-    product = lambda y: fold.gather(tyre.product(fold.spread(y)))
+    one, other = masked(symmetry, random), masked(symmetry, random)
+    product = lambda y: symmetry.gather(tyre.product(symmetry.spread(y)))
     left, right = (one * product(other)).sum(), (other * product(one)).sum()
     assert left == pytest.approx(right, rel=1e-10)
     assert (x * product(x)).sum() > 0
@@ -85,22 +87,22 @@ def test_the_half_turn_maps_forces_to_forces(
 
 def test_axisymmetric_inflation_is_of_the_symmetry(inflated: Inflated) -> None:
     """With the twist of the belts: u_theta is odd across."""
-    fold = Fold(inflated.model.mesh, ~inflated.held, ANGLES)
+    symmetry = HalfTurn(inflated.model.mesh, ~inflated.held, ANGLES)
     U = np.repeat(inflated.U[None], ANGLES, 0)
-    np.testing.assert_allclose(fold.spread(fold.parts(U)), U, atol=1e-12)
+    np.testing.assert_allclose(symmetry.spread(symmetry.parts(U)), U, atol=1e-12)
     mirrored = np.empty_like(inflated.U)
-    mirrored[fold.beyond] = inflated.U[fold.nodes] * MIRROR
-    assert abs(mirrored[fold.beyond] - inflated.U[fold.beyond])[:, 1].max() > 1e-6
+    mirrored[symmetry.beyond] = inflated.U[symmetry.nodes] * MIRROR
+    assert abs(mirrored[symmetry.beyond] - inflated.U[symmetry.beyond])[:, 1].max() > 1e-6
 
 
 def test_sections_without_the_symmetry_are_refused() -> None:
     work = ring((0.2, 0.25, 0.3), 0.02, 2, support.Rubber())
     free = work.free.copy()
-    Fold(work.model.mesh, free, ANGLES)
+    HalfTurn(work.model.mesh, free, ANGLES)
     free[np.argmax(work.model.mesh.X[:, 1]), 2] ^= True
     with pytest.raises(NotSymmetric, match="supports differ"):
-        Fold(work.model.mesh, free, ANGLES)
+        HalfTurn(work.model.mesh, free, ANGLES)
     b = support.block((0.2, 0.3, 2), (-0.02, 0.03, 2), True)
     m = support.model_of(support.deck(b.X, b.solids, support.Rubber()))
     with pytest.raises(NotSymmetric):
-        Fold(m.mesh, np.ones((len(b.X), 3), bool), ANGLES)
+        HalfTurn(m.mesh, np.ones((len(b.X), 3), bool), ANGLES)

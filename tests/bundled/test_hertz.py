@@ -126,7 +126,7 @@ def _press(
     for i in range(steps):
         found = press.to(F * (i + 1) / steps)
     forces, at = found.contact.local, found.contact.positions
-    press.tyre.residual(press.fold.spread(found.parts))
+    press.tyre.residual(press.symmetry.spread(found.parts))
     area = press.tyre.surface_shares(work.model.mesh.faces["TREAD"])
     area = area[: len(forces), found.contact.road.nodes]
     pressure = forces[..., 0] / area

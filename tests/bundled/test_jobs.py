@@ -12,13 +12,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tyrecal_solvers.bundled.deck.keywords import DeckError, Row
+from tyrecal_solvers.bundled.deck.keywords import DataLine, DeckError
 from tyrecal_solvers.bundled.deck.request import Request
 from tyrecal_solvers.bundled.deck.steps import Deck
-from tyrecal_solvers.bundled.job import Analysis, TimedOut
+from tyrecal_solvers.bundled.job import Job, TimedOut
 from tyrecal_solvers.bundled.results import StepResult, write
 from tyrecal_solvers.bundled.section.boundary import rim_freedoms
-from tyrecal_solvers.bundled.section.point_elements import read_attached
+from tyrecal_solvers.bundled.section.point_elements import read_point_elements
 
 from ..effects.support import CASE, decks
 
@@ -41,7 +41,7 @@ def run(effects: tuple[tuple[str, float], ...], *edits: tuple[str, str], **reque
         name = "modes" if old in pair["modes"] else "inflate"
         assert old in pair[name]
         pair[name] = pair[name].replace(old, new, 1)
-    return Analysis(Deck(pair, "modes", "inflate"), Request(**request)).run()
+    return Job(Deck(pair, "modes", "inflate"), Request(**request)).run()
 
 
 FREQUENCY = "*FREQUENCY, EIGENSOLVER=LANCZOS, NORMALIZATION=MASS\n20\n"
@@ -197,9 +197,9 @@ def test_masses_and_springs_stand_in_their_components() -> None:
     )
     pair["modes"] = pair["modes"].replace("*STEP, NAME=EQ", more + "*STEP, NAME=EQ")
     deck = Deck(pair, "modes", "inflate")
-    model = Analysis(deck, Request()).model
+    model = Job(deck, Request()).model
     _, revolve, _ = deck.read([])
-    found = read_attached(revolve, model.mesh)
+    found = read_point_elements(revolve, model.mesh)
     at = {
         (int(r), int(c)): (m, k)
         for r, c, m, k in zip(
@@ -223,7 +223,7 @@ def test_masses_and_springs_stand_in_their_components() -> None:
     pair["modes"] = pair["modes"].replace("*STEP, NAME=EQ", bad + "*STEP, NAME=EQ")
     _, revolve, _ = Deck(pair, "modes", "inflate").read([])
     with pytest.raises(DeckError, match="a spring acts along 1, 2 or 3, got 4"):
-        read_attached(revolve, model.mesh)
+        read_point_elements(revolve, model.mesh)
 
 
 def test_what_holds_other_nodes_does_not_hold_the_rim() -> None:
@@ -231,7 +231,7 @@ def test_what_holds_other_nodes_does_not_hold_the_rim() -> None:
     mesh: Any = SimpleNamespace(node_sets={"RIM_REFERENCE": [9], "CROWN": [1, 9], "ONE": [1]})
 
     def free(*rows: str) -> set[int]:
-        held = [Row(1, [f.strip() for f in row.split(",")]) for row in rows]
+        held = [DataLine(1, [f.strip() for f in row.split(",")]) for row in rows]
         return rim_freedoms(mesh, SimpleNamespace(held=held), 9)  # type: ignore[arg-type]
 
     assert free("9, 1, 6") == set() and free() == {1, 2, 3, 4, 5, 6}
@@ -241,7 +241,7 @@ def test_what_holds_other_nodes_does_not_hold_the_rim() -> None:
 
 def test_the_mass_is_the_sections_and_what_is_attached() -> None:
     """Volume by Pappus's rule times density, the plies' thickness being none, and 0.1 kg."""
-    plain, more = (Analysis(Deck(texts(e), "modes", "inflate"), Request()) for e in (PLAIN, MASS))
+    plain, more = (Job(Deck(texts(e), "modes", "inflate"), Request()) for e in (PLAIN, MASS))
     rubber, cords = (part.mass.sum() for part in plain.model.parts)
     assert plain.mass_kg == pytest.approx(2 * np.pi * (rubber + cords), rel=1e-9)
     assert 10 < plain.mass_kg < 16
@@ -251,10 +251,10 @@ def test_the_mass_is_the_sections_and_what_is_attached() -> None:
 def test_a_job_without_a_frequency_step_ends_with_its_static_state() -> None:
     """And one whose time has passed does not begin."""
     text = texts(PLAIN)["inflate"]
-    (found,) = Analysis(Deck({"inflate": text}, "inflate", None), Request()).run()
+    (found,) = Job(Deck({"inflate": text}, "inflate", None), Request()).run()
     assert (found.step, found.pressure_Pa, found.modes) == (1, 160000.0, [])
     assert 1e-4 < abs(found.U).max() < 0.02 and found.factorisations > 1
-    late = Analysis(Deck({"inflate": text}, "inflate", None), Request(), time.monotonic() - 1e-3)
+    late = Job(Deck({"inflate": text}, "inflate", None), Request(), time.monotonic() - 1e-3)
     with pytest.raises(TimedOut, match="the time limit passed"):
         late.run()
 
@@ -264,7 +264,7 @@ def test_time_is_looked_at_between_harmonics(
     effects: tuple[tuple[str, float], ...], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     looks: list[int] = []
-    monkeypatch.setattr(Analysis, "_check_time", lambda self: looks.append(1))
+    monkeypatch.setattr(Job, "_check_time", lambda self: looks.append(1))
     counts = []
     for harmonics in ([1], [1, 2, 3]):
         looks.clear()
@@ -279,7 +279,7 @@ def test_modes_are_written_by_rising_frequency(tmp_path: Path) -> None:
     density = lines.index("*DENSITY") + 2
     deck = Deck(texts(PLAIN), "modes", "inflate")
     asked = {"rho": [("inflate", density, 0, 1.0)]}
-    analysis = Analysis(deck, Request(harmonics=[2, 0, 1], sensitivities=asked))
+    analysis = Job(deck, Request(harmonics=[2, 0, 1], sensitivities=asked))
     (result,) = analysis.run()
     write(tmp_path / "modes", analysis.model, [result])
     (step,) = json.loads((tmp_path / "modes.json").read_text())["steps"]
@@ -305,7 +305,7 @@ def crown_held(rows: str) -> StepResult:
 
 def motion_at_the_crown(result: StepResult) -> np.ndarray:
     """Largest motion (3,) of the set CROWN over all modes, of that of all nodes."""
-    mesh = Analysis(Deck(texts(PLAIN), "modes", "inflate"), Request()).model.mesh
+    mesh = Job(Deck(texts(PLAIN), "modes", "inflate"), Request()).model.mesh
     rows = [mesh.index[node] for node in mesh.node_sets["CROWN"]]
     shapes = np.concatenate([m.shapes for m in result.modes])
     return abs(shapes[:, rows]).max((0, 1)) / abs(shapes).max()

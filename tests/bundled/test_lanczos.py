@@ -104,7 +104,7 @@ def test_no_mass_is_refused(size: int) -> None:
 
 def test_too_small_a_basis_is_refused(random: np.random.Generator, monkeypatch) -> None:
     """NotConverged instead of inaccurate modes."""
-    monkeypatch.setattr(lanczos, "LARGEST_BASIS", 6)
+    monkeypatch.setattr(lanczos, "MAX_BASIS", 6)
     K, M = problem(random.uniform(1, 1e4, 60), float, random)
     with pytest.raises(lanczos.NotConverged, match="5 modes"):
         lowest(K, M, 5, 0.0, random.normal(size=(60, 3)))
@@ -189,13 +189,11 @@ def test_bandwidth_is_that_of_a_good_order() -> None:
 def test_numbers_that_are_too_far_apart_end_as_a_failure_of_the_solver(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def lapack(analysis: job.Analysis) -> None:
+    def lapack(analysis: job.Job) -> None:
         raise np.linalg.LinAlgError("Eigenvalues did not converge")
 
-    monkeypatch.setattr(
-        job.Analysis, "__init__", lambda a, *_: a.__dict__.update(road=None, model=None)
-    )
-    monkeypatch.setattr(job.Analysis, "run", lapack)
+    monkeypatch.setattr(job.Job, "__init__", lambda a, *_: a.__dict__.update(road=None, model=None))
+    monkeypatch.setattr(job.Job, "run", lapack)
     (tmp_path / "modes.inp").write_text("*HEADING\n")
     with pytest.raises(job.Failures, match="too far apart: Eigenvalues did not converge"):
         job.run(tmp_path, "modes", None)

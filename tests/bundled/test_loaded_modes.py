@@ -17,7 +17,7 @@ from tyrecal_solvers.bundled.modes.harmonics import HarmonicModes, Unstable, Vib
 from tyrecal_solvers.bundled.modes.lanczos import NotConverged
 from tyrecal_solvers.bundled.road import davidson, footprint_job, stick
 from tyrecal_solvers.bundled.road.contact import Contact
-from tyrecal_solvers.bundled.road.contact_newton import Pressed
+from tyrecal_solvers.bundled.road.contact_newton import PressedState
 from tyrecal_solvers.bundled.road.half_turn_symmetry import HALF_TURN
 from tyrecal_solvers.bundled.road.loaded_modes import Inertia, LoadedModes, loaded_modes
 from tyrecal_solvers.bundled.section.mechanics import mass
@@ -66,7 +66,7 @@ class State:
 
     around: Circumference
     U: Array
-    pressed: Pressed
+    pressed: PressedState
     hold: Contact
     areas: Array
 
@@ -74,7 +74,7 @@ class State:
 def press(work: Round, load: float, friction: float = 0.5, stiffness: float = 1e9) -> State:
     stand = work.press(LENGTHS, stiffness, friction)
     found = stand.to(load)
-    U = stand.fold.spread(found.parts)
+    U = stand.symmetry.spread(found.parts)
     stand.tyre.residual(U)
     contact = found.contact
     areas = stand.tyre.surface_shares(work.model.mesh.faces["TREAD"])
@@ -121,8 +121,8 @@ def test_they_solve_the_whole_problem(tyre: Round, pressed: State, found: Loaded
     work.residual(pressed.U)
     weigh = Inertia(tyre.model, pressed.around)
     for value, parity, x in zip(found.eigenvalues, found.parity, found.shapes, strict=True):
-        fold = tyre.fold(pressed.around, int(parity))
-        gathered = lambda F, fold=fold: fold.gather(F)
+        symmetry = tyre.symmetry(pressed.around, int(parity))
+        gathered = lambda F, symmetry=symmetry: symmetry.gather(F)
         force = gathered(work.product(x) + pressed.hold.product(x))
         inertia = value * gathered(weigh(x))
         assert np.linalg.norm(force - inertia) < 2e-3 * np.linalg.norm(inertia)
@@ -233,7 +233,7 @@ def test_davidson_fails_by_name(
         davidson.lowest(block(K - 50 * np.eye(120)), block(M), block(np.eye(120)), fields, 3)
     with pytest.raises(NotConverged, match="do not span"):
         davidson.lowest(block(K), block(M), block(np.eye(120)), np.repeat(fields[:1], 4, 0), 3)
-    monkeypatch.setattr(davidson, "LONGEST", 2)
+    monkeypatch.setattr(davidson, "MAX_BLOCKS", 2)
     with pytest.raises(NotConverged, match="did not converge"):
         davidson.lowest(block(K), block(M), block(np.eye(120)), fields, 3)
 
@@ -278,14 +278,14 @@ def test_results_hold_the_half_turn(tyre: Round, pressed: State, found: LoadedMo
     """Shapes on the whole tyre, as the job writes them: each kept or reversed by the half turn."""
     work = tyre.press(LENGTHS, 1e9, 0.5)
     rows = np.arange(len(tyre.U))
-    wanted = footprint_job.Vibrating(tyre.model, 6, rows)
+    wanted = footprint_job.ModesAtLoad(tyre.model, 6, rows)
     state = work.to(10.0)
     equations = support.numbering(tyre.model, ~tyre.free)
     tread = tyre.model.mesh.faces["TREAD"]
     written = footprint_job._modes(work, state, wanted, tread, equations, tyre.U)
     shapes = written["mode_shape"]
     back = (-np.arange(shapes.shape[1])) % shapes.shape[1]
-    image = HALF_TURN * shapes[:, back][:, :, work.fold.other]
+    image = HALF_TURN * shapes[:, back][:, :, work.symmetry.other]
     parity = found.parity[:6, None, None, None]
     np.testing.assert_allclose(shapes, parity * image, atol=1e-6 * abs(shapes).max())
     hertz = np.sqrt(found.eigenvalues[:6]) / (2 * np.pi)

@@ -11,8 +11,8 @@ from tyrecal_solvers.bundled.modes.harmonics import Vibration
 from tyrecal_solvers.bundled.section import mechanics, model
 from tyrecal_solvers.bundled.section.elements import Solids
 from tyrecal_solvers.bundled.section.parts.elastic import Elastic, Rows, on_diagonals
-from tyrecal_solvers.bundled.section.parts.law import Law
-from tyrecal_solvers.bundled.section.parts.part import Part
+from tyrecal_solvers.bundled.section.parts.law import EnergyLaw
+from tyrecal_solvers.bundled.section.parts.part import TyrePart
 from tyrecal_solvers.bundled.section.parts.section_job import SectionJob
 from tyrecal_solvers.bundled.solid3d.circumference import half_circle
 from tyrecal_solvers.bundled.solid3d.revolved import Revolved
@@ -25,7 +25,7 @@ Array = np.ndarray
 
 
 @dataclass(frozen=True)
-class SaintVenantKirchhoff(Law):
+class SaintVenantKirchhoff(EnergyLaw):
     """W = G E : E + L/2 tr(E)^2, E = (F^T F - 1) / 2, in place of Mooney and Rivlin's."""
 
     G: Array
@@ -64,7 +64,7 @@ def test_a_law_of_ones_own(inflated: Inflated) -> None:
     own = inflated.model
 
     def kirchhoff(scale: complex = 1.0) -> model.Model:
-        def changed(law: Law) -> Law:
+        def changed(law: EnergyLaw) -> EnergyLaw:
             if not hasattr(law, "C10"):
                 return law
             G = 2 * (law.C10 + law.C01)
@@ -83,7 +83,7 @@ def test_a_law_of_ones_own(inflated: Inflated) -> None:
     np.testing.assert_allclose(force, np.pi * section, atol=1e-9 * abs(section).max())
 
     modes, h = values[1], 1e-3
-    fields = sensitivity.Fields(np.full(4, 1), modes.shapes)
+    fields = sensitivity.ModeShapes(np.full(4, 1), modes.shapes)
     seeded = kirchhoff(1 + 1e-30j)
     got = sensitivity.eigenvalue_rates(seeded, U, U, [], fields, modes.eigenvalues)
     up, down = (
@@ -93,7 +93,7 @@ def test_a_law_of_ones_own(inflated: Inflated) -> None:
 
 
 @dataclass(frozen=True)
-class Bedding(Law):
+class Bedding(EnergyLaw):
     """Springs to the ground at every point of the rubber, W = k u^2 / 2."""
 
     k: Array
@@ -108,9 +108,9 @@ class Bedding(Law):
         return (self.k * weights)[:, None, None] * np.eye(3)
 
 
-def bedding(job: SectionJob) -> list[Part]:
+def bedding(job: SectionJob) -> list[TyrePart]:
     """Read from a deck: under all rubber, in proportion to its mass."""
-    parts: list[Part] = []
+    parts: list[TyrePart] = []
     for solids in job.mesh.blocks.values():
         if isinstance(solids, Solids):
             N = np.broadcast_to(solids.mass_N, (*solids.mass_weights.shape, len(solids.mass_N[0])))

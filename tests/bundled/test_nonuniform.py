@@ -13,9 +13,9 @@ from scipy.sparse.linalg import eigsh, splu
 from tyrecal_solvers.bundled.modes import harmonics
 from tyrecal_solvers.bundled.modes.harmonics import Vibration
 from tyrecal_solvers.bundled.nonuniform import coupled, splice
-from tyrecal_solvers.bundled.nonuniform.splice import Sector
+from tyrecal_solvers.bundled.nonuniform.splice import Splice
 from tyrecal_solvers.bundled.section import mechanics
-from tyrecal_solvers.bundled.section.point_elements import Attached
+from tyrecal_solvers.bundled.section.point_elements import PointElements
 from tyrecal_solvers.bundled.solid3d.circumference import Circumference, functions, points
 from tyrecal_solvers.bundled.solid3d.revolved import Revolved
 
@@ -32,11 +32,13 @@ def vibration(inflated: Inflated) -> Vibration:
     return Vibration(inflated.model, inflated.U, inflated.loads, number, 0.0)
 
 
-def on_crown(inflated: Inflated, mass: float = 0.0, spring: float = 0.0) -> Attached:
+def on_crown(inflated: Inflated, mass: float = 0.0, spring: float = 0.0) -> PointElements:
     """Mass (kg) in all three directions and a radial spring (N/m) on the node furthest out."""
     crown = int(np.argmax(inflated.model.mesh.X[:, 0]))
     stiffness = np.array([spring, 0.0, 0.0], complex)
-    return Attached(np.full(3, crown), np.arange(3), np.full(3, mass, complex), stiffness, SECTORS)
+    return PointElements(
+        np.full(3, crown), np.arange(3), np.full(3, mass, complex), stiffness, SECTORS
+    )
 
 
 def frequencies(modes: list[harmonics.HarmonicModes]) -> Array:
@@ -145,7 +147,7 @@ def test_a_sector_of_360_degrees_is_another_tyre(vibration: Vibration, inflated:
         inflated.U,
         inflated.loads,
         inflated.model,
-        Sector(2 * np.pi, other),
+        Splice(2 * np.pi, other),
         waves,
         COUNT,
         beyond=1,
@@ -166,7 +168,7 @@ def test_no_share_is_the_plain_tyre(vibration: Vibration, inflated: Inflated) ->
         inflated.U,
         inflated.loads,
         inflated.model,
-        Sector(0.2, inflated.model),
+        Splice(0.2, inflated.model),
         WAVES,
         COUNT,
         beyond=1,
@@ -309,7 +311,7 @@ def test_against_bricks(small: Inflated) -> None:
     spliced = Bricks(model, free, small.loads, stiff)
     split = lowest(spliced.inflate(small.U), spliced.masses())
     known = np.sort(plain_of(vibration, waves))
-    a = Attached(
+    a = PointElements(
         np.full(3, crown), np.arange(3), np.full(3, 0.1 + 0j), np.zeros(3, complex), ELEMENTS
     )
     mine_heavy = frequencies(coupled.attached_modes(vibration, a, waves, COUNT))
@@ -319,7 +321,7 @@ def test_against_bricks(small: Inflated) -> None:
             small.U,
             small.loads,
             model,
-            Sector(2 * np.pi / ELEMENTS, stiff),
+            Splice(2 * np.pi / ELEMENTS, stiff),
             waves,
             COUNT,
         )

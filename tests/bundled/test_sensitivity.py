@@ -97,15 +97,15 @@ def base() -> Modes:
     return solve(TYRE.deck)
 
 
-def fields_of(base: Modes) -> sensitivity.Fields:
-    return sensitivity.Fields(base.n, base.shapes)
+def fields_of(base: Modes) -> sensitivity.ModeShapes:
+    return sensitivity.ModeShapes(base.n, base.shapes)
 
 
 def rates(
     base: Modes,
     tangents: list[tuple[int, int, float]],
     pressure: complex,
-    fields: sensitivity.Fields | None = None,
+    fields: sensitivity.ModeShapes | None = None,
 ) -> Array:
     """d lambda by the solver's complex step, for tangents on the deck and on the pressure."""
     seeded = model.build(keywords.seed(keywords.read_keywords(TYRE.deck), tangents), None, True)
@@ -144,7 +144,7 @@ def test_against_central_differences(base: Modes, name: str) -> None:
 
 def test_pressure_against_central_differences(base: Modes) -> None:
     """The same by ln p."""
-    got = rates(base, [], complex(PRESSURE, keywords.STEP * PRESSURE))
+    got = rates(base, [], complex(PRESSURE, keywords.COMPLEX_STEP * PRESSURE))
     wanted = difference(lambda s: support.hertz(solve(TYRE.deck, PRESSURE * np.exp(s)).eigenvalues))
     agree(hertz_per_unit(got, base.eigenvalues), wanted)
 
@@ -176,7 +176,7 @@ def test_preload_matters(base: Modes) -> None:
 def test_euler_identity(base: Modes) -> None:
     """lambda is homogeneous of degree 0 in (moduli, 1/D1, pressure, densities) scaled together:
     stiffness and mass grow alike, the shape stays. sum of p d lambda/dp = 0."""
-    total = rates(base, [], complex(PRESSURE, keywords.STEP * PRESSURE))
+    total = rates(base, [], complex(PRESSURE, keywords.COMPLEX_STEP * PRESSURE))
     C10, C01, D1 = map(float, LINES[RUBBER[0]].split(","))
     places = [Place(RUBBER, 0, C10), Place(RUBBER, 1, C01), Place(RUBBER, 2, -D1)]
     places += [VARIABLES["rubber density"], VARIABLES["cord density"], VARIABLES["belt modulus"]]

@@ -9,7 +9,7 @@ import pytest
 from tyrecal_solvers.bundled.deck import keywords
 from tyrecal_solvers.bundled.modes import sensitivity
 from tyrecal_solvers.bundled.modes.bordered import Bordered
-from tyrecal_solvers.bundled.modes.cavity import Air
+from tyrecal_solvers.bundled.modes.cavity import Cavity
 from tyrecal_solvers.bundled.modes.harmonics import Vibration
 from tyrecal_solvers.bundled.modes.wheel import Wheel
 from tyrecal_solvers.bundled.section import model
@@ -58,17 +58,17 @@ VARIABLES = {
 }
 
 
-def beside(m: model.Model, with_air: bool) -> tuple[Wheel, Air | None, list[Pressure]]:
+def around(m: model.Model, with_air: bool) -> tuple[Wheel, Cavity | None, list[Pressure]]:
     """The wheel on its springs, the air, and the loads on cavity and well."""
     loads = [Pressure(m.mesh.faces[name], PRESSURE) for name in ("CAVITY", "WELL")]
     row = m.mesh.index[REFERENCE]
     wheel = Wheel(row, np.array(TYRE.rim), frozenset(MOTIONS), SPRINGS, STEEL)
-    return wheel, Air(4.06, 4.78e5, [load.lines for load in loads]) if with_air else None, loads
+    return wheel, Cavity(4.06, 4.78e5, [load.lines for load in loads]) if with_air else None, loads
 
 
 def solved(text: str, with_air: bool) -> tuple[Vibration, Array, list]:
     m = support.model_of(text)
-    wheel, air, loads = beside(m, with_air)
+    wheel, air, loads = around(m, with_air)
     held = support.held(m, [*TYRE.rim, m.mesh.index[REFERENCE]])
     U = support.inflate(m, held, loads[:1])
     vibration = Vibration(m, U, loads, support.numbering(m, held), 0.0, wheel, air)
@@ -93,7 +93,7 @@ def test_against_central_differences(name: str, with_air: bool) -> None:
     rim = [q * turn for m in modes for q in (m.rim if len(m.rim) else np.zeros((COUNT, 0)))]
     flow = [w * turn for m in modes for w in (m.air if len(m.air) else np.zeros((COUNT, 0)))]
     seeded = variable.seeded()
-    wheel, air, loads = beside(seeded, with_air)
+    wheel, air, loads = around(seeded, with_air)
     factor = vibration.factor(0)
     assert isinstance(factor, Bordered)
     V = sensitivity.state_rate(seeded, U, loads, vibration.numbering, factor.tyre)
@@ -102,9 +102,9 @@ def test_against_central_differences(name: str, with_air: bool) -> None:
         U,
         V,
         loads,
-        sensitivity.Fields(np.repeat(HARMONICS, COUNT), shapes),
+        sensitivity.ModeShapes(np.repeat(HARMONICS, COUNT), shapes),
         np.concatenate([m.eigenvalues for m in modes]),
-        sensitivity.Beside(wheel, air, rim, flow),
+        sensitivity.RimAndAir(wheel, air, rim, flow),
     )
     h = 5e-3
     at = {k: eigenvalues(variable.deck(k * h), with_air) for k in (-2, -1, 1, 2)}

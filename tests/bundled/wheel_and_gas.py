@@ -7,7 +7,7 @@ from functools import cache
 
 import numpy as np
 from tyrecal_solvers.bundled.modes import harmonics
-from tyrecal_solvers.bundled.modes.cavity import Air
+from tyrecal_solvers.bundled.modes.cavity import Cavity
 from tyrecal_solvers.bundled.modes.wheel import Wheel
 from tyrecal_solvers.bundled.section.band import Numbering
 from tyrecal_solvers.bundled.section.model import Model
@@ -37,12 +37,12 @@ class Inflated:
         row = self.model.mesh.index[REFERENCE]
         return Wheel(row, self.rim, frozenset(free), dict(stiffness), STEEL)
 
-    def air(self, density: float = 4.06, bulk: float = 4.78e5) -> Air:
+    def air(self, density: float = 4.06, bulk: float = 4.78e5) -> Cavity:
         """A gas in the cavity; by default air at 240 kPa and 20 C."""
-        return Air(density, bulk, [load.lines for load in self.loads])
+        return Cavity(density, bulk, [load.lines for load in self.loads])
 
-    def vibration(self, *beside: Wheel | Air | None, shift: float = 0.0) -> harmonics.Vibration:
-        wheel, air = (*beside, None, None)[:2]
+    def vibration(self, *others: Wheel | Cavity | None, shift: float = 0.0) -> harmonics.Vibration:
+        wheel, air = (*others, None, None)[:2]
         return harmonics.Vibration(
             self.model, self.U, self.loads, self.numbering, shift, wheel, air
         )

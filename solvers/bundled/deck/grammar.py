@@ -38,7 +38,7 @@ SECTION_JOB: dict[str, dict[str, Values]] = {
     "ACOUSTIC MEDIUM": {"BULK MODULUS": ("",)},
     "BOUNDARY": {},
 }
-STEPS: dict[str, dict[str, Values]] = {
+STEP_KEYWORDS: dict[str, dict[str, Values]] = {
     "STEP": {"NAME": None, "NLGEOM": YES, "INC": None, "PERTURBATION": ("",)},
     "STATIC": {"LONG TERM": ("",), "DIRECT": ("",)},
     "FREQUENCY": {
@@ -78,7 +78,7 @@ REVOLVE_JOB: dict[str, dict[str, Values]] = {
 }
 
 
-FIELDS = {  # data fields that are honoured; a further one that is not blank is refused
+MAX_FIELDS = {  # data fields that are honoured; a further one that is not blank is refused
     "DENSITY": 1,
     "ELASTIC": 2,
     "HYPERELASTIC": 3,
@@ -116,7 +116,7 @@ def check(keywords: list[Keyword], revolve: bool) -> tuple[list[Keyword], list[l
                 raise DeckError(keyword.line, "*STEP inside a step: *END STEP is missing")
             inside = True
             steps.append([])
-        allowed = STEPS if inside else REVOLVE_JOB if revolve else SECTION_JOB
+        allowed = STEP_KEYWORDS if inside else REVOLVE_JOB if revolve else SECTION_JOB
         _check_one(keyword, allowed, "a step" if inside else "the model")
         (steps[-1] if inside else model).append(keyword)
         if keyword.name == "END STEP":
@@ -135,8 +135,8 @@ def check(keywords: list[Keyword], revolve: bool) -> tuple[list[Keyword], list[l
 def _check_one(keyword: Keyword, allowed: dict[str, dict[str, Values]], where: str) -> None:
     if keyword.name not in allowed:
         raise DeckError(keyword.line, f"keyword *{keyword.name} is not honoured in {where}")
-    for row in keyword.rows if keyword.name in FIELDS else ():
-        extra = [text for text in row.fields[FIELDS[keyword.name] :] if text]
+    for row in keyword.rows if keyword.name in MAX_FIELDS else ():
+        extra = [text for text in row.fields[MAX_FIELDS[keyword.name] :] if text]
         if extra:
             raise DeckError(row.line, f"data '{extra[0]}' of *{keyword.name} is not honoured")
     parameters = allowed[keyword.name]

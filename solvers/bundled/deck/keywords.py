@@ -7,15 +7,15 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
-LARGEST = 100_000_000  # bytes of a deck
+MAX_DECK_BYTES = 100_000_000
 
 
-class Line(int):
+class LineNumber(int):
     """A 1-based line number that knows the job whose deck it counts in."""
 
     job = ""
 
-    def __new__(cls, number: int, job: str) -> Line:
+    def __new__(cls, number: int, job: str) -> LineNumber:
         line = super().__new__(cls, number)
         line.job = job
         return line
@@ -40,9 +40,9 @@ def read_deck(path: Path) -> str:
     if path.exists() and not path.is_file():
         raise DeckError(0, f"{path.name} is not a regular file")
     with path.open("rb") as file:
-        content = file.read(LARGEST + 1)
-    if len(content) > LARGEST:
-        raise DeckError(0, f"{path.name} is larger than {LARGEST / 1e6:g} MB")
+        content = file.read(MAX_DECK_BYTES + 1)
+    if len(content) > MAX_DECK_BYTES:
+        raise DeckError(0, f"{path.name} is larger than {MAX_DECK_BYTES / 1e6:g} MB")
     try:
         return content.decode("utf-8").replace("\r\n", "\n").replace("\r", "\n")
     except UnicodeDecodeError:
@@ -50,7 +50,7 @@ def read_deck(path: Path) -> str:
 
 
 @dataclass
-class Row:
+class DataLine:
     """One data line: its 1-based number, its comma-separated fields, and tangents of fields.
 
     ``tangents`` maps a field's index to d(number)/d(variable) where a sensitivity is asked for.
@@ -66,7 +66,7 @@ class Row:
         return value or default
 
     def number(self, index: int, default: float | None = None) -> complex | float:
-        """Field ``index`` as a number; complex by ``STEP`` times its tangent when it has one."""
+        """Field ``index`` as a number; complex by its tangent, where it has one."""
         text = self.text(index)
         if not text:
             if default is None:
@@ -79,7 +79,7 @@ class Row:
         if value - value != 0.0:
             raise DeckError(self.line, f"'{text}' is not a finite number")
         tangent = self.tangents.get(index)
-        return value if tangent is None else complex(value, STEP * tangent)
+        return value if tangent is None else complex(value, COMPLEX_STEP * tangent)
 
     def integer(self, index: int) -> int:
         """Field ``index`` as an integer."""
@@ -89,7 +89,7 @@ class Row:
             raise DeckError(self.line, f"'{self.text(index)}' is not a whole number") from None
 
 
-STEP = 1e-30  # complex step: so small that its square vanishes beside every real part
+COMPLEX_STEP = 1e-30  # so small that its square vanishes against every real part
 
 
 @dataclass
@@ -100,17 +100,17 @@ class Keyword:
     """
 
     name: str
-    line: Line
+    line: LineNumber
     parameters: dict[str, str]
     lines: list[tuple[int, str]]
     tangents: Mapping[int, Mapping[int, float]] = field(default_factory=dict)
 
     @cached_property
-    def rows(self) -> list[Row]:
+    def rows(self) -> list[DataLine]:
         """The data lines, split at their commas."""
         return [
-            Row(
-                Line(number, self.line.job),
+            DataLine(
+                LineNumber(number, self.line.job),
                 [f.strip() for f in text.split(",")],
                 self.tangents.get(number, {}),
             )
@@ -140,7 +140,7 @@ class Keyword:
         except ValueError:
             raise DeckError(self.line, f"{parameter}={text} is not a number") from None
 
-    def only_row(self) -> Row:
+    def only_row(self) -> DataLine:
         """The single data row of a keyword that has exactly one."""
         if len(self.rows) != 1:
             raise DeckError(self.line, f"*{self.name} takes one data line, got {len(self.rows)}")
@@ -153,7 +153,7 @@ def read_keywords(text: str, job: str = "") -> list[Keyword]:
     Raises DeckError where data stand before the first keyword.
     """
     keywords: list[Keyword] = []
-    pending, pending_line = "", Line(0, job)
+    pending, pending_line = "", LineNumber(0, job)
     lines: list[tuple[int, str]] = []
     for count, raw in enumerate(text.splitlines(), start=1):
         line = raw.strip()
@@ -162,11 +162,11 @@ def read_keywords(text: str, job: str = "") -> list[Keyword]:
         if pending:
             pending += line
         elif line.startswith("*"):
-            pending, pending_line = line, Line(count, job)
+            pending, pending_line = line, LineNumber(count, job)
         elif not line:
             continue
         elif not keywords:
-            raise DeckError(Line(count, job), f"data '{line[:40]}' before the first keyword")
+            raise DeckError(LineNumber(count, job), f"data '{line[:40]}' before the first keyword")
         else:
             lines.append((count, line))
             continue
@@ -180,7 +180,7 @@ def read_keywords(text: str, job: str = "") -> list[Keyword]:
     return keywords
 
 
-def _keyword(line: str, number: Line, lines: list[tuple[int, str]]) -> Keyword:
+def _keyword(line: str, number: LineNumber, lines: list[tuple[int, str]]) -> Keyword:
     name, *rest = (part.strip() for part in line[1:].split(","))
     parameters = {}
     for part in rest:

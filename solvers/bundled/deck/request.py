@@ -13,7 +13,7 @@ from . import grammar
 from .keywords import DeckError, Keyword, read_deck, read_keywords
 from .steps import Tangent
 
-HIGHEST, MOST = 999, 999  # harmonic; modes of one
+MAX_HARMONIC, MAX_MODES = 999, 999  # harmonic; modes of one
 
 
 class BadRequest(DeckError):
@@ -94,7 +94,7 @@ def _harmonics(file: str, key: str, value: Any) -> None:
     if not isinstance(value, list) or not value:
         raise BadRequest(file, key, value, "must be a list of harmonics, as in [0, 1, 2], or null")
     for i, n in enumerate(value):
-        _whole(0, HIGHEST)(file, f"{key}[{i}]", n)
+        _whole(0, MAX_HARMONIC)(file, f"{key}[{i}]", n)
         if n in value[:i]:
             raise BadRequest(file, f"{key}[{i}]", n, "must stand there once")
 
@@ -172,7 +172,7 @@ def _finite(file: str, key: str, value: Any) -> None:
 
 _CHECKS: dict[str, Callable[[str, str, Any], None]] = {
     "harmonics": _harmonics,
-    "modes_per_harmonic": _whole(1, MOST),
+    "modes_per_harmonic": _whole(1, MAX_MODES),
     "sensitivities": _sensitivities,
     "own_frequency": _own_frequency,
     "cavity": _cavity,

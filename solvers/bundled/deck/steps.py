@@ -7,14 +7,14 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from . import grammar
-from .keywords import DeckError, Keyword, Row, read_keywords, seed
+from .keywords import DataLine, DeckError, Keyword, read_keywords, seed
 
 PROCEDURES = ("STATIC", "FREQUENCY", "COMPLEX FREQUENCY")
 Tangent = tuple[str, int, int, float]  # job, 1-based line, 0-based field, d number / d variable
 
 
 @dataclass
-class Step:
+class DeckStep:
     """One step with what holds in it; loads and supports carry on from step to step of a job.
 
     number: in the job, from 1; procedure: its keyword of ``PROCEDURES``; pressures: surface to the
@@ -27,10 +27,10 @@ class Step:
     number: int
     procedure: Keyword
     pressures: dict[str, complex | float] = field(default_factory=dict)
-    held: list[Row] = field(default_factory=list)
+    held: list[DataLine] = field(default_factory=list)
     long_term: bool = True
     revolved: bool = False
-    forces: list[Row] = field(default_factory=list)
+    forces: list[DataLine] = field(default_factory=list)
     output: str = ""
     centrifugal: dict[str, complex | float] = field(default_factory=dict)
     spin: dict[str, complex | float] = field(default_factory=dict)
@@ -54,7 +54,7 @@ class Deck:
             if k.name == "SYMMETRIC MODEL GENERATION":
                 raise DeckError(k.line, "this job revolves a section job: name that with --oldjob")
 
-    def read(self, tangents: list[Tangent]) -> tuple[list[Keyword], list[Keyword], list[Step]]:
+    def read(self, tangents: list[Tangent]) -> tuple[list[Keyword], list[Keyword], list[DeckStep]]:
         """Model blocks of the section job and of the one that revolves it (none: empty), and all
         steps, their numbers carrying ``tangents``."""
         models: list[list[Keyword]] = []
@@ -71,11 +71,11 @@ class Deck:
         return models[0], revolve, [step for part in steps for step in part]
 
 
-def _steps(model: list[Keyword], blocks: list[list[Keyword]], revolved: bool) -> list[Step]:
-    steps: list[Step] = []
+def _steps(model: list[Keyword], blocks: list[list[Keyword]], revolved: bool) -> list[DeckStep]:
+    steps: list[DeckStep] = []
     held = [row for k in model if k.name == "BOUNDARY" for row in k.rows]
     pressures: dict[str, complex | float] = {}
-    forces: list[Row] = []
+    forces: list[DataLine] = []
     turning: dict[str, dict[str, complex | float]] = {"CENTRIF": {}, "ROTDYNF": {}}
     long_term = True
     for number, block in enumerate(blocks, start=1):
@@ -93,7 +93,7 @@ def _steps(model: list[Keyword], blocks: list[list[Keyword]], revolved: bool) ->
             long_term = "LONG TERM" in procedure.parameters
         output = next((k.get("NSET") for k in block if k.name == "NODE FILE"), "")
         steps.append(
-            Step(
+            DeckStep(
                 number,
                 procedure,
                 pressures,
@@ -145,7 +145,7 @@ def _procedure(block: list[Keyword]) -> Keyword:
     return found[0]
 
 
-def _check_transfer(section: list[Keyword], steps: list[Step], revolve: list[Keyword]) -> None:
+def _check_transfer(section: list[Keyword], steps: list[DeckStep], revolve: list[Keyword]) -> None:
     """The revolve job takes over the end of the section job's only step, and holds its rim."""
     blocks = {k.name: k for k in revolve}
     for needed in ("SYMMETRIC MODEL GENERATION", "SYMMETRIC RESULTS TRANSFER"):

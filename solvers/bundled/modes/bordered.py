@@ -70,8 +70,8 @@ class Border:
         q, w, _ = self.widths
         size = len(tyre)
         u, rim, flow = x[:size], x[size : size + q], x[size + q :]
-        beside, own = self.mass
-        parts = [tyre + beside @ rim, beside.conj().T @ u + own @ rim]
+        across, own = self.mass
+        parts = [tyre + across @ rim, across.conj().T @ u + own @ rim]
         if w:
             parts.append(self.flow_mass @ flow)
         return np.concatenate(parts)
@@ -89,8 +89,8 @@ class Bordered:
         self._size, self._extra = len(self._columns), q + w
         own = self._schur[: q + w, : q + w]
         if s:  # s is negative definite by itself
-            beside = self._schur[q + w :, : q + w]
-            own = own - beside.conj().T @ np.linalg.solve(self._schur[q + w :, q + w :], beside)
+            mixed = self._schur[q + w :, : q + w]
+            own = own - mixed.conj().T @ np.linalg.solve(self._schur[q + w :, q + w :], mixed)
         scale = np.sqrt(abs(np.diag(own)))
         try:
             np.linalg.cholesky(own / np.outer(scale, scale))

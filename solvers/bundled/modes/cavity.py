@@ -28,19 +28,19 @@ from ..deck.keywords import DeckError, Keyword
 from ..section import elements
 from ..section.elements import Lines
 from ..section.materials import Number, read_materials
-from ..section.mesh import Mesh
+from ..section.mesh import DeckMesh
 from ..section.parts.frame import SPIN, cross
 from ..section.parts.pressure import surface_point
 
 Array = np.ndarray
 DEGREE = 4
-ALONG = 6  # points of a line of the wall; the well is one line
+POINTS_ALONG = 6  # points of a line of the wall; the well is one line
 GAUSS = np.polynomial.legendre.leggauss(7)
 ACROSS, ACROSS_WEIGHTS = (GAUSS[0] + 1) / 2, GAUSS[1] / 2
 
 
 @dataclass(frozen=True)
-class Air:
+class Cavity:
     """Density (kg/m3) and bulk modulus (Pa) of the air inside the closed ``surfaces``."""
 
     density: Number
@@ -48,7 +48,7 @@ class Air:
     surfaces: list[Lines]
 
 
-def read_air(keywords: list[Keyword], mesh: Mesh, cavity: Mapping[str, Any]) -> Air:
+def read_cavity(keywords: list[Keyword], mesh: DeckMesh, cavity: Mapping[str, Any]) -> Cavity:
     """The gas ``cavity["material"]`` inside ``cavity["surfaces"]``. Raises DeckError."""
     name = str(cavity.get("material", "")).upper()
     material = read_materials(keywords).get(name)
@@ -58,7 +58,7 @@ def read_air(keywords: list[Keyword], mesh: Mesh, cavity: Mapping[str, Any]) -> 
     missing = [surface for surface in surfaces if surface not in mesh.faces]
     if missing or not surfaces:
         raise DeckError(0, f"the cavity needs surfaces that are defined, got {missing or 'none'}")
-    return Air(material.density, material.bulk_modulus, [mesh.faces[s] for s in surfaces])
+    return Cavity(material.density, material.bulk_modulus, [mesh.faces[s] for s in surfaces])
 
 
 @dataclass(frozen=True)
@@ -84,10 +84,10 @@ class Coupling:
         return found
 
 
-def coupling(air: Air, X: Array, U: Array, n: int) -> Coupling:
+def coupling(air: Cavity, X: Array, U: Array, n: int) -> Coupling:
     """Matrices of the inflated cavity. X (nodes, 2), U (nodes, 3); complex steps allowed."""
     kind = np.result_type(X, U)
-    walls = [elements.lines(X, surface.connectivity, ALONG) for surface in air.surfaces]
+    walls = [elements.lines(X, surface.connectivity, POINTS_ALONG) for surface in air.surfaces]
     wall = [(lines, *surface_point(lines, U)) for lines in walls]
     radii = [np.sqrt(x[..., 0] ** 2 + x[..., 1] ** 2) for _, x, _ in wall]
     box = [_middle(radii), _middle([x[..., 2] for _, x, _ in wall])]

@@ -17,43 +17,43 @@ from scipy.sparse import csr_array
 from ..section import mechanics
 from ..section.band import Cholesky, Indefinite, Numbering
 from ..section.model import Model
-from ..section.parts.part import Part
-from ..section.point_elements import Attached
+from ..section.parts.part import TyrePart
+from ..section.point_elements import PointElements
 from . import bordered, lanczos
 from .bordered import Border, Bordered
-from .cavity import Air, Coupling, coupling
+from .cavity import Cavity, Coupling, coupling
 from .wheel import Wheel
 
 Array = np.ndarray
-MOST_HARMONICS = 60
-IN_THE_AIR = 0.5  # share of a mode's kinetic energy above which it is the cavity's, not the tyre's
+MAX_HARMONICS = 60
+# share of a mode's kinetic energy above which it is the cavity's, not the tyre's
+MIN_AIR_SHARE = 0.5
 
 
 class Unstable(ArithmeticError):
     """The inflated state is not stable: a harmonic of it buckles."""
 
 
-class Makeup(Protocol):
+class Combination(Protocol):
     """What a mode that is not one harmonic of a tyre at rest is made of."""
 
     def forms(self) -> tuple[Array, Array, Array, Array]:
         """As `HarmonicModes.forms`."""
 
-    def rates(self, forms: Array, change: Change) -> Array:
+    def rates(self, forms: Array, change: SeededTyre) -> Array:
         """d lambda / dp (m,) from the forms (m,) and what else has p's tangent."""
 
-    def where(self, keep: Array | slice) -> Makeup:
+    def where(self, keep: Array | slice) -> Combination:
         """That of some of the modes."""
 
 
 @dataclass
-class Change:
-    """What carries the tangent of p beside the section and its loads: the model, Omega, and what
-    is attached to the tyre."""
+class SeededTyre:
+    """What carries p's tangent along with the section and its loads."""
 
     model: Model
-    spin: complex | float
-    attached: Attached
+    spin: complex | float  # Omega, rad/s
+    attached: PointElements
 
 
 @dataclass
@@ -73,7 +73,7 @@ class HarmonicModes:
     rim: Array = field(default_factory=lambda: np.zeros((0, 0)))
     air: Array = field(default_factory=lambda: np.zeros((0, 0)))
     members: Array | None = None
-    makeup: Makeup | None = None
+    makeup: Combination | None = None
 
     def forms(self) -> tuple[Array, Array, Array, Array]:
         """Harmonics (p,), shapes (p, nodes, 3), the mode (p,) that each is part of, and lambda (m,)
@@ -108,11 +108,11 @@ class Vibration:
         self,
         model: Model,
         U: Array,
-        loads: Sequence[Part],
+        loads: Sequence[TyrePart],
         numbering: Numbering,
         shift: float,
         wheel: Wheel | None = None,
-        air: Air | None = None,
+        air: Cavity | None = None,
         lowest_Hz: float = 0.0,
     ):
         self.numbering, self.shift = numbering, shift
@@ -179,8 +179,8 @@ class Vibration:
         if self._shifted_mass is not None:
             band -= self.shift * self._shifted_mass
         try:
-            tyre, beside = Cholesky(band), self._border(n)
-            return Bordered(tyre, beside, self.shift) if beside else tyre
+            tyre, border = Cholesky(band), self._border(n)
+            return Bordered(tyre, border, self.shift) if border else tyre
         except Indefinite:
             raise Unstable(
                 f"the inflated tyre is not stable: its stiffness for {n} waves round the"
@@ -225,9 +225,9 @@ class Vibration:
         return bordered.assemble(self.numbering, fields, own, stiffness, mass, air)
 
     def _times_mass(self, n: int, x: Array) -> Array:
-        beside = self._border(n)
+        border = self._border(n)
         tyre = self.times_mass(x[: self.numbering.size])
-        return beside.times_mass(x, tyre) if beside else tyre
+        return border.times_mass(x, tyre) if border else tyre
 
     def modes(self, n: int, count: int, factor: Cholesky | Bordered | None = None) -> HarmonicModes:
         """The ``count`` lowest modes of harmonic n that are the tyre's, from ``lowest_Hz`` on.
@@ -245,10 +245,10 @@ class Vibration:
         self, n: int, count: int, factor: Cholesky | Bordered
     ) -> tuple[HarmonicModes, Array]:
         """The lowest modes, and which of them are the tyre's."""
-        beside, size = self._border(n), self.numbering.size
+        border, size = self._border(n), self.numbering.size
         start = self.numbering.gather(_start_fields(self._X, n))
-        if beside:
-            q, w, _ = beside.widths
+        if border:
+            q, w, _ = border.widths
             start = np.concatenate([start, np.ones((q, 3)), np.zeros((w, 3))])
         values, vectors = lanczos.lowest(
             factor.solve, lambda x: self._times_mass(n, x), start, count, self.shift
@@ -258,15 +258,15 @@ class Vibration:
         is_tyres = np.ones(len(values), bool)
         if self.lowest_Hz:
             is_tyres = values >= (2 * np.pi * self.lowest_Hz) ** 2
-        if beside:
+        if border:
             rim, flow = vectors[size : size + q], vectors[size + q :]
-            shapes = shapes + beside.fields @ rim
+            shapes = shapes + border.fields @ rim
             if w:
                 air = self._couplings[n]
                 modes = zip(np.moveaxis(shapes, -1, 0), values, strict=True)
                 flow = np.stack([air.flow(u, value) for u, value in modes], -1)
-                energy = np.einsum("wm,wv,vm->m", flow.conj(), beside.flow_mass, flow).real
-                is_tyres &= energy < IN_THE_AIR
+                energy = np.einsum("wm,wv,vm->m", flow.conj(), border.flow_mass, flow).real
+                is_tyres &= energy < MIN_AIR_SHARE
         return HarmonicModes(n, values, np.moveaxis(shapes, -1, 0), rim.T, flow.T), is_tyres
 
 
@@ -303,7 +303,7 @@ def lowest_of_all(
     Harmonics are added until one starts above the highest mode kept; ``check`` may raise to stop.
     """
     found: list[HarmonicModes] = []
-    for n in range(MOST_HARMONICS):
+    for n in range(MAX_HARMONICS):
         check()
         count = 2
         while True:

@@ -9,10 +9,10 @@ import numpy as np
 
 from ..deck.keywords import Keyword
 from ..deck.request import Request
-from ..deck.steps import Deck, Step
+from ..deck.steps import Deck, DeckStep
 from ..section.model import Model
-from ..section.point_elements import Attached, read_attached
-from .cavity import Air, read_air
+from ..section.point_elements import PointElements, read_point_elements
+from .cavity import Cavity, read_cavity
 from .wheel import Wheel, read_wheel
 
 Array = np.ndarray
@@ -40,12 +40,12 @@ class Inflated:
         """The section at its relaxed static moduli."""
         return self.models(None, True, False)
 
-    def attached(self) -> Attached:
+    def attached(self) -> PointElements:
         """Masses and springs on the tyre. Raises DeckError."""
-        return read_attached(self.revolve, self.model.mesh)
+        return read_point_elements(self.revolve, self.model.mesh)
 
-    def beside(self, model: Model, step: Step) -> tuple[Wheel | None, Air | None]:
+    def wheel_and_cavity(self, model: Model, step: DeckStep) -> tuple[Wheel | None, Cavity | None]:
         """The rim that moves in a step and the gas in the cavity, where there are such."""
         wheel = read_wheel(self.revolve, model.mesh, step) if step.revolved else None
         cavity = self.request.cavity
-        return wheel, read_air(self.section, model.mesh, cavity) if cavity else None
+        return wheel, read_cavity(self.section, model.mesh, cavity) if cavity else None

@@ -11,10 +11,9 @@ from collections.abc import Callable
 import numpy as np
 
 Array = np.ndarray
-TOLERANCE = (
-    1e-7  # residual of the inverse, in the norm of M, over 1 / lambda; lambda's is its square
-)
-LARGEST_BASIS = 300
+# residual of the inverse, in the norm of M, over 1 / lambda; lambda's is its square
+INVERSE_RTOL = 1e-7
+MAX_BASIS = 300
 
 
 class NotConverged(ArithmeticError):
@@ -53,9 +52,9 @@ def lowest(
             inverse, vectors = inverse[::-1][:count], vectors[:, ::-1][:, :count]
             last = vectors[-len(gram) :]
             error = np.sqrt(np.abs(np.einsum("bm,bc,cm->m", last.conj(), gram, last)))
-            if (error <= TOLERANCE * inverse).all():
+            if (error <= INVERSE_RTOL * inverse).all():
                 return shift + 1 / inverse, basis @ vectors
-        if len(projected) > LARGEST_BASIS:
+        if len(projected) > MAX_BASIS:
             break
     if len(projected) >= size:  # the basis spans everything: the projection is the problem
         return shift + 1 / inverse, basis @ vectors

@@ -15,26 +15,26 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import csr_array
 
-from ..deck.keywords import STEP
+from ..deck.keywords import COMPLEX_STEP
 from ..section import mechanics
 from ..section.band import Cholesky, Numbering
 from ..section.model import Model
-from ..section.parts.fields import Fields
-from ..section.parts.part import Part
-from .cavity import Air, coupling
+from ..section.parts.mode_shapes import ModeShapes
+from ..section.parts.part import TyrePart
+from .cavity import Cavity, coupling
 from .wheel import Wheel
 
 Array = np.ndarray
 
 
 def state_rate(
-    model: Model, U: Array, loads: Sequence[Part], numbering: Numbering, factor: Cholesky
+    model: Model, U: Array, loads: Sequence[TyrePart], numbering: Numbering, factor: Cholesky
 ) -> Array:
     """v = dU/dp (n, 3) of the equilibrium U; ``model``, ``loads`` carry p's tangent.
 
     ``factor``: of the real Newton tangent at U.
     """
-    rate = np.imag(mechanics.residual(model, U, loads, numbering)) / STEP
+    rate = np.imag(mechanics.residual(model, U, loads, numbering)) / COMPLEX_STEP
     return numbering.spread(-factor.solve(rate))
 
 
@@ -42,20 +42,20 @@ def eigenvalue_rates(
     model: Model,
     U: Array,
     V: Array,
-    loads: Sequence[Part],
-    fields: Fields,
+    loads: Sequence[TyrePart],
+    fields: ModeShapes,
     eigenvalues: Array,
-    beside: Beside | None = None,
+    rim_and_air: RimAndAir | None = None,
 ) -> Array:
     """d lambda/dp (m,) of the modes ``fields``, lambda (m,).
 
-    ``model`` and ``loads`` carry the tangent of p, V = dU/dp; ``beside``: the rim and the air that
-    move along. Where the model has laws of frequency, lambda changes its own modulus:
+    ``model`` and ``loads`` carry the tangent of p, V = dU/dp; ``rim_and_air``: what moves along.
+    Where the model has tables of moduli, lambda changes its own modulus:
     d lambda/dp = (d lambda/dp at that modulus) / (1 - d lambda/d rho d rho/d lambda).
     """
-    state = U + 1j * STEP * V
-    if beside:
-        fields = beside.carried(model.mesh.X, fields)
+    state = U + 1j * COMPLEX_STEP * V
+    if rim_and_air:
+        fields = rim_and_air.carried(model.mesh.X, fields)
     total = np.zeros(len(eigenvalues), complex)
     own = 1.0
     for part in (*model.parts, *loads):
@@ -70,22 +70,22 @@ def eigenvalue_rates(
                 slope = np.array([table.slope(f) for f in hertz])
                 own = own - form.real * ratio.real * slope / (2 * eigenvalues)
     total -= eigenvalues * _energies(mechanics.mass(model), fields)
-    if beside:
-        total += beside.forms(model, state, loads, fields, eigenvalues)
-    return total.imag / STEP / own
+    if rim_and_air:
+        total += rim_and_air.forms(model, state, loads, fields, eigenvalues)
+    return total.imag / COMPLEX_STEP / own
 
 
 @dataclass(frozen=True)
-class Beside:
-    """What moves beside the tyre: rim and air with p's tangent, and the modes' amplitudes of
+class RimAndAir:
+    """What moves along with the tyre: rim and air with p's tangent, and the modes' amplitudes of
     their motions, per mode (q,) and (w,)."""
 
     wheel: Wheel | None
-    air: Air | None
+    air: Cavity | None
     rim: list[Array]
     flow: list[Array]
 
-    def carried(self, X: Array, fields: Fields) -> Fields:
+    def carried(self, X: Array, fields: ModeShapes) -> ModeShapes:
         """The modes with the rim's nodes where p's tangent takes them."""
         if self.wheel is None or not np.iscomplexobj(X):
             return fields
@@ -97,7 +97,12 @@ class Beside:
         return fields.replaced(real, imag)
 
     def forms(
-        self, model: Model, state: Array, loads: Sequence[Part], fields: Fields, eigenvalues: Array
+        self,
+        model: Model,
+        state: Array,
+        loads: Sequence[TyrePart],
+        fields: ModeShapes,
+        eigenvalues: Array,
     ) -> Array:
         """Their part of phi^H (K - lambda M) phi per mode, with the tangent of p."""
         total = np.zeros(len(eigenvalues), complex)
@@ -118,7 +123,7 @@ class Beside:
         return total
 
 
-def _energies(M: csr_array, fields: Fields) -> Array:
+def _energies(M: csr_array, fields: ModeShapes) -> Array:
     """u^T M u (m,) per mode; of real shapes only p's tangent, imaginary."""
     energy = np.zeros((len(fields.modes), 3), complex)
     if not (fields.complex or np.iscomplexobj(M.data)):

@@ -17,14 +17,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..deck.keywords import DeckError, Keyword
-from ..deck.steps import Step
+from ..deck.steps import DeckStep
 from ..section.boundary import rim_freedoms
 from ..section.materials import Number
-from ..section.mesh import Mesh
+from ..section.mesh import DeckMesh
 
 Array = np.ndarray
 FREEDOMS = {"axial": (2,), "spin": (5,), "radial": (1, 3), "tilt": (4, 6)}  # 2: along the axle
-OF_HARMONIC = {0: ("axial", "spin"), 1: ("radial", "tilt")}
+MOTIONS = {0: ("axial", "spin"), 1: ("radial", "tilt")}
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class Wheel:
 
     def motions(self, n: int) -> list[str]:
         """Those of harmonic n that are free."""
-        return [name for name in OF_HARMONIC.get(n, ()) if name in self.free]
+        return [name for name in MOTIONS.get(n, ()) if name in self.free]
 
     def fields(self, n: int, X: Array) -> tuple[Array, Array]:
         """Real and imaginary part of T (nodes, 3, motions); X (nodes, 2) may be complex."""
@@ -74,7 +74,7 @@ class Wheel:
         return np.array(stiffness), np.array([self.inertia.get(m, 0.0) / circle for m in names])
 
 
-def read_wheel(keywords: list[Keyword], mesh: Mesh, step: Step) -> Wheel | None:
+def read_wheel(keywords: list[Keyword], mesh: DeckMesh, step: DeckStep) -> Wheel | None:
     """The rim that ``step`` releases, with the point elements of the revolve job's model.
 
     None where every rim is held. Raises DeckError.
@@ -103,7 +103,7 @@ def read_wheel(keywords: list[Keyword], mesh: Mesh, step: Step) -> Wheel | None:
     return wheels[0] if wheels else None
 
 
-def _point_elements(keywords: list[Keyword], mesh: Mesh) -> dict[str, tuple[str, list[int]]]:
+def _point_elements(keywords: list[Keyword], mesh: DeckMesh) -> dict[str, tuple[str, list[int]]]:
     """Element set to type and nodes of the job's point elements on a rim's reference node; those
     on the tyre are `point_elements`' ."""
     sets: dict[str, tuple[str, list[int]]] = {}

@@ -14,16 +14,19 @@ import numpy as np
 from scipy.linalg import eigh
 from scipy.optimize import linear_sum_assignment
 
-from ..modes.harmonics import Change, HarmonicModes, Makeup, Vibration
-from ..section.point_elements import Attached
+from ..modes.harmonics import Combination, HarmonicModes, SeededTyre, Vibration
+from ..section.point_elements import PointElements
 
 Array = np.ndarray
-CANDIDATES = 3  # coupled modes looked at for every one wanted
-NEAR = 4  # harmonics beyond the highest wanted whose modes may lie close to wanted ones
-SLIGHT = 1e-6  # share of a mode's energy below which a harmonic does not count for its slopes
-NEGLIGIBLE = 1e-9  # share of the static response that a direction may hold to be left out
-FAR = 9.0  # times the highest eigenvalue looked at: fields beyond it follow almost statically
-MOMENTS = 3  # responses of those, each to the last one's inertia: right to (1 / FAR)^(2 MOMENTS)
+CANDIDATES_PER_MODE = 3  # coupled modes looked at for every one wanted
+SPARE_HARMONICS = 4  # harmonics beyond the highest wanted whose modes may lie close to wanted ones
+# share of a mode's energy below which a harmonic does not count for its slopes
+MIN_ENERGY_SHARE = 1e-6
+MIN_RESPONSE_SHARE = 1e-9  # share of the static response that a direction may hold to be left out
+# times the highest eigenvalue looked at: fields beyond it follow almost statically
+STATIC_FROM = 9.0
+# responses of those, each to the last one's inertia: right to STATIC_FROM^(-2 STATIC_MOMENTS)
+STATIC_MOMENTS = 3
 
 
 @dataclass
@@ -65,7 +68,7 @@ class Basis:
         c = np.array([self.place[i][2] for i in rows])[:, None] * vectors[rows]
         return np.tensordot(c.T, self.families[f].shapes[[self.place[i][1] for i in rows]], 1)
 
-    def at_zero(self, attached: Attached) -> Array:
+    def at_zero(self, attached: PointElements) -> Array:
         """Displacement (d, fields) of the attached components."""
         columns = []
         for family in self.families:
@@ -77,7 +80,7 @@ class Basis:
 
 def attached_modes(
     vibration: Vibration,
-    attached: Attached,
+    attached: PointElements,
     harmonics: list[int],
     count: int,
     check: Callable[[], None] = lambda: None,
@@ -92,11 +95,11 @@ def attached_modes(
     top = attached.highest if highest is None else highest
     for n in range(max([top, *harmonics]) + 1):
         check()
-        own = count + 1 if n <= max(harmonics) + NEAR else 0
+        own = count + 1 if n <= max(harmonics) + SPARE_HARMONICS else 0
         families.append(_with_response(vibration, n, own, attached))
     basis = Basis(families)
     p = basis.at_zero(attached)
-    looked = CANDIDATES * len(_seats(harmonics, count)) + 10
+    looked = CANDIDATES_PER_MODE * len(_seats(harmonics, count)) + 10
     fewer = _reduced(basis.eigenvalues, p, looked)
     at = p @ fewer
     K = fewer.T @ (basis.eigenvalues[:, None] * fewer)
@@ -112,10 +115,10 @@ def _reduced(eigenvalues: Array, p: Array, looked: int) -> Array:
     The low fields themselves; of the many high ones D^-1 p^T, D^-2 p^T, ...: Lanczos' vectors of
     the forces that attached masses and springs exert on them.
     """
-    limit = FAR * np.sort(eigenvalues)[: looked + 1][-1]
+    limit = STATIC_FROM * np.sort(eigenvalues)[: looked + 1][-1]
     low, high = np.flatnonzero(eigenvalues <= limit), np.flatnonzero(eigenvalues > limit)
     relative = limit / eigenvalues[high, None]
-    moments = np.hstack([relative**k * p[:, high].T for k in range(1, MOMENTS + 1)])
+    moments = np.hstack([relative**k * p[:, high].T for k in range(1, STATIC_MOMENTS + 1)])
     rest = np.linalg.qr(moments)[0]
     whole = np.zeros((len(eigenvalues), len(low) + rest.shape[1]))
     whole[low, range(len(low))] = 1.0
@@ -123,7 +126,7 @@ def _reduced(eigenvalues: Array, p: Array, looked: int) -> Array:
     return whole
 
 
-def _with_response(vibration: Vibration, n: int, count: int, attached: Attached) -> Family:
+def _with_response(vibration: Vibration, n: int, count: int, attached: PointElements) -> Family:
     """Modes of harmonic n and the static response to unit forces on the attached components."""
     factor, numbering = vibration.factor(n), vibration.numbering
     force = np.zeros((*numbering.equation.shape, len(attached.rows)), complex if n else float)
@@ -131,7 +134,7 @@ def _with_response(vibration: Vibration, n: int, count: int, attached: Attached)
     force = numbering.gather(force)
     response = factor.solve(force)
     gives, directions = np.linalg.eigh(force.conj().T @ response)
-    directions = directions[:, gives > NEGLIGIBLE * gives[-1]]
+    directions = directions[:, gives > MIN_RESPONSE_SHARE * gives[-1]]
     vectors = response @ directions
     images = force @ directions + vibration.shift * vibration.times_mass(vectors)
     if count:
@@ -156,34 +159,33 @@ def ritz(vibration: Vibration, n: int, vectors: Array, images: Array) -> Family:
 
 
 @dataclass
-class Parts:
+class CoupledShapes:
     """The harmonics that attached masses and springs couple in each mode.
 
-    mode (p,), n (p,), shapes (p, nodes, 3): those that hold more than `SLIGHT` of its energy;
-    eigenvalues (m,); at (d, m): displacement of the attached components.
+    p: those that hold more than `MIN_ENERGY_SHARE` of its energy.
     """
 
-    mode: Array
-    n: Array
-    shapes: Array
-    eigenvalues: Array
-    at: Array
+    mode: Array  # (p,)
+    n: Array  # (p,)
+    shapes: Array  # (p, nodes, 3)
+    eigenvalues: Array  # (m,)
+    at: Array  # (d, m): displacement of the attached components
 
     def forms(self) -> tuple[Array, Array, Array, Array]:
         """A sum of parts for each mode."""
         return self.n, self.shapes, self.mode, self.eigenvalues
 
-    def rates(self, forms: Array, change: Change) -> Array:
+    def rates(self, forms: Array, change: SeededTyre) -> Array:
         """psi^T (K' - lambda M') psi of the whole."""
         return forms + change.attached.rates(self.eigenvalues, self.at)
 
-    def where(self, keep: Array | slice) -> Parts:
+    def where(self, keep: Array | slice) -> CoupledShapes:
         """The parts of some of the modes."""
         kept = np.arange(len(self.eigenvalues))[keep]
         place = np.full(len(self.eigenvalues), -1)
         place[kept] = np.arange(len(kept))
         mine = place[self.mode] >= 0
-        return Parts(
+        return CoupledShapes(
             place[self.mode[mine]],
             self.n[mine],
             self.shapes[mine],
@@ -207,9 +209,9 @@ def named(
         mine = told[n]
         own = next(i for i, family in enumerate(basis.families) if family.n == n)
         share = basis.energy(vectors[:, mine]).T / values[mine][:, None]
-        mode, which = np.nonzero(share > SLIGHT)
+        mode, which = np.nonzero(share > MIN_ENERGY_SHARE)
         parts = {i: basis.part(i, vectors[:, mine]) for i in {own, *which.tolist()}}
-        makeup = Parts(
+        makeup = CoupledShapes(
             mode,
             np.array([basis.families[i].n for i in which]),
             np.array([parts[i][j] for j, i in zip(mode, which.tolist(), strict=True)]),
@@ -229,7 +231,7 @@ def tell(
     by rising frequency.
     """
     seats = _seats(harmonics, count)
-    looked = CANDIDATES * len(seats) + 10
+    looked = CANDIDATES_PER_MODE * len(seats) + 10
     overlap = np.array([held[seat][:looked] for seat in seats])
     _, taken = linear_sum_assignment(overlap, maximize=True)
     told: dict[int, list[int]] = {n: [] for n in harmonics}
@@ -245,7 +247,7 @@ def _seats(harmonics: list[int], count: int) -> list[tuple[int, int]]:
     return [(n, k) for n in harmonics for k in range(count) for _ in range(2 if n else 1)]
 
 
-def split(n: int, values: Array, shapes: Array, makeup: Makeup | None = None) -> HarmonicModes:
+def split(n: int, values: Array, shapes: Array, makeup: Combination | None = None) -> HarmonicModes:
     """Modes that come two by two for n >= 1."""
     members = np.tile([1, 2], len(values) // 2) if n else None
     return HarmonicModes(n, values, shapes, members=members, makeup=makeup)

@@ -20,15 +20,15 @@ import numpy as np
 from scipy.linalg import eigh
 from scipy.optimize import linear_sum_assignment
 
-from ..deck.keywords import STEP
-from ..modes.harmonics import Change, HarmonicModes, Vibration
+from ..deck.keywords import COMPLEX_STEP
+from ..modes.harmonics import HarmonicModes, SeededTyre, Vibration
 from ..section.mechanics import mass_matrices
 from ..section.parts.frame import SPIN
 from .coupled import Family, ritz, split
 
 Array = np.ndarray
-MORE = 4  # modes in the basis beyond those wanted
-ROUNDS = 2  # of responses to the Coriolis force added to the basis
+SPARE_MODES = 4  # modes in the basis beyond those wanted
+CORIOLIS_ROUNDS = 2  # of responses to the Coriolis force added to the basis
 
 
 def waves(vibration: Vibration, spin: float, n: int, count: int) -> HarmonicModes:
@@ -37,7 +37,7 @@ def waves(vibration: Vibration, spin: float, n: int, count: int) -> HarmonicMode
 
     spin: Omega, rad/s; ``vibration``: with the centrifugal terms. Raises as `Vibration.modes`.
     """
-    family = _basis(vibration, spin, n, count + MORE)
+    family = _basis(vibration, spin, n, count + SPARE_MODES)
     gyroscopic = _coriolis(vibration, spin, family)
     omega, U = _quadratic(family.eigenvalues, gyroscopic)
     held = abs(U[:count]) ** 2 / (abs(U) ** 2).sum(0)
@@ -78,14 +78,14 @@ class Whirl:
         modes = len(self.omega)
         return np.full(modes, self.n), self.shapes, np.arange(modes), self.omega**2
 
-    def rates(self, forms: Array, change: Change) -> Array:
+    def rates(self, forms: Array, change: SeededTyre) -> Array:
         """omega' = U^H (K' + omega C' - omega^2 M') U / (2 omega - U^H C U)."""
-        faster = np.imag(change.spin) / STEP
+        faster = np.imag(change.spin) / COMPLEX_STEP
         by_spin = self.coriolis * faster / self.spin
         for connectivity, M in mass_matrices(change.model):
             if np.iscomplexobj(M):
                 u = self.shapes[:, connectivity]
-                turned = np.einsum("meai,eab,ij,mebj->m", u.conj(), M.imag / STEP, SPIN, u)
+                turned = np.einsum("meai,eab,ij,mebj->m", u.conj(), M.imag / COMPLEX_STEP, SPIN, u)
                 by_spin = by_spin + (2j * self.spin * turned).real
         slope = (forms + self.omega * by_spin) / (2 * self.omega - self.coriolis)
         return np.asarray(2 * self.fixed * (slope - self.n * faster))
@@ -102,7 +102,7 @@ def _basis(vibration: Vibration, spin: float, n: int, count: int) -> Family:
     vectors = numbering.gather(np.moveaxis(modes.shapes, 0, -1))
     images = vibration.times_mass(vectors) * modes.eigenvalues
     newest = vectors
-    for _ in range(ROUNDS):
+    for _ in range(CORIOLIS_ROUNDS):
         forces = [vibration.times_mass(_turned(vibration, newest))]
         if newest is not vectors:
             forces.append(vibration.times_mass(newest))

@@ -5,23 +5,23 @@ from __future__ import annotations
 import numpy as np
 
 from ..deck.keywords import DeckError
-from ..deck.steps import Step
+from ..deck.steps import DeckStep
 from ..modes.harmonics import HarmonicModes, HasModes, Vibration
 from ..modes.inflated import Inflated
 from ..section.loads import agreed_spin, pressures
 from ..section.model import build
 from .coupled import attached_modes
 from .rotation import waves
-from .splice import Sector, sector_modes
+from .splice import Splice, sector_modes
 
 
-def is_uneven(tyre: Inflated, step: Step) -> bool:
+def is_nonuniform(tyre: Inflated, step: DeckStep) -> bool:
     """Whether the tyre is not the same all round, or turns."""
     return bool(_turns(step) or tyre.sector or tyre.attached())
 
 
-def uneven_modes(
-    tyre: Inflated, step: Step, vibration: HasModes, harmonics: list[int], count: int
+def nonuniform_modes(
+    tyre: Inflated, step: DeckStep, vibration: HasModes, harmonics: list[int], count: int
 ) -> list[HarmonicModes]:
     """The ``count`` lowest modes of each harmonic. Raises DeckError, Unstable, NotConverged,
     InflationFailed."""
@@ -56,7 +56,7 @@ def uneven_modes(
 
 
 def _sector_modes(
-    tyre: Inflated, step: Step, vibration: Vibration, harmonics: list[int], count: int
+    tyre: Inflated, step: DeckStep, vibration: Vibration, harmonics: list[int], count: int
 ) -> list[HarmonicModes]:
     """With a sector of other stuff, at the static moduli."""
     line = step.procedure.line
@@ -68,11 +68,11 @@ def _sector_modes(
     model, other = (build(k, None, step.long_term) for k in (tyre.section, tyre.sector))
     if model.mesh is not other.mesh:
         raise DeckError(line, "the sector's section job must have the same mesh")
-    sector = Sector(np.radians(float(tyre.request.sector["width_deg"])), other)
+    sector = Splice(np.radians(float(tyre.request.sector["width_deg"])), other)
     return sector_modes(
         vibration, tyre.U, pressures(model, step), model, sector, harmonics, count, tyre.check
     )
 
 
-def _turns(step: Step) -> bool:
+def _turns(step: DeckStep) -> bool:
     return step.procedure.name == "COMPLEX FREQUENCY"

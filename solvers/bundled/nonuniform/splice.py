@@ -23,24 +23,24 @@ from ..section.mechanics import mass
 from ..section.model import Model
 from ..section.parts.elastic import Elastic
 from ..section.parts.law import Inverted
-from ..section.parts.part import Part
+from ..section.parts.part import TyrePart
 from ..solid3d.circumference import Circumference
 from ..solid3d.gmres import gmres
 from ..solid3d.revolved import Revolved
 from .coupled import split, tell
 
 Array = np.ndarray
-NEAR = 2  # harmonics beyond the highest wanted whose modes may lie close to wanted ones
-BEYOND = 6  # harmonics of the displacements beyond the highest wanted
-TOLERANCE = 1e-9  # out-of-balance force over the rim's
-LONGEST = 20  # iterations
-LOOSE = 1e-4  # of each step of Newton's method
-INDEPENDENT = 1e-11  # of the basis' Gram matrix
-ROUNDS = 2  # of responses
+SPARE_HARMONICS = 2  # harmonics beyond the highest wanted whose modes may lie close to wanted ones
+EXTRA_HARMONICS = 6  # harmonics of the displacements beyond the highest wanted
+FORCE_RTOL = 1e-9  # out-of-balance force over the rim's
+MAX_ITERATIONS = 20
+LINEAR_RTOL = 1e-4  # of each step of Newton's method
+MIN_GRAM = 1e-11  # of the basis' Gram matrix
+RESPONSE_ROUNDS = 2  # of responses
 
 
 @dataclass(frozen=True)
-class Sector:
+class Splice:
     """Its width (rad), about Theta = 0, and the section as it is there."""
 
     width: float
@@ -67,17 +67,17 @@ def full_circle(highest: int) -> Circumference:
 
 def blended(model: Model, other: Model, share: Array) -> Model:
     """``model`` with constants per Gauss point and station (p, s): ``share`` (s,) of ``other``."""
-    parts: list[Part] = []
+    parts: list[TyrePart] = []
     for part, its in zip(model.parts, other.parts, strict=True):
         assert isinstance(part, Elastic) and isinstance(its, Elastic)
         parts.append(replace(part, law=part.law.blended(its.law, share)))
     return replace(model, parts=parts)
 
 
-class Round:
+class FullCircle:
     """Fields (k, nodes, 3) by their values round the tyre; ``free`` (nodes, 3)."""
 
-    def __init__(self, vibration: Vibration, tyre: Revolved, sector: Sector, highest: int):
+    def __init__(self, vibration: Vibration, tyre: Revolved, sector: Splice, highest: int):
         self.vibration, self.tyre, self.highest = vibration, tyre, highest
         self.factors = [vibration.factor(n) for n in range(highest + 1)]
         self.free = vibration.numbering.equation < vibration.numbering.size
@@ -128,13 +128,13 @@ def _angles(k: int) -> Array:
 def sector_modes(
     vibration: Vibration,
     U: Array,
-    loads: Sequence[Part],
+    loads: Sequence[TyrePart],
     model: Model,
-    sector: Sector,
+    sector: Splice,
     harmonics: list[int],
     count: int,
     check: Callable[[], None] = lambda: None,
-    beyond: int = BEYOND,
+    beyond: int = EXTRA_HARMONICS,
 ) -> list[HarmonicModes]:
     """The ``count`` lowest modes of each harmonic of a tyre with a sector of other stuff.
 
@@ -145,9 +145,9 @@ def sector_modes(
     around = full_circle(top)
     share = sector.share(_angles(len(around.weights)), 2 * top)
     tyre = Revolved(blended(model, sector.model, share), loads, around)
-    fields = Round(vibration, tyre, sector, top)
+    fields = FullCircle(vibration, tyre, sector, top)
     equilibrium(fields, U, check)
-    near = range(min(max(harmonics) + NEAR, top) + 1)
+    near = range(min(max(harmonics) + SPARE_HARMONICS, top) + 1)
     start: list[Array] = []
     plain = {}
     for n in near:
@@ -167,14 +167,14 @@ def sector_modes(
     return result
 
 
-def equilibrium(fields: Round, U: Array, check: Callable[[], None]) -> None:
+def equilibrium(fields: FullCircle, U: Array, check: Callable[[], None]) -> None:
     """Newton's method from the plain tyre's state. Raises InflationFailed."""
     state = np.repeat(U[None], len(fields.tyre.around.angles), 0)
     shape = state.shape
     product = lambda x: fields.forces(x.reshape(shape)).ravel()
     response = lambda x: fields.response(x.reshape(shape)).ravel()
     scale = 0.0
-    for _ in range(LONGEST):
+    for _ in range(MAX_ITERATIONS):
         check()
         try:
             whole = fields.tyre.residual(state)
@@ -182,21 +182,21 @@ def equilibrium(fields: Round, U: Array, check: Callable[[], None]) -> None:
             raise InflationFailed(0.0, 0.0, f"with the splice {error}") from None
         force = (whole * fields.free).ravel()
         scale = scale or float(np.linalg.norm(whole))  # of what the rim bears
-        if np.linalg.norm(force) <= TOLERANCE * scale:
+        if np.linalg.norm(force) <= FORCE_RTOL * scale:
             return
-        step, _, _ = gmres(product, response, -force, LOOSE, LONGEST)
+        step, _, _ = gmres(product, response, -force, LINEAR_RTOL, MAX_ITERATIONS)
         state = state + step.reshape(shape)
     raise InflationFailed(0.0, 0.0, "Newton's method did not converge with the splice")
 
 
 def ritz_davidson(
-    fields: Round, start: list[Array], wanted: int, check: Callable[[], None]
+    fields: FullCircle, start: list[Array], wanted: int, check: Callable[[], None]
 ) -> tuple[Array, Callable[[int], Array], Array]:
     """Eigenvalues (m,) rising, the fields of the modes, M~-normalised, by their place, and
     (len(start), m): how much of each of the ``start`` fields they hold."""
     shape, new, used = start[0].shape, start, 0
-    room = np.empty((3, len(start) + ROUNDS * wanted, start[0].size))
-    for left in reversed(range(ROUNDS + 1)):
+    room = np.empty((3, len(start) + RESPONSE_ROUNDS * wanted, start[0].size))
+    for left in reversed(range(RESPONSE_ROUNDS + 1)):
         for field in new:
             check()
             inertia = fields.inertia(field)
@@ -210,7 +210,7 @@ def ritz_davidson(
         V, KV, MV = room[:, :used]
         K, M = V @ KV.T, V @ MV.T
         gram, turn = np.linalg.eigh((M + M.T) / 2)
-        turn = turn[:, gram > INDEPENDENT] / np.sqrt(gram[gram > INDEPENDENT])
+        turn = turn[:, gram > MIN_GRAM] / np.sqrt(gram[gram > MIN_GRAM])
         values, inner = np.linalg.eigh(turn.T @ ((K + K.T) / 2) @ turn)
         x = turn @ inner
         if left:

@@ -16,13 +16,14 @@ from scipy.linalg.lapack import spotrf, strtrs
 
 from ..section.band import Indefinite
 from ..solid3d.circumference import Circumference
-from .half_turn_symmetry import MIRROR, Fold, NotSymmetric
+from .half_turn_symmetry import MIRROR, HalfTurn, NotSymmetric
 
 Array = np.ndarray
 Tangents = list[tuple[Array, Array, Array, Array]]
-SMALL = 300  # rows of a triangle that are not halved any more
+MAX_UNDIVIDED_ROWS = 300  # rows of a triangle that are not halved any more
 _Assembled = tuple[tuple[int, ...], Array, Array, Array]
-BIAS = 2e-3  # of what couples the parts over what does not, above which a level takes both as one
+# of what couples the parts over what does not, above which a level takes both as one
+MIN_COUPLING = 2e-3
 
 
 @dataclass
@@ -40,21 +41,21 @@ class _Front:
 class Elimination:
     """The order of elimination, from the elements' connectivities."""
 
-    def __init__(self, connectivities: list[Array], fold: Fold, around: Circumference):
-        self.fold, self.around = fold, around
-        place = np.full(fold.shape[1], -1)
-        place[fold.nodes] = np.arange(len(fold.nodes))
-        other = fold.other
+    def __init__(self, connectivities: list[Array], symmetry: HalfTurn, around: Circumference):
+        self.symmetry, self.around = symmetry, around
+        place = np.full(symmetry.shape[1], -1)
+        place[symmetry.nodes] = np.arange(len(symmetry.nodes))
+        other = symmetry.other
         # elements on z >= 0, their images, and their nodes' places in the quarter
         chosen: list[tuple[Array, ...]] = []
-        beyond = ~np.isin(np.arange(fold.shape[1]), fold.nodes)
-        inner = (place >= 0) & (other != np.arange(fold.shape[1]))
+        beyond = ~np.isin(np.arange(symmetry.shape[1]), symmetry.nodes)
+        inner = (place >= 0) & (other != np.arange(symmetry.shape[1]))
         for c in connectivities:
             if (beyond[c].any(1) & inner[c].any(1)).any():
                 raise NotSymmetric("an element straddles the middle plane")
             inside = np.flatnonzero((place[c] >= 0).all(1))
             chosen.append((inside, *_images(c, inside, other), place[c[inside]]))
-        level = _levels([c for *_, c in chosen], fold)
+        level = _levels([c for *_, c in chosen], symmetry)
         self.fronts = _fronts(chosen, level)
         # the same threads for every factor: what one factor frees then serves the next, for the
         # system keeps memory by threads
@@ -84,10 +85,10 @@ def _images(c: Array, inside: Array, other: Array) -> tuple[Array, Array]:
     return np.array(images, int), np.array(orders, int).reshape(len(images), c.shape[1])
 
 
-def _levels(connectivities: list[Array], fold: Fold) -> Array:
+def _levels(connectivities: list[Array], symmetry: HalfTurn) -> Array:
     """Steps from the nodes that are farthest from the tread's middle; -1 for held ones."""
-    free = np.asarray(fold.mask.any((0, 1, 3)))
-    from_middle = _steps(connectivities, fold.nodes == fold.beyond, free)
+    free = np.asarray(symmetry.mask.any((0, 1, 3)))
+    from_middle = _steps(connectivities, symmetry.nodes == symmetry.beyond, free)
     return _steps(connectivities, from_middle == from_middle.max(), free)
 
 
@@ -133,7 +134,7 @@ class Factor:
 
     def __init__(self, order: Elimination, tangents: Tangents, contact: Array):
         self.order = order
-        self.contact = order.fold.blocks(contact)
+        self.contact = order.symmetry.blocks(contact)
         self._steps: list[tuple[Array, Array, slice, Array, Array]] = []
         carried: list[Array] = []
         levels = self._assemble(tangents)
@@ -155,7 +156,7 @@ class Factor:
         kinds = [_between_angles(kind, self.order) for kind in tangents]
         for front in self.order.fronts:
             same, cross = _tables(front, kinds)
-            coupled = coupled or bool(abs(cross).max() > BIAS * abs(same).max())
+            coupled = coupled or bool(abs(cross).max() > MIN_COUPLING * abs(same).max())
             same = np.ascontiguousarray(same)
             if coupled:
                 cross = np.ascontiguousarray(cross)
@@ -164,7 +165,7 @@ class Factor:
                 self.contact[:, gone, :3, 3:] = self.contact[:, gone, 3:, :3] = 0.0
             groups = [(0, 1)] if coupled else [(0,), (1,)]
             block = lambda group, rows, cols, t=(same, cross), f=front: _block(
-                t, f, group, self.order.fold, self.contact, rows, cols
+                t, f, group, self.order.symmetry, self.contact, rows, cols
             )
             yield (
                 front,
@@ -189,12 +190,12 @@ class Factor:
         """What a level leaves to the next one, of each part or of both."""
         gone, left = front.nodes[: front.eliminated], front.nodes[front.eliminated :]
         rests = []
-        for group, first, beside, rest in blocks:
+        for group, first, onward, rest in blocks:
             if len(gone):
                 before = [carried[h] for h in group if h < len(carried)]
-                _add_carried(first, before, len(group), self.order.fold.shape[0])
-                _eliminate(first, beside, rest, pool)
-                self._steps.append((gone, left, slice(group[0], group[-1] + 1), first, beside))
+                _add_carried(first, before, len(group), self.order.symmetry.shape[0])
+                _eliminate(first, onward, rest, pool)
+                self._steps.append((gone, left, slice(group[0], group[-1] + 1), first, onward))
             rests.append(rest)
         return rests
 
@@ -227,7 +228,7 @@ class Factor:
 
     def backward(self, pieces: list[Array]) -> Array:
         """L^-T of what `forward` gave, as parts (v, 2, k, q, 3)."""
-        x = np.zeros((pieces[-1].shape[1], *self.order.fold.mask.shape), np.float32)
+        x = np.zeros((pieces[-1].shape[1], *self.order.symmetry.mask.shape), np.float32)
 
         def go(steps: list[int]) -> None:
             for i in steps[::-1]:
@@ -240,7 +241,7 @@ class Factor:
 
         go(self._chains[2])
         list(self.order.chains.map(go, self._chains[:2]))
-        return np.asarray(x * self.order.fold.mask, float)
+        return np.asarray(x * self.order.symmetry.mask, float)
 
 
 def _between_angles(kind: tuple[Array, ...], order: Elimination) -> Array:
@@ -278,7 +279,7 @@ def _block(
     tables: tuple[Array, Array],
     front: _Front,
     group: tuple[int, ...],
-    fold: Fold,
+    symmetry: HalfTurn,
     contact: Array,
     rows: str,
     cols: str,
@@ -287,7 +288,7 @@ def _block(
     both, held components cut out; Fortran order."""
     chosen = {"gone": slice(0, front.eliminated), "left": slice(front.eliminated, None)}
     here, there = chosen[rows], chosen[cols]
-    masks = fold.mask[:, :, front.nodes]
+    masks = symmetry.mask[:, :, front.nodes]
     K = masks.shape[1]
     n, m = len(front.nodes[here]) * 3, len(front.nodes[there]) * 3
     after, beyond = 3 * (here.start or 0), 3 * (there.start or 0)
@@ -326,12 +327,12 @@ def _add_carried(first: Array, carried: list[Array], parts: int, angles: int) ->
         whole[h : h + blocks, :, :m, h : h + blocks, :, :m] += add
 
 
-def _eliminate(first: Array, beside: Array, rest: Array, pool: ThreadPoolExecutor) -> None:
-    """L of the first block, X = L^-1 beside and rest - X^T X in their places; lower triangles."""
+def _eliminate(first: Array, onward: Array, rest: Array, pool: ThreadPoolExecutor) -> None:
+    """L of the first block, X = L^-1 onward, and rest - X^T X in their places; lower triangles."""
     _cholesky(first, pool)
-    if beside.shape[1]:
-        _divide_both(first, beside, pool)
-        _subtract_square(rest, beside, pool)
+    if onward.shape[1]:
+        _divide_both(first, onward, pool)
+        _subtract_square(rest, onward, pool)
 
 
 # Triangles are halved down to small ones, of which the inverses are kept. All that takes time is
@@ -342,7 +343,7 @@ def _eliminate(first: Array, beside: Array, rest: Array, pool: ThreadPoolExecuto
 def _cholesky(A: Array, pool: ThreadPoolExecutor) -> None:
     """The lower triangle of A becomes its Cholesky factor L, but the inverse in L's small triangles
     on the diagonal. Raises Indefinite."""
-    if len(A) <= SMALL:
+    if len(A) <= MAX_UNDIVIDED_ROWS:
         L, info = spotrf(A, lower=1)
         if info:
             raise Indefinite("the tangent stiffness is not positive definite")
@@ -364,7 +365,7 @@ def _divide_both(L: Array, B: Array, pool: ThreadPoolExecutor) -> None:
 
 
 def _divide(L: Array, B: Array) -> None:
-    if len(L) <= SMALL:
+    if len(L) <= MAX_UNDIVIDED_ROWS:
         B[:] = L @ B
         return
     h = len(L) // 2
@@ -375,7 +376,7 @@ def _divide(L: Array, B: Array) -> None:
 
 def _divide_transposed(L: Array, B: Array) -> None:
     """B becomes L^-T B."""
-    if len(L) <= SMALL:
+    if len(L) <= MAX_UNDIVIDED_ROWS:
         B[:] = L.T @ B
         return
     h = len(L) // 2

@@ -24,11 +24,11 @@ from ..section.elements import Lines
 from ..solid3d.circumference import Circumference
 
 Array = np.ndarray
-FARTHEST = np.pi / 3  # from the vertical: no node beyond it can touch
+MAX_CONTACT_ANGLE = np.pi / 3  # from the vertical: no node beyond it can touch
 
 
 @dataclass(frozen=True)
-class Road:
+class FlatRoad:
     """Contact at nodes (k, c) of half the circumference.
 
     nodes (c,): rows of the section; area (k, c): reference area that a node stands for, m2;
@@ -95,7 +95,7 @@ class Road:
         energy = float(overlap + self.friction * (pressed * path).sum())
         return Contact(self, height, at, local, K, by_height, energy)
 
-    def settled(self, contact: Contact) -> Road:
+    def settled(self, contact: Contact) -> FlatRoad:
         """The road after a load was reached: slip counts anew, less the elastic one."""
         share, _ = self.share(contact.height)
         slip = (contact.positions[..., 1:] - self.anchor) * share[..., None]
@@ -113,7 +113,7 @@ class Contact:
     across; of half the tyre. Their derivatives K (k, c, 3, 3) by the nodes' positions and by_height
     (k, c, 3). energy, J: stored and dissipated, their potential where the friction is bounded."""
 
-    road: Road
+    road: FlatRoad
     height: float
     positions: Array
     local: Array
@@ -157,12 +157,12 @@ def flat_road(
     stiffness: float,
     friction: float,
     elastic_slip: float,
-) -> Road:
+) -> FlatRoad:
     """The road under the nodes of the surface ``tread``. X (n, 2): R, Z of the section, m."""
     share = np.zeros(len(X))
     np.add.at(share, tread.connectivity, (tread.weights * tread.R) @ tread.N)
     nodes = np.flatnonzero(share)
-    near = around.angles < FARTHEST
+    near = around.angles < MAX_CONTACT_ANGLE
     c, s = np.cos(around.angles[near]), np.sin(around.angles[near])
     frame = np.zeros((len(c), 3, 3))
     frame[:, 0, 0], frame[:, 0, 1] = c, -s
@@ -174,4 +174,6 @@ def flat_road(
     height = float(origin[..., 0].max())
     gap = height - origin[..., 0]
     anchor = origin[..., 1:]
-    return Road(nodes, area, frame, origin, stiffness, friction, elastic_slip, anchor, gap, height)
+    return FlatRoad(
+        nodes, area, frame, origin, stiffness, friction, elastic_slip, anchor, gap, height
+    )

@@ -15,29 +15,31 @@ from ..section.parts.law import Inverted
 from ..solid3d.gmres import gmres
 from ..solid3d.revolved import Revolved
 from .block_cholesky import Elimination, Factor
-from .contact import Contact, Road
-from .contact_update import Touching
-from .half_turn_symmetry import Fold
+from .contact import Contact, FlatRoad
+from .contact_update import ContactUpdate
+from .half_turn_symmetry import HalfTurn
 
 Array = np.ndarray
 log = logging.getLogger("tyrecal_solvers")
-TOLERANCE = 1e-8  # out-of-balance force over the load
-LONGEST = 40  # Newton iterations a load
-EXHAUSTED = 15  # GMRES iterations of a step, after which the preconditioner is formed anew
-LONGEST_LINEAR = 60
-EXACT = 1e-2  # residual of the linear problem, relative
-STIFF = 1e-3  # the same of the vertical stiffness
-ROUGH = 0.3  # residual of the linear problem as long as the contact changes much
-ASTRAY = 0.5  # more is left only of a tangent that is far from a stable one
-PATIENCE = 2  # steps that may fail to halve the residual, with Coulomb's friction
-NEAR = 1e-2  # residual over the load, before Coulomb's friction is tried
-FAR = 0.1  # the same, before the friction's bounds are taken anew
-SOFT = 1e-4  # m: an elastic slip that is no obstacle
-HARDER = 0.3  # from one elastic slip to the next smaller one
-SHORTEST = 1 / 64  # step of the line search
-TOUCH = 1e-6  # m/N of deflection to begin with: it must touch, and stay small
-SOFTEST = 1 / 16  # share of a load's increase, below which it counts as unreachable
-FURTHEST = 0.1  # of the section's height that a stiff tyre (`TOUCH`) goes down in one step
+FORCE_RTOL = 1e-8  # out-of-balance force over the load
+MAX_ITERATIONS = 40  # Newton iterations a load
+# GMRES iterations of a step, after which the preconditioner is formed anew
+MAX_GMRES_BEFORE_NEW_FACTOR = 15
+MAX_GMRES = 60
+LINEAR_RTOL = 1e-2  # residual of the linear problem, relative
+STIFFNESS_RTOL = 1e-3  # the same of the vertical stiffness
+ROUGH_LINEAR_RTOL = 0.3  # residual of the linear problem as long as the contact changes much
+MAX_LINEAR_RESIDUAL = 0.5  # more is left only of a tangent that is far from a stable one
+MAX_SETBACKS = 2  # steps that may fail to halve the residual, with Coulomb's friction
+COULOMB_RTOL = 1e-2  # residual over the load, before Coulomb's friction is tried
+FRICTION_BOUND_RTOL = 0.1  # the same, before the friction's bounds are taken anew
+SOFT_ELASTIC_SLIP = 1e-4  # m: an elastic slip that is no obstacle
+ELASTIC_SLIP_FACTOR = 0.3  # from one elastic slip to the next smaller one
+MIN_STEP_LENGTH = 1 / 64  # step of the line search
+FIRST_COMPLIANCE = 1e-6  # m/N of deflection to begin with: it must touch, and stay small
+MIN_LOAD_STEP = 1 / 16  # share of a load's increase, below which it counts as unreachable
+# of the section's height that a stiff tyre (`FIRST_COMPLIANCE`) goes down in one step
+MAX_DEFLECTION_STEP = 0.1
 
 
 Bound = tuple[Array, Array]
@@ -50,7 +52,7 @@ class NotPressed(ArithmeticError):
 
 
 @dataclass
-class Pressed:
+class PressedState:
     """An equilibrium: parts (2, k, q, 3) of the displacements, the road's height (m), contact,
     and the tangent vertical stiffness dF / d(deflection), N/m."""
 
@@ -60,31 +62,41 @@ class Pressed:
     stiffness: float
 
 
-class Press:
+class ContactNewton:
     """Presses a tyre from its inflated state ``U`` (k, n, 3) to rising loads."""
 
-    def __init__(self, tyre: Revolved, fold: Fold, road: Road, U: Array, check: Callable[[], None]):
-        self.tyre, self.fold, self.check = tyre, fold, check
+    def __init__(
+        self,
+        tyre: Revolved,
+        symmetry: HalfTurn,
+        road: FlatRoad,
+        U: Array,
+        check: Callable[[], None],
+    ):
+        self.tyre, self.symmetry, self.check = tyre, symmetry, check
         self.free_radius = float(road.positions(U)[..., 0].max())
-        self.flat = self._flat_height(tyre.model.mesh.X, np.flatnonzero(~fold.free.any(1)))
+        self.flat = self._flat_height(tyre.model.mesh.X, np.flatnonzero(~symmetry.free.any(1)))
         self.road = road.settled(road.forces(U, self.free_radius))
         tyre.residual(U)
-        self.order = Elimination([t[0] for t in tyre.tangents()], fold, tyre.around)
-        self.parts = fold.parts(U)
+        self.order = Elimination([t[0] for t in tyre.tangents()], symmetry, tyre.around)
+        self.parts = symmetry.parts(U)
         self.height = self.free_radius
         self.load = 0.0
         self._bound = np.zeros_like(road.area), np.zeros_like(road.area)
-        self._factor: Touching | None = None
+        self._factor: ContactUpdate | None = None
         self._used = 0
         self._stale = False  # the preconditioner is of an earlier load
         self._slope: tuple[Array, float] | None = None  # of parts and height by the load
         self.factorisations = self.products = self.iterations = 0
 
-    def to(self, load: float) -> Pressed:
+    def to(self, load: float) -> PressedState:
         """The equilibrium at ``load`` (N), in smaller steps where need be. Raises NotPressed, also
         where the road has come to the rim."""
-        step = min(load - self.load, FURTHEST * (self.free_radius - self.flat) / TOUCH)
-        smallest = SOFTEST * step
+        step = min(
+            load - self.load,
+            MAX_DEFLECTION_STEP * (self.free_radius - self.flat) / FIRST_COMPLIANCE,
+        )
+        smallest = MIN_LOAD_STEP * step
         while True:
             self.check()
             target = min(self.load + step, load)
@@ -128,17 +140,17 @@ class Press:
         self, parts: Array, height: float, load: float, bound: Bound | None
     ) -> tuple[Array, float, Contact]:
         """Residuals: forces on the parts, and half the load less the contact's."""
-        U = self.fold.spread(parts)
+        U = self.symmetry.spread(parts)
         forces = self.tyre.residual(U)
         contact = self.road.forces(U, height, bound)
-        force = self.fold.gather(forces + contact.nodal(U.shape))
+        force = self.symmetry.gather(forces + contact.nodal(U.shape))
         return force, (load - contact.force) / 2, contact
 
     def _energy(self, contact: Contact, load: float, height: float) -> float:
         """Potential of half the tyre, its road and its load at the last state, J."""
         return self.tyre.potential() + contact.energy + load / 2 * height
 
-    def _newton(self, load: float) -> Pressed:
+    def _newton(self, load: float) -> PressedState:
         """By Tresca's friction, with the last normal forces, to where Coulomb's converges."""
         parts, height = self.parts, self.height
         self._stale = self._factor is not None
@@ -146,21 +158,21 @@ class Press:
             parts = parts + (load - self.load) * self._slope[0]
             height += (load - self.load) * self._slope[1]
         else:
-            height -= TOUCH * load
-        bound, near = self._bound, NEAR
-        for attempt in range(LONGEST):
-            reached = near if attempt else FAR
+            height -= FIRST_COMPLIANCE * load
+        bound, near = self._bound, COULOMB_RTOL
+        for attempt in range(MAX_ITERATIONS):
+            reached = near if attempt else FRICTION_BOUND_RTOL
             parts, height, contact = self._softly(parts, height, load, bound, reached)
             bound = contact.local[..., 0], self.road.share(height)[0]
             if not attempt:
                 continue  # what newly touches had no friction yet
             try:
-                parts, height, contact = self._settle(parts, height, load, None, TOLERANCE)
+                parts, height, contact = self._settle(parts, height, load, None, FORCE_RTOL)
             except NotPressed:
-                near = max(0.1 * near, TOLERANCE)
+                near = max(0.1 * near, FORCE_RTOL)
                 continue
             self._bound = contact.local[..., 0], np.ones_like(self.road.area)
-            return Pressed(parts, height, contact, self._stiffness(contact))
+            return PressedState(parts, height, contact, self._stiffness(contact))
         raise NotPressed("the friction did not settle")
 
     def _softly(
@@ -169,8 +181,8 @@ class Press:
         """By Tresca's friction; a hard stick is approached by softer ones."""
         road = self.road
         slips = [road.elastic_slip]
-        while slips[0] < SOFT:
-            slips.insert(0, slips[0] / HARDER)
+        while slips[0] < SOFT_ELASTIC_SLIP:
+            slips.insert(0, slips[0] / ELASTIC_SLIP_FACTOR)
         try:
             for slip in slips:
                 self.road = replace(road, elastic_slip=slip)
@@ -189,14 +201,16 @@ class Press:
         if bound is None and self._stale:
             self._form(contact)
         setbacks = 0
-        for _ in range(LONGEST):
+        for _ in range(MAX_ITERATIONS):
             self.check()
             if size <= tolerance * load:
                 return parts, height, contact
             self.iterations += 1
             energy = self._energy(contact, load, height) if bound else 0.0
-            rough = size > NEAR * load
-            step, rise = self._step(contact, force, lacking, ROUGH if rough else EXACT)
+            rough = size > COULOMB_RTOL * load
+            step, rise = self._step(
+                contact, force, lacking, ROUGH_LINEAR_RTOL if rough else LINEAR_RTOL
+            )
             slope = float((force * step).sum() + lacking * rise)
             length, before = 1.0, size
             while True:
@@ -211,33 +225,33 @@ class Press:
                 except Inverted:
                     pass
                 length /= 2
-                if length < SHORTEST:
+                if length < MIN_STEP_LENGTH:
                     raise NotPressed("the line search found no lower energy")
             parts, height = ahead
             setbacks += size > 0.5 * before
-            if bound is None and setbacks > PATIENCE:
+            if bound is None and setbacks > MAX_SETBACKS:
                 break
-        raise NotPressed(f"Newton's method did not converge in {LONGEST} iterations")
+        raise NotPressed(f"Newton's method did not converge in {MAX_ITERATIONS} iterations")
 
     def _step(
         self, contact: Contact, force: Array, lacking: float, tolerance: float
     ) -> tuple[Array, float]:
         """Newton's step of the parts and of the road's height."""
-        border = _Border(self.fold, contact)
+        border = _RoadHeight(self.symmetry, contact)
         right = -np.append(force.ravel(), lacking * border.scale)
-        if self._used > EXHAUSTED:
+        if self._used > MAX_GMRES_BEFORE_NEW_FACTOR:
             self._form(contact)
         found, self._used, left = self._solve(border, contact, right, tolerance)
-        if not left <= ASTRAY:
+        if not left <= MAX_LINEAR_RESIDUAL:
             raise NotPressed("the tangent is too far from a stable one")
         return found[:-1].reshape(force.shape), float(found[-1]) * border.scale
 
     def _solve(
-        self, border: _Border, contact: Contact, right: Array, tolerance: float
+        self, border: _RoadHeight, contact: Contact, right: Array, tolerance: float
     ) -> tuple[Array, int, float]:
         factor = self._factor or self._form(contact)
         shape, scale = self.parts.shape, border.scale
-        factor.to(contact.stiffness(*self.fold.shape[:2], positive=False))
+        factor.to(contact.stiffness(*self.symmetry.shape[:2], positive=False))
         # two right-hand sides at once cost little more than one: all wait for the factor's memory
         answer, first = factor.solve(np.stack([border.by_height, right[:-1].reshape(shape)]))
         schur = border.stiffness - float((border.of_force * answer).sum())
@@ -247,8 +261,8 @@ class Press:
         def product(v: Array) -> Array:
             self.products += 1
             parts, rise = v[:-1].reshape(shape), v[-1] * scale
-            V = self.fold.spread(parts)
-            image = self.fold.gather(self.tyre.product(V) + contact.product(V))
+            V = self.symmetry.spread(parts)
+            image = self.symmetry.gather(self.tyre.product(V) + contact.product(V))
             image += border.by_height * rise
             more = float((border.of_force * parts).sum()) + border.stiffness * rise
             return np.append(image.ravel(), more * scale)
@@ -259,15 +273,17 @@ class Press:
             return np.append((y - answer * rise).ravel(), rise / scale)
 
         begin = precondition(right, first) / float(np.linalg.norm(right))
-        return gmres(product, precondition, right, tolerance, LONGEST_LINEAR, begin)
+        return gmres(product, precondition, right, tolerance, MAX_GMRES, begin)
 
-    def _form(self, contact: Contact) -> Touching:
+    def _form(self, contact: Contact) -> ContactUpdate:
         """The preconditioner at the last state; where that is unstable, the one before stays."""
         self.factorisations += 1
         self._stale = False
-        stiffness = contact.stiffness(*self.fold.shape[:2], positive=True)
+        stiffness = contact.stiffness(*self.symmetry.shape[:2], positive=True)
         try:
-            self._factor = Touching(Factor(self.order, self.tyre.tangents(np.float32), stiffness))
+            self._factor = ContactUpdate(
+                Factor(self.order, self.tyre.tangents(np.float32), stiffness)
+            )
         except Indefinite:
             if self._factor is None:
                 raise
@@ -275,22 +291,22 @@ class Press:
 
     def _stiffness(self, contact: Contact) -> float:
         """dF / d(deflection): the whole tyre's force against the road's rise, tyre following."""
-        border = _Border(self.fold, contact)
+        border = _RoadHeight(self.symmetry, contact)
         unit = np.append(np.zeros(self.parts.size), border.scale)
-        found = self._solve(border, contact, unit, STIFF)[0]
+        found = self._solve(border, contact, unit, STIFFNESS_RTOL)[0]
         rise = float(found[-1]) * border.scale
         self._slope = -found[:-1].reshape(self.parts.shape) / 2, -rise / 2
         return 2 / rise
 
 
-class _Border:
+class _RoadHeight:
     """The road's height as one more unknown: its row and column of the tangent, of half the
     tyre. ``scale`` brings it to the size of the displacements."""
 
-    def __init__(self, fold: Fold, contact: Contact):
+    def __init__(self, symmetry: HalfTurn, contact: Contact):
         of_force = np.zeros_like(contact.by_height)
         of_force[..., 0] = contact.by_height[..., 0]
-        self.by_height = fold.gather(contact.nodal(fold.shape, contact.by_height))
-        self.of_force = fold.gather(contact.nodal(fold.shape, of_force))
+        self.by_height = symmetry.gather(contact.nodal(symmetry.shape, contact.by_height))
+        self.of_force = symmetry.gather(contact.nodal(symmetry.shape, of_force))
         self.stiffness = float(contact.K[..., 0, 0].sum())
         self.scale = max(self.stiffness, 1.0) ** -0.5

@@ -17,16 +17,17 @@ from scipy.linalg import lu_factor, lu_solve
 from .block_cholesky import Factor
 
 Array = np.ndarray
-AT_ONCE = 64  # columns that a thread forms at a time
-SLIGHT = 1e-3  # change of a node's contact stiffness over the stiffest contact, left to GMRES
+COLUMNS_AT_ONCE = 64  # columns that a thread forms at a time
+# change of a node's contact stiffness over the stiffest contact, left to GMRES
+MIN_STIFFNESS_CHANGE = 1e-3
 
 
-class Touching:
+class ContactUpdate:
     """Approximate inverse of the tangent stiffness as the contact changes."""
 
     def __init__(self, factor: Factor):
         self.factor = factor
-        mask = factor.order.fold.mask
+        mask = factor.order.symmetry.mask
         self._column = np.full(mask.shape, -1)  # of each dof in Y
         self._blocks: list[list[Array]] = []  # Y by the times of forming, by the factor's pieces
         self._compliance = np.zeros((0, 0))
@@ -34,9 +35,9 @@ class Touching:
 
     def to(self, contact: Array) -> None:
         """Take ``contact`` (k, n, 3, 3), N/m, not necessarily symmetric, in place of the last."""
-        blocks = self.factor.order.fold.blocks(contact)
+        blocks = self.factor.order.symmetry.blocks(contact)
         change = blocks - self.factor.contact
-        moved = abs(change).max((2, 3)) > SLIGHT * abs(blocks).max(initial=0.0)
+        moved = abs(change).max((2, 3)) > MIN_STIFFNESS_CHANGE * abs(blocks).max(initial=0.0)
         self._form(moved)
         columns = self._column.transpose(1, 2, 0, 3)[moved].reshape(-1, 6)
         self._active = np.unique(columns[columns >= 0])
@@ -52,19 +53,19 @@ class Touching:
 
     def _form(self, moved: Array) -> None:
         """Columns of Y for the places (k, q) that lack them, and their part of Y^T Y."""
-        lacking = moved[..., None] & self.factor.order.fold.mask & (self._column < 0)
+        lacking = moved[..., None] & self.factor.order.symmetry.mask & (self._column < 0)
         dofs = np.argwhere(lacking)
         if not len(dofs):
             return
         before = len(self._compliance)
         self._column[lacking] = before + np.arange(len(dofs))
         # two threads share the work the same way everywhere, so that the bits are the same too
-        some = np.array_split(dofs, min(len(dofs), 2 * -(-len(dofs) // (2 * AT_ONCE))))
+        some = np.array_split(dofs, min(len(dofs), 2 * -(-len(dofs) // (2 * COLUMNS_AT_ONCE))))
         pieces = list(self.factor.order.pool.map(self._columns, some))
-        new = [_beside(each) for each in zip(*pieces, strict=True)]
-        beside = [_products(block, new) for block in self._blocks]
+        new = [_side_by_side(each) for each in zip(*pieces, strict=True)]
+        earlier = [_products(block, new) for block in self._blocks]
         corner = _products(new, new)
-        across = np.concatenate([*beside, corner], 0)
+        across = np.concatenate([*earlier, corner], 0)
         self._compliance = np.block([[self._compliance, across[:before]], [across.T]])
         self._blocks.append(new)
 
@@ -91,7 +92,7 @@ class Touching:
         return self.factor.backward(y).reshape(right.shape)
 
 
-def _beside(pieces: Sequence[Array]) -> Array:
+def _side_by_side(pieces: Sequence[Array]) -> Array:
     """Columns of all; no rows stand for zeros."""
     rows = max(len(piece) for piece in pieces)
     whole = np.zeros((rows, sum(piece.shape[1] for piece in pieces)), np.float32)

@@ -15,10 +15,10 @@ from ..modes.lanczos import NotConverged
 
 Array = np.ndarray
 Operator = Callable[[Array], Array]
-TOLERANCE = 1e-9  # of an eigenvalue, relative
-LARGEST_BASIS = 8  # times the wanted pairs, before the basis is cut down to its best half
-LONGEST = 60  # blocks
-DEPENDENT = 1e-10  # of a direction's squared length, below which it is in the basis already
+EIGENVALUE_RTOL = 1e-9  # of an eigenvalue, relative
+MAX_BASIS_PER_MODE = 8  # times the wanted pairs, before the basis is cut down to its best half
+MAX_BLOCKS = 60
+MIN_LENGTH2 = 1e-10  # of a direction's squared length, below which it is in the basis already
 
 
 def lowest(
@@ -34,7 +34,7 @@ def lowest(
     block = _orthonormal(start, V, mass)
     if len(block) < count:
         raise NotConverged(f"{len(start)} fields to start from do not span {count} modes")
-    for _ in range(LONGEST):
+    for _ in range(MAX_BLOCKS):
         image = product(block)
         V, W = np.concatenate([V, block]), np.concatenate([W, image])
         column = V @ image.T
@@ -48,16 +48,16 @@ def lowest(
         step = inverse(residual)
         # the residual in the norm of K^-1, squared: the eigenvalue's error, relative
         error = np.einsum("cs,cs->c", residual, step) / lowest
-        if (error <= TOLERANCE).all():
+        if (error <= EIGENVALUE_RTOL).all():
             return lowest, x
-        if len(V) + count > LARGEST_BASIS * count:
-            best = turn[:, : LARGEST_BASIS * count // 2].T
+        if len(V) + count > MAX_BASIS_PER_MODE * count:
+            best = turn[:, : MAX_BASIS_PER_MODE * count // 2].T
             V, W, H = best @ V, best @ W, np.diag(values[: len(best)])
-        block = _orthonormal(step[error > TOLERANCE], V, mass)
+        block = _orthonormal(step[error > EIGENVALUE_RTOL], V, mass)
         if not len(block):
             break
     raise NotConverged(
-        f"{count} modes of the pressed tyre did not converge: {(error > TOLERANCE).sum()} are"
+        f"{count} modes of the pressed tyre did not converge: {(error > EIGENVALUE_RTOL).sum()} are"
         f" left, the worst off by {error.max():.1e}"
     )
 
@@ -72,6 +72,6 @@ def _orthonormal(block: Array, V: Array, mass: Operator) -> Array:
         gram = image @ block.T - overlap @ overlap.T
         block = block - overlap @ V
         values, turn = np.linalg.eigh((gram + gram.T) / 2)
-        keep = values > DEPENDENT
+        keep = values > MIN_LENGTH2
         block = (turn[:, keep] / np.sqrt(values[keep])).T @ block
     return block

@@ -31,16 +31,16 @@ from ..section.parts.pressure import Pressure
 from ..solid3d.circumference import half_circle
 from ..solid3d.revolved import Revolved
 from .contact import flat_road
-from .contact_newton import NotPressed, Press, Pressed
-from .half_turn_symmetry import HALF_TURN, Fold, NotSymmetric
+from .contact_newton import ContactNewton, NotPressed, PressedState
+from .half_turn_symmetry import HALF_TURN, HalfTurn, NotSymmetric
 from .loaded_modes import SPARE, loaded_modes
 from .patch import contact_area
 from .stick import held
 
 Array = np.ndarray
 log = logging.getLogger("tyrecal_solvers")
-ARRAYS = ("ring", "node", "along_m", "across_m", "pressure_Pa", "area_m2", "traction_Pa")
-SMALLEST_SLIP = 1e-6  # m, before friction is full: harder sticks are not reached
+PATCH_ARRAYS = ("ring", "node", "along_m", "across_m", "pressure_Pa", "area_m2", "traction_Pa")
+MIN_ELASTIC_SLIP = 1e-6  # m, before friction is full: harder sticks are not reached
 
 CAUSES: dict[type[Exception], str] = {
     NotPressed: "no_equilibrium",
@@ -48,7 +48,7 @@ CAUSES: dict[type[Exception], str] = {
     NotConverged: "crashed",
     np.linalg.LinAlgError: "crashed",
 }
-OF_MODES = ("mode_frequency_Hz", "mode_node", "mode_shape")
+MODE_ARRAYS = ("mode_frequency_Hz", "mode_node", "mode_shape")
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ class RoadData:
 
 
 @dataclass(frozen=True)
-class Vibrating:
+class ModesAtLoad:
     """Modes wanted at a load: of ``model``, how many, and at which nodes (rows) their shapes."""
 
     model: Model
@@ -93,11 +93,11 @@ def read_road(model: list[Keyword]) -> RoadData | None:
     stiffness = float(np.real(found["SURFACE BEHAVIOR"].only_row().number(0)))
     friction = float(np.real(found["FRICTION"].only_row().number(0)))
     slip = float(np.real(found["FRICTION"].number("ELASTIC SLIP") or 0.0))
-    if not (stiffness > 0 and friction >= 0 and slip >= SMALLEST_SLIP):
+    if not (stiffness > 0 and friction >= 0 and slip >= MIN_ELASTIC_SLIP):
         raise DeckError(
             found["FRICTION"].line,
             "the contact's stiffness must be positive, friction not negative, the elastic slip at"
-            f" least {SMALLEST_SLIP:g} m",
+            f" least {MIN_ELASTIC_SLIP:g} m",
         )
     return RoadData(
         bodies[0].need("REF NODE"), tread, stiffness, friction, slip, _half_lengths(model)
@@ -149,7 +149,7 @@ def press(
     wanted: list[float],
     check: Callable[[], None],
     give_up: type[Exception],
-    vibrations: Mapping[float, Vibrating] = MappingProxyType({}),
+    vibrations: Mapping[float, ModesAtLoad] = MappingProxyType({}),
 ) -> dict[str, Any]:
     """Footprints at the ``wanted`` loads (N) of a tyre inflated to ``U`` (n, 3), with modes where
     there are ``vibrations``.
@@ -170,8 +170,8 @@ def press(
     road = flat_road(model.mesh.X, tread, around, data.stiffness, data.friction, data.elastic_slip)
     tyre = Revolved(model, loads, around)
     try:
-        fold = Fold(model.mesh, equations.equation < equations.size, k)
-        work = Press(tyre, fold, road, np.repeat(U[None], k, 0), check)
+        symmetry = HalfTurn(model.mesh, equations.equation < equations.size, k)
+        work = ContactNewton(tyre, symmetry, road, np.repeat(U[None], k, 0), check)
     except NotSymmetric as error:
         raise DeckError(0, f"a pressed tyre must be symmetric: {error}") from None
     footprints: list[dict[str, Any]] = []
@@ -203,12 +203,12 @@ def press(
     }
 
 
-def _footprint(work: Press, found: Pressed, load: float, tread: Any) -> dict[str, Any]:
+def _footprint(work: ContactNewton, found: PressedState, load: float, tread: Any) -> dict[str, Any]:
     """One load's results on the whole tyre, whose other half is this one's half turn."""
-    fold, around = work.fold, work.tyre.around
-    U = fold.spread(found.parts)
+    symmetry, around = work.symmetry, work.tyre.around
+    U = symmetry.spread(found.parts)
     contact = found.contact
-    other = fold.other
+    other = symmetry.other
     turned = np.empty_like(U)
     turned[:, other] = U * HALF_TURN
     area = work.tyre.surface_shares(tread)[: len(contact.local), contact.road.nodes]
@@ -225,7 +225,7 @@ def _footprint(work: Press, found: Pressed, load: float, tread: Any) -> dict[str
     both = lambda a, sign=1.0: np.concatenate([a, sign * a[again]])
     size = both(share)
     residual = work.tyre.residual(U)
-    held = ~fold.free
+    held = ~symmetry.free
     c, s = np.cos(around.angles)[:, None], np.sin(around.angles)[:, None]
     at_rim = residual * held
     # the half turn cancels what the two halves bear along and across
@@ -249,24 +249,24 @@ def _footprint(work: Press, found: Pressed, load: float, tread: Any) -> dict[str
 
 
 def _modes(
-    work: Press,
-    found: Pressed,
-    wanted: Vibrating,
+    work: ContactNewton,
+    found: PressedState,
+    wanted: ModesAtLoad,
     tread: Lines,
     equations: Numbering,
     inflated: Array,
 ) -> dict[str, Array]:
     """The whole tyre's modes about one load, their shapes at the wanted nodes."""
     tyre = Revolved(wanted.model, work.tyre.loads, work.tyre.around)
-    U = work.fold.spread(found.parts)
+    U = work.symmetry.spread(found.parts)
     work.tyre.residual(U)
     area = work.tyre.surface_shares(tread)[: len(found.contact.local), work.road.nodes]
     hold = held(found.contact, area, tyre.around)
     vibration = Vibration(wanted.model, inflated, tyre.loads, equations, 0.0)
     start = lowest_of_all(vibration, 2 * (wanted.count + 2 * SPARE), work.check)
     work.rest()
-    modes = loaded_modes(tyre, work.fold.free, U, hold, start, wanted.count, work.check)
-    shapes, other = modes.shapes, work.fold.other
+    modes = loaded_modes(tyre, work.symmetry.free, U, hold, start, wanted.count, work.check)
+    shapes, other = modes.shapes, work.symmetry.other
     turned = modes.parity[:, None, None, None] * (HALF_TURN * shapes)[:, :, other]
     whole = np.concatenate([shapes, turned[:, 1:-1][:, ::-1]], 1)
     return {
@@ -291,7 +291,7 @@ def write(stem: Path, model: Model, result: dict[str, Any]) -> None:
         footprint = {**footprint, "node": numbers[footprint["node"]]}
         if "mode_node" in footprint:
             footprint["mode_node"] = numbers[footprint["mode_node"]]
-        for name in (*ARRAYS, "displacement", *OF_MODES):
+        for name in (*PATCH_ARRAYS, "displacement", *MODE_ARRAYS):
             if name in footprint:
                 arrays[f"{name}_{i}"] = footprint.pop(name)
         lines.append({**footprint, "rim_N": footprint["rim_N"].tolist()})
@@ -312,7 +312,7 @@ def read(stem: Path) -> dict[str, Any]:
             answer[name] = arrays[name]
         for i, footprint in enumerate(answer["footprints"]):
             footprint["rim_N"] = np.array(footprint["rim_N"])
-            for name in (*ARRAYS, "displacement", *OF_MODES):
+            for name in (*PATCH_ARRAYS, "displacement", *MODE_ARRAYS):
                 if f"{name}_{i}" in arrays:
                     footprint[name] = arrays[f"{name}_{i}"]
     del answer["format"]

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..section.mesh import Mesh
+from ..section.mesh import DeckMesh
 
 Array = np.ndarray
 MIRROR = np.array([1.0, 1.0, -1.0])
@@ -26,21 +26,21 @@ class NotSymmetric(ValueError):
     """The section is not its own mirror image."""
 
 
-def mirror_images(mesh: Mesh) -> Array:
+def mirror_images(mesh: DeckMesh) -> Array:
     """Each node's mirror image (n,) in the middle plane, -1 where there is none."""
     X = np.round(mesh.X.real / SAME_PLACE).astype(int)
     places = {(r, z): i for i, (r, z) in enumerate(X.tolist())}
     return np.array([places.get((r, -z), -1) for r, z in X.tolist()])
 
 
-class Fold:
+class HalfTurn:
     """Fields (k, n, 3) on half the circumference as parts (2, k, q, 3) on the nodes z >= 0.
 
     mesh; free (n, 3); angles k; parity p; ``other`` (n,): each node's mirror image.
     Raises NotSymmetric.
     """
 
-    def __init__(self, mesh: Mesh, free: Array, angles: int, parity: int = 1):
+    def __init__(self, mesh: DeckMesh, free: Array, angles: int, parity: int = 1):
         X = mesh.X.real
         other = mirror_images(mesh)
         if (other < 0).any() or (free != free[other]).any():

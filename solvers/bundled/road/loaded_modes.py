@@ -22,7 +22,7 @@ from ..solid3d.revolved import Revolved
 from . import davidson
 from .block_cholesky import Elimination, Factor
 from .contact import Contact
-from .half_turn_symmetry import HALF_TURN, Fold
+from .half_turn_symmetry import HALF_TURN, HalfTurn
 
 Array = np.ndarray
 SPARE = 3  # modes of each kind beyond half of the wanted ones
@@ -54,9 +54,11 @@ def loaded_modes(
     Raises Unstable, NotConverged; what ``check`` raises to stop.
     """
     tyre.residual(U)
-    folds = [Fold(tyre.model.mesh, free, len(U), parity) for parity in (1, -1)]
+    symmetries = [HalfTurn(tyre.model.mesh, free, len(U), parity) for parity in (1, -1)]
     wanted = [count // 2 + SPARE] * 2
-    kinds = [_one_parity(tyre, fold, hold, unloaded, wanted[0], check) for fold in folds]
+    kinds = [
+        _one_parity(tyre, symmetry, hold, unloaded, wanted[0], check) for symmetry in symmetries
+    ]
     while True:
         complete = min(values[-1] for values, _ in kinds)  # all below it have been found
         values = np.concatenate([each for each, _ in kinds])
@@ -65,15 +67,17 @@ def loaded_modes(
             break
         short = int(np.argmin([each[-1] for each, _ in kinds]))
         wanted[short] += SPARE
-        kinds[short] = _one_parity(tyre, folds[short], hold, unloaded, wanted[short], check)
-    parity = np.repeat([fold.parity for fold in folds], [len(each) for each, _ in kinds])
+        kinds[short] = _one_parity(tyre, symmetries[short], hold, unloaded, wanted[short], check)
+    parity = np.repeat(
+        [symmetry.parity for symmetry in symmetries], [len(each) for each, _ in kinds]
+    )
     shapes = np.concatenate([each for _, each in kinds])
     return LoadedModes(values[order], parity[order], shapes[order])
 
 
 def _one_parity(
     tyre: Revolved,
-    fold: Fold,
+    symmetry: HalfTurn,
     hold: Contact,
     unloaded: list[HarmonicModes],
     count: int,
@@ -81,11 +85,11 @@ def _one_parity(
 ) -> tuple[Array, Array]:
     """omega^2 (count,) and shapes (count, k, n, 3) of the modes that keep or reverse the turn."""
     tangents = tyre.tangents(np.float32)
-    shape = (2, fold.shape[0], len(fold.nodes), 3)
-    order = Elimination([t[0] for t in tangents], fold, tyre.around)
+    shape = (2, symmetry.shape[0], len(symmetry.nodes), 3)
+    order = Elimination([t[0] for t in tangents], symmetry, tyre.around)
     check()
     try:
-        factor = Factor(order, tangents, hold.stiffness(*fold.shape[:2], positive=True))
+        factor = Factor(order, tangents, hold.stiffness(*symmetry.shape[:2], positive=True))
     except Indefinite:
         raise Unstable("the pressed tyre is not stable: its stiffness is not positive") from None
     del tangents
@@ -94,19 +98,19 @@ def _one_parity(
     def each(image: Callable[[Array], Array]) -> davidson.Operator:
         def apply(block: Array) -> Array:
             check()
-            fields = (fold.spread(parts) for parts in block.reshape(-1, *shape))
-            return np.array([fold.gather(image(V)).ravel() for V in fields])
+            fields = (symmetry.spread(parts) for parts in block.reshape(-1, *shape))
+            return np.array([symmetry.gather(image(V)).ravel() for V in fields])
 
         return apply
 
     def inverse(block: Array) -> Array:
         return factor.solve(block.reshape(-1, *shape)).reshape(len(block), -1)
 
-    waves = standing_waves(unloaded, fold, tyre.around)
-    start = np.array([(fold.parts(V) * fold.mask).ravel() for V in waves])
+    waves = standing_waves(unloaded, symmetry, tyre.around)
+    start = np.array([(symmetry.parts(V) * symmetry.mask).ravel() for V in waves])
     stiffness = each(lambda V: tyre.product(V) + hold.product(V))
     values, x = davidson.lowest(stiffness, each(weigh), inverse, start, count)
-    shapes = [fold.spread(parts) for parts in x.reshape(-1, *shape)]
+    shapes = [symmetry.spread(parts) for parts in x.reshape(-1, *shape)]
     return values, np.array(shapes) / np.sqrt(2)  # the half tyre has half of the modal mass
 
 
@@ -124,7 +128,9 @@ class Inertia:
         return np.ascontiguousarray((self._section @ flat).reshape(n, k, 3).swapaxes(0, 1))
 
 
-def standing_waves(unloaded: list[HarmonicModes], fold: Fold, around: Circumference) -> list[Array]:
+def standing_waves(
+    unloaded: list[HarmonicModes], symmetry: HalfTurn, around: Circumference
+) -> list[Array]:
     """What the modes of the inflated tyre have of the fold's parity, fields (k, n, 3)."""
     waves = []
     for modes in unloaded:
@@ -133,8 +139,8 @@ def standing_waves(unloaded: list[HarmonicModes], fold: Fold, around: Circumfere
             for phase in (1.0, 1j) if modes.n else (1.0,):
                 ahead, behind = (phase * shape * turn).real, (phase * shape * turn.conj()).real
                 image = np.empty_like(behind)
-                image[:, fold.other] = HALF_TURN * behind
-                wave = ahead + fold.parity * image
+                image[:, symmetry.other] = HALF_TURN * behind
+                wave = ahead + symmetry.parity * image
                 if abs(wave).max() > 1e-6 * abs(ahead).max():
                     waves.append(wave)
     return waves

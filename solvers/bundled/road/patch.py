@@ -13,7 +13,8 @@ from ..solid3d.circumference import Circumference
 from .contact import Contact
 
 Array = np.ndarray
-OUTER = 4  # nodes that tell the edge: of quadratic elements, corners and middles share unevenly
+# nodes that tell the edge: of quadratic elements, corners and middles share unevenly
+EDGE_NODES = 4
 
 
 def contact_area(contact: Contact, shares: Array, around: Circumference) -> float:
@@ -40,7 +41,7 @@ def edge(x: Array, pressure: Array, last: int) -> float:
     """Where the pressure ends, beyond the node ``last`` and before the next one."""
     following = float(x[last + 1]) if last + 1 < len(x) else float(x[last])
     middle = (float(x[last]) + following) / 2
-    outer = slice(max(last + 1 - OUTER, 0), last + 1)
+    outer = slice(max(last + 1 - EDGE_NODES, 0), last + 1)
     if last == 0:
         return middle
     fall, level = np.polyfit(x[outer] ** 2, pressure[outer] ** 2, 1)

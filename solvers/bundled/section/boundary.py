@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..deck.keywords import DeckError, Row
-from ..deck.steps import Step
+from ..deck.keywords import DataLine, DeckError
+from ..deck.steps import DeckStep
 from .band import Numbering
-from .mesh import Mesh
+from .mesh import DeckMesh
 from .model import Model
 
 Array = np.ndarray
-SECTION = {1: 0, 2: 2, 5: 1}  # ABAQUS's r, z, twist to our components r, theta, z
-REVOLVED = {2: 2}  # the axle is the revolved model's second axis
-REVOLVED_ALL = {1: 0, 2: 1, 3: 2}
+SECTION_DOFS = {1: 0, 2: 2, 5: 1}  # ABAQUS's r, z, twist to our components r, theta, z
+REVOLVED_DOF = {2: 2}  # the axle is the revolved model's second axis
+REVOLVED_DOFS = {1: 0, 2: 1, 3: 2}
 
 
-def numbering(model: Model, step: Step) -> Numbering:
+def numbering(model: Model, step: DeckStep) -> Numbering:
     """Equations of the components that ``step`` leaves free, remembered with the mesh.
 
     Raises DeckError.
@@ -30,7 +30,7 @@ def numbering(model: Model, step: Step) -> Numbering:
     return mesh.numberings[key]
 
 
-def _free(mesh: Mesh, step: Step) -> Array:
+def _free(mesh: DeckMesh, step: DeckStep) -> Array:
     free = np.zeros((len(mesh.X), 3), bool)
     for block in mesh.blocks.values():
         free[block.connectivity] = True
@@ -55,7 +55,7 @@ def _free(mesh: Mesh, step: Step) -> Array:
     return free
 
 
-def rim_freedoms(mesh: Mesh, step: Step, reference: int) -> set[int]:
+def rim_freedoms(mesh: DeckMesh, step: DeckStep, reference: int) -> set[int]:
     """Those of the degrees of freedom 1 to 6 of a rim's reference node that are not held."""
     held: set[int] = set()
     for row in step.held:
@@ -65,21 +65,23 @@ def rim_freedoms(mesh: Mesh, step: Step, reference: int) -> set[int]:
     return set(range(1, 7)) - held
 
 
-def _names(mesh: Mesh, row: Row, reference: int) -> bool:
+def _names(mesh: DeckMesh, row: DataLine, reference: int) -> bool:
     name = row.text(0).upper()
     return name == str(reference) or mesh.node_sets.get(name) == [reference]
 
 
-def _range(row: Row) -> tuple[int, int]:
+def _range(row: DataLine) -> tuple[int, int]:
     first = row.integer(1)
     return first, row.integer(2) if row.text(2) else first
 
 
-def _components(row: Row, revolved: bool) -> list[int]:
+def _components(row: DataLine, revolved: bool) -> list[int]:
     first, last = _range(row)
     if row.text(3) and row.number(3) != 0.0:
         raise DeckError(row.line, "only zero displacements are honoured")
-    known = (REVOLVED_ALL if first == 1 and last >= 3 else REVOLVED) if revolved else SECTION
+    known = (
+        (REVOLVED_DOFS if first == 1 and last >= 3 else REVOLVED_DOF) if revolved else SECTION_DOFS
+    )
     chosen = [known[d] for d in range(first, last + 1) if d in known]
     if not chosen:
         raise DeckError(

@@ -11,20 +11,20 @@ import numpy as np
 from . import mechanics
 from .band import Cholesky, Indefinite, Numbering
 from .model import Model
-from .parts.part import Part
+from .parts.part import TyrePart
 from .parts.pressure import Pressure
 from .parts.spin import Spin
 
 Array = np.ndarray
-TOLERANCE = 1e-9  # out-of-balance force over pressure force; the next step is at round-off
-LOOSE = 1e-6  # accepted where round-off lets the force fall no further
-SMALLEST_STEP = 1 / 256
-LONGEST = 30  # iterations
-QUICK = 11  # iterations after which another path is likely to be shorter
-FIRM = 8.0  # multiple of the rubber's stiffness that inflates without trouble
+FORCE_RTOL = 1e-9  # out-of-balance force over pressure force; the next step is at round-off
+ROUND_OFF_RTOL = 1e-6  # accepted where round-off lets the force fall no further
+MIN_LOAD_STEP = 1 / 256
+MAX_ITERATIONS = 30
+MAX_QUICK_ITERATIONS = 11  # iterations after which another path is likely to be shorter
+STIFFENING = 8.0  # multiple of the rubber's stiffness that inflates without trouble
 SECTION_RADIUS = 0.3  # meridional radius of curvature over the section's height, for the start
-SLOWEST, FASTEST = 4e5, 4e15  # of the inertia that holds back a wrinkling path, rad2/s2
-RELEASE = 0.05  # factor on the artificial tension from one iteration to the next
+MIN_INERTIA, MAX_INERTIA = 4e5, 4e15  # of the inertia that holds back a wrinkling path, rad2/s2
+TENSION_FACTOR = 0.05  # factor on the artificial tension from one iteration to the next
 
 
 class InflationFailed(ArithmeticError):
@@ -38,7 +38,7 @@ class InflationFailed(ArithmeticError):
 
 
 @dataclass
-class State:
+class InflatedState:
     """An equilibrium: displacements U (n, 3), and what it cost."""
 
     U: Array
@@ -51,7 +51,7 @@ def equilibrium(
     loads: list[Pressure],
     start: Array,
     check: Callable[[], None] = lambda: None,
-) -> State:
+) -> InflatedState:
     """Equilibrium under ``loads``, reached from the displacements ``start``.
 
     The whole load is tried first. Where that takes long, because soft rubber between stiff cords
@@ -62,13 +62,13 @@ def equilibrium(
     Raises InflationFailed with the pressure that was reached.
     """
     solve = _Solver(model, numbering, loads)
-    U = solve(start, 1.0, 1.0, QUICK if loads else LONGEST)
+    U = solve(start, 1.0, 1.0, MAX_QUICK_ITERATIONS if loads else MAX_ITERATIONS)
     if U is None:
         check()
         U = _by_stiffness(solve, start, check)
     if U is None:
         U = _by_pressure(solve, start, check)
-    return State(U, solve.factorisations)
+    return InflatedState(U, solve.factorisations)
 
 
 class _Solver:
@@ -98,13 +98,13 @@ class _Solver:
 
 
 def _by_stiffness(solve: _Solver, start: Array, check: Callable[[], None]) -> Array | None:
-    """From rubber ``FIRM`` times as stiff down to its own stiffness, in adaptive factors."""
-    stiffness, factor = FIRM, FIRM
-    U = solve(start, 1.0, stiffness, LONGEST)
+    """From rubber ``STIFFENING`` times as stiff down to its own stiffness, in adaptive factors."""
+    stiffness, factor = STIFFENING, STIFFENING
+    U = solve(start, 1.0, stiffness, MAX_ITERATIONS)
     while U is not None and stiffness > 1.0:
         check()
         target = max(1.0, stiffness / factor)
-        softer = solve(U, 1.0, target, QUICK)
+        softer = solve(U, 1.0, target, MAX_QUICK_ITERATIONS)
         if softer is None:
             factor = factor**0.5
             if factor < 1.1:
@@ -120,10 +120,10 @@ def _by_pressure(solve: _Solver, start: Array, check: Callable[[], None]) -> Arr
     while reached < 1.0:
         check()
         target = min(1.0, reached + step)
-        further = solve(U, target, 1.0, LONGEST)
+        further = solve(U, target, 1.0, MAX_ITERATIONS)
         if further is None:
             step /= 2
-            if step < SMALLEST_STEP:
+            if step < MIN_LOAD_STEP:
                 raise InflationFailed(reached, solve.full, solve.why)
         else:
             U, reached = further, target
@@ -146,7 +146,7 @@ def _newton(
     smallest, used, inertia, before = 1e-3 * tension, 0, 0.0, float("inf")
     for _ in range(longest):
         size = float(np.linalg.norm(force))
-        if size <= TOLERANCE * scale or (size <= LOOSE * scale and size > 0.5 * before):
+        if size <= FORCE_RTOL * scale or (size <= ROUND_OFF_RTOL * scale and size > 0.5 * before):
             return U, used, ""
         before = size
         taut = model.with_laws(methodcaller("tautened", tension))
@@ -159,10 +159,10 @@ def _newton(
                 step = -Cholesky(held).solve(force)
                 break
             except Indefinite:  # it wrinkles on the way: hold it back by its inertia, 1 / dt^2
-                inertia = max(10 * inertia, SLOWEST)
-                if inertia > FASTEST:
+                inertia = max(10 * inertia, MIN_INERTIA)
+                if inertia > MAX_INERTIA:
                     return None, used, "the tangent stiffness is not positive definite"
-        inertia = inertia / 10 if inertia > SLOWEST else 0.0
+        inertia = inertia / 10 if inertia > MIN_INERTIA else 0.0
         slope = float(force @ step)
         field, length = numbering.spread(step), 1.0
         while True:
@@ -177,14 +177,14 @@ def _newton(
             if length < 1e-4:
                 return None, used, "the line search found no lower energy"
         U, energy = trial, lower
-        tension = tension * RELEASE if tension > smallest else 0.0
+        tension = tension * TENSION_FACTOR if tension > smallest else 0.0
     return None, used, f"Newton's method did not converge in {longest} iterations"
 
 
 def _load_force(model: Model, U: Array, loads: list[Pressure], numbering: Numbering) -> Array:
     """Force of the pressure alone, of at least 1 Pa, or of the spin where there is none: the scale
     of what counts as balanced."""
-    acting: list[Part] = [p for p in model.parts if isinstance(p, Spin)]
+    acting: list[TyrePart] = [p for p in model.parts if isinstance(p, Spin)]
     if loads:
         felt = [max(float(np.real(load.pressure)), 1.0) for load in loads]
         acting = [Pressure(each.lines, p) for each, p in zip(loads, felt, strict=True)]

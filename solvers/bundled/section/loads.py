@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 
 from ..deck.keywords import DeckError
-from ..deck.steps import Step
+from ..deck.steps import DeckStep
 from .model import Model
 from .parts.pressure import Pressure
 from .parts.spin import spinning
 
 
-def pressures(model: Model, step: Step) -> list[Pressure]:
+def pressures(model: Model, step: DeckStep) -> list[Pressure]:
     """The pressure on each surface. Raises DeckError."""
     for surface in step.pressures:
         if surface not in model.mesh.faces:
@@ -21,7 +21,7 @@ def pressures(model: Model, step: Step) -> list[Pressure]:
     return [Pressure(model.mesh.faces[s], value) for s, value in step.pressures.items()]
 
 
-def turning(model: Model, step: Step) -> Model:
+def turning(model: Model, step: DeckStep) -> Model:
     """The model with the centrifugal load of a step. Raises DeckError."""
     spin2 = _uniform(model, step, step.centrifugal, "CENTRIF")
     if not spin2:
@@ -29,12 +29,12 @@ def turning(model: Model, step: Step) -> Model:
     return replace(model, parts=model.parts + spinning(model.parts, model.mesh.X, spin2))
 
 
-def spin(model: Model, step: Step) -> complex | float:
+def spin(model: Model, step: DeckStep) -> complex | float:
     """Omega, rad/s, of the step's Coriolis load, 0 where there is none. Raises DeckError."""
     return _uniform(model, step, step.spin, "ROTDYNF")
 
 
-def agreed_spin(model: Model, step: Step) -> float:
+def agreed_spin(model: Model, step: DeckStep) -> float:
     """Omega, rad/s, on which the step's loads agree. Raises DeckError."""
     line, omega = step.procedure.line, float(np.real(spin(model, step)))
     spin2 = float(np.real(_uniform(model, step, step.centrifugal, "CENTRIF")))
@@ -46,7 +46,7 @@ def agreed_spin(model: Model, step: Step) -> float:
 
 
 def _uniform(
-    model: Model, step: Step, sets: dict[str, complex | float], load: str
+    model: Model, step: DeckStep, sets: dict[str, complex | float], load: str
 ) -> complex | float:
     """The magnitude of a load that all of the tyre bears, 0 where there is none."""
     if not sets:

@@ -13,23 +13,23 @@ from scipy.sparse import csr_array
 
 from .band import Numbering
 from .model import Model
-from .parts.part import Part
+from .parts.part import TyrePart
 
 Array = np.ndarray
 OfElements = list[tuple[Array, Array]]  # connectivities with vectors or matrices of elements
 
 
-def potential(model: Model, U: Array, loads: Sequence[Part]) -> Any:
+def potential(model: Model, U: Array, loads: Sequence[TyrePart]) -> Any:
     """Strain energy less the work of the loads, J per radian."""
     return sum(part.energy(U) for part in (*model.parts, *loads))
 
 
-def residual(model: Model, U: Array, loads: Sequence[Part], numbering: Numbering) -> Array:
+def residual(model: Model, U: Array, loads: Sequence[TyrePart], numbering: Numbering) -> Array:
     """Out-of-balance force (size,), N per radian: gradient of the potential."""
     return numbering.vector(_forces(model, U, loads))
 
 
-def gradient(model: Model, U: Array, loads: Sequence[Part]) -> Array:
+def gradient(model: Model, U: Array, loads: Sequence[TyrePart]) -> Array:
     """Gradient of the potential by every component (n, 3), those that are held among them."""
     parts = _forces(model, U, loads)
     total = np.zeros(U.shape, np.result_type(*(v for _, v in parts)))
@@ -38,12 +38,12 @@ def gradient(model: Model, U: Array, loads: Sequence[Part]) -> Array:
     return total
 
 
-def _forces(model: Model, U: Array, loads: Sequence[Part]) -> OfElements:
+def _forces(model: Model, U: Array, loads: Sequence[TyrePart]) -> OfElements:
     return [(part.connectivity, part.force(U)) for part in (*model.parts, *loads)]
 
 
 def tangents(
-    model: Model, U: Array, loads: Sequence[Part], harmonics: bool
+    model: Model, U: Array, loads: Sequence[TyrePart], harmonics: bool
 ) -> tuple[OfElements, OfElements, OfElements]:
     """Element matrices of K(n) = K0 + i n K1 + n^2 K2.
 

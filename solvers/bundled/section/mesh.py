@@ -17,7 +17,7 @@ NODES = {"CGAX8R": 8, "CGAX8": 8, "CGAX4R": 4, "SFMGAX2": 3, "SFMGAX1": 2}
 
 
 @dataclass
-class Mesh:
+class DeckMesh:
     """Nodes, elements, sets and operators: all that the materials do not touch.
 
     X (n, 2) in m; ``index``: node number to row; ``blocks``: element type to operators;
@@ -35,11 +35,11 @@ class Mesh:
     numberings: dict[bytes, Numbering] = field(default_factory=dict)
 
 
-_MESHES: OrderedDict[tuple[object, ...], Mesh] = OrderedDict()
+_MESHES: OrderedDict[tuple[object, ...], DeckMesh] = OrderedDict()
 _TOPOLOGY = {"NODE", "ELEMENT", "NSET", "ELSET", "SURFACE", "RIGID BODY"}
 
 
-def read_mesh(keywords: list[Keyword]) -> Mesh:
+def read_mesh(keywords: list[Keyword]) -> DeckMesh:
     """The mesh of a section job, remembered while its blocks stay the same. Raises DeckError."""
     topology = [k for k in keywords if k.name in _TOPOLOGY]
     if any(k.tangents for k in topology):
@@ -53,7 +53,7 @@ def read_mesh(keywords: list[Keyword]) -> Mesh:
     return mesh
 
 
-def _mesh(keywords: list[Keyword]) -> Mesh:
+def _mesh(keywords: list[Keyword]) -> DeckMesh:
     index: dict[int, int] = {}
     coordinates: list[tuple[complex | float, complex | float]] = []
     node_sets: dict[str, list[int]] = {}
@@ -106,7 +106,7 @@ def _mesh(keywords: list[Keyword]) -> Mesh:
             if reference not in index or tied not in node_sets:
                 raise DeckError(k.line, f"node {reference} or node set {tied} is not defined")
             bodies[reference] = node_sets[tied]
-    return Mesh(X, index, blocks, place, node_sets, element_sets, faces, bodies)
+    return DeckMesh(X, index, blocks, place, node_sets, element_sets, faces, bodies)
 
 
 def _elements(

@@ -7,11 +7,11 @@ from dataclasses import dataclass, field, replace
 
 from ..deck.keywords import Keyword
 from .materials import ModulusTable, read_materials
-from .mesh import Mesh, read_mesh
+from .mesh import DeckMesh, read_mesh
 from .parts import cords, rubber
 from .parts.elastic import Elastic
-from .parts.law import Law
-from .parts.part import Part
+from .parts.law import EnergyLaw
+from .parts.part import TyrePart
 from .parts.section_job import SectionJob
 
 READERS = (rubber.read, cords.read)
@@ -21,11 +21,11 @@ READERS = (rubber.read, cords.read)
 class Model:
     """The tyre's section, ready for mechanics."""
 
-    mesh: Mesh
-    parts: list[Part]
+    mesh: DeckMesh
+    parts: list[TyrePart]
     tables: list[ModulusTable] = field(default_factory=list)  # moduli at each mode's own frequency
 
-    def with_laws(self, change: Callable[[Law], Law]) -> Model:
+    def with_laws(self, change: Callable[[EnergyLaw], EnergyLaw]) -> Model:
         """The same with changed laws."""
         parts = [replace(p, law=change(p.law)) if isinstance(p, Elastic) else p for p in self.parts]
         return replace(self, parts=parts)

@@ -12,24 +12,23 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..deck.keywords import STEP, DeckError, Keyword
-from .mesh import Mesh
+from ..deck.keywords import COMPLEX_STEP, DeckError, Keyword
+from .mesh import DeckMesh
 
 Array = np.ndarray
-AXES = {1: 0, 2: 2, 3: 1}  # of the revolved model at Theta = 0: radial, axial, tangential
+# of the revolved model at Theta = 0: radial, axial, tangential
+COMPONENT_OF_AXIS = {1: 0, 2: 2, 3: 1}
 
 
 @dataclass(frozen=True)
-class Attached:
-    """Displacement components that carry something: rows (d,) of the mesh's nodes, components
-    (d,) 0, 1, 2 of r, theta, z; mass (d,) in kg, stiffness (d,) in N/m, complex by ``STEP`` times
-    a tangent; sectors of the mesh."""
+class PointElements:
+    """Displacement components d that carry something, their numbers with a variable's tangent."""
 
-    rows: Array
-    components: Array
-    mass: Array
-    stiffness: Array
-    sectors: int
+    rows: Array  # (d,) of the mesh's nodes
+    components: Array  # (d,): 0, 1, 2 of r, theta, z
+    mass: Array  # (d,), kg
+    stiffness: Array  # (d,), N/m
+    sectors: int  # of the mesh
 
     def __bool__(self) -> bool:
         return bool(self.mass.any() or self.stiffness.any())
@@ -37,7 +36,7 @@ class Attached:
     def rates(self, eigenvalues: Array, at: Array) -> Array:
         """sum of (k' - lambda m') p^2 per mode (m,), ' by what the numbers' tangent is of;
         at (d, m): p of each component and mode."""
-        k, m = np.imag(self.stiffness) / STEP, np.imag(self.mass) / STEP
+        k, m = np.imag(self.stiffness) / COMPLEX_STEP, np.imag(self.mass) / COMPLEX_STEP
         return np.asarray(k @ at**2 - eigenvalues * (m @ at**2))
 
     @property
@@ -55,7 +54,7 @@ class Attached:
         return float(np.sinc(n / self.sectors))
 
 
-def read_attached(revolve: list[Keyword], mesh: Mesh) -> Attached:
+def read_point_elements(revolve: list[Keyword], mesh: DeckMesh) -> PointElements:
     """The *MASS and *SPRING elements of a revolve job. Raises DeckError."""
     nodes: dict[str, tuple[str, list[int]]] = {}
     rims: set[str] = set()  # element sets on a rim's reference node are `wheel`'s
@@ -76,16 +75,16 @@ def read_attached(revolve: list[Keyword], mesh: Mesh) -> Attached:
             value = _positive(k, 0 if k.name == "MASS" else 1)
             if k.name == "MASS":
                 mass[members] += value
-            elif (axis := k.rows[0].integer(0)) in AXES:
-                stiffness[members, AXES[axis]] += value
+            elif (axis := k.rows[0].integer(0)) in COMPONENT_OF_AXIS:
+                stiffness[members, COMPONENT_OF_AXIS[axis]] += value
             else:
                 raise DeckError(k.line, f"a spring acts along 1, 2 or 3, got {axis}")
     rows, components = np.nonzero(mass.real + stiffness.real)
     pick = rows, components
-    return Attached(rows, components, mass[pick], stiffness[pick], _sectors(revolve))
+    return PointElements(rows, components, mass[pick], stiffness[pick], _sectors(revolve))
 
 
-def _row(number: int, line: int, mesh: Mesh) -> int:
+def _row(number: int, line: int, mesh: DeckMesh) -> int:
     if number not in mesh.index or number in mesh.reference_nodes:
         raise DeckError(line, f"node {number} is no node of the tyre's section")
     return mesh.index[number]

@@ -15,7 +15,7 @@ import numpy as np
 from ..section.elements import Lines
 from ..section.model import Model
 from ..section.parts.frame import SPIN, cross
-from ..section.parts.part import Part, Precision
+from ..section.parts.part import Precision, TyrePart
 from ..section.parts.pressure import Pressure
 from .circumference import Circumference
 
@@ -26,7 +26,7 @@ Tangents = tuple[Array, Array, Array, Array]
 class Revolved:
     """Mechanics about the last state that `residual` was given."""
 
-    def __init__(self, model: Model, loads: Sequence[Part], around: Circumference):
+    def __init__(self, model: Model, loads: Sequence[TyrePart], around: Circumference):
         self.model, self.loads, self.around = model, loads, around
         nodes = len(model.mesh.X)
         self._parts = [part.at_stations(nodes) for part in (*model.parts, *loads)]

@@ -13,19 +13,19 @@ from typing import Self
 
 import numpy as np
 
-from ...deck.keywords import DeckError, Keyword, Row
+from ...deck.keywords import DataLine, DeckError, Keyword
 from ..elements import Lines
 from .elastic import Elastic, Rows, on_diagonals
-from .law import Law
-from .part import Part, consistent_mass
+from .law import EnergyLaw
+from .part import TyrePart, consistent_mass
 from .section_job import SectionJob
 
 Array = np.ndarray
-SURFACES = ("SFMGAX1", "SFMGAX2")
+SURFACE_ELEMENTS = ("SFMGAX1", "SFMGAX2")
 
 
 @dataclass(frozen=True)
-class LogarithmicCord(Law):
+class LogarithmicCord(EnergyLaw):
     """Constants per Gauss point."""
 
     stiffness: Array  # E A / s, N/m
@@ -70,7 +70,7 @@ def cord_rows(lines: Lines, cos: Array | float, sin: Array | float) -> Rows:
     return Rows(B0, hoop, slice(0, 3), direction, lines.weights * lines.R)
 
 
-def read(job: SectionJob) -> list[Part]:
+def read(job: SectionJob) -> list[TyrePart]:
     """The cords of each element type, of all its rebar layers. Raises DeckError."""
     layers: dict[str, list[_Layer]] = {}
     surface: Keyword | None = None
@@ -80,7 +80,7 @@ def read(job: SectionJob) -> list[Part]:
         elif k.name == "REBAR LAYER":
             if surface is None:
                 raise DeckError(k.line, "*REBAR LAYER must follow a *SURFACE SECTION")
-            for kind, rows in job.by_type(surface, SURFACES).items():
+            for kind, rows in job.by_type(surface, SURFACE_ELEMENTS).items():
                 block = job.mesh.blocks[kind]
                 assert isinstance(block, Lines)
                 own = layers.setdefault(kind, [])
@@ -96,7 +96,7 @@ class _Layer:
     mass: Array  # A rho / s (e, g), kg/m2
 
 
-def _layer(job: SectionJob, k: Keyword, row: Row, lines: Lines) -> _Layer:
+def _layer(job: SectionJob, k: Keyword, row: DataLine, lines: Lines) -> _Layer:
     """Data line: name, area, spacing, position, material, angle from the meridian (degrees)."""
     area, spacing = row.number(1), row.number(2)
     material = job.material(k, row.text(4).upper())

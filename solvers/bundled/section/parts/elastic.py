@@ -16,9 +16,9 @@ from typing import Any
 
 import numpy as np
 
-from .fields import Fields, contract
-from .law import Inverted, Law
-from .part import AtStations, Part, Precision, Tangents
+from .law import EnergyLaw, Inverted
+from .mode_shapes import ModeShapes, contract
+from .part import AtStations, Precision, Tangents, TyrePart
 
 Array = np.ndarray
 
@@ -49,12 +49,12 @@ def on_diagonals(values: Array) -> Array:
 
 
 @dataclass(frozen=True)
-class Elastic(Part):
+class Elastic(TyrePart):
     """Elements of one kind with their rows, their law and their mass."""
 
     connectivity: Array
     rows: Rows
-    law: Law
+    law: EnergyLaw
     mass: Array | None = None
 
     def at(self, U: Array) -> Array:
@@ -91,10 +91,10 @@ class Elastic(Part):
         A = self.law.tangent(self.at(U), self.rows.weights.ravel())
         return A.reshape(e, g, k, k)
 
-    def form(self, U: Array, fields: Fields) -> Array:
+    def form(self, U: Array, fields: ModeShapes) -> Array:
         return contract(self._tangent(U), fields.products(self.connectivity, self.rows))
 
-    def growing(self, table: int) -> Part | None:
+    def growing(self, table: int) -> TyrePart | None:
         law = self.law.growing(table)
         return None if law is None else replace(self, law=law)
 

@@ -11,14 +11,14 @@ import numpy as np
 
 from ..elements import Solids
 from .elastic import Elastic, Rows, on_diagonals
-from .law import Law
+from .law import EnergyLaw
 
 Array = np.ndarray
 SHARE_OF_SHEAR_MODULUS = 0.005
 
 
 @dataclass(frozen=True)
-class Hourglass(Law):
+class Hourglass(EnergyLaw):
     """Springs between the nodes of an element."""
 
     stiffness: Array  # (e,), Pa

@@ -23,7 +23,7 @@ class Inverted(ArithmeticError):
 
 
 @dataclass(frozen=True)
-class Law(ABC):
+class EnergyLaw(ABC):
     """W per unit of the rows' integration weight."""
 
     # the tangent takes the weights in while it is formed, a pass over 81 numbers a point less

@@ -12,14 +12,14 @@ from typing import Any
 import numpy as np
 from scipy.sparse import csr_matrix
 
-from .fields import Fields
+from .mode_shapes import ModeShapes
 
 Array = np.ndarray
 Precision = type[np.floating[Any]]
 Tangents = tuple[Array, Array | None, Array | None]
 
 
-class Part(ABC):
+class TyrePart(ABC):
     """Rubber, cords, a pressure, ...; a new one is a subclass, or an `elastic.Elastic`."""
 
     connectivity: Array  # (e, a): nodes of each element
@@ -42,11 +42,11 @@ class Part(ABC):
     def at_stations(self, nodes: int) -> AtStations:
         """The part in three dimensions, in a section of so many nodes."""
 
-    def growing(self, table: int) -> Part | None:
+    def growing(self, table: int) -> TyrePart | None:
         """What grows of its stiffness with the modulus table of that place; None: nothing."""
         return None
 
-    def form(self, U: Array, fields: Fields) -> Array:
+    def form(self, U: Array, fields: ModeShapes) -> Array:
         """phi^H K phi (m,) of the modes phi. K0 and K2 are symmetric, K1 antisymmetric, so that
         (a - i b)^T K(n) (a + i b) = (K0 + n^2 K2) : (a a^T + b b^T) + K1 : n (b a^T - a b^T)."""
         K0, K1, K2 = self.tangents(U, True)

@@ -17,13 +17,13 @@ import numpy as np
 
 from ..elements import Lines
 from .frame import IN_PLANE, SPIN, cross
-from .part import AtStations, Part, Precision, Tangents
+from .part import AtStations, Precision, Tangents, TyrePart
 
 Array = np.ndarray
 
 
 @dataclass
-class Pressure(Part):
+class Pressure(TyrePart):
     """A pressure (Pa) on the faces of a surface."""
 
     lines: Lines

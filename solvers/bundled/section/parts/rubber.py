@@ -19,8 +19,8 @@ from ..materials import Material
 from ..mesh import POINTS
 from . import hourglass
 from .elastic import Elastic, Rows
-from .law import Law
-from .part import Part, consistent_mass
+from .law import EnergyLaw
+from .part import TyrePart, consistent_mass
 from .section_job import SectionJob
 
 Array = np.ndarray
@@ -28,7 +28,7 @@ MIN_VOLUME_RATIO = 0.2  # over the reference volume: nearly incompressible rubbe
 
 
 @dataclass(frozen=True)
-class MooneyRivlin(Law):
+class MooneyRivlin(EnergyLaw):
     """Constants per Gauss point, or one for all."""
 
     weighted_tangent: ClassVar[bool] = True
@@ -191,9 +191,9 @@ class _Section:
     hourglass: complex | float | None  # Pa; None = by default
 
 
-def read(job: SectionJob) -> list[Part]:
+def read(job: SectionJob) -> list[TyrePart]:
     """The rubber of each element type, and its hourglass control. Raises DeckError."""
-    parts: list[Part] = []
+    parts: list[TyrePart] = []
     sections: dict[str, list[_Section]] = {}
     for kind, section in _sections(job):
         sections.setdefault(kind, []).append(section)
@@ -228,7 +228,7 @@ def _sections(job: SectionJob) -> Iterator[tuple[str, _Section]]:
             )
 
 
-def _rubber(job: SectionJob, kind: str, sections: list[_Section]) -> list[Part]:
+def _rubber(job: SectionJob, kind: str, sections: list[_Section]) -> list[TyrePart]:
     solids = job.mesh.blocks[kind]
     assert isinstance(solids, Solids)
     e, g = solids.weights.shape

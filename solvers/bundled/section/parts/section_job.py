@@ -9,7 +9,7 @@ import numpy as np
 
 from ...deck.keywords import DeckError, Keyword
 from ..materials import Material, ModulusTable
-from ..mesh import Mesh
+from ..mesh import DeckMesh
 
 Array = np.ndarray
 
@@ -19,7 +19,7 @@ class SectionJob:
     """A job's model, and the moduli that its rubber is to have."""
 
     keywords: list[Keyword]
-    mesh: Mesh
+    mesh: DeckMesh
     materials: dict[str, Material]
     tables: list[ModulusTable]  # whose rubber keeps its static modulus: the table is the model's
     dynamic_Hz: float | None  # at which the vibration's modulus is evaluated; None = static

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 
 from .frame import IN_PLANE
-from .part import AtStations, Part, Tangents
+from .part import AtStations, Tangents, TyrePart
 
 Array = np.ndarray
 
 
 @dataclass(frozen=True)
-class Spin(Part):
+class Spin(TyrePart):
     """The force on the mass of one other part."""
 
     connectivity: Array
@@ -45,7 +45,7 @@ class Spin(Part):
         raise NotImplementedError("a turning tyre is honoured off the road and all round alike")
 
 
-def spinning(parts: list[Part], X: Array, spin2: complex | float) -> list[Part]:
+def spinning(parts: list[TyrePart], X: Array, spin2: complex | float) -> list[TyrePart]:
     """The centrifugal forces of parts that have mass; X (n, 2): R, Z of all nodes."""
     massive = [(p.connectivity, p.mass) for p in parts if p.mass is not None]
     return [Spin(c, mass, X[c, 0], spin2) for c, mass in massive]

@@ -26,7 +26,7 @@ class Operators(Protocol):
         """The three of the k rows that B1 has."""
 
 
-class Fields:
+class ModeShapes:
     """Modes as sums of shapes a + i b of harmonics n.
 
     modes: per mode n (p,), a and b (p, nodes, 3) of the p shapes that it is the sum of.
@@ -45,7 +45,7 @@ class Fields:
         self.modes = [(self.n[mine], real[mine], imag[mine]) for mine in own]
         self.known: list[tuple[Operators, Array]] = []
 
-    def replaced(self, real: Array, imag: Array) -> Fields:
+    def replaced(self, real: Array, imag: Array) -> ModeShapes:
         """The same sums of other shapes."""
         other = copy.copy(self)
         other._set(real, imag)
