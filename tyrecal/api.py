@@ -19,12 +19,14 @@ from math import inf
 from pathlib import Path
 from typing import Any
 
-from .case import CaseError, LoadedCase, overridden, start_values, unusual_value, with_level
-from .case import load_case as _load_case
-from .case import with_values as _with_values
+from .case import CaseError, LoadedCase, start_values, with_level
+from .deck.tyre_design import TyreDesign
+from .design import load_case as _load_case
+from .design import overridden, unusual_value
+from .design import with_values as _with_values
 from .diagnose.diagnosis import Diagnosis
 from .effects import Effect, catalogue
-from .evaluate.door import Door, Question
+from .evaluate.evaluator import Evaluator, Question
 from .evaluate.failure import EvaluationFailed
 from .evaluate.pressed import Pressed
 from .evaluate.store import Store
@@ -108,7 +110,7 @@ def evaluate_modes(
     >>> f"{modes[0].label} {modes[0].frequency_Hz:.1f} Hz"
     '[0,0] axial 37.3 Hz'
     """
-    answer = _door(case, solver, record).evaluate(Question(_values(case, values)))
+    answer = _evaluator(case, solver, record).evaluate(Question(_values(case, values)))
     return sorted(paired_labels(answer.modes), key=lambda mode: mode.frequency_Hz)
 
 
@@ -137,9 +139,9 @@ def fit_case(
     if starts < 1:
         raise ValueError(f"starts must be at least 1, got {starts}")
     _values(case, fixed)
-    door = _door(case, solver, record)
-    fit = calibrate(case, door, method, fixed, starts, seed, jobs)
-    of = provenance(case, door.solver, load_N=case.case.targets.loads_N or 0.0)
+    evaluator = _evaluator(case, solver, record)
+    fit = calibrate(case, evaluator, method, fixed, starts, seed, jobs)
+    of = provenance(case, evaluator.solver, load_N=case.case.targets.loads_N or 0.0)
     fit.result = stamped(fit.result, of)
     return fit
 
@@ -170,9 +172,9 @@ def sweep_pressure(
     for pressure in pressures_kPa:
         _with_values(case, {**design, pressure_name(case): pressure})
         _refuse_unusual(case, "pressures_kPa", pressure_name(case), pressure, allow_unusual)
-    door = _door(case, solver, record)
+    evaluator = _evaluator(case, solver, record)
     states = []
-    for outcome in sweep(door, {"": design}, list(pressures_kPa), jobs):
+    for outcome in sweep(case, evaluator, {"": design}, list(pressures_kPa), jobs):
         if isinstance(outcome, Failure):
             raise outcome.failed
         states.append(outcome)
@@ -197,7 +199,6 @@ def evaluate_footprint(
     >>> f"{1e4 * at_1_kN['area_m2']:.0f} cm2, {1e3 * at_1_kN['deflection_m']:.1f} mm"
     '37 cm2, 5.3 mm'
     """
-    from .deck.context import section_mesh
     from .studies.footprint import footprint_row
 
     design = _values(case, values)
@@ -206,10 +207,10 @@ def evaluate_footprint(
         raise ValueError(f"loads_N must be above 0 and rise, got {list(loads_N)}")
     for load in loads_N:
         _refuse_unusual(case, "loads_N", "road.loads_N.0", load, allow_unusual)
-    found: Pressed = _door(case, solver, record).press(design, list(loads_N))
+    found: Pressed = _evaluator(case, solver, record).press(design, list(loads_N))
     if found.failed:
         raise found.failed
-    mesh = section_mesh(_with_values(case, design))
+    mesh = TyreDesign(case, design).tyre.mesh
     return [footprint_row(found, footprint, mesh) for footprint in found.footprints]
 
 
@@ -237,8 +238,8 @@ def diagnose_case(
     from .diagnose.study import study
 
     others = [Path(path) for path in repeats]
-    door = _door(case, solver, record)
-    return study(case, door, Path(measured), others, jobs=jobs, effects=effects).diagnosis
+    evaluator = _evaluator(case, solver, record)
+    return study(case, evaluator, Path(measured), others, jobs=jobs, effects=effects).diagnosis
 
 
 def list_effects() -> dict[str, Effect]:
@@ -286,5 +287,7 @@ def _refuse_unusual(
         raise ValueError(f"{what} is {value:g}: {message}")
 
 
-def _door(case: LoadedCase, solver: str, record: Path | str | None) -> Door:
-    return Door(case, solver, store=Store(Path(record).resolve()) if record else None)
+def _evaluator(case: LoadedCase, solver: str, record: Path | str | None) -> Evaluator:
+    return Evaluator(
+        TyreDesign(case), solver, store=Store(Path(record).resolve()) if record else None
+    )

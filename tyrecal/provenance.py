@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from .case import LoadedCase
 from .case.identity import tyre_sha256
-from .effects import with_effects
+from .design import resolved
 
 if TYPE_CHECKING:
     from .evaluate.solver import Solver
@@ -74,7 +74,7 @@ def measured_sha256(files: Sequence[Path]) -> str:
 
 def _rim(case: LoadedCase) -> str:
     """How the rim is held while the tyre vibrates."""
-    rim = with_effects(case).case.rim
+    rim = resolved(case).case.rim
     return "free" if rim.free else "spindle" if rim.spindle.gives_way else "fixed"
 
 

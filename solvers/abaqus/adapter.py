@@ -1,9 +1,10 @@
-"""ABAQUS behind the tool's door: write, run, read. Imports nothing of the tool."""
+"""ABAQUS behind the tool's evaluator: write, run, read. Imports nothing of the tool."""
 
 from __future__ import annotations
 
 import re
 import subprocess
+from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Protocol
@@ -23,9 +24,9 @@ JOB, OLDJOB = "modes", "inflate"
 
 
 class Decks(Protocol):
-    """What the tool hands over; of ``case``, ``case.case.solver.options`` is read."""
+    """What the tool hands over; ``options``: the solver's, from the case."""
 
-    case: Any
+    options: Mapping[str, Any]
 
     def texts(self, dialect: str) -> dict[str, str]:
         """File name to text."""
@@ -65,7 +66,7 @@ class Abaqus:
     def write(self, decks: Decks, folder: Path) -> list[Path]:
         """Write the decks and, beside them, the case's options. Raises ``refusals``."""
         program = self.command if self.version == "unknown" else []
-        paths = [read_options(decks.case.case.solver.options).save(folder, program)]
+        paths = [read_options(decks.options).save(folder, program)]
         for name, text in decks.texts(self.dialect).items():
             paths.append(folder / name)
             paths[-1].write_text(text, encoding="utf-8", newline="")

@@ -1,4 +1,4 @@
-"""The bundled solver behind the tool's door: write, run, read. Imports nothing of the tool."""
+"""The bundled solver behind the tool's evaluator: write, run, read. Imports nothing of the tool."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""CalculiX behind the tool's door: write, run, read. Imports nothing of the tool."""
+"""CalculiX behind the tool's evaluator: write, run, read. Imports nothing of the tool."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import re
 import shutil
 import subprocess
 import time
+from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
 from pathlib import Path
@@ -30,9 +31,9 @@ class Refused(ValueError):
 
 
 class Decks(Protocol):
-    """What the tool hands over; of ``case``, options and the vibration frequency are read."""
+    """What the tool hands over; ``options``: the solver's, from the case."""
 
-    case: Any
+    options: Mapping[str, Any]
 
     def texts(self, dialect: str) -> dict[str, str]:
         """File name to text."""
@@ -63,7 +64,7 @@ class CalculiX:
 
     def write(self, decks: Decks, folder: Path) -> list[Path]:
         """Write the decks and, beside them, how to run them. Raises Refused."""
-        settings = _settings(decks.case.case)
+        settings = _settings(decks.options)
         if self.version == "unknown":  # else the version tells this program's answers from others'
             settings["command"] = self.command
         paths = []
@@ -233,16 +234,10 @@ def _find(pattern: str, path: Path) -> str:
     return found[1]
 
 
-def _settings(case: Any) -> dict[str, Any]:
-    given = case.solver.options
+def _settings(given: Mapping[str, Any]) -> dict[str, Any]:
     unknown = [name for name in given if name not in OPTIONS]
     if unknown:
         raise Refused(f"solver.options: calculix has no '{unknown[0]}', only {', '.join(OPTIONS)}")
-    if case.analysis.vibration_frequency_Hz is not None:
-        raise Refused(
-            "analysis.vibration_frequency_Hz must be null: CalculiX cannot evaluate hyperelastic"
-            " rubber at a frequency"
-        )
     settings = {**OPTIONS, **given}
     if type(settings["parallel"]) is not int or settings["parallel"] < 1:
         raise Refused(f"solver.options.parallel is '{settings['parallel']}', must be 1 or more")

@@ -19,9 +19,12 @@ from tempfile import TemporaryDirectory
 import click
 import numpy as np
 
-from tyrecal.case import LoadedCase, load_case, start_values
+from tyrecal.case import LoadedCase, start_values
+from tyrecal.deck.decks import Design
+from tyrecal.deck.tyre_design import TyreDesign
+from tyrecal.design import load_case
 from tyrecal.diagnose.study import study
-from tyrecal.evaluate.door import Door, Question
+from tyrecal.evaluate.evaluator import Evaluator, Question
 from tyrecal.evaluate.results import Evaluation
 from tyrecal.modes.label import paired_labels
 
@@ -29,16 +32,16 @@ CASE = Path(__file__).parents[2] / "cases" / "p235_75r17.yaml"
 PRESSURES_kPa, EFFECT, SIZE, SCATTER = (160.0, 240.0, 320.0), "bead_filler", 0.5, 0.002
 
 
-class Watched(Door):
-    """A door that notes how often what was asked in this process, and for how long."""
+class Watched(Evaluator):
+    """An evaluator that notes how often what was asked in this process, and for how long."""
 
-    def __init__(self, case: LoadedCase, solver_name: str = "") -> None:
-        super().__init__(case, solver_name)
+    def __init__(self, design: Design, solver_name: str = "") -> None:
+        super().__init__(design, solver_name)
         self.count: Counter[str] = Counter()
         self.seconds: defaultdict[str, float] = defaultdict(float)
 
     def evaluate(self, question: Question) -> Evaluation:
-        """As `Door.evaluate`."""
+        """As `Evaluator.evaluate`."""
         start = time.process_time()
         try:
             return super().evaluate(question)
@@ -46,16 +49,16 @@ class Watched(Door):
             effects = [path[8:] for path in question.values if path.startswith("effects.")]
             kind = "+".join(sorted(effects)) or "plain"
             kind += f", slopes by {len(question.gradients)}" if question.gradients else ""
-            highest = self.case.case.analysis.highest_harmonic
+            highest = self.design.request["highest_harmonic"]
             kind += (
                 f", up to n = {highest}" if highest > LOADED.case.analysis.highest_harmonic else ""
             )
             self.count[kind] += 1
             self.seconds[kind] += time.process_time() - start
 
-    def worker(self) -> Door:
+    def worker(self) -> Evaluator:
         """Counts with this one, where it stays in this process."""
-        other = Watched(self.case, self.solver_name)
+        other = Watched(self.design, self.solver_name)
         other.count, other.seconds = self.count, self.seconds
         return other
 
@@ -72,12 +75,12 @@ HARMONICS = LOADED.case.analysis.highest_harmonic
 
 def made(case: LoadedCase, path: Path) -> Path:
     """A file of measurements: the model's own with an effect and scatter."""
-    random, door = np.random.default_rng(1), Door(case)
+    random, evaluator = np.random.default_rng(1), Evaluator(TyreDesign(case))
     wanted = {(t.c, t.m, t.kind) for t in case.case.targets.modes} if case.case.targets else set()
     lines = ["quantity,c,m,kind,member,pressure_kPa,load_N,value,sigma"]
     for p in PRESSURES_kPa:
         values = {**start_values(case), "pressure_kPa": p, f"effects.{EFFECT}": SIZE}
-        for mode in paired_labels(door.evaluate(Question(values)).modes):
+        for mode in paired_labels(evaluator.evaluate(Question(values)).modes):
             x = mode.label
             if (x.c, x.m, x.kind) in wanted:
                 f = mode.frequency_Hz * float(np.exp(SCATTER * random.normal()))
@@ -94,21 +97,21 @@ def main(measured: Path | None, jobs: int) -> None:
     """Diagnose once and print how long it took."""
     with TemporaryDirectory() as folder:
         measured = measured or made(LOADED, Path(folder) / "measured.csv")
-        door = Watched(LOADED) if jobs == 1 else Door(LOADED)
+        evaluator = Watched(TyreDesign(LOADED)) if jobs == 1 else Evaluator(TyreDesign(LOADED))
         wall, start = time.perf_counter(), time.process_time()
-        found = study(LOADED, door, measured, jobs=jobs)
+        found = study(LOADED, evaluator, measured, jobs=jobs)
         wall, own = time.perf_counter() - wall, time.process_time() - start
     workers = sum(map(processor_s, multiprocessing.active_children()))  # kept for more
-    if isinstance(door, Watched):
+    if isinstance(evaluator, Watched):
         print("| asked | evaluations | processor time, s | each, s |\n|---|---|---|---|")
-        for kind, seconds in sorted(door.seconds.items(), key=lambda item: -item[1]):
-            count = door.count[kind]
+        for kind, seconds in sorted(evaluator.seconds.items(), key=lambda item: -item[1]):
+            count = evaluator.count[kind]
             print(f"| {kind} | {count} | {seconds:.2f} | {seconds / count:.3f} |")
-        asked = sum(door.seconds.values())
-        print(f"| all | {sum(door.count.values())} | {asked:.1f} | |")
+        asked = sum(evaluator.seconds.values())
+        print(f"| all | {sum(evaluator.count.values())} | {asked:.1f} | |")
         print(f"\nthe rest, mostly evidence: {own - asked:.1f} s")
     print(f"wall {wall:.1f} s, processor time {own:.1f} s here, {workers:.1f} s in other processes")
-    print(f"solver runs: {door.counts.runs}; verdict: {found.diagnosis.verdict.kind}")
+    print(f"solver runs: {evaluator.counts.runs}; verdict: {found.diagnosis.verdict.kind}")
 
 
 if __name__ == "__main__":

@@ -24,13 +24,15 @@ from tyrecal_solvers.bundled import adapter
 from tyrecal_solvers.bundled.modes import lanczos, sensitivity
 from tyrecal_solvers.bundled.section import band, inflation, mechanics
 
-from tyrecal.case import load_case, start_values
-from tyrecal.evaluate.door import Door, Question
+from tyrecal.case import start_values
+from tyrecal.deck.tyre_design import TyreDesign
+from tyrecal.design import load_case
+from tyrecal.evaluate.evaluator import Evaluator, Question
 
 CASE = Path(__file__).parents[2] / "cases" / "p235_75r17.yaml"
 
 
-def record(door: Door, question: Question) -> list[tuple[np.ndarray, list[np.ndarray]]]:
+def record(evaluator: Evaluator, question: Question) -> list[tuple[np.ndarray, list[np.ndarray]]]:
     """Matrices factorised in one evaluation, each with its right-hand sides."""
     log: list[tuple[np.ndarray, list[np.ndarray]]] = []
     plain = band.Cholesky
@@ -51,7 +53,7 @@ def record(door: Door, question: Question) -> list[tuple[np.ndarray, list[np.nda
     for module in users:
         module.Cholesky = Recorder
     try:
-        door.evaluate(question)
+        evaluator.evaluate(question)
     finally:
         for module in users:
             module.Cholesky = plain
@@ -69,7 +71,7 @@ def replay(log: list[tuple[np.ndarray, list[np.ndarray]]]) -> float:
     return time.perf_counter() - start
 
 
-def timed_parts(door: Door, question: Question) -> dict[str, float]:
+def timed_parts(evaluator: Evaluator, question: Question) -> dict[str, float]:
     """Seconds by part of one evaluation, from wrapped functions (outermost only)."""
     spent: dict[str, float] = defaultdict(float)
     places = [
@@ -96,7 +98,7 @@ def timed_parts(door: Door, question: Question) -> dict[str, float]:
 
         setattr(owner, name, wrapped)
     start = time.perf_counter()
-    door.evaluate(question)
+    evaluator.evaluate(question)
     spent["everything"] = time.perf_counter() - start
     for owner, name, original in kept:
         setattr(owner, name, original)
@@ -106,17 +108,17 @@ def timed_parts(door: Door, question: Question) -> dict[str, float]:
 def main(rounds: int) -> None:
     case = load_case(CASE)
     values = start_values(case)
-    door = Door(case)
+    evaluator = Evaluator(TyreDesign(case))
     question = Question(values, tuple(values))
-    log = record(door, question)
+    log = record(evaluator, question)
     whole, floor, solver = [], [], []
     parts: dict[str, list[float]] = defaultdict(list)
     for _ in range(rounds):  # interleaved, so that a slow spell of the machine hits both
         start = time.perf_counter()
-        door.evaluate(question)
+        evaluator.evaluate(question)
         whole.append(time.perf_counter() - start)
         floor.append(replay(log))
-        for label, seconds in timed_parts(door, question).items():
+        for label, seconds in timed_parts(evaluator, question).items():
             parts[label].append(seconds)
         solver.append(parts["solver, all"][-1])
     factorisations = len(log)

@@ -33,8 +33,10 @@ from tests.studies.footprint_calculix import (
     inflated_radius,
     meshed,
 )
-from tyrecal.case import LoadedCase, load_case, with_values
-from tyrecal.evaluate.door import Door
+from tyrecal.case import LoadedCase
+from tyrecal.deck.tyre_design import TyreDesign
+from tyrecal.design import load_case, with_values
+from tyrecal.evaluate.evaluator import Evaluator
 
 LOAD_N = 2000.0
 LIMIT_S = 3000.0
@@ -49,7 +51,7 @@ def without_friction(case: LoadedCase) -> LoadedCase:
 def bundled(case: LoadedCase, alike: bool) -> Row:
     with common() if alike else nullcontext():
         start = time.perf_counter()
-        (row,) = Door(case, "bundled").press({}, (LOAD_N,)).footprints
+        (row,) = Evaluator(TyreDesign(case), "bundled").press({}, (LOAD_N,)).footprints
         seconds = time.perf_counter() - start
     return seconds, row.deflection_m, row.road_N, float(row.area_m2.sum())
 

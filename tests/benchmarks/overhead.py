@@ -3,7 +3,7 @@
     python tests/benchmarks/overhead.py [rounds]
 
 The work: the same analysis on decks already in memory, nothing read or written. The whole: from a
-design to its modes through the door, with a record that does not know it yet. Sides alternate.
+design to its modes through the evaluator, with a record that does not know it yet. Sides alternate.
 """
 
 from __future__ import annotations
@@ -24,8 +24,10 @@ from tyrecal_solvers.bundled.deck.request import read_request
 from tyrecal_solvers.bundled.deck.steps import Deck
 from tyrecal_solvers.bundled.job import Job
 
-from tyrecal.case import load_case, start_values
-from tyrecal.evaluate.door import Door, Question
+from tyrecal.case import start_values
+from tyrecal.deck.tyre_design import TyreDesign
+from tyrecal.design import load_case
+from tyrecal.evaluate.evaluator import Evaluator, Question
 from tyrecal.evaluate.store import Store
 
 CASE = Path(__file__).parents[2] / "cases" / "p235_75r17.yaml"
@@ -38,8 +40,8 @@ def main(rounds: int) -> None:
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
         record = folder / "record"
-        door = Door(case, folder=folder / "runs", keep=True)
-        door.evaluate(Question(values, names))
+        evaluator = Evaluator(TyreDesign(case), folder=folder / "runs", keep=True)
+        evaluator.evaluate(Question(values, names))
         (run,) = (folder / "runs").iterdir()
         texts = {name: (run / f"{name}.inp").read_text() for name in (JOB, OLDJOB)}
         request = read_request(run / f"{JOB}.request.json")
@@ -51,9 +53,9 @@ def main(rounds: int) -> None:
                 work.append(time.perf_counter() - start)
             question = Question({**values, "C10": values["C10"] * (1 + 1e-6 * (number + 1))}, names)
             for seconds in (whole, again):
-                door = Door(case, folder=folder / "runs", store=Store(record))
+                evaluator = Evaluator(TyreDesign(case), folder=folder / "runs", store=Store(record))
                 start = time.perf_counter()
-                door.evaluate(question)
+                evaluator.evaluate(question)
                 seconds.append(time.perf_counter() - start)
         size = sum(p.stat().st_size for p in record.rglob("*.record")) / rounds
     ratios = [w / s for w, s in zip(whole, work, strict=True)]

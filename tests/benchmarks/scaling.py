@@ -18,8 +18,10 @@ import sys
 import time
 from pathlib import Path
 
-from tyrecal.case import load_case, start_values, with_values
-from tyrecal.evaluate.door import Door, Question
+from tyrecal.case import start_values
+from tyrecal.deck.tyre_design import TyreDesign
+from tyrecal.design import load_case, with_values
+from tyrecal.evaluate.evaluator import Evaluator, Question
 
 CASE = Path(__file__).parents[2] / "cases" / "p235_75r17.yaml"
 MESHES = [  # elements per region of the half section, rows outside the belts
@@ -43,14 +45,14 @@ def main(rounds: int) -> None:
             f"{level}.elements.{name}": n
             for (name, _), n in zip(case.section.regions, elements, strict=True)
         }
-        door = Door(with_values(case, {**numbers, f"{level}.rows.3": rows}))
+        evaluator = Evaluator(TyreDesign(with_values(case, {**numbers, f"{level}.rows.3": rows})))
         question = Question(values, tuple(values))
-        evaluation = door.evaluate(question)
+        evaluation = evaluator.evaluate(question)
         moving = (abs(evaluation.displacement) > 0).any(1).sum()
         times = []
         for _ in range(rounds):
             start = time.perf_counter()
-            door.evaluate(question)
+            evaluator.evaluate(question)
             times.append(time.perf_counter() - start)
         sizes.append(3 * int(moving))
         seconds.append(statistics.median(times))

@@ -8,8 +8,9 @@ from dataclasses import replace
 from tyrecal.blind.maker import Computed, SolverMaker
 from tyrecal.blind.outside import FAMILIES
 from tyrecal.case import LoadedCase
+from tyrecal.deck.tyre_design import TyreDesign
 from tyrecal.effects.edit import with_part
-from tyrecal.evaluate.door import Door
+from tyrecal.evaluate.evaluator import Evaluator
 from tyrecal.evaluate.store import Store
 from tyrecal.modes.mode import Label
 
@@ -36,6 +37,6 @@ def finer(case: LoadedCase) -> LoadedCase:
 
 def other_maker(solver: str, case: LoadedCase, store: Store | None = None) -> OtherMaker:
     """``bundled``: for what CalculiX's sector cannot express; ``calculix``: the honest one."""
-    laws = other_laws(frozenset(Door(case, solver).solver.capabilities))
+    laws = other_laws(frozenset(Evaluator(TyreDesign(case), solver).solver.capabilities))
     about = f"{solver} solver on another mesh, effects by other laws than the catalogue's"
     return OtherMaker(about, solver, laws, FAMILIES, store)

@@ -9,10 +9,12 @@ from scipy.stats import uniform
 from tyrecal.blind.emulated import emulate
 from tyrecal.blind.laws import Law
 from tyrecal.blind.outside import FAMILIES
-from tyrecal.case import LoadedCase, with_values
+from tyrecal.case import LoadedCase
+from tyrecal.deck.tyre_design import TyreDesign
+from tyrecal.design import with_values
 from tyrecal.diagnose.response import Answer, Point
 from tyrecal.effects import catalogue
-from tyrecal.evaluate.door import Door, Question
+from tyrecal.evaluate.evaluator import Evaluator, Question
 from tyrecal.modes.label import paired_labels
 from tyrecal.modes.mode import Label
 
@@ -24,13 +26,14 @@ from .toy import CASE, Scale
 
 LABELS = [Label(t.c, t.m, t.kind) for t in CASE.case.targets.modes]  # type: ignore[union-attr]
 AT = with_values(CASE, {"pressure_kPa": 160.0})
-ABLE = Door(CASE).solver.capabilities
+ABLE = Evaluator(TyreDesign(CASE)).solver.capabilities
 CHEAP = sorted(set(other_laws(frozenset({"modes"}))))
 
 
 def ln_f(case: LoadedCase) -> np.ndarray:
     found = {
-        m.label: m.frequency_Hz for m in paired_labels(Door(case).evaluate(Question({})).modes)
+        m.label: m.frequency_Hz
+        for m in paired_labels(Evaluator(TyreDesign(case)).evaluate(Question({})).modes)
     }
     return np.log([found[label] for label in LABELS])
 

@@ -16,8 +16,10 @@ from tyrecal_solvers.bundled.deck.keywords import DeckError
 from tyrecal_solvers.bundled.road import footprint_job
 from tyrecal_solvers.bundled.road.contact_newton import ContactNewton, NotPressed
 
-from tyrecal.case import LoadedCase, load_case
-from tyrecal.deck.write import Decks
+from tyrecal.case import LoadedCase
+from tyrecal.deck.decks import Decks
+from tyrecal.deck.tyre_design import TyreDesign
+from tyrecal.design import load_case
 
 from ..conftest import CASES
 from . import support
@@ -52,7 +54,7 @@ def coarse_case(**road: object) -> LoadedCase:
 
 @cache
 def texts(loads: tuple[float, ...], friction: float) -> dict[str, str]:
-    return Decks(coarse_case(friction=friction), loads_N=loads).texts("abaqus")
+    return Decks(TyreDesign(coarse_case(friction=friction)), loads_N=loads).texts("abaqus")
 
 
 def run(

@@ -12,9 +12,10 @@ from tyrecal_solvers.bundled.modes.frequency_dependent import NotSelfConsistent,
 from tyrecal_solvers.bundled.section.materials import ModulusTable, read_materials
 from tyrecal_solvers.bundled.section.parts.rubber import MooneyRivlin
 
-from tyrecal.case import with_values
+from tyrecal.deck.tyre_design import TyreDesign
+from tyrecal.design import with_values
 from tyrecal.effects import catalogue
-from tyrecal.evaluate.door import Door, Question
+from tyrecal.evaluate.evaluator import Evaluator, Question
 from tyrecal.modes.label import paired_labels
 
 from ..chance import generator
@@ -132,12 +133,12 @@ def test_slopes_carry_the_implicit_term() -> None:
     case = with_values(CASE, {"effects.frequency_stiffening": 0.2})
     names = ("C10", "A_belt", "effects.frequency_stiffening")
     values = {**START, names[2]: 0.2}
-    door = Door(case)
-    exact = door.evaluate(Question(values, names)).gradients
+    evaluator = Evaluator(TyreDesign(case))
+    exact = evaluator.evaluate(Question(values, names)).gradients
     for name in names:
         h = 1e-3 * values[name]
         up, down = (
-            np.array([m.frequency_Hz for m in door.evaluate(Question(v)).modes])
+            np.array([m.frequency_Hz for m in evaluator.evaluate(Question(v)).modes])
             for v in ({**values, name: values[name] + h}, {**values, name: values[name] - h})
         )
         central = (up - down) / (2 * h)
@@ -146,7 +147,9 @@ def test_slopes_carry_the_implicit_term() -> None:
 
 
 def test_labels_and_multiplicities_as_before() -> None:
-    answer = Door(CASE).evaluate(Question({**START, "effects.frequency_stiffening": 0.1}))
+    answer = Evaluator(TyreDesign(CASE)).evaluate(
+        Question({**START, "effects.frequency_stiffening": 0.1})
+    )
     modes = paired_labels(answer.modes)
     assert {(m.label.c > 0) + 1 for m in modes} == {1, 2}
     assert all(m.multiplicity == (2 if m.label.c else 1) for m in modes)

@@ -24,7 +24,8 @@ from tyrecal_solvers.bundled.section.mechanics import mass
 from tyrecal_solvers.bundled.solid3d.circumference import Circumference, half_circle
 from tyrecal_solvers.bundled.solid3d.revolved import Revolved
 
-from tyrecal.deck.write import Decks
+from tyrecal.deck.decks import Decks
+from tyrecal.deck.tyre_design import TyreDesign
 
 from ..chance import generator
 from . import support
@@ -242,7 +243,7 @@ LOADS = (1000.0,)
 
 
 def texts(count: int = 6) -> dict[str, str]:
-    return Decks(coarse_case(), loads_N=LOADS, loaded_modes=count).texts("abaqus")
+    return Decks(TyreDesign(coarse_case()), loads_N=LOADS, loaded_modes=count).texts("abaqus")
 
 
 def refused(folder: Path, edit: Callable[[str], str]) -> str:

@@ -13,8 +13,10 @@ from tyrecal_solvers.bundled.deck.request import BadRequest, Request, read_reque
 from tyrecal_solvers.bundled.job import TimedOut
 from tyrecal_solvers.bundled.modes.harmonics import Unstable
 
-from tyrecal.case import load_case, with_level
-from tyrecal.deck.write import Decks
+from tyrecal.case import with_level
+from tyrecal.deck.decks import Decks
+from tyrecal.deck.tyre_design import TyreDesign
+from tyrecal.design import load_case
 
 from ..conftest import CASES
 
@@ -26,7 +28,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The decks of a coarse tyre."""
     path = tmp_path_factory.mktemp("decks")
     case = with_level(load_case(CASES / "p235_75r17.yaml"), "coarse")
-    for name, text in Decks(case).texts("abaqus").items():
+    for name, text in Decks(TyreDesign(case)).texts("abaqus").items():
         (path / name).write_text(text)
     return path
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tyrecal.case import validate
+from tyrecal.design import validate
 
 from .bad_cases import BAD, write
 

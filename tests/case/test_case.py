@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from tyrecal.case import CaseError, load_case, parse_assignment, start_values, validate, with_values
+from tyrecal.case import CaseError, number_at, parse_assignment, start_values
 from tyrecal.case.checks import at, find
-from tyrecal.case.variables import number_at
+from tyrecal.design import load_case, validate, with_values
 
 from .bad_cases import CASES, CSV, GOOD, TABLE
 

@@ -7,11 +7,11 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from tyrecal.case import load_case, unusual_value, validate
-from tyrecal.case.guard import refusal
 from tyrecal.case.shape import with_defaults
-from tyrecal.case.usual import USUAL
 from tyrecal.cli.main import cli
+from tyrecal.design import load_case, unusual_value, validate
+from tyrecal.design.guard import refusal
+from tyrecal.design.usual import USUAL
 
 from .wrong import CASES, CSV, GOOD, PRESSURE, TABLE
 
@@ -277,7 +277,7 @@ def test_every_range_is_of_a_number_that_a_case_can_have() -> None:
 
 def test_a_search_may_try_what_it_likes() -> None:
     """A range holds for what is stated; what evaluates designs is not told of it."""
-    from tyrecal.case import with_values
+    from tyrecal.design import with_values
 
     loaded = load_case(CASES / "p235_75r17.yaml")
     assert unusual_value(loaded, "C10", 5e2)

@@ -9,8 +9,9 @@ from typing import Any
 import pytest
 from ruamel.yaml import YAML
 
-from tyrecal.case import LoadedCase, load_case, number_at, with_level, with_values
+from tyrecal.case import LoadedCase, number_at, with_level
 from tyrecal.case.identity import is_of_tyre, tyre_sha256
+from tyrecal.design import load_case, with_values
 from tyrecal.effects import catalogue
 
 from ..conftest import CASES

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tyrecal.evaluate.door import Door
+from tyrecal.evaluate.evaluator import Evaluator
 from tyrecal.evaluate.failure import EvaluationFailed
 from tyrecal.files import results
 
@@ -52,19 +52,19 @@ def nothing(patch: pytest.MonkeyPatch) -> None:
 def crash(patch: pytest.MonkeyPatch) -> None:
     """The solver dies."""
 
-    def fails(door: Door, *question: object) -> None:
+    def fails(evaluator: Evaluator, *question: object) -> None:
         raise EvaluationFailed("crashed", "the licence was eaten")
 
-    patch.setattr(Door, "evaluate", fails)
+    patch.setattr(Evaluator, "evaluate", fails)
 
 
 def interrupt(patch: pytest.MonkeyPatch) -> None:
     """Ctrl-C in the middle."""
 
-    def stops(door: Door, *question: object) -> None:
+    def stops(evaluator: Evaluator, *question: object) -> None:
         raise KeyboardInterrupt
 
-    patch.setattr(Door, "evaluate", stops)
+    patch.setattr(Evaluator, "evaluate", stops)
 
 
 def full_disc(patch: pytest.MonkeyPatch) -> None:

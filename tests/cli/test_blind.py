@@ -59,7 +59,7 @@ def test_a_study_from_end_to_end(
     }
     for name, value in few.items():
         monkeypatch.setattr(f"tyrecal.blind.emulated.{name}", value)
-    only = lambda door, ids=None: spans_of(door, ["spindle_lateral"])
+    only = lambda case, evaluator, ids=None: spans_of(case, evaluator, ["spindle_lateral"])
     monkeypatch.setattr("tyrecal.blind.answer.spans_of", only)  # the ruler's, too
     out = tmp_path / "t"
     make = [

@@ -320,12 +320,16 @@ def test_a_gauge_is_a_number_like_any_other(
         axial.append(next(m["frequency_Hz"] for m in result["modes"] if m["kind"] == "axial"))
     assert masses[1] > masses[0] > masses[2]
     assert masses[1] - masses[2] == pytest.approx(0.02 * 4.4, rel=0.2)  # a tread of 4.4 kg
-    from tyrecal.case import load_case, start_values
-    from tyrecal.evaluate.door import Door, Question
+    from tyrecal.case import start_values
+    from tyrecal.deck.tyre_design import TyreDesign
+    from tyrecal.design import load_case
+    from tyrecal.evaluate.evaluator import Evaluator, Question
 
     case = load_case(path)
     name = "section.gauges.0.factor"
-    answer = Door(case).evaluate(Question({**start_values(case), name: 1.0}, (name,)))
+    answer = Evaluator(TyreDesign(case)).evaluate(
+        Question({**start_values(case), name: 1.0}, (name,))
+    )
     modes = [(m.frequency_Hz, g) for m, g in zip(answer.modes, answer.gradients[name], strict=True)]
     slope = min(modes, key=lambda mode: abs(mode[0] - axial[0]))[1]
     assert slope == pytest.approx((axial[1] - axial[2]) / 0.02, rel=1e-3)

@@ -174,12 +174,12 @@ def test_ctrl_c_leaves_what_was_done_and_says_how_to_go_on(jobs: str, tmp_path: 
 def test_ctrl_c_without_a_record_says_so(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    from tyrecal.evaluate.door import Door
+    from tyrecal.evaluate.evaluator import Evaluator
 
-    def stopped(door: Door, question: object) -> None:
+    def stopped(evaluator: Evaluator, question: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(Door, "evaluate", stopped)
+    monkeypatch.setattr(Evaluator, "evaluate", stopped)
     assert run("modes", CASE, "--output", str(tmp_path), "--no-store") == 130
     assert "--no-store nothing is on record" in capsys.readouterr().err
     assert run("modes", CASE, "--output", str(tmp_path)) == 130

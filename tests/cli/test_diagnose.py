@@ -7,8 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from tyrecal.case import load_case, start_values
-from tyrecal.evaluate.door import Door, Question
+from tyrecal.case import start_values
+from tyrecal.deck.tyre_design import TyreDesign
+from tyrecal.design import load_case
+from tyrecal.evaluate.evaluator import Evaluator, Question
 from tyrecal.modes.label import paired_labels
 from tyrecal.modes.mode import Label
 
@@ -37,7 +39,7 @@ def measured(case: Path, path: Path, **effects: float) -> Path:
     for p in (180.0, 240.0):
         values = {**start_values(loaded), "pressure_kPa": p}
         values |= {f"effects.{id}": e for id, e in effects.items()}
-        for mode in paired_labels(Door(loaded).evaluate(Question(values)).modes):
+        for mode in paired_labels(Evaluator(TyreDesign(loaded)).evaluate(Question(values)).modes):
             label = mode.label
             if label.m < 2 and (label.c or label.kind) and label != Label(4, 1):
                 f = mode.frequency_Hz
@@ -86,7 +88,9 @@ def test_what_was_measured_under_load_is_compared(
     with the effect that frequencies alone have named does not."""
     file, out = measured(coarse, tmp_path / "m.csv", bead_filler=2.0), tmp_path / "out"
     loaded, loads = load_case(coarse), [200.0, 500.0]
-    pressed = Door(loaded).press({**start_values(loaded), "effects.bead_filler": 2.0}, loads)
+    pressed = Evaluator(TyreDesign(loaded)).press(
+        {**start_values(loaded), "effects.bead_filler": 2.0}, loads
+    )
     with file.open("a") as lines:
         for each in pressed.footprints:
             f = each.stiffness_N_per_m

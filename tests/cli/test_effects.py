@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tyrecal.deck.tyre_design import TyreDesign
 from tyrecal.effects import IDS, catalogue
-from tyrecal.evaluate.door import Door
+from tyrecal.evaluate.evaluator import Evaluator
 from tyrecal.studies.signature import Plain
 
 from ..effects.support import CASE as LOADED
@@ -115,7 +116,7 @@ def test_a_failing_effect_costs_no_other(
 
 
 def test_re_fit_finds_the_variable_that_an_effect_is_and_leaves_what_is_across() -> None:
-    plain = Plain(Door(LOADED), START, (160.0, 240.0))
+    plain = Plain(LOADED, Evaluator(TyreDesign(LOADED)), START, (160.0, 240.0))
     found = plain.signature("temperature", 1.0)
     assert found.absorbed == pytest.approx(1, abs=1e-4)
     assert found.refitted["C10"] == pytest.approx(0.9925 * START["C10"], rel=1e-3)

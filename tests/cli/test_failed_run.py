@@ -9,7 +9,7 @@ import pytest
 
 from tyrecal.batch.case import CaseTask, run_case
 from tyrecal.batch.studies import Asked
-from tyrecal.evaluate.door import Door
+from tyrecal.evaluate.evaluator import Evaluator
 from tyrecal.evaluate.failure import EvaluationFailed
 from tyrecal.files import PREVIOUS, RESULTS
 
@@ -20,11 +20,11 @@ from .test_cli import CASE, run
 
 @pytest.fixture(autouse=True)
 def _unable(monkeypatch: pytest.MonkeyPatch) -> None:
-    def fails(door: Door, *question: object) -> None:
+    def fails(evaluator: Evaluator, *question: object) -> None:
         raise EvaluationFailed("crashed", "the licence was eaten")
 
-    monkeypatch.setattr(Door, "evaluate", fails)
-    monkeypatch.setattr(Door, "press", fails)
+    monkeypatch.setattr(Evaluator, "evaluate", fails)
+    monkeypatch.setattr(Evaluator, "press", fails)
 
 
 def names(study: str) -> set[str]:

@@ -9,9 +9,10 @@ from typing import Any
 
 import pytest
 
-from tyrecal.case import load_case
-from tyrecal.evaluate import door as door_module
-from tyrecal.evaluate.door import Door
+from tyrecal.deck.tyre_design import TyreDesign
+from tyrecal.design import load_case
+from tyrecal.evaluate import evaluator as door_module
+from tyrecal.evaluate.evaluator import Evaluator
 from tyrecal.fit.problem import Problem
 from tyrecal.report import pictures
 from tyrecal.report.convergence import draw_convergence
@@ -143,7 +144,7 @@ def test_jobs_change_no_bit(tmp_path: Path) -> None:
     held = {"A_belt": 2.118683e-7, "A_carcass": 4.208352e-7}
     points = []
     for jobs in (1, 2):
-        problem = Problem(case, Door(case), held, jobs=jobs)
+        problem = Problem(case, Evaluator(TyreDesign(case)), held, jobs=jobs)
         points.append(problem.evaluate(problem.start()))
     assert (points[0].footprint == points[1].footprint).all()
     assert (points[0].jacobian == points[1].jacobian).all()

@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 from ruamel.yaml import YAML
 
-from tyrecal.case import load_case, with_values
-from tyrecal.deck.context import section_mesh
+from tyrecal.design import load_case, resolved, with_values
 
 from ..conftest import CASES
 from ..tyre.test_outline import curves, write_outline
@@ -151,7 +150,7 @@ def test_a_station_table_gives_the_same_mesh(here: Path) -> None:
     mine, theirs = load_case(here / "mine.yaml"), load_case(CASES / "205_60r15.yaml")
     theirs = with_values(theirs, {"effects.carcass_turn_up": 0.0})
     assert mine.case.section.stations == "own.csv"
-    one, other = section_mesh(mine), section_mesh(theirs)
+    one, other = resolved(mine).mesh, resolved(theirs).mesh
     assert (one.solids, one.cords, one.rim) == (other.solids, other.cords, other.rim)
     assert np.array(list(one.nodes.values())) == pytest.approx(
         np.array(list(other.nodes.values())), abs=1e-12

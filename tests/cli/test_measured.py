@@ -130,7 +130,7 @@ def test_several_kinds_of_files_join_and_the_diagnosis_reads_them(
 def test_fits_take_what_is_at_their_pressure(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    from tyrecal.case import load_case
+    from tyrecal.design import load_case
     from tyrecal.measured.targets import with_measured
 
     lines = [

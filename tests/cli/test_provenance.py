@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
-from tyrecal.case import load_case
 from tyrecal.case.identity import tyre_sha256
+from tyrecal.design import load_case
 from tyrecal.provenance import measured_sha256
 
 from ..studies.loaded import coarse_case

@@ -10,9 +10,9 @@ from typing import Any
 
 import pytest
 
-from tyrecal.case import load_case
 from tyrecal.case.identity import tyre_sha256
-from tyrecal.evaluate.door import Door, Question
+from tyrecal.design import load_case
+from tyrecal.evaluate.evaluator import Evaluator, Question
 from tyrecal.evaluate.failure import EvaluationFailed
 from tyrecal.evaluate.results import Evaluation
 
@@ -198,14 +198,14 @@ def test_a_pressure_that_fails_costs_no_other(
 
 def test_a_failure_amid_the_sweep(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Findings go on over the gap: the bows of uneven steps are still those of concave curves."""
-    evaluate = Door.evaluate
+    evaluate = Evaluator.evaluate
 
-    def moody(door: Door, question: Question) -> Evaluation:
+    def moody(evaluator: Evaluator, question: Question) -> Evaluation:
         if question.values["pressure_kPa"] == 140:
             raise EvaluationFailed("timed_out", "ran out of time")
-        return evaluate(door, question)
+        return evaluate(evaluator, question)
 
-    monkeypatch.setattr(Door, "evaluate", moody)
+    monkeypatch.setattr(Evaluator, "evaluate", moody)
     arguments = ["--output", str(tmp_path), "--to-kPa", "180", "--steps", "5", "--quiet"]
     assert run("sweep-pressure", CASE, *arguments) == 3
     found = result(tmp_path)

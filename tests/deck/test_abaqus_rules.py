@@ -11,8 +11,9 @@ import pytest
 from tyrecal_solvers.bundled.deck.keywords import DeckError, Keyword, read_keywords
 from tyrecal_solvers.bundled.job import run
 
-from tyrecal.case import load_case, with_values
-from tyrecal.deck.write import Decks
+from tyrecal.deck.decks import Decks
+from tyrecal.deck.tyre_design import TyreDesign
+from tyrecal.design import load_case, with_values
 
 from ..conftest import CASES
 from ..effects.support import CASE as COARSE
@@ -49,7 +50,7 @@ LOADS: dict[str, dict[str, Any]] = {
 
 def jobs(values: str, loads: str) -> dict[str, list[Keyword]]:
     case = FOUR_NODES if "hourglass" in values else CASE
-    texts = Decks(with_values(case, VALUES[values]), **LOADS[loads]).texts("abaqus")
+    texts = Decks(TyreDesign(with_values(case, VALUES[values])), **LOADS[loads]).texts("abaqus")
     return {name: read_keywords(text, name) for name, text in texts.items()}
 
 
@@ -105,7 +106,7 @@ def test_a_turning_tyre_is_as_stiff_as_the_frequency_says() -> None:
 def test_the_bundled_solver_refuses_them_elsewhere(
     tmp_path: Path, job: str, old: str, new: str, words: str
 ) -> None:
-    for name, text in Decks(FOUR_NODES).texts("abaqus").items():
+    for name, text in Decks(TyreDesign(FOUR_NODES)).texts("abaqus").items():
         if name == f"{job}.inp":
             assert text.count(old) == 1
             text = text.replace(old, new)

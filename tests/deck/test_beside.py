@@ -1,5 +1,5 @@
 """Decks of a rim that moves, of gas in the cavity, of rubber that follows the frequency: through
-the door; what is not honoured is refused by line."""
+the evaluator; what is not honoured is refused by line."""
 
 from __future__ import annotations
 
@@ -11,10 +11,11 @@ import pytest
 from tyrecal_solvers.bundled.deck.keywords import DeckError
 from tyrecal_solvers.bundled.job import run
 
-from tyrecal.case import CaseError, LoadedCase, load_case, with_values
-from tyrecal.deck.write import Decks
-from tyrecal.effects import with_effects
-from tyrecal.evaluate.door import Door, Question
+from tyrecal.case import CaseError, LoadedCase
+from tyrecal.deck.decks import Decks
+from tyrecal.deck.tyre_design import TyreDesign
+from tyrecal.design import load_case, resolved, with_values
+from tyrecal.evaluate.evaluator import Evaluator, Question
 from tyrecal.evaluate.failure import DeckRefused
 from tyrecal.evaluate.solver import find_solver
 
@@ -31,11 +32,11 @@ RIM = {"rim.mass_kg": 15.0, "rim.polar_inertia_kg_m2": 0.43, "rim.diametral_iner
 
 def gradient(values: dict[str, float], name: str, step: float = 1e-3) -> tuple[np.ndarray, ...]:
     """Exact d Hz / d ln of a number, and its central difference."""
-    door, at = Door(CASE), values[name]
-    exact = np.array(door.evaluate(Question(values, (name,))).gradients[name]) * at
+    evaluator, at = Evaluator(TyreDesign(CASE)), values[name]
+    exact = np.array(evaluator.evaluate(Question(values, (name,))).gradients[name]) * at
 
     def hertz(by: float) -> np.ndarray:
-        modes = door.evaluate(Question({**values, name: at * (1 + by)})).modes
+        modes = evaluator.evaluate(Question({**values, name: at * (1 + by)})).modes
         return np.array([m.frequency_Hz for m in modes])
 
     return exact, (hertz(step) - hertz(-step)) / (2 * step)
@@ -98,7 +99,9 @@ def test_other_gases() -> None:
     for gas in ("air", "helium", "sulphur_hexafluoride"):
         cavity = CASE.case.cavity.model_copy(update={"gas": gas, "share": 1.0})
         case = CASE.case.model_copy(update={"cavity": cavity})
-        block = Decks(LoadedCase(**{**CASE.__dict__, "case": case})).texts("abaqus")["inflate.inp"]
+        block = Decks(TyreDesign(LoadedCase(**{**CASE.__dict__, "case": case}))).texts("abaqus")[
+            "inflate.inp"
+        ]
         numbers = re.search(r"MEDIUM, BULK MODULUS\n(\S+)\n\*DENSITY\n(\S+)", block)
         text[gas] = [float(x) for x in numbers.groups()]
     bulk, density = text["air"]
@@ -116,7 +119,7 @@ def test_prony_level_and_exponent_make_one_table() -> None:
     values = {"analysis.vibration_frequency_Hz": 100.0}
     both = with_values(CASE, {**values, "materials.rubber.frequency_exponent": 1e-9})
     assert frequencies(both) == pytest.approx(frequencies(with_values(CASE, values)), rel=1e-7)
-    assert "PRONY" not in Decks(both).texts("abaqus")["inflate.inp"]
+    assert "PRONY" not in Decks(TyreDesign(both)).texts("abaqus")["inflate.inp"]
 
 
 @pytest.mark.parametrize(
@@ -129,7 +132,7 @@ def test_prony_level_and_exponent_make_one_table() -> None:
 )
 def test_solvers_that_cannot(values: dict[str, float], solver: str, words: str) -> None:
     with pytest.raises(DeckRefused, match=words):
-        Door(with_values(CASE, values), solver).evaluate(Question({}))
+        Evaluator(TyreDesign(with_values(CASE, values)), solver).evaluate(Question({}))
 
 
 def test_abaqus_has_keywords_for_a_rim_that_moves() -> None:
@@ -137,7 +140,7 @@ def test_abaqus_has_keywords_for_a_rim_that_moves() -> None:
 
 
 def run_deck(folder: Path, *edits: tuple[str, str]) -> None:
-    texts = Decks(with_effects(with_values(CASE, SOFT))).texts("abaqus")
+    texts = Decks(TyreDesign(resolved(with_values(CASE, SOFT)).written)).texts("abaqus")
     for name, text in texts.items():
         for old, new in edits:
             text = text.replace(old, new)
@@ -175,7 +178,9 @@ def test_decks_that_are_refused(tmp_path: Path, old: str, new: str, words: str) 
 )
 def test_cavities_that_are_refused(tmp_path: Path, cavity: str, words: str) -> None:
     (tmp_path / "modes.request.json").write_text(f'{{"cavity": {cavity}}}')
-    for name, text in Decks(with_values(CASE, {"cavity.share": 1.0})).texts("abaqus").items():
+    for name, text in (
+        Decks(TyreDesign(with_values(CASE, {"cavity.share": 1.0}))).texts("abaqus").items()
+    ):
         (tmp_path / name).write_text(text)
     with pytest.raises(DeckError, match=words):
         run(tmp_path, "modes", "inflate")

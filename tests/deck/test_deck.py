@@ -1,4 +1,4 @@
-"""The deck is a real door: what stands in it, and only that, decides the result."""
+"""The deck is a real evaluator: what stands in it, and only that, decides the result."""
 
 from __future__ import annotations
 
@@ -9,11 +9,13 @@ from pathlib import Path
 
 import pytest
 
-from tyrecal.case import load_case, start_values, with_values
-from tyrecal.deck.environment import TemplateFailed, number
-from tyrecal.deck.write import Decks
-from tyrecal.evaluate.door import Door, Question
+from tyrecal.case import start_values
+from tyrecal.deck.decks import Decks
+from tyrecal.deck.tyre_design import TyreDesign
+from tyrecal.design import load_case, with_values
+from tyrecal.evaluate.evaluator import Evaluator, Question
 from tyrecal.evaluate.failure import DeckRefused
+from tyrecal.templates import TemplateFailed, number
 
 from ..conftest import CASES
 
@@ -33,7 +35,10 @@ def case_with_template(folder: Path, name: str, old: str, new: str):
 
 
 def frequencies(case) -> list[float]:
-    return [m.frequency_Hz for m in Door(case).evaluate(Question(start_values(case))).modes]
+    return [
+        m.frequency_Hz
+        for m in Evaluator(TyreDesign(case)).evaluate(Question(start_values(case))).modes
+    ]
 
 
 def test_a_number_edited_in_the_users_template_moves_the_frequencies(case_folder: Path) -> None:
@@ -78,9 +83,9 @@ def test_the_solver_alone_gives_the_same_bytes(tmp_path: Path) -> None:
     """The written decks, run by another process through the solver's own command."""
     case = load_case(CASES / "p235_75r17.yaml")
     values = start_values(case)
-    door = Door(case, folder=tmp_path / "runs", keep=True)
-    door.evaluate(Question(values, tuple(values)))
-    (run,) = door.folder.iterdir()
+    evaluator = Evaluator(TyreDesign(case), folder=tmp_path / "runs", keep=True)
+    evaluator.evaluate(Question(values, tuple(values)))
+    (run,) = evaluator.folder.iterdir()
     alone = tmp_path / "alone"
     alone.mkdir()
     for name in ("inflate.inp", "modes.inp", "modes.request.json"):
@@ -103,7 +108,7 @@ def test_the_solver_alone_gives_the_same_bytes(tmp_path: Path) -> None:
 def test_without_the_side_file_the_deck_alone_is_solved(tmp_path: Path) -> None:
     """*FREQUENCY's number of modes then decides, over all harmonics, doublets counted twice."""
     case = load_case(CASES / "p235_75r17.yaml")
-    for name, text in Decks(case, start_values(case)).texts("abaqus").items():
+    for name, text in Decks(TyreDesign(case, start_values(case))).texts("abaqus").items():
         (tmp_path / name).write_text(text.replace("\n20\n", "\n16\n"))
     from tyrecal_solvers.bundled.job import run
 
@@ -120,7 +125,7 @@ def test_tangents_find_every_place_of_a_variable() -> None:
     """Both belts' areas move with A_belt, one for one; C10 stands in one place."""
     case = load_case(CASES / "p235_75r17.yaml")
     values = start_values(case)
-    decks = Decks(case, values, tuple(values))
+    decks = Decks(TyreDesign(case, values), tuple(values))
     tangents = decks.tangents("abaqus")
     lines = decks.texts("abaqus")["inflate.inp"].splitlines()
     assert {n: len(rows) for n, rows in tangents.items()} == {"A_belt": 2, "A_carcass": 1, "C10": 1}
@@ -148,7 +153,7 @@ def test_tangents_find_every_place_of_a_variable() -> None:
 def test_a_template_may_not_leave_its_sandbox(case_folder: Path, edit: str, words: str) -> None:
     case = case_with_template(case_folder, "inflate.inp.j2", "*HEADING\n", f"*HEADING\n{edit}\n")
     with pytest.raises(TemplateFailed, match="inflate") as failure:
-        Decks(case).texts("abaqus")
+        Decks(TyreDesign(case)).texts("abaqus")
     assert words in str(failure.value)
     assert "\n" not in str(failure.value)
 
@@ -176,10 +181,10 @@ DOUBLED = (
 def test_a_template_has_an_end(case_folder: Path, edit: str) -> None:
     case = case_with_template(case_folder, "inflate.inp.j2", "*HEADING\n", f"*HEADING\n{edit}\n")
     with pytest.raises(TemplateFailed, match=r"inflate.*(MemoryError|was stopped)"):
-        Decks(case).texts("abaqus")
+        Decks(TyreDesign(case)).texts("abaqus")
     own = case_folder / "my templates" / "inflate.inp.j2"
     own.write_text(own.read_text().replace(edit, "right"))
-    assert "\nright\n" in Decks(case).texts("abaqus")["inflate.inp"]
+    assert "\nright\n" in Decks(TyreDesign(case)).texts("abaqus")["inflate.inp"]
 
 
 def test_own_templates_give_the_same_bytes(
@@ -188,9 +193,9 @@ def test_own_templates_give_the_same_bytes(
     """Rendered apart, and where a module in the present folder has the name of one of ours."""
     (case_folder / "jinja2.py").write_text("raise SystemExit('a stranger was imported')")
     monkeypatch.chdir(case_folder)
-    plain = Decks(load_case(CASES / "p235_75r17.yaml")).texts("abaqus")
+    plain = Decks(TyreDesign(load_case(CASES / "p235_75r17.yaml"))).texts("abaqus")
     own = case_with_template(case_folder, "inflate.inp.j2", "*HEADING\n", "*HEADING\n")
-    assert Decks(own).texts("abaqus") == plain
+    assert Decks(TyreDesign(own)).texts("abaqus") == plain
 
 
 @pytest.mark.parametrize(
@@ -206,7 +211,7 @@ def test_own_templates_give_the_same_bytes(
 def test_a_deck_of_own_templates_stays_in_its_folder(case_folder: Path, line: str) -> None:
     case = case_with_template(case_folder, "inflate.inp.j2", "*RESTART, WRITE\n", f"{line}\n")
     with pytest.raises(TemplateFailed, match=r"inflate\.inp, line \d+: .* leads out"):
-        Decks(case).texts("abaqus")
+        Decks(TyreDesign(case)).texts("abaqus")
 
 
 def test_a_link_out_of_the_template_folder_is_refused(case_folder: Path, tmp_path: Path) -> None:
@@ -216,14 +221,14 @@ def test_a_link_out_of_the_template_folder_is_refused(case_folder: Path, tmp_pat
     (tmp_path / "secret.txt").write_text("secret")
     (case_folder / "my templates" / "link.txt").symlink_to(tmp_path / "secret.txt")
     with pytest.raises(TemplateFailed, match="leads out"):
-        Decks(case).texts("abaqus")
+        Decks(TyreDesign(case)).texts("abaqus")
 
 
 @pytest.mark.parametrize("keyword", ["*TIE, NAME=X", "*NODE, SYSTEM=C", "*INCLUDE, INPUT=x.inp"])
 def test_an_unknown_keyword_is_refused_by_name_and_line(case_folder: Path, keyword: str) -> None:
     case = case_with_template(case_folder, "inflate.inp.j2", "*RESTART, WRITE\n", f"{keyword}\n")
     with pytest.raises(DeckRefused, match=r"inflate\.inp, line 6: .* is not honoured"):
-        Door(case).evaluate(Question({}))
+        Evaluator(TyreDesign(case)).evaluate(Question({}))
 
 
 def test_numbers_have_thirteen_digits_and_fit_abaqus_fields() -> None:
@@ -268,7 +273,7 @@ def test_a_deck_that_would_mean_another_tyre_is_refused(
     """Each with the deck's name, and its line where a line is to blame."""
     case = case_with_template(case_folder, template, old, new)
     with pytest.raises(DeckRefused, match=r"(inflate|modes)\.inp") as failure:
-        Door(case).evaluate(Question({}))
+        Evaluator(TyreDesign(case)).evaluate(Question({}))
     assert words in str(failure.value)
 
 
@@ -277,6 +282,6 @@ def test_without_its_load_the_second_job_is_not_inflated(case_folder: Path) -> N
     case = case_with_template(
         case_folder, "modes.inp.j2", "*DSLOAD\nCAVITY, P, {{ pressure | number }}\n", ""
     )
-    answer = Door(case).evaluate(Question({}))
+    answer = Evaluator(TyreDesign(case)).evaluate(Question({}))
     assert answer.pressure_kPa == 0.0
     assert abs(answer.displacement).max() < 1e-6

@@ -8,10 +8,12 @@ from pathlib import Path
 
 import pytest
 
-from tyrecal.case import load_case, overridden, start_values, with_level, with_values
+from tyrecal.case import start_values, with_level
 from tyrecal.case.identity import tyre_sha256
+from tyrecal.deck.decks import Decks
 from tyrecal.deck.header import LONGEST_NAME, header, without_header
-from tyrecal.deck.write import Decks
+from tyrecal.deck.tyre_design import TyreDesign
+from tyrecal.design import load_case, overridden, with_values
 
 from ..cli.test_cli import run
 from ..conftest import CASES
@@ -25,7 +27,7 @@ CASE = CASES / "p235_75r17.yaml"
 def test_every_deck_says_what_it_is_of(dialect: str, more: dict) -> None:
     case = with_level(load_case(CASE), "coarse")
     case = overridden(case, {"rebar_layers.belt_1.angle_deg": 68.0, "C10": 1.2e6})
-    texts = Decks(case, start_values(case), **more).texts(dialect)
+    texts = Decks(TyreDesign(case, start_values(case)), **more).texts(dialect)
     assert len(texts) > 1
     for text in texts.values():
         first = "".join(text.splitlines(keepends=True)[:3])
@@ -43,7 +45,7 @@ def test_the_comment_moves_no_slope() -> None:
     paths = ("materials.rubber.density_kg_per_m3", "effects.bead_filler")
     values = {**start_values(case), paths[0]: 1100.0, paths[1]: 1.0}
     moved = with_values(case, {paths[1]: 1.0})
-    decks = Decks(moved, values, tuple(values))
+    decks = Decks(TyreDesign(moved, values), tuple(values))
     rows = decks.tangents("abaqus")
     lines = decks.texts("abaqus")["inflate.inp"].splitlines()
     for path in paths:
@@ -92,4 +94,4 @@ def test_the_users_own_templates_have_it_too(case_folder: Path) -> None:
     path = case_folder / "p235_75r17.yaml"
     path.write_text(path.read_text() + "\ntemplates: own\n")
     case = load_case(path)
-    assert Decks(case).texts("abaqus")["modes.inp"] == header(case) + "*HEADING\nmine\n"
+    assert Decks(TyreDesign(case)).texts("abaqus")["modes.inp"] == header(case) + "*HEADING\nmine\n"

@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tyrecal.case import with_values
+from tyrecal.deck.tyre_design import TyreDesign
+from tyrecal.design import with_values
 from tyrecal.diagnose.expansion import expand
 from tyrecal.diagnose.observations import Observations, Row
 from tyrecal.diagnose.problem import Change, Problem
@@ -19,7 +20,7 @@ from tyrecal.diagnose.study import spans_of, study
 from tyrecal.diagnose.tyre_model import TyreModel
 from tyrecal.diagnose.uncertainties import sources
 from tyrecal.errors import InputError
-from tyrecal.evaluate.door import Door
+from tyrecal.evaluate.evaluator import Evaluator
 from tyrecal.evaluate.failure import DeckRefused
 from tyrecal.report.diagnosis import page
 
@@ -31,10 +32,10 @@ WITH_FILLER = with_values(CASE, {"effects.bead_filler": HELD})
 
 @pytest.mark.slow
 def test_parameters_count_from_what_the_case_has() -> None:
-    door = Door(WITH_FILLER)
-    spans, _ = spans_of(door, EFFECTS)
+    evaluator = Evaluator(TyreDesign(WITH_FILLER))
+    spans, _ = spans_of(WITH_FILLER, evaluator, EFFECTS)
     assert spans["bead_filler"].low == pytest.approx(-HELD)
-    own = TyreModel(WITH_FILLER, door, ROWS, sources(WITH_FILLER)[0], spans)
+    own = TyreModel(WITH_FILLER, evaluator, ROWS, sources(WITH_FILLER)[0], spans)
     less, as_it_is = own.answers([Point(X, {"bead_filler": -HELD}), Point(X)])
     assert isinstance(less, Answer) and isinstance(as_it_is, Answer)
     assert less.eta == pytest.approx(asked(Point(X)).eta, abs=1e-9)
@@ -50,9 +51,9 @@ def test_splits_count_from_what_the_case_has() -> None:
     """A mass on the tread splits pairs by itself, a wider rim does not: neither is added twice."""
     rows = ROWS[:-1]
     case = with_values(CASE, {"effects.point_mass": 0.04})
-    door = Door(case)
-    spans, _ = spans_of(door, ("point_mass", "rim_width"))
-    own = TyreModel(case, door, rows, [], spans)
+    evaluator = Evaluator(TyreDesign(case))
+    spans, _ = spans_of(case, evaluator, ("point_mass", "rim_width"))
+    own = TyreModel(case, evaluator, rows, [], spans)
     none = np.full(len(rows), np.nan)
     told = tuple(Row("frequency_Hz", label, p) for label, p in rows)
     observations = Observations(told, np.zeros(len(rows)), none, 0.0, none, none)
@@ -68,7 +69,7 @@ def test_splits_count_from_what_the_case_has() -> None:
 def test_a_splice_in_the_case_is_refused_in_words_that_help() -> None:
     case = with_values(CASE, {"effects.stiffness_splice": 0.5})
     with pytest.raises(DeckRefused, match=r"\(a splice\) .* take it out of the case"):
-        TyreModel(case, Door(case), ROWS, [], {})
+        TyreModel(case, Evaluator(TyreDesign(case)), ROWS, [], {})
 
 
 @pytest.mark.slow
@@ -76,7 +77,7 @@ def test_a_source_of_error_steps_from_what_the_case_has() -> None:
     wide = with_values(CASE, {"effects.rim_width": 4e-3})
     columns = []
     for case in (CASE, wide):
-        own = TyreModel(case, Door(case), ROWS, sources(case)[0], {})
+        own = TyreModel(case, Evaluator(TyreDesign(case)), ROWS, sources(case)[0], {})
         (found,) = own.answers([Point(X, constants=True)])
         assert isinstance(found, Answer) and found.constants is not None
         columns.append(found.constants[:, own.sources.index("rim_width")])
@@ -88,8 +89,10 @@ def test_a_source_of_error_steps_from_what_the_case_has() -> None:
 def test_a_part_of_an_effect_in_the_case_leaves_the_rest_to_be_found(tmp_path: Path) -> None:
     truth = 0.8 * MODEL.spans["bead_filler"].high
     path = written(tmp_path / "a.csv", asked(Point(X, {"bead_filler": truth})).eta)
-    none = study(CASE, Door(CASE), path, effects=EFFECTS, section_map=False)
-    some = study(WITH_FILLER, Door(WITH_FILLER), path, effects=EFFECTS, section_map=False)
+    none = study(CASE, Evaluator(TyreDesign(CASE)), path, effects=EFFECTS, section_map=False)
+    some = study(
+        WITH_FILLER, Evaluator(TyreDesign(WITH_FILLER)), path, effects=EFFECTS, section_map=False
+    )
     sizes = [each.diagnosis.parameter("bead_filler") for each in (none, some)]
     assert sizes[1]["low"] < truth < sizes[1]["high"]
     assert sizes[1]["value"] == pytest.approx(sizes[0]["value"], rel=0.1)
@@ -108,7 +111,7 @@ def test_a_toggled_run_is_set_to_what_it_says_whatever_the_case_has(tmp_path: Pa
     for change in (Change("bead_filler", 0.0), Change("bead_filler", 0.0, times=True)):
         d = study(
             WITH_FILLER,
-            Door(WITH_FILLER),
+            Evaluator(TyreDesign(WITH_FILLER)),
             one,
             toggled=[(other, change)],
             effects=EFFECTS,
@@ -126,7 +129,7 @@ def test_a_run_switched_beyond_the_range_is_asked_there(tmp_path: Path) -> None:
     other = written(tmp_path / "b.csv", asked(Point(X, {"bead_filler": far})).eta)
     found = study(
         CASE,
-        Door(CASE),
+        Evaluator(TyreDesign(CASE)),
         one,
         toggled=[(other, Change("bead_filler", far))],
         effects=EFFECTS,
@@ -155,7 +158,7 @@ def test_a_change_that_the_diagnosis_cannot_follow(
     one = written(tmp_path / "a.csv", asked(Point(X)).eta)
     other = written(tmp_path / "b.csv", asked(Point(X)).eta, noise=2e-3)
     with pytest.raises(InputError, match=words):
-        study(CASE, Door(CASE), one, toggled=[(other, change)], effects=EFFECTS)
+        study(CASE, Evaluator(TyreDesign(CASE)), one, toggled=[(other, change)], effects=EFFECTS)
 
 
 @pytest.mark.slow
@@ -166,7 +169,7 @@ def test_an_effect_that_a_variable_sets_is_no_candidate(tmp_path: Path) -> None:
     variables = {**CASE.case.variables, "filler": variable}
     case = replace(CASE, case=CASE.case.model_copy(update={"variables": variables}))
     path = written(tmp_path / "a.csv", asked(Point(X)).eta)
-    found = study(case, Door(case), path, effects=EFFECTS, section_map=False)
+    found = study(case, Evaluator(TyreDesign(case)), path, effects=EFFECTS, section_map=False)
     assert found.calibrated == ("bead_filler",)
     assert not found.diagnosis.problem.expansion.failed
     assert "bead_filler" not in found.diagnosis.probabilities
@@ -178,7 +181,7 @@ def test_an_effect_that_a_variable_sets_is_no_candidate(tmp_path: Path) -> None:
     )
     case = replace(CASE, case=CASE.case.model_copy(update={"variables": {"p": variable}}))
     with pytest.raises(InputError, match="sets pressure_kPa"):
-        study(case, Door(case), path, effects=EFFECTS)
+        study(case, Evaluator(TyreDesign(case)), path, effects=EFFECTS)
 
 
 def test_what_is_wrong_with_a_file_names_that_file(tmp_path: Path) -> None:
@@ -186,10 +189,17 @@ def test_what_is_wrong_with_a_file_names_that_file(tmp_path: Path) -> None:
     copy = tmp_path / "copy.csv"
     copy.write_text(one.read_text())
     with pytest.raises(InputError, match=r"copy.csv: holds the same values as .*a.csv"):
-        study(CASE, Door(CASE), one, [copy], effects=EFFECTS)
+        study(CASE, Evaluator(TyreDesign(CASE)), one, [copy], effects=EFFECTS)
     high = written(tmp_path / "high.csv", asked(Point(X)).eta[:-1] + 1.0, ROWS[:-1])
     with pytest.raises(InputError, match=r"high.csv: .* right unit"):
-        study(CASE, Door(CASE), one, [], [(high, Change("bead_filler", 0.0))], effects=EFFECTS)
+        study(
+            CASE,
+            Evaluator(TyreDesign(CASE)),
+            one,
+            [],
+            [(high, Change("bead_filler", 0.0))],
+            effects=EFFECTS,
+        )
     on_rim = written(tmp_path / "rim.csv", asked(Point(X)).eta + 0.6 * (np.arange(19) == 18))
     with pytest.raises(InputError, match=r"rim.csv: the mass is 1.8 times .* without its rim"):
-        study(CASE, Door(CASE), on_rim, effects=EFFECTS)
+        study(CASE, Evaluator(TyreDesign(CASE)), on_rim, effects=EFFECTS)

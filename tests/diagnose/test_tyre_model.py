@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tyrecal.case import with_values
+from tyrecal.deck.tyre_design import TyreDesign
+from tyrecal.design import with_values
 from tyrecal.diagnose.add import NotAdded, add
 from tyrecal.diagnose.diagnosis import diagnose
 from tyrecal.diagnose.evidence import probabilities, weigh
@@ -26,7 +27,7 @@ from tyrecal.diagnose.tyre_model import TyreModel
 from tyrecal.diagnose.uncertainties import DENSITY, PRESSURE_kPa, sources
 from tyrecal.diagnose.verdict import decide
 from tyrecal.errors import InputError
-from tyrecal.evaluate.door import Door
+from tyrecal.evaluate.evaluator import Evaluator
 from tyrecal.evaluate.failure import DeckRefused
 from tyrecal.measured.tables import read_measurements
 from tyrecal.modes.mode import Label
@@ -51,9 +52,9 @@ ROWS = [*((label, p) for p in (180.0, 240.0) for label in LABELS), (None, 0.0)]
 
 
 def model(rows: list = ROWS) -> TyreModel:
-    door = Door(CASE)
-    spans, _ = spans_of(door, EFFECTS)
-    return TyreModel(CASE, door, rows, sources(CASE)[0], spans)
+    evaluator = Evaluator(TyreDesign(CASE))
+    spans, _ = spans_of(CASE, evaluator, EFFECTS)
+    return TyreModel(CASE, evaluator, rows, sources(CASE)[0], spans)
 
 
 MODEL = model()
@@ -118,7 +119,7 @@ def test_slopes_against_differences() -> None:
             rows = ROWS
             if path == "pressure_kPa":
                 rows = [(label, p + side * size if label else p) for label, p in ROWS]
-            other = TyreModel(there, Door(there), rows, [], {})
+            other = TyreModel(there, Evaluator(TyreDesign(there)), rows, [], {})
             (found,) = other.answers([Point(x)])
             assert isinstance(found, Answer)
             shifted.append(found.eta)
@@ -171,7 +172,7 @@ def test_parts_of_the_section_make_the_whole() -> None:
 def test_an_effect_in_the_models_own_data_is_named_with_its_size(tmp_path: Path) -> None:
     truth = 0.8 * MODEL.spans["bead_filler"].high
     path = written(tmp_path / "a.csv", asked(Point(X, {"bead_filler": truth})).eta)
-    found = study(CASE, Door(CASE), path, effects=EFFECTS)
+    found = study(CASE, Evaluator(TyreDesign(CASE)), path, effects=EFFECTS)
     d = found.diagnosis
     assert d.verdict.kind == "named" and d.verdict.key == "bead_filler"
     size = d.parameter("bead_filler")
@@ -234,7 +235,7 @@ def test_a_toggled_run_shows_the_cause(tmp_path: Path) -> None:
     other = written(tmp_path / "b.csv", asked(Point(X)).eta)
     d = study(
         CASE,
-        Door(CASE),
+        Evaluator(TyreDesign(CASE)),
         one,
         toggled=[(other, Change("bead_filler", 0.0))],
         assumed=Assumed(),
@@ -249,14 +250,14 @@ def test_a_wrong_unit_and_one_mode_alone(tmp_path: Path) -> None:
     eta = asked(Point(X)).eta
     thrice = written(tmp_path / "a.csv", eta + np.log(2 * np.pi))
     with pytest.raises(InputError, match="right unit"):
-        study(CASE, Door(CASE), thrice, effects=EFFECTS)
+        study(CASE, Evaluator(TyreDesign(CASE)), thrice, effects=EFFECTS)
     one = written(tmp_path / "b.csv", eta[5:6], ROWS[5:6])
-    d = study(CASE, Door(CASE), one, effects=EFFECTS, section_map=False).diagnosis
+    d = study(CASE, Evaluator(TyreDesign(CASE)), one, effects=EFFECTS, section_map=False).diagnosis
     assert d.verdict.kind == "undecided" and "cannot tell" in d.verdict.words
     assert d.shrinkage is None
     weighed = written(tmp_path / "c.csv", eta[-1:], ROWS[-1:])
     with pytest.raises(InputError, match="no frequency"):
-        study(CASE, Door(CASE), weighed, effects=EFFECTS)
+        study(CASE, Evaluator(TyreDesign(CASE)), weighed, effects=EFFECTS)
 
 
 @pytest.mark.parametrize(
@@ -325,12 +326,12 @@ def test_sources_of_error_are_those_of_the_case_or_assumed_and_never_calibrated(
 
 def test_an_effect_without_slopes_takes_the_plain_tyres() -> None:
     """The solver gives none with a splice: all is asked once, together, and nothing in vain."""
-    door = Door(CASE)
+    evaluator = Evaluator(TyreDesign(CASE))
     splice = Point(X, {"stiffness_splice": 1.0})
-    spans, _ = spans_of(door, ("bead_filler", "stiffness_splice"))
-    own = TyreModel(CASE, door, ROWS[:9], [], spans)
+    spans, _ = spans_of(CASE, evaluator, ("bead_filler", "stiffness_splice"))
+    own = TyreModel(CASE, evaluator, ROWS[:9], [], spans)
     found = own.answers([splice, Point(X, {"bead_filler": 1.0})])
-    assert door.counts.runs == 3  # the plain one is the third
+    assert evaluator.counts.runs == 3  # the plain one is the third
     (plain,) = own.answers([Point(X)])
     assert isinstance(plain, Answer) and isinstance(found[0], Answer)
     assert found[0].jacobian == pytest.approx(plain.jacobian, abs=1e-12)
@@ -345,4 +346,4 @@ def test_a_refusal_with_one_effect_is_that_points_answer() -> None:
     assert isinstance(refused, DeckRefused) and isinstance(plain, Answer)
     with pytest.raises(DeckRefused):
         other = with_values(CASE, {"effects.cavity_air": 1.0, "effects.point_mass": 0.05})
-        TyreModel(other, Door(other), ROWS, [], {}).answers([Point(X)])
+        TyreModel(other, Evaluator(TyreDesign(other)), ROWS, [], {}).answers([Point(X)])

@@ -7,10 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tyrecal.case import LoadedCase, load_case, start_values
-from tyrecal.deck.context import section_mesh
+from tyrecal.case import LoadedCase, start_values
+from tyrecal.deck.tyre_design import TyreDesign
+from tyrecal.design import load_case, resolved
 from tyrecal.diagnose.under_load import LoadedRow, UnderLoad, compare
-from tyrecal.evaluate.door import Door
+from tyrecal.evaluate.evaluator import Evaluator
 from tyrecal.measured.measurement import Measurement
 from tyrecal.modes.loaded import Member
 from tyrecal.modes.mode import Label
@@ -37,8 +38,8 @@ def true_values(case: LoadedCase) -> dict[str, float]:
 @pytest.fixture(scope="module")
 def readings(case: LoadedCase) -> list[Measurement]:
     """Areas and a stiffness of that tyre; the first area as the mean of two."""
-    pressed = Door(case).press(true_values(case), LOADS)
-    low, high = (footprint_row(pressed, each, section_mesh(case)) for each in pressed.footprints)
+    pressed = Evaluator(TyreDesign(case)).press(true_values(case), LOADS)
+    low, high = (footprint_row(pressed, each, resolved(case).mesh) for each in pressed.footprints)
     (first, last), area = LOADS, low["area_m2"]
     found = [
         (AREA, first, 1.01 * area),
@@ -51,7 +52,7 @@ def readings(case: LoadedCase) -> list[Measurement]:
 
 def test_the_tyre_itself_is_found(case: LoadedCase, readings: list[Measurement]) -> None:
     tyres = {"none": start_values(case), "it": true_values(case)}
-    found = compare(case, Door(case), readings, tyres)
+    found = compare(case, Evaluator(TyreDesign(case)), readings, tyres)
     assert not found.failed
     assert [(row.quantity, row.load_N) for row in found.rows] == [
         (AREA, LOADS[0]),
@@ -70,7 +71,7 @@ def test_the_tyre_itself_is_found(case: LoadedCase, readings: list[Measurement])
 def test_modes_under_load(case: LoadedCase) -> None:
     """Named by the doublet's member; one that the tyre does not have stays without a value."""
     values = {**start_values(case), "pressure_kPa": 220.0}
-    (tyre,) = load_tyres(Door(case), {"": values}, LOADS[:1]).values()
+    (tyre,) = load_tyres(case, Evaluator(TyreDesign(case)), {"": values}, LOADS[:1]).values()
     assert isinstance(tyre, LoadedTyre)
     hertz = {mode.member: mode.frequency_Hz for mode in tyre.loads[-1].modes}
     wanted = [
@@ -84,7 +85,7 @@ def test_modes_under_load(case: LoadedCase) -> None:
         )
         for m in wanted
     ]
-    found = compare(case, Door(case), read, {"none": start_values(case)})
+    found = compare(case, Evaluator(TyreDesign(case)), read, {"none": start_values(case)})
     off = {row.member: row.off for row in found.rows}
     assert [off[m]["none"] for m in wanted[:2]] == pytest.approx([0, 0], abs=1e-6)
     assert not off[wanted[2]]
@@ -96,7 +97,7 @@ def test_what_cannot_be_pressed_is_said(case: LoadedCase, readings: list[Measure
     beyond = replace(readings[0], load_N=1e6)
     spliced = {**true_values(case), "effects.stiffness_splice": 0.1}
     tyres = {"none": start_values(case), "it": spliced}
-    found = compare(case, Door(case), [*readings[:2], beyond], tyres)
+    found = compare(case, Evaluator(TyreDesign(case)), [*readings[:2], beyond], tyres)
     first, second = found.rows
     assert set(first.off) == {"none"} and not second.off
     assert found.rms_percent("it") is None and found.rms_percent("none")

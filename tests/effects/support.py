@@ -1,4 +1,4 @@
-"""A coarse case, and frequencies through the public door."""
+"""A coarse case, and frequencies through the public evaluator."""
 
 from __future__ import annotations
 
@@ -8,9 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
-from tyrecal.case import LoadedCase, load_case, start_values, with_values
-from tyrecal.deck.write import Decks
-from tyrecal.evaluate.door import Door, Question
+from tyrecal.case import LoadedCase, start_values
+from tyrecal.deck.decks import Decks
+from tyrecal.deck.tyre_design import TyreDesign
+from tyrecal.design import load_case, with_values
+from tyrecal.evaluate.evaluator import Evaluator, Question
 from tyrecal.modes.label import paired_labels
 from tyrecal.modes.mode import Label
 
@@ -36,7 +38,7 @@ START = start_values(CASE)
 def decks(case: LoadedCase, **effects: float) -> dict[str, str]:
     """The decks of a case with effects."""
     values = {f"effects.{id}": value for id, value in effects.items()}
-    return data(Decks(with_values(case, values)))
+    return data(Decks(TyreDesign(with_values(case, values))))
 
 
 def data(decks: Decks) -> dict[str, str]:
@@ -50,12 +52,12 @@ def data(decks: Decks) -> dict[str, str]:
 def frequencies(case: LoadedCase = CASE, **effects: float) -> dict[Label, float]:
     """Hz by label of a case with effects."""
     values = {f"effects.{id}": value for id, value in effects.items()}
-    modes = paired_labels(Door(case).evaluate(Question({**START, **values})).modes)
+    modes = paired_labels(Evaluator(TyreDesign(case)).evaluate(Question({**START, **values})).modes)
     return {mode.label: mode.frequency_Hz for mode in modes}
 
 
 def slopes(case: LoadedCase, id: str, value: float) -> np.ndarray:
     """Exact d Hz / d parameter of every mode, in the order of the solver."""
     name = f"effects.{id}"
-    answer = Door(case).evaluate(Question({**START, name: value}, (name,)))
+    answer = Evaluator(TyreDesign(case)).evaluate(Question({**START, name: value}, (name,)))
     return np.array(answer.gradients[name])

@@ -7,13 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tyrecal.case import CaseError, load_case, with_values
-from tyrecal.deck.environment import TemplateFailed
-from tyrecal.deck.write import Decks
-from tyrecal.effects import IDS, Effect, catalogue, with_effects
-from tyrecal.evaluate.door import Door, Question
+from tyrecal.case import CaseError
+from tyrecal.deck.decks import Decks
+from tyrecal.deck.tyre_design import TyreDesign
+from tyrecal.design import load_case, resolved, with_values
+from tyrecal.effects import IDS, Effect, catalogue
+from tyrecal.evaluate.evaluator import Evaluator, Question
 from tyrecal.evaluate.failure import DeckRefused, EvaluationFailed
 from tyrecal.fit.calibrate import calibrate
+from tyrecal.templates import TemplateFailed
 
 from .support import CASE, CASES, START, coarse, data, decks, frequencies, slopes
 
@@ -32,12 +34,12 @@ def test_entry_is_complete(effect: Effect) -> None:
 
 
 def test_a_case_without_effects_is_the_very_case() -> None:
-    assert with_effects(CASE) is CASE
+    assert resolved(CASE).written is CASE
 
 
 @each
 def test_zero_writes_the_same_decks(effect: Effect) -> None:
-    plain = data(Decks(CASE))
+    plain = data(Decks(TyreDesign(CASE)))
     assert decks(CASE, **{effect.id: 0.0}) == plain
     assert decks(CASE, **{effect.id: effect.high}) != plain
 
@@ -45,9 +47,9 @@ def test_zero_writes_the_same_decks(effect: Effect) -> None:
 @each
 def test_effect_is_written_in_the_case_and_none_is_left(effect: Effect) -> None:
     case = with_values(CASE, {f"effects.{effect.id}": effect.high})
-    applied = with_effects(case)
+    applied = resolved(case).written
     assert not any(applied.case.effects.values())
-    assert with_effects(applied) is applied
+    assert resolved(applied).written is applied
     assert CASE.case.effects[effect.id] == 0
 
 
@@ -55,10 +57,10 @@ def test_effect_is_written_in_the_case_and_none_is_left(effect: Effect) -> None:
 def test_slopes_are_those_of_the_frequencies(effect: Effect) -> None:
     at = 0.4 * effect.high
     name = f"effects.{effect.id}"
-    door = Door(CASE)
+    evaluator = Evaluator(TyreDesign(CASE))
     f = {
         side: np.array(
-            [m.frequency_Hz for m in door.evaluate(Question({**START, name: at * side})).modes]
+            [m.frequency_Hz for m in evaluator.evaluate(Question({**START, name: at * side})).modes]
         )
         for side in (1 - STEP, 1 + STEP)
     }
@@ -96,7 +98,7 @@ def test_a_fit_ends_where_an_effect_is_absent(method: str, start: float) -> None
     targets = CASE.case.targets.model_copy(update={"modes": modes})
     changed = CASE.case.model_copy(update={"targets": targets, "variables": {"filler": filler}})
     case = replace(CASE, case=changed)
-    result = calibrate(case, Door(case), method).result
+    result = calibrate(case, Evaluator(TyreDesign(case)), method).result
     found = result["variables"]["filler"]
     assert result["converged"] and found["at_bound"] and 0 <= found["value"] < 1e-3
     assert result["moved"] == (start > 0)
@@ -106,7 +108,7 @@ def test_a_fit_ends_where_an_effect_is_absent(method: str, start: float) -> None
 @each
 def test_slope_at_zero_or_one_sentence(effect: Effect) -> None:
     name = f"effects.{effect.id}"
-    evaluate = Decks(with_values(CASE, {name: 0.0}), {name: 0.0}, (name,)).tangents
+    evaluate = Decks(TyreDesign(with_values(CASE, {name: 0.0}), {name: 0.0}), (name,)).tangents
     try:
         rows = evaluate("abaqus")[name]
     except TemplateFailed as error:
@@ -140,7 +142,7 @@ def test_case_file_holds_effects_and_varies_them(case_folder) -> None:
     text = path.read_text().replace("variables:", variable)
     path.write_text(text + "effects: {temperature: 5}\n")
     case = load_case(path)
-    by_variable = data(Decks(with_values(case, {"gauge": 3.0})))
+    by_variable = data(Decks(TyreDesign(with_values(case, {"gauge": 3.0}))))
     assert by_variable == decks(load_case(CASES / path.name), temperature=5, pressure_offset=3)
 
 
@@ -172,13 +174,15 @@ def test_what_cannot_be_is_refused_in_one_sentence(id: str, value: float) -> Non
 
 def test_a_design_that_cannot_be_is_a_failure_to_step_back_from() -> None:
     with pytest.raises(EvaluationFailed, match="tread_wear") as failed:
-        Door(CASE).evaluate(Question({"effects.tread_wear": 2.0}))
+        Evaluator(TyreDesign(CASE)).evaluate(Question({"effects.tread_wear": 2.0}))
     assert failed.value.cause == "refused"
 
 
 def test_a_solver_says_which_effect_it_cannot_express() -> None:
     with pytest.raises(DeckRefused, match="'calculix' cannot express"):
-        Door(CASE, "calculix").evaluate(Question({"effects.dynamic_stiffening": 0.1}))
+        Evaluator(TyreDesign(CASE), "calculix").evaluate(
+            Question({"effects.dynamic_stiffening": 0.1})
+        )
 
 
 def test_a_tyre_without_a_belt_has_no_effects_of_it() -> None:

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from tyrecal_solvers.bundled.section import inflation
 
-from tyrecal.case import LoadedCase, with_values
-from tyrecal.deck.context import section_mesh
-from tyrecal.deck.write import Decks
+from tyrecal.case import LoadedCase
+from tyrecal.deck.decks import Decks
+from tyrecal.deck.tyre_design import TyreDesign
+from tyrecal.design import resolved, with_values
 
 from ..bundled import support
 from .support import CASE
@@ -18,8 +19,8 @@ Array = np.ndarray
 
 def frequencies(case: LoadedCase, start: dict[int, tuple[float, float]] | None = None) -> Array:
     """Hz, two modes a harmonic; start: (r, z) displacements, which held nodes keep."""
-    model = support.model_of(Decks(case).texts("abaqus")["inflate.inp"])
-    row, mesh = model.mesh.index, section_mesh(case)
+    model = support.model_of(Decks(TyreDesign(case)).texts("abaqus")["inflate.inp"])
+    row, mesh = model.mesh.index, resolved(case).mesh
     loose = [row[n] for n in row if n not in mesh.nodes]
     held = support.held(model, [row[n] for n in mesh.rim] + loose)
     loads = support.cavity(model, case.case.pressure_kPa * 1e3)
@@ -35,7 +36,7 @@ def frequencies(case: LoadedCase, start: dict[int, tuple[float, float]] | None =
 @pytest.mark.parametrize("value", [0.0127, -0.0127])
 def test_bent_section_is_the_mounted_one_but_for_small_stresses(value: float) -> None:
     wide = with_values(CASE, {"effects.rim_width": value})
-    before, after = section_mesh(CASE).nodes, section_mesh(wide).nodes
+    before, after = resolved(CASE).mesh.nodes, resolved(wide).mesh.nodes
     start = {n: (after[n][0] - r, after[n][1] - z) for n, (r, z) in before.items()}
     plain = frequencies(CASE)
     mounted, bent = frequencies(CASE, start) / plain - 1, frequencies(wide) / plain - 1

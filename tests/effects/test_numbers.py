@@ -9,12 +9,14 @@ import pytest
 from scipy.interpolate import CubicSpline
 from scipy.spatial import cKDTree
 
-from tyrecal.case import LoadedCase, load_case, with_values
+from tyrecal.case import LoadedCase
 from tyrecal.case.materials import Cord
 from tyrecal.case.section import Gauge, RebarLayer
-from tyrecal.deck.write import Decks
-from tyrecal.effects import catalogue, with_effects
-from tyrecal.evaluate.door import Door, Question
+from tyrecal.deck.decks import Decks
+from tyrecal.deck.tyre_design import TyreDesign
+from tyrecal.design import load_case, resolved, with_values
+from tyrecal.effects import catalogue
+from tyrecal.evaluate.evaluator import Evaluator, Question
 from tyrecal.modes.mode import Label
 from tyrecal.tyre.section import fill_lines
 
@@ -34,24 +36,24 @@ AREAS = {
 def edited(**parts: object) -> dict[str, str]:
     """Decks of the case with parts of it replaced by hand."""
     case = CASE.case.model_copy(update=parts)
-    return data(Decks(replace(CASE, case=case)))
+    return data(Decks(TyreDesign(replace(CASE, case=case))))
 
 
 def set_to(**values: float) -> dict[str, str]:
     """Decks of the case with numbers set by path, __ for a dot."""
     paths = {name.replace("__", "."): value for name, value in values.items()}
-    return data(Decks(with_values(CASE, paths)))
+    return data(Decks(TyreDesign(with_values(CASE, paths))))
 
 
 def mass(**effects: float) -> float:
     values = {f"effects.{id}": value for id, value in effects.items()}
-    return Door(CASE).evaluate(Question({**START, **values})).mass_kg
+    return Evaluator(TyreDesign(CASE)).evaluate(Question({**START, **values})).mass_kg
 
 
 def section(**effects: float) -> Array:
     """Points (line, station, 2) of the section with effects."""
     values = {f"effects.{id}": value for id, value in effects.items()}
-    return with_effects(with_values(CASE, values)).section.points
+    return resolved(with_values(CASE, values)).written.section.points
 
 
 def length(line: Array) -> Array:
@@ -135,7 +137,10 @@ def test_masses() -> None:
     )
     at = CASE.section.points[1:-1, EDGE, 0].mean()
     belts = AREAS["belt_1"] + AREAS["belt_2"]
-    wider = [Door(FINE).evaluate(Question({"effects.belt_width": b})).mass_kg for b in (0, 0.004)]
+    wider = [
+        Evaluator(TyreDesign(FINE)).evaluate(Question({"effects.belt_width": b})).mass_kg
+        for b in (0, 0.004)
+    ]
     assert wider[1] - wider[0] == pytest.approx(0.004 * 2 * np.pi * at * belts, rel=0.05)
     hoop = 1140 * 1e6 / 3.5e9
     belt = swept(CASE.section.points[-2, : EDGE + 1])
@@ -179,8 +184,10 @@ def test_dynamic_stiffening_of_an_unstressed_tyre_is_a_stiffer_rubber() -> None:
     slack = with_values(CASE, {"pressure_kPa": 0.0})
     stiff = with_values(slack, {"C10": 1.5e6})
     values = {"A_belt": START["A_belt"], "A_carcass": START["A_carcass"]}
-    e = Door(slack).evaluate(Question({**values, "effects.dynamic_stiffening": 0.5}))
-    s = Door(stiff).evaluate(Question(values))
+    e = Evaluator(TyreDesign(slack)).evaluate(
+        Question({**values, "effects.dynamic_stiffening": 0.5})
+    )
+    s = Evaluator(TyreDesign(stiff)).evaluate(Question(values))
     found, expected = ([m.frequency_Hz for m in answer.modes] for answer in (e, s))
     assert found == pytest.approx(expected, rel=1e-9)
 
@@ -229,7 +236,7 @@ def test_belt_bends_in_its_plane_at_higher_frequency(id: str, value: float) -> N
 @pytest.mark.parametrize("id", [e.id for e in catalogue().values() if not e.needs])
 def test_calculix_has_a_deck_of_it(id: str) -> None:
     case: LoadedCase = with_values(CASE, {f"effects.{id}": catalogue()[id].high / 2})
-    assert Decks(case).texts("calculix") != Decks(CASE).texts("calculix")
+    assert Decks(TyreDesign(case)).texts("calculix") != Decks(TyreDesign(CASE)).texts("calculix")
 
 
 def test_turned_up_carcass_holds_the_belt_from_the_side() -> None:
@@ -256,7 +263,7 @@ def test_layer_ends_with_its_regions() -> None:
     layer = CASE.case.rebar_layers["carcass"]
     short = layer.model_copy(update={"regions": ["crown", "upper_sidewall"]})
     layers = {**CASE.case.rebar_layers, "carcass": short}
-    long = data(Decks(CASE))["inflate.inp"]
+    long = data(Decks(TyreDesign(CASE)))["inflate.inp"]
     found = edited(rebar_layers=layers)["inflate.inp"]
     gone = set(long.splitlines()) - set(found.splitlines())
     assert len(gone) == 2 * (3 + 1)  # the lower sidewall's and the bead's elements, both sides

@@ -10,15 +10,17 @@ import pytest
 from tyrecal_solvers.bundled.deck.keywords import DeckError
 from tyrecal_solvers.bundled.job import run
 
-from tyrecal.case import LoadedCase, load_case, with_values
-from tyrecal.deck.environment import TemplateFailed
-from tyrecal.deck.write import Decks
-from tyrecal.evaluate.door import Door, Question
+from tyrecal.case import LoadedCase
+from tyrecal.deck.decks import Decks
+from tyrecal.deck.tyre_design import TyreDesign
+from tyrecal.design import load_case, with_values
+from tyrecal.evaluate.evaluator import Evaluator, Question
 from tyrecal.evaluate.failure import DeckRefused
 from tyrecal.evaluate.results import Evaluation
 from tyrecal.evaluate.store import Store
 from tyrecal.modes.mode import Label
 from tyrecal.studies.modes import modes_result
+from tyrecal.templates import TemplateFailed
 
 from .support import CASE, CASES, START, data, decks
 
@@ -34,7 +36,7 @@ def few(case: LoadedCase = CASE) -> LoadedCase:
 
 def evaluated(id: str = "", value: float = 0.0, case: LoadedCase | None = None) -> Evaluation:
     effect = {f"effects.{id}": value} if id else {}
-    return Door(case or few()).evaluate(Question({**START, **effect}))
+    return Evaluator(TyreDesign(case or few())).evaluate(Question({**START, **effect}))
 
 
 def by_label(found: Evaluation) -> dict[Label, dict]:
@@ -86,21 +88,21 @@ def test_a_mass_is_weighed_with_the_tyre() -> None:
 
 
 def test_the_record_answers_with_both_members(tmp_path) -> None:
-    door = Door(few(), store=Store(tmp_path))
+    evaluator = Evaluator(TyreDesign(few()), store=Store(tmp_path))
     question = Question({**START, "effects.point_mass": 0.02})
-    first, again = door.evaluate(question), door.evaluate(question)
-    assert (door.counts.runs, door.counts.recorded) == (1, 1)
+    first, again = evaluator.evaluate(question), evaluator.evaluate(question)
+    assert (evaluator.counts.runs, evaluator.counts.recorded) == (1, 1)
     assert [m.members for m in first.modes] == [m.members for m in again.modes]
 
 
 def test_a_splice_has_no_exact_slopes() -> None:
     name = "effects.stiffness_splice"
-    door = Door(with_values(few(), {name: 0.2}))
-    assert not door.has_gradients and Door(few()).has_gradients
+    evaluator = Evaluator(TyreDesign(with_values(few(), {name: 0.2})))
+    assert not evaluator.has_gradients and Evaluator(TyreDesign(few())).has_gradients
     with pytest.raises(DeckRefused, match="no exact derivatives"):
-        door.evaluate(Question({**START, name: 0.2}, ("A_belt",)))
+        evaluator.evaluate(Question({**START, name: 0.2}, ("A_belt",)))
     with pytest.raises(TemplateFailed, match=f"{name} is 0"):
-        Decks(few(), {name: 0.0}, (name,)).tangents("abaqus")
+        Decks(TyreDesign(few(), {name: 0.0}), (name,)).tangents("abaqus")
 
 
 @pytest.mark.parametrize(
@@ -113,13 +115,13 @@ def test_a_splice_has_no_exact_slopes() -> None:
 )
 def test_what_does_not_go_together(values: dict[str, float], words: str) -> None:
     with pytest.raises(DeckRefused, match=words):
-        Door(few()).evaluate(Question({**START, **values}))
+        Evaluator(TyreDesign(few())).evaluate(Question({**START, **values}))
 
 
 def test_not_on_a_road() -> None:
     for id, words in (("stiffness_splice", "pressed on a road"), ("rotation", "turning tyre")):
         with pytest.raises((DeckRefused, TemplateFailed), match=words):
-            Door(CASE).press({**START, f"effects.{id}": SMALL[id]}, [1000.0])
+            Evaluator(TyreDesign(CASE)).press({**START, f"effects.{id}": SMALL[id]}, [1000.0])
 
 
 @pytest.mark.parametrize("solver", ["calculix", "abaqus"])
@@ -128,7 +130,7 @@ def test_not_on_a_road() -> None:
 )
 def test_others_refuse_the_case_in_one_sentence(solver: str, path: str) -> None:
     with pytest.raises(DeckRefused, match=f"solver '{solver}' cannot express"):
-        Door(CASE, solver).evaluate(Question({**START, path: 0.5}))
+        Evaluator(TyreDesign(CASE), solver).evaluate(Question({**START, path: 0.5}))
 
 
 def test_deck_is_abaqus() -> None:
@@ -153,8 +155,8 @@ def test_splice_in_the_case_file(case_folder) -> None:
     text = path.read_text()
     splice = "splice: {share: 1.0, width_deg: 4, numbers: [rebar_layers.carcass.area_m2]}\n"
     path.write_text(text + splice)
-    written = data(Decks(load_case(path)))
-    plain = data(Decks(load_case(CASES / path.name)))
+    written = data(Decks(TyreDesign(load_case(path))))
+    plain = data(Decks(TyreDesign(load_case(CASES / path.name))))
     assert {name: written[name] for name in plain} == plain
     differ = [
         (a, b)
@@ -166,7 +168,7 @@ def test_splice_in_the_case_file(case_folder) -> None:
     assert len(differ) == 1 and differ[0][0].startswith("CARCASS,")
     path.write_text(text + splice.replace("area_m2", "area"))
     with pytest.raises(TemplateFailed, match=r"splice.numbers: .*there is no 'area'"):
-        Decks(load_case(path)).texts("abaqus")
+        Decks(TyreDesign(load_case(path))).texts("abaqus")
 
 
 @pytest.mark.parametrize("id", ["point_mass", "rotation"])
@@ -236,7 +238,7 @@ def test_attached_decks_that_are_refused(tmp_path, old: str, new: str, words: st
 
 
 def test_sector_of_another_mesh_is_refused(tmp_path) -> None:
-    texts = Decks(with_values(few(), {"splice.share": 0.5})).texts("abaqus")
+    texts = Decks(TyreDesign(with_values(few(), {"splice.share": 0.5}))).texts("abaqus")
     for name, text in texts.items():
         (tmp_path / name).write_text(text)
     request = {"harmonics": [0, 1], "sector": {"job": "splice", "width_deg": 10.0}}

@@ -1,4 +1,4 @@
-"""A solver of a few lines behind the door, to test what the door and the record do with it."""
+"""A solver of a few lines, to test what the evaluator and the record do with it."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from tyrecal.case import load_case
-from tyrecal.evaluate.door import Door, Question
+from tyrecal.deck.tyre_design import TyreDesign
+from tyrecal.design import load_case
+from tyrecal.evaluate.evaluator import Evaluator, Question
 from tyrecal.evaluate.results import Evaluation
 from tyrecal.evaluate.store import Store
 
@@ -69,12 +70,14 @@ class StandIn:
         }
 
 
-def door(folder: Path, solver: StandIn | None = None) -> Door:
-    """A door to a stand-in with a record, both under ``folder``."""
+def evaluator(folder: Path, solver: StandIn | None = None) -> Evaluator:
+    """A evaluator to a stand-in with a record, both under ``folder``."""
     solver = solver or StandIn()
-    return Door(CASE, folder=folder / "runs", store=Store(folder / "record"), _solver=solver)
+    return Evaluator(
+        TyreDesign(CASE), folder=folder / "runs", store=Store(folder / "record"), _solver=solver
+    )
 
 
-def ask(door: Door, value: float = 1e6) -> Evaluation:
+def ask(evaluator: Evaluator, value: float = 1e6) -> Evaluation:
     """Evaluate one design."""
-    return door.evaluate(Question({"C10": value}))
+    return evaluator.evaluate(Question({"C10": value}))

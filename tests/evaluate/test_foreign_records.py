@@ -15,11 +15,11 @@ import numpy as np
 import pytest
 
 from tyrecal.cli.main import main
-from tyrecal.evaluate.door import Counts
+from tyrecal.evaluate.evaluator import Counts
 from tyrecal.evaluate.failure import EvaluationFailed
 from tyrecal.evaluate.store import Store
 
-from .stand_in import StandIn, ask, door
+from .stand_in import StandIn, ask, evaluator
 from .test_store import records, same
 
 Content = dict[str, Any]
@@ -131,7 +131,7 @@ def test_is_computed_again(
     kind: str, tmp_path: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    fresh = ask(door(tmp_path))
+    fresh = ask(evaluator(tmp_path))
     (path,) = records(tmp_path)
     KINDS[kind](path)
     if kind != "another pressure":  # only who asks knows which one was wanted
@@ -139,21 +139,21 @@ def test_is_computed_again(
         assert verified.summary(verify=True)["damaged"] == 1 and not records(tmp_path)
         path.with_suffix(".damaged").rename(path)
         caplog.clear()
-    again = door(tmp_path)
+    again = evaluator(tmp_path)
     same(fresh, ask(again))
     assert again.counts == Counts(1, 0)
     assert [str(path) in r.getMessage() for r in caplog.records] == [True]  # said once
-    same(fresh, ask(door(tmp_path)))
+    same(fresh, ask(evaluator(tmp_path)))
     assert not (tmp_path / "unpickled").exists()
 
 
 def test_two_records_that_changed_places(tmp_path: Path) -> None:
-    fresh = [ask(door(tmp_path), value) for value in (1e6, 2e6)]
+    fresh = [ask(evaluator(tmp_path), value) for value in (1e6, 2e6)]
     first, second = records(tmp_path)
     one, other = first.read_bytes(), second.read_bytes()
     first.write_bytes(other)
     second.write_bytes(one)
-    again = door(tmp_path)
+    again = evaluator(tmp_path)
     for before, value in zip(fresh, (1e6, 2e6), strict=True):
         same(before, ask(again, value))
     assert again.counts == Counts(2, 0)
@@ -161,19 +161,19 @@ def test_two_records_that_changed_places(tmp_path: Path) -> None:
 
 def test_a_failures_words_and_folder_are_not_believed(tmp_path: Path) -> None:
     with pytest.raises(EvaluationFailed):
-        ask(door(tmp_path, StandIn("unstable")))
+        ask(evaluator(tmp_path, StandIn("unstable")))
     (path,) = records(tmp_path)
     words, elsewhere = "\x1b]0;title\x07\x1b[31mred", str(tmp_path / "elsewhere")
     edited(lambda told: told["content"].update(words=words, folder=elsewhere))(path)
     with pytest.raises(EvaluationFailed) as failure:
-        ask(door(tmp_path, StandIn("unstable")))
+        ask(evaluator(tmp_path, StandIn("unstable")))
     kept = failure.value.folder
     assert kept and kept.parent == tmp_path / "runs" and str(failure.value).isprintable()
     assert "title" in failure.value.words
 
 
 def test_no_link_in_a_store_is_followed(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
-    ask(door(tmp_path))
+    ask(evaluator(tmp_path))
     (path,) = records(tmp_path)
     elsewhere = tmp_path / "elsewhere"
     path.parent.rename(elsewhere)
@@ -182,7 +182,7 @@ def test_no_link_in_a_store_is_followed(tmp_path: Path, caplog: pytest.LogCaptur
     KINDS["no JSON"](path)
     before[elsewhere / path.name] = path.read_bytes()
     store = Store(tmp_path / "record")
-    assert ask(door(tmp_path)).modes and store.prune(0) == 0
+    assert ask(evaluator(tmp_path)).modes and store.prune(0) == 0
     assert store.summary(verify=True)["records"] == 0
     assert {each: each.read_bytes() for each in elsewhere.iterdir()} == before
     assert "is a link" in caplog.text and "not recorded" in caplog.text
@@ -202,7 +202,7 @@ def test_a_store_that_all_may_write_is_named(
 def test_store_verify_names_what_it_sets_aside(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    ask(door(tmp_path))
+    ask(evaluator(tmp_path))
     (path,) = records(tmp_path)
     path.rename(path.with_name("00" * 32 + ".record"))
     with pytest.raises(SystemExit) as leave:

@@ -8,8 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tyrecal.case import LoadedCase, load_case
-from tyrecal.evaluate.door import Door, Question
+from tyrecal.case import LoadedCase
+from tyrecal.deck.tyre_design import TyreDesign
+from tyrecal.design import load_case
+from tyrecal.evaluate.evaluator import Evaluator, Question
 from tyrecal.evaluate.failure import EvaluationFailed
 from tyrecal.modes.label import label_modes
 
@@ -19,7 +21,7 @@ CASE = load_case(CASES / "p235_75r17.yaml")
 
 
 def frequencies(case: LoadedCase, **values: float) -> dict[str, float]:
-    modes = label_modes(Door(case).evaluate(Question(values)).modes)
+    modes = label_modes(Evaluator(TyreDesign(case)).evaluate(Question(values)).modes)
     return {str(mode.label): mode.frequency_Hz for mode in modes}
 
 
@@ -115,7 +117,7 @@ def test_the_papers_elements(case_folder: Path) -> None:
 def test_no_pressure_no_strain() -> None:
     """At rest nothing moves, and the cold tyre still has modes."""
     case = replace(CASE, case=CASE.case.model_copy(update={"pressure_kPa": 0.0}))
-    answer = Door(case).evaluate(Question({}))
+    answer = Evaluator(TyreDesign(case)).evaluate(Question({}))
     assert abs(answer.displacement).max() < 1e-12
     assert min(mode.frequency_Hz for mode in answer.modes) > 1.0
 
@@ -124,7 +126,9 @@ def test_no_pressure_no_strain() -> None:
 def test_an_honest_failure_tells_the_pressure_that_was_reached(tmp_path: Path) -> None:
     case = replace(CASE, case=CASE.case.model_copy(update={"pressure_kPa": 1900.0}))
     with pytest.raises(EvaluationFailed, match=r"inflation stopped at \d.* of 1900 kPa") as failure:
-        Door(case, folder=tmp_path / "runs").evaluate(Question({"A_carcass": 1e-8, "C10": 1e5}))
+        Evaluator(TyreDesign(case), folder=tmp_path / "runs").evaluate(
+            Question({"A_carcass": 1e-8, "C10": 1e5})
+        )
     assert failure.value.cause == "no_equilibrium"
     assert failure.value.folder is not None and (failure.value.folder / "modes.inp").exists()
 
@@ -133,7 +137,9 @@ def test_an_honest_failure_tells_the_pressure_that_was_reached(tmp_path: Path) -
 def test_answers_in_order_from_a_process_pool() -> None:
     questions = [Question({"A_belt": a}) for a in (2e-7, 3e-7, 4e-7)]
     questions.insert(1, Question({"A_carcass": 1e-8, "C10": 1e5, "pressure_kPa": 1900.0}))
-    alone, pooled = (list(Door(CASE).evaluate_all(questions, jobs)) for jobs in (1, 2))
+    alone, pooled = (
+        list(Evaluator(TyreDesign(CASE)).evaluate_all(questions, jobs)) for jobs in (1, 2)
+    )
     for one, other in zip(alone, pooled, strict=True):
         assert type(one) is type(other)
         if isinstance(one, EvaluationFailed):

@@ -1,4 +1,4 @@
-"""Footprints through the door: the same from the record, nothing believed that is not whole."""
+"""Evaluated footprints: the same from the record, nothing believed that is not whole."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tyrecal.evaluate.door import Door
+from tyrecal.deck.tyre_design import TyreDesign
+from tyrecal.evaluate.evaluator import Evaluator
 from tyrecal.evaluate.failure import DeckRefused, EvaluationFailed
 from tyrecal.evaluate.store import Store
 
@@ -18,15 +19,17 @@ from .stand_in import CASE
 LOADS = (500.0, 4000.0)
 
 
-def door(folder: Path, **changes: Any) -> Door:
+def evaluator(folder: Path, **changes: Any) -> Evaluator:
     solver = Hertz()
     for name, value in changes.items():
         setattr(solver, name, value)
-    return Door(CASE, folder=folder / "runs", store=Store(folder / "record"), _solver=solver)
+    return Evaluator(
+        TyreDesign(CASE), folder=folder / "runs", store=Store(folder / "record"), _solver=solver
+    )
 
 
 def test_the_record_answers_the_same_and_other_loads_are_another_question(tmp_path: Path) -> None:
-    first, second = door(tmp_path), door(tmp_path)
+    first, second = evaluator(tmp_path), evaluator(tmp_path)
     run, recorded = first.press({}, LOADS), second.press({}, LOADS)
     assert (first.counts.runs, second.counts.runs, second.counts.recorded) == (1, 0, 1)
     for one, other in zip(run.footprints, recorded.footprints, strict=True):
@@ -38,22 +41,22 @@ def test_the_record_answers_the_same_and_other_loads_are_another_question(tmp_pa
 
 
 def test_a_load_not_reached_is_on_record_and_its_run_is_kept(tmp_path: Path) -> None:
-    first = door(tmp_path, reach=1e3).press({}, LOADS)
+    first = evaluator(tmp_path, reach=1e3).press({}, LOADS)
     assert first.failed and first.failed.folder and first.failed.folder.exists()
     assert (first.failed.folder / "press.inp").exists()
-    again = door(tmp_path)
+    again = evaluator(tmp_path)
     recorded = again.press({}, LOADS)
     assert again.counts.runs == 0 and len(recorded.footprints) == 1
     assert recorded.failed and recorded.failed.words == first.failed.words
 
 
 def test_time_that_ran_out_is_not_on_record(tmp_path: Path) -> None:
-    slow = door(tmp_path, reach=1e3)
+    slow = evaluator(tmp_path, reach=1e3)
     read = slow.solver.read
     slow.solver.read = lambda folder: {**read(folder), "cause": "timed_out"}  # type: ignore[method-assign]
     pressed = slow.press({}, LOADS)
     assert pressed.failed and pressed.failed.cause == "timed_out"
-    again = door(tmp_path)
+    again = evaluator(tmp_path)
     assert again.press({}, LOADS).failed is None and again.counts.runs == 1
 
 
@@ -71,7 +74,7 @@ def test_time_that_ran_out_is_not_on_record(tmp_path: Path) -> None:
     ],
 )
 def test_answers_that_are_not_whole(change: Any, words: str, tmp_path: Path) -> None:
-    wrong = door(tmp_path)
+    wrong = evaluator(tmp_path)
     read = wrong.solver.read
 
     def changed(folder: Path) -> dict[str, Any]:
@@ -88,7 +91,7 @@ def test_answers_that_are_not_whole(change: Any, words: str, tmp_path: Path) -> 
 
 
 def test_each_load_has_the_time_of_a_run(tmp_path: Path) -> None:
-    asked = door(tmp_path)
+    asked = evaluator(tmp_path)
     limits: list[float] = []
     asked.solver.run = lambda folder, limit: limits.append(limit)  # type: ignore[method-assign]
     asked.press({}, LOADS)
@@ -97,11 +100,11 @@ def test_each_load_has_the_time_of_a_run(tmp_path: Path) -> None:
 
 
 def test_modes_on_a_road_are_another_capability_than_a_footprint(tmp_path: Path) -> None:
-    plain = door(tmp_path, capabilities=frozenset({"modes", "footprint"}))
+    plain = evaluator(tmp_path, capabilities=frozenset({"modes", "footprint"}))
     plain.needs_road()
     with pytest.raises(DeckRefused, match=r"find modes of a tyre on a road.*\(loaded_modes\)"):
         plain.needs_road(modes=True)
-    none = door(tmp_path, capabilities=frozenset({"modes", "loaded_modes"}))
+    none = evaluator(tmp_path, capabilities=frozenset({"modes", "loaded_modes"}))
     none.needs_road(modes=True)
     with pytest.raises(DeckRefused, match=r"press a tyre on a road.*\(footprint\)"):
         none.needs_road()

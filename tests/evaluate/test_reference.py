@@ -7,9 +7,10 @@ import json
 import numpy as np
 import pytest
 
-from tyrecal.case import load_case, start_values, with_values
-from tyrecal.case.variables import with_level
-from tyrecal.evaluate.door import Door, Question
+from tyrecal.case import start_values, with_level
+from tyrecal.deck.tyre_design import TyreDesign
+from tyrecal.design import load_case, with_values
+from tyrecal.evaluate.evaluator import Evaluator, Question
 from tyrecal.modes.label import label_modes
 from tyrecal.modes.match import match
 from tyrecal.modes.mode import Label
@@ -35,7 +36,7 @@ def evaluate(name: str, point: dict, level: str, gradients: tuple[str, ...] = ()
     case = replace(case, case=case.case.model_copy(update={"mesh": mesh}))
     case = with_values(case, {"pressure_kPa": point["pressure_kPa"]})
     values = {v: point[v] for v in VARIABLES}
-    evaluation = Door(case).evaluate(Question(values, gradients))
+    evaluation = Evaluator(TyreDesign(case)).evaluate(Question(values, gradients))
     return evaluation, match(label_modes(evaluation.modes), [label(k) for k in point["modes"]])
 
 
@@ -104,10 +105,10 @@ def test_any_number_of_the_case_has_an_exact_derivative(
             "rebar_layers.belt_1.angle_deg": 70.0,
             "materials.rubber.prony.0.g": 0.3,
         }.get(path) or _number(case, path)
-    door = Door(case)
+    evaluator = Evaluator(TyreDesign(case))
 
     def frequencies(x: float) -> np.ndarray:
-        evaluation = door.evaluate(Question({path: x}))
+        evaluation = evaluator.evaluate(Question({path: x}))
         return np.array([m.frequency_Hz for m in evaluation.modes])
 
     h = 2e-3 * value
@@ -115,7 +116,7 @@ def test_any_number_of_the_case_has_an_exact_derivative(
         (frequencies(value + k * h) - frequencies(value - k * h)) / (2 * k * h) for k in (1, 2)
     )
     difference = (4 * near - far) / 3
-    exact = door.evaluate(Question({path: value}, (path,))).gradients[path]
+    exact = evaluator.evaluate(Question({path: value}, (path,))).gradients[path]
     assert np.max(abs(exact - difference)) <= 1e-5 * np.max(abs(exact)) + 1e-12
 
 

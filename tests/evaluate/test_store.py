@@ -12,14 +12,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tyrecal.deck.tyre_design import TyreDesign
 from tyrecal.evaluate import store as store_module
-from tyrecal.evaluate.door import Counts, Door, Question
+from tyrecal.evaluate.evaluator import Counts, Evaluator, Question
 from tyrecal.evaluate.failure import EvaluationFailed
 from tyrecal.evaluate.record import Damaged, pack, unpack
 from tyrecal.evaluate.results import Evaluation, HarmonicShape
 from tyrecal.evaluate.store import Store
 
-from .stand_in import CASE, StandIn, ask, door
+from .stand_in import CASE, StandIn, ask, evaluator
 
 ABOUT = {"solver": "s", "version": "1"}
 
@@ -86,9 +87,9 @@ def test_any_changed_or_missing_byte_is_seen() -> None:
 
 
 def test_the_record_answers_like_the_solver(tmp_path: Path) -> None:
-    first = door(tmp_path)
+    first = evaluator(tmp_path)
     fresh = ask(first)
-    again = door(tmp_path)
+    again = evaluator(tmp_path)
     same(fresh, ask(again))
     assert (first.counts, again.counts) == (Counts(1, 0), Counts(0, 1))
     assert ask(again, 2e6) and again.counts == Counts(1, 1)
@@ -97,9 +98,9 @@ def test_the_record_answers_like_the_solver(tmp_path: Path) -> None:
 
 def test_the_bundled_solvers_answers_too(tmp_path: Path) -> None:
     question = Question({"A_belt": 2.1e-7, "C10": 9e5}, ("A_belt", "C10"))
-    plain = Door(CASE).evaluate(question)
+    plain = Evaluator(TyreDesign(CASE)).evaluate(question)
     for runs in (1, 0):
-        recorded = Door(CASE, store=Store(tmp_path))
+        recorded = Evaluator(TyreDesign(CASE), store=Store(tmp_path))
         same(plain, recorded.evaluate(question))
         assert recorded.counts.runs == runs
 
@@ -108,7 +109,7 @@ def test_the_bundled_solvers_answers_too(tmp_path: Path) -> None:
 def test_a_damaged_record_is_computed_again(
     damage: str, tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
-    fresh = ask(door(tmp_path))
+    fresh = ask(evaluator(tmp_path))
     (path,) = records(tmp_path)
     data = path.read_bytes()
     middle = len(data) // 2
@@ -122,7 +123,7 @@ def test_a_damaged_record_is_computed_again(
         }[damage]
     )
     for runs in (1, 0):
-        again = door(tmp_path)
+        again = evaluator(tmp_path)
         same(fresh, ask(again))
         assert again.counts.runs == runs
     assert [str(path) in r.getMessage() for r in caplog.records] == [True]  # said once
@@ -146,7 +147,7 @@ def test_only_failures_of_the_deck_are_recorded(cause: str, recorded: bool, tmp_
     solver = StandIn(cause)
     for _ in range(2):
         with pytest.raises(EvaluationFailed, match=f"said: {cause}") as failure:
-            ask(door(tmp_path, solver))
+            ask(evaluator(tmp_path, solver))
         assert failure.value.cause == cause and failure.value.words == f"said: {cause}"
         assert failure.value.folder and (failure.value.folder / "deck.inp").exists()
         folders.append(failure.value.folder)
@@ -164,7 +165,7 @@ def test_numbers_that_are_none_are_not_recorded(tmp_path: Path) -> None:
             return answer
 
     with pytest.raises(EvaluationFailed, match="nan Hz") as failure:
-        ask(door(tmp_path, Zeros()))
+        ask(evaluator(tmp_path, Zeros()))
     assert failure.value.folder and failure.value.folder.exists()
     assert not records(tmp_path)
 
@@ -173,12 +174,12 @@ def test_another_version_or_reader_is_another_question(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     solver = StandIn()
-    ask(door(tmp_path, solver))
+    ask(evaluator(tmp_path, solver))
     solver.version = "2"
-    ask(door(tmp_path, solver))
+    ask(evaluator(tmp_path, solver))
     monkeypatch.setitem(store_module._SOURCES, StandIn, "an edited reader")
-    ask(door(tmp_path, solver))
-    ask(door(tmp_path, solver))
+    ask(evaluator(tmp_path, solver))
+    ask(evaluator(tmp_path, solver))
     assert solver.runs == 3
     found = Store(tmp_path / "record").summary(verify=True)
     assert found["solvers"] == {"stand-in 1": 1, "stand-in 2": 2} and found["records"] == 3
@@ -252,7 +253,7 @@ def test_a_full_disc_does_not_spoil_an_evaluation(
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(Path, "write_bytes", full)
-    asked = door(tmp_path)
+    asked = evaluator(tmp_path)
     assert ask(asked).modes and ask(asked, 2e6).modes
     assert [r.levelno for r in caplog.records] == [logging.WARNING]  # said once
     assert "No space left" in caplog.text and "not recorded" in caplog.text
@@ -265,5 +266,5 @@ def test_a_full_disc_under_the_run_is_an_error(tmp_path: Path) -> None:
             raise OSError(28, "No space left on device")
 
     with pytest.raises(OSError, match=r"No space left on device: .*run-"):
-        ask(door(tmp_path, Full()))
+        ask(evaluator(tmp_path, Full()))
     assert not any((tmp_path / "runs").iterdir()) and not records(tmp_path)

@@ -1,4 +1,4 @@
-"""A tyre with frequencies in closed form behind the same door, to test the optimiser alone."""
+"""A tyre with frequencies in closed form behind the same evaluator, to test the optimiser alone."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 
 import numpy as np
 
-from tyrecal.evaluate.door import Question
+from tyrecal.evaluate.evaluator import Question
 from tyrecal.evaluate.failure import DeckRefused, EvaluationFailed
 from tyrecal.evaluate.results import Evaluation, HarmonicShape, RawMode
 from tyrecal.modes.mode import Label
@@ -38,7 +38,7 @@ def shape(label: Label) -> HarmonicShape:
     return HarmonicShape(label.c, np.arange(9), POINTS, u)
 
 
-class FakeDoor:
+class FakeEvaluator:
     """Frequencies f_i = base_i exp(sum_j power_ij ln(x_j / start_j)), with exact slopes.
 
     fails: designs for which the solver gives up.

@@ -10,10 +10,11 @@ from typing import Any
 import numpy as np
 from tyrecal_solvers.bundled.adapter import Bundled
 
-from tyrecal.case import LoadedCase, load_case, start_values
+from tyrecal.case import LoadedCase, start_values, with_level
 from tyrecal.case.calibration import TargetFootprint, TargetMode
-from tyrecal.case.variables import with_level
-from tyrecal.evaluate.door import Door
+from tyrecal.deck.tyre_design import TyreDesign
+from tyrecal.design import load_case
+from tyrecal.evaluate.evaluator import Evaluator
 from tyrecal.evaluate.store import Store
 
 from ..conftest import CASES
@@ -77,9 +78,9 @@ def stiffness_target(
     )
 
 
-def door(case: LoadedCase, folder: Path | None = None, **options: float) -> Door:
-    """A door to the stand-in, with a record where there is a folder."""
+def evaluator(case: LoadedCase, folder: Path | None = None, **options: float) -> Evaluator:
+    """A evaluator to the stand-in, with a record where there is a folder."""
     solver = Elastic()
     for name, value in options.items():
         setattr(solver, name, value)
-    return Door(case, store=Store(folder) if folder else None, _solver=solver)
+    return Evaluator(TyreDesign(case), store=Store(folder) if folder else None, _solver=solver)

@@ -11,9 +11,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tyrecal.case import LoadedCase, load_case, start_values
+from tyrecal.case import LoadedCase, start_values
+from tyrecal.deck.tyre_design import TyreDesign
+from tyrecal.design import load_case
 from tyrecal.errors import InputError
-from tyrecal.evaluate.door import Counts, Door, Question
+from tyrecal.evaluate.evaluator import Counts, Evaluator, Question
 from tyrecal.evaluate.executor import Here, WorkerLost
 from tyrecal.evaluate.failure import DeckRefused, EvaluationFailed
 from tyrecal.evaluate.results import Evaluation
@@ -25,7 +27,7 @@ from tyrecal.fit.slsqp import _beyond_crossing
 
 from ..chance import Chance
 from ..conftest import CASES
-from .fake import LABELS, FakeDoor
+from .fake import LABELS, FakeEvaluator
 
 CASE = load_case(CASES / "p235_75r17.yaml")
 START = start_values(CASE)
@@ -39,14 +41,14 @@ POWERS = {
 TRUTH = {"A_belt": 4e-7, "A_carcass": 1.5e-7, "C10": 4.5e5}
 
 
-def door(truth: dict[str, float] = TRUTH, powers=POWERS, **options) -> FakeDoor:
+def evaluator(truth: dict[str, float] = TRUTH, powers=POWERS, **options) -> FakeEvaluator:
     """A fake tyre that meets the targets exactly at ``truth``."""
     base = {
         label: TARGETS[label]
         * float(np.prod([(START[n] / truth[n]) ** p[i] for n, p in powers.items()]))
         for i, label in enumerate(LABELS)
     }
-    return FakeDoor(base, powers, START, **options)
+    return FakeEvaluator(base, powers, START, **options)
 
 
 def test_objective_by_hand_from_the_papers_table_2() -> None:
@@ -63,7 +65,7 @@ def test_objective_by_hand_from_the_papers_table_2() -> None:
 @pytest.mark.parametrize("method", ["slsqp", "least-squares"])
 @pytest.mark.parametrize("has_gradients", [True, False])
 def test_finds_the_truth(method: str, has_gradients: bool) -> None:
-    fit = calibrate(CASE, door(has_gradients=has_gradients), method)  # type: ignore[arg-type]
+    fit = calibrate(CASE, evaluator(has_gradients=has_gradients), method)  # type: ignore[arg-type]
     assert fit.result["converged"] and fit.result["moved"] and "footprint" not in fit.result
     assert fit.result["objective_Hz"] < 0.02
     for name, value in TRUTH.items():
@@ -79,7 +81,7 @@ def test_steps_back_from_designs_that_fail(
 ) -> None:
     """The truth lies just before a cliff, beyond which there is no equilibrium."""
     fails = lambda values: side * (values[name] / TRUTH[name] - 1) > margin
-    fit = calibrate(CASE, door(fails=fails), method)  # type: ignore[arg-type]
+    fit = calibrate(CASE, evaluator(fails=fails), method)  # type: ignore[arg-type]
     assert fit.result["objective_Hz"] < 0.05
     failed = [row for row in fit.history if row["objective_Hz"] is None]
     assert all("inflation stopped" in row["failure"] for row in failed)
@@ -89,24 +91,24 @@ def test_steps_back_from_designs_that_fail(
 @pytest.mark.parametrize("method", ["slsqp", "least-squares"])
 def test_converges_on_eigenvalues_of_seven_digits(method: str) -> None:
     """As CalculiX prints them; differences then leave noise in the gradient."""
-    base = door(has_gradients=False)
+    base = evaluator(has_gradients=False)
     base.solver = SimpleNamespace(difference_step=1e-3)  # type: ignore[assignment]
     base.round = lambda f: np.sqrt([float(f"{x:.6e}") for x in f**2])
     noisy = [TARGETS[label] * (1 + 0.02 * (-1) ** i) for i, label in enumerate(LABELS)]
     fit = calibrate(with_targets(frequency_Hz=noisy), base, method)  # type: ignore[arg-type]
     assert fit.result["converged"] and fit.result["evaluations"] <= 20
-    exact = calibrate(with_targets(frequency_Hz=noisy), door(), method)  # type: ignore[arg-type]
+    exact = calibrate(with_targets(frequency_Hz=noisy), evaluator(), method)  # type: ignore[arg-type]
     assert fit.result["objective_Hz"] == pytest.approx(exact.result["objective_Hz"], abs=1e-3)
 
 
 def test_a_start_that_fails_is_a_failure_not_a_number() -> None:
     with pytest.raises(EvaluationFailed, match="12 of 240 kPa"):
-        calibrate(CASE, door(fails=lambda values: True))  # type: ignore[arg-type]
+        calibrate(CASE, evaluator(fails=lambda values: True))  # type: ignore[arg-type]
 
 
 def test_a_design_whose_deck_is_refused_ends_the_fit_and_is_no_point_of_it() -> None:
     """A refusal is a mistake of the case, not of the design."""
-    refusing = door()
+    refusing = evaluator()
     answer = refusing.evaluate
 
     def evaluate(question: Question) -> Evaluation:
@@ -121,15 +123,15 @@ def test_a_design_whose_deck_is_refused_ends_the_fit_and_is_no_point_of_it() -> 
 
 def test_a_neighbour_that_fails_gives_way_to_the_one_on_the_other_side() -> None:
     edge = lambda values: values["C10"] > START["C10"] * 1.00005
-    there = Problem(CASE, door(has_gradients=False, fails=edge)).evaluate(START_X)  # type: ignore[arg-type]
-    plain = Problem(CASE, door(has_gradients=False)).evaluate(START_X)  # type: ignore[arg-type]
+    there = Problem(CASE, evaluator(has_gradients=False, fails=edge)).evaluate(START_X)  # type: ignore[arg-type]
+    plain = Problem(CASE, evaluator(has_gradients=False)).evaluate(START_X)  # type: ignore[arg-type]
     assert there.jacobian == pytest.approx(plain.jacobian, rel=1e-4)
     assert not (there.jacobian == plain.jacobian).all()
 
 
 def test_a_point_without_neighbours_fails() -> None:
     alone = lambda values: values["C10"] != START["C10"]
-    problem = Problem(CASE, door(has_gradients=False, fails=alone))  # type: ignore[arg-type]
+    problem = Problem(CASE, evaluator(has_gradients=False, fails=alone))  # type: ignore[arg-type]
     with pytest.raises(EvaluationFailed, match="12 of 240 kPa") as failure:
         problem.evaluate(START_X)
     assert failure.value.cause == "no_equilibrium"
@@ -141,33 +143,33 @@ def test_differences_stay_within_the_bounds(bound: str) -> None:
     at = getattr(CASE.case.variables["C10"], bound)
     within = lambda values: not 1e5 <= values["C10"] <= 1e7
     x = np.log([START["A_belt"], START["A_carcass"], at])
-    differ = Problem(CASE, door(has_gradients=False, fails=within)).evaluate(x)  # type: ignore[arg-type]
-    exact = Problem(CASE, door()).evaluate(x)  # type: ignore[arg-type]
+    differ = Problem(CASE, evaluator(has_gradients=False, fails=within)).evaluate(x)  # type: ignore[arg-type]
+    exact = Problem(CASE, evaluator()).evaluate(x)  # type: ignore[arg-type]
     assert differ.jacobian == pytest.approx(exact.jacobian, rel=1e-4)
     alone = lambda values: values["C10"] != at
     with pytest.raises(EvaluationFailed):
-        Problem(CASE, door(has_gradients=False, fails=alone)).evaluate(x)  # type: ignore[arg-type]
+        Problem(CASE, evaluator(has_gradients=False, fails=alone)).evaluate(x)  # type: ignore[arg-type]
 
 
 def test_jobs_go_to_the_neighbours_of_the_first_start() -> None:
-    tyre = door(has_gradients=False)
+    tyre = evaluator(has_gradients=False)
     plain = calibrate(CASE, tyre)  # type: ignore[arg-type]
     assert set(tyre.jobs) == {1}
-    tyre = door(has_gradients=False)
+    tyre = evaluator(has_gradients=False)
     assert calibrate(CASE, tyre, jobs=8).result == plain.result  # type: ignore[arg-type]
     assert set(tyre.jobs) == {1, 3}  # a point, and its three neighbours
 
 
 def test_says_that_it_did_not_move() -> None:
     """Frequencies that nothing changes: converged at once, and not moved."""
-    fit = calibrate(CASE, door(powers={n: 0 * p for n, p in POWERS.items()}))  # type: ignore[arg-type]
+    fit = calibrate(CASE, evaluator(powers={n: 0 * p for n, p in POWERS.items()}))  # type: ignore[arg-type]
     assert not fit.result["moved"]
     assert fit.result["singular_values"] == [0.0, 0.0, 0.0]
     assert all(v["standard_error"] is None for v in fit.result["variables"].values())
 
 
 def test_a_bound_that_holds_is_reported() -> None:
-    fit = calibrate(CASE, door({**TRUTH, "A_belt": 3e-8}))  # type: ignore[arg-type]
+    fit = calibrate(CASE, evaluator({**TRUTH, "A_belt": 3e-8}))  # type: ignore[arg-type]
     belt = fit.result["variables"]["A_belt"]
     assert belt["at_bound"] and belt["value"] == belt["lower"]
     assert fit.result["converged"]
@@ -176,7 +178,7 @@ def test_a_bound_that_holds_is_reported() -> None:
 def test_a_direction_that_the_data_do_not_see() -> None:
     """Two variables with one pattern: their sum is seen, their difference is not."""
     powers = {**POWERS, "A_carcass": POWERS["A_belt"]}
-    fit = calibrate(CASE, door(powers=powers))  # type: ignore[arg-type]
+    fit = calibrate(CASE, evaluator(powers=powers))  # type: ignore[arg-type]
     values = fit.result["singular_values"]
     assert values[-1] < 1e-9 * values[0]
     assert fit.result["variables"]["A_carcass"]["standard_error"] is None
@@ -184,14 +186,14 @@ def test_a_direction_that_the_data_do_not_see() -> None:
 
 
 def test_fixed_variables_stay_and_others_move() -> None:
-    fit = calibrate(CASE, door(), fixed={"C10": START["C10"]})  # type: ignore[arg-type]
+    fit = calibrate(CASE, evaluator(), fixed={"C10": START["C10"]})  # type: ignore[arg-type]
     assert set(fit.result["variables"]) == {"A_belt", "A_carcass"}
     assert fit.result["fixed"] == {"C10": START["C10"]}
     with pytest.raises(InputError):
-        calibrate(CASE, door(), fixed=START)  # type: ignore[arg-type]
+        calibrate(CASE, evaluator(), fixed=START)  # type: ignore[arg-type]
     without = replace(CASE, case=CASE.case.model_copy(update={"targets": None}))
     with pytest.raises(InputError):
-        calibrate(without, door())  # type: ignore[arg-type]
+        calibrate(without, evaluator())  # type: ignore[arg-type]
 
 
 def test_bounds_that_hold_too_few_tyres_end_the_drawing_of_starts() -> None:
@@ -200,14 +202,14 @@ def test_bounds_that_hold_too_few_tyres_end_the_drawing_of_starts() -> None:
     with pytest.raises(EvaluationFailed, match="the bounds hold too few") as failure:
         calibrate(
             CASE,
-            door(fails=lambda values: values != START),  # type: ignore[arg-type]
+            evaluator(fails=lambda values: values != START),  # type: ignore[arg-type]
             starts=4,
             finished=lambda *done: asked.append(done),
         )
     assert failure.value.words.startswith("63 drawn starts") and asked == [(1, 4)]
 
 
-class Counting(FakeDoor):
+class Counting(FakeEvaluator):
     """With counts of its own, wherever it is copied to."""
 
     counts = Counts()
@@ -235,7 +237,7 @@ def test_starts_of_other_processes_tell_how_often_the_solver_ran(
     told: list[tuple[int, int]] = []
     results, counts = [], []
     for jobs in (1, 2):
-        tyre = Counting(door().base, POWERS, START).worker()
+        tyre = Counting(evaluator().base, POWERS, START).worker()
         fit = calibrate(
             CASE,
             tyre,  # type: ignore[arg-type]
@@ -255,7 +257,7 @@ def test_a_start_whose_process_dies_ends_the_fit(monkeypatch: pytest.MonkeyPatch
             yield from ((i, WorkerLost("its process died, twice")) for i in range(len(tasks)))
 
     monkeypatch.setattr(calibrate_module, "executor", lambda *asked: nullcontext(Dying()))
-    tyre = Counting(door().base, POWERS, START)
+    tyre = Counting(evaluator().base, POWERS, START)
     with pytest.raises(EvaluationFailed, match="its process died, twice") as failure:
         calibrate(CASE, tyre, starts=3, jobs=2)  # type: ignore[arg-type]
     assert failure.value.cause == "crashed"
@@ -264,7 +266,7 @@ def test_a_start_whose_process_dies_ends_the_fit(monkeypatch: pytest.MonkeyPatch
 def test_starts_are_drawn_replaced_and_reproducible() -> None:
     fails = lambda values: values["C10"] > 4e6 or values["C10"] < 1.2e5
     first, second = (
-        calibrate(CASE, door(fails=fails), starts=8, seed=3)  # type: ignore[arg-type]
+        calibrate(CASE, evaluator(fails=fails), starts=8, seed=3)  # type: ignore[arg-type]
         for _ in range(2)
     )
     assert first.result == second.result
@@ -288,7 +290,7 @@ def test_the_papers_case(name: str, level: str, expected: float, tolerance: floa
     case = load_case(CASES / f"{name}.yaml")
     mesh = case.case.mesh.model_copy(update={"level": level})
     case = replace(case, case=case.case.model_copy(update={"mesh": mesh}))
-    fit = calibrate(case, Door(case))
+    fit = calibrate(case, Evaluator(TyreDesign(case)))
     result = fit.result
     assert result["objective_Hz"] == pytest.approx(expected, abs=tolerance)
     assert result["evaluations_to_0.05_Hz"] <= 12
@@ -299,8 +301,8 @@ def test_the_papers_case(name: str, level: str, expected: float, tolerance: floa
 
 @pytest.mark.slow
 def test_both_methods_agree_on_the_real_tyre() -> None:
-    slsqp = calibrate(CASE, Door(CASE)).result
-    other = calibrate(CASE, Door(CASE), "least-squares").result
+    slsqp = calibrate(CASE, Evaluator(TyreDesign(CASE))).result
+    other = calibrate(CASE, Evaluator(TyreDesign(CASE)), "least-squares").result
     assert other["objective_Hz"] == pytest.approx(slsqp["objective_Hz"], abs=1e-4)
     for name, variable in slsqp["variables"].items():
         assert other["variables"][name]["value"] == pytest.approx(variable["value"], rel=1e-2)
@@ -329,7 +331,7 @@ def test_standard_errors_are_those_of_the_fit_that_was_made(chance: Chance) -> N
         for _ in range(200):
             noisy = list(exact + sigma * chance.random.normal(size=9))
             case = with_targets(frequency_Hz=noisy, sigma_Hz=list(sigma), weight=weights)
-            variables = calibrate(case, door()).result["variables"].values()  # type: ignore[arg-type]
+            variables = calibrate(case, evaluator()).result["variables"].values()  # type: ignore[arg-type]
             found.append([np.log(v["value"]) for v in variables])
             stated.append([v["standard_error"] / v["value"] for v in variables])
         for values, error in zip(np.transpose(found), np.mean(stated, axis=0), strict=True):
@@ -338,7 +340,7 @@ def test_standard_errors_are_those_of_the_fit_that_was_made(chance: Chance) -> N
 
 def test_targets_that_do_not_count_are_none() -> None:
     with pytest.raises(InputError, match="every target has the weight 0"):
-        calibrate(with_targets(weight=[0.0] * 9), door())  # type: ignore[arg-type]
+        calibrate(with_targets(weight=[0.0] * 9), evaluator())  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("held", [False, True])
@@ -351,7 +353,7 @@ def test_a_pressure_that_varies_is_told_as_it_was_fitted(held: bool) -> None:
     case = replace(CASE, case=CASE.case.model_copy(update={"variables": variables}))
     powers = {"C10": POWERS["C10"], "pressure": POWERS["A_belt"]}
     start = {"C10": START["C10"], "pressure": 200.0}
-    tyre = FakeDoor({label: 1.05 * f for label, f in TARGETS.items()}, powers, start)
+    tyre = FakeEvaluator({label: 1.05 * f for label, f in TARGETS.items()}, powers, start)
     fixed = {"pressure": 250.0} if held else {}
     fit = calibrate(case, tyre, fixed=fixed)  # type: ignore[arg-type]
     assert fit.result["pressure_kPa"] == fit.fitted.values["pressure"] != 240.0
@@ -359,7 +361,7 @@ def test_a_pressure_that_varies_is_told_as_it_was_fitted(held: bool) -> None:
 
 def test_as_many_variables_as_data_tell_nothing_of_the_noise() -> None:
     weights = [1.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0]
-    result = calibrate(with_targets(weight=weights), door()).result  # type: ignore[arg-type]
+    result = calibrate(with_targets(weight=weights), evaluator()).result  # type: ignore[arg-type]
     assert result["noise_Hz"] is None
     assert all(v["standard_error"] is None for v in result["variables"].values())
 
@@ -367,7 +369,7 @@ def test_as_many_variables_as_data_tell_nothing_of_the_noise() -> None:
 def test_fewer_data_than_variables_are_said_to_be_too_few() -> None:
     one = [1.0] + [0.0] * 8
     with pytest.raises(InputError, match="1 target cannot determine 3 free variables"):
-        calibrate(with_targets(weight=one), door())  # type: ignore[arg-type]
+        calibrate(with_targets(weight=one), evaluator())  # type: ignore[arg-type]
 
 
 @pytest.mark.slow
@@ -388,13 +390,13 @@ def test_a_design_that_the_case_cannot_have_is_stepped_back_from() -> None:
     changed = {"variables": variables, "materials": materials}
     changed["mesh"] = CASE.case.mesh.model_copy(update={"level": "coarse"})
     case = replace(CASE, case=CASE.case.model_copy(update=changed))
-    result = calibrate(case, Door(case), starts=4, seed=0).result
+    result = calibrate(case, Evaluator(TyreDesign(case)), starts=4, seed=0).result
     assert result["replaced_starts"] > 0
     assert len(result["starts"]) == 4
 
 
 def test_no_crossing_is_looked_for_where_the_pair_has_no_weight() -> None:
-    problem = Problem(with_targets(weight=[0.0, 0.0] + [1.0] * 7), door())  # type: ignore[arg-type]
+    problem = Problem(with_targets(weight=[0.0, 0.0] + [1.0] * 7), evaluator())  # type: ignore[arg-type]
     assert list(_beyond_crossing(problem, problem.evaluate(problem.start()))) == []
 
 
@@ -404,13 +406,13 @@ def test_an_objective_that_no_computer_holds_is_refused() -> None:
     update = {"targets": targets.model_copy(update={"modes": heavy})}
     case = replace(CASE, case=CASE.case.model_copy(update=update))
     with np.errstate(over="ignore"), pytest.raises(InputError, match="no finite objective"):
-        calibrate(case, door())
+        calibrate(case, evaluator())
 
 
 @pytest.mark.parametrize("weights", [[1.0] * 9, [4.0, 0.25, *[1.0] * 7]])
 def test_slopes_at_a_crossing_are_those_of_the_difference(weights: list[float]) -> None:
     """Of axial less torsional frequency in Hz, whatever the targets weigh, on distinct modes."""
-    problem = Problem(with_targets(weight=weights), door())  # type: ignore[arg-type]
+    problem = Problem(with_targets(weight=weights), evaluator())  # type: ignore[arg-type]
     far, point = problem.evaluate(START_X + 0.2), problem.evaluate(START_X)
     found = crossing(problem, [far, point], point)
     assert found is not None and found.x is point.x

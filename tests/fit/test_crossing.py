@@ -6,22 +6,22 @@ import numpy as np
 import pytest
 from scipy.optimize import differential_evolution
 
-from tyrecal.evaluate.door import Question
+from tyrecal.evaluate.evaluator import Question
 from tyrecal.evaluate.results import Evaluation, HarmonicShape, RawMode
 from tyrecal.fit.calibrate import calibrate
 from tyrecal.fit.crossing import crossing, gap, order, pair_clarity
 from tyrecal.fit.problem import Problem
 from tyrecal.fit.slsqp import AT_CROSSING
 
-from .fake import LABELS, POINTS, FakeDoor, shape
-from .test_calibration import CASE, START, door
+from .fake import LABELS, POINTS, FakeEvaluator, shape
+from .test_calibration import CASE, START, evaluator
 
 pytestmark = pytest.mark.numbers
 
 COUPLING = 0.02  # Hz, half the least gap
 
 
-class CoupledDoor(FakeDoor):
+class CoupledEvaluator(FakeEvaluator):
     """The axial and the torsional mode are the two of [[axial, delta], [delta, torsional]]."""
 
     def evaluate(self, question: Question) -> Evaluation:
@@ -40,13 +40,13 @@ class CoupledDoor(FakeDoor):
         return Evaluation(alone.pressure_kPa, alone.mass_kg, (*mixed, *alone.modes[2:]), slopes)
 
 
-def coupled(axial: float, torsional: float) -> CoupledDoor:
+def coupled(axial: float, torsional: float) -> CoupledEvaluator:
     """The tyre that meets all targets at TRUTH but those two, which are off by these factors."""
-    plain = door()
+    plain = evaluator()
     base = dict(plain.base)
     base[LABELS[0]] *= axial
     base[LABELS[1]] *= torsional
-    return CoupledDoor(base, plain.powers, START)
+    return CoupledEvaluator(base, plain.powers, START)
 
 
 @pytest.mark.parametrize("torsional", [0.98, 0.965, 0.95])
@@ -57,7 +57,7 @@ def test_the_difference_without_coupling_is_found_on_either_side(torsional: floa
     point = problem.evaluate(at)
     found = crossing(problem, [point], point)
     assert found
-    alone = FakeDoor(tyre.base, tyre.powers, START).evaluate(Question(point.values)).modes[:2]
+    alone = FakeEvaluator(tyre.base, tyre.powers, START).evaluate(Question(point.values)).modes[:2]
     f = np.array([mode.frequency_Hz for mode in alone])
     assert pair_clarity(point) < 1 and abs(gap(point)) > 2 * COUPLING
     assert found.at(at) == pytest.approx(f[0] - f[1], rel=1e-9)

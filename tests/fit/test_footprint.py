@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tyrecal.deck.tyre_design import TyreDesign
 from tyrecal.errors import InputError
-from tyrecal.evaluate.door import Door, Question
+from tyrecal.evaluate.evaluator import Evaluator, Question
 from tyrecal.evaluate.failure import DeckRefused, EvaluationFailed
 from tyrecal.fit.calibrate import calibrate
 from tyrecal.fit.differences import differences
@@ -29,7 +30,7 @@ from .pressed import (
     Roadless,
     area_target,
     case_with,
-    door,
+    evaluator,
     power,
     stiffness_target,
 )
@@ -42,7 +43,8 @@ START_X = np.log(list(START.values()))
 def exact_modes(sigma_Hz: float | None) -> list:
     """The case's target modes with the frequencies that the model has at TRUTH."""
     found = {
-        m.label: m.frequency_Hz for m in paired_labels(Door(CASE).evaluate(Question(TRUTH)).modes)
+        m.label: m.frequency_Hz
+        for m in paired_labels(Evaluator(TyreDesign(CASE)).evaluate(Question(TRUTH)).modes)
     }
     return [
         t.model_copy(update={"frequency_Hz": found[Label(t.c, t.m, t.kind)], "sigma_Hz": sigma_Hz})
@@ -58,14 +60,14 @@ FOOTPRINT = [
 
 
 def test_without_sigmas_and_footprints_it_is_equation_1_to_the_last_bit() -> None:
-    point = Problem(CASE, Door(CASE)).evaluate(START_X)
+    point = Problem(CASE, Evaluator(TyreDesign(CASE))).evaluate(START_X)
     root = np.sqrt([2.0 if t.c else 1.0 for t in MODES])
     f = np.array([point.modes[Label(t.c, t.m, t.kind)].frequency_Hz for t in MODES])
     residuals = root * (f - np.array([t.frequency_Hz for t in MODES]))
     assert (point.residuals == residuals).all()
     assert point.objective == np.linalg.norm(residuals)
     ones = [t.model_copy(update={"sigma_Hz": 1.0}) for t in MODES]
-    same = Problem(case_with(ones, []), Door(CASE)).evaluate(START_X)
+    same = Problem(case_with(ones, []), Evaluator(TyreDesign(CASE))).evaluate(START_X)
     assert (same.residuals == point.residuals).all() and (same.jacobian == point.jacobian).all()
     assert objective_unit(CASE) == "Hz" and objective_unit(case_with(ones, [])) == "sigma"
 
@@ -74,7 +76,8 @@ def test_the_weighted_objective_by_hand() -> None:
     """A singlet 2 sigma off, a doublet 1 Hz off without sigma and of weight 3, an area 4 sigma, a
     stiffness half a sigma off and of weight 8: sqrt(2^2 + 2 . 3 + 4^2 + 8 / 4) = sqrt(28)."""
     raw = {
-        m.label: m.frequency_Hz for m in paired_labels(Door(CASE).evaluate(Question(START)).modes)
+        m.label: m.frequency_Hz
+        for m in paired_labels(Evaluator(TyreDesign(CASE)).evaluate(Question(START)).modes)
     }
     torsional, ovals = Label(0, 0, "torsional"), Label(2, 0)
     modes = [
@@ -88,7 +91,7 @@ def test_the_weighted_objective_by_hand() -> None:
             stiffness_target(1.05 * STIFFNESS_0, 0.1 * STIFFNESS_0, weight=8.0),
         ],
     )
-    point = Problem(case, door(case)).evaluate(START_X)
+    point = Problem(case, evaluator(case)).evaluate(START_X)
     assert point.objective == pytest.approx(28**0.5, rel=1e-9)
     assert point.residuals == pytest.approx([-2, 6**0.5, 4, -(2**0.5)])
     by_label = [Target(torsional, 40.4, 1.0, 0.2), Target(ovals, 79.0, 3.0)]
@@ -97,7 +100,7 @@ def test_the_weighted_objective_by_hand() -> None:
 
 def test_slopes_are_those_of_the_formula_and_of_central_differences() -> None:
     case = case_with(exact_modes(0.5), FOOTPRINT)
-    problem = Problem(case, door(case))
+    problem = Problem(case, evaluator(case))
     x = np.log(list(TRUTH.values())) + 0.05
     point = problem.evaluate(x)
     powers = np.array([list(AREA.values()), list(STIFFNESS.values())])
@@ -115,7 +118,7 @@ def test_slopes_are_those_of_the_formula_and_of_central_differences() -> None:
 @pytest.mark.parametrize("method", ["slsqp", "least-squares"])
 def test_finds_the_truth(method: str) -> None:
     case = case_with(exact_modes(0.5), FOOTPRINT)
-    result = calibrate(case, door(case), method).result
+    result = calibrate(case, evaluator(case), method).result
     assert result["converged"] and result["moved"] and result["objective_Hz"] < 0.01
     for name, value in TRUTH.items():
         assert result["variables"][name]["value"] == pytest.approx(value, rel=1e-3)
@@ -134,12 +137,12 @@ def test_finds_the_truth(method: str) -> None:
 def test_footprints_alone_determine_as_many_variables_as_there_are() -> None:
     case = case_with([], FOOTPRINT)
     held = {"A_belt": TRUTH["A_belt"]}
-    result = calibrate(case, door(case), fixed=held).result
+    result = calibrate(case, evaluator(case), fixed=held).result
     assert result["converged"] and result["modes"] == [] and result["noise_Hz"] is None
     for name in ("A_carcass", "C10"):
         assert result["variables"][name]["value"] == pytest.approx(TRUTH[name], rel=1e-3)
     with pytest.raises(InputError, match="2 targets cannot determine 3 free variables"):
-        calibrate(case, door(case))
+        calibrate(case, evaluator(case))
 
 
 def test_standard_errors_with_footprints_by_the_normal_equations() -> None:
@@ -147,8 +150,8 @@ def test_standard_errors_with_footprints_by_the_normal_equations() -> None:
     the noise; with footprints no error is larger than without."""
     modes = [t for t in exact_modes(0.5) if t.c == 0]
     case = case_with(modes, FOOTPRINT)
-    problem = Problem(case, door(case))
-    result = calibrate(case, door(case)).result
+    problem = Problem(case, evaluator(case))
+    result = calibrate(case, evaluator(case)).result
     x = np.log([v["value"] for v in result["variables"].values()])
     J = problem.evaluate(x).jacobian
     errors = np.sqrt(np.diag(np.linalg.inv(J.T @ J)))
@@ -156,9 +159,9 @@ def test_standard_errors_with_footprints_by_the_normal_equations() -> None:
     assert stated == pytest.approx(errors, rel=1e-6)
     assert result["singular_values"] == pytest.approx(np.linalg.svd(J, compute_uv=False))
     all_modes = case_with(exact_modes(0.5), [])
-    alone = calibrate(all_modes, Door(all_modes)).result["variables"]
+    alone = calibrate(all_modes, Evaluator(TyreDesign(all_modes))).result["variables"]
     both = case_with(exact_modes(0.5), FOOTPRINT)
-    together = calibrate(both, door(both)).result["variables"]
+    together = calibrate(both, evaluator(both)).result["variables"]
     for name in TRUTH:
         assert together[name]["standard_error"] < alone[name]["standard_error"]
 
@@ -172,7 +175,7 @@ def test_frequencies_without_sigma_share_one_from_their_own_residuals() -> None:
     ]
     sharp = [area_target(AREA_TRUE, 1e-6 * AREA_TRUE), stiffness_target(STIFFNESS_TRUE, 0.1)]
     case = case_with(modes, sharp)
-    result = calibrate(case, door(case)).result
+    result = calibrate(case, evaluator(case)).result
     plain = [m["fitted_Hz"] - m["target_Hz"] for m in result["modes"]]
     assert result["noise_Hz"] == pytest.approx(np.linalg.norm(plain) / 8**0.5, rel=1e-3)
 
@@ -180,12 +183,12 @@ def test_frequencies_without_sigma_share_one_from_their_own_residuals() -> None:
 def test_numbers_are_those_of_a_footprint_at_the_cases_loads() -> None:
     case = case_with([], [*FOOTPRINT, area_target(0.01, 0.001, 5000.0)])
     assert case.case.loads_N == [4000, 5000, 6000]
-    tyre = door(case)
+    tyre = evaluator(case)
     point = Problem(case, tyre).evaluate(START_X)
     outcomes = press(tyre, {"initial": START}, case.case.loads_N)
-    from tyrecal.deck.context import section_mesh
+    from tyrecal.design import resolved
 
-    rows = footprint_result({"initial": START}, [], outcomes, {"initial": section_mesh(CASE)})[
+    rows = footprint_result({"initial": START}, [], outcomes, {"initial": resolved(CASE).mesh})[
         "rows"
     ]
     assert list(point.footprint) == [
@@ -197,8 +200,8 @@ def test_numbers_are_those_of_a_footprint_at_the_cases_loads() -> None:
 
 def test_a_jump_between_neighbours_does_not_spoil_the_slope() -> None:
     case = case_with([], FOOTPRINT)
-    plain = Problem(case, door(case)).evaluate(START_X)
-    beside = door(case, jump=0.002, jump_at=START["C10"] * (1 + 5e-6))
+    plain = Problem(case, evaluator(case)).evaluate(START_X)
+    beside = evaluator(case, jump=0.002, jump_at=START["C10"] * (1 + 5e-6))
     assert Problem(case, beside).evaluate(START_X).jacobian == pytest.approx(
         plain.jacobian, rel=1e-4
     )
@@ -212,7 +215,9 @@ def test_a_minimum_at_a_jump_is_found_and_not_searched_for_ever(method: str) -> 
     """The area jumps just before the C10 that the targets want, by less than they can tell."""
     targets = [area_target(1.001 * AREA_TRUE, 0.02 * AREA_TRUE), FOOTPRINT[1]]
     case = case_with(exact_modes(0.5), targets)
-    result = calibrate(case, door(case, jump=0.001, jump_at=1.0002 * TRUTH["C10"]), method).result
+    result = calibrate(
+        case, evaluator(case, jump=0.001, jump_at=1.0002 * TRUTH["C10"]), method
+    ).result
     assert result["converged"] and "jump" in result["message"] and result["evaluations"] <= 15
     assert result["projected_gradient_norm"] > 1  # no minimum of a smooth function
     for name, value in TRUTH.items():
@@ -224,7 +229,7 @@ def test_a_minimum_at_a_jump_is_found_and_not_searched_for_ever(method: str) -> 
 def test_loads_out_of_reach_are_stepped_back_from(method: str) -> None:
     """The tyre of small C10 bottoms out before the load; the truth lies just before that."""
     case = case_with(exact_modes(0.5), FOOTPRINT)
-    tyre = door(case)
+    tyre = evaluator(case)
     solver = tyre.solver
     original = solver.write
 
@@ -243,14 +248,14 @@ def test_loads_out_of_reach_are_stepped_back_from(method: str) -> None:
 def test_a_later_load_out_of_reach_fails_and_one_without_a_target_is_not_pressed() -> None:
     case = case_with([], [*FOOTPRINT, area_target(0.01, 0.001, 5000.0)])
     with pytest.raises(EvaluationFailed, match="4500") as failure:
-        Problem(case, door(case, reach=4500.0)).evaluate(START_X)
+        Problem(case, evaluator(case, reach=4500.0)).evaluate(START_X)
     assert failure.value.cause == "no_equilibrium"
-    Problem(case, door(case, reach=5500.0)).evaluate(START_X)
+    Problem(case, evaluator(case, reach=5500.0)).evaluate(START_X)
 
 
 def test_the_record_answers_a_second_fit_to_the_last_bit(tmp_path: Path) -> None:
     case = case_with(exact_modes(0.5), FOOTPRINT)
-    first, second = door(case, tmp_path), door(case, tmp_path)
+    first, second = evaluator(case, tmp_path), evaluator(case, tmp_path)
     results = [json.dumps(calibrate(case, each).result) for each in (first, second)]
     assert results[0] == results[1]
     assert first.counts.runs > 0 and (second.counts.runs, second.counts.recorded) == (
@@ -261,8 +266,8 @@ def test_the_record_answers_a_second_fit_to_the_last_bit(tmp_path: Path) -> None
 
 def test_a_solver_without_a_road_is_refused_before_anything_runs() -> None:
     case = case_with(MODES, FOOTPRINT)
-    tyre = Door(case, _solver=Roadless())
+    tyre = Evaluator(TyreDesign(case), _solver=Roadless())
     with pytest.raises(DeckRefused, match="cannot press a tyre on a road"):
         calibrate(case, tyre)
     assert tyre.counts.runs == 0
-    assert calibrate(CASE, Door(CASE, _solver=Roadless())).result["converged"]
+    assert calibrate(CASE, Evaluator(TyreDesign(CASE), _solver=Roadless())).result["converged"]

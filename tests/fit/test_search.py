@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
-from tyrecal.deck.write import NEAR_ZERO
+from tyrecal.deck.tyre_design import NEAR_ZERO
 from tyrecal.evaluate.failure import EvaluationFailed
 from tyrecal.fit import least_squares, slsqp
 from tyrecal.fit.calibrate import _tolerance

@@ -7,8 +7,10 @@ from dataclasses import replace
 
 import pytest
 
-from tyrecal.case import LoadedCase, load_case
-from tyrecal.evaluate.door import Door
+from tyrecal.case import LoadedCase
+from tyrecal.deck.tyre_design import TyreDesign
+from tyrecal.design import load_case
+from tyrecal.evaluate.evaluator import Evaluator
 from tyrecal.fit.calibrate import Fit, calibrate
 from tyrecal.measured.tables import read_measurements
 
@@ -27,7 +29,9 @@ def case() -> LoadedCase:
 
 @pytest.fixture(scope="module")
 def fitted(case: LoadedCase) -> Fit:
-    return calibrate(case, Door(case), fixed={"A_belt": case.case.variables["A_belt"].start})
+    return calibrate(
+        case, Evaluator(TyreDesign(case)), fixed={"A_belt": case.case.variables["A_belt"].start}
+    )
 
 
 def test_the_case_has_the_targets_of_its_table(case: LoadedCase) -> None:
@@ -59,7 +63,7 @@ def test_the_fit_meets_what_was_measured_well(fitted: Fit) -> None:
 
 
 def test_four_modes_do_not_determine_the_belt(case: LoadedCase) -> None:
-    result = calibrate(case, Door(case)).result
+    result = calibrate(case, Evaluator(TyreDesign(case))).result
     assert result["variables"]["A_belt"]["standard_error"] > result["variables"]["A_belt"]["value"]
     assert result["correlations"]["A_belt"]["C10"] > 0.98
     assert result["singular_values"][-1] < 1 < result["singular_values"][-2]
@@ -67,6 +71,6 @@ def test_four_modes_do_not_determine_the_belt(case: LoadedCase) -> None:
 
 @pytest.mark.slow
 def test_the_deflection_is_predicted(case: LoadedCase, fitted: Fit) -> None:
-    pressed = Door(case).press(fitted.fitted.values, [3000.0])
+    pressed = Evaluator(TyreDesign(case)).press(fitted.fitted.values, [3000.0])
     (footprint,) = pressed.footprints
     assert footprint.deflection_m == pytest.approx(DEFLECTION_3_KN, rel=0.08)

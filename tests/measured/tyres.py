@@ -7,8 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from tyrecal.case import load_case, with_values
-from tyrecal.evaluate.door import Door, Question
+from tyrecal.deck.tyre_design import TyreDesign
+from tyrecal.design import load_case, with_values
+from tyrecal.evaluate.evaluator import Evaluator, Question
 from tyrecal.evaluate.results import HarmonicShape
 from tyrecal.measured.sensors import Sensors
 from tyrecal.modes.label import paired_labels
@@ -34,7 +35,7 @@ def modes() -> tuple[Mode, ...]:
         },
     )
     starts = {name: v.start for name, v in case.case.variables.items()}
-    found = paired_labels(Door(case).evaluate(Question(starts)).modes)
+    found = paired_labels(Evaluator(TyreDesign(case)).evaluate(Question(starts)).modes)
     return tuple(m for m in found if m.label.m < 2)
 
 

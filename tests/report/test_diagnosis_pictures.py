@@ -11,7 +11,7 @@ from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
-from tyrecal.case import load_case
+from tyrecal.design import load_case
 from tyrecal.diagnose.diagnosis import Diagnosis
 from tyrecal.diagnose.where import Place
 from tyrecal.report import diagnosis_pictures as pictures

@@ -12,8 +12,9 @@ from matplotlib.figure import Figure
 from PIL import Image
 from rich.console import Console
 
-from tyrecal.deck.context import section_mesh
-from tyrecal.evaluate.door import Door
+from tyrecal.deck.tyre_design import TyreDesign
+from tyrecal.design import resolved
+from tyrecal.evaluate.evaluator import Evaluator
 from tyrecal.evaluate.pressed import Pressed
 from tyrecal.report import pictures
 from tyrecal.report.figure import save
@@ -30,14 +31,17 @@ from .test_vtu import volume
 from .watched import watched
 
 LOADS = [500.0, 1000.0, 2000.0, 4000.0, 8000.0]
-MESH = section_mesh(CASE)
+MESH = resolved(CASE).mesh
 BOTH = {"initial": MESH, "fitted": MESH}
 
 
 @pytest.fixture(scope="module")
 def designs() -> dict[str, Pressed]:
-    door = Door(CASE, _solver=Hertz())
-    return {"initial": door.press({}, LOADS), "fitted": door.press({"A_belt": 1e-7}, LOADS[:4])}
+    evaluator = Evaluator(TyreDesign(CASE), _solver=Hertz())
+    return {
+        "initial": evaluator.press({}, LOADS),
+        "fitted": evaluator.press({"A_belt": 1e-7}, LOADS[:4]),
+    }
 
 
 @pytest.fixture
@@ -88,7 +92,7 @@ def test_area_and_deflection_of_both_designs(designs: dict[str, Pressed], tmp_pa
 
 
 def test_one_design_and_one_load(tmp_path: Path) -> None:
-    designs = {"initial": Door(CASE, _solver=Hertz()).press({}, [3000.0])}
+    designs = {"initial": Evaluator(TyreDesign(CASE), _solver=Hertz()).press({}, [3000.0])}
     draw_footprint(tmp_path, designs, BOTH, rows(designs), patches_data("", designs, BOTH).patches)
     assert len(list(tmp_path.iterdir())) == 3
 

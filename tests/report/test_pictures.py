@@ -9,9 +9,10 @@ import pytest
 from PIL import Image
 from threadpoolctl import threadpool_limits
 
-from tyrecal.case import LoadedCase, load_case, start_values
-from tyrecal.deck.context import section_mesh
-from tyrecal.evaluate.door import Door, Question
+from tyrecal.case import LoadedCase, start_values
+from tyrecal.deck.tyre_design import TyreDesign
+from tyrecal.design import load_case, resolved
+from tyrecal.evaluate.evaluator import Evaluator, Question
 from tyrecal.evaluate.results import Evaluation
 from tyrecal.modes.label import label_modes
 from tyrecal.modes.mode import Label, Mode
@@ -40,9 +41,9 @@ class Tyre:
 def tyre() -> Tyre:
     case = load_case(CASES / "p235_75r17.yaml")
     with threadpool_limits(1):
-        evaluation = Door(case).evaluate(Question(start_values(case)))
+        evaluation = Evaluator(TyreDesign(case)).evaluate(Question(start_values(case)))
     modes = {mode.label: mode for mode in label_modes(evaluation.modes)}
-    return Tyre(case, section_mesh(case), evaluation, modes)
+    return Tyre(case, resolved(case).mesh, evaluation, modes)
 
 
 def ink(path, width: int, height: int, most_bytes: int) -> float:
@@ -126,7 +127,7 @@ def test_section(tyre, tmp_path, written):
     for name, section, words in (
         ("inflated", inflated, tyre.case.case.name),
         ("long", plain, "A tyre " * 30),
-        ("low", section_data(low, section_mesh(low), {}), low.case.name),
+        ("low", section_data(low, resolved(low).mesh, {}), low.case.name),
         ("plain", plain, tyre.case.case.name),
     ):
         figure = draw_section(section, words, 240.0)

@@ -9,10 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tyrecal.case import load_case, start_values
-from tyrecal.deck.context import section_mesh
-from tyrecal.evaluate import door as door_module
-from tyrecal.evaluate.door import Door, Question
+from tyrecal.case import start_values
+from tyrecal.deck.tyre_design import TyreDesign
+from tyrecal.design import load_case, resolved
+from tyrecal.evaluate import evaluator as door_module
+from tyrecal.evaluate.evaluator import Evaluator, Question
 from tyrecal.evaluate.results import HarmonicShape
 from tyrecal.modes.label import paired_labels
 from tyrecal.modes.mode import Mode
@@ -31,7 +32,7 @@ ANGLES = 2 * np.pi * np.arange(48) / 48
 @pytest.fixture(scope="module")
 def tyre(tmp_path_factory: pytest.TempPathFactory):
     case = load_case(coarse_case(tmp_path_factory.mktemp("case")))
-    evaluation = Door(case).evaluate(Question(start_values(case)))
+    evaluation = Evaluator(TyreDesign(case)).evaluate(Question(start_values(case)))
     return case, evaluation, paired_labels(evaluation.modes)
 
 
@@ -53,7 +54,7 @@ def swept_again(content: dict, mode: dict) -> tuple[np.ndarray, np.ndarray]:
 def test_shapes_swept_again_are_the_modes(tyre) -> None:
     """Against the pictures' own sweep: alike but for scale, the turn of a pair and of the axes."""
     case, evaluation, modes = tyre
-    content, mesh = tyre_data(case, evaluation, modes), section_mesh(case)
+    content, mesh = tyre_data(case, evaluation, modes), resolved(case).mesh
     nodes = skin(mesh)
     # the pictures have Theta = 0 at +x, the page at the top
     turned = np.array([[0, 0, -1], [0, 1, 0], [1, 0, 0]])
@@ -81,7 +82,7 @@ def test_a_crest_stands_at_the_top(tyre) -> None:
 def test_a_solver_with_nodes_of_its_own(tyre) -> None:
     """Other numbers and another order change nothing; places too far away are not guessed."""
     case, evaluation, modes = tyre
-    mesh = section_mesh(case)
+    mesh = resolved(case).mesh
     order = generator(1).permutation(len(evaluation.nodes))
     other = type(evaluation)(
         evaluation.pressure_kPa,
@@ -107,7 +108,7 @@ def test_a_solver_with_nodes_of_its_own(tyre) -> None:
 def test_the_section_is_whole(tyre) -> None:
     """Areas of the polygons and of the outline agree (shoelace); cords stand once per layer."""
     case, *_ = tyre
-    mesh = section_mesh(case)
+    mesh = resolved(case).mesh
     found = section_data(case, mesh, {})
 
     def area(flat: list[float]) -> float:
@@ -124,9 +125,9 @@ def test_patches_keep_all_that_touches(tyre, monkeypatch: pytest.MonkeyPatch) ->
     case, *_ = tyre
     monkeypatch.setattr(door_module, "find_solver", lambda name, *command: Hertz())
     monkeypatch.setattr(Hertz, "reach", 1e5)
-    values, mesh = start_values(case), section_mesh(case)
+    values, mesh = start_values(case), resolved(case).mesh
     loads = [1000.0, 4000.0, 65e3]  # the last up to where the rings of nodes stand far apart
-    pressed = press(Door(case), {"initial": values}, loads)["initial"]
+    pressed = press(Evaluator(TyreDesign(case)), {"initial": values}, loads)["initial"]
     kept = patches_data("x", {"initial": pressed}, {"initial": mesh}).patches
     for footprint, patch in zip(pressed.footprints, kept, strict=True):
         there = patch_of(pressed, footprint, mesh)

@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from tyrecal.case import load_case
-from tyrecal.deck.context import section_mesh
+from tyrecal.design import load_case, resolved
 from tyrecal.effects import catalogue
 from tyrecal.modes.mode import Label
 from tyrecal.report.convergence import draw_convergence
@@ -129,7 +128,7 @@ def test_long_names_of_cases_and_variables(tmp_path: Path) -> None:
     name = "LT315/70R17 of the long term test, second batch, on a rim of 9 inches, after run-in"
     layers = {f"{k}_with_a_long_name": v for k, v in case.case.rebar_layers.items()}
     named = case.case.model_copy(update={"name": name, "rebar_layers": layers})
-    section = section_data(replace(case, case=named), section_mesh(case), {})
+    section = section_data(replace(case, case=named), resolved(case).mesh, {})
     save(draw_section(section, name, 240.0), tmp_path / "section.png")
     values = {"stiffness_of_the_belt_cords_in_the_shoulder": 2.0, "C10": 3.0}
     history = [{"point": k, "objective_Hz": 3 + 30 / k, "values": values} for k in range(1, 9)]

@@ -16,9 +16,10 @@ from typing import Any
 
 from tyrecal.case import LoadedCase
 from tyrecal.deck.calculix import calculix_context
-from tyrecal.deck.environment import environment, render
 from tyrecal.deck.header import header
 from tyrecal.deck.sector import Sector
+from tyrecal.design import resolved
+from tyrecal.templates import environment, render
 
 TEMPLATES = Path(__file__).parent / "templates"
 OUTER_FACE = "S4"  # a brick's face over side 2 of the section's element
@@ -75,7 +76,7 @@ def press_texts(
     inflated_radius_m: outer radius of the inflated tyre; largest_increment: of the way from one
     deflection to the next. Raises TemplateFailed.
     """
-    names = around(calculix_context(case), angles)
+    names = around(calculix_context(resolved(case)), angles)
     radius = max(x for _, x, _, _ in names["nodes"])
     square = ((-radius, -radius), (radius, -radius), (radius, radius), (-radius, radius))
     names["corners"] = [(x, y, z) for x in (radius, 1.1 * radius) for y, z in square]

@@ -15,9 +15,10 @@ import pytest
 from tyrecal_solvers.abaqus import launch
 from tyrecal_solvers.abaqus.adapter import Abaqus
 
-from tyrecal.case import load_case
 from tyrecal.cli.main import main
-from tyrecal.evaluate.door import Door, Question
+from tyrecal.deck.tyre_design import TyreDesign
+from tyrecal.design import load_case
+from tyrecal.evaluate.evaluator import Evaluator, Question
 from tyrecal.evaluate.failure import DeckRefused, EvaluationFailed
 from tyrecal.evaluate.store import Store
 from tyrecal.fit.problem import Problem
@@ -102,11 +103,13 @@ def test_slopes_and_record_are_the_same_with_any_number_of_jobs(
     case, points, records = load_case(coarse()), [], []
     command = (sys.executable, str(STANDIN))  # workers may be older than the environment is
     for jobs in (1, 2):
-        door = Door(case, "abaqus", store=Store(tmp_path / f"{jobs}"), command=command)
-        problem = Problem(case, door, {"A_belt": 2.2e-7}, jobs=jobs)
+        evaluator = Evaluator(
+            TyreDesign(case), "abaqus", store=Store(tmp_path / f"{jobs}"), command=command
+        )
+        problem = Problem(case, evaluator, {"A_belt": 2.2e-7}, jobs=jobs)
         points.append(problem.evaluate(problem.start()))
-        assert (door.counts.runs, door.counts.recorded) == (3, 0)
-        found = door.store.folder.rglob("*.record") if door.store else ()
+        assert (evaluator.counts.runs, evaluator.counts.recorded) == (3, 0)
+        found = evaluator.store.folder.rglob("*.record") if evaluator.store else ()
         records.append({path.name: path.read_bytes() for path in found})
     assert (points[0].jacobian == points[1].jacobian).all()
     assert (points[0].residuals == points[1].residuals).all()
@@ -147,11 +150,13 @@ def test_no_fault_becomes_a_number(
     said: str,
 ) -> None:
     monkeypatch.setenv("STANDIN_FAULT", fault)
-    door = Door(
-        load_case(coarse(time_limit_s=4 if fault == "hang" else 60)), "abaqus", tmp_path / "runs"
+    evaluator = Evaluator(
+        TyreDesign(load_case(coarse(time_limit_s=4 if fault == "hang" else 60))),
+        "abaqus",
+        tmp_path / "runs",
     )
     with pytest.raises(EvaluationFailed, match=said) as failure:
-        door.evaluate(Question({}))
+        evaluator.evaluate(Question({}))
     assert failure.value.cause == cause
     assert failure.value.folder and (failure.value.folder / "modes.inp").exists()
 
@@ -160,8 +165,8 @@ def test_no_fault_becomes_a_number(
 def test_results_of_an_earlier_run_are_removed_first(
     coarse: Callable[..., Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    door = Door(load_case(coarse()), "abaqus", tmp_path / "runs", keep=True)
-    door.evaluate(Question({}))
+    evaluator = Evaluator(TyreDesign(load_case(coarse())), "abaqus", tmp_path / "runs", keep=True)
+    evaluator.evaluate(Question({}))
     (folder,) = (tmp_path / "runs").iterdir()
     monkeypatch.setenv("STANDIN_FAULT", "nothing")
     adapter = Abaqus()
@@ -175,8 +180,8 @@ def test_a_licence_is_waited_for(
     coarse: Callable[..., Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("STANDIN_FAULT", "licence:2")
-    door = Door(load_case(coarse()), "abaqus", tmp_path / "runs", keep=True)
-    assert len(door.evaluate(Question({})).modes) == 20
+    evaluator = Evaluator(TyreDesign(load_case(coarse())), "abaqus", tmp_path / "runs", keep=True)
+    assert len(evaluator.evaluate(Question({})).modes) == 20
     (folder,) = (tmp_path / "runs").iterdir()
     assert len((folder / "denials").read_text()) == 4  # two denied, two granted
 
@@ -186,11 +191,14 @@ def test_a_licence_that_never_comes(
     coarse: Callable[..., Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("STANDIN_FAULT", "licence:inf")
-    door, waits = Door(load_case(coarse(wait_s=0.5)), "abaqus", tmp_path / "runs"), []
+    evaluator, waits = (
+        Evaluator(TyreDesign(load_case(coarse(wait_s=0.5))), "abaqus", tmp_path / "runs"),
+        [],
+    )
     clock = SimpleNamespace(monotonic=time.monotonic, sleep=waits.append)
     monkeypatch.setattr(launch, "time", clock)
     with pytest.raises(EvaluationFailed, match=r"after 0\.5 s of waiting.*FLEXnet") as failure:
-        door.evaluate(Question({}))
+        evaluator.evaluate(Question({}))
     assert failure.value.cause == "licence"
     assert waits == pytest.approx([0.1, 0.2, 0.2])
     assert failure.value.folder
@@ -205,7 +213,7 @@ def test_a_job_that_queues_until_its_time_is_over(
     words = f"import sys, time; 'release' in sys.argv[1] and sys.exit(); {queue}"
     case = load_case(coarse([sys.executable, "-c", words], time_limit_s=4))
     with pytest.raises(EvaluationFailed, match="Queued for 5") as failure:
-        Door(case, "abaqus", tmp_path / "runs").evaluate(Question({}))
+        Evaluator(TyreDesign(case), "abaqus", tmp_path / "runs").evaluate(Question({}))
     assert failure.value.cause == "licence"
 
 
@@ -235,7 +243,7 @@ def test_a_deck_without_modes_is_refused_before_it_runs(
     (own / "modes.inp.j2").write_text("*STEP\n*STATIC\n1.0, 1.0\n*END STEP\n")
     case.write_text(case.read_text() + "templates: own\n")
     with pytest.raises(DeckRefused, match="needs one"):
-        Door(load_case(case), "abaqus", tmp_path / "runs").evaluate(Question({}))
+        Evaluator(TyreDesign(load_case(case)), "abaqus", tmp_path / "runs").evaluate(Question({}))
 
 
 def test_the_release_is_asked_of_the_command_on_the_path(

@@ -15,12 +15,14 @@ from tyrecal_solvers.calculix.runner import _is_safe, _said, run_job
 from tyrecal_solvers.process import RunFailed
 
 from tyrecal.blind.outside import thick_cushion
-from tyrecal.case import LoadedCase, load_case, start_values, with_values
-from tyrecal.deck.environment import TemplateFailed
-from tyrecal.deck.write import Decks
-from tyrecal.evaluate.door import Door, Question
-from tyrecal.evaluate.failure import DeckRefused, EvaluationFailed
+from tyrecal.case import LoadedCase, start_values
+from tyrecal.deck.decks import Decks
+from tyrecal.deck.tyre_design import TyreDesign
+from tyrecal.design import load_case, with_values
+from tyrecal.evaluate.evaluator import Evaluator, Question
+from tyrecal.evaluate.failure import EvaluationFailed
 from tyrecal.modes.label import label_modes
+from tyrecal.templates import TemplateFailed
 
 from ..blind.laws import tread_density
 from ..conftest import CASES
@@ -397,7 +399,7 @@ def test_the_program_is_known_by_its_version(tmp_path: Path) -> None:
         solver.command = [sys.executable, "-c", f"print('{said}')"]
         assert solver.version == version
         (tmp_path / version).mkdir()
-        solver.write(Decks(main_case()), tmp_path / version)
+        solver.write(Decks(TyreDesign(main_case())), tmp_path / version)
         settings = json.loads((tmp_path / version / "calculix.json").read_text())
         assert settings.get("command") == (solver.command if version == "unknown" else None)
         assert settings["parallel"] == 1
@@ -440,7 +442,7 @@ def main_case(**options: object) -> LoadedCase:
 )
 def test_wrong_options_are_refused(tmp_path: Path, options: dict, words: str) -> None:
     with pytest.raises(Refused, match=words):
-        CalculiX().write(Decks(main_case(**options)), tmp_path)
+        CalculiX().write(Decks(TyreDesign(main_case(**options))), tmp_path)
 
 
 @pytest.mark.parametrize(
@@ -453,7 +455,7 @@ def test_wrong_options_are_refused(tmp_path: Path, options: dict, words: str) ->
 )
 def test_decks_that_cannot_be_written(options: dict, words: str) -> None:
     with pytest.raises(TemplateFailed, match=words):
-        Decks(main_case(**options)).texts("calculix")
+        Decks(TyreDesign(main_case(**options))).texts("calculix")
 
 
 def test_a_vibration_frequency_is_refused(tmp_path: Path) -> None:
@@ -466,13 +468,13 @@ def test_a_vibration_frequency_is_refused(tmp_path: Path) -> None:
         case.folder,
         case.raw,
     )
-    with pytest.raises(DeckRefused, match="vibration_frequency_Hz must be null"):
-        Door(case, "calculix", folder=tmp_path).evaluate(Question({}))
+    with pytest.raises(TemplateFailed, match="vibration_frequency_Hz must be null"):
+        Evaluator(TyreDesign(case), "calculix", folder=tmp_path).evaluate(Question({}))
 
 
 def test_decks_have_one_diameter_each_and_half_the_pressure() -> None:
     """What three silent traps of ccx 2.20 demand, and the plies' stiffness and mass."""
-    texts = Decks(main_case(), {}, modes_per_harmonic=3).texts("calculix")
+    texts = Decks(TyreDesign(main_case(), {}), modes_per_harmonic=3).texts("calculix")
     assert list(texts) == ["sector.inp", "inflate.inp", *(f"modes_{n}.inp" for n in range(5))]
     assert "CAVITY, P6, 240000\n" in texts["inflate.inp"]
     for n in range(5):
@@ -494,7 +496,7 @@ def test_decks_have_one_diameter_each_and_half_the_pressure() -> None:
 
 def test_the_inflated_state_is_one_of_revolution_and_let_go() -> None:
     """Nodes halfway between the faces follow those in front, in the inflating step alone."""
-    texts = Decks(main_case()).texts("calculix")
+    texts = Decks(TyreDesign(main_case())).texts("calculix")
     rows = re.findall(r"\*EQUATION\n3\n([^\n]*)", texts["sector.inp"])
     nodes = texts["sector.inp"].split("*NODE, NSET=TYRE\n")[1].split("*")[0].splitlines()
     place = {n: np.array([float(x) for x in xyz]) for n, *xyz in (x.split(", ") for x in nodes)}
@@ -505,7 +507,7 @@ def test_the_inflated_state_is_one_of_revolution_and_let_go() -> None:
         assert carried == pytest.approx(place[node][int(i) - 1], abs=1e-6)
     first, second = texts["inflate.inp"].split("*END STEP", 1)
     assert rows and "*EQUATION" not in first and "*EQUATION, REMOVE\nBETWEEN, 1, 3" in second
-    plain = Decks(main_case(element="C3D8")).texts("calculix")
+    plain = Decks(TyreDesign(main_case(element="C3D8"))).texts("calculix")
     assert "EQUATION" not in plain["sector.inp"] + plain["inflate.inp"]
     assert "*RESTART, READ, STEP=1\n" in plain["modes_0.inp"]
 
@@ -538,8 +540,8 @@ def test_masses_agree_where_cord_lines_have_kinks(case_folder: Path) -> None:
     case = load_case(coarse_case(case_folder))
     case = tread_density(thick_cushion(case, 1.5), -0.2)
     with common():
-        ours = Door(common_problem(case)).evaluate(Question({}))
-    for name, text in Decks(case).texts("calculix").items():
+        ours = Evaluator(TyreDesign(common_problem(case))).evaluate(Question({}))
+    for name, text in Decks(TyreDesign(case)).texts("calculix").items():
         (case_folder / name).write_text(text)
     run_job(case_folder, "inflate", ["sector.inp"], ["ccx"], 60.0)
     mass_kg = 180 * read_mass(case_folder / "inflate.dat")
@@ -551,8 +553,10 @@ def test_calculix_agrees_with_the_bundled_solver(case_folder: Path) -> None:
     """In a folder with a blank, of which ccx itself cannot write to the absolute path."""
     case = load_case(coarse_case(case_folder))
     values = start_values(case)
-    ours = Door(case).evaluate(Question(values))
-    theirs = Door(case, "calculix", folder=case_folder / "runs").evaluate(Question(values))
+    ours = Evaluator(TyreDesign(case)).evaluate(Question(values))
+    theirs = Evaluator(TyreDesign(case), "calculix", folder=case_folder / "runs").evaluate(
+        Question(values)
+    )
     assert theirs.mass_kg == pytest.approx(ours.mass_kg, rel=3e-3)
     assert abs(theirs.displacement).max() == pytest.approx(abs(ours.displacement).max(), rel=0.05)
     known = {mode.label: mode.frequency_Hz for mode in label_modes(ours.modes)}
@@ -590,5 +594,5 @@ def test_decks_that_ccx_rejects(
     assert old in text
     (case_folder / "own" / template).write_text(text.replace(old, new))
     with pytest.raises(EvaluationFailed) as failure:
-        Door(load_case(path), "calculix").evaluate(Question({"pressure_kPa": 0.0}))
+        Evaluator(TyreDesign(load_case(path)), "calculix").evaluate(Question({"pressure_kPa": 0.0}))
     assert failure.value.cause == cause

@@ -7,8 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from tyrecal.case import load_case, start_values
-from tyrecal.evaluate.door import Door, Question
+from tyrecal.case import start_values
+from tyrecal.deck.tyre_design import TyreDesign
+from tyrecal.design import load_case
+from tyrecal.evaluate.evaluator import Evaluator, Question
 
 from ..conftest import CASES, ROOT
 from ..example import install, tyrecal
@@ -37,7 +39,7 @@ def test_the_example_gives_the_bundled_solvers_frequencies(site: Path, tmp_path:
     assert done.returncode == 0, done.stderr
     found = [mode["frequency_Hz"] for mode in json.loads(done.stdout)["modes"]]
     case = load_case(path)
-    expected = Door(case).evaluate(Question(start_values(case))).modes
+    expected = Evaluator(TyreDesign(case)).evaluate(Question(start_values(case))).modes
     assert found == pytest.approx(sorted(m.frequency_Hz for m in expected), rel=1e-12)
 
 

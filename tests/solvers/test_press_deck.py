@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tyrecal.case import LoadedCase, load_case
+from tyrecal.case import LoadedCase
 from tyrecal.deck.calculix import calculix_context
-from tyrecal.deck.context import section_mesh
+from tyrecal.design import load_case, resolved
 
 from ..conftest import CASES
 from .press_deck import Angles, Road, around, press_texts
@@ -103,12 +103,12 @@ def test_numbers_have_no_gaps(element: str, angles: Angles) -> None:
 def test_the_section_is_carried_around(element: str) -> None:
     """Pappus, for chords: a wedge of d degrees holds area times mean radius times sin d."""
     case = coarse_case(element)
-    mesh = section_mesh(case)
+    mesh = resolved(case).mesh
     corner = np.array([[mesh.nodes[n] for n in solid[:4]] for solid in mesh.solids.values()])
     r, z = corner[..., 0], corner[..., 1]
     s, y = np.roll(r, -1, 1), np.roll(z, -1, 1)
     moment = ((r * y - s * z) * (r + s)).sum() / 6  # area times mean radius
-    names = calculix_context(case)
+    names = calculix_context(resolved(case))
     sector_angle = np.sin(2 * np.pi / names["sectors"])
     for angles in (HALF, WHOLE):
         tyre = around(names, angles)
@@ -122,7 +122,7 @@ def test_the_section_is_carried_around(element: str) -> None:
 
 @pytest.mark.parametrize("element", ["C3D8", "C3D20R"])
 def test_the_half_turned_about_x_is_the_other_half(element: str) -> None:
-    names = calculix_context(coarse_case(element))
+    names = calculix_context(resolved(coarse_case(element)))
     half, whole = around(names, HALF), around(names, WHOLE)
     place = {n: np.array(xyz) for n, *xyz in half["nodes"]}
     turned = {tuple(np.round(p * [1, s, s], 8) + 0.0) for p in place.values() for s in (1, -1)}
@@ -140,7 +140,7 @@ def test_the_road_meets_the_tread(element: str) -> None:
     """Its face lies at the outer radius, its travel ends at inflated radius less deflection."""
     case = coarse_case(element)
     texts = press_texts(case, [0.006, 0.01], HALF, 0.3925, Road(friction=0.0))
-    tyre = around(calculix_context(case), HALF)
+    tyre = around(calculix_context(resolved(case)), HALF)
     place = {n: np.array(xyz) for n, *xyz in tyre["nodes"]}
     outer = [place[n] for n in dict(tyre["node_sets"])["TREAD_NODES"]]
     radius = max(np.hypot(x, y) for x, y, _ in place.values())

@@ -16,8 +16,10 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
-from tyrecal.case import LoadedCase, load_case, with_values
-from tyrecal.evaluate.door import Door, Question
+from tyrecal.case import LoadedCase
+from tyrecal.deck.tyre_design import TyreDesign
+from tyrecal.design import load_case, with_values
+from tyrecal.evaluate.evaluator import Evaluator, Question
 from tyrecal.modes.label import label_modes
 from tyrecal.modes.match import match
 from tyrecal.modes.mode import Label
@@ -65,7 +67,9 @@ def main() -> None:
             worst: dict[str, float] = {}
             for point in points:
                 at = with_values(case, {"pressure_kPa": point["pressure_kPa"]})
-                answer = Door(at).evaluate(Question({v: point[v] for v in VARIABLES}))
+                answer = Evaluator(TyreDesign(at)).evaluate(
+                    Question({v: point[v] for v in VARIABLES})
+                )
                 modes = match(label_modes(answer.modes), [label(k) for k in point["modes"]])
                 for key, frequency in point["modes"].items():
                     off = 100 * (modes[label(key)].frequency_Hz / frequency - 1)
@@ -79,7 +83,9 @@ def _slopes(layout: tuple) -> None:
     case = with_layout(load_case(ROOT / "cases" / f"{known['section']}.yaml"), *layout)
     for i, where in enumerate(("initial", "optimised")):
         point = REFERENCE["sections"][known["section"]][i]
-        answer = Door(case).evaluate(Question({v: point[v] for v in VARIABLES}, VARIABLES))
+        answer = Evaluator(TyreDesign(case)).evaluate(
+            Question({v: point[v] for v in VARIABLES}, VARIABLES)
+        )
         modes = match(label_modes(answer.modes), [label(k) for k in point["modes"]])
         worst = 0.0
         for key, expected in known[where].items():

@@ -41,12 +41,12 @@ from tyrecal.blind.maker import Computed
 from tyrecal.blind.outside import FAMILIES
 from tyrecal.blind.protocol import Protocol
 from tyrecal.blind.ruler import measure
-from tyrecal.case import LoadedCase, load_case, number_at, start_values, with_values
+from tyrecal.case import LoadedCase, number_at, start_values
 from tyrecal.deck.calculix import PLY_THICKNESS_M
-from tyrecal.deck.context import gauged_section
+from tyrecal.deck.tyre_design import TyreDesign
+from tyrecal.design import load_case, resolved, with_values
 from tyrecal.diagnose.uncertainties import sources
-from tyrecal.effects import with_effects
-from tyrecal.evaluate.door import Door, Question
+from tyrecal.evaluate.evaluator import Evaluator, Question
 from tyrecal.evaluate.failure import EvaluationFailed
 from tyrecal.modes.label import label_modes
 from tyrecal.modes.match import LostLabel, match
@@ -96,10 +96,10 @@ def training(count: int) -> list[dict[str, float]]:
 
 def common_problem(case: LoadedCase, faces_at: frozenset[str] = frozenset()) -> LoadedCase:
     """The case as `calculix.split` makes it, with effects and gauges written into its section."""
-    case = with_effects(case)
-    c = case.case
+    tyre = resolved(case)
+    c = tyre.case
     plain = c.model_copy(update={"section": c.section.model_copy(update={"gauges": None})})
-    case = replace(case, case=plain, section=gauged_section(case))
+    case = replace(tyre.written, case=plain, section=tyre.gauged)
     return split(case, PLY_THICKNESS_M, faces_at)
 
 
@@ -125,7 +125,7 @@ def _solved(case: LoadedCase, labels: list[Label]) -> tuple[dict[str, float], fl
     """The same of ``case`` as it stands, with CalculiX's cord law and straight sides."""
     with common():
         for count in (None, 4):
-            answer = Door(case, "bundled").evaluate(Question({}, (), count))
+            answer = Evaluator(TyreDesign(case), "bundled").evaluate(Question({}, (), count))
             try:
                 found = match(label_modes(answer.modes), labels)
             except LostLabel as lost:
@@ -340,7 +340,9 @@ def main() -> None:
         told = lambda done, all: print(f"{done} of {all}", file=sys.stderr)
         sealed = folder.with_name(f"{folder.name}-truth")
         plain = load_case(case.path)
-        ruler = lambda: measure(tyre_model(plain, Door(plain), protocol), rows_of(plain, protocol))
+        ruler = lambda: measure(
+            tyre_model(plain, Evaluator(TyreDesign(plain)), protocol), rows_of(plain, protocol)
+        )
         print(make(folder, sealed, case, protocol, maker, ruler, JOBS, seed, told))
 
 

@@ -27,11 +27,12 @@ from unittest.mock import patch
 import numpy as np
 from tyrecal_solvers.bundled.section.parts import cords
 
-from tyrecal.case import LoadedCase, load_case, with_values
-from tyrecal.deck import context
+from tyrecal.case import LoadedCase
 from tyrecal.deck.calculix import PLY_THICKNESS_M
 from tyrecal.deck.sector import with_plies
-from tyrecal.evaluate.door import Door, Question
+from tyrecal.deck.tyre_design import TyreDesign
+from tyrecal.design import load_case, tyre, with_values
+from tyrecal.evaluate.evaluator import Evaluator, Question
 from tyrecal.evaluate.failure import EvaluationFailed
 from tyrecal.evaluate.results import HarmonicShape
 from tyrecal.evaluate.store import Store
@@ -136,14 +137,14 @@ def straight(*arguments: object) -> SectionMesh:
 @contextmanager
 def common(law: bool = True, sides: bool = True) -> Iterator[None]:
     """The bundled solver with CalculiX's cord law, sides, or both, in this process."""
-    context._mesh.cache_clear()
+    tyre._mesh.cache_clear()
     with ExitStack() as switched:
         if law:
             switched.enter_context(patch.object(cords, "LogarithmicCord", StVenantKirchhoff))
         if sides:
-            switched.enter_context(patch.object(context, "build_mesh", straight))
+            switched.enter_context(patch.object(tyre, "build_mesh", straight))
         yield
-    context._mesh.cache_clear()
+    tyre._mesh.cache_clear()
 
 
 def on_common_nodes(a: HarmonicShape, b: HarmonicShape) -> tuple[HarmonicShape, HarmonicShape]:
@@ -189,7 +190,7 @@ def compare(case: LoadedCase, store: Store | None) -> list[Row]:
 def modes_of(case: LoadedCase, solver: str, store: Store | None = None) -> dict[str, Mode]:
     """The case's target modes by the text of their label. Raises EvaluationFailed."""
     try:
-        answer = Door(case, solver, store=store).evaluate(Question({}))
+        answer = Evaluator(TyreDesign(case), solver, store=store).evaluate(Question({}))
     except EvaluationFailed as failure:
         raise EvaluationFailed(failure.cause, f"{solver}: {failure.words}") from None
     targets = [Label(t.c, t.m, t.kind) for t in case.case.targets.modes]

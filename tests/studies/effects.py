@@ -10,9 +10,10 @@ from pathlib import Path
 
 import numpy as np
 
-from tyrecal.case import load_case
+from tyrecal.deck.tyre_design import TyreDesign
+from tyrecal.design import load_case
 from tyrecal.effects import catalogue
-from tyrecal.evaluate.door import Door
+from tyrecal.evaluate.evaluator import Evaluator
 from tyrecal.studies.fitted import read_fitted
 from tyrecal.studies.signature import Plain, Signature, rms, stated_size
 
@@ -23,9 +24,9 @@ ALIKE = 0.85  # cosine of what a re-fit leaves of two effects, without their sig
 def main(case_file: str, fit_file: str) -> None:
     case = load_case(case_file)
     values, _ = read_fitted(Path(fit_file), case)
-    run = Plain(Door(case), values, PRESSURES_KPA)
-    one = Plain(Door(case), values, (case.case.pressure_kPa,))
-    known = run.door.solver.capabilities
+    run = Plain(case, Evaluator(TyreDesign(case)), values, PRESSURES_KPA)
+    one = Plain(case, Evaluator(TyreDesign(case)), values, (case.case.pressure_kPa,))
+    known = run.evaluator.solver.capabilities
     sizes = {id: stated_size(id) for id, effect in catalogue().items() if effect.within(known)}
     several = [run.signature(id, size) for id, size in sizes.items()]
     single = [one.signature(id, size) for id, size in sizes.items()]

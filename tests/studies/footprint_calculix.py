@@ -33,9 +33,11 @@ from tyrecal_solvers.calculix.results import read_fields
 from tyrecal_solvers.calculix.runner import run_job
 from tyrecal_solvers.process import RunFailed
 
-from tyrecal.case import LoadedCase, load_case, with_values
-from tyrecal.deck.write import Decks
-from tyrecal.evaluate.door import Door
+from tyrecal.case import LoadedCase
+from tyrecal.deck.decks import Decks
+from tyrecal.deck.tyre_design import TyreDesign
+from tyrecal.design import load_case, with_values
+from tyrecal.evaluate.evaluator import Evaluator
 from tyrecal.evaluate.failure import EvaluationFailed
 
 from ..solvers.press_deck import Angles, Road, press_texts
@@ -168,7 +170,7 @@ def inflated_radius(run: Run, folder: Path, limit_s: float) -> float:
         run_press(folder, ["ccx"], limit_s)
         return read_radius(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    texts = Decks(case_of(run)).texts("calculix")
+    texts = Decks(TyreDesign(case_of(run))).texts("calculix")
     for name in ("sector.inp", "inflate.inp"):
         (folder / name).write_text(texts[name])
     run_job(folder, "inflate", ["sector.inp"], ["ccx"], limit_s)
@@ -216,7 +218,7 @@ def solve_ours(run: Ours) -> dict[str, Any]:
     case = replace(case, case=case.case.model_copy(update={"road": road, "solver": solver}))
     try:
         with common() if run.alike else nullcontext():
-            pressed = Door(case, "bundled").press({}, run.loads_N)
+            pressed = Evaluator(TyreDesign(case), "bundled").press({}, run.loads_N)
     except EvaluationFailed as failure:
         return {"failed": str(failure)}
     return {

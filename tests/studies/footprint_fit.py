@@ -15,9 +15,10 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
-from tyrecal.case import LoadedCase, load_case, start_values, with_values
-from tyrecal.deck.context import section_mesh
-from tyrecal.evaluate.door import Door, Question
+from tyrecal.case import LoadedCase, start_values
+from tyrecal.deck.tyre_design import TyreDesign
+from tyrecal.design import load_case, resolved, with_values
+from tyrecal.evaluate.evaluator import Evaluator, Question
 from tyrecal.evaluate.store import Store
 from tyrecal.fit.calibrate import calibrate
 from tyrecal.modes.label import paired_labels
@@ -50,15 +51,15 @@ def known_case(folder: Path, mesh: str) -> Path:
     path.write_text(text)
     case = load_case(path)
     wanted = {(t.c, t.m, t.kind) for t in case.case.targets.modes}
-    door = Door(case, store=Store(folder / "record"))
+    evaluator = Evaluator(TyreDesign(case), store=Store(folder / "record"))
     lines = [
         f"    - {{c: {mode.label.c}, m: {mode.label.m}, frequency_Hz: {mode.frequency_Hz!r},"
         f" sigma_Hz: 0.5{f', kind: {mode.label.kind}' if mode.label.kind else ''}}}"
-        for mode in paired_labels(door.evaluate(Question(TRUTH)).modes)
+        for mode in paired_labels(evaluator.evaluate(Question(TRUTH)).modes)
         if (mode.label.c, mode.label.m, mode.label.kind) in wanted
     ]
-    pressed = door.press(TRUTH, case.case.loads_N[: case.case.loads_N.index(4000) + 1])
-    row = footprint_row(pressed, pressed.footprints[-1], section_mesh(with_values(case, TRUTH)))
+    pressed = evaluator.press(TRUTH, case.case.loads_N[: case.case.loads_N.index(4000) + 1])
+    row = footprint_row(pressed, pressed.footprints[-1], resolved(with_values(case, TRUTH)).mesh)
     area, stiffness = row["area_m2"], row["vertical_stiffness_N_per_m"]
     lines += [
         "  footprint:",
@@ -82,9 +83,12 @@ def main(folder: Path, mesh: str) -> None:
     case = load_case(known_case(folder, mesh))
     print("start", start_values(case))
     for words, each in (("frequencies alone", without_footprint(case)), ("both", case)):
-        door, began = Door(each, store=Store(folder / "record")), time.perf_counter()
-        result = calibrate(each, door).result
-        seconds, counts = time.perf_counter() - began, door.counts
+        evaluator, began = (
+            Evaluator(TyreDesign(each), store=Store(folder / "record")),
+            time.perf_counter(),
+        )
+        result = calibrate(each, evaluator).result
+        seconds, counts = time.perf_counter() - began, evaluator.counts
         print(f"{words}: {result['evaluations']} designs, {counts.runs} runs, {counts.recorded}")
         print(f"  from the record, {seconds:.0f} s; converged {result['converged']}:")
         print(f"  {result['message']}; objective", result["initial_objective_Hz"], "to")

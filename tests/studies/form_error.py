@@ -15,11 +15,13 @@ from dataclasses import replace
 import numpy as np
 
 from tests.conftest import CASES
-from tyrecal.case import LoadedCase, load_case
+from tyrecal.case import LoadedCase
 from tyrecal.case.section import Level
+from tyrecal.deck.tyre_design import TyreDesign
+from tyrecal.design import load_case
 from tyrecal.diagnose.response import Answer, Point
 from tyrecal.diagnose.tyre_model import TyreModel
-from tyrecal.evaluate.door import Door
+from tyrecal.evaluate.evaluator import Evaluator
 from tyrecal.modes.mode import Label
 
 PRESSURES = (160.0, 240.0, 320.0)
@@ -58,7 +60,7 @@ def variants(case: LoadedCase) -> dict[str, LoadedCase]:
 def answer(case: LoadedCase) -> Answer:
     """The model's answer at the fitted design."""
     rows = [(label, p) for p in PRESSURES for label in LABELS]
-    model = TyreModel(case, Door(case), rows, [], {})
+    model = TyreModel(case, Evaluator(TyreDesign(case)), rows, [], {})
     (found,) = model.answers([Point(np.log([FITTED[name] for name in model.variables]))])
     assert isinstance(found, Answer), found
     return found

@@ -14,8 +14,6 @@ from typing import Any
 import numpy as np
 from tyrecal_solvers.bundled.adapter import Bundled
 
-from tyrecal.deck.context import section_mesh
-
 from ..conftest import CASES
 
 BELT = 2.118683e-7
@@ -60,9 +58,9 @@ class Hertz(Bundled):
         """The real decks; remembers what the formula needs."""
         if not decks.loads_N:
             return super().write(decks, folder)
-        self.mesh, self.loads = section_mesh(decks.case), decks.loads_N
-        self.size = (BELT / decks.case.case.rebar_layers["belt_1"].area_m2) ** 0.05
-        self.pressure = decks.case.case.pressure_kPa * 1e3
+        self.mesh, self.loads = decks.design.tyre.mesh, decks.loads_N
+        self.size = (BELT / decks.design.tyre.case.rebar_layers["belt_1"].area_m2) ** 0.05
+        self.pressure = decks.design.tyre.case.pressure_kPa * 1e3
         paths = []
         for name, text in decks.texts(self.dialect).items():
             paths.append(folder / name)

@@ -23,8 +23,9 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import KDTree
 
-from tyrecal.case import load_case
-from tyrecal.evaluate.door import Door, Question
+from tyrecal.deck.tyre_design import TyreDesign
+from tyrecal.design import load_case
+from tyrecal.evaluate.evaluator import Evaluator, Question
 from tyrecal.evaluate.failure import EvaluationFailed
 from tyrecal.evaluate.results import HarmonicShape, RawMode, RingShape
 from tyrecal.modes.label import label_modes, pair_rings
@@ -51,8 +52,8 @@ SIDEWALL_R = (0.35, 0.30)  # m
 
 
 @cache
-def door() -> Door:
-    return Door(load_case(CASE))
+def evaluator() -> Evaluator:
+    return Evaluator(TyreDesign(load_case(CASE)))
 
 
 def evaluate(
@@ -60,7 +61,7 @@ def evaluate(
 ) -> list[RawMode]:
     """Modes of harmonics 0 to 4, harmonic by harmonic. Raises EvaluationFailed."""
     question = Question({**values, "pressure_kPa": pressure_kPa}, (), modes_per_harmonic)
-    modes = door().evaluate(question).modes
+    modes = evaluator().evaluate(question).modes
     return sorted(modes, key=lambda mode: mode.shape.n)  # type: ignore[union-attr]
 
 

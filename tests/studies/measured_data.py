@@ -23,8 +23,9 @@ from pathlib import Path
 import numpy as np
 import pyuff
 
-from tyrecal.case import load_case, with_values
-from tyrecal.evaluate.door import Door, Question
+from tyrecal.deck.tyre_design import TyreDesign
+from tyrecal.design import load_case, with_values
+from tyrecal.evaluate.evaluator import Evaluator, Question
 from tyrecal.evaluate.results import HarmonicShape
 from tyrecal.modes.label import paired_labels
 from tyrecal.modes.mode import Label, Mode
@@ -65,7 +66,7 @@ def evaluated(pressure_kPa: float) -> list[Mode]:
     case = load_case(CASES / "p235_75r17.yaml")
     case = with_values(case, {"analysis.highest_harmonic": HIGHEST})
     question = Question({**TRUTH, "pressure_kPa": pressure_kPa}, (), PER_HARMONIC)
-    modes = paired_labels(Door(case).evaluate(question).modes)
+    modes = paired_labels(Evaluator(TyreDesign(case)).evaluate(question).modes)
     return sorted((m for m in modes if m.frequency_Hz < CEILING), key=lambda m: m.frequency_Hz)
 
 

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tyrecal.case import load_case
-from tyrecal.deck.context import section_mesh
-from tyrecal.evaluate.door import Door
+from tyrecal.deck.tyre_design import TyreDesign
+from tyrecal.design import load_case, resolved
+from tyrecal.evaluate.evaluator import Evaluator
 from tyrecal.evaluate.failure import DeckRefused, EvaluationFailed
 from tyrecal.evaluate.pressed import Pressed
 from tyrecal.studies.footprint import findings, footprint_result, footprint_row, press
@@ -20,19 +20,19 @@ from ..evaluate.stand_in import CASE, StandIn
 from .hertz import BELT, Hertz, coarse_case
 
 LOADS = [500.0, 4000.0]
-MESH = section_mesh(CASE)
+MESH = resolved(CASE).mesh
 START = {"A_belt": BELT}
 
 
-def door(reach: float = 20e3) -> Door:
+def evaluator(reach: float = 20e3) -> Evaluator:
     solver = Hertz()
     solver.reach = reach
-    return Door(CASE, _solver=solver)
+    return Evaluator(TyreDesign(CASE), _solver=solver)
 
 
 def test_numbers_of_a_hertzian_patch() -> None:
     """Ellipse of half axes 80 and 50 mm under 4 kN: 125.7 cm2, its peak 1.5 times the mean."""
-    pressed = door().press(START, LOADS)
+    pressed = evaluator().press(START, LOADS)
     row = footprint_row(pressed, pressed.footprints[1], MESH)
     assert row["load_N"] == 4000 and row["deflection_m"] == pytest.approx(0.02)
     assert row["area_m2"] == pytest.approx(np.pi * 0.08 * 0.05)
@@ -45,7 +45,7 @@ def test_numbers_of_a_hertzian_patch() -> None:
 
 
 def test_the_patch_is_where_the_solver_says_and_in_order() -> None:
-    pressed = door().press(START, LOADS)
+    pressed = evaluator().press(START, LOADS)
     footprint = pressed.footprints[1]
     patch = patch_of(pressed, footprint, MESH)
     assert patch.touches.sum() == len(footprint.node)
@@ -73,7 +73,7 @@ def test_extents_end_half_way_to_the_next_node() -> None:
 def test_both_designs_and_what_they_say() -> None:
     designs = {"initial": START, "fitted": {"A_belt": 0.5 * BELT}}
     told: list[str] = []
-    outcomes = press(door(), designs, LOADS, notify=lambda name, outcome: told.append(name))
+    outcomes = press(evaluator(), designs, LOADS, notify=lambda name, outcome: told.append(name))
     assert told == ["initial", "fitted"]
     result = footprint_result(designs, LOADS, outcomes, {name: MESH for name in designs})
     assert [(row["design"], row["load_N"]) for row in result["rows"]] == [
@@ -119,7 +119,7 @@ def test_areas_that_do_not_grow_are_said(areas: tuple[float, ...], words: str) -
 
 
 def test_a_load_out_of_reach_keeps_those_below() -> None:
-    outcomes = press(door(3000.0), {"initial": START}, LOADS)
+    outcomes = press(evaluator(3000.0), {"initial": START}, LOADS)
     pressed = outcomes["initial"]
     assert isinstance(pressed, Pressed) and pressed.failed is not None
     assert len(pressed.footprints) == 1 and pressed.failed.cause == "no_equilibrium"
@@ -132,13 +132,13 @@ def test_a_load_out_of_reach_keeps_those_below() -> None:
             "words": "the rim is on the road at 3000 N",
         }
     ]
-    (failed,) = press(door(100.0), {"initial": START}, LOADS).values()
+    (failed,) = press(evaluator(100.0), {"initial": START}, LOADS).values()
     assert isinstance(failed, EvaluationFailed) and "rim" in failed.words
 
 
 def test_a_solver_without_a_road_says_so() -> None:
     with pytest.raises(DeckRefused, match="'stand-in' cannot press a tyre on a road"):
-        Door(CASE, _solver=StandIn()).press(START, LOADS)  # type: ignore[arg-type]
+        Evaluator(TyreDesign(CASE), _solver=StandIn()).press(START, LOADS)  # type: ignore[arg-type]
 
 
 @pytest.mark.slow
@@ -146,9 +146,9 @@ def test_the_bundled_solvers_own_footprints(tmp_path: Path) -> None:
     """Its loads are borne, by rim and road; it says where it touches; it is the same after half a
     turn; forces over deflections are the tangents' mean."""
     case = load_case(coarse_case(tmp_path))
-    mesh = section_mesh(case)
+    mesh = resolved(case).mesh
     loads = [2000.0, 2500.0]
-    pressed = Door(case).press({}, loads)
+    pressed = Evaluator(TyreDesign(case)).press({}, loads)
     assert pressed.failed is None and 12 < pressed.mass_kg < 14
     assert 0.39 < pressed.free_radius_m < 0.40
     for footprint, load in zip(pressed.footprints, loads, strict=True):
@@ -173,7 +173,7 @@ def test_the_bundled_solvers_own_footprints(tmp_path: Path) -> None:
 
 def test_a_patch_of_another_design_of_the_same_mesh() -> None:
     """Nodes that the solver adds, like the rim's reference, are no matter."""
-    pressed = door().press(START, LOADS)
+    pressed = evaluator().press(START, LOADS)
     footprint = pressed.footprints[0]
     more = replace(
         pressed,

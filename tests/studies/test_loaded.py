@@ -6,9 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from tyrecal.case import load_case
-from tyrecal.deck.write import Decks, fine_enough
-from tyrecal.evaluate.door import Door
+from tyrecal.deck.decks import Decks
+from tyrecal.deck.dialects import fine_enough
+from tyrecal.deck.tyre_design import TyreDesign
+from tyrecal.design import load_case
+from tyrecal.evaluate.evaluator import Evaluator
 from tyrecal.evaluate.failure import DeckRefused, EvaluationFailed
 from tyrecal.evaluate.store import Store
 from tyrecal.modes.loaded import SYMMETRIES, Member
@@ -27,7 +29,9 @@ def tyre(tmp_path_factory: pytest.TempPathFactory) -> LoadedTyre:
     """A coarse tyre at three loads."""
     folder = tmp_path_factory.mktemp("coarse")
     case = load_case(coarse_case(folder))
-    outcome = load_tyres(Door(case, store=Store(folder / "record")), {"initial": {}}, LOADS)
+    outcome = load_tyres(
+        case, Evaluator(TyreDesign(case), store=Store(folder / "record")), {"initial": {}}, LOADS
+    )
     assert isinstance(outcome["initial"], LoadedTyre)
     return outcome["initial"]
 
@@ -131,14 +135,16 @@ def test_failures_keep_what_was_computed(tyre: LoadedTyre) -> None:
 
 def test_a_solver_without_modes_on_the_road_is_refused() -> None:
     with pytest.raises(DeckRefused, match=r"cannot find modes of a tyre on a road.*loaded_modes"):
-        load_tyres(Door(CASE, _solver=StandIn()), {"initial": {}}, [1000.0])
+        load_tyres(CASE, Evaluator(TyreDesign(CASE), _solver=StandIn()), {"initial": {}}, [1000.0])
 
 
 @pytest.mark.slow
 def test_an_unloaded_tyre_that_fails_is_the_outcome(tmp_path: Path) -> None:
     """Far too much pressure: no modes without a load either."""
     case = load_case(coarse_case(tmp_path))
-    outcome = load_tyres(Door(case), {"initial": {"pressure_kPa": 1900.0}}, [1000.0])["initial"]
+    outcome = load_tyres(
+        case, Evaluator(TyreDesign(case)), {"initial": {"pressure_kPa": 1900.0}}, [1000.0]
+    )["initial"]
     assert isinstance(outcome, EvaluationFailed) and outcome.cause == "no_equilibrium"
 
 
@@ -155,8 +161,10 @@ def test_elements_are_short_enough_for_the_waves(waves: int) -> None:
 
 
 def test_the_deck_asks_for_modes_after_each_load() -> None:
-    plain = Decks(CASE, loads_N=(500.0, 900.0)).texts("abaqus")["press.inp"]
-    deck = Decks(CASE, loads_N=(500.0, 900.0), loaded_modes=24).texts("abaqus")["press.inp"]
+    plain = Decks(TyreDesign(CASE), loads_N=(500.0, 900.0)).texts("abaqus")["press.inp"]
+    deck = Decks(TyreDesign(CASE), loads_N=(500.0, 900.0), loaded_modes=24).texts("abaqus")[
+        "press.inp"
+    ]
     assert "FREQUENCY" not in plain
     assert deck.count("*STEP, NAME=MODES_") == 2 == deck.count("NORMALIZATION=MASS\n24\n")
     steps = [line.split("NAME=")[1].split(",")[0] for line in deck.splitlines() if "*STEP" in line]

@@ -8,9 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tyrecal.case import load_case, start_values
+from tyrecal.case import start_values
 from tyrecal.case.identity import tyre_sha256
-from tyrecal.evaluate.door import Door
+from tyrecal.deck.tyre_design import TyreDesign
+from tyrecal.design import load_case
+from tyrecal.evaluate.evaluator import Evaluator
 from tyrecal.evaluate.results import HarmonicShape, RawMode
 from tyrecal.modes.label import label_modes
 from tyrecal.modes.mode import Label
@@ -118,10 +120,10 @@ def test_more_modes_are_asked_for_where_a_target_is_lost() -> None:
     from dataclasses import replace
 
     short = replace(case, case=case.case.model_copy(update={"analysis": few}))
-    door = Door(short)
-    found = sweep(door, {"initial": start_values(case)}, [200.0])
-    assert door.counts.runs == 2
-    (whole,) = sweep(Door(case), {"initial": start_values(case)}, [200.0])
+    evaluator = Evaluator(TyreDesign(short))
+    found = sweep(short, evaluator, {"initial": start_values(case)}, [200.0])
+    assert evaluator.counts.runs == 2
+    (whole,) = sweep(case, Evaluator(TyreDesign(case)), {"initial": start_values(case)}, [200.0])
     (state,) = found
     for label in LABELS:
         assert state.frequencies[label] == pytest.approx(whole.frequencies[label], rel=1e-9)
@@ -137,10 +139,12 @@ def test_a_variable_that_sets_the_pressure_is_what_is_swept(case_folder: Path) -
     path.write_text(path.read_text().replace("\ntargets:", f"\n{extra}\ntargets:"))
     case = load_case(path)
     assert pressure_name(case) == "inflation"
-    (ours,) = sweep(Door(case), {"initial": start_values(case)}, [200.0])
+    (ours,) = sweep(case, Evaluator(TyreDesign(case)), {"initial": start_values(case)}, [200.0])
     plain = load_case(CASES / "p235_75r17.yaml")
     assert pressure_name(plain) == "pressure_kPa"
-    (theirs,) = sweep(Door(plain), {"initial": start_values(plain)}, [200.0])
+    (theirs,) = sweep(
+        plain, Evaluator(TyreDesign(plain)), {"initial": start_values(plain)}, [200.0]
+    )
     assert ours.frequencies == theirs.frequencies
     for label, slope in theirs.slopes.items():
         assert ours.slopes[label] == pytest.approx(slope, rel=1e-6)

@@ -10,10 +10,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tyrecal.case import LoadedCase, load_case, start_values
+from tyrecal.case import LoadedCase, start_values
 from tyrecal.case.draft import from_size
-from tyrecal.deck.context import section_mesh
-from tyrecal.evaluate.door import Door, Question
+from tyrecal.deck.tyre_design import TyreDesign
+from tyrecal.design import load_case, resolved
+from tyrecal.evaluate.evaluator import Evaluator, Question
 from tyrecal.studies.modes import modes_result
 from tyrecal.tyre.from_size import build, usual
 from tyrecal.tyre.mesh import build_mesh
@@ -65,7 +66,7 @@ def coarse(code: str, folder: Path) -> LoadedCase:
 def test_the_size_code_gives_sixteen_modes(code: str, tmp_path: Path) -> None:
     case = coarse(code, tmp_path)
     values = start_values(case)
-    evaluation = Door(case).evaluate(Question(values))
+    evaluation = Evaluator(TyreDesign(case)).evaluate(Question(values))
     result, _ = modes_result(case, values, evaluation)
     modes = {(m["c"], m["m"], m["kind"]): m for m in result["modes"]}
     assert modes.keys() >= SIXTEEN
@@ -75,7 +76,7 @@ def test_the_size_code_gives_sixteen_modes(code: str, tmp_path: Path) -> None:
     if code in MASSES:
         assert result["mass_kg"] / (1 - BEAD_WIRES) == pytest.approx(MASSES[code], rel=0.1)
     # what the standards state are dimensions of the inflated tyre: the section grows little
-    mesh = section_mesh(case)
+    mesh = resolved(case).mesh
     nodes = [i for i, n in enumerate(evaluation.nodes.tolist()) if n in mesh.nodes]
     at = np.array([mesh.nodes[evaluation.nodes.tolist()[i]] for i in nodes])
     moved = at + np.asarray(evaluation.displacement)[nodes][:, [0, 2]]

@@ -25,24 +25,18 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-from ..case import (
-    CaseError,
-    LoadedCase,
-    load_case,
-    start_values,
-    unusual_value,
-    with_level,
-    with_values,
-)
-from ..deck.environment import TemplateFailed
+from ..case import CaseError, LoadedCase, start_values, with_level
+from ..deck.tyre_design import TyreDesign
+from ..design import load_case, unusual_value, with_values
 from ..errors import InputError
-from ..evaluate.door import Door
+from ..evaluate.evaluator import Evaluator
 from ..evaluate.failure import DeckRefused, EvaluationFailed, SolverUnavailable
 from ..evaluate.sources import sources
 from ..evaluate.store import Store, sources_of
 from ..files import json_text, own_folder, read_bytes, read_json, set_aside, write_runs, write_text
 from ..provenance import provenance
 from ..studies.fitted import NOT_CONVERGED, has_good
+from ..templates import TemplateFailed
 from .studies import Asked, Outcome, Studied, study
 
 FINISHED = "finished.json"  # in a case's folder: what was asked, and the answer
@@ -78,13 +72,15 @@ def run_case(task: CaseTask) -> Report:
     report: Report = {"name": task.name, "provenance": None, "studies": {}, "facts": facts}
     try:
         loaded = _loaded(task)
-        door = Door(loaded, task.solver, task.folder / "runs", command=task.command)
-        question = _question(task, loaded, door)
-        report["provenance"] = provenance(loaded, door.solver)
-        facts["solver"] = f"{door.solver.name} {door.solver.version}"
+        evaluator = Evaluator(
+            TyreDesign(loaded), task.solver, task.folder / "runs", command=task.command
+        )
+        question = _question(task, loaded, evaluator)
+        report["provenance"] = provenance(loaded, evaluator.solver)
+        facts["solver"] = f"{evaluator.solver.name} {evaluator.solver.version}"
         finished = _finished(task.folder, question)
         if finished is None:
-            finished, files = _studied(task, loaded, door, facts)
+            finished, files = _studied(task, loaded, evaluator, facts)
             if not AGAIN & {each["cause"] for each in finished.values()}:
                 digests = {file: _digest(task.folder / file) for file in files}
                 _write(
@@ -110,13 +106,13 @@ def lost(task: CaseTask, words: str) -> Report:
 
 
 def _studied(
-    task: CaseTask, loaded: LoadedCase, door: Door, facts: dict[str, Any]
+    task: CaseTask, loaded: LoadedCase, evaluator: Evaluator, facts: dict[str, Any]
 ) -> tuple[dict[str, Any], list[str]]:
     """Every study's entry in the report, and the names of the result files."""
     own_folder(task.folder)
     _write_runs(task, facts, (), {})
-    door.store = Store(task.record) if task.record else None
-    state = Studied(loaded, door, {"initial": start_values(loaded)}, task.asked)
+    evaluator.store = Store(task.record) if task.record else None
+    state = Studied(loaded, evaluator, {"initial": start_values(loaded)}, task.asked)
     entries: dict[str, Any] = {}
     files: list[str] = []
     aside: dict[str, str] = {}
@@ -137,11 +133,11 @@ def _studied(
             set_aside(place, name, outcome.files)
         entries[name] = _entry(outcome, task)
         facts["seconds"][name] = round(time.monotonic() - clock, 3)
-    if door.folder:
+    if evaluator.folder:
         with suppress(OSError):  # it holds failures, or was never made
-            door.folder.rmdir()
+            evaluator.folder.rmdir()
     facts["cpu_seconds"] = round(time.process_time() - used, 3)
-    facts.update(solver_runs=door.counts.runs, answered_from_record=door.counts.recorded)
+    facts.update(solver_runs=evaluator.counts.runs, answered_from_record=evaluator.counts.recorded)
     ended = [name for name in task.studies if entries[name]["status"] in ENDED]
     _write_runs(task, facts, ended, aside)
     return entries, files
@@ -202,12 +198,17 @@ def _entry(outcome: Outcome, task: CaseTask) -> dict[str, Any]:
     }
 
 
-def _question(task: CaseTask, loaded: LoadedCase, door: Door) -> str:
+def _question(task: CaseTask, loaded: LoadedCase, evaluator: Evaluator) -> str:
     """Hash of all that the results depend on: the case and its files, what is asked, the tool."""
     own = loaded.folder / loaded.case.templates if loaded.case.templates else None
     files = [task.path, loaded.folder / loaded.case.section.file]
     files += sorted(path for path in own.rglob("*") if path.is_file()) if own else []
-    solver = [door.solver.name, door.solver.version, sources_of(type(door.solver)), sources()]
+    solver = [
+        evaluator.solver.name,
+        evaluator.solver.version,
+        sources_of(type(evaluator.solver)),
+        sources(),
+    ]
     asked = [task.studies, asdict(task.asked), task.mesh, solver, [_digest(p) for p in files]]
     return sha256(json.dumps(asked).encode()).hexdigest()
 

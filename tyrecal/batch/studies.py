@@ -13,9 +13,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from ..case import LoadedCase, with_values
-from ..deck.context import section_mesh
-from ..evaluate.door import Door, Question
+from ..case import LoadedCase
+from ..deck.tyre_design import TyreDesign
+from ..evaluate.evaluator import Evaluator, Question
 from ..evaluate.pressed import Pressed
 from ..files import json_text
 from ..fit.calibrate import calibrate, history_csv
@@ -45,7 +45,7 @@ class Studied:
     a fit has it; no_fit: a fit was asked for and has no result."""
 
     case: LoadedCase
-    door: Door
+    evaluator: Evaluator
     designs: dict[str, dict[str, float]]
     asked: Asked
     no_fit: bool = False
@@ -65,7 +65,7 @@ class Outcome:
 def fit(state: Studied) -> Outcome:
     """Calibrate from the case's own start. Raises what `calibrate` does."""
     state.no_fit = True
-    found = calibrate(state.case, state.door)
+    found = calibrate(state.case, state.evaluator)
     result = found.result
     state.no_fit = False
     state.designs["fitted"] = {name: found.fitted.values[name] for name in state.designs["initial"]}
@@ -86,9 +86,9 @@ def fit(state: Studied) -> Outcome:
 
 
 def modes(state: Studied) -> Outcome:
-    """Evaluate the case's own design. Raises what `Door.evaluate` does."""
+    """Evaluate the case's own design. Raises what `Evaluator.evaluate` does."""
     values = state.designs["initial"]
-    result, _ = modes_result(state.case, values, state.door.evaluate(Question(values)))
+    result, _ = modes_result(state.case, values, state.evaluator.evaluate(Question(values)))
     numbers = {"mass_kg": result["mass_kg"]}
     numbers |= {f"frequency_Hz {_label(mode)}": mode["frequency_Hz"] for mode in result["modes"]}
     return Outcome(quantities=numbers, files={"modes.json": _json(state, result)})
@@ -96,7 +96,7 @@ def modes(state: Studied) -> Outcome:
 
 def sweep_pressure(state: Studied) -> Outcome:
     """Every design over the pressure. Raises what `sweep` does."""
-    outcomes = sweep(state.door, state.designs, state.asked.pressures_kPa)
+    outcomes = sweep(state.case, state.evaluator, state.designs, state.asked.pressures_kPa)
     failures = [each for each in outcomes if isinstance(each, Failure)]
     if len(failures) == len(outcomes):
         raise failures[0].failed
@@ -118,14 +118,14 @@ def sweep_pressure(state: Studied) -> Outcome:
 
 def footprint(state: Studied) -> Outcome:
     """Every design at rising loads. Raises what `press` does."""
-    state.door.needs_road()
+    state.evaluator.needs_road()
     loads = state.asked.loads_N or state.case.case.loads_N
-    outcomes = press(state.door, state.designs, loads)
+    outcomes = press(state.evaluator, state.designs, loads)
     pressed = {name: each for name, each in outcomes.items() if isinstance(each, Pressed)}
     for outcome in outcomes.values():
         if not pressed and not isinstance(outcome, Pressed):
             raise outcome
-    meshes = {name: section_mesh(with_values(state.case, state.designs[name])) for name in pressed}
+    meshes = {name: TyreDesign(state.case, state.designs[name]).tyre.mesh for name in pressed}
     result = footprint_result(state.designs, loads, outcomes, meshes)
     numbers = {
         f"{kind} {row['design']} {row['load_N']:g} N": value
@@ -178,4 +178,4 @@ def _label(mode: Mapping[str, Any]) -> str:
 
 def _json(state: Studied, result: dict[str, Any], **of: Any) -> str:
     """A result file with its provenance, whose state is the case's but for ``of``."""
-    return json_text(stamped(result, provenance(state.case, state.door.solver, **of)))
+    return json_text(stamped(result, provenance(state.case, state.evaluator.solver, **of)))

@@ -14,7 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from ..case import LoadedCase, load_case
+from ..case import LoadedCase
+from ..design import load_case
 from ..diagnose.diagnosis import Diagnosis, diagnose
 from ..diagnose.evidence import NONE
 from ..diagnose.observations import observe
@@ -24,7 +25,7 @@ from ..diagnose.result import result
 from ..diagnose.study import spans_of
 from ..diagnose.tyre_model import TyreModel
 from ..diagnose.uncertainties import sources
-from ..evaluate.door import Door
+from ..evaluate.evaluator import Evaluator
 from ..evaluate.pool import process_pool
 from ..files import own_folder
 from ..measured.tables import read_measurements
@@ -44,14 +45,14 @@ def rows_of(case: LoadedCase, protocol: Protocol) -> list[ModelRow]:
 
 def tyre_model(
     case: LoadedCase,
-    door: Door,
+    evaluator: Evaluator,
     protocol: Protocol,
     jobs: int = 1,
     effects: Sequence[str] | None = None,
 ) -> TyreModel:
     """The model of the diagnosis for all trials."""
-    spans, _ = spans_of(door, effects)
-    return TyreModel(case, door, rows_of(case, protocol), sources(case)[0], spans, jobs)
+    spans, _ = spans_of(case, evaluator, effects)
+    return TyreModel(case, evaluator, rows_of(case, protocol), sources(case)[0], spans, jobs)
 
 
 def case_of(folder: Path) -> LoadedCase:

@@ -8,7 +8,8 @@ from math import log1p
 
 import numpy as np
 
-from ..case import LoadedCase, start_values, with_values
+from ..case import LoadedCase, start_values
+from ..design import with_values
 from ..diagnose.uncertainties import EFFECTS, Source, values_of
 from .laws import Law
 from .protocol import Protocol

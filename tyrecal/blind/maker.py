@@ -9,7 +9,8 @@ from typing import Protocol
 
 from ..case import LoadedCase
 from ..case.calibration import TargetMode, Targets
-from ..evaluate.door import Door
+from ..deck.tyre_design import TyreDesign
+from ..evaluate.evaluator import Evaluator
 from ..evaluate.failure import EvaluationFailed
 from ..evaluate.store import Store
 from ..fit.problem import Problem
@@ -63,8 +64,8 @@ class SolverMaker:
         ]
         wanted = {"targets": Targets(modes=targets), "variables": {}}
         case = replace(case, case=case.case.model_copy(update=wanted))
-        door = Door(case, self.solver, store=self.store)
-        (found,) = Problem(case, door).modes([{}])
+        evaluator = Evaluator(TyreDesign(case), self.solver, store=self.store)
+        (found,) = Problem(case, evaluator).modes([{}])
         if isinstance(found, EvaluationFailed):
             raise found
         evaluation, modes, _ = found
@@ -77,6 +78,6 @@ class SolverMaker:
 
 def bundled_maker(case: LoadedCase, store: Store | None = None) -> SolverMaker:
     """The diagnosis' own model, mesh and laws."""
-    laws = catalogue_laws(frozenset(Door(case, "bundled").solver.capabilities))
+    laws = catalogue_laws(frozenset(Evaluator(TyreDesign(case), "bundled").solver.capabilities))
     about = "bundled solver, the diagnosis' own mesh and the catalogue's laws: an inverse crime"
     return SolverMaker(about, "bundled", laws, FAMILIES, store)

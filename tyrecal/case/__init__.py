@@ -1,32 +1,18 @@
-"""The case file: what a tyre is, read, judged and varied."""
+"""The case file: what a tyre is, as typed data."""
 
-from .load import LoadedCase, load_case, validate
+from .loaded import LoadedCase
 from .mistakes import CaseError, Mistake
 from .schema import Case
-from .variables import (
-    number_at,
-    overridden,
-    overruled,
-    parse_assignment,
-    start_values,
-    unusual_value,
-    with_level,
-    with_values,
-)
+from .variables import number_at, overruled, parse_assignment, start_values, with_level
 
 __all__ = [
     "Case",
     "CaseError",
     "LoadedCase",
     "Mistake",
-    "load_case",
     "number_at",
-    "overridden",
     "overruled",
     "parse_assignment",
     "start_values",
-    "unusual_value",
-    "validate",
     "with_level",
-    "with_values",
 ]

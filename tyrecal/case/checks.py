@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import BaseModel, ValidationError
 
-from ..effects import IDS
+from ..plugins import IDS
 from .analysis import Analysis
 from .calibration import MEASURED
 from .meshable import Problems, levels, places

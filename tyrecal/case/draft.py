@@ -9,12 +9,12 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from ..design.load import validate
 from ..errors import InputError
 from ..files import read_bytes
 from ..tyre.from_size import build, usual
 from ..tyre.section import SectionError, refuse_separators
 from ..tyre.size import INCH, TyreSize
-from .load import validate
 from .new import new_case
 from .section import Outline, SectionSource
 from .stations import read_section_of

@@ -11,7 +11,7 @@ from typing import Any
 
 from ..tyre.section import Section
 from .checks import find
-from .load import LoadedCase
+from .loaded import LoadedCase
 from .mistakes import Keys
 
 # of a case; not among them: what it is called, its mesh, pressure and road, what is asked of it,

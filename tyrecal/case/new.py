@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from ruamel.yaml import YAML
 
-from ..deck.environment import environment, render
+from ..templates import environment, render
 from ..tyre.section import Section, SectionError
 
 ELEMENTS = {"coarse": 14, "default": 28, "refined": 56}  # along the half section, by level

@@ -6,13 +6,13 @@ from typing import Annotated
 
 from pydantic import AfterValidator, Field
 
-from ..effects import IDS
+from ..plugins import IDS
 from .analysis import Analysis, Road, Solver
 from .calibration import Targets, Uncertainty, Variable
 from .materials import Cord, Rubber
+from .nonuniform import PointMass, RoadSpring, Splice
 from .parts import Name, NotNegative, Number, Part, Text
 from .section import Mesh, RebarLayer, SectionSource, Solid
-from .uneven import PointMass, RoadSpring, Splice
 from .wheel import Cavity, Rim
 
 

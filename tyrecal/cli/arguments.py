@@ -24,16 +24,9 @@ def load(
     Says which numbers of the file do not count. Returns (case, values of the variables). Raises
     CaseError, click.UsageError; both for numbers that no tyre has, too, unless they are allowed.
     """
-    from ..case import (
-        load_case,
-        overridden,
-        overruled,
-        parse_assignment,
-        start_values,
-        with_level,
-        with_values,
-    )
-    from ..case.load import CaseError
+    from ..case import overruled, parse_assignment, start_values, with_level
+    from ..design import load_case, overridden, with_values
+    from ..design.load import CaseError
 
     case = load_case(path, allow_unusual)
     try:
@@ -66,7 +59,7 @@ def load(
 def refuse_unusual(loaded: Any, option: str, name: str, value: float, allowed: bool) -> None:
     """Raises click.UsageError where nobody states such a value of the variable, or number by its
     path, ``name``, unless it is ``allowed``. option: where it is stated."""
-    from ..case import unusual_value
+    from ..design import unusual_value
 
     if not allowed and (message := unusual_value(loaded, name, value)):
         raise click.UsageError(f"{option}: {message}")
@@ -107,8 +100,8 @@ def parse_pressures(low: float, high: float, steps: int, allowed: bool) -> tuple
     click.UsageError."""
     from math import isfinite
 
-    from ..case.guard import ALL_THE_SAME
-    from ..case.usual import USUAL
+    from ..design.guard import ALL_THE_SAME
+    from ..design.usual import USUAL
 
     for option, value in (("--from-kPa", low), ("--to-kPa", high)):
         if not (isfinite(value) and value > 0):

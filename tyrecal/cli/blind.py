@@ -96,8 +96,9 @@ def make(
     from ..blind.maker import bundled_maker
     from ..blind.protocol import Protocol
     from ..blind.ruler import measure
-    from ..case import load_case
-    from ..evaluate.door import Door
+    from ..deck.tyre_design import TyreDesign
+    from ..design import load_case
+    from ..evaluate.evaluator import Evaluator
     from ..evaluate.store import Store
 
     if not effects + plain + outside:
@@ -113,8 +114,8 @@ def make(
         maker = replace(maker, laws={id: maker.laws[id] for id in drawn})
     counts = {"effect": effects, "none": plain, "outside": outside}
     protocol = Protocol(maker.about, case.path.name, counts)
-    door = Door(case, "bundled", store=store)
-    ruler = lambda: measure(tyre_model(case, door, protocol, jobs), rows_of(case, protocol))
+    evaluator = Evaluator(TyreDesign(case), "bundled", store=store)
+    ruler = lambda: measure(tyre_model(case, evaluator, protocol, jobs), rows_of(case, protocol))
     with talk.progress("make trials") as bar:
         progress = _progress("made", talk, bar)
         mark = made(folder, sealed, case, protocol, maker, ruler, jobs, seed, progress)
@@ -161,9 +162,10 @@ def answer(
     from ..blind.emulated import emulate
     from ..blind.protocol import read_protocol
     from ..blind.seal import refuse_open_truth
+    from ..deck.tyre_design import TyreDesign
     from ..diagnose.response import Response
     from ..effects import catalogue
-    from ..evaluate.door import Door
+    from ..evaluate.evaluator import Evaluator
     from ..evaluate.store import Store
 
     for id in effects:
@@ -172,8 +174,8 @@ def answer(
     refuse_open_truth(folder)
     protocol, case = read_protocol(folder), blind.case_of(folder)
     resume("answers that were given are kept; the same command goes on from there")
-    door = Door(case, store=Store((store or folder / "record").resolve()))
-    model: Response = blind.tyre_model(case, door, protocol, jobs, effects or None)
+    evaluator = Evaluator(TyreDesign(case), store=Store((store or folder / "record").resolve()))
+    model: Response = blind.tyre_model(case, evaluator, protocol, jobs, effects or None)
     if emulated:
         model = emulate(model)
     with talk.progress("answer trials") as bar:

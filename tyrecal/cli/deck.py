@@ -42,27 +42,33 @@ def command(
     python -m tyrecal_solvers.bundled decks/modes --oldjob inflate
     tyrecal deck cases/p235_75r17.yaml --output pressed --loads-N 3000,5000
     """
-    from ..deck.write import Decks
-    from ..evaluate.door import Door
+    from ..deck.decks import Decks
+    from ..deck.tyre_design import TyreDesign
+    from ..evaluate.evaluator import Evaluator
+    from ..evaluate.failure import DeckRefused
     from ..files import whole
     from .output import Run
 
     loaded, values = arguments.load(case, mesh, assignments, pressure_kPa, talk, allow_unusual)
-    door = Door(loaded, solver)
-    adapter = door.solver
-    door.needs_effects_of(loaded)
+    design = TyreDesign(loaded, values)
+    evaluator = Evaluator(design, solver)
+    adapter = evaluator.solver
+    evaluator.refuse_lacking(design)
     if loads is not None:
-        door.needs_road()
+        evaluator.needs_road()
         asked = arguments.parse_loads(loads)
         arguments.refuse_unusual_loads(loaded, "--loads-N", asked, allow_unusual)
-        decks = Decks(loaded, values, loads_N=tuple(asked))
+        decks = Decks(design, loads_N=tuple(asked))
     else:
-        decks = Decks(loaded, values, tuple(values) if door.has_gradients else ())
-    decks.texts(adapter.dialect)  # a template that fails leaves the folder untouched
-    run = Run(case, output, "deck", adapter)
+        decks = Decks(design, tuple(values) if evaluator.has_gradients else ())
     paths = []
     with TemporaryDirectory() as fresh:  # an adapter's plain writing must meet no link
-        for path in adapter.write(decks, Path(fresh)):
+        try:
+            written = adapter.write(decks, Path(fresh))
+        except adapter.refusals as error:
+            raise DeckRefused(str(error)) from None
+        run = Run(case, output, "deck", adapter)  # what is refused leaves the folder untouched
+        for path in written:
             paths.append(str(run.folder / path.name))
             with whole(run.folder / path.name) as partial:
                 shutil.copyfile(path, partial)

@@ -124,20 +124,25 @@ def command(
         if not change.times:
             option, name = f"--toggled {change.id}={change.value:g}", f"effects.{change.id}"
             arguments.refuse_unusual(loaded, option, name, change.value, False)
-    door = study.door(loaded)
+    evaluator = study.evaluator(loaded)
     files = [measured, *repeats, *(path for path, _ in changes)]
     readings = [each for path in files for each in read_measurements(path)]
     pressures, at = ({each.pressure_kPa for each in readings}, {each.load_N for each in readings})
     run = study.run(
-        case, "diagnose", door, measured=files, pressure_kPa=sorted(pressures), load_N=sorted(at)
+        loaded,
+        "diagnose",
+        evaluator,
+        measured=files,
+        pressure_kPa=sorted(pressures),
+        load_N=sorted(at),
     )
     form = None if form_percent is None else form_percent / 100
     assumed = Assumed(form, split_percent / 100)
     with talk.progress("diagnose", STAGES) as bar:
-        door.heard = bar.at
+        evaluator.on_progress = bar.at
         found = diagnosed(
             loaded,
-            door,
+            evaluator,
             measured,
             repeats,
             changes,
@@ -168,7 +173,8 @@ def command(
 
 def _added(case: Path, assignment: str, output: Path | None, allowed: bool) -> Path:
     """The new case's file. Raises click.UsageError, CaseError."""
-    from ..case import load_case, parse_assignment
+    from ..case import parse_assignment
+    from ..design import load_case
     from ..diagnose.add import NotAdded, add
 
     loaded = load_case(case, allowed)

@@ -95,15 +95,15 @@ def command(
     if name and value is not None:
         path = f"effects.{name}"
         arguments.refuse_unusual(loaded, f"--value {value:g}", path, value, study.allow_unusual)
-    door = study.door(loaded)
-    adapter = door.solver
-    if not door.has_gradients:
+    evaluator = study.evaluator(loaded)
+    adapter = evaluator.solver
+    if not evaluator.has_gradients:
         raise click.UsageError(f"solver '{adapter.name}' gives no slopes, which a re-fit needs")
     kPa = _pressures(loaded, pressures, study.allow_unusual)
     if fitted:
         values = arguments.fitted_values(fitted, loaded, talk)
-    run = study.run(case, "effects", door, pressure_kPa=kPa)
-    plain = Plain(door, values, kPa)
+    run = study.run(loaded, "effects", evaluator, pressure_kPa=kPa)
+    plain = Plain(loaded, evaluator, values, kPa)
     if name and not talk.as_json:
         talk.say(effect_text(entries[name]) + "\n")
     sizes: dict[str, float] = {}

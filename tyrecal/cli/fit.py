@@ -101,21 +101,23 @@ def command(
         from ..measured.targets import with_measured
 
         loaded, left_out = with_measured(loaded, measured)
-    door = study.door(loaded)
+    evaluator = study.evaluator(loaded)
     fixed = {name: values[name] for name in fix}
-    check(Problem(loaded, door, fixed))
-    if not loaded.case.targets.footprint and starts == 1 and door.has_gradients:
-        why = f"a fit from one start asks solver '{door.solver.name}' for one design at a time"
+    check(Problem(loaded, evaluator, fixed))
+    if not loaded.case.targets.footprint and starts == 1 and evaluator.has_gradients:
+        why = f"a fit from one start asks solver '{evaluator.solver.name}' for one design at a time"
         if scheduler:
             raise click.UsageError(f"--scheduler changes nothing here: {why}; give --starts too")
         options.say_idle(talk, study.jobs, why)
     files = [measured] if measured else []
-    run = study.run(case, "fit", door, measured=files, load_N=loaded.case.targets.loads_N or 0.0)
+    run = study.run(
+        loaded, "fit", evaluator, measured=files, load_N=loaded.case.targets.loads_N or 0.0
+    )
     unit = objective_unit(loaded)
-    with talk.progress("fit") as bar, reached(scheduler) as door.scheduler:
+    with talk.progress("fit") as bar, reached(scheduler) as evaluator.scheduler:
         points = _Points(talk, bar, unit)
         fit = calibrate(
-            loaded, door, method, fixed, starts, seed, study.jobs, points.notify, bar.at
+            loaded, evaluator, method, fixed, starts, seed, study.jobs, points.notify, bar.at
         )
     result = run.write_json("fit.json", fit.result)
     run.write_text("fit.csv", fit_csv(fit.result))
@@ -128,13 +130,13 @@ def command(
     for warning in (*tyre_doubts(fit.result), *fit_doubts(fit.result)):
         talk.warn(warning)
     if pictures or study.report:
-        from ..case import with_values
-        from ..evaluate.door import Question
+        from ..design import with_values
+        from ..evaluate.evaluator import Question
         from ..report.shape_data import tyre_data
 
         values = fit.fitted.values
         modes = sorted(fit.fitted.modes.values(), key=lambda mode: mode.frequency_Hz)
-        evaluation = door.evaluate(Question(values))
+        evaluation = evaluator.evaluate(Question(values))
         shapes = tyre_data(with_values(loaded, values), evaluation, modes)
         run.write_json("fit_shapes.json", shapes)
     if pictures:

@@ -60,13 +60,13 @@ def command(
     if loads is not None:
         asked = arguments.parse_loads(loads)
         arguments.refuse_unusual_loads(loaded, "--loads-N", asked, study.allow_unusual)
-    door = study.door(loaded)
-    door.needs_road()
+    evaluator = study.evaluator(loaded)
+    evaluator.needs_road()
     fitted = _fit_compared(compare, fitted, (study.output or Path(case.stem)) / "fit.json")
     designs = _designs(compare, values, fitted, loaded, talk)
     if len(designs) == 1:
         options.say_idle(talk, study.jobs, "one design is pressed alone; --fitted adds another")
-    run = study.run(case, "footprint", door, load_N=asked)
+    run = study.run(loaded, "footprint", evaluator, load_N=asked)
 
     def notify(design: str, outcome: Any) -> None:
         reached, failure = progress(outcome)
@@ -75,8 +75,8 @@ def command(
         talk.detail(f"{design}: {reached} loads")
 
     with talk.progress("footprint") as bar:
-        door.heard = bar.at
-        outcomes = press(door, designs, asked, study.jobs, notify)
+        evaluator.on_progress = bar.at
+        outcomes = press(evaluator, designs, asked, study.jobs, notify)
     pressed = {name: each for name, each in outcomes.items() if isinstance(each, Pressed)}
     if not pressed:
         return EXIT_SOLVER
@@ -128,7 +128,6 @@ def _designs(
 
 def _mesh(loaded: Any, values: dict[str, float]) -> Any:
     """The section's mesh of a design; gauges can be variables."""
-    from ..case import with_values
-    from ..deck.context import section_mesh
+    from ..deck.tyre_design import TyreDesign
 
-    return section_mesh(with_values(loaded, values))
+    return TyreDesign(loaded, values).tyre.mesh

@@ -87,8 +87,8 @@ def command(
     tyrecal init 205/60R15 --section my_outline.csv --belt-width-mm 160 --output my_outline.yaml
     """
     from ..case.draft import from_file, from_size
-    from ..case.guard import ALL_THE_SAME
-    from ..case.usual import GAUGES, USUAL
+    from ..design.guard import ALL_THE_SAME
+    from ..design.usual import GAUGES, USUAL
     from ..tyre.size import INCH, parse_size
 
     if size is None and file is None:
@@ -124,7 +124,7 @@ def _write(
     draft: Draft, file: Path | None, target: Path, picture: Path | None, force: bool, talk: Talk
 ) -> None:
     """Write case, section and picture, none over an existing file and only what is right."""
-    from ..case import load_case
+    from ..design import load_case
     from ..files import whole
 
     table = target.with_name(draft.file)
@@ -146,12 +146,12 @@ def _write(
         f" {2e3 * outside[:, 1].max():.1f} mm, {loaded.case.pressure_kPa:g} kPa"
     )
     if picture:
-        from ..deck.context import section_mesh
+        from ..design import resolved
         from ..report.figure import save
         from ..report.section import draw_section
         from ..report.shape_data import section_data
 
-        section = section_data(loaded, section_mesh(loaded), {})
+        section = section_data(loaded, resolved(loaded).mesh, {})
         save(draw_section(section, loaded.case.name, loaded.case.pressure_kPa), picture)
         talk.say(f"section drawn in {picture}")
     talk.say(f"next: tyrecal modes {shlex.quote(str(target))}")

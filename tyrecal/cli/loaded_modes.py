@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from .arguments import parse_loads
 from .main import EXIT_SOLVER
 from .options import Study
+
+if TYPE_CHECKING:
+    from ..case import LoadedCase
 
 
 def wanted_loads(load_N: float | None, sweep: str | None) -> list[float]:
@@ -24,7 +27,14 @@ def wanted_loads(load_N: float | None, sweep: str | None) -> list[float]:
     return [] if load_N is None else parse_loads(repr(load_N), "--load-N")
 
 
-def at_load(door: Any, run: Any, values: Mapping[str, float], load_N: float, study: Study) -> int:
+def at_load(
+    loaded: LoadedCase,
+    evaluator: Any,
+    run: Any,
+    values: Mapping[str, float],
+    load_N: float,
+    study: Study,
+) -> int:
     """Modes under one load, in modes.json, with their shapes in modes_shapes.json."""
     from ..report.shape_data import loaded_data
     from ..report.table import modes_table
@@ -33,13 +43,13 @@ def at_load(door: Any, run: Any, values: Mapping[str, float], load_N: float, stu
 
     talk = study.talk
     with talk.progress(f"modes at {load_N:g} N") as bar:
-        door.heard = bar.at
-        outcome = load_tyres(door, {"initial": values}, [load_N])["initial"]
+        evaluator.on_progress = bar.at
+        outcome = load_tyres(loaded, evaluator, {"initial": values}, [load_N])["initial"]
     if not isinstance(outcome, LoadedTyre):
         raise outcome
     result = loaded_modes_result(values, outcome)
     result = run.write_json("modes.json", result)
-    run.write_json("modes_shapes.json", loaded_data(outcome, door.case))
+    run.write_json("modes_shapes.json", loaded_data(outcome, loaded))
     run.finish()
     talk.result(result)
     talk.show(modes_table(result))
@@ -50,7 +60,8 @@ def at_load(door: Any, run: Any, values: Mapping[str, float], load_N: float, stu
 
 
 def over_loads(
-    door: Any,
+    loaded: LoadedCase,
+    evaluator: Any,
     run: Any,
     designs: Mapping[str, Mapping[str, float]],
     loads_N: Sequence[float],
@@ -71,8 +82,8 @@ def over_loads(
         talk.detail(f"{design}: {reached} loads")
 
     with talk.progress("modes on the road") as bar:
-        door.heard = bar.at
-        outcomes = load_tyres(door, designs, loads_N, study.jobs, notify)
+        evaluator.on_progress = bar.at
+        outcomes = load_tyres(loaded, evaluator, designs, loads_N, study.jobs, notify)
     if not any(isinstance(each, LoadedTyre) for each in outcomes.values()):
         return EXIT_SOLVER
     result = load_sweep_result(designs, loads_N, outcomes)

@@ -48,7 +48,7 @@ def command(
     tyrecal modes cases/p235_75r17.yaml --load-N 4000
     tyrecal modes cases/p235_75r17.yaml --sweep-load 0,1000,2000,4000 --fitted p235_75r17/fit.json
     """
-    from ..evaluate.door import Question
+    from ..evaluate.evaluator import Question
     from ..report.shape_data import tyre_data
     from ..studies.modes import modes_result
 
@@ -62,22 +62,22 @@ def command(
         why = "one design is evaluated alone; --sweep-load with --fitted has two"
         options.say_idle(talk, study.jobs, why)
     loaded, values = study.load(case, assignments, pressure_kPa)
-    door = study.door(loaded)
+    evaluator = study.evaluator(loaded)
     designs = {"initial": values}
     option = "--load-N" if sweep is None else "--sweep-load"
     arguments.refuse_unusual_loads(loaded, option, loads, study.allow_unusual)
     if loads:
-        door.needs_road(modes=True)
+        evaluator.needs_road(modes=True)
     if fitted:
         designs["fitted"] = arguments.fitted_values(fitted, loaded, talk)
     if sweep is not None:
-        run = study.run(case, "modes", door, "sweep-load", load_N=loads)
+        run = study.run(loaded, "modes", evaluator, "sweep-load", load_N=loads)
         draw = pictures is not False
-        return over_loads(door, run, designs, loads, study, draw)
-    run = study.run(case, "modes", door, load_N=loads[0] if loads else 0.0)
+        return over_loads(loaded, evaluator, run, designs, loads, study, draw)
+    run = study.run(loaded, "modes", evaluator, load_N=loads[0] if loads else 0.0)
     if loads:
-        return at_load(door, run, values, loads[0], study)
-    evaluation = door.evaluate(Question(values))
+        return at_load(loaded, evaluator, run, values, loads[0], study)
+    evaluation = evaluator.evaluate(Question(values))
     result, modes = modes_result(loaded, values, evaluation)
     result = run.write_json("modes.json", result)
     run.write_json("modes_shapes.json", tyre_data(loaded, evaluation, modes))

@@ -5,7 +5,8 @@
 2. ``@options.talking`` gives every command --json, --quiet and --verbose as ``talk`` (`Talk`): say
    and show for people, result for programs, detail for --verbose, warn and error.
 3. ``@options.study``, in its place, gives what evaluates designs --jobs, --mesh, --solver,
-   --output, --store, --no-store and --report too, as ``study`` (`Study`): load, door, run, finish.
+   --output, --store, --no-store and --report too, as ``study`` (`Study`): load, evaluator,
+   run, finish.
 4. Its docstring says what it does and writes, and ends with examples after a line ``\\b``.
 5. Long work runs in ``with talk.progress("what") as bar``: ``bar.at(done, of)`` shows the time
    left. Ctrl-C says how to go on: ``run`` knows; others call `talk.resume`.
@@ -30,7 +31,8 @@ from . import arguments, complete
 from .talk import SOLVERS, Talk
 
 if TYPE_CHECKING:
-    from ..evaluate.door import Door
+    from ..case import LoadedCase
+    from ..evaluate.evaluator import Evaluator
     from .output import Run
 
 case_argument = click.argument(
@@ -246,34 +248,35 @@ class Study:
             path, self.mesh, assigned, pressure_kPa, self.talk, self.allow_unusual
         )
 
-    def door(self, loaded: Any) -> Door:
-        """The door to the solver asked for. Raises InputError."""
-        from ..evaluate.door import Door
+    def evaluator(self, loaded: Any) -> Evaluator:
+        """The evaluator with the solver asked for. Raises InputError."""
+        from ..deck.tyre_design import TyreDesign
+        from ..evaluate.evaluator import Evaluator
 
-        door = Door(loaded, self.solver, command=self.solver_command)
-        door.solver  # noqa: B018  a solver that is not there is refused before anything is written
-        return door
+        evaluator = Evaluator(TyreDesign(loaded), self.solver, command=self.solver_command)
+        evaluator.solver  # noqa: B018  a solver that is not there is refused before anything is written
+        return evaluator
 
     def run(
         self,
-        case: Path,
+        loaded: LoadedCase,
         command: str,
-        door: Door,
+        evaluator: Evaluator,
         study: str = "",
         measured: Sequence[Path] = (),
         **state: Any,
     ) -> Run:
-        """The command's run, with the record behind ``door``; ``study``: where it is not
+        """The command's run, with the record behind ``evaluator``; ``study``: where it is not
         ``command``; measured, state: of the results' `provenance`. Raises InputError,
         OSError."""
         from ..provenance import provenance
         from .output import Run
 
-        block = provenance(door.case, door.solver, measured, **state)
-        run = Run(case, self.output, command, door.solver, study, block)
-        door.folder, door.keep = run.runs, self.talk.verbose
-        door.store = run.open_store(self.store, self.no_store)
-        run.counts = counts = door.counts
+        block = provenance(loaded, evaluator.solver, measured, **state)
+        run = Run(loaded.path, self.output, command, evaluator.solver, study, block)
+        evaluator.folder, evaluator.keep = run.runs, self.talk.verbose
+        evaluator.store = run.open_store(self.store, self.no_store)
+        run.counts = counts = evaluator.counts
         words = "{0.runs} runs of the solver, {0.recorded} answers from the record"
         context = click.get_current_context()
         context.call_on_close(lambda: self.talk.detail(words.format(counts)))

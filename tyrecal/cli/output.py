@@ -37,7 +37,7 @@ from . import lock
 from .talk import resume
 
 if TYPE_CHECKING:
-    from ..evaluate.door import Counts
+    from ..evaluate.evaluator import Counts
     from ..evaluate.store import Store
 
 

@@ -51,11 +51,11 @@ def command(
     case, fitted, study = taken(case, fitted, study)
     loaded, values = study.load(case, assignments)
     pressures = _pressures(loaded, assignments, from_kPa, to_kPa, steps, study.allow_unusual)
-    door = study.door(loaded)
+    evaluator = study.evaluator(loaded)
     designs = {"initial": values}
     if fitted:
         designs["fitted"] = arguments.fitted_values(fitted, loaded, talk)
-    run = study.run(case, "sweep-pressure", door, pressure_kPa=pressures)
+    run = study.run(loaded, "sweep-pressure", evaluator, pressure_kPa=pressures)
 
     def notify(outcome: Outcome) -> None:
         place = f"{outcome.design}, {outcome.pressure_kPa:g} kPa"
@@ -65,8 +65,8 @@ def command(
             talk.detail(f"{place}: {len(outcome.modes)} modes")
 
     with talk.progress("sweep") as bar:
-        door.heard = bar.at
-        outcomes = sweep(door, designs, pressures, study.jobs, notify)
+        evaluator.on_progress = bar.at
+        outcomes = sweep(loaded, evaluator, designs, pressures, study.jobs, notify)
     failed = [each for each in outcomes if isinstance(each, Failure)]
     if len(failed) == len(outcomes):
         return EXIT_SOLVER
@@ -99,7 +99,8 @@ def _pressures(
     allow_unusual: bool,
 ) -> list[float]:
     """The pressures of the sweep, kPa. Raises click.UsageError."""
-    from ..case import parse_assignment, with_values
+    from ..case import parse_assignment
+    from ..design import with_values
     from ..studies.fitted import pressure_name
 
     name = pressure_name(loaded)

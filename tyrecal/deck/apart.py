@@ -16,7 +16,7 @@ import threading
 from pathlib import Path
 from typing import IO, Any
 
-from .environment import TemplateFailed, environment, render
+from ..templates import TemplateFailed, environment, render
 
 CPU_S, WALL_S = 5, 60.0  # of one template; shipped ones take a tenth of a second
 MEMORY = 2_000_000_000  # bytes of address space, where the system limits it

@@ -6,10 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from ..case import LoadedCase
+from ..case import Case
+from ..design import Tyre
+from ..templates import TemplateFailed
 from ..tyre.section import SectionError
-from .context import claimed, deck_name, gauged_section, solid_claims
-from .environment import TemplateFailed
+from .abaqus import claimed, deck_name, solid_claims
 from .sector import INNER_FACE, Sector, build_sector
 
 ELEMENTS = ("C3D20R", "C3D20", "C3D8")
@@ -21,9 +22,14 @@ FILLER = 1e-6  # of a ply's stiffness, isotropic, so that its tensor is not sing
 PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))  # CalculiX's order of components
 
 
-def calculix_context(case: LoadedCase) -> dict[str, Any]:
+def calculix_context(tyre: Tyre) -> dict[str, Any]:
     """Names for the templates, the same for every nodal diameter. Raises TemplateFailed."""
-    c = case.case
+    c = tyre.case
+    if c.analysis.vibration_frequency_Hz is not None:
+        raise TemplateFailed(
+            "analysis.vibration_frequency_Hz must be null: CalculiX cannot evaluate hyperelastic"
+            " rubber at a frequency"
+        )
     element = c.solver.options.get("element", ELEMENTS[0])
     thickness = c.solver.options.get("ply_thickness_m", PLY_THICKNESS_M)
     if element not in ELEMENTS:
@@ -38,8 +44,8 @@ def calculix_context(case: LoadedCase) -> dict[str, Any]:
     sectors = PARTS * c.analysis.sectors
     try:
         sector = build_sector(
-            gauged_section(case),
-            tuple(level.elements[name] for name, _ in case.section.regions),
+            tyre.gauged,
+            tuple(level.elements[name] for name, _ in tyre.section.regions),
             tuple(level.rows),
             tuple(level.grading) if level.grading else None,
             element != "C3D8",
@@ -61,41 +67,41 @@ def calculix_context(case: LoadedCase) -> dict[str, Any]:
         "between": sector.between,
         "half_turn": (float(np.cos(np.pi / sectors)), -float(np.sin(np.pi / sectors))),
         "inner_face": INNER_FACE,
-        "solids": _solids(case, sector, numbers),
-        "rubbers": _rubbers(case),
-        "plies": _plies(case, sector),
+        "solids": _solids(tyre, sector, numbers),
+        "rubbers": _rubbers(c),
+        "plies": _plies(c, sector),
         "cavity": [numbers[cell] for cell in sector.inner],
         "pressure": c.pressure_kPa * 1e3,
     }
 
 
-def _solids(case: LoadedCase, sector: Sector, numbers: dict[int, int]) -> list[dict[str, Any]]:
-    level = case.case.mesh.levels[case.case.mesh.level]
-    claims, rows = solid_claims(case), tuple(level.rows)
+def _solids(tyre: Tyre, sector: Sector, numbers: dict[int, int]) -> list[dict[str, Any]]:
+    case = tyre.case
+    claims, rows = solid_claims(case), tuple(case.mesh.levels[case.mesh.level].rows)
     blocks: dict[int, list[tuple[int, ...]]] = {}
     for cell, nodes in sector.bricks.items():
         region, row = sector.regions[cell], sector.rows[cell]
-        entry = claimed(claims, case.section.names, rows, region, row)
+        entry = claimed(claims, tyre.section.names, rows, region, row)
         if entry is not None:
             blocks.setdefault(entry, []).append((numbers[cell], *nodes))
     return [
         {
             "set": f"SOLID_{entry + 1}",
-            "material": deck_name(case.case.solids[entry].material),
+            "material": deck_name(case.solids[entry].material),
             "elements": elements,
         }
         for entry, elements in sorted(blocks.items())
     ]
 
 
-def _rubbers(case: LoadedCase) -> list[dict[str, Any]]:
+def _rubbers(case: Case) -> list[dict[str, Any]]:
     """Constants in the static state: CalculiX has no viscoelasticity for hyperelastic rubber."""
     rubbers = []
-    for name, m in case.case.materials.items():
+    for name, m in case.materials.items():
         if m.kind != "rubber":
             continue
         shear, bulk = 1 - sum(t.g for t in m.prony), 1 - sum(t.k for t in m.prony)
-        if m.moduli == case.case.analysis.static_moduli:
+        if m.moduli == case.analysis.static_moduli:
             shear = bulk = 1.0
         elif m.moduli == "long_term":
             shear, bulk = 1 / shear, 1 / bulk
@@ -111,12 +117,12 @@ def _rubbers(case: LoadedCase) -> list[dict[str, Any]]:
     return rubbers
 
 
-def _plies(case: LoadedCase, sector: Sector) -> list[dict[str, Any]]:
+def _plies(case: Case, sector: Sector) -> list[dict[str, Any]]:
     """One material a layer and strip: stiffness E A / (s t) along the cords, their mass,
     t being the strip's own."""
     plies, number = [], len(sector.bricks)
-    for name, layer in case.case.rebar_layers.items():
-        cord: Any = case.case.materials[layer.material]
+    for name, layer in case.rebar_layers.items():
+        cord: Any = case.materials[layer.material]
         angle = np.radians(layer.angle_deg)
         for k, strip in enumerate(sector.strips[layer.line], start=1):
             if layer.regions and sector.regions[strip.element] not in layer.regions:

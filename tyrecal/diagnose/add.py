@@ -8,7 +8,7 @@ from ruamel.yaml import YAML
 from ruamel.yaml.nodes import ScalarNode
 from ruamel.yaml.representer import RoundTripRepresenter
 
-from ..case import load_case, with_values
+from ..design import load_case, with_values
 from ..errors import InputError
 from ..files import whole
 

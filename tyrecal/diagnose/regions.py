@@ -9,6 +9,7 @@ import numpy as np
 
 from ..case import LoadedCase
 from ..case.schema import Rubber, Solid
+from ..deck.tyre_design import TyreDesign
 from ..evaluate.failure import EvaluationFailed
 from ..fit import problem as fit
 from .tyre_model import TyreModel
@@ -33,7 +34,7 @@ def regions(model: TyreModel, x: Array) -> list[Region]:
     One evaluation a pressure, with exact slopes by the constants of each part. Raises
     EvaluationFailed.
     """
-    case, parts = split_by_region(model.door.case)
+    case, parts = split_by_region(model.case)
     materials = case.case.materials
     numbers = {}
     for material in parts:
@@ -41,9 +42,8 @@ def regions(model: TyreModel, x: Array) -> list[Region]:
         keys = ("C10_Pa", "C01_Pa", "D1_per_Pa") if rubber else ("youngs_modulus_Pa",)
         for key in (*keys, "density_kg_per_m3"):
             numbers[f"materials.{material}.{key}"] = float(getattr(materials[material], key))
-    door = model.door.worker()
-    door.case, door.heard = case, model.door.heard
-    problem = fit.Problem(case, door, jobs=model.jobs)
+    evaluator = model.evaluator.of(TyreDesign(case))
+    problem = fit.Problem(case, evaluator, jobs=model.jobs)
     own = model.values(x)
     taken = {path: own[name] for name, v in case.case.variables.items() for path in v.sets}
     design = {**numbers, **taken}
@@ -51,7 +51,6 @@ def regions(model: TyreModel, x: Array) -> list[Region]:
     for each in found:
         if isinstance(each, EvaluationFailed):
             raise each
-    model.door.counts.add(door.counts)
     at = dict(zip(model.pressures, found, strict=True))
     result = []
     for material, name in parts.items():

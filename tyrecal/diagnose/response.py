@@ -1,4 +1,4 @@
-"""What the diagnosis asks a model, and the model behind the one door that answers.
+"""What the diagnosis asks a model, and the model that answers.
 
 eta(x, e, c) = ln f over rows (mode, pressure) and ln mass; x: logarithms of the design variables
 (linear ones: in units of the width of their bounds); e: parameters of effects; c: constants that

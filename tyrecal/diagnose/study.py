@@ -12,7 +12,7 @@ from ..case import LoadedCase
 from ..case.mistakes import suggestion
 from ..effects import catalogue
 from ..errors import InputError
-from ..evaluate.door import Door
+from ..evaluate.evaluator import Evaluator
 from ..measured.measurement import Measurement
 from ..measured.tables import read_measurements
 from .calibrated import calibrated_variables
@@ -58,7 +58,7 @@ class Study:
 
 def study(
     case: LoadedCase,
-    door: Door,
+    evaluator: Evaluator,
     measured: Path,
     repeats: Sequence[Path] = (),
     toggled: Sequence[tuple[Path, Change]] = (),
@@ -72,7 +72,7 @@ def study(
 
     effects: ids to consider, None = the whole catalogue; one that a variable of the case sets is
     none; stage: hears of each of ``diagnosis.STAGES``. Raises InputError,
-    EvaluationFailed, and what ``Door.evaluate`` raises.
+    EvaluationFailed, and what ``Evaluator.evaluate`` raises.
     """
     switched = [path for path, _ in toggled]
     runs = {path: read_measurements(path) for path in (measured, *repeats, *switched)}
@@ -93,12 +93,12 @@ def study(
             "a variable of the case sets pressure_kPa, which a diagnosis takes from the"
             " measurements: consider the effect pressure_offset instead"
         )
-    spans, inexpressible = spans_of(door, [id for id in ids if id not in fitted])
+    spans, inexpressible = spans_of(case, evaluator, [id for id in ids if id not in fitted])
     changes = tuple(_counted_from(change, spans) for _, change in toggled)
     for change in changes:
         spans[change.id] = _reaching(spans[change.id], change)
     found, assumed_sources = sources(case)
-    model = TyreModel(case, door, rows, found, spans, jobs)
+    model = TyreModel(case, evaluator, rows, found, spans, jobs)
     _check_units(model, observations, [measured, *switched], changes)
     diagnosis = diagnose(
         model,
@@ -107,7 +107,7 @@ def study(
         changes,
         assumed,
         parts=(lambda x: regions(model, x)) if section_map else None,
-        further=lambda more: TyreModel(case, door.for_case(case), more, found, spans, jobs),
+        further=lambda more: TyreModel(case, evaluator, more, found, spans, jobs),
         stage=stage,
     )
     own = [runs[path] for path in (measured, *repeats)]
@@ -118,13 +118,13 @@ def study(
         tuple(inexpressible),
         fitted,
         model,
-        _under_load(case, door, own, diagnosis, model),
+        _under_load(case, evaluator, own, diagnosis, model),
     )
 
 
 def _under_load(
     case: LoadedCase,
-    door: Door,
+    evaluator: Evaluator,
     runs: Sequence[Sequence[Measurement]],
     diagnosis: Diagnosis,
     model: TyreModel,
@@ -141,11 +141,13 @@ def _under_load(
         x = diagnosis.problem.expansion.x0 + found.fitted.d[found.best]
         effects = {id: float(e[found.best]) for id, e in found.values.items()}
         tyres[key] = model.design(Point(x, effects))
-    return compare(case, door, readings, tyres)
+    return compare(case, evaluator, readings, tyres)
 
 
-def spans_of(door: Door, ids: Sequence[str] | None = None) -> tuple[dict[str, Span], list[str]]:
-    """Effects that the door's solver can express, and ids of those that it cannot.
+def spans_of(
+    case: LoadedCase, evaluator: Evaluator, ids: Sequence[str] | None = None
+) -> tuple[dict[str, Span], list[str]]:
+    """Effects that the evaluator's solver can express, and ids of those that it cannot.
 
     Raises ValueError where one of ``ids`` is no effect.
     """
@@ -156,10 +158,10 @@ def spans_of(door: Door, ids: Sequence[str] | None = None) -> tuple[dict[str, Sp
     for id, effect in catalogue().items():
         if ids is not None and id not in ids:
             continue
-        if not effect.within(door.solver.capabilities):
+        if not effect.within(evaluator.solver.capabilities):
             unable.append(id)
         else:
-            base = door.case.case.effects.get(id, 0.0)
+            base = case.case.effects.get(id, 0.0)
             able[id] = Span(
                 effect.low - base,
                 effect.high - base,

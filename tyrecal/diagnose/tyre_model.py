@@ -1,4 +1,4 @@
-"""The tyre behind the one door as a `Response`."""
+"""The evaluated tyre as a `Response`."""
 
 from __future__ import annotations
 
@@ -11,8 +11,9 @@ import numpy as np
 
 from ..case import LoadedCase, start_values
 from ..case.calibration import TargetMode, Targets
+from ..deck.tyre_design import TyreDesign
 from ..effects import catalogue
-from ..evaluate.door import Door
+from ..evaluate.evaluator import Evaluator
 from ..evaluate.failure import DeckRefused, EvaluationFailed
 from ..fit import problem as fit
 from ..modes.mode import Label
@@ -38,20 +39,20 @@ class TyreModel:
     def __init__(
         self,
         case: LoadedCase,
-        door: Door,
+        evaluator: Evaluator,
         rows: Sequence[ModelRow],
         found: list[Source],
         spans: Mapping[str, Span],
         jobs: int = 1,
     ):
-        if not door.has_gradients and "gradients" in door.solver.capabilities:
+        if not evaluator.has_gradients and "gradients" in evaluator.solver.capabilities:
             raise DeckRefused(
                 "with what the case has in it (a splice) the solver gives no exact slopes, which a"
                 " diagnosis needs: take it out of the case, the diagnosis weighs it as an effect"
             )
-        if not door.has_gradients:
+        if not evaluator.has_gradients:
             raise DeckRefused(
-                f"solver '{door.solver.name}' gives no exact slopes, which a diagnosis needs:"
+                f"solver '{evaluator.solver.name}' gives no exact slopes, which a diagnosis needs:"
                 " 'tyrecal solvers' shows which one does (gradients)"
             )
         self.rows, self.found, self.jobs = list(rows), found, jobs
@@ -60,9 +61,9 @@ class TyreModel:
         self.pressures = sorted({p for label, p in rows if label}) or [case.case.pressure_kPa]
         labels = sorted({label for label, _ in rows if label}, key=str)
         case = asked_for(case, labels)
-        self.door = door
-        door.case = case
-        self._fit = fit.Problem(case, door, jobs=jobs)
+        self.case = case
+        self.evaluator = evaluator = evaluator.of(TyreDesign(case))
+        self._fit = fit.Problem(case, evaluator, jobs=jobs)
         self._variables = case.case.variables
         self.variables: Sequence[str] = list(self._variables)
         self.sources: Sequence[str] = [source.name for source in found]
@@ -143,7 +144,7 @@ class TyreModel:
         """Whether the solver gives slopes with an effect."""
         try:
             far = span.base + span.high or span.base + span.low
-            return self.door.has_gradients_at({EFFECTS + id: far})
+            return self.evaluator.has_gradients_at({EFFECTS + id: far})
         except ValueError:  # the case cannot have that much of it
             return True
 

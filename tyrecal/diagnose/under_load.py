@@ -7,10 +7,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import log, sqrt
 
-from ..case import LoadedCase, with_values
-from ..deck.context import section_mesh
-from ..deck.environment import TemplateFailed
-from ..evaluate.door import Door
+from ..case import LoadedCase
+from ..deck.tyre_design import TyreDesign
+from ..evaluate.evaluator import Evaluator
 from ..evaluate.failure import DeckRefused, EvaluationFailed
 from ..fit.footprint import ROW
 from ..measured.measurement import Measurement
@@ -18,6 +17,7 @@ from ..modes.loaded import Member
 from ..modes.mode import Label
 from ..studies.footprint import footprint_row
 from ..studies.loaded import load_tyres
+from ..templates import TemplateFailed
 from .tyre_model import asked_for
 
 Place = tuple[str, Member | None, float]  # quantity, mode, load in N
@@ -58,7 +58,10 @@ class UnderLoad:
 
 
 def compare(
-    case: LoadedCase, door: Door, readings: Sequence[Measurement], tyres: Mapping[str, Values]
+    case: LoadedCase,
+    evaluator: Evaluator,
+    readings: Sequence[Measurement],
+    tyres: Mapping[str, Values],
 ) -> UnderLoad:
     """Each tyre (name to values of the case's numbers) pressed at the measured pressures and loads.
 
@@ -74,7 +77,7 @@ def compare(
             for part in (_footprints, _modes):
                 try:
                     for place, value in part(
-                        case, door, {**values, "pressure_kPa": pressure}, places
+                        case, evaluator, {**values, "pressure_kPa": pressure}, places
                     ):
                         found[name][place] = value
                 except (EvaluationFailed, DeckRefused, TemplateFailed) as failure:
@@ -112,14 +115,14 @@ def _grouped(
 
 
 def _footprints(
-    case: LoadedCase, door: Door, values: Values, places: Sequence[Place]
+    case: LoadedCase, evaluator: Evaluator, values: Values, places: Sequence[Place]
 ) -> Iterator[tuple[Place, float]]:
     wanted = [place for place in places if place[1] is None]
     loads = sorted({load for _, _, load in wanted})
     if not loads:
         return
-    pressed = door.for_case(case).press(values, loads)
-    mesh = section_mesh(with_values(case, values))
+    pressed = evaluator.of(TyreDesign(case)).press(values, loads)
+    mesh = TyreDesign(case, values).tyre.mesh
     rows = {each.load_N: footprint_row(pressed, each, mesh) for each in pressed.footprints}
     for quantity, member, load in wanted:
         if load in rows:
@@ -129,14 +132,15 @@ def _footprints(
 
 
 def _modes(
-    case: LoadedCase, door: Door, values: Values, places: Sequence[Place]
+    case: LoadedCase, evaluator: Evaluator, values: Values, places: Sequence[Place]
 ) -> Iterator[tuple[Place, float]]:
     wanted = [place for place in places if place[1]]
     loads = sorted({load for _, _, load in wanted})
     if not loads:
         return
     labels: list[Label] = sorted({member.label for _, member, _ in wanted if member}, key=str)
-    (outcome,) = load_tyres(door.for_case(asked_for(case, labels)), {"": values}, loads).values()
+    case = asked_for(case, labels)
+    (outcome,) = load_tyres(case, evaluator.of(TyreDesign(case)), {"": values}, loads).values()
     if isinstance(outcome, EvaluationFailed):
         raise outcome
     at = {

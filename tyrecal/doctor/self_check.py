@@ -27,8 +27,9 @@ def self_check(solver: str = "bundled") -> dict[str, Any]:
     ``mass_kg``, ``modes`` [{label, frequency_Hz, recorded_Hz, deviation_percent}] and ``problem``,
     None or why there are no figures. Raises InputError.
     """
-    from ..case import load_case
-    from ..evaluate.door import Door, Question
+    from ..deck.tyre_design import TyreDesign
+    from ..design import load_case
+    from ..evaluate.evaluator import Evaluator, Question
     from ..evaluate.failure import DeckRefused, EvaluationFailed, SolverUnavailable
     from ..modes.label import paired_labels
 
@@ -43,7 +44,7 @@ def self_check(solver: str = "bundled") -> dict[str, Any]:
         "problem": None,
     }
     try:
-        answer = Door(load_case(CASE), solver).evaluate(Question({}))
+        answer = Evaluator(TyreDesign(load_case(CASE)), solver).evaluate(Question({}))
         hertz = {str(m.label): m.frequency_Hz for m in paired_labels(answer.modes)}
         found["mass_kg"] = answer.mass_kg
         found["modes"] = [

@@ -46,7 +46,7 @@ class _Part(BaseModel):
 
 
 class _Failure(_Part):
-    cause: Literal["no_equilibrium", "unstable"]  # the deck's own doing, see `door.SETTLED`
+    cause: Literal["no_equilibrium", "unstable"]  # the deck's own doing, see `evaluator.SETTLED`
     words: Annotated[str, Field(max_length=100_000)]
     folder: Annotated[str, Field(max_length=4096)] | None
 
@@ -147,7 +147,7 @@ class _Pressed(_Tyre):
 
 
 def check(content: Any) -> None:
-    """Whether ``content`` is what `Door` records. Raises Damaged."""
+    """Whether ``content`` is what `Evaluator` records. Raises Damaged."""
     kind: type[_Part] = _Failure
     if isinstance(content, dict) and "answer" in content:
         content = content["answer"]

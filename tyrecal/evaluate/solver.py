@@ -20,7 +20,7 @@ class Solver(Protocol):
     dialect: the template folder of its decks; capabilities: of ``modes``,
     ``gradients``, ``footprint``, ``loaded_modes``, and what effects need (`Effect.needs`):
     ``vibration_modulus``, a modulus in the frequency step other than in the static one, and those
-    of `deck.beside.WORDS`;
+    of `design.tyre.CAPABILITIES`;
     A solver that starts a program has ``command`` too, a list of its words, which is the user's to
     set (`tyrecal.settings`), never the case's;
     refusals, failures: exceptions of `write`, `run` and `read` for a deck it cannot honour and
@@ -35,7 +35,7 @@ class Solver(Protocol):
     failures: tuple[type[Exception], ...]
 
     def write(self, decks: Any, folder: Path) -> list[Path]:
-        """Write all input files of `tyrecal.deck.Decks` into an empty folder.
+        """Write all input files of `tyrecal.deck.decks.Decks` into an empty folder.
 
         ``loads_N`` is not empty only where the solver can do footprints, ``loaded_modes`` not 0
         only where it finds modes there.

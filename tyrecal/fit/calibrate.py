@@ -10,10 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from ..case import LoadedCase, with_values
+from ..case import LoadedCase
 from ..case.calibration import cannot_fit
+from ..design import with_values
 from ..errors import InputError
-from ..evaluate.door import Counts, Door
+from ..evaluate.evaluator import Counts, Evaluator
 from ..evaluate.executor import executor, in_order
 from ..evaluate.failure import EvaluationFailed, WorkerLost
 from . import least_squares, slsqp
@@ -57,7 +58,7 @@ class Fit:
 
 def calibrate(
     case: LoadedCase,
-    door: Door,
+    evaluator: Evaluator,
     method: str = "slsqp",
     fixed: Mapping[str, float] | None = None,
     starts: int = 1,
@@ -74,7 +75,7 @@ def calibrate(
     tyre is pressed. notify is told of every design here, finished of every start. Raises
     what `check` does; EvaluationFailed when the case's own start cannot be evaluated.
     """
-    problem = Problem(case, door, fixed, notify, jobs)
+    problem = Problem(case, evaluator, fixed, notify, jobs)
     check(problem)
     initial = problem.evaluate(problem.start())
     if not np.isfinite(initial.objective):
@@ -108,7 +109,7 @@ def check(problem: Problem) -> None:
     if reason := cannot_fit(weights, len(problem.variables)):
         raise InputError(reason)
     if problem.footprint:
-        problem.door.needs_road()
+        problem.evaluator.needs_road()
 
 
 def _run(problem: Problem, start: Array, method: str) -> StartReport:
@@ -163,23 +164,23 @@ def _more_starts(
 def _run_all(
     problem: Problem, starts: list[Array], jobs: int, method: str
 ) -> Iterator[StartReport | EvaluationFailed]:
-    """Answers in the order of the starts; ``jobs`` at a time, or by the door's scheduler."""
-    if jobs <= 1 and not problem.door.scheduler:
+    """Answers in the order of the starts; ``jobs`` at a time, or by the evaluator's scheduler."""
+    if jobs <= 1 and not problem.evaluator.scheduler:
         yield from (_start_here(problem, x, method) for x in starts)
         return
-    door = problem.door.worker()
-    tasks = [(Problem(problem.case, door, problem.fixed), x, method) for x in starts]
-    with executor(jobs, problem.door.scheduler) as workers:
+    evaluator = problem.evaluator.worker()
+    tasks = [(Problem(problem.case, evaluator, problem.fixed), x, method) for x in starts]
+    with executor(jobs, problem.evaluator.scheduler) as workers:
         for answer in in_order(workers.each(_start_alone, tasks)):
             if isinstance(answer, WorkerLost):
                 raise EvaluationFailed("crashed", str(answer))
             report, counts = answer
-            problem.door.counts.add(counts)
+            problem.evaluator.counts.add(counts)
             yield report
 
 
 def _start_here(problem: Problem, start: Array, method: str) -> StartReport | EvaluationFailed:
-    alone = Problem(problem.case, problem.door, problem.fixed, problem.notify)
+    alone = Problem(problem.case, problem.evaluator, problem.fixed, problem.notify)
     try:
         return _run(alone, start, method)
     except EvaluationFailed as failure:
@@ -188,7 +189,7 @@ def _start_here(problem: Problem, start: Array, method: str) -> StartReport | Ev
 
 def _start_alone(task: tuple[Problem, Array, str]) -> tuple[StartReport | EvaluationFailed, Counts]:
     problem, start, method = task
-    return _start_here(problem, start, method), problem.door.counts
+    return _start_here(problem, start, method), problem.evaluator.counts
 
 
 def _history(problem: Problem) -> list[dict[str, Any]]:

@@ -18,10 +18,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..case import LoadedCase, with_values
+from ..case import LoadedCase
 from ..case.calibration import MEASURED
-from ..deck.context import section_mesh
-from ..evaluate.door import Door
+from ..deck.tyre_design import TyreDesign
+from ..evaluate.evaluator import Evaluator
 from ..evaluate.failure import EvaluationFailed
 from ..evaluate.pressed import Pressed
 from ..studies.footprint import footprint_row
@@ -60,7 +60,8 @@ def read_footprint_targets(case: LoadedCase) -> list[FootprintTarget]:
 
 
 def press(
-    door: Door,
+    case: LoadedCase,
+    evaluator: Evaluator,
     targets: Sequence[FootprintTarget],
     designs: Sequence[Mapping[str, float]],
     jobs: int,
@@ -68,14 +69,14 @@ def press(
     """Of each design the targets' quantities and, behind them, by which share of itself each may
     jump (2 targets,): a touching node's share of the patch; or why a load was not reached."""
     last = max(t.load_N for t in targets)
-    loads = [load for load in door.case.case.loads_N if load <= last]
-    for values, outcome in zip(designs, door.press_all(designs, loads, jobs), strict=True):
+    loads = [load for load in case.case.loads_N if load <= last]
+    for values, outcome in zip(designs, evaluator.press_all(designs, loads, jobs), strict=True):
         if isinstance(outcome, EvaluationFailed):
             yield outcome
         elif outcome.failed:
             yield outcome.failed
         else:
-            yield _quantities(door.case, values, outcome, targets)
+            yield _quantities(case, values, outcome, targets)
 
 
 def _quantities(
@@ -84,7 +85,7 @@ def _quantities(
     pressed: Pressed,
     targets: Sequence[FootprintTarget],
 ) -> Array:
-    mesh = section_mesh(with_values(case, values))
+    mesh = TyreDesign(case, values).tyre.mesh
     rows = {each.load_N: footprint_row(pressed, each, mesh) for each in pressed.footprints}
     share = {each.load_N: 1 / len(each.node) for each in pressed.footprints}
     found = [rows[t.load_N][ROW.get(t.quantity, t.quantity)] for t in targets]

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..case import LoadedCase
-from ..evaluate.door import Door, Question
+from ..evaluate.evaluator import Evaluator, Question
 from ..evaluate.failure import DeckRefused, EvaluationFailed, SolverUnavailable
 from ..evaluate.results import Evaluation
 from ..modes.label import paired_labels
@@ -106,12 +106,12 @@ class Problem:
     def __init__(
         self,
         case: LoadedCase,
-        door: Door,
+        evaluator: Evaluator,
         fixed: Mapping[str, float] | None = None,
         notify: Callable[[int, Mapping[str, float], Point | EvaluationFailed], None] | None = None,
         jobs: int = 1,
     ):
-        self.case, self.door, self.notify, self.jobs = case, door, notify, jobs
+        self.case, self.evaluator, self.notify, self.jobs = case, evaluator, notify, jobs
         self.fixed = dict(fixed or {})
         self.variables = [
             read_variable(name, v)
@@ -124,7 +124,7 @@ class Problem:
         self.lower = np.array([v.scaled(v.lower) for v in self.variables])
         self.upper = np.array([v.scaled(v.upper) for v in self.variables])
         self.difference_step = (
-            None if door.has_gradients else getattr(door.solver, "difference_step", STEP)
+            None if evaluator.has_gradients else getattr(evaluator.solver, "difference_step", STEP)
         )
         self.points: dict[tuple[float, ...], Point | EvaluationFailed] = {}
 
@@ -176,7 +176,9 @@ class Problem:
             slopes = differences(self.variables, values, step, self._frequencies, frequencies)[1]
         pressed = shares = np.empty(0)
         if self.footprint:
-            ask = lambda designs: press(self.door, self.footprint, designs, self.jobs)
+            ask = lambda designs: press(
+                self.case, self.evaluator, self.footprint, designs, self.jobs
+            )
             found, rises = differences(self.variables, values, PRESS_STEP, ask, steepest=STEEPEST)
             pressed, shares = np.split(found, 2)
             slopes = np.vstack([slopes, rises[: len(pressed)]])
@@ -229,7 +231,7 @@ class Problem:
             asked, waiting = waiting, []
             questions = [Question(*wanted[i], count) for i in asked]
             jobs = min(self.jobs, len(asked))
-            for i, answer in zip(asked, self.door.answer_all(questions, jobs), strict=True):
+            for i, answer in zip(asked, self.evaluator.answer_all(questions, jobs), strict=True):
                 if isinstance(answer, EvaluationFailed | DeckRefused):
                     answers[i] = answer
                     continue

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 from ..case.calibration import Variable as CaseVariable
-from ..deck.write import NEAR_ZERO
+from ..deck.tyre_design import NEAR_ZERO
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from math import nan
 
-from ..case.usual import MEASURED
+from ..design.usual import MEASURED
 from ..modes.mode import Label
 
 COLUMNS = ("quantity", "c", "m", "kind", "member", "pressure_kPa", "load_N", "value", "sigma")

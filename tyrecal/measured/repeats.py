@@ -18,7 +18,7 @@ from math import isnan
 
 import numpy as np
 
-from ..case.usual import LARGEST_SIGMA
+from ..design.usual import LARGEST_SIGMA
 from ..errors import InputError
 from ..modes.mode import Label
 from .measurement import Key, Measurement

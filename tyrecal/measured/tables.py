@@ -17,7 +17,7 @@ from dataclasses import replace
 from math import isnan
 from pathlib import Path
 
-from ..case.usual import LARGEST_SIGMA
+from ..design.usual import LARGEST_SIGMA
 from ..errors import InputError
 from ..files import read_bytes
 from .columns import Column, read_columns

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from ..case import LoadedCase, with_values
-from ..deck.context import section_mesh
+from ..case import LoadedCase
+from ..design import resolved, with_values
 from ..evaluate.pressed import Pressed
 from ..evaluate.results import Evaluation
 from ..modes.mode import Label, Mode
@@ -30,7 +30,7 @@ def draw_evaluation(
 
     Only modes known on the whole section are drawn: a 3-D solver gives them on the crown alone.
     """
-    mesh = section_mesh(case)
+    mesh = resolved(case).mesh
     moved, modes = placed(evaluation, modes, mesh)
     section = section_data(case, mesh, moved)
     figure = draw_section(section, case.case.name, evaluation.pressure_kPa)

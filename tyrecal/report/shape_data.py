@@ -9,8 +9,7 @@ import numpy as np
 from pydantic import Field
 
 from ..case import LoadedCase
-from ..deck.context import section_mesh
-from ..effects import with_effects
+from ..design import resolved
 from ..evaluate.pressed import Pressed
 from ..evaluate.results import Evaluation, HarmonicShape
 from ..modes.loaded import MIRROR
@@ -117,7 +116,7 @@ def tyre_data(case: LoadedCase, evaluation: Evaluation, modes: Sequence[Mode]) -
     A shape is u = Re[amplitude exp(i n Theta)], in r, theta, z; of a pair the member whose crest
     stands at Theta = 0. Modes that are not known on the section are left out.
     """
-    mesh = section_mesh(case)
+    mesh = resolved(case).mesh
     moved, modes = placed(evaluation, modes, mesh)
     nodes = skin(mesh)
     R, Z = np.array([mesh.nodes[int(n)] for n in nodes]).T
@@ -136,7 +135,7 @@ def tyre_data(case: LoadedCase, evaluation: Evaluation, modes: Sequence[Mode]) -
 def section_data(case: LoadedCase, mesh: SectionMesh, displacement: Mapping[int, Array]) -> Section:
     """The section on ``mesh``; displacement: node number to (r, theta, z) of the inflation, m;
     empty: unknown."""
-    case = with_effects(case)
+    case = resolved(case).written
     place = {n: np.array([z, r]) * 1e3 for n, (r, z) in mesh.nodes.items()}
     areas: dict[str, list[Flat]] = {name: [] for name, _ in case.section.regions}
     for number, (region, _) in mesh.cells.items():
@@ -164,7 +163,7 @@ def section_data(case: LoadedCase, mesh: SectionMesh, displacement: Mapping[int,
 
 def parts_data(case: LoadedCase, named: Iterable[str]) -> DiagnosisSection:
     """The section's parts under the names that they have in the map of parts ``named``."""
-    mesh = section_mesh(case)
+    mesh = resolved(case).mesh
     place = {n: np.array([z, r]) * 1e3 for n, (r, z) in mesh.nodes.items()}
     parts = rubber_parts(case, mesh, {name.split(",")[0] for name in named})
     cords: dict[str, list[Flat]] = {}

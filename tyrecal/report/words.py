@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ..case.usual import MEASURED
+from ..design.usual import MEASURED
 
 KNOWN = {
     (0, 0, "axial"): "lateral",

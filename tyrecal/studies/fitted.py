@@ -7,8 +7,9 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
-from ..case import LoadedCase, start_values, with_values
+from ..case import LoadedCase, start_values
 from ..case.identity import is_of_tyre, tyre_sha256
+from ..design import with_values
 from ..errors import InputError
 from ..files import read_json
 

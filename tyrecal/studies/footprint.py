@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from ..evaluate.door import Door
+from ..evaluate.evaluator import Evaluator
 from ..evaluate.failure import EvaluationFailed
 from ..evaluate.pressed import Footprint, Pressed
 from ..tyre.mesh import SectionMesh
@@ -16,17 +16,17 @@ Outcome = Pressed | EvaluationFailed
 
 
 def press(
-    door: Door,
+    evaluator: Evaluator,
     designs: Mapping[str, Mapping[str, float]],
     loads_N: Sequence[float],
     jobs: int = 1,
     notify: Callable[[str, Outcome], None] = lambda design, outcome: None,
 ) -> dict[str, Outcome]:
     """Every design (name to values of the variables) at rising loads, or why not even at the
-    first one. Raises DeckRefused and what else ``Door.press`` raises for wrong input."""
+    first one. Raises DeckRefused and what else ``Evaluator.press`` raises for wrong input."""
     found: dict[str, Outcome] = {}
     for design, outcome in zip(
-        designs, door.press_all(designs.values(), loads_N, jobs), strict=True
+        designs, evaluator.press_all(designs.values(), loads_N, jobs), strict=True
     ):
         found[design] = outcome
         notify(design, outcome)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..case import LoadedCase
-from ..evaluate.door import Door, Question
+from ..evaluate.evaluator import Evaluator, Question
 from ..evaluate.failure import EvaluationFailed
 from ..evaluate.pressed import Pressed
 from ..evaluate.results import Evaluation
@@ -67,27 +67,28 @@ Outcome = LoadedTyre | EvaluationFailed
 
 
 def load_tyres(
-    door: Door,
+    case: LoadedCase,
+    evaluator: Evaluator,
     designs: Mapping[str, Mapping[str, float]],
     loads_N: Sequence[float],
     jobs: int = 1,
     notify: Callable[[str, Outcome], None] = lambda design, outcome: None,
 ) -> dict[str, Outcome]:
     """Every design (name to values of the variables) at rising loads, one above 0 at least, or why
-    it has no modes. Raises DeckRefused and what else ``Door.press`` raises for wrong input.
+    it has no modes. Raises DeckRefused and what else ``Evaluator.press`` raises for wrong input.
     """
-    door.needs_road(modes=True)
-    unloaded = {name: _unloaded(door, values) for name, values in designs.items()}
+    evaluator.needs_road(modes=True)
+    unloaded = {name: _unloaded(case, evaluator, values) for name, values in designs.items()}
     able = [name for name, each in unloaded.items() if not isinstance(each, EvaluationFailed)]
     loads = [load for load in loads_N if load]
-    answers = door.press_all([designs[name] for name in able], loads, jobs, _count(door.case))
+    answers = evaluator.press_all([designs[name] for name in able], loads, jobs, _count(case))
     found: dict[str, Outcome] = {}
     for name in designs:
         free = unloaded[name]
         found[name] = (
             free
             if isinstance(free, EvaluationFailed)
-            else _loaded_tyre(door.case, free, next(answers), 0.0 in loads_N)
+            else _loaded_tyre(case, free, next(answers), 0.0 in loads_N)
         )
         notify(name, found[name])
     return found
@@ -112,16 +113,18 @@ def _count(case: LoadedCase) -> int:
     return 2 + 4 * case.case.analysis.highest_harmonic + SPARE
 
 
-def _unloaded(door: Door, values: Mapping[str, float]) -> Evaluation | EvaluationFailed:
+def _unloaded(
+    case: LoadedCase, evaluator: Evaluator, values: Mapping[str, float]
+) -> Evaluation | EvaluationFailed:
     """The unloaded tyre's modes with a few harmonics more, the wanted ones surely among them."""
-    highest = door.case.case.analysis.highest_harmonic + FURTHER
+    highest = case.case.analysis.highest_harmonic + FURTHER
     lost = ""
     for count in (None, *MORE_MODES):
         question = Question({**values, "analysis.highest_harmonic": highest}, (), count)
         try:
-            found = door.evaluate(question)
+            found = evaluator.evaluate(question)
             modes = paired_labels(found.modes)
-            match(modes, _wanted(door.case, modes))
+            match(modes, _wanted(case, modes))
         except EvaluationFailed as failure:
             return failure
         except LostLabel as error:

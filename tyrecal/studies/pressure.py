@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-from ..evaluate.door import Door, Question
+from ..case import LoadedCase
+from ..evaluate.evaluator import Evaluator, Question
 from ..evaluate.failure import EvaluationFailed
 from ..evaluate.results import Evaluation
 from ..fit.problem import MORE_MODES, read_targets
@@ -44,7 +45,8 @@ Outcome = State | Failure
 
 
 def sweep(
-    door: Door,
+    case: LoadedCase,
+    evaluator: Evaluator,
     designs: Mapping[str, Mapping[str, float]],
     pressures_kPa: Sequence[float],
     jobs: int = 1,
@@ -53,12 +55,12 @@ def sweep(
     """Every design (name to values of the variables) at every pressure, in that order.
 
     Where a target's mode is not among the modes that the case asks for, more are asked for.
-    Raises DeckRefused and what else ``Door.evaluate`` raises for wrong input; an evaluation that
-    fails is an outcome.
+    Raises DeckRefused and what else ``Evaluator.evaluate`` raises for wrong input; an
+    evaluation that fails is an outcome.
     """
-    name = pressure_name(door.case)
-    wanted = [target.label for target in read_targets(door.case)]
-    gradients = (name,) if door.has_gradients else ()
+    name = pressure_name(case)
+    wanted = [target.label for target in read_targets(case)]
+    gradients = (name,) if evaluator.has_gradients else ()
     places = waiting = [(design, p) for design in designs for p in pressures_kPa]
     outcomes: dict[tuple[str, float], Outcome] = {}
     for count in (None, *MORE_MODES):
@@ -66,7 +68,7 @@ def sweep(
             break
         questions = [Question({**designs[d], name: p}, gradients, count) for d, p in waiting]
         lost = []
-        for place, answer in zip(waiting, door.evaluate_all(questions, jobs), strict=True):
+        for place, answer in zip(waiting, evaluator.evaluate_all(questions, jobs), strict=True):
             outcomes[place] = outcome = _outcome(*place, answer, name, wanted)
             if isinstance(outcome, Failure) and outcome.failed.cause == "lost_label":
                 lost.append(place)

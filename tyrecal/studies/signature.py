@@ -8,8 +8,9 @@ from itertools import islice
 
 import numpy as np
 
+from ..case import LoadedCase
 from ..effects import catalogue
-from ..evaluate.door import Door, Question
+from ..evaluate.evaluator import Evaluator, Question
 from ..evaluate.failure import EvaluationFailed
 from ..evaluate.results import Evaluation
 from ..fit.problem import read_targets
@@ -45,20 +46,26 @@ class Signature:
 class Plain:
     """The tyre without the effect at each pressure, with slopes by the case's variables.
 
-    values: of the variables, in their own units. Raises what ``Door.evaluate`` does.
+    values: of the variables, in their own units. Raises what ``Evaluator.evaluate`` does.
     """
 
-    def __init__(self, door: Door, values: Mapping[str, float], pressures_kPa: Sequence[float]):
-        self.door, self.pressures_kPa = door, tuple(pressures_kPa)
-        pressure = pressure_name(door.case)
-        variables = door.case.case.variables
+    def __init__(
+        self,
+        case: LoadedCase,
+        evaluator: Evaluator,
+        values: Mapping[str, float],
+        pressures_kPa: Sequence[float],
+    ):
+        self.case, self.evaluator, self.pressures_kPa = case, evaluator, tuple(pressures_kPa)
+        pressure = pressure_name(case)
+        variables = case.case.variables
         self.names = tuple(name for name in values if name != pressure)
         self.values = dict(values)
         self.states = [{**values, pressure: p} for p in pressures_kPa]
-        found = [door.evaluate(Question(state, self.names)) for state in self.states]
+        found = [evaluator.evaluate(Question(state, self.names)) for state in self.states]
         self.mass_kg = found[0].mass_kg
         modes = [_modes(evaluation) for evaluation in found]
-        wanted = [t.label for t in read_targets(door.case)] or [m for m in modes[0] if m.m < 2]
+        wanted = [t.label for t in read_targets(case)] or [m for m in modes[0] if m.m < 2]
         self.labels = tuple(label for label in wanted if all(label in each for each in modes))
         self.hertz = np.array([[m[label].frequency_Hz for label in self.labels] for m in modes])
         self.weights = np.sqrt([[m[label].multiplicity for label in self.labels] for m in modes])
@@ -76,7 +83,7 @@ class Plain:
         self.jacobian = np.array(slopes) * self.steps / self.hertz[:, :, None]
 
     def signature(self, id: str, value: float) -> Signature:
-        """What the effect does to this tyre. Raises what ``Door.evaluate`` does."""
+        """What the effect does to this tyre. Raises what ``Evaluator.evaluate`` does."""
         found = next(self.signatures({id: value}))
         if isinstance(found, EvaluationFailed):
             raise found
@@ -87,14 +94,14 @@ class Plain:
     ) -> Iterator[Signature | EvaluationFailed]:
         """Of each effect, in their order, its signature at that size; ``jobs`` designs at a time.
 
-        Raises what ``Door.evaluate_all`` does.
+        Raises what ``Evaluator.evaluate_all`` does.
         """
         questions = [
             Question({**state, f"effects.{id}": value})
             for id, value in sizes.items()
             for state in self.states
         ]
-        answers = self.door.evaluate_all(questions, jobs)
+        answers = self.evaluator.evaluate_all(questions, jobs)
         for id, value in sizes.items():
             found: list[Evaluation] = []
             failed: list[EvaluationFailed] = []
@@ -140,7 +147,7 @@ class Plain:
     def _moved(self, name: str, step: float, place: int) -> float:
         """The variable after a step of the logarithm, or of its range."""
         value = self.values[name]
-        if self.door.case.case.variables[name].scale == "log":
+        if self.case.case.variables[name].scale == "log":
             return float(value * np.exp(step))
         return float(value + step * self.steps[place])
 

@@ -1,4 +1,4 @@
-"""The one door for evaluations: a design goes in, modes, footprints or a typed failure come out."""
+"""Evaluations: a design goes in, modes, footprints or a typed failure come out."""
 
 from __future__ import annotations
 
@@ -9,10 +9,7 @@ from math import isclose
 from pathlib import Path
 from typing import Any, TypeVar
 
-from ..case import LoadedCase, with_values
-from ..deck.beside import needs
-from ..deck.write import Decks
-from ..effects import catalogue, with_effects
+from ..deck.decks import Decks, Design
 from ..files import printable
 from ..interrupt import interrupts_put_off, raise_interrupt
 from . import folders
@@ -58,46 +55,39 @@ def _unheard(done: int, total: int) -> None:
 
 
 @dataclass
-class Door:
-    """Evaluates designs of a case with a solver, each in a fresh folder under ``folder``.
+class Evaluator:
+    """Evaluates a design, and others of the same tyre, each in a fresh folder."""
 
-    keep: leave the folders of successful runs too (those of failures are always kept); store: the
-    record that is asked before the solver, and told what it said; heard: called with how many of
-    how many designs asked at once are answered; scheduler: address of the Dask scheduler whose
-    workers evaluate where there are several questions, else processes do; command: words that
-    start the solver's program, else as the user has set it where the solver runs.
-    """
-
-    case: LoadedCase
-    solver_name: str = ""
-    folder: Path | None = None
-    keep: bool = False
-    store: Store | None = None
-    scheduler: str = ""
-    command: tuple[str, ...] = ()
+    design: Design
+    solver_name: str = ""  # else the design's
+    folder: Path | None = None  # of the run folders; None: temporary ones
+    keep: bool = False  # the folders of successful runs too; those of failures always are
+    store: Store | None = None  # the record, asked before the solver and told what it said
+    scheduler: str = (
+        ""  # address of the Dask scheduler that several questions go to, else processes
+    )
+    command: tuple[str, ...] = ()  # words that start the solver's program, else the user's settings
     counts: Counts = field(default_factory=Counts)
-    heard: Callable[[int, int], None] = field(default=_unheard, repr=False)
+    # called with how many of how many designs asked at once are answered
+    on_progress: Callable[[int, int], None] = field(default=_unheard, repr=False)
     _solver: Solver | None = field(default=None, repr=False)
 
     @property
     def solver(self) -> Solver:
         """The adapter. Raises InputError."""
         if self._solver is None:
-            name = self.solver_name or self.case.case.solver.name
+            name = self.solver_name or self.design.solver.name
             self._solver = find_solver(name, self.command)
         return self._solver
 
     @property
     def has_gradients(self) -> bool:
-        """Whether the solver gives exact slopes: of a tyre with a splice none does."""
-        plain = not with_effects(self.case).case.splice.share
-        return plain and "gradients" in self.solver.capabilities
+        """Whether the solver gives exact slopes of the design."""
+        return self.design.has_slopes and "gradients" in self.solver.capabilities
 
     def has_gradients_at(self, values: Mapping[str, float]) -> bool:
-        """`has_gradients` of the case with values of variables or effects."""
-        other = self.worker()
-        other.case = with_values(self.case, values)
-        return other.has_gradients
+        """`has_gradients` of the design with values of variables or effects."""
+        return self.of(self.design.at(values)).has_gradients
 
     def evaluate(self, question: Question) -> Evaluation:
         """Modes of one design, the same from the record as from a run.
@@ -105,8 +95,8 @@ class Door:
         Raises EvaluationFailed; DeckRefused, TemplateFailed, CaseError where the input is wrong;
         OSError where the run folder cannot be written.
         """
-        case = self._with(question.values)
-        decks = Decks(case, question.values, question.gradients, question.modes_per_harmonic)
+        design = self._with(question.values)
+        decks = Decks(design, question.gradients, question.modes_per_harmonic)
         return self._ask(decks, lambda answer, kept: evaluation(answer))
 
     def press(
@@ -118,7 +108,7 @@ class Door:
         Raises what `evaluate` does; DeckRefused too where the solver has no road.
         """
         self.needs_road(bool(modes))
-        decks = Decks(self._with(values), values, loads_N=tuple(loads_N), loaded_modes=modes)
+        decks = Decks(self._with(values), loads_N=tuple(loads_N), loaded_modes=modes)
         return self._ask(decks, lambda answer, kept: pressed(answer, loads_N, kept, modes))
 
     def needs_road(self, modes: bool = False) -> None:
@@ -132,28 +122,19 @@ class Door:
                 f" shows which one can ({capability})"
             )
 
-    def needs_effects_of(self, case: LoadedCase) -> None:
-        """Raises DeckRefused where the solver cannot express an effect that the case has."""
-        for id in (id for id, value in case.case.effects.items() if value):
-            if not catalogue()[id].within(self.solver.capabilities):
-                raise DeckRefused(
-                    f"solver '{self.solver.name}' cannot express the effect '{id}';"
-                    " 'tyrecal effects' shows which one can"
-                )
-        for need, words in needs(case).items():
+    def refuse_lacking(self, design: Design) -> None:
+        """Raises DeckRefused where the solver cannot express what the design has."""
+        for need, lack in design.needs.items():
             if need not in self.solver.capabilities:
-                raise DeckRefused(
-                    f"solver '{self.solver.name}' cannot express {words};"
-                    f" 'tyrecal solvers' shows which one can ({need})"
-                )
+                raise DeckRefused(f"solver '{self.solver.name}' cannot express {lack}")
 
-    def _with(self, values: Mapping[str, float]) -> LoadedCase:
+    def _with(self, values: Mapping[str, float]) -> Design:
         try:
-            case = with_values(self.case, values)
+            design = self.design.at(values)
         except ValueError as error:  # no such tyre: the optimiser steps back from it
             raise EvaluationFailed("refused", str(error)) from None
-        self.needs_effects_of(case)
-        return case
+        self.refuse_lacking(design)
+        return design
 
     def _ask(self, decks: Decks, typed: Callable[[dict[str, Any], Path | None], T]) -> T:
         """The solver's answer, or the record's, ``typed``, which is told where a run that ended
@@ -179,11 +160,11 @@ class Door:
             solver.write(decks, folder)
             if self.store:
                 key = key_of(folder, solver)
-            answer = self._recall(key, with_effects(decks.case).case.pressure_kPa)
+            answer = self._recall(key, decks.design.pressure_kPa)
             if answer is not None:
                 result = typed(answer, None)
             else:
-                limit_s = decks.case.case.solver.time_limit_s * max(1, len(decks.loads_N))
+                limit_s = decks.design.solver.time_limit_s * max(1, len(decks.loads_N))
                 limit_s *= MODES_ON_TOP if decks.loaded_modes else 1
                 answer = self._run(folder, limit_s)
                 words = answer.get("failure", "")
@@ -245,17 +226,17 @@ class Door:
         return _not_refused(self._each("press", asked, jobs))
 
     def _each(self, ask: str, asked: Sequence[tuple[Any, ...]], jobs: int) -> Iterator[Any]:
-        self.heard(0, len(asked))
+        self.on_progress(0, len(asked))
         if len(asked) <= 1 or (jobs <= 1 and not self.scheduler):
             for done, arguments in enumerate(asked, start=1):
                 answer = _answer(self, ask, arguments)
-                self.heard(done, len(asked))
+                self.on_progress(done, len(asked))
                 yield answer
             return
         with executor(jobs, self.scheduler) as workers:
             answers = workers.each(partial(_answer_and_count, self.worker(), ask), asked)
             for done, answer in enumerate(in_order(answers), start=1):
-                self.heard(done, len(asked))
+                self.on_progress(done, len(asked))
                 if isinstance(answer, WorkerLost):
                     yield EvaluationFailed("crashed", str(answer))
                     continue
@@ -263,17 +244,17 @@ class Door:
                 self.counts.add(counts)
                 yield found
 
-    def worker(self) -> Door:
-        """The same door for another process, wherever it is, with counts of its own."""
+    def worker(self) -> Evaluator:
+        """The same for another process, wherever it is, with counts of its own."""
         folder = self.folder.absolute() if self.folder else None
-        return Door(
-            self.case, self.solver_name, folder, self.keep, self.store, command=self.command
+        return Evaluator(
+            self.design, self.solver_name, folder, self.keep, self.store, command=self.command
         )
 
-    def for_case(self, case: LoadedCase) -> Door:
-        """The same door, counts and listener too, for another case."""
+    def of(self, design: Design) -> Evaluator:
+        """The same, counts and listener too, for another tyre's designs."""
         other = self.worker()
-        other.case, other.counts, other.heard = case, self.counts, self.heard
+        other.design, other.counts, other.on_progress = design, self.counts, self.on_progress
         return other
 
     def _recall(self, key: str, pressure_kPa: float) -> dict[str, Any] | None:
@@ -318,10 +299,10 @@ class Door:
         return folders.keep(folder, outcome)
 
 
-def _answer(door: Door, ask: str, arguments: tuple[Any, ...]) -> Any:
-    """What the door's method ``ask`` returns, or the failure or refusal that it raises."""
+def _answer(evaluator: Evaluator, ask: str, arguments: tuple[Any, ...]) -> Any:
+    """What the evaluator's method ``ask`` returns, or the failure or refusal that it raises."""
     try:
-        return getattr(door, ask)(*arguments)
+        return getattr(evaluator, ask)(*arguments)
     except (EvaluationFailed, DeckRefused) as failure:
         return failure
 
@@ -334,5 +315,7 @@ def _not_refused(answers: Iterator[Any]) -> Iterator[Any]:
         yield answer
 
 
-def _answer_and_count(door: Door, ask: str, arguments: tuple[Any, ...]) -> tuple[Any, Counts]:
-    return _answer(door, ask, arguments), door.counts
+def _answer_and_count(
+    evaluator: Evaluator, ask: str, arguments: tuple[Any, ...]
+) -> tuple[Any, Counts]:
+    return _answer(evaluator, ask, arguments), evaluator.counts

@@ -1,4 +1,4 @@
-"""The door itself, with a stand-in behind it: what is kept, counted, told, limited and believed."""
+"""The evaluator with a stand-in's answers: what is kept, counted, told, limited and believed."""
 
 from __future__ import annotations
 
@@ -14,10 +14,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tyrecal.evaluate import door as door_module
+from tyrecal.deck.tyre_design import TyreDesign
+from tyrecal.evaluate import evaluator as door_module
 from tyrecal.evaluate import queue
 from tyrecal.evaluate.cluster import _at_worker
-from tyrecal.evaluate.door import Counts, Door, Question
+from tyrecal.evaluate.evaluator import Counts, Evaluator, Question
 from tyrecal.evaluate.executor import Here, WorkerLost
 from tyrecal.evaluate.failure import EvaluationFailed, SolverUnavailable
 from tyrecal.evaluate.folders import drop_unfinished
@@ -28,21 +29,21 @@ from tyrecal.evaluate.sources import sources
 from tyrecal.evaluate.store import Store
 
 from ..studies.hertz import Hertz
-from .stand_in import CASE, StandIn, ask, door
+from .stand_in import CASE, StandIn, ask, evaluator
 
 Edit = Callable[[dict[str, Any]], Any]
 
 
 def test_a_run_that_went_well_is_kept_where_that_is_asked(tmp_path: Path) -> None:
     """With a word on what came of it, as those of failures always are."""
-    asked = door(tmp_path)
+    asked = evaluator(tmp_path)
     ask(asked)
     assert not list((tmp_path / "runs").iterdir())
     asked.keep = True
     ask(asked, 2e6)
     (kept,) = (tmp_path / "runs").iterdir()
     assert (kept / "outcome.txt").read_text() == "finished\n" and (kept / "deck.inp").exists()
-    failing = door(tmp_path, StandIn("unstable"))
+    failing = evaluator(tmp_path, StandIn("unstable"))
     with pytest.raises(EvaluationFailed):
         ask(failing, 3e6)
     (other,) = set((tmp_path / "runs").iterdir()) - {kept}
@@ -54,7 +55,7 @@ def test_a_run_that_went_well_is_kept_where_that_is_asked(tmp_path: Path) -> Non
 
 def test_a_failure_without_a_folder_of_runs_leaves_none() -> None:
     with pytest.raises(EvaluationFailed) as failure:
-        Door(CASE, _solver=StandIn("crashed")).evaluate(Question({"C10": 1e6}))
+        Evaluator(TyreDesign(CASE), _solver=StandIn("crashed")).evaluate(Question({"C10": 1e6}))
     assert failure.value.folder is None
 
 
@@ -67,8 +68,8 @@ def test_a_record_names_a_folder_of_ours_or_none(tmp_path: Path, place: str) -> 
     if place != "gone":
         (at / "outcome.txt").write_text("failed")
     named = {"none": None, "a NUL": "a\0b"}.get(place, str(at))
-    assert door(tmp_path)._known(named) == (at if place == "here" else None)
-    assert Door(CASE)._known(str(at)) is None
+    assert evaluator(tmp_path)._known(named) == (at if place == "here" else None)
+    assert Evaluator(TyreDesign(CASE))._known(str(at)) is None
 
 
 def test_time_limits_grow_with_loads_and_modes(tmp_path: Path) -> None:
@@ -76,7 +77,7 @@ def test_time_limits_grow_with_loads_and_modes(tmp_path: Path) -> None:
     solver.capabilities = solver.capabilities | {"loaded_modes"}  # type: ignore[misc]
     limits: list[float] = []
     solver.run = lambda folder, limit: limits.append(limit)  # type: ignore[method-assign]
-    asked = Door(CASE, folder=tmp_path, _solver=solver)
+    asked = Evaluator(TyreDesign(CASE), folder=tmp_path, _solver=solver)
     one = CASE.case.solver.time_limit_s
     asked.press({}, [500.0, 900.0])
     with pytest.raises(EvaluationFailed, match="not 2 modes"):
@@ -84,15 +85,15 @@ def test_time_limits_grow_with_loads_and_modes(tmp_path: Path) -> None:
     assert limits == [2 * one, 6 * one]
     alone = StandIn()
     alone.run = lambda folder, limit: limits.append(limit)  # type: ignore[method-assign]
-    ask(door(tmp_path, alone))
+    ask(evaluator(tmp_path, alone))
     assert limits[2:] == [one]
 
 
 def test_a_record_of_another_pressure_is_not_this_ones(tmp_path: Path) -> None:
     """To a millionth."""
     for off, runs in ((0.9e-6, 0), (1.1e-6, 1)):
-        ask(door(tmp_path))
-        again = door(tmp_path)
+        ask(evaluator(tmp_path))
+        again = evaluator(tmp_path)
         read = again.store.read  # type: ignore[union-attr]
 
         def changed(key: str, off: float = off, read: Any = read) -> Any:
@@ -120,10 +121,10 @@ def test_of_several_questions_each_is_heard_counted_and_may_fail(
 
     monkeypatch.setattr(door_module, "executor", lambda *asked: nullcontext(Workers()))
     told: list[tuple[int, int]] = []
-    asked = replace(door(tmp_path), heard=lambda *done: told.append(done))
+    asked = replace(evaluator(tmp_path), on_progress=lambda *done: told.append(done))
 
-    def worker() -> Door:
-        other = Door.worker(asked)
+    def worker() -> Evaluator:
+        other = Evaluator.worker(asked)
         other._solver = asked.solver
         return other
 
@@ -141,13 +142,13 @@ def test_of_several_questions_each_is_heard_counted_and_may_fail(
 
 
 def test_a_worker_has_counts_of_its_own_another_case_has_not(tmp_path: Path) -> None:
-    asked = door(tmp_path)
+    asked = evaluator(tmp_path)
     asked.keep, asked.command, asked.scheduler = True, ("a",), "tcp://there"
     other = asked.worker()
     assert other.counts is not asked.counts and other.folder == asked.folder and other.keep
     assert other.store is asked.store and other.command == ("a",) and not other.scheduler
-    same = asked.for_case(CASE)
-    assert same.counts is asked.counts and same.heard is asked.heard
+    same = asked.of(TyreDesign(CASE))
+    assert same.counts is asked.counts and same.on_progress is asked.on_progress
 
 
 def footprint(load: float, **changes: Any) -> dict[str, Any]:

@@ -2,45 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from copy import deepcopy
-from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pydantic import ValidationError
 
-from ..effects import EffectRefused, with_effects
-from .calibration import cannot_fit
-from .checks import problems
-from .document import Document, read_document
+from ..case.calibration import cannot_fit
+from ..case.checks import problems
+from ..case.document import Document, read_document
+from ..case.loaded import LoadedCase
+from ..case.meshable import folds
+from ..case.mistakes import CaseError, Keys, Mistake, dotted
+from ..case.schema import Case
+from ..case.shape import disagreements, explain, without
+from ..case.stations import check_templates, read_stations
+from ..effects import EffectRefused
 from .guard import unusual
-from .meshable import folds
-from .mistakes import CaseError, Keys, Mistake, dotted
-from .schema import Case
-from .shape import disagreements, explain, without
-from .stations import check_templates, read_stations
-
-if TYPE_CHECKING:
-    from ..tyre.section import Section
-
-
-@dataclass(frozen=True)
-class LoadedCase:
-    """A valid case: typed (``case``), as plain data (``raw``), with its section and its place.
-
-    path: the case file; folder: where it lies, to which its own paths are relative;
-    file_pressure_kPa: the pressure in the file, whatever is set later; overrides: what the user
-    has set since, by name or path, for results to say.
-    """
-
-    case: Case
-    path: Path
-    section: Section
-    folder: Path
-    raw: dict[str, Any]
-    file_pressure_kPa: float | None = None
-    overrides: Mapping[str, float] = field(default_factory=dict)
+from .tyre import resolved
 
 
 def load_case(path: Path | str, allow_unusual: bool = False) -> LoadedCase:
@@ -88,7 +68,7 @@ def _read(path: Path, allow_unusual: bool) -> tuple[LoadedCase | None, list[Mist
         return None, sorted(document.mistakes, key=lambda m: (m.file != str(path), m.line))
     loaded = LoadedCase(case, path, section, path.parent, raw, case.pressure_kPa)
     try:
-        with_effects(loaded)
+        resolved(loaded)
     except EffectRefused as error:
         document.add(("effects", error.id), error.reason)
         return None, document.mistakes

@@ -5,54 +5,21 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import Any
 
-from ..case import LoadedCase
+from ..case import Case
 from ..case.analysis import Analysis
-from ..effects import with_effects
-from ..tyre.gauges import with_gauges
-from ..tyre.mesh import SectionMesh, build_mesh
-from ..tyre.section import Section
-from .beside import frequency_rubber, gas_material, wheel
-from .uneven import attached, turning
+from ..design import Tyre
+from ..tyre.mesh import SectionMesh
+from .nonuniform import attached, turning
+from .wheel_and_gas import frequency_rubber, gas_material, wheel
 
 REFERENCE_NODE, ROAD_NODE = 900001, 900002
 WELL_ELEMENT = 900001
 CLEARANCE = 0.05  # m from the section, not inflated, to the road
 
 
-def section_mesh(case: LoadedCase) -> SectionMesh:
-    """The mesh of a case's section at its chosen level (remembered while the case keeps it)."""
-    case = with_effects(case)
-    mesh, level = case.case.mesh, case.case.mesh.levels[case.case.mesh.level]
-    elements = tuple(level.elements[name] for name, _ in case.section.regions)
-    grading = tuple(level.grading) if level.grading else None
-    quadratic = mesh.element.startswith("CGAX8")
-    return _mesh(gauged_section(case), elements, tuple(level.rows), quadratic, grading)
-
-
-def gauged_section(case: LoadedCase) -> Section:
-    """The case's section with its gauges applied."""
-    gauges = case.case.section.gauges or []
-    return with_gauges(
-        case.section,
-        tuple((tuple(g.regions or ()), (g.between[0], g.between[1]), g.factor) for g in gauges),
-    )
-
-
-@lru_cache(maxsize=8)
-def _mesh(
-    section: Section,
-    elements: tuple[int, ...],
-    rows: tuple[int, ...],
-    quadratic: bool,
-    grading: tuple[float, ...] | None,
-) -> SectionMesh:
-    return build_mesh(section, list(elements), list(rows), quadratic, list(grading or ()) or None)
-
-
-def context(case: LoadedCase) -> dict[str, Any]:
+def context(tyre: Tyre) -> dict[str, Any]:
     """Names for the templates; the guide to own templates lists them."""
-    c = case.case
-    mesh = section_mesh(case)
+    c, mesh = tyre.case, tyre.mesh
     materials = [
         {"name": deck_name(name), **_material(material, c.analysis)}
         for name, material in c.materials.items()
@@ -78,10 +45,10 @@ def context(case: LoadedCase) -> dict[str, Any]:
             }
         )
     rows = tuple(c.mesh.levels[c.mesh.level].rows)
-    claims = solid_claims(case)
+    claims = solid_claims(c)
     point = c.rim.reference_point_m
     tables = _tables(
-        mesh, case.section.names, rows, claims, tuple(sets), (point.r, point.z), c.mesh.element
+        mesh, tyre.section.names, rows, claims, tuple(sets), (point.r, point.z), c.mesh.element
     )
     hourglass = None if mesh.quadratic else {"stiffness": c.mesh.hourglass_stiffness_Pa}
     return {
@@ -151,9 +118,9 @@ def _material(material: Any, analysis: Analysis) -> dict[str, Any]:
 Claims = tuple[tuple[tuple[str, ...], tuple[str, ...]], ...]
 
 
-def solid_claims(case: LoadedCase) -> Claims:
+def solid_claims(case: Case) -> Claims:
     """Per entry of ``solids``: the regions and the pair of lines it names, empty where none."""
-    return tuple((tuple(s.regions or ()), tuple(s.between or ())) for s in case.case.solids)
+    return tuple((tuple(s.regions or ()), tuple(s.between or ())) for s in case.solids)
 
 
 def claimed(

@@ -11,13 +11,14 @@ from dataclasses import replace
 from math import sqrt
 from typing import TYPE_CHECKING, Any
 
-from ..effects import IDS, catalogue
-from .calibration import MEASURED as SIGMAS
-from .checks import at, find
-from .meshable import Problems
-from .mistakes import Keys, dotted
-from .parts import number
-from .shape import entries, table
+from ..case.calibration import MEASURED as SIGMAS
+from ..case.checks import at, find
+from ..case.meshable import Problems
+from ..case.mistakes import Keys, dotted
+from ..case.parts import number
+from ..case.shape import entries, table
+from ..effects import catalogue
+from ..plugins import IDS
 from .usual import (
     BELT_ANGLE,
     CARCASS_ANGLE,

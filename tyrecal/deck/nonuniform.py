@@ -11,18 +11,13 @@ ELEMENT = 999_100_001  # beyond all that a revolve makes
 AXES = {"radial": 1, "lateral": 2, "tangential": 3}  # of the revolved tyre in the plane Theta = 0
 
 
-def uneven(c: Case) -> bool:
-    """Whether anything makes the tyre differ round its circumference."""
-    return bool(c.point_mass.mass_kg or c.splice.share or _springs(c))
-
-
 def attached(c: Case, mesh: SectionMesh) -> list[dict[str, Any]]:
     """Mass and spring elements on nodes of the tread: name, keyword, elements, lines of data."""
     groups: list[tuple[str, str, list[int], tuple[int, float] | None]] = []
     number = ELEMENT
     if c.point_mass.mass_kg:
         groups.append(("POINT_MASS", "MASS", _nodes(mesh, c.point_mass.z_m, 0.0), None))
-    for direction, stiffness in _springs(c).items():
+    for direction, stiffness in c.road_spring.stiffnesses.items():
         nodes = _nodes(mesh, 0.0, c.road_spring.width_m)
         groups.append((f"ROAD_{direction.upper()}", "SPRING", nodes, (AXES[direction], stiffness)))
     result = []
@@ -46,11 +41,6 @@ def turning(c: Case, sets: list[str]) -> dict[str, Any] | None:
     if not c.spin_rad_per_s:
         return None
     return {"omega": c.spin_rad_per_s, "omega2": c.spin_rad_per_s**2, "sets": sets}
-
-
-def _springs(c: Case) -> dict[str, float]:
-    values = {name: getattr(c.road_spring, f"{name}_N_per_m") for name in AXES}
-    return {name: value for name, value in values.items() if value}
 
 
 def _nodes(mesh: SectionMesh, z: float, width: float) -> list[int]:

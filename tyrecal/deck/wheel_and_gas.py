@@ -6,12 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from ..case import Case, LoadedCase
+from ..case import Case
 from ..case.analysis import Analysis
 from ..case.materials import Rubber
 from ..case.wheel import Rim
-from ..effects import with_effects
-from .uneven import uneven
+from ..design import Tyre
 
 ELEMENT = 999_000_001  # beyond all that a revolve makes
 LOWEST_HZ, SHIFT = 1.0, -100.0  # of a free wheel's modes: above its rigid motions; 1/s2
@@ -24,40 +23,16 @@ GASES = {  # specific gas constant (J/kg/K) and ratio of specific heats at 20 C
 }
 TABLE_HZ = np.geomspace(1.0, 1000.0, 13)
 
-# Capabilities that parts of a case ask of a solver, and what they are for, in words.
-WORDS = {
-    "spindle": "a rim that moves",
-    "frequency_modulus": "rubber whose modulus follows each mode's frequency",
-    "cavity": "the gas in the cavity",
-    "coupled": "a mass, a spring or a splice that couples harmonics",
-    "rotation": "a tyre that turns",
-}
 
-
-def needs(case: LoadedCase) -> dict[str, str]:
-    """What a solver must be able to do for a case with its effects, and what it is for."""
-    c = with_effects(case).case
-    asked = {
-        "spindle": c.rim.moves,
-        "frequency_modulus": bool(_following(c)),
-        "cavity": bool(c.cavity.share),
-        "coupled": uneven(c),
-        "rotation": bool(c.spin_rad_per_s),
-    }
-    return {need: WORDS[need] for need, there in asked.items() if there}
-
-
-def beside_the_deck(case: LoadedCase) -> dict[str, Any]:
+def aside(tyre: Tyre) -> dict[str, Any]:
     """What no deck of keywords says: which surfaces hold the gas, whose frequency counts."""
-    asked = needs(case)
     request: dict[str, Any] = {}
-    if "frequency_modulus" in asked:
+    if "frequency_modulus" in tyre.needs:
         request["own_frequency"] = True
-    if "cavity" in asked:
+    if "cavity" in tyre.needs:
         request["cavity"] = {"material": GAS, "surfaces": ["CAVITY", "WELL"]}
-    splice = with_effects(case).case.splice
-    if splice.share:
-        request["sector"] = {"job": "splice", "width_deg": splice.width_deg}
+    if tyre.case.splice.share:
+        request["sector"] = {"job": "splice", "width_deg": tyre.case.splice.width_deg}
     return request
 
 
@@ -106,11 +81,6 @@ def gas_material(case: Case) -> dict[str, Any] | None:
         "density": cavity.share * p / (R * (cavity.temperature_C + 273.15)),
         "bulk_modulus": cavity.share * gamma * p,
     }
-
-
-def _following(case: Case) -> list[Rubber]:
-    rubbers = [m for m in case.materials.values() if isinstance(m, Rubber)]
-    return [m for m in rubbers if m.frequency_exponent]
 
 
 def frequency_rubber(m: Rubber, analysis: Analysis) -> dict[str, Any]:

@@ -25,6 +25,16 @@ class RoadSpring(Part):
     tangential_N_per_m: NotNegative = 0.0
     width_m: Positive = 0.08
 
+    @property
+    def stiffnesses(self) -> dict[str, float]:
+        """Those that are there, N/m, by direction."""
+        named = {
+            "radial": self.radial_N_per_m,
+            "lateral": self.lateral_N_per_m,
+            "tangential": self.tangential_N_per_m,
+        }
+        return {direction: stiffness for direction, stiffness in named.items() if stiffness}
+
 
 class Splice(Part):
     """A sector about the angle 0 in which numbers of the case are larger by ``share`` of

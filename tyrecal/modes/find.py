@@ -1,0 +1,68 @@
+"""Labelled modes of designs: more are asked for where a wanted label is not among them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+from ..evaluate.evaluator import Evaluator, Question
+from ..evaluate.failure import DeckRefused, EvaluationFailed
+from ..evaluate.results import Evaluation
+from .label import paired_labels
+from .match import LostLabel, margin, match
+from .mode import Label, Mode
+
+MORE_MODES = (4, 8)  # per harmonic, where a label is not among the modes first asked for
+Wanted = Callable[[Sequence[Mode]], Sequence[Label]]
+
+
+@dataclass(frozen=True)
+class Found:
+    """An evaluated design with its modes by label."""
+
+    evaluation: Evaluation
+    modes: list[Mode]  # all of them, by rising frequency
+    wanted: dict[Label, Mode]
+
+    @property
+    def clarity(self) -> float:
+        """The smallest of the wanted modes', 0 (some label is a tie) to 1."""
+        return margin(self.wanted)
+
+
+Answer = Found | EvaluationFailed | DeckRefused
+
+
+def labelled(evaluation: Evaluation) -> list[Mode]:
+    """All modes with their labels, by rising frequency."""
+    return sorted(paired_labels(evaluation.modes), key=lambda mode: mode.frequency_Hz)
+
+
+def find_modes(
+    evaluator: Evaluator,
+    questions: Sequence[Question],
+    wanted: Sequence[Label] | Wanted,
+    jobs: int = 1,
+) -> Iterator[tuple[int, Answer]]:
+    """Place and answer of each question as they come, those without a wanted label at the end.
+
+    wanted: labels, or what tells them from the modes.
+    """
+    lost = dict.fromkeys(range(len(questions)), EvaluationFailed("lost_label", ""))
+    for count in (None, *MORE_MODES):
+        places, lost = list(lost), {}
+        asked = [replace(questions[place], modes_per_harmonic=count) for place in places]
+        answers = evaluator.answer_all(asked, min(jobs, len(asked)))
+        for place, answer in zip(places, answers, strict=True):
+            if not isinstance(answer, Evaluation):
+                yield place, answer
+                continue
+            modes = labelled(answer)
+            try:
+                labels = wanted(modes) if callable(wanted) else wanted
+                yield place, Found(answer, modes, match(modes, labels))
+            except LostLabel as error:
+                lost[place] = EvaluationFailed("lost_label", str(error))
+        if not lost:
+            break
+    yield from lost.items()
