@@ -19,19 +19,16 @@ NEAR = 0.25  # relative distance of modes whose labels could be taken for one an
 
 @dataclass(frozen=True)
 class Truth:
-    """One tyre. id: random; kind: effect, none or outside; law: id of the effect, or name of the
-    family outside the catalogue, "" for none; size: its parameter; variables, constants: by name,
-    constants in standard deviations; scatter: seed of noise, missing values and members; swapped:
-    two labels, or none."""
+    """One tyre."""
 
-    id: str
-    kind: str
-    law: str
-    size: float
+    id: str  # random
+    kind: str  # effect, none or outside
+    law: str  # id of the effect, or name of the family outside the catalogue, "" for none
+    size: float  # its parameter
     variables: dict[str, float]
-    constants: dict[str, float]
-    scatter: int
-    swapped: bool
+    constants: dict[str, float]  # in standard deviations
+    scatter: int  # seed of noise, missing values and members
+    swapped: bool  # two labels
 
 
 def draw(

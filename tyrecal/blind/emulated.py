@@ -14,11 +14,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations_with_replacement
-from math import prod
 
 import numpy as np
 from scipy.stats import qmc
 
+from ..diagnose.expansion import lagrange
 from ..diagnose.response import Answer, Point, Response, Span
 
 Array = np.ndarray
@@ -27,40 +27,38 @@ PLAIN_DEGREE, EFFECT_DEGREE, SOURCE_DEGREE = 4, 3, 2
 PLAIN_DESIGNS, EFFECT_DESIGNS, SOURCE_DESIGNS = 20, 10, 12
 ONE_SIDED, TWO_SIDED = (0.1, 0.4, 0.75, 1.0), (0.5, 1.0)
 SEED = 1
-REWEIGHTED, FAR, SMALL = 12, 2.0, 1e-5  # times; of medians; of ln f, what no model is good to
+REWEIGHTED = 12  # times
+HUBER, FLOOR = 2.0, 1e-5  # a weight falls beyond so many medians; of ln f, below any model
 
 
 @dataclass(frozen=True)
 class Polynomial:
-    """powers (k, v); coefficients (k, n)."""
+    """In the design variables t."""
 
-    powers: Array
-    coefficients: Array
+    powers: Array  # (k, v)
+    coefficients: Array  # (k, n)
 
     def at(self, t: Array) -> tuple[Array, Array]:
         """Values (n,) and slopes (n, v) at t (v,)."""
-        return monomials(self.powers, t) @ self.coefficients, (
-            slopes(self.powers, t) @ self.coefficients
-        ).T
+        slope = (slopes(self.powers, t) @ self.coefficients).T
+        return monomials(self.powers, t) @ self.coefficients, slope
 
 
 @dataclass(frozen=True)
-class Grown:
-    """An effect: nodes (k,), 0 left out; polynomials of what it adds at each, and of the split."""
+class EmulatedEffect:
+    """What an effect adds, by Lagrange between its nodes."""
 
-    nodes: Array
-    added: tuple[Polynomial, ...]
+    nodes: Array  # (k,) of the parameter, 0 left out
+    added: tuple[Polynomial, ...]  # at each
     split: tuple[Polynomial, ...]
 
     def at(self, e: float, t: Array) -> tuple[Array, Array, Array]:
         """Added eta (n,), slopes (n, v) by t, split (n,) at parameter e."""
-        weights = _lagrange(np.append(self.nodes, 0.0), e)[:-1]
-        found = [p.at(t) for p in self.added]
-        return (
-            sum(w * value for w, (value, _) in zip(weights, found, strict=True)),
-            sum(w * slope for w, (_, slope) in zip(weights, found, strict=True)),
-            sum(w * p.at(t)[0] for w, p in zip(weights, self.split, strict=True)),
-        )
+        weights = lagrange(np.append(self.nodes, 0.0), np.array([e]))[0, :-1]
+        values, tilts = zip(*(p.at(t) for p in self.added), strict=True)
+        splits = [p.at(t)[0] for p in self.split]
+        eta, slope, split = (np.tensordot(weights, part, 1) for part in (values, tilts, splits))
+        return eta, slope, split
 
 
 class Emulated:
@@ -70,13 +68,12 @@ class Emulated:
     def __init__(
         self,
         model: Response,
-        designs: Sequence[Array],
         reach: float,
         plain: Polynomial,
         constants: Polynomial,
-        effects: Mapping[str, Grown],
+        effects: Mapping[str, EmulatedEffect],
     ):
-        self.model, self.reach, self.designs = model, reach, designs
+        self.model, self.reach = model, reach
         self.variables, self.sources = model.variables, model.sources
         self.start, self.spread = model.start, model.spread
         self.spans: Mapping[str, Span] = {k: s for k, s in model.spans.items() if k in effects}
@@ -127,12 +124,12 @@ def emulate(model: Response, reach: float = REACH) -> Emulated:
         signs[sources],
         [plain[i].constants.ravel() for i in sources],  # type: ignore[union-attr]
     )
-    grown = {}
+    effects = {}
     for id, span in model.spans.items():
         found = _effect(model, id, span, signs, designs, plain, reach)
         if found is not None:
-            grown[id] = found
-    return Emulated(model, designs, reach, fitted, constants, grown)
+            effects[id] = found
+    return Emulated(model, reach, fitted, constants, effects)
 
 
 def monomial_powers(count: int, degree: int) -> Array:
@@ -151,12 +148,8 @@ def monomials(powers: Array, t: Array) -> Array:
 
 def slopes(powers: Array, t: Array) -> Array:
     """d q_k / d t (v, k)."""
-    rows = []
-    for i in range(len(t)):
-        lower = powers.copy()
-        lower[:, i] = np.maximum(lower[:, i] - 1, 0)
-        rows.append(powers[:, i] * monomials(lower, t))
-    return np.array(rows)
+    lower = [np.maximum(powers - unit, 0) for unit in np.eye(len(t), dtype=int)]
+    return np.array([p * monomials(low, t) for p, low in zip(powers.T, lower, strict=True)])
 
 
 def _effect(
@@ -167,7 +160,7 @@ def _effect(
     designs: Sequence[Array],
     plain: Sequence[Answer | Exception],
     reach: float,
-) -> Grown | None:
+) -> EmulatedEffect | None:
     powers = monomial_powers(len(signs[0]), EFFECT_DEGREE)
     chosen = [i for i in range(EFFECT_DESIGNS) if isinstance(plain[i], Answer)]
     nodes, added, split = [], [], []
@@ -186,7 +179,7 @@ def _effect(
         split.append(_values(monomial_powers(len(signs[0]), 1), where, [a.split for _, a in both]))
     if not nodes:
         return None
-    return Grown(np.array(nodes), tuple(added), tuple(split))
+    return EmulatedEffect(np.array(nodes), tuple(added), tuple(split))
 
 
 def _node_values(span: Span) -> list[float]:
@@ -203,27 +196,17 @@ def _fit(powers: Array, t: Array, answers: Sequence[Answer], reach: float) -> Po
     rows = [monomials(powers, each)[None] for each in t] + [slopes(powers, each) for each in t]
     values = [a.eta[None] for a in answers] + [reach * a.jacobian.T for a in answers]
     A, b = np.concatenate(rows), np.concatenate(values)
-    found = np.linalg.lstsq(A, b, rcond=None)[0]
+    found = np.linalg.lstsq(A, b, None)[0]
     for _ in range(REWEIGHTED):
         off = abs(b - A @ found)
-        scale = FAR * np.median(off, axis=0) + SMALL
+        scale = HUBER * np.median(off, axis=0) + FLOOR
         weights = np.sqrt(np.minimum(1.0, scale / np.maximum(off, scale)))
-        found = np.array(
-            [
-                np.linalg.lstsq(A * w[:, None], c * w, rcond=None)[0]
-                for w, c in zip(weights.T, b.T, strict=True)
-            ]
-        ).T
+        columns = zip(weights.T, b.T, strict=True)
+        found = np.array([np.linalg.lstsq(A * w[:, None], c * w, None)[0] for w, c in columns]).T
     return Polynomial(powers, found)
 
 
 def _values(powers: Array, t: Array, values: Sequence[Array]) -> Polynomial:
     rows = np.array([monomials(powers, each) for each in t])
-    found, *_ = np.linalg.lstsq(rows, np.array(values), rcond=None)
+    found, *_ = np.linalg.lstsq(rows, np.array(values), None)
     return Polynomial(powers, found)
-
-
-def _lagrange(nodes: Array, e: float) -> Array:
-    """Lagrange's polynomials of the nodes (k,) at e."""
-    others = [np.delete(nodes, k) for k in range(len(nodes))]
-    return np.array([prod((e - o) / (n - o)) for n, o in zip(nodes, others, strict=True)])

@@ -10,33 +10,24 @@ from ..files import json_text, write_text
 from ..files import read_json as read_file
 
 FILE = "protocol.json"
-KINDS = ("effect", "none", "outside")
 
 
 @dataclass(frozen=True)
 class Protocol:
-    """Numbers of a study; the standard deviations of constants are the case's `uncertainties`.
+    """Numbers of a study; the standard deviations of constants are the case's `uncertainties`."""
 
-    maker: who made the data, in words; case: the case file beside it; counts: trials by kind;
-    spread: design variables are the case's start times exp(U(-ln(1 + spread), ln(1 + spread)));
-    given_kPa, held_out_kPa: pressures; noise: relative, of every value; mass: relative, of the
-    weighed mass; split: standard deviation of every tyre's own relative split of a doublet, the
-    same at all pressures; missing: at most so many values a pressure; swapped: share of trials in
-    which two labels are exchanged; smallest: least size as a share of an effect's range.
-    """
-
-    maker: str
-    case: str
-    counts: dict[str, int]
-    spread: float = 0.4
+    maker: str  # who made the data, in words
+    case: str  # the case file beside it
+    counts: dict[str, int]  # trials by kind
+    spread: float = 0.4  # design variables: start exp(U(-ln(1 + spread), ln(1 + spread)))
     given_kPa: tuple[float, ...] = (160.0, 240.0, 320.0)
     held_out_kPa: float = 200.0
-    noise: float = 0.002
-    mass: float = 0.005
-    split: float = 0.003
-    missing: int = 2
-    swapped: float = 0.05
-    smallest: float = 0.2
+    noise: float = 0.002  # of every value, relative
+    mass: float = 0.005  # of the weighed mass, relative
+    split: float = 0.003  # of a doublet, relative: each tyre's own at all pressures
+    missing: int = 2  # values a pressure, at most
+    swapped: float = 0.05  # share of trials in which two labels are exchanged
+    smallest: float = 0.2  # least size, as a share of an effect's range
 
     @property
     def pressures_kPa(self) -> tuple[float, ...]:

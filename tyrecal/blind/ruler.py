@@ -6,7 +6,8 @@
 
 S, J and the catalogue's g_j come from the plain case at its start, J and g_j moved to the trial's
 own design to first order; g from the maker's runs with and without. Splits of pairs add
-((s - s_j) / tau)^2, tau^2 = 2 noise^2 + (the tyre's own split)^2.
+((s - s_j) / tau)^2, tau^2 = 2 noise^2 + (the tyre's own split)^2. Covariance and projection are
+written here again, not the diagnosis' own: a mistake of its would be one of its judge's.
 """
 
 from __future__ import annotations
@@ -38,12 +39,12 @@ ModelRow = tuple[Label | None, float]
 
 @dataclass(frozen=True)
 class Signature:
-    """An effect on all rows: sizes (k,), with 0; shift (k, n), tilt (k, n, v), split (k, n)."""
+    """An effect on all rows."""
 
-    sizes: Array
-    shift: Array
-    tilt: Array
-    split: Array
+    sizes: Array  # (k,) with 0
+    shift: Array  # (k, n)
+    tilt: Array  # (k, n, v)
+    split: Array  # (k, n)
 
     @cached_property
     def _weights(self) -> tuple[Array, Array]:
@@ -62,16 +63,15 @@ class Signature:
 
 @dataclass(frozen=True)
 class Ruler:
-    """rows: (label or None, kPa); x0 (v,); eta (n,), jacobian (n, v), hessian (n, v, v) there;
-    constants (n, k): change by one standard deviation of each; spread (v,): prior of ln x."""
+    """The plain case at its start x0, and the catalogue's effects there."""
 
     rows: tuple[ModelRow, ...]
-    x0: Array
-    spread: Array
-    eta: Array
-    jacobian: Array
-    hessian: Array
-    constants: Array
+    x0: Array  # (v,)
+    spread: Array  # (v,) prior of ln x
+    eta: Array  # (n,)
+    jacobian: Array  # (n, v)
+    hessian: Array  # (n, v, v)
+    constants: Array  # (n, k) change by one standard deviation of each
     signatures: Mapping[str, Signature]
 
     def sigma(
@@ -107,13 +107,12 @@ class Ruler:
 
 @dataclass(frozen=True)
 class Difficulty:
-    """lam: lambda; nearest: min_j delta_j^2 over other effects; group: the effect and those with
-    delta_j^2 < 9; equivalent: the catalogue's parameter that comes closest to the true effect."""
+    """How hard an effect is to see, and to tell from others."""
 
-    lam: float
-    nearest: float
-    group: tuple[str, ...]
-    equivalent: float | None
+    lam: float  # lambda
+    nearest: float  # min_j delta_j^2 over other effects
+    group: tuple[str, ...]  # the effect and those with delta_j^2 < 9
+    equivalent: float | None  # the catalogue's parameter that comes closest to the true effect
 
     @property
     def band(self) -> float:

@@ -28,29 +28,26 @@ Array = np.ndarray
 
 @dataclass(frozen=True)
 class Scored:
-    """A trial. truth: key that is true ("none", "outside" or an id); group: keys that count as
-    right; lam, band: lambda and min(lambda, min_j delta_j^2), 0 without an effect; ranked: keys by
-    falling probability; on_truth, on_group: probability; before, after: rms error held out, in ln
-    f; right parameter: whether its interval holds the equivalent one, None unless named."""
+    """A trial, its answer beside the truth."""
 
     id: str
     kind: str
     law: str
     size: float
     swapped: bool
-    truth: str
-    group: tuple[str, ...]
-    lam: float
-    band: float
+    truth: str  # the true key: "none", "outside" or an id
+    group: tuple[str, ...]  # keys that count as right
+    lam: float  # lambda, 0 without an effect
+    band: float  # min(lambda, min_j delta_j^2), likewise
     verdict: str
     named: str | None
-    ranked: tuple[str, ...]
+    ranked: tuple[str, ...]  # keys by falling probability
     probabilities: dict[str, float]
-    on_truth: float
+    on_truth: float  # probability
     on_group: float
     in_set: bool
-    parameter_held: bool | None
-    before: float
+    parameter_held: bool | None  # whether its interval holds the equivalent one; None: not named
+    before: float  # rms error held out, in ln f
     after: float
     baselines: dict[str, str]
 

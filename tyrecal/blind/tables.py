@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -118,14 +119,10 @@ def _baselines(trials: Sequence[Scored]) -> dict[str, Any]:
 
 def _confusion(trials: Sequence[Scored]) -> dict[str, dict[str, int]]:
     """How often each likeliest answer was given, by truth."""
-    table: dict[str, dict[str, int]] = {}
+    table: defaultdict[str, Counter[str]] = defaultdict(Counter)
     for t in trials:
-        row = table.setdefault(t.truth, {})
-        row[t.ranked[0]] = row.get(t.ranked[0], 0) + 1
-    return {
-        key: dict(sorted(row.items(), key=lambda item: -item[1]))
-        for key, row in sorted(table.items())
-    }
+        table[t.truth][t.ranked[0]] += 1
+    return {key: dict(row.most_common()) for key, row in sorted(table.items())}
 
 
 def _lines(f: dict[str, Any], maker: str) -> Iterator[str]:

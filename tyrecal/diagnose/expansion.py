@@ -50,7 +50,7 @@ class Nodes:
 
     def at(self, e: Array) -> tuple[Array, Array, Array]:
         """a (q, n), B (q, n, v) and split (q, n) at parameters (q,)."""
-        weights = _lagrange(self.values, e)
+        weights = lagrange(self.values, e)
         shift = weights @ self.shift
         tilt = np.einsum("qk,knv->qnv", weights, self.tilt)
         if self.anchor:
@@ -180,13 +180,13 @@ def _bent(plain: Expansion, span: Span, found: Mapping[float, Answer | Exception
         return []
     middles = (made.values[1:] + made.values[:-1]) / 2
     last = len(made.values) - 1 if made.reach[1] > 0 else 0  # without the farthest node
-    fewer = _lagrange(np.delete(made.values, last), middles) @ np.delete(made.shift, last, 0)
-    if abs(_lagrange(made.values, middles) @ made.shift - fewer).max() < MAX_LAST_TERM:
+    fewer = lagrange(np.delete(made.values, last), middles) @ np.delete(made.shift, last, 0)
+    if abs(lagrange(made.values, middles) @ made.shift - fewer).max() < MAX_LAST_TERM:
         return []
     return [e for e in made.reach if e]
 
 
-def _lagrange(nodes: Array, e: Array) -> Array:
+def lagrange(nodes: Array, e: Array) -> Array:
     """Lagrange's polynomials of the nodes (k,) at e (q,): (q, k)."""
     e = np.atleast_1d(e)[:, None]
     weights = np.ones((len(e), len(nodes)))
