@@ -32,7 +32,7 @@ from .evaluate.pressed import Pressed
 from .evaluate.store import Store
 from .files import read_json
 from .fit.calibrate import METHODS, Fit, calibrate
-from .modes.label import paired_labels
+from .modes.find import labelled
 from .modes.mode import Mode
 from .provenance import provenance, stamped
 from .studies.pressure import State
@@ -111,7 +111,7 @@ def evaluate_modes(
     '[0,0] axial 37.3 Hz'
     """
     answer = _evaluator(case, solver, record).evaluate(Question(_values(case, values)))
-    return sorted(paired_labels(answer.modes), key=lambda mode: mode.frequency_Hz)
+    return labelled(answer)
 
 
 def fit_case(

@@ -86,6 +86,20 @@ def test_fit_with_pictures(tmp_path: Path) -> None:
     assert "C10" not in json.loads((tmp_path / "fit.json").read_text())["variables"]
 
 
+def test_a_deck_that_the_solver_refuses(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """One sentence, and no folder: of rubber at a frequency, and of an option that is none."""
+    other = str(CASES / "205_60r15.yaml")
+    for case, more, why in (
+        (other, [], "analysis.vibration_frequency_Hz must be null"),
+        (CASE, ["--set", "analysis.sectors=8"], "analysis.sectors is 8, must be at least"),
+    ):
+        out = tmp_path / "out"
+        assert run("deck", case, "--solver", "calculix", "--output", str(out), *more) == 2
+        (told,) = capsys.readouterr().err.splitlines()
+        assert told.startswith("error: ") and why in told
+        assert not out.exists()
+
+
 def test_deck_runs_alone(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run("deck", CASE, "--output", str(tmp_path / "decks"), "--json") == 0
     paths = [Path(p) for p in json.loads(capsys.readouterr().out)]

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import log
 from typing import Protocol
 
 from ..case import LoadedCase
-from ..case.calibration import TargetMode, Targets
 from ..deck.tyre_design import TyreDesign
-from ..evaluate.evaluator import Evaluator
-from ..evaluate.failure import EvaluationFailed
+from ..evaluate.evaluator import Evaluator, Question
 from ..evaluate.store import Store
-from ..fit.problem import Problem
+from ..modes.find import Found, find_modes
 from ..modes.mode import Label
 from .laws import Frequencies, Law, catalogue_laws
 from .outside import FAMILIES
@@ -58,22 +56,15 @@ class SolverMaker:
 
     def compute(self, case: LoadedCase, labels: list[Label]) -> Computed:
         """Raises EvaluationFailed, also where a label is lost."""
-        targets = [
-            TargetMode(c=x.c, m=x.m, kind=x.kind, frequency_Hz=1.0)  # type: ignore[arg-type]
-            for x in labels
-        ]
-        wanted = {"targets": Targets(modes=targets), "variables": {}}
-        case = replace(case, case=case.case.model_copy(update=wanted))
         evaluator = Evaluator(TyreDesign(case), self.solver, store=self.store)
-        (found,) = Problem(case, evaluator).modes([{}])
-        if isinstance(found, EvaluationFailed):
+        ((_, found),) = find_modes(evaluator, [Question({})], labels)
+        if not isinstance(found, Found):
             raise found
-        evaluation, modes, _ = found
         ln_f = {}
         for label in labels:
-            low, high = modes[label].raw.members or (modes[label].frequency_Hz,) * 2
+            low, high = found.wanted[label].raw.members or (found.wanted[label].frequency_Hz,) * 2
             ln_f[label] = log(low), log(high)
-        return Computed(ln_f, log(evaluation.mass_kg))
+        return Computed(ln_f, log(found.evaluation.mass_kg))
 
 
 def bundled_maker(case: LoadedCase, store: Store | None = None) -> SolverMaker:

@@ -12,6 +12,7 @@ from ..case.schema import Rubber, Solid
 from ..deck.tyre_design import TyreDesign
 from ..evaluate.failure import EvaluationFailed
 from ..fit import problem as fit
+from ..modes.find import Found
 from .tyre_model import TyreModel
 
 Array = np.ndarray
@@ -47,21 +48,22 @@ def regions(model: TyreModel, x: Array) -> list[Region]:
     own = model.values(x)
     taken = {path: own[name] for name, v in case.case.variables.items() for path in v.sets}
     design = {**numbers, **taken}
-    found = problem.modes([{**design, "pressure_kPa": p} for p in model.pressures], tuple(numbers))
-    for each in found:
+    states = [{**design, "pressure_kPa": p} for p in model.pressures]
+    at: dict[float, Found] = {}
+    for pressure, each in zip(model.pressures, problem.modes(states, tuple(numbers)), strict=True):
         if isinstance(each, EvaluationFailed):
             raise each
-    at = dict(zip(model.pressures, found, strict=True))
+        at[pressure] = each
     result = []
     for material, name in parts.items():
         columns = np.zeros((2, len(model.rows)))
         for i, (label, pressure) in enumerate(model.rows):
             if label is None:
                 continue
-            evaluation, modes, _ = at[pressure]  # type: ignore[misc]
-            f, place = modes[label].frequency_Hz, modes[label].position
+            mode, gradients = at[pressure].wanted[label], at[pressure].evaluation.gradients
+            f, place = mode.frequency_Hz, mode.position
             for path in (p for p in numbers if p.startswith(f"materials.{material}.")):
-                slope = evaluation.gradients[path][place] * design[path] / f
+                slope = gradients[path][place] * design[path] / f
                 key = path.rpartition(".")[2]
                 sign = -1.0 if key == "D1_per_Pa" else 1.0
                 columns[int(key.startswith("density")), i] += sign * slope

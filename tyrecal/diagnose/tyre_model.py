@@ -14,8 +14,9 @@ from ..case.calibration import TargetMode, Targets
 from ..deck.tyre_design import TyreDesign
 from ..effects import catalogue
 from ..evaluate.evaluator import Evaluator
-from ..evaluate.failure import DeckRefused, EvaluationFailed
+from ..evaluate.failure import DeckRefused
 from ..fit import problem as fit
+from ..modes.find import Found, ModesAnswer
 from ..modes.mode import Label
 from .response import Answer, Point, Span
 from .uncertainties import EFFECTS, Source, unit_of, values_of
@@ -172,7 +173,7 @@ class TyreModel:
 
     def _modes(
         self, wanted: Sequence[tuple[dict[str, float], tuple[str, ...]]]
-    ) -> list[fit.Found | EvaluationFailed | DeckRefused]:
+    ) -> list[ModesAnswer]:
         self._fit.jobs = self.jobs if len(wanted) >= WORTH_A_POOL else 1
         # the longest first, so that the last ones end together
         order = sorted(range(len(wanted)), key=lambda i: -self._effort(wanted[i][0]))
@@ -188,26 +189,25 @@ class TyreModel:
         return int(any(catalogue()[id].needs for id in ids))
 
     def _answer(
-        self,
-        point: Point,
-        designs: list[dict[str, float]],
-        found: Sequence[fit.Found | EvaluationFailed | DeckRefused],
+        self, point: Point, designs: list[dict[str, float]], answers: Sequence[ModesAnswer]
     ) -> Answer | Exception:
-        for each in found:
+        found: list[Found] = []
+        for each in answers:
             if isinstance(each, DeckRefused) and not point.effects:
                 raise each
-            if isinstance(each, EvaluationFailed | DeckRefused):
+            if not isinstance(each, Found):
                 return each
+            found.append(each)
         at = dict(zip(self.pressures, zip(designs, found, strict=True), strict=True))
         eta, jacobian = np.zeros(len(self.rows)), np.zeros((len(self.rows), len(self.variables)))
         slopes, split = np.zeros((len(self.rows), len(self.found))), np.zeros(len(self.rows))
         for i, (label, pressure) in enumerate(self.rows):
             if label is None:
-                eta[i] = log(found[0][0].mass_kg)  # type: ignore[index]
+                eta[i] = log(found[0].evaluation.mass_kg)
                 jacobian[i], slopes[i] = self._mass_slopes(point.x)
                 continue
             design, answer = at[pressure]
-            evaluation, modes, _ = answer  # type: ignore[misc]
+            evaluation, modes = answer.evaluation, answer.wanted
             f, place = modes[label].frequency_Hz, modes[label].position
             eta[i] = log(f)
             if members := modes[label].raw.members:
@@ -240,11 +240,12 @@ class TyreModel:
                 steps = {k: s for k, s in source.steps.items() if not k.startswith(EFFECTS)}
                 steps.pop("pressure_kPa", None)
                 designs.append({**own, **{k: own[k] + s for k, s in steps.items()}})
-            found = self._modes([(design, ()) for design in designs])
-            for each in found:
-                if isinstance(each, EvaluationFailed | DeckRefused):
+            masses = []
+            for each in self._modes([(design, ()) for design in designs]):
+                if not isinstance(each, Found):
                     raise each
-            mass = np.array([each[0].mass_kg for each in found])  # type: ignore[index]
+                masses.append(each.evaluation.mass_kg)
+            mass = np.array(masses)
             count, ratio = len(x), mass[1:] / mass[0]
             rise = self._rise(x, x + MASS_STEP)
             self._mass = x, (ratio[:count] - 1) / rise, np.log(ratio[count:])

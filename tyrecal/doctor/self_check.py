@@ -31,7 +31,7 @@ def self_check(solver: str = "bundled") -> dict[str, Any]:
     from ..design import load_case
     from ..evaluate.evaluator import Evaluator, Question
     from ..evaluate.failure import DeckRefused, EvaluationFailed, SolverUnavailable
-    from ..modes.label import paired_labels
+    from ..modes.find import labelled
 
     started = time.monotonic()
     tolerance = TOLERANCE_PERCENT.get(solver, OTHERS_PERCENT)
@@ -45,7 +45,7 @@ def self_check(solver: str = "bundled") -> dict[str, Any]:
     }
     try:
         answer = Evaluator(TyreDesign(load_case(CASE)), solver).evaluate(Question({}))
-        hertz = {str(m.label): m.frequency_Hz for m in paired_labels(answer.modes)}
+        hertz = {str(m.label): m.frequency_Hz for m in labelled(answer)}
         found["mass_kg"] = answer.mass_kg
         found["modes"] = [
             {

@@ -22,17 +22,13 @@ import numpy as np
 from ..case import LoadedCase
 from ..evaluate.evaluator import Evaluator, Question
 from ..evaluate.failure import DeckRefused, EvaluationFailed, SolverUnavailable
-from ..evaluate.results import Evaluation
-from ..modes.label import paired_labels
-from ..modes.match import LostLabel, margin, match
+from ..modes.find import Found, ModesAnswer, find_modes
 from ..modes.mode import Label, Mode
 from .differences import STEP, differences
 from .footprint import PRESS_STEP, STEEPEST, press, read_footprint_targets
 from .variable import read_variable
 
 Array = np.ndarray
-MORE_MODES = (4, 8)  # per harmonic, when a label is not among the modes first asked for
-Found = tuple[Evaluation, dict[Label, Mode], float]
 
 
 @dataclass(frozen=True)
@@ -164,11 +160,11 @@ class Problem:
         (answer,) = self.modes([values], names if exact else ())
         if isinstance(answer, EvaluationFailed):
             raise answer
-        evaluation, modes, clarity = answer
+        modes, gradients = answer.wanted, answer.evaluation.gradients
         order = [modes[t.label] for t in self.targets]
         frequencies = np.array([m.frequency_Hz for m in order])
         if exact:
-            slopes = np.array([[evaluation.gradients[n][m.position] for n in names] for m in order])
+            slopes = np.array([[gradients[n][m.position] for n in names] for m in order])
             slopes = slopes.reshape(len(order), len(names))
             slopes *= [v.slope(values[v.name]) for v in self.variables]
         else:
@@ -190,8 +186,8 @@ class Problem:
             self.scale * (np.concatenate([frequencies, pressed]) - wanted),
             self.scale[:, None] * slopes,
             modes,
-            clarity,
-            evaluation.mass_kg,
+            answer.clarity,
+            answer.evaluation.mass_kg,
             pressed,
             float(np.linalg.norm(self.scale[len(order) :] * pressed * shares)),
         )
@@ -204,15 +200,12 @@ class Problem:
             if isinstance(answer, EvaluationFailed):
                 yield answer
             else:
-                yield np.array([answer[1][t.label].frequency_Hz for t in self.targets])
+                yield np.array([answer.wanted[t.label].frequency_Hz for t in self.targets])
 
     def modes(
         self, designs: Sequence[Mapping[str, float]], names: tuple[str, ...] = ()
     ) -> list[Found | EvaluationFailed]:
-        """Of each design its evaluation, target modes and margin, or its failure.
-
-        Raises DeckRefused.
-        """
+        """Of each design its target modes, or its failure. Raises DeckRefused."""
         found: list[Found | EvaluationFailed] = []
         for answer in self.modes_of([(design, names) for design in designs]):
             if isinstance(answer, DeckRefused):
@@ -222,28 +215,12 @@ class Problem:
 
     def modes_of(
         self, wanted: Sequence[tuple[Mapping[str, float], tuple[str, ...]]]
-    ) -> list[Found | EvaluationFailed | DeckRefused]:
+    ) -> list[ModesAnswer]:
         """`modes` of designs, each with the names of its own slopes, refusals among them."""
         labels = [t.label for t in self.targets]
-        answers: dict[int, Found | EvaluationFailed | DeckRefused] = {}
-        waiting = list(range(len(wanted)))
-        for count in (None, *MORE_MODES):
-            asked, waiting = waiting, []
-            questions = [Question(*wanted[i], count) for i in asked]
-            jobs = min(self.jobs, len(asked))
-            for i, answer in zip(asked, self.evaluator.answer_all(questions, jobs), strict=True):
-                if isinstance(answer, EvaluationFailed | DeckRefused):
-                    answers[i] = answer
-                    continue
-                try:
-                    found = match(paired_labels(answer.modes), labels)
-                    answers[i] = answer, found, margin(found)
-                except LostLabel as lost:
-                    answers[i] = EvaluationFailed("lost_label", str(lost))
-                    waiting.append(i)
-            if not waiting:
-                break
-        return [answers[i] for i in range(len(wanted))]
+        questions = [Question(*each) for each in wanted]
+        answers = dict(find_modes(self.evaluator, questions, labels, self.jobs))
+        return [answers[place] for place in range(len(wanted))]
 
 
 def objective_unit(case: LoadedCase) -> str:

@@ -21,7 +21,7 @@ class Found:
     """An evaluated design with its modes by label."""
 
     evaluation: Evaluation
-    modes: list[Mode]  # all of them, by rising frequency
+    modes: list[Mode]  # all of them, harmonic by harmonic
     wanted: dict[Label, Mode]
 
     @property
@@ -30,7 +30,7 @@ class Found:
         return margin(self.wanted)
 
 
-Answer = Found | EvaluationFailed | DeckRefused
+ModesAnswer = Found | EvaluationFailed | DeckRefused
 
 
 def labelled(evaluation: Evaluation) -> list[Mode]:
@@ -43,7 +43,7 @@ def find_modes(
     questions: Sequence[Question],
     wanted: Sequence[Label] | Wanted,
     jobs: int = 1,
-) -> Iterator[tuple[int, Answer]]:
+) -> Iterator[tuple[int, ModesAnswer]]:
     """Place and answer of each question as they come, those without a wanted label at the end.
 
     wanted: labels, or what tells them from the modes.
@@ -57,7 +57,7 @@ def find_modes(
             if not isinstance(answer, Evaluation):
                 yield place, answer
                 continue
-            modes = labelled(answer)
+            modes = paired_labels(answer.modes)
             try:
                 labels = wanted(modes) if callable(wanted) else wanted
                 yield place, Found(answer, modes, match(modes, labels))

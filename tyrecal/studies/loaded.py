@@ -9,13 +9,11 @@ import numpy as np
 
 from ..case import LoadedCase
 from ..evaluate.evaluator import Evaluator, Question
-from ..evaluate.failure import EvaluationFailed
+from ..evaluate.failure import DeckRefused, EvaluationFailed
 from ..evaluate.pressed import Pressed
-from ..evaluate.results import Evaluation
-from ..fit.problem import MORE_MODES, read_targets
-from ..modes.label import paired_labels
+from ..fit.problem import read_targets
+from ..modes.find import Found, find_modes
 from ..modes.loaded import Member, Rings, follow, members, rings, state
-from ..modes.match import LostLabel, match
 from ..modes.mode import Label, Mode
 
 FURTHER = 3  # harmonics beyond the case's that may stand among its modes
@@ -115,40 +113,30 @@ def _count(case: LoadedCase) -> int:
 
 def _unloaded(
     case: LoadedCase, evaluator: Evaluator, values: Mapping[str, float]
-) -> Evaluation | EvaluationFailed:
+) -> Found | EvaluationFailed:
     """The unloaded tyre's modes with a few harmonics more, the wanted ones surely among them."""
     highest = case.case.analysis.highest_harmonic + FURTHER
-    lost = ""
-    for count in (None, *MORE_MODES):
-        question = Question({**values, "analysis.highest_harmonic": highest}, (), count)
-        try:
-            found = evaluator.evaluate(question)
-            modes = paired_labels(found.modes)
-            match(modes, _wanted(case, modes))
-        except EvaluationFailed as failure:
-            return failure
-        except LostLabel as error:
-            lost = str(error)
-            continue
-        return found
-    return EvaluationFailed("lost_label", lost)
+    question = Question({**values, "analysis.highest_harmonic": highest})
+    ((_, found),) = find_modes(evaluator, [question], lambda modes: _wanted(case, modes))
+    if isinstance(found, DeckRefused):
+        raise found
+    return found
 
 
 def _loaded_tyre(
-    case: LoadedCase, evaluation: Evaluation, pressed: Pressed | EvaluationFailed, with_zero: bool
+    case: LoadedCase, unloaded: Found, pressed: Pressed | EvaluationFailed, with_zero: bool
 ) -> Outcome:
     if isinstance(pressed, EvaluationFailed):
         return pressed
     first = pressed.footprints[0]
     assert first.mode_node is not None
     where = rings(pressed.angles, first.mode_node, pressed.nodes, pressed.points)
-    modes = paired_labels(evaluation.modes)
-    wanted = set(_wanted(case, modes))
+    wanted = set(unloaded.wanted)
     hertz_there = [f.mode_frequency_Hz for f in pressed.footprints]
     highest = max(float(f.max()) for f in hertz_there if f is not None)
     shapes: dict[Member, np.ndarray] = {}
     hertz: dict[Member, float] = {}
-    for mode in modes:
+    for mode in unloaded.modes:
         if mode.label in wanted or mode.frequency_Hz < NEAR * highest:
             shapes |= (both := members(mode, where))
             hertz |= dict.fromkeys(both, mode.frequency_Hz)

@@ -7,7 +7,7 @@ from typing import Any
 
 from ..case import LoadedCase
 from ..evaluate.results import Evaluation
-from ..modes.label import paired_labels
+from ..modes.find import labelled
 from ..modes.mode import Mode
 
 
@@ -15,7 +15,7 @@ def modes_result(
     case: LoadedCase, values: Mapping[str, float], evaluation: Evaluation
 ) -> tuple[dict[str, Any], list[Mode]]:
     """The content of modes.json, and the labelled modes, both by rising frequency."""
-    modes = sorted(paired_labels(evaluation.modes), key=lambda mode: mode.frequency_Hz)
+    modes = labelled(evaluation)
     result = {
         "format": 1,
         "pressure_kPa": evaluation.pressure_kPa,

@@ -7,11 +7,9 @@ from dataclasses import dataclass
 
 from ..case import LoadedCase
 from ..evaluate.evaluator import Evaluator, Question
-from ..evaluate.failure import EvaluationFailed
-from ..evaluate.results import Evaluation
-from ..fit.problem import MORE_MODES, read_targets
-from ..modes.label import paired_labels
-from ..modes.match import LostLabel, match
+from ..evaluate.failure import DeckRefused, EvaluationFailed
+from ..fit.problem import read_targets
+from ..modes.find import Found, find_modes, labelled
 from ..modes.mode import Label, Mode
 from .fitted import pressure_name
 
@@ -61,40 +59,24 @@ def sweep(
     name = pressure_name(case)
     wanted = [target.label for target in read_targets(case)]
     gradients = (name,) if evaluator.has_gradients else ()
-    places = waiting = [(design, p) for design in designs for p in pressures_kPa]
-    outcomes: dict[tuple[str, float], Outcome] = {}
-    for count in (None, *MORE_MODES):
-        if not waiting:
-            break
-        questions = [Question({**designs[d], name: p}, gradients, count) for d, p in waiting]
-        lost = []
-        for place, answer in zip(waiting, evaluator.evaluate_all(questions, jobs), strict=True):
-            outcomes[place] = outcome = _outcome(*place, answer, name, wanted)
-            if isinstance(outcome, Failure) and outcome.failed.cause == "lost_label":
-                lost.append(place)
-            else:
-                notify(outcome)
-        waiting = lost
-    for place in waiting:
-        notify(outcomes[place])
-    return [outcomes[place] for place in places]
+    places = [(design, p) for design in designs for p in pressures_kPa]
+    questions = [Question({**designs[design], name: p}, gradients) for design, p in places]
+    outcomes: dict[int, Outcome] = {}
+    for i, answer in find_modes(evaluator, questions, wanted, jobs):
+        if isinstance(answer, DeckRefused):
+            raise answer
+        outcomes[i] = _outcome(*places[i], answer, name)
+        notify(outcomes[i])
+    return [outcomes[i] for i in range(len(places))]
 
 
 def _outcome(
-    design: str,
-    pressure_kPa: float,
-    answer: Evaluation | EvaluationFailed,
-    name: str,
-    wanted: Sequence[Label],
+    design: str, pressure_kPa: float, answer: Found | EvaluationFailed, name: str
 ) -> Outcome:
     if isinstance(answer, EvaluationFailed):
         return Failure(design, pressure_kPa, answer)
-    modes = sorted(paired_labels(answer.modes), key=lambda mode: mode.frequency_Hz)
-    try:
-        match(modes, wanted)
-    except LostLabel as lost:
-        return Failure(design, pressure_kPa, EvaluationFailed("lost_label", str(lost)))
-    gradient = answer.gradients.get(name)
+    modes = labelled(answer.evaluation)
+    gradient = answer.evaluation.gradients.get(name)
     exact = None
     if gradient is not None:
         scale = {m.label: pressure_kPa / m.frequency_Hz for m in modes}

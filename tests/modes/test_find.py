@@ -1,0 +1,73 @@
+"""Labelled modes of designs: a label that is not among the first modes is asked for again."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from tyrecal.evaluate.evaluator import Question
+from tyrecal.evaluate.failure import DeckRefused, EvaluationFailed
+from tyrecal.modes.find import MORE_MODES, Found, find_modes, labelled
+
+from ..fit.fake import LABELS, FakeEvaluator
+from ..fit.test_calibration import POWERS, START, TARGETS
+
+
+class FewModes(FakeEvaluator):
+    """Gives the last mode only where as many as ``enough`` are asked for."""
+
+    enough: int | None = None
+
+    def evaluate(self, question: Question):
+        evaluation = super().evaluate(question)
+        self.asked = [*getattr(self, "asked", []), question.modes_per_harmonic]
+        if question.values["C10"] > START["C10"]:
+            raise DeckRefused("too stiff")
+        if self.enough and (question.modes_per_harmonic or 0) < self.enough:
+            return replace(evaluation, modes=evaluation.modes[:-1])
+        return evaluation
+
+
+@pytest.mark.parametrize("enough", [None, *MORE_MODES, 99])
+def test_a_lost_label_is_asked_for_with_more_modes(enough: int | None) -> None:
+    evaluator = FewModes(TARGETS, POWERS, START)
+    evaluator.enough = enough
+    ((place, found),) = find_modes(evaluator, [Question(START)], [LABELS[-1]])
+    assert place == 0
+    wanted = [None, *MORE_MODES]
+    assert evaluator.asked == wanted[: wanted.index(enough) + 1 if enough in wanted else None]
+    if enough == 99:
+        assert isinstance(found, EvaluationFailed) and found.cause == "lost_label"
+        assert str(LABELS[-1]) in str(found)
+    else:
+        assert isinstance(found, Found) and list(found.wanted) == [LABELS[-1]]
+        assert len(found.modes) == len(LABELS) and 0 < found.clarity <= 1
+
+
+def test_each_has_its_place_those_that_wait_the_last_ones() -> None:
+    """Refusals and failures are answers too, and cost no other question anything."""
+    evaluator = FewModes(TARGETS, POWERS, START, lambda values: values["C10"] < START["C10"])
+    evaluator.enough = 4
+    soft, stiff = ({**START, "C10": START["C10"] * factor} for factor in (0.5, 2.0))
+    # the plain one alone wants the mode that is not there at first
+    told = list(
+        find_modes(evaluator, [Question(START), Question(soft), Question(stiff)], [LABELS[-1]])
+    )
+    assert [place for place, _ in told] == [1, 2, 0]
+    kinds = [type(answer) for _, answer in told]
+    assert kinds == [EvaluationFailed, DeckRefused, Found]
+
+
+def test_labels_may_hang_on_the_modes() -> None:
+    evaluator = FakeEvaluator(TARGETS, POWERS, START)
+    ((_, found),) = find_modes(
+        evaluator, [Question(START)], lambda modes: [m.label for m in modes if m.label.c == 2]
+    )
+    assert isinstance(found, Found) and set(found.wanted) == {x for x in LABELS if x.c == 2}
+
+
+def test_modes_rise_in_frequency() -> None:
+    evaluator = FakeEvaluator(TARGETS, POWERS, START)
+    hertz = [mode.frequency_Hz for mode in labelled(evaluator.evaluate(Question(START)))]
+    assert hertz == sorted(hertz) and len(hertz) == len(LABELS)
