@@ -3,134 +3,130 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from .deck.keywords import DataLine
 from .deck.steps import DeckStep, Tangent
-from .modes import sensitivity
 from .modes.bordered import Bordered
 from .modes.frequency_dependent import SelfConsistent
 from .modes.harmonics import HarmonicModes, HasModes, SeededTyre, Vibration, lowest_of_all
 from .modes.inflated import Inflated
+from .modes.sensitivity import ModeShapes, RimAndAir, eigenvalue_rates, state_rate
 from .nonuniform.select import is_nonuniform, nonuniform_modes
-from .section.band import Cholesky, Numbering
+from .section.band import Cholesky
 from .section.boundary import numbering
 from .section.loads import pressures, spin, turning
-from .section.model import build
+from .section.model import Model, build
 
 Array = np.ndarray
 
 
-def frequency_step(
-    tyre: Inflated, place: int, step: DeckStep
-) -> tuple[list[HarmonicModes], dict[str, list[Array]]]:
-    """Modes by harmonic, and d lambda / d variable by variable and harmonic.
+class FrequencyStep:
+    """A step of the tyre; ``place``: its own among all of the deck.
 
-    place: of the step among all of the deck. Raises DeckError, Unstable, NotConverged,
-    NotSelfConsistent, InflationFailed.
+    Raises DeckError, Unstable, NotConverged, NotSelfConsistent, InflationFailed.
     """
-    procedure = step.procedure
-    dynamic_Hz = procedure.number("PROPERTY EVALUATION")
-    row = procedure.rows[0] if procedure.rows else DataLine(procedure.line, [])
-    shift = float(np.real(row.number(3, 0.0))) * (2 * np.pi) ** 2
-    own = tyre.request.own_frequency
-    model = turning(tyre.models(dynamic_Hz, step.long_term, own), step)
-    equations = numbering(model, step)
-    wheel, air = tyre.wheel_and_cavity(model, step)
-    vibration = Vibration(
-        model,
-        tyre.U,
-        pressures(model, step),
-        equations,
-        shift,
-        wheel,
-        air,
-        float(np.real(row.number(1, 0.0))),
-    )
-    factor = vibration.factor(0)
-    solver: HasModes = vibration
-    if model.tables:
-        solver = SelfConsistent(vibration, model.tables)
-    modes = _modes(tyre, step, row, solver, factor)
-    if row.text(2):
-        modes = [m.below(float(np.real(row.number(2)))) for m in modes]
-    rates: dict[str, list[Array]] = {}
-    if tyre.request.sensitivities:
-        newton = factor.tyre if isinstance(factor, Bordered) else factor
-        if dynamic_Hz is not None or shift:
-            still = turning(tyre.models(None, step.long_term, False), step)  # Newton's tangent
-            plain = Vibration(still, tyre.U, pressures(still, step), equations, 0.0).factor(0)
-            newton = plain.tyre if isinstance(plain, Bordered) else plain
-        fields, eigenvalues = _asked(modes)
-        for variable, tangents in tyre.request.sensitivities.items():
-            rates[variable] = _rates(
-                tyre, tangents, place, dynamic_Hz, newton, equations, modes, fields, eigenvalues
-            )
-    return modes, rates
+
+    def __init__(self, tyre: Inflated, place: int, step: DeckStep):
+        self.tyre, self.place, self.step = tyre, place, step
+        self.dynamic_Hz = step.procedure.number("PROPERTY EVALUATION")
+        # how many modes, the lowest and the highest frequency, the shift in cycles squared
+        rows = step.procedure.rows
+        self.row = rows[0] if rows else DataLine(step.procedure.line, [])
+        self.model = _model(tyre, step, self.dynamic_Hz, tyre.request.own_frequency)
+        self.equations = numbering(self.model, step)
+        self.vibration = Vibration(
+            self.model,
+            tyre.U,
+            pressures(self.model, step),
+            self.equations,
+            self.row.real(3, 0.0) * (2 * np.pi) ** 2,
+            *tyre.wheel_and_cavity(self.model, step),
+            lowest_Hz=self.row.real(1, 0.0),
+        )
+        self.factor = self.vibration.factor(0)
+
+    def modes(self) -> list[HarmonicModes]:
+        """By harmonic."""
+        solver: HasModes = self.vibration
+        if self.model.tables:
+            solver = SelfConsistent(self.vibration, self.model.tables)
+        modes = self._modes(solver)
+        return [m.below(self.row.real(2)) for m in modes] if self.row.text(2) else modes
+
+    def _modes(self, solver: HasModes) -> list[HarmonicModes]:
+        tyre, step = self.tyre, self.step
+        harmonics = tyre.request.harmonics if step.revolved else [0]
+        count, nonuniform = tyre.request.modes_per_harmonic, is_nonuniform(tyre, step)
+        if harmonics is None:
+            lowest = lowest_of_all(solver, self.row.integer(0), tyre.check)
+            if not nonuniform:
+                return lowest
+            harmonics, count = [m.n for m in lowest], max(len(m.eigenvalues) for m in lowest)
+        if nonuniform:
+            return nonuniform_modes(tyre, step, solver, harmonics, count)
+        modes = []
+        for n in harmonics:
+            tyre.check()
+            modes.append(solver.modes(n, count, None if n else self.factor))
+        return modes
+
+    def rates(self, modes: list[HarmonicModes]) -> dict[str, list[Array]]:
+        """d lambda / d variable by variable and harmonic."""
+        asked = self.tyre.request.sensitivities
+        if not asked:
+            return {}
+        forms = [m.forms() for m in modes]
+        n, shapes, owner, eigenvalues = (np.concatenate(x) for x in zip(*forms, strict=True))
+        before = np.cumsum([0, *(len(values) for *_, values in forms[:-1])])
+        owner += np.repeat(before, [len(own) for _, _, own, _ in forms])
+        fields, newton = ModeShapes(n, shapes, owner), self._newton()
+        return {
+            v: self._rates(rows, newton, modes, fields, eigenvalues) for v, rows in asked.items()
+        }
+
+    def _newton(self) -> Cholesky:
+        """The factor of Newton's tangent at the inflated state."""
+        factor = self.factor
+        if self.dynamic_Hz is not None or self.vibration.shift:
+            still = _model(self.tyre, self.step, None, False)
+            loads = pressures(still, self.step)
+            factor = Vibration(still, self.tyre.U, loads, self.equations, 0.0).factor(0)
+        return factor.tyre if isinstance(factor, Bordered) else factor
+
+    def _rates(
+        self,
+        tangents: list[Tangent],
+        newton: Cholesky,
+        modes: list[HarmonicModes],
+        fields: ModeShapes,
+        eigenvalues: Array,
+    ) -> list[Array]:
+        """Per harmonic, with the deck's numbers carrying the variable's tangent."""
+        section, revolve, steps = self.tyre.deck.read(tangents)
+        models = partial(build, section)
+        seeded = replace(self.tyre, section=section, revolve=revolve, models=models)
+        step, U, own = steps[self.place], seeded.U, seeded.request.own_frequency
+        still = moving = _model(seeded, step, None, False)
+        V = state_rate(still, U, pressures(still, step), self.equations, newton)
+        if self.dynamic_Hz is not None or own:
+            moving = _model(seeded, step, self.dynamic_Hz, own)
+        wheel, air = seeded.wheel_and_cavity(moving, step)
+        rim_and_air = None
+        if wheel or air:
+            rim, flow = [q for m in modes for q in m.rim], [w for m in modes for w in m.air]
+            rim_and_air = RimAndAir(wheel, air, rim, flow)
+        loads = pressures(moving, step)
+        forms = eigenvalue_rates(moving, U, V, loads, fields, eigenvalues, rim_and_air)
+        tyre = SeededTyre(moving, spin(self.tyre.model, step), seeded.attached())
+        each = np.split(forms, np.cumsum([len(m.eigenvalues) for m in modes])[:-1])
+        return [
+            m.combination.rates(its, tyre) if m.combination else its
+            for m, its in zip(modes, each, strict=True)
+        ]
 
 
-def _modes(
-    tyre: Inflated, step: DeckStep, row: DataLine, vibration: HasModes, factor: Cholesky | Bordered
-) -> list[HarmonicModes]:
-    harmonics = tyre.request.harmonics if step.revolved else [0]
-    count = tyre.request.modes_per_harmonic
-    uneven = is_nonuniform(tyre, step)
-    if harmonics is None:
-        lowest = lowest_of_all(vibration, row.integer(0), tyre.check)
-        if not uneven:
-            return lowest
-        harmonics, count = [m.n for m in lowest], max(len(m.eigenvalues) for m in lowest)
-    if uneven:
-        return nonuniform_modes(tyre, step, vibration, harmonics, count)
-    modes = []
-    for n in harmonics:
-        tyre.check()
-        known = factor if n == 0 else None
-        modes.append(vibration.modes(n, count, known))
-    return modes
-
-
-def _asked(modes: list[HarmonicModes]) -> tuple[sensitivity.ModeShapes, Array]:
-    """The fields and the eigenvalues whose derivatives are asked for."""
-    forms = [m.forms() for m in modes]
-    n, shapes, owner, eigenvalues = (np.concatenate(x) for x in zip(*forms, strict=True))
-    before = np.cumsum([0, *(len(values) for *_, values in forms[:-1])])
-    owner += np.repeat(before, [len(own) for _, _, own, _ in forms])
-    return sensitivity.ModeShapes(n, shapes, owner), eigenvalues
-
-
-def _rates(
-    tyre: Inflated,
-    tangents: list[Tangent],
-    place: int,
-    dynamic_Hz: float | None,
-    factor: Cholesky,
-    equations: Numbering,
-    modes: list[HarmonicModes],
-    fields: sensitivity.ModeShapes,
-    eigenvalues: Array,
-) -> list[Array]:
-    """d lambda / d variable per harmonic, with the deck's numbers carrying its tangent."""
-    section, revolve, steps = tyre.deck.read(tangents)
-    seeded = replace(tyre, section=section, revolve=revolve)
-    step, own = steps[place], tyre.request.own_frequency
-    still = turning(build(section, None, step.long_term), step)
-    V = sensitivity.state_rate(still, tyre.U, pressures(still, step), equations, factor)
-    moving = still
-    if dynamic_Hz is not None or own:
-        moving = turning(build(section, dynamic_Hz, step.long_term, own), step)
-    wheel, air = seeded.wheel_and_cavity(moving, step)
-    rim_and_air = None
-    if wheel or air:
-        rim, flow = [q for m in modes for q in m.rim], [w for m in modes for w in m.air]
-        rim_and_air = sensitivity.RimAndAir(wheel, air, rim, flow)
-    forms = sensitivity.eigenvalue_rates(
-        moving, tyre.U, V, pressures(moving, step), fields, eigenvalues, rim_and_air
-    )
-    change = SeededTyre(moving, spin(tyre.model, step), seeded.attached())
-    each = np.split(forms, np.cumsum([len(m.eigenvalues) for m in modes])[:-1])
-    return [
-        m.makeup.rates(own_forms, change) if m.makeup else own_forms
-        for m, own_forms in zip(modes, each, strict=True)
-    ]
+def _model(tyre: Inflated, step: DeckStep, dynamic_Hz: float | None, own: bool) -> Model:
+    return turning(tyre.models(dynamic_Hz, step.long_term, own), step)

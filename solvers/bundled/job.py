@@ -14,10 +14,10 @@ from threadpoolctl import ThreadpoolController
 from .deck.keywords import DeckError, Keyword, read_deck
 from .deck.request import Request, read_request, read_sector
 from .deck.steps import Deck, DeckStep
-from .frequency_step import frequency_step
+from .frequency_step import FrequencyStep
 from .modes.frequency_dependent import NotSelfConsistent
 from .modes.harmonics import HarmonicModes, Unstable
-from .modes.inflated import Inflated, Models
+from .modes.inflated import Inflated
 from .modes.lanczos import NotConverged
 from .results import StepResult, write
 from .road import footprint_job
@@ -27,7 +27,6 @@ from .section.inflation import InflationFailed, equilibrium
 from .section.loads import pressures, turning
 from .section.mechanics import mass
 from .section.model import build
-from .section.point_elements import read_point_elements
 
 Failures = (InflationFailed, Unstable, NotConverged, NotSelfConsistent, NotPressed)
 
@@ -73,25 +72,27 @@ class Job:
         deadline: float = float("inf"),
         sector: Sequence[Keyword] = (),
     ):
-        self.sector = list(sector)
-        self.deck, self.request, self.deadline = deck, request, deadline
-        self.section, self.revolve, self.steps = deck.read([])
-        self.road = footprint_job.read_road(self.revolve)
-        self.models: Models = cache(partial(build, self.section))
-        self.model = self.models(None, True, False)
-        self.U = np.zeros((len(self.model.mesh.X), 3))
+        section, revolve, self.steps = deck.read([])
+        self.deadline, self.road = deadline, footprint_job.read_road(revolve)
+        models = cache(partial(build, section))
+        self.model = models(None, True, False)
+        U = np.zeros((len(self.model.mesh.X), 3))
+        check = self._check_time
+        self.tyre = Inflated(deck, request, section, revolve, list(sector), models, U, check)
         self.mass_kg = float(2 * np.pi * mass(self.model).sum().real)
-        self.mass_kg += read_point_elements(self.revolve, self.model.mesh).total_kg
+        self.mass_kg += self.tyre.attached().total_kg
         self.factorisations = 0
 
     def run(self) -> list[StepResult]:
         """Results of every frequency step, or of the last static one where there is none."""
-        results = []
+        results: list[StepResult] = []
         for place, step in enumerate(self.steps):
             if step.procedure.name == "STATIC":
                 self._static(step)
             else:
-                results.append(self._frequency(place, step))
+                work = FrequencyStep(self.tyre, place, step)
+                modes = work.modes()
+                results.append(self._result(step, modes, work.rates(modes)))
         return results or [self._result(self.steps[-1], [], {})]
 
     def press(self) -> dict[str, Any]:
@@ -117,18 +118,18 @@ class Job:
             row = step.forces[-1]
             if row.text(0) != self.road.node or row.integer(1) != 1:
                 raise DeckError(row.line, "the force on the road is along the first axis")
-            wanted.append(-float(np.real(row.number(2))))
+            wanted.append(-row.real(2))
             if not wanted[-1] > max([0.0, *wanted[:-1]]):
                 raise DeckError(row.line, "loads on the road must push it to the tyre, and rise")
         if not wanted:
             raise DeckError(self.steps[-1].procedure.line, "no *CLOAD presses the road")
         step = [each for each in self.steps if each.procedure.name == "STATIC"][-1]
-        model = self.models(None, step.long_term, False)
+        model = self.tyre.models(None, step.long_term, False)
         found = footprint_job.press(
             model,
             numbering(model, step),
             pressures(model, step),
-            self.U,
+            self.tyre.U,
             self.road,
             wanted,
             self._check_time,
@@ -151,35 +152,23 @@ class Job:
             raise DeckError(line, "modes on the road need a *NODE FILE with a set of the section")
         numbers = self.model.mesh.node_sets[step.output]
         nodes = np.array([self.model.mesh.index[n] for n in numbers])
-        model = self.models(step.procedure.number("PROPERTY EVALUATION"), step.long_term, False)
+        dynamic_Hz = step.procedure.number("PROPERTY EVALUATION")
+        model = self.tyre.models(dynamic_Hz, step.long_term, False)
         return footprint_job.ModesAtLoad(model, row.integer(0), nodes)
 
     def _static(self, step: DeckStep) -> None:
         self._check_time()
-        model = turning(self.models(None, step.long_term, False), step)
-        equations = numbering(model, step)
-        found = equilibrium(model, equations, pressures(model, step), self.U, self._check_time)
-        self.U = found.U
-        self.factorisations += found.factorisations
-
-    def _frequency(self, place: int, step: DeckStep) -> StepResult:
-        tyre = Inflated(
-            self.deck,
-            self.request,
-            self.section,
-            self.revolve,
-            self.sector,
-            self.models,
-            self.U,
-            self._check_time,
-        )
-        return self._result(step, *frequency_step(tyre, place, step))
+        model = turning(self.tyre.models(None, step.long_term, False), step)
+        loads, equations = pressures(model, step), numbering(model, step)
+        U, factorisations = equilibrium(model, equations, loads, self.tyre.U, self._check_time)
+        self.tyre.U = U
+        self.factorisations += factorisations
 
     def _result(
         self, step: DeckStep, modes: list[HarmonicModes], rates: dict[str, list[np.ndarray]]
     ) -> StepResult:
         return StepResult(
-            step.number, step.pressure, self.mass_kg, modes, rates, self.U, self.factorisations
+            step.number, step.pressure, self.mass_kg, modes, rates, self.tyre.U, self.factorisations
         )
 
     def _check_time(self) -> None:

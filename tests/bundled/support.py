@@ -209,7 +209,7 @@ def cavity(m: Model, pressure: float) -> list[Pressure]:
 
 def inflate(m: Model, mask: Array, loads: list[Pressure]) -> Array:
     """Equilibrium displacements (n, 3)."""
-    return inflation.equilibrium(m, numbering(m, mask), loads, np.zeros((len(m.mesh.X), 3))).U
+    return inflation.equilibrium(m, numbering(m, mask), loads, np.zeros((len(m.mesh.X), 3)))[0]
 
 
 def eigenvalues(

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from tyrecal_solvers.bundled.section import elements
 from tyrecal_solvers.bundled.section.parts.cords import cord_rows
-from tyrecal_solvers.bundled.section.parts.elastic import on_diagonals
+from tyrecal_solvers.bundled.section.parts.rows import on_diagonals
 
 Array = np.ndarray
 ANGLES = np.arange(8) * 2 * np.pi / 8

@@ -10,9 +10,10 @@ from tyrecal_solvers.bundled.modes import sensitivity
 from tyrecal_solvers.bundled.modes.harmonics import Vibration
 from tyrecal_solvers.bundled.section import mechanics, model
 from tyrecal_solvers.bundled.section.elements import Solids
-from tyrecal_solvers.bundled.section.parts.elastic import Elastic, Rows, on_diagonals
+from tyrecal_solvers.bundled.section.parts.elastic import Elastic
 from tyrecal_solvers.bundled.section.parts.law import EnergyLaw
 from tyrecal_solvers.bundled.section.parts.part import TyrePart
+from tyrecal_solvers.bundled.section.parts.rows import Rows, on_diagonals
 from tyrecal_solvers.bundled.section.parts.section_job import SectionJob
 from tyrecal_solvers.bundled.solid3d.circumference import half_circle
 from tyrecal_solvers.bundled.solid3d.revolved import Revolved

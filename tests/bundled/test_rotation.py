@@ -88,7 +88,7 @@ def test_waves_are_the_lowest(inflated: Inflated, n: int) -> None:
     U = support.inflate(m, inflated.held, inflated.loads)
     vibration = Vibration(m, U, inflated.loads, support.numbering(m, inflated.held), 0.0)
     got = rotation.waves(vibration, spin, n, 2)
-    assert isinstance(got.makeup, rotation.Whirl)
+    assert isinstance(got.combination, rotation.Whirl)
     free = ~inflated.held.ravel()
     K0, K1, K2 = support.matrices(m, U, inflated.loads)
     K = (K0 + 1j * n * K1 + n * n * K2)[free][:, free]
@@ -96,7 +96,7 @@ def test_waves_are_the_lowest(inflated: Inflated, n: int) -> None:
     M, C = np.kron(mass, np.eye(3)), 2j * spin * np.kron(mass, SPIN)
     M, C = M[free][:, free], C[free][:, free]
     for sign in (1, -1):
-        waves = np.sort(abs(got.makeup.omega[np.sign(got.makeup.omega) == sign]))
+        waves = np.sort(abs(got.combination.omega[np.sign(got.combination.omega) == sign]))
         for j, omega in enumerate(sign * waves):
             for side, below in ((1 - 1e-6, j), (1 + 1e-6, j + 1)):
                 values = eigvalsh(K + side * omega * C - (side * omega) ** 2 * M)

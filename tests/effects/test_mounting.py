@@ -28,7 +28,7 @@ def frequencies(case: LoadedCase, start: dict[int, tuple[float, float]] | None =
     for node, (r, z) in (start or {}).items():
         U[row[node], [0, 2]] = r, z
     numbering = support.numbering(model, held)
-    U = inflation.equilibrium(model, numbering, loads, U).U
+    U = inflation.equilibrium(model, numbering, loads, U)[0]
     values = [support.eigenvalues(model, U, loads, held, n, 2) for n in range(5)]
     return support.hertz(np.concatenate(values))
 

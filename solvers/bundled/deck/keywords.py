@@ -81,6 +81,10 @@ class DataLine:
         tangent = self.tangents.get(index)
         return value if tangent is None else complex(value, COMPLEX_STEP * tangent)
 
+    def real(self, index: int, default: float | None = None) -> float:
+        """Field ``index`` as a number without a tangent."""
+        return self.number(index, default).real
+
     def integer(self, index: int) -> int:
         """Field ``index`` as an integer."""
         try:

@@ -155,7 +155,7 @@ def _check_transfer(section: list[Keyword], steps: list[DeckStep], revolve: list
     generation, transfer = (
         blocks[f"SYMMETRIC {n}"] for n in ("MODEL GENERATION", "RESULTS TRANSFER")
     )
-    segments = [float(np.real(row.number(0))) for row in generation.rows[2:]]
+    segments = [row.real(0) for row in generation.rows[2:]]
     if not abs(sum(segments) - 360.0) < 1e-6:
         raise DeckError(generation.line, "the tyre is revolved by 360 degrees")
     axis = [generation.rows[0].number(i, 0.0) for i in range(6)]

@@ -17,7 +17,7 @@ from scipy.sparse import csr_array
 from ..section import mechanics
 from ..section.band import Cholesky, Indefinite, Numbering
 from ..section.model import Model
-from ..section.parts.part import TyrePart
+from ..section.parts.part import TyrePart, of_each_component
 from ..section.point_elements import PointElements
 from . import bordered, lanczos
 from .bordered import Border, Bordered
@@ -61,25 +61,24 @@ class HarmonicModes:
     """Modes of one harmonic: omega^2 (m,) in 1/s2 and shapes (m, n, 3), u^H M u = 1.
 
     M is the mass per radian: over the whole circle the kinetic mass is 2 pi for n = 0, pi else.
-    rim (m, q), air (m, w): the amplitudes of the rim's motions (in ``shapes`` too) and of the
-    cavity's flow (see `wheel`, `cavity`). members (m,): None, or where each doublet has split into
-    two modes, 1 and 2 in turn; the shape is then the part of harmonic n. makeup: what modes that
-    are more than that are made of.
     """
 
     n: int
     eigenvalues: Array
     shapes: Array
+    # amplitudes of the rim's motions (m, q), in ``shapes`` too, and of the cavity's flow (m, w)
     rim: Array = field(default_factory=lambda: np.zeros((0, 0)))
     air: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    # (m,), where each doublet has split into two modes, 1 and 2 in turn; the shape is then the part
+    # of harmonic n
     members: Array | None = None
-    makeup: Combination | None = None
+    combination: Combination | None = None  # what modes that are more than that are made of
 
     def forms(self) -> tuple[Array, Array, Array, Array]:
         """Harmonics (p,), shapes (p, nodes, 3), the mode (p,) that each is part of, and lambda (m,)
         of the forms phi^H (K' - lambda M') phi that the eigenvalues' derivatives are made of."""
-        if self.makeup is not None:
-            return self.makeup.forms()
+        if self.combination is not None:
+            return self.combination.forms()
         modes = len(self.eigenvalues)
         return np.full(modes, self.n), self.shapes, np.arange(modes), self.eigenvalues
 
@@ -91,9 +90,9 @@ class HarmonicModes:
         """Those of a mask or slice."""
         rim, air = (a[keep] if len(a) else a for a in (self.rim, self.air))
         members = None if self.members is None else self.members[keep]
-        makeup = self.makeup.where(keep) if self.makeup else None
+        combination = self.combination.where(keep) if self.combination else None
         return HarmonicModes(
-            self.n, self.eigenvalues[keep], self.shapes[keep], rim, air, members, makeup
+            self.n, self.eigenvalues[keep], self.shapes[keep], rim, air, members, combination
         )
 
 
@@ -131,16 +130,9 @@ class Vibration:
         self._couplings: dict[int, Coupling] = {}
         self._shifted_mass = None
         if shift:
-            masses = [
-                (
-                    c,
-                    np.einsum("eab,ij->eaibj", m.real, np.eye(3)).reshape(
-                        len(m), 3 * m.shape[1], -1
-                    ),
-                )
-                for c, m in mechanics.mass_matrices(model)
-            ]
-            self._shifted_mass = numbering.assemble(masses)
+            masses = mechanics.mass_matrices(model)
+            three = [(c, of_each_component(m.real, np.eye(3))) for c, m in masses]
+            self._shifted_mass = numbering.assemble(three)
 
     def at(self, ratios: Array) -> Vibration:
         """The same with the modulus ratios of the model's laws of frequency (l,)."""

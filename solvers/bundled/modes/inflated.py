@@ -22,18 +22,18 @@ Models = Callable[[float | None, bool, bool], Model]
 
 @dataclass
 class Inflated:
-    """Its deck and what else is asked; the model blocks of the section's job, of the job that
-    revolves it (empty: none) and of the section in a ``sector`` (empty: none); its models;
-    displacement U (nodes, 3) in m; ``check`` raises where the time is over."""
+    """A deck's tyre, and what is asked of it."""
 
     deck: Deck
     request: Request
+    # model blocks: of the section's job; of the job that revolves it, of the section in a splice,
+    # both empty where there is none
     section: list[Keyword]
     revolve: list[Keyword]
     sector: list[Keyword]
     models: Models
-    U: Array
-    check: Callable[[], None]
+    U: Array  # displacements (nodes, 3), m
+    check: Callable[[], None]  # raises where the time is over
 
     @property
     def model(self) -> Model:

@@ -211,14 +211,14 @@ def named(
         share = basis.energy(vectors[:, mine]).T / values[mine][:, None]
         mode, which = np.nonzero(share > MIN_ENERGY_SHARE)
         parts = {i: basis.part(i, vectors[:, mine]) for i in {own, *which.tolist()}}
-        makeup = CoupledShapes(
+        combination = CoupledShapes(
             mode,
             np.array([basis.families[i].n for i in which]),
             np.array([parts[i][j] for j, i in zip(mode, which.tolist(), strict=True)]),
             values[mine],
             p @ vectors[:, mine],
         )
-        result.append(split(n, values[mine], parts[own], makeup))
+        result.append(split(n, values[mine], parts[own], combination))
     return result
 
 
@@ -247,7 +247,9 @@ def _seats(harmonics: list[int], count: int) -> list[tuple[int, int]]:
     return [(n, k) for n in harmonics for k in range(count) for _ in range(2 if n else 1)]
 
 
-def split(n: int, values: Array, shapes: Array, makeup: Combination | None = None) -> HarmonicModes:
+def split(
+    n: int, values: Array, shapes: Array, combination: Combination | None = None
+) -> HarmonicModes:
     """Modes that come two by two for n >= 1."""
     members = np.tile([1, 2], len(values) // 2) if n else None
-    return HarmonicModes(n, values, shapes, members=members, makeup=makeup)
+    return HarmonicModes(n, values, shapes, members=members, combination=combination)

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from scipy.linalg.lapack import spotrf, strtrs
@@ -163,22 +164,51 @@ class Factor:
             else:
                 gone = front.nodes[: front.eliminated]
                 self.contact[:, gone, :3, 3:] = self.contact[:, gone, 3:, :3] = 0.0
-            groups = [(0, 1)] if coupled else [(0,), (1,)]
-            block = lambda group, rows, cols, t=(same, cross), f=front: _block(
-                t, f, group, self.order.symmetry, self.contact, rows, cols
-            )
-            yield (
-                front,
-                [
-                    (
-                        g,
-                        block(g, "gone", "gone"),
-                        block(g, "gone", "left"),
-                        block(g, "left", "left"),
-                    )
-                    for g in groups
-                ],
-            )
+            first, rest = slice(0, front.eliminated), slice(front.eliminated, None)
+            blocks: list[_Assembled] = []
+            for group in [(0, 1)] if coupled else [(0,), (1,)]:
+                make = partial(self._block, (same, cross), front, group)
+                blocks.append((group, make(first, first), make(first, rest), make(rest, rest)))
+            yield front, blocks
+
+    def _block(
+        self,
+        tables: tuple[Array, Array],
+        front: _Front,
+        group: tuple[int, ...],
+        rows: slice,
+        cols: slice,
+    ) -> Array:
+        """Stiffness over (part, angle, node, component) of some of a front's nodes, of one part or
+        both, held components cut out; Fortran order."""
+        masks = self.order.symmetry.mask[:, :, front.nodes]
+        K = masks.shape[1]
+        n, m = len(front.nodes[rows]) * 3, len(front.nodes[cols]) * 3
+        after, beyond = 3 * (rows.start or 0), 3 * (cols.start or 0)
+        out = np.zeros((len(group) * K * n, len(group) * K * m), np.float32, order="F")
+        for x, g in enumerate(group):
+            for y, h in enumerate(group):
+                # its transpose, in C order: (angle, column, angle, row)
+                place = out[x * K * n : (x + 1) * K * n, y * K * m : (y + 1) * K * m].T
+                tiles = np.lib.stride_tricks.as_strided(
+                    place, (K, m, K, n), (m * place.strides[0], place.strides[0], n * 4, 4)
+                )
+                table = tables[0 if g == h else 1]
+                parts = table[:, beyond : beyond + m, after : after + n]
+                # of each element round the circumference, what its three nodes are to each other
+                for t, part in enumerate(parts.reshape(len(parts) // 9, 3, 3, m, n).swapaxes(2, 3)):
+                    tiles[2 * t : 2 * t + 3, :, 2 * t : 2 * t + 3] += part
+                if rows == cols and rows.stop is not None:
+                    for k, i in np.argwhere(self.contact[:, front.nodes[rows]].any((2, 3))):
+                        own = slice(3 * i, 3 * i + 3)
+                        touching = self.contact[k, front.nodes[i]]
+                        tiles[k, own, k, own] += touching[3 * g : 3 * g + 3, 3 * h : 3 * h + 3].T
+                place[~masks[h][:, cols].ravel()] = 0.0
+                place[:, ~masks[g][:, rows].ravel()] = 0.0
+        if rows == cols:
+            diagonal = np.einsum("ii->i", out)
+            diagonal += np.concatenate([~masks[g][:, rows].ravel() for g in group])
+        return out
 
     def _eliminate(
         self,
@@ -273,48 +303,6 @@ def _tables(front: _Front, kinds: list[Array]) -> tuple[Array, Array]:
 
 def _dofs(nodes: Array) -> Array:
     return np.asarray((3 * nodes[:, None] + np.arange(3)).ravel())
-
-
-def _block(
-    tables: tuple[Array, Array],
-    front: _Front,
-    group: tuple[int, ...],
-    symmetry: HalfTurn,
-    contact: Array,
-    rows: str,
-    cols: str,
-) -> Array:
-    """Stiffness over (part, angle, node, component) of nodes ``gone`` or ``left``, of one part or
-    both, held components cut out; Fortran order."""
-    chosen = {"gone": slice(0, front.eliminated), "left": slice(front.eliminated, None)}
-    here, there = chosen[rows], chosen[cols]
-    masks = symmetry.mask[:, :, front.nodes]
-    K = masks.shape[1]
-    n, m = len(front.nodes[here]) * 3, len(front.nodes[there]) * 3
-    after, beyond = 3 * (here.start or 0), 3 * (there.start or 0)
-    out = np.zeros((len(group) * K * n, len(group) * K * m), np.float32, order="F")
-    for x, g in enumerate(group):
-        for y, h in enumerate(group):
-            # its transpose, in C order: (angle, column, angle, row)
-            place = out[x * K * n : (x + 1) * K * n, y * K * m : (y + 1) * K * m].T
-            tiles = np.lib.stride_tricks.as_strided(
-                place, (K, m, K, n), (m * place.strides[0], place.strides[0], n * 4, 4)
-            )
-            table = tables[0 if g == h else 1]
-            parts = table[:, beyond : beyond + m, after : after + n]
-            for t, part in enumerate(parts.reshape(len(parts) // 9, 3, 3, m, n).swapaxes(2, 3)):
-                tiles[2 * t : 2 * t + 3, :, 2 * t : 2 * t + 3] += part
-            if rows == cols and rows == "gone":
-                for k, i in np.argwhere(contact[:, front.nodes[here]].any((2, 3))):
-                    a = slice(3 * i, 3 * i + 3)
-                    block = contact[k, front.nodes[i], 3 * g : 3 * g + 3, 3 * h : 3 * h + 3]
-                    tiles[k, a, k, a] += block.T
-            place[~masks[h][:, there].ravel()] = 0.0
-            place[:, ~masks[g][:, here].ravel()] = 0.0
-    if rows == cols:
-        diagonal = np.einsum("ii->i", out)
-        diagonal += np.concatenate([~masks[g][:, here].ravel() for g in group])
-    return out
 
 
 def _add_carried(first: Array, carried: list[Array], parts: int, angles: int) -> None:

@@ -90,8 +90,8 @@ def read_road(model: list[Keyword]) -> RoadData | None:
     found = {k.name: k for k in model if k.name in ("SURFACE BEHAVIOR", "FRICTION")}
     if len(found) < 2:
         raise DeckError(pair.line, "the contact needs a *SURFACE BEHAVIOR and a *FRICTION")
-    stiffness = float(np.real(found["SURFACE BEHAVIOR"].only_row().number(0)))
-    friction = float(np.real(found["FRICTION"].only_row().number(0)))
+    stiffness = found["SURFACE BEHAVIOR"].only_row().real(0)
+    friction = found["FRICTION"].only_row().real(0)
     slip = float(np.real(found["FRICTION"].number("ELASTIC SLIP") or 0.0))
     if not (stiffness > 0 and friction >= 0 and slip >= MIN_ELASTIC_SLIP):
         raise DeckError(
@@ -109,8 +109,8 @@ def _check_flat(surface: Keyword) -> None:
     rows = surface.rows
     if surface.get("TYPE") != "CYLINDER" or len(rows) != 4:
         raise DeckError(surface.line, "the road is an analytical surface of TYPE=CYLINDER")
-    axes = [float(np.real(rows[0].number(i))) for i in range(6)]
-    sweep = [float(np.real(rows[1].number(i))) for i in range(3)]
+    axes = [rows[0].real(i) for i in range(6)]
+    sweep = [rows[1].real(i) for i in range(3)]
     H = axes[0]
     flat = axes == [H, 0.0, 0.0, H, 1.0, 0.0] and sweep == [H, 0.0, -1.0] and H > 0
     straight = [rows[2].text(0).upper(), rows[3].text(0).upper()] == ["START", "LINE"]
@@ -127,7 +127,7 @@ def _half_lengths(model: list[Keyword]) -> Array:
         count = row.integer(1)
         if row.number(2, 1.0) != 1.0:
             raise DeckError(row.line, "a bias of the elements' lengths is not honoured")
-        lengths += [float(np.real(row.number(0))) / count] * count
+        lengths += [row.real(0) / count] * count
     half = np.array(lengths[: len(lengths) // 2])
     if len(lengths) % 2 or not np.allclose(half, lengths[: len(half) - 1 : -1]):
         raise DeckError(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from operator import methodcaller
 
 import numpy as np
@@ -37,22 +36,15 @@ class InflationFailed(ArithmeticError):
         )
 
 
-@dataclass
-class InflatedState:
-    """An equilibrium: displacements U (n, 3), and what it cost."""
-
-    U: Array
-    factorisations: int
-
-
 def equilibrium(
     model: Model,
     numbering: Numbering,
     loads: list[Pressure],
     start: Array,
     check: Callable[[], None] = lambda: None,
-) -> InflatedState:
-    """Equilibrium under ``loads``, reached from the displacements ``start``.
+) -> tuple[Array, int]:
+    """Displacements (n, 3) in equilibrium under ``loads``, reached from the displacements
+    ``start``, and how many factorisations they took.
 
     The whole load is tried first. Where that takes long, because soft rubber between stiff cords
     wrinkles on the way, the rubber is stiffened and let down again step by step. Where that fails
@@ -68,7 +60,7 @@ def equilibrium(
         U = _by_stiffness(solve, start, check)
     if U is None:
         U = _by_pressure(solve, start, check)
-    return InflatedState(U, solve.factorisations)
+    return U, solve.factorisations
 
 
 class _Solver:

@@ -142,7 +142,7 @@ def _viscoelastic(m: Material, k: Keyword) -> None:
 def _modulus_table(k: Keyword) -> ModulusTable:
     """Rows of loss and storage: G''/G0, 1 - G'/G0, K''/K0, 1 - K'/K0, frequency in Hz. A
     vibration without damping has no use for the losses."""
-    frequency = [float(np.real(row.number(4))) for row in k.rows]
+    frequency = [row.real(4) for row in k.rows]
     ratios = [1 - row.number(1) for row in k.rows]
     if len(frequency) < 2 or any(b <= a for a, b in pairwise([0.0, *frequency])):
         raise DeckError(k.line, "a table of moduli has two rows or more, their frequencies rise")

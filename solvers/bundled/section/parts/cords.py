@@ -15,9 +15,10 @@ import numpy as np
 
 from ...deck.keywords import DataLine, DeckError, Keyword
 from ..elements import Lines
-from .elastic import Elastic, Rows, on_diagonals
+from .elastic import Elastic
 from .law import EnergyLaw
 from .part import TyrePart, consistent_mass
+from .rows import Rows, on_diagonals
 from .section_job import SectionJob
 
 Array = np.ndarray

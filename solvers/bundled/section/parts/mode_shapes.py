@@ -3,27 +3,12 @@
 from __future__ import annotations
 
 import copy
-from typing import Protocol
 
 import numpy as np
 
+from .rows import Rows
+
 Array = np.ndarray
-
-
-class Operators(Protocol):
-    """Of rows z = B0 u + B1 du/dTheta at Gauss points (see `elastic.Rows`)."""
-
-    @property
-    def B0(self) -> Array:
-        """(e, g, k, 3a)."""
-
-    @property
-    def hoop(self) -> Array:
-        """(e, g, a): the three diagonal blocks of B1."""
-
-    @property
-    def around(self) -> slice:
-        """The three of the k rows that B1 has."""
 
 
 class ModeShapes:
@@ -43,7 +28,7 @@ class ModeShapes:
         self.complex = np.iscomplexobj(real)  # they carry a variable's tangent
         own = [self._owner == j for j in range(self._owner.max() + 1)]
         self.modes = [(self.n[mine], real[mine], imag[mine]) for mine in own]
-        self.known: list[tuple[Operators, Array]] = []
+        self.known: list[tuple[Rows, Array]] = []
 
     def replaced(self, real: Array, imag: Array) -> ModeShapes:
         """The same sums of other shapes."""
@@ -51,9 +36,9 @@ class ModeShapes:
         other._set(real, imag)
         return other
 
-    def products(self, connectivity: Array, rows: Operators) -> Array:
+    def products(self, connectivity: Array, rows: Rows) -> Array:
         """G (m, e, g, k, k), sum of z z^T over a mode's shapes, real and imaginary: the form
-        phi^H K phi is A : G. Operators without a tangent are all variables': G is remembered."""
+        phi^H K phi is A : G. Rows without a tangent are all variables': G is remembered."""
         for own, G in self.known:
             same = own.B0 is rows.B0 or np.array_equal(own.B0, rows.B0)
             if same and (own.hoop is rows.hoop or np.array_equal(own.hoop, rows.hoop)):
@@ -77,7 +62,7 @@ def contract(A: Array, G: Array) -> Array:
 
 
 def _gradients(
-    connectivity: Array, rows: Operators, real: Array, imag: Array, n: Array
+    connectivity: Array, rows: Rows, real: Array, imag: Array, n: Array
 ) -> tuple[Array, Array]:
     """Real and imaginary part of (B0 + i n B1)(a + i b), each (e, g, k, p)."""
     e, g, k, d = rows.B0.shape

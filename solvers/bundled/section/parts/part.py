@@ -99,6 +99,12 @@ class AtStations(ABC):
         """Second derivatives by u u, u du and du du (s, e, 3a, 3a)."""
 
 
+def of_each_component(M: Array, components: Array) -> Array:
+    """Matrices (e, a, a) of scalars as (e, 3a, 3a), coupled by ``components`` (3, 3)."""
+    e, a, _ = M.shape
+    return np.einsum("eab,ij->eaibj", M, components).reshape(e, 3 * a, 3 * a)
+
+
 def consistent_mass(N: Array, weights: Array) -> Array:
     """Element masses (e, a, a) from N (g, a) and weights (e, g), kg per radian."""
     return np.tensordot(weights, N[:, :, None] * N[:, None, :], 1)

@@ -18,9 +18,10 @@ from ..elements import Solids
 from ..materials import Material
 from ..mesh import POINTS
 from . import hourglass
-from .elastic import Elastic, Rows
+from .elastic import Elastic
 from .law import EnergyLaw
 from .part import TyrePart, consistent_mass
+from .rows import Rows
 from .section_job import SectionJob
 
 Array = np.ndarray

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from .frame import IN_PLANE
-from .part import AtStations, Tangents, TyrePart
+from .part import AtStations, Tangents, TyrePart, of_each_component
 
 Array = np.ndarray
 
@@ -37,9 +37,7 @@ class Spin(TyrePart):
         return np.asarray(force.reshape(len(force), -1))
 
     def tangents(self, U: Array, harmonics: bool) -> Tangents:
-        e, a, _ = self.whirled.shape
-        softening = np.einsum("eab,ij->eaibj", -self.spin2 * self.whirled, IN_PLANE)
-        return softening.reshape(e, 3 * a, 3 * a), None, None
+        return of_each_component(-self.spin2 * self.whirled, IN_PLANE), None, None
 
     def at_stations(self, nodes: int) -> AtStations:
         raise NotImplementedError("a turning tyre is honoured off the road and all round alike")
