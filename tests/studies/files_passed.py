@@ -3,14 +3,14 @@
     python tests/studies/files_passed.py [COMMAND ...]      default: modes, on the coarse mesh
 
 Prints each file of ``tyrecal`` and ``solvers`` in which a function is called (`sys.setprofile`),
-with the number of calls, and how many files they are.
+but for what importing a module calls, and how many files they are.
 """
 
 from __future__ import annotations
 
 import sys
 import tempfile
-from collections import Counter
+from inspect import CO_OPTIMIZED
 from pathlib import Path
 from types import FrameType
 from typing import Any
@@ -19,18 +19,19 @@ ROOT = Path(__file__).parents[2]
 COMMAND = ["modes", "cases/p235_75r17.yaml", "--mesh", "coarse", "--no-store", "--no-pictures"]
 
 
-def files_passed(arguments: list[str]) -> Counter[str]:
-    """Calls of functions by file, below the repository's root, in a run of the command."""
+def files_passed(arguments: list[str]) -> list[str]:
+    """Files below the repository's root in which the command calls a function, in that order."""
     sys.path.insert(0, str(ROOT))
     from tyrecal.cli.main import main
 
-    calls: Counter[str] = Counter()
+    files: dict[str, None] = {}
     product = tuple(f"{ROOT / folder}/" for folder in ("tyrecal", "solvers"))
 
     def called(frame: FrameType, event: str, argument: Any) -> None:
         name = frame.f_code.co_filename
-        if event == "call" and name.startswith(product) and frame.f_code.co_name != "<module>":
-            calls[name.removeprefix(f"{ROOT}/")] += 1
+        new = event == "call" and name not in files and name.startswith(product)
+        if new and frame.f_code.co_flags & CO_OPTIMIZED and not importing(frame):  # a function's
+            files[name] = None
 
     with tempfile.TemporaryDirectory() as folder:
         sys.setprofile(called)
@@ -40,11 +41,17 @@ def files_passed(arguments: list[str]) -> Counter[str]:
             pass
         finally:
             sys.setprofile(None)
-    return calls
+    return [name.removeprefix(f"{ROOT}/") for name in files]
+
+
+def importing(frame: FrameType | None) -> bool:
+    """Whether a call is part of an import."""
+    while frame := frame and frame.f_back:
+        if frame.f_code.co_name == "<module>" and frame.f_globals["__name__"] != "__main__":
+            return True
+    return False
 
 
 if __name__ == "__main__":
     found = files_passed(sys.argv[1:] or COMMAND)
-    for file, count in found.most_common():
-        print(f"{count:9} {file}")
-    print(f"{len(found)} files")
+    print(*found, f"{len(found)} files", sep="\n")
