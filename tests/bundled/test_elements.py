@@ -2,13 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from tyrecal_solvers.bundled.section import elements
 from tyrecal_solvers.bundled.section.parts.cords import cord_rows
 from tyrecal_solvers.bundled.section.parts.rows import on_diagonals
+from tyrecal_solvers.bundled.section.shapes import TYPES, ElementType
 
 Array = np.ndarray
+
+
+def element(nodes: int, points: int) -> ElementType:
+    return replace(TYPES["CGAX8" if nodes == 8 else "CGAX4R"], points=points)
+
+
 ANGLES = np.arange(8) * 2 * np.pi / 8
 HARMONICS = (0, 1, 2)
 STATES = {
@@ -59,7 +68,7 @@ def test_patch(A: Array, nodes: int, points: int, patch: tuple[Array, Array]) ->
     Q^T A Q at every Gauss point and angle, exactly, on a distorted mesh with curved sides
     (patch test; isoparametric elements hold every linear field, Hughes ch. 3)."""
     X, table = patch
-    s = elements.solids(X, table[:, :nodes], points)
+    s = elements.solids(X, table[:, :nodes], element(nodes, points))
     fields = harmonics_of(A, np.array([0.2, -0.1, 0.3]), X)
     for angle in (0.0, 0.7, 2.9):
         Q, H = frame(angle), 0.0
@@ -103,7 +112,7 @@ def test_weights_add_up_to_the_volume(nodes: int, points: int) -> None:
     that are not parallel to the axes: R dA is cubic at most in each of xi, eta."""
     X = np.array([[0.2, 0.0], [0.5, 0.1], [0.6, 0.4], [0.3, 0.5]])
     X = np.concatenate([X, (X + np.roll(X, -1, 0)) / 2])[:nodes]
-    s = elements.solids(X, np.arange(nodes)[None], points)
+    s = elements.solids(X, np.arange(nodes)[None], element(nodes, points))
     r, z = X[:4].T
     r1, z1 = np.roll(r, -1), np.roll(z, -1)
     moment = ((r + r1) * (r * z1 - r1 * z)).sum() / 6  # of the polygon's area about the axis
@@ -115,7 +124,7 @@ def test_hourglass_vectors(patch: tuple[Array, Array], random: np.random.Generat
     """gamma . u = 0 for every u = a + b R + c Z, and not for the hourglass mode itself
     (Flanagan and Belytschko 1981, eq. 51)."""
     X, table = patch
-    s = elements.solids(X, table[:, :4], 1)
+    s = elements.solids(X, table[:, :4], element(4, 1))
     assert s.hourglass is not None
     linear = X @ random.normal(size=2) + 0.4
     size = abs(s.hourglass).max()
@@ -128,7 +137,7 @@ def test_hourglass_scale() -> None:
     h = (1, -1, 1, -1), since sum |grad N|^2 = 1/a^2 + 1/b^2 at the centre."""
     a, b, R = 0.02, 0.05, 0.3
     X = np.array([R, 0.0]) + np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * [a / 2, b / 2]
-    (gamma,) = elements.solids(X, np.arange(4)[None], 1).hourglass
+    (gamma,) = elements.solids(X, np.arange(4)[None], element(4, 1)).hourglass
     wanted = np.sqrt(R * a * b * (1 / a**2 + 1 / b**2))
     assert gamma @ [1, -1, 1, -1] == pytest.approx(wanted, rel=1e-13)
 
@@ -140,5 +149,5 @@ def test_folded_element_is_named(nodes: int, patch: tuple[Array, Array]) -> None
     table = table[:, :nodes].copy()
     table[5] = table[5][[0, 3, 2, 1, 7, 6, 5, 4][:nodes]]
     with pytest.raises(elements.FoldedElement) as error:
-        elements.solids(X, table, 2)
+        elements.solids(X, table, element(nodes, 2))
     assert error.value.index == 5

@@ -1,4 +1,4 @@
-"""A part or a law added from outside: one class, and the section, 3-D and slopes have it."""
+"""A part, a law or an element added from outside: the section, 3-D and slopes have it."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from tyrecal_solvers.bundled.modes import sensitivity
 from tyrecal_solvers.bundled.modes.harmonics import Vibration
-from tyrecal_solvers.bundled.section import mechanics, model
+from tyrecal_solvers.bundled.section import mechanics, model, shapes
 from tyrecal_solvers.bundled.section.elements import Solids
 from tyrecal_solvers.bundled.section.parts.elastic import Elastic
 from tyrecal_solvers.bundled.section.parts.law import EnergyLaw
@@ -149,3 +149,43 @@ def test_a_part_of_ones_own(monkeypatch: pytest.MonkeyPatch, quadratic: bool) ->
     assert mechanics.potential(spun, np.ones((len(b.X), 3)), []) == pytest.approx(
         1.5 * SPRING * mechanics.mass(bare).sum(), rel=1e-12
     )
+
+
+def nine(points: int) -> shapes.Rule:
+    """The Lagrangian quadrilateral: products of two lines' functions."""
+    xi, weights = shapes.gauss(points, 2)
+    along, up = ((x * (x - 1) / 2, 1 - x * x, x * (x + 1) / 2) for x in xi.T)
+    slopes = [(x - 0.5, -2 * x, x + 0.5) for x in xi.T]
+    places = [(0, 0), (2, 0), (2, 2), (0, 2), (1, 0), (2, 1), (1, 2), (0, 1), (1, 1)]
+    N = np.stack([along[i] * up[j] for i, j in places], -1)
+    dN = np.stack(
+        [np.stack([slopes[0][i] * up[j], along[i] * slopes[1][j]], -1) for i, j in places], 1
+    )
+    return shapes.Rule(N, dN, weights)
+
+
+def test_an_element_of_ones_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A thick ring of nine-node elements: its mass, and the lowest modes of n = 0..2 of one of
+    eight-node elements, which are almost as rich."""
+    kind = shapes.ElementType(9, nine, 3, 3, shapes.FACES_QUADRATIC)
+    monkeypatch.setitem(shapes.TYPES, "CGAX9", kind)
+    b = support.block((0.2, 0.3, 6), (0.0, 0.1, 4), True)
+    eight = support.deck(b.X, b.solids, support.Rubber()).replace("CGAX8R", "CGAX8")
+    head, rest = eight.split("*ELEMENT", 1)
+    rows, after = rest.split("\n", len(b.solids) + 1)[1:-1], rest.split("\n", len(b.solids) + 1)[-1]
+    middles = b.X[b.solids[:, :4]].mean(1)
+    numbers = len(b.X) + 1 + np.arange(len(middles))
+    nodes = [f"{n}, {float(r)!r}, {float(z)!r}" for n, (r, z) in zip(numbers, middles, strict=True)]
+    rows = [f"{row}, {n}" for row, n in zip(rows, numbers, strict=True)]
+    start = rest.split("\n", 1)[0].replace("CGAX8", "CGAX9")
+    deck = "\n".join([head + "\n".join(nodes), "*ELEMENT" + start, *rows, after])
+    models = [support.model_of(text) for text in (eight, deck)]
+    assert [m.parts[0].connectivity.shape[1] for m in models] == [8, 9]
+    masses = [mechanics.mass(m).sum() for m in models]
+    assert masses[1] == pytest.approx(masses[0], rel=1e-12)
+    for n in range(3):
+        values = []
+        for m in models:
+            held = support.held(m, np.flatnonzero(m.mesh.X[:, 0] < 0.2 + 1e-9))
+            values.append(support.eigenvalues(m, 0 * held, [], held, n, 3))
+        np.testing.assert_allclose(values[1], values[0], rtol=0.02)

@@ -15,7 +15,7 @@ SECTION_JOB: dict[str, dict[str, Values]] = {
     "HEADING": {},
     "RESTART": {"WRITE": ("",), "FREQUENCY": None},
     "NODE": {"NSET": None},
-    "ELEMENT": {"TYPE": ("CGAX8R", "CGAX8", "CGAX4R", "SFMGAX2", "SFMGAX1"), "ELSET": None},
+    "ELEMENT": {"TYPE": None, "ELSET": None},  # `section.shapes` knows the types
     "NSET": {"NSET": None, "GENERATE": ("",)},
     "ELSET": {"ELSET": None, "GENERATE": ("",)},
     "RIGID BODY": {"REF NODE": None, "TIE NSET": None},

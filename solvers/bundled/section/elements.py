@@ -41,16 +41,14 @@ class Solids:
     mass_weights: Array  # (e, g')
 
 
-def solids(X: Array, connectivity: Array, points: int) -> Solids:
-    """Operators of quadrilaterals with ``points`` x ``points`` Gauss points.
+def solids(X: Array, connectivity: Array, kind: shapes.ElementType) -> Solids:
+    """Operators of solids of one type; with one Gauss point the hourglass vectors, too.
 
-    X (n, 2): R, Z of all nodes in m. With one point, the hourglass vectors are formed too.
-    Raises FoldedElement.
+    X (n, 2): R, Z of all nodes in m. Raises FoldedElement.
     """
-    nodes = connectivity.shape[1]
-    rule = shapes.quad(nodes, points)
+    rule, mass_rule = kind.rule(kind.points), kind.rule(kind.mass_points)
     R, weights, gradient = _map(X, connectivity, rule)
-    e, g, a = *weights.shape, nodes
+    e, g, a = *weights.shape, kind.nodes
     hoop = rule.N / R[:, :, None]
     B0 = np.zeros((e, g, 3, 3, a, 3), weights.dtype)
     for i in range(3):
@@ -58,14 +56,13 @@ def solids(X: Array, connectivity: Array, points: int) -> Solids:
         B0[:, :, i, 2, :, i] = gradient[..., 1]
     B0[:, :, 0, 1, :, 1] = -hoop
     B0[:, :, 1, 1, :, 0] = hoop
-    mass_rule = shapes.quad(nodes, 3 if nodes == 8 else 2)
     _, mass_weights, _ = _map(X, connectivity, mass_rule)
     return Solids(
         connectivity,
         weights,
         B0.reshape(e, g, 9, 3 * a),
         hoop,
-        _hourglass(X[connectivity], gradient[:, 0], weights[:, 0]) if points == 1 else None,
+        _hourglass(X[connectivity], gradient[:, 0], weights[:, 0]) if kind.points == 1 else None,
         mass_rule.N,
         mass_weights,
     )

@@ -8,12 +8,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..deck.keywords import DeckError, Keyword
-from . import elements, shapes
+from . import elements
 from .band import Numbering
+from .shapes import TYPES
 
 Array = np.ndarray
-POINTS = {"CGAX8R": 2, "CGAX8": 3, "CGAX4R": 1}
-NODES = {"CGAX8R": 8, "CGAX8": 8, "CGAX4R": 4, "SFMGAX2": 3, "SFMGAX1": 2}
 
 
 @dataclass
@@ -82,9 +81,9 @@ def _mesh(keywords: list[Keyword]) -> DeckMesh:
     blocks: dict[str, elements.Solids | elements.Lines] = {}
     for kind, rows in connectivity.items():
         table = np.array(rows)
-        if kind in POINTS:
+        if TYPES[kind].faces:
             try:
-                blocks[kind] = elements.solids(X, table, POINTS[kind])
+                blocks[kind] = elements.solids(X, table, TYPES[kind])
             except elements.FoldedElement as error:
                 number = next(e for e, p in place.items() if p == (kind, error.index))
                 raise DeckError(
@@ -117,11 +116,15 @@ def _elements(
     sets: dict[str, list[int]],
 ) -> None:
     kind = k.need("TYPE")
-    table = connectivity.setdefault(kind, [])
+    if kind not in TYPES:
+        raise DeckError(
+            k.line, f"TYPE={kind} of *ELEMENT is not honoured, only {' or '.join(TYPES)}"
+        )
+    table, count = connectivity.setdefault(kind, []), TYPES[kind].nodes
     for row in k.rows:
-        number, nodes = row.integer(0), [row.integer(i + 1) for i in range(NODES[kind])]
-        if len(row.fields) != NODES[kind] + 1:
-            raise DeckError(row.line, f"a {kind} element has {NODES[kind]} nodes")
+        number, nodes = row.integer(0), [row.integer(i + 1) for i in range(count)]
+        if len(row.fields) != count + 1:
+            raise DeckError(row.line, f"a {kind} element has {count} nodes")
         if number in place:
             raise DeckError(row.line, f"element {number} is defined twice")
         missing = [n for n in nodes if n not in index]
@@ -172,13 +175,13 @@ def _surface(
             raise DeckError(row.line, f"face '{face}' is not one of S1, S2, S3, S4, SPOS")
         for number in members:
             kind, position = place[number]
-            if face == "SPOS" and kind not in POINTS:
+            order = TYPES[kind].faces
+            if face == "SPOS" and not order:
                 # seen from the left of its direction, as a solid's face is from the right
                 rows.append(connectivity[kind][position][::-1])
                 continue
-            if kind not in POINTS or face == "SPOS":
+            if not order or face == "SPOS":
                 raise DeckError(row.line, f"element {number} of type {kind} has no face {face}")
-            order = shapes.FACES_QUADRATIC if NODES[kind] == 8 else shapes.FACES_LINEAR
             rows.append([connectivity[kind][position][i] for i in order[int(face[1]) - 1]])
     if len({len(nodes) for nodes in rows}) > 1:
         raise DeckError(k.line, "a surface with edges of two and of three nodes is not honoured")

@@ -1,11 +1,13 @@
-"""Shape functions and Gauss rules of the section's elements (any finite-element textbook).
+"""The section's elements: shape functions and Gauss rules (any finite-element textbook).
 
 Corners run counter-clockwise in the (R, Z) plane, then the midside nodes 1-2, 2-3, 3-4, 4-1.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -64,3 +66,28 @@ def line(nodes: int, points: int) -> Rule:
         return Rule(np.hstack([1 - x, 1 + x]) / 2, dN[..., None], weights)
     N = np.hstack([x * (x - 1) / 2, 1 - x**2, x * (x + 1) / 2])
     return Rule(N, np.hstack([x - 0.5, -2 * x, x + 0.5])[..., None], weights)
+
+
+@dataclass(frozen=True)
+class ElementType:
+    """An element by its name in the deck."""
+
+    nodes: int
+    rule: Callable[[int], Rule]  # of so many Gauss points a direction
+    points: int = 2
+    mass_points: int = 2  # that integrate the mass in full
+    faces: tuple[tuple[int, ...], ...] = ()  # the nodes of a solid's faces; a line has none
+
+
+TYPES = {
+    "CGAX8R": ElementType(8, partial(quad, 8), 2, 3, FACES_QUADRATIC),
+    "CGAX8": ElementType(8, partial(quad, 8), 3, 3, FACES_QUADRATIC),
+    "CGAX4R": ElementType(4, partial(quad, 4), 1, 2, FACES_LINEAR),
+    "SFMGAX2": ElementType(3, partial(line, 3)),
+    "SFMGAX1": ElementType(2, partial(line, 2)),
+}
+
+
+def solids() -> list[str]:
+    """The types that fill an area."""
+    return [name for name, kind in TYPES.items() if kind.faces]

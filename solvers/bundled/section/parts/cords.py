@@ -14,6 +14,7 @@ from typing import Self
 import numpy as np
 
 from ...deck.keywords import DataLine, DeckError, Keyword
+from .. import shapes
 from ..elements import Lines
 from .elastic import Elastic
 from .law import EnergyLaw
@@ -22,7 +23,6 @@ from .rows import Rows, on_diagonals
 from .section_job import SectionJob
 
 Array = np.ndarray
-SURFACE_ELEMENTS = ("SFMGAX1", "SFMGAX2")
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ def read(job: SectionJob) -> list[TyrePart]:
         elif k.name == "REBAR LAYER":
             if surface is None:
                 raise DeckError(k.line, "*REBAR LAYER must follow a *SURFACE SECTION")
-            for kind, rows in job.by_type(surface, SURFACE_ELEMENTS).items():
+            for kind, rows in job.by_type(surface, shapes.TYPES.keys() - shapes.solids()).items():
                 block = job.mesh.blocks[kind]
                 assert isinstance(block, Lines)
                 own = layers.setdefault(kind, [])

@@ -14,9 +14,9 @@ from typing import ClassVar, Self
 import numpy as np
 
 from ...deck.keywords import DeckError, Keyword
+from .. import shapes
 from ..elements import Solids
 from ..materials import Material
-from ..mesh import POINTS
 from . import hourglass
 from .elastic import Elastic
 from .law import EnergyLaw
@@ -201,7 +201,7 @@ def read(job: SectionJob) -> list[TyrePart]:
     for kind, own in sections.items():
         parts += _rubber(job, kind, own)
     for kind in job.mesh.blocks:
-        if kind in POINTS and kind not in sections:
+        if kind in shapes.solids() and kind not in sections:
             raise DeckError(0, f"the {kind} elements have no *SOLID SECTION")
     return parts
 
@@ -220,7 +220,7 @@ def _sections(job: SectionJob) -> Iterator[tuple[str, _Section]]:
                 raise DeckError(k.line, f"section controls {control} are not defined")
             given = after is not None and after.name == "HOURGLASS STIFFNESS"
             stiffness = after.only_row().number(0) if after and given else None
-            for kind, rows in job.by_type(k, POINTS).items():
+            for kind, rows in job.by_type(k, shapes.solids()).items():
                 yield kind, _Section(rows, material, stiffness)
         elif k.name == "HOURGLASS STIFFNESS" and (before is None or before.name != "SOLID SECTION"):
             raise DeckError(
