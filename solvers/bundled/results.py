@@ -25,13 +25,13 @@ Array = np.ndarray
 
 @dataclass
 class StepResult:
-    """Results of one step; ``rates``: variable to d lambda per harmonic."""
+    """Results of one step."""
 
     step: int
     pressure_Pa: float
     mass_kg: float
     modes: list[HarmonicModes]
-    rates: dict[str, list[Array]]
+    rates: dict[str, list[Array]]  # variable to d lambda per harmonic
     U: Array
     factorisations: int
 

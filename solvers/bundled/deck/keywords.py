@@ -51,13 +51,11 @@ def read_deck(path: Path) -> str:
 
 @dataclass
 class DataLine:
-    """One data line: its 1-based number, its comma-separated fields, and tangents of fields.
+    """One data line."""
 
-    ``tangents`` maps a field's index to d(number)/d(variable) where a sensitivity is asked for.
-    """
-
-    line: int
-    fields: list[str]
+    line: int  # 1-based
+    fields: list[str]  # between the commas
+    # of a field's index: d number / d variable, where a slope is asked for
     tangents: Mapping[int, float] = field(default_factory=dict)
 
     def text(self, index: int, default: str = "") -> str:
@@ -98,15 +96,13 @@ COMPLEX_STEP = 1e-30  # so small that its square vanishes against every real par
 
 @dataclass
 class Keyword:
-    """One keyword with its parameters (upper-case names) and its data lines.
-
-    ``lines``: 1-based numbers and texts; ``tangents``: by line, then by field (see `seed`).
-    """
+    """One keyword with its parameters and its data lines."""
 
     name: str
     line: LineNumber
-    parameters: dict[str, str]
-    lines: list[tuple[int, str]]
+    parameters: dict[str, str]  # upper-case names
+    lines: list[tuple[int, str]]  # 1-based numbers and texts
+    # by line, then by field (see `seed`)
     tangents: Mapping[int, Mapping[int, float]] = field(default_factory=dict)
 
     @cached_property

@@ -15,24 +15,20 @@ Tangent = tuple[str, int, int, float]  # job, 1-based line, 0-based field, d num
 
 @dataclass
 class DeckStep:
-    """One step with what holds in it; loads and supports carry on from step to step of a job.
+    """One step with what holds in it; loads and supports carry on from step to step of a job."""
 
-    number: in the job, from 1; procedure: its keyword of ``PROCEDURES``; pressures: surface to the
-    deck's number (Pa); held: rows of *BOUNDARY; long_term: the static state is relaxed;
-    revolved: of the second job, in three dimensions;
-    forces: rows of *CLOAD; output: the node set of its *NODE FILE, or ""; centrifugal: element set
-    to Omega^2 (rad2/s2) of *DLOAD's CENTRIF; spin: element set to Omega (rad/s) of ROTDYNF.
-    """
-
-    number: int
-    procedure: Keyword
+    number: int  # in the job, from 1
+    procedure: Keyword  # its keyword of ``PROCEDURES``
+    # surface to the deck's number, Pa
     pressures: dict[str, complex | float] = field(default_factory=dict)
-    held: list[DataLine] = field(default_factory=list)
-    long_term: bool = True
-    revolved: bool = False
-    forces: list[DataLine] = field(default_factory=list)
-    output: str = ""
+    held: list[DataLine] = field(default_factory=list)  # rows of *BOUNDARY
+    long_term: bool = True  # the static state is relaxed
+    revolved: bool = False  # of the second job, in three dimensions
+    forces: list[DataLine] = field(default_factory=list)  # rows of *CLOAD
+    output: str = ""  # the node set of its *NODE FILE, or ""
+    # element set to Omega^2 (rad2/s2) of *DLOAD's CENTRIF
     centrifugal: dict[str, complex | float] = field(default_factory=dict)
+    # element set to Omega (rad/s) of its ROTDYNF
     spin: dict[str, complex | float] = field(default_factory=dict)
 
     @property

@@ -23,14 +23,13 @@ Array = np.ndarray
 
 @dataclass(frozen=True)
 class Border:
-    """Columns beside the band, for q and w: ``fields`` T (nodes, 3, q); stiffness (size, q) and
-    (q, q), mass likewise; air: C on the band (s, size), on q (s, q), and its matrices."""
+    """Columns of the unknowns q, w and s on the band."""
 
-    fields: Array
-    stiffness: tuple[Array, Array]
-    mass: tuple[Array, Array]
-    wall: Array
-    wall_rim: Array
+    fields: Array  # T (nodes, 3, q)
+    stiffness: tuple[Array, Array]  # (size, q) on the band, (q, q) on q
+    mass: tuple[Array, Array]  # likewise
+    wall: Array  # C on the band (s, size)
+    wall_rim: Array  # C on q (s, q)
     air: Coupling | None
 
     @property

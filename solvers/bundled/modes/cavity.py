@@ -63,12 +63,12 @@ def read_cavity(keywords: list[Keyword], mesh: DeckMesh, cavity: Mapping[str, An
 
 @dataclass(frozen=True)
 class Coupling:
-    """C (k, nodes, 3) m2, H (k, k), Q (k, k) per radian; ``flowing``: columns of H that w has."""
+    """Matrices of a harmonic, per radian."""
 
-    C: Array
-    H: Array
-    Q: Array
-    flowing: slice
+    C: Array  # (k, nodes, 3), m2
+    H: Array  # (k, k)
+    Q: Array  # (k, k)
+    flowing: slice  # columns of H that w has
 
     def strain(self, u: Array, w: Array) -> Array:
         """C u + H w for u (nodes, 3) and w, real or of a complex step."""

@@ -29,16 +29,13 @@ MOTIONS = {0: ("axial", "spin"), 1: ("radial", "tilt")}
 
 @dataclass(frozen=True)
 class Wheel:
-    """What moves: ``free`` motions of the rim's nodes ``rim`` (k,), rows of the mesh's X.
+    """The rim that moves."""
 
-    stiffness, inertia: per motion, N/m and kg or N m/rad and kg m2; absent = 0.
-    """
-
-    reference: int
-    rim: Array
-    free: frozenset[str]
-    stiffness: dict[str, Number]
-    inertia: dict[str, Number]
+    reference: int  # row of the mesh's X
+    rim: Array  # rows (k,) of its nodes
+    free: frozenset[str]  # its motions
+    stiffness: dict[str, Number]  # per motion, N/m or N m/rad; absent = 0
+    inertia: dict[str, Number]  # per motion, kg or kg m2; absent = 0
 
     def motions(self, n: int) -> list[str]:
         """Those of harmonic n that are free."""

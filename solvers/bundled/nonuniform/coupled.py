@@ -31,12 +31,11 @@ STATIC_MOMENTS = 3
 
 @dataclass
 class Family:
-    """Fields of harmonic n that diagonalise K(n) and M: eigenvalues (k,), shapes (k, nodes, 3),
-    u^H M u = 1 per radian, the lowest first."""
+    """Fields of harmonic n that diagonalise K(n) and M, the lowest first; u^H M u = 1."""
 
     n: int
-    eigenvalues: Array
-    shapes: Array
+    eigenvalues: Array  # (k,)
+    shapes: Array  # (k, nodes, 3)
 
     @property
     def whole(self) -> float:

@@ -59,14 +59,13 @@ def waves(vibration: Vibration, spin: float, n: int, count: int) -> HarmonicMode
 
 @dataclass
 class Whirl:
-    """Waves (m,) of harmonic n: omega in the turning frame, shapes (m, nodes, 3), U^H M U = 1,
-    coriolis = U^H C U."""
+    """Waves (m,) of harmonic n; U^H M U = 1."""
 
     n: int
-    spin: float
-    omega: Array
-    shapes: Array
-    coriolis: Array
+    spin: float  # Omega, rad/s
+    omega: Array  # (m,) in the turning frame, rad/s
+    shapes: Array  # U (m, nodes, 3)
+    coriolis: Array  # U^H C U (m,)
 
     @property
     def fixed(self) -> Array:

@@ -41,10 +41,10 @@ RESPONSE_ROUNDS = 2  # of responses
 
 @dataclass(frozen=True)
 class Splice:
-    """Its width (rad), about Theta = 0, and the section as it is there."""
+    """A sector about Theta = 0."""
 
-    width: float
-    model: Model
+    width: float  # rad
+    model: Model  # the section as it is there
 
     def share(self, angles: Array, highest: int) -> Array:
         """chi at angles (k,), harmonics up to ``highest``."""

@@ -29,13 +29,11 @@ MIN_COUPLING = 2e-3
 
 @dataclass
 class _Front:
-    """One level: rows of its nodes in the quarter, those to eliminate first, then the rest.
+    """One level."""
 
-    elements: per kind, its elements here and their mirror images with their nodes' places.
-    """
-
-    nodes: Array
+    nodes: Array  # rows of its nodes in the quarter: those to eliminate first, then the rest
     eliminated: int
+    # per kind, its elements here and their mirror images with their nodes' places
     elements: list[tuple[Array, Array, Array, Array]]
 
 

@@ -29,23 +29,18 @@ MAX_CONTACT_ANGLE = np.pi / 3  # from the vertical: no node beyond it can touch
 
 @dataclass(frozen=True)
 class FlatRoad:
-    """Contact at nodes (k, c) of half the circumference.
+    """Contact at nodes (k, c) of half the circumference."""
 
-    nodes (c,): rows of the section; area (k, c): reference area that a node stands for, m2;
-    stiffness: Pa/m; friction: coefficient; elastic_slip: m; anchor (k, c, 2), m: where slip
-    counts from; gap (k, c), m: to the road at the last load, at ``height``, 0 where it touched.
-    """
-
-    nodes: Array
-    area: Array
-    frame: Array
-    origin: Array
-    stiffness: float
-    friction: float
-    elastic_slip: float
-    anchor: Array
-    gap: Array
-    height: float
+    nodes: Array  # (c,): rows of the section
+    area: Array  # (k, c): reference area that a node stands for, m2
+    frame: Array  # (k, 3, 3): to the road's down, along, across
+    origin: Array  # (k, c, 3): reference positions in that frame, m
+    stiffness: float  # Pa/m
+    friction: float  # coefficient
+    elastic_slip: float  # m
+    anchor: Array  # (k, c, 2): where slip counts from, m
+    gap: Array  # (k, c): to the road at the last load, 0 where it touched, m
+    height: float  # of the road at the last load, m
 
     def positions(self, U: Array) -> Array:
         """Depth, and place in the road along and across (k, c, 3), m."""
@@ -109,17 +104,15 @@ class FlatRoad:
 
 @dataclass(frozen=True)
 class Contact:
-    """Forces ``local`` of the tyre on the road (k, c, 3), N, in the road's frame: down, along,
-    across; of half the tyre. Their derivatives K (k, c, 3, 3) by the nodes' positions and by_height
-    (k, c, 3). energy, J: stored and dissipated, their potential where the friction is bounded."""
+    """Forces of half the tyre on the road, in the road's frame: down, along, across."""
 
     road: FlatRoad
     height: float
     positions: Array
-    local: Array
-    K: Array
-    by_height: Array
-    energy: float
+    local: Array  # (k, c, 3), N
+    K: Array  # (k, c, 3, 3): derivatives by the nodes' positions, N/m
+    by_height: Array  # (k, c, 3): and by the road's height, N/m
+    energy: float  # J, stored and dissipated: the potential where the friction is bounded
 
     @property
     def force(self) -> float:

@@ -53,13 +53,12 @@ class NotPressed(ArithmeticError):
 
 @dataclass
 class PressedState:
-    """An equilibrium: parts (2, k, q, 3) of the displacements, the road's height (m), contact,
-    and the tangent vertical stiffness dF / d(deflection), N/m."""
+    """An equilibrium."""
 
-    parts: Array
-    height: float
+    parts: Array  # (2, k, q, 3) of the displacements, m
+    height: float  # the road's, m
     contact: Contact
-    stiffness: float
+    stiffness: float  # vertical, of the tangent, dF / d(deflection), N/m
 
 
 class ContactNewton:

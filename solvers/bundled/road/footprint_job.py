@@ -53,24 +53,23 @@ MODE_ARRAYS = ("mode_frequency_Hz", "mode_node", "mode_shape")
 
 @dataclass(frozen=True)
 class RoadData:
-    """What a deck says of the road: its reference node, the tread's surface, stiffness of the
-    overclosure (Pa/m), friction, elastic slip (m), and the elements round half the tyre (rad)."""
+    """What a deck says of the road."""
 
-    node: str
-    tread: str
-    stiffness: float
+    node: str  # its reference node
+    tread: str  # the tread's surface
+    stiffness: float  # of the overclosure, Pa/m
     friction: float
-    elastic_slip: float
-    lengths: Array
+    elastic_slip: float  # m
+    lengths: Array  # of the elements round half the tyre, rad
 
 
 @dataclass(frozen=True)
 class ModesAtLoad:
-    """Modes wanted at a load: of ``model``, how many, and at which nodes (rows) their shapes."""
+    """Modes wanted at a load."""
 
     model: Model
     count: int
-    nodes: Array
+    nodes: Array  # rows at which their shapes are wanted
 
 
 def read_road(model: list[Keyword]) -> RoadData | None:

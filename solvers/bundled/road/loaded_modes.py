@@ -30,13 +30,11 @@ SPARE = 3  # modes of each kind beyond half of the wanted ones
 
 @dataclass(frozen=True)
 class LoadedModes:
-    """omega^2 (m,) in 1/s2, ascending; parity (m,): 1 for modes that keep the half turn, -1 for
-    those that it reverses; shapes (m, k, n, 3) on half the tyre; the whole tyre's modal mass is 1.
-    """
+    """Modes m, ascending; the whole tyre has modal mass 1."""
 
-    eigenvalues: Array
-    parity: Array
-    shapes: Array
+    eigenvalues: Array  # omega^2 (m,), 1/s2
+    parity: Array  # (m,): 1 for modes that keep the half turn, -1 for those that it reverses
+    shapes: Array  # (m, k, n, 3) on half the tyre
 
 
 def loaded_modes(

@@ -17,20 +17,17 @@ Array = np.ndarray
 
 @dataclass
 class DeckMesh:
-    """Nodes, elements, sets and operators: all that the materials do not touch.
+    """Nodes, elements, sets and operators: all that the materials do not touch."""
 
-    X (n, 2) in m; ``index``: node number to row; ``blocks``: element type to operators;
-    ``place``: element number to (type, row of its block); ``faces``: surface name to lines.
-    """
-
-    X: Array
-    index: dict[int, int]
-    blocks: dict[str, elements.Solids | elements.Lines]
-    place: dict[int, tuple[str, int]]
+    X: Array  # (n, 2): R, Z, m
+    index: dict[int, int]  # node number to row
+    blocks: dict[str, elements.Solids | elements.Lines]  # element type to operators
+    place: dict[int, tuple[str, int]]  # element number to (type, row of its block)
     node_sets: dict[str, list[int]]
     element_sets: dict[str, list[int]]
-    faces: dict[str, elements.Lines]
-    reference_nodes: dict[int, list[int]]
+    faces: dict[str, elements.Lines]  # surface name to lines
+    reference_nodes: dict[int, list[int]]  # of rigid rims, to the nodes tied to them
+    # by the mask of free components
     numberings: dict[bytes, Numbering] = field(default_factory=dict)
 
 

@@ -17,19 +17,14 @@ Array = np.ndarray
 
 @dataclass(frozen=True)
 class Circumference:
-    """Half the tyre's way round, from the road's side (angle 0) to the top (pi).
+    """Half the tyre's way round, from the road's side (angle 0) to the top (pi)."""
 
-    angles (k,) of the nodes, rad; N, slope (s, k): functions and their derivatives by the angle
-    at Gauss stations; weights (s,), rad; shares (k,): integrals of the functions, rad;
-    stations: of each element.
-    """
-
-    angles: Array
-    N: Array
-    slope: Array
-    weights: Array
-    shares: Array
-    stations: tuple[slice, ...]
+    angles: Array  # (k,) of the nodes, rad
+    N: Array  # (s, k): functions at Gauss stations
+    slope: Array  # (s, k): their derivatives by the angle
+    weights: Array  # (s,), rad
+    shares: Array  # (k,): integrals of the functions, rad
+    stations: tuple[slice, ...]  # of each element
 
 
 def points(length: float) -> int:
