@@ -34,7 +34,7 @@ from .files import read_json
 from .fit.calibrate import METHODS, Fit, calibrate
 from .modes.find import labelled
 from .modes.mode import Mode
-from .provenance import provenance, stamped
+from .provenance import provenance
 from .studies.pressure import State
 
 __all__ = [
@@ -142,7 +142,7 @@ def fit_case(
     evaluator = _evaluator(case, solver, record)
     fit = calibrate(case, evaluator, method, fixed, starts, seed, jobs)
     of = provenance(case, evaluator.solver, load_N=case.case.targets.loads_N or 0.0)
-    fit.result = stamped(fit.result, of)
+    fit.found = fit.found.stamped(of)
     return fit
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from tyrecal.report.figure import save
 from tyrecal.report.load import draw_load_sweep
-from tyrecal.report.table import load_csv
+from tyrecal.studies.loaded_result import LoadRow, LoadSweep
 
 from ..bundled import support
 from ..studies.loaded import coarse_case
@@ -105,9 +105,9 @@ def test_a_picture_of_both_designs(tmp_path: Path) -> None:
         {"design": "initial", "load_N": 0.0, "deflection_m": 0.0, "modes": [mode]},
         {"design": "fitted", "load_N": 9.0, "deflection_m": 0.0, "modes": [mode, mode | {"m": 2}]},
     ]
-    save(draw_load_sweep(rows), tmp_path / "both.png")
+    save(draw_load_sweep([LoadRow(**row) for row in rows]), tmp_path / "both.png")
     assert (tmp_path / "both.png").read_bytes()[:4] == b"\x89PNG"
-    assert len(load_csv(rows).splitlines()) == 4
+    assert len(LoadSweep(rows=rows, failed=[], findings=[]).csv().splitlines()) == 4
 
 
 def test_the_command_explains_itself(capsys: pytest.CaptureFixture[str]) -> None:

@@ -29,7 +29,7 @@ def test_studies_write_it_and_the_command_writes_the_same(
     monkeypatch.setattr(door_module, "find_solver", lambda name, *command: Hertz())
     assert run("footprint", case, *options, *fitted, "--loads-N", "1000,4000") == 0
     page = (out / "report.html").read_bytes()
-    assert page.count(b'<svg class="swatch"') > 4 and len(page) < 1_000_000
+    assert page.count(b"<svg ") > 4 and len(page) < 1_000_000
     assert run("fit", case, *options) in (0, 4)
     assert (out / "report.html").read_bytes() == page
     (out / "report.html").unlink()

@@ -50,7 +50,7 @@ def test_doublets_split_and_the_mean_stands_for_both(id: str) -> None:
     evaluation one mode at their mean; singles and labels are the plain tyre's."""
     found, plain = evaluated(id, SMALL[id]), evaluated()
     assert by_label(found).keys() == by_label(plain).keys()
-    entries = modes_result(CASE, START, found)[0]["modes"]
+    entries = modes_result(CASE, START, found)[0].content()["modes"]
     for label, mode in by_label(found).items():
         own = [e for e in entries if (e["c"], e["m"], e["kind"]) == (label.c, label.m, label.kind)]
         assert [e["multiplicity"] for e in own] == ([1, 1] if label.c else [1])
@@ -62,7 +62,7 @@ def test_doublets_split_and_the_mean_stands_for_both(id: str) -> None:
             assert mode.raw.members == tuple(members) and mode.multiplicity == 2
     frequencies = [e["frequency_Hz"] for e in entries]
     assert frequencies == sorted(frequencies)
-    assert all("member" not in e for e in modes_result(CASE, START, plain)[0]["modes"])
+    assert all("member" not in e for e in modes_result(CASE, START, plain)[0].content()["modes"])
 
 
 @each

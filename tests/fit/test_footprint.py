@@ -188,9 +188,9 @@ def test_numbers_are_those_of_a_footprint_at_the_cases_loads() -> None:
     outcomes = press(tyre, {"initial": START}, case.case.loads_N)
     from tyrecal.design import resolved
 
-    rows = footprint_result({"initial": START}, [], outcomes, {"initial": resolved(CASE).mesh})[
-        "rows"
-    ]
+    rows = footprint_result(
+        {"initial": START}, [], outcomes, {"initial": resolved(CASE).mesh}
+    ).content()["rows"]
     assert list(point.footprint) == [
         rows[0]["area_m2"],
         rows[0]["vertical_stiffness_N_per_m"],

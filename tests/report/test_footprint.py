@@ -16,19 +16,16 @@ from tyrecal.deck.tyre_design import TyreDesign
 from tyrecal.design import resolved
 from tyrecal.evaluate.evaluator import Evaluator
 from tyrecal.evaluate.pressed import Pressed
-from tyrecal.report import pictures
 from tyrecal.report.figure import save
-from tyrecal.report.footprint import draw_curves
-from tyrecal.report.pictures import draw_footprint
+from tyrecal.report.footprint import draw_curves, draw_footprint
 from tyrecal.report.shape_data import patches_data
-from tyrecal.report.table import footprint_csv, footprint_table
-from tyrecal.report.vtu import write_pressed_vtu
-from tyrecal.studies.footprint import footprint_result
+from tyrecal.report.table import shown
+from tyrecal.report.vtu import write_pressed, write_pressed_vtu
+from tyrecal.studies.footprint import FootprintResult, FootprintRow, footprint_result
 
 from ..evaluate.stand_in import CASE
 from ..studies.hertz import ANGLES, FREE, Hertz
 from .test_vtu import volume
-from .watched import watched
 
 LOADS = [500.0, 1000.0, 2000.0, 4000.0, 8000.0]
 MESH = resolved(CASE).mesh
@@ -44,26 +41,29 @@ def designs() -> dict[str, Pressed]:
     }
 
 
-@pytest.fixture
-def drawn(monkeypatch: pytest.MonkeyPatch) -> list[Figure]:
-    """The figures that were saved."""
-    return watched(pictures, monkeypatch)
+def result(designs: dict[str, Pressed]) -> FootprintResult:
+    return footprint_result({}, LOADS, designs, BOTH)
 
 
-def rows(designs: dict[str, Pressed]) -> list[dict]:
-    return footprint_result({}, LOADS, designs, BOTH)["rows"]
+def drawn(designs: dict[str, Pressed], folder: Path) -> list[Figure]:
+    """The figures, which were saved beside the files for ParaView."""
+    patches = patches_data("", designs, BOTH).patches
+    figures = draw_footprint(result(designs).rows, patches)
+    for name, figure in figures.items():
+        save(figure, folder / f"{name}.png")
+    write_pressed(folder, designs, BOTH)
+    return list(figures.values())
 
 
 @pytest.mark.slow
 def test_every_load_of_every_design_in_one_scale(
-    drawn: list[Figure], designs: dict[str, Pressed], tmp_path: Path
+    designs: dict[str, Pressed], tmp_path: Path
 ) -> None:
-    draw_footprint(tmp_path, designs, BOTH, rows(designs), patches_data("", designs, BOTH).patches)
+    _, initial, fitted = drawn(designs, tmp_path)
     names = {path.name for path in tmp_path.iterdir()}
     assert {"footprint.png", "footprint_initial.png", "footprint_fitted.png"} < names
     assert {f"footprint_initial_{load:g}N.vtu" for load in LOADS} < names
     assert len(names) == 3 + 5 + 4
-    _, initial, fitted = drawn
     limits = set()
     for figure, count in ((initial, 5), (fitted, 4)):
         panels = [axes for axes in figure.axes if axes.get_title("left")]
@@ -80,29 +80,30 @@ def test_every_load_of_every_design_in_one_scale(
 
 
 def test_area_and_deflection_of_both_designs(designs: dict[str, Pressed], tmp_path: Path) -> None:
-    table = rows(designs)
+    table = result(designs).rows
     figure = draw_curves(table)
     save(figure, tmp_path / "footprint.png")
     left, right, *_ = figure.axes
     assert [text.get_text() for text in left.get_legend().get_texts()] == ["initial", "fitted"]
     assert [line.get_linestyle() for line in left.lines] == ["--", "-"]
     assert list(left.lines[1].get_xdata()) == [0.5, 1, 2, 4]
-    assert left.lines[0].get_ydata()[3] == pytest.approx(1e4 * table[3]["area_m2"])
+    assert left.lines[0].get_ydata()[3] == pytest.approx(1e4 * table[3].area_m2)
     assert right.lines[0].get_ydata()[3] == pytest.approx(20.0)
 
 
 def test_one_design_and_one_load(tmp_path: Path) -> None:
     designs = {"initial": Evaluator(TyreDesign(CASE), _solver=Hertz()).press({}, [3000.0])}
-    draw_footprint(tmp_path, designs, BOTH, rows(designs), patches_data("", designs, BOTH).patches)
+    drawn(designs, tmp_path)
     assert len(list(tmp_path.iterdir())) == 3
 
 
 def test_marks_of_one_load_are_whole() -> None:
     """Of designs that hardly differ, too."""
     row = {"load_N": 2e3, "area_m2": 8.3e-3, "deflection_m": 0.011}
-    row |= {"vertical_stiffness_N_per_m": 2e5, "mean_pressure_Pa": 3e5}
+    row |= {"vertical_stiffness_N_per_m": 2e5, "mean_pressure_Pa": 3e5, "peak_pressure_Pa": 4e5}
+    row |= {"length_m": 0.1, "width_m": 0.1}
     other = {**row, "design": "fitted", "area_m2": 8.45e-3, "deflection_m": 0.0112}
-    for axes in draw_curves([{**row, "design": "initial"}, other]).axes:
+    for axes in draw_curves([FootprintRow(**row, design="initial"), FootprintRow(**other)]).axes:
         marks = [line.get_ydata()[0] for line in axes.lines]
         assert len(marks) == 2 and max(marks) < 0.97 * axes.get_ylim()[1]
 
@@ -144,16 +145,18 @@ def test_between_rings_far_apart_points_are_added(
 
 
 def test_table_and_csv(designs: dict[str, Pressed]) -> None:
-    table = rows(designs)
-    lines = footprint_csv(table).splitlines()
+    found = result(designs)
+    lines = found.csv().splitlines()
     assert lines[0] == (
         "design,load_N,deflection_m,area_m2,length_m,width_m,mean_pressure_Pa,"
         "peak_pressure_Pa,vertical_stiffness_N_per_m"
     )
     assert len(lines) == 1 + 9
-    assert [float(x) for x in lines[4].split(",")[1:]] == list(table[3].values())[1:]
+    assert [float(x) for x in lines[4].split(",")[1:]] == list(found.rows[3].model_dump().values())[
+        1:
+    ]
     console = Console(width=110)
     with console.capture() as text:
-        console.print(footprint_table(table))
-    shown = text.get()
-    assert "area cm²" in shown and "20.00" in shown and "125.7" in shown and "300.0" in shown
+        console.print(shown(*found.tables()))
+    told = text.get()
+    assert "area cm²" in told and "20.00" in told and "125.7" in told and "300.0" in told

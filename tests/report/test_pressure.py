@@ -11,13 +11,15 @@ from tyrecal.modes.mode import Label
 from tyrecal.report import pressure
 from tyrecal.report.figure import save
 from tyrecal.report.pressure import draw_pressure_sweep
-from tyrecal.report.table import sweep_csv, sweep_table
+from tyrecal.report.table import shown
+from tyrecal.studies.pressure_findings import PressureFindings
+from tyrecal.studies.pressure_result import PressureRow, PressureSweep
 
 LABELS = [(0, 0, "axial"), (0, 0, "torsional"), (1, 0, None), (1, 1, None), (2, 0, None)]
 
 
 def rows(labels=LABELS, designs=("initial", "fitted"), pressures=(100.0, 200.0, 320.0), slope=0.4):
-    return [
+    found = [
         {
             "design": design,
             "pressure_kPa": p,
@@ -36,6 +38,7 @@ def rows(labels=LABELS, designs=("initial", "fitted"), pressures=(100.0, 200.0, 
         for k, design in enumerate(designs)
         for p in pressures
     ]
+    return [PressureRow.model_validate(row) for row in found]
 
 
 def test_each_mode_is_drawn_in_its_family_and_named_once(tmp_path):
@@ -103,11 +106,12 @@ def test_table_and_csv():
         ],
     }
     console = Console(width=110, record=True)
-    console.print(sweep_table(given, found))
+    sweep = PressureSweep(rows=given, findings=[PressureFindings(**found, words=[])])
+    console.print(shown(*sweep.tables()))
     text = console.export_text()
     line = next(line for line in text.splitlines() if line.startswith("[2,0]"))
     assert "ovalisation" in line and "+12.3" in line and "+59.2" in line and "0.400" in line
-    csv = sweep_csv(given).splitlines()
+    csv = sweep.csv().splitlines()
     assert len(csv) == 1 + 3 * 5
     assert csv[1].startswith("initial,100.0,0,0,axial,1,22.7")
-    assert sweep_csv(rows(slope=None)).splitlines()[-1].endswith(",")
+    assert PressureSweep(rows=rows(slope=None), findings=[]).csv().splitlines()[-1].endswith(",")

@@ -10,8 +10,11 @@ import pytest
 from rich.console import Console
 from rich.table import Table
 
-from tyrecal.report.table import fit_csv, fit_table, modes_table
-from tyrecal.report.words import fit_doubts, motion, tyre_doubts
+from tyrecal.fit.result import FitResult
+from tyrecal.modes.mode import Label
+from tyrecal.report.table import shown
+from tyrecal.report.words import fit_doubts, tyre_doubts
+from tyrecal.studies.modes import ModesResult
 
 # c, m, kind, initial, optimised, target: Table 2 of Bekakos et al. 2016
 TABLE_2 = [
@@ -21,43 +24,55 @@ TABLE_2 = [
     (2, 1, None, 76.33, 68.41, 66.1),
     (3, 1, None, 117.07, 107.9, 102.7),
 ]
-FIT = {
-    "initial_objective_Hz": 33.1349,
-    "objective_Hz": 8.6031,
-    "modes": [
-        {
-            "c": c,
-            "m": m,
-            "kind": kind,
-            "multiplicity": 2 if c else 1,
-            "frequency_Hz": fitted,
-            "initial_Hz": initial,
-            "fitted_Hz": fitted,
-            "target_Hz": target,
-            "deviation_percent": round(100 * (fitted / target - 1), 4),
-        }
-        for c, m, kind, initial, fitted, target in TABLE_2
-    ],
-    "variables": {
-        "A_belt": {
-            "initial": 2.11868e-7,
-            "value": 3.64826e-7,
-            "lower": 1e-7,
-            "upper": 1e-5,
-            "standard_error": 3.64826e-8,
-            "at_bound": False,
+FIT = FitResult.model_validate(
+    {
+        **dict.fromkeys(
+            ("pressure_kPa", "mass_kg", "projected_gradient_norm", "label_margin"), 1.0
+        ),
+        **dict.fromkeys(("evaluations", "failed_evaluations"), 1),
+        **dict.fromkeys(("converged", "moved"), True),
+        "method": "slsqp",
+        "message": "",
+        "correlations": {},
+        "singular_values": [],
+        "starts": [],
+        "initial_objective_Hz": 33.1349,
+        "objective_Hz": 8.6031,
+        "modes": [
+            {
+                "c": c,
+                "m": m,
+                "kind": kind,
+                "multiplicity": 2 if c else 1,
+                "frequency_Hz": fitted,
+                "initial_Hz": initial,
+                "fitted_Hz": fitted,
+                "target_Hz": target,
+                "deviation_percent": round(100 * (fitted / target - 1), 4),
+            }
+            for c, m, kind, initial, fitted, target in TABLE_2
+        ],
+        "variables": {
+            "A_belt": {
+                "initial": 2.11868e-7,
+                "value": 3.64826e-7,
+                "lower": 1e-7,
+                "upper": 1e-5,
+                "standard_error": 3.64826e-8,
+                "at_bound": False,
+            },
+            "odd[bold]name": {
+                "initial": 4.2e-7,
+                "value": 1e-8,
+                "lower": 1e-8,
+                "upper": 1e-5,
+                "standard_error": None,
+                "at_bound": True,
+            },
         },
-        "odd[bold]name": {
-            "initial": 4.2e-7,
-            "value": 1e-8,
-            "lower": 1e-8,
-            "upper": 1e-5,
-            "standard_error": None,
-            "at_bound": True,
-        },
-    },
-    "fixed": {"C10": 1e6},
-}
+        "fixed": {"C10": 1e6},
+    }
+)
 
 
 def lines(table: Table, width: int = 110, terminal: bool = False) -> list[str]:
@@ -70,7 +85,7 @@ def lines(table: Table, width: int = 110, terminal: bool = False) -> list[str]:
 
 
 def test_a_fit_reads_like_table_2():
-    rows = [" ".join(line.split()) for line in lines(fit_table(FIT))]
+    rows = [" ".join(line.split()) for line in lines(shown(*FIT.tables()))]
     assert [row for row in rows if row][2:] == [
         "[0,0] lateral 36.85 30.86 31.70 -2.65",
         "[0,0] torsional 37.17 35.85 35.00 +2.43",
@@ -87,21 +102,21 @@ def test_a_fit_reads_like_table_2():
 
 
 def test_a_narrow_terminal_breaks_no_figure():
-    text = "\n".join(lines(fit_table(FIT), 80))
+    text = "\n".join(lines(shown(*FIT.tables()), 80))
     assert "…" not in text
     for figure in ("117.07", "107.90", "102.70", "+5.06", "2.119e-07", "3.648e-07", "1e-07..1e-05"):
         assert figure in text
 
 
 def test_colours_only_on_terminals():
-    assert not any("\x1b" in line for line in lines(fit_table(FIT)))
-    coloured = {line[:5]: line for line in lines(fit_table(FIT), terminal=True)}
+    assert not any("\x1b" in line for line in lines(shown(*FIT.tables())))
+    coloured = {line[:5]: line for line in lines(shown(*FIT.tables()), terminal=True)}
     assert "\x1b[31m" in coloured["[3,1]"]
     assert "\x1b[33m" in coloured["[2,1]"]
 
 
 def test_csv_to_the_byte():
-    assert fit_csv(FIT) == (
+    assert FIT.csv() == (
         "c,m,kind,multiplicity,initial_Hz,fitted_Hz,target_Hz,deviation_percent\n"
         "0,0,axial,1,36.85,30.86,31.7,-2.6498\n"
         "0,0,torsional,1,37.17,35.85,35.0,2.4286\n"
@@ -120,8 +135,8 @@ def test_modes_under_load_show_their_symmetry():
         "multiplicity": 1,
         "symmetry": "antisymmetric",
     }
-    table = modes_table({"pressure_kPa": 240.0, "load_N": 4000.0, "mass_kg": 12.8, "modes": [mode]})
-    text = lines(table)
+    content = {"pressure_kPa": 240.0, "load_N": 4000.0, "mass_kg": 12.8, "modes": [mode]}
+    text = lines(shown(*ModesResult(**content, variables={}).tables()))
     assert text[0].strip() == "240 kPa, 4000 N, 12.80 kg"
     assert " ".join(text[-1].split()) == "[1,0] vertical / fore-aft 58.75 antisymmetric"
 
@@ -138,7 +153,7 @@ def test_modes_under_load_show_their_symmetry():
     ],
 )
 def test_words(label, words):
-    assert motion(*label) == words
+    assert Label(*label).motion == words
 
 
 def test_tables_load_no_drawing_packages():

@@ -21,6 +21,8 @@ from tyrecal.report.pressure import draw_pressure_sweep
 from tyrecal.report.section import draw_section
 from tyrecal.report.shape_data import section_data
 from tyrecal.report.signature import draw_signature
+from tyrecal.studies.loaded_result import LoadRow
+from tyrecal.studies.pressure_result import PressureRow
 from tyrecal.studies.signature import Signature
 
 from ..conftest import CASES
@@ -98,7 +100,7 @@ def test_crowded_lines_over_the_load(designs: tuple[str, ...], tmp_path: Path) -
         }
         for design, load in product(designs, (0.0, 4000.0))
     ]
-    save(draw_load_sweep(rows), tmp_path / "load.png")
+    save(draw_load_sweep([LoadRow(**row, deflection_m=0.0) for row in rows]), tmp_path / "load.png")
 
 
 def test_crowded_lines_over_the_pressure(tmp_path: Path) -> None:
@@ -119,7 +121,7 @@ def test_crowded_lines_over_the_pressure(tmp_path: Path) -> None:
         }
         for design, kPa in product(("initial", "fitted"), (100.0, 320.0))
     ]
-    figure = draw_pressure_sweep(rows, {Label(2, 0): 95.0}, 240.0)
+    figure = draw_pressure_sweep([PressureRow(**row) for row in rows], {Label(2, 0): 95.0}, 240.0)
     save(figure, tmp_path / "pressure.png")
 
 

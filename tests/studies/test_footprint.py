@@ -13,7 +13,7 @@ from tyrecal.design import load_case, resolved
 from tyrecal.evaluate.evaluator import Evaluator
 from tyrecal.evaluate.failure import DeckRefused, EvaluationFailed
 from tyrecal.evaluate.pressed import Pressed
-from tyrecal.studies.footprint import findings, footprint_result, footprint_row, press
+from tyrecal.studies.footprint import FootprintRow, findings, footprint_result, footprint_row, press
 from tyrecal.studies.patch import Patch, patch_of
 
 from ..evaluate.stand_in import CASE, StandIn
@@ -75,7 +75,7 @@ def test_both_designs_and_what_they_say() -> None:
     told: list[str] = []
     outcomes = press(evaluator(), designs, LOADS, notify=lambda name, outcome: told.append(name))
     assert told == ["initial", "fitted"]
-    result = footprint_result(designs, LOADS, outcomes, {name: MESH for name in designs})
+    result = footprint_result(designs, LOADS, outcomes, {name: MESH for name in designs}).content()
     assert [(row["design"], row["load_N"]) for row in result["rows"]] == [
         ("initial", 500),
         ("initial", 4000),
@@ -102,16 +102,18 @@ def test_both_designs_and_what_they_say() -> None:
     ],
 )
 def test_areas_that_do_not_grow_are_said(areas: tuple[float, ...], words: str) -> None:
+    alike = dict.fromkeys(("deflection_m", "length_m", "width_m", "peak_pressure_Pa"), 1.0)
+    alike |= {"mean_pressure_Pa": 240e3, "vertical_stiffness_N_per_m": 1.0}
     rows = [
-        {"design": design, "load_N": load, "area_m2": area, "mean_pressure_Pa": 240e3}
+        FootprintRow(design=design, load_N=load, area_m2=area, **alike)
         for design, own in (("initial", (1.0, 1.0, 1.0)), ("fitted", areas))
         for load, area in zip((1e3, 2e3, 3e3), own, strict=True)
     ]
-    found = findings(rows, {"initial": 240.0, "fitted": 120.0})
+    found = findings(rows, {"initial": 240.0, "fitted": 120.0}).model_dump()
     assert words in found["words"][0]
     assert found["words"][1].endswith("1.00 of the inflation pressure, within the usual 0.8 to 1.6")
     assert "outside the usual 0.8 to 1.6 at 1000 N (2.00), 2000 N" in found["words"][2]
-    assert findings(rows[:3], {"initial": 0.0}) == {
+    assert findings(rows[:3], {"initial": 0.0}).model_dump() == {
         "fitted_over_initial": [],
         "mean_over_inflation": {},
         "words": [],
@@ -123,7 +125,7 @@ def test_a_load_out_of_reach_keeps_those_below() -> None:
     pressed = outcomes["initial"]
     assert isinstance(pressed, Pressed) and pressed.failed is not None
     assert len(pressed.footprints) == 1 and pressed.failed.cause == "no_equilibrium"
-    result = footprint_result({"initial": START}, LOADS, outcomes, {"initial": MESH})
+    result = footprint_result({"initial": START}, LOADS, outcomes, {"initial": MESH}).content()
     assert result["failed"] == [
         {
             "design": "initial",

@@ -83,11 +83,11 @@ def test_members_share_the_unloaded_frequency(tyre: LoadedTyre) -> None:
 
 @pytest.mark.slow
 def test_results_as_files_hold_them(tyre: LoadedTyre) -> None:
-    one = loaded_modes_result({"A": 1.0}, tyre)
+    one = loaded_modes_result({"A": 1.0}, tyre).content()
     assert (one["load_N"], one["variables"]) == (1000.0, {"A": 1.0}) and one["mass_kg"] > 10
     for mode in one["modes"]:
         assert mode["multiplicity"] == 1 and mode["symmetry"] in SYMMETRIES
-    sweep = load_sweep_result({"initial": {}}, LOADS, {"initial": tyre})
+    sweep = load_sweep_result({"initial": {}}, LOADS, {"initial": tyre}).content()
     assert [row["load_N"] for row in sweep["rows"]] == LOADS and not sweep["failed"]
     assert sweep["rows"][0]["deflection_m"] == 0 < sweep["rows"][1]["deflection_m"]
     assert sweep["rows"][-1]["modes"] == one["modes"]
@@ -108,7 +108,7 @@ def test_findings_in_words() -> None:
         loaded(500.0, 82.0, 84.0),
         loaded(900.0, 85.0, 92.0, 0.3),
     ]
-    found = findings(loads)
+    found = findings("initial", loads).model_dump()
     assert [x["split"] for x in found["splits"][0]["split_Hz"]] == pytest.approx([0, 2, 7])
     assert found["words"][0] == (
         "every doublet's split grows with the load; antisymmetric less symmetric at the last, Hz:"
@@ -117,18 +117,21 @@ def test_findings_in_words() -> None:
     assert found["words"][1] == "every frequency rises with the load"
     assert "0.30, [2,0] symmetric at 900 N (a low one says that the load" in found["words"][2]
     assert found["least_overlap"] == 0.3
-    back = findings([*loads, loaded(2000.0, 90.0, 91.0)])["words"]
+    back = findings("initial", [*loads, loaded(2000.0, 90.0, 91.0)]).words
     assert "but for [2,0] (900 N) from the load named on" in back[0]
     assert back[1] == "every frequency rises with the load, but for [2,0] antisymmetric"
     lost = Loaded(900.0, 0.01, (), (Member(Label(3, 0), "symmetric"),), ())
-    assert "at 900 N no shape could be told to be [3,0] symmetric" in findings([lost])["words"][-1]
+    assert (
+        "at 900 N no shape could be told to be [3,0] symmetric"
+        in findings("initial", [lost]).words[-1]
+    )
 
 
 @pytest.mark.slow
 def test_failures_keep_what_was_computed(tyre: LoadedTyre) -> None:
     failed = EvaluationFailed("no_equilibrium", "too much")
     cut = LoadedTyre(tyre.pressure_kPa, tyre.mass_kg, tyre.loads[:2], failed)
-    result = load_sweep_result({"initial": {}}, LOADS, {"initial": cut})
+    result = load_sweep_result({"initial": {}}, LOADS, {"initial": cut}).content()
     assert [row["load_N"] for row in result["rows"]] == LOADS[:2]
     assert [(each["load_N"], each["words"]) for each in result["failed"]] == [(1000.0, "too much")]
 

@@ -67,7 +67,7 @@ def test_findings_name_every_exception():
         Label(2, 0): lambda p: 80 + 3 * np.sqrt(p),
         Label(3, 0): lambda p: 90 + 2 * np.sqrt(p),  # rises less than [2,0]
     }
-    found = findings(states(curves), list(curves))
+    found = findings(states(curves), list(curves)).model_dump()
     by_label = {(m["c"], m["m"], m["kind"]): m for m in found["modes"]}
     assert [m["curvature"] for m in found["modes"]] == ["convex", "neither"] + ["concave"] * 3
     assert [m["rises"] for m in found["modes"]] == [True, False, True, True, True]
@@ -83,7 +83,7 @@ def test_findings_name_every_exception():
     assert "but for [0,0] lateral (convex), [0,0] torsional (neither)" in text
     assert found["disagreements"] == [] and found["least_mac"] == pytest.approx(1.0)
     assert "labels stay with the shapes" in text and "three pressures" not in text
-    two = findings(states(curves)[:2], list(curves))
+    two = findings(states(curves)[:2], list(curves)).model_dump()
     assert {m["curvature"] for m in two["modes"]} == {"unknown"}
     assert "how the curves bend takes three pressures to tell" in two["words"]
 
@@ -95,9 +95,11 @@ def test_modes_that_cross_keep_their_labels_and_modes_that_mix_are_told():
     plain = states(curves)
     assert plain[0].modes[0].frequency_Hz < plain[0].modes[1].frequency_Hz
     assert plain[3].frequencies == pytest.approx({AXIAL: 47.0, TORSIONAL: 31.7})
-    assert findings(plain, [AXIAL, TORSIONAL])["disagreements"] == []
+    assert findings(plain, [AXIAL, TORSIONAL]).disagreements == []
 
-    mixing = findings(states(curves, lambda p: np.pi / 2 * P.index(p) / 3), [AXIAL, TORSIONAL])
+    mixing = findings(
+        states(curves, lambda p: np.pi / 2 * P.index(p) / 3), [AXIAL, TORSIONAL]
+    ).model_dump()
     told = mixing["disagreements"]
     assert {(d["from_kPa"], d["to_kPa"]) for d in told} == {(130.0, 200.0)}
     assert {(d["label"], d["followed_to"]) for d in told} == {
@@ -127,7 +129,7 @@ def test_more_modes_are_asked_for_where_a_target_is_lost() -> None:
     (state,) = found
     for label in LABELS:
         assert state.frequencies[label] == pytest.approx(whole.frequencies[label], rel=1e-9)
-    result = sweep_result(short, {"initial": {}}, found)
+    result = sweep_result(short, {"initial": {}}, found).content()
     assert result["findings"] == [] and len(result["rows"]) == 1
 
 

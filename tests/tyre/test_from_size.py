@@ -68,13 +68,13 @@ def test_the_size_code_gives_sixteen_modes(code: str, tmp_path: Path) -> None:
     values = start_values(case)
     evaluation = Evaluator(TyreDesign(case)).evaluate(Question(values))
     result, _ = modes_result(case, values, evaluation)
-    modes = {(m["c"], m["m"], m["kind"]): m for m in result["modes"]}
+    modes = {(m.c, m.m, m.kind): m for m in result.modes}
     assert modes.keys() >= SIXTEEN
-    assert sum(modes[label]["multiplicity"] for label in SIXTEEN) == 16
-    assert min(modes[label]["clarity"] for label in SIXTEEN) > 0.5
-    assert result["pressure_kPa"] == parse_size(code).pressure_kPa
+    assert sum(modes[label].multiplicity for label in SIXTEEN) == 16
+    assert min(modes[label].clarity or 0.0 for label in SIXTEEN) > 0.5
+    assert result.pressure_kPa == parse_size(code).pressure_kPa
     if code in MASSES:
-        assert result["mass_kg"] / (1 - BEAD_WIRES) == pytest.approx(MASSES[code], rel=0.1)
+        assert result.mass_kg / (1 - BEAD_WIRES) == pytest.approx(MASSES[code], rel=0.1)
     # what the standards state are dimensions of the inflated tyre: the section grows little
     mesh = resolved(case).mesh
     nodes = [i for i, n in enumerate(evaluation.nodes.tolist()) if n in mesh.nodes]

@@ -9,23 +9,20 @@ The numbers are named ``KIND`` or ``KIND WHERE``: ``mass_kg``, ``fitted_Hz [2,1]
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 from ..case import LoadedCase
-from ..deck.tyre_design import TyreDesign
 from ..evaluate.evaluator import Evaluator, Question
-from ..evaluate.pressed import Pressed
-from ..files import json_text
+from ..evaluate.failure import EvaluationFailed
 from ..fit.calibrate import calibrate, history_csv
-from ..provenance import provenance, stamped
-from ..report.table import fit_csv, footprint_csv, sweep_csv
+from ..provenance import provenance
+from ..studies import footprint as pressed
+from ..studies import pressure_result
 from ..studies.fitted import NOT_CONVERGED
-from ..studies.footprint import footprint_result, press
 from ..studies.modes import modes_result
-from ..studies.pressure import Failure, sweep
-from ..studies.pressure_result import sweep_result
+from ..studies.result import Failed, Part, Result
 
 Numbers = dict[str, float]
 
@@ -65,80 +62,58 @@ class Outcome:
 def fit(state: Studied) -> Outcome:
     """Calibrate from the case's own start. Raises what `calibrate` does."""
     state.no_fit = True
-    found = calibrate(state.case, state.evaluator)
-    result = found.result
+    fitted = calibrate(state.case, state.evaluator)
+    found = fitted.found
     state.no_fit = False
-    state.designs["fitted"] = {name: found.fitted.values[name] for name in state.designs["initial"]}
-    numbers = {"objective": result["objective_Hz"], "mass_kg": result["mass_kg"]}
-    numbers |= {f"variable {name}": each["value"] for name, each in result["variables"].items()}
-    numbers |= {f"fitted_Hz {_label(mode)}": mode["fitted_Hz"] for mode in result["modes"]}
-    for each in result.get("footprint", ()):
-        numbers[f"fitted_{each['quantity']} {each['load_N']:g} N"] = each["fitted"]
-    files = {
-        "fit.json": _json(state, result, load_N=state.case.case.targets.loads_N or 0.0),
-        "fit.csv": fit_csv(result),
-        "fit_history.csv": history_csv(found.history),
-    }
-    if result["converged"] and result["moved"]:
+    state.designs["fitted"] = {n: fitted.fitted.values[n] for n in state.designs["initial"]}
+    numbers = {"objective": found.objective_Hz, "mass_kg": found.mass_kg}
+    numbers |= {f"variable {name}": each.value for name, each in found.variables.items()}
+    numbers |= {f"fitted_Hz {mode.label}": mode.fitted_Hz for mode in found.modes}
+    for each in found.footprint:
+        numbers[f"fitted_{each.quantity} {each.load_N:g} N"] = each.fitted
+    files = _files(state, found, load_N=state.case.case.targets.loads_N or 0.0)
+    files["fit_history.csv"] = history_csv(fitted.history)
+    if found.is_good:
         return Outcome(quantities=numbers, files=files)
-    words = result["message"] if result["moved"] else "the fit did not move"
+    words = found.message if found.moved else "the fit did not move"
     return Outcome("failed", NOT_CONVERGED, f"not converged: {words}", numbers, files)
 
 
 def modes(state: Studied) -> Outcome:
     """Evaluate the case's own design. Raises what `Evaluator.evaluate` does."""
     values = state.designs["initial"]
-    result, _ = modes_result(state.case, values, state.evaluator.evaluate(Question(values)))
-    numbers = {"mass_kg": result["mass_kg"]}
-    numbers |= {f"frequency_Hz {_label(mode)}": mode["frequency_Hz"] for mode in result["modes"]}
-    return Outcome(quantities=numbers, files={"modes.json": _json(state, result)})
+    found, _ = modes_result(state.case, values, state.evaluator.evaluate(Question(values)))
+    numbers = {"mass_kg": found.mass_kg}
+    for mode in found.modes:
+        member = f" member {mode.member}" if mode.member else ""
+        numbers[f"frequency_Hz {mode.label}{member}"] = mode.frequency_Hz
+    return Outcome(quantities=numbers, files=_files(state, found))
 
 
 def sweep_pressure(state: Studied) -> Outcome:
-    """Every design over the pressure. Raises what `sweep` does."""
-    outcomes = sweep(state.case, state.evaluator, state.designs, state.asked.pressures_kPa)
-    failures = [each for each in outcomes if isinstance(each, Failure)]
-    if len(failures) == len(outcomes):
-        raise failures[0].failed
-    result = sweep_result(state.case, state.designs, outcomes)
+    """Every design over the pressure. Raises what `pressure_result.run` does."""
+    pressures = state.asked.pressures_kPa
+    found = pressure_result.run(state.case, state.evaluator, state.designs, pressures)
     numbers = {
-        f"frequency_Hz {row['design']} {row['pressure_kPa']:g} kPa {_label(mode)}": (
-            mode["frequency_Hz"]
-        )
-        for row in result["rows"]
-        for mode in row["modes"]
+        f"frequency_Hz {row.design} {row.pressure_kPa:g} kPa {mode.label}": mode.frequency_Hz
+        for row in found.rows
+        for mode in row.modes
     }
-    files = {
-        "pressure_sweep.json": _json(state, result, pressure_kPa=state.asked.pressures_kPa),
-        "pressure_sweep.csv": sweep_csv(result["rows"]),
-    }
-    places = [f"{each['design']}, {each['pressure_kPa']:g} kPa" for each in result["failed"]]
-    return _with_failed(result, places, numbers, files)
+    files = _files(state, found, pressure_kPa=pressures)
+    return _reached(found.rows, found.failed, numbers, files)
 
 
 def footprint(state: Studied) -> Outcome:
-    """Every design at rising loads. Raises what `press` does."""
+    """Every design at rising loads. Raises what `footprint.run` does."""
     state.evaluator.needs_road()
     loads = state.asked.loads_N or state.case.case.loads_N
-    outcomes = press(state.evaluator, state.designs, loads)
-    pressed = {name: each for name, each in outcomes.items() if isinstance(each, Pressed)}
-    for outcome in outcomes.values():
-        if not pressed and not isinstance(outcome, Pressed):
-            raise outcome
-    meshes = {name: TyreDesign(state.case, state.designs[name]).tyre.mesh for name in pressed}
-    result = footprint_result(state.designs, loads, outcomes, meshes)
+    found, _, _ = pressed.run(state.case, state.evaluator, state.designs, loads)
     numbers = {
-        f"{kind} {row['design']} {row['load_N']:g} N": value
-        for row in result["rows"]
-        for kind, value in row.items()
-        if kind not in ("design", "load_N")
+        f"{kind} {row.design} {row.load_N:g} N": value
+        for row in found.rows
+        for kind, value in row.model_dump(exclude={"design", "load_N"}).items()
     }
-    files = {
-        "footprint.json": _json(state, result, load_N=loads),
-        "footprint.csv": footprint_csv(result["rows"]),
-    }
-    places = [f"{each['design']}, {each['load_N']:g} N" for each in result["failed"]]
-    return _with_failed(result, places, numbers, files)
+    return _reached(found.rows, found.failed, numbers, _files(state, found, load_N=loads))
 
 
 STUDIES: dict[str, Callable[[Studied], Outcome]] = {  # in the order in which they are done
@@ -157,25 +132,22 @@ def study(name: str, state: Studied) -> Outcome:
     return STUDIES[name](state)
 
 
-def _with_failed(
-    result: Mapping[str, Any], places: list[str], numbers: Numbers, files: dict[str, str]
+def _reached(
+    rows: Sequence[Part], failed: Sequence[Failed], numbers: Numbers, files: dict[str, str]
 ) -> Outcome:
-    """Good, or failed at the first of some places."""
-    if not places:
+    """Good, or failed at the first of some places. Raises EvaluationFailed where nothing was
+    reached."""
+    if not failed:
         return Outcome(quantities=numbers, files=files)
-    first = result["failed"][0]
-    words = f"{places[0]}: {first['words']}"
-    if len(places) > 1:
-        words += f" (and {len(places) - 1} more)"
-    return Outcome("failed", first["cause"], words, numbers, files)
+    first = failed[0]
+    if not rows:
+        raise EvaluationFailed(first.cause, first.words)
+    words = f"{first.place}: {first.words}"
+    if len(failed) > 1:
+        words += f" (and {len(failed) - 1} more)"
+    return Outcome("failed", first.cause, words, numbers, files)
 
 
-def _label(mode: Mapping[str, Any]) -> str:
-    words = [f"[{mode['c']},{mode['m']}]", mode["kind"] or ""]
-    words.append(f"member {mode['member']}" if "member" in mode else "")
-    return " ".join(word for word in words if word)
-
-
-def _json(state: Studied, result: dict[str, Any], **of: Any) -> str:
-    """A result file with its provenance, whose state is the case's but for ``of``."""
-    return json_text(stamped(result, provenance(state.case, state.evaluator.solver, **of)))
+def _files(state: Studied, found: Result, **of: Any) -> dict[str, str]:
+    """The result's files; its provenance's state is the case's but for ``of``."""
+    return found.stamped(provenance(state.case, state.evaluator.solver, **of)).texts()

@@ -67,7 +67,7 @@ def command(
     from ..report.effects import effect_entry, effect_text, signature_entry
     from ..report.figure import save
     from ..report.signature import draw_signature
-    from ..report.table import effects_table, signatures_table
+    from ..report.table import effects_table, shown, signatures_table
     from ..studies.signature import Plain, stated_size
 
     talk = study.talk
@@ -86,7 +86,7 @@ def command(
         if name and not talk.as_json:
             talk.say(effect_text(entries[name]))
         else:
-            talk.show(effects_table(list(entries.values())))
+            talk.show(shown(effects_table(list(entries.values()))))
         return 0
 
     loaded, values = study.load(case, assignments)
@@ -130,7 +130,7 @@ def command(
     run.finish()
     talk.result(found)
     if found:
-        talk.show(signatures_table(found))
+        talk.show(shown(signatures_table(found)))
     talk.say(f"results in {run.folder}")
     return EXIT_SOLVER if failed else 0
 

@@ -85,9 +85,9 @@ def command(
     from ..evaluate.queue import reached
     from ..fit.calibrate import calibrate, check, history_csv
     from ..fit.problem import Problem, objective_unit
-    from ..report.table import fit_csv, fit_table
+    from ..report.table import shown
     from ..report.words import fit_doubts, fit_verdict, tyre_doubts
-    from ..studies.fitted import NOT_CONVERGED, has_good, is_good
+    from ..studies.fitted import NOT_CONVERGED, has_good
 
     talk = study.talk
     options.not_both(study.jobs, scheduler)
@@ -119,15 +119,15 @@ def command(
         fit = calibrate(
             loaded, evaluator, method, fixed, starts, seed, study.jobs, points.notify, bar.at
         )
-    result = run.write_json("fit.json", fit.result)
-    run.write_text("fit.csv", fit_csv(fit.result))
+    fit.found = run.write(fit.found)
+    result = fit.result
     run.write_text("fit_history.csv", history_csv(fit.history))
     talk.result(result)
-    talk.show(fit_table(result))
-    talk.say("\n".join(fit_verdict(fit.result)))
+    talk.show(shown(*fit.found.tables()))
+    talk.say("\n".join(fit_verdict(result)))
     for each in left_out:
         talk.note(f"{measured}: not used: {each}")
-    for warning in (*tyre_doubts(fit.result), *fit_doubts(fit.result)):
+    for warning in (*tyre_doubts(result), *fit_doubts(result)):
         talk.warn(warning)
     if pictures or study.report:
         from ..design import with_values
@@ -143,7 +143,7 @@ def command(
         from ..report.pictures import draw_fit
 
         draw_fit(run.new, loaded, values, evaluation, modes, fit.history, unit)
-    good = is_good(result)
+    good = fit.found.is_good
     earlier = not good and has_good(run.folder / "fit.json")
     run.finish(aside=NOT_CONVERGED if earlier else "")
     if earlier:

@@ -48,10 +48,8 @@ def command(
     tyrecal footprint cases/p235_75r17.yaml --fitted p235_75r17/fit.json --jobs 2
     tyrecal footprint cases/p235_75r17.yaml --loads-N 3000,5000 --set road.friction=0 --json
     """
-    from ..evaluate.pressed import Pressed
     from ..report.shape_data import patches_data
-    from ..report.table import footprint_csv, footprint_table
-    from ..studies.footprint import footprint_result, press, progress
+    from ..studies.footprint import run
 
     talk = study.talk
     case, fitted, study = taken(case, fitted, study)
@@ -66,39 +64,22 @@ def command(
     designs = _designs(compare, values, fitted, loaded, talk)
     if len(designs) == 1:
         options.say_idle(talk, study.jobs, "one design is pressed alone; --fitted adds another")
-    run = study.run(loaded, "footprint", evaluator, load_N=asked)
-
-    def notify(design: str, outcome: Any) -> None:
-        reached, failure = progress(outcome)
-        if failure:
-            talk.error(f"{design}, {asked[reached]:g} N: {failure}")
-        talk.detail(f"{design}: {reached} loads")
-
+    output = study.run(loaded, "footprint", evaluator, load_N=asked)
     with talk.progress("footprint") as bar:
         evaluator.on_progress = bar.at
-        outcomes = press(evaluator, designs, asked, study.jobs, notify)
-    pressed = {name: each for name, each in outcomes.items() if isinstance(each, Pressed)}
+        found, pressed, meshes = run(loaded, evaluator, designs, asked, study.jobs, study.notify)
     if not pressed:
         return EXIT_SOLVER
-    meshes = {name: _mesh(loaded, designs[name]) for name in pressed}
-    result = footprint_result(designs, asked, outcomes, meshes)
-    result = run.write_json("footprint.json", result)
     patches = patches_data(loaded.case.name, pressed, meshes)
-    run.write_json("footprint_patches.json", patches)
-    run.write_text("footprint.csv", footprint_csv(result["rows"]))
+    output.write_json("footprint_patches.json", patches)
+    figures = {}
     if pictures:
-        from ..report.pictures import draw_footprint
+        from ..report.footprint import draw_footprint
+        from ..report.vtu import write_pressed
 
-        draw_footprint(run.new, pressed, meshes, result["rows"], patches.patches)
-    run.finish()
-    talk.result(result)
-    talk.show(footprint_table(result["rows"]))
-    for sentence in result["findings"]["words"]:
-        talk.say(sentence)
-    if result["failed"]:
-        talk.error("not every load was reached; the loads below it are kept")
-    study.finish(run)
-    return EXIT_SOLVER if result["failed"] else 0
+        figures = draw_footprint(found.rows, patches.patches)
+        write_pressed(output.new, pressed, meshes)
+    return study.present(output, found, figures)
 
 
 def _fit_compared(compare: str | None, fitted: Path | None, own: Path) -> Path | None:
@@ -124,10 +105,3 @@ def _designs(
     if fitted and "fitted" in names:
         designs["fitted"] = arguments.fitted_values(fitted, loaded, talk)
     return {name: designs[name] for name in names}
-
-
-def _mesh(loaded: Any, values: dict[str, float]) -> Any:
-    """The section's mesh of a design; gauges can be variables."""
-    from ..deck.tyre_design import TyreDesign
-
-    return TyreDesign(loaded, values).tyre.mesh

@@ -37,7 +37,7 @@ def at_load(
 ) -> int:
     """Modes under one load, in modes.json, with their shapes in modes_shapes.json."""
     from ..report.shape_data import loaded_data
-    from ..report.table import modes_table
+    from ..report.table import shown
     from ..studies.loaded import LoadedTyre, load_tyres
     from ..studies.loaded_result import loaded_modes_result
 
@@ -47,13 +47,12 @@ def at_load(
         outcome = load_tyres(loaded, evaluator, {"initial": values}, [load_N])["initial"]
     if not isinstance(outcome, LoadedTyre):
         raise outcome
-    result = loaded_modes_result(values, outcome)
-    result = run.write_json("modes.json", result)
+    found = run.write(loaded_modes_result(values, outcome))
     run.write_json("modes_shapes.json", loaded_data(outcome, loaded))
     run.finish()
-    talk.result(result)
-    talk.show(modes_table(result))
-    for sentence in result["findings"]["words"]:
+    talk.result(found.content())
+    talk.show(shown(*found.tables()))
+    for sentence in found.sentences():
         talk.say(sentence)
     study.page(run)
     return 0
@@ -62,46 +61,23 @@ def at_load(
 def over_loads(
     loaded: LoadedCase,
     evaluator: Any,
-    run: Any,
+    output: Any,
     designs: Mapping[str, Mapping[str, float]],
     loads_N: Sequence[float],
     study: Study,
     pictures: bool,
 ) -> int:
     """Modes over the load, in load_sweep.json, .csv and .png."""
-    from ..report.table import load_csv, load_table
-    from ..studies.loaded import LoadedTyre, load_tyres, progress
-    from ..studies.loaded_result import load_sweep_result
+    from ..studies.loaded_result import run
 
-    talk, above = study.talk, [load for load in loads_N if load]
-
-    def notify(design: str, outcome: Any) -> None:
-        reached, failure = progress(outcome)
-        if failure:
-            talk.error(f"{design}, {above[reached]:g} N: {failure}")
-        talk.detail(f"{design}: {reached} loads")
-
-    with talk.progress("modes on the road") as bar:
+    with study.talk.progress("modes on the road") as bar:
         evaluator.on_progress = bar.at
-        outcomes = load_tyres(loaded, evaluator, designs, loads_N, study.jobs, notify)
-    if not any(isinstance(each, LoadedTyre) for each in outcomes.values()):
+        found = run(loaded, evaluator, designs, loads_N, study.jobs, study.notify)
+    if not found.rows:
         return EXIT_SOLVER
-    result = load_sweep_result(designs, loads_N, outcomes)
-    result = run.write_json("load_sweep.json", result)
-    run.write_text("load_sweep.csv", load_csv(result["rows"]))
+    figures = {}
     if pictures:
-        from ..report.figure import save
         from ..report.load import draw_load_sweep
 
-        save(draw_load_sweep(result["rows"]), run.new / "load_sweep.png")
-    run.finish()
-    talk.result(result)
-    for found in result["findings"]:
-        rows = [row for row in result["rows"] if row["design"] == found["design"]]
-        talk.show(load_table(rows, found["design"]))
-        for sentence in found["words"]:
-            talk.say(f"{found['design']}: {sentence}")
-    if result["failed"]:
-        talk.error("not every load was reached; the loads below it are kept")
-    study.finish(run)
-    return EXIT_SOLVER if result["failed"] else 0
+        figures["load_sweep"] = draw_load_sweep(found.rows)
+    return study.present(output, found, figures)

@@ -79,19 +79,19 @@ def command(
         return at_load(loaded, evaluator, run, values, loads[0], study)
     evaluation = evaluator.evaluate(Question(values))
     result, modes = modes_result(loaded, values, evaluation)
-    result = run.write_json("modes.json", result)
+    result = run.write(result)
     run.write_json("modes_shapes.json", tyre_data(loaded, evaluation, modes))
     if pictures:
         from ..report.pictures import draw_evaluation
 
         draw_evaluation(run.new, "modes", loaded, evaluation, modes)
     run.finish()
-    from ..report.table import modes_table
+    from ..report.table import shown
     from ..report.words import tyre_doubts
 
-    talk.result(result)
-    talk.show(modes_table(result))
-    for doubt in tyre_doubts(result):
+    talk.result(result.content())
+    talk.show(shown(*result.tables()))
+    for doubt in tyre_doubts(result.content()):
         talk.warn(doubt)
     study.page(run)
     return 0

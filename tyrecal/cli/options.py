@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import wraps
 from pathlib import Path
@@ -31,8 +31,12 @@ from . import arguments, complete
 from .talk import SOLVERS, Talk
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from ..case import LoadedCase
     from ..evaluate.evaluator import Evaluator
+    from ..evaluate.failure import EvaluationFailed
+    from ..studies.result import Result
     from .output import Run
 
 case_argument = click.argument(
@@ -289,6 +293,31 @@ class Study:
             self.talk.note(
                 f"results of '{run.study}' in '{run.folder}' are those of an earlier run"
             )
+
+    def notify(self, words: str, failure: EvaluationFailed | None) -> None:
+        """How a study goes: a place that was reached, or why it was not."""
+        if failure:
+            self.talk.error(f"{words}: {failure}")
+        else:
+            self.talk.detail(words)
+
+    def present(self, run: Run, found: Result, figures: Mapping[str, Figure]) -> int:
+        """Write a result with its figures by name, say what was found, and give the exit code."""
+        from ..report.table import shown
+        from .main import EXIT_SOLVER
+
+        found = run.write(found, figures)
+        run.finish()
+        self.talk.result(found.content())
+        for table in found.tables():
+            self.talk.show(shown(table))
+        for sentence in found.sentences():
+            self.talk.say(sentence)
+        if lost := found.doubts():
+            count = len(lost) + len(getattr(found, "rows", ()))
+            self.talk.error(f"{len(lost)} of {count} evaluations failed; the others are kept")
+        self.finish(run)
+        return EXIT_SOLVER if lost else 0
 
     def finish(self, run: Run) -> None:
         """Say where the results are; see `page`."""

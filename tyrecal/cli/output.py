@@ -9,9 +9,10 @@ import shutil
 import sys
 import tempfile
 import time
+from collections.abc import Mapping
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 from pydantic import BaseModel
@@ -33,14 +34,17 @@ from ..files import (
 from ..interrupt import interrupts_put_off
 from ..provenance import stamped
 from ..settings import root
+from ..studies.result import Result
 from . import lock
 from .talk import resume
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from ..evaluate.evaluator import Counts
     from ..evaluate.store import Store
 
-
+AnyResult = TypeVar("AnyResult", bound=Result)
 NEW = ".new-"  # folder of a run's results until all are there
 
 
@@ -101,6 +105,18 @@ class Run:
             )
         resume(words)
         return self.store
+
+    def write(self, found: AnyResult, figures: Mapping[str, Figure] | None = None) -> AnyResult:
+        """Write a study's files and figures; returns the result with its provenance."""
+        found = found.stamped(self.provenance or {})
+        for name, text in found.texts().items():
+            self.write_text(name, text)
+        if figures:
+            from ..report.figure import save
+
+            for name, figure in figures.items():
+                save(figure, self.new / f"{name}.png")
+        return found
 
     def write_json(self, name: str, content: Any) -> Any:
         """Write a result file with its provenance; returns what stands in it."""

@@ -22,11 +22,11 @@ def command(talk: Talk) -> int:
     tyrecal fit cases/p235_75r17.yaml --solver bundled
     """
     from ..evaluate.solver import installed
-    from ..report.table import solvers_table
+    from ..report.table import shown, solvers_table
 
     found = installed()
     talk.result(found)
-    talk.show(solvers_table(found))
+    talk.show(shown(solvers_table(found)))
     if not talk.as_json:
         for solver in found:
             if solver["command"]:

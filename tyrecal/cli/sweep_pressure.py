@@ -41,11 +41,7 @@ def command(
     tyrecal sweep-pressure cases/p235_75r17.yaml --from-kPa 180 --to-kPa 260 --steps 5 --json
     """
     from ..fit.problem import read_targets
-    from ..report.figure import save
-    from ..report.pressure import draw_pressure_sweep
-    from ..report.table import sweep_csv, sweep_table
-    from ..studies.pressure import Failure, Outcome, sweep
-    from ..studies.pressure_result import sweep_result
+    from ..studies.pressure_result import run
 
     talk = study.talk
     case, fitted, study = taken(case, fitted, study)
@@ -55,39 +51,20 @@ def command(
     designs = {"initial": values}
     if fitted:
         designs["fitted"] = arguments.fitted_values(fitted, loaded, talk)
-    run = study.run(loaded, "sweep-pressure", evaluator, pressure_kPa=pressures)
-
-    def notify(outcome: Outcome) -> None:
-        place = f"{outcome.design}, {outcome.pressure_kPa:g} kPa"
-        if isinstance(outcome, Failure):
-            talk.error(f"{place}: {outcome.failed}")
-        else:
-            talk.detail(f"{place}: {len(outcome.modes)} modes")
-
+    output = study.run(loaded, "sweep-pressure", evaluator, pressure_kPa=pressures)
     with talk.progress("sweep") as bar:
         evaluator.on_progress = bar.at
-        outcomes = sweep(loaded, evaluator, designs, pressures, study.jobs, notify)
-    failed = [each for each in outcomes if isinstance(each, Failure)]
-    if len(failed) == len(outcomes):
+        found = run(loaded, evaluator, designs, pressures, study.jobs, study.notify)
+    if not found.rows:
         return EXIT_SOLVER
-    result = sweep_result(loaded, designs, outcomes)
-    result = run.write_json("pressure_sweep.json", result)
-    run.write_text("pressure_sweep.csv", sweep_csv(result["rows"]))
+    figures = {}
     if pictures:
+        from ..report.pressure import draw_pressure_sweep
+
         targets = {each.label: each.frequency_Hz for each in read_targets(loaded)}
-        figure = draw_pressure_sweep(result["rows"], targets, loaded.case.pressure_kPa)
-        save(figure, run.new / "pressure_sweep.png")
-    run.finish()
-    talk.result(result)
-    for found in [] if talk.as_json else result["findings"]:
-        rows = [row for row in result["rows"] if row["design"] == found["design"]]
-        talk.show(sweep_table(rows, found))
-        for sentence in found["words"]:
-            talk.say(f"{found['design']}: {sentence}")
-    if failed:
-        talk.error(f"{len(failed)} of {len(outcomes)} evaluations failed; the others are kept")
-    study.finish(run)
-    return EXIT_SOLVER if failed else 0
+        figure = draw_pressure_sweep(found.rows, targets, loaded.case.pressure_kPa)
+        figures["pressure_sweep"] = figure
+    return study.present(output, found, figures)
 
 
 def _pressures(

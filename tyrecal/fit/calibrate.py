@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -12,14 +10,14 @@ import numpy as np
 
 from ..case import LoadedCase
 from ..case.calibration import cannot_fit
-from ..design import with_values
 from ..errors import InputError
 from ..evaluate.evaluator import Counts, Evaluator
 from ..evaluate.executor import executor, in_order
 from ..evaluate.failure import EvaluationFailed, WorkerLost
+from ..studies.result import csv_text
 from . import least_squares, slsqp
-from .problem import Point, Problem, objective_unit
-from .uncertainty import uncertainty
+from .problem import Point, Problem
+from .result import FitResult, StartReport, fit_result
 
 Array = np.ndarray
 METHODS: dict[str, Callable[[Problem, Array, float], slsqp.Outcome]] = {
@@ -29,31 +27,24 @@ METHODS: dict[str, Callable[[Problem, Array, float], slsqp.Outcome]] = {
 TOLERANCE = 1e-3  # projected gradient, Hz per unit of a logarithm: 1e-5 Hz for a change of 1 %
 SLOPE_NOISE_HZ = 50.0  # differences of a step that suits the digits: this times the step
 SLOPE_ERROR = 1e-4  # of d ln q / d x of areas and stiffnesses, by the curvature within a step
-UNMOVED = 1e-6  # largest change of a scaled variable below which the fit did not move
 MOST_REPLACED = 20  # replaced starts per start asked for
 
 Notify = Callable[[int, Mapping[str, float], Point | EvaluationFailed], None]
 
 
 @dataclass
-class StartReport:
-    """One start of a fit: where it began and ended. ``message``: the optimiser's own words."""
-
-    initial: dict[str, float]
-    point: Point
-    message: str
-    converged: bool
-    history: list[dict[str, Any]]
-
-
-@dataclass
 class Fit:
-    """A finished fit. ``result``: the content of fit.json; history: design points in order."""
+    """A finished fit; history: design points in order."""
 
-    result: dict[str, Any]
+    found: FitResult
     history: list[dict[str, Any]]
     initial: Point
     fitted: Point
+
+    @property
+    def result(self) -> dict[str, Any]:
+        """The content of fit.json."""
+        return self.found.content()
 
 
 def calibrate(
@@ -88,7 +79,7 @@ def calibrate(
     best = min(reports, key=lambda r: r.point.objective)
     history = _joined([r.history for r in reports])
     return Fit(
-        _result(problem, initial, best, reports, history, replaced, method),
+        fit_result(problem, initial, best, reports, history, replaced, method),
         history,
         initial,
         best.point,
@@ -212,125 +203,8 @@ def _joined(histories: list[list[dict[str, Any]]]) -> list[dict[str, Any]]:
     return rows
 
 
-def _result(
-    problem: Problem,
-    initial: Point,
-    best: StartReport,
-    reports: list[StartReport],
-    history: list[dict[str, Any]],
-    replaced: int,
-    method: str,
-) -> dict[str, Any]:
-    point = best.point
-    moved = float(abs(point.x - initial.x).max()) > UNMOVED
-    objectives = [row["objective_Hz"] for row in history]
-    near = next(
-        i for i, f in enumerate(objectives, start=1) if f is not None and f < point.objective + 0.05
-    )
-    known = uncertainty(problem, point)
-    names = [v.name for v in problem.variables]
-    variables = {}
-    for i, v in enumerate(problem.variables):
-        value = point.values[v.name]
-        room = point.x[i] - problem.lower[i], problem.upper[i] - point.x[i]
-        at_bound = bool(min(room) < 1e-6)
-        variables[v.name] = {
-            "initial": initial.values[v.name],
-            "value": value,
-            "lower": problem.case.case.variables[v.name].lower,
-            "upper": problem.case.case.variables[v.name].upper,
-            "standard_error": known.standard_errors[i],
-            "at_bound": at_bound,
-        }
-    modes = []
-    for target in problem.targets:
-        mode = point.modes[target.label]
-        fitted = mode.frequency_Hz
-        modes.append(
-            {
-                "c": target.label.c,
-                "m": target.label.m,
-                "kind": target.label.kind,
-                "frequency_Hz": fitted,
-                "multiplicity": mode.multiplicity,
-                "initial_Hz": initial.modes[target.label].frequency_Hz,
-                "fitted_Hz": fitted,
-                "target_Hz": target.frequency_Hz,
-                "deviation_percent": 100 * (fitted / target.frequency_Hz - 1),
-            }
-        )
-    pressed = [
-        {
-            "load_N": target.load_N,
-            "quantity": target.quantity,
-            "initial": float(initial.footprint[i]),
-            "fitted": float(point.footprint[i]),
-            "target": target.value,
-            "sigma": target.sigma,
-            "deviation_percent": 100 * (float(point.footprint[i]) / target.value - 1),
-        }
-        for i, target in enumerate(problem.footprint)
-    ]
-    return {
-        "format": 1,
-        "method": method,
-        "pressure_kPa": with_values(problem.case, point.values).case.pressure_kPa,
-        "mass_kg": point.mass_kg,
-        "objective_Hz": point.objective,
-        "objective_unit": objective_unit(problem.case),
-        "initial_objective_Hz": initial.objective,
-        "evaluations": len(history),
-        "evaluations_to_0.05_Hz": near,
-        "gradient_evaluations": sum(f is not None for f in objectives),
-        "failed_evaluations": sum(f is None for f in objectives),
-        "converged": best.converged,
-        "moved": moved,
-        "message": best.message,
-        "projected_gradient_norm": slsqp.projected_gradient(problem, point),
-        "label_margin": point.clarity,
-        "variables": variables,
-        "fixed": dict(problem.fixed),
-        "modes": modes,
-        **({"footprint": pressed} if pressed else {}),
-        "noise_Hz": known.noise_Hz,
-        "correlations": {
-            a: {b: _finite(known.correlations[i, j]) for j, b in enumerate(names)}
-            for i, a in enumerate(names)
-        },
-        "singular_values": [float(s) for s in known.singular_values],
-        "starts": [
-            {
-                "initial": r.initial,
-                "objective_Hz": r.point.objective,
-                "converged": r.converged,
-                "evaluations": len(r.history),
-                "message": r.message,
-                "values": dict(r.point.values),
-            }
-            for r in reports
-        ],
-        "replaced_starts": replaced,
-    }
-
-
-def _finite(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None
-
-
 def history_csv(history: list[dict[str, Any]]) -> str:
     """All design points as CSV: point, start, variables, objective_Hz, failure."""
     names = list(history[0]["values"])
-    file = io.StringIO(newline="")
-    writer = csv.writer(file)
-    writer.writerow(["point", "start", *names, "objective_Hz", "failure"])
-    for row in history:
-        writer.writerow(
-            [
-                row["point"],
-                row["start"],
-                *(row["values"][n] for n in names),
-                row["objective_Hz"],
-                row["failure"] or "",
-            ]
-        )
-    return file.getvalue()
+    keys = ["point", "start", *names, "objective_Hz", "failure"]
+    return csv_text(keys, ({**row["values"], **row} for row in history), end="\r\n")

@@ -7,6 +7,14 @@ from dataclasses import dataclass
 from ..evaluate.results import RawMode
 
 FAMILIES = ("in-plane", "out-of-plane")
+KNOWN = {
+    (0, 0, "axial"): "lateral",
+    (0, 0, "torsional"): "torsional",
+    (1, 1, None): "pitch / yaw-camber",
+    (1, 0, None): "vertical / fore-aft",
+    (2, 0, None): "ovalisation",
+}
+ORDINALS = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth")
 
 
 @dataclass(frozen=True, order=True)
@@ -34,6 +42,18 @@ class Label:
     def said(self) -> str:
         """As people say it; files and options have the label itself: ``axial`` is lateral."""
         return str(self).replace("axial", "lateral")
+
+    @property
+    def motion(self) -> str:
+        """What the tyre does: that of [2,1] is 'first out-of-plane bending'."""
+        if (self.c, self.m, self.kind) in KNOWN:
+            return KNOWN[self.c, self.m, self.kind]
+        if self.m > 1:
+            return "belt bends across its width"
+        if self.c < 2:
+            return "overtone"
+        order = ORDINALS[self.c - 2] if self.c - 2 < len(ORDINALS) else f"{self.c - 1}th"
+        return f"{order} {'out-of' if self.m else 'in'}-plane bending"
 
     def __str__(self) -> str:
         return f"[{self.c},{self.m}]" + (f" {self.kind}" if self.kind else "")

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter, NullLocator
 
-from ..modes.mode import Label
+from ..fit.result import FittedMode
 from .figure import COLOURS, GREY, MARKERS, headline, in_house_style, new_figure
 
 
@@ -95,18 +95,18 @@ def _summary(objective: np.ndarray, unit: str) -> str:
 
 
 @in_house_style
-def draw_deviations(modes: Sequence[Mapping[str, Any]]) -> Figure:
+def draw_deviations(modes: Sequence[FittedMode]) -> Figure:
     """Frequencies over their targets before and after the fit, a line a mode of fit.json."""
     figure = new_figure(5.2, 0.9 + 0.26 * len(modes))
     axes = figure.add_subplot()
-    after = [mode["deviation_percent"] for mode in modes]
-    before = [100 * (mode["initial_Hz"] / mode["target_Hz"] - 1) for mode in modes]
+    after = [mode.deviation_percent for mode in modes]
+    before = [100 * (mode.initial_Hz / mode.target_Hz - 1) for mode in modes]
     rows = range(len(modes))
     axes.axvline(0, color=GREY, lw=0.8)
     axes.hlines(rows, before, after, color=GREY, lw=1.2)
     axes.plot(before, rows, "s", color=COLOURS[1], mfc="white", ms=5, label="initial")
     axes.plot(after, rows, "o", color=COLOURS[0], ms=5, label="fitted")
-    axes.set_yticks(rows, [Label(mode["c"], mode["m"], mode["kind"]).said for mode in modes])
+    axes.set_yticks(rows, [mode.label.said for mode in modes])
     axes.invert_yaxis()
     axes.set_xlabel("deviation from target, %")
     axes.legend(frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -11,6 +11,7 @@ from matplotlib import colormaps
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from ..studies.footprint import FootprintRow
 from .figure import COLOURS, GREY, headline, in_house_style, new_figure
 from .shape_data import Patch
 
@@ -29,6 +30,16 @@ CURVES = {  # key of a row: words, unit over SI
     "vertical_stiffness_N_per_m": ("vertical stiffness, N/mm", 1e-3),
     "mean_pressure_Pa": ("mean contact pressure, kPa", 1e-3),
 }
+
+
+def draw_footprint(rows: Sequence[FootprintRow], patches: Sequence[Patch]) -> dict[str, Figure]:
+    """By name: footprint and, all in one scale, footprint_DESIGN."""
+    highest = max(row.peak_pressure_Pa for row in rows) / 1e3
+    figures = {"footprint": draw_curves(rows)}
+    for design in dict.fromkeys(patch.design for patch in patches):
+        own = [patch for patch in patches if patch.design == design]
+        figures[f"footprint_{design}"] = draw_patches(own, highest)
+    return figures
 
 
 @in_house_style
@@ -79,17 +90,17 @@ def _halves(patch: Patch) -> np.ndarray:
 
 
 @in_house_style
-def draw_curves(rows: Sequence[Mapping[str, Any]]) -> Figure:
+def draw_curves(rows: Sequence[FootprintRow]) -> Figure:
     """Area, deflection, stiffness and mean pressure over the load, every design of the rows."""
     figure = new_figure(8.6, 6.2)
     grid = figure.subplots(2, 2).ravel()
-    for colour, design in zip(COLOURS, dict.fromkeys(row["design"] for row in rows), strict=False):
-        own = [row for row in rows if row["design"] == design]
-        load = [row["load_N"] / 1e3 for row in own]
+    for colour, design in zip(COLOURS, dict.fromkeys(row.design for row in rows), strict=False):
+        own = [row for row in rows if row.design == design]
+        load = [row.load_N / 1e3 for row in own]
         style: dict[str, Any] = {"color": colour, "label": design, "ms": 4.5, "lw": 1.4}
         style |= STYLES.get(design, {})
         for axes, (key, (_, unit)) in zip(grid, CURVES.items(), strict=True):
-            axes.plot(load, [unit * row[key] for row in own], **style)
+            axes.plot(load, [unit * getattr(row, key) for row in own], **style)
     for axes, (words, _) in zip(grid, CURVES.values(), strict=True):
         top = 1.05 * axes.dataLim.ymax  # of one load or of equal designs no mark is cut
         axes.set(xlabel="load, kN", ylabel=words, xlim=(0, None), ylim=(0, top))

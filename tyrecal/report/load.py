@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from matplotlib.figure import Figure
 
 from ..modes.loaded import SYMMETRIES
 from ..modes.mode import FAMILIES, Label
+from ..studies.loaded_result import LoadRow
 from .figure import COLOURS, MARKERS, in_house_style, new_figure
 from .pressure import GAP, name_lines
 
@@ -20,13 +21,13 @@ Curve = tuple[list[float], list[float]]
 
 
 @in_house_style
-def draw_load_sweep(rows: Sequence[Mapping[str, Any]]) -> Figure:
+def draw_load_sweep(rows: Sequence[LoadRow]) -> Figure:
     """Frequency over load, a column a family and a line a design; c has a colour and a marker,
     the two members of a doublet share them.
 
     rows: of load_sweep.json; a load of 0 is the unloaded tyre.
     """
-    designs = {row["design"]: _curves(rows, row["design"]) for row in rows}
+    designs = {row.design: _curves(rows, row.design) for row in rows}
     labels = {label for curves in designs.values() for label, _ in curves}
     shown = [name for name in (*FAMILIES, None) if any(x.family == name for x in labels)]
     figure = new_figure(1.0 + 4.4 * len(shown), 0.6 + 5.4 * len(designs))
@@ -61,13 +62,12 @@ def draw_load_sweep(rows: Sequence[Mapping[str, Any]]) -> Figure:
     return figure
 
 
-def _curves(rows: Sequence[Mapping[str, Any]], design: str) -> dict[tuple[Label, str], Curve]:
+def _curves(rows: Sequence[LoadRow], design: str) -> dict[tuple[Label, str], Curve]:
     """Loads (kN) and frequencies (Hz) of each member."""
     found: dict[tuple[Label, str], Curve] = {}
     for row in rows:
-        for mode in row["modes"] if row["design"] == design else []:
-            key = Label(mode["c"], mode["m"], mode["kind"]), mode["symmetry"]
-            load, hertz = found.setdefault(key, ([], []))
-            load.append(row["load_N"] / 1e3)
-            hertz.append(mode["frequency_Hz"])
+        for mode in row.modes if row.design == design else []:
+            load, hertz = found.setdefault((mode.label, mode.symmetry or ""), ([], []))
+            load.append(row.load_N / 1e3)
+            hertz.append(mode.frequency_Hz)
     return found

@@ -8,18 +8,15 @@ from typing import Any
 
 from ..case import LoadedCase
 from ..design import resolved, with_values
-from ..evaluate.pressed import Pressed
 from ..evaluate.results import Evaluation
 from ..modes.mode import Label, Mode
-from ..tyre.mesh import SectionMesh
 from .convergence import draw_convergence
 from .figure import save
-from .footprint import draw_curves, draw_patches
 from .revolve import placed
 from .section import draw_section
-from .shape_data import Patch, section_data
+from .shape_data import section_data
 from .shapes import draw_mode, draw_modes_overview
-from .vtu import write_pressed_vtu, write_vtu
+from .vtu import write_vtu
 
 
 def draw_evaluation(
@@ -56,24 +53,6 @@ def draw_fit(
     """The pictures of the fitted design, and convergence.png; ``unit``: of the objective."""
     draw_evaluation(folder, "fit", with_values(case, values), evaluation, modes)
     save(draw_convergence(history, unit), folder / "convergence.png")
-
-
-def draw_footprint(
-    folder: Path,
-    designs: Mapping[str, Pressed],
-    meshes: Mapping[str, SectionMesh],
-    rows: Sequence[Mapping[str, Any]],
-    patches: Sequence[Patch],
-) -> None:
-    """footprint.png, footprint_DESIGN.png, all in one scale, and footprint_DESIGN_LOADN.vtu."""
-    save(draw_curves(rows), folder / "footprint.png")
-    highest = max(row["peak_pressure_Pa"] for row in rows) / 1e3
-    for name, pressed in designs.items():
-        own = [patch for patch in patches if patch.design == name]
-        save(draw_patches(own, highest), folder / f"footprint_{name}.png")
-        for footprint in pressed.footprints:
-            path = folder / f"footprint_{name}_{footprint.load_N:g}N.vtu"
-            write_pressed_vtu(path, pressed, footprint, meshes[name])
 
 
 def file_name(label: Label) -> str:

@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..modes.mode import FAMILIES, Label
+from ..studies.pressure_result import PressureRow
 from .figure import COLOURS, GREY, MARKERS, in_house_style, new_figure
 
 LINES = {"initial": (0, (4, 2)), "fitted": "-"}
@@ -20,7 +21,7 @@ Curves = dict[Label, tuple[np.ndarray, np.ndarray, np.ndarray]]
 
 @in_house_style
 def draw_pressure_sweep(
-    rows: Sequence[Mapping[str, Any]],
+    rows: Sequence[PressureRow],
     targets: Mapping[Label, float] | None = None,
     target_kPa: float = 0.0,
 ) -> Figure:
@@ -29,10 +30,10 @@ def draw_pressure_sweep(
     rows: of pressure_sweep.json; a design "initial" is dashed, "fitted" solid; c has a colour and
     a marker. targets: measured Hz by label at ``target_kPa``, crosses where that was swept.
     """
-    swept = [row["pressure_kPa"] for row in rows]
+    swept = [row.pressure_kPa for row in rows]
     if not min(swept) <= target_kPa <= max(swept):
         targets = None
-    designs = {row["design"]: _curves(rows, row["design"]) for row in rows}
+    designs = {row.design: _curves(rows, row.design) for row in rows}
     labels = sorted({label for curves in designs.values() for label in curves}, key=str)
     columns = {name: [x for x in labels if x.family == name] for name in (*FAMILIES, None)}
     shown = [name for name in columns if columns[name]]
@@ -95,14 +96,14 @@ def _draw(top: Axes, bottom: Axes, curve: Any, design: str, c: int) -> None:
     bottom.plot(p, slope, **{**style, "ms": 0 if len(p) > 1 else 4})
 
 
-def _curves(rows: Sequence[Mapping[str, Any]], design: str) -> Curves:
+def _curves(rows: Sequence[PressureRow], design: str) -> Curves:
     """Label to pressures (kPa), frequencies (Hz) and slopes of a design, each (row,)."""
     found: dict[Label, list[tuple[float, float, float]]] = {}
     for row in rows:
-        for mode in row["modes"] if row["design"] == design else []:
-            slope = mode["d_ln_f_d_ln_p"]
-            point = row["pressure_kPa"], mode["frequency_Hz"], np.nan if slope is None else slope
-            found.setdefault(Label(mode["c"], mode["m"], mode["kind"]), []).append(point)
+        for mode in row.modes if row.design == design else []:
+            slope = mode.d_ln_f_d_ln_p
+            point = row.pressure_kPa, mode.frequency_Hz, np.nan if slope is None else slope
+            found.setdefault(mode.label, []).append(point)
     return {label: tuple(np.array(points).T) for label, points in found.items()}
 
 

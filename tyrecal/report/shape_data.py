@@ -85,7 +85,7 @@ class Shapes(Result):
     surface_m: list[list[list[float]]] = Field(default=[])
     modes: list[Shape]
 
-    def of(self, table: Sequence[Named]) -> bool:
+    def are_of(self, table: Sequence[Named]) -> bool:
         """Whether these are the modes that a table lists, and not those of another run; a split
         doublet has its mean here, both members there."""
         for mode in self.modes:

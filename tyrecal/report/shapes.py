@@ -18,7 +18,6 @@ from ..modes.mode import Mode
 from ..tyre.mesh import SectionMesh
 from .figure import COLOURS, in_house_style, new_figure, save
 from .revolve import motion, skin, swept
-from .words import motion as words
 
 Array = np.ndarray
 
@@ -119,9 +118,7 @@ def _surface(mode: Mode, mesh: SectionMesh, scale: float | None) -> _Surface:
 def title(mode: Mode) -> str:
     """Label, frequency and words: '[2,1] 66.1 Hz: first out-of-plane bending'."""
     label = mode.label
-    return (
-        f"[{label.c},{label.m}] {mode.frequency_Hz:.1f} Hz: {words(label.c, label.m, label.kind)}"
-    )
+    return f"[{label.c},{label.m}] {mode.frequency_Hz:.1f} Hz: {label.motion}"
 
 
 def _view(

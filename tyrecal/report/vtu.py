@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import meshio
@@ -31,6 +32,16 @@ def write_vtu(path: Path, mode: Mode, mesh: SectionMesh, sectors: int = 60) -> N
     if mode.label.c:
         fields["second_of_pair"] = motion(mode.raw, nodes, angles, np.pi / 2)
     _write(path, grid, swept(nodes, mesh, angles), fields)
+
+
+def write_pressed(
+    folder: Path, designs: Mapping[str, Pressed], meshes: Mapping[str, SectionMesh]
+) -> None:
+    """footprint_DESIGN_LOADN.vtu of every design and load. Raises OSError."""
+    for name, pressed in designs.items():
+        for footprint in pressed.footprints:
+            path = folder / f"footprint_{name}_{footprint.load_N:g}N.vtu"
+            write_pressed_vtu(path, pressed, footprint, meshes[name])
 
 
 def write_pressed_vtu(

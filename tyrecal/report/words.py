@@ -6,15 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ..design.usual import MEASURED
-
-KNOWN = {
-    (0, 0, "axial"): "lateral",
-    (0, 0, "torsional"): "torsional",
-    (1, 1, None): "pitch / yaw-camber",
-    (1, 0, None): "vertical / fore-aft",
-    (2, 0, None): "ovalisation",
-}
-ORDINALS = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth")
+from ..modes.mode import Label
 
 CLOSE, FAR = 2.0, 5.0  # % of deviation from a target
 MINUS = "\N{MINUS SIGN}"
@@ -24,25 +16,13 @@ FAR_OFF = 30.0  # % after a fit: no tyre is that far from its model
 SLOWEST_HZ = 1.0  # no mode of a tyre is below
 
 
-def motion(c: int, m: int, kind: str | None = None) -> str:
-    """What the tyre does in mode [c, m]: ``motion(2, 1)`` is 'first out-of-plane bending'."""
-    if (c, m, kind) in KNOWN:
-        return KNOWN[c, m, kind]
-    if m > 1:
-        return "belt bends across its width"
-    if c < 2:
-        return "overtone"
-    order = ORDINALS[c - 2] if c - 2 < len(ORDINALS) else f"{c - 1}th"
-    return f"{order} {'out-of' if m else 'in'}-plane bending"
-
-
 def nearness(modes: Sequence[Mapping[str, Any]]) -> str:
     """How near the fitted frequencies (``modes`` of fit.json) come to their targets."""
     near = [mode for mode in modes if abs(mode["deviation_percent"]) <= CLOSE]
     worst = max(modes, key=lambda mode: abs(mode["deviation_percent"]))
     twice = [mode["deviation_percent"] for mode in modes for _ in range(mode["multiplicity"])]
     rms = (sum(x * x for x in twice) / len(twice)) ** 0.5
-    name = f"[{worst['c']},{worst['m']}] {motion(worst['c'], worst['m'], worst['kind'])}"
+    name = f"[{worst['c']},{worst['m']}] {Label(worst['c'], worst['m'], worst['kind']).motion}"
     return (
         f"{len(near)} of {len(modes)} frequencies come within {CLOSE:g} % of their targets (rms"
         f" {rms:.1f} %); farthest off is {name} with {worst['deviation_percent']:+.1f} %"

@@ -1,1 +1,34 @@
-"""Studies: what is asked of a tyre model beside its fit."""
+"""Studies of a tyre. A study is a `Result` with a `run`, its figures in `report` and its command in
+`cli`; one from outside names its `Result` as an entry point ``tyrecal.studies``."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from importlib.metadata import entry_points
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from .result import Result
+
+GROUP = "tyrecal.studies"
+RESULTS = {  # in the order of a page
+    "fit": "tyrecal.fit.result:FitResult",
+    "modes": "tyrecal.studies.modes:ModesResult",
+    "sweep-pressure": "tyrecal.studies.pressure_result:PressureSweep",
+    "footprint": "tyrecal.studies.footprint:FootprintResult",
+    "effects": "tyrecal.report.html.contents:Effects",
+    "sweep-load": "tyrecal.studies.loaded_result:LoadSweep",
+    "diagnose": "tyrecal.report.html.contents:DiagnosisResult",
+}
+
+
+def result_types() -> dict[str, type[Result]]:
+    """By the name of the study, those from outside last."""
+    outside = {entry.name: entry.value for entry in entry_points(group=GROUP)}
+    return {name: named(place) for name, place in {**RESULTS, **outside}.items()}
+
+
+def named(place: str) -> Any:
+    """What a place ``module:name`` names."""
+    module, _, name = place.partition(":")
+    return getattr(import_module(module), name)

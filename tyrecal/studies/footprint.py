@@ -3,13 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import Annotated
 
+from pydantic import Field
+
+from ..case import LoadedCase
+from ..deck.tyre_design import TyreDesign
 from ..evaluate.evaluator import Evaluator
 from ..evaluate.failure import EvaluationFailed
 from ..evaluate.pressed import Footprint, Pressed
 from ..tyre.mesh import SectionMesh
 from .patch import patch_of
+from .result import (
+    Column,
+    Failed,
+    Notify,
+    Part,
+    Positive,
+    Result,
+    Table,
+    csv_text,
+    missing,
+    not_reached,
+    silent,
+)
 
 USUAL = (0.8, 1.6)  # mean contact pressure of a passenger car's tyre over its inflation pressure
 Outcome = Pressed | EvaluationFailed
@@ -40,43 +57,99 @@ def progress(outcome: Outcome) -> tuple[int, EvaluationFailed | None]:
     return 0, outcome
 
 
+class FootprintRow(Part):
+    """The tyre at one load, SI."""
+
+    design: Annotated[str, Column("design", "")]
+    load_N: Annotated[Positive, Column("load N", ".0f")]
+    deflection_m: Annotated[float, Column("deflection mm", ".2f", 1e3)]
+    area_m2: Annotated[Positive, Column("area cm²", ".1f", 1e4)]
+    length_m: Annotated[float, Column("length mm", ".1f", 1e3)]
+    width_m: Annotated[float, Column("width mm", ".1f", 1e3)]
+    mean_pressure_Pa: Annotated[float, Column("mean kPa", ".1f", 1e-3)]
+    peak_pressure_Pa: Annotated[Positive, Column("peak kPa", ".1f", 1e-3)]
+    vertical_stiffness_N_per_m: Annotated[float, Column("stiffness N/mm", ".1f", 1e-3)]
+
+
+class FootprintFindings(Part):
+    """What the rows say."""
+
+    fitted_over_initial: list[dict[str, float]] = Field(default=[])  # area, where both were pressed
+    mean_over_inflation: dict[str, list[dict[str, float]]] = Field(default={})  # pressure, by load
+    words: list[str]
+
+
+class FootprintResult(Result):
+    """footprint.json"""
+
+    study, stem, heading = "footprint", "footprint", "Footprint"
+
+    pressure_kPa: dict[str, float] = Field(default={})  # by design
+    designs: dict[str, dict[str, float]] = Field(default={})  # values of the variables
+    rows: list[FootprintRow]
+    failed: list[Failed]
+    findings: FootprintFindings
+
+    def csv(self) -> str:
+        return csv_text(list(FootprintRow.model_fields), (row.model_dump() for row in self.rows))
+
+    def tables(self) -> list[Table]:
+        caption = "mean and peak: contact pressure; stiffness: tangent at the load"
+        columns = list(FootprintRow.columns().values())
+        return [Table(columns, [row.cells() for row in self.rows], caption=caption)]
+
+    def sentences(self) -> list[str]:
+        return self.findings.words
+
+    def doubts(self) -> list[str]:
+        return missing(self.failed)
+
+
+def run(
+    case: LoadedCase,
+    evaluator: Evaluator,
+    designs: Mapping[str, Mapping[str, float]],
+    loads_N: Sequence[float],
+    jobs: int = 1,
+    notify: Notify = silent,
+) -> tuple[FootprintResult, dict[str, Pressed], dict[str, SectionMesh]]:
+    """Every design at rising loads: the result, and what was reached, with the sections' meshes.
+    Raises as ``press`` does; the result has no rows where no design bore the first load."""
+
+    def told(design: str, outcome: Outcome) -> None:
+        reached, failure = progress(outcome)
+        if failure:
+            notify(f"{design}, {loads_N[reached]:g} N", failure)
+        notify(f"{design}: {reached} loads", None)
+
+    outcomes = press(evaluator, designs, loads_N, jobs, told)
+    pressed = {name: each for name, each in outcomes.items() if isinstance(each, Pressed)}
+    meshes = {name: TyreDesign(case, designs[name]).tyre.mesh for name in pressed}
+    return footprint_result(designs, loads_N, outcomes, meshes), pressed, meshes
+
+
 def footprint_result(
     designs: Mapping[str, Mapping[str, float]],
     loads_N: Sequence[float],
     outcomes: Mapping[str, Outcome],
     meshes: Mapping[str, SectionMesh],
-) -> dict[str, Any]:
-    """The content of footprint.json: ``rows``, ``failed``, ``findings``, the ``designs``' values.
-
-    outcomes: of ``press``, one of them at least with footprints; meshes: of the designs' sections.
-    """
+) -> FootprintResult:
+    """outcomes: of ``press``; meshes: of the designs' sections."""
     pressed = {name: each for name, each in outcomes.items() if isinstance(each, Pressed)}
     rows = [
-        {"design": name, **footprint_row(each, footprint, meshes[name])}
+        FootprintRow(design=name, **footprint_row(each, footprint, meshes[name]))
         for name, each in pressed.items()
         for footprint in each.footprints
     ]
-    failed = []
-    for name, outcome in outcomes.items():
-        reached, failure = progress(outcome)
-        if failure:
-            failed.append(
-                {
-                    "design": name,
-                    "load_N": loads_N[reached],
-                    "cause": failure.cause,
-                    "words": failure.words,
-                }
-            )
     pressures = {name: each.pressure_kPa for name, each in pressed.items()}
-    return {
-        "format": 1,
-        "pressure_kPa": pressures,
-        "designs": {name: dict(values) for name, values in designs.items()},
-        "rows": rows,
-        "failed": failed,
-        "findings": findings(rows, pressures),
-    }
+    return FootprintResult(
+        format=1,
+        pressure_kPa=pressures,
+        designs={name: dict(values) for name, values in designs.items()},
+        rows=rows,
+        failed=not_reached(loads_N, {name: progress(each) for name, each in outcomes.items()}),
+        findings=findings(rows, pressures),
+    )
 
 
 def footprint_row(pressed: Pressed, footprint: Footprint, mesh: SectionMesh) -> dict[str, float]:
@@ -95,27 +168,23 @@ def footprint_row(pressed: Pressed, footprint: Footprint, mesh: SectionMesh) -> 
     }
 
 
-def findings(
-    rows: Sequence[Mapping[str, Any]], pressure_kPa: Mapping[str, float]
-) -> dict[str, Any]:
-    """What the rows say: ``fitted_over_initial`` area, where both were pressed; per design
-    ``mean_over_inflation``, its mean contact pressure over its inflation pressure
-    (``pressure_kPa``), each by load; ``words``: sentences."""
-    area = {(row["design"], row["load_N"]): row["area_m2"] for row in rows}
+def findings(rows: Sequence[FootprintRow], pressure_kPa: Mapping[str, float]) -> FootprintFindings:
+    """What the rows say; ``pressure_kPa``: inflation by design."""
+    area = {(row.design, row.load_N): row.area_m2 for row in rows}
     loads = [load for design, load in area if design == "fitted" and ("initial", load) in area]
     ratios = {load: area["fitted", load] / area["initial", load] for load in loads}
     words = [_larger(ratios)] if ratios else []
     means = {}
     for design, kPa in pressure_kPa.items():
         if kPa:
-            own = [row for row in rows if row["design"] == design]
-            means[design] = {row["load_N"]: row["mean_pressure_Pa"] / kPa / 1e3 for row in own}
+            own = [row for row in rows if row.design == design]
+            means[design] = {row.load_N: row.mean_pressure_Pa / kPa / 1e3 for row in own}
             words.append(f"{design}: {_mean(means[design])}")
-    return {
-        "fitted_over_initial": _by_load(ratios),
-        "mean_over_inflation": {design: _by_load(shares) for design, shares in means.items()},
-        "words": words,
-    }
+    return FootprintFindings(
+        fitted_over_initial=_by_load(ratios),
+        mean_over_inflation={design: _by_load(shares) for design, shares in means.items()},
+        words=words,
+    )
 
 
 def _by_load(values: Mapping[float, float]) -> list[dict[str, float]]:

@@ -6,89 +6,183 @@ from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import Any
 
+from pydantic import Field
+
+from ..case import LoadedCase
+from ..evaluate.evaluator import Evaluator
 from ..modes.loaded import SYMMETRIES
 from ..modes.mode import Label
-from .loaded import Loaded, LoadedMode, LoadedTyre, Outcome, progress
+from .loaded import Loaded, LoadedMode, LoadedTyre, Outcome, load_tyres, progress
+from .modes import ModesFindings, ModesResult
+from .result import (
+    NAMED,
+    Column,
+    Failed,
+    ModeEntry,
+    Notify,
+    Part,
+    Result,
+    Table,
+    csv_text,
+    missing,
+    not_reached,
+    of_last_design,
+    silent,
+    with_design,
+)
 
 STEADY = 1e-3  # Hz, below which a split is none
 
 
-def loaded_modes_result(values: Mapping[str, float], tyre: LoadedTyre) -> dict[str, Any]:
+class LoadRow(Part):
+    """A design at a load; 0: the unloaded tyre."""
+
+    design: str
+    load_N: float
+    deflection_m: float
+    modes: list[ModeEntry]
+
+
+class LoadFindings(Part):
+    """Of one design."""
+
+    design: str
+    splits: list[dict[str, Any]] = Field(default=[])  # of doublets, antisymmetric less symmetric
+    least_overlap: float = 1.0  # with the unloaded member
+    words: list[str]
+
+
+class LoadSweep(Result):
+    """load_sweep.json"""
+
+    study, stem, heading = "sweep-load", "load_sweep", "Frequencies over load"
+    command = "modes --sweep-load"
+
+    pressure_kPa: dict[str, float] = Field(default={})  # by design
+    designs: dict[str, dict[str, float]] = Field(default={})  # values of the variables
+    rows: list[LoadRow]
+    failed: list[Failed]
+    findings: list[LoadFindings]
+
+    def csv(self) -> str:
+        keys = ["design", "load_N", "deflection_m", "c", "m", "kind", "symmetry", "frequency_Hz"]
+        rows = ({**row.model_dump(), **m.model_dump()} for row in self.rows for m in row.modes)
+        return csv_text([*keys, "overlap", "spanned"], rows)
+
+    def tables(self) -> list[Table]:
+        return [self._table(design) for design in dict.fromkeys(row.design for row in self.rows)]
+
+    def _table(self, design: str) -> Table:
+        """A line a member of a doublet: Hz at each load."""
+        own = [row for row in self.rows if row.design == design]
+        hertz = [Column(f"{row.load_N:g} N") for row in own]
+        found = [{(m.label, m.symmetry): m for m in row.modes} for row in own]
+        members = {key: mode for modes in reversed(found) for key, mode in modes.items()}
+        lowest = {
+            label: min(m.frequency_Hz for (other, _), m in members.items() if other == label)
+            for label, _ in members
+        }
+        order = sorted(members, key=lambda k: (lowest[k[0]], str(k[0]), k[1] != SYMMETRIES[0]))
+        rows = [
+            [
+                *members[key].named(),
+                key[1],
+                *(hertz[0].cell(m[key].frequency_Hz if key in m else None) for m in found),
+            ]
+            for key in order
+        ]
+        return Table([*NAMED, Column("symmetry", ""), *hertz], rows, f"{design}, Hz")
+
+    def sentences(self) -> list[str]:
+        return with_design(self.findings)
+
+    def summary(self) -> list[str]:
+        return of_last_design(self.findings)
+
+    def doubts(self) -> list[str]:
+        return missing(self.failed)
+
+
+def run(
+    case: LoadedCase,
+    evaluator: Evaluator,
+    designs: Mapping[str, Mapping[str, float]],
+    loads_N: Sequence[float],
+    jobs: int = 1,
+    notify: Notify = silent,
+) -> LoadSweep:
+    """Every design at rising loads. Raises as ``load_tyres`` does."""
+    above = [load for load in loads_N if load]
+
+    def told(design: str, outcome: Outcome) -> None:
+        reached, failure = progress(outcome)
+        if failure:
+            notify(f"{design}, {above[reached]:g} N", failure)
+        notify(f"{design}: {reached} loads", None)
+
+    return load_sweep_result(
+        designs, loads_N, load_tyres(case, evaluator, designs, loads_N, jobs, told)
+    )
+
+
+def loaded_modes_result(values: Mapping[str, float], tyre: LoadedTyre) -> ModesResult:
     """The content of modes.json: the tyre at its last load."""
     last = tyre.loads[-1]
-    return {
-        "format": 1,
-        "pressure_kPa": tyre.pressure_kPa,
-        "load_N": last.load_N,
-        "mass_kg": tyre.mass_kg,
-        "variables": dict(values),
-        "deflection_m": last.deflection_m,
-        "modes": [_entry(mode) for mode in last.modes],
-        "findings": {"words": _doubts([last])},
-    }
+    return ModesResult(
+        format=1,
+        pressure_kPa=tyre.pressure_kPa,
+        load_N=last.load_N,
+        mass_kg=tyre.mass_kg,
+        variables=dict(values),
+        deflection_m=last.deflection_m,
+        modes=[_entry(mode) for mode in last.modes],
+        findings=ModesFindings(words=_doubts([last])),
+    )
 
 
 def load_sweep_result(
     designs: Mapping[str, Mapping[str, float]],
     loads_N: Sequence[float],
     outcomes: Mapping[str, Outcome],
-) -> dict[str, Any]:
-    """The content of load_sweep.json: ``rows``, ``failed``, ``findings`` of each design, the
-    ``designs``' values.
-
-    outcomes: of ``load_tyres``, one LoadedTyre at least.
-    """
+) -> LoadSweep:
+    """outcomes: of ``load_tyres``."""
     tyres = {name: each for name, each in outcomes.items() if isinstance(each, LoadedTyre)}
     above = [load for load in loads_N if load]
-    failed = []
-    for name, outcome in outcomes.items():
-        reached, failure = progress(outcome)
-        if failure:
-            failed.append(
-                {
-                    "design": name,
-                    "load_N": above[reached],
-                    "cause": failure.cause,
-                    "words": failure.words,
-                }
+    return LoadSweep(
+        format=1,
+        pressure_kPa={name: tyre.pressure_kPa for name, tyre in tyres.items()},
+        designs={name: dict(values) for name, values in designs.items()},
+        rows=[
+            LoadRow(
+                design=name,
+                load_N=each.load_N,
+                deflection_m=each.deflection_m,
+                modes=[_entry(mode) for mode in each.modes],
             )
-    return {
-        "format": 1,
-        "pressure_kPa": {name: tyre.pressure_kPa for name, tyre in tyres.items()},
-        "designs": {name: dict(values) for name, values in designs.items()},
-        "rows": [
-            {
-                "design": name,
-                "load_N": each.load_N,
-                "deflection_m": each.deflection_m,
-                "modes": [_entry(mode) for mode in each.modes],
-            }
             for name, tyre in tyres.items()
             for each in tyre.loads
         ],
-        "failed": failed,
-        "findings": [{"design": name, **findings(tyre.loads)} for name, tyre in tyres.items()],
-    }
+        failed=not_reached(above, {name: progress(each) for name, each in outcomes.items()}),
+        findings=[findings(name, tyre.loads) for name, tyre in tyres.items()],
+    )
 
 
-def _entry(mode: LoadedMode) -> dict[str, Any]:
+def _entry(mode: LoadedMode) -> ModeEntry:
     label = mode.member.label
-    return {
-        "c": label.c,
-        "m": label.m,
-        "kind": label.kind,
-        "frequency_Hz": mode.frequency_Hz,
-        "multiplicity": 1,
-        "symmetry": mode.member.symmetry,
-        "overlap": round(mode.overlap, 6),
-        "spanned": round(mode.spanned, 6),
-    }
+    return ModeEntry(
+        c=label.c,
+        m=label.m,
+        kind=label.kind,
+        frequency_Hz=mode.frequency_Hz,
+        multiplicity=1,
+        symmetry=mode.member.symmetry,
+        overlap=round(mode.overlap, 6),
+        spanned=round(mode.spanned, 6),
+    )
 
 
-def findings(loads: Sequence[Loaded]) -> dict[str, Any]:
-    """What one design's loads say: ``splits`` of each doublet, antisymmetric less symmetric member,
-    and whether their size grows with the load; ``least_overlap`` with the unloaded member;
-    ``words``: sentences."""
+def findings(design: str, loads: Sequence[Loaded]) -> LoadFindings:
+    """Whether splits grow with the load, which frequencies fall, how far shapes change."""
     tables = {
         each.load_N: {(m.member.label, m.member.symmetry): m.frequency_Hz for m in each.modes}
         for each in loads
@@ -106,11 +200,12 @@ def findings(loads: Sequence[Loaded]) -> dict[str, Any]:
             " followed load by load); the modes at the load before make up"
             f" {min(m.spanned for m in loaded):.2f} of each shape or more"
         )
-    return {
-        "splits": splits,
-        "least_overlap": least.overlap if least else 1.0,
-        "words": words + _doubts(loads),
-    }
+    return LoadFindings(
+        design=design,
+        splits=splits,
+        least_overlap=least.overlap if least else 1.0,
+        words=words + _doubts(loads),
+    )
 
 
 def _load_of(loads: Sequence[Loaded], mode: LoadedMode) -> float:

@@ -3,39 +3,86 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Annotated, Any
+
+from pydantic import Field
 
 from ..case import LoadedCase
 from ..evaluate.results import Evaluation
 from ..modes.find import labelled
 from ..modes.mode import Mode
+from .result import NAMED, Column, ModeEntry, Part, Result, Table
+
+EXTRA = {"symmetry": "", "member": "d", "clarity": ".2f", "overlap": ".2f"}  # forms
+
+
+class ModesFindings(Part):
+    """Doubts about the names of modes under a load."""
+
+    words: list[str] = Field(default=[])
+
+
+class ModesResult(Result):
+    """modes.json"""
+
+    study, stem, heading = "modes", "modes", "Modes"
+
+    pressure_kPa: float
+    load_N: float
+    mass_kg: float
+    variables: dict[str, float]
+    deflection_m: float | None = None
+    modes: Annotated[list[ModeEntry], Field(min_length=1)]
+    findings: ModesFindings = ModesFindings()
+
+    def tables(self) -> list[Table]:
+        known = ("symmetry", "member", "clarity", "overlap")
+        extra = [key for key in known if any(getattr(m, key) is not None for m in self.modes)]
+        columns = [*NAMED, Column("Hz"), *(Column(key, EXTRA[key]) for key in extra)]
+        rows = [
+            [
+                *m.named(),
+                *(
+                    c.cell(getattr(m, k))
+                    for c, k in zip(columns[2:], ["frequency_Hz", *extra], strict=True)
+                ),
+            ]
+            for m in self.modes
+        ]
+        load = f", {self.load_N:g} N" if self.load_N else ""
+        title = f"{self.pressure_kPa:g} kPa{load}, {self.mass_kg:.2f} kg"
+        return [Table(columns, rows, title, str(self.provenance or ""))]
+
+    def sentences(self) -> list[str]:
+        return self.findings.words
 
 
 def modes_result(
     case: LoadedCase, values: Mapping[str, float], evaluation: Evaluation
-) -> tuple[dict[str, Any], list[Mode]]:
-    """The content of modes.json, and the labelled modes, both by rising frequency."""
+) -> tuple[ModesResult, list[Mode]]:
+    """The result, and the labelled modes, both by rising frequency."""
     modes = labelled(evaluation)
-    result = {
-        "format": 1,
-        "pressure_kPa": evaluation.pressure_kPa,
-        "load_N": 0.0,
-        "mass_kg": evaluation.mass_kg,
-        "variables": dict(values),
-        "modes": sorted(
+    result = ModesResult(
+        format=1,
+        pressure_kPa=evaluation.pressure_kPa,
+        load_N=0.0,
+        mass_kg=evaluation.mass_kg,
+        variables=dict(values),
+        modes=sorted(
             (entry for mode in modes for entry in _entries(mode)),
-            key=lambda entry: entry["frequency_Hz"],
+            key=lambda entry: entry.frequency_Hz,
         ),
-    }
+    )
     return result, modes
 
 
-def _entries(mode: Mode) -> list[dict[str, Any]]:
+def _entries(mode: Mode) -> list[ModeEntry]:
     """A mode, or the two members of a doublet that is split."""
+    entry = mode_entry(mode)
     if mode.raw.members is None:
-        return [mode_entry(mode)]
+        return [ModeEntry(**entry)]
     return [
-        {**mode_entry(mode), "frequency_Hz": hertz, "multiplicity": 1, "member": member}
+        ModeEntry(**{**entry, "frequency_Hz": hertz, "multiplicity": 1, "member": member})
         for member, hertz in enumerate(mode.raw.members, start=1)
     ]
 

@@ -8,17 +8,32 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from pydantic import Field
 
 from ..modes.follow import follow
 from ..modes.mode import FAMILIES, Label
 from .pressure import State
+from .result import Part
 
 BENT = "concave", "convex"
 STRAIGHT = 1e-6  # of a frequency: solvers that print them give seven digits
 
 
-def findings(states: Sequence[State], labels: Sequence[Label]) -> dict[str, Any]:
-    """Findings on one design's states by rising pressure, two at least; ``words`` has sentences."""
+class PressureFindings(Part):
+    """Of one design."""
+
+    design: str
+    from_kPa: float = 0.0
+    to_kPa: float = 0.0
+    modes: list[dict[str, Any]] = Field(default=[])  # rise and curvature
+    families: list[dict[str, Any]] = Field(default=[])
+    least_mac: float = 1.0  # between neighbouring pressures
+    disagreements: list[dict[str, Any]] = Field(default=[])  # of labels and shapes followed
+    words: list[str]
+
+
+def findings(states: Sequence[State], labels: Sequence[Label]) -> PressureFindings:
+    """Findings on one design's states by rising pressure, two at least."""
     p = np.array([state.pressure_kPa for state in states])
     table = {label: np.array([s.frequencies[label] for s in states]) for label in labels}
     modes = [{"c": x.c, "m": x.m, "kind": x.kind, **_curve(p, table[x])} for x in labels]
@@ -49,8 +64,7 @@ def findings(states: Sequence[State], labels: Sequence[Label]) -> dict[str, Any]
             if step.before != step.after
         ],
     }
-    result["words"] = _words(result, labels)
-    return result
+    return PressureFindings(**result, words=_words(result, labels))
 
 
 def _curve(p: np.ndarray, f: np.ndarray) -> dict[str, Any]:

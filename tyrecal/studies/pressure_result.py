@@ -1,48 +1,166 @@
-"""The content of pressure_sweep.json."""
+"""Frequencies and their slopes over the pressure: pressure_sweep.json."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
+from pydantic import Field
 
 from ..case import LoadedCase
+from ..evaluate.evaluator import Evaluator
 from ..fit.problem import read_targets
 from ..modes.mode import Label
 from .modes import mode_entry
-from .pressure import Failure, Outcome, State
-from .pressure_findings import findings
+from .pressure import Failure, Outcome, State, sweep
+from .pressure_findings import PressureFindings, findings
+from .result import (
+    NAMED,
+    Column,
+    Failed,
+    ModeEntry,
+    Notify,
+    Part,
+    Positive,
+    Result,
+    Table,
+    csv_text,
+    missing,
+    of_last_design,
+    silent,
+    with_design,
+)
+
+
+class PressureRow(Part):
+    """A design at a pressure."""
+
+    design: str
+    pressure_kPa: Positive
+    modes: list[ModeEntry]  # by rising frequency
+
+
+class PressureSweep(Result):
+    """pressure_sweep.json"""
+
+    study, stem, heading = "sweep-pressure", "pressure_sweep", "Frequencies over pressure"
+
+    slopes: str = ""  # "exact", or by "differences"
+    designs: dict[str, dict[str, float]] = Field(default={})  # values of the variables
+    rows: list[PressureRow]
+    failed: list[Failed] = Field(default=[])
+    findings: list[PressureFindings]  # of each design with two pressures or more
+
+    def csv(self) -> str:
+        keys = ["design", "pressure_kPa", "c", "m", "kind", "multiplicity", "frequency_Hz"]
+        rows = ({**row.model_dump(), **m.model_dump()} for row in self.rows for m in row.modes)
+        return csv_text([*keys, "d_ln_f_d_ln_p"], rows)
+
+    def tables(self) -> list[Table]:
+        return [self._ends(each) for each in self.findings if each.modes]
+
+    def _ends(self, found: PressureFindings) -> Table:
+        """Hz at both ends, rise, slopes at both ends, curvature."""
+        low, high = f"{found.from_kPa:g} kPa", f"{found.to_kPa:g} kPa"
+        slope = Column(high, ".3f")
+        columns = [
+            *NAMED,
+            hertz := Column(f"Hz, {low}"),
+            Column(high),
+            rise := Column("rise Hz", "+.2f"),
+            share := Column("rise %", "+.1f"),
+            Column("slope"),
+            slope,
+            Column("curvature", ""),
+        ]
+        own = [row for row in self.rows if row.design == found.design]
+        first, last = ({mode.label: mode for mode in row.modes} for row in (own[0], own[-1]))
+        rows = []
+        for mode in found.modes:
+            label = Label(mode["c"], mode["m"], mode["kind"])
+            ends = first[label], last[label]
+            rows.append(
+                [
+                    *ends[0].named(),
+                    *(hertz.cell(end.frequency_Hz) for end in ends),
+                    rise.cell(mode["rise_Hz"]),
+                    share.cell(mode["rise_percent"]),
+                    *(slope.cell(end.d_ln_f_d_ln_p) for end in ends),
+                    mode["curvature"],
+                ]
+            )
+        caption = f"slope: d ln f / d ln p, at {found.from_kPa:g} and {high}"
+        return Table(columns, rows, found.design, caption)
+
+    def numbers(self) -> list[Table]:
+        tables = []
+        for design in dict.fromkeys(row.design for row in self.rows):
+            own = [row for row in self.rows if row.design == design]
+            columns = [*NAMED, *(Column(f"{row.pressure_kPa:.5g}") for row in own)]
+            modes = {mode.label: mode for row in own for mode in row.modes}
+            hertz = [{mode.label: mode.frequency_Hz for mode in row.modes} for row in own]
+            rows = [
+                [*mode.named(), *(columns[-1].cell(each.get(label)) for each in hertz)]
+                for label, mode in modes.items()
+            ]
+            tables.append(Table(columns, rows, f"{design}: Hz at each pressure, kPa"))
+        return tables
+
+    def sentences(self) -> list[str]:
+        return with_design(self.findings)
+
+    def summary(self) -> list[str]:
+        return of_last_design(self.findings)
+
+    def doubts(self) -> list[str]:
+        return missing(self.failed)
+
+
+def run(
+    case: LoadedCase,
+    evaluator: Evaluator,
+    designs: Mapping[str, Mapping[str, float]],
+    pressures_kPa: Sequence[float],
+    jobs: int = 1,
+    notify: Notify = silent,
+) -> PressureSweep:
+    """Every design at every pressure. Raises as ``sweep`` does, and the first failure where no
+    pressure could be evaluated."""
+
+    def told(outcome: Outcome) -> None:
+        place = f"{outcome.design}, {outcome.pressure_kPa:g} kPa"
+        if isinstance(outcome, Failure):
+            notify(place, outcome.failed)
+        else:
+            notify(f"{place}: {len(outcome.modes)} modes", None)
+
+    return sweep_result(case, designs, sweep(case, evaluator, designs, pressures_kPa, jobs, told))
 
 
 def sweep_result(
     case: LoadedCase, designs: Mapping[str, Mapping[str, float]], outcomes: Sequence[Outcome]
-) -> dict[str, Any]:
-    """The content of pressure_sweep.json: ``rows``, ``failed``, ``findings`` of each design with
-    two pressures or more, the ``designs``' values, and where the slopes come from.
-
-    outcomes: of ``sweep``, one State at least.
-    """
+) -> PressureSweep:
+    """outcomes: of ``sweep``."""
     states = [each for each in outcomes if isinstance(each, State)]
-    labels = _swept_labels(case, states)
+    labels = _swept_labels(case, states) if states else []
     by_design = [[s for s in states if s.design == name] for name in designs]
-    return {
-        "format": 1,
-        "slopes": "exact" if all(s.slopes is not None for s in states) else "differences",
-        "designs": {name: dict(values) for name, values in designs.items()},
-        "rows": [row for each in by_design for row in _rows(each, labels)],
-        "failed": [
-            {
-                "design": each.design,
-                "pressure_kPa": each.pressure_kPa,
-                "cause": each.failed.cause,
-                "words": each.failed.words,
-            }
+    return PressureSweep(
+        format=1,
+        slopes="exact" if all(s.slopes is not None for s in states) else "differences",
+        designs={name: dict(values) for name, values in designs.items()},
+        rows=[row for each in by_design for row in _rows(each, labels)],
+        failed=[
+            Failed(
+                design=each.design,
+                pressure_kPa=each.pressure_kPa,
+                cause=each.failed.cause,
+                words=each.failed.words,
+            )
             for each in outcomes
             if isinstance(each, Failure)
         ],
-        "findings": [findings(each, labels) for each in by_design if len(each) > 1],
-    }
+        findings=[findings(each, labels) for each in by_design if len(each) > 1],
+    )
 
 
 def _swept_labels(case: LoadedCase, states: Sequence[State]) -> list[Label]:
@@ -71,18 +189,18 @@ def slopes(states: Sequence[State], labels: Sequence[Label]) -> dict[Label, list
     return {label: table[:, i].tolist() for i, label in enumerate(labels)}
 
 
-def _rows(states: Sequence[State], labels: Sequence[Label]) -> list[dict[str, Any]]:
-    """Entries of pressure_sweep.json for the states of one design, modes by rising frequency."""
-    table = slopes(states, labels)
+def _rows(states: Sequence[State], labels: Sequence[Label]) -> list[PressureRow]:
+    """The rows of one design."""
+    table = slopes(states, labels) if states else {}
     return [
-        {
-            "design": state.design,
-            "pressure_kPa": state.pressure_kPa,
-            "modes": [
-                {**mode_entry(mode), "d_ln_f_d_ln_p": table[mode.label][k]}
+        PressureRow(
+            design=state.design,
+            pressure_kPa=state.pressure_kPa,
+            modes=[
+                ModeEntry(**mode_entry(mode), d_ln_f_d_ln_p=table[mode.label][k])
                 for mode in state.modes
                 if mode.label in table
             ],
-        }
+        )
         for k, state in enumerate(states)
     ]

@@ -1,21 +1,81 @@
-"""What all result files share: pieces that are checked when read, and what a file is of."""
+"""What all studies' results share: files, tables and words come from one class a study.
+
+A result is a `Result` with its numbers as fields. What a number is called in tables, its unit and
+its digits stand at its field, as a `Column`; JSON, CSV, the terminal and the page follow from it.
+"""
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+import csv
+import io
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from ..evaluate.failure import EvaluationFailed
+from ..files import json_text
 from ..modes.mode import Label
 
 Positive = Annotated[float, Field(gt=0)]
 Wave = Annotated[int, Field(ge=0, le=200)]
 
 
+@dataclass(frozen=True)
+class Column:
+    """A column of a table."""
+
+    name: str  # with the unit
+    form: str = ".2f"  # of a number; "": the column holds words
+    per_unit: float = 1.0  # what a value of the file is multiplied with
+
+    def cell(self, value: Any) -> str | None:
+        """A value as it is shown."""
+        if value is None or isinstance(value, str):
+            return value
+        return format(self.per_unit * value, self.form)
+
+
+@dataclass(frozen=True)
+class Deviation:
+    """A cell with a colour or mark that says how far off a target is."""
+
+    percent: float
+
+
+Cell = str | Deviation | None  # None: there is no value
+NAMED = (Column("mode", ""), Column("motion", ""))  # see `Named.named`
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table, for a terminal and for a page alike."""
+
+    columns: Sequence[Column]
+    rows: Sequence[Sequence[Cell]]
+    title: str = ""
+    caption: str = ""
+
+
 class Part(BaseModel):
     """A piece of a result file; numbers are finite, SI or as named."""
 
     model_config = ConfigDict(extra="ignore", allow_inf_nan=False, frozen=True)
+
+    @classmethod
+    def columns(cls) -> dict[str, Column]:
+        """By field, those that tables show."""
+        return {
+            key: each
+            for key, field in cls.model_fields.items()
+            for each in field.metadata
+            if isinstance(each, Column)
+        }
+
+    def cells(self) -> list[str | None]:
+        """A table's row."""
+        return [column.cell(getattr(self, key)) for key, column in self.columns().items()]
 
 
 class State(Part):
@@ -41,12 +101,95 @@ class Provenance(Part):
     targets: str | None = None
     measured_sha256: str | None = None
 
+    def __str__(self) -> str:
+        given = [f"{name}={value:g}" for name, value in self.overrides.items()]
+        solver = f"{self.solver} {self.solver_version}"
+        return ", ".join([f"tyre {self.tyre_sha256[:8]}", *given, f"mesh {self.mesh}", solver])
+
 
 class Result(Part):
-    """A result file, not only a piece of one; older ones do not say what they are of."""
+    """A result file; older ones do not say what they are of."""
 
-    format: Literal[1]
+    study: ClassVar[str] = ""  # the command, as its entry in run.json
+    stem: ClassVar[str] = ""  # of its files
+    command: ClassVar[str] = ""  # where it is not the study
+    heading: ClassVar[str] = ""  # on the page
+    figures: ClassVar[str] = ""  # "module:function" of a study from outside, see `page`
+
+    format: Literal[1] = 1
     provenance: Provenance | None = None
+
+    def content(self) -> dict[str, Any]:
+        """What stands in the JSON file."""
+        return self.model_dump(exclude_unset=True, by_alias=True)
+
+    def stamped(self, provenance: Mapping[str, Any]) -> Self:
+        """The result with what it is of."""
+        return self.model_copy(update={"provenance": Provenance.model_validate(provenance)})
+
+    def texts(self) -> dict[str, str]:
+        """The files by name."""
+        texts = {f"{self.stem}.json": json_text(self.content())}
+        return texts | ({f"{self.stem}.csv": table} if (table := self.csv()) else {})
+
+    def csv(self) -> str:
+        """The rows, all digits, in the units of the JSON file; "": there is no such file."""
+        return ""
+
+    def tables(self) -> list[Table]:
+        """For the terminal and the page."""
+        return []
+
+    def numbers(self) -> list[Table]:
+        """More of them, for the page alone."""
+        return []
+
+    def sentences(self) -> list[str]:
+        """What was found, in sentences."""
+        return []
+
+    def summary(self) -> list[str]:
+        """The same in short, for the head of the page."""
+        return self.sentences()
+
+    def doubts(self) -> list[str]:
+        """What must not be overlooked."""
+        return []
+
+
+class Failed(Part):
+    """What a study could not reach."""
+
+    design: str
+    load_N: float | None = None
+    pressure_kPa: float | None = None
+    cause: str = ""
+    words: str = ""
+
+    @property
+    def place(self) -> str:
+        """Design and load or pressure."""
+        at = [f"{self.load_N:g} N"] if self.load_N is not None else []
+        at += [f"{self.pressure_kPa:g} kPa"] if self.pressure_kPa is not None else []
+        return ", ".join([self.design, *at])
+
+
+Notify = Callable[[str, EvaluationFailed | None], None]  # words; why a place was not reached
+
+
+def silent(words: str, failure: EvaluationFailed | None) -> None:
+    """Say nothing of how a study goes."""
+
+
+def not_reached(
+    loads_N: Sequence[float], progress: Mapping[str, tuple[int, EvaluationFailed | None]]
+) -> list[Failed]:
+    """By design, how many loads were reached, and why no more."""
+    return [
+        Failed(design=name, load_N=loads_N[count], cause=failure.cause, words=failure.words)
+        for name, (count, failure) in progress.items()
+        if failure
+    ]
 
 
 class Named(Part):
@@ -61,3 +204,44 @@ class Named(Part):
     def label(self) -> Label:
         """[c, m]"""
         return Label(self.c, self.m, self.kind)
+
+    def named(self) -> list[str]:
+        """The cells of `NAMED`."""
+        pair = " ×2" if getattr(self, "multiplicity", 1) > 1 else ""
+        return [f"[{self.c},{self.m}]{pair}", self.label.motion]
+
+
+class ModeEntry(Named):
+    """A mode of modes.json or of a sweep."""
+
+    multiplicity: int = 1
+    clarity: float | None = None  # of its label, 0 to 1
+    member: int | None = None  # of a split doublet
+    symmetry: str | None = None  # about the patch
+    overlap: float | None = None  # with the unloaded shape of its name
+    spanned: float | None = None  # by the modes at the load before
+    d_ln_f_d_ln_p: float | None = None
+
+
+def csv_text(keys: Sequence[str], rows: Iterable[Mapping[str, Any]], end: str = "\n") -> str:
+    """Rows as CSV, all digits."""
+    text = io.StringIO(newline="")
+    writer = csv.DictWriter(text, keys, restval="", extrasaction="ignore", lineterminator=end)
+    writer.writeheader()
+    writer.writerows(rows)
+    return text.getvalue()
+
+
+def missing(failed: Sequence[Failed]) -> list[str]:
+    """What was not reached, in words."""
+    return [f"not reached: {each.place}: {each.words or each.cause}" for each in failed]
+
+
+def with_design(found: Sequence[Any]) -> list[str]:
+    """Sentences, each with its design."""
+    return [f"{each.design}: {words}" for each in found for words in each.words]
+
+
+def of_last_design(found: Sequence[Any]) -> list[str]:
+    """Of the last design: the fitted one where there are two."""
+    return [f"{each.design}: {'; '.join(each.words)}" for each in found[-1:]]

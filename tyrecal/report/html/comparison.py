@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TypeVar
 
-from ..table import QUANTITIES, percent
-from ..words import CLOSE, FAR, MINUS, motion
-from .contents import Diagnosis, Fit, FittedMode, Variable
+from ...fit.result import QUANTITIES, FitResult, FittedMode
+from ..words import CLOSE, FAR, MINUS
+from .contents import DiagnosisResult
 from .results import Results
 from .summary import VERDICTS
 
@@ -61,7 +61,7 @@ def comparison(results: Sequence[Results]) -> list[Group]:
     return groups
 
 
-def _whole(fits: Sequence[Fit | None]) -> Iterator[Row]:
+def _whole(fits: Sequence[FitResult | None]) -> Iterator[Row]:
     yield Row("objective", "initial", _cells(fits, lambda fit: _objective(fit, "initial_")))
     yield Row("objective", "fitted", _cells(fits, _objective))
     yield Row("worst mode", "", _cells(fits, _worst))
@@ -70,7 +70,7 @@ def _whole(fits: Sequence[Fit | None]) -> Iterator[Row]:
     yield Row("mass", "tyre without rim", _cells(fits, lambda fit: f"{fit.mass_kg:.2f} kg"))
 
 
-def _verdicts(diagnoses: Sequence[Diagnosis | None]) -> Iterator[Row]:
+def _verdicts(diagnoses: Sequence[DiagnosisResult | None]) -> Iterator[Row]:
     yield Row("verdict", "", _cells(diagnoses, lambda d: VERDICTS[d.verdict]))
     yield Row("likeliest", "probability", _cells(diagnoses, _likeliest))
 
@@ -79,15 +79,15 @@ def _cells(contents: Sequence[Content | None], tell: Callable[[Content], str]) -
     return [NOTHING if each is None else tell(each) for each in contents]
 
 
-def _objective(fit: Fit, when: str = "") -> str:
+def _objective(fit: FitResult, when: str = "") -> str:
     return f"{getattr(fit, f'{when}objective_Hz'):.2f} {UNITS.get(fit.objective_unit, '')}".strip()
 
 
-def _end(fit: Fit) -> str:
+def _end(fit: FitResult) -> str:
     return f"{'yes' if fit.converged else 'no'}, {fit.evaluations}"
 
 
-def _worst(fit: Fit) -> str:
+def _worst(fit: FitResult) -> str:
     if not fit.modes:
         return NOTHING
     worst = max(fit.modes, key=lambda mode: abs(mode.deviation_percent))
@@ -95,29 +95,29 @@ def _worst(fit: Fit) -> str:
 
 
 def _aim(mode: FittedMode) -> tuple[str, str]:
-    return f"[{mode.c},{mode.m}]", motion(mode.c, mode.m, mode.kind)
+    return f"[{mode.c},{mode.m}]", mode.label.motion
 
 
-def _variable(fit: Fit, name: str) -> str:
+def _variable(fit: FitResult, name: str) -> str:
     if name in fit.fixed:
         return f"{fit.fixed[name]:.4g} held"
-    known: Variable | None = fit.variables.get(name)
+    known = fit.variables.get(name)
     if known is None:
         return NOTHING
-    error = known.standard_error
-    spread = f" ±{NB}{percent(100 * error / known.value)}{NB}%" if error and known.value else ""
+    error = known.error_percent
+    spread = f" ±{NB}{error}{NB}%" if error else ""
     return f"{known.value:.4g}{spread}{', at bound' if known.at_bound else ''}"
 
 
-def _deviations(fit: Fit) -> dict[tuple[str, str], float]:
+def _deviations(fit: FitResult) -> dict[tuple[str, str], float]:
     """In %, by what was aimed at."""
     return {_aim(mode): mode.deviation_percent for mode in fit.modes} | {
-        (f"{each.load_N:g} N", QUANTITIES[each.quantity][0].split(",")[0]): each.deviation_percent
+        (f"{each.load_N:g} N", QUANTITIES[each.quantity].name.split(",")[0]): each.deviation_percent
         for each in fit.footprint
     }
 
 
-def _graded(fit: Fit, aim: tuple[str, str]) -> str:
+def _graded(fit: FitResult, aim: tuple[str, str]) -> str:
     off = _deviations(fit).get(aim)
     if off is None:
         return NOTHING
@@ -125,6 +125,6 @@ def _graded(fit: Fit, aim: tuple[str, str]) -> str:
     return f"{grade}{NB}{off:+.2f}".replace("-", MINUS)
 
 
-def _likeliest(diagnosis: Diagnosis) -> str:
+def _likeliest(diagnosis: DiagnosisResult) -> str:
     name, p = max(diagnosis.probabilities.items(), key=lambda item: item[1])
     return f"{name} {p:.2f}"

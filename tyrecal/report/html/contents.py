@@ -9,161 +9,9 @@ from pydantic import Field, model_validator
 
 from ...diagnose.observations import Row
 from ...modes.mode import Label
-from ...studies.result import Named, Part, Positive, Provenance, Result, Wave
+from ...studies.result import Column, Part, Positive, Provenance, Result, Table, Wave
 
 ROW = re.compile(r"\[(\d{1,3}),(\d{1,3})\](?: (axial|torsional))? at ([\d.]{1,9}) kPa")
-
-
-class ModeEntry(Named):
-    """A mode of modes.json or of a sweep."""
-
-    multiplicity: int = 1
-    symmetry: str | None = None
-    member: int | None = None
-    clarity: float | None = None
-    overlap: float | None = None
-    d_ln_f_d_ln_p: float | None = None
-
-
-class FittedMode(Named):
-    """A row of the fit's table."""
-
-    multiplicity: int
-    initial_Hz: Positive
-    fitted_Hz: Positive
-    target_Hz: Positive
-    deviation_percent: float
-
-
-class Variable(Part):
-    """A design variable of a fit."""
-
-    initial: float
-    value: float
-    lower: float
-    upper: float
-    standard_error: float | None
-    at_bound: bool
-
-
-class FittedFootprint(Part):
-    """A target on the road."""
-
-    quantity: Literal["contact_area_m2", "vertical_stiffness_N_per_m"]
-    load_N: float
-    initial: float
-    fitted: float
-    target: float
-    deviation_percent: float
-
-
-class Fit(Result):
-    """fit.json"""
-
-    method: str
-    pressure_kPa: float
-    mass_kg: float
-    objective_Hz: float
-    initial_objective_Hz: float
-    objective_unit: str
-    evaluations: int
-    failed_evaluations: int
-    converged: bool
-    moved: bool
-    message: str
-    projected_gradient_norm: float
-    label_margin: float
-    variables: dict[str, Variable]
-    fixed: dict[str, float]
-    modes: list[FittedMode]
-    footprint: list[FittedFootprint] = Field(default=[])
-    correlations: dict[str, dict[str, float | None]]
-    singular_values: list[float]
-    starts: list[Any]
-
-
-class Words(Part):
-    """Findings in sentences."""
-
-    words: list[str] = Field(default=[])
-    design: str = ""
-
-
-class Modes(Result):
-    """modes.json"""
-
-    pressure_kPa: float
-    load_N: float
-    mass_kg: float
-    variables: dict[str, float]
-    deflection_m: float | None = None
-    modes: Annotated[list[ModeEntry], Field(min_length=1)]
-    findings: Words = Words()
-
-
-class Failed(Part):
-    """What a study could not reach."""
-
-    design: str
-    words: str = ""
-    cause: str = ""
-    load_N: float | None = None
-    pressure_kPa: float | None = None
-
-
-class PressureRow(Part):
-    """A design at a pressure."""
-
-    design: str
-    pressure_kPa: Positive
-    modes: list[ModeEntry]
-
-
-class PressureSweep(Result):
-    """pressure_sweep.json"""
-
-    rows: Annotated[list[PressureRow], Field(min_length=1)]
-    failed: list[Failed] = Field(default=[])
-    findings: list[Words]
-
-
-class LoadRow(Part):
-    """A design at a load."""
-
-    design: str
-    load_N: float
-    deflection_m: float
-    modes: list[ModeEntry]
-
-
-class LoadSweep(Result):
-    """load_sweep.json"""
-
-    rows: Annotated[list[LoadRow], Field(min_length=1)]
-    failed: list[Failed]
-    findings: list[Words]
-
-
-class FootprintRow(Part):
-    """A line of footprint.json, SI."""
-
-    design: str
-    load_N: Positive
-    deflection_m: float
-    area_m2: Positive
-    length_m: float
-    width_m: float
-    mean_pressure_Pa: float
-    peak_pressure_Pa: Positive
-    vertical_stiffness_N_per_m: float
-
-
-class Footprints(Result):
-    """footprint.json"""
-
-    rows: Annotated[list[FootprintRow], Field(min_length=1)]
-    failed: list[Failed]
-    findings: Words
 
 
 class Explained(Part):
@@ -238,8 +86,10 @@ class NextMeasurement(Part):
     hours: float
 
 
-class Diagnosis(Result):
+class DiagnosisResult(Result):
     """diagnosis.json"""
+
+    study, stem, heading = "diagnose", "diagnosis", "Diagnosis"
 
     verdict: Literal["named", "undecided", "no_gap", "outside"]
     words: str
@@ -272,6 +122,12 @@ class EffectMode(Part):
     c: Wave
     m: Wave
     kind: str | None
+
+    @property
+    def label(self) -> Label:
+        """[c, m]"""
+        return Label(self.c, self.m, self.kind)
+
     before_percent: float | None
     after_percent: float | None
 
@@ -297,17 +153,40 @@ class Effect(Part):
     provenance: Provenance | None = None
 
 
-class Effects(Part):
+class Effects(Result):
     """effects.json, which is a list; empty where no effect had an answer."""
+
+    study, stem, heading = "effects", "effects", "Effects"
 
     entries: list[Effect]
 
     @model_validator(mode="before")
     @classmethod
     def _of_list(cls, content: Any) -> Any:
-        return {"entries": content}
+        first = content[0] if content and isinstance(content, list) else {}
+        of = first.get("provenance") if isinstance(first, dict) else None
+        return {"format": 1, "provenance": of, "entries": content}
 
-    @property
-    def provenance(self) -> Provenance | None:
-        """Of the first, as of all."""
-        return self.entries[0].provenance if self.entries else None
+    def tables(self) -> list[Table]:
+        """One row an effect, at the pressure in the middle."""
+        first = self.entries[0].rows
+        middle = first[len(first) // 2].pressure_kPa
+        labels = dict.fromkeys(m.label for e in self.entries for row in e.rows for m in row.modes)
+        change, share = Column("left", "+.1f"), Column("absorbed, %", ".0f", 100.0)
+        heads = [each for x in labels for each in (Column(x.said), change)]
+        rows = []
+        for each in self.entries:
+            size = f"{each.symbol} = {each.value:.4g} {each.unit}".rstrip()
+            modes = {m.label: m for r in each.rows if r.pressure_kPa == middle for m in r.modes}
+            cells = []
+            for label in labels:
+                mode = modes.get(label)
+                cells.append(change.cell(mode and mode.before_percent))
+                cells.append(change.cell(mode and mode.after_percent))
+            rows.append([each.title, size, *cells, share.cell(each.absorbed)])
+        caption = (
+            f"Change of frequency, %, at {middle:g} kPa: as the effect comes, and what is left once"
+            " the variables are fitted again. Absorbed: the share of it, over all pressures, that"
+            " calibration hides."
+        )
+        return [Table([Column("effect", ""), Column("", ""), *heads, share], rows, caption)]

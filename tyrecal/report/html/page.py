@@ -19,8 +19,13 @@ from matplotlib.figure import Figure
 from ...diagnose.where import Place
 from ...errors import InputError
 from ...files import open_file, whole
-from ...modes.mode import Label
-from ...studies.result import Named
+from ...fit.result import FitResult
+from ...studies import named, result_types
+from ...studies.footprint import FootprintResult
+from ...studies.loaded_result import LoadSweep
+from ...studies.modes import ModesResult
+from ...studies.pressure_result import PressureSweep
+from ...studies.result import Deviation, Named, Result
 from ..convergence import draw_convergence, draw_deviations
 from ..diagnosis_pictures import draw_residuals
 from ..figure import svg
@@ -28,28 +33,17 @@ from ..footprint import draw_curves, draw_patches
 from ..load import draw_load_sweep
 from ..pressure import draw_pressure_sweep
 from ..section import draw_section, draw_section_map
-from ..shape_data import Patch, Shapes
-from ..table import FOOTPRINT, QUANTITIES, percent
-from ..words import CLOSE, FAR, MINUS, map_resolution, motion
+from ..shape_data import Shapes
+from ..words import CLOSE, FAR, MINUS, fit_doubts, map_resolution
 from .comparison import comparison
-from .contents import Effects, LoadSweep, PressureRow
 from .markdown import html
 from .results import Results, read_results
 from .shapes import packed
-from .summary import VERDICTS, design_words, summary
+from .summary import VERDICTS, sentence, summary
 
 LARGEST = 5_000_000  # bytes of a page
 SHOWN, LEAST = 12, 0.005  # explanations, and the probability below which one is not shown
 MARK = '<meta name="generator" content="tyrecal report">'
-STUDIES = {
-    "fit": "fit",
-    "modes": "modes",
-    "pressure": "sweep-pressure",
-    "footprint": "footprint",
-    "effects": "effects",
-    "load": "modes --sweep-load",
-    "diagnosis": "diagnose",
-}
 
 
 @dataclass(frozen=True)
@@ -88,7 +82,10 @@ def write_page(path: Path, folders: Sequence[Path]) -> Page:
         raise InputError(f"'{path}' is no page of tyrecal's; give another file with --output")
     with whole(path) as partial:
         partial.write_bytes(content)
-    found = {str(each.folder): _commands(each) for each in results}
+    found = {
+        str(each.folder): [result_types()[name].command or name for name in each.studies]
+        for each in results
+    }
     return Page(path, size, found)
 
 
@@ -109,17 +106,12 @@ def page(results: Sequence[Results]) -> str:
 
 def chapter(found: Results, prefix: str) -> dict[str, Any]:
     """What the templates ask of one folder's results."""
-    shapes = []
-    if found.fit:
-        shapes.append(_shapes(found, "fit", found.fit_shapes, found.fit.modes))
-    if found.modes:
-        shapes.append(_shapes(found, "modes", found.modes_shapes, found.modes.modes))
     draw = partial(_picture, found, prefix)
+    shapes = [_shapes(found, what, shapes, table) for what, shapes, table in _shown_modes(found)]
     return {
         "prefix": prefix,
         "folder": found.folder.resolve().name,
         "case": found.case,
-        "told": summary(found),
         "of": list(found.provenances.items()),
         "mixed": len({each.tyre_sha256 for each in found.provenances.values()}) > 1,
         "stale": [
@@ -127,35 +119,73 @@ def chapter(found: Results, prefix: str) -> dict[str, Any]:
             for study, run in found.runs.items()
             if study in found.provenances and not run.finished
         ],
-        "absent": [name for key, name in STUDIES.items() if not getattr(found, key)],
-        "fit": found.fit and _fit(found, draw),
+        "absent": [
+            kind.command or name
+            for name, kind in result_types().items()
+            if name not in found.studies
+        ],
+        "studies": [_study(found, each, draw) for each in found.studies.values()],
         "shapes": shapes,
         "section": _section(found, draw),
-        "modes": found.modes,
-        "pressure": found.pressure and _pressure(found, draw),
-        "load": found.load and _load(found.load, draw),
-        "footprint": found.footprint and _footprint(found, draw),
-        "effects": found.effects and _effects(found.effects),
         "diagnosis": found.diagnosis and _diagnosis(found, draw),
+        "fit": found.fit,
+        "history": found.history,
+        "sets": found.fit_shapes.variables if found.fit_shapes else {},
+        "patches": found.patches,
     }
 
 
-def _effects(found: Effects) -> dict[str, Any]:
-    """One row an effect, at the pressure in the middle."""
-    first = found.entries[0].rows
-    middle = first[len(first) // 2].pressure_kPa
-    labels = list(
-        dict.fromkeys(
-            (m.c, m.m, m.kind) for each in found.entries for row in each.rows for m in row.modes
-        )
-    )
-    rows = []
-    for each in found.entries:
-        modes = [m for row in each.rows if row.pressure_kPa == middle for m in row.modes]
-        known = {(m.c, m.m, m.kind): (m.before_percent, m.after_percent) for m in modes}
-        rows.append((each, [known.get(label, (None, None)) for label in labels]))
-    names = [Label(*label).said for label in labels]
-    return {"pressure_kPa": middle, "names": names, "rows": rows}
+def _study(found: Results, result: Result, draw: Draw) -> dict[str, Any]:
+    """What every study has: words, pictures, tables."""
+    doubts = fit_doubts(result.content()) if isinstance(result, FitResult) else result.doubts()
+    pictures = list(_pictures(found, result, draw))
+    with _lists_of(found.folder / f"{result.stem}.json"):
+        return {
+            "id": result.study,
+            "heading": result.heading,
+            "summary": summary(result),
+            "doubts": doubts,
+            "sentences": [*map(sentence, result.sentences())],
+            "pictures": pictures,
+            "tables": result.tables(),
+            "numbers": result.numbers(),
+        }
+
+
+def _pictures(found: Results, result: Result, draw: Draw) -> Iterator[Markup]:
+    """The figures of a study, each with words for who does not see it."""
+    fit, file = found.fit, f"{result.stem}.json"
+    if isinstance(result, FitResult):
+        if result.modes:
+            words = "Frequencies over their targets before and after the fit"
+            yield draw("deviations", words, file, partial(draw_deviations, result.modes))
+        if found.history:
+            words = "The objective and the variables, design point by design point"
+            plot = partial(draw_convergence, found.history, result.objective_unit)
+            yield draw("convergence", words, "fit_history.csv", plot)
+    elif isinstance(result, PressureSweep):
+        targets = {m.label: m.target_Hz for m in fit.modes} if fit else {}
+        at = fit.pressure_kPa if fit else 0.0
+        plot = partial(draw_pressure_sweep, result.rows, targets, at)
+        yield draw("pressure", "Frequencies over the pressure", file, plot)
+    elif isinstance(result, LoadSweep):
+        plot = partial(draw_load_sweep, result.rows)
+        yield draw("load", "Frequencies over the load", file, plot)
+    elif isinstance(result, FootprintResult):
+        known = {(row.design, row.load_N) for row in result.rows}
+        patches = found.patches.patches if found.patches else []
+        patches = [each for each in patches if (each.design, each.load_N) in known]
+        words = "Contact area, deflection, stiffness and mean contact pressure over the load"
+        yield draw("curves", words, file, partial(draw_curves, result.rows))
+        highest = max((row.peak_pressure_Pa for row in result.rows), default=0.0) / 1e3
+        for design in dict.fromkeys(patch.design for patch in patches):
+            own = [patch for patch in patches if patch.design == design]
+            plot = partial(draw_patches, own, highest)
+            words = f"Contact pressure, {design}"
+            yield draw(f"patches-{design}", words, "footprint_patches.json", plot)
+    elif result.figures:
+        for name, figure in named(result.figures)(result).items():
+            yield svg(figure, name, name)
 
 
 def _picture(
@@ -173,7 +203,7 @@ def _shapes(
     why = ""
     if shapes is None:
         why = f"The mode shapes are not in this folder; 'tyrecal {what} --report' keeps them."
-    elif not shapes.of(table):
+    elif not shapes.are_of(table):
         why, shapes = "The mode shapes in this folder are those of another run: not shown.", None
     elif not shapes.modes:
         why = "This solver gives shapes on the crown alone, so there is no section to revolve."
@@ -190,107 +220,21 @@ def _shapes(
     return {"id": what, "heading": heading, "data": data, "why": why}
 
 
+def _shown_modes(found: Results) -> Iterator[tuple[str, Shapes | None, Sequence[Named]]]:
+    """Of each study whose modes are shown: its name, shapes, and the table's modes."""
+    if fit := found.fit:
+        yield "fit", found.fit_shapes, fit.modes
+    if modes := found.get(ModesResult):
+        yield "modes", found.modes_shapes, modes.modes
+
+
 def _section(found: Results, draw: Draw) -> Markup | None:
     """The section of the fitted tyre, or of that whose modes are known."""
-    for what, shapes, result in (
-        ("fit", found.fit_shapes, found.fit),
-        ("modes", found.modes_shapes, found.modes),
-    ):
-        if shapes and shapes.section and result and shapes.of(result.modes):
-            args = shapes.section, shapes.case, shapes.pressure_kPa
-            file = f"{what}_shapes.json"
-            return draw("section", "The section", file, partial(draw_section, *args))
+    for what, shapes, table in _shown_modes(found):
+        if shapes and shapes.section and shapes.are_of(table):
+            plot = partial(draw_section, shapes.section, shapes.case, shapes.pressure_kPa)
+            return draw("section", "The section", f"{what}_shapes.json", plot)
     return None
-
-
-def _fit(found: Results, draw: Draw) -> dict[str, Any]:
-    fit, history = found.fit, found.history
-    assert fit
-    modes = [mode.model_dump() for mode in fit.modes]
-    convergence = partial(draw_convergence, history, fit.objective_unit)
-    words = "The objective and the variables, design point by design point"
-    return {
-        "of": fit,
-        "sets": found.fit_shapes.variables if found.fit_shapes else {},
-        "deviations": draw(
-            "deviations",
-            "Frequencies over their targets before and after the fit",
-            "fit.json",
-            partial(draw_deviations, modes),
-        )
-        if modes
-        else None,
-        "convergence": draw("convergence", words, "fit_history.csv", convergence)
-        if history
-        else None,
-        "quantities": QUANTITIES,
-    }
-
-
-def _pressure(found: Results, draw: Draw) -> dict[str, Any]:
-    assert found.pressure
-    fit, rows = found.fit, found.pressure.rows
-    targets = {m.label: m.target_Hz for m in fit.modes} if fit else {}
-    told = found.pressure.model_dump()["rows"]
-    sweep = partial(draw_pressure_sweep, told, targets, fit.pressure_kPa if fit else 0.0)
-    return {
-        "picture": draw("pressure", "Frequencies over the pressure", "pressure_sweep.json", sweep),
-        "words": design_words(found.pressure),
-        "tables": _tables(rows),
-    }
-
-
-def _load(found: LoadSweep, draw: Draw) -> dict[str, Any]:
-    sweep = partial(draw_load_sweep, found.model_dump()["rows"])
-    return {
-        "rows": found.rows,
-        "words": design_words(found),
-        "picture": draw("load", "Frequencies over the load", "load_sweep.json", sweep),
-    }
-
-
-def _tables(rows: Sequence[PressureRow]) -> list[dict[str, Any]]:
-    """A table a design: modes by rows, frequencies at each pressure by columns."""
-    tables = []
-    for design in dict.fromkeys(row.design for row in rows):
-        own = [row for row in rows if row.design == design]
-        found: dict[str, list[float | None]] = {}
-        for k, row in enumerate(own):
-            for mode in row.modes:
-                found.setdefault(mode.label.said, [None] * len(own))[k] = mode.frequency_Hz
-        columns = [row.pressure_kPa for row in own]
-        tables.append({"design": design, "columns": columns, "rows": found})
-    return tables
-
-
-def _footprint(found: Results, draw: Draw) -> dict[str, Any]:
-    assert found.footprint
-    rows = found.footprint.rows
-    known = {(row.design, row.load_N) for row in rows}
-    designs: dict[str, list[Patch]] = {}
-    for patch in found.patches.patches if found.patches else []:
-        if (patch.design, patch.load_N) in known:
-            designs.setdefault(patch.design, []).append(patch)
-    highest = max(row.peak_pressure_Pa for row in rows) / 1e3
-    return {
-        "rows": rows,
-        "columns": FOOTPRINT,
-        "curves": draw(
-            "curves",
-            "Contact area, deflection, stiffness and mean contact pressure over the load",
-            "footprint.json",
-            partial(draw_curves, found.footprint.model_dump()["rows"]),
-        ),
-        "patches": [
-            draw(
-                f"patches-{k}",
-                f"Contact pressure, {design}",
-                "footprint_patches.json",
-                partial(draw_patches, patches, highest),
-            )
-            for k, (design, patches) in enumerate(designs.items())
-        ],
-    }
 
 
 def _diagnosis(found: Results, draw: Draw) -> dict[str, Any]:
@@ -334,10 +278,6 @@ def _lists_of(path: Path) -> Iterator[None]:
         raise InputError(f"'{path}' is damaged: its lists do not go together") from None
 
 
-def _commands(found: Results) -> list[str]:
-    return [name for key, name in STUDIES.items() if getattr(found, key)]
-
-
 def _range(value: float | list[float]) -> str:
     """A number, or the ends of several."""
     values = value if isinstance(value, list) else [value]
@@ -358,9 +298,7 @@ def environment() -> ImmutableSandboxedEnvironment:
     made.filters["fixed"] = lambda value, digits: f"{value:.{digits}f}".replace("-", MINUS)
     made.filters["signed"] = lambda value, digits: f"{value:+.{digits}f}".replace("-", MINUS)
     made.filters["digits"] = lambda value, count: f"{value:.{count}g}"
-    made.filters["percent"] = percent
     made.filters["range"] = _range
+    made.tests["deviation"] = lambda cell: isinstance(cell, Deviation)
     made.globals["map_resolution"] = map_resolution
-    made.filters["motion"] = lambda mode: motion(mode.c, mode.m, mode.kind)
-    made.filters["label"] = lambda mode: mode.label.said
     return made

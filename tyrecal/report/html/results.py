@@ -13,11 +13,14 @@ from pydantic import ValidationError
 
 from ...errors import InputError
 from ...files import NotAFile, read_runs, read_text
+from ...fit.result import FitResult
+from ...studies import result_types
 from ...studies.result import Part, Provenance, Result
 from ..shape_data import DiagnosisSection, Patches, Shapes
-from .contents import Diagnosis, Effects, Fit, Footprints, LoadSweep, Modes, PressureSweep, RunFacts
+from .contents import DiagnosisResult, RunFacts
 
 File = TypeVar("File", bound=Part)
+Study = TypeVar("Study", bound=Result)
 
 
 @dataclass(frozen=True)
@@ -25,34 +28,31 @@ class Results:
     """What a folder holds; None or empty: it does not."""
 
     folder: Path
-    fit: Fit | None = None
+    studies: dict[str, Result]  # by name, in the order of a page
     fit_shapes: Shapes | None = None
     history: list[dict[str, Any]] = field(default_factory=list)
-    modes: Modes | None = None
     modes_shapes: Shapes | None = None
-    pressure: PressureSweep | None = None
-    load: LoadSweep | None = None
-    footprint: Footprints | None = None
     patches: Patches | None = None
-    effects: Effects | None = None
-    diagnosis: Diagnosis | None = None
     diagnosis_section: DiagnosisSection | None = None
     diagnosis_words: str = ""
     runs: dict[str, RunFacts] = field(default_factory=dict)
 
+    def get(self, kind: type[Study]) -> Study | None:
+        """The result of a study."""
+        return next((each for each in self.studies.values() if isinstance(each, kind)), None)
+
+    @property
+    def fit(self) -> FitResult | None:
+        return self.get(FitResult)
+
+    @property
+    def diagnosis(self) -> DiagnosisResult | None:
+        return self.get(DiagnosisResult)
+
     @property
     def provenances(self) -> dict[str, Provenance]:
         """What the results of each study are of, where they say so."""
-        known: dict[str, Result | Effects | None] = {
-            "fit": self.fit,
-            "modes": self.modes,
-            "sweep-pressure": self.pressure,
-            "footprint": self.footprint,
-            "effects": self.effects,
-            "sweep-load": self.load,
-            "diagnose": self.diagnosis,
-        }
-        return {name: each.provenance for name, each in known.items() if each and each.provenance}
+        return {name: of for name, each in self.studies.items() if (of := each.provenance)}
 
     @property
     def case(self) -> str:
@@ -72,26 +72,20 @@ def read_results(folder: Path) -> Results:
     if not folder.is_dir():
         what = "is a file" if folder.exists() else "does not exist"
         raise InputError(f"'{folder}' {what}; give a folder of results")
-    effects = _read(folder / "effects.json", Effects)
+    types = result_types()
+    studies = {name: _read(folder / f"{kind.stem}.json", kind) for name, kind in types.items()}
     found = Results(
         folder,
-        _read(folder / "fit.json", Fit),
+        {name: each for name, each in studies.items() if each and _is_filled(each)},
         _read(folder / "fit_shapes.json", Shapes),
         _history(folder / "fit_history.csv"),
-        _read(folder / "modes.json", Modes),
         _read(folder / "modes_shapes.json", Shapes),
-        _read(folder / "pressure_sweep.json", PressureSweep),
-        _read(folder / "load_sweep.json", LoadSweep),
-        _read(folder / "footprint.json", Footprints),
         _read(folder / "footprint_patches.json", Patches),
-        effects if effects and effects.entries else None,
-        _read(folder / "diagnosis.json", Diagnosis),
         _read(folder / "diagnosis_section.json", DiagnosisSection),
         _text(folder / "diagnosis.md") or "",
         _runs(folder),
     )
-    studies = (found.fit, found.modes, found.pressure, found.load, found.footprint)
-    if not any((*studies, found.effects, found.diagnosis)):
+    if not found.studies:
         run = max(found.runs.values(), key=lambda each: each.started, default=RunFacts())
         last = "" if run.finished else f": its last run, 'tyrecal {run.command}', did not finish"
         if (folder / "batch.json").exists():
@@ -101,6 +95,11 @@ def read_results(folder: Path) -> Results:
             f" effects or diagnose{last}"
         )
     return found
+
+
+def _is_filled(found: Result) -> bool:
+    """Whether it has rows; where no effect had an answer effects.json has none."""
+    return bool(getattr(found, "entries", True))
 
 
 def _read(path: Path, kind: type[File]) -> File | None:

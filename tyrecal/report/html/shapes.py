@@ -9,7 +9,6 @@ import numpy as np
 
 from ...modes.mode import Label
 from ..shape_data import Shape, Shapes
-from ..words import motion
 
 STEPS = 32767
 ANGLES = 60  # round the circumference, in the page
@@ -70,7 +69,7 @@ def _named(mode: Shape) -> dict[str, str]:
     return {
         "name": Label(mode.c, mode.m, mode.kind).said + symmetry,
         "hertz": f"{mode.frequency_Hz:.2f} Hz",
-        "words": motion(mode.c, mode.m, mode.kind),
+        "words": mode.label.motion,
     }
 
 

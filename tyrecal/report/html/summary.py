@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from typing import Any
 
+from ...fit.result import FitResult
+from ...studies.modes import ModesResult
+from ...studies.result import Result
 from ...units import said
-from ..words import fit_doubts, nearness
-from .contents import Diagnosis, Effect, Failed, Fit, Footprints, LoadSweep, Modes, PressureSweep
-from .results import Results
+from ..words import nearness
+from .contents import DiagnosisResult, Effect, Effects
 
 VERDICTS = {
     "named": "Named",
@@ -18,42 +20,15 @@ VERDICTS = {
 }
 
 
-@dataclass(frozen=True)
-class Told:
-    """One study: its heading, what it says, and what must not be overlooked."""
-
-    id: str
-    heading: str
-    words: list[str]
-    doubts: list[str] = field(default_factory=list)
+def summary(found: Result) -> list[str]:
+    """A study in short, in sentences."""
+    for kind, words in SHORT.items():
+        if isinstance(found, kind):
+            return words(found)
+    return [*map(sentence, found.summary())]
 
 
-def summary(found: Results) -> list[Told]:
-    """Every study of a folder."""
-    told = []
-    if found.fit:
-        doubts = fit_doubts(found.fit.model_dump())
-        told.append(Told("fit", "Fit", fit_words(found.fit), doubts))
-    if found.modes:
-        heading = "Modes on the road" if found.modes.load_N else "Modes"
-        told.append(Told("modes", heading, modes_words(found.modes)))
-    if found.pressure:
-        words = last_words(found.pressure)
-        told.append(Told("pressure", "Over pressure", words, missing(found.pressure.failed)))
-    if found.footprint:
-        words = [*map(sentence, found.footprint.findings.words)] or [rows_words(found.footprint)]
-        told.append(Told("footprint", "Footprint", words, missing(found.footprint.failed)))
-    if found.effects:
-        told.append(Told("effects", "Effects", [effect_words(e) for e in found.effects.entries]))
-    if found.load:
-        words = last_words(found.load)
-        told.append(Told("load", "Modes over load", words, missing(found.load.failed)))
-    if found.diagnosis:
-        told.append(Told("diagnosis", "Diagnosis", diagnosis_words(found.diagnosis)))
-    return told
-
-
-def fit_words(fit: Fit) -> list[str]:
+def fit_words(fit: FitResult) -> list[str]:
     """How the fit went, how near it came, where the variables went."""
     unit = fit.objective_unit if fit.objective_unit == "Hz" else "(deviations in sigmas)"
     equation = "equation (1), " if fit.objective_unit == "Hz" else ""
@@ -72,7 +47,7 @@ def fit_words(fit: Fit) -> list[str]:
     return [*words, f"{moves}."]
 
 
-def modes_words(modes: Modes) -> list[str]:
+def modes_words(modes: ModesResult) -> list[str]:
     """How many modes, where, of what tyre."""
     hertz = [mode.frequency_Hz for mode in modes.modes]
     where = f"{modes.pressure_kPa:g} kPa" + (f" under {modes.load_N:g} N" if modes.load_N else "")
@@ -85,32 +60,7 @@ def modes_words(modes: Modes) -> list[str]:
     return [*words, *map(sentence, modes.findings.words)]
 
 
-def design_words(found: PressureSweep | LoadSweep) -> list[str]:
-    """Findings, each with its design where there are two."""
-    several = len(found.findings) > 1
-    return [
-        sentence(f"{each.design}: {words}" if several else words)
-        for each in found.findings
-        for words in each.words
-    ]
-
-
-def last_words(found: PressureSweep | LoadSweep) -> list[str]:
-    """Findings of the last design: the fitted one where there are two."""
-    several = len(found.findings) > 1
-    return [
-        sentence((f"{each.design}: " if several else "") + "; ".join(each.words))
-        for each in found.findings[-1:]
-    ]
-
-
-def rows_words(found: Footprints) -> str:
-    """How many loads."""
-    loads = [row.load_N for row in found.rows]
-    return f"{len(found.rows)} footprints from {min(loads):g} to {max(loads):g} N."
-
-
-def diagnosis_words(found: Diagnosis) -> list[str]:
+def diagnosis_words(found: DiagnosisResult) -> list[str]:
     """Verdict, size, how far the error shrinks, what next."""
     gap = found.verdict != "no_gap"
     words = [sentence(VERDICTS[found.verdict] + (f": {found.words}" if gap else ""))]
@@ -144,16 +94,14 @@ def effect_words(effect: Effect) -> str:
     return f"{words}."
 
 
-def missing(failed: Sequence[Failed]) -> list[str]:
-    """What was not reached."""
-    words = []
-    for each in failed:
-        at = f"{each.load_N:g} N" if each.load_N is not None else ""
-        at = at or (f"{each.pressure_kPa:g} kPa" if each.pressure_kPa is not None else "")
-        words.append(f"not reached: {each.design}, {at}: {each.words or each.cause}")
-    return words
-
-
 def sentence(words: str) -> str:
     """With a capital and a full stop."""
     return words[:1].upper() + words[1:] + ("" if words.endswith((".", "!", "?")) else ".")
+
+
+SHORT: dict[type[Result], Callable[[Any], list[str]]] = {
+    FitResult: fit_words,
+    ModesResult: modes_words,
+    Effects: lambda found: [effect_words(each) for each in found.entries],
+    DiagnosisResult: diagnosis_words,
+}
