@@ -12,7 +12,7 @@ from math import exp, radians, sin, tanh
 
 import numpy as np
 
-from tyrecal.blind.laws import Law
+from tyrecal.blind.laws import EffectLaw
 from tyrecal.case import LoadedCase
 from tyrecal.case.schema import Cord, RebarLayer, Rubber
 from tyrecal.effects import catalogue
@@ -37,11 +37,11 @@ Array = np.ndarray
 Add = Callable[[LoadedCase, float], LoadedCase]
 
 
-def other_laws(capabilities: frozenset[str]) -> dict[str, Law]:
+def other_laws(capabilities: frozenset[str]) -> dict[str, EffectLaw]:
     """Other laws for the effects that a solver with these capabilities can express."""
     known = catalogue()
     return {
-        id: Law(known[id].low, known[id].high, add)
+        id: EffectLaw(known[id].low, known[id].high, add)
         for id, add in _OTHER.items()
         if known[id].within(capabilities)
     }

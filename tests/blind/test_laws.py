@@ -7,12 +7,12 @@ import pytest
 from scipy.stats import uniform
 
 from tyrecal.blind.emulated import emulate
-from tyrecal.blind.laws import Law
+from tyrecal.blind.laws import EffectLaw
 from tyrecal.blind.outside import FAMILIES
 from tyrecal.case import LoadedCase
 from tyrecal.deck.tyre_design import TyreDesign
 from tyrecal.design import with_values
-from tyrecal.diagnose.response import Answer, Point
+from tyrecal.diagnose.model import Answer, Query
 from tyrecal.effects import catalogue
 from tyrecal.evaluate.evaluator import Evaluator, Question
 from tyrecal.modes.label import paired_labels
@@ -88,7 +88,7 @@ def test_sizes_are_drawn_on_both_sides(chance: Chance) -> None:
 
     False failures: 3e-7.
     """
-    law = Law(-1.0, 2.0, lambda case, e: case)
+    law = EffectLaw(-1.0, 2.0, lambda case, e: case)
     drawn = np.array([law.drawn(chance.random, 0.2) for _ in range(200)])
     assert all(-1 <= e <= -0.2 or 0.4 <= e <= 2 for e in drawn)
     chance.often(drawn > 0, 0.5, 0.5)
@@ -102,20 +102,20 @@ def test_the_emulated_model_is_the_model_between_its_designs_and_goes_straight_o
     random, asked = generator(1), scale.asked
     for _ in range(10):
         x = scale.start + random.uniform(-0.7, 0.7, 3)
-        point = Point(x, {"e1": float(random.uniform(0, 1))}, constants=True)
+        point = Query(x, {"e1": float(random.uniform(0, 1))}, constants=True)
         (got,) = twin.answers([point])
         (want,) = scale.answers([point])
         assert isinstance(got, Answer) and isinstance(want, Answer)
         for name in ("eta", "jacobian", "constants"):
             assert np.allclose(getattr(got, name), getattr(want, name), atol=1e-6)
     assert scale.asked == asked + 10
-    edge, beyond = (Point(scale.start + step * np.array([1.0, 0.2, 0.1])) for step in (0.8, 1.3))
+    edge, beyond = (Query(scale.start + step * np.array([1.0, 0.2, 0.1])) for step in (0.8, 1.3))
     at, after = twin.answers([edge, beyond])
     assert isinstance(at, Answer) and isinstance(after, Answer) and scale.asked == asked + 10
     assert np.allclose(after.jacobian[:, 0], at.jacobian[:, 0], atol=0.05)
     middle = at.eta + at.jacobian[:, 0] * 0.5
     rest = after.eta - middle  # what the other two, still inside, add
-    inside = twin.answers([Point(scale.start + np.array([0.8, 0.26, 0.13]))])[0]
+    inside = twin.answers([Query(scale.start + np.array([0.8, 0.26, 0.13]))])[0]
     assert isinstance(inside, Answer)
     assert np.allclose(rest, inside.eta - at.eta + 0.5 * (inside.jacobian - at.jacobian)[:, 0])
     assert np.allclose(after.jacobian, inside.jacobian)

@@ -11,11 +11,11 @@ from scipy.stats import binom
 
 from tyrecal.blind.baselines import guesses
 from tyrecal.blind.protocol import Protocol
-from tyrecal.blind.ruler import Ruler, Signature, difficulty, measure
+from tyrecal.blind.ruler import EffectShifts, Ruler, difficulty, measure
 from tyrecal.blind.score import Scored
 from tyrecal.blind.statistics import brier, calibration_error, calibration_quantile, clopper_pearson
 from tyrecal.blind.tables import summary
-from tyrecal.diagnose.response import Point
+from tyrecal.diagnose.model import Query
 from tyrecal.modes.mode import Label
 
 from ..chance import Chance
@@ -152,7 +152,7 @@ def ruler() -> Ruler:
     """Four rows of one mode each, one variable that moves all alike, two effects."""
     rows = tuple((Label(n, 0), 240.0) for n in (1, 2, 3, 4))
     sizes = np.array([0.0, 0.5, 1.0])
-    line = lambda g: Signature(sizes, np.outer(sizes, g), np.zeros((3, 4, 1)), np.zeros((3, 4)))
+    line = lambda g: EffectShifts(sizes, np.outer(sizes, g), np.zeros((3, 4, 1)), np.zeros((3, 4)))
     return Ruler(
         rows,
         np.zeros(1),
@@ -215,5 +215,5 @@ def test_baselines_find_a_strong_effect_and_none_where_there_is_none() -> None:
     assert sqrt(sigma[0, 0]) == pytest.approx(RULES.noise / sqrt(2))
 
 
-def _at(scale: Scale) -> Point:
-    return Point(scale.start, constants=True)
+def _at(scale: Scale) -> Query:
+    return Query(scale.start, constants=True)

@@ -7,11 +7,11 @@ from math import log
 
 import numpy as np
 
-from tyrecal.blind.laws import Law
+from tyrecal.blind.laws import EffectLaw
 from tyrecal.blind.maker import Computed
 from tyrecal.blind.protocol import Protocol
 from tyrecal.case import LoadedCase, number_at, start_values
-from tyrecal.diagnose.response import Answer, Point
+from tyrecal.diagnose.model import Answer, Query
 from tyrecal.effects.edit import changed
 from tyrecal.modes.mode import Label
 
@@ -34,8 +34,8 @@ class Scale(Toy):
         self.start = np.array([log(v) for v in start_values(CASE).values()])
         self.model_rows = [(None, 0.0), *self.rows]
 
-    def _answer(self, point: Point) -> Answer:
-        answer = super()._answer(Point(point.x - self.start, point.effects, point.constants))
+    def _answer(self, point: Query) -> Answer:
+        answer = super()._answer(Query(point.x - self.start, point.effects, point.constants))
         top = lambda row, rest: np.concatenate([np.atleast_2d(row), np.atleast_2d(rest)])
         constants = None
         if answer.constants is not None:
@@ -55,14 +55,14 @@ class ToyMaker:
 
     def __init__(self, scale: Scale) -> None:
         self.scale = scale
-        self.laws = {id: Law(0.0, 1.0, _named(id)) for id in scale.g}
-        self.outside = {"odd_mode": Law(0.0, 1.0, _named("odd_mode"))}
+        self.laws = {id: EffectLaw(0.0, 1.0, _named(id)) for id in scale.g}
+        self.outside = {"odd_mode": EffectLaw(0.0, 1.0, _named("odd_mode"))}
 
     def compute(self, case: LoadedCase, labels: list[Label]) -> Computed:
         x = np.array([log(number_at(case, path)) for path in NUMBERS])
         id, _, e = case.case.name.partition(" ")
         effects = {id: float(e)} if id in self.scale.g else {}
-        (answer,) = self.scale.answers([Point(x, effects)])
+        (answer,) = self.scale.answers([Query(x, effects)])
         assert isinstance(answer, Answer)
         pressure = min(PRESSURES, key=lambda p: abs(p - case.case.pressure_kPa))
         odd = 0.2 * float(e) if id == "odd_mode" else 0.0

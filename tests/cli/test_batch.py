@@ -312,7 +312,7 @@ def test_time_left_counts_what_ran(
     assert seconds_left(10.0, 5, 20) == 40.0
     assert seconds_left(10.0, 0, 20) is None
     monkeypatch.setattr(progress.time, "monotonic", iter([0.0, 1.0, 60.0, 70.0]).__next__)
-    with progress.Progress(4, quiet=False, verbose=False) as shown:
+    with progress.BatchProgress(4, quiet=False, verbose=False) as shown:
         shown.notify({**report("a", fit=entry()), "facts": {"answered": True}})
         shown.notify(report("b", fit=entry()))
         shown.notify(report("c", fit=entry("error")))

@@ -9,9 +9,9 @@ import pytest
 
 from tyrecal.diagnose.calibrated import calibrated_variables
 from tyrecal.diagnose.diagnosis import Diagnosis, diagnose
-from tyrecal.diagnose.response import Answer, Point
+from tyrecal.diagnose.model import Answer, Query
 from tyrecal.diagnose.result import result
-from tyrecal.diagnose.study import Study
+from tyrecal.diagnose.study import DiagnosedCase
 from tyrecal.report.diagnosis import page
 from tyrecal.units import in_engineers_units
 
@@ -22,14 +22,14 @@ X = np.array((0.3, -0.2, 0.1))
 
 def exact(toy: Toy, effects: dict[str, float]) -> Diagnosis:
     """Of data at X without scatter."""
-    base, (answer,) = problem(toy), toy.answers([Point(X, effects)])
+    base, (answer,) = problem(toy), toy.answers([Query(X, effects)])
     assert isinstance(answer, Answer)
     seen = base.measured(answer.eta[base.places]).observations
     return diagnose(toy, toy.rows, seen, assumed=base.assumed)
 
 
 def told(d: Diagnosis, toy: Toy) -> str:
-    return page(Study(d, (), False, (), (), toy), "tyre", "a.csv")  # type: ignore[arg-type]
+    return page(DiagnosedCase(d, (), False, (), (), toy), "tyre", "a.csv")  # type: ignore[arg-type]
 
 
 @pytest.fixture(scope="module")

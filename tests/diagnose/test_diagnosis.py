@@ -9,14 +9,14 @@ from scipy.optimize import least_squares
 from tyrecal.diagnose.diagnosis import Diagnosis, diagnose
 from tyrecal.diagnose.evidence import explain, weigh
 from tyrecal.diagnose.expansion import anchored, expand
+from tyrecal.diagnose.inverse_problem import Toggle
+from tyrecal.diagnose.model import Answer, Query
 from tyrecal.diagnose.next_measurement import rank
-from tyrecal.diagnose.observations import Row
-from tyrecal.diagnose.problem import Change
-from tyrecal.diagnose.regions import Region
-from tyrecal.diagnose.response import Answer, Point
+from tyrecal.diagnose.observations import Observable
+from tyrecal.diagnose.regions import SectionPart
 from tyrecal.diagnose.result import result
 from tyrecal.diagnose.shrinkage import held_out, shrink
-from tyrecal.diagnose.study import Study
+from tyrecal.diagnose.study import DiagnosedCase
 from tyrecal.modes.mode import Label
 from tyrecal.report.diagnosis import page
 
@@ -37,8 +37,8 @@ def diagnosed(toy: Toy, effects: dict[str, float], seed: int, **keys: object) ->
     [((160.0, 240.0, 320.0), {240.0}), ((160.0, 240.0), {160.0}), ((240.0,), set())],
 )
 def test_what_is_held_out_follows_a_rule(pressures: tuple[float, ...], held: set[float]) -> None:
-    rows = [Row("frequency_Hz", x, p) for p in pressures for x in LABELS]
-    rows.append(Row("mass_kg", None, 0.0))
+    rows = [Observable("frequency_Hz", x, p) for p in pressures for x in LABELS]
+    rows.append(Observable("mass_kg", None, 0.0))
     mask, _ = held_out(rows)
     chosen = [row for row, h in zip(rows, mask, strict=True) if h]
     if held:
@@ -105,7 +105,7 @@ def test_a_calibration_as_usual_stands_beside(without: bool) -> None:
     effects = {} if without else h.mean()
 
     def off(x: np.ndarray) -> np.ndarray:
-        return toy._answer(Point(x, effects)).eta - y
+        return toy._answer(Query(x, effects)).eta - y
 
     weighed = lambda x: np.concatenate([off(x)[~hold] / 0.002, (x - toy.start) / toy.spread])
     best = least_squares(weighed, toy.start, xtol=1e-14, ftol=1e-14).x
@@ -122,11 +122,11 @@ def test_a_toggle_that_parts_twins_comes_first_and_does() -> None:
     assert alone.verdict.kind == "undecided"
     words = [choice.what for choice in alone.choices if choice.gain > 0][:2]
     assert any(id in what for what in words for id in ("e0", "twin"))
-    base = problem(toy, changes=(Change("e0", 0.0),))
+    base = problem(toy, changes=(Toggle("e0", 0.0),))
     y = drawn(toy, problem(toy), generator(3), {"e0": 0.7}, 0.3)
     noise = generator(4).normal(0, 0.001, len(y))
     both = base.measured(np.concatenate([y, y - 0.7 * toy.g["e0"] + noise])).observations
-    after = diagnose(toy, toy.rows, both, (Change("e0", 0.0),), base.assumed)
+    after = diagnose(toy, toy.rows, both, (Toggle("e0", 0.0),), base.assumed)
     assert after.verdict.kind == "named" and after.verdict.key == "e0" and after.rung == 4
 
 
@@ -159,7 +159,7 @@ def test_an_anchor_is_exact_where_it_was_asked_and_absent_without_the_effect() -
     x = np.array([0.4, -0.3, 0.2])
     toy.bend = toy.bend * 1.5  # the model at hand departs from what was expanded
     found = anchored(bare, toy, {"e0": (0.6, x)})
-    (answer,) = toy.answers([Point(x, {"e0": 0.6})])
+    (answer,) = toy.answers([Query(x, {"e0": 0.6})])
     assert isinstance(answer, Answer)
     eta, J = found.plain(x)
     for e, wanted in ((0.6, answer), (0.0, None)):
@@ -204,10 +204,10 @@ def test_the_section_map_finds_the_part_and_joins_what_looks_alike(chance: Chanc
     shape = lambda: np.tile(random.normal(0, 0.3, len(LABELS)), 3)
     soft, other = shape(), shape()
     parts = [
-        Region("sidewall", soft, shape() / 10, ""),
-        Region("bead", 1.01 * soft, shape() / 10, ""),
-        Region("tread", other, shape() / 10, ""),
-        Region("nowhere", 0 * soft, 0 * soft, ""),
+        SectionPart("sidewall", soft, shape() / 10, ""),
+        SectionPart("bead", 1.01 * soft, shape() / 10, ""),
+        SectionPart("tread", other, shape() / 10, ""),
+        SectionPart("nowhere", 0 * soft, 0 * soft, ""),
     ]
     base = problem(toy)
     y = drawn(toy, base, chance.random, {}, 0.3) + 0.05 * soft
@@ -229,7 +229,7 @@ def test_a_pair_is_told_with_both_sizes() -> None:
     d = diagnosed(toy, {"e0": 0.8, "e1": 0.6}, 7)
     told = result(d)
     assert told["effect"] == "e0+e1" and set(told["parameters"]) == {"e0", "e1"}
-    words = page(Study(d, (), False, (), (), toy), "tyre", "a.csv")  # type: ignore[arg-type]
+    words = page(DiagnosedCase(d, (), False, (), (), toy), "tyre", "a.csv")  # type: ignore[arg-type]
     for size in told["parameters"].values():
         assert size["low"] < size["value"] < size["high"]
         number = f"{size['value']:.3g}"

@@ -21,9 +21,9 @@ from tyrecal.diagnose.evidence import (
     weigh,
 )
 from tyrecal.diagnose.gap import find_gap, projection
-from tyrecal.diagnose.problem import Assumed, Change
-from tyrecal.diagnose.reading import exchanged, with_exchanged
-from tyrecal.diagnose.response import Answer, Point, Span
+from tyrecal.diagnose.inverse_problem import Assumed, Toggle
+from tyrecal.diagnose.label_swap import exchanged, with_exchanged
+from tyrecal.diagnose.model import Answer, Query, Span
 from tyrecal.diagnose.separability import separate
 from tyrecal.diagnose.verdict import decide
 
@@ -63,7 +63,7 @@ def test_evidence_against_quadrature_where_the_model_bends(far: tuple[int, int, 
     toy = Toy(pressures=(240.0,), effects=1, bend=0.1)
     toy.spread = np.full(3, 0.05)
     base = problem(toy, noise=0.01)
-    (answer,) = toy.answers([Point(toy.spread * far)])
+    (answer,) = toy.answers([Query(toy.spread * far)])
     assert isinstance(answer, Answer)
     p = base.measured(answer.eta)
     fitted = refit(p, {}, 1)
@@ -320,7 +320,7 @@ def test_a_toggled_run_cancels_what_both_share(chance: Chance) -> None:
     toy = flat(size=0.01)
     toy.constants = np.stack([toy.g["e0"], toy.g["e1"]], 1)  # gauges that look like effects
     alone = problem(toy)
-    both = problem(toy, changes=(Change("e0", 0.0),))
+    both = problem(toy, changes=(Toggle("e0", 0.0),))
     lambdas = []
     for p in (alone, both):
         P, _, _ = projection(p, np.zeros(3))
@@ -344,7 +344,7 @@ def test_a_known_change_is_in_every_hypothesis(chance: Chance) -> None:
     False failures: 2e-7.
     """
     toy = flat(size=0.02)
-    switched = problem(toy, changes=(Change("e1", 0.5),))
+    switched = problem(toy, changes=(Toggle("e1", 0.5),))
     p_values, none = [], []
     for _ in range(20):
         y = drawn(toy, switched, chance.random, {}, 1.0)
@@ -360,7 +360,7 @@ def test_a_known_change_is_in_every_hypothesis(chance: Chance) -> None:
 def test_covariance_is_what_it_says() -> None:
     """Model-form error: 0.9 between pressures, 0.97 between runs, none between modes."""
     toy = Toy(pressures=(160.0, 240.0))
-    p = problem(toy, changes=(Change("e0", 0.0),), noise=1e-9)
+    p = problem(toy, changes=(Toggle("e0", 0.0),), noise=1e-9)
     S = covariance(p.observations, 0 * p.constants, form=0.01) / 1e-4
     n = len(toy.base)
     assert S[0, len(LABELS)] == pytest.approx(0.9)

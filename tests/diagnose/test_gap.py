@@ -6,18 +6,20 @@ import numpy as np
 import pytest
 
 from tyrecal.diagnose.gap import _contrasts, family
-from tyrecal.diagnose.observations import Row
+from tyrecal.diagnose.observations import Observable
 
 from ..chance import generator
 from .toy import LABELS
 
 pytestmark = pytest.mark.numbers
 
-ROWS = tuple(Row("frequency_Hz", label, p) for p in (160.0, 240.0, 320.0) for label in LABELS)
-MASS = Row("mass_kg", None, 240.0)
+ROWS = tuple(
+    Observable("frequency_Hz", label, p) for p in (160.0, 240.0, 320.0) for label in LABELS
+)
+MASS = Observable("mass_kg", None, 240.0)
 
 
-def found(rows: tuple[Row, ...], r: np.ndarray) -> dict[str, float]:
+def found(rows: tuple[Observable, ...], r: np.ndarray) -> dict[str, float]:
     return {c.name: c.percent for c in _contrasts(rows, r, np.eye(len(rows)))}
 
 

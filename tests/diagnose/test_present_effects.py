@@ -12,9 +12,9 @@ import pytest
 from tyrecal.deck.tyre_design import TyreDesign
 from tyrecal.design import with_values
 from tyrecal.diagnose.expansion import expand
-from tyrecal.diagnose.observations import Observations, Row
-from tyrecal.diagnose.problem import Change, Problem
-from tyrecal.diagnose.response import Answer, Point
+from tyrecal.diagnose.inverse_problem import InverseProblem, Toggle
+from tyrecal.diagnose.model import Answer, Query
+from tyrecal.diagnose.observations import Observable, Observations
 from tyrecal.diagnose.result import result
 from tyrecal.diagnose.study import spans_of, study
 from tyrecal.diagnose.tyre_model import TyreModel
@@ -36,13 +36,13 @@ def test_parameters_count_from_what_the_case_has() -> None:
     spans, _ = spans_of(WITH_FILLER, evaluator, EFFECTS)
     assert spans["bead_filler"].low == pytest.approx(-HELD)
     own = TyreModel(WITH_FILLER, evaluator, ROWS, sources(WITH_FILLER)[0], spans)
-    less, as_it_is = own.answers([Point(X, {"bead_filler": -HELD}), Point(X)])
+    less, as_it_is = own.answers([Query(X, {"bead_filler": -HELD}), Query(X)])
     assert isinstance(less, Answer) and isinstance(as_it_is, Answer)
-    assert less.eta == pytest.approx(asked(Point(X)).eta, abs=1e-9)
-    assert as_it_is.eta == pytest.approx(asked(Point(X, {"bead_filler": HELD})).eta, abs=1e-9)
+    assert less.eta == pytest.approx(asked(Query(X)).eta, abs=1e-9)
+    assert as_it_is.eta == pytest.approx(asked(Query(X, {"bead_filler": HELD})).eta, abs=1e-9)
     nodes = expand(own, X).nodes["bead_filler"]
     more, _, _ = nodes.at(np.array([1.2 - HELD]))
-    wanted = asked(Point(X, {"bead_filler": 1.2})).eta - as_it_is.eta
+    wanted = asked(Query(X, {"bead_filler": 1.2})).eta - as_it_is.eta
     assert more[0] == pytest.approx(wanted, abs=5e-4)
 
 
@@ -55,11 +55,11 @@ def test_splits_count_from_what_the_case_has() -> None:
     spans, _ = spans_of(case, evaluator, ("point_mass", "rim_width"))
     own = TyreModel(case, evaluator, rows, [], spans)
     none = np.full(len(rows), np.nan)
-    told = tuple(Row("frequency_Hz", label, p) for label, p in rows)
+    told = tuple(Observable("frequency_Hz", label, p) for label, p in rows)
     observations = Observations(told, np.zeros(len(rows)), none, 0.0, none, none)
-    problem = Problem(observations, expand(own, X), spans, np.arange(len(rows)), X, X)
+    problem = InverseProblem(observations, expand(own, X), spans, np.arange(len(rows)), X, X)
     for id, e in (("point_mass", 0.03), ("point_mass", -0.04), ("rim_width", 5e-3)):
-        (there,) = own.answers([Point(X, {id: e})])
+        (there,) = own.answers([Query(X, {id: e})])
         assert isinstance(there, Answer)
         _, _, split = problem.added({id: np.array([e])}, 1)
         assert split[0] == pytest.approx(abs(there.split), abs=5e-5)
@@ -78,7 +78,7 @@ def test_a_source_of_error_steps_from_what_the_case_has() -> None:
     columns = []
     for case in (CASE, wide):
         own = TyreModel(case, Evaluator(TyreDesign(case)), ROWS, sources(case)[0], {})
-        (found,) = own.answers([Point(X, constants=True)])
+        (found,) = own.answers([Query(X, constants=True)])
         assert isinstance(found, Answer) and found.constants is not None
         columns.append(found.constants[:, own.sources.index("rim_width")])
     assert columns[1] == pytest.approx(columns[0], rel=0.3, abs=2e-4)
@@ -88,7 +88,7 @@ def test_a_source_of_error_steps_from_what_the_case_has() -> None:
 @pytest.mark.slow
 def test_a_part_of_an_effect_in_the_case_leaves_the_rest_to_be_found(tmp_path: Path) -> None:
     truth = 0.8 * MODEL.spans["bead_filler"].high
-    path = written(tmp_path / "a.csv", asked(Point(X, {"bead_filler": truth})).eta)
+    path = written(tmp_path / "a.csv", asked(Query(X, {"bead_filler": truth})).eta)
     none = study(CASE, Evaluator(TyreDesign(CASE)), path, effects=EFFECTS, section_map=False)
     some = study(
         WITH_FILLER, Evaluator(TyreDesign(WITH_FILLER)), path, effects=EFFECTS, section_map=False
@@ -106,9 +106,9 @@ def test_a_part_of_an_effect_in_the_case_leaves_the_rest_to_be_found(tmp_path: P
 @pytest.mark.slow
 def test_a_toggled_run_is_set_to_what_it_says_whatever_the_case_has(tmp_path: Path) -> None:
     truth = 1.5
-    one = written(tmp_path / "a.csv", asked(Point(X, {"bead_filler": truth})).eta)
-    other = written(tmp_path / "b.csv", asked(Point(X)).eta)
-    for change in (Change("bead_filler", 0.0), Change("bead_filler", 0.0, times=True)):
+    one = written(tmp_path / "a.csv", asked(Query(X, {"bead_filler": truth})).eta)
+    other = written(tmp_path / "b.csv", asked(Query(X)).eta)
+    for change in (Toggle("bead_filler", 0.0), Toggle("bead_filler", 0.0, times=True)):
         d = study(
             WITH_FILLER,
             Evaluator(TyreDesign(WITH_FILLER)),
@@ -125,13 +125,13 @@ def test_a_toggled_run_is_set_to_what_it_says_whatever_the_case_has(tmp_path: Pa
 def test_a_run_switched_beyond_the_range_is_asked_there(tmp_path: Path) -> None:
     """The range is where the effect may be, not how far a laboratory can go with it."""
     far = 1.5 * MODEL.spans["bead_filler"].high
-    one = written(tmp_path / "a.csv", asked(Point(X)).eta)
-    other = written(tmp_path / "b.csv", asked(Point(X, {"bead_filler": far})).eta)
+    one = written(tmp_path / "a.csv", asked(Query(X)).eta)
+    other = written(tmp_path / "b.csv", asked(Query(X, {"bead_filler": far})).eta)
     found = study(
         CASE,
         Evaluator(TyreDesign(CASE)),
         one,
-        toggled=[(other, Change("bead_filler", far))],
+        toggled=[(other, Toggle("bead_filler", far))],
         effects=EFFECTS,
         section_map=False,
     )
@@ -139,7 +139,7 @@ def test_a_run_switched_beyond_the_range_is_asked_there(tmp_path: Path) -> None:
     nodes, own = d.bare.expansion.nodes["bead_filler"], d.bare.expansion
     assert nodes.reach[1] == MODEL.spans["bead_filler"].high
     shift, _, _ = nodes.at(np.array([far]))
-    (there,) = found.model.answers([Point(own.x0, {"bead_filler": far})])
+    (there,) = found.model.answers([Query(own.x0, {"bead_filler": far})])
     assert isinstance(there, Answer)
     assert shift[0] == pytest.approx(there.eta - own.eta, abs=1e-9)
     assert d.verdict.kind in ("no_gap", "undecided") and d.probabilities["none"] > 0.25
@@ -148,15 +148,15 @@ def test_a_run_switched_beyond_the_range_is_asked_there(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        (Change("point_mass", 0.05), "not among the effects"),
-        (Change("bead_filler", -40.0), "cannot be evaluated"),
+        (Toggle("point_mass", 0.05), "not among the effects"),
+        (Toggle("bead_filler", -40.0), "cannot be evaluated"),
     ],
 )
 def test_a_change_that_the_diagnosis_cannot_follow(
-    tmp_path: Path, change: Change, words: str
+    tmp_path: Path, change: Toggle, words: str
 ) -> None:
-    one = written(tmp_path / "a.csv", asked(Point(X)).eta)
-    other = written(tmp_path / "b.csv", asked(Point(X)).eta, noise=2e-3)
+    one = written(tmp_path / "a.csv", asked(Query(X)).eta)
+    other = written(tmp_path / "b.csv", asked(Query(X)).eta, noise=2e-3)
     with pytest.raises(InputError, match=words):
         study(CASE, Evaluator(TyreDesign(CASE)), one, toggled=[(other, change)], effects=EFFECTS)
 
@@ -168,7 +168,7 @@ def test_an_effect_that_a_variable_sets_is_no_candidate(tmp_path: Path) -> None:
     )
     variables = {**CASE.case.variables, "filler": variable}
     case = replace(CASE, case=CASE.case.model_copy(update={"variables": variables}))
-    path = written(tmp_path / "a.csv", asked(Point(X)).eta)
+    path = written(tmp_path / "a.csv", asked(Query(X)).eta)
     found = study(case, Evaluator(TyreDesign(case)), path, effects=EFFECTS, section_map=False)
     assert found.calibrated == ("bead_filler",)
     assert not found.diagnosis.problem.expansion.failed
@@ -185,21 +185,21 @@ def test_an_effect_that_a_variable_sets_is_no_candidate(tmp_path: Path) -> None:
 
 
 def test_what_is_wrong_with_a_file_names_that_file(tmp_path: Path) -> None:
-    one = written(tmp_path / "a.csv", asked(Point(X)).eta)
+    one = written(tmp_path / "a.csv", asked(Query(X)).eta)
     copy = tmp_path / "copy.csv"
     copy.write_text(one.read_text())
     with pytest.raises(InputError, match=r"copy.csv: holds the same values as .*a.csv"):
         study(CASE, Evaluator(TyreDesign(CASE)), one, [copy], effects=EFFECTS)
-    high = written(tmp_path / "high.csv", asked(Point(X)).eta[:-1] + 1.0, ROWS[:-1])
+    high = written(tmp_path / "high.csv", asked(Query(X)).eta[:-1] + 1.0, ROWS[:-1])
     with pytest.raises(InputError, match=r"high.csv: .* right unit"):
         study(
             CASE,
             Evaluator(TyreDesign(CASE)),
             one,
             [],
-            [(high, Change("bead_filler", 0.0))],
+            [(high, Toggle("bead_filler", 0.0))],
             effects=EFFECTS,
         )
-    on_rim = written(tmp_path / "rim.csv", asked(Point(X)).eta + 0.6 * (np.arange(19) == 18))
+    on_rim = written(tmp_path / "rim.csv", asked(Query(X)).eta + 0.6 * (np.arange(19) == 18))
     with pytest.raises(InputError, match=r"rim.csv: the mass is 1.8 times .* without its rim"):
         study(CASE, Evaluator(TyreDesign(CASE)), on_rim, effects=EFFECTS)

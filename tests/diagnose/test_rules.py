@@ -22,14 +22,14 @@ from tyrecal.diagnose.evidence import (
     weigh,
 )
 from tyrecal.diagnose.expansion import Expansion, Nodes, _nodes, expand, node_values
-from tyrecal.diagnose.gap import Group, _chi2, _corrected, find_gap
+from tyrecal.diagnose.gap import ResidualGroup, _chi2, _corrected, find_gap
+from tyrecal.diagnose.inverse_problem import Assumed, Toggle
+from tyrecal.diagnose.label_swap import _near
+from tyrecal.diagnose.model import Answer, Query, Span
 from tyrecal.diagnose.next_measurement import rank
-from tyrecal.diagnose.observations import Observations, Row
+from tyrecal.diagnose.observations import Observable, Observations
 from tyrecal.diagnose.plain_fit import plain_fit
-from tyrecal.diagnose.problem import Assumed, Change
-from tyrecal.diagnose.reading import _near
-from tyrecal.diagnose.regions import Region
-from tyrecal.diagnose.response import Answer, Point, Span
+from tyrecal.diagnose.regions import SectionPart
 from tyrecal.diagnose.separability import separate
 from tyrecal.diagnose.verdict import decide
 from tyrecal.diagnose.where import section_map
@@ -108,9 +108,9 @@ def test_no_more_data_than_variables_tell_nothing() -> None:
 
 def test_holms_correction_by_hand() -> None:
     """p-values 0.01, 0.04, 0.03, 0.5: times 4, 2, 3 and 1 by their order, never falling."""
-    groups = [Group("k", str(p), 0.0, 0.0, 1, p, p) for p in (0.01, 0.04, 0.03, 0.5)]
+    groups = [ResidualGroup("k", str(p), 0.0, 0.0, 1, p, p) for p in (0.01, 0.04, 0.03, 0.5)]
     assert [g.corrected for g in _corrected(groups)] == pytest.approx([0.04, 0.09, 0.09, 0.5])
-    high = [Group("k", str(p), 0.0, 0.0, 1, p, p) for p in (0.6, 0.9)]
+    high = [ResidualGroup("k", str(p), 0.0, 0.0, 1, p, p) for p in (0.6, 0.9)]
     assert [g.corrected for g in _corrected(high)] == [1.0, 1.0]
 
 
@@ -153,7 +153,7 @@ def test_what_was_switched_on_purpose_is_no_part_of_another_effect() -> None:
     """A second run with e1 = 0.5: what calibration hides of e0 is what it hides of two runs."""
     toy = Toy(effects=2, bend=0.0, pressures=(240.0,))
     toy.tilt = {id: 0 * tilt for id, tilt in toy.tilt.items()}
-    p = problem(toy, changes=(Change("e1", 0.5),))
+    p = problem(toy, changes=(Toggle("e1", 0.5),))
     gap = find_gap(p, np.zeros(3), ("A", "B", "C"))
     J, g = np.vstack([toy.J, toy.J]), np.concatenate([toy.g["e0"], toy.g["e0"]])
     marginal = np.linalg.inv(p.sigma + J @ np.diag(toy.spread**2) @ J.T)
@@ -168,7 +168,11 @@ def test_a_part_of_the_section_by_its_formula() -> None:
     n, random = len(p.places), generator("where")
     P, r = np.diag(random.uniform(1e4, 4e4, n)), random.normal(0, 0.01, n)
     k, m = random.normal(0, 0.05, (2, n))
-    parts = [Region("a", k, 0 * m, ""), Region("b", 0 * k, m, ""), Region("c", 3 * k, 1e-9 * m, "")]
+    parts = [
+        SectionPart("a", k, 0 * m, ""),
+        SectionPart("b", 0 * k, m, ""),
+        SectionPart("c", 3 * k, 1e-9 * m, ""),
+    ]
     found, rank_ = section_map(p, P, r, parts)
     at = {place.region: place for place in found}
     for g, s, part in ((k, 0.2, "a"), (m, 0.1, "b")):
@@ -193,7 +197,7 @@ def test_parts_look_alike_from_a_cosine_of_095_on() -> None:
     one, other = np.eye(n)[:2]
     near = lambda cosine: cosine * one + np.sqrt(1 - cosine**2) * other
     for cosine, same in ((0.96, True), (0.94, False), (-0.96, True)):
-        parts = [Region("a", one, 0 * one, ""), Region("b", near(cosine), 0 * one, "")]
+        parts = [SectionPart("a", one, 0 * one, ""), SectionPart("b", near(cosine), 0 * one, "")]
         found, _ = section_map(p, 1e4 * np.eye(n), one, parts)
         assert [bool(place.same_as) for place in found] == [same, same]
 
@@ -322,7 +326,7 @@ def test_more_nodes_where_a_cubic_is_not_enough() -> None:
         toy = Toy(effects=1, size=1e-3, pressures=(240.0,))
         plain = toy._answer
 
-        def bent(point: Point, size: float = size, plain: Any = plain) -> Answer:
+        def bent(point: Query, size: float = size, plain: Any = plain) -> Answer:
             found = plain(point)
             e = point.effects.get("e0", 0.0)
             return replace(found, eta=found.eta + size * e * (e - 0.25) * (e - 0.75))
@@ -343,7 +347,7 @@ def test_the_plain_fit_ends_near_the_minimum_and_takes_no_leaps() -> None:
     """Of a model that bends, from afar; no step beyond 0.7 in any x."""
     toy = Toy(effects=0, bend=0.02)
     p = problem(toy)
-    (there,) = toy.answers([Point(np.array([1.5, -1.2, 0.8]))])
+    (there,) = toy.answers([Query(np.array([1.5, -1.2, 0.8]))])
     assert isinstance(there, Answer)
     asked: list[Array] = []
     answers = toy.answers
@@ -351,18 +355,18 @@ def test_the_plain_fit_ends_near_the_minimum_and_takes_no_leaps() -> None:
     x = plain_fit(toy, p.measured(there.eta).observations, p.places, 0.001)
     steps = np.abs(np.diff(asked, axis=0)).max(1)
     assert steps[0] == pytest.approx(0.7) and steps.max() < 0.7 + 1e-9 and len(asked) <= 10
-    value = lambda x: float(np.sum((toy._answer(Point(x)).eta - there.eta) ** 2))
+    value = lambda x: float(np.sum((toy._answer(Query(x)).eta - there.eta) ** 2))
     assert abs(x - [1.5, -1.2, 0.8]).max() < 0.05 and value(x) < value(asked[-1]) / 2
 
 
 def test_the_plain_fit_steps_back_from_what_has_no_solution() -> None:
     toy = Toy(effects=0, bend=0.0)
     p = problem(toy)
-    (there,) = toy.answers([Point(np.array([0.6, 0.0, 0.0]))])
+    (there,) = toy.answers([Query(np.array([0.6, 0.0, 0.0]))])
     assert isinstance(there, Answer)
     answer = toy._answer
 
-    def walled(point: Point) -> Answer:
+    def walled(point: Query) -> Answer:
         return ValueError("wall") if point.x[0] > 0.1 else answer(point)  # type: ignore[return-value]
 
     toy._answer = walled  # type: ignore[method-assign]
@@ -427,7 +431,7 @@ def test_the_gains_of_what_is_switched_and_checked_by_their_formula() -> None:
     S = p.sigma - 15 * reduced
     checked = found["measure by itself: gauge"]
     assert checked.gain == pytest.approx(apart(S, toy.J, off) - now, rel=1e-6)
-    both = problem(toy, changes=(Change("e0", 0.0),))
+    both = problem(toy, changes=(Toggle("e0", 0.0),))
     twice = np.vstack([toy.J, toy.J])
     moved = np.concatenate([off, -toy.g["e1"]])
     switched = found["measure again without e0"]
@@ -437,15 +441,15 @@ def test_the_gains_of_what_is_switched_and_checked_by_their_formula() -> None:
 def test_a_change_counts_from_what_the_case_has() -> None:
     """Set to a value, or times one."""
     e = {"a": np.array([0.0, 0.5]), "b": np.array([1.0, 2.0])}
-    assert Change("a", 0.3, base=0.2).applied(e, 2)["a"] == pytest.approx([0.1, 0.1])
-    assert Change("a", 3.0, True, 0.2).applied(e, 2)["a"] == pytest.approx([0.4, 1.9])
-    assert Change("c", 3.0, True, 0.2).applied(e, 2)["c"] == pytest.approx([0.4, 0.4])
-    assert Change("a", 0.3).applied(e, 2)["b"] is e["b"]
+    assert Toggle("a", 0.3, base=0.2).applied(e, 2)["a"] == pytest.approx([0.1, 0.1])
+    assert Toggle("a", 3.0, True, 0.2).applied(e, 2)["a"] == pytest.approx([0.4, 1.9])
+    assert Toggle("c", 3.0, True, 0.2).applied(e, 2)["c"] == pytest.approx([0.4, 0.4])
+    assert Toggle("a", 0.3).applied(e, 2)["b"] is e["b"]
 
 
 def test_labels_far_apart_are_not_taken_for_each_other() -> None:
     """Only what lies within 30 % of each other wherever both were measured."""
-    rows = tuple(Row("frequency_Hz", x, p) for x in LABELS[2:5] for p in (160.0, 240.0))
+    rows = tuple(Observable("frequency_Hz", x, p) for x in LABELS[2:5] for p in (160.0, 240.0))
     y = np.array([0.0, 0.0, 0.29, -0.29, 0.1, 0.31])
     none = np.full(6, np.nan)
     pairs = set(_near(Observations(rows, y, none, 0.0, none, none)))

@@ -16,10 +16,10 @@ from tyrecal.diagnose.diagnosis import diagnose
 from tyrecal.diagnose.evidence import probabilities, weigh
 from tyrecal.diagnose.expansion import expand
 from tyrecal.diagnose.gap import find_gap, projection
+from tyrecal.diagnose.inverse_problem import Assumed, InverseProblem, Toggle, places
+from tyrecal.diagnose.model import Answer, Query
 from tyrecal.diagnose.observations import observe
-from tyrecal.diagnose.problem import Assumed, Change, Problem, places
 from tyrecal.diagnose.regions import regions
-from tyrecal.diagnose.response import Answer, Point
 from tyrecal.diagnose.result import result
 from tyrecal.diagnose.separability import separate
 from tyrecal.diagnose.study import parse_change, spans_of, study
@@ -61,7 +61,7 @@ MODEL = model()
 X = MODEL.start + np.array((0.2, -0.1, 0.15))
 
 
-def asked(point: Point) -> Answer:
+def asked(point: Query) -> Answer:
     (found,) = MODEL.answers([point])
     assert isinstance(found, Answer), found
     return found
@@ -83,13 +83,13 @@ def written(path: Path, eta: np.ndarray, rows: list = ROWS, noise: float = 1e-3)
 
 
 @pytest.fixture(scope="module")
-def plain(tmp_path_factory: pytest.TempPathFactory) -> Problem:
+def plain(tmp_path_factory: pytest.TempPathFactory) -> InverseProblem:
     """The tyre at X, weighed, measured without a mistake."""
     expansion = expand(MODEL, X)
     path = written(tmp_path_factory.mktemp("plain") / "a.csv", expansion.eta)
     observations = observe(read_measurements(path))
     where = places(observations, ROWS)
-    return Problem(
+    return InverseProblem(
         replace(observations, y=expansion.eta[where]),
         expansion,
         MODEL.spans,
@@ -102,9 +102,9 @@ def plain(tmp_path_factory: pytest.TempPathFactory) -> Problem:
 @pytest.mark.slow
 def test_slopes_against_differences() -> None:
     x, step = MODEL.start + np.array((0.1, -0.2, 0.05)), 1e-4
-    own = asked(Point(x, constants=True))
+    own = asked(Query(x, constants=True))
     for j, d in enumerate(step * np.eye(3)):
-        two = (asked(Point(x + d)).eta - asked(Point(x - d)).eta) / (2 * step)
+        two = (asked(Query(x + d)).eta - asked(Query(x - d)).eta) / (2 * step)
         modes = slice(0, -1)
         assert own.jacobian[modes, j] == pytest.approx(two[modes], abs=2e-4)
         assert own.jacobian[-1, j] == pytest.approx(two[-1], abs=1e-5)  # of a mass
@@ -120,7 +120,7 @@ def test_slopes_against_differences() -> None:
             if path == "pressure_kPa":
                 rows = [(label, p + side * size if label else p) for label, p in ROWS]
             other = TyreModel(there, Evaluator(TyreDesign(there)), rows, [], {})
-            (found,) = other.answers([Point(x)])
+            (found,) = other.answers([Query(x)])
             assert isinstance(found, Answer)
             shifted.append(found.eta)
         wanted = (shifted[0] - shifted[1]) / 0.2
@@ -129,18 +129,18 @@ def test_slopes_against_differences() -> None:
 
 
 @pytest.mark.slow
-def test_the_expansion_is_the_model_at_its_nodes_and_close_between(plain: Problem) -> None:
+def test_the_expansion_is_the_model_at_its_nodes_and_close_between(plain: InverseProblem) -> None:
     found = plain.expansion
     there = X + np.array((0.15, -0.15, 0.1))
     eta, _ = found.plain(there)
-    assert eta == pytest.approx(asked(Point(there)).eta, abs=5e-4)
+    assert eta == pytest.approx(asked(Query(there)).eta, abs=5e-4)
     for id in EFFECTS:
         nodes = found.nodes[id]
         high = nodes.reach[1]
         for e, near in ((high, 1e-9), (0.6 * high, 3e-4), (0.1 * high, 5e-4)):
             a, B, _ = nodes.at(np.array([e]))
-            assert found.eta + a[0] == pytest.approx(asked(Point(X, {id: e})).eta, abs=near)
-            moved = asked(Point(there, {id: e})).eta
+            assert found.eta + a[0] == pytest.approx(asked(Query(X, {id: e})).eta, abs=near)
+            moved = asked(Query(there, {id: e})).eta
             assert eta + a[0] + B[0] @ (there - X) == pytest.approx(moved, abs=2e-3)
 
 
@@ -148,7 +148,7 @@ def test_parts_of_the_section_make_the_whole() -> None:
     """All rubber heavier together is the density; all parts and the pressure stiffer by the same
     factor raise every frequency by half of it."""
     parts = regions(MODEL, MODEL.start)
-    own = asked(Point(MODEL.start, constants=True))
+    own = asked(Query(MODEL.start, constants=True))
     assert own.constants is not None
     rubber = [part for part in parts if not part.name.endswith("cords")]
     assert {part.name for part in rubber} == {
@@ -171,7 +171,7 @@ def test_parts_of_the_section_make_the_whole() -> None:
 
 def test_an_effect_in_the_models_own_data_is_named_with_its_size(tmp_path: Path) -> None:
     truth = 0.8 * MODEL.spans["bead_filler"].high
-    path = written(tmp_path / "a.csv", asked(Point(X, {"bead_filler": truth})).eta)
+    path = written(tmp_path / "a.csv", asked(Query(X, {"bead_filler": truth})).eta)
     found = study(CASE, Evaluator(TyreDesign(CASE)), path, effects=EFFECTS)
     d = found.diagnosis
     assert d.verdict.kind == "named" and d.verdict.key == "bead_filler"
@@ -183,7 +183,7 @@ def test_an_effect_in_the_models_own_data_is_named_with_its_size(tmp_path: Path)
     assert sum(told["probabilities"].values()) == pytest.approx(1, abs=1e-4)
 
 
-def test_a_plain_tyre_has_no_gap(plain: Problem, chance: Chance) -> None:
+def test_a_plain_tyre_has_no_gap(plain: InverseProblem, chance: Chance) -> None:
     """Measured with all that its covariance allows, nothing is named in 49 of 50, and "none" has a
     quarter in 17 of 20 (0.94 of 300 draws); without a mistake it is said.
 
@@ -202,7 +202,7 @@ def test_a_plain_tyre_has_no_gap(plain: Problem, chance: Chance) -> None:
     chance.often(quarter, 0.85)
 
 
-def test_the_mass_gives_the_hidden_away(plain: Problem) -> None:
+def test_the_mass_gives_the_hidden_away(plain: InverseProblem) -> None:
     """One more row raises lambda by the square of what its shift is off from what the other rows
     tell of it, over its variance given them (exact: information adds up). At one design no draw is
     in that; a fit's own design, which draws move, changes lambda by more than the mass does."""
@@ -231,13 +231,13 @@ def test_the_mass_gives_the_hidden_away(plain: Problem) -> None:
 @pytest.mark.slow
 def test_a_toggled_run_shows_the_cause(tmp_path: Path) -> None:
     truth = 0.5 * MODEL.spans["bead_filler"].high
-    one = written(tmp_path / "a.csv", asked(Point(X, {"bead_filler": truth})).eta)
-    other = written(tmp_path / "b.csv", asked(Point(X)).eta)
+    one = written(tmp_path / "a.csv", asked(Query(X, {"bead_filler": truth})).eta)
+    other = written(tmp_path / "b.csv", asked(Query(X)).eta)
     d = study(
         CASE,
         Evaluator(TyreDesign(CASE)),
         one,
-        toggled=[(other, Change("bead_filler", 0.0))],
+        toggled=[(other, Toggle("bead_filler", 0.0))],
         assumed=Assumed(),
         effects=EFFECTS,
         section_map=False,
@@ -247,7 +247,7 @@ def test_a_toggled_run_shows_the_cause(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_a_wrong_unit_and_one_mode_alone(tmp_path: Path) -> None:
-    eta = asked(Point(X)).eta
+    eta = asked(Query(X)).eta
     thrice = written(tmp_path / "a.csv", eta + np.log(2 * np.pi))
     with pytest.raises(InputError, match="right unit"):
         study(CASE, Evaluator(TyreDesign(CASE)), thrice, effects=EFFECTS)
@@ -263,12 +263,12 @@ def test_a_wrong_unit_and_one_mode_alone(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "change"),
     [
-        ("bead_filler=1", Change("bead_filler", 1.0, False)),
-        (" bead_filler = 0", Change("bead_filler", 0.0, False)),
-        ("bead_filler*0.5", Change("bead_filler", 0.5, True)),
+        ("bead_filler=1", Toggle("bead_filler", 1.0, False)),
+        (" bead_filler = 0", Toggle("bead_filler", 0.0, False)),
+        ("bead_filler*0.5", Toggle("bead_filler", 0.5, True)),
     ],
 )
-def test_a_change_is_a_value_or_a_factor(text: str, change: Change) -> None:
+def test_a_change_is_a_value_or_a_factor(text: str, change: Toggle) -> None:
     assert parse_change(text) == change
 
 
@@ -327,12 +327,12 @@ def test_sources_of_error_are_those_of_the_case_or_assumed_and_never_calibrated(
 def test_an_effect_without_slopes_takes_the_plain_tyres() -> None:
     """The solver gives none with a splice: all is asked once, together, and nothing in vain."""
     evaluator = Evaluator(TyreDesign(CASE))
-    splice = Point(X, {"stiffness_splice": 1.0})
+    splice = Query(X, {"stiffness_splice": 1.0})
     spans, _ = spans_of(CASE, evaluator, ("bead_filler", "stiffness_splice"))
     own = TyreModel(CASE, evaluator, ROWS[:9], [], spans)
-    found = own.answers([splice, Point(X, {"bead_filler": 1.0})])
+    found = own.answers([splice, Query(X, {"bead_filler": 1.0})])
     assert evaluator.counts.runs == 3  # the plain one is the third
-    (plain,) = own.answers([Point(X)])
+    (plain,) = own.answers([Query(X)])
     assert isinstance(plain, Answer) and isinstance(found[0], Answer)
     assert found[0].jacobian == pytest.approx(plain.jacobian, abs=1e-12)
     assert (found[0].eta > plain.eta).all() and found[0].split[-1] > 0
@@ -341,9 +341,9 @@ def test_an_effect_without_slopes_takes_the_plain_tyres() -> None:
 
 def test_a_refusal_with_one_effect_is_that_points_answer() -> None:
     """Springs and air in the cavity do not go together: the others are answered all the same."""
-    both = Point(X, {"point_mass": 0.05, "cavity_air": 1.0})
-    refused, plain = MODEL.answers([both, Point(X)])
+    both = Query(X, {"point_mass": 0.05, "cavity_air": 1.0})
+    refused, plain = MODEL.answers([both, Query(X)])
     assert isinstance(refused, DeckRefused) and isinstance(plain, Answer)
     with pytest.raises(DeckRefused):
         other = with_values(CASE, {"effects.cavity_air": 1.0, "effects.point_mass": 0.05})
-        TyreModel(other, Evaluator(TyreDesign(other)), ROWS, [], {}).answers([Point(X)])
+        TyreModel(other, Evaluator(TyreDesign(other)), ROWS, [], {}).answers([Query(X)])

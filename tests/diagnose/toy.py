@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from tyrecal.diagnose.expansion import Expansion, expand
-from tyrecal.diagnose.observations import Observations, Row
-from tyrecal.diagnose.problem import Assumed, Change, Problem, places
-from tyrecal.diagnose.response import Answer, Point, Span
+from tyrecal.diagnose.inverse_problem import Assumed, InverseProblem, Toggle, places
+from tyrecal.diagnose.model import Answer, Query, Span
+from tyrecal.diagnose.observations import Observable, Observations
 from tyrecal.modes.mode import Label
 
 Array = np.ndarray
@@ -77,11 +77,11 @@ class Toy:
     def unit(self, variable: str) -> str:
         return "Pa"
 
-    def answers(self, points: Sequence[Point]) -> list[Answer | Exception]:
+    def answers(self, points: Sequence[Query]) -> list[Answer | Exception]:
         self.asked += len(points)
         return [self._answer(point) for point in points]
 
-    def _answer(self, point: Point) -> Answer:
+    def _answer(self, point: Query) -> Answer:
         x = point.x
         eta = self.base + self.J @ x + self.bend * (x @ x)
         J = self.J + 2 * self.bend[:, None] * x
@@ -99,12 +99,12 @@ def problem(
     noise: float = 0.002,
     assumed: Assumed = Assumed(form=0.001, law=0.0),  # noqa: B008
     x0: Array | None = None,
-    changes: tuple[Change, ...] = (),
-) -> Problem:
+    changes: tuple[Toggle, ...] = (),
+) -> InverseProblem:
     """The toy beside data y, by default its own without scatter; one run more for each change."""
     expansion: Expansion = expand(toy, np.zeros(3) if x0 is None else x0)
     rows = tuple(
-        Row("frequency_Hz", label, p, run)
+        Observable("frequency_Hz", label, p, run)
         for run in range(1 + len(changes))
         for label, p in toy.rows
     )
@@ -112,7 +112,7 @@ def problem(
     y = np.tile(toy.base, 1 + len(changes)) if y is None else y
     none = np.full(n, np.nan)
     observations = Observations(rows, y, np.full(n, noise), 0.0, none, none)
-    return Problem(
+    return InverseProblem(
         observations,
         expansion,
         toy.spans,
@@ -125,11 +125,15 @@ def problem(
 
 
 def drawn(
-    toy: Toy, base: Problem, random: np.random.Generator, effects: dict[str, float], spread: float
+    toy: Toy,
+    base: InverseProblem,
+    random: np.random.Generator,
+    effects: dict[str, float],
+    spread: float,
 ) -> Array:
     """Data (n,) with effects, design variables drawn by ``spread``, and everything off by Sigma."""
     x = random.normal(0, spread, 3)
-    (answer,) = toy.answers([Point(x, effects)])
+    (answer,) = toy.answers([Query(x, effects)])
     assert isinstance(answer, Answer)
     # by Cholesky's factor: an SVD's vectors, the default, depend on the BLAS kernel
     return random.multivariate_normal(answer.eta[base.places], base.sigma, method="cholesky")

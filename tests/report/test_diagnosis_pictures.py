@@ -13,7 +13,7 @@ from matplotlib.text import Text
 
 from tyrecal.design import load_case
 from tyrecal.diagnose.diagnosis import Diagnosis
-from tyrecal.diagnose.where import Place
+from tyrecal.diagnose.where import PartChange
 from tyrecal.report import diagnosis_pictures as pictures
 from tyrecal.report.figure import save
 from tyrecal.report.section import WARM, draw_section_map
@@ -112,8 +112,8 @@ def test_no_gap_has_nothing_that_explains_it(tmp_path: Path) -> None:
 def test_section_map(tmp_path: Path) -> None:
     """The part that explains most is the warmest, and its row stands in the table."""
     places = (
-        Place("upper sidewall", 9.0, 20.0, 21.4, 8.0, 4.9, ("carcass cords",)),
-        Place("tread", -3.0, 20.0, -0.2, 10.0, -0.01, ()),
+        PartChange("upper sidewall", 9.0, 20.0, 21.4, 8.0, 4.9, ("carcass cords",)),
+        PartChange("tread", -3.0, 20.0, -0.2, 10.0, -0.01, ()),
     )
     case = load_case(CASES / "p235_75r17.yaml")
     figure = draw_section_map(parts_data(case, [place.region for place in places]), places, 1)

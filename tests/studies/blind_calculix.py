@@ -35,7 +35,7 @@ from scipy.stats import qmc
 
 from tyrecal.blind.answer import rows_of, tyre_model
 from tyrecal.blind.draw import Truth, draw, tyre
-from tyrecal.blind.laws import Law
+from tyrecal.blind.laws import EffectLaw
 from tyrecal.blind.make import make
 from tyrecal.blind.maker import Computed
 from tyrecal.blind.outside import FAMILIES
@@ -173,7 +173,7 @@ def train(count: int) -> None:
             run(with_values(base(), values), {"about": "train", "values": values})
 
 
-def laws_confirmed() -> dict[str, Law]:
+def laws_confirmed() -> dict[str, EffectLaw]:
     """What CalculiX is asked: all laws and families but errors of reading."""
     known = {**other_laws(frozenset({"modes"})), **FAMILIES}
     return {name: law for name, law in known.items() if not law.read}
@@ -270,7 +270,9 @@ class EmulatedCalculix:
 
     def __init__(self) -> None:
         known = other_laws(frozenset({"modes"}))
-        self.laws: dict[str, Law] = {id: law for id, law in known.items() if id not in LEFT_OUT}
+        self.laws: dict[str, EffectLaw] = {
+            id: law for id, law in known.items() if id not in LEFT_OUT
+        }
         self.outside = FAMILIES
         self._fitted = fitted(usual(recorded("train"))[0])
 

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from tyrecal.blind.protocol import read_protocol
-from tyrecal.blind.ruler import Ruler, Signature, read_ruler
+from tyrecal.blind.ruler import EffectShifts, Ruler, read_ruler
 from tyrecal.blind.score import Scored, case_of, labels_of, means, score
 from tyrecal.blind.seal import open_truth
 from tyrecal.blind.tables import DETECTED
@@ -93,7 +93,7 @@ def _rms(
 def _shift(ruler: Ruler, d: Array, places: Array, effects: Mapping[str, float]) -> Array:
     total = np.zeros(len(places))
     for id, e in effects.items():
-        signature: Signature = ruler.signatures[id]
+        signature: EffectShifts = ruler.signatures[id]
         sizes, shift, _ = signature.grid(d, places)
         total += [np.interp(e, sizes, column) for column in shift.T]
     return total

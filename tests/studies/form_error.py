@@ -19,7 +19,7 @@ from tyrecal.case import LoadedCase
 from tyrecal.case.section import Level
 from tyrecal.deck.tyre_design import TyreDesign
 from tyrecal.design import load_case
-from tyrecal.diagnose.response import Answer, Point
+from tyrecal.diagnose.model import Answer, Query
 from tyrecal.diagnose.tyre_model import TyreModel
 from tyrecal.evaluate.evaluator import Evaluator
 from tyrecal.modes.mode import Label
@@ -61,7 +61,7 @@ def answer(case: LoadedCase) -> Answer:
     """The model's answer at the fitted design."""
     rows = [(label, p) for p in PRESSURES for label in LABELS]
     model = TyreModel(case, Evaluator(TyreDesign(case)), rows, [], {})
-    (found,) = model.answers([Point(np.log([FITTED[name] for name in model.variables]))])
+    (found,) = model.answers([Query(np.log([FITTED[name] for name in model.variables]))])
     assert isinstance(found, Answer), found
     return found
 

@@ -18,9 +18,9 @@ from ..case import LoadedCase
 from ..design import load_case
 from ..diagnose.diagnosis import Diagnosis, diagnose
 from ..diagnose.evidence import NONE
+from ..diagnose.inverse_problem import Assumed
+from ..diagnose.model import ResponseModel
 from ..diagnose.observations import observe
-from ..diagnose.problem import Assumed
-from ..diagnose.response import Response
 from ..diagnose.result import result
 from ..diagnose.study import spans_of
 from ..diagnose.tyre_model import TyreModel
@@ -62,7 +62,7 @@ def case_of(folder: Path) -> LoadedCase:
 
 def answer(
     folder: Path,
-    response: Response,
+    model: ResponseModel,
     rows: Sequence[ModelRow],
     jobs: int = 1,
     on_progress: Callable[[int, int], None] = lambda done, all: None,
@@ -77,7 +77,7 @@ def answer(
     answers = folder / "answers"
     own_folder(answers)
     waiting = [t for t in trials if not (answers / f"{t.stem}.json").exists()]
-    work = partial(one_answer, response, list(rows), protocol)
+    work = partial(one_answer, model, list(rows), protocol)
     before = len(trials) - len(waiting)
     with process_pool(jobs) if jobs > 1 and len(waiting) > 1 else nullcontext() as pool:
         contents = (pool.map if pool else map)(work, waiting)
@@ -88,11 +88,11 @@ def answer(
 
 
 def one_answer(
-    response: Response, rows: list[ModelRow], protocol: Protocol, trial: Path
+    model: ResponseModel, rows: list[ModelRow], protocol: Protocol, trial: Path
 ) -> dict[str, Any]:
     """The diagnosis of one file of measurements, and what it predicts at the held-out pressure."""
     observations = observe(read_measurements(trial), split=protocol.split)
-    found = diagnose(response, rows, observations, assumed=Assumed(split=protocol.split))
+    found = diagnose(model, rows, observations, assumed=Assumed(split=protocol.split))
     told = result(found)
     told.pop("next_measurements"), told.pop("section_map")
     key = told["effect"] or told["likeliest"]

@@ -11,7 +11,7 @@ import numpy as np
 from ..case import LoadedCase, start_values
 from ..design import with_values
 from ..diagnose.uncertainties import EFFECTS, Source, values_of
-from .laws import Law
+from .laws import EffectLaw
 from .protocol import Protocol
 
 NEAR = 0.25  # relative distance of modes whose labels could be taken for one another
@@ -35,8 +35,8 @@ def draw(
     protocol: Protocol,
     case: LoadedCase,
     sources: Sequence[Source],
-    laws: Mapping[str, Law],
-    outside: Mapping[str, Law],
+    laws: Mapping[str, EffectLaw],
+    outside: Mapping[str, EffectLaw],
     seed: int,
 ) -> list[Truth]:
     """All trials, in an order that says nothing: that of their ids.
@@ -71,7 +71,11 @@ def draw(
 
 
 def tyre(
-    truth: Truth, case: LoadedCase, sources: Sequence[Source], pressure_kPa: float, law: Law | None
+    truth: Truth,
+    case: LoadedCase,
+    sources: Sequence[Source],
+    pressure_kPa: float,
+    law: EffectLaw | None,
 ) -> LoadedCase:
     """The case as this tyre is at a stated pressure, with ``law``'s effect or without.
 

@@ -19,7 +19,7 @@ import numpy as np
 from scipy.stats import qmc
 
 from ..diagnose.expansion import lagrange
-from ..diagnose.response import Answer, Point, Response, Span
+from ..diagnose.model import Answer, Query, ResponseModel, Span
 
 Array = np.ndarray
 REACH = 0.8  # of ln x: 40 % by the draw, the rest what an ignored effect moves a fit
@@ -62,12 +62,12 @@ class EmulatedEffect:
 
 
 class Emulated:
-    """A `Response` that stands for ``model`` within ``reach`` of its start, and for a straight one
-    beyond."""
+    """A `ResponseModel` that stands for ``model`` within ``reach`` of its start, and for a straight
+    one beyond."""
 
     def __init__(
         self,
-        model: Response,
+        model: ResponseModel,
         reach: float,
         plain: Polynomial,
         constants: Polynomial,
@@ -79,14 +79,14 @@ class Emulated:
         self.spans: Mapping[str, Span] = {k: s for k, s in model.spans.items() if k in effects}
         self._plain, self._constants, self._effects = plain, constants, effects
 
-    def answers(self, points: Sequence[Point]) -> list[Answer | Exception]:
+    def answers(self, points: Sequence[Query]) -> list[Answer | Exception]:
         """From the polynomials; from the model where an effect has none."""
         far = [i for i, point in enumerate(points) if not set(point.effects) <= set(self._effects)]
         asked = self.model.answers([points[i] for i in far]) if far else []
         known = dict(zip(far, asked, strict=True))
         return [known[i] if i in known else self._answer(p) for i, p in enumerate(points)]
 
-    def _answer(self, point: Point) -> Answer:
+    def _answer(self, point: Query) -> Answer:
         there = (point.x - self.start) / self.reach
         t = np.clip(there, -1.0, 1.0)
         eta, slope = self._plain.at(t)
@@ -100,7 +100,7 @@ class Emulated:
         return Answer(eta + slope @ (there - t), slope / self.reach, split, constants)
 
 
-def emulate(model: Response, reach: float = REACH) -> Emulated:
+def emulate(model: ResponseModel, reach: float = REACH) -> Emulated:
     """Ask the model at its designs, the plain tyre and every effect of its spans.
 
     An effect without an answer at so many designs that its polynomials are not determined is
@@ -111,7 +111,7 @@ def emulate(model: Response, reach: float = REACH) -> Emulated:
     signs = 2 * qmc.Halton(count, seed=SEED).random(PLAIN_DESIGNS) - 1
     signs[0] = 0.0
     designs = [start + reach * t for t in signs]
-    asked = [Point(x, constants=i < SOURCE_DESIGNS) for i, x in enumerate(designs)]
+    asked = [Query(x, constants=i < SOURCE_DESIGNS) for i, x in enumerate(designs)]
     plain = model.answers(asked)
     good = [i for i, answer in enumerate(plain) if isinstance(answer, Answer)]
     powers = monomial_powers(count, PLAIN_DEGREE)
@@ -153,7 +153,7 @@ def slopes(powers: Array, t: Array) -> Array:
 
 
 def _effect(
-    model: Response,
+    model: ResponseModel,
     id: str,
     span: Span,
     signs: Array,
@@ -165,7 +165,7 @@ def _effect(
     chosen = [i for i in range(EFFECT_DESIGNS) if isinstance(plain[i], Answer)]
     nodes, added, split = [], [], []
     for e in _node_values(span):
-        answers = model.answers([Point(designs[i], {id: float(e)}) for i in chosen])
+        answers = model.answers([Query(designs[i], {id: float(e)}) for i in chosen])
         both = [(i, a) for i, a in zip(chosen, answers, strict=True) if isinstance(a, Answer)]
         if len(both) * (1 + len(signs[0])) < len(powers):
             continue

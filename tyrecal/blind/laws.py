@@ -16,7 +16,7 @@ Frequencies = Mapping[Label, tuple[float, float]]
 
 
 @dataclass(frozen=True)
-class Law:
+class EffectLaw:
     """How an effect, or what no catalogue holds, enters the tyre by one parameter."""
 
     low: float  # of the parameter's range
@@ -31,8 +31,10 @@ class Law:
         return float(random.choice(ends) * random.uniform(smallest, 1.0))
 
 
-def catalogue_laws(capabilities: frozenset[str]) -> dict[str, Law]:
+def catalogue_laws(capabilities: frozenset[str]) -> dict[str, EffectLaw]:
     """The catalogue's own, of effects that a solver with these capabilities can express."""
     return {
-        id: Law(e.low, e.high, e.add) for id, e in catalogue().items() if e.within(capabilities)
+        id: EffectLaw(e.low, e.high, e.add)
+        for id, e in catalogue().items()
+        if e.within(capabilities)
     }

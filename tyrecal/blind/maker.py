@@ -13,7 +13,7 @@ from ..evaluate.evaluator import Evaluator, Question
 from ..evaluate.store import Store
 from ..modes.find import Found, find_modes
 from ..modes.mode import Label
-from .laws import Frequencies, Law, catalogue_laws
+from .laws import EffectLaw, Frequencies, catalogue_laws
 from .outside import FAMILIES
 
 
@@ -33,11 +33,11 @@ class Maker(Protocol):
         """In words, for the protocol."""
 
     @property
-    def laws(self) -> Mapping[str, Law]:
+    def laws(self) -> Mapping[str, EffectLaw]:
         """Of effects, by id."""
 
     @property
-    def outside(self) -> Mapping[str, Law]:
+    def outside(self) -> Mapping[str, EffectLaw]:
         """Of families that the catalogue does not hold, by name."""
 
     def compute(self, case: LoadedCase, labels: list[Label]) -> Computed:
@@ -50,8 +50,8 @@ class SolverMaker:
 
     about: str
     solver: str
-    laws: Mapping[str, Law]
-    outside: Mapping[str, Law]
+    laws: Mapping[str, EffectLaw]
+    outside: Mapping[str, EffectLaw]
     store: Store | None = None
 
     def compute(self, case: LoadedCase, labels: list[Label]) -> Computed:

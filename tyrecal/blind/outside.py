@@ -10,7 +10,7 @@ from ..case.schema import Cord
 from ..effects.edit import changed, with_gauge, with_layers, with_part
 from ..effects.parts import belt_lines, carcass, carcass_line, crown
 from ..modes.mode import Label
-from .laws import Frequencies, Law
+from .laws import EffectLaw, Frequencies
 
 
 def thick_cushion(case: LoadedCase, e: float) -> LoadedCase:
@@ -60,8 +60,8 @@ def stand_resonance(computed: Mapping[float, Frequencies], e: float) -> Mapping[
 
 
 FAMILIES = {
-    "thick_cushion": Law(0.0, 3.0, thick_cushion),
-    "bias_carcass": Law(0.0, 20.0, bias_carcass),
-    "tension_stiffening": Law(-1.0, 1.0, tension_stiffening),
-    "stand_resonance": Law(-0.15, 0.15, untouched, stand_resonance),
+    "thick_cushion": EffectLaw(0.0, 3.0, thick_cushion),
+    "bias_carcass": EffectLaw(0.0, 20.0, bias_carcass),
+    "tension_stiffening": EffectLaw(-1.0, 1.0, tension_stiffening),
+    "stand_resonance": EffectLaw(-0.15, 0.15, untouched, stand_resonance),
 }

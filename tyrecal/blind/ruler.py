@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from ..diagnose.form_error import form_error
-from ..diagnose.response import Answer, Point, Response
+from ..diagnose.model import Answer, Query, ResponseModel
 from ..errors import InputError
 from ..modes.mode import Label
 from .protocol import Protocol, read_json, write_json
@@ -38,7 +38,7 @@ ModelRow = tuple[Label | None, float]
 
 
 @dataclass(frozen=True)
-class Signature:
+class EffectShifts:
     """An effect on all rows."""
 
     sizes: Array  # (k,) with 0
@@ -72,7 +72,7 @@ class Ruler:
     jacobian: Array  # (n, v)
     hessian: Array  # (n, v, v)
     constants: Array  # (n, k) change by one standard deviation of each
-    signatures: Mapping[str, Signature]
+    signatures: Mapping[str, EffectShifts]
 
     def sigma(
         self, places: Array, counts: Array, protocol: Protocol, constants: bool = True
@@ -153,13 +153,13 @@ def difficulty(
     return Difficulty(lam, min(distances.values(), default=np.inf), (law, *near), equivalent)
 
 
-def measure(response: Response, rows: Sequence[ModelRow]) -> dict[str, Any]:
+def measure(model: ResponseModel, rows: Sequence[ModelRow]) -> dict[str, Any]:
     """The ruler as plain data. Raises what the model says where the plain tyre has no solution."""
-    x0 = np.asarray(response.start, float)
+    x0 = np.asarray(model.start, float)
     count = len(x0)
-    first, *around = response.answers(
-        [Point(x0, constants=True)]
-        + [Point(x0 + side * STEP * unit) for unit in np.eye(count) for side in (1, -1)]
+    first, *around = model.answers(
+        [Query(x0, constants=True)]
+        + [Query(x0 + side * STEP * unit) for unit in np.eye(count) for side in (1, -1)]
     )
     for answer in (first, *around):
         if not isinstance(answer, Answer):
@@ -169,9 +169,9 @@ def measure(response: Response, rows: Sequence[ModelRow]) -> dict[str, Any]:
     hessian = np.stack([(slopes[2 * i] - slopes[2 * i + 1]) / (2 * STEP) for i in range(count)], -1)
     hessian = (hessian + hessian.transpose(0, 2, 1)) / 2
     signatures = {}
-    for id, span in response.spans.items():
+    for id, span in model.spans.items():
         sizes = sorted({f * end for end in (span.low, span.high) if end for f in SHARES})
-        asked = response.answers([Point(x0, {id: e}) for e in sizes])
+        asked = model.answers([Query(x0, {id: e}) for e in sizes])
         known = [(e, a) for e, a in zip(sizes, asked, strict=True) if isinstance(a, Answer)]
         zero = (0.0, Answer(first.eta, first.jacobian, 0 * first.split))
         known = sorted([*known, zero], key=lambda pair: pair[0])
@@ -186,7 +186,7 @@ def measure(response: Response, rows: Sequence[ModelRow]) -> dict[str, Any]:
         "format": 1,
         "rows": [[_words(label), p] for label, p in rows],
         "x0": x0.tolist(),
-        "spread": np.asarray(response.spread).tolist(),
+        "spread": np.asarray(model.spread).tolist(),
         "eta": first.eta.tolist(),
         "jacobian": first.jacobian.tolist(),
         "hessian": _rounded(hessian),
@@ -208,7 +208,7 @@ def read_ruler(folder: Path, labels: Sequence[Label]) -> Ruler:
     try:
         numbers = {key: np.array(content[key], float) for key in NUMBERS}
         signatures = {
-            id: Signature(*(np.array(each[key], float) for key in SIGNATURE))
+            id: EffectShifts(*(np.array(each[key], float) for key in SIGNATURE))
             for id, each in content["signatures"].items()
         }
         rows = tuple((known[name], float(p)) for name, p in content["rows"])

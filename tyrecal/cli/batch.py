@@ -115,7 +115,7 @@ def command(
     from ..evaluate.queue import reached
     from ..settings import root
     from .output import Run
-    from .progress import Progress
+    from .progress import BatchProgress
 
     names = _names(cases)
     wanted = _studies(studies)
@@ -148,7 +148,7 @@ def command(
     ]
     _prepare(tasks, folder)
     started = run.started
-    progress = Progress(len(tasks), talk.quiet, talk.verbose)
+    progress = BatchProgress(len(tasks), talk.quiet, talk.verbose)
     try:
         with progress, reached(scheduler) as address:
             reports = run_batch(tasks, jobs, address, progress.notify)

@@ -163,7 +163,7 @@ def answer(
     from ..blind.protocol import read_protocol
     from ..blind.seal import refuse_open_truth
     from ..deck.tyre_design import TyreDesign
-    from ..diagnose.response import Response
+    from ..diagnose.model import ResponseModel
     from ..effects import catalogue
     from ..evaluate.evaluator import Evaluator
     from ..evaluate.store import Store
@@ -175,7 +175,7 @@ def answer(
     protocol, case = read_protocol(folder), blind.case_of(folder)
     resume("answers that were given are kept; the same command goes on from there")
     evaluator = Evaluator(TyreDesign(case), store=Store((store or folder / "record").resolve()))
-    model: Response = blind.tyre_model(case, evaluator, protocol, jobs, effects or None)
+    model: ResponseModel = blind.tyre_model(case, evaluator, protocol, jobs, effects or None)
     if emulated:
         model = emulate(model)
     with talk.progress("answer trials") as bar:

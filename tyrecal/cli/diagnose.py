@@ -102,7 +102,7 @@ def command(
     if measured is None:
         raise click.UsageError("--measured FILE must be given, or --add EFFECT=VALUE")
     from ..diagnose.diagnosis import STAGES
-    from ..diagnose.problem import Assumed
+    from ..diagnose.inverse_problem import Assumed
     from ..diagnose.result import result
     from ..diagnose.study import parse_change
     from ..diagnose.study import study as diagnosed

@@ -12,7 +12,7 @@ import click
 BETWEEN_S = 30.0  # lines where there is no terminal
 
 
-class Progress:
+class BatchProgress:
     """A bar on a terminal; elsewhere a line now and then, and one for each case that fails."""
 
     def __init__(self, total: int, quiet: bool, verbose: bool):
@@ -21,7 +21,7 @@ class Progress:
         self.began = self.said = time.monotonic()
         self.bar: Any = None
 
-    def __enter__(self) -> Progress:
+    def __enter__(self) -> BatchProgress:
         if sys.stderr.isatty() and not self.quiet:
             from rich.console import Console
             from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn

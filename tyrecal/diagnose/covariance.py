@@ -12,13 +12,13 @@ from __future__ import annotations
 import numpy as np
 
 from .form_error import form_error
-from .observations import Observations, Row
+from .observations import Observable, Observations
 
 Array = np.ndarray
 BETWEEN_PRESSURES, BETWEEN_RUNS = 0.9, 0.97
 
 
-def alike(rows: tuple[Row, ...]) -> Array:
+def alike(rows: tuple[Observable, ...]) -> Array:
     """Correlation (n, n) of what belongs to a mode: 1 on the diagonal, 0 between modes."""
     result = np.zeros((len(rows), len(rows)))
     for i, a in enumerate(rows):

@@ -12,17 +12,17 @@ from ..modes.mode import Label
 from .evidence import NONE, Hypothesis, probabilities, weigh
 from .expansion import Expansion, anchored, expand
 from .gap import Gap, find_gap, projection
+from .inverse_problem import Assumed, InverseProblem, Toggle, places
+from .label_swap import exchanged, with_exchanged
+from .model import ResponseModel
 from .next_measurement import Choice, ModelRow, rank
 from .observations import Observations
 from .plain_fit import plain_fit
-from .problem import Assumed, Change, Problem, places
-from .reading import exchanged, with_exchanged
-from .regions import Region
-from .response import Response
+from .regions import SectionPart
 from .separability import Separability, separate
 from .shrinkage import Shrinkage, shrink
 from .verdict import NAMED, NO_GAP, Verdict, decide
-from .where import Place, section_map
+from .where import PartChange, section_map
 
 Array = np.ndarray
 IN_PLAY, MOST_IN_PLAY = 8.0, 6  # ln evidence behind the best up to which a node is asked again
@@ -42,8 +42,8 @@ class Diagnosis:
     effective_rank: the section map, and how many combinations of its parts the data see; rung: of
     the ladder of proof, 1 to 4; exchanged: labels that were put right before all else."""
 
-    problem: Problem
-    bare: Problem
+    problem: InverseProblem
+    bare: InverseProblem
     variables: tuple[str, ...]
     sources: tuple[str, ...]
     hypotheses: tuple[Hypothesis, ...]
@@ -51,7 +51,7 @@ class Diagnosis:
     verdict: Verdict
     gap: Gap
     separability: Separability
-    parts: tuple[Place, ...]
+    parts: tuple[PartChange, ...]
     effective_rank: int
     shrinkage: Shrinkage | None
     rung: int
@@ -87,13 +87,13 @@ class Diagnosis:
 
 
 def diagnose(
-    response: Response,
+    model: ResponseModel,
     rows: Sequence[ModelRow],
     observations: Observations,
-    changes: tuple[Change, ...] = (),
+    changes: tuple[Toggle, ...] = (),
     assumed: Assumed = Assumed(),  # noqa: B008
-    parts: Callable[[Array], Sequence[Region]] | None = None,
-    further: Callable[[list[ModelRow]], Response] | None = None,
+    parts: Callable[[Array], Sequence[SectionPart]] | None = None,
+    further: Callable[[list[ModelRow]], ResponseModel] | None = None,
     expansion: Expansion | None = None,
     seed: int = 0,
     stage: Callable[[str], None] = lambda stage: None,
@@ -108,26 +108,19 @@ def diagnose(
     where = places(observations, rows)
     stage(STAGES[0])
     if expansion is None:
-        expansion = expand(response, plain_fit(response, observations, where, assumed.form))
-    problem = Problem(
-        observations,
-        expansion,
-        response.spans,
-        where,
-        response.start,
-        response.spread,
-        changes,
-        assumed,
+        expansion = expand(model, plain_fit(model, observations, where, assumed.form))
+    problem = InverseProblem(
+        observations, expansion, model.spans, where, model.start, model.spread, changes, assumed
     )
-    labels = exchanged(problem) if len(where) > len(response.start) else None
+    labels = exchanged(problem) if len(where) > len(model.start) else None
     if labels:
         observations = with_exchanged(observations, *labels)
-        expansion = expand(response, plain_fit(response, observations, where, assumed.form))
+        expansion = expand(model, plain_fit(model, observations, where, assumed.form))
         problem = replace(problem, observations=observations, expansion=expansion)
     hypotheses, bare = weigh(problem), problem
     stage(STAGES[1])
     for _ in range(ROUNDS if expansion.nodes else 0):
-        problem, changed = _asked_again(problem, response, hypotheses)
+        problem, changed = _asked_again(problem, model, hypotheses)
         if not changed:
             break
         hypotheses = weigh(problem)
@@ -137,7 +130,7 @@ def diagnose(
     assert plain is not None
     d = plain.d[0]
     verdict = decide(hypotheses, p, len(where), len(d))
-    gap = find_gap(bare, d, tuple(response.variables))
+    gap = find_gap(bare, d, tuple(model.variables))
     P, _, _ = projection(problem, d)
     means = {h.key: h.mean() for h in hypotheses if h.values}
     sizes = {key: value[key] for key, value in means.items() if key in value}
@@ -147,12 +140,12 @@ def diagnose(
     found, effective_rank = section_map(bare, P, gap.residuals, regions)
     shrinkage = shrink(problem, verdict.key, seed) if problem.expansion.nodes else None
     stage(STAGES[3])
-    choices = rank(bare, d, p, means, response.sources, further)
+    choices = rank(bare, d, p, means, model.sources, further)
     return Diagnosis(
         problem,
         bare,
-        tuple(response.variables),
-        tuple(response.sources),
+        tuple(model.variables),
+        tuple(model.sources),
         tuple(hypotheses),
         p,
         verdict,
@@ -168,8 +161,8 @@ def diagnose(
 
 
 def _asked_again(
-    problem: Problem, response: Response, hypotheses: Sequence[Hypothesis]
-) -> tuple[Problem, bool]:
+    problem: InverseProblem, model: ResponseModel, hypotheses: Sequence[Hypothesis]
+) -> tuple[InverseProblem, bool]:
     """The problem with the model asked where the effects in play have their re-fits, each at its
     likeliest size, and whether anything was left to ask."""
     singles = [h for h in hypotheses if h.key in problem.expansion.nodes]
@@ -187,10 +180,10 @@ def _asked_again(
             wanted[h.key] = e, problem.expansion.x0 + d
     if not wanted:
         return problem, False
-    return replace(problem, expansion=anchored(problem.expansion, response, wanted)), True
+    return replace(problem, expansion=anchored(problem.expansion, model, wanted)), True
 
 
-def _rung(verdict: Verdict, shrinkage: Shrinkage | None, problem: Problem) -> int:
+def _rung(verdict: Verdict, shrinkage: Shrinkage | None, problem: InverseProblem) -> int:
     """1: fits in sample; 2: held-out error falls beyond the placebo's; 4: a toggled run moved the
     frequencies as the named effect says (its posterior check holds with that run among the data).
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from .covariance import alike
 from .expansion import Nodes
-from .problem import Problem
+from .inverse_problem import InverseProblem
 
 Array = np.ndarray
 NONE, OUTSIDE = "none", "outside"
@@ -80,7 +80,7 @@ class Hypothesis:
 
 
 def refit(
-    problem: Problem, effects: Mapping[str, Array], count: int, extra: Array | None = None
+    problem: InverseProblem, effects: Mapping[str, Array], count: int, extra: Array | None = None
 ) -> Fitted:
     """x re-fitted at each of ``count`` parameters. extra (n, n): more covariance."""
     y = problem.observations.y
@@ -114,7 +114,7 @@ def refit(
     return Fitted(ln_evidence + ln_splits(problem, split), d, chi2, np.linalg.inv(normal))
 
 
-def ln_splits(problem: Problem, split: Array) -> Array:
+def ln_splits(problem: InverseProblem, split: Array) -> Array:
     """ln p(splits) (q,) where pairs should be ``split`` (q, n) apart.
 
     Folded normal distribution: s = |N(split, tau^2)|, tau with the non-uniformity that every
@@ -128,7 +128,7 @@ def ln_splits(problem: Problem, split: Array) -> Array:
     return np.asarray((ln - np.log(tau) - np.log(2 * np.pi) / 2).sum(1))
 
 
-def weigh(problem: Problem, pairs: bool = True) -> list[Hypothesis]:
+def weigh(problem: InverseProblem, pairs: bool = True) -> list[Hypothesis]:
     """Every hypothesis with its evidence: none, outside, singles, pairs of the best with all."""
     ids = list(problem.expansion.nodes)
     plain = refit(problem, {}, 1)
@@ -145,7 +145,7 @@ def probabilities(hypotheses: Sequence[Hypothesis]) -> dict[str, float]:
     return {h.key: float(x) for h, x in zip(hypotheses, p / p.sum(), strict=True)}
 
 
-def _pairs(problem: Problem, singles: Sequence[Hypothesis]) -> list[Hypothesis]:
+def _pairs(problem: InverseProblem, singles: Sequence[Hypothesis]) -> list[Hypothesis]:
     """Forward stepping: the best singles, each with every other effect."""
     order = [h.key for h in singles]
     best = {h.key for h in sorted(singles, key=lambda h: -h.ln_evidence)[:PARTNERS]}
@@ -154,7 +154,7 @@ def _pairs(problem: Problem, singles: Sequence[Hypothesis]) -> list[Hypothesis]:
     return [explain(problem, two, PRIOR_PAIRS / len(all_pairs)) for two in tried]
 
 
-def outside(problem: Problem) -> Hypothesis:
+def outside(problem: InverseProblem) -> Hypothesis:
     """What the catalogue does not hold: half of it unknown effects, half errors of reading.
 
     Unknown effects shift modes by a random amount each, alike at all pressures, or all of Sigma
@@ -182,7 +182,7 @@ def outside(problem: Problem) -> Hypothesis:
     return Hypothesis(OUTSIDE, PRIOR_OUTSIDE, total, {}, np.zeros(1), best, words)
 
 
-def explain(problem: Problem, ids: Sequence[str], prior: float) -> Hypothesis:
+def explain(problem: InverseProblem, ids: Sequence[str], prior: float) -> Hypothesis:
     """One or two effects over their ranges; what two add is added up.
 
     Where a peak is narrow, points gather about it: those within two places of the best one give way

@@ -17,7 +17,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from .response import Answer, Point, Response, Span
+from .model import Answer, Query, ResponseModel, Span
 
 Array = np.ndarray
 ONE_SIDED = (0.25, 0.75, 1.0)  # with 0 the Lobatto points of a cubic
@@ -80,19 +80,19 @@ class Expansion:
         return self.eta + self.jacobian @ d + bent @ d / 2, self.jacobian + bent
 
 
-def expand(response: Response, x0: Array) -> Expansion:
+def expand(model: ResponseModel, x0: Array) -> Expansion:
     """Ask the model about x0: curvature by x, sources of error, every effect at its nodes.
 
     Raises what the model answered where it has no solution at x0 itself.
     """
-    ids, count = list(response.spans), len(x0)
+    ids, count = list(model.spans), len(x0)
     steps = CURVATURE_STEP * np.eye(count)
-    values = {id: node_values(response.spans[id]) for id in ids}
-    points = [Point(x0, constants=True)]
-    points += [Point(x0 + side * step) for step in steps for side in (1, -1)]
+    values = {id: node_values(model.spans[id]) for id in ids}
+    points = [Query(x0, constants=True)]
+    points += [Query(x0 + side * step) for step in steps for side in (1, -1)]
     asked = [(id, float(e)) for id in ids for e in values[id]]
-    points += [Point(x0, {id: e}) for id, e in asked]
-    answers = response.answers(points)
+    points += [Query(x0, {id: e}) for id, e in asked]
+    answers = model.answers(points)
     first = answers[0]
     if isinstance(first, Exception):
         raise first
@@ -110,14 +110,14 @@ def expand(response: Response, x0: Array) -> Expansion:
     more = [
         (id, far * f)
         for id in ids
-        for far in _bent(plain, response.spans[id], found[id])
+        for far in _bent(plain, model.spans[id], found[id])
         for f in BENDING
     ]
-    again = response.answers([Point(x0, {id: e}) for id, e in more]) if more else []
+    again = model.answers([Query(x0, {id: e}) for id, e in more]) if more else []
     for (id, e), answer in zip(more, again, strict=True):
         found[id][e] = answer
     for id in ids:
-        made = _nodes(plain, response.spans[id], found[id])
+        made = _nodes(plain, model.spans[id], found[id])
         if made is None:
             failed[id] = str(next(a for a in found[id].values() if isinstance(a, Exception)))
         else:
@@ -135,11 +135,11 @@ def node_values(span: Span) -> Array:
 
 
 def anchored(
-    expansion: Expansion, response: Response, wanted: Mapping[str, tuple[float, Array]]
+    expansion: Expansion, model: ResponseModel, wanted: Mapping[str, tuple[float, Array]]
 ) -> Expansion:
     """The expansion with effects asked again at {id: (parameter, x (v,))}; one that has no
     solution there stays as it was."""
-    answers = response.answers([Point(x, {id: e}) for id, (e, x) in wanted.items()])
+    answers = model.answers([Query(x, {id: e}) for id, (e, x) in wanted.items()])
     nodes = dict(expansion.nodes)
     for (id, (e, x)), answer in zip(wanted.items(), answers, strict=True):
         if isinstance(answer, Answer):

@@ -14,15 +14,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import chi2, norm
 
-from .observations import Row
-from .problem import Problem
+from .inverse_problem import InverseProblem
+from .observations import Observable
 
 Array = np.ndarray
 FAMILIES = {"in-plane": "in-plane", "out-of-plane": "lateral"}
 
 
 @dataclass(frozen=True)
-class Group:
+class ResidualGroup:
     """Residuals of some rows."""
 
     kind: str  # family, harmonic, pressure or mass
@@ -57,7 +57,7 @@ class Gap:
     p_value: float
     residuals: Array  # (n,) ln measured - ln model
     spread: Array  # (n,) their standard deviation without a gap
-    groups: tuple[Group, ...]
+    groups: tuple[ResidualGroup, ...]
     contrasts: tuple[Contrast, ...]
     absorbed: Mapping[str, float]  # share of each effect that calibration hides
     bias_percent: Mapping[str, Mapping[str, float]]  # of variables, by effect at full size
@@ -68,7 +68,7 @@ class Gap:
         return float(100 * np.sqrt(np.mean(self.residuals**2)))
 
 
-def projection(problem: Problem, d: Array) -> tuple[Array, Array, Array]:
+def projection(problem: InverseProblem, d: Array) -> tuple[Array, Array, Array]:
     """P (n, n), Sigma^-1 (n, n), and (J^T S^-1 J + Sx^-1)^-1 J^T S^-1 (v, n), at x0 + d."""
     _, J = problem.plain(d)
     inverse = np.linalg.inv(problem.sigma)
@@ -77,7 +77,7 @@ def projection(problem: Problem, d: Array) -> tuple[Array, Array, Array]:
     return (P + P.T) / 2, inverse, absorbing
 
 
-def find_gap(problem: Problem, d: Array, variables: tuple[str, ...]) -> Gap:
+def find_gap(problem: InverseProblem, d: Array, variables: tuple[str, ...]) -> Gap:
     """The gap at the plain fit x0 + d."""
     P, inverse, absorbing = projection(problem, d)
     sigma = problem.sigma
@@ -113,7 +113,7 @@ def find_gap(problem: Problem, d: Array, variables: tuple[str, ...]) -> Gap:
     )
 
 
-def _groups(rows: tuple[Row, ...], r: Array, C: Array) -> list[Group]:
+def _groups(rows: tuple[Observable, ...], r: Array, C: Array) -> list[ResidualGroup]:
     kinds = {
         "family": [family(row) for row in rows],
         "harmonic": [str(row.label.c) if row.label else None for row in rows],
@@ -127,11 +127,11 @@ def _groups(rows: tuple[Row, ...], r: Array, C: Array) -> list[Group]:
             value, freedom = _chi2(r[G], C[np.ix_(G, G)])
             p = float(chi2.sf(value, freedom)) if freedom else 1.0
             rms = float(100 * np.sqrt(np.mean(r[G] ** 2)))
-            result.append(Group(kind, name, rms, value, freedom, p, p))
+            result.append(ResidualGroup(kind, name, rms, value, freedom, p, p))
     return result
 
 
-def family(row: Row) -> str | None:
+def family(row: Observable) -> str | None:
     """in-plane, lateral (out-of-plane), [0,0], or None."""
     if row.label is None:
         return None
@@ -146,7 +146,7 @@ def _chi2(r: Array, C: Array) -> tuple[float, int]:
     return float((along**2 / values[keep]).sum()), int(keep.sum())
 
 
-def _corrected(groups: list[Group]) -> list[Group]:
+def _corrected(groups: list[ResidualGroup]) -> list[ResidualGroup]:
     """Holm: the i-th smallest of m p-values times m - i + 1, never falling."""
     order = sorted(range(len(groups)), key=lambda i: groups[i].p_value)
     running, result = 0.0, list(groups)
@@ -156,7 +156,7 @@ def _corrected(groups: list[Group]) -> list[Group]:
     return result
 
 
-def _contrasts(rows: tuple[Row, ...], r: Array, C: Array) -> list[Contrast]:
+def _contrasts(rows: tuple[Observable, ...], r: Array, C: Array) -> list[Contrast]:
     modes = np.array([row.label is not None for row in rows])
     c = np.array([row.label.c if row.label else -1 for row in rows], float)
     lateral = np.array([family(row) == "lateral" for row in rows])

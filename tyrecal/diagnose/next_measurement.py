@@ -15,9 +15,9 @@ import numpy as np
 from ..modes.mode import Label
 from .covariance import covariance
 from .evidence import NONE, OUTSIDE
-from .observations import Observations, Row
-from .problem import Change, Problem
-from .response import Answer, Point, Response
+from .inverse_problem import InverseProblem, Toggle
+from .model import Answer, Query, ResponseModel
+from .observations import Observable, Observations
 
 Array = np.ndarray
 ModelRow = tuple[Label | None, float]
@@ -64,12 +64,12 @@ class _Look:
 
 
 def rank(
-    problem: Problem,
+    problem: InverseProblem,
     d: Array,
     probabilities: Mapping[str, float],
     sizes: Mapping[str, Mapping[str, float]],
     sources: Sequence[str],
-    further: Callable[[list[ModelRow]], Response] | None = None,
+    further: Callable[[list[ModelRow]], ResponseModel] | None = None,
 ) -> list[Choice]:
     """The menu by falling gain, at the plain fit x0 + d.
 
@@ -86,7 +86,7 @@ def rank(
         return []
     now = _look(problem, d, likely, sizes)
     before = now.apart(likely, problem.spread)
-    menu: list[tuple[str, float, Problem]] = []
+    menu: list[tuple[str, float, InverseProblem]] = []
     for k, source in enumerate(sources):
         known = replace(problem, reduced={**problem.reduced, k: CHECKED})
         menu.append((f"measure by itself: {source.replace('_', ' ')}", HOURS["check"], known))
@@ -110,7 +110,7 @@ def rank(
 
 
 def _look(
-    problem: Problem,
+    problem: InverseProblem,
     d: Array,
     likely: Mapping[str, float],
     sizes: Mapping[str, Mapping[str, float]],
@@ -122,7 +122,7 @@ def _look(
     return _Look(problem.sigma, problem.plain(d)[1], shifts)
 
 
-def _switched(problem: Problem, id: str) -> Problem:
+def _switched(problem: InverseProblem, id: str) -> InverseProblem:
     """The problem with one run more, in which the effect is absent."""
     run = 1 + len(problem.changes)
     first = np.array([row.run == 0 for row in problem.observations.rows])
@@ -132,16 +132,16 @@ def _switched(problem: Problem, id: str) -> Problem:
     numbers = (join(o.y), join(o.scatter), o.common, join(o.split), join(o.split_scatter))
     both = Observations(rows, *numbers)
     base = problem.spans[id].base if id in problem.spans else 0.0
-    changes = (*problem.changes, Change(id, 0.0, base=base))
+    changes = (*problem.changes, Toggle(id, 0.0, base=base))
     return replace(problem, observations=both, places=join(problem.places), changes=changes)
 
 
 def _more_rows(
-    problem: Problem,
+    problem: InverseProblem,
     now: _Look,
     likely: Mapping[str, float],
     sizes: Mapping[str, Mapping[str, float]],
-    further: Callable[[list[ModelRow]], Response],
+    further: Callable[[list[ModelRow]], ResponseModel],
 ) -> list[tuple[str, float, _Look]]:
     """Other pressures, higher harmonics and the mass, as far as the model has an answer."""
     o = problem.observations
@@ -161,7 +161,7 @@ def _more_rows(
     rows = list(dict.fromkeys(row for _, _, more in offered for row in more))
     model = further(rows)
     x0 = problem.expansion.x0
-    points = [Point(x0, constants=True), *(Point(x0, sizes.get(key, {})) for key in likely)]
+    points = [Query(x0, constants=True), *(Query(x0, sizes.get(key, {})) for key in likely)]
     answers = model.answers(points)
     if not all(isinstance(answer, Answer) for answer in answers):
         return []
@@ -171,7 +171,7 @@ def _more_rows(
     result = []
     for words, hours, more in offered:
         at = [rows.index(row) for row in more]
-        new = tuple(Row("frequency_Hz" if x else "mass_kg", x, p) for x, p in more)
+        new = tuple(Observable("frequency_Hz" if x else "mass_kg", x, p) for x, p in more)
         size = np.array([scatter if label else MASS_PERCENT / 100 for label, _ in more])
         none, join = np.full(len(more), np.nan), lambda *parts: np.concatenate(parts)
         both = Observations(

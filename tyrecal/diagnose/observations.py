@@ -21,7 +21,7 @@ Key = tuple[str, Label | None, float]
 
 
 @dataclass(frozen=True)
-class Row:
+class Observable:
     """What one number is."""
 
     quantity: str
@@ -38,7 +38,7 @@ class Row:
 class Observations:
     """All that was measured of one tyre."""
 
-    rows: tuple[Row, ...]
+    rows: tuple[Observable, ...]
     y: Array  # (n,) ln value
     scatter: Array  # (n,) standard deviation of y by repeatability
     common: float  # the part of it that all frequencies of one run share
@@ -79,7 +79,7 @@ def observe(
     rows, numbers = [], []
     for index, run in enumerate(runs):
         for key in sorted({key[:3] for key in run}, key=_order):
-            rows.append(Row(key[0], key[1], key[2], index))
+            rows.append(Observable(key[0], key[1], key[2], index))
             numbers.append(_pair(run, key, split))
     table = np.array(numbers, float).reshape(-1, 4).T
     return Observations(
@@ -118,7 +118,7 @@ def _unrepeated(runs: Sequence[dict]) -> Iterator[str]:
 
 
 def _names(keys: Sequence[Key]) -> str:
-    return ", ".join(dict.fromkeys(str(Row(key[0], key[1], key[2])) for key in keys))
+    return ", ".join(dict.fromkeys(str(Observable(key[0], key[1], key[2])) for key in keys))
 
 
 def _stated(run: dict) -> dict:

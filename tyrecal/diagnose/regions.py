@@ -20,7 +20,7 @@ TREAD = "tread"
 
 
 @dataclass(frozen=True)
-class Region:
+class SectionPart:
     """A part of the section."""
 
     name: str
@@ -29,7 +29,7 @@ class Region:
     material: str  # what the split case calls it
 
 
-def regions(model: TyreModel, x: Array) -> list[Region]:
+def regions(model: TyreModel, x: Array) -> list[SectionPart]:
     """Every region's rubber (the crown's in two: tread and what lies under it), every cord.
 
     One evaluation a pressure, with exact slopes by the constants of each part. Raises
@@ -67,7 +67,7 @@ def regions(model: TyreModel, x: Array) -> list[Region]:
                 key = path.rpartition(".")[2]
                 sign = -1.0 if key == "D1_per_Pa" else 1.0
                 columns[int(key.startswith("density")), i] += sign * slope
-        result.append(Region(name, columns[0], columns[1], material))
+        result.append(SectionPart(name, columns[0], columns[1], material))
     return result
 
 

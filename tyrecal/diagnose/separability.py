@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .problem import Problem
+from .inverse_problem import InverseProblem
 
 Array = np.ndarray
 VISIBLE, APART = 10.0, 9.0
@@ -50,7 +50,7 @@ class Separability:
         return [group for group in result if len(group) > 1]
 
 
-def separate(problem: Problem, P: Array, sizes: Mapping[str, float]) -> Separability:
+def separate(problem: InverseProblem, P: Array, sizes: Mapping[str, float]) -> Separability:
     """Judge each effect at its size, or at full size where it would not be seen at that."""
     ids = tuple(problem.expansion.nodes)
     grids, shifts, ends = {}, {}, {}

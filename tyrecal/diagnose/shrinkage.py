@@ -17,8 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from .evidence import NONE, Hypothesis, grid, weigh
-from .observations import Row
-from .problem import Problem
+from .inverse_problem import InverseProblem
+from .observations import Observable
 
 Array = np.ndarray
 PLACEBOS, DRAWS = 200, 200
@@ -44,7 +44,7 @@ class Shrinkage:
     least_squares_after_percent: float
 
 
-def held_out(rows: Sequence[Row]) -> tuple[Array, str]:
+def held_out(rows: Sequence[Observable]) -> tuple[Array, str]:
     """The rows to hold out (n,), by rule, and in words.
 
     Three pressures or more: the second highest; two: the lower; one: the highest harmonic of each
@@ -68,7 +68,7 @@ def held_out(rows: Sequence[Row]) -> tuple[Array, str]:
     return np.array(hold, bool), f"the highest harmonics, {' and '.join(names)}"
 
 
-def shrink(problem: Problem, key: str | None = None, seed: int = 0) -> Shrinkage | None:
+def shrink(problem: InverseProblem, key: str | None = None, seed: int = 0) -> Shrinkage | None:
     """Shrinkage by the effect ``key`` (None: the likeliest on the fitted rows); None where too
     few rows are left, or no effect is known."""
     hold, words = held_out(problem.observations.rows)
@@ -106,7 +106,7 @@ def shrink(problem: Problem, key: str | None = None, seed: int = 0) -> Shrinkage
     )
 
 
-def _least_squares(problem: Problem, hold: Array, sizes: Mapping[str, float]) -> Array:
+def _least_squares(problem: InverseProblem, hold: Array, sizes: Mapping[str, float]) -> Array:
     """Errors on the held-out rows after least squares of the other frequencies' ln, of run 0, with
     effects of these sizes in the model; bounds hold x as in all fits."""
     rows = problem.observations.rows
@@ -127,20 +127,20 @@ def _least_squares(problem: Problem, hold: Array, sizes: Mapping[str, float]) ->
     return _predicted_errors(out, effects, d[None])[0]
 
 
-def _errors(out: Problem, hypothesis: Hypothesis, place: int) -> Array:
+def _errors(out: InverseProblem, hypothesis: Hypothesis, place: int) -> Array:
     """ln measured - ln predicted on the held-out rows, at a place of the hypothesis' grid."""
     assert hypothesis.fitted is not None
     effects = {id: e[[place]] for id, e in hypothesis.values.items()}
     return _predicted_errors(out, effects, hypothesis.fitted.d[[place]])[0]
 
 
-def _predicted_errors(out: Problem, effects: dict[str, Array], d: Array) -> Array:
+def _predicted_errors(out: InverseProblem, effects: dict[str, Array], d: Array) -> Array:
     shift, tilt, _ = out.added(effects, len(d))
     plain = np.array([out.plain(each)[0] for each in d])
     return np.asarray(out.observations.y - plain - shift - np.einsum("qnv,qv->qn", tilt, d))
 
 
-def _samples(out: Problem, hypothesis: Hypothesis, random: np.random.Generator) -> Array:
+def _samples(out: InverseProblem, hypothesis: Hypothesis, random: np.random.Generator) -> Array:
     """Errors (draws, n) with parameters and x drawn from the posterior."""
     fitted = hypothesis.fitted
     assert fitted is not None
@@ -154,7 +154,7 @@ def _samples(out: Problem, hypothesis: Hypothesis, random: np.random.Generator) 
     return _predicted_errors(out, {id: e[places] for id, e in hypothesis.values.items()}, d)
 
 
-def _placebo(problem: Problem, hold: Array, random: np.random.Generator) -> float:
+def _placebo(problem: InverseProblem, hold: Array, random: np.random.Generator) -> float:
     """The 95 % quantile of R on tyres without any effect, linear in x about the plain fit."""
     keep = ~hold
     n, sigma, count = len(hold), problem.sigma, len(problem.centre)

@@ -18,10 +18,10 @@ from ..measured.tables import read_measurements
 from .calibrated import calibrated_variables
 from .diagnosis import Diagnosis, diagnose
 from .evidence import NONE
+from .inverse_problem import Assumed, Toggle
+from .model import Answer, Query, Span
 from .observations import Observations, observe
-from .problem import Assumed, Change
 from .regions import regions
-from .response import Answer, Point, Span
 from .tyre_model import TyreModel
 from .uncertainties import EFFECTS, Source, calibrated, sources
 from .under_load import UnderLoad, Values, compare
@@ -31,7 +31,7 @@ ALIKE_MASS = 1.5  # as the mass: a rim weighs as much as its tyre
 
 
 @dataclass(frozen=True)
-class Study:
+class DiagnosedCase:
     """A diagnosis with what it rests on: sources of error, whether they were assumed, effects
     that the solver cannot express, those that variables of the case calibrate, the model, and what
     was measured under load, None without."""
@@ -61,13 +61,13 @@ def study(
     evaluator: Evaluator,
     measured: Path,
     repeats: Sequence[Path] = (),
-    toggled: Sequence[tuple[Path, Change]] = (),
+    toggled: Sequence[tuple[Path, Toggle]] = (),
     assumed: Assumed = Assumed(),  # noqa: B008
     jobs: int = 1,
     effects: Sequence[str] | None = None,
     section_map: bool = True,
     stage: Callable[[str], None] = lambda stage: None,
-) -> Study:
+) -> DiagnosedCase:
     """Read the files and diagnose the case with them.
 
     effects: ids to consider, None = the whole catalogue; one that a variable of the case sets is
@@ -111,7 +111,7 @@ def study(
         stage=stage,
     )
     own = [runs[path] for path in (measured, *repeats)]
-    return Study(
+    return DiagnosedCase(
         diagnosis,
         tuple(found),
         assumed_sources,
@@ -140,7 +140,7 @@ def _under_load(
         assert found.fitted is not None
         x = diagnosis.problem.expansion.x0 + found.fitted.d[found.best]
         effects = {id: float(e[found.best]) for id, e in found.values.items()}
-        tyres[key] = model.design(Point(x, effects))
+        tyres[key] = model.design(Query(x, effects))
     return compare(case, evaluator, readings, tyres)
 
 
@@ -173,7 +173,7 @@ def spans_of(
     return able, unable
 
 
-def parse_change(text: str) -> Change:
+def parse_change(text: str) -> Toggle:
     """``EFFECT=VALUE`` or ``EFFECT*FACTOR``. Raises InputError."""
     for mark in "=*":
         id, found, value = text.partition(mark)
@@ -194,10 +194,10 @@ def parse_change(text: str) -> Change:
         raise InputError(f"'{text}': '{value.strip()}' is not a number")
     if mark == "*" and number == 1:
         raise InputError(f"'{text}': a factor of 1 switches nothing")
-    return Change(id, number, mark == "*")
+    return Toggle(id, number, mark == "*")
 
 
-def _counted_from(change: Change, spans: Mapping[str, Span]) -> Change:
+def _counted_from(change: Toggle, spans: Mapping[str, Span]) -> Toggle:
     """The change, from what the case has of its effect. Raises InputError."""
     if change.id not in spans:
         raise InputError(
@@ -208,7 +208,7 @@ def _counted_from(change: Change, spans: Mapping[str, Span]) -> Change:
     return replace(change, base=spans[change.id].base)
 
 
-def _reaching(span: Span, change: Change) -> Span:
+def _reaching(span: Span, change: Toggle) -> Span:
     """The span with a node where the toggled run was measured, beyond the range if need be."""
     e = change.value - change.base
     if change.times or span.low <= e <= span.high or e in (0.0, *span.also):
@@ -231,13 +231,13 @@ def _check_copies(paths: Sequence[Path], runs: Mapping[Path, Sequence[Measuremen
 
 
 def _check_units(
-    model: TyreModel, observations: Observations, paths: Sequence[Path], changes: Sequence[Change]
+    model: TyreModel, observations: Observations, paths: Sequence[Path], changes: Sequence[Toggle]
 ) -> None:
     """Raises InputError where a value is not even near the model's start, paths being the
     runs'; InputError where the model has no answer with what was switched."""
     set_to = [c for c in changes if not c.times and c.value != c.base]
-    points = [Point(model.start, {c.id: c.value - c.base}) for c in set_to]
-    answer, *others = model.answers([Point(model.start), *points])
+    points = [Query(model.start, {c.id: c.value - c.base}) for c in set_to]
+    answer, *others = model.answers([Query(model.start), *points])
     if not isinstance(answer, Answer):
         raise answer
     for change, other in zip(set_to, others, strict=True):

@@ -1,4 +1,4 @@
-"""The evaluated tyre as a `Response`."""
+"""The evaluated tyre as a `ResponseModel`."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from ..evaluate.failure import DeckRefused
 from ..fit import problem as fit
 from ..modes.find import Found, ModesAnswer
 from ..modes.mode import Label
-from .response import Answer, Point, Span
+from .model import Answer, Query, Span
 from .uncertainties import EFFECTS, Source, unit_of, values_of
 
 Array = np.ndarray
@@ -89,14 +89,14 @@ class TyreModel:
         """The unit of a design variable, "" where it has none."""
         return unit_of(self._variables[variable].sets[0])
 
-    def design(self, point: Point) -> dict[str, float]:
+    def design(self, point: Query) -> dict[str, float]:
         """Numbers of the case at a point: variables, and effects on top of those that it has."""
         effects = {
             EFFECTS + id: self._present.get(id, 0.0) + float(e) for id, e in point.effects.items()
         }
         return {**self.values(point.x), **effects}
 
-    def answers(self, points: Sequence[Point]) -> list[Answer | Exception]:
+    def answers(self, points: Sequence[Query]) -> list[Answer | Exception]:
         """Each point at every pressure, all in one batch, ``jobs`` evaluations at a time.
 
         A plain point that the solver refuses raises DeckRefused. With an effect that it gives no
@@ -112,21 +112,21 @@ class TyreModel:
             if path.startswith(EFFECTS)
         ]
         asked = dict.fromkeys(map(_key, points))
-        asked |= dict.fromkeys(_key(Point(p.x)) for p in bare)
-        asked |= dict.fromkeys(_key(Point(p.x, {id: e})) for p in stepped for _, id, e in steps)
+        asked |= dict.fromkeys(_key(Query(p.x)) for p in bare)
+        asked |= dict.fromkeys(_key(Query(p.x, {id: e})) for p in stepped for _, id, e in steps)
         known = dict(zip(asked, self._evaluated([_point(key) for key in asked]), strict=True))
         return [self._completed(point, known, steps) for point in points]
 
     def _completed(
         self,
-        point: Point,
+        point: Query,
         known: Mapping[Key, Answer | Exception],
         steps: Sequence[tuple[int, str, float]],
     ) -> Answer | Exception:
         """The answer with what other points have to say about its slopes."""
         answer = known[_key(point)]
         if isinstance(answer, Answer) and self._is_bare(point):
-            plain = known[_key(Point(point.x))]
+            plain = known[_key(Query(point.x))]
             if not isinstance(plain, Answer):
                 return plain
             answer = replace(answer, jacobian=plain.jacobian)
@@ -135,7 +135,7 @@ class TyreModel:
         assert answer.constants is not None
         constants = answer.constants.copy()
         for k, id, e in steps:
-            other = known[_key(Point(point.x, {id: e}))]
+            other = known[_key(Query(point.x, {id: e}))]
             if not isinstance(other, Answer):
                 return other
             constants[:, k] += other.eta - answer.eta
@@ -149,14 +149,14 @@ class TyreModel:
         except ValueError:  # the case cannot have that much of it
             return True
 
-    def _is_bare(self, point: Point) -> bool:
+    def _is_bare(self, point: Query) -> bool:
         return not self._slopeless.isdisjoint(point.effects)
 
     def _scaled(self, name: str, value: float) -> float:
         v = self._variables[name]
         return log(value) if v.scale == "log" else (value - v.lower) / (v.upper - v.lower)
 
-    def _evaluated(self, points: Sequence[Point]) -> list[Answer | Exception]:
+    def _evaluated(self, points: Sequence[Query]) -> list[Answer | Exception]:
         """Distinct points, slopes with those that have them."""
         wanted = []
         for point, pressure in product(points, self.pressures):
@@ -189,7 +189,7 @@ class TyreModel:
         return int(any(catalogue()[id].needs for id in ids))
 
     def _answer(
-        self, point: Point, designs: list[dict[str, float]], answers: Sequence[ModesAnswer]
+        self, point: Query, designs: list[dict[str, float]], answers: Sequence[ModesAnswer]
     ) -> Answer | Exception:
         found: list[Found] = []
         for each in answers:
@@ -261,13 +261,13 @@ class TyreModel:
         return np.where(log_scaled, np.expm1(step), step)
 
 
-def _key(point: Point) -> Key:
+def _key(point: Query) -> Key:
     """What tells two points apart."""
     return point.x.tobytes(), tuple(point.effects.items()), point.constants
 
 
-def _point(key: Key) -> Point:
-    return Point(np.frombuffer(key[0]), dict(key[1]), key[2])
+def _point(key: Key) -> Query:
+    return Query(np.frombuffer(key[0]), dict(key[1]), key[2])
 
 
 def asked_for(case: LoadedCase, labels: Sequence[Label]) -> LoadedCase:

@@ -20,7 +20,7 @@ from ..studies.loaded import load_tyres
 from ..templates import TemplateFailed
 from .tyre_model import asked_for
 
-Place = tuple[str, Member | None, float]  # quantity, mode, load in N
+LoadedKey = tuple[str, Member | None, float]  # quantity, mode, load in N
 Values = Mapping[str, float]
 
 
@@ -71,7 +71,7 @@ def compare(
     failed: dict[str, None] = {}
     for pressure, here in _grouped(readings):
         places = sorted(here, key=lambda place: (place[2], place[0], str(place[1] or "")))
-        found: dict[str, dict[Place, float]] = {}
+        found: dict[str, dict[LoadedKey, float]] = {}
         for name, values in tyres.items():
             found[name] = {}
             for part in (_footprints, _modes):
@@ -94,9 +94,9 @@ def compare(
 
 def _grouped(
     readings: Sequence[Measurement],
-) -> Iterator[tuple[float, dict[Place, tuple[float, float]]]]:
+) -> Iterator[tuple[float, dict[LoadedKey, tuple[float, float]]]]:
     """By pressure: mean and its standard deviation by place."""
-    every: defaultdict[float, defaultdict[Place, list[Measurement]]]
+    every: defaultdict[float, defaultdict[LoadedKey, list[Measurement]]]
     every = defaultdict(lambda: defaultdict(list))
     for each in readings:
         member = Member(each.label, each.member) if each.label else None
@@ -115,8 +115,8 @@ def _grouped(
 
 
 def _footprints(
-    case: LoadedCase, evaluator: Evaluator, values: Values, places: Sequence[Place]
-) -> Iterator[tuple[Place, float]]:
+    case: LoadedCase, evaluator: Evaluator, values: Values, places: Sequence[LoadedKey]
+) -> Iterator[tuple[LoadedKey, float]]:
     wanted = [place for place in places if place[1] is None]
     loads = sorted({load for _, _, load in wanted})
     if not loads:
@@ -132,8 +132,8 @@ def _footprints(
 
 
 def _modes(
-    case: LoadedCase, evaluator: Evaluator, values: Values, places: Sequence[Place]
-) -> Iterator[tuple[Place, float]]:
+    case: LoadedCase, evaluator: Evaluator, values: Values, places: Sequence[LoadedKey]
+) -> Iterator[tuple[LoadedKey, float]]:
     wanted = [place for place in places if place[1]]
     loads = sorted({load for _, _, load in wanted})
     if not loads:

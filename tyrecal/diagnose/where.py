@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .problem import Problem
-from .regions import Region
+from .inverse_problem import InverseProblem
+from .regions import SectionPart
 
 Array = np.ndarray
 STIFFNESS, MASS = 0.2, 0.1  # standard deviations of a part's relative change before the data
@@ -16,7 +16,7 @@ SAME = 0.95  # cosine of columns beyond which two parts cannot be told apart
 
 
 @dataclass(frozen=True)
-class Place:
+class PartChange:
     """A part of the section: the change of its stiffness, or of its mass, that alone fits the gap
     best."""
 
@@ -30,8 +30,8 @@ class Place:
 
 
 def section_map(
-    problem: Problem, P: Array, residuals: Array, parts: Sequence[Region]
-) -> tuple[list[Place], int]:
+    problem: InverseProblem, P: Array, residuals: Array, parts: Sequence[SectionPart]
+) -> tuple[list[PartChange], int]:
     """Parts by falling evidence, and how many combinations of them the data see.
 
     One number k with prior N(0, s^2): with a = g^T P g and b = g^T P r it is b / (a + 1/s^2), and
@@ -62,5 +62,5 @@ def section_map(
             for j, size in ((i, STIFFNESS), (count + i, MASS))
         )
         found = tuple(dict.fromkeys(same))
-        result.append(Place(part.name, *stiffness, *mass, float(ln[better]), found))
+        result.append(PartChange(part.name, *stiffness, *mass, float(ln[better]), found))
     return sorted(result, key=lambda place: -place.evidence), rank

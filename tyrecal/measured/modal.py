@@ -16,7 +16,7 @@ from .identify import FORMS, Responses, identify
 from .labels import Judged, Labeller
 from .measurement import Measurement
 from .sensors import MeasuredMode, Sensors, real_part
-from .universal import Function, Place, Shape, Signal, Universal
+from .universal import Function, MeasuredShape, Place, Signal, Universal
 
 Array = np.ndarray
 
@@ -99,7 +99,7 @@ def _named(file: Universal, error: InputError) -> InputError:
     return error if named else InputError(f"{file.path}: {error}")
 
 
-def _signals(shape: Shape) -> tuple[Signal, ...]:
+def _signals(shape: MeasuredShape) -> tuple[Signal, ...]:
     rows, columns = np.nonzero(np.isfinite(shape.values))
     return tuple((shape.nodes[i], int(k) + 1) for i, k in zip(rows, columns, strict=True))
 

@@ -42,7 +42,7 @@ RESPONSE, TIME = 4, 17  # codes of a function's type, and of what it stands over
 
 
 @dataclass(frozen=True)
-class Shape:
+class MeasuredShape:
     """A data set 55."""
 
     frequency_Hz: float
@@ -70,7 +70,7 @@ class Universal:
 
     path: Path
     nodes: dict[int, Place]
-    shapes: list[Shape]
+    shapes: list[MeasuredShape]
     functions: list[Function]
     lines: list[tuple[int, ...]] = field(default_factory=list)
     skipped: Counter[str] = field(default_factory=Counter)  # what was not used, how often
@@ -146,7 +146,7 @@ def _take(result: Universal, place: str, each: dict[str, Any], length: float) ->
             result.skipped[FUNCTIONS.get(code, f"function of type {code}")] += 1
 
 
-def _shape(place: str, each: dict[str, Any]) -> Shape:
+def _shape(place: str, each: dict[str, Any]) -> MeasuredShape:
     if each["analysis_type"] == 2:
         hertz, damping = each["freq"], each["modal_damp_vis"] or float("nan")
     else:  # eigenvalue -zeta w + j w sqrt(1 - zeta^2)
@@ -160,10 +160,10 @@ def _shape(place: str, each: dict[str, Any]) -> Shape:
     nodes = tuple(int(node) for node in each["node_nums"])
     if len(nodes) != len(values) or not len(nodes) or not np.isfinite(values).all():
         raise InputError(f"{place}: a node lacks its values")
-    return Shape(float(hertz), float(damping), nodes, values, place)
+    return MeasuredShape(float(hertz), float(damping), nodes, values, place)
 
 
-def _unmeasured(shapes: list[Shape]) -> None:
+def _unmeasured(shapes: list[MeasuredShape]) -> None:
     """Set what is 0 in every mode to NaN: the format has no other word for not measured."""
     sums: defaultdict[int, Array] = defaultdict(lambda: np.zeros(3))
     for shape in shapes:

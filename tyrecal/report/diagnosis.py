@@ -8,7 +8,7 @@ from typing import Any
 from ..diagnose.covariance import BETWEEN_PRESSURES
 from ..diagnose.diagnosis import Diagnosis
 from ..diagnose.evidence import NONE, OUTSIDE
-from ..diagnose.study import Study
+from ..diagnose.study import DiagnosedCase
 from ..diagnose.under_load import LoadedRow
 from ..diagnose.verdict import NAMED, NO_GAP, UNDECIDED
 from ..units import in_engineers_units, said
@@ -23,7 +23,7 @@ RUNGS = {
 SHOWN = 6
 
 
-def page(study: Study, case: str, measured: str) -> str:
+def page(study: DiagnosedCase, case: str, measured: str) -> str:
     """The page as Markdown."""
     d = study.diagnosis
     parts = [
@@ -61,7 +61,7 @@ def _counted(d: Diagnosis) -> str:
     return f"{modes} modes at {at} kPa" + (f", {runs} runs" if runs > 1 else "")
 
 
-def _title(study: Study, key: str) -> str:
+def _title(study: DiagnosedCase, key: str) -> str:
     spans = study.diagnosis.problem.spans
     words = {NONE: "no effect at all", OUTSIDE: "something outside the catalogue"}
     if key in words:
@@ -69,7 +69,7 @@ def _title(study: Study, key: str) -> str:
     return " and ".join(spans[id].title or id for id in key.split("+"))
 
 
-def _headline(study: Study) -> str:
+def _headline(study: DiagnosedCase) -> str:
     v = study.diagnosis.verdict
     if v.kind == NAMED and v.key:
         return f"Named: {_title(study, v.key)}"
@@ -78,7 +78,7 @@ def _headline(study: Study) -> str:
     return "No gap is seen" if v.kind == NO_GAP else "Outside the catalogue"
 
 
-def _answer(study: Study) -> Iterator[str]:
+def _answer(study: DiagnosedCase) -> Iterator[str]:
     d = study.diagnosis
     v, p = d.verdict, d.probabilities
     if study.asked_for is not None:
@@ -185,7 +185,7 @@ def _where(d: Diagnosis) -> Iterator[str]:
         yield map_resolution(d.effective_rank) + finer
 
 
-def _under_load(study: Study) -> Iterator[str]:
+def _under_load(study: DiagnosedCase) -> Iterator[str]:
     found = study.under_load
     if not found:
         return
@@ -218,7 +218,7 @@ def _measured(row: LoadedRow) -> str:
     return f"vertical stiffness {1e-3 * row.value:.1f} N/mm{percent}"
 
 
-def _which(study: Study) -> Iterator[str]:
+def _which(study: DiagnosedCase) -> Iterator[str]:
     d = study.diagnosis
     order = sorted(d.probabilities.items(), key=lambda item: -item[1])
     rows = [
@@ -299,7 +299,7 @@ def _shrinkage(d: Diagnosis) -> Iterator[str]:
     )
 
 
-def _variables(study: Study) -> Iterator[str]:
+def _variables(study: DiagnosedCase) -> Iterator[str]:
     """What was calibrated, without and with what the diagnosis leads to."""
     found, key = study.variables, study.diagnosis.leading
     heads = {"without": "without an effect", "with": f"with `{key}`"}
@@ -333,7 +333,7 @@ def _next(d: Diagnosis) -> Iterator[str]:
     )
 
 
-def _assumptions(study: Study) -> Iterator[str]:
+def _assumptions(study: DiagnosedCase) -> Iterator[str]:
     d = study.diagnosis
     kind = "assumed, as the case states none" if study.assumed_sources else "stated by the case"
     words = ", ".join(source.words for source in study.sources) or "none"

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from ..diagnose.diagnosis import Diagnosis
 from ..diagnose.evidence import NONE, OUTSIDE
 from ..diagnose.gap import family
-from ..diagnose.observations import Row
+from ..diagnose.observations import Observable
 from ..modes.mode import Label
 from .figure import COLOURS, GREY, headline, in_house_style, new_figure
 from .section import draw_section_map
@@ -40,7 +40,7 @@ def draw_diagnosis(d: Diagnosis, parts: DiagnosisSection) -> dict[str, Figure]:
 
 @in_house_style
 def draw_residuals(
-    rows: Sequence[Row],
+    rows: Sequence[Observable],
     residuals: Array,
     spread: Array,
     after: Array | None = None,

@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from ..diagnose.where import Place
+from ..diagnose.where import PartChange
 from .figure import COLOURS, GREY, RUBBER, headline, in_house_style, new_figure
 from .shape_data import DiagnosisSection, Flat, Section
 from .words import MINUS, map_resolution
@@ -128,11 +128,11 @@ def _inner_crown(around: Array) -> float:
 
 @in_house_style
 def draw_section_map(
-    parts: DiagnosisSection, places: Sequence[Place], effective_rank: int | None = None
+    parts: DiagnosisSection, places: Sequence[PartChange], effective_rank: int | None = None
 ) -> Figure:
     """Parts of the section, coloured by the evidence for a change of them alone; with an
     ``effective_rank`` a table of them beside, and what the data see."""
-    by_name: dict[str, Place] = {}
+    by_name: dict[str, PartChange] = {}
     for place in places:  # of several rubbers in a region the likelier one
         by_name.setdefault(place.region.split(",")[0], place)
     table = effective_rank is not None
@@ -157,7 +157,7 @@ def draw_section_map(
     return figure
 
 
-def _write_table(axes: Axes, places: Sequence[Place], effective_rank: int) -> None:
+def _write_table(axes: Axes, places: Sequence[PartChange], effective_rank: int) -> None:
     """Parts as lines of text, and what can be told from them."""
     axes.axis("off")
     table = [f"{'part':22s}   stiffness, %     mass, %   ln evidence"]
@@ -173,7 +173,7 @@ def _write_table(axes: Axes, places: Sequence[Place], effective_rank: int) -> No
     axes.text(0.0, 0.02, "\n".join(words), va="bottom", color="0.3", **small)
 
 
-def _colour(place: Place | None) -> tuple[float, ...]:
+def _colour(place: PartChange | None) -> tuple[float, ...]:
     return WARM(0.0 if place is None else min(max(place.evidence, 0.0) / FULL_COLOUR, 1.0))
 
 

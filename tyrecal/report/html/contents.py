@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
-from ...diagnose.observations import Row
+from ...diagnose.observations import Observable
 from ...modes.mode import Label
 from ...studies.result import Column, Part, Positive, Provenance, Result, Table, Wave
 
@@ -45,13 +45,13 @@ class Residual(Part):
     sigma_percent: float
 
     @property
-    def of(self) -> Row | None:
+    def of(self) -> Observable | None:
         """What was measured, where it is a frequency."""
         found = ROW.fullmatch(self.row)
         if not found:
             return None
         c, m, kind, pressure = found.groups()
-        return Row("frequency", Label(int(c), int(m), kind), float(pressure), self.run)
+        return Observable("frequency", Label(int(c), int(m), kind), float(pressure), self.run)
 
 
 class Gap(Part):

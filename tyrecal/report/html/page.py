@@ -16,7 +16,7 @@ from jinja2.sandbox import ImmutableSandboxedEnvironment
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
-from ...diagnose.where import Place
+from ...diagnose.where import PartChange
 from ...errors import InputError
 from ...files import open_file, whole
 from ...fit.result import FitResult
@@ -243,7 +243,7 @@ def _diagnosis(found: Results, draw: Draw) -> dict[str, Any]:
     place, drawn = found.diagnosis_section, None
     if place and d.section_map:
         told = "Parts of the section by the evidence for a change of them alone"
-        places = [Place(**region.model_dump()) for region in d.section_map]
+        places = [PartChange(**region.model_dump()) for region in d.section_map]
         drawing = partial(draw_section_map, place, places)
         drawn = draw("map", told, "diagnosis_section.json", drawing)
     known = [(row, each) for each in d.gap.residuals if not each.run and (row := each.of)]

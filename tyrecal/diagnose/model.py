@@ -30,7 +30,7 @@ class Span:
 
 
 @dataclass(frozen=True)
-class Point:
+class Query:
     """Where the model is asked."""
 
     x: Array  # (v,)
@@ -48,7 +48,7 @@ class Answer:
     constants: Array | None = None  # (n, k) change by one standard deviation of each source
 
 
-class Response(Protocol):
+class ResponseModel(Protocol):
     """A model that can be asked."""
 
     variables: Sequence[str]  # names of x
@@ -57,5 +57,5 @@ class Response(Protocol):
     sources: Sequence[str]  # names of the sources of error
     spans: Mapping[str, Span]  # effects by id
 
-    def answers(self, points: Sequence[Point]) -> list[Answer | Exception]:
+    def answers(self, points: Sequence[Query]) -> list[Answer | Exception]:
         """An answer for each point in order, or why there is none; rows as it was made for."""

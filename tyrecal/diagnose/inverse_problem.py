@@ -10,14 +10,14 @@ import numpy as np
 
 from .covariance import alike, covariance
 from .expansion import Expansion
+from .model import Span
 from .observations import Observations
-from .response import Span
 
 Array = np.ndarray
 
 
 @dataclass(frozen=True)
-class Change:
+class Toggle:
     """What was switched in a toggled run."""
 
     id: str  # of the effect
@@ -42,7 +42,7 @@ class Assumed:
 
 
 @dataclass(frozen=True)
-class Problem:
+class InverseProblem:
     """n observations beside the model."""
 
     observations: Observations
@@ -51,7 +51,7 @@ class Problem:
     places: Array  # (n,) of the observations among the model's rows
     centre: Array  # (v,) of x before any measurement
     spread: Array  # (v,) likewise
-    changes: tuple[Change, ...] = ()  # what was switched in runs 1, 2, ...
+    changes: tuple[Toggle, ...] = ()  # what was switched in runs 1, 2, ...
     assumed: Assumed = Assumed()
     reduced: Mapping[int, float] = field(default_factory=dict)  # factors of sources of error
 
@@ -68,11 +68,11 @@ class Problem:
         """Sigma (n, n)."""
         return covariance(self.observations, self.constants, self.assumed.form)
 
-    def only(self, keep: Array) -> Problem:
+    def only(self, keep: Array) -> InverseProblem:
         """The problem with the rows of a mask (n,) alone."""
         return replace(self, observations=self.observations.only(keep), places=self.places[keep])
 
-    def measured(self, y: Array) -> Problem:
+    def measured(self, y: Array) -> InverseProblem:
         """The problem with other values (n,) in the same rows."""
         return replace(self, observations=replace(self.observations, y=y))
 

@@ -15,8 +15,8 @@ import numpy as np
 
 from ..modes.mode import Label
 from .evidence import NONE, OUTSIDE, Hypothesis, refit, weigh
+from .inverse_problem import InverseProblem
 from .observations import Observations
-from .problem import Problem
 
 Array = np.ndarray
 EXCHANGED = 0.05  # of laboratories' files, two of their labels
@@ -24,7 +24,7 @@ NEAR = 0.30  # relative distance of modes that could be taken for one another
 GAIN = 3.0  # in ln of evidence of the plain tyre, from which a reading is worth a closer look
 
 
-def exchanged(problem: Problem) -> tuple[Label, Label] | None:
+def exchanged(problem: InverseProblem) -> tuple[Label, Label] | None:
     """The labels that have most probably taken each other's place at all pressures, None if none.
 
     problem: expanded about a fit of the file as it is.
