@@ -6,7 +6,7 @@ import math
 from dataclasses import replace
 
 from tyrecal.blind.maker import Computed, SolverMaker
-from tyrecal.blind.outside import FAMILIES
+from tyrecal.blind.outside import OUTSIDE_FAMILIES
 from tyrecal.case import LoadedCase
 from tyrecal.deck.tyre_design import TyreDesign
 from tyrecal.effects.edit import with_part
@@ -39,4 +39,4 @@ def other_maker(solver: str, case: LoadedCase, store: Store | None = None) -> Ot
     """``bundled``: for what CalculiX's sector cannot express; ``calculix``: the honest one."""
     laws = other_laws(frozenset(Evaluator(TyreDesign(case), solver).solver.capabilities))
     about = f"{solver} solver on another mesh, effects by other laws than the catalogue's"
-    return OtherMaker(about, solver, laws, FAMILIES, store)
+    return OtherMaker(about, solver, laws, OUTSIDE_FAMILIES, store)

@@ -8,7 +8,7 @@ from scipy.stats import uniform
 
 from tyrecal.blind.emulated import emulate
 from tyrecal.blind.laws import EffectLaw
-from tyrecal.blind.outside import FAMILIES
+from tyrecal.blind.outside import OUTSIDE_FAMILIES
 from tyrecal.case import LoadedCase
 from tyrecal.deck.tyre_design import TyreDesign
 from tyrecal.design import with_values
@@ -42,8 +42,8 @@ PLAIN = ln_f(AT)
 
 
 def test_calculix_can_make_at_least_twelve_effects_and_four_families() -> None:
-    assert len(CHEAP) >= 12 and len(FAMILIES) >= 4
-    assert not set(FAMILIES) & set(catalogue())
+    assert len(CHEAP) >= 12 and len(OUTSIDE_FAMILIES) >= 4
+    assert not set(OUTSIDE_FAMILIES) & set(catalogue())
     assert set(other_maker("calculix", CASE).laws) == set(CHEAP)
     for id, law in other_laws(frozenset(ABLE)).items():
         assert (law.low, law.high) == (catalogue()[id].low, catalogue()[id].high)
@@ -59,13 +59,17 @@ def test_a_law_does_what_the_catalogue_s_does_by_another_way(id: str) -> None:
         assert own @ theirs > 0.6 * np.linalg.norm(own) * np.linalg.norm(theirs)
 
 
-@pytest.mark.parametrize("name", sorted(name for name, law in FAMILIES.items() if not law.read))
+@pytest.mark.parametrize(
+    "name", sorted(name for name, law in OUTSIDE_FAMILIES.items() if not law.read)
+)
 def test_a_family_moves_frequencies(name: str) -> None:
-    assert abs(ln_f(FAMILIES[name].add(AT, FAMILIES[name].high)) - PLAIN).max() > 2e-3
+    assert (
+        abs(ln_f(OUTSIDE_FAMILIES[name].add(AT, OUTSIDE_FAMILIES[name].high)) - PLAIN).max() > 2e-3
+    )
 
 
 def test_a_resonance_of_the_stand_is_read_at_every_pressure() -> None:
-    law, stood, other = FAMILIES["stand_resonance"], Label(1, 0), Label(2, 0)
+    law, stood, other = OUTSIDE_FAMILIES["stand_resonance"], Label(1, 0), Label(2, 0)
     heard = {p: {stood: (np.log(p), np.log(p)), other: (5.0, 5.1)} for p in (160.0, 240.0, 320.0)}
     assert law.add(AT, 0.1) is AT and law.read
     read = law.read(heard, 0.1)

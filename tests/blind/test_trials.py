@@ -14,7 +14,7 @@ from tyrecal.blind.draw import draw
 from tyrecal.blind.make import make
 from tyrecal.blind.maker import bundled_maker
 from tyrecal.blind.protocol import Protocol, read_json, write_json
-from tyrecal.blind.ruler import FILE as RULER
+from tyrecal.blind.ruler import RULER_FILE as RULER
 from tyrecal.blind.ruler import measure
 from tyrecal.blind.score import score
 from tyrecal.blind.seal import ANSWERS, SEAL, TRUTH

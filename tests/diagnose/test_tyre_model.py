@@ -24,7 +24,7 @@ from tyrecal.diagnose.result import result
 from tyrecal.diagnose.separability import separate
 from tyrecal.diagnose.study import parse_change, spans_of, study
 from tyrecal.diagnose.tyre_model import TyreModel
-from tyrecal.diagnose.uncertainties import DENSITY, PRESSURE_kPa, sources
+from tyrecal.diagnose.uncertainties import DENSITY_PERCENT, PRESSURE_kPa, sources
 from tyrecal.diagnose.verdict import decide
 from tyrecal.errors import InputError
 from tyrecal.evaluate.evaluator import Evaluator
@@ -308,7 +308,7 @@ def test_sources_of_error_are_those_of_the_case_or_assumed_and_never_calibrated(
     bare = replace(CASE, case=CASE.case.model_copy(update={"uncertainties": {}}))
     found, assumed = sources(bare)
     assumed_words = {s.name: s.words for s in found}
-    assert assumed and assumed_words["rubber_density"] == f"rubber density {DENSITY:g} %"
+    assert assumed and assumed_words["rubber_density"] == f"rubber density {DENSITY_PERCENT:g} %"
     assert set(assumed_words) == {
         "pressure",
         "rubber_density",

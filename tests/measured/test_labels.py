@@ -8,7 +8,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tyrecal.measured.labels import LIKELY, OTHER_PARITY, SAME_PARITY, SIDEWALL, Labeller
+from tyrecal.measured.labels import (
+    MIN_LABEL_PROBABILITY,
+    OTHER_PARITY,
+    SAME_PARITY,
+    SIDEWALL,
+    Labeller,
+)
 from tyrecal.measured.modal import LabelledMode, settled
 from tyrecal.measured.sensors import MeasuredMode, Sensors, real_part
 from tyrecal.modes.mode import Label
@@ -92,9 +98,9 @@ def test_poor_layouts_are_as_sure_as_they_are_right(chance: Chance) -> None:
         sure.append(judged.confidence)
         right.append(next(iter(judged.probabilities)) == mode.label)
     p, hit = np.array(sure), np.array(right)
-    chance.often(p >= LIKELY, 0.1, 0.9)
-    chance.often(hit[p >= LIKELY], 0.96)
-    middle = (p > 0.5) & (p < LIKELY)
+    chance.often(p >= MIN_LABEL_PROBABILITY, 0.1, 0.9)
+    chance.often(hit[p >= MIN_LABEL_PROBABILITY], 0.96)
+    middle = (p > 0.5) & (p < MIN_LABEL_PROBABILITY)
     said = float(np.mean(p[middle]))
     chance.often(hit[middle], said - 0.15, min(said + 0.15, 1.0))
     chance.often(hit[p < 0.5], 0.0, 0.6)

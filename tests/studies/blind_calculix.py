@@ -38,7 +38,7 @@ from tyrecal.blind.draw import Truth, draw, tyre
 from tyrecal.blind.laws import EffectLaw
 from tyrecal.blind.make import make
 from tyrecal.blind.maker import Computed
-from tyrecal.blind.outside import FAMILIES
+from tyrecal.blind.outside import OUTSIDE_FAMILIES
 from tyrecal.blind.protocol import Protocol
 from tyrecal.blind.ruler import measure
 from tyrecal.case import LoadedCase, number_at, start_values
@@ -175,7 +175,7 @@ def train(count: int) -> None:
 
 def laws_confirmed() -> dict[str, EffectLaw]:
     """What CalculiX is asked: all laws and families but errors of reading."""
-    known = {**other_laws(frozenset({"modes"})), **FAMILIES}
+    known = {**other_laws(frozenset({"modes"})), **OUTSIDE_FAMILIES}
     return {name: law for name, law in known.items() if not law.read}
 
 
@@ -273,7 +273,7 @@ class EmulatedCalculix:
         self.laws: dict[str, EffectLaw] = {
             id: law for id, law in known.items() if id not in LEFT_OUT
         }
-        self.outside = FAMILIES
+        self.outside = OUTSIDE_FAMILIES
         self._fitted = fitted(usual(recorded("train"))[0])
 
     def compute(self, case: LoadedCase, labels: list[Label]) -> Computed:

@@ -11,11 +11,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from .ruler import GRID, Ruler
+from .ruler import SIZE_POINTS, Ruler
 
 Array = np.ndarray
-STEPS = 8
-LONGEST = 0.5  # of ln x, a step
+MAX_STEPS = 8
+MAX_STEP = 0.5  # of ln x, a step
 NONE = "none"
 PRIOR_NONE = 0.25
 
@@ -38,7 +38,7 @@ def guesses(ruler: Ruler, y: Array, places: Array, sigma: Array) -> dict[str, st
         lengths = np.einsum("qn,nm,qm->q", off, P, off)
         best = int(np.argmin(lengths))
         aic[id] = float(lengths[best]) + 2 * (len(d) + 1)
-        odds[id] = float(share + np.logaddexp.reduce(-lengths / 2) - np.log(GRID))
+        odds[id] = float(share + np.logaddexp.reduce(-lengths / 2) - np.log(SIZE_POINTS))
         along = root @ g[best]
         near[id] = float(residual @ along / max(1e-12, np.linalg.norm(along)))
     freedom = max(1, len(y) - len(d))
@@ -54,10 +54,10 @@ def _fit(ruler: Ruler, y: Array, places: Array, inverse: Array) -> Array:
     """d = ln x - ln x0 by Gauss and Newton's steps."""
     d = np.zeros(len(ruler.x0))
     information = np.diag(ruler.spread**-2.0)
-    for _ in range(STEPS):
+    for _ in range(MAX_STEPS):
         eta, J = ruler.plain(d, places)
         step = np.linalg.solve(
             J.T @ inverse @ J + information, J.T @ inverse @ (y - eta) - information @ d
         )
-        d = d + step * min(1.0, LONGEST / max(abs(step).max(), 1e-300))
+        d = d + step * min(1.0, MAX_STEP / max(abs(step).max(), 1e-300))
     return d

@@ -10,11 +10,11 @@ import numpy as np
 
 from ..case import LoadedCase, start_values
 from ..design import with_values
-from ..diagnose.uncertainties import EFFECTS, Source, values_of
+from ..diagnose.uncertainties import EFFECT_PATH, Source, values_of
 from .laws import EffectLaw
 from .protocol import Protocol
 
-NEAR = 0.25  # relative distance of modes whose labels could be taken for one another
+MAX_SWAP_DISTANCE = 0.25  # relative distance of modes whose labels could be taken for one another
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ def tyre(
     values: dict[str, float] = dict(truth.variables)
     for source in sources:
         for path, step in source.steps.items():
-            known = values.get(path, 0.0 if path.startswith(EFFECTS) else plain[path])
+            known = values.get(path, 0.0 if path.startswith(EFFECT_PATH) else plain[path])
             values[path] = known + truth.constants[source.name] * step
     values.setdefault("pressure_kPa", pressure_kPa)
     made = with_values(case, values)

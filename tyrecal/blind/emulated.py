@@ -28,7 +28,7 @@ PLAIN_DESIGNS, EFFECT_DESIGNS, SOURCE_DESIGNS = 20, 10, 12
 ONE_SIDED, TWO_SIDED = (0.1, 0.4, 0.75, 1.0), (0.5, 1.0)
 SEED = 1
 REWEIGHTED = 12  # times
-HUBER, FLOOR = 2.0, 1e-5  # a weight falls beyond so many medians; of ln f, below any model
+HUBER, MIN_SCALE = 2.0, 1e-5  # a weight falls beyond so many medians; of ln f, below any model
 
 
 @dataclass(frozen=True)
@@ -199,7 +199,7 @@ def _fit(powers: Array, t: Array, answers: Sequence[Answer], reach: float) -> Po
     found = np.linalg.lstsq(A, b, None)[0]
     for _ in range(REWEIGHTED):
         off = abs(b - A @ found)
-        scale = HUBER * np.median(off, axis=0) + FLOOR
+        scale = HUBER * np.median(off, axis=0) + MIN_SCALE
         weights = np.sqrt(np.minimum(1.0, scale / np.maximum(off, scale)))
         columns = zip(weights.T, b.T, strict=True)
         found = np.array([np.linalg.lstsq(A * w[:, None], c * w, None)[0] for w, c in columns]).T

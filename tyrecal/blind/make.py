@@ -23,9 +23,9 @@ from ..errors import InputError
 from ..evaluate.failure import EvaluationFailed
 from ..evaluate.pool import process_pool
 from ..files import refuse_link, whole
-from ..measured.measurement import COLUMNS
+from ..measured.measurement import CSV_COLUMNS
 from ..modes.mode import Label
-from .draw import NEAR, Truth, draw, tyre
+from .draw import MAX_SWAP_DISTANCE, Truth, draw, tyre
 from .maker import Computed, Maker
 from .protocol import Protocol, read_json, write_json, write_protocol
 from .ruler import write_ruler
@@ -180,7 +180,12 @@ def _swap(
     """Two doublets of like frequency take each other's label at every pressure."""
     first = next(iter(read.values()))
     mean = {label: np.nanmean(first[label]) for label in labels if label.c}
-    near = [(a, b) for a in mean for b in mean if a < b and abs(np.log(mean[a] / mean[b])) < NEAR]
+    near = [
+        (a, b)
+        for a in mean
+        for b in mean
+        if a < b and abs(np.log(mean[a] / mean[b])) < MAX_SWAP_DISTANCE
+    ]
     if near:
         a, b = near[int(random.integers(len(near)))]
         for here in read.values():
@@ -191,7 +196,7 @@ def _write_trials(folder: Path, protocol: Protocol, trials: list[Trial]) -> None
     """One CSV a trial, all of the same form, digits and time."""
     (folder / "trials").mkdir(exist_ok=True)
     for trial in trials:
-        lines = [",".join(COLUMNS)]
+        lines = [",".join(CSV_COLUMNS)]
         read = values(trial, protocol)
         for p in protocol.given_kPa:
             for label, members in read[p].items():

@@ -14,7 +14,7 @@ from ..evaluate.store import Store
 from ..modes.find import Found, find_modes
 from ..modes.mode import Label
 from .laws import EffectLaw, Frequencies, catalogue_laws
-from .outside import FAMILIES
+from .outside import OUTSIDE_FAMILIES
 
 
 @dataclass(frozen=True)
@@ -71,4 +71,4 @@ def bundled_maker(case: LoadedCase, store: Store | None = None) -> SolverMaker:
     """The diagnosis' own model, mesh and laws."""
     laws = catalogue_laws(frozenset(Evaluator(TyreDesign(case), "bundled").solver.capabilities))
     about = "bundled solver, the diagnosis' own mesh and the catalogue's laws: an inverse crime"
-    return SolverMaker(about, "bundled", laws, FAMILIES, store)
+    return SolverMaker(about, "bundled", laws, OUTSIDE_FAMILIES, store)

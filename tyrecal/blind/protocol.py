@@ -9,7 +9,7 @@ from ..errors import InputError
 from ..files import json_text, write_text
 from ..files import read_json as read_file
 
-FILE = "protocol.json"
+PROTOCOL_FILE = "protocol.json"
 
 
 @dataclass(frozen=True)
@@ -55,15 +55,15 @@ def read_json(path: Path) -> dict:
 
 def write_protocol(folder: Path, protocol: Protocol) -> None:
     """Write the rules of ``folder``."""
-    write_json(folder / FILE, {"format": 1, **asdict(protocol)})
+    write_json(folder / PROTOCOL_FILE, {"format": 1, **asdict(protocol)})
 
 
 def read_protocol(folder: Path) -> Protocol:
     """The rules of ``folder``. Raises InputError."""
-    content = read_json(folder / FILE)
+    content = read_json(folder / PROTOCOL_FILE)
     try:
         content.pop("format")
         content["given_kPa"] = tuple(content["given_kPa"])
         return Protocol(**content)
     except (KeyError, TypeError) as error:
-        raise InputError(f"{folder / FILE}: not the rules of trials ({error})") from None
+        raise InputError(f"{folder / PROTOCOL_FILE}: not the rules of trials ({error})") from None

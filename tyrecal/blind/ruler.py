@@ -27,10 +27,10 @@ from ..modes.mode import Label
 from .protocol import Protocol, read_json, write_json
 
 Array = np.ndarray
-FILE = "ruler.json"
-STEP = 0.05  # of ln x, for the curvature
+RULER_FILE = "ruler.json"
+CURVATURE_STEP = 0.05  # of ln x, for the curvature
 SHARES = (0.15, 0.5, 1.0)  # of each side of a range
-GRID = 61
+SIZE_POINTS = 61
 BETWEEN_PRESSURES = 0.9
 NUMBERS = ("x0", "spread", "eta", "jacobian", "hessian", "constants")
 SIGNATURE = ("sizes", "shift", "tilt", "split")
@@ -49,7 +49,7 @@ class EffectShifts:
     @cached_property
     def _weights(self) -> tuple[Array, Array]:
         """Sizes (q,) from end to end, and the weights (q, k) of the given ones there."""
-        e = np.linspace(self.sizes[0], self.sizes[-1], GRID)
+        e = np.linspace(self.sizes[0], self.sizes[-1], SIZE_POINTS)
         if len(self.sizes) > 2:  # a parabola through three of them is smoother than lines
             return e, _parabolas(self.sizes, e)
         return e, np.array([np.interp(e, self.sizes, unit) for unit in np.eye(len(self.sizes))]).T
@@ -159,14 +159,16 @@ def measure(model: ResponseModel, rows: Sequence[ModelRow]) -> dict[str, Any]:
     count = len(x0)
     first, *around = model.answers(
         [Query(x0, constants=True)]
-        + [Query(x0 + side * STEP * unit) for unit in np.eye(count) for side in (1, -1)]
+        + [Query(x0 + side * CURVATURE_STEP * unit) for unit in np.eye(count) for side in (1, -1)]
     )
     for answer in (first, *around):
         if not isinstance(answer, Answer):
             raise answer
     assert isinstance(first, Answer) and first.constants is not None
     slopes = [a.jacobian for a in around]  # type: ignore[union-attr]
-    hessian = np.stack([(slopes[2 * i] - slopes[2 * i + 1]) / (2 * STEP) for i in range(count)], -1)
+    hessian = np.stack(
+        [(slopes[2 * i] - slopes[2 * i + 1]) / (2 * CURVATURE_STEP) for i in range(count)], -1
+    )
     hessian = (hessian + hessian.transpose(0, 2, 1)) / 2
     signatures = {}
     for id, span in model.spans.items():
@@ -197,12 +199,12 @@ def measure(model: ResponseModel, rows: Sequence[ModelRow]) -> dict[str, Any]:
 
 def write_ruler(folder: Path, content: Mapping[str, Any]) -> None:
     """Beside the trials, open to all."""
-    write_json(folder / FILE, dict(content))
+    write_json(folder / RULER_FILE, dict(content))
 
 
 def read_ruler(folder: Path, labels: Sequence[Label]) -> Ruler:
     """The ruler of ``folder``. Raises InputError."""
-    content = read_json(folder / FILE)
+    content = read_json(folder / RULER_FILE)
     known: dict[str, Label | None] = {str(label): label for label in labels}
     known["mass"] = None
     try:
@@ -214,7 +216,7 @@ def read_ruler(folder: Path, labels: Sequence[Label]) -> Ruler:
         rows = tuple((known[name], float(p)) for name, p in content["rows"])
         return Ruler(rows, signatures=signatures, **numbers)
     except (KeyError, ValueError, TypeError) as error:
-        raise InputError(f"{folder / FILE}: not a ruler of these trials ({error})") from None
+        raise InputError(f"{folder / RULER_FILE}: not a ruler of these trials ({error})") from None
 
 
 def _words(label: Label | None) -> str:

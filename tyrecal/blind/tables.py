@@ -11,7 +11,7 @@ import numpy as np
 from .score import Scored
 from .statistics import brier, calibration_error, calibration_quantile, clopper_pearson
 
-BANDS = ((0.0, 4.0), (4.0, 10.0), (10.0, 25.0), (25.0, float("inf")))
+DIFFICULTY_BANDS = ((0.0, 4.0), (4.0, 10.0), (10.0, 25.0), (25.0, float("inf")))
 DETECTED = 10.0  # band from which an effect counts as detectable
 
 
@@ -34,11 +34,11 @@ def summary(trials: Sequence[Scored]) -> dict[str, Any]:
         "swapped": sum(t.swapped for t in trials),
         "by_band": [
             {"low": low, "high": high if high < 1e9 else None, **_band(effects, low, high)}
-            for low, high in BANDS
+            for low, high in DIFFICULTY_BANDS
         ],
         "by_lambda": [
             {"low": low, "top_1_group": rate([t.right for t in effects if low <= t.lam < high])}
-            for low, high in BANDS
+            for low, high in DIFFICULTY_BANDS
         ],
         "false_alarms": rate([t.verdict == "named" for t in none]),
         "named_right": rate([t.named in t.group for t in named]),

@@ -13,15 +13,15 @@ from click.shell_completion import CompletionItem, split_arg_string
 
 Items = list[CompletionItem]
 SUFFIXES = (".yaml", ".yml")
-MOST = 200  # case files; a folder with more has the shell's own completion
-DEPTH = 3  # folders below the one typed in which cases are looked for
+MAX_CASES = 200  # case files; a folder with more has the shell's own completion
+MAX_DEPTH = 3  # folders below the one typed in which cases are looked for
 
 
 def cases(ctx: click.Context, param: click.Parameter, incomplete: str) -> Items:
     """Case files, those in folders below too; without any, what the shell says."""
     start = Path(incomplete).parent
-    found = [str(path) for path in _yaml(start, DEPTH) if str(path).startswith(incomplete)]
-    if not found or len(found) > MOST:
+    found = [str(path) for path in _yaml(start, MAX_DEPTH) if str(path).startswith(incomplete)]
+    if not found or len(found) > MAX_CASES:
         return [CompletionItem(incomplete, type="file")]
     return [CompletionItem(path) for path in found]
 

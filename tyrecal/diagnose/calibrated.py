@@ -10,7 +10,7 @@ from .diagnosis import Diagnosis
 from .evidence import NONE
 from .tyre_model import TyreModel
 
-STEP = 1e-6  # of x, for the slope of a variable in its own unit
+SLOPE_STEP = 1e-6  # of x, for the slope of a variable in its own unit
 
 
 def calibrated_variables(diagnosis: Diagnosis, model: TyreModel) -> dict[str, Any]:
@@ -33,12 +33,13 @@ def _calibrated(diagnosis: Diagnosis, model: TyreModel, key: str) -> dict[str, d
     apart = d - p @ d
     covariance = np.tensordot(p, found.fitted.covariance, 1) + (p[:, None] * apart).T @ apart
     x = diagnosis.problem.expansion.x0 + d[found.best]
-    values, above, below = model.values(x), model.values(x + STEP), model.values(x - STEP)
+    values = model.values(x)
+    above, below = (model.values(x + step) for step in (SLOPE_STEP, -SLOPE_STEP))
     scatter = np.sqrt(np.diag(covariance)).tolist()
     return {
         name: {
             "value": values[name],
-            "standard_error": scatter[i] * (above[name] - below[name]) / (2 * STEP),
+            "standard_error": scatter[i] * (above[name] - below[name]) / (2 * SLOPE_STEP),
             "unit": model.unit(name),
         }
         for i, name in enumerate(values)

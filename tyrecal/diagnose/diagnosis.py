@@ -25,15 +25,16 @@ from .verdict import NAMED, NO_GAP, Verdict, decide
 from .where import PartChange, section_map
 
 Array = np.ndarray
-IN_PLAY, MOST_IN_PLAY = 8.0, 6  # ln evidence behind the best up to which a node is asked again
-ROUNDS = 2
+IN_PLAY_WITHIN = 8.0  # ln evidence behind the best, up to which an effect is asked again
+MAX_IN_PLAY = 6
+MAX_ROUNDS = 2
 STAGES = (
     "calibrate and ask each effect",
     "ask the likeliest effects again",
     "parts of the section",
     "the next measurements",
 )
-CLOSE = 0.05  # of a range, and of ln x: an effect asked as near as that, or to 0, is known
+KNOWN_WITHIN = 0.05  # of a range, and of ln x: an effect asked as near as that, or to 0, is known
 
 
 @dataclass(frozen=True)
@@ -119,7 +120,7 @@ def diagnose(
         problem = replace(problem, observations=observations, expansion=expansion)
     hypotheses, bare = weigh(problem), problem
     stage(STAGES[1])
-    for _ in range(ROUNDS if expansion.nodes else 0):
+    for _ in range(MAX_ROUNDS if expansion.nodes else 0):
         problem, changed = _asked_again(problem, model, hypotheses)
         if not changed:
             break
@@ -167,16 +168,17 @@ def _asked_again(
     likeliest size, and whether anything was left to ask."""
     singles = [h for h in hypotheses if h.key in problem.expansion.nodes]
     best = max(h.ln_evidence for h in hypotheses)
-    play = [h for h in singles if h.ln_evidence > best - IN_PLAY]
-    play = sorted(play, key=lambda h: -h.ln_evidence)[:MOST_IN_PLAY]
+    play = [h for h in singles if h.ln_evidence > best - IN_PLAY_WITHIN]
+    play = sorted(play, key=lambda h: -h.ln_evidence)[:MAX_IN_PLAY]
     wanted: dict[str, tuple[float, Array]] = {}
     for h in play:
         assert h.fitted is not None
         nodes, d = problem.expansion.nodes[h.key], h.fitted.d[h.best]
         e, width = float(h.values[h.key][h.best]), nodes.reach[1] - nodes.reach[0]
         last = nodes.anchor
-        known = last and abs(e - last.e) < CLOSE * width and abs(d - last.d).max() < CLOSE
-        if not known and abs(e) > CLOSE * width:
+        near = KNOWN_WITHIN * width
+        known = last and abs(e - last.e) < near and abs(d - last.d).max() < KNOWN_WITHIN
+        if not known and abs(e) > near:
             wanted[h.key] = e, problem.expansion.x0 + d
     if not wanted:
         return problem, False

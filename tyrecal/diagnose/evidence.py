@@ -23,7 +23,7 @@ from .inverse_problem import InverseProblem
 Array = np.ndarray
 NONE, OUTSIDE = "none", "outside"
 PRIOR_NONE, PRIOR_OUTSIDE, PRIOR_PAIRS = 0.25, 0.10, 0.03  # the singles share the rest
-POINTS = {1: 25, 2: 15}  # of the rule in each parameter, by how many effects there are
+RULE_POINTS = {1: 25, 2: 15}  # of the rule in each parameter, by how many effects there are
 SHARP_FALL = 2.0  # of ln Z from the best point to its neighbours, which asks for more points
 MAX_ZOOMS = 6
 REFIT_STEPS = 6  # of Gauss and Newton, in a model that is quadratic and near its minimum
@@ -191,7 +191,7 @@ def explain(problem: InverseProblem, ids: Sequence[str], prior: float) -> Hypoth
     """
     box = [problem.expansion.nodes[id].reach for id in ids]
     widths = [high - low for low, high in box]
-    count, kept = POINTS[len(ids)], []
+    count, kept = RULE_POINTS[len(ids)], []
     for zoom in range(MAX_ZOOMS + 1):
         rules = [_rule(low, high, count) for low, high in box]
         values = _grid([points for points, _ in rules])
@@ -241,5 +241,5 @@ def _rule(low: float, high: float, count: int) -> tuple[Array, Array]:
 def grid(nodes: Nodes) -> tuple[Array, Array]:
     """Parameters over the reach and ln of weight times density, which sum to 1."""
     low, high = nodes.reach
-    points, weights = _rule(low, high, POINTS[1])
+    points, weights = _rule(low, high, RULE_POINTS[1])
     return points, np.log(weights / (high - low))

@@ -18,7 +18,7 @@ from .inverse_problem import InverseProblem
 from .observations import Observable
 
 Array = np.ndarray
-FAMILIES = {"in-plane": "in-plane", "out-of-plane": "lateral"}
+FAMILY_NAMES = {"in-plane": "in-plane", "out-of-plane": "lateral"}
 
 
 @dataclass(frozen=True)
@@ -135,7 +135,7 @@ def family(row: Observable) -> str | None:
     """in-plane, lateral (out-of-plane), [0,0], or None."""
     if row.label is None:
         return None
-    return "[0,0]" if row.label.kind else FAMILIES.get(row.label.family or "")
+    return "[0,0]" if row.label.kind else FAMILY_NAMES.get(row.label.family or "")
 
 
 def _chi2(r: Array, C: Array) -> tuple[float, int]:

@@ -19,9 +19,9 @@ from .inverse_problem import InverseProblem
 from .observations import Observations
 
 Array = np.ndarray
-EXCHANGED = 0.05  # of laboratories' files, two of their labels
-NEAR = 0.30  # relative distance of modes that could be taken for one another
-GAIN = 3.0  # in ln of evidence of the plain tyre, from which a reading is worth a closer look
+SWAP_PROBABILITY = 0.05  # of laboratories' files, two of their labels
+MAX_SWAP_DISTANCE = 0.30  # relative distance of modes that could be taken for one another
+MIN_GAIN = 3.0  # in ln of evidence of the plain tyre, from which a reading is worth a closer look
 
 
 def exchanged(problem: InverseProblem) -> tuple[Label, Label] | None:
@@ -34,14 +34,14 @@ def exchanged(problem: InverseProblem) -> tuple[Label, Label] | None:
     found: list[tuple[Label, Label]] = []
     for a, b in readings:
         other = replace(problem, observations=with_exchanged(problem.observations, a, b))
-        if float(refit(other, {}, 1).ln_evidence[0]) > plain + GAIN:
+        if float(refit(other, {}, 1).ln_evidence[0]) > plain + MIN_GAIN:
             found.append((a, b))
     if not found:
         return None
-    best, most = None, _all(weigh(problem, pairs=False)) + float(np.log(1 - EXCHANGED))
+    best, most = None, _all(weigh(problem, pairs=False)) + float(np.log(1 - SWAP_PROBABILITY))
     for a, b in found:
         other = replace(problem, observations=with_exchanged(problem.observations, a, b))
-        ln = _all(weigh(other, pairs=False)) + float(np.log(EXCHANGED / len(readings)))
+        ln = _all(weigh(other, pairs=False)) + float(np.log(SWAP_PROBABILITY / len(readings)))
         if ln > most:
             best, most = (a, b), ln
     return best
@@ -66,7 +66,7 @@ def _near(observations: Observations) -> Iterator[tuple[Label, Label]]:
             at.setdefault(row.label, {})[row.pressure_kPa, row.run] = y
     for a, b in combinations(sorted(at, key=str), 2):
         both = at[a].keys() & at[b].keys()
-        if both and max(abs(at[a][k] - at[b][k]) for k in both) < NEAR:
+        if both and max(abs(at[a][k] - at[b][k]) for k in both) < MAX_SWAP_DISTANCE:
             yield a, b
 
 

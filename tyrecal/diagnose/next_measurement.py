@@ -27,7 +27,7 @@ HOURS = dict(toggle=4.0, check=1.0, repeat=2.0, pressure=1.0, harmonics=1.0, wei
 """Of a laboratory, as an orientation."""
 CHECKED = 0.25  # what is left of a constant's standard deviation when it is measured by itself
 REPEATED = 4  # times, each after dismounting
-PRESSURES_kPa = (160.0, 200.0, 240.0, 280.0, 320.0)
+OFFERED_kPa = (160.0, 200.0, 240.0, 280.0, 320.0)
 FAR_kPa = 60.0  # from every pressure measured so far, for a new one to be offered
 MASS_PERCENT = 0.5
 
@@ -148,7 +148,7 @@ def _more_rows(
     labels = sorted({row.label for row in o.rows if row.label}, key=str)
     pressures = sorted({row.pressure_kPa for row in o.rows if row.label})
     offered: list[tuple[str, float, list[ModelRow]]] = []
-    for p in PRESSURES_kPa:
+    for p in OFFERED_kPa:
         if all(abs(p - q) >= FAR_kPa for q in pressures):
             more: list[ModelRow] = [(label, p) for label in labels]
             offered.append((f"measure the same modes at {p:g} kPa", HOURS["pressure"], more))

@@ -9,7 +9,7 @@ from .model import Answer, Query, ResponseModel
 from .observations import Observations
 
 Array = np.ndarray
-MAX_STEPS, MAX_STEP, TOLERANCE = 12, 0.7, 0.02
+MAX_STEPS, MAX_STEP, CLOSE_ENOUGH = 12, 0.7, 0.02
 
 
 def plain_fit(
@@ -17,7 +17,7 @@ def plain_fit(
 ) -> Array:
     """x (v,) by damped Gauss-Newton steps from the start; a step has at most ``MAX_STEP`` in any x.
 
-    It ends within ``TOLERANCE`` of the minimum: the expansion about x goes the rest of the way.
+    It ends within ``CLOSE_ENOUGH`` of the minimum: the expansion about x goes the rest of the way.
     Raises the model's own failure where the start has no solution.
     """
     x = np.array(model.start, float)
@@ -40,7 +40,7 @@ def plain_fit(
         slope = J.T @ inverse @ r + information @ (model.start - x)
         step = np.linalg.solve(J.T @ inverse @ J + information, slope)
         step *= min(1.0, MAX_STEP / max(abs(step).max(), 1e-300))
-        if abs(step).max() < TOLERANCE:
+        if abs(step).max() < CLOSE_ENOUGH:
             return x + step
         for halvings in range(6):
             trial = x + step / 2**halvings

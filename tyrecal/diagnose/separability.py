@@ -17,7 +17,7 @@ from .inverse_problem import InverseProblem
 
 Array = np.ndarray
 VISIBLE, APART = 10.0, 9.0
-GRID = 81
+GRID_POINTS = 81
 
 
 @dataclass(frozen=True)
@@ -56,8 +56,8 @@ def separate(problem: InverseProblem, P: Array, sizes: Mapping[str, float]) -> S
     grids, shifts, ends = {}, {}, {}
     for id in ids:
         low, high = problem.expansion.nodes[id].reach
-        grids[id] = np.linspace(low, high, GRID)
-        shifts[id] = problem.added({id: grids[id]}, GRID)[0] - problem.added({}, 1)[0]
+        grids[id] = np.linspace(low, high, GRID_POINTS)
+        shifts[id] = problem.added({id: grids[id]}, GRID_POINTS)[0] - problem.added({}, 1)[0]
         ends[id] = int(np.argmax(abs(grids[id])))
     length = {id: np.einsum("qn,nm,qm->q", shifts[id], P, shifts[id]) for id in ids}
     at = {}

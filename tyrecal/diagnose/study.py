@@ -23,11 +23,11 @@ from .model import Answer, Query, Span
 from .observations import Observations, observe
 from .regions import regions
 from .tyre_model import TyreModel
-from .uncertainties import EFFECTS, Source, calibrated, sources
+from .uncertainties import EFFECT_PATH, Source, calibrated, sources
 from .under_load import UnderLoad, Values, compare
 
-ALIKE = 2.0  # factor between measured and computed frequency beyond which the unit is wrong
-ALIKE_MASS = 1.5  # as the mass: a rim weighs as much as its tyre
+MAX_FREQUENCY_RATIO = 2.0  # between measured and computed; beyond, the unit is wrong
+MAX_MASS_RATIO = 1.5  # as the mass: a rim weighs as much as its tyre
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,7 @@ def study(
     if not any(label for label, _ in rows):
         raise InputError(f"{measured}: there is no frequency of the unloaded tyre in it")
     ids = list(catalogue()) if effects is None else list(effects)
-    fitted = tuple(id for id in ids if EFFECTS + id in calibrated(case))
+    fitted = tuple(id for id in ids if EFFECT_PATH + id in calibrated(case))
     if "pressure_kPa" in calibrated(case):
         raise InputError(
             "a variable of the case sets pressure_kPa, which a diagnosis takes from the"
@@ -247,12 +247,12 @@ def _check_units(
     values = zip(observations.rows, observations.y, strict=True)
     for row, y in sorted(values, key=lambda each: each[0].label is None):  # frequencies first
         ratio = exp(y - at[row.label, row.pressure_kPa])
-        if row.label and not 1 / ALIKE < ratio < ALIKE:
+        if row.label and not 1 / MAX_FREQUENCY_RATIO < ratio < MAX_FREQUENCY_RATIO:
             raise InputError(
                 f"{paths[row.run]}: {row} was measured {ratio:.2g} times as high as the model has"
                 " it; is it the right unit, mode and pressure?"
             )
-        if not row.label and not 1 / ALIKE_MASS < ratio < ALIKE_MASS:
+        if not row.label and not 1 / MAX_MASS_RATIO < ratio < MAX_MASS_RATIO:
             raise InputError(
                 f"{paths[row.run]}: the mass is {ratio:.2g} times the model's; is it in kg, and of"
                 " the tyre without its rim?"

@@ -19,7 +19,7 @@ from ..fit import problem as fit
 from ..modes.find import Found, ModesAnswer
 from ..modes.mode import Label
 from .model import Answer, Query, Span
-from .uncertainties import EFFECTS, Source, unit_of, values_of
+from .uncertainties import EFFECT_PATH, Source, unit_of, values_of
 
 Array = np.ndarray
 MASS_STEP = 0.02  # of a logarithm: the mass is linear in areas and densities
@@ -92,7 +92,8 @@ class TyreModel:
     def design(self, point: Query) -> dict[str, float]:
         """Numbers of the case at a point: variables, and effects on top of those that it has."""
         effects = {
-            EFFECTS + id: self._present.get(id, 0.0) + float(e) for id, e in point.effects.items()
+            EFFECT_PATH + id: self._present.get(id, 0.0) + float(e)
+            for id, e in point.effects.items()
         }
         return {**self.values(point.x), **effects}
 
@@ -106,10 +107,10 @@ class TyreModel:
         bare = [p for p in points if self._is_bare(p)]
         stepped = [p for p in points if p.constants]
         steps = [
-            (k, path.removeprefix(EFFECTS), step)
+            (k, path.removeprefix(EFFECT_PATH), step)
             for k, source in enumerate(self.found)
             for path, step in source.steps.items()
-            if path.startswith(EFFECTS)
+            if path.startswith(EFFECT_PATH)
         ]
         asked = dict.fromkeys(map(_key, points))
         asked |= dict.fromkeys(_key(Query(p.x)) for p in bare)
@@ -145,7 +146,7 @@ class TyreModel:
         """Whether the solver gives slopes with an effect."""
         try:
             far = span.base + span.high or span.base + span.low
-            return self.evaluator.has_gradients_at({EFFECTS + id: far})
+            return self.evaluator.has_gradients_at({EFFECT_PATH + id: far})
         except ValueError:  # the case cannot have that much of it
             return True
 
@@ -183,7 +184,7 @@ class TyreModel:
     def _effort(self, design: Mapping[str, float]) -> int:
         """How long an evaluation takes, by its effects: 2 without slopes, 1 where it needs more
         than a plain tyre's modes."""
-        ids = {name.removeprefix(EFFECTS) for name in design if name.startswith(EFFECTS)}
+        ids = {name.removeprefix(EFFECT_PATH) for name in design if name.startswith(EFFECT_PATH)}
         if not self._slopeless.isdisjoint(ids):
             return 2
         return int(any(catalogue()[id].needs for id in ids))
@@ -219,7 +220,7 @@ class TyreModel:
                     slopes[i, k] = sum(
                         step * evaluation.gradients[path][place] / f
                         for path, step in source.steps.items()
-                        if not path.startswith(EFFECTS)
+                        if not path.startswith(EFFECT_PATH)
                     )
         return Answer(eta, jacobian, split, slopes if point.constants else None)
 
@@ -237,7 +238,7 @@ class TyreModel:
             designs = [own]
             designs += [{**own, **self.values(x + d)} for d in MASS_STEP * np.eye(len(x))]
             for source in self.found:
-                steps = {k: s for k, s in source.steps.items() if not k.startswith(EFFECTS)}
+                steps = {k: s for k, s in source.steps.items() if not k.startswith(EFFECT_PATH)}
                 steps.pop("pressure_kPa", None)
                 designs.append({**own, **{k: own[k] + s for k, s in steps.items()}})
             masses = []

@@ -10,9 +10,10 @@ from ..case.schema import Cord, Rubber
 from ..effects import catalogue
 from ..units import in_engineers_units
 
-DENSITY, MODULUS, SPACING, GAUGE, ANGLE_deg, PRESSURE_kPa = 1.5, 3.0, 1.0, 3.0, 1.0, 1.0
-EFFECTS = "effects."
-UNITS = {  # by a key's end, the longer first
+DENSITY_PERCENT, MODULUS_PERCENT, SPACING_PERCENT, GAUGE_PERCENT = 1.5, 3.0, 1.0, 3.0
+ANGLE_deg, PRESSURE_kPa = 1.0, 1.0
+EFFECT_PATH = "effects."
+UNIT_BY_ENDING = {  # by a key's end, the longer first
     "kg_per_m3": "kg/m3",
     "kg_m2": "kg m2",
     "m_per_N": "m/N",
@@ -76,17 +77,17 @@ def _usual(case: LoadedCase) -> Iterator[tuple[str, str, float, float]]:
     for name, material in case.case.materials.items():
         path = f"materials.{name}."
         if isinstance(material, Rubber):
-            yield f"{name}_density", path + "density_kg_per_m3", DENSITY, 0.0
+            yield f"{name}_density", path + "density_kg_per_m3", DENSITY_PERCENT, 0.0
         elif isinstance(material, Cord):
-            yield f"{name}_modulus", path + "youngs_modulus_Pa", MODULUS, 0.0
+            yield f"{name}_modulus", path + "youngs_modulus_Pa", MODULUS_PERCENT, 0.0
     for name, layer in case.case.rebar_layers.items():
         path = f"rebar_layers.{name}."
         spacing = "spacing_m" if layer.spacing_m is not None else "spacing_deg"
-        yield f"{name}_spacing", path + spacing, SPACING, 0.0
+        yield f"{name}_spacing", path + spacing, SPACING_PERCENT, 0.0
         yield f"{name}_angle", path + "angle_deg", 0.0, ANGLE_deg
     for i, gauge in enumerate(case.case.section.gauges or []):
         name = f"gauge_{'_'.join(gauge.between)}_{i}"
-        yield name, f"section.gauges.{i}.factor", GAUGE, 0.0
+        yield name, f"section.gauges.{i}.factor", GAUGE_PERCENT, 0.0
 
 
 def _source(name: str, steps: dict[str, float], percent: float, absolute: float) -> Source:
@@ -97,9 +98,9 @@ def _source(name: str, steps: dict[str, float], percent: float, absolute: float)
 
 def unit_of(path: str) -> str:
     """The unit of the number at a dotted path, "" where it has none."""
-    if path.startswith(EFFECTS):
-        return catalogue()[path.removeprefix(EFFECTS)].unit
-    return next((unit for end, unit in UNITS.items() if path.endswith(f"_{end}")), "")
+    if path.startswith(EFFECT_PATH):
+        return catalogue()[path.removeprefix(EFFECT_PATH)].unit
+    return next((unit for end, unit in UNIT_BY_ENDING.items() if path.endswith(f"_{end}")), "")
 
 
 def calibrated(case: LoadedCase) -> set[str]:
@@ -109,5 +110,5 @@ def calibrated(case: LoadedCase) -> set[str]:
 
 def values_of(case: LoadedCase, found: list[Source]) -> dict[str, float]:
     """The case's own numbers at every path of the sources, effects aside."""
-    paths = [path for source in found for path in source.steps if not path.startswith(EFFECTS)]
+    paths = [path for source in found for path in source.steps if not path.startswith(EFFECT_PATH)]
     return {path: float(number_at(case, path)) for path in paths}

@@ -11,8 +11,8 @@ from .inverse_problem import InverseProblem
 from .regions import SectionPart
 
 Array = np.ndarray
-STIFFNESS, MASS = 0.2, 0.1  # standard deviations of a part's relative change before the data
-SAME = 0.95  # cosine of columns beyond which two parts cannot be told apart
+STIFFNESS_PRIOR, MASS_PRIOR = 0.2, 0.1  # standard deviations of a part's relative change
+SAME_COSINE = 0.95  # cosine of columns beyond which two parts cannot be told apart
 
 
 @dataclass(frozen=True)
@@ -39,8 +39,8 @@ def section_map(
     """
     if not parts:
         return [], 0
-    columns = [(part.stiffness, STIFFNESS, part) for part in parts]
-    columns += [(part.mass, MASS, part) for part in parts]
+    columns = [(part.stiffness, STIFFNESS_PRIOR, part) for part in parts]
+    columns += [(part.mass, MASS_PRIOR, part) for part in parts]
     G = np.array([g[problem.places] * s for g, s, _ in columns])
     gram = G @ P @ G.T
     size = np.sqrt(np.maximum(np.diag(gram), 1e-300))
@@ -55,11 +55,11 @@ def section_map(
         same = [
             columns[j][2].name
             for j in range(2 * count)
-            if abs(cosine[better, j]) > SAME and j % count != i
+            if abs(cosine[better, j]) > SAME_COSINE and j % count != i
         ]
         stiffness, mass = (
             (float(100 * size * change[j]), float(100 * size * sigma[j]))
-            for j, size in ((i, STIFFNESS), (count + i, MASS))
+            for j, size in ((i, STIFFNESS_PRIOR), (count + i, MASS_PRIOR))
         )
         found = tuple(dict.fromkeys(same))
         result.append(PartChange(part.name, *stiffness, *mass, float(ln[better]), found))

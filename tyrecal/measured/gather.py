@@ -16,8 +16,8 @@ from .repeats import FLOOR, combined
 from .tables import read_table
 from .universal import Place, Universal, is_universal, read_universal
 
-NODES_AGREE = 1e-6  # m
-EXPLAINED = 0.98  # of the functions' mean square; less, and modes are missing
+SAME_PLACE_m = 1e-6  # m
+MIN_EXPLAINED = 0.98  # of the functions' mean square; less, and modes are missing
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ def gather(
             raise InputError(f"{path}: universal files hold no pressure; give --pressure-kPa")
         run = read_modal_test(file, nodes, layout or Layout())
         runs.append(run)
-        if run.explained < EXPLAINED:
+        if run.explained < MIN_EXPLAINED:
             notes.append(
                 f"{path}: the modes make {run.explained:.0%} of the functions; one may be missing:"
                 " look at the picture, try a narrower --band"
@@ -79,7 +79,7 @@ def all_nodes(files: Sequence[Universal]) -> dict[int, Place]:
     for file in files:
         for number, place in file.nodes.items():
             known = nodes.setdefault(number, place)
-            if max(abs(a - b) for a, b in zip(known, place, strict=True)) > NODES_AGREE:
+            if max(abs(a - b) for a, b in zip(known, place, strict=True)) > SAME_PLACE_m:
                 raise InputError(
                     f"{file.path}: node {number} stands elsewhere than in the files before"
                 )

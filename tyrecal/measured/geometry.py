@@ -16,12 +16,12 @@ from .universal import Place, Signal
 
 Array = np.ndarray
 
-RADII = (0.15, 1.5)  # m, of tyres
-FLAT = 0.75  # a tyre's width over its diameter is less
-OUTER = 0.8  # of the largest radius, of sensors on the tread and its shoulders
-OFF_CENTRE = 0.1  # of the radius
-CIRCLES = 3  # fitted one after the other
-AXES = "xyz"
+RADIUS_RANGE_m = (0.15, 1.5)  # m, of tyres
+MAX_ASPECT = 0.75  # a tyre's width over its diameter is less
+OUTER_RADIUS = 0.8  # of the largest radius, of sensors on the tread and its shoulders
+MAX_OFF_CENTRE = 0.1  # of the radius
+CIRCLE_FITS = 3  # fitted one after the other
+AXIS_NAMES = "xyz"
 
 
 def sensors_of(
@@ -45,14 +45,15 @@ def sensors_of(
             f"node {lacking[0]} has no coordinates; give the file with data set 15 or 2411, too"
         )
     X = np.array([nodes[node] for node, _ in signals]) - centre
-    z = AXES.index(axle or _axle(np.array(list(nodes.values()))))
+    z = AXIS_NAMES.index(axle or _axle(np.array(list(nodes.values()))))
     x, y = (z + 1) % 3, (z + 2) % 3
     R, angle = np.hypot(X[:, x], X[:, y]), np.arctan2(X[:, y], X[:, x])
-    _check_centre(X[:, [x, y]], AXES[z])
-    if not RADII[0] <= R.max() <= RADII[1]:
+    _check_centre(X[:, [x, y]], AXIS_NAMES[z])
+    low, high = RADIUS_RANGE_m
+    if not low <= R.max() <= high:
         raise InputError(
-            f"the sensors' largest radius about {AXES[z]} is {R.max():.4g} m, no tyre's"
-            f" ({RADII[0]:g} to {RADII[1]:g}); is the unit of length (data set 164) right?"
+            f"the sensors' largest radius about {AXIS_NAMES[z]} is {R.max():.4g} m, no tyre's"
+            f" ({low:g} to {high:g}); is the unit of length (data set 164) right?"
         )
     directions = np.zeros((len(signals), 3))
     for row, (_, direction) in enumerate(signals):
@@ -70,11 +71,11 @@ def _axle(X: Array) -> str:
     """The axis along which places (k, 3) spread least, if they are a tyre's."""
     spread = np.ptp(X, axis=0)
     order = np.argsort(spread)
-    if not spread[order[0]] < FLAT * spread[order[1]]:
+    if not spread[order[0]] < MAX_ASPECT * spread[order[1]]:
         raise InputError(
             "the sensors' places do not tell which axis is the axle; give --axle x, y or z"
         )
-    return AXES[order[0]]
+    return AXIS_NAMES[order[0]]
 
 
 def _check_centre(places: Array, axle: str) -> None:
@@ -87,9 +88,9 @@ def _check_centre(places: Array, axle: str) -> None:
     if len(places) < 4:
         return  # too few to tell
     middle = (places.min(0) + places.max(0)) / 2
-    for _ in range(CIRCLES):
+    for _ in range(CIRCLE_FITS):
         distance = np.hypot(*(places - middle).T)
-        outer = places[distance / distance.max() > OUTER]
+        outer = places[distance / distance.max() > OUTER_RADIUS]
         A = np.column_stack([2 * outer, np.ones(len(outer))])
         solution, _, rank, _ = np.linalg.lstsq(A, np.sum(outer**2, axis=1), rcond=None)
         if len(outer) < 4 or rank < 3:
@@ -97,7 +98,7 @@ def _check_centre(places: Array, axle: str) -> None:
         middle = solution[:2]
     distance = np.hypot(*(outer - middle).T)
     radius, off = distance.mean(), np.hypot(*middle)
-    if np.abs(distance / radius - 1).max() < 1 - BELT and off > OFF_CENTRE * radius:
+    if np.abs(distance / radius - 1).max() < 1 - BELT and off > MAX_OFF_CENTRE * radius:
         raise InputError(
             f"the sensors' circle about {axle} has its middle {off:.3g} m off the axle;"
             " give --centre X,Y,Z"

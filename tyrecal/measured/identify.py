@@ -10,7 +10,7 @@ Powers of z = exp(-i w T) with real coefficients, from 0 Hz on, are nearly depen
 band: over 70 to 90 Hz rounding decided which mode was found. So the band alone, shifted, is laid
 round three quarters of the unit circle, with complex coefficients (the condition of 40 powers is
 then about cos(pi / 8)^-40 = 24); the denominator comes from the data by QR, not from normal
-equations, which would square the condition; and SLIGHT of the data's size bounds what rounding can
+equations, which would square the condition; and RIDGE of the data's size bounds what rounding can
 do where the order is higher than the data have modes.
 
 No formula states how far such a frequency is off. The delete-one-group jackknife over the
@@ -33,16 +33,16 @@ from .sensors import MeasuredMode
 
 Array = np.ndarray
 
-ORDER, LINES = 40, 5  # highest order of the denominators, and lines for each order
-ARC, SLIGHT = 0.75, 1e-8  # share of the unit circle that the band takes; ridge, relative
-MARGIN = 1.05  # lines up to here times the band's end are used
+MAX_ORDER, LINES_PER_ORDER = 40, 5  # highest order of the denominators, and lines for each order
+ARC, RIDGE = 0.75, 1e-8  # share of the unit circle that the band takes; ridge, relative
+BAND_MARGIN = 1.05  # lines up to here times the band's end are used
 SAME_FREQUENCY, SAME_DAMPING = 0.01, 0.2  # relative, of a pole and its like one order below
-LOW = 3  # the lowest third of the orders is too low to hold all modes, and biased
-SPAN = 0.01  # relative width of one mode's poles
-OFTEN = 0.4  # share of the orders in which a mode's pole has to be stable
-DAMPINGS = (0.002, 0.2)  # ratios that a tyre's mode can have
+LOW_ORDERS = 3  # the lowest third of the orders is too low to hold all modes, and biased
+MODE_WIDTH = 0.01  # relative width of one mode's poles
+MIN_STABLE_SHARE = 0.4  # share of the orders in which a mode's pole has to be stable
+DAMPING_RANGE = (0.002, 0.2)  # ratios that a tyre's mode can have
 DEVIATION = 1.4826  # standard deviation of a normal variable over its median deviation
-GROUPS = 10  # of the jackknife, at most
+MAX_GROUPS = 10  # of the jackknife, at most
 FORMS = ("receptance", "mobility", "accelerance")
 
 
@@ -73,10 +73,10 @@ def identify(measured: Responses, low_Hz: float, high_Hz: float) -> Identified:
     f, mobility = measured.frequency_Hz, measured.values * _to_mobility(measured)
     if len(f) < 50 or not np.allclose(np.diff(f), f[1] - f[0], rtol=1e-3):
         raise InputError("functions must hold 50 evenly spaced frequencies or more")
-    used = (f >= low_Hz) & (f <= MARGIN * high_Hz)
-    order = int(np.clip(np.sum(used & (f <= high_Hz)) // LINES, 4, ORDER))
+    used = (f >= low_Hz) & (f <= BAND_MARGIN * high_Hz)
+    order = int(np.clip(np.sum(used & (f <= high_Hz)) // LINES_PER_ORDER, 4, MAX_ORDER))
     points = np.unique(measured.points)
-    count = min(GROUPS, len(points))
+    count = min(MAX_GROUPS, len(points))
     triangles = np.array(
         [
             _triangle(mobility[np.isin(measured.points, points[j::count])][:, used], order)
@@ -133,7 +133,7 @@ def _poles(triangles: Array, f: Array) -> list[Array]:
     """Poles, rad/s, of each order from 1 on; the highest coefficient is 1, so that those which
     only follow the noise are unstable."""
     size = triangles.shape[-1]
-    ridge = SLIGHT * np.linalg.norm(triangles) / np.sqrt(size) * np.eye(size)
+    ridge = RIDGE * np.linalg.norm(triangles) / np.sqrt(size) * np.eye(size)
     R = np.asarray(np.linalg.qr(np.vstack([*triangles, ridge]), mode="r"))
     T = ARC / (len(f) * (f[1] - f[0]))
     result = []
@@ -170,12 +170,12 @@ def _modes(poles: list[Array], low_Hz: float, high_Hz: float) -> Array:
     frequency."""
     stable: list[tuple[float, float]] = []
     before = np.empty((0, 2))
-    high = poles[len(poles) // LOW :]
+    high = poles[len(poles) // LOW_ORDERS :]
     for each in high:
         w = np.abs(each)
         found = np.column_stack([w / (2 * np.pi), -each.real / w])
         right = (each.imag > 0) & (found[:, 0] >= low_Hz) & (found[:, 0] <= high_Hz)
-        right &= (found[:, 1] > DAMPINGS[0]) & (found[:, 1] < DAMPINGS[1])
+        right &= (found[:, 1] > DAMPING_RANGE[0]) & (found[:, 1] < DAMPING_RANGE[1])
         found = found[right]
         change = np.abs(before[None] / found[:, None] - 1)
         again = (change < (SAME_FREQUENCY, SAME_DAMPING)).all(2).any(1)
@@ -184,10 +184,10 @@ def _modes(poles: list[Array], low_Hz: float, high_Hz: float) -> Array:
     stable.sort()
     rest, modes = np.array(stable).reshape(-1, 2), []
     while len(rest):  # the most crowded place first
-        near = np.abs(rest[:, None, 0] / rest[None, :, 0] - 1) < SPAN / 2
+        near = np.abs(rest[:, None, 0] / rest[None, :, 0] - 1) < MODE_WIDTH / 2
         centre = np.median(rest[near[np.argmax(near.sum(1))]], axis=0)
-        mine = np.abs(rest[:, 0] / centre[0] - 1) < SPAN
-        if mine.sum() < OFTEN * len(high):
+        mine = np.abs(rest[:, 0] / centre[0] - 1) < MODE_WIDTH
+        if mine.sum() < MIN_STABLE_SHARE * len(high):
             break
         middle = np.median(rest[mine], axis=0)
         spread = DEVIATION * np.median(np.abs(rest[mine, 0] - middle[0]))
@@ -203,7 +203,7 @@ def _jackknife(again: list[Array], frequencies: Array) -> Array:
     for j, modes in enumerate(again):
         for i, hertz in enumerate(frequencies):
             change = np.abs(modes[:, 0] / hertz - 1)
-            if len(change) and change.min() < 2 * SPAN:
+            if len(change) and change.min() < 2 * MODE_WIDTH:
                 found[j, i] = modes[np.argmin(change), 0]
     seen = np.isfinite(found).sum(0)
     with warnings.catch_warnings():

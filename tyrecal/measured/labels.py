@@ -29,13 +29,13 @@ from .sensors import Sensors
 
 Array = np.ndarray
 
-LIKELY = 0.9  # probability that a label needs to be told
-ALIKE = 4.0  # expected logarithm of the odds below which sensors cannot tell two labels apart
+MIN_LABEL_PROBABILITY = 0.9  # probability that a label needs to be told
+MIN_LN_ODDS = 4.0  # expected logarithm of the odds below which sensors cannot tell two labels apart
 SAME_PARITY, OTHER_PARITY = 0.03, 0.01  # variance of motions that are not the label's, of 1
 OTHER_WAVES = 0.001  # likewise, of motions with another c: tyres are not uniform
 SIDEWALL = 0.5  # variance of the sidewalls' motion; belts stand out, but sidewalls bulge
-NOISE = (1e-4, 1e-3, 1e-2, 5e-2, 0.2)  # variance, of the mean signal's
-WIDTH = 0.2  # a belt's half width is at least this share of its radius
+NOISE_VARIANCES = (1e-4, 1e-3, 1e-2, 5e-2, 0.2)  # variance, of the mean signal's
+MIN_HALF_WIDTH = 0.2  # a belt's half width is at least this share of its radius
 HEIGHTS = 2  # highest polynomial over a sidewall's height
 
 
@@ -81,13 +81,13 @@ class Labeller:
         p /= p.sum()
         order = np.argsort(-p, kind="stable")
         probabilities = {self.labels[i]: float(p[i]) for i in order}
-        if p[order[0]] >= LIKELY:
+        if p[order[0]] >= MIN_LABEL_PROBABILITY:
             return Judged(self.labels[order[0]], probabilities)
         return Judged(None, probabilities, self._why(p, order))
 
     def _evidence(self, values: Array, parts: Array) -> float:
         """ln of the mean over nu of p(u | label, nu). values (k,), parts (k,): of S, of u."""
-        v = np.maximum(values, 0.0) + np.array(NOISE)[:, None]
+        v = np.maximum(values, 0.0) + np.array(NOISE_VARIANCES)[:, None]
         square = np.sum(parts**2 / v, axis=1)
         each = -0.5 * np.log(v).sum(1) - 0.5 * len(parts) * np.log(np.maximum(square, 1e-300))
         return float(np.logaddexp.reduce(each))
@@ -104,7 +104,7 @@ class Labeller:
         """Of each label the other ones that these sensors cannot tell from it, whatever noise."""
         every = range(len(self.labels))
         odds = [[self.odds(i, j) if i != j else np.inf for j in every] for i in every]
-        alike = np.minimum(odds, np.transpose(odds)) < ALIKE
+        alike = np.minimum(odds, np.transpose(odds)) < MIN_LN_ODDS
         return {self.labels[i]: [self.labels[j] for j in np.flatnonzero(alike[i])] for i in every}
 
     def _why(self, p: Array, order: Array) -> str:
@@ -112,10 +112,10 @@ class Labeller:
         c = np.array([label.c for label in self.labels])
         first = order[0]
         others = order[c[order] != c[first]]
-        open_waves = len(others) and p[c == c[first]].sum() < LIKELY
+        open_waves = len(others) and p[c == c[first]].sum() < MIN_LABEL_PROBABILITY
         second = others[0] if open_waves else order[1]
         a, b = self.labels[first], self.labels[second]
-        if min(self.odds(first, second), self.odds(second, first)) >= ALIKE:
+        if min(self.odds(first, second), self.odds(second, first)) >= MIN_LN_ODDS:
             return f"the shape is between {a.said} and {b.said}: noise, or two modes mixed"
         if a.c != b.c:
             angles = np.round(np.degrees(self.sensors.points[:, 1])) % 360
@@ -142,7 +142,7 @@ def _missing(sensors: Sensors) -> str:
     lacking = [name for name, seen in zip(names, measured, strict=True) if not seen]
     if lacking:
         return f"nothing {' or '.join(lacking)} was measured on the tread"
-    if np.ptp(Z[belt]) < WIDTH * R.max():
+    if np.ptp(Z[belt]) < MIN_HALF_WIDTH * R.max():
         return "they do not stand on both edges of the tread"
     return "there are too few on the tread"
 
@@ -151,7 +151,7 @@ def _motions(sensors: Sensors, c: int) -> Array:
     """B (k, terms): belt polynomials, then sidewall ones, by component; cosines, then sines."""
     R, angle, Z = sensors.points.T
     belt = R / R.max() > BELT
-    half_width = max(np.abs(Z[belt]).max(), WIDTH * R.max())
+    half_width = max(np.abs(Z[belt]).max(), MIN_HALF_WIDTH * R.max())
     across = legvander(np.clip(Z / half_width, -1, 1), DEGREE) * belt[:, None]
     height = (R - R.min()) / (np.ptp(R) or 1.0) * 2 - 1
     up = legvander(height, HEIGHTS) * ~belt[:, None]

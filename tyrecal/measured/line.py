@@ -14,7 +14,7 @@ from .measurement import Measurement
 
 LABEL = re.compile(r"^[\[(]?\s*(\d+)\s*[,;/ ]\s*(\d+)\s*[\])]?\s*(.*)$")
 MAX_ORDERS = {"c": 20, "m": 3}
-KINDS = {
+KIND_WORDS = {
     "axial": "axial",
     "lateral": "axial",
     "torsional": "torsional",
@@ -22,8 +22,8 @@ KINDS = {
     "rotational": "torsional",
     "": None,
 }
-DOUBLET = {"": "", "1": "1", "2": "2", "a": "1", "b": "2", "lower": "1", "upper": "2"}
-SYMMETRIES = ("symmetric", "antisymmetric")
+DOUBLET_WORDS = {"": "", "1": "1", "2": "2", "a": "1", "b": "2", "lower": "1", "upper": "2"}
+LOADED_MEMBERS = ("symmetric", "antisymmetric")
 
 
 @dataclass(frozen=True)
@@ -107,21 +107,21 @@ class Line:
                     f"{name} is '{cell}', must be a whole number from 0 to {MAX_ORDERS[name]}"
                 )
         word = kind.strip().lower()
-        if word not in KINDS:
+        if word not in KIND_WORDS:
             raise ValueError(f"kind is '{kind}', must be lateral (axial), torsional or empty")
         zero = int(c) == int(m) == 0
         if zero and not word:
             raise ValueError("[0,0] needs a kind, lateral (axial) or torsional")
         if word and not zero and self.cell("value"):
             raise ValueError(f"kind is '{kind}', must be empty: only [0,0] has one")
-        return Label(int(c), int(m), KINDS[word] if zero else None)
+        return Label(int(c), int(m), KIND_WORDS[word] if zero else None)
 
     def _member(self, label: Label, loaded: bool) -> str:
         word = self.cell("member").lower()
-        if loaded and word in SYMMETRIES:
+        if loaded and word in LOADED_MEMBERS:
             return word
-        if not loaded and word in DOUBLET and (label.c or not word):
-            return DOUBLET[word]
+        if not loaded and word in DOUBLET_WORDS and (label.c or not word):
+            return DOUBLET_WORDS[word]
         wanted = "1, 2 or empty" if label.c else f"empty for {label}"
         wanted = "symmetric or antisymmetric under load" if loaded else wanted
         raise ValueError(f"member is '{self.cell('member')}', must be {wanted}")

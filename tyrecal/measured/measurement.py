@@ -9,8 +9,8 @@ from math import nan
 from ..design.usual import MEASURED
 from ..modes.mode import Label
 
-COLUMNS = ("quantity", "c", "m", "kind", "member", "pressure_kPa", "load_N", "value", "sigma")
-PRESSURES_kPa = (20.0, 2000.0)
+CSV_COLUMNS = ("quantity", "c", "m", "kind", "member", "pressure_kPa", "load_N", "value", "sigma")
+PRESSURE_RANGE_kPa = (20.0, 2000.0)
 Key = tuple[str, Label | None, str, float, float]
 
 
@@ -41,7 +41,7 @@ class Measurement:
     @property
     def mistake(self) -> str | None:
         """A sentence, where no tyre has such a value."""
-        low, high = PRESSURES_kPa
+        low, high = PRESSURE_RANGE_kPa
         if not self.value > 0:
             return f"{self.quantity} is {self.value:g}, must be greater than 0"
         if refusal := MEASURED[self.quantity].refusal(self.value):
@@ -58,7 +58,7 @@ class Measurement:
 
 def measurements_csv(measurements: Sequence[Measurement]) -> str:
     """The measurements CSV."""
-    lines = [",".join(COLUMNS)]
+    lines = [",".join(CSV_COLUMNS)]
     for each in measurements:
         label = each.label
         mode = f"{label.c},{label.m},{label.kind or ''}" if label else ",,"

@@ -20,8 +20,8 @@ from .universal import Function, MeasuredShape, Place, Signal, Universal
 
 Array = np.ndarray
 
-DOUBLET = 0.05  # relative distance of a doublet's members, at most
-COLLINEAR = 0.5  # modal phase collinearity below which a shape has no real part to speak of
+MAX_DOUBLET_SPLIT = 0.05  # relative distance of a doublet's members, at most
+MIN_COLLINEARITY = 0.5  # modal phase collinearity below which a shape has no real part to speak of
 
 
 @dataclass(frozen=True)
@@ -190,7 +190,7 @@ def _labelled(mode: MeasuredMode, labeller: Labeller, place: str) -> LabelledMod
     part = np.mean(shape[belt] ** 2) / (np.mean(shape**2) or 1.0)
     if judged.label and part < TAKES_PART:
         judged = replace(judged, label=None, why="the belt hardly moves: a mode of the sidewalls")
-    if judged.label and collinearity < COLLINEAR:
+    if judged.label and collinearity < MIN_COLLINEARITY:
         why = f"the shape is complex (collinearity {collinearity:.2f})"
         judged = replace(judged, label=None, why=why)
     return LabelledMode(mode, labeller.sensors, shape / (size or 1.0), collinearity, judged, place)
@@ -212,7 +212,7 @@ def settled(told: list[LabelledMode]) -> list[LabelledMode]:
             result += group
             continue
         lowest = hertz(group[0])
-        pair = [each for each in group if hertz(each) <= (1 + DOUBLET) * lowest]
+        pair = [each for each in group if hertz(each) <= (1 + MAX_DOUBLET_SPLIT) * lowest]
         pair = pair[: 2 if label.c else 1]
         for number, each in enumerate(pair, start=1):
             result.append(replace(each, member=str(number) if len(pair) == 2 else ""))

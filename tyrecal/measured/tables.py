@@ -22,22 +22,22 @@ from ..errors import InputError
 from ..files import read_bytes
 from .columns import Column, read_columns
 from .line import Line
-from .measurement import COLUMNS, Measurement
+from .measurement import CSV_COLUMNS, Measurement
 
 MAX_LINES, MAX_CELL = 10_000, 300  # of a file; characters
 OPENED = re.compile(r"^[\[(]\s*\d+$")  # a label that its comma has parted
 
 
 def read_measurements(path: Path) -> list[Measurement]:
-    """A measurements CSV: a table with `COLUMNS` and every sigma, which measures nothing twice.
+    """A measurements CSV: a table with `CSV_COLUMNS` and every sigma, which measures nothing twice.
 
     Raises InputError with every mistake, each with file and line; OSError.
     """
     lines, comma = _lines(path)
     place, headings = lines[0]
-    if sorted(headings) != sorted(COLUMNS):
+    if sorted(headings) != sorted(CSV_COLUMNS):
         raise InputError(
-            f"{place}: the columns must be {','.join(COLUMNS)}, with commas between;"
+            f"{place}: the columns must be {','.join(CSV_COLUMNS)}, with commas between;"
             " 'tyrecal measured import' makes such a file of other tables"
         )
     columns = read_columns(headings, place, None)

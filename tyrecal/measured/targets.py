@@ -14,7 +14,7 @@ from ..modes.mode import Label
 from .measurement import Measurement
 from .tables import read_measurements
 
-ALIKE_kPa = 0.5  # pressures that differ by less are one
+SAME_PRESSURE_kPa = 0.5  # pressures that differ by less are one
 
 
 def with_measured(case: LoadedCase, path: Path) -> tuple[LoadedCase, list[str]]:
@@ -27,7 +27,7 @@ def with_measured(case: LoadedCase, path: Path) -> tuple[LoadedCase, list[str]]:
     pressure = case.case.pressure_kPa
     weighed = [r for r in readings if r.quantity == "mass_kg"]
     rest = [r for r in readings if r.quantity != "mass_kg"]
-    here = [r for r in rest if abs(r.pressure_kPa - pressure) <= ALIKE_kPa]
+    here = [r for r in rest if abs(r.pressure_kPa - pressure) <= SAME_PRESSURE_kPa]
     modal = [r for r in here if r.label and not r.load_N]
     loaded = [r for r in here if r.label and r.load_N]
     pressed = [r for r in here if not r.label and r.load_N]

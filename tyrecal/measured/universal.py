@@ -24,8 +24,8 @@ Signal = tuple[int, int]  # number of a node; direction 1, 2 or 3, negative wher
 Place = tuple[float, float, float]  # m
 
 MAX_BYTES = 1_000_000_000  # response functions of many points are long
-MARK = re.compile(rb" {4}-1(?: {74})?(?=[\r\n]|\Z)")  # binary values may stand before it
-FORMS = {8: "receptance", 11: "mobility", 12: "accelerance"}
+DELIMITER = re.compile(rb" {4}-1(?: {74})?(?=[\r\n]|\Z)")  # binary values may stand before it
+ORDINATES = {8: "receptance", 11: "mobility", 12: "accelerance"}
 UNHEEDED = (151, 2400, 2412)  # titles and elements: nothing is lost without them
 FUNCTIONS = {
     1: "time response",
@@ -38,7 +38,7 @@ FUNCTIONS = {
     9: "power spectral density",
     12: "spectrum",
 }
-RESPONSE, TIME = 4, 17  # codes of a function's type, and of what it stands over
+RESPONSE_FUNCTION, TIME = 4, 17  # codes of a function's type, and of what it stands over
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,7 @@ def read_universal(path: Path) -> Universal:
     import pyuff
 
     text = read_bytes(path, MAX_BYTES)
-    marks = [match.start() for match in MARK.finditer(text)]
+    marks = [match.start() for match in DELIMITER.finditer(text)]
     line_of = lambda mark: text.count(b"\n", 0, mark) + 1
     if not marks:
         raise InputError(f"{path}: no data set in it")
@@ -139,7 +139,7 @@ def _take(result: Universal, place: str, each: dict[str, Any], length: float) ->
         else:
             result.skipped["data at nodes that are no mode shape"] += 1
     elif each["type"] == 58:
-        if each["func_type"] == RESPONSE:
+        if each["func_type"] == RESPONSE_FUNCTION:
             result.functions.append(_function(place, each))
         else:
             code = each["func_type"]
@@ -189,6 +189,6 @@ def _function(place: str, each: dict[str, Any]) -> Function:
     response = int(each["rsp_node"]), int(each["rsp_dir"])
     if abs(response[1]) not in (1, 2, 3):
         raise InputError(f"{place}: the response's direction is {response[1]}, must be 1 to 3")
-    form = FORMS.get(each["ordinate_spec_data_type"])
+    form = ORDINATES.get(each["ordinate_spec_data_type"])
     reference = int(each["ref_node"]), int(each["ref_dir"])
     return Function(f, values, form, response, reference, place)
