@@ -87,37 +87,25 @@ class Bundled:
             nodes, points = arrays["nodes"], arrays["points"]
             displacement = arrays[f"displacement_{step['step']}"]
             shapes = arrays[f"shapes_{step['step']}"] if step["modes"] else []
-        modes: list[dict[str, Any]] = []
-        places: list[list[int]] = []  # of each mode in the file
-        doublets: dict[tuple[int, int], int] = {}
-        for place, (mode, shape) in enumerate(zip(step["modes"], shapes, strict=True)):
-            key = mode["n"], mode.get("doublet", -1)
-            if key in doublets:  # the upper one of two that have split
-                places[doublets[key]].append(place)
-                lower = modes[doublets[key]]["frequency_Hz"]
-                modes[doublets[key]] |= {
-                    "frequency_Hz": (lower + mode["frequency_Hz"]) / 2,
-                    "multiplicity": 2,
-                    "members": [lower, mode["frequency_Hz"]],
-                }
-                continue
-            places.append([place])
-            modes.append(
-                {
-                    "frequency_Hz": mode["frequency_Hz"],
-                    "multiplicity": mode["multiplicity"],
-                    "n": mode["n"],
-                    "amplitude": shape,
-                }
-            )
-            if "doublet" in mode:
-                doublets[key] = len(modes) - 1
+        # modes of the file by place; the two that a doublet has split into count as one
+        members: dict[object, list[int]] = {}
+        for i, mode in enumerate(step["modes"]):
+            doublet = (mode["n"], mode["doublet"]) if "doublet" in mode else i
+            members.setdefault(doublet, []).append(i)
+        modes = []
+        for places in members.values():
+            first, hertz = places[0], [step["modes"][i]["frequency_Hz"] for i in places]
+            mode = {key: step["modes"][first][key] for key in ("frequency_Hz", "multiplicity", "n")}
+            modes.append({**mode, "amplitude": shapes[first]})
+            if len(places) > 1:
+                both = {"frequency_Hz": sum(hertz) / 2, "multiplicity": 2, "members": hertz}
+                modes[-1] |= both
         return {
             "pressure_Pa": step["pressure_Pa"],
             "mass_kg": step["mass_kg"],
             "modes": modes,
             "gradients": {
-                name: [sum(slopes[i] for i in own) / len(own) for own in places]
+                name: [sum(slopes[i] for i in own) / len(own) for own in members.values()]
                 for name, slopes in step["sensitivities"].items()
             },
             "nodes": nodes,

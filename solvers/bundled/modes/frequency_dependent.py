@@ -27,6 +27,9 @@ MAX_ITERATIONS = 40
 class NotSelfConsistent(ArithmeticError):
     """No frequency was found at which a mode has the modulus of that frequency."""
 
+    def __init__(self, n: int, j: int):
+        super().__init__(f"the modulus of mode {j + 1} of harmonic {n} does not settle")
+
 
 class SelfConsistent:
     """Modes of a vibration whose rubber follows the ``tables``."""
@@ -59,9 +62,7 @@ class SelfConsistent:
                 mode = found.where(slice(j, j + 1))
                 return replace(mode, eigenvalues=np.array([(2 * np.pi * frequency) ** 2]))
             found = self._at(frequency, found.n, j + 1)
-        raise NotSelfConsistent(
-            f"the modulus of mode {j + 1} of harmonic {found.n} does not settle"
-        )
+        raise NotSelfConsistent(found.n, j)
 
     def _own(self, found: HarmonicModes, j: int, frequency_Hz: float) -> float:
         """f with (2 pi f)^2 = lambda + sum_l (rho_l(f) - rho_l(f_0)) phi^H dK_l phi for mode j of
@@ -75,9 +76,7 @@ class SelfConsistent:
             if abs(new / f - 1) <= FREQUENCY_RTOL:
                 return float(new)
             f = new
-        raise NotSelfConsistent(
-            f"the modulus of mode {j + 1} of harmonic {found.n} does not settle"
-        )
+        raise NotSelfConsistent(found.n, j)
 
 
 def joined(modes: list[HarmonicModes]) -> HarmonicModes:

@@ -102,7 +102,7 @@ def read_wheel(keywords: list[Keyword], mesh: DeckMesh, step: DeckStep) -> Wheel
 
 def _point_elements(keywords: list[Keyword], mesh: DeckMesh) -> dict[str, tuple[str, list[int]]]:
     """Element set to type and nodes of the job's point elements on a rim's reference node; those
-    on the tyre are `point_elements`' ."""
+    on the tyre are of the module `point_elements`."""
     sets: dict[str, tuple[str, list[int]]] = {}
     for k in keywords:
         if k.name == "ELEMENT":

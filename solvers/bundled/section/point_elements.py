@@ -57,7 +57,7 @@ class PointElements:
 def read_point_elements(revolve: list[Keyword], mesh: DeckMesh) -> PointElements:
     """The *MASS and *SPRING elements of a revolve job. Raises DeckError."""
     nodes: dict[str, tuple[str, list[int]]] = {}
-    rims: set[str] = set()  # element sets on a rim's reference node are `wheel`'s
+    rims: set[str] = set()  # element sets on a rim's reference node are of `wheel`
     mass = np.zeros((len(mesh.X), 3), complex)
     stiffness = np.zeros((len(mesh.X), 3), complex)
     for k in revolve:
