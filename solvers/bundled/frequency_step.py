@@ -17,7 +17,7 @@ from .modes.sensitivity import ModeShapes, RimAndAir, eigenvalue_rates, state_ra
 from .nonuniform.select import is_nonuniform, nonuniform_modes
 from .section.band import Cholesky
 from .section.boundary import numbering
-from .section.loads import pressures, spin, turning
+from .section.loads import loads, spin
 from .section.model import Model, build
 
 Array = np.ndarray
@@ -40,7 +40,7 @@ class FrequencyStep:
         self.vibration = Vibration(
             self.model,
             tyre.U,
-            pressures(self.model, step),
+            loads(self.model, step),
             self.equations,
             self.row.real(3, 0.0) * (2 * np.pi) ** 2,
             *tyre.wheel_and_cavity(self.model, step),
@@ -92,8 +92,8 @@ class FrequencyStep:
         factor = self.factor
         if self.dynamic_Hz is not None or self.vibration.shift:
             still = _model(self.tyre, self.step, None, False)
-            loads = pressures(still, self.step)
-            factor = Vibration(still, self.tyre.U, loads, self.equations, 0.0).factor(0)
+            acting = loads(still, self.step)
+            factor = Vibration(still, self.tyre.U, acting, self.equations, 0.0).factor(0)
         return factor.tyre if isinstance(factor, Bordered) else factor
 
     def _rates(
@@ -110,7 +110,7 @@ class FrequencyStep:
         seeded = replace(self.tyre, section=section, revolve=revolve, models=models)
         step, U, own = steps[self.place], seeded.U, seeded.request.own_frequency
         still = moving = _model(seeded, step, None, False)
-        V = state_rate(still, U, pressures(still, step), self.equations, newton)
+        V = state_rate(still, U, loads(still, step), self.equations, newton)
         if self.dynamic_Hz is not None or own:
             moving = _model(seeded, step, self.dynamic_Hz, own)
         wheel, air = seeded.wheel_and_cavity(moving, step)
@@ -118,8 +118,8 @@ class FrequencyStep:
         if wheel or air:
             rim, flow = [q for m in modes for q in m.rim], [w for m in modes for w in m.air]
             rim_and_air = RimAndAir(wheel, air, rim, flow)
-        loads = pressures(moving, step)
-        forms = eigenvalue_rates(moving, U, V, loads, fields, eigenvalues, rim_and_air)
+        acting = loads(moving, step)
+        forms = eigenvalue_rates(moving, U, V, acting, fields, eigenvalues, rim_and_air)
         tyre = SeededTyre(moving, spin(self.tyre.model, step), seeded.attached())
         each = np.split(forms, np.cumsum([len(m.eigenvalues) for m in modes])[:-1])
         return [
@@ -129,4 +129,4 @@ class FrequencyStep:
 
 
 def _model(tyre: Inflated, step: DeckStep, dynamic_Hz: float | None, own: bool) -> Model:
-    return turning(tyre.models(dynamic_Hz, step.long_term, own), step)
+    return tyre.models(dynamic_Hz, step.long_term, own)

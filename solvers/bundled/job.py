@@ -24,7 +24,7 @@ from .road import footprint_job
 from .road.contact_newton import NotPressed
 from .section.boundary import numbering
 from .section.inflation import InflationFailed, equilibrium
-from .section.loads import pressures, turning
+from .section.loads import loads, pressures
 from .section.mechanics import mass
 from .section.model import build
 
@@ -158,9 +158,9 @@ class Job:
 
     def _static(self, step: DeckStep) -> None:
         self._check_time()
-        model = turning(self.tyre.models(None, step.long_term, False), step)
-        loads, equations = pressures(model, step), numbering(model, step)
-        U, factorisations = equilibrium(model, equations, loads, self.tyre.U, self._check_time)
+        model = self.tyre.models(None, step.long_term, False)
+        acting, equations = loads(model, step), numbering(model, step)
+        U, factorisations = equilibrium(model, equations, acting, self.tyre.U, self._check_time)
         self.tyre.U = U
         self.factorisations += factorisations
 

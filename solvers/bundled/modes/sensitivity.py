@@ -19,8 +19,10 @@ from ..deck.keywords import COMPLEX_STEP
 from ..section import mechanics
 from ..section.band import Cholesky, Numbering
 from ..section.model import Model
+from ..section.parts.frame import IN_PLANE
 from ..section.parts.mode_shapes import ModeShapes
 from ..section.parts.part import TyrePart
+from ..section.parts.spin import Spin
 from .cavity import Cavity, coupling
 from .wheel import Wheel
 
@@ -58,7 +60,8 @@ def eigenvalue_rates(
         fields = rim_and_air.carried(model.mesh.X, fields)
     total = np.zeros(len(eigenvalues), complex)
     own = 1.0
-    for part in (*model.parts, *loads):
+    spins = [load for load in loads if isinstance(load, Spin)]
+    for part in (*model.parts, *(load for load in loads if not isinstance(load, Spin))):
         total += part.form(state, fields)
         for i, table in enumerate(model.tables):
             if (grown := part.growing(i)) is not None:
@@ -69,7 +72,10 @@ def eigenvalue_rates(
                 # d rho / d lambda = rho (d ln rho / d ln f) / (2 lambda)
                 slope = np.array([table.slope(f) for f in hertz])
                 own = own - form.real * ratio.real * slope / (2 * eigenvalues)
-    total -= eigenvalues * _energies(mechanics.mass(model), fields)
+    M = mechanics.mass(model)
+    total -= eigenvalues * _energies(M, fields).sum(1)
+    if spins:  # of all parts at once, their mass being there
+        total -= _energies(spins[0].spin2 * M, fields) @ np.diag(IN_PLANE)
     if rim_and_air:
         total += rim_and_air.forms(model, state, loads, fields, eigenvalues)
     return total.imag / COMPLEX_STEP / own
@@ -124,14 +130,14 @@ class RimAndAir:
 
 
 def _energies(M: csr_array, fields: ModeShapes) -> Array:
-    """u^T M u (m,) per mode; of real shapes only p's tangent, imaginary."""
+    """u^T M u (m, 3) per mode and component; of real shapes only p's tangent, imaginary."""
     energy = np.zeros((len(fields.modes), 3), complex)
     if not (fields.complex or np.iscomplexobj(M.data)):
-        return energy.sum(1)
+        return energy
     if not fields.complex:
         M = csr_array((M.data.imag, M.indices, M.indptr), M.shape)
         M.eliminate_zeros()
     for j, (_, a, b) in enumerate(fields.modes):
         u = np.moveaxis(np.concatenate([a, b]), 0, -1)  # (nodes, 3, parts)
         energy[j] = ((M @ u.reshape(len(u), -1)).reshape(u.shape) * u).sum((0, 2))
-    return (energy if fields.complex else 1j * energy).sum(1)
+    return energy if fields.complex else 1j * energy

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from operator import methodcaller
 
 import numpy as np
@@ -12,7 +12,6 @@ from .band import Cholesky, Indefinite, Numbering
 from .model import Model
 from .parts.part import TyrePart
 from .parts.pressure import Pressure
-from .parts.spin import Spin
 
 Array = np.ndarray
 FORCE_RTOL = 1e-9  # out-of-balance force over pressure force; the next step is at round-off
@@ -39,7 +38,7 @@ class InflationFailed(ArithmeticError):
 def equilibrium(
     model: Model,
     numbering: Numbering,
-    loads: list[Pressure],
+    loads: Sequence[TyrePart],
     start: Array,
     check: Callable[[], None] = lambda: None,
 ) -> tuple[Array, int]:
@@ -54,7 +53,7 @@ def equilibrium(
     Raises InflationFailed with the pressure that was reached.
     """
     solve = _Solver(model, numbering, loads)
-    U = solve(start, 1.0, 1.0, MAX_QUICK_ITERATIONS if loads else MAX_ITERATIONS)
+    U = solve(start, 1.0, 1.0, MAX_QUICK_ITERATIONS if solve.pressures else MAX_ITERATIONS)
     if U is None:
         check()
         U = _by_stiffness(solve, start, check)
@@ -66,9 +65,10 @@ def equilibrium(
 class _Solver:
     """Newton solutions at a share of the load and a multiple of the rubber's stiffness."""
 
-    def __init__(self, model: Model, numbering: Numbering, loads: list[Pressure]):
+    def __init__(self, model: Model, numbering: Numbering, loads: Sequence[TyrePart]):
         self.model, self.numbering, self.loads = model, numbering, loads
-        self.full = max((abs(load.pressure) for load in loads), default=0.0)
+        self.pressures = [abs(load.pressure) for load in loads if isinstance(load, Pressure)]
+        self.full = max(self.pressures, default=0.0)
         # a slack membrane has no stiffness against pressure yet, so the first tangents from rest
         # carry the tension p rho that the cords are about to take up
         self.tension = self.full * SECTION_RADIUS * np.ptp(model.mesh.X[:, 0].real)
@@ -80,7 +80,10 @@ class _Solver:
     def __call__(self, U: Array, share: float, stiffness: float, longest: int) -> Array | None:
         """Displacements from the start U, or None and ``why``."""
         model = self.model.with_laws(methodcaller("stiffened", stiffness))
-        loads = [Pressure(load.lines, load.pressure * share) for load in self.loads]
+        loads = [
+            Pressure(load.lines, load.pressure * share) if isinstance(load, Pressure) else load
+            for load in self.loads
+        ]
         tension = 0.0 if U.any() else share * self.tension
         found, used, self.why = _newton(
             model, self.numbering, loads, self.mass, U, tension, longest
@@ -126,7 +129,7 @@ def _by_pressure(solve: _Solver, start: Array, check: Callable[[], None]) -> Arr
 def _newton(
     model: Model,
     numbering: Numbering,
-    loads: list[Pressure],
+    loads: Sequence[TyrePart],
     mass: Array,
     U: Array,
     tension: float,
@@ -173,11 +176,12 @@ def _newton(
     return None, used, f"Newton's method did not converge in {longest} iterations"
 
 
-def _load_force(model: Model, U: Array, loads: list[Pressure], numbering: Numbering) -> Array:
+def _load_force(model: Model, U: Array, loads: Sequence[TyrePart], numbering: Numbering) -> Array:
     """Force of the pressure alone, of at least 1 Pa, or of the spin where there is none: the scale
     of what counts as balanced."""
-    acting: list[TyrePart] = [p for p in model.parts if isinstance(p, Spin)]
-    if loads:
-        felt = [max(float(np.real(load.pressure)), 1.0) for load in loads]
-        acting = [Pressure(each.lines, p) for each, p in zip(loads, felt, strict=True)]
-    return mechanics.residual(Model(model.mesh, []), U, acting, numbering) if acting else np.ones(1)
+    pressures = [load for load in loads if isinstance(load, Pressure)]
+    felt = [Pressure(p.lines, max(float(np.real(p.pressure)), 1.0)) for p in pressures]
+    if not loads:
+        return np.ones(1)
+    bare = Model(model.mesh, [])
+    return mechanics.residual(bare, U if felt else 0 * U, felt or loads, numbering)

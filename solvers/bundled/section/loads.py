@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from ..deck.keywords import DeckError
 from ..deck.steps import DeckStep
 from .model import Model
+from .parts.part import TyrePart
 from .parts.pressure import Pressure
 from .parts.spin import spinning
 
@@ -21,12 +20,11 @@ def pressures(model: Model, step: DeckStep) -> list[Pressure]:
     return [Pressure(model.mesh.faces[s], value) for s, value in step.pressures.items()]
 
 
-def turning(model: Model, step: DeckStep) -> Model:
-    """The model with the centrifugal load of a step. Raises DeckError."""
+def loads(model: Model, step: DeckStep) -> list[TyrePart]:
+    """All that acts on the tyre: pressures, and the forces of its spin. Raises DeckError."""
     spin2 = _uniform(model, step, step.centrifugal, "CENTRIF")
-    if not spin2:
-        return model
-    return replace(model, parts=model.parts + spinning(model.parts, model.mesh.X, spin2))
+    spins = spinning(model.parts, model.mesh.X, spin2) if spin2 else []
+    return [*pressures(model, step), *spins]
 
 
 def spin(model: Model, step: DeckStep) -> complex | float:

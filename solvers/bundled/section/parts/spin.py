@@ -43,7 +43,7 @@ class Spin(TyrePart):
         raise NotImplementedError("a turning tyre is honoured off the road and all round alike")
 
 
-def spinning(parts: list[TyrePart], X: Array, spin2: complex | float) -> list[TyrePart]:
+def spinning(parts: list[TyrePart], X: Array, spin2: complex | float) -> list[Spin]:
     """The centrifugal forces of parts that have mass; X (n, 2): R, Z of all nodes."""
     massive = [(p.connectivity, p.mass) for p in parts if p.mass is not None]
     return [Spin(c, mass, X[c, 0], spin2) for c, mass in massive]
