@@ -84,7 +84,9 @@ def set_aside(folder: Path, study: str, written: Collection[str]) -> None:
 
 def results(folder: Path, study: str) -> list[Path]:
     """Files in ``folder`` that are results of ``study``."""
-    return [file for pattern in RESULTS[study] for file in folder.glob(pattern)]
+    stem = study.replace("-", "_")  # of a study from outside
+    patterns = RESULTS.get(study, (f"{stem}.*", f"{stem}_*"))
+    return [file for pattern in patterns for file in folder.glob(pattern)]
 
 
 def read_runs(folder: Path) -> dict[str, dict[str, Any]]:

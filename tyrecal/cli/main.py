@@ -6,7 +6,7 @@ import os
 import signal
 import sys
 from importlib import import_module
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -14,6 +14,9 @@ from ..errors import TyrecalError
 from ..files import CHANGED
 from ..interrupt import SIGNALS, exit_code, interrupt_heard, interrupts_remembered
 from .talk import RESUME, coloured, error, say
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
 
 # One BLAS thread: the tyre's matrices are small, and cores are better spent on other designs.
 # Has to be set before NumPy is imported.
@@ -61,15 +64,23 @@ class Interrupted(Exception):
         self.code = exit_code(number)
 
 
+def _outside() -> dict[str, EntryPoint]:
+    """Commands of studies from outside: see `tyrecal.studies`."""
+    from importlib.metadata import entry_points
+
+    return {entry.name: entry for entry in entry_points(group="tyrecal.commands")}
+
+
 class Commands(click.Group):
     """The commands, each imported when it is called."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        return list(COMMANDS)
+        return [*COMMANDS, *_outside()]
 
     def get_command(self, ctx: click.Context, name: str) -> click.Command | None:
         if name not in COMMANDS:
-            return None
+            entry = _outside().get(name)
+            return entry.load() if entry else None
         command: click.Command = import_module(f"tyrecal.cli.{name.replace('-', '_')}").command
         return command
 
@@ -81,7 +92,7 @@ class Commands(click.Group):
             if len(args) == 1:
                 click.echo(ctx.get_help())
                 ctx.exit()
-        if args[0] not in COMMANDS and not args[0].startswith("-"):
+        if args[0] not in COMMANDS and args[0][:1] != "-" and args[0] not in _outside():
             raise click.UsageError(f"no command '{args[0]}'{_meant(args[0])}", ctx)
         return super().resolve_command(ctx, args)
 
@@ -102,7 +113,8 @@ class Commands(click.Group):
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         with formatter.section("Commands"):
-            formatter.write_dl(list(COMMANDS.items()))
+            outside = {n: e.load().get_short_help_str(90) for n, e in _outside().items()}
+            formatter.write_dl(list({**COMMANDS, **outside}.items()))
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         with formatter.section("Exit codes"):

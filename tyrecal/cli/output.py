@@ -20,7 +20,6 @@ from pydantic import BaseModel
 from ..errors import InputError
 from ..files import (
     PREVIOUS,
-    RESULTS,
     RUN,
     json_text,
     own_folder,
@@ -148,8 +147,7 @@ class Run:
             self.placed = self.folder / aside
             own_folder(self.placed)
         with interrupts_put_off():
-            if self.study in RESULTS:
-                take_place(self.new, self.placed, self.study)
+            take_place(self.new, self.placed, self.study)
             self._finished = True
             self._write_facts(**({"results": aside} if aside else {}), **facts)
 

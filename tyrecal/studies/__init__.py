@@ -1,5 +1,6 @@
 """Studies of a tyre. A study is a `Result` with a `run`, its figures in `report` and its command in
-`cli`; one from outside names its `Result` as an entry point ``tyrecal.studies``."""
+`cli`. One from outside names its `Result` as an entry point ``tyrecal.studies`` and its command as
+one of ``tyrecal.commands``."""
 
 from __future__ import annotations
 

@@ -184,8 +184,9 @@ def _pictures(found: Results, result: Result, draw: Draw) -> Iterator[Markup]:
             words = f"Contact pressure, {design}"
             yield draw(f"patches-{design}", words, "footprint_patches.json", plot)
     elif result.figures:
-        for name, figure in named(result.figures)(result).items():
-            yield svg(figure, name, name)
+        plots = named(result.figures)(result)
+        for name in plots:
+            yield draw(name, result.heading, file, partial(plots.__getitem__, name))
 
 
 def _picture(
