@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from .case import LoadedCase
 from .case.identity import tyre_sha256
 from .design import resolved
+from .version import __version__
 
 if TYPE_CHECKING:
     from .evaluate.solver import Solver
@@ -30,8 +31,6 @@ def provenance(
     pressure_kPa (default: the case's), load_N: of the study, several where it has several; measured
     files in the order of the command. Raises OSError.
     """
-    from . import __version__
-
     c = case.case
     files = list(measured)
     return {

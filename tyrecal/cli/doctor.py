@@ -46,10 +46,10 @@ def command(solver: str, store: Path | None, talk: Talk) -> int:
     tyrecal doctor --solver calculix
     tyrecal doctor --json
     """
-    from .. import __version__
     from ..doctor.installation import extras, machine, packages, records
     from ..doctor.self_check import self_check
     from ..evaluate.solver import installed
+    from ..version import __version__
 
     with talk.progress("known tyre"):
         check = self_check(solver)

@@ -152,7 +152,7 @@ class Run:
             self._write_facts(**({"results": aside} if aside else {}), **facts)
 
     def _write_facts(self, **facts: Any) -> None:
-        import tyrecal
+        from ..version import __version__
 
         counts = self.counts and {
             "solver_runs": self.counts.runs,
@@ -167,7 +167,7 @@ class Run:
             "seconds": round(time.monotonic() - self._clock, 3),
             "host": platform.node(),
             "python": platform.python_version(),
-            "tyrecal": tyrecal.__version__,
+            "tyrecal": __version__,
             "solver": f"{self.solver.name} {self.solver.version}" if self.solver else None,
             "record": str(self.store.folder) if self.store else None,
             **(counts or {}),
