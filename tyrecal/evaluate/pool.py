@@ -21,7 +21,7 @@ from typing import Any
 
 from ..interrupt import exit_code, interrupt_heard, interrupts_put_off, interrupts_remembered
 
-WARM = "tyrecal.evaluate.warm"
+WARM = "tyrecal.batch.warm"
 ANSWERED_S = 0.1  # within which an interruption is
 PATIENCE_S = 5.0  # for processes that were told to end
 PARENTS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGHUP") if hasattr(signal, name))

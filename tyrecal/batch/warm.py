@@ -7,12 +7,12 @@ import gc
 from contextlib import suppress
 from importlib.metadata import entry_points
 
-from .pool import leave_interrupts_to_parent
+from ..evaluate.pool import leave_interrupts_to_parent
 
 leave_interrupts_to_parent()
 
-from ..batch import case  # noqa: E402, F401  takes a second: the studies and all that they need
-from .solver import GROUP  # noqa: E402
+from ..evaluate.solver import GROUP  # noqa: E402
+from . import case  # noqa: E402, F401  takes a second: the studies and all that they need
 
 for entry in entry_points(group=GROUP):
     with suppress(Exception):  # a solver that cannot be imported says so where it is asked for
