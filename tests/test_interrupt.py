@@ -16,14 +16,14 @@ from typing import Any
 import click
 import pytest
 
-from tyrecal.evaluate import folders
-from tyrecal.evaluate.pool import first_done, process_pool
 from tyrecal.interrupt import (
     interrupt_heard,
     interrupts_put_off,
     interrupts_remembered,
     raise_interrupt,
 )
+from tyrecal.simulate.evaluate import folders
+from tyrecal.simulate.evaluate.pool import first_done, process_pool
 
 from .cli.test_conventions import CASE, COARSE, run
 
@@ -120,7 +120,7 @@ def test_where_it_is_ignored_it_stays_so() -> None:
 def test_the_command_ends_as_interrupted(
     met: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    from tyrecal.evaluate.store import Store
+    from tyrecal.simulate.evaluate.store import Store
 
     def read(store: Store, key: str) -> None:
         try:

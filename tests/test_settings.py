@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from tyrecal import settings
 from tyrecal.errors import InputError
-from tyrecal.evaluate.solver import find_solver
-from tyrecal.settings import SettingsError, command_of, place, root
+from tyrecal.simulate import settings
+from tyrecal.simulate.evaluate.solver import find_solver
+from tyrecal.simulate.settings import SettingsError, command_of, place, root
 
 from .cli.test_cli import CASE, run
 from .conftest import CASES

@@ -19,23 +19,23 @@ from math import inf
 from pathlib import Path
 from typing import Any
 
-from .case import CaseError, LoadedCase, start_values, with_level
-from .deck.tyre_design import TyreDesign
-from .design import load_case as _load_case
-from .design import overridden, unusual_value
-from .design import with_values as _with_values
-from .diagnose.diagnosis import Diagnosis
-from .effects import Effect, catalogue
-from .evaluate.evaluator import Evaluator, Question
-from .evaluate.failure import EvaluationFailed
-from .evaluate.pressed import Pressed
-from .evaluate.store import Store
 from .files import read_json
-from .fit.calibrate import METHODS, Fit, calibrate
-from .modes.find import labelled
-from .modes.mode import Mode
-from .provenance import provenance
+from .simulate.deck.tyre_design import TyreDesign
+from .simulate.evaluate.evaluator import Evaluator, Question
+from .simulate.evaluate.failure import EvaluationFailed
+from .simulate.evaluate.pressed import Pressed
+from .simulate.evaluate.store import Store
+from .simulate.modes.find import labelled
+from .simulate.modes.mode import Mode
+from .simulate.provenance import provenance
+from .studies.diagnose.diagnosis import Diagnosis
+from .studies.fit.calibrate import METHODS, Fit, calibrate
 from .studies.pressure import State
+from .tyre.case import CaseError, LoadedCase, start_values, with_level
+from .tyre.effects import Effect, catalogue
+from .tyre.load import load_case as _load_case
+from .tyre.values import overridden, unusual_value
+from .tyre.values import with_values as _with_values
 
 __all__ = [
     "CaseError",
@@ -235,7 +235,7 @@ def diagnose_case(
     >>> found.verdict.kind, found.verdict.key
     ('named', 'rim_width')
     """
-    from .diagnose.study import study
+    from .studies.diagnose.study import study
 
     others = [Path(path) for path in repeats]
     evaluator = _evaluator(case, solver, record)

@@ -9,7 +9,7 @@ from typing import Any
 
 from tyrecal_solvers.bundled.adapter import Bundled
 
-from tyrecal.evaluate.store import key_of
+from tyrecal.simulate.evaluate.store import key_of
 
 DELAY_S = 0.05  # so that a run can be interrupted
 

@@ -16,9 +16,9 @@ from typing import Any
 
 import pytest
 
-from tyrecal.evaluate.cluster import connected
-from tyrecal.evaluate.executor import executor, in_order
-from tyrecal.evaluate.failure import SolverUnavailable, WorkerLost
+from tyrecal.simulate.evaluate.cluster import connected
+from tyrecal.simulate.evaluate.executor import executor, in_order
+from tyrecal.simulate.evaluate.failure import SolverUnavailable, WorkerLost
 
 from ..cli.test_cli import run
 from ..conftest import ROOT
@@ -189,7 +189,7 @@ def test_order_and_exceptions(machines: Machines) -> None:
 def test_another_edition_at_a_worker_is_refused(
     machines: Machines, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from tyrecal.evaluate import cluster
+    from tyrecal.simulate.evaluate import cluster
 
     monkeypatch.setattr(cluster, "sources", lambda: "another")
     with (
@@ -202,7 +202,7 @@ def test_another_edition_at_a_worker_is_refused(
 def test_no_scheduler_there(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    from tyrecal.evaluate import cluster
+    from tyrecal.simulate.evaluate import cluster
 
     monkeypatch.setattr(cluster, "PATIENCE_S", 0.3)
     (case,) = map(str, vary(tmp_path / "cases", 1))

@@ -24,7 +24,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 from tests.batch.support import vary
-from tyrecal.evaluate.executor import executor
+from tyrecal.simulate.evaluate.executor import executor
 
 IDLE_S = 20
 MOVED: Counter[str] = Counter()  # bytes by direction

@@ -19,14 +19,14 @@ from tempfile import TemporaryDirectory
 import click
 import numpy as np
 
-from tyrecal.case import LoadedCase, start_values
-from tyrecal.deck.decks import Design
-from tyrecal.deck.tyre_design import TyreDesign
-from tyrecal.design import load_case
-from tyrecal.diagnose.study import study
-from tyrecal.evaluate.evaluator import Evaluator, Question
-from tyrecal.evaluate.results import Evaluation
-from tyrecal.modes.label import paired_labels
+from tyrecal.simulate.deck.decks import Design
+from tyrecal.simulate.deck.tyre_design import TyreDesign
+from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
+from tyrecal.simulate.evaluate.results import Evaluation
+from tyrecal.simulate.modes.label import paired_labels
+from tyrecal.studies.diagnose.study import study
+from tyrecal.tyre.case import LoadedCase, start_values
+from tyrecal.tyre.load import load_case
 
 CASE = Path(__file__).parents[2] / "cases" / "p235_75r17.yaml"
 PRESSURES_kPa, EFFECT, SIZE, SCATTER = (160.0, 240.0, 320.0), "bead_filler", 0.5, 0.002

@@ -24,10 +24,10 @@ from tyrecal_solvers.bundled import adapter
 from tyrecal_solvers.bundled.modes import lanczos, sensitivity
 from tyrecal_solvers.bundled.section import band, inflation, mechanics
 
-from tyrecal.case import start_values
-from tyrecal.deck.tyre_design import TyreDesign
-from tyrecal.design import load_case
-from tyrecal.evaluate.evaluator import Evaluator, Question
+from tyrecal.simulate.deck.tyre_design import TyreDesign
+from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
+from tyrecal.tyre.case import start_values
+from tyrecal.tyre.load import load_case
 
 CASE = Path(__file__).parents[2] / "cases" / "p235_75r17.yaml"
 

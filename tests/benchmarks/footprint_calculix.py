@@ -33,10 +33,11 @@ from tests.studies.footprint_calculix import (
     inflated_radius,
     meshed,
 )
-from tyrecal.case import LoadedCase
-from tyrecal.deck.tyre_design import TyreDesign
-from tyrecal.design import load_case, with_values
-from tyrecal.evaluate.evaluator import Evaluator
+from tyrecal.simulate.deck.tyre_design import TyreDesign
+from tyrecal.simulate.evaluate.evaluator import Evaluator
+from tyrecal.tyre.case import LoadedCase
+from tyrecal.tyre.load import load_case
+from tyrecal.tyre.values import with_values
 
 LOAD_N = 2000.0
 LIMIT_S = 3000.0

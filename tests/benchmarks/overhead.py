@@ -24,11 +24,11 @@ from tyrecal_solvers.bundled.deck.request import read_request
 from tyrecal_solvers.bundled.deck.steps import Deck
 from tyrecal_solvers.bundled.job import Job
 
-from tyrecal.case import start_values
-from tyrecal.deck.tyre_design import TyreDesign
-from tyrecal.design import load_case
-from tyrecal.evaluate.evaluator import Evaluator, Question
-from tyrecal.evaluate.store import Store
+from tyrecal.simulate.deck.tyre_design import TyreDesign
+from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
+from tyrecal.simulate.evaluate.store import Store
+from tyrecal.tyre.case import start_values
+from tyrecal.tyre.load import load_case
 
 CASE = Path(__file__).parents[2] / "cases" / "p235_75r17.yaml"
 

@@ -18,10 +18,11 @@ import sys
 import time
 from pathlib import Path
 
-from tyrecal.case import start_values
-from tyrecal.deck.tyre_design import TyreDesign
-from tyrecal.design import load_case, with_values
-from tyrecal.evaluate.evaluator import Evaluator, Question
+from tyrecal.simulate.deck.tyre_design import TyreDesign
+from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
+from tyrecal.tyre.case import start_values
+from tyrecal.tyre.load import load_case
+from tyrecal.tyre.values import with_values
 
 CASE = Path(__file__).parents[2] / "cases" / "p235_75r17.yaml"
 MESHES = [  # elements per region of the half section, rows outside the belts

@@ -16,5 +16,5 @@ from .makers import other_maker
 
 if __name__ == "__main__":
     solver, *rest = sys.argv[1:]
-    with patch("tyrecal.blind.maker.bundled_maker", partial(other_maker, solver)):
+    with patch("tyrecal.studies.blind.maker.bundled_maker", partial(other_maker, solver)):
         main(["blind", "make", *rest])

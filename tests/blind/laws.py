@@ -12,13 +12,20 @@ from math import exp, radians, sin, tanh
 
 import numpy as np
 
-from tyrecal.blind.laws import EffectLaw
-from tyrecal.case import LoadedCase
-from tyrecal.case.schema import Cord, RebarLayer, Rubber
-from tyrecal.effects import catalogue
-from tyrecal.effects.edit import changed, unused, with_gauge, with_layers, with_part, with_rubbers
-from tyrecal.effects.edit import with_rubbers_at as rubbers_at
-from tyrecal.effects.parts import (
+from tyrecal.studies.blind.laws import EffectLaw
+from tyrecal.tyre.case import LoadedCase
+from tyrecal.tyre.case.schema import Cord, RebarLayer, Rubber
+from tyrecal.tyre.effects import catalogue
+from tyrecal.tyre.effects.edit import (
+    changed,
+    unused,
+    with_gauge,
+    with_layers,
+    with_part,
+    with_rubbers,
+)
+from tyrecal.tyre.effects.edit import with_rubbers_at as rubbers_at
+from tyrecal.tyre.effects.parts import (
     belt_edge,
     belt_lines,
     belts,

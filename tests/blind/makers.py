@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from tyrecal.blind.maker import Computed, SolverMaker
-from tyrecal.blind.outside import OUTSIDE_FAMILIES
-from tyrecal.case import LoadedCase
-from tyrecal.deck.tyre_design import TyreDesign
-from tyrecal.effects.edit import with_part
-from tyrecal.evaluate.evaluator import Evaluator
-from tyrecal.evaluate.store import Store
-from tyrecal.modes.mode import Label
+from tyrecal.simulate.deck.tyre_design import TyreDesign
+from tyrecal.simulate.evaluate.evaluator import Evaluator
+from tyrecal.simulate.evaluate.store import Store
+from tyrecal.simulate.modes.mode import Label
+from tyrecal.studies.blind.maker import Computed, SolverMaker
+from tyrecal.studies.blind.outside import OUTSIDE_FAMILIES
+from tyrecal.tyre.case import LoadedCase
+from tyrecal.tyre.effects.edit import with_part
 
 from .laws import other_laws
 

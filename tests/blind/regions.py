@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from tyrecal.case import LoadedCase
-from tyrecal.effects.edit import changed, with_part
+from tyrecal.tyre.case import LoadedCase
+from tyrecal.tyre.effects.edit import changed, with_part
 
 Array = np.ndarray
 

@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 from scipy.stats import uniform
 
-from tyrecal.blind.emulated import emulate
-from tyrecal.blind.laws import EffectLaw
-from tyrecal.blind.outside import OUTSIDE_FAMILIES
-from tyrecal.case import LoadedCase
-from tyrecal.deck.tyre_design import TyreDesign
-from tyrecal.design import with_values
-from tyrecal.diagnose.model import Answer, Query
-from tyrecal.effects import catalogue
-from tyrecal.evaluate.evaluator import Evaluator, Question
-from tyrecal.modes.label import paired_labels
-from tyrecal.modes.mode import Label
+from tyrecal.simulate.deck.tyre_design import TyreDesign
+from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
+from tyrecal.simulate.modes.label import paired_labels
+from tyrecal.simulate.modes.mode import Label
+from tyrecal.studies.blind.emulated import emulate
+from tyrecal.studies.blind.laws import EffectLaw
+from tyrecal.studies.blind.outside import OUTSIDE_FAMILIES
+from tyrecal.studies.diagnose.model import Answer, Query
+from tyrecal.tyre.case import LoadedCase
+from tyrecal.tyre.effects import catalogue
+from tyrecal.tyre.values import with_values
 
 from ..chance import Chance, generator
 from .laws import other_laws

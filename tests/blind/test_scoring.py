@@ -9,14 +9,19 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from tyrecal.blind.baselines import guesses
-from tyrecal.blind.protocol import Protocol
-from tyrecal.blind.ruler import EffectShifts, Ruler, difficulty, measure
-from tyrecal.blind.score import Scored
-from tyrecal.blind.statistics import brier, calibration_error, calibration_quantile, clopper_pearson
-from tyrecal.blind.tables import summary
-from tyrecal.diagnose.model import Query
-from tyrecal.modes.mode import Label
+from tyrecal.simulate.modes.mode import Label
+from tyrecal.studies.blind.baselines import guesses
+from tyrecal.studies.blind.protocol import Protocol
+from tyrecal.studies.blind.ruler import EffectShifts, Ruler, difficulty, measure
+from tyrecal.studies.blind.score import Scored
+from tyrecal.studies.blind.statistics import (
+    brier,
+    calibration_error,
+    calibration_quantile,
+    clopper_pearson,
+)
+from tyrecal.studies.blind.tables import summary
+from tyrecal.studies.diagnose.model import Query
 
 from ..chance import Chance
 from .toy import Scale
@@ -28,7 +33,7 @@ RULES = Protocol("by hand", "", {})
 
 @pytest.fixture(autouse=True)
 def no_error_of_form(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("tyrecal.blind.ruler.form_error", lambda label: 0.0)
+    monkeypatch.setattr("tyrecal.studies.blind.ruler.form_error", lambda label: 0.0)
 
 
 @pytest.mark.parametrize("right, count", [(0, 59), (4, 200), (54, 60), (60, 60), (7, 9)])

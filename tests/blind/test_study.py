@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tyrecal.blind.protocol import read_protocol
-from tyrecal.blind.score import Scored, score
-from tyrecal.blind.tables import page, summary
 from tyrecal.errors import InputError
+from tyrecal.studies.blind.protocol import read_protocol
+from tyrecal.studies.blind.score import Scored, score
+from tyrecal.studies.blind.tables import page, summary
 
 from ..studies.blind_least_squares import STUDIES, errors, unpacked
 

@@ -9,19 +9,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tyrecal.blind.answer import answer
-from tyrecal.blind.draw import draw
-from tyrecal.blind.make import make
-from tyrecal.blind.maker import bundled_maker
-from tyrecal.blind.protocol import Protocol, read_json, write_json
-from tyrecal.blind.ruler import RULER_FILE as RULER
-from tyrecal.blind.ruler import measure
-from tyrecal.blind.score import score
-from tyrecal.blind.seal import ANSWERS, SEAL, TRUTH
-from tyrecal.blind.tables import page, summary
-from tyrecal.diagnose.uncertainties import sources
 from tyrecal.errors import InputError
 from tyrecal.measured.tables import read_measurements
+from tyrecal.studies.blind.answer import answer
+from tyrecal.studies.blind.draw import draw
+from tyrecal.studies.blind.make import make
+from tyrecal.studies.blind.maker import bundled_maker
+from tyrecal.studies.blind.protocol import Protocol, read_json, write_json
+from tyrecal.studies.blind.ruler import RULER_FILE as RULER
+from tyrecal.studies.blind.ruler import measure
+from tyrecal.studies.blind.score import score
+from tyrecal.studies.blind.seal import ANSWERS, SEAL, TRUTH
+from tyrecal.studies.blind.tables import page, summary
+from tyrecal.studies.diagnose.uncertainties import sources
 
 from .toy import CASE, Scale, ToyMaker, protocol
 

@@ -7,13 +7,13 @@ from math import log
 
 import numpy as np
 
-from tyrecal.blind.laws import EffectLaw
-from tyrecal.blind.maker import Computed
-from tyrecal.blind.protocol import Protocol
-from tyrecal.case import LoadedCase, number_at, start_values
-from tyrecal.diagnose.model import Answer, Query
-from tyrecal.effects.edit import changed
-from tyrecal.modes.mode import Label
+from tyrecal.simulate.modes.mode import Label
+from tyrecal.studies.blind.laws import EffectLaw
+from tyrecal.studies.blind.maker import Computed
+from tyrecal.studies.blind.protocol import Protocol
+from tyrecal.studies.diagnose.model import Answer, Query
+from tyrecal.tyre.case import LoadedCase, number_at, start_values
+from tyrecal.tyre.effects.edit import changed
 
 from ..diagnose.toy import Toy
 from ..effects.support import coarse

@@ -17,8 +17,8 @@ from tyrecal_solvers.bundled.section.model import Model
 from tyrecal_solvers.bundled.section.parts.pressure import Pressure
 from tyrecal_solvers.bundled.section.parts.spin import spinning
 
-from tyrecal.tyre.mesh import build_mesh
-from tyrecal.tyre.section import read_section
+from tyrecal.tyre.section.mesh import build_mesh
+from tyrecal.tyre.section.section import read_section
 
 Array = np.ndarray
 SECTION = Path(__file__).parents[2] / "cases" / "p235_75r17.csv"

@@ -16,10 +16,10 @@ from tyrecal_solvers.bundled.deck.keywords import DeckError
 from tyrecal_solvers.bundled.road import footprint_job
 from tyrecal_solvers.bundled.road.contact_newton import ContactNewton, NotPressed
 
-from tyrecal.case import LoadedCase
-from tyrecal.deck.decks import Decks
-from tyrecal.deck.tyre_design import TyreDesign
-from tyrecal.design import load_case
+from tyrecal.simulate.deck.decks import Decks
+from tyrecal.simulate.deck.tyre_design import TyreDesign
+from tyrecal.tyre.case import LoadedCase
+from tyrecal.tyre.load import load_case
 
 from ..conftest import CASES
 from . import support

@@ -12,11 +12,11 @@ from tyrecal_solvers.bundled.modes.frequency_dependent import NotSelfConsistent,
 from tyrecal_solvers.bundled.section.materials import ModulusTable, read_materials
 from tyrecal_solvers.bundled.section.parts.rubber import MooneyRivlin
 
-from tyrecal.deck.tyre_design import TyreDesign
-from tyrecal.design import with_values
-from tyrecal.effects import catalogue
-from tyrecal.evaluate.evaluator import Evaluator, Question
-from tyrecal.modes.label import paired_labels
+from tyrecal.simulate.deck.tyre_design import TyreDesign
+from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
+from tyrecal.simulate.modes.label import paired_labels
+from tyrecal.tyre.effects import catalogue
+from tyrecal.tyre.values import with_values
 
 from ..chance import generator
 from ..effects.support import CASE, START, frequencies

@@ -24,8 +24,8 @@ from tyrecal_solvers.bundled.section.mechanics import mass
 from tyrecal_solvers.bundled.solid3d.circumference import Circumference, half_circle
 from tyrecal_solvers.bundled.solid3d.revolved import Revolved
 
-from tyrecal.deck.decks import Decks
-from tyrecal.deck.tyre_design import TyreDesign
+from tyrecal.simulate.deck.decks import Decks
+from tyrecal.simulate.deck.tyre_design import TyreDesign
 
 from ..chance import generator
 from . import support

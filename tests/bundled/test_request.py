@@ -13,10 +13,10 @@ from tyrecal_solvers.bundled.deck.request import BadRequest, Request, read_reque
 from tyrecal_solvers.bundled.job import TimedOut
 from tyrecal_solvers.bundled.modes.harmonics import Unstable
 
-from tyrecal.case import with_level
-from tyrecal.deck.decks import Decks
-from tyrecal.deck.tyre_design import TyreDesign
-from tyrecal.design import load_case
+from tyrecal.simulate.deck.decks import Decks
+from tyrecal.simulate.deck.tyre_design import TyreDesign
+from tyrecal.tyre.case import with_level
+from tyrecal.tyre.load import load_case
 
 from ..conftest import CASES
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tyrecal.design import validate
+from tyrecal.tyre.load import validate
 
 from .bad_cases import BAD, write
 

@@ -7,9 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from tyrecal.case import CaseError, number_at, parse_assignment, start_values
-from tyrecal.case.checks import at, find
-from tyrecal.design import load_case, validate, with_values
+from tyrecal.tyre.case import CaseError, number_at, parse_assignment, start_values
+from tyrecal.tyre.case.checks import at, find
+from tyrecal.tyre.load import load_case, validate
+from tyrecal.tyre.values import with_values
 
 from .bad_cases import CASES, CSV, GOOD, TABLE
 

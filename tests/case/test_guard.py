@@ -7,11 +7,12 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from tyrecal.case.shape import with_defaults
 from tyrecal.cli.main import cli
-from tyrecal.design import load_case, unusual_value, validate
-from tyrecal.design.guard import refusal
-from tyrecal.design.usual import USUAL
+from tyrecal.tyre.case.shape import with_defaults
+from tyrecal.tyre.guard import refusal
+from tyrecal.tyre.load import load_case, validate
+from tyrecal.tyre.usual import USUAL
+from tyrecal.tyre.values import unusual_value
 
 from .wrong import CASES, CSV, GOOD, PRESSURE, TABLE
 
@@ -277,7 +278,7 @@ def test_every_range_is_of_a_number_that_a_case_can_have() -> None:
 
 def test_a_search_may_try_what_it_likes() -> None:
     """A range holds for what is stated; what evaluates designs is not told of it."""
-    from tyrecal.design import with_values
+    from tyrecal.tyre.values import with_values
 
     loaded = load_case(CASES / "p235_75r17.yaml")
     assert unusual_value(loaded, "C10", 5e2)

@@ -9,10 +9,11 @@ from typing import Any
 import pytest
 from ruamel.yaml import YAML
 
-from tyrecal.case import LoadedCase, number_at, with_level
-from tyrecal.case.identity import is_of_tyre, tyre_sha256
-from tyrecal.design import load_case, with_values
-from tyrecal.effects import catalogue
+from tyrecal.tyre.case import LoadedCase, number_at, with_level
+from tyrecal.tyre.case.identity import is_of_tyre, tyre_sha256
+from tyrecal.tyre.effects import catalogue
+from tyrecal.tyre.load import load_case
+from tyrecal.tyre.values import with_values
 
 from ..conftest import CASES
 

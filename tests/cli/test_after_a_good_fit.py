@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from tyrecal.evaluate.evaluator import Evaluator
-from tyrecal.evaluate.failure import EvaluationFailed
 from tyrecal.files import results
+from tyrecal.simulate.evaluate.evaluator import Evaluator
+from tyrecal.simulate.evaluate.failure import EvaluationFailed
 
 from ..conftest import CASES
 from .test_cli import run
@@ -73,7 +73,7 @@ def full_disc(patch: pytest.MonkeyPatch) -> None:
     def fails(*arguments: object) -> None:
         raise OSError(28, "No space left on device", "fit_history.csv")
 
-    patch.setattr("tyrecal.fit.calibrate.history_csv", fails)
+    patch.setattr("tyrecal.studies.fit.calibrate.history_csv", fails)
 
 
 def no_picture(patch: pytest.MonkeyPatch) -> None:
@@ -87,7 +87,7 @@ def no_picture(patch: pytest.MonkeyPatch) -> None:
 
 def unmoved(patch: pytest.MonkeyPatch) -> None:
     """The optimiser gives up where it starts."""
-    from tyrecal.fit import calibrate, slsqp
+    from tyrecal.studies.fit import calibrate, slsqp
 
     def stays(problem: object, start: object, tolerance: float) -> slsqp.Outcome:
         return slsqp.Outcome(problem.evaluate(start), "gave up")  # type: ignore[attr-defined]

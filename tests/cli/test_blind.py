@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from tyrecal.blind.seal import SEAL, TRUTH
-from tyrecal.diagnose.study import spans_of
+from tyrecal.studies.blind.seal import SEAL, TRUTH
+from tyrecal.studies.diagnose.study import spans_of
 
 from .test_cli import run
 from .test_diagnose import coarse  # noqa: F401  the main case with a coarse mesh
@@ -58,9 +58,9 @@ def test_a_study_from_end_to_end(
         "ONE_SIDED": (0.5, 1.0),
     }
     for name, value in few.items():
-        monkeypatch.setattr(f"tyrecal.blind.emulated.{name}", value)
+        monkeypatch.setattr(f"tyrecal.studies.blind.emulated.{name}", value)
     only = lambda case, evaluator, ids=None: spans_of(case, evaluator, ["spindle_lateral"])
-    monkeypatch.setattr("tyrecal.blind.answer.spans_of", only)  # the ruler's, too
+    monkeypatch.setattr("tyrecal.studies.blind.answer.spans_of", only)  # the ruler's, too
     out = tmp_path / "t"
     make = [
         "make",

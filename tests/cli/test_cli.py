@@ -334,10 +334,10 @@ def test_a_gauge_is_a_number_like_any_other(
         axial.append(next(m["frequency_Hz"] for m in result["modes"] if m["kind"] == "axial"))
     assert masses[1] > masses[0] > masses[2]
     assert masses[1] - masses[2] == pytest.approx(0.02 * 4.4, rel=0.2)  # a tread of 4.4 kg
-    from tyrecal.case import start_values
-    from tyrecal.deck.tyre_design import TyreDesign
-    from tyrecal.design import load_case
-    from tyrecal.evaluate.evaluator import Evaluator, Question
+    from tyrecal.simulate.deck.tyre_design import TyreDesign
+    from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
+    from tyrecal.tyre.case import start_values
+    from tyrecal.tyre.load import load_case
 
     case = load_case(path)
     name = "section.gauges.0.factor"

@@ -106,7 +106,7 @@ def test_exit_codes(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     if code == 4:  # the objective is least at the start: nothing moves
-        from tyrecal.fit import calibrate
+        from tyrecal.studies.fit import calibrate
 
         monkeypatch.setattr(calibrate, "UNMOVED", float("inf"))
     assert run(*arguments) == code
@@ -174,7 +174,7 @@ def test_ctrl_c_leaves_what_was_done_and_says_how_to_go_on(jobs: str, tmp_path: 
 def test_ctrl_c_without_a_record_says_so(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    from tyrecal.evaluate.evaluator import Evaluator
+    from tyrecal.simulate.evaluate.evaluator import Evaluator
 
     def stopped(evaluator: Evaluator, question: object) -> None:
         raise KeyboardInterrupt

@@ -7,12 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from tyrecal.case import start_values
-from tyrecal.deck.tyre_design import TyreDesign
-from tyrecal.design import load_case
-from tyrecal.evaluate.evaluator import Evaluator, Question
-from tyrecal.modes.label import paired_labels
-from tyrecal.modes.mode import Label
+from tyrecal.simulate.deck.tyre_design import TyreDesign
+from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
+from tyrecal.simulate.modes.label import paired_labels
+from tyrecal.simulate.modes.mode import Label
+from tyrecal.tyre.case import start_values
+from tyrecal.tyre.load import load_case
 
 from ..solvers.test_abaqus import COARSE
 from .test_cli import run

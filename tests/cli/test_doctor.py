@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tyrecal.doctor import installation, self_check
+from tyrecal.simulate.doctor import installation, self_check
 
 from .test_cli import run
 

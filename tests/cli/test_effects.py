@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tyrecal.deck.tyre_design import TyreDesign
-from tyrecal.effects import IDS, catalogue
-from tyrecal.evaluate.evaluator import Evaluator
+from tyrecal.simulate.deck.tyre_design import TyreDesign
+from tyrecal.simulate.evaluate.evaluator import Evaluator
 from tyrecal.studies.signature import Plain
+from tyrecal.tyre.effects import IDS, catalogue
 
 from ..effects.support import CASE as LOADED
 from ..effects.support import START

@@ -9,9 +9,9 @@ import pytest
 
 from tyrecal.batch.case import CaseTask, run_case
 from tyrecal.batch.studies import Asked
-from tyrecal.evaluate.evaluator import Evaluator
-from tyrecal.evaluate.failure import EvaluationFailed
 from tyrecal.files import PREVIOUS, RESULTS
+from tyrecal.simulate.evaluate.evaluator import Evaluator
+from tyrecal.simulate.evaluate.failure import EvaluationFailed
 
 from ..batch.support import vary
 from ..conftest import CASES

@@ -9,14 +9,14 @@ from typing import Any
 
 import pytest
 
-from tyrecal.deck.tyre_design import TyreDesign
-from tyrecal.design import load_case
-from tyrecal.evaluate import evaluator as door_module
-from tyrecal.evaluate.evaluator import Evaluator
-from tyrecal.fit.problem import Problem
 from tyrecal.report import pictures
 from tyrecal.report.convergence import draw_convergence
 from tyrecal.report.figure import save
+from tyrecal.simulate.deck.tyre_design import TyreDesign
+from tyrecal.simulate.evaluate import evaluator as door_module
+from tyrecal.simulate.evaluate.evaluator import Evaluator
+from tyrecal.studies.fit.problem import Problem
+from tyrecal.tyre.load import load_case
 
 from ..fit.pressed import AREA_0, STIFFNESS_0, Elastic
 from ..studies.hertz import coarse_case

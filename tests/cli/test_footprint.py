@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from tyrecal.evaluate import evaluator as door_module
+from tyrecal.simulate.evaluate import evaluator as door_module
 
 from ..conftest import ROOT
 from ..studies.hertz import Hertz, coarse_case

@@ -11,7 +11,9 @@ import numpy as np
 import pytest
 from ruamel.yaml import YAML
 
-from tyrecal.design import load_case, resolved, with_values
+from tyrecal.tyre.load import load_case
+from tyrecal.tyre.resolve import resolved
+from tyrecal.tyre.values import with_values
 
 from ..conftest import CASES
 from ..tyre.test_outline import curves, write_outline

@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 import pyuff
 
-from tyrecal.diagnose.observations import observe
 from tyrecal.measured.tables import read_measurements
-from tyrecal.modes.mode import Label
+from tyrecal.simulate.modes.mode import Label
+from tyrecal.studies.diagnose.observations import observe
 
 from ..measured.test_universal import ANGLES, function, geometry, shape, units, write
 from ..studies.measured_data import BAND, CASES, TRUTH, evaluated, write_shapes, write_table
@@ -130,8 +130,8 @@ def test_several_kinds_of_files_join_and_the_diagnosis_reads_them(
 def test_fits_take_what_is_at_their_pressure(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    from tyrecal.design import load_case
     from tyrecal.measured.targets import with_measured
+    from tyrecal.tyre.load import load_case
 
     lines = [
         "frequency_Hz,2,1,,1,240,0,66.0,0.3",

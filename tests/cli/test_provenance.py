@@ -9,9 +9,9 @@ from typing import Any
 
 import pytest
 
-from tyrecal.case.identity import tyre_sha256
-from tyrecal.design import load_case
-from tyrecal.provenance import measured_sha256
+from tyrecal.simulate.provenance import measured_sha256
+from tyrecal.tyre.case.identity import tyre_sha256
+from tyrecal.tyre.load import load_case
 
 from ..studies.loaded import coarse_case
 from .test_cli import run

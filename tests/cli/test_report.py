@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tyrecal.evaluate import evaluator as door_module
+from tyrecal.simulate.evaluate import evaluator as door_module
 
 from ..report.html import toy
 from ..studies.hertz import Hertz

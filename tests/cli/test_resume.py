@@ -229,7 +229,7 @@ def test_solvers_lists_what_works_and_what_does_not(
 ) -> None:
     from importlib.metadata import EntryPoint
 
-    from tyrecal.evaluate import solver
+    from tyrecal.simulate.evaluate import solver
 
     entries = [
         EntryPoint("bundled", "tyrecal_solvers.bundled.adapter:Bundled", solver.GROUP),

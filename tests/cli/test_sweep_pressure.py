@@ -10,11 +10,11 @@ from typing import Any
 
 import pytest
 
-from tyrecal.case.identity import tyre_sha256
-from tyrecal.design import load_case
-from tyrecal.evaluate.evaluator import Evaluator, Question
-from tyrecal.evaluate.failure import EvaluationFailed
-from tyrecal.evaluate.results import Evaluation
+from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
+from tyrecal.simulate.evaluate.failure import EvaluationFailed
+from tyrecal.simulate.evaluate.results import Evaluation
+from tyrecal.tyre.case.identity import tyre_sha256
+from tyrecal.tyre.load import load_case
 
 from ..conftest import CASES, ROOT
 from ..solvers import test_abaqus

@@ -11,9 +11,10 @@ import pytest
 from tyrecal_solvers.bundled.deck.keywords import DeckError, Keyword, read_keywords
 from tyrecal_solvers.bundled.job import run
 
-from tyrecal.deck.decks import Decks
-from tyrecal.deck.tyre_design import TyreDesign
-from tyrecal.design import load_case, with_values
+from tyrecal.simulate.deck.decks import Decks
+from tyrecal.simulate.deck.tyre_design import TyreDesign
+from tyrecal.tyre.load import load_case
+from tyrecal.tyre.values import with_values
 
 from ..conftest import CASES
 from ..effects.support import CASE as COARSE

@@ -11,13 +11,15 @@ import pytest
 from tyrecal_solvers.bundled.deck.keywords import DeckError
 from tyrecal_solvers.bundled.job import run
 
-from tyrecal.case import CaseError, LoadedCase
-from tyrecal.deck.decks import Decks
-from tyrecal.deck.tyre_design import TyreDesign
-from tyrecal.design import load_case, resolved, with_values
-from tyrecal.evaluate.evaluator import Evaluator, Question
-from tyrecal.evaluate.failure import DeckRefused
-from tyrecal.evaluate.solver import find_solver
+from tyrecal.simulate.deck.decks import Decks
+from tyrecal.simulate.deck.tyre_design import TyreDesign
+from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
+from tyrecal.simulate.evaluate.failure import DeckRefused
+from tyrecal.simulate.evaluate.solver import find_solver
+from tyrecal.tyre.case import CaseError, LoadedCase
+from tyrecal.tyre.load import load_case
+from tyrecal.tyre.resolve import resolved
+from tyrecal.tyre.values import with_values
 
 from ..effects.support import CASE, START, decks, frequencies
 

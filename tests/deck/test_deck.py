@@ -9,13 +9,14 @@ from pathlib import Path
 
 import pytest
 
-from tyrecal.case import start_values
-from tyrecal.deck.decks import Decks
-from tyrecal.deck.tyre_design import TyreDesign
-from tyrecal.design import load_case, with_values
-from tyrecal.evaluate.evaluator import Evaluator, Question
-from tyrecal.evaluate.failure import DeckRefused
-from tyrecal.templates import TemplateFailed, number
+from tyrecal.simulate.deck.decks import Decks
+from tyrecal.simulate.deck.tyre_design import TyreDesign
+from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
+from tyrecal.simulate.evaluate.failure import DeckRefused
+from tyrecal.tyre.case import start_values
+from tyrecal.tyre.load import load_case
+from tyrecal.tyre.templates import TemplateFailed, number
+from tyrecal.tyre.values import with_values
 
 from ..conftest import CASES
 

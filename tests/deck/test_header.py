@@ -8,12 +8,13 @@ from pathlib import Path
 
 import pytest
 
-from tyrecal.case import start_values, with_level
-from tyrecal.case.identity import tyre_sha256
-from tyrecal.deck.decks import Decks
-from tyrecal.deck.header import LONGEST_NAME, header, without_header
-from tyrecal.deck.tyre_design import TyreDesign
-from tyrecal.design import load_case, overridden, with_values
+from tyrecal.simulate.deck.decks import Decks
+from tyrecal.simulate.deck.header import LONGEST_NAME, header, without_header
+from tyrecal.simulate.deck.tyre_design import TyreDesign
+from tyrecal.tyre.case import start_values, with_level
+from tyrecal.tyre.case.identity import tyre_sha256
+from tyrecal.tyre.load import load_case
+from tyrecal.tyre.values import overridden, with_values
 
 from ..cli.test_cli import run
 from ..conftest import CASES

@@ -7,12 +7,12 @@ import re
 import numpy as np
 import pytest
 
-from tyrecal.diagnose.calibrated import calibrated_variables
-from tyrecal.diagnose.diagnosis import Diagnosis, diagnose
-from tyrecal.diagnose.model import Answer, Query
-from tyrecal.diagnose.result import result
-from tyrecal.diagnose.study import DiagnosedCase
 from tyrecal.report.diagnosis import page
+from tyrecal.studies.diagnose.calibrated import calibrated_variables
+from tyrecal.studies.diagnose.diagnosis import Diagnosis, diagnose
+from tyrecal.studies.diagnose.model import Answer, Query
+from tyrecal.studies.diagnose.result import result
+from tyrecal.studies.diagnose.study import DiagnosedCase
 from tyrecal.units import in_engineers_units
 
 from .toy import Toy, problem

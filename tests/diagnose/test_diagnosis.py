@@ -6,19 +6,19 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from tyrecal.diagnose.diagnosis import Diagnosis, diagnose
-from tyrecal.diagnose.evidence import explain, weigh
-from tyrecal.diagnose.expansion import anchored, expand
-from tyrecal.diagnose.inverse_problem import Toggle
-from tyrecal.diagnose.model import Answer, Query
-from tyrecal.diagnose.next_measurement import rank
-from tyrecal.diagnose.observations import Observable
-from tyrecal.diagnose.regions import SectionPart
-from tyrecal.diagnose.result import result
-from tyrecal.diagnose.shrinkage import held_out, shrink
-from tyrecal.diagnose.study import DiagnosedCase
-from tyrecal.modes.mode import Label
 from tyrecal.report.diagnosis import page
+from tyrecal.simulate.modes.mode import Label
+from tyrecal.studies.diagnose.diagnosis import Diagnosis, diagnose
+from tyrecal.studies.diagnose.evidence import explain, weigh
+from tyrecal.studies.diagnose.expansion import anchored, expand
+from tyrecal.studies.diagnose.inverse_problem import Toggle
+from tyrecal.studies.diagnose.model import Answer, Query
+from tyrecal.studies.diagnose.next_measurement import rank
+from tyrecal.studies.diagnose.observations import Observable
+from tyrecal.studies.diagnose.regions import SectionPart
+from tyrecal.studies.diagnose.result import result
+from tyrecal.studies.diagnose.shrinkage import held_out, shrink
+from tyrecal.studies.diagnose.study import DiagnosedCase
 
 from ..chance import Chance, generator
 from .toy import LABELS, Toy, drawn, problem

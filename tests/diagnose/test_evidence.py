@@ -10,8 +10,8 @@ import pytest
 from numpy.polynomial.hermite import hermgauss
 from scipy.stats import chi2, multivariate_normal, ncx2
 
-from tyrecal.diagnose.covariance import covariance
-from tyrecal.diagnose.evidence import (
+from tyrecal.studies.diagnose.covariance import covariance
+from tyrecal.studies.diagnose.evidence import (
     NONE,
     PRIOR_NONE,
     Hypothesis,
@@ -20,12 +20,12 @@ from tyrecal.diagnose.evidence import (
     refit,
     weigh,
 )
-from tyrecal.diagnose.gap import find_gap, projection
-from tyrecal.diagnose.inverse_problem import Assumed, Toggle
-from tyrecal.diagnose.label_swap import exchanged, with_exchanged
-from tyrecal.diagnose.model import Answer, Query, Span
-from tyrecal.diagnose.separability import separate
-from tyrecal.diagnose.verdict import decide
+from tyrecal.studies.diagnose.gap import find_gap, projection
+from tyrecal.studies.diagnose.inverse_problem import Assumed, Toggle
+from tyrecal.studies.diagnose.label_swap import exchanged, with_exchanged
+from tyrecal.studies.diagnose.model import Answer, Query, Span
+from tyrecal.studies.diagnose.separability import separate
+from tyrecal.studies.diagnose.verdict import decide
 
 from ..chance import Chance, generator
 from .toy import LABELS, Toy, drawn, problem

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tyrecal.diagnose.gap import _contrasts, family
-from tyrecal.diagnose.observations import Observable
+from tyrecal.studies.diagnose.gap import _contrasts, family
+from tyrecal.studies.diagnose.observations import Observable
 
 from ..chance import generator
 from .toy import LABELS

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tyrecal.diagnose.observations import observe
 from tyrecal.measured.measurement import Measurement
-from tyrecal.modes.mode import Label
+from tyrecal.simulate.modes.mode import Label
+from tyrecal.studies.diagnose.observations import observe
 
 from ..chance import Chance
 from ..measured.test_measurements import GOOD, read

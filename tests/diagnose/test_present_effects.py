@@ -9,20 +9,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tyrecal.deck.tyre_design import TyreDesign
-from tyrecal.design import with_values
-from tyrecal.diagnose.expansion import expand
-from tyrecal.diagnose.inverse_problem import InverseProblem, Toggle
-from tyrecal.diagnose.model import Answer, Query
-from tyrecal.diagnose.observations import Observable, Observations
-from tyrecal.diagnose.result import result
-from tyrecal.diagnose.study import spans_of, study
-from tyrecal.diagnose.tyre_model import TyreModel
-from tyrecal.diagnose.uncertainties import sources
 from tyrecal.errors import InputError
-from tyrecal.evaluate.evaluator import Evaluator
-from tyrecal.evaluate.failure import DeckRefused
 from tyrecal.report.diagnosis import page
+from tyrecal.simulate.deck.tyre_design import TyreDesign
+from tyrecal.simulate.evaluate.evaluator import Evaluator
+from tyrecal.simulate.evaluate.failure import DeckRefused
+from tyrecal.studies.diagnose.expansion import expand
+from tyrecal.studies.diagnose.inverse_problem import InverseProblem, Toggle
+from tyrecal.studies.diagnose.model import Answer, Query
+from tyrecal.studies.diagnose.observations import Observable, Observations
+from tyrecal.studies.diagnose.result import result
+from tyrecal.studies.diagnose.study import spans_of, study
+from tyrecal.studies.diagnose.tyre_model import TyreModel
+from tyrecal.studies.diagnose.uncertainties import sources
+from tyrecal.tyre.values import with_values
 
 from .test_tyre_model import CASE, EFFECTS, MODEL, ROWS, X, asked, written
 

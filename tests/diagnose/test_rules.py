@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from tyrecal.diagnose.evidence import (
+from tyrecal.studies.diagnose.evidence import (
     INFLATION,
     UNKNOWN,
     Fitted,
@@ -21,18 +21,18 @@ from tyrecal.diagnose.evidence import (
     refit,
     weigh,
 )
-from tyrecal.diagnose.expansion import Expansion, Nodes, _nodes, expand, node_values
-from tyrecal.diagnose.gap import ResidualGroup, _chi2, _corrected, find_gap
-from tyrecal.diagnose.inverse_problem import Assumed, Toggle
-from tyrecal.diagnose.label_swap import _near
-from tyrecal.diagnose.model import Answer, Query, Span
-from tyrecal.diagnose.next_measurement import rank
-from tyrecal.diagnose.observations import Observable, Observations
-from tyrecal.diagnose.plain_fit import plain_fit
-from tyrecal.diagnose.regions import SectionPart
-from tyrecal.diagnose.separability import separate
-from tyrecal.diagnose.verdict import decide
-from tyrecal.diagnose.where import section_map
+from tyrecal.studies.diagnose.expansion import Expansion, Nodes, _nodes, expand, node_values
+from tyrecal.studies.diagnose.gap import ResidualGroup, _chi2, _corrected, find_gap
+from tyrecal.studies.diagnose.inverse_problem import Assumed, Toggle
+from tyrecal.studies.diagnose.label_swap import _near
+from tyrecal.studies.diagnose.model import Answer, Query, Span
+from tyrecal.studies.diagnose.next_measurement import rank
+from tyrecal.studies.diagnose.observations import Observable, Observations
+from tyrecal.studies.diagnose.plain_fit import plain_fit
+from tyrecal.studies.diagnose.regions import SectionPart
+from tyrecal.studies.diagnose.separability import separate
+from tyrecal.studies.diagnose.verdict import decide
+from tyrecal.studies.diagnose.where import section_map
 
 from ..chance import generator
 from ..conftest import CASES

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tyrecal.diagnose.separability import APART, Separability, _smallest
+from tyrecal.studies.diagnose.separability import APART, Separability, _smallest
 
 
 def judged(distances: np.ndarray, **lambdas: float) -> Separability:

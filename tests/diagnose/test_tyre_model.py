@@ -9,28 +9,28 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tyrecal.deck.tyre_design import TyreDesign
-from tyrecal.design import with_values
-from tyrecal.diagnose.add import NotAdded, add
-from tyrecal.diagnose.diagnosis import diagnose
-from tyrecal.diagnose.evidence import probabilities, weigh
-from tyrecal.diagnose.expansion import expand
-from tyrecal.diagnose.gap import find_gap, projection
-from tyrecal.diagnose.inverse_problem import Assumed, InverseProblem, Toggle, places
-from tyrecal.diagnose.model import Answer, Query
-from tyrecal.diagnose.observations import observe
-from tyrecal.diagnose.regions import regions
-from tyrecal.diagnose.result import result
-from tyrecal.diagnose.separability import separate
-from tyrecal.diagnose.study import parse_change, spans_of, study
-from tyrecal.diagnose.tyre_model import TyreModel
-from tyrecal.diagnose.uncertainties import DENSITY_PERCENT, PRESSURE_kPa, sources
-from tyrecal.diagnose.verdict import decide
 from tyrecal.errors import InputError
-from tyrecal.evaluate.evaluator import Evaluator
-from tyrecal.evaluate.failure import DeckRefused
 from tyrecal.measured.tables import read_measurements
-from tyrecal.modes.mode import Label
+from tyrecal.simulate.deck.tyre_design import TyreDesign
+from tyrecal.simulate.evaluate.evaluator import Evaluator
+from tyrecal.simulate.evaluate.failure import DeckRefused
+from tyrecal.simulate.modes.mode import Label
+from tyrecal.studies.diagnose.add import NotAdded, add
+from tyrecal.studies.diagnose.diagnosis import diagnose
+from tyrecal.studies.diagnose.evidence import probabilities, weigh
+from tyrecal.studies.diagnose.expansion import expand
+from tyrecal.studies.diagnose.gap import find_gap, projection
+from tyrecal.studies.diagnose.inverse_problem import Assumed, InverseProblem, Toggle, places
+from tyrecal.studies.diagnose.model import Answer, Query
+from tyrecal.studies.diagnose.observations import observe
+from tyrecal.studies.diagnose.regions import regions
+from tyrecal.studies.diagnose.result import result
+from tyrecal.studies.diagnose.separability import separate
+from tyrecal.studies.diagnose.study import parse_change, spans_of, study
+from tyrecal.studies.diagnose.tyre_model import TyreModel
+from tyrecal.studies.diagnose.uncertainties import DENSITY_PERCENT, PRESSURE_kPa, sources
+from tyrecal.studies.diagnose.verdict import decide
+from tyrecal.tyre.values import with_values
 
 from ..chance import Chance, generator
 from ..effects.support import coarse

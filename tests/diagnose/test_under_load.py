@@ -7,16 +7,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tyrecal.case import LoadedCase, start_values
-from tyrecal.deck.tyre_design import TyreDesign
-from tyrecal.design import load_case, resolved
-from tyrecal.diagnose.under_load import LoadedRow, UnderLoad, compare
-from tyrecal.evaluate.evaluator import Evaluator
 from tyrecal.measured.measurement import Measurement
-from tyrecal.modes.loaded import Member
-from tyrecal.modes.mode import Label
+from tyrecal.simulate.deck.tyre_design import TyreDesign
+from tyrecal.simulate.evaluate.evaluator import Evaluator
+from tyrecal.simulate.modes.loaded import Member
+from tyrecal.simulate.modes.mode import Label
+from tyrecal.studies.diagnose.under_load import LoadedRow, UnderLoad, compare
 from tyrecal.studies.footprint import footprint_row
 from tyrecal.studies.loaded import LoadedTyre, load_tyres
+from tyrecal.tyre.case import LoadedCase, start_values
+from tyrecal.tyre.load import load_case
+from tyrecal.tyre.resolve import resolved
 
 from ..studies.loaded import coarse_case
 

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tyrecal.diagnose.expansion import Expansion, expand
-from tyrecal.diagnose.inverse_problem import Assumed, InverseProblem, Toggle, places
-from tyrecal.diagnose.model import Answer, Query, Span
-from tyrecal.diagnose.observations import Observable, Observations
-from tyrecal.modes.mode import Label
+from tyrecal.simulate.modes.mode import Label
+from tyrecal.studies.diagnose.expansion import Expansion, expand
+from tyrecal.studies.diagnose.inverse_problem import Assumed, InverseProblem, Toggle, places
+from tyrecal.studies.diagnose.model import Answer, Query, Span
+from tyrecal.studies.diagnose.observations import Observable, Observations
 
 Array = np.ndarray
 LABELS = [

@@ -8,13 +8,14 @@ from pathlib import Path
 
 import numpy as np
 
-from tyrecal.case import LoadedCase, start_values
-from tyrecal.deck.decks import Decks
-from tyrecal.deck.tyre_design import TyreDesign
-from tyrecal.design import load_case, with_values
-from tyrecal.evaluate.evaluator import Evaluator, Question
-from tyrecal.modes.label import paired_labels
-from tyrecal.modes.mode import Label
+from tyrecal.simulate.deck.decks import Decks
+from tyrecal.simulate.deck.tyre_design import TyreDesign
+from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
+from tyrecal.simulate.modes.label import paired_labels
+from tyrecal.simulate.modes.mode import Label
+from tyrecal.tyre.case import LoadedCase, start_values
+from tyrecal.tyre.load import load_case
+from tyrecal.tyre.values import with_values
 
 CASES = Path(__file__).parents[2] / "cases"
 COARSE = {"crown": 3, "upper_sidewall": 3, "lower_sidewall": 3, "bead": 1}

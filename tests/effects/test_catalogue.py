@@ -7,15 +7,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tyrecal.case import CaseError
-from tyrecal.deck.decks import Decks
-from tyrecal.deck.tyre_design import TyreDesign
-from tyrecal.design import load_case, resolved, with_values
-from tyrecal.effects import IDS, Effect, catalogue
-from tyrecal.evaluate.evaluator import Evaluator, Question
-from tyrecal.evaluate.failure import DeckRefused, EvaluationFailed
-from tyrecal.fit.calibrate import calibrate
-from tyrecal.templates import TemplateFailed
+from tyrecal.simulate.deck.decks import Decks
+from tyrecal.simulate.deck.tyre_design import TyreDesign
+from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
+from tyrecal.simulate.evaluate.failure import DeckRefused, EvaluationFailed
+from tyrecal.studies.fit.calibrate import calibrate
+from tyrecal.tyre.case import CaseError
+from tyrecal.tyre.effects import IDS, Effect, catalogue
+from tyrecal.tyre.load import load_case
+from tyrecal.tyre.resolve import resolved
+from tyrecal.tyre.templates import TemplateFailed
+from tyrecal.tyre.values import with_values
 
 from .support import CASE, CASES, START, coarse, data, decks, frequencies, slopes
 

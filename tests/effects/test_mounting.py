@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from tyrecal_solvers.bundled.section import inflation
 
-from tyrecal.case import LoadedCase
-from tyrecal.deck.decks import Decks
-from tyrecal.deck.tyre_design import TyreDesign
-from tyrecal.design import resolved, with_values
+from tyrecal.simulate.deck.decks import Decks
+from tyrecal.simulate.deck.tyre_design import TyreDesign
+from tyrecal.tyre.case import LoadedCase
+from tyrecal.tyre.resolve import resolved
+from tyrecal.tyre.values import with_values
 
 from ..bundled import support
 from .support import CASE

@@ -9,16 +9,18 @@ import pytest
 from scipy.interpolate import CubicSpline
 from scipy.spatial import cKDTree
 
-from tyrecal.case import LoadedCase
-from tyrecal.case.materials import Cord
-from tyrecal.case.section import Gauge, RebarLayer
-from tyrecal.deck.decks import Decks
-from tyrecal.deck.tyre_design import TyreDesign
-from tyrecal.design import load_case, resolved, with_values
-from tyrecal.effects import catalogue
-from tyrecal.evaluate.evaluator import Evaluator, Question
-from tyrecal.modes.mode import Label
-from tyrecal.tyre.section import fill_lines
+from tyrecal.simulate.deck.decks import Decks
+from tyrecal.simulate.deck.tyre_design import TyreDesign
+from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
+from tyrecal.simulate.modes.mode import Label
+from tyrecal.tyre.case import LoadedCase
+from tyrecal.tyre.case.materials import Cord
+from tyrecal.tyre.case.section import Gauge, RebarLayer
+from tyrecal.tyre.effects import catalogue
+from tyrecal.tyre.load import load_case
+from tyrecal.tyre.resolve import resolved
+from tyrecal.tyre.section.section import fill_lines
+from tyrecal.tyre.values import with_values
 
 from .support import CASE, CASES, START, data, decks, frequencies
 

@@ -10,17 +10,18 @@ import pytest
 from tyrecal_solvers.bundled.deck.keywords import DeckError
 from tyrecal_solvers.bundled.job import run
 
-from tyrecal.case import LoadedCase
-from tyrecal.deck.decks import Decks
-from tyrecal.deck.tyre_design import TyreDesign
-from tyrecal.design import load_case, with_values
-from tyrecal.evaluate.evaluator import Evaluator, Question
-from tyrecal.evaluate.failure import DeckRefused
-from tyrecal.evaluate.results import Evaluation
-from tyrecal.evaluate.store import Store
-from tyrecal.modes.mode import Label
+from tyrecal.simulate.deck.decks import Decks
+from tyrecal.simulate.deck.tyre_design import TyreDesign
+from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
+from tyrecal.simulate.evaluate.failure import DeckRefused
+from tyrecal.simulate.evaluate.results import Evaluation
+from tyrecal.simulate.evaluate.store import Store
+from tyrecal.simulate.modes.mode import Label
 from tyrecal.studies.modes import modes_result
-from tyrecal.templates import TemplateFailed
+from tyrecal.tyre.case import LoadedCase
+from tyrecal.tyre.load import load_case
+from tyrecal.tyre.templates import TemplateFailed
+from tyrecal.tyre.values import with_values
 
 from .support import CASE, CASES, START, data, decks
 

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from tyrecal.deck.tyre_design import TyreDesign
-from tyrecal.design import load_case
-from tyrecal.evaluate.evaluator import Evaluator, Question
-from tyrecal.evaluate.results import Evaluation
-from tyrecal.evaluate.store import Store
+from tyrecal.simulate.deck.tyre_design import TyreDesign
+from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
+from tyrecal.simulate.evaluate.results import Evaluation
+from tyrecal.simulate.evaluate.store import Store
+from tyrecal.tyre.load import load_case
 
 from ..conftest import CASES
 

@@ -9,13 +9,14 @@ from typing import Any
 
 import pytest
 
-from tyrecal.case import start_values, with_level
-from tyrecal.case.analysis import Solver
-from tyrecal.deck.decks import Decks
-from tyrecal.deck.tyre_design import TyreDesign
-from tyrecal.design import load_case, with_values
-from tyrecal.effects import catalogue
-from tyrecal.evaluate.evaluator import Evaluator, Question
+from tyrecal.simulate.deck.decks import Decks
+from tyrecal.simulate.deck.tyre_design import TyreDesign
+from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
+from tyrecal.tyre.case import start_values, with_level
+from tyrecal.tyre.case.analysis import Solver
+from tyrecal.tyre.effects import catalogue
+from tyrecal.tyre.load import load_case
+from tyrecal.tyre.values import with_values
 
 from ..conftest import CASES
 

@@ -14,19 +14,19 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tyrecal.deck.tyre_design import TyreDesign
-from tyrecal.evaluate import evaluator as door_module
-from tyrecal.evaluate import queue
-from tyrecal.evaluate.cluster import _at_worker
-from tyrecal.evaluate.evaluator import Counts, Evaluator, Question
-from tyrecal.evaluate.executor import Here, WorkerLost
-from tyrecal.evaluate.failure import EvaluationFailed, SolverUnavailable
-from tyrecal.evaluate.folders import drop_unfinished
-from tyrecal.evaluate.pressed import pressed
-from tyrecal.evaluate.record import Damaged
-from tyrecal.evaluate.recorded import check
-from tyrecal.evaluate.sources import sources
-from tyrecal.evaluate.store import Store
+from tyrecal.simulate.deck.tyre_design import TyreDesign
+from tyrecal.simulate.evaluate import evaluator as door_module
+from tyrecal.simulate.evaluate import queue
+from tyrecal.simulate.evaluate.cluster import _at_worker
+from tyrecal.simulate.evaluate.evaluator import Counts, Evaluator, Question
+from tyrecal.simulate.evaluate.executor import Here, WorkerLost
+from tyrecal.simulate.evaluate.failure import EvaluationFailed, SolverUnavailable
+from tyrecal.simulate.evaluate.folders import drop_unfinished
+from tyrecal.simulate.evaluate.pressed import pressed
+from tyrecal.simulate.evaluate.record import Damaged
+from tyrecal.simulate.evaluate.recorded import check
+from tyrecal.simulate.evaluate.sources import sources
+from tyrecal.simulate.evaluate.store import Store
 
 from ..studies.hertz import Hertz
 from .stand_in import CASE, StandIn, ask, evaluator

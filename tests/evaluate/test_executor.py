@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from tyrecal.evaluate.executor import Here, Processes, end_workers, executor, in_order
-from tyrecal.evaluate.failure import WorkerLost
+from tyrecal.simulate.evaluate.executor import Here, Processes, end_workers, executor, in_order
+from tyrecal.simulate.evaluate.failure import WorkerLost
 
 
 def square(task: float) -> float:

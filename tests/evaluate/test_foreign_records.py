@@ -15,9 +15,9 @@ import numpy as np
 import pytest
 
 from tyrecal.cli.main import main
-from tyrecal.evaluate.evaluator import Counts
-from tyrecal.evaluate.failure import EvaluationFailed
-from tyrecal.evaluate.store import Store
+from tyrecal.simulate.evaluate.evaluator import Counts
+from tyrecal.simulate.evaluate.failure import EvaluationFailed
+from tyrecal.simulate.evaluate.store import Store
 
 from .stand_in import StandIn, ask, evaluator
 from .test_store import records, same

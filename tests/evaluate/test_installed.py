@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from tyrecal.evaluate import solver
+from tyrecal.simulate.evaluate import solver
 
 
 @pytest.mark.parametrize(

@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tyrecal.case import LoadedCase
-from tyrecal.deck.tyre_design import TyreDesign
-from tyrecal.design import load_case
-from tyrecal.evaluate.evaluator import Evaluator, Question
-from tyrecal.evaluate.failure import EvaluationFailed
-from tyrecal.modes.label import label_modes
+from tyrecal.simulate.deck.tyre_design import TyreDesign
+from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
+from tyrecal.simulate.evaluate.failure import EvaluationFailed
+from tyrecal.simulate.modes.label import label_modes
+from tyrecal.tyre.case import LoadedCase
+from tyrecal.tyre.load import load_case
 
 from ..conftest import CASES
 

@@ -13,14 +13,14 @@ from typing import Any
 
 import pytest
 
-from tyrecal.evaluate.pool import PATIENCE_S, Pool, process_pool
+from tyrecal.simulate.evaluate.pool import PATIENCE_S, Pool, process_pool
 
 ROOT = Path(__file__).parents[2]
 PARENT = """
 import os, sys, time
 from pathlib import Path
 from tests.evaluate.test_pool import work
-from tyrecal.evaluate.pool import process_pool
+from tyrecal.simulate.evaluate.pool import process_pool
 
 if __name__ == "__main__":
     with process_pool(1) as pool:
@@ -29,8 +29,8 @@ if __name__ == "__main__":
 STOPPED = """
 import os, random, signal, sys, threading
 from tests.evaluate.test_pool import large
-from tyrecal.evaluate.executor import Processes
-from tyrecal.evaluate.pool import process_pool
+from tyrecal.simulate.evaluate.executor import Processes
+from tyrecal.simulate.evaluate.pool import process_pool
 
 if __name__ == "__main__":
     moment = random.Random(1)
@@ -53,7 +53,7 @@ if __name__ == "__main__":
 SCRIPT = """
 import tyrecal.__main__  # as the command does, which every worker imports anew
 from tests.evaluate.test_pool import answers_term
-from tyrecal.evaluate.pool import process_pool
+from tyrecal.simulate.evaluate.pool import process_pool
 
 if __name__ == "__main__":
     with process_pool(1) as pool:

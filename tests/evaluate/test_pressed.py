@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tyrecal.deck.tyre_design import TyreDesign
-from tyrecal.evaluate.evaluator import Evaluator
-from tyrecal.evaluate.failure import DeckRefused, EvaluationFailed
-from tyrecal.evaluate.store import Store
+from tyrecal.simulate.deck.tyre_design import TyreDesign
+from tyrecal.simulate.evaluate.evaluator import Evaluator
+from tyrecal.simulate.evaluate.failure import DeckRefused, EvaluationFailed
+from tyrecal.simulate.evaluate.store import Store
 
 from ..studies.hertz import Hertz
 from .stand_in import CASE

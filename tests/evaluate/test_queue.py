@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from tyrecal.evaluate.executor import executor
-from tyrecal.evaluate.queue import jobs_of, reached, read_settings
-from tyrecal.settings import SettingsError
+from tyrecal.simulate.evaluate.executor import executor
+from tyrecal.simulate.evaluate.queue import jobs_of, reached, read_settings
+from tyrecal.simulate.settings import SettingsError
 
 SETTINGS = """
 queueing_system: {system}

@@ -7,13 +7,14 @@ import json
 import numpy as np
 import pytest
 
-from tyrecal.case import start_values, with_level
-from tyrecal.deck.tyre_design import TyreDesign
-from tyrecal.design import load_case, with_values
-from tyrecal.evaluate.evaluator import Evaluator, Question
-from tyrecal.modes.label import label_modes
-from tyrecal.modes.match import match
-from tyrecal.modes.mode import Label
+from tyrecal.simulate.deck.tyre_design import TyreDesign
+from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
+from tyrecal.simulate.modes.label import label_modes
+from tyrecal.simulate.modes.match import match
+from tyrecal.simulate.modes.mode import Label
+from tyrecal.tyre.case import start_values, with_level
+from tyrecal.tyre.load import load_case
+from tyrecal.tyre.values import with_values
 
 from ..conftest import CASES, ROOT
 

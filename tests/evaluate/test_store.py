@@ -12,13 +12,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tyrecal.deck.tyre_design import TyreDesign
-from tyrecal.evaluate import store as store_module
-from tyrecal.evaluate.evaluator import Counts, Evaluator, Question
-from tyrecal.evaluate.failure import EvaluationFailed
-from tyrecal.evaluate.record import Damaged, pack, unpack
-from tyrecal.evaluate.results import Evaluation, HarmonicShape
-from tyrecal.evaluate.store import Store
+from tyrecal.simulate.deck.tyre_design import TyreDesign
+from tyrecal.simulate.evaluate import store as store_module
+from tyrecal.simulate.evaluate.evaluator import Counts, Evaluator, Question
+from tyrecal.simulate.evaluate.failure import EvaluationFailed
+from tyrecal.simulate.evaluate.record import Damaged, pack, unpack
+from tyrecal.simulate.evaluate.results import Evaluation, HarmonicShape
+from tyrecal.simulate.evaluate.store import Store
 
 from .stand_in import CASE, StandIn, ask, evaluator
 

@@ -6,10 +6,10 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 
 import numpy as np
 
-from tyrecal.evaluate.evaluator import Question
-from tyrecal.evaluate.failure import DeckRefused, EvaluationFailed
-from tyrecal.evaluate.results import Evaluation, HarmonicShape, RawMode
-from tyrecal.modes.mode import Label
+from tyrecal.simulate.evaluate.evaluator import Question
+from tyrecal.simulate.evaluate.failure import DeckRefused, EvaluationFailed
+from tyrecal.simulate.evaluate.results import Evaluation, HarmonicShape, RawMode
+from tyrecal.simulate.modes.mode import Label
 
 WIDTH = np.linspace(-0.08, 0.08, 9)
 POINTS = np.stack([np.full(9, 0.39), WIDTH], 1)

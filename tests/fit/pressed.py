@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 from tyrecal_solvers.bundled.adapter import Bundled
 
-from tyrecal.case import LoadedCase, start_values, with_level
-from tyrecal.case.calibration import TargetFootprint, TargetMode
-from tyrecal.deck.tyre_design import TyreDesign
-from tyrecal.design import load_case
-from tyrecal.evaluate.evaluator import Evaluator
-from tyrecal.evaluate.store import Store
+from tyrecal.simulate.deck.tyre_design import TyreDesign
+from tyrecal.simulate.evaluate.evaluator import Evaluator
+from tyrecal.simulate.evaluate.store import Store
+from tyrecal.tyre.case import LoadedCase, start_values, with_level
+from tyrecal.tyre.case.calibration import TargetFootprint, TargetMode
+from tyrecal.tyre.load import load_case
 
 from ..conftest import CASES
 from ..studies.hertz import Hertz

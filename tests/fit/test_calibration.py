@@ -11,19 +11,19 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tyrecal.case import LoadedCase, start_values
-from tyrecal.deck.tyre_design import TyreDesign
-from tyrecal.design import load_case
 from tyrecal.errors import InputError
-from tyrecal.evaluate.evaluator import Counts, Evaluator, Question
-from tyrecal.evaluate.executor import Here, WorkerLost
-from tyrecal.evaluate.failure import DeckRefused, EvaluationFailed
-from tyrecal.evaluate.results import Evaluation
-from tyrecal.fit import calibrate as calibrate_module
-from tyrecal.fit.calibrate import calibrate
-from tyrecal.fit.crossing import crossing, gap
-from tyrecal.fit.problem import Problem, Target, objective, read_targets
-from tyrecal.fit.slsqp import _beyond_crossing
+from tyrecal.simulate.deck.tyre_design import TyreDesign
+from tyrecal.simulate.evaluate.evaluator import Counts, Evaluator, Question
+from tyrecal.simulate.evaluate.executor import Here, WorkerLost
+from tyrecal.simulate.evaluate.failure import DeckRefused, EvaluationFailed
+from tyrecal.simulate.evaluate.results import Evaluation
+from tyrecal.studies.fit import calibrate as calibrate_module
+from tyrecal.studies.fit.calibrate import calibrate
+from tyrecal.studies.fit.crossing import crossing, gap
+from tyrecal.studies.fit.problem import Problem, Target, objective, read_targets
+from tyrecal.studies.fit.slsqp import _beyond_crossing
+from tyrecal.tyre.case import LoadedCase, start_values
+from tyrecal.tyre.load import load_case
 
 from ..chance import Chance
 from ..conftest import CASES

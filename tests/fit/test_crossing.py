@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from scipy.optimize import differential_evolution
 
-from tyrecal.evaluate.evaluator import Question
-from tyrecal.evaluate.results import Evaluation, HarmonicShape, RawMode
-from tyrecal.fit.calibrate import calibrate
-from tyrecal.fit.crossing import crossing, gap, order, pair_clarity
-from tyrecal.fit.problem import Problem
-from tyrecal.fit.slsqp import AT_CROSSING
+from tyrecal.simulate.evaluate.evaluator import Question
+from tyrecal.simulate.evaluate.results import Evaluation, HarmonicShape, RawMode
+from tyrecal.studies.fit.calibrate import calibrate
+from tyrecal.studies.fit.crossing import crossing, gap, order, pair_clarity
+from tyrecal.studies.fit.problem import Problem
+from tyrecal.studies.fit.slsqp import AT_CROSSING
 
 from .fake import LABELS, POINTS, FakeEvaluator, shape
 from .test_calibration import CASE, START, evaluator

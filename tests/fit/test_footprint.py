@@ -8,16 +8,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tyrecal.deck.tyre_design import TyreDesign
 from tyrecal.errors import InputError
-from tyrecal.evaluate.evaluator import Evaluator, Question
-from tyrecal.evaluate.failure import DeckRefused, EvaluationFailed
-from tyrecal.fit.calibrate import calibrate
-from tyrecal.fit.differences import differences
-from tyrecal.fit.problem import Problem, Target, objective, objective_unit
-from tyrecal.fit.variable import Variable
-from tyrecal.modes.label import paired_labels
-from tyrecal.modes.mode import Label
+from tyrecal.simulate.deck.tyre_design import TyreDesign
+from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
+from tyrecal.simulate.evaluate.failure import DeckRefused, EvaluationFailed
+from tyrecal.simulate.modes.label import paired_labels
+from tyrecal.simulate.modes.mode import Label
+from tyrecal.studies.fit.calibrate import calibrate
+from tyrecal.studies.fit.differences import differences
+from tyrecal.studies.fit.problem import Problem, Target, objective, objective_unit
+from tyrecal.studies.fit.variable import Variable
 from tyrecal.studies.footprint import footprint_result, press
 
 from .pressed import (
@@ -186,7 +186,7 @@ def test_numbers_are_those_of_a_footprint_at_the_cases_loads() -> None:
     tyre = evaluator(case)
     point = Problem(case, tyre).evaluate(START_X)
     outcomes = press(tyre, {"initial": START}, case.case.loads_N)
-    from tyrecal.design import resolved
+    from tyrecal.tyre.resolve import resolved
 
     rows = footprint_result(
         {"initial": START}, [], outcomes, {"initial": resolved(CASE).mesh}

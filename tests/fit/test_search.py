@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
-from tyrecal.deck.tyre_design import NEAR_ZERO
-from tyrecal.evaluate.failure import EvaluationFailed
-from tyrecal.fit import least_squares, slsqp
-from tyrecal.fit.calibrate import _tolerance
-from tyrecal.fit.crossing import AXIAL, TORSIONAL, Crossing, crossing
-from tyrecal.fit.problem import Point, Target
-from tyrecal.fit.uncertainty import uncertainty
-from tyrecal.fit.variable import Variable, read_variable
+from tyrecal.simulate.deck.tyre_design import NEAR_ZERO
+from tyrecal.simulate.evaluate.failure import EvaluationFailed
+from tyrecal.studies.fit import least_squares, slsqp
+from tyrecal.studies.fit.calibrate import _tolerance
+from tyrecal.studies.fit.crossing import AXIAL, TORSIONAL, Crossing, crossing
+from tyrecal.studies.fit.problem import Point, Target
+from tyrecal.studies.fit.uncertainty import uncertainty
+from tyrecal.studies.fit.variable import Variable, read_variable
 
 from ..chance import generator
 

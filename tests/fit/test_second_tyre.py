@@ -7,12 +7,12 @@ from dataclasses import replace
 
 import pytest
 
-from tyrecal.case import LoadedCase
-from tyrecal.deck.tyre_design import TyreDesign
-from tyrecal.design import load_case
-from tyrecal.evaluate.evaluator import Evaluator
-from tyrecal.fit.calibrate import Fit, calibrate
 from tyrecal.measured.tables import read_measurements
+from tyrecal.simulate.deck.tyre_design import TyreDesign
+from tyrecal.simulate.evaluate.evaluator import Evaluator
+from tyrecal.studies.fit.calibrate import Fit, calibrate
+from tyrecal.tyre.case import LoadedCase
+from tyrecal.tyre.load import load_case
 
 from ..conftest import CASES
 

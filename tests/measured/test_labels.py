@@ -17,7 +17,7 @@ from tyrecal.measured.labels import (
 )
 from tyrecal.measured.modal import LabelledMode, settled
 from tyrecal.measured.sensors import MeasuredMode, Sensors, real_part
-from tyrecal.modes.mode import Label
+from tyrecal.simulate.modes.mode import Label
 
 from ..chance import Chance, generator
 from .tyres import HIGHEST, layout, measured, modes, noted

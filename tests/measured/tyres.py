@@ -7,13 +7,14 @@ from pathlib import Path
 
 import numpy as np
 
-from tyrecal.deck.tyre_design import TyreDesign
-from tyrecal.design import load_case, with_values
-from tyrecal.evaluate.evaluator import Evaluator, Question
-from tyrecal.evaluate.results import HarmonicShape
 from tyrecal.measured.sensors import Sensors
-from tyrecal.modes.label import paired_labels
-from tyrecal.modes.mode import Mode
+from tyrecal.simulate.deck.tyre_design import TyreDesign
+from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
+from tyrecal.simulate.evaluate.results import HarmonicShape
+from tyrecal.simulate.modes.label import paired_labels
+from tyrecal.simulate.modes.mode import Mode
+from tyrecal.tyre.load import load_case
+from tyrecal.tyre.values import with_values
 
 Array = np.ndarray
 CASES = Path(__file__).parents[2] / "cases"

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import pytest
 
-from tyrecal.evaluate.evaluator import Question
-from tyrecal.evaluate.failure import DeckRefused, EvaluationFailed
-from tyrecal.modes.find import MORE_MODES, Found, find_modes, labelled
+from tyrecal.simulate.evaluate.evaluator import Question
+from tyrecal.simulate.evaluate.failure import DeckRefused, EvaluationFailed
+from tyrecal.simulate.modes.find import MORE_MODES, Found, find_modes, labelled
 
 from ..fit.fake import LABELS, FakeEvaluator
 from ..fit.test_calibration import POWERS, START, TARGETS

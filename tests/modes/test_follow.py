@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from tyrecal.evaluate.results import HarmonicShape, RawMode
-from tyrecal.modes.follow import follow
-from tyrecal.modes.mode import Label, Mode
-from tyrecal.modes.sample import harmonic_of, on_rings
+from tyrecal.simulate.evaluate.results import HarmonicShape, RawMode
+from tyrecal.simulate.modes.follow import follow
+from tyrecal.simulate.modes.mode import Label, Mode
+from tyrecal.simulate.modes.sample import harmonic_of, on_rings
 
 from ..chance import generator
 

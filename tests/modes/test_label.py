@@ -6,10 +6,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.polynomial.legendre import legval
 
-from tyrecal.evaluate.results import HarmonicShape, RawMode, RingShape
-from tyrecal.modes.label import belt_motion, label_modes, pair_rings
-from tyrecal.modes.mode import Label
-from tyrecal.modes.sample import on_rings
+from tyrecal.simulate.evaluate.results import HarmonicShape, RawMode, RingShape
+from tyrecal.simulate.modes.label import belt_motion, label_modes, pair_rings
+from tyrecal.simulate.modes.mode import Label
+from tyrecal.simulate.modes.sample import on_rings
 
 from ..chance import generator
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tyrecal.evaluate.results import HarmonicShape, RawMode, RingShape
-from tyrecal.modes.loaded import (
+from tyrecal.simulate.evaluate.results import HarmonicShape, RawMode, RingShape
+from tyrecal.simulate.modes.loaded import (
     SYMMETRIES,
     Member,
     Rings,
@@ -17,7 +17,7 @@ from tyrecal.modes.loaded import (
     rings,
     state,
 )
-from tyrecal.modes.mode import Label, Mode
+from tyrecal.simulate.modes.mode import Label, Mode
 
 Array = np.ndarray
 NODES = np.array([3, 5, 7])

@@ -3,9 +3,9 @@ import pickle
 import numpy as np
 import pytest
 
-from tyrecal.evaluate.results import HarmonicShape, RawMode
-from tyrecal.modes.match import LostLabel, margin, match
-from tyrecal.modes.mode import Label, Mode
+from tyrecal.simulate.evaluate.results import HarmonicShape, RawMode
+from tyrecal.simulate.modes.match import LostLabel, margin, match
+from tyrecal.simulate.modes.mode import Label, Mode
 
 RAW = RawMode(1.0, HarmonicShape(0, np.empty(0), np.empty((0, 2)), np.empty((0, 3))), 1)
 AXIAL, TORSIONAL = Label(0, 0, "axial"), Label(0, 0, "torsional")

@@ -3,9 +3,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tyrecal.evaluate.results import HarmonicShape, RingShape
-from tyrecal.modes.sample import on_rings
-from tyrecal.modes.subspace import mac, subspace_mac
+from tyrecal.simulate.evaluate.results import HarmonicShape, RingShape
+from tyrecal.simulate.modes.sample import on_rings
+from tyrecal.simulate.modes.subspace import mac, subspace_mac
 
 from ..chance import generator
 

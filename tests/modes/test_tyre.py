@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from tyrecal.modes.label import label_modes
-from tyrecal.modes.match import margin, match
-from tyrecal.modes.mode import Label
+from tyrecal.simulate.modes.label import label_modes
+from tyrecal.simulate.modes.match import margin, match
+from tyrecal.simulate.modes.mode import Label
 
 from ..studies.labels import evaluate
 

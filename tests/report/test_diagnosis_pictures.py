@@ -11,13 +11,13 @@ from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
-from tyrecal.design import load_case
-from tyrecal.diagnose.diagnosis import Diagnosis
-from tyrecal.diagnose.where import PartChange
 from tyrecal.report import diagnosis_pictures as pictures
 from tyrecal.report.figure import save
 from tyrecal.report.section import WARM, draw_section_map
 from tyrecal.report.shape_data import DiagnosisSection, parts_data
+from tyrecal.studies.diagnose.diagnosis import Diagnosis
+from tyrecal.studies.diagnose.where import PartChange
+from tyrecal.tyre.load import load_case
 
 from ..conftest import CASES
 from ..diagnose.test_calibrated import exact

@@ -12,16 +12,16 @@ from matplotlib.figure import Figure
 from PIL import Image
 from rich.console import Console
 
-from tyrecal.deck.tyre_design import TyreDesign
-from tyrecal.design import resolved
-from tyrecal.evaluate.evaluator import Evaluator
-from tyrecal.evaluate.pressed import Pressed
 from tyrecal.report.figure import save
 from tyrecal.report.footprint import draw_curves, draw_footprint
 from tyrecal.report.shape_data import patches_data
 from tyrecal.report.table import shown
 from tyrecal.report.vtu import write_pressed, write_pressed_vtu
+from tyrecal.simulate.deck.tyre_design import TyreDesign
+from tyrecal.simulate.evaluate.evaluator import Evaluator
+from tyrecal.simulate.evaluate.pressed import Pressed
 from tyrecal.studies.footprint import FootprintResult, FootprintRow, footprint_result
+from tyrecal.tyre.resolve import resolved
 
 from ..evaluate.stand_in import CASE
 from ..studies.hertz import ANGLES, FREE, Hertz

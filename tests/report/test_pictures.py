@@ -9,20 +9,21 @@ import pytest
 from PIL import Image
 from threadpoolctl import threadpool_limits
 
-from tyrecal.case import LoadedCase, start_values
-from tyrecal.deck.tyre_design import TyreDesign
-from tyrecal.design import load_case, resolved
-from tyrecal.evaluate.evaluator import Evaluator, Question
-from tyrecal.evaluate.results import Evaluation
-from tyrecal.modes.label import label_modes
-from tyrecal.modes.mode import Label, Mode
 from tyrecal.report import shapes
 from tyrecal.report.convergence import draw_convergence
 from tyrecal.report.figure import save
 from tyrecal.report.section import draw_section
 from tyrecal.report.shape_data import section_data
 from tyrecal.report.shapes import draw_mode, draw_modes_overview, title
-from tyrecal.tyre.mesh import SectionMesh, build_mesh
+from tyrecal.simulate.deck.tyre_design import TyreDesign
+from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
+from tyrecal.simulate.evaluate.results import Evaluation
+from tyrecal.simulate.modes.label import label_modes
+from tyrecal.simulate.modes.mode import Label, Mode
+from tyrecal.tyre.case import LoadedCase, start_values
+from tyrecal.tyre.load import load_case
+from tyrecal.tyre.resolve import resolved
+from tyrecal.tyre.section.mesh import SectionMesh, build_mesh
 
 from ..conftest import CASES
 

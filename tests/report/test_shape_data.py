@@ -9,19 +9,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tyrecal.case import start_values
-from tyrecal.deck.tyre_design import TyreDesign
-from tyrecal.design import load_case, resolved
-from tyrecal.evaluate import evaluator as door_module
-from tyrecal.evaluate.evaluator import Evaluator, Question
-from tyrecal.evaluate.results import HarmonicShape
-from tyrecal.modes.label import paired_labels
-from tyrecal.modes.mode import Mode
 from tyrecal.report.html.shapes import packed
 from tyrecal.report.revolve import motion, placed, skin, swept
 from tyrecal.report.shape_data import Shapes, patches_data, section_data, tyre_data
+from tyrecal.simulate.deck.tyre_design import TyreDesign
+from tyrecal.simulate.evaluate import evaluator as door_module
+from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
+from tyrecal.simulate.evaluate.results import HarmonicShape
+from tyrecal.simulate.modes.label import paired_labels
+from tyrecal.simulate.modes.mode import Mode
 from tyrecal.studies.footprint import press
 from tyrecal.studies.patch import patch_of
+from tyrecal.tyre.case import start_values
+from tyrecal.tyre.load import load_case
+from tyrecal.tyre.resolve import resolved
 
 from ..chance import generator
 from ..studies.hertz import Hertz, coarse_case

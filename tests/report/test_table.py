@@ -10,10 +10,10 @@ import pytest
 from rich.console import Console
 from rich.table import Table
 
-from tyrecal.fit.result import FitResult
-from tyrecal.modes.mode import Label
 from tyrecal.report.table import shown
 from tyrecal.report.words import fit_doubts, tyre_doubts
+from tyrecal.simulate.modes.mode import Label
+from tyrecal.studies.fit.result import FitResult
 from tyrecal.studies.modes import ModesResult
 
 # c, m, kind, initial, optimised, target: Table 2 of Bekakos et al. 2016

@@ -11,9 +11,6 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from tyrecal.design import load_case, resolved
-from tyrecal.effects import catalogue
-from tyrecal.modes.mode import Label
 from tyrecal.report.convergence import draw_convergence
 from tyrecal.report.figure import headline, new_figure, save
 from tyrecal.report.load import draw_load_sweep
@@ -21,9 +18,13 @@ from tyrecal.report.pressure import draw_pressure_sweep
 from tyrecal.report.section import draw_section
 from tyrecal.report.shape_data import section_data
 from tyrecal.report.signature import draw_signature
+from tyrecal.simulate.modes.mode import Label
 from tyrecal.studies.loaded_result import LoadRow
 from tyrecal.studies.pressure_result import PressureRow
 from tyrecal.studies.signature import Signature
+from tyrecal.tyre.effects import catalogue
+from tyrecal.tyre.load import load_case
+from tyrecal.tyre.resolve import resolved
 
 from ..conftest import CASES
 

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from tyrecal.errors import InputError
-from tyrecal.evaluate.results import HarmonicShape, RawMode, RingShape
-from tyrecal.modes.mode import Label, Mode
 from tyrecal.report.vtu import write_vtu
-from tyrecal.tyre.mesh import SectionMesh, build_mesh
-from tyrecal.tyre.section import read_section
+from tyrecal.simulate.evaluate.results import HarmonicShape, RawMode, RingShape
+from tyrecal.simulate.modes.mode import Label, Mode
+from tyrecal.tyre.section.mesh import SectionMesh, build_mesh
+from tyrecal.tyre.section.section import read_section
 
 from ..conftest import CASES
 

@@ -14,12 +14,12 @@ from itertools import accumulate
 from pathlib import Path
 from typing import Any
 
-from tyrecal.case import LoadedCase
-from tyrecal.deck.calculix import calculix_context
-from tyrecal.deck.header import header
-from tyrecal.deck.sector import Sector
-from tyrecal.design import resolved
-from tyrecal.templates import environment, render
+from tyrecal.simulate.deck.calculix import calculix_context
+from tyrecal.simulate.deck.header import header
+from tyrecal.simulate.deck.sector import Sector
+from tyrecal.tyre.case import LoadedCase
+from tyrecal.tyre.resolve import resolved
+from tyrecal.tyre.templates import environment, render
 
 TEMPLATES = Path(__file__).parent / "templates"
 OUTER_FACE = "S4"  # a brick's face over side 2 of the section's element

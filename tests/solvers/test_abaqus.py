@@ -16,12 +16,12 @@ from tyrecal_solvers.abaqus import launch
 from tyrecal_solvers.abaqus.adapter import Abaqus
 
 from tyrecal.cli.main import main
-from tyrecal.deck.tyre_design import TyreDesign
-from tyrecal.design import load_case
-from tyrecal.evaluate.evaluator import Evaluator, Question
-from tyrecal.evaluate.failure import DeckRefused, EvaluationFailed
-from tyrecal.evaluate.store import Store
-from tyrecal.fit.problem import Problem
+from tyrecal.simulate.deck.tyre_design import TyreDesign
+from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
+from tyrecal.simulate.evaluate.failure import DeckRefused, EvaluationFailed
+from tyrecal.simulate.evaluate.store import Store
+from tyrecal.studies.fit.problem import Problem
+from tyrecal.tyre.load import load_case
 
 STANDIN = Path(__file__).with_name("standin_abaqus.py")
 COARSE = """

@@ -14,15 +14,16 @@ from tyrecal_solvers.calculix.results import Fields, pairs, read_mass
 from tyrecal_solvers.calculix.runner import _is_safe, _said, run_job
 from tyrecal_solvers.process import RunFailed
 
-from tyrecal.blind.outside import thick_cushion
-from tyrecal.case import LoadedCase, start_values
-from tyrecal.deck.decks import Decks
-from tyrecal.deck.tyre_design import TyreDesign
-from tyrecal.design import load_case, with_values
-from tyrecal.evaluate.evaluator import Evaluator, Question
-from tyrecal.evaluate.failure import EvaluationFailed
-from tyrecal.modes.label import label_modes
-from tyrecal.templates import TemplateFailed
+from tyrecal.simulate.deck.decks import Decks
+from tyrecal.simulate.deck.tyre_design import TyreDesign
+from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
+from tyrecal.simulate.evaluate.failure import EvaluationFailed
+from tyrecal.simulate.modes.label import label_modes
+from tyrecal.studies.blind.outside import thick_cushion
+from tyrecal.tyre.case import LoadedCase, start_values
+from tyrecal.tyre.load import load_case
+from tyrecal.tyre.templates import TemplateFailed
+from tyrecal.tyre.values import with_values
 
 from ..blind.laws import tread_density
 from ..conftest import CASES

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from tyrecal.case import start_values
-from tyrecal.deck.tyre_design import TyreDesign
-from tyrecal.design import load_case
-from tyrecal.evaluate.evaluator import Evaluator, Question
+from tyrecal.simulate.deck.tyre_design import TyreDesign
+from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
+from tyrecal.tyre.case import start_values
+from tyrecal.tyre.load import load_case
 
 from ..conftest import CASES, ROOT
 from ..example import install, tyrecal

@@ -8,9 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tyrecal.case import LoadedCase
-from tyrecal.deck.calculix import calculix_context
-from tyrecal.design import load_case, resolved
+from tyrecal.simulate.deck.calculix import calculix_context
+from tyrecal.tyre.case import LoadedCase
+from tyrecal.tyre.load import load_case
+from tyrecal.tyre.resolve import resolved
 
 from ..conftest import CASES
 from .press_deck import Angles, Road, around, press_texts

@@ -16,13 +16,14 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
-from tyrecal.case import LoadedCase
-from tyrecal.deck.tyre_design import TyreDesign
-from tyrecal.design import load_case, with_values
-from tyrecal.evaluate.evaluator import Evaluator, Question
-from tyrecal.modes.label import label_modes
-from tyrecal.modes.match import match
-from tyrecal.modes.mode import Label
+from tyrecal.simulate.deck.tyre_design import TyreDesign
+from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
+from tyrecal.simulate.modes.label import label_modes
+from tyrecal.simulate.modes.match import match
+from tyrecal.simulate.modes.mode import Label
+from tyrecal.tyre.case import LoadedCase
+from tyrecal.tyre.load import load_case
+from tyrecal.tyre.values import with_values
 
 ROOT = Path(__file__).parents[2]
 REFERENCE = json.loads((ROOT / "tests/data/reference.json").read_text())

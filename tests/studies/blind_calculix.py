@@ -33,24 +33,26 @@ from typing import Any
 import numpy as np
 from scipy.stats import qmc
 
-from tyrecal.blind.answer import rows_of, tyre_model
-from tyrecal.blind.draw import Truth, draw, tyre
-from tyrecal.blind.laws import EffectLaw
-from tyrecal.blind.make import make
-from tyrecal.blind.maker import Computed
-from tyrecal.blind.outside import OUTSIDE_FAMILIES
-from tyrecal.blind.protocol import Protocol
-from tyrecal.blind.ruler import measure
-from tyrecal.case import LoadedCase, number_at, start_values
-from tyrecal.deck.calculix import PLY_THICKNESS_M
-from tyrecal.deck.tyre_design import TyreDesign
-from tyrecal.design import load_case, resolved, with_values
-from tyrecal.diagnose.uncertainties import sources
-from tyrecal.evaluate.evaluator import Evaluator, Question
-from tyrecal.evaluate.failure import EvaluationFailed
-from tyrecal.modes.label import label_modes
-from tyrecal.modes.match import LostLabel, match
-from tyrecal.modes.mode import Label
+from tyrecal.simulate.deck.calculix import PLY_THICKNESS_M
+from tyrecal.simulate.deck.tyre_design import TyreDesign
+from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
+from tyrecal.simulate.evaluate.failure import EvaluationFailed
+from tyrecal.simulate.modes.label import label_modes
+from tyrecal.simulate.modes.match import LostLabel, match
+from tyrecal.simulate.modes.mode import Label
+from tyrecal.studies.blind.answer import rows_of, tyre_model
+from tyrecal.studies.blind.draw import Truth, draw, tyre
+from tyrecal.studies.blind.laws import EffectLaw
+from tyrecal.studies.blind.make import make
+from tyrecal.studies.blind.maker import Computed
+from tyrecal.studies.blind.outside import OUTSIDE_FAMILIES
+from tyrecal.studies.blind.protocol import Protocol
+from tyrecal.studies.blind.ruler import measure
+from tyrecal.studies.diagnose.uncertainties import sources
+from tyrecal.tyre.case import LoadedCase, number_at, start_values
+from tyrecal.tyre.load import load_case
+from tyrecal.tyre.resolve import resolved
+from tyrecal.tyre.values import with_values
 
 from ..blind.laws import other_laws
 from .calculix import common, modes_of, split
@@ -261,7 +263,7 @@ def fitted(runs: Runs) -> dict[str, Array]:
 
 
 class EmulatedCalculix:
-    """A `tyrecal.blind.maker.Maker`: CalculiX C3D20R, as this module emulates it."""
+    """A `tyrecal.studies.blind.maker.Maker`: CalculiX C3D20R, as this module emulates it."""
 
     about = (
         "CalculiX 2.20 (C3D20R, St Venant-Kirchhoff cords, plies of 0.2 mm, another mesh) by an"

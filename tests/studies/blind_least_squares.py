@@ -20,12 +20,12 @@ from typing import Any
 
 import numpy as np
 
-from tyrecal.blind.protocol import read_protocol
-from tyrecal.blind.ruler import EffectShifts, Ruler, read_ruler
-from tyrecal.blind.score import Scored, case_of, labels_of, means, score
-from tyrecal.blind.seal import open_truth
-from tyrecal.blind.tables import DETECTED
 from tyrecal.measured.tables import read_measurements
+from tyrecal.studies.blind.protocol import read_protocol
+from tyrecal.studies.blind.ruler import EffectShifts, Ruler, read_ruler
+from tyrecal.studies.blind.score import Scored, case_of, labels_of, means, score
+from tyrecal.studies.blind.seal import open_truth
+from tyrecal.studies.blind.tables import DETECTED
 
 Array = np.ndarray
 STUDIES = sorted((Path(__file__).parents[1] / "benchmarks").glob("blind_study_*"))

@@ -27,20 +27,22 @@ from unittest.mock import patch
 import numpy as np
 from tyrecal_solvers.bundled.section.parts import cords
 
-from tyrecal.case import LoadedCase
-from tyrecal.deck.calculix import PLY_THICKNESS_M
-from tyrecal.deck.sector import with_plies
-from tyrecal.deck.tyre_design import TyreDesign
-from tyrecal.design import load_case, tyre, with_values
-from tyrecal.evaluate.evaluator import Evaluator, Question
-from tyrecal.evaluate.failure import EvaluationFailed
-from tyrecal.evaluate.results import HarmonicShape
-from tyrecal.evaluate.store import Store
-from tyrecal.modes.label import label_modes
-from tyrecal.modes.match import LostLabel, match
-from tyrecal.modes.mode import Label, Mode
-from tyrecal.modes.subspace import mac
-from tyrecal.tyre.mesh import SectionMesh, build_mesh
+from tyrecal.simulate.deck.calculix import PLY_THICKNESS_M
+from tyrecal.simulate.deck.sector import with_plies
+from tyrecal.simulate.deck.tyre_design import TyreDesign
+from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
+from tyrecal.simulate.evaluate.failure import EvaluationFailed
+from tyrecal.simulate.evaluate.results import HarmonicShape
+from tyrecal.simulate.evaluate.store import Store
+from tyrecal.simulate.modes.label import label_modes
+from tyrecal.simulate.modes.match import LostLabel, match
+from tyrecal.simulate.modes.mode import Label, Mode
+from tyrecal.simulate.modes.subspace import mac
+from tyrecal.tyre import resolve
+from tyrecal.tyre.case import LoadedCase
+from tyrecal.tyre.load import load_case
+from tyrecal.tyre.section.mesh import SectionMesh, build_mesh
+from tyrecal.tyre.values import with_values
 
 ROOT = Path(__file__).parents[2]
 CASES = ("p235_75r17", "p235_75r17_narrow_rim")
@@ -137,14 +139,14 @@ def straight(*arguments: object) -> SectionMesh:
 @contextmanager
 def common(law: bool = True, sides: bool = True) -> Iterator[None]:
     """The bundled solver with CalculiX's cord law, sides, or both, in this process."""
-    tyre._mesh.cache_clear()
+    resolve._mesh.cache_clear()
     with ExitStack() as switched:
         if law:
             switched.enter_context(patch.object(cords, "LogarithmicCord", StVenantKirchhoff))
         if sides:
-            switched.enter_context(patch.object(tyre, "build_mesh", straight))
+            switched.enter_context(patch.object(resolve, "build_mesh", straight))
         yield
-    tyre._mesh.cache_clear()
+    resolve._mesh.cache_clear()
 
 
 def on_common_nodes(a: HarmonicShape, b: HarmonicShape) -> tuple[HarmonicShape, HarmonicShape]:

@@ -10,12 +10,12 @@ from pathlib import Path
 
 import numpy as np
 
-from tyrecal.deck.tyre_design import TyreDesign
-from tyrecal.design import load_case
-from tyrecal.effects import catalogue
-from tyrecal.evaluate.evaluator import Evaluator
+from tyrecal.simulate.deck.tyre_design import TyreDesign
+from tyrecal.simulate.evaluate.evaluator import Evaluator
 from tyrecal.studies.fitted import read_fitted
 from tyrecal.studies.signature import Plain, Signature, rms, stated_size
+from tyrecal.tyre.effects import catalogue
+from tyrecal.tyre.load import load_case
 
 PRESSURES_KPA = (160.0, 240.0, 320.0)
 ALIKE = 0.85  # cosine of what a re-fit leaves of two effects, without their sign

@@ -33,12 +33,13 @@ from tyrecal_solvers.calculix.results import read_fields
 from tyrecal_solvers.calculix.runner import run_job
 from tyrecal_solvers.process import RunFailed
 
-from tyrecal.case import LoadedCase
-from tyrecal.deck.decks import Decks
-from tyrecal.deck.tyre_design import TyreDesign
-from tyrecal.design import load_case, with_values
-from tyrecal.evaluate.evaluator import Evaluator
-from tyrecal.evaluate.failure import EvaluationFailed
+from tyrecal.simulate.deck.decks import Decks
+from tyrecal.simulate.deck.tyre_design import TyreDesign
+from tyrecal.simulate.evaluate.evaluator import Evaluator
+from tyrecal.simulate.evaluate.failure import EvaluationFailed
+from tyrecal.tyre.case import LoadedCase
+from tyrecal.tyre.load import load_case
+from tyrecal.tyre.values import with_values
 
 from ..solvers.press_deck import Angles, Road, press_texts
 from ..solvers.press_results import read_press, read_radius, run_press

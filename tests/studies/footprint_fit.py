@@ -15,14 +15,16 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
-from tyrecal.case import LoadedCase, start_values
-from tyrecal.deck.tyre_design import TyreDesign
-from tyrecal.design import load_case, resolved, with_values
-from tyrecal.evaluate.evaluator import Evaluator, Question
-from tyrecal.evaluate.store import Store
-from tyrecal.fit.calibrate import calibrate
-from tyrecal.modes.label import paired_labels
+from tyrecal.simulate.deck.tyre_design import TyreDesign
+from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
+from tyrecal.simulate.evaluate.store import Store
+from tyrecal.simulate.modes.label import paired_labels
+from tyrecal.studies.fit.calibrate import calibrate
 from tyrecal.studies.footprint import footprint_row
+from tyrecal.tyre.case import LoadedCase, start_values
+from tyrecal.tyre.load import load_case
+from tyrecal.tyre.resolve import resolved
+from tyrecal.tyre.values import with_values
 
 from ..conftest import CASES
 

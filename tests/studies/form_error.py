@@ -15,14 +15,14 @@ from dataclasses import replace
 import numpy as np
 
 from tests.conftest import CASES
-from tyrecal.case import LoadedCase
-from tyrecal.case.section import Level
-from tyrecal.deck.tyre_design import TyreDesign
-from tyrecal.design import load_case
-from tyrecal.diagnose.model import Answer, Query
-from tyrecal.diagnose.tyre_model import TyreModel
-from tyrecal.evaluate.evaluator import Evaluator
-from tyrecal.modes.mode import Label
+from tyrecal.simulate.deck.tyre_design import TyreDesign
+from tyrecal.simulate.evaluate.evaluator import Evaluator
+from tyrecal.simulate.modes.mode import Label
+from tyrecal.studies.diagnose.model import Answer, Query
+from tyrecal.studies.diagnose.tyre_model import TyreModel
+from tyrecal.tyre.case import LoadedCase
+from tyrecal.tyre.case.section import Level
+from tyrecal.tyre.load import load_case
 
 PRESSURES = (160.0, 240.0, 320.0)
 LABELS = [Label(0, 0, "axial"), Label(0, 0, "torsional")]

@@ -23,14 +23,14 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import KDTree
 
-from tyrecal.deck.tyre_design import TyreDesign
-from tyrecal.design import load_case
-from tyrecal.evaluate.evaluator import Evaluator, Question
-from tyrecal.evaluate.failure import EvaluationFailed
-from tyrecal.evaluate.results import HarmonicShape, RawMode, RingShape
-from tyrecal.modes.label import label_modes, pair_rings
-from tyrecal.modes.mode import Label, Mode
-from tyrecal.modes.sample import on_rings
+from tyrecal.simulate.deck.tyre_design import TyreDesign
+from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
+from tyrecal.simulate.evaluate.failure import EvaluationFailed
+from tyrecal.simulate.evaluate.results import HarmonicShape, RawMode, RingShape
+from tyrecal.simulate.modes.label import label_modes, pair_rings
+from tyrecal.simulate.modes.mode import Label, Mode
+from tyrecal.simulate.modes.sample import on_rings
+from tyrecal.tyre.load import load_case
 
 Array = np.ndarray
 

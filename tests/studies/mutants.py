@@ -54,19 +54,19 @@ PLACE = Path(tempfile.gettempdir()) / "mutants"
 QUOTA = {  # lines of every 200
     "solvers/bundled": 97,
     "solvers/calculix": 13,
-    "tyrecal/fit": 23,
-    "tyrecal/diagnose": 26,
-    "tyrecal/modes": 13,
-    "tyrecal/evaluate": 13,
+    "tyrecal/studies/fit": 23,
+    "tyrecal/studies/diagnose": 26,
+    "tyrecal/simulate/modes": 13,
+    "tyrecal/simulate/evaluate": 13,
     "tyrecal/measured": 15,
 }
 NEW = {"solvers/calculix": "tests/solvers/"}  # where an area's tests are; else tests/AREA/
 PROCESSES = {  # tests whose work happens in processes that `cover` does not see into
     "solvers/calculix/": ["tests/solvers/test_calculix_runs.py"],
-    "tyrecal/evaluate/pool": ["tests/evaluate/test_pool.py"],
-    "tyrecal/evaluate/executor": ["tests/evaluate/test_executor.py"],
-    "tyrecal/evaluate/cluster": ["tests/batch/test_cluster.py"],
-    "tyrecal/evaluate/queue": ["tests/evaluate/test_queue.py"],
+    "tyrecal/simulate/evaluate/pool": ["tests/evaluate/test_pool.py"],
+    "tyrecal/simulate/evaluate/executor": ["tests/evaluate/test_executor.py"],
+    "tyrecal/simulate/evaluate/cluster": ["tests/batch/test_cluster.py"],
+    "tyrecal/simulate/evaluate/queue": ["tests/evaluate/test_queue.py"],
 }
 QUICK = "not (slow or guide or ccx or browser or cluster or lint)"
 SLOW = QUICK.replace("slow or ", "")

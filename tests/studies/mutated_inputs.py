@@ -38,9 +38,9 @@ from typing import Any
 from tyrecal_solvers.bundled.__main__ import main as solve
 
 from tyrecal.cli.main import main as tyrecal
-from tyrecal.evaluate.results import evaluation
-from tyrecal.evaluate.store import Store
-from tyrecal.modes.label import paired_labels
+from tyrecal.simulate.evaluate.results import evaluation
+from tyrecal.simulate.evaluate.store import Store
+from tyrecal.simulate.modes.label import paired_labels
 
 CASES = Path(__file__).parents[2] / "cases"
 CPU_S, WALL_S = 10, 120

@@ -8,13 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tyrecal.deck.tyre_design import TyreDesign
-from tyrecal.design import load_case, resolved
-from tyrecal.evaluate.evaluator import Evaluator
-from tyrecal.evaluate.failure import DeckRefused, EvaluationFailed
-from tyrecal.evaluate.pressed import Pressed
+from tyrecal.simulate.deck.tyre_design import TyreDesign
+from tyrecal.simulate.evaluate.evaluator import Evaluator
+from tyrecal.simulate.evaluate.failure import DeckRefused, EvaluationFailed
+from tyrecal.simulate.evaluate.pressed import Pressed
 from tyrecal.studies.footprint import FootprintRow, findings, footprint_result, footprint_row, press
 from tyrecal.studies.patch import Patch, patch_of
+from tyrecal.tyre.load import load_case
+from tyrecal.tyre.resolve import resolved
 
 from ..evaluate.stand_in import CASE, StandIn
 from .hertz import BELT, Hertz, coarse_case

@@ -6,17 +6,17 @@ from pathlib import Path
 
 import pytest
 
-from tyrecal.deck.decks import Decks
-from tyrecal.deck.dialects import fine_enough
-from tyrecal.deck.tyre_design import TyreDesign
-from tyrecal.design import load_case
-from tyrecal.evaluate.evaluator import Evaluator
-from tyrecal.evaluate.failure import DeckRefused, EvaluationFailed
-from tyrecal.evaluate.store import Store
-from tyrecal.modes.loaded import SYMMETRIES, Member
-from tyrecal.modes.mode import Label
+from tyrecal.simulate.deck.decks import Decks
+from tyrecal.simulate.deck.dialects import fine_enough
+from tyrecal.simulate.deck.tyre_design import TyreDesign
+from tyrecal.simulate.evaluate.evaluator import Evaluator
+from tyrecal.simulate.evaluate.failure import DeckRefused, EvaluationFailed
+from tyrecal.simulate.evaluate.store import Store
+from tyrecal.simulate.modes.loaded import SYMMETRIES, Member
+from tyrecal.simulate.modes.mode import Label
 from tyrecal.studies.loaded import Loaded, LoadedMode, LoadedTyre, load_tyres
 from tyrecal.studies.loaded_result import findings, load_sweep_result, loaded_modes_result
+from tyrecal.tyre.load import load_case
 
 from ..evaluate.stand_in import CASE, StandIn
 from .loaded import coarse_case

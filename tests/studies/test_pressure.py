@@ -8,18 +8,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tyrecal.case import start_values
-from tyrecal.case.identity import tyre_sha256
-from tyrecal.deck.tyre_design import TyreDesign
-from tyrecal.design import load_case
-from tyrecal.evaluate.evaluator import Evaluator
-from tyrecal.evaluate.results import HarmonicShape, RawMode
-from tyrecal.modes.label import label_modes
-from tyrecal.modes.mode import Label
+from tyrecal.simulate.deck.tyre_design import TyreDesign
+from tyrecal.simulate.evaluate.evaluator import Evaluator
+from tyrecal.simulate.evaluate.results import HarmonicShape, RawMode
+from tyrecal.simulate.modes.label import label_modes
+from tyrecal.simulate.modes.mode import Label
 from tyrecal.studies.fitted import NotThisFit, pressure_name, read_fitted
 from tyrecal.studies.pressure import State, sweep
 from tyrecal.studies.pressure_findings import findings
 from tyrecal.studies.pressure_result import slopes, sweep_result
+from tyrecal.tyre.case import start_values
+from tyrecal.tyre.case.identity import tyre_sha256
+from tyrecal.tyre.load import load_case
 
 from ..conftest import CASES
 from ..fit.fake import LABELS, shape

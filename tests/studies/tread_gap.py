@@ -11,7 +11,7 @@ import numpy as np
 from scipy.integrate import trapezoid
 from tyrecal_solvers.calculix.results import read_fields
 
-from tyrecal.evaluate.pressed import Footprint, Pressed
+from tyrecal.simulate.evaluate.pressed import Footprint, Pressed
 
 from ..solvers.press_deck import OUTER_NODES
 from ..solvers.press_results import read_press

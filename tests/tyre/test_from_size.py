@@ -10,16 +10,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tyrecal.case import LoadedCase, start_values
-from tyrecal.case.draft import from_size
-from tyrecal.deck.tyre_design import TyreDesign
-from tyrecal.design import load_case, resolved
-from tyrecal.evaluate.evaluator import Evaluator, Question
+from tyrecal.simulate.deck.tyre_design import TyreDesign
+from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.studies.modes import modes_result
-from tyrecal.tyre.from_size import build, usual
-from tyrecal.tyre.mesh import build_mesh
-from tyrecal.tyre.section import Section, SectionError, fill_lines, read_section
-from tyrecal.tyre.size import parse_size
+from tyrecal.tyre.case import LoadedCase, start_values
+from tyrecal.tyre.case.draft import from_size
+from tyrecal.tyre.load import load_case
+from tyrecal.tyre.resolve import resolved
+from tyrecal.tyre.section.from_size import build, usual
+from tyrecal.tyre.section.mesh import build_mesh
+from tyrecal.tyre.section.section import Section, SectionError, fill_lines, read_section
+from tyrecal.tyre.section.size import parse_size
 
 TEN = [
     "145/80R13",

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tyrecal.tyre.from_size import build, usual
-from tyrecal.tyre.mesh import build_mesh
-from tyrecal.tyre.outline import read_outline, section_of_outline
-from tyrecal.tyre.section import SectionError, from_gauges, read_section
-from tyrecal.tyre.size import parse_size
+from tyrecal.tyre.section.from_size import build, usual
+from tyrecal.tyre.section.mesh import build_mesh
+from tyrecal.tyre.section.outline import read_outline, section_of_outline
+from tyrecal.tyre.section.section import SectionError, from_gauges, read_section
+from tyrecal.tyre.section.size import parse_size
 
 Array = np.ndarray
 SIZE = parse_size("205/60R15")

@@ -25,18 +25,19 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-from ..case import CaseError, LoadedCase, start_values, with_level
-from ..deck.tyre_design import TyreDesign
-from ..design import load_case, unusual_value, with_values
 from ..errors import InputError
-from ..evaluate.evaluator import Evaluator
-from ..evaluate.failure import DeckRefused, EvaluationFailed, SolverUnavailable
-from ..evaluate.sources import sources
-from ..evaluate.store import Store, sources_of
 from ..files import json_text, own_folder, read_bytes, read_json, set_aside, write_runs, write_text
-from ..provenance import provenance
+from ..simulate.deck.tyre_design import TyreDesign
+from ..simulate.evaluate.evaluator import Evaluator
+from ..simulate.evaluate.failure import DeckRefused, EvaluationFailed, SolverUnavailable
+from ..simulate.evaluate.sources import sources
+from ..simulate.evaluate.store import Store, sources_of
+from ..simulate.provenance import provenance
 from ..studies.fitted import NOT_CONVERGED, has_good
-from ..templates import TemplateFailed
+from ..tyre.case import CaseError, LoadedCase, start_values, with_level
+from ..tyre.load import load_case
+from ..tyre.templates import TemplateFailed
+from ..tyre.values import unusual_value, with_values
 from .studies import Asked, Outcome, Studied, study
 
 FINISHED = "finished.json"  # in a case's folder: what was asked, and the answer

@@ -7,8 +7,8 @@ from collections.abc import Callable, Sequence
 from contextlib import closing
 from pathlib import Path
 
-from ..evaluate.executor import WorkerLost, executor
 from ..files import printable
+from ..simulate.evaluate.executor import WorkerLost, executor
 from .case import CaseTask, Report, lost, run_case
 
 

@@ -13,16 +13,16 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from ..case import LoadedCase
-from ..evaluate.evaluator import Evaluator, Question
-from ..evaluate.failure import EvaluationFailed
-from ..fit.calibrate import calibrate, history_csv
-from ..provenance import provenance
+from ..simulate.evaluate.evaluator import Evaluator, Question
+from ..simulate.evaluate.failure import EvaluationFailed
+from ..simulate.provenance import provenance
 from ..studies import footprint as pressed
 from ..studies import pressure_result
+from ..studies.fit.calibrate import calibrate, history_csv
 from ..studies.fitted import NOT_CONVERGED
 from ..studies.modes import modes_result
 from ..studies.result import Failed, Part, Result
+from ..tyre.case import LoadedCase
 
 Numbers = dict[str, float]
 

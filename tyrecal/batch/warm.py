@@ -7,11 +7,11 @@ import gc
 from contextlib import suppress
 from importlib.metadata import entry_points
 
-from ..evaluate.pool import leave_interrupts_to_parent
+from ..simulate.evaluate.pool import leave_interrupts_to_parent
 
 leave_interrupts_to_parent()
 
-from ..evaluate.solver import GROUP  # noqa: E402
+from ..simulate.evaluate.solver import GROUP  # noqa: E402
 from . import case  # noqa: E402, F401  takes a second: the studies and all that they need
 
 for entry in entry_points(group=GROUP):

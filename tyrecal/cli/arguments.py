@@ -24,9 +24,9 @@ def load(
     Says which numbers of the file do not count. Returns (case, values of the variables). Raises
     CaseError, click.UsageError; both for numbers that no tyre has, too, unless they are allowed.
     """
-    from ..case import overruled, parse_assignment, start_values, with_level
-    from ..design import load_case, overridden, with_values
-    from ..design.load import CaseError
+    from ..tyre.case import overruled, parse_assignment, start_values, with_level
+    from ..tyre.load import CaseError, load_case
+    from ..tyre.values import overridden, with_values
 
     case = load_case(path, allow_unusual)
     try:
@@ -59,7 +59,7 @@ def load(
 def refuse_unusual(loaded: Any, option: str, name: str, value: float, allowed: bool) -> None:
     """Raises click.UsageError where nobody states such a value of the variable, or number by its
     path, ``name``, unless it is ``allowed``. option: where it is stated."""
-    from ..design import unusual_value
+    from ..tyre.values import unusual_value
 
     if not allowed and (message := unusual_value(loaded, name, value)):
         raise click.UsageError(f"{option}: {message}")
@@ -69,7 +69,7 @@ def parse_loads(text: str, option: str = "--loads-N", zero: bool = False) -> lis
     """Loads in N; ``zero``: 0 may be the first. Raises click.UsageError."""
     from itertools import pairwise
 
-    from ..case.analysis import LARGEST_LOAD_N, LEAST_LOAD_N
+    from ..tyre.case.analysis import LARGEST_LOAD_N, LEAST_LOAD_N
 
     loads: list[float] = []
     for word in text.split(","):
@@ -100,8 +100,8 @@ def parse_pressures(low: float, high: float, steps: int, allowed: bool) -> tuple
     click.UsageError."""
     from math import isfinite
 
-    from ..design.guard import ALL_THE_SAME
-    from ..design.usual import USUAL
+    from ..tyre.guard import ALL_THE_SAME
+    from ..tyre.usual import USUAL
 
     for option, value in (("--from-kPa", low), ("--to-kPa", high)):
         if not (isfinite(value) and value > 0):

@@ -102,7 +102,7 @@ def command(
     Exit codes: 0 all cases good; 2 the input is wrong; 5 some failed or drifted; 130, 143,
     129 interrupted, terminated, hung up.
     """
-    from ..evaluate.pool import warm_up
+    from ..simulate.evaluate.pool import warm_up
 
     if jobs > 1 and len(cases) > 1 and not scheduler:
         warm_up()  # while we import
@@ -112,8 +112,8 @@ def command(
     from ..batch.run import run_batch
     from ..batch.studies import Asked
     from ..batch.summary import summary
-    from ..evaluate.queue import reached
-    from ..settings import root
+    from ..simulate.evaluate.queue import reached
+    from ..simulate.settings import root
     from .output import Run
     from .progress import BatchProgress
 
@@ -210,7 +210,7 @@ def _sweep(tasks: Sequence[Any]) -> None:
     """Drop the run folders of processes that died."""
     from contextlib import suppress
 
-    from ..evaluate.folders import drop_unfinished
+    from ..simulate.evaluate.folders import drop_unfinished
 
     for task in tasks:
         drop_unfinished(task.folder / "runs")

@@ -91,15 +91,15 @@ def make(
     """
     from dataclasses import replace
 
-    from ..blind.answer import rows_of, tyre_model
-    from ..blind.make import make as made
-    from ..blind.maker import bundled_maker
-    from ..blind.protocol import Protocol
-    from ..blind.ruler import measure
-    from ..deck.tyre_design import TyreDesign
-    from ..design import load_case
-    from ..evaluate.evaluator import Evaluator
-    from ..evaluate.store import Store
+    from ..simulate.deck.tyre_design import TyreDesign
+    from ..simulate.evaluate.evaluator import Evaluator
+    from ..simulate.evaluate.store import Store
+    from ..studies.blind.answer import rows_of, tyre_model
+    from ..studies.blind.make import make as made
+    from ..studies.blind.maker import bundled_maker
+    from ..studies.blind.protocol import Protocol
+    from ..studies.blind.ruler import measure
+    from ..tyre.load import load_case
 
     if not effects + plain + outside:
         raise click.UsageError("there must be at least one trial")
@@ -158,15 +158,15 @@ def answer(
     \b
     tyrecal blind answer trials --jobs 2
     """
-    from ..blind import answer as blind
-    from ..blind.emulated import emulate
-    from ..blind.protocol import read_protocol
-    from ..blind.seal import refuse_open_truth
-    from ..deck.tyre_design import TyreDesign
-    from ..diagnose.model import ResponseModel
-    from ..effects import catalogue
-    from ..evaluate.evaluator import Evaluator
-    from ..evaluate.store import Store
+    from ..simulate.deck.tyre_design import TyreDesign
+    from ..simulate.evaluate.evaluator import Evaluator
+    from ..simulate.evaluate.store import Store
+    from ..studies.blind import answer as blind
+    from ..studies.blind.emulated import emulate
+    from ..studies.blind.protocol import read_protocol
+    from ..studies.blind.seal import refuse_open_truth
+    from ..studies.diagnose.model import ResponseModel
+    from ..tyre.effects import catalogue
 
     for id in effects:
         if id not in catalogue():
@@ -198,10 +198,10 @@ def score(folder: Path, truth: Path | None, talk: Talk) -> int:
     \b
     tyrecal blind score trials --json
     """
-    from ..blind.protocol import read_protocol, write_json
-    from ..blind.score import score as scored
-    from ..blind.tables import page, summary
     from ..files import write_text
+    from ..studies.blind.protocol import read_protocol, write_json
+    from ..studies.blind.score import score as scored
+    from ..studies.blind.tables import page, summary
 
     figures = summary(scored(folder, _sealed(folder, truth)))
     write_json(folder / "score.json", figures)

@@ -35,14 +35,14 @@ def solvers(ctx: click.Context, param: click.Parameter, incomplete: str) -> Item
 
 def effects(ctx: click.Context, param: click.Parameter, incomplete: str) -> Items:
     """Ids of effects."""
-    from ..effects import IDS
+    from ..tyre.effects import IDS
 
     return _starting(IDS, incomplete)
 
 
 def effect_values(ctx: click.Context, param: click.Parameter, incomplete: str) -> Items:
     """``EFFECT=``."""
-    from ..effects import IDS
+    from ..tyre.effects import IDS
 
     return _starting((f"{id}=" for id in IDS), incomplete)
 
@@ -61,7 +61,7 @@ def levels(ctx: click.Context, param: click.Parameter, incomplete: str) -> Items
 
 def assignments(ctx: click.Context, param: click.Parameter, incomplete: str) -> Items:
     """``NAME=`` of the case's variables and of its other numbers, by path, and of effects."""
-    from ..effects import IDS
+    from ..tyre.effects import IDS
 
     names = [*_part("variables"), *_numbers(_case()), *(f"effects.{id}" for id in IDS)]
     return _starting((f"{name}=" for name in dict.fromkeys(names)), incomplete)
@@ -86,7 +86,7 @@ def _yaml(folder: Path, depth: int) -> Iterator[Path]:
 
 def _case() -> dict[str, Any]:
     """The case on the command line as plain data, judged by nobody."""
-    from ..case.document import read_document
+    from ..tyre.case.document import read_document
 
     for word in split_arg_string(os.environ.get("COMP_WORDS", "")):
         if word.endswith(SUFFIXES):  # click has no arguments yet where an option lacks its value

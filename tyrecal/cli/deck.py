@@ -42,11 +42,11 @@ def command(
     python -m tyrecal_solvers.bundled decks/modes --oldjob inflate
     tyrecal deck cases/p235_75r17.yaml --output pressed --loads-N 3000,5000
     """
-    from ..deck.decks import Decks
-    from ..deck.tyre_design import TyreDesign
-    from ..evaluate.evaluator import Evaluator
-    from ..evaluate.failure import DeckRefused
     from ..files import whole
+    from ..simulate.deck.decks import Decks
+    from ..simulate.deck.tyre_design import TyreDesign
+    from ..simulate.evaluate.evaluator import Evaluator
+    from ..simulate.evaluate.failure import DeckRefused
     from .output import Run
 
     loaded, values = arguments.load(case, mesh, assignments, pressure_kPa, talk, allow_unusual)

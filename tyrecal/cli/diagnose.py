@@ -101,15 +101,15 @@ def command(
         return 0
     if measured is None:
         raise click.UsageError("--measured FILE must be given, or --add EFFECT=VALUE")
-    from ..diagnose.diagnosis import STAGES
-    from ..diagnose.inverse_problem import Assumed
-    from ..diagnose.result import result
-    from ..diagnose.study import parse_change
-    from ..diagnose.study import study as diagnosed
-    from ..effects import catalogue
     from ..measured.tables import read_measurements
     from ..report.diagnosis import page
     from ..report.shape_data import parts_data
+    from ..studies.diagnose.diagnosis import STAGES
+    from ..studies.diagnose.inverse_problem import Assumed
+    from ..studies.diagnose.result import result
+    from ..studies.diagnose.study import parse_change
+    from ..studies.diagnose.study import study as diagnosed
+    from ..tyre.effects import catalogue
 
     loaded, values = study.load(case, assignments)
     loaded = arguments.starting_at(loaded, values)
@@ -173,9 +173,9 @@ def command(
 
 def _added(case: Path, assignment: str, output: Path | None, allowed: bool) -> Path:
     """The new case's file. Raises click.UsageError, CaseError."""
-    from ..case import parse_assignment
-    from ..design import load_case
-    from ..diagnose.add import NotAdded, add
+    from ..studies.diagnose.add import NotAdded, add
+    from ..tyre.case import parse_assignment
+    from ..tyre.load import load_case
 
     loaded = load_case(case, allowed)
     try:

@@ -46,9 +46,9 @@ def command(solver: str, store: Path | None, talk: Talk) -> int:
     tyrecal doctor --solver calculix
     tyrecal doctor --json
     """
-    from ..doctor.installation import extras, machine, packages, records
-    from ..doctor.self_check import self_check
-    from ..evaluate.solver import installed
+    from ..simulate.doctor.installation import extras, machine, packages, records
+    from ..simulate.doctor.self_check import self_check
+    from ..simulate.evaluate.solver import installed
     from ..version import __version__
 
     with talk.progress("known tyre"):

@@ -60,15 +60,15 @@ def command(
     tyrecal effects bead_filler --case cases/p235_75r17.yaml --fitted p235_75r17/fit.json
     tyrecal effects --case cases/p235_75r17.yaml --jobs 2
     """
-    from ..case.mistakes import suggestion
-    from ..effects import IDS, catalogue
-    from ..evaluate.failure import EvaluationFailed
-    from ..evaluate.solver import installed
     from ..report.effects import effect_entry, effect_text, signature_entry
     from ..report.figure import save
     from ..report.signature import draw_signature
     from ..report.table import effects_table, shown, signatures_table
+    from ..simulate.evaluate.failure import EvaluationFailed
+    from ..simulate.evaluate.solver import installed
     from ..studies.signature import Plain, stated_size
+    from ..tyre.case.mistakes import suggestion
+    from ..tyre.effects import IDS, catalogue
 
     talk = study.talk
 
@@ -137,7 +137,7 @@ def command(
 
 def _variables_in(assignments: tuple[str, ...], values: Mapping[str, float]) -> list[str]:
     """Variables among what is set."""
-    from ..case import parse_assignment
+    from ..tyre.case import parse_assignment
 
     return [name for name, _ in map(parse_assignment, assignments) if name in values]
 

@@ -82,11 +82,11 @@ def command(
     tyrecal fit cases/p235_75r17.yaml --starts 20 --seed 1 --jobs 2
     tyrecal fit cases/p235_75r17.yaml --starts 20 --seed 1 --scheduler tcp://10.0.0.1:8786
     """
-    from ..evaluate.queue import reached
-    from ..fit.calibrate import calibrate, check, history_csv
-    from ..fit.problem import Problem, objective_unit
     from ..report.table import shown
     from ..report.words import fit_doubts, fit_verdict, tyre_doubts
+    from ..simulate.evaluate.queue import reached
+    from ..studies.fit.calibrate import calibrate, check, history_csv
+    from ..studies.fit.problem import Problem, objective_unit
     from ..studies.fitted import NOT_CONVERGED, has_good
 
     talk = study.talk
@@ -130,9 +130,9 @@ def command(
     for warning in (*tyre_doubts(result), *fit_doubts(result)):
         talk.warn(warning)
     if pictures or study.report:
-        from ..design import with_values
-        from ..evaluate.evaluator import Question
         from ..report.shape_data import tyre_data
+        from ..simulate.evaluate.evaluator import Question
+        from ..tyre.values import with_values
 
         values = fit.fitted.values
         modes = sorted(fit.fitted.modes.values(), key=lambda mode: mode.frequency_Hz)

@@ -14,7 +14,7 @@ from . import options
 from .talk import Talk
 
 if TYPE_CHECKING:
-    from ..case.draft import Draft
+    from ..tyre.case.draft import Draft
 
 POSITIVE = click.FloatRange(min=0, min_open=True)
 
@@ -86,10 +86,10 @@ def command(
     tyrecal init P235/75R17 --section my_stations.csv --output my_tyre.yaml
     tyrecal init 205/60R15 --section my_outline.csv --belt-width-mm 160 --output my_outline.yaml
     """
-    from ..case.draft import from_file, from_size
-    from ..design.guard import ALL_THE_SAME
-    from ..design.usual import GAUGES, USUAL
-    from ..tyre.size import INCH, parse_size
+    from ..tyre.case.draft import from_file, from_size
+    from ..tyre.guard import ALL_THE_SAME
+    from ..tyre.section.size import INCH, parse_size
+    from ..tyre.usual import GAUGES, USUAL
 
     if size is None and file is None:
         raise click.UsageError("give a SIZE, as in 'tyrecal init 205/60R15', or --section FILE")
@@ -124,8 +124,8 @@ def _write(
     draft: Draft, file: Path | None, target: Path, picture: Path | None, force: bool, talk: Talk
 ) -> None:
     """Write case, section and picture, none over an existing file and only what is right."""
-    from ..design import load_case
     from ..files import whole
+    from ..tyre.load import load_case
 
     table = target.with_name(draft.file)
     own = file is not None and file.resolve() == table.resolve()  # it is there already
@@ -146,10 +146,10 @@ def _write(
         f" {2e3 * outside[:, 1].max():.1f} mm, {loaded.case.pressure_kPa:g} kPa"
     )
     if picture:
-        from ..design import resolved
         from ..report.figure import save
         from ..report.section import draw_section
         from ..report.shape_data import section_data
+        from ..tyre.resolve import resolved
 
         section = section_data(loaded, resolved(loaded).mesh, {})
         save(draw_section(section, loaded.case.name, loaded.case.pressure_kPa), picture)

@@ -12,7 +12,7 @@ from .main import EXIT_SOLVER
 from .options import Study
 
 if TYPE_CHECKING:
-    from ..case import LoadedCase
+    from ..tyre.case import LoadedCase
 
 
 def wanted_loads(load_N: float | None, sweep: str | None) -> list[float]:

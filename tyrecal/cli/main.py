@@ -123,7 +123,7 @@ class Commands(click.Group):
 
 def _meant(name: str) -> str:
     """The command that a misspelt one stands for; else all of them."""
-    from ..case.mistakes import suggestion
+    from ..tyre.case.mistakes import suggestion
 
     begun = [command for command in COMMANDS if command.startswith(name.lower())]
     parts = [command for command in COMMANDS if name.lower() in command.split("-")]
@@ -153,7 +153,7 @@ def cli(ctx: click.Context) -> None:
 def _defaults(command: str | None) -> dict[str, Any]:
     """What the user's settings say in place of an option. Raises SettingsError, but not where the
     installation is looked at."""
-    from ..settings import SettingsError, settings
+    from ..simulate.settings import SettingsError, settings
 
     try:
         found = settings()

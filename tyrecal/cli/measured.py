@@ -201,7 +201,7 @@ def _layout(
     response: str = "",
 ) -> Layout:
     from ..measured.modal import Layout
-    from ..modes.label import HIGHEST_HARMONIC
+    from ..simulate.modes.label import HIGHEST_HARMONIC
 
     x, y, z = _numbers("--centre", centre, 3)
     most = HIGHEST_HARMONIC if highest is None else highest

@@ -48,8 +48,8 @@ def command(
     tyrecal modes cases/p235_75r17.yaml --load-N 4000
     tyrecal modes cases/p235_75r17.yaml --sweep-load 0,1000,2000,4000 --fitted p235_75r17/fit.json
     """
-    from ..evaluate.evaluator import Question
     from ..report.shape_data import tyre_data
+    from ..simulate.evaluate.evaluator import Question
     from ..studies.modes import modes_result
 
     loads = wanted_loads(load_N, sweep)

@@ -33,10 +33,10 @@ from .talk import SOLVERS, Talk
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from ..case import LoadedCase
-    from ..evaluate.evaluator import Evaluator
-    from ..evaluate.failure import EvaluationFailed
+    from ..simulate.evaluate.evaluator import Evaluator
+    from ..simulate.evaluate.failure import EvaluationFailed
     from ..studies.result import Result
+    from ..tyre.case import LoadedCase
     from .output import Run
 
 case_argument = click.argument(
@@ -254,8 +254,8 @@ class Study:
 
     def evaluator(self, loaded: Any) -> Evaluator:
         """The evaluator with the solver asked for. Raises InputError."""
-        from ..deck.tyre_design import TyreDesign
-        from ..evaluate.evaluator import Evaluator
+        from ..simulate.deck.tyre_design import TyreDesign
+        from ..simulate.evaluate.evaluator import Evaluator
 
         evaluator = Evaluator(TyreDesign(loaded), self.solver, command=self.solver_command)
         evaluator.solver  # noqa: B018  a solver that is not there is refused before anything is written
@@ -273,7 +273,7 @@ class Study:
         """The command's run, with the record behind ``evaluator``; ``study``: where it is not
         ``command``; measured, state: of the results' `provenance`. Raises InputError,
         OSError."""
-        from ..provenance import provenance
+        from ..simulate.provenance import provenance
         from .output import Run
 
         block = provenance(loaded, evaluator.solver, measured, **state)
@@ -382,7 +382,7 @@ def _words(command: str | None) -> tuple[str, ...]:
     """The words of --solver-command. Raises SettingsError."""
     if command is None:
         return ()
-    from ..settings import words
+    from ..simulate.settings import words
 
     return tuple(words(command, "--solver-command"))
 

@@ -31,8 +31,8 @@ from ..files import (
     write_text,
 )
 from ..interrupt import interrupts_put_off
-from ..provenance import stamped
-from ..settings import root
+from ..simulate.provenance import stamped
+from ..simulate.settings import root
 from ..studies.result import Result
 from . import lock
 from .talk import resume
@@ -40,8 +40,8 @@ from .talk import resume
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from ..evaluate.evaluator import Counts
-    from ..evaluate.store import Store
+    from ..simulate.evaluate.evaluator import Counts
+    from ..simulate.evaluate.store import Store
 
 AnyResult = TypeVar("AnyResult", bound=Result)
 NEW = ".new-"  # folder of a run's results until all are there
@@ -93,7 +93,7 @@ class Run:
         """The record of evaluations: in ``folder``, or beside the results, or ``none``."""
         words = "with --no-store nothing is on record; the same command starts from the beginning"
         if not none:
-            from ..evaluate.store import Store
+            from ..simulate.evaluate.store import Store
 
             if not folder:
                 refuse_link(self.folder / "record")
@@ -182,7 +182,7 @@ class Run:
 
     def _drop_unfinished(self) -> None:
         """What processes that were ended, now or in an earlier run, left of their runs."""
-        from ..evaluate.folders import drop_unfinished
+        from ..simulate.evaluate.folders import drop_unfinished
 
         drop_unfinished(self.runs)
 
@@ -191,7 +191,7 @@ class Run:
             if hasattr(self, "new"):
                 shutil.rmtree(self.new, ignore_errors=True)
             if self.solver and self._lock and not self._finished:
-                from ..evaluate.executor import end_workers
+                from ..simulate.evaluate.executor import end_workers
 
                 end_workers()
                 self._drop_unfinished()

@@ -21,8 +21,8 @@ def command(talk: Talk) -> int:
     tyrecal solvers
     tyrecal fit cases/p235_75r17.yaml --solver bundled
     """
-    from ..evaluate.solver import installed
     from ..report.table import shown, solvers_table
+    from ..simulate.evaluate.solver import installed
 
     found = installed()
     talk.result(found)
@@ -37,7 +37,7 @@ def command(talk: Talk) -> int:
 
 def settings_file() -> dict[str, Any]:
     """``file`` of the user's settings, or None; ``there``: whether it is; ``problem``, or None."""
-    from ..settings import SettingsError, place, settings
+    from ..simulate.settings import SettingsError, place, settings
 
     path, problem = place(), None
     try:

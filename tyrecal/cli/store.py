@@ -34,8 +34,8 @@ def command(folder: Path, verify: bool, prune: float | None, talk: Talk) -> int:
     tyrecal store p235_75r17
     tyrecal store p235_75r17 --verify --prune 100
     """
-    from ..evaluate.store import Store
     from ..files import refuse_link
+    from ..simulate.evaluate.store import Store
 
     if verify or prune is not None:
         resume("what was removed by then is evaluated anew when it is needed")

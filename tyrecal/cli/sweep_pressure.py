@@ -40,7 +40,7 @@ def command(
     tyrecal sweep-pressure cases/p235_75r17.yaml --fitted p235_75r17/fit.json --jobs 2
     tyrecal sweep-pressure cases/p235_75r17.yaml --from-kPa 180 --to-kPa 260 --steps 5 --json
     """
-    from ..fit.problem import read_targets
+    from ..studies.fit.problem import read_targets
     from ..studies.pressure_result import run
 
     talk = study.talk
@@ -76,9 +76,9 @@ def _pressures(
     allow_unusual: bool,
 ) -> list[float]:
     """The pressures of the sweep, kPa. Raises click.UsageError."""
-    from ..case import parse_assignment
-    from ..design import with_values
     from ..studies.fitted import pressure_name
+    from ..tyre.case import parse_assignment
+    from ..tyre.values import with_values
 
     name = pressure_name(loaded)
     if name in [parse_assignment(text)[0] for text in assignments]:

@@ -65,7 +65,7 @@ def _fits(folders: list[Path]) -> Iterator[tuple[str, Path, Path]]:
 
 def _cases() -> Iterator[Path]:
     """Case files of this folder."""
-    from ..case.document import read_document
+    from ..tyre.case.document import read_document
 
     for path in Path().iterdir():
         if path.suffix in (".yaml", ".yml") and path.is_file():

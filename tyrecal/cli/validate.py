@@ -24,8 +24,8 @@ def command(case: Path, allow_unusual: bool, talk: Talk) -> int:
     tyrecal validate cases/p235_75r17.yaml
     tyrecal validate my.yaml --json
     """
-    from ..case import overruled
-    from ..design import load_case, validate
+    from ..tyre.case import overruled
+    from ..tyre.load import load_case, validate
 
     mistakes = validate(case, allow_unusual)
     for mistake in mistakes:

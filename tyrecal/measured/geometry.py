@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ..errors import InputError
-from ..modes.label import BELT
+from ..simulate.modes.label import BELT
 from .sensors import Sensors
 from .universal import Place, Signal
 

@@ -23,8 +23,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.polynomial.legendre import legvander
 
-from ..modes.label import AXIAL, BELT, COLUMNS, DEGREE, HIGHEST_HARMONIC, PARITY
-from ..modes.mode import Label
+from ..simulate.modes.label import AXIAL, BELT, COLUMNS, DEGREE, HIGHEST_HARMONIC, PARITY
+from ..simulate.modes.mode import Label
 from .sensors import Sensors
 
 Array = np.ndarray

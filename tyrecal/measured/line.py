@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from math import isfinite, nan
 
-from ..modes.mode import Label
+from ..simulate.modes.mode import Label
 from ..units import QUANTITIES
 from .columns import Column
 from .measurement import Measurement

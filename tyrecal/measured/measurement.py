@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from math import nan
 
-from ..design.usual import MEASURED
-from ..modes.mode import Label
+from ..simulate.modes.mode import Label
+from ..tyre.usual import MEASURED
 
 CSV_COLUMNS = ("quantity", "c", "m", "kind", "member", "pressure_kPa", "load_N", "value", "sigma")
 PRESSURE_RANGE_kPa = (20.0, 2000.0)

@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..errors import InputError
-from ..modes.label import BELT, HIGHEST_HARMONIC, TAKES_PART
-from ..modes.mode import Label
+from ..simulate.modes.label import BELT, HIGHEST_HARMONIC, TAKES_PART
+from ..simulate.modes.mode import Label
 from .geometry import sensors_of
 from .identify import FORMS, Responses, identify
 from .labels import Judged, Labeller

@@ -18,9 +18,9 @@ from math import isnan
 
 import numpy as np
 
-from ..design.usual import LARGEST_SIGMA
 from ..errors import InputError
-from ..modes.mode import Label
+from ..simulate.modes.mode import Label
+from ..tyre.usual import LARGEST_SIGMA
 from .measurement import Key, Measurement
 
 FLOOR = 0.001  # of the value

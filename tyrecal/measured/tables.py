@@ -17,9 +17,9 @@ from dataclasses import replace
 from math import isnan
 from pathlib import Path
 
-from ..design.usual import LARGEST_SIGMA
 from ..errors import InputError
 from ..files import read_bytes
+from ..tyre.usual import LARGEST_SIGMA
 from .columns import Column, read_columns
 from .line import Line
 from .measurement import CSV_COLUMNS, Measurement

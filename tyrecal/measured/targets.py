@@ -7,10 +7,10 @@ from dataclasses import replace
 from math import hypot
 from pathlib import Path
 
-from ..case import LoadedCase
-from ..case.calibration import MEASURED, TargetFootprint, TargetMode, Targets
 from ..errors import InputError
-from ..modes.mode import Label
+from ..simulate.modes.mode import Label
+from ..tyre.case import LoadedCase
+from ..tyre.case.calibration import MEASURED, TargetFootprint, TargetMode, Targets
 from .measurement import Measurement
 from .tables import read_measurements
 

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter, NullLocator
 
-from ..fit.result import FittedMode
+from ..studies.fit.result import FittedMode
 from .figure import COLOURS, GREY, MARKERS, headline, in_house_style, new_figure
 
 

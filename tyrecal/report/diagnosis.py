@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from ..diagnose.covariance import BETWEEN_PRESSURES
-from ..diagnose.diagnosis import Diagnosis
-from ..diagnose.evidence import NONE, OUTSIDE
-from ..diagnose.study import DiagnosedCase
-from ..diagnose.under_load import LoadedRow
-from ..diagnose.verdict import NAMED, NO_GAP, UNDECIDED
+from ..studies.diagnose.covariance import BETWEEN_PRESSURES
+from ..studies.diagnose.diagnosis import Diagnosis
+from ..studies.diagnose.evidence import NONE, OUTSIDE
+from ..studies.diagnose.study import DiagnosedCase
+from ..studies.diagnose.under_load import LoadedRow
+from ..studies.diagnose.verdict import NAMED, NO_GAP, UNDECIDED
 from ..units import in_engineers_units, said
 from .words import map_resolution
 

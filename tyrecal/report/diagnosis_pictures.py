@@ -8,11 +8,11 @@ from textwrap import fill
 import numpy as np
 from matplotlib.figure import Figure
 
-from ..diagnose.diagnosis import Diagnosis
-from ..diagnose.evidence import NONE, OUTSIDE
-from ..diagnose.gap import family
-from ..diagnose.observations import Observable
-from ..modes.mode import Label
+from ..simulate.modes.mode import Label
+from ..studies.diagnose.diagnosis import Diagnosis
+from ..studies.diagnose.evidence import NONE, OUTSIDE
+from ..studies.diagnose.gap import family
+from ..studies.diagnose.observations import Observable
 from .figure import COLOURS, GREY, headline, in_house_style, new_figure
 from .section import draw_section_map
 from .shape_data import DiagnosisSection

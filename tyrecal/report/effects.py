@@ -10,14 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from ..effects import Effect
 from ..studies.signature import Signature, rms
+from ..tyre.effects import Effect
 
 WIDTH = 98
 
 
 def effect_entry(effect: Effect, solvers: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """An effect as JSON; solvers: those installed, as `tyrecal.evaluate.solver.installed` says."""
+    """An effect as JSON; solvers: those installed, as `solver.installed` says."""
     return {
         "id": effect.id,
         "title": effect.title,

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..modes.label import BELT
-from ..modes.mode import Label
+from ..simulate.modes.label import BELT
+from ..simulate.modes.mode import Label
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

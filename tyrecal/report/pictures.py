@@ -6,10 +6,11 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from ..case import LoadedCase
-from ..design import resolved, with_values
-from ..evaluate.results import Evaluation
-from ..modes.mode import Label, Mode
+from ..simulate.evaluate.results import Evaluation
+from ..simulate.modes.mode import Label, Mode
+from ..tyre.case import LoadedCase
+from ..tyre.resolve import resolved
+from ..tyre.values import with_values
 from .convergence import draw_convergence
 from .figure import save
 from .revolve import placed

@@ -14,10 +14,10 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..errors import InputError
-from ..evaluate.results import Evaluation, HarmonicShape, RawMode
-from ..modes.mode import Mode
-from ..modes.sample import on_rings
-from ..tyre.mesh import SectionMesh
+from ..simulate.evaluate.results import Evaluation, HarmonicShape, RawMode
+from ..simulate.modes.mode import Mode
+from ..simulate.modes.sample import on_rings
+from ..tyre.section.mesh import SectionMesh
 
 Array = np.ndarray
 NEAREST = 1e-3  # m, within which a node of another mesh stands for one of ours

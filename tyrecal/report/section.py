@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from ..diagnose.where import PartChange
+from ..studies.diagnose.where import PartChange
 from .figure import COLOURS, GREY, RUBBER, headline, in_house_style, new_figure
 from .shape_data import DiagnosisSection, Flat, Section
 from .words import MINUS, map_resolution

@@ -8,16 +8,16 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from ..case import LoadedCase
-from ..design import resolved
-from ..evaluate.pressed import Pressed
-from ..evaluate.results import Evaluation, HarmonicShape
-from ..modes.loaded import MIRROR
-from ..modes.mode import Mode
+from ..simulate.evaluate.pressed import Pressed
+from ..simulate.evaluate.results import Evaluation, HarmonicShape
+from ..simulate.modes.loaded import MIRROR
+from ..simulate.modes.mode import Mode
 from ..studies.loaded import LoadedTyre
 from ..studies.patch import patch_of
 from ..studies.result import Named, Part, Result, Wave
-from ..tyre.mesh import SectionMesh
+from ..tyre.case import LoadedCase
+from ..tyre.resolve import resolved
+from ..tyre.section.mesh import SectionMesh
 from .revolve import placed, skin
 
 Array = np.ndarray

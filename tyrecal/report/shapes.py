@@ -14,8 +14,8 @@ from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d import Axes3D
 from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 
-from ..modes.mode import Mode
-from ..tyre.mesh import SectionMesh
+from ..simulate.modes.mode import Mode
+from ..tyre.section.mesh import SectionMesh
 from .figure import COLOURS, in_house_style, new_figure, save
 from .revolve import motion, skin, swept
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
-from ..effects import catalogue
 from ..studies.signature import Signature
+from ..tyre.effects import catalogue
 from .figure import COLOURS, GREY, headline, in_house_style, new_figure
 from .words import MINUS
 

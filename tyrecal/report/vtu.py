@@ -8,10 +8,10 @@ from pathlib import Path
 import meshio
 import numpy as np
 
-from ..evaluate.pressed import Footprint, Pressed
 from ..files import whole
-from ..modes.mode import Mode
-from ..tyre.mesh import SectionMesh
+from ..simulate.evaluate.pressed import Footprint, Pressed
+from ..simulate.modes.mode import Mode
+from ..tyre.section.mesh import SectionMesh
 from .revolve import cartesian, corners, motion, swept
 
 WIDEST = np.radians(5.0)  # between rings of points of the pressed tyre

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ..design.usual import MEASURED
-from ..modes.mode import Label
+from ..simulate.modes.mode import Label
+from ..tyre.usual import MEASURED
 
 CLOSE, FAR = 2.0, 5.0  # % of deviation from a target
 MINUS = "\N{MINUS SIGN}"

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 GROUP = "tyrecal.studies"
 RESULTS = {  # in the order of a page
-    "fit": "tyrecal.fit.result:FitResult",
+    "fit": "tyrecal.studies.fit.result:FitResult",
     "modes": "tyrecal.studies.modes:ModesResult",
     "sweep-pressure": "tyrecal.studies.pressure_result:PressureSweep",
     "footprint": "tyrecal.studies.footprint:FootprintResult",

@@ -7,11 +7,11 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
-from ..case import LoadedCase, start_values
-from ..case.identity import is_of_tyre, tyre_sha256
-from ..design import with_values
 from ..errors import InputError
 from ..files import read_json
+from ..tyre.case import LoadedCase, start_values
+from ..tyre.case.identity import is_of_tyre, tyre_sha256
+from ..tyre.values import with_values
 
 NOT_CONVERGED = "not_converged"  # folder of a fit that may not take a better one's place
 

@@ -7,12 +7,12 @@ from typing import Annotated
 
 from pydantic import Field
 
-from ..case import LoadedCase
-from ..deck.tyre_design import TyreDesign
-from ..evaluate.evaluator import Evaluator
-from ..evaluate.failure import EvaluationFailed
-from ..evaluate.pressed import Footprint, Pressed
-from ..tyre.mesh import SectionMesh
+from ..simulate.deck.tyre_design import TyreDesign
+from ..simulate.evaluate.evaluator import Evaluator
+from ..simulate.evaluate.failure import EvaluationFailed
+from ..simulate.evaluate.pressed import Footprint, Pressed
+from ..tyre.case import LoadedCase
+from ..tyre.section.mesh import SectionMesh
 from .patch import patch_of
 from .result import (
     Column,

@@ -7,14 +7,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..case import LoadedCase
-from ..evaluate.evaluator import Evaluator, Question
-from ..evaluate.failure import DeckRefused, EvaluationFailed
-from ..evaluate.pressed import Pressed
-from ..fit.problem import read_targets
-from ..modes.find import Found, find_modes
-from ..modes.loaded import Member, Rings, follow, members, rings, state
-from ..modes.mode import Label, Mode
+from ..simulate.evaluate.evaluator import Evaluator, Question
+from ..simulate.evaluate.failure import DeckRefused, EvaluationFailed
+from ..simulate.evaluate.pressed import Pressed
+from ..simulate.modes.find import Found, find_modes
+from ..simulate.modes.loaded import Member, Rings, follow, members, rings, state
+from ..simulate.modes.mode import Label, Mode
+from ..tyre.case import LoadedCase
+from .fit.problem import read_targets
 
 FURTHER = 3  # harmonics beyond the case's that may stand among its modes
 SPARE = 6  # modes at a load beyond as many as stand for [0,0] to [c,1]

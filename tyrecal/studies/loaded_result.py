@@ -8,10 +8,10 @@ from typing import Any
 
 from pydantic import Field
 
-from ..case import LoadedCase
-from ..evaluate.evaluator import Evaluator
-from ..modes.loaded import SYMMETRIES
-from ..modes.mode import Label
+from ..simulate.evaluate.evaluator import Evaluator
+from ..simulate.modes.loaded import SYMMETRIES
+from ..simulate.modes.mode import Label
+from ..tyre.case import LoadedCase
 from .loaded import Loaded, LoadedMode, LoadedTyre, Outcome, load_tyres, progress
 from .modes import ModesFindings, ModesResult
 from .result import (

@@ -7,10 +7,10 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from ..case import LoadedCase
-from ..evaluate.results import Evaluation
-from ..modes.find import labelled
-from ..modes.mode import Mode
+from ..simulate.evaluate.results import Evaluation
+from ..simulate.modes.find import labelled
+from ..simulate.modes.mode import Mode
+from ..tyre.case import LoadedCase
 from .result import NAMED, Column, ModeEntry, Part, Result, Table
 
 EXTRA = {"symmetry": "", "member": "d", "clarity": ".2f", "overlap": ".2f"}  # forms

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..evaluate.pressed import Footprint, Pressed
-from ..tyre.mesh import SectionMesh
+from ..simulate.evaluate.pressed import Footprint, Pressed
+from ..tyre.section.mesh import SectionMesh
 
 Array = np.ndarray
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-from ..case import LoadedCase
-from ..evaluate.evaluator import Evaluator, Question
-from ..evaluate.failure import DeckRefused, EvaluationFailed
-from ..fit.problem import read_targets
-from ..modes.find import Found, find_modes, labelled
-from ..modes.mode import Label, Mode
+from ..simulate.evaluate.evaluator import Evaluator, Question
+from ..simulate.evaluate.failure import DeckRefused, EvaluationFailed
+from ..simulate.modes.find import Found, find_modes, labelled
+from ..simulate.modes.mode import Label, Mode
+from ..tyre.case import LoadedCase
+from .fit.problem import read_targets
 from .fitted import pressure_name
 
 

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from ..modes.follow import follow
-from ..modes.mode import FAMILIES, Label
+from ..simulate.modes.follow import follow
+from ..simulate.modes.mode import FAMILIES, Label
 from .pressure import State
 from .result import Part
 

@@ -7,10 +7,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from pydantic import Field
 
-from ..case import LoadedCase
-from ..evaluate.evaluator import Evaluator
-from ..fit.problem import read_targets
-from ..modes.mode import Label
+from ..simulate.evaluate.evaluator import Evaluator
+from ..simulate.modes.mode import Label
+from ..tyre.case import LoadedCase
+from .fit.problem import read_targets
 from .modes import mode_entry
 from .pressure import Failure, Outcome, State, sweep
 from .pressure_findings import PressureFindings, findings

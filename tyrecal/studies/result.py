@@ -14,9 +14,9 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from ..evaluate.failure import EvaluationFailed
 from ..files import json_text
-from ..modes.mode import Label
+from ..simulate.evaluate.failure import EvaluationFailed
+from ..simulate.modes.mode import Label
 
 Positive = Annotated[float, Field(gt=0)]
 Wave = Annotated[int, Field(ge=0, le=200)]

@@ -8,14 +8,14 @@ from itertools import islice
 
 import numpy as np
 
-from ..case import LoadedCase
-from ..effects import catalogue
-from ..evaluate.evaluator import Evaluator, Question
-from ..evaluate.failure import EvaluationFailed
-from ..evaluate.results import Evaluation
-from ..fit.problem import read_targets
-from ..modes.label import paired_labels
-from ..modes.mode import Label, Mode
+from ..simulate.evaluate.evaluator import Evaluator, Question
+from ..simulate.evaluate.failure import EvaluationFailed
+from ..simulate.evaluate.results import Evaluation
+from ..simulate.modes.label import paired_labels
+from ..simulate.modes.mode import Label, Mode
+from ..tyre.case import LoadedCase
+from ..tyre.effects import catalogue
+from .fit.problem import read_targets
 from .fitted import pressure_name
 
 Array = np.ndarray

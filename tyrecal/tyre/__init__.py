@@ -1,0 +1,1 @@
+"""What a tyre is: case file, section, mesh, materials, effects, resolved."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TypeVar
 
-from ...fit.result import QUANTITIES, FitResult, FittedMode
+from ...studies.fit.result import QUANTITIES, FitResult, FittedMode
 from ..words import CLOSE, FAR, MINUS
 from .contents import DiagnosisResult
 from .results import Results

@@ -7,8 +7,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
-from ...diagnose.observations import Observable
-from ...modes.mode import Label
+from ...simulate.modes.mode import Label
+from ...studies.diagnose.observations import Observable
 from ...studies.result import Column, Part, Positive, Provenance, Result, Table, Wave
 
 ROW = re.compile(r"\[(\d{1,3}),(\d{1,3})\](?: (axial|torsional))? at ([\d.]{1,9}) kPa")

@@ -16,11 +16,11 @@ from jinja2.sandbox import ImmutableSandboxedEnvironment
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
-from ...diagnose.where import PartChange
 from ...errors import InputError
 from ...files import open_file, whole
-from ...fit.result import FitResult
 from ...studies import named, result_types
+from ...studies.diagnose.where import PartChange
+from ...studies.fit.result import FitResult
 from ...studies.footprint import FootprintResult
 from ...studies.loaded_result import LoadSweep
 from ...studies.modes import ModesResult

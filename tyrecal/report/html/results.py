@@ -13,8 +13,8 @@ from pydantic import ValidationError
 
 from ...errors import InputError
 from ...files import NotAFile, read_runs, read_text
-from ...fit.result import FitResult
 from ...studies import result_types
+from ...studies.fit.result import FitResult
 from ...studies.result import Part, Provenance, Result
 from ..shape_data import DiagnosisSection, Patches, Shapes
 from .contents import DiagnosisResult, RunFacts

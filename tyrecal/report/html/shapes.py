@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...modes.mode import Label
+from ...simulate.modes.mode import Label
 from ..shape_data import Shape, Shapes
 
 STEPS = 32767

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from ...fit.result import FitResult
+from ...studies.fit.result import FitResult
 from ...studies.modes import ModesResult
 from ...studies.result import Result
 from ...units import said

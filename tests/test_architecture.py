@@ -1,0 +1,116 @@
+"""The map in .github/ARCHITECTURE.md is true: rooms, arrows, files and names are as it says."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+MAP = (ROOT / ".github" / "ARCHITECTURE.md").read_text(encoding="utf-8")
+ROOMS = re.findall(r"^(\w+) {2,}", MAP.split("```")[1], re.MULTILINE)  # from the top down
+LEAVES = ("errors", "files", "interrupt", "units", "version")
+FACES = ("__init__", "__main__")  # what is offered, and the command
+PACKAGES = {"tyrecal": "tyrecal", "solvers": "tyrecal_solvers"}
+
+
+def module_of(path: Path) -> str:
+    """The dotted name of a file."""
+    parts = path.relative_to(ROOT).with_suffix("").parts
+    return ".".join((PACKAGES[parts[0]], *parts[1:])).removesuffix(".__init__")
+
+
+@cache
+def modules() -> dict[str, Path]:
+    """Every module of the product by name."""
+    return {module_of(path): path for top in PACKAGES for path in (ROOT / top).rglob("*.py")}
+
+
+def imported(name: str) -> Iterator[str]:
+    """Modules that a module imports, late and for types only too."""
+    path = modules()[name]
+    package = name if path.name == "__init__.py" else name.rpartition(".")[0]
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom):
+            above = package.rsplit(".", node.level - 1)[0] if node.level else ""
+            source = ".".join(filter(None, (above, node.module)))
+            for alias in node.names:
+                inner = f"{source}.{alias.name}"
+                yield from (each for each in (inner, source)[inner not in modules() :][:1])
+        elif isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+
+
+def room_of(name: str) -> str:
+    """The room, leaf or face that a module of `tyrecal` stands in."""
+    return [*name.split("."), "__init__"][1]
+
+
+def test_the_rooms_are_those_of_the_map() -> None:
+    shown = {
+        path.stem
+        for path in (ROOT / "tyrecal").iterdir()
+        if path.suffix == ".py" or (path / "__init__.py").exists()
+    }
+    assert shown == {*ROOMS, *LEAVES, *FACES}
+    assert len(ROOMS) <= 8
+
+
+def test_imports_run_downwards() -> None:
+    """From the command to the leaves; the face hands on what `api` offers."""
+    order = ["__main__", *ROOMS[: ROOMS.index("api")], "__init__", *ROOMS[ROOMS.index("api") :]]
+    for name in modules():
+        here = room_of(name)
+        for other in imported(name):
+            if not (name.startswith("tyrecal.") and other.startswith("tyrecal.")):
+                continue
+            there = room_of(other)
+            if here in LEAVES:
+                assert there in LEAVES, f"{name} imports {other}"
+            elif there not in LEAVES:
+                assert order.index(here) <= order.index(there), f"{name} imports {other}"
+
+
+def test_no_circle() -> None:
+    """Not even of imports that are late or for types only."""
+    below = {name: {x for x in imported(name) if x in modules()} - {name} for name in modules()}
+    done: set[str] = set()
+
+    def visit(name: str, way: tuple[str, ...]) -> None:
+        assert name not in way, " -> ".join([*way[way.index(name) :], name])
+        if name not in done:
+            for other in sorted(below[name]):
+                visit(other, (*way, name))
+            done.add(name)
+
+    for name in below:
+        visit(name, ())
+
+
+@pytest.mark.parametrize("file", sorted(set(re.findall(r"`([\w/]+\.py)`", MAP))))
+def test_files_of_the_map(file: str) -> None:
+    assert (ROOT / "tyrecal" / file).is_file() or (ROOT / file).is_file()
+
+
+def test_names_of_the_map() -> None:
+    """A name in backticks behind a file, before the next one, is defined there."""
+    told = 0
+    for line in MAP.replace("\n   ", " ").splitlines():
+        marks = re.findall(r"`([^`]+)`", line)
+        files = [mark for mark in marks if re.fullmatch(r"[\w/]+\.py", mark)]
+        for file in files:
+            path = next(p for p in (ROOT / "tyrecal" / file, ROOT / file) if p.is_file())
+            defined = {
+                node.name
+                for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+                if isinstance(node, ast.ClassDef | ast.FunctionDef)
+            }
+            follows = marks[marks.index(file) + 1 :][:1]
+            if follows and re.fullmatch(r"[A-Za-z_]+", follows[0]) and follows[0] not in ("deck",):
+                assert follows[0] in defined, f"{file} has no {follows[0]}"
+                told += 1
+    assert told >= 15

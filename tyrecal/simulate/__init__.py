@@ -1,0 +1,1 @@
+"""What a design does: decks, evaluator, record, workers, labelled modes."""

@@ -1,0 +1,137 @@
+"""A case's own templates, rendered in a process apart, which is ended where they take too much.
+
+A template may loop for ever, or ask for all memory in one expression: nothing in this process could
+end that, in a thread or on Windows. The process is kept for the next deck, and ends with this one.
+"""
+
+from __future__ import annotations
+
+import atexit
+import contextlib
+import os
+import pickle
+import subprocess
+import sys
+import threading
+from pathlib import Path
+from typing import IO, Any
+
+from ...tyre.templates import TemplateFailed, environment, render
+
+CPU_S, WALL_S = 5, 60.0  # of one template; shipped ones take a tenth of a second
+MEMORY = 2_000_000_000  # bytes of address space, where the system limits it
+LARGEST = 50_000_000  # bytes of text
+GOOD, BAD = b"+", b"-"
+_own = threading.local()
+
+
+class Apart:
+    """Templates of a dialect, the user's own in ``folder`` before the tool's."""
+
+    auto_reload = True
+
+    def __init__(self, dialect: str, folder: Path):
+        self.dialect, self.folder = dialect, folder.absolute()
+
+    def render(self, template: str, names: dict[str, Any]) -> str:
+        """The text of a template. Raises TemplateFailed."""
+        asked = pickle.dumps((self.dialect, self.folder, template, names))
+        process = _process()
+        timer = threading.Timer(WALL_S, process.kill)
+        timer.start()
+        try:
+            assert process.stdin and process.stdout
+            process.stdin.write(len(asked).to_bytes(8, "big") + asked)
+            process.stdin.flush()
+            kind = process.stdout.read(1)
+            text = _read(process.stdout, LARGEST)
+        except (OSError, ValueError, EOFError):
+            _end(process)
+            raise TemplateFailed(
+                f"template '{template}' was stopped: it takes more than {CPU_S} s of a core,"
+                f" {MEMORY / 1e9:g} GB of memory or {LARGEST / 1e6:g} MB of text"
+            ) from None
+        except BaseException:  # its answer must not be taken for that to the next question
+            _end(process)
+            raise
+        finally:
+            timer.cancel()
+        if kind == BAD:
+            raise TemplateFailed(text.decode())
+        return text.decode()
+
+
+def _process() -> subprocess.Popen[bytes]:
+    """This thread's process; another one after a fork, or where it has ended."""
+    process: subprocess.Popen[bytes] | None = getattr(_own, "process", None)
+    if process is None or _own.pid != os.getpid() or process.poll() is not None:
+        process = subprocess.Popen(
+            # -P: what lies in the present folder, perhaps a stranger's, is not imported
+            [sys.executable, "-P", "-c", f"from {__name__} import serve; serve()"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
+            start_new_session=True,  # Ctrl-C is for this process, and ends that one too
+        )
+        _own.process, _own.pid = process, os.getpid()
+        atexit.register(_end, process)
+    return process
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    atexit.unregister(_end)
+    process.kill()
+    with contextlib.suppress(Exception):
+        process.wait(5)
+        for pipe in (process.stdin, process.stdout):
+            pipe.close()  # type: ignore[union-attr]
+
+
+def _read(stream: IO[bytes], most: int) -> bytes:
+    """A message: its length in 8 bytes, then itself. Raises EOFError, ValueError."""
+    size = int.from_bytes(_exactly(stream, 8), "big")
+    if size > most:
+        raise ValueError("too long")
+    return _exactly(stream, size)
+
+
+def _exactly(stream: IO[bytes], count: int) -> bytes:
+    found = stream.read(count)
+    if len(found) < count:
+        raise EOFError
+    return found
+
+
+def serve() -> None:
+    """What the process apart does: texts of templates, until nobody asks any more."""
+    answers = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # whatever is printed is no answer
+    while True:
+        try:
+            asked = _read(sys.stdin.buffer, sys.maxsize)
+        except EOFError:
+            return
+        dialect, folder, template, names = pickle.loads(asked)
+        _limit()
+        try:
+            kind, text = GOOD, render(environment(dialect, folder), template, names).encode()
+        except TemplateFailed as error:
+            kind, text = BAD, str(error)[:2000].encode("utf-8", "replace")
+        except UnicodeEncodeError:
+            kind, text = BAD, f"template '{template}' gives what is no text".encode()
+        answers.write(kind + len(text).to_bytes(8, "big"))
+        answers.write(text)
+        answers.flush()
+
+
+def _limit() -> None:
+    """Memory, and processor time from now on, as far as the system limits them."""
+    with contextlib.suppress(ImportError, ValueError, OSError):
+        import resource
+
+        used = resource.getrusage(resource.RUSAGE_SELF)
+        end = int(used.ru_utime + used.ru_stime) + 1 + CPU_S
+        resource.setrlimit(resource.RLIMIT_CPU, (end, resource.RLIM_INFINITY))
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+        resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))

@@ -1,0 +1,162 @@
+"""Decks of a design in a dialect, and where its variables stand in them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import Any, Protocol
+
+from ...tyre.case.analysis import Solver
+from ...tyre.templates import TemplateFailed
+
+Tangents = dict[str, list[tuple[str, int, int, float]]]
+
+
+class Design(Protocol):
+    """What is evaluated: a tyre with all its numbers, which can write itself as decks.
+
+    `TyreDesign` is one, of a case; whatever has these is another.
+    """
+
+    values: Mapping[str, float]
+    """Of the design variables, and other numbers that were set, by name or path."""
+
+    @property
+    def header(self) -> str:
+        """The comment lines that each of its decks begins with."""
+
+    @property
+    def pressure_kPa(self) -> float:
+        """The inflation pressure that its decks state."""
+
+    @property
+    def request(self) -> dict[str, Any]:
+        """``highest_harmonic`` and ``modes_per_harmonic`` that it wants, what decks cannot say."""
+
+    @property
+    def needs(self) -> dict[str, str]:
+        """Capabilities that a solver must have for it, and a sentence's end of what it lacks."""
+
+    @property
+    def has_slopes(self) -> bool:
+        """Whether a solver with gradients gives exact ones of it."""
+
+    @property
+    def solver(self) -> Solver:
+        """Which solver it is meant for, its options and time limit."""
+
+    def at(self, values: Mapping[str, float]) -> Design:
+        """The design with numbers set. Raises ValueError where it cannot have them."""
+
+    def neighbour(self, name: str, side: int) -> tuple[Design, float]:
+        """The design a small step to one side (1, -1) of a variable, and its value there."""
+
+    def texts(self, dialect: str, request: Mapping[str, Any]) -> dict[str, str]:
+        """File name to text, without the header. Raises TemplateFailed."""
+
+
+class Decks:
+    """Texts of a design's decks, written when asked for: what a solver's adapter is given."""
+
+    def __init__(
+        self,
+        design: Design,
+        gradients: tuple[str, ...] = (),
+        modes_per_harmonic: int | None = None,
+        loads_N: tuple[float, ...] = (),
+        loaded_modes: int = 0,
+    ):
+        """gradients: variables whose places in the deck are wanted; modes_per_harmonic: the
+        design's, or a larger number for a second look; loads_N: press the tyre on the road with
+        these instead of finding modes; loaded_modes: how many to find there."""
+        self.design, self.gradients = design, gradients
+        self.loads_N, self.loaded_modes = loads_N, loaded_modes
+        self.request = {**design.request, "loads_N": loads_N, "loaded_modes": loaded_modes}
+        if modes_per_harmonic:
+            self.request["modes_per_harmonic"] = modes_per_harmonic
+        self._header = design.header  # of all its texts: slopes come of their data
+
+    @property
+    def values(self) -> Mapping[str, float]:
+        """Of the design's variables, by name."""
+        return self.design.values
+
+    @property
+    def options(self) -> Mapping[str, Any]:
+        """The solver's own, from the case."""
+        return self.design.solver.options
+
+    def texts(self, dialect: str) -> dict[str, str]:
+        """File name to text, which begins with `header`. Raises TemplateFailed."""
+        return self._texts(self.design, dialect)
+
+    def _texts(self, design: Design, dialect: str) -> dict[str, str]:
+        written = design.texts(dialect, self.request)
+        return {file: self._header + text for file, text in written.items()}
+
+    def tangents(self, dialect: str) -> Tangents:
+        """Per variable, rows [job, 1-based line, 0-based field, d number / d variable].
+
+        From two decks written a little to either side of the variable, so it holds for any
+        template; the derivative is exact where the deck's number is linear in the variable.
+        Raises TemplateFailed where keywords come and go with the variable.
+        """
+        result: Tangents = {}
+        for name in self.gradients:
+            above, below = self.design.neighbour(name, 1), self.design.neighbour(name, -1)
+            texts = [self._texts(design, dialect) for design, _ in (above, below)]
+            if self.values[name] == 0:  # an effect: its keywords may be there on one side only
+                own = self.texts(dialect)
+                if any(
+                    t.keys() != own.keys() or _keywords(t[file]) != _keywords(own[file])
+                    for t in texts
+                    for file in own
+                ):
+                    raise TemplateFailed(
+                        f"{name} is 0, where keywords of the deck come and go: it has no slope"
+                        " there, give it another value"
+                    )
+            result[name] = [
+                (file.removesuffix(".inp"), *row)
+                for file in texts[0]
+                for row in _slopes(file, texts[0][file], texts[1][file], above[1] - below[1])
+            ]
+        return result
+
+
+def _keywords(text: str) -> tuple[int, list[str]]:
+    """The deck's number of lines, and its keyword lines."""
+    return text.count("\n"), re.findall(r"^\*\w.*", text, re.MULTILINE)
+
+
+def _slopes(file: str, above: str, below: str, width: float) -> list[tuple[int, int, float]]:
+    """Fields that differ between two decks: (line, field, difference over ``width``).
+
+    Comments and headings may differ as they like. Raises TemplateFailed.
+    """
+    if above == below:
+        return []
+    first, second = above.splitlines(), below.splitlines()
+    if len(first) != len(second):
+        raise TemplateFailed(f"{file}: its number of lines depends on a variable: no derivative")
+    rows, keyword = [], ""
+    for line, (one, other) in enumerate(zip(first, second, strict=True), start=1):
+        if one.startswith("*") and not one.startswith("**"):
+            keyword = one.split(",")[0].upper()
+        if one == other or one.startswith("**") or keyword == "*HEADING":
+            continue
+        try:
+            if one.startswith("*"):
+                raise ValueError("a keyword line")
+            fields = zip(one.split(","), other.split(","), strict=True)
+            rows += [
+                (line, i, (float(a) - float(b)) / width)
+                for i, (a, b) in enumerate(fields)
+                if a != b
+            ]
+        except ValueError:
+            raise TemplateFailed(
+                f"{file}, line {line}: '{one.strip()}' changes with a variable, but not as numbers"
+                " of a data line: it has no exact derivative"
+            ) from None
+    return rows

@@ -1,0 +1,124 @@
+"""The design of a case: its tyre resolved once, written by templates."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import Any
+
+from ...tyre.case import LoadedCase
+from ...tyre.case.analysis import Solver
+from ...tyre.effects import catalogue
+from ...tyre.resolve import resolved
+from ...tyre.templates import TemplateFailed, environment
+from ...tyre.values import set_values
+from .apart import Apart
+from .dialects import DIALECTS
+from .header import header
+from .wheel_and_gas import aside
+
+NEAR_ZERO = 1e-4  # of a variable's span: below, steps are shares of this
+STEP = 1e-4  # of a variable, to see which numbers of the deck it moves and how fast
+OUTSIDE = re.compile(  # but for comments: an absolute path or one upwards, code of one's own
+    r"^(?!\*\*).*=[ \t]*[\"']?(?:[/\\~@]|\.\.|[a-z]:[/\\]).*|^\*[ \t]*USER[ \t]*SUBROUTINE.*",
+    re.MULTILINE | re.IGNORECASE,
+)
+
+
+class TyreDesign:
+    """A case at values of its variables, or of any of its numbers (see `decks.Design`)."""
+
+    def __init__(self, case: LoadedCase, values: Mapping[str, float] | None = None):
+        """Raises ValueError for an unknown name, or a value that the case cannot have."""
+        self.values: Mapping[str, float] = dict(values or {})
+        self.case = set_values(case, self.values)
+        self.tyre = resolved(self.case)
+
+    def at(self, values: Mapping[str, float]) -> TyreDesign:
+        """The case with these values. Raises ValueError."""
+        return TyreDesign(self.case, values)
+
+    @property
+    def header(self) -> str:
+        """What the decks are of."""
+        return header(self.case)
+
+    @property
+    def pressure_kPa(self) -> float:
+        """The inflation pressure, effects on it counted."""
+        return self.tyre.case.pressure_kPa
+
+    @property
+    def request(self) -> dict[str, Any]:
+        """The case's ``analysis``, and what no deck of keywords says."""
+        analysis = self.case.case.analysis
+        return {
+            "highest_harmonic": analysis.highest_harmonic,
+            "modes_per_harmonic": analysis.modes_per_harmonic,
+            **aside(self.tyre),
+        }
+
+    @property
+    def needs(self) -> dict[str, str]:
+        """What its effects ask of a solver, and the tyre's own parts."""
+        lacks = {}
+        for id, value in self.case.case.effects.items():
+            if value and (need := catalogue()[id].needs):
+                lacks[need] = f"the effect '{id}'; 'tyrecal effects' shows which one can"
+        for need, words in self.tyre.needs.items():
+            lacks.setdefault(need, f"{words}; 'tyrecal solvers' shows which one can ({need})")
+        return lacks
+
+    @property
+    def has_slopes(self) -> bool:
+        """No solver gives those of a tyre with a splice."""
+        return not self.tyre.case.splice.share
+
+    @property
+    def solver(self) -> Solver:
+        """The case's."""
+        return self.case.case.solver
+
+    def neighbour(self, name: str, side: int) -> tuple[TyreDesign, float]:
+        """The design a small step to one side of a variable, or at it where that side is none.
+
+        The step is a share of the value or, where that is next to nothing beside the variable's
+        span, of the span, as the deck's digits would not show it else; it leads to no other sign.
+        """
+        value = self.values[name]
+        variable = self.case.case.variables.get(name)
+        span, least = 1.0, 0.0
+        if variable:
+            span = max(abs(variable.lower), abs(variable.upper))
+            least = 0.0 if variable.scale == "log" else NEAR_ZERO * span
+        elif name.startswith("effects."):
+            effect = catalogue()[name.removeprefix("effects.")]
+            span = max(abs(effect.low), abs(effect.high))
+            least = NEAR_ZERO * span
+        moved = value + side * STEP * (max(abs(value), least) if value else span)
+        if moved * value < 0:
+            moved = value
+        try:
+            return self.at({name: moved}), moved
+        except ValueError:
+            return self.at({name: value}), value
+
+    def texts(self, dialect: str, request: Mapping[str, Any]) -> dict[str, str]:
+        """File name to text, without the header. Raises TemplateFailed."""
+        own = self.case.case.templates
+        env = Apart(dialect, self.case.folder / own) if own else environment(dialect, None)
+        texts = DIALECTS[dialect](self.tyre, env, request)
+        if own:
+            for file, text in texts.items():
+                _refuse_outside(file, text)
+        return texts
+
+
+def _refuse_outside(file: str, text: str) -> None:
+    """Raises TemplateFailed where a deck of somebody's own templates would have the solver read or
+    write elsewhere than in its run folder, compile a program or load a library."""
+    for found in OUTSIDE.finditer(text):
+        line = text.count("\n", 0, found.start()) + 1
+        raise TemplateFailed(
+            f"{file}, line {line}: '{found[0].strip():.60}' leads out of the run's folder"
+        )

@@ -1,0 +1,321 @@
+"""Evaluations: a design goes in, modes, footprints or a typed failure come out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from math import isclose
+from pathlib import Path
+from typing import Any, TypeVar
+
+from ...files import printable
+from ...interrupt import interrupts_put_off, raise_interrupt
+from ..deck.decks import Decks, Design
+from . import folders
+from .executor import executor, in_order
+from .failure import DeckRefused, EvaluationFailed, WorkerLost
+from .pressed import Pressed, pressed
+from .results import Evaluation, evaluation
+from .solver import Solver, find_solver
+from .store import Store, key_of
+
+CAUSES = {"InflationFailed": "no_equilibrium", "Unstable": "unstable", "TimedOut": "timed_out"}
+SETTLED = ("no_equilibrium", "unstable")  # the deck's own doing: another run would say the same
+MODES_ON_TOP = 3  # times the time limit of a load, where modes are sought there too
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Question:
+    """One evaluation: values of variables or of any number of the case, by name or path.
+
+    gradients: names of variables whose slopes are wanted; modes_per_harmonic: None = the case's.
+    """
+
+    values: Mapping[str, float]
+    gradients: tuple[str, ...] = ()
+    modes_per_harmonic: int | None = None
+
+
+@dataclass
+class Counts:
+    """How often the solver ran, and how often the record answered instead."""
+
+    runs: int = 0
+    recorded: int = 0
+
+    def add(self, other: Counts) -> None:
+        """Count what another process did."""
+        self.runs, self.recorded = self.runs + other.runs, self.recorded + other.recorded
+
+
+def _unheard(done: int, total: int) -> None:
+    """Nobody wants to know."""
+
+
+@dataclass
+class Evaluator:
+    """Evaluates a design, and others of the same tyre, each in a fresh folder."""
+
+    design: Design
+    solver_name: str = ""  # else the design's
+    folder: Path | None = None  # of the run folders; None: temporary ones
+    keep: bool = False  # the folders of successful runs too; those of failures always are
+    store: Store | None = None  # the record, asked before the solver and told what it said
+    scheduler: str = (
+        ""  # address of the Dask scheduler that several questions go to, else processes
+    )
+    command: tuple[str, ...] = ()  # words that start the solver's program, else the user's settings
+    counts: Counts = field(default_factory=Counts)
+    # called with how many of how many designs asked at once are answered
+    on_progress: Callable[[int, int], None] = field(default=_unheard, repr=False)
+    _solver: Solver | None = field(default=None, repr=False)
+
+    @property
+    def solver(self) -> Solver:
+        """The adapter. Raises InputError."""
+        if self._solver is None:
+            name = self.solver_name or self.design.solver.name
+            self._solver = find_solver(name, self.command)
+        return self._solver
+
+    @property
+    def has_gradients(self) -> bool:
+        """Whether the solver gives exact slopes of the design."""
+        return self.design.has_slopes and "gradients" in self.solver.capabilities
+
+    def has_gradients_at(self, values: Mapping[str, float]) -> bool:
+        """`has_gradients` of the design with values of variables or effects."""
+        return self.of(self.design.at(values)).has_gradients
+
+    def evaluate(self, question: Question) -> Evaluation:
+        """Modes of one design, the same from the record as from a run.
+
+        Raises EvaluationFailed; DeckRefused, TemplateFailed, CaseError where the input is wrong;
+        OSError where the run folder cannot be written.
+        """
+        design = self._with(question.values)
+        decks = Decks(design, question.gradients, question.modes_per_harmonic)
+        return self._ask(decks, lambda answer, kept: evaluation(answer))
+
+    def press(
+        self, values: Mapping[str, float], loads_N: Sequence[float], modes: int = 0
+    ) -> Pressed:
+        """One design on the road at rising loads, as far as the solver gets, with so many ``modes``
+        at each.
+
+        Raises what `evaluate` does; DeckRefused too where the solver has no road.
+        """
+        self.needs_road(bool(modes))
+        decks = Decks(self._with(values), loads_N=tuple(loads_N), loaded_modes=modes)
+        return self._ask(decks, lambda answer, kept: pressed(answer, loads_N, kept, modes))
+
+    def needs_road(self, modes: bool = False) -> None:
+        """Raises DeckRefused where the solver cannot press a tyre on a road, or has no modes of it
+        there."""
+        capability = "loaded_modes" if modes else "footprint"
+        if capability not in self.solver.capabilities:
+            what = "find modes of a tyre" if modes else "press a tyre"
+            raise DeckRefused(
+                f"solver '{self.solver.name}' cannot {what} on a road; 'tyrecal solvers'"
+                f" shows which one can ({capability})"
+            )
+
+    def refuse_lacking(self, design: Design) -> None:
+        """Raises DeckRefused where the solver cannot express what the design has."""
+        for need, lack in design.needs.items():
+            if need not in self.solver.capabilities:
+                raise DeckRefused(f"solver '{self.solver.name}' cannot express {lack}")
+
+    def _with(self, values: Mapping[str, float]) -> Design:
+        try:
+            design = self.design.at(values)
+        except ValueError as error:  # no such tyre: the optimiser steps back from it
+            raise EvaluationFailed("refused", str(error)) from None
+        self.refuse_lacking(design)
+        return design
+
+    def _ask(self, decks: Decks, typed: Callable[[dict[str, Any], Path | None], T]) -> T:
+        """The solver's answer, or the record's, ``typed``, which is told where a run that ended
+        early is kept."""
+        raise_interrupt()
+        folder: Path | None = None
+        try:
+            with interrupts_put_off():  # it must not come between the folder and its name
+                folder = folders.fresh(self.folder)
+            return self._ask_in(folder, decks, typed)
+        except KeyboardInterrupt:
+            if folder:
+                folders.drop(folder)
+            raise
+
+    def _ask_in(
+        self, folder: Path, decks: Decks, typed: Callable[[dict[str, Any], Path | None], T]
+    ) -> T:
+        """`_ask` in a fresh ``folder``, which is dropped where the run went well."""
+        solver, key = self.solver, ""
+        kept: Path | None = None
+        try:
+            solver.write(decks, folder)
+            if self.store:
+                key = key_of(folder, solver)
+            answer = self._recall(key, decks.design.pressure_kPa)
+            if answer is not None:
+                result = typed(answer, None)
+            else:
+                limit_s = decks.design.solver.time_limit_s * max(1, len(decks.loads_N))
+                limit_s *= MODES_ON_TOP if decks.loaded_modes else 1
+                answer = self._run(folder, limit_s)
+                words = answer.get("failure", "")
+                kept = self._kept(folder, words) if words else None
+                result = typed(answer, kept)
+                if not words or answer.get("cause", SETTLED[0]) in SETTLED:
+                    self._record(key, {}, {"answer": answer})
+        except solver.refusals as error:
+            folders.drop(folder)
+            raise DeckRefused(str(error)) from None
+        except solver.failures as error:
+            cause = getattr(error, "cause", None) or CAUSES.get(type(error).__name__, "crashed")
+            failure = EvaluationFailed(cause, str(error), self._kept(folder, str(error)))
+            if cause in SETTLED:
+                place = str(failure.folder.resolve()) if failure.folder else None
+                content = {"cause": cause, "words": failure.words, "folder": place}
+                self._record(key, {"cause": cause}, content)
+            raise failure from None
+        except EvaluationFailed as failure:
+            if failure.folder and failure.folder.exists():
+                folders.drop(folder)
+                raise
+            words = failure.words
+            raise EvaluationFailed(failure.cause, words, self._kept(folder, words)) from None
+        except OSError as error:
+            folders.drop(folder)
+            place = error.filename or str(folder)
+            raise OSError(error.errno, error.strerror or str(error), place) from None
+        except BaseException:
+            folders.drop(folder)
+            raise
+        if self.keep and not kept:
+            folders.keep(folder, "finished")
+        elif not kept:
+            folders.drop(folder)
+        return result
+
+    def evaluate_all(
+        self, questions: Iterable[Question], jobs: int = 1
+    ) -> Iterator[Evaluation | EvaluationFailed]:
+        """Answers in the order of the questions, failures among them; ``jobs`` at a time."""
+        return _not_refused(self.answer_all(questions, jobs))
+
+    def answer_all(
+        self, questions: Iterable[Question], jobs: int = 1
+    ) -> Iterator[Evaluation | EvaluationFailed | DeckRefused]:
+        """`evaluate_all` with refusals among the answers, instead of raised."""
+        return self._each("evaluate", [(question,) for question in questions], jobs)
+
+    def press_all(
+        self,
+        designs: Iterable[Mapping[str, float]],
+        loads_N: Sequence[float],
+        jobs: int = 1,
+        modes: int = 0,
+    ) -> Iterator[Pressed | EvaluationFailed]:
+        """`press` for each design, in their order; ``jobs`` at a time."""
+        asked = [(values, loads_N, modes) for values in designs]
+        return _not_refused(self._each("press", asked, jobs))
+
+    def _each(self, ask: str, asked: Sequence[tuple[Any, ...]], jobs: int) -> Iterator[Any]:
+        self.on_progress(0, len(asked))
+        if len(asked) <= 1 or (jobs <= 1 and not self.scheduler):
+            for done, arguments in enumerate(asked, start=1):
+                answer = _answer(self, ask, arguments)
+                self.on_progress(done, len(asked))
+                yield answer
+            return
+        with executor(jobs, self.scheduler) as workers:
+            answers = workers.each(partial(_answer_and_count, self.worker(), ask), asked)
+            for done, answer in enumerate(in_order(answers), start=1):
+                self.on_progress(done, len(asked))
+                if isinstance(answer, WorkerLost):
+                    yield EvaluationFailed("crashed", str(answer))
+                    continue
+                found, counts = answer
+                self.counts.add(counts)
+                yield found
+
+    def worker(self) -> Evaluator:
+        """The same for another process, wherever it is, with counts of its own."""
+        folder = self.folder.absolute() if self.folder else None
+        return Evaluator(
+            self.design, self.solver_name, folder, self.keep, self.store, command=self.command
+        )
+
+    def of(self, design: Design) -> Evaluator:
+        """The same, counts and listener too, for another tyre's designs."""
+        other = self.worker()
+        other.design, other.counts, other.on_progress = design, self.counts, self.on_progress
+        return other
+
+    def _recall(self, key: str, pressure_kPa: float) -> dict[str, Any] | None:
+        content = self.store.read(key) if self.store else None
+        if not self.store or content is None:
+            return None
+        if "answer" in content:
+            answer: dict[str, Any] = content["answer"]
+            found_kPa = answer["pressure_Pa"] / 1e3
+            if not isclose(found_kPa, pressure_kPa, rel_tol=1e-6, abs_tol=1e-9):
+                self.store.set_aside(self.store.path(key), f"it is of {found_kPa:g} kPa")
+                return None
+            self.counts.recorded += 1
+            return answer
+        self.counts.recorded += 1
+        raise EvaluationFailed(
+            content["cause"], printable(content["words"]), self._known(content["folder"])
+        )
+
+    def _known(self, folder: str | None) -> Path | None:
+        """A folder that a record names, where it is a run of ours that failed."""
+        if folder is None or self.folder is None or "\0" in folder:
+            return None
+        path, parent = Path(folder), self.folder.resolve()
+        return path if path.parent == parent and (path / folders.OUTCOME).is_file() else None
+
+    def _run(self, folder: Path, time_limit_s: float) -> dict[str, Any]:
+        self.counts.runs += 1
+        self.solver.run(folder, time_limit_s)
+        return self.solver.read(folder)
+
+    def _record(self, key: str, about: dict[str, str], content: dict[str, Any]) -> None:
+        if self.store and key:
+            names = {"solver": self.solver.name, "version": self.solver.version}
+            self.store.write(key, {**names, **about}, content)
+
+    def _kept(self, folder: Path, outcome: str) -> Path | None:
+        """The folder of a failure; None where it is among temporary ones, and dropped."""
+        if self.folder is None and not self.keep:
+            folders.drop(folder)
+            return None
+        return folders.keep(folder, outcome)
+
+
+def _answer(evaluator: Evaluator, ask: str, arguments: tuple[Any, ...]) -> Any:
+    """What the evaluator's method ``ask`` returns, or the failure or refusal that it raises."""
+    try:
+        return getattr(evaluator, ask)(*arguments)
+    except (EvaluationFailed, DeckRefused) as failure:
+        return failure
+
+
+def _not_refused(answers: Iterator[Any]) -> Iterator[Any]:
+    """The answers; raises a refusal among them."""
+    for answer in answers:
+        if isinstance(answer, DeckRefused):
+            raise answer
+        yield answer
+
+
+def _answer_and_count(
+    evaluator: Evaluator, ask: str, arguments: tuple[Any, ...]
+) -> tuple[Any, Counts]:
+    return _answer(evaluator, ask, arguments), evaluator.counts

@@ -1,0 +1,112 @@
+"""Solver adapters: the contract, and the registry filled by entry points."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from importlib.metadata import EntryPoint, entry_points
+from pathlib import Path
+from typing import Any, Protocol
+
+from ...errors import InputError
+from ..settings import SettingsError, command_of
+
+GROUP = "tyrecal.solvers"
+
+
+class Solver(Protocol):
+    """What a solver brings: one class, registered under the entry point group above.
+
+    version: of the program that runs, "unknown" where it is not found; part of every record's key.
+    dialect: the template folder of its decks; capabilities: of ``modes``,
+    ``gradients``, ``footprint``, ``loaded_modes``, and what effects need (`Effect.needs`):
+    ``vibration_modulus``, a modulus in the frequency step other than in the static one, and those
+    of `design.tyre.CAPABILITIES`;
+    A solver that starts a program has ``command`` too, a list of its words, which is the user's to
+    set (`tyrecal.simulate.settings`), never the case's;
+    refusals, failures: exceptions of `write`, `run` and `read` for a deck it cannot honour and
+    for no solution; a failure's attribute ``cause``, where it has one, is `EvaluationFailed`'s.
+    """
+
+    name: str
+    version: str
+    dialect: str
+    capabilities: frozenset[str]
+    refusals: tuple[type[Exception], ...]
+    failures: tuple[type[Exception], ...]
+
+    def write(self, decks: Any, folder: Path) -> list[Path]:
+        """Write all input files of `tyrecal.simulate.deck.decks.Decks` into an empty folder.
+
+        ``loads_N`` is not empty only where the solver can do footprints, ``loaded_modes`` not 0
+        only where it finds modes there.
+        """
+
+    def run(self, folder: Path, time_limit_s: float) -> None:
+        """Run to the end or raise."""
+
+    def read(self, folder: Path) -> dict[str, Any]:
+        """pressure_Pa, mass_kg, modes [{frequency_Hz, multiplicity, n, amplitude}], gradients
+        {variable: [Hz per unit]}, nodes, points, displacement. A doublet that is split is one
+        mode of multiplicity 2 at the mean frequency, with ``members`` [Hz, Hz].
+
+        A solver in three dimensions gives each mode {frequency_Hz, multiplicity 1, displacement
+        (k, 3)} at ``points`` (k, 3), as in `RingShape`; pairs are joined by the tool.
+
+        Where loads were asked for: pressure_Pa, mass_kg, nodes, points, angles, free_radius_m,
+        footprints [the fields of `Footprint`], of one load at least, and ``failure``: "" or why
+        the next one was not reached (its ``cause``, if not no_equilibrium).
+        """
+
+
+def find_solver(name: str, command: Sequence[str] = ()) -> Solver:
+    """The installed solver of that name, with the program that the user has set, or ``command``.
+
+    Raises InputError; SettingsError.
+    """
+    found = {entry.name: entry for entry in entry_points(group=GROUP)}
+    if name not in found:
+        raise InputError(f"solver '{name}' is not installed, only {', '.join(sorted(found))}")
+    solver: Solver = found[name].load()()
+    if command and not hasattr(solver, "command"):
+        raise InputError(f"solver '{name}' starts no program: it takes no --solver-command")
+    _set_command(solver, list(command) or command_of(name)[0])
+    return solver
+
+
+def _set_command(solver: Any, command: list[str]) -> None:
+    if command and hasattr(solver, "command"):
+        solver.command = command
+
+
+def installed() -> list[dict[str, Any]]:
+    """Every registered solver: ``name``, ``version``, ``dialect``, ``capabilities``, ``problem``:
+    why it cannot be used, or None; ``command`` that it starts, or None, and ``command_from``: where
+    that is set. Raises nothing."""
+    return [_described(entry) for entry in sorted(entry_points(group=GROUP))]
+
+
+def _described(entry: EntryPoint) -> dict[str, Any]:
+    facts: dict[str, Any] = {
+        "name": entry.name,
+        "version": None,
+        "dialect": None,
+        "capabilities": [],
+        "problem": None,
+        "command": None,
+        "command_from": None,
+    }
+    try:
+        solver: Any = entry.load()()
+        if hasattr(solver, "command"):
+            command, origin = command_of(entry.name)
+            _set_command(solver, command)
+            facts["command"], facts["command_from"] = solver.command, origin or "default"
+        facts["dialect"], facts["capabilities"] = solver.dialect, sorted(solver.capabilities)
+        facts["version"] = solver.version
+        if solver.version == "unknown":
+            facts["problem"] = "its program was not found"
+    except SettingsError as error:
+        facts["problem"] = str(error)
+    except Exception as error:  # whatever a stranger's code raises when it is imported
+        facts["problem"] = f"{type(error).__name__}: {error}"
+    return facts

@@ -1,0 +1,81 @@
+"""What results are of: tool, solver, tyre, state, mesh and measurements, the same in every file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from hashlib import sha256
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..tyre.case import LoadedCase
+from ..tyre.case.identity import tyre_sha256
+from ..tyre.resolve import resolved
+from ..version import __version__
+
+if TYPE_CHECKING:
+    from .evaluate.solver import Solver
+
+KEY = "provenance"
+Number = float | Sequence[float]
+
+
+def provenance(
+    case: LoadedCase,
+    solver: Solver,
+    measured: Iterable[Path] = (),
+    pressure_kPa: Number | None = None,
+    load_N: Number = 0.0,
+) -> dict[str, Any]:
+    """The block ``provenance`` of a result file.
+
+    pressure_kPa (default: the case's), load_N: of the study, several where it has several; measured
+    files in the order of the command. Raises OSError.
+    """
+    c = case.case
+    files = list(measured)
+    return {
+        "tyrecal": __version__,
+        "solver": solver.name,
+        "solver_version": solver.version,
+        "name": c.name,
+        "size": c.size,
+        "tyre_sha256": tyre_sha256(case),
+        "overrides": dict(case.overrides),
+        "state": {
+            "pressure_kPa": _plain(c.pressure_kPa if pressure_kPa is None else pressure_kPa),
+            "load_N": _plain(load_N),
+            "rim": _rim(case),
+        },
+        "mesh": c.mesh.level,
+        "targets": c.targets.source or None,
+        "measured_sha256": measured_sha256(files) if files else None,
+    }
+
+
+def stamped(content: Any, block: dict[str, Any]) -> Any:
+    """A result with its provenance, behind its format; each entry of a list has it."""
+    if isinstance(content, list):
+        return [stamped(each, block) for each in content]
+    head = {"format": content["format"]} if "format" in content else {}
+    return {**head, KEY: block, **content}
+
+
+def measured_sha256(files: Sequence[Path]) -> str:
+    """Hash of a file's bytes; of several that of their hashes, one a line, in this order.
+
+    Raises OSError.
+    """
+    hashes = [sha256(path.read_bytes()).hexdigest() for path in files]
+    if len(hashes) == 1:
+        return hashes[0]
+    return sha256("".join(f"{each}\n" for each in hashes).encode()).hexdigest()
+
+
+def _rim(case: LoadedCase) -> str:
+    """How the rim is held while the tyre vibrates."""
+    rim = resolved(case).case.rim
+    return "free" if rim.free else "spindle" if rim.spindle.gives_way else "fixed"
+
+
+def _plain(number: Number) -> float | list[float]:
+    return float(number) if isinstance(number, int | float) else [float(each) for each in number]

@@ -1,0 +1,121 @@
+"""What belongs to the user and not to a case: the programs of solvers, and defaults of options.
+
+A case may come from anybody, so it names no program. These do, the first that is there: the option
+``--solver-command``, the environment variable of COMMAND, ``commands`` of the settings file.
+"""
+
+from __future__ import annotations
+
+import os
+import shlex
+from collections.abc import Sequence
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+
+from ..errors import InputError
+
+if TYPE_CHECKING:
+    from pydantic import BaseModel
+
+FILE = "TYRECAL_SETTINGS"  # variable that names another settings file; empty: none
+COMMAND = "TYRECAL_SOLVER_COMMAND"  # of whichever solver is used
+Model = TypeVar("Model", bound="BaseModel")
+
+
+class SettingsError(InputError):
+    """A settings file, or a command of the user's, is wrong."""
+
+
+def place() -> Path | None:
+    """The settings file, whether it is there or not; None where there shall be none."""
+    if FILE in os.environ:
+        return Path(os.environ[FILE]) if os.environ[FILE] else None
+    from platformdirs import user_config_path
+
+    return user_config_path("tyrecal", appauthor=False) / "settings.yaml"
+
+
+def typed(path: Path, kind: type[Model]) -> Model:
+    """A YAML file as a model of pydantic. Raises SettingsError: a sentence a mistake, its line."""
+    from pydantic import ValidationError
+
+    from ..tyre.case.document import read_document
+
+    document = read_document(path)
+    if document.data is None or document.mistakes:
+        raise SettingsError("\n".join(str(each) for each in document.mistakes))
+    try:
+        return kind.model_validate(document.data)
+    except ValidationError as error:
+        for each in error.errors():
+            document.add(each["loc"], each["msg"])
+        raise SettingsError("\n".join(str(each) for each in document.mistakes)) from None
+
+
+def settings() -> Any:
+    """The user's settings: ``commands`` {solver: words}; ``jobs``, ``solver``, ``output``, None
+    where they are not set. Raises SettingsError."""
+    path = place()
+    if path is None or (FILE not in os.environ and not path.exists()):
+        return _read(None, 0.0)
+    return _read(path, path.stat().st_mtime if path.exists() else 0.0)
+
+
+@lru_cache(maxsize=1)
+def _read(path: Path | None, changed: float) -> Any:
+    from pydantic import BaseModel, ConfigDict, Field
+
+    from ..tyre.case.parts import Name
+
+    class Settings(BaseModel):
+        model_config = ConfigDict(extra="forbid", strict=True)
+
+        commands: dict[Name, str | list[str]] = Field(default_factory=dict)
+        jobs: Annotated[int, Field(ge=1, le=256)] | None = None
+        solver: Name | None = None
+        output: str | None = None
+
+    found = typed(path, Settings) if path else Settings()
+    for solver, command in found.commands.items():
+        words(command, f"{path}: commands.{solver}", here=False)
+    if found.output is not None and not Path(found.output).expanduser().is_absolute():
+        raise SettingsError(
+            f"{path}: output is {found.output}: must be a whole path or begin with ~"
+        )
+    return found
+
+
+def root() -> Path:
+    """The folder in which folders of results are made: the present one, unless the user has set
+    another. Raises SettingsError."""
+    folder = settings().output
+    return Path(folder).expanduser() if folder else Path()
+
+
+def words(command: str | Sequence[str], origin: str, here: bool = True) -> list[str]:
+    """A command's words; no shell is used. ``here``: a relative path starts in the present folder,
+    never in the one that the solver runs in, else it is refused. Raises SettingsError."""
+    try:
+        found = shlex.split(command) if isinstance(command, str) else list(command)
+    except ValueError:
+        found = []
+    if not found or not all(isinstance(word, str) and word for word in found):
+        raise SettingsError(f"{origin} is {command!r}: must be a command, or a list of its words")
+    program = Path(found[0]).expanduser()
+    if len(program.parts) > 1 and not program.is_absolute():
+        if not here:
+            raise SettingsError(f"{origin} is {command!r}: must be a name or a whole path")
+        program = program.absolute()
+    return [str(program), *found[1:]]
+
+
+def command_of(solver: str) -> tuple[list[str], str]:
+    """The command that the user has set for ``solver``, and where; empty where nowhere.
+
+    Raises SettingsError."""
+    if given := os.environ.get(COMMAND):
+        return words(given, COMMAND), COMMAND
+    if solver in (commands := settings().commands):
+        return words(commands[solver], f"{place()}: commands.{solver}", here=False), str(place())
+    return [], ""

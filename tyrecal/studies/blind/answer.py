@@ -1,0 +1,127 @@
+"""Trials answered: the diagnosis with what its user would have, and nothing else.
+
+It reads the case, the measurements and the rules; a prediction for the held-out pressure is part of
+each answer, so that the scorer alone compares it with what was measured there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import nullcontext
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...files import own_folder
+from ...measured.tables import read_measurements
+from ...simulate.evaluate.evaluator import Evaluator
+from ...simulate.evaluate.pool import process_pool
+from ...simulate.modes.mode import Label
+from ...tyre.case import LoadedCase
+from ...tyre.load import load_case
+from ..diagnose.diagnosis import Diagnosis, diagnose
+from ..diagnose.evidence import NONE
+from ..diagnose.inverse_problem import Assumed
+from ..diagnose.model import ResponseModel
+from ..diagnose.observations import observe
+from ..diagnose.result import result
+from ..diagnose.study import spans_of
+from ..diagnose.tyre_model import TyreModel
+from ..diagnose.uncertainties import sources
+from .make import labels_of
+from .protocol import Protocol, read_protocol, write_json
+from .seal import refuse_open_truth, seal_answers
+
+ModelRow = tuple[Label | None, float]
+
+
+def rows_of(case: LoadedCase, protocol: Protocol) -> list[ModelRow]:
+    """All that a model is asked of: the mass, and each mode at each pressure."""
+    modes = labels_of(case)
+    return [(None, 0.0), *((label, p) for p in protocol.pressures_kPa for label in modes)]
+
+
+def tyre_model(
+    case: LoadedCase,
+    evaluator: Evaluator,
+    protocol: Protocol,
+    jobs: int = 1,
+    effects: Sequence[str] | None = None,
+) -> TyreModel:
+    """The model of the diagnosis for all trials."""
+    spans, _ = spans_of(case, evaluator, effects)
+    return TyreModel(case, evaluator, rows_of(case, protocol), sources(case)[0], spans, jobs)
+
+
+def case_of(folder: Path) -> LoadedCase:
+    """The case that lies beside the trials. Raises InputError, CaseError."""
+    return load_case(folder / "case" / read_protocol(folder).case, allow_unusual=True)
+
+
+def answer(
+    folder: Path,
+    model: ResponseModel,
+    rows: Sequence[ModelRow],
+    jobs: int = 1,
+    on_progress: Callable[[int, int], None] = lambda done, all: None,
+) -> str:
+    """Answer every trial that has no answer yet; returns the sha256 of all answers.
+
+    Raises InputError where the truth lies among the trials.
+    """
+    refuse_open_truth(folder)
+    protocol = read_protocol(folder)
+    trials = sorted((folder / "trials").glob("*.csv"))
+    answers = folder / "answers"
+    own_folder(answers)
+    waiting = [t for t in trials if not (answers / f"{t.stem}.json").exists()]
+    work = partial(one_answer, model, list(rows), protocol)
+    before = len(trials) - len(waiting)
+    with process_pool(jobs) if jobs > 1 and len(waiting) > 1 else nullcontext() as pool:
+        contents = (pool.map if pool else map)(work, waiting)
+        for done, (trial, content) in enumerate(zip(waiting, contents, strict=True), before + 1):
+            write_json(answers / f"{trial.stem}.json", content)
+            on_progress(done, len(trials))
+    return seal_answers(folder, [answers / f"{trial.stem}.json" for trial in trials])
+
+
+def one_answer(
+    model: ResponseModel, rows: list[ModelRow], protocol: Protocol, trial: Path
+) -> dict[str, Any]:
+    """The diagnosis of one file of measurements, and what it predicts at the held-out pressure."""
+    observations = observe(read_measurements(trial), split=protocol.split)
+    found = diagnose(model, rows, observations, assumed=Assumed(split=protocol.split))
+    told = result(found)
+    told.pop("next_measurements"), told.pop("section_map")
+    key = told["effect"] or told["likeliest"]
+    return {
+        "diagnosis": told,
+        "held_out": {
+            "pressure_kPa": protocol.held_out_kPa,
+            "effect": key,
+            "plain_Hz": predicted(found, rows, protocol.held_out_kPa, NONE),
+            "with_effect_Hz": predicted(found, rows, protocol.held_out_kPa, key) if key else None,
+        },
+    }
+
+
+def predicted(
+    found: Diagnosis, rows: Sequence[ModelRow], pressure_kPa: float, key: str
+) -> dict[str, float]:
+    """Hz by label at a pressure that was not fitted, by a hypothesis at its best parameters."""
+    places = [i for i, (label, p) in enumerate(rows) if label and p == pressure_kPa]
+    hypothesis, expansion = found.hypothesis(key), found.problem.expansion
+    assert hypothesis.fitted is not None
+    best = int(np.argmax(hypothesis.posterior))
+    d = hypothesis.fitted.d[best]
+    eta = expansion.plain(expansion.x0 + d)[0]
+    for id, e in hypothesis.values.items():
+        shift, tilt, _ = expansion.nodes[id].at(e[[best]])
+        eta = eta + shift[0] + tilt[0] @ d
+    said = {str(rows[i][0]): round(float(np.exp(eta[i])), 4) for i in places}
+    if found.exchanged:  # the laboratory's own labels
+        a, b = map(str, found.exchanged)
+        said[a], said[b] = said[b], said[a]
+    return said

@@ -1,0 +1,74 @@
+"""Who makes the data: a solver, a mesh, and laws by which effects enter the tyre."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import log
+from typing import Protocol
+
+from ...simulate.deck.tyre_design import TyreDesign
+from ...simulate.evaluate.evaluator import Evaluator, Question
+from ...simulate.evaluate.store import Store
+from ...simulate.modes.find import Found, find_modes
+from ...simulate.modes.mode import Label
+from ...tyre.case import LoadedCase
+from .laws import EffectLaw, Frequencies, catalogue_laws
+from .outside import OUTSIDE_FAMILIES
+
+
+@dataclass(frozen=True)
+class Computed:
+    """A tyre at one pressure, without noise."""
+
+    ln_f: Frequencies
+    ln_mass: float  # in kg
+
+
+class Maker(Protocol):
+    """Makes data."""
+
+    @property
+    def about(self) -> str:
+        """In words, for the protocol."""
+
+    @property
+    def laws(self) -> Mapping[str, EffectLaw]:
+        """Of effects, by id."""
+
+    @property
+    def outside(self) -> Mapping[str, EffectLaw]:
+        """Of families that the catalogue does not hold, by name."""
+
+    def compute(self, case: LoadedCase, labels: list[Label]) -> Computed:
+        """The tyre as it stands in ``case``. Raises EvaluationFailed; ValueError."""
+
+
+@dataclass(frozen=True)
+class SolverMaker:
+    """An installed solver."""
+
+    about: str
+    solver: str
+    laws: Mapping[str, EffectLaw]
+    outside: Mapping[str, EffectLaw]
+    store: Store | None = None
+
+    def compute(self, case: LoadedCase, labels: list[Label]) -> Computed:
+        """Raises EvaluationFailed, also where a label is lost."""
+        evaluator = Evaluator(TyreDesign(case), self.solver, store=self.store)
+        ((_, found),) = find_modes(evaluator, [Question({})], labels)
+        if not isinstance(found, Found):
+            raise found
+        ln_f = {}
+        for label in labels:
+            low, high = found.wanted[label].raw.members or (found.wanted[label].frequency_Hz,) * 2
+            ln_f[label] = log(low), log(high)
+        return Computed(ln_f, log(found.evaluation.mass_kg))
+
+
+def bundled_maker(case: LoadedCase, store: Store | None = None) -> SolverMaker:
+    """The diagnosis' own model, mesh and laws."""
+    laws = catalogue_laws(frozenset(Evaluator(TyreDesign(case), "bundled").solver.capabilities))
+    about = "bundled solver, the diagnosis' own mesh and the catalogue's laws: an inverse crime"
+    return SolverMaker(about, "bundled", laws, OUTSIDE_FAMILIES, store)

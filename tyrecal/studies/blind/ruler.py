@@ -1,0 +1,239 @@
+"""How hard a trial is, by a ruler made before the study: sensitivities, covariance, signatures.
+
+    P = S^-1 - S^-1 J (J^T S^-1 J + Sx^-1)^-1 J^T S^-1        S: noise + form + constants
+    lambda = g^T P g + splits                                  g: the true effect, noise-free
+    delta_j^2 = min over e_j of (g - g_j)^T P (g - g_j) + splits
+
+S, J and the catalogue's g_j come from the plain case at its start, J and g_j moved to the trial's
+own design to first order; g from the maker's runs with and without. Splits of pairs add
+((s - s_j) / tau)^2, tau^2 = 2 noise^2 + (the tyre's own split)^2. Covariance and projection are
+written here again, not the diagnosis' own: a mistake of its would be one of its judge's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...errors import InputError
+from ...simulate.modes.mode import Label
+from ..diagnose.form_error import form_error
+from ..diagnose.model import Answer, Query, ResponseModel
+from .protocol import Protocol, read_json, write_json
+
+Array = np.ndarray
+RULER_FILE = "ruler.json"
+CURVATURE_STEP = 0.05  # of ln x, for the curvature
+SHARES = (0.15, 0.5, 1.0)  # of each side of a range
+SIZE_POINTS = 61
+BETWEEN_PRESSURES = 0.9
+NUMBERS = ("x0", "spread", "eta", "jacobian", "hessian", "constants")
+SIGNATURE = ("sizes", "shift", "tilt", "split")
+ModelRow = tuple[Label | None, float]
+
+
+@dataclass(frozen=True)
+class EffectShifts:
+    """An effect on all rows."""
+
+    sizes: Array  # (k,) with 0
+    shift: Array  # (k, n)
+    tilt: Array  # (k, n, v)
+    split: Array  # (k, n)
+
+    @cached_property
+    def _weights(self) -> tuple[Array, Array]:
+        """Sizes (q,) from end to end, and the weights (q, k) of the given ones there."""
+        e = np.linspace(self.sizes[0], self.sizes[-1], SIZE_POINTS)
+        if len(self.sizes) > 2:  # a parabola through three of them is smoother than lines
+            return e, _parabolas(self.sizes, e)
+        return e, np.array([np.interp(e, self.sizes, unit) for unit in np.eye(len(self.sizes))]).T
+
+    def grid(self, d: Array, places: Array) -> tuple[Array, Array, Array]:
+        """Sizes (q,), shift (q, n) at x0 + d, split (q, n), rows ``places`` alone."""
+        e, weights = self._weights
+        shift = self.shift + self.tilt @ d
+        return e, (weights @ shift)[:, places], (weights @ self.split)[:, places]
+
+
+@dataclass(frozen=True)
+class Ruler:
+    """The plain case at its start x0, and the catalogue's effects there."""
+
+    rows: tuple[ModelRow, ...]
+    x0: Array  # (v,)
+    spread: Array  # (v,) prior of ln x
+    eta: Array  # (n,)
+    jacobian: Array  # (n, v)
+    hessian: Array  # (n, v, v)
+    constants: Array  # (n, k) change by one standard deviation of each
+    signatures: Mapping[str, EffectShifts]
+
+    def sigma(
+        self, places: Array, counts: Array, protocol: Protocol, constants: bool = True
+    ) -> Array:
+        """Covariance (n, n) of rows that are means of ``counts`` (n,) values; constants False:
+        repeatability alone."""
+        rows = [self.rows[i] for i in places]
+        weighed = np.array([label is None for label, _ in rows])
+        scatter = np.diag(np.where(weighed, protocol.mass, protocol.noise) ** 2 / counts)
+        if not constants:
+            return np.asarray(scatter)
+        same = np.array([[a[0] == b[0] for b in rows] for a in rows])
+        alike = np.where(np.eye(len(rows), dtype=bool), 1.0, BETWEEN_PRESSURES) * same
+        form = np.array([form_error(label) for label, _ in rows])
+        g = self.constants[places]
+        return np.asarray(scatter + alike * np.outer(form, form) + g @ g.T)
+
+    def plain(self, d: Array, places: Array) -> tuple[Array, Array]:
+        """eta (n,), J (n, v) at x0 + d without effects."""
+        bent = self.hessian[places] @ d
+        return self.eta[places] + self.jacobian[places] @ d + bent @ d / 2, (
+            self.jacobian[places] + bent
+        )
+
+    def projection(self, d: Array, places: Array, sigma: Array) -> Array:
+        """P (n, n) at x0 + d."""
+        inverse = np.linalg.inv(sigma)
+        J = self.plain(d, places)[1]
+        inner = J.T @ inverse @ J + np.diag(self.spread**-2.0)
+        return np.asarray(inverse - inverse @ J @ np.linalg.solve(inner, J.T @ inverse))
+
+
+@dataclass(frozen=True)
+class Difficulty:
+    """How hard an effect is to see, and to tell from others."""
+
+    lam: float  # lambda
+    nearest: float  # min_j delta_j^2 over other effects
+    group: tuple[str, ...]  # the effect and those with delta_j^2 < 9
+    equivalent: float | None  # the catalogue's parameter that comes closest to the true effect
+
+    @property
+    def band(self) -> float:
+        """min(lambda, min_j delta_j^2)."""
+        return min(self.lam, self.nearest)
+
+
+APART = 9.0
+
+
+def difficulty(
+    ruler: Ruler,
+    protocol: Protocol,
+    law: str,
+    d: Array,
+    places: Array,
+    counts: Array,
+    shift: Array,
+    split: Array,
+) -> Difficulty:
+    """Of a true effect that shifts the measured rows ``places`` by ``shift`` (n,), and pairs apart
+    by ``split`` (n,); d: the trial's design minus x0."""
+    P = ruler.projection(d, places, ruler.sigma(places, counts, protocol))
+    tau2 = 2 * protocol.noise**2 + protocol.split**2
+    pairs = counts == 2
+    lam = float(shift @ P @ shift + (split[pairs] ** 2).sum() / tau2)
+    distances, equivalent = {}, None
+    for id, signature in ruler.signatures.items():
+        e, g, s = signature.grid(d, places)
+        off = g - shift
+        apart = ((np.abs(s) - np.abs(split))[:, pairs] ** 2).sum(1) / tau2
+        length = np.einsum("qn,nm,qm->q", off, P, off) + apart
+        if id == law:
+            equivalent = float(e[np.argmin(length)])
+        else:
+            distances[id] = float(length.min())
+    near = [id for id, distance in distances.items() if distance < APART]
+    return Difficulty(lam, min(distances.values(), default=np.inf), (law, *near), equivalent)
+
+
+def measure(model: ResponseModel, rows: Sequence[ModelRow]) -> dict[str, Any]:
+    """The ruler as plain data. Raises what the model says where the plain tyre has no solution."""
+    x0 = np.asarray(model.start, float)
+    count = len(x0)
+    first, *around = model.answers(
+        [Query(x0, constants=True)]
+        + [Query(x0 + side * CURVATURE_STEP * unit) for unit in np.eye(count) for side in (1, -1)]
+    )
+    for answer in (first, *around):
+        if not isinstance(answer, Answer):
+            raise answer
+    assert isinstance(first, Answer) and first.constants is not None
+    slopes = [a.jacobian for a in around]  # type: ignore[union-attr]
+    hessian = np.stack(
+        [(slopes[2 * i] - slopes[2 * i + 1]) / (2 * CURVATURE_STEP) for i in range(count)], -1
+    )
+    hessian = (hessian + hessian.transpose(0, 2, 1)) / 2
+    signatures = {}
+    for id, span in model.spans.items():
+        sizes = sorted({f * end for end in (span.low, span.high) if end for f in SHARES})
+        asked = model.answers([Query(x0, {id: e}) for e in sizes])
+        known = [(e, a) for e, a in zip(sizes, asked, strict=True) if isinstance(a, Answer)]
+        zero = (0.0, Answer(first.eta, first.jacobian, 0 * first.split))
+        known = sorted([*known, zero], key=lambda pair: pair[0])
+        if len(known) > 1:
+            signatures[id] = {
+                "sizes": [e for e, _ in known],
+                "shift": [_rounded(a.eta - first.eta) for _, a in known],
+                "tilt": [_rounded(a.jacobian - first.jacobian) for _, a in known],
+                "split": [_rounded(a.split) for _, a in known],
+            }
+    return {
+        "format": 1,
+        "rows": [[_words(label), p] for label, p in rows],
+        "x0": x0.tolist(),
+        "spread": np.asarray(model.spread).tolist(),
+        "eta": first.eta.tolist(),
+        "jacobian": first.jacobian.tolist(),
+        "hessian": _rounded(hessian),
+        "constants": _rounded(first.constants),
+        "signatures": signatures,
+    }
+
+
+def write_ruler(folder: Path, content: Mapping[str, Any]) -> None:
+    """Beside the trials, open to all."""
+    write_json(folder / RULER_FILE, dict(content))
+
+
+def read_ruler(folder: Path, labels: Sequence[Label]) -> Ruler:
+    """The ruler of ``folder``. Raises InputError."""
+    content = read_json(folder / RULER_FILE)
+    known: dict[str, Label | None] = {str(label): label for label in labels}
+    known["mass"] = None
+    try:
+        numbers = {key: np.array(content[key], float) for key in NUMBERS}
+        signatures = {
+            id: EffectShifts(*(np.array(each[key], float) for key in SIGNATURE))
+            for id, each in content["signatures"].items()
+        }
+        rows = tuple((known[name], float(p)) for name, p in content["rows"])
+        return Ruler(rows, signatures=signatures, **numbers)
+    except (KeyError, ValueError, TypeError) as error:
+        raise InputError(f"{folder / RULER_FILE}: not a ruler of these trials ({error})") from None
+
+
+def _words(label: Label | None) -> str:
+    return "mass" if label is None else str(label)
+
+
+def _rounded(values: Array) -> list[Any]:
+    """Nine decimals: 1e-7 % of a frequency."""
+    return np.round(values, 9).tolist()
+
+
+def _parabolas(nodes: Array, e: Array) -> Array:
+    """Weights (q, k) of the nodes: parabolas through the three that are nearest to each e."""
+    weights = np.zeros((len(e), len(nodes)))
+    for q, value in enumerate(e):
+        chosen = np.sort(np.argsort(abs(nodes - value), kind="stable")[:3])
+        for k in chosen:
+            others = nodes[chosen[chosen != k]]
+            weights[q, k] = np.prod((value - others) / (nodes[k] - others))
+    return weights

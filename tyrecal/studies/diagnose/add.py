@@ -1,0 +1,53 @@
+"""A new case with an effect in it, the old file's comments kept."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ruamel.yaml import YAML
+from ruamel.yaml.nodes import ScalarNode
+from ruamel.yaml.representer import RoundTripRepresenter
+
+from ...errors import InputError
+from ...files import whole
+from ...tyre.load import load_case
+from ...tyre.values import with_values
+
+
+class NotAdded(InputError):
+    """The new case cannot be written."""
+
+
+def add(path: Path, id: str, value: float, folder: Path | None = None) -> Path:
+    """Write CASE_EFFECT.yaml beside the case at ``path`` with the effect's parameter in it.
+
+    Its section and templates are named relative to the case, so it goes beside it, or into
+    ``folder`` where that is the same. Raises NotAdded, ValueError for an unknown effect or a
+    parameter that cannot be, OSError.
+    """
+    loaded = load_case(path, allow_unusual=True)  # of the old case its user was told
+    with_values(loaded, {f"effects.{id}": value})
+    target = path.with_name(f"{path.stem}_{id}{path.suffix}")
+    if folder is not None and folder.resolve() != path.parent.resolve():
+        raise NotAdded(f"the new case goes beside the old one, to '{target}', not to '{folder}'")
+    if target.exists():
+        raise NotAdded(f"'{target}' exists already; move it away first")
+    yaml = YAML()
+    yaml.preserve_quotes = True
+    yaml.width = 1000
+    yaml.representer.add_representer(type(None), _null)
+    data = yaml.load(path.read_text(encoding="utf-8"))
+    effects = dict(data.get("effects") or {})
+    if "effects" in data:
+        data["effects"][id] = value
+    else:
+        place = list(data).index("variables") if "variables" in data else len(data)
+        data.insert(place, "effects", {**effects, id: value})
+    with whole(target) as partial, partial.open("w", encoding="utf-8") as file:
+        yaml.dump(data, file)
+    load_case(target, allow_unusual=True)
+    return target
+
+
+def _null(representer: RoundTripRepresenter, _: None) -> ScalarNode:
+    return representer.represent_scalar("tag:yaml.org,2002:null", "null")

@@ -1,0 +1,197 @@
+"""The whole diagnosis: observations and a model go in, an honest answer comes out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ...simulate.modes.mode import Label
+from .evidence import NONE, Hypothesis, probabilities, weigh
+from .expansion import Expansion, anchored, expand
+from .gap import Gap, find_gap, projection
+from .inverse_problem import Assumed, InverseProblem, Toggle, places
+from .label_swap import exchanged, with_exchanged
+from .model import ResponseModel
+from .next_measurement import Choice, ModelRow, rank
+from .observations import Observations
+from .plain_fit import plain_fit
+from .regions import SectionPart
+from .separability import Separability, separate
+from .shrinkage import Shrinkage, shrink
+from .verdict import NAMED, NO_GAP, Verdict, decide
+from .where import PartChange, section_map
+
+Array = np.ndarray
+IN_PLAY_WITHIN = 8.0  # ln evidence behind the best, up to which an effect is asked again
+MAX_IN_PLAY = 6
+MAX_ROUNDS = 2
+STAGES = (
+    "calibrate and ask each effect",
+    "ask the likeliest effects again",
+    "parts of the section",
+    "the next measurements",
+)
+KNOWN_WITHIN = 0.05  # of a range, and of ln x: an effect asked as near as that, or to 0, is known
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """What was found. problem: as it was solved; bare: before effects were asked again; parts,
+    effective_rank: the section map, and how many combinations of its parts the data see; rung: of
+    the ladder of proof, 1 to 4; exchanged: labels that were put right before all else."""
+
+    problem: InverseProblem
+    bare: InverseProblem
+    variables: tuple[str, ...]
+    sources: tuple[str, ...]
+    hypotheses: tuple[Hypothesis, ...]
+    probabilities: Mapping[str, float]
+    verdict: Verdict
+    gap: Gap
+    separability: Separability
+    parts: tuple[PartChange, ...]
+    effective_rank: int
+    shrinkage: Shrinkage | None
+    rung: int
+    choices: tuple[Choice, ...]
+    exchanged: tuple[Label, Label] | None = None
+
+    def hypothesis(self, key: str) -> Hypothesis:
+        """The hypothesis of that key."""
+        return next(h for h in self.hypotheses if h.key == key)
+
+    @property
+    def best(self) -> str | None:
+        """The likeliest effect or pair, named or not; None where the catalogue is empty."""
+        keys = [h.key for h in self.hypotheses if h.values]
+        return max(keys, key=lambda key: self.probabilities[key], default=None)
+
+    @property
+    def leading(self) -> str | None:
+        """The effect or pair that is named or, where there may be a gap, likeliest; else None."""
+        return self.verdict.key or (self.best if self.verdict.kind != NO_GAP else None)
+
+    def parameter(self, key: str, id: str = "") -> dict[str, Any]:
+        """Mean and 90 % interval of the effect ``id`` of ``key``, the first by default, with its
+        unit; what the case has of it is counted in."""
+        hypothesis, id = self.hypothesis(key), id or key.split("+")[0]
+        span = self.problem.spans[id]
+        return {
+            "value": span.base + hypothesis.mean()[id],
+            "low": span.base + hypothesis.quantile(id, 0.05),
+            "high": span.base + hypothesis.quantile(id, 0.95),
+            "unit": span.unit,
+        }
+
+
+def diagnose(
+    model: ResponseModel,
+    rows: Sequence[ModelRow],
+    observations: Observations,
+    changes: tuple[Toggle, ...] = (),
+    assumed: Assumed = Assumed(),  # noqa: B008
+    parts: Callable[[Array], Sequence[SectionPart]] | None = None,
+    further: Callable[[list[ModelRow]], ResponseModel] | None = None,
+    expansion: Expansion | None = None,
+    seed: int = 0,
+    stage: Callable[[str], None] = lambda stage: None,
+) -> Diagnosis:
+    """Diagnose observations with a model of ``rows`` (label or None, kPa).
+
+    changes: what was switched in runs 1, 2, ...; parts: slopes by the section's parts at x;
+    further: a model of other rows, for the next measurement; expansion: of an earlier call with
+    the same model, near whose x0 the fit lies; stage: hears of each of ``STAGES``. Raises the
+    model's failure where the plain tyre has no solution.
+    """
+    where = places(observations, rows)
+    stage(STAGES[0])
+    if expansion is None:
+        expansion = expand(model, plain_fit(model, observations, where, assumed.form))
+    problem = InverseProblem(
+        observations, expansion, model.spans, where, model.start, model.spread, changes, assumed
+    )
+    labels = exchanged(problem) if len(where) > len(model.start) else None
+    if labels:
+        observations = with_exchanged(observations, *labels)
+        expansion = expand(model, plain_fit(model, observations, where, assumed.form))
+        problem = replace(problem, observations=observations, expansion=expansion)
+    hypotheses, bare = weigh(problem), problem
+    stage(STAGES[1])
+    for _ in range(MAX_ROUNDS if expansion.nodes else 0):
+        problem, changed = _asked_again(problem, model, hypotheses)
+        if not changed:
+            break
+        hypotheses = weigh(problem)
+    p = probabilities(hypotheses)
+    by_key = {h.key: h for h in hypotheses}
+    plain = by_key[NONE].fitted
+    assert plain is not None
+    d = plain.d[0]
+    verdict = decide(hypotheses, p, len(where), len(d))
+    gap = find_gap(bare, d, tuple(model.variables))
+    P, _, _ = projection(problem, d)
+    means = {h.key: h.mean() for h in hypotheses if h.values}
+    sizes = {key: value[key] for key, value in means.items() if key in value}
+    separability = separate(bare, P, sizes)
+    stage(STAGES[2])
+    regions = list(parts(problem.expansion.x0 + d)) if parts else []
+    found, effective_rank = section_map(bare, P, gap.residuals, regions)
+    shrinkage = shrink(problem, verdict.key, seed) if problem.expansion.nodes else None
+    stage(STAGES[3])
+    choices = rank(bare, d, p, means, model.sources, further)
+    return Diagnosis(
+        problem,
+        bare,
+        tuple(model.variables),
+        tuple(model.sources),
+        tuple(hypotheses),
+        p,
+        verdict,
+        gap,
+        separability,
+        tuple(found),
+        effective_rank,
+        shrinkage,
+        _rung(verdict, shrinkage, problem),
+        tuple(choices),
+        labels,
+    )
+
+
+def _asked_again(
+    problem: InverseProblem, model: ResponseModel, hypotheses: Sequence[Hypothesis]
+) -> tuple[InverseProblem, bool]:
+    """The problem with the model asked where the effects in play have their re-fits, each at its
+    likeliest size, and whether anything was left to ask."""
+    singles = [h for h in hypotheses if h.key in problem.expansion.nodes]
+    best = max(h.ln_evidence for h in hypotheses)
+    play = [h for h in singles if h.ln_evidence > best - IN_PLAY_WITHIN]
+    play = sorted(play, key=lambda h: -h.ln_evidence)[:MAX_IN_PLAY]
+    wanted: dict[str, tuple[float, Array]] = {}
+    for h in play:
+        assert h.fitted is not None
+        nodes, d = problem.expansion.nodes[h.key], h.fitted.d[h.best]
+        e, width = float(h.values[h.key][h.best]), nodes.reach[1] - nodes.reach[0]
+        last = nodes.anchor
+        near = KNOWN_WITHIN * width
+        known = last and abs(e - last.e) < near and abs(d - last.d).max() < KNOWN_WITHIN
+        if not known and abs(e) > near:
+            wanted[h.key] = e, problem.expansion.x0 + d
+    if not wanted:
+        return problem, False
+    return replace(problem, expansion=anchored(problem.expansion, model, wanted)), True
+
+
+def _rung(verdict: Verdict, shrinkage: Shrinkage | None, problem: InverseProblem) -> int:
+    """1: fits in sample; 2: held-out error falls beyond the placebo's; 4: a toggled run moved the
+    frequencies as the named effect says (its posterior check holds with that run among the data).
+
+    3, agreement with an independent measurement of the parameter, is the engineer's to state.
+    """
+    if verdict.kind == NAMED and verdict.key in [change.id for change in problem.changes]:
+        return 4
+    proven = shrinkage is not None and verdict.kind == NAMED
+    return 2 if proven and shrinkage and shrinkage.fraction > shrinkage.placebo_95 else 1

@@ -1,0 +1,78 @@
+"""Labels of two modes exchanged in the measurements: found and put right before all else.
+
+A laboratory reads the order of a mode from its shape at few sensors. Two modes of like frequency
+that took each other's label make a gap that no tyre has; every hypothesis would answer for it. So
+the reading is inferred with them: P(reading) times the sum over hypotheses of prior times evidence.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+
+from ...simulate.modes.mode import Label
+from .evidence import NONE, OUTSIDE, Hypothesis, refit, weigh
+from .inverse_problem import InverseProblem
+from .observations import Observations
+
+Array = np.ndarray
+SWAP_PROBABILITY = 0.05  # of laboratories' files, two of their labels
+MAX_SWAP_DISTANCE = 0.30  # relative distance of modes that could be taken for one another
+MIN_GAIN = 3.0  # in ln of evidence of the plain tyre, from which a reading is worth a closer look
+
+
+def exchanged(problem: InverseProblem) -> tuple[Label, Label] | None:
+    """The labels that have most probably taken each other's place at all pressures, None if none.
+
+    problem: expanded about a fit of the file as it is.
+    """
+    plain = float(refit(problem, {}, 1).ln_evidence[0])
+    readings = list(_near(problem.observations))
+    found: list[tuple[Label, Label]] = []
+    for a, b in readings:
+        other = replace(problem, observations=with_exchanged(problem.observations, a, b))
+        if float(refit(other, {}, 1).ln_evidence[0]) > plain + MIN_GAIN:
+            found.append((a, b))
+    if not found:
+        return None
+    best, most = None, _all(weigh(problem, pairs=False)) + float(np.log(1 - SWAP_PROBABILITY))
+    for a, b in found:
+        other = replace(problem, observations=with_exchanged(problem.observations, a, b))
+        ln = _all(weigh(other, pairs=False)) + float(np.log(SWAP_PROBABILITY / len(readings)))
+        if ln > most:
+            best, most = (a, b), ln
+    return best
+
+
+def with_exchanged(observations: Observations, a: Label, b: Label) -> Observations:
+    """The same values with labels a and b exchanged, wherever both were measured."""
+    where = {(row.label, row.pressure_kPa, row.run): i for i, row in enumerate(observations.rows)}
+    order = np.arange(len(observations.rows))
+    for (label, pressure, run), i in where.items():
+        if label == a and (b, pressure, run) in where:
+            j = where[b, pressure, run]
+            order[i], order[j] = j, i
+    return observations.at(order)
+
+
+def _near(observations: Observations) -> Iterator[tuple[Label, Label]]:
+    """Pairs of labels that lie near each other wherever both were measured."""
+    at: dict[Label, dict[tuple[float, int], float]] = {}
+    for row, y in zip(observations.rows, observations.y.tolist(), strict=True):
+        if row.label:
+            at.setdefault(row.label, {})[row.pressure_kPa, row.run] = y
+    for a, b in combinations(sorted(at, key=str), 2):
+        both = at[a].keys() & at[b].keys()
+        if both and max(abs(at[a][k] - at[b][k]) for k in both) < MAX_SWAP_DISTANCE:
+            yield a, b
+
+
+def _all(hypotheses: list[Hypothesis]) -> float:
+    """ln of the sum of prior times evidence, what lies outside the catalogue left aside: it fits
+    anything."""
+    known = [h for h in hypotheses if h.key != OUTSIDE]
+    assert known[0].key == NONE
+    return float(np.logaddexp.reduce([h.ln_evidence + np.log(h.prior) for h in known]))

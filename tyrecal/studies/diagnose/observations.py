@@ -1,0 +1,167 @@
+"""Measurements as numbers: logarithms with their scatter, pairs as mean and split, several runs.
+
+A pair f_a, f_b becomes mu = (ln f_a + ln f_b)/2 with variance (s_a^2 + s_b^2)/4 and the split
+s = |ln f_a - ln f_b|, whose scatter is tau^2 = s_a^2 + s_b^2; s_a, s_b are relative.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from ...measured.measurement import Measurement
+from ...measured.repeats import PRIOR_REPEATS
+from ...simulate.modes.mode import Label
+
+Array = np.ndarray
+Key = tuple[str, Label | None, float]
+
+
+@dataclass(frozen=True)
+class Observable:
+    """What one number is."""
+
+    quantity: str
+    label: Label | None  # of the mode; None: the mass
+    pressure_kPa: float
+    run: int = 0  # 0 is the tyre as it is, in 1, 2, ... something was switched
+
+    def __str__(self) -> str:
+        name = str(self.label) if self.label else "mass"
+        return f"{name} at {self.pressure_kPa:g} kPa" if self.label else name
+
+
+@dataclass(frozen=True)
+class Observations:
+    """All that was measured of one tyre."""
+
+    rows: tuple[Observable, ...]
+    y: Array  # (n,) ln value
+    scatter: Array  # (n,) standard deviation of y by repeatability
+    common: float  # the part of it that all frequencies of one run share
+    split: Array  # (n,) of pairs with both members measured, else NaN
+    split_scatter: Array  # (n,) likewise
+    left_out: tuple[str, ...] = ()  # measurements that are not used, why
+
+    def at(self, places: Array) -> Observations:
+        """The numbers at these places, the rows as they are."""
+        names = ("y", "scatter", "split", "split_scatter")
+        return replace(self, **{name: getattr(self, name)[places] for name in names})
+
+    def only(self, keep: Array) -> Observations:
+        """The rows of a mask (n,) alone."""
+        rows = tuple(row for row, k in zip(self.rows, keep, strict=True) if k)
+        return replace(self.at(keep), rows=rows)
+
+
+def observe(
+    readings: Sequence[Measurement],
+    repeats: Sequence[Sequence[Measurement]] = (),
+    toggled: Sequence[Sequence[Measurement]] = (),
+    split: float = 0.0,
+) -> Observations:
+    """Observations of a tyre.
+
+    repeats: the same measured again after dismounting, whose mean is used, and whose scatter
+    takes the place of the stated sigma; toggled: runs 1, 2, ...; split: the relative split that
+    this kind of tyre has by non-uniformity, which a lone member of a pair is off by half of. What
+    was measured under load is left out of toggled runs; of others it is `under_load`'s.
+    """
+    left_out: list[str] = []
+    unloaded = [[r for r in run if not r.load_N] for run in (readings, *repeats)]
+    used = [_used(run, left_out) for run in (*unloaded, *toggled)]
+    left_out += _unrepeated(used[: 1 + len(repeats)])
+    scattered, common = _scatter(used[: 1 + len(repeats)])
+    runs = [scattered, *(_stated(run) for run in used[1 + len(repeats) :])]
+    rows, numbers = [], []
+    for index, run in enumerate(runs):
+        for key in sorted({key[:3] for key in run}, key=_order):
+            rows.append(Observable(key[0], key[1], key[2], index))
+            numbers.append(_pair(run, key, split))
+    table = np.array(numbers, float).reshape(-1, 4).T
+    return Observations(
+        tuple(rows), table[0], table[1], common, table[2], table[3], tuple(left_out)
+    )
+
+
+def _used(run: Sequence[Measurement], left_out: list[str]) -> dict[tuple[str, ...], Measurement]:
+    """Readings by (quantity, label, pressure, member); of two members, 1 is the lower."""
+    found: dict[tuple, Measurement] = {}
+    for each in run:
+        if each.load_N or each.quantity not in ("frequency_Hz", "mass_kg"):
+            what = f"{each.label} under load" if each.load_N and each.label else each.quantity
+            left_out.append(f"{Path(each.place).name}, {what}: not used by the diagnosis")
+            continue
+        pressure = each.pressure_kPa if each.label else 0.0
+        found[each.quantity, each.label, pressure, each.member] = each
+    for key in [key for key in found if key[3] == "1"]:
+        twin = (*key[:3], "2")
+        if twin in found and found[twin].value < found[key].value:
+            found[key], found[twin] = found[twin], found[key]
+    return found
+
+
+def _unrepeated(runs: Sequence[dict]) -> Iterator[str]:
+    """What `_scatter` cannot use of repeats, a value of which has to stand in every file."""
+    keys = dict.fromkeys(key for run in runs for key in run)
+    some = [key for key in keys if not all(key in run for run in runs)]
+    first, later = [k for k in some if k in runs[0]], [k for k in some if k not in runs[0]]
+    if first:
+        yield f"repeats of {_names(first)}: not in every file, the first one's value and sigma hold"
+    if later:
+        yield f"{_names(later)}: in repeats only"
+    if len(runs) > 1 and len(keys) - len(some) < 2:
+        yield "all repeats: fewer than two values stand in every file"
+
+
+def _names(keys: Sequence[Key]) -> str:
+    return ", ".join(dict.fromkeys(str(Observable(key[0], key[1], key[2])) for key in keys))
+
+
+def _stated(run: dict) -> dict:
+    """ln value and relative sigma by key, as stated."""
+    return {key: (np.log(each.value), each.sigma / each.value) for key, each in run.items()}
+
+
+def _scatter(runs: Sequence[dict]) -> tuple[dict, float]:
+    """Mean over repeats and its standard deviation by key, and the common part.
+
+    Analysis of variance in two ways: y_ik = m_i + b_k + e_ik, values i, runs k. var e of each
+    value is drawn towards that of all, being known from few repeats.
+    """
+    stated = [_stated(run) for run in runs]
+    keys = [key for key in stated[0] if key[0] == "frequency_Hz" and all(key in s for s in stated)]
+    if len(runs) < 2 or len(keys) < 2:
+        return stated[0], 0.0
+    y = np.array([[s[key][0] for s in stated] for key in keys])
+    count, freedom = len(runs), len(runs) - 1
+    off = y - y.mean(1, keepdims=True)
+    shift = off.mean(0)
+    rest = ((off - shift) ** 2).sum(1)
+    pooled = rest.sum() / (freedom * (len(keys) - 1))
+    each = (PRIOR_REPEATS * pooled + rest) / (PRIOR_REPEATS + freedom)
+    common = max(0.0, (shift**2).sum() / freedom - pooled / len(keys))
+    result = dict(stated[0])
+    for key, mean, variance in zip(keys, y.mean(1), each, strict=True):
+        result[key] = mean, float(np.sqrt(variance / count))
+    return result, float(np.sqrt(common / count))
+
+
+def _pair(run: dict, key: Key, split: float) -> tuple[float, float, float, float]:
+    """y, its scatter, split, its scatter."""
+    if (*key, "") in run:
+        return (*run[(*key, "")], np.nan, np.nan)
+    members = [run[(*key, m)] for m in "12" if (*key, m) in run]
+    if len(members) == 1:
+        return (members[0][0], float(np.hypot(members[0][1], split / 2)), np.nan, np.nan)
+    (a, sa), (b, sb) = members
+    tau = float(np.hypot(sa, sb))
+    return (a + b) / 2, tau / 2, abs(a - b), tau
+
+
+def _order(key: Key) -> tuple:
+    label = key[1]
+    return (key[2], label is None, (label.c, label.m, label.kind or "") if label else ())

@@ -1,0 +1,110 @@
+"""Slopes of the modes by stiffness and mass of each part of the section, preload included."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...simulate.deck.tyre_design import TyreDesign
+from ...simulate.evaluate.failure import EvaluationFailed
+from ...simulate.modes.find import Found
+from ...tyre.case import LoadedCase
+from ...tyre.case.schema import Rubber, Solid
+from ..fit import problem as fit
+from .tyre_model import TyreModel
+
+Array = np.ndarray
+TREAD = "tread"
+
+
+@dataclass(frozen=True)
+class SectionPart:
+    """A part of the section."""
+
+    name: str
+    stiffness: Array  # (n,) d ln f by its logarithm
+    mass: Array  # likewise
+    material: str  # what the split case calls it
+
+
+def regions(model: TyreModel, x: Array) -> list[SectionPart]:
+    """Every region's rubber (the crown's in two: tread and what lies under it), every cord.
+
+    One evaluation a pressure, with exact slopes by the constants of each part. Raises
+    EvaluationFailed.
+    """
+    case, parts = split_by_region(model.case)
+    materials = case.case.materials
+    numbers = {}
+    for material in parts:
+        rubber = isinstance(materials[material], Rubber)
+        keys = ("C10_Pa", "C01_Pa", "D1_per_Pa") if rubber else ("youngs_modulus_Pa",)
+        for key in (*keys, "density_kg_per_m3"):
+            numbers[f"materials.{material}.{key}"] = float(getattr(materials[material], key))
+    evaluator = model.evaluator.of(TyreDesign(case))
+    problem = fit.Problem(case, evaluator, jobs=model.jobs)
+    own = model.values(x)
+    taken = {path: own[name] for name, v in case.case.variables.items() for path in v.sets}
+    design = {**numbers, **taken}
+    states = [{**design, "pressure_kPa": p} for p in model.pressures]
+    at: dict[float, Found] = {}
+    for pressure, each in zip(model.pressures, problem.modes(states, tuple(numbers)), strict=True):
+        if isinstance(each, EvaluationFailed):
+            raise each
+        at[pressure] = each
+    result = []
+    for material, name in parts.items():
+        columns = np.zeros((2, len(model.rows)))
+        for i, (label, pressure) in enumerate(model.rows):
+            if label is None:
+                continue
+            mode, gradients = at[pressure].wanted[label], at[pressure].evaluation.gradients
+            f, place = mode.frequency_Hz, mode.position
+            for path in (p for p in numbers if p.startswith(f"materials.{material}.")):
+                slope = gradients[path][place] * design[path] / f
+                key = path.rpartition(".")[2]
+                sign = -1.0 if key == "D1_per_Pa" else 1.0
+                columns[int(key.startswith("density")), i] += sign * slope
+        result.append(SectionPart(name, columns[0], columns[1], material))
+    return result
+
+
+def split_by_region(case: LoadedCase) -> tuple[LoadedCase, Mapping[str, str]]:
+    """The same tyre with a rubber of its own in every region, and names of the parts by material.
+
+    Cords keep their materials, which are parts too. Design variables set all copies.
+    """
+    lines, names = case.section.names, [name for name, _ in case.section.regions]
+    materials, solids, parts = dict(case.case.materials), [], {}
+    copies: dict[str, list[str]] = {}
+    for i, solid in enumerate(case.case.solids):
+        for region in solid.regions or names:
+            pieces: list[tuple[str, list[str] | None]] = [(region, solid.between)]
+            if region == names[0] and solid.between is None:
+                pieces = [
+                    (f"{region} under the tread", [lines[0], lines[-2]]),
+                    (TREAD, [lines[-2], lines[-1]]),
+                ]
+            for words, between in pieces:
+                copy = f"part_{i}_{words.replace(' ', '_')}"
+                materials[copy] = case.case.materials[solid.material]
+                copies.setdefault(solid.material, []).append(copy)
+                solids.append(Solid(material=copy, regions=[region], between=between))
+                one = len(case.case.solids) == 1
+                parts[copy] = words.replace("_", " ") + ("" if one else f", {solid.material}")
+    for name, own in case.case.materials.items():
+        if not isinstance(own, Rubber):
+            parts[name] = name.replace("_", " ") + "s"
+    variables = {}
+    for name, variable in case.case.variables.items():
+        sets = []
+        for path in variable.sets:
+            head, _, rest = path.partition(".")
+            material, _, key = rest.partition(".")
+            same = copies.get(material, []) if head == "materials" else []
+            sets += [path, *(f"materials.{copy}.{key}" for copy in same)]
+        variables[name] = variable.model_copy(update={"sets": sets})
+    wanted = {"materials": materials, "solids": solids, "variables": variables}
+    return replace(case, case=case.case.model_copy(update=wanted)), parts

@@ -1,0 +1,259 @@
+"""A case and its files of measurements, diagnosed: what the command does, for other programs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import exp, isfinite, nan
+from pathlib import Path
+from typing import Any
+
+from ...errors import InputError
+from ...measured.measurement import Measurement
+from ...measured.tables import read_measurements
+from ...simulate.evaluate.evaluator import Evaluator
+from ...tyre.case import LoadedCase
+from ...tyre.case.mistakes import suggestion
+from ...tyre.effects import catalogue
+from .calibrated import calibrated_variables
+from .diagnosis import Diagnosis, diagnose
+from .evidence import NONE
+from .inverse_problem import Assumed, Toggle
+from .model import Answer, Query, Span
+from .observations import Observations, observe
+from .regions import regions
+from .tyre_model import TyreModel
+from .uncertainties import EFFECT_PATH, Source, calibrated, sources
+from .under_load import UnderLoad, Values, compare
+
+MAX_FREQUENCY_RATIO = 2.0  # between measured and computed; beyond, the unit is wrong
+MAX_MASS_RATIO = 1.5  # as the mass: a rim weighs as much as its tyre
+
+
+@dataclass(frozen=True)
+class DiagnosedCase:
+    """A diagnosis with what it rests on: sources of error, whether they were assumed, effects
+    that the solver cannot express, those that variables of the case calibrate, the model, and what
+    was measured under load, None without."""
+
+    diagnosis: Diagnosis
+    sources: tuple[Source, ...]
+    assumed_sources: bool
+    inexpressible: tuple[str, ...]
+    calibrated: tuple[str, ...]
+    model: TyreModel
+    under_load: UnderLoad | None = None
+
+    @property
+    def variables(self) -> dict[str, Any]:
+        """See `calibrated_variables`."""
+        return calibrated_variables(self.diagnosis, self.model)
+
+    @property
+    def asked_for(self) -> tuple[str, ...] | None:
+        """The effects considered, where they are not all of the catalogue."""
+        known = {*self.diagnosis.problem.spans, *self.inexpressible, *self.calibrated}
+        return None if known == set(catalogue()) else tuple(self.diagnosis.problem.spans)
+
+
+def study(
+    case: LoadedCase,
+    evaluator: Evaluator,
+    measured: Path,
+    repeats: Sequence[Path] = (),
+    toggled: Sequence[tuple[Path, Toggle]] = (),
+    assumed: Assumed = Assumed(),  # noqa: B008
+    jobs: int = 1,
+    effects: Sequence[str] | None = None,
+    section_map: bool = True,
+    stage: Callable[[str], None] = lambda stage: None,
+) -> DiagnosedCase:
+    """Read the files and diagnose the case with them.
+
+    effects: ids to consider, None = the whole catalogue; one that a variable of the case sets is
+    none; stage: hears of each of ``diagnosis.STAGES``. Raises InputError,
+    EvaluationFailed, and what ``Evaluator.evaluate`` raises.
+    """
+    switched = [path for path, _ in toggled]
+    runs = {path: read_measurements(path) for path in (measured, *repeats, *switched)}
+    _check_copies([measured, *repeats, *switched], runs)
+    observations = observe(
+        runs[measured],
+        [runs[path] for path in repeats],
+        [runs[path] for path in switched],
+        assumed.split,
+    )
+    rows = list(dict.fromkeys((row.label, row.pressure_kPa) for row in observations.rows))
+    if not any(label for label, _ in rows):
+        raise InputError(f"{measured}: there is no frequency of the unloaded tyre in it")
+    ids = list(catalogue()) if effects is None else list(effects)
+    fitted = tuple(id for id in ids if EFFECT_PATH + id in calibrated(case))
+    if "pressure_kPa" in calibrated(case):
+        raise InputError(
+            "a variable of the case sets pressure_kPa, which a diagnosis takes from the"
+            " measurements: consider the effect pressure_offset instead"
+        )
+    spans, inexpressible = spans_of(case, evaluator, [id for id in ids if id not in fitted])
+    changes = tuple(_counted_from(change, spans) for _, change in toggled)
+    for change in changes:
+        spans[change.id] = _reaching(spans[change.id], change)
+    found, assumed_sources = sources(case)
+    model = TyreModel(case, evaluator, rows, found, spans, jobs)
+    _check_units(model, observations, [measured, *switched], changes)
+    diagnosis = diagnose(
+        model,
+        rows,
+        observations,
+        changes,
+        assumed,
+        parts=(lambda x: regions(model, x)) if section_map else None,
+        further=lambda more: TyreModel(case, evaluator, more, found, spans, jobs),
+        stage=stage,
+    )
+    own = [runs[path] for path in (measured, *repeats)]
+    return DiagnosedCase(
+        diagnosis,
+        tuple(found),
+        assumed_sources,
+        tuple(inexpressible),
+        fitted,
+        model,
+        _under_load(case, evaluator, own, diagnosis, model),
+    )
+
+
+def _under_load(
+    case: LoadedCase,
+    evaluator: Evaluator,
+    runs: Sequence[Sequence[Measurement]],
+    diagnosis: Diagnosis,
+    model: TyreModel,
+) -> UnderLoad | None:
+    """What was measured on a road, against the calibrated tyre and the one with the effect that is
+    named or, where there is a gap, likeliest."""
+    readings = [each for run in runs for each in run if each.load_N]
+    if not readings:
+        return None
+    tyres: dict[str, Values] = {}
+    for key in filter(None, (NONE, diagnosis.leading)):
+        found = diagnosis.hypothesis(key)
+        assert found.fitted is not None
+        x = diagnosis.problem.expansion.x0 + found.fitted.d[found.best]
+        effects = {id: float(e[found.best]) for id, e in found.values.items()}
+        tyres[key] = model.design(Query(x, effects))
+    return compare(case, evaluator, readings, tyres)
+
+
+def spans_of(
+    case: LoadedCase, evaluator: Evaluator, ids: Sequence[str] | None = None
+) -> tuple[dict[str, Span], list[str]]:
+    """Effects that the evaluator's solver can express, and ids of those that it cannot.
+
+    Raises ValueError where one of ``ids`` is no effect.
+    """
+    able, unable = {}, []
+    for id in ids or ():
+        if id not in catalogue():
+            raise ValueError(f"'{id}' is not one of the effects{suggestion(id, catalogue())}")
+    for id, effect in catalogue().items():
+        if ids is not None and id not in ids:
+            continue
+        if not effect.within(evaluator.solver.capabilities):
+            unable.append(id)
+        else:
+            base = case.case.effects.get(id, 0.0)
+            able[id] = Span(
+                effect.low - base,
+                effect.high - base,
+                effect.unit,
+                effect.title,
+                effect.toggle,
+                base,
+            )
+    return able, unable
+
+
+def parse_change(text: str) -> Toggle:
+    """``EFFECT=VALUE`` or ``EFFECT*FACTOR``. Raises InputError."""
+    for mark in "=*":
+        id, found, value = text.partition(mark)
+        if found:
+            break
+    id = id.strip()
+    known = catalogue()
+    if not found or id not in known:
+        raise InputError(
+            f"'{text}' must say what was switched: EFFECT=VALUE or EFFECT*FACTOR, EFFECT one of"
+            f" {', '.join(known)}"
+        )
+    try:
+        number = float(value)
+    except ValueError:
+        number = nan
+    if not isfinite(number):
+        raise InputError(f"'{text}': '{value.strip()}' is not a number")
+    if mark == "*" and number == 1:
+        raise InputError(f"'{text}': a factor of 1 switches nothing")
+    return Toggle(id, number, mark == "*")
+
+
+def _counted_from(change: Toggle, spans: Mapping[str, Span]) -> Toggle:
+    """The change, from what the case has of its effect. Raises InputError."""
+    if change.id not in spans:
+        raise InputError(
+            f"'{change.id}' was switched in a toggled run, but is not among the effects that are"
+            " considered: add it with --effect, or leave --without; the solver has to express it,"
+            " and no variable may set it"
+        )
+    return replace(change, base=spans[change.id].base)
+
+
+def _reaching(span: Span, change: Toggle) -> Span:
+    """The span with a node where the toggled run was measured, beyond the range if need be."""
+    e = change.value - change.base
+    if change.times or span.low <= e <= span.high or e in (0.0, *span.also):
+        return span
+    return replace(span, also=(*span.also, e))
+
+
+def _check_copies(paths: Sequence[Path], runs: Mapping[Path, Sequence[Measurement]]) -> None:
+    """Raises InputError where two runs are the same to the last digit."""
+    told = [
+        [(r.quantity, r.label, r.member, r.pressure_kPa, r.load_N, r.value) for r in runs[path]]
+        for path in paths
+    ]
+    for k, path in enumerate(paths):
+        if told[k] in told[:k]:
+            first = paths[told.index(told[k])]
+            raise InputError(
+                f"{path}: holds the same values as {first}; a copy is no measurement of its own"
+            )
+
+
+def _check_units(
+    model: TyreModel, observations: Observations, paths: Sequence[Path], changes: Sequence[Toggle]
+) -> None:
+    """Raises InputError where a value is not even near the model's start, paths being the
+    runs'; InputError where the model has no answer with what was switched."""
+    set_to = [c for c in changes if not c.times and c.value != c.base]
+    points = [Query(model.start, {c.id: c.value - c.base}) for c in set_to]
+    answer, *others = model.answers([Query(model.start), *points])
+    if not isinstance(answer, Answer):
+        raise answer
+    for change, other in zip(set_to, others, strict=True):
+        if isinstance(other, Exception):
+            raise InputError(f"'{change.id}={change.value:g}' cannot be evaluated: {other}")
+    at = dict(zip(model.rows, answer.eta.tolist(), strict=True))
+    values = zip(observations.rows, observations.y, strict=True)
+    for row, y in sorted(values, key=lambda each: each[0].label is None):  # frequencies first
+        ratio = exp(y - at[row.label, row.pressure_kPa])
+        if row.label and not 1 / MAX_FREQUENCY_RATIO < ratio < MAX_FREQUENCY_RATIO:
+            raise InputError(
+                f"{paths[row.run]}: {row} was measured {ratio:.2g} times as high as the model has"
+                " it; is it the right unit, mode and pressure?"
+            )
+        if not row.label and not 1 / MAX_MASS_RATIO < ratio < MAX_MASS_RATIO:
+            raise InputError(
+                f"{paths[row.run]}: the mass is {ratio:.2g} times the model's; is it in kg, and of"
+                " the tyre without its rim?"
+            )

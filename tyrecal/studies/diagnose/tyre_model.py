@@ -1,0 +1,283 @@
+"""The evaluated tyre as a `ResponseModel`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from itertools import product
+from math import exp, log, sqrt
+
+import numpy as np
+
+from ...simulate.deck.tyre_design import TyreDesign
+from ...simulate.evaluate.evaluator import Evaluator
+from ...simulate.evaluate.failure import DeckRefused
+from ...simulate.modes.find import Found, ModesAnswer
+from ...simulate.modes.mode import Label
+from ...tyre.case import LoadedCase, start_values
+from ...tyre.case.calibration import TargetMode, Targets
+from ...tyre.effects import catalogue
+from ..fit import problem as fit
+from .model import Answer, Query, Span
+from .uncertainties import EFFECT_PATH, Source, unit_of, values_of
+
+Array = np.ndarray
+MASS_STEP = 0.02  # of a logarithm: the mass is linear in areas and densities
+
+WORTH_A_POOL = 10  # evaluations, for processes to be started
+
+ModelRow = tuple[Label | None, float]
+Key = tuple[bytes, tuple[tuple[str, float], ...], bool]  # of a point
+
+
+class TyreModel:
+    """ln f of the modes ``rows`` (label, pressure in kPa), and ln mass where the label is None.
+
+    case: its variables are x; found: sources of error; spans: effects that may be asked for;
+    jobs: evaluations at a time. Raises DeckRefused where the solver has no exact slopes.
+    """
+
+    def __init__(
+        self,
+        case: LoadedCase,
+        evaluator: Evaluator,
+        rows: Sequence[ModelRow],
+        found: list[Source],
+        spans: Mapping[str, Span],
+        jobs: int = 1,
+    ):
+        if not evaluator.has_gradients and "gradients" in evaluator.solver.capabilities:
+            raise DeckRefused(
+                "with what the case has in it (a splice) the solver gives no exact slopes, which a"
+                " diagnosis needs: take it out of the case, the diagnosis weighs it as an effect"
+            )
+        if not evaluator.has_gradients:
+            raise DeckRefused(
+                f"solver '{evaluator.solver.name}' gives no exact slopes, which a diagnosis needs:"
+                " 'tyrecal solvers' shows which one does (gradients)"
+            )
+        self.rows, self.found, self.jobs = list(rows), found, jobs
+        self.spans: Mapping[str, Span] = spans
+        self._present = case.case.effects
+        self.pressures = sorted({p for label, p in rows if label}) or [case.case.pressure_kPa]
+        labels = sorted({label for label, _ in rows if label}, key=str)
+        case = asked_for(case, labels)
+        self.case = case
+        self.evaluator = evaluator = evaluator.of(TyreDesign(case))
+        self._fit = fit.Problem(case, evaluator, jobs=jobs)
+        self._variables = case.case.variables
+        self.variables: Sequence[str] = list(self._variables)
+        self.sources: Sequence[str] = [source.name for source in found]
+        self.start = np.array([self._scaled(n, v) for n, v in start_values(case).items()])
+        wide = [
+            log(v.upper / v.lower) if v.scale == "log" else 1.0 for v in self._variables.values()
+        ]
+        self.spread = np.array(wide) / sqrt(12)  # of a uniform distribution within the bounds
+        self._plain = values_of(case, found)
+        self._plain.setdefault("pressure_kPa", case.case.pressure_kPa)
+        self._slopeless = {id for id, span in spans.items() if not self._has_slopes(id, span)}
+        self._mass: tuple[Array, Array, Array] | None = None
+
+    def values(self, x: Array) -> dict[str, float]:
+        """Design variables at x, in their own units, bounds not enforced."""
+        return {
+            name: exp(xi) if v.scale == "log" else v.lower + xi * (v.upper - v.lower)
+            for (name, v), xi in zip(self._variables.items(), map(float, x), strict=True)
+        }
+
+    def unit(self, variable: str) -> str:
+        """The unit of a design variable, "" where it has none."""
+        return unit_of(self._variables[variable].sets[0])
+
+    def design(self, point: Query) -> dict[str, float]:
+        """Numbers of the case at a point: variables, and effects on top of those that it has."""
+        effects = {
+            EFFECT_PATH + id: self._present.get(id, 0.0) + float(e)
+            for id, e in point.effects.items()
+        }
+        return {**self.values(point.x), **effects}
+
+    def answers(self, points: Sequence[Query]) -> list[Answer | Exception]:
+        """Each point at every pressure, all in one batch, ``jobs`` evaluations at a time.
+
+        A plain point that the solver refuses raises DeckRefused. With an effect that it gives no
+        slopes with, the plain tyre's at the same x stand for them. Slopes by sources that are
+        effects: one step of each, one way.
+        """
+        bare = [p for p in points if self._is_bare(p)]
+        stepped = [p for p in points if p.constants]
+        steps = [
+            (k, path.removeprefix(EFFECT_PATH), step)
+            for k, source in enumerate(self.found)
+            for path, step in source.steps.items()
+            if path.startswith(EFFECT_PATH)
+        ]
+        asked = dict.fromkeys(map(_key, points))
+        asked |= dict.fromkeys(_key(Query(p.x)) for p in bare)
+        asked |= dict.fromkeys(_key(Query(p.x, {id: e})) for p in stepped for _, id, e in steps)
+        known = dict(zip(asked, self._evaluated([_point(key) for key in asked]), strict=True))
+        return [self._completed(point, known, steps) for point in points]
+
+    def _completed(
+        self,
+        point: Query,
+        known: Mapping[Key, Answer | Exception],
+        steps: Sequence[tuple[int, str, float]],
+    ) -> Answer | Exception:
+        """The answer with what other points have to say about its slopes."""
+        answer = known[_key(point)]
+        if isinstance(answer, Answer) and self._is_bare(point):
+            plain = known[_key(Query(point.x))]
+            if not isinstance(plain, Answer):
+                return plain
+            answer = replace(answer, jacobian=plain.jacobian)
+        if not point.constants or not isinstance(answer, Answer):
+            return answer
+        assert answer.constants is not None
+        constants = answer.constants.copy()
+        for k, id, e in steps:
+            other = known[_key(Query(point.x, {id: e}))]
+            if not isinstance(other, Answer):
+                return other
+            constants[:, k] += other.eta - answer.eta
+        return replace(answer, constants=constants)
+
+    def _has_slopes(self, id: str, span: Span) -> bool:
+        """Whether the solver gives slopes with an effect."""
+        try:
+            far = span.base + span.high or span.base + span.low
+            return self.evaluator.has_gradients_at({EFFECT_PATH + id: far})
+        except ValueError:  # the case cannot have that much of it
+            return True
+
+    def _is_bare(self, point: Query) -> bool:
+        return not self._slopeless.isdisjoint(point.effects)
+
+    def _scaled(self, name: str, value: float) -> float:
+        v = self._variables[name]
+        return log(value) if v.scale == "log" else (value - v.lower) / (v.upper - v.lower)
+
+    def _evaluated(self, points: Sequence[Query]) -> list[Answer | Exception]:
+        """Distinct points, slopes with those that have them."""
+        wanted = []
+        for point, pressure in product(points, self.pressures):
+            known = dict(self._plain) if point.constants else {}
+            names = () if self._is_bare(point) else (*self.variables, *known)
+            design = {**known, "pressure_kPa": pressure, **self.design(point)}
+            wanted.append((design, names))
+        found = self._modes(wanted)
+        per, results = len(self.pressures), []
+        for i, point in enumerate(points):
+            here = slice(i * per, (i + 1) * per)
+            results.append(self._answer(point, [design for design, _ in wanted[here]], found[here]))
+        return results
+
+    def _modes(
+        self, wanted: Sequence[tuple[dict[str, float], tuple[str, ...]]]
+    ) -> list[ModesAnswer]:
+        self._fit.jobs = self.jobs if len(wanted) >= WORTH_A_POOL else 1
+        # the longest first, so that the last ones end together
+        order = sorted(range(len(wanted)), key=lambda i: -self._effort(wanted[i][0]))
+        found = self._fit.modes_of([wanted[i] for i in order])
+        return [found[place] for place in np.argsort(order)]
+
+    def _effort(self, design: Mapping[str, float]) -> int:
+        """How long an evaluation takes, by its effects: 2 without slopes, 1 where it needs more
+        than a plain tyre's modes."""
+        ids = {name.removeprefix(EFFECT_PATH) for name in design if name.startswith(EFFECT_PATH)}
+        if not self._slopeless.isdisjoint(ids):
+            return 2
+        return int(any(catalogue()[id].needs for id in ids))
+
+    def _answer(
+        self, point: Query, designs: list[dict[str, float]], answers: Sequence[ModesAnswer]
+    ) -> Answer | Exception:
+        found: list[Found] = []
+        for each in answers:
+            if isinstance(each, DeckRefused) and not point.effects:
+                raise each
+            if not isinstance(each, Found):
+                return each
+            found.append(each)
+        at = dict(zip(self.pressures, zip(designs, found, strict=True), strict=True))
+        eta, jacobian = np.zeros(len(self.rows)), np.zeros((len(self.rows), len(self.variables)))
+        slopes, split = np.zeros((len(self.rows), len(self.found))), np.zeros(len(self.rows))
+        for i, (label, pressure) in enumerate(self.rows):
+            if label is None:
+                eta[i] = log(found[0].evaluation.mass_kg)
+                jacobian[i], slopes[i] = self._mass_slopes(point.x)
+                continue
+            design, answer = at[pressure]
+            evaluation, modes = answer.evaluation, answer.wanted
+            f, place = modes[label].frequency_Hz, modes[label].position
+            eta[i] = log(f)
+            if members := modes[label].raw.members:
+                eta[i], split[i] = log(members[0] * members[1]) / 2, log(members[1] / members[0])
+            for j, name in enumerate(self.variables if evaluation.gradients else ()):
+                jacobian[i, j] = evaluation.gradients[name][place] * self._slope(name, design) / f
+            if point.constants:
+                for k, source in enumerate(self.found):
+                    slopes[i, k] = sum(
+                        step * evaluation.gradients[path][place] / f
+                        for path, step in source.steps.items()
+                        if not path.startswith(EFFECT_PATH)
+                    )
+        return Answer(eta, jacobian, split, slopes if point.constants else None)
+
+    def _slope(self, name: str, design: Mapping[str, float]) -> float:
+        v = self._variables[name]
+        return design[name] if v.scale == "log" else v.upper - v.lower
+
+    def _mass_slopes(self, x: Array) -> tuple[Array, Array]:
+        """d ln mass by x (v,) and by the sources of error (k,).
+
+        From neighbours, found once: the mass is m0 + sum of m_j times the value of variable j.
+        """
+        if self._mass is None:
+            own = {**self._plain, **self.values(x), "pressure_kPa": self.pressures[0]}
+            designs = [own]
+            designs += [{**own, **self.values(x + d)} for d in MASS_STEP * np.eye(len(x))]
+            for source in self.found:
+                steps = {k: s for k, s in source.steps.items() if not k.startswith(EFFECT_PATH)}
+                steps.pop("pressure_kPa", None)
+                designs.append({**own, **{k: own[k] + s for k, s in steps.items()}})
+            masses = []
+            for each in self._modes([(design, ()) for design in designs]):
+                if not isinstance(each, Found):
+                    raise each
+                masses.append(each.evaluation.mass_kg)
+            mass = np.array(masses)
+            count, ratio = len(x), mass[1:] / mass[0]
+            rise = self._rise(x, x + MASS_STEP)
+            self._mass = x, (ratio[:count] - 1) / rise, np.log(ratio[count:])
+        there, shares, sources = self._mass
+        rise = self._rise(there, x)
+        growth = np.where([v.scale == "log" for v in self._variables.values()], 1 + rise, 1.0)
+        return shares * growth / (1 + shares @ rise), sources
+
+    def _rise(self, before: Array, after: Array) -> Array:
+        """Relative rise of log variables, rise of x of linear ones."""
+        step = after - before
+        log_scaled = [v.scale == "log" for v in self._variables.values()]
+        return np.where(log_scaled, np.expm1(step), step)
+
+
+def _key(point: Query) -> Key:
+    """What tells two points apart."""
+    return point.x.tobytes(), tuple(point.effects.items()), point.constants
+
+
+def _point(key: Key) -> Query:
+    return Query(np.frombuffer(key[0]), dict(key[1]), key[2])
+
+
+def asked_for(case: LoadedCase, labels: Sequence[Label]) -> LoadedCase:
+    """The case with the measured modes as targets, and enough harmonics for them."""
+    modes = [TargetMode(c=x.c, m=x.m, kind=x.kind, frequency_Hz=1.0) for x in labels]  # type: ignore[arg-type]
+    analysis = case.case.analysis
+    highest = max([analysis.highest_harmonic, *(label.c for label in labels)])
+    wanted = {
+        "targets": Targets(modes=modes),
+        "analysis": analysis.model_copy(update={"highest_harmonic": highest}),
+    }
+    return replace(case, case=case.case.model_copy(update=wanted))

@@ -1,0 +1,114 @@
+"""Sources of error: numbers of the case that nobody calibrates, and how far they may be off."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from ...tyre.case import LoadedCase, number_at
+from ...tyre.case.schema import Cord, Rubber
+from ...tyre.effects import catalogue
+from ...units import in_engineers_units
+
+DENSITY_PERCENT, MODULUS_PERCENT, SPACING_PERCENT, GAUGE_PERCENT = 1.5, 3.0, 1.0, 3.0
+ANGLE_deg, PRESSURE_kPa = 1.0, 1.0
+EFFECT_PATH = "effects."
+UNIT_BY_ENDING = {  # by a key's end, the longer first
+    "kg_per_m3": "kg/m3",
+    "kg_m2": "kg m2",
+    "m_per_N": "m/N",
+    "Pa_per_m": "Pa/m",
+    "N_per_m": "N/m",
+    "rad_per_N_m": "rad/(N m)",
+    "rad_per_s": "rad/s",
+    "kPa": "kPa",
+    "Pa": "Pa",
+    "deg": "degrees",
+    "m": "m",
+    "m2": "m2",
+    "kg": "kg",
+    "Hz": "Hz",
+    "C": "C",
+}
+
+
+@dataclass(frozen=True)
+class Source:
+    """Something that is uncertain."""
+
+    name: str
+    steps: dict[str, float]  # of a number by its path, in its unit, at one standard deviation
+    words: str  # the same for people
+
+
+def sources(case: LoadedCase) -> tuple[list[Source], bool]:
+    """The case's own sources, else the assumed ones; whether they are assumed. A number that a
+    design variable sets is none: the fit finds it.
+
+    Assumed, a standard deviation each: rubber densities 1.5 %, moduli of cords 3 %, spacings 1 %,
+    gauges that the case has 3 %, cord angles 1 degree, pressure 1 kPa.
+    """
+    stated, taken = case.case.uncertainties, calibrated(case)
+    if not stated:
+        return list(_assumed(case, taken)), True
+    result = []
+    for name, each in stated.items():
+        signs = each.signs or [1] * len(each.sets)
+        steps = {
+            path: sign * (each.absolute or number_at(case, path) * (each.percent or 0) / 100)
+            for path, sign in zip(each.sets, signs, strict=True)
+            if path not in taken
+        }
+        if steps:
+            result.append(_source(name, steps, each.percent or 0.0, each.absolute or 0.0))
+    return result, False
+
+
+def _assumed(case: LoadedCase, taken: set[str]) -> Iterator[Source]:
+    for name, path, percent, absolute in _usual(case):
+        if path not in taken:
+            step = absolute or number_at(case, path) * percent / 100
+            yield _source(name, {path: step}, percent, absolute)
+
+
+def _usual(case: LoadedCase) -> Iterator[tuple[str, str, float, float]]:
+    """Name, path, and standard deviation, per cent or absolute."""
+    yield "pressure", "pressure_kPa", 0.0, PRESSURE_kPa
+    for name, material in case.case.materials.items():
+        path = f"materials.{name}."
+        if isinstance(material, Rubber):
+            yield f"{name}_density", path + "density_kg_per_m3", DENSITY_PERCENT, 0.0
+        elif isinstance(material, Cord):
+            yield f"{name}_modulus", path + "youngs_modulus_Pa", MODULUS_PERCENT, 0.0
+    for name, layer in case.case.rebar_layers.items():
+        path = f"rebar_layers.{name}."
+        spacing = "spacing_m" if layer.spacing_m is not None else "spacing_deg"
+        yield f"{name}_spacing", path + spacing, SPACING_PERCENT, 0.0
+        yield f"{name}_angle", path + "angle_deg", 0.0, ANGLE_deg
+    for i, gauge in enumerate(case.case.section.gauges or []):
+        name = f"gauge_{'_'.join(gauge.between)}_{i}"
+        yield name, f"section.gauges.{i}.factor", GAUGE_PERCENT, 0.0
+
+
+def _source(name: str, steps: dict[str, float], percent: float, absolute: float) -> Source:
+    unit = unit_of(next(iter(steps)))
+    size = f"{percent:g} %" if percent else in_engineers_units(absolute, unit)
+    return Source(name, steps, f"{name.replace('_', ' ')} {size}")
+
+
+def unit_of(path: str) -> str:
+    """The unit of the number at a dotted path, "" where it has none."""
+    if path.startswith(EFFECT_PATH):
+        return catalogue()[path.removeprefix(EFFECT_PATH)].unit
+    return next((unit for end, unit in UNIT_BY_ENDING.items() if path.endswith(f"_{end}")), "")
+
+
+def calibrated(case: LoadedCase) -> set[str]:
+    """Paths that the design variables set."""
+    return {path for variable in case.case.variables.values() for path in variable.sets}
+
+
+def values_of(case: LoadedCase, found: list[Source]) -> dict[str, float]:
+    """The case's own numbers at every path of the sources, effects aside."""
+    paths = [path for source in found for path in source.steps if not path.startswith(EFFECT_PATH)]
+    return {path: float(number_at(case, path)) for path in paths}

@@ -1,0 +1,155 @@
+"""What was measured on the road against tyres that were fitted without a load: held out by kind."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from math import log, sqrt
+
+from ...measured.measurement import Measurement
+from ...simulate.deck.tyre_design import TyreDesign
+from ...simulate.evaluate.evaluator import Evaluator
+from ...simulate.evaluate.failure import DeckRefused, EvaluationFailed
+from ...simulate.modes.loaded import Member
+from ...simulate.modes.mode import Label
+from ...tyre.case import LoadedCase
+from ...tyre.templates import TemplateFailed
+from ..fit.footprint import ROW
+from ..footprint import footprint_row
+from ..loaded import load_tyres
+from .tyre_model import asked_for
+
+LoadedKey = tuple[str, Member | None, float]  # quantity, mode, load in N
+Values = Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class LoadedRow:
+    """A measured contact area, vertical stiffness or mode (``member``) at a load, value and sigma
+    in the unit of ``quantity``; ``off``: ln value less ln of each tyre's, where it has one."""
+
+    quantity: str
+    member: Member | None
+    pressure_kPa: float
+    load_N: float
+    value: float
+    sigma: float
+    off: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class UnderLoad:
+    """Rows by pressure and load; ``tyres``: names of those compared, the calibrated one first;
+    ``failed``: what a tyre lacks and why."""
+
+    rows: tuple[LoadedRow, ...]
+    tyres: tuple[str, ...]
+    failed: tuple[str, ...]
+
+    def rms_percent(self, tyre: str, load_N: float | None = None) -> float | None:
+        """Of ``off``, over the rows (of all loads, or of one) that every tyre has which has any;
+        None: there is none."""
+        able = {each for row in self.rows for each in row.off}
+        rows = [row for row in self.rows if able == set(row.off) and load_N in (None, row.load_N)]
+        if tyre not in able or not rows:
+            return None
+        return 100 * sqrt(sum(row.off[tyre] ** 2 for row in rows) / len(rows))
+
+
+def compare(
+    case: LoadedCase,
+    evaluator: Evaluator,
+    readings: Sequence[Measurement],
+    tyres: Mapping[str, Values],
+) -> UnderLoad:
+    """Each tyre (name to values of the case's numbers) pressed at the measured pressures and loads.
+
+    The same measured several times counts as its mean.
+    """
+    rows: list[LoadedRow] = []
+    failed: dict[str, None] = {}
+    for pressure, here in _grouped(readings):
+        places = sorted(here, key=lambda place: (place[2], place[0], str(place[1] or "")))
+        found: dict[str, dict[LoadedKey, float]] = {}
+        for name, values in tyres.items():
+            found[name] = {}
+            for part in (_footprints, _modes):
+                try:
+                    for place, value in part(
+                        case, evaluator, {**values, "pressure_kPa": pressure}, places
+                    ):
+                        found[name][place] = value
+                except (EvaluationFailed, DeckRefused, TemplateFailed) as failure:
+                    failed[f"{name}, {pressure:g} kPa: {failure}"] = None
+        for place in places:
+            quantity, member, load = place
+            value, sigma = here[place]
+            off = {
+                name: log(value / known[place]) for name, known in found.items() if place in known
+            }
+            rows.append(LoadedRow(quantity, member, pressure, load, value, sigma, off))
+    return UnderLoad(tuple(rows), tuple(tyres), tuple(failed))
+
+
+def _grouped(
+    readings: Sequence[Measurement],
+) -> Iterator[tuple[float, dict[LoadedKey, tuple[float, float]]]]:
+    """By pressure: mean and its standard deviation by place."""
+    every: defaultdict[float, defaultdict[LoadedKey, list[Measurement]]]
+    every = defaultdict(lambda: defaultdict(list))
+    for each in readings:
+        member = Member(each.label, each.member) if each.label else None
+        every[each.pressure_kPa][each.quantity, member, each.load_N].append(each)
+    for pressure, places in sorted(every.items()):
+        yield (
+            pressure,
+            {
+                place: (
+                    sum(each.value for each in same) / len(same),
+                    sqrt(sum(each.sigma**2 for each in same)) / len(same),
+                )
+                for place, same in places.items()
+            },
+        )
+
+
+def _footprints(
+    case: LoadedCase, evaluator: Evaluator, values: Values, places: Sequence[LoadedKey]
+) -> Iterator[tuple[LoadedKey, float]]:
+    wanted = [place for place in places if place[1] is None]
+    loads = sorted({load for _, _, load in wanted})
+    if not loads:
+        return
+    pressed = evaluator.of(TyreDesign(case)).press(values, loads)
+    mesh = TyreDesign(case, values).tyre.mesh
+    rows = {each.load_N: footprint_row(pressed, each, mesh) for each in pressed.footprints}
+    for quantity, member, load in wanted:
+        if load in rows:
+            yield (quantity, member, load), rows[load][ROW.get(quantity, quantity)]
+    if pressed.failed:
+        raise pressed.failed
+
+
+def _modes(
+    case: LoadedCase, evaluator: Evaluator, values: Values, places: Sequence[LoadedKey]
+) -> Iterator[tuple[LoadedKey, float]]:
+    wanted = [place for place in places if place[1]]
+    loads = sorted({load for _, _, load in wanted})
+    if not loads:
+        return
+    labels: list[Label] = sorted({member.label for _, member, _ in wanted if member}, key=str)
+    case = asked_for(case, labels)
+    (outcome,) = load_tyres(case, evaluator.of(TyreDesign(case)), {"": values}, loads).values()
+    if isinstance(outcome, EvaluationFailed):
+        raise outcome
+    at = {
+        (each.load_N, mode.member): mode.frequency_Hz
+        for each in outcome.loads
+        for mode in each.modes
+    }
+    for quantity, member, load in wanted:
+        if member and (load, member) in at:
+            yield (quantity, member, load), at[load, member]
+    if outcome.failed:
+        raise outcome.failed

@@ -1,0 +1,210 @@
+"""The calibration of a case, from one start or many, and its result."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...errors import InputError
+from ...simulate.evaluate.evaluator import Counts, Evaluator
+from ...simulate.evaluate.executor import executor, in_order
+from ...simulate.evaluate.failure import EvaluationFailed, WorkerLost
+from ...tyre.case import LoadedCase
+from ...tyre.case.calibration import cannot_fit
+from ..result import csv_text
+from . import least_squares, slsqp
+from .problem import Point, Problem
+from .result import FitResult, StartReport, fit_result
+
+Array = np.ndarray
+METHODS: dict[str, Callable[[Problem, Array, float], slsqp.Outcome]] = {
+    "slsqp": slsqp.minimise,
+    "least-squares": least_squares.minimise,
+}
+TOLERANCE = 1e-3  # projected gradient, Hz per unit of a logarithm: 1e-5 Hz for a change of 1 %
+SLOPE_NOISE_HZ = 50.0  # differences of a step that suits the digits: this times the step
+SLOPE_ERROR = 1e-4  # of d ln q / d x of areas and stiffnesses, by the curvature within a step
+MOST_REPLACED = 20  # replaced starts per start asked for
+
+Notify = Callable[[int, Mapping[str, float], Point | EvaluationFailed], None]
+
+
+@dataclass
+class Fit:
+    """A finished fit; history: design points in order."""
+
+    found: FitResult
+    history: list[dict[str, Any]]
+    initial: Point
+    fitted: Point
+
+    @property
+    def result(self) -> dict[str, Any]:
+        """The content of fit.json."""
+        return self.found.content()
+
+
+def calibrate(
+    case: LoadedCase,
+    evaluator: Evaluator,
+    method: str = "slsqp",
+    fixed: Mapping[str, float] | None = None,
+    starts: int = 1,
+    seed: int = 0,
+    jobs: int = 1,
+    notify: Notify | None = None,
+    finished: Callable[[int, int], None] = lambda done, starts: None,
+) -> Fit:
+    """Fit the case's free variables to its targets.
+
+    starts: the case's own start and ``starts - 1`` drawn uniformly in the scaled box; drawn
+    starts that cannot be evaluated are counted and replaced. jobs: processes for the drawn starts,
+    and for the neighbours of a point of the first one, where the solver gives no slopes or the
+    tyre is pressed. notify is told of every design here, finished of every start. Raises
+    what `check` does; EvaluationFailed when the case's own start cannot be evaluated.
+    """
+    problem = Problem(case, evaluator, fixed, notify, jobs)
+    check(problem)
+    initial = problem.evaluate(problem.start())
+    if not np.isfinite(initial.objective):
+        raise InputError("the targets' weights and standard deviations leave no finite objective")
+    reports = [_run(problem, problem.start(), method)]
+    replaced = 0
+    if starts > 1:
+        more, replaced = _more_starts(problem, starts - 1, seed, jobs, method, finished)
+        reports += more
+    best = min(reports, key=lambda r: r.point.objective)
+    history = _joined([r.history for r in reports])
+    return Fit(
+        fit_result(problem, initial, best, reports, history, replaced, method),
+        history,
+        initial,
+        best.point,
+    )
+
+
+def check(problem: Problem) -> None:
+    """Raises InputError; DeckRefused where there are footprint targets and the solver has no
+    road."""
+    if not len(problem.scale):
+        raise InputError(
+            "the case has no targets: there is nothing to fit to; add measured modes to it, as in"
+            " targets: {modes: [{c: 2, m: 0, frequency_Hz: 79.5}, ...]}"
+        )
+    if not problem.variables:
+        raise InputError("no variable is free: there is nothing to fit")
+    weights = [t.weight for t in problem.targets] + [t.weight for t in problem.footprint]
+    if reason := cannot_fit(weights, len(problem.variables)):
+        raise InputError(reason)
+    if problem.footprint:
+        problem.evaluator.needs_road()
+
+
+def _run(problem: Problem, start: Array, method: str) -> StartReport:
+    first = problem.evaluate(start)
+    tolerance = _tolerance(problem)
+    outcome = METHODS[method](problem, start, tolerance)
+    converged = slsqp.is_converged(problem, outcome.point, max(10 * TOLERANCE, tolerance))
+    converged = converged or slsqp.is_at_jump(problem, outcome.point)
+    converged = converged or outcome.message == slsqp.AT_CROSSING
+    values, history = dict(first.values), _history(problem)
+    return StartReport(values, outcome.point, outcome.message, converged, history)
+
+
+def _tolerance(problem: Problem) -> float:
+    """What the projected gradient can be told from 0 by, given how exact the slopes are."""
+    modal = SLOPE_NOISE_HZ * (problem.difference_step or 0.0)
+    sigma = min((t.sigma_Hz or 1.0 for t in problem.targets), default=1.0)
+    pressed = SLOPE_ERROR * float(np.linalg.norm([t.scale * t.value for t in problem.footprint]))
+    return max(TOLERANCE, modal / sigma + pressed)
+
+
+def _more_starts(
+    problem: Problem,
+    count: int,
+    seed: int,
+    jobs: int,
+    method: str,
+    finished: Callable[[int, int], None],
+) -> tuple[list[StartReport], int]:
+    generator = np.random.default_rng(seed)
+    reports: list[StartReport] = []
+    replaced = 0
+    finished(1, count + 1)
+    while len(reports) < count:
+        drawn = [
+            generator.uniform(problem.lower, problem.upper) for _ in range(count - len(reports))
+        ]
+        for answer in _run_all(problem, drawn, jobs, method):
+            if isinstance(answer, EvaluationFailed):
+                replaced += 1
+            else:
+                reports.append(answer)
+                finished(len(reports) + 1, count + 1)
+        if replaced > MOST_REPLACED * count:
+            raise EvaluationFailed(
+                "no_equilibrium",
+                f"{replaced} drawn starts could not be evaluated: the bounds hold too few tyres",
+            )
+    return reports, replaced
+
+
+def _run_all(
+    problem: Problem, starts: list[Array], jobs: int, method: str
+) -> Iterator[StartReport | EvaluationFailed]:
+    """Answers in the order of the starts; ``jobs`` at a time, or by the evaluator's scheduler."""
+    if jobs <= 1 and not problem.evaluator.scheduler:
+        yield from (_start_here(problem, x, method) for x in starts)
+        return
+    evaluator = problem.evaluator.worker()
+    tasks = [(Problem(problem.case, evaluator, problem.fixed), x, method) for x in starts]
+    with executor(jobs, problem.evaluator.scheduler) as workers:
+        for answer in in_order(workers.each(_start_alone, tasks)):
+            if isinstance(answer, WorkerLost):
+                raise EvaluationFailed("crashed", str(answer))
+            report, counts = answer
+            problem.evaluator.counts.add(counts)
+            yield report
+
+
+def _start_here(problem: Problem, start: Array, method: str) -> StartReport | EvaluationFailed:
+    alone = Problem(problem.case, problem.evaluator, problem.fixed, problem.notify)
+    try:
+        return _run(alone, start, method)
+    except EvaluationFailed as failure:
+        return failure
+
+
+def _start_alone(task: tuple[Problem, Array, str]) -> tuple[StartReport | EvaluationFailed, Counts]:
+    problem, start, method = task
+    return _start_here(problem, start, method), problem.evaluator.counts
+
+
+def _history(problem: Problem) -> list[dict[str, Any]]:
+    names = list(problem.fixed) + [v.name for v in problem.variables]
+    return [
+        {
+            "objective_Hz": p.objective if isinstance(p, Point) else None,
+            "failure": None if isinstance(p, Point) else p.words,
+            "values": dict(zip(names, key, strict=True)),
+        }
+        for key, p in problem.points.items()
+    ]
+
+
+def _joined(histories: list[list[dict[str, Any]]]) -> list[dict[str, Any]]:
+    rows: list[dict[str, Any]] = []
+    for start, history in enumerate(histories, start=1):
+        for row in history:
+            rows.append({"point": len(rows) + 1, "start": start, **row})
+    return rows
+
+
+def history_csv(history: list[dict[str, Any]]) -> str:
+    """All design points as CSV: point, start, variables, objective_Hz, failure."""
+    names = list(history[0]["values"])
+    keys = ["point", "start", *names, "objective_Hz", "failure"]
+    return csv_text(keys, ({**row["values"], **row} for row in history), end="\r\n")

@@ -1,0 +1,65 @@
+"""The second method: Levenberg and Marquardt's damped Gauss-Newton steps within the bounds.
+
+Each step d minimises |r + J d|^2 + mu |d|^2 tr(J^T J) / v, v variables, within the bounds on x + d
+(Nocedal and Wright, Numerical Optimization, sec. 10.3); mu falls after a step that lowers the
+objective and rises after one that does not.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.optimize import lsq_linear
+
+from ...simulate.evaluate.failure import EvaluationFailed
+from .problem import Point, Problem
+from .slsqp import AT_JUMP, Outcome, is_at_jump, is_converged
+
+Array = np.ndarray
+STEPS = 100
+HALVINGS = 5  # of a step towards a design without a solution
+DAMPING, STIFFEST = 0.1, 1e8  # mu at first, and where no step is left to try
+
+
+def minimise(problem: Problem, start: Array, tolerance: float) -> Outcome:
+    """Minimise the objective from ``start`` until the projected gradient is below ``tolerance``.
+
+    Raises EvaluationFailed when the start itself cannot be evaluated.
+    """
+    point, damping = problem.evaluate(start), DAMPING
+    for _ in range(STEPS):
+        if is_converged(problem, point, tolerance):
+            return Outcome(point, "converged")
+        if damping > STIFFEST:
+            return Outcome(point, "no lower objective along any damped step")
+        trial = _first_solvable(problem, point, _step(problem, point, damping))
+        if trial and is_at_jump(problem, point, point.objective - trial.objective):
+            return Outcome(min(point, trial, key=lambda p: p.objective), AT_JUMP)
+        if trial is not None and trial.objective < point.objective:
+            point, damping = trial, damping / 5
+        else:
+            damping *= 4
+    return Outcome(point, f"stopped after {STEPS} steps")
+
+
+def _first_solvable(problem: Problem, point: Point, step: Array) -> Point | None:
+    """The first design with a solution on the way back along ``step``, halved each time."""
+    for halvings in range(HALVINGS):
+        try:
+            return problem.evaluate(point.x + step / 2**halvings)
+        except EvaluationFailed:
+            continue
+    return None
+
+
+def _step(problem: Problem, point: Point, damping: float) -> Array:
+    J, r = point.jacobian, point.residuals
+    count = J.shape[1]
+    spread = np.sqrt(damping / count) * np.linalg.norm(J)
+    matrix = np.vstack([J, spread * np.eye(count)])
+    right = np.concatenate([-r, np.zeros(count)])
+    below, above = problem.lower - point.x, problem.upper - point.x
+    room = 1e-12 * (problem.upper - problem.lower)  # lsq_linear wants the start strictly inside
+    step: Array = lsq_linear(
+        matrix, right, (np.minimum(below, 0) - room, np.maximum(above, 0) + room)
+    ).x
+    return np.clip(step, below, above)

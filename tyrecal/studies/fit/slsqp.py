@@ -1,0 +1,217 @@
+"""SLSQP on the design variables, restarted in the Gauss-Newton metric of each point it reaches.
+
+Raw variables of sizes 1e-7 and 1e6 stop SLSQP at its start, and its identity first Hessian sends
+it to the bounds. So each restart works in coordinates y, x = x_k + F_k (J^T J + mu)^(-1/2) y, in
+which the Hessian of F^2/2 is the identity but for the residuals' curvature (Nocedal and Wright,
+Numerical Optimization, ch. 10 and 18); bounds become linear constraints.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import minimize
+
+from ...simulate.evaluate.failure import EvaluationFailed
+from .crossing import MIXED, TELLING, Crossing, crossing, gap, order, pair_clarity
+from .problem import Point, Problem
+
+Array = np.ndarray
+RESTARTS = 40
+EXACT = 1e-3  # Hz, an objective below every measurement's resolution
+DAMPING = 0.1  # mu over the mean diagonal of J^T J, at first
+TRIALS = 3  # of a step, where the objective may jump
+AT_JUMP = "less is left to gain than areas and stiffnesses jump by"
+ROOM = 0.1  # of the gap of the [0, 0] modes, between a bounded step and where labels change places
+CREEPING = 3e-4  # of the objective, less than ROOM costs: a gain that is not worth another step
+ALONG = 0.1  # of the gradient: as much along the crossing counts as none
+AT_CROSSING = "the two [0,0] modes meet: beyond, labels change places and the objective is higher"
+CAME_BACK = "came back over the crossing of the two [0,0] modes"
+
+
+class _Jump(Exception):
+    """No lower objective along a step, however short."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Where an optimiser stopped, in its own words why, and the crossing that bounds it."""
+
+    point: Point
+    message: str
+    edge: Crossing | None = None
+
+
+def minimise(problem: Problem, start: Array, tolerance: float) -> Outcome:
+    """Minimise the objective from ``start`` until the projected gradient is below ``tolerance``.
+
+    Where the search ends with the two [0, 0] modes mixed, it is held by their crossing, at which
+    the labels change places and the objective jumps; then the other side is searched too. Where
+    that is higher, the design is a minimum: the jump bounds it.
+
+    Raises EvaluationFailed when the start itself cannot be evaluated.
+    """
+    best = _descend(problem, problem.evaluate(start), tolerance)
+    if pair_clarity(best.point) < MIXED:
+        for across in _beyond_crossing(problem, best.point, best.edge):
+            try:
+                there = problem.evaluate(across)
+            except EvaluationFailed:
+                continue
+            other = _descend(problem, there, tolerance, best.point)
+            if other.message != CAME_BACK and other.point.objective < best.point.objective:
+                best = other
+                break
+    return best
+
+
+def projected_gradient(problem: Problem, point: Point) -> float:
+    """Norm of dF/dx without what pushes against a bound, Hz per unit of x."""
+    g = point.gradient.copy()
+    g[(point.x <= problem.lower + 1e-9) & (g > 0)] = 0.0
+    g[(point.x >= problem.upper - 1e-9) & (g < 0)] = 0.0
+    return float(np.linalg.norm(g))
+
+
+def is_converged(problem: Problem, point: Point, tolerance: float) -> bool:
+    """Whether no admissible change lowers the objective, or the fit is exact for all purposes."""
+    return point.objective <= EXACT or projected_gradient(problem, point) <= tolerance
+
+
+def is_at_jump(problem: Problem, point: Point, lowered: float = 0.0) -> bool:
+    """Whether areas and stiffnesses jump by more than is left to gain, and a step from the point
+    ``lowered`` the objective by less than a quarter of that: were it quadratic, a Gauss-Newton
+    step would lower it by (J^T r) . (J^T J)^-1 (J^T r) / 2F, of the variables that no bound holds.
+    """
+    if not point.roughness:
+        return False
+    free = ((point.x > problem.lower + 1e-9) | (point.gradient < 0)) & (
+        (point.x < problem.upper - 1e-9) | (point.gradient > 0)
+    )
+    step = np.linalg.lstsq(point.jacobian[:, free], -point.residuals, rcond=None)[0]
+    gain = -0.5 * float(point.gradient[free] @ step)
+    return gain <= point.roughness and lowered < gain / 4
+
+
+def _descend(
+    problem: Problem, point: Point, tolerance: float, known: Point | None = None
+) -> Outcome:
+    """SLSQP from ``point`` to its end, or back on the side of ``known``, no lower."""
+    damping, message = DAMPING, "restarts used up"
+    edge: Crossing | None = None
+    for _ in range(RESTARTS):
+        if is_converged(problem, point, tolerance):
+            return Outcome(point, "converged")
+        seen, full_step = _restart(problem, point, damping, edge)
+        reached = min(seen, key=lambda p: p.objective)
+        side = order(problem, reached)
+        back = known is not None and side == order(problem, known)
+        if known and back and reached.objective >= (1 - CREEPING) * known.objective:
+            return Outcome(reached, CAME_BACK)
+        if side != order(problem, point):
+            edge = None
+        elif edge or (
+            any(order(problem, p) == -side != 0 for p in seen)
+            and min(map(pair_clarity, seen)) < MIXED
+        ):
+            edge = crossing(problem, seen, reached) or edge
+        creeping = point.objective - reached.objective <= CREEPING * point.objective
+        if edge and creeping and _is_bounded(reached, edge):
+            return Outcome(reached, AT_CROSSING, edge)
+        if is_at_jump(problem, point, point.objective - reached.objective):
+            return Outcome(reached, AT_JUMP)
+        if reached.objective >= point.objective - 1e-9 * max(point.objective, 1e-3):
+            if damping > 1e3 * DAMPING:
+                return Outcome(point, "no lower objective along the search direction", edge)
+            damping *= 10
+            continue
+        damping *= 0.3 if full_step else 2.0
+        point = reached
+    return Outcome(point, message, edge)
+
+
+def _is_bounded(point: Point, edge: Crossing) -> bool:
+    """Whether the labels are about to change places and the gradient is normal to where they do,
+    as it is at any bound that holds."""
+    normal = edge.slopes / max(float(np.linalg.norm(edge.slopes)), 1e-300)
+    along = np.linalg.norm(point.gradient - (point.gradient @ normal) * normal)
+    near = pair_clarity(point) < TELLING
+    return near and bool(along <= ALONG * np.linalg.norm(point.gradient))
+
+
+def _restart(
+    problem: Problem, point: Point, damping: float, edge: Crossing | None
+) -> tuple[list[Point], bool]:
+    """One SLSQP iteration on this side of ``edge``; the points seen and whether the first step,
+    taken whole, was the best."""
+    J, scale = point.jacobian, max(point.objective, 1e-300)
+    H = J.T @ J
+    H[np.diag_indices(len(H))] += damping * np.trace(H) / len(H)
+    turn = scale * np.linalg.inv(np.linalg.cholesky(H)).T
+    seen = [point]
+
+    def function(y: Array) -> tuple[float, Array]:
+        if point.roughness and len(seen) > TRIALS + 1:
+            raise _Jump  # each trial presses several tyres
+        x = np.clip(point.x + turn @ y, problem.lower, problem.upper)
+        try:
+            there = problem.evaluate(x)
+        except EvaluationFailed:
+            return np.inf, np.zeros(len(y))  # worse than anything: the line search steps back
+        seen.append(there)
+        gradient = there.jacobian.T @ there.residuals
+        return 0.5 * (there.objective / scale) ** 2, turn.T @ gradient / scale**2
+
+    matrix, held = np.empty((0, len(turn))), np.empty(0)  # the crossing's row, where it bounds
+    if edge:
+        side = np.sign(gap(point))
+        matrix = side * (edge.slopes @ turn)[None, :]
+        held = np.array([side * edge.at(point.x) - ROOM * abs(gap(point))])
+    bounds = {
+        "type": "ineq",
+        "fun": lambda y: np.concatenate(
+            [
+                point.x + turn @ y - problem.lower,
+                problem.upper - point.x - turn @ y,
+                held + matrix @ y,
+            ]
+        ),
+        "jac": lambda y: np.concatenate([turn, -turn, matrix]),
+    }
+    with suppress(_Jump):
+        minimize(
+            function,
+            np.zeros(len(J.T)),
+            jac=True,
+            method="SLSQP",
+            constraints=[bounds],
+            options={"maxiter": 1, "ftol": 1e-15},
+        )
+    best = min(seen, key=lambda p: p.objective)
+    return seen, len(seen) > 2 and best is seen[2]
+
+
+def _beyond_crossing(
+    problem: Problem, point: Point, edge: Crossing | None = None
+) -> Iterator[Array]:
+    """Designs on the other side of the [0, 0] modes' crossing, the nearest in the metric first.
+
+    d of the crossing, see there, is carried to the other side of 0 with the least change of the
+    residuals: dx = -(d +- wanted) H^-1 grad d / (grad d . H^-1 grad d).
+    """
+    side = order(problem, point)
+    edge = edge or (crossing(problem, [point], point) if side else None)
+    if edge is None:
+        return
+    H = point.jacobian.T @ point.jacobian
+    H[np.diag_indices(len(H))] += 1e-3 * np.trace(H) / len(H)
+    direction = np.linalg.solve(H, edge.slopes)
+    rise = float(edge.slopes @ direction)
+    if rise < 1e-12 * (edge.slopes @ edge.slopes + 1e-300):
+        return
+    for wanted in (1.0, 2.0, 4.0):  # Hz beyond
+        change = -(edge.at(point.x) + side * wanted) * direction / rise
+        yield np.clip(point.x + change, problem.lower, problem.upper)

@@ -1,0 +1,44 @@
+"""Design variables as the optimiser has them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from ...simulate.deck.tyre_design import NEAR_ZERO
+from ...tyre.case.calibration import Variable as CaseVariable
+
+
+@dataclass(frozen=True)
+class Variable:
+    """A design variable: bounds in its own unit; ``log`` scaled inside the optimiser or not."""
+
+    name: str
+    start: float
+    lower: float
+    upper: float
+    log: bool = True
+
+    def scaled(self, value: float) -> float:
+        """The optimiser's coordinate of a value."""
+        return math.log(value) if self.log else (value - self.lower) / (self.upper - self.lower)
+
+    def value(self, x: float) -> float:
+        """The value at an optimiser's coordinate, inside the bounds to the last bit."""
+        if x == self.scaled(self.start):
+            return self.start
+        raw = math.exp(x) if self.log else self.lower + x * (self.upper - self.lower)
+        return min(max(raw, self.lower), self.upper)
+
+    def slope(self, value: float) -> float:
+        """d value / d coordinate."""
+        return value if self.log else self.upper - self.lower
+
+
+def read_variable(name: str, v: CaseVariable) -> Variable:
+    """A variable as the optimiser has it: next to 0 where it moves effects and a bound is 0, as
+    most have no slope there, where their keywords leave the deck."""
+    effect = all(path.startswith("effects.") for path in v.sets)
+    least = NEAR_ZERO * max(abs(v.lower), abs(v.upper)) if effect else 0.0
+    lower, upper = v.lower or least, v.upper or -least
+    return Variable(name, min(max(v.start, lower), upper), lower, upper, v.scale == "log")

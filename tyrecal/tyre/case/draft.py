@@ -1,0 +1,134 @@
+"""Cases of other tyres, ready to be written: from a size code, or with a section of one's own."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from ...errors import InputError
+from ...files import read_bytes
+from ..load import validate
+from ..section.from_size import build, usual
+from ..section.section import SectionError, refuse_separators
+from ..section.size import INCH, TyreSize
+from .new import new_case
+from .section import Outline, SectionSource
+from .stations import read_section_of
+
+FLANGE = 17.3e-3  # m, height of the rim's flange, contour J
+PRESSURE_KPA = 250.0  # where nothing says more
+
+
+@dataclass(frozen=True)
+class Draft:
+    """A case's text and the file that its section is in: name beside the case, and content."""
+
+    text: str
+    file: str
+    content: bytes
+
+    def check(self, allow_unusual: bool = False) -> None:
+        """Raises InputError where the case is not right, a mistake a line."""
+        with TemporaryDirectory() as folder:
+            Path(folder, self.file).write_bytes(self.content)
+            path = Path(folder, "case.yaml")
+            path.write_text(self.text, encoding="utf-8")
+            mistakes = validate(path, allow_unusual)
+        if mistakes:
+            raise InputError("\n".join(f"{m.key} is {m.value}: {m.message}" for m in mistakes))
+
+
+def from_size(
+    size: TyreSize, lengths: Mapping[str, float], pressure_kPa: float | None, stem: str
+) -> Draft:
+    """A case with a section built from a size; ``lengths``: fields of Gauges that differ from the
+    usual, m. Raises InputError."""
+    try:
+        gauges = replace(usual(size, lengths.get("rim")), **lengths)
+        table = build(size, gauges)
+    except SectionError as error:
+        raise InputError(str(error)) from None
+    mm = {k: f"{1e3 * getattr(gauges, k):.1f}" for k in ("crown", "sidewall", "bead", "belt")}
+    text = new_case(
+        table.section(),
+        f"{stem}.csv",
+        f"{size.text} on a {gauges.rim / INCH:g} inch rim",
+        size.text,
+        size.pressure_kPa if pressure_kPa is None else pressure_kPa,
+        f"section from the size code, crown {mm['crown']}, sidewall {mm['sidewall']},\n"
+        f"# bead {mm['bead']} mm thick, belt {mm['belt']} mm wide: an estimate to start from.",
+        carcass_plies=2 if size.light_truck else 1,
+    )
+    return Draft(text, f"{stem}.csv", table.csv().encode())
+
+
+def from_file(
+    file: Path, size: TyreSize | None, belt: float | None, pressure_kPa: float | None
+) -> Draft:
+    """A case with the section in ``file``: a station table, or two curves with a belt of width
+    ``belt``, m. Raises InputError, OSError."""
+    content = read_bytes(file)  # before others open it: it may be a pipe
+    try:
+        outline = _is_outline(file)
+        if belt is not None and not outline:
+            raise InputError("--belt-width-mm goes with an outline: a station table has its belts")
+        keys = _outline_keys(file, size, belt) if outline else None
+        given: dict[str, Any] = (
+            {"outline": {"file": file.name, **keys}} if keys else {"stations": file.name}
+        )
+        source = SectionSource.model_validate(given)
+        usual_kPa = size.pressure_kPa if size else PRESSURE_KPA
+        section = read_section_of(source, file.parent)
+        text = new_case(
+            section,
+            file.name,
+            size.text + " with a section of its own" if size else file.stem,
+            size.text if size else "not given",
+            usual_kPa if pressure_kPa is None else pressure_kPa,
+            "",
+            keys,
+            2 if size and size.light_truck else 1,
+        )
+        return Draft(text, file.name, content)
+    except SectionError as error:
+        line = f", line {error.line}" if error.line else ""
+        raise InputError(f"{file}{line}: {error}") from None
+    except UnicodeDecodeError:
+        raise InputError(f"{file}: must be text in UTF-8") from None
+    except csv.Error as error:
+        raise InputError(f"{file}: {error}") from None
+
+
+def _is_outline(file: Path) -> bool:
+    with file.open(newline="", encoding="utf-8-sig") as lines:
+        header = next(csv.reader(lines), [])
+    refuse_separators(header)
+    return "curve" in header
+
+
+def _outline_keys(file: Path, size: TyreSize | None, belt: float | None) -> dict[str, float]:
+    """What the curves do not show, as far as it is known, else as is usual."""
+    from ..section.outline import read_outline
+
+    curves = read_outline(file)
+    if not size:
+        width = 2 * float(curves["outer"][:, 1].max())
+        keys = {
+            "belt_width_m": belt or 0.75 * width,
+            "rim_radius_m": float(curves["inner"][-1, 0]) + FLANGE,
+        }
+        defaults = {k: f.default for k, f in Outline.model_fields.items() if not f.is_required()}
+        return {k: round(v, 5) for k, v in {**keys, **defaults}.items()}
+    g = usual(size)
+    return {
+        "belt_width_m": round(belt or g.belt, 5),
+        "rim_radius_m": round(size.flange_radius(g.rim), 5),
+        "carcass_depth_m": g.liner,
+        "belt_depth_m": g.ply,
+        "belt_spacing_m": g.belts,
+        "belt_step_m": g.step,
+    }

@@ -1,0 +1,109 @@
+"""Which tyre a case is of: one hash of all that makes it this tyre and no other."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from contextlib import suppress
+from functools import lru_cache
+from hashlib import sha256
+from typing import Any
+
+from ..section.section import Section
+from .checks import find
+from .loaded import LoadedCase
+from .mistakes import Keys
+
+# of a case; not among them: what it is called, its mesh, pressure and road, what is asked of it,
+# its targets and uncertainties, solver and templates
+TYRE: dict[str, Any] = {
+    "section": {"gauges": True, "outline": True},
+    "materials": True,
+    "solids": True,
+    "rebar_layers": True,
+    "rim": True,
+    "cavity": True,
+    "spin_rad_per_s": True,
+    "point_mass": True,
+    "road_spring": True,
+    "splice": True,
+    "analysis": {"static_moduli": True, "vibration_frequency_Hz": True},
+}
+STATE: tuple[Keys, ...] = (("rim", "free"), ("section", "outline", "file"))
+
+
+def tyre_sha256(loaded: LoadedCase) -> str:
+    """Hash of the tyre as 64 hexadecimal digits, the same however its case is written.
+
+    It changes with every number that is physics (in the unit of its key) and with what is a
+    variable, by name and path; not with a variable's value, nor with the state: pressure, load,
+    road, and whether the rim is held or free. Keys at their default, and effects of 0, count as
+    absent.
+    """
+    text = json.dumps(_content(loaded), sort_keys=True, allow_nan=False)
+    return sha256(text.encode()).hexdigest()
+
+
+def is_of_tyre(path: str) -> bool:
+    """Whether the number at a dotted path of a case makes a tyre another one. (A variable's name is
+    no path.)"""
+    part, _, rest = path.partition(".")
+    known = TYRE.get(part, part == "effects")
+    return known is True or (known is not False and rest.partition(".")[0] in known)
+
+
+def _content(loaded: LoadedCase) -> dict[str, Any]:
+    """The tyre as plain data, without the values of its variables."""
+    case = loaded.case
+    data: dict[str, Any] = case.model_dump(include=TYRE, exclude_defaults=True)
+    data["effects"] = {id: value for id, value in case.effects.items() if value}
+    for keys in STATE:
+        _leave_out(data, keys)
+    for variable in case.variables.values():
+        for path in variable.sets:
+            with suppress(KeyError):  # a law may have divided the layer
+                _leave_out(data, find(case, path))
+    return {
+        "tyre": _plain(data),
+        "variables": {name: sorted(v.sets) for name, v in case.variables.items()},
+        "drawn": _drawn(loaded.section),
+    }
+
+
+def _leave_out(data: Any, keys: Keys) -> None:
+    """Take the value at ``keys`` out of ``data``, where it stands there."""
+    *way, last = keys
+    for key in way:
+        if not _has(data, key):
+            return
+        data = data[key]
+    if _has(data, last):
+        data[last] = None
+
+
+def _has(data: Any, key: str | int) -> bool:
+    if isinstance(data, list):
+        return isinstance(key, int) and key < len(data)
+    return isinstance(data, dict) and key in data
+
+
+def _plain(value: Any) -> Any:
+    """Numbers as floats (one zero among them), and no key that holds nothing."""
+    if isinstance(value, Mapping):
+        entries = {key: _plain(each) for key, each in value.items()}
+        return {key: each for key, each in entries.items() if each not in (None, {}, [])}
+    if isinstance(value, list | tuple):
+        return [_plain(each) for each in value]
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        return float(value) + 0.0
+    return value
+
+
+@lru_cache(maxsize=8)
+def _drawn(section: Section) -> str:
+    """Hash of what the section was drawn from, m: the curves of its outline, else its stations."""
+    content: Any = [curve.tolist() for curve in section.outline]
+    if not section.outline:
+        points = section.points + 0.0  # which knows one zero only
+        content = [section.names, section.regions, section.rigid.tolist(), points.tolist()]
+    return sha256(json.dumps(content).encode()).hexdigest()

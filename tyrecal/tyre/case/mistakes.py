@@ -1,0 +1,60 @@
+"""Mistakes in a case: where, what stands there, and what would be right."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from difflib import get_close_matches
+
+from ...errors import InputError
+from ...files import printable
+
+Keys = tuple[str | int, ...]
+"""Keys and list indices that lead to a value of the case."""
+
+
+@dataclass(frozen=True)
+class Mistake:
+    """One mistake: the file, its line (from 1), the dotted key, its value, what would be right.
+
+    ``key`` is empty where the file as a whole is wrong, ``line`` 0 where it has none.
+    """
+
+    file: str
+    line: int
+    key: str
+    value: str
+    message: str
+
+    def __str__(self) -> str:
+        what = f"{self.key} is {self.value}: " if self.key else ""
+        where = f"{self.file}, line {self.line}" if self.line else self.file
+        return printable(f"{where}: {what}{self.message}")
+
+
+class CaseError(InputError):
+    """A case that cannot be used; ``mistakes`` holds all that is wrong with it."""
+
+    def __init__(self, mistakes: list[Mistake]):
+        super().__init__("\n".join(map(str, mistakes)))
+        self.mistakes = mistakes
+
+
+def dotted(keys: Keys) -> str:
+    """The key as people write it: ``materials.rubber.prony.0.g``."""
+    return ".".join(map(str, keys))
+
+
+def shortened(text: str, length: int = 40) -> str:
+    """``text`` on one line, cut to ``length`` characters."""
+    text = printable(text)
+    return text if len(text) <= length else text[: length - 3] + "..."
+
+
+def suggestion(name: str, known: Iterable[str], otherwise: str | None = None) -> str:
+    """``; did you mean 'x'?``; where nothing is close ``otherwise``, or what is known."""
+    names = list(known)
+    close = get_close_matches(name, names, 1)
+    if close:
+        return f"; did you mean '{close[0]}'?"
+    return f"; known: {', '.join(map(str, names)) or 'none'}" if otherwise is None else otherwise

@@ -1,0 +1,159 @@
+"""Files that a case names: they must lie in its folder and be what they should be."""
+
+from __future__ import annotations
+
+import csv
+from collections import Counter
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from pydantic import ValidationError
+
+from .document import MOST_BYTES, Document
+from .mistakes import Keys, Mistake, dotted, shortened
+from .parts import WRONG
+from .section import SectionSource
+
+if TYPE_CHECKING:
+    from ..section.section import Section
+
+SMALLEST_MM, LARGEST_MM = 50, 5000  # outer radius of a tyre
+
+
+def inside(folder: Path, name: str) -> Path:
+    """The path of ``name`` in ``folder``; ValueError when it leads outside, links included."""
+    path = Path(name)
+    if not name.strip() or path.is_absolute() or ".." in path.parts:
+        raise ValueError("must be a path inside the case's folder")
+    try:
+        if not (folder / path).resolve().is_relative_to(folder.resolve()):
+            raise ValueError("must not link to a place outside the case's folder")
+        (folder / path).exists()
+    except (OSError, RuntimeError) as error:
+        raise ValueError(f"cannot be read: {getattr(error, 'strerror', None) or error}") from None
+    return folder / path
+
+
+def check_templates(document: Document, data: dict[str, Any], folder: Path) -> None:
+    """Record what is wrong with the case's folder of templates, if it names one."""
+    name = data.get("templates")
+    if isinstance(name, str):
+        try:
+            if not inside(folder, name).is_dir():
+                document.add(("templates",), "must be a folder, there is none of this name")
+        except ValueError as error:
+            document.add(("templates",), str(error))
+
+
+def read_stations(document: Document, data: dict[str, Any], folder: Path) -> Section | None:
+    """The section that the case names; None, with the mistakes recorded, where it is wrong."""
+    from ..section.section import SectionError
+
+    source = data.get("section")
+    source = source if isinstance(source, dict) else {}
+    outline = source.get("outline")
+    keys: Keys = ("section", "outline", "file") if outline else ("section", "stations")
+    name = outline.get("file") if isinstance(outline, dict) else source.get("stations")
+    if not isinstance(name, str):
+        return None
+    try:
+        path = inside(folder, name)
+        if not path.is_file():
+            raise ValueError("must be a file, there is none of this name")
+        if outline is WRONG or (outline and WRONG in outline.values()):
+            return None  # reported by the schema already
+        given = {"outline": outline} if outline else {"stations": name}
+        section = read_section_of(SectionSource.model_validate(given), folder)
+    except ValidationError:  # this too
+        return None
+    except SectionError as error:
+        message = shortened(str(error), 300)
+        if error.line:
+            value = document.places.get(keys, (1, name))[1]
+            document.mistakes.append(Mistake(str(path), error.line, dotted(keys), value, message))
+        else:
+            document.add(keys, message)
+    except UnicodeDecodeError:
+        document.add(keys, "the station table must be text in UTF-8")
+    except (ValueError, csv.Error) as error:
+        document.add(keys, shortened(str(error), 300))
+    except OSError as error:
+        document.add(keys, f"cannot be read: {error.strerror}")
+    else:
+        return section
+    return None
+
+
+def read_section_of(source: SectionSource, folder: Path) -> Section:
+    """The section that part of a case describes. Raises SectionError, ValueError, OSError."""
+    from ..section.outline import read_outline, section_of_outline
+    from ..section.section import fill_lines, read_section
+
+    path = inside(folder, source.file)
+    if path.stat().st_size > MOST_BYTES:
+        raise ValueError(f"the table of the section is larger than {MOST_BYTES} bytes")
+    given = source.outline
+    if not given:
+        _check_table(path)
+        section = read_section(path)
+        fill_lines(section)
+    else:
+        section = section_of_outline(
+            read_outline(path),
+            given.belt_width_m,
+            given.rim_radius_m,
+            given.carcass_depth_m,
+            given.belt_depth_m,
+            given.belt_spacing_m,
+            given.belt_step_m,
+        )
+    _check_section(section)
+    return section
+
+
+def _check_table(path: Path) -> None:
+    """The table is a table: a comma for a decimal point would shift its columns unseen."""
+    from ..section.section import GAUGE, SectionError, gauged_lines, refuse_separators
+
+    with path.open(newline="", encoding="utf-8-sig") as file:
+        rows = csv.reader(file)
+        header = next(rows, [])
+        if not header:
+            raise SectionError("the station table is empty", 1)
+        refuse_separators(header)
+        names = [column[: -len("_r_mm")] for column in header if column[-5:] in ("_r_mm", "_z_mm")]
+        known = ["region", "rigid", *(f"{name}_{axis}_mm" for name in names for axis in "rz")]
+        known += [f"{name}{GAUGE}" for name in gauged_lines(header)]
+        for column in known:
+            if column not in header:
+                raise SectionError(f"column '{shortened(column)}' is missing", 1)
+        for column, count in Counter(header).items():
+            if count > 1:
+                raise SectionError(f"column '{shortened(column)}' is given {count} times", 1)
+            if column not in [*known, "station"]:
+                raise SectionError(f"column '{shortened(column)}' is not known", 1)
+        for row in rows:
+            if row and len(row) != len(header):
+                raise SectionError(f"{len(row)} values for {len(header)} columns", rows.line_num)
+
+
+def _check_section(section: Section) -> None:
+    from ..section.section import SectionError
+
+    for name in [*section.names, *(region for region, _ in section.regions)]:
+        if not name.isascii() or not name.replace("_", "").replace("-", "").isalnum():
+            raise SectionError(
+                f"the name '{shortened(name)}' of a line or region must be one word of"
+                " letters, digits, - and _"
+            )
+    for name, count in section.regions:
+        if count < 1:
+            raise SectionError(f"region '{name}' needs at least two stations")
+    reach = 1e3 * section.points[-1, 0, 0]  # mm; a tyre of inches, cm or m would pass else
+    if not SMALLEST_MM < reach < LARGEST_MM:
+        raise SectionError(
+            f"the tyre's outer radius is {reach:.3g} mm: r and z must be in mm, and a tyre's radius"
+            f" between {SMALLEST_MM} and {LARGEST_MM} mm"
+        )
+    if not section.rigid.any():
+        raise SectionError("no station is held by the rim, rigid must be 1 somewhere")

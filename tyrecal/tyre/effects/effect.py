@@ -1,0 +1,51 @@
+"""An effect: what a plain model leaves out, as a change of the case with one parameter."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from ...errors import InputError
+
+if TYPE_CHECKING:
+    from ..case import LoadedCase
+
+
+@dataclass(frozen=True)
+class Effect:
+    """One entry of the catalogue.
+
+    id, title: its name in files and in words; symbol, unit: of the parameter ("" = a number);
+    low, high: the parameter's range on passenger tyres, taken as equally likely throughout;
+    changes: the keywords of the deck that it touches; signature: which modes move, which way and
+    how far, as this model says; toggle: the experiment that would prove it; aliases: ids of
+    effects that frequencies alone hardly tell from it; add: the case with the effect of that
+    parameter (not 0) in it, written in the case's own numbers, or ValueError ("must be ...");
+    needs: what a solver must list among its capabilities to express it, "" = nothing.
+    """
+
+    id: str
+    title: str
+    symbol: str
+    unit: str
+    low: float
+    high: float
+    changes: tuple[str, ...]
+    signature: str
+    toggle: str
+    aliases: tuple[str, ...]
+    add: Callable[[LoadedCase, float], LoadedCase]
+    needs: str = ""
+
+    def within(self, capabilities: Collection[str]) -> bool:
+        """Whether a solver with these capabilities can express it."""
+        return not self.needs or self.needs in capabilities
+
+
+class EffectRefused(InputError):
+    """A parameter with which the effect, or the case, cannot be."""
+
+    def __init__(self, id: str, reason: str, value: float):
+        super().__init__(f"effects.{id} {reason}, got {value:g}")
+        self.id, self.reason = id, reason

@@ -1,0 +1,104 @@
+"""Where the parts of a tyre are in its section: carcass, belt, tread, sidewall, bead.
+
+They are told by the lines' lengths: the carcass runs from bead to bead, belts end.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..case import LoadedCase
+from ..section.section import Section
+
+Array = np.ndarray
+
+
+def present(section: Section) -> Array:
+    """Whether a line really is there, (line, station)."""
+    there: Array = ~np.isnan(section.points).any(-1)
+    return there
+
+
+def carcass_line(case: LoadedCase) -> str:
+    """The innermost line of cords that runs from bead to bead. Raises ValueError."""
+    used = {layer.line for layer in case.case.rebar_layers.values()}
+    for name, there in zip(case.section.names, present(case.section), strict=True):
+        if there.all() and name in used:
+            return name
+    raise ValueError("must be 0: no layer of cords runs from bead to bead in this case")
+
+
+def carcass(case: LoadedCase) -> list[str]:
+    """Names of the layers on the carcass' line. Raises ValueError."""
+    line = carcass_line(case)
+    return [name for name, layer in case.case.rebar_layers.items() if layer.line == line]
+
+
+def belt_lines(case: LoadedCase) -> list[str]:
+    """Lines of cords that start at the crown and end before the bead, from inside to outside.
+
+    Raises ValueError.
+    """
+    there = present(case.section)
+    used = {layer.line for layer in case.case.rebar_layers.values()}
+    lines = [
+        name
+        for name, stations in zip(case.section.names, there, strict=True)
+        if name in used and stations[0] and not stations.all()
+    ]
+    if not lines:
+        raise ValueError("must be 0: this case has no belt, no layer of cords ends at the shoulder")
+    return lines
+
+
+def belts(case: LoadedCase) -> list[str]:
+    """Names of the layers on the belts' lines, from inside to outside. Raises ValueError."""
+    layers = case.case.rebar_layers
+    return [name for line in belt_lines(case) for name in layers if layers[name].line == line]
+
+
+def belt_edge(case: LoadedCase) -> int:
+    """Station at which the widest belt ends. Raises ValueError."""
+    there = present(case.section)
+    places = [case.section.names.index(line) for line in belt_lines(case)]
+    return int(max(np.flatnonzero(np.logical_and.accumulate(there[k]))[-1] for k in places))
+
+
+def crown(case: LoadedCase) -> list[str]:
+    """Regions of which most lies within the belt. Raises ValueError."""
+    edge = belt_edge(case)
+    return [name for name, first, last in _regions(case.section) if (first + last) / 2 < edge]
+
+
+def sidewall(case: LoadedCase) -> list[str]:
+    """Regions between the belt and where the rim holds the tyre. Raises ValueError."""
+    edge, held = belt_edge(case), rim_edge(case.section)
+    return [
+        name for name, first, last in _regions(case.section) if edge <= (first + last) / 2 < held
+    ]
+
+
+def lower_sidewall(case: LoadedCase) -> list[str]:
+    """Regions of the sidewall below the section's widest point. Raises ValueError."""
+    line = case.section.points[case.section.names.index(carcass_line(case))]
+    widest = int(np.argmax(line[:, 1]))
+    middle = {name: (first + last) / 2 for name, first, last in _regions(case.section)}
+    found = [name for name in sidewall(case) if middle[name] > widest]
+    if not found:
+        raise ValueError("must be 0: no region of this case is a lower half of the sidewall")
+    return found
+
+
+def rim_edge(section: Section) -> int:
+    """The first station that the rim holds."""
+    return int(np.flatnonzero(section.rigid)[0])
+
+
+def stations(section: Section, region: str) -> tuple[int, int]:
+    """First and last station of a region; neighbours share one."""
+    return next((first, last) for name, first, last in _regions(section) if name == region)
+
+
+def _regions(section: Section) -> list[tuple[str, int, int]]:
+    ends = np.cumsum([0, *(count for _, count in section.regions)])
+    return [(name, int(ends[i]), int(ends[i + 1])) for i, (name, _) in enumerate(section.regions)]

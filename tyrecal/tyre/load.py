@@ -1,0 +1,94 @@
+"""A case file read and judged: everything that is wrong with it in one go."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from copy import deepcopy
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from .case.calibration import cannot_fit
+from .case.checks import problems
+from .case.document import Document, read_document
+from .case.loaded import LoadedCase
+from .case.meshable import folds
+from .case.mistakes import CaseError, Keys, Mistake, dotted
+from .case.schema import Case
+from .case.shape import disagreements, explain, without
+from .case.stations import check_templates, read_stations
+from .effects import EffectRefused
+from .guard import unusual
+from .resolve import resolved
+
+
+def load_case(path: Path | str, allow_unusual: bool = False) -> LoadedCase:
+    """Read a case file. Raises CaseError with every mistake in it, numbers among them that no tyre
+    has, unless they are allowed."""
+    loaded, mistakes = _read(Path(path), allow_unusual)
+    if loaded is None:
+        raise CaseError(mistakes)
+    return loaded
+
+
+def validate(path: Path | str, allow_unusual: bool = False) -> list[Mistake]:
+    """Every mistake in a case file and the files it names, by line; empty when it is right.
+
+    Targets that no fit can use are mistakes here, though other studies do without.
+    """
+    loaded, mistakes = _read(Path(path), allow_unusual)
+    if loaded and loaded.case.targets.weights and loaded.case.variables:
+        reason = cannot_fit(loaded.case.targets.weights, len(loaded.case.variables))
+        if reason:
+            document = read_document(Path(path))
+            document.add(("targets",), reason)
+            return document.mistakes
+    return mistakes
+
+
+def _read(path: Path, allow_unusual: bool) -> tuple[LoadedCase | None, list[Mistake]]:
+    document = read_document(path)
+    data = document.data
+    if data is None:
+        return None, document.mistakes
+    raw = deepcopy(data)
+    case = _typed(document, data)
+    _add(document, disagreements(data))
+    section = read_stations(document, data, path.parent)
+    check_templates(document, data, path.parent)
+    _add(document, problems(data, section))
+    meshable = not any(m.key.startswith(("mesh", "section")) for m in document.mistakes)
+    if section and meshable and (message := folds(data, section)):
+        form = "outline" if data["section"].get("outline") else "stations"
+        document.add(("section", form), message)
+    if not allow_unusual:
+        _add(document, unusual(data, section))
+    if case is None or section is None or document.mistakes:
+        return None, sorted(document.mistakes, key=lambda m: (m.file != str(path), m.line))
+    loaded = LoadedCase(case, path, section, path.parent, raw, case.pressure_kPa)
+    try:
+        resolved(loaded)
+    except EffectRefused as error:
+        document.add(("effects", error.id), error.reason)
+        return None, document.mistakes
+    return loaded, []
+
+
+def _typed(document: Document, data: dict[str, Any]) -> Case | None:
+    """The case as the schema sees it; else its mistakes are recorded, and WRONG in ``data``."""
+    try:
+        return Case.model_validate(data)
+    except ValidationError as error:
+        found = list(explain(error))
+        _add(document, found)
+        without(data, [keys for keys, _ in found])
+        return None
+
+
+def _add(document: Document, found: Iterable[tuple[Keys, str]]) -> None:
+    """Record what is found at keys of which nothing has been said yet."""
+    told = {mistake.key for mistake in document.mistakes}
+    for keys, message in found:
+        if dotted(keys) not in told:
+            document.add(keys, message)

@@ -1,0 +1,108 @@
+"""The tyre of a case, resolved once: its effects written in, its section meshed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
+
+from .case import Case, LoadedCase
+from .case.materials import Rubber
+from .effects import EffectRefused, catalogue
+from .plugins import IDS
+from .section.gauges import with_gauges
+from .section.mesh import SectionMesh, build_mesh
+from .section.section import Section
+
+# What parts of a tyre ask of a solver: the capability, and what it is for, in words.
+CAPABILITIES = {
+    "spindle": "a rim that moves",
+    "frequency_modulus": "rubber whose modulus follows each mode's frequency",
+    "cavity": "the gas in the cavity",
+    "coupled": "a mass, a spring or a splice that couples harmonics",
+    "rotation": "a tyre that turns",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Tyre:
+    """A tyre as it is modelled: of all its effects none is left to apply."""
+
+    written: LoadedCase
+    """The case with its effects written into its other numbers."""
+
+    @property
+    def case(self) -> Case:
+        """The numbers of the tyre."""
+        return self.written.case
+
+    @property
+    def section(self) -> Section:
+        """The section as drawn, before its gauges."""
+        return self.written.section
+
+    @cached_property
+    def gauged(self) -> Section:
+        """The section with its gauges applied."""
+        return _gauged(self.case, self.section)
+
+    @cached_property
+    def mesh(self) -> SectionMesh:
+        """The mesh of the section at the chosen level, the same one for tyres that share it."""
+        return section_mesh(self.case, self.gauged)
+
+    @cached_property
+    def needs(self) -> dict[str, str]:
+        """Capabilities that a solver must have for this tyre, and what for, in words."""
+        c = self.case
+        rubbers = [m for m in c.materials.values() if isinstance(m, Rubber)]
+        asked = {
+            "spindle": c.rim.moves,
+            "frequency_modulus": any(m.frequency_exponent for m in rubbers),
+            "cavity": bool(c.cavity.share),
+            "coupled": bool(c.point_mass.mass_kg or c.splice.share or c.road_spring.stiffnesses),
+            "rotation": bool(c.spin_rad_per_s),
+        }
+        return {need: CAPABILITIES[need] for need, there in asked.items() if there}
+
+
+def resolved(case: LoadedCase) -> Tyre:
+    """The tyre of a case. Raises EffectRefused for a parameter that cannot be."""
+    present = {id: value for id, value in case.case.effects.items() if value}
+    if present:
+        case = replace(case, case=case.case.model_copy(update={"effects": dict.fromkeys(IDS, 0.0)}))
+    for id in sorted(present, key=IDS.index):
+        try:
+            before, case = case, catalogue()[id].add(case, present[id])
+            if (case.section, case.case.section) != (before.section, before.case.section):
+                section_mesh(case.case, _gauged(case.case, case.section))  # refuses what folds over
+        except ValueError as error:
+            raise EffectRefused(id, str(error), present[id]) from None
+    return Tyre(case)
+
+
+def section_mesh(case: Case, gauged: Section) -> SectionMesh:
+    """The mesh of a gauged section at the case's level. Raises ValueError where it folds over."""
+    level = case.mesh.levels[case.mesh.level]
+    elements = tuple(level.elements[name] for name, _ in gauged.regions)
+    grading = tuple(level.grading) if level.grading else None
+    quadratic = case.mesh.element.startswith("CGAX8")
+    return _mesh(gauged, elements, tuple(level.rows), quadratic, grading)
+
+
+def _gauged(case: Case, section: Section) -> Section:
+    gauges = case.section.gauges or []
+    return with_gauges(
+        section,
+        tuple((tuple(g.regions or ()), (g.between[0], g.between[1]), g.factor) for g in gauges),
+    )
+
+
+@lru_cache(maxsize=8)
+def _mesh(
+    section: Section,
+    elements: tuple[int, ...],
+    rows: tuple[int, ...],
+    quadratic: bool,
+    grading: tuple[float, ...] | None,
+) -> SectionMesh:
+    return build_mesh(section, list(elements), list(rows), quadratic, list(grading or ()) or None)

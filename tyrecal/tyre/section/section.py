@@ -1,0 +1,218 @@
+"""The tyre's half section as a station table: lines through the thickness, station by station.
+
+Every line is given by its points, or one of them is and the others by gauges: their distances
+from it along its normal. Lines given before it lie inside it, those after it outside.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from ...errors import InputError
+
+Array = np.ndarray
+GAUGE = "_gauge_mm"
+
+
+class SectionError(InputError):
+    """A station table that is not a section; ``line`` is the 1-based line of the file or 0."""
+
+    def __init__(self, message: str, line: int = 0):
+        super().__init__(message)
+        self.line = line
+
+
+@dataclass(frozen=True, eq=False)
+class Section:
+    """Half a section, uninflated, from the crown's centre (z = 0) to the bead.
+
+    names: the lines from the inner surface to the outer, e.g. inner, ply, belt1, belt2, outer;
+    points (line, station, 2): r and z in m, NaN where a line is absent;
+    regions: name and number of stations' intervals, in order; rigid (station,): held by the rim;
+    outline: the outer and the inner curve (point, 2), m, where it was drawn between such.
+    """
+
+    names: tuple[str, ...]
+    points: Array
+    regions: tuple[tuple[str, int], ...]
+    rigid: Array
+    outline: tuple[Array, ...] = ()
+
+
+def read_section(path: Path) -> Section:
+    """Read a station table: station, region, <line>_r_mm, <line>_z_mm ..., rigid (0 or 1).
+
+    Columns of lines stand from the inner surface to the outer; <line>_gauge_mm, its distance from
+    the one line that has points, takes the place of a line's two. Raises SectionError, OSError.
+    """
+    with path.open(newline="", encoding="utf-8-sig") as file:
+        reader = csv.DictReader(file)
+        header = reader.fieldnames or []
+        gauged = gauged_lines(header)
+        names = tuple(h.rsplit("_", 2)[0] for h in header if h.endswith(("_r_mm", GAUGE)))
+        drawn = [n for n in names if n not in gauged]
+        for needed in ["region", "rigid", *(f"{n}_z_mm" for n in drawn)]:
+            if needed not in header:
+                raise SectionError(f"column '{needed}' is missing", 1)
+        if gauged and len(drawn) != 1:
+            raise SectionError(
+                "gauges are distances from one line, of which _r_mm and _z_mm must be given,"
+                f" got {', '.join(drawn) or 'none'}",
+                1,
+            )
+        if len(names) < 2:
+            raise SectionError(
+                f"at least an inner and an outer line are needed, got {', '.join(names) or 'none'}",
+                1,
+            )
+        columns = [
+            (f"{n}{GAUGE}",) * 2 if n in gauged else (f"{n}_r_mm", f"{n}_z_mm") for n in names
+        ]
+        points, labels, rigid = [], [], []
+        for row in reader:
+            columns = [
+                (f"{n}{GAUGE}",) * 2 if n in gauged else (f"{n}_r_mm", f"{n}_z_mm") for n in names
+            ]
+            points.append(
+                [[millimetres(row, c, reader.line_num) for c in pair] for pair in columns]
+            )
+            labels.append(row["region"])
+            if row["rigid"] not in ("0", "1"):
+                raise SectionError(f"rigid is '{row['rigid']}', must be 0 or 1", reader.line_num)
+            rigid.append(row["rigid"] == "1")
+    if len(points) < 3:
+        raise SectionError(f"{len(points)} stations are too few, at least 3 are needed")
+    table = np.array(points).swapaxes(0, 1) * 1e-3
+    if gauged:
+        line = names.index(drawn[0])
+        gauges = np.where(np.arange(len(names)) < line, -1.0, 1.0)[:, None] * table[..., 0]
+        gauges[line] = 0.0
+        table = from_gauges(table[line], gauges)
+    for end in (0, -1):
+        missing = np.flatnonzero(np.isnan(table[end]).any(1))
+        if len(missing):
+            raise SectionError(
+                f"line '{names[end]}' must be given at every station", int(missing[0]) + 2
+            )
+    if abs(table[0, 0, 1]) > 1e-9:
+        raise SectionError("the first station must lie on the centre plane, z = 0", 2)
+    regions = regions_of(labels, rigid)
+    return Section(names, table, regions, np.array(rigid))
+
+
+def regions_of(labels: list[str], rigid: list[bool]) -> tuple[tuple[str, int], ...]:
+    """Names and intervals of the regions that the stations belong to."""
+    starts = [0] + [i for i in range(1, len(labels)) if labels[i] != labels[i - 1]]
+    # regions share a station: the first one's last, or the first that the rim holds
+    ends = [*(s if rigid[s] != rigid[s - 1] else s - 1 for s in starts[1:]), len(labels) - 1]
+    counts, last = [], 0
+    for end in ends:
+        counts.append(end - last)
+        last = end
+    regions = tuple((labels[s], c) for s, c in zip(starts, counts, strict=True))
+    if len({name for name, _ in regions}) < len(regions):
+        raise SectionError("the stations of a region must follow one another")
+    return regions
+
+
+def gauged_lines(header: Sequence[str]) -> list[str]:
+    """Lines that a station table's columns give by gauges."""
+    return [column[: -len(GAUGE)] for column in header if column.endswith(GAUGE)]
+
+
+def from_gauges(line: Array, gauges: Array) -> Array:
+    """Lines (line, station, 2) at distances ``gauges`` (line, station) outwards along the normal
+    of ``line`` (station, 2), which starts at the crown's centre, where it runs along the axle.
+
+    Raises SectionError where two stations are one point or the line has gaps.
+    """
+    step = np.hypot(*np.diff(line, axis=0).T)
+    if not (step > 0).all():  # NaN too
+        raise SectionError("the line with points must be given at every station, no point twice")
+    along = np.concatenate([[0.0], np.cumsum(step)])
+    spline = CubicSpline(along, line, bc_type=((1, np.array([0.0, 1.0])), (2, np.zeros(2))))
+    tangent = spline(along, 1)
+    normal = np.stack([tangent[:, 1], -tangent[:, 0]], -1) / np.hypot(*tangent.T)[:, None]
+    points: Array = line + gauges[..., None] * normal
+    return points
+
+
+def refuse_separators(header: Sequence[str]) -> None:
+    """Raises SectionError where columns are not separated by commas, as some spreadsheets do."""
+    if len(header) == 1 and (";" in header[0] or "\t" in header[0]):
+        raise SectionError("columns must be separated by commas, and numbers have points", 1)
+
+
+def millimetres(row: dict[str, str], column: str, line: int) -> float:
+    """The number in a column, NaN where it is empty. Raises SectionError."""
+    text = (row[column] or "").strip()
+    if not text:
+        return float("nan")
+    try:
+        value = float(text)
+    except ValueError:
+        raise SectionError(f"{column} is '{text}', must be a number in mm", line) from None
+    if not np.isfinite(value):
+        raise SectionError(f"{column} is '{text}', must be a finite number in mm", line)
+    return value
+
+
+def fill_lines(section: Section) -> Array:
+    """Lines (line, station, 2) made whole for a mesh.
+
+    Where a line is absent it keeps the fraction of the thickness, between the nearest lines
+    that exist, of the station where it ends, so that element rows run on without a step.
+    """
+    points = section.points.copy()
+    present = ~np.isnan(points).any(-1)
+    for k in range(1, len(section.names) - 1):
+        have = np.flatnonzero(present[k])
+        if not len(have):
+            raise SectionError(f"line '{section.names[k]}' has no station at all")
+        for j in np.flatnonzero(~present[k]):
+            near = have[np.argmin(abs(have - j))]
+            below = k - 1  # already made whole
+            both = present[:, j] & present[:, near]
+            above = next(m for m in range(k + 1, len(section.names)) if both[m])
+            start, end = points[below, near], points[above, near]
+            span = end - start
+            fraction = (points[k, near] - start) @ span / (span @ span)
+            points[k, j] = points[below, j] + fraction * (points[above, j] - points[below, j])
+    return points
+
+
+def resample(section: Section, intervals: list[int]) -> tuple[Array, list[str], Array, Array]:
+    """The section at ``intervals`` equal steps of station number per region.
+
+    Returns points (line, column, 2), the region of each interval, rigid (column,) and present
+    (line, column): whether the line really exists there. Stations are met exactly where the
+    table's spacing allows; between stations a cubic spline per region runs through them.
+    """
+    points = fill_lines(section)
+    real = ~np.isnan(section.points).any(-1)
+    columns, names, start = [0.0], [], 0
+    for (name, count), steps in zip(section.regions, intervals, strict=True):
+        columns += list(start + count * np.arange(1, steps + 1) / steps)
+        names += [name] * steps
+        start += count
+    where = np.array(columns)
+    out = np.empty((len(points), len(where), 2))
+    start = 0
+    for _, count in section.regions:
+        stations = np.arange(start, start + count + 1)
+        inside = (where >= start) & (where <= start + count)
+        spline = CubicSpline(stations, points[:, stations], axis=1)
+        out[:, inside] = spline(where[inside])
+        start += count
+    nearest = np.rint(where).astype(int)
+    exact = abs(where - nearest) < 1e-9
+    out[:, exact] = points[:, nearest[exact]]
+    floor, ceil = np.floor(where + 1e-9).astype(int), np.ceil(where - 1e-9).astype(int)
+    present = real[:, floor] & real[:, ceil]
+    return out, names, section.rigid[floor] & section.rigid[ceil], present

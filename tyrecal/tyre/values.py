@@ -1,0 +1,149 @@
+"""Numbers of a case set by the name of a variable or by dotted path."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from numbers import Real
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+
+from .case.checks import at, find, problems
+from .case.loaded import LoadedCase
+from .case.meshable import folds
+from .case.mistakes import Keys, dotted, suggestion
+from .case.schema import Case
+from .case.shape import explain
+from .case.stations import read_section_of
+from .guard import refusal
+from .resolve import resolved
+
+# numbers that stand alone: no other part of the case, and no mesh, depends on their values
+ALONE = {
+    "pressure_kPa",
+    "materials",
+    "rebar_layers",
+    "rim",
+    "cavity",
+    "effects",
+    "solver",
+    "spin_rad_per_s",
+    "point_mass",
+    "road_spring",
+    "splice",
+}
+
+
+def with_values(loaded: LoadedCase, values: Mapping[str, float]) -> LoadedCase:
+    """A new case with variables (by name) or any of its numbers (by dotted path) set.
+
+    Values are in the unit of the numbers they set; a variable's bounds are not enforced. Raises
+    ValueError, in one sentence, for an unknown name or a value that the case cannot have.
+    """
+    changed = set_values(loaded, values)
+    resolved(changed)
+    return changed
+
+
+def set_values(loaded: LoadedCase, values: Mapping[str, float]) -> LoadedCase:
+    """`with_values` of who resolves the case next: that its effects can be is not asked here."""
+    targets: dict[Keys, float] = {}
+    tree: dict[Any, Any] = {}
+    for name, value in values.items():
+        if isinstance(value, bool) or not isinstance(value, Real):
+            raise ValueError(f"{name} is {value!r}, must be a number")
+        for keys in _keys(loaded, name):
+            if keys in targets:
+                raise ValueError(f"{name}: {dotted(keys)} is set twice")
+            targets[keys] = _number(loaded.case, keys, float(value))
+    for keys, number in targets.items():
+        branch: Any = tree
+        for key in keys[:-1]:
+            branch = branch.setdefault(key, {})
+        branch[keys[-1]] = number
+    case = _set(loaded.case, tree, ())
+    raw = _set_raw(loaded.raw, case, tree)
+    touched = set(tree) - ALONE
+    section = loaded.section
+    redrawn = "outline" in tree.get("section", {})
+    if redrawn:
+        section = read_section_of(case.section, loaded.folder)
+    if touched:
+        for wrong, reason in problems(raw, section):
+            raise ValueError(f"{dotted(wrong)} {reason}")
+    if ("mesh" in touched or redrawn) and (message := folds(raw, section)):
+        raise ValueError(message)
+    return replace(loaded, case=case, raw=raw, section=section)
+
+
+def overridden(loaded: LoadedCase, values: Mapping[str, float]) -> LoadedCase:
+    """`with_values` of what the user sets, noted among the case's ``overrides``."""
+    changed = with_values(loaded, values)
+    given = {name: float(value) for name, value in values.items()}
+    return replace(changed, overrides={**loaded.overrides, **given})
+
+
+def unusual_value(loaded: LoadedCase, name: str, value: float) -> str | None:
+    """Why no user states ``value`` of a variable, or of the number at a dotted path: what is usual,
+    what was probably meant; None where it is usual. Raises ValueError for an unknown name."""
+    found = (refusal(loaded.raw, loaded.section, keys, value) for keys in _keys(loaded, name))
+    return next((message for message in found if message), None)
+
+
+def _keys(loaded: LoadedCase, name: str) -> list[Keys]:
+    """Where the variable or the dotted path ``name`` leads."""
+    variables = loaded.case.variables
+    paths = variables[name].sets if name in variables else [name]
+    try:
+        return [find(loaded.case, path) for path in paths]
+    except KeyError as error:
+        if "." in name:
+            raise ValueError(f"{name}: {error.args[0]}") from None
+        known = [*variables, "pressure_kPa"]
+        raise ValueError(f"there is no variable '{name}'{suggestion(name, known)}") from None
+
+
+def _number(case: Case, keys: Keys, value: float) -> float:
+    """``value`` as the kind of number that stands at ``keys`` of the case."""
+    old = at(case, keys)
+    if isinstance(old, bool) or not isinstance(old, int | float | None):
+        raise ValueError(f"{dotted(keys)} is not a number, it cannot be {value:g}")
+    return int(value) if isinstance(old, int) and value.is_integer() else value
+
+
+def _set(node: Any, tree: Any, keys: Keys) -> Any:
+    """``node`` at ``keys`` of the case with the numbers of ``tree`` in it.
+
+    Only the parts on the way are copied and judged again; the rest is shared.
+    """
+    if not isinstance(tree, dict):
+        return tree
+    fields = node.__dict__ if isinstance(node, BaseModel) else node
+    new: Any = list(fields) if isinstance(fields, list) else dict(fields)
+    for key, branch in tree.items():
+        new[key] = _set(fields[key], branch, (*keys, key))
+    if not isinstance(node, BaseModel):
+        return new
+    try:
+        return type(node).model_validate(new)
+    except ValidationError as error:
+        wrong, message = next(explain(error, keys))
+        value: Any = tree
+        for key in wrong[len(keys) :]:
+            value = value.get(key) if isinstance(value, dict) else None
+        got = "" if value is None or isinstance(value, dict) else f", got {value:g}"
+        raise ValueError(f"{dotted(wrong)} {message}{got}") from None
+
+
+def _set_raw(raw: Any, case: Any, tree: Any) -> Any:
+    """The plain data with the same numbers as the typed ``case``."""
+    if not isinstance(tree, dict):
+        return tree
+    fields = case.__dict__ if isinstance(case, BaseModel) else case
+    if isinstance(fields, list):
+        return [
+            _set_raw(r, fields[i], tree[i]) if i in tree else r for i, r in enumerate(raw or fields)
+        ]
+    new = {k: _set_raw((raw or {}).get(k), fields[k], branch) for k, branch in tree.items()}
+    return {**(raw or {}), **new}
