@@ -2,7 +2,8 @@
 
 Valid against both schemas in use, Jenkins' and Ant's: what they disagree about is left out. A study
 without a result is an error; one that is not as it should be, or drifted, a failure. What only the
-baseline has is skipped, and a suite's system-out says so, as of what only this batch has.
+baseline has is skipped, and a suite's system-out says so, as of what only this batch has. Not by a
+library such as junitparser, which writes any element and holds to neither schema.
 """
 
 from __future__ import annotations

@@ -38,7 +38,7 @@ TABLES = {"pressure": units.PRESSURE, "load": units.LOAD, **units.QUANTITIES}
 
 
 @dataclass(frozen=True)
-class Column:
+class TableColumn:
     """Where a meaning stands in a line."""
 
     index: int
@@ -49,12 +49,12 @@ class Column:
 
 def read_columns(
     headings: Sequence[str], place: str, pressure_kPa: float | None
-) -> dict[str, Column]:
+) -> dict[str, TableColumn]:
     """Columns by meaning, of those that have one; ``pressure_kPa``: where none says it.
 
     Raises InputError at ``place``.
     """
-    columns: dict[str, Column] = {}
+    columns: dict[str, TableColumn] = {}
     for index, heading in enumerate(headings):
         name, unit = _heading(heading)
         meaning = MEANING.get(name)
@@ -79,7 +79,7 @@ def read_columns(
     return columns
 
 
-def _column(index: int, heading: str, meaning: str, unit: str) -> Column:
+def _column(index: int, heading: str, meaning: str, unit: str) -> TableColumn:
     """Raises ValueError with what is wrong with the unit."""
     if table := TABLES.get(meaning):
         if not unit and meaning != "frequency_Hz":
@@ -87,13 +87,13 @@ def _column(index: int, heading: str, meaning: str, unit: str) -> Column:
         factor = units.factor(table, unit) if unit else 1.0
         if factor is None:
             raise ValueError(f": the unit must be one of {', '.join(table)}")
-        return Column(index, factor)
+        return TableColumn(index, factor)
     if meaning == "sigma" and unit and unit != "%":
         for quantity, table in units.QUANTITIES.items():
             if factor := units.factor(table, unit):
-                return Column(index, factor, of=quantity)
+                return TableColumn(index, factor, of=quantity)
         raise ValueError(": unknown unit")
-    return Column(index, percent=unit == "%")
+    return TableColumn(index, percent=unit == "%")
 
 
 def _heading(text: str) -> tuple[str, str]:

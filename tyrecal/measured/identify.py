@@ -69,20 +69,20 @@ def identify(measured: Responses, low_Hz: float, high_Hz: float) -> Identified:
 
     Raises InputError where the functions hold no mode, or lie at uneven frequencies.
     """
-    measured = _from_above_0(measured)
-    f, mobility = measured.frequency_Hz, measured.values * _to_mobility(measured)
+    above_0 = measured.frequency_Hz > 0  # where nothing moves or everything drifts
+    f, points = measured.frequency_Hz[above_0], measured.points
+    # velocity over force, whose modes are about as high at all frequencies: least squares heed them
+    # alike
+    to_mobility = (2j * np.pi * f) ** (1 - FORMS.index(measured.form))
+    mobility = measured.values[:, above_0] * to_mobility
     if len(f) < 50 or not np.allclose(np.diff(f), f[1] - f[0], rtol=1e-3):
         raise InputError("functions must hold 50 evenly spaced frequencies or more")
     used = (f >= low_Hz) & (f <= BAND_MARGIN * high_Hz)
     order = int(np.clip(np.sum(used & (f <= high_Hz)) // LINES_PER_ORDER, 4, MAX_ORDER))
-    points = np.unique(measured.points)
-    count = min(MAX_GROUPS, len(points))
-    triangles = np.array(
-        [
-            _triangle(mobility[np.isin(measured.points, points[j::count])][:, used], order)
-            for j in range(count)
-        ]
-    )
+    distinct = np.unique(points)
+    count = min(MAX_GROUPS, len(distinct))
+    groups = [np.isin(points, distinct[j::count]) for j in range(count)]
+    triangles = np.array([_triangle(mobility[group][:, used], order) for group in groups])
     modes = _modes(_poles(triangles, f[used]), low_Hz, high_Hz)
     if not len(modes):
         raise InputError(f"no mode is stable between {low_Hz:g} and {high_Hz:g} Hz")
@@ -94,24 +94,8 @@ def identify(measured: Responses, low_Hz: float, high_Hz: float) -> Identified:
     residues, fitted = _residues(f, mobility, inside, _pole(hertz, z))
     fitted[:, ~inside] = np.nan
     found = zip(hertz, z, residues, sigma, strict=True)
-    return Identified(
-        tuple(MeasuredMode(float(h), u, float(zk), float(s)) for h, zk, u, s in found),
-        fitted / _to_mobility(measured),
-    )
-
-
-def _from_above_0(measured: Responses) -> Responses:
-    """Without the line at 0 Hz, where nothing moves or everything drifts."""
-    keep = measured.frequency_Hz > 0
-    return Responses(
-        measured.frequency_Hz[keep], measured.values[:, keep], measured.form, measured.points
-    )
-
-
-def _to_mobility(measured: Responses) -> Array:
-    """Factor (n,) to velocity over force, whose modes are about as high at all frequencies, so
-    that least squares heed them alike."""
-    return (2j * np.pi * measured.frequency_Hz) ** (1 - FORMS.index(measured.form))
+    found_modes = [MeasuredMode(float(h), u, float(zk), float(s)) for h, zk, u, s in found]
+    return Identified(tuple(found_modes), fitted / to_mobility)
 
 
 def _triangle(H: Array, order: int) -> Array:

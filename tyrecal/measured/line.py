@@ -9,7 +9,7 @@ from math import isfinite, nan
 
 from ..simulate.modes.mode import Label
 from ..units import QUANTITIES
-from .columns import Column
+from .columns import TableColumn
 from .measurement import Measurement
 
 LABEL = re.compile(r"^[\[(]?\s*(\d+)\s*[,;/ ]\s*(\d+)\s*[\])]?\s*(.*)$")
@@ -32,7 +32,7 @@ class Line:
 
     place: str  # file and line
     cells: Mapping[str, str]  # by meaning
-    columns: Mapping[str, Column]
+    columns: Mapping[str, TableColumn]
     comma: bool  # whether it can be a decimal one
 
     def cell(self, meaning: str) -> str:

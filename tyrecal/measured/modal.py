@@ -3,7 +3,8 @@ frequency-response functions."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -73,30 +74,34 @@ def read_modal_test(file: Universal, nodes: Mapping[int, Place], layout: Layout)
 
     Raises InputError.
     """
-    try:
+    with _naming(file):
         return (_from_shapes if file.shapes else _identified)(file, nodes, layout)
-    except InputError as error:
-        raise _named(file, error) from None
 
 
 def sensors_in(file: Universal, layout: Layout) -> Labeller:
     """Judge of the sensors of a file. Raises InputError."""
-    try:
+    with _naming(file):
         signals = list(_signals(file.shapes[0])) if file.shapes else []
         if file.functions and not signals:
             signals = list(next(iter(_by_reference(file.functions).values())))
         if not signals:
             raise InputError("nothing was measured in it")
-        sensors = sensors_of(signals, file.nodes, layout.axle, layout.centre, layout.cylindrical)
-    except InputError as error:
-        raise _named(file, error) from None
+        return _labeller(signals, file.nodes, layout)
+
+
+def _labeller(signals: Sequence[Signal], nodes: Mapping[int, Place], layout: Layout) -> Labeller:
+    sensors = sensors_of(signals, nodes, layout.axle, layout.centre, layout.cylindrical)
     return Labeller(sensors, layout.highest)
 
 
-def _named(file: Universal, error: InputError) -> InputError:
-    """The error, with its file."""
-    named = str(error).startswith(str(file.path))
-    return error if named else InputError(f"{file.path}: {error}")
+@contextmanager
+def _naming(file: Universal) -> Iterator[None]:
+    """Every InputError begins with its file."""
+    try:
+        yield
+    except InputError as error:
+        named = str(error).startswith(str(file.path))
+        raise error if named else InputError(f"{file.path}: {error}") from None
 
 
 def _signals(shape: MeasuredShape) -> tuple[Signal, ...]:
@@ -112,8 +117,7 @@ def _from_shapes(file: Universal, nodes: Mapping[int, Place], layout: Layout) ->
         if signals not in labellers:
             if not signals:
                 raise InputError(f"{shape.place}: every value is 0")
-            sensors = sensors_of(signals, nodes, layout.axle, layout.centre, layout.cylindrical)
-            labellers[signals] = Labeller(sensors, layout.highest)
+            labellers[signals] = _labeller(signals, nodes, layout)
         amplitude = shape.values[np.isfinite(shape.values)]
         mode = MeasuredMode(shape.frequency_Hz, amplitude, shape.damping)
         told.append(_labelled(mode, labellers[signals], shape.place))
@@ -137,13 +141,12 @@ def _identified(file: Universal, nodes: Mapping[int, Place], layout: Layout) -> 
         )
     f = first.frequency_Hz
     signals = list(next(iter(table.values())))
-    sensors = sensors_of(signals, nodes, layout.axle, layout.centre, layout.cylindrical)
+    labeller = _labeller(signals, nodes, layout)
     values = np.vstack([[each.values for each in row.values()] for row in table.values()])
     points = np.tile([node for node, _ in signals], len(table))
     low, high = layout.band or (f[0], f[-1])
     found = identify(Responses(f, values, form, points), low, high)
     f, values = f[f > 0], values[:, f > 0]
-    labeller = Labeller(sensors, layout.highest)
     told = []
     for mode in found.modes:
         residues = mode.amplitude.reshape(len(table), -1)

@@ -20,7 +20,7 @@ from pathlib import Path
 from ..errors import InputError
 from ..files import read_bytes
 from ..tyre.usual import LARGEST_SIGMA
-from .columns import Column, read_columns
+from .columns import TableColumn, read_columns
 from .line import Line
 from .measurement import CSV_COLUMNS, Measurement
 
@@ -63,7 +63,7 @@ def read_table(path: Path, pressure_kPa: float | None = None) -> list[Measuremen
 def _measurements(
     path: Path,
     lines: list[tuple[str, list[str]]],
-    columns: dict[str, Column],
+    columns: dict[str, TableColumn],
     comma: bool,
     pressure_kPa: float,
     more: Callable[[Measurement], str | None] = lambda each: None,

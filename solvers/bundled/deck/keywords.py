@@ -1,4 +1,7 @@
-"""ABAQUS keyword grammar: a deck as a list of keyword blocks that remember their lines."""
+"""ABAQUS keyword grammar: a deck as a list of keyword blocks that remember their lines.
+
+Not by meshio, which reads nodes, elements and sets, passes over the rest, and knows no lines.
+"""
 
 from __future__ import annotations
 

@@ -1,7 +1,8 @@
 """Lowest eigenpairs of K x = lambda M x by block Lanczos on (K - shift M)^-1 M.
 
 Parlett, The Symmetric Eigenvalue Problem, ch. 13, with full reorthogonalisation in the inner
-product of M; real symmetric or complex Hermitian.
+product of M; real symmetric or complex Hermitian. Not by SciPy's eigsh, which starts from one
+vector instead of a block, and leaves Hermitian matrices to its general solver.
 """
 
 from __future__ import annotations

@@ -1,7 +1,8 @@
 """Lowest eigenpairs of K x = lambda M x by the block Davidson method (Saad, Numerical Methods for
 Large Eigenvalue Problems, 8.4): only products with K and an approximate inverse of it.
 
-With the exact inverse its subspace is that of shift-invert Lanczos.
+With the exact inverse its subspace is that of shift-invert Lanczos. Not by SciPy's lobpcg, which
+keeps three blocks where this keeps all, and goes on where K is not positive.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""Generalised minimal residuals, preconditioned from the right (Saad, Iterative Methods, 9.3)."""
+"""Generalised minimal residuals, preconditioned from the right (Saad, Iterative Methods, 9.3).
+
+Not by SciPy's gmres, which preconditions from the left, and so minimises another residual.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""One record as bytes: a checksum, a line of JSON, then the arrays as npz. No pickle anywhere."""
+"""One record as bytes: a checksum, a line of JSON, then the arrays as npz. No pickle anywhere.
+
+Not by joblib's Memory: it pickles, which runs what a stranger's file says, and has no checksum.
+"""
 
 from __future__ import annotations
 

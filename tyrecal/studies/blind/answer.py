@@ -18,13 +18,12 @@ from ...files import own_folder
 from ...measured.tables import read_measurements
 from ...simulate.evaluate.evaluator import Evaluator
 from ...simulate.evaluate.pool import process_pool
-from ...simulate.modes.mode import Label
 from ...tyre.case import LoadedCase
 from ...tyre.load import load_case
 from ..diagnose.diagnosis import Diagnosis, diagnose
 from ..diagnose.evidence import NONE
 from ..diagnose.inverse_problem import Assumed
-from ..diagnose.model import ResponseModel
+from ..diagnose.model import ModelRow, ResponseModel
 from ..diagnose.observations import observe
 from ..diagnose.result import result
 from ..diagnose.study import spans_of
@@ -33,8 +32,6 @@ from ..diagnose.uncertainties import sources
 from .make import labels_of
 from .protocol import Protocol, read_protocol, write_json
 from .seal import refuse_open_truth, seal_answers
-
-ModelRow = tuple[Label | None, float]
 
 
 def rows_of(case: LoadedCase, protocol: Protocol) -> list[ModelRow]:

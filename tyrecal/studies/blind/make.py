@@ -161,14 +161,8 @@ def _again(
     truth: Truth, case: LoadedCase, protocol: Protocol, random: np.random.Generator
 ) -> Truth:
     """The same trial with other design variables and constants."""
-    other = draw(
-        Protocol(protocol.maker, protocol.case, {"none": 1}, protocol.spread),
-        case,
-        sources(case)[0],
-        {},
-        {},
-        int(random.integers(2**63)),
-    )[0]
+    rules, found = replace(protocol, counts={"none": 1}), sources(case)[0]
+    (other,) = draw(rules, case, found, {}, {}, int(random.integers(2**63)))
     return replace(truth, variables=other.variables, constants=other.constants)
 
 
@@ -219,7 +213,6 @@ def _write_trials(folder: Path, protocol: Protocol, trials: list[Trial]) -> None
 
 def _plain(trial: Trial) -> dict[str, Any]:
     """One trial without noise, for JSON."""
-
     tables = {}
     for key, computed in (("with_effect", trial.with_effect), ("without", trial.without)):
         tables[key] = [

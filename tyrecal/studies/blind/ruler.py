@@ -23,7 +23,7 @@ import numpy as np
 from ...errors import InputError
 from ...simulate.modes.mode import Label
 from ..diagnose.form_error import form_error
-from ..diagnose.model import Answer, Query, ResponseModel
+from ..diagnose.model import Answer, ModelRow, Query, ResponseModel
 from .protocol import Protocol, read_json, write_json
 
 Array = np.ndarray
@@ -34,7 +34,6 @@ SIZE_POINTS = 61
 BETWEEN_PRESSURES = 0.9
 NUMBERS = ("x0", "spread", "eta", "jacobian", "hessian", "constants")
 SIGNATURE = ("sizes", "shift", "tilt", "split")
-ModelRow = tuple[Label | None, float]
 
 
 @dataclass(frozen=True)

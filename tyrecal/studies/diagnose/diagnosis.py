@@ -14,8 +14,8 @@ from .expansion import Expansion, anchored, expand
 from .gap import Gap, find_gap, projection
 from .inverse_problem import Assumed, InverseProblem, Toggle, places
 from .label_swap import exchanged, with_exchanged
-from .model import ResponseModel
-from .next_measurement import Choice, ModelRow, rank
+from .model import ModelRow, ResponseModel
+from .next_measurement import Choice, rank
 from .observations import Observations
 from .plain_fit import plain_fit
 from .regions import SectionPart
@@ -39,12 +39,10 @@ KNOWN_WITHIN = 0.05  # of a range, and of ln x: an effect asked as near as that,
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """What was found. problem: as it was solved; bare: before effects were asked again; parts,
-    effective_rank: the section map, and how many combinations of its parts the data see; rung: of
-    the ladder of proof, 1 to 4; exchanged: labels that were put right before all else."""
+    """What was found."""
 
-    problem: InverseProblem
-    bare: InverseProblem
+    problem: InverseProblem  # as it was solved
+    bare: InverseProblem  # before effects were asked again
     variables: tuple[str, ...]
     sources: tuple[str, ...]
     hypotheses: tuple[Hypothesis, ...]
@@ -52,12 +50,12 @@ class Diagnosis:
     verdict: Verdict
     gap: Gap
     separability: Separability
-    parts: tuple[PartChange, ...]
-    effective_rank: int
+    parts: tuple[PartChange, ...]  # the section map
+    effective_rank: int  # combinations of its parts that the data see
     shrinkage: Shrinkage | None
-    rung: int
+    rung: int  # of the ladder of proof, 1 to 4
     choices: tuple[Choice, ...]
-    exchanged: tuple[Label, Label] | None = None
+    exchanged: tuple[Label, Label] | None = None  # labels that were put right before all else
 
     def hypothesis(self, key: str) -> Hypothesis:
         """The hypothesis of that key."""

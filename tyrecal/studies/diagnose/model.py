@@ -13,7 +13,10 @@ from typing import Protocol
 
 import numpy as np
 
+from ...simulate.modes.mode import Label
+
 Array = np.ndarray
+ModelRow = tuple[Label | None, float]  # a mode, None: the mass; kPa
 
 
 @dataclass(frozen=True)

@@ -16,11 +16,10 @@ from ...simulate.modes.mode import Label
 from .covariance import covariance
 from .evidence import NONE, OUTSIDE
 from .inverse_problem import InverseProblem, Toggle
-from .model import Answer, Query, ResponseModel
+from .model import Answer, ModelRow, Query, ResponseModel
 from .observations import Observable, Observations
 
 Array = np.ndarray
-ModelRow = tuple[Label | None, float]
 MAX_DISTANCE = 40.0
 MIN_PROBABILITY, MAX_EXPLANATIONS = 0.02, 6  # others do not count
 HOURS = dict(toggle=4.0, check=1.0, repeat=2.0, pressure=1.0, harmonics=1.0, weigh=0.25)

@@ -32,17 +32,15 @@ MAX_MASS_RATIO = 1.5  # as the mass: a rim weighs as much as its tyre
 
 @dataclass(frozen=True)
 class DiagnosedCase:
-    """A diagnosis with what it rests on: sources of error, whether they were assumed, effects
-    that the solver cannot express, those that variables of the case calibrate, the model, and what
-    was measured under load, None without."""
+    """A diagnosis with what it rests on."""
 
     diagnosis: Diagnosis
-    sources: tuple[Source, ...]
-    assumed_sources: bool
-    inexpressible: tuple[str, ...]
-    calibrated: tuple[str, ...]
+    sources: tuple[Source, ...]  # of error
+    assumed_sources: bool  # whether they were assumed
+    inexpressible: tuple[str, ...]  # effects that the solver cannot express
+    calibrated: tuple[str, ...]  # effects that variables of the case calibrate
     model: TyreModel
-    under_load: UnderLoad | None = None
+    under_load: UnderLoad | None = None  # what was measured there
 
     @property
     def variables(self) -> dict[str, Any]:
@@ -161,26 +159,16 @@ def spans_of(
         if not effect.within(evaluator.solver.capabilities):
             unable.append(id)
         else:
-            base = case.case.effects.get(id, 0.0)
-            able[id] = Span(
-                effect.low - base,
-                effect.high - base,
-                effect.unit,
-                effect.title,
-                effect.toggle,
-                base,
-            )
+            base, words = case.case.effects.get(id, 0.0), (effect.unit, effect.title, effect.toggle)
+            able[id] = Span(effect.low - base, effect.high - base, *words, base)
     return able, unable
 
 
 def parse_change(text: str) -> Toggle:
     """``EFFECT=VALUE`` or ``EFFECT*FACTOR``. Raises InputError."""
-    for mark in "=*":
-        id, found, value = text.partition(mark)
-        if found:
-            break
-    id = id.strip()
-    known = catalogue()
+    mark = "=" if "=" in text else "*"
+    id, found, value = text.partition(mark)
+    id, known = id.strip(), catalogue()
     if not found or id not in known:
         raise InputError(
             f"'{text}' must say what was switched: EFFECT=VALUE or EFFECT*FACTOR, EFFECT one of"

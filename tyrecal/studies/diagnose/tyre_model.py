@@ -18,7 +18,7 @@ from ...tyre.case import LoadedCase, start_values
 from ...tyre.case.calibration import TargetMode, Targets
 from ...tyre.effects import catalogue
 from ..fit import problem as fit
-from .model import Answer, Query, Span
+from .model import Answer, ModelRow, Query, Span
 from .uncertainties import EFFECT_PATH, Source, unit_of, values_of
 
 Array = np.ndarray
@@ -26,7 +26,6 @@ MASS_STEP = 0.02  # of a logarithm: the mass is linear in areas and densities
 
 WORTH_A_POOL = 10  # evaluations, for processes to be started
 
-ModelRow = tuple[Label | None, float]
 Key = tuple[bytes, tuple[tuple[str, float], ...], bool]  # of a point
 
 
@@ -112,10 +111,9 @@ class TyreModel:
             for path, step in source.steps.items()
             if path.startswith(EFFECT_PATH)
         ]
-        asked = dict.fromkeys(map(_key, points))
-        asked |= dict.fromkeys(_key(Query(p.x)) for p in bare)
-        asked |= dict.fromkeys(_key(Query(p.x, {id: e})) for p in stepped for _, id, e in steps)
-        known = dict(zip(asked, self._evaluated([_point(key) for key in asked]), strict=True))
+        beside = [Query(p.x, {id: e}) for p in stepped for _, id, e in steps]
+        asked = {_key(p): p for p in (*points, *(Query(p.x) for p in bare), *beside)}
+        known = dict(zip(asked, self._evaluated(list(asked.values())), strict=True))
         return [self._completed(point, known, steps) for point in points]
 
     def _completed(
@@ -265,10 +263,6 @@ class TyreModel:
 def _key(point: Query) -> Key:
     """What tells two points apart."""
     return point.x.tobytes(), tuple(point.effects.items()), point.constants
-
-
-def _point(key: Key) -> Query:
-    return Query(np.frombuffer(key[0]), dict(key[1]), key[2])
 
 
 def asked_for(case: LoadedCase, labels: Sequence[Label]) -> LoadedCase:

@@ -26,26 +26,24 @@ Values = Mapping[str, float]
 
 @dataclass(frozen=True)
 class LoadedRow:
-    """A measured contact area, vertical stiffness or mode (``member``) at a load, value and sigma
-    in the unit of ``quantity``; ``off``: ln value less ln of each tyre's, where it has one."""
+    """A measured contact area, vertical stiffness or mode at a load."""
 
     quantity: str
-    member: Member | None
+    member: Member | None  # of a mode
     pressure_kPa: float
     load_N: float
-    value: float
+    value: float  # in the unit of ``quantity``
     sigma: float
-    off: Mapping[str, float]
+    off: Mapping[str, float]  # ln value less ln of each tyre's, where it has one
 
 
 @dataclass(frozen=True)
 class UnderLoad:
-    """Rows by pressure and load; ``tyres``: names of those compared, the calibrated one first;
-    ``failed``: what a tyre lacks and why."""
+    """What was measured on the road beside what tyres have there."""
 
-    rows: tuple[LoadedRow, ...]
-    tyres: tuple[str, ...]
-    failed: tuple[str, ...]
+    rows: tuple[LoadedRow, ...]  # by pressure and load
+    tyres: tuple[str, ...]  # names of those compared, the calibrated one first
+    failed: tuple[str, ...]  # what a tyre lacks and why
 
     def rms_percent(self, tyre: str, load_N: float | None = None) -> float | None:
         """Of ``off``, over the rows (of all loads, or of one) that every tyre has which has any;
@@ -75,19 +73,16 @@ def compare(
         for name, values in tyres.items():
             found[name] = {}
             for part in (_footprints, _modes):
-                try:
-                    for place, value in part(
-                        case, evaluator, {**values, "pressure_kPa": pressure}, places
-                    ):
-                        found[name][place] = value
+                try:  # what comes before a failure is kept
+                    inflated = {**values, "pressure_kPa": pressure}
+                    found[name].update(part(case, evaluator, inflated, places))
                 except (EvaluationFailed, DeckRefused, TemplateFailed) as failure:
                     failed[f"{name}, {pressure:g} kPa: {failure}"] = None
         for place in places:
             quantity, member, load = place
             value, sigma = here[place]
-            off = {
-                name: log(value / known[place]) for name, known in found.items() if place in known
-            }
+            known = {name: table[place] for name, table in found.items() if place in table}
+            off = {name: log(value / computed) for name, computed in known.items()}
             rows.append(LoadedRow(quantity, member, pressure, load, value, sigma, off))
     return UnderLoad(tuple(rows), tuple(tyres), tuple(failed))
 
@@ -102,16 +97,12 @@ def _grouped(
         member = Member(each.label, each.member) if each.label else None
         every[each.pressure_kPa][each.quantity, member, each.load_N].append(each)
     for pressure, places in sorted(every.items()):
-        yield (
-            pressure,
-            {
-                place: (
-                    sum(each.value for each in same) / len(same),
-                    sqrt(sum(each.sigma**2 for each in same)) / len(same),
-                )
-                for place, same in places.items()
-            },
-        )
+        yield pressure, {place: _mean(same) for place, same in places.items()}
+
+
+def _mean(same: Sequence[Measurement]) -> tuple[float, float]:
+    variance = sum(each.sigma**2 for each in same)
+    return sum(each.value for each in same) / len(same), sqrt(variance) / len(same)
 
 
 def _footprints(
