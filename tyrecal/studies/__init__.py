@@ -17,9 +17,9 @@ RESULTS = {  # in the order of a page
     "modes": "tyrecal.studies.modes:ModesResult",
     "sweep-pressure": "tyrecal.studies.pressure_result:PressureSweep",
     "footprint": "tyrecal.studies.footprint:FootprintResult",
-    "effects": "tyrecal.report.html.contents:Effects",
+    "effects": "tyrecal.studies.effects_result:Effects",
     "sweep-load": "tyrecal.studies.loaded_result:LoadSweep",
-    "diagnose": "tyrecal.report.html.contents:DiagnosisResult",
+    "diagnose": "tyrecal.studies.diagnose.summary:DiagnosisResult",
 }
 
 

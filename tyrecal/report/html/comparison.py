@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TypeVar
 
+from ...studies.diagnose.summary import DiagnosisResult
 from ...studies.fit.result import QUANTITIES, FitResult, FittedMode
 from ..words import CLOSE, FAR, MINUS
-from .contents import DiagnosisResult
 from .results import Results
 from .summary import VERDICTS
 

@@ -19,7 +19,6 @@ from matplotlib.figure import Figure
 from ...errors import InputError
 from ...files import open_file, whole
 from ...studies import named, result_types
-from ...studies.diagnose.where import PartChange
 from ...studies.fit.result import FitResult
 from ...studies.footprint import FootprintResult
 from ...studies.loaded_result import LoadSweep
@@ -244,8 +243,7 @@ def _diagnosis(found: Results, draw: Draw) -> dict[str, Any]:
     place, drawn = found.diagnosis_section, None
     if place and d.section_map:
         told = "Parts of the section by the evidence for a change of them alone"
-        places = [PartChange(**region.model_dump()) for region in d.section_map]
-        drawing = partial(draw_section_map, place, places)
+        drawing = partial(draw_section_map, place, d.section_map)
         drawn = draw("map", told, "diagnosis_section.json", drawing)
     known = [(row, each) for each in d.gap.residuals if not each.run and (row := each.of)]
     percent = np.array([[each.percent, each.sigma_percent] for _, each in known]).T / 100

@@ -14,13 +14,22 @@ from pydantic import ValidationError
 from ...errors import InputError
 from ...files import NotAFile, read_runs, read_text
 from ...studies import result_types
+from ...studies.diagnose.summary import DiagnosisResult
 from ...studies.fit.result import FitResult
 from ...studies.result import Part, Provenance, Result
 from ..shape_data import DiagnosisSection, Patches, Shapes
-from .contents import DiagnosisResult, RunFacts
 
 File = TypeVar("File", bound=Part)
 Study = TypeVar("Study", bound=Result)
+
+
+class RunFacts(Part):
+    """A study's entry in run.json, but for what differs from run to run."""
+
+    case: str | None = None
+    command: str | None = None
+    finished: bool = True
+    started: str = ""
 
 
 @dataclass(frozen=True)

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from ...studies.diagnose.summary import DiagnosisResult
+from ...studies.effects_result import EffectResult, Effects
 from ...studies.fit.result import FitResult
 from ...studies.modes import ModesResult
 from ...studies.result import Result
 from ...units import said
 from ..words import nearness
-from .contents import DiagnosisResult, Effect, Effects
 
 VERDICTS = {
     "named": "Named",
@@ -83,7 +84,7 @@ def diagnosis_words(found: DiagnosisResult) -> list[str]:
     return words
 
 
-def effect_words(effect: Effect) -> str:
+def effect_words(effect: EffectResult) -> str:
     """How large, and how much of it calibration hides."""
     words = f"{effect.title}, {effect.symbol} = {effect.value:g} {effect.unit}".rstrip()
     if effect.before_percent is None:

@@ -1,119 +1,13 @@
-"""The contents of result files, as far as a page asks for them; numbers finite, SI or as named."""
+"""effects.json read back: what effects do to the modes, before and after a re-fit."""
 
 from __future__ import annotations
 
-import re
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 from pydantic import Field, model_validator
 
-from ...simulate.modes.mode import Label
-from ...studies.diagnose.observations import Observable
-from ...studies.result import Column, Part, Positive, Provenance, Result, Table, Wave
-
-ROW = re.compile(r"\[(\d{1,3}),(\d{1,3})\](?: (axial|torsional))? at ([\d.]{1,9}) kPa")
-
-
-class Explained(Part):
-    """The size of the effect that a diagnosis names or likes best."""
-
-    effect: str
-    value: float
-    low: float
-    high: float
-    unit: str
-
-
-class Region(Part):
-    """A line of the section's map."""
-
-    region: str
-    stiffness_percent: float
-    stiffness_sigma: float
-    mass_percent: float
-    mass_sigma: float
-    evidence: float
-    same_as: list[str]
-
-
-class Residual(Part):
-    """A measurement over the calibrated model."""
-
-    row: str
-    run: int
-    percent: float
-    sigma_percent: float
-
-    @property
-    def of(self) -> Observable | None:
-        """What was measured, where it is a frequency."""
-        found = ROW.fullmatch(self.row)
-        if not found:
-            return None
-        c, m, kind, pressure = found.groups()
-        return Observable("frequency", Label(int(c), int(m), kind), float(pressure), self.run)
-
-
-class Gap(Part):
-    """What calibration leaves."""
-
-    p_value: float
-    chi2: float
-    freedom: int
-    rms_percent: float
-    residuals: list[Residual]
-
-
-class Shrinkage(Part):
-    """Errors on held-out data."""
-
-    held_out: str
-    effect: str
-    before_percent: float
-    after_percent: float
-    fraction: float
-    low: float
-    high: float
-    placebo_95: float
-    floor_percent: float
-
-
-class NextMeasurement(Part):
-    """Something worth to be measured."""
-
-    what: str
-    gain: float
-    hours: float
-
-
-class DiagnosisResult(Result):
-    """diagnosis.json"""
-
-    study, stem, heading = "diagnose", "diagnosis", "Diagnosis"
-
-    verdict: Literal["named", "undecided", "no_gap", "outside"]
-    words: str
-    effect: str | None
-    parameter: Explained | None
-    probabilities: dict[str, float]
-    candidate_set: list[str]
-    groups: list[list[str]]
-    detectability: dict[str, float]
-    gap: Gap
-    section_map: list[Region]
-    effective_rank: int
-    shrinkage: Shrinkage | None
-    rung: int
-    next_measurements: list[NextMeasurement]
-
-
-class RunFacts(Part):
-    """A study's entry in run.json, but for what differs from run to run."""
-
-    case: str | None = None
-    command: str | None = None
-    finished: bool = True
-    started: str = ""
+from ..simulate.modes.mode import Label
+from .result import Column, Part, Positive, Provenance, Result, Table, Wave
 
 
 class EffectMode(Part):
@@ -139,7 +33,7 @@ class EffectRow(Part):
     modes: list[EffectMode]
 
 
-class Effect(Part):
+class EffectResult(Part):
     """An entry of effects.json."""
 
     title: str
@@ -158,7 +52,7 @@ class Effects(Result):
 
     study, stem, heading = "effects", "effects", "Effects"
 
-    entries: list[Effect]
+    entries: list[EffectResult]
 
     @model_validator(mode="before")
     @classmethod
