@@ -56,7 +56,7 @@ def judged(a: float, none: float, outside: float = 0.0, p_value: float = 0.5, **
     """What is decided where the effects a and b, none and outside have these probabilities."""
     rows, variables = of.get("rows", 20), of.get("variables", 3)
     h = explained(p_value, rows, variables, of.get("parameters", 1))
-    other = Hypothesis("outside", 0.1, 0.0, {}, np.zeros(1), None, "strange")
+    other = Hypothesis("outside", 0.1, 0.0, {}, np.zeros(1), h.fitted, "strange")
     share = {"a": a, "none": none, "outside": outside, "b": 1 - a - none - outside}
     return decide([h, replace(h, key="b"), other], share, rows, variables)
 

@@ -154,7 +154,6 @@ def _after(d: Diagnosis) -> Array | None:
     if d.leading is None:
         return None
     h = d.hypothesis(d.leading)
-    assert h.fitted is not None
     i = h.best
     shift, tilt, _ = d.problem.added({id: e[[i]] for id, e in h.values.items()}, 1)
     eta, _ = d.problem.plain(h.fitted.d[i])

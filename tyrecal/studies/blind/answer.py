@@ -110,7 +110,6 @@ def predicted(
     """Hz by label at a pressure that was not fitted, by a hypothesis at its best parameters."""
     places = [i for i, (label, p) in enumerate(rows) if label and p == pressure_kPa]
     hypothesis, expansion = found.hypothesis(key), found.problem.expansion
-    assert hypothesis.fitted is not None
     best = int(np.argmax(hypothesis.posterior))
     d = hypothesis.fitted.d[best]
     eta = expansion.plain(expansion.x0 + d)[0]

@@ -28,7 +28,6 @@ def calibrated_variables(diagnosis: Diagnosis, model: TyreModel) -> dict[str, An
 
 def _calibrated(diagnosis: Diagnosis, model: TyreModel, key: str) -> dict[str, dict[str, Any]]:
     found = diagnosis.hypothesis(key)
-    assert found.fitted is not None
     p, d = found.posterior, found.fitted.d
     apart = d - p @ d
     covariance = np.tensordot(p, found.fitted.covariance, 1) + (p[:, None] * apart).T @ apart

@@ -124,10 +124,7 @@ def diagnose(
             break
         hypotheses = weigh(problem)
     p = probabilities(hypotheses)
-    by_key = {h.key: h for h in hypotheses}
-    plain = by_key[NONE].fitted
-    assert plain is not None
-    d = plain.d[0]
+    d = next(h for h in hypotheses if h.key == NONE).fitted.d[0]
     verdict = decide(hypotheses, p, len(where), len(d))
     gap = find_gap(bare, d, tuple(model.variables))
     P, _, _ = projection(problem, d)
@@ -170,7 +167,6 @@ def _asked_again(
     play = sorted(play, key=lambda h: -h.ln_evidence)[:MAX_IN_PLAY]
     wanted: dict[str, tuple[float, Array]] = {}
     for h in play:
-        assert h.fitted is not None
         nodes, d = problem.expansion.nodes[h.key], h.fitted.d[h.best]
         e, width = float(h.values[h.key][h.best]), nodes.reach[1] - nodes.reach[0]
         last = nodes.anchor

@@ -51,13 +51,12 @@ class Hypothesis:
     ln_evidence: float
     values: Mapping[str, Array]  # parameters (q,) by id
     ln_weights: Array  # ln of weight times prior density (q,)
-    fitted: Fitted | None
+    fitted: Fitted
     words: str = ""
 
     @property
     def posterior(self) -> Array:
         """Probability (q,) of the grid's parameters."""
-        assert self.fitted is not None
         ln = self.fitted.ln_evidence + self.ln_weights
         p = np.exp(ln - ln.max())
         return np.asarray(p / p.sum())
@@ -65,7 +64,6 @@ class Hypothesis:
     @property
     def best(self) -> int:
         """The most probable parameters' place on the grid, its weights aside."""
-        assert self.fitted is not None
         return int(np.argmax(self.fitted.ln_evidence))
 
     def mean(self) -> dict[str, float]:

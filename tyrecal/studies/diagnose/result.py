@@ -161,7 +161,6 @@ def _parameter(diagnosis: Diagnosis, key: str | None) -> dict[str, Any] | None:
     hypothesis = diagnosis.hypothesis(key)
     effects = {id: np.array([e]) for id, e in hypothesis.mean().items()}
     shift = diagnosis.bare.added(effects, 1)[0][0] - diagnosis.bare.added({}, 1)[0][0]
-    assert hypothesis.fitted is not None
     P, _, _ = projection(diagnosis.bare, hypothesis.fitted.d[hypothesis.best])
     return {"effect": key.split("+")[0], **own, "lambda": float(shift @ P @ shift)}
 

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -80,11 +81,13 @@ def shrink(problem: InverseProblem, key: str | None = None, seed: int = 0) -> Sh
     singles = [h for name, h in hypotheses.items() if name in problem.expansion.nodes]
     chosen = hypotheses.get(key or "") or max(singles, key=lambda h: h.ln_evidence)
     out = problem.only(hold)
-    before = _errors(out, hypotheses[NONE], 0)
-    best = int(np.argmax(chosen.posterior))
-    after = _errors(out, chosen, best)
+    before = _errors(out, hypotheses[NONE], [0])[0]
+    after = _errors(out, chosen, [int(np.argmax(chosen.posterior))])[0]
     random = np.random.default_rng(seed)
-    samples = _samples(out, chosen, random)
+    places = random.choice(len(chosen.posterior), DRAWS, p=chosen.posterior)
+    normal = partial(random.multivariate_normal, method="cholesky")
+    drawn = np.array([normal(chosen.fitted.d[i], chosen.fitted.covariance[i]) for i in places])
+    samples = _errors(out, chosen, places, drawn)
     spread = np.sqrt(np.diag(out.sigma))
     rms = lambda e: np.sqrt(np.mean(np.square(e), axis=-1))
     ratios = 1 - rms(samples) / rms(before)
@@ -127,31 +130,22 @@ def _least_squares(problem: InverseProblem, hold: Array, sizes: Mapping[str, flo
     return _predicted_errors(out, effects, d[None])[0]
 
 
-def _errors(out: InverseProblem, hypothesis: Hypothesis, place: int) -> Array:
-    """ln measured - ln predicted on the held-out rows, at a place of the hypothesis' grid."""
-    assert hypothesis.fitted is not None
-    effects = {id: e[[place]] for id, e in hypothesis.values.items()}
-    return _predicted_errors(out, effects, hypothesis.fitted.d[[place]])[0]
+def _errors(
+    out: InverseProblem,
+    hypothesis: Hypothesis,
+    places: Sequence[int] | Array,
+    d: Array | None = None,
+) -> Array:
+    """ln measured - ln predicted (q, n) on the held-out rows, at places (q,) of the hypothesis'
+    grid; d (q, v): x - x0 there, if not the re-fitted ones."""
+    effects = {id: e[places] for id, e in hypothesis.values.items()}
+    return _predicted_errors(out, effects, hypothesis.fitted.d[places] if d is None else d)
 
 
 def _predicted_errors(out: InverseProblem, effects: dict[str, Array], d: Array) -> Array:
     shift, tilt, _ = out.added(effects, len(d))
     plain = np.array([out.plain(each)[0] for each in d])
     return np.asarray(out.observations.y - plain - shift - np.einsum("qnv,qv->qn", tilt, d))
-
-
-def _samples(out: InverseProblem, hypothesis: Hypothesis, random: np.random.Generator) -> Array:
-    """Errors (draws, n) with parameters and x drawn from the posterior."""
-    fitted = hypothesis.fitted
-    assert fitted is not None
-    places = random.choice(len(hypothesis.posterior), DRAWS, p=hypothesis.posterior)
-    d = np.array(
-        [
-            random.multivariate_normal(fitted.d[i], fitted.covariance[i], method="cholesky")
-            for i in places
-        ]
-    )
-    return _predicted_errors(out, {id: e[places] for id, e in hypothesis.values.items()}, d)
 
 
 def _placebo(problem: InverseProblem, hold: Array, random: np.random.Generator) -> float:

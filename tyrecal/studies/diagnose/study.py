@@ -135,7 +135,6 @@ def _under_load(
     tyres: dict[str, Values] = {}
     for key in filter(None, (NONE, diagnosis.leading)):
         found = diagnosis.hypothesis(key)
-        assert found.fitted is not None
         x = diagnosis.problem.expansion.x0 + found.fitted.d[found.best]
         effects = {id: float(e[found.best]) for id, e in found.values.items()}
         tyres[key] = model.design(Query(x, effects))

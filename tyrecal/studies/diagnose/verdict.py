@@ -64,6 +64,5 @@ def decide(
 
 def _check(hypothesis: Hypothesis, rows: int, variables: int) -> float:
     """p-value of chi2 at the likeliest parameters."""
-    assert hypothesis.fitted is not None
     freedom = max(1, rows - variables - len(hypothesis.values))
     return float(chi2.sf(hypothesis.fitted.chi2[hypothesis.best], freedom))
