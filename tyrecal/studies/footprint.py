@@ -23,7 +23,6 @@ from .result import (
     Result,
     Table,
     csv_text,
-    missing,
     not_reached,
     silent,
 )
@@ -97,12 +96,6 @@ class FootprintResult(Result):
         caption = "mean and peak: contact pressure; stiffness: tangent at the load"
         columns = list(FootprintRow.columns().values())
         return [Table(columns, [row.cells() for row in self.rows], caption=caption)]
-
-    def sentences(self) -> list[str]:
-        return self.findings.words
-
-    def doubts(self) -> list[str]:
-        return missing(self.failed)
 
 
 def run(

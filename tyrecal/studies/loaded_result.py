@@ -24,11 +24,8 @@ from .result import (
     Result,
     Table,
     csv_text,
-    missing,
     not_reached,
-    of_last_design,
     silent,
-    with_design,
 )
 
 STEADY = 1e-3  # Hz, below which a split is none
@@ -92,15 +89,6 @@ class LoadSweep(Result):
             for key in order
         ]
         return Table([*NAMED, Column("symmetry", ""), *hertz], rows, f"{design}, Hz")
-
-    def sentences(self) -> list[str]:
-        return with_design(self.findings)
-
-    def summary(self) -> list[str]:
-        return of_last_design(self.findings)
-
-    def doubts(self) -> list[str]:
-        return missing(self.failed)
 
 
 def run(

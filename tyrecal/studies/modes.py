@@ -53,9 +53,6 @@ class ModesResult(Result):
         title = f"{self.pressure_kPa:g} kPa{load}, {self.mass_kg:.2f} kg"
         return [Table(columns, rows, title, str(self.provenance or ""))]
 
-    def sentences(self) -> list[str]:
-        return self.findings.words
-
 
 def modes_result(
     case: LoadedCase, values: Mapping[str, float], evaluation: Evaluation

@@ -25,10 +25,7 @@ from .result import (
     Result,
     Table,
     csv_text,
-    missing,
-    of_last_design,
     silent,
-    with_design,
 )
 
 
@@ -105,15 +102,6 @@ class PressureSweep(Result):
             ]
             tables.append(Table(columns, rows, f"{design}: Hz at each pressure, kPa"))
         return tables
-
-    def sentences(self) -> list[str]:
-        return with_design(self.findings)
-
-    def summary(self) -> list[str]:
-        return of_last_design(self.findings)
-
-    def doubts(self) -> list[str]:
-        return missing(self.failed)
 
 
 def run(

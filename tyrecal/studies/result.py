@@ -145,16 +145,25 @@ class Result(Part):
         return []
 
     def sentences(self) -> list[str]:
-        """What was found, in sentences."""
-        return []
+        """What was found: ``findings`` of all, or of each design, by their ``words``."""
+        return self._words(slice(None))
 
     def summary(self) -> list[str]:
-        """The same in short, for the head of the page."""
-        return self.sentences()
+        """The same in short, for the head of the page: of the last design, the fitted one."""
+        return self._words(slice(-1, None), "; ")
+
+    def _words(self, chosen: slice, between: str = "") -> list[str]:
+        found = getattr(self, "findings", [])
+        if not isinstance(found, list):
+            return list(found.words)
+        told = [(each.design, each.words) for each in found[chosen]]
+        told = [(name, [between.join(words)] if between else words) for name, words in told]
+        return [f"{name}: {each}" for name, words in told for each in words]
 
     def doubts(self) -> list[str]:
-        """What must not be overlooked."""
-        return []
+        """What must not be overlooked: the states in ``failed`` were not reached."""
+        failed: list[Failed] = getattr(self, "failed", [])
+        return [f"not reached: {each.place}: {each.words or each.cause}" for each in failed]
 
 
 class Failed(Part):
@@ -230,18 +239,3 @@ def csv_text(keys: Sequence[str], rows: Iterable[Mapping[str, Any]], end: str = 
     writer.writeheader()
     writer.writerows(rows)
     return text.getvalue()
-
-
-def missing(failed: Sequence[Failed]) -> list[str]:
-    """What was not reached, in words."""
-    return [f"not reached: {each.place}: {each.words or each.cause}" for each in failed]
-
-
-def with_design(found: Sequence[Any]) -> list[str]:
-    """Sentences, each with its design."""
-    return [f"{each.design}: {words}" for each in found for words in each.words]
-
-
-def of_last_design(found: Sequence[Any]) -> list[str]:
-    """Of the last design: the fitted one where there are two."""
-    return [f"{each.design}: {'; '.join(each.words)}" for each in found[-1:]]
