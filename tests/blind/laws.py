@@ -202,7 +202,7 @@ def rim_width(case: LoadedCase, e: float) -> LoadedCase:
 
 def pressure_offset(case: LoadedCase, e: float) -> LoadedCase:
     """A gauge whose scale is off: a factor, which is the offset at the case's own pressure."""
-    nominal = case.file_pressure_kPa or case.case.pressure_kPa
+    nominal = case.file_data["pressure_kPa"]
     return changed(case, pressure_kPa=case.case.pressure_kPa * (1 + e / nominal))
 
 
@@ -223,7 +223,7 @@ def temperature(case: LoadedCase, e: float) -> LoadedCase:
 
 def temperature_drift(case: LoadedCase, e: float) -> LoadedCase:
     """The tyre nears a temperature, as it does in time, by the law above."""
-    nominal = case.file_pressure_kPa or case.case.pressure_kPa
+    nominal = case.file_data["pressure_kPa"]
     return temperature(case, 1.3 * e * tanh((case.case.pressure_kPa - nominal) / 130.0))
 
 

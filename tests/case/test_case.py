@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from tyrecal.tyre.case import CaseError, number_at, parse_assignment, start_values
-from tyrecal.tyre.case.checks import at, find
+from tyrecal.tyre.case.checks import find
 from tyrecal.tyre.load import load_case, validate
 from tyrecal.tyre.values import with_values
 
@@ -46,7 +46,7 @@ def test_values_and_defaults() -> None:
     assert case.mesh.hourglass_stiffness_Pa is None and case.templates is None
     assert len(case.targets.modes) == 9 and case.targets.modes[0].weight == 1
     assert P235.section.names == ("inner", "ply", "belt1", "belt2", "outer")
-    assert P235.folder == CASES and P235.raw["rim"]["reference_point_m"] == {"r": 0, "z": 0}
+    assert P235.folder == CASES and P235.file_data["rim"]["reference_point_m"] == {"r": 0, "z": 0}
 
 
 def test_a_case_without_targets_and_variables(tmp_path: Path) -> None:
@@ -129,18 +129,17 @@ def test_start_values_and_with_values() -> None:
     assert new.case.rebar_layers["belt_1"].area_m2 == new.case.rebar_layers["belt_2"].area_m2
     assert new.case.rebar_layers["belt_2"].area_m2 == 3e-7 and new.case.pressure_kPa == 200
     assert new.case.mesh.levels["default"].rows == [2, 1, 1, 3]
-    assert new.raw["mesh"]["levels"]["default"]["rows"] == [2, 1, 1, 3]
-    assert new.raw["rebar_layers"]["belt_1"]["area_m2"] == 3e-7
+    assert new.file_data == P235.file_data  # as the file has it
     # the old one is as it was
     assert P235.case.rebar_layers["belt_1"].area_m2 == 2.118683e-7
-    assert P235.raw["pressure_kPa"] == 240 and P235.case.mesh.levels["default"].rows[0] == 1
+    assert P235.file_data["pressure_kPa"] == 240 and P235.case.mesh.levels["default"].rows[0] == 1
 
 
 def test_optional_numbers_can_be_set() -> None:
     values = {"analysis.vibration_frequency_Hz": 60.0, "mesh.hourglass_stiffness_Pa": 3e4}
     new = with_values(P235, values)
     assert new.case.analysis.vibration_frequency_Hz == 60
-    assert new.raw["mesh"]["hourglass_stiffness_Pa"] == 3e4
+    assert new.case.mesh.hourglass_stiffness_Pa == 3e4
 
 
 @pytest.mark.parametrize(
@@ -157,9 +156,9 @@ def test_a_number_that_is_not_written_can_vary(number: str, tmp_path: Path) -> N
     variable = f"variables:\n  x: {{sets: [{number}], start: 0.1, lower: 0.01, upper: 0.4}}\n"
     loaded = load_case(put(tmp_path, ("\nvariables:", "\n" + variable.rstrip())))
     with pytest.raises(KeyError):
-        find(loaded.raw, number)
+        find(loaded.file_data, number)
     moved = with_values(loaded, {"x": 0.2})
-    assert number_at(moved, number) == 0.2 and at(moved.raw, find(moved.raw, number)) == 0.2
+    assert number_at(moved, number) == 0.2
 
 
 @pytest.mark.parametrize(

@@ -241,7 +241,7 @@ def test_usual_loads_follow_size_and_pressure() -> None:
     loaded = load_case(CASES / "p235_75r17.yaml")
     assert unusual_value(loaded, "road.loads_N.0", 20e3) is None
     assert unusual_value(loaded, "road.loads_N.0", 40e3)
-    at_600 = {**loaded.raw, "pressure_kPa": 600.0}
+    at_600 = {**loaded.file_data, "pressure_kPa": 600.0}
     assert refusal(at_600, loaded.section, ("road", "loads_N", 0), 40e3) is None
     assert refusal(at_600, loaded.section, ("road", "loads_N", 0), 61e3)
 
@@ -251,7 +251,7 @@ def test_every_range_is_of_a_number_that_a_case_can_have() -> None:
     reached = set()
     for path in CASES.glob("*.yaml"):
         loaded = load_case(path)
-        data = with_defaults(loaded.raw)
+        data = with_defaults(loaded.file_data)
         for pattern in USUAL:
             words = pattern.split(".")
             found = [((), data)]

@@ -26,7 +26,6 @@ FOUR_NODES = replace(  # of a kind that needs hourglass control
     case=CASE.case.model_copy(
         update={"mesh": CASE.case.mesh.model_copy(update={"element": "CGAX4R"})}
     ),
-    raw={**CASE.raw, "mesh": {**CASE.raw["mesh"], "element": "CGAX4R"}},
 )
 HOURGLASS = {"mesh.hourglass_stiffness_Pa": 3e4}
 VALUES: dict[str, dict[str, float]] = {

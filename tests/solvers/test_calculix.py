@@ -428,7 +428,7 @@ def main_case(**options: object) -> LoadedCase:
         loaded.path,
         loaded.section,
         loaded.folder,
-        loaded.raw,
+        loaded.file_data,
     )
 
 
@@ -467,7 +467,7 @@ def test_a_vibration_frequency_is_refused(tmp_path: Path) -> None:
         case.path,
         case.section,
         case.folder,
-        case.raw,
+        case.file_data,
     )
     with pytest.raises(TemplateFailed, match="vibration_frequency_Hz must be null"):
         Evaluator(TyreDesign(case), "calculix", folder=tmp_path).evaluate(Question({}))

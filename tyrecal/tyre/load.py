@@ -52,7 +52,7 @@ def _read(path: Path, allow_unusual: bool) -> tuple[LoadedCase | None, list[Mist
     data = document.data
     if data is None:
         return None, document.mistakes
-    raw = deepcopy(data)
+    file_data = deepcopy(data)
     case = _typed(document, data)
     _add(document, disagreements(data))
     section = read_stations(document, data, path.parent)
@@ -66,7 +66,7 @@ def _read(path: Path, allow_unusual: bool) -> tuple[LoadedCase | None, list[Mist
         _add(document, unusual(data, section))
     if case is None or section is None or document.mistakes:
         return None, sorted(document.mistakes, key=lambda m: (m.file != str(path), m.line))
-    loaded = LoadedCase(case, path, section, path.parent, raw, case.pressure_kPa)
+    loaded = LoadedCase(case, path, section, path.parent, file_data)
     try:
         resolved(loaded)
     except EffectRefused as error:

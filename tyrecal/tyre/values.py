@@ -63,18 +63,18 @@ def set_values(loaded: LoadedCase, values: Mapping[str, float]) -> LoadedCase:
             branch = branch.setdefault(key, {})
         branch[keys[-1]] = number
     case = _set(loaded.case, tree, ())
-    raw = _set_raw(loaded.raw, case, tree)
     touched = set(tree) - ALONE
     section = loaded.section
     redrawn = "outline" in tree.get("section", {})
     if redrawn:
         section = read_section_of(case.section, loaded.folder)
     if touched:
-        for wrong, reason in problems(raw, section):
+        data = case.plain()
+        for wrong, reason in problems(data, section):
             raise ValueError(f"{dotted(wrong)} {reason}")
-    if ("mesh" in touched or redrawn) and (message := folds(raw, section)):
-        raise ValueError(message)
-    return replace(loaded, case=case, raw=raw, section=section)
+        if ("mesh" in touched or redrawn) and (message := folds(data, section)):
+            raise ValueError(message)
+    return replace(loaded, case=case, section=section)
 
 
 def overridden(loaded: LoadedCase, values: Mapping[str, float]) -> LoadedCase:
@@ -87,7 +87,8 @@ def overridden(loaded: LoadedCase, values: Mapping[str, float]) -> LoadedCase:
 def unusual_value(loaded: LoadedCase, name: str, value: float) -> str | None:
     """Why no user states ``value`` of a variable, or of the number at a dotted path: what is usual,
     what was probably meant; None where it is usual. Raises ValueError for an unknown name."""
-    found = (refusal(loaded.raw, loaded.section, keys, value) for keys in _keys(loaded, name))
+    data = loaded.case.plain()
+    found = (refusal(data, loaded.section, keys, value) for keys in _keys(loaded, name))
     return next((message for message in found if message), None)
 
 
@@ -134,16 +135,3 @@ def _set(node: Any, tree: Any, keys: Keys) -> Any:
             value = value.get(key) if isinstance(value, dict) else None
         got = "" if value is None or isinstance(value, dict) else f", got {value:g}"
         raise ValueError(f"{dotted(wrong)} {message}{got}") from None
-
-
-def _set_raw(raw: Any, case: Any, tree: Any) -> Any:
-    """The plain data with the same numbers as the typed ``case``."""
-    if not isinstance(tree, dict):
-        return tree
-    fields = case.__dict__ if isinstance(case, BaseModel) else case
-    if isinstance(fields, list):
-        return [
-            _set_raw(r, fields[i], tree[i]) if i in tree else r for i, r in enumerate(raw or fields)
-        ]
-    new = {k: _set_raw((raw or {}).get(k), fields[k], branch) for k, branch in tree.items()}
-    return {**(raw or {}), **new}

@@ -33,7 +33,7 @@ def bias_carcass(case: LoadedCase, e: float) -> LoadedCase:
 def tension_stiffening(case: LoadedCase, e: float) -> LoadedCase:
     """Carcass cords whose modulus goes with their tension: times 1 + e per 100 kPa over the
     pressure of the case file."""
-    nominal = case.file_pressure_kPa or case.case.pressure_kPa
+    nominal = case.file_data["pressure_kPa"]
     factor = 1 + e * (case.case.pressure_kPa - nominal) / 100.0
     names = {case.case.rebar_layers[name].material for name in carcass(case)}
     materials = {

@@ -15,17 +15,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class LoadedCase:
-    """A valid case: typed (``case``), as plain data (``raw``), with its section and its place.
-
-    path: the case file; folder: where it lies, to which its own paths are relative;
-    file_pressure_kPa: the pressure in the file, whatever is set later; overrides: what the user
-    has set since, by name or path, for results to say.
-    """
+    """A valid case as typed data, with its section and its place."""
 
     case: Case
-    path: Path
+    path: Path  # of the case file
     section: Section
-    folder: Path
-    raw: dict[str, Any]
-    file_pressure_kPa: float | None = None
+    folder: Path  # to which the case's own paths are relative
+    file_data: dict[str, Any]  # as the file has it, whatever is set later
+    # set by the user since, by name or path, for results to say
     overrides: Mapping[str, float] = field(default_factory=dict)

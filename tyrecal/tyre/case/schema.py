@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
 from pydantic import AfterValidator, Field
 
@@ -55,6 +55,10 @@ class Case(Part):
     uncertainties: dict[Name, Uncertainty] = Field(default_factory=dict)
     solver: Solver
     templates: Text | None = None
+
+    def plain(self) -> dict[str, Any]:
+        """The case as plain data, defaults and all."""
+        return self.model_dump(exclude_none=True)
 
     @property
     def loads_N(self) -> list[float]:

@@ -23,7 +23,7 @@ def overruled(loaded: LoadedCase, given: Collection[str] = ()) -> list[str]:
     for name, variable in loaded.case.variables.items():
         for path in [] if name in given else variable.sets:
             try:
-                written = at(loaded.raw, find(loaded.raw, path))
+                written = at(loaded.file_data, find(loaded.file_data, path))
             except KeyError:  # left to its default
                 continue
             if written is not None and written != variable.start:

@@ -6,8 +6,6 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from typing import Any, TypeVar
 
-from pydantic import BaseModel
-
 from ..case import Case, LoadedCase
 from ..case.materials import Rubber
 from ..case.parts import Part
@@ -18,9 +16,7 @@ P = TypeVar("P", bound=Part)
 
 def changed(loaded: LoadedCase, **parts: Any) -> LoadedCase:
     """The case with whole parts of it (``materials=...``) replaced, and judged."""
-    case = Case.model_validate({**loaded.case.__dict__, **parts})
-    raw = {**loaded.raw, **{key: _plain(value) for key, value in parts.items()}}
-    return replace(loaded, case=case, raw=raw)
+    return replace(loaded, case=Case.model_validate({**loaded.case.__dict__, **parts}))
 
 
 def with_part(part: P, **values: Any) -> P:
@@ -101,11 +97,3 @@ def on_spindle(loaded: LoadedCase, key: str, compliance: float) -> LoadedCase:
         raise ValueError("must be at least 0")
     spindle = with_part(rim.spindle, **{key: getattr(rim.spindle, key) + compliance})
     return changed(loaded, rim=with_part(rim, spindle=spindle))
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, BaseModel):
-        return value.model_dump(exclude_none=True)
-    if isinstance(value, dict):
-        return {key: _plain(entry) for key, entry in value.items()}
-    return [_plain(entry) for entry in value] if isinstance(value, list) else value

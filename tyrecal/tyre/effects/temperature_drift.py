@@ -9,7 +9,7 @@ from .effect import Effect
 
 def add(case: LoadedCase, value: float) -> LoadedCase:
     """A temperature of value (p - p0) / 100 kPa, p0 being the pressure in the case file."""
-    nominal = case.case.pressure_kPa if case.file_pressure_kPa is None else case.file_pressure_kPa
+    nominal = case.file_data["pressure_kPa"]
     kelvin = value * (case.case.pressure_kPa - nominal) / 100
     try:
         return temperature.add(case, kelvin)
