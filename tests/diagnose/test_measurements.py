@@ -58,6 +58,48 @@ def test_a_wrong_line_is_named(tmp_path: Path, line: str, words: str) -> None:
     assert "line 3" in sentence and words in sentence
 
 
+@pytest.mark.parametrize(
+    ("good", "bad"),
+    [
+        ("frequency_Hz,2,0,,,20,0,79.5,0.2", "frequency_Hz,2,0,,,19.9,0,79.5,0.2"),
+        ("frequency_Hz,2,0,,,2000,0,79.5,0.2", "frequency_Hz,2,0,,,2001,0,79.5,0.2"),
+        ("frequency_Hz,20,3,,,240,0,79.5,0.2", "frequency_Hz,21,3,,,240,0,79.5,0.2"),
+        ("frequency_Hz,20,3,,,240,0,79.5,0.2", "frequency_Hz,20,4,,,240,0,79.5,0.2"),
+        ("frequency_Hz,2,0,,,240,0,75,15", "frequency_Hz,2,0,,,240,0,75,15.1"),
+        ("frequency_Hz,2,0,,1,240,0,79.5,0.2", "frequency_Hz,2,0,,0,240,0,79.5,0.2"),
+        ("frequency_Hz,0,1,,,240,0,79.5,0.2", "frequency_Hz,0,1,axial,,240,0,79.5,0.2"),
+        ("frequency_Hz,1,0,,,240,0,79.5,0.2", "frequency_Hz,1,0,torsional,,240,0,79.5,0.2"),
+        ("frequency_Hz,0,1,,symmetric,240,4e3,79.5,1", "frequency_Hz,0,1,,,240,4e3,79.5,1"),
+        ("frequency_Hz,2,0,,,240,0,79.5,0.2", "frequency_Hz,2,0,,,240,-1,79.5,0.2"),
+        ("frequency_Hz,2,0,,,240,0,79.5,0.2", "frequency_Hz,2,0,,,240,some,79.5,0.2"),
+        ("contact_area_m2,,,,,240,0.5,0.02,0.001", "contact_area_m2,,,,,240,0,0.02,0.001"),
+        ("mass_kg,,,,,20,0,12.5,0.05", "mass_kg,,,,,19,0,12.5,0.05"),
+        ("mass_kg,,,,,20,0,12.5,0.05", "mass_kg,,,,1,20,0,12.5,0.05"),
+        ("mass_kg,,,,,20,0,12.5,0.05", "mass_kg,,,axial,,20,0,12.5,0.05"),
+    ],
+)
+def test_what_is_allowed_at_a_limit_and_refused_beyond(tmp_path: Path, good: str, bad: str) -> None:
+    assert len(read(tmp_path, good)) == 1
+    with pytest.raises(InputError, match="line 2"):
+        read(tmp_path, bad)
+
+
+def test_ten_thousand_lines_are_read_and_no_more(tmp_path: Path) -> None:
+    lines = [f"frequency_Hz,2,0,,,{20 + 0.1 * i:.1f},0,79.5,0.2" for i in range(10_001)]
+    assert len(read(tmp_path, *lines[1:])) == 10_000
+    with pytest.raises(InputError, match="more than 10000 lines"):
+        read(tmp_path, *lines)
+
+
+def test_pairs_and_single_values_of_another_load_or_pressure_do_not_meet(tmp_path: Path) -> None:
+    line = "frequency_Hz,2,0,,{},{},{},79.5,0.2"
+    apart = [line.format(1, 240, 0), line.format("", 250, 0), line.format("symmetric", 250, 1)]
+    assert len(read(tmp_path, *apart)) == 3
+    for member in ("2", ""):  # whichever comes first
+        with pytest.raises(InputError, match="line 3: gives a pair a member"):
+            read(tmp_path, line.format(member, 240, 0), line.format("" if member else 2, 240, 0))
+
+
 def test_what_is_left_empty_is_none(tmp_path: Path) -> None:
     """No load and, of the mass, no pressure: 0; and no label."""
     mode, mass = read(tmp_path, "frequency_Hz,2,0,,,240,,79.5,0.2", "mass_kg,,,,,,,12.5,0.05")
@@ -154,3 +196,20 @@ def test_repeats_that_cannot_be_used_are_said(tmp_path: Path) -> None:
     alone = observe(read(tmp_path, *both), [read(tmp_path, again[0])])
     assert any(words.startswith("all repeats: fewer than two") for words in alone.left_out)
     assert not observe(read(tmp_path, *both), [read(tmp_path, *both)]).left_out
+
+
+def test_a_toggled_run_is_no_repeat(tmp_path: Path) -> None:
+    """It may have other modes, and its values do not enter the scatter."""
+    lines = [GOOD, "frequency_Hz,3,0,,,240,0,98,0.2", "frequency_Hz,4,0,,,240,0,116,0.2"]
+    again = ["frequency_Hz,2,0,,,240,0,79.7,0.2", "frequency_Hz,3,0,,,240,0,98.1,0.2",
+             "frequency_Hz,4,0,,,240,0,115.8,0.2"]  # fmt: skip
+    run, repeat = read(tmp_path, *lines), read(tmp_path, *again)
+    toggled = read(tmp_path, lines[0], "frequency_Hz,1,0,,,240,0,40,0.3")
+    for repeats in ([], [repeat]):
+        alone, found = observe(run, repeats), observe(run, repeats, [toggled])
+        assert not found.left_out and found.common == alone.common
+        assert found.y[:3] == pytest.approx(alone.y)
+        assert found.scatter[:3] == pytest.approx(alone.scatter)
+        assert found.y[3:] == pytest.approx(np.log([40, 79.5]))
+        assert found.scatter[3:] == pytest.approx([0.3 / 40, 0.2 / 79.5])
+        assert [row.run for row in found.rows] == [0, 0, 0, 1, 1]

@@ -5,26 +5,29 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
-from tyrecal.case import with_values
+from tyrecal.case import load_case, with_values
+from tyrecal.case.section import Gauge
 from tyrecal.diagnose.add import NotAdded, add
 from tyrecal.diagnose.diagnosis import diagnose
 from tyrecal.diagnose.evidence import probabilities, weigh
 from tyrecal.diagnose.expansion import expand
 from tyrecal.diagnose.gap import find_gap, projection
 from tyrecal.diagnose.measurements import read_measurements
-from tyrecal.diagnose.observations import observe
+from tyrecal.diagnose.observations import Observations, Row, observe
 from tyrecal.diagnose.problem import Assumed, Change, Problem, places
 from tyrecal.diagnose.regions import regions
 from tyrecal.diagnose.response import Answer, Point
 from tyrecal.diagnose.result import result
 from tyrecal.diagnose.separability import separate
-from tyrecal.diagnose.study import parse_change, spans_of, study
+from tyrecal.diagnose.study import _check_units, parse_change, spans_of, study
 from tyrecal.diagnose.tyre_model import TyreModel
-from tyrecal.diagnose.uncertainties import DENSITY, PRESSURE_kPa, sources
+from tyrecal.diagnose.uncertainties import DENSITY, PRESSURE_kPa, sources, values_of
 from tyrecal.diagnose.verdict import decide
 from tyrecal.errors import InputError
 from tyrecal.evaluate.door import Door
@@ -32,6 +35,7 @@ from tyrecal.evaluate.failure import DeckRefused
 from tyrecal.modes.mode import Label
 
 from ..chance import Chance, generator
+from ..conftest import CASES
 from ..effects.support import coarse
 
 CASE = coarse()
@@ -292,6 +296,55 @@ def test_sources_of_error_are_those_of_the_case_or_assumed_and_never_calibrated(
     variable = CASE.case.variables["C10"].model_copy(update={"sets": ["pressure_kPa"]})
     moved = CASE.case.model_copy(update={"variables": {"p": variable}})
     assert "pressure" not in {s.name for s in sources(replace(CASE, case=moved))[0]}
+
+
+def test_what_is_assumed_of_constants_is_what_the_guide_says() -> None:
+    guide = " ".join((CASES / "diagnosis.md").read_text().split())
+    assert ("densities of rubber 1.5 %, moduli of cords 3 %, spacings 1 %, gauges 3 %, cord angles"
+            " 1 degree, pressure 1 kPa") in guide  # fmt: skip
+    case = load_case(CASES / "p235_75r17.yaml")
+    gauge = Gauge(between=["bead", "upper_sidewall"], factor=2.0)
+    section = case.case.section.model_copy(update={"gauges": [gauge]})
+    bare = case.case.model_copy(update={"uncertainties": {}, "section": section})
+    found, assumed = sources(replace(case, case=bare))
+    relative = {"density": 0.015, "modulus": 0.03, "spacing": 0.01}
+    assert assumed and len(found) >= 9
+    for source in found:
+        ((path, step),) = source.steps.items()
+        kind = source.name.rpartition("_")[2]
+        if kind in relative:
+            assert step == pytest.approx(relative[kind] * values_of(case, [source])[path])
+            assert source.words.endswith(f" {100 * relative[kind]:g} %")
+        elif source.name.startswith("gauge"):
+            assert step == pytest.approx(0.06) and path == "section.gauges.0.factor"
+        else:
+            assert step == 1.0 and (kind == "angle") == path.endswith("angle_deg")
+            assert source.words.endswith(" 1 degrees" if kind == "angle" else "pressure 1 kPa")
+
+
+def test_what_is_not_even_near_the_model_is_refused() -> None:
+    """A frequency by a factor of 2, the mass by 1.5, either way; frequencies are told first."""
+    rows = [(Label(2, 0), 240.0), (None, 0.0)]
+    answer = Answer(np.log([80.0, 12.0]), np.zeros((2, 1)), np.zeros(2))
+    start = np.zeros(1)
+    model: Any = SimpleNamespace(rows=rows, start=start, answers=lambda points: [answer])
+
+    def check(frequency: float, mass: float) -> None:
+        measured = (Row("mass_kg", None, 0.0), Row("frequency_Hz", *rows[0]))
+        none = np.full(2, np.nan)
+        y = np.log([12.0 * mass, 80.0 * frequency])
+        _check_units(model, Observations(measured, y, none, 0.0, none, none), [Path("a.csv")], ())
+
+    for good in (1.0, 1.99, 1 / 1.99):
+        check(good, 1.0)
+    for good in (1.49, 1 / 1.49):
+        check(1.0, good)
+    for bad in (2.01, 1 / 2.01):
+        with pytest.raises(InputError, match=f"a.csv: .* was measured {bad:.2g} times as high"):
+            check(bad, 1.51)
+    for bad in (1.51, 1 / 1.51):
+        with pytest.raises(InputError, match=f"a.csv: the mass is {bad:.2g} times the model's"):
+            check(1.9, bad)
 
 
 def test_an_effect_without_slopes_takes_the_plain_tyres() -> None:

@@ -62,6 +62,7 @@ def test_time_that_ran_out_is_not_on_record(tmp_path: Path) -> None:
     [
         (lambda answer: answer["footprints"].pop(), "footprints at"),
         (lambda answer: answer["footprints"].clear(), "footprints at"),
+        (lambda answer: answer.update(footprints=[], failure="no load"), "footprints at"),
         (lambda answer: answer["footprints"].reverse(), "footprints at"),
         (lambda answer: answer.update(failure="no more"), "footprints at"),
         (lambda answer: answer["footprints"][0].update(road_N=400.0), "bears 400 N of 500 N"),

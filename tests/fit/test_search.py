@@ -338,19 +338,21 @@ def test_uncertainty_by_its_formula() -> None:
 
 def test_noise_is_what_is_left_over_the_freedom_that_is_left() -> None:
     """Of four frequencies without sigma and two variables: two degrees; a fifth, known one takes
-    its leverage."""
+    its leverage. Weights are none of the noise."""
     random = generator("noise")
     J, y = random.normal(size=(5, 2)), random.normal(size=5)
+    scale = np.array([1.0, 4.0, 0.5, 2.0, 3.0])
+    J = scale[:, None] * J
     variables = [Variable("a", 3.0, 1.0, 9.0), Variable("b", 3.0, 1.0, 9.0)]
-    point_of = lambda n: Point({"a": 3.0, "b": 3.0}, np.zeros(2), y[:n], J[:n], {}, 1.0, 1.0,
-                               np.empty(0), 0.0)  # fmt: skip
+    point_of = lambda n: Point({"a": 3.0, "b": 3.0}, np.zeros(2), (scale * y)[:n], J[:n], {}, 1.0,
+                               1.0, np.empty(0), 0.0)  # fmt: skip
     none = [SimpleNamespace(sigma_Hz=None)] * 4
     told: dict[str, Any] = {"variables": variables, "footprint": []}
-    problem: Any = SimpleNamespace(scale=np.ones(4), targets=none, **told)
+    problem: Any = SimpleNamespace(scale=scale[:4], targets=none, **told)
     found = uncertainty(problem, point_of(4))
     assert found.noise_Hz == pytest.approx(np.linalg.norm(y[:4]) / np.sqrt(2))
     known = [*none, SimpleNamespace(sigma_Hz=0.3)]
-    problem = SimpleNamespace(scale=np.ones(5), targets=known, **told)
+    problem = SimpleNamespace(scale=scale, targets=known, **told)
     leverage = J[4] @ np.linalg.inv(J.T @ J) @ J[4]
     noise = np.linalg.norm(y[:4]) / np.sqrt(4 - (2 - leverage))
     sigma = np.sqrt((4 * noise**2 + 0.3**2) / 5)

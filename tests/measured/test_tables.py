@@ -171,3 +171,8 @@ def test_a_table_may_be_as_long_as_is_said(tmp_path: Path, monkeypatch: pytest.M
     assert len(read(tmp_path, PLAIN)) == 2
     with pytest.raises(InputError, match="more than 3 lines"):
         read(tmp_path, PLAIN + "3,1,,240,102.7\n")
+
+
+def test_a_table_of_more_than_ten_thousand_lines_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="more than 10000 lines"):
+        read(tmp_path, PLAIN + "2,1,,240,66.1\n" * 9_998)

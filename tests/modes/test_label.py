@@ -269,15 +269,28 @@ def test_an_order_is_claimed_with_a_fifth_of_the_motion(share, label):
     assert labels([lower, upper]) == [Label(3, 1), label]
 
 
-@pytest.mark.parametrize("part, label", [(0.09, Label(3, 2)), (0.11, Label(3, 0))])
-def test_an_order_is_claimed_with_a_tenth_of_the_belts_part(part, label):
-    """Of the mean square motion; below that a mode of the sidewalls claims nothing."""
+def with_sidewalls(part):
+    """[3,0] on the belt, whose mean square motion is that share of all points'."""
     belt = POINTS[:, 0] > 0.94 * POINTS[:, 0].max()
     u = np.where(belt[:, None], [1.0, 0.6j, 0.0], 0.0)
     u[~belt, 2] = np.sqrt(1.36 * (1 / part - belt.mean()) / (1 - belt.mean()))
-    made = HarmonicShape(3, NODES, POINTS, u)
+    return HarmonicShape(3, NODES, POINTS, u)
+
+
+@pytest.mark.parametrize("part, label", [(0.09, Label(3, 2)), (0.11, Label(3, 0))])
+def test_an_order_is_claimed_with_a_tenth_of_the_belts_part(part, label):
+    """Of the mean square motion; below that a mode of the sidewalls claims nothing."""
+    made = with_sidewalls(part)
     assert belt_motion(made).participation == pytest.approx(part)
     assert labels([RawMode(50.0, made, 2)]) == [label]
+
+
+@pytest.mark.parametrize("hertz, first", [(69.0, False), (72.0, True), (200.0, True)])
+def test_of_two_that_move_the_belt_alike_the_more_compliant_part_has_the_label(hertz, first):
+    """Half of the belt's part at 50 Hz against all of it above: they are even at 50 sqrt(2) Hz."""
+    modes = [RawMode(50.0, with_sidewalls(0.5), 2), RawMode(hertz, with_sidewalls(1.0), 2)]
+    assert (labels(modes)[0] == Label(3, 0)) == first
+    assert (labels(modes)[1] == Label(3, 0)) != first
 
 
 def test_halves_are_joined_to_half_a_per_cent():
