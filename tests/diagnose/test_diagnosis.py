@@ -21,6 +21,8 @@ from tyrecal.diagnose.response import Answer, Point, Span
 from tyrecal.diagnose.result import result
 from tyrecal.diagnose.shrinkage import PLACEBOS, _placebo, held_out, shrink
 from tyrecal.diagnose.study import Study
+from tyrecal.diagnose.under_load import LoadedRow, UnderLoad
+from tyrecal.modes.loaded import Member
 from tyrecal.modes.mode import Label
 from tyrecal.report.diagnosis import page
 
@@ -368,12 +370,47 @@ def test_the_result_says_what_was_found() -> None:
     assert [row["percent"] for row in rows] == pytest.approx(100 * d.gap.residuals)
     assert [row["sigma_percent"] for row in rows] == pytest.approx(100 * d.gap.spread)
     assert told["shrinkage"] == {
-        name: getattr(d.shrinkage, name) for name in d.shrinkage.__dataclass_fields__  # type: ignore[union-attr]
+        name: getattr(d.shrinkage, name)
+        for name in d.shrinkage.__dataclass_fields__  # type: ignore[union-attr]
     }
     shares = list(told["probabilities"].values())
-    assert shares == sorted(shares, reverse=True) and {"none", "outside"} <= set(told["probabilities"])
+    assert shares == sorted(shares, reverse=True) and {"none", "outside"} <= set(
+        told["probabilities"]
+    )
     kept = {key for key, p in d.probabilities.items() if p > 1e-6}
     assert set(told["probabilities"]) == kept | {"none", "outside"} != set(d.probabilities)
+
+
+def test_the_result_says_what_was_measured_under_load() -> None:
+    """By load where all tyres have an answer, every row with what each tyre is off by."""
+    d = diagnosed(Toy(effects=3), {}, 7)
+    member = Member(Label(2, 0), "symmetric")
+    area = LoadedRow("contact_area_m2", None, 240.0, 3e3, 0.01, 1e-4, {"none": 0.03, "e1": -0.01})
+    mode = LoadedRow("frequency_Hz", member, 220.0, 1e3, 80.0, 0.5, {"none": 0.02, "e1": 0.0})
+    lost = LoadedRow("contact_area_m2", None, 240.0, 2e3, 0.02, 1e-4, {"none": 0.5})
+    rows = (area, mode, lost)
+    told = result(d, UnderLoad(rows, ("none", "e1"), ("e1, 240 kPa: no",)))
+    assert list(told["gap"]["by_load"].items()) == [
+        ("1000", pytest.approx(2.0)), ("3000", pytest.approx(3.0)),
+    ]  # fmt: skip
+    under = told["under_load"]
+    assert under["effect"] == "e1" and under["failed"] == ["e1, 240 kPa: no"]
+    assert under["calibrated_rms_percent"] == pytest.approx(100 * np.hypot(0.03, 0.02) / 2**0.5)
+    assert under["effect_rms_percent"] == pytest.approx(1 / 2**0.5)
+    assert [row["calibrated_percent"] for row in under["rows"]] == pytest.approx([3.0, 2.0, 50.0])
+    assert [row["effect_percent"] for row in under["rows"]] == [-1.0, 0.0, None]
+    assert [row["mode"] for row in under["rows"]] == [None, str(member), None]
+    for row, own in zip(under["rows"], rows, strict=True):
+        names = ("quantity", "pressure_kPa", "load_N", "measured", "sigma")
+        assert [row[name] for name in names] == [
+            own.quantity, own.pressure_kPa, own.load_N, own.value, own.sigma,
+        ]  # fmt: skip
+    alone = result(d, UnderLoad(rows[2:], ("none",), ()))["under_load"]
+    assert alone["effect"] is None and alone["effect_rms_percent"] is None
+    assert alone["rows"][0]["effect_percent"] is None
+    assert alone["calibrated_rms_percent"] == pytest.approx(50.0)
+    plain = result(d)
+    assert plain["under_load"] is None and plain["gap"]["by_load"] == {}
 
 
 def test_the_result_is_plain_data_with_the_promised_keys() -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tyrecal.diagnose.measurements import read_measurements
+from tyrecal.diagnose.measurements import Reading, read_measurements
 from tyrecal.diagnose.observations import observe
 from tyrecal.errors import InputError
 from tyrecal.modes.mode import Label
@@ -152,8 +152,6 @@ def test_repeats_tell_the_scatter_and_what_a_run_shares(chance: Chance) -> None:
 
     False failures: 2e-7.
     """
-    from tyrecal.diagnose.measurements import Reading
-
     random = chance.random
     labels = [Label(c, m) for c in range(1, 7) for m in (0, 1)]
     own, shared = [], []
@@ -213,3 +211,23 @@ def test_a_toggled_run_is_no_repeat(tmp_path: Path) -> None:
         assert found.y[3:] == pytest.approx(np.log([40, 79.5]))
         assert found.scatter[3:] == pytest.approx([0.3 / 40, 0.2 / 79.5])
         assert [row.run for row in found.rows] == [0, 0, 0, 1, 1]
+
+
+def test_the_scatter_of_repeats_by_the_analysis_of_variance() -> None:
+    """Two ways without interaction (values, runs), 4 values in 3 runs: mean squares over their
+    degrees of freedom; each value's own variance counts 2 of 6 parts beside the pooled one."""
+    table = np.random.default_rng(4).normal(0, 0.003, (4, 3)) + np.array([0.01, 0.0, -0.02])
+    runs = [
+        [Reading("frequency_Hz", Label(c + 1, 0), "", 240.0, 0.0, 50 * np.exp(y), 1.0, 2)
+         for c, y in enumerate(column)]
+        for column in table.T
+    ]  # fmt: skip
+    found = observe(runs[0], runs[1:])
+    rest = [[y - table[i].mean() - table[:, k].mean() + table.mean() for k, y in enumerate(row)]
+            for i, row in enumerate(table)]  # fmt: skip
+    squares = np.sum(np.square(rest), axis=1)
+    pooled = squares.sum() / ((4 - 1) * (3 - 1))
+    between_runs = 4 * np.sum((table.mean(0) - table.mean()) ** 2) / (3 - 1)
+    assert found.y == pytest.approx(np.log(50) + table.mean(1))
+    assert found.common**2 == pytest.approx((between_runs - pooled) / 4 / 3)
+    assert found.scatter**2 == pytest.approx((4 * pooled + squares) / (4 + 2) / 3)

@@ -33,6 +33,7 @@ from tyrecal.diagnose.response import Answer, Point, Span
 from tyrecal.diagnose.separability import separate
 from tyrecal.diagnose.verdict import decide
 from tyrecal.diagnose.where import section_map
+from tyrecal.modes.mode import Label
 
 from ..chance import generator
 from ..conftest import CASES
@@ -474,3 +475,85 @@ def test_cosines_and_distances_by_their_formula() -> None:
             off = grid[:, None] * toy.g[b] - at[a] * toy.g[a]
             wanted = np.einsum("qn,nm,qm->q", off, P, off).min() if i != j else 0.0
             assert found.distances[i, j] == pytest.approx(wanted)
+
+
+def test_the_gains_of_further_rows_by_their_formula() -> None:
+    """Two more modes at the scatter of the others, or the mass to half a per cent, with form,
+    constants and what an effect does there."""
+    toy = Toy(effects=2, size=0.003, bend=0.0, pressures=(240.0,))
+    toy.tilt = {id: 0 * tilt for id, tilt in toy.tilt.items()}
+    p = problem(toy)
+    p = replace(p, observations=replace(p.observations, scatter=np.linspace(1e-3, 3e-3, 9)))
+    sizes, likely = {id: {id: 0.5} for id in ("e0", "e1")}, {"e0": 0.4, "e1": 0.3, "none": 0.2}
+    random = generator("rows")
+    eta, J, c = random.normal(size=50), random.normal(size=(50, 3)), random.normal(size=(50, 2))
+    moved = {"e0": random.normal(0, 0.002, 50), "e1": random.normal(0, 0.002, 50)}
+    rows: list = []
+
+    def answer(point: Point) -> Answer:
+        n = slice(0, len(rows))
+        shift = sum((e * moved[id][n] for id, e in point.effects.items()), np.zeros(len(rows)))
+        own = 0.003 * c[n] if point.constants else None
+        return Answer(eta[n] + shift, J[n], np.zeros(len(rows)), own)
+
+    def further(wanted: list) -> Any:
+        rows.extend(wanted)
+        return SimpleNamespace(answers=lambda points: [answer(point) for point in points])
+
+    found = {c.what: c for c in rank(p, np.zeros(3), likely, sizes, (), further)}
+    assert len(found) == 7  # repeats, two toggles, 160 and 320 kPa, harmonics, the mass
+    assert found.keys() > {"measure the same modes at 160 kPa", "measure the same modes at 320 kPa"}
+
+    def apart(at: list[int], form: float) -> float:
+        whole = np.vstack([toy.J, J[at]])
+        constants = np.vstack([toy.constants, 0.003 * c[at]])
+        noise = [*np.linspace(1e-3, 3e-3, 9), *(2e-3 if rows[i][0] else 0.005 for i in at)]
+        sizes = np.array([0.001] * 9 + [form] * len(at))
+        same = np.eye(len(whole))
+        for k, i in enumerate(at):
+            if rows[i][0] in LABELS:
+                same[9 + k, LABELS.index(rows[i][0])] = same[LABELS.index(rows[i][0]), 9 + k] = 0.9
+        S = np.diag(np.square(noise)) + same * np.outer(sizes, sizes) + constants @ constants.T
+        S = S + 1e-12 * np.eye(len(S)) + whole @ np.diag(toy.spread**2) @ whole.T
+        g = {id: 0.5 * np.append(toy.g[id], moved[id][at]) for id in moved}
+        g["none"] = np.zeros(len(whole))
+        off = lambda a, b: (g[a] - g[b]) @ np.linalg.inv(S) @ (g[a] - g[b])
+        pairs = (("e0", "e1"), ("e0", "none"), ("e1", "none"))
+        return float(sum(2 * likely[a] * likely[b] * off(a, b) for a, b in pairs))
+
+    now = apart([], 0.001)
+    for what, hours, at, form in (
+        ("weigh the tyre", 0.25, [rows.index((None, 0.0))], 0.0),
+        ("measure [5,0] and [5,1], too", 1.0,
+         [rows.index((Label(5, m), 240.0)) for m in (0, 1)], 0.001),
+        ("measure the same modes at 320 kPa", 1.0,
+         [rows.index((label, 320.0)) for label in sorted(LABELS, key=str)], 0.001),
+    ):  # fmt: skip
+        gain = (apart(at, form) - now) / hours
+        assert found[what].gain == pytest.approx(gain, rel=1e-6), what
+
+
+def test_what_is_not_asked_twice_or_has_no_answer_is_not_offered() -> None:
+    """Pressures nearer than 60 kPa to one measured; the mass where it is known; nothing where the
+    model fails; six explanations at most."""
+    toy = Toy(effects=8, pressures=(220.0, 260.0))
+    p = problem(toy)
+    sizes = {id: {id: 0.5} for id in toy.spans}
+    likely = {id: 0.1 + 0.001 * i for i, id in enumerate(sizes)}
+    asked: list = []
+
+    def further(wanted: list) -> Any:
+        asked.append(wanted)
+        return SimpleNamespace(answers=lambda points: [ValueError("no") for _ in points])
+
+    words = [c.what for c in rank(p, np.zeros(3), likely, sizes, (), further)]
+    assert sorted(what for what in words if "again" in what) == [
+        f"measure again without e{i}" for i in range(2, 8)
+    ]
+    assert len(words) == 7  # and repeats
+    (rows,) = asked
+    assert {pressure for _, pressure in rows} == {160.0, 320.0, 220.0, 260.0, 0.0}
+    o = p.observations
+    weighed = replace(p, observations=replace(o, rows=(*o.rows[:-1], Row("mass_kg", None, 0.0))))
+    rank(weighed, np.zeros(3), likely, sizes, (), further)
+    assert (None, 0.0) not in asked[1]

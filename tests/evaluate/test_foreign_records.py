@@ -160,12 +160,12 @@ def of_modes() -> Content:
 
 
 def of_footprints() -> Content:
-    """Of a load: a patch of one point, on two rings through three nodes, with one mode."""
+    """Of a load: a patch of a point at each of three nodes, on two rings, with one mode."""
     patch = {
         "load_N": 4e3, "road_N": 4e3, "rim_N": np.zeros(3), "deflection_m": 0.02,
-        "stiffness_N_per_m": 2e5, "ring": np.array([1]), "node": np.array([2]),
-        "along_m": np.zeros(1), "across_m": np.zeros(1), "pressure_Pa": np.ones(1),
-        "area_m2": np.ones(1), "traction_Pa": np.zeros((1, 2)), "displacement": np.zeros((2, 3, 3)),
+        "stiffness_N_per_m": 2e5, "ring": np.array([0, 1, 1]), "node": np.arange(3),
+        "along_m": np.zeros(3), "across_m": np.zeros(3), "pressure_Pa": np.ones(3),
+        "area_m2": np.ones(3), "traction_Pa": np.zeros((3, 2)), "displacement": np.zeros((2, 3, 3)),
         "contact_area_m2": 0.02, "mode_frequency_Hz": np.array([70.0]),
         "mode_node": np.array([0, 2]), "mode_shape": np.zeros((1, 2, 2, 3)),
     }  # fmt: skip
@@ -196,11 +196,11 @@ PRESSED: list[Content] = [
 ]  # fmt: skip
 PATCH: list[Content] = [
     {"load_N": 0.0}, {"road_N": np.nan}, {"rim_N": np.zeros(2)}, {"deflection_m": "deep"},
-    {"stiffness_N_per_m": np.inf}, {"ring": np.array([2])}, {"ring": np.array([-1])},
-    {"ring": np.array([1.0])}, {"node": np.array([3])}, {"ring": np.array([0, 1])},
+    {"stiffness_N_per_m": np.inf}, {"ring": np.array([0, 1, 2])}, {"ring": np.array([-1, 0, 1])},
+    {"ring": np.array([0.0, 1.0, 1.0])}, {"node": np.array([0, 1, 3])}, {"ring": np.array([0, 1])},
     *({name: np.zeros(2)} for name in ("along_m", "across_m", "pressure_Pa", "area_m2")),
     {"node": np.array([0, 1])}, {"traction_Pa": np.zeros((2, 2))}, {"surplus": 1.0},
-    {"traction_Pa": np.zeros((1, 3))}, {"displacement": np.zeros((3, 3, 3))},
+    {"traction_Pa": np.zeros((3, 3))}, {"displacement": np.zeros((3, 3, 3))},
     {"displacement": np.zeros((2, 2, 3))}, {"displacement": np.zeros((2, 3, 2))},
     {"contact_area_m2": 0.0}, {"mode_frequency_Hz": None}, {"mode_node": None},
     {"mode_shape": None}, {"mode_frequency_Hz": np.ones(2)}, {"mode_node": np.arange(3)},

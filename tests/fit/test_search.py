@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 from types import SimpleNamespace
 from typing import Any
@@ -234,6 +235,21 @@ class Paired(Linear):
     """With both [0, 0] modes among the targets."""
 
     targets = (Target(AXIAL, 40.0), Target(TORSIONAL, 40.0))
+
+
+def test_no_crossing_is_looked_for_where_no_design_lies_beyond(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """However mixed the labels are."""
+
+    class OneSided(Paired):
+        def evaluate(self, x: Array) -> Point:
+            return replace(super().evaluate(x), modes=pair(3.0, 0.1))
+
+    monkeypatch.setattr(slsqp, "crossing", lambda *asked: pytest.fail("looked for one"))
+    plain = linear()
+    problem: Any = OneSided(plain.J, plain.J @ [1.0, 2.0, 3.0] - 0.3)
+    assert slsqp._descend(problem, problem.evaluate(np.zeros(3)), 1e-3).message == "converged"
 
 
 def test_a_step_that_meets_the_crossing_leaves_it_some_room() -> None:

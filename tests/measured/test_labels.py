@@ -222,3 +222,49 @@ def test_doublets_have_two_members_and_overtones_no_label() -> None:
         (80.0, Label(2, 0), ""), (85.0, None, ""), (120.0, None, ""),
     ]  # fmt: skip
     assert "[2,1] stands at 66.10 Hz already" in settled(given)[-1].judged.why
+
+
+def test_another_number_of_waves_holds_a_thousandth() -> None:
+    """Of radial sensors on the middle line, which see r P0 and half of r P2 (energies 1 and 5):
+    [2,0] beside a wave of c = 3, of which the mean over c = 0 to 6 has a seventh."""
+    sensors = ring(17, directions="r")
+    labeller = Labeller(sensors, 6)
+    S = labeller.covariance[labeller.labels.index(Label(2, 0))]
+    assert np.trace(S) == pytest.approx(17)
+    energy = {}
+    for c in (2, 3):
+        wave = np.cos(c * sensors.points[:, 1])
+        energy[c] = wave @ S @ wave
+    other = 0.001 * (1 + 1 / 4) / 7
+    assert energy[3] / energy[2] == pytest.approx(other / (1 + 0.03 * 5 / 4 + other), rel=1e-6)
+
+
+def test_probabilities_are_those_of_normal_signals_of_any_size() -> None:
+    """p(u | label) by the formula of the module, over its five sizes of noise."""
+    sensors = ring(7, across=(-0.06, 0.06))
+    labeller = Labeller(sensors, 4)
+    u = waves(sensors, 2) + 0.4 * generator("signals").standard_normal(len(sensors.points))
+    k, ln = len(u), []
+    for S in labeller.covariance:
+        each = []
+        for nu in (1e-4, 1e-3, 1e-2, 5e-2, 0.2):
+            whole = S + nu * np.eye(k)
+            square = u @ np.linalg.solve(whole, u)
+            each.append(-np.linalg.slogdet(whole)[1] / 2 - k / 2 * np.log(square))
+        ln.append(np.logaddexp.reduce(each))
+    p = np.exp(np.array(ln) - max(ln))
+    wanted = dict(zip(labeller.labels, p / p.sum(), strict=True))
+    found = labeller.judge(u).probabilities
+    assert found == pytest.approx(wanted, abs=1e-9) and list(found.values())[1] > 1e-6
+    i, j = 3, 8
+    Si, Sj = (labeller.covariance[n] + 0.01 * np.eye(k) for n in (i, j))
+    change = np.linalg.slogdet(Sj)[1] - np.linalg.slogdet(Si)[1]
+    odds = (np.trace(np.linalg.inv(Sj) @ Si) - k + change) / 2
+    assert labeller.odds(i, j) == pytest.approx(odds)
+
+
+@pytest.mark.parametrize("size", [1e-40, 1e40])
+def test_a_shapes_unit_is_never_too_large_or_too_small(size: float) -> None:
+    sensors = ring(9, across=(-0.06, 0.06))
+    labeller, u = Labeller(sensors, 4), waves(sensors, 2)
+    assert labeller.judge(size * u).probabilities == pytest.approx(labeller.judge(u).probabilities)

@@ -323,3 +323,15 @@ def test_the_next_free_overtone_of_its_parity_is_taken():
     assert labels(many) == [TORSIONAL, Label(0, 2), Label(0, 4)]
     many = [mode(50.0 + i, 2, [ORDERS[m]]) for i, m in enumerate((0, 0, 0, 1, 1))]
     assert labels(many) == [Label(2, 0), Label(2, 2), Label(2, 4), Label(2, 1), Label(2, 3)]
+
+
+@pytest.mark.parametrize("motion, m", [({"r": [1.0]}, 0), ({"r": [0, 1.0]}, 1)])
+def test_two_rings_carry_a_plane_and_no_higher_degree(motion, m):
+    """What is constant over the width, or linear, is nothing else, though a parabola or a cubic
+    through two places might be as well."""
+    theta, z = np.tile(ANGLES, 2), np.repeat([-0.06, 0.06], len(ANGLES))
+    u = legval(z / 0.06, motion["r"]) * np.cos(2 * theta)
+    ring = RingShape(
+        np.column_stack([np.full(len(z), 0.39), theta, z]), np.column_stack([u, 0 * u, 0 * u])
+    )
+    assert belt_motion(ring).shares[m] == pytest.approx(1, abs=1e-6)
