@@ -26,7 +26,7 @@ from tyrecal.diagnose.response import Answer, Point
 from tyrecal.diagnose.result import result
 from tyrecal.diagnose.separability import separate
 from tyrecal.diagnose.study import _check_units, parse_change, spans_of, study
-from tyrecal.diagnose.tyre_model import TyreModel
+from tyrecal.diagnose.tyre_model import TyreModel, _key
 from tyrecal.diagnose.uncertainties import DENSITY, PRESSURE_kPa, sources, values_of
 from tyrecal.diagnose.verdict import decide
 from tyrecal.errors import InputError
@@ -360,6 +360,24 @@ def test_an_effect_without_slopes_takes_the_plain_tyres() -> None:
     assert found[0].jacobian == pytest.approx(plain.jacobian, abs=1e-12)
     assert (found[0].eta > plain.eta).all() and found[0].split[-1] > 0
     assert isinstance(found[1], Answer) and abs(found[1].jacobian - plain.jacobian).max() > 1e-3
+
+
+def test_sources_that_are_effects_step_once_and_fail_alone() -> None:
+    """What the step moves is added to the slope; where it has no solution the point has none."""
+    n = len(ROWS)
+    answer = Answer(np.zeros(n), np.zeros((n, 3)), np.zeros(n), np.full((n, 2), 0.5))
+    moved = replace(answer, eta=np.arange(float(n)), constants=None)
+    point, stepped = Point(X, constants=True), Point(X, {"rim_width": 1e-3})
+    steps = [(1, "rim_width", 1e-3)]
+    known: dict[Any, Any] = {_key(point): answer, _key(stepped): moved}
+    found = MODEL._completed(point, known, steps)
+    assert isinstance(found, Answer) and found.constants is not None
+    assert found.constants[:, 0] == pytest.approx(np.full(n, 0.5))
+    assert found.constants[:, 1] == pytest.approx(0.5 + np.arange(n))
+    assert answer.constants is not None and (answer.constants == 0.5).all()  # its own stays
+    failure = DeckRefused("no such rim")
+    assert MODEL._completed(point, {**known, _key(stepped): failure}, steps) is failure
+    assert MODEL._completed(Point(X), {_key(Point(X)): moved}, steps) is moved
 
 
 def test_a_refusal_with_one_effect_is_that_points_answer() -> None:

@@ -335,3 +335,14 @@ def test_two_rings_carry_a_plane_and_no_higher_degree(motion, m):
         np.column_stack([np.full(len(z), 0.39), theta, z]), np.column_stack([u, 0 * u, 0 * u])
     )
     assert belt_motion(ring).shares[m] == pytest.approx(1, abs=1e-6)
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_either_sidewall_tells_how_many_waves_there_are(side):
+    """The belt hardly moves, with two waves; one sidewall does, with three."""
+    rows = [(0.39, 0.0, 0.1, 2), (0.39, 0.03, 0.1, 2), (0.32, 0.1 * side, 1.0, 3),
+            (0.32, -0.1 * side, 0.0, 3)]  # fmt: skip
+    points = [(R, angle, z) for R, z, _, _ in rows for angle in ANGLES]
+    u = np.concatenate([size * np.cos(c * ANGLES) for _, _, size, c in rows])
+    ring = RingShape(np.array(points), np.column_stack([u, 0 * u, 0 * u]))
+    assert belt_motion(ring).c == 3
