@@ -17,7 +17,12 @@ from tyrecal_solvers.bundled.eigen import NotConverged
 from tyrecal_solvers.bundled.fold import HALF_TURN
 from tyrecal_solvers.bundled.harmonics import HarmonicModes, Unstable, Vibration
 from tyrecal_solvers.bundled.keywords import DeckError
-from tyrecal_solvers.bundled.loaded_modes import Inertia, LoadedModes, loaded_modes
+from tyrecal_solvers.bundled.loaded_modes import (
+    Inertia,
+    LoadedModes,
+    loaded_modes,
+    standing_waves,
+)
 from tyrecal_solvers.bundled.mechanics import mass
 from tyrecal_solvers.bundled.pressing import Pressed
 from tyrecal_solvers.bundled.revolved import Revolved
@@ -112,6 +117,24 @@ def test_without_a_road_the_modes_are_the_harmonic_ones(tyre: Round) -> None:
     for each in errors.values():
         assert 0 < each[1] < 0.01
         assert support.order(each)[0] > 3.5
+
+
+def test_standing_waves_of_the_unloaded_tyre_are_nearly_its_modes(tyre: Round) -> None:
+    """Each has the frequency of its harmonic, as exactly as the elements hold it, and keeps or
+    reverses the half turn; of every mode there is one, of a doublet one of either parity."""
+    around = half_circle(np.full(24, np.pi / 24))
+    work, weigh = tyre.tyre(around), Inertia(tyre.model, around)
+    work.residual(tyre.everywhere(around))
+    for n in range(4):
+        (value,) = (unloaded := harmonic(tyre, n, 1)).eigenvalues
+        found = {p: standing_waves([unloaded], tyre.fold(around, p), around) for p in (1, -1)}
+        assert [bool(waves) for waves in found.values()].count(True) == (2 if n else 1)
+        for parity, waves in found.items():
+            fold = tyre.fold(around, parity)
+            for V in waves:
+                quotient = (V * work.product(V)).sum() / (V * weigh(V)).sum()
+                assert quotient == pytest.approx(value, rel=2e-3)
+                np.testing.assert_allclose(fold.spread(fold.parts(V)), V, atol=1e-9 * abs(V).max())
 
 
 def test_they_solve_the_whole_problem(tyre: Round, pressed: State, found: LoadedModes) -> None:
