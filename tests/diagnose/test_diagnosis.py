@@ -19,7 +19,7 @@ from tyrecal.diagnose.problem import Assumed, Change
 from tyrecal.diagnose.regions import Region
 from tyrecal.diagnose.response import Answer, Point, Span
 from tyrecal.diagnose.result import result
-from tyrecal.diagnose.shrinkage import PLACEBOS, _placebo, held_out, shrink
+from tyrecal.diagnose.shrinkage import _placebo, held_out, shrink
 from tyrecal.diagnose.study import Study
 from tyrecal.diagnose.under_load import LoadedRow, UnderLoad
 from tyrecal.modes.loaded import Member
@@ -330,7 +330,7 @@ def test_the_placebo_is_what_tyres_without_an_effect_would_show() -> None:
     p = problem(toy, assumed=Assumed(form=0.001, law=0.04))
     hold, _ = held_out(p.observations.rows)
     noise = np.random.default_rng(7).multivariate_normal(
-        np.zeros(len(hold)), p.sigma, PLACEBOS, method="cholesky"
+        np.zeros(len(hold)), p.sigma, 200, method="cholesky"
     )
     kept, out = p.only(~hold), p.only(hold)
     shares = []

@@ -21,7 +21,7 @@ from tyrecal.diagnose.evidence import (
     refit,
     weigh,
 )
-from tyrecal.diagnose.expansion import Expansion, Nodes, _nodes, expand, node_values
+from tyrecal.diagnose.expansion import Expansion, Nodes, _bent, _nodes, expand, node_values
 from tyrecal.diagnose.gap import Group, _chi2, _corrected, find_gap
 from tyrecal.diagnose.next_measurement import rank
 from tyrecal.diagnose.observations import Observations, Row
@@ -323,6 +323,19 @@ def test_more_nodes_where_a_cubic_is_not_enough() -> None:
         nodes = expand(toy, np.zeros(3)).nodes["e0"].values
         wanted = [0, 0.08, 0.25, 0.5, 0.75, 1] if more else [0, 0.25, 0.75, 1]
         assert nodes.tolist() == pytest.approx(wanted)
+
+
+def test_where_a_far_node_has_no_solution_the_rest_may_bend_too() -> None:
+    """Three nodes do, two cannot tell: asked more towards the farthest that has an answer."""
+    n, none = 2, np.zeros((2, 1))
+    answer = lambda e: Answer(np.full(n, e * e), none, np.zeros(n))
+    plain = Expansion(np.zeros(1), np.zeros(n), none, np.zeros((n, 1, 1)), np.zeros(n), none, {})
+    failed, span = ValueError("no such tyre"), Span(0.0, 1.0)
+    found = {0.25: answer(0.25), 0.75: answer(0.75), 1.0: failed}
+    assert _bent(plain, span, found) == [0.75]
+    assert _bent(plain, span, {**found, 0.75: failed}) == []
+    back = {-e: each for e, each in found.items()}
+    assert _bent(plain, Span(-1.0, 0.0), back) == [-0.75]
 
 
 def test_curvature_is_that_of_two_slopes() -> None:

@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tyrecal.case import load_case, with_values
+from tyrecal.case import load_case, start_values, with_values
+from tyrecal.case.calibration import Uncertainty
 from tyrecal.case.section import Gauge
 from tyrecal.diagnose.add import NotAdded, add
 from tyrecal.diagnose.diagnosis import diagnose
@@ -322,6 +323,56 @@ def test_what_is_assumed_of_constants_is_what_the_guide_says() -> None:
             assert source.words.endswith(" 1 degrees" if kind == "angle" else "pressure 1 kPa")
 
 
+def test_a_stated_source_moves_its_numbers_as_it_says() -> None:
+    """By per cent of each or by so much, up or down together; not what a variable sets."""
+    angles = [f"rebar_layers.belt_{k}.angle_deg" for k in (1, 2)]
+    density, layers = "materials.rubber.density_kg_per_m3", CASE.case.rebar_layers
+    stated = {
+        "both_angles": Uncertainty(sets=angles, percent=2.0, signs=[1, -1]),
+        "air": Uncertainty(sets=["pressure_kPa"], absolute=3.0, signs=[-1]),
+        "stuff": Uncertainty(sets=[density, "materials.rubber.C10_Pa"], percent=1.0),
+        "fitted": Uncertainty(sets=["materials.rubber.C10_Pa"], percent=1.0),
+        "rim": Uncertainty(sets=["effects.rim_width"], percent=5.0),
+    }
+    case = replace(CASE, case=CASE.case.model_copy(update={"uncertainties": stated}))
+    found, assumed = sources(case)
+    told = {source.name: (source.words, source.steps) for source in found}
+    assert not assumed and list(told) == ["both_angles", "air", "stuff", "rim"]
+    assert told["both_angles"] == ("both angles 2 %", pytest.approx({
+        angles[0]: 0.02 * layers["belt_1"].angle_deg,
+        angles[1]: -0.02 * layers["belt_2"].angle_deg,
+    }))  # fmt: skip
+    assert told["air"] == ("air 3 kPa", {"pressure_kPa": -3.0})
+    rho = CASE.case.materials["rubber"].density_kg_per_m3
+    assert told["stuff"] == ("stuff 1 %", pytest.approx({density: 0.01 * rho}))
+    assert told["rim"] == ("rim 5 %", {"effects.rim_width": 0.0})  # of what the case has not
+    assert values_of(case, found) == {
+        **{path: layers[path.split(".")[1]].angle_deg for path in angles},
+        "pressure_kPa": CASE.case.pressure_kPa, density: rho,
+    }  # fmt: skip
+
+
+def test_coordinates_of_a_linear_and_a_logarithmic_variable() -> None:
+    """The share of the way between the bounds, or a logarithm; both uniform within the bounds
+    before anything is measured; numbers come back, beyond the bounds too."""
+    variables = CASE.case.variables
+    C10 = variables["C10"].model_copy(update={"scale": "linear", "lower": 3e5, "upper": 1.1e6})
+    case = CASE.case.model_copy(update={"variables": {**variables, "C10": C10}})
+    own = TyreModel(replace(CASE, case=case), Door(CASE), ROWS, [], {})
+    start, belt = start_values(CASE), variables["A_belt"]
+    assert list(own.variables) == ["A_belt", "A_carcass", "C10"]
+    assert own.values(own.start) == pytest.approx(start)
+    assert own.start[[0, 2]] == pytest.approx([np.log(start["A_belt"]), (start["C10"] - 3e5) / 8e5])
+    there = own.values(own.start + np.array([0.1, 0.0, 0.5]))
+    assert there["A_belt"] == pytest.approx(np.exp(0.1) * start["A_belt"])
+    assert there["C10"] == pytest.approx(start["C10"] + 4e5) and there["C10"] > 1.1e6
+    assert own.spread[0] == pytest.approx(np.log(belt.upper / belt.lower) / 12**0.5)
+    assert own.spread[2] == pytest.approx(1 / 12**0.5)
+    assert own._slope("C10", there) == 8e5 and own._slope("A_belt", there) == there["A_belt"]
+    rise = own._rise(own.start, own.start + 0.1)
+    assert rise == pytest.approx([np.expm1(0.1), np.expm1(0.1), 0.1])
+
+
 def test_what_is_not_even_near_the_model_is_refused() -> None:
     """A frequency by a factor of 2, the mass by 1.5, either way; frequencies are told first."""
     rows = [(Label(2, 0), 240.0), (None, 0.0)]
@@ -358,6 +409,7 @@ def test_an_effect_without_slopes_takes_the_plain_tyres() -> None:
     (plain,) = own.answers([Point(X)])
     assert isinstance(plain, Answer) and isinstance(found[0], Answer)
     assert found[0].jacobian == pytest.approx(plain.jacobian, abs=1e-12)
+    assert plain.constants is None  # they were not asked for
     assert (found[0].eta > plain.eta).all() and found[0].split[-1] > 0
     assert isinstance(found[1], Answer) and abs(found[1].jacobian - plain.jacobian).max() > 1e-3
 

@@ -261,6 +261,12 @@ def test_a_start_whose_process_dies_ends_the_fit(monkeypatch: pytest.MonkeyPatch
     assert failure.value.cause == "crashed"
 
 
+def test_one_start_is_nothing_to_count() -> None:
+    told: list[tuple[int, int]] = []
+    fit = calibrate(CASE, door(), finished=lambda *done: told.append(done))  # type: ignore[arg-type]
+    assert told == [] and len(fit.result["starts"]) == 1 and fit.result["replaced_starts"] == 0
+
+
 def test_starts_are_drawn_replaced_and_reproducible() -> None:
     fails = lambda values: values["C10"] > 4e6 or values["C10"] < 1.2e5
     first, second = (
