@@ -35,6 +35,7 @@ from tyrecal.evaluate.door import Door
 from tyrecal.evaluate.failure import DeckRefused
 from tyrecal.modes.mode import Label
 
+from ..case.test_guard import SLIPS
 from ..chance import Chance, generator
 from ..conftest import CASES
 from ..effects.support import coarse
@@ -270,6 +271,16 @@ def test_an_effect_is_added_with_the_files_comments_kept(case_folder: Path) -> N
         add(old, "bead_filler", 1.5)
     with pytest.raises(ValueError, match="no 'nothing'"):
         add(old, "nothing", 1.5)
+
+
+def test_an_effect_is_added_to_a_case_whose_numbers_are_unusual(case_folder: Path) -> None:
+    """Its user was told of them already."""
+    path = case_folder / "p235_75r17.yaml"
+    old, new, *_ = next(iter(SLIPS.values()))
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new, 1))
+    assert load_case(add(path, "bead_filler", 1.5), allow_unusual=True).case.effects
 
 
 def test_sources_of_error_are_those_of_the_case_or_assumed_and_never_calibrated() -> None:

@@ -156,6 +156,19 @@ def test_a_mode_that_left_is_not_named() -> None:
     assert found.spanned[0] == pytest.approx(1) and found.spanned[1] < 0.1
 
 
+def test_what_is_not_known_lies_above() -> None:
+    """A spring mixes a new mode in from above: the lower two keep their names, whose shapes have
+    come nearer to each other's, as they do where it was known from the beginning."""
+    basis = waves(3)[:3]
+    K = np.diag(np.array([40.0, 60.0, 80.0]) ** 2)
+    held = np.array([1.0, 1.0, 1.5])
+    before, after = solved(K, basis), solved(K + 3e3 * np.outer(held, held), basis)
+    lower = State(before.frequencies[:2], before.shapes[:2], before.symmetric[:2])
+    whole, part = follow(before, after, WIDE), follow(lower, after, WIDE)
+    np.testing.assert_array_equal(whole.position, np.arange(3))
+    np.testing.assert_array_equal(part.position, np.arange(2))
+
+
 def test_the_nearest_orthonormal_columns_do_not_depend_on_sizes() -> None:
     """They are orthonormal, and as near to the directions as an independent formula has them:
     v (v^T v)^-1/2 of columns of length 1."""
