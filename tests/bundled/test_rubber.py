@@ -8,7 +8,10 @@ import numpy as np
 import pytest
 from scipy.linalg import qr
 from tyrecal_solvers.bundled import rubber
+from tyrecal_solvers.bundled.inflation import _stiffened
 from tyrecal_solvers.bundled.rubber import MooneyRivlin
+
+from . import support
 
 Array = np.ndarray
 H = 1e-30
@@ -122,3 +125,15 @@ def test_vibration_shear_and_bulk_modulus_are_separate(law: MooneyRivlin) -> Non
     scaled = MooneyRivlin(1.4 * law.C10, 1.4 * law.C01, 1.1 * law.inverse_D1)
     close(rubber.tangent(one, vibrating), rubber.tangent(one, scaled))
     assert np.array_equal(rubber.stress(one, vibrating), rubber.stress(one, law))
+
+
+def test_stiffer_rubber_has_all_its_moduli_so_many_times() -> None:
+    """On another path to the same equilibrium."""
+    plain = support.model_of(support.tyre((3, 2, 2, 1)).deck)
+    stiff = _stiffened(plain, 3.0)
+    for before, after in zip(plain.rubbers, stiff.rubbers, strict=True):
+        for name in ("C10", "C01", "inverse_D1"):
+            was, now = (getattr(each.material, name) for each in (before, after))
+            np.testing.assert_allclose(now, 3 * was)
+        assert np.real(before.material.C10).any() and np.real(before.material.inverse_D1).any()
+    assert stiff.cords is plain.cords

@@ -409,6 +409,30 @@ def test_what_is_not_even_near_the_model_is_refused() -> None:
             check(1.9, bad)
 
 
+def test_a_model_without_an_answer_says_why_before_anything_is_judged() -> None:
+    """Of the plain tyre its own failure; of a switched one what was switched."""
+    rows = [(Label(2, 0), 240.0)]
+    answer = Answer(np.log([80.0]), np.zeros((1, 1)), np.zeros(1))
+    failure, asked_for = DeckRefused("no such tyre"), []
+    none = np.full(1, np.nan)
+    seen = Observations((Row("frequency_Hz", *rows[0]),), answer.eta, none, 0.0, none, none)
+
+    def check(answers: list, *changes: Change) -> None:
+        told = lambda points: asked_for.append([dict(p.effects) for p in points]) or answers
+        model: Any = SimpleNamespace(rows=rows, start=np.zeros(1), answers=told)
+        _check_units(model, seen, [Path("a.csv")], changes)
+
+    with pytest.raises(DeckRefused, match="no such tyre"):
+        check([failure])
+    switched = Change("point_mass", 0.05, base=0.02)
+    with pytest.raises(InputError, match=r"'point_mass=0.05' cannot be evaluated: no such tyre"):
+        check([answer, failure], switched)
+    check([answer, answer], switched)
+    # what is as in the case, or a factor, is no other tyre
+    check([answer], replace(switched, value=0.02), replace(switched, times=True))
+    assert asked_for == [[{}], *[[{}, {"point_mass": pytest.approx(0.03)}]] * 2, [{}]]
+
+
 def test_an_effect_without_slopes_takes_the_plain_tyres() -> None:
     """The solver gives none with a splice: all is asked once, together, and nothing in vain."""
     door = Door(CASE)

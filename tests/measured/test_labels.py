@@ -3,13 +3,15 @@ sensors do not determine them."""
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tyrecal.measured.labels import Labeller
-from tyrecal.measured.modal import Told, settled
+from tyrecal.measured.labels import Judged, Labeller
+from tyrecal.measured.modal import Told, _told, settled
 from tyrecal.measured.sensors import MeasuredMode, Sensors, real_part
 from tyrecal.modes.mode import Label
 
@@ -271,3 +273,45 @@ def test_a_shapes_unit_is_never_too_large_or_too_small(size: float) -> None:
     sensors = ring(9, across=(-0.06, 0.06))
     labeller, u = Labeller(sensors, 4), waves(sensors, 2)
     assert labeller.judge(size * u).probabilities == pytest.approx(labeller.judge(u).probabilities)
+
+
+def belt_and_walls() -> Sensors:
+    """Nine radial sensors on the tread, nine on either sidewall."""
+    rows = [(R, 2 * np.pi * a / 9, z) for R, z in ((0.39, 0.0), (0.3, 0.1), (0.3, -0.1))
+            for a in range(9)]  # fmt: skip
+    return Sensors(np.array(rows), np.tile([1.0, 0.0, 0.0], (27, 1)))
+
+
+def told_of(amplitude: np.ndarray) -> Told:
+    """What is told of a shape that the labels are sure of."""
+    sensors = belt_and_walls()
+    sure = SimpleNamespace(sensors=sensors, judge=lambda shape: Judged(Label(2, 0), {}, ""))
+    return _told(MeasuredMode(66.0, amplitude), sure, "a.uff")  # type: ignore[arg-type]
+
+
+def test_a_shape_is_told_with_its_largest_value_1() -> None:
+    wave = np.tile(np.cos(2 * np.pi * np.arange(9) * 2 / 9), 3)
+    for size in (1e-5, 1.0, 3e4j):
+        shape = told_of(size * wave + 0j).shape
+        assert abs(shape).max() == pytest.approx(1) and abs(shape[0]) == pytest.approx(1)
+        assert abs(shape) == pytest.approx(abs(wave))
+    assert not told_of(np.zeros(27, complex)).shape.any()
+
+
+@pytest.mark.parametrize(("part", "label"), [(0.11, True), (0.09, False)])
+def test_a_mode_of_the_sidewalls_has_no_label(part: float, label: bool) -> None:
+    """The mean square of the belt's motion is below a tenth of all sensors'."""
+    wall = np.sqrt((3 / part - 1) / 2)
+    told = told_of(np.repeat([1.0, wall, wall], 9) + 0j)
+    assert (told.judged.label is not None) == label
+    assert label or "the belt hardly moves" in told.judged.why
+
+
+@pytest.mark.parametrize(("collinear", "label"), [(0.51, True), (0.49, False)])
+def test_a_complex_shape_has_no_label(collinear: float, label: bool) -> None:
+    size = np.sqrt((1 - collinear) / (1 + collinear))
+    turn = 2 * np.pi * np.arange(9) * 2 / 9
+    told = told_of(np.tile(np.cos(turn) + 1j * size * np.sin(turn), 3))
+    assert told.collinearity == pytest.approx(collinear)
+    assert (told.judged.label is not None) == label
+    assert label or "collinearity 0.49" in told.judged.why
