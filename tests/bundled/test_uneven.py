@@ -173,6 +173,10 @@ def test_no_share_is_the_plain_tyre(vibration: Vibration, inflated: Inflated) ->
         WAVES, COUNT, beyond=1,
     )  # fmt: skip
     np.testing.assert_allclose(frequencies(got), plain(vibration), rtol=1e-8)
+    mass = lambda u: float((u.conj() * (vibration.mass @ u)).real.sum())
+    for n, modes in zip(WAVES, got, strict=True):
+        own = [mass(u) for u in vibration.modes(n, COUNT).shapes]
+        assert [mass(u) for u in modes.shapes] == pytest.approx(own[:1] * len(modes.shapes))
 
 
 class Bricks:
