@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.linalg import qr
-from tyrecal_solvers.bundled import rubber
+from tyrecal_solvers.bundled import inflation, rubber
 from tyrecal_solvers.bundled.inflation import _stiffened
 from tyrecal_solvers.bundled.rubber import MooneyRivlin
 
@@ -137,3 +137,18 @@ def test_stiffer_rubber_has_all_its_moduli_so_many_times() -> None:
             np.testing.assert_allclose(now, 3 * was)
         assert np.real(before.material.C10).any() and np.real(before.material.inverse_D1).any()
     assert stiff.cords is plain.cords
+
+
+def test_between_the_paths_to_an_equilibrium_time_is_looked_at(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """After the whole load at once, and before every step of the load."""
+    tried: list[str] = []
+    monkeypatch.setattr(inflation, "_newton", lambda *given: tried.append("try") or (None, 1, "no"))
+    m = support.model_of(support.tyre((3, 2, 2, 1)).deck)
+    number, loads = support.numbering(m), support.cavity(m, 1e5)
+    look = lambda: tried.append("look")
+    with pytest.raises(inflation.InflationFailed, match="no"):
+        inflation.equilibrium(m, number, loads, np.zeros((len(m.mesh.X), 3)), look)
+    assert tried[:6] == ["try", "look", "try", "look", "try", "look"]
+    assert tried.count("look") == tried.count("try") - 1

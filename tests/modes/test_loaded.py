@@ -48,6 +48,15 @@ def test_areas_are_the_bands() -> None:
     np.testing.assert_allclose(WHERE.areas[0], WHERE.areas[0][::-1])
 
 
+def test_a_ring_has_half_of_the_way_to_either_neighbour() -> None:
+    angles = np.array([0.0, 0.1, 0.4, 1.0, 3.0, 5.0])
+    found = rings(angles, NODES, NODES, POINTS).areas
+    arcs = [(0.1 + 2 * np.pi - 5.0) / 2, 0.2, 0.45, 1.3, 2.0, (2 * np.pi - 3.0) / 2]
+    np.testing.assert_allclose(found[:, 1] / found.sum(0)[1], np.array(arcs) / (2 * np.pi))
+    order = np.array([2, 0, 1])  # whatever the order of the nodes
+    np.testing.assert_allclose(rings(angles, NODES[order], NODES, POINTS).areas, found[:, order])
+
+
 def test_members_of_a_doublet_stand_by_the_patch() -> None:
     """One even, one odd, about angle 0, wherever the doublet was turned to; orthogonal."""
     both = members(OVAL, WHERE)
