@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tyrecal.evaluate.door import Door
+from tyrecal.evaluate.door import Door, Question
 from tyrecal.evaluate.failure import DeckRefused, EvaluationFailed
 from tyrecal.evaluate.store import Store
 
 from ..studies.hertz import Hertz
+from . import stand_in
 from .stand_in import CASE
 
 LOADS = (500.0, 4000.0)
@@ -106,3 +107,15 @@ def test_modes_on_a_road_are_another_capability_than_a_footprint(tmp_path: Path)
     none.needs_road(modes=True)
     with pytest.raises(DeckRefused, match=r"press a tyre on a road.*\(footprint\)"):
         none.needs_road()
+
+
+def test_unless_asked_otherwise_all_is_done_in_this_process(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("tyrecal.evaluate.door.executor", lambda *asked: pytest.fail("elsewhere"))
+    asked = door(tmp_path)
+    assert len(list(asked.press_all([{}, {"C10": 9e5}], LOADS))) == asked.counts.runs == 2
+    assert len(list(asked.press_all([{}], LOADS, jobs=2))) == 1  # one design needs no other
+    questions = [Question({"C10": value}) for value in (1e6, 2e6)]
+    plain = stand_in.door(tmp_path / "plain")
+    assert len(list(plain.evaluate_all(questions))) == len(list(plain.answer_all(questions))) == 2
