@@ -31,6 +31,7 @@ from tyrecal.diagnose.reading import _near
 from tyrecal.diagnose.regions import Region
 from tyrecal.diagnose.response import Answer, Point, Span
 from tyrecal.diagnose.separability import separate
+from tyrecal.diagnose.study import _reaching
 from tyrecal.diagnose.verdict import decide
 from tyrecal.diagnose.where import section_map
 from tyrecal.modes.mode import Label
@@ -570,3 +571,17 @@ def test_what_is_not_asked_twice_or_has_no_answer_is_not_offered() -> None:
     weighed = replace(p, observations=replace(o, rows=(*o.rows[:-1], Row("mass_kg", None, 0.0))))
     rank(weighed, np.zeros(3), likely, sizes, (), further)
     assert (None, 0.0) not in asked[1]
+
+
+def test_a_change_beyond_the_range_is_asked_where_it_was_measured() -> None:
+    """Counted from what the case has; within the range, at 0, or as a factor nothing is added."""
+    span = Span(-0.3, 0.7, base=0.3)  # of an effect from 0 to 1
+    reached = lambda value, times=False: _reaching(span, Change("a", value, times, 0.3)).also
+    assert reached(1.5) == (pytest.approx(1.2),) and reached(-0.2) == (pytest.approx(-0.5),)
+    for value in (1.0, 0.0, 0.3, 0.65):
+        assert reached(value) == ()
+    assert reached(5.0, True) == ()
+    twice = _reaching(_reaching(span, Change("a", 1.5, base=0.3)), Change("a", 1.5, base=0.3))
+    assert len(twice.also) == 1
+    zero = _reaching(Span(0.5, 1.0), Change("a", 0.0))  # 0 is a node anyway
+    assert zero.also == ()

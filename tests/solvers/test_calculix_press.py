@@ -111,7 +111,7 @@ def test_pressures_stand_where_their_nodes_have_moved(tmp_path: Path) -> None:
         "    1C\n    2C\n" + lines((1, [0.3, -0.1, -0.2]), (2, [0.3, 0.0, 0.1])) + " -3\n"
         + " -4  DISP        4    1\n" + lines((1, [0, 0.01, 0.0]), (2, [0, 0, 0.02])) + " -3\n"
         + " -4  CONTACT     6    1\n" + "".join(heads)
-        + lines((1, [-1e-5, -0.1, -0.2, 3e5, 0]), (2, [0.0, 0, 0, 0, 0])) + " -3\n 9999\n"
+        + lines((1, [-1e-5, -0.1, -0.2, 3e5, -1e5]), (2, [0.0, 0, 0, 0, 0])) + " -3\n 9999\n"
     )  # fmt: skip
     (tmp_path / "press.frd").write_text(text)
     (patch,) = read_pressures(tmp_path)
