@@ -13,8 +13,9 @@ import, and tests that start processes, need a mutated copy.
 
 Every mutant is a line of mutants.jsonl; where that has the commit, seed and number already, `run`
 goes on behind; with a larger budget those that survived a smaller one meet more tests, with --slow
-those too that are not quick, as far as `cover` knows them, and their last line counts. What
-survived is judged by hand: the keys `verdict` and `because` of its line.
+those too that are not quick, as far as `cover` knows them, and their last line counts; --areas
+leaves the others out. What survived is judged by hand: the keys `verdict` and `because` of its
+line.
 """
 
 from __future__ import annotations
