@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 from tyrecal_solvers.bundled.road.contact_update import ContactUpdate
 
+from . import support
 from .conftest import Inflated
-from .test_block_cholesky import Problem, conjugate_gradients, road_blocks
+from .contact import ring
+from .test_block_cholesky import LENGTHS, Problem, conjugate_gradients, road_blocks
 
 Array = np.ndarray
 
@@ -90,3 +92,20 @@ def test_places_are_formed_once(inflated: Inflated) -> None:
     touching.to(blocks)
     expected = fresh.solve(x)
     assert touching.solve(x) == pytest.approx(expected, abs=1e-4 * abs(expected).max())
+
+
+def test_takes_what_the_factor_left_out_of_the_contact() -> None:
+    """Without cords the factor takes what keeps the mirror and what reverses it by themselves; a
+    road under one side couples them, which is added: the inverse to single precision."""
+    work = ring((0.2, 0.21, 0.23), 0.02, 2, support.Rubber(), 2e3)
+    plain = Inflated(None, work.model, ~work.free, work.loads, work.U)  # type: ignore[arg-type]
+    X = work.model.mesh.X
+    blocks = np.zeros((2 * len(LENGTHS) + 1, len(X), 3, 3))
+    blocks[1:4, (X[:, 0] > 0.2299) & (X[:, 1] > 0.001)] = 1e7 * np.diag([1.0, 0.1, 0.1])
+    problem = Problem(plain, contact=blocks)
+    touching = ContactUpdate(problem.factor)
+    touching.to(blocks)
+    x = problem.random()[0]
+    back = touching.solve(problem.product(x))
+    np.testing.assert_allclose(back, x, atol=1e-2 * abs(x).max())
+    assert abs(problem.factor.solve(problem.product(x)) - x).max() > 0.1 * abs(x).max()

@@ -2,9 +2,16 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
-from tyrecal_solvers.bundled.road.half_turn_symmetry import MIRROR, HalfTurn, NotSymmetric
+from tyrecal_solvers.bundled.road.half_turn_symmetry import (
+    MIRROR,
+    HalfTurn,
+    NotSymmetric,
+    mirror_images,
+)
 from tyrecal_solvers.bundled.solid3d.circumference import half_circle
 from tyrecal_solvers.bundled.solid3d.revolved import Revolved
 
@@ -106,3 +113,10 @@ def test_sections_without_the_symmetry_are_refused() -> None:
     m = support.model_of(support.deck(b.X, b.solids, support.Rubber()))
     with pytest.raises(NotSymmetric):
         HalfTurn(m.mesh, np.ones((len(b.X), 3), bool), ANGLES)
+
+
+@pytest.mark.parametrize(("off", "same"), [(0.4e-6, True), (0.9e-6, False), (-0.9e-6, False)])
+def test_mirror_images_stand_in_the_same_place_to_half_a_micrometre(off: float, same: bool) -> None:
+    X = np.array([[0.3, 0.0], [0.3, 0.02], [0.3, -0.02 - off], [0.35, -0.02]])
+    images = mirror_images(SimpleNamespace(X=X))  # type: ignore[arg-type]
+    assert images.tolist() == ([0, 2, 1, -1] if same else [0, -1, -1, -1])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from tyrecal_solvers.bundled.deck import grammar
@@ -166,6 +168,15 @@ def test_a_static_step_has_relaxed_or_sudden_moduli(given: str) -> None:
         assert pytest.approx(1e6 * share[0]) == law.C10 and pytest.approx(2e5 * share[0]) == law.C01
         assert law.inverse_D1 == pytest.approx(share[1] / 5.085e-8)
         assert control.law.stiffness == pytest.approx(0.005 * 2 * 1.2e6 * share[0])
+
+
+def test_neo_hookes_law_is_mooney_and_rivlins_without_its_second_part() -> None:
+    def law(deck: str) -> Any:
+        return model.build(read_keywords(deck), None, True).parts[0].law
+
+    whole = law(changed("MOONEY-RIVLIN\n", "MOONEY-RIVLIN\n"))
+    neo = law(changed("MOONEY-RIVLIN\n", "NEO HOOKE\n").replace("0., 5.", "5."))
+    assert (neo.C10, neo.C01, neo.inverse_D1) == (whole.C10, 0.0, whole.inverse_D1)
 
 
 LAYER = """*ELEMENT, TYPE=SFMGAX1, ELSET=PLY

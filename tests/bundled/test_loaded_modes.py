@@ -19,7 +19,12 @@ from tyrecal_solvers.bundled.road import davidson, footprint_job, stick
 from tyrecal_solvers.bundled.road.contact import Contact
 from tyrecal_solvers.bundled.road.contact_newton import PressedState
 from tyrecal_solvers.bundled.road.half_turn_symmetry import HALF_TURN
-from tyrecal_solvers.bundled.road.loaded_modes import Inertia, LoadedModes, loaded_modes
+from tyrecal_solvers.bundled.road.loaded_modes import (
+    Inertia,
+    LoadedModes,
+    loaded_modes,
+    standing_waves,
+)
 from tyrecal_solvers.bundled.section.mechanics import mass
 from tyrecal_solvers.bundled.solid3d.circumference import Circumference, half_circle
 from tyrecal_solvers.bundled.solid3d.revolved import Revolved
@@ -114,6 +119,24 @@ def test_without_a_road_the_modes_are_the_harmonic_ones(tyre: Round) -> None:
     for each in errors.values():
         assert 0 < each[1] < 0.01
         assert support.order(each)[0] > 3.5
+
+
+def test_standing_waves_of_the_unloaded_tyre_are_nearly_its_modes(tyre: Round) -> None:
+    """Each has the frequency of its harmonic, as exactly as the elements hold it, and keeps or
+    reverses the half turn; of every mode there is one, of a doublet one of either parity."""
+    around = half_circle(np.full(24, np.pi / 24))
+    work, weigh = tyre.tyre(around), Inertia(tyre.model, around)
+    work.residual(tyre.everywhere(around))
+    for n in range(4):
+        (value,) = (unloaded := harmonic(tyre, n, 1)).eigenvalues
+        found = {p: standing_waves([unloaded], tyre.fold(around, p), around) for p in (1, -1)}
+        assert [bool(waves) for waves in found.values()].count(True) == (2 if n else 1)
+        for parity, waves in found.items():
+            fold = tyre.fold(around, parity)
+            for V in waves:
+                quotient = (V * work.product(V)).sum() / (V * weigh(V)).sum()
+                assert quotient == pytest.approx(value, rel=2e-3)
+                np.testing.assert_allclose(fold.spread(fold.parts(V)), V, atol=1e-9 * abs(V).max())
 
 
 def test_they_solve_the_whole_problem(tyre: Round, pressed: State, found: LoadedModes) -> None:

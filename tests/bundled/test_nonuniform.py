@@ -85,6 +85,17 @@ def test_secular_equation(
         assert gap(found[j] - step) * gap(found[j] + step) < 0
 
 
+def test_what_is_attached_leaves_shapes_of_unit_mass(
+    vibration: Vibration, inflated: Inflated
+) -> None:
+    """Next to nothing on the tyre: each member of a doublet is as large as the plain mode."""
+    modes = coupled.attached_modes(vibration, on_crown(inflated, 1e-9), WAVES, COUNT)
+    mass = lambda u: float((u.conj() * (vibration.mass @ u)).real.sum())
+    for n, found in zip(WAVES, modes, strict=True):
+        own = mass(vibration.modes(n, 1).shapes[0])
+        assert [mass(u) for u in found.shapes] == pytest.approx([own] * len(found.shapes), rel=1e-6)
+
+
 def test_mass_lowers_and_spring_raises(vibration: Vibration, inflated: Inflated) -> None:
     """Rayleigh: no frequency rises with a mass or falls with a spring. A radial spring, of rank 1,
     leaves one member of every doublet within a hair of where it was."""
@@ -174,6 +185,10 @@ def test_no_share_is_the_plain_tyre(vibration: Vibration, inflated: Inflated) ->
         beyond=1,
     )
     np.testing.assert_allclose(frequencies(got), plain(vibration), rtol=1e-8)
+    mass = lambda u: float((u.conj() * (vibration.mass @ u)).real.sum())
+    for n, modes in zip(WAVES, got, strict=True):
+        own = [mass(u) for u in vibration.modes(n, COUNT).shapes]
+        assert [mass(u) for u in modes.shapes] == pytest.approx(own[:1] * len(modes.shapes))
 
 
 class Bricks:

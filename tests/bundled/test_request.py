@@ -131,6 +131,13 @@ def test_requests_at_their_limits(tmp_path: Path, request_: dict[str, Any], fine
             read_request(path, ["modes"])
 
 
+def test_what_a_request_does_not_ask_for_is_not_done(tmp_path: Path) -> None:
+    """Two modes of each harmonic, at the moduli of the deck, no slopes and nothing beside."""
+    path = tmp_path / "modes.request.json"
+    for found in (read_request(path, ["modes"]), path.write_text("{}") and read_request(path, [])):
+        assert found == Request(None, 2, {}, False, None, None)  # type: ignore[comparison-overlap]
+
+
 def test_rows_may_be_of_the_sectors_job(tmp_path: Path) -> None:
     (tmp_path / "other.inp").write_text("*HEADING\n")
     path = tmp_path / "modes.request.json"

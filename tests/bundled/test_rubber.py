@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from operator import methodcaller
 
 import numpy as np
 import pytest
 from scipy.linalg import qr
+from tyrecal_solvers.bundled.section import inflation
+from tyrecal_solvers.bundled.section.parts.cords import LogarithmicCord
 from tyrecal_solvers.bundled.section.parts.rubber import MooneyRivlin
+
+from . import support
 
 Array = np.ndarray
 H = 1e-30
@@ -125,3 +130,31 @@ def test_vibration_shear_and_bulk_modulus_are_separate(law: MooneyRivlin) -> Non
     scaled = MooneyRivlin(1.4 * law.C10, 1.4 * law.C01, 1.1 * law.inverse_D1)
     close(vibrating.tangent(one), scaled.tangent(one))
     assert np.array_equal(stress(one, vibrating), stress(one, law))
+
+
+def test_stiffer_rubber_has_all_its_moduli_so_many_times() -> None:
+    """On another path to the same equilibrium."""
+    plain = support.model_of(support.tyre((3, 2, 2, 1)).deck)
+    stiff = plain.with_laws(methodcaller("stiffened", 3.0))
+    pairs = [(a.law, b.law) for a, b in zip(plain.parts, stiff.parts, strict=True)]
+    ((before, after),) = [each for each in pairs if isinstance(each[0], MooneyRivlin)]
+    for name in ("C10", "C01", "inverse_D1"):
+        np.testing.assert_allclose(getattr(after, name), 3 * getattr(before, name))
+    assert np.real(before.C10).any() and np.real(before.inverse_D1).any()
+    cords = [each for each in pairs if isinstance(each[0], LogarithmicCord)]
+    assert cords and all(before is after for before, after in cords)
+
+
+def test_between_the_paths_to_an_equilibrium_time_is_looked_at(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """After the whole load at once, and before every step of the load."""
+    tried: list[str] = []
+    monkeypatch.setattr(inflation, "_newton", lambda *given: tried.append("try") or (None, 1, "no"))
+    m = support.model_of(support.tyre((3, 2, 2, 1)).deck)
+    number, loads = support.numbering(m), support.cavity(m, 1e5)
+    look = lambda: tried.append("look")
+    with pytest.raises(inflation.InflationFailed, match="no"):
+        inflation.equilibrium(m, number, loads, np.zeros((len(m.mesh.X), 3)), look)
+    assert tried[:6] == ["try", "look", "try", "look", "try", "look"]
+    assert tried.count("look") == tried.count("try") - 1

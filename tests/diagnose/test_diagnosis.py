@@ -2,23 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
 from tyrecal.report.diagnosis import page
+from tyrecal.simulate.modes.loaded import Member
 from tyrecal.simulate.modes.mode import Label
 from tyrecal.studies.diagnose.diagnosis import Diagnosis, diagnose
-from tyrecal.studies.diagnose.evidence import explain, weigh
+from tyrecal.studies.diagnose.evidence import explain, grid, refit, weigh
 from tyrecal.studies.diagnose.expansion import anchored, expand
-from tyrecal.studies.diagnose.inverse_problem import Toggle
-from tyrecal.studies.diagnose.model import Answer, Query
+from tyrecal.studies.diagnose.inverse_problem import Assumed, Toggle
+from tyrecal.studies.diagnose.model import Answer, Query, Span
 from tyrecal.studies.diagnose.next_measurement import rank
 from tyrecal.studies.diagnose.observations import Observable
 from tyrecal.studies.diagnose.regions import SectionPart
 from tyrecal.studies.diagnose.result import result
-from tyrecal.studies.diagnose.shrinkage import held_out, shrink
+from tyrecal.studies.diagnose.shrinkage import _placebo, held_out, shrink
 from tyrecal.studies.diagnose.study import DiagnosedCase
+from tyrecal.studies.diagnose.under_load import LoadedRow, UnderLoad
 
 from ..chance import Chance, generator
 from .toy import LABELS, Toy, drawn, problem
@@ -95,8 +101,9 @@ def test_without_an_effect_the_error_shrinks_beyond_the_placebo_in_one_of_twenty
 def test_a_calibration_as_usual_stands_beside(without: bool) -> None:
     """Least squares of the other rows, by SciPy on the tyre itself, without and with the effect."""
     toy = Toy(size=0.02, pressures=(160.0, 200.0, 240.0))
+    toy.spread = np.array([0.003, 0.01, 0.03])  # so that the bounds count
     base = problem(toy)
-    y = drawn(toy, base, generator(1), {"e1": 0.9}, 0.3)
+    y = drawn(toy, base, generator(1), {"e1": 0.9}, 0.03)
     there = base.measured(y)
     s = shrink(there, "e1")
     assert s is not None
@@ -255,6 +262,170 @@ def test_the_intervals_of_a_pair_cover(chance: Chance) -> None:
             hits.append(low <= truth[id] <= high)
     for hits in inside.values():
         chance.often(hits, 0.88, 0.92)
+
+
+class OtherUnits(Toy):
+    """The toy with effects counted in fortieths, and design variables in other units each."""
+
+    effect, x = 40.0, np.array([2.0, 0.5, 1.5])
+
+    def __init__(self, **keys: Any):
+        super().__init__(**keys)
+        self.spread = self.spread * self.x
+        self.spans = {id: Span(0.0, self.effect) for id in self.spans}
+
+    def _answer(self, point: Query) -> Answer:
+        effects = {id: e / self.effect for id, e in point.effects.items()}
+        found = super()._answer(Query(point.x / self.x, effects, point.constants))
+        return replace(found, jacobian=found.jacobian / self.x)
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_diagnosis_does_not_depend_on_units(seed: int) -> None:
+    """Of effects and of design variables: the same probabilities, gap, errors held out and gains,
+    and sizes in the other unit."""
+    toys = [
+        kind(effects=3, size=0.02, pressures=(200.0, 240.0), bend=0.0) for kind in (Toy, OtherUnits)
+    ]
+    for toy in toys:
+        toy.spread = 0.4 * toy.spread  # so that the prior counts
+    base = problem(toys[0])
+    y = drawn(toys[0], base, generator(seed), {"e1": 0.4}, 0.5)
+    shape = np.random.default_rng(5).normal(0, 0.3, (2, len(y)))
+    parts = [SectionPart("a", shape[0], shape[1], ""), SectionPart("b", shape[1], shape[0], "")]
+    one, other = (
+        result(
+            diagnose(
+                toy,
+                toy.rows,
+                base.measured(y).observations,
+                assumed=Assumed(form=0.001),
+                parts=lambda x: parts,
+                seed=seed,
+            )
+        )
+        for toy in toys
+    )
+    for told, scale, unit in ((one, 1.0, np.ones(3)), (other, OtherUnits.effect, OtherUnits.x)):
+        for sizes in (told["parameter"], *told["parameters"].values()):
+            for key in ("value", "low", "high"):
+                sizes[key] /= scale
+        for key in ("judged_at", "smallest_visible"):
+            told[key] = {id: e if e is None else e / scale for id, e in told[key].items()}
+        for by, width in zip(told["bias_percent"].values(), unit, strict=True):
+            by |= {id: float(np.log1p(change / 100)) / width for id, change in by.items()}
+    flat = [list(numbers(told)) for told in (one, other)]
+    assert [place for place, _ in flat[0]] == [place for place, _ in flat[1]]
+    values = [np.array([value for _, value in each]) for each in flat]
+    assert len(values[0]) > 150
+    assert values[1] == pytest.approx(values[0], rel=1e-4, abs=1e-6)
+
+
+def numbers(told: Any, place: str = "") -> Iterator[tuple[str, float]]:
+    """Every number of a result, and where it stands."""
+    inner = told.items() if isinstance(told, dict) else enumerate(told)
+    for key, value in inner:
+        if isinstance(value, dict | list):
+            yield from numbers(value, f"{place}.{key}")
+        elif isinstance(value, int | float):
+            yield f"{place}.{key}", float(value)
+
+
+def test_the_placebo_is_what_tyres_without_an_effect_would_show() -> None:
+    """Each drawn tyre by itself: the likeliest effect of the rows that are kept, at its likeliest
+    size, lowers the error of those held out by R; 95 % of them show less."""
+    toy = Toy(effects=2, size=0.02, pressures=(200.0, 240.0), bend=0.0)
+    toy.tilt = {id: 200 * tilt for id, tilt in toy.tilt.items()}
+    toy.spans["e1"] = Span(0.0, 0.7)
+    p = problem(toy, assumed=Assumed(form=0.001, law=0.04))
+    hold, _ = held_out(p.observations.rows)
+    noise = np.random.default_rng(7).multivariate_normal(
+        np.zeros(len(hold)), p.sigma, 200, method="cholesky"
+    )
+    kept, out = p.only(~hold), p.only(hold)
+    shares = []
+    for each in noise:
+        there = kept.measured(kept.plain(np.zeros(3))[0] + each[~hold])
+        before = each[hold] - out.plain(np.zeros(3))[1] @ refit(there, {}, 1).d[0]
+        best = max((explain(there, [id], 1.0) for id in toy.g), key=lambda h: h.ln_evidence)
+        assert best.fitted is not None
+        e, d = {best.key: best.values[best.key][[best.best]]}, best.fitted.d[best.best]
+        shift, tilt, _ = out.added(e, 1)
+        after = each[hold] - shift[0] - (out.plain(np.zeros(3))[1] + tilt[0]) @ d
+        shares.append(1 - np.sqrt(np.mean(after**2) / np.mean(before**2)))
+    found = _placebo(p, hold, np.random.default_rng(7))
+    assert found == pytest.approx(np.quantile(shares, 0.95), rel=1e-6)
+
+
+def test_sizes_on_the_grid_have_a_density_of_one_over_the_range() -> None:
+    """Of polynomials the weighted sum is the mean over the range, wherever that lies."""
+    nodes = expand(Toy(effects=1), np.zeros(3)).nodes["e0"]
+    for low, high in ((0.0, 1.0), (-3.0, 1.0), (2.0, 7.0)):
+        e, ln = grid(replace(nodes, reach=(low, high)))
+        mean = (high**4 - low**4) / 4 / (high - low)
+        assert np.exp(ln) @ e**3 == pytest.approx(mean)
+        assert low < e.min() and e.max() < high and len(e) == 25
+
+
+def test_the_result_says_what_was_found() -> None:
+    d = diagnosed(Toy(effects=3, pressures=(200.0, 240.0)), {"e1": 0.8}, 7)
+    told = result(d)
+    assert [(g["name"], g["p_value"], g["holm"]) for g in told["gap"]["groups"]] == [
+        (g.name, g.p_value, g.corrected) for g in d.gap.groups
+    ]
+    assert any(g["holm"] > g["p_value"] for g in told["gap"]["groups"])
+    by = {**told["gap"]["by_family"], **told["gap"]["by_harmonic"], **told["gap"]["by_pressure"]}
+    assert by == {g.name: g.rms_percent for g in d.gap.groups}
+    rows = told["gap"]["residuals"]
+    assert [row["percent"] for row in rows] == pytest.approx(100 * d.gap.residuals)
+    assert [row["sigma_percent"] for row in rows] == pytest.approx(100 * d.gap.spread)
+    assert told["shrinkage"] == {
+        name: getattr(d.shrinkage, name)
+        for name in d.shrinkage.__dataclass_fields__  # type: ignore[union-attr]
+    }
+    shares = list(told["probabilities"].values())
+    assert shares == sorted(shares, reverse=True) and {"none", "outside"} <= set(
+        told["probabilities"]
+    )
+    kept = {key for key, p in d.probabilities.items() if p > 1e-6}
+    assert set(told["probabilities"]) == kept | {"none", "outside"} != set(d.probabilities)
+
+
+def test_the_result_says_what_was_measured_under_load() -> None:
+    """By load where all tyres have an answer, every row with what each tyre is off by."""
+    d = diagnosed(Toy(effects=3), {}, 7)
+    member = Member(Label(2, 0), "symmetric")
+    area = LoadedRow("contact_area_m2", None, 240.0, 3e3, 0.01, 1e-4, {"none": 0.03, "e1": -0.01})
+    mode = LoadedRow("frequency_Hz", member, 220.0, 1e3, 80.0, 0.5, {"none": 0.02, "e1": 0.0})
+    lost = LoadedRow("contact_area_m2", None, 240.0, 2e3, 0.02, 1e-4, {"none": 0.5})
+    rows = (area, mode, lost)
+    told = result(d, UnderLoad(rows, ("none", "e1"), ("e1, 240 kPa: no",)))
+    assert list(told["gap"]["by_load"].items()) == [
+        ("1000", pytest.approx(2.0)),
+        ("3000", pytest.approx(3.0)),
+    ]
+    under = told["under_load"]
+    assert under["effect"] == "e1" and under["failed"] == ["e1, 240 kPa: no"]
+    assert under["calibrated_rms_percent"] == pytest.approx(100 * np.hypot(0.03, 0.02) / 2**0.5)
+    assert under["effect_rms_percent"] == pytest.approx(1 / 2**0.5)
+    assert [row["calibrated_percent"] for row in under["rows"]] == pytest.approx([3.0, 2.0, 50.0])
+    assert [row["effect_percent"] for row in under["rows"]] == [-1.0, 0.0, None]
+    assert [row["mode"] for row in under["rows"]] == [None, str(member), None]
+    for row, own in zip(under["rows"], rows, strict=True):
+        names = ("quantity", "pressure_kPa", "load_N", "measured", "sigma")
+        assert [row[name] for name in names] == [
+            own.quantity,
+            own.pressure_kPa,
+            own.load_N,
+            own.value,
+            own.sigma,
+        ]
+    alone = result(d, UnderLoad(rows[2:], ("none",), ()))["under_load"]
+    assert alone["effect"] is None and alone["effect_rms_percent"] is None
+    assert alone["rows"][0]["effect_percent"] is None
+    assert alone["calibrated_rms_percent"] == pytest.approx(50.0)
+    plain = result(d)
+    assert plain["under_load"] is None and plain["gap"]["by_load"] == {}
 
 
 def test_the_result_is_plain_data_with_the_promised_keys() -> None:

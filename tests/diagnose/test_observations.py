@@ -98,3 +98,47 @@ def test_repeats_that_cannot_be_used_are_said(tmp_path: Path) -> None:
     alone = observe(read(tmp_path, *both), [read(tmp_path, again[0])])
     assert any(words.startswith("all repeats: fewer than two") for words in alone.left_out)
     assert not observe(read(tmp_path, *both), [read(tmp_path, *both)]).left_out
+
+
+def test_a_toggled_run_is_no_repeat(tmp_path: Path) -> None:
+    """It may have other modes, and its values do not enter the scatter."""
+    lines = [GOOD, "frequency_Hz,3,0,,,240,0,98,0.2", "frequency_Hz,4,0,,,240,0,116,0.2"]
+    again = [
+        "frequency_Hz,2,0,,,240,0,79.7,0.2",
+        "frequency_Hz,3,0,,,240,0,98.1,0.2",
+        "frequency_Hz,4,0,,,240,0,115.8,0.2",
+    ]
+    run, repeat = read(tmp_path, *lines), read(tmp_path, *again)
+    toggled = read(tmp_path, lines[0], "frequency_Hz,1,0,,,240,0,40,0.3")
+    for repeats in ([], [repeat]):
+        alone, found = observe(run, repeats), observe(run, repeats, [toggled])
+        assert not found.left_out and found.common == alone.common
+        assert found.y[:3] == pytest.approx(alone.y)
+        assert found.scatter[:3] == pytest.approx(alone.scatter)
+        assert found.y[3:] == pytest.approx(np.log([40, 79.5]))
+        assert found.scatter[3:] == pytest.approx([0.3 / 40, 0.2 / 79.5])
+        assert [row.run for row in found.rows] == [0, 0, 0, 1, 1]
+
+
+def test_the_scatter_of_repeats_by_the_analysis_of_variance() -> None:
+    """Two ways without interaction (values, runs), 4 values in 3 runs: mean squares over their
+    degrees of freedom; each value's own variance counts 2 of 6 parts beside the pooled one."""
+    table = np.random.default_rng(4).normal(0, 0.003, (4, 3)) + np.array([0.01, 0.0, -0.02])
+    runs = [
+        [
+            Measurement("frequency_Hz", Label(c + 1, 0), "", 240.0, 0.0, 50 * np.exp(y), 1.0)
+            for c, y in enumerate(column)
+        ]
+        for column in table.T
+    ]
+    found = observe(runs[0], runs[1:])
+    rest = [
+        [y - table[i].mean() - table[:, k].mean() + table.mean() for k, y in enumerate(row)]
+        for i, row in enumerate(table)
+    ]
+    squares = np.sum(np.square(rest), axis=1)
+    pooled = squares.sum() / ((4 - 1) * (3 - 1))
+    between_runs = 4 * np.sum((table.mean(0) - table.mean()) ** 2) / (3 - 1)
+    assert found.y == pytest.approx(np.log(50) + table.mean(1))
+    assert found.common**2 == pytest.approx((between_runs - pooled) / 4 / 3)
+    assert found.scatter**2 == pytest.approx((4 * pooled + squares) / (4 + 2) / 3)

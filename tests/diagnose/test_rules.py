@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
+from tyrecal.simulate.modes.mode import Label
 from tyrecal.studies.diagnose.evidence import (
     INFLATION,
     UNKNOWN,
@@ -21,7 +22,7 @@ from tyrecal.studies.diagnose.evidence import (
     refit,
     weigh,
 )
-from tyrecal.studies.diagnose.expansion import Expansion, Nodes, _nodes, expand, node_values
+from tyrecal.studies.diagnose.expansion import Expansion, Nodes, _bent, _nodes, expand, node_values
 from tyrecal.studies.diagnose.gap import ResidualGroup, _chi2, _corrected, find_gap
 from tyrecal.studies.diagnose.inverse_problem import Assumed, Toggle
 from tyrecal.studies.diagnose.label_swap import _near
@@ -31,6 +32,7 @@ from tyrecal.studies.diagnose.observations import Observable, Observations
 from tyrecal.studies.diagnose.plain_fit import plain_fit
 from tyrecal.studies.diagnose.regions import SectionPart
 from tyrecal.studies.diagnose.separability import separate
+from tyrecal.studies.diagnose.study import _reaching
 from tyrecal.studies.diagnose.verdict import decide
 from tyrecal.studies.diagnose.where import section_map
 
@@ -337,6 +339,19 @@ def test_more_nodes_where_a_cubic_is_not_enough() -> None:
         assert nodes.tolist() == pytest.approx(wanted)
 
 
+def test_where_a_far_node_has_no_solution_the_rest_may_bend_too() -> None:
+    """Three nodes do, two cannot tell: asked more towards the farthest that has an answer."""
+    n, none = 2, np.zeros((2, 1))
+    answer = lambda e: Answer(np.full(n, e * e), none, np.zeros(n))
+    plain = Expansion(np.zeros(1), np.zeros(n), none, np.zeros((n, 1, 1)), np.zeros(n), none, {})
+    failed, span = ValueError("no such tyre"), Span(0.0, 1.0)
+    found = {0.25: answer(0.25), 0.75: answer(0.75), 1.0: failed}
+    assert _bent(plain, span, found) == [0.75]
+    assert _bent(plain, span, {**found, 0.75: failed}) == []
+    back = {-e: each for e, each in found.items()}
+    assert _bent(plain, Span(-1.0, 0.0), back) == [-0.75]
+
+
 def test_curvature_is_that_of_two_slopes() -> None:
     toy = Toy(effects=0, bend=0.1)
     found = expand(toy, np.array([0.2, -0.1, 0.3]))
@@ -487,3 +502,109 @@ def test_cosines_and_distances_by_their_formula() -> None:
             off = grid[:, None] * toy.g[b] - at[a] * toy.g[a]
             wanted = np.einsum("qn,nm,qm->q", off, P, off).min() if i != j else 0.0
             assert found.distances[i, j] == pytest.approx(wanted)
+
+
+def test_the_gains_of_further_rows_by_their_formula() -> None:
+    """Two more modes at the scatter of the others, or the mass to half a per cent, with form,
+    constants and what an effect does there."""
+    toy = Toy(effects=2, size=0.003, bend=0.0, pressures=(240.0,))
+    toy.tilt = {id: 0 * tilt for id, tilt in toy.tilt.items()}
+    p = problem(toy)
+    p = replace(p, observations=replace(p.observations, scatter=np.linspace(1e-3, 3e-3, 9)))
+    sizes, likely = {id: {id: 0.5} for id in ("e0", "e1")}, {"e0": 0.4, "e1": 0.3, "none": 0.2}
+    random = generator("rows")
+    eta, J, c = random.normal(size=50), random.normal(size=(50, 3)), random.normal(size=(50, 2))
+    moved = {"e0": random.normal(0, 0.002, 50), "e1": random.normal(0, 0.002, 50)}
+    rows: list = []
+
+    def answer(point: Query) -> Answer:
+        n = slice(0, len(rows))
+        shift = sum((e * moved[id][n] for id, e in point.effects.items()), np.zeros(len(rows)))
+        own = 0.003 * c[n] if point.constants else None
+        return Answer(eta[n] + shift, J[n], np.zeros(len(rows)), own)
+
+    def further(wanted: list) -> Any:
+        rows.extend(wanted)
+        return SimpleNamespace(answers=lambda points: [answer(point) for point in points])
+
+    found = {c.what: c for c in rank(p, np.zeros(3), likely, sizes, (), further)}
+    assert len(found) == 7  # repeats, two toggles, 160 and 320 kPa, harmonics, the mass
+    assert found.keys() > {"measure the same modes at 160 kPa", "measure the same modes at 320 kPa"}
+
+    def apart(at: list[int], form: float) -> float:
+        whole = np.vstack([toy.J, J[at]])
+        constants = np.vstack([toy.constants, 0.003 * c[at]])
+        noise = [*np.linspace(1e-3, 3e-3, 9), *(2e-3 if rows[i][0] else 0.005 for i in at)]
+        sizes = np.array([0.001] * 9 + [form] * len(at))
+        same = np.eye(len(whole))
+        for k, i in enumerate(at):
+            if rows[i][0] in LABELS:
+                same[9 + k, LABELS.index(rows[i][0])] = same[LABELS.index(rows[i][0]), 9 + k] = 0.9
+        S = np.diag(np.square(noise)) + same * np.outer(sizes, sizes) + constants @ constants.T
+        S = S + 1e-12 * np.eye(len(S)) + whole @ np.diag(toy.spread**2) @ whole.T
+        g = {id: 0.5 * np.append(toy.g[id], moved[id][at]) for id in moved}
+        g["none"] = np.zeros(len(whole))
+        off = lambda a, b: (g[a] - g[b]) @ np.linalg.inv(S) @ (g[a] - g[b])
+        pairs = (("e0", "e1"), ("e0", "none"), ("e1", "none"))
+        return float(sum(2 * likely[a] * likely[b] * off(a, b) for a, b in pairs))
+
+    now = apart([], 0.001)
+    for what, hours, at, form in (
+        ("weigh the tyre", 0.25, [rows.index((None, 0.0))], 0.0),
+        (
+            "measure [5,0] and [5,1], too",
+            1.0,
+            [rows.index((Label(5, m), 240.0)) for m in (0, 1)],
+            0.001,
+        ),
+        (
+            "measure the same modes at 320 kPa",
+            1.0,
+            [rows.index((label, 320.0)) for label in sorted(LABELS, key=str)],
+            0.001,
+        ),
+    ):
+        gain = (apart(at, form) - now) / hours
+        assert found[what].gain == pytest.approx(gain, rel=1e-6), what
+
+
+def test_what_is_not_asked_twice_or_has_no_answer_is_not_offered() -> None:
+    """Pressures nearer than 60 kPa to one measured; the mass where it is known; nothing where the
+    model fails; six explanations at most."""
+    toy = Toy(effects=8, pressures=(220.0, 260.0))
+    p = problem(toy)
+    sizes = {id: {id: 0.5} for id in toy.spans}
+    likely = {id: 0.1 + 0.001 * i for i, id in enumerate(sizes)}
+    asked: list = []
+
+    def further(wanted: list) -> Any:
+        asked.append(wanted)
+        return SimpleNamespace(answers=lambda points: [ValueError("no") for _ in points])
+
+    words = [c.what for c in rank(p, np.zeros(3), likely, sizes, (), further)]
+    assert sorted(what for what in words if "again" in what) == [
+        f"measure again without e{i}" for i in range(2, 8)
+    ]
+    assert len(words) == 7  # and repeats
+    (rows,) = asked
+    assert {pressure for _, pressure in rows} == {160.0, 320.0, 220.0, 260.0, 0.0}
+    o = p.observations
+    weighed = replace(
+        p, observations=replace(o, rows=(*o.rows[:-1], Observable("mass_kg", None, 0.0)))
+    )
+    rank(weighed, np.zeros(3), likely, sizes, (), further)
+    assert (None, 0.0) not in asked[1]
+
+
+def test_a_change_beyond_the_range_is_asked_where_it_was_measured() -> None:
+    """Counted from what the case has; within the range, at 0, or as a factor nothing is added."""
+    span = Span(-0.3, 0.7, base=0.3)  # of an effect from 0 to 1
+    reached = lambda value, times=False: _reaching(span, Toggle("a", value, times, 0.3)).also
+    assert reached(1.5) == (pytest.approx(1.2),) and reached(-0.2) == (pytest.approx(-0.5),)
+    for value in (1.0, 0.0, 0.3, 0.65):
+        assert reached(value) == ()
+    assert reached(5.0, True) == ()
+    twice = _reaching(_reaching(span, Toggle("a", 1.5, base=0.3)), Toggle("a", 1.5, base=0.3))
+    assert len(twice.also) == 1
+    zero = _reaching(Span(0.5, 1.0), Toggle("a", 0.0))  # 0 is a node anyway
+    assert zero.also == ()

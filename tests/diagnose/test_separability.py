@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tyrecal.studies.diagnose.separability import APART, Separability, _smallest
+from tyrecal.studies.diagnose.separability import Separability, _smallest
 
 
 def judged(distances: np.ndarray, **lambdas: float) -> Separability:
@@ -18,10 +18,10 @@ def judged(distances: np.ndarray, **lambdas: float) -> Separability:
 def test_effects_are_linked_by_what_stands_between_them() -> None:
     """a is near b, b near c, c near d, each from one side alone: one group; e is by itself, and f,
     which nothing shows, links nothing."""
-    far = np.full((6, 6), 5 * APART)
+    far = np.full((6, 6), 45.0)
     for i, j in ((1, 0), (1, 2), (3, 2), (4, 5), (5, 0)):
-        far[i, j] = 0.5 * APART
-    found = judged(far, a=20.0, b=20.0, c=20.0, d=20.0, e=20.0, f=0.5 * APART)
+        far[i, j] = 4.5
+    found = judged(far, a=20.0, b=20.0, c=20.0, d=20.0, e=20.0, f=4.5)
     assert [sorted(group) for group in found.groups()] == [["a", "b", "c", "d"]]
     assert found.groups(["a", "c", "d", "e"]) == [["c", "d"]]
     assert found.groups(["a", "e", "f"]) == []
@@ -29,9 +29,9 @@ def test_effects_are_linked_by_what_stands_between_them() -> None:
 
 def test_at_the_limits() -> None:
     """delta^2 = 9 is apart, lambda = 9 is seen."""
-    just = np.array([[0.0, APART], [APART, 0.0]])
-    assert judged(just, a=APART, b=APART).groups() == []
-    assert judged(np.nextafter(just, 0), a=APART, b=APART).groups() == [["a", "b"]]
+    just = np.array([[0.0, 9.0], [9.0, 0.0]])
+    assert judged(just, a=9.0, b=9.0).groups() == []
+    assert judged(np.nextafter(just, 0), a=9.0, b=9.0).groups() == [["a", "b"]]
 
 
 def test_the_smallest_that_is_seen() -> None:

@@ -5,6 +5,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -22,17 +24,23 @@ from tyrecal.studies.diagnose.expansion import expand
 from tyrecal.studies.diagnose.gap import find_gap, projection
 from tyrecal.studies.diagnose.inverse_problem import Assumed, InverseProblem, Toggle, places
 from tyrecal.studies.diagnose.model import Answer, Query
-from tyrecal.studies.diagnose.observations import observe
+from tyrecal.studies.diagnose.observations import Observable, Observations, observe
 from tyrecal.studies.diagnose.regions import regions
 from tyrecal.studies.diagnose.result import result
 from tyrecal.studies.diagnose.separability import separate
-from tyrecal.studies.diagnose.study import parse_change, spans_of, study
-from tyrecal.studies.diagnose.tyre_model import TyreModel
-from tyrecal.studies.diagnose.uncertainties import DENSITY_PERCENT, PRESSURE_kPa, sources
+from tyrecal.studies.diagnose.study import _check_units, parse_change, spans_of, study
+from tyrecal.studies.diagnose.tyre_model import TyreModel, _key
+from tyrecal.studies.diagnose.uncertainties import DENSITY_PERCENT, PRESSURE_kPa, sources, values_of
 from tyrecal.studies.diagnose.verdict import decide
+from tyrecal.tyre.case import start_values
+from tyrecal.tyre.case.calibration import Uncertainty
+from tyrecal.tyre.case.section import Gauge
+from tyrecal.tyre.load import load_case
 from tyrecal.tyre.values import with_values
 
+from ..case.test_guard import SLIPS
 from ..chance import Chance, generator
+from ..conftest import CASES
 from ..effects.support import coarse
 
 CASE = coarse()
@@ -179,7 +187,7 @@ def test_an_effect_in_the_models_own_data_is_named_with_its_size(tmp_path: Path)
     assert size["low"] < truth < size["high"]
     told = result(d)
     assert told["effect"] == "bead_filler" and told["rung"] in (1, 2)
-    assert told["shrinkage"]["fraction"] > 0.3
+    assert told["shrinkage"]["fraction"] > 0.3 and told["section_map"]  # unless it is left out
     assert sum(told["probabilities"].values()) == pytest.approx(1, abs=1e-4)
 
 
@@ -294,6 +302,16 @@ def test_an_effect_is_added_with_the_files_comments_kept(case_folder: Path) -> N
         add(old, "nothing", 1.5)
 
 
+def test_an_effect_is_added_to_a_case_whose_numbers_are_unusual(case_folder: Path) -> None:
+    """Its user was told of them already."""
+    path = case_folder / "p235_75r17.yaml"
+    old, new, *_ = next(iter(SLIPS.values()))
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new, 1))
+    assert load_case(add(path, "bead_filler", 1.5), allow_unusual=True).case.effects
+
+
 def test_sources_of_error_are_those_of_the_case_or_assumed_and_never_calibrated() -> None:
     stated, assumed = sources(CASE)
     assert not assumed and {"pressure", "belt_spacing", "rim_width"} <= {s.name for s in stated}
@@ -324,6 +342,137 @@ def test_sources_of_error_are_those_of_the_case_or_assumed_and_never_calibrated(
     assert "pressure" not in {s.name for s in sources(replace(CASE, case=moved))[0]}
 
 
+def test_what_is_assumed_of_constants_is_what_the_guide_says() -> None:
+    guide = " ".join((CASES / "diagnosis.md").read_text().split())
+    assert (
+        "densities of rubber 1.5 %, moduli of cords 3 %, spacings 1 %, gauges 3 %, cord angles"
+        " 1 degree, pressure 1 kPa"
+    ) in guide
+    case = load_case(CASES / "p235_75r17.yaml")
+    gauge = Gauge(between=["bead", "upper_sidewall"], factor=2.0)
+    section = case.case.section.model_copy(update={"gauges": [gauge]})
+    bare = case.case.model_copy(update={"uncertainties": {}, "section": section})
+    found, assumed = sources(replace(case, case=bare))
+    relative = {"density": 0.015, "modulus": 0.03, "spacing": 0.01}
+    assert assumed and len(found) >= 9
+    for source in found:
+        ((path, step),) = source.steps.items()
+        kind = source.name.rpartition("_")[2]
+        if kind in relative:
+            assert step == pytest.approx(relative[kind] * values_of(case, [source])[path])
+            assert source.words.endswith(f" {100 * relative[kind]:g} %")
+        elif source.name.startswith("gauge"):
+            assert step == pytest.approx(0.06) and path == "section.gauges.0.factor"
+        else:
+            assert step == 1.0 and (kind == "angle") == path.endswith("angle_deg")
+            assert source.words.endswith(" 1 degrees" if kind == "angle" else "pressure 1 kPa")
+
+
+def test_a_stated_source_moves_its_numbers_as_it_says() -> None:
+    """By per cent of each or by so much, up or down together; not what a variable sets."""
+    angles = [f"rebar_layers.belt_{k}.angle_deg" for k in (1, 2)]
+    density, layers = "materials.rubber.density_kg_per_m3", CASE.case.rebar_layers
+    stated = {
+        "both_angles": Uncertainty(sets=angles, percent=2.0, signs=[1, -1]),
+        "air": Uncertainty(sets=["pressure_kPa"], absolute=3.0, signs=[-1]),
+        "stuff": Uncertainty(sets=[density, "materials.rubber.C10_Pa"], percent=1.0),
+        "fitted": Uncertainty(sets=["materials.rubber.C10_Pa"], percent=1.0),
+        "rim": Uncertainty(sets=["effects.rim_width"], percent=5.0),
+    }
+    case = replace(CASE, case=CASE.case.model_copy(update={"uncertainties": stated}))
+    found, assumed = sources(case)
+    told = {source.name: (source.words, source.steps) for source in found}
+    assert not assumed and list(told) == ["both_angles", "air", "stuff", "rim"]
+    assert told["both_angles"] == (
+        "both angles 2 %",
+        pytest.approx(
+            {
+                angles[0]: 0.02 * layers["belt_1"].angle_deg,
+                angles[1]: -0.02 * layers["belt_2"].angle_deg,
+            }
+        ),
+    )
+    assert told["air"] == ("air 3 kPa", {"pressure_kPa": -3.0})
+    rho = CASE.case.materials["rubber"].density_kg_per_m3
+    assert told["stuff"] == ("stuff 1 %", pytest.approx({density: 0.01 * rho}))
+    assert told["rim"] == ("rim 5 %", {"effects.rim_width": 0.0})  # of what the case has not
+    assert values_of(case, found) == {
+        **{path: layers[path.split(".")[1]].angle_deg for path in angles},
+        "pressure_kPa": CASE.case.pressure_kPa,
+        density: rho,
+    }
+
+
+def test_coordinates_of_a_linear_and_a_logarithmic_variable() -> None:
+    """The share of the way between the bounds, or a logarithm; both uniform within the bounds
+    before anything is measured; numbers come back, beyond the bounds too."""
+    variables = CASE.case.variables
+    C10 = variables["C10"].model_copy(update={"scale": "linear", "lower": 3e5, "upper": 1.1e6})
+    case = CASE.case.model_copy(update={"variables": {**variables, "C10": C10}})
+    own = TyreModel(replace(CASE, case=case), Evaluator(TyreDesign(CASE)), ROWS, [], {})
+    start, belt = start_values(CASE), variables["A_belt"]
+    assert list(own.variables) == ["A_belt", "A_carcass", "C10"]
+    assert own.values(own.start) == pytest.approx(start)
+    assert own.start[[0, 2]] == pytest.approx([np.log(start["A_belt"]), (start["C10"] - 3e5) / 8e5])
+    there = own.values(own.start + np.array([0.1, 0.0, 0.5]))
+    assert there["A_belt"] == pytest.approx(np.exp(0.1) * start["A_belt"])
+    assert there["C10"] == pytest.approx(start["C10"] + 4e5) and there["C10"] > 1.1e6
+    assert own.spread[0] == pytest.approx(np.log(belt.upper / belt.lower) / 12**0.5)
+    assert own.spread[2] == pytest.approx(1 / 12**0.5)
+    assert own._slope("C10", there) == 8e5 and own._slope("A_belt", there) == there["A_belt"]
+    rise = own._rise(own.start, own.start + 0.1)
+    assert rise == pytest.approx([np.expm1(0.1), np.expm1(0.1), 0.1])
+
+
+def test_what_is_not_even_near_the_model_is_refused() -> None:
+    """A frequency by a factor of 2, the mass by 1.5, either way; frequencies are told first."""
+    rows = [(Label(2, 0), 240.0), (None, 0.0)]
+    answer = Answer(np.log([80.0, 12.0]), np.zeros((2, 1)), np.zeros(2))
+    start = np.zeros(1)
+    model: Any = SimpleNamespace(rows=rows, start=start, answers=lambda points: [answer])
+
+    def check(frequency: float, mass: float) -> None:
+        measured = (Observable("mass_kg", None, 0.0), Observable("frequency_Hz", *rows[0]))
+        none = np.full(2, np.nan)
+        y = np.log([12.0 * mass, 80.0 * frequency])
+        _check_units(model, Observations(measured, y, none, 0.0, none, none), [Path("a.csv")], ())
+
+    for good in (1.0, 1.99, 1 / 1.99):
+        check(good, 1.0)
+    for good in (1.49, 1 / 1.49):
+        check(1.0, good)
+    for bad in (2.01, 1 / 2.01):
+        with pytest.raises(InputError, match=f"a.csv: .* was measured {bad:.2g} times as high"):
+            check(bad, 1.51)
+    for bad in (1.51, 1 / 1.51):
+        with pytest.raises(InputError, match=f"a.csv: the mass is {bad:.2g} times the model's"):
+            check(1.9, bad)
+
+
+def test_a_model_without_an_answer_says_why_before_anything_is_judged() -> None:
+    """Of the plain tyre its own failure; of a switched one what was switched."""
+    rows = [(Label(2, 0), 240.0)]
+    answer = Answer(np.log([80.0]), np.zeros((1, 1)), np.zeros(1))
+    failure, asked_for = DeckRefused("no such tyre"), []
+    none = np.full(1, np.nan)
+    seen = Observations((Observable("frequency_Hz", *rows[0]),), answer.eta, none, 0.0, none, none)
+
+    def check(answers: list, *changes: Toggle) -> None:
+        told = lambda points: asked_for.append([dict(p.effects) for p in points]) or answers
+        model: Any = SimpleNamespace(rows=rows, start=np.zeros(1), answers=told)
+        _check_units(model, seen, [Path("a.csv")], changes)
+
+    with pytest.raises(DeckRefused, match="no such tyre"):
+        check([failure])
+    switched = Toggle("point_mass", 0.05, base=0.02)
+    with pytest.raises(InputError, match=r"'point_mass=0.05' cannot be evaluated: no such tyre"):
+        check([answer, failure], switched)
+    check([answer, answer], switched)
+    # what is as in the case, or a factor, is no other tyre
+    check([answer], replace(switched, value=0.02), replace(switched, times=True))
+    assert asked_for == [[{}], *[[{}, {"point_mass": pytest.approx(0.03)}]] * 2, [{}]]
+
+
 def test_an_effect_without_slopes_takes_the_plain_tyres() -> None:
     """The solver gives none with a splice: all is asked once, together, and nothing in vain."""
     evaluator = Evaluator(TyreDesign(CASE))
@@ -335,8 +484,27 @@ def test_an_effect_without_slopes_takes_the_plain_tyres() -> None:
     (plain,) = own.answers([Query(X)])
     assert isinstance(plain, Answer) and isinstance(found[0], Answer)
     assert found[0].jacobian == pytest.approx(plain.jacobian, abs=1e-12)
+    assert plain.constants is None  # they were not asked for
     assert (found[0].eta > plain.eta).all() and found[0].split[-1] > 0
     assert isinstance(found[1], Answer) and abs(found[1].jacobian - plain.jacobian).max() > 1e-3
+
+
+def test_sources_that_are_effects_step_once_and_fail_alone() -> None:
+    """What the step moves is added to the slope; where it has no solution the point has none."""
+    n = len(ROWS)
+    answer = Answer(np.zeros(n), np.zeros((n, 3)), np.zeros(n), np.full((n, 2), 0.5))
+    moved = replace(answer, eta=np.arange(float(n)), constants=None)
+    point, stepped = Query(X, constants=True), Query(X, {"rim_width": 1e-3})
+    steps = [(1, "rim_width", 1e-3)]
+    known: dict[Any, Any] = {_key(point): answer, _key(stepped): moved}
+    found = MODEL._completed(point, known, steps)
+    assert isinstance(found, Answer) and found.constants is not None
+    assert found.constants[:, 0] == pytest.approx(np.full(n, 0.5))
+    assert found.constants[:, 1] == pytest.approx(0.5 + np.arange(n))
+    assert answer.constants is not None and (answer.constants == 0.5).all()  # its own stays
+    failure = DeckRefused("no such rim")
+    assert MODEL._completed(point, {**known, _key(stepped): failure}, steps) is failure
+    assert MODEL._completed(Query(X), {_key(Query(X)): moved}, steps) is moved
 
 
 def test_a_refusal_with_one_effect_is_that_points_answer() -> None:

@@ -17,6 +17,8 @@ import pytest
 from tyrecal.cli.main import main
 from tyrecal.simulate.evaluate.evaluator import Counts
 from tyrecal.simulate.evaluate.failure import EvaluationFailed
+from tyrecal.simulate.evaluate.record import Damaged
+from tyrecal.simulate.evaluate.recorded import check
 from tyrecal.simulate.evaluate.store import Store
 
 from .stand_in import StandIn, ask, evaluator
@@ -145,6 +147,175 @@ def test_is_computed_again(
     assert [str(path) in r.getMessage() for r in caplog.records] == [True]  # said once
     same(fresh, ask(evaluator(tmp_path)))
     assert not (tmp_path / "unpickled").exists()
+
+
+def of_modes() -> Content:
+    """What is recorded of two modes on three points of a section, and their slopes by A."""
+    one = {"frequency_Hz": 50.0, "multiplicity": 2, "n": 1, "amplitude": np.ones((3, 3), complex)}
+    two = {"frequency_Hz": 60.0, "multiplicity": 1, "displacement": np.ones((3, 3))}
+    return {
+        "pressure_Pa": 0.0,
+        "mass_kg": 12.0,
+        "nodes": np.arange(3),
+        "points": np.zeros((3, 2)),
+        "modes": [one, two],
+        "gradients": {"A": np.ones(2)},
+        "displacement": np.zeros((3, 3)),
+    }
+
+
+def of_footprints() -> Content:
+    """Of a load: a patch of a point at each of three nodes, on two rings, with one mode."""
+    patch = {
+        "load_N": 4e3,
+        "road_N": 4e3,
+        "rim_N": np.zeros(3),
+        "deflection_m": 0.02,
+        "stiffness_N_per_m": 2e5,
+        "ring": np.array([0, 1, 1]),
+        "node": np.arange(3),
+        "along_m": np.zeros(3),
+        "across_m": np.zeros(3),
+        "pressure_Pa": np.ones(3),
+        "area_m2": np.ones(3),
+        "traction_Pa": np.zeros((3, 2)),
+        "displacement": np.zeros((2, 3, 3)),
+        "contact_area_m2": 0.02,
+        "mode_frequency_Hz": np.array([70.0]),
+        "mode_node": np.array([0, 2]),
+        "mode_shape": np.zeros((1, 2, 2, 3)),
+    }
+    return {
+        "pressure_Pa": 2.4e5,
+        "mass_kg": 12.0,
+        "nodes": np.arange(3),
+        "points": np.zeros((3, 2)),
+        "angles": np.zeros(2),
+        "free_radius_m": 0.35,
+        "footprints": [patch],
+        "failure": "",
+    }
+
+
+MODES: list[Content] = [
+    {"pressure_Pa": -1.0},
+    {"pressure_Pa": True},
+    {"mass_kg": 0.0},
+    {"mass_kg": np.ones(1)},
+    {"nodes": np.arange(3.0)},
+    {"nodes": np.zeros((3, 1), int)},
+    {"nodes": np.arange(2)},
+    {"points": np.zeros((4, 2))},
+    {"points": np.zeros((3, 4))},
+    {"points": np.zeros((3, 1))},
+    {"points": np.full((3, 2), np.nan)},
+    {"points": np.zeros(3)},
+    {"modes": ()},
+    {"displacement": np.zeros((3, 2))},
+    {"displacement": np.zeros((2, 3))},
+    {"displacement": np.full((3, 3), np.inf)},
+    {"gradients": {"A": np.ones(3)}},
+    {"gradients": {"A": np.ones((2, 1))}},
+    {"gradients": {"A": np.full(2, np.nan)}},
+]
+MODE: list[Content] = [
+    {"frequency_Hz": -1.0},
+    {"frequency_Hz": np.inf},
+    {"multiplicity": 0},
+    {"multiplicity": 1.5},
+    {"n": -1},
+    {"n": 0.5},
+    {"amplitude": np.ones((3, 2))},
+    {"amplitude": np.ones((2, 3))},
+    {"amplitude": np.full((3, 3), np.nan)},
+    {"amplitude": "x"},
+    {"members": np.ones(3)},
+    {"members": np.array([50.0, 0.0])},
+    {"amplitude": None},
+]
+PRESSED: list[Content] = [
+    {"angles": np.zeros(3)},
+    {"angles": np.zeros((2, 1))},
+    {"free_radius_m": 0.0},
+    {"footprints": []},
+    {"failure": 3},
+    {"cause": "timed_out"},
+    {"points": np.zeros((4, 2))},
+]
+PATCH: list[Content] = [
+    {"load_N": 0.0},
+    {"road_N": np.nan},
+    {"rim_N": np.zeros(2)},
+    {"deflection_m": "deep"},
+    {"stiffness_N_per_m": np.inf},
+    {"ring": np.array([0, 1, 2])},
+    {"ring": np.array([-1, 0, 1])},
+    {"ring": np.array([0.0, 1.0, 1.0])},
+    {"node": np.array([0, 1, 3])},
+    {"ring": np.array([0, 1])},
+    *({name: np.zeros(2)} for name in ("along_m", "across_m", "pressure_Pa", "area_m2")),
+    {"node": np.array([0, 1])},
+    {"traction_Pa": np.zeros((2, 2))},
+    {"surplus": 1.0},
+    {"traction_Pa": np.zeros((3, 3))},
+    {"displacement": np.zeros((3, 3, 3))},
+    {"displacement": np.zeros((2, 2, 3))},
+    {"displacement": np.zeros((2, 3, 2))},
+    {"contact_area_m2": 0.0},
+    {"mode_frequency_Hz": None},
+    {"mode_node": None},
+    {"mode_shape": None},
+    {"mode_frequency_Hz": np.ones(2)},
+    {"mode_node": np.arange(3)},
+    {"mode_shape": np.zeros((1, 3, 2, 3))},
+    {"mode_shape": np.zeros((1, 2, 2, 2))},
+]
+
+
+@pytest.mark.parametrize(
+    ("change", "where"),
+    [
+        (change, where)
+        for where, changes in (
+            ("modes", MODES),
+            ("mode", MODE),
+            ("pressed", PRESSED),
+            ("patch", PATCH),
+        )
+        for change in changes
+    ],
+    ids=str,
+)
+def test_what_does_not_go_together_is_no_record(change: Content, where: str) -> None:
+    content = of_modes() if where in ("modes", "mode") else of_footprints()
+    check({"answer": content})
+    inner = {"mode": lambda: content["modes"][0], "patch": lambda: content["footprints"][0]}
+    inner.get(where, lambda: content)().update(change)
+    with pytest.raises(Damaged):
+        check({"answer": content})
+
+
+def test_what_may_be_missing_of_a_record() -> None:
+    """Slopes, the inflation, harmonics' points in three dimensions, what was not measured of a
+    shape; modes under load and the area of a patch."""
+    content = of_modes()
+    content |= {"gradients": {}, "displacement": np.zeros((0, 3)), "points": np.zeros((3, 3))}
+    content["modes"][1]["displacement"][0] = np.nan
+    check({"answer": content})
+    flat = content["modes"].pop(0)
+    content["nodes"] = np.arange(2)  # of the section alone they are the points'
+    check({"answer": content})
+    content["modes"].append(flat)
+    with pytest.raises(Damaged):
+        check({"answer": content})
+    content = of_footprints()
+    for name in ("contact_area_m2", "mode_frequency_Hz", "mode_node", "mode_shape"):
+        del content["footprints"][0][name]
+    check({"answer": content | {"cause": "unstable", "failure": "it fell over"}})
+    check({"cause": "unstable", "words": "it fell over", "folder": None})
+    for cause in ("timed_out", 3):
+        with pytest.raises(Damaged):
+            check({"cause": cause, "words": "it fell over", "folder": None})
 
 
 def test_two_records_that_changed_places(tmp_path: Path) -> None:

@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 
 from tyrecal.simulate.deck.tyre_design import TyreDesign
-from tyrecal.simulate.evaluate.evaluator import Evaluator
+from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.simulate.evaluate.failure import DeckRefused, EvaluationFailed
 from tyrecal.simulate.evaluate.store import Store
 
 from ..studies.hertz import Hertz
+from . import stand_in
 from .stand_in import CASE
 
 LOADS = (500.0, 4000.0)
@@ -65,6 +66,7 @@ def test_time_that_ran_out_is_not_on_record(tmp_path: Path) -> None:
     [
         (lambda answer: answer["footprints"].pop(), "footprints at"),
         (lambda answer: answer["footprints"].clear(), "footprints at"),
+        (lambda answer: answer.update(footprints=[], failure="no load"), "footprints at"),
         (lambda answer: answer["footprints"].reverse(), "footprints at"),
         (lambda answer: answer.update(failure="no more"), "footprints at"),
         (lambda answer: answer["footprints"][0].update(road_N=400.0), "bears 400 N of 500 N"),
@@ -108,3 +110,17 @@ def test_modes_on_a_road_are_another_capability_than_a_footprint(tmp_path: Path)
     none.needs_road(modes=True)
     with pytest.raises(DeckRefused, match=r"press a tyre on a road.*\(footprint\)"):
         none.needs_road()
+
+
+def test_unless_asked_otherwise_all_is_done_in_this_process(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(
+        "tyrecal.simulate.evaluate.evaluator.executor", lambda *asked: pytest.fail("elsewhere")
+    )
+    asked = evaluator(tmp_path)
+    assert len(list(asked.press_all([{}, {"C10": 9e5}], LOADS))) == asked.counts.runs == 2
+    assert len(list(asked.press_all([{}], LOADS, jobs=2))) == 1  # one design needs no other
+    questions = [Question({"C10": value}) for value in (1e6, 2e6)]
+    plain = stand_in.evaluator(tmp_path / "plain")
+    assert len(list(plain.evaluate_all(questions))) == len(list(plain.answer_all(questions))) == 2

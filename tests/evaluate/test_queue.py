@@ -35,6 +35,13 @@ def script(system: str, folder: Path) -> list[str]:
     return text.splitlines()
 
 
+def test_a_task_whose_worker_dies_is_given_to_three_others(tmp_path: Path) -> None:
+    path = tmp_path / "cluster.yaml"
+    path.write_text(SETTINGS.format(system="slurm"))
+    with jobs_of(read_settings(path)) as cluster:
+        assert cluster.scheduler.allowed_failures == 3
+
+
 def test_a_job_of_slurm(tmp_path: Path) -> None:
     lines = script("slurm", tmp_path)
     for line in (

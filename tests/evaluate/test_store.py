@@ -268,3 +268,15 @@ def test_a_full_disc_under_the_run_is_an_error(tmp_path: Path) -> None:
     with pytest.raises(OSError, match=r"No space left on device: .*run-"):
         ask(evaluator(tmp_path, Full()))
     assert not any((tmp_path / "runs").iterdir()) and not records(tmp_path)
+
+
+def test_a_key_tells_what_belongs_to_which_file(tmp_path: Path) -> None:
+    """Files of the same names and bytes, one after the other, but parted elsewhere."""
+    keys = set()
+    for files in ({"a": b"b1", "c": b"2"}, {"ab": b"1", "c": b"2"}, {"a": b"b1c", "2": b""}):
+        folder = tmp_path / str(len(keys))
+        folder.mkdir()
+        for name, content in files.items():
+            (folder / name).write_bytes(content)
+        keys.add(store_module.key_of(folder, StandIn()))
+    assert len(keys) == 3

@@ -18,9 +18,10 @@ from tyrecal.simulate.evaluate.executor import Here, WorkerLost
 from tyrecal.simulate.evaluate.failure import DeckRefused, EvaluationFailed
 from tyrecal.simulate.evaluate.results import Evaluation
 from tyrecal.studies.fit import calibrate as calibrate_module
-from tyrecal.studies.fit.calibrate import calibrate
+from tyrecal.studies.fit.calibrate import calibrate, history_csv
 from tyrecal.studies.fit.crossing import crossing, gap
 from tyrecal.studies.fit.problem import Problem, Target, objective, read_targets
+from tyrecal.studies.fit.result import StartReport, fit_result
 from tyrecal.studies.fit.slsqp import _beyond_crossing
 from tyrecal.tyre.case import LoadedCase, start_values
 from tyrecal.tyre.load import load_case
@@ -263,6 +264,12 @@ def test_a_start_whose_process_dies_ends_the_fit(monkeypatch: pytest.MonkeyPatch
     assert failure.value.cause == "crashed"
 
 
+def test_one_start_is_nothing_to_count() -> None:
+    told: list[tuple[int, int]] = []
+    fit = calibrate(CASE, evaluator(), finished=lambda *done: told.append(done))  # type: ignore[arg-type]
+    assert told == [] and len(fit.result["starts"]) == 1 and fit.result["replaced_starts"] == 0
+
+
 def test_starts_are_drawn_replaced_and_reproducible() -> None:
     fails = lambda values: values["C10"] > 4e6 or values["C10"] < 1.2e5
     first, second = (
@@ -422,3 +429,69 @@ def test_slopes_at_a_crossing_are_those_of_the_difference(weights: list[float]) 
         wanted = gap(problem.evaluate(START_X + e)) - gap(problem.evaluate(START_X - e))
         assert found.slopes[k] == pytest.approx(wanted / (2 * h), rel=1e-5)
     assert found.at(point.x + e) == pytest.approx(gap(problem.evaluate(point.x + e)), abs=1e-6)
+
+
+def test_the_result_says_what_happened() -> None:
+    """Points, failures, when the objective was near its end, and deviations, from the history."""
+    fails = lambda values: values["A_belt"] > 1.005 * TRUTH["A_belt"]
+    fit = calibrate(CASE, evaluator(fails=fails), starts=3, seed=1)  # type: ignore[arg-type]
+    told, history = fit.result, fit.history
+    objectives = [row["objective_Hz"] for row in history]
+    assert [row["point"] for row in history] == list(range(1, len(history) + 1))
+    assert [row["start"] for row in history] == sorted(row["start"] for row in history)
+    assert {row["start"] for row in history} == {1, 2, 3}
+    assert [s["evaluations"] for s in told["starts"]] == [
+        sum(row["start"] == k for row in history) for k in (1, 2, 3)
+    ]
+    failed = [row for row in history if row["objective_Hz"] is None]
+    assert told["failed_evaluations"] == len(failed) > 0 and told["replaced_starts"] > 0
+    assert told["gradient_evaluations"] == len(history) - len(failed)
+    assert all((row["failure"] is None) == (row["objective_Hz"] is not None) for row in history)
+    near = [f is not None and f < told["objective_Hz"] + 0.05 for f in objectives]
+    assert told["evaluations_to_0.05_Hz"] == near.index(True) + 1 > 2
+    assert told["objective_Hz"] == min(s["objective_Hz"] for s in told["starts"])
+    assert told["objective_Hz"] == fit.fitted.objective < told["initial_objective_Hz"]
+    assert told["initial_objective_Hz"] == fit.initial.objective == objectives[0]
+    for mode, label in zip(told["modes"], LABELS, strict=True):
+        assert (mode["c"], mode["m"], mode["kind"]) == (label.c, label.m, label.kind)
+        share = mode["fitted_Hz"] / mode["target_Hz"] - 1
+        assert mode["deviation_percent"] == pytest.approx(100 * share)
+        assert mode["initial_Hz"] == fit.initial.modes[label].frequency_Hz
+        assert mode["fitted_Hz"] == mode["frequency_Hz"] == fit.fitted.modes[label].frequency_Hz
+    for i, a in enumerate(told["variables"]):
+        assert told["correlations"][a][a] == pytest.approx(1)
+        one = told["variables"][a]
+        assert one["initial"] == START[a] and one["value"] == fit.fitted.values[a]
+        assert (one["lower"], one["upper"]) == (
+            CASE.case.variables[a].lower,
+            CASE.case.variables[a].upper,
+        )
+        assert fit.fitted.x[i] == pytest.approx(np.log(one["value"]))
+    lines = history_csv(history).splitlines()
+    assert lines[0] == "point,start,A_belt,A_carcass,C10,objective_Hz,failure"
+    assert len(lines) == len(history) + 1
+    first = lines[1].split(",")
+    assert [float(cell) for cell in first[:-1]] == [1, 1, *START.values(), objectives[0]]
+    assert first[-1] == "" and any("inflation stopped" in line for line in lines)
+
+
+@pytest.mark.parametrize(("gap", "at_bound"), [(0.9e-6, True), (1.1e-6, False)])
+@pytest.mark.parametrize("side", ["lower", "upper"])
+def test_a_variable_is_at_a_bound_to_a_millionth(gap: float, at_bound: bool, side: str) -> None:
+    problem = Problem(CASE, evaluator())  # type: ignore[arg-type]
+    x = START_X.copy()
+    x[2] = problem.lower[2] + gap if side == "lower" else problem.upper[2] - gap
+    point = problem.evaluate(x)
+    report = StartReport({}, point, "", True, [])
+    history = [{"objective_Hz": point.objective, "values": {}}]
+    found = fit_result(problem, point, report, [report], history, 0, "slsqp").variables
+    assert [one.at_bound for one in found.values()] == [False, False, at_bound]
+
+
+@pytest.mark.parametrize(("change", "moved"), [(1.1e-6, True), (-1.1e-6, True), (0.9e-6, False)])
+def test_a_fit_has_moved_by_more_than_a_millionth(change: float, moved: bool) -> None:
+    problem = Problem(CASE, evaluator())  # type: ignore[arg-type]
+    first, last = problem.evaluate(START_X), problem.evaluate(START_X + change * np.eye(3)[1])
+    report = StartReport({}, last, "", True, [])
+    history = [{"objective_Hz": last.objective, "values": {}}]
+    assert fit_result(problem, first, report, [report], history, 0, "slsqp").moved == moved

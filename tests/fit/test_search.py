@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 from types import SimpleNamespace
 from typing import Any
@@ -15,6 +16,7 @@ from tyrecal.simulate.evaluate.failure import EvaluationFailed
 from tyrecal.studies.fit import least_squares, slsqp
 from tyrecal.studies.fit.calibrate import _tolerance
 from tyrecal.studies.fit.crossing import AXIAL, TORSIONAL, Crossing, crossing
+from tyrecal.studies.fit.differences import differences
 from tyrecal.studies.fit.problem import Point, Target
 from tyrecal.studies.fit.uncertainty import uncertainty
 from tyrecal.studies.fit.variable import Variable, read_variable
@@ -236,6 +238,21 @@ class Paired(Linear):
     targets = (Target(AXIAL, 40.0), Target(TORSIONAL, 40.0))
 
 
+def test_no_crossing_is_looked_for_where_no_design_lies_beyond(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """However mixed the labels are."""
+
+    class OneSided(Paired):
+        def evaluate(self, x: Array) -> Point:
+            return replace(super().evaluate(x), modes=pair(3.0, 0.1))
+
+    monkeypatch.setattr(slsqp, "crossing", lambda *asked: pytest.fail("looked for one"))
+    plain = linear()
+    problem: Any = OneSided(plain.J, plain.J @ [1.0, 2.0, 3.0] - 0.3)
+    assert slsqp._descend(problem, problem.evaluate(np.zeros(3)), 1e-3).message == "converged"
+
+
 def test_a_step_that_meets_the_crossing_leaves_it_some_room() -> None:
     """A tenth of the gap of the point that it starts from, on whichever side that is."""
     for side in (1.0, -1.0):
@@ -339,20 +356,22 @@ def test_uncertainty_by_its_formula() -> None:
 
 def test_noise_is_what_is_left_over_the_freedom_that_is_left() -> None:
     """Of four frequencies without sigma and two variables: two degrees; a fifth, known one takes
-    its leverage."""
+    its leverage. Weights are none of the noise."""
     random = generator("noise")
     J, y = random.normal(size=(5, 2)), random.normal(size=5)
+    scale = np.array([1.0, 4.0, 0.5, 2.0, 3.0])
+    J = scale[:, None] * J
     variables = [Variable("a", 3.0, 1.0, 9.0), Variable("b", 3.0, 1.0, 9.0)]
     point_of = lambda n: Point(
-        {"a": 3.0, "b": 3.0}, np.zeros(2), y[:n], J[:n], {}, 1.0, 1.0, np.empty(0), 0.0
+        {"a": 3.0, "b": 3.0}, np.zeros(2), (scale * y)[:n], J[:n], {}, 1.0, 1.0, np.empty(0), 0.0
     )
     none = [SimpleNamespace(sigma_Hz=None)] * 4
     told: dict[str, Any] = {"variables": variables, "footprint": []}
-    problem: Any = SimpleNamespace(scale=np.ones(4), targets=none, **told)
+    problem: Any = SimpleNamespace(scale=scale[:4], targets=none, **told)
     found = uncertainty(problem, point_of(4))
     assert found.noise_Hz == pytest.approx(np.linalg.norm(y[:4]) / np.sqrt(2))
     known = [*none, SimpleNamespace(sigma_Hz=0.3)]
-    problem = SimpleNamespace(scale=np.ones(5), targets=known, **told)
+    problem = SimpleNamespace(scale=scale, targets=known, **told)
     leverage = J[4] @ np.linalg.inv(J.T @ J) @ J[4]
     noise = np.linalg.norm(y[:4]) / np.sqrt(4 - (2 - leverage))
     sigma = np.sqrt((4 * noise**2 + 0.3**2) / 5)
@@ -373,3 +392,59 @@ def test_a_variables_coordinate_and_back(log: bool) -> None:
             assert v.slope(value) == pytest.approx(rise, rel=1e-6)
     assert v.value(v.scaled(0.7)) == 0.7
     assert v.value(v.scaled(2.3) + 1) == 2.3 and v.value(v.scaled(0.3) - 1) == 0.3
+
+
+def asked_slopes(ask: Any, start: dict[str, float], step: float = 0.1, **how: Any) -> Any:
+    """Differences of two linear variables within -1 to 1, and the steps that were asked for."""
+    variables = [Variable(name, 0.0, -1.0, 1.0, log=False) for name in start]
+    steps: list[dict[str, float]] = []
+
+    def told(designs: Any) -> Any:
+        steps.extend({n: round(v[n] - start[n], 9) for n in v if v[n] != start[n]} for v in designs)
+        return [ask(v) for v in designs]
+
+    return differences(variables, start, step, told, **how), steps
+
+
+def test_slopes_are_differences_to_one_neighbour_that_has_room() -> None:
+    """Per coordinate, which is half the value here; above, or below where a bound is too near."""
+    values = lambda v: np.array([3 * v["a"] - v["b"], 2 * v["b"] + 5])
+    for start, wanted in (
+        ({"a": 0.0, "b": 0.2}, [{}, {"a": 0.2}, {"b": 0.2}]),
+        ({"a": 0.8, "b": 0.81}, [{}, {"a": 0.2}, {"b": -0.2}]),
+        ({"a": -1.0, "b": 1.0}, [{}, {"a": 0.2}, {"b": -0.2}]),
+    ):
+        (centre, slopes), steps = asked_slopes(values, start)
+        assert steps == wanted and centre == pytest.approx(values(start))
+        assert slopes == pytest.approx(np.array([[6.0, -2.0], [0.0, 4.0]]))
+        _, steps = asked_slopes(values, start, centre=values(start))
+        assert steps == wanted[1:]
+
+
+def test_a_step_is_a_third_of_the_room_at_most() -> None:
+    (_, slopes), steps = asked_slopes(lambda v: np.array([1 + v["a"]]), {"a": 0.0}, 0.9)
+    assert steps == [{}, {"a": round(2 / 3, 9)}] and slopes == pytest.approx(np.array([[2.0]]))
+
+
+def test_a_neighbour_beyond_a_jump_or_without_a_solution_gives_way_to_the_other() -> None:
+    """A jump is a slope of 20 times the quantity and more; without either neighbour there is no
+    slope, and without a licence no question."""
+    jump = lambda v: np.array([1.0 + (2.2 if v["a"] > 0 else 0.0) - 0.5 * v["a"]])
+    (_, slopes), steps = asked_slopes(jump, {"a": 0.0}, steepest=20.0)
+    assert steps == [{}, {"a": 0.2}, {"a": -0.2}] and slopes == pytest.approx(np.array([[-1.0]]))
+    (_, slopes), steps = asked_slopes(jump, {"a": 0.0}, steepest=21.5)
+    assert steps == [{}, {"a": 0.2}] and slopes == pytest.approx(np.array([[21.0]]))
+
+    def failing(cause: str, both: bool) -> Any:
+        failure = EvaluationFailed(cause, "not there")
+        return lambda v: failure if v["a"] > 0 or (both and v["a"] < 0) else np.array([1 + v["a"]])
+
+    (_, slopes), _ = asked_slopes(failing("no_equilibrium", False), {"a": 0.0})
+    assert slopes == pytest.approx(np.array([[2.0]]))
+    for ask, count in ((failing("no_equilibrium", True), 3), (failing("licence", False), 2)):
+        seen: list[Any] = []
+        with pytest.raises(EvaluationFailed, match="not there"):
+            asked_slopes(lambda v, ask=ask, seen=seen: seen.append(v) or ask(v), {"a": 0.0})  # type: ignore[misc]
+        assert len(seen) == count
+    with pytest.raises(EvaluationFailed, match="not there"):
+        asked_slopes(lambda v: EvaluationFailed("crashed", "not there"), {"a": 0.0})

@@ -3,19 +3,15 @@ sensors do not determine them."""
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tyrecal.measured.labels import (
-    MIN_LABEL_PROBABILITY,
-    OTHER_PARITY,
-    SAME_PARITY,
-    SIDEWALL,
-    Labeller,
-)
-from tyrecal.measured.modal import LabelledMode, settled
+from tyrecal.measured.labels import Judged, Labeller
+from tyrecal.measured.modal import LabelledMode, _labelled, settled
 from tyrecal.measured.sensors import MeasuredMode, Sensors, real_part
 from tyrecal.simulate.modes.mode import Label
 
@@ -23,6 +19,9 @@ from ..chance import Chance, generator
 from .tyres import HIGHEST, layout, measured, modes, noted
 
 pytestmark = pytest.mark.numbers
+
+MIN_LABEL_PROBABILITY = 0.9  # a label is told from this probability on
+SAME_PARITY, OTHER_PARITY, SIDEWALL = 0.03, 0.01, 0.5  # energies beside the label's own, of 1
 
 
 def ring(count: int, across: tuple[float, ...] = (0.0,), directions: str = "rtz") -> Sensors:
@@ -95,6 +94,7 @@ def test_poor_layouts_are_as_sure_as_they_are_right(chance: Chance) -> None:
         judged = Labeller(noted(sensors, rng), HIGHEST + 2).judge(
             real_part(measured(mode, sensors, nodes, rng, 0.1))[0]
         )
+        assert (judged.label is not None) == (judged.confidence >= MIN_LABEL_PROBABILITY)
         sure.append(judged.confidence)
         right.append(next(iter(judged.probabilities)) == mode.label)
     p, hit = np.array(sure), np.array(right)
@@ -168,7 +168,6 @@ def test_motions_that_are_not_the_labels_are_smaller_still_of_the_other_parity(m
         SIDEWALL * (OTHER_PARITY if (side + m + (d == 2)) % 2 else 1) for _, side, d in sides
     ]
     assert energy / energy[shares.index(1.0)] == pytest.approx(shares, rel=0.1)
-    assert OTHER_PARITY < SAME_PARITY < 0.1 < SIDEWALL < 1
 
 
 def test_layouts_know_beforehand_what_they_cannot_tell() -> None:
@@ -252,3 +251,94 @@ def test_doublets_have_two_members_and_overtones_no_label() -> None:
         (120.0, None, ""),
     ]
     assert "[2,1] stands at 66.10 Hz already" in settled(given)[-1].judged.why
+
+
+def test_another_number_of_waves_holds_a_thousandth() -> None:
+    """Of radial sensors on the middle line, which see r P0 and half of r P2 (energies 1 and 5):
+    [2,0] beside a wave of c = 3, of which the mean over c = 0 to 6 has a seventh."""
+    sensors = ring(17, directions="r")
+    labeller = Labeller(sensors, 6)
+    S = labeller.covariance[labeller.labels.index(Label(2, 0))]
+    assert np.trace(S) == pytest.approx(17)
+    energy = {}
+    for c in (2, 3):
+        wave = np.cos(c * sensors.points[:, 1])
+        energy[c] = wave @ S @ wave
+    other = 0.001 * (1 + 1 / 4) / 7
+    assert energy[3] / energy[2] == pytest.approx(other / (1 + 0.03 * 5 / 4 + other), rel=1e-6)
+
+
+def test_probabilities_are_those_of_normal_signals_of_any_size() -> None:
+    """p(u | label) by the formula of the module, over its five sizes of noise."""
+    sensors = ring(7, across=(-0.06, 0.06))
+    labeller = Labeller(sensors, 4)
+    u = waves(sensors, 2) + 0.4 * generator("signals").standard_normal(len(sensors.points))
+    k, ln = len(u), []
+    for S in labeller.covariance:
+        each = []
+        for nu in (1e-4, 1e-3, 1e-2, 5e-2, 0.2):
+            whole = S + nu * np.eye(k)
+            square = u @ np.linalg.solve(whole, u)
+            each.append(-np.linalg.slogdet(whole)[1] / 2 - k / 2 * np.log(square))
+        ln.append(np.logaddexp.reduce(each))
+    p = np.exp(np.array(ln) - max(ln))
+    wanted = dict(zip(labeller.labels, p / p.sum(), strict=True))
+    found = labeller.judge(u).probabilities
+    assert found == pytest.approx(wanted, abs=1e-9) and list(found.values())[1] > 1e-6
+    i, j = 3, 8
+    Si, Sj = (labeller.covariance[n] + 0.01 * np.eye(k) for n in (i, j))
+    change = np.linalg.slogdet(Sj)[1] - np.linalg.slogdet(Si)[1]
+    odds = (np.trace(np.linalg.inv(Sj) @ Si) - k + change) / 2
+    assert labeller.odds(i, j) == pytest.approx(odds)
+
+
+@pytest.mark.parametrize("size", [1e-40, 1e40])
+def test_a_shapes_unit_is_never_too_large_or_too_small(size: float) -> None:
+    sensors = ring(9, across=(-0.06, 0.06))
+    labeller, u = Labeller(sensors, 4), waves(sensors, 2)
+    assert labeller.judge(size * u).probabilities == pytest.approx(labeller.judge(u).probabilities)
+
+
+def belt_and_walls() -> Sensors:
+    """Nine radial sensors on the tread, nine on either sidewall."""
+    rows = [
+        (R, 2 * np.pi * a / 9, z)
+        for R, z in ((0.39, 0.0), (0.3, 0.1), (0.3, -0.1))
+        for a in range(9)
+    ]
+    return Sensors(np.array(rows), np.tile([1.0, 0.0, 0.0], (27, 1)))
+
+
+def told_of(amplitude: np.ndarray) -> LabelledMode:
+    """What is told of a shape that the labels are sure of."""
+    sensors = belt_and_walls()
+    sure = SimpleNamespace(sensors=sensors, judge=lambda shape: Judged(Label(2, 0), {}, ""))
+    return _labelled(MeasuredMode(66.0, amplitude), sure, "a.uff")  # type: ignore[arg-type]
+
+
+def test_a_shape_is_told_with_its_largest_value_1() -> None:
+    wave = np.tile(np.cos(2 * np.pi * np.arange(9) * 2 / 9), 3)
+    for size in (1e-5, 1.0, 3e4j):
+        shape = told_of(size * wave + 0j).shape
+        assert abs(shape).max() == pytest.approx(1) and abs(shape[0]) == pytest.approx(1)
+        assert abs(shape) == pytest.approx(abs(wave))
+    assert not told_of(np.zeros(27, complex)).shape.any()
+
+
+@pytest.mark.parametrize(("part", "label"), [(0.11, True), (0.09, False)])
+def test_a_mode_of_the_sidewalls_has_no_label(part: float, label: bool) -> None:
+    """The mean square of the belt's motion is below a tenth of all sensors'."""
+    wall = np.sqrt((3 / part - 1) / 2)
+    told = told_of(np.repeat([1.0, wall, wall], 9) + 0j)
+    assert (told.judged.label is not None) == label
+    assert label or "the belt hardly moves" in told.judged.why
+
+
+@pytest.mark.parametrize(("collinear", "label"), [(0.51, True), (0.49, False)])
+def test_a_complex_shape_has_no_label(collinear: float, label: bool) -> None:
+    size = np.sqrt((1 - collinear) / (1 + collinear))
+    turn = 2 * np.pi * np.arange(9) * 2 / 9
+    told = told_of(np.tile(np.cos(turn) + 1j * size * np.sin(turn), 3))
+    assert told.collinearity == pytest.approx(collinear)
+    assert (told.judged.label is not None) == label
+    assert label or "collinearity 0.49" in told.judged.why

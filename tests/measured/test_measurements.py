@@ -51,6 +51,48 @@ def test_a_wrong_line_is_named(tmp_path: Path, line: str, words: str) -> None:
     assert "line 3" in sentence and words in sentence
 
 
+@pytest.mark.parametrize(
+    ("good", "bad"),
+    [
+        ("frequency_Hz,2,0,,,20,0,79.5,0.2", "frequency_Hz,2,0,,,19.9,0,79.5,0.2"),
+        ("frequency_Hz,2,0,,,2000,0,79.5,0.2", "frequency_Hz,2,0,,,2001,0,79.5,0.2"),
+        ("frequency_Hz,20,3,,,240,0,79.5,0.2", "frequency_Hz,21,3,,,240,0,79.5,0.2"),
+        ("frequency_Hz,20,3,,,240,0,79.5,0.2", "frequency_Hz,20,4,,,240,0,79.5,0.2"),
+        ("frequency_Hz,2,0,,,240,0,75,15", "frequency_Hz,2,0,,,240,0,75,15.1"),
+        ("frequency_Hz,2,0,,1,240,0,79.5,0.2", "frequency_Hz,2,0,,0,240,0,79.5,0.2"),
+        ("frequency_Hz,0,1,,,240,0,79.5,0.2", "frequency_Hz,0,1,axial,,240,0,79.5,0.2"),
+        ("frequency_Hz,1,0,,,240,0,79.5,0.2", "frequency_Hz,1,0,torsional,,240,0,79.5,0.2"),
+        ("frequency_Hz,0,1,,symmetric,240,4e3,79.5,1", "frequency_Hz,0,1,,,240,4e3,79.5,1"),
+        ("frequency_Hz,2,0,,,240,0,79.5,0.2", "frequency_Hz,2,0,,,240,-1,79.5,0.2"),
+        ("frequency_Hz,2,0,,,240,0,79.5,0.2", "frequency_Hz,2,0,,,240,some,79.5,0.2"),
+        ("contact_area_m2,,,,,240,0.5,0.02,0.001", "contact_area_m2,,,,,240,0,0.02,0.001"),
+        ("mass_kg,,,,,20,0,12.5,0.05", "mass_kg,,,,1,20,0,12.5,0.05"),
+        ("mass_kg,,,,,20,0,12.5,0.05", "mass_kg,,,axial,,20,0,12.5,0.05"),
+    ],
+)
+def test_what_is_allowed_at_a_limit_and_refused_beyond(tmp_path: Path, good: str, bad: str) -> None:
+    assert len(read(tmp_path, good)) == 1
+    with pytest.raises(InputError, match="line 2"):
+        read(tmp_path, bad)
+
+
+def test_ten_thousand_lines_are_read_and_no_more(tmp_path: Path) -> None:
+    """The headings are one of them."""
+    lines = [f"frequency_Hz,2,0,,,{20 + 0.1 * i:.1f},0,79.5,0.2" for i in range(10_000)]
+    assert len(read(tmp_path, *lines[1:])) == 9_999
+    with pytest.raises(InputError, match="more than 10000 lines"):
+        read(tmp_path, *lines)
+
+
+def test_pairs_and_single_values_of_another_load_or_pressure_do_not_meet(tmp_path: Path) -> None:
+    line = "frequency_Hz,2,0,,{},{},{},79.5,0.2"
+    apart = [line.format(1, 240, 0), line.format("", 250, 0), line.format("symmetric", 250, 1)]
+    assert len(read(tmp_path, *apart)) == 3
+    for member in ("2", ""):  # whichever comes first
+        with pytest.raises(InputError, match="line 3: gives a pair a member"):
+            read(tmp_path, line.format(member, 240, 0), line.format("" if member else 2, 240, 0))
+
+
 def test_what_is_left_empty_is_none(tmp_path: Path) -> None:
     """No load and, of the mass, no pressure: 0; and no label."""
     mode, mass = read(tmp_path, "frequency_Hz,2,0,,,240,,79.5,0.2", "mass_kg,,,,,,,12.5,0.05")

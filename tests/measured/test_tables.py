@@ -185,3 +185,15 @@ def test_a_table_may_be_as_long_as_is_said(tmp_path: Path, monkeypatch: pytest.M
     assert len(read(tmp_path, PLAIN)) == 2
     with pytest.raises(InputError, match="more than 3 lines"):
         read(tmp_path, PLAIN + "3,1,,240,102.7\n")
+
+
+def test_a_table_of_more_than_ten_thousand_lines_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="more than 10000 lines"):
+        read(tmp_path, PLAIN + "2,1,,240,66.1\n" * 9_998)
+
+
+def test_a_cell_may_have_three_hundred_characters(tmp_path: Path) -> None:
+    lines = lambda count: f"remark,c,m,f,pressure [kPa]\n{'x' * count},2,1,66.1,240\n"
+    assert len(read(tmp_path, lines(300))) == 1
+    with pytest.raises(InputError, match="line 2: a cell of 301 characters"):
+        read(tmp_path, lines(301))

@@ -261,15 +261,28 @@ def test_an_order_is_claimed_with_a_fifth_of_the_motion(share, label):
     assert labels([lower, upper]) == [Label(3, 1), label]
 
 
-@pytest.mark.parametrize("part, label", [(0.09, Label(3, 2)), (0.11, Label(3, 0))])
-def test_an_order_is_claimed_with_a_tenth_of_the_belts_part(part, label):
-    """Of the mean square motion; below that a mode of the sidewalls claims nothing."""
+def with_sidewalls(part):
+    """[3,0] on the belt, whose mean square motion is that share of all points'."""
     belt = POINTS[:, 0] > 0.94 * POINTS[:, 0].max()
     u = np.where(belt[:, None], [1.0, 0.6j, 0.0], 0.0)
     u[~belt, 2] = np.sqrt(1.36 * (1 / part - belt.mean()) / (1 - belt.mean()))
-    made = HarmonicShape(3, NODES, POINTS, u)
+    return HarmonicShape(3, NODES, POINTS, u)
+
+
+@pytest.mark.parametrize("part, label", [(0.09, Label(3, 2)), (0.11, Label(3, 0))])
+def test_an_order_is_claimed_with_a_tenth_of_the_belts_part(part, label):
+    """Of the mean square motion; below that a mode of the sidewalls claims nothing."""
+    made = with_sidewalls(part)
     assert belt_motion(made).participation == pytest.approx(part)
     assert labels([RawMode(50.0, made, 2)]) == [label]
+
+
+@pytest.mark.parametrize("hertz, first", [(69.0, False), (72.0, True), (200.0, True)])
+def test_of_two_that_move_the_belt_alike_the_more_compliant_part_has_the_label(hertz, first):
+    """Half of the belt's part at 50 Hz against all of it above: they are even at 50 sqrt(2) Hz."""
+    modes = [RawMode(50.0, with_sidewalls(0.5), 2), RawMode(hertz, with_sidewalls(1.0), 2)]
+    assert (labels(modes)[0] == Label(3, 0)) == first
+    assert (labels(modes)[1] == Label(3, 0)) != first
 
 
 def test_halves_are_joined_to_half_a_per_cent():
@@ -302,3 +315,30 @@ def test_the_next_free_overtone_of_its_parity_is_taken():
     assert labels(many) == [TORSIONAL, Label(0, 2), Label(0, 4)]
     many = [mode(50.0 + i, 2, [ORDERS[m]]) for i, m in enumerate((0, 0, 0, 1, 1))]
     assert labels(many) == [Label(2, 0), Label(2, 2), Label(2, 4), Label(2, 1), Label(2, 3)]
+
+
+@pytest.mark.parametrize("motion, m", [({"r": [1.0]}, 0), ({"r": [0, 1.0]}, 1)])
+def test_two_rings_carry_a_plane_and_no_higher_degree(motion, m):
+    """What is constant over the width, or linear, is nothing else, though a parabola or a cubic
+    through two places might be as well."""
+    theta, z = np.tile(ANGLES, 2), np.repeat([-0.06, 0.06], len(ANGLES))
+    u = legval(z / 0.06, motion["r"]) * np.cos(2 * theta)
+    ring = RingShape(
+        np.column_stack([np.full(len(z), 0.39), theta, z]), np.column_stack([u, 0 * u, 0 * u])
+    )
+    assert belt_motion(ring).shares[m] == pytest.approx(1, abs=1e-6)
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_either_sidewall_tells_how_many_waves_there_are(side):
+    """The belt hardly moves, with two waves; one sidewall does, with three."""
+    rows = [
+        (0.39, 0.0, 0.1, 2),
+        (0.39, 0.03, 0.1, 2),
+        (0.32, 0.1 * side, 1.0, 3),
+        (0.32, -0.1 * side, 0.0, 3),
+    ]
+    points = [(R, angle, z) for R, z, _, _ in rows for angle in ANGLES]
+    u = np.concatenate([size * np.cos(c * ANGLES) for _, _, size, c in rows])
+    ring = RingShape(np.array(points), np.column_stack([u, 0 * u, 0 * u]))
+    assert belt_motion(ring).c == 3

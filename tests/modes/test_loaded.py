@@ -27,6 +27,9 @@ WHERE = rings(ANGLES, NODES, NODES, POINTS)
 LEAN = np.array([-1.0, 0.0, 1.0])
 
 
+NARROW = rings(ANGLES, NODES, NODES, np.array([[0.30, -0.05], [0.30, -0.04], [0.30, 0.05]]))
+
+
 def mode(n: int, r: Array, theta: Array, z: Array, kind: str | None = None) -> Mode:
     """u_r, u_z ~ exp(i n theta), u_theta ~ -i exp(i n theta), turned round the tyre by 0.7 rad."""
     amplitude = np.stack([r + 0j * LEAN, theta + 0j * LEAN, z + 0j * LEAN], -1) * np.exp(0.7j * n)
@@ -45,6 +48,15 @@ def test_areas_are_the_bands() -> None:
     np.testing.assert_allclose(WHERE.areas[0], WHERE.areas[0][::-1])
 
 
+def test_a_ring_has_half_of_the_way_to_either_neighbour() -> None:
+    angles = np.array([0.0, 0.1, 0.4, 1.0, 3.0, 5.0])
+    found = rings(angles, NODES, NODES, POINTS).areas
+    arcs = [(0.1 + 2 * np.pi - 5.0) / 2, 0.2, 0.45, 1.3, 2.0, (2 * np.pi - 3.0) / 2]
+    np.testing.assert_allclose(found[:, 1] / found.sum(0)[1], np.array(arcs) / (2 * np.pi))
+    order = np.array([2, 0, 1])  # whatever the order of the nodes
+    np.testing.assert_allclose(rings(angles, NODES[order], NODES, POINTS).areas, found[:, order])
+
+
 def test_members_of_a_doublet_stand_by_the_patch() -> None:
     """One even, one odd, about angle 0, wherever the doublet was turned to; orthogonal."""
     both = members(OVAL, WHERE)
@@ -55,6 +67,20 @@ def test_members_of_a_doublet_stand_by_the_patch() -> None:
         abs(shapes[0][0, :, 0]).min() == pytest.approx(1) and abs(shapes[1][0, :, 0]).max() < 1e-12
     )
     np.testing.assert_allclose(WHERE.overlaps(shapes, shapes), np.eye(2), atol=1e-3)
+
+
+def test_members_of_a_doublet_that_runs_round_stand_where_they_are_largest() -> None:
+    """Points of the section out of phase, as cords at a bias have them: no other phase has more of
+    its motion, area by area, along r and z in the patch's middle and of theta beside it."""
+    random = np.random.default_rng(3)
+    r, theta, z = random.normal(size=(3, 3)) + 1j * random.normal(size=(3, 3))
+    even, odd = members(mode(2, r, theta, z), NARROW).values()
+    amplitude = even[0] - 1j * odd[0]
+    axes, areas = np.array([1.0, 1j, 1.0]), NARROW.areas.sum(0)[:, None]
+    moves = lambda phase: ((amplitude * axes * np.exp(1j * phase)).real ** 2 * areas).sum()
+    assert max(areas) > 3 * min(areas)
+    others = np.array([moves(phase) for phase in np.linspace(0.05, np.pi - 0.05, 60)])
+    assert (others < moves(0.0)).all()
 
 
 @pytest.mark.parametrize(
@@ -137,6 +163,19 @@ def test_a_mode_that_left_is_not_named() -> None:
     found = follow(before, after, WIDE)
     assert found.position[0] == 0 and found.position[2] == -1
     assert found.spanned[0] == pytest.approx(1) and found.spanned[1] < 0.1
+
+
+def test_what_is_not_known_lies_above() -> None:
+    """A spring mixes a new mode in from above: the lower two keep their names, whose shapes have
+    come nearer to each other's, as they do where it was known from the beginning."""
+    basis = waves(3)[:3]
+    K = np.diag(np.array([40.0, 60.0, 80.0]) ** 2)
+    held = np.array([1.0, 1.0, 1.5])
+    before, after = solved(K, basis), solved(K + 3e3 * np.outer(held, held), basis)
+    lower = State(before.frequencies[:2], before.shapes[:2], before.symmetric[:2])
+    whole, part = follow(before, after, WIDE), follow(lower, after, WIDE)
+    np.testing.assert_array_equal(whole.position, np.arange(3))
+    np.testing.assert_array_equal(part.position, np.arange(2))
 
 
 def test_the_nearest_orthonormal_columns_do_not_depend_on_sizes() -> None:

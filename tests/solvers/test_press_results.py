@@ -114,12 +114,15 @@ def test_pressures_stand_where_their_nodes_have_moved(tmp_path: Path) -> None:
         + " -3\n"
         + " -4  CONTACT     6    1\n"
         + "".join(heads)
-        + lines((1, [-1e-5, -0.1, -0.2, 3e5, 0]), (2, [0.0, 0, 0, 0, 0]))
+        + lines((1, [-1e-5, -0.1, -0.2, 3e5, -1e5]), (2, [0.0, 0, 0, 0, 0]))
         + " -3\n 9999\n"
     )
     (tmp_path / "press.frd").write_text(text)
     (patch,) = read_pressures(tmp_path)
     assert patch.tolist() == [[pytest.approx(-0.09), pytest.approx(-0.2), 3e5]]
+    apart = text.replace(lines((2, [0.0, 0, 0, 0, 0])), "")  # what touches nothing may be missing
+    (tmp_path / "press.frd").write_text(apart)
+    assert apart != text and read_pressures(tmp_path)[0].tolist() == patch.tolist()
     (tmp_path / "press.frd").write_text(text.replace("CONTACT", "STRESS "))
     with pytest.raises(RunFailed, match="0 patches"):
         read_pressures(tmp_path)

@@ -10,6 +10,7 @@ sqrt(n / (n - v)) for the directions that were taken out. No measured data enter
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -67,6 +68,12 @@ def answer(case: LoadedCase) -> Answer:
 
 
 def main() -> None:
+    for label, percent in computed(print).items():
+        print(f'    "{label}": {percent:.2f},')
+
+
+def computed(tell: Callable[[str], None] = lambda line: None) -> dict[str, float]:
+    """Per cent by mode."""
     case = load_case(CASES / "p235_75r17.yaml")
     plain = answer(case)
     J, squares = plain.jacobian, []
@@ -76,10 +83,9 @@ def main() -> None:
         rest = d - J @ np.linalg.lstsq(J, d, rcond=None)[0]
         squares.append(rest.reshape(len(PRESSURES), -1) ** 2)
         raw, left = (100 * np.sqrt(np.mean(x**2)) for x in (d, rest))
-        print(f"{name}: rms {raw:.2f} %, {left:.2f} % after calibration")
+        tell(f"{name}: rms {raw:.2f} %, {left:.2f} % after calibration")
     per_mode = np.sqrt(np.mean(squares, axis=(0, 1)) * n / (n - v))
-    for label, sigma in zip(LABELS, per_mode, strict=True):
-        print(f'    "{label}": {max(FLOOR, 100 * sigma):.2f},')
+    return {str(x): max(FLOOR, 100 * sigma) for x, sigma in zip(LABELS, per_mode, strict=True)}
 
 
 if __name__ == "__main__":

@@ -13,8 +13,9 @@ import, and tests that start processes, need a mutated copy.
 
 Every mutant is a line of mutants.jsonl; where that has the commit, seed and number already, `run`
 goes on behind; with a larger budget those that survived a smaller one meet more tests, with --slow
-those too that are not quick, as far as `cover` knows them, and their last line counts. What
-survived is judged by hand: the keys `verdict` and `because` of its line.
+those too that are not quick, as far as `cover` knows them, and their last line counts; --areas
+leaves the others out. What survived is judged by hand: the keys `verdict` and `because` of its
+line.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ import sys
 import tempfile
 import time
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -81,16 +82,17 @@ def area_of(file: str) -> str:
     return next((a for a in QUOTA if file.startswith(f"{a}/")), file.rpartition("/")[0])
 
 
-def drawn(tree: Path, seed: int, count: int) -> list[Mutant]:
-    """``count`` mutants, the areas in the proportions of QUOTA, mixed."""
+def drawn(tree: Path, seed: int, count: int, areas: Sequence[str] = ()) -> list[Mutant]:
+    """``count`` mutants, ``areas`` (none: all) in the proportions of QUOTA, mixed."""
     chance, found = random.Random(seed), []
-    for area, share in QUOTA.items():
+    quota = {area: share for area, share in QUOTA.items() if not areas or area in areas}
+    for area, share in quota.items():
         lines: dict[tuple[str, int], list[Mutant]] = defaultdict(list)
         for path in sorted((tree / area).rglob("*.py")):
             file = path.relative_to(tree).as_posix()
             for mutant in mutants_of(file, path.read_bytes()):
                 lines[mutant.file, mutant.line].append(mutant)
-        wanted = round(share * count / sum(QUOTA.values()))
+        wanted = round(share * count / sum(quota.values()))
         for place in chance.sample(sorted(lines), wanted):
             source = (tree / place[0]).read_bytes()
             found.append(chance.choice([m for m in lines[place] if m.compiles(source)]))
@@ -240,7 +242,9 @@ class Runner:
             if (row["commit"], row["seed"]) == key
             and (row["outcome"] == "killed" or row["budget"] >= self.given.budget)
         }
-        mutants = list(enumerate(drawn(self.tree, self.given.seed, self.given.count)))
+        mutants = list(
+            enumerate(drawn(self.tree, self.given.seed, self.given.count, self.given.areas))
+        )
         only = {int(number) for number in self.given.only.split(",") if number}
         todo = [(i, m) for i, m in mutants if i not in done and (not only or i in only)]
         free = [self._slot(i) for i in range(self.given.jobs)]
@@ -418,6 +422,7 @@ def main() -> int:
     parser.add_argument("seed", nargs="?", type=int, help="of the draw")
     parser.add_argument("--tests", nargs="+", default=["tests"], help="which; by default all quick")
     parser.add_argument("--count", type=int, default=200)
+    parser.add_argument("--areas", nargs="+", default=[], help="of QUOTA; by default all")
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--only", default="", help="numbers of mutants")
     parser.add_argument("--budget", type=float, default=60.0, help="processor time of one, s")
