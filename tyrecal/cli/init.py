@@ -14,7 +14,7 @@ from . import options
 from .talk import Talk
 
 if TYPE_CHECKING:
-    from ..tyre.case.draft import Draft
+    from ..tyre.case.new_case import Draft
 
 POSITIVE = click.FloatRange(min=0, min_open=True)
 
@@ -86,7 +86,7 @@ def command(
     tyrecal init P235/75R17 --section my_stations.csv --output my_tyre.yaml
     tyrecal init 205/60R15 --section my_outline.csv --belt-width-mm 160 --output my_outline.yaml
     """
-    from ..tyre.case.draft import from_file, from_size
+    from ..tyre.case.new_case import from_file, from_size
     from ..tyre.guard import ALL_THE_SAME
     from ..tyre.section.size import INCH, parse_size
     from ..tyre.usual import GAUGES, USUAL

@@ -16,7 +16,7 @@ from scipy.spatial import cKDTree
 from ..errors import InputError
 from ..simulate.evaluate.results import Evaluation, HarmonicShape, RawMode
 from ..simulate.modes.mode import Mode
-from ..simulate.modes.sample import on_rings
+from ..simulate.modes.rings import on_rings
 from ..tyre.section.mesh import SectionMesh
 
 Array = np.ndarray
