@@ -11,7 +11,7 @@ import click
 
 from ..errors import InputError
 from . import options
-from .talk import Talk
+from .terminal import Terminal
 
 if TYPE_CHECKING:
     from ..tyre.case.new_case import Draft
@@ -73,7 +73,7 @@ def command(
     force: bool,
     allow_unusual: bool,
     pictures: bool,
-    talk: Talk,
+    terminal: Terminal,
 ) -> int:
     """Write the case of a tyre: from its SIZE code, or with a section of its own.
 
@@ -116,12 +116,17 @@ def command(
         assert tyre is not None
         draft = from_size(tyre, lengths, pressure_kPa, target.stem)
     draft.check(allow_unusual)
-    _write(draft, file, target, target.with_suffix(".png") if pictures else None, force, talk)
+    _write(draft, file, target, target.with_suffix(".png") if pictures else None, force, terminal)
     return 0
 
 
 def _write(
-    draft: Draft, file: Path | None, target: Path, picture: Path | None, force: bool, talk: Talk
+    draft: Draft,
+    file: Path | None,
+    target: Path,
+    picture: Path | None,
+    force: bool,
+    terminal: Terminal,
 ) -> None:
     """Write case, section and picture, none over an existing file and only what is right."""
     from ..files import whole
@@ -140,8 +145,8 @@ def _write(
     loaded = load_case(target, allow_unusual=True)
     outside = loaded.section.points[-1]
     written = {"case": str(target), "section": str(table)}
-    talk.result({**written, "picture": str(picture) if picture else None})
-    talk.say(
+    terminal.result({**written, "picture": str(picture) if picture else None})
+    terminal.say(
         f"{target}: {loaded.case.name}, outer diameter {2e3 * outside[0, 0]:.1f} mm, section width"
         f" {2e3 * outside[:, 1].max():.1f} mm, {loaded.case.pressure_kPa:g} kPa"
     )
@@ -153,5 +158,5 @@ def _write(
 
         section = section_data(loaded, resolved(loaded).mesh, {})
         save(draw_section(section, loaded.case.name, loaded.case.pressure_kPa), picture)
-        talk.say(f"section drawn in {picture}")
-    talk.say(f"next: tyrecal modes {shlex.quote(str(target))}")
+        terminal.say(f"section drawn in {picture}")
+    terminal.say(f"next: tyrecal modes {shlex.quote(str(target))}")
