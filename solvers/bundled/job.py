@@ -34,6 +34,8 @@ Failures = (InflationFailed, Unstable, NotConverged, NotSelfConsistent, NotPress
 class TimedOut(ArithmeticError):
     """The time limit passed."""
 
+    cause = "timed_out"
+
 
 def run(folder: Path, job: str, oldjob: str | None, time_limit: float = float("inf")) -> None:
     """Run ``job`` (on top of ``oldjob``) in ``folder``; write JOB.json and JOB.npz there.

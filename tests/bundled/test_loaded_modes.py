@@ -129,14 +129,16 @@ def test_standing_waves_of_the_unloaded_tyre_are_nearly_its_modes(tyre: Round) -
     work.residual(tyre.everywhere(around))
     for n in range(4):
         (value,) = (unloaded := harmonic(tyre, n, 1)).eigenvalues
-        found = {p: standing_waves([unloaded], tyre.fold(around, p), around) for p in (1, -1)}
+        found = {p: standing_waves([unloaded], tyre.symmetry(around, p), around) for p in (1, -1)}
         assert [bool(waves) for waves in found.values()].count(True) == (2 if n else 1)
         for parity, waves in found.items():
-            fold = tyre.fold(around, parity)
+            symmetry = tyre.symmetry(around, parity)
             for V in waves:
                 quotient = (V * work.product(V)).sum() / (V * weigh(V)).sum()
                 assert quotient == pytest.approx(value, rel=2e-3)
-                np.testing.assert_allclose(fold.spread(fold.parts(V)), V, atol=1e-9 * abs(V).max())
+                np.testing.assert_allclose(
+                    symmetry.spread(symmetry.parts(V)), V, atol=1e-9 * abs(V).max()
+                )
 
 
 def test_they_solve_the_whole_problem(tyre: Round, pressed: State, found: LoadedModes) -> None:

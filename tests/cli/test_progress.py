@@ -6,8 +6,8 @@ import logging
 
 import pytest
 
-from tyrecal.cli import talk
-from tyrecal.cli.talk import Progress, Talk
+from tyrecal.cli import terminal
+from tyrecal.cli.terminal import Progress, Terminal
 
 
 class Clock:
@@ -20,7 +20,7 @@ class Clock:
 @pytest.fixture
 def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
     clock = Clock()
-    monkeypatch.setattr(talk, "time", clock)
+    monkeypatch.setattr(terminal, "time", clock)
     return clock
 
 
@@ -75,7 +75,7 @@ def test_where_nobody_watches_a_line_a_stage(
     quiet: bool, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """On standard error, beside JSON too; nothing with --quiet."""
-    with Talk(as_json=True, quiet=quiet).progress("diagnose", ["one", "two"]) as progress:
+    with Terminal(as_json=True, quiet=quiet).progress("diagnose", ["one", "two"]) as progress:
         progress.begin("one")
         progress.begin("two")
     printed = capsys.readouterr()
@@ -87,20 +87,20 @@ def test_where_nobody_watches_a_line_a_stage(
 def test_what_is_reached_on_the_way_to_a_load_is_told(
     clock: Clock, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    with Talk().progress("footprint") as bar:
+    with Terminal().progress("footprint") as bar:
         bar.at(0, 1)
         clock.now = 100.0
-        logging.getLogger(talk.SOLVERS).info("28000 of 400000 N are reached (90 of 142 mm)")
+        logging.getLogger(terminal.SOLVERS).info("28000 of 400000 N are reached (90 of 142 mm)")
     assert "28000 of 400000 N are reached" in capsys.readouterr().err
 
 
 def test_a_load_that_the_solver_reaches_moves_the_bar(
     clock: Clock, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    with Talk().progress("footprint") as bar:
+    with Terminal().progress("footprint") as bar:
         bar.at(0, 2)
         clock.now = 100.0
-        logging.getLogger(talk.SOLVERS).info("1 of 4", extra={"loads": (1, 4)})
+        logging.getLogger(terminal.SOLVERS).info("1 of 4", extra={"loads": (1, 4)})
     assert (
         "footprint, load 2 of 4, 0 of 2 done, 1:40 elapsed, 11:40 left" in capsys.readouterr().err
     )

@@ -212,7 +212,7 @@ def test_nothing_was_changed_only_where_that_is_so(
         raise KeyboardInterrupt
 
     monkeypatch.setattr("tyrecal.cli.arguments.load", at_once)
-    monkeypatch.setattr("tyrecal.tyre.case.draft.from_size", at_once)
+    monkeypatch.setattr("tyrecal.tyre.case.new_case.from_size", at_once)
     assert run(*words) == 130
     assert "interrupted: nothing was changed" in capsys.readouterr().err
     assert not CHANGED.is_set()

@@ -11,12 +11,12 @@ import pytest
 
 from tyrecal.cli.options import Study
 from tyrecal.cli.taken import taken
-from tyrecal.cli.talk import Talk
+from tyrecal.cli.terminal import Terminal
 
 from ..conftest import CASES
 from .test_cli import run
 
-STUDY = Study(Talk(), "", "", (), None, None, no_store=False, allow_unusual=False)
+STUDY = Study(Terminal(), "", "", (), None, None, no_store=False, allow_unusual=False)
 
 
 @pytest.fixture

@@ -13,7 +13,7 @@ from tyrecal.simulate.deck.decks import Decks
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.tyre.case import start_values, with_level
-from tyrecal.tyre.case.analysis import Solver
+from tyrecal.tyre.case.analysis import SolverChoice
 from tyrecal.tyre.effects import catalogue
 from tyrecal.tyre.load import load_case
 from tyrecal.tyre.values import with_values
@@ -35,7 +35,7 @@ class DeckText:
     pressure_kPa: float = 240.0
     needs: Mapping[str, str] = field(default_factory=dict)
     has_slopes: bool = True
-    solver: Solver = CASE.case.solver
+    solver: SolverChoice = CASE.case.solver
 
     def at(self, values: Mapping[str, float]) -> DeckText:
         return replace(self, values={**self.values, **values})

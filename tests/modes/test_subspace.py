@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tyrecal.simulate.evaluate.results import HarmonicShape, RingShape
-from tyrecal.simulate.modes.sample import on_rings
+from tyrecal.simulate.modes.rings import on_rings
 from tyrecal.simulate.modes.subspace import mac, subspace_mac
 
 from ..chance import generator

@@ -14,7 +14,7 @@ from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.studies.modes import modes_result
 from tyrecal.tyre.case import LoadedCase, start_values
-from tyrecal.tyre.case.draft import from_size
+from tyrecal.tyre.case.new_case import from_size
 from tyrecal.tyre.load import load_case
 from tyrecal.tyre.resolve import resolved
 from tyrecal.tyre.section.from_size import build, usual

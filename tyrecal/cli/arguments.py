@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from .talk import Talk
+from .terminal import Terminal
 
 
 def load(
@@ -16,7 +16,7 @@ def load(
     mesh_level: str,
     assigned: tuple[str, ...],
     pressure_kPa: float | None,
-    talk: Talk,
+    terminal: Terminal,
     allow_unusual: bool = False,
 ) -> Any:
     """The case with its start values, mesh level, assignments and pressure applied.
@@ -40,7 +40,7 @@ def load(
                     f"{number} is set by the variable '{name}'; give --set {name}=VALUE instead"
                 )
         for sentence in overruled(case, given):
-            talk.note(sentence)
+            terminal.note(sentence)
         case = overridden(case, given)
         values = {**start_values(case), **{k: v for k, v in given.items() if k in names}}
         case = with_values(case, values)
@@ -113,7 +113,7 @@ def parse_pressures(low: float, high: float, steps: int, allowed: bool) -> tuple
     return tuple(round(low + (high - low) * i / (steps - 1), 9) for i in range(steps))
 
 
-def fitted_values(path: Path, loaded: Any, talk: Talk) -> dict[str, float]:
+def fitted_values(path: Path, loaded: Any, terminal: Terminal) -> dict[str, float]:
     """The design of a fit.json, or of the one in a results folder; says how the fit was made
     otherwise. Raises click.UsageError where it is not this case's."""
     from ..studies.fitted import NotThisFit, read_fitted
@@ -127,7 +127,7 @@ def fitted_values(path: Path, loaded: Any, talk: Talk) -> dict[str, float]:
     except NotThisFit as error:
         raise click.UsageError(f"--fitted: {error}") from None
     for sentence in otherwise:
-        talk.note(f"--fitted: {sentence}")
+        terminal.note(f"--fitted: {sentence}")
     return values
 
 

@@ -11,7 +11,7 @@ import click
 from ..files import json_text, refuse_link, write_text
 from . import arguments, options
 from .main import EXIT_BATCH
-from .talk import Talk
+from .terminal import Terminal
 
 STUDIES = ("fit", "modes", "sweep-pressure", "footprint")  # without importing what they need
 FILE = click.Path(path_type=Path, dir_okay=False)
@@ -85,7 +85,7 @@ def command(
     store: Path | None,
     no_store: bool,
     allow_unusual: bool,
-    talk: Talk,
+    terminal: Terminal,
 ) -> int:
     """Study many CASES, each on its own: one that fails stops no other.
 
@@ -148,7 +148,7 @@ def command(
     ]
     _prepare(tasks, folder)
     started = run.started
-    progress = BatchProgress(len(tasks), talk.quiet, talk.verbose)
+    progress = BatchProgress(len(tasks), terminal.quiet, terminal.verbose)
     try:
         with progress, reached(scheduler) as address:
             reports = run_batch(tasks, jobs, address, progress.notify)
@@ -166,11 +166,11 @@ def command(
     if write_baseline and baseline:
         _write(baseline, json_text(baseline_of(reports, before)))
     run.finish(cases={report["name"]: report["facts"] for report in reports}, scheduler=address)
-    talk.result(result)
-    _tell(result, talk)
+    terminal.result(result)
+    _tell(result, terminal)
     if write_baseline:
-        talk.say(f"baseline written to {baseline}")
-    talk.say(f"results in {run.folder}")
+        terminal.say(f"baseline written to {baseline}")
+    terminal.say(f"results in {run.folder}")
     return 0 if result["counts"]["good"] == len(reports) else EXIT_BATCH
 
 
@@ -218,21 +218,21 @@ def _sweep(tasks: Sequence[Any]) -> None:
             (task.folder / "runs").rmdir()
 
 
-def _tell(result: Mapping[str, Any], talk: Talk) -> None:
+def _tell(result: Mapping[str, Any], terminal: Terminal) -> None:
     """What is not as it should be, what drifted, and how many."""
     from ..report.batch import drift_table, failures_table
 
     failures = failures_table(result)
     if failures:
-        talk.show(failures, beside_json=True)
+        terminal.show(failures, beside_json=True)
     drift = result["baseline"]
     if drift:
         drifted = drift_table(drift)
         if drifted:
-            talk.show(drifted, beside_json=True)
+            terminal.show(drifted, beside_json=True)
         words = f"{len(drift['drifted'])} of {drift['compared']} numbers drifted"
         words += f", {drift['new']} are new" if drift["new"] else ""
-        talk.say(f"{words}; see the baseline's tolerances")
+        terminal.say(f"{words}; see the baseline's tolerances")
         for key, what in (
             ("missing_cases", "in the baseline, but not in this batch"),
             ("new_cases", "not in the baseline, so not compared"),
@@ -240,11 +240,11 @@ def _tell(result: Mapping[str, Any], talk: Talk) -> None:
             ("new_studies", "not in the baseline, so not compared"),
         ):
             if drift[key]:
-                talk.say(f"{what}: {_some(drift[key])}")
+                terminal.say(f"{what}: {_some(drift[key])}")
     counts = dict(result["counts"])
     total = counts.pop("cases")
     parts = ", ".join(f"{number} {what}" for what, number in counts.items() if number)
-    talk.say(f"{total} case{'s' * (total > 1)}: {parts}")
+    terminal.say(f"{total} case{'s' * (total > 1)}: {parts}")
 
 
 def _some(names: Sequence[str], most: int = 10) -> str:

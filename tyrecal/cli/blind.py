@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from . import complete, options
-from .talk import Progress, Talk, resume
+from .terminal import Progress, Terminal, resume
 
 folder = click.argument("folder", type=click.Path(path_type=Path, file_okay=False), metavar="DIR")
 truth = click.option(
@@ -77,7 +77,7 @@ def make(
     truth: Path | None,
     jobs: int,
     allow_unusual: bool,
-    talk: Talk,
+    terminal: Terminal,
 ) -> int:
     """Draw tyres, compute them, seal the truth and write measurements to DIR.
 
@@ -116,12 +116,12 @@ def make(
     protocol = Protocol(maker.about, case.path.name, counts)
     evaluator = Evaluator(TyreDesign(case), "bundled", store=store)
     ruler = lambda: measure(tyre_model(case, evaluator, protocol, jobs), rows_of(case, protocol))
-    with talk.progress("make trials") as bar:
-        progress = _progress("made", talk, bar)
+    with terminal.progress("make trials") as bar:
+        progress = _progress("made", terminal, bar)
         mark = made(folder, sealed, case, protocol, maker, ruler, jobs, seed, progress)
     number = sum(counts.values())
-    talk.result({"trials": number, "folder": str(folder), "truth": str(sealed), "sha256": mark})
-    talk.say(f"{number} trials in {folder}; the truth is in {sealed}, sha256 {mark}")
+    terminal.result({"trials": number, "folder": str(folder), "truth": str(sealed), "sha256": mark})
+    terminal.say(f"{number} trials in {folder}; the truth is in {sealed}, sha256 {mark}")
     return 0
 
 
@@ -149,7 +149,7 @@ def answer(
     effects: tuple[str, ...],
     jobs: int,
     store: Path | None,
-    talk: Talk,
+    terminal: Terminal,
 ) -> int:
     """Answer every trial of DIR with the diagnosis; needs nothing but DIR.
 
@@ -178,11 +178,11 @@ def answer(
     model: ResponseModel = blind.tyre_model(case, evaluator, protocol, jobs, effects or None)
     if emulated:
         model = emulate(model)
-    with talk.progress("answer trials") as bar:
+    with terminal.progress("answer trials") as bar:
         rows = blind.rows_of(case, protocol)
-        mark = blind.answer(folder, model, rows, jobs, _progress("answered", talk, bar))
-    talk.result({"folder": str(folder), "sha256": mark})
-    talk.say(f"all trials of {folder} are answered, sha256 {mark}")
+        mark = blind.answer(folder, model, rows, jobs, _progress("answered", terminal, bar))
+    terminal.result({"folder": str(folder), "sha256": mark})
+    terminal.say(f"all trials of {folder} are answered, sha256 {mark}")
     return 0
 
 
@@ -190,7 +190,7 @@ def answer(
 @folder
 @truth
 @options.talking
-def score(folder: Path, truth: Path | None, talk: Talk) -> int:
+def score(folder: Path, truth: Path | None, terminal: Terminal) -> int:
     """Open the truth and score the answers of DIR: score.json, score.md.
 
     The seals are checked first: the truth must be what was sealed, and answers what was hashed.
@@ -207,8 +207,8 @@ def score(folder: Path, truth: Path | None, talk: Talk) -> int:
     write_json(folder / "score.json", figures)
     words = page(figures, read_protocol(folder).maker)
     write_text(folder / "score.md", words)
-    talk.result(figures)
-    talk.say(words)
+    terminal.result(figures)
+    terminal.say(words)
     return 0
 
 
@@ -216,12 +216,12 @@ def _sealed(folder: Path, truth: Path | None) -> Path:
     return truth or folder.with_name(f"{folder.name}-truth")
 
 
-def _progress(what: str, talk: Talk, bar: Progress) -> Callable[[int, int], None]:
+def _progress(what: str, terminal: Terminal, bar: Progress) -> Callable[[int, int], None]:
     """Moves the bar, and writes a line at every tenth of the way."""
 
     def on_progress(done: int, total: int) -> None:
         bar.at(done, total)
         if done == total or done % max(1, total // 10) == 0:
-            talk.note(f"{what} {done} of {total}")
+            terminal.note(f"{what} {done} of {total}")
 
     return on_progress

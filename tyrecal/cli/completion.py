@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 
 from . import options
-from .talk import Talk
+from .terminal import Terminal
 
 # Asked with _TYRECAL_COMPLETE, click tells what completes the words. Its own scripts would take
 # NAME=value and --option=value apart, or put a space after NAME=, or split a,b.yaml.
@@ -76,7 +76,7 @@ SCRIPTS = {"bash": BASH, "zsh": ZSH, "fish": FISH}
 @click.command()
 @click.argument("shell", type=click.Choice(list(SCRIPTS)))
 @options.talking
-def command(shell: str, talk: Talk) -> int:
+def command(shell: str, terminal: Terminal) -> int:
     """Print the script that makes SHELL complete commands, cases, solvers, effects and variables.
 
     \b
@@ -84,8 +84,8 @@ def command(shell: str, talk: Talk) -> int:
     eval "$(tyrecal completion zsh)"                               in ~/.zshrc, after compinit
     tyrecal completion fish > ~/.config/fish/completions/tyrecal.fish
     """
-    if talk.as_json:
-        talk.result({"shell": shell, "script": SCRIPTS[shell]})
+    if terminal.as_json:
+        terminal.result({"shell": shell, "script": SCRIPTS[shell]})
     else:
-        talk.say(SCRIPTS[shell])
+        terminal.say(SCRIPTS[shell])
     return 0

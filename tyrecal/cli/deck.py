@@ -9,7 +9,7 @@ from tempfile import TemporaryDirectory
 import click
 
 from . import arguments, options
-from .talk import Talk
+from .terminal import Terminal
 
 
 @click.command()
@@ -33,7 +33,7 @@ def command(
     solver: str,
     output: Path | None,
     allow_unusual: bool,
-    talk: Talk,
+    terminal: Terminal,
 ) -> int:
     """Write the decks of CASE, to read or to run elsewhere.
 
@@ -49,7 +49,7 @@ def command(
     from ..simulate.evaluate.failure import DeckRefused
     from .output import Run
 
-    loaded, values = arguments.load(case, mesh, assignments, pressure_kPa, talk, allow_unusual)
+    loaded, values = arguments.load(case, mesh, assignments, pressure_kPa, terminal, allow_unusual)
     design = TyreDesign(loaded, values)
     evaluator = Evaluator(design, solver)
     adapter = evaluator.solver
@@ -73,8 +73,8 @@ def command(
             with whole(run.folder / path.name) as partial:
                 shutil.copyfile(path, partial)
     run.finish()
-    talk.result(paths)
-    if not talk.as_json:
-        talk.say("\n".join(paths))
-    talk.detail(f"written for solver '{adapter.name}' from the templates '{adapter.dialect}'")
+    terminal.result(paths)
+    if not terminal.as_json:
+        terminal.say("\n".join(paths))
+    terminal.detail(f"written for solver '{adapter.name}' from the templates '{adapter.dialect}'")
     return 0

@@ -91,13 +91,13 @@ def command(
     tyrecal diagnose my.yaml --measured run1.csv --toggled clamped.csv spindle_lateral=0
     tyrecal diagnose my.yaml --add bead_filler=1.5
     """
-    talk = study.talk
+    terminal = study.terminal
     if add:
         if assignments or measured:
             raise click.UsageError("--add writes a case and nothing else: no --set, no --measured")
         path = _added(case, add, study.output, study.allow_unusual)
-        talk.result({"case": str(path)})
-        talk.say(f"{path} has the effect in it; 'tyrecal fit {path}' calibrates it")
+        terminal.result({"case": str(path)})
+        terminal.say(f"{path} has the effect in it; 'tyrecal fit {path}' calibrates it")
         return 0
     if measured is None:
         raise click.UsageError("--measured FILE must be given, or --add EFFECT=VALUE")
@@ -138,7 +138,7 @@ def command(
     )
     form = None if form_percent is None else form_percent / 100
     assumed = Assumed(form, split_percent / 100)
-    with talk.progress("diagnose", STAGES) as bar:
+    with terminal.progress("diagnose", STAGES) as bar:
         evaluator.on_progress = bar.at
         found = diagnosed(
             loaded,
@@ -165,8 +165,8 @@ def command(
         for name, figure in draw_diagnosis(found.diagnosis, parts).items():
             save(figure, run.new / f"diagnosis_{name}.png")
     run.finish()
-    talk.result(told)
-    talk.say(words)
+    terminal.result(told)
+    terminal.say(words)
     study.finish(run)
     return 0
 

@@ -10,7 +10,7 @@ import click
 from . import complete, options
 from .main import EXIT_SOLVER
 from .solvers import command_words, settings_file, settings_words
-from .talk import Talk
+from .terminal import Terminal
 
 HINTS = {
     "abaqus": "'commands: {abaqus: ...}' of your settings says how it is started",
@@ -35,7 +35,7 @@ HINTS = {
     help="Record to look at (default: those of the results folders here; also from TYRECAL_STORE).",
 )
 @options.talking
-def command(solver: str, store: Path | None, talk: Talk) -> int:
+def command(solver: str, store: Path | None, terminal: Terminal) -> int:
     """Check the installation: packages, solvers, machine, records, and a known tyre's frequencies.
 
     The tyre takes a second or two. Exit code 3 where a package is missing or too old, or where the
@@ -51,7 +51,7 @@ def command(solver: str, store: Path | None, talk: Talk) -> int:
     from ..simulate.evaluate.solver import installed
     from ..version import __version__
 
-    with talk.progress("known tyre"):
+    with terminal.progress("known tyre"):
         check = self_check(solver)
     found: dict[str, Any] = {
         "format": 1,
@@ -67,15 +67,17 @@ def command(solver: str, store: Path | None, talk: Talk) -> int:
         "self_check": check,
     }
     found["ok"] = bool(check["ok"]) and all(each["ok"] for each in found["packages"])
-    talk.result(found)
-    if not talk.as_json:
-        talk.say("\n".join(_words(found)))
+    terminal.result(found)
+    if not terminal.as_json:
+        terminal.say("\n".join(_words(found)))
     for package in found["packages"]:
         if not package["ok"]:
             there = package["version"] or "not installed"
-            talk.error(f"{package['name']} must be {package['needed']}, it is {there}")
+            terminal.error(f"{package['name']} must be {package['needed']}, it is {there}")
     if not check["ok"]:
-        talk.error(f"the known tyre: {check['problem'] or 'its figures are not the recorded ones'}")
+        terminal.error(
+            f"the known tyre: {check['problem'] or 'its figures are not the recorded ones'}"
+        )
     return 0 if found["ok"] else EXIT_SOLVER
 
 

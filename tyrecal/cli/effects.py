@@ -70,7 +70,7 @@ def command(
     from ..tyre.case.mistakes import suggestion
     from ..tyre.effects import IDS, catalogue
 
-    talk = study.talk
+    terminal = study.terminal
 
     if name is not None and name not in IDS:
         raise click.UsageError(f"there is no effect '{name}'{suggestion(name, IDS)}")
@@ -82,11 +82,11 @@ def command(
     solvers = installed()
     entries = {id: effect_entry(catalogue()[id], solvers) for id in ([name] if name else IDS)}
     if not case:
-        talk.result(list(entries.values()))
-        if name and not talk.as_json:
-            talk.say(effect_text(entries[name]))
+        terminal.result(list(entries.values()))
+        if name and not terminal.as_json:
+            terminal.say(effect_text(entries[name]))
         else:
-            talk.show(shown(effects_table(list(entries.values()))))
+            terminal.show(shown(effects_table(list(entries.values()))))
         return 0
 
     loaded, values = study.load(case, assignments)
@@ -101,37 +101,37 @@ def command(
         raise click.UsageError(f"solver '{adapter.name}' gives no slopes, which a re-fit needs")
     kPa = _pressures(loaded, pressures, study.allow_unusual)
     if fitted:
-        values = arguments.fitted_values(fitted, loaded, talk)
+        values = arguments.fitted_values(fitted, loaded, terminal)
     run = study.run(loaded, "effects", evaluator, pressure_kPa=kPa)
     plain = Plain(loaded, evaluator, values, kPa)
-    if name and not talk.as_json:
-        talk.say(effect_text(entries[name]) + "\n")
+    if name and not terminal.as_json:
+        terminal.say(effect_text(entries[name]) + "\n")
     sizes: dict[str, float] = {}
     for id, entry in entries.items():
         if name or adapter.name in entry["solvers"]:
             sizes[id] = stated_size(id) if value is None else value
         else:
-            talk.say(f"{id}: solver '{adapter.name}' cannot express it")
-    talk.detail(f"each at {', '.join(f'{p:g}' for p in kPa)} kPa")
+            terminal.say(f"{id}: solver '{adapter.name}' cannot express it")
+    terminal.detail(f"each at {', '.join(f'{p:g}' for p in kPa)} kPa")
     found, failed = [], 0
-    with talk.progress("effects") as bar:
+    with terminal.progress("effects") as bar:
         answers = zip(sizes, plain.signatures(sizes, study.jobs), strict=True)
         for done, (id, signature) in enumerate(answers, start=1):
             bar.at(done, len(sizes))
             if isinstance(signature, EvaluationFailed):
                 failed += 1
-                talk.error(f"{id}: {signature}")
+                terminal.error(f"{id}: {signature}")
                 continue
-            talk.detail(id)
+            terminal.detail(id)
             found.append({**entries[id], **signature_entry(signature, values)})
             if pictures:
                 save(draw_signature(signature), run.new / f"effect_{id}.png")
     found = run.write_json("effects.json", found)
     run.finish()
-    talk.result(found)
+    terminal.result(found)
     if found:
-        talk.show(shown(signatures_table(found)))
-    talk.say(f"results in {run.folder}")
+        terminal.show(shown(signatures_table(found)))
+    terminal.say(f"results in {run.folder}")
     return EXIT_SOLVER if failed else 0
 
 

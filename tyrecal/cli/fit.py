@@ -11,7 +11,7 @@ import click
 
 from . import arguments, complete, options
 from .main import EXIT_FIT
-from .talk import Progress, Talk
+from .terminal import Progress, Terminal
 
 
 @click.command()
@@ -89,7 +89,7 @@ def command(
     from ..studies.fit.problem import Problem, objective_unit
     from ..studies.fitted import NOT_CONVERGED, has_good
 
-    talk = study.talk
+    terminal = study.terminal
     options.not_both(study.jobs, scheduler)
     loaded, values = study.load(case, assignments, pressure_kPa)
     unknown = [name for name in fix if name not in values]
@@ -108,27 +108,27 @@ def command(
         why = f"a fit from one start asks solver '{evaluator.solver.name}' for one design at a time"
         if scheduler:
             raise click.UsageError(f"--scheduler changes nothing here: {why}; give --starts too")
-        options.say_idle(talk, study.jobs, why)
+        options.say_idle(terminal, study.jobs, why)
     files = [measured] if measured else []
     run = study.run(
         loaded, "fit", evaluator, measured=files, load_N=loaded.case.targets.loads_N or 0.0
     )
     unit = objective_unit(loaded)
-    with talk.progress("fit") as bar, reached(scheduler) as evaluator.scheduler:
-        points = _Points(talk, bar, unit)
+    with terminal.progress("fit") as bar, reached(scheduler) as evaluator.scheduler:
+        points = _Points(terminal, bar, unit)
         fit = calibrate(
             loaded, evaluator, method, fixed, starts, seed, study.jobs, points.notify, bar.at
         )
     fit.found = run.write(fit.found)
     result = fit.result
     run.write_text("fit_history.csv", history_csv(fit.history))
-    talk.result(result)
-    talk.show(shown(*fit.found.tables()))
-    talk.say("\n".join(fit_verdict(result)))
+    terminal.result(result)
+    terminal.show(shown(*fit.found.tables()))
+    terminal.say("\n".join(fit_verdict(result)))
     for each in left_out:
-        talk.note(f"{measured}: not used: {each}")
+        terminal.note(f"{measured}: not used: {each}")
     for warning in (*tyre_doubts(result), *fit_doubts(result)):
-        talk.warn(warning)
+        terminal.warn(warning)
     if pictures or study.report:
         from ..report.shape_data import tyre_data
         from ..simulate.evaluate.evaluator import Question
@@ -147,19 +147,19 @@ def command(
     earlier = not good and has_good(run.folder / "fit.json")
     run.finish(aside=NOT_CONVERGED if earlier else "")
     if earlier:
-        talk.warn(f"the fit in '{run.folder}' had converged: it stays")
+        terminal.warn(f"the fit in '{run.folder}' had converged: it stays")
     study.finish(run)
     file = shlex.quote(str(measured)) if measured else "FILE"
     next_ = f"tyrecal diagnose {shlex.quote(str(case))} --measured {file}"
-    talk.say(f"next: {next_} says what the model lacks")
+    terminal.say(f"next: {next_} says what the model lacks")
     return 0 if good else EXIT_FIT
 
 
 class _Points:
     """Says how the fit goes: each design with --verbose, the latest and the best on a terminal."""
 
-    def __init__(self, talk: Talk, bar: Progress, unit: str):
-        self.talk, self.bar, self.unit, self.best = talk, bar, unit, float("inf")
+    def __init__(self, terminal: Terminal, bar: Progress, unit: str):
+        self.terminal, self.bar, self.unit, self.best = terminal, bar, unit, float("inf")
 
     def notify(self, number: int, values: Mapping[str, float], outcome: Any) -> None:
         """One more design point."""
@@ -167,5 +167,5 @@ class _Points:
         self.best = self.best if objective is None else min(self.best, objective)
         state = f"{objective:.4f} {self.unit}" if objective is not None else f"failed: {outcome}"
         numbers = "  ".join(f"{k}={v:.5g}" for k, v in values.items())
-        self.talk.detail(f"point {number}: {state}  {numbers}")
+        self.terminal.detail(f"point {number}: {state}  {numbers}")
         self.bar.words(f"design {number}: {state:.30}, best {self.best:.4f}")

@@ -10,7 +10,7 @@ import click
 from . import arguments, options
 from .main import EXIT_SOLVER
 from .taken import taken
-from .talk import Talk
+from .terminal import Terminal
 
 DESIGNS = ("initial", "fitted")
 
@@ -51,7 +51,7 @@ def command(
     from ..report.shape_data import patches_data
     from ..studies.footprint import run
 
-    talk = study.talk
+    terminal = study.terminal
     case, fitted, study = taken(case, fitted, study)
     loaded, values = study.load(case, assignments, pressure_kPa)
     asked = loaded.case.loads_N
@@ -61,11 +61,11 @@ def command(
     evaluator = study.evaluator(loaded)
     evaluator.needs_road()
     fitted = _fit_compared(compare, fitted, (study.output or Path(case.stem)) / "fit.json")
-    designs = _designs(compare, values, fitted, loaded, talk)
+    designs = _designs(compare, values, fitted, loaded, terminal)
     if len(designs) == 1:
-        options.say_idle(talk, study.jobs, "one design is pressed alone; --fitted adds another")
+        options.say_idle(terminal, study.jobs, "one design is pressed alone; --fitted adds another")
     output = study.run(loaded, "footprint", evaluator, load_N=asked)
-    with talk.progress("footprint") as bar:
+    with terminal.progress("footprint") as bar:
         evaluator.on_progress = bar.at
         found, pressed, meshes = run(loaded, evaluator, designs, asked, study.jobs, study.notify)
     if not pressed:
@@ -92,7 +92,11 @@ def _fit_compared(compare: str | None, fitted: Path | None, own: Path) -> Path |
 
 
 def _designs(
-    compare: str | None, values: dict[str, float], fitted: Path | None, loaded: Any, talk: Talk
+    compare: str | None,
+    values: dict[str, float],
+    fitted: Path | None,
+    loaded: Any,
+    terminal: Terminal,
 ) -> dict[str, dict[str, float]]:
     """Values of the variables by design. Raises click.UsageError."""
     names = DESIGNS[: 2 if fitted else 1] if compare is None else tuple(compare.split(","))
@@ -103,5 +107,5 @@ def _designs(
         raise click.UsageError("--compare: a design is named twice")
     designs = {"initial": values}
     if fitted and "fitted" in names:
-        designs["fitted"] = arguments.fitted_values(fitted, loaded, talk)
+        designs["fitted"] = arguments.fitted_values(fitted, loaded, terminal)
     return {name: designs[name] for name in names}

@@ -11,10 +11,10 @@ import click
 
 from ..errors import InputError
 from . import options
-from .talk import Talk
+from .terminal import Terminal
 
 if TYPE_CHECKING:
-    from ..tyre.case.draft import Draft
+    from ..tyre.case.new_case import Draft
 
 POSITIVE = click.FloatRange(min=0, min_open=True)
 
@@ -73,7 +73,7 @@ def command(
     force: bool,
     allow_unusual: bool,
     pictures: bool,
-    talk: Talk,
+    terminal: Terminal,
 ) -> int:
     """Write the case of a tyre: from its SIZE code, or with a section of its own.
 
@@ -86,7 +86,7 @@ def command(
     tyrecal init P235/75R17 --section my_stations.csv --output my_tyre.yaml
     tyrecal init 205/60R15 --section my_outline.csv --belt-width-mm 160 --output my_outline.yaml
     """
-    from ..tyre.case.draft import from_file, from_size
+    from ..tyre.case.new_case import from_file, from_size
     from ..tyre.guard import ALL_THE_SAME
     from ..tyre.section.size import INCH, parse_size
     from ..tyre.usual import GAUGES, USUAL
@@ -116,12 +116,17 @@ def command(
         assert tyre is not None
         draft = from_size(tyre, lengths, pressure_kPa, target.stem)
     draft.check(allow_unusual)
-    _write(draft, file, target, target.with_suffix(".png") if pictures else None, force, talk)
+    _write(draft, file, target, target.with_suffix(".png") if pictures else None, force, terminal)
     return 0
 
 
 def _write(
-    draft: Draft, file: Path | None, target: Path, picture: Path | None, force: bool, talk: Talk
+    draft: Draft,
+    file: Path | None,
+    target: Path,
+    picture: Path | None,
+    force: bool,
+    terminal: Terminal,
 ) -> None:
     """Write case, section and picture, none over an existing file and only what is right."""
     from ..files import whole
@@ -140,8 +145,8 @@ def _write(
     loaded = load_case(target, allow_unusual=True)
     outside = loaded.section.points[-1]
     written = {"case": str(target), "section": str(table)}
-    talk.result({**written, "picture": str(picture) if picture else None})
-    talk.say(
+    terminal.result({**written, "picture": str(picture) if picture else None})
+    terminal.say(
         f"{target}: {loaded.case.name}, outer diameter {2e3 * outside[0, 0]:.1f} mm, section width"
         f" {2e3 * outside[:, 1].max():.1f} mm, {loaded.case.pressure_kPa:g} kPa"
     )
@@ -153,5 +158,5 @@ def _write(
 
         section = section_data(loaded, resolved(loaded).mesh, {})
         save(draw_section(section, loaded.case.name, loaded.case.pressure_kPa), picture)
-        talk.say(f"section drawn in {picture}")
-    talk.say(f"next: tyrecal modes {shlex.quote(str(target))}")
+        terminal.say(f"section drawn in {picture}")
+    terminal.say(f"next: tyrecal modes {shlex.quote(str(target))}")

@@ -41,8 +41,8 @@ def at_load(
     from ..studies.loaded import LoadedTyre, load_tyres
     from ..studies.loaded_result import loaded_modes_result
 
-    talk = study.talk
-    with talk.progress(f"modes at {load_N:g} N") as bar:
+    terminal = study.terminal
+    with terminal.progress(f"modes at {load_N:g} N") as bar:
         evaluator.on_progress = bar.at
         outcome = load_tyres(loaded, evaluator, {"initial": values}, [load_N])["initial"]
     if not isinstance(outcome, LoadedTyre):
@@ -50,10 +50,10 @@ def at_load(
     found = run.write(loaded_modes_result(values, outcome))
     run.write_json("modes_shapes.json", loaded_data(outcome, loaded))
     run.finish()
-    talk.result(found.content())
-    talk.show(shown(*found.tables()))
+    terminal.result(found.content())
+    terminal.show(shown(*found.tables()))
     for sentence in found.sentences():
-        talk.say(sentence)
+        terminal.say(sentence)
     study.page(run)
     return 0
 
@@ -70,7 +70,7 @@ def over_loads(
     """Modes over the load, in load_sweep.json, .csv and .png."""
     from ..studies.loaded_result import run
 
-    with study.talk.progress("modes on the road") as bar:
+    with study.terminal.progress("modes on the road") as bar:
         evaluator.on_progress = bar.at
         found = run(loaded, evaluator, designs, loads_N, study.jobs, study.notify)
     if not found.rows:

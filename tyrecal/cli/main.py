@@ -13,7 +13,7 @@ import click
 from ..errors import TyrecalError
 from ..files import CHANGED
 from ..interrupt import SIGNALS, exit_code, interrupt_heard, interrupts_remembered
-from .talk import RESUME, coloured, error, say
+from .terminal import RESUME, coloured, error, say
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from . import options
-from .talk import Talk
+from .terminal import Terminal
 
 if TYPE_CHECKING:
     from ..measured.modal import Layout
@@ -118,7 +118,7 @@ def import_files(
     highest: int | None,
     response: str | None,
     pictures: bool,
-    talk: Talk,
+    terminal: Terminal,
 ) -> int:
     """Write the measurements in FILEs to one CSV, which 'tyrecal diagnose --measured' and
     'tyrecal fit --measured' read.
@@ -150,13 +150,13 @@ def import_files(
 
         draw_measured(output.with_suffix(".png"), found.runs)
     for note in found.notes:
-        talk.note(note)
-    talk.result(result(found))
+        terminal.note(note)
+    terminal.result(result(found))
     if found.runs:
         from ..report.measured import measured_table
 
-        talk.show(measured_table(found.runs))
-    talk.say(f"{len(found.rows)} measurements in {output}")
+        terminal.show(measured_table(found.runs))
+    terminal.say(f"{len(found.rows)} measurements in {output}")
     return 0
 
 
@@ -165,7 +165,12 @@ def import_files(
 @options.every(axle, centre, directions, highest)
 @options.talking
 def sensors(
-    file: Path, axle: str | None, centre: str, directions: str, highest: int | None, talk: Talk
+    file: Path,
+    axle: str | None,
+    centre: str,
+    directions: str,
+    highest: int | None,
+    terminal: Terminal,
 ) -> int:
     """Say which modes the sensors of a universal FILE can tell apart.
 
@@ -181,14 +186,14 @@ def sensors(
 
     layout = _layout(axle, centre, directions, highest)
     told = sensors_in(read_universal(file), layout).told_apart()
-    if talk.as_json:
+    if terminal.as_json:
         told_apart = [
             {**label_entry(label), "told": not alike, "looks_like": [str(x) for x in alike]}
             for label, alike in told.items()
         ]
-        talk.result(told_apart)
+        terminal.result(told_apart)
     else:
-        talk.say(sensors_words(told))
+        terminal.say(sensors_words(told))
     return 0
 
 

@@ -57,10 +57,10 @@ def command(
         raise click.UsageError("--fitted goes with --sweep-load")
     if pictures and load_N is not None:
         raise click.UsageError("--pictures goes with --sweep-load, or without a load")
-    talk = study.talk
+    terminal = study.terminal
     if not fitted:
         why = "one design is evaluated alone; --sweep-load with --fitted has two"
-        options.say_idle(talk, study.jobs, why)
+        options.say_idle(terminal, study.jobs, why)
     loaded, values = study.load(case, assignments, pressure_kPa)
     evaluator = study.evaluator(loaded)
     designs = {"initial": values}
@@ -69,7 +69,7 @@ def command(
     if loads:
         evaluator.needs_road(modes=True)
     if fitted:
-        designs["fitted"] = arguments.fitted_values(fitted, loaded, talk)
+        designs["fitted"] = arguments.fitted_values(fitted, loaded, terminal)
     if sweep is not None:
         run = study.run(loaded, "modes", evaluator, "sweep-load", load_N=loads)
         draw = pictures is not False
@@ -89,9 +89,9 @@ def command(
     from ..report.table import shown
     from ..report.words import tyre_doubts
 
-    talk.result(result.content())
-    talk.show(shown(*result.tables()))
+    terminal.result(result.content())
+    terminal.show(shown(*result.tables()))
     for doubt in tyre_doubts(result.content()):
-        talk.warn(doubt)
+        terminal.warn(doubt)
     study.page(run)
     return 0

@@ -2,14 +2,14 @@
 
 1. A command is a module of this package with ``command``, named in ``main.COMMANDS``; heavy imports
    stand inside the function, so that --help and completion stay quick.
-2. ``@options.talking`` gives every command --json, --quiet and --verbose as ``talk`` (`Talk`): say
-   and show for people, result for programs, detail for --verbose, warn and error.
+2. ``@options.talking`` gives every command --json, --quiet and --verbose as ``terminal``
+   (`Terminal`): say and show for people, result for programs, detail for --verbose, warn, error.
 3. ``@options.study``, in its place, gives what evaluates designs --jobs, --mesh, --solver,
    --output, --store, --no-store and --report too, as ``study`` (`Study`): load, evaluator,
    run, finish.
 4. Its docstring says what it does and writes, and ends with examples after a line ``\\b``.
-5. Long work runs in ``with talk.progress("what") as bar``: ``bar.at(done, of)`` shows the time
-   left. Ctrl-C says how to go on: ``run`` knows; others call `talk.resume`.
+5. Long work runs in ``with terminal.progress("what") as bar``: ``bar.at(done, of)`` shows the time
+   left. Ctrl-C says how to go on: ``run`` knows; others call `terminal.resume`.
 6. Wrong input raises click.UsageError, or an error that ``main`` knows; codes: ``main.EXIT_CODES``.
 7. What a shell can complete has ``shell_complete``, from `complete`.
 """
@@ -28,7 +28,7 @@ import click
 from click.core import ParameterSource
 
 from . import arguments, complete
-from .talk import SOLVERS, Talk
+from .terminal import SOLVERS, Terminal
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -197,11 +197,11 @@ STUDY = (jobs, *ONE_BY_ONE[:-3], report, *TALK)
 
 
 def talking(function: Callable[..., int]) -> Callable[..., int]:
-    """--json, --quiet and --verbose, as the argument ``talk``."""
+    """--json, --quiet and --verbose, as the argument ``terminal``."""
 
     @wraps(function)
     def command(*args: Any, **values: Any) -> int:
-        return function(*args, talk=_talk(values), **values)
+        return function(*args, terminal=_talk(values), **values)
 
     result: Callable[..., int] = every(*TALK)(command)
     return result
@@ -220,9 +220,9 @@ def study_one_by_one(function: Callable[..., int]) -> Callable[..., int]:
 def _study(function: Callable[..., int], given: tuple[Any, ...]) -> Callable[..., int]:
     @wraps(function)
     def command(*args: Any, **values: Any) -> int:
-        talk = _talk(values)
+        terminal = _talk(values)
         own = [field.name for field in fields(Study) if field.name in values]
-        asked = Study(talk, **{name: values.pop(name) for name in own})
+        asked = Study(terminal, **{name: values.pop(name) for name in own})
         return function(*args, study=asked, **values)
 
     result: Callable[..., int] = every(*given)(command)
@@ -233,7 +233,7 @@ def _study(function: Callable[..., int], given: tuple[Any, ...]) -> Callable[...
 class Study:
     """How designs are evaluated, and where the results go: the options of their names."""
 
-    talk: Talk
+    terminal: Terminal
     mesh: str
     solver: str
     solver_command: tuple[str, ...]
@@ -249,7 +249,7 @@ class Study:
     ) -> Any:
         """`arguments.load`, at the mesh level asked for."""
         return arguments.load(
-            path, self.mesh, assigned, pressure_kPa, self.talk, self.allow_unusual
+            path, self.mesh, assigned, pressure_kPa, self.terminal, self.allow_unusual
         )
 
     def evaluator(self, loaded: Any) -> Evaluator:
@@ -278,28 +278,28 @@ class Study:
 
         block = provenance(loaded, evaluator.solver, measured, **state)
         run = Run(loaded.path, self.output, command, evaluator.solver, study, block)
-        evaluator.folder, evaluator.keep = run.runs, self.talk.verbose
+        evaluator.folder, evaluator.keep = run.runs, self.terminal.verbose
         evaluator.store = run.open_store(self.store, self.no_store)
         run.counts = counts = evaluator.counts
         words = "{0.runs} runs of the solver, {0.recorded} answers from the record"
         context = click.get_current_context()
-        context.call_on_close(lambda: self.talk.detail(words.format(counts)))
+        context.call_on_close(lambda: self.terminal.detail(words.format(counts)))
         context.call_on_close(lambda: self._say_earlier(run))
         return run
 
     def _say_earlier(self, run: Run) -> None:
         """Say whose results are in the folder after a run that failed."""
         if run.has_earlier:
-            self.talk.note(
+            self.terminal.note(
                 f"results of '{run.study}' in '{run.folder}' are those of an earlier run"
             )
 
     def notify(self, words: str, failure: EvaluationFailed | None) -> None:
         """How a study goes: a place that was reached, or why it was not."""
         if failure:
-            self.talk.error(f"{words}: {failure}")
+            self.terminal.error(f"{words}: {failure}")
         else:
-            self.talk.detail(words)
+            self.terminal.detail(words)
 
     def present(self, run: Run, found: Result, figures: Mapping[str, Figure]) -> int:
         """Write a result with its figures by name, say what was found, and give the exit code."""
@@ -308,20 +308,20 @@ class Study:
 
         found = run.write(found, figures)
         run.finish()
-        self.talk.result(found.content())
+        self.terminal.result(found.content())
         for table in found.tables():
-            self.talk.show(shown(table))
+            self.terminal.show(shown(table))
         for sentence in found.sentences():
-            self.talk.say(sentence)
+            self.terminal.say(sentence)
         if lost := found.doubts():
             count = len(lost) + len(getattr(found, "rows", ()))
-            self.talk.error(f"{len(lost)} of {count} evaluations failed; the others are kept")
+            self.terminal.error(f"{len(lost)} of {count} evaluations failed; the others are kept")
         self.finish(run)
         return EXIT_SOLVER if lost else 0
 
     def finish(self, run: Run) -> None:
         """Say where the results are; see `page`."""
-        self.talk.say(f"results in {run.placed}")
+        self.terminal.say(f"results in {run.placed}")
         self.page(run)
 
     def page(self, run: Run) -> None:
@@ -331,22 +331,24 @@ class Study:
 
             path = run.placed / "report.html"
             write_page(path, [run.placed])
-            self.talk.say(f"report in {path}")
+            self.terminal.say(f"report in {path}")
 
 
-def _talk(values: dict[str, Any]) -> Talk:
+def _talk(values: dict[str, Any]) -> Terminal:
     """Takes the options of `TALK` out of a command's values."""
-    talk = Talk(*(values.pop(name) for name in ("as_json", "quiet", "verbose")))
-    if talk.quiet and talk.verbose:
+    terminal = Terminal(*(values.pop(name) for name in ("as_json", "quiet", "verbose")))
+    if terminal.quiet and terminal.verbose:
         raise click.UsageError("give --quiet or --verbose, not both")
     context, start = click.get_current_context(), time.monotonic()
-    if talk.verbose:
+    if terminal.verbose:
         logging.basicConfig(format="%(name)s: %(message)s")
         for name in ("tyrecal", SOLVERS):
             logging.getLogger(name).setLevel(logging.INFO)
         path = context.command_path
-        context.call_on_close(lambda: talk.detail(f"{path} took {time.monotonic() - start:.1f} s"))
-    return talk
+        context.call_on_close(
+            lambda: terminal.detail(f"{path} took {time.monotonic() - start:.1f} s")
+        )
+    return terminal
 
 
 def fitted(text: str) -> Callable[[Any], Any]:
@@ -366,10 +368,10 @@ def given() -> list[str]:
     ]
 
 
-def say_idle(talk: Talk, jobs: int, why: str) -> None:
+def say_idle(terminal: Terminal, jobs: int, why: str) -> None:
     """Note that --jobs has no effect here, which is no error: scripts may give it everywhere."""
     if jobs > 1 and not _by_settings("jobs"):
-        talk.note(f"--jobs changes nothing here: {why}")
+        terminal.note(f"--jobs changes nothing here: {why}")
 
 
 def _by_settings(option: str) -> bool:

@@ -35,7 +35,7 @@ from ..simulate.provenance import stamped
 from ..simulate.settings import root
 from ..studies.result import Result
 from . import lock
-from .talk import resume
+from .terminal import resume
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

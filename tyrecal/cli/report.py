@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from . import options
-from .talk import Talk
+from .terminal import Terminal
 
 
 @click.command()
@@ -21,7 +21,7 @@ from .talk import Talk
     help="The page (default: report.html in DIR, of several in the present folder).",
 )
 @options.talking
-def command(folders: tuple[Path, ...], output: Path | None, talk: Talk) -> int:
+def command(folders: tuple[Path, ...], output: Path | None, terminal: Terminal) -> int:
     """Tell the results in DIR (of fit, modes, sweep-pressure, footprint, diagnose: whatever is
     found) on one HTML page.
 
@@ -37,8 +37,8 @@ def command(folders: tuple[Path, ...], output: Path | None, talk: Talk) -> int:
 
     path = output or (folders[0] / "report.html" if len(folders) == 1 else Path("report.html"))
     written = write_page(path, folders)
-    talk.result({"page": str(path), "bytes": written.size, "found": written.found})
+    terminal.result({"page": str(path), "bytes": written.size, "found": written.found})
     for folder, found in written.found.items():
-        talk.say(f"{folder}: {', '.join(found)}")
-    talk.say(f"report in {path}")
+        terminal.say(f"{folder}: {', '.join(found)}")
+    terminal.say(f"report in {path}")
     return 0

@@ -8,12 +8,12 @@ from typing import Any
 import click
 
 from . import options
-from .talk import Talk
+from .terminal import Terminal
 
 
 @click.command()
 @options.talking
-def command(talk: Talk) -> int:
+def command(terminal: Terminal) -> int:
     """List the installed solvers: version, what they can do, why one cannot be used, which program
     each starts, and the settings file that says so.
 
@@ -25,13 +25,13 @@ def command(talk: Talk) -> int:
     from ..simulate.evaluate.solver import installed
 
     found = installed()
-    talk.result(found)
-    talk.show(shown(solvers_table(found)))
-    if not talk.as_json:
+    terminal.result(found)
+    terminal.show(shown(solvers_table(found)))
+    if not terminal.as_json:
         for solver in found:
             if solver["command"]:
-                talk.say(f"{solver['name']}{command_words(solver)}")
-        talk.say(f"settings: {settings_words(settings_file())}")
+                terminal.say(f"{solver['name']}{command_words(solver)}")
+        terminal.say(f"settings: {settings_words(settings_file())}")
     return 0
 
 

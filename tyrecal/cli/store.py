@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from . import options
-from .talk import Talk, resume
+from .terminal import Terminal, resume
 
 
 @click.command()
@@ -25,7 +25,7 @@ from .talk import Talk, resume
     help="Remove the least recently used until SIZE_MB are left.",
 )
 @options.talking
-def command(folder: Path, verify: bool, prune: float | None, talk: Talk) -> int:
+def command(folder: Path, verify: bool, prune: float | None, terminal: Terminal) -> int:
     """Look at the record of evaluations in DIR, a results folder or a --store of several.
 
     Nothing else depends on a record: one that is removed is evaluated again when it is needed.
@@ -46,8 +46,8 @@ def command(folder: Path, verify: bool, prune: float | None, talk: Talk) -> int:
     found = store.summary(verify)
     if removed is not None:
         found["removed"] = removed
-    talk.result(found)
-    if talk.as_json:
+    terminal.result(found)
+    if terminal.as_json:
         return 0
     size = found["bytes"] / 1e6
     records = "1 record" if found["records"] == 1 else f"{found['records']} records"
@@ -58,5 +58,5 @@ def command(folder: Path, verify: bool, prune: float | None, talk: Talk) -> int:
     if removed is not None:
         lines.append(f"  removed: {removed}")
     lines.append(f"  damaged: {found['damaged']}" + ("" if verify else " (found so far)"))
-    talk.say("\n".join(lines))
+    terminal.say("\n".join(lines))
     return 0

@@ -43,16 +43,16 @@ def command(
     from ..studies.fit.problem import read_targets
     from ..studies.pressure_result import run
 
-    talk = study.talk
+    terminal = study.terminal
     case, fitted, study = taken(case, fitted, study)
     loaded, values = study.load(case, assignments)
     pressures = _pressures(loaded, assignments, from_kPa, to_kPa, steps, study.allow_unusual)
     evaluator = study.evaluator(loaded)
     designs = {"initial": values}
     if fitted:
-        designs["fitted"] = arguments.fitted_values(fitted, loaded, talk)
+        designs["fitted"] = arguments.fitted_values(fitted, loaded, terminal)
     output = study.run(loaded, "sweep-pressure", evaluator, pressure_kPa=pressures)
-    with talk.progress("sweep") as bar:
+    with terminal.progress("sweep") as bar:
         evaluator.on_progress = bar.at
         found = run(loaded, evaluator, designs, pressures, study.jobs, study.notify)
     if not found.rows:

@@ -28,7 +28,7 @@ def taken(case: Path | None, fitted: Path | None, study: Study) -> tuple[Path, P
     fits = sorted(_fits([folder] if folder else [Path(), *_folders()]))
     if fits:
         _, case, folder = fits[-1]
-        study.talk.note(f"{case}, with the fit in '{folder}'; another CASE can be given")
+        study.terminal.note(f"{case}, with the fit in '{folder}'; another CASE can be given")
         return case, fitted or folder / FIT, replace(study, output=study.output or folder)
     if fitted:
         raise click.UsageError(f"give the CASE too: nothing beside '{fitted}' says what it is of")
@@ -38,7 +38,7 @@ def taken(case: Path | None, fitted: Path | None, study: Study) -> tuple[Path, P
         raise click.UsageError(f"give a CASE: there are several here, {listed}")
     if not cases:
         raise click.UsageError("give a CASE: there is neither one here nor a finished fit of one")
-    study.talk.note(f"{cases[0]}, the only case here")
+    study.terminal.note(f"{cases[0]}, the only case here")
     return cases[0], None, study
 
 

@@ -8,14 +8,14 @@ import click
 
 from . import options
 from .main import EXIT_INPUT
-from .talk import Talk
+from .terminal import Terminal
 
 
 @click.command()
 @options.case_argument
 @options.allow_unusual
 @options.talking
-def command(case: Path, allow_unusual: bool, talk: Talk) -> int:
+def command(case: Path, allow_unusual: bool, terminal: Terminal) -> int:
     """Check CASE and report every mistake: file, line, key, value, what would be right.
 
     Numbers that no tyre has are mistakes, too: most often they stand in another unit.
@@ -29,8 +29,8 @@ def command(case: Path, allow_unusual: bool, talk: Talk) -> int:
 
     mistakes = validate(case, allow_unusual)
     for mistake in mistakes:
-        talk.error(str(mistake))
-    talk.result(
+        terminal.error(str(mistake))
+    terminal.result(
         [
             {
                 "file": str(m.file),
@@ -46,8 +46,8 @@ def command(case: Path, allow_unusual: bool, talk: Talk) -> int:
         return EXIT_INPUT
     loaded = load_case(case, allow_unusual)
     for sentence in overruled(loaded):
-        talk.warn(sentence)
-    talk.say(f"{case}: no mistakes")
+        terminal.warn(sentence)
+    terminal.say(f"{case}: no mistakes")
     if not loaded.case.targets.weights:
-        talk.note("it has no targets: 'tyrecal fit' needs some, or --measured FILE")
+        terminal.note("it has no targets: 'tyrecal fit' needs some, or --measured FILE")
     return 0

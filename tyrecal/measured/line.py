@@ -14,14 +14,8 @@ from .measurement import Measurement
 
 LABEL = re.compile(r"^[\[(]?\s*(\d+)\s*[,;/ ]\s*(\d+)\s*[\])]?\s*(.*)$")
 MAX_ORDERS = {"c": 20, "m": 3}
-KIND_WORDS = {
-    "axial": "axial",
-    "lateral": "axial",
-    "torsional": "torsional",
-    "torsion": "torsional",
-    "rotational": "torsional",
-    "": None,
-}
+KIND_WORDS = {"": None, "axial": "axial", "lateral": "axial"}
+KIND_WORDS |= dict.fromkeys(("torsional", "torsion", "rotational"), "torsional")
 DOUBLET_WORDS = {"": "", "1": "1", "2": "2", "a": "1", "b": "2", "lower": "1", "upper": "2"}
 LOADED_MEMBERS = ("symmetric", "antisymmetric")
 

@@ -227,18 +227,10 @@ def settled(told: list[LabelledMode]) -> list[LabelledMode]:
 
 def measurements_of(test: ModalTest, pressure_kPa: float) -> list[Measurement]:
     """The frequencies of the modes that have a label."""
-    return [
-        Measurement(
-            "frequency_Hz",
-            each.judged.label,
-            each.member,
-            pressure_kPa,
-            0.0,
-            each.mode.frequency_Hz,
-            each.mode.sigma_Hz,
-            test.name,
-            each.place,
-        )
-        for each in test.modes
-        if each.judged.label
-    ]
+    found = []
+    for each in test.modes:
+        if label := each.judged.label:
+            what = ("frequency_Hz", label, each.member, pressure_kPa, 0.0)
+            value, sigma = each.mode.frequency_Hz, each.mode.sigma_Hz
+            found.append(Measurement(*what, value, sigma, test.name, each.place))
+    return found

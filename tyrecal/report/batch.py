@@ -9,7 +9,7 @@ from rich import box
 from rich.table import Table
 from rich.text import Text
 
-MOST_ROWS = 40
+MAX_ROWS = 40
 FIGURES = ("baseline", "now", "change", "allowed")
 COLOURS = {"error": "red", "failed": "red", "skipped": "yellow"}
 
@@ -23,7 +23,7 @@ def failures_table(result: Mapping[str, Any]) -> Table | None:
             if entry["status"] != "good":
                 key = case["name"], entry["status"], entry["words"] or ""
                 rows.setdefault(key, []).append(study)
-    for (name, status, words), studies in list(rows.items())[:MOST_ROWS]:
+    for (name, status, words), studies in list(rows.items())[:MAX_ROWS]:
         shown = Text(status, COLOURS[status])
         table.add_row(Text(name), ", ".join(studies), shown, Text(words))
     return _with_rest(table, len(rows))
@@ -32,7 +32,7 @@ def failures_table(result: Mapping[str, Any]) -> Table | None:
 def drift_table(drift: Mapping[str, Any]) -> Table | None:
     """Numbers that drifted, the worst first; None where there are none."""
     table = _table("case", "study", "quantity", *FIGURES)
-    for each in drift["drifted"][:MOST_ROWS]:
+    for each in drift["drifted"][:MAX_ROWS]:
         old, new, allowed = each["baseline"], each["value"], each["allowed"]
         table.add_row(
             Text(each["case"]),
@@ -62,6 +62,6 @@ def _share(change: float, of: float, sign: str = "") -> str:
 
 
 def _with_rest(table: Table, rows: int) -> Table | None:
-    if rows > MOST_ROWS:
-        table.caption = f"and {rows - MOST_ROWS} more, all of them in batch.json"
+    if rows > MAX_ROWS:
+        table.caption = f"and {rows - MAX_ROWS} more, all of them in batch.json"
     return table if rows else None

@@ -19,7 +19,8 @@ from .shape_data import DiagnosisSection
 
 Array = np.ndarray
 FAMILIES = ("[0,0]", "in-plane", "lateral")
-SHOWN, LEAST = 12, 0.005  # explanations, and the probability below which one is not drawn
+MAX_SHOWN = 12  # explanations
+MIN_PROBABILITY = 0.005  # of one that is shown
 WORDS = 24  # letters of a bar's name in a line
 
 
@@ -95,8 +96,10 @@ def draw_residuals(
 @in_house_style
 def draw_probabilities(d: Diagnosis) -> Figure:
     """The likeliest explanations as bars, before (a mark) and after the data."""
-    order = sorted(d.hypotheses, key=lambda h: -d.probabilities[h.key])[:SHOWN]
-    order = [h for h in order if d.probabilities[h.key] >= LEAST or h.key in (NONE, OUTSIDE)]
+    order = sorted(d.hypotheses, key=lambda h: -d.probabilities[h.key])[:MAX_SHOWN]
+    order = [
+        h for h in order if d.probabilities[h.key] >= MIN_PROBABILITY or h.key in (NONE, OUTSIDE)
+    ]
     figure = new_figure(7.4, 1.4 + 0.34 * len(order))
     axes = figure.add_subplot()
     place = np.arange(len(order))[::-1]

@@ -21,10 +21,10 @@ if TYPE_CHECKING:
 Array = np.ndarray
 
 COMPONENTS = ("radial", "tangential", "axial")
-ALONG = 0.9  # of a sensor's direction, for its motion to be drawn as that component
+MIN_COSINE = 0.9  # of a sensor's direction, for its motion to be drawn as that component
 AMPLITUDE = 0.35  # of the ring's radius, the largest motion drawn
 PER_ROW = 5
-MOST = 20  # shapes in a picture
+MAX_SHAPES = 20  # shapes in a picture
 
 
 def measured_table(runs: Sequence[ModalTest]) -> Table:
@@ -88,7 +88,7 @@ def _draw(path: Path, runs: Sequence[ModalTest]) -> None:
     from .figure import new_figure, save
 
     run = next((each for each in runs if each.functions is not None), runs[0])
-    modes = run.modes[:MOST]
+    modes = run.modes[:MAX_SHAPES]
     rows = -(-len(modes) // PER_ROW)
     top = run.functions is not None
     figure = new_figure(10.0, 3.4 * top + 2.35 * rows)
@@ -154,7 +154,7 @@ def _draw_shape(axes: Axes, told: LabelledMode) -> None:
     R, angle, _ = told.sensors.points.T
     belt = R / R.max() > BELT
     along = told.sensors.directions
-    rows = [np.flatnonzero(belt & (np.abs(along[:, k]) > ALONG)) for k in range(3)]
+    rows = [np.flatnonzero(belt & (np.abs(along[:, k]) > MIN_COSINE)) for k in range(3)]
     motion = [told.shape[rows[k]] * np.sign(along[rows[k], k]) for k in range(3)]
     k = _shown(told.judged.label, [np.mean(u**2) if len(u) else 0.0 for u in motion])
     u, at = motion[k], angle[rows[k]]

@@ -22,7 +22,7 @@ from .revolve import motion, skin, swept
 Array = np.ndarray
 
 ANGLES = 72
-LARGEST = 0.12  # displacement in the picture over the tyre's radius
+MAX_MOTION = 0.12  # displacement in the picture over the tyre's radius
 NEARER = 0.03  # of the radius: bold lines over the surface that they lie on
 VIEW = 1.15  # half a view's width over the tyre's radius
 COLOUR_MAP = colormaps["viridis"]
@@ -111,7 +111,7 @@ def _surface(mode: Mode, mesh: SectionMesh, scale: float | None) -> _Surface:
         phase = np.arctan2(2 * a[k] @ b[k], a[k] @ a[k] - b[k] @ b[k]) / 2
         u = np.cos(phase) * u + np.sin(phase) * quarter
     size = np.linalg.norm(u, axis=-1)
-    scale = LARGEST * np.abs(rest).max() / size.max() if scale is None else scale
+    scale = MAX_MOTION * np.abs(rest).max() / size.max() if scale is None else scale
     return _Surface(rest, rest + scale * u, size / size.max(), _twists(mode))
 
 

@@ -14,7 +14,7 @@ from ..simulate.modes.mode import Mode
 from ..tyre.section.mesh import SectionMesh
 from .revolve import cartesian, corners, motion, swept
 
-WIDEST = np.radians(5.0)  # between rings of points of the pressed tyre
+MAX_ANGLE = np.radians(5.0)  # between rings of points of the pressed tyre
 
 
 def write_vtu(path: Path, mode: Mode, mesh: SectionMesh, sectors: int = 60) -> None:
@@ -66,9 +66,9 @@ def write_pressed_vtu(
 
 
 def _refined(angles: np.ndarray, field: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Angles, and a field (angle, ...) linear between them, with no gap wider than ``WIDEST``."""
+    """Angles, and a field (angle, ...) linear between them; no gap is above ``MAX_ANGLE``."""
     gaps = np.diff(angles, append=angles[0] + 2 * np.pi)
-    parts = np.ceil(gaps / WIDEST - 1e-9).astype(int)
+    parts = np.ceil(gaps / MAX_ANGLE - 1e-9).astype(int)
     ring = np.repeat(np.arange(len(angles)), parts)
     share = np.concatenate([np.arange(count) / count for count in parts])
     following = field[(ring + 1) % len(angles)]

@@ -10,10 +10,10 @@ from ..tyre.usual import MEASURED
 
 CLOSE, FAR = 2.0, 5.0  # % of deviation from a target
 MINUS = "\N{MINUS SIGN}"
-HARDLY = 0.5  # standard error over the value, above which a variable is not determined
-SAME = 1.02  # of an objective, or a variable, up to which two fits are one
-FAR_OFF = 30.0  # % after a fit: no tyre is that far from its model
-SLOWEST_HZ = 1.0  # no mode of a tyre is below
+MAX_RELATIVE_ERROR = 0.5  # standard error over the value, above which a variable is not determined
+SAME_RATIO = 1.02  # of an objective, or a variable, up to which two fits are one
+MAX_OFF = 30.0  # % after a fit: no tyre is that far from its model
+MIN_FREQUENCY_HZ = 1.0  # no mode of a tyre is below
 
 
 def nearness(modes: Sequence[Mapping[str, Any]]) -> str:
@@ -50,14 +50,14 @@ def fit_verdict(result: Mapping[str, Any]) -> list[str]:
 def _starts(result: Mapping[str, Any]) -> str:
     """Whether the fits from several starts found one and the same."""
     starts, best = result["starts"], result["objective_Hz"]
-    alike = [start for start in starts if start["objective_Hz"] <= SAME * best + 1e-9]
+    alike = [start for start in starts if start["objective_Hz"] <= SAME_RATIO * best + 1e-9]
     spread = {
         name: max(abs(start["values"][name] / v["value"] - 1) for start in alike)
         for name, v in result["variables"].items()
         if v["value"]
     }
     far, share = max(spread.items(), key=lambda item: item[1], default=("", 0.0))
-    if share > SAME - 1:
+    if share > SAME_RATIO - 1:
         return (
             f"{len(alike)} of {len(starts)} starts reach this objective, but with {far} up to"
             f" {100 * share:.0f} % apart: other designs serve as well."
@@ -80,8 +80,8 @@ def tyre_doubts(result: Mapping[str, Any]) -> list[str]:
             f"the tyre weighs {result['mass_kg']:.4g} kg, {message.partition(';')[0]}: are"
             " densities and areas of cords in the units of their keys?"
         )
-    slowest = min((mode["frequency_Hz"] for mode in result["modes"]), default=SLOWEST_HZ)
-    if slowest < SLOWEST_HZ:
+    slowest = min((mode["frequency_Hz"] for mode in result["modes"]), default=MIN_FREQUENCY_HZ)
+    if slowest < MIN_FREQUENCY_HZ:
         doubts.append(
             f"a mode is at {slowest:.3g} Hz, lower than any tyre's: are all stiffnesses and"
             " compliances in the units of their keys?"
@@ -106,7 +106,7 @@ def fit_doubts(result: Mapping[str, Any]) -> list[str]:
             doubts.append(f"{name} ended at a bound: {why}")
         elif variable["standard_error"] is None:
             doubts.append(f"the data do not determine {name}: fix it, or add targets")
-        elif variable["standard_error"] > HARDLY * abs(variable["value"]):
+        elif variable["standard_error"] > MAX_RELATIVE_ERROR * abs(variable["value"]):
             share = 100 * variable["standard_error"] / max(abs(variable["value"]), 1e-300)
             doubts.append(f"the data hardly determine {name}: its standard error is {share:.0f} %")
     if failed := result["failed_evaluations"]:
@@ -117,10 +117,10 @@ def fit_doubts(result: Mapping[str, Any]) -> list[str]:
             f"a mode is hard to name (margin {result['label_margin']:.2f} of 1): two modes have"
             " met; look at their pictures"
         )
-    far = [mode for mode in result["modes"] if abs(mode["deviation_percent"] or 0) > FAR_OFF]
+    far = [mode for mode in result["modes"] if abs(mode["deviation_percent"] or 0) > MAX_OFF]
     if 2 * len(far) > len(result["modes"]):
         doubts.append(
-            f"most modes are still more than {FAR_OFF:g} % off: are the targets in Hz, with the"
+            f"most modes are still more than {MAX_OFF:g} % off: are the targets in Hz, with the"
             " right labels, at this pressure?"
         )
     values = result["singular_values"]

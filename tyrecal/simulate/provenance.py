@@ -16,15 +16,15 @@ if TYPE_CHECKING:
     from .evaluate.solver import Solver
 
 KEY = "provenance"
-Number = float | Sequence[float]
+OneOrMore = float | Sequence[float]
 
 
 def provenance(
     case: LoadedCase,
     solver: Solver,
     measured: Iterable[Path] = (),
-    pressure_kPa: Number | None = None,
-    load_N: Number = 0.0,
+    pressure_kPa: OneOrMore | None = None,
+    load_N: OneOrMore = 0.0,
 ) -> dict[str, Any]:
     """The block ``provenance`` of a result file.
 
@@ -77,5 +77,5 @@ def _rim(case: LoadedCase) -> str:
     return "free" if rim.free else "spindle" if rim.spindle.gives_way else "fixed"
 
 
-def _plain(number: Number) -> float | list[float]:
+def _plain(number: OneOrMore) -> float | list[float]:
     return float(number) if isinstance(number, int | float) else [float(each) for each in number]

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 FILE = "TYRECAL_SETTINGS"  # variable that names another settings file; empty: none
 COMMAND = "TYRECAL_SOLVER_COMMAND"  # of whichever solver is used
-Model = TypeVar("Model", bound="BaseModel")
+SettingsModel = TypeVar("SettingsModel", bound="BaseModel")
 
 
 class SettingsError(InputError):
@@ -36,7 +36,7 @@ def place() -> Path | None:
     return user_config_path("tyrecal", appauthor=False) / "settings.yaml"
 
 
-def typed(path: Path, kind: type[Model]) -> Model:
+def typed(path: Path, kind: type[SettingsModel]) -> SettingsModel:
     """A YAML file as a model of pydantic. Raises SettingsError: a sentence a mistake, its line."""
     from pydantic import ValidationError
 

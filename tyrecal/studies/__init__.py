@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from .result import Result
 
 GROUP = "tyrecal.studies"
-RESULTS = {  # in the order of a page
+RESULT_TYPES = {  # in the order of a page
     "fit": "tyrecal.studies.fit.result:FitResult",
     "modes": "tyrecal.studies.modes:ModesResult",
     "sweep-pressure": "tyrecal.studies.pressure_result:PressureSweep",
@@ -26,7 +26,7 @@ RESULTS = {  # in the order of a page
 def result_types() -> dict[str, type[Result]]:
     """By the name of the study, those from outside last."""
     outside = {entry.name: entry.value for entry in entry_points(group=GROUP)}
-    return {name: named(place) for name, place in {**RESULTS, **outside}.items()}
+    return {name: named(place) for name, place in {**RESULT_TYPES, **outside}.items()}
 
 
 def named(place: str) -> Any:

@@ -27,7 +27,7 @@ from .result import (
     silent,
 )
 
-USUAL = (0.8, 1.6)  # mean contact pressure of a passenger car's tyre over its inflation pressure
+USUAL_SHARE = (0.8, 1.6)  # mean contact pressure over the inflation, of a passenger car
 Outcome = Pressed | EvaluationFailed
 
 
@@ -198,7 +198,7 @@ def _larger(ratios: Mapping[float, float]) -> str:
 
 def _mean(shares: Mapping[float, float]) -> str:
     """How the mean contact pressure stands to the inflation pressure."""
-    low, high = USUAL
+    low, high = USUAL_SHARE
     odd = [f"{load:g} N ({x:.2f})" for load, x in shares.items() if not low <= x <= high]
     span = " to ".join(dict.fromkeys(f"{f(shares.values()):.2f}" for f in (min, max)))
     usual = f"the usual {low:g} to {high:g}"

@@ -16,10 +16,10 @@ from ..simulate.modes.mode import Label, Mode
 from ..tyre.case import LoadedCase
 from .fit.problem import read_targets
 
-FURTHER = 3  # harmonics beyond the case's that may stand among its modes
-SPARE = 6  # modes at a load beyond as many as stand for [0,0] to [c,1]
+EXTRA_HARMONICS = 3  # harmonics beyond the case's that may stand among its modes
+EXTRA_MODES = 6  # modes at a load beyond as many as stand for [0,0] to [c,1]
 NEAR = 1.5  # times the highest frequency at a load: unloaded modes beyond it take no part in names
-DECENT = 0.5  # share of a loaded shape that the modes before must make up to name it
+MIN_SPANNED = 0.5  # share of a loaded shape that the modes before must make up to name it
 
 
 @dataclass(frozen=True)
@@ -108,14 +108,14 @@ def _wanted(case: LoadedCase, modes: Sequence[Mode]) -> list[Label]:
 
 def _count(case: LoadedCase) -> int:
     """Modes to seek at each load: both [0,0], the two members of [c,0] and [c,1], and some."""
-    return 2 + 4 * case.case.analysis.highest_harmonic + SPARE
+    return 2 + 4 * case.case.analysis.highest_harmonic + EXTRA_MODES
 
 
 def _unloaded(
     case: LoadedCase, evaluator: Evaluator, values: Mapping[str, float]
 ) -> Found | EvaluationFailed:
     """The unloaded tyre's modes with a few harmonics more, the wanted ones surely among them."""
-    highest = case.case.analysis.highest_harmonic + FURTHER
+    highest = case.case.analysis.highest_harmonic + EXTRA_HARMONICS
     question = Question({**values, "analysis.highest_harmonic": highest})
     ((_, found),) = find_modes(evaluator, [question], lambda modes: _wanted(case, modes))
     if isinstance(found, DeckRefused):
@@ -169,7 +169,7 @@ def _followed(
         here = state(footprint.mode_frequency_Hz, footprint.mode_shape, where)
         step, straight = follow(before, here, where), follow(free, here, where)
         spanned = np.where(place < 0, 0.0, step.spanned[place])
-        place = np.where(spanned < DECENT, -1, step.position[place])
+        place = np.where(spanned < MIN_SPANNED, -1, step.position[place])
         overlaps = where.overlaps(free.shapes, here.shapes)
         chosen = [i for i, name in enumerate(names) if name.label in wanted]
         loads.append(

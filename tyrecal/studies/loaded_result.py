@@ -28,7 +28,7 @@ from .result import (
     silent,
 )
 
-STEADY = 1e-3  # Hz, below which a split is none
+SPLIT_ATOL = 1e-3  # Hz, below which a split is none
 
 
 class LoadRow(Part):
@@ -213,8 +213,8 @@ def _split(label: Label, tables: Mapping[float, Mapping[Any, float]]) -> dict[st
         "m": label.m,
         "kind": label.kind,
         "split_Hz": [{"load_N": load, "split": hertz} for load, hertz in both.items()],
-        "grows": all(b > a - STEADY for (_, a), (_, b) in pairwise(sizes)),
-        "shrinks_from_N": [low for (low, a), (_, b) in pairwise(sizes) if b <= a - STEADY],
+        "grows": all(b > a - SPLIT_ATOL for (_, a), (_, b) in pairwise(sizes)),
+        "shrinks_from_N": [low for (low, a), (_, b) in pairwise(sizes) if b <= a - SPLIT_ATOL],
     }
 
 
@@ -245,7 +245,7 @@ def _rising(tables: Mapping[float, Mapping[Any, float]]) -> list[str]:
             f"[{label.c},{label.m}] {symmetry}"
             for before, after in pairwise(tables.values())
             for (label, symmetry), hertz in after.items()
-            if hertz < before.get((label, symmetry), 0.0) - STEADY
+            if hertz < before.get((label, symmetry), 0.0) - SPLIT_ATOL
         }
     )
     if len(tables) < 2:

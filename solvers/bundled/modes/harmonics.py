@@ -33,6 +33,8 @@ MIN_AIR_SHARE = 0.5
 class Unstable(ArithmeticError):
     """The inflated state is not stable: a harmonic of it buckles."""
 
+    cause = "unstable"
+
 
 class Combination(Protocol):
     """What a mode that is not one harmonic of a tyre at rest is made of."""

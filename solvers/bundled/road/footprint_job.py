@@ -42,12 +42,6 @@ log = logging.getLogger("tyrecal_solvers")
 PATCH_ARRAYS = ("ring", "node", "along_m", "across_m", "pressure_Pa", "area_m2", "traction_Pa")
 MIN_ELASTIC_SLIP = 1e-6  # m, before friction is full: harder sticks are not reached
 
-CAUSES: dict[type[Exception], str] = {
-    NotPressed: "no_equilibrium",
-    Unstable: "unstable",
-    NotConverged: "crashed",
-    np.linalg.LinAlgError: "crashed",
-}
 MODE_ARRAYS = ("mode_frequency_Hz", "mode_node", "mode_shape")
 
 
@@ -187,7 +181,7 @@ def press(
             if not footprints:
                 raise error from None
             failure = str(error)
-            cause = "timed_out" if isinstance(error, give_up) else CAUSES[type(error)]
+            cause = getattr(error, "cause", "crashed")
             break
         footprints.append(footprint)
         reached = len(footprints), len(wanted)

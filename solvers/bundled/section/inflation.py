@@ -28,6 +28,8 @@ TENSION_FACTOR = 0.05  # factor on the artificial tension from one iteration to 
 class InflationFailed(ArithmeticError):
     """No stable equilibrium beyond ``reached`` times the load that was asked for."""
 
+    cause = "no_equilibrium"
+
     def __init__(self, reached: float, pressure: float, why: str):
         super().__init__(
             f"inflation stopped at {reached * pressure / 1e3:.4g} of"

@@ -26,7 +26,7 @@ from ...studies.modes import ModesResult
 from ...studies.pressure_result import PressureSweep
 from ...studies.result import Deviation, Named, Result
 from ..convergence import draw_convergence, draw_deviations
-from ..diagnosis_pictures import draw_residuals
+from ..diagnosis_pictures import MAX_SHOWN, MIN_PROBABILITY, draw_residuals
 from ..figure import svg
 from ..footprint import draw_curves, draw_patches
 from ..load import draw_load_sweep
@@ -40,8 +40,7 @@ from .results import Results, read_results
 from .shapes import packed
 from .summary import VERDICTS, sentence, summary
 
-LARGEST = 5_000_000  # bytes of a page
-SHOWN, LEAST = 12, 0.005  # explanations, and the probability below which one is not shown
+MAX_BYTES = 5_000_000
 MARK = '<meta name="generator" content="tyrecal report">'
 
 
@@ -66,7 +65,7 @@ def write_page(path: Path, folders: Sequence[Path]) -> Page:
     except UnicodeEncodeError:
         raise InputError("a name in the results is no text") from None
     size = len(content)
-    if size > LARGEST:
+    if size > MAX_BYTES:
         raise InputError(
             f"the page would have {size / 1e6:.1f} MB, more than 5: give fewer folders"
         )
@@ -252,8 +251,8 @@ def _diagnosis(found: Results, draw: Draw) -> dict[str, Any]:
         "verdict": VERDICTS[d.verdict],
         "likeliest": [
             (key, p)
-            for key, p in list(d.probabilities.items())[:SHOWN]
-            if p >= LEAST or key in ("none", "outside")
+            for key, p in list(d.probabilities.items())[:MAX_SHOWN]
+            if p >= MIN_PROBABILITY or key in ("none", "outside")
         ],
         "words": html(found.diagnosis_words),
         "map": drawn,

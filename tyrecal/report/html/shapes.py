@@ -10,7 +10,7 @@ import numpy as np
 from ...simulate.modes.mode import Label
 from ..shape_data import Shape, Shapes
 
-STEPS = 32767
+INT16_MAX = 32767
 ANGLES = 60  # round the circumference, in the page
 
 
@@ -75,5 +75,5 @@ def _named(mode: Shape) -> dict[str, str]:
 
 def _base64(values: np.ndarray) -> str:
     """Values of -1 to 1, little end first."""
-    whole = np.rint(np.clip(values, -1, 1) * STEPS).astype("<i2")
+    whole = np.rint(np.clip(values, -1, 1) * INT16_MAX).astype("<i2")
     return b64encode(whole.tobytes()).decode("ascii")

@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping
 from typing import Any, Protocol
 
-from ...tyre.case.analysis import Solver
+from ...tyre.case.analysis import SolverChoice
 from ...tyre.templates import TemplateFailed
 
 Tangents = dict[str, list[tuple[str, int, int, float]]]
@@ -42,7 +42,7 @@ class Design(Protocol):
         """Whether a solver with gradients gives exact ones of it."""
 
     @property
-    def solver(self) -> Solver:
+    def solver(self) -> SolverChoice:
         """Which solver it is meant for, its options and time limit."""
 
     def at(self, values: Mapping[str, float]) -> Design:

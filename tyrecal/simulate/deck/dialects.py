@@ -15,10 +15,10 @@ from .abaqus import context
 from .calculix import calculix_context
 
 ELEMENTS_A_WAVE = 7.5  # of quadratic ones: the frequencies are right to 0.4 %
-Request = Mapping[str, Any]  # what is asked of a deck, see `Decks.request`
+DeckRequest = Mapping[str, Any]  # what is asked of a deck, see `Decks.request`
 
 
-def _abaqus(tyre: Tyre, env: Any, request: Request) -> dict[str, str]:
+def _abaqus(tyre: Tyre, env: Any, request: DeckRequest) -> dict[str, str]:
     names = context(tyre)
     names["mesh_block"] = _mesh_block(env, names["mesh"])
     names["modes"] = 2 * request["modes_per_harmonic"] * (request["highest_harmonic"] + 1)
@@ -57,7 +57,7 @@ def fine_enough(angles_deg: Sequence[float], waves: int) -> list[float]:
     return [*kept, *([rest / more] * more)]
 
 
-def _calculix(tyre: Tyre, env: Any, request: Request) -> dict[str, str]:
+def _calculix(tyre: Tyre, env: Any, request: DeckRequest) -> dict[str, str]:
     """The sector, its inflation, and a deck per nodal diameter that goes on from there."""
     if tyre.case.analysis.sectors < 4 * request["highest_harmonic"]:
         raise TemplateFailed(
@@ -72,7 +72,7 @@ def _calculix(tyre: Tyre, env: Any, request: Request) -> dict[str, str]:
     return texts
 
 
-DIALECTS: dict[str, Callable[[Tyre, Any, Request], dict[str, str]]] = {
+DIALECTS: dict[str, Callable[[Tyre, Any, DeckRequest], dict[str, str]]] = {
     "abaqus": _abaqus,
     "calculix": _calculix,
 }

@@ -19,7 +19,7 @@ from ...tyre.section.mesh import SectionMesh, build_mesh
 from ...tyre.section.section import Section
 
 Array = np.ndarray
-Point = tuple[int, ...]  # a corner of the section's mesh, or the two corners of a side
+Corner = tuple[int, ...]  # a corner of the section's mesh, or the two corners of a side
 INNER_FACE = "P6"  # a brick's face over side 4 of the section's element
 
 
@@ -142,18 +142,18 @@ def _moment(corner: Array) -> float:
 
 def _extruded(mesh: SectionMesh, angle: float, quadratic: bool) -> dict[str, Any]:
     """Nodes, bricks and sets of the sector, its nodes numbered without gaps from 1."""
-    points: dict[Point, tuple[float, float]] = {(n,): rz for n, rz in mesh.nodes.items()}
-    sides: dict[int, list[Point]] = {number: [] for number in mesh.solids}
+    points: dict[Corner, tuple[float, float]] = {(n,): rz for n, rz in mesh.nodes.items()}
+    sides: dict[int, list[Corner]] = {number: [] for number in mesh.solids}
     for number, corners in mesh.solids.items():
         for a, b in zip(corners, corners[1:] + corners[:1], strict=True) if quadratic else ():
             (r, z), (s, y) = mesh.nodes[a], mesh.nodes[b]
             sides[number].append((min(a, b), max(a, b)))
             points[sides[number][-1]] = (r + s) / 2, (z + y) / 2
-    corner_points: list[Point] = [p for p in points if len(p) == 1]
+    corner_points: list[Corner] = [p for p in points if len(p) == 1]
     front = {p: k for k, p in enumerate(points, start=1)}
     behind = {p: len(points) + k for p, k in front.items()}
     between = {p: 2 * len(points) + k for k, p in enumerate(corner_points, start=1)}
-    planes: list[tuple[dict[Point, int], float]] = [
+    planes: list[tuple[dict[Corner, int], float]] = [
         (front, 0.0),
         (behind, -angle),
         (between, -angle / 2),

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from ...tyre.case import LoadedCase
-from ...tyre.case.analysis import Solver
+from ...tyre.case.analysis import SolverChoice
 from ...tyre.effects import catalogue
 from ...tyre.resolve import resolved
 from ...tyre.templates import TemplateFailed, environment
@@ -75,7 +75,7 @@ class TyreDesign:
         return not self.tyre.case.splice.share
 
     @property
-    def solver(self) -> Solver:
+    def solver(self) -> SolverChoice:
         """The case's."""
         return self.case.case.solver
 

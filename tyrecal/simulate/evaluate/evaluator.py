@@ -20,7 +20,6 @@ from .results import Evaluation, evaluation
 from .solver import Solver, find_solver
 from .store import Store, key_of
 
-CAUSES = {"InflationFailed": "no_equilibrium", "Unstable": "unstable", "TimedOut": "timed_out"}
 SETTLED = ("no_equilibrium", "unstable")  # the deck's own doing: another run would say the same
 MODES_ON_TOP = 3  # times the time limit of a load, where modes are sought there too
 T = TypeVar("T")
@@ -176,7 +175,7 @@ class Evaluator:
             folders.drop(folder)
             raise DeckRefused(str(error)) from None
         except solver.failures as error:
-            cause = getattr(error, "cause", None) or CAUSES.get(type(error).__name__, "crashed")
+            cause = getattr(error, "cause", "crashed")
             failure = EvaluationFailed(cause, str(error), self._kept(folder, str(error)))
             if cause in SETTLED:
                 place = str(failure.folder.resolve()) if failure.folder else None

@@ -1,6 +1,6 @@
 """A scheduler of our own, whose workers are jobs of a queueing system (SLURM, PBS).
 
-The settings are a YAML file: `Settings`. They say nothing about what is computed, so the results
+The settings are a YAML file, `QueueSettings`. They say nothing about what is computed: results
 are those of any other place.
 """
 
@@ -21,7 +21,7 @@ from .failure import SolverUnavailable
 THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS")
 
 
-class Settings(BaseModel):
+class QueueSettings(BaseModel):
     """Jobs of a queueing system. ``local`` starts them on this machine, to try the settings.
 
     workers: processes in all, each does one case at a time; cores: of one job, a worker each;
@@ -46,12 +46,12 @@ class Settings(BaseModel):
     log_directory: str | None = None
 
 
-def read_settings(path: Path) -> Settings:
+def read_settings(path: Path) -> QueueSettings:
     """Settings from their file. Raises SettingsError, in one sentence a mistake."""
-    return typed(path, Settings)
+    return typed(path, QueueSettings)
 
 
-def jobs_of(settings: Settings) -> Any:
+def jobs_of(settings: QueueSettings) -> Any:
     """A cluster of dask-jobqueue, its scheduler in this process, no jobs yet.
 
     Raises SolverUnavailable without the extra.

@@ -33,11 +33,11 @@ def _shaped(
     return AfterValidator(check)
 
 
-Number = Annotated[Any, _shaped(REAL)]
-Positive = Annotated[Any, _shaped(REAL, least=0.0)]
+Finite = Annotated[Any, _shaped(REAL)]
+PositiveFinite = Annotated[Any, _shaped(REAL, least=0.0)]
 Points = Annotated[Any, _shaped(REAL, None, 3)]
-Row = Annotated[Any, _shaped(REAL, None)]
-Numbers = Annotated[Any, _shaped("iu", None)]
+Triple = Annotated[Any, _shaped(REAL, None)]
+FiniteArray = Annotated[Any, _shaped("iu", None)]
 Field3D = Annotated[Any, _shaped(REAL, None, None, 3)]
 
 
@@ -54,7 +54,7 @@ class _Failure(_Part):
 class _Mode(_Part):
     """As `Solver.read` gives it: on the section (n, amplitude) or in three dimensions."""
 
-    frequency_Hz: Positive
+    frequency_Hz: PositiveFinite
     multiplicity: Annotated[Any, _shaped("iu", least=0)]
     n: Annotated[Any, _shaped("iu", least=-1)] = 0
     amplitude: Annotated[Any, _shaped("c" + REAL, None, 3)] = None
@@ -70,14 +70,14 @@ class _Mode(_Part):
 
 class _Tyre(_Part):
     pressure_Pa: Annotated[Any, _shaped(REAL, least=-1e-9)]
-    mass_kg: Positive
-    nodes: Numbers
+    mass_kg: PositiveFinite
+    nodes: FiniteArray
     points: Annotated[Any, _shaped(REAL, None, None)]
 
 
 class _Modes(_Tyre):
     modes: list[_Mode]
-    gradients: dict[str, Row]
+    gradients: dict[str, Triple]
     displacement: Points
 
     @model_validator(mode="after")
@@ -99,28 +99,28 @@ class _Footprint(_Part):
     """The fields of `pressed.Footprint`."""
 
     model_config = ConfigDict(extra="forbid")
-    load_N: Positive
-    road_N: Number
+    load_N: PositiveFinite
+    road_N: Finite
     rim_N: Annotated[Any, _shaped(REAL, 3)]
-    deflection_m: Number
-    stiffness_N_per_m: Number
-    ring: Numbers
-    node: Numbers
-    along_m: Row
-    across_m: Row
-    pressure_Pa: Row
-    area_m2: Row
+    deflection_m: Finite
+    stiffness_N_per_m: Finite
+    ring: FiniteArray
+    node: FiniteArray
+    along_m: Triple
+    across_m: Triple
+    pressure_Pa: Triple
+    area_m2: Triple
     traction_Pa: Annotated[Any, _shaped(REAL, None, 2)]
     displacement: Field3D
-    contact_area_m2: Positive | None = None
-    mode_frequency_Hz: Row | None = None
-    mode_node: Numbers | None = None
+    contact_area_m2: PositiveFinite | None = None
+    mode_frequency_Hz: Triple | None = None
+    mode_node: FiniteArray | None = None
     mode_shape: Annotated[Any, _shaped(REAL, None, None, None, 3)] | None = None
 
 
 class _Pressed(_Tyre):
-    angles: Row
-    free_radius_m: Positive
+    angles: Triple
+    free_radius_m: PositiveFinite
     footprints: Annotated[list[_Footprint], Field(min_length=1)]
     failure: Annotated[str, Field(max_length=100_000)]
     cause: Literal["no_equilibrium", "unstable"] = "no_equilibrium"

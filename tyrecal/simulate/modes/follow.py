@@ -10,7 +10,7 @@ from scipy.optimize import linear_sum_assignment
 
 from ..evaluate.results import HarmonicShape
 from .mode import Label, Mode
-from .sample import harmonic_of
+from .rings import harmonic_of
 from .subspace import mac
 
 

@@ -37,12 +37,11 @@ def add(path: Path, id: str, value: float, folder: Path | None = None) -> Path:
     yaml.width = 1000
     yaml.representer.add_representer(type(None), _null)
     data = yaml.load(path.read_text(encoding="utf-8"))
-    effects = dict(data.get("effects") or {})
     if "effects" in data:
         data["effects"][id] = value
     else:
         place = list(data).index("variables") if "variables" in data else len(data)
-        data.insert(place, "effects", {**effects, id: value})
+        data.insert(place, "effects", {id: value})
     with whole(target) as partial, partial.open("w", encoding="utf-8") as file:
         yaml.dump(data, file)
     load_case(target, allow_unusual=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+import numpy as np
 from scipy.stats import chi2
 
 from .evidence import NONE, OUTSIDE, PRIOR_NONE, Hypothesis
@@ -33,12 +34,8 @@ def decide(
     0.05, or nothing that fits; no_gap: "none" is likelier than it was before, and likeliest.
     """
     order = sorted(probabilities, key=lambda key: -probabilities[key])
-    candidates, total = [], 0.0
-    for key in order:
-        candidates.append(key)
-        total += probabilities[key]
-        if total >= SET:
-            break
+    totals = np.cumsum([probabilities[key] for key in order])
+    candidates = order[: int(np.searchsorted(totals, SET)) + 1]
     effects = [key for key in order if key not in (NONE, OUTSIDE)]
     none = probabilities[NONE]
     by_key = {h.key: h for h in hypotheses}

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 from pydantic import Field
 
 from .materials import Moduli
-from .parts import Frequency, Name, NotNegative, Part, Positive, Problem
+from .parts import Disagreement, Frequency, Name, NotNegative, Part, Positive
 
 LEAST_LOAD_N, LARGEST_LOAD_N = 1.0, 1e6  # outside, no tyre finds its balance on a road
 Load = Annotated[Positive, Field(ge=LEAST_LOAD_N, le=LARGEST_LOAD_N)]
@@ -44,7 +44,7 @@ class Road(Part):
     )
 
     @classmethod
-    def problems(cls, values: Mapping[str, Any]) -> Iterator[Problem]:
+    def problems(cls, values: Mapping[str, Any]) -> Iterator[Disagreement]:
         angles, loads = _numbers(values, "element_angles_deg"), _numbers(values, "loads_N")
         if angles and abs(sum(angles) - 180) > 1e-6:
             yield "element_angles_deg", f"must have the sum 180, got {sum(angles):g}"
@@ -59,7 +59,7 @@ def _numbers(values: Mapping[str, Any], key: str) -> list[float]:
     return value if right and value else []
 
 
-class Solver(Part):
+class SolverChoice(Part):
     """Which solver runs, how long one run (of footprints: a load) may take, its own options."""
 
     name: Name

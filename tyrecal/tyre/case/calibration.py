@@ -10,12 +10,12 @@ from pydantic import Field
 from .analysis import Load
 from .parts import (
     WRONG,
+    Disagreement,
     Frequency,
     NotNegative,
     Number,
     Part,
     Positive,
-    Problem,
     Text,
     number,
     one_of,
@@ -50,7 +50,7 @@ class Variable(Part):
     scale: Literal["log", "linear"] = "log"
 
     @classmethod
-    def problems(cls, values: Mapping[str, Any]) -> Iterator[Problem]:
+    def problems(cls, values: Mapping[str, Any]) -> Iterator[Disagreement]:
         start, lower, upper = (number(values, key) for key in ("start", "lower", "upper"))
         if lower is not None and upper is not None and not lower < upper:
             yield "upper", f"must be greater than lower, {lower:g}"
@@ -74,7 +74,7 @@ class TargetMode(Part):
     sigma_Hz: Positive | None = None
 
     @classmethod
-    def problems(cls, values: Mapping[str, Any]) -> Iterator[Problem]:
+    def problems(cls, values: Mapping[str, Any]) -> Iterator[Disagreement]:
         c, m, kind = number(values, "c"), number(values, "m"), values.get("kind")
         if c is None or m is None:
             return
@@ -95,7 +95,7 @@ class TargetFootprint(Part):
     weight: Weight = 1.0
 
     @classmethod
-    def problems(cls, values: Mapping[str, Any]) -> Iterator[Problem]:
+    def problems(cls, values: Mapping[str, Any]) -> Iterator[Disagreement]:
         given = [key for key in MEASURED if values.get(key) is not None]
         if not given and WRONG in values.values():  # a misspelt key, which is reported
             return
@@ -143,7 +143,7 @@ class Uncertainty(Part):
     signs: list[Annotated[int, Field(ge=-1, le=1)]] | None = None
 
     @classmethod
-    def problems(cls, values: Mapping[str, Any]) -> Iterator[Problem]:
+    def problems(cls, values: Mapping[str, Any]) -> Iterator[Disagreement]:
         yield from one_of(values, "percent", "absolute")
         sets, signs = values.get("sets"), values.get("signs")
         if isinstance(sets, list) and isinstance(signs, list) and len(signs) != len(sets):

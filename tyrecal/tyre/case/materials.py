@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from .parts import WRONG, Frequency, Number, Part, Positive, Problem, number
+from .parts import WRONG, Disagreement, Frequency, Number, Part, Positive, number
 
 Moduli = Literal["long_term", "instantaneous"]
 MOST_RELAXED = 0.999  # of a modulus: what is left must be a tyre's
@@ -40,7 +40,7 @@ class Rubber(Part):
     density_kg_per_m3: Positive
 
     @classmethod
-    def problems(cls, values: Mapping[str, Any]) -> Iterator[Problem]:
+    def problems(cls, values: Mapping[str, Any]) -> Iterator[Disagreement]:
         c10, c01 = number(values, "C10_Pa"), number(values, "C01_Pa")
         if c10 is not None and c01 is not None and not c10 + c01 > 0:
             yield "C10_Pa", f"must be greater than -C01_Pa, C10_Pa + C01_Pa is {c10 + c01:g}"

@@ -33,7 +33,7 @@ Degrees = Annotated[float, Field(ge=-180, le=180)]
 Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z][A-Za-z0-9_\-]*$", max_length=60)]
 Text = Annotated[str, StringConstraints(pattern=r"^[^\x00-\x1f\x7f]*$", max_length=300)]
 
-Problem = tuple[str, str]
+Disagreement = tuple[str, str]
 """A key of a part, and what would be right there."""
 
 WRONG = object()
@@ -46,7 +46,7 @@ def number(values: Mapping[str, Any], key: str) -> float | None:
     return value if isinstance(value, int | float) else None
 
 
-def one_of(values: Mapping[str, Any], first: str, second: str) -> Iterator[Problem]:
+def one_of(values: Mapping[str, Any], first: str, second: str) -> Iterator[Disagreement]:
     """What is wrong where not exactly one of two keys is given."""
     if values.get(first) is None and values.get(second) is None:
         yield first, f"must be given, or {second}"
@@ -60,7 +60,7 @@ class Part(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, frozen=True)
 
     @classmethod
-    def problems(cls, values: Mapping[str, Any]) -> Iterator[Problem]:
+    def problems(cls, values: Mapping[str, Any]) -> Iterator[Disagreement]:
         """What is wrong between the keys of ``values``; those that are WRONG are not judged."""
         yield from ()
 

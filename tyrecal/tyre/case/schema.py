@@ -7,7 +7,7 @@ from typing import Annotated, Any
 from pydantic import AfterValidator, Field
 
 from ..plugins import IDS
-from .analysis import Analysis, Road, Solver
+from .analysis import Analysis, Road, SolverChoice
 from .calibration import Targets, Uncertainty, Variable
 from .materials import Cord, Rubber
 from .nonuniform import PointMass, RoadSpring, Splice
@@ -53,7 +53,7 @@ class Case(Part):
     variables: dict[Name, Variable] = Field(default_factory=dict)
     targets: Targets = Targets()
     uncertainties: dict[Name, Uncertainty] = Field(default_factory=dict)
-    solver: Solver
+    solver: SolverChoice
     templates: Text | None = None
 
     def plain(self) -> dict[str, Any]:

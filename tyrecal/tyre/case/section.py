@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from .parts import Degrees, Name, Part, Positive, Problem, Text, one_of
+from .parts import Degrees, Disagreement, Name, Part, Positive, Text, one_of
 
 Element = Literal["CGAX8R", "CGAX8", "CGAX4R"]
 
@@ -52,7 +52,7 @@ class SectionSource(Part):
         return self.outline.file if self.outline else self.stations or ""
 
     @classmethod
-    def problems(cls, values: Mapping[str, Any]) -> Iterator[Problem]:
+    def problems(cls, values: Mapping[str, Any]) -> Iterator[Disagreement]:
         yield from one_of(values, "stations", "outline")
 
 
@@ -101,7 +101,7 @@ class RebarLayer(Part):
     regions: Annotated[list[str], Field(min_length=1)] | None = None
 
     @classmethod
-    def problems(cls, values: Mapping[str, Any]) -> Iterator[Problem]:
+    def problems(cls, values: Mapping[str, Any]) -> Iterator[Disagreement]:
         geometry = values.get("geometry", "constant")
         pair = {"constant": ("spacing_m", "spacing_deg"), "angular": ("spacing_deg", "spacing_m")}
         if geometry in pair:

@@ -7,10 +7,10 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from .parts import NotNegative, Number, Part, Positive, Problem, number
+from .parts import Disagreement, NotNegative, Number, Part, Positive, number
 
 
-class Point(Part):
+class ReferencePoint(Part):
     """A point of the section's plane, m."""
 
     r: Number
@@ -45,7 +45,7 @@ class Rim(Part):
     inertia (polar: about the axle) are then those of wheel and hub, by default of steel, 17 inch.
     """
 
-    reference_point_m: Point
+    reference_point_m: ReferencePoint
     mass_kg: Positive = 15.0
     polar_inertia_kg_m2: Positive = 0.43
     diametral_inertia_kg_m2: Positive = 0.27
@@ -58,7 +58,7 @@ class Rim(Part):
         return self.free or self.spindle.gives_way
 
     @classmethod
-    def problems(cls, values: Mapping[str, Any]) -> Iterator[Problem]:
+    def problems(cls, values: Mapping[str, Any]) -> Iterator[Disagreement]:
         spindle, point = (_values(values.get(key)) for key in ("spindle", "reference_point_m"))
         soft, free = any(number(spindle, key) for key in spindle), values.get("free") is True
         if soft and free:

@@ -9,11 +9,11 @@ import numpy as np
 
 from .section import Section, fill_lines
 
-Gauge = tuple[tuple[str, ...], tuple[str, str], float]  # regions, (line, line), factor
+GaugeFactor = tuple[tuple[str, ...], tuple[str, str], float]  # regions, (line, line), factor
 
 
 @lru_cache(maxsize=8)
-def with_gauges(section: Section, gauges: tuple[Gauge, ...]) -> Section:
+def with_gauges(section: Section, gauges: tuple[GaugeFactor, ...]) -> Section:
     """``section`` with thicknesses multiplied by the factors; no regions named = all of them.
 
     The innermost line between the surfaces (the carcass) stays where it is: gaps outside it move

@@ -96,7 +96,7 @@ class ElasticAtStations(AtStations):
 
     def _forces(self, P: Array) -> tuple[Array, Array]:
         """From dW/dz times weights (e, g, s, k)."""
-        P = P.swapaxes(2, 3)
+        P = np.ascontiguousarray(P.swapaxes(2, 3))  # copied once for both products
         by_u = self.B0.swapaxes(1, 2) @ P.reshape(self.e, self.g * self.k, -1)
         P = P[:, :, self.rows.around]
         return by_u, self.B1.swapaxes(1, 2) @ P.reshape(self.e, self.g * 3, -1)

@@ -15,7 +15,7 @@ from ..load import validate
 from ..section.from_size import build, usual
 from ..section.section import SectionError, refuse_separators
 from ..section.size import INCH, TyreSize
-from .new import new_case
+from .case_text import new_case
 from .section import Outline, SectionSource
 from .stations import read_section_of
 

@@ -1,4 +1,4 @@
-"""How commands talk: words for people, results for programs, how far long work is."""
+"""What commands say: words for people, results for programs, how far long work is."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def resume(words: str) -> None:
 
 
 @dataclass(frozen=True)
-class Talk:
+class Terminal:
     """What --json, --quiet and --verbose make of a command's words.
 
     Results go to standard output; beside --json only the JSON does. Errors and warnings go to
