@@ -13,14 +13,14 @@ _MASS = re.compile(rf"TOTAL MASS OF MODEL[\s=:]*({_NUMBER})")
 
 
 @dataclass(frozen=True)
-class Table:
+class DatTable:
     """frequencies_Hz: by number of the mode, of the last table; mass_kg: None where unsaid."""
 
     frequencies_Hz: dict[int, float]
     mass_kg: float | None
 
 
-def read_dat(path: Path) -> Table:
+def read_dat(path: Path) -> DatTable:
     """The last table of eigenvalues and the last total mass; empty where the file has none.
 
     Rows hold mode, eigenvalue, rad/time, cycles/time, generalised mass, composite damping.
@@ -28,7 +28,7 @@ def read_dat(path: Path) -> Table:
     text = path.read_text(encoding="latin-1") if path.exists() else ""
     headers = list(_HEADER.finditer(text))
     masses = _MASS.findall(text)
-    return Table(
+    return DatTable(
         _rows(text[headers[-1].end() :]) if headers else {}, _number(masses[-1]) if masses else None
     )
 

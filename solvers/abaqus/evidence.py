@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 
 from ..process import RunFailed
-from .dat import Table
+from .dat import DatTable
 from .fil import SIM, Modes, read_fil
 
 DIGITS = 1e-3  # largest relative difference of a frequency between .fil and .dat: five digits
 
 
-def checked_modes(path: Path, asked: int | None, table: Table) -> Modes:
+def checked_modes(path: Path, asked: int | None, table: DatTable) -> Modes:
     """Modes of the results file at ``path``; ``asked`` of them, those that the .dat's table lists.
 
     Raises RunFailed: ``no_results``, or ``unstable`` for a negative eigenvalue.

@@ -9,14 +9,14 @@ from ..bundled.deck.keywords import DeckError, read_keywords
 
 
 @dataclass(frozen=True)
-class Question:
+class AskedModes:
     """modes: how many, None where a frequency range decides; pressure_Pa: the largest."""
 
     modes: int | None
     pressure_Pa: float
 
 
-def read_question(path: Path) -> Question:
+def read_question(path: Path) -> AskedModes:
     """The question of a deck. Raises DeckError."""
     modes, pressure = None, 0.0
     procedures = 0
@@ -29,4 +29,4 @@ def read_question(path: Path) -> Question:
             pressure = max(float(row.number(2).real) for row in k.rows)
     if procedures != 1:
         raise DeckError(0, f"{path.name} needs one *FREQUENCY step, it has {procedures}")
-    return Question(modes, pressure)
+    return AskedModes(modes, pressure)

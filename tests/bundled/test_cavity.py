@@ -9,7 +9,7 @@ from scipy.optimize import brentq
 from scipy.special import jvp, yvp
 from tyrecal_solvers.bundled.deck.keywords import COMPLEX_STEP
 from tyrecal_solvers.bundled.modes import cavity
-from tyrecal_solvers.bundled.modes.cavity import Cavity, coupling
+from tyrecal_solvers.bundled.modes.cavity import GasCavity, coupling
 from tyrecal_solvers.bundled.section import elements, mechanics
 from tyrecal_solvers.bundled.section.parts import pressure
 from tyrecal_solvers.bundled.section.parts.pressure import surface_point
@@ -22,11 +22,11 @@ RHO, BULK = 4.06, 4.78e5
 C = np.sqrt(BULK / RHO)  # m/s
 
 
-def rectangle(a: float, b: float, height: float) -> tuple[Array, Cavity]:
+def rectangle(a: float, b: float, height: float) -> tuple[Array, GasCavity]:
     """A rigid duct a < r < b round the axle."""
     X = np.array([[b, 0.0], [b, height], [a, height], [a, 0.0]])
     lines = elements.lines(X, np.array([[1, 0], [2, 1], [3, 2], [0, 3]]), 3)
-    return X, Cavity(RHO, BULK, [lines])
+    return X, GasCavity(RHO, BULK, [lines])
 
 
 def resonances(a: float, b: float, n: int) -> Array:

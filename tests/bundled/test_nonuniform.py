@@ -13,7 +13,7 @@ from scipy.sparse.linalg import eigsh, splu
 from tyrecal_solvers.bundled.modes import harmonics
 from tyrecal_solvers.bundled.modes.harmonics import Vibration
 from tyrecal_solvers.bundled.nonuniform import coupled, splice
-from tyrecal_solvers.bundled.nonuniform.splice import Splice
+from tyrecal_solvers.bundled.nonuniform.splice import SpliceSector
 from tyrecal_solvers.bundled.section import mechanics
 from tyrecal_solvers.bundled.section.point_elements import PointElements
 from tyrecal_solvers.bundled.solid3d.circumference import Circumference, functions, points
@@ -158,7 +158,7 @@ def test_a_sector_of_360_degrees_is_another_tyre(vibration: Vibration, inflated:
         inflated.U,
         inflated.loads,
         inflated.model,
-        Splice(2 * np.pi, other),
+        SpliceSector(2 * np.pi, other),
         waves,
         COUNT,
         beyond=1,
@@ -179,7 +179,7 @@ def test_no_share_is_the_plain_tyre(vibration: Vibration, inflated: Inflated) ->
         inflated.U,
         inflated.loads,
         inflated.model,
-        Splice(0.2, inflated.model),
+        SpliceSector(0.2, inflated.model),
         WAVES,
         COUNT,
         beyond=1,
@@ -336,7 +336,7 @@ def test_against_bricks(small: Inflated) -> None:
             small.U,
             small.loads,
             model,
-            Splice(2 * np.pi / ELEMENTS, stiff),
+            SpliceSector(2 * np.pi / ELEMENTS, stiff),
             waves,
             COUNT,
         )

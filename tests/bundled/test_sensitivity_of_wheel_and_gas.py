@@ -9,7 +9,7 @@ import pytest
 from tyrecal_solvers.bundled.deck import keywords
 from tyrecal_solvers.bundled.modes import sensitivity
 from tyrecal_solvers.bundled.modes.bordered import Bordered
-from tyrecal_solvers.bundled.modes.cavity import Cavity
+from tyrecal_solvers.bundled.modes.cavity import GasCavity
 from tyrecal_solvers.bundled.modes.harmonics import Vibration
 from tyrecal_solvers.bundled.modes.wheel import Wheel
 from tyrecal_solvers.bundled.section import model
@@ -58,12 +58,16 @@ VARIABLES = {
 }
 
 
-def around(m: model.Model, with_air: bool) -> tuple[Wheel, Cavity | None, list[Pressure]]:
+def around(m: model.Model, with_air: bool) -> tuple[Wheel, GasCavity | None, list[Pressure]]:
     """The wheel on its springs, the air, and the loads on cavity and well."""
     loads = [Pressure(m.mesh.faces[name], PRESSURE) for name in ("CAVITY", "WELL")]
     row = m.mesh.index[REFERENCE]
     wheel = Wheel(row, np.array(TYRE.rim), frozenset(MOTIONS), SPRINGS, STEEL)
-    return wheel, Cavity(4.06, 4.78e5, [load.lines for load in loads]) if with_air else None, loads
+    return (
+        wheel,
+        GasCavity(4.06, 4.78e5, [load.lines for load in loads]) if with_air else None,
+        loads,
+    )
 
 
 def solved(text: str, with_air: bool) -> tuple[Vibration, Array, list]:

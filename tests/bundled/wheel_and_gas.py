@@ -7,7 +7,7 @@ from functools import cache
 
 import numpy as np
 from tyrecal_solvers.bundled.modes import harmonics
-from tyrecal_solvers.bundled.modes.cavity import Cavity
+from tyrecal_solvers.bundled.modes.cavity import GasCavity
 from tyrecal_solvers.bundled.modes.wheel import Wheel
 from tyrecal_solvers.bundled.section.band import Numbering
 from tyrecal_solvers.bundled.section.model import Model
@@ -37,11 +37,13 @@ class Inflated:
         row = self.model.mesh.index[REFERENCE]
         return Wheel(row, self.rim, frozenset(free), dict(stiffness), STEEL)
 
-    def air(self, density: float = 4.06, bulk: float = 4.78e5) -> Cavity:
+    def air(self, density: float = 4.06, bulk: float = 4.78e5) -> GasCavity:
         """A gas in the cavity; by default air at 240 kPa and 20 C."""
-        return Cavity(density, bulk, [load.lines for load in self.loads])
+        return GasCavity(density, bulk, [load.lines for load in self.loads])
 
-    def vibration(self, *others: Wheel | Cavity | None, shift: float = 0.0) -> harmonics.Vibration:
+    def vibration(
+        self, *others: Wheel | GasCavity | None, shift: float = 0.0
+    ) -> harmonics.Vibration:
         wheel, air = (*others, None, None)[:2]
         return harmonics.Vibration(
             self.model, self.U, self.loads, self.numbering, shift, wheel, air

@@ -89,8 +89,8 @@ def unmoved(patch: pytest.MonkeyPatch) -> None:
     """The optimiser gives up where it starts."""
     from tyrecal.studies.fit import calibrate, slsqp
 
-    def stays(problem: object, start: object, tolerance: float) -> slsqp.Outcome:
-        return slsqp.Outcome(problem.evaluate(start), "gave up")  # type: ignore[attr-defined]
+    def stays(problem: object, start: object, tolerance: float) -> slsqp.Descent:
+        return slsqp.Descent(problem.evaluate(start), "gave up")  # type: ignore[attr-defined]
 
     patch.setitem(calibrate.METHODS, "slsqp", stays)
 

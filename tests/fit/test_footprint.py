@@ -17,7 +17,7 @@ from tyrecal.simulate.modes.mode import Label
 from tyrecal.studies.fit.calibrate import calibrate
 from tyrecal.studies.fit.differences import differences
 from tyrecal.studies.fit.problem import Problem, Target, objective, objective_unit
-from tyrecal.studies.fit.variable import Variable
+from tyrecal.studies.fit.variable import DesignVariable
 from tyrecal.studies.footprint import footprint_result, press
 
 from .pressed import (
@@ -207,7 +207,7 @@ def test_a_jump_between_neighbours_does_not_spoil_the_slope() -> None:
     )
     both = lambda designs: [np.array([1.0 + (d["x"] != 1.0)]) for d in designs]
     with pytest.raises(EvaluationFailed, match="jumps"):
-        differences([Variable("x", 1.0, 0.5, 2.0)], {"x": 1.0}, 1e-5, both, steepest=20.0)
+        differences([DesignVariable("x", 1.0, 0.5, 2.0)], {"x": 1.0}, 1e-5, both, steepest=20.0)
 
 
 @pytest.mark.parametrize("method", ["slsqp", "least-squares"])

@@ -19,7 +19,7 @@ from tyrecal.studies.fit.crossing import AXIAL, TORSIONAL, Crossing, crossing
 from tyrecal.studies.fit.differences import differences
 from tyrecal.studies.fit.problem import Point, Target
 from tyrecal.studies.fit.uncertainty import uncertainty
-from tyrecal.studies.fit.variable import Variable, read_variable
+from tyrecal.studies.fit.variable import DesignVariable, read_variable
 
 from ..chance import generator
 
@@ -316,7 +316,7 @@ def test_the_tolerance_is_what_slopes_can_tell() -> None:
 def test_a_variable_stays_next_to_0_where_it_moves_effects_alone() -> None:
     """Most effects leave the deck at 0, and have no slope there; other numbers have one."""
 
-    def made(sets: list[str], lower: float, upper: float, start: float = 0.0) -> Variable:
+    def made(sets: list[str], lower: float, upper: float, start: float = 0.0) -> DesignVariable:
         told = {"sets": sets, "lower": lower, "upper": upper, "start": start, "scale": "linear"}
         return read_variable("x", SimpleNamespace(**told))  # type: ignore[arg-type]
 
@@ -338,7 +338,7 @@ def test_uncertainty_by_its_formula() -> None:
     slopes, scale = random.normal(size=(5, 2)), np.array([1.0, 4.0, 0.5, 0.0, 2.0])
     sigmas = np.array([0.1, 0.4, 0.2, 0.3])
     targets = [SimpleNamespace(sigma_Hz=s) for s in sigmas]
-    variables = [Variable("a", 3.0, 1.0, 9.0), Variable("b", 0.0, -1.0, 3.0, log=False)]
+    variables = [DesignVariable("a", 3.0, 1.0, 9.0), DesignVariable("b", 0.0, -1.0, 3.0, log=False)]
     problem: Any = SimpleNamespace(
         scale=scale, targets=targets, variables=variables, footprint=[SimpleNamespace(sigma=0.05)]
     )
@@ -361,7 +361,7 @@ def test_noise_is_what_is_left_over_the_freedom_that_is_left() -> None:
     J, y = random.normal(size=(5, 2)), random.normal(size=5)
     scale = np.array([1.0, 4.0, 0.5, 2.0, 3.0])
     J = scale[:, None] * J
-    variables = [Variable("a", 3.0, 1.0, 9.0), Variable("b", 3.0, 1.0, 9.0)]
+    variables = [DesignVariable("a", 3.0, 1.0, 9.0), DesignVariable("b", 3.0, 1.0, 9.0)]
     point_of = lambda n: Point(
         {"a": 3.0, "b": 3.0}, np.zeros(2), (scale * y)[:n], J[:n], {}, 1.0, 1.0, np.empty(0), 0.0
     )
@@ -382,7 +382,7 @@ def test_noise_is_what_is_left_over_the_freedom_that_is_left() -> None:
 def test_a_variables_coordinate_and_back(log: bool) -> None:
     """A logarithm, or the share of the way between the bounds; values stay within them, and the
     start is met to the last bit."""
-    v = Variable("x", 0.7, 0.3, 2.3, log)
+    v = DesignVariable("x", 0.7, 0.3, 2.3, log)
     for value in (0.3, 0.5, 0.7, 1.9, 2.3):
         x = v.scaled(value)
         assert x == pytest.approx(np.log(value) if log else (value - 0.3) / 2.0)
@@ -396,7 +396,7 @@ def test_a_variables_coordinate_and_back(log: bool) -> None:
 
 def asked_slopes(ask: Any, start: dict[str, float], step: float = 0.1, **how: Any) -> Any:
     """Differences of two linear variables within -1 to 1, and the steps that were asked for."""
-    variables = [Variable(name, 0.0, -1.0, 1.0, log=False) for name in start]
+    variables = [DesignVariable(name, 0.0, -1.0, 1.0, log=False) for name in start]
     steps: list[dict[str, float]] = []
 
     def told(designs: Any) -> Any:

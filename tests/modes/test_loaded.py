@@ -8,8 +8,8 @@ import pytest
 from tyrecal.simulate.evaluate.results import HarmonicShape, RawMode, RingShape
 from tyrecal.simulate.modes.loaded import (
     SYMMETRIES,
-    LoadedModes,
     Member,
+    ModesAtLoad,
     Rings,
     _nearest_orthonormal,
     follow,
@@ -123,7 +123,7 @@ def waves(count: int) -> Array:
 WIDE: Rings = rings(np.arange(24) * np.pi / 12, NODES, NODES, POINTS)
 
 
-def solved(K: Array, basis: Array) -> LoadedModes:
+def solved(K: Array, basis: Array) -> ModesAtLoad:
     """Modes of a stiffness on a basis of one symmetry."""
     values, vectors = np.linalg.eigh(K)
     return state(np.sqrt(values), np.einsum("im,ikjc->mkjc", vectors, basis), WIDE)
@@ -147,10 +147,10 @@ def test_a_curve_that_crosses_others_goes_on() -> None:
     """Modes that hardly attract cross, and so do those of different symmetry, in whatever order
     and with whatever sign they come."""
     basis = waves(3)
-    before = LoadedModes(np.array([40.0, 50.0, 60.0, 45.0]), basis[[0, 1, 2, 3]], np.arange(4) < 3)
-    after = LoadedModes(np.array([70.0, 52.0, 62.0, 99.0]), -basis[[0, 1, 2, 3]], np.arange(4) < 3)
+    before = ModesAtLoad(np.array([40.0, 50.0, 60.0, 45.0]), basis[[0, 1, 2, 3]], np.arange(4) < 3)
+    after = ModesAtLoad(np.array([70.0, 52.0, 62.0, 99.0]), -basis[[0, 1, 2, 3]], np.arange(4) < 3)
     order = np.array([2, 0, 3, 1])
-    mixed = LoadedModes(after.frequencies[order], after.shapes[order], after.symmetric[order])
+    mixed = ModesAtLoad(after.frequencies[order], after.shapes[order], after.symmetric[order])
     found = follow(before, mixed, WIDE)
     np.testing.assert_array_equal(order[found.position], np.arange(4))
 
@@ -158,10 +158,10 @@ def test_a_curve_that_crosses_others_goes_on() -> None:
 def test_a_mode_that_left_is_not_named() -> None:
     """What the next load's modes do not hold has no place there; a kind that is missing neither."""
     basis = waves(4)
-    before = LoadedModes(
+    before = ModesAtLoad(
         np.array([40.0, 50.0, 45.0]), basis[[0, 1, 4]], np.array([True, True, False])
     )
-    after = LoadedModes(np.array([41.0, 60.0]), basis[[0, 2]], np.array([True, True]))
+    after = ModesAtLoad(np.array([41.0, 60.0]), basis[[0, 2]], np.array([True, True]))
     found = follow(before, after, WIDE)
     assert found.position[0] == 0 and found.position[2] == -1
     assert found.spanned[0] == pytest.approx(1) and found.spanned[1] < 0.1

@@ -38,7 +38,7 @@ from ..tyre.case import CaseError, LoadedCase, start_values, with_level
 from ..tyre.load import load_case
 from ..tyre.templates import TemplateFailed
 from ..tyre.values import unusual_value, with_values
-from .studies import Asked, Outcome, Studied, study
+from .studies import Asked, Studied, StudyOutcome, study
 
 FINISHED = "finished.json"  # in a case's folder: what was asked, and the answer
 INPUT = (CaseError, DeckRefused, InputError, TemplateFailed, InputError)
@@ -101,7 +101,7 @@ def run_case(task: CaseTask) -> Report:
 
 def lost(task: CaseTask, words: str) -> Report:
     """The report of a case whose worker died."""
-    entry = _entry(Outcome("error", "worker_lost", words), task)
+    entry = _entry(StudyOutcome("error", "worker_lost", words), task)
     studies = dict.fromkeys(task.studies, entry)
     return {"name": task.name, "provenance": None, "studies": studies, "facts": {}}
 
@@ -171,24 +171,24 @@ def _loaded(task: CaseTask) -> LoadedCase:
         raise DeckRefused(str(error)) from None
 
 
-def _failed(error: Exception) -> Outcome:
+def _failed(error: Exception) -> StudyOutcome:
     """What an exception says of a study."""
     if isinstance(error, EvaluationFailed):
-        return Outcome("error", error.cause, error.words)
+        return StudyOutcome("error", error.cause, error.words)
     if isinstance(error, SolverUnavailable):
-        return Outcome("error", "unavailable", str(error))
+        return StudyOutcome("error", "unavailable", str(error))
     if isinstance(error, INPUT):
-        return Outcome("error", "input", str(error))
+        return StudyOutcome("error", "input", str(error))
     if isinstance(error, OSError):
-        return Outcome("error", "disc", str(error))
+        return StudyOutcome("error", "disc", str(error))
     trace = error.__traceback__
     while trace and trace.tb_next:
         trace = trace.tb_next
     place = f"{Path(trace.tb_frame.f_code.co_filename).name}:{trace.tb_lineno}" if trace else ""
-    return Outcome("error", "internal", f"{type(error).__name__}: {error} ({place})")
+    return StudyOutcome("error", "internal", f"{type(error).__name__}: {error} ({place})")
 
 
-def _entry(outcome: Outcome, task: CaseTask) -> dict[str, Any]:
+def _entry(outcome: StudyOutcome, task: CaseTask) -> dict[str, Any]:
     """A study as the report has it; its words do not depend on where the case lies."""
     words = outcome.words and outcome.words.replace(f"{task.path.parent}{os.sep}", "")
     return {

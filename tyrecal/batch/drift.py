@@ -37,10 +37,10 @@ DEFAULTS = {  # of a baseline that is written for the first time; people edit th
     "footprint/peak_pressure_Pa": {"relative": 0.03},
     "footprint/vertical_stiffness_N_per_m": {"relative": 0.01},
 }
-Numbers = dict[str, dict[str, dict[str, float]]]  # by case, study, quantity
+Figures = dict[str, dict[str, dict[str, float]]]  # by case, study, quantity
 
 
-def numbers_of(reports: Sequence[Report]) -> Numbers:
+def numbers_of(reports: Sequence[Report]) -> Figures:
     """What a baseline keeps of reports: the quantities of all studies that are good."""
     kept = {
         report["name"]: {
@@ -96,7 +96,7 @@ def compare(reports: Sequence[Report], baseline: Mapping[str, Any]) -> dict[str,
 
     A study that is not good is a failure already: it is not compared.
     """
-    known: Numbers = baseline["cases"]
+    known: Figures = baseline["cases"]
     drifted, compared, new = [], 0, 0
     missing_studies, new_studies = [], []
     for report in reports:

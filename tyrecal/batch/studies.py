@@ -21,7 +21,7 @@ from ..studies import pressure_result
 from ..studies.fit.calibrate import calibrate, history_csv
 from ..studies.fitted import NOT_CONVERGED
 from ..studies.modes import modes_result
-from ..studies.result import Failed, Part, Result
+from ..studies.result import Failed, Result, ResultPart
 from ..tyre.case import LoadedCase
 
 Numbers = dict[str, float]
@@ -49,7 +49,7 @@ class Studied:
 
 
 @dataclass
-class Outcome:
+class StudyOutcome:
     """What came of a study (see `case`), its numbers, and its result files, name to text."""
 
     status: str = "good"
@@ -59,7 +59,7 @@ class Outcome:
     files: dict[str, str] = field(default_factory=dict)
 
 
-def fit(state: Studied) -> Outcome:
+def fit(state: Studied) -> StudyOutcome:
     """Calibrate from the case's own start. Raises what `calibrate` does."""
     state.no_fit = True
     fitted = calibrate(state.case, state.evaluator)
@@ -74,12 +74,12 @@ def fit(state: Studied) -> Outcome:
     files = _files(state, found, load_N=state.case.case.targets.loads_N or 0.0)
     files["fit_history.csv"] = history_csv(fitted.history)
     if found.is_good:
-        return Outcome(quantities=numbers, files=files)
+        return StudyOutcome(quantities=numbers, files=files)
     words = found.message if found.moved else "the fit did not move"
-    return Outcome("failed", NOT_CONVERGED, f"not converged: {words}", numbers, files)
+    return StudyOutcome("failed", NOT_CONVERGED, f"not converged: {words}", numbers, files)
 
 
-def modes(state: Studied) -> Outcome:
+def modes(state: Studied) -> StudyOutcome:
     """Evaluate the case's own design. Raises what `Evaluator.evaluate` does."""
     values = state.designs["initial"]
     found, _ = modes_result(state.case, values, state.evaluator.evaluate(Question(values)))
@@ -87,10 +87,10 @@ def modes(state: Studied) -> Outcome:
     for mode in found.modes:
         member = f" member {mode.member}" if mode.member else ""
         numbers[f"frequency_Hz {mode.label}{member}"] = mode.frequency_Hz
-    return Outcome(quantities=numbers, files=_files(state, found))
+    return StudyOutcome(quantities=numbers, files=_files(state, found))
 
 
-def sweep_pressure(state: Studied) -> Outcome:
+def sweep_pressure(state: Studied) -> StudyOutcome:
     """Every design over the pressure. Raises what `pressure_result.run` does."""
     pressures = state.asked.pressures_kPa
     found = pressure_result.run(state.case, state.evaluator, state.designs, pressures)
@@ -103,7 +103,7 @@ def sweep_pressure(state: Studied) -> Outcome:
     return _reached(found.rows, found.failed, numbers, files)
 
 
-def footprint(state: Studied) -> Outcome:
+def footprint(state: Studied) -> StudyOutcome:
     """Every design at rising loads. Raises what `footprint.run` does."""
     state.evaluator.needs_road()
     loads = state.asked.loads_N or state.case.case.loads_N
@@ -116,7 +116,7 @@ def footprint(state: Studied) -> Outcome:
     return _reached(found.rows, found.failed, numbers, _files(state, found, load_N=loads))
 
 
-STUDIES: dict[str, Callable[[Studied], Outcome]] = {  # in the order in which they are done
+STUDIES: dict[str, Callable[[Studied], StudyOutcome]] = {  # in the order in which they are done
     "fit": fit,
     "modes": modes,
     "sweep-pressure": sweep_pressure,
@@ -125,27 +125,27 @@ STUDIES: dict[str, Callable[[Studied], Outcome]] = {  # in the order in which th
 OF_FITTED = ("sweep-pressure", "footprint")  # they want the fitted design where there is a fit
 
 
-def study(name: str, state: Studied) -> Outcome:
+def study(name: str, state: Studied) -> StudyOutcome:
     """One study; skipped where it wants a fit that has no result. Raises what the study does."""
     if state.no_fit and name in OF_FITTED:
-        return Outcome("skipped", None, "the fit before it has no result")
+        return StudyOutcome("skipped", None, "the fit before it has no result")
     return STUDIES[name](state)
 
 
 def _reached(
-    rows: Sequence[Part], failed: Sequence[Failed], numbers: Numbers, files: dict[str, str]
-) -> Outcome:
+    rows: Sequence[ResultPart], failed: Sequence[Failed], numbers: Numbers, files: dict[str, str]
+) -> StudyOutcome:
     """Good, or failed at the first of some places. Raises EvaluationFailed where nothing was
     reached."""
     if not failed:
-        return Outcome(quantities=numbers, files=files)
+        return StudyOutcome(quantities=numbers, files=files)
     first = failed[0]
     if not rows:
         raise EvaluationFailed(first.cause, first.words)
     words = f"{first.place}: {first.words}"
     if len(failed) > 1:
         words += f" (and {len(failed) - 1} more)"
-    return Outcome("failed", first.cause, words, numbers, files)
+    return StudyOutcome("failed", first.cause, words, numbers, files)
 
 
 def _files(state: Studied, found: Result, **of: Any) -> dict[str, str]:

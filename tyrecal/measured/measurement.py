@@ -11,7 +11,7 @@ from ..tyre.usual import MEASURED
 
 CSV_COLUMNS = ("quantity", "c", "m", "kind", "member", "pressure_kPa", "load_N", "value", "sigma")
 PRESSURE_RANGE_kPa = (20.0, 2000.0)
-Key = tuple[str, Label | None, str, float, float]
+MeasurementKey = tuple[str, Label | None, str, float, float]
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class Measurement:
     place: str = ""  # file and line
 
     @property
-    def key(self) -> Key:
+    def key(self) -> MeasurementKey:
         """What is measured."""
         return (self.quantity, self.label, self.member, self.pressure_kPa, self.load_N)
 

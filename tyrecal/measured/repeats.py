@@ -21,7 +21,7 @@ import numpy as np
 from ..errors import InputError
 from ..simulate.modes.mode import Label
 from ..tyre.usual import LARGEST_SIGMA
-from .measurement import Key, Measurement
+from .measurement import Measurement, MeasurementKey
 
 FLOOR = 0.001  # of the value
 PRIOR_REPEATS = 4.0  # repeats that the scatter of all values is worth for that of one value
@@ -36,7 +36,7 @@ def combined(
     Raises InputError where neither repeats nor anything else tell a standard deviation, or
     it is so large that no fit would read it.
     """
-    groups: dict[Key, list[Measurement]] = {}
+    groups: dict[MeasurementKey, list[Measurement]] = {}
     for each in _one_for_both(values):
         groups.setdefault(each.key, []).append(each)
     pooled = {q: _pooled(groups, q) for q in {key[0] for key in groups}}
@@ -65,7 +65,7 @@ def combined(
     return sorted(rows, key=_order)
 
 
-def _pooled(groups: dict[Key, list[Measurement]], quantity: str) -> float | None:
+def _pooled(groups: dict[MeasurementKey, list[Measurement]], quantity: str) -> float | None:
     """Relative variance of one run, over all that was repeated; None where nothing was."""
     total, freedom = 0.0, 0
     for key, runs in groups.items():

@@ -13,7 +13,7 @@ from matplotlib.ticker import MaxNLocator
 
 from ..studies.footprint import FootprintRow
 from .figure import COLOURS, GREY, headline, in_house_style, new_figure
-from .shape_data import Patch
+from .shape_data import PatchData
 
 COLOUR_MAP = colormaps["viridis"]
 MAX_BANDS = 12  # of colour
@@ -32,7 +32,7 @@ CURVES = {  # key of a row: words, unit over SI
 }
 
 
-def draw_footprint(rows: Sequence[FootprintRow], patches: Sequence[Patch]) -> dict[str, Figure]:
+def draw_footprint(rows: Sequence[FootprintRow], patches: Sequence[PatchData]) -> dict[str, Figure]:
     """By name: footprint and, all in one scale, footprint_DESIGN."""
     highest = max(row.peak_pressure_Pa for row in rows) / 1e3
     figures = {"footprint": draw_curves(rows)}
@@ -43,7 +43,7 @@ def draw_footprint(rows: Sequence[FootprintRow], patches: Sequence[Patch]) -> di
 
 
 @in_house_style
-def draw_patches(patches: Sequence[Patch], highest_kPa: float) -> Figure:
+def draw_patches(patches: Sequence[PatchData], highest_kPa: float) -> Figure:
     """One design's contact pressure, a patch a load, all at one scale, rolling direction upwards.
 
     highest_kPa: upper end of the colours; dots: nodes that touch.
@@ -81,7 +81,7 @@ def draw_patches(patches: Sequence[Patch], highest_kPa: float) -> Figure:
     return figure
 
 
-def _halves(patch: Patch) -> np.ndarray:
+def _halves(patch: PatchData) -> np.ndarray:
     """Half the width and half the length, mm, as far as the lowest band goes."""
     x, y, p = np.array([patch.across_mm, patch.along_mm, patch.pressure_kPa])
     contours: Any = contour_generator(x, y, p)

@@ -18,7 +18,7 @@ from matplotlib.patches import Patch
 
 from ..studies.diagnose.where import PartChange
 from .figure import COLOURS, GREY, RUBBER, headline, in_house_style, new_figure
-from .shape_data import DiagnosisSection, Flat, Section
+from .shape_data import DiagnosisSection, Flat, SectionData
 from .words import MINUS, map_resolution
 
 Array = np.ndarray
@@ -33,7 +33,7 @@ AXES = {"xlabel": "z along the axle, mm", "ylabel": "r from the axle, mm"}
 
 
 @in_house_style
-def draw_section(section: Section, name: str, pressure_kPa: float) -> Figure:
+def draw_section(section: SectionData, name: str, pressure_kPa: float) -> Figure:
     """Rubber by region, elements, the cords of each layer and what the rim holds, in mm.
 
     The belt's edge is repeated four times as large. Where the inflation is known, the inflated
@@ -62,7 +62,7 @@ def draw_section(section: Section, name: str, pressure_kPa: float) -> Figure:
     return figure
 
 
-def size_words(section: Section) -> str:
+def size_words(section: SectionData) -> str:
     """The section's size."""
     z, r = _points(section.outline).T
     return (
@@ -71,7 +71,7 @@ def size_words(section: Section) -> str:
     )
 
 
-def _draw(axes: Axes, section: Section, size: float) -> dict[str, Artist]:
+def _draw(axes: Axes, section: SectionData, size: float) -> dict[str, Artist]:
     """Fill ``axes``, lines ``size`` times as thick; returns the legend's entries."""
     entries: dict[str, Artist] = {}
     for k, (name, layer) in enumerate(section.cords.items()):
@@ -92,7 +92,7 @@ def _draw(axes: Axes, section: Section, size: float) -> dict[str, Artist]:
     return entries
 
 
-def _detail(axes: Axes, section: Section) -> None:
+def _detail(axes: Axes, section: SectionData) -> None:
     """The edge of the belt, or the crown of a tyre without one, enlarged inside the cavity."""
     held = {tuple(point) for cell in section.rim for point in _points(cell)}
     lasts = [_points(layer.lines[-1])[-1] for layer in section.cords.values() if layer.lines]

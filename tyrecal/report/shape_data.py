@@ -14,7 +14,7 @@ from ..simulate.modes.loaded import MIRROR
 from ..simulate.modes.mode import Mode
 from ..studies.loaded import LoadedTyre
 from ..studies.patch import patch_of
-from ..studies.result import Named, Part, Result, Wave
+from ..studies.result import Named, Result, ResultPart, Wave
 from ..tyre.case import LoadedCase
 from ..tyre.resolve import resolved
 from ..tyre.section.mesh import SectionMesh
@@ -26,7 +26,7 @@ DIGITS = 6  # of a shape, over its largest component
 TOLERANCE_HZ = 1e-6  # of a table's frequencies against the shapes'
 
 
-class Patch(Part):
+class PatchData(ResultPart):
     """Contact pressure on lines of nodes, (ring along, node across)."""
 
     design: str
@@ -40,17 +40,17 @@ class Patches(Result):
     """footprint_patches.json"""
 
     case: str
-    patches: list[Patch]
+    patches: list[PatchData]
 
 
-class Cords(Part):
+class Cords(ResultPart):
     """A layer as lines."""
 
     angle_deg: float
     lines: list[Flat]
 
 
-class Section(Part):
+class SectionData(ResultPart):
     """The section as elements by region, cords by layer, what the rim holds, and its outline
     before and after the inflation."""
 
@@ -78,7 +78,7 @@ class Shapes(Result):
     pressure_kPa: float
     load_N: float = 0.0
     variables: dict[str, list[str]] = Field(default={})
-    section: Section | None = None
+    section: SectionData | None = None
     R_m: list[float] = Field(default=[])
     Z_m: list[float] = Field(default=[])
     angles: list[float] = Field(default=[])
@@ -132,7 +132,9 @@ def tyre_data(case: LoadedCase, evaluation: Evaluation, modes: Sequence[Mode]) -
     }
 
 
-def section_data(case: LoadedCase, mesh: SectionMesh, displacement: Mapping[int, Array]) -> Section:
+def section_data(
+    case: LoadedCase, mesh: SectionMesh, displacement: Mapping[int, Array]
+) -> SectionData:
     """The section on ``mesh``; displacement: node number to (r, theta, z) of the inflation, m;
     empty: unknown."""
     case = resolved(case).written
@@ -152,7 +154,7 @@ def section_data(case: LoadedCase, mesh: SectionMesh, displacement: Mapping[int,
         )
         for name, layer in case.case.rebar_layers.items()
     }
-    return Section(
+    return SectionData(
         areas=areas,
         cords=cords,
         rim=[_line(place, n[:4]) for n in mesh.solids.values() if held.issuperset(n)],
@@ -257,7 +259,7 @@ def patches_data(
             patch = patch_of(pressed, footprint, meshes[design])
             near = _grown(patch.touches)
             patches.append(
-                Patch(
+                PatchData(
                     design=design,
                     load_N=footprint.load_N,
                     across_mm=_rounded(1e3 * patch.across[near], 3),

@@ -7,10 +7,10 @@ from typing import Annotated, Any
 from pydantic import Field, model_validator
 
 from ..simulate.modes.mode import Label
-from .result import Column, Part, Positive, Provenance, Result, Table, Wave
+from .result import Column, PositiveNumber, Provenance, Result, ResultPart, Table, Wave
 
 
-class EffectMode(Part):
+class EffectMode(ResultPart):
     """Change of a mode's frequency by an effect, as it comes and after the re-fit."""
 
     c: Wave
@@ -26,14 +26,14 @@ class EffectMode(Part):
     after_percent: float | None
 
 
-class EffectRow(Part):
+class EffectRow(ResultPart):
     """An effect at one pressure."""
 
-    pressure_kPa: Positive
+    pressure_kPa: PositiveNumber
     modes: list[EffectMode]
 
 
-class EffectResult(Part):
+class EffectResult(ResultPart):
     """An entry of effects.json."""
 
     title: str

@@ -18,9 +18,9 @@ from .result import (
     Column,
     Failed,
     Notify,
-    Part,
-    Positive,
+    PositiveNumber,
     Result,
+    ResultPart,
     Table,
     csv_text,
     not_reached,
@@ -28,7 +28,7 @@ from .result import (
 )
 
 USUAL_SHARE = (0.8, 1.6)  # mean contact pressure over the inflation, of a passenger car
-Outcome = Pressed | EvaluationFailed
+PressOutcome = Pressed | EvaluationFailed
 
 
 def press(
@@ -36,11 +36,11 @@ def press(
     designs: Mapping[str, Mapping[str, float]],
     loads_N: Sequence[float],
     jobs: int = 1,
-    notify: Callable[[str, Outcome], None] = lambda design, outcome: None,
-) -> dict[str, Outcome]:
+    notify: Callable[[str, PressOutcome], None] = lambda design, outcome: None,
+) -> dict[str, PressOutcome]:
     """Every design (name to values of the variables) at rising loads, or why not even at the
     first one. Raises DeckRefused and what else ``Evaluator.press`` raises for wrong input."""
-    found: dict[str, Outcome] = {}
+    found: dict[str, PressOutcome] = {}
     for design, outcome in zip(
         designs, evaluator.press_all(designs.values(), loads_N, jobs), strict=True
     ):
@@ -49,28 +49,28 @@ def press(
     return found
 
 
-def progress(outcome: Outcome) -> tuple[int, EvaluationFailed | None]:
+def progress(outcome: PressOutcome) -> tuple[int, EvaluationFailed | None]:
     """How many loads were reached, and why no more."""
     if isinstance(outcome, Pressed):
         return len(outcome.footprints), outcome.failed
     return 0, outcome
 
 
-class FootprintRow(Part):
+class FootprintRow(ResultPart):
     """The tyre at one load, SI."""
 
     design: Annotated[str, Column("design", "")]
-    load_N: Annotated[Positive, Column("load N", ".0f")]
+    load_N: Annotated[PositiveNumber, Column("load N", ".0f")]
     deflection_m: Annotated[float, Column("deflection mm", ".2f", 1e3)]
-    area_m2: Annotated[Positive, Column("area cm²", ".1f", 1e4)]
+    area_m2: Annotated[PositiveNumber, Column("area cm²", ".1f", 1e4)]
     length_m: Annotated[float, Column("length mm", ".1f", 1e3)]
     width_m: Annotated[float, Column("width mm", ".1f", 1e3)]
     mean_pressure_Pa: Annotated[float, Column("mean kPa", ".1f", 1e-3)]
-    peak_pressure_Pa: Annotated[Positive, Column("peak kPa", ".1f", 1e-3)]
+    peak_pressure_Pa: Annotated[PositiveNumber, Column("peak kPa", ".1f", 1e-3)]
     vertical_stiffness_N_per_m: Annotated[float, Column("stiffness N/mm", ".1f", 1e-3)]
 
 
-class FootprintFindings(Part):
+class FootprintFindings(ResultPart):
     """What the rows say."""
 
     fitted_over_initial: list[dict[str, float]] = Field(default=[])  # area, where both were pressed
@@ -109,7 +109,7 @@ def run(
     """Every design at rising loads: the result, and what was reached, with the sections' meshes.
     Raises as ``press`` does; the result has no rows where no design bore the first load."""
 
-    def told(design: str, outcome: Outcome) -> None:
+    def told(design: str, outcome: PressOutcome) -> None:
         reached, failure = progress(outcome)
         if failure:
             notify(f"{design}, {loads_N[reached]:g} N", failure)
@@ -124,7 +124,7 @@ def run(
 def footprint_result(
     designs: Mapping[str, Mapping[str, float]],
     loads_N: Sequence[float],
-    outcomes: Mapping[str, Outcome],
+    outcomes: Mapping[str, PressOutcome],
     meshes: Mapping[str, SectionMesh],
 ) -> FootprintResult:
     """outcomes: of ``press``; meshes: of the designs' sections."""

@@ -61,7 +61,7 @@ class LoadedTyre:
     angles: np.ndarray | None = field(default=None, compare=False, repr=False)
 
 
-Outcome = LoadedTyre | EvaluationFailed
+LoadOutcome = LoadedTyre | EvaluationFailed
 
 
 def load_tyres(
@@ -70,8 +70,8 @@ def load_tyres(
     designs: Mapping[str, Mapping[str, float]],
     loads_N: Sequence[float],
     jobs: int = 1,
-    notify: Callable[[str, Outcome], None] = lambda design, outcome: None,
-) -> dict[str, Outcome]:
+    notify: Callable[[str, LoadOutcome], None] = lambda design, outcome: None,
+) -> dict[str, LoadOutcome]:
     """Every design (name to values of the variables) at rising loads, one above 0 at least, or why
     it has no modes. Raises DeckRefused and what else ``Evaluator.press`` raises for wrong input.
     """
@@ -80,7 +80,7 @@ def load_tyres(
     able = [name for name, each in unloaded.items() if not isinstance(each, EvaluationFailed)]
     loads = [load for load in loads_N if load]
     answers = evaluator.press_all([designs[name] for name in able], loads, jobs, _count(case))
-    found: dict[str, Outcome] = {}
+    found: dict[str, LoadOutcome] = {}
     for name in designs:
         free = unloaded[name]
         found[name] = (
@@ -92,7 +92,7 @@ def load_tyres(
     return found
 
 
-def progress(outcome: Outcome) -> tuple[int, EvaluationFailed | None]:
+def progress(outcome: LoadOutcome) -> tuple[int, EvaluationFailed | None]:
     """How many loads above 0 were reached, and why no more."""
     if isinstance(outcome, LoadedTyre):
         return sum(each.load_N > 0 for each in outcome.loads), outcome.failed
@@ -125,7 +125,7 @@ def _unloaded(
 
 def _loaded_tyre(
     case: LoadedCase, unloaded: Found, pressed: Pressed | EvaluationFailed, with_zero: bool
-) -> Outcome:
+) -> LoadOutcome:
     if isinstance(pressed, EvaluationFailed):
         return pressed
     first = pressed.footprints[0]

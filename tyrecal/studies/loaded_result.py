@@ -12,7 +12,7 @@ from ..simulate.evaluate.evaluator import Evaluator
 from ..simulate.modes.loaded import SYMMETRIES
 from ..simulate.modes.mode import Label
 from ..tyre.case import LoadedCase
-from .loaded import Loaded, LoadedMode, LoadedTyre, Outcome, load_tyres, progress
+from .loaded import Loaded, LoadedMode, LoadedTyre, LoadOutcome, load_tyres, progress
 from .modes import ModesFindings, ModesResult
 from .result import (
     NAMED,
@@ -20,8 +20,8 @@ from .result import (
     Failed,
     ModeEntry,
     Notify,
-    Part,
     Result,
+    ResultPart,
     Table,
     csv_text,
     not_reached,
@@ -31,7 +31,7 @@ from .result import (
 SPLIT_ATOL = 1e-3  # Hz, below which a split is none
 
 
-class LoadRow(Part):
+class LoadRow(ResultPart):
     """A design at a load; 0: the unloaded tyre."""
 
     design: str
@@ -40,7 +40,7 @@ class LoadRow(Part):
     modes: list[ModeEntry]
 
 
-class LoadFindings(Part):
+class LoadFindings(ResultPart):
     """Of one design."""
 
     design: str
@@ -102,7 +102,7 @@ def run(
     """Every design at rising loads. Raises as ``load_tyres`` does."""
     above = [load for load in loads_N if load]
 
-    def told(design: str, outcome: Outcome) -> None:
+    def told(design: str, outcome: LoadOutcome) -> None:
         reached, failure = progress(outcome)
         if failure:
             notify(f"{design}, {above[reached]:g} N", failure)
@@ -131,7 +131,7 @@ def loaded_modes_result(values: Mapping[str, float], tyre: LoadedTyre) -> ModesR
 def load_sweep_result(
     designs: Mapping[str, Mapping[str, float]],
     loads_N: Sequence[float],
-    outcomes: Mapping[str, Outcome],
+    outcomes: Mapping[str, LoadOutcome],
 ) -> LoadSweep:
     """outcomes: of ``load_tyres``."""
     tyres = {name: each for name, each in outcomes.items() if isinstance(each, LoadedTyre)}

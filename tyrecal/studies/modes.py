@@ -11,12 +11,12 @@ from ..simulate.evaluate.results import Evaluation
 from ..simulate.modes.find import labelled
 from ..simulate.modes.mode import Mode
 from ..tyre.case import LoadedCase
-from .result import NAMED, Column, ModeEntry, Part, Result, Table
+from .result import NAMED, Column, ModeEntry, Result, ResultPart, Table
 
 EXTRA = {"symmetry": "", "member": "d", "clarity": ".2f", "overlap": ".2f"}  # forms
 
 
-class ModesFindings(Part):
+class ModesFindings(ResultPart):
     """Doubts about the names of modes under a load."""
 
     words: list[str] = Field(default=[])

@@ -15,7 +15,7 @@ from .fitted import pressure_name
 
 
 @dataclass(frozen=True)
-class State:
+class PressureState:
     """A design at a pressure: all labelled modes by rising frequency and, where the solver has
     slopes, d ln f / d ln p by label (else None)."""
 
@@ -39,7 +39,7 @@ class Failure:
     failed: EvaluationFailed
 
 
-Outcome = State | Failure
+SweepOutcome = PressureState | Failure
 
 
 def sweep(
@@ -48,8 +48,8 @@ def sweep(
     designs: Mapping[str, Mapping[str, float]],
     pressures_kPa: Sequence[float],
     jobs: int = 1,
-    notify: Callable[[Outcome], None] = lambda outcome: None,
-) -> list[Outcome]:
+    notify: Callable[[SweepOutcome], None] = lambda outcome: None,
+) -> list[SweepOutcome]:
     """Every design (name to values of the variables) at every pressure, in that order.
 
     Where a target's mode is not among the modes that the case asks for, more are asked for.
@@ -61,7 +61,7 @@ def sweep(
     gradients = (name,) if evaluator.has_gradients else ()
     places = [(design, p) for design in designs for p in pressures_kPa]
     questions = [Question({**designs[design], name: p}, gradients) for design, p in places]
-    outcomes: dict[int, Outcome] = {}
+    outcomes: dict[int, SweepOutcome] = {}
     for i, answer in find_modes(evaluator, questions, wanted, jobs):
         if isinstance(answer, DeckRefused):
             raise answer
@@ -72,7 +72,7 @@ def sweep(
 
 def _outcome(
     design: str, pressure_kPa: float, answer: Found | EvaluationFailed, name: str
-) -> Outcome:
+) -> SweepOutcome:
     if isinstance(answer, EvaluationFailed):
         return Failure(design, pressure_kPa, answer)
     modes = labelled(answer.evaluation)
@@ -81,4 +81,4 @@ def _outcome(
     if gradient is not None:
         scale = {m.label: pressure_kPa / m.frequency_Hz for m in modes}
         exact = {m.label: float(gradient[m.position]) * scale[m.label] for m in modes}
-    return State(design, pressure_kPa, modes, exact)
+    return PressureState(design, pressure_kPa, modes, exact)

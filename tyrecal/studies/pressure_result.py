@@ -12,7 +12,7 @@ from ..simulate.modes.mode import Label
 from ..tyre.case import LoadedCase
 from .fit.problem import read_targets
 from .modes import mode_entry
-from .pressure import Failure, Outcome, State, sweep
+from .pressure import Failure, PressureState, SweepOutcome, sweep
 from .pressure_findings import PressureFindings, findings
 from .result import (
     NAMED,
@@ -20,20 +20,20 @@ from .result import (
     Failed,
     ModeEntry,
     Notify,
-    Part,
-    Positive,
+    PositiveNumber,
     Result,
+    ResultPart,
     Table,
     csv_text,
     silent,
 )
 
 
-class PressureRow(Part):
+class PressureRow(ResultPart):
     """A design at a pressure."""
 
     design: str
-    pressure_kPa: Positive
+    pressure_kPa: PositiveNumber
     modes: list[ModeEntry]  # by rising frequency
 
 
@@ -115,7 +115,7 @@ def run(
     """Every design at every pressure. Raises as ``sweep`` does, and the first failure where no
     pressure could be evaluated."""
 
-    def told(outcome: Outcome) -> None:
+    def told(outcome: SweepOutcome) -> None:
         place = f"{outcome.design}, {outcome.pressure_kPa:g} kPa"
         if isinstance(outcome, Failure):
             notify(place, outcome.failed)
@@ -126,10 +126,10 @@ def run(
 
 
 def sweep_result(
-    case: LoadedCase, designs: Mapping[str, Mapping[str, float]], outcomes: Sequence[Outcome]
+    case: LoadedCase, designs: Mapping[str, Mapping[str, float]], outcomes: Sequence[SweepOutcome]
 ) -> PressureSweep:
     """outcomes: of ``sweep``."""
-    states = [each for each in outcomes if isinstance(each, State)]
+    states = [each for each in outcomes if isinstance(each, PressureState)]
     labels = _swept_labels(case, states) if states else []
     by_design = [[s for s in states if s.design == name] for name in designs]
     return PressureSweep(
@@ -151,7 +151,7 @@ def sweep_result(
     )
 
 
-def _swept_labels(case: LoadedCase, states: Sequence[State]) -> list[Label]:
+def _swept_labels(case: LoadedCase, states: Sequence[PressureState]) -> list[Label]:
     """The case's targets and, up to its highest harmonic, whatever else with m <= 1 was found in
     every state, by label."""
     everywhere = set.intersection(*(set(state.frequencies) for state in states))
@@ -162,7 +162,9 @@ def _swept_labels(case: LoadedCase, states: Sequence[State]) -> list[Label]:
     )
 
 
-def slopes(states: Sequence[State], labels: Sequence[Label]) -> dict[Label, list[float | None]]:
+def slopes(
+    states: Sequence[PressureState], labels: Sequence[Label]
+) -> dict[Label, list[float | None]]:
     """d ln f / d ln p per label at each state of one design: exact where the solver has slopes,
     else by differences of the logarithms over neighbouring pressures, of second order where there
     are three (None: there is but one)."""
@@ -177,7 +179,7 @@ def slopes(states: Sequence[State], labels: Sequence[Label]) -> dict[Label, list
     return {label: table[:, i].tolist() for i, label in enumerate(labels)}
 
 
-def _rows(states: Sequence[State], labels: Sequence[Label]) -> list[PressureRow]:
+def _rows(states: Sequence[PressureState], labels: Sequence[Label]) -> list[PressureRow]:
     """The rows of one design."""
     table = slopes(states, labels) if states else {}
     return [

@@ -18,7 +18,7 @@ from ..files import json_text
 from ..simulate.evaluate.failure import EvaluationFailed
 from ..simulate.modes.mode import Label
 
-Positive = Annotated[float, Field(gt=0)]
+PositiveNumber = Annotated[float, Field(gt=0)]
 Wave = Annotated[int, Field(ge=0, le=200)]
 
 
@@ -58,7 +58,7 @@ class Table:
     caption: str = ""
 
 
-class Part(BaseModel):
+class ResultPart(BaseModel):
     """A piece of a result file; numbers are finite, SI or as named."""
 
     model_config = ConfigDict(extra="ignore", allow_inf_nan=False, frozen=True)
@@ -78,7 +78,7 @@ class Part(BaseModel):
         return [column.cell(getattr(self, key)) for key, column in self.columns().items()]
 
 
-class State(Part):
+class ResultState(ResultPart):
     """What a study asked for, several values where it has several."""
 
     pressure_kPa: float | list[float]
@@ -86,7 +86,7 @@ class State(Part):
     rim: str  # how it is held
 
 
-class Provenance(Part):
+class Provenance(ResultPart):
     """What a result file is of."""
 
     tyrecal: str
@@ -96,7 +96,7 @@ class Provenance(Part):
     size: str
     tyre_sha256: str
     overrides: dict[str, float]
-    state: State
+    state: ResultState
     mesh: str
     targets: str | None = None
     measured_sha256: str | None = None
@@ -107,7 +107,7 @@ class Provenance(Part):
         return ", ".join([f"tyre {self.tyre_sha256[:8]}", *given, f"mesh {self.mesh}", solver])
 
 
-class Result(Part):
+class Result(ResultPart):
     """A result file; older ones do not say what they are of."""
 
     study: ClassVar[str] = ""  # the command, as its entry in run.json
@@ -166,7 +166,7 @@ class Result(Part):
         return [f"not reached: {each.place}: {each.words or each.cause}" for each in failed]
 
 
-class Failed(Part):
+class Failed(ResultPart):
     """What a study could not reach."""
 
     design: str
@@ -201,13 +201,13 @@ def not_reached(
     ]
 
 
-class Named(Part):
+class Named(ResultPart):
     """A mode's label and frequency."""
 
     c: Wave
     m: Wave
     kind: str | None
-    frequency_Hz: Positive
+    frequency_Hz: PositiveNumber
 
     @property
     def label(self) -> Label:

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from .keywords import DeckError, Keyword
 
-Values = tuple[str, ...] | None
+ParameterValues = tuple[str, ...] | None
 
 YES = ("YES", "")
-SECTION_JOB: dict[str, dict[str, Values]] = {
+SECTION_JOB: dict[str, dict[str, ParameterValues]] = {
     "HEADING": {},
     "RESTART": {"WRITE": ("",), "FREQUENCY": None},
     "NODE": {"NSET": None},
@@ -38,7 +38,7 @@ SECTION_JOB: dict[str, dict[str, Values]] = {
     "ACOUSTIC MEDIUM": {"BULK MODULUS": ("",)},
     "BOUNDARY": {},
 }
-STEP_KEYWORDS: dict[str, dict[str, Values]] = {
+STEP_KEYWORDS: dict[str, dict[str, ParameterValues]] = {
     "STEP": {"NAME": None, "NLGEOM": YES, "INC": None, "PERTURBATION": ("",)},
     "STATIC": {"LONG TERM": ("",), "DIRECT": ("",)},
     "FREQUENCY": {
@@ -59,7 +59,7 @@ STEP_KEYWORDS: dict[str, dict[str, Values]] = {
     "MODAL FILE": {},
     "END STEP": {},
 }
-REVOLVE_JOB: dict[str, dict[str, Values]] = {
+REVOLVE_JOB: dict[str, dict[str, ParameterValues]] = {
     "HEADING": {},
     "SYMMETRIC MODEL GENERATION": {"REVOLVE": ("",)},
     "SYMMETRIC RESULTS TRANSFER": {"STEP": None, "INC": None},
@@ -132,7 +132,9 @@ def check(keywords: list[Keyword], revolve: bool) -> tuple[list[Keyword], list[l
     return model, steps
 
 
-def _check_one(keyword: Keyword, allowed: dict[str, dict[str, Values]], where: str) -> None:
+def _check_one(
+    keyword: Keyword, allowed: dict[str, dict[str, ParameterValues]], where: str
+) -> None:
     if keyword.name not in allowed:
         raise DeckError(keyword.line, f"keyword *{keyword.name} is not honoured in {where}")
     for row in keyword.rows if keyword.name in MAX_FIELDS else ():

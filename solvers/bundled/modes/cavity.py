@@ -27,7 +27,7 @@ import numpy as np
 from ..deck.keywords import DeckError, Keyword
 from ..section import elements
 from ..section.elements import Lines
-from ..section.materials import Number, read_materials
+from ..section.materials import Scalar, read_materials
 from ..section.mesh import DeckMesh
 from ..section.parts.frame import SPIN, cross
 from ..section.parts.pressure import surface_point
@@ -40,15 +40,15 @@ ACROSS, ACROSS_WEIGHTS = (GAUSS[0] + 1) / 2, GAUSS[1] / 2
 
 
 @dataclass(frozen=True)
-class Cavity:
+class GasCavity:
     """Density (kg/m3) and bulk modulus (Pa) of the air inside the closed ``surfaces``."""
 
-    density: Number
-    bulk: Number
+    density: Scalar
+    bulk: Scalar
     surfaces: list[Lines]
 
 
-def read_cavity(keywords: list[Keyword], mesh: DeckMesh, cavity: Mapping[str, Any]) -> Cavity:
+def read_cavity(keywords: list[Keyword], mesh: DeckMesh, cavity: Mapping[str, Any]) -> GasCavity:
     """The gas ``cavity["material"]`` inside ``cavity["surfaces"]``. Raises DeckError."""
     name = str(cavity.get("material", "")).upper()
     material = read_materials(keywords).get(name)
@@ -58,7 +58,7 @@ def read_cavity(keywords: list[Keyword], mesh: DeckMesh, cavity: Mapping[str, An
     missing = [surface for surface in surfaces if surface not in mesh.faces]
     if missing or not surfaces:
         raise DeckError(0, f"the cavity needs surfaces that are defined, got {missing or 'none'}")
-    return Cavity(material.density, material.bulk_modulus, [mesh.faces[s] for s in surfaces])
+    return GasCavity(material.density, material.bulk_modulus, [mesh.faces[s] for s in surfaces])
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,7 @@ class Coupling:
         return found
 
 
-def coupling(air: Cavity, X: Array, U: Array, n: int) -> Coupling:
+def coupling(air: GasCavity, X: Array, U: Array, n: int) -> Coupling:
     """Matrices of the inflated cavity. X (nodes, 2), U (nodes, 3); complex steps allowed."""
     kind = np.result_type(X, U)
     walls = [elements.lines(X, surface.connectivity, POINTS_ALONG) for surface in air.surfaces]

@@ -21,7 +21,7 @@ from ..section.parts.part import TyrePart, of_each_component
 from ..section.point_elements import PointElements
 from . import bordered, lanczos
 from .bordered import Border, Bordered
-from .cavity import Cavity, Coupling, coupling
+from .cavity import Coupling, GasCavity, coupling
 from .wheel import Wheel
 
 Array = np.ndarray
@@ -113,7 +113,7 @@ class Vibration:
         numbering: Numbering,
         shift: float,
         wheel: Wheel | None = None,
-        air: Cavity | None = None,
+        air: GasCavity | None = None,
         lowest_Hz: float = 0.0,
     ):
         self.numbering, self.shift = numbering, shift

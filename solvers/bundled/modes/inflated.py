@@ -12,7 +12,7 @@ from ..deck.request import Request
 from ..deck.steps import Deck, DeckStep
 from ..section.model import Model
 from ..section.point_elements import PointElements, read_point_elements
-from .cavity import Cavity, read_cavity
+from .cavity import GasCavity, read_cavity
 from .wheel import Wheel, read_wheel
 
 Array = np.ndarray
@@ -44,7 +44,9 @@ class Inflated:
         """Masses and springs on the tyre. Raises DeckError."""
         return read_point_elements(self.revolve, self.model.mesh)
 
-    def wheel_and_cavity(self, model: Model, step: DeckStep) -> tuple[Wheel | None, Cavity | None]:
+    def wheel_and_cavity(
+        self, model: Model, step: DeckStep
+    ) -> tuple[Wheel | None, GasCavity | None]:
         """The rim that moves in a step and the gas in the cavity, where there are such."""
         wheel = read_wheel(self.revolve, model.mesh, step) if step.revolved else None
         cavity = self.request.cavity

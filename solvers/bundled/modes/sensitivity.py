@@ -23,7 +23,7 @@ from ..section.parts.frame import IN_PLANE
 from ..section.parts.mode_shapes import ModeShapes
 from ..section.parts.part import TyrePart
 from ..section.parts.spin import Spin
-from .cavity import Cavity, coupling
+from .cavity import GasCavity, coupling
 from .wheel import Wheel
 
 Array = np.ndarray
@@ -87,7 +87,7 @@ class RimAndAir:
     their motions, per mode (q,) and (w,)."""
 
     wheel: Wheel | None
-    air: Cavity | None
+    air: GasCavity | None
     rim: list[Array]
     flow: list[Array]
 

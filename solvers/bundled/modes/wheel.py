@@ -19,7 +19,7 @@ import numpy as np
 from ..deck.keywords import DeckError, Keyword
 from ..deck.steps import DeckStep
 from ..section.boundary import rim_freedoms
-from ..section.materials import Number
+from ..section.materials import Scalar
 from ..section.mesh import DeckMesh
 
 Array = np.ndarray
@@ -34,8 +34,8 @@ class Wheel:
     reference: int  # row of the mesh's X
     rim: Array  # rows (k,) of its nodes
     free: frozenset[str]  # its motions
-    stiffness: dict[str, Number]  # per motion, N/m or N m/rad; absent = 0
-    inertia: dict[str, Number]  # per motion, kg or kg m2; absent = 0
+    stiffness: dict[str, Scalar]  # per motion, N/m or N m/rad; absent = 0
+    inertia: dict[str, Scalar]  # per motion, kg or kg m2; absent = 0
 
     def motions(self, n: int) -> list[str]:
         """Those of harmonic n that are free."""
@@ -118,10 +118,10 @@ def _point_elements(keywords: list[Keyword], mesh: DeckMesh) -> dict[str, tuple[
 
 def _properties(
     keywords: list[Keyword], elements: dict[str, tuple[str, list[int]]], reference: int
-) -> tuple[dict[str, Number], dict[str, Number]]:
+) -> tuple[dict[str, Scalar], dict[str, Scalar]]:
     """Stiffness and inertia per motion."""
-    springs: dict[int, Number] = {}
-    inertia: dict[str, Number] = {}
+    springs: dict[int, Scalar] = {}
+    inertia: dict[str, Scalar] = {}
     needed = {"SPRING": "SPRING1", "MASS": "MASS", "ROTARY INERTIA": "ROTARYI"}
     for k in keywords:
         if k.name not in needed or k.get("ELSET") not in elements:
@@ -143,7 +143,7 @@ def _properties(
             inertia["tilt"] = across
             if across != other:
                 raise DeckError(k.line, "the rim's inertia is that of a body of revolution")
-    stiffness: dict[str, Number] = {}
+    stiffness: dict[str, Scalar] = {}
     for motion, dofs in FREEDOMS.items():
         values = [springs.pop(dof, 0.0) for dof in dofs]
         if any(value != values[0] for value in values):

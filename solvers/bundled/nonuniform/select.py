@@ -12,7 +12,7 @@ from ..section.loads import agreed_spin, pressures
 from ..section.model import build
 from .coupled import attached_modes
 from .rotation import waves
-from .splice import Splice, sector_modes
+from .splice import SpliceSector, sector_modes
 
 
 def is_nonuniform(tyre: Inflated, step: DeckStep) -> bool:
@@ -68,7 +68,7 @@ def _sector_modes(
     model, other = (build(k, None, step.long_term) for k in (tyre.section, tyre.sector))
     if model.mesh is not other.mesh:
         raise DeckError(line, "the sector's section job must have the same mesh")
-    sector = Splice(np.radians(float(tyre.request.sector["width_deg"])), other)
+    sector = SpliceSector(np.radians(float(tyre.request.sector["width_deg"])), other)
     return sector_modes(
         vibration, tyre.U, pressures(model, step), model, sector, harmonics, count, tyre.check
     )

@@ -40,7 +40,7 @@ RESPONSE_ROUNDS = 2  # of responses
 
 
 @dataclass(frozen=True)
-class Splice:
+class SpliceSector:
     """A sector about Theta = 0."""
 
     width: float  # rad
@@ -77,7 +77,7 @@ def blended(model: Model, other: Model, share: Array) -> Model:
 class FullCircle:
     """Fields (k, nodes, 3) by their values round the tyre; ``free`` (nodes, 3)."""
 
-    def __init__(self, vibration: Vibration, tyre: Revolved, sector: Splice, highest: int):
+    def __init__(self, vibration: Vibration, tyre: Revolved, sector: SpliceSector, highest: int):
         self.vibration, self.tyre, self.highest = vibration, tyre, highest
         self.factors = [vibration.factor(n) for n in range(highest + 1)]
         self.free = vibration.numbering.equation < vibration.numbering.size
@@ -130,7 +130,7 @@ def sector_modes(
     U: Array,
     loads: Sequence[TyrePart],
     model: Model,
-    sector: Splice,
+    sector: SpliceSector,
     harmonics: list[int],
     count: int,
     check: Callable[[], None] = lambda: None,

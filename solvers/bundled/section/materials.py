@@ -9,7 +9,7 @@ import numpy as np
 
 from ..deck.keywords import DeckError, Keyword
 
-Number = complex | float  # complex where it carries the tangent of a slope (`sensitivity`)
+Scalar = complex | float  # complex where it carries the tangent of a slope (`sensitivity`)
 
 
 @dataclass(frozen=True)
@@ -17,9 +17,9 @@ class ModulusTable:
     """Storage over static shear modulus by frequency."""
 
     frequency_Hz: tuple[float, ...]  # rising
-    ratios: tuple[Number, ...]
+    ratios: tuple[Scalar, ...]
 
-    def ratio(self, frequency_Hz: float) -> Number:
+    def ratio(self, frequency_Hz: float) -> Scalar:
         """rho, constant beyond the table's ends; complex where the table carries a tangent."""
         i, share = self._place(frequency_Hz)
         low, high = self.ratios[i : i + 2]
@@ -46,28 +46,28 @@ class Material:
 
     name: str
     line: int
-    density: Number = 0.0  # kg/m3
-    youngs_modulus: Number | None = None  # Pa
-    C10: Number | None = None  # Pa
-    C01: Number = 0.0  # Pa
-    inverse_D1: Number = 0.0  # Pa
+    density: Scalar = 0.0  # kg/m3
+    youngs_modulus: Scalar | None = None  # Pa
+    C10: Scalar | None = None  # Pa
+    C01: Scalar = 0.0  # Pa
+    inverse_D1: Scalar = 0.0  # Pa
     instantaneous: bool = False  # the moduli are those of sudden loading
-    prony: list[tuple[Number, Number, Number]] = field(default_factory=list)  # g, k, tau in s
+    prony: list[tuple[Scalar, Scalar, Scalar]] = field(default_factory=list)  # g, k, tau in s
     table: ModulusTable | None = None  # in place of a Prony series
-    bulk_modulus: Number | None = None  # Pa, of a gas
+    bulk_modulus: Scalar | None = None  # Pa, of a gas
 
-    def _relaxed(self) -> tuple[Number, Number]:
+    def _relaxed(self) -> tuple[Scalar, Scalar]:
         """Long-term over instantaneous modulus, shear and bulk: 1 - sum g, 1 - sum k."""
         return 1 - sum(g for g, _, _ in self.prony), 1 - sum(k for _, k, _ in self.prony)
 
-    def static_scale(self, long_term: bool) -> tuple[Number, Number]:
+    def static_scale(self, long_term: bool) -> tuple[Scalar, Scalar]:
         """Factors on the given shear and bulk moduli in a static step."""
         shear, bulk = self._relaxed()
         if self.instantaneous == (not long_term):
             return 1.0, 1.0
         return (shear, bulk) if long_term else (1 / shear, 1 / bulk)
 
-    def dynamic_ratio(self, frequency_Hz: float | None, long_term: bool) -> tuple[Number, Number]:
+    def dynamic_ratio(self, frequency_Hz: float | None, long_term: bool) -> tuple[Scalar, Scalar]:
         """Storage modulus at a frequency over the static step's, shear and bulk.
 
         G'(w)/G0 = 1 - sum g + sum g w^2 tau^2 / (1 + w^2 tau^2) (Ferry, ch. 3).
@@ -76,7 +76,7 @@ class Material:
             return 1.0, 1.0
         if self.table is not None:
             return self.table.ratio(frequency_Hz), 1.0
-        ratios: list[Number] = []
+        ratios: list[Scalar] = []
         for kind, relaxed in enumerate(self._relaxed()):
             storage = relaxed
             for term in self.prony:
@@ -151,7 +151,7 @@ def _modulus_table(k: Keyword) -> ModulusTable:
     return ModulusTable(tuple(frequency), tuple(ratios))
 
 
-def _positive(k: Keyword, index: int, what: str) -> Number:
+def _positive(k: Keyword, index: int, what: str) -> Scalar:
     value = k.only_row().number(index)
     if not np.real(value) > 0:
         raise DeckError(k.line, f"the {what} must be positive, got {np.real(value):g}")

@@ -16,14 +16,14 @@ from ...files import NotAFile, read_runs, read_text
 from ...studies import result_types
 from ...studies.diagnose.summary import DiagnosisResult
 from ...studies.fit.result import FitResult
-from ...studies.result import Part, Provenance, Result
+from ...studies.result import Provenance, Result, ResultPart
 from ..shape_data import DiagnosisSection, Patches, Shapes
 
-File = TypeVar("File", bound=Part)
-Study = TypeVar("Study", bound=Result)
+File = TypeVar("File", bound=ResultPart)
+StudyContent = TypeVar("StudyContent", bound=Result)
 
 
-class RunFacts(Part):
+class RunFacts(ResultPart):
     """A study's entry in run.json, but for what differs from run to run."""
 
     case: str | None = None
@@ -46,7 +46,7 @@ class Results:
     diagnosis_words: str = ""
     runs: dict[str, RunFacts] = field(default_factory=dict)
 
-    def get(self, kind: type[Study]) -> Study | None:
+    def get(self, kind: type[StudyContent]) -> StudyContent | None:
         """The result of a study."""
         return next((each for each in self.studies.values() if isinstance(each, kind)), None)
 

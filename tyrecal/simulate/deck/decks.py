@@ -9,7 +9,7 @@ from typing import Any, Protocol
 from ...tyre.case.analysis import SolverChoice
 from ...tyre.templates import TemplateFailed
 
-Tangents = dict[str, list[tuple[str, int, int, float]]]
+DeckSlopes = dict[str, list[tuple[str, int, int, float]]]
 
 
 class Design(Protocol):
@@ -94,14 +94,14 @@ class Decks:
         written = design.texts(dialect, self.request)
         return {file: self._header + text for file, text in written.items()}
 
-    def tangents(self, dialect: str) -> Tangents:
+    def tangents(self, dialect: str) -> DeckSlopes:
         """Per variable, rows [job, 1-based line, 0-based field, d number / d variable].
 
         From two decks written a little to either side of the variable, so it holds for any
         template; the derivative is exact where the deck's number is linear in the variable.
         Raises TemplateFailed where keywords come and go with the variable.
         """
-        result: Tangents = {}
+        result: DeckSlopes = {}
         for name in self.gradients:
             above, below = self.design.neighbour(name, 1), self.design.neighbour(name, -1)
             texts = [self._texts(design, dialect) for design, _ in (above, below)]

@@ -102,13 +102,13 @@ def members(mode: Mode, where: Rings) -> dict[Member, Array]:
     return {Member(mode.label, symmetry): field}
 
 
-def state(frequencies: Array, shapes: Array, where: Rings) -> LoadedModes:
+def state(frequencies: Array, shapes: Array, where: Rings) -> ModesAtLoad:
     """The modes of one load."""
-    return LoadedModes(frequencies, shapes, where.evenness(shapes) >= 0.5)
+    return ModesAtLoad(frequencies, shapes, where.evenness(shapes) >= 0.5)
 
 
 @dataclass(frozen=True)
-class LoadedModes:
+class ModesAtLoad:
     """Modes of the tyre at one load: frequencies (m,) in Hz, shapes (m, ring, node, 3), and
     whether each is symmetric about the patch (m,)."""
 
@@ -127,7 +127,7 @@ class Followed:
     spanned: Array
 
 
-def follow(before: LoadedModes, after: LoadedModes, where: Rings) -> Followed:
+def follow(before: ModesAtLoad, after: ModesAtLoad, where: Rings) -> Followed:
     """Modes followed from load to load, symmetric ones and antisymmetric ones by themselves.
 
     Within each kind the curves of the frequencies attract, bend away and exchange shapes rather

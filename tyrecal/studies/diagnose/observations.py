@@ -17,7 +17,7 @@ from ...measured.repeats import PRIOR_REPEATS
 from ...simulate.modes.mode import Label
 
 Array = np.ndarray
-Key = tuple[str, Label | None, float]
+ObservationKey = tuple[str, Label | None, float]
 
 
 @dataclass(frozen=True)
@@ -117,7 +117,7 @@ def _unrepeated(runs: Sequence[dict]) -> Iterator[str]:
         yield "all repeats: fewer than two values stand in every file"
 
 
-def _names(keys: Sequence[Key]) -> str:
+def _names(keys: Sequence[ObservationKey]) -> str:
     return ", ".join(dict.fromkeys(str(Observable(key[0], key[1], key[2])) for key in keys))
 
 
@@ -150,7 +150,7 @@ def _scatter(runs: Sequence[dict]) -> tuple[dict, float]:
     return result, float(np.sqrt(common / count))
 
 
-def _pair(run: dict, key: Key, split: float) -> tuple[float, float, float, float]:
+def _pair(run: dict, key: ObservationKey, split: float) -> tuple[float, float, float, float]:
     """y, its scatter, split, its scatter."""
     if (*key, "") in run:
         return (*run[(*key, "")], np.nan, np.nan)
@@ -162,6 +162,6 @@ def _pair(run: dict, key: Key, split: float) -> tuple[float, float, float, float
     return (a + b) / 2, tau / 2, abs(a - b), tau
 
 
-def _order(key: Key) -> tuple:
+def _order(key: ObservationKey) -> tuple:
     label = key[1]
     return (key[2], label is None, (label.c, label.m, label.kind or "") if label else ())

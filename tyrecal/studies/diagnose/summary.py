@@ -6,14 +6,14 @@ import re
 from typing import Literal
 
 from ...simulate.modes.mode import Label
-from ..result import Part, Result
+from ..result import Result, ResultPart
 from .observations import Observable
 from .where import PartChange
 
 ROW = re.compile(r"\[(\d{1,3}),(\d{1,3})\](?: (axial|torsional))? at ([\d.]{1,9}) kPa")
 
 
-class Explained(Part):
+class Explained(ResultPart):
     """The size of the effect that a diagnosis names or likes best."""
 
     effect: str
@@ -23,7 +23,7 @@ class Explained(Part):
     unit: str
 
 
-class Residual(Part):
+class Residual(ResultPart):
     """A measurement over the calibrated model."""
 
     row: str
@@ -41,7 +41,7 @@ class Residual(Part):
         return Observable("frequency", Label(int(c), int(m), kind), float(pressure), self.run)
 
 
-class GapSummary(Part):
+class GapSummary(ResultPart):
     """What calibration leaves."""
 
     p_value: float
@@ -51,7 +51,7 @@ class GapSummary(Part):
     residuals: list[Residual]
 
 
-class ShrinkageSummary(Part):
+class ShrinkageSummary(ResultPart):
     """Errors on held-out data."""
 
     held_out: str
@@ -65,7 +65,7 @@ class ShrinkageSummary(Part):
     floor_percent: float
 
 
-class NextMeasurement(Part):
+class NextMeasurement(ResultPart):
     """Something worth to be measured."""
 
     what: str

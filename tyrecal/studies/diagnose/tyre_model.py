@@ -26,7 +26,7 @@ MASS_STEP = 0.02  # of a logarithm: the mass is linear in areas and densities
 
 WORTH_A_POOL = 10  # evaluations, for processes to be started
 
-Key = tuple[bytes, tuple[tuple[str, float], ...], bool]  # of a point
+QueryKey = tuple[bytes, tuple[tuple[str, float], ...], bool]  # of a point
 
 
 class TyreModel:
@@ -119,7 +119,7 @@ class TyreModel:
     def _completed(
         self,
         point: Query,
-        known: Mapping[Key, Answer | Exception],
+        known: Mapping[QueryKey, Answer | Exception],
         steps: Sequence[tuple[int, str, float]],
     ) -> Answer | Exception:
         """The answer with what other points have to say about its slopes."""
@@ -260,7 +260,7 @@ class TyreModel:
         return np.where(log_scaled, np.expm1(step), step)
 
 
-def _key(point: Query) -> Key:
+def _key(point: Query) -> QueryKey:
     """What tells two points apart."""
     return point.x.tobytes(), tuple(point.effects.items()), point.constants
 

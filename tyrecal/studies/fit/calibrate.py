@@ -20,7 +20,7 @@ from .problem import Point, Problem
 from .result import FitResult, StartReport, fit_result
 
 Array = np.ndarray
-METHODS: dict[str, Callable[[Problem, Array, float], slsqp.Outcome]] = {
+METHODS: dict[str, Callable[[Problem, Array, float], slsqp.Descent]] = {
     "slsqp": slsqp.minimise,
     "least-squares": least_squares.minimise,
 }
@@ -29,7 +29,7 @@ SLOPE_NOISE_HZ = 50.0  # differences of a step that suits the digits: this times
 SLOPE_ERROR = 1e-4  # of d ln q / d x of areas and stiffnesses, by the curvature within a step
 MOST_REPLACED = 20  # replaced starts per start asked for
 
-Notify = Callable[[int, Mapping[str, float], Point | EvaluationFailed], None]
+FitNotify = Callable[[int, Mapping[str, float], Point | EvaluationFailed], None]
 
 
 @dataclass
@@ -55,7 +55,7 @@ def calibrate(
     starts: int = 1,
     seed: int = 0,
     jobs: int = 1,
-    notify: Notify | None = None,
+    notify: FitNotify | None = None,
     finished: Callable[[int, int], None] = lambda done, starts: None,
 ) -> Fit:
     """Fit the case's free variables to its targets.

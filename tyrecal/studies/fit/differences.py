@@ -7,17 +7,17 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 import numpy as np
 
 from ...simulate.evaluate.failure import EvaluationFailed
-from .variable import Variable
+from .variable import DesignVariable
 
 Array = np.ndarray
-Design = Mapping[str, float]
-Ask = Callable[[Sequence[Design]], Iterable[Array | EvaluationFailed]]
+DesignValues = Mapping[str, float]
+Ask = Callable[[Sequence[DesignValues]], Iterable[Array | EvaluationFailed]]
 STEP = 1e-4  # of a logarithm: best between truncation and the solver's digits
 
 
 def differences(
-    variables: Sequence[Variable],
-    values: Design,
+    variables: Sequence[DesignVariable],
+    values: DesignValues,
     step: float,
     ask: Ask,
     centre: Array | None = None,
@@ -67,7 +67,7 @@ def differences(
     return centre, np.array([columns[i] for i in range(len(variables))]).T
 
 
-def _sides(variable: Variable, value: float, step: float) -> list[float]:
+def _sides(variable: DesignVariable, value: float, step: float) -> list[float]:
     """Steps of a coordinate that stay within the bounds."""
     x, lower, upper = (variable.scaled(v) for v in (value, variable.lower, variable.upper))
     step = min(step, (upper - lower) / 3)

@@ -12,7 +12,7 @@ from scipy.optimize import lsq_linear
 
 from ...simulate.evaluate.failure import EvaluationFailed
 from .problem import Point, Problem
-from .slsqp import AT_JUMP, Outcome, is_at_jump, is_converged
+from .slsqp import AT_JUMP, Descent, is_at_jump, is_converged
 
 Array = np.ndarray
 STEPS = 100
@@ -20,7 +20,7 @@ HALVINGS = 5  # of a step towards a design without a solution
 DAMPING, STIFFEST = 0.1, 1e8  # mu at first, and where no step is left to try
 
 
-def minimise(problem: Problem, start: Array, tolerance: float) -> Outcome:
+def minimise(problem: Problem, start: Array, tolerance: float) -> Descent:
     """Minimise the objective from ``start`` until the projected gradient is below ``tolerance``.
 
     Raises EvaluationFailed when the start itself cannot be evaluated.
@@ -28,17 +28,17 @@ def minimise(problem: Problem, start: Array, tolerance: float) -> Outcome:
     point, damping = problem.evaluate(start), DAMPING
     for _ in range(STEPS):
         if is_converged(problem, point, tolerance):
-            return Outcome(point, "converged")
+            return Descent(point, "converged")
         if damping > STIFFEST:
-            return Outcome(point, "no lower objective along any damped step")
+            return Descent(point, "no lower objective along any damped step")
         trial = _first_solvable(problem, point, _step(problem, point, damping))
         if trial and is_at_jump(problem, point, point.objective - trial.objective):
-            return Outcome(min(point, trial, key=lambda p: p.objective), AT_JUMP)
+            return Descent(min(point, trial, key=lambda p: p.objective), AT_JUMP)
         if trial is not None and trial.objective < point.objective:
             point, damping = trial, damping / 5
         else:
             damping *= 4
-    return Outcome(point, f"stopped after {STEPS} steps")
+    return Descent(point, f"stopped after {STEPS} steps")
 
 
 def _first_solvable(problem: Problem, point: Point, step: Array) -> Point | None:

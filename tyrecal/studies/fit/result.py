@@ -10,10 +10,20 @@ import numpy as np
 from pydantic import Field
 
 from ...tyre.values import with_values
-from ..result import NAMED, Column, Deviation, Named, Part, Positive, Result, Table, csv_text
+from ..result import (
+    NAMED,
+    Column,
+    Deviation,
+    Named,
+    PositiveNumber,
+    Result,
+    ResultPart,
+    Table,
+    csv_text,
+)
 from . import slsqp
 from .problem import Point, Problem, objective_unit
-from .uncertainty import Uncertainty, uncertainty
+from .uncertainty import FitUncertainty, uncertainty
 
 MIN_STEP = 1e-6  # of a scaled variable, below which the fit did not move, or is at a bound
 NEAR_BEST_HZ = 0.05  # of the objective: the fit could have ended there
@@ -35,7 +45,7 @@ class StartReport:
     history: list[dict[str, Any]]
 
 
-class Variable(Part):
+class FittedVariable(ResultPart):
     """A design variable."""
 
     initial: float
@@ -58,13 +68,13 @@ class FittedMode(Named):
     """A mode that has a target."""
 
     multiplicity: int
-    initial_Hz: Positive
-    fitted_Hz: Positive
-    target_Hz: Positive
+    initial_Hz: PositiveNumber
+    fitted_Hz: PositiveNumber
+    target_Hz: PositiveNumber
     deviation_percent: float
 
 
-class FittedFootprint(Part):
+class FittedFootprint(ResultPart):
     """A target on the road, SI."""
 
     load_N: float
@@ -96,7 +106,7 @@ class FitResult(Result):
     message: str
     projected_gradient_norm: float
     label_margin: float  # least clarity of a label
-    variables: dict[str, Variable]
+    variables: dict[str, FittedVariable]
     fixed: dict[str, float]
     modes: list[FittedMode]
     footprint: list[FittedFootprint] = Field(default=[])
@@ -239,12 +249,12 @@ def fit_result(
 
 
 def _variables(
-    problem: Problem, initial: Point, point: Point, known: Uncertainty
-) -> dict[str, Variable]:
+    problem: Problem, initial: Point, point: Point, known: FitUncertainty
+) -> dict[str, FittedVariable]:
     variables = {}
     for i, v in enumerate(problem.variables):
         room = point.x[i] - problem.lower[i], problem.upper[i] - point.x[i]
-        variables[v.name] = Variable(
+        variables[v.name] = FittedVariable(
             initial=initial.values[v.name],
             value=point.values[v.name],
             lower=problem.case.case.variables[v.name].lower,

@@ -37,7 +37,7 @@ class _Jump(Exception):
 
 
 @dataclass(frozen=True)
-class Outcome:
+class Descent:
     """Where an optimiser stopped, in its own words why, and the crossing that bounds it."""
 
     point: Point
@@ -45,7 +45,7 @@ class Outcome:
     edge: Crossing | None = None
 
 
-def minimise(problem: Problem, start: Array, tolerance: float) -> Outcome:
+def minimise(problem: Problem, start: Array, tolerance: float) -> Descent:
     """Minimise the objective from ``start`` until the projected gradient is below ``tolerance``.
 
     Where the search ends with the two [0, 0] modes mixed, it is held by their crossing, at which
@@ -98,19 +98,19 @@ def is_at_jump(problem: Problem, point: Point, lowered: float = 0.0) -> bool:
 
 def _descend(
     problem: Problem, point: Point, tolerance: float, known: Point | None = None
-) -> Outcome:
+) -> Descent:
     """SLSQP from ``point`` to its end, or back on the side of ``known``, no lower."""
     damping, message = DAMPING, "restarts used up"
     edge: Crossing | None = None
     for _ in range(RESTARTS):
         if is_converged(problem, point, tolerance):
-            return Outcome(point, "converged")
+            return Descent(point, "converged")
         seen, full_step = _restart(problem, point, damping, edge)
         reached = min(seen, key=lambda p: p.objective)
         side = order(problem, reached)
         back = known is not None and side == order(problem, known)
         if known and back and reached.objective >= (1 - CREEPING) * known.objective:
-            return Outcome(reached, CAME_BACK)
+            return Descent(reached, CAME_BACK)
         if side != order(problem, point):
             edge = None
         elif edge or (
@@ -120,17 +120,17 @@ def _descend(
             edge = crossing(problem, seen, reached) or edge
         creeping = point.objective - reached.objective <= CREEPING * point.objective
         if edge and creeping and _is_bounded(reached, edge):
-            return Outcome(reached, AT_CROSSING, edge)
+            return Descent(reached, AT_CROSSING, edge)
         if is_at_jump(problem, point, point.objective - reached.objective):
-            return Outcome(reached, AT_JUMP)
+            return Descent(reached, AT_JUMP)
         if reached.objective >= point.objective - 1e-9 * max(point.objective, 1e-3):
             if damping > 1e3 * DAMPING:
-                return Outcome(point, "no lower objective along the search direction", edge)
+                return Descent(point, "no lower objective along the search direction", edge)
             damping *= 10
             continue
         damping *= 0.3 if full_step else 2.0
         point = reached
-    return Outcome(point, message, edge)
+    return Descent(point, message, edge)
 
 
 def _is_bounded(point: Point, edge: Crossing) -> bool:

@@ -12,7 +12,7 @@ Array = np.ndarray
 
 
 @dataclass(frozen=True)
-class Uncertainty:
+class FitUncertainty:
     """standard_errors: in each variable's own unit, None where the data do not tell;
     correlations (v, v); singular_values (v,) of the weighted Jacobian by the scaled variables,
     in the objective's unit, largest first: a small one is a combination that the data do not see;
@@ -25,7 +25,7 @@ class Uncertainty:
     noise_Hz: float | None
 
 
-def uncertainty(problem: Problem, point: Point) -> Uncertainty:
+def uncertainty(problem: Problem, point: Point) -> FitUncertainty:
     """Linearised uncertainty at ``point`` of the fit that was made, whatever its weights.
 
     The fit answers noise dq in the measured values with dx = (J^T J)^-1 J^T W^(1/2) dq, J and
@@ -51,7 +51,7 @@ def uncertainty(problem: Problem, point: Point) -> Uncertainty:
     values[: len(found)] = found
     modal = sigma[: int(counts[: len(problem.targets)].sum())]
     noise = float(np.sqrt(np.mean(modal**2))) if len(modal) else float("nan")
-    return Uncertainty(errors, correlations, values, noise if np.isfinite(noise) else None)
+    return FitUncertainty(errors, correlations, values, noise if np.isfinite(noise) else None)
 
 
 def _noise(problem: Problem, point: Point, counts: Array, leverage: Array) -> Array:

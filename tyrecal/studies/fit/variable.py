@@ -6,11 +6,11 @@ import math
 from dataclasses import dataclass
 
 from ...simulate.deck.tyre_design import NEAR_ZERO
-from ...tyre.case.calibration import Variable as CaseVariable
+from ...tyre.case.calibration import Variable
 
 
 @dataclass(frozen=True)
-class Variable:
+class DesignVariable:
     """A design variable: bounds in its own unit; ``log`` scaled inside the optimiser or not."""
 
     name: str
@@ -35,10 +35,10 @@ class Variable:
         return value if self.log else self.upper - self.lower
 
 
-def read_variable(name: str, v: CaseVariable) -> Variable:
+def read_variable(name: str, v: Variable) -> DesignVariable:
     """A variable as the optimiser has it: next to 0 where it moves effects and a bound is 0, as
     most have no slope there, where their keywords leave the deck."""
     effect = all(path.startswith("effects.") for path in v.sets)
     least = NEAR_ZERO * max(abs(v.lower), abs(v.upper)) if effect else 0.0
     lower, upper = v.lower or least, v.upper or -least
-    return Variable(name, min(max(v.start, lower), upper), lower, upper, v.scale == "log")
+    return DesignVariable(name, min(max(v.start, lower), upper), lower, upper, v.scale == "log")
