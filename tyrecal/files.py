@@ -19,7 +19,7 @@ from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 from typing import Any, BinaryIO
 
-LARGEST = 50_000_000  # bytes of a file that is read whole; ours are a hundredth of it
+MAX_FILE_BYTES = 50_000_000  # bytes of a file that is read whole; ours are a hundredth of it
 NOFOLLOW = getattr(os, "O_NOFOLLOW", 0)  # Windows has none: there `refuse_link` is all
 
 
@@ -146,7 +146,7 @@ def open_file(path: Path, follow: bool = True) -> BinaryIO:
     return os.fdopen(descriptor, "rb")
 
 
-def read_bytes(path: Path, most: int = LARGEST, follow: bool = True) -> bytes:
+def read_bytes(path: Path, most: int = MAX_FILE_BYTES, follow: bool = True) -> bytes:
     """The content of a file of at most ``most`` bytes. Raises as `open_file` does."""
     with open_file(path, follow) as file:
         content = file.read(most + 1)

@@ -10,7 +10,9 @@ from ..process import RunFailed
 from .dat import DatTable
 from .fil import SIM, Modes, read_fil
 
-DIGITS = 1e-3  # largest relative difference of a frequency between .fil and .dat: five digits
+FREQUENCY_RTOL = (
+    1e-3  # largest relative difference of a frequency between .fil and .dat: five digits
+)
 
 
 def checked_modes(path: Path, asked: int | None, table: DatTable) -> Modes:
@@ -36,7 +38,10 @@ def checked_modes(path: Path, asked: int | None, table: DatTable) -> Modes:
         raise _failed(f"{path.name}: a mode's eigenvalue, mass or shape is zero")
     own_Hz = np.sqrt(values) / (2 * np.pi)
     for number, printed_Hz in table.frequencies_Hz.items():
-        if number > len(own_Hz) or not abs(own_Hz[number - 1] - printed_Hz) <= DIGITS * printed_Hz:
+        if (
+            number > len(own_Hz)
+            or not abs(own_Hz[number - 1] - printed_Hz) <= FREQUENCY_RTOL * printed_Hz
+        ):
             raise _failed(f"{path.name} and {dat} disagree on mode {number}")
     if table.mass_kg is None:
         raise _failed(f"{dat} states no TOTAL MASS OF MODEL")

@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-FILE = "abaqus.json"
+OPTIONS_FILE = "abaqus.json"
 
 
 class OptionRefused(ValueError):
@@ -27,7 +27,7 @@ class Options:
     def save(self, folder: Path, program: Sequence[str] = ()) -> Path:
         """Write them into a run folder, and the ``program``, where no version tells it from others:
         its answers are its own."""
-        path = folder / FILE
+        path = folder / OPTIONS_FILE
         told = {**asdict(self), **({"command": [*program]} if program else {})}
         path.write_text(json.dumps(told, indent=1) + "\n", encoding="utf-8", newline="")
         return path
@@ -35,7 +35,7 @@ class Options:
 
 def load(folder: Path) -> Options:
     """Options that were saved in a run folder. Raises OSError."""
-    told = json.loads((folder / FILE).read_text(encoding="utf-8"))
+    told = json.loads((folder / OPTIONS_FILE).read_text(encoding="utf-8"))
     return Options(**{name: told[name] for name in Options.__dataclass_fields__})
 
 

@@ -12,19 +12,21 @@ import re
 from collections.abc import Iterator
 
 Item = int | float | str
-LINE = 80
+RECORD_LINE = 80
 
 
 def records(text: str) -> Iterator[tuple[int, list[Item]]]:
     """(key, attributes) of each record. Raises ValueError where the text is not whole."""
     lines = text.splitlines()
-    if any(len(line) > LINE for line in lines):
-        raise ValueError(f"a line is longer than {LINE} characters")
-    data = "".join(line.ljust(LINE) for line in lines).rstrip()
+    if any(len(line) > RECORD_LINE for line in lines):
+        raise ValueError(f"a line is longer than {RECORD_LINE} characters")
+    data = "".join(line.ljust(RECORD_LINE) for line in lines).rstrip()
     at = 0
     while at < len(data):
         if data[at] != "*":
-            raise ValueError(f"line {at // LINE + 1}: a record does not begin where it should")
+            raise ValueError(
+                f"line {at // RECORD_LINE + 1}: a record does not begin where it should"
+            )
         start, at = at, at + 1
         items: list[Item] = []
         try:
@@ -35,7 +37,7 @@ def records(text: str) -> Iterator[tuple[int, list[Item]]]:
             yield int(items[0]), items[1:]
         except (ValueError, IndexError):
             raise ValueError(
-                f"line {start // LINE + 1}: a record is cut short or damaged"
+                f"line {start // RECORD_LINE + 1}: a record is cut short or damaged"
             ) from None
         while at < len(data) and data[at] == " ":  # after 2001 the line is filled with blanks
             at += 1

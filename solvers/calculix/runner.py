@@ -10,7 +10,7 @@ from pathlib import Path
 
 from ..process import RunFailed, last_words, run_command
 
-RESULTS = ("dat", "frd", "sta", "cvg", "12d", "rout")
+RESULT_SUFFIXES = ("dat", "frd", "sta", "cvg", "12d", "rout")
 LONGEST_LINE = 10_000  # characters of a log
 LONGEST_PATH = 100  # ccx keeps 132 characters of a file's path, the file's name included
 NO_EQUILIBRIUM = re.compile(r"increment size smaller|too many cutbacks|max\. # of increments", re.I)
@@ -36,14 +36,14 @@ def run_job(
         try:
             _run(Path(short), job, command, time_limit_s)
         finally:
-            for suffix in (*RESULTS, "log"):
+            for suffix in (*RESULT_SUFFIXES, "log"):
                 if (Path(short) / f"{job}.{suffix}").exists():
                     shutil.copy(Path(short) / f"{job}.{suffix}", folder)
 
 
 def clear(folder: Path, job: str) -> None:
     """Remove results of another run, which must not pass for this one's."""
-    for suffix in (*RESULTS, "log"):
+    for suffix in (*RESULT_SUFFIXES, "log"):
         (folder / f"{job}.{suffix}").unlink(missing_ok=True)
 
 

@@ -204,7 +204,7 @@ def test_no_scheduler_there(
 ) -> None:
     from tyrecal.simulate.evaluate import cluster
 
-    monkeypatch.setattr(cluster, "PATIENCE_S", 0.3)
+    monkeypatch.setattr(cluster, "SCHEDULER_PATIENCE_S", 0.3)
     (case,) = map(str, vary(tmp_path / "cases", 1))
     nowhere = ["--scheduler", "tcp://127.0.0.1:1", "--output", str(tmp_path / "out")]
     assert run("batch", case, *nowhere) == 3

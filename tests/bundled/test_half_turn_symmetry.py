@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from tyrecal_solvers.bundled.road.half_turn_symmetry import (
-    MIRROR,
+    MIRROR_SIGNS,
     HalfTurn,
     NotSymmetric,
     mirror_images,
@@ -98,7 +98,7 @@ def test_axisymmetric_inflation_is_of_the_symmetry(inflated: Inflated) -> None:
     U = np.repeat(inflated.U[None], ANGLES, 0)
     np.testing.assert_allclose(symmetry.spread(symmetry.parts(U)), U, atol=1e-12)
     mirrored = np.empty_like(inflated.U)
-    mirrored[symmetry.beyond] = inflated.U[symmetry.nodes] * MIRROR
+    mirrored[symmetry.beyond] = inflated.U[symmetry.nodes] * MIRROR_SIGNS
     assert abs(mirrored[symmetry.beyond] - inflated.U[symmetry.beyond])[:, 1].max() > 1e-6
 
 

@@ -9,7 +9,7 @@ from tyrecal_solvers.bundled.modes.harmonics import Vibration
 from tyrecal_solvers.bundled.nonuniform import rotation
 from tyrecal_solvers.bundled.section import mechanics
 from tyrecal_solvers.bundled.section.model import Model
-from tyrecal_solvers.bundled.section.parts.pressure import SPIN
+from tyrecal_solvers.bundled.section.parts.pressure import SPIN_AXIS
 
 from . import support
 from .conftest import Inflated
@@ -70,7 +70,7 @@ def test_free_ring_stands_still_in_the_ground_frame() -> None:
     K0, K1, K2 = support.matrices(m, U, [])
     K = K0 + 1j * K1 + K2
     M = np.kron(mechanics.mass(m).toarray(), np.eye(3))
-    C = 2j * spin * np.kron(mechanics.mass(m).toarray(), SPIN)
+    C = 2j * spin * np.kron(mechanics.mass(m).toarray(), SPIN_AXIS)
     shift = np.tile([1.0, 1j, 0.0], len(U))
     left = (K + spin * C - spin**2 * M) @ shift
     assert np.linalg.norm(left) < 1e-12 * np.linalg.norm(K) * np.linalg.norm(shift)
@@ -93,7 +93,7 @@ def test_waves_are_the_lowest(inflated: Inflated, n: int) -> None:
     K0, K1, K2 = support.matrices(m, U, inflated.loads)
     K = (K0 + 1j * n * K1 + n * n * K2)[free][:, free]
     mass = mechanics.mass(m).toarray()
-    M, C = np.kron(mass, np.eye(3)), 2j * spin * np.kron(mass, SPIN)
+    M, C = np.kron(mass, np.eye(3)), 2j * spin * np.kron(mass, SPIN_AXIS)
     M, C = M[free][:, free], C[free][:, free]
     for sign in (1, -1):
         waves = np.sort(abs(got.combination.omega[np.sign(got.combination.omega) == sign]))
@@ -114,7 +114,7 @@ def test_slow_spin_by_first_order_perturbation(inflated: Inflated) -> None:
         got = rotation.waves(vibration, spin, n, 2).eigenvalues.reshape(-1, 2)
         split = np.diff(np.sqrt(got), axis=1)[:, 0] / (2 * spin)
         for k, shape in enumerate(vibration.modes(n, 2).shapes):
-            image = vibration.mass @ (shape @ SPIN.T)
+            image = vibration.mass @ (shape @ SPIN_AXIS.T)
             g = (1j * (shape.conj() * image).sum()).real
             assert split[k] == pytest.approx(abs(n - g), rel=1e-5)
             assert abs(g) < 2 * n / (n * n + 1) + 0.05

@@ -303,7 +303,7 @@ def test_names_tell_cases_apart() -> None:
 
 
 def test_the_command_names_the_librarys_studies() -> None:
-    assert tuple(STUDIES) == batch.STUDIES
+    assert tuple(STUDIES) == batch.STUDY_NAMES
 
 
 def test_time_left_counts_what_ran(

@@ -174,7 +174,7 @@ def test_what_is_not_known_lies_above() -> None:
     K = np.diag(np.array([40.0, 60.0, 80.0]) ** 2)
     held = np.array([1.0, 1.0, 1.5])
     before, after = solved(K, basis), solved(K + 3e3 * np.outer(held, held), basis)
-    lower = LoadedModes(before.frequencies[:2], before.shapes[:2], before.symmetric[:2])
+    lower = ModesAtLoad(before.frequencies[:2], before.shapes[:2], before.symmetric[:2])
     whole, part = follow(before, after, WIDE), follow(lower, after, WIDE)
     np.testing.assert_array_equal(whole.position, np.arange(3))
     np.testing.assert_array_equal(part.position, np.arange(2))

@@ -13,7 +13,7 @@ from matplotlib.text import Text
 
 from tyrecal.report import diagnosis_pictures as pictures
 from tyrecal.report.figure import save
-from tyrecal.report.section import WARM, draw_section_map
+from tyrecal.report.section import EVIDENCE_COLOURS, draw_section_map
 from tyrecal.report.shape_data import DiagnosisSection, parts_data
 from tyrecal.studies.diagnose.diagnosis import Diagnosis
 from tyrecal.studies.diagnose.where import PartChange
@@ -127,4 +127,4 @@ def test_section_map(tmp_path: Path) -> None:
         for c in figure.axes[0].collections
         if isinstance(c, PolyCollection)
     }
-    assert tuple(np.round(WARM(4.9 / 5), 3)) in colours and len(colours) == 2
+    assert tuple(np.round(EVIDENCE_COLOURS(4.9 / 5), 3)) in colours and len(colours) == 2

@@ -13,8 +13,8 @@ from . import arguments, options
 from .main import EXIT_BATCH
 from .terminal import Terminal
 
-STUDIES = ("fit", "modes", "sweep-pressure", "footprint")  # without importing what they need
-FILE = click.Path(path_type=Path, dir_okay=False)
+STUDY_NAMES = ("fit", "modes", "sweep-pressure", "footprint")  # without importing what they need
+FILE_PATH = click.Path(path_type=Path, dir_okay=False)
 
 
 @click.command()
@@ -26,12 +26,13 @@ FILE = click.Path(path_type=Path, dir_okay=False)
     default="fit",
     metavar="S1,S2,...",
     show_default=True,
-    help=f"Of {', '.join(STUDIES)}. After a fit, sweep and footprint study the fitted design too.",
+    help=f"Of {', '.join(STUDY_NAMES)}. After a fit, sweep and footprint study the fitted"
+    " design too.",
 )
-@click.option("--junit", type=FILE, metavar="FILE", help="Write JUnit XML for a CI server.")
+@click.option("--junit", type=FILE_PATH, metavar="FILE", help="Write JUnit XML for a CI server.")
 @click.option(
     "--baseline",
-    type=FILE,
+    type=FILE_PATH,
     metavar="FILE",
     help="Numbers to compare with, and how far each may drift.",
 )
@@ -187,9 +188,9 @@ def _studies(text: str) -> tuple[str, ...]:
     """The studies asked for, in the order in which they are done. Raises click.UsageError."""
     asked = [word.strip() for word in text.split(",")]
     for word in asked:
-        if word not in STUDIES:
-            raise click.UsageError(f"--studies: '{word}' is none of {', '.join(STUDIES)}")
-    return tuple(name for name in STUDIES if name in asked)
+        if word not in STUDY_NAMES:
+            raise click.UsageError(f"--studies: '{word}' is none of {', '.join(STUDY_NAMES)}")
+    return tuple(name for name in STUDY_NAMES if name in asked)
 
 
 def _prepare(tasks: Sequence[Any], folder: Path) -> None:

@@ -16,7 +16,10 @@ from ..files import open_file, read_json, write_text
 if TYPE_CHECKING:
     from filelock import BaseFileLock
 
-FILE, OWNER = ".lock", ".lock.json"  # what is locked; who holds it, which Windows reads meanwhile
+LOCK_FILE, OWNER = (
+    ".lock",
+    ".lock.json",
+)  # what is locked; who holds it, which Windows reads meanwhile
 log = logging.getLogger("tyrecal")
 
 
@@ -39,10 +42,10 @@ def lock(folder: Path, command: str, started: str) -> Lock | None:
     """
     from filelock import FileLock, SoftFileLock, Timeout
 
-    for name in (FILE, OWNER):
+    for name in (LOCK_FILE, OWNER):
         with contextlib.suppress(FileNotFoundError):
             open_file(folder / name, follow=False).close()
-    held = FileLock(folder / FILE, fallback_to_soft=False)
+    held = FileLock(folder / LOCK_FILE, fallback_to_soft=False)
     try:
         if isinstance(held, SoftFileLock):  # a mere file, which a killed process leaves behind
             raise NotImplementedError("this Python has none")

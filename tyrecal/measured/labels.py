@@ -23,7 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.polynomial.legendre import legvander
 
-from ..simulate.modes.label import AXIAL, BELT, COLUMNS, DEGREE, HIGHEST_HARMONIC, PARITY
+from ..simulate.modes.label import AXIAL_COLUMN, BELT, COLUMNS, DEGREE, HIGHEST_HARMONIC, PARITY
 from ..simulate.modes.mode import Label
 from .sensors import Sensors
 
@@ -128,8 +128,8 @@ class Labeller:
 
 
 def _label(c: int, column: int) -> Label:
-    if c == 0 and column in (0, AXIAL):
-        return Label(0, 0, "axial" if column == AXIAL else "torsional")
+    if c == 0 and column in (0, AXIAL_COLUMN):
+        return Label(0, 0, "axial" if column == AXIAL_COLUMN else "torsional")
     return Label(c, column)
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from math import nan
 
 from ..simulate.modes.mode import Label
-from ..tyre.usual import MEASURED
+from ..tyre.usual import USUAL_MEASUREMENTS
 
 CSV_COLUMNS = ("quantity", "c", "m", "kind", "member", "pressure_kPa", "load_N", "value", "sigma")
 PRESSURE_RANGE_kPa = (20.0, 2000.0)
@@ -18,7 +18,7 @@ MeasurementKey = tuple[str, Label | None, str, float, float]
 class Measurement:
     """A value that was measured, or the mean of several, in the unit of ``quantity``."""
 
-    quantity: str  # one of MEASURED
+    quantity: str  # one of USUAL_MEASUREMENTS
     label: Label | None  # None of what is no frequency
     member: str  # 1 or 2 of a doublet, symmetric or antisymmetric under load; "": one for both
     pressure_kPa: float  # 0 of the mass
@@ -44,7 +44,7 @@ class Measurement:
         low, high = PRESSURE_RANGE_kPa
         if not self.value > 0:
             return f"{self.quantity} is {self.value:g}, must be greater than 0"
-        if refusal := MEASURED[self.quantity].refusal(self.value):
+        if refusal := USUAL_MEASUREMENTS[self.quantity].refusal(self.value):
             return f"{self.quantity} is {self.value:g}: no tyre has that, {refusal}"
         if self.quantity != "mass_kg" and not low <= self.pressure_kPa <= high:
             said = f"the pressure is {self.pressure_kPa:g} kPa, must be {low:g} to {high:g}"

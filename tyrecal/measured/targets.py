@@ -10,7 +10,7 @@ from pathlib import Path
 from ..errors import InputError
 from ..simulate.modes.mode import Label
 from ..tyre.case import LoadedCase
-from ..tyre.case.calibration import MEASURED, TargetFootprint, TargetMode, Targets
+from ..tyre.case.calibration import MEASURED_SIGMA, TargetFootprint, TargetMode, Targets
 from .measurement import Measurement
 from .tables import read_measurements
 
@@ -69,7 +69,11 @@ def _modes(readings: Sequence[Measurement]) -> list[TargetMode]:
 def _footprint(readings: Sequence[Measurement]) -> list[TargetFootprint]:
     return [
         TargetFootprint.model_validate(
-            {"load_N": each.load_N, each.quantity: each.value, MEASURED[each.quantity]: each.sigma}
+            {
+                "load_N": each.load_N,
+                each.quantity: each.value,
+                MEASURED_SIGMA[each.quantity]: each.sigma,
+            }
         )
         for each in readings
     ]

@@ -11,7 +11,7 @@ from rich.text import Text
 
 MAX_ROWS = 40
 FIGURES = ("baseline", "now", "change", "allowed")
-COLOURS = {"error": "red", "failed": "red", "skipped": "yellow"}
+OUTCOME_COLOURS = {"error": "red", "failed": "red", "skipped": "yellow"}
 
 
 def failures_table(result: Mapping[str, Any]) -> Table | None:
@@ -24,7 +24,7 @@ def failures_table(result: Mapping[str, Any]) -> Table | None:
                 key = case["name"], entry["status"], entry["words"] or ""
                 rows.setdefault(key, []).append(study)
     for (name, status, words), studies in list(rows.items())[:MAX_ROWS]:
-        shown = Text(status, COLOURS[status])
+        shown = Text(status, OUTCOME_COLOURS[status])
         table.add_row(Text(name), ", ".join(studies), shown, Text(words))
     return _with_rest(table, len(rows))
 

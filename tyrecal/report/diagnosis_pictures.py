@@ -18,10 +18,10 @@ from .section import draw_section_map
 from .shape_data import DiagnosisSection
 
 Array = np.ndarray
-FAMILIES = ("[0,0]", "in-plane", "lateral")
+SHOWN_FAMILIES = ("[0,0]", "in-plane", "lateral")
 MAX_SHOWN = 12  # explanations
-MIN_PROBABILITY = 0.005  # of one that is shown
-WORDS = 24  # letters of a bar's name in a line
+MIN_SHOWN_PROBABILITY = 0.005  # of one that is shown
+MAX_LETTERS = 24  # letters of a bar's name in a line
 
 
 def draw_diagnosis(d: Diagnosis, parts: DiagnosisSection) -> dict[str, Figure]:
@@ -51,7 +51,7 @@ def draw_residuals(
     (``after``) with the likeliest ``effect`` in the model. Bars (``spread``): one standard
     deviation without a gap."""
     pressures = sorted({row.pressure_kPa for row in rows if row.label})
-    shown = [name for name in FAMILIES if any(family(row) == name for row in rows)]
+    shown = [name for name in SHOWN_FAMILIES if any(family(row) == name for row in rows)]
     figure = new_figure(2.0 + 2.8 * len(shown), 3.8)
     axes = figure.subplots(1, len(shown), sharey=True, squeeze=False)[0]
     for panel, name in zip(axes, shown, strict=True):
@@ -98,7 +98,9 @@ def draw_probabilities(d: Diagnosis) -> Figure:
     """The likeliest explanations as bars, before (a mark) and after the data."""
     order = sorted(d.hypotheses, key=lambda h: -d.probabilities[h.key])[:MAX_SHOWN]
     order = [
-        h for h in order if d.probabilities[h.key] >= MIN_PROBABILITY or h.key in (NONE, OUTSIDE)
+        h
+        for h in order
+        if d.probabilities[h.key] >= MIN_SHOWN_PROBABILITY or h.key in (NONE, OUTSIDE)
     ]
     figure = new_figure(7.4, 1.4 + 0.34 * len(order))
     axes = figure.add_subplot()
@@ -113,7 +115,7 @@ def draw_probabilities(d: Diagnosis) -> Figure:
         axes.text(max(value, h.prior) + 0.01, y, f"{value:.2f}", va="center", fontsize=8)
     axes.axvline(0.7, color=GREY, lw=0.8, ls=":")
     axes.text(0.71, -0.45, "named from here on", fontsize=8, color="0.3")
-    axes.set_yticks(place, [fill(_short(d, h.key), 2 * WORDS) for h in order])
+    axes.set_yticks(place, [fill(_short(d, h.key), 2 * MAX_LETTERS) for h in order])
     axes.set_xlim(0, max(1.0, 1.1 * max(p)))
     axes.set_xlabel("probability")
     words = "What explains the gap" if d.leading else "No gap is seen: how likely each effect is"
@@ -133,7 +135,7 @@ def draw_held_out(d: Diagnosis) -> Figure:
     names = ["without an effect"]
     axes.bar([0], [s.before_percent], color="0.6", width=0.55)
     if d.leading:
-        names.append(f"{fill(f'with {_within(d, s.effect)}', WORDS)}\n(line: 90 % range)")
+        names.append(f"{fill(f'with {_within(d, s.effect)}', MAX_LETTERS)}\n(line: 90 % range)")
         axes.bar([1], [s.after_percent], color=COLOURS[0], width=0.55)
         low, high = (s.before_percent * (1 - r) for r in (s.high, s.low))
         axes.plot([1, 1], [low, high], color="black", lw=1.2)

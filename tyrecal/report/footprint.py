@@ -17,10 +17,10 @@ from .shape_data import PatchData
 
 COLOUR_MAP = colormaps["viridis"]
 MAX_BANDS = 12  # of colour
-COLUMNS = 4
+MAX_COLUMNS = 4
 MARGIN = 10.0  # mm round the largest patch
 TRACE = 1e-6  # of the highest pressure, where the lowest band begins
-STYLES: dict[str, dict[str, Any]] = {
+DESIGN_STYLES: dict[str, dict[str, Any]] = {
     "initial": {"ls": (0, (4, 2)), "marker": "o", "mfc": "white"},
     "fitted": {"ls": "-", "marker": "s"},
 }
@@ -49,7 +49,7 @@ def draw_patches(patches: Sequence[PatchData], highest_kPa: float) -> Figure:
     highest_kPa: upper end of the colours; dots: nodes that touch.
     """
     width, length = 2 * (np.max([_halves(patch) for patch in patches], axis=0) + MARGIN)
-    columns = min(COLUMNS, len(patches))
+    columns = min(MAX_COLUMNS, len(patches))
     lines = -(-len(patches) // columns)
     inch = min(2.4, 9.0 / columns) / width
     figure = new_figure(1.4 + columns * (inch * width + 0.25), 0.9 + lines * (inch * length + 0.35))
@@ -98,7 +98,7 @@ def draw_curves(rows: Sequence[FootprintRow]) -> Figure:
         own = [row for row in rows if row.design == design]
         load = [row.load_N / 1e3 for row in own]
         style: dict[str, Any] = {"color": colour, "label": design, "ms": 4.5, "lw": 1.4}
-        style |= STYLES.get(design, {})
+        style |= DESIGN_STYLES.get(design, {})
         for axes, (key, (_, unit)) in zip(grid, CURVES.items(), strict=True):
             axes.plot(load, [unit * getattr(row, key) for row in own], **style)
     for axes, (words, _) in zip(grid, CURVES.values(), strict=True):

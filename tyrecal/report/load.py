@@ -13,7 +13,7 @@ from ..studies.loaded_result import LoadRow
 from .figure import COLOURS, MARKERS, in_house_style, new_figure
 from .pressure import GAP, name_lines
 
-STYLES: dict[str, dict[str, Any]] = {  # symmetric solid, antisymmetric dashed and hollow
+MEMBER_STYLES: dict[str, dict[str, Any]] = {  # symmetric solid, antisymmetric dashed and hollow
     SYMMETRIES[0]: {"ls": "-"},
     SYMMETRIES[1]: {"ls": (0, (4, 2)), "mfc": "white"},
 }
@@ -43,7 +43,7 @@ def draw_load_sweep(rows: Sequence[LoadRow]) -> Figure:
                     lw=1.4,
                     ms=4.5,
                     marker=MARKERS[label.c % len(MARKERS)],
-                    **STYLES.get(symmetry, {}),
+                    **MEMBER_STYLES.get(symmetry, {}),
                 )
             axes.set_title(f"{design}, {name or 'overtones'}", loc="left")
             axes.grid(True, color="0.92", lw=0.6)
@@ -56,7 +56,7 @@ def draw_load_sweep(rows: Sequence[LoadRow]) -> Figure:
         for axes, name in zip(line, shown, strict=True):
             ends = [(c[1][-1], c[0][-1], k[0]) for k, c in curves.items() if k[0].family == name]
             name_lines(axes, ends, GAP)
-    for symmetry, style in STYLES.items():
+    for symmetry, style in MEMBER_STYLES.items():
         grid[0, 0].plot([], [], color="k", marker="o", ms=4.5, lw=1.4, label=symmetry, **style)
     grid[0, 0].legend(frameon=False, loc="lower right")
     return figure

@@ -13,7 +13,7 @@ from ..simulate.modes.mode import FAMILIES, Label
 from ..studies.pressure_result import PressureRow
 from .figure import COLOURS, GREY, MARKERS, in_house_style, new_figure
 
-LINES = {"initial": (0, (4, 2)), "fitted": "-"}
+LINE_STYLES = {"initial": (0, (4, 2)), "fitted": "-"}
 GAP = 0.042  # of an axis' height between two labels' centres
 
 Curves = dict[Label, tuple[np.ndarray, np.ndarray, np.ndarray]]
@@ -75,7 +75,7 @@ def draw_pressure_sweep(
             ends = [(float(c[which][-1]), float(c[0][-1]), label) for label, c in mine.items()]
             name_lines(axes, ends, GAP * (1 if which == 1 else 5 / 3))
     for design in designs:
-        top.plot([], [], color="k", ls=LINES.get(design, ":"), label=design)
+        top.plot([], [], color="k", ls=LINE_STYLES.get(design, ":"), label=design)
     if targets:
         top.plot([], [], "kx", ms=7, mew=1.5, label="target")
     top.legend(frameon=False, loc="upper left")
@@ -85,7 +85,7 @@ def draw_pressure_sweep(
 def _draw(top: Axes, bottom: Axes, curve: Any, design: str, c: int) -> None:
     style: dict[str, Any] = {
         "color": COLOURS[c % len(COLOURS)],
-        "ls": LINES.get(design, ":"),
+        "ls": LINE_STYLES.get(design, ":"),
         "marker": MARKERS[c % len(MARKERS)],
         "ms": 4,
         "lw": 1.4,

@@ -20,7 +20,7 @@ from ..simulate.modes.rings import on_rings
 from ..tyre.section.mesh import SectionMesh
 
 Array = np.ndarray
-MAX_DISTANCE = 1e-3  # m, within which a node of another mesh stands for one of ours
+MAX_NODE_DISTANCE = 1e-3  # m, within which a node of another mesh stands for one of ours
 
 
 def placed(
@@ -37,7 +37,7 @@ def placed(
         return {}, []
     nodes, places = np.array(list(mesh.nodes)), np.array(list(mesh.nodes.values()))
     away, rows = cKDTree(known[0].points).query(places)
-    if away.max() > MAX_DISTANCE:
+    if away.max() > MAX_NODE_DISTANCE:
         return {}, []
     moved = dict(zip(mesh.nodes, evaluation.displacement[rows], strict=True))
     on_mesh = (HarmonicShape(s.n, nodes, places, s.amplitude[rows]) for s in known)

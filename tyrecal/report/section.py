@@ -24,12 +24,18 @@ from .words import MINUS, map_resolution
 Array = np.ndarray
 
 LETTERS = 110  # of all columns of the legend
-AXES_WIDTH, LINE, REST = 8.4, 0.2, 1.05  # inches: of the drawing, of a line of text, of all else
+AXES_WIDTH, LINE_HEIGHT, REST = (
+    8.4,
+    0.2,
+    1.05,
+)  # inches: of the drawing, of a line of text, of all else
 DETAIL = 4.0  # magnification of the belt's edge
 # of 40 steps: a colour bar of 50 or more would be a bitmap
-WARM = LinearSegmentedColormap.from_list("evidence", ["#EDEDED", "#F5C98A", "#D55E00"], 40)
+EVIDENCE_COLOURS = LinearSegmentedColormap.from_list(
+    "evidence", ["#EDEDED", "#F5C98A", "#D55E00"], 40
+)
 FULL_COLOUR = 5.0  # ln evidence
-AXES = {"xlabel": "z along the axle, mm", "ylabel": "r from the axle, mm"}
+AXIS_LABELS = {"xlabel": "z along the axle, mm", "ylabel": "r from the axle, mm"}
 
 
 @in_house_style
@@ -40,7 +46,7 @@ def draw_section(section: SectionData, name: str, pressure_kPa: float) -> Figure
     outline is dashed, at true scale.
     """
     figure = new_figure(9.0, 8.0)
-    axes = figure.add_subplot(aspect="equal", anchor="N", **AXES)
+    axes = figure.add_subplot(aspect="equal", anchor="N", **AXIS_LABELS)
     entries = _draw(axes, section, 1.0)
     axes.axvline(0, color=GREY, lw=0.8, ls=(0, (12, 3, 2, 3)))
     if section.inflated:
@@ -58,7 +64,7 @@ def draw_section(section: SectionData, name: str, pressure_kPa: float) -> Figure
     (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
     lines = name.count("\n") - (-len(entries) // columns)
     height = AXES_WIDTH * (high - low) / (right - left)
-    figure.set_figheight(height + REST + LINE * lines)
+    figure.set_figheight(height + REST + LINE_HEIGHT * lines)
     return figure
 
 
@@ -139,7 +145,7 @@ def draw_section_map(
     figure = new_figure(10.0 if table else 6.0, 5.2)
     widths = [5, 4] if table else [1]
     axes, *beside = figure.subplots(1, len(widths), squeeze=False, width_ratios=widths)[0]
-    axes.set(aspect="equal", **AXES)
+    axes.set(aspect="equal", **AXIS_LABELS)
     for name, cells in parts.areas.items():
         look: dict[str, Any] = {"fc": _colour(by_name.get(name)), "ec": "0.7", "lw": 0.3}
         axes.add_collection(PolyCollection(_all(cells), **look))
@@ -151,7 +157,7 @@ def draw_section_map(
     if effective_rank is not None:
         _write_table(beside[0], places, effective_rank)
     headline(figure, "One part changed alone: how well it explains what calibration leaves")
-    scale = ScalarMappable(Normalize(0, FULL_COLOUR), WARM)
+    scale = ScalarMappable(Normalize(0, FULL_COLOUR), EVIDENCE_COLOURS)
     bar = figure.colorbar(scale, ax=axes, orientation="horizontal", shrink=0.6, extend="max")
     bar.set_label("ln evidence against no change")
     return figure
@@ -174,7 +180,9 @@ def _write_table(axes: Axes, places: Sequence[PartChange], effective_rank: int) 
 
 
 def _colour(place: PartChange | None) -> tuple[float, ...]:
-    return WARM(0.0 if place is None else min(max(place.evidence, 0.0) / FULL_COLOUR, 1.0))
+    return EVIDENCE_COLOURS(
+        0.0 if place is None else min(max(place.evidence, 0.0) / FULL_COLOUR, 1.0)
+    )
 
 
 def _signed(value: float, digits: int) -> str:

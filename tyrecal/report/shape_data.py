@@ -22,7 +22,7 @@ from .revolve import placed, skin
 
 Array = np.ndarray
 Flat = list[float]  # points z, r in mm, one after the other
-DIGITS = 6  # of a shape, over its largest component
+SHAPE_DIGITS = 6  # of a shape, over its largest component
 TOLERANCE_HZ = 1e-6  # of a table's frequencies against the shapes'
 
 
@@ -303,5 +303,5 @@ def _line(place: Mapping[int, Array], nodes: Iterable[int]) -> list[float]:
     return _rounded(np.concatenate([place[n] for n in nodes]), 3)
 
 
-def _rounded(values: Any, digits: int = DIGITS) -> Any:
+def _rounded(values: Any, digits: int = SHAPE_DIGITS) -> Any:
     return (np.round(np.asarray(values, float), digits) + 0.0).tolist()  # no minus zero

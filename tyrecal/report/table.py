@@ -12,7 +12,7 @@ from rich.text import Text
 from ..studies.result import Cell, Column, Deviation, Table
 from .words import CLOSE, FAR
 
-NONE = "-"
+EMPTY_CELL = "-"
 
 
 def shown(table: Table, *sections: Table) -> rich.Table:
@@ -49,7 +49,7 @@ def _cell(cell: Cell) -> Text:
         off = abs(cell.percent)
         colour = "green" if off < CLOSE else "yellow" if off < FAR else "red"
         return Text(f"{cell.percent:+.2f}", colour)
-    return Text(NONE if cell is None else cell)
+    return Text(EMPTY_CELL if cell is None else cell)
 
 
 def solvers_table(solvers: Sequence[Mapping[str, Any]]) -> Table:

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ..simulate.modes.mode import Label
-from ..tyre.usual import MEASURED
+from ..tyre.usual import USUAL_MEASUREMENTS
 
 CLOSE, FAR = 2.0, 5.0  # % of deviation from a target
 MINUS = "\N{MINUS SIGN}"
@@ -75,7 +75,7 @@ def _starts(result: Mapping[str, Any]) -> str:
 def tyre_doubts(result: Mapping[str, Any]) -> list[str]:
     """What no tyre has of ``mass_kg`` and ``modes`` of a result."""
     doubts = []
-    if message := MEASURED["mass_kg"].refusal(result["mass_kg"]):
+    if message := USUAL_MEASUREMENTS["mass_kg"].refusal(result["mass_kg"]):
         doubts.append(
             f"the tyre weighs {result['mass_kg']:.4g} kg, {message.partition(';')[0]}: are"
             " densities and areas of cords in the units of their keys?"

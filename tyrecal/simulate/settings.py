@@ -18,7 +18,7 @@ from ..errors import InputError
 if TYPE_CHECKING:
     from pydantic import BaseModel
 
-FILE = "TYRECAL_SETTINGS"  # variable that names another settings file; empty: none
+SETTINGS_VARIABLE = "TYRECAL_SETTINGS"  # variable that names another settings file; empty: none
 COMMAND = "TYRECAL_SOLVER_COMMAND"  # of whichever solver is used
 SettingsModel = TypeVar("SettingsModel", bound="BaseModel")
 
@@ -29,8 +29,8 @@ class SettingsError(InputError):
 
 def place() -> Path | None:
     """The settings file, whether it is there or not; None where there shall be none."""
-    if FILE in os.environ:
-        return Path(os.environ[FILE]) if os.environ[FILE] else None
+    if SETTINGS_VARIABLE in os.environ:
+        return Path(os.environ[SETTINGS_VARIABLE]) if os.environ[SETTINGS_VARIABLE] else None
     from platformdirs import user_config_path
 
     return user_config_path("tyrecal", appauthor=False) / "settings.yaml"
@@ -57,7 +57,7 @@ def settings() -> Any:
     """The user's settings: ``commands`` {solver: words}; ``jobs``, ``solver``, ``output``, None
     where they are not set. Raises SettingsError."""
     path = place()
-    if path is None or (FILE not in os.environ and not path.exists()):
+    if path is None or (SETTINGS_VARIABLE not in os.environ and not path.exists()):
         return _read(None, 0.0)
     return _read(path, path.stat().st_mtime if path.exists() else 0.0)
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from .result import Result
 
-GROUP = "tyrecal.studies"
+STUDY_GROUP = "tyrecal.studies"
 RESULT_TYPES = {  # in the order of a page
     "fit": "tyrecal.studies.fit.result:FitResult",
     "modes": "tyrecal.studies.modes:ModesResult",
@@ -25,7 +25,7 @@ RESULT_TYPES = {  # in the order of a page
 
 def result_types() -> dict[str, type[Result]]:
     """By the name of the study, those from outside last."""
-    outside = {entry.name: entry.value for entry in entry_points(group=GROUP)}
+    outside = {entry.name: entry.value for entry in entry_points(group=STUDY_GROUP)}
     return {name: named(place) for name, place in {**RESULT_TYPES, **outside}.items()}
 
 

@@ -15,7 +15,7 @@ from ..tyre.case import LoadedCase
 from .loaded import Loaded, LoadedMode, LoadedTyre, LoadOutcome, load_tyres, progress
 from .modes import ModesFindings, ModesResult
 from .result import (
-    NAMED,
+    NAME_COLUMNS,
     Column,
     Failed,
     ModeEntry,
@@ -88,7 +88,7 @@ class LoadSweep(Result):
             ]
             for key in order
         ]
-        return Table([*NAMED, Column("symmetry", ""), *hertz], rows, f"{design}, Hz")
+        return Table([*NAME_COLUMNS, Column("symmetry", ""), *hertz], rows, f"{design}, Hz")
 
 
 def run(

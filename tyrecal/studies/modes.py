@@ -11,7 +11,7 @@ from ..simulate.evaluate.results import Evaluation
 from ..simulate.modes.find import labelled
 from ..simulate.modes.mode import Mode
 from ..tyre.case import LoadedCase
-from .result import NAMED, Column, ModeEntry, Result, ResultPart, Table
+from .result import NAME_COLUMNS, Column, ModeEntry, Result, ResultPart, Table
 
 EXTRA = {"symmetry": "", "member": "d", "clarity": ".2f", "overlap": ".2f"}  # forms
 
@@ -38,7 +38,7 @@ class ModesResult(Result):
     def tables(self) -> list[Table]:
         known = ("symmetry", "member", "clarity", "overlap")
         extra = [key for key in known if any(getattr(m, key) is not None for m in self.modes)]
-        columns = [*NAMED, Column("Hz"), *(Column(key, EXTRA[key]) for key in extra)]
+        columns = [*NAME_COLUMNS, Column("Hz"), *(Column(key, EXTRA[key]) for key in extra)]
         rows = [
             [
                 *m.named(),

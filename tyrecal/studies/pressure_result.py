@@ -15,7 +15,7 @@ from .modes import mode_entry
 from .pressure import Failure, PressureState, SweepOutcome, sweep
 from .pressure_findings import PressureFindings, findings
 from .result import (
-    NAMED,
+    NAME_COLUMNS,
     Column,
     Failed,
     ModeEntry,
@@ -61,7 +61,7 @@ class PressureSweep(Result):
         low, high = f"{found.from_kPa:g} kPa", f"{found.to_kPa:g} kPa"
         slope = Column(high, ".3f")
         columns = [
-            *NAMED,
+            *NAME_COLUMNS,
             hertz := Column(f"Hz, {low}"),
             Column(high),
             rise := Column("rise Hz", "+.2f"),
@@ -93,7 +93,7 @@ class PressureSweep(Result):
         tables = []
         for design in dict.fromkeys(row.design for row in self.rows):
             own = [row for row in self.rows if row.design == design]
-            columns = [*NAMED, *(Column(f"{row.pressure_kPa:.5g}") for row in own)]
+            columns = [*NAME_COLUMNS, *(Column(f"{row.pressure_kPa:.5g}") for row in own)]
             modes = {mode.label: mode for row in own for mode in row.modes}
             hertz = [{mode.label: mode.frequency_Hz for mode in row.modes} for row in own]
             rows = [

@@ -45,7 +45,7 @@ class Deviation:
 
 
 Cell = str | Deviation | None  # None: there is no value
-NAMED = (Column("mode", ""), Column("motion", ""))  # see `Named.named`
+NAME_COLUMNS = (Column("mode", ""), Column("motion", ""))  # see `Named.named`
 
 
 @dataclass(frozen=True)
@@ -215,7 +215,7 @@ class Named(ResultPart):
         return Label(self.c, self.m, self.kind)
 
     def named(self) -> list[str]:
-        """The cells of `NAMED`."""
+        """The cells of `NAME_COLUMNS`."""
         pair = " ×2" if getattr(self, "multiplicity", 1) > 1 else ""
         return [f"[{self.c},{self.m}]{pair}", self.label.motion]
 

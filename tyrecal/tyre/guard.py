@@ -11,7 +11,7 @@ from dataclasses import replace
 from math import sqrt
 from typing import TYPE_CHECKING, Any
 
-from .case.calibration import MEASURED as SIGMAS
+from .case.calibration import MEASURED_SIGMA as SIGMAS
 from .case.checks import at, find
 from .case.meshable import Problems
 from .case.mistakes import Keys, dotted

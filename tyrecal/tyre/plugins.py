@@ -1,13 +1,14 @@
 """Names of effects, the tool's own and those of installed packages; nothing is imported for them.
 
-Installed packages add theirs under the entry point group GROUP: the id, and where its `Effect` is.
+Installed packages add theirs under the entry point group EFFECT_GROUP: the id, and where its
+`Effect` is.
 """
 
 from __future__ import annotations
 
 from importlib.metadata import entry_points
 
-GROUP = "tyrecal.effects"
+EFFECT_GROUP = "tyrecal.effects"
 SPINDLE = ("spindle_lateral", "spindle_radial", "spindle_torsional", "spindle_tilt")
 # Each in a module of its own name, or in SPINDLE's; listed, and applied to a case, in this order.
 OWN = (
@@ -34,5 +35,5 @@ OWN = (
     "road_contact",
     "rotation",
 )
-ADDED = {entry.name: entry for entry in entry_points(group=GROUP) if entry.name not in OWN}
+ADDED = {entry.name: entry for entry in entry_points(group=EFFECT_GROUP) if entry.name not in OWN}
 IDS = (*OWN, *sorted(ADDED))

@@ -12,7 +12,7 @@ from math import pi
 
 from ..units import INCH, LOAD, PRESSURE, QUANTITIES
 
-ALIKE = 0.05  # readings that differ by less are one: bar and atm
+READING_RTOL = 0.05  # readings that differ by less are one: bar and atm
 Slips = Mapping[str, float | Callable[[float], float]]
 """What may have been written instead, and the factor, or the function, to the right unit."""
 
@@ -50,7 +50,7 @@ class Usual:
         found: dict[float, str] = {}
         for name, slip in self.slips.items():
             right = slip(value) if callable(slip) else slip * value
-            alike = any(abs(right - other) <= ALIKE * abs(other) for other in found)
+            alike = any(abs(right - other) <= READING_RTOL * abs(other) for other in found)
             if value and self.holds(right) and not alike:
                 found[right] = f"{value:g} {name}, {right:.4g}{unit}"
         return list(found.values())[:2]
@@ -66,7 +66,7 @@ STIFFNESS = QUANTITIES["vertical_stiffness_N_per_m"]
 LENGTH = {"mm": 1e-3, "cm": 1e-2, "inch": INCH}
 STRESS = {"MPa": 1e6, "GPa": 1e9, "kPa": 1e3, "bar": 1e5, "psi": 6894.757}
 DENSITY = {"g/cm3": 1e3, "t/mm3": 1e12, "kg/mm3": 1e9, "lb/in3": 27679.9, "lb/ft3": 16.0185}
-MASS = {"g": 1e-3, "t": 1e3}
+MASS_UNITS = {"g": 1e-3, "t": 1e3}
 INERTIA = {"kg mm2": 1e-6, "kg cm2": 1e-4, "t mm2": 1e-3}
 COMPLIANCE: Slips = {
     "N/m of stiffness": inverse(1.0),
@@ -84,11 +84,11 @@ TURNING: Slips = {
 ANGLE = {"rad": 180 / pi}
 FROM_CIRCUMFERENCE: Slips = {**ANGLE, "degrees from the circumference": lambda a: 90 - a}
 SHARE = {"%": 0.01}
-SPIN = {"rpm": pi / 30, "degrees/s": pi / 180}
+SPIN_UNITS = {"rpm": pi / 30, "degrees/s": pi / 180}
 CELSIUS: Slips = {"K": lambda T: T - 273.15, "degrees Fahrenheit": lambda T: (T - 32) / 1.8}
 
 # of measured values, in the units of the measurements CSV
-MEASURED = {
+USUAL_MEASUREMENTS = {
     "frequency_Hz": Usual(2, 1000, "Hz", FREQUENCY),
     "contact_area_m2": Usual(1e-4, 0.5, "m2", AREA),
     "vertical_stiffness_N_per_m": Usual(1e4, 1e7, "N/m", STIFFNESS),
@@ -140,7 +140,7 @@ USUAL: dict[str, Usual] = {
     "rebar_layers.*.spacing_deg": Usual(0.01, 5, "degrees", ANGLE),
     "rim.reference_point_m.r": Usual(-1, 1, "m", LENGTH),
     "rim.reference_point_m.z": Usual(-1, 1, "m", LENGTH),
-    "rim.mass_kg": Usual(1, 200, "kg", MASS),
+    "rim.mass_kg": Usual(1, 200, "kg", MASS_UNITS),
     "rim.polar_inertia_kg_m2": Usual(0.01, 30, "kg m2", INERTIA),
     "rim.diametral_inertia_kg_m2": Usual(0.01, 30, "kg m2", INERTIA),
     "rim.spindle.lateral_m_per_N": Usual(0, 1e-5, "m/N", COMPLIANCE, least=1e-10),
@@ -149,8 +149,8 @@ USUAL: dict[str, Usual] = {
     "rim.spindle.tilt_rad_per_N_m": Usual(0, 1e-3, "rad/(N m)", TURNING, least=1e-9),
     "cavity.temperature_C": Usual(-50, 150, "degrees Celsius", CELSIUS),
     "cavity.share": Usual(0, 2, "", SHARE),
-    "spin_rad_per_s": Usual(0, 300, "rad/s", SPIN),
-    "point_mass.mass_kg": Usual(0, 2, "kg", MASS),
+    "spin_rad_per_s": Usual(0, 300, "rad/s", SPIN_UNITS),
+    "point_mass.mass_kg": Usual(0, 2, "kg", MASS_UNITS),
     "point_mass.z_m": Usual(-0.3, 0.3, "m", LENGTH),
     "road_spring.radial_N_per_m": Usual(0, 5e6, "N/m", STIFFNESS, least=100),
     "road_spring.lateral_N_per_m": Usual(0, 5e6, "N/m", STIFFNESS, least=100),
@@ -162,11 +162,13 @@ USUAL: dict[str, Usual] = {
     "road.stiffness_Pa_per_m": Usual(1e8, 1e13, "Pa/m", {"MPa/mm, or N/mm3": 1e9}),
     "road.elastic_slip_m": Usual(1e-6, 1e-2, "m", LENGTH),
     "road.loads_N.*": Usual(100, 6e4, "N", LOAD),
-    "targets.modes.*.frequency_Hz": MEASURED["frequency_Hz"],
+    "targets.modes.*.frequency_Hz": USUAL_MEASUREMENTS["frequency_Hz"],
     "targets.modes.*.weight": Usual(0, 1e4, "", least=1e-4),
     "targets.footprint.*.load_N": Usual(100, 6e4, "N", LOAD),
-    "targets.footprint.*.contact_area_m2": MEASURED["contact_area_m2"],
-    "targets.footprint.*.vertical_stiffness_N_per_m": MEASURED["vertical_stiffness_N_per_m"],
+    "targets.footprint.*.contact_area_m2": USUAL_MEASUREMENTS["contact_area_m2"],
+    "targets.footprint.*.vertical_stiffness_N_per_m": USUAL_MEASUREMENTS[
+        "vertical_stiffness_N_per_m"
+    ],
     "targets.footprint.*.weight": Usual(0, 1e4, "", least=1e-4),
     "uncertainties.*.percent": Usual(0.001, 100, "%"),
     "solver.time_limit_s": Usual(1, 1e6, "s"),
@@ -178,10 +180,10 @@ BELT_ANGLE = Usual(25, 155, "degrees from the meridian", FROM_CIRCUMFERENCE)
 OF_EFFECTS: dict[str, Slips] = {
     "": SHARE,
     "m": LENGTH,
-    "kg": MASS,
+    "kg": MASS_UNITS,
     "N/m": STIFFNESS,
     "kPa": PRESSURE,
-    "rad/s": SPIN,
+    "rad/s": SPIN_UNITS,
     "m/N": COMPLIANCE,
     "rad/(N m)": TURNING,
     "degrees": ANGLE,

@@ -1,9 +1,9 @@
 """The air in the tyre's cavity as an acoustic medium, per circumferential harmonic.
 
-Its pressure is p = sum_k P_k psi_k(r, z) exp(i n theta), psi_k monomials of (r, z) up to DEGREE:
-exact for plane waves round a thin torus and for air that a rigid wheel carries along; for the flow
-across the section, whose own waves are above 700 Hz, right to 3e-5 of the tyre's frequencies.
-Weakly,
+Its pressure is p = sum_k P_k psi_k(r, z) exp(i n theta), psi_k monomials of (r, z) up to the degree
+MONOMIAL_DEGREE: exact for plane waves round a thin torus and for air that a rigid wheel carries
+along; for the flow across the section, whose own waves are above 700 Hz, right to 3e-5 of the
+tyre's frequencies. Weakly,
 
     Q P'' + H P = -C u'',    Q = 1/B int psi psi dV,  H = 1/rho int grad psi . grad psi dV,
                              C u = int psi u . n dA   (volume that the wall sweeps, weighted)
@@ -29,11 +29,11 @@ from ..section import elements
 from ..section.elements import Lines
 from ..section.materials import Scalar, read_materials
 from ..section.mesh import DeckMesh
-from ..section.parts.frame import SPIN, cross
+from ..section.parts.frame import SPIN_AXIS, cross
 from ..section.parts.pressure import surface_point
 
 Array = np.ndarray
-DEGREE = 4
+MONOMIAL_DEGREE = 4
 POINTS_ALONG = 6  # points of a line of the wall; the well is one line
 GAUSS = np.polynomial.legendre.leggauss(7)
 ACROSS, ACROSS_WEIGHTS = (GAUSS[0] + 1) / 2, GAUSS[1] / 2
@@ -98,7 +98,7 @@ def coupling(air: GasCavity, X: Array, U: Array, n: int) -> Coupling:
     for (lines, x, dx), r in zip(wall, radii, strict=True):
         z, dz = x[..., 2], dx[..., 2]
         psi, _ = _monomials(r, z, box)
-        swept = cross(dx, x @ SPIN.T) * lines.weights[..., None]  # n dA
+        swept = cross(dx, x @ SPIN_AXIS.T) * lines.weights[..., None]  # n dA
         parts = np.einsum("egk,egi,ga->keai", psi, swept, lines.N)
         for k, part in enumerate(parts):
             np.add.at(C[k], lines.connectivity, part)
@@ -119,7 +119,7 @@ def _integral(weights: Array, f: Array) -> Array:
 
 
 def _count() -> int:
-    return (DEGREE + 1) * (DEGREE + 2) // 2
+    return (MONOMIAL_DEGREE + 1) * (MONOMIAL_DEGREE + 2) // 2
 
 
 def _middle(values: list[Array]) -> tuple[float, float]:
@@ -133,7 +133,7 @@ def _monomials(r: Array, z: Array, box: list[tuple[float, float]]) -> tuple[Arra
     """Values (..., k) and slopes (..., k, 2) of x^i y^j, the constant first; x and y from -1 to 1
     over the section's box."""
     x, y = ((p - middle) / half for p, (middle, half) in zip((r, z), box, strict=True))
-    powers = [(d - j, j) for d in range(DEGREE + 1) for j in range(d + 1)]
+    powers = [(d - j, j) for d in range(MONOMIAL_DEGREE + 1) for j in range(d + 1)]
     values = np.stack([x**i * y**j for i, j in powers], -1)
     by_x = np.stack([i * x ** max(i - 1, 0) * y**j for i, j in powers], -1)
     by_y = np.stack([j * x**i * y ** max(j - 1, 0) for i, j in powers], -1)

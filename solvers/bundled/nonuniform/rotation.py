@@ -23,7 +23,7 @@ from scipy.optimize import linear_sum_assignment
 from ..deck.keywords import COMPLEX_STEP
 from ..modes.harmonics import HarmonicModes, SeededTyre, Vibration
 from ..section.mechanics import mass_matrices
-from ..section.parts.frame import SPIN
+from ..section.parts.frame import SPIN_AXIS
 from .coupled import Family, ritz, split
 
 Array = np.ndarray
@@ -84,7 +84,9 @@ class Whirl:
         for connectivity, M in mass_matrices(change.model):
             if np.iscomplexobj(M):
                 u = self.shapes[:, connectivity]
-                turned = np.einsum("meai,eab,ij,mebj->m", u.conj(), M.imag / COMPLEX_STEP, SPIN, u)
+                turned = np.einsum(
+                    "meai,eab,ij,mebj->m", u.conj(), M.imag / COMPLEX_STEP, SPIN_AXIS, u
+                )
                 by_spin = by_spin + (2j * self.spin * turned).real
         slope = (forms + self.omega * by_spin) / (2 * self.omega - self.coriolis)
         return np.asarray(2 * self.fixed * (slope - self.n * faster))
@@ -116,7 +118,7 @@ def _basis(vibration: Vibration, spin: float, n: int, count: int) -> Family:
 def _turned(vibration: Vibration, x: Array) -> Array:
     """e_z x u for (size, b)."""
     full = vibration.numbering.spread(x)
-    return vibration.numbering.gather(np.einsum("ij,njb->nib", SPIN, full))
+    return vibration.numbering.gather(np.einsum("ij,njb->nib", SPIN_AXIS, full))
 
 
 def _coriolis(vibration: Vibration, spin: float, family: Family) -> Array:

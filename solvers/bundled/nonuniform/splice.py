@@ -31,7 +31,7 @@ from .coupled import split, tell
 
 Array = np.ndarray
 SPARE_HARMONICS = 2  # harmonics beyond the highest wanted whose modes may lie close to wanted ones
-EXTRA_HARMONICS = 6  # harmonics of the displacements beyond the highest wanted
+EXTRA_SHAPE_HARMONICS = 6  # harmonics of the displacements beyond the highest wanted
 FORCE_RTOL = 1e-9  # out-of-balance force over the rim's
 MAX_ITERATIONS = 20
 LINEAR_RTOL = 1e-4  # of each step of Newton's method
@@ -134,7 +134,7 @@ def sector_modes(
     harmonics: list[int],
     count: int,
     check: Callable[[], None] = lambda: None,
-    beyond: int = EXTRA_HARMONICS,
+    beyond: int = EXTRA_SHAPE_HARMONICS,
 ) -> list[HarmonicModes]:
     """The ``count`` lowest modes of each harmonic of a tyre with a sector of other stuff.
 

@@ -17,7 +17,7 @@ from scipy.linalg.lapack import spotrf, strtrs
 
 from ..section.band import Indefinite
 from ..solid3d.circumference import Circumference
-from .half_turn_symmetry import MIRROR, HalfTurn, NotSymmetric
+from .half_turn_symmetry import MIRROR_SIGNS, HalfTurn, NotSymmetric
 
 Array = np.ndarray
 Tangents = list[tuple[Array, Array, Array, Array]]
@@ -290,7 +290,7 @@ def _tables(front: _Front, kinds: list[Array]) -> tuple[Array, Array]:
     same, cross = np.zeros((2, n + 3, n + 3, kinds[0].shape[-1]), np.float32)  # a spare: held nodes
     for chosen, kind in zip(front.elements, kinds, strict=True):
         for element, image, order, place in zip(*chosen, strict=True):
-            sign = np.tile(MIRROR, len(order)).astype(np.float32)
+            sign = np.tile(MIRROR_SIGNS, len(order)).astype(np.float32)
             there = kind[image][np.ix_(_dofs(order), _dofs(order))]
             there *= np.multiply.outer(sign, sign)[..., None]
             pairs = np.ix_(_dofs(place), _dofs(place))

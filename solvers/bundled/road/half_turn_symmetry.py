@@ -17,7 +17,7 @@ import numpy as np
 from ..section.mesh import DeckMesh
 
 Array = np.ndarray
-MIRROR = np.array([1.0, 1.0, -1.0])
+MIRROR_SIGNS = np.array([1.0, 1.0, -1.0])
 HALF_TURN = np.array([1.0, -1.0, -1.0])  # about the vertical: r, theta, z
 SAME_PLACE = 1e-6  # m
 
@@ -63,25 +63,25 @@ class HalfTurn:
     def spread(self, parts: Array) -> Array:
         """The field of two parts (2, k, q, 3)."""
         U = np.empty(self.shape)
-        U[:, self.beyond] = self.parity * MIRROR * (parts[0] - parts[1])
+        U[:, self.beyond] = self.parity * MIRROR_SIGNS * (parts[0] - parts[1])
         U[:, self.nodes] = parts[0] + parts[1]  # nodes of the middle keep the sum
         return U
 
     def gather(self, F: Array) -> Array:
         """Its transpose: forces on the two parts, zero on what is held."""
-        here, there = F[:, self.nodes], self.parity * MIRROR * F[:, self.beyond]
+        here, there = F[:, self.nodes], self.parity * MIRROR_SIGNS * F[:, self.beyond]
         there[:, self._middle] = 0.0
         return np.stack([here + there, here - there]) * self.mask
 
     def parts(self, U: Array) -> Array:
         """The two parts of a field that has the symmetry."""
-        here, there = U[:, self.nodes], self.parity * MIRROR * U[:, self.beyond]
+        here, there = U[:, self.nodes], self.parity * MIRROR_SIGNS * U[:, self.beyond]
         return np.stack([here + there, here - there]) / 2
 
     def blocks(self, stiffness: Array) -> Array:
         """Of stiffness at single nodes (k, n, 3, 3), what acts on the parts (k, q, 6, 6)."""
         here = stiffness[:, self.nodes]
-        there = stiffness[:, self.beyond] * np.multiply.outer(MIRROR, MIRROR)
+        there = stiffness[:, self.beyond] * np.multiply.outer(MIRROR_SIGNS, MIRROR_SIGNS)
         there[:, self._middle] = 0.0
         same, cross = here + there, here - there
         free = self.mask.transpose(1, 2, 0, 3).reshape(*same.shape[:2], 6)

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..section.elements import Lines
 from ..section.model import Model
-from ..section.parts.frame import SPIN, cross
+from ..section.parts.frame import SPIN_AXIS, cross
 from ..section.parts.part import Precision, TyrePart
 from ..section.parts.pressure import Pressure
 from .circumference import Circumference
@@ -68,7 +68,7 @@ class Revolved:
         u, du = self._stations(self._U)
         part = Pressure(lines, 1.0).at_stations(len(self.model.mesh.X))
         x, dx, around = part.place(u, du)
-        density = np.linalg.norm(cross(dx, around + x @ SPIN.T), axis=-1)
+        density = np.linalg.norm(cross(dx, around + x @ SPIN_AXIS.T), axis=-1)
         by_node = np.einsum("ega,eg,egs->eas", part.N, lines.weights, density)
         shares = np.zeros((len(self.model.mesh.X), u.shape[1]))
         np.add.at(shares, lines.connectivity, by_node)

@@ -350,7 +350,7 @@ def test_a_page_too_large_and_places_not_to_write_to(
     assert other.read_text() == "precious"
     with pytest.raises(InputError, match="is a folder"):
         write_page(tmp_path, [folder])
-    monkeypatch.setattr(page_module, "MAX_BYTES", 1000)
+    monkeypatch.setattr(page_module, "MAX_PAGE_BYTES", 1000)
     with pytest.raises(InputError, match="give fewer folders"):
         write_page(tmp_path / "large.html", [folder])
     assert not (tmp_path / "large.html").exists()

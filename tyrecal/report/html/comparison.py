@@ -8,10 +8,10 @@ from functools import partial
 from typing import TypeVar
 
 from ...studies.diagnose.summary import DiagnosisResult
-from ...studies.fit.result import QUANTITIES, FitResult, FittedMode
+from ...studies.fit.result import ROAD_QUANTITIES, FitResult, FittedMode
 from ..words import CLOSE, FAR, MINUS
 from .results import Results
-from .summary import VERDICTS
+from .summary import VERDICT_WORDS
 
 Content = TypeVar("Content")
 NOTHING, NB = "–", "\N{NO-BREAK SPACE}"
@@ -71,7 +71,7 @@ def _whole(fits: Sequence[FitResult | None]) -> Iterator[Row]:
 
 
 def _verdicts(diagnoses: Sequence[DiagnosisResult | None]) -> Iterator[Row]:
-    yield Row("verdict", "", _cells(diagnoses, lambda d: VERDICTS[d.verdict]))
+    yield Row("verdict", "", _cells(diagnoses, lambda d: VERDICT_WORDS[d.verdict]))
     yield Row("likeliest", "probability", _cells(diagnoses, _likeliest))
 
 
@@ -112,7 +112,10 @@ def _variable(fit: FitResult, name: str) -> str:
 def _deviations(fit: FitResult) -> dict[tuple[str, str], float]:
     """In %, by what was aimed at."""
     return {_aim(mode): mode.deviation_percent for mode in fit.modes} | {
-        (f"{each.load_N:g} N", QUANTITIES[each.quantity].name.split(",")[0]): each.deviation_percent
+        (
+            f"{each.load_N:g} N",
+            ROAD_QUANTITIES[each.quantity].name.split(",")[0],
+        ): each.deviation_percent
         for each in fit.footprint
     }
 

@@ -26,7 +26,7 @@ from ...studies.modes import ModesResult
 from ...studies.pressure_result import PressureSweep
 from ...studies.result import Deviation, Named, Result
 from ..convergence import draw_convergence, draw_deviations
-from ..diagnosis_pictures import MAX_SHOWN, MIN_PROBABILITY, draw_residuals
+from ..diagnosis_pictures import MAX_SHOWN, MIN_SHOWN_PROBABILITY, draw_residuals
 from ..figure import svg
 from ..footprint import draw_curves, draw_patches
 from ..load import draw_load_sweep
@@ -38,9 +38,9 @@ from .comparison import comparison
 from .markdown import html
 from .results import Results, read_results
 from .shapes import packed
-from .summary import VERDICTS, sentence, summary
+from .summary import VERDICT_WORDS, sentence, summary
 
-MAX_BYTES = 5_000_000
+MAX_PAGE_BYTES = 5_000_000
 MARK = '<meta name="generator" content="tyrecal report">'
 
 
@@ -65,7 +65,7 @@ def write_page(path: Path, folders: Sequence[Path]) -> Page:
     except UnicodeEncodeError:
         raise InputError("a name in the results is no text") from None
     size = len(content)
-    if size > MAX_BYTES:
+    if size > MAX_PAGE_BYTES:
         raise InputError(
             f"the page would have {size / 1e6:.1f} MB, more than 5: give fewer folders"
         )
@@ -248,11 +248,11 @@ def _diagnosis(found: Results, draw: Draw) -> dict[str, Any]:
     percent = np.array([[each.percent, each.sigma_percent] for _, each in known]).T / 100
     return {
         "of": d,
-        "verdict": VERDICTS[d.verdict],
+        "verdict": VERDICT_WORDS[d.verdict],
         "likeliest": [
             (key, p)
             for key, p in list(d.probabilities.items())[:MAX_SHOWN]
-            if p >= MIN_PROBABILITY or key in ("none", "outside")
+            if p >= MIN_SHOWN_PROBABILITY or key in ("none", "outside")
         ],
         "words": html(found.diagnosis_words),
         "map": drawn,

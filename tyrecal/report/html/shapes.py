@@ -11,7 +11,7 @@ from ...simulate.modes.mode import Label
 from ..shape_data import Shape, Shapes
 
 INT16_MAX = 32767
-ANGLES = 60  # round the circumference, in the page
+PAGE_ANGLES = 60  # round the circumference, in the page
 
 
 def packed(shapes: Shapes) -> dict[str, Any]:
@@ -35,7 +35,7 @@ def _swept(shapes: Shapes) -> dict[str, Any]:
     return {
         "kind": "swept",
         "points": len(R),
-        "angles": ANGLES,
+        "angles": PAGE_ANGLES,
         "place": _base64(np.stack([R, Z]) / radius),
         "modes": modes,
     }

@@ -13,7 +13,7 @@ from ...studies.result import Result
 from ...units import said
 from ..words import nearness
 
-VERDICTS = {
+VERDICT_WORDS = {
     "named": "Named",
     "undecided": "Undecided",
     "no_gap": "No gap is seen",
@@ -64,7 +64,7 @@ def modes_words(modes: ModesResult) -> list[str]:
 def diagnosis_words(found: DiagnosisResult) -> list[str]:
     """Verdict, size, how far the error shrinks, what next."""
     gap = found.verdict != "no_gap"
-    words = [sentence(VERDICTS[found.verdict] + (f": {found.words}" if gap else ""))]
+    words = [sentence(VERDICT_WORDS[found.verdict] + (f": {found.words}" if gap else ""))]
     if found.effect:
         words[0] += f" Probability {found.probabilities.get(found.effect, 0.0):.2f}."
     if found.effect and found.parameter:

@@ -20,7 +20,7 @@ from ...tyre.templates import TemplateFailed, environment, render
 
 CPU_S, WALL_S = 5, 60.0  # of one template; shipped ones take a tenth of a second
 MEMORY = 2_000_000_000  # bytes of address space, where the system limits it
-LARGEST = 50_000_000  # bytes of text
+MAX_TEXT_BYTES = 50_000_000  # bytes of text
 GOOD, BAD = b"+", b"-"
 _own = threading.local()
 
@@ -44,12 +44,12 @@ class Apart:
             process.stdin.write(len(asked).to_bytes(8, "big") + asked)
             process.stdin.flush()
             kind = process.stdout.read(1)
-            text = _read(process.stdout, LARGEST)
+            text = _read(process.stdout, MAX_TEXT_BYTES)
         except (OSError, ValueError, EOFError):
             _end(process)
             raise TemplateFailed(
                 f"template '{template}' was stopped: it takes more than {CPU_S} s of a core,"
-                f" {MEMORY / 1e9:g} GB of memory or {LARGEST / 1e6:g} MB of text"
+                f" {MEMORY / 1e9:g} GB of memory or {MAX_TEXT_BYTES / 1e6:g} MB of text"
             ) from None
         except BaseException:  # its answer must not be taken for that to the next question
             _end(process)

@@ -13,7 +13,7 @@ from ...tyre.templates import TemplateFailed
 from .abaqus import claimed, deck_name, solid_claims
 from .sector import INNER_FACE, Sector, build_sector
 
-ELEMENTS = ("C3D20R", "C3D20", "C3D8")
+ELEMENT_TYPES = ("C3D20R", "C3D20", "C3D8")
 PLY_THICKNESS_M = 2e-4
 # Of each of the case's sectors: with C3D20R of 6 degrees, 40 mm at the crown, CalculiX found no
 # inflated state for rubber of half the paper's C10.
@@ -30,9 +30,9 @@ def calculix_context(tyre: Tyre) -> dict[str, Any]:
             "analysis.vibration_frequency_Hz must be null: CalculiX cannot evaluate hyperelastic"
             " rubber at a frequency"
         )
-    element = c.solver.options.get("element", ELEMENTS[0])
+    element = c.solver.options.get("element", ELEMENT_TYPES[0])
     thickness = c.solver.options.get("ply_thickness_m", PLY_THICKNESS_M)
-    if element not in ELEMENTS:
+    if element not in ELEMENT_TYPES:
         raise TemplateFailed(
             f"solver.options.element is '{element}', must be C3D20R, C3D20 or C3D8"
         )

@@ -7,7 +7,7 @@ from ...tyre.case.identity import tyre_sha256
 
 LONGEST_NAME = 200  # of a case, as a line of a deck has at most 256 characters
 FIRST = b"** Written by tyrecal: "
-LINES = 3
+HEADER_LINES = 3
 
 
 def header(case: LoadedCase) -> str:
@@ -26,4 +26,4 @@ def header(case: LoadedCase) -> str:
 
 def without_header(text: bytes) -> bytes:
     """A file of a run, a deck without what it is called: what the solver is asked."""
-    return text.split(b"\n", LINES)[-1] if text.startswith(FIRST) else text
+    return text.split(b"\n", HEADER_LINES)[-1] if text.startswith(FIRST) else text

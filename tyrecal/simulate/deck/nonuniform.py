@@ -7,14 +7,14 @@ from typing import Any
 from ...tyre.case import Case
 from ...tyre.section.mesh import SectionMesh
 
-ELEMENT = 999_100_001  # beyond all that a revolve makes
+FIRST_ATTACHED_ELEMENT = 999_100_001  # beyond all that a revolve makes
 AXES = {"radial": 1, "lateral": 2, "tangential": 3}  # of the revolved tyre in the plane Theta = 0
 
 
 def attached(c: Case, mesh: SectionMesh) -> list[dict[str, Any]]:
     """Mass and spring elements on nodes of the tread: name, keyword, elements, lines of data."""
     groups: list[tuple[str, str, list[int], tuple[int, float] | None]] = []
-    number = ELEMENT
+    number = FIRST_ATTACHED_ELEMENT
     if c.point_mass.mass_kg:
         groups.append(("POINT_MASS", "MASS", _nodes(mesh, c.point_mass.z_m, 0.0), None))
     for direction, stiffness in c.road_spring.stiffnesses.items():

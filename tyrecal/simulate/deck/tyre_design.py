@@ -18,8 +18,8 @@ from .header import header
 from .wheel_and_gas import aside
 
 NEAR_ZERO = 1e-4  # of a variable's span: below, steps are shares of this
-STEP = 1e-4  # of a variable, to see which numbers of the deck it moves and how fast
-OUTSIDE = re.compile(  # but for comments: an absolute path or one upwards, code of one's own
+DECK_STEP = 1e-4  # of a variable, to see which numbers of the deck it moves and how fast
+LEADS_OUTSIDE = re.compile(  # but for comments: an absolute path or one upwards, code of one's own
     r"^(?!\*\*).*=[ \t]*[\"']?(?:[/\\~@]|\.\.|[a-z]:[/\\]).*|^\*[ \t]*USER[ \t]*SUBROUTINE.*",
     re.MULTILINE | re.IGNORECASE,
 )
@@ -95,7 +95,7 @@ class TyreDesign:
             effect = catalogue()[name.removeprefix("effects.")]
             span = max(abs(effect.low), abs(effect.high))
             least = NEAR_ZERO * span
-        moved = value + side * STEP * (max(abs(value), least) if value else span)
+        moved = value + side * DECK_STEP * (max(abs(value), least) if value else span)
         if moved * value < 0:
             moved = value
         try:
@@ -117,7 +117,7 @@ class TyreDesign:
 def _refuse_outside(file: str, text: str) -> None:
     """Raises TemplateFailed where a deck of somebody's own templates would have the solver read or
     write elsewhere than in its run folder, compile a program or load a library."""
-    for found in OUTSIDE.finditer(text):
+    for found in LEADS_OUTSIDE.finditer(text):
         line = text.count("\n", 0, found.start()) + 1
         raise TemplateFailed(
             f"{file}, line {line}: '{found[0].strip():.60}' leads out of the run's folder"

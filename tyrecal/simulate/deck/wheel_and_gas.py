@@ -12,7 +12,7 @@ from ...tyre.case.materials import Rubber
 from ...tyre.case.wheel import Rim
 from ...tyre.resolve import Tyre
 
-ELEMENT = 999_000_001  # beyond all that a revolve makes
+FIRST_WHEEL_ELEMENT = 999_000_001  # beyond all that a revolve makes
 LOWEST_HZ, SHIFT = 1.0, -100.0  # of a free wheel's modes: above its rigid motions; 1/s2
 GAS = "CAVITY_GAS"
 ATMOSPHERE = 101_325.0  # Pa
@@ -54,12 +54,14 @@ def wheel(rim: Rim) -> dict[str, Any]:
         for dof in dofs
         if compliance
     ]
-    numbered = [{**spring, "element": ELEMENT + 2 + i} for i, spring in enumerate(springs)]
+    numbered = [
+        {**spring, "element": FIRST_WHEEL_ELEMENT + 2 + i} for i, spring in enumerate(springs)
+    ]
     moving = {spring["dof"] for spring in springs}
     return {
-        "mass": {"element": ELEMENT, "value": rim.mass_kg},
+        "mass": {"element": FIRST_WHEEL_ELEMENT, "value": rim.mass_kg},
         "inertia": {
-            "element": ELEMENT + 1,
+            "element": FIRST_WHEEL_ELEMENT + 1,
             "polar": rim.polar_inertia_kg_m2,
             "diametral": rim.diametral_inertia_kg_m2,
         },

@@ -13,7 +13,7 @@ from threadpoolctl import threadpool_limits
 from .failure import SolverUnavailable, WorkerLost
 from .sources import sources
 
-PATIENCE_S = 20.0  # for a scheduler to answer
+SCHEDULER_PATIENCE_S = 20.0  # for a scheduler to answer
 log = logging.getLogger("tyrecal")
 
 
@@ -69,7 +69,7 @@ def connected(address: str) -> Iterator[Cluster]:
     except ImportError:
         raise SolverUnavailable("clusters need the extra: pip install 'tyrecal[cluster]'") from None
     try:
-        client = Client(address, timeout=PATIENCE_S, set_as_default=False)
+        client = Client(address, timeout=SCHEDULER_PATIENCE_S, set_as_default=False)
     except (OSError, ValueError) as error:
         raise SolverUnavailable(f"no Dask scheduler answers at '{address}': {error}") from None
     try:

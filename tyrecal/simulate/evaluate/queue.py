@@ -18,7 +18,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from ..settings import typed
 from .failure import SolverUnavailable
 
-THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS")
+THREAD_VARIABLES = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS")
 
 
 class QueueSettings(BaseModel):
@@ -76,7 +76,10 @@ def jobs_of(settings: QueueSettings) -> Any:
         "job_name": "tyrecal",
         "death_timeout": 600,
         "job_extra_directives": settings.directives,
-        "job_script_prologue": [*(f"export {name}=1" for name in THREADS), *settings.prologue],
+        "job_script_prologue": [
+            *(f"export {name}=1" for name in THREAD_VARIABLES),
+            *settings.prologue,
+        ],
     }
     if settings.queueing_system == "local":
         given["job_script_prologue"] = []  # its jobs are commands, not scripts

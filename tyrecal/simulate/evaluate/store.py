@@ -28,8 +28,8 @@ from .recorded import check
 from .solver import Solver
 
 FORMAT = "2"
-MOST_BYTES = 2_000_000_000
-LARGEST = 500_000_000  # bytes of one record
+MAX_STORE_BYTES = 2_000_000_000
+MAX_RECORD_BYTES = 500_000_000  # bytes of one record
 LEFTOVER_S = 3600.0  # age of a half-written file whose writer must be dead
 log = logging.getLogger("tyrecal")
 
@@ -108,7 +108,7 @@ class Store:
         path = self.path(key)
         try:
             data = pack(key, about, content)
-            if len(data) > LARGEST:
+            if len(data) > MAX_RECORD_BYTES:
                 raise ValueError(f"an answer of {len(data) / 1e6:.0f} MB is too large")
             self.folder.mkdir(parents=True, exist_ok=True)
             own_folder(path.parent)
@@ -119,7 +119,7 @@ class Store:
                 log.warning("evaluations are not recorded in '%s': %s", self.folder, error)
             self._warned = True
 
-    def prune(self, most_bytes: int = MOST_BYTES) -> int:
+    def prune(self, most_bytes: int = MAX_STORE_BYTES) -> int:
         """Remove what was least recently used until the store fits; the number removed.
 
         What this run wrote or read stays. Damaged records and leftovers of killed writers go.
@@ -193,7 +193,7 @@ def _about(path: Path) -> dict[str, Any]:
     """The record's first facts, without its arrays."""
     with open_file(path, follow=False) as file:
         file.seek(DIGEST)
-        about: dict[str, Any] = json.loads(file.readline(LARGEST))["about"]
+        about: dict[str, Any] = json.loads(file.readline(MAX_RECORD_BYTES))["about"]
         return about
 
 
@@ -203,7 +203,7 @@ def _read(path: Path) -> tuple[dict[str, Any], Any]:
     Raises Damaged; OSError where there is none, or it may not be read.
     """
     try:
-        about, content = unpack(read_bytes(path, LARGEST, follow=False), path.stem)
+        about, content = unpack(read_bytes(path, MAX_RECORD_BYTES, follow=False), path.stem)
     except NotAFile as error:
         raise Damaged(f"it {error.strerror}") from None
     check(content)

@@ -35,7 +35,9 @@ HIGHEST_HARMONIC = 12  # that is looked for in sampled shapes
 SUBSTANTIAL = 0.2  # share of the belt's motion below which a mode cannot claim an order
 TAKES_PART = 0.1  # the belt's mean square motion over that of all points, likewise
 
-AXIAL = 4  # column of z P0 on c = 0; columns 0 to 3 are the orders, 0 on c = 0 being theta P0
+AXIAL_COLUMN = (
+    4  # column of z P0 on c = 0; columns 0 to 3 are the orders, 0 on c = 0 being theta P0
+)
 PARITY = (0, 1, 0, 1, 1)  # axial motion is the c = 0 member of the out-of-plane family
 
 
@@ -47,7 +49,7 @@ def _columns(c_is_zero: bool) -> Array:
         if k < DEGREE:
             table[2, k, k + 1] = 1.0
     if c_is_zero:
-        table[0, 0], table[2, 0] = np.eye(5)[2], np.eye(5)[AXIAL]
+        table[0, 0], table[2, 0] = np.eye(5)[2], np.eye(5)[AXIAL_COLUMN]
     return table
 
 
@@ -115,7 +117,7 @@ def label_modes(evaluation_modes: Sequence[RawMode]) -> list[Mode]:
             for row, column in zip(*linear_sum_assignment(weight, maximize=True), strict=True)
             if weight[row, column] > 0
         }
-        taken = {column for column in claims.values() if column != AXIAL}
+        taken = {column for column in claims.values() if column != AXIAL_COLUMN}
         for row, i in enumerate(members):
             column = claims.get(row)
             if column is None:
@@ -181,8 +183,8 @@ def pair_rings(modes: Sequence[RawMode], tolerance: float = 5e-3) -> list[RawMod
 
 
 def _label(c: int, column: int) -> Label:
-    if c == 0 and column in (0, AXIAL):
-        return Label(0, 0, "axial" if column == AXIAL else "torsional")
+    if c == 0 and column in (0, AXIAL_COLUMN):
+        return Label(0, 0, "axial" if column == AXIAL_COLUMN else "torsional")
     return Label(c, column)
 
 

@@ -20,8 +20,8 @@ from ..evaluate.results import HarmonicShape
 from .mode import Label, Mode
 
 Array = np.ndarray
-LONGEST, SHORTEST = 1 / 16, 1e-7  # steps, of the way from load to load
-ALIKE = 0.8  # least overlap over a step, else it is halved
+MAX_LOAD_STEP, MIN_LOAD_SHARE = 1 / 16, 1e-7  # steps, of the way from load to load
+MIN_OVERLAP = 0.8  # least overlap over a step, else it is halved
 SPANNED = 1e-6  # of the largest direction
 ABOVE = 2.0  # times the highest omega^2 known, for what is not known
 SYMMETRIES = ("symmetric", "antisymmetric")
@@ -163,16 +163,16 @@ def _homotopy(f_before: Array, a: Array, f_after: Array, b: Array) -> Array:
     above = ABOVE * max(f_before.max(), f_after.max()) ** 2
     known = ((a, f_before), (b, f_after))
     ends = [(v * (f**2 - above)) @ v.T + above * np.eye(len(v)) for v, f in known]
-    now, t, step = a, 0.0, LONGEST
+    now, t, step = a, 0.0, MAX_LOAD_STEP
     while t < 1:
         ahead = min(t + step, 1.0)
         _, vectors = np.linalg.eigh((1 - ahead) * ends[0] + ahead * ends[1])
         overlap = (now.T @ vectors) ** 2
         rows, to = linear_sum_assignment(overlap, maximize=True)
-        if overlap[rows, to].min() < ALIKE and step > SHORTEST:
+        if overlap[rows, to].min() < MIN_OVERLAP and step > MIN_LOAD_SHARE:
             step /= 2
             continue
-        now, t, step = vectors[:, to], ahead, min(2 * step, LONGEST)
+        now, t, step = vectors[:, to], ahead, min(2 * step, MAX_LOAD_STEP)
     overlap = (now.T @ b) ** 2
     return np.where(overlap.max(1) > 0.5, overlap.argmax(1), -1)
 

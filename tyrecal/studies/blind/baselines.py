@@ -14,7 +14,7 @@ import numpy as np
 from .ruler import SIZE_POINTS, Ruler
 
 Array = np.ndarray
-MAX_STEPS = 8
+MAX_RULE_STEPS = 8
 MAX_STEP = 0.5  # of ln x, a step
 NONE = "none"
 PRIOR_NONE = 0.25
@@ -54,7 +54,7 @@ def _fit(ruler: Ruler, y: Array, places: Array, inverse: Array) -> Array:
     """d = ln x - ln x0 by Gauss and Newton's steps."""
     d = np.zeros(len(ruler.x0))
     information = np.diag(ruler.spread**-2.0)
-    for _ in range(MAX_STEPS):
+    for _ in range(MAX_RULE_STEPS):
         eta, J = ruler.plain(d, places)
         step = np.linalg.solve(
             J.T @ inverse @ J + information, J.T @ inverse @ (y - eta) - information @ d

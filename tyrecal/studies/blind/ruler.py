@@ -119,7 +119,7 @@ class Difficulty:
         return min(self.lam, self.nearest)
 
 
-APART = 9.0
+MIN_LAMBDA_APART = 9.0
 
 
 def difficulty(
@@ -148,7 +148,7 @@ def difficulty(
             equivalent = float(e[np.argmin(length)])
         else:
             distances[id] = float(length.min())
-    near = [id for id, distance in distances.items() if distance < APART]
+    near = [id for id, distance in distances.items() if distance < MIN_LAMBDA_APART]
     return Difficulty(lam, min(distances.values(), default=np.inf), (law, *near), equivalent)
 
 

@@ -10,7 +10,7 @@ from ..result import Result, ResultPart
 from .observations import Observable
 from .where import PartChange
 
-ROW = re.compile(r"\[(\d{1,3}),(\d{1,3})\](?: (axial|torsional))? at ([\d.]{1,9}) kPa")
+ROW_PATTERN = re.compile(r"\[(\d{1,3}),(\d{1,3})\](?: (axial|torsional))? at ([\d.]{1,9}) kPa")
 
 
 class Explained(ResultPart):
@@ -34,7 +34,7 @@ class Residual(ResultPart):
     @property
     def of(self) -> Observable | None:
         """What was measured, where it is a frequency."""
-        found = ROW.fullmatch(self.row)
+        found = ROW_PATTERN.fullmatch(self.row)
         if not found:
             return None
         c, m, kind, pressure = found.groups()

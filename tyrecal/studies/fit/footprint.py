@@ -23,12 +23,12 @@ from ...simulate.evaluate.evaluator import Evaluator
 from ...simulate.evaluate.failure import EvaluationFailed
 from ...simulate.evaluate.pressed import Pressed
 from ...tyre.case import LoadedCase
-from ...tyre.case.calibration import MEASURED
+from ...tyre.case.calibration import MEASURED_SIGMA
 from ..footprint import footprint_row
 
 Array = np.ndarray
 PRESS_STEP = 1e-5  # of a scaled variable: the root of the precision of a stiffness
-STEEPEST = 20.0  # d ln q / d x; a jump of 0.1 % within a step is 100
+MAX_SLOPE = 20.0  # d ln q / d x; a jump of 0.1 % within a step is 100
 ROW = {"contact_area_m2": "area_m2"}  # quantities with another name in a row of a footprint
 
 
@@ -54,7 +54,7 @@ def read_footprint_targets(case: LoadedCase) -> list[FootprintTarget]:
     return [
         FootprintTarget(t.load_N, quantity, getattr(t, quantity), getattr(t, sigma), t.weight)
         for t in (case.case.targets.footprint if case.case.targets else ())
-        for quantity, sigma in MEASURED.items()
+        for quantity, sigma in MEASURED_SIGMA.items()
         if getattr(t, quantity) is not None
     ]
 

@@ -15,7 +15,7 @@ from .problem import Point, Problem
 from .slsqp import AT_JUMP, Descent, is_at_jump, is_converged
 
 Array = np.ndarray
-STEPS = 100
+MAX_ITERATIONS_LM = 100
 HALVINGS = 5  # of a step towards a design without a solution
 DAMPING, STIFFEST = 0.1, 1e8  # mu at first, and where no step is left to try
 
@@ -26,7 +26,7 @@ def minimise(problem: Problem, start: Array, tolerance: float) -> Descent:
     Raises EvaluationFailed when the start itself cannot be evaluated.
     """
     point, damping = problem.evaluate(start), DAMPING
-    for _ in range(STEPS):
+    for _ in range(MAX_ITERATIONS_LM):
         if is_converged(problem, point, tolerance):
             return Descent(point, "converged")
         if damping > STIFFEST:
@@ -38,7 +38,7 @@ def minimise(problem: Problem, start: Array, tolerance: float) -> Descent:
             point, damping = trial, damping / 5
         else:
             damping *= 4
-    return Descent(point, f"stopped after {STEPS} steps")
+    return Descent(point, f"stopped after {MAX_ITERATIONS_LM} steps")
 
 
 def _first_solvable(problem: Problem, point: Point, step: Array) -> Point | None:

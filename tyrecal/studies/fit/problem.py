@@ -25,7 +25,7 @@ from ...simulate.modes.find import Found, ModesAnswer, find_modes
 from ...simulate.modes.mode import Label, Mode
 from ...tyre.case import LoadedCase
 from .differences import STEP, differences
-from .footprint import PRESS_STEP, STEEPEST, press, read_footprint_targets
+from .footprint import MAX_SLOPE, PRESS_STEP, press, read_footprint_targets
 from .variable import read_variable
 
 Array = np.ndarray
@@ -175,7 +175,7 @@ class Problem:
             ask = lambda designs: press(
                 self.case, self.evaluator, self.footprint, designs, self.jobs
             )
-            found, rises = differences(self.variables, values, PRESS_STEP, ask, steepest=STEEPEST)
+            found, rises = differences(self.variables, values, PRESS_STEP, ask, steepest=MAX_SLOPE)
             pressed, shares = np.split(found, 2)
             slopes = np.vstack([slopes, rises[: len(pressed)]])
         wanted = [t.frequency_Hz for t in self.targets] + [t.value for t in self.footprint]

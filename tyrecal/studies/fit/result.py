@@ -11,7 +11,7 @@ from pydantic import Field
 
 from ...tyre.values import with_values
 from ..result import (
-    NAMED,
+    NAME_COLUMNS,
     Column,
     Deviation,
     Named,
@@ -27,11 +27,11 @@ from .uncertainty import FitUncertainty, uncertainty
 
 MIN_STEP = 1e-6  # of a scaled variable, below which the fit did not move, or is at a bound
 NEAR_BEST_HZ = 0.05  # of the objective: the fit could have ended there
-QUANTITIES = {  # targets on the road
+ROAD_QUANTITIES = {  # targets on the road
     "contact_area_m2": Column("contact area, cm²", ".1f", 1e4),
     "vertical_stiffness_N_per_m": Column("vertical stiffness, N/mm", ".1f", 1e-3),
 }
-HERTZ, DIGITS = Column("Hz"), Column("", ".4g")
+HERTZ, RESULT_DIGITS = Column("Hz"), Column("", ".4g")
 
 
 @dataclass
@@ -131,7 +131,7 @@ class FitResult(Result):
     def tables(self) -> list[Table]:
         in_hertz = self.objective_unit == "Hz"
         units = f"frequencies{' and objective' * in_hertz} in Hz"
-        heads = [*NAMED, *map(Column, ("initial", "fitted", "target", "deviation %"))]
+        heads = [*NAME_COLUMNS, *map(Column, ("initial", "fitted", "target", "deviation %"))]
         rows: list[list[Any]] = [
             [
                 *mode.named(),
@@ -141,7 +141,7 @@ class FitResult(Result):
             for mode in self.modes
         ]
         for each in self.footprint:
-            quantity = QUANTITIES[each.quantity]
+            quantity = ROAD_QUANTITIES[each.quantity]
             figures = map(quantity.cell, (each.initial, each.fitted, each.target))
             off = Deviation(each.deviation_percent)
             rows.append([f"{each.load_N:g} N", quantity.name, *figures, off])
@@ -161,14 +161,14 @@ class FitResult(Result):
             [
                 name,
                 "at bound" if each.at_bound else "",
-                *map(DIGITS.cell, (each.initial, each.value)),
+                *map(RESULT_DIGITS.cell, (each.initial, each.value)),
                 f"{each.lower:g}..{each.upper:g}",
                 each.error_percent,
             ]
             for name, each in self.variables.items()
         ]
         rows += [
-            [name, "held", *map(DIGITS.cell, (value, value)), None, None]
+            [name, "held", *map(RESULT_DIGITS.cell, (value, value)), None, None]
             for name, value in self.fixed.items()
         ]
         return Table(heads, rows)

@@ -21,7 +21,7 @@ from .parts import (
     one_of,
 )
 
-MEASURED = {"contact_area_m2": "sigma_m2", "vertical_stiffness_N_per_m": "sigma_N_per_m"}
+MEASURED_SIGMA = {"contact_area_m2": "sigma_m2", "vertical_stiffness_N_per_m": "sigma_N_per_m"}
 """What a footprint target can hold, and the key of its standard deviation."""
 Weight = Annotated[NotNegative, Field(le=1e6)]
 
@@ -96,16 +96,16 @@ class TargetFootprint(Part):
 
     @classmethod
     def problems(cls, values: Mapping[str, Any]) -> Iterator[Disagreement]:
-        given = [key for key in MEASURED if values.get(key) is not None]
+        given = [key for key in MEASURED_SIGMA if values.get(key) is not None]
         if not given and WRONG in values.values():  # a misspelt key, which is reported
             return
         if not given:
-            both = " or ".join(MEASURED)
+            both = " or ".join(MEASURED_SIGMA)
             yield "load_N", f"must come with what was measured at this load, {both}"
         elif len(given) > 1:
             yield given[1], f"must be a target of its own: this one holds {given[0]} already"
         else:
-            for key, sigma in MEASURED.items():
+            for key, sigma in MEASURED_SIGMA.items():
                 if key in given and values.get(sigma) is None:
                     yield sigma, f"must be given: the standard deviation of {key}, in its unit"
                 if key not in given and values.get(sigma) is not None:

@@ -13,7 +13,7 @@ from ruamel.yaml import YAML
 from ..section.section import Section, SectionError
 from ..templates import environment, render
 
-ELEMENTS = {"coarse": 14, "default": 28, "refined": 56}  # along the half section, by level
+ELEMENTS_BY_LEVEL = {"coarse": 14, "default": 28, "refined": 56}  # along the half section, by level
 OUTER_ROWS = {"coarse": 1, "default": 3, "refined": 4}  # between the outermost line and the surface
 
 
@@ -52,7 +52,7 @@ def new_case(
         "outline": outline,
         "lines": section.names,
         "regions": [r for r, _ in section.regions],
-        "levels": {level: _level(section, level) for level in ELEMENTS},
+        "levels": {level: _level(section, level) for level in ELEMENTS_BY_LEVEL},
         "carcass": _numbered("carcass", plies),
         "belts": _numbered("belt", belts, always=True),
     }
@@ -81,7 +81,7 @@ def _level(section: Section, level: str) -> dict[str, Any]:
     elements, start = {}, 0
     for region, count in section.regions:
         share = (arc[start + count] - arc[start]) / arc[-1]
-        elements[region] = max(1, round(ELEMENTS[level] * share))
+        elements[region] = max(1, round(ELEMENTS_BY_LEVEL[level] * share))
         start += count
     rows = [1] * (len(section.names) - 2) + [OUTER_ROWS[level]]
     grading = [1.0] * (len(rows) - 1) + [0.7] if rows[-1] > 1 else None

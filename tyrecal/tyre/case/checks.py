@@ -13,7 +13,7 @@ from pydantic import BaseModel, ValidationError
 
 from ..plugins import IDS
 from .analysis import Analysis
-from .calibration import MEASURED
+from .calibration import MEASURED_SIGMA
 from .meshable import Problems, levels, places
 from .mistakes import Keys, dotted, suggestion
 from .parts import WRONG, number
@@ -111,7 +111,7 @@ def _targets(data: Mapping[str, Any]) -> Problems:
             yield ("targets", "modes", i), f"the mode {name} is a target already"
     for i, target in enumerate(entries(table(data, "targets"), "footprint")):
         load = number(target, "load_N") if isinstance(target, dict) else None
-        for quantity in MEASURED:
+        for quantity in MEASURED_SIGMA:
             if load is None or target.get(quantity) is None:
                 continue
             first = seen.setdefault((load, quantity), i)

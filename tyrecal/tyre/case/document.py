@@ -18,8 +18,8 @@ from ruamel.yaml.parser import Parser
 from .mistakes import Keys, Mistake, dotted, shortened
 from .parts import WRONG
 
-MOST_BYTES = 1_000_000  # of a table beside a case
-LONGEST = 100_000  # bytes of YAML; shipped cases have 5000, and it is read at 30 kB/s
+MAX_TABLE_BYTES = 1_000_000  # of a table beside a case
+MAX_CASE_BYTES = 100_000  # bytes of YAML; shipped cases have 5000, and it is read at 30 kB/s
 MOST_EVENTS = 20_000
 DEEPEST = 20
 
@@ -85,14 +85,14 @@ def _text(path: Path, document: Document) -> str | None:
             document.refuse(0, "is not a regular file")
             return None
         with path.open("rb") as file:
-            content = file.read(LONGEST + 1)
+            content = file.read(MAX_CASE_BYTES + 1)
     except FileNotFoundError:
         document.refuse(0, f"there is no such file{_case_beside(path)}")
     except (OSError, ValueError) as error:
         document.refuse(0, f"cannot be read: {getattr(error, 'strerror', None) or error}")
     else:
-        if len(content) > LONGEST:
-            document.refuse(1, f"the file is larger than {LONGEST} bytes")
+        if len(content) > MAX_CASE_BYTES:
+            document.refuse(1, f"the file is larger than {MAX_CASE_BYTES} bytes")
         elif not content.strip():
             document.refuse(1, "the file is empty")
         else:

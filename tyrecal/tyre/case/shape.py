@@ -44,7 +44,7 @@ MESSAGES = {
     "disagree": "{message}",
 }
 NAME = "must be one word of letters, digits, - and _, a letter first"
-LINE = "must be text without line breaks or control characters"
+ONE_LINE = "must be text without line breaks or control characters"
 
 
 def explain(error: ValidationError, start: Keys = ()) -> Iterator[tuple[Keys, str]]:
@@ -65,7 +65,7 @@ def explain(error: ValidationError, start: Keys = ()) -> Iterator[tuple[Keys, st
         elif kind == "disagree":
             yield (*keys, context["key"]), context["message"]
         elif kind == "string_pattern_mismatch":
-            yield keys, NAME if "A-Za-z" in context["pattern"] else LINE
+            yield keys, NAME if "A-Za-z" in context["pattern"] else ONE_LINE
         else:
             yield keys, MESSAGES[kind].format(**context) if kind in MESSAGES else item["msg"]
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import ValidationError
 
-from .document import MOST_BYTES, Document
+from .document import MAX_TABLE_BYTES, Document
 from .mistakes import Keys, Mistake, dotted, shortened
 from .parts import WRONG
 from .section import SectionSource
@@ -90,8 +90,8 @@ def read_section_of(source: SectionSource, folder: Path) -> Section:
     from ..section.section import fill_lines, read_section
 
     path = inside(folder, source.file)
-    if path.stat().st_size > MOST_BYTES:
-        raise ValueError(f"the table of the section is larger than {MOST_BYTES} bytes")
+    if path.stat().st_size > MAX_TABLE_BYTES:
+        raise ValueError(f"the table of the section is larger than {MAX_TABLE_BYTES} bytes")
     given = source.outline
     if not given:
         _check_table(path)

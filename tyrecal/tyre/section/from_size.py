@@ -19,7 +19,7 @@ from .size import TyreSize
 
 STATIONS = {"crown": 16, "shoulder": 4, "upper_sidewall": 16, "lower_sidewall": 16, "bead": 4}
 """Intervals between stations by region; the shoulder lies between the two belts' edges."""
-LINES = ("inner", "ply", "belt1", "belt2", "outer")
+LINE_NAMES = ("inner", "ply", "belt1", "belt2", "outer")
 WIDEST = 0.53  # of the section height: where a radial tyre is widest
 CROWN_RADIUS = 1.5  # of the carcass, times the section width over the aspect ratio
 SHOULDER = 0.85  # gauge at the wider belt's edge over the crown's
@@ -116,7 +116,7 @@ def build(size: TyreSize, gauges: Gauges) -> GaugeTable:
             total - inside,
         ]
     )
-    table = GaugeTable(LINES, "ply", line.at(s), rows, labels, s >= line.rim - tiny)
+    table = GaugeTable(LINE_NAMES, "ply", line.at(s), rows, labels, s >= line.rim - tiny)
     outside = table.section().points[-1, :, 1]
     at = s[np.argmax(outside)]
     if outside.max() > width / 2 + 1e-5:

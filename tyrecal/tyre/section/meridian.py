@@ -28,9 +28,9 @@ from scipy.optimize import brentq
 from .section import SectionError
 
 Array = np.ndarray
-STEPS = 200  # of each part
+STEPS_A_PART = 200  # of each part
 EXPONENTS = np.log([1.0, 40.0])  # of the belt's share: from a roof to nearly a step
-STEEPEST = np.tan(np.radians(75))  # of the carcass at the rim, from the wheel's plane
+MAX_RIM_SLOPE = np.tan(np.radians(75))  # of the carcass at the rim, from the wheel's plane
 
 
 @dataclass(frozen=True)
@@ -76,13 +76,13 @@ def meridian(
         lean = np.arctan(curvature * height - 3 * cubic * height**2)
     if z > widest[1] or height < offset:
         raise SectionError(f"a rim {2e3 * rim[1]:.0f} mm wide leaves the tyre no sidewall")
-    if abs(np.tan(lean)) > STEEPEST:
+    if abs(np.tan(lean)) > MAX_RIM_SLOPE:
         raise SectionError(f"a rim {2e3 * rim[1]:.0f} mm wide is too narrow for the tyre")
-    x = np.linspace(0, height, STEPS + 1)[1:]
+    x = np.linspace(0, height, STEPS_A_PART + 1)[1:]
     lower = np.stack([upper[-1, 0] - x, widest[1] - curvature / 2 * x**2 + cubic * x**3], -1)
     # held by the rim: an arc that turns upright, down to the seat
-    turn = np.linspace(lean, 0, STEPS // 4 + 1)[1:]
-    down = (rim[0] - seat) * np.linspace(0, 1, STEPS // 4 + 1)[1:]
+    turn = np.linspace(lean, 0, STEPS_A_PART // 4 + 1)[1:]
+    down = (rim[0] - seat) * np.linspace(0, 1, STEPS_A_PART // 4 + 1)[1:]
     steps = np.diff(down, prepend=0.0)
     held = np.stack([rim[0] - down, z - np.cumsum(np.tan(turn) * steps)], -1)
     points = np.concatenate([upper, lower, held])
@@ -142,7 +142,7 @@ def _widest(
 
 def _belt(crown: float, crown_radius: float, belt: float, rho: float, n: float) -> Array:
     """r, z and psi at stations under the belt, (s, 3)."""
-    s = np.linspace(0, belt, STEPS + 1)
+    s = np.linspace(0, belt, STEPS_A_PART + 1)
     alone = 1 - (1 - rho / (crown * crown_radius)) * (1 - (s / belt) ** n)
     r = np.full(len(s), crown)
     for _ in range(6):  # r hardly moves, and with it the curvature
@@ -155,7 +155,7 @@ def _beyond(edge: Array, rho: float) -> Array:
     """Points (s, 2) from the belt's ``edge`` (r, z, psi) to the widest one, at equal steps of psi:
     dz/dpsi = cos psi / kappa = rho cos psi / r."""
     r_b, z_b, psi_b = edge
-    psi = np.linspace(psi_b, np.pi / 2, STEPS + 1)
+    psi = np.linspace(psi_b, np.pi / 2, STEPS_A_PART + 1)
     r = np.sqrt(r_b**2 + 2 * rho * (np.cos(psi) - np.cos(psi_b)))
     return np.stack([r, z_b + _integral(rho * np.cos(psi) / r, psi)], -1)
 

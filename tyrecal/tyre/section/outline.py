@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-from .from_size import LINES, STATIONS
+from .from_size import LINE_NAMES, STATIONS
 from .section import Section, SectionError, millimetres, refuse_separators
 
 Array = np.ndarray
@@ -117,7 +117,7 @@ def section_of_outline(
     points = np.stack([np.stack([np.interp(s, arc, x) for x in line.T], -1) for line in lines])
     points[2, s > edge + 1e-9] = points[3, s > edge - belt_step / 2 + 1e-9] = np.nan
     drawn = curves["outer"], curves["inner"]
-    return Section(LINES, points, tuple(STATIONS.items()), s >= rim - 1e-9, drawn)
+    return Section(LINE_NAMES, points, tuple(STATIONS.items()), s >= rim - 1e-9, drawn)
 
 
 def _smooth(curve: Array) -> tuple[Array, Array]:

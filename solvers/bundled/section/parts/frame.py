@@ -6,7 +6,7 @@ import numpy as np
 
 Array = np.ndarray
 IN_PLANE = np.diag([1.0, 1.0, 0.0])  # of the wheel
-SPIN = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])  # e_z x
+SPIN_AXIS = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])  # e_z x
 
 
 def cross(a: Array, b: Array) -> Array:

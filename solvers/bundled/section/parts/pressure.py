@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from ..elements import Lines
-from .frame import IN_PLANE, SPIN, cross
+from .frame import IN_PLANE, SPIN_AXIS, cross
 from .part import AtStations, Precision, Tangents, TyrePart
 
 Array = np.ndarray
@@ -101,24 +101,24 @@ def second(x: Array, dx: Array) -> tuple[Array, Array, Array]:
     (xx, xd, dx_n): xx and xd at n = 0 with the whole Q not yet symmetrised, and the pair
     (n-linear u-u block, n-linear u'-u block) stacked in ``dx_n`` (..., 2, 3, 3), times i n.
     """
-    y, d = x @ IN_PLANE, x @ SPIN.T
+    y, d = x @ IN_PLANE, x @ SPIN_AXIS.T
     along = IN_PLANE @ _cross(dx)
-    xx = along @ SPIN
-    xd = -IN_PLANE @ _cross(d) - (_cross(y) @ SPIN).swapaxes(-1, -2)
+    xx = along @ SPIN_AXIS
+    xd = -IN_PLANE @ _cross(d) - (_cross(y) @ SPIN_AXIS).swapaxes(-1, -2)
     return xx, xd, np.stack([along, -_cross(y)], -3)
 
 
 def density(x: Array, dx: Array, around: Array | float) -> Array:
     """V's integrand (...) from x, x' and ``around`` = dx/dTheta."""
-    y, d = x @ IN_PLANE, around + x @ SPIN.T
+    y, d = x @ IN_PLANE, around + x @ SPIN_AXIS.T
     return np.asarray((y * cross(dx, d)).sum(-1) / 2)
 
 
 def first_around(x: Array, dx: Array, around: Array | float) -> tuple[Array, Array, Array]:
     """Gradients of V's integrand by x, x' and ``around`` = dx/dTheta, each (..., 3)."""
-    y, d = x @ IN_PLANE, around + x @ SPIN.T
+    y, d = x @ IN_PLANE, around + x @ SPIN_AXIS.T
     by_around = cross(y, dx)
-    by_x = cross(dx, d) @ IN_PLANE + by_around @ SPIN
+    by_x = cross(dx, d) @ IN_PLANE + by_around @ SPIN_AXIS
     return by_x / 2, cross(d, y) / 2, by_around / 2
 
 
@@ -126,10 +126,10 @@ def change(
     x: Array, dx: Array, around: Array, u: Array, du: Array, u_around: Array
 ) -> tuple[Array, Array, Array]:
     """Change of `first_around` with a small displacement u, u', du/dTheta (..., 3)."""
-    y, d = x @ IN_PLANE, around + x @ SPIN.T
-    v, e = u @ IN_PLANE, u_around + u @ SPIN.T
+    y, d = x @ IN_PLANE, around + x @ SPIN_AXIS.T
+    v, e = u @ IN_PLANE, u_around + u @ SPIN_AXIS.T
     by_around = cross(v, dx) + cross(y, du)
-    by_x = (cross(du, d) + cross(dx, e)) @ IN_PLANE + by_around @ SPIN
+    by_x = (cross(du, d) + cross(dx, e)) @ IN_PLANE + by_around @ SPIN_AXIS
     return by_x / 2, (cross(e, y) + cross(d, v)) / 2, by_around / 2
 
 
