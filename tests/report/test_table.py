@@ -182,3 +182,21 @@ def test_a_tyre_that_is_none_is_doubted() -> None:
     assert tyre_doubts({"mass_kg": 12.8, "modes": [{"frequency_Hz": 31.7}]}) == []
     heavy, slow = tyre_doubts({"mass_kg": 173e3, "modes": [{"frequency_Hz": 4.6e-5}]})
     assert "1.73e+05 kg, usual is 0.5 to 500 kg" in heavy and "4.6e-05 Hz" in slow
+
+
+def test_both_members_of_a_split_doublet_are_shown() -> None:
+    """With the number that the file has, where something splits it."""
+    mode = {"c": 2, "m": 1, "kind": None, "multiplicity": 1, "clarity": 0.9}
+    result = ModesResult.model_validate(
+        {
+            **dict.fromkeys(("pressure_kPa", "load_N", "mass_kg"), 1.0),
+            "variables": {},
+            "modes": [{**mode, "frequency_Hz": 66.0 + k, "member": k} for k in (1, 2)],
+        }
+    )
+    (table,) = result.tables()
+    place = [column.name for column in table.columns].index("member")
+    assert [row[place] for row in table.rows] == ["1", "2"]
+    console = Console(file=io.StringIO(), width=120)
+    console.print(shown(table))
+    assert "67.00" in console.file.getvalue()  # type: ignore[attr-defined]

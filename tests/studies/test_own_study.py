@@ -20,11 +20,11 @@ weigh = own_command:command
     "own_study.py": '''\
 from typing import Annotated
 
-from tyrecal.evaluate.evaluator import Question
-from tyrecal.studies.result import Column, Part, Result, Table, csv_text
+from tyrecal.simulate.evaluate.evaluator import Question
+from tyrecal.studies.result import Column, Result, ResultPart, Table, csv_text
 
 
-class Weight(Part):
+class Weight(ResultPart):
     """A design on the scales."""
 
     design: Annotated[str, Column("design", "")]

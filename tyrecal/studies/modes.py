@@ -13,7 +13,7 @@ from ..simulate.modes.mode import Mode
 from ..tyre.case import LoadedCase
 from .result import NAME_COLUMNS, Column, ModeEntry, Result, ResultPart, Table
 
-EXTRA = {"symmetry": "", "member": "d", "clarity": ".2f", "overlap": ".2f"}  # forms
+EXTRA = {"symmetry": "", "member": ".0f", "clarity": ".2f", "overlap": ".2f"}  # forms
 
 
 class ModesFindings(ResultPart):
