@@ -104,11 +104,9 @@ def test_names_of_the_map() -> None:
         files = [mark for mark in marks if re.fullmatch(r"[\w/]+\.py", mark)]
         for file in files:
             path = next(p for p in (ROOT / "tyrecal" / file, ROOT / file) if p.is_file())
-            defined = {
-                node.name
-                for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
-                if isinstance(node, ast.ClassDef | ast.FunctionDef)
-            }
+            defined = set(
+                re.findall(r"^(?: *(?:class|def) )?(\w+)", path.read_text(), re.MULTILINE)
+            )
             follows = marks[marks.index(file) + 1 :][:1]
             if follows and re.fullmatch(r"[A-Za-z_]+", follows[0]) and follows[0] not in ("deck",):
                 assert follows[0] in defined, f"{file} has no {follows[0]}"
