@@ -30,7 +30,7 @@ from .simulate.modes.mode import Mode
 from .simulate.provenance import provenance
 from .studies.diagnose.diagnosis import Diagnosis
 from .studies.fit.calibrate import METHODS, Fit, calibrate
-from .studies.pressure import PressureState
+from .studies.pressure import State
 from .tyre.case import CaseError, LoadedCase, start_values, with_level
 from .tyre.effects import Effect, catalogue
 from .tyre.load import load_case as _load_case
@@ -45,7 +45,7 @@ __all__ = [
     "Fit",
     "LoadedCase",
     "Mode",
-    "PressureState",
+    "State",
     "diagnose_case",
     "evaluate_footprint",
     "evaluate_modes",
@@ -155,7 +155,7 @@ def sweep_pressure(
     jobs: int = 1,
     solver: str = "",
     record: Path | str | None = None,
-) -> list[PressureState]:
+) -> list[State]:
     """Modes at each pressure (kPa): ``modes`` by rising frequency, ``frequencies`` by label, and
     ``slopes`` d ln f / d ln p by label, None where the solver has none.
 

@@ -14,7 +14,7 @@ from tyrecal.simulate.evaluate.results import HarmonicShape, RawMode
 from tyrecal.simulate.modes.label import label_modes
 from tyrecal.simulate.modes.mode import Label
 from tyrecal.studies.fitted import NotThisFit, pressure_name, read_fitted
-from tyrecal.studies.pressure import PressureState, sweep
+from tyrecal.studies.pressure import State, sweep
 from tyrecal.studies.pressure_findings import findings
 from tyrecal.studies.pressure_result import slopes, sweep_result
 from tyrecal.tyre.case import start_values
@@ -42,7 +42,7 @@ def states(curves, mixing=lambda p: 0.0):
                 u = np.cos(turn) * x.amplitude + np.sin(turn) * other.amplitude
                 x = HarmonicShape(0, x.nodes, x.points, u)
             raw.append(RawMode(f(p), x, 2 if label.c else 1))
-        made.append(PressureState("initial", p, label_modes(raw), None))
+        made.append(State("initial", p, label_modes(raw), None))
     return made
 
 

@@ -15,7 +15,7 @@ from .fitted import pressure_name
 
 
 @dataclass(frozen=True)
-class PressureState:
+class State:
     """A design at a pressure: all labelled modes by rising frequency and, where the solver has
     slopes, d ln f / d ln p by label (else None)."""
 
@@ -39,7 +39,7 @@ class Failure:
     failed: EvaluationFailed
 
 
-SweepOutcome = PressureState | Failure
+SweepOutcome = State | Failure
 
 
 def sweep(
@@ -81,4 +81,4 @@ def _outcome(
     if gradient is not None:
         scale = {m.label: pressure_kPa / m.frequency_Hz for m in modes}
         exact = {m.label: float(gradient[m.position]) * scale[m.label] for m in modes}
-    return PressureState(design, pressure_kPa, modes, exact)
+    return State(design, pressure_kPa, modes, exact)

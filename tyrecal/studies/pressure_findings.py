@@ -12,7 +12,7 @@ from pydantic import Field
 
 from ..simulate.modes.follow import follow
 from ..simulate.modes.mode import FAMILIES, Label
-from .pressure import PressureState
+from .pressure import State
 from .result import ResultPart
 
 BENT = "concave", "convex"
@@ -32,7 +32,7 @@ class PressureFindings(ResultPart):
     words: list[str]
 
 
-def findings(states: Sequence[PressureState], labels: Sequence[Label]) -> PressureFindings:
+def findings(states: Sequence[State], labels: Sequence[Label]) -> PressureFindings:
     """Findings on one design's states by rising pressure, two at least."""
     p = np.array([state.pressure_kPa for state in states])
     table = {label: np.array([s.frequencies[label] for s in states]) for label in labels}

@@ -12,7 +12,7 @@ from ..simulate.modes.mode import Label
 from ..tyre.case import LoadedCase
 from .fit.problem import read_targets
 from .modes import mode_entry
-from .pressure import Failure, PressureState, SweepOutcome, sweep
+from .pressure import Failure, State, SweepOutcome, sweep
 from .pressure_findings import PressureFindings, findings
 from .result import (
     NAME_COLUMNS,
@@ -129,7 +129,7 @@ def sweep_result(
     case: LoadedCase, designs: Mapping[str, Mapping[str, float]], outcomes: Sequence[SweepOutcome]
 ) -> PressureSweep:
     """outcomes: of ``sweep``."""
-    states = [each for each in outcomes if isinstance(each, PressureState)]
+    states = [each for each in outcomes if isinstance(each, State)]
     labels = _swept_labels(case, states) if states else []
     by_design = [[s for s in states if s.design == name] for name in designs]
     return PressureSweep(
@@ -151,7 +151,7 @@ def sweep_result(
     )
 
 
-def _swept_labels(case: LoadedCase, states: Sequence[PressureState]) -> list[Label]:
+def _swept_labels(case: LoadedCase, states: Sequence[State]) -> list[Label]:
     """The case's targets and, up to its highest harmonic, whatever else with m <= 1 was found in
     every state, by label."""
     everywhere = set.intersection(*(set(state.frequencies) for state in states))
@@ -162,9 +162,7 @@ def _swept_labels(case: LoadedCase, states: Sequence[PressureState]) -> list[Lab
     )
 
 
-def slopes(
-    states: Sequence[PressureState], labels: Sequence[Label]
-) -> dict[Label, list[float | None]]:
+def slopes(states: Sequence[State], labels: Sequence[Label]) -> dict[Label, list[float | None]]:
     """d ln f / d ln p per label at each state of one design: exact where the solver has slopes,
     else by differences of the logarithms over neighbouring pressures, of second order where there
     are three (None: there is but one)."""
@@ -179,7 +177,7 @@ def slopes(
     return {label: table[:, i].tolist() for i, label in enumerate(labels)}
 
 
-def _rows(states: Sequence[PressureState], labels: Sequence[Label]) -> list[PressureRow]:
+def _rows(states: Sequence[State], labels: Sequence[Label]) -> list[PressureRow]:
     """The rows of one design."""
     table = slopes(states, labels) if states else {}
     return [
