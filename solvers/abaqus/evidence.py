@@ -10,9 +10,8 @@ from ..process import RunFailed
 from .dat import DatTable
 from .fil import SIM, Modes, read_fil
 
-FREQUENCY_RTOL = (
-    1e-3  # largest relative difference of a frequency between .fil and .dat: five digits
-)
+# largest relative difference of a frequency between .fil and .dat: five digits
+FREQUENCY_RTOL = 1e-3
 
 
 def checked_modes(path: Path, asked: int | None, table: DatTable) -> Modes:

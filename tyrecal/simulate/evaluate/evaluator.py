@@ -49,7 +49,7 @@ class Counts:
         self.runs, self.recorded = self.runs + other.runs, self.recorded + other.recorded
 
 
-def _unheard(done: int, total: int) -> None:
+def _unwatched(done: int, total: int) -> None:
     """Nobody wants to know."""
 
 
@@ -62,13 +62,11 @@ class Evaluator:
     folder: Path | None = None  # of the run folders; None: temporary ones
     keep: bool = False  # the folders of successful runs too; those of failures always are
     store: Store | None = None  # the record, asked before the solver and told what it said
-    scheduler: str = (
-        ""  # address of the Dask scheduler that several questions go to, else processes
-    )
+    scheduler: str = ""  # address of a Dask scheduler for several questions, else processes
     command: tuple[str, ...] = ()  # words that start the solver's program, else the user's settings
     counts: Counts = field(default_factory=Counts)
     # called with how many of how many designs asked at once are answered
-    on_progress: Callable[[int, int], None] = field(default=_unheard, repr=False)
+    on_progress: Callable[[int, int], None] = field(default=_unwatched, repr=False)
     _solver: Solver | None = field(default=None, repr=False)
 
     @property

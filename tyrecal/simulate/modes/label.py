@@ -35,9 +35,8 @@ HIGHEST_HARMONIC = 12  # that is looked for in sampled shapes
 SUBSTANTIAL = 0.2  # share of the belt's motion below which a mode cannot claim an order
 TAKES_PART = 0.1  # the belt's mean square motion over that of all points, likewise
 
-AXIAL_COLUMN = (
-    4  # column of z P0 on c = 0; columns 0 to 3 are the orders, 0 on c = 0 being theta P0
-)
+# column of z P0 on c = 0; columns 0 to 3 are the orders, 0 on c = 0 being theta P0
+AXIAL_COLUMN = 4
 PARITY = (0, 1, 0, 1, 1)  # axial motion is the c = 0 member of the out-of-plane family
 
 
