@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
-from scipy.spatial import KDTree
 
 from ..process import RunFailed, end_commands
 from .results import Fields, pairs, read_eigenvalues, read_fields, read_mass
@@ -153,6 +152,8 @@ def _inflated(path: Path) -> tuple[Fields, Array]:
     Raises RunFailed (``unstable``) where other nodes do not move as those do: reduced integration
     lets an element's middle buckle between its faces, which had moved frequencies by up to 5 %.
     """
+    from scipy.spatial import KDTree
+
     fields = read_fields(path)
     x, y, z = fields.points.T
     front = np.flatnonzero(y == 0)

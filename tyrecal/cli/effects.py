@@ -61,8 +61,6 @@ def command(
     tyrecal effects --case cases/p235_75r17.yaml --jobs 2
     """
     from ..report.effects import effect_entry, effect_text, signature_entry
-    from ..report.figure import save
-    from ..report.signature import draw_signature
     from ..report.table import effects_table, shown, signatures_table
     from ..simulate.evaluate.failure import EvaluationFailed
     from ..simulate.evaluate.solver import installed
@@ -125,6 +123,9 @@ def command(
             terminal.detail(id)
             found.append({**entries[id], **signature_entry(signature, values)})
             if pictures:
+                from ..report.figure import save
+                from ..report.signature import draw_signature
+
                 save(draw_signature(signature), run.new / f"effect_{id}.png")
     found = run.write_json("effects.json", found)
     run.finish()

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import eigh
-from scipy.optimize import linear_sum_assignment
 
 from ..modes.harmonics import Combination, HarmonicModes, SeededTyre, Vibration
 from ..section.point_elements import PointElements
@@ -232,13 +231,21 @@ def tell(
     seats = _seats(harmonics, count)
     looked = CANDIDATES_PER_MODE * len(seats) + 10
     overlap = np.array([held[seat][:looked] for seat in seats])
-    _, taken = linear_sum_assignment(overlap, maximize=True)
+    taken = assigned(overlap)
     told: dict[int, list[int]] = {n: [] for n in harmonics}
     for n in harmonics:
         for k in range(count):
             places = [int(t) for seat, t in zip(seats, taken, strict=True) if seat == (n, k)]
             told[n] += sorted(places)
     return told
+
+
+def assigned(overlap: Array) -> Array:
+    """The column of each row of ``overlap``, none twice, whose sum is the largest."""
+    from scipy.optimize import linear_sum_assignment  # late: a third of a second
+
+    columns: Array = linear_sum_assignment(overlap, maximize=True)[1]
+    return columns
 
 
 def _seats(harmonics: list[int], count: int) -> list[tuple[int, int]]:

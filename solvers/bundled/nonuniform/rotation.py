@@ -18,13 +18,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import eigh
-from scipy.optimize import linear_sum_assignment
 
 from ..deck.keywords import COMPLEX_STEP
 from ..modes.harmonics import HarmonicModes, SeededTyre, Vibration
 from ..section.mechanics import mass_matrices
 from ..section.parts.frame import SPIN_AXIS
-from .coupled import Family, ritz, split
+from .coupled import Family, assigned, ritz, split
 
 Array = np.ndarray
 SPARE_MODES = 4  # modes in the basis beyond those wanted
@@ -45,8 +44,7 @@ def waves(vibration: Vibration, spin: float, n: int, count: int) -> HarmonicMode
     for sign in (1, -1) if n else (1,):
         pick = np.flatnonzero(np.sign(omega) == sign)
         pick = pick[np.argsort(abs(omega[pick]))]
-        _, taken = linear_sum_assignment(held[:, pick], maximize=True)
-        chosen.append(pick[taken])
+        chosen.append(pick[assigned(held[:, pick])])
     both = np.array(chosen).T  # (count, 1 or 2)
     fixed = (omega[both] - n * spin) ** 2
     mine = np.take_along_axis(both, np.argsort(fixed, axis=1), 1).ravel()

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from ..evaluate.results import HarmonicShape
+from .assignment import assignment
 from .mode import Label, Mode
 from .rings import harmonic_of
 from .subspace import mac
@@ -38,7 +38,7 @@ def follow(before: Sequence[Mode], after: Sequence[Mode]) -> list[Step]:
         old, new = ([mode for mode in modes if mode.label.c == c] for modes in (before, after))
         x, y = ([_harmonic(mode) for mode in modes] for modes in (old, new))
         macs = np.array([[mac(a, b) for b in y] for a in x])
-        for i, j in zip(*linear_sum_assignment(macs, maximize=True), strict=True):
+        for i, j in assignment(macs):
             steps.append(Step(old[i].label, new[j].label, float(macs[i, j])))
     return steps
 

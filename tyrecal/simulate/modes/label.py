@@ -21,9 +21,9 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.polynomial.legendre import legvander
-from scipy.optimize import linear_sum_assignment
 
 from ..evaluate.results import HarmonicShape, RawMode, RingShape
+from .assignment import assignment
 from .mode import Label, Mode
 
 Array = np.ndarray
@@ -111,11 +111,7 @@ def label_modes(evaluation_modes: Sequence[RawMode]) -> list[Mode]:
         part = np.array([motions[i].participation for i in members])[:, None]
         weight = shares * part * (frequency[members[0]] / frequency[members])[:, None] ** 2
         weight[(shares < SUBSTANTIAL) | (part < TAKES_PART)] = 0.0
-        claims = {
-            int(row): int(column)
-            for row, column in zip(*linear_sum_assignment(weight, maximize=True), strict=True)
-            if weight[row, column] > 0
-        }
+        claims = {row: column for row, column in assignment(weight) if weight[row, column] > 0}
         taken = {column for column in claims.values() if column != AXIAL_COLUMN}
         for row, i in enumerate(members):
             column = claims.get(row)

@@ -14,9 +14,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from ..evaluate.results import HarmonicShape
+from .assignment import assignment
 from .mode import Label, Mode
 
 Array = np.ndarray
@@ -168,7 +168,7 @@ def _homotopy(f_before: Array, a: Array, f_after: Array, b: Array) -> Array:
         ahead = min(t + step, 1.0)
         _, vectors = np.linalg.eigh((1 - ahead) * ends[0] + ahead * ends[1])
         overlap = (now.T @ vectors) ** 2
-        rows, to = linear_sum_assignment(overlap, maximize=True)
+        rows, to = np.array(assignment(overlap)).T
         if overlap[rows, to].min() < MIN_OVERLAP and step > MIN_LOAD_SHARE:
             step /= 2
             continue

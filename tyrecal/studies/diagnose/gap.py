@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import chi2, norm
+from scipy.special import chdtrc, ndtr
 
 from .inverse_problem import InverseProblem
 from .observations import Observable
@@ -45,7 +45,7 @@ class Contrast:
     @property
     def p_value(self) -> float:
         """Two-sided."""
-        return float(2 * norm.sf(abs(self.percent) / self.sigma_percent))
+        return float(2 * ndtr(-abs(self.percent) / self.sigma_percent))
 
 
 @dataclass(frozen=True)
@@ -103,7 +103,7 @@ def find_gap(problem: InverseProblem, d: Array, variables: tuple[str, ...]) -> G
     return Gap(
         total,
         freedom,
-        float(chi2.sf(total, freedom)),
+        chi2_tail(total, freedom),
         r,
         np.sqrt(np.diag(C)),
         tuple(_corrected(_groups(rows, r, C))),
@@ -125,7 +125,7 @@ def _groups(rows: tuple[Observable, ...], r: Array, C: Array) -> list[ResidualGr
         for name in sorted({n for n in names if n}, key=_as_number):
             G = np.array([n == name for n in names])
             value, freedom = _chi2(r[G], C[np.ix_(G, G)])
-            p = float(chi2.sf(value, freedom)) if freedom else 1.0
+            p = chi2_tail(value, freedom) if freedom else 1.0
             rms = float(100 * np.sqrt(np.mean(r[G] ** 2)))
             result.append(ResidualGroup(kind, name, rms, value, freedom, p, p))
     return result
@@ -136,6 +136,11 @@ def family(row: Observable) -> str | None:
     if row.label is None:
         return None
     return "[0,0]" if row.label.kind else FAMILY_NAMES.get(row.label.family or "")
+
+
+def chi2_tail(value: float, freedom: int) -> float:
+    """P(chi2 > ``value``) with ``freedom`` degrees of freedom; a form that rounds below 0 is 0."""
+    return float(chdtrc(freedom, max(value, 0.0)))
 
 
 def _chi2(r: Array, C: Array) -> tuple[float, int]:

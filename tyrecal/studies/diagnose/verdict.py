@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
 
 from .evidence import NONE, OUTSIDE, PRIOR_NONE, Hypothesis
+from .gap import chi2_tail
 
 NAMED, UNDECIDED, NO_GAP = "named", "undecided", "no_gap"
 SURE, RULED_OUT, CHECK, SET = 0.7, 0.05, 0.01, 0.9
@@ -62,4 +62,4 @@ def decide(
 def _check(hypothesis: Hypothesis, rows: int, variables: int) -> float:
     """p-value of chi2 at the likeliest parameters."""
     freedom = max(1, rows - variables - len(hypothesis.values))
-    return float(chi2.sf(hypothesis.fitted.chi2[hypothesis.best], freedom))
+    return chi2_tail(float(hypothesis.fitted.chi2[hypothesis.best]), freedom)

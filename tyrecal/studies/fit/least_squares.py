@@ -8,7 +8,6 @@ objective and rises after one that does not.
 from __future__ import annotations
 
 import numpy as np
-from scipy.optimize import lsq_linear
 
 from ...simulate.evaluate.failure import EvaluationFailed
 from .problem import Point, Problem
@@ -52,6 +51,8 @@ def _first_solvable(problem: Problem, point: Point, step: Array) -> Point | None
 
 
 def _step(problem: Problem, point: Point, damping: float) -> Array:
+    from scipy.optimize import lsq_linear
+
     J, r = point.jacobian, point.residuals
     count = J.shape[1]
     spread = np.sqrt(damping / count) * np.linalg.norm(J)

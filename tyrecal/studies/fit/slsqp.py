@@ -13,7 +13,6 @@ from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import minimize
 
 from ...simulate.evaluate.failure import EvaluationFailed
 from .crossing import MIXED, TELLING, Crossing, crossing, gap, order, pair_clarity
@@ -181,6 +180,8 @@ def _restart(
         ),
         "jac": lambda y: np.concatenate([turn, -turn, matrix]),
     }
+    from scipy.optimize import minimize  # late: not for those who only read results
+
     with suppress(_Jump):
         minimize(
             function,

@@ -86,7 +86,6 @@ def read_stations(document: Document, data: dict[str, Any], folder: Path) -> Sec
 
 def read_section_of(source: SectionSource, folder: Path) -> Section:
     """The section that part of a case describes. Raises SectionError, ValueError, OSError."""
-    from ..section.outline import read_outline, section_of_outline
     from ..section.section import fill_lines, read_section
 
     path = inside(folder, source.file)
@@ -98,6 +97,8 @@ def read_section_of(source: SectionSource, folder: Path) -> Section:
         section = read_section(path)
         fill_lines(section)
     else:
+        from ..section.outline import read_outline, section_of_outline
+
         section = section_of_outline(
             read_outline(path),
             given.belt_width_m,

@@ -6,10 +6,10 @@ from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from ..case import LoadedCase
 from ..section.section import Section, fill_lines
+from ..section.spline import CubicSpline
 from .effect import Effect
 from .parts import belt_edge, carcass_line, rim_edge, stations
 

@@ -6,7 +6,6 @@ from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
-from scipy.optimize import root
 
 from ..case import LoadedCase
 from ..section.section import Section
@@ -56,6 +55,8 @@ def _mounted(section: Section, line: int, start: int, end: int, distance: float)
     def miss(moment: Array) -> Array:
         phi, moved = turned(moment)
         return np.append((moved[-1] - [0.0, distance]) / length.sum(), phi[-1])
+
+    from scipy.optimize import root  # late: its import takes longer than an answer from the record
 
     found = root(miss, np.zeros(3), tol=1e-13)
     if not abs(found.fun).max() < 1e-9:

@@ -22,10 +22,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 
 from .section import SectionError
+from .spline import CubicSpline
 
 Array = np.ndarray
 STEPS_A_PART = 200  # of each part
@@ -45,9 +45,7 @@ class Meridian:
 
     def at(self, s: Array) -> Array:
         """Points (s, 2), r and z in m, at arcs s."""
-        ends = ((1, np.array([0.0, 1.0])), (2, np.zeros(2)))  # along the axle; straight
-        found: Array = CubicSpline(self.arc, self.points, bc_type=ends)(s)
-        return found
+        return CubicSpline(self.arc, self.points, start=np.array([0.0, 1.0]))(s)  # along the axle
 
 
 def meridian(

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from ...errors import InputError
+from .spline import CubicSpline
 
 Array = np.ndarray
 GAUGE = "_gauge_mm"
@@ -136,8 +136,7 @@ def from_gauges(line: Array, gauges: Array) -> Array:
     if not (step > 0).all():  # NaN too
         raise SectionError("the line with points must be given at every station, no point twice")
     along = np.concatenate([[0.0], np.cumsum(step)])
-    spline = CubicSpline(along, line, bc_type=((1, np.array([0.0, 1.0])), (2, np.zeros(2))))
-    tangent = spline(along, 1)
+    tangent = CubicSpline(along, line, start=np.array([0.0, 1.0])).slope
     normal = np.stack([tangent[:, 1], -tangent[:, 0]], -1) / np.hypot(*tangent.T)[:, None]
     points: Array = line + gauges[..., None] * normal
     return points
@@ -207,8 +206,8 @@ def resample(section: Section, intervals: list[int]) -> tuple[Array, list[str], 
     for _, count in section.regions:
         stations = np.arange(start, start + count + 1)
         inside = (where >= start) & (where <= start + count)
-        spline = CubicSpline(stations, points[:, stations], axis=1)
-        out[:, inside] = spline(where[inside])
+        spline = CubicSpline(stations, points[:, stations].swapaxes(0, 1))
+        out[:, inside] = spline(where[inside]).swapaxes(0, 1)
         start += count
     nearest = np.rint(where).astype(int)
     exact = abs(where - nearest) < 1e-9
