@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib import colormaps
-from matplotlib.cm import ScalarMappable
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection, TriMesh
 from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
-from mpl_toolkits.mplot3d import Axes3D
-from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
+from matplotlib.tri import Triangulation
 
 from ..simulate.modes.mode import Mode
 from ..tyre.section.mesh import SectionMesh
@@ -22,9 +23,11 @@ from .revolve import motion, skin, swept
 Array = np.ndarray
 
 ANGLES = 72
+MERIDIAN_POINTS = 49  # at most; more are not seen
 MAX_MOTION = 0.12  # displacement in the picture over the tyre's radius
-NEARER = 0.03  # of the radius: bold lines over the surface that they lie on
-VIEW = 1.15  # half a view's width over the tyre's radius
+LINE_WIDTH = 0.009  # inches: meridians in bold
+NEARER = 0.1  # inches: these, to the viewer, so that only other parts of the tyre hide them
+VIEW = 1.3  # half a view's width over the tyre's radius
 COLOUR_MAP = colormaps["viridis"]
 PERSPECTIVE = (22.0, -55.0)
 
@@ -37,17 +40,17 @@ def draw_mode(path: Path, mode: Mode, mesh: SectionMesh, scale: float | None = N
     of the radius. Raises InputError.
     """
     surface = _surface(mode, mesh, scale)
-    figure = new_figure(9.2, 5.7, None)
+    figure, sheet = _sheet(9.2, 5.7)
     for name, x, y, half, below, elevation, azimuth in (
         ("top", 1.9, 4.55, 1.85, 0.95, 90, -90),
         ("front, along the axle", 1.9, 1.8, 1.85, 1.68, 0, -90),
         ("side", 4.3, 1.8, 1.85, 1.68, 0, 0),
         ("perspective", 7.1, 3.1, 2.3, 2.12, *PERSPECTIVE),
     ):
-        _view(figure, surface, (x, y), half, elevation, azimuth)
-        figure.text(x / 9.2, (y - below) / 5.7, name, ha="center", va="center", color="0.3")
-    figure.suptitle(title(mode), x=0.5)
-    _key(figure, [mode], (5.6, 5.2))
+        _view(sheet, surface, (x, y), half, elevation, azimuth)
+        sheet.text(x, y - below, name, ha="center", va="center", color="0.3")
+    sheet.text(4.6, 5.5, title(mode), ha="center", va="center", fontsize=11)
+    _key(sheet, [mode], (5.6, 5.2))
     save(figure, path)
 
 
@@ -56,29 +59,41 @@ def draw_modes_overview(path: Path, modes: Sequence[Mode], mesh: SectionMesh) ->
     """Draw up to nine modes, lowest first, in perspective on one sheet. Raises InputError."""
     lowest = sorted(modes, key=lambda mode: mode.frequency_Hz)[:9]
     height = 0.9 + 3.2 * -(-len(lowest) // 3)
-    figure = new_figure(9.0, height, None)
+    figure, sheet = _sheet(9.0, height)
     for k, mode in enumerate(lowest):
         x, y = 1.5 + 3 * (k % 3), height - 1.8 - 3.2 * (k // 3)
-        _view(figure, _surface(mode, mesh, None), (x, y), 1.45, *PERSPECTIVE)
-        figure.text(x / 9.0, (y + 1.38) / height, title(mode).replace(" - ", "\n"), ha="center")
-    _key(figure, lowest, (0.3, 0.3))
+        _view(sheet, _surface(mode, mesh, None), (x, y), 1.45, *PERSPECTIVE)
+        sheet.text(x, y + 1.38, title(mode).replace(" - ", "\n"), ha="center")
+    _key(sheet, lowest, (0.3, 0.3))
     save(figure, path)
 
 
-def _key(figure: Figure, modes: Sequence[Mode], words_at: tuple[float, float]) -> None:
-    """What the colours are, at the foot, and the lines, at inches from the lower left corner."""
-    width, height = figure.get_size_inches()
-    bar = figure.add_axes((5.9 / width, 0.3 / height, 2.4 / width, 0.08 / height))
-    figure.colorbar(
-        ScalarMappable(cmap=COLOUR_MAP), bar, orientation="horizontal", ticks=[0, 0.5, 1]
-    )
-    bar.set_title("displacement over the largest", fontsize=8, color="0.3")
-    bar.tick_params(labelsize=8)
-    words = ["grey: outline at rest"]
+def _sheet(width: float, height: float) -> tuple[Figure, Axes]:
+    """One plane for all views, in inches from its lower left corner: axes cost more than faces."""
+    figure = new_figure(width, height, None)
+    sheet = figure.add_axes((0, 0, 1, 1))
+    sheet.set_axis_off()
+    sheet.set(xlim=(0, width), ylim=(0, height))
+    return figure, sheet
+
+
+def _key(sheet: Axes, modes: Sequence[Mode], words_at: tuple[float, float]) -> None:
+    """What the colours are, at the foot, and the lines, in inches from the lower left corner."""
+    left, right, low, high = bar = 5.9, 8.3, 0.3, 0.38
+    limits = sheet.viewLim.frozen()
+    shades = np.linspace(0, 1, 256)[None]
+    sheet.imshow(shades, COLOUR_MAP, extent=bar, aspect="auto", interpolation="nearest")
+    sheet.set(xlim=limits.intervalx, ylim=limits.intervaly)
+    words: dict[str, Any] = {"fontsize": 8, "color": "0.3"}
+    for share in (0, 0.5, 1):
+        at = left + share * (right - left)
+        sheet.text(at, low - 0.04, f"{share:g}", ha="center", va="top", **words)
+    middle = (left + right) / 2
+    sheet.text(middle, high + 0.06, "displacement over the largest", ha="center", **words)
+    lines = ["grey: outline at rest"]
     if any(_twists(mode) for mode in modes):
-        words.append("orange: meridians at rest")
-    x, y = words_at
-    figure.text(x / width, y / height, "; ".join(words), fontsize=8, color="0.3")
+        lines.append("orange: meridians at rest")
+    sheet.text(*words_at, "; ".join(lines), **words)
 
 
 def _twists(mode: Mode) -> bool:
@@ -89,16 +104,19 @@ def _twists(mode: Mode) -> bool:
 @dataclass(frozen=True)
 class _Surface:
     """rest, moved (k, angle, 3); share (k, angle): of the largest displacement; twists: the
-    meridians at rest are drawn."""
+    meridians at rest are drawn; sides: the rows of the widest points."""
 
     rest: Array
     moved: Array
     share: Array
-    twists: bool = False
+    twists: bool
+    sides: tuple[int, int]
 
 
 def _surface(mode: Mode, mesh: SectionMesh, scale: float | None) -> _Surface:
     nodes = skin(mesh)
+    points = min(len(nodes), MERIDIAN_POINTS)
+    nodes = nodes[np.linspace(0, len(nodes) - 1, points).round().astype(int)]
     angles = 2 * np.pi * np.arange(ANGLES + 1) / ANGLES
     rest = swept(nodes, mesh, angles)
     u = motion(mode.raw, nodes, angles)
@@ -112,7 +130,8 @@ def _surface(mode: Mode, mesh: SectionMesh, scale: float | None) -> _Surface:
         u = np.cos(phase) * u + np.sin(phase) * quarter
     size = np.linalg.norm(u, axis=-1)
     scale = MAX_MOTION * np.abs(rest).max() / size.max() if scale is None else scale
-    return _Surface(rest, rest + scale * u, size / size.max(), _twists(mode))
+    sides = int(np.argmin(rest[:, 0, 1])), int(np.argmax(rest[:, 0, 1]))
+    return _Surface(rest, rest + scale * u, size / size.max(), _twists(mode), sides)
 
 
 def title(mode: Mode) -> str:
@@ -122,7 +141,7 @@ def title(mode: Mode) -> str:
 
 
 def _view(
-    figure: Figure,
+    sheet: Axes,
     surface: _Surface,
     centre: tuple[float, float],
     half: float,
@@ -130,61 +149,73 @@ def _view(
     azimuth: float,
 ) -> None:
     """One orthographic view, ``half`` inches to each side of ``centre``."""
-    width, height = figure.get_size_inches()
-    x, y = centre
-    place = ((x - half) / width, (y - half) / height, 2 * half / width, 2 * half / height)
-    axes = figure.add_axes(place, projection="3d", computed_zorder=False)
-    assert isinstance(axes, Axes3D)
-    axes.set_axis_off()
-    axes.patch.set_alpha(0)
-    axes.set_proj_type("ortho")
-    axes.view_init(elevation, azimuth)
-    reach = VIEW * np.abs(surface.rest).max()
-    axes.set(xlim=(-reach, reach), ylim=(-reach, reach), zlim=(-reach, reach))
-    axes.set_box_aspect((1, 1, 1), zoom=1.5)
-    axes.add_collection3d(_faces(surface, elevation, azimuth))
-    axes.add_collection3d(_outline(surface.rest, elevation, azimuth))
-
-
-def _viewer(elevation: float, azimuth: float) -> Array:
-    """Unit vector towards the viewer."""
     up, round_ = np.radians([elevation, azimuth])
-    return np.array([np.cos(up) * np.cos(round_), np.cos(up) * np.sin(round_), np.sin(up)])
+    right = [-np.sin(round_), np.cos(round_), 0]
+    viewer = [np.cos(up) * np.cos(round_), np.cos(up) * np.sin(round_), np.sin(up)]
+    inches = half / VIEW / np.abs(surface.rest).max()
+    screen = inches * np.stack([right, np.cross(viewer, right), viewer], -1)
+    rest, moved = (points @ screen + [*centre, 0] for points in (surface.rest, surface.moved))
+    seen = replace(surface, rest=rest, moved=moved)
+    through_rim = 0.01 < abs(viewer[1]) < 0.99
+    sheet.add_collection(_faces(seen, through_rim), autolim=False)
+    sheet.add_collection(_outline(seen), autolim=False)
 
 
-def _faces(surface: _Surface, elevation: float, azimuth: float) -> Poly3DCollection:
-    p, share = surface.moved, surface.share
-    quads = np.stack([p[:-1, :-1], p[1:, :-1], p[1:, 1:], p[:-1, 1:]], 2).reshape(-1, 4, 3)
-    mean = (share[:-1, :-1] + share[1:, :-1] + share[1:, 1:] + share[:-1, 1:]).ravel() / 4
-    # meridians in bold, as faces without area so that nearer faces hide them: they show a twist;
-    # towards the viewer by a little, which moves nothing in the picture, so that their own do not
-    nearer = NEARER * np.abs(surface.rest).max() * _viewer(elevation, azimuth)
-    lines = []
-    for points in (p, surface.rest) if surface.twists else (p,):
-        bold = points[:, : -1 : ANGLES // 12] + nearer
-        lines.append(np.stack([bold[:-1], bold[1:], bold[1:], bold[:-1]], 2).reshape(-1, 4, 3))
-    kinds = np.repeat(np.arange(1 + len(lines)), [len(quads), *map(len, lines)])
-    edges = np.array([(0, 0, 0, 0.12), (0, 0, 0, 1), to_rgba(COLOURS[1])])
-    return Poly3DCollection(
-        np.concatenate([quads, *lines]),
-        facecolors=COLOUR_MAP(np.append(mean, np.zeros(len(kinds) - len(quads)))),
-        edgecolors=edges[kinds],
-        linewidths=0.6,
-    )
+def _faces(seen: _Surface, through_rim: bool) -> TriMesh:
+    """A surface on the screen (right, upwards, towards the viewer), its meridians in bold, as they
+    show a twist; the farthest triangles first. Faces turned away are seen through the rim only."""
+    rows, columns = seen.share.shape
+    node = np.arange(rows * columns).reshape(rows, columns)
+    quads = np.stack([node[:-1, :-1], node[1:, :-1], node[1:, 1:], node[:-1, 1:]], -1)
+    if not through_rim:
+        quads = quads[_towards(seen.moved)]
+    points, triangles = [seen.moved.reshape(-1, 3)], [_halves(quads)]
+    colours = [COLOUR_MAP(seen.share.ravel())]
+    for line, colour in ((seen.moved, "black"), (seen.rest, COLOURS[1]))[: 1 + seen.twists]:
+        corners = _strips(line[:, : -1 : ANGLES // 12])
+        first = sum(map(len, points))
+        points.append(corners)
+        triangles.append(_halves(first + np.arange(len(corners)).reshape(-1, 4)))
+        colours.append(np.tile(to_rgba(colour), (len(corners), 1)))
+    x, y, depth = np.concatenate(points).T
+    faces = np.concatenate(triangles)
+    order = np.argsort(depth[faces].mean(1), kind="stable")
+    return TriMesh(Triangulation(x, y, faces[order]), facecolors=np.concatenate(colours))
 
 
-def _outline(rest: Array, elevation: float, azimuth: float) -> Line3DCollection:
+def _halves(quads: Array) -> Array:
+    """Two triangles for each of ``quads`` (..., 4)."""
+    flat = quads.reshape(-1, 4)
+    return np.concatenate([flat[:, [0, 1, 2]], flat[:, [0, 2, 3]]])
+
+
+def _strips(lines: Array) -> Array:
+    """Corners (4 a segment, 3) of strips along ``lines`` (point, line, 3)."""
+    start, end = lines[:-1].reshape(-1, 3), lines[1:].reshape(-1, 3)
+    right, up = (end - start)[:, :2].T
+    across = np.stack([-up, right, np.zeros(len(start))], -1)
+    across *= LINE_WIDTH / 2 / np.maximum(np.hypot(right, up), LINE_WIDTH)[:, None]
+    corners = np.stack([start - across, start + across, end + across, end - across], 1)
+    return corners.reshape(-1, 3) + np.array([0, 0, NEARER])
+
+
+def _towards(points: Array) -> Array:
+    """Whether each face (k, angle) between ``points`` on the screen is turned to the viewer."""
+    along, around = points[1:, :-1] - points[:-1, :-1], points[:-1, 1:] - points[:-1, :-1]
+    turned: Array = along[..., 0] * around[..., 1] < along[..., 1] * around[..., 0]
+    return turned
+
+
+def _outline(seen: _Surface) -> LineCollection:
     """The tyre at rest in silhouette: edges between faces turned to the viewer and away.
 
     Only outside the widest points: nearer the rim such edges are hidden or do not move.
     """
-    widest = np.sort([np.argmin(rest[:, 0, 1]), np.argmax(rest[:, 0, 1])])
-    rest = rest[max(widest[0] - 1, 0) : widest[1] + 2]
-    viewer = _viewer(elevation, azimuth)
-    along, around = rest[1:, :-1] - rest[:-1, :-1], rest[:-1, 1:] - rest[:-1, :-1]
-    towards = np.cross(along, around) @ viewer > 0
+    first, last = sorted(seen.sides)
+    rest = seen.rest[max(first - 1, 0) : last + 2]
+    towards = _towards(rest)
     rings = np.argwhere(towards[1:] != towards[:-1])
     meridians = np.argwhere(towards != np.roll(towards, 1, axis=1))
-    edges = [(rest[i + 1, j], rest[i + 1, j + 1]) for i, j in rings]
-    edges += [(rest[i, j], rest[i + 1, j]) for i, j in meridians]
-    return Line3DCollection(edges, colors="0.35", lw=0.8)
+    edges = [(rest[i + 1, j, :2], rest[i + 1, j + 1, :2]) for i, j in rings]
+    edges += [(rest[i, j, :2], rest[i + 1, j, :2]) for i, j in meridians]
+    return LineCollection(edges, colors="0.35", lw=0.8)
