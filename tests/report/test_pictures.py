@@ -111,7 +111,7 @@ def test_a_scale_is_kept(tyre):
 
 def _amplitude(mode: Mode, mesh: SectionMesh) -> np.ndarray:
     rows = {int(n): k for k, n in enumerate(mode.raw.shape.nodes)}
-    return mode.raw.shape.amplitude[[rows[int(n)] for n in shapes.skin(mesh)]].real
+    return mode.raw.shape.amplitude[[rows[int(n)] for n in shapes._drawn(mesh)]].real
 
 
 def test_title(tyre):

@@ -23,7 +23,7 @@ from .revolve import motion, skin, swept
 Array = np.ndarray
 
 ANGLES = 72
-MERIDIAN_POINTS = 49  # at most; more are not seen
+MAX_MERIDIAN_POINTS = 49  # more are not seen
 MAX_MOTION = 0.12  # displacement in the picture over the tyre's radius
 LINE_WIDTH = 0.009  # inches: meridians in bold
 NEARER = 0.1  # inches: these, to the viewer, so that only other parts of the tyre hide them
@@ -113,10 +113,15 @@ class _Surface:
     sides: tuple[int, int]
 
 
-def _surface(mode: Mode, mesh: SectionMesh, scale: float | None) -> _Surface:
+def _drawn(mesh: SectionMesh) -> Array:
+    """The nodes of a drawn meridian: of the outer surface, its ends among them."""
     nodes = skin(mesh)
-    points = min(len(nodes), MERIDIAN_POINTS)
-    nodes = nodes[np.linspace(0, len(nodes) - 1, points).round().astype(int)]
+    count = min(len(nodes), MAX_MERIDIAN_POINTS)
+    return nodes[np.linspace(0, len(nodes) - 1, count).round().astype(int)]
+
+
+def _surface(mode: Mode, mesh: SectionMesh, scale: float | None) -> _Surface:
+    nodes = _drawn(mesh)
     angles = 2 * np.pi * np.arange(ANGLES + 1) / ANGLES
     rest = swept(nodes, mesh, angles)
     u = motion(mode.raw, nodes, angles)
