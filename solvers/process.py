@@ -13,24 +13,14 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+from .errors import RunFailed
+
 GRACE_S = 2.0  # for a group that was asked to end
 OWN_GROUP: dict[str, Any] = {"start_new_session": True}
 if sys.platform == "win32":
     OWN_GROUP = {"creationflags": subprocess.CREATE_NEW_PROCESS_GROUP}
 
 _running: list[subprocess.Popen[bytes]] = []
-
-
-class RunFailed(RuntimeError):
-    """An external solver did not deliver.
-
-    cause: ``crashed``, ``timed_out``, ``no_results``, ``licence``, ``unstable`` or
-    ``no_equilibrium``; the message ends with the solver's own last words.
-    """
-
-    def __init__(self, cause: str, message: str, words: str = ""):
-        super().__init__(f"{message}: {words}" if words else message)
-        self.cause = cause
 
 
 def run_command(

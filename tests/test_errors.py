@@ -1,37 +1,76 @@
-"""The tree of errors is as its drawing says, and nothing beside it is told in one sentence."""
+"""The trees of errors are as their drawings say, few, and nothing beside them is an error."""
 
 from __future__ import annotations
 
+import ast
+import builtins
 import importlib
-import pkgutil
 import re
 
-import tyrecal
+import pytest
+import tyrecal_solvers.errors
+
 from tyrecal import errors
+from tyrecal.errors import TyrecalError
+
+from .test_architecture import modules
+
+BUILTIN = {name for name, kind in vars(builtins).items() if isinstance(kind, type)}
 
 
-def drawn() -> dict[str, tuple[str, int]]:
-    """Name to parent and exit code, as the drawing has them; a child has its parent's code."""
-    found: dict[str, tuple[str, int]] = {}
+def drawn(text: str) -> dict[str, tuple[str, str]]:
+    """Name to parent and exit code, as a drawing has them; a child has its parent's code."""
+    found: dict[str, tuple[str, str]] = {}
     above: list[tuple[int, str]] = []
     for indent, name, code in re.findall(
-        r"^( {4,})([A-Z]\w+)(?:, (\d))?(?: {2,}|$)", errors.__doc__ or "", re.M
+        r"^( {4,})([A-Z]\w+)(?:, (\d))?(?: {2,}|$)", text, re.MULTILINE
     ):
         above = [(depth, parent) for depth, parent in above if depth < len(indent)]
-        parent = above[-1][1] if above else "Exception"
-        found[name] = parent, int(code or found.get(parent, ("", 2))[1])
+        parent = above[-1][1] if above else ""
+        found[name] = parent, code or found.get(parent, ("", "2"))[1]
         above.append((len(indent), name))
     return found
 
 
-def test_the_drawing_is_the_tree() -> None:
-    for module in pkgutil.walk_packages(tyrecal.__path__, "tyrecal."):
-        if not module.name.endswith("__main__"):
-            importlib.import_module(module.name)
-    tree: dict[str, tuple[str, int]] = {}
-    waiting: list[type[errors.TyrecalError]] = [errors.TyrecalError]
-    while waiting:
-        kind = waiting.pop()
-        tree[kind.__name__] = kind.__bases__[0].__name__, kind.exit_code
-        waiting += kind.__subclasses__()
-    assert tree == drawn()
+def exceptions() -> dict[str, tuple[str, str]]:
+    """Name to module and first base of every class that is an exception, wherever it is defined."""
+    classes: dict[str, tuple[str, str]] = {}
+    for module, path in modules().items():
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ClassDef) and node.bases:
+                classes[node.name] = module, ast.unparse(node.bases[0])
+    found: dict[str, tuple[str, str]] = {}
+    while new := {
+        name: (module, base)
+        for name, (module, base) in classes.items()
+        if name not in found
+        and (base in found or (base in BUILTIN and issubclass(vars(builtins)[base], BaseException)))
+    }:
+        found |= new
+    return found
+
+
+def test_all_exceptions_are_drawn() -> None:
+    """In the tree of the package that defines them, below the parent that they are drawn below."""
+    for top, text in (("tyrecal", errors.__doc__), ("tyrecal_solvers", solvers_text())):
+        tree = drawn(text or "")
+        own = {n: base for n, (m, base) in exceptions().items() if m.split(".")[0] == top}
+        assert own.keys() == tree.keys()
+        for name, base in own.items():
+            assert tree[name][0] == ("" if base in BUILTIN else base), name
+
+
+def solvers_text() -> str | None:
+    """The drawing of the solvers' errors."""
+    return tyrecal_solvers.errors.__doc__
+
+
+def test_they_are_few() -> None:
+    assert len(exceptions()) <= 20
+
+
+@pytest.mark.parametrize("name", sorted(drawn(errors.__doc__ or "")))
+def test_the_exit_codes_are_the_drawn_ones(name: str) -> None:
+    kind = getattr(importlib.import_module(exceptions()[name][0]), name)
+    assert issubclass(kind, TyrecalError)
+    assert kind.exit_code == int(drawn(errors.__doc__ or "")[name][1])

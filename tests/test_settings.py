@@ -12,7 +12,7 @@ import pytest
 from tyrecal.errors import InputError
 from tyrecal.simulate import settings
 from tyrecal.simulate.evaluate.solver import find_solver
-from tyrecal.simulate.settings import SettingsError, command_of, place, root
+from tyrecal.simulate.settings import command_of, place, root
 
 from .cli.test_cli import CASE, run
 from .conftest import CASES
@@ -88,7 +88,7 @@ def test_a_relative_path_is_not_that_of_the_run_folder(
     assert command_of("calculix")[0] == [str(tmp_path / "bin/ccx"), "-x"]
     monkeypatch.delenv("TYRECAL_SOLVER_COMMAND")
     file.write_text("commands: {calculix: bin/ccx}\n")
-    with pytest.raises(SettingsError, match="a name or a whole path"):
+    with pytest.raises(InputError, match="a name or a whole path"):
         command_of("calculix")
 
 

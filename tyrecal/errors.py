@@ -7,14 +7,16 @@
             EffectRefused           an effect's parameter
             TemplateFailed          a deck template
             DeckRefused             a deck that the solver refuses
-            SettingsError           the user's settings file, or a command in it
-            NotThisFit              a fit of another tyre
-            NotAdded                an effect that no case can be written with
+            Damaged                 a record that is not as it was written
+        NotAFile                    a link, pipe or device where a file of ours should be
         EvaluationFailed, 3         one run of the solver, with its cause and folder
         SolverUnavailable, 3        no run at all can be made
+        Interrupted                 a signal, with the exit code that the shell gives it
 
-What is not here and comes out of a command is a fault of the tool's, and has a traceback; what the
-system refuses, as a full disc, is an OSError and ends with 2.
+The solvers, which know nothing of the tool, have six of their own, drawn in `solvers/errors.py`:
+an adapter names them, and here they become DeckRefused and EvaluationFailed. What is in neither
+and comes out of a command is a fault of the tool's, and has a traceback; what the system refuses,
+as a full disc, is an OSError and ends with 2.
 """
 
 from __future__ import annotations

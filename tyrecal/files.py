@@ -19,6 +19,8 @@ from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 from typing import Any, BinaryIO
 
+from .errors import TyrecalError
+
 MAX_FILE_BYTES = 50_000_000  # bytes of a file that is read whole; ours are a hundredth of it
 NOFOLLOW = getattr(os, "O_NOFOLLOW", 0)  # Windows has none: there `refuse_link` is all
 
@@ -107,7 +109,7 @@ def write_runs(folder: Path, new: Mapping[str, Any], many_writers: bool = False)
     write_text(folder / RUN, json_text({**read_runs(folder), **new}), many_writers)
 
 
-class NotAFile(OSError):
+class NotAFile(TyrecalError, OSError):
     """What should be a file or folder of ours is something else: a link, a pipe, a device."""
 
     def __init__(self, path: Path, words: str):

@@ -11,12 +11,11 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ..bundled.deck.keywords import DeckError
-from ..process import RunFailed
+from ..errors import Refused, RunFailed
 from .dat import read_dat
 from .evidence import checked_modes
 from .launch import run_job
-from .options import OptionRefused, load, read_options
+from .options import load, read_options
 from .question import read_question
 from .rings import check_revolved, components, cylindrical
 
@@ -41,7 +40,7 @@ class Abaqus:
     name = "abaqus"
     dialect = "abaqus"
     capabilities = frozenset({"modes", "vibration_modulus", "spindle"})
-    refusals = (OptionRefused, DeckError)
+    refusals = (Refused,)
     failures = (RunFailed,)
 
     def __init__(self) -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..process import RunFailed
+from ..errors import RunFailed
 from .dat import DatTable
 from .fil import SIM, Modes, read_fil
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..process import RunFailed
+from ..errors import RunFailed
 from .records import Item, records
 
 Array = np.ndarray

@@ -6,7 +6,8 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from ..process import RunFailed, last_words, run_command
+from ..errors import RunFailed
+from ..process import last_words, run_command
 from .licence import denial, is_queueing
 from .options import Options
 

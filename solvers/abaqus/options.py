@@ -8,11 +8,9 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from ..errors import Refused
+
 OPTIONS_FILE = "abaqus.json"
-
-
-class OptionRefused(ValueError):
-    """An option that the runner does not have, or a value that it cannot take."""
 
 
 @dataclass(frozen=True)
@@ -40,16 +38,16 @@ def load(folder: Path) -> Options:
 
 
 def read_options(given: Mapping[str, Any]) -> Options:
-    """Options of a case. Raises OptionRefused."""
+    """Options of a case. Raises Refused."""
     unknown = sorted(set(given) - set(Options.__dataclass_fields__))
     if unknown:
         known = ", ".join(Options.__dataclass_fields__)
-        raise OptionRefused(f"solver.options: abaqus has no '{unknown[0]}', only {known}")
+        raise Refused(f"solver.options: abaqus has no '{unknown[0]}', only {known}")
     values = dict(given)
     for name, least in (("licence_wait_s", 0.0), ("licence_first_wait_s", 1e-3)):
         value = values.get(name, least)
         if isinstance(value, bool) or not isinstance(value, int | float) or not value >= least:
-            raise OptionRefused(
+            raise Refused(
                 f"solver.options.{name} must be a number of at least {least:g}, got {value!r}"
             )
     return Options(**values)

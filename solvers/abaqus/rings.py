@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..process import RunFailed
+from ..errors import RunFailed
 
 Array = np.ndarray
 

@@ -8,8 +8,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from .deck.keywords import DeckError
-from .job import Failures, TimedOut, run
+from ..errors import Refused, RunFailed
+from .job import run
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -34,10 +34,10 @@ def main(arguments: list[str] | None = None) -> int:
                 ]
             )
         )
-    except (DeckError, OSError) as error:
+    except (Refused, OSError) as error:
         print(f"error: {_printable(error)}", file=sys.stderr)
         return 2
-    except (*Failures, TimedOut) as error:
+    except RunFailed as error:
         print(f"failed: {_printable(error)}", file=sys.stderr)
         return 3
     except KeyboardInterrupt:

@@ -9,9 +9,9 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from ..errors import Refused, RunFailed
 from . import VERSION
-from .deck.keywords import DeckError
-from .job import Failures, TimedOut, run
+from .job import run
 from .road import footprint_job
 
 JOB, PRESS, OLDJOB = "modes", "press", "inflate"
@@ -52,8 +52,8 @@ class Bundled:
             "rotation",
         }
     )
-    refusals = (DeckError,)
-    failures = (*Failures, TimedOut)
+    refusals = (Refused,)
+    failures = (RunFailed,)
 
     def write(self, decks: Decks, folder: Path) -> list[Path]:
         """Write the decks and, beside them, what only this solver is asked."""

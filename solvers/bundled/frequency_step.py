@@ -26,7 +26,7 @@ Array = np.ndarray
 class FrequencyStep:
     """A step of the tyre; ``place``: its own among all of the deck.
 
-    Raises DeckError, Unstable, NotConverged, NotSelfConsistent, InflationFailed.
+    Raises DeckError, RunFailed.
     """
 
     def __init__(self, tyre: Inflated, place: int, step: DeckStep):

@@ -11,36 +11,26 @@ from typing import Any
 import numpy as np
 from threadpoolctl import ThreadpoolController
 
+from ..errors import RunFailed
 from .deck.keywords import DeckError, Keyword, read_deck
 from .deck.request import Request, read_request, read_sector
 from .deck.steps import Deck, DeckStep
 from .frequency_step import FrequencyStep
-from .modes.frequency_dependent import NotSelfConsistent
-from .modes.harmonics import HarmonicModes, Unstable
+from .modes.harmonics import HarmonicModes
 from .modes.inflated import Inflated
-from .modes.lanczos import NotConverged
 from .results import StepResult, write
 from .road import footprint_job
-from .road.contact_newton import NotPressed
 from .section.boundary import numbering
-from .section.inflation import InflationFailed, equilibrium
+from .section.inflation import equilibrium
 from .section.loads import loads, pressures
 from .section.mechanics import mass
 from .section.model import build
-
-Failures = (InflationFailed, Unstable, NotConverged, NotSelfConsistent, NotPressed)
-
-
-class TimedOut(ArithmeticError):
-    """The time limit passed."""
-
-    cause = "timed_out"
 
 
 def run(folder: Path, job: str, oldjob: str | None, time_limit: float = float("inf")) -> None:
     """Run ``job`` (on top of ``oldjob``) in ``folder``; write JOB.json and JOB.npz there.
 
-    Raises DeckError; one of `Failures`; TimedOut; OSError.
+    Raises Refused, RunFailed, OSError.
     """
     deadline = time.monotonic() + time_limit
     with _threads().limit(limits=1, user_api="blas"):
@@ -55,7 +45,7 @@ def run(folder: Path, job: str, oldjob: str | None, time_limit: float = float("i
             else:
                 write(folder / job, analysis.model, analysis.run())
         except (np.linalg.LinAlgError, OverflowError, ZeroDivisionError) as error:
-            raise NotConverged(f"the deck's numbers are too far apart: {error}") from None
+            raise RunFailed("crashed", f"the deck's numbers are too far apart: {error}") from None
 
 
 @cache
@@ -135,7 +125,6 @@ class Job:
             self.road,
             wanted,
             self._check_time,
-            TimedOut,
             vibrations,
         )
         return {"pressure_Pa": step.pressure, "mass_kg": self.mass_kg, **found}
@@ -175,4 +164,4 @@ class Job:
 
     def _check_time(self) -> None:
         if time.monotonic() > self.deadline:
-            raise TimedOut("the time limit passed")
+            raise RunFailed("timed_out", "the time limit passed")

@@ -15,7 +15,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ..process import RunFailed, end_commands
+from ..errors import Refused, RunFailed
+from ..process import end_commands
 from .results import Fields, pairs, read_eigenvalues, read_fields, read_mass
 from .runner import clear, run_job
 
@@ -23,10 +24,6 @@ Array = np.ndarray
 SECTOR, SETTINGS, INFLATE = "sector.inp", "calculix.json", "inflate"
 REVOLVED = 1e-3  # of the largest displacement; 2e-4 moves no frequency by 0.001 %, 9e-3 one by 5 %
 OPTIONS: dict[str, Any] = {"parallel": 1, "element": "C3D20R", "ply_thickness_m": 2e-4}
-
-
-class Refused(ValueError):
-    """The case asks for what CalculiX, or this adapter, cannot do."""
 
 
 class Decks(Protocol):

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..process import RunFailed
+from ..errors import RunFailed
 
 Array = np.ndarray
 SAME = 1e-4  # relative difference of the two eigenvalues of a pair, at most

@@ -8,7 +8,8 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
-from ..process import RunFailed, last_words, run_command
+from ..errors import RunFailed
+from ..process import last_words, run_command
 
 RESULT_SUFFIXES = ("dat", "frd", "sta", "cvg", "12d", "rout")
 LONGEST_LINE = 10_000  # characters of a log

@@ -18,7 +18,7 @@ import pytest
 
 from tyrecal.simulate.evaluate.cluster import connected
 from tyrecal.simulate.evaluate.executor import executor, in_order
-from tyrecal.simulate.evaluate.failure import SolverUnavailable, WorkerLost
+from tyrecal.simulate.evaluate.failure import EvaluationFailed, SolverUnavailable
 
 from ..cli.test_cli import run
 from ..conftest import ROOT
@@ -140,7 +140,7 @@ def test_a_task_that_kills_workers_is_given_up(tmp_path: Path) -> None:
             wait_for(lambda: len(workers.client.scheduler_info(-1)["workers"]) == 3)
             answers = dict(workers.each(square, [5.0, 3.0, 7.0]))
         assert answers[0] == 25 and answers[2] == 49
-        assert isinstance(answers[1], WorkerLost) and "2 workers died" in str(answers[1])
+        assert isinstance(answers[1], EvaluationFailed) and "2 workers died" in str(answers[1])
     finally:
         own.stop()
 

@@ -10,12 +10,13 @@ import numpy as np
 import pytest
 from tyrecal_solvers.bundled.deck import grammar, keywords
 from tyrecal_solvers.bundled.modes import harmonics
-from tyrecal_solvers.bundled.road.contact_newton import ContactNewton, NotPressed, PressedState
+from tyrecal_solvers.bundled.road.contact_newton import ContactNewton, PressedState
 from tyrecal_solvers.bundled.section import inflation, mechanics, model
 from tyrecal_solvers.bundled.section.band import Numbering
 from tyrecal_solvers.bundled.section.model import Model
 from tyrecal_solvers.bundled.section.parts.pressure import Pressure
 from tyrecal_solvers.bundled.section.parts.spin import spinning
+from tyrecal_solvers.errors import NoEquilibrium
 
 from tyrecal.tyre.section.mesh import build_mesh
 from tyrecal.tyre.section.section import read_section
@@ -31,7 +32,7 @@ def bears(patch: pytest.MonkeyPatch, most_N: float) -> None:
 
     def at_most(press: ContactNewton, load: float) -> PressedState:
         if load > most_N:
-            raise NotPressed("too much")
+            raise NoEquilibrium("too much")
         return newton(press, load)
 
     patch.setattr(ContactNewton, "_newton", at_most)

@@ -14,7 +14,8 @@ import pytest
 from tyrecal_solvers.bundled import job
 from tyrecal_solvers.bundled.deck.keywords import DeckError
 from tyrecal_solvers.bundled.road import footprint_job
-from tyrecal_solvers.bundled.road.contact_newton import ContactNewton, NotPressed
+from tyrecal_solvers.bundled.road.contact_newton import ContactNewton
+from tyrecal_solvers.errors import NoEquilibrium, RunFailed
 
 from tyrecal.simulate.deck.decks import Decks
 from tyrecal.simulate.deck.tyre_design import TyreDesign
@@ -263,7 +264,7 @@ def test_an_unreachable_load_keeps_the_others(
 
 
 def test_the_time_limit_passes(tmp_path: Path) -> None:
-    with pytest.raises(job.TimedOut, match="time limit"):
+    with pytest.raises(RunFailed, match="time limit"):
         run(tmp_path, limit=0.05)
 
 
@@ -276,7 +277,7 @@ class Late:
     def __call__(self) -> None:
         self.left -= 1
         if self.left < 0:
-            raise job.TimedOut("the time limit passed")
+            raise RunFailed("timed_out", "the time limit passed")
 
 
 def test_nothing_pickled_is_read(tmp_path: Path) -> None:
@@ -301,7 +302,7 @@ LENGTHS = np.radians([3.0] * 6 + [12.0, 30.0, 60.0, 60.0])
 
 
 def test_a_first_load_out_of_reach_fails(solid: Round) -> None:
-    with pytest.raises(NotPressed, match="flat on its rim"):
+    with pytest.raises(NoEquilibrium, match="flat on its rim"):
         solid.press(LENGTHS, 1e10).to(1e7)
 
 
@@ -310,7 +311,7 @@ def test_a_clock_that_runs_out_between_loads(solid: Round) -> None:
     press = solid.press(LENGTHS, 1e10)
     first = press.to(50.0)
     press.check = Late(1)
-    with pytest.raises(job.TimedOut):
+    with pytest.raises(RunFailed):
         press.to(200.0)
     assert press.load == 50.0
     np.testing.assert_array_equal(press.parts, first.parts)
@@ -319,9 +320,7 @@ def test_a_clock_that_runs_out_between_loads(solid: Round) -> None:
 def footprints(work: Round, clock: Late, loads: list[float]) -> dict[str, Any]:
     road = footprint_job.RoadData("1", "TREAD", 1e10, 0.0, 1e-5, LENGTHS)
     equations = support.numbering(work.model, ~work.free)
-    return footprint_job.press(
-        work.model, equations, work.loads, work.U, road, loads, clock, job.TimedOut
-    )
+    return footprint_job.press(work.model, equations, work.loads, work.U, road, loads, clock)
 
 
 def test_footprints_before_the_time_limit_stay(solid: Round) -> None:
@@ -333,7 +332,7 @@ def test_footprints_before_the_time_limit_stay(solid: Round) -> None:
     assert [f["load_N"] for f in found["footprints"]] == [50.0]
     assert found["footprints"][0]["deflection_m"] == wanted["footprints"][0]["deflection_m"]
     assert wanted["cause"] == wanted["failure"] == ""
-    with pytest.raises(job.TimedOut):
+    with pytest.raises(RunFailed):
         footprints(solid, Late(2), [50.0, 200.0])
 
 
@@ -366,7 +365,7 @@ def test_off_the_road_there_is_no_step(solid: Round) -> None:
     """Newton's step has overshot to where nothing touches: a smaller load is tried."""
     press = solid.press(LENGTHS, 1e10)
     force, lacking, contact = press._state(press.parts, press.height + 0.01, 100.0, None)
-    with pytest.raises(NotPressed, match="no force answers"):
+    with pytest.raises(NoEquilibrium, match="no force answers"):
         press._step(contact, force, lacking, 1e-6)
 
 

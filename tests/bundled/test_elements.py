@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from tyrecal_solvers.bundled.section import elements
 from tyrecal_solvers.bundled.section.parts.cords import cord_rows
+from tyrecal_solvers.bundled.section.parts.law import Inverted
 from tyrecal_solvers.bundled.section.parts.rows import on_diagonals
 from tyrecal_solvers.bundled.section.shapes import TYPES, ElementType
 
@@ -148,6 +149,6 @@ def test_folded_element_is_named(nodes: int, patch: tuple[Array, Array]) -> None
     X, table = patch
     table = table[:, :nodes].copy()
     table[5] = table[5][[0, 3, 2, 1, 7, 6, 5, 4][:nodes]]
-    with pytest.raises(elements.FoldedElement) as error:
+    with pytest.raises(Inverted) as error:
         elements.solids(X, table, element(nodes, 2))
-    assert error.value.index == 5
+    assert error.value.element == 5

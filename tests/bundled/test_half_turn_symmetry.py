@@ -6,14 +6,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from tyrecal_solvers.bundled.road.half_turn_symmetry import (
-    MIRROR_SIGNS,
-    HalfTurn,
-    NotSymmetric,
-    mirror_images,
-)
+from tyrecal_solvers.bundled.road.half_turn_symmetry import MIRROR_SIGNS, HalfTurn, mirror_images
 from tyrecal_solvers.bundled.solid3d.circumference import half_circle
 from tyrecal_solvers.bundled.solid3d.revolved import Revolved
+from tyrecal_solvers.errors import Refused
 
 from . import support
 from .conftest import Inflated
@@ -107,11 +103,11 @@ def test_sections_without_the_symmetry_are_refused() -> None:
     free = work.free.copy()
     HalfTurn(work.model.mesh, free, ANGLES)
     free[np.argmax(work.model.mesh.X[:, 1]), 2] ^= True
-    with pytest.raises(NotSymmetric, match="supports differ"):
+    with pytest.raises(Refused, match="supports differ"):
         HalfTurn(work.model.mesh, free, ANGLES)
     b = support.block((0.2, 0.3, 2), (-0.02, 0.03, 2), True)
     m = support.model_of(support.deck(b.X, b.solids, support.Rubber()))
-    with pytest.raises(NotSymmetric):
+    with pytest.raises(Refused):
         HalfTurn(m.mesh, np.ones((len(b.X), 3), bool), ANGLES)
 
 

@@ -15,10 +15,11 @@ import pytest
 from tyrecal_solvers.bundled.deck.keywords import DataLine, DeckError
 from tyrecal_solvers.bundled.deck.request import Request
 from tyrecal_solvers.bundled.deck.steps import Deck
-from tyrecal_solvers.bundled.job import Job, TimedOut
+from tyrecal_solvers.bundled.job import Job
 from tyrecal_solvers.bundled.results import StepResult, write
 from tyrecal_solvers.bundled.section.boundary import rim_freedoms
 from tyrecal_solvers.bundled.section.point_elements import read_point_elements
+from tyrecal_solvers.errors import RunFailed
 
 from ..effects.support import CASE, decks
 
@@ -255,7 +256,7 @@ def test_a_job_without_a_frequency_step_ends_with_its_static_state() -> None:
     assert (found.step, found.pressure_Pa, found.modes) == (1, 160000.0, [])
     assert 1e-4 < abs(found.U).max() < 0.02 and found.factorisations > 1
     late = Job(Deck({"inflate": text}, "inflate", None), Request(), time.monotonic() - 1e-3)
-    with pytest.raises(TimedOut, match="the time limit passed"):
+    with pytest.raises(RunFailed, match="the time limit passed"):
         late.run()
 
 

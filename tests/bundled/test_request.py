@@ -9,9 +9,8 @@ from typing import Any
 import pytest
 from tyrecal_solvers.bundled.__main__ import _words, main
 from tyrecal_solvers.bundled.deck.keywords import DeckError
-from tyrecal_solvers.bundled.deck.request import BadRequest, Request, read_request
-from tyrecal_solvers.bundled.job import TimedOut
-from tyrecal_solvers.bundled.modes.harmonics import Unstable
+from tyrecal_solvers.bundled.deck.request import Request, read_request
+from tyrecal_solvers.errors import Refused, RunFailed
 
 from tyrecal.simulate.deck.decks import Decks
 from tyrecal.simulate.deck.tyre_design import TyreDesign
@@ -127,7 +126,7 @@ def test_requests_at_their_limits(tmp_path: Path, request_: dict[str, Any], fine
         found = read_request(path, ["modes"])
         assert all(getattr(found, key) == value for key, value in request_.items())
     else:
-        with pytest.raises(BadRequest):
+        with pytest.raises(Refused):
             read_request(path, ["modes"])
 
 
@@ -147,15 +146,15 @@ def test_rows_may_be_of_the_sectors_job(tmp_path: Path) -> None:
         if fine:
             assert read_request(path, ["modes"]).sensitivities == rows
         else:
-            with pytest.raises(BadRequest, match="must be a job: modes"):
+            with pytest.raises(Refused, match="must be a job: modes"):
                 read_request(path, ["modes"])
 
 
 @pytest.mark.parametrize(
     ("error", "code", "words"),
     [
-        (TimedOut("later\x1b[31m"), 3, "failed: later [31m\n"),
-        (Unstable("soft"), 3, "failed: soft\n"),
+        (RunFailed("timed_out", "later\x1b[31m"), 3, "failed: later [31m\n"),
+        (RunFailed("unstable", "soft"), 3, "failed: soft\n"),
         (DeckError(3, "wrong"), 2, "error: deck, line 3: wrong\n"),
         (OSError("no\ndisc"), 2, "error: no disc\n"),
     ],

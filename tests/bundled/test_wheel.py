@@ -14,6 +14,7 @@ from tyrecal_solvers.bundled.modes.cavity import coupling
 from tyrecal_solvers.bundled.modes.wheel import Wheel
 from tyrecal_solvers.bundled.section import mechanics
 from tyrecal_solvers.bundled.section.parts.pressure import Pressure
+from tyrecal_solvers.errors import RunFailed
 
 from . import support
 from .support import Rubber
@@ -156,7 +157,7 @@ def test_a_wheel_that_is_pushed_away_is_not_stable(motion: str) -> None:
     tyre = inflated()
     n = 0 if motion in ("axial", "spin") else 1
     wheel = tyre.wheel((motion,), **{motion: -1e9})
-    with pytest.raises(harmonics.Unstable, match=f"for {n} waves"):
+    with pytest.raises(RunFailed, match=f"for {n} waves"):
         tyre.vibration(wheel).factor(n)
 
 
@@ -166,7 +167,7 @@ def test_a_gas_that_gives_way_is_not_stable(n: int) -> None:
     tyre = inflated()
     for wheel in (None, tyre.wheel(axial=1e6, radial=1e6, spin=1e5, tilt=1e5)):
         tyre.vibration(wheel, tyre.air()).factor(n)
-        with pytest.raises(harmonics.Unstable, match=f"for {n} waves"):
+        with pytest.raises(RunFailed, match=f"for {n} waves"):
             tyre.vibration(wheel, tyre.air(bulk=-4.78e5)).factor(n)
 
 

@@ -17,7 +17,7 @@ from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator
 from tyrecal.simulate.evaluate.failure import DeckRefused
 from tyrecal.simulate.modes.mode import Label
-from tyrecal.studies.diagnose.add import NotAdded, add
+from tyrecal.studies.diagnose.add import add
 from tyrecal.studies.diagnose.diagnosis import diagnose
 from tyrecal.studies.diagnose.evidence import probabilities, weigh
 from tyrecal.studies.diagnose.expansion import expand
@@ -296,7 +296,7 @@ def test_an_effect_is_added_with_the_files_comments_kept(case_folder: Path) -> N
         "bead_filler: 1.5"
     ]
     assert "# Table 1 of the paper" in new.read_text()
-    with pytest.raises(NotAdded):
+    with pytest.raises(InputError):
         add(old, "bead_filler", 1.5)
     with pytest.raises(ValueError, match="no 'nothing'"):
         add(old, "nothing", 1.5)

@@ -19,7 +19,7 @@ from tyrecal.simulate.evaluate import evaluator as door_module
 from tyrecal.simulate.evaluate import queue
 from tyrecal.simulate.evaluate.cluster import _at_worker
 from tyrecal.simulate.evaluate.evaluator import Counts, Evaluator, Question
-from tyrecal.simulate.evaluate.executor import Here, WorkerLost
+from tyrecal.simulate.evaluate.executor import Here
 from tyrecal.simulate.evaluate.failure import EvaluationFailed, SolverUnavailable
 from tyrecal.simulate.evaluate.folders import drop_unfinished
 from tyrecal.simulate.evaluate.pressed import pressed
@@ -117,7 +117,10 @@ def test_of_several_questions_each_is_heard_counted_and_may_fail(
         def each(self, function: Any, tasks: Any) -> Any:
             for place, task in enumerate(tasks):
                 given.append(task)
-                yield place, WorkerLost("it died") if place == 2 else function(task)
+                yield (
+                    place,
+                    EvaluationFailed("crashed", "it died") if place == 2 else function(task),
+                )
 
     monkeypatch.setattr(door_module, "executor", lambda *asked: nullcontext(Workers()))
     told: list[tuple[int, int]] = []

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from tyrecal.simulate.evaluate.executor import Here, Processes, end_workers, executor, in_order
-from tyrecal.simulate.evaluate.failure import WorkerLost
+from tyrecal.simulate.evaluate.failure import EvaluationFailed
 
 
 def square(task: float) -> float:
@@ -59,7 +59,7 @@ def test_a_task_that_kills_its_process_is_found_and_the_others_are_done() -> Non
     tasks = [5.0, 3.0, 7.0, 1.0, 3.0, 2.0]
     answers = dict(Processes(2).each(square, tasks))
     assert set(answers) == set(range(6))
-    assert {i for i, a in answers.items() if isinstance(a, WorkerLost)} == {1, 4}
+    assert {i for i, a in answers.items() if isinstance(a, EvaluationFailed)} == {1, 4}
     assert [answers[i] for i in (0, 2, 3, 5)] == [25, 49, 1, 4]
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from tyrecal.simulate.evaluate.executor import executor
 from tyrecal.simulate.evaluate.queue import jobs_of, reached, read_settings
-from tyrecal.simulate.settings import SettingsError
+from tyrecal.simulate.settings import InputError
 
 SETTINGS = """
 queueing_system: {system}
@@ -96,7 +96,7 @@ def common(lines: list[str]) -> None:
 def test_wrong_settings_are_named(edit: tuple[str, str], words: list[str], tmp_path: Path) -> None:
     path = tmp_path / "cluster.yaml"
     path.write_text(SETTINGS.format(system="slurm").replace(*edit))
-    with pytest.raises(SettingsError) as refused:
+    with pytest.raises(InputError) as refused:
         read_settings(path)
     for word in words:
         assert word in str(refused.value)

@@ -14,7 +14,7 @@ import pytest
 from tyrecal.errors import InputError
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Counts, Evaluator, Question
-from tyrecal.simulate.evaluate.executor import Here, WorkerLost
+from tyrecal.simulate.evaluate.executor import Here
 from tyrecal.simulate.evaluate.failure import DeckRefused, EvaluationFailed
 from tyrecal.simulate.evaluate.results import Evaluation
 from tyrecal.studies.fit import calibrate as calibrate_module
@@ -255,7 +255,10 @@ def test_starts_of_other_processes_tell_how_often_the_solver_ran(
 def test_a_start_whose_process_dies_ends_the_fit(monkeypatch: pytest.MonkeyPatch) -> None:
     class Dying(Here):
         def each(self, function: Any, tasks: Any) -> Any:
-            yield from ((i, WorkerLost("its process died, twice")) for i in range(len(tasks)))
+            yield from (
+                (i, EvaluationFailed("crashed", "its process died, twice"))
+                for i in range(len(tasks))
+            )
 
     monkeypatch.setattr(calibrate_module, "executor", lambda *asked: nullcontext(Dying()))
     tyre = Counting(evaluator().base, POWERS, START)

@@ -1,10 +1,9 @@
-import pickle
-
 import numpy as np
 import pytest
 
+from tyrecal.simulate.evaluate.failure import EvaluationFailed
 from tyrecal.simulate.evaluate.results import HarmonicShape, RawMode
-from tyrecal.simulate.modes.match import LostLabel, margin, match
+from tyrecal.simulate.modes.match import margin, match
 from tyrecal.simulate.modes.mode import Label, Mode
 
 RAW = RawMode(1.0, HarmonicShape(0, np.empty(0), np.empty((0, 2)), np.empty((0, 3))), 1)
@@ -25,10 +24,9 @@ def test_each_target_gets_its_mode_and_the_margin_is_the_least_clarity():
 
 
 def test_a_lost_label_is_named_with_what_was_found_instead():
-    with pytest.raises(LostLabel) as caught:
+    with pytest.raises(EvaluationFailed) as caught:
         match(MODES, [AXIAL, Label(2, 2), Label(2, 0)])
-    assert caught.value.labels == (Label(2, 2),)
-    assert caught.value.found[0] == (AXIAL, 36.7)
+    assert caught.value.cause == "lost_label"
     assert str(caught.value) == (
         "no mode is [2,2]; with 2 waves round the circumference there are"
         " [2,1] at 73.00 Hz, [2,0] at 88.10 Hz"
@@ -36,11 +34,5 @@ def test_a_lost_label_is_named_with_what_was_found_instead():
 
 
 def test_all_lost_labels_are_named_at_once():
-    with pytest.raises(LostLabel, match=r"\[5,0\], \[6,0\]; with 5 or 6 waves .* there is none"):
+    with pytest.raises(EvaluationFailed, match=r"\[5,0\], \[6,0\]; with 5 or 6 waves .* is none"):
         match(MODES, [Label(5, 0), Label(6, 0)])
-
-
-def test_the_error_survives_a_process_pool():
-    error = LostLabel([Label(4, 0)], MODES)
-    again = pickle.loads(pickle.dumps(error))
-    assert (again.labels, again.found, str(again)) == (error.labels, error.found, str(error))

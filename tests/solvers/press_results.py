@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from tyrecal_solvers.calculix.results import read_fields
 from tyrecal_solvers.calculix.runner import run_job
-from tyrecal_solvers.process import RunFailed
+from tyrecal_solvers.errors import RunFailed
 
 JOB, WHEEL = "press", "wheel.inp"
 BALANCE = 0.02  # of the force: CalculiX counts pressure on held nodes as the rim's reaction

@@ -10,9 +10,9 @@ import pytest
 from tyrecal_solvers.abaqus.dat import read_dat
 from tyrecal_solvers.abaqus.fil import read_fil
 from tyrecal_solvers.abaqus.licence import denial, is_queueing
-from tyrecal_solvers.abaqus.options import OptionRefused, read_options
+from tyrecal_solvers.abaqus.options import read_options
 from tyrecal_solvers.abaqus.rings import check_revolved, components, cylindrical
-from tyrecal_solvers.process import RunFailed
+from tyrecal_solvers.errors import Refused, RunFailed
 
 BLANK = " " * 80 + "\n"
 
@@ -239,5 +239,5 @@ def test_options() -> None:
         {"licence_wait_s": float("nan")},
         {"licence_first_wait_s": 0},
     ):
-        with pytest.raises(OptionRefused, match=r"solver\.options"):
+        with pytest.raises(Refused, match=r"solver\.options"):
             read_options(bad)

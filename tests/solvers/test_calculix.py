@@ -12,7 +12,7 @@ import pytest
 from tyrecal_solvers.calculix.adapter import CalculiX, Refused, _check_rubber, _inflated, _shapes
 from tyrecal_solvers.calculix.results import Fields, pairs, read_mass
 from tyrecal_solvers.calculix.runner import _is_safe, _said, run_job
-from tyrecal_solvers.process import RunFailed
+from tyrecal_solvers.errors import RunFailed
 
 from tyrecal.simulate.deck.decks import Decks
 from tyrecal.simulate.deck.tyre_design import TyreDesign

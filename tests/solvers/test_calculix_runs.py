@@ -13,7 +13,7 @@ import pytest
 from tyrecal_solvers.calculix.adapter import CalculiX
 from tyrecal_solvers.calculix.results import read_fields
 from tyrecal_solvers.calculix.runner import run_job
-from tyrecal_solvers.process import RunFailed
+from tyrecal_solvers.errors import RunFailed
 
 from .ring import INFLATE, MODES, sector, write_ring
 

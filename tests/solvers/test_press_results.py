@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from tyrecal_solvers.process import RunFailed
+from tyrecal_solvers.errors import RunFailed
 
 from .press_deck import Angles, press_texts
 from .press_results import read_press, read_pressures, read_radius, run_press

@@ -10,7 +10,8 @@ import time
 from pathlib import Path
 
 import pytest
-from tyrecal_solvers.process import RunFailed, last_words, run_command
+from tyrecal_solvers.errors import RunFailed
+from tyrecal_solvers.process import last_words, run_command
 
 
 def test_exit_code_and_output(tmp_path: Path) -> None:

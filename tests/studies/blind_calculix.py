@@ -38,7 +38,7 @@ from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.simulate.evaluate.failure import EvaluationFailed
 from tyrecal.simulate.modes.label import label_modes
-from tyrecal.simulate.modes.match import LostLabel, match
+from tyrecal.simulate.modes.match import match
 from tyrecal.simulate.modes.mode import Label
 from tyrecal.studies.blind.answer import rows_of, tyre_model
 from tyrecal.studies.blind.draw import Truth, draw, tyre
@@ -130,8 +130,8 @@ def _solved(case: LoadedCase, labels: list[Label]) -> tuple[dict[str, float], fl
             answer = Evaluator(TyreDesign(case), "bundled").evaluate(Question({}, (), count))
             try:
                 found = match(label_modes(answer.modes), labels)
-            except LostLabel as lost:
-                failure = EvaluationFailed("lost_label", str(lost))
+            except EvaluationFailed as lost:
+                failure = lost
                 continue
             return {str(x): float(np.log(found[x].frequency_Hz)) for x in labels}, answer.mass_kg
     raise failure

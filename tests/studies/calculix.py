@@ -35,7 +35,7 @@ from tyrecal.simulate.evaluate.failure import EvaluationFailed
 from tyrecal.simulate.evaluate.results import HarmonicShape
 from tyrecal.simulate.evaluate.store import Store
 from tyrecal.simulate.modes.label import label_modes
-from tyrecal.simulate.modes.match import LostLabel, match
+from tyrecal.simulate.modes.match import match
 from tyrecal.simulate.modes.mode import Label, Mode
 from tyrecal.simulate.modes.subspace import mac
 from tyrecal.tyre import resolve
@@ -254,7 +254,7 @@ def main(store: Store | None) -> None:
             where = f"| {name} | {design} | {pressure:g}"
             try:
                 rows = compare(at(name, values, pressure), store)
-            except (EvaluationFailed, LostLabel) as failure:
+            except EvaluationFailed as failure:
                 print(f"{where} | {failure} | | | |", flush=True)
                 continue
             worst = max(rows, key=lambda row: abs(row.common))

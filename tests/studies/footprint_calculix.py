@@ -31,7 +31,7 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 from tyrecal_solvers.calculix.results import read_fields
 from tyrecal_solvers.calculix.runner import run_job
-from tyrecal_solvers.process import RunFailed
+from tyrecal_solvers.errors import RunFailed
 
 from tyrecal.simulate.deck.decks import Decks
 from tyrecal.simulate.deck.tyre_design import TyreDesign

@@ -13,7 +13,7 @@ from tyrecal.simulate.evaluate.evaluator import Evaluator
 from tyrecal.simulate.evaluate.results import HarmonicShape, RawMode
 from tyrecal.simulate.modes.label import label_modes
 from tyrecal.simulate.modes.mode import Label
-from tyrecal.studies.fitted import NotThisFit, pressure_name, read_fitted
+from tyrecal.studies.fitted import InputError, pressure_name, read_fitted
 from tyrecal.studies.pressure import State, sweep
 from tyrecal.studies.pressure_findings import findings
 from tyrecal.studies.pressure_result import slopes, sweep_result
@@ -180,7 +180,7 @@ def test_a_file_that_is_no_fit_of_this_case(change: dict, words: str, tmp_path: 
     path = tmp_path / "fit.json"
     right = FIT | {"provenance": {"tyre_sha256": tyre_sha256(case), "mesh": "default"}}
     path.write_text(json.dumps(right | change))
-    with pytest.raises(NotThisFit, match=words) as refused:
+    with pytest.raises(InputError, match=words) as refused:
         read_fitted(path, case)
     assert "\n" not in str(refused.value)
     path.write_text(json.dumps(right))

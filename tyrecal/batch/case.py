@@ -34,14 +34,12 @@ from ..simulate.evaluate.sources import sources
 from ..simulate.evaluate.store import Store, sources_of
 from ..simulate.provenance import provenance
 from ..studies.fitted import NOT_CONVERGED, has_good
-from ..tyre.case import CaseError, LoadedCase, start_values, with_level
+from ..tyre.case import LoadedCase, start_values, with_level
 from ..tyre.load import load_case
-from ..tyre.templates import TemplateFailed
 from ..tyre.values import unusual_value, with_values
 from .studies import Asked, Studied, StudyOutcome, study
 
 FINISHED = "finished.json"  # in a case's folder: what was asked, and the answer
-INPUT = (CaseError, DeckRefused, InputError, TemplateFailed, InputError)
 ENDED = ("good", "failed")
 AGAIN = {"crashed", "timed_out", "no_results", "licence", "unavailable", "disc", "internal"}
 Report = dict[str, Any]
@@ -177,7 +175,7 @@ def _failed(error: Exception) -> StudyOutcome:
         return StudyOutcome("error", error.cause, error.words)
     if isinstance(error, SolverUnavailable):
         return StudyOutcome("error", "unavailable", str(error))
-    if isinstance(error, INPUT):
+    if isinstance(error, InputError):
         return StudyOutcome("error", "input", str(error))
     if isinstance(error, OSError):
         return StudyOutcome("error", "disc", str(error))

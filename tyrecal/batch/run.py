@@ -8,7 +8,8 @@ from contextlib import closing
 from pathlib import Path
 
 from ..files import printable
-from ..simulate.evaluate.executor import WorkerLost, executor
+from ..simulate.evaluate.executor import executor
+from ..simulate.evaluate.failure import EvaluationFailed
 from .case import CaseTask, Report, lost, run_case
 
 
@@ -46,7 +47,7 @@ def run_batch(
     reports: dict[int, Report] = {}
     with executor(jobs, scheduler) as workers, closing(workers.each(run_case, tasks)) as answers:
         for place, answer in answers:
-            if isinstance(answer, WorkerLost):
+            if isinstance(answer, EvaluationFailed):  # its process died
                 answer = lost(tasks[place], str(answer))
             reports[place] = answer
             notify(answer)

@@ -116,7 +116,8 @@ def parse_pressures(low: float, high: float, steps: int, allowed: bool) -> tuple
 def fitted_values(path: Path, loaded: Any, terminal: Terminal) -> dict[str, float]:
     """The design of a fit.json, or of the one in a results folder; says how the fit was made
     otherwise. Raises click.UsageError where it is not this case's."""
-    from ..studies.fitted import NotThisFit, read_fitted
+    from ..errors import InputError
+    from ..studies.fitted import read_fitted
 
     if path.is_dir():
         folder, path = path, path / "fit.json"
@@ -124,7 +125,7 @@ def fitted_values(path: Path, loaded: Any, terminal: Terminal) -> dict[str, floa
             raise click.UsageError(f"--fitted: there is no fit.json in the folder '{folder}'")
     try:
         values, otherwise = read_fitted(path, loaded)
-    except NotThisFit as error:
+    except InputError as error:
         raise click.UsageError(f"--fitted: {error}") from None
     for sentence in otherwise:
         terminal.note(f"--fitted: {sentence}")

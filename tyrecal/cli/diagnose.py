@@ -173,7 +173,7 @@ def command(
 
 def _added(case: Path, assignment: str, output: Path | None, allowed: bool) -> Path:
     """The new case's file. Raises click.UsageError, CaseError."""
-    from ..studies.diagnose.add import NotAdded, add
+    from ..studies.diagnose.add import add
     from ..tyre.case import parse_assignment
     from ..tyre.load import load_case
 
@@ -182,5 +182,5 @@ def _added(case: Path, assignment: str, output: Path | None, allowed: bool) -> P
         id, value = parse_assignment(assignment)
         arguments.refuse_unusual(loaded, f"--add {assignment}", f"effects.{id}", value, allowed)
         return add(case, id, value, output)
-    except (ValueError, NotAdded) as error:
+    except ValueError as error:
         raise click.UsageError(f"--add: {error}") from None

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..errors import TyrecalError
+from ..errors import InputError, TyrecalError
 from ..files import CHANGED
 from ..interrupt import SIGNALS, exit_code, interrupt_heard, interrupts_remembered
 from .terminal import RESUME, coloured, error, say
@@ -55,13 +55,13 @@ EXIT_CODES = {
 }
 
 
-class Interrupted(Exception):
-    """A signal ended the command; the words say which, and how to go on; code: to exit with."""
+class Interrupted(TyrecalError):
+    """A signal ended the command; the words say which, and how to go on."""
 
     def __init__(self, how_to_go_on: str = ""):
         number = interrupt_heard() or signal.SIGINT
         super().__init__(": ".join(filter(None, (SIGNALS[number], how_to_go_on))))
-        self.code = exit_code(number)
+        self.exit_code = exit_code(number)
 
 
 def _outside() -> dict[str, EntryPoint]:
@@ -151,13 +151,13 @@ def cli(ctx: click.Context) -> None:
 
 
 def _defaults(command: str | None) -> dict[str, Any]:
-    """What the user's settings say in place of an option. Raises SettingsError, but not where the
+    """What the user's settings say in place of an option. Raises InputError, but not where the
     installation is looked at."""
-    from ..simulate.settings import SettingsError, settings
+    from ..simulate.settings import settings
 
     try:
         found = settings()
-    except SettingsError:
+    except InputError:
         if command in ("doctor", "solvers"):
             return {}
         raise
@@ -188,7 +188,7 @@ def main(arguments: list[str] | None = None) -> None:
     except Interrupted as interrupted:
         say(f"\n{interrupted}", err=True)
         exec("")  # forgets one that has passed through exec(): Python would die of it at its end
-        sys.exit(interrupted.code)
+        sys.exit(interrupted.exit_code)
     except Exception as failure:
         code = _exit_code(failure)
         if code is None:

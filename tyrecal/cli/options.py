@@ -381,7 +381,7 @@ def _by_settings(option: str) -> bool:
 
 
 def _words(command: str | None) -> tuple[str, ...]:
-    """The words of --solver-command. Raises SettingsError."""
+    """The words of --solver-command. Raises InputError."""
     if command is None:
         return ()
     from ..simulate.settings import words

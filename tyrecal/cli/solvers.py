@@ -37,12 +37,13 @@ def command(terminal: Terminal) -> int:
 
 def settings_file() -> dict[str, Any]:
     """``file`` of the user's settings, or None; ``there``: whether it is; ``problem``, or None."""
-    from ..simulate.settings import SettingsError, place, settings
+    from ..errors import InputError
+    from ..simulate.settings import place, settings
 
     path, problem = place(), None
     try:
         settings()
-    except SettingsError as error:
+    except InputError as error:
         problem = str(error)
     there = path is not None and path.exists()
     return {"file": str(path) if path else None, "there": there, "problem": problem}

@@ -23,10 +23,6 @@ COMMAND = "TYRECAL_SOLVER_COMMAND"  # of whichever solver is used
 SettingsModel = TypeVar("SettingsModel", bound="BaseModel")
 
 
-class SettingsError(InputError):
-    """A settings file, or a command of the user's, is wrong."""
-
-
 def place() -> Path | None:
     """The settings file, whether it is there or not; None where there shall be none."""
     if SETTINGS_VARIABLE in os.environ:
@@ -37,25 +33,25 @@ def place() -> Path | None:
 
 
 def typed(path: Path, kind: type[SettingsModel]) -> SettingsModel:
-    """A YAML file as a model of pydantic. Raises SettingsError: a sentence a mistake, its line."""
+    """A YAML file as a model of pydantic. Raises InputError: a sentence a mistake, its line."""
     from pydantic import ValidationError
 
     from ..tyre.case.document import read_document
 
     document = read_document(path)
     if document.data is None or document.mistakes:
-        raise SettingsError("\n".join(str(each) for each in document.mistakes))
+        raise InputError("\n".join(str(each) for each in document.mistakes))
     try:
         return kind.model_validate(document.data)
     except ValidationError as error:
         for each in error.errors():
             document.add(each["loc"], each["msg"])
-        raise SettingsError("\n".join(str(each) for each in document.mistakes)) from None
+        raise InputError("\n".join(str(each) for each in document.mistakes)) from None
 
 
 def settings() -> Any:
     """The user's settings: ``commands`` {solver: words}; ``jobs``, ``solver``, ``output``, None
-    where they are not set. Raises SettingsError."""
+    where they are not set. Raises InputError."""
     path = place()
     if path is None or (SETTINGS_VARIABLE not in os.environ and not path.exists()):
         return _read(None, 0.0)
@@ -80,32 +76,30 @@ def _read(path: Path | None, changed: float) -> Any:
     for solver, command in found.commands.items():
         words(command, f"{path}: commands.{solver}", here=False)
     if found.output is not None and not Path(found.output).expanduser().is_absolute():
-        raise SettingsError(
-            f"{path}: output is {found.output}: must be a whole path or begin with ~"
-        )
+        raise InputError(f"{path}: output is {found.output}: must be a whole path or begin with ~")
     return found
 
 
 def root() -> Path:
     """The folder in which folders of results are made: the present one, unless the user has set
-    another. Raises SettingsError."""
+    another. Raises InputError."""
     folder = settings().output
     return Path(folder).expanduser() if folder else Path()
 
 
 def words(command: str | Sequence[str], origin: str, here: bool = True) -> list[str]:
     """A command's words; no shell is used. ``here``: a relative path starts in the present folder,
-    never in the one that the solver runs in, else it is refused. Raises SettingsError."""
+    never in the one that the solver runs in, else it is refused. Raises InputError."""
     try:
         found = shlex.split(command) if isinstance(command, str) else list(command)
     except ValueError:
         found = []
     if not found or not all(isinstance(word, str) and word for word in found):
-        raise SettingsError(f"{origin} is {command!r}: must be a command, or a list of its words")
+        raise InputError(f"{origin} is {command!r}: must be a command, or a list of its words")
     program = Path(found[0]).expanduser()
     if len(program.parts) > 1 and not program.is_absolute():
         if not here:
-            raise SettingsError(f"{origin} is {command!r}: must be a name or a whole path")
+            raise InputError(f"{origin} is {command!r}: must be a name or a whole path")
         program = program.absolute()
     return [str(program), *found[1:]]
 
@@ -113,7 +107,7 @@ def words(command: str | Sequence[str], origin: str, here: bool = True) -> list[
 def command_of(solver: str) -> tuple[list[str], str]:
     """The command that the user has set for ``solver``, and where; empty where nowhere.
 
-    Raises SettingsError."""
+    Raises InputError."""
     if given := os.environ.get(COMMAND):
         return words(given, COMMAND), COMMAND
     if solver in (commands := settings().commands):

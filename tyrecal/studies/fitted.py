@@ -16,16 +16,12 @@ from ..tyre.values import with_values
 NOT_CONVERGED = "not_converged"  # folder of a fit that may not take a better one's place
 
 
-class NotThisFit(InputError):
-    """The file is no result of a fit of this case."""
-
-
 def read_fitted(path: Path, case: LoadedCase) -> tuple[dict[str, float], list[str]]:
     """Fitted values of the case's variables (in the units of the numbers they set) in fit.json,
     and in which ways the fit was made otherwise, in sentences: on another mesh.
 
     The fit has to be of the same tyre, whatever its targets, state, mesh or solver. Raises
-    NotThisFit in one sentence; OSError.
+    InputError in one sentence; OSError.
     """
     try:
         fit = read_json(path)
@@ -34,24 +30,24 @@ def read_fitted(path: Path, case: LoadedCase) -> tuple[dict[str, float], list[st
         of = fit.get("provenance", {})
         tyre, theirs = of.get("tyre_sha256"), dict(of.get("overrides", {}))
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
-        raise NotThisFit(f"'{path}' is not the fit.json that 'tyrecal fit' writes") from None
+        raise InputError(f"'{path}' is not the fit.json that 'tyrecal fit' writes") from None
     names = set(start_values(case))
     for name in [*sorted(names - set(found)), *sorted(set(found) - names)]:
         where = "is missing from" if name in names else "of this case is not known, but stands in"
-        raise NotThisFit(
+        raise InputError(
             f"variable '{name}' {where} '{path}'; give a fit of this case, which has"
             f" {', '.join(sorted(names))}"
         )
     if tyre is None:
-        raise NotThisFit(
+        raise InputError(
             f"'{path}' does not say which tyre it is of, as an older tyrecal wrote it; run"
             f" 'tyrecal fit {case.path}' again"
         )
     if tyre != tyre_sha256(case):
-        raise NotThisFit(f"'{path}' is a fit of another tyre: {_difference(theirs, case)}")
+        raise InputError(f"'{path}' is a fit of another tyre: {_difference(theirs, case)}")
     for name, value in found.items():
         if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
-            raise NotThisFit(f"variable '{name}' is {value!r} in '{path}', must be a finite number")
+            raise InputError(f"variable '{name}' is {value!r} in '{path}', must be a finite number")
     values = {name: float(found[name]) for name in start_values(case)}
     design = dict(values)
     if pressure_name(case) == "pressure_kPa":
@@ -59,7 +55,7 @@ def read_fitted(path: Path, case: LoadedCase) -> tuple[dict[str, float], list[st
     try:
         with_values(case, design)
     except ValueError as error:
-        raise NotThisFit(f"'{path}' holds a design that this case cannot have: {error}") from None
+        raise InputError(f"'{path}' holds a design that this case cannot have: {error}") from None
     return values, _made_otherwise(of, case)
 
 

@@ -10,6 +10,8 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
+from ...errors import Refused
+
 MAX_DECK_BYTES = 100_000_000
 
 
@@ -24,7 +26,7 @@ class LineNumber(int):
         return line
 
 
-class DeckError(ValueError):
+class DeckError(Refused):
     """The deck asks for something that the solver cannot honour, or is not a deck.
 
     ``line``: 1-based line of the deck, 0 where no single line is to blame.

@@ -9,20 +9,12 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
+from ...errors import Refused
 from . import grammar
 from .keywords import DeckError, Keyword, read_deck, read_keywords
 from .steps import Tangent
 
 MAX_HARMONIC, MAX_MODES = 999, 999  # harmonic; modes of one
-
-
-class BadRequest(DeckError):
-    """The side file is not a request: the message has file, key, value and what would be right."""
-
-    def __init__(self, key: str, value: Any, right: str, file: str = ""):
-        told = f"{key} is {json.dumps(value):.60}, " if key else ""
-        ValueError.__init__(self, f"{file}: {told}{right}")
-        self.line, self.told = 0, (key, value, right)
 
 
 @dataclass
@@ -43,18 +35,19 @@ class Request:
 
 
 def read_request(path: Path, jobs: Sequence[str]) -> Request:
-    """The side file of ``jobs``, or the plain request where there is none. Raises DeckError."""
+    """The side file of ``jobs``, or the plain request where there is none. Raises Refused: key,
+    value and what would be right."""
     if not path.exists():
         return Request()
     try:
         _must(path.is_file(), "", None, "is no file")
         return _request(json.loads(read_deck(path)), path.parent, jobs)
-    except BadRequest as error:
-        raise BadRequest(*error.told, path.name) from None
     except DeckError:
         raise
+    except Refused as error:
+        raise Refused(f"{path.name}: {error}") from None
     except (ValueError, RecursionError) as error:
-        raise BadRequest("", None, f"is not JSON: {error}", path.name) from None
+        raise Refused(f"{path.name}: is not JSON: {error}") from None
 
 
 def _request(content: Any, folder: Path, jobs: Sequence[str]) -> Request:
@@ -83,7 +76,7 @@ def read_sector(folder: Path, sector: dict[str, Any]) -> list[Keyword]:
 
 def _must(holds: object, key: str, value: Any, right: str) -> None:
     if not holds:
-        raise BadRequest(key, value, right)
+        raise Refused(f"{key} is {json.dumps(value):.60}, {right}" if key else right)
 
 
 def _whole(least: int, most: int | None = None) -> Callable[[str, Any], None]:

@@ -12,6 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...errors import RunFailed
 from ..section.band import Cholesky
 from ..section.materials import ModulusTable
 from .bordered import Bordered
@@ -24,13 +25,6 @@ SHAPE_RTOL = 1e-4  # of a frequency, from one shape to the next: its square is w
 MAX_ITERATIONS = 40
 
 
-class NotSelfConsistent(ArithmeticError):
-    """No frequency was found at which a mode has the modulus of that frequency."""
-
-    def __init__(self, n: int, j: int):
-        super().__init__(f"the modulus of mode {j + 1} of harmonic {n} does not settle")
-
-
 class SelfConsistent:
     """Modes of a vibration whose rubber follows the ``tables``."""
 
@@ -40,8 +34,7 @@ class SelfConsistent:
     def modes(self, n: int, count: int, factor: Cholesky | Bordered | None = None) -> HarmonicModes:
         """The ``count`` lowest modes of harmonic n, each at the modulus of its own frequency.
 
-        ``factor`` serves a constant modulus only. Raises NotSelfConsistent; Unstable,
-        lanczos.NotConverged.
+        ``factor`` serves a constant modulus only. Raises RunFailed.
         """
         first = self._at(START_HZ, n, count)
         return joined([self._settled(first, j) for j in range(len(first.eigenvalues))])
@@ -62,7 +55,7 @@ class SelfConsistent:
                 mode = found.where(slice(j, j + 1))
                 return replace(mode, eigenvalues=np.array([(2 * np.pi * frequency) ** 2]))
             found = self._at(frequency, found.n, j + 1)
-        raise NotSelfConsistent(found.n, j)
+        raise _unsettled(found.n, j)
 
     def _own(self, found: HarmonicModes, j: int, frequency_Hz: float) -> float:
         """f with (2 pi f)^2 = lambda + sum_l (rho_l(f) - rho_l(f_0)) phi^H dK_l phi for mode j of
@@ -76,7 +69,11 @@ class SelfConsistent:
             if abs(new / f - 1) <= FREQUENCY_RTOL:
                 return float(new)
             f = new
-        raise NotSelfConsistent(found.n, j)
+        raise _unsettled(found.n, j)
+
+
+def _unsettled(n: int, j: int) -> RunFailed:
+    return RunFailed("crashed", f"the modulus of mode {j + 1} of harmonic {n} does not settle")
 
 
 def joined(modes: list[HarmonicModes]) -> HarmonicModes:

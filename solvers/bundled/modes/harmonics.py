@@ -14,6 +14,7 @@ from typing import Protocol
 import numpy as np
 from scipy.sparse import csr_array
 
+from ...errors import RunFailed
 from ..section import mechanics
 from ..section.band import Cholesky, Indefinite, Numbering
 from ..section.model import Model
@@ -28,12 +29,6 @@ Array = np.ndarray
 MAX_HARMONICS = 60
 # share of a mode's kinetic energy above which it is the cavity's, not the tyre's
 MIN_AIR_SHARE = 0.5
-
-
-class Unstable(ArithmeticError):
-    """The inflated state is not stable: a harmonic of it buckles."""
-
-    cause = "unstable"
 
 
 class Combination(Protocol):
@@ -156,7 +151,7 @@ class Vibration:
         return np.array(found)
 
     def factor(self, n: int) -> Cholesky | Bordered:
-        """Factor of K(n) - shift M. Raises Unstable."""
+        """Factor of K(n) - shift M. Raises RunFailed."""
         three = self._bands[0]
         if len(self.weights) > 1:
             three = [
@@ -176,9 +171,10 @@ class Vibration:
             tyre, border = Cholesky(band), self._border(n)
             return Bordered(tyre, border, self.shift) if border else tyre
         except Indefinite:
-            raise Unstable(
+            raise RunFailed(
+                "unstable",
                 f"the inflated tyre is not stable: its stiffness for {n} waves round the"
-                " circumference is not positive definite"
+                " circumference is not positive definite",
             ) from None
 
     @property
@@ -226,7 +222,7 @@ class Vibration:
     def modes(self, n: int, count: int, factor: Cholesky | Bordered | None = None) -> HarmonicModes:
         """The ``count`` lowest modes of harmonic n that are the tyre's, from ``lowest_Hz`` on.
 
-        Raises Unstable, lanczos.NotConverged.
+        Raises RunFailed.
         """
         factor, asked = factor or self.factor(n), count
         while True:

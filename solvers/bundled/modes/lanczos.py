@@ -11,14 +11,12 @@ from collections.abc import Callable
 
 import numpy as np
 
+from ...errors import RunFailed
+
 Array = np.ndarray
 # residual of the inverse, in the norm of M, over 1 / lambda; lambda's is its square
 INVERSE_RTOL = 1e-7
 MAX_BASIS = 300
-
-
-class NotConverged(ArithmeticError):
-    """The Lanczos basis was used up."""
 
 
 def lowest(
@@ -31,13 +29,13 @@ def lowest(
     """The ``count`` eigenvalues nearest above ``shift`` and their M-normalised vectors.
 
     solve(b): (K - shift M)^-1 b; mass(x): M x; start (size, b): first block.
-    Returns eigenvalues (count,) ascending and vectors (size, count). Raises NotConverged.
+    Returns eigenvalues (count,) ascending and vectors (size, count). Raises RunFailed.
     """
     size = start.shape[0]
     count = min(count, size)
     block, image, _ = _orthonormal(start, mass(start))
     if not block.shape[1]:
-        raise NotConverged("there is no mass that is free to vibrate")
+        raise RunFailed("crashed", "there is no mass that is free to vibrate")
     basis, images = block[:, :0], image[:, :0]
     projected = np.empty((0, 0), start.dtype)
     while block.shape[1]:
@@ -59,7 +57,8 @@ def lowest(
             break
     if len(projected) >= size:  # the basis spans everything: the projection is the problem
         return shift + 1 / inverse, basis @ vectors
-    raise NotConverged(f"{count} modes did not converge in {len(projected)} Lanczos vectors")
+    words = f"{count} modes did not converge in {len(projected)} Lanczos vectors"
+    raise RunFailed("crashed", words)
 
 
 def _bordered(matrix: Array, column: Array) -> Array:

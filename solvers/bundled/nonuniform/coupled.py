@@ -87,7 +87,7 @@ def attached_modes(
     """The ``count`` lowest modes of each harmonic with masses and springs on the tyre.
 
     K + k p p^T and M + m p p^T, p the displacement that carries k or m; ``highest``: harmonic of
-    the sum, as a rule the highest one that the sectors carry. Raises Unstable, NotConverged.
+    the sum, as a rule the highest one that the sectors carry. Raises RunFailed.
     """
     families = []
     top = attached.highest if highest is None else highest

@@ -23,8 +23,7 @@ def is_nonuniform(tyre: Inflated, step: DeckStep) -> bool:
 def nonuniform_modes(
     tyre: Inflated, step: DeckStep, vibration: HasModes, harmonics: list[int], count: int
 ) -> list[HarmonicModes]:
-    """The ``count`` lowest modes of each harmonic. Raises DeckError, Unstable, NotConverged,
-    InflationFailed."""
+    """The ``count`` lowest modes of each harmonic. Raises DeckError, RunFailed."""
     line = step.procedure.line
     attached, turns = tyre.attached(), _turns(step)
     if bool(attached) + turns + bool(tyre.sector) > 1:

@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..modes.harmonics import HarmonicModes, Vibration
-from ..section.inflation import InflationFailed
+from ..section.inflation import stopped
 from ..section.mechanics import mass
 from ..section.model import Model
 from ..section.parts.elastic import Elastic
@@ -139,7 +139,7 @@ def sector_modes(
     """The ``count`` lowest modes of each harmonic of a tyre with a sector of other stuff.
 
     U: the plain tyre's state under ``loads``; model: the plain one; ``beyond``: harmonics of the
-    displacements above the highest wanted. Raises InflationFailed, Unstable, NotConverged.
+    displacements above the highest wanted. Raises RunFailed.
     """
     top = max(harmonics) + beyond
     around = full_circle(top)
@@ -168,7 +168,7 @@ def sector_modes(
 
 
 def equilibrium(fields: FullCircle, U: Array, check: Callable[[], None]) -> None:
-    """Newton's method from the plain tyre's state. Raises InflationFailed."""
+    """Newton's method from the plain tyre's state. Raises NoEquilibrium."""
     state = np.repeat(U[None], len(fields.tyre.around.angles), 0)
     shape = state.shape
     product = lambda x: fields.forces(x.reshape(shape)).ravel()
@@ -179,14 +179,14 @@ def equilibrium(fields: FullCircle, U: Array, check: Callable[[], None]) -> None
         try:
             whole = fields.tyre.residual(state)
         except Inverted as error:
-            raise InflationFailed(0.0, 0.0, f"with the splice {error}") from None
+            raise stopped(0.0, 0.0, f"with the splice {error}") from None
         force = (whole * fields.free).ravel()
         scale = scale or float(np.linalg.norm(whole))  # of what the rim bears
         if np.linalg.norm(force) <= FORCE_RTOL * scale:
             return
         step, _, _ = gmres(product, response, -force, LINEAR_RTOL, MAX_ITERATIONS)
         state = state + step.reshape(shape)
-    raise InflationFailed(0.0, 0.0, "Newton's method did not converge with the splice")
+    raise stopped(0.0, 0.0, "Newton's method did not converge with the splice")
 
 
 def ritz_davidson(

@@ -15,9 +15,10 @@ from functools import partial
 import numpy as np
 from scipy.linalg.lapack import spotrf, strtrs
 
+from ...errors import Refused
 from ..section.band import Indefinite
 from ..solid3d.circumference import Circumference
-from .half_turn_symmetry import MIRROR_SIGNS, HalfTurn, NotSymmetric
+from .half_turn_symmetry import MIRROR_SIGNS, HalfTurn
 
 Array = np.ndarray
 Tangents = list[tuple[Array, Array, Array, Array]]
@@ -51,7 +52,7 @@ class Elimination:
         inner = (place >= 0) & (other != np.arange(symmetry.shape[1]))
         for c in connectivities:
             if (beyond[c].any(1) & inner[c].any(1)).any():
-                raise NotSymmetric("an element straddles the middle plane")
+                raise Refused("an element straddles the middle plane")
             inside = np.flatnonzero((place[c] >= 0).all(1))
             chosen.append((inside, *_images(c, inside, other), place[c[inside]]))
         level = _levels([c for *_, c in chosen], symmetry)

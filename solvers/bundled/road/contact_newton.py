@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ...errors import NoEquilibrium
 from ..section.band import Indefinite
 from ..section.parts.law import Inverted
 from ..solid3d.gmres import gmres
@@ -43,12 +44,6 @@ MAX_DEFLECTION_STEP = 0.1
 
 
 Bound = tuple[Array, Array]
-
-
-class NotPressed(ArithmeticError):
-    """No equilibrium with the road at a load."""
-
-    cause = "no_equilibrium"
 
 
 @dataclass
@@ -89,8 +84,10 @@ class ContactNewton:
         self.factorisations = self.products = self.iterations = 0
 
     def to(self, load: float) -> PressedState:
-        """The equilibrium at ``load`` (N), in smaller steps where need be. Raises NotPressed, also
-        where the road has come to the rim."""
+        """The equilibrium at ``load`` (N), in smaller steps where need be.
+
+        Raises NoEquilibrium, also where the road has come to the rim.
+        """
         step = min(
             load - self.load,
             MAX_DEFLECTION_STEP * (self.free_radius - self.flat) / FIRST_COMPLIANCE,
@@ -101,18 +98,18 @@ class ContactNewton:
             target = min(self.load + step, load)
             try:
                 found = self._newton(target)
-            except (NotPressed, Indefinite, Inverted) as error:
+            except (NoEquilibrium, Indefinite, Inverted) as error:
                 step /= 2
                 self._factor = None
                 if step < smallest:
-                    raise NotPressed(
+                    raise NoEquilibrium(
                         f"no equilibrium between {self.load:.4g} and {target:.4g} N"
                         f"{self.depth()}: {error}"
                     ) from None
                 continue
             self.parts, self.height, self.load = found.parts, found.height, target
             if self.height <= self.flat:
-                raise NotPressed(f"the tyre is flat on its rim at {target:.4g} N{self.depth()}")
+                raise NoEquilibrium(f"the tyre is flat on its rim at {target:.4g} N{self.depth()}")
             self.road = self.road.settled(found.contact)
             if target == load:
                 return found
@@ -167,12 +164,12 @@ class ContactNewton:
                 continue  # what newly touches had no friction yet
             try:
                 parts, height, contact = self._settle(parts, height, load, None, FORCE_RTOL)
-            except NotPressed:
+            except NoEquilibrium:
                 near = max(0.1 * near, FORCE_RTOL)
                 continue
             self._bound = contact.local[..., 0], np.ones_like(self.road.area)
             return PressedState(parts, height, contact, self._stiffness(contact))
-        raise NotPressed("the friction did not settle")
+        raise NoEquilibrium("the friction did not settle")
 
     def _softly(
         self, parts: Array, height: float, load: float, bound: Bound, tolerance: float
@@ -225,12 +222,12 @@ class ContactNewton:
                     pass
                 length /= 2
                 if length < MIN_STEP_LENGTH:
-                    raise NotPressed("the line search found no lower energy")
+                    raise NoEquilibrium("the line search found no lower energy")
             parts, height = ahead
             setbacks += size > 0.5 * before
             if bound is None and setbacks > MAX_SETBACKS:
                 break
-        raise NotPressed(f"Newton's method did not converge in {MAX_ITERATIONS} iterations")
+        raise NoEquilibrium(f"Newton's method did not converge in {MAX_ITERATIONS} iterations")
 
     def _step(
         self, contact: Contact, force: Array, lacking: float, tolerance: float
@@ -242,7 +239,7 @@ class ContactNewton:
             self._form(contact)
         found, self._used, left = self._solve(border, contact, right, tolerance)
         if not left <= MAX_LINEAR_RESIDUAL:
-            raise NotPressed("the tangent is too far from a stable one")
+            raise NoEquilibrium("the tangent is too far from a stable one")
         return found[:-1].reshape(force.shape), float(found[-1]) * border.scale
 
     def _solve(
@@ -255,7 +252,7 @@ class ContactNewton:
         answer, first = factor.solve(np.stack([border.by_height, right[:-1].reshape(shape)]))
         schur = border.stiffness - float((border.of_force * answer).sum())
         if not schur:
-            raise NotPressed("no force answers to the road's height")
+            raise NoEquilibrium("no force answers to the road's height")
 
         def product(v: Array) -> Array:
             self.products += 1

@@ -11,14 +11,14 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ..modes.harmonics import Unstable
-from ..modes.lanczos import NotConverged
+from ...errors import RunFailed
 
 Array = np.ndarray
 Operator = Callable[[Array], Array]
 EIGENVALUE_RTOL = 1e-9  # of an eigenvalue, relative
 MAX_BASIS_PER_MODE = 8  # times the wanted pairs, before the basis is cut down to its best half
 MAX_BLOCKS = 60
+NOT_STABLE = "the pressed tyre is not stable: its stiffness is not positive"
 MIN_LENGTH2 = 1e-10  # of a direction's squared length, below which it is in the basis already
 
 
@@ -28,13 +28,13 @@ def lowest(
     """The ``count`` lowest eigenvalues, ascending, and vectors (count, size), x^T M x = 1.
 
     Operators take blocks (b, size); ``inverse``: about K^-1, symmetric; start (b, size).
-    Raises NotConverged; Unstable where K is not positive.
+    Raises RunFailed, unstable where K is not positive.
     """
     V, W = np.empty((2, 0, start.shape[1]))
     H = np.empty((0, 0))
     block = _orthonormal(start, V, mass)
     if len(block) < count:
-        raise NotConverged(f"{len(start)} fields to start from do not span {count} modes")
+        raise RunFailed("crashed", f"{len(start)} fields to start from do not span {count} modes")
     for _ in range(MAX_BLOCKS):
         image = product(block)
         V, W = np.concatenate([V, block]), np.concatenate([W, image])
@@ -42,7 +42,7 @@ def lowest(
         H = np.block([[H, column[: len(H)]], [column[: len(H)].T, column[len(H) :]]])
         values, turn = np.linalg.eigh((H + H.T) / 2)
         if values[0] <= 0:
-            raise Unstable("the pressed tyre is not stable: its stiffness is not positive")
+            raise RunFailed("unstable", NOT_STABLE)
         lowest, turn_lowest = values[:count], turn[:, :count].T
         x = turn_lowest @ V
         residual = turn_lowest @ W - lowest[:, None] * mass(x)
@@ -57,9 +57,10 @@ def lowest(
         block = _orthonormal(step[error > EIGENVALUE_RTOL], V, mass)
         if not len(block):
             break
-    raise NotConverged(
+    raise RunFailed(
+        "crashed",
         f"{count} modes of the pressed tyre did not converge: {(error > EIGENVALUE_RTOL).sum()} are"
-        f" left, the worst off by {error.max():.1e}"
+        f" left, the worst off by {error.max():.1e}",
     )
 
 

@@ -19,9 +19,9 @@ from typing import Any
 
 import numpy as np
 
+from ...errors import Refused, RunFailed
 from ..deck.keywords import DeckError, Keyword
-from ..modes.harmonics import Unstable, Vibration, lowest_of_all
-from ..modes.lanczos import NotConverged
+from ..modes.harmonics import Vibration, lowest_of_all
 from ..section.band import Numbering
 from ..section.elements import Lines
 from ..section.model import Model
@@ -31,8 +31,8 @@ from ..section.parts.pressure import Pressure
 from ..solid3d.circumference import half_circle
 from ..solid3d.revolved import Revolved
 from .contact import flat_road
-from .contact_newton import ContactNewton, NotPressed, PressedState
-from .half_turn_symmetry import HALF_TURN, HalfTurn, NotSymmetric
+from .contact_newton import ContactNewton, PressedState
+from .half_turn_symmetry import HALF_TURN, HalfTurn
 from .loaded_modes import SPARE, loaded_modes
 from .patch import contact_area
 from .stick import held
@@ -141,13 +141,12 @@ def press(
     data: RoadData,
     wanted: list[float],
     check: Callable[[], None],
-    give_up: type[Exception],
     vibrations: Mapping[float, ModesAtLoad] = MappingProxyType({}),
 ) -> dict[str, Any]:
     """Footprints at the ``wanted`` loads (N) of a tyre inflated to ``U`` (n, 3), with modes where
     there are ``vibrations``.
 
-    Raises DeckError; NotPressed, Unstable, NotConverged where not even the first load is reached.
+    Raises DeckError; RunFailed where not even the first load is reached.
     """
     around = half_circle(data.lengths)
     k = len(around.angles)
@@ -165,7 +164,7 @@ def press(
     try:
         symmetry = HalfTurn(model.mesh, equations.equation < equations.size, k)
         work = ContactNewton(tyre, symmetry, road, np.repeat(U[None], k, 0), check)
-    except NotSymmetric as error:
+    except Refused as error:
         raise DeckError(0, f"a pressed tyre must be symmetric: {error}") from None
     footprints: list[dict[str, Any]] = []
     failure = cause = ""
@@ -175,13 +174,13 @@ def press(
             footprint = _footprint(work, found, load, tread)
             if load in vibrations:
                 footprint |= _modes(work, found, vibrations[load], tread, equations, U)
-        except (NotPressed, Unstable, NotConverged, np.linalg.LinAlgError, give_up) as error:
-            if isinstance(error, give_up) and work.load:
-                error = give_up(f"{error} after {work.load:.4g} N{work.depth()}")
+        except (RunFailed, np.linalg.LinAlgError) as error:
+            cause = getattr(error, "cause", "crashed")
+            if cause == "timed_out" and work.load:
+                error = RunFailed(cause, f"{error} after {work.load:.4g} N{work.depth()}")
             if not footprints:
                 raise error from None
             failure = str(error)
-            cause = getattr(error, "cause", "crashed")
             break
         footprints.append(footprint)
         reached = len(footprints), len(wanted)

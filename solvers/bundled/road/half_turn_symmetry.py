@@ -14,16 +14,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...errors import Refused
 from ..section.mesh import DeckMesh
 
 Array = np.ndarray
 MIRROR_SIGNS = np.array([1.0, 1.0, -1.0])
 HALF_TURN = np.array([1.0, -1.0, -1.0])  # about the vertical: r, theta, z
 SAME_PLACE = 1e-6  # m
-
-
-class NotSymmetric(ValueError):
-    """The section is not its own mirror image."""
 
 
 def mirror_images(mesh: DeckMesh) -> Array:
@@ -37,14 +34,14 @@ class HalfTurn:
     """Fields (k, n, 3) on half the circumference as parts (2, k, q, 3) on the nodes z >= 0.
 
     mesh; free (n, 3); angles k; parity p; ``other`` (n,): each node's mirror image.
-    Raises NotSymmetric.
+    Raises Refused.
     """
 
     def __init__(self, mesh: DeckMesh, free: Array, angles: int, parity: int = 1):
         X = mesh.X.real
         other = mirror_images(mesh)
         if (other < 0).any() or (free != free[other]).any():
-            raise NotSymmetric("the section or its supports differ between z and -z")
+            raise Refused("the section or its supports differ between z and -z")
         self.other = other
         self.nodes = np.flatnonzero(X[:, 1] > -SAME_PLACE)
         self.beyond = other[self.nodes]

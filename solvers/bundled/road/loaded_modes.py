@@ -13,7 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..modes.harmonics import HarmonicModes, Unstable
+from ...errors import RunFailed
+from ..modes.harmonics import HarmonicModes
 from ..section.band import Indefinite
 from ..section.mechanics import mass
 from ..section.model import Model
@@ -49,7 +50,7 @@ def loaded_modes(
     """The ``count`` lowest modes about U (k, n, 3).
 
     free (n, 3); hold: what holds the patch; unloaded: the inflated tyre's modes, to start from.
-    Raises Unstable, NotConverged; what ``check`` raises to stop.
+    Raises RunFailed; what ``check`` raises to stop.
     """
     tyre.residual(U)
     symmetries = [HalfTurn(tyre.model.mesh, free, len(U), parity) for parity in (1, -1)]
@@ -89,7 +90,7 @@ def _one_parity(
     try:
         factor = Factor(order, tangents, hold.stiffness(*symmetry.shape[:2], positive=True))
     except Indefinite:
-        raise Unstable("the pressed tyre is not stable: its stiffness is not positive") from None
+        raise RunFailed("unstable", davidson.NOT_STABLE) from None
     del tangents
     weigh = Inertia(tyre.model, tyre.around)
 

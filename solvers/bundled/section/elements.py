@@ -15,16 +15,9 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from . import shapes
+from .parts.law import Inverted
 
 Array = np.ndarray
-
-
-class FoldedElement(ValueError):
-    """An element whose Jacobian is not positive; ``index`` is its place in the block."""
-
-    def __init__(self, index: int):
-        super().__init__(f"element {index} has no positive area")
-        self.index = index
 
 
 @dataclass(frozen=True)
@@ -44,7 +37,7 @@ class Solids:
 def solids(X: Array, connectivity: Array, kind: shapes.ElementType) -> Solids:
     """Operators of solids of one type; with one Gauss point the hourglass vectors, too.
 
-    X (n, 2): R, Z of all nodes in m. Raises FoldedElement.
+    X (n, 2): R, Z of all nodes in m. Raises Inverted.
     """
     rule, mass_rule = kind.rule(kind.points), kind.rule(kind.mass_points)
     R, weights, gradient = _map(X, connectivity, rule)
@@ -76,7 +69,7 @@ def _map(X: Array, connectivity: Array, rule: shapes.Rule) -> tuple[Array, Array
     R = np.einsum("ga,ea->eg", rule.N, corners[..., 0])
     bad = np.flatnonzero(((det.real <= 0) | (R.real <= 0)).any(1))
     if len(bad):
-        raise FoldedElement(int(bad[0]))
+        raise Inverted(int(bad[0]))
     inverse = np.empty_like(tangent)  # dxi_k / dX_j
     inverse[..., 0, 0], inverse[..., 1, 1] = tangent[..., 1, 1], tangent[..., 0, 0]
     inverse[..., 0, 1], inverse[..., 1, 0] = -tangent[..., 0, 1], -tangent[..., 1, 0]

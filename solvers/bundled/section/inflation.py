@@ -7,6 +7,7 @@ from operator import methodcaller
 
 import numpy as np
 
+from ...errors import NoEquilibrium
 from . import mechanics
 from .band import Cholesky, Indefinite, Numbering
 from .model import Model
@@ -25,18 +26,6 @@ MIN_INERTIA, MAX_INERTIA = 4e5, 4e15  # of the inertia that holds back a wrinkli
 TENSION_FACTOR = 0.05  # factor on the artificial tension from one iteration to the next
 
 
-class InflationFailed(ArithmeticError):
-    """No stable equilibrium beyond ``reached`` times the load that was asked for."""
-
-    cause = "no_equilibrium"
-
-    def __init__(self, reached: float, pressure: float, why: str):
-        super().__init__(
-            f"inflation stopped at {reached * pressure / 1e3:.4g} of"
-            f" {pressure / 1e3:.4g} kPa: {why}"
-        )
-
-
 def equilibrium(
     model: Model,
     numbering: Numbering,
@@ -52,7 +41,7 @@ def equilibrium(
     too the load comes in steps. Each is another path to the same equilibrium. ``check`` is called
     between steps and may raise to stop.
 
-    Raises InflationFailed with the pressure that was reached.
+    Raises NoEquilibrium with the pressure that was reached.
     """
     solve = _Solver(model, numbering, loads)
     U = solve(start, 1.0, 1.0, MAX_QUICK_ITERATIONS if solve.pressures else MAX_ITERATIONS)
@@ -62,6 +51,12 @@ def equilibrium(
     if U is None:
         U = _by_pressure(solve, start, check)
     return U, solve.factorisations
+
+
+def stopped(reached: float, pressure: float, why: str) -> NoEquilibrium:
+    """No stable equilibrium beyond ``reached`` times the load that was asked for."""
+    full, found = pressure / 1e3, reached * pressure / 1e3
+    return NoEquilibrium(f"inflation stopped at {found:.4g} of {full:.4g} kPa: {why}")
 
 
 class _Solver:
@@ -121,7 +116,7 @@ def _by_pressure(solve: _Solver, start: Array, check: Callable[[], None]) -> Arr
         if further is None:
             step /= 2
             if step < MIN_LOAD_STEP:
-                raise InflationFailed(reached, solve.full, solve.why)
+                raise stopped(reached, solve.full, solve.why)
         else:
             U, reached = further, target
             step *= 2

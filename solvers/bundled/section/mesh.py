@@ -10,6 +10,7 @@ import numpy as np
 from ..deck.keywords import DeckError, Keyword
 from . import elements
 from .band import Numbering
+from .parts.law import Inverted
 from .shapes import TYPES
 
 Array = np.ndarray
@@ -81,8 +82,8 @@ def _mesh(keywords: list[Keyword]) -> DeckMesh:
         if TYPES[kind].faces:
             try:
                 blocks[kind] = elements.solids(X, table, TYPES[kind])
-            except elements.FoldedElement as error:
-                number = next(e for e, p in place.items() if p == (kind, error.index))
+            except Inverted as error:
+                number = next(e for e, p in place.items() if p == (kind, error.element))
                 raise DeckError(
                     0,
                     f"element {number} has no positive area: it folds over"

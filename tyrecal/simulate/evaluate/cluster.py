@@ -10,7 +10,7 @@ from typing import Any
 
 from threadpoolctl import threadpool_limits
 
-from .failure import SolverUnavailable, WorkerLost
+from .failure import EvaluationFailed, SolverUnavailable
 from .sources import sources
 
 SCHEDULER_PATIENCE_S = 20.0  # for a scheduler to answer
@@ -26,7 +26,7 @@ class Cluster:
     def each(
         self, function: Callable[[Any], Any], tasks: Sequence[Any]
     ) -> Generator[tuple[int, Any], None, None]:
-        """As in `Executor`. A task is given up, as WorkerLost, once it has seen more workers die
+        """As in `Executor`. A task is given up, as crashed, once it has seen more workers die
         than the scheduler allows (three, unless configured)."""
         from distributed import KilledWorker, as_completed
         from distributed.client import FutureCancelledError
@@ -41,7 +41,8 @@ class Cluster:
                 try:
                     answer = future.result()
                 except KilledWorker as error:
-                    answer = WorkerLost(f"{error.allowed_failures + 1} workers died with it")
+                    words = f"{error.allowed_failures + 1} workers died with it"
+                    answer = EvaluationFailed("crashed", words)
                 except FutureCancelledError:
                     raise SolverUnavailable(
                         f"the scheduler at {self.address} went away; the same command resumes"

@@ -14,7 +14,7 @@ from ...interrupt import interrupts_put_off, raise_interrupt
 from ..deck.decks import Decks, Design
 from . import folders
 from .executor import executor, in_order
-from .failure import DeckRefused, EvaluationFailed, WorkerLost
+from .failure import DeckRefused, EvaluationFailed
 from .pressed import Pressed, pressed
 from .results import Evaluation, evaluation
 from .solver import Solver, find_solver
@@ -234,8 +234,8 @@ class Evaluator:
             answers = workers.each(partial(_answer_and_count, self.worker(), ask), asked)
             for done, answer in enumerate(in_order(answers), start=1):
                 self.on_progress(done, len(asked))
-                if isinstance(answer, WorkerLost):
-                    yield EvaluationFailed("crashed", str(answer))
+                if isinstance(answer, EvaluationFailed):  # its process died
+                    yield answer
                     continue
                 found, counts = answer
                 self.counts.add(counts)

@@ -8,7 +8,7 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import ExitStack, contextmanager
 from typing import Any, Protocol
 
-from .failure import WorkerLost
+from .failure import EvaluationFailed
 from .pool import Pool, first_done, process_pool
 
 Task = tuple[int, Any]  # its place among the tasks, and what its function is given
@@ -20,9 +20,10 @@ class Executor(Protocol):
     def each(
         self, function: Callable[[Any], Any], tasks: Sequence[Any]
     ) -> Generator[tuple[int, Any], None, None]:
-        """(place of a task, ``function`` of it or WorkerLost), as they finish.
+        """(place of a task, ``function`` of it or EvaluationFailed), as they finish.
 
-        Raises what ``function`` raises. Closed early, it ends what is under way where it can.
+        A task whose process died with it has crashed. Raises what ``function`` raises. Closed
+        early, it ends what is under way where it can.
         """
 
 
@@ -52,7 +53,7 @@ class Processes:
             lost = yield from _until_one_dies(function, waiting, self.jobs)
             for suspect in lost:  # which of them killed its process? each again, alone
                 if (yield from _until_one_dies(function, [suspect], 1)):
-                    yield suspect[0], WorkerLost("its process died, twice")
+                    yield suspect[0], EvaluationFailed("crashed", "its process died, twice")
 
 
 def _until_one_dies(

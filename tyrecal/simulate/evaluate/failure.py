@@ -35,7 +35,3 @@ class SolverUnavailable(TyrecalError):
 
 class DeckRefused(InputError):
     """The solver refuses the deck: the case, or the user's template, asks for what it lacks."""
-
-
-class WorkerLost(Exception):
-    """The process that did a task died in the middle of it, each time that it was tried."""

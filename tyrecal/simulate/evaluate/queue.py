@@ -47,7 +47,7 @@ class QueueSettings(BaseModel):
 
 
 def read_settings(path: Path) -> QueueSettings:
-    """Settings from their file. Raises SettingsError, in one sentence a mistake."""
+    """Settings from their file. Raises InputError, in one sentence a mistake."""
     return typed(path, QueueSettings)
 
 
@@ -92,7 +92,7 @@ def jobs_of(settings: QueueSettings) -> Any:
 @contextmanager
 def reached(scheduler: str) -> Iterator[str]:
     """The address of a scheduler: as given, or of one that a settings file (``.yaml``) starts, with
-    its jobs, for as long as the block lasts. Raises SettingsError, SolverUnavailable."""
+    its jobs, for as long as the block lasts. Raises InputError, SolverUnavailable."""
     if not scheduler.endswith((".yaml", ".yml")):
         yield scheduler
         return

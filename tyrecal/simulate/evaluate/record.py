@@ -14,11 +14,13 @@ from zipfile import ZIP_STORED, ZipFile
 
 import numpy as np
 
+from ...errors import InputError
+
 ARRAY = "__array__"
 DIGEST = 65  # bytes of the first line: 64 hexadecimal digits and its end
 
 
-class Damaged(ValueError):
+class Damaged(InputError):
     """The bytes are not those that were written."""
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from ...errors import InputError
-from ..settings import SettingsError, command_of
+from ..settings import command_of
 
 GROUP = "tyrecal.solvers"
 
@@ -61,7 +61,7 @@ class Solver(Protocol):
 def find_solver(name: str, command: Sequence[str] = ()) -> Solver:
     """The installed solver of that name, with the program that the user has set, or ``command``.
 
-    Raises InputError; SettingsError.
+    Raises InputError.
     """
     found = {entry.name: entry for entry in entry_points(group=GROUP)}
     if name not in found:
@@ -105,7 +105,7 @@ def _described(entry: EntryPoint) -> dict[str, Any]:
         facts["version"] = solver.version
         if solver.version == "unknown":
             facts["problem"] = "its program was not found"
-    except SettingsError as error:
+    except InputError as error:
         facts["problem"] = str(error)
     except Exception as error:  # whatever a stranger's code raises when it is imported
         facts["problem"] = f"{type(error).__name__}: {error}"

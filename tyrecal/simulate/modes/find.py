@@ -9,7 +9,7 @@ from ..evaluate.evaluator import Evaluator, Question
 from ..evaluate.failure import DeckRefused, EvaluationFailed
 from ..evaluate.results import Evaluation
 from .label import paired_labels
-from .match import LostLabel, margin, match
+from .match import margin, match
 from .mode import Label, Mode
 
 MORE_MODES = (4, 8)  # per harmonic, where a label is not among the modes first asked for
@@ -61,8 +61,8 @@ def find_modes(
             try:
                 labels = wanted(modes) if callable(wanted) else wanted
                 yield place, Found(answer, modes, match(modes, labels))
-            except LostLabel as error:
-                lost[place] = EvaluationFailed("lost_label", str(error))
+            except EvaluationFailed as error:
+                lost[place] = error
         if not lost:
             break
     yield from lost.items()

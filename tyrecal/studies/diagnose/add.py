@@ -14,24 +14,20 @@ from ...tyre.load import load_case
 from ...tyre.values import with_values
 
 
-class NotAdded(InputError):
-    """The new case cannot be written."""
-
-
 def add(path: Path, id: str, value: float, folder: Path | None = None) -> Path:
     """Write CASE_EFFECT.yaml beside the case at ``path`` with the effect's parameter in it.
 
     Its section and templates are named relative to the case, so it goes beside it, or into
-    ``folder`` where that is the same. Raises NotAdded, ValueError for an unknown effect or a
+    ``folder`` where that is the same. Raises InputError; ValueError for an unknown effect or a
     parameter that cannot be, OSError.
     """
     loaded = load_case(path, allow_unusual=True)  # of the old case its user was told
     with_values(loaded, {f"effects.{id}": value})
     target = path.with_name(f"{path.stem}_{id}{path.suffix}")
     if folder is not None and folder.resolve() != path.parent.resolve():
-        raise NotAdded(f"the new case goes beside the old one, to '{target}', not to '{folder}'")
+        raise InputError(f"the new case goes beside the old one, to '{target}', not to '{folder}'")
     if target.exists():
-        raise NotAdded(f"'{target}' exists already; move it away first")
+        raise InputError(f"'{target}' exists already; move it away first")
     yaml = YAML()
     yaml.preserve_quotes = True
     yaml.width = 1000

@@ -11,7 +11,7 @@ import numpy as np
 from ...errors import InputError
 from ...simulate.evaluate.evaluator import Counts, Evaluator
 from ...simulate.evaluate.executor import executor, in_order
-from ...simulate.evaluate.failure import EvaluationFailed, WorkerLost
+from ...simulate.evaluate.failure import EvaluationFailed
 from ...tyre.case import LoadedCase
 from ...tyre.case.calibration import cannot_fit
 from ..result import csv_text
@@ -163,8 +163,8 @@ def _run_all(
     tasks = [(Problem(problem.case, evaluator, problem.fixed), x, method) for x in starts]
     with executor(jobs, problem.evaluator.scheduler) as workers:
         for answer in in_order(workers.each(_start_alone, tasks)):
-            if isinstance(answer, WorkerLost):
-                raise EvaluationFailed("crashed", str(answer))
+            if isinstance(answer, EvaluationFailed):  # its process died
+                raise answer
             report, counts = answer
             problem.evaluator.counts.add(counts)
             yield report

@@ -9,7 +9,6 @@ Numerical Optimization, ch. 10 and 18); bounds become linear constraints.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,10 +28,6 @@ CREEPING = 3e-4  # of the objective, less than ROOM costs: a gain that is not wo
 ALONG = 0.1  # of the gradient: as much along the crossing counts as none
 AT_CROSSING = "the two [0,0] modes meet: beyond, labels change places and the objective is higher"
 CAME_BACK = "came back over the crossing of the two [0,0] modes"
-
-
-class _Jump(Exception):
-    """No lower objective along a step, however short."""
 
 
 @dataclass(frozen=True)
@@ -154,7 +149,7 @@ def _restart(
 
     def function(y: Array) -> tuple[float, Array]:
         if point.roughness and len(seen) > TRIALS + 1:
-            raise _Jump  # each trial presses several tyres
+            return np.inf, np.zeros(len(y))  # each trial presses several tyres
         x = np.clip(point.x + turn @ y, problem.lower, problem.upper)
         try:
             there = problem.evaluate(x)
@@ -182,15 +177,14 @@ def _restart(
     }
     from scipy.optimize import minimize  # late: not for those who only read results
 
-    with suppress(_Jump):
-        minimize(
-            function,
-            np.zeros(len(J.T)),
-            jac=True,
-            method="SLSQP",
-            constraints=[bounds],
-            options={"maxiter": 1, "ftol": 1e-15},
-        )
+    minimize(
+        function,
+        np.zeros(len(J.T)),
+        jac=True,
+        method="SLSQP",
+        constraints=[bounds],
+        options={"maxiter": 1, "ftol": 1e-15},
+    )
     best = min(seen, key=lambda p: p.objective)
     return seen, len(seen) > 2 and best is seen[2]
 

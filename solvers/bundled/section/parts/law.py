@@ -16,10 +16,12 @@ Array = np.ndarray
 
 
 class Inverted(ArithmeticError):
-    """An element turned inside out, or nearly so."""
+    """An element turned inside out, or nearly so; ``element``: the first, where it is known."""
 
-    def __init__(self) -> None:
-        super().__init__("elements turn inside out")
+    def __init__(self, element: int | None = None) -> None:
+        one = f"element {element} has no positive area"
+        super().__init__("elements turn inside out" if element is None else one)
+        self.element = element
 
 
 @dataclass(frozen=True)
