@@ -112,3 +112,17 @@ def test_names_of_the_map() -> None:
                 assert follows[0] in defined, f"{file} has no {follows[0]}"
                 told += 1
     assert told >= 15
+
+
+def test_a_constants_name_means_one_thing() -> None:
+    """Few are defined twice: where somebody else's way of doing the same is wanted, as of the
+    blind trials' judge, or every file of a kind has its own, as an effect."""
+    files: dict[str, set[str]] = {}
+    for module, path in modules().items():
+        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+            targets = getattr(node, "targets", [getattr(node, "target", None)])
+            for each in (x for target in targets if target for x in ast.walk(target)):
+                if isinstance(each, ast.Name) and each.id.isupper():
+                    files.setdefault(each.id, set()).add(module)
+    twice = {name: sorted(found) for name, found in files.items() if len(found) > 1}
+    assert len(twice) <= 10, twice

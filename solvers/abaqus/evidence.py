@@ -11,7 +11,7 @@ from .dat import DatTable
 from .fil import SIM, Modes, read_fil
 
 # largest relative difference of a frequency between .fil and .dat: five digits
-FREQUENCY_RTOL = 1e-3
+PRINTED_RTOL = 1e-3
 
 
 def checked_modes(path: Path, asked: int | None, table: DatTable) -> Modes:
@@ -39,7 +39,7 @@ def checked_modes(path: Path, asked: int | None, table: DatTable) -> Modes:
     for number, printed_Hz in table.frequencies_Hz.items():
         if (
             number > len(own_Hz)
-            or not abs(own_Hz[number - 1] - printed_Hz) <= FREQUENCY_RTOL * printed_Hz
+            or not abs(own_Hz[number - 1] - printed_Hz) <= PRINTED_RTOL * printed_Hz
         ):
             raise _failed(f"{path.name} and {dat} disagree on mode {number}")
     if table.mass_kg is None:

@@ -55,7 +55,7 @@ def test_a_study_from_end_to_end(
         "SOURCE_DESIGNS": 4,
         "EFFECT_DEGREE": 1,
         "EFFECT_DESIGNS": 2,
-        "ONE_SIDED": (0.5, 1.0),
+        "ONE_SIDED_SHARES": (0.5, 1.0),
     }
     for name, value in few.items():
         monkeypatch.setattr(f"tyrecal.studies.blind.emulated.{name}", value)

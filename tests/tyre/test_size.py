@@ -7,7 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tyrecal.errors import InputError
-from tyrecal.tyre.section.size import ASPECTS, INCH, RIM_CODES, parse_size
+from tyrecal.tyre.section.size import ASPECTS, RIM_CODES, parse_size
+from tyrecal.units import INCH
 
 # overall diameter and design section width, mm, measuring rim, inch: tables of the European Tyre
 # and Rim Technical Organisation and the Tire and Rim Association, which round the rim's diameter

@@ -88,8 +88,9 @@ def command(
     """
     from ..tyre.case.new_case import from_file, from_size
     from ..tyre.guard import ALL_THE_SAME
-    from ..tyre.section.size import INCH, parse_size
+    from ..tyre.section.size import parse_size
     from ..tyre.usual import GAUGES, USUAL
+    from ..units import INCH
 
     if size is None and file is None:
         raise click.UsageError("give a SIZE, as in 'tyrecal init 205/60R15', or --section FILE")

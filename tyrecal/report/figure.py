@@ -10,7 +10,7 @@ from textwrap import fill
 
 import numpy as np
 from markupsafe import Markup
-from matplotlib import rc_context
+from matplotlib import colormaps, rc_context
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from PIL import Image
@@ -18,6 +18,7 @@ from PIL import Image
 from ..files import whole
 
 DPI = 150
+COLOUR_MAP = colormaps["viridis"]
 GREY = "0.45"
 # Okabe and Ito: told apart by colour-blind readers; their yellow is left out, pale on paper
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")

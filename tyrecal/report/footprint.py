@@ -7,15 +7,13 @@ from typing import Any
 
 import numpy as np
 from contourpy import contour_generator
-from matplotlib import colormaps
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from ..studies.footprint import FootprintRow
-from .figure import COLOURS, GREY, headline, in_house_style, new_figure
+from .figure import COLOUR_MAP, COLOURS, GREY, headline, in_house_style, new_figure
 from .shape_data import PatchData
 
-COLOUR_MAP = colormaps["viridis"]
 MAX_BANDS = 12  # of colour
 MAX_COLUMNS = 4
 MARGIN = 10.0  # mm round the largest patch

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, TriMesh
 from matplotlib.colors import to_rgba
@@ -17,7 +16,7 @@ from matplotlib.tri import Triangulation
 
 from ..simulate.modes.mode import Mode
 from ..tyre.section.mesh import SectionMesh
-from .figure import COLOURS, in_house_style, new_figure, save
+from .figure import COLOUR_MAP, COLOURS, in_house_style, new_figure, save
 from .revolve import motion, skin, swept
 
 Array = np.ndarray
@@ -28,7 +27,6 @@ MAX_MOTION = 0.12  # displacement in the picture over the tyre's radius
 LINE_WIDTH = 0.009  # inches: meridians in bold
 NEARER = 0.1  # inches: these, to the viewer, so that only other parts of the tyre hide them
 VIEW = 1.3  # half a view's width over the tyre's radius
-COLOUR_MAP = colormaps["viridis"]
 PERSPECTIVE = (22.0, -55.0)
 
 

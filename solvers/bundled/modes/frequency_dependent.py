@@ -22,7 +22,7 @@ Array = np.ndarray
 START_HZ = 60.0  # amid the modes of a tyre
 FREQUENCY_RTOL = 1e-13  # of a frequency for a given shape
 SHAPE_RTOL = 1e-4  # of a frequency, from one shape to the next: its square is what is left
-MAX_ITERATIONS = 40
+MAX_SETTLING = 40
 
 
 class SelfConsistent:
@@ -49,7 +49,7 @@ class SelfConsistent:
         """Mode j, from the modes at ``START_HZ``: the frequency at which the shape has its own
         modulus, then the shape there, until both agree."""
         frequency = START_HZ
-        for _ in range(MAX_ITERATIONS):
+        for _ in range(MAX_SETTLING):
             before, frequency = frequency, self._own(found, j, frequency)
             if abs(frequency / before - 1) <= SHAPE_RTOL:
                 mode = found.where(slice(j, j + 1))
@@ -64,7 +64,7 @@ class SelfConsistent:
         forms = self.vibration.forms(found.n, found.shapes[j])
         start, value = self._ratios(frequency_Hz), float(found.eigenvalues[j])
         f = np.sqrt(value) / (2 * np.pi)
-        for _ in range(MAX_ITERATIONS):
+        for _ in range(MAX_SETTLING):
             new = np.sqrt(value + (self._ratios(f) - start) @ forms) / (2 * np.pi)
             if abs(new / f - 1) <= FREQUENCY_RTOL:
                 return float(new)

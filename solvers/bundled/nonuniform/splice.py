@@ -30,11 +30,12 @@ from ..solid3d.revolved import Revolved
 from .coupled import split, tell
 
 Array = np.ndarray
-SPARE_HARMONICS = 2  # harmonics beyond the highest wanted whose modes may lie close to wanted ones
+# harmonics beyond the highest wanted whose modes may lie close to wanted ones
+SPARE_START_HARMONICS = 2
 EXTRA_SHAPE_HARMONICS = 6  # harmonics of the displacements beyond the highest wanted
-FORCE_RTOL = 1e-9  # out-of-balance force over the rim's
-MAX_ITERATIONS = 20
-LINEAR_RTOL = 1e-4  # of each step of Newton's method
+SPLICE_FORCE_RTOL = 1e-9  # out-of-balance force over the rim's
+MAX_SPLICE_ITERATIONS = 20
+SPLICE_LINEAR_RTOL = 1e-4  # of each step of Newton's method
 MIN_GRAM = 1e-11  # of the basis' Gram matrix
 RESPONSE_ROUNDS = 2  # of responses
 
@@ -147,7 +148,7 @@ def sector_modes(
     tyre = Revolved(blended(model, sector.model, share), loads, around)
     fields = FullCircle(vibration, tyre, sector, top)
     equilibrium(fields, U, check)
-    near = range(min(max(harmonics) + SPARE_HARMONICS, top) + 1)
+    near = range(min(max(harmonics) + SPARE_START_HARMONICS, top) + 1)
     start: list[Array] = []
     plain = {}
     for n in near:
@@ -174,7 +175,7 @@ def equilibrium(fields: FullCircle, U: Array, check: Callable[[], None]) -> None
     product = lambda x: fields.forces(x.reshape(shape)).ravel()
     response = lambda x: fields.response(x.reshape(shape)).ravel()
     scale = 0.0
-    for _ in range(MAX_ITERATIONS):
+    for _ in range(MAX_SPLICE_ITERATIONS):
         check()
         try:
             whole = fields.tyre.residual(state)
@@ -182,9 +183,9 @@ def equilibrium(fields: FullCircle, U: Array, check: Callable[[], None]) -> None
             raise stopped(0.0, 0.0, f"with the splice {error}") from None
         force = (whole * fields.free).ravel()
         scale = scale or float(np.linalg.norm(whole))  # of what the rim bears
-        if np.linalg.norm(force) <= FORCE_RTOL * scale:
+        if np.linalg.norm(force) <= SPLICE_FORCE_RTOL * scale:
             return
-        step, _, _ = gmres(product, response, -force, LINEAR_RTOL, MAX_ITERATIONS)
+        step, _, _ = gmres(product, response, -force, SPLICE_LINEAR_RTOL, MAX_SPLICE_ITERATIONS)
         state = state + step.reshape(shape)
     raise stopped(0.0, 0.0, "Newton's method did not converge with the splice")
 

@@ -22,8 +22,8 @@ from .half_turn_symmetry import HalfTurn
 
 Array = np.ndarray
 log = logging.getLogger("tyrecal_solvers")
-FORCE_RTOL = 1e-8  # out-of-balance force over the load
-MAX_ITERATIONS = 40  # Newton iterations a load
+CONTACT_FORCE_RTOL = 1e-8  # out-of-balance force over the load
+MAX_NEWTON = 40  # Newton iterations a load
 # GMRES iterations of a step, after which the preconditioner is formed anew
 MAX_GMRES_BEFORE_NEW_FACTOR = 15
 MAX_GMRES = 60
@@ -156,16 +156,16 @@ class ContactNewton:
         else:
             height -= FIRST_COMPLIANCE * load
         bound, near = self._bound, COULOMB_RTOL
-        for attempt in range(MAX_ITERATIONS):
+        for attempt in range(MAX_NEWTON):
             reached = near if attempt else FRICTION_BOUND_RTOL
             parts, height, contact = self._softly(parts, height, load, bound, reached)
             bound = contact.local[..., 0], self.road.share(height)[0]
             if not attempt:
                 continue  # what newly touches had no friction yet
             try:
-                parts, height, contact = self._settle(parts, height, load, None, FORCE_RTOL)
+                parts, height, contact = self._settle(parts, height, load, None, CONTACT_FORCE_RTOL)
             except NoEquilibrium:
-                near = max(0.1 * near, FORCE_RTOL)
+                near = max(0.1 * near, CONTACT_FORCE_RTOL)
                 continue
             self._bound = contact.local[..., 0], np.ones_like(self.road.area)
             return PressedState(parts, height, contact, self._stiffness(contact))
@@ -197,7 +197,7 @@ class ContactNewton:
         if bound is None and self._stale:
             self._form(contact)
         setbacks = 0
-        for _ in range(MAX_ITERATIONS):
+        for _ in range(MAX_NEWTON):
             self.check()
             if size <= tolerance * load:
                 return parts, height, contact
@@ -227,7 +227,7 @@ class ContactNewton:
             setbacks += size > 0.5 * before
             if bound is None and setbacks > MAX_SETBACKS:
                 break
-        raise NoEquilibrium(f"Newton's method did not converge in {MAX_ITERATIONS} iterations")
+        raise NoEquilibrium(f"Newton's method did not converge in {MAX_NEWTON} iterations")
 
     def _step(
         self, contact: Contact, force: Array, lacking: float, tolerance: float

@@ -17,7 +17,7 @@ from .parts.pressure import Pressure
 Array = np.ndarray
 FORCE_RTOL = 1e-9  # out-of-balance force over pressure force; the next step is at round-off
 ROUND_OFF_RTOL = 1e-6  # accepted where round-off lets the force fall no further
-MIN_LOAD_STEP = 1 / 256
+MIN_PRESSURE_STEP = 1 / 256
 MAX_ITERATIONS = 30
 MAX_QUICK_ITERATIONS = 11  # iterations after which another path is likely to be shorter
 STIFFENING = 8.0  # multiple of the rubber's stiffness that inflates without trouble
@@ -115,7 +115,7 @@ def _by_pressure(solve: _Solver, start: Array, check: Callable[[], None]) -> Arr
         further = solve(U, target, 1.0, MAX_ITERATIONS)
         if further is None:
             step /= 2
-            if step < MIN_LOAD_STEP:
+            if step < MIN_PRESSURE_STEP:
                 raise stopped(reached, solve.full, solve.why)
         else:
             U, reached = further, target

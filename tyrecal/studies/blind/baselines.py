@@ -15,7 +15,7 @@ from .ruler import SIZE_POINTS, Ruler
 
 Array = np.ndarray
 MAX_RULE_STEPS = 8
-MAX_STEP = 0.5  # of ln x, a step
+MAX_LN_STEP = 0.5  # of ln x, a step
 NONE = "none"
 PRIOR_NONE = 0.25
 
@@ -59,5 +59,5 @@ def _fit(ruler: Ruler, y: Array, places: Array, inverse: Array) -> Array:
         step = np.linalg.solve(
             J.T @ inverse @ J + information, J.T @ inverse @ (y - eta) - information @ d
         )
-        d = d + step * min(1.0, MAX_STEP / max(abs(step).max(), 1e-300))
+        d = d + step * min(1.0, MAX_LN_STEP / max(abs(step).max(), 1e-300))
     return d

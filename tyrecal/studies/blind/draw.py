@@ -14,7 +14,7 @@ from ..diagnose.uncertainties import EFFECT_PATH, Source, values_of
 from .laws import EffectLaw
 from .protocol import Protocol
 
-MAX_SWAP_DISTANCE = 0.25  # relative distance of modes whose labels could be taken for one another
+SWAPPED_WITHIN = 0.25  # relative distance of modes whose labels could be taken for one another
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,7 @@ Array = np.ndarray
 REACH = 0.8  # of ln x: 40 % by the draw, the rest what an ignored effect moves a fit
 PLAIN_DEGREE, EFFECT_DEGREE, SOURCE_DEGREE = 4, 3, 2
 PLAIN_DESIGNS, EFFECT_DESIGNS, SOURCE_DESIGNS = 20, 10, 12
-ONE_SIDED, TWO_SIDED = (0.1, 0.4, 0.75, 1.0), (0.5, 1.0)
+ONE_SIDED_SHARES, TWO_SIDED_SHARES = (0.1, 0.4, 0.75, 1.0), (0.5, 1.0)
 SEED = 1
 REWEIGHTED = 12  # times
 HUBER, MIN_SCALE = 2.0, 1e-5  # a weight falls beyond so many medians; of ln f, below any model
@@ -184,9 +184,9 @@ def _effect(
 
 def _node_values(span: Span) -> list[float]:
     if span.low < 0 < span.high:
-        return [f * end for end in (span.low, span.high) for f in TWO_SIDED]
+        return [f * end for end in (span.low, span.high) for f in TWO_SIDED_SHARES]
     far = max(span.low, span.high, key=abs)
-    return [f * far for f in ONE_SIDED]
+    return [f * far for f in ONE_SIDED_SHARES]
 
 
 def _fit(powers: Array, t: Array, answers: Sequence[Answer], reach: float) -> Polynomial:

@@ -25,7 +25,7 @@ from ...simulate.evaluate.pool import process_pool
 from ...simulate.modes.mode import Label
 from ...tyre.case import LoadedCase
 from ..diagnose.uncertainties import sources
-from .draw import MAX_SWAP_DISTANCE, Truth, draw, tyre
+from .draw import SWAPPED_WITHIN, Truth, draw, tyre
 from .maker import Computed, Maker
 from .protocol import Protocol, read_json, write_json, write_protocol
 from .ruler import write_ruler
@@ -178,7 +178,7 @@ def _swap(
         (a, b)
         for a in mean
         for b in mean
-        if a < b and abs(np.log(mean[a] / mean[b])) < MAX_SWAP_DISTANCE
+        if a < b and abs(np.log(mean[a] / mean[b])) < SWAPPED_WITHIN
     ]
     if near:
         a, b = near[int(random.integers(len(near)))]

@@ -20,10 +20,11 @@ import numpy as np
 from .evidence import NONE, Hypothesis, grid, weigh
 from .inverse_problem import InverseProblem
 from .observations import Observable
+from .plain_fit import MAX_STEP
 
 Array = np.ndarray
 PLACEBOS, DRAWS = 200, 200
-LEAST_SQUARES_STEPS, MAX_STEP = 8, 0.7  # the longest in any x
+LEAST_SQUARES_STEPS = 8
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from .slsqp import AT_JUMP, Descent, is_at_jump, is_converged
 Array = np.ndarray
 MAX_ITERATIONS_LM = 100
 HALVINGS = 5  # of a step towards a design without a solution
-DAMPING, STIFFEST = 0.1, 1e8  # mu at first, and where no step is left to try
+START_DAMPING, MAX_DAMPING = 0.1, 1e8  # mu at first, and where no step is left to try
 
 
 def minimise(problem: Problem, start: Array, tolerance: float) -> Descent:
@@ -24,11 +24,11 @@ def minimise(problem: Problem, start: Array, tolerance: float) -> Descent:
 
     Raises EvaluationFailed when the start itself cannot be evaluated.
     """
-    point, damping = problem.evaluate(start), DAMPING
+    point, damping = problem.evaluate(start), START_DAMPING
     for _ in range(MAX_ITERATIONS_LM):
         if is_converged(problem, point, tolerance):
             return Descent(point, "converged")
-        if damping > STIFFEST:
+        if damping > MAX_DAMPING:
             return Descent(point, "no lower objective along any damped step")
         trial = _first_solvable(problem, point, _step(problem, point, damping))
         if trial and is_at_jump(problem, point, point.objective - trial.objective):

@@ -11,10 +11,11 @@ from typing import Any
 
 from ...errors import InputError
 from ...files import read_bytes
+from ...units import INCH
 from ..load import validate
 from ..section.from_size import build, usual
 from ..section.section import SectionError, refuse_separators
-from ..section.size import INCH, TyreSize
+from ..section.size import TyreSize
 from .case_text import new_case
 from .section import Outline, SectionSource
 from .stations import read_section_of

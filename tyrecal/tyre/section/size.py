@@ -16,8 +16,8 @@ import re
 from dataclasses import dataclass
 
 from ...errors import InputError
+from ...units import INCH
 
-INCH = 0.0254
 TRUCK_RIM = r"(17|19|22|24)\.5"
 RIM_CODES = (10, *range(12, 25))
 NOMINAL_WIDTHS, ASPECTS = range(125, 400, 10), range(25, 90, 5)  # of cars: widths end in 5
