@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import shutil
+import subprocess
+import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,6 +23,7 @@ from tyrecal.tyre.resolve import resolved
 from tyrecal.tyre.templates import TemplateFailed
 from tyrecal.tyre.values import with_values
 
+from ..conftest import ROOT
 from .support import CASE, CASES, START, coarse, data, decks, frequencies, slopes
 
 EFFECTS = list(catalogue().values())
@@ -200,3 +205,26 @@ def test_a_tyre_without_a_belt_has_no_effects_of_it() -> None:
 def test_other_shipped_case_has_a_deck_of_it(effect: Effect) -> None:
     other = with_values(coarse("p235_75r17_narrow_rim.yaml"), {"pressure_kPa": 200.0})
     assert decks(other, **{effect.id: effect.high / 2}) != decks(other)
+
+
+def test_a_new_file_is_all_that_a_new_effect_touches(tmp_path: Path) -> None:
+    """In a copy: it is found, comes where it says, and writes itself into the case."""
+    package = shutil.copytree(ROOT / "tyrecal", tmp_path / "tyrecal")
+    text = (package / "tyre/effects/belt_angle.py").read_text()
+    text = text.replace('id="belt_angle"', 'id="steeper_belts"').replace("place=70", "place=71")
+    (package / "tyre/effects/steeper_belts.py").write_text(text)
+    program = f"""
+from tyrecal.tyre.effects import IDS, catalogue
+from tyrecal.tyre.load import load_case
+from tyrecal.tyre.resolve import resolved
+from tyrecal.tyre.values import with_values
+assert IDS.index("steeper_belts") == IDS.index("belt_angle") + 1
+assert list(catalogue()) == list(IDS) and len(set(IDS)) == len(IDS)
+case = load_case({str(CASES / "p235_75r17.yaml")!r})
+made = [resolved(with_values(case, {{f"effects.{{id}}": 1.5}})).case for id in IDS[6:8]]
+assert made[0] == made[1] != resolved(case).case
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr

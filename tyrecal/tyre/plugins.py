@@ -1,39 +1,29 @@
 """Names of effects, the tool's own and those of installed packages; nothing is imported for them.
 
-Installed packages add theirs under the entry point group EFFECT_GROUP: the id, and where its
-`Effect` is.
+The tool's own are found by the first two fields of an `Effect` in the files of `effects`. Installed
+packages add theirs under the entry point group EFFECT_GROUP: the id, and where its `Effect` is.
 """
 
 from __future__ import annotations
 
+import re
 from importlib.metadata import entry_points
+from pathlib import Path
 
 EFFECT_GROUP = "tyrecal.effects"
-SPINDLE = ("spindle_lateral", "spindle_radial", "spindle_torsional", "spindle_tilt")
-# Each in a module of its own name, or in SPINDLE's; listed, and applied to a case, in this order.
-OWN = (
-    "dynamic_stiffening",
-    "frequency_stiffening",
-    "tread_density",
-    "tread_wear",
-    "bead_filler",
-    "cap_ply",
-    "belt_angle",
-    "belt_width",
-    "carcass_fanning",
-    "carcass_turn_up",
-    "sidewall_gauge",
-    "rim_width",
-    "pressure_offset",
-    "temperature",
-    "temperature_drift",
-    "cavity_air",
-    *SPINDLE,
-    "wheel_free",
-    "stiffness_splice",
-    "point_mass",
-    "road_contact",
-    "rotation",
-)
+_ENTRY = re.compile(r'^ +id="(\w+)",\n +place=(\d+),$', re.MULTILINE)
+
+
+def _own() -> dict[str, str]:
+    """Id to module of each effect of the folder, by rising place."""
+    found = [
+        (int(place), id, path.stem)
+        for path in (Path(__file__).parent / "effects").glob("*.py")
+        for id, place in _ENTRY.findall(path.read_text(encoding="utf-8"))
+    ]
+    return {id: module for _, id, module in sorted(found)}
+
+
+OWN = _own()
 ADDED = {entry.name: entry for entry in entry_points(group=EFFECT_GROUP) if entry.name not in OWN}
 IDS = (*OWN, *sorted(ADDED))

@@ -14,6 +14,7 @@ __all__ = ["IDS", "Effect", "EffectRefused", "catalogue"]
 @cache
 def catalogue() -> dict[str, Effect]:
     """Every effect by its id. (Modules are imported here: the case's schema needs the ids only.)"""
-    spindle = {effect.id: effect for effect in import_module(".spindle", __package__).EFFECTS}
-    own = {id: spindle.get(id) or import_module(f".{id}", __package__).EFFECT for id in OWN}
-    return {**own, **{id: ADDED[id].load() for id in sorted(ADDED)}}
+    modules = [import_module(f".{name}", __package__) for name in dict.fromkeys(OWN.values())]
+    own = [x for m in modules for x in (m.EFFECTS if hasattr(m, "EFFECTS") else [m.EFFECT])]
+    found = {effect.id: effect for effect in own}
+    return {id: found[id] if id in OWN else ADDED[id].load() for id in IDS}

@@ -26,6 +26,7 @@ def add(case: LoadedCase, value: float) -> LoadedCase:
 
 EFFECT = Effect(
     id="bead_filler",
+    place=50,
     title="Bead filler",
     symbol="e",
     unit="",

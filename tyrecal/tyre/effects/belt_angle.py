@@ -26,6 +26,7 @@ def add(case: LoadedCase, value: float) -> LoadedCase:
 
 EFFECT = Effect(
     id="belt_angle",
+    place=70,
     title="Belt cord angle",
     symbol="da",
     unit="degrees",

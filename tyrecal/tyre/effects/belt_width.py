@@ -59,6 +59,7 @@ def _arc(points: Array) -> Array:
 
 EFFECT = Effect(
     id="belt_width",
+    place=80,
     title="Belt width",
     symbol="db",
     unit="m",

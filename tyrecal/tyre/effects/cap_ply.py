@@ -31,6 +31,7 @@ def add(case: LoadedCase, value: float) -> LoadedCase:
 
 EFFECT = Effect(
     id="cap_ply",
+    place=60,
     title="Cap ply",
     symbol="EA/s",
     unit="N/m",

@@ -42,6 +42,7 @@ def add(case: LoadedCase, value: float) -> LoadedCase:
 
 EFFECT = Effect(
     id="carcass_fanning",
+    place=90,
     title="Fanned carcass cords",
     symbol="e",
     unit="",

@@ -62,6 +62,7 @@ def _continued(section: Section, line: str, regions: tuple[str, ...]) -> Section
 
 EFFECT = Effect(
     id="carcass_turn_up",
+    place=100,
     title="Carcass turn-up",
     symbol="e",
     unit="",

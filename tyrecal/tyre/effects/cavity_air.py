@@ -15,6 +15,7 @@ def add(case: LoadedCase, value: float) -> LoadedCase:
 
 EFFECT = Effect(
     id="cavity_air",
+    place=160,
     title="Air in the cavity",
     symbol="s",
     unit="",

@@ -56,6 +56,7 @@ def _moduli(m: Rubber, share: str, long_term: bool, analysis: Analysis) -> tuple
 
 EFFECT = Effect(
     id="dynamic_stiffening",
+    place=10,
     title="Dynamic stiffening of rubber",
     symbol="e",
     unit="",

@@ -16,12 +16,14 @@ if TYPE_CHECKING:
 class Effect:
     """One entry of the catalogue.
 
-    id, title: its name in files and in words; symbol, unit: of the parameter ("" = a number);
-    low, high: the parameter's range on passenger tyres, taken as equally likely throughout;
-    changes: the keywords of the deck that it touches; signature: which modes move, which way and
-    how far, as this model says; toggle: the experiment that would prove it; aliases: ids of
-    effects that frequencies alone hardly tell from it; add: the case with the effect of that
-    parameter (not 0) in it, written in the case's own numbers, or ValueError ("must be ...");
+    id, title: its name in files and in words; place: where it comes among the tool's own, as they
+    are listed and applied to a case (those of installed packages follow, by their ids); symbol,
+    unit: of the parameter ("" = a number); low, high: the parameter's range on passenger tyres,
+    taken as equally likely throughout; changes: the keywords of the deck that it touches;
+    signature: which modes move, which way and how far, as this model says; toggle: the experiment
+    that would prove it; aliases: ids of effects that frequencies alone hardly tell from it; add:
+    the case with the effect of that parameter (not 0) in it, written in the case's own numbers, or
+    ValueError ("must be ...");
     needs: what a solver must list among its capabilities to express it, "" = nothing.
     """
 
@@ -37,6 +39,7 @@ class Effect:
     aliases: tuple[str, ...]
     add: Callable[[LoadedCase, float], LoadedCase]
     needs: str = ""
+    place: int = 0
 
     def within(self, capabilities: Collection[str]) -> bool:
         """Whether a solver with these capabilities can express it."""

@@ -19,6 +19,7 @@ def add(case: LoadedCase, value: float) -> LoadedCase:
 
 EFFECT = Effect(
     id="frequency_stiffening",
+    place=20,
     title="Stiffening of rubber with frequency",
     symbol="beta",
     unit="",

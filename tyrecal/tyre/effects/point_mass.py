@@ -17,6 +17,7 @@ def add(case: LoadedCase, value: float) -> LoadedCase:
 
 EFFECT = Effect(
     id="point_mass",
+    place=230,
     title="Mass on the tread",
     symbol="m",
     unit="kg",

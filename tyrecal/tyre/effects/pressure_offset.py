@@ -17,6 +17,7 @@ def add(case: LoadedCase, value: float) -> LoadedCase:
 
 EFFECT = Effect(
     id="pressure_offset",
+    place=130,
     title="Pressure gauge error",
     symbol="dp",
     unit="kPa",

@@ -78,6 +78,7 @@ def _rotated(vectors: Array, angle: Array) -> Array:
 
 EFFECT = Effect(
     id="rim_width",
+    place=120,
     title="Rim width",
     symbol="dB",
     unit="m",

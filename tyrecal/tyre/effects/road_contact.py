@@ -18,6 +18,7 @@ def add(case: LoadedCase, value: float) -> LoadedCase:
 
 EFFECT = Effect(
     id="road_contact",
+    place=240,
     title="Light contact with the road",
     symbol="k",
     unit="N/m",

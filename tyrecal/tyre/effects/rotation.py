@@ -16,6 +16,7 @@ def add(case: LoadedCase, value: float) -> LoadedCase:
 
 EFFECT = Effect(
     id="rotation",
+    place=250,
     title="Rotation",
     symbol="Omega",
     unit="rad/s",

@@ -18,6 +18,7 @@ def add(case: LoadedCase, value: float) -> LoadedCase:
 
 EFFECT = Effect(
     id="sidewall_gauge",
+    place=110,
     title="Sidewall gauge",
     symbol="e",
     unit="",

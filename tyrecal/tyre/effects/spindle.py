@@ -9,8 +9,9 @@ from .edit import on_spindle
 from .effect import Effect
 
 
-def _spindle(direction: str, key: str, along: str, **entry: Any) -> Effect:
+def _spindle(key: str, along: str, **entry: Any) -> Effect:
     """The compliance ``key`` of the case's `rim.spindle`."""
+    direction = key.partition("_")[0]
 
     def add(case: LoadedCase, value: float) -> LoadedCase:
         return on_spindle(case, key, value)
@@ -19,7 +20,6 @@ def _spindle(direction: str, key: str, along: str, **entry: Any) -> Effect:
         f"Compliance ``value`` more {along}; the wheel's mass and inertia are the case's (`rim`)."
     )
     return Effect(
-        id=f"spindle_{direction}",
         title=f"{direction.capitalize()} compliance of the spindle",
         low=0.0,
         changes=("*SPRING", "*MASS", "*ROTARY INERTIA", "*BOUNDARY"),
@@ -31,9 +31,10 @@ def _spindle(direction: str, key: str, along: str, **entry: Any) -> Effect:
 
 EFFECTS = (
     _spindle(
-        "lateral",
         "lateral_m_per_N",
         "along the axle",
+        id="spindle_lateral",
+        place=170,
         symbol="c_y",
         unit="m/N",
         high=4e-07,
@@ -43,9 +44,10 @@ EFFECTS = (
         aliases=(),
     ),
     _spindle(
-        "radial",
         "radial_m_per_N",
         "along any radius",
+        id="spindle_radial",
+        place=180,
         symbol="c_r",
         unit="m/N",
         high=1e-07,
@@ -55,9 +57,10 @@ EFFECTS = (
         aliases=("cavity_air",),
     ),
     _spindle(
-        "torsional",
         "torsional_rad_per_N_m",
         "about the axle",
+        id="spindle_torsional",
+        place=190,
         symbol="c_t",
         unit="rad/(N m)",
         high=2e-06,
@@ -68,9 +71,10 @@ EFFECTS = (
         aliases=("belt_width", "cap_ply", "temperature", "frequency_stiffening"),
     ),
     _spindle(
-        "tilt",
         "tilt_rad_per_N_m",
         "about any diameter",
+        id="spindle_tilt",
+        place=200,
         symbol="c_d",
         unit="rad/(N m)",
         high=4e-06,

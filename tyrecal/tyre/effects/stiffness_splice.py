@@ -25,6 +25,7 @@ def add(case: LoadedCase, value: float) -> LoadedCase:
 
 EFFECT = Effect(
     id="stiffness_splice",
+    place=220,
     title="Stiff sector (splice)",
     symbol="e",
     unit="",

@@ -21,6 +21,7 @@ def add(case: LoadedCase, value: float) -> LoadedCase:
 
 EFFECT = Effect(
     id="temperature",
+    place=140,
     title="Rubber temperature",
     symbol="dT",
     unit="K",

@@ -19,6 +19,7 @@ def add(case: LoadedCase, value: float) -> LoadedCase:
 
 EFFECT = Effect(
     id="temperature_drift",
+    place=150,
     title="Temperature drift over the run of pressures",
     symbol="dT'",
     unit="K per 100 kPa",

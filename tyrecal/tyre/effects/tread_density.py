@@ -23,6 +23,7 @@ def add(case: LoadedCase, value: float) -> LoadedCase:
 
 EFFECT = Effect(
     id="tread_density",
+    place=30,
     title="Tread density",
     symbol="e",
     unit="",

@@ -17,6 +17,7 @@ def add(case: LoadedCase, value: float) -> LoadedCase:
 
 EFFECT = Effect(
     id="tread_wear",
+    place=40,
     title="Tread wear",
     symbol="w",
     unit="",

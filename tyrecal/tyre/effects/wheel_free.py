@@ -32,6 +32,7 @@ def add(case: LoadedCase, value: float) -> LoadedCase:
 
 EFFECT = Effect(
     id="wheel_free",
+    place=210,
     title="Free wheel",
     symbol="1/m",
     unit="1/kg",
