@@ -11,8 +11,6 @@ import numpy as np
 
 from ..errors import Refused, RunFailed
 from . import VERSION
-from .job import run
-from .road import footprint_job
 
 JOB, PRESS, OLDJOB = "modes", "press", "inflate"
 # of the tool's request, as in `request.Request`
@@ -75,12 +73,16 @@ class Bundled:
 
     def run(self, folder: Path, time_limit_s: float) -> None:
         """Run in this process. Raises ``refusals`` and ``failures``."""
+        from .job import run  # late: an answer from the record needs none of it
+
         job = PRESS if (folder / f"{PRESS}.inp").exists() else JOB
         run(folder, job, OLDJOB, time_limit_s)
 
     def read(self, folder: Path) -> dict[str, Any]:
         """Results as plain data: the last frequency step of the job, or the footprints."""
         if (folder / f"{PRESS}.inp").exists():
+            from .road import footprint_job
+
             return footprint_job.read(folder / PRESS)
         step = json.loads((folder / f"{JOB}.json").read_text(encoding="utf-8"))["steps"][-1]
         with np.load(folder / f"{JOB}.npz", allow_pickle=False) as arrays:

@@ -46,27 +46,28 @@ def test_commands_import_what_they_use(tmp_path: Path) -> None:
     commands: list[tuple[list[str], tuple[str, ...]]] = [
         (["completion", "bash"], ("scipy", "numpy")),
         (["validate", CASE], ("scipy",)),
+        (["effects"], ("scipy",)),
+        (["solvers"], ("scipy",)),
         (["modes", CASE, *coarse, *out], ("scipy.optimize",)),
         (["sweep-pressure", CASE, *coarse, "--no-pictures", *out], ("scipy.optimize",)),
         (["deck", CASE, *out[:2]], ("scipy.optimize",)),
         (["footprint", CASE, "--help"], ("scipy.optimize",)),
-        (["effects"], ("scipy.optimize",)),
-        (["solvers"], ("scipy.optimize",)),
         (["doctor"], ("scipy.optimize",)),
         (["store", str(tmp_path / "store"), "--verify"], ("scipy.optimize",)),
         (["batch", CASE, "--studies", "modes", "--output", str(tmp_path)], ("scipy.optimize",)),
         (["fit", CASE, *coarse, "--no-pictures", *out], ()),
     ]
-    code = (
-        "import sys\nfrom tyrecal.cli.main import main\n"
-        f"for command, unused in {commands!r}:\n"
-        "    try: main(command)\n"
-        "    except SystemExit as leave: assert not leave.code, (command, leave.code)\n"
-        f"    found = [name for name in (*unused, *{never!r}) if name in sys.modules]\n"
-        "    assert not found, (command, found)\n"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
+    for process in (commands, [(["modes", CASE, *coarse, *out], ("scipy",))]):  # the record answers
+        code = (
+            "import sys\nfrom tyrecal.cli.main import main\n"
+            f"for command, unused in {process!r}:\n"
+            "    try: main(command)\n"
+            "    except SystemExit as leave: assert not leave.code, (command, leave.code)\n"
+            f"    found = [name for name in (*unused, *{never!r}) if name in sys.modules]\n"
+            "    assert not found, (command, found)\n"
+        )
+        done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
 
 
 @pytest.mark.parametrize("command", ["validate", "deck", "modes", "fit"])

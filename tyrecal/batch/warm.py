@@ -5,6 +5,7 @@ Only that process imports this module: `pool.warm_up`.
 
 import gc
 from contextlib import suppress
+from importlib import import_module
 from importlib.metadata import entry_points
 
 from ..simulate.evaluate.pool import leave_interrupts_to_parent
@@ -17,5 +18,7 @@ from . import case  # noqa: E402, F401  takes a second: the studies and all that
 for entry in entry_points(group=GROUP):
     with suppress(Exception):  # a solver that cannot be imported says so where it is asked for
         entry.load()
+for late in ("scipy.optimize", "tyrecal_solvers.bundled.job"):  # imported when they are used
+    import_module(late)
 
 gc.freeze()  # so that a worker's collector leaves these pages shared
