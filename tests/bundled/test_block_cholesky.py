@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -142,6 +143,22 @@ def test_exact_without_cords(quadratic: bool) -> None:
         x = problem.random()[0]
         back = problem.factor.solve(problem.product(x))
         np.testing.assert_allclose(back, x, atol=2e-3 * abs(x).max())
+
+
+def test_the_middle_of_the_tread_is_eliminated_last() -> None:
+    """From the edge on, column by column, so that a level touches the next one alone: of eight
+    columns four levels, and each node gone once."""
+    work = ring((0.2, 0.21, 0.23), 0.04, 8, support.Rubber())
+    around, X = half_circle(LENGTHS), work.model.mesh.X
+    symmetry = work.symmetry(around)
+    order = Elimination([part.connectivity for part in work.model.parts], symmetry, around)
+    assert len(order.fronts) == 1 + 4  # the first gathers elements, and eliminates nothing
+    gone = [symmetry.nodes[front.nodes[: front.eliminated]] for front in order.fronts]
+    free = np.flatnonzero(work.free.any(1) & (X[:, 1] > -1e-9))
+    assert sorted(np.concatenate(gone)) == sorted(free)
+    for before, after in pairwise(gone[1:]):
+        assert X[before, 1].min() > X[after, 1].max()
+    assert (X[gone[-1], 1] < 0.0101).all() and (abs(X[gone[-1], 1]) < 1e-9).any()
 
 
 def test_linear_elements_with_cords(inflated: Inflated) -> None:

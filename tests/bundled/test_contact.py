@@ -10,6 +10,7 @@ import pytest
 from tyrecal_solvers.bundled.deck.keywords import DeckError, read_keywords
 from tyrecal_solvers.bundled.road.contact import Contact, FlatRoad
 from tyrecal_solvers.bundled.road.footprint_job import read_road
+from tyrecal_solvers.bundled.road.patch import edge
 from tyrecal_solvers.bundled.solid3d.circumference import Circumference, half_circle
 from tyrecal_solvers.bundled.solid3d.gmres import gmres
 
@@ -128,6 +129,21 @@ def test_bounded_friction_has_a_potential(
     assert one == pytest.approx(other, rel=1e-10)
 
 
+def test_the_potential_has_no_jump_where_a_node_begins_to_slide(work: Round) -> None:
+    """From e / 2 of the elastic slip's path on; at thrice e, 2.5 e of the bound."""
+    road, U = settled(work, 0.7)
+    bound = np.ones_like(road.area), np.ones_like(road.area)
+
+    def friction(slips: float) -> float:
+        along = lowered(AROUND, len(work.U), np.array([0.0, slips * SLIP, 0.0]))
+        return road.forces(U + along, HEIGHT + 1.0, bound).energy
+
+    full = 0.7 * road.area.size * SLIP
+    rest = friction(0.0)
+    for slips, path in ((0.5, 0.125), (1 - 1e-9, 0.5), (1 + 1e-9, 0.5), (3.0, 2.5)):
+        assert friction(slips) - rest == pytest.approx(full * path, rel=1e-3)
+
+
 def test_friction_never_exceeds_coulombs_and_opposes_slip(
     work: Round, random: np.random.Generator
 ) -> None:
@@ -151,6 +167,9 @@ def test_positive_part_of_the_stiffness(work: Round, random: np.random.Generator
         phi = random.normal(size=U.shape)
         same = np.allclose(np.einsum("knij,knj->kni", blocks, phi), contact.product(phi))
         assert same == (friction == 0.0)
+        whole = contact.stiffness(*U.shape[:2], positive=False)
+        image = np.einsum("knij,knj->kni", whole, phi)
+        np.testing.assert_allclose(image, contact.product(phi), atol=1e-9 * abs(image).max())
 
 
 def test_settled_keeps_what_sticks(work: Round, random: np.random.Generator) -> None:
@@ -205,6 +224,23 @@ def test_nodes_slip_from_where_the_road_met_them(work: Round, random: np.random.
     force = lambda step: before.forces(W, height + step).local
     wanted = (force(e) - force(-e)) / (2 * e)
     np.testing.assert_allclose(contact.by_height, wanted, atol=1e-4 * abs(wanted).max())
+
+
+def test_the_edge_follows_from_the_last_four_nodes() -> None:
+    """p^2 ~ a^2 - x^2 over the last four that touch gives a, whatever is further in; between
+    nodes where the pressure rises to the edge, or one node alone touches; beyond neither the last
+    node nor the next."""
+    x = np.arange(0.0, 9.0)
+    pressure = np.sqrt(np.maximum(5.6**2 - x**2, 0.0))
+    assert edge(x, pressure, 5) == pytest.approx(5.6)
+    assert edge(x, np.where(x < 2, 9.0, pressure), 5) == pytest.approx(5.6)
+    assert abs(edge(x, np.where(x < 3, 9.0, pressure), 5) - 5.6) > 0.02
+    assert edge(x, np.where(x > 5, 0.0, 1 + x), 5) == 5.5
+    assert edge(x, np.where(x > 0, 0.0, 1.0), 0) == 0.5
+    assert edge(x, np.where(x > 5, 0.0, np.sqrt(np.maximum(7.0**2 - x**2, 0.0))), 5) == 6.0
+    assert edge(x[:6], pressure[:6], 5) == 5.0
+    steep = np.where(x > 5, 0.0, np.maximum(4.9**2 - x**2, 1e-9) ** 0.5)
+    assert edge(x, steep, 5) == 5.0
 
 
 def test_the_whole_tyres_force_is_on_the_axle(work: Round) -> None:
@@ -264,6 +300,18 @@ def test_gmres_ends_where_it_is_told(random: np.random.Generator) -> None:
     np.testing.assert_allclose(x, b / 3)
     few = np.where(np.arange(40) % 2, 2.0, 5.0)  # two different eigenvalues: two iterations
     assert gmres(lambda v: few * v, identity, random.normal(size=40), 1e-10, 20)[1] == 2
+
+
+def test_gmres_ends_where_no_direction_is_left() -> None:
+    """A turn by 90 degrees is solved in two; a projection spans two directions, and leaves what is
+    across it."""
+    turn = np.array([[0.0, -1.0], [1.0, 0.0]])
+    x, used, left = gmres(lambda v: turn @ v, lambda v: v, np.array([1.0, 0.0]), 1e-12, 5)
+    assert used == 2 and left < 1e-12
+    np.testing.assert_allclose(x, [0.0, -1.0], atol=1e-12)
+    onto, b = np.array([1.0, 0.0, 0.0]), np.array([3.0, 4.0, 0.0])
+    x, used, left = gmres(lambda v: onto * (onto @ v), lambda v: v, b, 1e-12, 5)
+    assert used == 2 and left == pytest.approx(4 / 5) and x[0] == pytest.approx(3.0)
 
 
 ROAD = """*SYMMETRIC MODEL GENERATION, REVOLVE

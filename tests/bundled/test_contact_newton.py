@@ -13,8 +13,9 @@ import numpy as np
 import pytest
 from tyrecal_solvers.bundled import job
 from tyrecal_solvers.bundled.deck.keywords import DeckError
-from tyrecal_solvers.bundled.road import footprint_job
+from tyrecal_solvers.bundled.road import contact_newton, footprint_job
 from tyrecal_solvers.bundled.road.contact_newton import ContactNewton
+from tyrecal_solvers.bundled.section.band import Indefinite
 from tyrecal_solvers.errors import NoEquilibrium, RunFailed
 
 from tyrecal.simulate.deck.decks import Decks
@@ -323,6 +324,33 @@ def footprints(work: Round, clock: Late, loads: list[float]) -> dict[str, Any]:
     return footprint_job.press(work.model, equations, work.loads, work.U, road, loads, clock)
 
 
+def test_each_load_that_is_reached_is_told(
+    solid: Round, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """And how far on the way to one that takes several steps."""
+    newton = ContactNewton._newton
+
+    def in_two_steps(press: ContactNewton, load: float) -> Any:
+        if load == 150.0 and press.load == 50.0:
+            raise NoEquilibrium("too much")
+        return newton(press, load)
+
+    monkeypatch.setattr(ContactNewton, "_newton", in_two_steps)
+    with caplog.at_level("INFO", "tyrecal_solvers"):
+        footprints(solid, Late(1000), [50.0, 150.0])
+    first, halfway, last = caplog.records
+    told = [(each.getMessage(), each.__dict__.get("loads")) for each in (first, last)]
+    assert told[0] == ("load 1 of 2 is reached: 50 N", (1, 2))
+    assert told[1] == ("load 2 of 2 is reached: 150 N", (2, 2))
+    assert re.match(r"100 of 150 N are reached \(\d+ of \d+ mm down", halfway.getMessage())
+
+
+def test_elements_with_hourglass_stiffness_are_not_pressed() -> None:
+    linear = ring((0.05, 0.08, 0.1), 0.02, 2, support.Rubber(), quadratic=False)
+    with pytest.raises(DeckError, match=r"CGAX4R cannot be pressed on a road.*: take CGAX8R"):
+        footprints(linear, Late(1000), [50.0])
+
+
 def test_footprints_before_the_time_limit_stay(solid: Round) -> None:
     """The job keeps the loads that were reached in time, and says why there are no more."""
     unhurried = Late(1000)
@@ -376,6 +404,131 @@ def test_nearly_the_same_load_again(solid: Round) -> None:
     again = press.to(50.0 * (1 + 1e-9))
     assert again.height == pytest.approx(first.height, rel=1e-9)
     assert again.stiffness == pytest.approx(first.stiffness, rel=2e-3)
+
+
+def test_a_little_more_load_is_one_step_along_the_slope(solid: Round) -> None:
+    """1 % more: what the slope by the load leaves is of second order, one step of Newton's method,
+    with the preconditioner formed once for the new load; without the slope it takes several."""
+    press = solid.press(LENGTHS, 1e10)
+    found = [press.to(load) for load in (198.0, 200.0)]
+    before = press.iterations, press.factorisations
+    found.append(press.to(202.0))
+    assert (press.iterations, press.factorisations) == (before[0] + 1, before[1] + 1)
+    parts, heights = np.array([f.parts for f in found]), [f.height for f in found]
+    curved = np.linalg.norm(parts[0] - 2 * parts[1] + parts[2])
+    assert curved < 0.02 * np.linalg.norm(parts[2] - parts[1])
+    assert abs(heights[0] - 2 * heights[1] + heights[2]) < 0.02 * (heights[1] - heights[2])
+
+
+@pytest.mark.parametrize(("used", "formed"), [(15, 0), (16, 1)])
+def test_after_many_iterations_the_preconditioner_is_formed_anew(
+    solid: Round, used: int, formed: int
+) -> None:
+    press = solid.press(LENGTHS, 1e10)
+    press.to(50.0)
+    state = press._state(press.parts, press.height, 51.0, None)
+    before, press._used = press.factorisations, used
+    press._step(state[2], *state[:2], 1e-2)
+    assert press.factorisations == before + formed and press._used < 15
+
+
+def test_an_unstable_tangent_leaves_the_preconditioner_as_it_is(
+    solid: Round, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Without one before there is no step, and the load is not reached."""
+    press = solid.press(LENGTHS, 1e10)
+    contact = press.to(50.0).contact
+    had = press._factor
+    assert had is not None
+
+    def unstable(*given: object) -> None:
+        raise Indefinite
+
+    monkeypatch.setattr(contact_newton, "Factor", unstable)
+    assert press._form(contact) is had
+    press.rest()
+    with pytest.raises(Indefinite):
+        press._form(contact)
+    with pytest.raises(NoEquilibrium, match="no equilibrium between 50 and"):
+        press.to(60.0)
+
+
+def test_time_is_looked_at_before_every_iteration(solid: Round) -> None:
+    looks: list[int] = []
+    press = solid.press(LENGTHS, 1e10, check=lambda: looks.append(1))
+    press.to(50.0)
+    looks.clear()
+    before = press.iterations
+    state = press.parts, press.height - 1e-4, 100.0, None, 1e-8
+    press._settle(*state)
+    assert len(looks) == press.iterations - before + 1 > 2
+
+
+def test_a_load_starts_along_the_slope_of_the_last_one(
+    solid: Round, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The first one by a micrometre per newton."""
+    press = solid.press(LENGTHS, 1e10)
+    started: list[tuple[Array, float]] = []
+    softly = ContactNewton._softly
+
+    def note(self: ContactNewton, parts: Array, height: float, *rest: Any) -> Any:
+        started.append((parts, height))
+        return softly(self, parts, height, *rest)
+
+    monkeypatch.setattr(ContactNewton, "_softly", note)
+    rest, free = press.parts, press.free_radius
+    first = press.to(50.0)
+    np.testing.assert_array_equal(started[0][0], rest)
+    assert started[0][1] == pytest.approx(free - 50e-6, abs=1e-12)
+    started.clear()
+    slope = press._slope
+    press.to(80.0)
+    assert slope is not None and slope[1] < 0
+    np.testing.assert_allclose(started[0][0], first.parts + 30 * slope[0], atol=1e-15)
+    assert started[0][1] == pytest.approx(first.height + 30 * slope[1], abs=1e-12)
+    assert slope[1] == pytest.approx(-1 / first.stiffness)
+
+
+def test_how_far_down_is_told_in_words(solid: Round) -> None:
+    """Of the way to where the crown, 10 mm thick, lies on the rim, 200 mm from the axle."""
+    X = np.array(
+        [[0.15, 0.0], [0.2, 0.1], [0.2, -0.1], [0.3, 0.1], [0.31, 0], [0.305, 0], [0.3, 0]]
+    )
+    assert ContactNewton._flat_height(X, np.array([1, 2])) == pytest.approx(0.21)
+    assert ContactNewton._flat_height(X[3:], np.array([], int)) == pytest.approx(0.01)
+    press = solid.press(LENGTHS, 1e10)
+    assert press.depth() == ""
+    press.flat, press.height, press.load = press.free_radius - 0.04, press.free_radius - 0.013, 1.0
+    assert press.depth() == " (13 of 40 mm down to the rim)"
+
+
+@pytest.mark.parametrize(("most_N", "reached"), [(101.0, 2), (26.0, 8), (12.6, 16), (12.4, 0)])
+def test_a_load_is_reached_in_up_to_sixteen_steps(
+    solid: Round, monkeypatch: pytest.MonkeyPatch, most_N: float, reached: int
+) -> None:
+    """Steps are halved until Newton's method finds a state; time is looked at before each."""
+    press, looks = solid.press(LENGTHS, 1e10), []
+    monkeypatch.setattr(press, "check", lambda: looks.append(1))
+    first, taken = press.to(50.0), []
+
+    def newton(load: float) -> object:
+        if load > press.load + most_N:
+            raise NoEquilibrium("too much")
+        taken.append(load)
+        return first
+
+    monkeypatch.setattr(press, "_newton", newton)
+    looks.clear()
+    if reached:
+        press.to(250.0)
+        assert taken == pytest.approx([50.0 + 200.0 / reached * (i + 1) for i in range(reached)])
+        assert len(looks) == reached + np.log2(reached)
+    else:
+        with pytest.raises(
+            NoEquilibrium, match=r"no equilibrium between 50 and 62.5 N \(.*too much"
+        ):
+            press.to(250.0)
 
 
 def test_a_much_larger_load_after_a_small_one(solid: Round) -> None:

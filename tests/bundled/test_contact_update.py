@@ -109,3 +109,18 @@ def test_takes_what_the_factor_left_out_of_the_contact() -> None:
     back = touching.solve(problem.product(x))
     np.testing.assert_allclose(back, x, atol=1e-2 * abs(x).max())
     assert abs(problem.factor.solve(problem.product(x)) - x).max() > 0.1 * abs(x).max()
+
+
+def test_changes_of_less_than_a_thousandth_are_left_out() -> None:
+    """Of the stiffest contact's stiffness; with what is left out the solution is the factor's."""
+    work = ring((0.2, 0.21, 0.23), 0.02, 2, support.Rubber(), 2e3)
+    plain = Inflated(None, work.model, ~work.free, work.loads, work.U)  # type: ignore[arg-type]
+    blocks = np.zeros((2 * len(LENGTHS) + 1, len(work.U), 3, 3))
+    blocks[1:4, work.model.mesh.X[:, 0] > 0.2299] = 1e7 * np.diag([1.0, 0.1, 0.1])
+    problem = Problem(plain, contact=blocks)
+    touching, x = ContactUpdate(problem.factor), problem.random()[0]
+    was = problem.factor.solve(x)
+    np.testing.assert_array_equal(touching.solve(x), was)
+    for more, same in ((1 + 0.9e-3, True), (1 + 1.1e-3, False)):
+        touching.to(more * blocks)
+        assert np.array_equal(touching.solve(x), was) == same

@@ -32,6 +32,18 @@ def test_force_and_tangent_by_complex_step(q: Array) -> None:
     close(CORD.tangent(q), D.swapaxes(1, 2))
 
 
+def test_an_artificial_tension_holds_every_direction_alike(q: Array) -> None:
+    """It has no energy and no force, but a tangent, with its weight."""
+    taut, weights = CORD.tautened(7.0), np.array([1.0, 2.0, 3.0, 4.0])
+    np.testing.assert_array_equal(taut.energy(q), CORD.energy(q))
+    np.testing.assert_array_equal(taut.force(q), CORD.force(q))
+    more = taut.tangent(q, weights) - CORD.tangent(q, weights)
+    np.testing.assert_allclose(more, 7 * weights[:, None, None] * np.eye(3), atol=1e-6)
+    np.testing.assert_allclose(
+        CORD.tangent(q, weights), weights[:, None, None] * CORD.tangent(q), rtol=1e-14
+    )
+
+
 def test_frame_indifference(q: Array, random: np.random.Generator) -> None:
     """W(Qq) = W(q), f(Qq) = Q f(q), D(Qq) = Q D(q) Q^T for a rotation Q."""
     Q = qr(random.normal(size=(3, 3)))[0]

@@ -6,9 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tyrecal_solvers.bundled.deck import grammar
 from tyrecal_solvers.bundled.deck.keywords import DeckError, read_keywords
 from tyrecal_solvers.bundled.modes import harmonics
 from tyrecal_solvers.bundled.modes.frequency_dependent import SelfConsistent
+from tyrecal_solvers.bundled.section import model
 from tyrecal_solvers.bundled.section.materials import ModulusTable, read_materials
 from tyrecal_solvers.bundled.section.parts.rubber import MooneyRivlin
 from tyrecal_solvers.errors import RunFailed
@@ -57,15 +59,16 @@ def test_the_tangent_is_linear_in_the_ratio() -> None:
         np.testing.assert_allclose(stiff.tangent(F), wanted, rtol=1e-9, atol=1e-3)
 
 
-def tube(law: ModulusTable | None) -> harmonics.HasModes:
-    """Rubber between a fixed hub and a free outside, that can only turn: K is G times a matrix."""
+def tube(law: ModulusTable | None, component: int = 1) -> harmonics.HasModes:
+    """Rubber between a fixed hub and a free outside, that can only turn, or move along the axle:
+    K is G times a matrix."""
     b = support.block((0.1, 0.3, 6), (0.0, 0.05, 1), True)
     m = support.model_of(support.deck(b.X, b.solids, Rubber(C10=2e5)))
     if law:
         zero = np.zeros(m.parts[0].rows.weights.size, int)
         m = replace(m.with_laws(lambda own: replace(own, table=zero)), tables=[law])
     mask = np.ones((len(b.X), 3), bool)
-    mask[:, 1] = b.where(0, 0.1)
+    mask[:, component] = b.where(0, 0.1)
     vibration = harmonics.Vibration(m, 0 * mask, [], support.numbering(m, mask), 0.0)
     return SelfConsistent(vibration, [law]) if law else vibration
 
@@ -77,6 +80,15 @@ def test_one_spring_in_closed_form() -> None:
     found = support.hertz(tube(POWER).modes(0, 4).eigenvalues)
     exact = (f0 * REFERENCE ** (-BETA / 2)) ** (1 / (1 - BETA / 2))
     assert f0[0] < REFERENCE < f0[-1] < 1000.0
+    np.testing.assert_allclose(found, exact, rtol=1e-10)
+    alone = tube(POWER).modes(0, 1)
+    assert support.hertz(alone.eigenvalues) == pytest.approx(exact[:1], rel=1e-10)
+
+
+def test_waves_that_only_shear_in_closed_form() -> None:
+    """The same of waves round the tube that move along the axle alone."""
+    f0, found = (support.hertz(tube(law, 2).modes(3, 2).eigenvalues) for law in (None, POWER))
+    exact = (f0 * REFERENCE ** (-BETA / 2)) ** (1 / (1 - BETA / 2))
     np.testing.assert_allclose(found, exact, rtol=1e-10)
 
 
@@ -104,6 +116,30 @@ def test_the_inflated_state_and_the_other_rubbers_stay() -> None:
     laws = [part.law for part in soft.parts]
     assert laws and all(isinstance(law, MooneyRivlin) for law in laws)
     assert not any(law.C10.any() or law.inverse_D1.any() for law in laws)
+
+
+def test_each_rubber_has_its_own_table_or_none() -> None:
+    """Three rubbers, two with tables: what grows with either is its own shear modulus alone."""
+    b = support.block((0.1, 0.4, 3), (0.0, 0.1, 1), False)
+    text = support.deck(b.X, b.solids, Rubber())
+    head, _, materials = text.partition("*SOLID SECTION")
+    _, _, gum = materials.partition("*MATERIAL, NAME=RUBBER\n")
+    for i in (1, 2, 3):
+        head += f"*ELSET, ELSET=E{i}\n{i}\n*SOLID SECTION, ELSET=E{i}, MATERIAL=GUM{i}\n"
+    table = "*VISCOELASTIC, FREQUENCY=TABULAR\n0., -{0}, 0., 0., 10.\n0., -0.9, 0., 0., 20.\n"
+    tables = {1: table.format(0.1), 2: "", 3: table.format(0.2)}
+    for i, rows in tables.items():
+        head += f"*MATERIAL, NAME=GUM{i}\n{gum}{rows}"
+    keywords, _ = grammar.check(read_keywords(head), False)
+    m = model.build(keywords, None, True, own_frequency=True)
+    assert [t.ratios[0] for t in m.tables] == pytest.approx([1.1, 1.2])
+    grown = [part.law.C10 for each in m.growing() for part in each.parts]
+    np.testing.assert_allclose(grown, [[1e6, 0, 0], [0, 0, 1e6]])
+    assert not model.build(keywords, 15.0, True).tables
+    law = model.build(keywords, 15.0, True).parts[0].law
+    middle = [np.exp(np.log([x, 1.9]) @ (1 - s, s)) for x in (1.1, 1.2) for s in [np.log2(1.5)]]
+    np.testing.assert_allclose(law.shear_ratio, [middle[0], 1, middle[1]])
+    assert (law.bulk_ratio == 1).all()
 
 
 def test_self_consistent_as_by_hand_through_the_door() -> None:

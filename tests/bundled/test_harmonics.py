@@ -14,6 +14,8 @@ from .conftest import Inflated
 
 pytestmark = pytest.mark.numbers
 
+Array = np.ndarray
+
 
 @pytest.mark.parametrize("n", [0, 1, 2, 3, 4])
 def test_modes_are_the_lowest(inflated: Inflated, n: int) -> None:
@@ -32,6 +34,40 @@ def test_modes_are_the_lowest(inflated: Inflated, n: int) -> None:
         for shape in modes.shapes:
             assert (shape.conj() * (mass @ shape)).sum().real == pytest.approx(1.0, rel=1e-9)
         np.testing.assert_allclose(modes.eigenvalues, wanted[:count], rtol=1e-7)
+
+
+class Spectrum:
+    """A vibration with known eigenvalues (m,) per harmonic; remembers what it was asked."""
+
+    def __init__(self, eigenvalues: list[Array]):
+        self.eigenvalues = eigenvalues
+        self.asked: list[int] = []
+        self.looks: list[int] = []
+
+    def modes(self, n: int, count: int, factor: object = None) -> harmonics.HarmonicModes:
+        self.asked.append(n)
+        values = self.eigenvalues[n][:count]
+        return harmonics.HarmonicModes(n, values, np.zeros((len(values), 1, 3)))
+
+
+@pytest.mark.parametrize("wanted", [1, 2, 3, 4, 7, 20])
+def test_the_lowest_of_all_harmonics(random: np.random.Generator, wanted: int) -> None:
+    """Doublets twice, whatever harmonic they are of, and time looked at for each: up to the first
+    one from the second on that starts above them."""
+    for _ in range(20):
+        spectra = [np.sort(random.uniform(1.0, 30.0, 30)) for _ in range(40)]
+        start = np.concatenate([random.uniform(1, 12, 2), 1 + np.cumsum(random.uniform(0, 3, 38))])
+        values = [own - own[0] + first for own, first in zip(spectra, start, strict=True)]
+        whole = np.sort(np.concatenate([np.repeat(v, 2 if n else 1) for n, v in enumerate(values)]))
+        limit, spectrum = whole[wanted - 1], Spectrum(values)
+        found = harmonics.lowest_of_all(spectrum, wanted, lambda own=spectrum: own.looks.append(1))
+        last = next(n for n in range(2, 40) if start[n] > limit)
+        assert [m.n for m in found] == list(range(last + 1))
+        assert (
+            sorted(set(spectrum.asked)) == list(range(last + 1)) and len(spectrum.looks) == last + 1
+        )
+        for n, m in enumerate(found):
+            np.testing.assert_array_equal(m.eigenvalues, values[n][values[n] <= limit])
 
 
 def test_a_buckling_harmonic_is_named(inflated: Inflated) -> None:

@@ -15,6 +15,7 @@ import pytest
 from tyrecal_solvers.bundled.deck.keywords import DataLine, DeckError
 from tyrecal_solvers.bundled.deck.request import Request
 from tyrecal_solvers.bundled.deck.steps import Deck
+from tyrecal_solvers.bundled.frequency_step import FrequencyStep
 from tyrecal_solvers.bundled.job import Job
 from tyrecal_solvers.bundled.results import StepResult, write
 from tyrecal_solvers.bundled.section.boundary import rim_freedoms
@@ -165,6 +166,54 @@ def test_what_a_transfer_or_a_table_may_not_be(old: str, new: str, words: str) -
     """Read alone, without a solution: what stands there would mean another state."""
     with pytest.raises(DeckError, match=re.escape(words)):
         run(PLAIN, (old, new))
+
+
+def test_rubber_is_relaxed_until_a_static_step_says_otherwise() -> None:
+    """A *FREQUENCY step has the state of the *STATIC one before it; before any it is relaxed."""
+    pair = dict(texts(PLAIN))
+    begin, end = (pair["modes"].index(text) for text in (STEP, "*STEP, NAME=MODES"))
+    pair["modes"] = pair["modes"][:begin] + pair["modes"][end:]
+    sudden = {name: text.replace(", LONG TERM", "") for name, text in texts(PLAIN).items()}
+    assert sudden != texts(PLAIN)
+    for texts_, relaxed in ((texts(PLAIN), [True] * 3), (sudden, [False] * 3), (pair, [True] * 2)):
+        *_, steps = Deck(texts_, "modes", "inflate").read([])
+        assert [step.long_term for step in steps] == relaxed
+
+
+def test_a_section_alone_has_the_modes_without_waves() -> None:
+    """Its *FREQUENCY step, whatever harmonics a request would have."""
+    text = texts(PLAIN)["inflate"] + f"*STEP\n{FREQUENCY.replace('20', '4')}*END STEP\n"
+    for request in (Request(), Request(harmonics=[0, 1, 2])):
+        (found,) = Job(Deck({"inflate": text}, "inflate", None), request).run()
+        assert [m.n for m in found.modes] == [0]
+        assert len(found.modes[0].eigenvalues) == request.modes_per_harmonic
+
+
+def test_slopes_take_the_static_tangent_whatever_the_vibration_has() -> None:
+    """Neither its shift nor its moduli: the factor of Newton's method at the inflated state."""
+    work = {}
+    for name, data in (("plain", "20\n"), ("shifted", "20, , , -1000.\n")):
+        pair = dict(texts(PLAIN))
+        pair["modes"] = pair["modes"].replace(FREQUENCY, FREQUENCY.replace("20\n", data))
+        job = Job(Deck(pair, "modes", "inflate"), Request())
+        job._static(job.steps[0])
+        work[name] = FrequencyStep(job.tyre, 2, job.steps[2])
+    plain, shifted = work["plain"], work["shifted"]
+    right = np.ones(plain.equations.size)
+    wanted = plain.factor.solve(right)
+    np.testing.assert_array_equal(plain._newton().solve(right), wanted)
+    np.testing.assert_array_equal(shifted._newton().solve(right), wanted)
+    assert not np.allclose(shifted.factor.solve(right), wanted, rtol=1e-9, atol=0)
+
+
+def test_as_many_modes_of_each_harmonic_as_the_fullest_has() -> None:
+    """Of a tyre that is not the same all round, whose harmonics *FREQUENCY's number finds."""
+    few = (FREQUENCY, FREQUENCY.replace("20", "9"))
+    plain, split = (run(effects, few)[0].modes for effects in (PLAIN, MASS))
+    most = max(len(m.eigenvalues) for m in plain)
+    assert most > min(len(m.eigenvalues) for m in plain)
+    assert [m.n for m in split] == [m.n for m in plain]
+    assert [len(m.eigenvalues) for m in split] == [(2 if m.n else 1) * most for m in plain]
 
 
 def test_increments_are_counted_whole() -> None:
@@ -322,17 +371,24 @@ def test_a_set_is_held_in_the_components_that_are_named() -> None:
 
 @pytest.mark.parametrize("effects", [PLAIN, MASS, TURNING])
 def test_modes_above_the_limit_are_left_out(effects: tuple[tuple[str, float], ...]) -> None:
-    """The third number of *FREQUENCY; what stays is what it was, with and without a doublet that
-    has split. A turning tyre's waves are asked for by another step, which has no limit."""
-    whole = run(effects, harmonics=[0, 1, 2])[0].modes
+    """The third number of *FREQUENCY; what stays is what it was, with its slopes, with and without
+    a doublet that has split. A turning tyre's waves are asked for by another step, which has no
+    limit."""
+    density = texts(effects)["inflate"].splitlines().index("*DENSITY") + 2
+    asked = {"p": [("inflate", density, 0, 1.0)]}
+    (first, *_) = run(effects, harmonics=[0, 1, 2], sensitivities=asked)
+    whole = first.modes
     hertz = np.sort(np.sqrt(np.concatenate([m.eigenvalues for m in whole]))) / (2 * np.pi)
     limit = (hertz[2] + hertz[3]) / 2
-    cut = run(effects, (FREQUENCY, f"{FREQUENCY[:-1]}, , {float(limit)!r}\n"), harmonics=[0, 1, 2])
+    edit = FREQUENCY, f"{FREQUENCY[:-1]}, , {float(limit)!r}\n"
+    cut = run(effects, edit, harmonics=[0, 1, 2], sensitivities=asked)
     left = cut[0].modes
-    for few, many in zip(left, whole, strict=True):
+    slopes = zip(cut[0].rates["p"], first.rates["p"], strict=True)
+    for few, many, (own, all_) in zip(left, whole, slopes, strict=True):
         below = np.sqrt(many.eigenvalues) < 2 * np.pi * limit
         np.testing.assert_array_equal(few.eigenvalues, many.eigenvalues[below])
         np.testing.assert_array_equal(few.shapes, many.shapes[below])
+        np.testing.assert_allclose(own, all_[below], rtol=1e-9)
     assert sum(len(m.eigenvalues) for m in left) == 3
 
 

@@ -7,7 +7,13 @@ from typing import Any
 import numpy as np
 import pytest
 from tyrecal_solvers.bundled.deck import grammar
-from tyrecal_solvers.bundled.deck.keywords import COMPLEX_STEP, DeckError, read_keywords, seed
+from tyrecal_solvers.bundled.deck.keywords import (
+    COMPLEX_STEP,
+    DeckError,
+    LineNumber,
+    read_keywords,
+    seed,
+)
 from tyrecal_solvers.bundled.section import model
 
 from . import support
@@ -56,6 +62,15 @@ def test_blocks_lines_and_numbers() -> None:
     assert one.rows[0].number(2, 7.0) == 7.0
     assert one.rows[1].number(2) == 0.01
     assert two.name == "END STEP" and two.rows == []
+
+
+def test_a_refusal_names_the_file_and_the_line() -> None:
+    """Where they are known."""
+    (node,) = read_keywords("*NODE\n1, x\n", "inflate")
+    with pytest.raises(DeckError, match=r"^inflate\.inp, line 2: 'x' is not a number$"):
+        node.rows[0].number(1)
+    assert str(DeckError(LineNumber(0, "modes"), "why")) == "modes.inp: why"
+    assert str(DeckError(3, "why")) == "deck, line 3: why" and str(DeckError(0, "w")) == "deck: w"
 
 
 def test_continuation_lines() -> None:
@@ -197,6 +212,18 @@ def test_a_layer_is_smeared() -> None:
     assert (cords.mass == 0.0).all()
 
 
+def test_a_layer_fans_out_with_the_radius() -> None:
+    """GEOMETRY=ANGULAR: the spacing in degrees, a share of the circumference."""
+    text = SQUARE + LAYER.replace("REBAR LAYER", "REBAR LAYER, GEOMETRY=ANGULAR")
+    heavy = text.replace("1E9, 0.3\n", "1E9, 0.3\n*DENSITY\n1500.\n").replace("2, 1, 4", "2, 1, 2")
+    *_, cords = support.model_of(heavy).parts
+    R = 0.25 + np.array([-0.05, 0.05]) / np.sqrt(3)
+    wanted = 1e9 * 4e-7 / (1e-3 * np.pi / 180 * R)
+    np.testing.assert_allclose(cords.law.stiffness, wanted, rtol=1e-12)
+    per_degree = 1500.0 * 4e-7 * 0.1  # kg a cord
+    assert cords.mass.sum() == pytest.approx(per_degree / (1e-3 * np.pi / 180))
+
+
 @pytest.mark.parametrize(
     ("old", "new", "line", "words"),
     [
@@ -225,6 +252,10 @@ def test_sets_are_numbers_ranges_and_other_sets() -> None:
     mesh = support.model_of(changed("*SURFACE", sets + "*SURFACE")).mesh
     assert (mesh.node_sets["A"], mesh.node_sets["B"]) == ([1, 3], [4, 1, 3])
     assert (mesh.node_sets["ODD"], mesh.node_sets["ROW"]) == ([1, 3], [2, 3, 4])
+    assert set(mesh.node_sets) == {"ALL", "A", "B", "ODD", "ROW"}
+    assert set(mesh.element_sets) == {"RUBBER", "TWICE"}
+    plain = support.model_of(SQUARE.replace("*NODE, NSET=ALL", "*NODE")).mesh
+    assert not plain.node_sets and set(plain.element_sets) == {"RUBBER"}
     assert mesh.element_sets["TWICE"] == [1, 1] and mesh.node_sets["ALL"] == [1, 2, 3, 4]
 
 
@@ -287,6 +318,8 @@ def test_seed_turns_a_number_complex() -> None:
         node[1].number(1), float
     )
     assert all(not k.tangents for k in deck)
+    # the other blocks are the same, with what is remembered with them
+    assert [a is b for a, b in zip(deck, marked, strict=True)].count(False) == 2
     m = model.build(marked, None, True)
     assert np.iscomplexobj(m.parts[0].mass) and np.iscomplexobj(m.mesh.X)
 

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from tyrecal_solvers.bundled import job
 from tyrecal_solvers.bundled.deck.keywords import DeckError
 from tyrecal_solvers.bundled.modes.harmonics import HarmonicModes, Vibration
 from tyrecal_solvers.bundled.road import davidson, footprint_job, stick
+from tyrecal_solvers.bundled.road import loaded_modes as loaded_modes_module
 from tyrecal_solvers.bundled.road.contact import Contact
 from tyrecal_solvers.bundled.road.contact_newton import PressedState
 from tyrecal_solvers.bundled.road.half_turn_symmetry import HALF_TURN
@@ -226,6 +228,39 @@ def test_the_same_bits_again(tyre: Round, pressed: State, found: LoadedModes) ->
     np.testing.assert_array_equal(again.shapes, found.shapes)
 
 
+def test_time_is_looked_at_before_the_factor_and_every_product(
+    tyre: Round, pressed: State, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A clock that ends at a look: nothing is done after it."""
+    done: list[str] = []
+    real = loaded_modes_module.Factor
+
+    def factor(*given: Any) -> Any:
+        done.append("factor")
+        return real(*given)
+
+    monkeypatch.setattr(loaded_modes_module, "Factor", factor)
+
+    def weigh(self: Inertia, V: Array) -> Array:
+        done.append("product")
+        return np.zeros_like(V)
+
+    monkeypatch.setattr(Inertia, "__call__", weigh)
+    for allowed, wanted in ((0, []), (1, ["factor"])):
+        left = [allowed]
+
+        def clock(left: list[int] = left) -> None:
+            left[0] -= 1
+            if left[0] < 0:
+                raise TimeoutError
+
+        done.clear()
+        work = tyre.tyre(pressed.around)
+        with pytest.raises(TimeoutError):
+            loaded_modes(work, tyre.free, pressed.U, pressed.hold, start(tyre), 4, clock)
+        assert done == wanted
+
+
 def test_an_unstable_state_fails_by_its_name(tyre: Round, pressed: State) -> None:
     pushed = replace(pressed.hold, K=-10 * pressed.hold.K)
     with pytest.raises(RunFailed, match="not stable"):
@@ -262,6 +297,20 @@ def test_davidson_fails_by_name(
     monkeypatch.setattr(davidson, "MAX_BLOCKS", 2)
     with pytest.raises(RunFailed, match="did not converge"):
         davidson.lowest(block(K), block(M), block(np.eye(120)), fields, 3)
+
+
+def test_only_new_directions_are_taken_into_a_basis(random: np.random.Generator) -> None:
+    """Of six fields, two in the basis, one of the others' sum and one a thousandfold: two are new,
+    M-orthonormal to the basis and to each other; none of those in the basis alone."""
+    _, M = matrices(random)
+    V = davidson._orthonormal(random.normal(size=(3, 120)), np.empty((0, 120)), block(M))
+    a, b = random.normal(size=(2, 120))
+    fields = np.array([V[0], V[1] - 2 * V[2], a, b, a + b + V[0], 1e3 * b])
+    new = davidson._orthonormal(fields, V, block(M))
+    basis = np.concatenate([V, new])
+    np.testing.assert_allclose(basis @ M @ basis.T, np.eye(5), atol=1e-9)
+    assert np.linalg.matrix_rank(np.concatenate([basis, [a], [b]]), 1e-6) == 5
+    assert not len(davidson._orthonormal(fields[:2], V, block(M)))
 
 
 LOADS = (1000.0,)
@@ -316,6 +365,56 @@ def test_results_hold_the_half_turn(tyre: Round, pressed: State, found: LoadedMo
     np.testing.assert_allclose(shapes, parity * image, atol=1e-6 * abs(shapes).max())
     hertz = np.sqrt(found.eigenvalues[:6]) / (2 * np.pi)
     np.testing.assert_allclose(written["mode_frequency_Hz"], hertz, rtol=1e-7)
+
+
+def test_what_the_job_asks_for_and_how_it_writes_it(
+    tyre: Round, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Modes about the pressed state with its hold, from twice so many and spare ones of the
+    inflated tyre; their shapes on the whole tyre, kept or reversed by the half turn."""
+    work = tyre.press(LENGTHS, 1e9, 0.5)
+    state = work.to(10.0)
+    k, nodes = len(work.tyre.around.angles), np.array([3, 0, 5])
+    shapes = generator(2).normal(size=(2, k, len(tyre.U), 3))
+    canned = LoadedModes(np.array([400.0, 900.0]) * np.pi**2, np.array([1, -1]), shapes)
+    asked: list[Any] = []
+
+    def lowest(vibration: Vibration, wanted: int, check: object) -> list[HarmonicModes]:
+        asked.append((vibration.shift, wanted, vibration.factor(0).solve(np.ones(free))))
+        return []
+
+    def modes_(work_: Revolved, free_: Array, U: Array, hold: Contact, *rest: Any) -> LoadedModes:
+        work_.residual(U)
+        asked.append((work_.product(shapes[0]), hold, rest))
+        return canned
+
+    monkeypatch.setattr(footprint_job, "lowest_of_all", lowest)
+    monkeypatch.setattr(footprint_job, "loaded_modes", modes_)
+    equations = support.numbering(tyre.model, ~tyre.free)
+    free = equations.size
+    wanted = footprint_job.ModesAtLoad(tyre.model, 2, nodes)
+    tread = tyre.model.mesh.faces["TREAD"]
+    work.tyre.residual(0 * shapes[0])  # a state that is not the wanted one
+    written = footprint_job._modes(work, state, wanted, tread, equations, tyre.U)
+    assert work._factor is None
+    (shift, started, solved), (product, hold, rest) = asked
+    plain = Vibration(tyre.model, tyre.U, work.tyre.loads, equations, 0.0)
+    np.testing.assert_array_equal(solved, plain.factor(0).solve(np.ones(free)))
+    assert (shift, started) == (0.0, 2 * (2 + 6)) and rest[:2] == ([], 2)
+    here = press(tyre, 10.0)
+    np.testing.assert_allclose(hold.K, here.hold.K, rtol=1e-9)
+    again = tyre.tyre(work.tyre.around)
+    again.residual(here.U)
+    np.testing.assert_allclose(product, again.product(shapes[0]), rtol=1e-9, atol=1e-6)
+    assert written["mode_frequency_Hz"] == pytest.approx([10.0, 15.0])
+    assert written["mode_node"].tolist() == [3, 0, 5]
+    whole = written["mode_shape"]
+    assert whole.shape == (2, 2 * (k - 1), 3, 3)
+    np.testing.assert_array_equal(whole[:, :k], shapes[:, :, nodes])
+    other = work.symmetry.other[nodes]
+    for ring_ in range(k, 2 * (k - 1)):
+        image = HALF_TURN * shapes[:, 2 * (k - 1) - ring_][:, other]
+        np.testing.assert_array_equal(whole[:, ring_], [[[1.0]], [[-1.0]]] * image)
 
 
 def test_the_vibration_modulus_counts(tyre: Round, pressed: State) -> None:

@@ -8,8 +8,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.linalg import eigh
 from scipy.sparse import csr_array, kron
 from scipy.sparse.linalg import eigsh, splu
+from tyrecal_solvers.bundled.deck.keywords import COMPLEX_STEP
 from tyrecal_solvers.bundled.modes import harmonics
 from tyrecal_solvers.bundled.modes.harmonics import Vibration
 from tyrecal_solvers.bundled.nonuniform import coupled, splice
@@ -21,6 +23,7 @@ from tyrecal_solvers.bundled.solid3d.revolved import Revolved
 
 from . import support
 from .conftest import Inflated
+from .contact import ring
 
 Array = np.ndarray
 WAVES, COUNT, SECTORS = [0, 1, 2, 3], 2, 6
@@ -96,6 +99,18 @@ def test_what_is_attached_leaves_shapes_of_unit_mass(
         assert [mass(u) for u in found.shapes] == pytest.approx([own] * len(found.shapes), rel=1e-6)
 
 
+def test_time_is_looked_at_for_every_harmonic_of_what_is_attached(
+    vibration: Vibration, inflated: Inflated
+) -> None:
+    """Those of the sectors, and those asked for beyond; the fields of n = 0 are real."""
+    looks: list[int] = []
+    attached = on_crown(inflated, 0.05)
+    coupled.attached_modes(vibration, attached, [0, 7], 1, lambda: looks.append(1))
+    assert len(looks) == max(SECTORS, 7) + 1
+    families = [coupled._with_response(vibration, n, 1, attached) for n in (0, 1)]
+    assert [np.iscomplexobj(family.shapes) for family in families] == [False, True]
+
+
 def test_mass_lowers_and_spring_raises(vibration: Vibration, inflated: Inflated) -> None:
     """Rayleigh: no frequency rises with a mass or falls with a spring. A radial spring, of rank 1,
     leaves one member of every doublet within a hair of where it was."""
@@ -128,6 +143,102 @@ def test_small_mass_by_first_order_perturbation(
         shift = -known.eigenvalues[k] * mass * np.linalg.eigvalsh(p.T @ p)[::-1]
         found = modes.eigenvalues[2 * k : 2 * k + 2] - known.eigenvalues[k]
         np.testing.assert_allclose(found, shift, rtol=2e-3, atol=1e-9 * known.eigenvalues[k])
+
+
+def test_a_heavier_sector_weighs_where_it_is(vibration: Vibration, inflated: Inflated) -> None:
+    """u M~ u of every wave up to the highest, by the integral over the sector of 0.4 rad."""
+    other, top, width = stiffer(inflated.model, 1.0), 3, 0.4
+    around = splice.full_circle(top)
+    tyre = Revolved(inflated.model, inflated.loads, around)
+    fields = splice.FullCircle(vibration, tyre, SpliceSector(width, other), top)
+    u = np.where(inflated.held, 0.0, 1.0)
+    plain, more = (float((u * (mechanics.mass(m) @ u)).sum()) for m in (inflated.model, other))
+    angle = np.linspace(-width / 2, width / 2, 4001)
+    for n in range(top + 1):
+        for wave in (1.0, 1j) if n else (1.0,):
+            field = fields.field(n, wave * u)
+            inside = np.trapezoid((wave * np.exp(1j * n * angle)).real ** 2, angle)
+            whole = np.pi if n else 2 * np.pi
+            wanted = plain * whole + (more - plain) * inside
+            assert (field * fields.inertia(field)).sum() == pytest.approx(wanted, rel=1e-6)
+            amplitude = fields.wave(field, n)
+            np.testing.assert_allclose(amplitude, wave * u, atol=1e-12)
+
+
+def test_an_equilibrium_with_a_splice_looks_at_the_time(
+    vibration: Vibration, inflated: Inflated
+) -> None:
+    """Once where the state is one already; more often with a stiffer sector, or it does not end."""
+    around = splice.full_circle(2)
+    looks: list[int] = []
+    for share, more in ((0.0, 1), (0.05, 2)):
+        other = stiffer(inflated.model, share)
+        sector = SpliceSector(2 * np.pi, other)
+        tyre = Revolved(splice.blended(inflated.model, other, np.ones(9)), inflated.loads, around)
+        fields = splice.FullCircle(vibration, tyre, sector, 2)
+        looks.clear()
+        splice.equilibrium(fields, inflated.U, lambda: looks.append(1))
+        assert more <= len(looks) <= 3 * more
+    with pytest.raises(TimeoutError):
+        splice.equilibrium(fields, inflated.U, timed_out)
+
+
+def timed_out() -> None:
+    raise TimeoutError
+
+
+def test_slopes_by_masses_and_springs(random: np.random.Generator) -> None:
+    """sum of (k' - lambda m') p^2 over the components."""
+    k, m = random.normal(size=(2, 4))
+    step = 1j * COMPLEX_STEP
+    at = PointElements(np.arange(4), np.zeros(4, int), 1.0 + step * m, 2.0 + step * k, 9)
+    values, p = np.array([3.0, 5.0]), random.normal(size=(4, 2))
+    wanted = [sum((k - value * m) * p[:, j] ** 2) for j, value in enumerate(values)]
+    assert at.rates(values, p) == pytest.approx(wanted)
+    assert at.total_kg == pytest.approx(4 / 3)
+    nothing = np.zeros(4)
+    empty = PointElements(np.arange(4), np.zeros(4, int), nothing, nothing, 9)
+    assert bool(at) and not empty
+    assert replace(empty, mass=np.ones(4)) and replace(empty, stiffness=np.ones(4))
+
+
+def test_few_fields_stand_for_those_far_above(random: np.random.Generator) -> None:
+    """Masses and springs on 400 fields: those that stand for the high ones leave the lowest modes
+    as they are, to ninefold's sixth power; all are orthonormal."""
+    eigenvalues, p = np.linspace(1.0, 40.0, 400) ** 2, random.normal(size=(3, 400))
+    fewer = coupled._reduced(eigenvalues, p, 20)
+    assert fewer.shape[1] < 100
+    np.testing.assert_allclose(fewer.T @ fewer, np.eye(fewer.shape[1]), atol=1e-12)
+    mass, spring = np.diag([0.0, 1e-2, 1e-3]), np.diag([3.0, 0.0, 1.0])
+    K, M = np.diag(eigenvalues) + p.T @ spring @ p, np.eye(400) + p.T @ mass @ p
+    whole = eigh(K, M, eigvals_only=True)[:20]
+    some = eigh(fewer.T @ K @ fewer, fewer.T @ M @ fewer, eigvals_only=True)[:20]
+    assert abs(whole / eigenvalues[:20] - 1).max() > 1e-3
+    np.testing.assert_allclose(some, whole, rtol=9.0**-6)
+
+
+def test_the_response_to_what_is_attached_is_among_the_fields() -> None:
+    """Of stiff stuff as of soft; two of one component have one."""
+    for shear in (1e5, 1e15):
+        work = ring((0.2, 0.21, 0.23), 0.02, 2, support.Rubber(C10=shear))
+        still = Vibration(work.model, work.U, [], support.numbering(work.model, ~work.free), 0.0)
+        outside = np.flatnonzero(work.model.mesh.X[:, 0] > 0.2299)[[0, 0, 1, 1]]
+        nothing = np.zeros(4, complex)
+        at = PointElements(outside, np.array([0, 2, 0, 0]), nothing, nothing, SECTORS)
+        assert len(coupled._with_response(still, 1, 2, at).shapes) == 2 + 3
+        assert len(coupled._with_response(still, 0, 0, at).shapes) == 3
+
+
+def test_the_series_of_a_sector_is_one_in_it_and_zero_elsewhere() -> None:
+    sector = SpliceSector(0.5, None)  # type: ignore[arg-type]
+    angles = np.array([0.0, 0.15, -0.2, 0.3, 1.0, np.pi])
+    share = sector.share(angles, 4000)
+    np.testing.assert_allclose(share, [1, 1, 1, 0, 0, 0], atol=5e-3)
+    circle = np.arange(64) * np.pi / 32
+    for h in range(5):
+        part = (sector.share(circle, 5) * np.cos(h * circle)).mean()
+        assert part == pytest.approx(np.sinc(h * 0.5 / 2 / np.pi) * 0.5 / (2 * np.pi))
+    assert np.allclose(sector.share(circle, 2), sector.share(-circle, 2))
 
 
 def test_full_circle_is_exact_for_waves() -> None:

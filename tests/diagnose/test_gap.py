@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tyrecal.studies.diagnose.gap import _contrasts, family
+from tyrecal.studies.diagnose.gap import _as_number, _contrasts, family
 from tyrecal.studies.diagnose.observations import Observable
 
 from ..chance import generator
@@ -21,6 +21,11 @@ MASS = Observable("mass_kg", None, 240.0)
 
 def found(rows: tuple[Observable, ...], r: np.ndarray) -> dict[str, float]:
     return {c.name: c.percent for c in _contrasts(rows, r, np.eye(len(rows)))}
+
+
+def test_groups_of_residuals_come_in_order() -> None:
+    """Names first, then numbers as they rise."""
+    assert sorted(["10", "0.5", "b", "2", "a"], key=_as_number) == ["a", "b", "0.5", "2", "10"]
 
 
 def test_the_mass_is_in_no_contrast() -> None:

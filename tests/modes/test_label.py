@@ -147,6 +147,14 @@ def test_a_sidewall_mode_below_the_belts_does_not_take_the_label():
     assert labels(modes) == [Label(3, 2), Label(3, 0)]
 
 
+def test_what_nothing_claims_has_the_first_free_order_of_its_parity():
+    """A mode of the sidewalls alone: without waves 1 or 2, with waves 2 or 3."""
+    for c, m, wanted in ((0, 1, 1), (0, 2, 2), (0, 3, 1), (2, 0, 2), (2, 1, 3), (2, 2, 2)):
+        assert labels([mode(40.0, c, [{"r": ORDERS[m]["r"]}], (0.05,), sidewall=1.0)]) == [
+            Label(c, wanted)
+        ]
+
+
 def test_no_label_twice_among_many_overtones():
     modes = [mode(50.0 + i, c, [ORDERS[i % 3]]) for c in (0, 1, 4) for i in range(9)]
     found = labels(modes)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -19,17 +19,14 @@ class DeckStep:
 
     number: int  # in the job, from 1
     procedure: Keyword  # its keyword of ``PROCEDURES``
-    # surface to the deck's number, Pa
-    pressures: dict[str, complex | float] = field(default_factory=dict)
-    held: list[DataLine] = field(default_factory=list)  # rows of *BOUNDARY
-    long_term: bool = True  # the static state is relaxed
-    revolved: bool = False  # of the second job, in three dimensions
-    forces: list[DataLine] = field(default_factory=list)  # rows of *CLOAD
-    output: str = ""  # the node set of its *NODE FILE, or ""
-    # element set to Omega^2 (rad2/s2) of *DLOAD's CENTRIF
-    centrifugal: dict[str, complex | float] = field(default_factory=dict)
-    # element set to Omega (rad/s) of its ROTDYNF
-    spin: dict[str, complex | float] = field(default_factory=dict)
+    pressures: dict[str, complex | float]  # surface to the deck's number, Pa
+    held: list[DataLine]  # rows of *BOUNDARY
+    long_term: bool  # the static state is relaxed
+    revolved: bool  # of the second job, in three dimensions
+    forces: list[DataLine]  # rows of *CLOAD
+    output: str  # the node set of its *NODE FILE, or ""
+    centrifugal: dict[str, complex | float]  # element set to Omega^2 (rad2/s2) of *DLOAD's CENTRIF
+    spin: dict[str, complex | float]  # element set to Omega (rad/s) of its ROTDYNF
 
     @property
     def pressure(self) -> float:

@@ -42,9 +42,8 @@ class Border:
 
     @property
     def flow_mass(self) -> Array:
-        """H of w (w, w), kg per radian."""
-        if self.air is None:
-            return np.zeros((0, 0))
+        """H of w (w, w), kg per radian, where there is air."""
+        assert self.air is not None
         flow: Array = self.air.H[self.air.flowing, self.air.flowing]
         return flow
 

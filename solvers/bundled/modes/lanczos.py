@@ -78,6 +78,6 @@ def _orthonormal(block: Array, image: Array) -> tuple[Array, Array, Array]:
     """
     gram = block.conj().T @ image
     values, vectors = np.linalg.eigh(gram)
-    keep = values > 1e-26 * max(values[-1], 1e-300)
+    keep = values > 1e-26 * abs(values[-1])
     turn = vectors[:, keep] / np.sqrt(values[keep])
     return block @ turn, image @ turn, gram

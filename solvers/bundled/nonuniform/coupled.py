@@ -82,16 +82,14 @@ def attached_modes(
     harmonics: list[int],
     count: int,
     check: Callable[[], None] = lambda: None,
-    highest: int | None = None,
 ) -> list[HarmonicModes]:
     """The ``count`` lowest modes of each harmonic with masses and springs on the tyre.
 
-    K + k p p^T and M + m p p^T, p the displacement that carries k or m; ``highest``: harmonic of
-    the sum, as a rule the highest one that the sectors carry. Raises RunFailed.
+    K + k p p^T and M + m p p^T, p the displacement that carries k or m, summed up to the highest
+    harmonic that the sectors carry. Raises RunFailed.
     """
     families = []
-    top = attached.highest if highest is None else highest
-    for n in range(max([top, *harmonics]) + 1):
+    for n in range(max([attached.highest, *harmonics]) + 1):
         check()
         own = count + 1 if n <= max(harmonics) + SPARE_HARMONICS else 0
         families.append(_with_response(vibration, n, own, attached))

@@ -1,0 +1,146 @@
+"""The paths to the inflated state: the whole load, stiffer rubber let down, load by load."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+import pytest
+from tyrecal_solvers.bundled.section import inflation
+from tyrecal_solvers.bundled.section.model import Model
+from tyrecal_solvers.bundled.section.parts.pressure import Pressure
+from tyrecal_solvers.errors import NoEquilibrium
+
+from . import support
+
+Array = np.ndarray
+FULL = 1e5  # Pa
+
+
+@pytest.fixture(scope="module")
+def small() -> Model:
+    b = support.block((0.2, 0.21, 1), (0.0, 0.01, 1), False)
+    return support.model_of(support.deck(b.X, b.solids, support.Rubber(), (), b.inner))
+
+
+@dataclass
+class Newton:
+    """In place of Newton's method: the state is its share and stiffness, found where ``bears`` says
+    so of the last share and stiffness, and these; remembers what was asked, two factors each."""
+
+    bears: Callable[[float, float, float, float], bool]
+    asked: list[tuple[float, float, int]] = field(default_factory=list)
+
+    def __call__(
+        self, model: Model, numbering: object, loads: list[Pressure], mass: Array, U: Array, *rest
+    ) -> tuple[Array | None, int, str]:
+        tension, longest = rest
+        assert tension == (0.0 if U.any() else pytest.approx(0.3 * 0.01 * loads[0].pressure))
+        share = loads[0].pressure / FULL
+        stiffness = float(np.real(model.parts[0].law.C10[0])) / support.Rubber().C10
+        self.asked.append((share, stiffness, longest))
+        before = U.ravel()[0], U.ravel()[1] or 1.0
+        if not self.bears(*before, share, stiffness):
+            return None, 2, "it wrinkles"
+        found = np.zeros_like(U)
+        found.ravel()[:2] = share, stiffness
+        return found, 2, ""
+
+
+def inflate(
+    small: Model, monkeypatch: pytest.MonkeyPatch, newton: Newton
+) -> tuple[Array, int, list[int]]:
+    looks: list[int] = []
+    monkeypatch.setattr(inflation, "_newton", newton)
+    U, used = inflation.equilibrium(
+        small,
+        support.numbering(small),
+        support.cavity(small, FULL),
+        np.zeros((len(small.mesh.X), 3)),
+        lambda: looks.append(len(newton.asked)),
+    )
+    return U, used, looks
+
+
+def test_the_whole_load_is_tried_first(small: Model, monkeypatch: pytest.MonkeyPatch) -> None:
+    newton = Newton(lambda *state: True)
+    U, used, looks = inflate(small, monkeypatch, newton)
+    assert newton.asked == [(1.0, 1.0, 11)] and used == 2 and not looks
+    assert U.ravel()[0] == 1.0
+
+
+@pytest.mark.parametrize(
+    ("most", "stiffness"),
+    [(8.0, [8, 1]), (7.9, [8, 1, 8**0.5, 1]), (2.0, [8, 1, 8**0.5, 8**0.75, 8**0.5, 8**0.25, 1])],
+)
+def test_stiff_rubber_is_let_down(
+    small: Model, monkeypatch: pytest.MonkeyPatch, most: float, stiffness: list[float]
+) -> None:
+    """By factors up to ``most``: a factor that is too large becomes its root; long iterations are
+    for the first alone, and time is looked at before each further one."""
+    newton = Newton(lambda _, before, share, now: now == 8 or 1 < before <= most * now)
+    U, used, looks = inflate(small, monkeypatch, newton)
+    assert [s for _, s, _ in newton.asked] == pytest.approx([1, *stiffness])
+    assert [longest for *_, longest in newton.asked] == [11, 30] + [11] * (len(stiffness) - 1)
+    assert all(share == 1.0 for share, *_ in newton.asked)
+    assert tuple(U.ravel()[:2]) == (1.0, 1.0) and used == 2 * len(newton.asked)
+    assert looks == [1, *range(2, len(newton.asked))]
+
+
+@pytest.mark.parametrize("most", [0.25, 0.24, 1 / 256])
+def test_the_load_comes_in_steps(
+    small: Model, monkeypatch: pytest.MonkeyPatch, most: float
+) -> None:
+    """Where stiff rubber is not let down by a tenth: a quarter first, then twice the last step, or
+    half of it where that was too much, down to a 256th."""
+    newton = Newton(
+        lambda reached, before, share, now: (
+            now == 8 or (now == 1 and before == 1 and share - reached <= most)
+        )
+    )
+    U, used, _ = inflate(small, monkeypatch, newton)
+    assert tuple(U.ravel()[:2]) == (1.0, 1.0) and used == 2 * len(newton.asked)
+    letting_down = [s for _, s, _ in newton.asked[2:] if s > 1]
+    assert letting_down == pytest.approx([8 / 8 ** (0.5**i) for i in range(1, 5)])
+    shares = [share for share, s, longest in newton.asked if s == 1 and longest == 30]
+    reached, step, wanted = 0.0, 0.25, []
+    while reached < 1:
+        wanted.append(min(1.0, reached + step))
+        if wanted[-1] - reached <= most:
+            reached, step = wanted[-1], 2 * step
+        else:
+            step /= 2
+    assert shares == wanted
+
+
+def test_where_no_load_step_helps_it_says_how_far_it_came(
+    small: Model, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    newton = Newton(lambda _, before, share, now: now == 1 and share <= 0.3)
+    with pytest.raises(
+        NoEquilibrium, match=r"^inflation stopped at 29\.\d+ of 100 kPa: it wrinkles$"
+    ):
+        inflate(small, monkeypatch, newton)
+    last = newton.asked[-1][0]
+    assert 0.3 < last <= 0.3 + 1 / 256
+
+
+def test_how_newtons_method_ends(small: Model) -> None:
+    """In equilibrium already: at once. After too few iterations, and where no inertia holds back
+    what gives way: with why."""
+    number = support.numbering(small, support.held(small, [2, 3]))  # the outside
+
+    def run(U: Array, pressure: float, longest: int, mass: float) -> tuple[Array | None, int, str]:
+        masses = np.full(number.size, mass)
+        loads = support.cavity(small, pressure)
+        return inflation._newton(small, number, loads, masses, U, 0.0, longest)
+
+    at = np.zeros((len(small.mesh.X), 3))
+    assert run(at, 0.0, 5, 1.0)[1:] == (0, "")
+    assert run(at, 1e4, 1, 1.0) == (None, 1, "Newton's method did not converge in 1 iterations")
+    found, used, _ = run(at, 1e4, 30, 1.0)
+    assert found is not None and used <= 6
+    assert run(found, 1e4, 30, 1.0)[1:] == (0, "")
+    # none, then 4e5 to 4e15 by tens
+    assert run(at, 1e9, 30, 0.0) == (None, 12, "the tangent stiffness is not positive definite")
