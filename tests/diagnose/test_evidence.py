@@ -57,6 +57,20 @@ def test_evidence_against_the_marginal_in_closed_form() -> None:
     assert explain(p, ["e0"], 1.0).ln_evidence == pytest.approx(wanted, abs=1e-5)
 
 
+def test_what_an_effects_law_may_be_off_is_scatter_of_its_own() -> None:
+    """As so much more covariance, parameter by parameter; none where there is no effect."""
+    toy = flat(pressures=(160.0, 240.0))
+    loose = problem(toy, assumed=Assumed(form=0.001, law=0.1)).measured(toy.base + toy.g["e0"])
+    strict = replace(loose, assumed=Assumed(form=0.001, law=0.0))
+    e = np.array([0.4, 1.0])
+    found = refit(loose, {"e0": e}, 2)
+    shift, *_ = loose.added({"e0": e}, 2)
+    for i, more in enumerate(loose.law(shift)):
+        own = refit(strict, {"e0": e[i : i + 1]}, 1, more)
+        assert more.any() and found.ln_evidence[i] == pytest.approx(own.ln_evidence[0])
+    assert refit(loose, {}, 1).ln_evidence == pytest.approx(refit(strict, {}, 1).ln_evidence)
+
+
 @pytest.mark.parametrize("far", [(0, 0, 0), (2, 2, 2), (-2, 2, 0), (3, 0, -3)])
 def test_evidence_against_quadrature_where_the_model_bends(far: tuple[int, int, int]) -> None:
     """Laplace in x against Gauss and Hermite's rule, 24 nodes each way, at and far from x0."""

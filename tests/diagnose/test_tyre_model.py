@@ -420,6 +420,8 @@ def test_coordinates_of_a_linear_and_a_logarithmic_variable() -> None:
     assert own.spread[0] == pytest.approx(np.log(belt.upper / belt.lower) / 12**0.5)
     assert own.spread[2] == pytest.approx(1 / 12**0.5)
     assert own._slope("C10", there) == 8e5 and own._slope("A_belt", there) == there["A_belt"]
+    with_more = own.design(Query(own.start, {"frequency_stiffening": 0.3}))
+    assert with_more["effects.frequency_stiffening"] == 0.3
     rise = own._rise(own.start, own.start + 0.1)
     assert rise == pytest.approx([np.expm1(0.1), np.expm1(0.1), 0.1])
 

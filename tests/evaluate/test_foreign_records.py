@@ -17,7 +17,7 @@ import pytest
 from tyrecal.cli.main import main
 from tyrecal.simulate.evaluate.evaluator import Counts
 from tyrecal.simulate.evaluate.failure import EvaluationFailed
-from tyrecal.simulate.evaluate.record import Damaged
+from tyrecal.simulate.evaluate.record import Damaged, _arrays
 from tyrecal.simulate.evaluate.recorded import check
 from tyrecal.simulate.evaluate.store import Store
 
@@ -379,3 +379,15 @@ def test_store_verify_names_what_it_sets_aside(
     with pytest.raises(SystemExit) as leave:
         main(["store", str(tmp_path), "--verify"])
     assert leave.value.code == 0 and "damaged: 1" in capsys.readouterr().out
+
+
+def test_arrays_that_are_packed_are_not_unpacked() -> None:
+    """Whether that makes them smaller or not; plain ones come back."""
+    noise = np.random.default_rng(0).bytes(4000)
+    for array in (np.zeros(1000), np.frombuffer(noise, np.uint8)):
+        plain, packed = io.BytesIO(), io.BytesIO()
+        np.savez(plain, a=array)
+        np.savez_compressed(packed, a=array)
+        np.testing.assert_array_equal(_arrays(plain.getvalue())["a"], array)
+        with pytest.raises(Damaged, match="larger than the file"):
+            _arrays(packed.getvalue())

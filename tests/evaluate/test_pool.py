@@ -173,3 +173,24 @@ def test_workers_of_the_command_answer_when_they_are_told_to_end(tmp_path: Path)
         [sys.executable, tmp_path / "script.py"], env=environment, capture_output=True, text=True
     )
     assert (done.stdout, done.stderr) == ("[True, True]\n", "")
+
+
+@pytest.mark.parametrize("kind", [KeyboardInterrupt, GeneratorExit])
+def test_an_interruption_ends_the_workers(
+    monkeypatch: pytest.MonkeyPatch, kind: type[BaseException]
+) -> None:
+    """In the block, and while its end is waited for."""
+    ended: list[str] = []
+    monkeypatch.setattr(Pool, "end", lambda self: ended.append("now"))
+    with pytest.raises(kind), Pool(1):
+        raise kind
+    assert ended == ["now"]
+
+    def interrupted(self: Pool, **given: Any) -> None:
+        assert given == {"cancel_futures": False}
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Pool, "shutdown", interrupted)
+    with pytest.raises(KeyboardInterrupt), Pool(1):
+        pass
+    assert ended == ["now", "now"]

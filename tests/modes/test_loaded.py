@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -81,6 +83,25 @@ def test_members_of_a_doublet_that_runs_round_stand_where_they_are_largest() -> 
     assert max(areas) > 3 * min(areas)
     others = np.array([moves(phase) for phase in np.linspace(0.05, np.pi - 0.05, 60)])
     assert (others < moves(0.0)).all()
+
+
+def test_shapes_count_by_the_areas_of_their_points() -> None:
+    random = np.random.default_rng(5)
+    a, b = random.normal(size=(2, 1, *NARROW.areas.shape, 3))
+    product = lambda x, y: float((x * y * NARROW.areas[:, :, None]).sum())
+    assert NARROW.flat(a) @ NARROW.flat(b).T == pytest.approx(product(a, b))
+    mac = product(a, b) ** 2 / (product(a, a) * product(b, b))
+    assert NARROW.overlaps(a, b) == pytest.approx(mac)
+
+
+def test_the_odd_member_is_the_even_one_turned_by_a_quarter_wave() -> None:
+    random = np.random.default_rng(4)
+    r, theta, z = random.normal(size=(3, 3)) + 1j * random.normal(size=(3, 3))
+    even, odd = members(mode(2, r, theta, z), NARROW).values()
+    turned = replace(NARROW, angles=NARROW.angles + np.pi / 4)
+    ahead, _ = members(mode(2, r, theta, z), turned).values()
+    np.testing.assert_allclose(ahead, odd, atol=1e-12)
+    assert abs(even - odd).max() > 0.1
 
 
 @pytest.mark.parametrize(
