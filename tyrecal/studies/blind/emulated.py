@@ -13,13 +13,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import combinations_with_replacement
 
 import numpy as np
 from scipy.stats import qmc
 
 from ..diagnose.expansion import lagrange
 from ..diagnose.model import Answer, Query, ResponseModel, Span
+from ..emulator import up_to
 
 Array = np.ndarray
 REACH = 0.8  # of ln x: 40 % by the draw, the rest what an ignored effect moves a fit
@@ -114,13 +114,13 @@ def emulate(model: ResponseModel, reach: float = REACH) -> Emulated:
     asked = [Query(x, constants=i < SOURCE_DESIGNS) for i, x in enumerate(designs)]
     plain = model.answers(asked)
     good = [i for i, answer in enumerate(plain) if isinstance(answer, Answer)]
-    powers = monomial_powers(count, PLAIN_DEGREE)
+    powers = up_to(count, PLAIN_DEGREE)
     if len(good) * (1 + count) < len(powers):
         raise next(a for a in plain if isinstance(a, Exception))
     fitted = _fit(powers, signs[good], [plain[i] for i in good], reach)  # type: ignore[misc]
     sources = [i for i in good if i < SOURCE_DESIGNS]
     constants = _values(
-        monomial_powers(count, SOURCE_DEGREE),
+        up_to(count, SOURCE_DEGREE),
         signs[sources],
         [plain[i].constants.ravel() for i in sources],  # type: ignore[union-attr]
     )
@@ -130,15 +130,6 @@ def emulate(model: ResponseModel, reach: float = REACH) -> Emulated:
         if found is not None:
             effects[id] = found
     return Emulated(model, reach, fitted, constants, effects)
-
-
-def monomial_powers(count: int, degree: int) -> Array:
-    """Powers (k, count) of all monomials up to a degree, the constant first."""
-    rows = [np.zeros(count, int)]
-    for d in range(1, degree + 1):
-        for chosen in combinations_with_replacement(range(count), d):
-            rows.append(np.bincount(chosen, minlength=count))
-    return np.array(rows)
 
 
 def monomials(powers: Array, t: Array) -> Array:
@@ -161,7 +152,7 @@ def _effect(
     plain: Sequence[Answer | Exception],
     reach: float,
 ) -> EmulatedEffect | None:
-    powers = monomial_powers(len(signs[0]), EFFECT_DEGREE)
+    powers = up_to(len(signs[0]), EFFECT_DEGREE)
     chosen = [i for i in range(EFFECT_DESIGNS) if isinstance(plain[i], Answer)]
     nodes, added, split = [], [], []
     for e in _node_values(span):
@@ -176,7 +167,7 @@ def _effect(
         where = signs[[i for i, _ in both]]
         nodes.append(float(e))
         added.append(_fit(powers, where, differences, reach))
-        split.append(_values(monomial_powers(len(signs[0]), 1), where, [a.split for _, a in both]))
+        split.append(_values(up_to(len(signs[0]), 1), where, [a.split for _, a in both]))
     if not nodes:
         return None
     return EmulatedEffect(np.array(nodes), tuple(added), tuple(split))
