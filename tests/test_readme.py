@@ -20,6 +20,7 @@ GUIDES = [
     "README.md",
     "cases/README.md",
     "cases/own_tyre.md",
+    "cases/sampling.md",
     "cases/diagnosis.md",
     "cases/blind.md",
     "cases/own_effect.md",
@@ -131,7 +132,7 @@ def test_the_quick_blocks_are_in_the_readme() -> None:
         assert any(block.startswith(words) for block in blocks("README.md")), words
 
 
-@pytest.mark.parametrize("guide", ["README.md", "cases/python.md"])
+@pytest.mark.parametrize("guide", ["README.md", "cases/python.md", "cases/sampling.md"])
 def test_python_of(guide: str, clone: Clone) -> None:
     (program,) = re.findall(r"```python\n(.*?)```", (ROOT / guide).read_text(), re.S)
     done = subprocess.run(

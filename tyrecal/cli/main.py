@@ -29,6 +29,7 @@ COMMANDS = {  # name: one line of help, so that the overview imports no command
     "deck": "Write the decks of a case, to read or to run elsewhere.",
     "modes": "Evaluate one design, unloaded or on a road: frequencies with their labels.",
     "fit": "Calibrate the case's variables to its target frequencies.",
+    "sample": "Draw the variables that the measurements leave open, and what they predict.",
     "sweep-pressure": "Follow every mode over the inflation pressure.",
     "footprint": "Press the tyre on a road: contact area and pressure over load.",
     "effects": "List and explain what a plain model leaves out, and what it does.",

@@ -19,6 +19,7 @@ RESULT_TYPES = {  # in the order of a page
     "footprint": "tyrecal.studies.footprint:FootprintResult",
     "effects": "tyrecal.studies.effects_result:Effects",
     "sweep-load": "tyrecal.studies.loaded_result:LoadSweep",
+    "sample": "tyrecal.studies.sample.result:SampleResult",
     "diagnose": "tyrecal.studies.diagnose.summary:DiagnosisResult",
 }
 

@@ -43,6 +43,7 @@ def write(folder: Path, name: str = "Toy & sons", effect: str = "rim_width") -> 
         "footprint.json": footprint(),
         "footprint_patches.json": patches(name),
         "effects.json": effects(name),
+        "sample.json": sample(),
         "diagnosis.json": diagnosis(effect),
         "diagnosis_section.json": {"format": 1, "case": name, **parts()},
     }
@@ -354,6 +355,65 @@ def patches(name: str) -> dict[str, Any]:
                 }
             )
     return {"format": 1, "case": name, "patches": found}
+
+
+def sample() -> dict[str, Any]:
+    """Two variables; counts of a bell, turned."""
+    at = np.linspace(-3, 3, 30)
+    bell = np.exp(-0.5 * (at[:, None] ** 2 + at**2 - 0.8 * at * at[:, None]))
+    share = np.exp(-0.5 * np.linspace(-3, 3, 40) ** 2)
+    variable = {
+        "mean": 3e-7,
+        "median": 3e-7,
+        "low": 2.2e-7,
+        "high": 4e-7,
+        "standard_error": 5e-8,
+        "best": 3.1e-7,
+        "lower": 1e-7,
+        "upper": 1e-5,
+        "density": (share / share.sum()).tolist(),
+        "box": [1.5e-7, 6e-7],
+        "log": True,
+        "unit": "m2",
+    }
+    linear = {**variable, "log": False, "unit": "", "box": [1e-7, 5e-7]}
+    row = {"c": 2, "m": 0, "kind": None, "frequency_Hz": 79.0, "low": 78.5, "high": 79.5}
+    return {
+        "format": 1,
+        "seed": 0,
+        "variables": {"A_belt": variable, "angle": linear},
+        "correlations": {"A_belt": {"A_belt": 1.0, "angle": 0.4}, "angle": {"A_belt": 0.4}},
+        "predicted": [
+            {**row, "pressure_kPa": p, "mean": 79.0, "standard_error": 0.3, "measured_Hz": measured}
+            for p, measured in ((240.0, 79.5), (200.0, None))
+        ],
+        "emulator": {
+            "evaluations": 40,
+            "failed": 0,
+            "degree": 4,
+            "median_error": 1e-7,
+            "stated_error": 1e-4,
+            "share_of_sigma": 0.01,
+            "boxes": 1,
+            "evaluations_of_all": 40,
+        },
+        "chains": {
+            "draws": 95000,
+            "kept": 19000,
+            "walkers": 100,
+            "steps": 950,
+            "dropped": 50,
+            "acceptance": 0.3,
+            "autocorrelation": {"A_belt": 10.0, "angle": 9.5},
+            "effective": 9500.0,
+            "enough": True,
+            "at_edge": 0.004,
+            "stopped": "the tyre would burst",
+        },
+        "pairs": [{"a": "angle", "b": "A_belt", "counts": (100 * bell).astype(int).tolist()}],
+        "optima": [{"values": {"A_belt": 3.1e-7, "angle": 3.1e-7}, "below": 0.0}],
+        "uncertain": ["pressure 1 kPa"],
+    }
 
 
 def effects(name: str) -> list[dict[str, Any]]:

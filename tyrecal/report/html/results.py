@@ -101,7 +101,7 @@ def read_results(folder: Path) -> Results:
             last = "; it is a batch's: give the folders of its cases, which stand in it"
         raise InputError(
             f"'{folder}' holds no results of fit, modes, sweep-pressure, footprint,"
-            f" effects or diagnose{last}"
+            f" effects, sample or diagnose{last}"
         )
     return found
 

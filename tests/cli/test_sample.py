@@ -1,0 +1,135 @@
+"""tyrecal sample: files, words, the same bytes again, and what is refused."""
+
+from __future__ import annotations
+
+import csv
+import json
+import sys
+from pathlib import Path
+
+import pytest
+
+from ..conftest import CASES
+from .test_cli import run
+
+CASE, DATA = str(CASES / "p235_75r17.yaml"), str(CASES / "p235_75r17_wheeler.csv")
+COARSE = ["--mesh", "coarse", "--draws", "20000"]
+FILES = ("sample.json", "sample.csv", "sample_draws.csv", "sample_corner.png")
+
+pytestmark = pytest.mark.numbers
+
+
+@pytest.mark.slow
+def test_a_sample_in_files_and_the_same_bytes_from_the_record_and_two_processes(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    command = ["sample", CASE, "--measured", DATA, *COARSE, "--at-kPa", "200"]
+    assert run(*command, "--output", str(out), "--json") == 0
+    said = capsys.readouterr()
+    found = json.loads((out / "sample.json").read_text())
+    assert json.loads(said.out) == found and "stage 3 of 4, sample" in said.err
+    assert found["provenance"]["measured_sha256"] and found["provenance"]["mesh"] == "coarse"
+    assert set(found["variables"]) == {"A_belt", "A_carcass", "C10"}
+    for v in found["variables"].values():
+        assert v["lower"] < v["low"] < v["median"] < v["high"] < v["upper"]
+        assert v["high"] - v["low"] == pytest.approx(2 * 1.645 * v["standard_error"], rel=0.3)
+    assert {row["pressure_kPa"] for row in found["predicted"]} == {200.0, 240.0}
+    measured = [row for row in found["predicted"] if row["measured_Hz"]]
+    assert len(measured) == 9 and {row["pressure_kPa"] for row in measured} == {240.0}
+    assert any((row["c"], row["m"]) == (4, 1) for row in found["predicted"])
+    for row in found["predicted"]:
+        assert row["low"] < row["frequency_Hz"] < row["high"]
+    assert found["emulator"]["evaluations"] == 40 and found["emulator"]["stated_error"] < 5e-3
+    draws = list(csv.DictReader((out / "sample_draws.csv").open()))
+    assert len(draws) == found["chains"]["kept"] > 1000
+    runs = json.loads((out / "run.json").read_text())["sample"]
+    assert runs["solver_runs"] > 40 and not (out / "runs").exists()
+
+    bytes_ = {name: (out / name).read_bytes() for name in FILES}
+    assert run(*command, "--output", str(out), "--report") == 0
+    said = capsys.readouterr()
+    assert {name: (out / name).read_bytes() for name in FILES} == bytes_
+    assert json.loads((out / "run.json").read_text())["sample"]["solver_runs"] == 0
+    assert "A_carcass" in said.out and "third out-of-plane bending" in said.out
+    assert "off by less than" in said.out
+    page = (out / "report.html").read_text()
+    assert "<h2>Sample</h2>" in page and "90 % of the draws" in page
+    assert 'aria-label="Sample"' in page and "A_belt, m2</text>" in page
+    other = tmp_path / "two"
+    again = ["--output", str(other), "--jobs", "2", "--quiet"]
+    assert run(*command, *again) == 0
+    assert {name: (other / name).read_bytes() for name in FILES} == bytes_
+
+
+@pytest.mark.slow
+def test_targets_without_a_sigma_have_that_of_the_fit(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shared = ["--store", str(tmp_path / "store"), "--mesh", "coarse"]
+    fit, out = tmp_path / "fit", tmp_path / "out"
+    assert run("fit", CASE, *shared, "--no-pictures", "--output", str(fit)) == 0
+    command = ["sample", CASE, *shared, "--draws", "5000", "--no-pictures"]
+    assert run(*command, "--output", str(out)) == 0
+    noise = json.loads((fit / "fit.json").read_text())["noise_Hz"]
+    found = json.loads((out / "sample.json").read_text())
+    assert found["noise_Hz"] == noise and not (out / "sample_corner.png").exists()
+    said = capsys.readouterr()
+    assert f"the targets state no sigma: {noise:.2f} Hz" in said.out
+    assert "steps are fewer than" in said.err
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        (["--draws", "10"], "1000<=x"),
+        (["--at-kPa", "2.4"], "--at-kPa 2.4: usual is 50 to 1200 kPa"),
+        (["--measured", "no.csv"], "does not exist"),
+        (["--measured", "mass.csv"], "no frequency of the unloaded tyre"),
+        (["--solver", "calculix"], "gives no exact slopes"),
+        (["--seed", "-1"], "0<=x"),
+    ],
+)
+def test_what_is_refused(
+    given: list[str],
+    words: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    head = Path(DATA).read_text().splitlines()[0]
+    Path("mass.csv").write_text(f"{head}\nmass_kg,,,,,,,12.8,0.1\n")
+    assert run("sample", CASE, *given) == 2
+    said = capsys.readouterr().err
+    assert words in said and "Traceback" not in said
+
+
+PRESSED = """\
+  P: {sets: [pressure_kPa], start: 240.0, lower: 100.0, upper: 400.0}
+
+"""
+
+
+@pytest.mark.parametrize(
+    ("variables", "words"),
+    [("variables:\n" + PRESSED, "sets pressure_kPa"), ("", "there is nothing to sample")],
+)
+def test_cases_that_cannot_be_sampled_leave_no_folder(
+    variables: str, words: str, case_folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path, out = case_folder / "p235_75r17.yaml", case_folder / "out"
+    before, _, rest = path.read_text().partition("variables:")
+    path.write_text(before + variables + rest[rest.index("targets:") :])
+    assert run("sample", str(path), "--measured", DATA, "--output", str(out)) == 2
+    assert words in capsys.readouterr().err and not out.exists()
+
+
+def test_a_missing_emcee_is_one_sentence_before_anything_is_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setitem(sys.modules, "emcee", None)
+    assert run("sample", CASE, "--output", str(tmp_path / "out")) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1 and "pip install 'tyrecal[sample]'" in said
+    assert not (tmp_path / "out").exists()

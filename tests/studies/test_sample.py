@@ -1,0 +1,342 @@
+"""Sampling: closed forms of a linear tyre, boxes that grow, two optima, what is predicted."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from tyrecal.errors import InputError
+from tyrecal.report.figure import save
+from tyrecal.report.sample import figures
+from tyrecal.simulate.evaluate.failure import EvaluationFailed
+from tyrecal.simulate.modes.mode import Label
+from tyrecal.studies.diagnose.observations import Observable, Observations
+from tyrecal.studies.emulator import Evaluated, fitted, spread
+from tyrecal.studies.fit.variable import DesignVariable
+from tyrecal.studies.sample import box as box_module
+from tyrecal.studies.sample.box import AT_EDGE, drawn, grown, larger, shares_at_edge
+from tyrecal.studies.sample.chains import needs_emcee, walk
+from tyrecal.studies.sample.posterior import Posterior, optima
+from tyrecal.studies.sample.predict import conditional
+from tyrecal.studies.sample.result import draws_csv, result
+from tyrecal.studies.sample.study import Sample, first_box, targets_as_readings
+from tyrecal.tyre.load import load_case
+
+from ..chance import Chance, generator
+from ..conftest import CASES
+
+pytestmark = pytest.mark.numbers
+
+Array = np.ndarray
+LABELS = (Label(1, 0), Label(2, 0), Label(3, 0))
+J = np.array([[0.5, 0.1], [0.2, -0.4], [0.1, 0.3]])
+VARIABLES = (DesignVariable("A", 1.0, 1e-3, 1e3), DesignVariable("B", 0.5, -50.0, 51.0, False))
+BOUNDS = np.array([[np.log(1e-3), np.log(1e3)], [0.0, 1.0]])
+SIGMA = np.array([0.01, 0.02, 0.015])
+
+
+def posterior(
+    box: Array, eta: Callable[[Array], Array] | None = None, y: Array | None = None
+) -> Posterior:
+    """Of a tyre with ln f = 4 + J x, or another, measured at x = (0, 0.5)."""
+    t = spread(14, 2)
+    centre, half = box.mean(1), np.ptp(box, axis=1) / 2
+    if eta is None:
+        eta = lambda x: 4 + x @ J.T
+    x, samples = centre + half * t, []
+    for each, at in zip(x, t, strict=True):
+        rise = np.array([(eta(each + e) - eta(each - e)) / 2e-4 for e in 1e-4 * np.eye(2)]).T
+        samples.append(Evaluated(at, eta(each), rise * half, 0.0))
+    made = fitted(VARIABLES, LABELS, centre, half, samples)
+    rows = np.array([[0, i] for i in range(3)])
+    values = eta(np.array([0.0, 0.5])) if y is None else y
+    return Posterior(made, np.zeros((1, 0)), rows, values, np.diag(1 / SIGMA), box)
+
+
+COVARIANCE = np.linalg.inv((J.T / SIGMA**2) @ J)
+WIDTH = np.sqrt(np.diag(COVARIANCE))
+CENTRE = np.array([0.0, 0.5])
+WIDE = np.stack([CENTRE - 7 * WIDTH, CENTRE + 7 * WIDTH], 1)
+
+
+def test_a_linear_tyre_has_the_normal_posterior_of_the_closed_form(chance: Chance) -> None:
+    """Draws ten autocorrelation times apart, made independent standard normal ones by the closed
+    form: mean, scatter and distribution. False failures: 7e-7."""
+    found = drawn(posterior(WIDE), BOUNDS, 100_000, int(chance.random.integers(2**31)))
+    assert np.allclose(found.covariance, COVARIANCE, rtol=1e-6)
+    assert np.allclose(found.optima, CENTRE[None], atol=1e-6 * WIDTH)
+    chains = found.chains
+    assert chains.enough and 0.2 < chains.acceptance < 0.6 and (chains.tau > 1).all()
+    apart = chains.draws[:: int(10 * chains.tau.max())].reshape(-1, 2)
+    z = np.linalg.solve(np.linalg.cholesky(COVARIANCE), (apart - CENTRE).T)
+    assert len(apart) >= 1000
+    for each in z:
+        chance.mean(each, 0.0, 0.0)
+        chance.scatter(each, 1.0)
+        chance.distributed(each, "norm")
+    chance.mean(z[0] * z[1], 0.0, 0.0)
+
+
+def test_draws_are_worth_as_many_as_their_autocorrelation_says() -> None:
+    found = drawn(posterior(WIDE), BOUNDS, 40_000, 3).chains
+    flat, tau = found.flat, found.tau.max()
+    assert len(flat) == found.draws.shape[0] * found.draws.shape[1]
+    assert found.effective == pytest.approx(len(flat) / tau)
+    apart = max(1, int(tau / 2))
+    assert len(found.thinned) == -(-found.draws.shape[0] // apart) * found.draws.shape[1]
+    assert 5 * tau <= found.dropped <= 5 * tau + 1
+    assert not drawn(posterior(WIDE), BOUNDS, 2000, 3).chains.enough
+
+
+def test_the_same_seed_gives_the_same_draws_and_another_one_others() -> None:
+    first, same, other = (
+        walk(posterior(WIDE), CENTRE[None], COVARIANCE, 3000, seed).flat for seed in (1, 1, 2)
+    )
+    assert first.tobytes() == same.tobytes() != other.tobytes()
+
+
+def test_walkers_begin_within_the_box_however_wide_they_are_sent_out() -> None:
+    far = walk(posterior(WIDE), CENTRE[None], 1e6 * COVARIANCE, 3000, 1)
+    inside = (far.flat >= WIDE[:, 0]) & (far.flat <= WIDE[:, 1])
+    assert inside.all()
+
+
+def test_the_density_ends_at_the_box() -> None:
+    density = posterior(WIDE)
+    x = np.array([CENTRE, WIDE[:, 0], WIDE[:, 1], WIDE[:, 1] * [1.01, 1], WIDE[:, 0] * [1, 0.99]])
+    values = density(x)
+    assert np.isfinite(values[:3]).all() and np.isneginf(values[3:]).all()
+    off = x[1] - CENTRE
+    assert values[1] == pytest.approx(-0.5 * off @ np.linalg.inv(COVARIANCE) @ off)
+    assert np.isneginf(density(WIDE[:, 1][None] + 1)).all()
+
+
+def two_valleys(x: Array) -> Array:
+    """The same frequencies at x and at its mirror image."""
+    A = x[..., 0] - 0.0
+    return np.stack([4 + A**2, 4 + x[..., 1] + 0.02 * A, 5 - x[..., 1]], -1)
+
+
+def test_all_optima_of_a_box_are_found_and_walkers_start_from_the_likely_ones() -> None:
+    box = np.array([[-1.0, 1.0], [0.2, 0.8]])
+    density = posterior(box, two_valleys, two_valleys(np.array([0.5, 0.5])))
+    best, height = optima(density)
+    assert len(best) == 2 and height[0] > height[1] > height[0] - 10
+    assert np.allclose(best, [[0.5, 0.5], [-0.5, 0.505]], atol=0.02)
+    for each in best:  # no place around is likelier
+        around = density(each + 1e-3 * generator("around").normal(size=(200, 2)))
+        assert around.max() <= density(each[None])[0] + 1e-9
+    x = drawn(density, BOUNDS, 20_000, 0).chains.flat[:, 0]
+    ratio = np.exp(height[1] - height[0])
+    assert np.mean(x < 0) == pytest.approx(ratio / (1 + ratio), abs=0.1)
+
+
+def test_an_optimum_at_the_edge_of_the_box_is_held_there() -> None:
+    box = np.array([[0.05, 0.3], [0.2, 0.8]])
+    best, _ = optima(posterior(box))
+    assert best[0, 0] == 0.05
+    y = np.linspace(0.2, 0.8, 4001)
+    line = posterior(box)(np.column_stack([np.full(len(y), 0.05), y]))
+    assert best[0, 1] == pytest.approx(y[line.argmax()], abs=2e-4)
+
+
+def test_the_box_grows_until_it_holds_the_posterior() -> None:
+    asked: list[Array] = []
+
+    def ask(box: Array) -> Posterior:
+        asked.append(box)
+        return posterior(box)
+
+    begun: list[bool] = []
+    first = np.stack([CENTRE - 2 * WIDTH, CENTRE + 1.5 * WIDTH], 1)
+    found = grown(ask, first, BOUNDS, np.ones(3), 20_000, 1, begun.append)
+    assert found.at_edge.sum() < AT_EDGE and not found.stopped
+    assert found.boxes == len(asked) >= 2 and found.evaluations == 14 * len(asked)
+    assert begun == [False, True] * len(asked)
+    for before, after in pairwise(asked):
+        assert (after[:, 0] <= before[:, 0]).all() and (after[:, 1] >= before[:, 1]).all()
+    tails = np.abs(found.posterior.box - CENTRE[:, None]) / WIDTH[:, None]
+    assert tails.min() > 3  # 1e-3 of a normal distribution lie beyond 3.3
+    assert found.chains.flat.std(0) == pytest.approx(WIDTH, rel=0.05)
+
+
+def test_a_box_that_cannot_grow_says_why() -> None:
+    first = np.stack([CENTRE - WIDTH, CENTRE + WIDTH], 1)
+    small = lambda box: posterior(box) if np.allclose(box, first) else failing(box)
+
+    def failing(box: Array) -> Posterior:
+        raise EvaluationFailed("no_equilibrium", "inflation stopped at 12 kPa")
+
+    found = grown(small, first, BOUNDS, np.ones(3), 3000, 1)
+    assert found.boxes == 1 and found.at_edge.sum() > AT_EDGE
+    assert found.stopped == "a larger box has no emulator: inflation stopped at 12 kPa"
+    with pytest.raises(EvaluationFailed, match="inflation"):
+        grown(failing, first, BOUNDS, np.ones(3), 3000, 1)
+
+    def rough(box: Array) -> Posterior:
+        made = posterior(box)
+        errors = np.full(3, 0.02 if not np.allclose(box, first) else 0.5)
+        return replace(made, emulator=replace(made.emulator, stated_errors=errors))
+
+    found = grown(rough, first, BOUNDS, np.array([0.03, 0.01, 0.03]), 3000, 1)
+    assert found.stopped == "the emulator of a larger box may be 2 % off"
+    assert found.boxes == 1 and found.evaluations == 28
+    assert grown(rough, first, BOUNDS, np.full(3, 0.03), 3000, 1).boxes > 1
+
+
+def test_a_box_does_not_grow_for_ever(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(box_module, "GROWTHS", 1)
+    first = np.stack([CENTRE - 0.1 * WIDTH, CENTRE + 0.1 * WIDTH], 1)
+    found = grown(posterior, first, BOUNDS, np.ones(3), 3000, 1)
+    assert found.boxes == 2 and found.stopped == "it was made larger 1 times"
+
+
+def test_bounds_are_no_edges() -> None:
+    box, bounds = np.array([[0.0, 1.0], [0.0, 1.0]]), np.array([[0.0, 5.0], [-3.0, 1.0]])
+    x = np.column_stack([np.linspace(0, 1, 1001), np.linspace(0, 1, 1001)])
+    found = shares_at_edge(x, box, bounds)
+    assert found == pytest.approx(np.array([[0.0, 0.025], [0.025, 0.0]]), abs=1e-3)
+    assert larger(box, bounds, found).tolist() == [[0.0, 1.25], [-0.25, 1.0]]
+    assert larger(box, bounds, np.full((2, 2), 1e-5)).tolist() == box.tolist()
+    near = np.array([[0.0, 1.1], [-0.1, 1.0]])
+    assert larger(box, near, found).tolist() == near.tolist()
+
+
+def test_the_first_box_is_as_wide_as_the_linear_errors_say() -> None:
+    bounds = np.array([[-9.0, 9.0], [0.0, 1.0]])
+    sharp = np.diag([1e4, 1e4])
+    box = first_box(np.array([0.2, 0.5]), sharp, VARIABLES, bounds)
+    assert box == pytest.approx(np.array([[0.155, 0.245], [0.455, 0.545]]), abs=1e-3)
+    nothing = first_box(np.array([0.2, 0.9]), np.zeros((2, 2)), VARIABLES, bounds)
+    assert nothing == pytest.approx(np.array([[-0.5, 0.9], [0.55, 1.0]]))
+    outside = first_box(np.array([20.0, -3.0]), sharp, VARIABLES, bounds)
+    assert outside == pytest.approx(np.array([[8.955, 9.0], [0.0, 0.045]]), abs=1e-3)
+
+
+def rows(pressures: tuple[float, ...]) -> tuple[Observable, ...]:
+    return tuple(Observable("frequency_Hz", label, p) for p in pressures for label in LABELS)
+
+
+def test_predictions_are_the_conditional_of_the_joint_normal_distribution() -> None:
+    """Against the inverse of the whole covariance, which holds the conditional one in its block."""
+    random = generator("joint")
+    g, other = random.normal(0, 0.01, (3, 4)), random.normal(0, 0.01, (6, 4))
+    here, there = rows((240.0,)), rows((200.0, 280.0))
+    form = np.array([0.0018, 0.0015, 0.0010])  # of form_error
+    scatter = np.diag([1e-4, 2e-4, 1e-4])
+    alike = np.kron(np.array([[1.0, 0.9, 0.9], [0.9, 1.0, 0.9], [0.9, 0.9, 1.0]]), np.eye(3))
+    whole = alike * np.outer(np.tile(form, 3), np.tile(form, 3))
+    whole += np.vstack([g, other]) @ np.vstack([g, other]).T
+    whole[:3, :3] += scatter
+    found = conditional(here, whole[:3, :3], g, there, other)
+    precision = np.linalg.inv(whole)
+    assert np.allclose(found.covariance, np.linalg.inv(precision[3:, 3:]), rtol=1e-6, atol=1e-15)
+    assert np.allclose(found.pull, -found.covariance @ precision[3:, :3], atol=1e-8)
+    C, A, B = np.diag([0.01, 0.04]), random.normal(size=(3, 2)), random.normal(size=(6, 2))
+    rest = B - found.pull @ A
+    expected = np.sqrt(np.diag(rest @ C @ rest.T + found.covariance))
+    assert np.allclose(found.sigma(A, B, C), expected)
+
+
+def test_drawn_predictions_have_that_mean_and_covariance(chance: Chance) -> None:
+    """False failures: 1.2e-6."""
+    here, there = rows((240.0,)), rows((200.0, 280.0))
+    g, other = chance.random.normal(0, 0.01, (3, 2)), chance.random.normal(0, 0.01, (6, 2))
+    sigma = g @ g.T + 1e-4 * np.eye(3)
+    found = conditional(here, sigma, g, there, other)
+    eta, off = np.tile(np.arange(6.0), (2000, 1)), np.tile([0.01, -0.02, 0.03], (2000, 1))
+    x = found.drawn(eta, off, int(chance.random.integers(2**31)))
+    middle = eta[0] + found.pull @ off[0]
+    for j in range(6):
+        chance.mean(x[:, j] - middle[j], 0.0, 0.0)
+        chance.scatter(x[:, j], float(np.sqrt(found.covariance[j, j])))
+
+
+def test_a_missing_emcee_is_told_in_one_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "emcee", None)
+    with pytest.raises(InputError, match=r"needs the package emcee.*pip install 'tyrecal\[sample]"):
+        needs_emcee()
+
+
+def test_targets_are_read_with_their_sigma_or_what_the_fit_leaves() -> None:
+    case = load_case(CASES / "p235_75r17.yaml")
+    modes = case.case.targets.modes
+    modes[0] = modes[0].model_copy(update={"sigma_Hz": 0.7})
+    modes[1] = modes[1].model_copy(update={"weight": 0.0})
+    read = targets_as_readings(case, 1.5)
+    assert [each.sigma for each in read] == [0.7] + 7 * [1.5]
+    assert [each.value for each in read][:2] == [31.7, 37.8]
+    assert {(each.pressure_kPa, each.quantity) for each in read} == {(240.0, "frequency_Hz")}
+
+
+def sampled(draws: int = 20_000) -> Sample:
+    """As `study.run` gives it, of the linear tyre."""
+    density = posterior(WIDE)
+    found = drawn(density, BOUNDS, draws, 5)
+    observations = Observations(rows((240.0,)), density.y, SIGMA, 0.0, SIGMA * np.nan, SIGMA)
+    x = found.chains.thinned
+    eta = density.ln_f(x, density.rows)
+    return Sample(
+        VARIABLES, ("m2", ""), observations, (), found, rows((240.0,)), eta, SIGMA, 0.01, None
+    )
+
+
+def test_the_result_says_what_the_draws_are() -> None:
+    sample = sampled()
+    found, flat = result(sample, 5), sample.drawn.chains.flat
+    A, B = found.variables["A"], found.variables["B"]
+    a, b = np.exp(flat[:, 0]), -50 + 101 * flat[:, 1]
+    for v, values in ((A, a), (B, b)):
+        assert v.mean == pytest.approx(values.mean())
+        assert (v.low, v.median, v.high) == pytest.approx(np.quantile(values, (0.05, 0.5, 0.95)))
+        assert sum(v.density) == pytest.approx(1.0, abs=1e-6)
+        assert v.low < v.best < v.high
+    assert A.standard_error == pytest.approx(WIDTH[0] * A.best, rel=1e-6)
+    assert B.standard_error == pytest.approx(WIDTH[1] * 101, rel=1e-6)
+    assert A.box == pytest.approx(np.exp(WIDE[0])) and B.box == pytest.approx(-50 + 101 * WIDE[1])
+    assert found.correlations["A"]["B"] == pytest.approx(np.corrcoef(flat.T)[0, 1])
+    (pair,) = found.pairs
+    thin = sample.drawn.chains.thinned
+    assert (pair.a, pair.b) == ("B", "A") and np.sum(pair.counts) == len(thin)
+    half = len(pair.counts) // 2  # rows are steps of B
+    assert np.sum(pair.counts[:half]) == (thin[:, 1] < WIDE[1].mean()).sum()
+    row, hertz = found.predicted[0], np.exp(sample.ln_f[:, 0])
+    assert (row.low, row.frequency_Hz) == pytest.approx(np.quantile(hertz, (0.05, 0.5)))
+    assert row.measured_Hz == pytest.approx(np.exp(sample.observations.y[0]))
+    assert row.sigma_Hz == pytest.approx(0.01 * row.measured_Hz)
+    assert row.standard_error == pytest.approx(0.01 * row.frequency_Hz)
+    table = np.array([line.split(",") for line in draws_csv(sample).splitlines()[1:]], float)
+    assert np.allclose(table, np.column_stack([np.exp(thin[:, 0]), -50 + 101 * thin[:, 1]]))
+    assert draws_csv(sample).startswith("A,B\n") and len(table) == found.chains.kept
+    assert found.csv().splitlines()[1].startswith("1,0,,240.0,")
+    assert found.chains.enough or found.doubts()
+
+
+def test_doubts_of_a_result() -> None:
+    sample = sampled(3000)
+    at_edge = np.array([[2e-3, 0.0], [0.0, 1e-3]])
+    poor = replace(sample.drawn, at_edge=at_edge, stopped="why")
+    words = " ".join(result(replace(sample, drawn=poor, rough=0.2), 0).doubts())
+    assert "0.3 % of the draws lie at the edge of the box, which could not grow: why" in words
+    assert "steps are fewer than 50 autocorrelation times" in words and "--draws" in words
+    assert "may be off by 0.2 of a standard deviation" in words
+    assert len(result(replace(sample, noise_Hz=1.2), 0).sentences()) == 3
+
+
+def test_the_corner_picture_says_names_units_and_lines(
+    tmp_path: object, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from pathlib import Path
+
+    from ..report.watched import every_text_readable
+
+    assert isinstance(tmp_path, Path)
+    (name, figure), *_ = figures(result(sampled(), 0)).items()
+    with every_text_readable(monkeypatch) as said:
+        save(figure, tmp_path / f"{name}.png")
+    assert {"A", "B", "A, m2", "draws", "linear", "median", "90 %"} <= set(said)

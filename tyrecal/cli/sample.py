@@ -1,0 +1,112 @@
+"""tyrecal sample"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from . import arguments, options
+
+
+@click.command()
+@options.every(options.case_argument, options.assignments, options.pressure)
+@click.option(
+    "--measured",
+    type=click.Path(path_type=Path, exists=True, dir_okay=False),
+    metavar="FILE",
+    help="Measurements (CSV), at any pressures, in place of the case's targets.",
+)
+@click.option(
+    "--draws",
+    type=click.IntRange(1000, 10_000_000),
+    default=100_000,
+    metavar="N",
+    show_default=True,
+    help="Draws in all.",
+)
+@click.option(
+    "--seed",
+    type=click.IntRange(0, 2**32 - 1),
+    default=0,
+    metavar="S",
+    show_default=True,
+    help="Seed of the draws.",
+)
+@click.option(
+    "--at-kPa",
+    "at_kPa",
+    type=float,
+    multiple=True,
+    metavar="P",
+    help="Predict frequencies at this pressure, too; repeatable (default: a fifth below and above"
+    " the case's).",
+)
+@click.option("--pictures/--no-pictures", default=True, help="Draw the corner picture.")
+@options.study
+def command(
+    case: Path,
+    assignments: tuple[str, ...],
+    pressure_kPa: float | None,
+    measured: Path | None,
+    draws: int,
+    seed: int,
+    at_kPa: tuple[float, ...],
+    pictures: bool,
+    study: options.Study,
+) -> int:
+    """Draw the variables of CASE that the measurements leave open, under their sigmas and the
+    case's uncertainties, and predict frequencies, with 90 % intervals.
+
+    Writes sample.json, sample.csv (frequencies), sample_draws.csv and a corner picture. The model
+    is an emulator of some 40 evaluations, whose error is stated. Needs the extra tyrecal[sample].
+
+    \b
+    tyrecal sample cases/p235_75r17.yaml --measured cases/p235_75r17_wheeler.csv
+    tyrecal sample my.yaml --measured measured.csv --at-kPa 180 --at-kPa 260 --jobs 2
+    """
+    from ..report.table import shown
+    from ..studies.sample.chains import needs_emcee
+    from ..studies.sample.result import draws_csv, result
+    from ..studies.sample.study import SAMPLE_STAGES, check, modal, run
+
+    terminal = study.terminal
+    needs_emcee()
+    loaded, values = study.load(case, assignments, pressure_kPa)
+    loaded = arguments.starting_at(loaded, values)
+    for pressure in at_kPa:
+        arguments.refuse_unusual(
+            loaded, f"--at-kPa {pressure:g}", "pressure_kPa", pressure, study.allow_unusual
+        )
+    readings = None
+    if measured:
+        from ..measured.tables import read_measurements
+
+        readings = read_measurements(measured)
+    evaluator = study.evaluator(loaded)
+    check(loaded, evaluator, readings)
+    output = study.run(
+        loaded, "sample", evaluator, measured=[measured] if measured else [], load_N=0.0
+    )
+    with terminal.progress("sample", SAMPLE_STAGES) as bar:
+        evaluator.on_progress = bar.at
+        sample = run(loaded, evaluator, readings, draws, seed, at_kPa, study.jobs, bar.begin)
+    found = output.write(result(sample, seed))
+    if pictures:
+        from ..report.figure import save
+        from ..report.sample import figures
+
+        for name, figure in figures(found).items():
+            save(figure, output.new / f"{name}.png")
+    output.write_text("sample_draws.csv", draws_csv(sample))
+    output.finish()
+    terminal.result(found.content())
+    for table in found.tables():
+        terminal.show(shown(table))
+    terminal.say("\n".join(found.sentences()))
+    if left_out := len(readings or ()) - len(modal(readings or ())):
+        terminal.note(f"{measured}: {left_out} values are no frequencies of the unloaded tyre")
+    for doubt in found.doubts():
+        terminal.warn(doubt)
+    study.finish(output)
+    return 0

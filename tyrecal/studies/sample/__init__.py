@@ -1,0 +1,1 @@
+"""The posterior of the design variables, drawn on an emulator."""

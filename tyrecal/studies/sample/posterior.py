@@ -1,0 +1,104 @@
+"""The posterior density of the design variables, on an emulator.
+
+    ln p(x | y) = -1/2 r^T Sigma^-1 r + constant,   r = y - eta(x),   x within the variables' bounds
+
+eta: ln f of the measured modes; Sigma: scatter, the model's form and what nobody calibrates, as a
+diagnosis has it (diagnose/covariance.py). Before the measurement every x within the bounds is as
+good as another: of a variable on a logarithmic scale, every ratio.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..emulator import Emulator, spread
+
+Array = np.ndarray
+STARTS, STEPS = 64, 60  # of `optima`
+SAME_OPTIMUM = 0.1  # standard deviations: optima closer than this are one
+FIRST_DAMPING, STIFFEST = 1e-3, 1e6  # of a step, in units of the information
+
+
+@dataclass(frozen=True)
+class Posterior:
+    """Its logarithm, for many x at a time.
+
+    states: values of the emulator's further coordinates, one row a state (pressures); rows (n, 2):
+    of every measured value the places of its state and its label; y (n,), whitened (n, n): W with
+    W^T W = Sigma^-1; box (v, 2): within it alone the density is known.
+    """
+
+    emulator: Emulator
+    states: Array
+    rows: Array
+    y: Array
+    whitened: Array
+    box: Array
+
+    def __call__(self, x: Array) -> Array:
+        """ln p (p,) at x (p, v) but for a constant; -inf outside the box."""
+        inside = ((self.box[:, 0] <= x) & (x <= self.box[:, 1])).all(1)
+        found = np.full(len(x), -np.inf)
+        if inside.any():
+            found[inside] = -0.5 * (self.residuals(x[inside]) ** 2).sum(1)
+        return found
+
+    def residuals(self, x: Array) -> Array:
+        """W r (p, n) at x (p, v)."""
+        off = self.y - self.ln_f(x, self.rows)
+        return np.asarray(off @ self.whitened.T)
+
+    def ln_f(self, x: Array, rows: Array) -> Array:
+        """ln f (p, n) of rows of states and labels at x (p, v)."""
+        every = np.stack([self.emulator.ln_f(self._at(x, s)) for s in self.states])
+        return every[rows[:, 0], :, rows[:, 1]].T
+
+    def slopes(self, x: Array, rows: Array) -> Array:
+        """d ln f / d x (p, n, v) of rows at x (p, v)."""
+        every = np.stack([self.emulator.slopes(self._at(x, s)) for s in self.states])
+        return np.moveaxis(every[rows[:, 0], :, rows[:, 1]], 0, 1)[:, :, : x.shape[1]]
+
+    def _at(self, x: Array, state: Array) -> Array:
+        return np.hstack([x, np.broadcast_to(state, (len(x), len(state)))])
+
+    def information(self, x: Array) -> Array:
+        """J^T Sigma^-1 J (p, v, v): its inverse is the linear covariance of the variables."""
+        J = np.einsum("ij,pjv->piv", self.whitened, self.slopes(x, self.rows))
+        return np.einsum("piv,piw->pvw", J, J)
+
+
+def optima(posterior: Posterior) -> tuple[Array, Array]:
+    """Maxima (o, v) of the density in the box from many starts, the highest first, and ln p (o,).
+
+    Damped Gauss-Newton steps from all starts at a time, each with a damping of its own; what leaves
+    the box stops at its edge.
+    """
+    low, high = posterior.box.T
+    x = low + (high - low) * (spread(STARTS, len(low)) + 1) / 2
+    value, damping = posterior(x), np.full(len(x), FIRST_DAMPING)
+    for _ in range(STEPS):
+        J = np.einsum("ij,pjv->piv", posterior.whitened, posterior.slopes(x, posterior.rows))
+        pull = np.einsum("piv,pi->pv", J, posterior.residuals(x))
+        H = np.einsum("piv,piw->pvw", J, J)
+        # an edge holds what is pushed against it
+        held = ((x <= low) & (pull < 0)) | ((x >= high) & (pull > 0))
+        free = ~held[:, :, None] & ~held[:, None, :]
+        scale = np.einsum("pvv->pv", H) * (1 + damping[:, None]) + 1e-300
+        H = np.where(free, H, 0.0)
+        H[:, range(len(low)), range(len(low))] = scale
+        step = np.linalg.solve(H, np.where(held, 0.0, pull)[:, :, None])[:, :, 0]
+        trial = np.clip(x + step, low, high)
+        there = posterior(trial)
+        better = there > value
+        x, value = np.where(better[:, None], trial, x), np.where(better, there, value)
+        damping = np.where(better, damping / 5, np.minimum(damping * 4, STIFFEST))
+    order = np.argsort(-value, kind="stable")
+    x, value = x[order], value[order]
+    kept: list[int] = []
+    for i, H in enumerate(posterior.information(x)):
+        apart = [(x[i] - x[j]) @ H @ (x[i] - x[j]) for j in kept]
+        if all(each > SAME_OPTIMUM**2 for each in apart):
+            kept.append(i)
+    return x[kept], value[kept]

@@ -1,0 +1,359 @@
+"""What a sample says: sample.json, sample.csv, its tables and sentences."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from ..result import (
+    NAME_COLUMNS,
+    Column,
+    Named,
+    PositiveNumber,
+    Result,
+    ResultPart,
+    Table,
+    csv_text,
+)
+from .box import AT_EDGE
+from .chains import ENOUGH
+from .study import ROUGH, Sample
+
+Array = np.ndarray
+LOW, HIGH = 0.05, 0.95  # quantiles: 90 % lie between
+NEARLY = 5.0  # of ln p below the highest: another optimum that is worth a word
+DENSITY_STEPS, PAIR_STEPS = 40, 30  # of histograms
+DIGITS = Column("", ".4g")
+
+
+class SampledVariable(ResultPart):
+    """A design variable, in the unit of the number that it sets."""
+
+    mean: float
+    median: float
+    low: float
+    high: float
+    standard_error: PositiveNumber  # linear, about the best
+    best: float  # where the density is highest
+    lower: float
+    upper: float
+    density: Annotated[
+        list[float], Field(min_length=1)
+    ]  # shares of draws in equal steps of the box
+    box: tuple[float, float]
+    log: bool  # steps are of the logarithm
+    unit: str = ""
+
+    @model_validator(mode="after")
+    def _within_the_box(self) -> Self:
+        low, high = self.box
+        if not low < high or (self.log and low <= 0):
+            raise ValueError("box must rise, from above 0 on a logarithmic scale")
+        slack = 1e-6 * (high - low)
+        if not all(low - slack <= x <= high + slack for x in (self.low, self.median, self.high)):
+            raise ValueError("low, median and high must be in the box")
+        if not low - slack <= self.best <= high + slack:
+            raise ValueError("best must be in the box")
+        return self
+
+
+class SampledPair(ResultPart):
+    """Two variables together: counts of thinned draws, rows along ``a``, in equal steps."""
+
+    a: str
+    b: str
+    counts: list[list[Annotated[int, Field(ge=0, lt=2**31)]]]
+
+
+class PredictedRow(Named):
+    """A frequency of the tyre at a pressure; ``frequency_Hz`` is its median."""
+
+    pressure_kPa: float
+    low: float
+    high: float
+    mean: float
+    standard_error: float  # linear
+    measured_Hz: float | None = None
+    sigma_Hz: float | None = None  # of its scatter
+
+
+class Optimum(ResultPart):
+    """A design that is likelier than those around it; ``below``: its ln p, below the highest."""
+
+    values: dict[str, float]
+    below: float
+
+
+class EmulatorFacts(ResultPart):
+    """The emulator of the last box; errors are relative."""
+
+    evaluations: int
+    failed: int
+    degree: int
+    median_error: float
+    stated_error: float
+    share_of_sigma: float  # that error of a measured row, the worst one's
+    boxes: int
+    evaluations_of_all: int
+
+
+class ChainFacts(ResultPart):
+    """The walkers' draws."""
+
+    draws: int
+    kept: int  # in sample_draws.csv
+    walkers: int
+    steps: int
+    dropped: int
+    acceptance: float
+    autocorrelation: dict[str, float]  # steps
+    effective: float
+    enough: bool
+    at_edge: float  # share of the draws
+    stopped: str  # why the box holds no more of them
+
+
+class SampleResult(Result):
+    """sample.json"""
+
+    study, stem, heading = "sample", "sample", "Sample"
+    figures = "tyrecal.report.sample:figures"
+
+    seed: int
+    variables: dict[str, SampledVariable]
+    correlations: dict[str, dict[str, float]]
+    predicted: list[PredictedRow]
+    emulator: EmulatorFacts
+    chains: ChainFacts
+    pairs: list[SampledPair]
+    optima: list[Optimum]
+    uncertain: list[str]  # what nobody calibrates
+    noise_Hz: float | None = None
+
+    @model_validator(mode="after")
+    def _whole(self) -> Self:
+        names = list(self.variables)
+        pairs = [(a, b) for i, a in enumerate(names) for b in names[:i]]
+        if not names or [(pair.a, pair.b) for pair in self.pairs] != pairs:
+            raise ValueError("pairs must be those of the variables")
+        if any(np.shape(pair.counts) != (PAIR_STEPS, PAIR_STEPS) for pair in self.pairs):
+            raise ValueError(f"counts must be {PAIR_STEPS} by {PAIR_STEPS}")
+        return self
+
+    def csv(self) -> str:
+        keys = ["c", "m", "kind", "pressure_kPa", "frequency_Hz", "low", "high", "mean"]
+        keys += ["standard_error", "measured_Hz", "sigma_Hz"]
+        return csv_text(keys, (row.model_dump() for row in self.predicted))
+
+    def tables(self) -> list[Table]:
+        heads = ("variable", "median", "90 % from", "to", "std. err. %", "linear %", "best", "unit")
+        rows: list[list[Any]] = []
+        for name, v in self.variables.items():
+            half = (v.high - v.low) / (2 * 1.645)  # as a standard error, were it normal
+            percent = [f"{100 * each / v.median:.2g}" for each in (half, v.standard_error)]
+            figures = [*map(DIGITS.cell, (v.median, v.low, v.high)), *percent]
+            rows.append([name, *figures, DIGITS.cell(v.best), v.unit])
+        return [Table([*map(Column, heads)], rows), *self._predicted()]
+
+    def _predicted(self) -> list[Table]:
+        hertz = Column("Hz", ".2f")
+        heads = [*NAME_COLUMNS, *map(Column, ("measured", "median", "90 % from", "to", "linear ±"))]
+        tables = []
+        for pressure in dict.fromkeys(row.pressure_kPa for row in self.predicted):
+            own = [row for row in self.predicted if row.pressure_kPa == pressure]
+            rows = [
+                [
+                    *row.named(),
+                    *map(hertz.cell, (row.measured_Hz, row.frequency_Hz, row.low, row.high)),
+                    hertz.cell(1.645 * row.standard_error),
+                ]
+                for row in own
+            ]
+            tables.append(Table(heads, rows, f"Hz at {pressure:g} kPa"))
+        return tables
+
+    def sentences(self) -> list[str]:
+        e, c = self.emulator, self.chains
+        told = [
+            f"{c.draws} draws, worth {c.effective:.0f} independent ones (autocorrelation"
+            f" {max(c.autocorrelation.values()):.1f} steps, {100 * c.acceptance:.0f} % accepted)",
+            f"emulator of {e.evaluations} evaluations: off by less than"
+            f" {100 * e.stated_error:.2g} % in 99 of 100 designs",
+        ]
+        if self.noise_Hz is not None:
+            told.append(
+                f"the targets state no sigma: {self.noise_Hz:.2f} Hz, as a fit leaves them, stands"
+                " for it"
+            )
+        near = [each for each in self.optima if each.below < NEARLY]
+        if len(near) > 1:
+            told.append(
+                f"{len(near)} designs are each likelier than those around them, by ln p"
+                f" {near[-1].below:.1f} apart: see optima in sample.json"
+            )
+        return told
+
+    def summary(self) -> list[str]:
+        ranges = (
+            f"{name} {v.low:.4g} to {v.high:.4g} {v.unit}".rstrip()
+            for name, v in self.variables.items()
+        )
+        return [f"90 % of the draws: {', '.join(ranges)}"]
+
+    def doubts(self) -> list[str]:
+        c = self.chains
+        found = []
+        if c.at_edge >= AT_EDGE:
+            found.append(
+                f"{100 * c.at_edge:.2g} % of the draws lie at the edge of the box, which could not"
+                f" grow: {c.stopped}"
+            )
+        if not c.enough:
+            tau = max(c.autocorrelation.values())
+            found.append(
+                f"{c.steps} steps are fewer than {ENOUGH} autocorrelation times of {tau:.1f}: give"
+                f" --draws {ENOUGH * tau * c.walkers * 1.5:.2g} or more"
+            )
+        if self.emulator.share_of_sigma > ROUGH:
+            found.append(
+                f"the emulator may be off by {self.emulator.share_of_sigma:.2g} of a standard"
+                " deviation of what was measured"
+            )
+        return found
+
+
+def result(sample: Sample, seed: int) -> SampleResult:
+    """What stands in sample.json."""
+    drawn, names = sample.drawn, [v.name for v in sample.variables]
+    chains, made, box = drawn.chains, drawn.posterior.emulator, drawn.posterior.box
+    flat, thin = chains.flat, chains.thinned
+    return SampleResult(
+        format=1,
+        seed=seed,
+        variables={name: _variable(sample, j) for j, name in enumerate(names)},
+        correlations={
+            a: dict(zip(names, row, strict=True))
+            for a, row in zip(names, np.atleast_2d(np.corrcoef(flat.T)).tolist(), strict=True)
+        },
+        predicted=_predicted(sample),
+        emulator=EmulatorFacts(
+            evaluations=made.evaluations,
+            failed=made.failed,
+            degree=int(made.degrees.sum(1).max()),
+            median_error=made.median_error,
+            stated_error=made.stated_error,
+            share_of_sigma=sample.rough,
+            boxes=drawn.boxes,
+            evaluations_of_all=drawn.evaluations,
+        ),
+        chains=ChainFacts(
+            draws=len(flat),
+            kept=len(thin),
+            walkers=chains.draws.shape[1],
+            steps=len(chains.draws),
+            dropped=chains.dropped,
+            acceptance=chains.acceptance,
+            autocorrelation=dict(zip(names, chains.tau.tolist(), strict=True)),
+            effective=chains.effective,
+            enough=chains.enough,
+            at_edge=float(drawn.at_edge.sum()),
+            stopped=drawn.stopped,
+        ),
+        pairs=[
+            SampledPair(
+                a=names[i],
+                b=names[j],
+                counts=np.histogram2d(thin[:, i], thin[:, j], PAIR_STEPS, box[[i, j]])[0]
+                .astype(int)
+                .tolist(),
+            )
+            for i in range(len(names))
+            for j in range(i)
+        ],
+        optima=[
+            Optimum(
+                values={
+                    v.name: v.value(float(xi)) for v, xi in zip(sample.variables, x, strict=True)
+                },
+                below=float(drawn.height[0] - height),
+            )
+            for x, height in zip(drawn.optima, drawn.height, strict=True)
+        ],
+        uncertain=[source.words for source in sample.sources],
+        noise_Hz=sample.noise_Hz,
+    )
+
+
+def draws_csv(sample: Sample) -> str:
+    """The thinned draws as CSV: a column a variable, in its own unit."""
+    columns = [_values(v.log, v.lower, v.upper, x) for v, x in _thinned(sample)]
+    names = [v.name for v in sample.variables]
+    table = np.column_stack(columns).tolist()
+    return csv_text(names, (dict(zip(names, row, strict=True)) for row in table))
+
+
+def _thinned(sample: Sample) -> list[tuple[Any, Array]]:
+    return list(zip(sample.variables, sample.drawn.chains.thinned.T, strict=True))
+
+
+def _values(log: bool, lower: float, upper: float, x: Array) -> Array:
+    """A variable's values from its coordinates."""
+    return np.exp(x) if log else lower + x * (upper - lower)
+
+
+def _variable(sample: Sample, j: int) -> SampledVariable:
+    v, drawn = sample.variables[j], sample.drawn
+    x, ends = drawn.chains.flat[:, j], drawn.posterior.box[j]
+    values = _values(v.log, v.lower, v.upper, x)
+    low, median, high = np.quantile(values, [LOW, 0.5, HIGH]).tolist()
+    best = v.value(float(drawn.optima[0, j]))
+    return SampledVariable(
+        mean=float(values.mean()),
+        median=median,
+        low=low,
+        high=high,
+        standard_error=float(np.sqrt(drawn.covariance[j, j])) * v.slope(best),
+        best=best,
+        lower=v.lower,
+        upper=v.upper,
+        density=(np.histogram(x, DENSITY_STEPS, tuple(ends))[0] / len(x)).tolist(),
+        box=tuple(_values(v.log, v.lower, v.upper, ends).tolist()),
+        log=v.log,
+        unit=sample.units[j],
+    )
+
+
+def _predicted(sample: Sample) -> list[PredictedRow]:
+    measured = {
+        (row.label, row.pressure_kPa): (float(np.exp(y)), float(scatter * np.exp(y)))
+        for row, y, scatter in zip(
+            sample.observations.rows,
+            sample.observations.y,
+            sample.observations.scatter,
+            strict=True,
+        )
+    }
+    hertz = np.exp(sample.ln_f)
+    low, median, high = np.quantile(hertz, [LOW, 0.5, HIGH], axis=0)
+    found = []
+    for i, row in enumerate(sample.rows):
+        value, sigma = measured.get((row.label, row.pressure_kPa), (None, None))
+        assert row.label
+        found.append(
+            PredictedRow(
+                c=row.label.c,
+                m=row.label.m,
+                kind=row.label.kind,
+                pressure_kPa=row.pressure_kPa,
+                frequency_Hz=float(median[i]),
+                low=float(low[i]),
+                high=float(high[i]),
+                mean=float(hertz[:, i].mean()),
+                standard_error=float(sample.linear[i] * median[i]),
+                measured_Hz=value,
+                sigma_Hz=sigma,
+            )
+        )
+    return found
