@@ -8,7 +8,7 @@ from dataclasses import replace
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator
 from tyrecal.simulate.evaluate.store import Store
-from tyrecal.simulate.modes.mode import Label
+from tyrecal.simulate.modes.label import Label
 from tyrecal.studies.blind.maker import Computed, SolverMaker
 from tyrecal.studies.blind.outside import OUTSIDE_FAMILIES
 from tyrecal.tyre.case import LoadedCase

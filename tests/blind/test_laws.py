@@ -8,8 +8,7 @@ from scipy.stats import uniform
 
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
-from tyrecal.simulate.modes.label import paired_labels
-from tyrecal.simulate.modes.mode import Label
+from tyrecal.simulate.modes.label import Label, paired_labels
 from tyrecal.studies.blind.emulated import emulate
 from tyrecal.studies.blind.laws import EffectLaw
 from tyrecal.studies.blind.outside import OUTSIDE_FAMILIES

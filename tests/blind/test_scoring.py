@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from tyrecal.simulate.modes.mode import Label
+from tyrecal.simulate.modes.label import Label
 from tyrecal.studies.blind.baselines import guesses
 from tyrecal.studies.blind.protocol import Protocol
 from tyrecal.studies.blind.ruler import EffectShifts, Ruler, difficulty, measure

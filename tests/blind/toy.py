@@ -7,7 +7,7 @@ from math import log
 
 import numpy as np
 
-from tyrecal.simulate.modes.mode import Label
+from tyrecal.simulate.modes.label import Label
 from tyrecal.studies.blind.laws import EffectLaw
 from tyrecal.studies.blind.maker import Computed
 from tyrecal.studies.blind.protocol import Protocol

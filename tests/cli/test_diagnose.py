@@ -9,8 +9,7 @@ import pytest
 
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
-from tyrecal.simulate.modes.label import paired_labels
-from tyrecal.simulate.modes.mode import Label
+from tyrecal.simulate.modes.label import Label, paired_labels
 from tyrecal.tyre.case import start_values
 from tyrecal.tyre.load import load_case
 

@@ -14,7 +14,7 @@ import pytest
 import pyuff
 
 from tyrecal.measured.tables import read_measurements
-from tyrecal.simulate.modes.mode import Label
+from tyrecal.simulate.modes.label import Label
 from tyrecal.studies.diagnose.observations import observe
 
 from ..measured.test_universal import ANGLES, function, geometry, shape, units, write

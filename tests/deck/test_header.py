@@ -8,8 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tyrecal.simulate.deck.decks import Decks
-from tyrecal.simulate.deck.header import LONGEST_NAME, header, without_header
+from tyrecal.simulate.deck.decks import LONGEST_NAME, Decks, header, without_header
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.tyre.case import start_values, with_level
 from tyrecal.tyre.case.identity import tyre_sha256

@@ -11,8 +11,8 @@ import pytest
 from scipy.optimize import least_squares
 
 from tyrecal.report.diagnosis import page
+from tyrecal.simulate.modes.label import Label
 from tyrecal.simulate.modes.loaded import Member
-from tyrecal.simulate.modes.mode import Label
 from tyrecal.studies.diagnose.diagnosis import Diagnosis, diagnose
 from tyrecal.studies.diagnose.evidence import explain, grid, refit, weigh
 from tyrecal.studies.diagnose.expansion import anchored, expand

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from tyrecal.simulate.modes.mode import Label
+from tyrecal.simulate.modes.label import Label
 from tyrecal.studies.diagnose.form_error import OTHERS, PERCENT, form_error
 
 from ..studies.form_error import FLOOR, LABELS, computed

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tyrecal.measured.measurement import Measurement
-from tyrecal.simulate.modes.mode import Label
+from tyrecal.simulate.modes.label import Label
 from tyrecal.studies.diagnose.observations import observe
 
 from ..chance import Chance

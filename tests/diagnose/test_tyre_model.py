@@ -16,7 +16,7 @@ from tyrecal.measured.tables import read_measurements
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator
 from tyrecal.simulate.evaluate.failure import DeckRefused
-from tyrecal.simulate.modes.mode import Label
+from tyrecal.simulate.modes.label import Label
 from tyrecal.studies.diagnose.add import add
 from tyrecal.studies.diagnose.diagnosis import diagnose
 from tyrecal.studies.diagnose.evidence import probabilities, weigh
@@ -33,8 +33,8 @@ from tyrecal.studies.diagnose.tyre_model import TyreModel, _key
 from tyrecal.studies.diagnose.uncertainties import DENSITY_PERCENT, PRESSURE_kPa, sources, values_of
 from tyrecal.studies.diagnose.verdict import decide
 from tyrecal.tyre.case import start_values
-from tyrecal.tyre.case.calibration import Uncertainty
-from tyrecal.tyre.case.section import Gauge
+from tyrecal.tyre.case.parts import Gauge
+from tyrecal.tyre.case.schema import Uncertainty
 from tyrecal.tyre.load import load_case
 from tyrecal.tyre.values import with_values
 

@@ -10,8 +10,8 @@ import pytest
 from tyrecal.measured.measurement import Measurement
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator
+from tyrecal.simulate.modes.label import Label
 from tyrecal.simulate.modes.loaded import Member
-from tyrecal.simulate.modes.mode import Label
 from tyrecal.studies.diagnose.under_load import LoadedRow, UnderLoad, compare
 from tyrecal.studies.footprint import footprint_row
 from tyrecal.studies.loaded import LoadedTyre, load_tyres

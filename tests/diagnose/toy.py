@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tyrecal.simulate.modes.mode import Label
+from tyrecal.simulate.modes.label import Label
 from tyrecal.studies.diagnose.expansion import Expansion, expand
 from tyrecal.studies.diagnose.inverse_problem import Assumed, InverseProblem, Toggle, places
 from tyrecal.studies.diagnose.model import Answer, Query, Span

@@ -11,8 +11,7 @@ import numpy as np
 from tyrecal.simulate.deck.decks import Decks
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
-from tyrecal.simulate.modes.label import paired_labels
-from tyrecal.simulate.modes.mode import Label
+from tyrecal.simulate.modes.label import Label, paired_labels
 from tyrecal.tyre.case import LoadedCase, start_values
 from tyrecal.tyre.load import load_case
 from tyrecal.tyre.values import with_values

@@ -12,10 +12,9 @@ from scipy.spatial import cKDTree
 from tyrecal.simulate.deck.decks import Decks
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
-from tyrecal.simulate.modes.mode import Label
+from tyrecal.simulate.modes.label import Label
 from tyrecal.tyre.case import LoadedCase
-from tyrecal.tyre.case.materials import Cord
-from tyrecal.tyre.case.section import Gauge, RebarLayer
+from tyrecal.tyre.case.parts import Cord, Gauge, RebarLayer
 from tyrecal.tyre.effects import catalogue
 from tyrecal.tyre.load import load_case
 from tyrecal.tyre.resolve import resolved

@@ -16,7 +16,7 @@ from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.simulate.evaluate.failure import DeckRefused
 from tyrecal.simulate.evaluate.results import Evaluation
 from tyrecal.simulate.evaluate.store import Store
-from tyrecal.simulate.modes.mode import Label
+from tyrecal.simulate.modes.label import Label
 from tyrecal.studies.modes import modes_result
 from tyrecal.tyre.case import LoadedCase
 from tyrecal.tyre.load import load_case

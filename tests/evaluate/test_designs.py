@@ -13,7 +13,7 @@ from tyrecal.simulate.deck.decks import Decks
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.tyre.case import start_values, with_level
-from tyrecal.tyre.case.analysis import SolverChoice
+from tyrecal.tyre.case.schema import SolverChoice
 from tyrecal.tyre.effects import catalogue
 from tyrecal.tyre.load import load_case
 from tyrecal.tyre.values import with_values

@@ -9,7 +9,7 @@ import numpy as np
 from tyrecal.simulate.evaluate.evaluator import Question
 from tyrecal.simulate.evaluate.failure import DeckRefused, EvaluationFailed
 from tyrecal.simulate.evaluate.results import Evaluation, HarmonicShape, RawMode
-from tyrecal.simulate.modes.mode import Label
+from tyrecal.simulate.modes.label import Label
 
 WIDTH = np.linspace(-0.08, 0.08, 9)
 POINTS = np.stack([np.full(9, 0.39), WIDTH], 1)

@@ -14,7 +14,7 @@ from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator
 from tyrecal.simulate.evaluate.store import Store
 from tyrecal.tyre.case import LoadedCase, start_values, with_level
-from tyrecal.tyre.case.calibration import TargetFootprint, TargetMode
+from tyrecal.tyre.case.schema import TargetFootprint, TargetMode
 from tyrecal.tyre.load import load_case
 
 from ..conftest import CASES

@@ -12,8 +12,7 @@ from tyrecal.errors import InputError
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.simulate.evaluate.failure import DeckRefused, EvaluationFailed
-from tyrecal.simulate.modes.label import paired_labels
-from tyrecal.simulate.modes.mode import Label
+from tyrecal.simulate.modes.label import Label, paired_labels
 from tyrecal.studies.fit.calibrate import calibrate
 from tyrecal.studies.fit.differences import differences
 from tyrecal.studies.fit.problem import Problem, Target, objective, objective_unit

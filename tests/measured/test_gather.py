@@ -14,7 +14,7 @@ from tyrecal.measured.gather import _entry, gather, result
 from tyrecal.measured.labels import Judged
 from tyrecal.measured.modal import Layout
 from tyrecal.measured.sensors import MeasuredMode
-from tyrecal.simulate.modes.mode import Label
+from tyrecal.simulate.modes.label import Label
 
 from ..chance import generator
 from .test_universal import function, shape, write

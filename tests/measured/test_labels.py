@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from tyrecal.measured.labels import Judged, Labeller
 from tyrecal.measured.modal import LabelledMode, _labelled, settled
 from tyrecal.measured.sensors import MeasuredMode, Sensors, real_part
-from tyrecal.simulate.modes.mode import Label
+from tyrecal.simulate.modes.label import Label
 
 from ..chance import Chance, generator
 from .tyres import HIGHEST, layout, measured, modes, noted

@@ -11,7 +11,7 @@ from scipy.stats import t
 from tyrecal.errors import InputError
 from tyrecal.measured.measurement import Measurement, measurements_csv
 from tyrecal.measured.repeats import combined
-from tyrecal.simulate.modes.mode import Label
+from tyrecal.simulate.modes.label import Label
 
 from ..chance import Chance
 

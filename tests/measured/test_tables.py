@@ -13,7 +13,7 @@ from tyrecal.errors import InputError
 from tyrecal.measured.measurement import Measurement, measurements_csv
 from tyrecal.measured.repeats import combined
 from tyrecal.measured.tables import read_table
-from tyrecal.simulate.modes.mode import Label
+from tyrecal.simulate.modes.label import Label
 
 AXIAL = Label(0, 0, "axial")
 PLAIN = "c,m,kind,pressure [kPa],frequency [Hz]\n0,0,axial,240,31.7\n2,1,,240,66.1\n"

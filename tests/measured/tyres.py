@@ -11,8 +11,7 @@ from tyrecal.measured.sensors import Sensors
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.simulate.evaluate.results import HarmonicShape
-from tyrecal.simulate.modes.label import paired_labels
-from tyrecal.simulate.modes.mode import Mode
+from tyrecal.simulate.modes.label import Mode, paired_labels
 from tyrecal.tyre.load import load_case
 from tyrecal.tyre.values import with_values
 

@@ -5,7 +5,7 @@ import pytest
 
 from tyrecal.simulate.evaluate.results import HarmonicShape, RawMode
 from tyrecal.simulate.modes.follow import follow
-from tyrecal.simulate.modes.mode import Label, Mode
+from tyrecal.simulate.modes.label import Label, Mode
 from tyrecal.simulate.modes.rings import harmonic_of, on_rings
 
 from ..chance import generator

@@ -7,8 +7,7 @@ from hypothesis import strategies as st
 from numpy.polynomial.legendre import legval
 
 from tyrecal.simulate.evaluate.results import HarmonicShape, RawMode, RingShape
-from tyrecal.simulate.modes.label import belt_motion, label_modes, pair_rings
-from tyrecal.simulate.modes.mode import Label
+from tyrecal.simulate.modes.label import Label, belt_motion, label_modes, pair_rings
 from tyrecal.simulate.modes.rings import on_rings
 
 from ..chance import generator

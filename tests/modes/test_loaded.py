@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from tyrecal.simulate.evaluate.results import HarmonicShape, RawMode, RingShape
+from tyrecal.simulate.modes.label import Label, Mode
 from tyrecal.simulate.modes.loaded import (
     SYMMETRIES,
     Member,
@@ -19,7 +20,6 @@ from tyrecal.simulate.modes.loaded import (
     rings,
     state,
 )
-from tyrecal.simulate.modes.mode import Label, Mode
 
 Array = np.ndarray
 NODES = np.array([3, 5, 7])

@@ -3,8 +3,8 @@ import pytest
 
 from tyrecal.simulate.evaluate.failure import EvaluationFailed
 from tyrecal.simulate.evaluate.results import HarmonicShape, RawMode
+from tyrecal.simulate.modes.label import Label, Mode
 from tyrecal.simulate.modes.match import margin, match
-from tyrecal.simulate.modes.mode import Label, Mode
 
 RAW = RawMode(1.0, HarmonicShape(0, np.empty(0), np.empty((0, 2)), np.empty((0, 3))), 1)
 AXIAL, TORSIONAL = Label(0, 0, "axial"), Label(0, 0, "torsional")

@@ -5,9 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from tyrecal.simulate.modes.label import label_modes
+from tyrecal.simulate.modes.label import Label, label_modes
 from tyrecal.simulate.modes.match import margin, match
-from tyrecal.simulate.modes.mode import Label
 
 from ..studies.labels import evaluate
 

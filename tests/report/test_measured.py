@@ -10,7 +10,7 @@ from tyrecal.measured.labels import Judged
 from tyrecal.measured.modal import LabelledMode, ModalTest
 from tyrecal.measured.sensors import MeasuredMode, Sensors
 from tyrecal.report.measured import measured_table
-from tyrecal.simulate.modes.mode import Label
+from tyrecal.simulate.modes.label import Label
 
 
 @pytest.mark.parametrize("name", ["[run].uff", "[bold].uff", "run [2].uff"])

@@ -18,8 +18,7 @@ from tyrecal.report.shapes import draw_mode, draw_modes_overview, title
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.simulate.evaluate.results import Evaluation
-from tyrecal.simulate.modes.label import label_modes
-from tyrecal.simulate.modes.mode import Label, Mode
+from tyrecal.simulate.modes.label import Label, Mode, label_modes
 from tyrecal.tyre.case import LoadedCase, start_values
 from tyrecal.tyre.load import load_case
 from tyrecal.tyre.resolve import resolved

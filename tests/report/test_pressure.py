@@ -11,7 +11,7 @@ from tyrecal.report import pressure
 from tyrecal.report.figure import save
 from tyrecal.report.pressure import draw_pressure_sweep
 from tyrecal.report.table import shown
-from tyrecal.simulate.modes.mode import Label
+from tyrecal.simulate.modes.label import Label
 from tyrecal.studies.pressure_findings import PressureFindings
 from tyrecal.studies.pressure_result import PressureRow, PressureSweep
 

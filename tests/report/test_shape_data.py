@@ -16,8 +16,7 @@ from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate import evaluator as door_module
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.simulate.evaluate.results import HarmonicShape
-from tyrecal.simulate.modes.label import paired_labels
-from tyrecal.simulate.modes.mode import Mode
+from tyrecal.simulate.modes.label import Mode, paired_labels
 from tyrecal.studies.footprint import press
 from tyrecal.studies.patch import patch_of
 from tyrecal.tyre.case import start_values

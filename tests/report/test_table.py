@@ -10,9 +10,8 @@ import pytest
 from rich.console import Console
 from rich.table import Table
 
-from tyrecal.report.table import shown
-from tyrecal.report.words import fit_doubts, tyre_doubts
-from tyrecal.simulate.modes.mode import Label
+from tyrecal.report.table import fit_doubts, shown, tyre_doubts
+from tyrecal.simulate.modes.label import Label
 from tyrecal.studies.fit.result import FitResult
 from tyrecal.studies.modes import ModesResult
 

@@ -18,7 +18,7 @@ from tyrecal.report.pressure import draw_pressure_sweep
 from tyrecal.report.section import draw_section
 from tyrecal.report.shape_data import section_data
 from tyrecal.report.signature import draw_signature
-from tyrecal.simulate.modes.mode import Label
+from tyrecal.simulate.modes.label import Label
 from tyrecal.studies.loaded_result import LoadRow
 from tyrecal.studies.pressure_result import PressureRow
 from tyrecal.studies.signature import Signature

@@ -11,7 +11,7 @@ import pytest
 from tyrecal.errors import InputError
 from tyrecal.report.vtu import write_vtu
 from tyrecal.simulate.evaluate.results import HarmonicShape, RawMode, RingShape
-from tyrecal.simulate.modes.mode import Label, Mode
+from tyrecal.simulate.modes.label import Label, Mode
 from tyrecal.tyre.section.mesh import SectionMesh, build_mesh
 from tyrecal.tyre.section.section import read_section
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from tyrecal.report.words import fit_doubts, fit_verdict
+from tyrecal.report.table import fit_doubts, fit_verdict
 
 
 def fit(**changes: Any) -> dict[str, Any]:

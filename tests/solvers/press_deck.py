@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from tyrecal.simulate.deck.calculix import calculix_context
-from tyrecal.simulate.deck.header import header
+from tyrecal.simulate.deck.decks import header
 from tyrecal.simulate.deck.sector import Sector
 from tyrecal.tyre.case import LoadedCase
 from tyrecal.tyre.resolve import resolved

@@ -34,9 +34,8 @@ from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.simulate.evaluate.failure import EvaluationFailed
 from tyrecal.simulate.evaluate.results import HarmonicShape
 from tyrecal.simulate.evaluate.store import Store
-from tyrecal.simulate.modes.label import label_modes
+from tyrecal.simulate.modes.label import Label, Mode, label_modes
 from tyrecal.simulate.modes.match import match
-from tyrecal.simulate.modes.mode import Label, Mode
 from tyrecal.simulate.modes.subspace import mac
 from tyrecal.tyre import resolve
 from tyrecal.tyre.case import LoadedCase

@@ -18,11 +18,11 @@ import numpy as np
 from tests.conftest import CASES
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator
-from tyrecal.simulate.modes.mode import Label
+from tyrecal.simulate.modes.label import Label
 from tyrecal.studies.diagnose.model import Answer, Query
 from tyrecal.studies.diagnose.tyre_model import TyreModel
 from tyrecal.tyre.case import LoadedCase
-from tyrecal.tyre.case.section import Level
+from tyrecal.tyre.case.parts import Level
 from tyrecal.tyre.load import load_case
 
 PRESSURES = (160.0, 240.0, 320.0)

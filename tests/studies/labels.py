@@ -27,8 +27,7 @@ from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.simulate.evaluate.failure import EvaluationFailed
 from tyrecal.simulate.evaluate.results import HarmonicShape, RawMode, RingShape
-from tyrecal.simulate.modes.label import label_modes, pair_rings
-from tyrecal.simulate.modes.mode import Label, Mode
+from tyrecal.simulate.modes.label import Label, Mode, label_modes, pair_rings
 from tyrecal.simulate.modes.rings import on_rings
 from tyrecal.tyre.load import load_case
 

@@ -7,13 +7,12 @@ from pathlib import Path
 import pytest
 
 from tyrecal.simulate.deck.decks import Decks
-from tyrecal.simulate.deck.dialects import fine_enough
-from tyrecal.simulate.deck.tyre_design import TyreDesign
+from tyrecal.simulate.deck.tyre_design import TyreDesign, fine_enough
 from tyrecal.simulate.evaluate.evaluator import Evaluator
 from tyrecal.simulate.evaluate.failure import DeckRefused, EvaluationFailed
 from tyrecal.simulate.evaluate.store import Store
+from tyrecal.simulate.modes.label import Label
 from tyrecal.simulate.modes.loaded import SYMMETRIES, Member
-from tyrecal.simulate.modes.mode import Label
 from tyrecal.studies.loaded import Loaded, LoadedMode, LoadedTyre, load_tyres
 from tyrecal.studies.loaded_result import findings, load_sweep_result, loaded_modes_result
 from tyrecal.tyre.load import load_case

@@ -11,8 +11,7 @@ import pytest
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator
 from tyrecal.simulate.evaluate.results import HarmonicShape, RawMode
-from tyrecal.simulate.modes.label import label_modes
-from tyrecal.simulate.modes.mode import Label
+from tyrecal.simulate.modes.label import Label, label_modes
 from tyrecal.studies.fitted import InputError, pressure_name, read_fitted
 from tyrecal.studies.pressure import State, sweep
 from tyrecal.studies.pressure_findings import findings

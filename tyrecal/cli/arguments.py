@@ -69,7 +69,7 @@ def parse_loads(text: str, option: str = "--loads-N", zero: bool = False) -> lis
     """Loads in N; ``zero``: 0 may be the first. Raises click.UsageError."""
     from itertools import pairwise
 
-    from ..tyre.case.analysis import LARGEST_LOAD_N, LEAST_LOAD_N
+    from ..tyre.case.schema import LARGEST_LOAD_N, LEAST_LOAD_N
 
     loads: list[float] = []
     for word in text.split(","):

@@ -82,8 +82,7 @@ def command(
     tyrecal fit cases/p235_75r17.yaml --starts 20 --seed 1 --jobs 2
     tyrecal fit cases/p235_75r17.yaml --starts 20 --seed 1 --scheduler tcp://10.0.0.1:8786
     """
-    from ..report.table import shown
-    from ..report.words import fit_doubts, fit_verdict, tyre_doubts
+    from ..report.table import fit_doubts, fit_verdict, shown, tyre_doubts
     from ..simulate.evaluate.queue import reached
     from ..studies.fit.calibrate import calibrate, check, history_csv
     from ..studies.fit.problem import Problem, objective_unit

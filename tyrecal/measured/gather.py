@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
-from ..simulate.modes.mode import Label
+from ..simulate.modes.label import Label
 from .measurement import Measurement
 from .modal import LabelledMode, Layout, ModalTest, measurements_of, read_modal_test
 from .repeats import FLOOR, combined

@@ -23,8 +23,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.polynomial.legendre import legvander
 
-from ..simulate.modes.label import AXIAL_COLUMN, BELT, COLUMNS, DEGREE, HIGHEST_HARMONIC, PARITY
-from ..simulate.modes.mode import Label
+from ..simulate.modes.label import (
+    AXIAL_COLUMN,
+    BELT,
+    COLUMNS,
+    DEGREE,
+    HIGHEST_HARMONIC,
+    PARITY,
+    Label,
+)
 from .sensors import Sensors
 
 Array = np.ndarray

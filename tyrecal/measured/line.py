@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from math import isfinite, nan
 
-from ..simulate.modes.mode import Label
+from ..simulate.modes.label import Label
 from ..units import QUANTITIES
 from .columns import TableColumn
 from .measurement import Measurement

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from math import nan
 
-from ..simulate.modes.mode import Label
+from ..simulate.modes.label import Label
 from ..tyre.usual import USUAL_MEASUREMENTS
 
 CSV_COLUMNS = ("quantity", "c", "m", "kind", "member", "pressure_kPa", "load_N", "value", "sigma")

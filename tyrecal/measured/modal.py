@@ -10,8 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..errors import InputError
-from ..simulate.modes.label import BELT, HIGHEST_HARMONIC, TAKES_PART
-from ..simulate.modes.mode import Label
+from ..simulate.modes.label import BELT, HIGHEST_HARMONIC, TAKES_PART, Label
 from .geometry import sensors_of
 from .identify import FORMS, Responses, identify
 from .labels import Judged, Labeller

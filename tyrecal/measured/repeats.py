@@ -19,7 +19,7 @@ from math import isnan
 import numpy as np
 
 from ..errors import InputError
-from ..simulate.modes.mode import Label
+from ..simulate.modes.label import Label
 from ..tyre.usual import LARGEST_SIGMA
 from .measurement import Measurement, MeasurementKey
 

@@ -8,9 +8,9 @@ from math import hypot
 from pathlib import Path
 
 from ..errors import InputError
-from ..simulate.modes.mode import Label
+from ..simulate.modes.label import Label
 from ..tyre.case import LoadedCase
-from ..tyre.case.calibration import MEASURED_SIGMA, TargetFootprint, TargetMode, Targets
+from ..tyre.case.schema import MEASURED_SIGMA, TargetFootprint, TargetMode, Targets
 from .measurement import Measurement
 from .tables import read_measurements
 

@@ -12,7 +12,7 @@ from ..studies.diagnose.study import DiagnosedCase
 from ..studies.diagnose.under_load import LoadedRow
 from ..studies.diagnose.verdict import NAMED, NO_GAP, UNDECIDED
 from ..units import in_engineers_units, said
-from .words import map_resolution
+from .table import map_resolution
 
 RUNGS = {
     1: "consistent with the data it was fitted to; no more than that",

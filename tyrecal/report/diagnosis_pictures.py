@@ -8,7 +8,7 @@ from textwrap import fill
 import numpy as np
 from matplotlib.figure import Figure
 
-from ..simulate.modes.mode import Label
+from ..simulate.modes.label import Label
 from ..studies.diagnose.diagnosis import Diagnosis
 from ..studies.diagnose.evidence import NONE, OUTSIDE
 from ..studies.diagnose.gap import family

@@ -7,8 +7,8 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
+from ..simulate.modes.label import FAMILIES, Label
 from ..simulate.modes.loaded import SYMMETRIES
-from ..simulate.modes.mode import FAMILIES, Label
 from ..studies.loaded_result import LoadRow
 from .figure import COLOURS, MARKERS, in_house_style, new_figure
 from .pressure import GAP, name_lines

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..simulate.modes.label import BELT
-from ..simulate.modes.mode import Label
+from ..simulate.modes.label import BELT, Label
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

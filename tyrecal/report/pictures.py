@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from ..simulate.evaluate.results import Evaluation
-from ..simulate.modes.mode import Label, Mode
+from ..simulate.modes.label import Label, Mode
 from ..tyre.case import LoadedCase
 from ..tyre.resolve import resolved
 from ..tyre.values import with_values

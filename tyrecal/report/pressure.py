@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ..simulate.modes.mode import FAMILIES, Label
+from ..simulate.modes.label import FAMILIES, Label
 from ..studies.pressure_result import PressureRow
 from .figure import COLOURS, GREY, MARKERS, in_house_style, new_figure
 

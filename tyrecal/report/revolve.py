@@ -14,7 +14,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..simulate.evaluate.results import Evaluation, HarmonicShape, RawMode
-from ..simulate.modes.mode import Mode
+from ..simulate.modes.label import Mode
 from ..simulate.modes.rings import on_rings
 from ..tyre.section.mesh import SectionMesh
 

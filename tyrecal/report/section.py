@@ -19,7 +19,7 @@ from matplotlib.patches import Patch
 from ..studies.diagnose.where import PartChange
 from .figure import COLOURS, GREY, RUBBER, headline, in_house_style, new_figure
 from .shape_data import DiagnosisSection, Flat, SectionData
-from .words import MINUS, map_resolution
+from .table import MINUS, map_resolution
 
 Array = np.ndarray
 

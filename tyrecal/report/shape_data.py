@@ -10,8 +10,8 @@ from pydantic import Field
 
 from ..simulate.evaluate.pressed import Pressed
 from ..simulate.evaluate.results import Evaluation, HarmonicShape
+from ..simulate.modes.label import Mode
 from ..simulate.modes.loaded import MIRROR
-from ..simulate.modes.mode import Mode
 from ..studies.loaded import LoadedTyre
 from ..studies.patch import patch_of
 from ..studies.result import Named, Result, ResultPart, Wave

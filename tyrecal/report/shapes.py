@@ -14,7 +14,7 @@ from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 from matplotlib.tri import Triangulation
 
-from ..simulate.modes.mode import Mode
+from ..simulate.modes.label import Mode
 from ..tyre.section.mesh import SectionMesh
 from .figure import COLOUR_MAP, COLOURS, in_house_style, new_figure, save
 from .revolve import motion, skin, swept

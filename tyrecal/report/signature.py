@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from ..studies.signature import Signature
 from ..tyre.effects import catalogue
 from .figure import COLOURS, GREY, headline, in_house_style, new_figure
-from .words import MINUS
+from .table import MINUS
 
 BAR = 0.38
 

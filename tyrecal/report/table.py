@@ -1,4 +1,4 @@
-"""Tables for a terminal."""
+"""Modes, and doubts about a fit, in an engineer's words; tables for a terminal."""
 
 from __future__ import annotations
 
@@ -9,10 +9,143 @@ from rich import box
 from rich import table as rich
 from rich.text import Text
 
+from ..simulate.modes.label import Label
 from ..studies.result import Cell, Column, Deviation, Table
-from .words import CLOSE, FAR
+from ..tyre.usual import USUAL_MEASUREMENTS
 
+CLOSE, FAR = 2.0, 5.0  # % of deviation from a target
+MINUS = "\N{MINUS SIGN}"
+MAX_RELATIVE_ERROR = 0.5  # standard error over the value, above which a variable is not determined
+SAME_RATIO = 1.02  # of an objective, or a variable, up to which two fits are one
+MAX_OFF = 30.0  # % after a fit: no tyre is that far from its model
+MIN_FREQUENCY_HZ = 1.0  # no mode of a tyre is below
 EMPTY_CELL = "-"
+
+
+def nearness(modes: Sequence[Mapping[str, Any]]) -> str:
+    """How near the fitted frequencies (``modes`` of fit.json) come to their targets."""
+    near = [mode for mode in modes if abs(mode["deviation_percent"]) <= CLOSE]
+    worst = max(modes, key=lambda mode: abs(mode["deviation_percent"]))
+    twice = [mode["deviation_percent"] for mode in modes for _ in range(mode["multiplicity"])]
+    rms = (sum(x * x for x in twice) / len(twice)) ** 0.5
+    name = f"[{worst['c']},{worst['m']}] {Label(worst['c'], worst['m'], worst['kind']).motion}"
+    return (
+        f"{len(near)} of {len(modes)} frequencies come within {CLOSE:g} % of their targets (rms"
+        f" {rms:.1f} %); farthest off is {name} with {worst['deviation_percent']:+.1f} %"
+    )
+
+
+def fit_verdict(result: Mapping[str, Any]) -> list[str]:
+    """What the content of fit.json amounts to, in sentences; doubts aside, see `fit_doubts`."""
+    ended = "Converged" if result["converged"] else "Ended"
+    words = [f"{ended} at {result['pressure_kPa']:g} kPa, {result['mass_kg']:.2f} kg."]
+    if result["modes"]:
+        words.append(f"{nearness(result['modes'])}.")
+    freedom = sum(mode["multiplicity"] for mode in result["modes"])
+    freedom += len(result.get("footprint", ())) - len(result["variables"])
+    if result["objective_unit"] == "sigma" and freedom > 0:
+        words.append(
+            f"chi2 per degree of freedom is {result['objective_Hz'] ** 2 / freedom:.3g}: about 1"
+            " where the targets' sigmas explain what is left."
+        )
+    if len(result["starts"]) > 1:
+        words.append(_starts(result))
+    return words
+
+
+def _starts(result: Mapping[str, Any]) -> str:
+    """Whether the fits from several starts found one and the same."""
+    starts, best = result["starts"], result["objective_Hz"]
+    alike = [start for start in starts if start["objective_Hz"] <= SAME_RATIO * best + 1e-9]
+    spread = {
+        name: max(abs(start["values"][name] / v["value"] - 1) for start in alike)
+        for name, v in result["variables"].items()
+        if v["value"]
+    }
+    far, share = max(spread.items(), key=lambda item: item[1], default=("", 0.0))
+    if share > SAME_RATIO - 1:
+        return (
+            f"{len(alike)} of {len(starts)} starts reach this objective, but with {far} up to"
+            f" {100 * share:.0f} % apart: other designs serve as well."
+        )
+    others = [start["objective_Hz"] for start in starts if start not in alike]
+    if others:
+        unit = result["objective_unit"]
+        return (
+            f"{len(alike)} of {len(starts)} starts end here, the others at {min(others):.2f} {unit}"
+            " or more."
+        )
+    return f"All {len(starts)} starts end here."
+
+
+def tyre_doubts(result: Mapping[str, Any]) -> list[str]:
+    """What no tyre has of ``mass_kg`` and ``modes`` of a result."""
+    doubts = []
+    if message := USUAL_MEASUREMENTS["mass_kg"].refusal(result["mass_kg"]):
+        doubts.append(
+            f"the tyre weighs {result['mass_kg']:.4g} kg, {message.partition(';')[0]}: are"
+            " densities and areas of cords in the units of their keys?"
+        )
+    slowest = min((mode["frequency_Hz"] for mode in result["modes"]), default=MIN_FREQUENCY_HZ)
+    if slowest < MIN_FREQUENCY_HZ:
+        doubts.append(
+            f"a mode is at {slowest:.3g} Hz, lower than any tyre's: are all stiffnesses and"
+            " compliances in the units of their keys?"
+        )
+    return doubts
+
+
+def fit_doubts(result: Mapping[str, Any]) -> list[str]:
+    """What the user of a fit (the content of fit.json) must not overlook."""
+    doubts = []
+    if not result["moved"]:
+        doubts.append("THE FIT DID NOT MOVE: every variable ended where it started")
+    if not result["converged"]:
+        doubts.append(
+            f"not converged: {result['message']}; projected gradient"
+            f" {result['projected_gradient_norm']:.3g} {result['objective_unit']}"
+        )
+    for name, variable in result["variables"].items():
+        if variable["at_bound"]:
+            seen = variable["standard_error"] is not None
+            why = "the data want it beyond" if seen else "the data do not see it"
+            doubts.append(f"{name} ended at a bound: {why}")
+        elif variable["standard_error"] is None:
+            doubts.append(f"the data do not determine {name}: fix it, or add targets")
+        elif variable["standard_error"] > MAX_RELATIVE_ERROR * abs(variable["value"]):
+            share = 100 * variable["standard_error"] / max(abs(variable["value"]), 1e-300)
+            doubts.append(f"the data hardly determine {name}: its standard error is {share:.0f} %")
+    if failed := result["failed_evaluations"]:
+        designs = "1 design" if failed == 1 else f"{failed} designs"
+        doubts.append(f"{designs} could not be evaluated; the search stepped back")
+    if result["label_margin"] < 0.3:
+        doubts.append(
+            f"a mode is hard to name (margin {result['label_margin']:.2f} of 1): two modes have"
+            " met; look at their pictures"
+        )
+    far = [mode for mode in result["modes"] if abs(mode["deviation_percent"] or 0) > MAX_OFF]
+    if 2 * len(far) > len(result["modes"]):
+        doubts.append(
+            f"most modes are still more than {MAX_OFF:g} % off: are the targets in Hz, with the"
+            " right labels, at this pressure?"
+        )
+    values = result["singular_values"]
+    if values and values[-1] < 1e-3 * values[0]:
+        doubts.append("the data do not determine all variables: see singular_values in fit.json")
+    return doubts
+
+
+def map_resolution(combinations: int) -> str:
+    """What the map on the section can show: its effective rank in words."""
+    if not combinations:
+        return (
+            "A change of 20 % in stiffness or 10 % in mass of any parts would stay within the"
+            " scatter of these data: the map is a hint at most, of a larger change of one part."
+        )
+    return (
+        f"The data see {combinations} independent combination{'s' if combinations > 1 else ''} of"
+        " parts (changes of 20 % in stiffness, 10 % in mass, beyond their scatter)."
+    )
 
 
 def shown(table: Table, *sections: Table) -> rich.Table:

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..files import whole
 from ..simulate.evaluate.pressed import Footprint, Pressed
-from ..simulate.modes.mode import Mode
+from ..simulate.modes.label import Mode
 from ..tyre.section.mesh import SectionMesh
 from .revolve import cartesian, corners, motion, swept
 

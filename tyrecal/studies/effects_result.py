@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 from pydantic import Field, model_validator
 
-from ..simulate.modes.mode import Label
+from ..simulate.modes.label import Label
 from .result import Column, PositiveNumber, Provenance, Result, ResultPart, Table, Wave
 
 

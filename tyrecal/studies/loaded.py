@@ -11,8 +11,8 @@ from ..simulate.evaluate.evaluator import Evaluator, Question
 from ..simulate.evaluate.failure import DeckRefused, EvaluationFailed
 from ..simulate.evaluate.pressed import Pressed
 from ..simulate.modes.find import Found, find_modes
+from ..simulate.modes.label import Label, Mode
 from ..simulate.modes.loaded import Member, Rings, follow, members, rings, state
-from ..simulate.modes.mode import Label, Mode
 from ..tyre.case import LoadedCase
 from .fit.problem import read_targets
 

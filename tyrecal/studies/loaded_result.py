@@ -9,8 +9,8 @@ from typing import Any
 from pydantic import Field
 
 from ..simulate.evaluate.evaluator import Evaluator
+from ..simulate.modes.label import Label
 from ..simulate.modes.loaded import SYMMETRIES
-from ..simulate.modes.mode import Label
 from ..tyre.case import LoadedCase
 from .loaded import Loaded, LoadedMode, LoadedTyre, LoadOutcome, load_tyres, progress
 from .modes import ModesFindings, ModesResult

@@ -9,7 +9,7 @@ from pydantic import Field
 
 from ..simulate.evaluate.results import Evaluation
 from ..simulate.modes.find import labelled
-from ..simulate.modes.mode import Mode
+from ..simulate.modes.label import Mode
 from ..tyre.case import LoadedCase
 from .result import NAME_COLUMNS, Column, ModeEntry, Result, ResultPart, Table
 

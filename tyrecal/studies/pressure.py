@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from ..simulate.evaluate.evaluator import Evaluator, Question
 from ..simulate.evaluate.failure import DeckRefused, EvaluationFailed
 from ..simulate.modes.find import Found, find_modes, labelled
-from ..simulate.modes.mode import Label, Mode
+from ..simulate.modes.label import Label, Mode
 from ..tyre.case import LoadedCase
 from .fit.problem import read_targets
 from .fitted import pressure_name

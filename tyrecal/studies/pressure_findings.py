@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import Field
 
 from ..simulate.modes.follow import follow
-from ..simulate.modes.mode import FAMILIES, Label
+from ..simulate.modes.label import FAMILIES, Label
 from .pressure import State
 from .result import ResultPart
 

@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from ..simulate.evaluate.evaluator import Evaluator
-from ..simulate.modes.mode import Label
+from ..simulate.modes.label import Label
 from ..tyre.case import LoadedCase
 from .fit.problem import read_targets
 from .modes import mode_entry

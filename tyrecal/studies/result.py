@@ -16,7 +16,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from ..files import json_text
 from ..simulate.evaluate.failure import EvaluationFailed
-from ..simulate.modes.mode import Label
+from ..simulate.modes.label import Label
 
 PositiveNumber = Annotated[float, Field(gt=0)]
 Wave = Annotated[int, Field(ge=0, le=200)]

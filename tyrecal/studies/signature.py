@@ -11,8 +11,7 @@ import numpy as np
 from ..simulate.evaluate.evaluator import Evaluator, Question
 from ..simulate.evaluate.failure import EvaluationFailed
 from ..simulate.evaluate.results import Evaluation
-from ..simulate.modes.label import paired_labels
-from ..simulate.modes.mode import Label, Mode
+from ..simulate.modes.label import Label, Mode, paired_labels
 from ..tyre.case import LoadedCase
 from ..tyre.effects import catalogue
 from .fit.problem import read_targets

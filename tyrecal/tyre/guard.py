@@ -11,11 +11,10 @@ from dataclasses import replace
 from math import sqrt
 from typing import TYPE_CHECKING, Any
 
-from .case.calibration import MEASURED_SIGMA as SIGMAS
-from .case.checks import at, find
-from .case.meshable import Problems
+from .case.checks import Problems, at, find
 from .case.mistakes import Keys, dotted
 from .case.parts import number
+from .case.schema import MEASURED_SIGMA as SIGMAS
 from .case.shape import entries, table
 from .effects import catalogue
 from .plugins import IDS

@@ -9,13 +9,11 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from .case.calibration import cannot_fit
-from .case.checks import problems
+from .case.checks import folds, problems
 from .case.document import Document, read_document
 from .case.loaded import LoadedCase
-from .case.meshable import folds
 from .case.mistakes import CaseError, Keys, Mistake, dotted
-from .case.schema import Case
+from .case.schema import Case, cannot_fit
 from .case.shape import disagreements, explain, without
 from .case.stations import check_templates, read_stations
 from .effects import EffectRefused

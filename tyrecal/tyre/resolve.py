@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
 from .case import Case, LoadedCase
-from .case.materials import Rubber
+from .case.parts import Rubber
 from .effects import EffectRefused, catalogue
 from .plugins import IDS
 from .section.gauges import with_gauges

@@ -9,9 +9,8 @@ from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
-from .case.checks import at, find, problems
+from .case.checks import at, find, folds, problems
 from .case.loaded import LoadedCase
-from .case.meshable import folds
 from .case.mistakes import Keys, dotted, suggestion
 from .case.schema import Case
 from .case.shape import explain

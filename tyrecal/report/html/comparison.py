@@ -9,7 +9,7 @@ from typing import TypeVar
 
 from ...studies.diagnose.summary import DiagnosisResult
 from ...studies.fit.result import ROAD_QUANTITIES, FitResult, FittedMode
-from ..words import CLOSE, FAR, MINUS
+from ..table import CLOSE, FAR, MINUS
 from .results import Results
 from .summary import VERDICT_WORDS
 

@@ -33,7 +33,7 @@ from ..load import draw_load_sweep
 from ..pressure import draw_pressure_sweep
 from ..section import draw_section, draw_section_map
 from ..shape_data import Shapes
-from ..words import CLOSE, FAR, MINUS, fit_doubts, map_resolution
+from ..table import CLOSE, FAR, MINUS, fit_doubts, map_resolution
 from .comparison import comparison
 from .markdown import html
 from .results import Results, read_results

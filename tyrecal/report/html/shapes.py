@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...simulate.modes.mode import Label
+from ...simulate.modes.label import Label
 from ..shape_data import Shape, Shapes
 
 INT16_MAX = 32767

@@ -11,7 +11,7 @@ from ...studies.fit.result import FitResult
 from ...studies.modes import ModesResult
 from ...studies.result import Result
 from ...units import said
-from ..words import nearness
+from ..table import nearness
 
 VERDICT_WORDS = {
     "named": "Named",

@@ -1,17 +1,33 @@
-"""The tyre as plain data for deck templates: numbers, names and element tables, nothing else."""
+"""The tyre as plain data for deck templates: numbers, names and element tables, nothing else.
+
+So is what moves beside it, rim and gas, and what sits at one place of its tread.
+"""
 
 from __future__ import annotations
 
 from functools import lru_cache
 from typing import Any
 
+import numpy as np
+
 from ...tyre.case import Case
-from ...tyre.case.analysis import Analysis
+from ...tyre.case.parts import Rim, Rubber
+from ...tyre.case.schema import Analysis
 from ...tyre.resolve import Tyre
 from ...tyre.section.mesh import SectionMesh
-from .nonuniform import attached, turning
-from .wheel_and_gas import frequency_rubber, gas_material, wheel
 
+FIRST_WHEEL_ELEMENT = 999_000_001  # beyond all that a revolve makes
+LOWEST_HZ, SHIFT = 1.0, -100.0  # of a free wheel's modes: above its rigid motions; 1/s2
+GAS = "CAVITY_GAS"
+ATMOSPHERE = 101_325.0  # Pa
+GASES = {  # specific gas constant (J/kg/K) and ratio of specific heats at 20 C
+    "air": (287.05, 1.400),
+    "helium": (2077.1, 1.667),
+    "sulphur_hexafluoride": (56.93, 1.094),
+}
+TABLE_HZ = np.geomspace(1.0, 1000.0, 13)
+FIRST_ATTACHED_ELEMENT = 999_100_001  # beyond all that a revolve makes
+AXES = {"radial": 1, "lateral": 2, "tangential": 3}  # of the revolved tyre in the plane Theta = 0
 REFERENCE_NODE, ROAD_NODE = 900001, 900002
 WELL_ELEMENT = 900001
 CLEARANCE = 0.05  # m from the section, not inflated, to the road
@@ -189,3 +205,133 @@ def _tables(
         "reference_r": reference[0],
         "reference_z": reference[1],
     }
+
+
+def aside(tyre: Tyre) -> dict[str, Any]:
+    """What no deck of keywords says: which surfaces hold the gas, whose frequency counts."""
+    request: dict[str, Any] = {}
+    if "frequency_modulus" in tyre.needs:
+        request["own_frequency"] = True
+    if "cavity" in tyre.needs:
+        request["cavity"] = {"material": GAS, "surfaces": ["CAVITY", "WELL"]}
+    if tyre.case.splice.share:
+        request["sector"] = {"job": "splice", "width_deg": tyre.case.splice.width_deg}
+    return request
+
+
+def wheel(rim: Rim) -> dict[str, Any]:
+    """The rim's point elements, which degrees of freedom stay held, and how to look for modes.
+
+    The axle is the second axis of the revolved tyre.
+    """
+    s = rim.spindle
+    compliances = {
+        (2,): ("LATERAL", s.lateral_m_per_N),
+        (1, 3): ("RADIAL", s.radial_m_per_N),
+        (5,): ("TORSIONAL", s.torsional_rad_per_N_m),
+        (4, 6): ("TILT", s.tilt_rad_per_N_m),
+    }
+    springs = [
+        {"name": f"SPINDLE_{name}_{dof}", "dof": dof, "stiffness": 1 / compliance}
+        for dofs, (name, compliance) in compliances.items()
+        for dof in dofs
+        if compliance
+    ]
+    numbered = [
+        {**spring, "element": FIRST_WHEEL_ELEMENT + 2 + i} for i, spring in enumerate(springs)
+    ]
+    moving = {spring["dof"] for spring in springs}
+    return {
+        "mass": {"element": FIRST_WHEEL_ELEMENT, "value": rim.mass_kg},
+        "inertia": {
+            "element": FIRST_WHEEL_ELEMENT + 1,
+            "polar": rim.polar_inertia_kg_m2,
+            "diametral": rim.diametral_inertia_kg_m2,
+        },
+        "springs": numbered,
+        "held": [] if rim.free else [dof for dof in range(1, 7) if dof not in moving],
+        "search": {"lowest": LOWEST_HZ, "shift": SHIFT} if rim.free else None,
+    }
+
+
+def gas_material(case: Case) -> dict[str, Any] | None:
+    """The share of an ideal gas: density p / (R T), adiabatic bulk modulus gamma p; p absolute."""
+    cavity = case.cavity
+    if not cavity.share:
+        return None
+    R, gamma = GASES[cavity.gas]
+    p = case.pressure_kPa * 1e3 + ATMOSPHERE
+    return {
+        "name": GAS,
+        "density": cavity.share * p / (R * (cavity.temperature_C + 273.15)),
+        "bulk_modulus": cavity.share * gamma * p,
+    }
+
+
+def frequency_rubber(m: Rubber, analysis: Analysis) -> dict[str, Any]:
+    """Constants of the inflated state as long-term ones, and the shear modulus over frequency:
+    G(f)/G0 = (f / f_ref)^beta times the Prony series' at the vibration frequency."""
+    shear, bulk = 1 - sum(t.g for t in m.prony), 1 - sum(t.k for t in m.prony)
+    static = (1.0, 1.0)
+    if m.moduli != analysis.static_moduli:
+        static = (1 / shear, 1 / bulk) if m.moduli == "long_term" else (shear, bulk)
+    level = 1.0
+    if analysis.vibration_frequency_Hz is not None:
+        squares = [(2 * np.pi * analysis.vibration_frequency_Hz * t.tau_s) ** 2 for t in m.prony]
+        dynamic = shear + sum(t.g * x / (1 + x) for t, x in zip(m.prony, squares, strict=True))
+        level = dynamic / (shear if analysis.static_moduli == "long_term" else 1.0)
+    return {
+        "kind": "rubber",
+        "C10": m.C10_Pa * static[0],
+        "C01": m.C01_Pa * static[0],
+        "D1": m.D1_per_Pa / static[1],
+        "moduli": "LONG TERM",
+        "prony": [],
+        "storage": [
+            {
+                "frequency": float(f),
+                "shear": 1 - float(level * (f / m.reference_frequency_Hz) ** m.frequency_exponent),
+            }
+            for f in TABLE_HZ
+        ],
+        "density": m.density_kg_per_m3,
+    }
+
+
+def attached(c: Case, mesh: SectionMesh) -> list[dict[str, Any]]:
+    """Mass and spring elements on nodes of the tread: name, keyword, elements, lines of data."""
+    groups: list[tuple[str, str, list[int], tuple[int, float] | None]] = []
+    number = FIRST_ATTACHED_ELEMENT
+    if c.point_mass.mass_kg:
+        groups.append(("POINT_MASS", "MASS", _nodes(mesh, c.point_mass.z_m, 0.0), None))
+    for direction, stiffness in c.road_spring.stiffnesses.items():
+        nodes = _nodes(mesh, 0.0, c.road_spring.width_m)
+        groups.append((f"ROAD_{direction.upper()}", "SPRING", nodes, (AXES[direction], stiffness)))
+    result = []
+    for name, keyword, nodes, spring in groups:
+        result.append(
+            {
+                "name": name,
+                "keyword": keyword,
+                "type": "SPRING1" if spring else "MASS",
+                "elements": [(number + i, node) for i, node in enumerate(nodes)],
+                "dof": spring[0] if spring else None,
+                "value": spring[1] / len(nodes) if spring else c.point_mass.mass_kg,
+            }
+        )
+        number += len(nodes)
+    return result
+
+
+def turning(c: Case, sets: list[str]) -> dict[str, Any] | None:
+    """Speed of a tyre that turns, rad/s, and the element sets that hold its mass."""
+    if not c.spin_rad_per_s:
+        return None
+    return {"omega": c.spin_rad_per_s, "omega2": c.spin_rad_per_s**2, "sets": sets}
+
+
+def _nodes(mesh: SectionMesh, z: float, width: float) -> list[int]:
+    """Nodes of the tread within half a width of a height; the nearest one at least."""
+    away = {node: abs(mesh.nodes[node][1] - z) for node in mesh.crown_outer}
+    nearest = min(away, key=lambda node: (away[node], node))
+    return [node for node in away if away[node] <= width / 2 or node == nearest]

@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any
 
 from ...files import NotAFile, open_file, own_folder, read_bytes, refuse_link, whole
-from ..deck.header import without_header
+from ..deck.decks import without_header
 from .record import DIGEST, Damaged, pack, unpack
 from .recorded import check
 from .solver import Solver

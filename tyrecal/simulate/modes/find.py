@@ -8,9 +8,8 @@ from dataclasses import dataclass, replace
 from ..evaluate.evaluator import Evaluator, Question
 from ..evaluate.failure import DeckRefused, EvaluationFailed
 from ..evaluate.results import Evaluation
-from .label import paired_labels
+from .label import Label, Mode, paired_labels
 from .match import margin, match
-from .mode import Label, Mode
 
 MORE_MODES = (4, 8)  # per harmonic, where a label is not among the modes first asked for
 Wanted = Callable[[Sequence[Mode]], Sequence[Label]]

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..evaluate.results import HarmonicShape
 from .assignment import assignment
-from .mode import Label, Mode
+from .label import Label, Mode
 from .rings import harmonic_of
 from .subspace import mac
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from ..evaluate.results import HarmonicShape
 from .assignment import assignment
-from .mode import Label, Mode
+from .label import Label, Mode
 
 Array = np.ndarray
 MAX_LOAD_STEP, MIN_LOAD_SHARE = 1 / 16, 1e-7  # steps, of the way from load to load

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ..evaluate.failure import EvaluationFailed
-from .mode import Label, Mode
+from .label import Label, Mode
 
 
 def match(modes: Sequence[Mode], targets: Sequence[Label]) -> dict[Label, Mode]:

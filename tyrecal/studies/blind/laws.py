@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...simulate.modes.mode import Label
+from ...simulate.modes.label import Label
 from ...tyre.case import LoadedCase
 from ...tyre.effects import catalogue
 

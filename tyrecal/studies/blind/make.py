@@ -22,7 +22,7 @@ from ...files import refuse_link, whole
 from ...measured.measurement import CSV_COLUMNS
 from ...simulate.evaluate.failure import EvaluationFailed
 from ...simulate.evaluate.pool import process_pool
-from ...simulate.modes.mode import Label
+from ...simulate.modes.label import Label
 from ...tyre.case import LoadedCase
 from ..diagnose.uncertainties import sources
 from .draw import SWAPPED_WITHIN, Truth, draw, tyre

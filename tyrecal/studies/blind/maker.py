@@ -11,7 +11,7 @@ from ...simulate.deck.tyre_design import TyreDesign
 from ...simulate.evaluate.evaluator import Evaluator, Question
 from ...simulate.evaluate.store import Store
 from ...simulate.modes.find import Found, find_modes
-from ...simulate.modes.mode import Label
+from ...simulate.modes.label import Label
 from ...tyre.case import LoadedCase
 from .laws import EffectLaw, Frequencies, catalogue_laws
 from .outside import OUTSIDE_FAMILIES

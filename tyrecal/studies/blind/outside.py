@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from math import log1p
 
-from ...simulate.modes.mode import Label
+from ...simulate.modes.label import Label
 from ...tyre.case import LoadedCase
 from ...tyre.case.schema import Cord
 from ...tyre.effects.edit import changed, with_gauge, with_layers, with_part

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import InputError
-from ...simulate.modes.mode import Label
+from ...simulate.modes.label import Label
 from ..diagnose.form_error import form_error
 from ..diagnose.model import Answer, ModelRow, Query, ResponseModel
 from .protocol import Protocol, read_json, write_json

@@ -15,7 +15,7 @@ import numpy as np
 
 from ...measured.measurement import Measurement
 from ...measured.tables import read_measurements
-from ...simulate.modes.mode import Label
+from ...simulate.modes.label import Label
 from .answer import case_of
 from .baselines import guesses
 from .make import labels_of

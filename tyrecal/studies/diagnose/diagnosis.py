@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ...simulate.modes.mode import Label
+from ...simulate.modes.label import Label
 from .evidence import NONE, Hypothesis, probabilities, weigh
 from .expansion import Expansion, anchored, expand
 from .gap import Gap, find_gap, projection

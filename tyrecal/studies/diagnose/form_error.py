@@ -5,7 +5,7 @@ Computed once by tests/studies/form_error.py, which says how; never from measure
 
 from __future__ import annotations
 
-from ...simulate.modes.mode import Label
+from ...simulate.modes.label import Label
 
 PERCENT = {
     "[0,0] axial": 0.13,

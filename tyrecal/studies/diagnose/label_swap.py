@@ -13,7 +13,7 @@ from itertools import combinations
 
 import numpy as np
 
-from ...simulate.modes.mode import Label
+from ...simulate.modes.label import Label
 from .evidence import NONE, OUTSIDE, Hypothesis, refit, weigh
 from .inverse_problem import InverseProblem
 from .observations import Observations

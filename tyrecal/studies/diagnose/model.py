@@ -13,7 +13,7 @@ from typing import Protocol
 
 import numpy as np
 
-from ...simulate.modes.mode import Label
+from ...simulate.modes.label import Label
 
 Array = np.ndarray
 ModelRow = tuple[Label | None, float]  # a mode, None: the mass; kPa

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...simulate.modes.mode import Label
+from ...simulate.modes.label import Label
 from .covariance import covariance
 from .evidence import NONE, OUTSIDE
 from .inverse_problem import InverseProblem, Toggle

@@ -14,7 +14,7 @@ import numpy as np
 
 from ...measured.measurement import Measurement
 from ...measured.repeats import PRIOR_REPEATS
-from ...simulate.modes.mode import Label
+from ...simulate.modes.label import Label
 
 Array = np.ndarray
 ObservationKey = tuple[str, Label | None, float]

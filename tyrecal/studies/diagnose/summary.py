@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from typing import Literal
 
-from ...simulate.modes.mode import Label
+from ...simulate.modes.label import Label
 from ..result import Result, ResultPart
 from .observations import Observable
 from .where import PartChange

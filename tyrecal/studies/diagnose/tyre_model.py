@@ -13,9 +13,9 @@ from ...simulate.deck.tyre_design import TyreDesign
 from ...simulate.evaluate.evaluator import Evaluator
 from ...simulate.evaluate.failure import DeckRefused
 from ...simulate.modes.find import Found, ModesAnswer
-from ...simulate.modes.mode import Label
+from ...simulate.modes.label import Label
 from ...tyre.case import LoadedCase, start_values
-from ...tyre.case.calibration import TargetMode, Targets
+from ...tyre.case.schema import TargetMode, Targets
 from ...tyre.effects import catalogue
 from ..fit import problem as fit
 from .model import Answer, ModelRow, Query, Span

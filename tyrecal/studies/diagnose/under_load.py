@@ -11,8 +11,8 @@ from ...measured.measurement import Measurement
 from ...simulate.deck.tyre_design import TyreDesign
 from ...simulate.evaluate.evaluator import Evaluator
 from ...simulate.evaluate.failure import DeckRefused, EvaluationFailed
+from ...simulate.modes.label import Label
 from ...simulate.modes.loaded import Member
-from ...simulate.modes.mode import Label
 from ...tyre.case import LoadedCase
 from ...tyre.templates import TemplateFailed
 from ..fit.footprint import ROW

@@ -13,7 +13,7 @@ from ...simulate.evaluate.evaluator import Counts, Evaluator
 from ...simulate.evaluate.executor import executor, in_order
 from ...simulate.evaluate.failure import EvaluationFailed
 from ...tyre.case import LoadedCase
-from ...tyre.case.calibration import cannot_fit
+from ...tyre.case.schema import cannot_fit
 from ..result import csv_text
 from . import least_squares, slsqp
 from .problem import Point, Problem

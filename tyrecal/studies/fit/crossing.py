@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...simulate.modes.mode import Label
+from ...simulate.modes.label import Label
 from .problem import Point, Problem
 
 Array = np.ndarray

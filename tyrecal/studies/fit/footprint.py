@@ -23,7 +23,7 @@ from ...simulate.evaluate.evaluator import Evaluator
 from ...simulate.evaluate.failure import EvaluationFailed
 from ...simulate.evaluate.pressed import Pressed
 from ...tyre.case import LoadedCase
-from ...tyre.case.calibration import MEASURED_SIGMA
+from ...tyre.case.schema import MEASURED_SIGMA
 from ..footprint import footprint_row
 
 Array = np.ndarray

@@ -22,7 +22,7 @@ import numpy as np
 from ...simulate.evaluate.evaluator import Evaluator, Question
 from ...simulate.evaluate.failure import DeckRefused, EvaluationFailed, SolverUnavailable
 from ...simulate.modes.find import Found, ModesAnswer, find_modes
-from ...simulate.modes.mode import Label, Mode
+from ...simulate.modes.label import Label, Mode
 from ...tyre.case import LoadedCase
 from .differences import STEP, differences
 from .footprint import MAX_SLOPE, PRESS_STEP, press, read_footprint_targets

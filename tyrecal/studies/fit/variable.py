@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 from ...simulate.deck.tyre_design import NEAR_ZERO
-from ...tyre.case.calibration import Variable
+from ...tyre.case.schema import Variable
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from ..section.from_size import build, usual
 from ..section.section import SectionError, refuse_separators
 from ..section.size import TyreSize
 from .case_text import new_case
-from .section import Outline, SectionSource
+from .parts import Outline, SectionSource
 from .stations import read_section_of
 
 FLANGE = 17.3e-3  # m, height of the rim's flange, contour J

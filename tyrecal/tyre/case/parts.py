@@ -1,9 +1,11 @@
-"""The kinds of number and text that a case file holds, and the model that all its parts share."""
+"""The parts of a tyre as a case file holds them: materials, section, wheel, what is not uniform;
+before them the kinds of number and text, and the model, that all parts of a case share.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import (
     AfterValidator,
@@ -16,6 +18,9 @@ from pydantic import (
 from pydantic_core import PydanticCustomError
 
 LEAST, LARGEST = 1e-30, 1e15  # beyond, products of numbers leave what a computer holds
+Moduli = Literal["long_term", "instantaneous"]
+MOST_RELAXED = 0.999  # of a modulus: what is left must be a tyre's
+Element = Literal["CGAX8R", "CGAX8", "CGAX4R"]
 
 
 def _can_be_computed_with(value: float) -> float:
@@ -32,10 +37,8 @@ Degrees = Annotated[float, Field(ge=-180, le=180)]
 # names end in decks, paths of keys and file names: one word of plain letters is safe in all
 Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z][A-Za-z0-9_\-]*$", max_length=60)]
 Text = Annotated[str, StringConstraints(pattern=r"^[^\x00-\x1f\x7f]*$", max_length=300)]
-
 Disagreement = tuple[str, str]
 """A key of a part, and what would be right there."""
-
 WRONG = object()
 """Stands in a part's values for one that is already reported."""
 
@@ -69,3 +72,257 @@ class Part(BaseModel):
         for key, message in self.problems(self.__dict__):
             raise PydanticCustomError("disagree", "{message}", {"key": key, "message": message})
         return self
+
+
+class Prony(Part):
+    """A term of the Prony series: shares of the shear and bulk modulus, relaxation time."""
+
+    g: Annotated[float, Field(ge=0, lt=1)]
+    k: Annotated[float, Field(ge=0, lt=1)]
+    tau_s: Annotated[Positive, Field(ge=1e-9, le=1e9)]
+
+
+class Rubber(Part):
+    """Mooney-Rivlin: C10 (I1 - 3) + C01 (I2 - 3) + (J - 1)^2 / D1, with a Prony series.
+
+    ``moduli`` says whether the constants are those of relaxed or of instantaneous rubber. In a
+    mode of frequency f the shear modulus is (f / reference_frequency_Hz)^frequency_exponent times
+    as large.
+    """
+
+    kind: Literal["rubber"]
+    C10_Pa: Number
+    C01_Pa: Number
+    D1_per_Pa: Positive
+    moduli: Moduli = "long_term"
+    prony: list[Prony] = Field(default_factory=list)
+    frequency_exponent: Annotated[float, Field(ge=0, le=0.5)] = 0.0
+    reference_frequency_Hz: Frequency = 60.0
+    density_kg_per_m3: Positive
+
+    @classmethod
+    def problems(cls, values: Mapping[str, Any]) -> Iterator[Disagreement]:
+        c10, c01 = number(values, "C10_Pa"), number(values, "C01_Pa")
+        if c10 is not None and c01 is not None and not c10 + c01 > 0:
+            yield "C10_Pa", f"must be greater than -C01_Pa, C10_Pa + C01_Pa is {c10 + c01:g}"
+        for share in "gk":
+            terms = values.get("prony")
+            terms = terms if isinstance(terms, list) else []
+            total = sum(number(dict(term), share) or 0 for term in terms if term is not WRONG)
+            if total > MOST_RELAXED:
+                least = f"must have a sum of all {share} of at most {MOST_RELAXED:g}"
+                yield "prony", f"{least}, got {total:.9g}"
+
+
+class Cord(Part):
+    """A linear elastic cord."""
+
+    kind: Literal["cord"]
+    youngs_modulus_Pa: Positive
+    poissons_ratio: Annotated[float, Field(ge=0, lt=0.5)]
+    density_kg_per_m3: Positive
+
+
+class Gauge(Part):
+    """A factor on the thickness between two lines, in some regions or in all."""
+
+    between: Annotated[list[Text], Field(min_length=2, max_length=2)]
+    regions: list[Text] | None = None
+    factor: Annotated[float, Field(ge=0.1, le=10)]
+
+
+class Outline(Part):
+    """The outer and the inner curve (CSV), and what they do not show.
+
+    ``belt_width_m``: of the wider belt, along the carcass; the rim holds what lies within
+    ``rim_radius_m``. Depths: inner surface to carcass, to the first belt, to the second.
+    """
+
+    file: Text
+    belt_width_m: Positive
+    rim_radius_m: Positive
+    carcass_depth_m: Positive = 1.2e-3
+    belt_depth_m: Positive = 1.2e-3
+    belt_spacing_m: Positive = 1.2e-3
+    belt_step_m: Positive = 0.010
+
+
+class SectionSource(Part):
+    """``stations``: the station table, or ``outline``: two curves; CSV, relative to the case file.
+
+    ``gauges`` scale it.
+    """
+
+    stations: Text | None = None
+    outline: Outline | None = None
+    gauges: list[Gauge] | None = None
+
+    @property
+    def file(self) -> str:
+        """The CSV that the section is in."""
+        return self.outline.file if self.outline else self.stations or ""
+
+    @classmethod
+    def problems(cls, values: Mapping[str, Any]) -> Iterator[Disagreement]:
+        yield from one_of(values, "stations", "outline")
+
+
+class Level(Part):
+    """A mesh: elements per region of the half section, rows per gap between two lines.
+
+    ``grading``: thickness of a row over that of the row inside it, per gap.
+    """
+
+    elements: dict[Name, Annotated[int, Field(ge=1, le=200)]]
+    rows: list[Annotated[int, Field(ge=1, le=20)]]
+    grading: list[Annotated[float, Field(ge=0.1, le=10)]] | None = None
+
+
+class Mesh(Part):
+    """Element type and the mesh levels by name; ``level`` is the one in use."""
+
+    element: Element
+    level: str
+    levels: Annotated[dict[Name, Level], Field(min_length=1)]
+    hourglass_stiffness_Pa: Positive | None = None
+
+
+class Solid(Part):
+    """A material in the whole section, or only in ``regions`` and/or ``between`` two lines."""
+
+    material: str
+    regions: Annotated[list[str], Field(min_length=1)] | None = None
+    between: Annotated[list[str], Field(min_length=2, max_length=2)] | None = None
+
+
+class RebarLayer(Part):
+    """Cords on a line of the section; ``angle_deg`` from the meridian, ``area_m2`` of one cord.
+
+    Cords stand ``spacing_m`` apart or, with ``geometry: angular``, ``spacing_deg`` apart. The
+    layer is as long as its line, or ends with some of its ``regions``.
+    """
+
+    line: str
+    material: str
+    area_m2: Positive
+    geometry: Literal["constant", "angular"] = "constant"
+    spacing_m: Positive | None = None
+    spacing_deg: Annotated[float, Field(gt=0, le=360)] | None = None
+    angle_deg: Degrees
+    regions: Annotated[list[str], Field(min_length=1)] | None = None
+
+    @classmethod
+    def problems(cls, values: Mapping[str, Any]) -> Iterator[Disagreement]:
+        geometry = values.get("geometry", "constant")
+        pair = {"constant": ("spacing_m", "spacing_deg"), "angular": ("spacing_deg", "spacing_m")}
+        if geometry in pair:
+            needed, other = pair[geometry]
+            if values.get(other) is not None:
+                yield other, f"must be absent with geometry: {geometry}, which takes {needed}"
+            if values.get(needed) is None:
+                yield needed, f"must be given with geometry: {geometry}"
+
+
+class ReferencePoint(Part):
+    """A point of the section's plane, m."""
+
+    r: Number
+    z: Number
+
+
+def _values(part: Any) -> Mapping[str, Any]:
+    """The values of a part, checked or as in the file; none where it is wrong."""
+    if isinstance(part, Part):
+        return part.__dict__
+    return part if isinstance(part, Mapping) else {}
+
+
+class Spindle(Part):
+    """Compliance of what holds the wheel, at the rim's reference point; 0 = clamped."""
+
+    lateral_m_per_N: NotNegative = 0.0
+    radial_m_per_N: NotNegative = 0.0
+    torsional_rad_per_N_m: NotNegative = 0.0
+    tilt_rad_per_N_m: NotNegative = 0.0
+
+    @property
+    def gives_way(self) -> bool:
+        """Whether the wheel moves on it."""
+        return any(self.__dict__.values())
+
+
+class Rim(Part):
+    """The rigid rim; its reference point is the wheel's centre.
+
+    In a vibration it moves on its ``spindle``, or is ``free``; its own mass and moments of
+    inertia (polar: about the axle) are then those of wheel and hub, by default of steel, 17 inch.
+    """
+
+    reference_point_m: ReferencePoint
+    mass_kg: Positive = 15.0
+    polar_inertia_kg_m2: Positive = 0.43
+    diametral_inertia_kg_m2: Positive = 0.27
+    spindle: Spindle = Spindle()
+    free: bool = False
+
+    @property
+    def moves(self) -> bool:
+        """Whether it moves in a vibration."""
+        return self.free or self.spindle.gives_way
+
+    @classmethod
+    def problems(cls, values: Mapping[str, Any]) -> Iterator[Disagreement]:
+        spindle, point = (_values(values.get(key)) for key in ("spindle", "reference_point_m"))
+        soft, free = any(number(spindle, key) for key in spindle), values.get("free") is True
+        if soft and free:
+            yield "free", "must be false where the spindle has a compliance"
+        r = number(point, "r")
+        if (soft or free) and r:
+            yield "reference_point_m", f"must have r = 0 where the rim moves, got {r:g}"
+
+
+class Cavity(Part):
+    """The gas in the tyre as it moves with the walls; ``share`` of its mass and stiffness, 0 =
+    a constant pressure only, 1 = the gas as it is."""
+
+    gas: Literal["air", "helium", "sulphur_hexafluoride"] = "air"
+    temperature_C: Annotated[float, Field(gt=-100, lt=300)] = 20.0
+    share: Annotated[NotNegative, Field(le=100)] = 0.0
+
+
+class PointMass(Part):
+    """A lumped mass on the tread, at the angle 0 and the height z over the middle."""
+
+    mass_kg: NotNegative = 0.0
+    z_m: Number = 0.0
+
+
+class RoadSpring(Part):
+    """A road that barely touches: springs from the tread to the ground at the angle 0, over
+    ``width_m`` about the middle; the deflection by the static load is left out."""
+
+    radial_N_per_m: NotNegative = 0.0
+    lateral_N_per_m: NotNegative = 0.0
+    tangential_N_per_m: NotNegative = 0.0
+    width_m: Positive = 0.08
+
+    @property
+    def stiffnesses(self) -> dict[str, float]:
+        """Those that are there, N/m, by direction."""
+        named = {
+            "radial": self.radial_N_per_m,
+            "lateral": self.lateral_N_per_m,
+            "tangential": self.tangential_N_per_m,
+        }
+        return {direction: stiffness for direction, stiffness in named.items() if stiffness}
+
+
+class Splice(Part):
+    """A sector about the angle 0 in which numbers of the case are larger by ``share`` of
+    themselves: materials, layers and densities, but no geometry."""
+
+    share: Annotated[float, Field(gt=-1, le=10)] = 0.0
+    width_deg: Annotated[float, Field(gt=0, le=180)] = 10.0
+    numbers: Annotated[list[Text], Field(min_length=1)] = Field(
+        default_factory=lambda: ["materials.rubber.C10_Pa"]
+    )

@@ -8,14 +8,9 @@ from typing import Annotated, Any, Union, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 
-from .analysis import Road
-from .calibration import TargetFootprint, TargetMode, Uncertainty, Variable
-from .materials import Cord, Rubber
 from .mistakes import Keys, suggestion
-from .parts import WRONG, Part
-from .schema import Case
-from .section import RebarLayer, SectionSource
-from .wheel import Rim
+from .parts import WRONG, Cord, Part, RebarLayer, Rim, Rubber, SectionSource
+from .schema import Case, Road, TargetFootprint, TargetMode, Uncertainty, Variable
 
 UNIONS = (Union, UnionType)
 KINDS: dict[str, type[BaseModel]] = {"rubber": Rubber, "cord": Cord}

@@ -11,8 +11,7 @@ from pydantic import ValidationError
 
 from .document import MAX_TABLE_BYTES, Document
 from .mistakes import Keys, Mistake, dotted, shortened
-from .parts import WRONG
-from .section import SectionSource
+from .parts import WRONG, SectionSource
 
 if TYPE_CHECKING:
     from ..section.section import Section

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from ..case import LoadedCase
-from ..case.materials import Cord
-from ..case.section import RebarLayer
+from ..case.parts import Cord, RebarLayer
 from .edit import changed, unused, with_layers
 from .effect import Effect
 from .parts import belt_lines

@@ -5,8 +5,8 @@ from __future__ import annotations
 from math import pi
 
 from ..case import LoadedCase
-from ..case.analysis import Analysis
-from ..case.materials import Prony, Rubber
+from ..case.parts import Prony, Rubber
+from ..case.schema import Analysis
 from .edit import changed, with_part, with_rubbers
 from .effect import Effect
 

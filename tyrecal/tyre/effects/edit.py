@@ -7,9 +7,7 @@ from dataclasses import replace
 from typing import Any, TypeVar
 
 from ..case import Case, LoadedCase
-from ..case.materials import Rubber
-from ..case.parts import Part
-from ..case.section import Gauge, Solid
+from ..case.parts import Gauge, Part, Rubber, Solid
 
 P = TypeVar("P", bound=Part)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..case import LoadedCase
-from ..case.materials import Rubber
+from ..case.parts import Rubber
 from .edit import changed, with_part
 from .effect import Effect
 
