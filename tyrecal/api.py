@@ -25,8 +25,7 @@ from .simulate.evaluate.evaluator import Evaluator, Question
 from .simulate.evaluate.failure import EvaluationFailed
 from .simulate.evaluate.pressed import Pressed
 from .simulate.evaluate.store import Store
-from .simulate.modes.find import labelled
-from .simulate.modes.label import Mode
+from .simulate.modes.label import Mode, labelled
 from .simulate.provenance import provenance
 from .studies.diagnose.diagnosis import Diagnosis
 from .studies.emulator import Emulator

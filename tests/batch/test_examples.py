@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from ruamel.yaml import YAML
 
-from tyrecal.simulate.evaluate.queue import jobs_of, read_settings
+from tyrecal.simulate.evaluate.cluster import jobs_of, read_settings
 
 from ..conftest import CASES, ROOT
 

@@ -9,9 +9,8 @@ from click.testing import CliRunner
 
 from tyrecal.cli.main import cli
 from tyrecal.tyre.case.shape import with_defaults
-from tyrecal.tyre.guard import refusal
 from tyrecal.tyre.load import load_case, validate
-from tyrecal.tyre.usual import USUAL
+from tyrecal.tyre.usual import USUAL, refusal
 from tyrecal.tyre.values import unusual_value
 
 from .wrong import CASES, CSV, GOOD, PRESSURE, TABLE

@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 
 from tyrecal.simulate.deck.tyre_design import TyreDesign
+from tyrecal.simulate.evaluate import cluster
 from tyrecal.simulate.evaluate import evaluator as door_module
-from tyrecal.simulate.evaluate import queue
 from tyrecal.simulate.evaluate.cluster import _at_worker
 from tyrecal.simulate.evaluate.evaluator import Counts, Evaluator, Question
 from tyrecal.simulate.evaluate.executor import Here
@@ -348,17 +348,17 @@ def test_as_many_jobs_as_the_workers_need(
     path = tmp_path / "here.yaml"
     path.write_text(f"queueing_system: local\nworkers: {workers}\ncores: {cores}\n")
     done: list[Any] = []
-    cluster = SimpleNamespace(
+    jobs_of = SimpleNamespace(
         adapt=lambda **bounds: done.append(bounds),
         scheduler_address="tcp://there",
         close=lambda: done.append("closed"),
     )
-    monkeypatch.setattr(queue, "jobs_of", lambda settings: cluster)
-    with pytest.raises(ZeroDivisionError), queue.reached(str(path)) as address:
+    monkeypatch.setattr(cluster, "jobs_of", lambda settings: jobs_of)
+    with pytest.raises(ZeroDivisionError), cluster.reached(str(path)) as address:
         assert address == "tcp://there"
         1 / 0  # noqa: B018
     assert done == [{"minimum_jobs": jobs, "maximum_jobs": jobs}, "closed"]
-    with queue.reached("tcp://elsewhere") as address:
+    with cluster.reached("tcp://elsewhere") as address:
         assert address == "tcp://elsewhere"
 
 

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from tyrecal.simulate.evaluate.cluster import jobs_of, reached, read_settings
 from tyrecal.simulate.evaluate.executor import executor
-from tyrecal.simulate.evaluate.queue import jobs_of, reached, read_settings
 from tyrecal.simulate.settings import InputError
 
 SETTINGS = """

@@ -8,7 +8,8 @@ import pytest
 
 from tyrecal.simulate.evaluate.evaluator import Question
 from tyrecal.simulate.evaluate.failure import DeckRefused, EvaluationFailed
-from tyrecal.simulate.modes.find import MORE_MODES, Found, find_modes, labelled
+from tyrecal.simulate.modes.find import MORE_MODES, Found, find_modes
+from tyrecal.simulate.modes.label import labelled
 
 from ..fit.fake import LABELS, FakeEvaluator
 from ..fit.test_calibration import POWERS, START, TARGETS

@@ -12,7 +12,7 @@ from tyrecal.report.figure import save
 from tyrecal.report.pressure import draw_pressure_sweep
 from tyrecal.report.table import shown
 from tyrecal.simulate.modes.label import Label
-from tyrecal.studies.pressure_findings import PressureFindings
+from tyrecal.studies.pressure import PressureFindings
 from tyrecal.studies.pressure_result import PressureRow, PressureSweep
 
 LABELS = [(0, 0, "axial"), (0, 0, "torsional"), (1, 0, None), (1, 1, None), (2, 0, None)]

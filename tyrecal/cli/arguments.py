@@ -100,8 +100,7 @@ def parse_pressures(low: float, high: float, steps: int, allowed: bool) -> tuple
     click.UsageError."""
     from math import isfinite
 
-    from ..tyre.guard import ALL_THE_SAME
-    from ..tyre.usual import USUAL
+    from ..tyre.usual import ALL_THE_SAME, USUAL
 
     for option, value in (("--from-kPa", low), ("--to-kPa", high)):
         if not (isfinite(value) and value > 0):

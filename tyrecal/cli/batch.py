@@ -113,7 +113,7 @@ def command(
     from ..batch.run import run_batch
     from ..batch.studies import Asked
     from ..batch.summary import summary
-    from ..simulate.evaluate.queue import reached
+    from ..simulate.evaluate.cluster import reached
     from ..simulate.settings import root
     from .output import Run
     from .progress import BatchProgress

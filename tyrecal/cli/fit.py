@@ -83,7 +83,7 @@ def command(
     tyrecal fit cases/p235_75r17.yaml --starts 20 --seed 1 --scheduler tcp://10.0.0.1:8786
     """
     from ..report.table import fit_doubts, fit_verdict, shown, tyre_doubts
-    from ..simulate.evaluate.queue import reached
+    from ..simulate.evaluate.cluster import reached
     from ..studies.fit.calibrate import calibrate, check, history_csv
     from ..studies.fit.problem import Problem, objective_unit
     from ..studies.fitted import NOT_CONVERGED, has_good

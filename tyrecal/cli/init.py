@@ -87,9 +87,8 @@ def command(
     tyrecal init 205/60R15 --section my_outline.csv --belt-width-mm 160 --output my_outline.yaml
     """
     from ..tyre.case.new_case import from_file, from_size
-    from ..tyre.guard import ALL_THE_SAME
     from ..tyre.section.size import parse_size
-    from ..tyre.usual import GAUGES, USUAL
+    from ..tyre.usual import ALL_THE_SAME, GAUGES, USUAL
     from ..units import INCH
 
     if size is None and file is None:

@@ -8,8 +8,7 @@ from typing import Annotated, Any
 from pydantic import Field
 
 from ..simulate.evaluate.results import Evaluation
-from ..simulate.modes.find import labelled
-from ..simulate.modes.label import Mode
+from ..simulate.modes.label import Mode, labelled
 from ..tyre.case import LoadedCase
 from .result import NAME_COLUMNS, Column, ModeEntry, Result, ResultPart, Table
 

@@ -1,17 +1,27 @@
-"""Frequencies over inflation pressure, each mode followed by its shape."""
+"""The tyre swept over the pressure: frequencies of each design, and what the sweep found."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from pydantic import Field
 
 from ..simulate.evaluate.evaluator import Evaluator, Question
 from ..simulate.evaluate.failure import DeckRefused, EvaluationFailed
-from ..simulate.modes.find import Found, find_modes, labelled
-from ..simulate.modes.label import Label, Mode
+from ..simulate.modes.find import Found, find_modes
+from ..simulate.modes.follow import follow
+from ..simulate.modes.label import FAMILIES, Label, Mode, labelled
 from ..tyre.case import LoadedCase
 from .fit.problem import read_targets
 from .fitted import pressure_name
+from .result import ResultPart
+
+BENT = "concave", "convex"
+STRAIGHT = 1e-6  # of a frequency: solvers that print them give seven digits
 
 
 @dataclass(frozen=True)
@@ -82,3 +92,127 @@ def _outcome(
         scale = {m.label: pressure_kPa / m.frequency_Hz for m in modes}
         exact = {m.label: float(gradient[m.position]) * scale[m.label] for m in modes}
     return State(design, pressure_kPa, modes, exact)
+
+
+class PressureFindings(ResultPart):
+    """Of one design."""
+
+    design: str
+    from_kPa: float = 0.0
+    to_kPa: float = 0.0
+    modes: list[dict[str, Any]] = Field(default=[])  # rise and curvature
+    families: list[dict[str, Any]] = Field(default=[])
+    least_mac: float = 1.0  # between neighbouring pressures
+    disagreements: list[dict[str, Any]] = Field(default=[])  # of labels and shapes followed
+    words: list[str]
+
+
+def findings(states: Sequence[State], labels: Sequence[Label]) -> PressureFindings:
+    """Findings on one design's states by rising pressure, two at least."""
+    p = np.array([state.pressure_kPa for state in states])
+    table = {label: np.array([s.frequencies[label] for s in states]) for label in labels}
+    modes = [{"c": x.c, "m": x.m, "kind": x.kind, **_curve(p, table[x])} for x in labels]
+    rises = {label: float(f[-1] - f[0]) for label, f in table.items()}
+    families = [_family(name, rises) for name in FAMILIES]
+    steps = [
+        (before.pressure_kPa, after.pressure_kPa, step)
+        for before, after in pairwise(states)
+        for step in follow(before.modes, after.modes)
+        if step.before in table
+    ]
+    result: dict[str, Any] = {
+        "design": states[0].design,
+        "from_kPa": states[0].pressure_kPa,
+        "to_kPa": states[-1].pressure_kPa,
+        "modes": modes,
+        "families": [each for each in families if each["members"]],
+        "least_mac": min((step.mac for _, _, step in steps), default=1.0),
+        "disagreements": [
+            {
+                "from_kPa": low,
+                "to_kPa": high,
+                "label": str(step.before),
+                "followed_to": str(step.after),
+                "mac": step.mac,
+            }
+            for low, high, step in steps
+            if step.before != step.after
+        ],
+    }
+    return PressureFindings(**result, words=_words(result, labels))
+
+
+def _curve(p: np.ndarray, f: np.ndarray) -> dict[str, Any]:
+    """Of one mode: its rise, whether it rises at every step, and how it bends; of two pressures
+    nobody can tell."""
+    weight = (p[2:] - p[1:-1]) / (p[2:] - p[:-2])
+    bow = f[1:-1] - (weight * f[:-2] + (1 - weight) * f[2:])  # above the neighbours' chord
+    straight = "neither" if len(bow) else "unknown"
+    up, down = bow > STRAIGHT * f[1:-1], bow < -STRAIGHT * f[1:-1]
+    return {
+        "rise_Hz": float(f[-1] - f[0]),
+        "rise_percent": float(100 * (f[-1] / f[0] - 1)),
+        "rises": bool((np.diff(f) > 0).all()),
+        "curvature": {(True, False): "concave", (False, True): "convex"}.get(
+            (bool(up.any()), bool(down.any())), straight
+        ),
+        "convex_at_kPa": [float(x) for x in p[1:-1][down]],
+    }
+
+
+def _family(name: str, rises: Mapping[Label, float]) -> dict[str, Any]:
+    """Whether the rise grows with c; exceptions: members that rise no more than the one before."""
+    members = [label for label in sorted(rises) if label.family == name]
+    hertz = [rises[label] for label in members]
+    exceptions = [str(x) for i, x in enumerate(members) if i and hertz[i] <= hertz[i - 1]]
+    return {
+        "family": name,
+        "members": [str(label) for label in members],
+        "rise_Hz": hertz,
+        "grows_with_c": not exceptions,
+        "exceptions": exceptions,
+    }
+
+
+def _words(found: Mapping[str, Any], labels: Sequence[Label]) -> list[str]:
+    said = {str(label): label.said for label in labels}
+    modes = list(zip(said.values(), found["modes"], strict=True))
+    span = f"from {found['from_kPa']:g} to {found['to_kPa']:g} kPa"
+    falling = [name for name, mode in modes if not mode["rises"]]
+    words = [f"{_all_but('every mode rises', falling)} {span}"]
+    for each in found["families"]:
+        if len(each["members"]) > 1:
+            first, *_, last = (
+                f"{said[name]} rises {hertz:.1f} Hz"
+                for name, hertz in zip(each["members"], each["rise_Hz"], strict=True)
+            )
+            others = [said.get(name, name) for name in each["exceptions"]]
+            grows = _all_but(f"{each['family']}, the rise grows with c", others)
+            words.append(f"{grows}: {first}, {last}")
+    bent = {name: mode["curvature"] for name, mode in modes if mode["curvature"] in BENT}
+    if any(mode["curvature"] == "unknown" for _, mode in modes):
+        words.append("how the curves bend takes three pressures to tell")
+    if bent:
+        odd = [
+            f"{name} ({bent.get(name, 'neither')})"
+            for name, _ in modes
+            if bent.get(name) != "concave"
+        ]
+        words.append(_all_but("every curve is concave, steeper at low pressure", odd))
+    if not found["disagreements"]:
+        words.append(
+            "labels stay with the shapes throughout; least MAC between neighbouring pressures"
+            f" {found['least_mac']:.3f}"
+        )
+    for odd_step in found["disagreements"]:
+        words.append(
+            f"from {odd_step['from_kPa']:g} to {odd_step['to_kPa']:g} kPa the shape of"
+            f" {said.get(odd_step['label'], odd_step['label'])} goes on under the label"
+            f" {said.get(odd_step['followed_to'], odd_step['followed_to'])}"
+            f" (MAC {odd_step['mac']:.2f})"
+        )
+    return words
+
+
+def _all_but(claim: str, exceptions: Sequence[str]) -> str:
+    return f"{claim}, but for {', '.join(exceptions)}" if exceptions else claim

@@ -12,8 +12,7 @@ from ..simulate.modes.label import Label
 from ..tyre.case import LoadedCase
 from .fit.problem import read_targets
 from .modes import mode_entry
-from .pressure import Failure, State, SweepOutcome, sweep
-from .pressure_findings import PressureFindings, findings
+from .pressure import Failure, PressureFindings, State, SweepOutcome, findings, sweep
 from .result import (
     NAME_COLUMNS,
     Column,

@@ -17,8 +17,8 @@ from .case.schema import Case, cannot_fit
 from .case.shape import disagreements, explain, without
 from .case.stations import check_templates, read_stations
 from .effects import EffectRefused
-from .guard import unusual
 from .resolve import resolved
+from .usual import unusual
 
 
 def load_case(path: Path | str, allow_unusual: bool = False) -> LoadedCase:

@@ -9,9 +9,8 @@ from .case import Case, LoadedCase
 from .case.parts import Rubber
 from .effects import EffectRefused, catalogue
 from .plugins import IDS
-from .section.gauges import with_gauges
 from .section.mesh import SectionMesh, build_mesh
-from .section.section import Section
+from .section.section import Section, with_gauges
 
 # What parts of a tyre ask of a solver: the capability, and what it is for, in words.
 CAPABILITIES = {

@@ -15,8 +15,8 @@ from .case.mistakes import Keys, dotted, suggestion
 from .case.schema import Case
 from .case.shape import explain
 from .case.stations import read_section_of
-from .guard import refusal
 from .resolve import resolved
+from .usual import refusal
 
 # numbers that stand alone: no other part of the case, and no mesh, depends on their values
 ALONE = {

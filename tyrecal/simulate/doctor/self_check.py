@@ -31,7 +31,7 @@ def self_check(solver: str = "bundled") -> dict[str, Any]:
     from ..deck.tyre_design import TyreDesign
     from ..evaluate.evaluator import Evaluator, Question
     from ..evaluate.failure import DeckRefused, EvaluationFailed, SolverUnavailable
-    from ..modes.find import labelled
+    from ..modes.label import labelled
 
     started = time.monotonic()
     tolerance = TOLERANCE_PERCENT.get(solver, OTHERS_PERCENT)

@@ -32,11 +32,6 @@ class Found:
 ModesAnswer = Found | EvaluationFailed | DeckRefused
 
 
-def labelled(evaluation: Evaluation) -> list[Mode]:
-    """All modes with their labels, by rising frequency."""
-    return sorted(paired_labels(evaluation.modes), key=lambda mode: mode.frequency_Hz)
-
-
 def find_modes(
     evaluator: Evaluator,
     questions: Sequence[Question],

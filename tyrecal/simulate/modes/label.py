@@ -24,7 +24,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.polynomial.legendre import legvander
 
-from ..evaluate.results import HarmonicShape, RawMode, RingShape
+from ..evaluate.results import Evaluation, HarmonicShape, RawMode, RingShape
 from .assignment import assignment
 
 FAMILIES = ("in-plane", "out-of-plane")
@@ -193,6 +193,11 @@ def label_modes(evaluation_modes: Sequence[RawMode]) -> list[Mode]:
         Mode(labels[i], mode.frequency_Hz, mode.multiplicity, clarity[i], i, mode)
         for i, mode in enumerate(evaluation_modes)
     ]
+
+
+def labelled(evaluation: Evaluation) -> list[Mode]:
+    """All modes with their labels, by rising frequency."""
+    return sorted(paired_labels(evaluation.modes), key=lambda mode: mode.frequency_Hz)
 
 
 def paired_labels(modes: Sequence[RawMode]) -> list[Mode]:

@@ -317,8 +317,8 @@ def folds(data: Mapping[str, Any], section: Section) -> str | None:
     """Why the section cannot be meshed at the chosen level of ``data``, which is right so far."""
     import numpy as np
 
-    from ..section.gauges import with_gauges
     from ..section.mesh import build_mesh
+    from ..section.section import with_gauges
 
     mesh = data["mesh"]
     level = mesh["levels"][mesh["level"]]

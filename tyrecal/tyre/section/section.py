@@ -2,13 +2,16 @@
 
 Every line is given by its points, or one of them is and the others by gauges: their distances
 from it along its normal. Lines given before it lie inside it, those after it outside.
+
+Gauges: the thickness between two lines of the section, scaled region by region.
 """
 
 from __future__ import annotations
 
 import csv
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +21,7 @@ from .spline import CubicSpline
 
 Array = np.ndarray
 GAUGE = "_gauge_mm"
+GaugeFactor = tuple[tuple[str, ...], tuple[str, str], float]  # regions, (line, line), factor
 
 
 class SectionError(InputError):
@@ -215,3 +219,38 @@ def resample(section: Section, intervals: list[int]) -> tuple[Array, list[str], 
     floor, ceil = np.floor(where + 1e-9).astype(int), np.ceil(where - 1e-9).astype(int)
     present = real[:, floor] & real[:, ceil]
     return out, names, section.rigid[floor] & section.rigid[ceil], present
+
+
+@lru_cache(maxsize=8)
+def with_gauges(section: Section, gauges: tuple[GaugeFactor, ...]) -> Section:
+    """``section`` with thicknesses multiplied by the factors; no regions named = all of them.
+
+    The innermost line between the surfaces (the carcass) stays where it is: gaps outside it move
+    what lies outside them outwards, the gap inside it moves the inner surface. A station between
+    two regions takes the geometric mean of their factors. Lines keep the stations they have.
+    """
+    if not gauges:
+        return section
+    points = fill_lines(section)
+    steps = np.diff(points, axis=0)  # (gap, station, 2)
+    for regions, (first, second), factor in gauges:
+        low, high = sorted((section.names.index(first), section.names.index(second)))
+        steps[low:high] *= _share(section, regions, factor)[None, :, None]
+    fixed = points[1]
+    moved = np.concatenate([[fixed - steps[0], fixed], fixed + np.cumsum(steps[1:], axis=0)])
+    moved[np.isnan(section.points)] = np.nan
+    return replace(section, points=moved)
+
+
+def _share(section: Section, regions: tuple[str, ...], factor: float) -> np.ndarray:
+    """The factor at each station."""
+    logs = np.zeros((2, section.points.shape[1]))  # of the region before and after a station
+    start = 0
+    for name, count in section.regions:
+        if not regions or name in regions:
+            logs[0, start + 1 : start + count + 1] = np.log(factor)
+            logs[1, start : start + count] = np.log(factor)
+        start += count
+    logs[0, 0], logs[1, -1] = logs[1, 0], logs[0, -1]
+    share: np.ndarray = np.exp(logs.mean(0))
+    return share
