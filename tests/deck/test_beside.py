@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from tyrecal_solvers.bundled.deck.keywords import DeckError
 from tyrecal_solvers.bundled.job import run
+from tyrecal_solvers.errors import Refused
 
 from tyrecal.simulate.deck.decks import Decks
 from tyrecal.simulate.deck.tyre_design import TyreDesign
@@ -184,7 +185,7 @@ def test_cavities_that_are_refused(tmp_path: Path, cavity: str, words: str) -> N
         Decks(TyreDesign(with_values(CASE, {"cavity.share": 1.0}))).texts("abaqus").items()
     ):
         (tmp_path / name).write_text(text)
-    with pytest.raises(DeckError, match=words):
+    with pytest.raises(Refused, match=words):
         run(tmp_path, "modes", "inflate")
 
 
