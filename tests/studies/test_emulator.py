@@ -12,8 +12,7 @@ from tyrecal.errors import InputError
 from tyrecal.simulate.evaluate.evaluator import Question
 from tyrecal.simulate.evaluate.failure import EvaluationFailed
 from tyrecal.simulate.evaluate.results import Evaluation, RawMode
-from tyrecal.simulate.modes.label import label_modes
-from tyrecal.simulate.modes.mode import Label
+from tyrecal.simulate.modes.label import Label, label_modes
 from tyrecal.studies import emulator as module
 from tyrecal.studies.emulator import (
     PAIR,

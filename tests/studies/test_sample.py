@@ -14,7 +14,7 @@ from tyrecal.errors import InputError
 from tyrecal.report.figure import save
 from tyrecal.report.sample import figures
 from tyrecal.simulate.evaluate.failure import EvaluationFailed
-from tyrecal.simulate.modes.mode import Label
+from tyrecal.simulate.modes.label import Label
 from tyrecal.studies.diagnose.observations import Observable, Observations
 from tyrecal.studies.emulator import Evaluated, fitted, spread
 from tyrecal.studies.fit.variable import DesignVariable

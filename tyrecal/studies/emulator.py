@@ -35,8 +35,8 @@ from numpy.polynomial import legendre
 from ..errors import InputError
 from ..simulate.evaluate.evaluator import Evaluator, Question
 from ..simulate.evaluate.failure import DeckRefused, EvaluationFailed
-from ..simulate.modes.find import Found, find_modes, labelled
-from ..simulate.modes.mode import Label
+from ..simulate.modes.find import Found, find_modes
+from ..simulate.modes.label import Label, labelled
 from .fit.crossing import AXIAL, TORSIONAL
 from .fit.variable import DesignVariable
 
