@@ -20,7 +20,7 @@ from tyrecal.studies.emulator import Evaluated, fitted, spread
 from tyrecal.studies.fit.variable import DesignVariable
 from tyrecal.studies.sample import box as box_module
 from tyrecal.studies.sample.box import AT_EDGE, drawn, grown, larger, shares_at_edge
-from tyrecal.studies.sample.chains import needs_emcee, walk
+from tyrecal.studies.sample.chains import autocorrelation_time, needs_emcee, walk
 from tyrecal.studies.sample.posterior import Posterior, optima
 from tyrecal.studies.sample.predict import conditional
 from tyrecal.studies.sample.result import draws_csv, result
@@ -93,6 +93,20 @@ def test_draws_are_worth_as_many_as_their_autocorrelation_says() -> None:
     assert not drawn(posterior(WIDE), BOUNDS, 2000, 3).chains.enough
 
 
+def test_the_autocorrelation_time_is_that_of_the_closed_form() -> None:
+    """Of x(t + 1) = a x(t) + noise it is (1 + a) / (1 - a), of independent draws 1; walkers that
+    stay apart from each other have a long one."""
+    random, times = generator("autocorrelation"), []
+    for a in (0.0, 0.5, 0.9):
+        x = [random.normal(size=(50, 1))]
+        for _ in range(4000):
+            x.append(a * x[-1] + np.sqrt(1 - a**2) * random.normal(size=(50, 1)))
+        times.append(float(autocorrelation_time(np.array(x))[0]))
+    assert times == pytest.approx([1.0, 3.0, 19.0], rel=0.1)
+    apart = random.normal(size=(1000, 50, 1)) + 10 * (np.arange(50) % 2)[:, None]
+    assert autocorrelation_time(apart)[0] > 300
+
+
 def test_the_same_seed_gives_the_same_draws_and_another_one_others() -> None:
     first, same, other = (
         walk(posterior(WIDE), CENTRE[None], COVARIANCE, 3000, seed).flat for seed in (1, 1, 2)
@@ -101,9 +115,11 @@ def test_the_same_seed_gives_the_same_draws_and_another_one_others() -> None:
 
 
 def test_walkers_begin_within_the_box_however_wide_they_are_sent_out() -> None:
-    far = walk(posterior(WIDE), CENTRE[None], 1e6 * COVARIANCE, 3000, 1)
-    inside = (far.flat >= WIDE[:, 0]) & (far.flat <= WIDE[:, 1])
-    assert inside.all()
+    corner = np.stack([CENTRE, CENTRE + 4 * WIDTH], 1)
+    for box, start in ((WIDE, CENTRE), (corner, CENTRE)):
+        far = walk(posterior(box), start[None], 1e6 * COVARIANCE, 3000, 1)
+        assert ((far.flat >= box[:, 0]) & (far.flat <= box[:, 1])).all()
+        assert np.unique(far.draws[0], axis=0).shape == (100, 2)
 
 
 def test_the_density_ends_at_the_box() -> None:

@@ -47,7 +47,8 @@ def draw_corner(found: SampleResult) -> Figure:
                 axes.set_xlabel(_named(column, v))
             if j == 0 < i:
                 axes.set_ylabel(_named(row, found.variables[row]))
-    grid[0, 0].legend(frameon=False, loc="upper left", bbox_to_anchor=(1.05, 1.0))
+    lines, words = grid[0, 0].get_legend_handles_labels()
+    grid[0, min(1, n - 1)].legend(lines, words, frameon=False, loc="upper left")
     return figure
 
 

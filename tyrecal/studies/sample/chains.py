@@ -20,6 +20,8 @@ Array = np.ndarray
 WALKERS = 100
 ENOUGH = 50  # tau, of steps
 WARM_UP = 5  # tau, of steps that are dropped
+WINDOW = 5  # tau: beyond, what is seen of rho is noise
+TRIES = 100  # of walkers to begin within the box
 MISSING = (
     "tyrecal sample needs the package emcee, which is not installed here:"
     " pip install 'tyrecal[sample]'"
@@ -77,20 +79,35 @@ def walk(
     size = start.shape[1]
     walkers = max(WALKERS, 4 * size)
     random = np.random.default_rng(seed)
-    begin = start[np.arange(walkers) % len(start)]
-    begin = begin + random.multivariate_normal(np.zeros(size), covariance, walkers)
-    for _ in range(100):  # those outside begin nearer to where they belong
+    about = start[np.arange(walkers) % len(start)]
+    begin, width = about.copy(), 1.0
+    outside = np.ones(walkers, bool)
+    for _ in range(TRIES):  # who begins outside begins anew, nearer to the optimum in the end
+        step = random.multivariate_normal(np.zeros(size), covariance, walkers)
+        begin[outside] = (about + width * step)[outside]
         outside = ~np.isfinite(density(begin))
         if not outside.any():
             break
-        nearest = start[np.arange(walkers) % len(start)][outside]
-        begin[outside] = nearest + (begin[outside] - nearest) / 2
+        width *= 0.9
     moves = [(emcee.moves.DEMove(), 0.9), (emcee.moves.DEMove(gamma0=1.0), 0.1)]
     sampler = emcee.EnsembleSampler(walkers, size, density, moves=moves, vectorize=True)
     state = np.random.RandomState(seed % 2**32).get_state()
     sampler.run_mcmc(emcee.State(begin, random_state=state), max(2, ceil(count / walkers)))
     draws = sampler.get_chain()
-    tau = np.maximum(emcee.autocorr.integrated_time(draws, tol=0), 1.0)
-    dropped = min(ceil(WARM_UP * tau.max()), len(draws) // 2)
+    dropped = min(ceil(WARM_UP * autocorrelation_time(draws).max()), len(draws) // 2)
+    draws = draws[dropped:]
     acceptance = float(np.mean(sampler.acceptance_fraction))
-    return Chains(draws[dropped:], dropped, acceptance, tau)
+    return Chains(draws, dropped, acceptance, autocorrelation_time(draws))
+
+
+def autocorrelation_time(draws: Array) -> Array:
+    """tau (v,) of draws (steps, walkers, v), in steps, at least 1 (Sokal 1989; Goodman and Weare
+    2010): 1 + 2 sum rho(t), rho the walkers' correlation about the mean of all, up to the first
+    window of `WINDOW` tau."""
+    count = len(draws)
+    spectrum = np.fft.rfft(draws - draws.mean((0, 1)), 2 * count, axis=0)
+    covariance = np.fft.irfft(abs(spectrum) ** 2, 2 * count, axis=0)[:count].mean(1)
+    tau = 2 * np.cumsum(covariance / covariance[0], 0) - 1
+    within = np.arange(count)[:, None] < WINDOW * tau
+    last = np.where(within.all(0), count - 1, np.argmin(within, 0))
+    return np.maximum(np.take_along_axis(tau, last[None], 0)[0], 1.0)
