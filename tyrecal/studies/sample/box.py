@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from math import ceil
 
 import numpy as np
 
@@ -15,6 +16,7 @@ Array = np.ndarray
 EDGE = 0.05  # of half a box: what lies there is at its edge
 AT_EDGE = 1e-3  # of the draws, that may
 GROWTH, GROWTHS = 0.25, 8  # of a box, at a side; times
+PROBE = 0.2  # of the draws, by which a box is tried
 LIKELY = 10.0  # below the highest ln p: optima that walkers start from
 
 
@@ -65,30 +67,33 @@ def grown(
     stage: hears whether sampling begins, or asking. Raises what ``ask`` does of the first box.
     """
     found: Drawn | None = None
-    evaluations = 0
-    for boxes in range(1, GROWTHS + 2):
+    evaluations, boxes, stopped = 0, 0, f"it was made larger {GROWTHS} times"
+    for _ in range(GROWTHS + 1):
         stage(False)
         try:
             posterior = ask(box)
         except EvaluationFailed as failure:
             if found is None:
                 raise
-            why = f"a larger box has no emulator: {failure}"
-            return replace(found, evaluations=evaluations, stopped=why)
+            stopped = f"a larger box has no emulator: {failure}"
+            break
         emulator = posterior.emulator
         evaluations += emulator.evaluations + emulator.failed
         error = emulator.stated_errors[posterior.rows[:, 1]]
         if found and (error > tolerance).any():
-            why = f"the emulator of a larger box may be {100 * error.max():.2g} % off"
-            return replace(found, evaluations=evaluations, stopped=why)
+            stopped = f"the emulator of a larger box may be {100 * error.max():.2g} % off"
+            break
         stage(True)
-        found = drawn(posterior, bounds, count, seed)
-        found = replace(found, boxes=boxes, evaluations=evaluations)
+        boxes += 1
+        found = drawn(posterior, bounds, ceil(PROBE * count), seed)
         if found.at_edge.sum() < AT_EDGE:
-            return found
+            found = drawn(posterior, bounds, count, seed)
+        if found.at_edge.sum() < AT_EDGE:
+            return replace(found, boxes=boxes, evaluations=evaluations)
         box = larger(box, bounds, found.at_edge)
     assert found
-    return replace(found, stopped=f"it was made larger {GROWTHS} times")
+    found = drawn(found.posterior, bounds, count, seed)
+    return replace(found, boxes=boxes, evaluations=evaluations, stopped=stopped)
 
 
 def shares_at_edge(x: Array, box: Array, bounds: Array) -> Array:

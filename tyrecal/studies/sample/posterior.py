@@ -52,16 +52,24 @@ class Posterior:
 
     def ln_f(self, x: Array, rows: Array) -> Array:
         """ln f (p, n) of rows of states and labels at x (p, v)."""
-        every = np.stack([self.emulator.ln_f(self._at(x, s)) for s in self.states])
-        return every[rows[:, 0], :, rows[:, 1]].T
+        found = np.empty((len(x), len(rows)))
+        for state in np.unique(rows[:, 0]):
+            own = rows[:, 0] == state
+            found[:, own] = self.emulator.ln_f(self._at(x, state))[:, rows[own, 1]]
+        return found
 
     def slopes(self, x: Array, rows: Array) -> Array:
         """d ln f / d x (p, n, v) of rows at x (p, v)."""
-        every = np.stack([self.emulator.slopes(self._at(x, s)) for s in self.states])
-        return np.moveaxis(every[rows[:, 0], :, rows[:, 1]], 0, 1)[:, :, : x.shape[1]]
+        found = np.empty((len(x), len(rows), x.shape[1]))
+        for state in np.unique(rows[:, 0]):
+            own = rows[:, 0] == state
+            rise = self.emulator.slopes(self._at(x, state))
+            found[:, own] = rise[:, rows[own, 1], : x.shape[1]]
+        return found
 
-    def _at(self, x: Array, state: Array) -> Array:
-        return np.hstack([x, np.broadcast_to(state, (len(x), len(state)))])
+    def _at(self, x: Array, state: int) -> Array:
+        further = self.states[state]
+        return np.hstack([x, np.broadcast_to(further, (len(x), len(further)))])
 
     def information(self, x: Array) -> Array:
         """J^T Sigma^-1 J (p, v, v): its inverse is the linear covariance of the variables."""
@@ -91,6 +99,8 @@ def optima(posterior: Posterior) -> tuple[Array, Array]:
         step = np.linalg.solve(H, np.where(held, 0.0, pull)[:, :, None])[:, :, 0]
         trial = np.clip(x + step, low, high)
         there = posterior(trial)
+        if abs(trial - x).max() < 1e-10 * np.ptp(posterior.box):
+            break
         better = there > value
         x, value = np.where(better[:, None], trial, x), np.where(better, there, value)
         damping = np.where(better, damping / 5, np.minimum(damping * 4, STIFFEST))
