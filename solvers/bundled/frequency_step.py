@@ -15,8 +15,8 @@ from .modes.harmonics import HarmonicModes, HasModes, SeededTyre, Vibration, low
 from .modes.inflated import Inflated
 from .modes.sensitivity import ModeShapes, RimAndAir, eigenvalue_rates, state_rate
 from .nonuniform.select import is_nonuniform, nonuniform_modes
-from .section.band import Cholesky
-from .section.boundary import numbering
+from .section.boundary import vibrating
+from .section.kept_fields import Factor
 from .section.loads import loads, spin
 from .section.model import Model, build
 
@@ -36,7 +36,7 @@ class FrequencyStep:
         rows = step.procedure.rows
         self.row = rows[0] if rows else DataLine(step.procedure.line, [])
         self.model = _model(tyre, step, self.dynamic_Hz, tyre.request.own_frequency)
-        self.equations = numbering(self.model, step)
+        self.equations = vibrating(self.model, step)
         self.vibration = Vibration(
             self.model,
             tyre.U,
@@ -87,7 +87,7 @@ class FrequencyStep:
             v: self._rates(rows, newton, modes, fields, eigenvalues) for v, rows in asked.items()
         }
 
-    def _newton(self) -> Cholesky:
+    def _newton(self) -> Factor:
         """The factor of Newton's tangent at the inflated state."""
         factor = self.factor
         if self.dynamic_Hz is not None or self.vibration.shift:
@@ -99,14 +99,14 @@ class FrequencyStep:
     def _rates(
         self,
         tangents: list[Tangent],
-        newton: Cholesky,
+        newton: Factor,
         modes: list[HarmonicModes],
         fields: ModeShapes,
         eigenvalues: Array,
     ) -> list[Array]:
         """Per harmonic, with the deck's numbers carrying the variable's tangent."""
         section, revolve, steps = self.tyre.deck.read(tangents)
-        models = partial(build, section)
+        models = partial(build, section, half=self.tyre.half)
         seeded = replace(self.tyre, section=section, revolve=revolve, models=models)
         step, U, own = steps[self.place], seeded.U, seeded.request.own_frequency
         still = moving = _model(seeded, step, None, False)
@@ -120,7 +120,7 @@ class FrequencyStep:
             rim_and_air = RimAndAir(wheel, air, rim, flow)
         acting = loads(moving, step)
         forms = eigenvalue_rates(moving, U, V, acting, fields, eigenvalues, rim_and_air)
-        tyre = SeededTyre(moving, spin(self.tyre.model, step), seeded.attached())
+        tyre = SeededTyre(moving, spin(self.model, step), seeded.attached())
         each = np.split(forms, np.cumsum([len(m.eigenvalues) for m in modes])[:-1])
         return [
             m.combination.rates(its, tyre) if m.combination else its

@@ -20,10 +20,11 @@ from .modes.harmonics import HarmonicModes
 from .modes.inflated import Inflated
 from .results import StepResult, write
 from .road import footprint_job
-from .section.boundary import numbering
+from .section.boundary import keeps_half_turn, numbering
 from .section.inflation import equilibrium
 from .section.loads import loads, pressures
 from .section.mechanics import mass
+from .section.mesh import read_mesh
 from .section.model import build
 
 
@@ -66,12 +67,16 @@ class Job:
     ):
         section, revolve, self.steps = deck.read([])
         self.deadline, self.road = deadline, footprint_job.read_road(revolve)
-        models = cache(partial(build, section))
+        mesh, half = read_mesh(section), False
+        if self.road is None and not sector:
+            half = keeps_half_turn(mesh, section, self.steps)
+        models = cache(partial(build, section, half=half))
         self.model = models(None, True, False)
-        U = np.zeros((len(self.model.mesh.X), 3))
+        U = np.zeros((len(mesh.X), 3))
         check = self._check_time
-        self.tyre = Inflated(deck, request, section, revolve, list(sector), models, U, check)
-        self.mass_kg = float(2 * np.pi * mass(self.model).sum().real)
+        self.tyre = Inflated(deck, request, section, revolve, list(sector), models, half, U, check)
+        copies = self.model.mesh.symmetry.copies
+        self.mass_kg = float(copies * 2 * np.pi * mass(self.model).sum().real)
         self.mass_kg += self.tyre.attached().total_kg
         self.factorisations = 0
 
@@ -152,7 +157,7 @@ class Job:
         model = self.tyre.models(None, step.long_term, False)
         acting, equations = loads(model, step), numbering(model, step)
         U, factorisations = equilibrium(model, equations, acting, self.tyre.U, self._check_time)
-        self.tyre.U = U
+        self.tyre.U = model.mesh.symmetry.field(U)
         self.factorisations += factorisations
 
     def _result(

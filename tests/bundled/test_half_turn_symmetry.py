@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
-from tyrecal_solvers.bundled.road.half_turn_symmetry import MIRROR_SIGNS, HalfTurn, mirror_images
+from tyrecal_solvers.bundled.road.half_turn_symmetry import HalfTurn
+from tyrecal_solvers.bundled.section.symmetry import MIRROR_SIGNS, mirror_images
 from tyrecal_solvers.bundled.solid3d.circumference import half_circle
 from tyrecal_solvers.bundled.solid3d.revolved import Revolved
 from tyrecal_solvers.errors import Refused
@@ -114,5 +113,5 @@ def test_sections_without_the_symmetry_are_refused() -> None:
 @pytest.mark.parametrize(("off", "same"), [(0.4e-6, True), (0.9e-6, False), (-0.9e-6, False)])
 def test_mirror_images_stand_in_the_same_place_to_half_a_micrometre(off: float, same: bool) -> None:
     X = np.array([[0.3, 0.0], [0.3, 0.02], [0.3, -0.02 - off], [0.35, -0.02]])
-    images = mirror_images(SimpleNamespace(X=X))  # type: ignore[arg-type]
+    images = mirror_images(X)
     assert images.tolist() == ([0, 2, 1, -1] if same else [0, -1, -1, -1])

@@ -85,7 +85,12 @@ def test_the_iteration_starts_from_smooth_motions(n: int) -> None:
     do not depend on each other, lopsided where a symmetry would keep it from half of the modes."""
     X = np.column_stack([np.linspace(0.3, 0.4, 9), np.linspace(-0.1, 0.1, 9)])
     shift, tilt, third = np.moveaxis(harmonics._start_fields(X, n), -1, 0)
-    assert not shift[:, :2].any() and (shift[:, 2] > 0).all()
+    turned = lambda u: (u * [1, -1, -1])[::-1].conj()  # z -> -z, and exp(i n Theta) back again
+    if n:
+        for field in (shift, tilt, third):
+            np.testing.assert_allclose(turned(field), field, atol=1e-15)
+        shift, tilt = shift / 1j, tilt / 1j
+    assert not shift[:, :2].any() and (shift[:, 2].real > 0).all()
     assert not tilt[:, 1:].any() and np.ptp(tilt[:, 0]) == pytest.approx(1.0)
     assert not third[:, 2].any() and abs(third[:, 0] + 1j * n * third[:, 1]).max() < 1e-12
     if n:

@@ -19,7 +19,6 @@ from tyrecal_solvers.bundled.road import davidson, footprint_job, stick
 from tyrecal_solvers.bundled.road import loaded_modes as loaded_modes_module
 from tyrecal_solvers.bundled.road.contact import Contact
 from tyrecal_solvers.bundled.road.contact_newton import PressedState
-from tyrecal_solvers.bundled.road.half_turn_symmetry import HALF_TURN
 from tyrecal_solvers.bundled.road.loaded_modes import (
     Inertia,
     LoadedModes,
@@ -27,6 +26,7 @@ from tyrecal_solvers.bundled.road.loaded_modes import (
     standing_waves,
 )
 from tyrecal_solvers.bundled.section.mechanics import mass
+from tyrecal_solvers.bundled.section.symmetry import HALF_TURN
 from tyrecal_solvers.bundled.solid3d.circumference import Circumference, half_circle
 from tyrecal_solvers.bundled.solid3d.revolved import Revolved
 from tyrecal_solvers.errors import RunFailed

@@ -14,8 +14,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..section.band import Cholesky, Indefinite, Numbering
+from ..section.band import Indefinite
+from ..section.kept_fields import Coordinates, Factor
 from ..section.mechanics import OfElements
+from ..section.symmetry import Whole
 from .cavity import Coupling
 
 Array = np.ndarray
@@ -51,8 +53,8 @@ class Border:
         """E (size, q + w + s) and D beside the band of K - shift M."""
         q, w, s = self.widths
         k = q + w
-        E = np.zeros((len(self.stiffness[0]), k + s), self.fields.dtype)
-        D = np.zeros((k + s, k + s), self.fields.dtype)
+        E = np.zeros((len(self.stiffness[0]), k + s), self.stiffness[0].dtype)
+        D = np.zeros((k + s, k + s), E.dtype)
         E[:, :q] = self.stiffness[0] - shift * self.mass[0]
         D[:q, :q] = self.stiffness[1] - shift * self.mass[1]
         if self.air is not None:
@@ -78,7 +80,7 @@ class Border:
 class Bordered:
     """Factor of a band with its border; ``tyre``: that of the band alone. Raises Indefinite."""
 
-    def __init__(self, tyre: Cholesky, border: Border, shift: float):
+    def __init__(self, tyre: Factor, border: Border, shift: float):
         self.tyre = tyre
         self._columns, D = border.columns(shift)
         self._inner = tyre.solve(self._columns) if D.size else self._columns
@@ -107,7 +109,8 @@ class Bordered:
 
 
 def assemble(
-    numbering: Numbering,
+    numbering: Coordinates,
+    symmetry: Whole,
     fields: Array,
     own: tuple[Array, Array],
     stiffness: Array,
@@ -116,14 +119,21 @@ def assemble(
 ) -> Border:
     """From the rim's ``fields`` T (nodes, 3, q), K T and M T (nodes, 3, q), and the wheel's own
     stiffness and mass (q,)."""
-    across = lambda image: np.tensordot(fields.conj(), image, ((0, 1), (0, 1)))
+    on_band = numbering.gather(stiffness)
+    real = np.isrealobj(on_band)  # on half of the section products of kept fields are real
+
+    def product(left: Array, right: Array) -> Array:
+        whole = np.tensordot(left, right, ((0, 1), (0, 1)))
+        return np.asarray(whole.real if real else whole)
+
     none = np.zeros((0, numbering.size))
+    wall = symmetry.kept(np.moveaxis(air.C, 0, -1)) if air else None
     return Border(
         fields,
-        (numbering.gather(stiffness), across(stiffness) + np.diag(own[0])),
-        (numbering.gather(mass), across(mass) + np.diag(own[1])),
-        numbering.gather(np.moveaxis(air.C, 0, -1)).T if air else none,
-        np.tensordot(air.C, fields, 2) if air else none[:, : fields.shape[2]],
+        (on_band, product(fields.conj(), stiffness) + np.diag(own[0])),
+        (numbering.gather(mass), product(fields.conj(), mass) + np.diag(own[1])),
+        none if wall is None else numbering.gather(wall).T,
+        none[:, : fields.shape[2]] if wall is None else product(wall.conj(), fields),
         air,
     )
 

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...errors import RunFailed
-from ..section.band import Cholesky
+from ..section.kept_fields import Factor
 from ..section.materials import ModulusTable
 from .bordered import Bordered
 from .harmonics import HarmonicModes, Vibration
@@ -31,7 +31,7 @@ class SelfConsistent:
     def __init__(self, vibration: Vibration, tables: list[ModulusTable]):
         self.vibration, self.tables = vibration, tables
 
-    def modes(self, n: int, count: int, factor: Cholesky | Bordered | None = None) -> HarmonicModes:
+    def modes(self, n: int, count: int, factor: Factor | Bordered | None = None) -> HarmonicModes:
         """The ``count`` lowest modes of harmonic n, each at the modulus of its own frequency.
 
         ``factor`` serves a constant modulus only. Raises RunFailed.

@@ -16,7 +16,8 @@ from scipy.sparse import csr_array
 
 from ...errors import RunFailed
 from ..section import mechanics
-from ..section.band import Cholesky, Indefinite, Numbering
+from ..section.band import Indefinite
+from ..section.kept_fields import Coordinates, Factor
 from ..section.model import Model
 from ..section.parts.part import TyrePart, of_each_component
 from ..section.point_elements import PointElements
@@ -105,7 +106,7 @@ class Vibration:
         model: Model,
         U: Array,
         loads: Sequence[TyrePart],
-        numbering: Numbering,
+        numbering: Coordinates,
         shift: float,
         wheel: Wheel | None = None,
         air: GasCavity | None = None,
@@ -122,7 +123,10 @@ class Vibration:
         self.weights = np.array([1.0] + [0.0] * (len(parts) - 1))
         self.mass: csr_array = mechanics.mass(model)
         self._X = model.mesh.X.real
-        self._forces = mechanics.gradient(model, U, loads) if wheel else U
+        self._symmetry = model.mesh.symmetry
+        self._forces = U
+        if wheel:
+            self._forces = self._symmetry.force(mechanics.gradient(model, U, loads))
         self._borders: dict[int, Border | None] = {}
         self._couplings: dict[int, Coupling] = {}
         self._shifted_mass = None
@@ -147,10 +151,10 @@ class Vibration:
                 image = (
                     image + 1j * n * bordered.apply(K1, field) + n * n * bordered.apply(K2, field)
                 )
-            found.append(float(np.vdot(field, image).real))
+            found.append(self._symmetry.copies * float(np.vdot(field, image).real))
         return np.array(found)
 
-    def factor(self, n: int) -> Cholesky | Bordered:
+    def factor(self, n: int) -> Factor | Bordered:
         """Factor of K(n) - shift M. Raises RunFailed."""
         three = self._bands[0]
         if len(self.weights) > 1:
@@ -168,7 +172,7 @@ class Vibration:
         if self._shifted_mass is not None:
             band -= self.shift * self._shifted_mass
         try:
-            tyre, border = Cholesky(band), self._border(n)
+            tyre, border = self.numbering.factor(band), self._border(n)
             return Bordered(tyre, border, self.shift) if border else tyre
         except Indefinite:
             raise RunFailed(
@@ -184,9 +188,7 @@ class Vibration:
 
     def times_mass(self, x: Array) -> Array:
         """The tyre's M x for (size,) or (size, b), per radian."""
-        full = self.numbering.spread(x)
-        image = self.mass @ full.reshape(len(full), -1)
-        return self.numbering.gather(image.reshape(full.shape))
+        return self.numbering.times(self.mass, x)
 
     def _border(self, n: int) -> Border | None:
         if n not in self._borders:
@@ -201,7 +203,7 @@ class Vibration:
         own = np.zeros(0), np.zeros(0)
         if self.wheel is not None and moving:
             real, imag = self.wheel.fields(n, self._X)
-            fields = real + 1j * imag if n else real
+            fields = self._symmetry.kept(real + 1j * imag if n else real)
             own = self.wheel.own(n, self._X, self._forces)
         stiffness = np.zeros_like(fields)
         for weight, three in zip(self.weights, self._parts, strict=True):
@@ -209,17 +211,18 @@ class Vibration:
                 if weight and factor and moving:
                     stiffness = stiffness + weight * factor * bordered.apply(part, fields)
         mass = (self.mass @ fields.reshape(len(fields), -1)).reshape(fields.shape)
+        stiffness, mass = self._symmetry.force(stiffness), self._symmetry.force(mass)
         if self.air and n not in self._couplings:
             self._couplings[n] = coupling(self.air, self._X, self._U, n)
         air = self._couplings.get(n)
-        return bordered.assemble(self.numbering, fields, own, stiffness, mass, air)
+        return bordered.assemble(self.numbering, self._symmetry, fields, own, stiffness, mass, air)
 
     def _times_mass(self, n: int, x: Array) -> Array:
         border = self._border(n)
         tyre = self.times_mass(x[: self.numbering.size])
         return border.times_mass(x, tyre) if border else tyre
 
-    def modes(self, n: int, count: int, factor: Cholesky | Bordered | None = None) -> HarmonicModes:
+    def modes(self, n: int, count: int, factor: Factor | Bordered | None = None) -> HarmonicModes:
         """The ``count`` lowest modes of harmonic n that are the tyre's, from ``lowest_Hz`` on.
 
         Raises RunFailed.
@@ -231,9 +234,7 @@ class Vibration:
                 return found.where(np.flatnonzero(is_tyres)[:count])
             asked += count - int(is_tyres.sum())
 
-    def _lowest(
-        self, n: int, count: int, factor: Cholesky | Bordered
-    ) -> tuple[HarmonicModes, Array]:
+    def _lowest(self, n: int, count: int, factor: Factor | Bordered) -> tuple[HarmonicModes, Array]:
         """The lowest modes, and which of them are the tyre's."""
         border, size = self._border(n), self.numbering.size
         start = self.numbering.gather(_start_fields(self._X, n))
@@ -251,12 +252,14 @@ class Vibration:
         if border:
             rim, flow = vectors[size : size + q], vectors[size + q :]
             shapes = shapes + border.fields @ rim
-            if w:
-                air = self._couplings[n]
-                modes = zip(np.moveaxis(shapes, -1, 0), values, strict=True)
-                flow = np.stack([air.flow(u, value) for u, value in modes], -1)
-                energy = np.einsum("wm,wv,vm->m", flow.conj(), border.flow_mass, flow).real
-                is_tyres &= energy < MIN_AIR_SHARE
+        if n == 0:  # of a kept field the real one, see `symmetry`
+            shapes = shapes.real + shapes.imag
+        if border and w:
+            air = self._couplings[n]
+            modes = zip(np.moveaxis(shapes, -1, 0), values, strict=True)
+            flow = np.stack([air.flow(u, value) for u, value in modes], -1)
+            energy = np.einsum("wm,wv,vm->m", flow.conj(), border.flow_mass, flow).real
+            is_tyres &= energy < MIN_AIR_SHARE
         return HarmonicModes(n, values, np.moveaxis(shapes, -1, 0), rim.T, flow.T), is_tyres
 
 
@@ -264,15 +267,13 @@ def _start_fields(X: Array, n: int) -> Array:
     """Smooth fields (nodes, 3, 3) that hold much of the lowest modes of harmonic n.
 
     Axial shift and tilt; spin for n = 0, else bending without stretching the circumference,
-    u_r + i n u_theta = 0.
+    u_r + i n u_theta = 0. Those of n >= 1 are kept by half turn and conjugation, see `symmetry`.
     """
     tilt = X[:, 1] / np.ptp(X[:, 1])
-    lop = (
-        0.0 if n else 0.3
-    )  # lopsided, for all three are odd under z -> -z, theta -> -theta at n = 0
+    lop = 0.3  # at n = 0, where half a turn reverses all three
     fields = np.zeros((len(X), 3, 3), complex if n else float)
-    fields[:, 2, 0] = 1.0 + lop * tilt
-    fields[:, 0, 1] = tilt + lop
+    fields[:, 2, 0] = 1j if n else 1.0 + lop * tilt
+    fields[:, 0, 1] = 1j * tilt if n else tilt + lop
     fields[:, 0, 2] = 1.0 if n else 0.0
     fields[:, 1, 2] = 1j / n if n else X[:, 0] / X[:, 0].max() * (1.0 + lop * tilt)
     return fields
@@ -281,7 +282,7 @@ def _start_fields(X: Array, n: int) -> Array:
 class HasModes(Protocol):
     """A vibration, of one modulus or of each mode's own."""
 
-    def modes(self, n: int, count: int, factor: Cholesky | Bordered | None = None) -> HarmonicModes:
+    def modes(self, n: int, count: int, factor: Factor | Bordered | None = None) -> HarmonicModes:
         """The lowest modes of a harmonic."""
 
 

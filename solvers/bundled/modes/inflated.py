@@ -10,6 +10,7 @@ import numpy as np
 from ..deck.keywords import Keyword
 from ..deck.request import Request
 from ..deck.steps import Deck, DeckStep
+from ..section.mesh import read_mesh
 from ..section.model import Model
 from ..section.point_elements import PointElements, read_point_elements
 from .cavity import GasCavity, read_cavity
@@ -32,6 +33,7 @@ class Inflated:
     revolve: list[Keyword]
     sector: list[Keyword]
     models: Models
+    half: bool  # they are of half the section, which stands for the whole
     U: Array  # displacements (nodes, 3), m
     check: Callable[[], None]  # raises where the time is over
 
@@ -42,7 +44,7 @@ class Inflated:
 
     def attached(self) -> PointElements:
         """Masses and springs on the tyre. Raises DeckError."""
-        return read_point_elements(self.revolve, self.model.mesh)
+        return read_point_elements(self.revolve, read_mesh(self.section))
 
     def wheel_and_cavity(
         self, model: Model, step: DeckStep
@@ -50,4 +52,6 @@ class Inflated:
         """The rim that moves in a step and the gas in the cavity, where there are such."""
         wheel = read_wheel(self.revolve, model.mesh, step) if step.revolved else None
         cavity = self.request.cavity
-        return wheel, read_cavity(self.section, model.mesh, cavity) if cavity else None
+        if not cavity:
+            return wheel, None
+        return wheel, read_cavity(self.section, read_mesh(self.section), cavity)

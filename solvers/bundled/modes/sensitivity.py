@@ -17,7 +17,7 @@ from scipy.sparse import csr_array
 
 from ..deck.keywords import COMPLEX_STEP
 from ..section import mechanics
-from ..section.band import Cholesky, Numbering
+from ..section.kept_fields import Coordinates, Factor
 from ..section.model import Model
 from ..section.parts.frame import IN_PLANE
 from ..section.parts.mode_shapes import ModeShapes
@@ -30,14 +30,15 @@ Array = np.ndarray
 
 
 def state_rate(
-    model: Model, U: Array, loads: Sequence[TyrePart], numbering: Numbering, factor: Cholesky
+    model: Model, U: Array, loads: Sequence[TyrePart], numbering: Coordinates, factor: Factor
 ) -> Array:
     """v = dU/dp (n, 3) of the equilibrium U; ``model``, ``loads`` carry p's tangent.
 
     ``factor``: of the real Newton tangent at U.
     """
-    rate = np.imag(mechanics.residual(model, U, loads, numbering)) / COMPLEX_STEP
-    return numbering.spread(-factor.solve(rate))
+    rate = np.imag(mechanics.gradient(model, U, loads)) / COMPLEX_STEP
+    rate = numbering.gather(model.mesh.symmetry.force(rate))
+    return np.asarray(numbering.spread(-factor.solve(rate)).real)
 
 
 def eigenvalue_rates(
@@ -59,7 +60,7 @@ def eigenvalue_rates(
     if rim_and_air:
         fields = rim_and_air.carried(model.mesh.X, fields)
     total = np.zeros(len(eigenvalues), complex)
-    own = 1.0
+    own, copies = 1.0, model.mesh.symmetry.copies
     spins = [load for load in loads if isinstance(load, Spin)]
     for part in (*model.parts, *(load for load in loads if not isinstance(load, Spin))):
         total += part.form(state, fields)
@@ -71,11 +72,12 @@ def eigenvalue_rates(
                 total += (ratio - 1) * form
                 # d rho / d lambda = rho (d ln rho / d ln f) / (2 lambda)
                 slope = np.array([table.slope(f) for f in hertz])
-                own = own - form.real * ratio.real * slope / (2 * eigenvalues)
+                own = own - copies * form.real * ratio.real * slope / (2 * eigenvalues)
     M = mechanics.mass(model)
     total -= eigenvalues * _energies(M, fields).sum(1)
     if spins:  # of all parts at once, their mass being there
         total -= _energies(spins[0].spin2 * M, fields) @ np.diag(IN_PLANE)
+    total *= copies
     if rim_and_air:
         total += rim_and_air.forms(model, state, loads, fields, eigenvalues)
     return total.imag / COMPLEX_STEP / own
@@ -114,6 +116,8 @@ class RimAndAir:
         total = np.zeros(len(eigenvalues), complex)
         X = model.mesh.X
         forces = mechanics.gradient(model, state, loads) if self.wheel else state
+        whole = model.mesh.symmetry.force
+        forces = whole(forces.real) + 1j * whole(forces.imag)
         couplings = {m: coupling(self.air, X, state, m) for m in set(fields.n.tolist()) if self.air}
         for j, ((m,), (real,), (imag,)) in enumerate(fields.modes):
             if self.wheel:

@@ -3,7 +3,7 @@
 Amplitudes q of u = Re[T q exp(i n Theta)] at the rim's nodes, d = x - reference point:
 
     n = 0   axial   T = (0, 0, 1)          spin about the axle      T = (0, r, 0)
-    n = 1   radial  T = (1, i, 0)          tilt about a diameter    T = (d_z, i d_z, -r)
+    n = 1   radial  T = (1, i, 0)          tilt about a diameter    T = i (d_z, i d_z, -r)
 
 Higher harmonics leave it at rest. A rotation w moves a node by w x d + w x (w x d) / 2; the second
 part works against the forces f (N per radian) that hold the rim in the inflated state, which adds
@@ -55,8 +55,8 @@ class Wheel:
             elif name == "radial":
                 real[self.rim, 0, k] = imag[self.rim, 1, k] = 1.0
             else:
-                real[self.rim, 0, k] = imag[self.rim, 1, k] = d_z
-                real[self.rim, 2, k] = -r
+                real[self.rim, 1, k], imag[self.rim, 0, k] = -d_z, d_z
+                imag[self.rim, 2, k] = -r
         return real, imag
 
     def own(self, n: int, X: Array, forces: Array) -> tuple[Array, Array]:

@@ -125,9 +125,9 @@ def _reduced(eigenvalues: Array, p: Array, looked: int) -> Array:
 def _with_response(vibration: Vibration, n: int, count: int, attached: PointElements) -> Family:
     """Modes of harmonic n and the static response to unit forces on the attached components."""
     factor, numbering = vibration.factor(n), vibration.numbering
-    force = np.zeros((*numbering.equation.shape, len(attached.rows)), complex if n else float)
+    force = np.zeros((*numbering.free.shape, len(attached.rows)))
     force[attached.rows, attached.components, range(len(attached.rows))] = 1.0
-    force = numbering.gather(force)
+    force = numbering.apart(force)
     response = factor.solve(force)
     gives, directions = np.linalg.eigh(force.conj().T @ response)
     directions = directions[:, gives > MIN_RESPONSE_SHARE * gives[-1]]
@@ -138,7 +138,10 @@ def _with_response(vibration: Vibration, n: int, count: int, attached: PointElem
         own = numbering.gather(np.moveaxis(modes.shapes, 0, -1))
         vectors = np.hstack([own, vectors])
         images = np.hstack([vibration.times_mass(own) * modes.eigenvalues, images])
-    return ritz(vibration, n, vectors, images)
+    family = ritz(vibration, n, vectors, images)
+    if n == 0:  # of kept fields the real ones, see `symmetry`
+        family.shapes = family.shapes.real + family.shapes.imag
+    return family
 
 
 def ritz(vibration: Vibration, n: int, vectors: Array, images: Array) -> Family:

@@ -85,7 +85,8 @@ class Whirl:
                 turned = np.einsum(
                     "meai,eab,ij,mebj->m", u.conj(), M.imag / COMPLEX_STEP, SPIN_AXIS, u
                 )
-                by_spin = by_spin + (2j * self.spin * turned).real
+                copies = change.model.mesh.symmetry.copies
+                by_spin = by_spin + copies * (2j * self.spin * turned).real
         slope = (forms + self.omega * by_spin) / (2 * self.omega - self.coriolis)
         return np.asarray(2 * self.fixed * (slope - self.n * faster))
 
@@ -114,15 +115,17 @@ def _basis(vibration: Vibration, spin: float, n: int, count: int) -> Family:
 
 
 def _turned(vibration: Vibration, x: Array) -> Array:
-    """e_z x u for (size, b)."""
+    """i e_z x u for (size, b), or without i where fields are real."""
     full = vibration.numbering.spread(x)
-    return vibration.numbering.gather(np.einsum("ij,njb->nib", SPIN_AXIS, full))
+    i = 1j if np.iscomplexobj(full) else 1.0
+    return vibration.numbering.gather(np.einsum("ij,njb->nib", i * SPIN_AXIS, full))
 
 
 def _coriolis(vibration: Vibration, spin: float, family: Family) -> Array:
     """C = 2 i Omega M S on the basis."""
     x = vibration.numbering.gather(np.moveaxis(family.shapes, 0, -1))
-    return 2j * spin * (x.conj().T @ vibration.times_mass(_turned(vibration, x)))
+    i = 1.0 if np.iscomplexobj(vibration.numbering.spread(x)) else 1j
+    return 2 * i * spin * (x.conj().T @ vibration.times_mass(_turned(vibration, x)))
 
 
 def _quadratic(K: Array, C: Array) -> tuple[Array, Array]:

@@ -47,8 +47,7 @@ def nonuniform_modes(
             modes.append(waves(vibration, spin, n, count))
         return modes
     if attached:
-        equations = vibration.numbering
-        if (equations.equation[attached.rows, attached.components] == equations.size).any():
+        if not vibration.numbering.free[attached.rows, attached.components].all():
             raise DeckError(line, "masses and springs on nodes that are held do nothing")
         return attached_modes(vibration, attached, harmonics, count, tyre.check)
     return _sector_modes(tyre, step, vibration, harmonics, count)

@@ -81,7 +81,7 @@ class FullCircle:
     def __init__(self, vibration: Vibration, tyre: Revolved, sector: SpliceSector, highest: int):
         self.vibration, self.tyre, self.highest = vibration, tyre, highest
         self.factors = [vibration.factor(n) for n in range(highest + 1)]
-        self.free = vibration.numbering.equation < vibration.numbering.size
+        self.free = vibration.numbering.free
         around = tyre.around
         share = sector.share(_angles(len(around.weights)), 2 * highest)
         self._waves = around.N.T @ ((around.weights * share)[:, None] * around.N)

@@ -17,8 +17,9 @@ from scipy.linalg.lapack import spotrf, strtrs
 
 from ...errors import Refused
 from ..section.band import Indefinite
+from ..section.symmetry import MIRROR_SIGNS
 from ..solid3d.circumference import Circumference
-from .half_turn_symmetry import MIRROR_SIGNS, HalfTurn
+from .half_turn_symmetry import HalfTurn
 
 Array = np.ndarray
 Tangents = list[tuple[Array, Array, Array, Array]]

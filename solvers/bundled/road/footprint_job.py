@@ -28,11 +28,12 @@ from ..section.model import Model
 from ..section.parts.elastic import Elastic
 from ..section.parts.hourglass import Hourglass
 from ..section.parts.pressure import Pressure
+from ..section.symmetry import HALF_TURN
 from ..solid3d.circumference import half_circle
 from ..solid3d.revolved import Revolved
 from .contact import flat_road
 from .contact_newton import ContactNewton, PressedState
-from .half_turn_symmetry import HALF_TURN, HalfTurn
+from .half_turn_symmetry import HalfTurn
 from .loaded_modes import SPARE, loaded_modes
 from .patch import contact_area
 from .stick import held

@@ -1,4 +1,4 @@
-"""A quarter of the tyre stands for the whole: half turns about the vertical, and mirror images.
+"""A quarter of the tyre stands for the whole: half turns about the vertical (`section.symmetry`).
 
 A tyre of mirror-symmetric section, pressed straight on the road, keeps (theta, z) -> (-theta, -z),
 a half turn about the vertical, although its cords break both mirror symmetries. So fields live on
@@ -16,18 +16,9 @@ import numpy as np
 
 from ...errors import Refused
 from ..section.mesh import DeckMesh
+from ..section.symmetry import MIRROR_SIGNS, SAME_PLACE, mirror_images
 
 Array = np.ndarray
-MIRROR_SIGNS = np.array([1.0, 1.0, -1.0])
-HALF_TURN = np.array([1.0, -1.0, -1.0])  # about the vertical: r, theta, z
-SAME_PLACE = 1e-6  # m
-
-
-def mirror_images(mesh: DeckMesh) -> Array:
-    """Each node's mirror image (n,) in the middle plane, -1 where there is none."""
-    X = np.round(mesh.X.real / SAME_PLACE).astype(int)
-    places = {(r, z): i for i, (r, z) in enumerate(X.tolist())}
-    return np.array([places.get((r, -z), -1) for r, z in X.tolist()])
 
 
 class HalfTurn:
@@ -39,7 +30,7 @@ class HalfTurn:
 
     def __init__(self, mesh: DeckMesh, free: Array, angles: int, parity: int = 1):
         X = mesh.X.real
-        other = mirror_images(mesh)
+        other = mirror_images(X)
         if (other < 0).any() or (free != free[other]).any():
             raise Refused("the section or its supports differ between z and -z")
         self.other = other

@@ -18,12 +18,13 @@ from ..modes.harmonics import HarmonicModes
 from ..section.band import Indefinite
 from ..section.mechanics import mass
 from ..section.model import Model
+from ..section.symmetry import HALF_TURN
 from ..solid3d.circumference import Circumference
 from ..solid3d.revolved import Revolved
 from . import davidson
 from .block_cholesky import Elimination, Factor
 from .contact import Contact
-from .half_turn_symmetry import HALF_TURN, HalfTurn
+from .half_turn_symmetry import HalfTurn
 
 Array = np.ndarray
 SPARE = 3  # modes of each kind beyond half of the wanted ones

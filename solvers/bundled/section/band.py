@@ -16,13 +16,13 @@ class Indefinite(ArithmeticError):
 
 class Numbering:
     """Equations of the free displacement components, in the order of the deck's nodes or, where
-    that gives the narrower band, of reverse Cuthill and McKee.
+    that gives the narrower band, of reverse Cuthill and McKee; towards the nodes ``end`` (n,).
 
     ``equation`` (n, 3): equation of each component, or ``size`` (a spare place that is dropped)
     where it is held; ``bandwidth``: sub-diagonals; ``order``: flat component of each equation.
     """
 
-    def __init__(self, connectivities: list[Array], free: Array):
+    def __init__(self, connectivities: list[Array], free: Array, end: Array | None = None):
         n = len(free)
         rows = np.concatenate([np.repeat(c, c.shape[1], 1).ravel() for c in connectivities])
         cols = np.concatenate([np.tile(c, (1, c.shape[1])).ravel() for c in connectivities])
@@ -31,6 +31,10 @@ class Numbering:
         graph = csr_array((np.ones(keep.sum(), np.int8), (rows[keep], cols[keep])), (n, n))
         orders: list[Array] = [np.arange(n), reverse_cuthill_mckee(graph, symmetric_mode=True)]
         nodes = min(orders, key=lambda order: _spread(graph, order))
+        if end is not None:
+            there = np.flatnonzero(end[nodes[touching[nodes]]])
+            if 2 * there.sum() < len(there) * touching.sum():  # nearer to the first node
+                nodes = nodes[::-1]
         flat = (3 * nodes[:, None] + np.arange(3)).ravel()
         self.order = flat[free.ravel()[flat]]
         self.size = len(self.order)
@@ -86,6 +90,24 @@ class Numbering:
     def gather(self, full: Array) -> Array:
         """Components (n, 3, ...) to equations (size, ...)."""
         return full.reshape(self.equation.size, *full.shape[2:])[self.order]
+
+    def apart(self, full: Array) -> Array:
+        """Coordinates (size, ...) that span fields (n, 3, ...)."""
+        return self.gather(full)
+
+    @property
+    def free(self) -> Array:
+        """Mask (n, 3) of the free components."""
+        return np.asarray(self.equation < self.size)
+
+    def factor(self, band: Array) -> Cholesky:
+        """Factor of an assembled band, which it overwrites. Raises Indefinite."""
+        return Cholesky(band)
+
+    def times(self, mass: csr_array, x: Array) -> Array:
+        """M x for (size,) or (size, b); ``mass`` (n, n) is that of each component."""
+        full = self.spread(x)
+        return self.gather((mass @ full.reshape(len(full), -1)).reshape(full.shape))
 
 
 def _spread(graph: csr_array, order: Array) -> int:

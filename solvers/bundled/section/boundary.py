@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..deck.keywords import DataLine, DeckError
+from ..deck.keywords import DataLine, DeckError, Keyword
 from ..deck.steps import DeckStep
 from .band import Numbering
+from .half_mesh import half_mesh
+from .kept_fields import KeptFields
 from .mesh import DeckMesh
 from .model import Model
+from .symmetry import MirrorHalf
 
 Array = np.ndarray
 SECTION_DOFS = {1: 0, 2: 2, 5: 1}  # ABAQUS's r, z, twist to our components r, theta, z
@@ -17,23 +20,58 @@ REVOLVED_DOFS = {1: 0, 2: 1, 3: 2}
 
 
 def numbering(model: Model, step: DeckStep) -> Numbering:
-    """Equations of the components that ``step`` leaves free, remembered with the mesh.
+    """Equations of the state's components that ``step`` leaves free, remembered with the mesh.
 
     Raises DeckError.
     """
     mesh = model.mesh
     free = _free(mesh, step)
-    key = free.tobytes()
-    if key not in mesh.numberings:
-        groups = [block.connectivity for block in mesh.blocks.values()]
-        mesh.numberings[key] = Numbering(groups, free)
-    return mesh.numberings[key]
+    if isinstance(mesh.symmetry, MirrorHalf):
+        free[mesh.symmetry.middle, 1:] = False  # the state is its own half turn
+    key = "state", free.tobytes()
+    if key not in mesh.derived:
+        mesh.derived[key] = Numbering(list(mesh.connectivity.values()), free)
+    known: Numbering = mesh.derived[key]
+    return known
+
+
+def vibrating(model: Model, step: DeckStep) -> Numbering | KeptFields:
+    """Coordinates of the vibrations that ``step`` leaves free. Raises DeckError."""
+    mesh, symmetry = model.mesh, model.mesh.symmetry
+    if not isinstance(symmetry, MirrorHalf):
+        return numbering(model, step)
+    free = _free(mesh, step)
+    key = "vibrations", free.tobytes()
+    if key not in mesh.derived:
+        mesh.derived[key] = KeptFields(list(mesh.connectivity.values()), free, symmetry)
+    known: KeptFields = mesh.derived[key]
+    return known
+
+
+def keeps_half_turn(mesh: DeckMesh, section: list[Keyword], steps: list[DeckStep]) -> bool:
+    """Whether a job is its own half turn: the mesh, the sets that are filled with something, what
+    loads and what holds them, all nodes of elements across the middle plane among that. Raises
+    DeckError."""
+    half = half_mesh(mesh)
+    if half is None or not isinstance(half.symmetry, MirrorHalf):
+        return False
+    filled = {k.need("ELSET") for k in section if k.name in ("SOLID SECTION", "SURFACE SECTION")}
+    filled |= {name for step in steps for name in (*step.centrifugal, *step.spin)}
+    loaded = {name for step in steps for name in step.pressures}
+    if not (filled <= half.element_sets.keys() and loaded <= half.edges.keys()):
+        return False
+    across = [rows[half.symmetry.share(rows)[:, 0] < 1] for rows in half.connectivity.values()]
+    masks = [_free(mesh, step) for step in steps]
+    return all(
+        (free == free[half.symmetry.other]).all() and not any(free[rows].any() for rows in across)
+        for free in masks
+    )
 
 
 def _free(mesh: DeckMesh, step: DeckStep) -> Array:
     free = np.zeros((len(mesh.X), 3), bool)
-    for block in mesh.blocks.values():
-        free[block.connectivity] = True
+    for rows in mesh.connectivity.values():
+        free[rows] = True
     for reference, tied in mesh.reference_nodes.items():
         moves = step.revolved and step.procedure.name == "FREQUENCY"
         if rim_freedoms(mesh, step, reference) and not moves:

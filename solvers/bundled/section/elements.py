@@ -34,10 +34,12 @@ class Solids:
     mass_weights: Array  # (e, g')
 
 
-def solids(X: Array, connectivity: Array, kind: shapes.ElementType) -> Solids:
+def solids(
+    X: Array, connectivity: Array, kind: shapes.ElementType, share: Array | float = 1.0
+) -> Solids:
     """Operators of solids of one type; with one Gauss point the hourglass vectors, too.
 
-    X (n, 2): R, Z of all nodes in m. Raises Inverted.
+    X (n, 2): R, Z of all nodes in m; share (e, 1): of each that counts. Raises Inverted.
     """
     rule, mass_rule = kind.rule(kind.points), kind.rule(kind.mass_points)
     R, weights, gradient = _map(X, connectivity, rule)
@@ -52,12 +54,12 @@ def solids(X: Array, connectivity: Array, kind: shapes.ElementType) -> Solids:
     _, mass_weights, _ = _map(X, connectivity, mass_rule)
     return Solids(
         connectivity,
-        weights,
+        weights * share,
         B0.reshape(e, g, 9, 3 * a),
         hoop,
         _hourglass(X[connectivity], gradient[:, 0], weights[:, 0]) if kind.points == 1 else None,
         mass_rule.N,
-        mass_weights,
+        mass_weights * share,
     )
 
 
@@ -106,8 +108,8 @@ class Lines:
         return Lines(**{name: v if name == "N" else v[rows] for name, v in own.items()})
 
 
-def lines(X: Array, connectivity: Array, points: int = 2) -> Lines:
-    """Operators along two- or three-node lines in the section."""
+def lines(X: Array, connectivity: Array, points: int = 2, share: Array | float = 1.0) -> Lines:
+    """Operators along two- or three-node lines in the section; share (e, 1): as for `solids`."""
     rule = shapes.line(connectivity.shape[1], points)
     ends = X[connectivity]
     dX = np.einsum("ga,eaj->egj", rule.dN[..., 0], ends)
@@ -119,5 +121,5 @@ def lines(X: Array, connectivity: Array, points: int = 2) -> Lines:
         rule.dN[..., 0] / length[..., None],
         np.einsum("ga,ea->eg", rule.N, ends[..., 0]),
         dX / length[..., None],
-        rule.weights * length,
+        rule.weights * length * share,
     )

@@ -15,7 +15,7 @@ from .parts.spin import spinning
 def pressures(model: Model, step: DeckStep) -> list[Pressure]:
     """The pressure on each surface. Raises DeckError."""
     for surface in step.pressures:
-        if surface not in model.mesh.faces:
+        if surface not in model.mesh.edges:
             raise DeckError(step.procedure.line, f"surface {surface} of the step is not defined")
     return [Pressure(model.mesh.faces[s], value) for s, value in step.pressures.items()]
 
@@ -59,7 +59,7 @@ def _uniform(
     }
     for number in set(model.mesh.place) - loaded:
         kind, row = model.mesh.place[number]
-        if tuple(model.mesh.blocks[kind].connectivity[row].tolist()) in massive:
+        if tuple(model.mesh.connectivity[kind][row].tolist()) in massive:
             raise DeckError(line, f"element {number} has mass, but is left out of the load {load}")
     if len(set(sets.values())) > 1:
         raise DeckError(line, f"the load {load} must be one for all elements of the tyre")

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from ..deck.keywords import DeckError, Keyword
 from . import elements
-from .band import Numbering
 from .parts.law import Inverted
 from .shapes import TYPES
+from .symmetry import Whole
 
 Array = np.ndarray
 
@@ -22,14 +24,43 @@ class DeckMesh:
 
     X: Array  # (n, 2): R, Z, m
     index: dict[int, int]  # node number to row
-    blocks: dict[str, elements.Solids | elements.Lines]  # element type to operators
+    connectivity: dict[str, Array]  # element type to rows (e, a) of nodes
     place: dict[int, tuple[str, int]]  # element number to (type, row of its block)
     node_sets: dict[str, list[int]]
     element_sets: dict[str, list[int]]
-    faces: dict[str, elements.Lines]  # surface name to lines
+    edges: dict[str, Array]  # surface name to rows (e, 2 or 3) of nodes
     reference_nodes: dict[int, list[int]]  # of rigid rims, to the nodes tied to them
-    # by the mask of free components
-    numberings: dict[bytes, Numbering] = field(default_factory=dict)
+    symmetry: Whole = field(default_factory=Whole)  # what the elements stand for
+    # what was made of the mesh, by its kind and what it depends on
+    derived: dict[tuple[object, ...], Any] = field(default_factory=dict)
+
+    @cached_property
+    def blocks(self) -> dict[str, elements.Solids | elements.Lines]:
+        """Element type to operators. Raises DeckError."""
+        return {kind: self._block(kind, rows) for kind, rows in self.connectivity.items()}
+
+    def _block(self, kind: str, rows: Array) -> elements.Solids | elements.Lines:
+        share = self.symmetry.share(rows)
+        if not TYPES[kind].faces:
+            return elements.lines(self.X, rows, share=share)
+        try:
+            return elements.solids(self.X, rows, TYPES[kind], share)
+        except Inverted as error:
+            number = next(e for e, p in self.place.items() if p == (kind, error.element))
+            raise DeckError(
+                0,
+                f"element {number} has no positive area: it folds over or its nodes run clockwise",
+            ) from None
+
+    @cached_property
+    def faces(self) -> dict[str, elements.Lines]:
+        """Surface name to lines."""
+        return {
+            name: elements.lines(
+                self.X, rows, 3 if rows.shape[1] == 3 else 2, self.symmetry.share(rows)
+            )
+            for name, rows in self.edges.items()
+        }
 
 
 _MESHES: OrderedDict[tuple[object, ...], DeckMesh] = OrderedDict()
@@ -76,23 +107,8 @@ def _mesh(keywords: list[Keyword]) -> DeckMesh:
         elif k.name == "ELSET":
             element_sets.setdefault(k.need("ELSET"), []).extend(_members(k, element_sets, place))
     X = np.array(coordinates)
-    blocks: dict[str, elements.Solids | elements.Lines] = {}
-    for kind, rows in connectivity.items():
-        table = np.array(rows)
-        if TYPES[kind].faces:
-            try:
-                blocks[kind] = elements.solids(X, table, TYPES[kind])
-            except Inverted as error:
-                number = next(e for e, p in place.items() if p == (kind, error.element))
-                raise DeckError(
-                    0,
-                    f"element {number} has no positive area: it folds over"
-                    " or its nodes run clockwise",
-                ) from None
-        else:
-            blocks[kind] = elements.lines(X, table)
-    faces = {
-        k.need("NAME"): _surface(k, X, connectivity, place, element_sets)
+    edges = {
+        k.need("NAME"): _surface(k, connectivity, place, element_sets)
         for k in keywords
         if k.name == "SURFACE"
     }
@@ -103,7 +119,8 @@ def _mesh(keywords: list[Keyword]) -> DeckMesh:
             if reference not in index or tied not in node_sets:
                 raise DeckError(k.line, f"node {reference} or node set {tied} is not defined")
             bodies[reference] = node_sets[tied]
-    return DeckMesh(X, index, blocks, place, node_sets, element_sets, faces, bodies)
+    tables = {kind: np.array(rows) for kind, rows in connectivity.items()}
+    return DeckMesh(X, index, tables, place, node_sets, element_sets, edges, bodies)
 
 
 def _elements(
@@ -158,11 +175,10 @@ def _members(k: Keyword, sets: dict[str, list[int]], known: dict) -> list[int]:
 
 def _surface(
     k: Keyword,
-    X: Array,
     connectivity: dict[str, list[list[int]]],
     place: dict[int, tuple[str, int]],
     sets: dict[str, list[int]],
-) -> elements.Lines:
+) -> Array:
     rows: list[list[int]] = []
     for row in k.rows:
         name, face = row.text(0).upper(), row.text(1).upper()
@@ -183,4 +199,4 @@ def _surface(
             rows.append([connectivity[kind][position][i] for i in order[int(face[1]) - 1]])
     if len({len(nodes) for nodes in rows}) > 1:
         raise DeckError(k.line, "a surface with edges of two and of three nodes is not honoured")
-    return elements.lines(X, np.array(rows), 3 if len(rows[0]) == 3 else 2)
+    return np.array(rows)

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 from ..deck.keywords import Keyword
+from .half_mesh import half_mesh
 from .materials import ModulusTable, read_materials
 from .mesh import DeckMesh, read_mesh
 from .parts import cords, rubber
@@ -38,16 +39,25 @@ class Model:
 
 
 def build(
-    keywords: list[Keyword], dynamic_Hz: float | None, long_term: bool, own_frequency: bool = False
+    keywords: list[Keyword],
+    dynamic_Hz: float | None,
+    long_term: bool,
+    own_frequency: bool = False,
+    half: bool = False,
 ) -> Model:
     """The model of a section job.
 
     ``dynamic_Hz``: evaluate the rubber's vibration modulus at this frequency, None = static;
     ``long_term``: the static state is relaxed (else instantaneous moduli); ``own_frequency``:
-    rubber with a table of moduli keeps its static modulus, the table is in the model's.
+    rubber with a table of moduli keeps its static modulus, the table is in the model's; ``half``:
+    the elements of z >= 0, which stand for all (see `symmetry`).
     Raises DeckError.
     """
     mesh = read_mesh(keywords)
+    if half:
+        folded = half_mesh(mesh)
+        assert folded is not None
+        mesh = folded
     materials = read_materials(keywords)
     known = [m.table for m in materials.values() if m.table is not None]
     tables = list(dict.fromkeys(known)) if own_frequency else []

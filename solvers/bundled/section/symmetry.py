@@ -1,0 +1,128 @@
+"""Half of the section stands for the whole, where the section is its own mirror image.
+
+Half a turn about the vertical, (Theta, z) -> (-Theta, -z), then carries the tyre into itself,
+biased cords and twist included, and displacements u = (u_r, u_theta, u_z) into S u, S = diag(1, -1,
+-1). So the state under pressure keeps u(z) = S u(-z). The half turn makes exp(i n Theta) run the
+other way round, complex conjugation turns it back: both together,
+
+    U(z) -> S conj U(-z),
+
+commute with K(n) and M, with the rim's motions, the air and, as the spin changes its sign too,
+with the Coriolis matrix 2 i Omega M (e_z x). Their square is 1, so what they keep is a real space
+that K(n) maps into itself: fields c = a + i b, a real and its own half turn, b real and reversed.
+At n = 0 a and b are apart, and u = a + b are all real fields.
+
+Sums over the elements of z >= 0 are half of all. What breaks the symmetry is solved on the whole.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+
+from ...errors import Refused
+
+Array = np.ndarray
+MIRROR_SIGNS = np.array([1.0, 1.0, -1.0])
+HALF_TURN = np.array([1.0, -1.0, -1.0])  # about the vertical: r, theta, z
+SAME_PLACE = 1e-6  # m
+EXACT = 1e-12  # m, the last digits of a deck
+
+
+def mirror_images(X: Array) -> Array:
+    """Each node's mirror image (n,) in the middle plane, -1 where there is none; X (n, 2)."""
+    places = np.round(X.real / SAME_PLACE).astype(int).tolist()
+    rows = {(r, z): i for i, (r, z) in enumerate(places)}
+    return np.array([rows.get((r, -z), -1) for r, z in places])
+
+
+class Whole:
+    """All elements are there: fields and sums are whole."""
+
+    copies = 1  # of the elements that are there make the tyre
+
+    def share(self, rows: Array) -> Array:
+        """Of the integration weights of elements (e, a), that counts (e, 1)."""
+        return np.ones((len(rows), 1))
+
+    def field(self, u: Array) -> Array:
+        """The whole of a field (n, 3, ...) known on z >= 0."""
+        return u
+
+    def force(self, f: Array) -> Array:
+        """The whole of forces (n, 3, ...) that the elements there exert in a kept field."""
+        return f
+
+    def kept(self, u: Array) -> Array:
+        """c = a + i b of a real field (n, 3, ...); a complex one is kept as it is."""
+        return u
+
+
+class MirrorHalf(Whole):
+    """The elements of z >= 0 are there, and by half those that are their own mirror images.
+
+    X (n, 2): R, Z of all nodes; other (n,): their mirror images; here, middle (n,): those of
+    z >= 0, of z = 0.
+    Raises Refused.
+    """
+
+    copies = 2
+
+    def __init__(self, X: Array):
+        self.other = mirror_images(X)
+        known = (self.other >= 0) & (self.other[self.other] == np.arange(len(X)))
+        if not known.all() or abs(X.real - X.real[self.other] * [1, -1]).max() > EXACT:
+            raise Refused("a node has no mirror image")
+        self.here = X[:, 1].real > -SAME_PLACE
+        self.middle = self.here & self.here[self.other]
+
+    @cached_property
+    def _nodes(self) -> tuple[Array, Array]:
+        """Nodes beyond the middle plane and their images before it."""
+        beyond = np.flatnonzero(~self.here)
+        return beyond, self.other[beyond]
+
+    def turned(self, u: Array) -> Array:
+        """S conj u(-z)."""
+        return _signed(u[self.other].conj())
+
+    def images(self, rows: Array) -> Array:
+        """Nodes of the elements' mirror images, the other way round as their sense is."""
+        return np.asarray(self.other[rows][:, ::-1])
+
+    def keeps(self, rows: Array) -> Array:
+        """Mask (e,) of the elements that are there."""
+        own = (np.sort(rows) == np.sort(self.other[rows])).all(1)
+        return np.asarray(own | self.here[rows].all(1))
+
+    def share(self, rows: Array) -> Array:
+        beside = self.here[rows].all(1) & ~self.middle[rows].all(1)
+        return np.where(beside, 1.0, 0.5)[:, None]
+
+    def alike(self, X: Array) -> Array:
+        """X with tangents (imaginary) that move both sides alike. What moves them against each
+        other is reversed by the half turn, and changes no eigenvalue at first order."""
+        if not np.iscomplexobj(X):
+            return X
+        return X.real + 0.5j * (X.imag + X.imag[self.other] * [1, -1])
+
+    def field(self, u: Array) -> Array:
+        beyond, images = self._nodes
+        whole = u.copy()
+        whole[beyond] = _signed(u[images].conj())
+        return whole
+
+    def force(self, f: Array) -> Array:
+        return f + self.turned(f)
+
+    def kept(self, u: Array) -> Array:
+        if np.iscomplexobj(u):
+            return u
+        turned = self.turned(u)
+        return (u + turned) / 2 + 0.5j * (u - turned)
+
+
+def _signed(u: Array) -> Array:
+    """S u."""
+    return u * HALF_TURN.reshape(3, *[1] * (u.ndim - 2))
