@@ -135,13 +135,14 @@ class RimAndAir:
 
 def _energies(M: csr_array, fields: ModeShapes) -> Array:
     """u^T M u (m, 3) per mode and component; of real shapes only p's tangent, imaginary."""
-    energy = np.zeros((len(fields.modes), 3), complex)
     if not (fields.complex or np.iscomplexobj(M.data)):
-        return energy
+        return np.zeros((len(fields.modes), 3), complex)
     if not fields.complex:
         M = csr_array((M.data.imag, M.indices, M.indptr), M.shape)
         M.eliminate_zeros()
-    for j, (_, a, b) in enumerate(fields.modes):
-        u = np.moveaxis(np.concatenate([a, b]), 0, -1)  # (nodes, 3, parts)
-        energy[j] = ((M @ u.reshape(len(u), -1)).reshape(u.shape) * u).sum((0, 2))
+    energy: Array = np.zeros((len(fields.n), 3), fields.real.dtype)
+    for part in (fields.real, fields.imag):
+        u = np.moveaxis(part, 0, -1)  # (nodes, 3, shapes)
+        energy = energy + ((M @ u.reshape(len(u), -1)).reshape(u.shape) * u).sum(0).T
+    energy = fields.summed(energy)
     return energy if fields.complex else 1j * energy

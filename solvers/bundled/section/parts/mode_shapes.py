@@ -26,6 +26,7 @@ class ModeShapes:
 
     def _set(self, real: Array, imag: Array) -> None:
         self.complex = np.iscomplexobj(real)  # they carry a variable's tangent
+        self.real, self.imag = real, imag  # a and b (p, nodes, 3) of all shapes
         own = [self._owner == j for j in range(self._owner.max() + 1)]
         self.modes = [(self.n[mine], real[mine], imag[mine]) for mine in own]
         self.known: list[tuple[Rows, Array]] = []
@@ -35,6 +36,12 @@ class ModeShapes:
         other = copy.copy(self)
         other._set(real, imag)
         return other
+
+    def summed(self, values: Array) -> Array:
+        """Per mode (m, ...) the sum of its shapes' values (p, ...)."""
+        total = np.zeros((len(self.modes), *values.shape[1:]), values.dtype)
+        np.add.at(total, self._owner, values)
+        return total
 
     def products(self, connectivity: Array, rows: Rows) -> Array:
         """G (m, e, g, k, k), sum of z z^T over a mode's shapes, real and imaginary: the form

@@ -48,21 +48,23 @@ class TyrePart(ABC):
 
     def form(self, U: Array, fields: ModeShapes) -> Array:
         """phi^H K phi (m,) of the modes phi. K0 and K2 are symmetric, K1 antisymmetric, so that
-        (a - i b)^T K(n) (a + i b) = (K0 + n^2 K2) : (a a^T + b b^T) + K1 : n (b a^T - a b^T)."""
+        (a - i b)^T K(n) (a + i b) = a.K0 a + b.K0 b + n^2 (a.K2 a + b.K2 b) + 2 n b.K1 a."""
         K0, K1, K2 = self.tangents(U, True)
-        total = np.zeros(len(fields.modes), complex)
-        for j, (n, real, imag) in enumerate(fields.modes):
-            a, b = (
-                np.moveaxis(part[:, self.connectivity].reshape(len(n), *K0.shape[:2]), 0, -1)
-                for part in (real, imag)
-            )
-            at, bt = a.swapaxes(1, 2), b.swapaxes(1, 2)
-            total[j] = (K0 * (a @ at + b @ bt)).sum()
-            if K1 is not None:
-                total[j] += (K1 * ((n * b) @ at - (n * a) @ bt)).sum()
-            if K2 is not None:
-                total[j] += (K2 * ((n * n * a) @ at + (n * n * b) @ bt)).sum()
-        return total
+        a, b = (
+            np.moveaxis(part[:, self.connectivity].reshape(len(fields.n), *K0.shape[:2]), 0, -1)
+            for part in (fields.real, fields.imag)
+        )
+        n = fields.n
+
+        def form(left: Array, K: Array, right: Array) -> Array:
+            return np.asarray((left * (K @ right)).sum((0, 1)))
+
+        total = form(a, K0, a) + form(b, K0, b) + 0j
+        if K1 is not None:
+            total += 2 * n * form(b, K1, a)
+        if K2 is not None:
+            total += n * n * (form(a, K2, a) + form(b, K2, b))
+        return fields.summed(total)
 
 
 class AtStations(ABC):
