@@ -87,8 +87,8 @@ class KeptFields:
 
     def spread(self, x: Array) -> Array:
         """The field c (n, 3, ...) of coordinates (size, ...)."""
-        c = _complex(x)
-        return self.symmetry.field(self._spread((c.reshape(len(c), -1) * self._length), c.shape))
+        c = _complex(x.reshape(self.size, -1)) * self._length
+        return self.symmetry.field(self._spread(c, x.shape))
 
     def _spread(self, values: Array, shape: tuple[int, ...]) -> Array:
         """Values (equations, k) on all components (n, 3, ...) of z >= 0."""
@@ -128,9 +128,8 @@ class KeptFields:
 
 
 def _complex(x: Array) -> Array:
-    """Pairs of rows as complex rows."""
-    pairs = x.reshape(len(x) // 2, 2, *x.shape[1:])
-    return pairs[:, 0] + 1j * pairs[:, 1]
+    """A copy of pairs of rows (size, k) as complex rows, Fortran-ordered."""
+    return np.array(x.T, order="C").view(complex).T
 
 
 class KeptCholesky:
@@ -161,19 +160,20 @@ class KeptCholesky:
         y, s = _complex(right.reshape(len(right), -1)), self._factor.shape[1]
         f = _substituted(self._factor, y[:s], "N")
         g = (self._phase.conj()[:, None] * y[s:]).real
-        m = cho_solve(self._schur, g - (self._W.conj().T @ f[self._near]).real)
+        m = cho_solve(self._schur, g - (self._W.conj().T @ f[self._near]).real, check_finite=False)
         f[self._near] -= self._W @ m
-        c = np.concatenate([_substituted(self._factor, f, "C"), self._phase[:, None] * m])
-        return np.stack([c.real, c.imag], 1).reshape(right.shape)
+        y[:s], y[s:] = _substituted(self._factor, f, "C"), self._phase[:, None] * m
+        return y.T.view(float).T.reshape(right.shape)
 
 
 def _substituted(factor: Array, right: Array, trans: str) -> Array:
     """L^-1 ("N") or L^-H ("C") times a complex block (s, k)."""
     if np.iscomplexobj(factor):
-        return ztbtrs(factor, np.asfortranarray(right), uplo="L", trans=trans)[0]
+        right = np.array(right, order="F")
+        return ztbtrs(factor, right, uplo="L", trans=trans, overwrite_b=1)[0]
     k = right.shape[1]
-    parts = np.asfortranarray(np.hstack([right.real, right.imag]))
-    x = dtbtrs(factor, parts, uplo="L", trans=trans)[0]
+    parts = np.concatenate([right.real.T, right.imag.T]).T
+    x = dtbtrs(factor, parts, uplo="L", trans=trans, overwrite_b=1)[0]
     return x[:, :k] + 1j * x[:, k:]
 
 
