@@ -92,6 +92,22 @@ def test_each_case_has_the_results_of_the_commands(
     assert run("modes", str(cases[0]), "--output", str(done / "tyre_00"), "--quiet") == 0  # its own
 
 
+@pytest.mark.slow
+def test_a_batch_samples_as_the_command_does(tmp_path: Path) -> None:
+    (case,) = vary(tmp_path / "cases", 1)
+    out, own = tmp_path / "out", tmp_path / "own"
+    assert batched([case], out, "--studies", "sample") == 0
+    options = ["--output", str(own), "--no-pictures", "--quiet", "--store", str(out / "record")]
+    assert run("sample", str(case), *options) == 0
+    for file in ("sample.json", "sample.csv", "sample_draws.csv"):
+        assert (out / case.stem / file).read_bytes() == (own / file).read_bytes(), file
+    numbers = result(out)["cases"][0]["studies"]["sample"]["quantities"]
+    found = json.loads((own / "sample.json").read_text())
+    assert numbers["median C10"] == found["variables"]["C10"]["median"]
+    (row,) = [r for r in found["predicted"] if r["c"] == 4 and r["m"] and r["pressure_kPa"] == 240]
+    assert numbers["predicted_Hz 240 kPa [4,1]"] == row["frequency_Hz"]
+
+
 def test_the_numbers_are_those_of_the_files(done: Path) -> None:
     numbers = result(done)["cases"][0]["studies"]
     fit = json.loads((done / "tyre_00/fit.json").read_text())

@@ -22,6 +22,8 @@ from ..studies.fit.calibrate import calibrate, history_csv
 from ..studies.fitted import NOT_CONVERGED
 from ..studies.modes import modes_result
 from ..studies.result import Failed, Result, ResultPart
+from ..studies.sample import study as sampling
+from ..studies.sample.result import draws_csv, result
 from ..tyre.case import LoadedCase
 
 Numbers = dict[str, float]
@@ -116,11 +118,25 @@ def footprint(state: Studied) -> StudyOutcome:
     return _reached(found.rows, found.failed, numbers, _files(state, found, load_N=loads))
 
 
+def sample(state: Studied) -> StudyOutcome:
+    """Draw the variables under the case's targets. Raises what `sample.study.run` does."""
+    drawn = sampling.run(state.case, state.evaluator, None, sampling.MANY_DRAWS)
+    found = result(drawn, 0)
+    numbers = {f"median {name}": each.median for name, each in found.variables.items()}
+    for row in found.predicted:
+        numbers[f"predicted_Hz {row.pressure_kPa:g} kPa {row.label}"] = row.frequency_Hz
+    files = _files(state, found, load_N=0.0) | {"sample_draws.csv": draws_csv(drawn)}
+    if doubts := found.doubts():
+        return StudyOutcome("failed", "not_sampled", "; ".join(doubts), numbers, files)
+    return StudyOutcome(quantities=numbers, files=files)
+
+
 STUDIES: dict[str, Callable[[Studied], StudyOutcome]] = {  # in the order in which they are done
     "fit": fit,
     "modes": modes,
     "sweep-pressure": sweep_pressure,
     "footprint": footprint,
+    "sample": sample,
 }
 OF_FITTED = ("sweep-pressure", "footprint")  # they want the fitted design where there is a fit
 

@@ -13,7 +13,13 @@ from . import arguments, options
 from .main import EXIT_BATCH
 from .terminal import Terminal
 
-STUDY_NAMES = ("fit", "modes", "sweep-pressure", "footprint")  # without importing what they need
+STUDY_NAMES = (
+    "fit",
+    "modes",
+    "sweep-pressure",
+    "footprint",
+    "sample",
+)  # without importing what they need
 FILE_PATH = click.Path(path_type=Path, dir_okay=False)
 
 

@@ -30,11 +30,12 @@ from .predict import conditional
 Array = np.ndarray
 SAMPLE_STAGES = ("calibrate", "emulate", "sample", "ask for what is uncertain")
 PRESSURE_NAME = "pressure_kPa"
+MANY_DRAWS = 100_000  # where nobody says how many
 OTHER_PRESSURES = (0.8, 1.2)  # times the case's, where no others are asked for
-EACH = 10  # designs of a box for each of its coordinates
+EACH = (10, 20)  # designs of a box for each of its coordinates; where they are too few
 WIDE = 4.5  # standard deviations, of half a box at first
 WIDEST_BOX = 0.7  # at first, of ln x: so far it was tried how good an emulator is
-ROUGH = 0.1  # of a row's standard deviation in Sigma: what an emulator may be off by
+ROUGH = 0.2  # of a row's standard deviation in Sigma: what an emulator's 99 % bound may be
 
 
 @dataclass(frozen=True)
@@ -100,8 +101,11 @@ def run(
 
     def ask(box: Array) -> Posterior:
         whole = np.vstack([box, *[states[[0, -1]].T] * states.shape[1]])
-        made = emulator(model.evaluator, asked, whole, labels, EACH * len(asked), jobs)
-        at = rows_of(observations.rows, made.labels, pressures)
+        for each in EACH:  # of more designs, the first ones are the same
+            made = emulator(model.evaluator, asked, whole, labels, each * len(asked), jobs)
+            at = rows_of(observations.rows, made.labels, pressures)
+            if (made.stated_errors[at[:, 1]] <= ROUGH * spread).all():
+                break
         return Posterior(made, states, at, observations.y, white, box)
 
     J = white @ answer.jacobian[where]
