@@ -464,6 +464,36 @@ def test_time_is_looked_at_before_every_iteration(solid: Round) -> None:
     assert len(looks) == press.iterations - before + 1 > 2
 
 
+def test_friction_that_does_not_converge_is_left_soon(
+    solid: Round, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """After three steps that do not halve the residual; two are borne."""
+    press = solid.press(LENGTHS, 1e10, 0.5)
+    press.to(50.0)
+    monkeypatch.setattr(press, "_step", lambda *given: (0 * press.parts, 0.0))
+    before = press.iterations
+    with pytest.raises(NoEquilibrium, match="did not converge"):
+        press._settle(press.parts, press.height - 1e-4, 100.0, None, 1e-8)
+    assert press.iterations == before + 3
+
+
+@pytest.mark.parametrize(("share", "words"), [(0.9e-4, "no lower energy"), (1.1e-4, "converge")])
+def test_the_line_search_asks_for_a_ten_thousandth_of_the_slope(
+    solid: Round, monkeypatch: pytest.MonkeyPatch, share: float, words: str
+) -> None:
+    """An energy that falls by a share of what the forces on the parts and on the road tell."""
+    press = solid.press(LENGTHS, 1e10)
+    press.to(50.0)
+    parts, height = press.parts, press.height - 1e-5
+    force, lacking, _ = press._state(parts, height, 100.0, press._bound)
+    step, rise = -1e-9 * force / (force**2).sum(), -1e-9 / lacking
+    monkeypatch.setattr(press, "_step", lambda *given: (step, rise))
+    fall = lambda contact, load, at: -share * 2e-9 * (at - height) / rise
+    monkeypatch.setattr(press, "_energy", fall)
+    with pytest.raises(NoEquilibrium, match=words):
+        press._settle(parts, height, 100.0, press._bound, 1e-8)
+
+
 def test_a_load_starts_along_the_slope_of_the_last_one(
     solid: Round, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import time
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
@@ -12,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tyrecal_solvers.bundled.adapter import Bundled
 from tyrecal_solvers.bundled.deck.keywords import DataLine, DeckError
 from tyrecal_solvers.bundled.deck.request import Request
 from tyrecal_solvers.bundled.deck.steps import Deck
@@ -181,6 +183,16 @@ def test_rubber_is_relaxed_until_a_static_step_says_otherwise() -> None:
         assert [step.long_term for step in steps] == relaxed
 
 
+def test_the_pressure_of_a_step_is_the_largest_of_its_surfaces() -> None:
+    """None: 0. Within a job they carry on from step to step."""
+    pair = dict(texts(PLAIN))
+    pair["modes"] = pair["modes"].replace("CAVITY, P, 160000", "WELL, P, 170000\nFLANK, P, 10")
+    _, _, (first, second, third) = Deck(pair, "modes", "inflate").read([])
+    assert second.pressures == third.pressures == {"WELL": 170e3, "FLANK": 10.0}
+    assert (first.pressure, second.pressure) == (160e3, 170e3)
+    assert replace(first, pressures={}).pressure == 0.0
+
+
 def test_a_section_alone_has_the_modes_without_waves() -> None:
     """Its *FREQUENCY step, whatever harmonics a request would have."""
     text = texts(PLAIN)["inflate"] + f"*STEP\n{FREQUENCY.replace('20', '4')}*END STEP\n"
@@ -323,6 +335,63 @@ def test_time_is_looked_at_between_harmonics(
         run(effects, harmonics=harmonics)
         counts.append(len(looks))
     assert counts[1] >= counts[0] + 2 * len(run(effects, harmonics=[1]))
+
+
+def test_the_adapter_writes_the_decks_and_what_they_cannot_say(tmp_path: Path) -> None:
+    """Harmonics up to the highest, and of the rest what the tool asks for; a pressed tyre's deck
+    says all."""
+    tangents = {"p": [("modes", 3, 0, 1.0)]}
+    decks: Any = SimpleNamespace(
+        request={"highest_harmonic": 3, "modes_per_harmonic": 4, "own_frequency": True, "other": 1},
+        loads_N=(),
+        texts=lambda dialect: {"modes.inp": f"** ä {dialect}\n"},
+        tangents=lambda dialect: tangents,
+    )
+    deck, request = Bundled().write(decks, tmp_path)
+    assert deck.name == "modes.inp" and deck.read_bytes() == "** ä abaqus\n".encode()
+    assert request.name == "modes.request.json"
+    assert json.loads(request.read_text()) == {
+        "harmonics": [0, 1, 2, 3],
+        "modes_per_harmonic": 4,
+        "sensitivities": {"p": [["modes", 3, 0, 1.0]]},
+        "own_frequency": True,
+    }
+    request.unlink()
+    decks.loads_N = (100.0,)
+    assert Bundled().write(decks, tmp_path) == [deck] and not request.exists()
+
+
+def test_the_two_that_a_doublet_has_split_into_are_read_as_one(tmp_path: Path) -> None:
+    """With both frequencies, the mean of them and of their slopes, and the first one's shape."""
+    density = texts(MASS)["inflate"].splitlines().index("*DENSITY") + 2
+    asked = {"p": [("inflate", density, 0, 1.0)]}
+    job = Job(Deck(texts(MASS), "modes", "inflate"), Request([0, 1], 2, asked))
+    (result,) = job.run()
+    write(tmp_path / "modes", job.model, [result])
+    found = Bundled().read(tmp_path)
+    shapes = np.load(tmp_path / "modes.npz")["shapes_2"]
+    order = np.sort(np.concatenate([m.eigenvalues for m in result.modes]))
+    wanted = {}
+    for m, rates in zip(result.modes, result.rates["p"], strict=True):
+        size, hertz = 2 if m.n else 1, np.sqrt(m.eigenvalues) / (2 * np.pi)
+        for i in range(0, len(hertz), size):
+            own = slice(i, i + size)
+            slope = (rates[own] / (8 * np.pi**2 * hertz[own])).mean()
+            first = shapes[np.flatnonzero(order == m.eigenvalues[i])[0]]
+            wanted[hertz[own].mean()] = m.n, size, list(hertz[own]), slope, first
+    assert len(found["modes"]) == len(wanted) == 4
+    for mode, slope in zip(found["modes"], found["gradients"]["p"], strict=True):
+        place = min(wanted, key=lambda f, mode=mode: abs(f - mode["frequency_Hz"]))
+        n, size, members, own, shape = wanted[place]
+        assert mode["frequency_Hz"] == pytest.approx(place) and slope == pytest.approx(own)
+        assert (mode["n"], mode["multiplicity"]) == (n, size)
+        assert mode.get("members", members) == pytest.approx(members)
+        assert ("members" in mode) == (n > 0)
+        np.testing.assert_array_equal(mode["amplitude"], shape)
+    assert (found["mass_kg"], found["pressure_Pa"]) == (job.mass_kg, 160e3)
+    np.testing.assert_array_equal(found["displacement"], result.U)
+    np.testing.assert_array_equal(found["points"], job.model.mesh.X)
+    assert found["nodes"].tolist() == list(job.model.mesh.index)
 
 
 def test_modes_are_written_by_rising_frequency(tmp_path: Path) -> None:

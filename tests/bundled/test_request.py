@@ -78,6 +78,7 @@ def told(folder: Path, request: Any, capsys: pytest.CaptureFixture[str]) -> str:
         ({"sector": {"job": "inflate"}}, "sector is"),
         ({"sector": {"job": "nix", "width_deg": 1}}, 'sector.job is "nix", has no deck beside it'),
         ({"sector": {"job": "../inflate", "width_deg": 1}}, "must be a job in the same folder"),
+        ({"sector": {"job": 3, "width_deg": 1}}, "sector.job is 3, must be a name"),
         ({"sector": {"job": "inflate", "width_deg": "x"}}, 'sector.width_deg is "x"'),
         ({"sector": {"job": "inflate", "width_deg": 400}}, "must be above 0 and at most 360"),
     ],

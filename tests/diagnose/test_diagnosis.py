@@ -13,7 +13,7 @@ from scipy.optimize import least_squares
 from tyrecal.report.diagnosis import page
 from tyrecal.simulate.modes.label import Label
 from tyrecal.simulate.modes.loaded import Member
-from tyrecal.studies.diagnose.diagnosis import Diagnosis, diagnose
+from tyrecal.studies.diagnose.diagnosis import STAGES, Diagnosis, diagnose
 from tyrecal.studies.diagnose.evidence import explain, grid, refit, weigh
 from tyrecal.studies.diagnose.expansion import anchored, expand
 from tyrecal.studies.diagnose.inverse_problem import Assumed, Toggle
@@ -36,6 +36,12 @@ def diagnosed(toy: Toy, effects: dict[str, float], seed: int, **keys: object) ->
     base = problem(toy)
     y = drawn(toy, base, generator(seed), effects, 0.3)
     return diagnose(toy, toy.rows, base.measured(y).observations, assumed=base.assumed, **keys)  # type: ignore[arg-type]
+
+
+def test_every_stage_is_told_once_and_in_order() -> None:
+    told: list[str] = []
+    diagnosed(Toy(effects=1), {"e0": 0.5}, 0, stage=told.append)
+    assert told == list(STAGES)
 
 
 @pytest.mark.parametrize(

@@ -422,6 +422,12 @@ def test_coordinates_of_a_linear_and_a_logarithmic_variable() -> None:
     assert own._slope("C10", there) == 8e5 and own._slope("A_belt", there) == there["A_belt"]
     with_more = own.design(Query(own.start, {"frequency_stiffening": 0.3}))
     assert with_more["effects.frequency_stiffening"] == 0.3
+    shares = np.array([0.2, 0.3, 0.1])
+    own._mass = own.start, shares, np.zeros(0)
+    x, step = own.start + np.array([0.1, -0.2, 0.3]), 1e-6 * np.eye(3)
+    mass = lambda x: np.log(1 + shares @ own._rise(own.start, x))
+    wanted = [(mass(x + d) - mass(x - d)) / 2e-6 for d in step]
+    assert own._mass_slopes(x)[0] == pytest.approx(wanted, rel=1e-6)
     rise = own._rise(own.start, own.start + 0.1)
     assert rise == pytest.approx([np.expm1(0.1), np.expm1(0.1), 0.1])
 

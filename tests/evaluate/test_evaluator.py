@@ -17,6 +17,7 @@ import pytest
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate import cluster
 from tyrecal.simulate.evaluate import evaluator as door_module
+from tyrecal.simulate.evaluate import sources as sources_module
 from tyrecal.simulate.evaluate.cluster import _at_worker
 from tyrecal.simulate.evaluate.evaluator import Counts, Evaluator, Question
 from tyrecal.simulate.evaluate.executor import Here
@@ -366,3 +367,25 @@ def test_workers_of_another_edition_are_refused() -> None:
     assert _at_worker(abs, sources(), -3) == 3
     with pytest.raises(SolverUnavailable, match="another edition"):
         _at_worker(abs, "0" * 64, -3)
+
+
+def test_the_sources_hash_tells_names_and_contents(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whatever the order in which a disk lists them; other files count for nothing."""
+    monkeypatch.setattr(sources_module, "files", lambda package: tmp_path / package)
+    for package in sources_module.PACKAGES:
+        (tmp_path / package / "in").mkdir(parents=True)
+    path = tmp_path / "tyrecal" / "in" / "a.py"
+    hashes = []
+    for name, text in (("a.py", "1"), ("b.py", "1"), ("b.py", "2"), ("b.txt", "2")):
+        path = path.rename(path.with_name(name)) if path.exists() else path
+        path.write_text(text)
+        hashes.append(sources.__wrapped__())
+    template = tmp_path / "tyrecal_templates" / "a.j2"
+    template.write_text("x")
+    hashes.append(sources.__wrapped__())
+    template.rename(tmp_path / "tyrecal_templates" / "in" / "a.j2")
+    hashes.append(sources.__wrapped__())
+    (tmp_path / "tyrecal" / "in" / "b.pyc").write_text("x")
+    assert len(set(hashes)) == len(hashes) == 6 and sources.__wrapped__() == hashes[-1]

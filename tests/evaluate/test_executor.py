@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+from tyrecal.simulate.evaluate import executor as executor_module
 from tyrecal.simulate.evaluate.executor import Here, Processes, end_workers, executor, in_order
 from tyrecal.simulate.evaluate.failure import EvaluationFailed
 
@@ -93,3 +94,22 @@ def work(task: str | int) -> None:
     """The long task, or a short one."""
     if isinstance(task, str):
         mark(task)
+
+
+def test_workers_that_were_ended_are_not_ended_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Those at work, and those that wait for the next tasks."""
+    ended: list[str] = []
+
+    class Workers:
+        def __init__(self, name: str):
+            self.name = name
+
+        def end(self) -> None:
+            ended.append(self.name)
+
+    monkeypatch.setattr(executor_module, "_idle", {2: Workers("idle")})
+    monkeypatch.setattr(executor_module, "_at_work", {Workers("at work")})
+    end_workers()
+    assert sorted(ended) == ["at work", "idle"]
+    end_workers()
+    assert sorted(ended) == ["at work", "at work", "idle"]

@@ -12,7 +12,7 @@ import pytest
 from tyrecal.errors import InputError
 from tyrecal.measured.gather import _entry, gather, result
 from tyrecal.measured.labels import Judged
-from tyrecal.measured.modal import Layout
+from tyrecal.measured.modal import Layout, ModalTest
 from tyrecal.measured.sensors import MeasuredMode
 from tyrecal.simulate.modes.label import Label
 
@@ -74,17 +74,28 @@ def test_a_file_is_no_repeat_of_itself(tmp_path: Path) -> None:
 
 
 def test_two_references_and_geometry_of_its_own(tmp_path: Path) -> None:
+    """What a file has beyond that is passed over, and told."""
     where = write(tmp_path / "where.uff", nodes())
+    coherence = function(np.ones(len(F)), F, func_type=6)
+    more = [[coherence, coherence], []]
     files = [
-        write(tmp_path / f"{k}.uff", *functions(101, k), *functions(102, k + 9)) for k in (1, 2)
+        write(tmp_path / f"{k}.uff", *functions(101, k), *functions(102, k + 9), *more[k - 1])
+        for k in (1, 2)
     ]
     found = gather([where, *files], 240.0, LAYOUT)
     assert {row.label: row.value for row in found.rows} == pytest.approx(MODES, rel=1e-3)
-    assert len(found.runs) == 2 and not found.notes
+    assert len(found.runs) == 2 and found.notes == [f"{files[0]}: 2 of coherence not used"]
     assert all(run.explained > 0.99 for run in found.runs)
     assert all(mode["confidence"] > 0.99 for mode in result(found)["modes"])
     with pytest.raises(InputError, match="node 1 has no coordinates"):
         gather(files, 240.0, LAYOUT)
+
+
+def test_shapes_leave_nothing_to_explain() -> None:
+    """Functions: the share of their mean square, where the modes are fitted."""
+    assert ModalTest("shapes", ()).explained == 1.0
+    H, made = np.array([[3.0, 4.0j, 9.0]]), np.array([[3.0, 3.0j, np.nan]])
+    assert ModalTest("functions", (), F[:3], H, made).explained == pytest.approx(1 - 1 / 25)
 
 
 def test_references_need_the_same_signals(tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ from scipy.stats import t
 
 from tyrecal.errors import InputError
 from tyrecal.measured.measurement import Measurement, measurements_csv
-from tyrecal.measured.repeats import combined
+from tyrecal.measured.repeats import _order, combined
 from tyrecal.simulate.modes.label import Label
 
 from ..chance import Chance
@@ -108,3 +108,22 @@ def test_the_csv_is_sorted_and_whole() -> None:
         "frequency_Hz,1,0,,,240,0,66,0.123",
         "frequency_Hz,2,0,,,240,0,70,0.1",
     ]
+
+
+def test_rows_come_by_quantity_state_and_mode() -> None:
+    """Frequencies first, by pressure and load; [0,0] by its kind, then c, m and the member."""
+    at = lambda label, member="", pressure=240.0, load=0.0: Measurement(
+        "frequency_Hz", label, member, pressure, load, 50.0
+    )
+    area = Measurement("contact_area_m2", None, "", 160.0, 4e3, 0.02)
+    wanted = [
+        at(Label(9, 3), pressure=160.0),
+        at(Label(0, 0, "axial")),
+        at(Label(0, 0, "torsional")),
+        at(Label(0, 1)),
+        at(Label(1, 0), "1"),
+        at(Label(1, 0), "2"),
+        at(Label(1, 0), load=10.0),
+        area,
+    ]
+    assert sorted(wanted[::-1], key=_order) == wanted

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 import re
+import subprocess
 import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from tyrecal_solvers.calculix import adapter
 from tyrecal_solvers.calculix.adapter import CalculiX, Refused, _check_rubber, _inflated, _shapes
 from tyrecal_solvers.calculix.results import Fields, pairs, read_mass
 from tyrecal_solvers.calculix.runner import _is_safe, _said, run_job
@@ -256,6 +258,25 @@ def test_one_deck_of_several_that_fails_fails_all(tmp_path: Path, parallel: int)
         evaluate(with_two_diameters(tmp_path, "error", parallel))
 
 
+@pytest.mark.parametrize(("parallel", "ended"), [(1, 0), (2, 1)])
+def test_an_interruption_ends_the_decks_at_work(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, parallel: int, ended: int
+) -> None:
+    """In this thread it reaches them by itself."""
+    folder, calls = with_two_diameters(tmp_path, "none", parallel), []
+
+    def run_job(place: Path, job: str, *given: object) -> None:
+        if job != "inflate":
+            raise KeyboardInterrupt
+        (place / f"{job}.rout").write_text("a state")
+
+    monkeypatch.setattr(adapter, "run_job", run_job)
+    monkeypatch.setattr(adapter, "end_commands", lambda: calls.append(1))
+    with pytest.raises(KeyboardInterrupt):
+        evaluate(folder)
+    assert len(calls) == ended
+
+
 def test_after_a_failure_nothing_runs_on(tmp_path: Path) -> None:
     """The folder may go: a deck that had begun has ended."""
     with pytest.raises(RunFailed, match="code 139"):
@@ -391,6 +412,15 @@ def test_paths_that_ccx_copes_with() -> None:
     """Of 100 characters at most, without a blank, in ASCII."""
     assert _is_safe(Path("/" + 99 * "x")) and not _is_safe(Path("/" + 100 * "x"))
     assert not _is_safe(Path("/a b")) and not _is_safe(Path("/\u00fc"))
+
+
+def test_a_program_has_twenty_seconds_to_say_its_version(monkeypatch: pytest.MonkeyPatch) -> None:
+    def silent(command: list[str], timeout: float, **given: object) -> None:
+        assert command == ["mute", "-v"] and timeout == 20
+        raise subprocess.TimeoutExpired(command, timeout)
+
+    monkeypatch.setattr(subprocess, "run", silent)
+    assert adapter._version(("mute",)) == "unknown"
 
 
 def test_the_program_is_known_by_its_version(tmp_path: Path) -> None:
