@@ -11,6 +11,7 @@ import numpy as np
 
 from ..errors import Refused, RunFailed
 from . import VERSION
+from .deck.start import write_start
 
 JOB, PRESS, OLDJOB = "modes", "press", "inflate"
 # of the tool's request, as in `request.Request`
@@ -22,6 +23,7 @@ class Decks(Protocol):
 
     request: Mapping[str, Any]
     loads_N: tuple[float, ...]
+    start: np.ndarray | None
 
     def texts(self, dialect: str) -> dict[str, str]:
         """File name to text."""
@@ -48,6 +50,7 @@ class Bundled:
             "cavity",
             "coupled",
             "rotation",
+            "start",
         }
     )
     refusals = (Refused,)
@@ -58,6 +61,8 @@ class Bundled:
         paths = []
         for name, text in decks.texts(self.dialect).items():
             paths.append(folder / name)
+            if decks.start is not None and name == f"{OLDJOB}.inp":
+                text += write_start(folder, decks.start)
             paths[-1].write_text(text, encoding="utf-8", newline="")
         if decks.loads_N:
             return paths

@@ -14,6 +14,7 @@ from threadpoolctl import ThreadpoolController
 from ..errors import RunFailed
 from .deck.keywords import DeckError, Keyword, read_deck
 from .deck.request import Request, read_request, read_sector
+from .deck.start import read_start
 from .deck.steps import Deck, DeckStep
 from .frequency_step import FrequencyStep
 from .modes.harmonics import HarmonicModes
@@ -24,7 +25,7 @@ from .section.boundary import keeps_half_turn, numbering
 from .section.inflation import equilibrium
 from .section.loads import loads, pressures
 from .section.mechanics import mass
-from .section.mesh import read_mesh
+from .section.mesh import DeckMesh, read_mesh
 from .section.model import build
 
 
@@ -39,7 +40,8 @@ def run(folder: Path, job: str, oldjob: str | None, time_limit: float = float("i
         deck = Deck(texts, job, oldjob)
         request = read_request(folder / f"{job}.request.json", list(texts))
         sector = read_sector(folder, request.sector) if request.sector else []
-        analysis = Job(deck, request, deadline, sector)
+        start = read_start(folder, texts[oldjob or job])
+        analysis = Job(deck, request, deadline, sector, start)
         try:
             if analysis.road is not None:
                 footprint_job.write(folder / job, analysis.model, analysis.press())
@@ -55,6 +57,15 @@ def _threads() -> ThreadpoolController:
     return ThreadpoolController()
 
 
+def _on_nodes(shape: np.ndarray | None, mesh: DeckMesh) -> np.ndarray | None:
+    """The displacements (n, 3) of a shape to start from; None where it is of other nodes."""
+    if shape is None or sorted(shape[:, 0]) != sorted(mesh.index):
+        return None
+    U = np.zeros((len(mesh.X), 3))
+    U[[mesh.index[int(number)] for number in shape[:, 0]]] = shape[:, 1:]
+    return U
+
+
 class Job:
     """The steps of a deck, carried out one after the other from the state at rest."""
 
@@ -64,6 +75,7 @@ class Job:
         request: Request,
         deadline: float = float("inf"),
         sector: Sequence[Keyword] = (),
+        start: np.ndarray | None = None,
     ):
         section, revolve, self.steps = deck.read([])
         self.deadline, self.road = deadline, footprint_job.read_road(revolve)
@@ -79,6 +91,7 @@ class Job:
         self.mass_kg = float(copies * 2 * np.pi * mass(self.model).sum().real)
         self.mass_kg += self.tyre.attached().total_kg
         self.factorisations = 0
+        self.guess = _on_nodes(start, mesh)
 
     def run(self) -> list[StepResult]:
         """Results of every frequency step, or of the last static one where there is none."""
@@ -156,7 +169,10 @@ class Job:
         self._check_time()
         model = self.tyre.models(None, step.long_term, False)
         acting, equations = loads(model, step), numbering(model, step)
-        U, factorisations = equilibrium(model, equations, acting, self.tyre.U, self._check_time)
+        guess, self.guess = self.guess, None  # of the first step
+        U, factorisations = equilibrium(
+            model, equations, acting, self.tyre.U, self._check_time, guess
+        )
         self.tyre.U = model.mesh.symmetry.field(U)
         self.factorisations += factorisations
 

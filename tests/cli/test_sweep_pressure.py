@@ -201,7 +201,7 @@ def test_a_failure_amid_the_sweep(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     evaluate = Evaluator.evaluate
 
     def moody(evaluator: Evaluator, question: Question) -> Evaluation:
-        if question.values["pressure_kPa"] == 140:
+        if question.values.get("pressure_kPa") == 140:
             raise EvaluationFailed("timed_out", "ran out of time")
         return evaluate(evaluator, question)
 

@@ -35,6 +35,7 @@ class DeckText:
     pressure_kPa: float = 240.0
     needs: Mapping[str, str] = field(default_factory=dict)
     has_slopes: bool = True
+    nominal: None = None
     solver: SolverChoice = CASE.case.solver
 
     def at(self, values: Mapping[str, float]) -> DeckText:

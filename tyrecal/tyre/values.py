@@ -73,7 +73,7 @@ def set_values(loaded: LoadedCase, values: Mapping[str, float]) -> LoadedCase:
             raise ValueError(f"{dotted(wrong)} {reason}")
         if ("mesh" in touched or redrawn) and (message := folds(data, section)):
             raise ValueError(message)
-    return replace(loaded, case=case, section=section)
+    return replace(loaded, case=case, section=section, as_read=loaded.as_read or loaded)
 
 
 def overridden(loaded: LoadedCase, values: Mapping[str, float]) -> LoadedCase:

@@ -32,19 +32,26 @@ def equilibrium(
     loads: Sequence[TyrePart],
     start: Array,
     check: Callable[[], None] = lambda: None,
+    guess: Array | None = None,
 ) -> tuple[Array, int]:
     """Displacements (n, 3) in equilibrium under ``loads``, reached from the displacements
     ``start``, and how many factorisations they took.
 
-    The whole load is tried first. Where that takes long, because soft rubber between stiff cords
-    wrinkles on the way, the rubber is stiffened and let down again step by step. Where that fails
-    too the load comes in steps. Each is another path to the same equilibrium. ``check`` is called
-    between steps and may raise to stop.
+    A ``guess`` (n, 3), the shape of a tyre alike, is tried first, the whole load from ``start``
+    next. Where that takes long, because soft rubber between stiff cords wrinkles on the way, the
+    rubber is stiffened and let down again step by step. Where that fails too the load comes in
+    steps. Each is another path to the same equilibrium. ``check`` is called between steps and may
+    raise to stop.
 
     Raises NoEquilibrium with the pressure that was reached.
     """
     solve = _Solver(model, numbering, loads)
-    U = solve(start, 1.0, 1.0, MAX_QUICK_ITERATIONS if solve.pressures else MAX_ITERATIONS)
+    U = None
+    if guess is not None:
+        held = numbering.spread(numbering.gather(guess))  # 0 at the rim
+        U = solve(held, 1.0, 1.0, MAX_QUICK_ITERATIONS)
+    if U is None:
+        U = solve(start, 1.0, 1.0, MAX_QUICK_ITERATIONS if solve.pressures else MAX_ITERATIONS)
     if U is None:
         check()
         U = _by_stiffness(solve, start, check)
@@ -133,8 +140,11 @@ def _newton(
     longest: int,
 ) -> tuple[Array | None, int, str]:
     scale = np.linalg.norm(_load_force(model, U, loads, numbering))
-    energy = mechanics.potential(model, U, loads)
-    force = mechanics.residual(model, U, loads, numbering)
+    with np.errstate(all="ignore"):  # a guess may turn elements inside out
+        energy = mechanics.potential(model, U, loads)
+        force = mechanics.residual(model, U, loads, numbering)
+    if not (np.isfinite(energy) and np.isfinite(force).all()):
+        return None, 0, "the start is no shape that the tyre can have"
     smallest, used, inertia, before = 1e-3 * tension, 0, 0.0, float("inf")
     for _ in range(longest):
         size = float(np.linalg.norm(force))

@@ -9,6 +9,8 @@ import re
 from collections.abc import Mapping
 from typing import Any, Protocol
 
+import numpy as np
+
 from ...tyre.case import LoadedCase
 from ...tyre.case.identity import tyre_sha256
 from ...tyre.case.schema import SolverChoice
@@ -53,6 +55,11 @@ class Design(Protocol):
     def solver(self) -> SolverChoice:
         """Which solver it is meant for, its options and time limit."""
 
+    @property
+    def nominal(self) -> Design | None:
+        """The tyre before anything was set, whose inflated shape is a good start for all others;
+        None where this is it, or nothing else is known."""
+
     def at(self, values: Mapping[str, float]) -> Design:
         """The design with numbers set. Raises ValueError where it cannot have them."""
 
@@ -73,12 +80,15 @@ class Decks:
         modes_per_harmonic: int | None = None,
         loads_N: tuple[float, ...] = (),
         loaded_modes: int = 0,
+        start: np.ndarray | None = None,
     ):
         """gradients: variables whose places in the deck are wanted; modes_per_harmonic: the
         design's, or a larger number for a second look; loads_N: press the tyre on the road with
-        these instead of finding modes; loaded_modes: how many to find there."""
+        these instead of finding modes; loaded_modes: how many to find there; start (n, 4): node
+        numbers and displacements, m, of a shape near the inflated one, for solvers that can use
+        it (``start``)."""
         self.design, self.gradients = design, gradients
-        self.loads_N, self.loaded_modes = loads_N, loaded_modes
+        self.loads_N, self.loaded_modes, self.start = loads_N, loaded_modes, start
         self.request = {**design.request, "loads_N": loads_N, "loaded_modes": loaded_modes}
         if modes_per_harmonic:
             self.request["modes_per_harmonic"] = modes_per_harmonic

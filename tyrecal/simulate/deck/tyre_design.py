@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from itertools import takewhile
 from math import ceil
 from typing import Any
 
-from ...tyre.case import LoadedCase, number_at
+from ...tyre.case import LoadedCase, number_at, start_values
 from ...tyre.case.schema import SolverChoice
 from ...tyre.effects import catalogue
 from ...tyre.resolve import Tyre, resolved
@@ -32,15 +33,36 @@ LEADS_OUTSIDE = re.compile(  # but for comments: an absolute path or one upwards
 class TyreDesign:
     """A case at values of its variables, or of any of its numbers (see `decks.Design`)."""
 
-    def __init__(self, case: LoadedCase, values: Mapping[str, float] | None = None):
-        """Raises ValueError for an unknown name, or a value that the case cannot have."""
+    def __init__(
+        self,
+        case: LoadedCase,
+        values: Mapping[str, float] | None = None,
+        plain: LoadedCase | None = None,
+    ):
+        """plain: the case that other values were set in before.
+
+        Raises ValueError for an unknown name, or a value that the case cannot have."""
         self.values: Mapping[str, float] = dict(values or {})
+        self.plain = plain or case
         self.case = set_values(case, self.values)
         self.tyre = resolved(self.case)
 
     def at(self, values: Mapping[str, float]) -> TyreDesign:
         """The case with these values. Raises ValueError."""
-        return TyreDesign(self.case, values)
+        return TyreDesign(self.case, values, self.plain)
+
+    @property
+    def nominal(self) -> TyreDesign | None:
+        """The case with its variables at their start, pressure and effects as its file has them;
+        None: this is it."""
+        read = self.plain.as_read or self.plain
+        update = {"pressure_kPa": read.case.pressure_kPa, "effects": read.case.effects}
+        case = replace(self.plain, case=self.plain.case.model_copy(update=update))
+        try:
+            nominal = TyreDesign(case, start_values(case))
+        except ValueError:  # only with what was set is it a tyre
+            return None
+        return None if nominal.case.case == self.case.case else nominal
 
     @property
     def header(self) -> str:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from math import isclose
 from pathlib import Path
 from typing import Any, TypeVar
+
+import numpy as np
 
 from ...files import printable
 from ...interrupt import interrupts_put_off, raise_interrupt
@@ -23,6 +25,8 @@ from .store import Store, key_of
 SETTLED = ("no_equilibrium", "unstable")  # the deck's own doing: another run would say the same
 MODES_ON_TOP = 3  # times the time limit of a load, where modes are sought there too
 T = TypeVar("T")
+Array = np.ndarray
+DesignKey = tuple[str, float, tuple[tuple[str, float], ...]]
 
 
 @dataclass(frozen=True)
@@ -67,6 +71,8 @@ class Evaluator:
     counts: Counts = field(default_factory=Counts)
     # called with how many of how many designs asked at once are answered
     on_progress: Callable[[int, int], None] = field(default=_unwatched, repr=False)
+    # of nominal designs: node numbers and displacements, see `_start_of`
+    shapes: dict[DesignKey, Array] = field(default_factory=dict, repr=False)
     _solver: Solver | None = field(default=None, repr=False)
 
     @property
@@ -93,8 +99,31 @@ class Evaluator:
         OSError where the run folder cannot be written.
         """
         design = self._with(question.values)
-        decks = Decks(design, question.gradients, question.modes_per_harmonic)
-        return self._ask(decks, lambda answer, kept: evaluation(answer))
+        start = self._start_of(design)
+        decks = Decks(design, question.gradients, question.modes_per_harmonic, start=start)
+        found = self._ask(decks, lambda answer, kept: evaluation(answer))
+        if start is None and design.nominal is None:
+            self.shapes.setdefault(_key(design), _shape(found))
+        return found
+
+    def _start_of(self, design: Design) -> Array | None:
+        """Where a design's inflation starts: at the inflated shape of its nominal one, which is
+        asked for first, so that the answer hangs on no other question. None: at rest, as for that
+        one itself, and for all where it does not inflate."""
+        nominal = design.nominal
+        return None if nominal is None else self._inflated(nominal)
+
+    def _inflated(self, nominal: Design) -> Array | None:
+        if "start" not in self.solver.capabilities:
+            return None
+        if (key := _key(nominal)) not in self.shapes:
+            other = replace(self.of(nominal), folder=None, keep=False)
+            try:
+                self.shapes[key] = _shape(other.evaluate(Question(nominal.values)))
+            except (EvaluationFailed, DeckRefused):
+                self.shapes[key] = np.empty((0, 4))
+        shape = self.shapes[key]
+        return shape if len(shape) else None
 
     def press(
         self, values: Mapping[str, float], loads_N: Sequence[float], modes: int = 0
@@ -230,6 +259,7 @@ class Evaluator:
                 self.on_progress(done, len(asked))
                 yield answer
             return
+        self._inflated(self.design.nominal or self.design)  # before the workers each ask for it
         with executor(jobs, self.scheduler) as workers:
             answers = workers.each(partial(_answer_and_count, self.worker(), ask), asked)
             for done, answer in enumerate(in_order(answers), start=1):
@@ -245,7 +275,13 @@ class Evaluator:
         """The same for another process, wherever it is, with counts of its own."""
         folder = self.folder.absolute() if self.folder else None
         return Evaluator(
-            self.design, self.solver_name, folder, self.keep, self.store, command=self.command
+            self.design,
+            self.solver_name,
+            folder,
+            self.keep,
+            self.store,
+            command=self.command,
+            shapes=self.shapes,
         )
 
     def of(self, design: Design) -> Evaluator:
@@ -294,6 +330,18 @@ class Evaluator:
             folders.drop(folder)
             return None
         return folders.keep(folder, outcome)
+
+
+def _key(design: Design) -> DesignKey:
+    """What tells nominal designs apart."""
+    return design.header, design.pressure_kPa, tuple(sorted(design.values.items()))
+
+
+def _shape(found: Evaluation) -> Array:
+    """Node numbers and displacements (n, 4) of an inflated tyre; empty where they are not known."""
+    if len(found.nodes) != len(found.displacement):
+        return np.empty((0, 4))
+    return np.column_stack([found.nodes, found.displacement])
 
 
 def _answer(evaluator: Evaluator, ask: str, arguments: tuple[Any, ...]) -> Any:

@@ -24,3 +24,4 @@ class LoadedCase:
     file_data: dict[str, Any]  # as the file has it, whatever is set later
     # set by the user since, by name or path, for results to say
     overrides: Mapping[str, float] = field(default_factory=dict)
+    as_read: LoadedCase | None = None  # before any number was set; None: none was

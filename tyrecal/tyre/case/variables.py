@@ -55,7 +55,8 @@ def with_level(loaded: LoadedCase, level: str) -> LoadedCase:
     if level not in mesh.levels:
         raise ValueError(f"mesh level '{level}' is not one of the case's: {', '.join(mesh.levels)}")
     case = loaded.case.model_copy(update={"mesh": mesh.model_copy(update={"level": level})})
-    return replace(loaded, case=case)
+    read = loaded.as_read and with_level(loaded.as_read, level)
+    return replace(loaded, case=case, as_read=read)
 
 
 def number_at(loaded: LoadedCase, path: str) -> float:
