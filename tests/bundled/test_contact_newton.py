@@ -324,6 +324,12 @@ def footprints(work: Round, clock: Late, loads: list[float]) -> dict[str, Any]:
     return footprint_job.press(work.model, equations, work.loads, work.U, road, loads, clock)
 
 
+def test_nodes_that_bear_less_than_a_newton_belong_to_the_patch(solid: Round) -> None:
+    (found,) = footprints(solid, Late(1000), [0.5])["footprints"]
+    assert found["pressure_Pa"] @ found["area_m2"] == pytest.approx(0.5, rel=1e-6)
+    assert (found["pressure_Pa"] > 0).all() and len(found["node"]) > 1
+
+
 def test_each_load_that_is_reached_is_told(
     solid: Round, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -311,7 +311,7 @@ class Runner:
             chosen = [self.items[name] for name in names]
             if chosen:
                 chosen[0].config.pluginmanager.register(watch)
-            for item, following in zip(chosen, [*chosen[1:], None], strict=True):
+            for item, following in zip(chosen, [*chosen, None][1:], strict=True):
                 item.ihook.pytest_runtest_protocol(item=item, nextitem=following)
                 if watch.failed:
                     return watch
