@@ -16,7 +16,7 @@ Array = np.ndarray
 EDGE = 0.05  # of half a box: what lies there is at its edge
 AT_EDGE = 1e-3  # of the draws, that may
 GROWTH, GROWTHS = 0.25, 8  # of a box, at a side; times
-PROBE = 0.2  # of the draws, by which a box is tried
+PROBE = 0.1  # of the draws, by which a box is tried
 LIKELY = 10.0  # below the highest ln p: optima that walkers start from
 
 
