@@ -38,7 +38,7 @@ def numbers(found: Evaluation | Exception) -> bytes:
     )
 
 
-def test_same_bytes_in_any_order_from_the_record_and_by_workers(tmp_path: Path) -> None:
+def test_same_bytes_in_any_order_and_from_the_record(tmp_path: Path) -> None:
     fresh = lambda: Evaluator(TyreDesign(CASE))
     alone = ask(fresh(), FAR)
     after = fresh()
@@ -50,8 +50,14 @@ def test_same_bytes_in_any_order_from_the_record_and_by_workers(tmp_path: Path) 
     first, again = ask(stored, FAR), ask(stored, FAR)
     assert first == again == alone
     assert (stored.counts.runs, stored.counts.recorded) == (2, 1)  # the nominal one, and this
+
+
+@pytest.mark.slow
+def test_same_bytes_by_workers() -> None:
     questions = [Question(values) for values in (FAR, START, NEAR)]
-    assert numbers(next(iter(fresh().evaluate_all(questions, jobs=2)))) == alone
+    pooled = Evaluator(TyreDesign(CASE)).evaluate_all(questions, jobs=2)
+    alone = Evaluator(TyreDesign(CASE)).evaluate_all(questions)
+    assert list(map(numbers, pooled)) == list(map(numbers, alone))
 
 
 def test_what_was_set_before_does_not_count() -> None:
