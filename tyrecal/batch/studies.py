@@ -13,14 +13,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from ..simulate.evaluate.evaluator import Evaluator, Question
+from ..simulate.evaluate.evaluator import Evaluator
 from ..simulate.evaluate.failure import EvaluationFailed
 from ..simulate.provenance import provenance
 from ..studies import footprint as pressed
+from ..studies import modes as evaluated
 from ..studies import pressure_result
 from ..studies.fit.calibrate import calibrate, history_csv
 from ..studies.fitted import NOT_CONVERGED
-from ..studies.modes import modes_result
 from ..studies.result import Failed, Result, ResultPart
 from ..studies.sample import study as sampling
 from ..studies.sample.result import draws_csv, result
@@ -82,9 +82,9 @@ def fit(state: Studied) -> StudyOutcome:
 
 
 def modes(state: Studied) -> StudyOutcome:
-    """Evaluate the case's own design. Raises what `Evaluator.evaluate` does."""
+    """Evaluate the case's own design. Raises what `modes.run` does."""
     values = state.designs["initial"]
-    found, _ = modes_result(state.case, values, state.evaluator.evaluate(Question(values)))
+    found, _, _ = evaluated.run(state.case, state.evaluator, values)
     numbers = {"mass_kg": found.mass_kg}
     for mode in found.modes:
         member = f" member {mode.member}" if mode.member else ""

@@ -56,8 +56,7 @@ def command(
     tyrecal modes cases/p235_75r17.yaml --sweep-load 0,1000,2000,4000 --fitted p235_75r17/fit.json
     """
     from ..report.shape_data import tyre_data
-    from ..simulate.evaluate.evaluator import Question
-    from ..studies.modes import modes_result
+    from ..studies import modes as studies
 
     loads = wanted_loads(load_N, sweep)
     if fitted and sweep is None:
@@ -84,8 +83,7 @@ def command(
     run = study.run(loaded, "modes", evaluator, load_N=loads[0] if loads else 0.0)
     if loads:
         return at_load(loaded, evaluator, run, values, loads[0], study)
-    evaluation = evaluator.evaluate(Question(values))
-    result, modes = modes_result(loaded, values, evaluation)
+    result, evaluation, modes = studies.run(loaded, evaluator, values)
     result = run.write(result)
     run.write_json("modes_shapes.json", tyre_data(loaded, evaluation, modes))
     if pictures:

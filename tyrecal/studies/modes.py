@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import Field
 
@@ -11,6 +11,9 @@ from ..simulate.evaluate.results import Evaluation
 from ..simulate.modes.label import Mode, labelled
 from ..tyre.case import LoadedCase
 from .result import NAME_COLUMNS, Column, ModeEntry, Result, ResultPart, Table
+
+if TYPE_CHECKING:
+    from ..simulate.evaluate.evaluator import Evaluator
 
 EXTRA = {"symmetry": "", "member": ".0f", "clarity": ".2f", "overlap": ".2f"}  # forms
 
@@ -51,6 +54,17 @@ class ModesResult(Result):
         load = f", {self.load_N:g} N" if self.load_N else ""
         title = f"{self.pressure_kPa:g} kPa{load}, {self.mass_kg:.2f} kg"
         return [Table(columns, rows, title, str(self.provenance or ""))]
+
+
+def run(
+    case: LoadedCase, evaluator: Evaluator, values: Mapping[str, float]
+) -> tuple[ModesResult, Evaluation, list[Mode]]:
+    """One design: the result, and what it was made of. Raises what `Evaluator.evaluate` does."""
+    from ..simulate.evaluate.evaluator import Question  # late: not for those who read results
+
+    evaluation = evaluator.evaluate(Question(values))
+    result, modes = modes_result(case, values, evaluation)
+    return result, evaluation, modes
 
 
 def modes_result(
