@@ -34,3 +34,16 @@ class NoEquilibrium(RunFailed):
 
     def __init__(self, message: str):
         super().__init__("no_equilibrium", message)
+
+
+class Indefinite(ArithmeticError):
+    """The matrix is not positive definite: the state is unstable, or has a free rigid body."""
+
+
+class Inverted(ArithmeticError):
+    """An element turned inside out, or nearly so; ``element``: the first, where it is known."""
+
+    def __init__(self, element: int | None = None) -> None:
+        one = f"element {element} has no positive area"
+        super().__init__("elements turn inside out" if element is None else one)
+        self.element = element

@@ -1,26 +1,74 @@
-"""A frequency step: modes of the inflated tyre, and how fast their eigenvalues change."""
+"""A frequency step: modes of the inflated tyre, and how fast their eigenvalues change.
+
+Of a tyre that is not the same all round, or that turns, one thing at a time is honoured.
+"""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 
-from .deck.keywords import DataLine
-from .deck.steps import DeckStep, Tangent
+from .deck.keywords import DataLine, DeckError, Keyword
+from .deck.request import Request
+from .deck.steps import Deck, DeckStep, Tangent
 from .modes.bordered import Bordered
+from .modes.cavity import GasCavity, read_cavity
 from .modes.frequency_dependent import SelfConsistent
 from .modes.harmonics import HarmonicModes, HasModes, SeededTyre, Vibration, lowest_of_all
-from .modes.inflated import Inflated
 from .modes.sensitivity import ModeShapes, RimAndAir, eigenvalue_rates, state_rate
-from .nonuniform.select import is_nonuniform, nonuniform_modes
+from .modes.wheel import Wheel, read_wheel
+from .nonuniform.coupled import attached_modes
+from .nonuniform.rotation import waves
+from .nonuniform.splice import SpliceSector, sector_modes
 from .section.boundary import vibrating
 from .section.kept_fields import Factor
-from .section.loads import loads, spin
+from .section.loads import agreed_spin, loads, pressures, spin
+from .section.mesh import read_mesh
 from .section.model import Model, build
+from .section.point_elements import PointElements, read_point_elements
 
 Array = np.ndarray
+Models = Callable[[float | None, bool, bool], Model]
+"""The section's model by `model.build`'s arguments dynamic_Hz, long_term, own_frequency."""
+
+
+@dataclass
+class Inflated:
+    """A deck's tyre, and what is asked of it."""
+
+    deck: Deck
+    request: Request
+    # model blocks: of the section's job; of the job that revolves it, of the section in a splice,
+    # both empty where there is none
+    section: list[Keyword]
+    revolve: list[Keyword]
+    sector: list[Keyword]
+    models: Models
+    half: bool  # they are of half the section, which stands for the whole
+    U: Array  # displacements (nodes, 3), m
+    check: Callable[[], None]  # raises where the time is over
+
+    @property
+    def model(self) -> Model:
+        """The section at its relaxed static moduli."""
+        return self.models(None, True, False)
+
+    def attached(self) -> PointElements:
+        """Masses and springs on the tyre. Raises DeckError."""
+        return read_point_elements(self.revolve, read_mesh(self.section))
+
+    def wheel_and_cavity(
+        self, model: Model, step: DeckStep
+    ) -> tuple[Wheel | None, GasCavity | None]:
+        """The rim that moves in a step and the gas in the cavity, where there are such."""
+        wheel = read_wheel(self.revolve, model.mesh, step) if step.revolved else None
+        cavity = self.request.cavity
+        if not cavity:
+            return wheel, None
+        return wheel, read_cavity(self.section, read_mesh(self.section), cavity)
 
 
 class FrequencyStep:
@@ -130,3 +178,64 @@ class FrequencyStep:
 
 def _model(tyre: Inflated, step: DeckStep, dynamic_Hz: float | None, own: bool) -> Model:
     return tyre.models(dynamic_Hz, step.long_term, own)
+
+
+def is_nonuniform(tyre: Inflated, step: DeckStep) -> bool:
+    """Whether the tyre is not the same all round, or turns."""
+    return bool(_turns(step) or tyre.sector or tyre.attached())
+
+
+def nonuniform_modes(
+    tyre: Inflated, step: DeckStep, vibration: HasModes, harmonics: list[int], count: int
+) -> list[HarmonicModes]:
+    """The ``count`` lowest modes of each harmonic. Raises DeckError, RunFailed."""
+    line = step.procedure.line
+    attached, turns = tyre.attached(), _turns(step)
+    if bool(attached) + turns + bool(tyre.sector) > 1:
+        raise DeckError(
+            line,
+            "of masses and springs on the tyre, a sector of other stuff, and its turning, one"
+            " at a time is honoured",
+        )
+    if not (isinstance(vibration, Vibration) and vibration.plain):
+        raise DeckError(
+            line,
+            "masses and springs on the tyre, a sector of other stuff, or its turning, are not"
+            " honoured together with a rim that moves, air in the cavity or rubber at each"
+            " mode's own frequency",
+        )
+    if turns:
+        spin = agreed_spin(tyre.model, step)
+        modes = []
+        for n in harmonics:
+            tyre.check()
+            modes.append(waves(vibration, spin, n, count))
+        return modes
+    if attached:
+        if not vibration.numbering.free[attached.rows, attached.components].all():
+            raise DeckError(line, "masses and springs on nodes that are held do nothing")
+        return attached_modes(vibration, attached, harmonics, count, tyre.check)
+    return _sector_modes(tyre, step, vibration, harmonics, count)
+
+
+def _sector_modes(
+    tyre: Inflated, step: DeckStep, vibration: Vibration, harmonics: list[int], count: int
+) -> list[HarmonicModes]:
+    """With a sector of other stuff, at the static moduli."""
+    line = step.procedure.line
+    if step.procedure.number("PROPERTY EVALUATION") is not None or vibration.shift:
+        raise DeckError(line, "a sector of other stuff is honoured at the static moduli")
+    if tyre.request.sensitivities:
+        raise DeckError(line, "a tyre with a sector of other stuff has no exact derivatives")
+    assert tyre.request.sector
+    model, other = (build(k, None, step.long_term) for k in (tyre.section, tyre.sector))
+    if model.mesh is not other.mesh:
+        raise DeckError(line, "the sector's section job must have the same mesh")
+    sector = SpliceSector(np.radians(float(tyre.request.sector["width_deg"])), other)
+    return sector_modes(
+        vibration, tyre.U, pressures(model, step), model, sector, harmonics, count, tyre.check
+    )
+
+
+def _turns(step: DeckStep) -> bool:
+    return step.procedure.name == "COMPLEX FREQUENCY"

@@ -16,9 +16,8 @@ from .deck.keywords import DeckError, Keyword, read_deck
 from .deck.request import Request, read_request, read_sector
 from .deck.start import read_start
 from .deck.steps import Deck, DeckStep
-from .frequency_step import FrequencyStep
+from .frequency_step import FrequencyStep, Inflated
 from .modes.harmonics import HarmonicModes
-from .modes.inflated import Inflated
 from .results import StepResult, write
 from .road import footprint_job
 from .section.boundary import keeps_half_turn, numbering

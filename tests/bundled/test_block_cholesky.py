@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from tyrecal_solvers.bundled.road.block_cholesky import Elimination, Factor
 from tyrecal_solvers.bundled.road.half_turn_symmetry import HalfTurn
-from tyrecal_solvers.bundled.section.band import Indefinite
 from tyrecal_solvers.bundled.solid3d.circumference import half_circle
 from tyrecal_solvers.bundled.solid3d.revolved import Revolved
+from tyrecal_solvers.errors import Indefinite
 
 from ..chance import generator
 from . import support

@@ -15,8 +15,7 @@ from tyrecal_solvers.bundled import job
 from tyrecal_solvers.bundled.deck.keywords import DeckError
 from tyrecal_solvers.bundled.road import contact_newton, footprint_job
 from tyrecal_solvers.bundled.road.contact_newton import ContactNewton
-from tyrecal_solvers.bundled.section.band import Indefinite
-from tyrecal_solvers.errors import NoEquilibrium, RunFailed
+from tyrecal_solvers.errors import Indefinite, NoEquilibrium, RunFailed
 
 from tyrecal.simulate.deck.decks import Decks
 from tyrecal.simulate.deck.tyre_design import TyreDesign

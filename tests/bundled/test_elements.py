@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from tyrecal_solvers.bundled.section import elements
 from tyrecal_solvers.bundled.section.parts.cords import cord_rows
-from tyrecal_solvers.bundled.section.parts.law import Inverted
-from tyrecal_solvers.bundled.section.parts.rows import on_diagonals
+from tyrecal_solvers.bundled.section.parts.part import on_diagonals
 from tyrecal_solvers.bundled.section.shapes import TYPES, ElementType
+from tyrecal_solvers.errors import Inverted
 
 Array = np.ndarray
 

@@ -19,7 +19,6 @@ from tyrecal_solvers.bundled.job import Job
 from tyrecal_solvers.bundled.modes import lanczos
 from tyrecal_solvers.bundled.results import StepResult
 from tyrecal_solvers.bundled.section import mechanics
-from tyrecal_solvers.bundled.section.band import Indefinite
 from tyrecal_solvers.bundled.section.half_mesh import half_mesh
 from tyrecal_solvers.bundled.section.kept_fields import KeptCholesky, KeptFields
 from tyrecal_solvers.bundled.section.mesh import DeckMesh
@@ -27,7 +26,7 @@ from tyrecal_solvers.bundled.section.model import Model, build
 from tyrecal_solvers.bundled.section.parts.part import of_each_component
 from tyrecal_solvers.bundled.section.parts.pressure import Pressure
 from tyrecal_solvers.bundled.section.symmetry import HALF_TURN, MirrorHalf, mirror_images
-from tyrecal_solvers.errors import Refused
+from tyrecal_solvers.errors import Indefinite, Refused
 
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.tyre.case import LoadedCase

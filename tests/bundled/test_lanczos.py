@@ -9,8 +9,8 @@ import pytest
 from scipy.linalg import eigh, qr
 from tyrecal_solvers.bundled import job
 from tyrecal_solvers.bundled.modes import lanczos
-from tyrecal_solvers.bundled.section.band import Cholesky, Indefinite, Numbering
-from tyrecal_solvers.errors import RunFailed
+from tyrecal_solvers.bundled.section.band import Cholesky, Numbering
+from tyrecal_solvers.errors import Indefinite, RunFailed
 
 from ..chance import generator
 

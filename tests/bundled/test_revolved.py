@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from tyrecal_solvers.bundled.section import mechanics
-from tyrecal_solvers.bundled.section.parts.law import Inverted
 from tyrecal_solvers.bundled.solid3d.circumference import Circumference, functions, half_circle
 from tyrecal_solvers.bundled.solid3d.revolved import Revolved
+from tyrecal_solvers.errors import Inverted
 
 from ..chance import generator
 from . import support

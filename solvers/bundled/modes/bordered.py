@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..section.band import Indefinite
+from ...errors import Indefinite
 from ..section.kept_fields import Coordinates, Factor
 from ..section.mechanics import OfElements
 from ..section.symmetry import Whole

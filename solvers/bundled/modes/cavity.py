@@ -29,7 +29,7 @@ from ..section import elements
 from ..section.elements import Lines
 from ..section.materials import Scalar, read_materials
 from ..section.mesh import DeckMesh
-from ..section.parts.frame import SPIN_AXIS, cross
+from ..section.parts.part import SPIN_AXIS, cross
 from ..section.parts.pressure import surface_point
 
 Array = np.ndarray

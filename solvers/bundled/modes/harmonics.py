@@ -14,9 +14,8 @@ from typing import Protocol
 import numpy as np
 from scipy.sparse import csr_array
 
-from ...errors import RunFailed
+from ...errors import Indefinite, RunFailed
 from ..section import mechanics
-from ..section.band import Indefinite
 from ..section.kept_fields import Coordinates, Factor
 from ..section.model import Model
 from ..section.parts.part import TyrePart, of_each_component

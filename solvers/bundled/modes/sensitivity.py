@@ -19,9 +19,7 @@ from ..deck.keywords import COMPLEX_STEP
 from ..section import mechanics
 from ..section.kept_fields import Coordinates, Factor
 from ..section.model import Model
-from ..section.parts.frame import IN_PLANE
-from ..section.parts.mode_shapes import ModeShapes
-from ..section.parts.part import TyrePart
+from ..section.parts.part import IN_PLANE, ModeShapes, TyrePart
 from ..section.parts.spin import Spin
 from .cavity import GasCavity, coupling
 from .wheel import Wheel

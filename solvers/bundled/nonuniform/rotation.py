@@ -22,7 +22,7 @@ from scipy.linalg import eigh
 from ..deck.keywords import COMPLEX_STEP
 from ..modes.harmonics import HarmonicModes, SeededTyre, Vibration
 from ..section.mechanics import mass_matrices
-from ..section.parts.frame import SPIN_AXIS
+from ..section.parts.part import SPIN_AXIS
 from .coupled import Family, assigned, ritz, split
 
 Array = np.ndarray

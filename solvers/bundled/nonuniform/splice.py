@@ -17,12 +17,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ...errors import Inverted
 from ..modes.harmonics import HarmonicModes, Vibration
 from ..section.inflation import stopped
 from ..section.mechanics import mass
 from ..section.model import Model
 from ..section.parts.elastic import Elastic
-from ..section.parts.law import Inverted
 from ..section.parts.part import TyrePart
 from ..solid3d.circumference import Circumference
 from ..solid3d.gmres import gmres

@@ -15,8 +15,7 @@ from functools import partial
 import numpy as np
 from scipy.linalg.lapack import spotrf, strtrs
 
-from ...errors import Refused
-from ..section.band import Indefinite
+from ...errors import Indefinite, Refused
 from ..section.symmetry import MIRROR_SIGNS
 from ..solid3d.circumference import Circumference
 from .half_turn_symmetry import HalfTurn

@@ -10,9 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...errors import NoEquilibrium
-from ..section.band import Indefinite
-from ..section.parts.law import Inverted
+from ...errors import Indefinite, Inverted, NoEquilibrium
 from ..solid3d.gmres import gmres
 from ..solid3d.revolved import Revolved
 from .block_cholesky import Elimination, Factor

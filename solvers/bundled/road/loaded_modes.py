@@ -13,9 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...errors import RunFailed
+from ...errors import Indefinite, RunFailed
 from ..modes.harmonics import HarmonicModes
-from ..section.band import Indefinite
 from ..section.mechanics import mass
 from ..section.model import Model
 from ..section.symmetry import HALF_TURN

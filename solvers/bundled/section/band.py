@@ -7,11 +7,9 @@ from scipy.linalg.lapack import dpbtrf, dpbtrs, zpbtrf, zpbtrs
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
+from ...errors import Indefinite
+
 Array = np.ndarray
-
-
-class Indefinite(ArithmeticError):
-    """The matrix is not positive definite: the state is unstable, or has a free rigid body."""
 
 
 class Numbering:

@@ -14,8 +14,8 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
+from ...errors import Inverted
 from . import shapes
-from .parts.law import Inverted
 
 Array = np.ndarray
 

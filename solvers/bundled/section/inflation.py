@@ -7,9 +7,9 @@ from operator import methodcaller
 
 import numpy as np
 
-from ...errors import NoEquilibrium
+from ...errors import Indefinite, NoEquilibrium
 from . import mechanics
-from .band import Cholesky, Indefinite, Numbering
+from .band import Cholesky, Numbering
 from .model import Model
 from .parts.part import TyrePart
 from .parts.pressure import Pressure

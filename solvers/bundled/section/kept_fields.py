@@ -18,7 +18,8 @@ from scipy.linalg import cho_factor, cho_solve
 from scipy.linalg.lapack import dpbtrf, dtbtrs, zpbtrf, ztbtrs
 from scipy.sparse import csr_array
 
-from .band import Cholesky, Indefinite, Numbering
+from ...errors import Indefinite
+from .band import Cholesky, Numbering
 from .mechanics import OfElements
 from .symmetry import MirrorHalf
 

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from ...errors import Inverted
 from ..deck.keywords import DeckError, Keyword
 from . import elements
-from .parts.law import Inverted
 from .shapes import TYPES
 from .symmetry import Whole
 

@@ -10,10 +10,8 @@ from .half_mesh import half_mesh
 from .materials import ModulusTable, read_materials
 from .mesh import DeckMesh, read_mesh
 from .parts import cords, rubber
-from .parts.elastic import Elastic
-from .parts.law import EnergyLaw
-from .parts.part import TyrePart
-from .parts.section_job import SectionJob
+from .parts.elastic import Elastic, EnergyLaw
+from .parts.part import SectionJob, TyrePart
 
 READERS = (rubber.read, cords.read)
 

@@ -14,8 +14,7 @@ import numpy as np
 
 from ..section.elements import Lines
 from ..section.model import Model
-from ..section.parts.frame import SPIN_AXIS, cross
-from ..section.parts.part import Precision, TyrePart
+from ..section.parts.part import SPIN_AXIS, Precision, TyrePart, cross
 from ..section.parts.pressure import Pressure
 from .circumference import Circumference
 

@@ -16,11 +16,8 @@ import numpy as np
 from ...deck.keywords import DataLine, DeckError, Keyword
 from .. import shapes
 from ..elements import Lines
-from .elastic import Elastic
-from .law import EnergyLaw
-from .part import TyrePart, consistent_mass
-from .rows import Rows, on_diagonals
-from .section_job import SectionJob
+from .elastic import Elastic, EnergyLaw
+from .part import Rows, SectionJob, TyrePart, consistent_mass, on_diagonals
 
 Array = np.ndarray
 

@@ -10,9 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..elements import Solids
-from .elastic import Elastic
-from .law import EnergyLaw
-from .rows import Rows, on_diagonals
+from .elastic import Elastic, EnergyLaw
+from .part import Rows, on_diagonals
 
 Array = np.ndarray
 SHARE_OF_SHEAR_MODULUS = 0.005

@@ -1,4 +1,5 @@
-"""What every part of the tyre has: energy, force, tangents, mass and form, and the same in 3-D.
+"""What every part of the tyre has: energy, force, tangents, mass and form, and the same in 3-D;
+what it is read from, the modes that its form is of, and the rows that they are taken through.
 
 All that a step, a vibration or a slope needs of the tyre is a sum over its parts. State U (n, 3)
 in m: displacements in the frame of the reference angle (see `elements`); energies per radian.
@@ -6,15 +7,23 @@ in m: displacements in the frame of the reference angle (see `elements`); energi
 
 from __future__ import annotations
 
+import copy
 from abc import ABC, abstractmethod
+from collections.abc import Container
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from scipy.sparse import csr_matrix
 
-from .mode_shapes import ModeShapes
+from ...deck.keywords import DeckError, Keyword
+from ..materials import Material, ModulusTable
+from ..mesh import DeckMesh
 
 Array = np.ndarray
+IN_PLANE = np.diag([1.0, 1.0, 0.0])  # of the wheel
+SPIN_AXIS = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])  # e_z x
 Precision = type[np.floating[Any]]
 Tangents = tuple[Array, Array | None, Array | None]
 
@@ -110,3 +119,139 @@ def of_each_component(M: Array, components: Array) -> Array:
 def consistent_mass(N: Array, weights: Array) -> Array:
     """Element masses (e, a, a) from N (g, a) and weights (e, g), kg per radian."""
     return np.tensordot(weights, N[:, :, None] * N[:, None, :], 1)
+
+
+def cross(a: Array, b: Array) -> Array:
+    """a x b over the last axis; np.cross spends ten times as long on its arguments."""
+    ax, ay, az = a[..., 0], a[..., 1], a[..., 2]
+    bx, by, bz = b[..., 0], b[..., 1], b[..., 2]
+    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], -1)
+
+
+@dataclass(frozen=True)
+class Rows:
+    """z at Gauss points of elements of one kind."""
+
+    B0: Array  # (e, g, k, 3a)
+    hoop: Array  # (e, g, a): B1 (e, g, 3, 3a) is this on its three diagonals
+    around: slice  # the three of the k rows that B1 has
+    rest: Array  # z0, (k,) or (e, g, k)
+    weights: Array  # (e, g): of the integral per radian
+
+    @cached_property
+    def B1(self) -> Array:
+        """What du/dTheta adds to the rows ``around``."""
+        return on_diagonals(self.hoop)
+
+
+def on_diagonals(values: Array) -> Array:
+    """Rows (e, g, 3, 3a), each component of u times ``values`` (e, g, a)."""
+    e, g, a = values.shape
+    rows = np.zeros((e, g, 3, a, 3), values.dtype)
+    for i in range(3):
+        rows[:, :, i, :, i] = values
+    return rows.reshape(e, g, 3, 3 * a)
+
+
+class ModeShapes:
+    """Modes as sums of shapes a + i b of harmonics n.
+
+    modes: per mode n (p,), a and b (p, nodes, 3) of the p shapes that it is the sum of.
+    """
+
+    def __init__(self, n: Array, shapes: Array, owner: Array | None = None):
+        """``owner`` (p,): the mode, from 0 on, that each of the shapes is part of; None: each is a
+        mode."""
+        self.n, self.shapes = n, shapes
+        self._owner = np.arange(len(n)) if owner is None else owner
+        self._set(shapes.real, shapes.imag)
+
+    def _set(self, real: Array, imag: Array) -> None:
+        self.complex = np.iscomplexobj(real)  # they carry a variable's tangent
+        self.real, self.imag = real, imag  # a and b (p, nodes, 3) of all shapes
+        own = [self._owner == j for j in range(self._owner.max() + 1)]
+        self.modes = [(self.n[mine], real[mine], imag[mine]) for mine in own]
+        self.known: list[tuple[Rows, Array]] = []
+
+    def replaced(self, real: Array, imag: Array) -> ModeShapes:
+        """The same sums of other shapes."""
+        other = copy.copy(self)
+        other._set(real, imag)
+        return other
+
+    def summed(self, values: Array) -> Array:
+        """Per mode (m, ...) the sum of its shapes' values (p, ...)."""
+        total = np.zeros((len(self.modes), *values.shape[1:]), values.dtype)
+        np.add.at(total, self._owner, values)
+        return total
+
+    def products(self, connectivity: Array, rows: Rows) -> Array:
+        """G (m, e, g, k, k), sum of z z^T over a mode's shapes, real and imaginary: the form
+        phi^H K phi is A : G. Rows without a tangent are all variables': G is remembered."""
+        for own, G in self.known:
+            same = own.B0 is rows.B0 or np.array_equal(own.B0, rows.B0)
+            if same and (own.hoop is rows.hoop or np.array_equal(own.hoop, rows.hoop)):
+                return G
+        kind = np.result_type(rows.B0, rows.hoop, self.modes[0][1])
+        G = np.empty((len(self.modes), *rows.B0.shape[:3], rows.B0.shape[2]), kind)
+        for j, (n, a, b) in enumerate(self.modes):
+            z = np.concatenate(_gradients(connectivity, rows, a, b, n), -1)
+            np.matmul(z, z.swapaxes(-1, -2), out=G[j])
+        if not np.iscomplexobj(G):
+            self.known.append((rows, G))
+        return G
+
+
+def contract(A: Array, G: Array) -> Array:
+    """sum over Gauss points of A : G per mode; A (e, g, k, k), G (m, e, g, k, k)."""
+    G, A = G.reshape(len(G), -1), A.reshape(-1)
+    if np.iscomplexobj(G):
+        return np.asarray(G @ A)
+    return np.asarray(G @ A.real + 1j * (G @ A.imag))
+
+
+def _gradients(
+    connectivity: Array, rows: Rows, real: Array, imag: Array, n: Array
+) -> tuple[Array, Array]:
+    """Real and imaginary part of (B0 + i n B1)(a + i b), each (e, g, k, p)."""
+    e, g, k, d = rows.B0.shape
+    B = rows.B0.reshape(e, g * k, d)
+    z, around = [], []
+    for part in (real, imag):
+        u = np.moveaxis(part[:, connectivity], 0, -1)  # (e, a, 3, p)
+        z.append((B @ u.reshape(e, d, -1)).reshape(e, g, k, -1))
+        around.append(np.einsum("ega,eaip->egip", rows.hoop, u) * n)
+    z[0][:, :, rows.around] -= around[1]
+    z[1][:, :, rows.around] += around[0]
+    return z[0], z[1]
+
+
+@dataclass(frozen=True)
+class SectionJob:
+    """A job's model, and the moduli that its rubber is to have."""
+
+    keywords: list[Keyword]
+    mesh: DeckMesh
+    materials: dict[str, Material]
+    tables: list[ModulusTable]  # whose rubber keeps its static modulus: the table is the model's
+    dynamic_Hz: float | None  # at which the vibration's modulus is evaluated; None = static
+    long_term: bool  # the static state is relaxed, else its moduli are the instantaneous ones
+
+    def material(self, k: Keyword, name: str) -> Material:
+        """A material that a keyword names. Raises DeckError."""
+        if name not in self.materials:
+            raise DeckError(k.line, f"material {name} is not defined")
+        return self.materials[name]
+
+    def by_type(self, k: Keyword, kinds: Container[str]) -> dict[str, Array]:
+        """The elements of a keyword's set: element type to rows of its block. Raises DeckError."""
+        name = k.need("ELSET")
+        if name not in self.mesh.element_sets:
+            raise DeckError(k.line, f"element set {name} is not defined")
+        rows: dict[str, list[int]] = {}
+        for number in self.mesh.element_sets[name]:
+            kind, position = self.mesh.place[number]
+            if kind not in kinds:
+                raise DeckError(k.line, f"element {number} of type {kind} cannot have *{k.name}")
+            rows.setdefault(kind, []).append(position)
+        return {kind: np.array(r) for kind, r in rows.items()}

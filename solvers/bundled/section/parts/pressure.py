@@ -16,8 +16,7 @@ from typing import Any
 import numpy as np
 
 from ..elements import Lines
-from .frame import IN_PLANE, SPIN_AXIS, cross
-from .part import AtStations, Precision, Tangents, TyrePart
+from .part import IN_PLANE, SPIN_AXIS, AtStations, Precision, Tangents, TyrePart, cross
 
 Array = np.ndarray
 

@@ -18,11 +18,8 @@ from .. import shapes
 from ..elements import Solids
 from ..materials import Material
 from . import hourglass
-from .elastic import Elastic
-from .law import EnergyLaw
-from .part import TyrePart, consistent_mass
-from .rows import Rows
-from .section_job import SectionJob
+from .elastic import Elastic, EnergyLaw
+from .part import Rows, SectionJob, TyrePart, consistent_mass
 
 Array = np.ndarray
 MIN_VOLUME_RATIO = 0.2  # over the reference volume: nearly incompressible rubber stays near 1

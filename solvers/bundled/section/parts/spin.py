@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from .frame import IN_PLANE
-from .part import AtStations, Tangents, TyrePart, of_each_component
+from .part import IN_PLANE, AtStations, Tangents, TyrePart, of_each_component
 
 Array = np.ndarray
 
