@@ -136,6 +136,25 @@ def test_tangents_find_every_place_of_a_variable() -> None:
         assert float(lines[line - 1].split(",")[field]) in values.values()
 
 
+def test_to_first_order_a_splice_is_its_share_of_the_circumference_all_round() -> None:
+    """Every number that it changes, by its width over 360 degrees; elsewhere than at 0 nothing."""
+    name, width = "effects.stiffness_splice", 30.0
+    case = with_values(load_case(CASES / "p235_75r17.yaml"), {"splice.width_deg": width})
+    design = TyreDesign(case, {name: 0.0})
+    assert design.has_slopes
+    decks = Decks(design, (name,))
+    lines = decks.texts("abaqus")["inflate.inp"].splitlines()
+    slopes = {
+        float(lines[line - 1].split(",")[field]): slope
+        for job, line, field, slope in decks.tangents("abaqus")[name]
+        if job == "inflate"
+    }
+    assert sorted(slopes) == [1e6, 9.87e9, 172.2e9]  # C10, and the cords' moduli; C01 is 0
+    assert slopes == pytest.approx({x: x * width / 360 for x in slopes}, rel=1e-6)
+    spliced = TyreDesign(case, {name: 0.5})
+    assert not spliced.neighbour(name, 1)[0].has_slopes
+
+
 @pytest.mark.parametrize(
     ("edit", "words"),
     [

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
+from numpy.polynomial import Polynomial
 from scipy.stats import chi2
 
 from tyrecal.simulate.modes.label import Label
@@ -22,7 +24,16 @@ from tyrecal.studies.diagnose.evidence import (
     refit,
     weigh,
 )
-from tyrecal.studies.diagnose.expansion import Expansion, Nodes, _bent, _nodes, expand, node_values
+from tyrecal.studies.diagnose.expansion import (
+    Expansion,
+    Nodes,
+    _more,
+    _nodes,
+    expand,
+    hermite,
+    lagrange,
+    node_values,
+)
 from tyrecal.studies.diagnose.gap import ResidualGroup, _chi2, _corrected, find_gap
 from tyrecal.studies.diagnose.inverse_problem import Assumed, Toggle
 from tyrecal.studies.diagnose.label_swap import _near
@@ -311,14 +322,88 @@ def test_an_effect_reaches_as_far_as_there_are_solutions() -> None:
     failed = ValueError("no such tyre")
     span = Span(-1.0, 1.0)
     asked = {-1.0: answer(-1), -0.5: failed, 0.5: answer(0.5), 1.0: answer(1), 1.5: answer(1.5)}
-    made = _nodes(plain, span, asked)
+    made = _nodes("e0", plain, span, asked)
     assert made and made.values.tolist() == [0.0, 0.5, 1.0, 1.5] and made.reach == (0.0, 1.0)
     shift, tilt, split = made.at(np.array([0.25, 1.25]))
     assert shift[:, 0] == pytest.approx([0.25, 1.25])
     assert tilt[:, 0, 0] == pytest.approx([0.75, 3.75])
     assert split[:, 0] == pytest.approx([0.25, 1.25])
-    assert _nodes(plain, span, dict.fromkeys(asked, failed)) is None
+    assert _nodes("e0", plain, span, dict.fromkeys(asked, failed)) is None
     assert isinstance(made, Nodes)
+
+
+def test_hermites_polynomials_take_values_and_slopes() -> None:
+    """Those of a polynomial of as many coefficients: that polynomial. Without slopes Lagrange's."""
+    nodes, sloped = np.array([-2.0, 0.0, 0.5, 3.0]), np.array([True, False, True, True])
+    made = Polynomial([0.3, -1.0, 0.5, 0.2, -0.4, 0.1, 0.02])
+    e = np.array([-1.5, 0.0, 0.2, 0.5, 2.0])
+    values, slopes = hermite(nodes, sloped, e)
+    assert values @ made(nodes) + slopes @ made.deriv()(nodes) == pytest.approx(made(e))
+    assert values[1] == pytest.approx([0, 1, 0, 0]) and abs(slopes[[1, 3]]).max() == 0
+    assert (slopes[:, 1] == 0).all()  # none is given there
+    cubic = Polynomial([0.3, -1.0, 0.5, 0.2])
+    assert lagrange(nodes, e) @ cubic(nodes) == pytest.approx(cubic(e))
+    values, slopes = hermite(nodes, np.zeros(4, bool), e)
+    assert values == pytest.approx(lagrange(nodes, e)) and (slopes == 0).all()
+
+
+class Sloped(Toy):
+    """eta + 2e-4 e^power, with slopes by the effect, or the one where it is 0."""
+
+    def __init__(self, power: int, at_0: bool = False, span: Span | None = None):
+        super().__init__(effects=1, size=0.0, pressures=(240.0,))
+        self.curve, self.at_0 = 2e-4 * Polynomial([0.0] * power + [1.0]), at_0
+        self.spans = {"e0": span or Span(0.0, 1.0)}
+        self.sloped, self.sloped_at_0 = ((), ("e0",)) if at_0 else (("e0",), ())
+        self.points: list[Query] = []
+
+    def answers(self, points: Sequence[Query]) -> list[Answer | Exception]:
+        self.points += points
+        return super().answers(points)
+
+    def _answer(self, point: Query) -> Answer:
+        found, e = super()._answer(point), point.effects.get("e0", 0.0)
+        assert not point.slopes or (e == 0) == self.at_0
+        slope = np.full(len(found.eta), self.curve.deriv()(e))
+        slope[-1] = np.nan  # the last row has none
+        eta = found.eta + self.curve(e)
+        return replace(found, eta=eta, slopes=dict.fromkeys(point.slopes, slope))
+
+
+@pytest.mark.parametrize(
+    ("at_0", "span", "power", "wanted"),
+    [
+        (False, Span(0.0, 1.0), 4, [0, 0.25, 1]),
+        (False, Span(-2.0, 0.0), 4, [-2, -0.5, 0]),
+        (False, Span(-0.5, 1.0), 4, [-0.5, 0, 1]),
+        (True, Span(0.0, 1.0), 3, [0, 0.25, 1]),
+    ],
+)
+def test_two_sizes_and_their_slopes_make_a_quartic(
+    at_0: bool, span: Span, power: int, wanted: list[float]
+) -> None:
+    """The slope where the effect is 0 and two sizes a cubic; no slope is asked in vain."""
+    toy = Sloped(power, at_0, span)
+    nodes = expand(toy, np.zeros(3)).nodes["e0"]
+    assert nodes.values.tolist() == pytest.approx(wanted)
+    e = np.linspace(span.low, span.high, 7)
+    assert nodes.at(e)[0][:, 0] == pytest.approx(toy.curve(e), abs=1e-12)
+    asked = [q for q in toy.points if q.slopes]
+    assert [q.constants for q in asked] == ([True] if at_0 else [False, False])
+    by_values = lagrange(nodes.values, e) @ toy.curve(nodes.values)
+    assert nodes.at(e)[0][:, -1] == pytest.approx(by_values, abs=1e-12)
+
+
+def test_more_sizes_where_two_and_their_slopes_are_not_enough() -> None:
+    """At 60 % of the range, where the far slope is worth 0.05 % and more half way to it, of the
+    fifth order at 0, 1/4 and 1 (double): e (e - 1/4)^2 (e - 1) / (3/4)^2 at 5/8."""
+    last = 0.625 * 0.375**3 / 0.75**2
+    for slope, more in ((0.00049, []), (0.00051, [0.6])):
+        toy = Sloped(4)
+        own = Polynomial([0, 1]) * Polynomial([-0.25, 1]) ** 2 * Polynomial([-1, 1]) / 0.75**2
+        toy.curve = slope / last * own
+        values = expand(toy, np.zeros(3)).nodes["e0"].values
+        assert values.tolist() == pytest.approx([0, 0.25, *more, 1])
 
 
 def test_more_nodes_where_a_cubic_is_not_enough() -> None:
@@ -346,10 +431,11 @@ def test_where_a_far_node_has_no_solution_the_rest_may_bend_too() -> None:
     plain = Expansion(np.zeros(1), np.zeros(n), none, np.zeros((n, 1, 1)), np.zeros(n), none, {})
     failed, span = ValueError("no such tyre"), Span(0.0, 1.0)
     found = {0.25: answer(0.25), 0.75: answer(0.75), 1.0: failed}
-    assert _bent(plain, span, found) == [0.75]
-    assert _bent(plain, span, {**found, 0.75: failed}) == []
+    more = lambda span, found: _more(_nodes("e0", plain, span, found))
+    assert more(span, found) == pytest.approx([0.75 * 0.08, 0.75 * 0.5])
+    assert more(span, {**found, 0.75: failed}) == []
     back = {-e: each for e, each in found.items()}
-    assert _bent(plain, Span(-1.0, 0.0), back) == [-0.75]
+    assert more(Span(-1.0, 0.0), back) == pytest.approx([-0.75 * 0.08, -0.75 * 0.5])
 
 
 def test_curvature_is_that_of_two_slopes() -> None:

@@ -3,6 +3,7 @@ itself, parts of the section against the whole, and a diagnosis of the model's o
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -32,7 +33,7 @@ from tyrecal.studies.diagnose.study import _check_units, parse_change, spans_of,
 from tyrecal.studies.diagnose.tyre_model import TyreModel, _key
 from tyrecal.studies.diagnose.uncertainties import DENSITY_PERCENT, PRESSURE_kPa, sources, values_of
 from tyrecal.studies.diagnose.verdict import decide
-from tyrecal.tyre.case import start_values
+from tyrecal.tyre.case import LoadedCase, start_values
 from tyrecal.tyre.case.parts import Gauge
 from tyrecal.tyre.case.schema import Uncertainty
 from tyrecal.tyre.load import load_case
@@ -495,6 +496,42 @@ def test_an_effect_without_slopes_takes_the_plain_tyres() -> None:
     assert plain.constants is None  # they were not asked for
     assert (found[0].eta > plain.eta).all() and found[0].split[-1] > 0
     assert isinstance(found[1], Answer) and abs(found[1].jacobian - plain.jacobian).max() > 1e-3
+
+
+SPLICE = "stiffness_splice"
+WIDE = with_values(CASE, {"splice.width_deg": 100.0})
+
+
+def with_slopes(case: LoadedCase, ids: Sequence[str]) -> TyreModel:
+    """At 180 kPa, and the mass."""
+    evaluator = Evaluator(TyreDesign(case))
+    spans, _ = spans_of(case, evaluator, ids)
+    return TyreModel(case, evaluator, [*ROWS[:9], (None, 0.0)], [], spans)
+
+
+def test_slopes_by_effects_against_differences() -> None:
+    """By the parameter at any size but 0, none of the mass; no effect that moves nodes, none that
+    parts pairs far."""
+    own = with_slopes(WIDE, ("bead_filler", "temperature", SPLICE, "rotation", "rim_width"))
+    assert own.sloped == {"bead_filler", "temperature"} and own.sloped_at_0 == {SPLICE}
+    id, e, step = "bead_filler", 0.5, 5e-4
+    points = [Query(X, {id: e + step}), Query(X, {id: e - step}), Query(X, {id: e}, slopes=(id,))]
+    above, below, found = own.answers(points)
+    assert isinstance(above, Answer) and isinstance(below, Answer) and isinstance(found, Answer)
+    two = (above.eta - below.eta)[:-1] / (2 * step)
+    assert found.slopes[id][:-1] == pytest.approx(two, rel=1e-4, abs=1e-6)
+    assert np.isnan(found.slopes[id][-1]) and above.slopes == {}
+
+
+@pytest.mark.slow
+def test_the_slope_by_a_splice_against_differences_of_spliced_tyres() -> None:
+    own, step = with_slopes(WIDE, (SPLICE,)), 0.02
+    points = [Query(X, slopes=(SPLICE,)), Query(X, {SPLICE: step}), Query(X, {SPLICE: -step})]
+    found, above, below = own.answers(points)
+    assert isinstance(found, Answer) and isinstance(above, Answer) and isinstance(below, Answer)
+    two = (above.eta - below.eta)[:-1] / (2 * step)
+    assert found.slopes[SPLICE][:-1] == pytest.approx(two, rel=2e-3)
+    assert (two > 0.01).all()
 
 
 def test_sources_that_are_effects_step_once_and_fail_alone() -> None:

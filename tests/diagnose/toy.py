@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
@@ -34,6 +34,8 @@ class Toy:
     """
 
     variables = ("A", "B", "C")
+    sloped: Collection[str] = ()
+    sloped_at_0: Collection[str] = ()
 
     def __init__(
         self,

@@ -96,12 +96,14 @@ def test_the_record_answers_with_both_members(tmp_path) -> None:
     assert [m.members for m in first.modes] == [m.members for m in again.modes]
 
 
-def test_a_splice_has_no_exact_slopes() -> None:
+def test_a_splice_has_no_exact_slopes_but_where_it_is_0() -> None:
     name = "effects.stiffness_splice"
     evaluator = Evaluator(TyreDesign(with_values(few(), {name: 0.2})))
     assert not evaluator.has_gradients and Evaluator(TyreDesign(few())).has_gradients
     with pytest.raises(DeckRefused, match="no exact derivatives"):
         evaluator.evaluate(Question({**START, name: 0.2}, ("A_belt",)))
+    assert Decks(TyreDesign(few(), {name: 0.0}), (name,)).tangents("abaqus")[name]
+    name = "effects.point_mass"
     with pytest.raises(TemplateFailed, match=f"{name} is 0"):
         Decks(TyreDesign(few(), {name: 0.0}), (name,)).tangents("abaqus")
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping, Sequence
+from copy import copy
 from dataclasses import replace
 from itertools import takewhile
 from math import ceil
@@ -125,9 +126,21 @@ class TyreDesign:
         if moved * value < 0:
             moved = value
         try:
-            return self.at({name: moved}), moved
+            other = self.at({name: moved})
         except ValueError:
             return self.at({name: value}), value
+        return (other if self.tyre.case.splice.share else other._all_round()), moved
+
+    def _all_round(self) -> TyreDesign:
+        """The design with its splice's change all round in place of it, less by the share of the
+        circumference that the splice takes up: chi's mean, which is all that the means of
+        frequencies depend on to first order."""
+        splice = self.tyre.case.splice
+        if not splice.share:
+            return self
+        other = copy(self)
+        other.tyre = _with_splice_of(self.tyre, splice.share * splice.width_deg / 360)
+        return other
 
     def texts(self, dialect: str, request: Mapping[str, Any]) -> dict[str, str]:
         """File name to text, without the header. Raises TemplateFailed."""
@@ -163,18 +176,19 @@ def _abaqus(tyre: Tyre, env: Any, request: DeckRequest) -> dict[str, str]:
     if tyre.case.splice.share:
         if names["loads"]:
             raise TemplateFailed("splice: a tyre with a splice cannot be pressed on a road")
-        names = context(_spliced(tyre))
+        names = context(_with_splice_of(tyre, tyre.case.splice.share))
         names["mesh_block"] = _mesh_block(env, names["mesh"])
         texts["splice.inp"] = render(env, "inflate.inp.j2", names)
     return texts
 
 
-def _spliced(tyre: Tyre) -> Tyre:
-    """The tyre as it is in its splice. Raises TemplateFailed."""
+def _with_splice_of(tyre: Tyre, share: float) -> Tyre:
+    """The tyre all of which has its splice's numbers larger by ``share`` of themselves, and no
+    splice. Raises TemplateFailed."""
     splice, case = tyre.case.splice, tyre.written
     try:
-        values = {path: number_at(case, path) * (1 + splice.share) for path in splice.numbers}
-        return Tyre(set_values(case, values))
+        values = {path: number_at(case, path) * (1 + share) for path in splice.numbers}
+        return Tyre(set_values(case, {**values, "splice.share": 0.0}))
     except ValueError as error:
         raise TemplateFailed(f"splice.numbers: {error}") from None
 

@@ -11,7 +11,7 @@ likewise. Beyond the box the model goes straight on, with the slopes at its near
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -64,6 +64,9 @@ class EmulatedEffect:
 class Emulated:
     """A `ResponseModel` that stands for ``model`` within ``reach`` of its start, and for a straight
     one beyond."""
+
+    sloped: Collection[str] = ()  # by effects its slopes would be those of its own polynomials
+    sloped_at_0: Collection[str] = ()
 
     def __init__(
         self,

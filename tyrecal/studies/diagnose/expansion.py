@@ -5,9 +5,10 @@ With d = x - x0, quadratic about the plain fit x0, plus what each effect adds:
     eta(x, e) = eta0 + J0 d + d^T H d / 2 + sum over effects i of [a_i(e_i) + B_i(e_i) d]
 
 a_i, B_i: polynomials in e_i through its nodes, 0 at e_i = 0: differences of what the model says at
-x0 with and without the effect. An effect that is in play is asked once more where its re-fit lies,
-at x_a, e_a: what the expansion is off by there, eta_a and J_a, it gains (e / e_a)^3 times (once
-beyond e_a), being itself off by terms of third order. Effects add up.
+x0 with and without the effect; a_i has its slopes there, too, where the model gives them (Hermite).
+An effect that is in play is asked once more where its re-fit lies, at x_a, e_a: what the expansion
+is off by there, eta_a and J_a, it gains (e / e_a)^3 times (once beyond e_a), being itself off by
+terms of third order. Effects add up.
 """
 
 from __future__ import annotations
@@ -24,6 +25,9 @@ ONE_SIDED = (0.25, 0.75, 1.0)  # with 0 the Lobatto points of a cubic
 TWO_SIDED = (0.5, 1.0)  # on either side
 BENDING = (0.08, 0.5)  # more of them, of the range, where the cubic is not enough
 MAX_LAST_TERM = 0.003  # of ln f, by Newton's polynomial, where the cubic is enough
+# the same where there are slopes, or the slope at 0
+ONE_SIDED_SLOPED, TWO_SIDED_SLOPED, BENDING_SLOPED = (0.25, 1.0), (1.0,), (0.6,)
+MAX_LAST_TERM_SLOPED = 0.0005
 CURVATURE_STEP = 0.05  # of a logarithm, for H from two Jacobians
 
 
@@ -43,6 +47,8 @@ class Nodes:
 
     values: Array  # (k,) of its parameter
     shift: Array  # (k, n) a_k
+    slope: Array  # (k, n) d a / d e; NaN: values alone serve the row; 0 where not sloped
+    sloped: Array  # (k,) whether it does
     tilt: Array  # (k, n, v) B_k
     split: Array  # (k, n)
     reach: tuple[float, float]  # of the parameter, between nodes that have a solution
@@ -50,14 +56,19 @@ class Nodes:
 
     def at(self, e: Array) -> tuple[Array, Array, Array]:
         """a (q, n), B (q, n, v) and split (q, n) at parameters (q,)."""
-        weights = lagrange(self.values, e)
-        shift = weights @ self.shift
+        shift, weights = self.shift_at(e), lagrange(self.values, e)
         tilt = np.einsum("qk,knv->qnv", weights, self.tilt)
         if self.anchor:
             grown = np.clip(e / self.anchor.e, 0, 1) ** 3
             shift = shift + grown[:, None] * (self.anchor.shift - self.anchor.tilt @ self.anchor.d)
             tilt = tilt + grown[:, None, None] * self.anchor.tilt
         return shift, tilt, np.abs(weights @ self.split)
+
+    def shift_at(self, e: Array) -> Array:
+        """a (q, n) by the nodes alone, at parameters (q,)."""
+        values, slopes = hermite(self.values, self.sloped, e)
+        shift = values @ self.shift + slopes @ self.slope
+        return np.where(np.isnan(shift), lagrange(self.values, e) @ self.shift, shift)
 
 
 @dataclass(frozen=True)
@@ -87,11 +98,12 @@ def expand(model: ResponseModel, x0: Array) -> Expansion:
     """
     ids, count = list(model.spans), len(x0)
     steps = CURVATURE_STEP * np.eye(count)
-    values = {id: node_values(model.spans[id]) for id in ids}
-    points = [Query(x0, constants=True)]
+    at_0 = tuple(id for id in ids if id in model.sloped_at_0)
+    values = {id: node_values(model.spans[id], id in {*model.sloped, *at_0}) for id in ids}
+    points = [Query(x0, constants=True, slopes=at_0)]
     points += [Query(x0 + side * step) for step in steps for side in (1, -1)]
     asked = [(id, float(e)) for id in ids for e in values[id]]
-    points += [Query(x0, {id: e}) for id, e in asked]
+    points += [_with_effect(model, x0, id, e) for id, e in asked]
     answers = model.answers(points)
     first = answers[0]
     if isinstance(first, Exception):
@@ -106,18 +118,13 @@ def expand(model: ResponseModel, x0: Array) -> Expansion:
     plain = Expansion(x0, first.eta, first.jacobian, hessian, first.split, first.constants, {})
     nodes, failed = {}, {}
     replies = dict(zip(asked, answers[1 + 2 * count :], strict=True))
-    found = {id: {e: replies[id, e] for e in map(float, values[id])} for id in ids}
-    more = [
-        (id, far * f)
-        for id in ids
-        for far in _bent(plain, model.spans[id], found[id])
-        for f in BENDING
-    ]
-    again = model.answers([Query(x0, {id: e}) for id, e in more]) if more else []
+    found = {id: {float(e): replies[id, float(e)] for e in values[id]} | {0.0: first} for id in ids}
+    more = [(id, e) for id in ids for e in _more(_nodes(id, plain, model.spans[id], found[id]))]
+    again = model.answers([_with_effect(model, x0, id, e) for id, e in more]) if more else []
     for (id, e), answer in zip(more, again, strict=True):
         found[id][e] = answer
     for id in ids:
-        made = _nodes(plain, model.spans[id], found[id])
+        made = _nodes(id, plain, model.spans[id], found[id])
         if made is None:
             failed[id] = str(next(a for a in found[id].values() if isinstance(a, Exception)))
         else:
@@ -125,13 +132,13 @@ def expand(model: ResponseModel, x0: Array) -> Expansion:
     return replace(plain, nodes=nodes, failed=failed)
 
 
-def node_values(span: Span) -> Array:
-    """Where an effect is asked: parameters other than 0, rising."""
+def node_values(span: Span, slopes: bool = False) -> Array:
+    """Where an effect is asked: parameters other than 0, rising; fewer where its slopes are."""
     if span.low < 0 < span.high:
-        sides = [-f * -span.low for f in reversed(TWO_SIDED)] + [f * span.high for f in TWO_SIDED]
-        return np.sort([*sides, *span.also])
+        shares = np.array(TWO_SIDED_SLOPED if slopes else TWO_SIDED)
+        return np.sort([*(shares * span.low), *(shares * span.high), *span.also])
     far = span.high if abs(span.high) >= abs(span.low) else span.low
-    return np.sort([*(far * np.array(ONE_SIDED)), *span.also])
+    return np.sort([*(far * np.array(ONE_SIDED_SLOPED if slopes else ONE_SIDED)), *span.also])
 
 
 def anchored(
@@ -151,46 +158,86 @@ def anchored(
     return replace(expansion, nodes=nodes)
 
 
+def _with_effect(model: ResponseModel, x: Array, id: str, e: float) -> Query:
+    """The question for one effect, and its slope where the model has that."""
+    return Query(x, {id: e}, slopes=(id,) if id in model.sloped else ())
+
+
 def _nodes(
-    plain: Expansion, span: Span, replies: Mapping[float, Answer | Exception]
+    id: str, plain: Expansion, span: Span, replies: Mapping[float, Answer | Exception]
 ) -> Nodes | None:
     """Nodes from 0 outwards as far as there are solutions; None where there is none at all."""
-    rows = {0.0: (np.zeros_like(plain.eta), np.zeros_like(plain.jacobian), plain.split)}
+    asked = {0.0: Answer(plain.eta, plain.jacobian, plain.split), **replies}
+    good = [0.0]
     reach = [max(0.0, span.low), min(0.0, span.high)]  # 0, or the near end of the range
     for side in (1, -1):
         for e in sorted((e for e in replies if e * side > 0), key=abs):
-            answer = replies[e]
-            if not isinstance(answer, Answer):
+            if not isinstance(asked[e], Answer):
                 break
-            rows[e] = answer.eta - plain.eta, answer.jacobian - plain.jacobian, answer.split
+            good.append(e)
             if span.low <= e <= span.high:
                 reach[0 if side < 0 else 1] = e
-    if len(rows) == 1:
+    if len(good) == 1:
         return None
     low, high = sorted(reach)
-    values = np.array(sorted(rows))
-    shift, tilt, split = (np.array([rows[float(e)][part] for e in values]) for part in range(3))
-    return Nodes(values, shift, tilt, split, (low, high))
+    values = np.array(sorted(good))
+    answers = [answer for e in values if isinstance(answer := asked[float(e)], Answer)]
+    return Nodes(
+        values,
+        np.array([each.eta - plain.eta for each in answers]),
+        np.array([each.slopes.get(id, np.zeros_like(plain.eta)) for each in answers]),
+        np.array([id in each.slopes for each in answers]),
+        np.array([each.jacobian - plain.jacobian for each in answers]),
+        np.array([each.split for each in answers]),
+        (low, high),
+    )
 
 
-def _bent(plain: Expansion, span: Span, found: Mapping[float, Answer | Exception]) -> list[float]:
-    """The far ends of the range towards which its nodes do not follow the effect closely."""
-    made = _nodes(plain, span, found)
-    if made is None or len(made.values) < 3:
+def _more(made: Nodes | None) -> list[float]:
+    """Further parameters towards the far ends of the range, where the nodes do not follow the
+    effect closely: where what the farthest says last, its slope or its value, matters."""
+    if made is None or len(made.values) + sum(made.sloped) < 3:
         return []
     middles = (made.values[1:] + made.values[:-1]) / 2
-    last = len(made.values) - 1 if made.reach[1] > 0 else 0  # without the farthest node
-    fewer = lagrange(np.delete(made.values, last), middles) @ np.delete(made.shift, last, 0)
-    if abs(lagrange(made.values, middles) @ made.shift - fewer).max() < MAX_LAST_TERM:
+    last = len(made.values) - 1 if made.reach[1] > 0 else 0  # the farthest node
+    if made.sloped[last]:
+        fewer = replace(made, sloped=made.sloped & (np.arange(len(made.values)) != last))
+    else:
+        rest = lambda each: np.delete(each, last, 0)
+        fewer = replace(
+            made,
+            values=rest(made.values),
+            shift=rest(made.shift),
+            slope=rest(made.slope),
+            sloped=rest(made.sloped),
+        )
+    sloped = bool(made.sloped.any())
+    if abs(made.shift_at(middles) - fewer.shift_at(middles)).max() < (
+        MAX_LAST_TERM_SLOPED if sloped else MAX_LAST_TERM
+    ):
         return []
-    return [e for e in made.reach if e]
+    return [far * f for far in made.reach if far for f in (BENDING_SLOPED if sloped else BENDING)]
+
+
+def hermite(nodes: Array, sloped: Array, e: Array) -> tuple[Array, Array]:
+    """Hermite's polynomials at e (q,), of values and of slopes at the nodes (k,): (q, k) each.
+
+    sloped (k,): whether the slope at a node is given; those of slopes that are not are 0.
+
+        A_i = l_i(e) (1 - l_i'(e_i) (e - e_i)),   B_i = l_i(e) (e - e_i),
+        l_i = product over j != i of ((e - e_j) / (e_i - e_j))^(1 or, with a slope at j, 2)
+    """
+    e = np.atleast_1d(e)[:, None]
+    values, slopes = np.ones((len(e), len(nodes))), np.zeros((len(e), len(nodes)))
+    for i, here in enumerate(nodes):
+        others, times = np.delete(nodes, i), 1 + np.delete(sloped, i)
+        values[:, i] = np.prod(((e - others) / (here - others)) ** times, axis=1)
+        if sloped[i]:
+            slopes[:, i] = values[:, i] * (e[:, 0] - here)
+            values[:, i] -= slopes[:, i] * np.sum(times / (here - others))
+    return values, slopes
 
 
 def lagrange(nodes: Array, e: Array) -> Array:
     """Lagrange's polynomials of the nodes (k,) at e (q,): (q, k)."""
-    e = np.atleast_1d(e)[:, None]
-    weights = np.ones((len(e), len(nodes)))
-    for k, here in enumerate(nodes):
-        others = np.delete(nodes, k)
-        weights[:, k] = np.prod((e - others) / (here - others), axis=1)
-    return weights
+    return hermite(nodes, np.zeros(len(nodes), int), e)[0]

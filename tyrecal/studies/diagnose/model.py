@@ -7,7 +7,7 @@ nobody calibrates. All else works on this alone, so that an emulator can take it
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -39,6 +39,7 @@ class Query:
     x: Array  # (v,)
     effects: Mapping[str, float] = field(default_factory=dict)  # parameter by id, absent: 0
     constants: bool = False  # whether for slopes by the sources of error, too
+    slopes: tuple[str, ...] = ()  # effects for slopes by whose parameters, too
 
 
 @dataclass(frozen=True)
@@ -49,6 +50,7 @@ class Answer:
     jacobian: Array  # (n, v) d eta / d x
     split: Array  # (n,) ln of the ratio of a pair's frequencies
     constants: Array | None = None  # (n, k) change by one standard deviation of each source
+    slopes: Mapping[str, Array] = field(default_factory=dict)  # (n,) d eta / d e; NaN: unknown
 
 
 class ResponseModel(Protocol):
@@ -59,6 +61,14 @@ class ResponseModel(Protocol):
     spread: Array  # (v,) its standard deviation
     sources: Sequence[str]  # names of the sources of error
     spans: Mapping[str, Span]  # effects by id
+
+    @property
+    def sloped(self) -> Collection[str]:
+        """Effects that `Query.slopes` may name at parameters other than 0."""
+
+    @property
+    def sloped_at_0(self) -> Collection[str]:
+        """Effects that it may name where they are 0, and nowhere else."""
 
     def answers(self, points: Sequence[Query]) -> list[Answer | Exception]:
         """An answer for each point in order, or why there is none; rows as it was made for."""

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
+from functools import cached_property
 from itertools import product
 from math import exp, log, sqrt
 
 import numpy as np
 
+from ...simulate.deck.decks import Decks
 from ...simulate.deck.tyre_design import TyreDesign
 from ...simulate.evaluate.evaluator import Evaluator
 from ...simulate.evaluate.failure import DeckRefused
@@ -17,16 +19,19 @@ from ...simulate.modes.label import Label
 from ...tyre.case import LoadedCase, start_values
 from ...tyre.case.schema import TargetMode, Targets
 from ...tyre.effects import catalogue
+from ...tyre.templates import TemplateFailed
 from ..fit import problem as fit
+from .expansion import node_values
 from .model import Answer, ModelRow, Query, Span
 from .uncertainties import EFFECT_PATH, Source, unit_of, values_of
 
 Array = np.ndarray
 MASS_STEP = 0.02  # of a logarithm: the mass is linear in areas and densities
 
+MANY_NUMBERS = 100  # of a deck: nodes are among them
 WORTH_A_POOL = 10  # evaluations, for processes to be started
 
-QueryKey = tuple[bytes, tuple[tuple[str, float], ...], bool]  # of a point
+QueryKey = tuple[bytes, tuple[tuple[str, float], ...], bool, tuple[str, ...]]  # of a point
 
 
 class TyreModel:
@@ -76,6 +81,17 @@ class TyreModel:
         self._plain.setdefault("pressure_kPa", case.case.pressure_kPa)
         self._slopeless = {id for id, span in spans.items() if not self._has_slopes(id, span)}
         self._mass: tuple[Array, Array, Array] | None = None
+
+    @cached_property
+    def sloped(self) -> Collection[str]:
+        """Effects with whose parameter a few numbers of the decks change."""
+        sizes = {id: map(float, node_values(span, True)) for id, span in self.spans.items()}
+        return {id for id in self.spans if id not in self._slopeless and self._moves(id, sizes[id])}
+
+    @cached_property
+    def sloped_at_0(self) -> Collection[str]:
+        """The splice: to first order it is its share of the circumference, all round."""
+        return {id for id in self._slopeless if self._moves(id, [0.0])}
 
     def values(self, x: Array) -> dict[str, float]:
         """Design variables at x, in their own units, bounds not enforced."""
@@ -148,6 +164,23 @@ class TyreModel:
         except ValueError:  # the case cannot have that much of it
             return True
 
+    def _moves(self, id: str, sizes: Iterable[float]) -> bool:
+        """Whether a few numbers of the decks are all that changes with an effect, about each of
+        the sizes: a slope by where nodes are takes as long as an evaluation. Not where waves part
+        so far that the slope of a pair's mean is none of its geometric mean."""
+        if catalogue()[id].needs == "rotation":
+            return False
+        path, base = EFFECT_PATH + id, self._present.get(id, 0.0)
+        try:
+            for e in sizes:
+                design = self.evaluator.design.at({path: base + e})
+                moved = Decks(design, (path,)).tangents(self.evaluator.solver.dialect)[path]
+                if len(moved) > MANY_NUMBERS:
+                    return False
+        except (ValueError, TemplateFailed):
+            return False
+        return True
+
     def _is_bare(self, point: Query) -> bool:
         return not self._slopeless.isdisjoint(point.effects)
 
@@ -160,8 +193,10 @@ class TyreModel:
         wanted = []
         for point, pressure in product(points, self.pressures):
             known = dict(self._plain) if point.constants else {}
-            names = () if self._is_bare(point) else (*self.variables, *known)
-            design = {**known, "pressure_kPa": pressure, **self.design(point)}
+            slopes = [EFFECT_PATH + id for id in point.slopes]
+            names = () if self._is_bare(point) else (*self.variables, *known, *slopes)
+            at_0 = {EFFECT_PATH + id: self._present.get(id, 0.0) for id in point.slopes}
+            design = {**known, "pressure_kPa": pressure, **at_0, **self.design(point)}
             wanted.append((design, names))
         found = self._modes(wanted)
         per, results = len(self.pressures), []
@@ -200,6 +235,7 @@ class TyreModel:
         at = dict(zip(self.pressures, zip(designs, found, strict=True), strict=True))
         eta, jacobian = np.zeros(len(self.rows)), np.zeros((len(self.rows), len(self.variables)))
         slopes, split = np.zeros((len(self.rows), len(self.found))), np.zeros(len(self.rows))
+        by_effect = {id: np.full(len(self.rows), np.nan) for id in point.slopes}  # not the mass
         for i, (label, pressure) in enumerate(self.rows):
             if label is None:
                 eta[i] = log(found[0].evaluation.mass_kg)
@@ -211,6 +247,8 @@ class TyreModel:
             eta[i] = log(f)
             if members := modes[label].raw.members:
                 eta[i], split[i] = log(members[0] * members[1]) / 2, log(members[1] / members[0])
+            for id, slope in by_effect.items():
+                slope[i] = evaluation.gradients[EFFECT_PATH + id][place] / f
             for j, name in enumerate(self.variables if evaluation.gradients else ()):
                 jacobian[i, j] = evaluation.gradients[name][place] * self._slope(name, design) / f
             if point.constants:
@@ -220,7 +258,7 @@ class TyreModel:
                         for path, step in source.steps.items()
                         if not path.startswith(EFFECT_PATH)
                     )
-        return Answer(eta, jacobian, split, slopes if point.constants else None)
+        return Answer(eta, jacobian, split, slopes if point.constants else None, by_effect)
 
     def _slope(self, name: str, design: Mapping[str, float]) -> float:
         v = self._variables[name]
@@ -262,7 +300,7 @@ class TyreModel:
 
 def _key(point: Query) -> QueryKey:
     """What tells two points apart."""
-    return point.x.tobytes(), tuple(point.effects.items()), point.constants
+    return point.x.tobytes(), tuple(point.effects.items()), point.constants, point.slopes
 
 
 def asked_for(case: LoadedCase, labels: Sequence[Label]) -> LoadedCase:
