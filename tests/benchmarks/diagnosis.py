@@ -13,13 +13,13 @@ import multiprocessing
 import os
 import time
 from collections import Counter, defaultdict
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import click
 import numpy as np
 
-from tyrecal.simulate.deck.decks import Design
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.simulate.evaluate.results import Evaluation
@@ -32,13 +32,12 @@ CASE = Path(__file__).parents[2] / "cases" / "p235_75r17.yaml"
 PRESSURES_kPa, EFFECT, SIZE, SCATTER = (160.0, 240.0, 320.0), "bead_filler", 0.5, 0.002
 
 
+@dataclass
 class Watched(Evaluator):
     """An evaluator that notes how often what was asked in this process, and for how long."""
 
-    def __init__(self, design: Design, solver_name: str = "") -> None:
-        super().__init__(design, solver_name)
-        self.count: Counter[str] = Counter()
-        self.seconds: defaultdict[str, float] = defaultdict(float)
+    count: Counter[str] = field(default_factory=Counter)
+    seconds: defaultdict[str, float] = field(default_factory=lambda: defaultdict(float))
 
     def evaluate(self, question: Question) -> Evaluation:
         """As `Evaluator.evaluate`."""
@@ -58,9 +57,9 @@ class Watched(Evaluator):
 
     def worker(self) -> Evaluator:
         """Counts with this one, where it stays in this process."""
-        other = Watched(self.design, self.solver_name)
-        other.count, other.seconds = self.count, self.seconds
-        return other
+        plain = super().worker()
+        own = {each.name: getattr(plain, each.name) for each in fields(Evaluator)}
+        return Watched(**own, count=self.count, seconds=self.seconds)
 
 
 def processor_s(process: multiprocessing.process.BaseProcess) -> float:

@@ -27,7 +27,7 @@ BENDING = (0.08, 0.5)  # more of them, of the range, where the cubic is not enou
 MAX_LAST_TERM = 0.003  # of ln f, by Newton's polynomial, where the cubic is enough
 # the same where there are slopes, or the slope at 0
 ONE_SIDED_SLOPED, TWO_SIDED_SLOPED, BENDING_SLOPED = (0.25, 1.0), (1.0,), (0.6,)
-MAX_LAST_TERM_SLOPED = 0.0005
+MAX_LAST_TERM_SLOPED = 0.001  # some five times what the curve is off by
 CURVATURE_STEP = 0.05  # of a logarithm, for H from two Jacobians
 
 
