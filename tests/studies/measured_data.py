@@ -97,7 +97,7 @@ def members(mode: Mode, node: int, angle: float) -> Array:
     """Motion r, theta, z of the two halves of a pair (or of a single mode) at a place."""
     shape = mode.raw.shape
     assert isinstance(shape, HarmonicShape)
-    phases = (0.0, np.pi / 2) if shape.n else (0.0,)
+    phases = (np.pi / 2, np.pi) if shape.n else (0.0,)
     turn = np.exp(1j * (shape.n * angle + np.array(phases)))
     return (shape.amplitude[node] * turn[:, None]).real
 
