@@ -168,6 +168,7 @@ def test_cylinder(degrees: float, close: float) -> None:
     assert found.traction == 0.0
 
 
+@pytest.mark.slow
 def test_cylinder_converges() -> None:
     """Twice as many elements round the patch change the answer half as much or less."""
     for name in ("peak", "radius"):

@@ -15,6 +15,7 @@ from ..studies.loaded import coarse_case
 from .test_cli import run
 
 
+@pytest.mark.slow
 def test_studies_write_it_and_the_command_writes_the_same(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

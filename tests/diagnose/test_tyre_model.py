@@ -178,6 +178,7 @@ def test_parts_of_the_section_make_the_whole() -> None:
     assert mass == pytest.approx(np.full(18, -0.5), abs=1e-3)
 
 
+@pytest.mark.slow
 def test_an_effect_in_the_models_own_data_is_named_with_its_size(tmp_path: Path) -> None:
     truth = 0.8 * MODEL.spans["bead_filler"].high
     path = written(tmp_path / "a.csv", asked(Query(X, {"bead_filler": truth})).eta)

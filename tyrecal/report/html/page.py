@@ -60,6 +60,7 @@ def write_page(path: Path, folders: Sequence[Path]) -> Page:
     """Write the results of ``folders`` as one page that needs no network. The same results give
     the same bytes. Raises InputError; OSError."""
     results = [read_results(folder) for folder in folders]
+    _refuse(path)
     try:
         content = page(results).encode("utf-8")
     except UnicodeEncodeError:
@@ -69,6 +70,17 @@ def write_page(path: Path, folders: Sequence[Path]) -> Page:
         raise InputError(
             f"the page would have {size / 1e6:.1f} MB, more than 5: give fewer folders"
         )
+    with whole(path) as partial:
+        partial.write_bytes(content)
+    found = {
+        str(each.folder): [result_types()[name].command or name for name in each.studies]
+        for each in results
+    }
+    return Page(path, size, found)
+
+
+def _refuse(path: Path) -> None:
+    """Raises InputError where no page may be written to ``path``; OSError."""
     if path.is_dir():
         raise InputError(f"'{path}' is a folder; give a file with --output")
     try:
@@ -78,13 +90,8 @@ def write_page(path: Path, folders: Sequence[Path]) -> Page:
         ours = True
     if not ours:
         raise InputError(f"'{path}' is no page of tyrecal's; give another file with --output")
-    with whole(path) as partial:
-        partial.write_bytes(content)
-    found = {
-        str(each.folder): [result_types()[name].command or name for name in each.studies]
-        for each in results
-    }
-    return Page(path, size, found)
+    if not path.parent.is_dir():
+        raise InputError(f"'{path}' cannot be written: there is no folder '{path.parent}'")
 
 
 def page(results: Sequence[Results]) -> str:
