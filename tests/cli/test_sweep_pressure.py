@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -163,17 +164,20 @@ def test_jobs_and_the_record_change_no_byte(tmp_path: Path) -> None:
     assert {name: (two / name).read_bytes() for name in RESULTS} == first
     for out in (one, two):
         facts = json.loads((out / "run.json").read_text())["sweep-pressure"]
-        assert (facts["solver_runs"], facts["answered_from_record"]) == (6, 0)
+        assert (facts["solver_runs"], facts["answered_from_record"]) == (
+            7,
+            0,
+        )  # a nominal tyre's, too
         assert facts["command"] == "sweep-pressure" and not (out / "runs").exists()
     lost = next(one.glob("record/*/*.record"))
     lost.unlink()  # as if the first run had been killed before it
     assert run(*arguments, str(one), "--jobs", "2") == 0
     assert {name: (one / name).read_bytes() for name in RESULTS} == first
     facts = json.loads((one / "run.json").read_text())["sweep-pressure"]
-    assert (facts["solver_runs"], facts["answered_from_record"]) == (1, 5)
+    assert (facts["solver_runs"], facts["answered_from_record"]) == (1, 6)
 
 
-SOFT = ["--set", "A_carcass=1e-8", "--set", "C10=1e5"]  # has no equilibrium beyond 353 kPa
+SOFT = ["--set", "A_carcass=1e-8", "--set", "C10=1e5"]  # has no equilibrium much beyond 350 kPa
 
 
 @pytest.mark.slow
@@ -189,7 +193,7 @@ def test_a_pressure_that_fails_costs_no_other(
     (failed,) = found["failed"]
     assert (failed["pressure_kPa"], failed["cause"]) == (400, "no_equilibrium")
     (kept,) = (out / "runs").iterdir()
-    assert "error: initial, 400 kPa: inflation stopped at 353" in printed.err
+    assert re.search(r"error: initial, 400 kPa: inflation stopped at 35\d\.", printed.err)
     assert str(kept) in printed.err and "1 of 3 evaluations failed" in printed.err
     assert "from 100 to 250 kPa" in printed.out
     assert (out / "pressure_sweep.png").exists()

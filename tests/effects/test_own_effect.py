@@ -38,7 +38,7 @@ def test_it_is_the_change_that_it_says(site: Path) -> None:
     softened = modes(site, "--set", "effects.belt_softening=0.25")
     by_hand = modes(site, "--set", f"{modulus}={0.75 * 172.2e9!r}")
     assert plain == absent
-    assert softened == by_hand
+    assert softened == pytest.approx(by_hand, rel=1e-9)  # it starts elsewhere
     assert softened["4,0,None"] < 0.999 * plain["4,0,None"]
 
 

@@ -36,6 +36,7 @@ class DeckText:
     needs: Mapping[str, str] = field(default_factory=dict)
     has_slopes: bool = True
     nominal: None = None
+    is_nominal: bool = False
     solver: SolverChoice = CASE.case.solver
 
     def at(self, values: Mapping[str, float]) -> DeckText:

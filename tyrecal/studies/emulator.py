@@ -117,8 +117,11 @@ class Emulator:
         rise = [products(self.degrees, t, j) @ self.coefficients for j in range(len(self.half))]
         found = np.stack(rise, 2)[:, :-1] / self.half
         if (pair := places(self.labels)) is not None:
-            a, b = pair  # the slope of sqrt(s) is that of s over 2 sqrt(s)
-            root = np.sqrt(np.maximum(q[:, b], SEEN**2)) * np.where(q[:, -1] < 0, -1.0, 1.0)
+            a, b = (
+                pair  # the slope of sqrt(s) is that of s over 2 sqrt(s); none where s is cut at 0
+            )
+            root = np.sqrt(np.where(q[:, b] > SEEN**2, q[:, b], np.inf))
+            root *= np.where(q[:, -1] < 0, -1.0, 1.0)
             mean, gap = found[:, a].copy(), found[:, b] / (2 * root[:, None])
             found[:, a], found[:, b] = mean + gap / 2, mean - gap / 2
         return found

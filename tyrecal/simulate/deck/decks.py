@@ -58,7 +58,11 @@ class Design(Protocol):
     @property
     def nominal(self) -> Design | None:
         """The tyre before anything was set, whose inflated shape is a good start for all others;
-        None where this is it, or nothing else is known."""
+        None where none is known."""
+
+    @property
+    def is_nominal(self) -> bool:
+        """Whether this is `nominal`."""
 
     def at(self, values: Mapping[str, float]) -> Design:
         """The design with numbers set. Raises ValueError where it cannot have them."""

@@ -54,16 +54,20 @@ class TyreDesign:
 
     @property
     def nominal(self) -> TyreDesign | None:
-        """The case with its variables at their start, pressure and effects as its file has them;
-        None: this is it."""
+        """The case with its variables at their start, pressure and effects as its file has them."""
         read = self.plain.as_read or self.plain
         update = {"pressure_kPa": read.case.pressure_kPa, "effects": read.case.effects}
         case = replace(self.plain, case=self.plain.case.model_copy(update=update))
         try:
-            nominal = TyreDesign(case, start_values(case))
+            return TyreDesign(case, start_values(case))
         except ValueError:  # only with what was set is it a tyre
             return None
-        return None if nominal.case.case == self.case.case else nominal
+
+    @property
+    def is_nominal(self) -> bool:
+        """Whether nothing is set."""
+        nominal = self.nominal
+        return nominal is not None and nominal.case.case == self.case.case
 
     @property
     def header(self) -> str:

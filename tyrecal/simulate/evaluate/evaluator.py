@@ -102,16 +102,16 @@ class Evaluator:
         start = self._start_of(design)
         decks = Decks(design, question.gradients, question.modes_per_harmonic, start=start)
         found = self._ask(decks, lambda answer, kept: evaluation(answer))
-        if start is None and design.nominal is None:
-            self.shapes.setdefault(_key(design), _shape(found))
+        if design.is_nominal and (nominal := design.nominal):
+            self.shapes.setdefault(_key(nominal), _shape(found))
         return found
 
     def _start_of(self, design: Design) -> Array | None:
         """Where a design's inflation starts: at the inflated shape of its nominal one, which is
         asked for first, so that the answer hangs on no other question. None: at rest, as for that
         one itself, and for all where it does not inflate."""
-        nominal = design.nominal
-        return None if nominal is None else self._inflated(nominal)
+        nominal = None if design.is_nominal else design.nominal
+        return self._inflated(nominal) if nominal else None
 
     def _inflated(self, nominal: Design) -> Array | None:
         if "start" not in self.solver.capabilities:
@@ -259,7 +259,8 @@ class Evaluator:
                 self.on_progress(done, len(asked))
                 yield answer
             return
-        self._inflated(self.design.nominal or self.design)  # before the workers each ask for it
+        if ask == "evaluate" and (nominal := self.design.nominal):
+            self._inflated(nominal)  # before the workers each ask for it
         with executor(jobs, self.scheduler) as workers:
             answers = workers.each(partial(_answer_and_count, self.worker(), ask), asked)
             for done, answer in enumerate(in_order(answers), start=1):

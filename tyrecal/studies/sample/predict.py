@@ -43,7 +43,7 @@ class Conditional:
         whose linear covariance is (v, v)."""
         rest = other - self.pull @ J
         variance = np.einsum("iv,vw,iw->i", rest, covariance, rest) + np.diag(self.covariance)
-        return np.asarray(np.sqrt(variance))
+        return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
 
 
 def conditional(
