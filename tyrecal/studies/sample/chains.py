@@ -83,7 +83,7 @@ def walk(
     begin, width = about.copy(), 1.0
     outside = np.ones(walkers, bool)
     for _ in range(TRIES):  # who begins outside begins anew, nearer to the optimum in the end
-        step = random.multivariate_normal(np.zeros(size), covariance, walkers)
+        step = random.multivariate_normal(np.zeros(size), covariance, walkers, method="cholesky")
         begin[outside] = (about + width * step)[outside]
         outside = ~np.isfinite(density(begin))
         if not outside.any():
