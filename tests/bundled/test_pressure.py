@@ -6,6 +6,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from tyrecal_solvers.bundled.deck.keywords import DeckError
+from tyrecal_solvers.bundled.deck.request import Request
+from tyrecal_solvers.bundled.deck.steps import Deck
+from tyrecal_solvers.bundled.job import Job
 from tyrecal_solvers.bundled.section import elements, mechanics
 from tyrecal_solvers.bundled.section.model import Model
 from tyrecal_solvers.bundled.section.parts import pressure
@@ -114,3 +118,65 @@ def test_pressure_force_is_minus_p_times_the_first_variation(random: np.random.G
     number = mechanics.Numbering([table], np.ones((len(X), 3), bool))
     force = number.spread(mechanics.residual(model, U0, [Pressure(lines, 7.0)], number))
     assert (force * phi).sum() * 2 * np.pi == pytest.approx(-7.0 * slope, rel=1e-10)
+
+
+def test_the_force_of_an_open_surface_is_the_followers_and_a_caps_thrust(
+    random: np.random.Generator,
+) -> None:
+    """p n dA, in components, and along the axle p r^2 / 2 per radian at the ends, out of the one
+    and into the other: nothing where they are held along the axle, as ABAQUS's P has it."""
+    X, table = arc(5, 3)
+    lines = elements.lines(X, table, 3)
+    U = 0.02 * random.normal(size=(len(X), 3))
+    x, dx = pressure.surface_point(lines, U)
+    normal = np.cross(dx, np.stack([-x[..., 1], x[..., 0], 0 * x[..., 0]], -1))
+    follower = np.zeros_like(U)
+    of_nodes = np.einsum("ga,eg,egi->eai", lines.N, lines.weights, normal)
+    np.add.at(follower, table, -7.0 * of_nodes)
+    force = np.zeros_like(U)
+    np.add.at(force, table, Pressure(lines, 7.0).force(U).reshape(*table.shape, 3))
+    for end, sign in ((table[-1, -1], 1), (table[0, 0], -1)):
+        r = np.hypot(X[end, 0] + U[end, 0], U[end, 1])
+        follower[end, 2] += sign * 7.0 * r**2 / 2
+    np.testing.assert_allclose(force, follower, atol=1e-12 * abs(force).max())
+
+
+TUBE = support.block((0.30, 0.31, 1), (0.0, 0.1, 3), True)
+
+
+def tube(*held: str, surface: str = "", cap: float = 0.0) -> Job:
+    """A rubber tube under 100 Pa on its inside, with sets LOW and HIGH of its ends' nodes."""
+    text = support.deck(TUBE.X, TUBE.solids, support.Rubber(), inner=TUBE.inner)
+    for name, z in (("LOW", 0.0), ("HIGH", 0.1)):
+        own = ", ".join(map(str, np.flatnonzero(TUBE.where(1, z)) + 1))
+        text += f"*NSET, NSET={name}\n{own}\n"
+    rows = "\n".join(("LOW, 5", *held))
+    text += f"{surface}*STEP, NLGEOM=YES\n*STATIC, LONG TERM\n1.0, 1.0\n*BOUNDARY\n{rows}\n"
+    text += "*DSLOAD\nCAVITY, P, 100.0\n" + (f"LID, P, {cap!r}\n" if cap else "") + "*END STEP\n"
+    return Job(Deck({"tube": text}, "tube", None), Request())
+
+
+def test_an_end_that_is_free_along_the_axle_is_refused() -> None:
+    """By its node, at the procedure's line; held along the axle the tube widens as Lame's does in
+    plane strain."""
+    inner = np.flatnonzero(TUBE.where(0, 0.30) & TUBE.where(1, 0.1))[0]
+    with pytest.raises(DeckError, match=rf"line \d+.*node {inner + 1}, which is free along the"):
+        tube("LOW, 2").run()
+    with pytest.raises(DeckError, match="free along the axle"):
+        tube("LOW, 2", "HIGH, 1").run()
+    (found,) = tube("LOW, 2", "HIGH, 2").run()
+    rubber, a, b = support.Rubber(), 0.30, 0.31
+    G, K = rubber.shear, 2 / rubber.D1
+    wanted = 100.0 * a**2 / (b**2 - a**2) * (a / (2 * (K + G / 3)) + b**2 / (2 * G * a))
+    assert found.U[inner, 0] == pytest.approx(wanted, rel=2e-3)
+
+
+def test_an_end_is_closed_by_a_surface_under_the_same_pressure() -> None:
+    """From end to end, as a wheel's well does; and not by one under another pressure."""
+    low, high = (np.flatnonzero(TUBE.where(0, 0.30) & TUBE.where(1, z))[0] + 1 for z in (0.0, 0.1))
+    lid = f"*ELEMENT, TYPE=SFMGAX1, ELSET=LID\n99, {high}, {low}\n*SURFACE, NAME=LID\nLID, SPOS\n"
+    for text, cap in ((lid, 100.0), (lid.replace(f"{high}, {low}", f"{low}, {high}"), -100.0)):
+        tube("LOW, 2", surface=text, cap=cap).run()
+    for cap in (101.0, -100.0):
+        with pytest.raises(DeckError, match="free along the axle"):
+            tube("LOW, 2", surface=lid, cap=cap).run()

@@ -68,6 +68,35 @@ def keeps_half_turn(mesh: DeckMesh, section: list[Keyword], steps: list[DeckStep
     )
 
 
+def check_open_ends(mesh: DeckMesh, step: DeckStep) -> None:
+    """Refuses a pressure on a surface with an end that is free along the axle.
+
+    -p V would load it with a closed cap's thrust p r^2 / 2 per radian, which is not there; without
+    it a pressure that follows has no symmetric stiffness (see `parts.pressure`). Raises DeckError.
+    """
+    thrust = np.zeros(len(mesh.X))
+    for surface, pressure in step.pressures.items():
+        lines = mesh.edges[surface]
+        np.add.at(thrust, lines[:, -1], np.real(pressure))
+        np.subtract.at(thrust, lines[:, 0], np.real(pressure))
+    open_ends = (abs(thrust) > 1e-9 * step.pressure) & (mesh.X[:, 0].real > 0)
+    if isinstance(mesh.symmetry, MirrorHalf):  # it is cut in the middle plane
+        open_ends &= mesh.symmetry.here & ~mesh.symmetry.middle
+    loose = open_ends & _free(mesh, step)[:, 2]
+    for reference, tied in mesh.reference_nodes.items():
+        if rim_freedoms(mesh, step, reference) & {2, 4, 6}:  # along the axle, tilted
+            rim = [mesh.index[n] for n in tied]
+            loose[rim] = open_ends[rim]
+    if loose.any():
+        row = int(np.argmax(loose))
+        node = next(number for number, own in mesh.index.items() if own == row)
+        raise DeckError(
+            step.procedure.line,
+            f"the surface under pressure ends at node {node}, which is free along the axle: hold it"
+            " there (2), or close it by a surface under the same pressure",
+        )
+
+
 def _free(mesh: DeckMesh, step: DeckStep) -> Array:
     free = np.zeros((len(mesh.X), 3), bool)
     for rows in mesh.connectivity.values():

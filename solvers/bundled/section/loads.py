@@ -6,6 +6,7 @@ import numpy as np
 
 from ..deck.keywords import DeckError
 from ..deck.steps import DeckStep
+from .boundary import check_open_ends
 from .model import Model
 from .parts.part import TyrePart
 from .parts.pressure import Pressure
@@ -17,6 +18,7 @@ def pressures(model: Model, step: DeckStep) -> list[Pressure]:
     for surface in step.pressures:
         if surface not in model.mesh.edges:
             raise DeckError(step.procedure.line, f"surface {surface} of the step is not defined")
+    check_open_ends(model.mesh, step)
     return [Pressure(model.mesh.faces[s], value) for s, value in step.pressures.items()]
 
 
