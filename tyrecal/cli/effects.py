@@ -9,7 +9,6 @@ from typing import Any
 import click
 
 from . import arguments, complete, options
-from .main import EXIT_SOLVER
 
 
 @click.command()
@@ -60,11 +59,10 @@ def command(
     tyrecal effects bead_filler --case cases/p235_75r17.yaml --fitted p235_75r17/fit.json
     tyrecal effects --case cases/p235_75r17.yaml --jobs 2
     """
-    from ..report.effects import effect_entry, effect_text, signature_entry
-    from ..report.table import effects_table, shown, signatures_table
-    from ..simulate.evaluate.failure import EvaluationFailed
+    from ..report.effects import effect_text, effects_table
+    from ..report.table import shown
     from ..simulate.evaluate.solver import installed
-    from ..studies.signature import Plain, stated_size
+    from ..studies.effects import CatalogueEntry, run
     from ..tyre.case.mistakes import suggestion
     from ..tyre.effects import IDS, catalogue
 
@@ -78,13 +76,14 @@ def command(
         if option not in ("--json", "--quiet", "--verbose"):
             raise click.UsageError(f"{option} needs a --case")
     solvers = installed()
-    entries = {id: effect_entry(catalogue()[id], solvers) for id in ([name] if name else IDS)}
+    chosen = [name] if name else IDS
+    entries = [CatalogueEntry.of(catalogue()[id], solvers) for id in chosen]
     if not case:
-        terminal.result(list(entries.values()))
+        terminal.result([each.model_dump(exclude_unset=True) for each in entries])
         if name and not terminal.as_json:
-            terminal.say(effect_text(entries[name]))
+            terminal.say(effect_text(entries[0]))
         else:
-            terminal.show(shown(effects_table(list(entries.values()))))
+            terminal.show(shown(effects_table(entries)))
         return 0
 
     loaded, values = study.load(case, assignments)
@@ -100,40 +99,25 @@ def command(
     kPa = _pressures(loaded, pressures, study.allow_unusual)
     if fitted:
         values = arguments.fitted_values(fitted, loaded, terminal)
-    run = study.run(loaded, "effects", evaluator, pressure_kPa=kPa)
-    plain = Plain(loaded, evaluator, values, kPa)
+    output = study.run(loaded, "effects", evaluator, pressure_kPa=kPa)
     if name and not terminal.as_json:
-        terminal.say(effect_text(entries[name]) + "\n")
-    sizes: dict[str, float] = {}
-    for id, entry in entries.items():
-        if name or adapter.name in entry["solvers"]:
-            sizes[id] = stated_size(id) if value is None else value
-        else:
-            terminal.say(f"{id}: solver '{adapter.name}' cannot express it")
+        terminal.say(effect_text(entries[0]) + "\n")
+    able = [each for each in entries if name or adapter.name in each.solvers]
+    for each in entries:
+        if each not in able:
+            terminal.say(f"{each.id}: solver '{adapter.name}' cannot express it")
     terminal.detail(f"each at {', '.join(f'{p:g}' for p in kPa)} kPa")
-    found, failed = [], 0
     with terminal.progress("effects") as bar:
-        answers = zip(sizes, plain.signatures(sizes, study.jobs), strict=True)
-        for done, (id, signature) in enumerate(answers, start=1):
-            bar.at(done, len(sizes))
-            if isinstance(signature, EvaluationFailed):
-                failed += 1
-                terminal.error(f"{id}: {signature}")
-                continue
-            terminal.detail(id)
-            found.append({**entries[id], **signature_entry(signature, values)})
-            if pictures:
-                from ..report.figure import save
-                from ..report.signature import draw_signature
+        evaluator.on_progress = bar.at
+        found, signatures = run(
+            loaded, evaluator, values, kPa, able, value, study.jobs, study.notify
+        )
+    figures = {}
+    if pictures:
+        from ..report.signature import draw_signature
 
-                save(draw_signature(signature), run.new / f"effect_{id}.png")
-    found = run.write_json("effects.json", found)
-    run.finish()
-    terminal.result(found)
-    if found:
-        terminal.show(shown(signatures_table(found)))
-    terminal.say(f"results in {run.folder}")
-    return EXIT_SOLVER if failed else 0
+        figures = {f"effect_{each.id}": draw_signature(each) for each in signatures}
+    return study.present(output, found, figures)
 
 
 def _variables_in(assignments: tuple[str, ...], values: Mapping[str, float]) -> list[str]:

@@ -17,7 +17,7 @@ RESULT_TYPES = {  # in the order of a page
     "modes": "tyrecal.studies.modes:ModesResult",
     "sweep-pressure": "tyrecal.studies.pressure_result:PressureSweep",
     "footprint": "tyrecal.studies.footprint:FootprintResult",
-    "effects": "tyrecal.studies.effects_result:Effects",
+    "effects": "tyrecal.studies.effects:Effects",
     "sweep-load": "tyrecal.studies.loaded_result:LoadSweep",
     "sample": "tyrecal.studies.sample.result:SampleResult",
     "diagnose": "tyrecal.studies.diagnose.summary:DiagnosisResult",

@@ -444,9 +444,20 @@ def effects(name: str) -> list[dict[str, Any]]:
         ]
         both.append(
             {
+                "id": title.split()[0].lower(),
                 "title": title,
                 "symbol": "e",
                 "unit": "K",
+                "low": 0.0,
+                "high": 3.0,
+                "about": ["What it is."],
+                "changes": ["*ELASTIC"],
+                "signature": "all modes rise",
+                "toggle": "cool it",
+                "aliases": [],
+                "solvers": ["bundled"],
+                "mass_kg": 0.1,
+                "refitted": {"C10": {"before": 1e6, "after": 1.1e6}},
                 "value": 3.0,
                 "rows": rows,
                 "before_percent": 4.5,

@@ -15,6 +15,7 @@ from ...errors import InputError
 from ...files import NotAFile, read_runs, read_text
 from ...studies import result_types
 from ...studies.diagnose.summary import DiagnosisResult
+from ...studies.effects import Effects
 from ...studies.fit.result import FitResult
 from ...studies.result import Provenance, Result, ResultPart
 from ..shape_data import DiagnosisSection, Patches, Shapes
@@ -108,7 +109,7 @@ def read_results(folder: Path) -> Results:
 
 def _is_filled(found: Result) -> bool:
     """Whether it has rows; where no effect had an answer effects.json has none."""
-    return bool(getattr(found, "entries", True))
+    return not isinstance(found, Effects) or bool(found.rows)
 
 
 def _read(path: Path, kind: type[File]) -> File | None:

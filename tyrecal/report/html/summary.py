@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from ...studies.diagnose.summary import DiagnosisResult
-from ...studies.effects_result import EffectResult, Effects
+from ...studies.effects import EffectResult, Effects
 from ...studies.fit.result import FitResult
 from ...studies.modes import ModesResult
 from ...studies.result import Result
@@ -103,6 +103,6 @@ def sentence(words: str) -> str:
 SHORT: dict[type[Result], Callable[[Any], list[str]]] = {
     FitResult: fit_words,
     ModesResult: modes_words,
-    Effects: lambda found: [effect_words(each) for each in found.entries],
+    Effects: lambda found: [effect_words(each) for each in found.rows],
     DiagnosisResult: diagnosis_words,
 }

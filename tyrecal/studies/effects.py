@@ -1,0 +1,262 @@
+"""Signatures of effects: what each does to the modes, before and after a re-fit (effects.json)."""
+
+from __future__ import annotations
+
+import inspect
+import sys
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Any, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from ..simulate.evaluate.evaluator import Evaluator
+from ..simulate.evaluate.failure import EvaluationFailed
+from ..simulate.modes.label import Label
+from ..tyre.case import LoadedCase
+from ..tyre.effects import Effect
+from .result import (
+    Column,
+    Failed,
+    Notify,
+    PositiveNumber,
+    Provenance,
+    Result,
+    ResultPart,
+    Table,
+    Wave,
+    silent,
+)
+from .signature import Plain, Signature, rms, stated_size
+
+
+class EffectMode(ResultPart):
+    """Change of a mode's frequency by an effect, as it comes and after the re-fit."""
+
+    c: Wave
+    m: Wave
+    kind: str | None
+
+    @property
+    def label(self) -> Label:
+        """[c, m]"""
+        return Label(self.c, self.m, self.kind)
+
+    before_percent: float | None  # None: the mode got lost
+    after_percent: float | None
+
+
+class EffectRow(ResultPart):
+    """An effect at one pressure."""
+
+    pressure_kPa: PositiveNumber
+    modes: list[EffectMode]
+
+
+class Refitted(ResultPart):
+    """A variable before and after the re-fit, in its own unit."""
+
+    before: float
+    after: float
+
+    @property
+    def said(self) -> str:
+        """How far it moves."""
+        if not self.before:
+            return f"{self.after - self.before:+.3g}"
+        return f"{100 * (self.after / self.before - 1):+.1f} %"
+
+
+class CatalogueEntry(ResultPart):
+    """An effect of the catalogue."""
+
+    provenance: Provenance | None = None
+    id: str
+    title: str
+    symbol: str
+    unit: str
+    low: float
+    high: float
+    about: list[str]
+    changes: list[str]
+    signature: str
+    toggle: str
+    aliases: list[str]
+    solvers: list[str]  # those installed that can express it
+
+    @classmethod
+    def of(cls, effect: Effect, solvers: Sequence[Mapping[str, Any]]) -> CatalogueEntry:
+        """``solvers``: those installed, as `solver.installed` says."""
+        return cls(
+            id=effect.id,
+            title=effect.title,
+            symbol=effect.symbol,
+            unit=effect.unit,
+            low=effect.low,
+            high=effect.high,
+            about=about(effect),
+            changes=list(effect.changes),
+            signature=effect.signature,
+            toggle=effect.toggle,
+            aliases=list(effect.aliases),
+            solvers=[s["name"] for s in solvers if effect.within(s["capabilities"])],
+        )
+
+
+class EffectResult(CatalogueEntry):
+    """An entry of effects.json."""
+
+    value: float
+    mass_kg: float
+    before_percent: float | None  # rms over modes and pressures
+    after_percent: float | None
+    absorbed: float | None  # share of it that the re-fit takes up
+    refitted: dict[str, Refitted]
+    rows: Annotated[list[EffectRow], Field(min_length=1)]
+
+
+class Effects(Result):
+    """effects.json, which is a list; empty where no effect had an answer."""
+
+    study, stem, heading = "effects", "effects", "Effects"
+
+    rows: list[EffectResult]
+    failed: list[Failed] = Field(default=[])
+
+    @model_validator(mode="before")
+    @classmethod
+    def _of_list(cls, content: Any) -> Any:
+        if not isinstance(content, list):
+            return content
+        first = content[0] if content and isinstance(content[0], dict) else {}
+        return {"format": 1, "provenance": first.get("provenance"), "rows": content}
+
+    def content(self) -> Any:
+        return [each.model_dump(exclude_unset=True) for each in self.rows]
+
+    def stamped(self, provenance: Mapping[str, Any]) -> Self:
+        of = Provenance.model_validate(provenance)
+        rows = [each.model_copy(update={"provenance": of}) for each in self.rows]
+        return self.model_copy(update={"provenance": of, "rows": rows})
+
+    def tables(self) -> list[Table]:
+        """How far each effect moves the modes, and the variables that follow it."""
+        if not self.rows:
+            return []
+        percent, absorbed = Column("before %"), Column("absorbed %", ".1f", 100.0)
+        size, mass = Column("size", "g"), Column("kg", "+.2f")
+        rows = [
+            [
+                each.id,
+                size.cell(each.value),
+                each.unit,
+                mass.cell(each.mass_kg),
+                *map(percent.cell, (each.before_percent, each.after_percent)),
+                absorbed.cell(each.absorbed),
+                *(moved.said for moved in each.refitted.values()),
+            ]
+            for each in self.rows
+        ]
+        caption = (
+            "rms change of all modes, as it comes and after the best linear re-fit of the"
+            " variables; how far that moves them"
+        )
+        names = [Column(name) for name in self.rows[0].refitted]
+        words = [Column("effect", ""), size, Column("unit", ""), mass]
+        return [Table([*words, percent, Column("after %"), absorbed, *names], rows, "", caption)]
+
+    def numbers(self) -> list[Table]:
+        """One row an effect, at the pressure in the middle."""
+        first = self.rows[0].rows
+        middle = first[len(first) // 2].pressure_kPa
+        labels = dict.fromkeys(m.label for e in self.rows for row in e.rows for m in row.modes)
+        change, share = Column("left", "+.1f"), Column("absorbed, %", ".0f", 100.0)
+        heads = [each for x in labels for each in (Column(x.said), change)]
+        rows = []
+        for each in self.rows:
+            size = f"{each.symbol} = {each.value:.4g} {each.unit}".rstrip()
+            modes = {m.label: m for r in each.rows if r.pressure_kPa == middle for m in r.modes}
+            cells = []
+            for label in labels:
+                mode = modes.get(label)
+                cells.append(change.cell(mode and mode.before_percent))
+                cells.append(change.cell(mode and mode.after_percent))
+            rows.append([each.title, size, *cells, share.cell(each.absorbed)])
+        caption = (
+            f"Change of frequency, %, at {middle:g} kPa: as the effect comes, and what is left once"
+            " the variables are fitted again. Absorbed: the share of it, over all pressures, that"
+            " calibration hides."
+        )
+        return [Table([Column("effect", ""), Column("", ""), *heads, share], rows, "", caption)]
+
+
+def run(
+    case: LoadedCase,
+    evaluator: Evaluator,
+    values: Mapping[str, float],
+    pressures_kPa: Sequence[float],
+    entries: Sequence[CatalogueEntry],
+    size: float | None = None,
+    jobs: int = 1,
+    notify: Notify = silent,
+) -> tuple[Effects, list[Signature]]:
+    """Each effect on the tyre of ``values``: the result, and what it is made of.
+
+    size: of all, None: each at the end of its range (`stated_size`). Raises what
+    ``Evaluator.evaluate`` does for the plain tyre.
+    """
+    plain = Plain(case, evaluator, values, pressures_kPa)
+    sizes = {each.id: stated_size(each.id) if size is None else size for each in entries}
+    rows, failed, signatures = [], [], []
+    for entry, signature in zip(entries, plain.signatures(sizes, jobs), strict=True):
+        if isinstance(signature, EvaluationFailed):
+            failed.append(Failed(design=entry.id, cause=signature.cause, words=signature.words))
+            notify(entry.id, signature)
+            continue
+        rows.append(_effect_result(entry, signature, values))
+        signatures.append(signature)
+        notify(entry.id, None)
+    return Effects(rows=rows, failed=failed), signatures
+
+
+def _effect_result(
+    entry: CatalogueEntry, found: Signature, values: Mapping[str, float]
+) -> EffectResult:
+    """``values``: of the variables before the re-fit."""
+    change = lambda percent: float(percent) if np.isfinite(percent) else None
+    return EffectResult(
+        **entry.model_dump(exclude_unset=True),
+        value=found.value,
+        mass_kg=found.mass_kg,
+        before_percent=rms(found.before),
+        after_percent=rms(found.after),
+        absorbed=found.absorbed,
+        refitted={
+            name: Refitted(before=values[name], after=value)
+            for name, value in found.refitted.items()
+        },
+        rows=[
+            EffectRow(
+                pressure_kPa=pressure,
+                modes=[
+                    EffectMode(
+                        c=label.c,
+                        m=label.m,
+                        kind=label.kind,
+                        before_percent=change(before),
+                        after_percent=change(after),
+                    )
+                    for label, before, after in zip(found.labels, *percents, strict=True)
+                ],
+            )
+            for pressure, *percents in zip(
+                found.pressures_kPa, found.before, found.after, strict=True
+            )
+        ],
+    )
+
+
+def about(effect: Effect) -> list[str]:
+    """What it is, and what it does to the case: the words that stand in the effect's own file."""
+    module = inspect.getdoc(sys.modules[effect.add.__module__]) or ""
+    return [part for part in (module, inspect.getdoc(effect.add) or "") if part]
