@@ -18,7 +18,6 @@ from . import case  # noqa: E402, F401  takes a second: the studies and all that
 for entry in entry_points(group=GROUP):
     with suppress(Exception):  # a solver that cannot be imported says so where it is asked for
         entry.load()
-for late in ("scipy.optimize", "tyrecal_solvers.bundled.job"):  # imported when they are used
-    import_module(late)
+import_module("tyrecal_solvers.bundled.job")  # imported when it is used
 
 gc.freeze()  # so that a worker's collector leaves these pages shared

@@ -1,8 +1,7 @@
 """The second method: Levenberg and Marquardt's damped Gauss-Newton steps within the bounds.
 
-Each step d minimises |r + J d|^2 + mu |d|^2 tr(J^T J) / v, v variables, within the bounds on x + d
-(Nocedal and Wright, Numerical Optimization, sec. 10.3); mu falls after a step that lowers the
-objective and rises after one that does not.
+Of each step (`damped_step`) mu falls after one that lowers the objective, and rises after one that
+does not.
 """
 
 from __future__ import annotations
@@ -10,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...simulate.evaluate.failure import EvaluationFailed
+from .damped_step import damped_step
 from .problem import Point, Problem
 from .slsqp import AT_JUMP, Descent, is_at_jump, is_converged
 
@@ -51,16 +51,9 @@ def _first_solvable(problem: Problem, point: Point, step: Array) -> Point | None
 
 
 def _step(problem: Problem, point: Point, damping: float) -> Array:
-    from scipy.optimize import lsq_linear
-
-    J, r = point.jacobian, point.residuals
-    count = J.shape[1]
-    spread = np.sqrt(damping / count) * np.linalg.norm(J)
-    matrix = np.vstack([J, spread * np.eye(count)])
-    right = np.concatenate([-r, np.zeros(count)])
     below, above = problem.lower - point.x, problem.upper - point.x
-    room = 1e-12 * (problem.upper - problem.lower)  # lsq_linear wants the start strictly inside
-    step: Array = lsq_linear(
-        matrix, right, (np.minimum(below, 0) - room, np.maximum(above, 0) + room)
-    ).x
+    sides = np.vstack([np.eye(len(below)), -np.eye(len(below))])
+    step = damped_step(
+        point.jacobian, point.residuals, damping, sides, np.concatenate([below, -above])
+    )
     return np.clip(step, below, above)

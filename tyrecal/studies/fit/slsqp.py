@@ -1,9 +1,9 @@
 """SLSQP on the design variables, restarted in the Gauss-Newton metric of each point it reaches.
 
 Raw variables of sizes 1e-7 and 1e6 stop SLSQP at its start, and its identity first Hessian sends
-it to the bounds. So each restart works in coordinates y, x = x_k + F_k (J^T J + mu)^(-1/2) y, in
-which the Hessian of F^2/2 is the identity but for the residuals' curvature (Nocedal and Wright,
-Numerical Optimization, ch. 10 and 18); bounds become linear constraints.
+it to the bounds. So each restart works in coordinates in which the Hessian of F^2/2 is the identity
+but for the residuals' curvature (`damped_step`; Nocedal and Wright, Numerical Optimization, ch. 10
+and 18), and is SLSQP's first iteration; bounds become linear constraints.
 """
 
 from __future__ import annotations
@@ -15,13 +15,16 @@ import numpy as np
 
 from ...simulate.evaluate.failure import EvaluationFailed
 from .crossing import MIXED, TELLING, Crossing, crossing, gap, order, pair_clarity
+from .damped_step import damped_step
 from .problem import Point, Problem
 
 Array = np.ndarray
 RESTARTS = 40
 EXACT = 1e-3  # Hz, an objective below every measurement's resolution
 DAMPING = 0.1  # mu over the mean diagonal of J^T J, at first
-TRIALS = 3  # of a step, where the objective may jump
+MOST_TRIALS = 11  # of a step, each shortened to the vertex of a parabola, as Kraft's search does
+SMALLEST_PART = 0.1  # in one shortening
+TRIALS = 3  # of a step, where the objective may jump: each trial presses several tyres
 AT_JUMP = "less is left to gain than areas and stiffnesses jump by"
 ROOM = 0.1  # of the gap of the [0, 0] modes, between a bounded step and where labels change places
 CREEPING = 3e-4  # of the objective, less than ROOM costs: a gain that is not worth another step
@@ -141,52 +144,28 @@ def _restart(
 ) -> tuple[list[Point], bool]:
     """One SLSQP iteration on this side of ``edge``; the points seen and whether the first step,
     taken whole, was the best."""
-    J, scale = point.jacobian, max(point.objective, 1e-300)
-    H = J.T @ J
-    H[np.diag_indices(len(H))] += damping * np.trace(H) / len(H)
-    turn = scale * np.linalg.inv(np.linalg.cholesky(H)).T
-    seen = [point]
-
-    def function(y: Array) -> tuple[float, Array]:
-        if point.roughness and len(seen) > TRIALS + 1:
-            return np.inf, np.zeros(len(y))  # each trial presses several tyres
-        x = np.clip(point.x + turn @ y, problem.lower, problem.upper)
-        try:
-            there = problem.evaluate(x)
-        except EvaluationFailed:
-            return np.inf, np.zeros(len(y))  # worse than anything: the line search steps back
-        seen.append(there)
-        gradient = there.jacobian.T @ there.residuals
-        return 0.5 * (there.objective / scale) ** 2, turn.T @ gradient / scale**2
-
-    matrix, held = np.empty((0, len(turn))), np.empty(0)  # the crossing's row, where it bounds
+    n = len(point.x)
+    G, h = np.vstack([np.eye(n), -np.eye(n)]), [problem.lower - point.x, point.x - problem.upper]
     if edge:
         side = np.sign(gap(point))
-        matrix = side * (edge.slopes @ turn)[None, :]
-        held = np.array([side * edge.at(point.x) - ROOM * abs(gap(point))])
-    bounds = {
-        "type": "ineq",
-        "fun": lambda y: np.concatenate(
-            [
-                point.x + turn @ y - problem.lower,
-                problem.upper - point.x - turn @ y,
-                held + matrix @ y,
-            ]
-        ),
-        "jac": lambda y: np.concatenate([turn, -turn, matrix]),
-    }
-    from scipy.optimize import minimize  # late: not for those who only read results
-
-    minimize(
-        function,
-        np.zeros(len(J.T)),
-        jac=True,
-        method="SLSQP",
-        constraints=[bounds],
-        options={"maxiter": 1, "ftol": 1e-15},
-    )
+        G = np.vstack([G, side * edge.slopes])
+        h.append(np.array([ROOM * abs(gap(point)) - side * edge.at(point.x)]))
+    step = damped_step(point.jacobian, point.residuals, damping, G, np.concatenate(h))
+    slope = float((point.jacobian.T @ point.residuals) @ step)  # of F^2/2 along it
+    seen, share, before = [point], 1.0, 0.5 * point.objective**2
+    for _ in range(TRIALS if point.roughness else MOST_TRIALS):
+        try:
+            there = problem.evaluate(np.clip(point.x + share * step, problem.lower, problem.upper))
+        except EvaluationFailed:  # worse than anything
+            rise = np.inf
+        else:
+            seen.append(there)
+            rise = 0.5 * there.objective**2 - before
+        if rise <= 0.1 * share * slope:
+            break
+        share *= max(share * slope / (2 * (share * slope - rise)), SMALLEST_PART)
     best = min(seen, key=lambda p: p.objective)
-    return seen, len(seen) > 2 and best is seen[2]
+    return seen, len(seen) > 1 and best is seen[1]
 
 
 def _beyond_crossing(
