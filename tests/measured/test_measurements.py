@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from tyrecal.errors import InputError
+from tyrecal.measured.measurement import measurements_csv
 from tyrecal.measured.tables import read_measurements
+from tyrecal.measured.targets import on_own_rim
+from tyrecal.tyre.load import load_case
+from tyrecal.tyre.state import TyreState
+from tyrecal.tyre.values import with_values
+
+from ..conftest import CASES
 
 HEADER = "quantity,c,m,kind,member,pressure_kPa,load_N,value,sigma\n"
 GOOD = "frequency_Hz,2,0,,,240,0,79.5,0.2"
@@ -120,3 +128,74 @@ def test_the_order_of_columns_is_free(tmp_path: Path) -> None:
     (one,) = read(tmp_path, "79.5,0.2,frequency_Hz,2,0,,,240,0", header=swapped)
     (other,) = read(tmp_path, GOOD)
     assert one == other
+
+
+RIMS = HEADER.replace("sigma\n", "sigma,rim\n")
+LABORATORY = "label,frequency_Hz,sigma_Hz,pressure_kPa,load_N,rim\n"
+
+
+def test_a_value_carries_its_state(tmp_path: Path) -> None:
+    """Pressure, load, and rim: as the case has it without a column, fixed where its cell is empty;
+    as another laboratory writes it, too."""
+    (plain,) = read(tmp_path, GOOD)
+    assert plain.state == TyreState(240.0, 0.0, None)
+    told = {"": "fixed", "fixed": "fixed", "Free": "free", "springs": "springs", "case": None}
+    lines = [f"frequency_Hz,2,0,,,{200 + k},0,79.5,0.2,{x}" for k, x in enumerate(told)]
+    rows = read(tmp_path, *lines, header=RIMS)
+    assert [each.rim for each in rows] == list(told.values())
+    lines = [
+        '"[2,0]",79.5,0.2,240,,free',
+        '"[2,0]",79.1,0.2,240,0,',
+        '"[0,0] lateral",31.7,0.2,160,0,case',
+    ]
+    one, other, third = read(tmp_path, *lines, header=LABORATORY)
+    assert (one.label, one.state, one.sigma) == (plain.label, TyreState(240.0, 0.0, "free"), 0.2)
+    assert other.state == TyreState(240.0, 0.0, "fixed") and third.state == TyreState(160.0)
+    (mass,) = read(tmp_path, "mass_kg,,,,,,,12.5,0.05,free", header=RIMS)
+    assert mass.state == TyreState()
+    written = measurements_csv([*rows, one, mass])
+    again = read(tmp_path, *written.splitlines()[1:], header=RIMS)
+    assert [(r.key, r.value) for r in again] == [(r.key, r.value) for r in [*rows, one, mass]]
+    assert "rim" not in measurements_csv([plain])
+
+
+@pytest.mark.parametrize(
+    ("header", "line", "words"),
+    [
+        (RIMS, "frequency_Hz,2,0,,,240,0,79.5,0.2,loose", "rim is 'loose', must be one of fixed,"),
+        (
+            RIMS,
+            "contact_area_m2,,,,,240,4000,0.02,1e-3,free",
+            "rim is free, must be fixed or empty",
+        ),
+        (RIMS, "frequency_Hz,2,0,,,240,0,80.5,0.2,fixed", "measures the same as line 2"),
+        (LABORATORY, '"[2,0]",79.5,,240,0,free', "sigma is ''"),
+    ],
+)
+def test_a_wrong_state_is_named(tmp_path: Path, header: str, line: str, words: str) -> None:
+    good = GOOD + "," if header == RIMS else '"[2,0]",79.1,0.2,240,0,'
+    with pytest.raises(InputError) as caught:
+        read(tmp_path, good, line, header=header)
+    assert "line 3" in str(caught.value) and words in str(caught.value)
+
+
+def test_columns_of_another_table_are_all_known(tmp_path: Path) -> None:
+    for header in (
+        LABORATORY.replace("load_N", "laod_N"),
+        LABORATORY.replace("sigma_Hz", "remark"),
+        RIMS.replace("rim", "frequency_Hz"),
+    ):
+        with pytest.raises(InputError, match=r"line 1: the columns must be .* measured import"):
+            read(tmp_path, GOOD, header=header)
+
+
+def test_other_studies_take_what_stands_on_the_cases_rim(tmp_path: Path) -> None:
+    case = load_case(CASES / "p235_75r17.yaml")
+    lines = [f"frequency_Hz,{c},0,,,240,0,79.5,0.2,{rim}" for c, rim in ((2, ""), (3, "free"))]
+    rows = [*read(tmp_path, *lines, header=RIMS), *read(tmp_path, GOOD)]
+    here, (note,) = on_own_rim(case, rows)
+    assert here == [replace(rows[0], rim=None), rows[2]]
+    assert note.startswith("1 values with the rim free: a fit takes them")
+    here, (note,) = on_own_rim(with_values(case, {"rim.free": True}), rows)
+    assert here == [replace(rows[1], rim=None), rows[2]] and "rim fixed" in note
+    assert on_own_rim(case, rows[2:]) == (rows[2:], [])

@@ -24,7 +24,7 @@ def load(
     Says which numbers of the file do not count. Returns (case, values of the variables). Raises
     CaseError, click.UsageError; both for numbers that no tyre has, too, unless they are allowed.
     """
-    from ..tyre.case import overruled, parse_assignment, start_values, with_level
+    from ..tyre.case import as_written, overruled, parse_assignment, start_values, with_level
     from ..tyre.load import CaseError, load_case
     from ..tyre.values import overridden, with_values
 
@@ -45,7 +45,7 @@ def load(
         values = {**start_values(case), **{k: v for k, v in given.items() if k in names}}
         case = with_values(case, values)
         for name, value in given.items():
-            option = f"--set {name}={value:g}"
+            option = f"--set {name}={as_written(value)}"
             if name == "pressure_kPa" and value == pressure_kPa:
                 option = f"--pressure-kPa {value:g}"
             refuse_unusual(case, option, name, value, allow_unusual)

@@ -78,11 +78,12 @@ def command(
         arguments.refuse_unusual(
             loaded, f"--at-kPa {pressure:g}", "pressure_kPa", pressure, study.allow_unusual
         )
-    readings = None
+    readings, elsewhere = None, list[str]()
     if measured:
         from ..measured.tables import read_measurements
+        from ..measured.targets import on_own_rim
 
-        readings = read_measurements(measured)
+        readings, elsewhere = on_own_rim(loaded, read_measurements(measured))
     evaluator = study.evaluator(loaded)
     check(loaded, evaluator, readings)
     output = study.run(
@@ -106,6 +107,8 @@ def command(
     terminal.say("\n".join(found.sentences()))
     if left_out := len(readings or ()) - len(modal(readings or ())):
         terminal.note(f"{measured}: {left_out} values are no frequencies of the unloaded tyre")
+    for each in elsewhere:
+        terminal.note(f"{measured}: not used: {each}")
     for doubt in found.doubts():
         terminal.warn(doubt)
     study.finish(output)

@@ -27,6 +27,7 @@ HEADINGS = {
     "load": "load vertical_load wheel_load fz last radlast charge",
     "sigma": "sigma std stdev stddev sd std_dev standard_deviation uncertainty unsicherheit"
     " standardabweichung",
+    "rim": "rim wheel support felge rad",
     "run": "run repeat repetition test messung wiederholung",
     "quantity": "quantity",
     "value": "value",
@@ -45,6 +46,11 @@ class TableColumn:
     factor: float = 1.0  # to our unit
     percent: bool = False  # of the value
     of: str = ""  # the quantity that a sigma's unit belongs to; "" where it has none or is in %
+
+
+def meaning_of(heading: str) -> str | None:
+    """What a column holds; None of damping, remarks and the like."""
+    return MEANING.get(_heading(heading)[0])
 
 
 def read_columns(

@@ -97,6 +97,7 @@ def result(gathered: Gathered) -> dict[str, Any]:
                 "member": row.member,
                 "pressure_kPa": row.pressure_kPa,
                 "load_N": row.load_N,
+                **({"rim": row.rim} if row.rim else {}),
                 "value": row.value,
                 "sigma": row.sigma,
             }

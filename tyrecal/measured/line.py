@@ -8,9 +8,10 @@ from dataclasses import dataclass
 from math import isfinite, nan
 
 from ..simulate.modes.label import Label
+from ..tyre.state import RIMS, Rim
 from ..units import QUANTITIES
 from .columns import TableColumn
-from .measurement import Measurement
+from .measurement import AS_CASE, Measurement
 
 LABEL = re.compile(r"^[\[(]?\s*(\d+)\s*[,;/ ]\s*(\d+)\s*[\])]?\s*(.*)$")
 MAX_ORDERS = {"c": 20, "m": 3}
@@ -69,9 +70,11 @@ class Line:
             own = self.number("sigma") if sigma and sigma.of in ("", quantity) else nan
             if sigma and sigma.percent:
                 own *= 0.01 * value
-            at = 0.0 if quantity == "mass_kg" else pressure
+            at, rim = pressure, self._rim()
+            if quantity == "mass_kg":
+                at, rim = 0.0, None
             name = f"{run} {self.cell('run')}".rstrip()
-            yield Measurement(quantity, label, member, at, load, value, own, name, self.place)
+            yield Measurement(quantity, label, member, at, load, value, own, name, self.place, rim)
 
     def _quantities(self) -> list[str]:
         if not self.cell("value"):
@@ -84,6 +87,19 @@ class Line:
         if quantity != "frequency_Hz" and any(map(self.cell, ("c", "m", "kind", "member"))):
             raise ValueError(f"c, m, kind and member must be empty for {quantity}")
         return [quantity]
+
+    def _rim(self) -> Rim | None:
+        """As the case has it where no column says it; fixed where its cell is empty."""
+        word = self.cell("rim").strip().lower() or RIMS[0]
+        if "rim" not in self.columns or word == AS_CASE:
+            return None
+        for rim in RIMS:
+            if word == rim:
+                return rim
+        known = ", ".join((*RIMS, AS_CASE))
+        raise ValueError(
+            f"rim is '{self.cell('rim')}', must be one of {known} (as the case has it)"
+        )
 
     def _label(self) -> Label:
         c, m, kind = self.cell("c"), self.cell("m"), self.cell("kind")

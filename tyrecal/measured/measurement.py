@@ -7,11 +7,14 @@ from dataclasses import dataclass
 from math import nan
 
 from ..simulate.modes.label import Label
+from ..tyre.state import Rim, TyreState
 from ..tyre.usual import USUAL_MEASUREMENTS
 
 CSV_COLUMNS = ("quantity", "c", "m", "kind", "member", "pressure_kPa", "load_N", "value", "sigma")
+RIM_COLUMN = "rim"  # where some stand on another rim than the case's
+AS_CASE = "case"
 PRESSURE_RANGE_kPa = (20.0, 2000.0)
-MeasurementKey = tuple[str, Label | None, str, float, float]
+MeasurementKey = tuple[str, Label | None, str, float, float, Rim | None]
 
 
 @dataclass(frozen=True)
@@ -27,11 +30,18 @@ class Measurement:
     sigma: float = nan  # standard deviation, NaN where it is not stated
     run: str = ""  # what was mounted and measured once
     place: str = ""  # file and line
+    rim: Rim | None = None  # None: as the case has it
 
     @property
     def key(self) -> MeasurementKey:
         """What is measured."""
-        return (self.quantity, self.label, self.member, self.pressure_kPa, self.load_N)
+        state = (self.pressure_kPa, self.load_N, self.rim)
+        return (self.quantity, self.label, self.member, *state)
+
+    @property
+    def state(self) -> TyreState:
+        """What the tyre was in."""
+        return TyreState(self.pressure_kPa or None, self.load_N, self.rim)
 
     @property
     def name(self) -> str:
@@ -51,6 +61,8 @@ class Measurement:
             return f"{said}; which unit?"
         if self.quantity in ("contact_area_m2", "vertical_stiffness_N_per_m") and not self.load_N:
             return f"the load is 0, must be greater than 0 for {self.quantity}"
+        if self.rim not in (None, "fixed") and self.quantity != "frequency_Hz":
+            return f"rim is {self.rim}, must be fixed or empty for {self.quantity}"
         if self.sigma <= 0:
             return f"sigma is {self.sigma:g}, must be greater than 0"
         return None
@@ -58,11 +70,13 @@ class Measurement:
 
 def measurements_csv(measurements: Sequence[Measurement]) -> str:
     """The measurements CSV."""
-    lines = [",".join(CSV_COLUMNS)]
+    on_rims = any(each.rim for each in measurements)
+    lines = [",".join([*CSV_COLUMNS, *[RIM_COLUMN] * on_rims])]
     for each in measurements:
         label = each.label
         mode = f"{label.c},{label.m},{label.kind or ''}" if label else ",,"
         pressure = f"{each.pressure_kPa:g}" if each.quantity != "mass_kg" else ""
         state = f"{each.member},{pressure},{each.load_N:g}"
-        lines.append(f"{each.quantity},{mode},{state},{each.value:.6g},{each.sigma:.3g}")
+        rim = f",{each.rim or AS_CASE}" * on_rims
+        lines.append(f"{each.quantity},{mode},{state},{each.value:.6g},{each.sigma:.3g}{rim}")
     return "\n".join(lines) + "\n"

@@ -81,7 +81,7 @@ def _one_for_both(values: Sequence[Measurement]) -> list[Measurement]:
     others do."""
     places: dict[tuple[object, ...], dict[str, list[Measurement]]] = {}
     for each in values:
-        place = (each.quantity, each.label, each.pressure_kPa, each.load_N)
+        place = (each.quantity, each.label, each.state)
         places.setdefault(place, {}).setdefault(each.run, []).append(each)
     result = []
     for runs in places.values():
@@ -100,4 +100,5 @@ def _one_for_both(values: Sequence[Measurement]) -> list[Measurement]:
 def _order(row: Measurement) -> tuple[object, ...]:
     label = row.label or Label(99, 0)
     mode = (label.c, label.m, label.kind or "", row.member)
-    return (row.quantity != "frequency_Hz", row.quantity, row.pressure_kPa, row.load_N, *mode)
+    state = (row.pressure_kPa, row.load_N, row.rim or "")
+    return (row.quantity != "frequency_Hz", row.quantity, *state, *mode)

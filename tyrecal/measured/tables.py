@@ -20,24 +20,28 @@ from pathlib import Path
 from ..errors import InputError
 from ..files import read_bytes
 from ..tyre.usual import LARGEST_SIGMA
-from .columns import TableColumn, read_columns
+from .columns import TableColumn, meaning_of, read_columns
 from .line import Line
-from .measurement import CSV_COLUMNS, Measurement
+from .measurement import CSV_COLUMNS, RIM_COLUMN, Measurement
 
 MAX_LINES, MAX_CELL = 10_000, 300  # of a file; characters
 OPENED = re.compile(r"^[\[(]\s*\d+$")  # a label that its comma has parted
 
 
 def read_measurements(path: Path) -> list[Measurement]:
-    """A measurements CSV: a table with `CSV_COLUMNS` and every sigma, which measures nothing twice.
+    """A table that can be used as it is: the measurements CSV with `CSV_COLUMNS`, or another all of
+    whose columns are known, with every sigma; it measures nothing twice.
 
     Raises InputError with every mistake, each with file and line; OSError.
     """
     lines, comma = _lines(path)
     place, headings = lines[0]
-    if sorted(headings) != sorted(CSV_COLUMNS):
+    known = [meaning_of(heading) for heading in headings]
+    own = "quantity" in known and {*headings} - {RIM_COLUMN} != {*CSV_COLUMNS}
+    if own or None in known or "sigma" not in known:
         raise InputError(
-            f"{place}: the columns must be {','.join(CSV_COLUMNS)}, with commas between;"
+            f"{place}: the columns must be {','.join(CSV_COLUMNS)}, and {RIM_COLUMN} where it is"
+            " not the case's, or like label,frequency_Hz,sigma_Hz,pressure_kPa,load_N,rim;"
             " 'tyrecal measured import' makes such a file of other tables"
         )
     columns = read_columns(headings, place, None)
@@ -148,7 +152,7 @@ def _twice(measurements: list[Measurement]) -> Iterator[str]:
     """Lines that measure what another does."""
     seen: dict[tuple[object, ...], Measurement] = {}
     for each in measurements:
-        place = (each.quantity, each.label, each.pressure_kPa, each.load_N)
+        place = (each.quantity, each.label, each.state)
         first = seen.setdefault((*place, each.member), each)
         if first is not each:
             yield f"{each.place}: measures the same as {_line(first)}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 from math import hypot
@@ -11,6 +12,7 @@ from ..errors import InputError
 from ..simulate.modes.label import Label
 from ..tyre.case import LoadedCase
 from ..tyre.case.schema import MEASURED_SIGMA, TargetFootprint, TargetMode, Targets
+from ..tyre.state import rim_of
 from .measurement import Measurement
 from .tables import read_measurements
 
@@ -47,6 +49,22 @@ def with_measured(case: LoadedCase, path: Path) -> tuple[LoadedCase, list[str]]:
     notes += [f"{len(loaded)} frequencies under load"] * bool(loaded)
     notes += ["the mass"] * bool(weighed)
     return replace(case, case=case.case.model_copy(update=wanted)), notes
+
+
+def on_own_rim(
+    case: LoadedCase, readings: Sequence[Measurement]
+) -> tuple[list[Measurement], list[str]]:
+    """What was measured on the rim that the case has, and what was on others, for studies of that
+    one alone."""
+    own = rim_of(case)
+    here = [replace(each, rim=None) for each in readings if each.rim in (None, own)]
+    others = Counter(each.rim for each in readings if each.rim not in (None, own))
+    notes = [
+        f"{count} values with the rim {rim}: a fit takes them; the rim of this case is {own},"
+        " see --set rim.free=true"
+        for rim, count in others.items()
+    ]
+    return here, notes
 
 
 def _modes(readings: Sequence[Measurement]) -> list[TargetMode]:

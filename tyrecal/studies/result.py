@@ -17,6 +17,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from ..files import json_text
 from ..simulate.evaluate.failure import EvaluationFailed
 from ..simulate.modes.label import Label
+from ..tyre.case import as_written
 
 PositiveNumber = Annotated[float, Field(gt=0)]
 Wave = Annotated[int, Field(ge=0, le=200)]
@@ -95,14 +96,14 @@ class Provenance(ResultPart):
     name: str
     size: str
     tyre_sha256: str
-    overrides: dict[str, float]
+    overrides: dict[str, float | bool]
     state: ResultState
     mesh: str
     targets: str | None = None
     measured_sha256: str | None = None
 
     def __str__(self) -> str:
-        given = [f"{name}={value:g}" for name, value in self.overrides.items()]
+        given = [f"{name}={as_written(value)}" for name, value in self.overrides.items()]
         solver = f"{self.solver} {self.solver_version}"
         return ", ".join([f"tyre {self.tyre_sha256[:8]}", *given, f"mesh {self.mesh}", solver])
 

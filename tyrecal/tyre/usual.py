@@ -225,7 +225,7 @@ def refusal(
     data: Mapping[str, Any], section: Section | None, keys: Keys, value: float
 ) -> str | None:
     """Why ``value`` is not usual at ``keys`` of the case that ``data`` and ``section`` are of."""
-    for usual, of in _ranges(data, section, keys):
+    for usual, of in () if isinstance(value, bool) else _ranges(data, section, keys):
         judged = value % 180 if usual is BELT_ANGLE else value
         if usual is CARCASS_ANGLE:
             judged = (value + 90) % 180 - 90

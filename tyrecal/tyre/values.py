@@ -15,6 +15,7 @@ from .case.mistakes import Keys, dotted, suggestion
 from .case.schema import Case
 from .case.shape import explain
 from .case.stations import read_section_of
+from .case.variables import as_written
 from .resolve import resolved
 from .usual import refusal
 
@@ -50,12 +51,12 @@ def set_values(loaded: LoadedCase, values: Mapping[str, float]) -> LoadedCase:
     targets: dict[Keys, float] = {}
     tree: dict[Any, Any] = {}
     for name, value in values.items():
-        if isinstance(value, bool) or not isinstance(value, Real):
+        if not isinstance(value, Real):
             raise ValueError(f"{name} is {value!r}, must be a number")
         for keys in _keys(loaded, name):
             if keys in targets:
                 raise ValueError(f"{name}: {dotted(keys)} is set twice")
-            targets[keys] = _number(loaded.case, keys, float(value))
+            targets[keys] = _number(loaded.case, keys, value)
     for keys, number in targets.items():
         branch: Any = tree
         for key in keys[:-1]:
@@ -79,7 +80,7 @@ def set_values(loaded: LoadedCase, values: Mapping[str, float]) -> LoadedCase:
 def overridden(loaded: LoadedCase, values: Mapping[str, float]) -> LoadedCase:
     """`with_values` of what the user sets, noted among the case's ``overrides``."""
     changed = with_values(loaded, values)
-    given = {name: float(value) for name, value in values.items()}
+    given = {n: x if isinstance(x, bool) else float(x) for n, x in values.items()}
     return replace(changed, overrides={**loaded.overrides, **given})
 
 
@@ -105,11 +106,17 @@ def _keys(loaded: LoadedCase, name: str) -> list[Keys]:
 
 
 def _number(case: Case, keys: Keys, value: float) -> float:
-    """``value`` as the kind of number that stands at ``keys`` of the case."""
+    """``value`` as the kind of number that stands at ``keys`` of the case, or true or false."""
     old = at(case, keys)
-    if isinstance(old, bool) or not isinstance(old, int | float | None):
-        raise ValueError(f"{dotted(keys)} is not a number, it cannot be {value:g}")
-    return int(value) if isinstance(old, int) and value.is_integer() else value
+    if isinstance(old, bool) or isinstance(value, bool):
+        if isinstance(old, bool) and isinstance(value, bool):
+            return value
+        kind = "true or false" if isinstance(old, bool) else "a number"
+        raise ValueError(f"{dotted(keys)} must be {kind}, got {as_written(value)}")
+    number = float(value)
+    if not isinstance(old, int | float | None):
+        raise ValueError(f"{dotted(keys)} is not a number, it cannot be {number:g}")
+    return int(number) if isinstance(old, int) and number.is_integer() else number
 
 
 def _set(node: Any, tree: Any, keys: Keys) -> Any:
@@ -132,5 +139,5 @@ def _set(node: Any, tree: Any, keys: Keys) -> Any:
         value: Any = tree
         for key in wrong[len(keys) :]:
             value = value.get(key) if isinstance(value, dict) else None
-        got = "" if value is None or isinstance(value, dict) else f", got {value:g}"
+        got = "" if value is None or isinstance(value, dict) else f", got {as_written(value)}"
         raise ValueError(f"{dotted(wrong)} {message}{got}") from None

@@ -11,6 +11,7 @@ from typing import Any
 from ...errors import InputError
 from ...measured.measurement import Measurement
 from ...measured.tables import read_measurements
+from ...measured.targets import on_own_rim
 from ...simulate.evaluate.evaluator import Evaluator
 from ...tyre.case import LoadedCase
 from ...tyre.case.mistakes import suggestion
@@ -73,7 +74,13 @@ def study(
     EvaluationFailed, and what ``Evaluator.evaluate`` raises.
     """
     switched = [path for path, _ in toggled]
-    runs = {path: read_measurements(path) for path in (measured, *repeats, *switched)}
+    told = {path: read_measurements(path) for path in (measured, *repeats, *switched)}
+    runs = {path: on_own_rim(case, readings)[0] for path, readings in told.items()}
+    elsewhere = [
+        f"{path.name}: {note}"
+        for path, readings in told.items()
+        for note in on_own_rim(case, readings)[1]
+    ]
     _check_copies([measured, *repeats, *switched], runs)
     observations = observe(
         runs[measured],
@@ -81,6 +88,7 @@ def study(
         [runs[path] for path in switched],
         assumed.split,
     )
+    observations = replace(observations, left_out=(*observations.left_out, *elsewhere))
     rows = list(dict.fromkeys((row.label, row.pressure_kPa) for row in observations.rows))
     if not any(label for label, _ in rows):
         raise InputError(f"{measured}: there is no frequency of the unloaded tyre in it")

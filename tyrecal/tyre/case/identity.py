@@ -47,6 +47,8 @@ def tyre_sha256(loaded: LoadedCase) -> str:
 def is_of_tyre(path: str) -> bool:
     """Whether the number at a dotted path of a case makes a tyre another one. (A variable's name is
     no path.)"""
+    if tuple(path.split(".")) in STATE:
+        return False
     part, _, rest = path.partition(".")
     known = TYRE.get(part, part == "effects")
     return known is True or (known is not False and rest.partition(".")[0] in known)

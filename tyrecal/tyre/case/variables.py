@@ -9,6 +9,8 @@ from math import isfinite
 from .checks import at, find
 from .loaded import LoadedCase
 
+SWITCHES = {"true": True, "false": False}  # as a case file writes them
+
 
 def start_values(loaded: LoadedCase) -> dict[str, float]:
     """The start value of every variable by name, in the unit of the numbers it sets."""
@@ -35,11 +37,13 @@ def overruled(loaded: LoadedCase, given: Collection[str] = ()) -> list[str]:
 
 
 def parse_assignment(text: str) -> tuple[str, float]:
-    """``NAME=VALUE`` as name and number. Raises ValueError."""
+    """``NAME=VALUE`` as name and number; true and false, too. Raises ValueError."""
     name, equals, value = text.partition("=")
     name = name.strip()
     if not equals or not name:
         raise ValueError(f"'{text}' must be NAME=VALUE, as in C10=1.2e6")
+    if value.strip() in SWITCHES:
+        return name, SWITCHES[value.strip()]
     try:
         number = float(value)
     except ValueError:
@@ -47,6 +51,11 @@ def parse_assignment(text: str) -> tuple[str, float]:
     if not isfinite(number):
         raise ValueError(f"{name} is '{value.strip()}', must be a finite number")
     return name, number
+
+
+def as_written(value: float) -> str:
+    """A number, or true or false, as a case file writes it."""
+    return str(value).lower() if isinstance(value, bool) else f"{value:g}"
 
 
 def with_level(loaded: LoadedCase, level: str) -> LoadedCase:

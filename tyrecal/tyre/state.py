@@ -1,0 +1,111 @@
+"""The state that a tyre is in while it is measured or computed: pressure, load, and how its rim is
+held.
+
+Everything else makes it another tyre (`case.identity`): one design has one frequency for each mode
+in each state, and a fit over several states has one design.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from .case.loaded import LoadedCase
+
+Rim = Literal["fixed", "springs", "free"]
+RIMS: tuple[Rim, ...] = ("fixed", "springs", "free")
+SPRINGS = tuple(
+    f"{part}{axis}"
+    for part, axes in (
+        (
+            "rim.spindle.",
+            ("lateral_m_per_N", "radial_m_per_N", "torsional_rad_per_N_m", "tilt_rad_per_N_m"),
+        ),
+        ("effects.spindle_", ("lateral", "radial", "torsional", "tilt")),
+    )
+    for axis in axes
+)
+"""Numbers of a case that are compliances of what holds its rim."""
+WHEEL_FREE = "effects.wheel_free"
+
+
+@dataclass(frozen=True)
+class TyreState:
+    """Inflation pressure; vertical load on the road, 0: none; whether the rim is held ``fixed``, by
+    ``springs`` (the compliances of the case's spindle) or ``free``. None: as the case has it."""
+
+    pressure_kPa: float | None = None
+    load_N: float = 0.0
+    rim: Rim | None = None
+
+    @property
+    def unloaded(self) -> TyreState:
+        """The same without a load."""
+        return replace(self, load_N=0.0)
+
+    def of(self, case: LoadedCase) -> TyreState:
+        """The state with None for what the case has anyway, so that equal ones compare equal."""
+        same_pressure = self.pressure_kPa == case.case.pressure_kPa
+        return TyreState(
+            None if same_pressure else self.pressure_kPa,
+            self.load_N,
+            None if self.rim == rim_of(case) else self.rim,
+        )
+
+    def told(self, case: LoadedCase) -> TyreState:
+        """The state with the case's own pressure and rim in the places of None."""
+        pressure = case.case.pressure_kPa if self.pressure_kPa is None else self.pressure_kPa
+        return TyreState(pressure, self.load_N, self.rim or rim_of(case))
+
+    def numbers(self, case: LoadedCase) -> dict[str, float]:
+        """What it sets of the case, by path: nothing where it is as the case.
+
+        Raises ValueError where the case cannot be in it.
+        """
+        state, found = self.of(case), dict[str, float]()
+        if state.pressure_kPa is not None:
+            found["pressure_kPa"] = state.pressure_kPa
+        if state.rim == "springs":
+            raise ValueError(
+                "has no springs in this case: give a compliance in rim.spindle, as"
+                " rim: {spindle: {lateral_m_per_N: 1e-7}}"
+            )
+        if state.rim:
+            found |= {"rim.free": state.rim == "free", WHEEL_FREE: 0.0} | dict.fromkeys(
+                SPRINGS, 0.0
+            )
+            point = case.case.rim.reference_point_m
+            if state.rim == "free" and point.r:
+                raise ValueError(
+                    "cannot move: rim.reference_point_m must be on the axle, with r = 0, got"
+                    f" {point.r:g}"
+                )
+        return found
+
+    def design(self, case: LoadedCase, values: Mapping[str, float]) -> dict[str, float]:
+        """Values of variables, or other numbers of the case by path, and the state's own, which win
+        over a variable that sets the same. Raises ValueError."""
+        own = self.numbers(case)
+        return {**without(case, values, own), **own}
+
+
+def without(
+    case: LoadedCase, values: Mapping[str, float], own: Mapping[str, float]
+) -> dict[str, float]:
+    """``values`` less those of variables that set one of the numbers ``own``."""
+    variables = case.case.variables
+    taken = {name for name, v in variables.items() if not own.keys().isdisjoint(v.sets)}
+    return {name: value for name, value in values.items() if name not in taken}
+
+
+def rim_of(case: LoadedCase) -> Rim:
+    """How the case has its rim held; a compliance that a variable sets counts as one."""
+    c = case.case
+    if c.rim.free or c.effects["wheel_free"]:
+        return "free"
+    set_by_variables = {path for v in c.variables.values() for path in v.sets}
+    effects = (c.effects[path.removeprefix("effects.")] for path in SPRINGS if "effects" in path)
+    if c.rim.spindle.gives_way or any(effects) or not set_by_variables.isdisjoint(SPRINGS):
+        return "springs"
+    return "fixed"
