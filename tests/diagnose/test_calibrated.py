@@ -11,7 +11,7 @@ from tyrecal.report.diagnosis import page
 from tyrecal.studies.diagnose.calibrated import calibrated_variables
 from tyrecal.studies.diagnose.diagnosis import Diagnosis, diagnose
 from tyrecal.studies.diagnose.model import Answer, Query
-from tyrecal.studies.diagnose.result import result
+from tyrecal.studies.diagnose.result import diagnosis_result
 from tyrecal.studies.diagnose.study import DiagnosedCase
 from tyrecal.units import in_engineers_units
 
@@ -56,8 +56,8 @@ def test_the_variables_with_the_effect_are_the_truth(toy: Toy, named: Diagnosis)
         assert variable["unit"] == "Pa" and 0 < variable["standard_error"] < 0.05 * truth
         assert abs(variable["value"] - truth) < variable["standard_error"]
     assert found["without"].keys() == found["with"].keys() == set(toy.variables)
-    assert "calibrated" not in result(named)
-    assert result(named, None, found)["calibrated"] == found
+    assert "calibrated" not in diagnosis_result(named).content()
+    assert diagnosis_result(named, None, found).content()["calibrated"] == found
 
 
 def test_the_page_has_them_with_units(toy: Toy, named: Diagnosis) -> None:

@@ -21,7 +21,7 @@ from tyrecal.studies.diagnose.model import Answer, Query, Span
 from tyrecal.studies.diagnose.next_measurement import rank
 from tyrecal.studies.diagnose.observations import Observable
 from tyrecal.studies.diagnose.regions import SectionPart
-from tyrecal.studies.diagnose.result import result
+from tyrecal.studies.diagnose.result import diagnosis_result
 from tyrecal.studies.diagnose.shrinkage import _placebo, held_out, shrink
 from tyrecal.studies.diagnose.study import DiagnosedCase
 from tyrecal.studies.diagnose.under_load import LoadedRow, UnderLoad
@@ -240,7 +240,7 @@ def test_the_section_map_finds_the_part_and_joins_what_looks_alike(chance: Chanc
 def test_a_pair_is_told_with_both_sizes() -> None:
     toy = Toy(effects=3, size=0.05)
     d = diagnosed(toy, {"e0": 0.8, "e1": 0.6}, 7)
-    told = result(d)
+    told = diagnosis_result(d).content()
     assert told["effect"] == "e0+e1" and set(told["parameters"]) == {"e0", "e1"}
     words = page(DiagnosedCase(d, (), False, (), (), toy), "tyre", "a.csv")  # type: ignore[arg-type]
     for size in told["parameters"].values():
@@ -300,7 +300,7 @@ def test_a_diagnosis_does_not_depend_on_units(seed: int) -> None:
     shape = np.random.default_rng(5).normal(0, 0.3, (2, len(y)))
     parts = [SectionPart("a", shape[0], shape[1], ""), SectionPart("b", shape[1], shape[0], "")]
     one, other = (
-        result(
+        diagnosis_result(
             diagnose(
                 toy,
                 toy.rows,
@@ -309,7 +309,7 @@ def test_a_diagnosis_does_not_depend_on_units(seed: int) -> None:
                 parts=lambda x: parts,
                 seed=seed,
             )
-        )
+        ).content()
         for toy in toys
     )
     for told, scale, unit in ((one, 1.0, np.ones(3)), (other, OtherUnits.effect, OtherUnits.x)):
@@ -375,7 +375,7 @@ def test_sizes_on_the_grid_have_a_density_of_one_over_the_range() -> None:
 
 def test_the_result_says_what_was_found() -> None:
     d = diagnosed(Toy(effects=3, pressures=(200.0, 240.0)), {"e1": 0.8}, 7)
-    told = result(d)
+    told = diagnosis_result(d).content()
     assert [(g["name"], g["p_value"], g["holm"]) for g in told["gap"]["groups"]] == [
         (g.name, g.p_value, g.corrected) for g in d.gap.groups
     ]
@@ -405,7 +405,7 @@ def test_the_result_says_what_was_measured_under_load() -> None:
     mode = LoadedRow("frequency_Hz", member, 220.0, 1e3, 80.0, 0.5, {"none": 0.02, "e1": 0.0})
     lost = LoadedRow("contact_area_m2", None, 240.0, 2e3, 0.02, 1e-4, {"none": 0.5})
     rows = (area, mode, lost)
-    told = result(d, UnderLoad(rows, ("none", "e1"), ("e1, 240 kPa: no",)))
+    told = diagnosis_result(d, UnderLoad(rows, ("none", "e1"), ("e1, 240 kPa: no",))).content()
     assert list(told["gap"]["by_load"].items()) == [
         ("1000", pytest.approx(2.0)),
         ("3000", pytest.approx(3.0)),
@@ -426,18 +426,18 @@ def test_the_result_says_what_was_measured_under_load() -> None:
             own.value,
             own.sigma,
         ]
-    alone = result(d, UnderLoad(rows[2:], ("none",), ()))["under_load"]
+    alone = diagnosis_result(d, UnderLoad(rows[2:], ("none",), ())).content()["under_load"]
     assert alone["effect"] is None and alone["effect_rms_percent"] is None
     assert alone["rows"][0]["effect_percent"] is None
     assert alone["calibrated_rms_percent"] == pytest.approx(50.0)
-    plain = result(d)
+    plain = diagnosis_result(d).content()
     assert plain["under_load"] is None and plain["gap"]["by_load"] == {}
 
 
 def test_the_result_is_plain_data_with_the_promised_keys() -> None:
     import json
 
-    told = result(diagnosed(Toy(effects=3), {}, 7))
+    told = diagnosis_result(diagnosed(Toy(effects=3), {}, 7)).content()
     json.dumps(told, allow_nan=False)
     assert {
         "verdict",

@@ -18,7 +18,7 @@ from tyrecal.studies.diagnose.expansion import expand
 from tyrecal.studies.diagnose.inverse_problem import InverseProblem, Toggle
 from tyrecal.studies.diagnose.model import Answer, Query
 from tyrecal.studies.diagnose.observations import Observable, Observations
-from tyrecal.studies.diagnose.result import result
+from tyrecal.studies.diagnose.result import diagnosis_result
 from tyrecal.studies.diagnose.study import spans_of, study
 from tyrecal.studies.diagnose.tyre_model import TyreModel
 from tyrecal.studies.diagnose.uncertainties import sources
@@ -96,7 +96,9 @@ def test_a_part_of_an_effect_in_the_case_leaves_the_rest_to_be_found(tmp_path: P
     sizes = [each.diagnosis.parameter("bead_filler") for each in (none, some)]
     assert sizes[1]["low"] < truth < sizes[1]["high"]
     assert sizes[1]["value"] == pytest.approx(sizes[0]["value"], rel=0.1)
-    seen = [result(each.diagnosis)["smallest_visible"]["bead_filler"] for each in (none, some)]
+    seen = [
+        diagnosis_result(each.diagnosis).smallest_visible["bead_filler"] for each in (none, some)
+    ]
     assert abs(seen[1]) == pytest.approx(seen[0], rel=0.8)  # nearest to the case, up or down
     words = page(some, "tyre", "a.csv")
     assert "counting the 0.9 that the case has already" in words

@@ -27,7 +27,7 @@ from tyrecal.studies.diagnose.inverse_problem import Assumed, InverseProblem, To
 from tyrecal.studies.diagnose.model import Answer, Query
 from tyrecal.studies.diagnose.observations import Observable, Observations, observe
 from tyrecal.studies.diagnose.regions import regions
-from tyrecal.studies.diagnose.result import result
+from tyrecal.studies.diagnose.result import diagnosis_result
 from tyrecal.studies.diagnose.separability import separate
 from tyrecal.studies.diagnose.study import _check_units, parse_change, spans_of, study
 from tyrecal.studies.diagnose.tyre_model import TyreModel, _key
@@ -187,7 +187,7 @@ def test_an_effect_in_the_models_own_data_is_named_with_its_size(tmp_path: Path)
     assert d.verdict.kind == "named" and d.verdict.key == "bead_filler"
     size = d.parameter("bead_filler")
     assert size["low"] < truth < size["high"]
-    told = result(d)
+    told = diagnosis_result(d).content()
     assert told["effect"] == "bead_filler" and told["rung"] in (1, 2)
     assert told["shrinkage"]["fraction"] > 0.3 and told["section_map"]  # unless it is left out
     assert sum(told["probabilities"].values()) == pytest.approx(1, abs=1e-4)

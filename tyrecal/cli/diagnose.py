@@ -106,7 +106,7 @@ def command(
     from ..report.shape_data import parts_data
     from ..studies.diagnose.diagnosis import STAGES
     from ..studies.diagnose.inverse_problem import Assumed
-    from ..studies.diagnose.result import result
+    from ..studies.diagnose.result import diagnosis_result
     from ..studies.diagnose.study import parse_change
     from ..studies.diagnose.study import study as diagnosed
     from ..tyre.effects import catalogue
@@ -151,10 +151,8 @@ def command(
             considered,
             stage=bar.begin,
         )
-    told = result(found.diagnosis, found.under_load, found.variables)
-    told = run.write_json("diagnosis.json", told)
-    named = [part["region"] for part in told["section_map"]]
-    parts = parts_data(loaded, named)
+    told = run.write(diagnosis_result(found.diagnosis, found.under_load, found.variables))
+    parts = parts_data(loaded, [part.region for part in told.section_map])
     run.write_json("diagnosis_section.json", parts)
     words = page(found, loaded.case.name, measured.name)
     run.write_text("diagnosis.md", words)
@@ -165,7 +163,7 @@ def command(
         for name, figure in draw_diagnosis(found.diagnosis, parts).items():
             save(figure, run.new / f"diagnosis_{name}.png")
     run.finish()
-    terminal.result(told)
+    terminal.result(told.content())
     terminal.say(words)
     study.finish(run)
     return 0

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TypeVar
 
-from ...studies.diagnose.summary import DiagnosisResult
+from ...studies.diagnose.result import DiagnosisResult
 from ...studies.fit.result import ROAD_QUANTITIES, FitResult, FittedMode
 from ..table import CLOSE, FAR, MINUS
 from .results import Results

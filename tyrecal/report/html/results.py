@@ -14,7 +14,7 @@ from pydantic import ValidationError
 from ...errors import InputError
 from ...files import NotAFile, read_runs, read_text
 from ...studies import result_types
-from ...studies.diagnose.summary import DiagnosisResult
+from ...studies.diagnose.result import DiagnosisResult
 from ...studies.effects import Effects
 from ...studies.fit.result import FitResult
 from ...studies.result import Provenance, Result, ResultPart

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from ...studies.diagnose.summary import DiagnosisResult
+from ...studies.diagnose.result import DiagnosisResult
 from ...studies.effects import EffectResult, Effects
 from ...studies.fit.result import FitResult
 from ...studies.modes import ModesResult

@@ -25,7 +25,7 @@ from ..diagnose.evidence import NONE
 from ..diagnose.inverse_problem import Assumed
 from ..diagnose.model import ModelRow, ResponseModel
 from ..diagnose.observations import observe
-from ..diagnose.result import result
+from ..diagnose.result import diagnosis_result
 from ..diagnose.study import spans_of
 from ..diagnose.tyre_model import TyreModel
 from ..diagnose.uncertainties import sources
@@ -90,7 +90,7 @@ def one_answer(
     """The diagnosis of one file of measurements, and what it predicts at the held-out pressure."""
     observations = observe(read_measurements(trial), split=protocol.split)
     found = diagnose(model, rows, observations, assumed=Assumed(split=protocol.split))
-    told = result(found)
+    told = diagnosis_result(found).content()
     told.pop("next_measurements"), told.pop("section_map")
     key = told["effect"] or told["likeliest"]
     return {

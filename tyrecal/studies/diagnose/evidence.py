@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -21,7 +21,8 @@ from .expansion import Nodes
 from .inverse_problem import InverseProblem
 
 Array = np.ndarray
-NONE, OUTSIDE = "none", "outside"
+NONE: Final = "none"
+OUTSIDE: Final = "outside"
 PRIOR_NONE, PRIOR_OUTSIDE, PRIOR_PAIRS = 0.25, 0.10, 0.03  # the singles share the rest
 RULE_POINTS = {1: 25, 2: 15}  # of the rule in each parameter, by how many effects there are
 SHARP_FALL = 2.0  # of ln Z from the best point to its neighbours, which asks for more points

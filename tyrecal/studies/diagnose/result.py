@@ -1,171 +1,288 @@
-"""The diagnosis as the content of diagnosis.json."""
+"""diagnosis.json: numbers in the units of their names, None where there is none.
+
+What a page does not ask for may be missing from a file that an earlier version wrote.
+"""
 
 from __future__ import annotations
 
-from typing import Any
+import re
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from pydantic import Field
 
-from .diagnosis import Diagnosis
-from .evidence import NONE
+from ...simulate.modes.label import Label
+from ..result import Result, ResultPart
+from .evidence import NONE, OUTSIDE
 from .gap import projection
-from .under_load import UnderLoad
+from .observations import Observable
+from .shrinkage import Shrinkage
+from .verdict import VerdictKind
+from .where import PartChange
+
+if TYPE_CHECKING:
+    from .diagnosis import Diagnosis
+    from .under_load import UnderLoad
+
+ROW_PATTERN = re.compile(r"\[(\d{1,3}),(\d{1,3})\](?: (axial|torsional))? at ([\d.]{1,9}) kPa")
+LEAST_PROBABILITY = 1e-6  # of an effect that is listed
 
 
-def result(
+class EffectSize(ResultPart):
+    """Mean and 90 % interval of an effect's size, what the case has of it counted in."""
+
+    value: float
+    low: float
+    high: float
+    unit: str
+
+
+class Explained(ResultPart):
+    """The size of the effect that a diagnosis names or likes best."""
+
+    effect: str
+    value: float
+    low: float
+    high: float
+    unit: str
+    detectability: float = Field(default=0.0, alias="lambda")
+
+
+class Residual(ResultPart):
+    """A measurement over the calibrated model."""
+
+    row: str
+    run: int
+    percent: float
+    sigma_percent: float
+
+    @property
+    def of(self) -> Observable | None:
+        """What was measured, where it is a frequency."""
+        found = ROW_PATTERN.fullmatch(self.row)
+        if not found:
+            return None
+        c, m, kind, pressure = found.groups()
+        return Observable("frequency", Label(int(c), int(m), kind), float(pressure), self.run)
+
+
+class GroupTest(ResultPart):
+    """Whether a group of modes is off by more than chance."""
+
+    kind: str
+    name: str
+    p_value: float
+    holm: float  # corrected for the number of groups
+
+
+class ContrastPart(ResultPart):
+    """A combination of residuals."""
+
+    name: str
+    percent: float
+    sigma_percent: float
+
+
+class GapPart(ResultPart):
+    """What calibration leaves; rms in per cent by group."""
+
+    p_value: float
+    chi2: float
+    freedom: int
+    rms_percent: float
+    by_family: dict[str, float] = Field(default={})
+    by_harmonic: dict[str, float] = Field(default={})
+    by_pressure: dict[str, float] = Field(default={})
+    by_load: dict[str, float] = Field(default={})
+    groups: list[GroupTest] = Field(default=[])
+    contrasts: list[ContrastPart] = Field(default=[])
+    residuals: list[Residual]
+
+
+class LoadedPart(ResultPart):
+    """Something measured on the road, and how far the tyres are off."""
+
+    quantity: str
+    mode: str | None
+    pressure_kPa: float
+    load_N: float
+    measured: float
+    sigma: float
+    calibrated_percent: float | None
+    effect_percent: float | None
+
+
+class UnderLoadPart(ResultPart):
+    """The calibrated tyre on the road, and the one with the effect, neither fitted there."""
+
+    effect: str | None
+    rows: list[LoadedPart]
+    calibrated_rms_percent: float | None
+    effect_rms_percent: float | None
+    failed: list[str]
+
+
+class NextMeasurement(ResultPart):
+    """Something worth to be measured."""
+
+    what: str
+    gain: float  # per hour
+    hours: float
+
+
+class DiagnosisResult(Result):
+    """diagnosis.json"""
+
+    study, stem, heading = "diagnose", "diagnosis", "Diagnosis"
+
+    verdict: VerdictKind
+    words: str
+    effect: str | None
+    parameter: Explained | None
+    parameters: dict[str, EffectSize] = Field(default={})  # of every effect of a pair
+    likeliest: str | None = None
+    calibrated: dict[str, Any] | None = None  # see `calibrated_variables`
+    probabilities: dict[str, float]
+    candidate_set: list[str]
+    fit_p_value: float | None = None
+    groups: list[list[str]]
+    detectability: dict[str, float]  # lambda at the sizes in ``judged_at``
+    judged_at: dict[str, float] = Field(default={})
+    full_size: dict[str, float | None] = Field(default={})  # lambda at the range's far end
+    # least change from the case with lambda = 10
+    smallest_visible: dict[str, float | None] = Field(default={})
+    gap: GapPart
+    under_load: UnderLoadPart | None = None
+    section_map: list[PartChange]
+    effective_rank: int
+    shrinkage: Shrinkage | None
+    rung: int
+    absorbed: dict[str, float] = Field(default={})
+    # of each variable where an effect has its full size and is ignored
+    bias_percent: dict[str, dict[str, float]] = Field(default={})
+    next_measurements: list[NextMeasurement]
+    exchanged_labels: list[str] = Field(default=[])
+    left_out: list[str] = Field(default=[])
+    not_evaluated: dict[str, str] = Field(default={})
+
+
+def diagnosis_result(
     diagnosis: Diagnosis,
     under_load: UnderLoad | None = None,
     calibrated: dict[str, Any] | None = None,
-) -> dict[str, Any]:
-    """Plain data; numbers in the units of their names, None where there is none.
+) -> DiagnosisResult:
+    """What was found. ``calibrated``: see `calibrated_variables`."""
+    d, shown = diagnosis, diagnosis.verdict.key or diagnosis.best
+    found = DiagnosisResult(
+        format=1,
+        verdict=d.verdict.kind,
+        words=d.verdict.words,
+        effect=d.verdict.key,
+        parameter=_explained(d, shown),
+        parameters={
+            id: EffectSize(**d.parameter(key, id))
+            for key in [shown]
+            if key
+            for id in key.split("+")
+        },
+        likeliest=d.best,
+        probabilities=_listed(d.probabilities),
+        candidate_set=list(d.verdict.candidates),
+        fit_p_value=d.verdict.check,
+        groups=d.separability.groups(),
+        detectability=dict(d.separability.lambdas),
+        judged_at={id: d.problem.spans[id].base + e for id, e in d.separability.sizes.items()},
+        full_size=dict(d.separability.full),
+        smallest_visible=dict(d.separability.smallest),
+        gap=_gap(d, under_load),
+        under_load=_under_load(under_load),
+        section_map=list(d.parts),
+        effective_rank=d.effective_rank,
+        shrinkage=d.shrinkage,
+        rung=d.rung,
+        absorbed=dict(d.gap.absorbed),
+        bias_percent={name: dict(by_effect) for name, by_effect in d.gap.bias_percent.items()},
+        next_measurements=[
+            NextMeasurement(what=c.what, gain=c.gain, hours=c.hours) for c in d.choices
+        ],
+        exchanged_labels=[str(label) for label in d.exchanged or ()],
+        left_out=list(d.problem.observations.left_out),
+        not_evaluated=dict(d.problem.expansion.failed),
+    )
+    return found.model_copy(update={"calibrated": calibrated}) if calibrated else found
 
-    ``detectability`` is lambda at the sizes in ``judged_at``; ``full_size`` at the far end of each
-    range; ``smallest_visible``: the least change from the case with lambda = 10. ``bias_percent``:
-    the effect at full size and ignored. ``parameters``: of every effect of a pair. Sizes count in
-    what the case has of an effect. ``calibrated``: see `calibrated_variables`.
-    """
-    d, gap, s = diagnosis, diagnosis.gap, diagnosis.shrinkage
-    best = d.best
-    named = d.verdict.key
+
+def _gap(diagnosis: Diagnosis, under_load: UnderLoad | None) -> GapPart:
+    gap, rows = diagnosis.gap, diagnosis.problem.observations.rows
     by = {
         kind: {g.name: g.rms_percent for g in gap.groups if g.kind == kind}
         for kind in ("family", "harmonic", "pressure")
     }
-    return {
-        "format": 1,
-        "verdict": d.verdict.kind,
-        "words": d.verdict.words,
-        "effect": named,
-        "parameter": _parameter(d, named or best),
-        "parameters": {
-            id: d.parameter(key, id) for key in [named or best] if key for id in key.split("+")
-        },
-        "likeliest": best,
-        **({"calibrated": calibrated} if calibrated else {}),
-        "probabilities": _sorted(d.probabilities),
-        "candidate_set": list(d.verdict.candidates),
-        "fit_p_value": d.verdict.check,
-        "groups": d.separability.groups(),
-        "detectability": dict(d.separability.lambdas),
-        "judged_at": {id: d.problem.spans[id].base + e for id, e in d.separability.sizes.items()},
-        "full_size": dict(d.separability.full),
-        "smallest_visible": dict(d.separability.smallest),
-        "gap": {
-            "p_value": gap.p_value,
-            "chi2": gap.chi2,
-            "freedom": gap.freedom,
-            "rms_percent": gap.rms_percent,
-            "by_family": by["family"],
-            "by_harmonic": by["harmonic"],
-            "by_pressure": by["pressure"],
-            "by_load": _by_load(under_load),
-            "groups": [
-                {"kind": g.kind, "name": g.name, "p_value": g.p_value, "holm": g.corrected}
-                for g in gap.groups
-            ],
-            "contrasts": [
-                {"name": c.name, "percent": c.percent, "sigma_percent": c.sigma_percent}
-                for c in gap.contrasts
-            ],
-            "residuals": [
-                {"row": str(row), "run": row.run, "percent": 100 * r, "sigma_percent": 100 * sd}
-                for row, r, sd in zip(
-                    d.problem.observations.rows,
-                    gap.residuals.tolist(),
-                    gap.spread.tolist(),
-                    strict=True,
-                )
-            ],
-        },
-        "under_load": _under_load(under_load),
-        "section_map": [
-            {
-                "region": p.region,
-                "stiffness_percent": p.stiffness_percent,
-                "stiffness_sigma": p.stiffness_sigma,
-                "mass_percent": p.mass_percent,
-                "mass_sigma": p.mass_sigma,
-                "evidence": p.evidence,
-                "same_as": list(p.same_as),
-            }
-            for p in d.parts
+    loads = sorted({row.load_N for row in under_load.rows}) if under_load else []
+    rms = {load: under_load.rms_percent(NONE, load) for load in loads} if under_load else {}
+    return GapPart(
+        p_value=gap.p_value,
+        chi2=gap.chi2,
+        freedom=gap.freedom,
+        rms_percent=gap.rms_percent,
+        by_family=by["family"],
+        by_harmonic=by["harmonic"],
+        by_pressure=by["pressure"],
+        by_load={f"{load:g}": value for load, value in rms.items() if value is not None},
+        groups=[
+            GroupTest(kind=g.kind, name=g.name, p_value=g.p_value, holm=g.corrected)
+            for g in gap.groups
         ],
-        "effective_rank": d.effective_rank,
-        "shrinkage": None
-        if s is None
-        else {
-            "held_out": s.held_out,
-            "effect": s.effect,
-            "before_percent": s.before_percent,
-            "after_percent": s.after_percent,
-            "fraction": s.fraction,
-            "low": s.low,
-            "high": s.high,
-            "placebo_95": s.placebo_95,
-            "floor_percent": s.floor_percent,
-            "before_sigma": s.before_sigma,
-            "after_sigma": s.after_sigma,
-            "least_squares_before_percent": s.least_squares_before_percent,
-            "least_squares_after_percent": s.least_squares_after_percent,
-        },
-        "rung": d.rung,
-        "absorbed": dict(gap.absorbed),
-        "bias_percent": {name: dict(by_effect) for name, by_effect in gap.bias_percent.items()},
-        "next_measurements": [
-            {"what": c.what, "gain": c.gain, "hours": c.hours} for c in d.choices
+        contrasts=[
+            ContrastPart(name=c.name, percent=c.percent, sigma_percent=c.sigma_percent)
+            for c in gap.contrasts
         ],
-        "exchanged_labels": [str(label) for label in d.exchanged or ()],
-        "left_out": list(d.problem.observations.left_out),
-        "not_evaluated": dict(d.problem.expansion.failed),
-    }
+        residuals=[
+            Residual(row=str(row), run=row.run, percent=100 * r, sigma_percent=100 * sd)
+            for row, r, sd in zip(rows, gap.residuals.tolist(), gap.spread.tolist(), strict=True)
+        ],
+    )
 
 
-def _by_load(found: UnderLoad | None) -> dict[str, float]:
-    """rms of the calibrated tyre's deviations, per cent, by load in N."""
-    if found is None:
-        return {}
-    rms = {row.load_N: found.rms_percent(NONE, row.load_N) for row in found.rows}
-    return {f"{load:g}": value for load, value in sorted(rms.items()) if value is not None}
-
-
-def _under_load(found: UnderLoad | None) -> dict[str, Any] | None:
+def _under_load(found: UnderLoad | None) -> UnderLoadPart | None:
     if found is None:
         return None
     effect = found.tyres[1] if len(found.tyres) > 1 else None
-    off = lambda row, tyre: 100 * row.off[tyre] if tyre in row.off else None
-    return {
-        "effect": effect,
-        "rows": [
-            {
-                "quantity": row.quantity,
-                "mode": str(row.member) if row.member else None,
-                "pressure_kPa": row.pressure_kPa,
-                "load_N": row.load_N,
-                "measured": row.value,
-                "sigma": row.sigma,
-                "calibrated_percent": off(row, NONE),
-                "effect_percent": off(row, effect),
-            }
+    return UnderLoadPart(
+        effect=effect,
+        rows=[
+            LoadedPart(
+                quantity=row.quantity,
+                mode=str(row.member) if row.member else None,
+                pressure_kPa=row.pressure_kPa,
+                load_N=row.load_N,
+                measured=row.value,
+                sigma=row.sigma,
+                calibrated_percent=100 * row.off[NONE] if NONE in row.off else None,
+                effect_percent=100 * row.off[effect] if effect and effect in row.off else None,
+            )
             for row in found.rows
         ],
-        "calibrated_rms_percent": found.rms_percent(NONE),
-        "effect_rms_percent": found.rms_percent(effect) if effect else None,
-        "failed": list(found.failed),
-    }
+        calibrated_rms_percent=found.rms_percent(NONE),
+        effect_rms_percent=found.rms_percent(effect) if effect else None,
+        failed=list(found.failed),
+    )
 
 
-def _parameter(diagnosis: Diagnosis, key: str | None) -> dict[str, Any] | None:
+def _explained(diagnosis: Diagnosis, key: str | None) -> Explained | None:
+    """``detectability``: lambda of all that ``key`` names, at its likeliest size."""
     if key is None:
         return None
-    own = diagnosis.parameter(key)
     hypothesis = diagnosis.hypothesis(key)
     effects = {id: np.array([e]) for id, e in hypothesis.mean().items()}
     shift = diagnosis.bare.added(effects, 1)[0][0] - diagnosis.bare.added({}, 1)[0][0]
     P, _, _ = projection(diagnosis.bare, hypothesis.fitted.d[hypothesis.best])
-    return {"effect": key.split("+")[0], **own, "lambda": float(shift @ P @ shift)}
+    size = {**diagnosis.parameter(key), "lambda": float(shift @ P @ shift)}
+    return Explained(effect=key.split("+")[0], **size)
 
 
-def _sorted(probabilities: Any) -> dict[str, float]:
-    """Likeliest first; none and outside always, others that hold a millionth."""
+def _listed(probabilities: Mapping[str, float]) -> dict[str, float]:
+    """Likeliest first; none and outside always."""
     order = sorted(probabilities.items(), key=lambda item: -item[1])
-    return {key: p for key, p in order if p > 1e-6 or key in ("none", "outside")}
+    return {key: p for key, p in order if p > LEAST_PROBABILITY or key in (NONE, OUTSIDE)}

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Final, Literal
 
 import numpy as np
 
 from .evidence import NONE, OUTSIDE, PRIOR_NONE, Hypothesis
 from .gap import chi2_tail
 
-NAMED, UNDECIDED, NO_GAP = "named", "undecided", "no_gap"
+VerdictKind = Literal["named", "undecided", "no_gap", "outside"]
+NAMED: Final = "named"
+UNDECIDED: Final = "undecided"
+NO_GAP: Final = "no_gap"
 SURE, RULED_OUT, CHECK, SET = 0.7, 0.05, 0.01, 0.9
 
 
@@ -18,7 +22,7 @@ SURE, RULED_OUT, CHECK, SET = 0.7, 0.05, 0.01, 0.9
 class Verdict:
     """What may be said."""
 
-    kind: str  # named, undecided, no_gap or outside
+    kind: VerdictKind
     key: str | None  # of what is named, an id or "id1+id2"
     candidates: tuple[str, ...]  # keys that hold 90 % of the probability together
     check: float  # p-value of the likeliest effect's own fit
@@ -42,7 +46,7 @@ def decide(
     best = effects[0] if effects else None
     check = _check(by_key[best], rows, variables) if best else 1.0
 
-    def verdict(kind: str, words: str) -> Verdict:
+    def verdict(kind: VerdictKind, words: str) -> Verdict:
         return Verdict(kind, best if kind == NAMED else None, tuple(candidates), check, words)
 
     if rows <= variables:
