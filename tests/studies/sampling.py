@@ -9,7 +9,7 @@ evaluations; fresh designs are drawn, evaluated without slopes and compared, mod
 
 coverage: designs are drawn within a box of +-0.7, which is also what is known of them beforehand;
 their frequencies at 240 kPa are moved by a draw of all that may be off (sigma 0.3 % each, form,
-constants) and sampled by 20 000 draws. Told is how often the 90 % intervals hold the design's own
+constants) and sampled by 100 000 draws. Told is how often the 90 % intervals hold the design's own
 variables, and the frequencies that were not measured, at 192, 240 and 288 kPa. Where all is right,
 each is binomial: 360 of 400 with a standard deviation of 6.
 
@@ -119,7 +119,7 @@ def coverage(count: int, seed: int) -> None:
         off = common @ random.normal(size=len(rows))
         y = density.ln_f(truth, at)[0] + off[:n] + RELATIVE_SIGMA * random.normal(size=n)
         here = replace(density, y=y)
-        sample = drawn(here, box(0.7), 20_000, i)
+        sample = drawn(here, box(0.7), 100_000, i)
         low, high = np.quantile(sample.chains.flat, [0.05, 0.95], axis=0)
         held += (low <= truth[0]) & (truth[0] <= high)
         linear += abs(truth[0] - sample.optima[0]) <= 1.645 * np.sqrt(np.diag(sample.covariance))

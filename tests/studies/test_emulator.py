@@ -49,11 +49,15 @@ def made(tyre: Any, reach: float = 0.3, count: int = 30) -> Emulator:
     return emulator(tyre, VARIABLES, box(reach), LABELS, count)
 
 
-def polynomial(degrees: Array, a: Array, t: Array) -> list[Evaluated]:
-    """Evaluated designs whose ln f are polynomials."""
-    rise = np.stack([products(degrees, t, j) @ a for j in range(t.shape[1])], 2)
+def polynomial(degrees: Array, a: Array, t: Array, centre: Array, half: Array) -> list[Evaluated]:
+    """Evaluated designs whose ln f are polynomials of t."""
+    rise = np.stack([products(degrees, t, j) @ a for j in range(t.shape[1])], 2) / half
     value = products(degrees, t) @ a
-    return [Evaluated(*each, 0.0) for each in zip(t, value, rise, strict=True)]
+    named = lambda each: dict(zip(MODES, each, strict=True))
+    return [
+        Evaluated(x, named(y), named(slope), 0.0)
+        for x, y, slope in zip(centre + half * t, value, rise, strict=True)
+    ]
 
 
 @pytest.mark.parametrize(("v", "degree", "count"), [(1, 5, 4), (2, 4, 7), (3, 4, 12), (4, 3, 10)])
@@ -65,14 +69,15 @@ def test_polynomials_are_found_from_fewer_designs_than_terms(
     a = random.normal(size=(len(degrees), 2))
     assert count < len(degrees) == comb(v + degree, v) <= count * (1 + v)
     centre, half = random.normal(size=v), random.uniform(0.1, 1.0, v)
-    found = fitted((), MODES, centre, half, polynomial(degrees, a, spread(count, v)))
+    samples = lambda count: polynomial(degrees, a, spread(count, v), centre, half)
+    found = fitted((), MODES, centre, half, samples(count))
     t = random.uniform(-1, 1, (50, v))
     x = centre + half * t
     assert np.allclose(found.ln_f(x), products(degrees, t) @ a, rtol=0, atol=1e-9)
     rise = np.stack([products(degrees, t, j) @ a for j in range(v)], 2) / half
     assert np.allclose(found.slopes(x), rise, rtol=0, atol=1e-7)
     assert found.evaluations == count and not found.failed
-    surer = fitted((), MODES, centre, half, polynomial(degrees, a, spread(3 * count, v)))
+    surer = fitted((), MODES, centre, half, samples(3 * count))
     assert surer.stated_error < 1e-9
 
 
@@ -223,6 +228,55 @@ def test_designs_that_fail_are_left_out_and_all_of_them_are_told() -> None:
     assert found.evaluations == 20 - found.failed and found.stated_error < 1e-9
     with pytest.raises(EvaluationFailed, match="inflation stopped"):
         made(evaluator(fails=lambda values: True), 0.3, 20)
+
+
+class Counted(FakeEvaluator):
+    """Notes what is asked."""
+
+    def evaluate(self, question: Question) -> Evaluation:
+        self.asked.append([float(np.log(question.values[name])) for name in START])
+        return super().evaluate(question)
+
+
+def test_a_larger_box_asks_for_what_is_new_in_it() -> None:
+    """Designs of the smaller one stand for as many as would lie there, failed ones, too; more
+    designs of the same box are the further ones of the same sequence."""
+    plain, belt = evaluator(), START["A_belt"]
+    tyre = Counted(plain.base, plain.powers, START, fails=lambda v: v["A_belt"] < 0.8 * belt)
+    tyre.asked = []
+    whole = box(0.3)
+    first = emulator(tyre, VARIABLES, whole, LABELS, 20)
+    assert len(tyre.asked) == 20 and first.failed > 0
+    larger = whole + np.array([[0.0, 0.0], [0.0, 0.3], [-0.1, 0.0]])
+    grown = emulator(tyre, VARIABLES, larger, LABELS, 20, before=first)
+    t = spread(20, 3)
+    x = larger.mean(1) + np.ptp(larger, axis=1) / 2 * t
+    outside = ((x < whole[:, 0]) | (x > whole[:, 1])).any(1)
+    assert 5 < outside.sum() < 15 and np.allclose(tyre.asked[20:], x[outside])
+    assert grown.evaluations + grown.failed == len(tyre.asked)
+    assert grown.designs[: first.evaluations] == first.designs and grown.stated_error < 1e-9
+    assert np.allclose(grown.ln_f(x), [exact(plain, each) for each in x], rtol=0, atol=1e-9)
+    same = emulator(tyre, VARIABLES, larger, LABELS, 20, before=grown)
+    asked = len(tyre.asked)
+    assert same.designs == grown.designs and asked == 20 + outside.sum()
+    emulator(tyre, VARIABLES, larger, LABELS, asked + 3, before=grown)
+    further = larger.mean(1) + np.ptp(larger, axis=1) / 2 * spread(asked + 3, 3)[asked:]
+    assert np.allclose(tyre.asked[asked:], further)
+
+
+def test_where_the_last_variables_are_known_fewer_are_left() -> None:
+    """The same frequencies and slopes by those that are left."""
+    found, random = made(meeting()), generator("restricted")
+    last = box(0.3)[1:].mean(1) + np.array([0.1, -0.2])
+    fewer = found.restricted(last)
+    low, high = box(0.28)[0]
+    x = random.uniform(low, high, (20, 1))
+    whole = np.hstack([x, np.tile(last, (20, 1))])
+    assert np.allclose(fewer.ln_f(x), found.ln_f(whole), rtol=0, atol=1e-12)
+    assert np.allclose(fewer.slopes(x), found.slopes(whole)[:, :, :1], rtol=0, atol=1e-10)
+    assert len(fewer.degrees) == found.degrees.max() + 1 and len(fewer.box) == 1
+    nothing = found.restricted(np.zeros(0))
+    assert np.allclose(nothing.ln_f(whole), found.ln_f(whole), rtol=0, atol=1e-12)
 
 
 def test_solvers_without_slopes_and_too_few_evaluations_are_refused() -> None:

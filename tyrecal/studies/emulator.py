@@ -26,8 +26,9 @@ The degree D is that of the least such error; stated is a bound that 99 % of des
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations_with_replacement
+from math import log
 
 import numpy as np
 from numpy.polynomial import legendre
@@ -36,7 +37,7 @@ from ..errors import InputError
 from ..simulate.evaluate.evaluator import Evaluator, Question
 from ..simulate.evaluate.failure import DeckRefused, EvaluationFailed
 from ..simulate.modes.find import Found, find_modes
-from ..simulate.modes.label import Label, labelled
+from ..simulate.modes.label import Label
 from .fit.crossing import AXIAL, TORSIONAL
 from .fit.variable import DesignVariable
 
@@ -52,12 +53,12 @@ SHARE_Z, SURE_Z = 2.326, 1.645  # normal quantiles of 99 and 95 %
 
 @dataclass(frozen=True)
 class Evaluated:
-    """An evaluated design: t (v,); of each label ln f (n,) and d ln f / d t (n, v); d, see above,
-    0 where the two [0, 0] modes are not both wanted."""
+    """An evaluated design: x (v,); of each of its labels ln f, and d ln f / d x (v,); d, see above,
+    0 where the two [0, 0] modes are not both there."""
 
-    t: Array
-    value: Array
-    slope: Array
+    x: Array
+    ln_f: Mapping[Label, float]
+    slopes: Mapping[Label, Array]
     apart: float
 
 
@@ -65,8 +66,9 @@ class Evaluated:
 class Emulator:
     """Frequencies of ``labels`` for any design in the box, by what `fitted` found.
 
-    degrees (k, v) of the products; coefficients (k, n + 1), the last of d; errors, relative: the
-    median of all; of each label (n,) what 99 % of designs keep; what they keep in all labels.
+    degrees (k, v) of the products; coefficients (k, n + 1), the last of d; designs: what it is made
+    of; errors, relative: the median of all; of each label (n,) what 99 % of designs keep; what they
+    keep in all labels.
     """
 
     variables: tuple[DesignVariable, ...]
@@ -75,7 +77,7 @@ class Emulator:
     half: Array
     degrees: Array
     coefficients: Array
-    evaluations: int
+    designs: tuple[Evaluated, ...]
     failed: int  # designs of the box that could not be evaluated
     median_error: float
     stated_errors: Array
@@ -101,9 +103,31 @@ class Emulator:
         return dict(zip(self.labels, hertz.tolist(), strict=True))
 
     @property
+    def evaluations(self) -> int:
+        """Of designs that could be evaluated."""
+        return len(self.designs)
+
+    @property
     def box(self) -> Array:
         """Ends (v, 2) of the box in x."""
         return np.stack([self.centre - self.half, self.centre + self.half], 1)
+
+    def restricted(self, last: Array) -> Emulator:
+        """Of the first variables alone, the coordinates x of the others being ``last`` (s,)."""
+        v = len(self.half) - len(last)
+        t = (last - self.centre[v:]) / self.half[v:]
+        degrees, place = np.unique(self.degrees[:, :v], axis=0, return_inverse=True)
+        coefficients = np.zeros((len(degrees), self.coefficients.shape[1]))
+        factors = products(self.degrees[:, v:], t[None]).T
+        np.add.at(coefficients, place.ravel(), factors * self.coefficients)
+        return replace(
+            self,
+            variables=self.variables[:v],
+            centre=self.centre[:v],
+            half=self.half[:v],
+            degrees=degrees,
+            coefficients=coefficients,
+        )
 
     def ln_f(self, x: Array) -> Array:
         """ln f (p, n) at designs x (p, v), whether they are in the box or not."""
@@ -134,10 +158,12 @@ def emulator(
     wanted: Sequence[Label],
     count: int,
     jobs: int = 1,
+    before: Emulator | None = None,
 ) -> Emulator:
     """Ask for ``count`` designs of a box (v, 2) of x, all at once, and fit their frequencies.
 
-    wanted: labels that every design must have; others with m <= 1 are taken where all have them.
+    wanted: labels that every design must have; others with m <= 1 are taken where all have them;
+    before: of the same box or a part of it; its designs stand for as many as would lie there.
     Raises InputError where the solver has no slopes, or of too small a count; EvaluationFailed
     where too few designs could be evaluated; DeckRefused.
     """
@@ -146,38 +172,42 @@ def emulator(
         raise InputError(f"an emulator needs {LEAST_DESIGNS} evaluations at least, got {count}")
     centre, half = np.mean(box, 1), np.ptp(box, axis=1) / 2
     names = tuple(v.name for v in variables)
-    t = spread(count, len(names))
+    x, samples, failed = centre + half * spread(count, len(names)), [], 0
+    if before:
+        samples, failed = list(before.designs), before.failed
+        there = ((before.box[:, 0] <= x) & (x <= before.box[:, 1])).all(1)
+        x = x[~there | (np.cumsum(there) > len(samples) + failed)]
     designs = [
-        {v.name: v.value(float(x)) for v, x in zip(variables, centre + half * each, strict=True)}
-        for each in t
+        {v.name: v.value(float(xi)) for v, xi in zip(variables, each, strict=True)} for each in x
     ]
     questions = [Question(design, names) for design in designs]
-    answers = dict(find_modes(evaluator, questions, wanted, jobs))
-    found: list[tuple[int, Found]] = []
+    answers = dict(find_modes(evaluator, questions, wanted, jobs)) if questions else {}
     for place, answer in sorted(answers.items()):
         if isinstance(answer, DeckRefused):
             raise answer
         if isinstance(answer, Found):
-            found.append((place, answer))
-    if len(found) < LEAST_DESIGNS:
+            samples.append(_evaluated(x[place], answer, variables))
+        else:
+            failed += 1
+    if len(samples) < LEAST_DESIGNS:
         raise next(a for a in answers.values() if isinstance(a, EvaluationFailed))
-    hertz = [{m.label: m for m in labelled(answer.evaluation)} for _, answer in found]
-    shared = set.intersection(*map(set, hertz))
+    shared = set.intersection(*(set(each.ln_f) for each in samples))
     more = {label for label in shared if label.m <= 1} - set(wanted)
     labels = [*wanted, *sorted(more, key=lambda x: (x.c, x.m, x.kind or ""))]
-    samples = []
-    for (place, answer), modes in zip(found, hertz, strict=True):
-        own, gradients = [modes[label] for label in labels], answer.evaluation.gradients
-        f = np.array([mode.frequency_Hz for mode in own])
-        per_t = [h * v.slope(designs[place][v.name]) for h, v in zip(half, variables, strict=True)]
-        rise = np.array([[gradients[n][mode.position] for n in names] for mode in own]) * per_t
-        apart = 0.0
-        if set(PAIR) <= set(labels):
-            axial, torsional = (modes[label] for label in PAIR)
-            clear = min(axial.clarity, torsional.clarity)
-            apart = float(np.log(axial.frequency_Hz / torsional.frequency_Hz)) * clear
-        samples.append(Evaluated(t[place], np.log(f), rise / f[:, None], apart))
-    return fitted(tuple(variables), labels, centre, half, samples, count - len(found))
+    return fitted(tuple(variables), labels, centre, half, samples, failed)
+
+
+def _evaluated(x: Array, answer: Found, variables: Sequence[DesignVariable]) -> Evaluated:
+    modes, gradients = {mode.label: mode for mode in answer.modes}, answer.evaluation.gradients
+    per_x = [v.slope(v.value(float(xi))) for v, xi in zip(variables, x, strict=True)]
+    by_name = np.array([gradients[v.name] for v in variables])  # (v, modes)
+    rise = {label: by_name[:, m.position] * per_x / m.frequency_Hz for label, m in modes.items()}
+    apart = 0.0
+    if set(PAIR) <= set(modes):
+        axial, torsional = (modes[label] for label in PAIR)
+        clear = min(axial.clarity, torsional.clarity)
+        apart = log(axial.frequency_Hz / torsional.frequency_Hz) * clear
+    return Evaluated(x, {label: log(m.frequency_Hz) for label, m in modes.items()}, rise, apart)
 
 
 def needs_slopes(evaluator: Evaluator) -> None:
@@ -198,10 +228,11 @@ def fitted(
     failed: int = 0,
 ) -> Emulator:
     """The polynomials of evaluated designs, and how far they are off those that are left out."""
-    t = np.array([each.t for each in samples])
-    value, slope = paired(labels, samples)
+    t = np.array([(each.x - centre) / half for each in samples])
+    own = np.array([[each.ln_f[label] for label in labels] for each in samples])
+    rise = np.array([[each.slopes[label] * half for label in labels] for each in samples])
+    value, slope = paired(labels, own, rise)
     apart = np.array([each.apart for each in samples])
-    own = np.array([each.value for each in samples])
     equations = np.concatenate([value, *np.moveaxis(slope, 2, 0)])
     best: Emulator | None = None
     for degree in DEGREES:
@@ -223,7 +254,7 @@ def fitted(
                 half,
                 degrees,
                 np.column_stack([coefficients, side]),
-                len(samples),
+                tuple(samples),
                 failed,
                 float(np.median(error)),
                 np.minimum([bound(each) for each in error.T], stated),
@@ -266,10 +297,10 @@ def places(labels: Sequence[Label]) -> tuple[int, int] | None:
     return labels.index(AXIAL), labels.index(TORSIONAL)
 
 
-def paired(labels: Sequence[Label], samples: Sequence[Evaluated]) -> tuple[Array, Array]:
-    """q (p, n) and d q / d t (p, n, v): m and s in the places of the two [0, 0] modes."""
-    q = np.array([each.value for each in samples])
-    slope = np.array([each.slope for each in samples])
+def paired(labels: Sequence[Label], ln_f: Array, slopes: Array) -> tuple[Array, Array]:
+    """q (p, n) and d q / d t (p, n, v) of ln f and its slopes: m and s in the places of the two
+    [0, 0] modes."""
+    q, slope = ln_f.copy(), slopes.copy()
     if (pair := places(labels)) is not None:
         a, b = pair
         gap, rise = q[:, a] - q[:, b], slope[:, a] - slope[:, b]
@@ -299,7 +330,7 @@ def up_to(count: int, degree: int) -> Array:
 
 def products(degrees: Array, t: Array, by: int = -1) -> Array:
     """P_k(t) (p, k) at t (p, v), or their slopes by one coordinate."""
-    highest = int(degrees.max())
+    highest = int(degrees.max(initial=0))
     table = legendre.legvander(t, highest)  # (p, v, degree + 1)
     if by >= 0:
         table[:, by] = legendre.legval(t[:, by], legendre.legder(np.eye(highest + 1))).T

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from math import ceil
 
 import numpy as np
 
 from ...simulate.evaluate.failure import EvaluationFailed
 from .chains import Chains, walk
-from .posterior import Posterior, optima
+from .posterior import Posterior
 
 Array = np.ndarray
 EDGE = 0.05  # of half a box: what lies there is at its edge
 AT_EDGE = 1e-3  # of the draws, that may
 GROWTH, GROWTHS = 0.25, 8  # of a box, at a side; times
-PROBE = 0.1  # of the draws, by which a box is tried
+PROBES = 10_000  # by which a box is tried
+PROBE_FREEDOM = 4  # of their distribution, whose tails are wider than the posterior's
 LIKELY = 10.0  # below the highest ln p: optima that walkers start from
 
 
@@ -40,15 +40,37 @@ class Drawn:
 
 def drawn(posterior: Posterior, bounds: Array, count: int, seed: int) -> Drawn:
     """About ``count`` draws from all likely optima on; bounds (v, 2) of x."""
-    best, height = optima(posterior)
-    half = np.ptp(posterior.box, axis=1) / 2
-    flat = np.diag(half**-2.0)  # what the data do not see is not wider than the box
-    covariance = np.linalg.inv(posterior.information(best[:1])[0] + 1e-12 * flat)
-    begin = np.linalg.inv(posterior.information(best[:1])[0] + flat)
-    chains = walk(posterior, best[height > height[0] - LIKELY], begin, count, seed)
+    best, height = posterior.optima
+    information, flat = posterior.information(best[:1])[0], _flat(posterior.box)
+    covariance = np.linalg.inv(information + 1e-12 * flat)
+    likely = best[height > height[0] - LIKELY]
+    chains = walk(posterior, likely, np.linalg.inv(information + flat), count, seed)
     edges = shares_at_edge(chains.flat, posterior.box, bounds)
     asked = posterior.emulator.evaluations + posterior.emulator.failed
     return Drawn(posterior, best, height, covariance, chains, edges, 1, asked, "")
+
+
+def _flat(box: Array) -> Array:
+    """Information (v, v) beside that of the data: what they do not see is not wider than a box."""
+    return np.diag((np.ptp(box, axis=1) / 2) ** -2.0)
+
+
+def probed(posterior: Posterior, bounds: Array, seed: int) -> Array:
+    """What `shares_at_edge` of the posterior's draws will be, by importance sampling: draws of
+    Student's t about the likely optima, each weighted by the posterior's density over theirs."""
+    best, height = posterior.optima
+    best = best[height > height[0] - LIKELY]
+    size, count = best.shape[1], -(-PROBES // len(best))
+    random = np.random.default_rng([seed, 2])
+    roots = np.linalg.cholesky(posterior.information(best) + _flat(posterior.box))  # (o, v, v)
+    z = random.normal(size=(len(best), count, size))
+    z /= np.sqrt(random.chisquare(PROBE_FREEDOM, (len(best), count, 1)) / PROBE_FREEDOM)
+    x = (best[:, None] + z @ np.linalg.inv(roots)).reshape(-1, size)
+    away = ((x[:, None] - best)[:, :, None] @ roots)[:, :, 0]  # (n, o, v)
+    tail = (1 + (away**2).sum(2) / PROBE_FREEDOM) ** (-(PROBE_FREEDOM + size) / 2)
+    theirs = tail @ np.prod(np.einsum("ovv->ov", roots), axis=1)
+    ln_p = posterior(x)
+    return shares_at_edge(x, posterior.box, bounds, np.exp(ln_p - ln_p.max()) / theirs)
 
 
 def grown(
@@ -63,43 +85,47 @@ def grown(
     """Draws from a box (v, 2) with less than `AT_EDGE` of them at its edges, or from the last one
     that could be had.
 
-    ask: the posterior on an emulator of a box; tolerance (n,): its largest errors, row by row;
-    stage: hears whether sampling begins, or asking. Raises what ``ask`` does of the first box.
+    ask: the posterior on an emulator of a box, each one larger than the last; tolerance (n,): its
+    largest errors, row by row; stage: hears whether sampling begins, or asking. Raises what ``ask``
+    does of the first box.
     """
-    found: Drawn | None = None
+    last: Posterior | None = None
     evaluations, boxes, stopped = 0, 0, f"it was made larger {GROWTHS} times"
     for _ in range(GROWTHS + 1):
         stage(False)
         try:
             posterior = ask(box)
         except EvaluationFailed as failure:
-            if found is None:
+            if last is None:
                 raise
             stopped = f"a larger box has no emulator: {failure}"
             break
         emulator = posterior.emulator
-        evaluations += emulator.evaluations + emulator.failed
+        evaluations = emulator.evaluations + emulator.failed  # those of smaller boxes among them
         error = emulator.stated_errors[posterior.rows[:, 1]]
-        if found and (error > tolerance).any():
+        if last and (error > tolerance).any():
             stopped = f"the emulator of a larger box may be {100 * error.max():.2g} % off"
             break
         stage(True)
-        boxes += 1
-        found = drawn(posterior, bounds, ceil(PROBE * count), seed)
-        if found.at_edge.sum() < AT_EDGE:
+        boxes, last = boxes + 1, posterior
+        at_edge = probed(posterior, bounds, seed)
+        if at_edge.sum() < AT_EDGE:
             found = drawn(posterior, bounds, count, seed)
-        if found.at_edge.sum() < AT_EDGE:
-            return replace(found, boxes=boxes, evaluations=evaluations)
-        box = larger(box, bounds, found.at_edge)
-    assert found
-    found = drawn(found.posterior, bounds, count, seed)
+            if found.at_edge.sum() < AT_EDGE:
+                return replace(found, boxes=boxes, evaluations=evaluations)
+            at_edge = found.at_edge
+        box = larger(box, bounds, at_edge)
+    assert last
+    found = drawn(last, bounds, count, seed)
     return replace(found, boxes=boxes, evaluations=evaluations, stopped=stopped)
 
 
-def shares_at_edge(x: Array, box: Array, bounds: Array) -> Array:
-    """Share (v, 2) of draws x (n, v) at each edge; 0 where it is a bound of the variable."""
+def shares_at_edge(x: Array, box: Array, bounds: Array, weights: Array | None = None) -> Array:
+    """Share (v, 2) of draws x (n, v), which count by ``weights`` (n,), at each edge; 0 where it is
+    a bound of the variable."""
     near = EDGE * np.ptp(box, axis=1) / 2
-    low, high = (x < box[:, 0] + near).mean(0), (x > box[:, 1] - near).mean(0)
+    share = lambda there: np.average(there, 0, weights)
+    low, high = share(x < box[:, 0] + near), share(x > box[:, 1] - near)
     inner = abs(box - bounds) > 1e-9 * np.ptp(bounds, axis=1)[:, None]
     return np.stack([low, high], 1) * inner
 

@@ -3,7 +3,11 @@
 emcee (Foreman-Mackey, Hogg, Lang and Goodman 2013): each step moves a half of the walkers by what
 the other half knows of the density, here along differences of two of them (ter Braak and Vrugt
 2008). The draws of a walker are alike over tau steps, the integrated autocorrelation time; from
-N steps come N / tau independent draws a walker, and tau itself is known from 50 tau steps on.
+N steps come N / tau independent draws a walker. Of W walkers tau itself is known but for a share of
+
+    sqrt(2 (2 M + 1) / (W N)),    M = 5 tau: the window that it is summed over
+
+(Sokal 1989): from 20 tau steps on, four such windows, 10 % of 100 walkers and 5 % of 400.
 """
 
 from __future__ import annotations
@@ -17,10 +21,12 @@ import numpy as np
 from ...errors import InputError
 
 Array = np.ndarray
-WALKERS = 100
-ENOUGH = 50  # tau, of steps
+WALKERS = (100, 400)  # at least and at most: a step of many takes hardly longer than one of few
+STEPS = 400  # that as many walkers as that leave of the draws
+ENOUGH = 20  # tau, of steps
 WARM_UP = 5  # tau, of steps that are dropped
 WINDOW = 5  # tau: beyond, what is seen of rho is noise
+SPARE_STEPS = 1.5  # of draws that would be enough: a short chain's tau is too small
 TRIES = 100  # of walkers to begin within the box
 MISSING = (
     "tyrecal sample needs the package emcee, which is not installed here:"
@@ -60,6 +66,18 @@ class Chains:
         return bool(len(self.draws) >= ENOUGH * self.tau.max())
 
 
+def walkers(count: int, size: int) -> int:
+    """Of ``count`` draws of so many variables."""
+    fewest, most = WALKERS
+    return max(min(count // STEPS, most), fewest, 4 * size)
+
+
+def enough_draws(tau: float) -> float:
+    """How many draws in all would be enough, of some variables."""
+    steps = SPARE_STEPS * (WARM_UP + ENOUGH) * tau
+    return steps * WALKERS[steps > STEPS]
+
+
 def needs_emcee() -> None:
     """Raises InputError where emcee is not installed."""
     try:
@@ -77,22 +95,24 @@ def walk(
     import emcee
 
     size = start.shape[1]
-    walkers = max(WALKERS, 4 * size)
+    number = walkers(count, size)
     random = np.random.default_rng(seed)
-    about = start[np.arange(walkers) % len(start)]
+    about = start[np.arange(number) % len(start)]
     begin, width = about.copy(), 1.0
-    outside = np.ones(walkers, bool)
+    outside = np.ones(number, bool)
     for _ in range(TRIES):  # who begins outside begins anew, nearer to the optimum in the end
-        step = random.multivariate_normal(np.zeros(size), covariance, walkers, method="cholesky")
+        step = random.multivariate_normal(np.zeros(size), covariance, number, method="cholesky")
         begin[outside] = (about + width * step)[outside]
         outside = ~np.isfinite(density(begin))
         if not outside.any():
             break
         width *= 0.9
     moves = [(emcee.moves.DEMove(), 0.9), (emcee.moves.DEMove(gamma0=1.0), 0.1)]
-    sampler = emcee.EnsembleSampler(walkers, size, density, moves=moves, vectorize=True)
+    sampler = emcee.EnsembleSampler(number, size, density, moves=moves, vectorize=True)
+    # its own looks at every value by itself, which takes longer than the density
+    sampler.compute_log_prob = lambda x: (density(x), None)
     state = np.random.RandomState(seed % 2**32).get_state()
-    sampler.run_mcmc(emcee.State(begin, random_state=state), max(2, ceil(count / walkers)))
+    sampler.run_mcmc(emcee.State(begin, random_state=state), max(2, ceil(count / number)))
     draws = sampler.get_chain()
     dropped = min(ceil(WARM_UP * autocorrelation_time(draws).max()), len(draws) // 2)
     draws = draws[dropped:]

@@ -10,6 +10,7 @@ good as another: of a variable on a logarithmic scale, every ratio.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -53,23 +54,30 @@ class Posterior:
     def ln_f(self, x: Array, rows: Array) -> Array:
         """ln f (p, n) of rows of states and labels at x (p, v)."""
         found = np.empty((len(x), len(rows)))
-        for state in np.unique(rows[:, 0]):
+        for state, emulator in enumerate(self._at_states):
             own = rows[:, 0] == state
-            found[:, own] = self.emulator.ln_f(self._at(x, state))[:, rows[own, 1]]
+            if own.any():
+                found[:, own] = emulator.ln_f(x)[:, rows[own, 1]]
         return found
 
     def slopes(self, x: Array, rows: Array) -> Array:
         """d ln f / d x (p, n, v) of rows at x (p, v)."""
         found = np.empty((len(x), len(rows), x.shape[1]))
-        for state in np.unique(rows[:, 0]):
+        for state, emulator in enumerate(self._at_states):
             own = rows[:, 0] == state
-            rise = self.emulator.slopes(self._at(x, state))
-            found[:, own] = rise[:, rows[own, 1], : x.shape[1]]
+            if own.any():
+                found[:, own] = emulator.slopes(x)[:, rows[own, 1]]
         return found
 
-    def _at(self, x: Array, state: int) -> Array:
-        further = self.states[state]
-        return np.hstack([x, np.broadcast_to(further, (len(x), len(further)))])
+    @cached_property
+    def _at_states(self) -> list[Emulator]:
+        """Of the variables alone, state by state."""
+        return [self.emulator.restricted(state) for state in self.states]
+
+    @cached_property
+    def optima(self) -> tuple[Array, Array]:
+        """What `optima` finds."""
+        return optima(self)
 
     def information(self, x: Array) -> Array:
         """J^T Sigma^-1 J (p, v, v): its inverse is the linear covariance of the variables."""

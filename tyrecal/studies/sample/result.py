@@ -18,7 +18,7 @@ from ..result import (
     csv_text,
 )
 from .box import AT_EDGE
-from .chains import ENOUGH
+from .chains import ENOUGH, enough_draws
 from .study import ROUGH, Sample
 
 Array = np.ndarray
@@ -214,7 +214,7 @@ class SampleResult(Result):
             tau = max(c.autocorrelation.values())
             found.append(
                 f"{c.steps} steps are fewer than {ENOUGH} autocorrelation times of {tau:.1f}: give"
-                f" --draws {ENOUGH * tau * c.walkers * 1.5:.2g} or more"
+                f" --draws {enough_draws(tau):.2g} or more"
             )
         if self.emulator.share_of_sigma > ROUGH:
             found.append(

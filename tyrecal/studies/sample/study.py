@@ -18,7 +18,7 @@ from ..diagnose.observations import Observable, Observations, observe
 from ..diagnose.plain_fit import plain_fit
 from ..diagnose.tyre_model import TyreModel
 from ..diagnose.uncertainties import Source, calibrated, sources
-from ..emulator import emulator, needs_slopes
+from ..emulator import Emulator, emulator, needs_slopes
 from ..fit.calibrate import calibrate
 from ..fit.problem import read_targets
 from ..fit.variable import DesignVariable, read_variable
@@ -99,10 +99,14 @@ def run(
     asked = (*variables, *[ends] * states.shape[1])
     labels = sorted({row.label for row in observations.rows if row.label}, key=str)
 
+    before: Emulator | None = None
+
     def ask(box: Array) -> Posterior:
+        nonlocal before
         whole = np.vstack([box, *[states[[0, -1]].T] * states.shape[1]])
-        for each in EACH:  # of more designs, the first ones are the same
-            made = emulator(model.evaluator, asked, whole, labels, each * len(asked), jobs)
+        for each in EACH:
+            count = each * len(asked)
+            made = before = emulator(model.evaluator, asked, whole, labels, count, jobs, before)
             at = rows_of(observations.rows, made.labels, pressures)
             if (made.stated_errors[at[:, 1]] <= ROUGH * spread).all():
                 break
