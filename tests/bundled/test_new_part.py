@@ -10,7 +10,8 @@ from tyrecal_solvers.bundled.modes import sensitivity
 from tyrecal_solvers.bundled.modes.harmonics import Vibration
 from tyrecal_solvers.bundled.section import mechanics, model, shapes
 from tyrecal_solvers.bundled.section.elements import Solids
-from tyrecal_solvers.bundled.section.parts.elastic import Elastic, EnergyLaw
+from tyrecal_solvers.bundled.section.laws.energy_law import EnergyLaw
+from tyrecal_solvers.bundled.section.parts.elastic import Elastic
 from tyrecal_solvers.bundled.section.parts.part import Rows, SectionJob, TyrePart, on_diagonals
 from tyrecal_solvers.bundled.solid3d.circumference import half_circle
 from tyrecal_solvers.bundled.solid3d.revolved import Revolved

@@ -29,9 +29,19 @@ SECTION_JOB: dict[str, dict[str, ParameterValues]] = {
     "DENSITY": {},
     "ELASTIC": {"TYPE": ("ISOTROPIC",)},
     "HYPERELASTIC": {
-        "N": ("1",),
-        "MOONEY-RIVLIN": ("",),
-        "NEO HOOKE": ("",),
+        **dict.fromkeys(
+            (
+                "NEO HOOKE",
+                "MOONEY-RIVLIN",
+                "POLYNOMIAL",
+                "REDUCED POLYNOMIAL",
+                "YEOH",
+                "ARRUDA-BOYCE",
+                "OGDEN",
+            ),
+            ("",),
+        ),
+        "N": ("1", "2", "3"),
         "MODULI": ("LONG TERM", "INSTANTANEOUS"),
     },
     "VISCOELASTIC": {"TIME": ("PRONY",), "FREQUENCY": ("TABULAR",)},
@@ -81,7 +91,7 @@ REVOLVE_JOB: dict[str, dict[str, ParameterValues]] = {
 MAX_FIELDS = {  # data fields that are honoured; a further one that is not blank is refused
     "DENSITY": 1,
     "ELASTIC": 2,
-    "HYPERELASTIC": 3,
+    "HYPERELASTIC": 8,
     "VISCOELASTIC": 5,
     "ACOUSTIC MEDIUM": 1,
     "SPRING": 1,

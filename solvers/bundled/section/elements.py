@@ -33,6 +33,12 @@ class Solids:
     mass_N: Array  # (g', a)
     mass_weights: Array  # (e, g')
 
+    def pick(self, rows: Array) -> Solids:
+        """Some of the elements."""
+        own = {each.name: getattr(self, each.name) for each in fields(self)}
+        whole = ("mass_N",) if self.hourglass is not None else ("mass_N", "hourglass")
+        return Solids(**{name: v if name in whole else v[rows] for name, v in own.items()})
+
 
 def solids(
     X: Array, connectivity: Array, kind: shapes.ElementType, share: Array | float = 1.0

@@ -8,6 +8,9 @@ from itertools import pairwise
 import numpy as np
 
 from ..deck.keywords import DeckError, Keyword
+from .laws.data_lines import read_law
+from .laws.hyperelastic import Hyperelastic
+from .laws.linear_elastic import LinearElastic
 
 Scalar = complex | float  # complex where it carries the tangent of a slope (`sensitivity`)
 
@@ -48,13 +51,23 @@ class Material:
     line: int
     density: Scalar = 0.0  # kg/m3
     youngs_modulus: Scalar | None = None  # Pa
-    C10: Scalar | None = None  # Pa
-    C01: Scalar = 0.0  # Pa
-    inverse_D1: Scalar = 0.0  # Pa
+    poissons_ratio: Scalar = 0.0
+    rubber: Hyperelastic | None = None  # constants of one point
     instantaneous: bool = False  # the moduli are those of sudden loading
     prony: list[tuple[Scalar, Scalar, Scalar]] = field(default_factory=list)  # g, k, tau in s
     table: ModulusTable | None = None  # in place of a Prony series
     bulk_modulus: Scalar | None = None  # Pa, of a gas
+
+    @property
+    def law(self) -> Hyperelastic | None:
+        """Of a solid: rubber's, or linear elasticity; None: it is neither. Raises DeckError."""
+        if self.rubber is not None or self.youngs_modulus is None:
+            return self.rubber
+        E, nu = self.youngs_modulus, self.poissons_ratio
+        if not -1 < np.real(nu) < 0.5:
+            words = f"Poisson's ratio of material {self.name} must lie above -1 and below 0.5"
+            raise DeckError(self.line, words)
+        return LinearElastic(np.asarray(E / (2 + 2 * nu)), np.asarray(E / (3 - 6 * nu)))
 
     def _relaxed(self) -> tuple[Scalar, Scalar]:
         """Long-term over instantaneous modulus, shear and bulk: 1 - sum g, 1 - sum k."""
@@ -109,19 +122,11 @@ def _density(m: Material, k: Keyword) -> None:
 
 def _elastic(m: Material, k: Keyword) -> None:
     m.youngs_modulus = _positive(k, 0, "Young's modulus")
+    m.poissons_ratio = k.only_row().number(1, 0.0)
 
 
 def _hyperelastic(m: Material, k: Keyword) -> None:
-    row = k.only_row()
-    m.C10 = row.number(0)
-    neo = "NEO HOOKE" in k.parameters
-    m.C01 = 0.0 if neo else row.number(1)
-    D1 = row.number(1 if neo else 2)
-    if np.real(D1) <= 0:
-        raise DeckError(row.line, "D1 must be positive: fully incompressible rubber would lock")
-    if np.real(m.C10 + m.C01) <= 0:
-        raise DeckError(row.line, "C10 + C01, half the shear modulus, must be positive")
-    m.inverse_D1 = 1 / D1
+    m.rubber = read_law(k)
     m.instantaneous = k.get("MODULI") == "INSTANTANEOUS"
 
 

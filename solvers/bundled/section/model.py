@@ -7,10 +7,11 @@ from dataclasses import dataclass, field, replace
 
 from ..deck.keywords import Keyword
 from .half_mesh import half_mesh
+from .laws.energy_law import EnergyLaw
 from .materials import ModulusTable, read_materials
 from .mesh import DeckMesh, read_mesh
 from .parts import cords, rubber
-from .parts.elastic import Elastic, EnergyLaw
+from .parts.elastic import Elastic
 from .parts.part import SectionJob, TyrePart
 
 READERS = (rubber.read, cords.read)

@@ -16,7 +16,8 @@ import numpy as np
 from ...deck.keywords import DataLine, DeckError, Keyword
 from .. import shapes
 from ..elements import Lines
-from .elastic import Elastic, EnergyLaw
+from ..laws.energy_law import EnergyLaw
+from .elastic import Elastic
 from .part import Rows, SectionJob, TyrePart, consistent_mass, on_diagonals
 
 Array = np.ndarray

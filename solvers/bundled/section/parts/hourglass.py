@@ -10,7 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..elements import Solids
-from .elastic import Elastic, EnergyLaw
+from ..laws.energy_law import EnergyLaw
+from .elastic import Elastic
 from .part import Rows, on_diagonals
 
 Array = np.ndarray

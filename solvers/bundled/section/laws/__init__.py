@@ -1,0 +1,1 @@
+"""Laws of the tyre's materials."""
