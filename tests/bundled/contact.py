@@ -11,7 +11,7 @@ from tyrecal_solvers.bundled.road.contact_newton import ContactNewton
 from tyrecal_solvers.bundled.road.half_turn_symmetry import HalfTurn
 from tyrecal_solvers.bundled.section.model import Model
 from tyrecal_solvers.bundled.section.parts.pressure import Pressure
-from tyrecal_solvers.bundled.solid3d.circumference import Circumference, half_circle
+from tyrecal_solvers.bundled.solid3d.circumference import HalfCircle, half_circle
 from tyrecal_solvers.bundled.solid3d.revolved import Revolved
 
 from . import support
@@ -29,21 +29,21 @@ class Round:
     loads: list[Pressure]
     U: Array
 
-    def tyre(self, around: Circumference) -> Revolved:
+    def tyre(self, around: HalfCircle) -> Revolved:
         return Revolved(self.model, self.loads, around)
 
-    def symmetry(self, around: Circumference, parity: int = 1) -> HalfTurn:
-        return HalfTurn(self.model.mesh, self.free, len(around.angles), parity)
+    def symmetry(self, around: HalfCircle, parity: int = 1) -> HalfTurn:
+        return HalfTurn(self.model.mesh, self.free, around, parity)
 
     def road(
-        self, around: Circumference, stiffness: float, friction: float = 0.0, slip: float = 1e-5
+        self, around: HalfCircle, stiffness: float, friction: float = 0.0, slip: float = 1e-5
     ) -> FlatRoad:
         mesh = self.model.mesh
         return flat_road(mesh.X, mesh.faces["TREAD"], around, stiffness, friction, slip)
 
-    def everywhere(self, around: Circumference) -> Array:
-        """The inflated state at all angles (k, n, 3)."""
-        return np.repeat(self.U[None], len(around.angles), 0)
+    def everywhere(self, around: HalfCircle) -> Array:
+        """The inflated state all round (k, n, 3)."""
+        return np.multiply.outer(around.turn(0).real, self.U)
 
     def press(
         self,

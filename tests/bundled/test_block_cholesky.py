@@ -33,15 +33,18 @@ class Problem:
         parity: int = 1,
         contact: Array | None = None,
         lengths: Array = LENGTHS,
+        waves: int = 0,
     ):
-        around = half_circle(lengths)
-        k = len(around.angles)
-        self.symmetry = HalfTurn(work.model.mesh, ~work.held, k, parity)
+        around = half_circle(lengths, waves)
+        k = around.N.shape[1]
+        self.symmetry = HalfTurn(work.model.mesh, ~work.held, around, parity)
         self.tyre = Revolved(work.model, work.loads, around)
-        self.tyre.residual(np.repeat(work.U[None], k, 0))
-        self.contact = np.zeros((k, len(work.U), 3, 3)) if contact is None else contact
+        self.tyre.residual(np.multiply.outer(around.turn(0).real, work.U))
+        self.contact = np.zeros((k, len(work.U), 3, 3))
+        if contact is not None:
+            self.contact[: len(contact)] = contact
         tangents = self.tyre.tangents(np.float32)
-        order = Elimination([t[0] for t in tangents], self.symmetry, around)
+        order = Elimination([t[0] for t in tangents], self.symmetry)
         self.factor = Factor(order, tangents, self.contact)
 
     def product(self, x: Array) -> Array:
@@ -85,10 +88,11 @@ def road_blocks(work: Inflated, stiffness: float, sideways: float) -> Array:
     return blocks
 
 
+@pytest.mark.parametrize("waves", [0, 3], ids=["elements", "waves"])
 @pytest.mark.parametrize("parity", [1, -1], ids=["kept", "reversed"])
-def test_few_iterations_on_the_inflated_tyre(inflated: Inflated, parity: int) -> None:
+def test_few_iterations_on_the_inflated_tyre(inflated: Inflated, parity: int, waves: int) -> None:
     """Single precision and the dropped couplings cost at most eight iterations to 1e-6."""
-    problem = Problem(inflated, parity)
+    problem = Problem(inflated, parity, lengths=LENGTHS[:4] if waves else LENGTHS, waves=waves)
     b = problem.random()[0]
     x, used = conjugate_gradients(problem.product, problem.factor.solve, b)
     assert np.linalg.norm(problem.product(x) - b) <= 2e-6 * np.linalg.norm(b)
@@ -130,7 +134,7 @@ def test_approximate_inverse_is_symmetric(inflated: Inflated) -> None:
 @pytest.mark.parametrize("quadratic", [True, False], ids=["Q8", "Q4"])
 def test_exact_without_cords(quadratic: bool) -> None:
     """A section without a bias has no coupling to drop: the inverse, to single precision, also
-    with a road under both sides and the middle."""
+    with a road under both sides and the middle, and with waves beyond it."""
     work = ring((0.2, 0.21, 0.23), 0.02, 4, support.Rubber(), 2e3, quadratic=quadratic)
     plain = Inflated(None, work.model, ~work.free, work.loads, work.U)  # type: ignore[arg-type]
     blocks = np.zeros((2 * len(LENGTHS) + 1, len(work.U), 3, 3))
@@ -138,8 +142,9 @@ def test_exact_without_cords(quadratic: bool) -> None:
     outside = work.model.mesh.X[:, 0] > 0.2299
     blocks[:5, outside] = 1e6 * (np.outer(down, down) + np.diag([0.0, 0.1, 0.1]))
     blocks[0, outside, 0, 1] = blocks[0, outside, 1, 0] = 0.0
-    for contact in (None, blocks):
-        problem = Problem(plain, contact=contact)
+    cases = (None, LENGTHS, 0), (blocks, LENGTHS, 0), (blocks[:5], LENGTHS[:4], 3)
+    for contact, lengths, waves in cases:
+        problem = Problem(plain, contact=contact, lengths=lengths, waves=waves)
         x = problem.random()[0]
         back = problem.factor.solve(problem.product(x))
         np.testing.assert_allclose(back, x, atol=2e-3 * abs(x).max())
@@ -151,7 +156,7 @@ def test_the_middle_of_the_tread_is_eliminated_last() -> None:
     work = ring((0.2, 0.21, 0.23), 0.04, 8, support.Rubber())
     around, X = half_circle(LENGTHS), work.model.mesh.X
     symmetry = work.symmetry(around)
-    order = Elimination([part.connectivity for part in work.model.parts], symmetry, around)
+    order = Elimination([part.connectivity for part in work.model.parts], symmetry)
     assert len(order.fronts) == 1 + 4  # the first gathers elements, and eliminates nothing
     gone = [symmetry.nodes[front.nodes[: front.eliminated]] for front in order.fronts]
     free = np.flatnonzero(work.free.any(1) & (X[:, 1] > -1e-9))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from tyrecal_solvers.bundled.road.half_turn_symmetry import HalfTurn
 from tyrecal_solvers.bundled.section.symmetry import MIRROR_SIGNS, mirror_images
-from tyrecal_solvers.bundled.solid3d.circumference import half_circle
+from tyrecal_solvers.bundled.solid3d.circumference import HalfCircle, half_circle
 from tyrecal_solvers.bundled.solid3d.revolved import Revolved
 from tyrecal_solvers.errors import Refused
 
@@ -17,12 +17,17 @@ from .contact import ring
 pytestmark = pytest.mark.numbers
 
 Array = np.ndarray
-ANGLES = 7
+AROUND = half_circle(np.full(3, np.pi / 3))
+WAVES = half_circle(np.array([0.2, 0.5]), 4)
 
 
-@pytest.fixture(scope="module", params=[1, -1], ids=["kept", "reversed"])
+@pytest.fixture(
+    scope="module",
+    params=[(AROUND, 1), (AROUND, -1), (WAVES, 1), (WAVES, -1)],
+    ids=["kept", "reversed", "kept, waves", "reversed, waves"],
+)
 def symmetry(request, inflated: Inflated) -> HalfTurn:
-    return HalfTurn(inflated.model.mesh, ~inflated.held, ANGLES, request.param)
+    return HalfTurn(inflated.model.mesh, ~inflated.held, *request.param)
 
 
 def masked(symmetry: HalfTurn, random: np.random.Generator) -> Array:
@@ -51,8 +56,9 @@ def test_a_turned_tyre_is_the_same(symmetry: HalfTurn, random: np.random.Generat
     image = np.empty_like(U)
     image[:, symmetry.beyond] = U[:, symmetry.nodes] * [1, -1, -1]
     image[:, symmetry.nodes] = U[:, symmetry.beyond] * [1, -1, -1]
-    for plane in (0, -1):
-        np.testing.assert_allclose(U[plane], symmetry.parity * image[plane], atol=1e-14)
+    planes = symmetry.around.at(np.array([0.0, np.pi]))
+    here, there = (np.einsum("ak,kni->ani", planes, field) for field in (U, image))
+    np.testing.assert_allclose(here, symmetry.parity * there, atol=1e-13 * abs(U).max())
     assert not U[:, ~symmetry.free].any()
 
 
@@ -63,20 +69,23 @@ def test_dimension(symmetry: HalfTurn, inflated: Inflated) -> None:
     middle = free[abs(X[:, 1]) < 1e-9].all(1).sum()
     pairs = (free.all(1).sum() - middle) // 2
     in_plane = 3 * pairs + (1 if symmetry.parity == 1 else 2) * middle
-    assert symmetry.mask.sum() == (ANGLES - 2) * free.sum() + 2 * in_plane
+    # an even and an odd wave each are two functions of the half
+    apart = 7 - 2 if symmetry.around is AROUND else 4 - 1 + 5
+    planes = 2 if symmetry.around is AROUND else 1
+    assert symmetry.mask.sum() == apart * free.sum() + planes * in_plane
     assert free.sum() == 3 * (2 * pairs + middle)
 
 
+@pytest.mark.parametrize("around", [AROUND, WAVES], ids=["elements", "waves"])
 def test_the_half_turn_maps_forces_to_forces(
-    inflated: Inflated, random: np.random.Generator
+    inflated: Inflated, random: np.random.Generator, around: HalfCircle
 ) -> None:
     """The tyre with belts at +-20 degrees keeps the half turn: where a field has the symmetry so
     have its forces in the planes, although not the mirror images'."""
-    around = half_circle(np.full(3, np.pi / 3))
-    symmetry = HalfTurn(inflated.model.mesh, ~inflated.held, 7)
+    symmetry = HalfTurn(inflated.model.mesh, ~inflated.held, around)
     tyre = Revolved(inflated.model, inflated.loads, around)
     x = masked(symmetry, random)
-    tyre.residual(np.repeat(inflated.U[None], 7, 0))
+    tyre.residual(np.multiply.outer(around.turn(0).real, inflated.U))
     one, other = masked(symmetry, random), masked(symmetry, random)
     product = lambda y: symmetry.gather(tyre.product(symmetry.spread(y)))
     left, right = (one * product(other)).sum(), (other * product(one)).sum()
@@ -89,9 +98,10 @@ def test_the_half_turn_maps_forces_to_forces(
 
 def test_axisymmetric_inflation_is_of_the_symmetry(inflated: Inflated) -> None:
     """With the twist of the belts: u_theta is odd across."""
-    symmetry = HalfTurn(inflated.model.mesh, ~inflated.held, ANGLES)
-    U = np.repeat(inflated.U[None], ANGLES, 0)
-    np.testing.assert_allclose(symmetry.spread(symmetry.parts(U)), U, atol=1e-12)
+    for around in (AROUND, WAVES):
+        symmetry = HalfTurn(inflated.model.mesh, ~inflated.held, around)
+        U = np.multiply.outer(around.turn(0).real, inflated.U)
+        np.testing.assert_allclose(symmetry.spread(symmetry.parts(U)), U, atol=1e-12)
     mirrored = np.empty_like(inflated.U)
     mirrored[symmetry.beyond] = inflated.U[symmetry.nodes] * MIRROR_SIGNS
     assert abs(mirrored[symmetry.beyond] - inflated.U[symmetry.beyond])[:, 1].max() > 1e-6
@@ -100,14 +110,14 @@ def test_axisymmetric_inflation_is_of_the_symmetry(inflated: Inflated) -> None:
 def test_sections_without_the_symmetry_are_refused() -> None:
     work = ring((0.2, 0.25, 0.3), 0.02, 2, support.Rubber())
     free = work.free.copy()
-    HalfTurn(work.model.mesh, free, ANGLES)
+    HalfTurn(work.model.mesh, free, AROUND)
     free[np.argmax(work.model.mesh.X[:, 1]), 2] ^= True
     with pytest.raises(Refused, match="supports differ"):
-        HalfTurn(work.model.mesh, free, ANGLES)
+        HalfTurn(work.model.mesh, free, AROUND)
     b = support.block((0.2, 0.3, 2), (-0.02, 0.03, 2), True)
     m = support.model_of(support.deck(b.X, b.solids, support.Rubber()))
     with pytest.raises(Refused):
-        HalfTurn(m.mesh, np.ones((len(b.X), 3), bool), ANGLES)
+        HalfTurn(m.mesh, np.ones((len(b.X), 3), bool), AROUND)
 
 
 @pytest.mark.parametrize(("off", "same"), [(0.4e-6, True), (0.9e-6, False), (-0.9e-6, False)])

@@ -322,9 +322,7 @@ class Bricks:
         full_N[rows[:, None], self.cols] = self.N
         full_slope[rows[:, None], self.cols] = self.slope
         angles = np.arange(k) * length / 2 - length / 2
-        around = Circumference(
-            angles, full_N, full_slope, self.weights, self.weights @ full_N, (slice(0, s),)
-        )
+        around = Circumference(angles, full_N, full_slope, self.weights)
         self.inside = (element == 0).astype(float)
         self.tyre = Revolved(splice.blended(model, other, self.inside), loads, around)
         self.mass = mechanics.mass(model), mechanics.mass(other)

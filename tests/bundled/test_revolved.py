@@ -5,7 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from tyrecal_solvers.bundled.section import mechanics
-from tyrecal_solvers.bundled.solid3d.circumference import Circumference, functions, half_circle
+from tyrecal_solvers.bundled.solid3d.circumference import (
+    Circumference,
+    functions,
+    half_circle,
+    waves_beyond,
+)
 from tyrecal_solvers.bundled.solid3d.revolved import Revolved
 from tyrecal_solvers.errors import Inverted
 
@@ -20,7 +25,7 @@ UNEVEN = UNEVEN / UNEVEN.sum() * np.pi
 
 
 def fields(tyre: Revolved, random: np.random.Generator, size: float) -> Array:
-    return size * random.normal(size=(len(tyre.around.angles), len(tyre.model.mesh.X), 3))
+    return size * random.normal(size=(tyre.around.N.shape[1], len(tyre.model.mesh.X), 3))
 
 
 def turned(around: Circumference, Q: Array, shift: Array, X: Array) -> Array:
@@ -43,7 +48,8 @@ def test_functions_hold_circles_and_rigid_bodies(lengths: Array) -> None:
     assert len(around.angles) == 2 * len(lengths) + 1
     assert around.angles[0] == 0.0 and around.angles[-1] == pytest.approx(np.pi, abs=1e-12)
     place = np.empty(len(around.weights))
-    for start, length, rows in zip(starts, lengths, around.stations, strict=False):
+    for start, length, piece in zip(starts, lengths, around.pieces, strict=False):
+        rows = piece.stations
         x, w = np.polynomial.legendre.leggauss(rows.stop - rows.start)
         place[rows] = start + (x + 1) * length / 2
         np.testing.assert_allclose(around.weights[rows], w * length / 2, rtol=1e-14)
@@ -61,18 +67,91 @@ def test_functions_hold_circles_and_rigid_bodies(lengths: Array) -> None:
     assert abs(around.shares @ np.cos(around.angles)) < 1e-9
 
 
+JOIN = 0.6
+
+
+@pytest.mark.parametrize("highest", [2, 6])
+def test_waves_beyond_the_elements(highest: int) -> None:
+    """Even functions are all of cos j x, odd ones of sin j x from the join to the top; both go on
+    where the last element ends, are orthonormal but for the one that is not zero there, and what
+    the stations sum up are integrals."""
+    around = half_circle(np.array([0.1, 0.2, 0.3]), highest)
+    fine, w = np.polynomial.legendre.leggauss(200)
+    beyond, w = JOIN + (np.pi - JOIN) * (1 + fine) / 2, (np.pi - JOIN) * w / 2
+    before, after = around.at(np.array([JOIN * (1 - 1e-12), JOIN]))
+    np.testing.assert_allclose(before, after, atol=1e-9)
+    x, h = np.pi - beyond, 1e-6
+    slope = (around.at(beyond + h) - around.at(beyond - h)) / (2 * h)
+    far = around.stations > JOIN
+    for rows, wave in ((around.even, np.cos), (around.odd, np.sin)):
+        own = rows[around.pieces[-1].functions]
+        values = around.at(beyond)[:, own]
+        waves = wave(np.multiply.outer(x, np.arange(highest + 1) + (wave is np.sin)))
+        left = waves - values @ np.linalg.lstsq(values, waves, rcond=None)[0]
+        assert len(own) == highest + 1 and abs(left).max() < 1e-9
+        assert after[own].tolist() == pytest.approx([1.0] + [0.0] * highest, abs=1e-12)
+        gram = values.T @ (w[:, None] * values)
+        np.testing.assert_allclose(gram[1:, 1:], np.eye(highest), atol=1e-9)
+        np.testing.assert_allclose(gram[0, 1:], 0.0, atol=1e-9)
+        summed = around.N[far][:, own].T @ (around.weights[far, None] * around.N[far][:, own])
+        np.testing.assert_allclose(summed, gram, atol=1e-9)
+        slopes = around.slope[far][:, own].T @ (
+            around.weights[far, None] * around.slope[far][:, own]
+        )
+        exact = slope[:, own].T @ (w[:, None] * slope[:, own])
+        np.testing.assert_allclose(slopes, exact, rtol=1e-7, atol=1e-7)
+
+
+def test_what_waves_stand_for() -> None:
+    """The elements up to the first beyond 10 degrees, 45 degrees away at the farthest, and one more
+    of the last one's length; 7 waves, or 3 more than elements of the deck hold; none where no
+    element is short."""
+    deck = np.radians([4, 4, 4, 5, 8, 17, 45, 93])
+    around = waves_beyond(deck)
+    ends = np.degrees(around.ends)
+    np.testing.assert_allclose(ends, [0, 4, 8, 12, 17, 25, 33])
+    assert len(around.even) == 12 + 8
+    fine = waves_beyond(np.radians([5.0] * 36))
+    assert fine.ends[-1] == pytest.approx(np.radians(50.0)) and len(fine.even) == 20 + 9 + 3 + 1
+    assert not waves_beyond(np.radians([20.0] * 9)).waves.size
+
+
+def test_coefficients_of_harmonics() -> None:
+    """Of exp(i n theta): exact all round for n < 2, beyond the elements up to the highest wave, and
+    the nearest sum of waves above."""
+    around = half_circle(np.array([0.1, 0.2, 0.3]), 4)
+    far = around.stations > JOIN
+    for n in range(5):
+        error = abs(around.N @ around.turn(n) - np.exp(1j * n * around.stations))
+        assert error.max() < (1e-9 if n < 2 else 1e-2) and error[far].max() < 1e-9
+    assert abs(around.slope @ around.turn(1) - 1j * np.exp(1j * around.stations)).max() < 1e-9
+    error = abs(around.N @ around.turn(5) - np.exp(5j * around.stations))
+    best = error[far] ** 2 @ around.weights[far]
+    rows = around.odd[around.pieces[-1].functions]
+    for row in (*around.even[around.pieces[-1].functions][1:], *rows[1:]):
+        other = around.turn(5)
+        other[row] += 1e-3 * (1j if row in rows else 1.0)
+        worse = abs(around.N @ other - np.exp(5j * around.stations))[far] ** 2
+        assert worse @ around.weights[far] > best
+
+
 def test_functions_are_one_at_their_own_node() -> None:
     for half in (1e-3, 0.1, 1.0):
         values, _ = functions(np.array([-half, 0.0, half]), half)
         np.testing.assert_allclose(values, np.eye(3), atol=1e-9)
 
 
-@pytest.fixture(scope="module", params=[True, False], ids=["Q8", "Q4"])
+@pytest.fixture(
+    scope="module", params=[(True, 0), (False, 0), (True, 3)], ids=["Q8", "Q4", "waves"]
+)
 def small(request) -> tuple[Revolved, Array]:
-    """A small tyre between rest and inflation, out of balance, three elements round half of it."""
-    tyre = support.tyre((2, 2, 2, 1), quadratic=request.param)
+    """A small tyre between rest and inflation, out of balance, three elements round half of it, or
+    two and waves."""
+    quadratic, waves = request.param
+    tyre = support.tyre((2, 2, 2, 1), quadratic=quadratic)
     m = support.model_of(tyre.deck)
-    work = Revolved(m, support.cavity(m, 240e3), half_circle(np.array([0.4, 1.0, np.pi - 1.4])))
+    lengths = np.array([0.4, 1.0] if waves else [0.4, 1.0, np.pi - 1.4])
+    work = Revolved(m, support.cavity(m, 240e3), half_circle(lengths, waves))
     return work, fields(work, generator(3), 2e-5)
 
 

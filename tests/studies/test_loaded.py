@@ -162,6 +162,11 @@ def test_elements_are_short_enough_for_the_waves(waves: int) -> None:
     assert len(set(half[len(kept) :])) <= 1
 
 
+def test_elements_that_are_short_enough_all_round_stay() -> None:
+    for angles in ([10.0] * 18, [2.0] * 45 + [9.0] * 10):
+        assert fine_enough(angles, 4) == angles
+
+
 def test_the_deck_asks_for_modes_after_each_load() -> None:
     plain = Decks(TyreDesign(CASE), loads_N=(500.0, 900.0)).texts("abaqus")["press.inp"]
     deck = Decks(TyreDesign(CASE), loads_N=(500.0, 900.0), loaded_modes=24).texts("abaqus")[

@@ -63,7 +63,7 @@ def full_circle(highest: int) -> Circumference:
     N = (1 + 2 * np.cos(away[..., None] * n).sum(-1)) / k
     slope = -2 * (n * np.sin(away[..., None] * n)).sum(-1) / k
     weights = np.full(s, 2 * np.pi / s)
-    return Circumference(angles, N, slope, weights, weights @ N, (slice(0, s),))
+    return Circumference(angles, N, slope, weights)
 
 
 def blended(model: Model, other: Model, share: Array) -> Model:

@@ -1,8 +1,8 @@
 """Preconditioner of the tyre in three dimensions: block Cholesky along the section's meridian.
 
-Nodes in levels from the bead to the middle of the tread couple only with their neighbours; all
-angles of a level are eliminated together, as dense blocks in single precision. Where cords run at
-a bias the two parts of the fold are eliminated as one, elsewhere each by itself.
+Nodes in levels from the bead to the middle of the tread couple only with their neighbours; a
+level's functions round the tyre are eliminated together, as dense blocks in single precision. Where
+cords run at a bias the two parts of the fold are eliminated as one, elsewhere each by itself.
 """
 
 from __future__ import annotations
@@ -17,8 +17,7 @@ from scipy.linalg.lapack import spotrf, strtrs
 
 from ...errors import Indefinite, Refused
 from ..section.symmetry import MIRROR_SIGNS
-from ..solid3d.circumference import Circumference
-from .half_turn_symmetry import HalfTurn
+from .half_turn_symmetry import ODD, HalfTurn
 
 Array = np.ndarray
 Tangents = list[tuple[Array, Array, Array, Array]]
@@ -41,8 +40,8 @@ class _Front:
 class Elimination:
     """The order of elimination, from the elements' connectivities."""
 
-    def __init__(self, connectivities: list[Array], symmetry: HalfTurn, around: Circumference):
-        self.symmetry, self.around = symmetry, around
+    def __init__(self, connectivities: list[Array], symmetry: HalfTurn):
+        self.symmetry, around = symmetry, symmetry.around
         place = np.full(symmetry.shape[1], -1)
         place[symmetry.nodes] = np.arange(len(symmetry.nodes))
         other = symmetry.other
@@ -60,14 +59,22 @@ class Elimination:
         # the same threads for every factor: what one factor frees then serves the next, for the
         # system keeps memory by threads
         self.ahead, self.pool, self.chains = (ThreadPoolExecutor(n) for n in (1, 2, 2))
-        # what a station's tangents by u u, u v, v u, v v (v = du/dTheta) are to the nodes round the
-        # circumference: products of two of an element's functions or slopes (2, 2, s, 9 t)
-        N, w = np.stack([around.N, around.slope]), around.weights
-        products = np.zeros((2, 2, len(w), len(around.stations), 3, 3))
-        for t, rows in enumerate(around.stations):
-            own = N[:, rows, 2 * t : 2 * t + 3]
-            products[:, :, rows, t] = np.einsum("xsk,ysl,s->xyskl", own, own, w[rows])
-        self.products = products.reshape(2, 2, len(w), -1).astype(np.float32)
+        # what a station's tangents by u u, u v, v u, v v (v = du/dTheta) are to the functions round
+        # the circumference: per piece, products of two of its functions or slopes, even or odd ones
+        # (2, 2, 2, 2, s, f f), and where its pairs stand among all
+        N = np.stack(
+            [[F[:, rows] for F in (around.N, around.slope)] for rows in (around.even, around.odd)]
+        )
+        self.products: list[tuple[slice, Array]] = []
+        self.pairs: list[tuple[slice, slice]] = []
+        for piece in around.pieces:
+            own = N[:, :, piece.stations, piece.functions]
+            weighted = own * around.weights[piece.stations, None]
+            products = np.einsum("pxsk,qysl->pqxyskl", own, weighted)
+            products = products.reshape(*products.shape[:5], -1).astype(np.float32)
+            self.products.append((piece.stations, products))
+            before = self.pairs[-1][1].stop if self.pairs else 0
+            self.pairs.append((piece.functions, slice(before, before + products.shape[-1])))
 
 
 def _images(c: Array, inside: Array, other: Array) -> tuple[Array, Array]:
@@ -153,33 +160,30 @@ class Factor:
     def _assemble(self, tangents: Tangents) -> Iterator[tuple[_Front, list[_Assembled]]]:
         """Level by level its blocks, of each part or of both where the bias couples them."""
         coupled = False
-        kinds = [_between_angles(kind, self.order) for kind in tangents]
         for front in self.order.fronts:
-            same, cross = _tables(front, kinds)
-            coupled = coupled or bool(abs(cross).max() > MIN_COUPLING * abs(same).max())
-            same = np.ascontiguousarray(same)
-            if coupled:
-                cross = np.ascontiguousarray(cross)
-            else:
+            tables = _tables(front, tangents, self.order)
+            own, other = abs(tables[0][0]).max(), abs(tables[0][1]).max()
+            coupled = coupled or bool(other > MIN_COUPLING * own)
+            if not coupled:
                 gone = front.nodes[: front.eliminated]
                 self.contact[:, gone, :3, 3:] = self.contact[:, gone, 3:, :3] = 0.0
             first, rest = slice(0, front.eliminated), slice(front.eliminated, None)
             blocks: list[_Assembled] = []
             for group in [(0, 1)] if coupled else [(0,), (1,)]:
-                make = partial(self._block, (same, cross), front, group)
+                make = partial(self._block, tables, front, group)
                 blocks.append((group, make(first, first), make(first, rest), make(rest, rest)))
             yield front, blocks
 
     def _block(
         self,
-        tables: tuple[Array, Array],
+        tables: list[list[Array]],
         front: _Front,
         group: tuple[int, ...],
         rows: slice,
         cols: slice,
     ) -> Array:
-        """Stiffness over (part, angle, node, component) of some of a front's nodes, of one part or
-        both, held components cut out; Fortran order."""
+        """Stiffness over (part, function, node, component) of some of a front's nodes, of one part
+        or both, held components cut out; Fortran order."""
         masks = self.order.symmetry.mask[:, :, front.nodes]
         K = masks.shape[1]
         n, m = len(front.nodes[rows]) * 3, len(front.nodes[cols]) * 3
@@ -187,16 +191,16 @@ class Factor:
         out = np.zeros((len(group) * K * n, len(group) * K * m), np.float32, order="F")
         for x, g in enumerate(group):
             for y, h in enumerate(group):
-                # its transpose, in C order: (angle, column, angle, row)
+                # its transpose, in C order: (function, column, function, row)
                 place = out[x * K * n : (x + 1) * K * n, y * K * m : (y + 1) * K * m].T
                 tiles = np.lib.stride_tricks.as_strided(
                     place, (K, m, K, n), (m * place.strides[0], place.strides[0], n * 4, 4)
                 )
-                table = tables[0 if g == h else 1]
-                parts = table[:, beyond : beyond + m, after : after + n]
-                # of each element round the circumference, what its three nodes are to each other
-                for t, part in enumerate(parts.reshape(len(parts) // 9, 3, 3, m, n).swapaxes(2, 3)):
-                    tiles[2 * t : 2 * t + 3, :, 2 * t : 2 * t + 3] += part
+                # the transpose of a symmetric whole: rows of h, columns of g
+                table = tables[h][g][:, beyond : beyond + m, after : after + n]
+                for own, pairs in self.order.pairs:
+                    f = own.stop - own.start
+                    tiles[own, :, own] += table[pairs].reshape(f, f, m, n).swapaxes(1, 2)
                 if rows == cols and rows.stop is not None:
                     for k, i in np.argwhere(self.contact[:, front.nodes[rows]].any((2, 3))):
                         own = slice(3 * i, 3 * i + 3)
@@ -222,7 +226,7 @@ class Factor:
         for group, first, onward, rest in blocks:
             if len(gone):
                 before = [carried[h] for h in group if h < len(carried)]
-                _add_carried(first, before, len(group), self.order.symmetry.shape[0])
+                _add_carried(first, before, len(group), len(self.order.symmetry.around.even))
                 _eliminate(first, onward, rest, pool)
                 self._steps.append((gone, left, slice(group[0], group[-1] + 1), first, onward))
             rests.append(rest)
@@ -273,43 +277,58 @@ class Factor:
         return np.asarray(x * self.order.symmetry.mask, float)
 
 
-def _between_angles(kind: tuple[Array, ...], order: Elimination) -> Array:
-    """Tangents of elements between nodes round the circumference (e, 3a, 3a, 9 t)."""
-    _, K0, K1, K2 = kind
-    stations = lambda K: K.reshape(len(K), -1).T
-    total = stations(K0) @ order.products[0, 0]
-    total += stations(K1) @ order.products[0, 1]
-    total += stations(K1.swapaxes(-1, -2)) @ order.products[1, 0]
-    total += stations(K2) @ order.products[1, 1]
-    return total.reshape(*K0.shape[1:], -1)
+def _between_functions(kind: tuple[Array, ...], elements: Array, order: Elimination) -> Array:
+    """Tangents of some elements between functions round the circumference, of even and odd fields
+    (2, 2, e, 3a, 3a, pairs)."""
+    K0, K1, K2 = (K[:, elements] for K in kind[1:])
+    by = [K.reshape(len(K), -1) for K in (K0, K1, K1.swapaxes(-1, -2), K2)]
+    total = np.empty((2, 2, *K0.shape[1:], order.pairs[-1][1].stop), np.float32)
+    for (stations, products), (_, pairs) in zip(order.products, order.pairs, strict=True):
+        for p, q in np.ndindex(2, 2):
+            each = products[p, q].reshape(4, *products.shape[4:])
+            among = sum(K[stations].T @ F for K, F in zip(by, each, strict=True))
+            total[p, q, ..., pairs] = among.reshape(*K0.shape[1:], -1)
+    return total
 
 
-def _tables(front: _Front, kinds: list[Array]) -> tuple[Array, Array]:
-    """Stiffness over the front's nodes (9 t, 3 nodes, 3 nodes): sums of elements and their mirror
-    images, and differences."""
+def _tables(front: _Front, tangents: Tangents, order: Elimination) -> list[list[Array]]:
+    """Stiffness over the front's nodes (pairs, 3 nodes, 3 nodes), between a and b: sums of elements
+    and their mirror images, and differences."""
     n = 3 * len(front.nodes)
-    same, cross = np.zeros((2, n + 3, n + 3, kinds[0].shape[-1]), np.float32)  # a spare: held nodes
-    for chosen, kind in zip(front.elements, kinds, strict=True):
-        for element, image, order, place in zip(*chosen, strict=True):
-            sign = np.tile(MIRROR_SIGNS, len(order)).astype(np.float32)
-            there = kind[image][np.ix_(_dofs(order), _dofs(order))]
-            there *= np.multiply.outer(sign, sign)[..., None]
-            pairs = np.ix_(_dofs(place), _dofs(place))
-            same[pairs] += kind[element] + there
-            cross[pairs] += kind[element] - there
-    return same[:n, :n].transpose(2, 0, 1), cross[:n, :n].transpose(2, 0, 1)
+    tables = np.zeros((2, 2, n + 3, n + 3, order.pairs[-1][1].stop), np.float32)
+    for (elements, images, orders, places), kind in zip(front.elements, tangents, strict=True):
+        if not len(elements):
+            continue
+        between = _between_functions(kind, np.concatenate([elements, images]), order)
+        every = np.arange(between.shape[3])
+        sign = np.tile(MIRROR_SIGNS, len(every) // 3).astype(np.float32)
+        odd = np.tile(ODD, len(every) // 3).astype(int)
+        for e, (its, place) in enumerate(zip(orders, places, strict=True)):
+            turned, at = _dofs(its), np.ix_(_dofs(place), _dofs(place))
+            for g, h in np.ndindex(2, 2):
+                parities = odd[g][:, None], odd[h]
+                here = between[(*parities, e, every[:, None], every)]
+                there = between[(*parities, len(elements) + e, turned[:, None], turned)]
+                there *= np.multiply.outer(sign, sign)[..., None]
+                tables[g, h][at] += here + there if g == h else here - there
+    # the last place is a spare of held nodes
+    return [[np.ascontiguousarray(t[:n, :n].transpose(2, 0, 1)) for t in row] for row in tables]
 
 
 def _dofs(nodes: Array) -> Array:
     return np.asarray((3 * nodes[:, None] + np.arange(3)).ravel())
 
 
-def _add_carried(first: Array, carried: list[Array], parts: int, angles: int) -> None:
+def _add_carried(first: Array, carried: list[Array], parts: int, functions: int) -> None:
     """Add to the first block what earlier levels left of its nodes, of each part or of both."""
-    whole = first.T.reshape(parts, angles, -1, parts, angles, len(first) // (parts * angles))
+    whole = first.T.reshape(
+        parts, functions, -1, parts, functions, len(first) // (parts * functions)
+    )
     blocks = parts // max(len(carried), 1)
     for h, more in enumerate(carried):
-        add = more.T.reshape(blocks, angles, -1, blocks, angles, len(more) // (blocks * angles))
+        add = more.T.reshape(
+            blocks, functions, -1, blocks, functions, len(more) // (blocks * functions)
+        )
         m = add.shape[2]
         whole[h : h + blocks, :, :m, h : h + blocks, :, :m] += add
 

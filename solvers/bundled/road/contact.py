@@ -155,7 +155,7 @@ def flat_road(
     share = np.zeros(len(X))
     np.add.at(share, tread.connectivity, (tread.weights * tread.R) @ tread.N)
     nodes = np.flatnonzero(share)
-    near = around.angles < MAX_CONTACT_ANGLE
+    near = np.flatnonzero(around.angles < MAX_CONTACT_ANGLE)
     c, s = np.cos(around.angles[near]), np.sin(around.angles[near])
     frame = np.zeros((len(c), 3, 3))
     frame[:, 0, 0], frame[:, 0, 1] = c, -s

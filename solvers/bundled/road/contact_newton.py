@@ -70,7 +70,7 @@ class ContactNewton:
         self.flat = self._flat_height(tyre.model.mesh.X, np.flatnonzero(~symmetry.free.any(1)))
         self.road = road.settled(road.forces(U, self.free_radius))
         tyre.residual(U)
-        self.order = Elimination([t[0] for t in tyre.tangents()], symmetry, tyre.around)
+        self.order = Elimination([t[0] for t in tyre.tangents()], symmetry)
         self.parts = symmetry.parts(U)
         self.height = self.free_radius
         self.load = 0.0

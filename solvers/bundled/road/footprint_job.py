@@ -29,7 +29,7 @@ from ..section.parts.elastic import Elastic
 from ..section.parts.hourglass import Hourglass
 from ..section.parts.pressure import Pressure
 from ..section.symmetry import HALF_TURN
-from ..solid3d.circumference import half_circle
+from ..solid3d.circumference import HalfCircle, half_circle, waves_beyond
 from ..solid3d.revolved import Revolved
 from .contact import flat_road
 from .contact_newton import ContactNewton, PressedState
@@ -149,8 +149,9 @@ def press(
 
     Raises DeckError; RunFailed where not even the first load is reached.
     """
-    around = half_circle(data.lengths)
-    k = len(around.angles)
+    by_elements = half_circle(data.lengths)
+    rings = by_elements.angles
+    around = waves_beyond(data.lengths) if vibrations else by_elements
     if data.tread not in model.mesh.faces:
         raise DeckError(0, f"surface {data.tread} is not defined in the section's job")
     if any(isinstance(p, Elastic) and isinstance(p.law, Hourglass) for p in model.parts):
@@ -163,8 +164,8 @@ def press(
     road = flat_road(model.mesh.X, tread, around, data.stiffness, data.friction, data.elastic_slip)
     tyre = Revolved(model, loads, around)
     try:
-        symmetry = HalfTurn(model.mesh, equations.equation < equations.size, k)
-        work = ContactNewton(tyre, symmetry, road, np.repeat(U[None], k, 0), check)
+        symmetry = HalfTurn(model.mesh, equations.equation < equations.size, around)
+        work = ContactNewton(tyre, symmetry, road, np.multiply.outer(around.turn(0).real, U), check)
     except Refused as error:
         raise DeckError(0, f"a pressed tyre must be symmetric: {error}") from None
     footprints: list[dict[str, Any]] = []
@@ -172,9 +173,9 @@ def press(
     for load in wanted:
         try:
             found = work.to(load)
-            footprint = _footprint(work, found, load, tread)
+            footprint = _footprint(work, found, load, tread, rings)
             if load in vibrations:
-                footprint |= _modes(work, found, vibrations[load], tread, equations, U)
+                footprint |= _modes(work, found, vibrations[load], tread, equations, U, rings)
         except (RunFailed, np.linalg.LinAlgError) as error:
             cause = getattr(error, "cause", "crashed")
             if cause == "timed_out" and work.load:
@@ -186,24 +187,27 @@ def press(
         footprints.append(footprint)
         reached = len(footprints), len(wanted)
         log.info("load %d of %d is reached: %g N", *reached, load, extra={"loads": reached})
-    rest = around.angles[1:-1][::-1]
     return {
         "free_radius_m": work.free_radius,
-        "angles": np.concatenate([around.angles, 2 * np.pi - rest]),
+        "angles": np.concatenate([rings, 2 * np.pi - rings[-2:0:-1]]),
         "footprints": footprints,
         "failure": failure,
         "cause": cause,
     }
 
 
-def _footprint(work: ContactNewton, found: PressedState, load: float, tread: Any) -> dict[str, Any]:
-    """One load's results on the whole tyre, whose other half is this one's half turn."""
-    symmetry, around = work.symmetry, work.tyre.around
+def _footprint(
+    work: ContactNewton, found: PressedState, load: float, tread: Any, angles: Array
+) -> dict[str, Any]:
+    """One load's results on the whole tyre, whose other half is this one's half turn; ``angles``
+    of the rings."""
+    symmetry, around = work.symmetry, work.symmetry.around
     U = symmetry.spread(found.parts)
     contact = found.contact
     other = symmetry.other
-    turned = np.empty_like(U)
-    turned[:, other] = U * HALF_TURN
+    displacement = _at(around, angles, U)
+    turned = np.empty_like(displacement)
+    turned[:, other] = displacement * HALF_TURN
     area = work.tyre.surface_shares(tread)[: len(contact.local), contact.road.nodes]
     rings, columns = np.nonzero(contact.local[..., 0] > 0)
     force, place = contact.local[rings, columns], contact.positions[rings, columns, 1:]
@@ -214,15 +218,15 @@ def _footprint(work: ContactNewton, found: PressedState, load: float, tread: Any
     )
     force = force * np.where(rings == 0, 2.0, 1.0)[:, None]
     again = rings > 0
-    ring = np.concatenate([rings, (2 * (len(around.angles) - 1) - rings)[again]])
+    ring = np.concatenate([rings, (2 * (len(angles) - 1) - rings)[again]])
     both = lambda a, sign=1.0: np.concatenate([a, sign * a[again]])
     size = both(share)
     residual = work.tyre.residual(U)
     held = ~symmetry.free
-    c, s = np.cos(around.angles)[:, None], np.sin(around.angles)[:, None]
+    turn = around.turn(1)[:, None]
     at_rim = residual * held
     # the half turn cancels what the two halves bear along and across
-    down = float((c * at_rim[..., 0] - s * at_rim[..., 1]).sum())
+    down = float((turn.real * at_rim[..., 0] - turn.imag * at_rim[..., 1]).sum())
     return {
         "load_N": load,
         "road_N": contact.force,
@@ -237,7 +241,7 @@ def _footprint(work: ContactNewton, found: PressedState, load: float, tread: Any
         "contact_area_m2": contact_area(contact, area, around),
         "pressure_Pa": both(force[:, 0]) / size,
         "traction_Pa": both(force[:, 1:], -1.0) / size[:, None],
-        "displacement": np.concatenate([U, turned[1:-1][::-1]]),
+        "displacement": np.concatenate([displacement, turned[1:-1][::-1]]),
     }
 
 
@@ -248,8 +252,9 @@ def _modes(
     tread: Lines,
     equations: Numbering,
     inflated: Array,
+    angles: Array,
 ) -> dict[str, Array]:
-    """The whole tyre's modes about one load, their shapes at the wanted nodes."""
+    """The whole tyre's modes about one load, their shapes at the wanted nodes of the rings."""
     tyre = Revolved(wanted.model, work.tyre.loads, work.tyre.around)
     U = work.symmetry.spread(found.parts)
     work.tyre.residual(U)
@@ -258,8 +263,9 @@ def _modes(
     vibration = Vibration(wanted.model, inflated, tyre.loads, equations, 0.0)
     start = lowest_of_all(vibration, 2 * (wanted.count + 2 * SPARE), work.check)
     work.rest()
-    modes = loaded_modes(tyre, work.symmetry.free, U, hold, start, wanted.count, work.check)
-    shapes, other = modes.shapes, work.symmetry.other
+    modes = loaded_modes(tyre, work.symmetry, U, hold, start, wanted.count, work.check)
+    other = work.symmetry.other
+    shapes = np.array([_at(work.symmetry.around, angles, shape) for shape in modes.shapes])
     turned = modes.parity[:, None, None, None] * (HALF_TURN * shapes)[:, :, other]
     whole = np.concatenate([shapes, turned[:, 1:-1][:, ::-1]], 1)
     return {
@@ -267,6 +273,11 @@ def _modes(
         "mode_node": wanted.nodes,
         "mode_shape": whole[:, :, wanted.nodes],
     }
+
+
+def _at(around: HalfCircle, angles: Array, U: Array) -> Array:
+    """Values (a, n, 3) of a field (k, n, 3) at angles."""
+    return np.asarray((around.at(angles) @ U.reshape(len(U), -1)).reshape(-1, *U.shape[1:]))
 
 
 def _images(nodes: Array, other: Array) -> Array:

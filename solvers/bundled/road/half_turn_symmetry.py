@@ -7,7 +7,8 @@ a half turn about the vertical, although its cords break both mirror symmetries.
     U(theta, z) = a + b,    U(theta, -z) = p S (a - b),    S = diag(1, 1, -1),
 
 a even and b odd under theta -> -theta (u_theta the other way round); p = 1 for what the half turn
-keeps, -1 for what it reverses. Only the cords' bias couples a with b.
+keeps, -1 for what it reverses. Only the cords' bias couples a with b. Of the functions round the
+tyre (`HalfCircle`) each component of a part has the even or the odd ones.
 """
 
 from __future__ import annotations
@@ -17,59 +18,80 @@ import numpy as np
 from ...errors import Refused
 from ..section.mesh import DeckMesh
 from ..section.symmetry import MIRROR_SIGNS, SAME_PLACE, mirror_images
+from ..solid3d.circumference import HalfCircle
 
 Array = np.ndarray
+SAME_ANGLE = 1e-9  # rad
+ODD = np.array([[False, True, False], [True, False, True]])  # of a and b, under theta -> -theta
 
 
 class HalfTurn:
-    """Fields (k, n, 3) on half the circumference as parts (2, k, q, 3) on the nodes z >= 0.
+    """Fields (k, n, 3) on half the circumference as parts (2, f, q, 3) on the nodes z >= 0.
 
-    mesh; free (n, 3); angles k; parity p; ``other`` (n,): each node's mirror image.
-    Raises Refused.
+    mesh; free (n, 3); functions round the tyre ``around``, of which a part has f; parity p;
+    ``other`` (n,): each node's mirror image. Raises Refused.
     """
 
-    def __init__(self, mesh: DeckMesh, free: Array, angles: int, parity: int = 1):
+    def __init__(self, mesh: DeckMesh, free: Array, around: HalfCircle, parity: int = 1):
         X = mesh.X.real
         other = mirror_images(X)
         if (other < 0).any() or (free != free[other]).any():
             raise Refused("the section or its supports differ between z and -z")
-        self.other = other
+        self.other, self.around = other, around
         self.nodes = np.flatnonzero(X[:, 1] > -SAME_PLACE)
         self.beyond = other[self.nodes]
-        self.parity, self.shape = parity, (angles, len(X), 3)
+        self.parity, self.shape = parity, (around.N.shape[1], len(X), 3)
         middle = self.nodes == self.beyond
         self._middle = middle
         self.free = free
-        mask = np.broadcast_to(free[self.nodes], (2, angles, len(self.nodes), 3)).copy()
-        mask[0][[0, -1], :, 1] = False
-        mask[1][[0, -1], :, 0::2] = False
+        # rows of the k functions that a part's component has (part, component, f)
+        self._rows = np.where(ODD[..., None], around.odd, around.even)
+        mask = np.tile(free[self.nodes], (2, len(around.even), 1, 1))
+        planes = np.flatnonzero(abs(np.sin(around.angles)) < SAME_ANGLE)
+        for part, odd in zip(mask, ODD, strict=True):
+            part[np.ix_(planes, np.arange(len(self.nodes)), odd)] = False
         even = 0 if parity == 1 else 1  # which part is even in z
         mask[even][:, middle, 2] = False
         mask[1 - even][:, middle, :2] = False
         self.mask = mask
 
     def spread(self, parts: Array) -> Array:
-        """The field of two parts (2, k, q, 3)."""
-        U = np.empty(self.shape)
-        U[:, self.beyond] = self.parity * MIRROR_SIGNS * (parts[0] - parts[1])
-        U[:, self.nodes] = parts[0] + parts[1]  # nodes of the middle keep the sum
+        """The field of two parts (2, f, q, 3)."""
+        U, here = np.empty(self.shape), np.zeros((self.shape[0], len(self.nodes), 3))
+        there = here.copy()
+        for component, (a, b) in enumerate(self._rows.swapaxes(0, 1)):
+            here[a, :, component] = there[a, :, component] = parts[0, ..., component]
+            here[b, :, component] += parts[1, ..., component]
+            there[b, :, component] -= parts[1, ..., component]
+        U[:, self.beyond] = self.parity * MIRROR_SIGNS * there
+        U[:, self.nodes] = here  # nodes of the middle keep the sum
         return U
 
     def gather(self, F: Array) -> Array:
         """Its transpose: forces on the two parts, zero on what is held."""
         here, there = F[:, self.nodes], self.parity * MIRROR_SIGNS * F[:, self.beyond]
         there[:, self._middle] = 0.0
-        return np.stack([here + there, here - there]) * self.mask
+        return self._both(here, there) * self.mask
 
     def parts(self, U: Array) -> Array:
         """The two parts of a field that has the symmetry."""
         here, there = U[:, self.nodes], self.parity * MIRROR_SIGNS * U[:, self.beyond]
-        return np.stack([here + there, here - there]) / 2
+        return self._both(here, there) / 2
+
+    def _both(self, here: Array, there: Array) -> Array:
+        """The sum on the functions of a, the difference on those of b."""
+        pair = (here + there, here - there)
+        parts = np.empty(self.mask.shape)
+        for part, values, rows in zip(parts, pair, self._rows, strict=True):
+            for component, own in enumerate(rows):
+                part[..., component] = values[own, :, component]
+        return parts
 
     def blocks(self, stiffness: Array) -> Array:
-        """Of stiffness at single nodes (k, n, 3, 3), what acts on the parts (k, q, 6, 6)."""
-        here = stiffness[:, self.nodes]
-        there = stiffness[:, self.beyond] * np.multiply.outer(MIRROR_SIGNS, MIRROR_SIGNS)
+        """Of stiffness at single nodes (k, n, 3, 3), what acts on the parts (f, q, 6, 6)."""
+        here = stiffness[: len(self.mask[0]), self.nodes]
+        there = stiffness[: len(self.mask[0]), self.beyond]
+        there = there * np.multiply.outer(MIRROR_SIGNS, MIRROR_SIGNS)
         there[:, self._middle] = 0.0
         same, cross = here + there, here - there
         free = self.mask.transpose(1, 2, 0, 3).reshape(*same.shape[:2], 6)

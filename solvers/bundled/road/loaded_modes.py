@@ -40,7 +40,7 @@ class LoadedModes:
 
 def loaded_modes(
     tyre: Revolved,
-    free: Array,
+    pressed: HalfTurn,
     U: Array,
     hold: Contact,
     unloaded: list[HarmonicModes],
@@ -49,11 +49,14 @@ def loaded_modes(
 ) -> LoadedModes:
     """The ``count`` lowest modes about U (k, n, 3).
 
-    free (n, 3); hold: what holds the patch; unloaded: the inflated tyre's modes, to start from.
+    pressed: what U keeps; hold: what holds the patch; unloaded: the inflated tyre's modes, to start
+    from.
     Raises RunFailed; what ``check`` raises to stop.
     """
     tyre.residual(U)
-    symmetries = [HalfTurn(tyre.model.mesh, free, len(U), parity) for parity in (1, -1)]
+    symmetries = [
+        HalfTurn(tyre.model.mesh, pressed.free, pressed.around, parity) for parity in (1, -1)
+    ]
     wanted = [count // 2 + SPARE] * 2
     kinds = [
         _one_parity(tyre, symmetry, hold, unloaded, wanted[0], check) for symmetry in symmetries
@@ -84,8 +87,8 @@ def _one_parity(
 ) -> tuple[Array, Array]:
     """omega^2 (count,) and shapes (count, k, n, 3) of the modes that keep or reverse the turn."""
     tangents = tyre.tangents(np.float32)
-    shape = (2, symmetry.shape[0], len(symmetry.nodes), 3)
-    order = Elimination([t[0] for t in tangents], symmetry, tyre.around)
+    shape = symmetry.mask.shape
+    order = Elimination([t[0] for t in tangents], symmetry)
     check()
     try:
         factor = Factor(order, tangents, hold.stiffness(*symmetry.shape[:2], positive=True))
@@ -105,7 +108,7 @@ def _one_parity(
     def inverse(block: Array) -> Array:
         return factor.solve(block.reshape(-1, *shape)).reshape(len(block), -1)
 
-    waves = standing_waves(unloaded, symmetry, tyre.around)
+    waves = standing_waves(unloaded, symmetry)
     start = np.array([(symmetry.parts(V) * symmetry.mask).ravel() for V in waves])
     stiffness = each(lambda V: tyre.product(V) + hold.product(V))
     values, x = davidson.lowest(stiffness, each(weigh), inverse, start, count)
@@ -127,13 +130,11 @@ class Inertia:
         return np.ascontiguousarray((self._section @ flat).reshape(n, k, 3).swapaxes(0, 1))
 
 
-def standing_waves(
-    unloaded: list[HarmonicModes], symmetry: HalfTurn, around: Circumference
-) -> list[Array]:
+def standing_waves(unloaded: list[HarmonicModes], symmetry: HalfTurn) -> list[Array]:
     """What the modes of the inflated tyre have of the fold's parity, fields (k, n, 3)."""
     waves = []
     for modes in unloaded:
-        turn = np.exp(1j * modes.n * around.angles)[:, None, None]
+        turn = symmetry.around.turn(modes.n)[:, None, None]
         for shape in modes.shapes:
             for phase in (1.0, 1j) if modes.n else (1.0,):
                 ahead, behind = (phase * shape * turn).real, (phase * shape * turn.conj()).real

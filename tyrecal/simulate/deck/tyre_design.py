@@ -204,7 +204,7 @@ def fine_enough(angles_deg: Sequence[float], waves: int) -> list[float]:
     kept = list(takewhile(lambda angle: angle <= longest, angles_deg))
     rest = 180 - sum(kept)
     more = ceil(rest / longest - 1e-9)
-    return [*kept, *([rest / more] * more)]
+    return [*kept, *(rest / more for _ in range(more))]
 
 
 def _calculix(tyre: Tyre, env: Any, request: DeckRequest) -> dict[str, str]:
