@@ -20,7 +20,7 @@ import numpy as np
 from .hyperelastic import Hyperelastic
 
 Array = np.ndarray
-SLOPE_STEP = 1e-3  # of F: its fourth power is left, and round-off over it
+STRETCH_STEP = 1e-3  # of F: its fourth power is left, and round-off over it
 
 
 @dataclass(frozen=True)
@@ -92,9 +92,9 @@ def _with_slope(function: Callable[[Array], Array], z: Array) -> Array:
     size = abs(z.imag).max()
     if size == 0.0:
         return function(z.real) + 0j
-    way = SLOPE_STEP / size * z.imag
+    way = STRETCH_STEP / size * z.imag
     near, far = (function(z.real + k * way) - function(z.real - k * way) for k in (1, 2))
-    return function(z.real) + 1j * size * (8 * near - far) / (12 * SLOPE_STEP)
+    return function(z.real) + 1j * size * (8 * near - far) / (12 * STRETCH_STEP)
 
 
 def over(difference: Array, d: Array, limit: Array | float) -> Array:
