@@ -33,7 +33,7 @@ class Newton:
     asked: list[tuple[float, float, int]] = field(default_factory=list)
 
     def __call__(
-        self, model: Model, numbering: object, loads: list[Pressure], mass: Array, U: Array, *rest
+        self, model: Model, numbering: object, loads: list[Pressure], mass: object, U: Array, *rest
     ) -> tuple[Array | None, int, str]:
         tension, longest = rest
         assert tension == (0.0 if U.any() else pytest.approx(0.3 * 0.01 * loads[0].pressure))
@@ -132,7 +132,7 @@ def test_how_newtons_method_ends(small: Model) -> None:
     number = support.numbering(small, support.held(small, [2, 3]))  # the outside
 
     def run(U: Array, pressure: float, longest: int, mass: float) -> tuple[Array | None, int, str]:
-        masses = np.full(number.size, mass)
+        masses = lambda: np.full(number.size, mass)
         loads = support.cavity(small, pressure)
         return inflation._newton(small, number, loads, masses, U, 0.0, longest)
 

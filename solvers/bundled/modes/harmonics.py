@@ -166,8 +166,8 @@ class Vibration:
             band = K0.copy(order="F")
         else:
             band = np.empty(K0.shape, complex, order="F")
-            band.real = K0 + n * n * K2
-            band.imag = n * K1
+            np.add(K0, n * n * K2, out=band.real)
+            np.multiply(n, K1, out=band.imag)
         if self._shifted_mass is not None:
             band -= self.shift * self._shifted_mass
         try:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import cached_property
 from operator import methodcaller
 
 import numpy as np
@@ -76,10 +77,14 @@ class _Solver:
         # a slack membrane has no stiffness against pressure yet, so the first tangents from rest
         # carry the tension p rho that the cords are about to take up
         self.tension = self.full * SECTION_RADIUS * np.ptp(model.mesh.X[:, 0].real)
-        lumped = mechanics.mass(model).diagonal()  # row sums are negative at Q8 corners
-        self.mass = numbering.gather(np.repeat(lumped[:, None], 3, 1))
         self.factorisations = 0
         self.why = ""
+
+    @cached_property
+    def mass(self) -> Array:
+        """Lumped, of each equation (size,); row sums are negative at Q8 corners."""
+        lumped = mechanics.mass(self.model).diagonal()
+        return self.numbering.gather(np.repeat(lumped[:, None], 3, 1))
 
     def __call__(self, U: Array, share: float, stiffness: float, longest: int) -> Array | None:
         """Displacements from the start U, or None and ``why``."""
@@ -90,7 +95,7 @@ class _Solver:
         ]
         tension = 0.0 if U.any() else share * self.tension
         found, used, self.why = _newton(
-            model, self.numbering, loads, self.mass, U, tension, longest
+            model, self.numbering, loads, lambda: self.mass, U, tension, longest
         )
         self.factorisations += used
         return found
@@ -134,7 +139,7 @@ def _newton(
     model: Model,
     numbering: Numbering,
     loads: Sequence[TyrePart],
-    mass: Array,
+    mass: Callable[[], Array],
     U: Array,
     tension: float,
     longest: int,
@@ -156,7 +161,8 @@ def _newton(
         while True:
             used += 1
             held = band.copy(order="F")
-            held[0] += inertia * mass
+            if inertia:
+                held[0] += inertia * mass()
             try:
                 step = -Cholesky(held).solve(force)
                 break

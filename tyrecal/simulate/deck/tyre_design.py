@@ -6,6 +6,7 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
+from functools import cached_property
 from itertools import takewhile
 from math import ceil
 from typing import Any
@@ -52,7 +53,7 @@ class TyreDesign:
         """The case with these values. Raises ValueError."""
         return TyreDesign(self.case, values, self.plain)
 
-    @property
+    @cached_property
     def nominal(self) -> TyreDesign | None:
         """The case with its variables at their start, pressure and effects as its file has them."""
         read = self.plain.as_read or self.plain

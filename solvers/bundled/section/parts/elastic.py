@@ -19,7 +19,7 @@ import numpy as np
 
 from ....errors import Inverted
 from ..laws.energy_law import EnergyLaw
-from .part import AtStations, ModeShapes, Precision, Rows, Tangents, TyrePart, contract
+from .part import AtStations, ModeShapes, Precision, Rows, Tangents, TyrePart, contract, real_times
 
 Array = np.ndarray
 
@@ -37,7 +37,7 @@ class Elastic(TyrePart):
         """z (e * g, k)."""
         e, g, k, d = self.rows.B0.shape
         u = U[self.connectivity].reshape(e, d, 1)
-        z = (self.rows.B0.reshape(e, g * k, d) @ u).reshape(e, g, k)
+        z = real_times(self.rows.B0.reshape(e, g * k, d), u).reshape(e, g, k)
         return (z + self.rows.rest).reshape(e * g, k)
 
     def energy(self, U: Array) -> Any:
@@ -46,7 +46,8 @@ class Elastic(TyrePart):
     def force(self, U: Array) -> Array:
         e, g, k, d = self.rows.B0.shape
         P = self.law.force(self.at(U)).reshape(e, g, k) * self.rows.weights[..., None]
-        return np.asarray((P.reshape(e, 1, g * k) @ self.rows.B0.reshape(e, g * k, d))[:, 0])
+        transposed = self.rows.B0.reshape(e, g * k, d).swapaxes(1, 2)
+        return real_times(transposed, P.reshape(e, g * k, 1))[..., 0]
 
     def tangents(self, U: Array, harmonics: bool) -> Tangents:
         B0, B1, around = self.rows.B0, self.rows.B1, self.rows.around

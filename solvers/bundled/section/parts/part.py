@@ -26,6 +26,7 @@ IN_PLANE = np.diag([1.0, 1.0, 0.0])  # of the wheel
 SPIN_AXIS = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])  # e_z x
 Precision = type[np.floating[Any]]
 Tangents = tuple[Array, Array | None, Array | None]
+TOGETHER = 5  # modes whose gradients are formed at once
 
 
 class TyrePart(ABC):
@@ -194,9 +195,14 @@ class ModeShapes:
                 return G
         kind = np.result_type(rows.B0, rows.hoop, self.modes[0][1])
         G = np.empty((len(self.modes), *rows.B0.shape[:3], rows.B0.shape[2]), kind)
-        for j, (n, a, b) in enumerate(self.modes):
-            z = np.concatenate(_gradients(connectivity, rows, a, b, n), -1)
-            np.matmul(z, z.swapaxes(-1, -2), out=G[j])
+        for first in range(0, len(self.modes), TOGETHER):
+            modes = self.modes[first : first + TOGETHER]
+            n, a, b = (np.concatenate(own) for own in zip(*modes, strict=True))
+            z = _gradients(connectivity, rows, a, b, n)
+            ends = np.cumsum([len(own) for own, _, _ in modes])[:-1]
+            for j, part in enumerate(np.split(z, ends, -1), first):
+                columns = part.reshape(*rows.B0.shape[:3], -1)
+                np.matmul(columns, columns.swapaxes(-1, -2), out=G[j])
         if not np.iscomplexobj(G):
             self.known.append((rows, G))
         return G
@@ -210,20 +216,23 @@ def contract(A: Array, G: Array) -> Array:
     return np.asarray(G @ A.real + 1j * (G @ A.imag))
 
 
-def _gradients(
-    connectivity: Array, rows: Rows, real: Array, imag: Array, n: Array
-) -> tuple[Array, Array]:
-    """Real and imaginary part of (B0 + i n B1)(a + i b), each (e, g, k, p)."""
+def _gradients(connectivity: Array, rows: Rows, real: Array, imag: Array, n: Array) -> Array:
+    """Real and imaginary parts of (B0 + i n B1)(a + i b), (e, g, k, 2, p)."""
     e, g, k, d = rows.B0.shape
-    B = rows.B0.reshape(e, g * k, d)
-    z, around = [], []
-    for part in (real, imag):
-        u = np.moveaxis(part[:, connectivity], 0, -1)  # (e, a, 3, p)
-        z.append((B @ u.reshape(e, d, -1)).reshape(e, g, k, -1))
-        around.append(np.einsum("ega,eaip->egip", rows.hoop, u) * n)
-    z[0][:, :, rows.around] -= around[1]
-    z[1][:, :, rows.around] += around[0]
-    return z[0], z[1]
+    u = np.moveaxis(np.stack([real[:, connectivity], imag[:, connectivity]]), 1, -1)
+    u = np.ascontiguousarray(np.moveaxis(u, 0, -2))  # (e, a, 3, 2, p)
+    z = (rows.B0.reshape(e, g * k, d) @ u.reshape(e, d, -1)).reshape(e, g, k, 2, -1)
+    around = (rows.hoop @ u.reshape(e, d // 3, -1)).reshape(e, g, 3, 2, -1) * n
+    z[:, :, rows.around, 0] -= around[..., 1, :]
+    z[:, :, rows.around, 1] += around[..., 0, :]
+    return np.asarray(z)
+
+
+def real_times(B: Array, z: Array) -> Array:
+    """B @ z (e, k, 1) for columns z (e, d, 1); a real B is not made complex for complex ones."""
+    if np.iscomplexobj(B) or not np.iscomplexobj(z):
+        return np.asarray(B @ z)
+    return np.asarray((B @ np.ascontiguousarray(z).view(float)).view(complex))
 
 
 @dataclass(frozen=True)
