@@ -62,7 +62,8 @@ class Table:
 class ResultPart(BaseModel):
     """A piece of a result file; numbers are finite, SI or as named."""
 
-    model_config = ConfigDict(extra="ignore", allow_inf_nan=False, frozen=True)
+    # built by who reads a result: a study imports many kinds, and writes one
+    model_config = ConfigDict(extra="ignore", allow_inf_nan=False, frozen=True, defer_build=True)
 
     @classmethod
     def columns(cls) -> dict[str, Column]:

@@ -42,7 +42,7 @@ Field3D = Annotated[Any, _shaped(REAL, None, None, 3)]
 
 
 class _Part(BaseModel):
-    model_config = ConfigDict(strict=True)
+    model_config = ConfigDict(strict=True, defer_build=True)  # built by who reads one
 
 
 class _Failure(_Part):
