@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.sparse import csr_array
 from tyrecal_solvers.bundled.deck import grammar, keywords
 from tyrecal_solvers.bundled.modes import harmonics
 from tyrecal_solvers.bundled.road.contact_newton import ContactNewton, PressedState
@@ -238,6 +239,17 @@ def dense(parts: list[tuple[Array, Array]], n: int) -> Array:
         e = (3 * connectivity[:, :, None] + np.arange(3)).reshape(len(connectivity), -1)
         np.add.at(K, (e[:, :, None], e[:, None, :]), values)
     return K
+
+
+def sparse(parts: list[tuple[Array, Array]], n: int) -> csr_array:
+    """The same without the zeros."""
+    places, values = [], []
+    for connectivity, matrices in parts:
+        e = (3 * connectivity[:, :, None] + np.arange(3)).reshape(len(connectivity), -1)
+        pair = np.repeat(e, e.shape[1], 1).ravel(), np.tile(e, (1, e.shape[1])).ravel()
+        places.append(np.stack(pair))
+        values.append(matrices.ravel())
+    return csr_array((np.concatenate(values), np.hstack(places)), (3 * n, 3 * n))
 
 
 def order(errors: Sequence[float], ratio: float = 2.0) -> Array:

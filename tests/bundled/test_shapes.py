@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import factorial
+
 import numpy as np
 import pytest
 from tyrecal_solvers.bundled.section import shapes
@@ -77,6 +79,44 @@ def test_gauss_exactness(points: int, dimension: int) -> None:
             wanted = np.prod([exact[p] for p in powers])
             assert w @ monomial(x, powers) == pytest.approx(wanted, abs=1e-14)
     assert abs(w @ x[:, 0] ** (2 * points) / 2 ** (dimension - 1) - exact[-1]) > 1e-2
+
+
+TRIANGLE = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [0.5, 0.0], [0.5, 0.5], [0.0, 0.5]])
+OF_TRIANGLE = [(0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)]  # i, j of x^i y^j
+
+
+@pytest.mark.parametrize("nodes", [3, 6])
+@pytest.mark.parametrize(("points", "degree"), [(1, 1), (3, 2), (7, 5)])
+def test_triangles(nodes: int, points: int, degree: int) -> None:
+    """N and dN hold every polynomial of the element's degree, which fixes both; the points have the
+    integral i! j! / (i + j + 2)! of x^i y^j up to their degree, and no further."""
+    r = shapes.triangle(nodes, points)
+    x = r.N[:, :3] @ TRIANGLE[:3] if nodes == 3 else r.N @ TRIANGLE
+    for powers in OF_TRIANGLE[:nodes]:
+        q = monomial(TRIANGLE[:nodes], powers)
+        np.testing.assert_allclose(r.N @ q, monomial(x, powers), atol=1e-14)
+        got = np.einsum("gak,a->gk", r.dN, q)
+        np.testing.assert_allclose(got, slope(x, powers), atol=1e-14)
+    misses = []
+    for i in range(degree + 2):
+        for j in range(degree + 2 - i):
+            exact = factorial(i) * factorial(j) / factorial(i + j + 2)
+            error = abs(r.weights @ monomial(x, (i, j)) - exact)
+            assert error < 1e-15 or i + j > degree
+            misses += [error] if i + j == degree + 1 else []
+    assert max(misses) > 1e-5
+
+
+@pytest.mark.parametrize("kind", [k for k, each in shapes.TYPES.items() if each.faces])
+def test_faces_of_every_solid(kind: str) -> None:
+    """Face S_k of corners k and k + 1, its midside between them; as many faces as corners."""
+    each = shapes.TYPES[kind]
+    corners = len(each.faces)
+    places = NODES[each.nodes] if corners == 4 else TRIANGLE[: each.nodes]
+    for k, face in enumerate(each.faces):
+        assert (face[0], face[-1]) == (k, (k + 1) % corners)
+        if len(face) == 3:
+            np.testing.assert_array_equal(2 * places[face[1]], places[face[0]] + places[face[2]])
 
 
 def test_faces_run_along_the_edges() -> None:

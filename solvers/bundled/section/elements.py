@@ -22,13 +22,15 @@ Array = np.ndarray
 
 @dataclass(frozen=True)
 class Solids:
-    """Quadrilaterals of one type, at Gauss points; B1 is as in `parts.elastic`."""
+    """Quadrilaterals or triangles of one type, at Gauss points; B1 is as in `parts.elastic`."""
 
     connectivity: Array  # (e, a)
     weights: Array  # (e, g): w det(dX/dxi) R, m2 per radian
     B0: Array  # (e, g, 9, 3a)
     hoop: Array  # (e, g, a): N / R, the only rows of B1
-    hourglass: Array | None  # (e, a), of elements with one Gauss point
+    hourglass: Array | None  # (e, a), of quadrilaterals with one Gauss point
+    # (e, g, g), of what the points have onto the pressure's terms; None: onto itself
+    projection: Array | None
     # a rule that integrates the mass in full
     mass_N: Array  # (g', a)
     mass_weights: Array  # (e, g')
@@ -36,8 +38,8 @@ class Solids:
     def pick(self, rows: Array) -> Solids:
         """Some of the elements."""
         own = {each.name: getattr(self, each.name) for each in fields(self)}
-        whole = ("mass_N",) if self.hourglass is not None else ("mass_N", "hourglass")
-        return Solids(**{name: v if name in whole else v[rows] for name, v in own.items()})
+        kept = {name for name, v in own.items() if name == "mass_N" or v is None}
+        return Solids(**{name: v if name in kept else v[rows] for name, v in own.items()})
 
 
 def solids(
@@ -63,7 +65,8 @@ def solids(
         weights * share,
         B0.reshape(e, g, 9, 3 * a),
         hoop,
-        _hourglass(X[connectivity], gradient[:, 0], weights[:, 0]) if kind.points == 1 else None,
+        _hourglass(X[connectivity], gradient[:, 0], weights[:, 0]) if (g, a) == (1, 4) else None,
+        _projection(rule.N @ X[connectivity], weights, kind.pressures),
         mass_rule.N,
         mass_weights * share,
     )
@@ -94,6 +97,17 @@ def _hourglass(corners: Array, gradient: Array, weights: Array) -> Array:
     h = np.array([1.0, -1.0, 1.0, -1.0])
     gamma = (h - np.einsum("a,eaj,ebj->eb", h, corners, gradient)) / 4
     return gamma * np.sqrt(weights * (gradient**2).sum((1, 2)))[:, None]
+
+
+def _projection(x: Array, weights: Array, terms: int) -> Array | None:
+    """Q (Q^T w Q)^-1 Q^T w, the mean-square fit of the terms Q = 1, R, Z to values at the points
+    x (e, g, 2) with their weights (e, g)."""
+    e, g, _ = x.shape
+    if terms in (0, g):
+        return None
+    Q = np.concatenate([np.ones((e, g, 1)), x - x.mean(1, keepdims=True)], 2)[..., :terms]
+    weighted = Q.swapaxes(1, 2) * weights[:, None]
+    return np.asarray(Q @ np.linalg.solve(weighted @ Q, weighted))
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,9 @@ import numpy as np
 from ...errors import Indefinite, NoEquilibrium
 from . import mechanics
 from .band import Cholesky, Numbering
+from .laws.hyperelastic import Hyperelastic
 from .model import Model
+from .parts.elastic import Elastic
 from .parts.part import TyrePart
 from .parts.pressure import Pressure
 
@@ -23,6 +25,7 @@ MAX_ITERATIONS = 30
 MAX_QUICK_ITERATIONS = 11  # iterations after which another path is likely to be shorter
 STIFFENING = 8.0  # multiple of the rubber's stiffness that inflates without trouble
 SECTION_RADIUS = 0.3  # meridional radius of curvature over the section's height, for the start
+EASED = 100.0  # bulk over shear modulus of rubber that inflates in few iterations
 MIN_INERTIA, MAX_INERTIA = 4e5, 4e15  # of the inertia that holds back a wrinkling path, rad2/s2
 TENSION_FACTOR = 0.05  # factor on the artificial tension from one iteration to the next
 
@@ -44,10 +47,23 @@ def equilibrium(
     steps. Each is another path to the same equilibrium. ``check`` is called between steps and may
     raise to stop.
 
+    Nearly incompressible rubber is made so afterwards: Newton's straight steps change its volume.
+
     Raises NoEquilibrium with the pressure that was reached.
     """
     solve = _Solver(model, numbering, loads)
-    U = None
+    laws = [
+        p.law for p in model.parts if isinstance(p, Elastic) and isinstance(p.law, Hyperelastic)
+    ]
+    tightest = max((law.bulk_over_shear.max() for law in laws), default=0.0)
+    if tightest > EASED:
+        solve.model = model.with_laws(methodcaller("eased", EASED))
+        start, guess, solve.model = _reached(solve, start, check, guess), None, model
+    return _reached(solve, start, check, guess), solve.factorisations
+
+
+def _reached(solve: _Solver, start: Array, check: Callable[[], None], guess: Array | None) -> Array:
+    U, numbering = None, solve.numbering
     if guess is not None:
         held = numbering.spread(numbering.gather(guess))  # 0 at the rim
         U = solve(held, 1.0, 1.0, MAX_QUICK_ITERATIONS)
@@ -58,7 +74,7 @@ def equilibrium(
         U = _by_stiffness(solve, start, check)
     if U is None:
         U = _by_pressure(solve, start, check)
-    return U, solve.factorisations
+    return U
 
 
 def stopped(reached: float, pressure: float, why: str) -> NoEquilibrium:

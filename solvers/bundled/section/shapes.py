@@ -1,6 +1,7 @@
 """The section's elements: shape functions and Gauss rules (any finite-element textbook).
 
-Corners run counter-clockwise in the (R, Z) plane, then the midside nodes 1-2, 2-3, 3-4, 4-1.
+Corners run counter-clockwise in the (R, Z) plane, then the midside nodes 1-2, 2-3, 3-4, 4-1, of
+triangles 1-2, 2-3, 3-1.
 """
 
 from __future__ import annotations
@@ -14,6 +15,8 @@ import numpy as np
 CORNERS = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 FACES_QUADRATIC = ((0, 4, 1), (1, 5, 2), (2, 6, 3), (3, 7, 0))
 FACES_LINEAR = ((0, 1), (1, 2), (2, 3), (3, 0))
+FACES_TRIANGLE = ((0, 1), (1, 2), (2, 0))
+FACES_TRIANGLE_QUADRATIC = ((0, 3, 1), (1, 4, 2), (2, 5, 0))
 
 
 @dataclass(frozen=True)
@@ -57,6 +60,33 @@ def quad(nodes: int, points: int) -> Rule:
     return Rule(np.hstack([corner, N]), dN, weights)
 
 
+def _of_triangle(points: int) -> tuple[np.ndarray, np.ndarray]:
+    """Areal coordinates (g, 3) and weights (g) of a half: exact to degree 1, 2 and 5 (Hammer,
+    Marlowe and Stroud, 1956)."""
+    if points == 1:
+        return np.full((1, 3), 1 / 3), np.full(1, 1 / 2)
+    orbit = lambda a: a + (1 - 3 * a) * np.eye(3)
+    if points == 3:
+        return orbit(1 / 6), np.full(3, 1 / 6)
+    a, b = (6 - 15**0.5) / 21, (6 + 15**0.5) / 21
+    areal = np.concatenate([np.full((1, 3), 1 / 3), orbit(a), orbit(b)])
+    low, high = (155 - 15**0.5) / 2400, (155 + 15**0.5) / 2400
+    return areal, np.array([9 / 80, *[low] * 3, *[high] * 3])
+
+
+def triangle(nodes: int, points: int) -> Rule:
+    """Three-node linear or six-node quadratic triangle with 1, 3 or 7 points in all."""
+    areal, weights = _of_triangle(points)
+    slope = np.array([[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]])  # dL_i / dxi
+    if nodes == 3:
+        return Rule(areal, np.broadcast_to(slope, (points, 3, 2)), weights)
+    after = np.roll(areal, -1, 1)
+    N = np.hstack([areal * (2 * areal - 1), 4 * areal * after])
+    corner = (4 * areal - 1)[..., None] * slope
+    midside = 4 * (areal[..., None] * np.roll(slope, -1, 0) + after[..., None] * slope)
+    return Rule(N, np.concatenate([corner, midside], 1), weights)
+
+
 def line(nodes: int, points: int) -> Rule:
     """Two-node or three-node (end, middle, end) line with Gauss points."""
     xi, weights = gauss(points, 1)
@@ -73,16 +103,29 @@ class ElementType:
     """An element by its name in the deck."""
 
     nodes: int
-    rule: Callable[[int], Rule]  # of so many Gauss points a direction
+    rule: Callable[[int], Rule]  # of so many Gauss points a direction, in a triangle in all
     points: int = 2
     mass_points: int = 2  # that integrate the mass in full
     faces: tuple[tuple[int, ...], ...] = ()  # the nodes of a solid's faces; a line has none
+    # terms of the pressure in the element: 1, or 1, R and Z; 0: each point has its own
+    pressures: int = 0
+    hybrid: bool = False  # does not lock where rubber is incompressible
 
 
 TYPES = {
     "CGAX8R": ElementType(8, partial(quad, 8), 2, 3, FACES_QUADRATIC),
+    "CGAX8RH": ElementType(8, partial(quad, 8), 2, 3, FACES_QUADRATIC, 3, True),
     "CGAX8": ElementType(8, partial(quad, 8), 3, 3, FACES_QUADRATIC),
+    "CGAX8H": ElementType(8, partial(quad, 8), 3, 3, FACES_QUADRATIC, 3, True),
     "CGAX4R": ElementType(4, partial(quad, 4), 1, 2, FACES_LINEAR),
+    "CGAX4RH": ElementType(4, partial(quad, 4), 1, 2, FACES_LINEAR, 1, True),
+    "CGAX4": ElementType(4, partial(quad, 4), 2, 2, FACES_LINEAR, 1),  # as ABAQUS integrates it
+    "CGAX4H": ElementType(4, partial(quad, 4), 2, 2, FACES_LINEAR, 1, True),
+    "CGAX6": ElementType(6, partial(triangle, 6), 3, 7, FACES_TRIANGLE_QUADRATIC),
+    # linear in three points, the pressure would lock: 10 % and 0.05 % of a thick tube, two across
+    "CGAX6H": ElementType(6, partial(triangle, 6), 3, 7, FACES_TRIANGLE_QUADRATIC, 1, True),
+    "CGAX3": ElementType(3, partial(triangle, 3), 1, 7, FACES_TRIANGLE),
+    "CGAX3H": ElementType(3, partial(triangle, 3), 1, 7, FACES_TRIANGLE, 1, True),
     "SFMGAX2": ElementType(3, partial(line, 3)),
     "SFMGAX1": ElementType(2, partial(line, 2)),
 }

@@ -46,6 +46,10 @@ class EnergyLaw(ABC):
         """The law with an artificial tension (N/m), as slack parts have it at the start."""
         return self
 
+    def eased(self, ratio: float) -> Self:
+        """The law with no bulk modulus above ``ratio`` times the shear modulus."""
+        return self
+
     def growing(self, table: int) -> Self | None:
         """What grows of the tangent with the modulus table of that place; None: nothing."""
         return None

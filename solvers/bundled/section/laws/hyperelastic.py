@@ -11,7 +11,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import ClassVar, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -20,8 +20,8 @@ from .energy_law import EnergyLaw
 Array = np.ndarray
 MIN_VOLUME_RATIO = 0.2  # over the reference volume: nearly incompressible rubber stays near 1
 # of bulk over shear modulus, which stands for none at all in hybrid elements: Poisson's ratio
-# 0.49995. What it leaves of an answer is of its inverse, and round-off grows with it.
-INCOMPRESSIBLE = 1e4
+# 0.49975. A thick tube then grows by 0.03 % more; Newton's method takes the longer, the larger.
+INCOMPRESSIBLE = 2e3
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -73,6 +73,16 @@ class Hyperelastic(EnergyLaw):
         names = (*cls.shear_moduli, *cls.bulk_moduli, *cls.numbers)
         table = np.array([[getattr(law, name) for law in laws] for name in names])[:, owner]
         return cls(**dict(zip(names, table, strict=True)))
+
+    @property
+    def incompressible(self) -> bool:
+        """Whether U is zero."""
+        return not any(np.any(getattr(self, name)) for name in self.bulk_moduli)
+
+    def nearly_incompressible(self) -> Self:
+        """The same with the bulk modulus 2 / D1 that stands for none."""
+        own: dict[str, Any] = {self.bulk_moduli[0]: INCOMPRESSIBLE / 2 * self.shear_modulus}
+        return replace(self, **own)
 
     def bears(self, z: Array) -> bool:
         return bool(determinant(square(z))[0].min() > MIN_VOLUME_RATIO)
@@ -130,6 +140,14 @@ class Hyperelastic(EnergyLaw):
 
     def stiffened(self, factor: float) -> Self:
         return self.scaled(factor, factor)
+
+    @property
+    def bulk_over_shear(self) -> Array:
+        """K / G of small strains."""
+        return np.asarray((self.volume(np.ones(1))[2] / self.shear_modulus).real)
+
+    def eased(self, ratio: float) -> Self:
+        return self.scaled(1.0, np.minimum(1.0, ratio / self.bulk_over_shear))
 
     def growing(self, table: int) -> Self:
         own = self.scaled(self.table == table, 0.0)

@@ -40,12 +40,18 @@ class Elastic(TyrePart):
         z = real_times(self.rows.B0.reshape(e, g * k, d), u).reshape(e, g, k)
         return (z + self.rows.rest).reshape(e * g, k)
 
+    def law_at(self, z: Array) -> EnergyLaw:
+        """The law at the rows z of all points."""
+        return self.law
+
     def energy(self, U: Array) -> Any:
-        return (self.law.energy(self.at(U)) * self.rows.weights.ravel()).sum()
+        z = self.at(U)
+        return (self.law_at(z).energy(z) * self.rows.weights.ravel()).sum()
 
     def force(self, U: Array) -> Array:
         e, g, k, d = self.rows.B0.shape
-        P = self.law.force(self.at(U)).reshape(e, g, k) * self.rows.weights[..., None]
+        z = self.at(U)
+        P = self.law_at(z).force(z).reshape(e, g, k) * self.rows.weights[..., None]
         transposed = self.rows.B0.reshape(e, g * k, d).swapaxes(1, 2)
         return real_times(transposed, P.reshape(e, g * k, 1))[..., 0]
 
@@ -65,8 +71,8 @@ class Elastic(TyrePart):
     def _tangent(self, U: Array) -> Array:
         """A (e, g, k, k) times the weights."""
         e, g, k, _ = self.rows.B0.shape
-        A = self.law.tangent(self.at(U), self.rows.weights.ravel())
-        return A.reshape(e, g, k, k)
+        z = self.at(U)
+        return self.law_at(z).tangent(z, self.rows.weights.ravel()).reshape(e, g, k, k)
 
     def form(self, U: Array, fields: ModeShapes) -> Array:
         return contract(self._tangent(U), fields.products(self.connectivity, self.rows))
@@ -108,10 +114,14 @@ class ElasticAtStations(AtStations):
             self.rows.rest if self.rows.rest.ndim == 1 else self.rows.rest[:, :, None]
         )
         self.z, self._A = z.reshape(-1, self.k), None
-        self.law = self._law.at_stations(self.e * self.g, z.shape[2])
+        self.law = self.law_at(self._law.at_stations(self.e * self.g, z.shape[2]))
         if not self.law.bears(self.z):
             raise Inverted
         return self._forces(self.law.force(self.z).reshape(z.shape) * self._weights)
+
+    def law_at(self, law: EnergyLaw) -> EnergyLaw:
+        """The law of all points at the rows ``z``."""
+        return law
 
     @property
     def _weights(self) -> Array:

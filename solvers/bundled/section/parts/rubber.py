@@ -16,6 +16,7 @@ from ..elements import Solids
 from ..materials import Material
 from . import hourglass
 from .elastic import Elastic
+from .hybrid import Hybrid
 from .part import Rows, SectionJob, TyrePart, consistent_mass
 
 Array = np.ndarray
@@ -54,17 +55,15 @@ def _sections(job: SectionJob) -> Iterator[tuple[str, _Section]]:
             if material.law is None:
                 needed = "neither *HYPERELASTIC nor *ELASTIC"
                 raise DeckError(k.line, f"material {material.name} of a solid is {needed}")
-            if not np.real(material.law.volume(np.ones(1))[2]) > 0:
-                words = f"material {material.name} is incompressible (D1 is 0, or not there)"
-                raise DeckError(
-                    k.line, f"{words}: its elements must be hybrid, CGAX8RH or the like"
-                )
             control = k.get("CONTROLS")
             if control and control not in controls:
                 raise DeckError(k.line, f"section controls {control} are not defined")
             given = after is not None and after.name == "HOURGLASS STIFFNESS"
             stiffness = after.only_row().number(0) if after and given else None
             for kind, rows in job.by_type(k, shapes.solids()).items():
+                if material.law.incompressible and not shapes.TYPES[kind].hybrid:
+                    words = f"material {material.name} is incompressible (D1 is 0, or not there)"
+                    raise DeckError(k.line, f"{words}: {kind} would lock, {kind}H does not")
                 yield kind, _Section(rows, material, stiffness)
         elif k.name == "HOURGLASS STIFFNESS" and (before is None or before.name != "SOLID SECTION"):
             raise DeckError(
@@ -104,7 +103,8 @@ def _of_one_law(
     for section in sections:
         material, law = section.material, section.material.law
         assert law is not None
-        laws.append(law.scaled(*material.static_scale(job.long_term)))
+        scaled = law.scaled(*material.static_scale(job.long_term))
+        laws.append(scaled.nearly_incompressible() if law.incompressible else scaled)
         place = job.tables.index(material.table) if material.table in job.tables else -1
         ratio = (1.0, 1.0) if place >= 0 else material.dynamic_ratio(job.dynamic_Hz, job.long_term)
         hold = section.hourglass
@@ -123,4 +123,6 @@ def _of_one_law(
     rows = Rows(solids.B0, solids.hoop, slice(1, None, 3), np.eye(3).ravel(), solids.weights)
     mass = consistent_mass(solids.mass_N, density[:, None] * solids.mass_weights)
     rubber = Elastic(solids.connectivity, rows, law, mass)
+    if solids.projection is not None:
+        rubber = Hybrid(solids.connectivity, rows, law, mass, projection=solids.projection)
     return [rubber] if solids.hourglass is None else [rubber, hourglass.control(solids, hold)]
