@@ -19,7 +19,7 @@ import numpy as np
 
 Array = np.ndarray
 LONGEST_NEAR = np.radians(10.0)  # of elements near the patch
-FARTHEST = np.radians(45.0)  # from its middle, but for the last one
+FARTHEST_ELEMENT = np.radians(45.0)  # from its middle, but for the last one
 WAVE_BY_ELEMENTS = (
     2 * np.pi / 7.5
 )  # of the highest harmonic, over the elements' length that hold it
@@ -130,7 +130,7 @@ def waves_beyond(lengths: Array) -> HalfCircle:
     near = [
         length
         for length, end in zip(short, np.cumsum(short), strict=True)
-        if end < 1.001 * FARTHEST
+        if end < 1.001 * FARTHEST_ELEMENT
     ]
     if not near:
         return half_circle(lengths)
