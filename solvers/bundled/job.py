@@ -18,6 +18,7 @@ from .deck.start import read_start
 from .deck.steps import Deck, DeckStep
 from .frequency_step import FrequencyStep, Inflated
 from .modes.harmonics import HarmonicModes
+from .modes.wheel import free_along_load
 from .results import StepResult, write
 from .road import footprint_job
 from .section.boundary import keeps_half_turn, numbering
@@ -162,7 +163,8 @@ class Job:
         nodes = np.array([self.model.mesh.index[n] for n in numbers])
         dynamic_Hz = step.procedure.number("PROPERTY EVALUATION")
         model = self.tyre.models(dynamic_Hz, step.long_term, False)
-        return footprint_job.ModesAtLoad(model, row.integer(0), nodes)
+        wheel_kg = free_along_load(self.tyre.revolve, self.model.mesh, step)
+        return footprint_job.ModesAtLoad(model, row.integer(0), nodes, wheel_kg)
 
     def _static(self, step: DeckStep) -> None:
         self._check_time()

@@ -62,7 +62,10 @@ def start(work: Round) -> list[HarmonicModes]:
 
 def modes(work: Round, U: Array, held: Contact, around: HalfCircle, count: int) -> LoadedModes:
     symmetry = work.symmetry(around)
-    return loaded_modes(work.tyre(around), symmetry, U, held, start(work), count, lambda: None)
+    (found,) = loaded_modes(
+        work.tyre(around), symmetry, U, [held], start(work), count, lambda: None
+    )
+    return found
 
 
 def no_hold(work: Round, around: HalfCircle) -> Contact:
@@ -178,6 +181,49 @@ def test_they_solve_the_whole_problem(tyre: Round, pressed: State, found: Loaded
     np.testing.assert_allclose(gram[same], np.eye(10)[same], atol=1e-7)
 
 
+def test_a_wheel_free_along_the_load(tyre: Round, pressed: State, found: LoadedModes) -> None:
+    """What the half turn reverses is as it was. A wheel far heavier than the tyre swings slowly on
+    the tyre's stiffness, which statics knows, all else as if it were held; a wheel without mass
+    lowers each eigenvalue, and none below the one before."""
+    symmetry, work = tyre.symmetry(pressed.around), tyre.tyre(pressed.around)
+
+    def free(wheel_kg: float) -> LoadedModes:
+        given = work, symmetry, pressed.U, [pressed.hold], start(tyre), 10, lambda: None, wheel_kg
+        return loaded_modes(*given)[0]
+
+    heavy, light = free(1e6), free(0.0)
+    keeps = found.eigenvalues[found.parity == 1]
+    np.testing.assert_allclose(
+        heavy.eigenvalues[heavy.parity == -1][:3],
+        found.eigenvalues[found.parity == -1][:3],
+        rtol=1e-7,
+    )
+    swing, *others = heavy.eigenvalues[heavy.parity == 1]
+    np.testing.assert_allclose(others[:3], keeps[:3], rtol=1e-4)
+    shape = heavy.shapes[0]
+    shift = shape[0, ~tyre.free.any(1), 0]
+    np.testing.assert_allclose(shift, shift[0], rtol=1e-9)
+    stiffness = (shape * (work.product(shape) + pressed.hold.product(shape))).sum() / shift[0] ** 2
+    assert swing == pytest.approx(2 * stiffness / 1e6, rel=1e-3)
+    mine = light.eigenvalues[light.parity == 1]
+    assert (mine[:3] < keeps[:3] * (1 + 1e-8)).all() and (mine[1:4] > keeps[:3] * (1 - 1e-8)).all()
+    assert mine[0] < 0.1 * keeps[0]
+
+
+def test_a_second_hold_is_as_if_it_were_the_first(tyre: Round, pressed: State) -> None:
+    """The factor's hold exchanged for none along the road: the same eigenvalues, below those of
+    the patch that sticks."""
+    K = pressed.hold.K.copy()
+    K[..., 1:, 1:] = 0.0
+    smooth = replace(pressed.hold, K=K)
+    alone = modes(tyre, pressed.U, smooth, pressed.around, 10)
+    symmetry, work = tyre.symmetry(pressed.around), tyre.tyre(pressed.around)
+    holds = [pressed.hold, smooth]
+    both = loaded_modes(work, symmetry, pressed.U, holds, start(tyre), 10, lambda: None)
+    np.testing.assert_allclose(both[1].eigenvalues, alone.eigenvalues, rtol=1e-8)
+    assert (both[1].eigenvalues < both[0].eigenvalues).all()
+
+
 def test_mass_of_rigid_motions(tyre: Round) -> None:
     """Half the tyre's mass for shifts down and along the axle, whatever the elements' lengths."""
     around = half_circle(LENGTHS)
@@ -274,7 +320,7 @@ def test_time_is_looked_at_before_the_factor_and_every_product(
         done.clear()
         work, symmetry = tyre.tyre(pressed.around), tyre.symmetry(pressed.around)
         with pytest.raises(TimeoutError):
-            loaded_modes(work, symmetry, pressed.U, pressed.hold, start(tyre), 4, clock)
+            loaded_modes(work, symmetry, pressed.U, [pressed.hold], start(tyre), 4, clock)
         assert done == wanted
 
 
@@ -333,8 +379,9 @@ def test_only_new_directions_are_taken_into_a_basis(random: np.random.Generator)
 LOADS = (1000.0,)
 
 
-def texts(count: int = 6) -> dict[str, str]:
-    return Decks(TyreDesign(coarse_case()), loads_N=LOADS, loaded_modes=count).texts("abaqus")
+def texts(count: int = 6, **road: object) -> dict[str, str]:
+    design = TyreDesign(coarse_case(**road))
+    return Decks(design, loads_N=LOADS, loaded_modes=count).texts("abaqus")
 
 
 def refused(folder: Path, edit: Callable[[str], str]) -> str:
@@ -350,6 +397,7 @@ def refused(folder: Path, edit: Callable[[str], str]) -> str:
     [
         (r"(?s)\*STEP, NAME=LOAD_1.*?\*END STEP\n", "", "come after a force"),
         (r"(MASS\n6\n\*BOUNDARY, OP=NEW\n.*\n)900002, 1, 6\n", r"\1", "must hold the road"),
+        (r"(MASS\n6\n\*BOUNDARY, OP=NEW\n)900001, 1, 6\n", r"\g<1>900001, 3, 6\n", "held in 2, 6"),
         (r"MASS\n6\n", "MASS\n6, , 100.0\n", "limits and shifts"),
         (r"NSET=CROWN", "NSET=HUB", "a set of the section"),
         (r"PERTURBATION", "INTERMITTENT", "INTERMITTENT"),
@@ -363,6 +411,27 @@ def test_what_is_not_honoured(tmp_path: Path, pattern: str, new: str, words: str
         return changed
 
     assert words in refused(tmp_path, edit)
+
+
+def test_the_deck_says_how_the_wheel_stands(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Held, or free along the load with the rim's mass, which no plain footprint's deck has."""
+    asked: list[Any] = []
+
+    def press(*given: Any) -> dict[str, Any]:
+        asked.extend(given[-1].values())
+        raise RunFailed("crashed", "enough")
+
+    monkeypatch.setattr(footprint_job, "press", press)
+    for wheel, kg in (("held", None), ("free_along_load", 15.0)):
+        for name, text in texts(wheel=wheel).items():
+            (tmp_path / name).write_text(text)
+        with pytest.raises(RunFailed, match="enough"):
+            job.run(tmp_path, "press", "inflate")
+        assert asked[-1].wheel_kg == kg
+    plain = Decks(TyreDesign(coarse_case(wheel="free_along_load")), loads_N=LOADS).texts("abaqus")
+    assert "MASS" not in plain["press.inp"]
 
 
 @pytest.mark.slow
@@ -402,28 +471,32 @@ def test_what_the_job_asks_for_and_how_it_writes_it(
         asked.append((vibration.shift, wanted, vibration.factor(0).solve(np.ones(free))))
         return []
 
-    def modes_(work_: Revolved, kept: Any, U: Array, hold: Contact, *rest: Any) -> LoadedModes:
+    loose = LoadedModes(np.array([100.0]) * np.pi**2, np.array([-1]), shapes[1:])
+
+    def modes_(work_: Revolved, kept: Any, U: Array, holds: Any, *rest: Any) -> list[LoadedModes]:
         work_.residual(U)
-        asked.append((work_.product(shapes[0]), hold, rest))
-        return canned
+        asked.append((work_.product(shapes[0]), holds, rest))
+        return [canned, loose]
 
     monkeypatch.setattr(footprint_job, "lowest_of_all", lowest)
     monkeypatch.setattr(footprint_job, "loaded_modes", modes_)
     equations = support.numbering(tyre.model, ~tyre.free)
     free = equations.size
-    wanted = footprint_job.ModesAtLoad(tyre.model, 2, nodes)
+    wanted = footprint_job.ModesAtLoad(tyre.model, 2, nodes, 9.0)
     tread = tyre.model.mesh.faces["TREAD"]
     work.tyre.residual(0 * shapes[0])  # a state that is not the wanted one
     written = footprint_job._modes(
         work, state, wanted, tread, equations, tyre.U, work.tyre.around.angles
     )
     assert work._factor is None
-    (shift, started, solved), (product, hold, rest) = asked
+    (shift, started, solved), (product, (hold, smooth), rest) = asked
     plain = Vibration(tyre.model, tyre.U, work.tyre.loads, equations, 0.0)
     np.testing.assert_array_equal(solved, plain.factor(0).solve(np.ones(free)))
     assert (shift, started) == (0.0, 2 * (2 + 6)) and rest[:2] == ([], 2)
     here = press(tyre, 10.0)
     np.testing.assert_allclose(hold.K, here.hold.K, rtol=1e-9)
+    np.testing.assert_array_equal(smooth.K[..., 0, 0], hold.K[..., 0, 0])
+    assert not smooth.K[..., 1:, 1:].any() and rest[-1] == 9.0
     again = tyre.tyre(work.tyre.around)
     again.residual(here.U)
     np.testing.assert_allclose(product, again.product(shapes[0]), rtol=1e-9, atol=1e-6)
@@ -436,6 +509,18 @@ def test_what_the_job_asks_for_and_how_it_writes_it(
     for ring_ in range(k, 2 * (k - 1)):
         image = HALF_TURN * shapes[:, 2 * (k - 1) - ring_][:, other]
         np.testing.assert_allclose(whole[:, ring_], [[[1.0]], [[-1.0]]] * image, atol=1e-12)
+
+
+def test_traction_of_a_patch_that_sticks() -> None:
+    """Sizes of the forces along the road, of both halves: down does not count, what is along at 30
+    degrees is turned there, waves are not nodes."""
+    around = half_circle(np.radians([30.0, 30.0]), 2)
+    force = np.zeros((around.N.shape[1], 3, 3))
+    force[0, 0] = 5.0, 3.0, -4.0
+    force[2, 1] = 2.0 * np.array([np.sin(np.pi / 6), np.cos(np.pi / 6), 0.0])
+    force[2, 2] = 7.0 * np.array([np.cos(np.pi / 6), -np.sin(np.pi / 6), 0.0])
+    force[5] = 1.0
+    assert footprint_job._traction(around, force) == pytest.approx(2 * (5.0 + 2.0))
 
 
 def test_the_vibration_modulus_counts(tyre: Round, pressed: State) -> None:

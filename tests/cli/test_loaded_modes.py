@@ -30,6 +30,9 @@ def test_one_load_the_record_and_a_load_out_of_reach(
     assert (result["load_N"], result["pressure_kPa"]) == (300, 240) and result["mass_kg"] > 10
     assert len(result["modes"]) == 10
     assert {mode["multiplicity"] for mode in result["modes"]} == {1}
+    pitch = [m for m in result["modes"] if (m["c"], m["m"], m["symmetry"]) == (1, 1, "symmetric")]
+    assert pitch[0]["frequency_Hz"] > pitch[0]["sliding_Hz"] + 10 and 0 < pitch[0]["grip_mm"] < 2
+    assert "[1,1] symmetric at 300 N has" in result["findings"]["words"][0]
     assert "antisymmetric" in capsys.readouterr().out
     shapes = (out / "modes_shapes.json").read_bytes()
     assert run(*arguments, "--json", "--report") == 0
@@ -77,6 +80,7 @@ def test_a_tyre_that_no_load_is_borne_by(
         (["--sweep-load", "500", "--load-N", "500"], "not both"),
         (["--load-N", "500", "--fitted", CASE], "--fitted goes with --sweep-load"),
         (["--load-N", "500", "--pictures"], "--pictures goes with"),
+        (["--wheel", "held"], "--wheel goes with --load-N"),
         (["--load-N", "500", "--solver", "calculix"], "cannot find modes of a tyre on a road"),
     ],
 )

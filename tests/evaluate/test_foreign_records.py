@@ -184,6 +184,9 @@ def of_footprints() -> Content:
         "mode_frequency_Hz": np.array([70.0]),
         "mode_node": np.array([0, 2]),
         "mode_shape": np.zeros((1, 2, 2, 3)),
+        "mode_traction_N": np.array([9.0]),
+        "sliding_frequency_Hz": np.array([60.0, 65.0]),
+        "sliding_shape": np.zeros((2, 2, 2, 3)),
     }
     return {
         "pressure_Pa": 2.4e5,
@@ -269,6 +272,12 @@ PATCH: list[Content] = [
     {"mode_node": np.arange(3)},
     {"mode_shape": np.zeros((1, 3, 2, 3))},
     {"mode_shape": np.zeros((1, 2, 2, 2))},
+    {"mode_traction_N": None},
+    {"mode_traction_N": np.ones(2)},
+    {"sliding_frequency_Hz": None},
+    {"sliding_frequency_Hz": np.ones(1)},
+    {"sliding_shape": None},
+    {"sliding_shape": np.zeros((2, 2, 3, 3))},
 ]
 
 
@@ -309,6 +318,9 @@ def test_what_may_be_missing_of_a_record() -> None:
     with pytest.raises(Damaged):
         check({"answer": content})
     content = of_footprints()
+    for name in ("mode_traction_N", "sliding_frequency_Hz", "sliding_shape"):
+        del content["footprints"][0][name]
+    check({"answer": content})  # of a road without friction
     for name in ("contact_area_m2", "mode_frequency_Hz", "mode_node", "mode_shape"):
         del content["footprints"][0][name]
     check({"answer": content | {"cause": "unstable", "failure": "it fell over"}})

@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from tyrecal.simulate.deck.decks import Decks
 from tyrecal.simulate.deck.tyre_design import TyreDesign, fine_enough
 from tyrecal.simulate.evaluate.evaluator import Evaluator
 from tyrecal.simulate.evaluate.failure import DeckRefused, EvaluationFailed
+from tyrecal.simulate.evaluate.pressed import Footprint
 from tyrecal.simulate.evaluate.store import Store
 from tyrecal.simulate.modes.label import Label
 from tyrecal.simulate.modes.loaded import SYMMETRIES, Member
-from tyrecal.studies.loaded import Loaded, LoadedMode, LoadedTyre, load_tyres
+from tyrecal.studies.loaded import Loaded, LoadedMode, LoadedTyre, _grip_mm, load_tyres
 from tyrecal.studies.loaded_result import findings, load_sweep_result, loaded_modes_result
 from tyrecal.tyre.load import load_case
 
 from ..evaluate.stand_in import CASE, StandIn
+from ..evaluate.test_foreign_records import of_footprints
 from .loaded import coarse_case
 
 LOADS = [0.0, 500.0, 1000.0]
@@ -133,6 +137,35 @@ def test_failures_keep_what_was_computed(tyre: LoadedTyre) -> None:
     result = load_sweep_result({"initial": {}}, LOADS, {"initial": cut}).content()
     assert [row["load_N"] for row in result["rows"]] == LOADS[:2]
     assert [(each["load_N"], each["words"]) for each in result["failed"]] == [(1000.0, "too much")]
+
+
+def test_what_friction_can_bear() -> None:
+    """The crown's largest motion times friction and load over the forces in the shape."""
+    shape = np.zeros((2, 3, 2, 3))
+    shape[0, 1, 1] = 0.3, 0.0, 0.4
+    shape[1, 2, 0, 1] = 2.0
+    footprint = of_footprints()["footprints"][0] | {
+        "load_N": 600.0,
+        "mode_shape": shape,
+        "mode_traction_N": np.array([3e4, 6e5]),
+    }
+    assert _grip_mm(Footprint(**footprint), 0.5) == pytest.approx([5.0, 1.0])
+    assert _grip_mm(Footprint(**footprint | {"mode_traction_N": None}), 0.0) is None
+
+
+def test_the_most_that_friction_does_is_said() -> None:
+    modes = [
+        replace(mode, sliding_Hz=hertz, grip_mm=0.25)
+        for mode, hertz in zip(loaded(900.0, 85.0, 92.0).modes, (84.0, 81.0), strict=True)
+    ]
+    words = findings("initial", [Loaded(900.0, 0.01, tuple(modes))]).words
+    assert any("[2,0] antisymmetric at 900 N has 81.00 Hz, 11.00 Hz less" in x for x in words)
+    assert any("moves less than 0.25 mm" in x for x in words)
+    entry = loaded_modes_result({}, LoadedTyre(240.0, 12.0, (Loaded(900.0, 0.01, tuple(modes)),)))
+    first = entry.content()["modes"][0]
+    assert (first["sliding_Hz"], first["grip_mm"]) == (84.0, 0.25)
+    bare = loaded_modes_result({}, LoadedTyre(240.0, 12.0, (loaded(900.0, 85.0, 92.0),)))
+    assert "sliding_Hz" not in bare.content()["modes"][0]
 
 
 def test_a_solver_without_modes_on_the_road_is_refused() -> None:

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     options.pressure,
     options.one_load,
     options.sweep_load,
+    options.wheel,
     options.fitted("With --sweep-load: the design that 'tyrecal fit' found for this case, too."),
 )
 @click.option(
@@ -39,6 +40,7 @@ def command(
     pressure_kPa: float | None,
     load_N: float | None,
     sweep: str | None,
+    wheel: str | None,
     fitted: Path | None,
     pictures: bool | None,
     study: options.Study,
@@ -47,6 +49,8 @@ def command(
 
     With --load-N the tyre stands on a flat road, and vibrates about its deflected state while the
     patch is held: doublets split in a member symmetric about the patch and an antisymmetric one.
+    sliding_Hz is the frequency where nothing holds the patch along the road, grip_mm the largest
+    motion of the crown that friction can bear while the patch sticks.
     --sweep-load follows them over the load: load_sweep.json, .csv and .png.
 
     \b
@@ -57,10 +61,13 @@ def command(
     """
     from ..report.shape_data import tyre_data
     from ..studies import modes as studies
+    from ..tyre.effects.edit import changed, with_part
 
     loads = wanted_loads(load_N, sweep)
     if fitted and sweep is None:
         raise click.UsageError("--fitted goes with --sweep-load")
+    if wheel and not loads:
+        raise click.UsageError("--wheel goes with --load-N or --sweep-load")
     if pictures and load_N is not None:
         raise click.UsageError("--pictures goes with --sweep-load, or without a load")
     terminal = study.terminal
@@ -68,6 +75,9 @@ def command(
         why = "one design is evaluated alone; --sweep-load with --fitted has two"
         options.say_idle(terminal, study.jobs, why)
     loaded, values = study.load(case, assignments, pressure_kPa)
+    if wheel:
+        road = with_part(loaded.case.road, wheel=wheel.replace("-", "_"))
+        loaded = changed(loaded, road=road)
     evaluator = study.evaluator(loaded)
     designs = {"initial": values}
     option = "--load-N" if sweep is None else "--sweep-load"

@@ -139,6 +139,14 @@ sweep_load = click.option(
 )
 
 
+wheel = click.option(
+    "--wheel",
+    type=click.Choice(["held", "free-along-load"]),
+    help="Under a load: the wheel's centre is held while the tyre vibrates, or free along the load"
+    " with the rim's mass (default: road.wheel of the case).",
+)
+
+
 _from = click.option(
     "--from-kPa",
     "from_kPa",

@@ -9,10 +9,10 @@ import numpy as np
 
 from ..simulate.evaluate.evaluator import Evaluator, Question
 from ..simulate.evaluate.failure import DeckRefused, EvaluationFailed
-from ..simulate.evaluate.pressed import Pressed
+from ..simulate.evaluate.pressed import Footprint, Pressed
 from ..simulate.modes.find import Found, find_modes
 from ..simulate.modes.label import Label, Mode
-from ..simulate.modes.loaded import Member, Rings, follow, members, rings, state
+from ..simulate.modes.loaded import Member, ModesAtLoad, Rings, follow, members, rings, state
 from ..tyre.case import LoadedCase
 from .fit.problem import read_targets
 
@@ -25,13 +25,18 @@ MIN_SPANNED = 0.5  # share of a loaded shape that the modes before must make up 
 @dataclass(frozen=True)
 class LoadedMode:
     """A mode at a load: overlap with its unloaded member, 0 to 1, and the share of its shape that
-    the modes at the load before ``spanned``; under a load its shape (ring, node, 3)."""
+    the modes at the load before ``spanned``; under a load its shape (ring, node, 3). On a road with
+    friction this is the mode of a patch that sticks, ``sliding_Hz`` that of one which nothing holds
+    along the road, and ``grip_mm`` the largest motion of the crown at which the patch's forces
+    along the road, their sizes summed, reach friction times the load."""
 
     member: Member
     frequency_Hz: float
     overlap: float
     spanned: float
     shape: np.ndarray | None = field(default=None, compare=False, repr=False)
+    sliding_Hz: float | None = None
+    grip_mm: float | None = None
 
 
 @dataclass(frozen=True)
@@ -140,7 +145,7 @@ def _loaded_tyre(
         if mode.label in wanted or mode.frequency_Hz < NEAR * highest:
             shapes |= (both := members(mode, where))
             hertz |= dict.fromkeys(both, mode.frequency_Hz)
-    loads = _followed(pressed, where, wanted, shapes, hertz)
+    loads = _followed(pressed, where, wanted, shapes, hertz, case.case.road.friction)
     if with_zero:
         named = (LoadedMode(x, f, 1.0, 1.0) for x, f in hertz.items() if x.label in wanted)
         loads = [Loaded(0.0, 0.0, _by_frequency(named)), *loads]
@@ -155,11 +160,12 @@ def _followed(
     wanted: set[Label],
     shapes: Mapping[Member, np.ndarray],
     hertz: Mapping[Member, float],
+    friction: float,
 ) -> list[Loaded]:
     """The named modes at each load, followed from the unloaded ``shapes`` on."""
     names = list(shapes)
     free = state(np.array(list(hertz.values())), np.array(list(shapes.values())), where)
-    before, place = free, np.arange(len(names))
+    sticking, sliding = _Trail(free, where), _Trail(free, where)
     row = {int(node): i for i, node in enumerate(pressed.nodes)}
     nodes = [row[int(node)] for node in where.nodes]
     R, Z = pressed.points[nodes].T
@@ -167,11 +173,16 @@ def _followed(
     for footprint in pressed.footprints:
         assert footprint.mode_frequency_Hz is not None and footprint.mode_shape is not None
         here = state(footprint.mode_frequency_Hz, footprint.mode_shape, where)
-        step, straight = follow(before, here, where), follow(free, here, where)
-        spanned = np.where(place < 0, 0.0, step.spanned[place])
-        place = np.where(spanned < MIN_SPANNED, -1, step.position[place])
+        straight = follow(free, here, where)
+        place, spanned = sticking.to(here)
         overlaps = where.overlaps(free.shapes, here.shapes)
         chosen = [i for i, name in enumerate(names) if name.label in wanted]
+        slipping = np.full(len(names), np.nan)
+        if footprint.sliding_frequency_Hz is not None and footprint.sliding_shape is not None:
+            loose = state(footprint.sliding_frequency_Hz, footprint.sliding_shape, where)
+            there, _ = sliding.to(loose)
+            slipping = np.where(there < 0, np.nan, loose.frequencies[there])
+        grip_mm = _grip_mm(footprint, friction)
         loads.append(
             Loaded(
                 footprint.load_N,
@@ -183,6 +194,8 @@ def _followed(
                         float(overlaps[i, place[i]]),
                         float(spanned[i]),
                         here.shapes[place[i]],
+                        None if np.isnan(slipping[i]) else float(slipping[i]),
+                        None if grip_mm is None else float(grip_mm[place[i]]),
                     )
                     for i in chosen
                     if place[i] >= 0
@@ -192,8 +205,31 @@ def _followed(
                 np.stack([R, 0 * R, Z], -1) + footprint.displacement[:, nodes],
             )
         )
-        before = here
     return loads
+
+
+class _Trail:
+    """Modes followed from load to load, from those of the unloaded tyre on."""
+
+    def __init__(self, free: ModesAtLoad, where: Rings):
+        self._before, self._where = free, where
+        self._place = np.arange(len(free.frequencies))
+
+    def to(self, here: ModesAtLoad) -> tuple[np.ndarray, np.ndarray]:
+        """Each unloaded mode's place at the next load, -1 where it is lost, and `spanned`."""
+        step = follow(self._before, here, self._where)
+        spanned = np.where(self._place < 0, 0.0, step.spanned[self._place])
+        self._place = np.where(spanned < MIN_SPANNED, -1, step.position[self._place])
+        self._before = here
+        return self._place, spanned
+
+
+def _grip_mm(footprint: Footprint, friction: float) -> np.ndarray | None:
+    """Per mode the largest motion on the rings, mm, at which friction is used up."""
+    if footprint.mode_traction_N is None or footprint.mode_shape is None:
+        return None
+    largest = np.linalg.norm(footprint.mode_shape, axis=-1).max((1, 2))
+    return np.asarray(1e3 * largest * friction * footprint.load_N / footprint.mode_traction_N)
 
 
 def _by_frequency(modes: Iterable[LoadedMode]) -> tuple[LoadedMode, ...]:

@@ -64,7 +64,7 @@ class LoadSweep(Result):
     def csv(self) -> str:
         keys = ["design", "load_N", "deflection_m", "c", "m", "kind", "symmetry", "frequency_Hz"]
         rows = ({**row.model_dump(), **m.model_dump()} for row in self.rows for m in row.modes)
-        return csv_text([*keys, "overlap", "spanned"], rows)
+        return csv_text([*keys, "overlap", "spanned", "sliding_Hz", "grip_mm"], rows)
 
     def tables(self) -> list[Table]:
         return [self._table(design) for design in dict.fromkeys(row.design for row in self.rows)]
@@ -124,7 +124,7 @@ def loaded_modes_result(values: Mapping[str, float], tyre: LoadedTyre) -> ModesR
         variables=dict(values),
         deflection_m=last.deflection_m,
         modes=[_entry(mode) for mode in last.modes],
-        findings=ModesFindings(words=_doubts([last])),
+        findings=ModesFindings(words=_held_by_friction([last]) + _doubts([last])),
     )
 
 
@@ -157,6 +157,7 @@ def load_sweep_result(
 
 def _entry(mode: LoadedMode) -> ModeEntry:
     label = mode.member.label
+    with_friction = {"sliding_Hz": mode.sliding_Hz, "grip_mm": mode.grip_mm}
     return ModeEntry(
         c=label.c,
         m=label.m,
@@ -166,7 +167,7 @@ def _entry(mode: LoadedMode) -> ModeEntry:
         symmetry=mode.member.symmetry,
         overlap=round(mode.overlap, 6),
         spanned=round(mode.spanned, 6),
-    )
+    ).model_copy(update={key: hertz for key, hertz in with_friction.items() if hertz is not None})
 
 
 def findings(design: str, loads: Sequence[Loaded]) -> LoadFindings:
@@ -192,7 +193,7 @@ def findings(design: str, loads: Sequence[Loaded]) -> LoadFindings:
         design=design,
         splits=splits,
         least_overlap=least.overlap if least else 1.0,
-        words=words + _doubts(loads),
+        words=words + _held_by_friction(loads) + _doubts(loads),
     )
 
 
@@ -252,6 +253,25 @@ def _rising(tables: Mapping[float, Mapping[Any, float]]) -> list[str]:
         return []
     claim = "every frequency rises with the load"
     return [claim + (f", but for {', '.join(falling)}" if falling else "")]
+
+
+def _held_by_friction(loads: Sequence[Loaded]) -> list[str]:
+    """What friction does to the mode that it moves most, and up to which motion it can."""
+    told = [
+        (mode.frequency_Hz - mode.sliding_Hz, each.load_N, mode)
+        for each in loads
+        for mode in each.modes
+        if mode.sliding_Hz is not None and mode.grip_mm is not None
+    ]
+    if not told:
+        return []
+    shift, load, most = max(told, key=lambda each: each[0])
+    return [
+        f"the patch is taken to stick; with nothing along the road {most.member} at {load:g} N has"
+        f" {most.sliding_Hz:.2f} Hz, {shift:.2f} Hz less, and friction holds it only while the"
+        f" crown moves less than {most.grip_mm:.2g} mm: beyond, or on a slippery road, the"
+        " truth lies between"
+    ]
 
 
 def _doubts(loads: Sequence[Loaded]) -> list[str]:

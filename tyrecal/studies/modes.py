@@ -15,7 +15,10 @@ from .result import NAME_COLUMNS, Column, ModeEntry, Result, ResultPart, Table
 if TYPE_CHECKING:
     from ..simulate.evaluate.evaluator import Evaluator
 
-EXTRA = {"symmetry": "", "member": ".0f", "clarity": ".2f", "overlap": ".2f"}  # forms
+EXTRA = {  # forms
+    **{"sliding_Hz": ".2f", "grip_mm": ".2f", "symmetry": ""},
+    **{"member": ".0f", "clarity": ".2f", "overlap": ".2f"},
+}
 
 
 class ModesFindings(ResultPart):
@@ -38,7 +41,7 @@ class ModesResult(Result):
     findings: ModesFindings = ModesFindings()
 
     def tables(self) -> list[Table]:
-        known = ("symmetry", "member", "clarity", "overlap")
+        known = ("sliding_Hz", "grip_mm", "symmetry", "member", "clarity", "overlap")
         extra = [key for key in known if any(getattr(m, key) is not None for m in self.modes)]
         columns = [*NAME_COLUMNS, Column("Hz"), *(Column(key, EXTRA[key]) for key in extra)]
         rows = [

@@ -231,6 +231,9 @@ class ModeEntry(Named):
     symmetry: str | None = None  # about the patch
     overlap: float | None = None  # with the unloaded shape of its name
     spanned: float | None = None  # by the modes at the load before
+    sliding_Hz: float | None = None  # where nothing holds the patch along the road
+    # largest motion of the crown up to which friction bears the forces of a patch that sticks
+    grip_mm: float | None = None
     d_ln_f_d_ln_p: float | None = None
 
 

@@ -100,6 +100,25 @@ def read_wheel(keywords: list[Keyword], mesh: DeckMesh, step: DeckStep) -> Wheel
     return wheels[0] if wheels else None
 
 
+def free_along_load(keywords: list[Keyword], mesh: DeckMesh, step: DeckStep) -> float | None:
+    """Mass, kg, of the wheel whose centre ``step`` releases along the first axis; None: all is
+    held. Raises DeckError."""
+    elements = _point_elements(keywords, mesh)
+    found = None
+    for reference in mesh.reference_nodes:
+        freedoms = rim_freedoms(mesh, step, reference)
+        if freedoms - {1}:
+            raise DeckError(
+                step.procedure.line,
+                f"of a tyre on a road the rim's reference node {reference} is held in 1, 6, or free"
+                " along the load: held in 2, 6",
+            )
+        if freedoms:
+            inertia = _properties(keywords, elements, reference)[1]
+            found = float(np.real(inertia.get("radial", 0.0)))
+    return found
+
+
 def _point_elements(keywords: list[Keyword], mesh: DeckMesh) -> dict[str, tuple[str, list[int]]]:
     """Element set to type and nodes of the job's point elements on a rim's reference node; those
     on the tyre are of the module `point_elements`."""

@@ -4,7 +4,9 @@ JOB.json: pressure_Pa, mass_kg, free_radius_m, failure, cause, ``footprints`` [l
 (x down, y, z), deflection_m, stiffness_N_per_m, contact_area_m2]. JOB.npz: nodes, points, angles of
 the whole tyre, and per footprint i the arrays of its patch and the displacement, as NAME_i; where
 modes were asked for: mode_frequency_Hz (m,), mode_shape (m, ring, node, 3) at mode_node, modal mass
-1 kg.
+1 kg; with friction the patch's forces along the road in these, mode_traction_N (m,), their sizes
+summed, and sliding_frequency_Hz, sliding_shape of the same tyre while nothing holds the patch along
+the road.
 """
 
 from __future__ import annotations
@@ -12,7 +14,7 @@ from __future__ import annotations
 import json
 import logging
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -43,7 +45,10 @@ log = logging.getLogger("tyrecal_solvers")
 PATCH_ARRAYS = ("ring", "node", "along_m", "across_m", "pressure_Pa", "area_m2", "traction_Pa")
 MIN_ELASTIC_SLIP = 1e-6  # m, before friction is full: harder sticks are not reached
 
-MODE_ARRAYS = ("mode_frequency_Hz", "mode_node", "mode_shape")
+MODE_ARRAYS = (
+    *("mode_frequency_Hz", "mode_node", "mode_shape"),
+    *("mode_traction_N", "sliding_frequency_Hz", "sliding_shape"),
+)
 
 
 @dataclass(frozen=True)
@@ -65,6 +70,7 @@ class ModesAtLoad:
     model: Model
     count: int
     nodes: Array  # rows at which their shapes are wanted
+    wheel_kg: float | None = None  # of a wheel that is free along the load
 
 
 def read_road(model: list[Keyword]) -> RoadData | None:
@@ -259,20 +265,36 @@ def _modes(
     U = work.symmetry.spread(found.parts)
     work.tyre.residual(U)
     area = work.tyre.surface_shares(tread)[: len(found.contact.local), work.road.nodes]
-    hold = held(found.contact, area, tyre.around)
+    road = found.contact.road
+    smooth = replace(found.contact, road=replace(road, friction=0.0))
+    holds = [held(each, area, tyre.around) for each in (found.contact, smooth)]
+    holds = holds if road.friction else holds[:1]
     vibration = Vibration(wanted.model, inflated, tyre.loads, equations, 0.0)
     start = lowest_of_all(vibration, 2 * (wanted.count + 2 * SPARE), work.check)
     work.rest()
-    modes = loaded_modes(tyre, work.symmetry, U, hold, start, wanted.count, work.check)
-    other = work.symmetry.other
-    shapes = np.array([_at(work.symmetry.around, angles, shape) for shape in modes.shapes])
-    turned = modes.parity[:, None, None, None] * (HALF_TURN * shapes)[:, :, other]
-    whole = np.concatenate([shapes, turned[:, 1:-1][:, ::-1]], 1)
-    return {
-        "mode_frequency_Hz": np.sqrt(modes.eigenvalues) / (2 * np.pi),
-        "mode_node": wanted.nodes,
-        "mode_shape": whole[:, :, wanted.nodes],
-    }
+    modes = loaded_modes(
+        tyre, work.symmetry, U, holds, start, wanted.count, work.check, wanted.wheel_kg
+    )
+    told = {"mode_node": wanted.nodes}
+    for name, each in zip(("mode", "sliding"), modes, strict=False):
+        shapes = np.array([_at(work.symmetry.around, angles, shape) for shape in each.shapes])
+        turned = each.parity[:, None, None, None] * (HALF_TURN * shapes)[:, :, work.symmetry.other]
+        whole = np.concatenate([shapes, turned[:, 1:-1][:, ::-1]], 1)
+        told[f"{name}_frequency_Hz"] = np.sqrt(each.eigenvalues) / (2 * np.pi)
+        told[f"{name}_shape"] = whole[:, :, wanted.nodes]
+    if road.friction:
+        told["mode_traction_N"] = np.array(
+            [_traction(work.symmetry.around, holds[0].product(V)) for V in modes[0].shapes]
+        )
+    return told
+
+
+def _traction(around: HalfCircle, forces: Array) -> float:
+    """Sum of the sizes of nodal forces (k, n, 3) along the road, of the whole tyre, N."""
+    nodes = len(around.angles)
+    c, s = np.cos(around.angles)[:, None], np.sin(around.angles)[:, None]
+    r, theta, z = np.moveaxis(forces[:nodes], -1, 0)
+    return 2 * float(np.hypot(s * r + c * theta, z).sum())
 
 
 def _at(around: HalfCircle, angles: Array, U: Array) -> Array:

@@ -4,11 +4,12 @@
 
 Displacements are components in the frame of the reference angle, so the mass does not depend on
 it. The pressed tyre keeps the half turn about the vertical, which every mode keeps or reverses.
+A wheel that is free along the load adds one unknown, its shift down, to modes that keep it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,6 +24,7 @@ from ..solid3d.revolved import Revolved
 from . import davidson
 from .block_cholesky import Elimination, Factor
 from .contact import Contact
+from .contact_update import ContactUpdate
 from .half_turn_symmetry import HalfTurn
 
 Array = np.ndarray
@@ -42,78 +44,132 @@ def loaded_modes(
     tyre: Revolved,
     pressed: HalfTurn,
     U: Array,
-    hold: Contact,
+    holds: Sequence[Contact],
     unloaded: list[HarmonicModes],
     count: int,
     check: Callable[[], None],
-) -> LoadedModes:
-    """The ``count`` lowest modes about U (k, n, 3).
+    wheel_kg: float | None = None,
+) -> list[LoadedModes]:
+    """The ``count`` lowest modes about U (k, n, 3) with each of ``holds``, what holds the patch.
 
-    pressed: what U keeps; hold: what holds the patch; unloaded: the inflated tyre's modes, to start
-    from.
-    Raises RunFailed; what ``check`` raises to stop.
+    pressed: what U keeps; unloaded: the inflated tyre's modes, to start from; wheel_kg: of a wheel
+    that is free along the load, None: it is held. Raises RunFailed; what ``check`` raises to stop.
     """
     tyre.residual(U)
-    symmetries = [
-        HalfTurn(tyre.model.mesh, pressed.free, pressed.around, parity) for parity in (1, -1)
-    ]
-    wanted = [count // 2 + SPARE] * 2
-    kinds = [
-        _one_parity(tyre, symmetry, hold, unloaded, wanted[0], check) for symmetry in symmetries
-    ]
-    while True:
-        complete = min(values[-1] for values, _ in kinds)  # all below it have been found
-        values = np.concatenate([each for each, _ in kinds])
-        order = np.argsort(values, kind="stable")[:count]
-        if values[order[-1]] <= complete:
-            break
-        short = int(np.argmin([each[-1] for each, _ in kinds]))
+
+    def kind(parity: int, wanted: int) -> list[tuple[Array, Array]]:
+        symmetry = HalfTurn(tyre.model.mesh, pressed.free, pressed.around, parity)
+        its = _Kind(tyre, symmetry, holds[0], unloaded, wheel_kg if parity == 1 else None, check)
+        return [its.lowest(hold, wanted) for hold in holds]
+
+    wanted = {1: count // 2 + SPARE, -1: count // 2 + SPARE}
+    kinds = {parity: kind(parity, number) for parity, number in wanted.items()}
+    while (short := _short(kinds, count)) is not None:
         wanted[short] += SPARE
-        kinds[short] = _one_parity(tyre, symmetries[short], hold, unloaded, wanted[short], check)
-    parity = np.repeat(
-        [symmetry.parity for symmetry in symmetries], [len(each) for each, _ in kinds]
-    )
-    shapes = np.concatenate([each for _, each in kinds])
-    return LoadedModes(values[order], parity[order], shapes[order])
+        kinds[short] = kind(short, wanted[short])
+    found = []
+    for keeping, reversing in zip(kinds[1], kinds[-1], strict=True):
+        values = np.concatenate([keeping[0], reversing[0]])
+        order = np.argsort(values, kind="stable")[:count]
+        parity = np.repeat([1, -1], [len(keeping[0]), len(reversing[0])])
+        shapes = np.concatenate([keeping[1], reversing[1]])
+        found.append(LoadedModes(values[order], parity[order], shapes[order]))
+    return found
 
 
-def _one_parity(
-    tyre: Revolved,
-    symmetry: HalfTurn,
-    hold: Contact,
-    unloaded: list[HarmonicModes],
-    count: int,
-    check: Callable[[], None],
-) -> tuple[Array, Array]:
-    """omega^2 (count,) and shapes (count, k, n, 3) of the modes that keep or reverse the turn."""
-    tangents = tyre.tangents(np.float32)
-    shape = symmetry.mask.shape
-    order = Elimination([t[0] for t in tangents], symmetry)
-    check()
-    try:
-        factor = Factor(order, tangents, hold.stiffness(*symmetry.shape[:2], positive=True))
-    except Indefinite:
-        raise RunFailed("unstable", davidson.NOT_STABLE) from None
-    del tangents
-    weigh = Inertia(tyre.model, tyre.around)
+def _short(kinds: dict[int, list[tuple[Array, Array]]], count: int) -> int | None:
+    """The kind of which more must be known, for modes of its beyond the last may be among the
+    ``count`` lowest of a hold; None where all are."""
+    for keeping, reversing in zip(kinds[1], kinds[-1], strict=True):
+        values = np.sort(np.concatenate([keeping[0], reversing[0]]))
+        if values[count - 1] > min(keeping[0][-1], reversing[0][-1]):
+            return 1 if keeping[0][-1] < reversing[0][-1] else -1
+    return None
 
-    def each(image: Callable[[Array], Array]) -> davidson.Operator:
+
+class _Kind:
+    """Vibrations that keep the half turn, or are reversed by it, as vectors: the two parts, and
+    where the wheel is free its shift."""
+
+    def __init__(
+        self,
+        tyre: Revolved,
+        symmetry: HalfTurn,
+        hold: Contact,
+        unloaded: list[HarmonicModes],
+        wheel_kg: float | None,
+        check: Callable[[], None],
+    ):
+        self.tyre, self.symmetry, self.check = tyre, symmetry, check
+        self.wheel_kg = wheel_kg
+        tangents = tyre.tangents(np.float32)
+        order = Elimination([t[0] for t in tangents], symmetry)
+        check()
+        try:
+            self.factor = ContactUpdate(Factor(order, tangents, self._blocks(hold)))
+        except Indefinite:
+            raise RunFailed("unstable", davidson.NOT_STABLE) from None
+        self.start = [symmetry.parts(V) * symmetry.mask for V in standing_waves(unloaded, symmetry)]
+        turn = symmetry.around.turn(1)[:, None]
+        down = np.stack([turn.real, -turn.imag, 0 * turn.real], -1)
+        self.down = down * ~symmetry.free  # the rim's nodes (k, n, 3), by 1 m
+
+    def lowest(self, hold: Contact, count: int) -> tuple[Array, Array]:
+        """omega^2 (count,) and shapes (count, k, n, 3)."""
+        self.factor.to(self._blocks(hold))
+        weigh, kg = Inertia(self.tyre.model, self.symmetry.around), self.wheel_kg or 0.0
+        stiffness = self._each(lambda V: self.tyre.product(V) + hold.product(V), 0.0)
+        inverse, start = self._inverse(hold)
+        x = davidson.lowest(stiffness, self._each(weigh, kg / 2), inverse, start, count)
+        shapes = [self._field(row) for row in x[1]]
+        return x[0], np.array(shapes) / np.sqrt(2)  # the half tyre has half of the modal mass
+
+    def _blocks(self, hold: Contact) -> Array:
+        return hold.stiffness(*self.symmetry.shape[:2], positive=True)
+
+    def _field(self, vector: Array) -> Array:
+        size = self.symmetry.mask.size
+        field = self.symmetry.spread(vector[:size].reshape(self.symmetry.mask.shape))
+        return field if self.wheel_kg is None else field + vector[size] * self.down
+
+    def _forces(self, F: Array) -> Array:
+        """The transpose of `_field`."""
+        forces = self.symmetry.gather(F).ravel()
+        return forces if self.wheel_kg is None else np.append(forces, (F * self.down).sum())
+
+    def _each(self, image: Callable[[Array], Array], of_shift: float) -> davidson.Operator:
+        """An operator on blocks from one on fields, and what the wheel's shift has by itself."""
+
         def apply(block: Array) -> Array:
-            check()
-            fields = (symmetry.spread(parts) for parts in block.reshape(-1, *shape))
-            return np.array([symmetry.gather(image(V)).ravel() for V in fields])
+            self.check()
+            images = np.array([self._forces(image(self._field(x))) for x in block])
+            if self.wheel_kg is not None:
+                images[:, -1] += of_shift * block[:, -1]
+            return images
 
         return apply
 
-    def inverse(block: Array) -> Array:
-        return factor.solve(block.reshape(-1, *shape)).reshape(len(block), -1)
+    def _inverse(self, hold: Contact) -> tuple[davidson.Operator, Array]:
+        """About K^-1, and vectors to start from."""
+        shape = self.symmetry.mask.shape
+        start = np.array([V.ravel() for V in self.start])
 
-    waves = standing_waves(unloaded, symmetry)
-    start = np.array([(symmetry.parts(V) * symmetry.mask).ravel() for V in waves])
-    stiffness = each(lambda V: tyre.product(V) + hold.product(V))
-    values, x = davidson.lowest(stiffness, each(weigh), inverse, start, count)
-    shapes = [symmetry.spread(parts) for parts in x.reshape(-1, *shape)]
-    return values, np.array(shapes) / np.sqrt(2)  # the half tyre has half of the modal mass
+        def inner(block: Array) -> Array:
+            return self.factor.solve(block.reshape(-1, *shape)).reshape(len(block), -1)
+
+        if self.wheel_kg is None:
+            return inner, start
+        # the wheel eliminated last: what follows its shift, and the stiffness that is left
+        border = self._forces(self.tyre.product(self.down) + hold.product(self.down))
+        follows = inner(border[None, :-1])[0]
+        left = border[-1] - border[:-1] @ follows
+
+        def bordered(block: Array) -> Array:
+            y = inner(block[:, :-1])
+            shift = (block[:, -1] - block[:, :-1] @ follows) / left
+            return np.column_stack([y - np.outer(shift, follows), shift])
+
+        return bordered, np.vstack([np.pad(start, ((0, 0), (0, 1))), np.append(-follows, 1.0)])
 
 
 class Inertia:

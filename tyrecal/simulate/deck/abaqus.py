@@ -94,6 +94,7 @@ def context(tyre: Tyre) -> dict[str, Any]:
             "stiffness": c.road.stiffness_Pa_per_m,
             "friction": c.road.friction,
             "elastic_slip": c.road.elastic_slip_m,
+            "wheel": wheel(c.rim)["mass"] if c.road.wheel == "free_along_load" else None,
         },
     }
 

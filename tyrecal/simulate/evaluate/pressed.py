@@ -27,7 +27,9 @@ class Footprint:
     contact_area_m2: of a solver that places the patch's edge between nodes, else None.
 
     Of modes, where they were asked for: mode_frequency_Hz (m,); mode_shape (m, ring, j, 3), as
-    displacement, at the nodes mode_node (j,) only.
+    displacement, at the nodes mode_node (j,) only. Of a road with friction, in which these modes
+    stick: mode_traction_N (m,), the patch's forces along the road in each shape, their sizes
+    summed; and the modes of a patch that slides freely, sliding_frequency_Hz and sliding_shape.
     """
 
     load_N: float
@@ -47,6 +49,9 @@ class Footprint:
     mode_frequency_Hz: Array | None = None
     mode_node: Array | None = None
     mode_shape: Array | None = None
+    mode_traction_N: Array | None = None
+    sliding_frequency_Hz: Array | None = None
+    sliding_shape: Array | None = None
 
 
 @dataclass(frozen=True)

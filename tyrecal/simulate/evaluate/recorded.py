@@ -116,6 +116,13 @@ class _Footprint(_Part):
     mode_frequency_Hz: Triple | None = None
     mode_node: FiniteArray | None = None
     mode_shape: Annotated[Any, _shaped(REAL, None, None, None, 3)] | None = None
+    mode_traction_N: Triple | None = None
+    sliding_frequency_Hz: Triple | None = None
+    sliding_shape: Annotated[Any, _shaped(REAL, None, None, None, 3)] | None = None
+
+
+def _shape(array: Any) -> tuple[int, ...]:
+    return np.shape(array)
 
 
 class _Pressed(_Tyre):
@@ -141,8 +148,15 @@ class _Pressed(_Tyre):
             if any(part is not None for part in told):
                 if any(part is None for part in told):
                     raise ValueError("of modes under load a part is missing")
-                if np.shape(told[2])[:3] != (np.size(told[0]), rings, np.size(told[1])):  # type: ignore[arg-type]
+                if _shape(told[2])[:3] != (*_shape(told[0]), rings, *_shape(told[1])):
                     raise ValueError("modes under load do not go together")
+            free = (each.mode_traction_N, each.sliding_frequency_Hz, each.sliding_shape)
+            if any(part is not None for part in free) and not (
+                all(part is not None for part in (*told, *free))
+                and _shape(free[0]) == _shape(told[0])
+                and _shape(free[2])[:3] == (*_shape(free[1]), *_shape(told[2])[1:3])
+            ):
+                raise ValueError("modes of a sliding patch do not go together")
         return self
 
 

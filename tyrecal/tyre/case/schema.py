@@ -61,12 +61,15 @@ class Road(Part):
     """The flat, rigid road that a tyre is pressed on, and the mesh round the tyre for it.
 
     ``stiffness_Pa_per_m``: contact pressure over overclosure; ``elastic_slip_m``: slip before
-    friction is full; ``element_angles_deg``: lengths from the patch's middle to the top.
+    friction is full; ``element_angles_deg``: lengths from the patch's middle to the top;
+    ``wheel``: in vibrations on the road its centre is held, or free along the load, with the rim's
+    mass.
     """
 
     friction: NotNegative = 0.5
     stiffness_Pa_per_m: Positive = 1e10
     elastic_slip_m: Annotated[float, Field(ge=1e-6)] = 1e-4
+    wheel: Literal["held", "free_along_load"] = "held"
     element_angles_deg: Annotated[list[Positive], Field(min_length=1, max_length=200)] = Field(
         default_factory=lambda: [4.0] * 3 + [5.0, 8.0, 17.0, 45.0, 93.0]
     )
