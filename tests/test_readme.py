@@ -20,6 +20,7 @@ GUIDES = [
     "README.md",
     "cases/README.md",
     "cases/own_tyre.md",
+    "cases/own_deck.md",
     "cases/sampling.md",
     "cases/diagnosis.md",
     "cases/blind.md",

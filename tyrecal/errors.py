@@ -4,6 +4,7 @@
         InputError, 2               what was given is wrong: a file, a folder, a name, a number
             CaseError               a case file, with every mistake in it
             SectionError            a table of stations, with its line
+            OwnDeckError            a user's deck, with file and line
             EffectRefused           an effect's parameter
             TemplateFailed          a deck template
             DeckRefused             a deck that the solver refuses

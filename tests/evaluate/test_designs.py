@@ -46,6 +46,9 @@ class DeckText:
         moved = self.values[name] * (1 + side * 1e-4)
         return self.at({name: moved}), moved
 
+    def explained(self, refusal: str) -> str:
+        return refusal
+
     def texts(self, dialect: str, request: Mapping[str, Any]) -> dict[str, str]:
         assert dialect == "abaqus"
         marks = {name: format(value, ".13g") for name, value in self.values.items()}

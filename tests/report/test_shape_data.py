@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from tyrecal.report.html.shapes import packed
-from tyrecal.report.revolve import motion, placed, skin, swept
+from tyrecal.report.revolve import motion, placed, swept
 from tyrecal.report.shape_data import Shapes, patches_data, section_data, tyre_data
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate import evaluator as door_module
@@ -55,7 +55,7 @@ def test_shapes_swept_again_are_the_modes(tyre) -> None:
     """Against the pictures' own sweep: alike but for scale, the turn of a pair and of the axes."""
     case, evaluation, modes = tyre
     content, mesh = tyre_data(case, evaluation, modes), resolved(case).mesh
-    nodes = skin(mesh)
+    nodes = mesh.skin()
     # the pictures have Theta = 0 at +x, the page at the top
     turned = np.array([[0, 0, -1], [0, 1, 0], [1, 0, 0]])
     rest = swept(nodes, mesh, ANGLES) @ turned.T

@@ -200,7 +200,7 @@ def _entry(outcome: StudyOutcome, task: CaseTask) -> dict[str, Any]:
 def _question(task: CaseTask, loaded: LoadedCase, evaluator: Evaluator) -> str:
     """Hash of all that the results depend on: the case and its files, what is asked, the tool."""
     own = loaded.folder / loaded.case.templates if loaded.case.templates else None
-    files = [task.path, loaded.folder / loaded.case.section.file]
+    files = [task.path, *loaded.files]
     files += sorted(path for path in own.rglob("*") if path.is_file()) if own else []
     solver = [
         evaluator.solver.name,

@@ -13,6 +13,11 @@ from .terminal import Terminal
 
 
 @click.command()
+@click.option(
+    "--check",
+    is_flag=True,
+    help="Only say what is in CASE, a case or an ABAQUS deck of your own (FILE.inp).",
+)
 @options.every(
     options.case_argument,
     options.assignments,
@@ -33,6 +38,7 @@ def command(
     solver: str,
     output: Path | None,
     allow_unusual: bool,
+    check: bool,
     terminal: Terminal,
 ) -> int:
     """Write the decks of CASE, to read or to run elsewhere.
@@ -41,7 +47,10 @@ def command(
     tyrecal deck cases/p235_75r17.yaml --output decks
     python -m tyrecal_solvers.bundled decks/modes --oldjob inflate
     tyrecal deck cases/p235_75r17.yaml --output pressed --loads-N 3000,5000
+    tyrecal deck --check my_tyre.inp
     """
+    if check:
+        return _check(case, mesh, assignments, terminal)
     from ..files import whole
     from ..simulate.deck.decks import Decks
     from ..simulate.deck.tyre_design import TyreDesign
@@ -77,4 +86,31 @@ def command(
     if not terminal.as_json:
         terminal.say("\n".join(paths))
     terminal.detail(f"written for solver '{adapter.name}' from the templates '{adapter.dialect}'")
+    return 0
+
+
+def _check(path: Path, mesh: str, assignments: tuple[str, ...], terminal: Terminal) -> int:
+    """Say what a user's deck holds, and which of its numbers have paths."""
+    from ..simulate.deck.own import trial
+    from ..tyre.own_deck.found import contents, words
+    from ..tyre.own_deck.own_deck import read_own_deck
+    from ..tyre.resolve import resolved
+
+    if path.suffix in (".yaml", ".yml"):
+        loaded, _ = arguments.load(path, mesh, assignments, None, terminal, True)
+        if loaded.deck is None:
+            raise click.UsageError(f"'{path}' names no deck of your own: 'tyrecal validate' judges")
+        deck, flat, numbers = loaded.deck, resolved(loaded).flat, loaded.case.deck.numbers
+    else:
+        if not path.is_file():
+            raise click.UsageError(f"there is no file '{path}'")
+        deck = read_own_deck(path)
+        flat, numbers = deck.flat({}), deck.numbers
+    mass_kg = trial(flat)
+    found = contents(deck, flat)
+    terminal.result({"mass_kg": mass_kg, **found, "numbers": dict(numbers)})
+    for sentence in words(found, mass_kg):
+        terminal.say(sentence)
+    for name, value in numbers.items():
+        terminal.say(f"  {name} = {value:g}")
     return 0

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import shlex
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
@@ -38,6 +38,18 @@ def _length(flag: str, text: str, unit: str = "mm") -> Any:
     metavar="FILE",
     help="CSV of your own section: stations, or an outer and an inner curve.",
 )
+@click.option(
+    "--deck",
+    "deck_file",
+    type=click.Path(path_type=Path, exists=True, dir_okay=False),
+    metavar="FILE.inp",
+    help="ABAQUS deck of your own axisymmetric section.",
+)
+@click.option(
+    "--units",
+    type=click.Choice(["m", "mm"]),
+    help="Of the deck: m, kg, s, Pa, or mm, t, s, MPa (default: told by its densities).",
+)
 @_length("crown", "Thickness at the crown, grooves spread over the tread.")
 @_length("sidewall", "Thickness at the widest point.")
 @_length("bead", "Thickness at the rim's flange.")
@@ -63,6 +75,8 @@ def _length(flag: str, text: str, unit: str = "mm") -> Any:
 def command(
     size: str | None,
     file: Path | None,
+    deck_file: Path | None,
+    units: Literal["m", "mm"] | None,
     crown_mm: float | None,
     sidewall_mm: float | None,
     bead_mm: float | None,
@@ -85,14 +99,19 @@ def command(
     tyrecal init "LT315/70R17 121/118S" --crown-mm 20 --rim-width-in 9
     tyrecal init P235/75R17 --section my_stations.csv --output my_tyre.yaml
     tyrecal init 205/60R15 --section my_outline.csv --belt-width-mm 160 --output my_outline.yaml
+    tyrecal init --deck my_tyre.inp
     """
     from ..tyre.case.new_case import from_file, from_size
     from ..tyre.section.size import parse_size
     from ..tyre.usual import ALL_THE_SAME, GAUGES, USUAL
     from ..units import INCH
 
-    if size is None and file is None:
-        raise click.UsageError("give a SIZE, as in 'tyrecal init 205/60R15', or --section FILE")
+    if size is None and file is None and deck_file is None:
+        raise click.UsageError(
+            "give a SIZE, as in 'tyrecal init 205/60R15', --section FILE or --deck FILE.inp"
+        )
+    if units and not deck_file:
+        raise click.UsageError("--units goes with --deck")
     usual = {**GAUGES, "pressure_kPa": USUAL["pressure_kPa"]}
     stated = click.get_current_context().params
     for name, each in [] if allow_unusual else usual.items():
@@ -100,6 +119,12 @@ def command(
             option = name.replace("_", "-")
             raise click.UsageError(f"--{option} {stated[name]:g}: {message}{ALL_THE_SAME}")
     tyre = parse_size(size) if size is not None else None
+    if deck_file is not None:
+        if file or lengths_given(stated):
+            raise click.UsageError("with --deck the file holds the tyre's shape and thicknesses")
+        words = tyre.text if tyre else "not given"
+        _from_deck(deck_file, units, words, pressure_kPa, output, pictures, force, terminal)
+        return 0
     given = {"crown": crown_mm, "sidewall": sidewall_mm, "bead": bead_mm, "belt": belt_width_mm}
     lengths = {key: 1e-3 * value for key, value in given.items() if value is not None}
     if rim_width_in is not None:
@@ -151,12 +176,68 @@ def _write(
         f" {2e3 * outside[:, 1].max():.1f} mm, {loaded.case.pressure_kPa:g} kPa"
     )
     if picture:
-        from ..report.figure import save
-        from ..report.section import draw_section
-        from ..report.shape_data import section_data
-        from ..tyre.resolve import resolved
+        _draw(loaded, picture, terminal)
+    terminal.say(f"next: tyrecal modes {shlex.quote(str(target))}")
 
-        section = section_data(loaded, resolved(loaded).mesh, {})
-        save(draw_section(section, loaded.case.name, loaded.case.pressure_kPa), picture)
-        terminal.say(f"section drawn in {picture}")
+
+def _draw(loaded: Any, picture: Path, terminal: Terminal) -> None:
+    from ..report.figure import save
+    from ..report.section import draw_section
+    from ..report.shape_data import section_data
+    from ..tyre.resolve import resolved
+
+    section = section_data(loaded, resolved(loaded).mesh, {})
+    save(draw_section(section, loaded.case.name, loaded.case.pressure_kPa), picture)
+    terminal.say(f"section drawn in {picture}")
+
+
+def lengths_given(stated: dict[str, Any]) -> bool:
+    """Whether an option gives a length of a section."""
+    return any(stated[name] is not None for name in stated if name.endswith(("_mm", "_in")))
+
+
+def _from_deck(
+    file: Path,
+    units: Literal["m", "mm"] | None,
+    size: str,
+    pressure_kPa: float | None,
+    output: Path | None,
+    pictures: bool,
+    force: bool,
+    terminal: Terminal,
+) -> None:
+    """Write the case of a deck beside it, say what is in the deck, and draw it."""
+    from ..files import whole
+    from ..simulate.deck.own import trial
+    from ..tyre.case.own_case import own_case
+    from ..tyre.load import load_case
+    from ..tyre.own_deck.found import contents, words
+    from ..tyre.own_deck.own_deck import read_own_deck
+
+    deck = read_own_deck(file, units)
+    if deck.marks:
+        name, block = next(iter(deck.marks.items()))
+        raise block.refused(
+            f"the mark {{{{ {name} }}}} has no number yet: make the case from the deck with plain"
+            " numbers, then put marks in their place"
+        )
+    flat = deck.flat({})
+    text = own_case(deck, flat, size, pressure_kPa)
+    target = output or file.with_suffix(".yaml")
+    if target.resolve().parent != file.resolve().parent:
+        raise click.UsageError(f"--output '{target}': the case stands in its deck's folder")
+    picture = target.with_suffix(".png") if pictures else None
+    for path in [target, *([picture] if picture else [])]:
+        if path.exists() and not force:
+            raise InputError(f"'{path}' exists already; give --force to write over it")
+    mass_kg = trial(flat)
+    with whole(target) as partial:
+        partial.write_text(text, encoding="utf-8")
+    found = contents(deck, flat)
+    terminal.result({"case": str(target), "mass_kg": mass_kg, **found})
+    for sentence in words(found, mass_kg):
+        terminal.say(sentence)
+    loaded = load_case(target, allow_unusual=True)
+    if picture:
+        _draw(loaded, picture, terminal)
     terminal.say(f"next: tyrecal modes {shlex.quote(str(target))}")

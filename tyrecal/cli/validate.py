@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from . import options
 from .main import EXIT_INPUT
 from .terminal import Terminal
+
+if TYPE_CHECKING:
+    from ..tyre.case.mistakes import Mistake
 
 
 @click.command()
@@ -28,6 +32,8 @@ def command(case: Path, allow_unusual: bool, terminal: Terminal) -> int:
     from ..tyre.load import load_case, validate
 
     mistakes = validate(case, allow_unusual)
+    if not mistakes and (refused := _refused(case, allow_unusual)):
+        mistakes = [refused]
     for mistake in mistakes:
         terminal.error(str(mistake))
     terminal.result(
@@ -51,3 +57,22 @@ def command(case: Path, allow_unusual: bool, terminal: Terminal) -> int:
     if not loaded.case.targets.weights:
         terminal.note("it has no targets: 'tyrecal fit' needs some, or --measured FILE")
     return 0
+
+
+def _refused(path: Path, allow_unusual: bool) -> Mistake | None:
+    """What the bundled solver refuses of a deck of one's own that is meant for it."""
+    from ..simulate.deck.own import trial
+    from ..tyre.case.mistakes import Mistake
+    from ..tyre.load import load_case
+    from ..tyre.own_deck.text import OwnDeckError
+    from ..tyre.resolve import resolved
+
+    loaded = load_case(path, allow_unusual)
+    if not loaded.deck or loaded.case.solver.name != "bundled":
+        return None
+    try:
+        trial(resolved(loaded).flat)
+    except OwnDeckError as error:
+        file = str(loaded.deck.path.parent / error.place.file)
+        return Mistake(file, error.place.line, "", "", error.message)
+    return None

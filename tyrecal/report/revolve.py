@@ -53,19 +53,6 @@ def placed(
     ]
 
 
-def corners(mesh: SectionMesh) -> Array:
-    """Numbers of the solids' corner nodes: (row points, columns), from the inner surface out."""
-    step = 2 if mesh.quadratic else 1
-    along, rows = mesh.shape
-    return 1000 * (step * np.arange(along + 1) + 1) + step * np.arange(rows + 1)[:, None] + 1
-
-
-def skin(mesh: SectionMesh) -> Array:
-    """Corner nodes of the outer surface from -z to +z, from inner bead edge to inner bead edge."""
-    grid = corners(mesh)
-    return np.concatenate([grid[:-1, 0], grid[-1], grid[-2::-1, -1]])
-
-
 def swept(nodes: Array, mesh: SectionMesh, angles: Array) -> Array:
     """Undeformed points (node, angle, 3), m."""
     R, Z = np.array([mesh.nodes[int(n)] for n in nodes]).T

@@ -16,9 +16,10 @@ from ..studies.loaded import LoadedTyre
 from ..studies.patch import patch_of
 from ..studies.result import Named, Result, ResultPart, Wave
 from ..tyre.case import LoadedCase
+from ..tyre.own_deck.section_mesh import OwnDeckMesh
 from ..tyre.resolve import resolved
 from ..tyre.section.mesh import SectionMesh
-from .revolve import placed, skin
+from .revolve import placed
 
 Array = np.ndarray
 Flat = list[float]  # points z, r in mm, one after the other
@@ -118,7 +119,7 @@ def tyre_data(case: LoadedCase, evaluation: Evaluation, modes: Sequence[Mode]) -
     """
     mesh = resolved(case).mesh
     moved, modes = placed(evaluation, modes, mesh)
-    nodes = skin(mesh)
+    nodes = mesh.skin()
     R, Z = np.array([mesh.nodes[int(n)] for n in nodes]).T
     return {
         "format": 1,
@@ -143,16 +144,18 @@ def section_data(
     for number, (region, _) in mesh.cells.items():
         areas[region].append(_line(place, mesh.solids[number][:4]))
     held = set(mesh.rim)
-    around = outline(mesh)
+    around = mesh.outline()
     inflated = None
     if displacement:
         moved = {n: place[n] + 1e3 * np.take(displacement[n], [2, 0]) for n in around}
         inflated = _line(moved, around)
+    angles = {name: layer.angle_deg for name, layer in case.case.rebar_layers.items()}
+    layers = {name: turns(case, mesh, name) for name in angles}
+    if isinstance(mesh, OwnDeckMesh):
+        angles, layers = mesh.angles, mesh.layers
     cords = {
-        name: Cords(
-            angle_deg=layer.angle_deg, lines=[_line(place, n) for n in turns(case, mesh, name)]
-        )
-        for name, layer in case.case.rebar_layers.items()
+        name: Cords(angle_deg=angles[name], lines=[_line(place, nodes) for nodes in lines])
+        for name, lines in layers.items()
     }
     return SectionData(
         areas=areas,
@@ -175,15 +178,6 @@ def parts_data(case: LoadedCase, named: Iterable[str]) -> DiagnosisSection:
         cords.setdefault(name, []).extend(_line(place, x) for x in lines)
     areas = {name: [_line(place, nodes) for nodes in solids] for name, solids in parts.items()}
     return DiagnosisSection(format=1, case=case.case.name, areas=areas, cords=cords)
-
-
-def outline(mesh: SectionMesh) -> list[int]:
-    """Numbers of the nodes round the section, closed."""
-    step = 2 if mesh.quadratic else 1
-    columns, rows = (step * n for n in mesh.shape)
-    walk = [(0, j) for j in range(columns)] + [(i, columns) for i in range(rows)]
-    walk += [(rows, j) for j in range(columns, 0, -1)] + [(i, 0) for i in range(rows, -1, -1)]
-    return [1000 * (j + 1) + i + 1 for i, j in walk]
 
 
 def turns(case: LoadedCase, mesh: SectionMesh, name: str) -> list[tuple[int, ...]]:

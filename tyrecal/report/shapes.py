@@ -17,7 +17,7 @@ from matplotlib.tri import Triangulation
 from ..simulate.modes.label import Mode
 from ..tyre.section.mesh import SectionMesh
 from .figure import COLOUR_MAP, COLOURS, in_house_style, new_figure, save
-from .revolve import motion, skin, swept
+from .revolve import motion, swept
 
 Array = np.ndarray
 
@@ -113,7 +113,7 @@ class _Surface:
 
 def _drawn(mesh: SectionMesh) -> Array:
     """The nodes of a drawn meridian: of the outer surface, its ends among them."""
-    nodes = skin(mesh)
+    nodes = mesh.skin()
     count = min(len(nodes), MAX_MERIDIAN_POINTS)
     return nodes[np.linspace(0, len(nodes) - 1, count).round().astype(int)]
 

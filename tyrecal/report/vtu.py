@@ -12,7 +12,7 @@ from ..files import whole
 from ..simulate.evaluate.pressed import Footprint, Pressed
 from ..simulate.modes.label import Mode
 from ..tyre.section.mesh import SectionMesh
-from .revolve import cartesian, corners, motion, swept
+from .revolve import cartesian, motion, swept
 
 MAX_ANGLE = np.radians(5.0)  # between rings of points of the pressed tyre
 
@@ -26,12 +26,12 @@ def write_vtu(path: Path, mode: Mode, mesh: SectionMesh, sectors: int = 60) -> N
     one: unit modal mass, 1/sqrt(kg)): ``mode`` and, of a pair, ``second_of_pair``, a quarter of a
     wave further. Raises InputError; OSError.
     """
-    grid = corners(mesh)
-    nodes, angles = grid.ravel(), 2 * np.pi * np.arange(sectors) / sectors
+    nodes, quads = mesh.grid()
+    angles = 2 * np.pi * np.arange(sectors) / sectors
     fields = {"mode": motion(mode.raw, nodes, angles)}
     if mode.label.c:
         fields["second_of_pair"] = motion(mode.raw, nodes, angles, np.pi / 2)
-    _write(path, grid, swept(nodes, mesh, angles), fields)
+    _write(path, quads, swept(nodes, mesh, angles), fields)
 
 
 def write_pressed(
@@ -53,8 +53,8 @@ def write_pressed_vtu(
     together, and ``contact_pressure`` in Pa, interpolated where rings are far apart. Raises
     OSError.
     """
-    grid = corners(mesh)
-    nodes, row = grid.ravel(), {int(node): i for i, node in enumerate(pressed.nodes)}
+    nodes, quads = mesh.grid()
+    row = {int(node): i for i, node in enumerate(pressed.nodes)}
     field = np.zeros((len(pressed.angles), len(row), 4))
     field[..., :3] = footprint.displacement
     field[footprint.ring, [row[int(n)] for n in footprint.node], 3] = footprint.pressure_Pa
@@ -62,7 +62,7 @@ def write_pressed_vtu(
     place = np.stack(np.broadcast_arrays(0.0, angles, 0.0), -1)
     u = cartesian(place, np.moveaxis(field[..., :3], 0, 1))
     fields = {"displacement": u, "contact_pressure": field[..., 3].T}
-    _write(path, grid, swept(nodes, mesh, angles) + u, fields)
+    _write(path, quads, swept(nodes, mesh, angles) + u, fields)
 
 
 def _refined(angles: np.ndarray, field: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -76,13 +76,15 @@ def _refined(angles: np.ndarray, field: np.ndarray) -> tuple[np.ndarray, np.ndar
     return angles[ring] + share * gaps[ring], (1 - weight) * field[ring] + weight * following
 
 
-def _write(path: Path, grid: np.ndarray, points: np.ndarray, fields: dict[str, np.ndarray]) -> None:
-    """Points and fields (node, angle, ...) on the grid of corner nodes swept round."""
+def _write(
+    path: Path, quads: np.ndarray, points: np.ndarray, fields: dict[str, np.ndarray]
+) -> None:
+    """Points and fields (node, angle, ...) on corner nodes swept round, elements between them."""
     tyre = meshio.Mesh(
         points.reshape(-1, 3),
-        [("hexahedron", _hexahedra(grid.shape, points.shape[1]))],
+        [("hexahedron", _hexahedra(quads, points.shape[1]))],
         point_data={
-            name: field.reshape(grid.size * points.shape[1], *field.shape[2:])
+            name: field.reshape(points.shape[0] * points.shape[1], *field.shape[2:])
             for name, field in fields.items()
         },
     )
@@ -90,10 +92,8 @@ def _write(path: Path, grid: np.ndarray, points: np.ndarray, fields: dict[str, n
         tyre.write(partial, file_format="vtu")
 
 
-def _hexahedra(shape: tuple[int, int], sectors: int) -> np.ndarray:
-    rings = np.arange(shape[0] * shape[1]).reshape(shape)
-    quads = np.stack([rings[:-1, :-1], rings[1:, :-1], rings[1:, 1:], rings[:-1, 1:]], -1)
-    here = quads.reshape(-1, 1, 4) * sectors + np.arange(sectors)[:, None]
+def _hexahedra(quads: np.ndarray, sectors: int) -> np.ndarray:
+    here = quads[:, None] * sectors + np.arange(sectors)[:, None]
     there = np.roll(here, -1, axis=1)
     # counter-clockwise in (r, z) looks against Theta, so the face with the larger one comes first
     return np.concatenate([there, here], -1).reshape(-1, 8)

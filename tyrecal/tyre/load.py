@@ -10,6 +10,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from .case.checks import folds, problems
+from .case.deck_file import read_deck_of, section_of
 from .case.document import Document, read_document
 from .case.loaded import LoadedCase
 from .case.mistakes import CaseError, Keys, Mistake, dotted
@@ -51,12 +52,13 @@ def _read(path: Path, allow_unusual: bool) -> tuple[LoadedCase | None, list[Mist
     if data is None:
         return None, document.mistakes
     file_data = deepcopy(data)
+    deck = read_deck_of(document, data, path.parent)
     case = _typed(document, data)
     _add(document, disagreements(data))
-    section = read_stations(document, data, path.parent)
+    section = section_of(deck, data) if deck else read_stations(document, data, path.parent)
     check_templates(document, data, path.parent)
     _add(document, problems(data, section))
-    meshable = not any(m.key.startswith(("mesh", "section")) for m in document.mistakes)
+    meshable = not (deck or any(m.key.startswith(("mesh", "section")) for m in document.mistakes))
     if section and meshable and (message := folds(data, section)):
         form = "outline" if data["section"].get("outline") else "stations"
         document.add(("section", form), message)
@@ -64,7 +66,7 @@ def _read(path: Path, allow_unusual: bool) -> tuple[LoadedCase | None, list[Mist
         _add(document, unusual(data, section))
     if case is None or section is None or document.mistakes:
         return None, sorted(document.mistakes, key=lambda m: (m.file != str(path), m.line))
-    loaded = LoadedCase(case, path, section, path.parent, file_data)
+    loaded = LoadedCase(case, path, section, path.parent, file_data, deck=deck)
     try:
         resolved(loaded)
     except EffectRefused as error:

@@ -8,6 +8,8 @@ from functools import cached_property, lru_cache
 from .case import Case, LoadedCase
 from .case.parts import Rubber
 from .effects import EffectRefused, catalogue
+from .own_deck.flat import Flat
+from .own_deck.section_mesh import section_mesh as own_deck_mesh
 from .plugins import IDS
 from .section.mesh import SectionMesh, build_mesh
 from .section.section import Section, with_gauges
@@ -19,7 +21,23 @@ CAPABILITIES = {
     "cavity": "the gas in the cavity",
     "coupled": "a mass, a spring or a splice that couples harmonics",
     "rotation": "a tyre that turns",
+    "own_deck": "a deck of one's own",
 }
+
+
+# effects that know nothing of what the section is made of
+WITHOUT_A_SECTION = (
+    "pressure_offset",
+    "cavity_air",
+    "spindle_lateral",
+    "spindle_radial",
+    "spindle_torsional",
+    "spindle_tilt",
+    "wheel_free",
+    "point_mass",
+    "road_contact",
+    "rotation",
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +58,13 @@ class Tyre:
         return self.written.section
 
     @cached_property
+    def flat(self) -> Flat:
+        """The deck of the tyre's section, of a case that names one. Raises OwnDeckError."""
+        deck, source = self.written.deck, self.case.deck
+        assert deck and source
+        return deck.flat(source.numbers)
+
+    @cached_property
     def gauged(self) -> Section:
         """The section with its gauges applied."""
         return _gauged(self.case, self.section)
@@ -47,7 +72,7 @@ class Tyre:
     @cached_property
     def mesh(self) -> SectionMesh:
         """The mesh of the section at the chosen level, the same one for tyres that share it."""
-        return section_mesh(self.case, self.gauged)
+        return _deck_mesh(self.flat) if self.written.deck else section_mesh(self.case, self.gauged)
 
     @cached_property
     def needs(self) -> dict[str, str]:
@@ -60,6 +85,7 @@ class Tyre:
             "cavity": bool(c.cavity.share),
             "coupled": bool(c.point_mass.mass_kg or c.splice.share or c.road_spring.stiffnesses),
             "rotation": bool(c.spin_rad_per_s),
+            "own_deck": bool(c.deck),
         }
         return {need: CAPABILITIES[need] for need, there in asked.items() if there}
 
@@ -70,6 +96,10 @@ def resolved(case: LoadedCase) -> Tyre:
     if present:
         case = replace(case, case=case.case.model_copy(update={"effects": dict.fromkeys(IDS, 0.0)}))
     for id in sorted(present, key=IDS.index):
+        if case.deck and id not in WITHOUT_A_SECTION:
+            known = ", ".join(WITHOUT_A_SECTION)
+            reason = f"changes lines or rubbers of a section, a deck has these effects: {known}"
+            raise EffectRefused(id, reason, present[id])
         try:
             before, case = case, catalogue()[id].add(case, present[id])
             if (case.section, case.case.section) != (before.section, before.case.section):
@@ -86,6 +116,11 @@ def section_mesh(case: Case, gauged: Section) -> SectionMesh:
     grading = tuple(level.grading) if level.grading else None
     quadratic = case.mesh.element.startswith("CGAX8")
     return _mesh(gauged, elements, tuple(level.rows), quadratic, grading)
+
+
+@lru_cache(maxsize=8)
+def _deck_mesh(flat: Flat) -> SectionMesh:
+    return own_deck_mesh(flat)
 
 
 def _gauged(case: Case, section: Section) -> Section:

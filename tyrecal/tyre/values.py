@@ -22,6 +22,7 @@ from .usual import refusal
 # numbers that stand alone: no other part of the case, and no mesh, depends on their values
 ALONE = {
     "pressure_kPa",
+    "deck",
     "materials",
     "rebar_layers",
     "rim",

@@ -13,8 +13,10 @@ import numpy as np
 from ...tyre.case import Case
 from ...tyre.case.parts import Rim, Rubber
 from ...tyre.case.schema import Analysis
+from ...tyre.own_deck.flat import REFERENCE_NODE
 from ...tyre.resolve import Tyre
 from ...tyre.section.mesh import SectionMesh
+from .own import own_section
 
 FIRST_WHEEL_ELEMENT = 999_000_001  # beyond all that a revolve makes
 LOWEST_HZ, SHIFT = 1.0, -100.0  # of a free wheel's modes: above its rigid motions; 1/s2
@@ -28,7 +30,7 @@ GASES = {  # specific gas constant (J/kg/K) and ratio of specific heats at 20 C
 TABLE_HZ = np.geomspace(1.0, 1000.0, 13)
 FIRST_ATTACHED_ELEMENT = 999_100_001  # beyond all that a revolve makes
 AXES = {"radial": 1, "lateral": 2, "tangential": 3}  # of the revolved tyre in the plane Theta = 0
-REFERENCE_NODE, ROAD_NODE = 900001, 900002
+ROAD_NODE = 900002
 WELL_ELEMENT = 900001
 CLEARANCE = 0.05  # m from the section, not inflated, to the road
 
@@ -36,11 +38,40 @@ CLEARANCE = 0.05  # m from the section, not inflated, to the road
 def context(tyre: Tyre) -> dict[str, Any]:
     """Names for the templates; the guide to own templates lists them."""
     c, mesh = tyre.case, tyre.mesh
+    gas = gas_material(c)
+    names = own_section(tyre) if c.deck else _section(tyre)
+    return {
+        **names,
+        "name": c.name,
+        "well": _well(mesh) if c.rim.moves or gas else None,
+        "wheel": wheel(c.rim) if c.rim.moves else None,
+        "gas": gas,
+        "attached": attached(c, mesh),
+        "turning": turning(c, names["sets"]),
+        "pressure": c.pressure_kPa * 1e3,
+        "long_term": c.analysis.static_moduli == "long_term",
+        "increments": c.analysis.static_increments,
+        "vibration_frequency": c.analysis.vibration_frequency_Hz,
+        "sectors": c.analysis.sectors,
+        "road": {
+            "reference_node": ROAD_NODE,
+            "height": names["mesh"]["radius"] + CLEARANCE,
+            "angles": c.road.element_angles_deg + c.road.element_angles_deg[::-1],
+            "stiffness": c.road.stiffness_Pa_per_m,
+            "friction": c.road.friction,
+            "elastic_slip": c.road.elastic_slip_m,
+            "wheel": wheel(c.rim)["mass"] if c.road.wheel == "free_along_load" else None,
+        },
+    }
+
+
+def _section(tyre: Tyre) -> dict[str, Any]:
+    """Mesh, rubbers, layers and materials of a section of stations."""
+    c, mesh = tyre.case, tyre.mesh
     materials = [
         {"name": deck_name(name), **_material(material, c.analysis)}
         for name, material in c.materials.items()
     ]
-    gas = gas_material(c)
     layers: dict[tuple[Any, ...], dict[str, Any]] = {}
     sets: list[tuple[str, str, tuple[str, ...]]] = []
     for name, layer in c.rebar_layers.items():
@@ -68,13 +99,8 @@ def context(tyre: Tyre) -> dict[str, Any]:
     )
     hourglass = None if mesh.quadratic else {"stiffness": c.mesh.hourglass_stiffness_Pa}
     return {
-        "name": c.name,
         "mesh": tables,
-        "well": _well(mesh) if c.rim.moves or gas else None,
-        "wheel": wheel(c.rim) if c.rim.moves else None,
-        "gas": gas,
-        "attached": attached(c, mesh),
-        "turning": turning(c, [block["name"] for block in (*tables["solids"], *tables["lines"])]),
+        "sets": [block["name"] for block in (*tables["solids"], *tables["lines"])],
         "solids": [
             {"set": block["name"], "material": deck_name(c.solids[block["entry"]].material)}
             for block in tables["solids"]
@@ -82,20 +108,6 @@ def context(tyre: Tyre) -> dict[str, Any]:
         "layers": list(layers.values()),
         "materials": materials,
         "hourglass": hourglass,
-        "pressure": c.pressure_kPa * 1e3,
-        "long_term": c.analysis.static_moduli == "long_term",
-        "increments": c.analysis.static_increments,
-        "vibration_frequency": c.analysis.vibration_frequency_Hz,
-        "sectors": c.analysis.sectors,
-        "road": {
-            "reference_node": ROAD_NODE,
-            "height": tables["radius"] + CLEARANCE,
-            "angles": c.road.element_angles_deg + c.road.element_angles_deg[::-1],
-            "stiffness": c.road.stiffness_Pa_per_m,
-            "friction": c.road.friction,
-            "elastic_slip": c.road.elastic_slip_m,
-            "wheel": wheel(c.rim)["mass"] if c.road.wheel == "free_along_load" else None,
-        },
     }
 
 
@@ -106,7 +118,7 @@ def deck_name(text: str) -> str:
 
 def _well(mesh: SectionMesh) -> dict[str, Any]:
     """A surface element over the rim's well, which closes the cavity: its left side is inside."""
-    right, left = mesh.solids[mesh.inner[-1]][3], mesh.solids[mesh.inner[0]][0]
+    left, right = mesh.inner_ends
     return {"element": WELL_ELEMENT, "nodes": (right, left)}
 
 

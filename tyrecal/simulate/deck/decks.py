@@ -70,6 +70,9 @@ class Design(Protocol):
     def neighbour(self, name: str, side: int) -> tuple[Design, float]:
         """The design a small step to one side (1, -1) of a variable, and its value there."""
 
+    def explained(self, refusal: str) -> str:
+        """A solver's refusal of its texts in words for who made it."""
+
     def texts(self, dialect: str, request: Mapping[str, Any]) -> dict[str, str]:
         """File name to text, without the header. Raises TemplateFailed."""
 

@@ -20,7 +20,8 @@ from ...tyre.values import set_values
 from .abaqus import aside, context
 from .apart import Apart
 from .calculix import calculix_context
-from .decks import header
+from .decks import HEADER_LINES, header
+from .own import explained
 
 ELEMENTS_A_WAVE = 7.5  # of quadratic ones: the frequencies are right to 0.4 %
 DeckRequest = Mapping[str, Any]  # what is asked of a deck, see `Decks.request`
@@ -48,6 +49,8 @@ class TyreDesign:
         self.plain = plain or case
         self.case = set_values(case, self.values)
         self.tyre = resolved(self.case)
+        if self.case.deck:  # numbers that it cannot have are refused here, as any others
+            self.tyre.flat.text  # noqa: B018
 
     def at(self, values: Mapping[str, float]) -> TyreDesign:
         """The case with these values. Raises ValueError."""
@@ -147,6 +150,10 @@ class TyreDesign:
         other.tyre = _with_splice_of(self.tyre, splice.share * splice.width_deg / 360)
         return other
 
+    def explained(self, refusal: str) -> str:
+        """A solver's refusal of a line, in the lines of the user's own deck."""
+        return explained(self.tyre, refusal, HEADER_LINES)
+
     def texts(self, dialect: str, request: Mapping[str, Any]) -> dict[str, str]:
         """File name to text, without the header. Raises TemplateFailed."""
         own = self.case.case.templates
@@ -170,7 +177,8 @@ def _refuse_outside(file: str, text: str) -> None:
 
 def _abaqus(tyre: Tyre, env: Any, request: DeckRequest) -> dict[str, str]:
     names = context(tyre)
-    names["mesh_block"] = _mesh_block(env, names["mesh"])
+    if not tyre.case.deck:
+        names["mesh_block"] = _mesh_block(env, names["mesh"])
     names["modes"] = 2 * request["modes_per_harmonic"] * (request["highest_harmonic"] + 1)
     names["loads"], names["loaded_modes"] = request["loads_N"], request["loaded_modes"]
     if names["loaded_modes"]:

@@ -200,7 +200,7 @@ class Evaluator:
                     self._record(key, {}, {"answer": answer})
         except solver.refusals as error:
             folders.drop(folder)
-            raise DeckRefused(str(error)) from None
+            raise DeckRefused(decks.design.explained(str(error))) from None
         except solver.failures as error:
             cause = getattr(error, "cause", "crashed")
             failure = EvaluationFailed(cause, str(error), self._kept(folder, str(error)))

@@ -42,7 +42,7 @@ def new_case(
             "no line between the surfaces runs from the crown to the bead: the carcass needs one"
         )
     env = environment("case", None)
-    env.filters["text"] = _text
+    env.filters["text"] = plain_text
     names: dict[str, Any] = {
         "file": file,
         "name": name,
@@ -59,7 +59,7 @@ def new_case(
     return render(env, "case.yaml.j2", names)
 
 
-def _text(words: str) -> str:
+def plain_text(words: str) -> str:
     """As YAML has it: plain where it stays text, else in quotes."""
     plain = (
         re.fullmatch(r"\w[\w ./()-]*", words) and YAML(typ="safe", pure=True).load(words) == words

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import BaseModel, ValidationError
 
+from ..own_deck.numbers import canonical
 from ..plugins import IDS
 from .mistakes import Keys, dotted, suggestion
 from .parts import WRONG, number
@@ -204,7 +205,7 @@ def find(data: Mapping[str, Any] | BaseModel, path: str) -> Keys:
     """
     keys: Keys = ()
     here: Any = data
-    for word in path.split("."):
+    for word in _words(data, path):
         if here is WRONG:
             return ()
         key: str | int = word
@@ -220,6 +221,16 @@ def find(data: Mapping[str, Any] | BaseModel, path: str) -> Keys:
             raise KeyError(f"there is no '{word}'{place}{suggestion(word, known)}")
         here, keys = here[key], (*keys, key)
     return keys
+
+
+def _words(data: Mapping[str, Any] | BaseModel, path: str) -> list[str]:
+    """The keys that a path names; of a number of the deck, as in `material RUBBER / DENSITY /
+    density`, those under which it is known."""
+    if "/" not in path:
+        return path.split(".")
+    deck = data.get("deck") if isinstance(data, Mapping) else getattr(data, "deck", None)
+    known = deck.get("numbers") if isinstance(deck, Mapping) else getattr(deck, "numbers", None)
+    return ["deck", "numbers", canonical(path.removeprefix("deck.numbers."), known or ()) or path]
 
 
 def at(data: Any, keys: Keys) -> Any:

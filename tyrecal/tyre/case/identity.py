@@ -18,6 +18,7 @@ from .mistakes import Keys
 # its targets and uncertainties, solver and templates
 TYRE: dict[str, Any] = {
     "section": {"gauges": True, "outline": True},
+    "deck": {"numbers": True},
     "materials": True,
     "solids": True,
     "rebar_layers": True,
@@ -68,7 +69,7 @@ def _content(loaded: LoadedCase) -> dict[str, Any]:
     return {
         "tyre": _plain(data),
         "variables": {name: sorted(v.sets) for name, v in case.variables.items()},
-        "drawn": _drawn(loaded.section),
+        "drawn": loaded.deck.sha256 if loaded.deck else _drawn(loaded.section),
     }
 
 

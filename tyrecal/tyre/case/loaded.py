@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from .schema import Case
 
 if TYPE_CHECKING:
+    from ..own_deck.own_deck import OwnDeck
     from ..section.section import Section
 
 
@@ -25,3 +26,11 @@ class LoadedCase:
     # set by the user since, by name or path, for results to say
     overrides: Mapping[str, float] = field(default_factory=dict)
     as_read: LoadedCase | None = None  # before any number was set; None: none was
+    deck: OwnDeck | None = None  # that the section is of, where the case names one
+
+    @property
+    def files(self) -> list[Path]:
+        """That the section stands in."""
+        if self.deck:
+            return [self.deck.path.parent / name for name in self.deck.files]
+        return [self.folder / self.case.section.file]

@@ -164,7 +164,20 @@ class SectionSource(Part):
 
     @classmethod
     def problems(cls, values: Mapping[str, Any]) -> Iterator[Disagreement]:
-        yield from one_of(values, "stations", "outline")
+        if any(values.get(key) is not None for key in cls.model_fields):  # else there is a deck
+            yield from one_of(values, "stations", "outline")
+
+
+class DeckSource(Part):
+    """An ABAQUS deck of the section, relative to the case file, in m or mm (with t, s, MPa).
+
+    ``numbers``: of the marks in its text, by name, and others of its numbers, by path, in its own
+    units; those not given are as the text has them.
+    """
+
+    file: Text
+    units: Literal["m", "mm"]
+    numbers: dict[Text, Number] = Field(default_factory=dict)
 
 
 class Level(Part):

@@ -17,8 +17,10 @@ from .parts import (
     WRONG,
     Cavity,
     Cord,
+    DeckSource,
     Disagreement,
     Frequency,
+    Level,
     Mesh,
     Moduli,
     Name,
@@ -230,6 +232,14 @@ def _every_effect(given: dict[str, float]) -> dict[str, float]:
     return {**dict.fromkeys(IDS, 0.0), **given}
 
 
+OF_A_SECTION = ("section", "mesh", "materials", "solids")
+"""What a case must have that is no deck's."""
+IN_A_DECK = ("section", "mesh", "materials", "solids", "rebar_layers", "templates")
+"""What stands in the deck, where the case names one."""
+DECK_LEVEL = "deck"
+"""The mesh level of a deck: it has its own mesh."""
+
+
 class Case(Part):
     """One tyre, its mesh and analysis, what may vary and what was measured.
 
@@ -241,12 +251,15 @@ class Case(Part):
     name: Text
     size: Text
     pressure_kPa: Annotated[Number, Field(ge=0, lt=2000)]
-    section: SectionSource
-    mesh: Mesh
-    materials: Annotated[
-        dict[Name, Annotated[Rubber | Cord, Field(discriminator="kind")]], Field(min_length=1)
-    ]
-    solids: Annotated[list[Solid], Field(min_length=1)]
+    deck: DeckSource | None = None
+    section: SectionSource = SectionSource()
+    mesh: Mesh = Mesh(
+        element="CGAX8", level=DECK_LEVEL, levels={DECK_LEVEL: Level(elements={}, rows=[])}
+    )
+    materials: dict[Name, Annotated[Rubber | Cord, Field(discriminator="kind")]] = Field(
+        default_factory=dict
+    )
+    solids: list[Solid] = Field(default_factory=list)
     rebar_layers: dict[Name, RebarLayer] = Field(default_factory=dict)
     rim: Rim
     cavity: Cavity = Cavity()
@@ -264,6 +277,22 @@ class Case(Part):
     uncertainties: dict[Name, Uncertainty] = Field(default_factory=dict)
     solver: SolverChoice
     templates: Text | None = None
+
+    @classmethod
+    def problems(cls, values: Mapping[str, Any]) -> Iterator[Disagreement]:
+        given = {key for key in (*OF_A_SECTION, *IN_A_DECK) if cls._is_given(key, values.get(key))}
+        if values.get("deck") is None:
+            for key in OF_A_SECTION:
+                if key not in given:
+                    more = ", at least 1 entries" if key in ("materials", "solids") else ""
+                    yield key, f"must be given{more}"
+        else:
+            yield from ((key, "must be absent with deck") for key in IN_A_DECK if key in given)
+
+    @classmethod
+    def _is_given(cls, key: str, value: Any) -> bool:
+        """Whether a key has a value of its own."""
+        return bool(value) and value != cls.model_fields[key].get_default()
 
     def plain(self) -> dict[str, Any]:
         """The case as plain data, defaults and all."""

@@ -47,7 +47,7 @@ def explain(error: ValidationError, start: Keys = ()) -> Iterator[tuple[Keys, st
     for item in error.errors(include_url=False, include_input=False):
         keys, kind, context = (*start, *item["loc"]), item["type"], item.get("ctx", {})
         material: type[BaseModel] | None = None
-        if keys[0] == "materials" and len(keys) > 2 and keys[2] in KINDS:
+        if keys[:1] == ("materials",) and len(keys) > 2 and keys[2] in KINDS:
             # pydantic names the kind between the material and its key
             keys, material = (*keys[:2], *keys[3:]), KINDS[str(keys[2])]
         if keys[-1:] == ("[key]",):
@@ -131,6 +131,7 @@ def disagreements(data: Mapping[str, Any]) -> Iterator[tuple[Keys, str]]:
         for i, target in enumerate(entries(table(data, "targets"), key)):
             parts.append((("targets", key, i), target, kind))
     parts += [((key,), data.get(key), kind) for key, kind in SINGLE.items()]
+    parts.append(((), data, Case))
     for keys, part, kind in parts:
         if isinstance(part, dict):
             for key, message in kind.problems(part):

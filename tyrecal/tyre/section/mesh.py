@@ -36,6 +36,38 @@ class SectionMesh:
         """The region that an element of a cord line lies in."""
         return self.cells[1000 * (cord % 1_000_000) + 1][0]
 
+    def corners(self) -> Array:
+        """The solids' corner nodes: (row points, columns), from the inner surface out."""
+        step = 2 if self.quadratic else 1
+        along, rows = self.shape
+        return 1000 * (step * np.arange(along + 1) + 1) + step * np.arange(rows + 1)[:, None] + 1
+
+    def grid(self) -> tuple[Array, Array]:
+        """Corner nodes, and where the four of each element stand among them."""
+        nodes = self.corners()
+        k = np.arange(nodes.size).reshape(nodes.shape)
+        quads = np.stack([k[:-1, :-1], k[1:, :-1], k[1:, 1:], k[:-1, 1:]], -1)
+        return nodes.ravel(), quads.reshape(-1, 4)
+
+    def skin(self) -> Array:
+        """Corner nodes of the outer surface from -z to +z, from inner bead edge to inner bead
+        edge."""
+        grid = self.corners()
+        return np.concatenate([grid[:-1, 0], grid[-1], grid[-2::-1, -1]])
+
+    def outline(self) -> list[int]:
+        """Numbers of the nodes round the section, closed."""
+        step = 2 if self.quadratic else 1
+        columns, rows = (step * n for n in self.shape)
+        walk = [(0, j) for j in range(columns)] + [(i, columns) for i in range(rows)]
+        walk += [(rows, j) for j in range(columns, 0, -1)] + [(i, 0) for i in range(rows, -1, -1)]
+        return [1000 * (j + 1) + i + 1 for i, j in walk]
+
+    @property
+    def inner_ends(self) -> tuple[int, int]:
+        """First and last node of the inner surface."""
+        return self.solids[self.inner[0]][0], self.solids[self.inner[-1]][3]
+
     @property
     def outer_nodes(self) -> list[int]:
         """Nodes of the outer surface from -z to +z, midside ones too."""

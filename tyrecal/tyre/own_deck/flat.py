@@ -1,0 +1,394 @@
+"""The flat deck of a user's one: in SI units, without parts, generated nodes and what only asks for
+output, in the words that solvers honour; each of its lines knows where it comes from.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from .grammar import MATERIAL, Sorted
+from .model import Assigned, Face, Model
+from .numbers import DIMENSIONS, named_fields, written
+from .scope import Point
+from .text import Block, OwnDeckError, Place, Row
+
+REFERENCE_NODE = 900001
+OVER_THE_BELT = 0.94  # of the largest radius: nodes of the outer surface beyond are the crown's
+SECTION_OPTIONS = ("HOURGLASS STIFFNESS", "REBAR LAYER")
+
+
+@dataclass(frozen=True, eq=False)
+class Ply:
+    """A rebar layer as it is found."""
+
+    name: str
+    set_name: str
+    material: str
+    area_m2: float
+    spacing: float  # m, or degrees
+    angular: bool
+    angle_deg: float
+    elements: tuple[int, ...]  # numbers in the flat deck
+
+
+@dataclass(frozen=True, eq=False)
+class FlatMesh:
+    """Nodes and elements under the flat deck's numbers, m.
+
+    outer, inner: nodes of the outer and of the inner surface in order, from -z to +z; around: of
+    all the boundary, closed, from the inner surface's first on.
+    """
+
+    nodes: dict[int, Point]
+    solids: dict[int, tuple[int, ...]]
+    plies: dict[int, tuple[int, ...]]
+    section_of: dict[int, int]  # solid to its place among the solid sections
+    rim: tuple[int, ...]
+    cavity: tuple[Face, ...]
+    tread: tuple[Face, ...]
+    outer: tuple[int, ...]
+    inner: tuple[int, ...]
+    around: tuple[int, ...]
+    reference: Point
+    element_at: dict[int, int]  # the deck's number of an element to the flat one
+    lines: tuple[str, ...]
+    origins: tuple[Place, ...]
+
+    @cached_property
+    def crown(self) -> tuple[int, ...]:
+        """Nodes of the outer surface over the belt."""
+        most = max(self.nodes[n][0] for n in self.outer)
+        return tuple(n for n in self.outer if self.nodes[n][0] > OVER_THE_BELT * most)
+
+
+@dataclass(frozen=True, eq=False)
+class Flat:
+    """The flat deck without its step; ``origins``: of each line."""
+
+    mesh: FlatMesh
+    lines: tuple[str, ...]
+    origins: tuple[Place, ...]
+    materials: tuple[str, ...]  # of the solid sections, by their place
+    sections: tuple[str, ...]  # their sets, likewise
+    plies: tuple[Ply, ...]
+    pressure_Pa: float
+    long_term: bool
+    found: Sorted
+    model: Model
+
+    @property
+    def set_names(self) -> list[str]:
+        """Of the element sets, rubber first."""
+        count = len(self.model.solids), len(self.model.plies)
+        words = zip(("SOLID", "PLY"), count, strict=True)
+        return [f"{word}_{k + 1}" for word, n in words for k in range(n)]
+
+    @property
+    def text(self) -> str:
+        """The lines."""
+        return "\n".join(self.lines)
+
+
+def flatten(found: Sorted, model: Model, length: float, mass: float) -> Flat:
+    """The flat deck of a model whose units of length and mass are so many m and kg. Raises
+    OwnDeckError."""
+    mesh = _mesh(model, length)
+    write = _Writer(length, mass)
+    blocks = _materials(found.model)
+    used: dict[str, str] = {}
+    rubbers, plies = [], list[Ply]()
+    for k, section in enumerate(model.solids, start=1):
+        name = _used(section.block, section.block.need("MATERIAL"), blocks, used)
+        rubbers.append(section.block.get("MATERIAL"))
+        controls = section.block.get("CONTROLS")
+        more = f", CONTROLS={controls}" if controls else ""
+        write.line(f"*SOLID SECTION, ELSET=SOLID_{k}, MATERIAL={name}{more}", section.block.place)
+        for option in section.options:
+            if option.name != "HOURGLASS STIFFNESS":
+                raise option.refused("does not belong under a *SOLID SECTION")
+            write.block(option, "*HOURGLASS STIFFNESS")
+        if any(row.text(0) for row in section.block.rows[1:]):
+            raise section.block.refused("takes no more than one data line", section.block.rows[1])
+    for k, section in enumerate(model.plies, start=1):
+        write.line(f"*SURFACE SECTION, ELSET=PLY_{k}", section.block.place)
+        for option in section.options:
+            plies += _layers(write, section, k, option, blocks, used, mesh, length)
+    for block in found.model:
+        if block.name == "SECTION CONTROLS":
+            head = f"*SECTION CONTROLS, NAME={block.need('NAME')}, HOURGLASS=STIFFNESS"
+            if "HOURGLASS" not in block.parameters or block.rows:
+                raise block.refused("only HOURGLASS=STIFFNESS is honoured of it")
+            write.line(head, block.place)
+    for name, plain_name in used.items():
+        write.line(f"*MATERIAL, NAME={plain_name}", blocks[name][0].place)
+        for option in blocks[name][1:]:
+            values = "".join(
+                f", {key}" + (f"={value}" if value else "")
+                for key, value in option.parameters.items()
+            )
+            write.block(option, f"*{option.name}{values}")
+    static = next(block for block in found.inflation if block.name == "STATIC")
+    _check_amplitudes(found, static)
+    block, row, i = model.pressure[0]
+    stress = mass / length
+    return Flat(
+        mesh,
+        (*mesh.lines, *write.lines),
+        (*mesh.origins, *write.origins),
+        tuple(rubbers),
+        tuple(section.name for section in model.solids),
+        tuple(plies),
+        row.number(i) * stress,
+        "LONG TERM" in static.parameters,
+        found,
+        model,
+    )
+
+
+class _Writer:
+    """Lines with their origins, numbers in SI units."""
+
+    def __init__(self, length: float, mass: float):
+        self.length, self.mass = length, mass
+        self.lines: list[str] = []
+        self.origins: list[Place] = []
+
+    def line(self, text: str, place: Place) -> None:
+        self.lines.append(text)
+        self.origins.append(place)
+
+    def scale(self, name: str) -> float:
+        """Of a field of this name, to SI units."""
+        L, M, _ = DIMENSIONS.get(name, (0, 0, 0))
+        return self.length**L * self.mass**M
+
+    def block(self, block: Block, head: str, angular: bool = False) -> None:
+        """A keyword line, and the block's data."""
+        self.line(head, block.place)
+        scales = {(i, j): self.scale(name) for name, i, j in named_fields(block)}
+        for i, row in enumerate(block.rows):
+            fields = list(row.fields)
+            for j, text in enumerate(fields):
+                scale = scales.get((i, j), 1.0)
+                if angular and j == 2:
+                    scale = 1.0
+                if scale != 1.0 and text:
+                    fields[j] = written(row.number(j) * scale)
+            self.line(", ".join(fields), row.place)
+
+
+def _materials(blocks: Sequence[Block]) -> dict[str, list[Block]]:
+    """*MATERIAL with its options, by name."""
+    found: dict[str, list[Block]] = {}
+    current: list[Block] = []
+    for block in blocks:
+        if block.name == "MATERIAL":
+            name = block.need("NAME")
+            if name in found:
+                raise block.refused(f"the material {name} is defined twice")
+            if block.rows:
+                raise block.refused("takes no data")
+            current = found[name] = [block]
+        elif block.name in MATERIAL:
+            if any(each.name == block.name for each in current):
+                raise block.refused(f"stands twice under {current[0].get('NAME')}")
+            list(named_fields(block))
+            current.append(block)
+    return found
+
+
+def _used(
+    block: Block, name: str, blocks: Mapping[str, Sequence[Block]], used: dict[str, str]
+) -> str:
+    """The flat deck's name of a material that is used."""
+    if name not in blocks:
+        raise block.refused(f"the material {name} is not defined")
+    if not any(each.name == "DENSITY" for each in blocks[name]):
+        raise blocks[name][0].refused(f"the material {name} needs a *DENSITY")
+    if name not in used:
+        simple = re.fullmatch(r"[A-Z][A-Z0-9_\-]{0,60}", name)
+        used[name] = name if simple else f"MATERIAL_{len(used) + 1}"
+    return used[name]
+
+
+def _layers(
+    write: _Writer,
+    section: Assigned,
+    k: int,
+    option: Block,
+    blocks: Mapping[str, Sequence[Block]],
+    used: dict[str, str],
+    mesh: FlatMesh,
+    length: float,
+) -> list[Ply]:
+    if option.name != "REBAR LAYER":
+        raise option.refused("does not belong under a *SURFACE SECTION")
+    if not option.rows:
+        raise option.refused("needs a data line: name, area, spacing, position, material, angle")
+    angular = option.get("GEOMETRY") == "ANGULAR"
+    rows, found = [], []
+    for row in option.rows:
+        material = row.name(4)
+        flat_name = _used(option, material, blocks, used)
+        if any(row.fields[6:]):
+            raise option.refused(
+                f"data '{next(filter(None, row.fields[6:]))}' is not honoured", row
+            )
+        if row.number(3, 0.0):
+            raise option.refused("the position of a layer in its surface element must be 0", row)
+        for j, what in ((1, "area"), (2, "spacing")):
+            if not row.number(j) > 0:
+                raise option.refused(f"the {what} must be positive", row)
+        name = re.sub(r"\W", "_", row.name(0)) or "LAYER"
+        rows.append(Row(row.place, (name, *row.fields[1:4], flat_name, *row.fields[5:])))
+        found.append(
+            Ply(
+                row.name(0),
+                section.name,
+                material,
+                row.number(1) * length**2,
+                row.number(2) * (1.0 if angular else length),
+                angular,
+                row.number(5, 0.0),
+                tuple(mesh.element_at[n] for n in section.elements),
+            )
+        )
+    head = "*REBAR LAYER" + (", GEOMETRY=ANGULAR" if angular else "")
+    write.block(Block(option.name, option.place, option.parameters, tuple(rows)), head, angular)
+    return found
+
+
+def _check_amplitudes(found: Sorted, static: Block) -> None:
+    """What follows an amplitude has its full size at the step's end."""
+    tables = {block.need("NAME"): block for block in found.model if block.name == "AMPLITUDE"}
+    for block in found.inflation:
+        name = block.get("AMPLITUDE")
+        if not name:
+            continue
+        if name not in tables:
+            raise block.refused(f"the amplitude {name} is not defined")
+        table = tables[name]
+        numbers = [row.number(i) for row in table.rows for i, text in enumerate(row.fields) if text]
+        period = static.rows[0].number(1, 1.0) if static.rows else 1.0
+        if len(numbers) < 2 or len(numbers) % 2:
+            raise table.refused("holds pairs of time and amplitude")
+        end = float(np.interp(period, numbers[::2], numbers[1::2]))
+        if end != 1.0:
+            raise block.refused(f"the amplitude {name} ends at {end:g}, it must end at 1")
+
+
+def _mesh(model: Model, length: float) -> FlatMesh:
+    known = getattr(model, "_flat", {})
+    if length in known:
+        mesh: FlatMesh = known[length]
+        return mesh
+    number = {n: k for k, n in enumerate(sorted(model.nodes), start=1)}
+    nodes = {number[n]: (length * r, length * z) for n, (r, z) in sorted(model.nodes.items())}
+    lines, origins = list[str](), list[Place]()
+
+    def line(text: str, place: Place) -> None:
+        lines.append(text)
+        origins.append(place)
+
+    start = model.solids[0].block.place
+    line("*NODE, NSET=TYRE", start)
+    for n, (r, z) in nodes.items():
+        line(f"{n}, {r!r}, {z!r}", start)
+    r, z = model.reference[1]
+    reference = (length * r, length * z)
+    line("*NODE, NSET=RIM_REFERENCE", start)
+    line(f"{REFERENCE_NODE}, {reference[0]!r}, {reference[1]!r}", start)
+    element_at = {n: k for k, n in enumerate(sorted(model.elements), start=1)}
+    solids, plies, section_of = {}, {}, {}
+    for word, group in (("SOLID", model.solids), ("PLY", model.plies)):
+        for k, section in enumerate(group, start=1):
+            kinds: dict[str, list[int]] = {}
+            for n in section.elements:
+                kinds.setdefault(model.elements[n].kind, []).append(n)
+            for kind, members in kinds.items():
+                first = model.elements[members[0]]
+                line(f"*ELEMENT, TYPE={kind}, ELSET={word}_{k}", first.block.place)
+                for n in members:
+                    element = model.elements[n]
+                    own = tuple(number[each] for each in element.nodes)
+                    if word == "SOLID":
+                        solids[element_at[n]], section_of[element_at[n]] = own, k - 1
+                    else:
+                        plies[element_at[n]] = own
+                    line(", ".join(map(str, (element_at[n], *own))), element.row.place)
+    rim = tuple(sorted(number[n] for n in model.rim))
+    renumbered = lambda face: (element_at[face[0]], face[1], tuple(number[n] for n in face[2]))
+    cavity = [renumbered(face) for face in model.cavity]
+    boundary = [renumbered(face) for face in model.boundary]
+    held, under = set(rim), {face[:2] for face in cavity}
+    tread = [f for f in boundary if f[:2] not in under and not held.issuperset(f[2])]
+    if not tread:
+        raise OwnDeckError(start, "no free surface of the rubber is left for the tread")
+    outer, inner = _chain(tread, nodes), _chain(cavity, nodes)
+    line("*NSET, NSET=RIM", start)
+    _numbers(line, rim, start)
+    most = max(nodes[n][0] for n in outer)
+    line("*NSET, NSET=CROWN", start)
+    _numbers(line, [n for n in outer if nodes[n][0] > OVER_THE_BELT * most], start)
+    for name, faces in (("CAVITY", cavity), ("TREAD", tread)):
+        line(f"*SURFACE, NAME={name}, TYPE=ELEMENT", start)
+        for n, face, _ in faces:
+            line(f"{n}, {face}", start)
+    line(f"*RIGID BODY, REF NODE={REFERENCE_NODE}, TIE NSET=RIM", start)
+    made = FlatMesh(
+        nodes,
+        solids,
+        plies,
+        section_of,
+        rim,
+        tuple(cavity),
+        tuple(tread),
+        tuple(outer),
+        tuple(inner),
+        tuple(_around(boundary, inner)),
+        reference,
+        element_at,
+        tuple(lines),
+        tuple(origins),
+    )
+    object.__setattr__(model, "_flat", {**known, length: made})
+    return made
+
+
+def _around(boundary: Sequence[Face], inner: Sequence[int]) -> list[int]:
+    """The boundary that the inner surface is part of, along that."""
+    following = {face[2][0]: face[2][1:] for face in boundary}
+    chain = [inner[0] if inner[0] in following else boundary[0][2][0]]
+    while len(chain) == 1 or chain[-1] != chain[0]:
+        if chain[-1] not in following or len(chain) > 3 * len(boundary):
+            break
+        chain += following[chain[-1]]
+    return chain if chain[1] == inner[1] else chain[::-1]
+
+
+def _numbers(line: object, numbers: Sequence[int], place: Place) -> None:
+    for k in range(0, len(numbers), 12):
+        line(", ".join(map(str, numbers[k : k + 12])), place)  # type: ignore[operator]
+
+
+def _chain(faces: Sequence[Face], nodes: Mapping[int, Point]) -> list[int]:
+    """Nodes of the longest chain of faces, from -z to +z."""
+    following = {face[2][0]: face[2] for face in faces}
+    ends = {face[2][-1] for face in faces}
+    best = list[int]()
+    for start in [n for n in following if n not in ends] or [faces[0][2][0]]:
+        chain, seen = [start], {start}
+        while chain[-1] in following:
+            further = following[chain[-1]][1:]
+            chain += further
+            if further[-1] in seen:
+                break
+            seen.add(further[-1])
+        if len(chain) > len(best):
+            best = chain
+    return best if nodes[best[0]][1] <= nodes[best[-1]][1] else best[::-1]

@@ -1,0 +1,111 @@
+"""What a deck was found to hold, in words and as data."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from .flat import Flat
+from .own_deck import OwnDeck
+from .text import names_of
+
+
+def contents(deck: OwnDeck, flat: Flat) -> dict[str, Any]:
+    """The data."""
+    mesh, model = flat.mesh, flat.model
+    crown = np.array([mesh.nodes[n] for n in mesh.crown])
+    held = np.array([mesh.nodes[n] for n in mesh.rim])
+    return {
+        "units": deck.units,
+        "nodes": len(mesh.nodes),
+        "elements": dict(Counter(element.kind for element in model.elements.values())),
+        "sections": [
+            {"set": name, "material": material}
+            for name, material in zip(flat.sections, flat.materials, strict=True)
+        ],
+        "compounds": {name: laws(flat, name) for name in dict.fromkeys(flat.materials)},
+        "plies": [
+            {
+                "name": ply.name,
+                "set": ply.set_name,
+                "material": ply.material,
+                "area_m2": ply.area_m2,
+                "spacing_deg" if ply.angular else "spacing_m": ply.spacing,
+                "angle_deg": ply.angle_deg,
+            }
+            for ply in flat.plies
+        ],
+        "rim": {"nodes": len(mesh.rim), "radius_m": float(held[:, 0].max())},
+        "cavity": {"surface": model.cavity_name, "faces": len(mesh.cavity)},
+        "pressure_kPa": flat.pressure_Pa / 1e3,
+        "static_moduli": "long_term" if flat.long_term else "instantaneous",
+        "crown": {
+            "nodes": len(crown),
+            "radius_m": float(crown[:, 0].max()),
+            "half_width_m": float(abs(crown[:, 1]).max()),
+        },
+        "reflected": model.reflected,
+        "marks": list(deck.marks),
+        "passed_over": names_of(flat.found.passed),
+        "later_steps": [step_name(block.parameters.get("NAME", "")) for block in flat.found.later],
+    }
+
+
+def laws(flat: Flat, material: str) -> list[str]:
+    """The options of a material."""
+    found: list[str] = []
+    inside = False
+    for block in flat.found.model:
+        if block.name == "MATERIAL":
+            inside = block.get("NAME") == material
+        elif inside and block.name in ("ELASTIC", "HYPERELASTIC", "VISCOELASTIC"):
+            found.append(", ".join((block.name.lower(), *map(str.lower, block.parameters))))
+    return found
+
+
+def step_name(name: str) -> str:
+    """A step's name, for words."""
+    return name or "without a name"
+
+
+def words(found: dict[str, Any], mass_kg: float) -> Iterator[str]:
+    """The same in sentences."""
+    how = {"m": "m, kg, s, Pa", "mm": "mm, t, s, MPa"}[found["units"]]
+    kinds = ", ".join(f"{count} {kind}" for kind, count in found["elements"].items())
+    half = ", the half made whole" if found["reflected"] else ""
+    yield f"units {how}; {mass_kg:.2f} kg without the rim"
+    yield f"{found['nodes']} nodes, {kinds}{half}"
+    for section in found["sections"]:
+        laws = "; ".join(found["compounds"][section["material"]])
+        yield f"section {section['set']}: {section['material']} ({laws})"
+    for ply in found["plies"]:
+        spacing = (
+            f"{ply['spacing_deg']:g} degrees"
+            if "spacing_deg" in ply
+            else f"{1e3 * ply['spacing_m']:.4g} mm"
+        )
+        yield (
+            f"ply {ply['name']} on {ply['set']}: {ply['material']}, {1e6 * ply['area_m2']:.4g} mm2"
+            f" every {spacing}, {ply['angle_deg']:g} degrees from the meridian"
+        )
+    rim, crown = found["rim"], found["crown"]
+    yield f"rim: holds {rim['nodes']} nodes, up to r = {1e3 * rim['radius_m']:.1f} mm"
+    yield (
+        f"cavity: surface {found['cavity']['surface']}, {found['cavity']['faces']} faces,"
+        f" {found['pressure_kPa']:g} kPa, {found['static_moduli'].replace('_', ' ')} moduli"
+    )
+    yield (
+        f"crown: {crown['nodes']} nodes of the outer surface, {2e3 * crown['half_width_m']:.1f} mm"
+        f" wide, radius {1e3 * crown['radius_m']:.1f} mm"
+    )
+    if found["marks"]:
+        yield f"marks: {', '.join(found['marks'])}"
+    if found["passed_over"]:
+        yield f"passed over, as they change no answer: *{', *'.join(found['passed_over'])}"
+    if found["later_steps"]:
+        yield (
+            f"left out, as they come after the inflation: steps {', '.join(found['later_steps'])}"
+        )

@@ -1,0 +1,305 @@
+"""The numbers of a deck that may be set: by a mark `{{ NAME }}` in its text, or by a path that
+names the place, as in `material RUBBER / HYPERELASTIC / C10`.
+
+Values stand in the deck's own units.
+"""
+
+from __future__ import annotations
+
+import ast
+import math
+import operator
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from typing import Any
+
+from .text import Block, Row, named
+
+DECK_MARK = re.compile(r"\{\{\s*([A-Za-z][A-Za-z0-9_\-]*)\s*\}\}")
+PARAMETER = re.compile(r"<\s*(\w+)\s*>")
+LAYER = ("", "area", "spacing", "", "", "angle")  # the data fields of *REBAR LAYER
+LAW_CONSTANTS: dict[
+    str, Callable[[int], list[str]]
+] = {  # the constants of *HYPERELASTIC, of order N
+    "NEO HOOKE": lambda N: ["C10", "D1"],
+    "MOONEY-RIVLIN": lambda N: ["C10", "C01", "D1"],
+    "YEOH": lambda N: [*_each("C{}0", 3), *_each("D{}", 3)],
+    "REDUCED POLYNOMIAL": lambda N: [*_each("C{}0", N), *_each("D{}", N)],
+    "POLYNOMIAL": lambda N: [
+        *(f"C{total - j}{j}" for total in range(1, N + 1) for j in range(total + 1)),
+        *_each("D{}", N),
+    ],
+    "ARRUDA-BOYCE": lambda N: ["mu", "lambda_m", "D1"],
+    "OGDEN": lambda N: [
+        *(name for i in range(1, N + 1) for name in (f"mu{i}", f"alpha{i}")),
+        *_each("D{}", N),
+    ],
+}
+FIELDS = {
+    "DENSITY": ["density"],
+    "ELASTIC": ["E", "nu"],
+    "PRONY": ["g", "k", "tau"],
+    "TABULAR": ["shear loss", "shear storage", "bulk loss", "bulk storage", "frequency"],
+    "HOURGLASS STIFFNESS": ["stiffness"],
+}
+# L, M, T exponents of the unit of a field, by its name; those not here have none
+OF_STRESS, OF_COMPLIANCE = (-1, 1, -2), (1, -1, 2)
+DIMENSIONS: dict[str, tuple[int, int, int]] = {
+    **dict.fromkeys(("E", "stiffness", "mu", "pressure"), OF_STRESS),
+    **dict.fromkeys(("D1", "D2", "D3", "D4", "D5", "D6"), OF_COMPLIANCE),
+    **dict.fromkeys((f"mu{i}" for i in range(1, 7)), OF_STRESS),
+    **dict.fromkeys((f"C{i}{j}" for i in range(7) for j in range(7)), OF_STRESS),
+    "density": (-3, 1, 0),
+    "area": (2, 0, 0),
+    "spacing": (1, 0, 0),
+    "length": (1, 0, 0),
+}
+Numbers = Mapping[str, float]
+
+
+def _each(form: str, count: int) -> list[str]:
+    return [form.format(i) for i in range(1, count + 1)]
+
+
+def field_names(block: Block) -> list[str]:
+    """Names of the data fields of a material's option; of one over several lines, of all."""
+    if block.name == "HYPERELASTIC":
+        laws = [law for law in LAW_CONSTANTS if law in block.parameters]
+        if len(laws) > 1:
+            raise block.refused(f"{laws[0]} and {laws[1]} are two laws")
+        order = int(block.parameters.get("N", "1"))
+        return LAW_CONSTANTS[laws[0] if laws else "POLYNOMIAL"](order)
+    if block.name == "VISCOELASTIC":
+        return FIELDS["PRONY" if "TIME" in block.parameters else "TABULAR"]
+    return FIELDS.get(block.name, [])
+
+
+def named_fields(block: Block) -> Iterator[tuple[str, int, int]]:
+    """Name, row and field of the numbers of a material's option or a rebar layer."""
+    if block.name == "REBAR LAYER":
+        for i, row in enumerate(block.rows):
+            yield from ((name, i, j) for j, name in enumerate(LAYER) if name and row.text(j))
+        return
+    names = field_names(block)
+    if block.name == "HYPERELASTIC":  # eight constants a line
+        for k, name in enumerate(names):
+            i, j = divmod(k, 8)
+            if i < len(block.rows) and block.rows[i].text(j):
+                yield name, i, j
+        return
+    for i, row in enumerate(block.rows):
+        for j, name in enumerate(names):
+            if row.text(j):
+                yield name, i, j
+
+
+def paths(blocks: Sequence[Block]) -> dict[str, tuple[int, int, int]]:
+    """Path to block, row and field of the plain numbers of materials, layers and parameters."""
+    found: dict[str, tuple[int, int, int]] = {}
+    material, section = "", ""
+    layers = [row.name(0) for b in blocks if b.name == "REBAR LAYER" for row in b.rows]
+    for place, block in enumerate(blocks):
+        if block.name == "STEP":
+            break
+        if block.name == "MATERIAL":
+            material = f"material {block.get('NAME')}"
+        elif block.name == "SURFACE SECTION":
+            section = f"section {block.get('ELSET')} / "
+        elif block.name == "PARAMETER":
+            for i, row in enumerate(block.rows):
+                name, value = assigned(row)
+                if _plain(value):
+                    found[f"parameter / {name}"] = place, i, -1
+            continue
+        for name, i, j in named_fields(block):
+            row = block.rows[i]
+            if not _plain(row.text(j)):
+                continue
+            if block.name == "REBAR LAYER":
+                own = row.name(0)
+                path = f"rebar {own} / {name}"
+                path = section + path if layers.count(own) > 1 else path
+            elif block.name == "HOURGLASS STIFFNESS":
+                continue
+            else:
+                line = (
+                    f"row {i + 1} / "
+                    if len(block.rows) > 1 and block.name != "HYPERELASTIC"
+                    else ""
+                )
+                path = f"{material} / {block.name} / {line}{name}"
+            if path not in found:
+                found[path] = place, i, j
+    return found
+
+
+def assigned(row: Row) -> tuple[str, str]:
+    """Name and expression of a *PARAMETER's data line, without a comment."""
+    name, _, value = ",".join(row.fields).partition("#")[0].partition("=")
+    return name.strip(), value.strip()
+
+
+def _plain(text: str) -> bool:
+    try:
+        value = float(text.replace("D", "E").replace("d", "e"))
+    except ValueError:
+        return False
+    return math.isfinite(value)
+
+
+def plain(text: str) -> float:
+    """A field as a number."""
+    return float(text.replace("D", "E").replace("d", "e"))
+
+
+def marks(blocks: Sequence[Block]) -> dict[str, Block]:
+    """The marks of a deck, each with a block that has it."""
+    found: dict[str, Block] = {}
+    for block in blocks:
+        for row in block.rows:
+            for field in row.fields:
+                for name in DECK_MARK.findall(field):
+                    found.setdefault(name, block)
+        for value in block.parameters.values():
+            if "{{" in value:
+                raise block.refused(f"a mark stands in data lines, not in {value}")
+    return found
+
+
+def marked_numbers(marks: Mapping[str, Block], given: Numbers, variable: Any) -> dict[str, float]:
+    """Values of marks that only a variable of a case gives, by its start."""
+    if not isinstance(variable, dict) or not isinstance(variable.get("start"), int | float):
+        return {}
+    paths = [p for p in variable.get("sets") or () if isinstance(p, str)]
+    names = [path.removeprefix("deck.numbers.") for path in paths]
+    return {name: variable["start"] for name in names if name in marks and name not in given}
+
+
+def written(value: float) -> str:
+    """A number as decks have it: 13 digits in at most 20 characters."""
+    return format(value, ".13g")
+
+
+def is_marked(block: Block) -> bool:
+    """Whether its numbers depend on marks or parameters."""
+    return any("{{" in field or "<" in field for row in block.rows for field in row.fields) or any(
+        "<" in value for value in block.parameters.values()
+    )
+
+
+def filled(block: Block, numbers: Numbers, parameters: Mapping[str, Any]) -> Block:
+    """A block with the numbers of its marks and parameters."""
+
+    def text(field: str) -> str:
+        if "{{" in field:
+            field = DECK_MARK.sub(
+                lambda m: written(numbers[m[1]]) if m[1] in numbers else m[0], field
+            )
+            if "{{" in field:
+                raise block.refused(f"the mark {field} has no number: give it in deck.numbers")
+        return PARAMETER.sub(lambda m: _parameter(block, parameters, m[1]), field)
+
+    rows = tuple(
+        Row(row.place, tuple(map(text, row.fields)))
+        if any("{{" in field or "<" in field for field in row.fields)
+        else row
+        for row in block.rows
+    )
+    values = {k: text(v) if "<" in v else v for k, v in block.parameters.items()}
+    return Block(block.name, block.place, values, rows)
+
+
+def _parameter(block: Block, parameters: Mapping[str, Any], name: str) -> str:
+    for known, value in parameters.items():
+        if known.upper() == name.upper():
+            return value if isinstance(value, str) else written(value)
+    raise block.refused(f"the parameter <{name}> is not defined above")
+
+
+OPERATORS: dict[type, Callable[..., Any]] = {
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: operator.truediv,
+    ast.Pow: operator.pow,
+    ast.USub: operator.neg,
+    ast.UAdd: operator.pos,
+}
+EXPRESSION_FUNCTIONS = {
+    name: getattr(math, name)
+    for name in ("sin", "cos", "tan", "asin", "acos", "atan", "sqrt", "exp", "log", "log10", "fabs")
+} | {"abs": abs, "float": float, "min": min, "max": max, "int": int}
+
+
+def parameters(block: Block, known: dict[str, Any]) -> None:
+    """Add the parameters that a *PARAMETER defines: NAME = expression, of those above too."""
+    for row in block.rows:
+        text = ",".join(row.fields)
+        name, expression = assigned(row)
+        if not (name or expression):
+            continue
+        if not expression or not re.fullmatch(r"[A-Za-z]\w*", name):
+            raise block.refused(f"'{text}' is not NAME = expression", row)
+        try:
+            value = _evaluate(ast.parse(expression, mode="eval").body, known)
+        except ZeroDivisionError:
+            raise block.refused(f"'{text}' divides by 0", row) from None
+        except (ValueError, SyntaxError, KeyError, TypeError, OverflowError) as error:
+            raise block.refused(f"'{text}' is not honoured: {error}", row) from None
+        known[name] = value
+
+
+def _evaluate(node: ast.AST, known: Mapping[str, Any]) -> Any:
+    if isinstance(node, ast.Constant) and type(node.value) in (int, float, str):
+        return node.value
+    if isinstance(node, ast.Name):
+        same = [value for name, value in known.items() if name.upper() == node.id.upper()]
+        if node.id == "pi":
+            return math.pi
+        if not same:
+            raise ValueError(f"{node.id} is not defined above")
+        return same[0]
+    if isinstance(node, ast.UnaryOp) and type(node.op) in OPERATORS:
+        return OPERATORS[type(node.op)](_number(_evaluate(node.operand, known)))
+    if isinstance(node, ast.BinOp) and type(node.op) in OPERATORS:
+        left, right = (_number(_evaluate(side, known)) for side in (node.left, node.right))
+        whole = isinstance(left, int) and isinstance(right, int)
+        if isinstance(node.op, ast.Div) and whole and left % right:
+            raise ValueError(f"{left}/{right} of whole numbers: write {left}./{right}")
+        if isinstance(node.op, ast.Pow) and abs(right) > 100:
+            raise ValueError("a power above 100")
+        return OPERATORS[type(node.op)](left, right)
+    if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
+        function = EXPRESSION_FUNCTIONS.get(node.func.id)
+        if function and not node.keywords:
+            return function(*(_number(_evaluate(a, known)) for a in node.args))
+    raise ValueError("only numbers, names, + - * / ** and plain functions are")
+
+
+def _number(value: Any) -> Any:
+    if isinstance(value, str):
+        raise ValueError(f"'{value}' is no number")
+    return value
+
+
+def replaced(block: Block, changes: Mapping[tuple[int, int], float]) -> Block:
+    """A block with numbers at (row, field) set; field -1: the value of NAME = value."""
+    rows = list(block.rows)
+    for (i, j), value in changes.items():
+        fields = list(rows[i].fields)
+        if j < 0:
+            fields = [f"{assigned(rows[i])[0]} = {written(value)}"]
+        else:
+            fields[j] = written(value)
+        rows[i] = Row(rows[i].place, tuple(fields))
+    return Block(block.name, block.place, block.parameters, tuple(rows))
+
+
+def canonical(path: str, known: Iterable[str]) -> str | None:
+    """The path of ``known`` that is meant, whatever the case and blanks."""
+    wanted = _key(path)
+    return next((each for each in known if _key(each) == wanted), None)
+
+
+def _key(path: str) -> tuple[str, ...]:
+    return tuple(named(word) for word in path.split("/"))

@@ -1,0 +1,137 @@
+"""A user's deck, read once: its numbers by name, and the flat deck that it is for any of them."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from hashlib import sha256
+from pathlib import Path
+from typing import Any, Literal
+
+from . import numbers as numbers_of
+from .flat import Flat, flatten
+from .grammar import MESH, NO_EFFECT, Sorted, sort
+from .model import Model, build
+from .text import Block, OwnDeckError, Place, read_blocks
+
+Units = Literal["m", "mm"]
+UNIT_LENGTH = {"m": 1.0, "mm": 1e-3}  # of a unit of length, m
+UNIT_MASS = {"m": 1.0, "mm": 1e3}  # of a unit of mass, kg: mm, t, s, MPa
+DENSITIES = {"m": (300.0, 2e4), "mm": (3e-10, 2e-8)}  # of tyres' materials
+TOPOLOGY = {*MESH, "PART", "END PART", "INSTANCE", "END INSTANCE", "ASSEMBLY", "END ASSEMBLY"}
+TOPOLOGY |= {"SYMMETRIC MODEL GENERATION", "BOUNDARY", "DSLOAD", "DLOAD"}
+
+
+@dataclass(eq=False)
+class OwnDeck:
+    """The deck in ``path`` in its ``units``."""
+
+    path: Path
+    units: Units
+    blocks: tuple[Block, ...]
+    _models: dict[tuple[Block, ...], Model] = field(default_factory=dict, repr=False)
+
+    @cached_property
+    def places(self) -> dict[str, tuple[int, int, int]]:
+        """Paths of its plain numbers, to block, row and field."""
+        return numbers_of.paths(self.blocks)
+
+    @cached_property
+    def marks(self) -> dict[str, Block]:
+        """Its marks."""
+        return numbers_of.marks(self.blocks)
+
+    @cached_property
+    def numbers(self) -> dict[str, float]:
+        """Its plain numbers by path, as the text has them."""
+        found = {}
+        for path, (place, i, j) in self.places.items():
+            row = self.blocks[place].rows[i]
+            text = numbers_of.assigned(row)[1] if j < 0 else row.text(j)
+            found[path] = numbers_of.plain(text)
+        return found
+
+    @property
+    def files(self) -> list[str]:
+        """Names of the files that it stands in, relative to its folder."""
+        places = [block.place for block in self.blocks]
+        places += [row.place for block in self.blocks for row in block.rows]
+        return list(dict.fromkeys([self.path.name, *(place.file for place in places)]))
+
+    @cached_property
+    def sha256(self) -> str:
+        """Hash of all that it says but its plain numbers, however it is indented or commented."""
+        numbers = set(self.places.values())
+        said = []
+        for k, block in enumerate(self.blocks):
+            fields = [
+                "" if (k, i, j) in numbers or (k, i, -1) in numbers else text
+                for i, row in enumerate(block.rows)
+                for j, text in enumerate(row.fields)
+            ]
+            if block.name not in NO_EFFECT:
+                said.append((block.name, sorted(block.parameters.items()), fields))
+        return sha256(json.dumps([self.units, said]).encode()).hexdigest()
+
+    def with_numbers(self, numbers: Mapping[str, float]) -> list[Block]:
+        """The blocks with all marks, parameters and numbers set. Raises OwnDeckError."""
+        changes: dict[int, dict[tuple[int, int], float]] = {}
+        for path, value in numbers.items():
+            if path in self.places and value != self.numbers[path]:
+                place, i, j = self.places[path]
+                changes.setdefault(place, {})[i, j] = value
+        known: dict[str, Any] = {}
+        result = []
+        for place, block in enumerate(self.blocks):
+            if place in changes:
+                block = numbers_of.replaced(block, changes[place])
+            if numbers_of.is_marked(block):
+                block = numbers_of.filled(block, numbers, known)
+            if block.name == "PARAMETER":
+                numbers_of.parameters(block, known)
+            result.append(block)
+        return result
+
+    def model(self, found: Sorted) -> Model:
+        """The section of sorted blocks, remembered while the mesh's own stay the same."""
+        key = tuple(b for b in (*found.model, *found.inflation) if b.name in TOPOLOGY)
+        if key not in self._models:
+            while len(self._models) > 3:
+                self._models.pop(next(iter(self._models)))
+            self._models[key] = build(found)
+        return self._models[key]
+
+    def flat(self, numbers: Mapping[str, float]) -> Flat:
+        """The flat deck with numbers set, in SI units. Raises OwnDeckError."""
+        found = sort(self.with_numbers(numbers))
+        return flatten(found, self.model(found), UNIT_LENGTH[self.units], UNIT_MASS[self.units])
+
+
+def read_own_deck(path: Path, units: Units | None = None) -> OwnDeck:
+    """The deck, its units told by its densities where they are not given. Raises OwnDeckError,
+    OSError."""
+    blocks = tuple(read_blocks(path))
+    if not blocks:
+        raise OwnDeckError(Place(path.name, 1), "there is no keyword in it")
+    return OwnDeck(path, units or recognised(blocks), blocks)
+
+
+def recognised(blocks: Sequence[Block]) -> Units:
+    """The units that the densities are in. Raises OwnDeckError where these do not tell."""
+    rows = [(b, row) for b in blocks if b.name == "DENSITY" for row in b.rows[:1]]
+    values = []
+    for block, row in rows:
+        text = row.text(0)
+        if "{{" not in text and "<" not in text:
+            values.append((block, row.number(0)))
+    fits = [
+        units
+        for units, (low, high) in DENSITIES.items()
+        if values and all(low <= value <= high for _, value in values)
+    ]
+    if not fits:
+        block = values[0][0] if values else blocks[0]
+        raise block.refused("the densities do not tell the units: give --units m or --units mm")
+    return "m" if fits[0] == "m" else "mm"

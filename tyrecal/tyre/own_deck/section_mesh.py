@@ -1,0 +1,116 @@
+"""A deck's section as all else sees it: its mesh, and its half drawn."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..section.mesh import SectionMesh
+from ..section.section import Section
+from .flat import Flat, Ply
+from .scope import CORNERS_OF
+
+Array = np.ndarray
+DRAWN_STATIONS = 40  # of the drawn half
+
+
+@dataclass(eq=False)
+class OwnDeckMesh(SectionMesh):
+    """A mesh of any arrangement; regions are its rubbers, lines the sets of its plies."""
+
+    path_outer: list[int] = field(default_factory=list)
+    path_inner: list[int] = field(default_factory=list)
+    around: list[int] = field(default_factory=list)
+    plies: tuple[Ply, ...] = ()
+
+    @property
+    def inner_ends(self) -> tuple[int, int]:
+        """First and last node of the inner surface."""
+        return self.path_inner[0], self.path_inner[-1]
+
+    @property
+    def outer_nodes(self) -> list[int]:
+        """Nodes of the outer surface from -z to +z, midside ones too."""
+        return self.path_outer
+
+    def grid(self) -> tuple[Array, Array]:
+        """Corner nodes, and where the four of each element stand among them."""
+        quads = [(*nodes[:c], *[nodes[2]] * (4 - c)) for nodes, c in self._corners()]
+        nodes, places = np.unique(np.array(quads), return_inverse=True)
+        return nodes, places.reshape(-1, 4)
+
+    def skin(self) -> Array:
+        """Corner nodes of the outer surface from -z to +z."""
+        corners = {n for nodes, c in self._corners() for n in nodes[:c]}
+        return np.array([n for n in self.path_outer if n in corners])
+
+    @property
+    def angles(self) -> dict[str, float]:
+        """Of the layers by name, degrees from the meridian."""
+        return {name: ply.angle_deg for name, ply in self._named().items()}
+
+    @property
+    def layers(self) -> dict[str, list[tuple[int, ...]]]:
+        """Nodes of the elements to draw each layer with: layers of one set take turns."""
+        found = {}
+        for name, ply in self._named().items():
+            sharing = [other.set_name for other in self.plies].count(ply.set_name)
+            turn = [other for other in self.plies if other.set_name == ply.set_name].index(ply)
+            found[name] = list(self.cords[ply.set_name].values())[turn::sharing]
+        return found
+
+    def _named(self) -> dict[str, Ply]:
+        names = [ply.name for ply in self.plies]
+        return {
+            ply.name if names.count(ply.name) == 1 else f"{ply.set_name} {ply.name}": ply
+            for ply in self.plies
+        }
+
+    def _corners(self) -> list[tuple[tuple[int, ...], int]]:
+        return [(nodes, CORNERS_OF[len(nodes)]) for nodes in self.solids.values()]
+
+    def outline(self) -> list[int]:
+        """Nodes round the section, closed, from the inner surface's first."""
+        return self.around
+
+
+def section_mesh(flat: Flat) -> OwnDeckMesh:
+    """The mesh of a flat deck."""
+    mesh = flat.mesh
+    number = {name: k for k, name in enumerate(dict.fromkeys(flat.materials))}
+    lines = {ply.set_name: ply.elements for ply in flat.plies}
+    return OwnDeckMesh(
+        quadratic=any(len(nodes) in (6, 8) for nodes in mesh.solids.values()),
+        nodes=mesh.nodes,
+        solids=mesh.solids,
+        cells={
+            n: (flat.materials[k], number[flat.materials[k]]) for n, k in mesh.section_of.items()
+        },
+        cords={set_name: {n: mesh.plies[n] for n in own} for set_name, own in lines.items()},
+        rim=list(mesh.rim),
+        inner=[face[0] for face in mesh.cavity],
+        outer=[face[0] for face in mesh.tread],
+        shape=(len(mesh.solids), 1),
+        crown_outer=list(mesh.crown),
+        path_outer=list(mesh.outer),
+        path_inner=list(mesh.inner),
+        around=list(mesh.around),
+        plies=flat.plies,
+    )
+
+
+def section(flat: Flat) -> Section:
+    """The half of positive z, of its inner and its outer surface."""
+    mesh = flat.mesh
+    lines = []
+    for path in (mesh.inner, mesh.outer):
+        points = np.array([mesh.nodes[n] for n in path])
+        half = points[points[:, 1] >= 0]
+        arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(half, axis=0).T))])
+        at = np.linspace(0.0, arc[-1], DRAWN_STATIONS)
+        lines.append(np.column_stack([np.interp(at, arc, x) for x in half.T]))
+    rim = np.array([mesh.nodes[n] for n in mesh.rim])
+    rigid = lines[1][:, 0] <= rim[:, 0].max()
+    regions = tuple((name, DRAWN_STATIONS - 1) for name in dict.fromkeys(flat.materials))
+    return Section(("inner", "outer"), np.array(lines), regions, rigid)
