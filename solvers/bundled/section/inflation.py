@@ -190,12 +190,15 @@ def _newton(
         slope = float(force @ step)
         field, length = numbering.spread(step), 1.0
         while True:
-            trial = U + length * field
+            trial, lower = U + length * field, None
             with np.errstate(all="ignore"):
-                lower = mechanics.potential(model, trial, loads)
                 force = mechanics.residual(model, trial, loads, numbering)
-            # near the solution the energy is flat to round-off and the force decides
-            if np.linalg.norm(force) < 0.5 * size or lower <= energy + 1e-4 * length * slope:
+                # near the solution the energy is flat to round-off and the force decides
+                if np.linalg.norm(force) < 0.5 * size:
+                    break
+                lower = mechanics.potential(model, trial, loads)
+                energy = mechanics.potential(model, U, loads) if energy is None else energy
+            if lower <= energy + 1e-4 * length * slope:
                 break
             length /= 2
             if length < 1e-4:
