@@ -411,6 +411,27 @@ def test_nearly_the_same_load_again(solid: Round) -> None:
     assert again.stiffness == pytest.approx(first.stiffness, rel=2e-3)
 
 
+def test_a_stiffness_that_is_not_found_is_no_number(
+    solid: Round, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(contact_newton, "STIFFNESS_RTOL", 1e-30)
+    with pytest.raises(NoEquilibrium, match="vertical stiffness was not found in 60 iterations"):
+        solid.press(LENGTHS, 1e10).to(50.0)
+
+
+@pytest.mark.slow
+def test_incompressible_rubber_is_pressed(tmp_path: Path) -> None:
+    """In hybrid elements: the vertical stiffness is that of two loads' difference."""
+    loads = (1000.0, 1010.0)
+    for name, text in texts(loads, 0.0).items():
+        hybrid = text.replace("TYPE=CGAX8R", "TYPE=CGAX8RH").replace("5.085e-08", "0")
+        (tmp_path / name).write_text(hybrid)
+    job.run(tmp_path, "press", "inflate")
+    low, high = footprint_job.read(tmp_path / "press")["footprints"]
+    found = 10.0 / (high["deflection_m"] - low["deflection_m"])
+    assert found == pytest.approx((low["stiffness_N_per_m"] + high["stiffness_N_per_m"]) / 2, 0.01)
+
+
 def test_a_little_more_load_is_one_step_along_the_slope(solid: Round) -> None:
     """1 % more: what the slope by the load leaves is of second order, one step of Newton's method,
     with the preconditioner formed once for the new load; without the slope it takes several."""

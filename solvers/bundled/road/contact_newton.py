@@ -287,7 +287,9 @@ class ContactNewton:
         """dF / d(deflection): the whole tyre's force against the road's rise, tyre following."""
         border = _RoadHeight(self.symmetry, contact)
         unit = np.append(np.zeros(self.parts.size), border.scale)
-        found = self._solve(border, contact, unit, STIFFNESS_RTOL)[0]
+        found, _, left = self._solve(border, contact, unit, STIFFNESS_RTOL)
+        if left > STIFFNESS_RTOL:
+            raise NoEquilibrium(f"the vertical stiffness was not found in {MAX_GMRES} iterations")
         rise = float(found[-1]) * border.scale
         self._slope = -found[:-1].reshape(self.parts.shape) / 2, -rise / 2
         return 2 / rise

@@ -20,8 +20,9 @@ from .energy_law import EnergyLaw
 Array = np.ndarray
 MIN_VOLUME_RATIO = 0.2  # over the reference volume: nearly incompressible rubber stays near 1
 # of bulk over shear modulus, which stands for none at all in hybrid elements: Poisson's ratio
-# 0.49975. A thick tube then grows by 0.03 % more; Newton's method takes the longer, the larger.
-INCOMPRESSIBLE = 2e3
+# 0.4995. A thick tube then grows by 0.06 % more. At 2000 the single precision of a footprint's
+# factors does not suffice any longer, and Newton's method takes the longer, the larger.
+INCOMPRESSIBLE = 1e3
 
 
 @dataclass(frozen=True, kw_only=True)
