@@ -9,6 +9,7 @@ import numpy as np
 from tyrecal_solvers.bundled.road.contact import FlatRoad, flat_road
 from tyrecal_solvers.bundled.road.contact_newton import ContactNewton
 from tyrecal_solvers.bundled.road.half_turn_symmetry import HalfTurn
+from tyrecal_solvers.bundled.road.tread import tread_of
 from tyrecal_solvers.bundled.section.model import Model
 from tyrecal_solvers.bundled.section.parts.pressure import Pressure
 from tyrecal_solvers.bundled.solid3d.circumference import HalfCircle, half_circle
@@ -39,7 +40,8 @@ class Round:
         self, around: HalfCircle, stiffness: float, friction: float = 0.0, slip: float = 1e-5
     ) -> FlatRoad:
         mesh = self.model.mesh
-        return flat_road(mesh.X, mesh.faces["TREAD"], around, stiffness, friction, slip)
+        tread = tread_of(mesh.X, mesh.faces["TREAD"].connectivity, around)
+        return flat_road(mesh.X, tread, stiffness, friction, slip, self.everywhere(around))
 
     def everywhere(self, around: HalfCircle) -> Array:
         """The inflated state all round (k, n, 3)."""

@@ -7,6 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from scipy.sparse import bsr_matrix, csr_matrix
 from tyrecal_solvers.bundled.road.block_cholesky import Elimination, Factor
 from tyrecal_solvers.bundled.road.half_turn_symmetry import HalfTurn
 from tyrecal_solvers.bundled.solid3d.circumference import half_circle
@@ -45,7 +46,12 @@ class Problem:
             self.contact[: len(contact)] = contact
         tangents = self.tyre.tangents(np.float32)
         order = Elimination([t[0] for t in tangents], self.symmetry)
-        self.factor = Factor(order, tangents, self.contact)
+        self.factor = Factor(order, tangents, self.folded(self.contact))
+
+    def folded(self, contact: Array) -> csr_matrix:
+        """On the parts, stiffness at single nodes (k, n, 3, 3)."""
+        nodes = np.arange(contact.shape[0] * contact.shape[1] + 1)
+        return self.symmetry.fold(bsr_matrix((contact.reshape(-1, 3, 3), nodes[:-1], nodes)))
 
     def product(self, x: Array) -> Array:
         U = self.symmetry.spread(x)

@@ -1,4 +1,4 @@
-"""The road: contact and friction at nodes, and the equations' iterative solution."""
+"""The road: contact and friction over the patch, and the equations' iterative solution."""
 
 from __future__ import annotations
 
@@ -8,24 +8,24 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from tyrecal_solvers.bundled.deck.keywords import DeckError, read_keywords
-from tyrecal_solvers.bundled.road.contact import Contact, FlatRoad
+from tyrecal_solvers.bundled.road.contact import Bound, Contact, FlatRoad
 from tyrecal_solvers.bundled.road.footprint_job import read_road
-from tyrecal_solvers.bundled.road.patch import edge
+from tyrecal_solvers.bundled.road.patch import patch
 from tyrecal_solvers.bundled.solid3d.circumference import Circumference, half_circle
 from tyrecal_solvers.bundled.solid3d.gmres import gmres
 
 from . import support
-from .contact import Round, ring
+from .contact import Round, ball, ring
 
 Array = np.ndarray
-HEIGHT = 0.3
+HEIGHT, WIDTH = 0.3, 0.04
 STIFFNESS, SLIP = 1e9, 1e-5
 AROUND = half_circle(np.array([0.01, 0.01, 0.02, 0.5, np.pi - 0.54]))
 
 
 @pytest.fixture(scope="module")
 def work() -> Round:
-    return ring((0.2, 0.25, HEIGHT), 0.02, 2, support.Rubber())
+    return ring((0.2, 0.25, HEIGHT), WIDTH / 2, 2, support.Rubber())
 
 
 def lowered(around: Circumference, nodes: int, shift: Array) -> Array:
@@ -44,53 +44,127 @@ def settled(work: Round, friction: float, depth: float = 2e-4) -> tuple[FlatRoad
 
 
 def states(U: Array, random: np.random.Generator) -> dict[str, Array]:
-    """Beyond ``U`` by less and by more than the elastic slip, all differently."""
+    """Beyond ``U`` by less and by more than the elastic slip, a little differently everywhere."""
     return {
-        name: U + size * random.normal(size=U.shape)
-        for name, size in (("sticking", 0.1 * SLIP), ("sliding", 20 * SLIP))
+        name: U
+        + lowered(AROUND, U.shape[1], np.array([0.0, slips * SLIP, -slips * SLIP / 2]))
+        + 0.1 * SLIP * random.normal(size=U.shape)
+        for name, slips in (("sticking", 0.2), ("sliding", 20.0))
     }
 
 
-def test_places_and_areas(work: Round) -> None:
-    """Undeformed nodes lie on the cylinder; the areas of the nodes near the road are those of its
-    half, 60 degrees to the side; none beyond can touch."""
+def densely(road: FlatRoad, U: Array, height: float, count: int = 4000) -> tuple[float, float]:
+    """Force of half the tyre (N) and its patch (m2, not deformed) by adding up many points."""
+    points = road.tread.everywhere((np.arange(count) + 0.5) / count)
+    over = np.maximum(points.positions(U)[..., 0] - height, 0.0)
+    area = (road.tread.ds * road.tread.X[..., 0])[points.e] * road.tread.length[points.t, None]
+    each = over.sum(-1), (over > 0).sum(-1)
+    force, covered = ((area * one).sum() / count for one in each)
+    return road.stiffness * float(force), float(covered)
+
+
+def test_places(work: Round) -> None:
+    """Undeformed points lie on the cylinder, of spans that begin within 60 degrees of the road, and
+    a shift moves them by itself; their rates are the derivatives by the angle."""
     road = work.road(AROUND, STIFFNESS)
-    at = road.positions(np.zeros((len(AROUND.angles), len(work.U), 3)))
-    k = len(road.area)
-    assert AROUND.angles[k - 1] < np.pi / 3 <= AROUND.angles[k]
-    np.testing.assert_allclose(
-        at[..., 0], HEIGHT * np.cos(AROUND.angles[:k])[:, None] + 0 * at[..., 0]
-    )
-    np.testing.assert_allclose(
-        at[..., 1], HEIGHT * np.sin(AROUND.angles[:k])[:, None] + 0 * at[..., 0]
-    )
-    np.testing.assert_array_equal(at[..., 2], work.model.mesh.X[road.nodes, 1] + 0 * at[..., 0])
-    assert sorted(road.nodes) == sorted(np.flatnonzero(work.model.mesh.X[:, 0] > HEIGHT - 1e-9))
-    areas = road.area.sum(1)
-    np.testing.assert_allclose(areas, AROUND.shares[:k] * HEIGHT * 0.04, rtol=1e-12)
+    points = road.tread.everywhere(np.linspace(0, 1, 4))
+    at = points.positions(np.zeros((len(AROUND.angles), len(work.U), 3)))
+    np.testing.assert_allclose(at[..., 0], HEIGHT * np.cos(points.angle), atol=1e-15)
+    np.testing.assert_allclose(at[..., 1], HEIGHT * np.sin(points.angle), atol=1e-15)
+    assert abs(at[..., 2]).max() < WIDTH / 2 and np.ptp(at[..., 2]) > 0.9 * WIDTH
+    assert road.tread.begin == pytest.approx([0.0, 0.01, 0.02, 0.04, 0.54])
     U = lowered(AROUND, len(work.U), np.array([1e-3, 2e-3, -3e-3]))
+    moved = points.positions(U)
+    np.testing.assert_allclose(moved - at, 0 * at + [1e-3, 2e-3, -3e-3], atol=1e-15)
+    e = 1e-6
+    ahead = lambda step: replace(points, angle=points.angle + step).positions(U)
+    wanted = (ahead(e) - ahead(-e)) / (2 * e)
+    np.testing.assert_allclose(points.rates(U), wanted, atol=1e-9)
+
+
+@pytest.mark.parametrize("depth", [1e-6, 1e-5, 1.5e-5, 2e-5, 6e-5, 2.4e-4, 3e-3])
+def test_a_round_ring_on_the_road(work: Round, depth: float) -> None:
+    """Sunk in by a depth without being deformed, the patch ending within elements and near their
+    borders: W R (R sin t - (R - depth) t) k of force at R cos t = R - depth; its area, length and
+    width; the force's derivative is k times the area."""
+    road = work.road(AROUND, STIFFNESS)
+    contact = road.forces(lowered(AROUND, len(work.U), np.array([depth, 0, 0])), HEIGHT)
+    t = np.arccos((HEIGHT - depth) / HEIGHT)
+    wanted = STIFFNESS * WIDTH * HEIGHT * (HEIGHT * np.sin(t) - (HEIGHT - depth) * t)
+    assert contact.force / 2 == pytest.approx(wanted, rel=1e-7)
+    assert contact.stiffness == pytest.approx(STIFFNESS * WIDTH * HEIGHT * t, rel=1e-8)
+    found = patch(contact, work.model.mesh.X, AROUND.angles)
+    assert found.length == pytest.approx(2 * HEIGHT * np.sin(t), rel=1e-8)
+    assert found.width == pytest.approx(WIDTH)
+    assert found.area.sum() == pytest.approx(WIDTH * HEIGHT * np.sin(t), rel=1e-7)
+    assert found.force[..., 0].sum() == pytest.approx(wanted, rel=1e-7)
+    assert not contact.traction.any()  # has touched nothing before
+
+
+@pytest.mark.parametrize("depth", [2e-4, 4.1e-4])
+def test_a_ball_on_the_road(depth: float) -> None:
+    """The cap that is below the road: its force, its circle along and across, within elements of
+    both directions."""
+    R = 0.1
+    work = ball((0.03, R), np.linspace(0.0, 0.4, 17), support.Rubber())
+    around = half_circle(np.array([0.07] * 6 + [np.pi - 0.42]))
+    road = work.road(around, STIFFNESS)
+    contact = road.forces(lowered(around, len(work.U), np.array([depth, 0, 0])), R)
+    across = (R - depth) / R
+    wanted = 2 * np.pi * R**2 * (R / 2 * (1 - across**2) - (R - depth) * (1 - across))
+    assert contact.force == pytest.approx(STIFFNESS * wanted, rel=5e-3)
+    found = patch(contact, work.model.mesh.X, around.angles)
+    radius = np.sqrt(2 * R * depth - depth**2)
+    assert found.length == pytest.approx(2 * radius, rel=1e-3)
+    assert found.width == pytest.approx(2 * radius, rel=1e-3)
+    assert 2 * found.area.sum() == pytest.approx(np.pi * radius**2, rel=1e-2)
+
+
+@pytest.mark.parametrize("size", [1e-5, 3e-5, 3e-4])
+def test_patches_of_any_shape(work: Round, random: np.random.Generator, size: float) -> None:
+    """Touching here and there, twice in an element or with a gap amid it: what many points add up
+    to, but for their own error."""
+    road = work.road(AROUND, STIFFNESS)
+    U = lowered(AROUND, len(work.U), np.array([2e-4, 0.0, 0.0]))
+    for _ in range(5):
+        V = U + size * random.normal(size=U.shape)
+        contact = road.forces(V, HEIGHT)
+        force, area = densely(road, V, HEIGHT)
+        assert contact.force / 2 == pytest.approx(force, rel=1e-5)
+        assert contact.points.area.sum() == pytest.approx(area, rel=2e-3)
+
+
+def test_nodes_share_the_patch(work: Round, random: np.random.Generator) -> None:
+    """Areas and forces of the nodes sum to the patch's; the areas are those of the deformed tread,
+    stretched along and across; nodes in its midst bear the pressure there."""
+    road, _ = settled(work, 0.7)
+    U = lowered(AROUND, len(work.U), np.array([1e-2, 0.0, 0.0]))
+    X = work.model.mesh.X
+    U[..., 2] += 0.05 * X[:, 1]
+    U[..., 1] += 0.02 * HEIGHT * np.sin(AROUND.angles)[:, None]
+    contact = road.forces(U, HEIGHT)
+    found = patch(contact, X, AROUND.angles)
+    np.testing.assert_allclose(found.force.sum((0, 1))[0], contact.normal.sum())
     np.testing.assert_allclose(
-        road.positions(U) - at, np.broadcast_to([1e-3, 2e-3, -3e-3], at.shape), atol=1e-15
+        found.force[..., 1:].sum((0, 1)), contact.traction.sum((0, 1, 2)), atol=1e-9
     )
+    points = contact.points
+    stretch = points.densities(U)[points.angle < 0.02]
+    np.testing.assert_allclose(stretch, 1.02 * 1.05, rtol=2e-3)
+    assert found.area.sum() == pytest.approx((points.area * points.densities(U)).sum())
+    assert found.area.min() == 0.0 and (found.area[found.force[..., 0] > 0] > 0).all()
+    middle = np.flatnonzero(abs(X[:, 1]) + abs(X[:, 0] - HEIGHT) < 1e-9)[0]
+    pressure = found.force[2, middle, 0] / found.area[2, middle]
+    over = road.forces(U, HEIGHT).positions[..., 0].max() - HEIGHT
+    assert pressure == pytest.approx(STIFFNESS * over / (1.02 * 1.05), rel=0.02)
 
 
 def test_an_open_road_pushes_nobody(work: Round, random: np.random.Generator) -> None:
     road, U = settled(work, 0.7)
     V = U + 1e-6 * random.normal(size=U.shape)
     open_ = road.forces(V, HEIGHT + 1e-3)
-    assert not open_.local.any() and not open_.K.any() and open_.energy == 0.0
-    assert open_.force == 0.0 and not open_.product(V).any()
-
-
-def test_pressure_is_the_overclosures(work: Round) -> None:
-    road = work.road(AROUND, STIFFNESS, 0.7)
-    contact = road.forces(lowered(AROUND, len(work.U), np.array([2e-4, 0, 0])), HEIGHT)
-    depth = 2e-4 - HEIGHT * (1 - np.cos(AROUND.angles[: len(road.area)]))
-    pressure = contact.local[..., 0] / road.area
-    wanted = STIFFNESS * np.maximum(depth, 0)[:, None]
-    np.testing.assert_allclose(pressure, wanted + 0 * pressure, rtol=1e-9, atol=1e-3)
-    assert contact.force == pytest.approx(2 * contact.local[..., 0].sum())
-    assert not contact.local[..., 1:].any()  # has touched nothing before
+    assert open_.force == open_.energy == 0.0
+    assert not open_.field.any() and not open_.matrix().nnz
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.7])
@@ -98,16 +172,18 @@ def test_pressure_is_the_overclosures(work: Round) -> None:
 def test_tangent_is_the_forces_derivative(
     work: Round, random: np.random.Generator, friction: float, state: str
 ) -> None:
+    """Without friction to rounding; with it but for the points' own way, as the edge moves."""
     road, U = settled(work, friction)
     V = states(U, random)[state]
     contact = road.forces(V, HEIGHT)
-    slip = np.linalg.norm((contact.positions[..., 1:] - road.anchor)[road.gap == 0], axis=-1)
-    assert (slip < SLIP).all() if state == "sticking" else (slip > SLIP).mean() > 0.9
-    phi, e = random.normal(size=U.shape), 1e-11
-    force = lambda step: road.forces(V + step * phi, HEIGHT).nodal(V.shape)
+    slip = np.linalg.norm(contact.moved, axis=-1)[road.gap(contact.points) == 0]
+    assert (slip < SLIP).mean() > 0.9 if state == "sticking" else (slip > SLIP).mean() > 0.9
+    phi, e = random.normal(size=U.shape), 1e-9
+    force = lambda step: road.forces(V + step * phi, HEIGHT).field
     wanted = (force(e) - force(-e)) / (2 * e)
-    found = contact.product(phi)
-    np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-5 * abs(found).max())
+    found = (contact.matrix() @ phi.ravel()).reshape(phi.shape)
+    close = 1e-2 if friction else 1e-4
+    np.testing.assert_allclose(found, wanted, rtol=0, atol=close * abs(found).max())
 
 
 @pytest.mark.parametrize("state", ["sticking", "sliding"])
@@ -118,30 +194,35 @@ def test_bounded_friction_has_a_potential(
     the tangent is symmetric."""
     road, U = settled(work, 0.7)
     V = states(U, random)[state]
-    bound = random.uniform(0.0, 2.0, (2, *road.area.shape))
+    points = road.forces(V, HEIGHT).points
+    bound = Bound(points, *random.uniform(0.0, 2.0, (2, *points.angle.shape)))
     phi, psi = random.normal(size=(2, *U.shape))
     e = 1e-9
     energy = lambda step: road.forces(V + step * phi, HEIGHT, bound).energy
     contact = road.forces(V, HEIGHT, bound)
     wanted = (8 * (energy(e) - energy(-e)) - energy(2 * e) + energy(-2 * e)) / (12 * e)
-    assert (contact.nodal(V.shape) * phi).sum() == pytest.approx(wanted, rel=1e-5)
-    one, other = (psi * contact.product(phi)).sum(), (phi * contact.product(psi)).sum()
+    assert (contact.field * phi).sum() == pytest.approx(wanted, rel=1e-5)
+    K = contact.matrix()
+    one, other = psi.ravel() @ (K @ phi.ravel()), phi.ravel() @ (K @ psi.ravel())
     assert one == pytest.approx(other, rel=1e-10)
+    force = lambda step: road.forces(V + step * phi, HEIGHT, bound).field
+    wanted = (force(e) - force(-e)) / (2 * e)
+    found = (K @ phi.ravel()).reshape(phi.shape)
+    np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-4 * abs(found).max())
 
 
-def test_the_potential_has_no_jump_where_a_node_begins_to_slide(work: Round) -> None:
+def test_the_potential_has_no_jump_where_a_point_begins_to_slide(work: Round) -> None:
     """From e / 2 of the elastic slip's path on; at thrice e, 2.5 e of the bound."""
     road, U = settled(work, 0.7)
-    bound = np.ones_like(road.area), np.ones_like(road.area)
+    bound = road.forces(U, HEIGHT).bound(1.0)
 
     def friction(slips: float) -> float:
         along = lowered(AROUND, len(work.U), np.array([0.0, slips * SLIP, 0.0]))
         return road.forces(U + along, HEIGHT + 1.0, bound).energy
 
-    full = 0.7 * road.area.size * SLIP
-    rest = friction(0.0)
+    full = 0.7 * bound.normal.sum() * SLIP
     for slips, path in ((0.5, 0.125), (1 - 1e-9, 0.5), (1 + 1e-9, 0.5), (3.0, 2.5)):
-        assert friction(slips) - rest == pytest.approx(full * path, rel=1e-3)
+        assert friction(slips) == pytest.approx(full * path, rel=1e-3)
 
 
 def test_friction_never_exceeds_coulombs_and_opposes_slip(
@@ -150,10 +231,9 @@ def test_friction_never_exceeds_coulombs_and_opposes_slip(
     road, U = settled(work, 0.7)
     for V in states(U, random).values():
         contact = road.forces(V, HEIGHT)
-        traction = np.linalg.norm(contact.local[..., 1:], axis=-1)
-        assert (traction <= 0.7 * contact.local[..., 0] * (1 + 1e-12)).all()
-        slip = contact.positions[..., 1:] - road.anchor
-        assert (slip * contact.local[..., 1:]).sum(-1).min() >= 0.0  # on the road: along the slip
+        traction = np.linalg.norm(contact.traction, axis=-1)
+        assert (traction <= 0.7 * contact.normal * (1 + 1e-12)).all()
+        assert (contact.moved * contact.traction).sum(-1).min() >= 0.0  # on the road: along it
 
 
 def test_positive_part_of_the_stiffness(work: Round, random: np.random.Generator) -> None:
@@ -161,36 +241,32 @@ def test_positive_part_of_the_stiffness(work: Round, random: np.random.Generator
     for friction in (0.0, 0.7):
         road, U = settled(work, friction)
         contact = road.forces(states(U, random)["sliding"], HEIGHT)
-        blocks = contact.stiffness(*U.shape[:2], positive=True)
-        np.testing.assert_allclose(blocks, blocks.swapaxes(-1, -2), atol=1e-9 * blocks.max())
-        assert np.linalg.eigvalsh(blocks).min() >= -1e-9 * blocks.max()
-        phi = random.normal(size=U.shape)
-        same = np.allclose(np.einsum("knij,knj->kni", blocks, phi), contact.product(phi))
-        assert same == (friction == 0.0)
-        whole = contact.stiffness(*U.shape[:2], positive=False)
-        image = np.einsum("knij,knj->kni", whole, phi)
-        np.testing.assert_allclose(image, contact.product(phi), atol=1e-9 * abs(image).max())
+        whole, part = contact.matrix(), contact.matrix(positive=True)
+        scale = abs(part).max()
+        assert abs(part - part.T).max() < 1e-9 * scale
+        x = random.normal(size=(5, U.size))
+        assert (np.einsum("in,ni->i", x, part @ x.T) > -1e-9 * scale).all()
+        assert (abs(whole - part).max() < 1e-9 * scale) == (friction == 0.0)
 
 
 def test_settled_keeps_what_sticks(work: Round, random: np.random.Generator) -> None:
-    """Once a load is reached the forces at the same state are the same, sticking or sliding; nodes
+    """Once a load is reached the forces at the same state are the same, sticking or sliding; points
     that newly touch have no traction until they move; those that left have forgotten theirs."""
     road, U = settled(work, 0.7)
-    for V in states(U, random).values():
-        V = V + lowered(AROUND, len(work.U), np.array([2e-4, 0.0, 0.0]))
+    down = lowered(AROUND, len(work.U), np.array([2e-4, 0.0, 0.0]))
+    for x in (0.3 * SLIP, 4 * SLIP):
+        V = U + down + lowered(AROUND, len(work.U), np.array([0.0, x, -x / 2]))
         contact = road.forces(V, HEIGHT)
-        new = (contact.local[..., 0] > 0) & (road.gap > 0)
+        new = (contact.normal > 0) & (road.gap(contact.points) > 0)
         assert new.any()
-        assert not contact.local[new][:, 1:].any()
+        assert not contact.traction[new].any()
         after = road.settled(contact)
         again = after.forces(V, HEIGHT)
-        np.testing.assert_allclose(again.local, contact.local, rtol=1e-6, atol=1e-9)
-        moved = after.forces(V + lowered(AROUND, len(work.U), np.array([0, SLIP / 2, 0])), HEIGHT)
-        wanted = 0.7 * contact.local[new][:, 0] / 2
-        np.testing.assert_allclose(moved.local[new][:, 1], wanted, rtol=1e-6)
+        scale = abs(contact.traction).max()
+        np.testing.assert_allclose(again.traction, contact.traction, atol=1e-6 * scale)
         gone = after.settled(after.forces(V, HEIGHT + 1.0))
-        assert (gone.gap > 0).all()
-        assert not gone.forces(V, HEIGHT).local[..., 1:].any()
+        touched = gone.forces(V, HEIGHT)
+        assert (gone.gap(touched.points) > 0).all() and not touched.traction.any()
 
 
 def test_traction_of_a_reached_load_is_path_dependent(work: Round) -> None:
@@ -199,62 +275,41 @@ def test_traction_of_a_reached_load_is_path_dependent(work: Round) -> None:
     along = lambda s: U + lowered(AROUND, len(work.U), np.array([0.0, s * SLIP, 0.0]))
     there = road.forces(along(10), HEIGHT)
     back = road.settled(there).forces(along(0), HEIGHT)
-    on = there.local[..., 0] > 0
-    np.testing.assert_allclose(there.local[on][:, 1], 0.7 * there.local[on][:, 0])
-    np.testing.assert_allclose(back.local[on][:, 1], -0.7 * back.local[on][:, 0])
+    np.testing.assert_allclose(there.traction[..., 0], 0.7 * there.normal, atol=1e-12)
+    np.testing.assert_allclose(back.traction[..., 0], -0.7 * back.normal, atol=1e-12)
 
 
-def test_nodes_slip_from_where_the_road_met_them(work: Round, random: np.random.Generator) -> None:
-    """A node 0.3 mm above a road that rises by 0.4 mm has gone a quarter of its way on it; one
+def test_points_slip_from_where_the_road_met_them(work: Round, random: np.random.Generator) -> None:
+    """A point 0.3 mm above a road that rises by 0.4 mm has gone a quarter of its way on it; one
     that the road does not reach, none; the forces' derivative by the height is theirs."""
     road, U = settled(work, 0.7)
-    V = U + 20 * SLIP * random.normal(size=U.shape)
-    before = road.settled(road.forces(V, float(road.positions(V)[..., 0].max())))
-    W, height = V + 3 * SLIP * random.normal(size=U.shape), before.height - 4e-4
-    share, _ = before.share(height)
-    wanted = np.clip(1 - before.gap / 4e-4, 0, None)
-    np.testing.assert_allclose(share, wanted)
-    assert ((share > 0) & (share < 1)).mean() > 0.05
-    contact, e = before.forces(W, height), 1e-11
-    slip = (contact.positions[..., 1:] - before.anchor) * share[..., None]
-    length = np.linalg.norm(slip, axis=-1)
-    traction = np.linalg.norm(contact.local[..., 1:], axis=-1)
-    wanted = 0.7 * contact.local[..., 0] * np.minimum(length / SLIP, 1.0)
-    np.testing.assert_allclose(traction, wanted, rtol=1e-9)
-    force = lambda step: before.forces(W, height + step).local
+    along = lowered(AROUND, len(work.U), np.array([0.0, SLIP / 2, SLIP / 4]))
+    height = road.height - 4e-4
+    contact, e = road.forces(U + along, height), 1e-9
+    gap = road.gap(contact.points)
+    np.testing.assert_allclose(contact.share, np.clip(1 - gap / 4e-4, 0, None))
+    assert ((contact.share > 0) & (contact.share < 1)).mean() > 0.05
+    slip = np.linalg.norm(contact.moved * contact.share[..., None], axis=-1)
+    traction = np.linalg.norm(contact.traction, axis=-1)
+    wanted = 0.7 * contact.normal * slip / SLIP
+    np.testing.assert_allclose(traction, wanted, rtol=1e-9, atol=1e-15)
+    force = lambda step: road.forces(U + along, height + step).field
     wanted = (force(e) - force(-e)) / (2 * e)
-    np.testing.assert_allclose(contact.by_height, wanted, atol=1e-4 * abs(wanted).max())
-
-
-def test_the_edge_follows_from_the_last_four_nodes() -> None:
-    """p^2 ~ a^2 - x^2 over the last four that touch gives a, whatever is further in; between
-    nodes where the pressure rises to the edge, or one node alone touches; beyond neither the last
-    node nor the next."""
-    x = np.arange(0.0, 9.0)
-    pressure = np.sqrt(np.maximum(5.6**2 - x**2, 0.0))
-    assert edge(x, pressure, 5) == pytest.approx(5.6)
-    assert edge(x, np.where(x < 2, 9.0, pressure), 5) == pytest.approx(5.6)
-    assert abs(edge(x, np.where(x < 3, 9.0, pressure), 5) - 5.6) > 0.02
-    assert edge(x, np.where(x > 5, 0.0, 1 + x), 5) == 5.5
-    assert edge(x, np.where(x > 0, 0.0, 1.0), 0) == 0.5
-    assert edge(x, np.where(x > 5, 0.0, np.sqrt(np.maximum(7.0**2 - x**2, 0.0))), 5) == 6.0
-    assert edge(x[:6], pressure[:6], 5) == 5.0
-    steep = np.where(x > 5, 0.0, np.maximum(4.9**2 - x**2, 1e-9) ** 0.5)
-    assert edge(x, steep, 5) == 5.0
+    np.testing.assert_allclose(contact.by_height(), wanted, atol=1e-3 * abs(wanted).max())
+    down = lambda step: road.forces(U + along, height + step).force
+    assert -contact.stiffness * 2 == pytest.approx((down(e) - down(-e)) / (2 * e), rel=1e-6)
 
 
 def test_the_whole_tyres_force_is_on_the_axle(work: Round) -> None:
-    """Nodal forces' resultant, in fixed directions, is half the tyre's."""
+    """The field's resultant, in fixed directions, is half the tyre's."""
     road, U = settled(work, 0.7)
     V = U + lowered(AROUND, len(work.U), np.array([0.0, 3 * SLIP, SLIP]))
     contact: Contact = road.forces(V, HEIGHT)
-    field = contact.nodal(V.shape)
-    for i, shift in enumerate(np.eye(3)):
-        work_of = (field * lowered(AROUND, len(work.U), shift)).sum()
-        assert work_of == pytest.approx(contact.local[..., i].sum(), rel=1e-12)
-    assert contact.force == pytest.approx(
-        2 * (field * lowered(AROUND, len(work.U), np.eye(3)[0])).sum()
-    )
+    local = [contact.normal.sum(), *contact.traction.sum((0, 1, 2))]
+    for shift, wanted in zip(np.eye(3), local, strict=True):
+        work_of = (contact.field * lowered(AROUND, len(work.U), shift)).sum()
+        assert work_of == pytest.approx(wanted, rel=1e-12)
+    assert contact.force == pytest.approx(2 * local[0])
     assert replace(road, friction=0.0).forces(V, HEIGHT).force == pytest.approx(contact.force)
 
 
@@ -332,7 +387,7 @@ LINE, 1., 0.
 1E10
 *FRICTION, ELASTIC SLIP=1E-6
 0.5
-*CONTACT PAIR, INTERACTION=GRIP, TYPE=NODE TO SURFACE
+*CONTACT PAIR, INTERACTION=GRIP, TYPE=SURFACE TO SURFACE
 TREAD, ROAD
 """
 

@@ -147,7 +147,8 @@ def test_results_keep_the_half_turn(pressed: dict[str, Any]) -> None:
 
 
 def test_places_are_the_displaced_nodes(pressed: dict[str, Any]) -> None:
-    """Along and across from the displacements; contact nodes lie on the road."""
+    """Along and across from the displacements; every node that is deeper than the road is high
+    belongs to the patch, sunk in by its pressure, and of the others those beside it."""
     X = pressed["points"]
     rows = np.array([list(pressed["nodes"]).index(n) for n in pressed["footprints"][1]["node"]])
     f = pressed["footprints"][1]
@@ -158,7 +159,12 @@ def test_places_are_the_displaced_nodes(pressed: dict[str, Any]) -> None:
     np.testing.assert_allclose(f["across_m"], Z + u[:, 2], atol=1e-9)
     depth = c * (R + u[:, 0]) - s * u[:, 1]
     height = pressed["free_radius_m"] - f["deflection_m"]
-    assert (depth >= height).all() and (depth < height + 2e-4).all()
+    inside = depth > height
+    assert 0.3 < inside.mean() < 1.0
+    assert (depth < height + 1.5 * f["pressure_Pa"].max() / 1e9).all()
+    c, s = np.cos(pressed["angles"])[:, None], np.sin(pressed["angles"])[:, None]
+    u = f["displacement"]
+    assert (c * (X[:, 0] + u[..., 0]) - s * u[..., 1] > height).sum() == inside.sum()
 
 
 def test_friction_is_within_coulombs_cone(pressed: dict[str, Any]) -> None:
@@ -433,13 +439,14 @@ def test_incompressible_rubber_is_pressed(tmp_path: Path) -> None:
 
 
 def test_a_little_more_load_is_one_step_along_the_slope(solid: Round) -> None:
-    """1 % more: what the slope by the load leaves is of second order, one step of Newton's method,
-    with the preconditioner formed once for the new load; without the slope it takes several."""
+    """1 % more: what the slope by the load leaves is of second order, and what one step of Newton's
+    method leaves of that of fourth, so two do, with the preconditioner formed once for the new
+    load; without the slope it takes several."""
     press = solid.press(LENGTHS, 1e10)
     found = [press.to(load) for load in (198.0, 200.0)]
     before = press.iterations, press.factorisations
     found.append(press.to(202.0))
-    assert (press.iterations, press.factorisations) == (before[0] + 1, before[1] + 1)
+    assert (press.iterations, press.factorisations) == (before[0] + 2, before[1] + 1)
     parts, heights = np.array([f.parts for f in found]), [f.height for f in found]
     curved = np.linalg.norm(parts[0] - 2 * parts[1] + parts[2])
     assert curved < 0.02 * np.linalg.norm(parts[2] - parts[1])
@@ -604,8 +611,8 @@ def test_friction_of_any_size_converges(solid: Round, friction: float, slip: flo
     press.to(50.0)
     found = press.to(100.0)
     assert found.contact.force == pytest.approx(100.0, rel=1e-7)
-    traction = np.linalg.norm(found.contact.local[..., 1:], axis=-1)
-    assert (traction <= friction * found.contact.local[..., 0] * (1 + 1e-9)).all()
+    traction = np.linalg.norm(found.contact.traction, axis=-1)
+    assert (traction <= friction * found.contact.normal * (1 + 1e-9)).all()
 
 
 def test_a_ring_is_pressed_in_the_middle(solid: Round) -> None:
@@ -615,8 +622,7 @@ def test_a_ring_is_pressed_in_the_middle(solid: Round) -> None:
     found = press.to(100.0)
     assert abs(found.parts[1]).max() < 1e-9 * abs(found.parts[0]).max()
     assert found.contact.force == pytest.approx(100.0, rel=1e-8)
-    slip = found.contact.local[..., 1:]
-    assert abs(slip).max() > 0.0  # friction is at work
+    assert abs(found.contact.traction).max() > 0.0  # friction is at work
 
 
 def test_a_softer_road_gives_more(solid: Round) -> None:

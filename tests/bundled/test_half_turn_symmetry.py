@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.sparse import random_array as random_matrix
 from tyrecal_solvers.bundled.road.half_turn_symmetry import HalfTurn
 from tyrecal_solvers.bundled.section.symmetry import MIRROR_SIGNS, mirror_images
 from tyrecal_solvers.bundled.solid3d.circumference import HalfCircle, half_circle
@@ -47,6 +48,17 @@ def test_gather_is_the_transpose_of_spread(symmetry: HalfTurn, random: np.random
         (symmetry.gather(F) * x).sum(), rel=1e-12
     )
     assert not symmetry.gather(F)[~symmetry.mask].any()
+
+
+def test_a_folded_stiffness_is_that_of_the_spread_parts(
+    symmetry: HalfTurn, random: np.random.Generator
+) -> None:
+    """Of any stiffness between nodes, symmetric or not."""
+    x, size = masked(symmetry, random), int(np.prod(symmetry.shape))
+    K = random_matrix((size, size), density=1e-3, rng=1, format="csr")
+    wanted = symmetry.gather((K @ symmetry.spread(x).ravel()).reshape(symmetry.shape))
+    found = (symmetry.fold(K) @ x.ravel()).reshape(x.shape)
+    np.testing.assert_allclose(found, wanted, atol=1e-12 * abs(wanted).max())
 
 
 def test_a_turned_tyre_is_the_same(symmetry: HalfTurn, random: np.random.Generator) -> None:

@@ -12,7 +12,7 @@ CYLINDERS: list[dict[str, float]] = [
     {"share": 0.05, "degrees": 0.5},
     {"share": 0.025, "degrees": 0.25, "first": 2e-3},
     {"share": 0.1, "degrees": 1.0, "first": 2e-3, "growth": 1.5},  # thinner elements inwards
-    *({"share": 0.1, "degrees": 1.0, "stiffness": k} for k in (1e9, 1e10, 1e12)),
+    *({"share": 0.1, "degrees": 1.0, "stiffness": k} for k in (1e9, 1e11, 1e12)),
     *({"share": 0.1, "degrees": 1.0, "friction": 0.5, "steps": n} for n in (1, 3, 10)),
 ]
 BALLS: list[dict[str, float]] = [
@@ -20,7 +20,7 @@ BALLS: list[dict[str, float]] = [
     {"share": 0.05, "degrees": 0.7},
 ]
 
-NAMES = ("peak", "largest", "radius", "mean")
+NAMES = ("peak", "radius", "mean")
 
 
 def line(what: str, options: dict[str, float], found: Found) -> str:

@@ -83,7 +83,7 @@ REVOLVE_JOB: dict[str, dict[str, ParameterValues]] = {
     "SURFACE INTERACTION": {"NAME": None},
     "SURFACE BEHAVIOR": {"PRESSURE-OVERCLOSURE": ("LINEAR",)},
     "FRICTION": {"ELASTIC SLIP": None},
-    "CONTACT PAIR": {"INTERACTION": None, "TYPE": ("NODE TO SURFACE",)},
+    "CONTACT PAIR": {"INTERACTION": None, "TYPE": ("SURFACE TO SURFACE",)},
     "BOUNDARY": {},
 }
 

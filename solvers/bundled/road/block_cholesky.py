@@ -14,6 +14,7 @@ from functools import partial
 
 import numpy as np
 from scipy.linalg.lapack import spotrf, strtrs
+from scipy.sparse import csr_matrix
 
 from ...errors import Indefinite, Refused
 from ..section.symmetry import MIRROR_SIGNS
@@ -135,13 +136,13 @@ def _fronts(chosen: list[tuple[Array, ...]], level: Array) -> list[_Front]:
 class Factor:
     """Approximate inverse of the tangent stiffness on the two parts.
 
-    tangents: at the stations (`Revolved.tangents`); contact (k, n, 3, 3): stiffness at the
-    nodes, N/m. Raises Indefinite.
+    tangents: at the stations (`Revolved.tangents`); contact: stiffness of the parts (2 k q 3,
+    2 k q 3), N/m. Raises Indefinite.
     """
 
-    def __init__(self, order: Elimination, tangents: Tangents, contact: Array):
+    def __init__(self, order: Elimination, tangents: Tangents, contact: csr_matrix):
         self.order = order
-        self.contact = order.symmetry.blocks(contact)
+        self.contact = contact
         self._steps: list[tuple[Array, Array, slice, Array, Array]] = []
         carried: list[Array] = []
         levels = self._assemble(tangents)
@@ -165,8 +166,7 @@ class Factor:
             own, other = abs(tables[0][0]).max(), abs(tables[0][1]).max()
             coupled = coupled or bool(other > MIN_COUPLING * own)
             if not coupled:
-                gone = front.nodes[: front.eliminated]
-                self.contact[:, gone, :3, 3:] = self.contact[:, gone, 3:, :3] = 0.0
+                self._uncouple(front.nodes[: front.eliminated])
             first, rest = slice(0, front.eliminated), slice(front.eliminated, None)
             blocks: list[_Assembled] = []
             for group in [(0, 1)] if coupled else [(0,), (1,)]:
@@ -201,17 +201,33 @@ class Factor:
                 for own, pairs in self.order.pairs:
                     f = own.stop - own.start
                     tiles[own, :, own] += table[pairs].reshape(f, f, m, n).swapaxes(1, 2)
-                if rows == cols and rows.stop is not None:
-                    for k, i in np.argwhere(self.contact[:, front.nodes[rows]].any((2, 3))):
-                        own = slice(3 * i, 3 * i + 3)
-                        touching = self.contact[k, front.nodes[i]]
-                        tiles[k, own, k, own] += touching[3 * g : 3 * g + 3, 3 * h : 3 * h + 3].T
                 place[~masks[h][:, cols].ravel()] = 0.0
                 place[:, ~masks[g][:, rows].ravel()] = 0.0
+        if rows.stop is not None:  # of what is eliminated here
+            dofs = [self._dofs(group, front.nodes[some]) for some in (rows, cols)]
+            touching = self.contact[dofs[0]][:, dofs[1]].tocoo()
+            out[touching.row, touching.col] += touching.data
         if rows == cols:
             diagonal = np.einsum("ii->i", out)
             diagonal += np.concatenate([~masks[g][:, rows].ravel() for g in group])
         return out
+
+    def _dofs(self, parts: tuple[int, ...], nodes: Array) -> Array:
+        """Places of (part, angle, node, component) among the flat parts."""
+        flat = np.arange(self.order.symmetry.mask.size).reshape(self.order.symmetry.mask.shape)
+        return np.asarray(flat[list(parts)][:, :, nodes].ravel())
+
+    def _uncouple(self, nodes: Array) -> None:
+        """Leave out what the contact couples of the nodes' two parts."""
+        if not self.contact.nnz:
+            return
+        place = np.indices(self.order.symmetry.mask.shape)
+        part, here = place[0].ravel(), np.isin(place[2].ravel(), nodes)
+        entries = self.contact.tocoo()
+        row, col = entries.row, entries.col
+        keep = (part[row] == part[col]) | ~(here[row] | here[col])
+        kept = entries.data[keep], (row[keep], col[keep])
+        self.contact = csr_matrix(kept, shape=self.contact.shape)
 
     def _eliminate(
         self,

@@ -1,15 +1,16 @@
-"""A rigid flat road under the tyre: unilateral contact and Coulomb friction at nodes.
+"""A rigid flat road under the tyre: unilateral contact and Coulomb friction over the patch.
 
 The road's normal is the vertical at theta = 0, downwards; its distance from the axle is H. With
-c = cos theta, s = sin theta of a node's reference angle its depth and its place in the road are
+c = cos theta, s = sin theta of a point's reference angle its depth and its place in the road are
 
     d = c (R + u_r) - s u_theta,   x = s (R + u_r) + c u_theta,   z = Z + u_z
 
     pressure = k <d - H>,   traction = mu pressure min(|slip| / e, 1) slip / |slip|
 
-with the overclosure's stiffness k and the elastic slip e; slip counts from where a node stood
-when the last load had been reached, plus the elastic slip that it had then. A node that the road
-was a gap g away from then, at H0, met it on its way to H, and slips from there on:
+with the overclosure's stiffness k and the elastic slip e, integrated over the part of the tread
+where d > H (`tread`). Slip counts from where a point stood when the last load had been reached,
+plus the elastic slip that it had then. A point that the road was a gap g away from then, at H0,
+met it on its way to H, and slips from there on:
 
     slip = (1 - g / (H0 - H)) (x - x0)
 """
@@ -17,89 +18,102 @@ was a gap g away from then, at H0, met it on its way to H, and slips from there 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
+from scipy.sparse import csr_matrix
 
-from ..section.elements import Lines
-from ..solid3d.circumference import Circumference
+from .tread import Points, Tread
 
 Array = np.ndarray
-MAX_CONTACT_ANGLE = np.pi / 3  # from the vertical: no node beyond it can touch
+SAMPLES = 9  # of a span's lines, between which the elastic slip is linear
+
+
+@dataclass(frozen=True)
+class Bound:
+    """Normal forces that limit the friction (Tresca), and shares of the step, at fixed points."""
+
+    points: Points
+    normal: Array  # (i, j, p), N
+    share: Array  # (i, j, p)
 
 
 @dataclass(frozen=True)
 class FlatRoad:
-    """Contact at nodes (k, c) of half the circumference."""
+    """The road, and the tread as it stood on it when the last load was reached."""
 
-    nodes: Array  # (c,): rows of the section
-    area: Array  # (k, c): reference area that a node stands for, m2
-    frame: Array  # (k, 3, 3): to the road's down, along, across
-    origin: Array  # (k, c, 3): reference positions in that frame, m
+    tread: Tread
     stiffness: float  # Pa/m
     friction: float  # coefficient
     elastic_slip: float  # m
-    anchor: Array  # (k, c, 2): where slip counts from, m
-    gap: Array  # (k, c): to the road at the last load, 0 where it touched, m
-    height: float  # of the road at the last load, m
+    U: Array  # (k, n, 3), m
+    elastic: Array  # (t, e, j, SAMPLES, 2): slip that is still elastic, m
+    height: float  # of the road, m
 
-    def positions(self, U: Array) -> Array:
-        """Depth, and place in the road along and across (k, c, 3), m."""
-        u = U[: len(self.area), self.nodes]
-        return np.asarray(self.origin + np.einsum("kij,kcj->kci", self.frame, u))
+    def gap(self, points: Points) -> Array:
+        """To the road at the last load (i, j, p), 0 where it touched, m."""
+        return np.maximum(self.height - points.positions(self.U)[..., 0], 0.0)
 
-    def share(self, height: float) -> tuple[Array, Array]:
-        """Of a step to ``height``, what each node went on the road (k, c), and its slope, 1/m."""
-        rise = max(self.height - height, 1e-12)
-        met = self.gap < rise
-        share = np.where(met, 1.0 - self.gap / rise, 0.0)
-        return share, np.where(met, -self.gap / rise**2, 0.0)
+    def share(self, points: Points, height: float) -> tuple[Array, Array]:
+        """Of a step to ``height``, what each point went on the road, and its slope, 1/m."""
+        rise, gap = max(self.height - height, 1e-12), self.gap(points)
+        met = gap < rise
+        return np.where(met, 1.0 - gap / rise, 0.0), np.where(met, -gap / rise**2, 0.0)
 
-    def forces(self, U: Array, height: float, bound: tuple[Array, Array] | None = None) -> Contact:
-        """Forces and tangents at a state U (k, n, 3) with the road at ``height`` (m).
+    def moved(self, points: Points, at: Array) -> Array:
+        """Along and across (i, j, p, 2) from where slip counts; ``at``: the points' positions."""
+        tread, t = points.tread, points.t
+        place = (points.angle - tread.begin[t, None, None]) / tread.length[t, None, None]
+        place = np.clip(place * (SAMPLES - 1), 0.0, SAMPLES - 1 - 1e-12)
+        left, own = place.astype(int), self.elastic[t, points.e]
+        take = lambda i: np.take_along_axis(own, i[..., None], 2)
+        right = (place - left)[..., None]
+        elastic = take(left) * (1 - right) + take(left + 1) * right
+        elastic *= (self.gap(points) == 0.0)[..., None]
+        return np.asarray(at[..., 1:] - points.positions(self.U)[..., 1:] + elastic)
 
-        ``bound``: normal forces (k, c) that limit the friction (Tresca) and shares of the step,
-        instead of those of the state itself (Coulomb).
-        """
-        at = self.positions(U)
-        overclosure = at[..., 0] - height
-        touching = overclosure > 0
-        normal = self.stiffness * self.area * np.where(touching, overclosure, 0.0)
-        moved = at[..., 1:] - self.anchor
-        share, growth = self.share(height) if bound is None else (bound[1], 0.0 * normal)
-        slip = moved * share[..., None]
-        length = np.maximum(np.linalg.norm(slip, axis=-1), 1e-300)
-        e, sticking = self.elastic_slip, length <= self.elastic_slip
-        along = slip / np.where(sticking, e, length)[..., None]
-        pressed = normal if bound is None else bound[0]
-        local = np.concatenate([normal[..., None], self.friction * pressed[..., None] * along], -1)
-        K = np.zeros((*normal.shape, 3, 3))
-        stiff = self.stiffness * self.area * touching
-        K[..., 0, 0] = stiff
+    def forces(self, U: Array, height: float, bound: Bound | None = None) -> Contact:
+        """Forces at a state U (k, n, 3) with the road at ``height`` (m); ``bound``: of Tresca's
+        friction, instead of Coulomb's."""
+        points = self.tread.patch(U, height)
+        at = points.positions(U)
+        normal = self.stiffness * points.area * np.maximum(at[..., 0] - height, 0.0)
         if bound is None:
-            K[..., 1:, 0] = self.friction * stiff[..., None] * along
-        reach = self.friction * pressed / np.where(sticking, e, length)
-        by_slip = reach[..., None, None] * np.eye(2)
-        sliding = np.where(sticking, 0.0, reach)[..., None, None]
-        by_slip -= sliding * along[..., :, None] * along[..., None, :]
-        K[..., 1:, 1:] = by_slip * share[..., None, None]
-        by_height = -K[..., 0]
-        by_height[..., 1:] += np.einsum("kcij,kcj->kci", by_slip, moved) * growth[..., None]
-        overlap = (self.stiffness * self.area * np.maximum(overclosure, 0.0) ** 2).sum() / 2
-        path = np.where(sticking, length**2 / (2 * e), length - e / 2)
-        path = np.divide(path, share, out=np.zeros_like(path), where=share > 0)
-        energy = float(overlap + self.friction * (pressed * path).sum())
-        return Contact(self, height, at, local, K, by_height, energy)
+            where, pressed, place = points, normal, at
+            share, growth = self.share(points, height)
+        else:
+            where, pressed, share = bound.points, bound.normal, bound.share
+            growth, place = 0.0 * share, where.positions(U)
+        return Contact(
+            self,
+            U,
+            height,
+            points,
+            at,
+            normal,
+            bound is None,
+            where,
+            pressed,
+            self.moved(where, place),
+            share,
+            growth,
+        )
 
     def settled(self, contact: Contact) -> FlatRoad:
         """The road after a load was reached: slip counts anew, less the elastic one."""
-        share, _ = self.share(contact.height)
-        slip = (contact.positions[..., 1:] - self.anchor) * share[..., None]
+        samples = self.tread.everywhere(np.linspace(0.0, 1.0, SAMPLES))
+        at = samples.positions(contact.U)
+        slip = self.moved(samples, at) * self.share(samples, contact.height)[0][..., None]
         length = np.maximum(np.linalg.norm(slip, axis=-1, keepdims=True), 1e-300)
         elastic = slip * np.minimum(self.elastic_slip / length, 1.0)
-        gap = np.maximum(contact.height - contact.positions[..., 0], 0.0)
-        elastic *= (gap == 0.0)[..., None]
-        anchor = contact.positions[..., 1:] - elastic
-        return replace(self, anchor=anchor, gap=gap, height=contact.height)
+        # beside the patch as at its edge: between samples it is then known up to the edge
+        away = abs(np.arange(SAMPLES)[:, None] - np.arange(SAMPLES)) * 1.0
+        inside = at[..., 0] >= contact.height
+        nearest = np.where(inside[..., None, :], away, np.inf).argmin(-1)
+        elastic = np.take_along_axis(elastic, nearest[..., None], 2)
+        return replace(
+            self, U=contact.U, elastic=elastic.reshape(self.elastic.shape), height=contact.height
+        )
 
 
 @dataclass(frozen=True)
@@ -107,66 +121,117 @@ class Contact:
     """Forces of half the tyre on the road, in the road's frame: down, along, across."""
 
     road: FlatRoad
+    U: Array
     height: float
-    positions: Array
-    local: Array  # (k, c, 3), N
-    K: Array  # (k, c, 3, 3): derivatives by the nodes' positions, N/m
-    by_height: Array  # (k, c, 3): and by the road's height, N/m
-    energy: float  # J, stored and dissipated: the potential where the friction is bounded
+    points: Points  # of the patch
+    positions: Array  # (i, j, p, 3), m
+    normal: Array  # (i, j, p), N
+    coulomb: bool
+    # of the friction: where it acts, its bound, way since the last load, share of it on the road
+    grip: Points
+    pressed: Array
+    moved: Array
+    share: Array
+    growth: Array  # of the share with the road's height, 1/m
+
+    def bound(self, share: Array | float) -> Bound:
+        """What is to limit the friction of a step, of which the points go ``share`` on the road."""
+        return Bound(self.points, self.normal, share + 0.0 * self.normal)
 
     @property
     def force(self) -> float:
         """Vertical force of the whole tyre, N."""
-        return 2 * float(self.local[..., 0].sum())
+        return 2 * float(self.normal.sum())
 
-    def nodal(self, shape: tuple[int, ...], local: Array | None = None) -> Array:
-        """Forces on the road as a field (k, n, 3) in the frame of the reference angle."""
-        field = np.zeros(shape)
-        turned = np.einsum("kij,kci->kcj", self.road.frame, self.local if local is None else local)
-        field[: len(turned), self.road.nodes] = turned
-        return field
+    @cached_property
+    def _slip(self) -> tuple[Array, Array, Array]:
+        """Slip's length (m), its direction or, sticking, its share of the elastic one; sticks."""
+        slip = self.moved * self.share[..., None]
+        length = np.maximum(np.linalg.norm(slip, axis=-1), 1e-300)
+        sticking = length <= self.road.elastic_slip
+        scale = np.where(sticking, self.road.elastic_slip, length)
+        return length, slip / scale[..., None], sticking
 
-    def product(self, V: Array) -> Array:
-        """Tangent times a field (k, n, 3)."""
-        v = np.einsum("kij,kcj->kci", self.road.frame, V[: len(self.local), self.road.nodes])
-        return self.nodal(V.shape, np.einsum("kcij,kcj->kci", self.K, v))
+    @property
+    def traction(self) -> Array:
+        """Friction at its points (i, j, p, 2), N."""
+        return np.asarray(self.road.friction * self.pressed[..., None] * self._slip[1])
 
-    def stiffness(self, angles: int, nodes: int, positive: bool) -> Array:
-        """At the nodes (k, n, 3, 3), in the frame of the reference angle; ``positive``: all but
-        the friction's growth with the pressure."""
-        K = self.K.copy()
-        if positive:
-            K[..., 1:, 0] = 0.0
-        field = np.zeros((angles, nodes, 3, 3))
-        turned = np.einsum("kai,kcab,kbj->kcij", self.road.frame, K, self.road.frame)
-        field[: len(turned), self.road.nodes] = turned
-        return field
+    @cached_property
+    def field(self) -> Array:
+        """Forces on the road (k, n, 3) in the frame of the reference angle, N."""
+        down = _local(self.normal, 0.0 * self.positions[..., 1:])
+        return self.points.spread(down) + self.grip.spread(
+            _local(0.0 * self.pressed, self.traction)
+        )
+
+    @property
+    def energy(self) -> float:
+        """J, stored and dissipated: the potential where the friction is bounded."""
+        over = np.maximum(self.positions[..., 0] - self.height, 0.0)
+        e, (length, _, sticking) = self.road.elastic_slip, self._slip
+        path = np.where(sticking, length**2 / (2 * e), length - e / 2)
+        path = np.divide(path, self.share, out=np.zeros_like(path), where=self.share > 0)
+        work = self.road.friction * float((self.pressed * path).sum())
+        return float((self.normal * over).sum()) / 2 + work
+
+    @cached_property
+    def _by_slip(self) -> Array:
+        """Friction's derivatives by the slip (i, j, p, 2, 2), N/m."""
+        length, along, sticking = self._slip
+        reach = (
+            self.road.friction * self.pressed / np.where(sticking, self.road.elastic_slip, length)
+        )
+        sliding = np.where(sticking, 0.0, reach)[..., None, None]
+        return np.asarray(
+            reach[..., None, None] * np.eye(2) - sliding * along[..., :, None] * along[..., None, :]
+        )
+
+    @property
+    def _stiff(self) -> Array:
+        """Normal stiffness (i, j, p), N/m."""
+        return self.road.stiffness * self.points.area
+
+    def matrix(self, positive: bool = False) -> csr_matrix:
+        """Tangent stiffness of fields (k n 3, k n 3), N/m; ``positive``: all but the friction's
+        growth with the pressure."""
+        K = np.zeros((*self.grip.angle.shape, 3, 3))
+        K[..., 1:, 1:] = self._by_slip * self.share[..., None, None]
+        normal = K if self.coulomb else np.zeros((*self.points.angle.shape, 3, 3))
+        normal[..., 0, 0] = self._stiff
+        if not self.coulomb:
+            return self.points.matrix(normal) + self.grip.matrix(K)
+        if not positive:
+            K[..., 1:, 0] = self.road.friction * self._stiff[..., None] * self._slip[1]
+        return self.grip.matrix(K)
+
+    @property
+    def stiffness(self) -> float:
+        """Of the vertical force of half the tyre against the road's height, N/m."""
+        return float(self._stiff.sum())
+
+    def force_by_height(self) -> Array:
+        """Derivative of the normal forces (k, n, 3) by the road's height, N/m; less that of the
+        vertical force by the displacements."""
+        return self.points.spread(_local(-self._stiff, 0.0 * self.positions[..., 1:]))
+
+    def by_height(self) -> Array:
+        """Derivatives of all forces (k, n, 3) by the road's height, N/m."""
+        more = np.einsum("ijpxy,ijpy->ijpx", self._by_slip, self.moved) * self.growth[..., None]
+        if self.coulomb:
+            more = more - self.road.friction * self._stiff[..., None] * self._slip[1]
+        return self.force_by_height() + self.grip.spread(_local(0.0 * self.pressed, more))
+
+
+def _local(down: Array, along_and_across: Array) -> Array:
+    return np.concatenate([down[..., None], along_and_across], -1)
 
 
 def flat_road(
-    X: Array,
-    tread: Lines,
-    around: Circumference,
-    stiffness: float,
-    friction: float,
-    elastic_slip: float,
+    X: Array, tread: Tread, stiffness: float, friction: float, elastic_slip: float, U: Array
 ) -> FlatRoad:
-    """The road under the nodes of the surface ``tread``. X (n, 2): R, Z of the section, m."""
-    share = np.zeros(len(X))
-    np.add.at(share, tread.connectivity, (tread.weights * tread.R) @ tread.N)
-    nodes = np.flatnonzero(share)
-    near = np.flatnonzero(around.angles < MAX_CONTACT_ANGLE)
-    c, s = np.cos(around.angles[near]), np.sin(around.angles[near])
-    frame = np.zeros((len(c), 3, 3))
-    frame[:, 0, 0], frame[:, 0, 1] = c, -s
-    frame[:, 1, 0], frame[:, 1, 1] = s, c
-    frame[:, 2, 2] = 1.0
-    R, Z = X[nodes].T
-    origin = np.stack([c[:, None] * R, s[:, None] * R, np.broadcast_to(Z, (len(c), len(Z)))], -1)
-    area = around.shares[near][:, None] * share[nodes]
-    height = float(origin[..., 0].max())
-    gap = height - origin[..., 0]
-    anchor = origin[..., 1:]
-    return FlatRoad(
-        nodes, area, frame, origin, stiffness, friction, elastic_slip, anchor, gap, height
-    )
+    """The road that just touches a tread displaced by U (k, n, 3), all round alike. X (n, 2): R, Z
+    of the section, m."""
+    height = float((X[tread.nodes, 0] + U[0, tread.nodes, 0]).max())
+    elastic = np.zeros((len(tread.begin), *tread.ds.shape, SAMPLES, 2))
+    return FlatRoad(tread, stiffness, friction, elastic_slip, U, elastic, height)

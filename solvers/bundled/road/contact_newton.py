@@ -14,7 +14,7 @@ from ...errors import Indefinite, Inverted, NoEquilibrium
 from ..solid3d.gmres import gmres
 from ..solid3d.revolved import Revolved
 from .block_cholesky import Elimination, Factor
-from .contact import Contact, FlatRoad
+from .contact import Bound, Contact, FlatRoad
 from .contact_update import ContactUpdate
 from .half_turn_symmetry import HalfTurn
 
@@ -41,9 +41,6 @@ MIN_LOAD_STEP = 1 / 16  # share of a load's increase, below which it counts as u
 MAX_DEFLECTION_STEP = 0.1
 
 
-Bound = tuple[Array, Array]
-
-
 @dataclass
 class PressedState:
     """An equilibrium."""
@@ -66,15 +63,15 @@ class ContactNewton:
         check: Callable[[], None],
     ):
         self.tyre, self.symmetry, self.check = tyre, symmetry, check
-        self.free_radius = float(road.positions(U)[..., 0].max())
+        self.free_radius = road.height
         self.flat = self._flat_height(tyre.model.mesh.X, np.flatnonzero(~symmetry.free.any(1)))
-        self.road = road.settled(road.forces(U, self.free_radius))
+        self.road = road
         tyre.residual(U)
         self.order = Elimination([t[0] for t in tyre.tangents()], symmetry)
         self.parts = symmetry.parts(U)
         self.height = self.free_radius
         self.load = 0.0
-        self._bound = np.zeros_like(road.area), np.zeros_like(road.area)
+        self._bound = road.forces(U, self.free_radius).bound(1.0)
         self._factor: ContactUpdate | None = None
         self._used = 0
         self._stale = False  # the preconditioner is of an earlier load
@@ -137,7 +134,7 @@ class ContactNewton:
         U = self.symmetry.spread(parts)
         forces = self.tyre.residual(U)
         contact = self.road.forces(U, height, bound)
-        force = self.symmetry.gather(forces + contact.nodal(U.shape))
+        force = self.symmetry.gather(forces + contact.field)
         return force, (load - contact.force) / 2, contact
 
     def _energy(self, contact: Contact, load: float, height: float) -> float:
@@ -157,7 +154,7 @@ class ContactNewton:
         for attempt in range(MAX_NEWTON):
             reached = near if attempt else FRICTION_BOUND_RTOL
             parts, height, contact = self._softly(parts, height, load, bound, reached)
-            bound = contact.local[..., 0], self.road.share(height)[0]
+            bound = contact.bound(self.road.share(contact.points, height)[0])
             if not attempt:
                 continue  # what newly touches had no friction yet
             try:
@@ -165,7 +162,7 @@ class ContactNewton:
             except NoEquilibrium:
                 near = max(0.1 * near, CONTACT_FORCE_RTOL)
                 continue
-            self._bound = contact.local[..., 0], np.ones_like(self.road.area)
+            self._bound = contact.bound(1.0)
             return PressedState(parts, height, contact, self._stiffness(contact))
         raise NoEquilibrium("the friction did not settle")
 
@@ -245,7 +242,8 @@ class ContactNewton:
     ) -> tuple[Array, int, float]:
         factor = self._factor or self._form(contact)
         shape, scale = self.parts.shape, border.scale
-        factor.to(contact.stiffness(*self.symmetry.shape[:2], positive=False))
+        touching = contact.matrix()
+        factor.to(self.symmetry.fold(touching))
         # two right-hand sides at once cost little more than one: all wait for the factor's memory
         answer, first = factor.solve(np.stack([border.by_height, right[:-1].reshape(shape)]))
         schur = border.stiffness - float((border.of_force * answer).sum())
@@ -256,7 +254,9 @@ class ContactNewton:
             self.products += 1
             parts, rise = v[:-1].reshape(shape), v[-1] * scale
             V = self.symmetry.spread(parts)
-            image = self.symmetry.gather(self.tyre.product(V) + contact.product(V))
+            image = self.symmetry.gather(
+                self.tyre.product(V) + (touching @ V.ravel()).reshape(V.shape)
+            )
             image += border.by_height * rise
             more = float((border.of_force * parts).sum()) + border.stiffness * rise
             return np.append(image.ravel(), more * scale)
@@ -273,7 +273,7 @@ class ContactNewton:
         """The preconditioner at the last state; where that is unstable, the one before stays."""
         self.factorisations += 1
         self._stale = False
-        stiffness = contact.stiffness(*self.symmetry.shape[:2], positive=True)
+        stiffness = self.symmetry.fold(contact.matrix(positive=True))
         try:
             self._factor = ContactUpdate(
                 Factor(self.order, self.tyre.tangents(np.float32), stiffness)
@@ -300,9 +300,7 @@ class _RoadHeight:
     tyre. ``scale`` brings it to the size of the displacements."""
 
     def __init__(self, symmetry: HalfTurn, contact: Contact):
-        of_force = np.zeros_like(contact.by_height)
-        of_force[..., 0] = contact.by_height[..., 0]
-        self.by_height = symmetry.gather(contact.nodal(symmetry.shape, contact.by_height))
-        self.of_force = symmetry.gather(contact.nodal(symmetry.shape, of_force))
-        self.stiffness = float(contact.K[..., 0, 0].sum())
+        self.by_height = symmetry.gather(contact.by_height())
+        self.of_force = symmetry.gather(contact.force_by_height())
+        self.stiffness = contact.stiffness
         self.scale = max(self.stiffness, 1.0) ** -0.5

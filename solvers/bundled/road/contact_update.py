@@ -4,7 +4,7 @@ Woodbury: with the factor's K = L L^T, and a change D of the contact stiffness a
 
     (K + E D E^T)^-1 = L^-T (1 - Y (1 + D Y^T Y)^-1 D Y^T) L^-1,   Y = L^-1 E
 
-Columns of Y are formed when a node's contact first changes, and kept.
+Columns of Y are formed when a component's contact first changes, and kept.
 """
 
 from __future__ import annotations
@@ -13,12 +13,13 @@ from collections.abc import Sequence
 
 import numpy as np
 from scipy.linalg import lu_factor, lu_solve
+from scipy.sparse import csr_matrix
 
 from .block_cholesky import Factor
 
 Array = np.ndarray
 COLUMNS_AT_ONCE = 64  # columns that a thread forms at a time
-# change of a node's contact stiffness over the stiffest contact, left to GMRES
+# change of a component's contact stiffness over the stiffest contact, left to GMRES
 MIN_STIFFNESS_CHANGE = 1e-3
 
 
@@ -27,38 +28,33 @@ class ContactUpdate:
 
     def __init__(self, factor: Factor):
         self.factor = factor
-        mask = factor.order.symmetry.mask
-        self._column = np.full(mask.shape, -1)  # of each dof in Y
+        self._column = np.full(factor.order.symmetry.mask.size, -1)  # of each dof in Y
         self._blocks: list[list[Array]] = []  # Y by the times of forming, by the factor's pieces
         self._compliance = np.zeros((0, 0))
         self._active = np.zeros(0, int)
 
-    def to(self, contact: Array) -> None:
-        """Take ``contact`` (k, n, 3, 3), N/m, not necessarily symmetric, in place of the last."""
-        blocks = self.factor.order.symmetry.blocks(contact)
-        change = blocks - self.factor.contact
-        moved = abs(change).max((2, 3)) > MIN_STIFFNESS_CHANGE * abs(blocks).max(initial=0.0)
-        self._form(moved)
-        columns = self._column.transpose(1, 2, 0, 3)[moved].reshape(-1, 6)
-        self._active = np.unique(columns[columns >= 0])
-        place = np.searchsorted(self._active, columns)
-        size = len(self._active)
-        D = np.zeros((size + 1, size + 1))  # a spare for held dofs
-        place[columns < 0] = size
-        np.add.at(D, (place[:, :, None], place[:, None]), change[moved])
-        self._D = D[:size, :size]
+    def to(self, contact: csr_matrix) -> None:
+        """Take ``contact`` (2 k q 3, 2 k q 3), N/m, not necessarily symmetric, in place of the
+        last."""
+        change = csr_matrix(contact - self.factor.contact)
+        size = abs(change)
+        largest = np.maximum(size.max(0).toarray()[0], size.max(1).toarray()[:, 0])
+        dofs = np.flatnonzero(largest > MIN_STIFFNESS_CHANGE * abs(contact).max())
+        self._form(dofs)
+        self._active = self._column[dofs]
+        size = len(dofs)
+        self._D = change[dofs][:, dofs].toarray()
         if size:
             compliance = self._compliance[np.ix_(self._active, self._active)]
             self._small = lu_factor(np.eye(size) + self._D @ compliance, check_finite=False)
 
-    def _form(self, moved: Array) -> None:
-        """Columns of Y for the places (k, q) that lack them, and their part of Y^T Y."""
-        lacking = moved[..., None] & self.factor.order.symmetry.mask & (self._column < 0)
-        dofs = np.argwhere(lacking)
+    def _form(self, dofs: Array) -> None:
+        """Columns of Y for the dofs that lack them, and their part of Y^T Y."""
+        dofs = dofs[self._column[dofs] < 0]
         if not len(dofs):
             return
         before = len(self._compliance)
-        self._column[lacking] = before + np.arange(len(dofs))
+        self._column[dofs] = before + np.arange(len(dofs))
         # two threads share the work the same way everywhere, so that the bits are the same too
         some = np.array_split(dofs, min(len(dofs), 2 * -(-len(dofs) // (2 * COLUMNS_AT_ONCE))))
         pieces = list(self.factor.order.pool.map(self._columns, some))
@@ -70,9 +66,9 @@ class ContactUpdate:
         self._blocks.append(new)
 
     def _columns(self, dofs: Array) -> list[Array]:
-        right = np.zeros((len(dofs), *self._column.shape), np.float32)
-        right[(np.arange(len(dofs)), *dofs.T)] = 1.0
-        return self.factor.forward(right)
+        right = np.zeros((len(dofs), self._column.size), np.float32)
+        right[np.arange(len(dofs)), dofs] = 1.0
+        return self.factor.forward(right.reshape(-1, *self.factor.order.symmetry.mask.shape))
 
     def solve(self, right: Array) -> Array:
         """The inverse times parts (..., 2, k, q, 3)."""

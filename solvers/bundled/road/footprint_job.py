@@ -25,7 +25,6 @@ from ...errors import Refused, RunFailed
 from ..deck.keywords import DeckError, Keyword
 from ..modes.harmonics import Vibration, lowest_of_all
 from ..section.band import Numbering
-from ..section.elements import Lines
 from ..section.model import Model
 from ..section.parts.elastic import Elastic
 from ..section.parts.hourglass import Hourglass
@@ -37,8 +36,9 @@ from .contact import flat_road
 from .contact_newton import ContactNewton, PressedState
 from .half_turn_symmetry import HalfTurn
 from .loaded_modes import SPARE, loaded_modes
-from .patch import contact_area
+from .patch import patch
 from .stick import held
+from .tread import tread_of
 
 Array = np.ndarray
 log = logging.getLogger("tyrecal_solvers")
@@ -167,11 +167,13 @@ def press(
             " round the circumference: take CGAX8R",
         )
     tread = model.mesh.faces[data.tread]
-    road = flat_road(model.mesh.X, tread, around, data.stiffness, data.friction, data.elastic_slip)
-    tyre = Revolved(model, loads, around)
+    tyre, start = Revolved(model, loads, around), np.multiply.outer(around.turn(0).real, U)
+    surface = tread_of(model.mesh.X, tread.connectivity, around)
+    law = data.stiffness, data.friction, data.elastic_slip
+    road = flat_road(model.mesh.X, surface, *law, start)
     try:
         symmetry = HalfTurn(model.mesh, equations.equation < equations.size, around)
-        work = ContactNewton(tyre, symmetry, road, np.multiply.outer(around.turn(0).real, U), check)
+        work = ContactNewton(tyre, symmetry, road, start, check)
     except Refused as error:
         raise DeckError(0, f"a pressed tyre must be symmetric: {error}") from None
     footprints: list[dict[str, Any]] = []
@@ -179,9 +181,9 @@ def press(
     for load in wanted:
         try:
             found = work.to(load)
-            footprint = _footprint(work, found, load, tread, rings)
+            footprint = _footprint(work, found, load, rings)
             if load in vibrations:
-                footprint |= _modes(work, found, vibrations[load], tread, equations, U, rings)
+                footprint |= _modes(work, found, vibrations[load], equations, U, rings)
         except (RunFailed, np.linalg.LinAlgError) as error:
             cause = getattr(error, "cause", "crashed")
             if cause == "timed_out" and work.load:
@@ -203,7 +205,7 @@ def press(
 
 
 def _footprint(
-    work: ContactNewton, found: PressedState, load: float, tread: Any, angles: Array
+    work: ContactNewton, found: PressedState, load: float, angles: Array
 ) -> dict[str, Any]:
     """One load's results on the whole tyre, whose other half is this one's half turn; ``angles``
     of the rings."""
@@ -214,19 +216,20 @@ def _footprint(
     displacement = _at(around, angles, U)
     turned = np.empty_like(displacement)
     turned[:, other] = displacement * HALF_TURN
-    area = work.tyre.surface_shares(tread)[: len(contact.local), contact.road.nodes]
-    rings, columns = np.nonzero(contact.local[..., 0] > 0)
-    force, place = contact.local[rings, columns], contact.positions[rings, columns, 1:]
-    share, nodes = area[rings, columns], contact.road.nodes[columns]
+    half = patch(contact, work.tyre.model.mesh.X, angles)
+    size, force = half.area.copy(), half.force.copy()
     # ring 0 belongs to both halves: each node there meets its own image
-    share = np.where(
-        rings == 0, share + area[rings, _images(contact.road.nodes, other)[columns]], share
-    )
-    force = force * np.where(rings == 0, 2.0, 1.0)[:, None]
+    size[0] += half.area[0, other]
+    force[0] += half.force[0, other] * [1.0, -1.0, -1.0]
+    rings, nodes = np.nonzero(size)
+    size, force = size[rings, nodes], force[rings, nodes]
     again = rings > 0
     ring = np.concatenate([rings, (2 * (len(angles) - 1) - rings)[again]])
     both = lambda a, sign=1.0: np.concatenate([a, sign * a[again]])
-    size = both(share)
+    angle, X = angles[rings], work.tyre.model.mesh.X
+    u = displacement[rings, nodes]
+    along = np.sin(angle) * (X[nodes, 0] + u[:, 0]) + np.cos(angle) * u[:, 1]
+    across = X[nodes, 1] + u[:, 2]
     residual = work.tyre.residual(U)
     held = ~symmetry.free
     turn = around.turn(1)[:, None]
@@ -241,12 +244,14 @@ def _footprint(
         "stiffness_N_per_m": found.stiffness,
         "ring": ring,
         "node": np.concatenate([nodes, other[nodes][again]]),
-        "along_m": both(place[:, 0], -1.0),
-        "across_m": both(place[:, 1], -1.0),
-        "area_m2": size,
-        "contact_area_m2": contact_area(contact, area, around),
-        "pressure_Pa": both(force[:, 0]) / size,
-        "traction_Pa": both(force[:, 1:], -1.0) / size[:, None],
+        "along_m": both(along, -1.0),
+        "across_m": both(across, -1.0),
+        "area_m2": both(size),
+        "contact_area_m2": 2 * float(half.area.sum()),
+        "contact_length_m": half.length,
+        "contact_width_m": half.width,
+        "pressure_Pa": both(force[:, 0] / size),
+        "traction_Pa": both(force[:, 1:] / size[:, None], -1.0),
         "displacement": np.concatenate([displacement, turned[1:-1][::-1]]),
     }
 
@@ -255,7 +260,6 @@ def _modes(
     work: ContactNewton,
     found: PressedState,
     wanted: ModesAtLoad,
-    tread: Lines,
     equations: Numbering,
     inflated: Array,
     angles: Array,
@@ -264,10 +268,9 @@ def _modes(
     tyre = Revolved(wanted.model, work.tyre.loads, work.tyre.around)
     U = work.symmetry.spread(found.parts)
     work.tyre.residual(U)
-    area = work.tyre.surface_shares(tread)[: len(found.contact.local), work.road.nodes]
     road = found.contact.road
     smooth = replace(found.contact, road=replace(road, friction=0.0))
-    holds = [held(each, area, tyre.around) for each in (found.contact, smooth)]
+    holds = [held(each) for each in (found.contact, smooth)]
     holds = holds if road.friction else holds[:1]
     vibration = Vibration(wanted.model, inflated, tyre.loads, equations, 0.0)
     start = lowest_of_all(vibration, 2 * (wanted.count + 2 * SPARE), work.check)
@@ -284,7 +287,10 @@ def _modes(
         told[f"{name}_shape"] = whole[:, :, wanted.nodes]
     if road.friction:
         told["mode_traction_N"] = np.array(
-            [_traction(work.symmetry.around, holds[0].product(V)) for V in modes[0].shapes]
+            [
+                _traction(work.symmetry.around, (holds[0] @ V.ravel()).reshape(V.shape))
+                for V in modes[0].shapes
+            ]
         )
     return told
 
@@ -300,12 +306,6 @@ def _traction(around: HalfCircle, forces: Array) -> float:
 def _at(around: HalfCircle, angles: Array, U: Array) -> Array:
     """Values (a, n, 3) of a field (k, n, 3) at angles."""
     return np.asarray((around.at(angles) @ U.reshape(len(U), -1)).reshape(-1, *U.shape[1:]))
-
-
-def _images(nodes: Array, other: Array) -> Array:
-    """Where among ``nodes`` the mirror image of each stands."""
-    place = {n: i for i, n in enumerate(nodes)}
-    return np.array([place[other[n]] for n in nodes])
 
 
 def write(stem: Path, model: Model, result: dict[str, Any]) -> None:

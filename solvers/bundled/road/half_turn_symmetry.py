@@ -13,7 +13,10 @@ tyre (`HalfCircle`) each component of a part has the even or the odd ones.
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
+from scipy.sparse import csr_matrix
 
 from ...errors import Refused
 from ..section.mesh import DeckMesh
@@ -87,13 +90,21 @@ class HalfTurn:
                 part[..., component] = values[own, :, component]
         return parts
 
-    def blocks(self, stiffness: Array) -> Array:
-        """Of stiffness at single nodes (k, n, 3, 3), what acts on the parts (f, q, 6, 6)."""
-        here = stiffness[: len(self.mask[0]), self.nodes]
-        there = stiffness[: len(self.mask[0]), self.beyond]
-        there = there * np.multiply.outer(MIRROR_SIGNS, MIRROR_SIGNS)
-        there[:, self._middle] = 0.0
-        same, cross = here + there, here - there
-        free = self.mask.transpose(1, 2, 0, 3).reshape(*same.shape[:2], 6)
-        whole = np.block([[same, cross], [cross, same]])
-        return np.asarray(whole * (free[..., :, None] & free[..., None, :]))
+    @cached_property
+    def _spread(self) -> csr_matrix:
+        """`spread` as a matrix (k n 3, 2 f q 3), held components zero."""
+        k, n, _ = self.shape
+        part, function, row, i = np.indices(self.mask.shape)
+        ring = self._rows[part, i, function]
+        here = (ring * n + self.nodes[row]) * 3 + i
+        there = (ring * n + self.beyond[row]) * 3 + i
+        sign = self.parity * MIRROR_SIGNS[i] * np.where(part, -1.0, 1.0) * ~self._middle[row]
+        column = np.arange(here.size)
+        mask = self.mask.ravel()
+        values = np.concatenate([mask * 1.0, mask * sign.ravel()])
+        places = np.concatenate([here.ravel(), there.ravel()]), np.tile(column, 2)
+        return csr_matrix((values, places), shape=(k * n * 3, here.size))
+
+    def fold(self, stiffness: csr_matrix) -> csr_matrix:
+        """What a stiffness between fields (k n 3, k n 3) is to the parts (2 f q 3, 2 f q 3)."""
+        return csr_matrix(self._spread.T @ stiffness @ self._spread)

@@ -13,6 +13,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.sparse import csr_matrix
 
 from ...errors import Indefinite, RunFailed
 from ..modes.harmonics import HarmonicModes
@@ -23,7 +24,6 @@ from ..solid3d.circumference import Circumference
 from ..solid3d.revolved import Revolved
 from . import davidson
 from .block_cholesky import Elimination, Factor
-from .contact import Contact
 from .contact_update import ContactUpdate
 from .half_turn_symmetry import HalfTurn
 
@@ -44,13 +44,14 @@ def loaded_modes(
     tyre: Revolved,
     pressed: HalfTurn,
     U: Array,
-    holds: Sequence[Contact],
+    holds: Sequence[csr_matrix],
     unloaded: list[HarmonicModes],
     count: int,
     check: Callable[[], None],
     wheel_kg: float | None = None,
 ) -> list[LoadedModes]:
-    """The ``count`` lowest modes about U (k, n, 3) with each of ``holds``, what holds the patch.
+    """The ``count`` lowest modes about U (k, n, 3) with each of ``holds`` (k n 3, k n 3), what
+    holds the patch, N/m.
 
     pressed: what U keeps; unloaded: the inflated tyre's modes, to start from; wheel_kg: of a wheel
     that is free along the load, None: it is held. Raises RunFailed; what ``check`` raises to stop.
@@ -95,7 +96,7 @@ class _Kind:
         self,
         tyre: Revolved,
         symmetry: HalfTurn,
-        hold: Contact,
+        hold: csr_matrix,
         unloaded: list[HarmonicModes],
         wheel_kg: float | None,
         check: Callable[[], None],
@@ -106,7 +107,7 @@ class _Kind:
         order = Elimination([t[0] for t in tangents], symmetry)
         check()
         try:
-            self.factor = ContactUpdate(Factor(order, tangents, self._blocks(hold)))
+            self.factor = ContactUpdate(Factor(order, tangents, self.symmetry.fold(hold)))
         except Indefinite:
             raise RunFailed("unstable", davidson.NOT_STABLE) from None
         self.start = [symmetry.parts(V) * symmetry.mask for V in standing_waves(unloaded, symmetry)]
@@ -114,18 +115,17 @@ class _Kind:
         down = np.stack([turn.real, -turn.imag, 0 * turn.real], -1)
         self.down = down * ~symmetry.free  # the rim's nodes (k, n, 3), by 1 m
 
-    def lowest(self, hold: Contact, count: int) -> tuple[Array, Array]:
+    def lowest(self, hold: csr_matrix, count: int) -> tuple[Array, Array]:
         """omega^2 (count,) and shapes (count, k, n, 3)."""
-        self.factor.to(self._blocks(hold))
+        self.factor.to(self.symmetry.fold(hold))
         weigh, kg = Inertia(self.tyre.model, self.symmetry.around), self.wheel_kg or 0.0
-        stiffness = self._each(lambda V: self.tyre.product(V) + hold.product(V), 0.0)
+        stiffness = self._each(
+            lambda V: self.tyre.product(V) + (hold @ V.ravel()).reshape(V.shape), 0.0
+        )
         inverse, start = self._inverse(hold)
         x = davidson.lowest(stiffness, self._each(weigh, kg / 2), inverse, start, count)
         shapes = [self._field(row) for row in x[1]]
         return x[0], np.array(shapes) / np.sqrt(2)  # the half tyre has half of the modal mass
-
-    def _blocks(self, hold: Contact) -> Array:
-        return hold.stiffness(*self.symmetry.shape[:2], positive=True)
 
     def _field(self, vector: Array) -> Array:
         size = self.symmetry.mask.size
@@ -149,7 +149,7 @@ class _Kind:
 
         return apply
 
-    def _inverse(self, hold: Contact) -> tuple[davidson.Operator, Array]:
+    def _inverse(self, hold: csr_matrix) -> tuple[davidson.Operator, Array]:
         """About K^-1, and vectors to start from."""
         shape = self.symmetry.mask.shape
         start = np.array([V.ravel() for V in self.start])
@@ -160,7 +160,9 @@ class _Kind:
         if self.wheel_kg is None:
             return inner, start
         # the wheel eliminated last: what follows its shift, and the stiffness that is left
-        border = self._forces(self.tyre.product(self.down) + hold.product(self.down))
+        border = self._forces(
+            self.tyre.product(self.down) + (hold @ self.down.ravel()).reshape(self.down.shape)
+        )
         follows = inner(border[None, :-1])[0]
         left = border[-1] - border[:-1] @ follows
 

@@ -187,7 +187,7 @@ def _functions(ends: Array, waves: Array, angles: Array) -> tuple[Array, Array]:
     return result[0], result[1]
 
 
-def functions(angle: Array, half: float) -> tuple[Array, Array]:
+def functions(angle: Array, half: Array | float) -> tuple[Array, Array]:
     """The three functions and their derivatives (p, 3) at angles from the element's middle."""
     bulge, dbulge = (1 - np.cos(angle)) / (1 - np.cos(half)), np.sin(angle) / (1 - np.cos(half))
     tilt, dtilt = np.sin(angle) / np.sin(half), np.cos(angle) / np.sin(half)

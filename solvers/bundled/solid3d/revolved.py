@@ -12,10 +12,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..section.elements import Lines
 from ..section.model import Model
-from ..section.parts.part import SPIN_AXIS, Precision, TyrePart, cross
-from ..section.parts.pressure import Pressure
+from ..section.parts.part import Precision, TyrePart
 from .circumference import Circumference
 
 Array = np.ndarray
@@ -61,17 +59,6 @@ class Revolved:
         """Tangent stiffness times V (k, n, 3), N."""
         u, du = self._stations(V)
         return self._nodes([p.product(u, du) for p in self._parts])
-
-    def surface_shares(self, lines: Lines) -> Array:
-        """Deformed area (k, n) that each node stands for on a surface, of half the tyre, m2."""
-        u, du = self._stations(self._U)
-        part = Pressure(lines, 1.0).at_stations(len(self.model.mesh.X))
-        x, dx, around = part.place(u, du)
-        density = np.linalg.norm(cross(dx, around + x @ SPIN_AXIS.T), axis=-1)
-        by_node = np.einsum("ega,eg,egs->eas", part.N, lines.weights, density)
-        shares = np.zeros((len(self.model.mesh.X), u.shape[1]))
-        np.add.at(shares, lines.connectivity, by_node)
-        return np.asarray((shares * self.around.weights @ self.around.N).T)
 
     def tangents(self, precision: Precision = np.float64) -> list[Tangents]:
         """Per part: connectivity; d2W/du du, du dv and dv dv, v = du/dTheta, (s, e, 3a, 3a)."""

@@ -21,10 +21,11 @@ class Footprint:
 
     road_N: resultant of the contact pressure; rim_N (3,): reaction at the rim: down, then along y
     (the axle) and z; deflection_m: of the axle since the tyre was free; stiffness_N_per_m: tangent
-    d force / d deflection. Of each node that touches (p,): ``ring`` (place among the angles) and
+    d force / d deflection. Of each node of the patch (p,): ``ring`` (place among the angles) and
     ``node`` (deck number), along_m and across_m in the road, pressure_Pa, area_m2, which it stands
     for, traction_Pa (p, 2). displacement (ring, node, 3): r, theta, z at the reference angle, m.
-    contact_area_m2: of a solver that places the patch's edge between nodes, else None.
+    contact_area_m2, contact_length_m, contact_width_m: of a solver that places the patch's edge
+    between nodes, else None; then nodes beside the patch have a share of it, too.
 
     Of modes, where they were asked for: mode_frequency_Hz (m,); mode_shape (m, ring, j, 3), as
     displacement, at the nodes mode_node (j,) only. Of a road with friction, in which these modes
@@ -46,6 +47,8 @@ class Footprint:
     traction_Pa: Array
     displacement: Array
     contact_area_m2: float | None = None
+    contact_length_m: float | None = None
+    contact_width_m: float | None = None
     mode_frequency_Hz: Array | None = None
     mode_node: Array | None = None
     mode_shape: Array | None = None

@@ -113,6 +113,8 @@ class _Footprint(_Part):
     traction_Pa: Annotated[Any, _shaped(REAL, None, 2)]
     displacement: Field3D
     contact_area_m2: PositiveFinite | None = None
+    contact_length_m: PositiveFinite | None = None
+    contact_width_m: PositiveFinite | None = None
     mode_frequency_Hz: Triple | None = None
     mode_node: FiniteArray | None = None
     mode_shape: Annotated[Any, _shaped(REAL, None, None, None, 3)] | None = None

@@ -4,10 +4,9 @@ Every design is pressed at all loads of the case up to the last one with a targe
 friction remembers the loads on the way.
 
 Areas are reproducible to 1e-12 of themselves, stiffnesses to 1e-10, so slopes over 1e-5 have five
-digits. But both are smooth in pieces only, and jump as nodes come to touch or to slide: at 4 kN by
-0.2 and 0.14 %, once within 0.04 of ln C10, on the default mesh; by a node's share of the patch at
-most. The small step sees the slope of a piece; a jump between two neighbours is rare, and known by
-its steepness.
+digits. The bundled solver's are smooth; another's may jump as nodes come to touch or to slide, by a
+node's share of the patch at most. The small step sees the slope of a piece; a jump between two
+neighbours is rare, and known by its steepness.
 """
 
 from __future__ import annotations

@@ -69,7 +69,7 @@ class Road(Part):
     """
 
     friction: NotNegative = 0.5
-    stiffness_Pa_per_m: Positive = 1e10
+    stiffness_Pa_per_m: Positive = 1e9
     elastic_slip_m: Annotated[float, Field(ge=1e-6)] = 1e-4
     wheel: Literal["held", "free_along_load"] = "held"
     element_angles_deg: Annotated[list[Positive], Field(min_length=1, max_length=200)] = Field(
