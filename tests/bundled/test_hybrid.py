@@ -335,6 +335,36 @@ def test_half_the_section_is_the_whole(kind: str, D1: str, monkeypatch: pytest.M
     np.testing.assert_allclose(slopes[0], wanted, atol=1e-5 * abs(wanted).max())
 
 
+def test_triangles_among_quadrilaterals_on_half_the_section(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """CGAX4H, and in each sidewall two cut along diagonals that are mirror images: the whole's."""
+    case = CASE.case
+    mesh = case.mesh.model_copy(update={"element": "CGAX4R"})
+    own = decks(replace(CASE, case=case.model_copy(update={"mesh": mesh})))
+    text, triangles = own["inflate.inp"].replace("TYPE=CGAX4R", "TYPE=CGAX4H"), []
+    for number, other in ((3002, False), (3003, False), (18002, True), (18003, True)):
+        a, b, c, d = number, number + 1, number + 1001, number + 1000
+        row = f"\n{number}, {a}, {b}, {c}, {d}\n"
+        assert text.count(row) == 1
+        text = text.replace(row, "\n")
+        a, b, c, d = (b, c, d, a) if other else (a, b, c, d)
+        triangles += [f"{number}, {a}, {b}, {c}", f"7{number}, {a}, {c}, {d}"]
+    start = "*ELEMENT, TYPE=CGAX4H, ELSET=SOLID_1"
+    rows = "\n".join(["*ELEMENT, TYPE=CGAX3H, ELSET=SOLID_1", *triangles, start])
+    pair = {"inflate": text.replace(start, rows), "modes": own["modes.inp"]}
+    quadrilaterals = {**pair, "inflate": own["inflate.inp"].replace("CGAX4R", "CGAX4H")}
+    assert Job(Deck(pair, "modes", "inflate"), Request()).tyre.half
+    half, plain = run(pair), run(quadrilaterals)
+    monkeypatch.setattr(jobs, "keeps_half_turn", lambda *_: False)
+    whole = run(pair)
+    assert half.mass_kg == pytest.approx(plain.mass_kg, rel=1e-9)
+    values = [np.concatenate([m.eigenvalues for m in each.modes]) for each in (half, whole, plain)]
+    np.testing.assert_allclose(values[0], values[1], rtol=1e-8)
+    np.testing.assert_allclose(values[0], values[2], rtol=0.1)
+    assert abs(values[0] / values[2] - 1).max() > 1e-4
+
+
 def test_the_way_to_incompressible_rubber_is_one_of_two(monkeypatch: pytest.MonkeyPatch) -> None:
     """By softer bulk first, or at once: the same state, in fewer factorisations."""
     steps = []

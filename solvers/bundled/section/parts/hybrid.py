@@ -21,7 +21,7 @@ import numpy as np
 from ..laws.energy_law import EnergyLaw
 from ..laws.hyperelastic import Hyperelastic, determinant, square
 from .elastic import Elastic, ElasticAtStations
-from .part import ModeShapes, Precision, Tangents, gradients
+from .part import ModeShapes, Precision, Tangents
 
 Array = np.ndarray
 
@@ -70,11 +70,14 @@ class Hybrid(Elastic):
     def form(self, U: Array, fields: ModeShapes) -> Array:
         total = super().form(U, fields)
         by_F, stiffness = self._of_volume(U)
-        for j, (n, a, b) in enumerate(fields.modes):
-            z = gradients(self.connectivity, self.rows, a, b, n).reshape(*by_F.shape, -1)
-            change = self.projection @ (by_F[..., None] * z).sum(2)  # (e, g, shapes)
-            total[j] += (stiffness[..., None] * change**2).sum()
-        return total
+        d0, d1 = volume_rows(self, by_F)
+        a, b = (
+            np.moveaxis(part[:, self.connectivity].reshape(len(fields.n), *d0.shape[::2]), 0, -1)
+            for part in (fields.real, fields.imag)
+        )
+        real, imag = d0 @ a - fields.n * (d1 @ b), d0 @ b + fields.n * (d1 @ a)  # dtheta
+        each = (stiffness[..., None] * (real**2 + imag**2)).sum((0, 1))
+        return np.asarray(total + fields.summed(each))
 
     def at_stations(self, nodes: int) -> HybridAtStations:
         return HybridAtStations(self, nodes)

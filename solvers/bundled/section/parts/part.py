@@ -198,7 +198,7 @@ class ModeShapes:
         for first in range(0, len(self.modes), TOGETHER):
             modes = self.modes[first : first + TOGETHER]
             n, a, b = (np.concatenate(own) for own in zip(*modes, strict=True))
-            z = gradients(connectivity, rows, a, b, n)
+            z = _gradients(connectivity, rows, a, b, n)
             ends = np.cumsum([len(own) for own, _, _ in modes])[:-1]
             for j, part in enumerate(np.split(z, ends, -1), first):
                 columns = part.reshape(*rows.B0.shape[:3], -1)
@@ -216,7 +216,7 @@ def contract(A: Array, G: Array) -> Array:
     return np.asarray(G @ A.real + 1j * (G @ A.imag))
 
 
-def gradients(connectivity: Array, rows: Rows, real: Array, imag: Array, n: Array) -> Array:
+def _gradients(connectivity: Array, rows: Rows, real: Array, imag: Array, n: Array) -> Array:
     """Real and imaginary parts of (B0 + i n B1)(a + i b), (e, g, k, 2, p)."""
     e, g, k, d = rows.B0.shape
     u = np.moveaxis(np.stack([real[:, connectivity], imag[:, connectivity]]), 1, -1)
