@@ -228,7 +228,10 @@ def _sector_modes(
     if tyre.request.sensitivities:
         raise DeckError(line, "a tyre with a sector of other stuff has no exact derivatives")
     assert tyre.request.sector
-    model, other = (build(k, None, step.long_term) for k in (tyre.section, tyre.sector))
+    model, other = (
+        build(keywords, None, step.long_term, half=tyre.half)
+        for keywords in (tyre.section, tyre.sector)
+    )
     if model.mesh is not other.mesh:
         raise DeckError(line, "the sector's section job must have the same mesh")
     sector = SpliceSector(np.radians(float(tyre.request.sector["width_deg"])), other)

@@ -80,8 +80,9 @@ class Job:
         section, revolve, self.steps = deck.read([])
         self.deadline, self.road = deadline, footprint_job.read_road(revolve)
         mesh, half = read_mesh(section), False
-        if self.road is None and not sector:
-            half = keeps_half_turn(mesh, section, self.steps)
+        if self.road is None:
+            filled = [section, list(sector)] if sector else [section]
+            half = all(keeps_half_turn(read_mesh(each), each, self.steps) for each in filled)
         models = cache(partial(build, section, half=half))
         self.model = models(None, True, False)
         U = np.zeros((len(mesh.X), 3))

@@ -13,6 +13,7 @@ from numpy.polynomial import Polynomial
 from scipy.stats import chi2
 
 from tyrecal.simulate.modes.label import Label
+from tyrecal.studies.diagnose.diagnosis import _asked_again
 from tyrecal.studies.diagnose.evidence import (
     INFLATION,
     UNKNOWN,
@@ -394,6 +395,62 @@ def test_two_sizes_and_their_slopes_make_a_quartic(
     assert nodes.at(e)[0][:, -1] == pytest.approx(by_values, abs=1e-12)
 
 
+def test_where_splits_do_not_matter_one_size_and_the_slope_at_0_make_a_quadratic() -> None:
+    toy = Sloped(2, at_0=True)
+    nodes = expand(toy, np.zeros(3), splits=False).nodes["e0"]
+    assert nodes.values.tolist() == [0, 1] and nodes.sloped.tolist() == [True, False]
+    e = np.linspace(0, 1, 7)
+    assert nodes.at(e)[0][:, 0] == pytest.approx(toy.curve(e), abs=1e-12)
+    both = Sloped(2, at_0=True, span=Span(-1.0, 1.0))
+    assert expand(both, np.zeros(3), splits=False).nodes["e0"].values.tolist() == [-1, 0, 1]
+    own = Sloped(2)
+    assert expand(own, np.zeros(3), splits=False).nodes["e0"].values.tolist() == [0, 0.25, 1]
+
+
+def test_a_nearer_size_is_asked_where_the_far_end_has_no_solution() -> None:
+    class Stops(Sloped):
+        far = 0.5
+
+        def _answer(self, point: Query) -> Answer:
+            if point.effects.get("e0", 0.0) > self.far:
+                return ValueError("no such tyre")  # type: ignore[return-value]
+            return super()._answer(point)
+
+    toy = Stops(2, at_0=True)
+    nodes = expand(toy, np.zeros(3), splits=False).nodes["e0"]
+    assert nodes.values.tolist() == [0, 0.25] and nodes.reach == (0.0, 0.25)
+    toy.far = 0.1
+    found = expand(toy, np.zeros(3), splits=False)
+    assert not found.nodes and found.failed == {"e0": "no such tyre"}
+
+
+def test_an_effect_is_not_asked_again_where_it_was_asked() -> None:
+    """Near a node, or 0, and near x0: what was asked there is known; elsewhere it is asked."""
+    for size, move, wanted in (
+        (1.0, 0.0, False),
+        (0.74, 0.02, False),
+        (0.02, 0.2, False),
+        (1.0, 0.2, True),
+        (0.5, 0.0, True),
+        (0.64, 0.0, True),
+    ):
+        toy = Toy(effects=1, size=0.3, pressures=(160.0, 240.0), bend=0.0)
+        toy.tilt["e0"] *= 0
+        base = problem(toy, assumed=Assumed(form=1e-6, law=0.0), noise=1e-5)
+        p = base.measured(toy.base + toy.J @ np.array([move, 0.0, 0.0]) + size * toy.g["e0"])
+        hypotheses = weigh(p)
+        best = next(h for h in hypotheses if h.key == "e0")
+        assert best.values["e0"][best.best] == pytest.approx(size, abs=0.02)
+        assert best.fitted.d[best.best][0] == pytest.approx(move, abs=0.03)
+        before = toy.asked
+        again, changed = _asked_again(p, toy, hypotheses)
+        assert changed == wanted and toy.asked - before == wanted
+        anchor = again.expansion.nodes["e0"].anchor
+        assert (anchor is not None) == wanted
+        if wanted:  # and not a second time
+            assert not _asked_again(again, toy, weigh(again))[1]
+
+
 def test_more_sizes_where_two_and_their_slopes_are_not_enough() -> None:
     """At 60 % of the range, where the far slope is worth 0.1 % and more half way to it, of the
     fifth order at 0, 1/4 and 1 (double): e (e - 1/4)^2 (e - 1) / (3/4)^2 at 5/8."""
@@ -493,7 +550,8 @@ def test_the_menu_of_measurements() -> None:
         answer = Answer(zero, J, zero, np.zeros((count, 2)))
         by = lambda point: 0.1 * len(point.effects) * random.normal(size=count)
         moved = lambda point: replace(answer, eta=by(point))
-        return SimpleNamespace(answers=lambda points: [answer, *map(moved, points[1:])])
+        answers = lambda points: [answer, *map(moved, points[1:])]
+        return SimpleNamespace(answers=answers, sloped_at_0=())
 
     found = rank(p, np.zeros(3), likely, sizes, ("rubber_density",), further)
     assert {c.what: c.hours for c in found} == {
@@ -512,6 +570,43 @@ def test_the_menu_of_measurements() -> None:
     assert not any("e2" in c.what for c in few)
     assert rank(p, np.zeros(3), {"e0": 0.99, "none": 0.01}, sizes, ()) == []
     assert rank(p, np.zeros(3), {"e0": 0.5, "strange": 0.5}, sizes, ()) == []
+
+
+def test_what_further_rows_gain_from_an_effect_whose_slope_at_0_is_known() -> None:
+    """It is not asked: its slope there, bent as in the rows that it was asked for; those of the
+    others as they are asked."""
+    toy = Sloped(2, at_0=True, span=Span(0.0, 1.0))
+    toy.curve = 2e-3 * Polynomial([0.0, 1.0, -0.3])
+    toy.spans["e1"], toy.g["e1"] = Span(0.0, 1.0), np.full(len(toy.rows), 0.001)
+    toy.tilt["e1"], toy.splits["e1"] = np.zeros((len(toy.rows), 3)), np.zeros(len(toy.rows))
+    p = problem(toy)
+    likely = {"none": 0.4, "e0": 0.3, "e0+e1": 0.3}
+    sizes = {"e0": {"e0": 0.5}, "e0+e1": {"e0": 1.0, "e1": 0.5}}
+    asked: list[Query] = []
+
+    def ranked(model: Any) -> float:
+        found = rank(p, np.zeros(3), likely, sizes, (), lambda rows: model(len(rows)))
+        return next(c.gain for c in found if "[5,0]" in c.what)
+
+    def answered(count: int, straight: bool) -> Any:
+        zero, J = np.zeros(count), np.tile([0.1, 0.2, 0.3], (count, 1))
+
+        def answer(point: Query) -> Answer:
+            asked.append(point)
+            e0, e1 = (point.effects.get(id, 0.0) for id in ("e0", "e1"))
+            eta = zero + 3 * toy.curve(e0) + 0.004 * e1
+            slopes = dict.fromkeys(point.slopes, zero + 3 * toy.curve.deriv()(0.0))
+            return Answer(eta, J, zero, np.zeros((count, 2)) if point.constants else None, slopes)
+
+        known = ("e0",) if straight else ()
+        return SimpleNamespace(answers=lambda q: [*map(answer, q)], sloped_at_0=known)
+
+    whole = ranked(lambda count: answered(count, False))
+    assert any(q.effects.get("e0") for q in asked)
+    asked.clear()
+    assert ranked(lambda count: answered(count, True)) == pytest.approx(whole, rel=1e-9)
+    assert [dict(q.effects) for q in asked] == [{}, {}, {}, {"e1": 0.5}]
+    assert asked[0].slopes == ("e0",) and asked[0].constants
 
 
 def test_the_gains_of_what_is_switched_and_checked_by_their_formula() -> None:
@@ -611,7 +706,8 @@ def test_the_gains_of_further_rows_by_their_formula() -> None:
 
     def further(wanted: list) -> Any:
         rows.extend(wanted)
-        return SimpleNamespace(answers=lambda points: [answer(point) for point in points])
+        answers = lambda points: [answer(point) for point in points]
+        return SimpleNamespace(answers=answers, sloped_at_0=())
 
     found = {c.what: c for c in rank(p, np.zeros(3), likely, sizes, (), further)}
     assert len(found) == 7  # repeats, two toggles, 160 and 320 kPa, harmonics, the mass
@@ -665,7 +761,7 @@ def test_what_is_not_asked_twice_or_has_no_answer_is_not_offered() -> None:
 
     def further(wanted: list) -> Any:
         asked.append(wanted)
-        return SimpleNamespace(answers=lambda points: [ValueError("no") for _ in points])
+        return SimpleNamespace(answers=lambda q: [ValueError("no")] * len(q), sloped_at_0=())
 
     words = [c.what for c in rank(p, np.zeros(3), likely, sizes, (), further)]
     assert sorted(what for what in words if "again" in what) == [

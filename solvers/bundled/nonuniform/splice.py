@@ -5,6 +5,13 @@ elsewhere, by its Fourier series up to twice the highest harmonic N of the displ
 all that products of two of them see. On 2 N + 1 nodes round the tyre displacements are exact
 trigonometric polynomials, and sums over the stations exact integrals.
 
+A tyre that is its own half turn about the vertical (`symmetry`) remains so with the sector about
+Theta = 0: fields that half a turn keeps and those that it reverses,
+
+    u(Theta, z) = +- S u(-Theta, -z),    S = diag(1, -1, -1),
+
+one of each doublet in either, vibrate apart, and the elements of z >= 0 tell all of them.
+
 The state under pressure is found again, because a stiffer sector also takes up other forces; then
 Ritz's method on the axisymmetric tyre's modes and on the responses K^-1 r to what is left of each,
 r = (K~ - lambda M~) u, the axisymmetric K per harmonic (Davidson, J. Comp. Physics 17, 1975).
@@ -12,8 +19,10 @@ r = (K~ - lambda M~) u, the axisymmetric K per harmonic (Davidson, J. Comp. Phys
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -24,6 +33,7 @@ from ..section.mechanics import mass
 from ..section.model import Model
 from ..section.parts.elastic import Elastic
 from ..section.parts.part import TyrePart
+from ..section.symmetry import HALF_TURN, MirrorHalf, Whole
 from ..solid3d.circumference import Circumference
 from ..solid3d.gmres import gmres
 from ..solid3d.revolved import Revolved
@@ -38,6 +48,8 @@ MAX_SPLICE_ITERATIONS = 20
 SPLICE_LINEAR_RTOL = 1e-4  # of each step of Newton's method
 MIN_GRAM = 1e-11  # of the basis' Gram matrix
 RESPONSE_ROUNDS = 2  # of responses
+SPARE_MODES_KEPT = 2  # modes beyond those wanted that responses are added for
+NEGLIGIBLE_PART = 1e-8  # square of a field's part that half a turn keeps, over the field's
 
 
 @dataclass(frozen=True)
@@ -76,9 +88,16 @@ def blended(model: Model, other: Model, share: Array) -> Model:
 
 
 class FullCircle:
-    """Fields (k, nodes, 3) by their values round the tyre; ``free`` (nodes, 3)."""
+    """Fields (k, nodes, 3) by their values round the tyre; ``free`` (nodes, 3).
+
+    turn: 1 of those that half a turn keeps, -1 of those that it reverses; 0: of all, where it does
+    not keep the tyre.
+    """
 
     def __init__(self, vibration: Vibration, tyre: Revolved, sector: SpliceSector, highest: int):
+        symmetry: Whole = tyre.model.mesh.symmetry
+        self._other = symmetry.other if isinstance(symmetry, MirrorHalf) else None
+        self.turn = 0.0 if self._other is None else 1.0
         self.vibration, self.tyre, self.highest = vibration, tyre, highest
         self.factors = [vibration.factor(n) for n in range(highest + 1)]
         self.free = vibration.numbering.free
@@ -87,6 +106,25 @@ class FullCircle:
         self._waves = around.N.T @ ((around.weights * share)[:, None] * around.N)
         self._plain = vibration.mass * (2 * np.pi / len(around.angles))
         self._more = mass(sector.model) - vibration.mass
+
+    def turning(self, turn: float) -> FullCircle:
+        """The same of other fields."""
+        other = copy.copy(self)
+        other.turn = turn
+        return other
+
+    def turned(self, field: Array) -> Array:
+        """S u(-Theta, -z)."""
+        back = np.roll(field[::-1], 1, axis=0)
+        return np.asarray(back[:, self._other] * HALF_TURN)
+
+    def part(self, field: Array) -> Array:
+        """What of a field is one of these."""
+        return (field + self.turn * self.turned(field)) / 2 if self.turn else field
+
+    def whole(self, sums: Array) -> Array:
+        """Forces of all elements from those of the elements there."""
+        return sums + self.turn * self.turned(sums) if self.turn else sums
 
     def field(self, n: int, shape: Array) -> Array:
         """Re[shape exp(i n Theta)]."""
@@ -99,7 +137,12 @@ class FullCircle:
 
     def forces(self, field: Array) -> Array:
         """K~ u, N."""
-        return self.tyre.product(field) * self.free
+        return self.whole(self.tyre.product(field)) * self.free
+
+    def out_of_balance(self, state: Array) -> Array:
+        """Forces inside the tyre less the pressure's, N, those at the rim among them. Raises
+        Inverted."""
+        return self.whole(self.tyre.residual(state))
 
     def inertia(self, field: Array) -> Array:
         """M~ u, kg m."""
@@ -110,16 +153,17 @@ class FullCircle:
             image = image + np.einsum(
                 "kj,njc->nkc", self._waves, (self._more @ flat).reshape(shape)
             )
-        return np.asarray(image.swapaxes(0, 1) * self.free)
+        return self.whole(image.swapaxes(0, 1)) * self.free
 
     def response(self, force: Array) -> Array:
-        """K^-1 of the plain tyre times forces, harmonic by harmonic."""
-        numbering = self.vibration.numbering
-        waves = np.fft.rfft(force, axis=0) * len(force) / (2 * np.pi)  # N per radian
+        """K^-1 of the plain tyre times forces, harmonic by harmonic. Waves of a field that half a
+        turn reverses are those of a kept one times -i."""
+        numbering, phase = self.vibration.numbering, 1j if self.turn < 0 else 1.0
+        waves = np.fft.rfft(force, axis=0) * len(force) / (2 * np.pi) * phase  # N per radian
         for n, factor in enumerate(self.factors):
             right = numbering.gather(waves[n])
             waves[n] = numbering.spread(factor.solve(right if n else right.real))
-        return np.fft.irfft(waves, len(force), axis=0)
+        return np.fft.irfft(waves / phase, len(force), axis=0)
 
 
 def _angles(k: int) -> Array:
@@ -149,23 +193,60 @@ def sector_modes(
     fields = FullCircle(vibration, tyre, sector, top)
     equilibrium(fields, U, check)
     near = range(min(max(harmonics) + SPARE_START_HARMONICS, top) + 1)
-    start: list[Array] = []
-    plain = {}
-    for n in near:
-        for k, shape in enumerate(vibration.modes(n, count).shapes):
-            pair = [fields.field(n, c * shape) for c in ((1.0, 1j) if n else (1.0,))]
-            plain[n, k] = range(len(start), len(start) + len(pair))
-            start += pair
-    wanted = sum((2 if n else 1) * count for n in harmonics)
-    values, modes, first = ritz_davidson(fields, start, wanted + 2, check)
-    held = {key: sum(first[i] ** 2 for i in places) for key, places in plain.items()}
+    plain = {
+        (n, k): [fields.field(n, c * shape) for c in ((1.0, 1j) if n else (1.0,))]
+        for n in near
+        for k, shape in enumerate(vibration.modes(n, count).shapes)
+    }
+    seats = [(n, k) for n in harmonics for k in range(count)]
+    apart = [
+        _modes_of(fields.turning(turn), plain, seats, check)
+        for turn in ((1.0, -1.0) if fields.turn else (0.0,))
+    ]
+    values = np.concatenate([each.eigenvalues for each in apart])
+    order = np.argsort(values, kind="stable")
+    held = {key: np.concatenate([each.held[key] for each in apart])[order] for key in plain}
     told = tell(held, harmonics, count)
+    shape_of = [partial(each.shape, j) for each in apart for j in range(len(each.eigenvalues))]
     result = []
     for n in harmonics:
         size = np.sqrt(np.pi if n else 2 * np.pi)  # from the whole circle's unit mass
-        shapes = np.array([size * fields.wave(modes(j), n) for j in told[n]])
-        result.append(split(n, values[told[n]], shapes))
+        shapes = np.array([size * fields.wave(shape_of[j](), n) for j in order[told[n]]])
+        result.append(split(n, values[order[told[n]]], shapes))
     return result
+
+
+@dataclass(frozen=True)
+class _Apart:
+    """Modes (m,) of one of the kinds of fields that vibrate apart; held (m,): how much of the plain
+    mode (n, k) is in each; shape: the field (k, nodes, 3) of a mode by its place."""
+
+    eigenvalues: Array
+    held: dict[tuple[int, int], Array]
+    shape: Callable[[int], Array]
+
+
+def _modes_of(
+    fields: FullCircle,
+    plain: dict[tuple[int, int], list[Array]],
+    seats: list[tuple[int, int]],
+    check: Callable[[], None],
+) -> _Apart:
+    """plain: fields of the plain tyre's modes (n, k); seats: those that are wanted."""
+    start: list[Array] = []
+    places = {}
+    for key, whole in plain.items():
+        parts = [part for part in map(fields.part, whole) if _counts(part, whole[0])]
+        places[key] = list(range(len(start), len(start) + len(parts)))
+        start += parts
+    wanted = sum(len(places[seat]) for seat in seats) + SPARE_MODES_KEPT
+    values, modes, first = ritz_davidson(fields, start, wanted, check)
+    held = {key: (first[own] ** 2).sum(0) for key, own in places.items()}
+    return _Apart(values, held, modes)
+
+
+def _counts(part: Array, whole: Array) -> bool:
+    return float((part * part).sum()) > NEGLIGIBLE_PART * float((whole * whole).sum())
 
 
 def equilibrium(fields: FullCircle, U: Array, check: Callable[[], None]) -> None:
@@ -178,7 +259,7 @@ def equilibrium(fields: FullCircle, U: Array, check: Callable[[], None]) -> None
     for _ in range(MAX_SPLICE_ITERATIONS):
         check()
         try:
-            whole = fields.tyre.residual(state)
+            whole = fields.out_of_balance(state)
         except Inverted as error:
             raise stopped(0.0, 0.0, f"with the splice {error}") from None
         force = (whole * fields.free).ravel()

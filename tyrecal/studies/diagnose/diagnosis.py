@@ -34,7 +34,9 @@ STAGES = (
     "parts of the section",
     "the next measurements",
 )
-KNOWN_WITHIN = 0.05  # of a range, and of ln x: an effect asked as near as that, or to 0, is known
+KNOWN_WITHIN = (
+    0.05  # of a range, and of ln x: an effect asked as near as that is known; at 0 all is
+)
 
 
 @dataclass(frozen=True)
@@ -104,17 +106,17 @@ def diagnose(
     the same model, near whose x0 the fit lies; stage: hears of each of ``STAGES``. Raises the
     model's failure where the plain tyre has no solution.
     """
-    where = places(observations, rows)
+    where, splits = places(observations, rows), bool(np.isfinite(observations.split).any())
     stage(STAGES[0])
     if expansion is None:
-        expansion = expand(model, plain_fit(model, observations, where, assumed.form))
+        expansion = expand(model, plain_fit(model, observations, where, assumed.form), splits)
     problem = InverseProblem(
         observations, expansion, model.spans, where, model.start, model.spread, changes, assumed
     )
     labels = exchanged(problem) if len(where) > len(model.start) else None
     if labels:
         observations = with_exchanged(observations, *labels)
-        expansion = expand(model, plain_fit(model, observations, where, assumed.form))
+        expansion = expand(model, plain_fit(model, observations, where, assumed.form), splits)
         problem = replace(problem, observations=observations, expansion=expansion)
     hypotheses, bare = weigh(problem), problem
     stage(STAGES[1])
@@ -169,10 +171,13 @@ def _asked_again(
     for h in play:
         nodes, d = problem.expansion.nodes[h.key], h.fitted.d[h.best]
         e, width = float(h.values[h.key][h.best]), nodes.reach[1] - nodes.reach[0]
-        last = nodes.anchor
+        asked = [(float(each), np.zeros_like(d)) for each in nodes.values]  # 0 among them
+        asked += [(nodes.anchor.e, nodes.anchor.d)] if nodes.anchor else []
         near = KNOWN_WITHIN * width
-        known = last and abs(e - last.e) < near and abs(d - last.d).max() < KNOWN_WITHIN
-        if not known and abs(e) > near:
+        if not any(
+            abs(e - size) < near and (size == 0 or abs(d - at).max() < KNOWN_WITHIN)
+            for size, at in asked
+        ):
             wanted[h.key] = e, problem.expansion.x0 + d
     if not wanted:
         return problem, False

@@ -13,7 +13,7 @@ terms of third order. Effects add up.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -27,6 +27,9 @@ BENDING = (0.08, 0.5)  # more of them, of the range, where the cubic is not enou
 MAX_LAST_TERM = 0.003  # of ln f, by Newton's polynomial, where the cubic is enough
 # the same where there are slopes, or the slope at 0
 ONE_SIDED_SLOPED, TWO_SIDED_SLOPED, BENDING_SLOPED = (0.25, 1.0), (1.0,), (0.6,)
+FAR_END = (
+    1.0,
+)  # the one size beside the slope at 0; splits, of which that tells nothing, need two
 MAX_LAST_TERM_SLOPED = 0.001  # some five times what the curve is off by
 CURVATURE_STEP = 0.05  # of a logarithm, for H from two Jacobians
 
@@ -91,15 +94,18 @@ class Expansion:
         return self.eta + self.jacobian @ d + bent @ d / 2, self.jacobian + bent
 
 
-def expand(model: ResponseModel, x0: Array) -> Expansion:
+def expand(model: ResponseModel, x0: Array, splits: bool = True) -> Expansion:
     """Ask the model about x0: curvature by x, sources of error, every effect at its nodes.
 
+    splits: whether those of pairs matter, or their means alone.
     Raises what the model answered where it has no solution at x0 itself.
     """
     ids, count = list(model.spans), len(x0)
     steps = CURVATURE_STEP * np.eye(count)
     at_0 = tuple(id for id in ids if id in model.sloped_at_0)
-    values = {id: node_values(model.spans[id], id in {*model.sloped, *at_0}) for id in ids}
+    shares = {id: ONE_SIDED_SLOPED if splits else FAR_END for id in at_0}
+    shares |= dict.fromkeys(model.sloped, ONE_SIDED_SLOPED)
+    values = {id: node_values(model.spans[id], shares.get(id, ())) for id in ids}
     points = [Query(x0, constants=True, slopes=at_0)]
     points += [Query(x0 + side * step) for step in steps for side in (1, -1)]
     asked = [(id, float(e)) for id in ids for e in values[id]]
@@ -119,7 +125,12 @@ def expand(model: ResponseModel, x0: Array) -> Expansion:
     nodes, failed = {}, {}
     replies = dict(zip(asked, answers[1 + 2 * count :], strict=True))
     found = {id: {float(e): replies[id, float(e)] for e in values[id]} | {0.0: first} for id in ids}
-    more = [(id, e) for id in ids for e in _more(_nodes(id, plain, model.spans[id], found[id]))]
+    more = [
+        (id, e)
+        for id in ids
+        for e in _more(_nodes(id, plain, model.spans[id], found[id]))
+        or _nearer(model.spans[id], found[id])
+    ]
     again = model.answers([_with_effect(model, x0, id, e) for id, e in more]) if more else []
     for (id, e), answer in zip(more, again, strict=True):
         found[id][e] = answer
@@ -132,13 +143,14 @@ def expand(model: ResponseModel, x0: Array) -> Expansion:
     return replace(plain, nodes=nodes, failed=failed)
 
 
-def node_values(span: Span, slopes: bool = False) -> Array:
-    """Where an effect is asked: parameters other than 0, rising; fewer where its slopes are."""
+def node_values(span: Span, sloped: Sequence[float] = ()) -> Array:
+    """Where an effect is asked: parameters other than 0, rising; where its slopes are asked, too,
+    of a one-sided range at the shares ``sloped``."""
     if span.low < 0 < span.high:
-        shares = np.array(TWO_SIDED_SLOPED if slopes else TWO_SIDED)
+        shares = np.array(TWO_SIDED_SLOPED if sloped else TWO_SIDED)
         return np.sort([*(shares * span.low), *(shares * span.high), *span.also])
     far = span.high if abs(span.high) >= abs(span.low) else span.low
-    return np.sort([*(far * np.array(ONE_SIDED_SLOPED if slopes else ONE_SIDED)), *span.also])
+    return np.sort([*(far * np.array(sloped or ONE_SIDED)), *span.also])
 
 
 def anchored(
@@ -217,6 +229,13 @@ def _more(made: Nodes | None) -> list[float]:
     ):
         return []
     return [far * f for far in made.reach if far for f in (BENDING_SLOPED if sloped else BENDING)]
+
+
+def _nearer(span: Span, replies: Mapping[float, Answer | Exception]) -> list[float]:
+    """Parameters nearer to 0 that were saved, where none beyond has a solution."""
+    if any(isinstance(reply, Answer) for e, reply in replies.items() if e):
+        return []
+    return [e for e in map(float, node_values(span, ONE_SIDED_SLOPED)) if e not in replies]
 
 
 def hermite(nodes: Array, sloped: Array, e: Array) -> tuple[Array, Array]:

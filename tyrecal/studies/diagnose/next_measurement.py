@@ -15,6 +15,7 @@ import numpy as np
 from ...simulate.modes.label import Label
 from .covariance import covariance
 from .evidence import NONE, OUTSIDE
+from .expansion import Nodes
 from .inverse_problem import InverseProblem, Toggle
 from .model import Answer, ModelRow, Query, ResponseModel
 from .observations import Observable, Observations
@@ -135,6 +136,15 @@ def _switched(problem: InverseProblem, id: str) -> InverseProblem:
     return replace(problem, observations=both, places=join(problem.places), changes=changes)
 
 
+def _along(nodes: Nodes, e: float, slope: Array) -> Array:
+    """What an effect of parameter e adds to further rows (m,), whose slopes by it are known at 0:
+    they bend as those that it was asked for do, on the whole; 0 where there is no slope."""
+    line, bent = nodes.slope[nodes.values == 0][0] * e, nodes.shift_at(np.array([e]))[0]
+    known = np.isfinite(line)
+    share = bent[known] @ line[known] / (line[known] @ line[known]) if line[known].any() else 1.0
+    return np.nan_to_num(slope) * e * share
+
+
 def _more_rows(
     problem: InverseProblem,
     now: _Look,
@@ -160,12 +170,26 @@ def _more_rows(
     rows = list(dict.fromkeys(row for _, _, more in offered for row in more))
     model = further(rows)
     x0 = problem.expansion.x0
-    points = [Query(x0, constants=True), *(Query(x0, sizes.get(key, {})) for key in likely)]
+    effects = [sizes.get(key, {}) for key in likely]
+    lines = tuple({id: 0.0 for each in effects for id in each if id in model.sloped_at_0})
+    points = [Query(x0, constants=True, slopes=lines)]
+    points += [Query(x0, {id: e for id, e in each.items() if id not in lines}) for each in effects]
     answers = model.answers(points)
     if not all(isinstance(answer, Answer) for answer in answers):
         return []
     plain, *others = [answer for answer in answers if isinstance(answer, Answer)]
     assert plain.constants is not None
+    added = {
+        key: sum(
+            (
+                _along(problem.expansion.nodes[id], each[id], plain.slopes[id])
+                for id in lines
+                if id in each
+            ),
+            other.eta - plain.eta,
+        )
+        for key, each, other in zip(likely, effects, others, strict=True)
+    }
     scatter = float(np.median(o.scatter))
     result = []
     for words, hours, more in offered:
@@ -182,10 +206,7 @@ def _more_rows(
             join(o.split_scatter, none),
         )
         constants = np.vstack([problem.constants, plain.constants[at]])
-        shifts = {
-            key: np.concatenate([now.shifts[key], (other.eta - plain.eta)[at]])
-            for key, other in zip(likely, others, strict=True)
-        }
+        shifts = {key: np.concatenate([now.shifts[key], added[key][at]]) for key in likely}
         jacobian = np.vstack([now.jacobian, plain.jacobian[at]])
         sigma = covariance(both, constants, problem.assumed.form)
         result.append((words, hours, _Look(sigma, jacobian, shifts)))

@@ -21,7 +21,7 @@ from ...tyre.case.schema import TargetMode, Targets
 from ...tyre.effects import catalogue
 from ...tyre.templates import TemplateFailed
 from ..fit import problem as fit
-from .expansion import node_values
+from .expansion import ONE_SIDED_SLOPED, node_values
 from .model import Answer, ModelRow, Query, Span
 from .uncertainties import EFFECT_PATH, Source, unit_of, values_of
 
@@ -90,7 +90,9 @@ class TyreModel:
     @cached_property
     def sloped(self) -> Collection[str]:
         """Effects with whose parameter a few numbers of the decks change."""
-        sizes = {id: map(float, node_values(span, True)) for id, span in self.spans.items()}
+        sizes = {
+            id: map(float, node_values(span, ONE_SIDED_SLOPED)) for id, span in self.spans.items()
+        }
         return {id for id in self.spans if id not in self._slopeless and self._moves(id, sizes[id])}
 
     @cached_property
