@@ -96,9 +96,10 @@ def test_each_case_has_the_results_of_the_commands(
 def test_a_batch_samples_as_the_command_does(tmp_path: Path) -> None:
     (case,) = vary(tmp_path / "cases", 1)
     out, own = tmp_path / "out", tmp_path / "own"
-    assert batched([case], out, "--studies", "sample") in (0, 5)  # 5: a box that could not grow
+    told = {0: 0, 5: 4}  # good, or in doubt: a box that could not grow
+    status = batched([case], out, "--studies", "sample")
     options = ["--output", str(own), "--no-pictures", "--quiet", "--store", str(out / "record")]
-    assert run("sample", str(case), *options) == 0
+    assert run("sample", str(case), *options) == told[status]
     for file in ("sample.json", "sample.csv", "sample_draws.csv"):
         assert (out / case.stem / file).read_bytes() == (own / file).read_bytes(), file
     numbers = result(out)["cases"][0]["studies"]["sample"]["quantities"]

@@ -13,7 +13,7 @@ from ..conftest import CASES
 from .test_cli import run
 
 CASE, DATA = str(CASES / "p235_75r17.yaml"), str(CASES / "p235_75r17_wheeler.csv")
-COARSE = ["--mesh", "coarse", "--draws", "20000"]
+COARSE = ["--mesh", "coarse", "--draws", "60000"]
 FILES = ("sample.json", "sample.csv", "sample_draws.csv", "sample_corner.png")
 
 pytestmark = pytest.mark.numbers
@@ -72,7 +72,7 @@ def test_targets_without_a_sigma_have_that_of_the_fit(
     fit, out = tmp_path / "fit", tmp_path / "out"
     assert run("fit", CASE, *shared, "--no-pictures", "--output", str(fit)) == 0
     command = ["sample", CASE, *shared, "--draws", "5000", "--no-pictures"]
-    assert run(*command, "--output", str(out)) == 0
+    assert run(*command, "--output", str(out)) == 4  # too few draws
     noise = json.loads((fit / "fit.json").read_text())["noise_Hz"]
     found = json.loads((out / "sample.json").read_text())
     assert found["noise_Hz"] == noise and not (out / "sample_corner.png").exists()
@@ -88,6 +88,7 @@ def test_targets_without_a_sigma_have_that_of_the_fit(
         (["--at-kPa", "2.4"], "--at-kPa 2.4: usual is 50 to 1200 kPa"),
         (["--measured", "no.csv"], "does not exist"),
         (["--measured", "mass.csv"], "no frequency of the unloaded tyre"),
+        (["--measured", "high.csv", "--mesh", "coarse", "--no-store"], "is it the right unit"),
         (["--solver", "calculix"], "gives no exact slopes"),
         (["--seed", "-1"], "0<=x"),
     ],
@@ -102,6 +103,7 @@ def test_what_is_refused(
     monkeypatch.chdir(tmp_path)
     head = Path(DATA).read_text().splitlines()[0]
     Path("mass.csv").write_text(f"{head}\nmass_kg,,,,,,,12.8,0.1\n")
+    Path("high.csv").write_text(f"{head}\nfrequency_Hz,2,0,,,240,0,200.0,1.0\n")
     assert run("sample", CASE, *given) == 2
     said = capsys.readouterr().err
     assert words in said and "Traceback" not in said

@@ -29,7 +29,7 @@ from tyrecal.studies.diagnose.observations import Observable, Observations, obse
 from tyrecal.studies.diagnose.regions import regions
 from tyrecal.studies.diagnose.result import diagnosis_result
 from tyrecal.studies.diagnose.separability import separate
-from tyrecal.studies.diagnose.study import _check_units, parse_change, spans_of, study
+from tyrecal.studies.diagnose.study import check_units, parse_change, spans_of, study
 from tyrecal.studies.diagnose.tyre_model import TyreModel, _key
 from tyrecal.studies.diagnose.uncertainties import DENSITY_PERCENT, PRESSURE_kPa, sources, values_of
 from tyrecal.studies.diagnose.verdict import decide
@@ -445,7 +445,7 @@ def test_what_is_not_even_near_the_model_is_refused() -> None:
         measured = (Observable("mass_kg", None, 0.0), Observable("frequency_Hz", *rows[0]))
         none = np.full(2, np.nan)
         y = np.log([12.0 * mass, 80.0 * frequency])
-        _check_units(model, Observations(measured, y, none, 0.0, none, none), [Path("a.csv")], ())
+        check_units(model, Observations(measured, y, none, 0.0, none, none), ["a.csv"], ())
 
     for good in (1.0, 1.99, 1 / 1.99):
         check(good, 1.0)
@@ -470,7 +470,7 @@ def test_a_model_without_an_answer_says_why_before_anything_is_judged() -> None:
     def check(answers: list, *changes: Toggle) -> None:
         told = lambda points: asked_for.append([dict(p.effects) for p in points]) or answers
         model: Any = SimpleNamespace(rows=rows, start=np.zeros(1), answers=told)
-        _check_units(model, seen, [Path("a.csv")], changes)
+        check_units(model, seen, ["a.csv"], changes)
 
     with pytest.raises(DeckRefused, match="no such tyre"):
         check([failure])

@@ -48,7 +48,7 @@ EXIT_CODES = {
     0: "done",
     EXIT_INPUT: "the input is wrong, or a file cannot be read or written",
     EXIT_SOLVER: "the solver failed",
-    EXIT_FIT: "the fit did not converge or did not move",
+    EXIT_FIT: "the fit did not converge or did not move, or a sample is in doubt",
     EXIT_BATCH: "some cases of a batch failed or drifted",
     130: "interrupted (Ctrl-C)",
     143: "terminated (SIGTERM)",

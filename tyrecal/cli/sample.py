@@ -69,6 +69,7 @@ def command(
     from ..studies.sample.chains import needs_emcee
     from ..studies.sample.result import draws_csv, result
     from ..studies.sample.study import SAMPLE_STAGES, check, modal, run
+    from .main import EXIT_FIT
 
     terminal = study.terminal
     needs_emcee()
@@ -109,7 +110,8 @@ def command(
         terminal.note(f"{measured}: {left_out} values are no frequencies of the unloaded tyre")
     for each in elsewhere:
         terminal.note(f"{measured}: not used: {each}")
-    for doubt in found.doubts():
+    doubts = found.doubts()
+    for doubt in doubts:
         terminal.warn(doubt)
     study.finish(output)
-    return 0
+    return EXIT_FIT if doubts else 0

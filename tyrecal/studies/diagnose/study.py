@@ -105,7 +105,7 @@ def study(
         spans[change.id] = _reaching(spans[change.id], change)
     found, assumed_sources = sources(case)
     model = TyreModel(case, evaluator, rows, found, spans, jobs)
-    _check_units(model, observations, [measured, *switched], changes)
+    check_units(model, observations, [str(measured), *map(str, switched)], changes)
     diagnosis = diagnose(
         model,
         rows,
@@ -225,11 +225,14 @@ def _check_copies(paths: Sequence[Path], runs: Mapping[Path, Sequence[Measuremen
             )
 
 
-def _check_units(
-    model: TyreModel, observations: Observations, paths: Sequence[Path], changes: Sequence[Toggle]
+def check_units(
+    model: TyreModel,
+    observations: Observations,
+    runs: Sequence[str],
+    changes: Sequence[Toggle] = (),
 ) -> None:
-    """Raises InputError where a value is not even near the model's start, paths being the
-    runs'; InputError where the model has no answer with what was switched."""
+    """Raises InputError where a value of one of the ``runs`` is not even near the model's start;
+    InputError where the model has no answer with what was switched."""
     set_to = [c for c in changes if not c.times and c.value != c.base]
     points = [Query(model.start, {c.id: c.value - c.base}) for c in set_to]
     answer, *others = model.answers([Query(model.start), *points])
@@ -244,11 +247,11 @@ def _check_units(
         ratio = exp(y - at[row.label, row.pressure_kPa])
         if row.label and not 1 / MAX_FREQUENCY_RATIO < ratio < MAX_FREQUENCY_RATIO:
             raise InputError(
-                f"{paths[row.run]}: {row} was measured {ratio:.2g} times as high as the model has"
+                f"{runs[row.run]}: {row} was measured {ratio:.2g} times as high as the model has"
                 " it; is it the right unit, mode and pressure?"
             )
         if not row.label and not 1 / MAX_MASS_RATIO < ratio < MAX_MASS_RATIO:
             raise InputError(
-                f"{paths[row.run]}: the mass is {ratio:.2g} times the model's; is it in kg, and of"
+                f"{runs[row.run]}: the mass is {ratio:.2g} times the model's; is it in kg, and of"
                 " the tyre without its rim?"
             )

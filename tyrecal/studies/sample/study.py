@@ -16,6 +16,7 @@ from ..diagnose.inverse_problem import Assumed, places
 from ..diagnose.model import Answer, ModelRow, Query
 from ..diagnose.observations import Observable, Observations, observe
 from ..diagnose.plain_fit import plain_fit
+from ..diagnose.study import check_units
 from ..diagnose.tyre_model import TyreModel
 from ..diagnose.uncertainties import Source, calibrated, sources
 from ..emulator import Emulator, emulator, needs_slopes
@@ -83,6 +84,7 @@ def run(
     )
     found, _ = sources(case)
     model = TyreModel(case, evaluator, known, found, {}, jobs)
+    check_units(model, observations, ["what was measured"])
     where = places(observations, known)
     x = plain_fit(model, observations, where)
     answer = _answer(model, x)
