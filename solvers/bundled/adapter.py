@@ -65,15 +65,20 @@ class Bundled:
             if decks.start is not None and name == f"{OLDJOB}.inp":
                 text += write_start(folder, decks.start)
             paths[-1].write_text(text, encoding="utf-8", newline="")
+        request = {k: decks.request[k] for k in REQUEST_KEYS if k in decks.request}
         if decks.loads_N:
-            return paths
-        request = {
-            "harmonics": list(range(decks.request["highest_harmonic"] + 1)),
-            "modes_per_harmonic": decks.request["modes_per_harmonic"],
-            "sensitivities": decks.tangents(self.dialect),
-            **{k: decks.request[k] for k in REQUEST_KEYS if k in decks.request},
-        }
-        paths.append(folder / f"{JOB}.request.json")
+            asked = bool(decks.request["loaded_modes"])
+            request = {k: v for k, v in request.items() if asked and k == "cavity"}
+            if not request:
+                return paths
+        else:
+            request = {
+                "harmonics": list(range(decks.request["highest_harmonic"] + 1)),
+                "modes_per_harmonic": decks.request["modes_per_harmonic"],
+                "sensitivities": decks.tangents(self.dialect),
+                **request,
+            }
+        paths.append(folder / f"{PRESS if decks.loads_N else JOB}.request.json")
         paths[-1].write_text(json.dumps(request), encoding="utf-8", newline="")
         return paths
 

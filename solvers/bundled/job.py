@@ -17,16 +17,18 @@ from .deck.request import Request, read_request, read_sector
 from .deck.start import read_start
 from .deck.steps import Deck, DeckStep
 from .frequency_step import FrequencyStep, Inflated
+from .modes.cavity import read_cavity
 from .modes.harmonics import HarmonicModes
 from .modes.wheel import free_along_load
 from .results import StepResult, write
 from .road import footprint_job
+from .road.pressed_cavity import cavity_modes
 from .section.boundary import keeps_half_turn, numbering
 from .section.inflation import equilibrium
 from .section.loads import loads, pressures
 from .section.mechanics import mass
 from .section.mesh import DeckMesh, read_mesh
-from .section.model import build
+from .section.model import Model, build
 
 
 def run(folder: Path, job: str, oldjob: str | None, time_limit: float = float("inf")) -> None:
@@ -146,7 +148,23 @@ class Job:
             self._check_time,
             vibrations,
         )
+        if self.tyre.request.cavity:
+            found |= self._cavity(model, found)
         return {"pressure_Pa": step.pressure, "mass_kg": self.mass_kg, **found}
+
+    def _cavity(self, model: Model, found: dict[str, Any]) -> dict[str, Any]:
+        """cavity_Hz of the first wave in the cavity: of the inflated tyre, and in each footprint
+        the two, fore-aft and vertical."""
+        assert self.tyre.request.cavity
+        air = read_cavity(self.tyre.section, model.mesh, self.tyre.request.cavity)
+        X, U = model.mesh.X, self.tyre.U
+        hertz = lambda u, angles: cavity_modes(air, X, u, angles).tolist()
+        footprints = [
+            {**each, "cavity_Hz": hertz(each["displacement"], found["angles"])}
+            for each in found["footprints"]
+        ]
+        free, _ = hertz(np.stack([U, U]), np.array([0.0, np.pi]))
+        return {"cavity_Hz": free, "footprints": footprints}
 
     def _vibrating(self, step: DeckStep) -> footprint_job.ModesAtLoad:
         """What a *FREQUENCY step on the road asks for."""

@@ -209,3 +209,36 @@ def test_the_deck_asks_for_modes_after_each_load() -> None:
     assert deck.count("*STEP, NAME=MODES_") == 2 == deck.count("NORMALIZATION=MASS\n24\n")
     steps = [line.split("NAME=")[1].split(",")[0] for line in deck.splitlines() if "*STEP" in line]
     assert steps == ["EQUILIBRIUM", "LOAD_1", "MODES_1", "LOAD_2", "MODES_2"]
+
+
+def test_the_cavitys_first_mode_stands_with_the_tyres() -> None:
+    """In the files, the tables and in words; without a gas in none of them."""
+    plain = [loaded(0.0, 80.0, 80.0, 1.0), loaded(500.0, 82.0, 84.0)]
+    waves = (186.0, 186.0), (185.1, 187.0)
+    filled = [replace(each, cavity_Hz=hertz) for each, hertz in zip(plain, waves, strict=True)]
+    for loads, count in ((plain, 0), (filled, 2)):
+        tyre = LoadedTyre(240.0, 12.0, tuple(loads))
+        sweep = load_sweep_result({"a": {}}, [0.0, 500.0], {"a": tyre})
+        one = loaded_modes_result({}, tyre)
+        assert [len(row.get("cavity", [])) for row in sweep.content()["rows"]] == [count, count]
+        assert len(one.content().get("cavity", [])) == count
+        cells = [row for row in sweep.tables()[0].rows if row[0] == "cavity"]
+        assert (
+            cells
+            == [
+                ["cavity", "fore-aft", "", "186.00", "185.10"],
+                ["cavity", "vertical", "", "186.00", "187.00"],
+            ][:count]
+        )
+        single = [row[:3] for row in one.tables()[0].rows if row[0] == "cavity"]
+        assert (
+            single == [["cavity", "fore-aft", "185.10"], ["cavity", "vertical", "187.00"]][:count]
+        )
+        assert len({len(row) for row in one.tables()[0].rows}) == 1
+        lines = [line for line in sweep.csv().splitlines() if "cavity" in line]
+        assert len(lines) == 2 * count
+        if lines:
+            assert lines[-1].startswith("a,500.0,0.0025,1,,cavity vertical,,187.0")
+        told = [w for w in (*sweep.sentences(), *one.sentences()) if "cavity" in w]
+        assert len(told) == count
+        assert all("fore-aft 185.1, vertical 187.0 Hz, split +1.9" in each for each in told)

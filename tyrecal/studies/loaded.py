@@ -44,7 +44,8 @@ class Loaded:
     """The tyre at one load: its named modes by rising frequency; ``unnamed``: members that no
     shape could be found for; ``disputed``: members that have another name where they are followed
     from the unloaded tyre in one stride; surface (ring, node, 3): where the shapes' points stand,
-    r, theta, z in m at their angles, deformed."""
+    r, theta, z in m at their angles, deformed; cavity_Hz: of the first wave in the cavity's
+    gas, fore and aft, and up and down; none: there is no gas."""
 
     load_N: float
     deflection_m: float
@@ -52,6 +53,7 @@ class Loaded:
     unnamed: tuple[Member, ...] = ()
     disputed: tuple[Member, ...] = ()
     surface: np.ndarray | None = field(default=None, compare=False, repr=False)
+    cavity_Hz: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -148,7 +150,8 @@ def _loaded_tyre(
     loads = _followed(pressed, where, wanted, shapes, hertz, case.case.road.friction)
     if with_zero:
         named = (LoadedMode(x, f, 1.0, 1.0) for x, f in hertz.items() if x.label in wanted)
-        loads = [Loaded(0.0, 0.0, _by_frequency(named)), *loads]
+        wave = () if pressed.cavity_Hz is None else (pressed.cavity_Hz,) * 2
+        loads = [Loaded(0.0, 0.0, _by_frequency(named), cavity_Hz=wave), *loads]
     return LoadedTyre(
         pressed.pressure_kPa, pressed.mass_kg, tuple(loads), pressed.failed, pressed.angles
     )
@@ -203,6 +206,7 @@ def _followed(
                 tuple(names[i] for i in chosen if place[i] < 0),
                 tuple(names[i] for i in chosen if 0 <= place[i] != straight.position[i]),
                 np.stack([R, 0 * R, Z], -1) + footprint.displacement[:, nodes],
+                () if footprint.cavity_Hz is None else tuple(map(float, footprint.cavity_Hz)),
             )
         )
     return loads

@@ -16,6 +16,7 @@ from .loaded import Loaded, LoadedMode, LoadedTyre, LoadOutcome, load_tyres, pro
 from .modes import ModesFindings, ModesResult
 from .result import (
     NAME_COLUMNS,
+    CavityMode,
     Column,
     Failed,
     ModeEntry,
@@ -38,6 +39,7 @@ class LoadRow(ResultPart):
     load_N: float
     deflection_m: float
     modes: list[ModeEntry]
+    cavity: list[CavityMode] = Field(default=[])
 
 
 class LoadFindings(ResultPart):
@@ -63,7 +65,7 @@ class LoadSweep(Result):
 
     def csv(self) -> str:
         keys = ["design", "load_N", "deflection_m", "c", "m", "kind", "symmetry", "frequency_Hz"]
-        rows = ({**row.model_dump(), **m.model_dump()} for row in self.rows for m in row.modes)
+        rows = ({**row.model_dump(), **m} for row in self.rows for m in _csv_modes(row))
         return csv_text([*keys, "overlap", "spanned", "sliding_Hz", "grip_mm"], rows)
 
     def tables(self) -> list[Table]:
@@ -88,7 +90,19 @@ class LoadSweep(Result):
             ]
             for key in order
         ]
+        for pair in zip(*(row.cavity for row in own), strict=False):
+            cells = [hertz[0].cell(each.frequency_Hz) for each in pair]
+            rows.append([*pair[0].named(), "", *cells])
         return Table([*NAME_COLUMNS, Column("symmetry", ""), *hertz], rows, f"{design}, Hz")
+
+
+def _csv_modes(row: LoadRow) -> list[dict[str, Any]]:
+    """The tyre's modes, and the cavity's, of the kinds "cavity fore-aft" and "cavity vertical"."""
+    cavity = [
+        {"c": 1, "kind": f"cavity {each.direction}", "frequency_Hz": each.frequency_Hz}
+        for each in row.cavity
+    ]
+    return [*(mode.model_dump() for mode in row.modes), *cavity]
 
 
 def run(
@@ -124,7 +138,10 @@ def loaded_modes_result(values: Mapping[str, float], tyre: LoadedTyre) -> ModesR
         variables=dict(values),
         deflection_m=last.deflection_m,
         modes=[_entry(mode) for mode in last.modes],
-        findings=ModesFindings(words=_held_by_friction([last]) + _doubts([last])),
+        **_cavity(last),
+        findings=ModesFindings(
+            words=_cavity_words([last]) + _held_by_friction([last]) + _doubts([last])
+        ),
     )
 
 
@@ -146,6 +163,7 @@ def load_sweep_result(
                 load_N=each.load_N,
                 deflection_m=each.deflection_m,
                 modes=[_entry(mode) for mode in each.modes],
+                **_cavity(each),
             )
             for name, tyre in tyres.items()
             for each in tyre.loads
@@ -170,6 +188,22 @@ def _entry(mode: LoadedMode) -> ModeEntry:
     ).model_copy(update={key: hertz for key, hertz in with_friction.items() if hertz is not None})
 
 
+def _cavity(loaded: Loaded) -> dict[str, Any]:
+    """The field of a result, where there is a gas."""
+    return {"cavity": CavityMode.pair(loaded.cavity_Hz)} if loaded.cavity_Hz else {}
+
+
+def _cavity_words(loads: Sequence[Loaded]) -> list[str]:
+    """How far the last load splits the cavity's first mode."""
+    if not loads or not loads[-1].cavity_Hz:
+        return []
+    fore_aft, vertical = loads[-1].cavity_Hz
+    return [
+        f"the cavity's first mode at {loads[-1].load_N:g} N, between rigid walls: fore-aft"
+        f" {fore_aft:.1f}, vertical {vertical:.1f} Hz, split {vertical - fore_aft:+.1f}"
+    ]
+
+
 def findings(design: str, loads: Sequence[Loaded]) -> LoadFindings:
     """Whether splits grow with the load, which frequencies fall, how far shapes change."""
     tables = {
@@ -180,7 +214,7 @@ def findings(design: str, loads: Sequence[Loaded]) -> LoadFindings:
     splits = [_split(label, tables) for label in labels]
     loaded = [mode for each in loads if each.load_N for mode in each.modes]
     least = min(loaded, key=lambda mode: mode.overlap, default=None)
-    words = _splitting(splits) + _rising(tables)
+    words = _splitting(splits) + _rising(tables) + _cavity_words(loads)
     if least:
         words.append(
             f"least overlap of a loaded shape with the unloaded one of its name:"

@@ -10,7 +10,7 @@ from pydantic import Field
 from ..simulate.evaluate.results import Evaluation
 from ..simulate.modes.label import Mode, labelled
 from ..tyre.case import LoadedCase
-from .result import NAME_COLUMNS, Column, ModeEntry, Result, ResultPart, Table
+from .result import NAME_COLUMNS, CavityMode, Column, ModeEntry, Result, ResultPart, Table
 
 if TYPE_CHECKING:
     from ..simulate.evaluate.evaluator import Evaluator
@@ -38,6 +38,7 @@ class ModesResult(Result):
     variables: dict[str, float]
     deflection_m: float | None = None
     modes: Annotated[list[ModeEntry], Field(min_length=1)]
+    cavity: list[CavityMode] = Field(default=[])  # of the tyre on the road
     findings: ModesFindings = ModesFindings()
 
     def tables(self) -> list[Table]:
@@ -54,6 +55,8 @@ class ModesResult(Result):
             ]
             for m in self.modes
         ]
+        gap = [None] * len(extra)
+        rows += [[*c.named(), columns[2].cell(c.frequency_Hz), *gap] for c in self.cavity]
         load = f", {self.load_N:g} N" if self.load_N else ""
         title = f"{self.pressure_kPa:g} kPa{load}, {self.mass_kg:.2f} kg"
         return [Table(columns, rows, title, str(self.provenance or ""))]

@@ -237,6 +237,23 @@ class ModeEntry(Named):
     d_ln_f_d_ln_p: float | None = None
 
 
+class CavityMode(ResultPart):
+    """A member of the first wave round the cavity, between rigid walls."""
+
+    direction: Literal["fore-aft", "vertical"]  # in which the gas pushes the wheel
+    frequency_Hz: PositiveNumber
+
+    @classmethod
+    def pair(cls, hertz: Sequence[float]) -> list[CavityMode]:
+        """Of the two frequencies (fore-aft, vertical), or none."""
+        names: tuple[Literal["fore-aft", "vertical"], ...] = ("fore-aft", "vertical")
+        return [cls(direction=d, frequency_Hz=f) for d, f in zip(names, hertz, strict=False)]
+
+    def named(self) -> list[str]:
+        """The cells of `NAME_COLUMNS`."""
+        return ["cavity", self.direction]
+
+
 def csv_text(keys: Sequence[str], rows: Iterable[Mapping[str, Any]], end: str = "\n") -> str:
     """Rows as CSV, all digits."""
     text = io.StringIO(newline="")

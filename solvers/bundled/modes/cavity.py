@@ -90,14 +90,14 @@ def coupling(air: GasCavity, X: Array, U: Array, n: int) -> Coupling:
     walls = [elements.lines(X, surface.connectivity, POINTS_ALONG) for surface in air.surfaces]
     wall = [(lines, *surface_point(lines, U)) for lines in walls]
     radii = [np.sqrt(x[..., 0] ** 2 + x[..., 1] ** 2) for _, x, _ in wall]
-    box = [_middle(radii), _middle([x[..., 2] for _, x, _ in wall])]
+    box = [middle(radii), middle([x[..., 2] for _, x, _ in wall])]
     centre = box[0][0]
     C: Array = np.zeros((_count(), *U.shape), kind)
     Q = np.zeros((_count(), _count()), kind)
     H = np.zeros_like(Q)
     for (lines, x, dx), r in zip(wall, radii, strict=True):
         z, dz = x[..., 2], dx[..., 2]
-        psi, _ = _monomials(r, z, box)
+        psi, _ = monomials(r, z, box)
         swept = cross(dx, x @ SPIN_AXIS.T) * lines.weights[..., None]  # n dA
         parts = np.einsum("egk,egi,ga->keai", psi, swept, lines.N)
         for k, part in enumerate(parts):
@@ -105,7 +105,7 @@ def coupling(air: GasCavity, X: Array, U: Array, n: int) -> Coupling:
         # int f dr dz = -closed line integral of (int f dr) dz, from the centre outwards
         rho = centre + (r - centre)[..., None] * ACROSS
         weights = -((r - centre) * dz * lines.weights)[..., None] * ACROSS_WEIGHTS * rho
-        psi, slopes = _monomials(rho, z[..., None] + 0 * rho, box)
+        psi, slopes = monomials(rho, z[..., None] + 0 * rho, box)
         Q += _integral(weights, psi)
         H += _integral(weights, slopes[..., 0]) + _integral(weights, slopes[..., 1])
         H += _integral(n * n * weights / rho**2, psi)
@@ -122,14 +122,14 @@ def _count() -> int:
     return (MONOMIAL_DEGREE + 1) * (MONOMIAL_DEGREE + 2) // 2
 
 
-def _middle(values: list[Array]) -> tuple[float, float]:
+def middle(values: list[Array]) -> tuple[float, float]:
     """Middle and half width of a range."""
     low = min(float(v.real.min()) for v in values)
     high = max(float(v.real.max()) for v in values)
     return (low + high) / 2, (high - low) / 2
 
 
-def _monomials(r: Array, z: Array, box: list[tuple[float, float]]) -> tuple[Array, Array]:
+def monomials(r: Array, z: Array, box: list[tuple[float, float]]) -> tuple[Array, Array]:
     """Values (..., k) and slopes (..., k, 2) of x^i y^j, the constant first; x and y from -1 to 1
     over the section's box."""
     x, y = ((p - middle) / half for p, (middle, half) in zip((r, z), box, strict=True))

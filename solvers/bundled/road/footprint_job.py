@@ -1,12 +1,13 @@
 """The job that presses the inflated tyre on the road: what its deck asks, its steps, its results.
 
 JOB.json: pressure_Pa, mass_kg, free_radius_m, failure, cause, ``footprints`` [load_N, road_N, rim_N
-(x down, y, z), deflection_m, stiffness_N_per_m, contact_area_m2]. JOB.npz: nodes, points, angles of
-the whole tyre, and per footprint i the arrays of its patch and the displacement, as NAME_i; where
-modes were asked for: mode_frequency_Hz (m,), mode_shape (m, ring, node, 3) at mode_node, modal mass
-1 kg; with friction the patch's forces along the road in these, mode_traction_N (m,), their sizes
-summed, and sliding_frequency_Hz, sliding_shape of the same tyre while nothing holds the patch along
-the road.
+(x down, y, z), deflection_m, stiffness_N_per_m, contact_area_m2]; with a gas cavity_Hz of the
+cavity's first wave, free and in ``footprints`` (fore-aft, vertical). JOB.npz: nodes, points, angles
+of the whole tyre, and per footprint i the arrays of its patch and the displacement, as NAME_i;
+where modes were asked for: mode_frequency_Hz (m,), mode_shape (m, ring, node, 3) at mode_node,
+modal mass 1 kg; with friction the patch's forces along the road in these, mode_traction_N (m,),
+their sizes summed, and sliding_frequency_Hz, sliding_shape of the same tyre while nothing holds the
+patch along the road.
 """
 
 from __future__ import annotations

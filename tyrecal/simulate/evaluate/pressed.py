@@ -31,6 +31,8 @@ class Footprint:
     displacement, at the nodes mode_node (j,) only. Of a road with friction, in which these modes
     stick: mode_traction_N (m,), the patch's forces along the road in each shape, their sizes
     summed; and the modes of a patch that slides freely, sliding_frequency_Hz and sliding_shape.
+    With a gas in the cavity: cavity_Hz (2,), its first wave fore and aft, and up and down, between
+    rigid walls.
     """
 
     load_N: float
@@ -55,6 +57,7 @@ class Footprint:
     mode_traction_N: Array | None = None
     sliding_frequency_Hz: Array | None = None
     sliding_shape: Array | None = None
+    cavity_Hz: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -63,7 +66,8 @@ class Pressed:
 
     nodes (n,): deck numbers; points (n, 2): R, Z in m, not inflated; angles (k,): of the rings,
     rad from the patch's middle, 0 <= angle < 2 pi; free_radius_m: inflated, without a load.
-    failed: why the load after the last footprint was not reached, or None.
+    failed: why the load after the last footprint was not reached, or None. cavity_Hz: of the first
+    wave in the cavity before any load, where there is a gas.
     """
 
     pressure_kPa: float
@@ -74,6 +78,7 @@ class Pressed:
     free_radius_m: float
     footprints: tuple[Footprint, ...]
     failed: EvaluationFailed | None = None
+    cavity_Hz: float | None = None
 
 
 def pressed(
@@ -110,6 +115,7 @@ def pressed(
         failed=EvaluationFailed(answer.get("cause", "no_equilibrium"), words, kept)
         if words
         else None,
+        cavity_Hz=answer.get("cavity_Hz"),
     )
 
 

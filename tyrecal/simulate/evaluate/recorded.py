@@ -121,6 +121,7 @@ class _Footprint(_Part):
     mode_traction_N: Triple | None = None
     sliding_frequency_Hz: Triple | None = None
     sliding_shape: Annotated[Any, _shaped(REAL, None, None, None, 3)] | None = None
+    cavity_Hz: Annotated[Any, _shaped(REAL, 2, least=0.0)] | None = None
 
 
 def _shape(array: Any) -> tuple[int, ...]:
@@ -131,6 +132,7 @@ class _Pressed(_Tyre):
     angles: Triple
     free_radius_m: PositiveFinite
     footprints: Annotated[list[_Footprint], Field(min_length=1)]
+    cavity_Hz: PositiveFinite | None = None
     failure: Annotated[str, Field(max_length=100_000)]
     cause: Literal["no_equilibrium", "unstable"] = "no_equilibrium"
 

@@ -33,7 +33,8 @@ EFFECT = Effect(
         "all down, [0,0] torsional most: -1.5 % at +15 K, [2,1] and [3,1] -1 %, [0,0] "
         "lateral least; just as C10"
     ),
-    toggle="measure again with the tyre soaked at another temperature, at the same pressure",
+    toggle="measure again with the tyre soaked at another temperature, at the same pressure "
+    "(sealed, 15 K warmer, it gains 17 kPa at 240 kPa: +2.5 %)",
     aliases=("dynamic_stiffening", "sidewall_gauge"),
     add=add,
 )
