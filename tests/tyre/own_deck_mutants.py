@@ -242,7 +242,7 @@ def judged(folder: Path, text: str, flat: str) -> str:
 
 def draw(count: int, seed: int) -> list[tuple[str, str, str, str]]:
     """Kind, style, judgement and text of each mutant."""
-    random, found = Random(seed), []
+    random, found = Random(seed), list[tuple[str, str, str, str]]()
     styles = {"plain": own_decks.plain, **own_decks.STYLES}
     del styles["millimetres"], styles["free_format"]  # of the same words as others
     with TemporaryDirectory() as folder:

@@ -2,24 +2,26 @@
 
 from __future__ import annotations
 
+import json
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from tyrecal.cli.main import main
 from tyrecal.simulate.deck.own import trial
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.tyre.case import start_values
 from tyrecal.tyre.case.own_case import own_case
 from tyrecal.tyre.load import load_case
+from tyrecal.tyre.own_deck.flat import Flat
 from tyrecal.tyre.own_deck.own_deck import read_own_deck
 from tyrecal.tyre.own_deck.text import OwnDeckError
 from tyrecal.tyre.values import with_values
 
-from . import own_decks
-
-MM = {"millimetres"}
+from . import own_deck_mutants, own_decks
 
 
 def write(folder: Path, text: str) -> Path:
@@ -133,3 +135,71 @@ def test_refused_by_line(text: str, tmp_path: Path) -> None:
     path.write_text(whole.replace(text, other, 1))
     with pytest.raises(OwnDeckError, match=r"^tyre.inp, line \d+: .*" + words):
         trial(read_own_deck(path).flat({}))
+
+
+def test_laws_and_elements_in_either_units(tmp_path: Path) -> None:
+    """Every law's constants are converted; hybrid elements take incompressible rubber."""
+    laws = {
+        "YEOH": ((1e6, -2e5, 5e4), (-1,) * 3),
+        "NEO HOOKE": ((1e6, 5e-8), (-1, 1)),
+        "ARRUDA-BOYCE": ((2e6, 3.0), (-1, 0)),
+        "OGDEN, N=2": ((2e6, 2.0, 1e5, -2.0), (-1, 0, -1, 0)),
+        "REDUCED POLYNOMIAL, N=2": ((1e6, 1e4, 5e-8, 5e-8), (-1, -1, 1, 1)),
+        "POLYNOMIAL, N=2": ((8e5, 2e5, 1e4, 1e4, 1e4), (-1,) * 5),
+    }
+    for law, (constants, powers) in laws.items():
+        texts = []
+        for style, scale in ((own_decks.plain, 1.0), (own_decks.millimetres, 1e6)):
+            row = ", ".join(repr(x * scale**p) for x, p in zip(constants, powers, strict=True))
+            text = re.sub(r"MOONEY-RIVLIN(.*)\n.*", rf"{law}\1\n{row}", style())
+            (tmp_path / "tyre.inp").write_text(text.replace("CGAX8R,", "CGAX8RH,"))
+            texts.append(read_own_deck(tmp_path / "tyre.inp").flat({}))
+            assert trial(texts[-1]) == pytest.approx(9.3377, rel=1e-5)
+        for first, other in zip(*map(numbers_of, texts), strict=True):
+            assert other == pytest.approx(first, rel=1e-12)
+
+
+def numbers_of(flat: Flat) -> list[list[float]]:
+    """Of the data lines of the materials, and the nodes' coordinates."""
+    lines = flat.lines[flat.lines.index("*MATERIAL, NAME=RUBBER") :]
+    rows = [line.split(",") for line in lines if not line.startswith("*")]
+    nodes = [x for point in flat.mesh.nodes.values() for x in point]
+    return [[float(x) for row in rows for x in row], nodes]
+
+
+def test_wrong_decks_are_refused_by_line_or_are_the_same(request: pytest.FixtureRequest) -> None:
+    """None is computed otherwise."""
+    found = own_deck_mutants.draw(25, request.config.getoption("--seed"))
+    wrong = [(kind, style, how) for kind, style, how, _ in found if how not in ("refused", "same")]
+    assert not wrong
+    assert sum(how == "refused" for _, _, how, _ in found) >= 20
+
+
+def test_what_stays_the_same_is_built_once(tmp_path: Path) -> None:
+    """A layer's area, a constant, a parameter of either: the mesh is the one that was."""
+    (tmp_path / "tyre.inp").write_text(own_decks.parameters())
+    deck = read_own_deck(tmp_path / "tyre.inp")
+    meshes = [
+        deck.flat(numbers).mesh
+        for numbers in ({}, {"parameter / area": 3e-7}, {"material CORD / ELASTIC / E": 1e9})
+    ]
+    assert meshes[0] is meshes[1] is meshes[2]
+
+
+@pytest.mark.slow
+def test_studies_take_such_a_case(tmp_path: Path) -> None:
+    """A sweep follows the pressure, a footprint bears the load, the rest is refused by name."""
+    case = write(tmp_path, own_decks.cae())
+
+    def run(*words: str) -> int:
+        with pytest.raises(SystemExit) as ended:
+            main([*words, "--quiet", "--output", str(tmp_path / "out"), "--no-store"])
+        return int(ended.value.code or 0)
+
+    pressures = ("--from-kPa", "150", "--to-kPa", "250", "--steps", "2")
+    assert run("sweep-pressure", str(case), *pressures) == 0
+    assert run("footprint", str(case), "--loads-N", "500") == 0
+    rows = json.loads((tmp_path / "out" / "footprint.json").read_text())["rows"]
+    assert rows[0]["area_m2"] * rows[0]["mean_pressure_Pa"] == pytest.approx(500, rel=1e-6)
+    assert run("modes", str(case), "--set", "effects.bead_filler=0.5") == 2
+    assert run("modes", str(case), "--solver", "calculix") == 2

@@ -150,7 +150,8 @@ def command(
     study.finish(run)
     file = shlex.quote(str(measured)) if measured else "FILE"
     next_ = f"tyrecal diagnose {shlex.quote(str(case))} --measured {file}"
-    terminal.say(f"next: {next_} says what the model lacks")
+    if not loaded.deck:
+        terminal.say(f"next: {next_} says what the model lacks")
     return 0 if good else EXIT_FIT
 
 

@@ -13,6 +13,7 @@ from ...measured.measurement import Measurement
 from ...measured.tables import read_measurements
 from ...measured.targets import on_own_rim
 from ...simulate.evaluate.evaluator import Evaluator
+from ...simulate.evaluate.failure import DeckRefused
 from ...tyre.case import LoadedCase
 from ...tyre.case.mistakes import suggestion
 from ...tyre.effects import catalogue
@@ -154,8 +155,13 @@ def spans_of(
 ) -> tuple[dict[str, Span], list[str]]:
     """Effects that the evaluator's solver can express, and ids of those that it cannot.
 
-    Raises ValueError where one of ``ids`` is no effect.
+    Raises ValueError where one of ``ids`` is no effect; DeckRefused for a deck of one's own.
     """
+    if case.deck:
+        raise DeckRefused(
+            "a diagnosis weighs effects that change lines and rubbers of a section: a deck of one's"
+            " own has none of these"
+        )
     able, unable = {}, []
     for id in ids or ():
         if id not in catalogue():

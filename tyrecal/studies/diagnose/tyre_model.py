@@ -50,11 +50,6 @@ class TyreModel:
         spans: Mapping[str, Span],
         jobs: int = 1,
     ):
-        if case.deck:
-            raise DeckRefused(
-                "a diagnosis weighs effects that change lines and rubbers of a section: a deck of"
-                " one's own has none of these"
-            )
         if not evaluator.has_gradients and "gradients" in evaluator.solver.capabilities:
             raise DeckRefused(
                 "with what the case has in it (a splice) the solver gives no exact slopes, which a"

@@ -100,6 +100,7 @@ def flatten(found: Sorted, model: Model, length: float, mass: float) -> Flat:
     mesh = _mesh(model, length)
     write = _Writer(length, mass)
     blocks = _materials(found.model)
+    options = _options(found.model)
     used: dict[str, str] = {}
     rubbers, plies = [], list[Ply]()
     for k, section in enumerate(model.solids, start=1):
@@ -108,7 +109,7 @@ def flatten(found: Sorted, model: Model, length: float, mass: float) -> Flat:
         controls = section.block.get("CONTROLS")
         more = f", CONTROLS={controls}" if controls else ""
         write.line(f"*SOLID SECTION, ELSET=SOLID_{k}, MATERIAL={name}{more}", section.block.place)
-        for option in section.options:
+        for option in options[section.block]:
             if option.name != "HOURGLASS STIFFNESS":
                 raise option.refused("does not belong under a *SOLID SECTION")
             write.block(option, "*HOURGLASS STIFFNESS")
@@ -116,7 +117,9 @@ def flatten(found: Sorted, model: Model, length: float, mass: float) -> Flat:
             raise section.block.refused("takes no more than one data line", section.block.rows[1])
     for k, section in enumerate(model.plies, start=1):
         write.line(f"*SURFACE SECTION, ELSET=PLY_{k}", section.block.place)
-        for option in section.options:
+        if not options[section.block]:
+            raise section.block.refused("without *REBAR LAYER it holds nothing: delete it")
+        for option in options[section.block]:
             plies += _layers(write, section, k, option, blocks, used, mesh, length)
     for block in found.model:
         if block.name == "SECTION CONTROLS":
@@ -180,6 +183,19 @@ class _Writer:
                 if scale != 1.0 and text:
                     fields[j] = written(row.number(j) * scale)
             self.line(", ".join(fields), row.place)
+
+
+def _options(blocks: Sequence[Block]) -> dict[Block, list[Block]]:
+    """What stands under each section option: *REBAR LAYER, or *HOURGLASS STIFFNESS."""
+    found: dict[Block, list[Block]] = {}
+    section: Block | None = None
+    for block in blocks:
+        if block.name in ("SOLID SECTION", "SURFACE SECTION"):
+            section = block
+            found[section] = []
+        elif section and block.name in SECTION_OPTIONS:
+            found[section].append(block)
+    return found
 
 
 def _materials(blocks: Sequence[Block]) -> dict[str, list[Block]]:

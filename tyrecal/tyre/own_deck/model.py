@@ -19,10 +19,9 @@ Face = tuple[int, str, tuple[int, ...]]  # of a solid: its number, the face, its
 
 @dataclass(frozen=True, eq=False)
 class Assigned:
-    """A section option with what stands under it, and its elements."""
+    """A section option and its elements."""
 
     block: Block
-    options: tuple[Block, ...]  # *REBAR LAYER, or *HOURGLASS STIFFNESS
     name: str  # of the element set
     elements: tuple[int, ...]
 
@@ -50,7 +49,7 @@ class _Made:
     """What is collected on the way."""
 
     root: Scope = field(default_factory=Scope)
-    sections: list[tuple[Block, list[Block], str]] = field(default_factory=list)  # prefix
+    sections: list[tuple[Block, str]] = field(default_factory=list)  # with names' prefix
     surfaces: dict[str, tuple[Block, str]] = field(default_factory=dict)
     rules: list[tuple[Block, str]] = field(default_factory=list)  # rigid bodies, ties, embedded
     held: list[Block] = field(default_factory=list)
@@ -168,9 +167,7 @@ def _other(made: _Made, block: Block, prefix: str, parts: dict[str, _Part]) -> N
                 return
         raise block.refused(f"the instance {block.get('INSTANCE')} is not defined above")
     if name in ("SOLID SECTION", "SURFACE SECTION"):
-        made.sections.append((block, [], prefix))
-    elif name in ("REBAR LAYER", "HOURGLASS STIFFNESS"):
-        made.sections[-1][1].append(block)
+        made.sections.append((block, prefix))
     elif name == "SURFACE":
         if prefix + block.need("NAME") in made.surfaces:
             raise block.refused(f"the surface {block.get('NAME')} is defined twice")
@@ -253,7 +250,7 @@ class _Builder:
         """Section options with their elements; every element has one."""
         owner: dict[int, Block] = {}
         solids, plies = list[Assigned](), list[Assigned]()
-        for block, options, prefix in self.made.sections:
+        for block, prefix in self.made.sections:
             name = prefix + block.need("ELSET")
             elements = self.root.elements_in(name, block)
             if not elements:
@@ -269,11 +266,7 @@ class _Builder:
                         f"element {n} has a section already, at {before.file}, line {before.line}"
                     )
                 owner[n] = block
-            (solids if solid else plies).append(
-                Assigned(block, tuple(options), name, tuple(elements))
-            )
-            if not solid and not options:
-                raise block.refused("a surface without *REBAR LAYER holds nothing: delete it")
+            (solids if solid else plies).append(Assigned(block, name, tuple(elements)))
         for n, element in self.root.elements.items():
             if n not in owner and not element.kind.startswith("RAX"):
                 need = "*SOLID SECTION" if element.is_solid else "*SURFACE SECTION"
@@ -575,10 +568,7 @@ class _Builder:
                 element.kind, reflected(element, nodes), element.block, element.row
             )
         both = lambda each: Assigned(
-            each.block,
-            each.options,
-            each.name,
-            each.elements + tuple(n + further for n in each.elements),
+            each.block, each.name, each.elements + tuple(n + further for n in each.elements)
         )
         for n, face, nodes in pressed:
             turned = tuple(image[self.same.get(m, m)] for m in nodes)[::-1]

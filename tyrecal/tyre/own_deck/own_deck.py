@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from . import numbers as numbers_of
-from .flat import Flat, flatten
+from .flat import SECTION_OPTIONS, Flat, flatten
 from .grammar import MESH, NO_EFFECT, Sorted, sort
 from .model import Model, build
 from .text import Block, OwnDeckError, Place, read_blocks
@@ -20,8 +20,9 @@ Units = Literal["m", "mm"]
 UNIT_LENGTH = {"m": 1.0, "mm": 1e-3}  # of a unit of length, m
 UNIT_MASS = {"m": 1.0, "mm": 1e3}  # of a unit of mass, kg: mm, t, s, MPa
 DENSITIES = {"m": (300.0, 2e4), "mm": (3e-10, 2e-8)}  # of tyres' materials
-TOPOLOGY = {*MESH, "PART", "END PART", "INSTANCE", "END INSTANCE", "ASSEMBLY", "END ASSEMBLY"}
-TOPOLOGY |= {"SYMMETRIC MODEL GENERATION", "BOUNDARY", "DSLOAD", "DLOAD"}
+TOPOLOGY = {"PART", "END PART", "INSTANCE", "END INSTANCE", "ASSEMBLY", "END ASSEMBLY"}
+TOPOLOGY |= {"SYMMETRIC MODEL GENERATION", "BOUNDARY", "DSLOAD", "DLOAD", *MESH}
+TOPOLOGY -= {*SECTION_OPTIONS}
 
 
 @dataclass(eq=False)
@@ -32,6 +33,7 @@ class OwnDeck:
     units: Units
     blocks: tuple[Block, ...]
     _models: dict[tuple[Block, ...], Model] = field(default_factory=dict, repr=False)
+    _filled: dict[int, Block] = field(default_factory=dict, repr=False)
 
     @cached_property
     def places(self) -> dict[str, tuple[int, int, int]]:
@@ -42,6 +44,11 @@ class OwnDeck:
     def marks(self) -> dict[str, Block]:
         """Its marks."""
         return numbers_of.marks(self.blocks)
+
+    @cached_property
+    def _marked(self) -> set[int]:
+        """Places of the blocks whose numbers hang on marks or parameters."""
+        return {k for k, block in enumerate(self.blocks) if numbers_of.is_marked(block)}
 
     @cached_property
     def numbers(self) -> dict[str, float]:
@@ -87,12 +94,21 @@ class OwnDeck:
         for place, block in enumerate(self.blocks):
             if place in changes:
                 block = numbers_of.replaced(block, changes[place])
-            if numbers_of.is_marked(block):
-                block = numbers_of.filled(block, numbers, known)
+            if place in self._marked:
+                block = self._same(place, numbers_of.filled(block, numbers, known))
             if block.name == "PARAMETER":
                 numbers_of.parameters(block, known)
             result.append(block)
         return result
+
+    def _same(self, place: int, block: Block) -> Block:
+        """A block, or the one that was there last where it says the same."""
+        last = self._filled.get(place, block)
+        rows = [[row.fields for row in each.rows] for each in (block, last)]
+        if last.parameters != block.parameters or rows[0] != rows[1]:
+            last = block
+        self._filled[place] = last
+        return last
 
     def model(self, found: Sorted) -> Model:
         """The section of sorted blocks, remembered while the mesh's own stay the same."""

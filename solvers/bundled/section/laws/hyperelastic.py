@@ -72,7 +72,8 @@ class Hyperelastic(EnergyLaw):
     def of_points(cls, laws: Sequence[Self], owner: Array) -> Self:
         """One law of many points, each of which has the constants of one of ``laws``."""
         names = (*cls.shear_moduli, *cls.bulk_moduli, *cls.numbers)
-        table = np.array([[getattr(law, name) for law in laws] for name in names])[:, owner]
+        constants = [[np.ravel(getattr(law, name))[0] for law in laws] for name in names]
+        table = np.array(constants)[:, owner]
         return cls(**dict(zip(names, table, strict=True)))
 
     @property
