@@ -378,3 +378,20 @@ def test_the_way_to_incompressible_rubber_is_one_of_two(monkeypatch: pytest.Monk
 def test_incompressible_rubber_needs_hybrid_elements() -> None:
     with pytest.raises(DeckError, match="CGAX8R would lock, CGAX8RH does not"):
         run(tyre("CGAX8R", "0"))
+
+
+def test_incompressible_rubber_starts_near_a_shape_at_full_bulk() -> None:
+    """From its own shape there is nothing to do; from that of softer rubber a few steps."""
+    pair = tyre("CGAX8RH", "0")
+    shapes = []
+    for C in ("1000000", "900000"):
+        text = pair["inflate"].replace("1000000, 0, 0", f"{C}, 0, 0")
+        job = Job(Deck({**pair, "inflate": text}, "modes", "inflate"), Request())
+        job._static(job.steps[0])
+        index = job.model.mesh.index
+        shapes.append(np.column_stack([sorted(index, key=index.__getitem__), job.tyre.U]))
+    for shape, most in zip(shapes, (0, 5), strict=True):
+        job = Job(Deck(pair, "modes", "inflate"), Request(), start=shape)
+        job._static(job.steps[0])
+        assert job.factorisations <= most
+        np.testing.assert_allclose(job.tyre.U, shapes[0][:, 1:], atol=1e-8)

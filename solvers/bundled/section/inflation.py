@@ -25,7 +25,7 @@ MAX_ITERATIONS = 30
 MAX_QUICK_ITERATIONS = 11  # iterations after which another path is likely to be shorter
 STIFFENING = 8.0  # multiple of the rubber's stiffness that inflates without trouble
 SECTION_RADIUS = 0.3  # meridional radius of curvature over the section's height, for the start
-EASED = 100.0  # bulk over shear modulus of rubber that inflates in few iterations
+EASED = 300.0  # bulk over shear modulus of rubber that inflates in few iterations
 MIN_INERTIA, MAX_INERTIA = 4e5, 4e15  # of the inertia that holds back a wrinkling path, rad2/s2
 TENSION_FACTOR = 0.05  # factor on the artificial tension from one iteration to the next
 
@@ -52,23 +52,24 @@ def equilibrium(
     Raises NoEquilibrium with the pressure that was reached.
     """
     solve = _Solver(model, numbering, loads)
-    laws = [
-        p.law for p in model.parts if isinstance(p, Elastic) and isinstance(p.law, Hyperelastic)
-    ]
-    tightest = max((law.bulk_over_shear.max() for law in laws), default=0.0)
-    if tightest > EASED:
-        solve.model = model.with_laws(methodcaller("eased", EASED))
-        start, guess, solve.model = _reached(solve, start, check, guess), None, model
-    return _reached(solve, start, check, guess), solve.factorisations
-
-
-def _reached(solve: _Solver, start: Array, check: Callable[[], None], guess: Array | None) -> Array:
-    U, numbering = None, solve.numbering
+    parts = [part for part in model.parts if isinstance(part, Elastic)]
+    laws = [part.law for part in parts if isinstance(part.law, Hyperelastic)]
+    tight = any((law.bulk_over_shear > EASED).any() for law in laws)
+    if tight and guess is None and start.any():
+        guess = start
     if guess is not None:
         held = numbering.spread(numbering.gather(guess))  # 0 at the rim
         U = solve(held, 1.0, 1.0, MAX_QUICK_ITERATIONS)
-    if U is None:
-        U = solve(start, 1.0, 1.0, MAX_QUICK_ITERATIONS if solve.pressures else MAX_ITERATIONS)
+        if U is not None:
+            return U, solve.factorisations
+    if tight:
+        solve.model = model.with_laws(methodcaller("eased", EASED))
+        start, solve.model = _reached(solve, start, check), model
+    return _reached(solve, start, check), solve.factorisations
+
+
+def _reached(solve: _Solver, start: Array, check: Callable[[], None]) -> Array:
+    U = solve(start, 1.0, 1.0, MAX_QUICK_ITERATIONS if solve.pressures else MAX_ITERATIONS)
     if U is None:
         check()
         U = _by_stiffness(solve, start, check)
