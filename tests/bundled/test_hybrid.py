@@ -126,6 +126,22 @@ def test_force_and_stiffness_are_derivatives(bent: tuple[Hybrid, Array]) -> None
         np.testing.assert_allclose(own, its, atol=1e-11 * abs(K0).max())
 
 
+def test_a_law_of_frequency(bent: tuple[Hybrid, Array]) -> None:
+    """K at another shear modulus is K and its growth, about a state that is strained."""
+    part, U = bent
+    law, points = part.law, part.rows.weights.size
+    assert isinstance(law, Hyperelastic)
+    tabled = replace(part, law=replace(law, table=np.zeros(points, int)))
+    grown = tabled.growing(0)
+    assert grown is not None and tabled.growing(1) is not None
+    stiff = replace(law, shear_ratio=np.full(points, 1.4), bulk_ratio=np.ones(points))
+    whole = replace(part, law=stiff).tangents(U, True)
+    for K, one, more in zip(whole, part.tangents(U, True), grown.tangents(U, True), strict=True):
+        np.testing.assert_allclose(K, one + 0.4 * more, atol=1e-10 * abs(whole[0]).max())
+    other = tabled.growing(1)
+    assert other is not None and not np.any(other.tangents(U, False)[0])
+
+
 def test_at_stations_as_in_the_section(bent: tuple[Hybrid, Array]) -> None:
     """Force and tangents of a state that is the same all round; K1 is the station's less its
     transpose; products with fields are derivatives of the force, the tangents those of products;
