@@ -270,17 +270,12 @@ class ContactNewton:
         return gmres(product, precondition, right, tolerance, MAX_GMRES, begin)
 
     def _form(self, contact: Contact) -> ContactUpdate:
-        """The preconditioner at the last state; where that is unstable, the one before stays."""
+        """The preconditioner at the last state. Raises Indefinite; the one before is gone, as two
+        at a time would double the memory."""
         self.factorisations += 1
-        self._stale = False
+        self._stale, self._factor = False, None
         stiffness = self.symmetry.fold(contact.matrix(positive=True))
-        try:
-            self._factor = ContactUpdate(
-                Factor(self.order, self.tyre.tangents(np.float32), stiffness)
-            )
-        except Indefinite:
-            if self._factor is None:
-                raise
+        self._factor = ContactUpdate(Factor(self.order, self.tyre.tangents(np.float32), stiffness))
         return self._factor
 
     def _stiffness(self, contact: Contact) -> float:
