@@ -14,6 +14,7 @@ from tyrecal.simulate.deck.own import trial
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.tyre.case import start_values
+from tyrecal.tyre.case.identity import tyre_sha256
 from tyrecal.tyre.case.own_case import own_case
 from tyrecal.tyre.load import load_case
 from tyrecal.tyre.own_deck.flat import Flat
@@ -175,6 +176,18 @@ def test_wrong_decks_are_refused_by_line_or_are_the_same(request: pytest.Fixture
     assert sum(how == "refused" for _, _, how, _ in found) >= 20
 
 
+def test_a_tyre_is_the_same_however_its_paths_are_written(tmp_path: Path) -> None:
+    """And however its deck is indented; another tyre with another constant."""
+    case = write(tmp_path, own_decks.plain())
+    first = tyre_sha256(load_case(case))
+    text, deck = case.read_text(), (tmp_path / "tyre.inp").read_text()
+    case.write_text(text.replace("material RUBBER / HYPER", "Material  rubber/hyper"))
+    (tmp_path / "tyre.inp").write_text("** mine\n" + deck.replace(", ", "  , "))
+    assert tyre_sha256(load_case(case)) == first
+    (tmp_path / "tyre.inp").write_text(deck.replace("*DENSITY\n1100", "*DENSITY\n1200"))
+    assert tyre_sha256(load_case(case)) != first
+
+
 def test_what_stays_the_same_is_built_once(tmp_path: Path) -> None:
     """A layer's area, a constant, a parameter of either: the mesh is the one that was."""
     (tmp_path / "tyre.inp").write_text(own_decks.parameters())
@@ -202,4 +215,5 @@ def test_studies_take_such_a_case(tmp_path: Path) -> None:
     rows = json.loads((tmp_path / "out" / "footprint.json").read_text())["rows"]
     assert rows[0]["area_m2"] * rows[0]["mean_pressure_Pa"] == pytest.approx(500, rel=1e-6)
     assert run("modes", str(case), "--set", "effects.bead_filler=0.5") == 2
+    assert run("modes", str(case), "--set", "rebar carcass/AREA=3e-7") == 2  # a variable sets it
     assert run("modes", str(case), "--solver", "calculix") == 2

@@ -26,6 +26,7 @@ def load(
     """
     from ..tyre.case import as_written, overruled, parse_assignment, start_values, with_level
     from ..tyre.load import CaseError, load_case
+    from ..tyre.own_deck.numbers import as_known
     from ..tyre.values import overridden, with_values
 
     case = load_case(path, allow_unusual)
@@ -33,7 +34,9 @@ def load(
         if mesh_level:
             case = with_level(case, mesh_level)
         names = set(case.case.variables)
-        given = _once([parse_assignment(text) for text in assigned], pressure_kPa)
+        numbers = case.case.deck.numbers if case.case.deck else {}
+        pairs = [parse_assignment(text) for text in assigned]
+        given = _once([(as_known(name, numbers), value) for name, value in pairs], pressure_kPa)
         for name, variable in case.case.variables.items():
             for number in set(variable.sets) & set(given):
                 raise click.UsageError(

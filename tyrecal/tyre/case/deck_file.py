@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..own_deck.numbers import marked_numbers
+from ..own_deck.numbers import as_known, marked_numbers
 from ..own_deck.own_deck import OwnDeck, read_own_deck
 from ..own_deck.text import OwnDeckError
 from .document import Document
@@ -49,6 +49,9 @@ def read_deck_of(document: Document, data: dict[str, Any], folder: Path) -> OwnD
         document.add(("deck", "file"), f"cannot be read: {error.strerror}")
     else:
         source["numbers"] = {**deck.numbers, **given}
+        for entry in (*table(data, "variables").values(), *table(data, "uncertainties").values()):
+            if isinstance(paths := entry.get("sets") if isinstance(entry, dict) else None, list):
+                entry["sets"] = [as_known(path, source["numbers"]) for path in paths]
         return deck
     return None
 

@@ -50,6 +50,8 @@ def is_of_tyre(path: str) -> bool:
     no path.)"""
     if tuple(path.split(".")) in STATE:
         return False
+    if "/" in path:  # of a number of the deck
+        return True
     part, _, rest = path.partition(".")
     known = TYRE.get(part, part == "effects")
     return known is True or (known is not False and rest.partition(".")[0] in known)

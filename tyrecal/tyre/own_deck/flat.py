@@ -117,6 +117,8 @@ def flatten(found: Sorted, model: Model, length: float, mass: float) -> Flat:
             raise section.block.refused("takes no more than one data line", section.block.rows[1])
     for k, section in enumerate(model.plies, start=1):
         write.line(f"*SURFACE SECTION, ELSET=PLY_{k}", section.block.place)
+        if section.block.rows:
+            raise section.block.refused("takes no data", section.block.rows[0])
         if not options[section.block]:
             raise section.block.refused("without *REBAR LAYER it holds nothing: delete it")
         for option in options[section.block]:

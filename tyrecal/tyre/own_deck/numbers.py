@@ -295,6 +295,13 @@ def replaced(block: Block, changes: Mapping[tuple[int, int], float]) -> Block:
     return Block(block.name, block.place, block.parameters, tuple(rows))
 
 
+def as_known(path: Any, known: Iterable[str]) -> Any:
+    """A path of the deck as it is known; any other, or what is none, as it stands."""
+    if not isinstance(path, str) or "/" not in path:
+        return path
+    return canonical(path.removeprefix("deck.numbers."), known) or path
+
+
 def canonical(path: str, known: Iterable[str]) -> str | None:
     """The path of ``known`` that is meant, whatever the case and blanks."""
     wanted = _key(path)
