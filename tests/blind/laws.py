@@ -277,13 +277,13 @@ def point_mass(case: LoadedCase, e: float) -> LoadedCase:
 
 
 def road_contact(case: LoadedCase, e: float) -> LoadedCase:
-    """A patch that resists sideways, too, with a fiftieth of its stiffness."""
+    """A patch that slips at its edge: half as stiff along the road as down."""
     made = catalogue()["road_contact"].add(case, e)
     assert made.case.road_spring is not None
     spring = made.case.road_spring
-    return changed(
-        made, road_spring=with_part(spring, lateral_N_per_m=0.02 * spring.radial_N_per_m)
-    )
+    along = 0.5 * spring.radial_N_per_m
+    slipping = with_part(spring, lateral_N_per_m=along, tangential_N_per_m=along)
+    return changed(made, road_spring=slipping)
 
 
 def _without(case: LoadedCase, names: list[str]) -> LoadedCase:

@@ -1,4 +1,4 @@
-"""The tyre stands on something that just holds it up: a soft pad, a bench, a road."""
+"""The tyre stands on a road, barely: a small patch that sticks to it."""
 
 from __future__ import annotations
 
@@ -6,13 +6,23 @@ from ..case import LoadedCase
 from .edit import changed, with_part
 from .effect import Effect
 
+# stiffness along the road over that down, of a patch that sticks to a half space (Mindlin 1949;
+# Johnson, Contact Mechanics, 7.2): 8 G a / (2 - nu) over 4 G a / (1 - nu), nu = 1/2
+ALONG_OVER_DOWN = 2 / 3
+
 
 def add(case: LoadedCase, value: float) -> LoadedCase:
-    """A radial spring more from the tread to the ground; the tyre stays round."""
+    """Springs more from the tread to the ground, radial, lateral and tangential; the tyre stays
+    round."""
     if value < 0:
         raise ValueError("must be at least 0")
     spring = case.case.road_spring
-    stiffer = with_part(spring, radial_N_per_m=spring.radial_N_per_m + value)
+    stiffer = with_part(
+        spring,
+        radial_N_per_m=spring.radial_N_per_m + value,
+        lateral_N_per_m=spring.lateral_N_per_m + ALONG_OVER_DOWN * value,
+        tangential_N_per_m=spring.tangential_N_per_m + ALONG_OVER_DOWN * value,
+    )
     return changed(case, road_spring=stiffer)
 
 
@@ -23,14 +33,15 @@ EFFECT = Effect(
     symbol="k",
     unit="N/m",
     low=0.0,
-    high=3e5,
+    high=6e5,
     changes=("*SPRING",),
     signature=(
-        "the member of each doublet that is symmetric about the patch rises: [c,0] by 3 to 5 % at "
-        "0.3 MN/m, [c,1] by less than 1 %; the other one and both [0,0] stay"
+        "as under a load of 100 N at 0.55 MN/m: of each [c,1] the member symmetric about the patch "
+        "rises, [1,1] by 25 %, [2,1] by 12 %, the other one stays; both of [c,0] rise, [1,0] by 5 "
+        "and 9 %; [0,0] torsional by 17, axial by 5 %"
     ),
     toggle="lift the tyre off, or turn it between two measurements",
-    aliases=("spindle_radial",),
+    aliases=(),
     add=add,
     needs="coupled",
 )
