@@ -17,7 +17,7 @@ from tyrecal_solvers.bundled.deck.keywords import DeckError
 from tyrecal_solvers.bundled.modes.harmonics import HarmonicModes, Vibration
 from tyrecal_solvers.bundled.road import davidson, footprint_job, stick
 from tyrecal_solvers.bundled.road import loaded_modes as loaded_modes_module
-from tyrecal_solvers.bundled.road.contact_newton import PressedState
+from tyrecal_solvers.bundled.road.contact_newton import ContactNewton, PressedState
 from tyrecal_solvers.bundled.road.loaded_modes import (
     Inertia,
     LoadedModes,
@@ -215,6 +215,19 @@ def test_a_second_hold_is_as_if_it_were_the_first(tyre: Round, pressed: State) -
     both = loaded_modes(work, symmetry, pressed.U, holds, start(tyre), 10, lambda: None)
     np.testing.assert_allclose(both[1].eigenvalues, alone.eigenvalues, rtol=1e-8)
     assert (both[1].eigenvalues < both[0].eigenvalues).all()
+
+
+def test_a_road_before_waves(tyre: Round) -> None:
+    """A ring pressed on 5 short elements and waves bears the load, and as deeply as on elements
+    alone, to 1 %."""
+    heights = []
+    for around in (half_circle(LENGTHS), half_circle(np.radians([5.0] * 4 + [10.0]), 7)):
+        symmetry, start = tyre.symmetry(around), tyre.everywhere(around)
+        road = tyre.road(around, 1e9)
+        found = ContactNewton(tyre.tyre(around), symmetry, road, start, lambda: None).to(10.0)
+        assert found.contact.force == pytest.approx(10.0, rel=1e-6)
+        heights.append(0.1 - found.height)
+    assert heights[1] == pytest.approx(heights[0], rel=0.01)
 
 
 def test_mass_of_rigid_motions(tyre: Round) -> None:

@@ -234,5 +234,5 @@ def tread_of(X: Array, faces: Array, around: HalfCircle) -> Tread:
         np.einsum("ja,eac->ejc", own.N, own.X),
         own.tangent,
         own.weights,
-        (len(around.angles), len(X), 3),
+        (around.N.shape[1], len(X), 3),
     )
