@@ -30,6 +30,7 @@ from .simulate.provenance import provenance
 from .studies.diagnose.diagnosis import Diagnosis
 from .studies.emulator import Emulator
 from .studies.fit.calibrate import METHODS, Fit, calibrate
+from .studies.fit.targets import states_of, target_labels
 from .studies.pressure import State
 from .tyre.case import CaseError, LoadedCase, start_values, with_level
 from .tyre.effects import Effect, catalogue
@@ -130,7 +131,8 @@ def fit_case(
     """Calibrate the case's variables to its targets; ``fixed`` holds some at a value.
 
     ``method`` is "slsqp" or "least-squares". ``result`` holds what fit.json does, ``provenance``
-    too, ``fitted`` the design: ``values``, ``objective`` in Hz, ``modes`` by label.
+    too, ``fitted`` the design: ``values``, ``objective`` in Hz, ``modes`` by label and, of targets
+    in several states, ``states``: modes of each.
 
     >>> fit = fit_case(load_case("cases/p235_75r17.yaml", mesh="coarse"), fixed={"C10": 1e6})
     >>> fit.result["converged"], f"{fit.initial.objective:.0f} to {fit.fitted.objective:.0f} Hz"
@@ -143,7 +145,7 @@ def fit_case(
     _values(case, fixed)
     evaluator = _evaluator(case, solver, record)
     fit = calibrate(case, evaluator, method, fixed, starts, seed, jobs)
-    of = provenance(case, evaluator.solver, load_N=case.case.targets.loads_N or 0.0)
+    of = provenance(case, evaluator.solver, **states_of(case))
     fit.found = fit.found.stamped(of)
     return fit
 
@@ -270,7 +272,6 @@ def emulate(
     True
     """
     from .studies.emulator import emulator
-    from .studies.fit.problem import read_targets
     from .studies.fit.variable import DesignVariable, read_variable
 
     if not reach > 0:
@@ -290,7 +291,7 @@ def emulate(
         start = min(max(case.case.pressure_kPa, low), high)
         variables.append(DesignVariable("pressure_kPa", start, low, high))
         box.append((log(low), log(high)))
-    labels = [target.label for target in read_targets(case)]
+    labels = target_labels(case)
     count = evaluations or 10 * len(variables)
     return emulator(_evaluator(case, solver, record), variables, box, labels, count, jobs)
 

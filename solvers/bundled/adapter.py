@@ -121,6 +121,7 @@ class Bundled:
                 name: [sum(slopes[i] for i in own) / len(own) for own in members.values()]
                 for name, slopes in step["sensitivities"].items()
             },
+            "mass_gradients": step["mass_sensitivities"],
             "nodes": nodes,
             "points": points,
             "displacement": displacement,

@@ -11,7 +11,7 @@ from functools import partial
 
 import numpy as np
 
-from .deck.keywords import DataLine, DeckError, Keyword
+from .deck.keywords import COMPLEX_STEP, DataLine, DeckError, Keyword
 from .deck.request import Request
 from .deck.steps import Deck, DeckStep, Tangent
 from .modes.bordered import Bordered
@@ -26,6 +26,7 @@ from .nonuniform.splice import SpliceSector, sector_modes
 from .section.boundary import vibrating
 from .section.kept_fields import Factor
 from .section.loads import agreed_spin, loads, pressures, spin
+from .section.mechanics import total_mass
 from .section.mesh import read_mesh
 from .section.model import Model, build
 from .section.point_elements import PointElements, read_point_elements
@@ -121,18 +122,21 @@ class FrequencyStep:
             modes.append(solver.modes(n, count, None if n else self.factor))
         return modes
 
-    def rates(self, modes: list[HarmonicModes]) -> dict[str, list[Array]]:
-        """d lambda / d variable by variable and harmonic."""
+    def rates(self, modes: list[HarmonicModes]) -> tuple[dict[str, list[Array]], dict[str, float]]:
+        """d lambda / d variable per harmonic, and d mass / d variable, by variable."""
         asked = self.tyre.request.sensitivities
         if not asked:
-            return {}
+            return {}, {}
         forms = [m.forms() for m in modes]
         n, shapes, owner, eigenvalues = (np.concatenate(x) for x in zip(*forms, strict=True))
         before = np.cumsum([0, *(len(values) for *_, values in forms[:-1])])
         owner += np.repeat(before, [len(own) for _, _, own, _ in forms])
         fields, newton = ModeShapes(n, shapes, owner), self._newton()
-        return {
+        found = {
             v: self._rates(rows, newton, modes, fields, eigenvalues) for v, rows in asked.items()
+        }
+        return {v: rates for v, (rates, _) in found.items()}, {
+            v: mass for v, (_, mass) in found.items()
         }
 
     def _newton(self) -> Factor:
@@ -151,8 +155,8 @@ class FrequencyStep:
         modes: list[HarmonicModes],
         fields: ModeShapes,
         eigenvalues: Array,
-    ) -> list[Array]:
-        """Per harmonic, with the deck's numbers carrying the variable's tangent."""
+    ) -> tuple[list[Array], float]:
+        """Per harmonic, and the mass's; the deck's numbers carry the variable's tangent."""
         section, revolve, steps = self.tyre.deck.read(tangents)
         models = partial(build, section, half=self.tyre.half)
         seeded = replace(self.tyre, section=section, revolve=revolve, models=models)
@@ -168,12 +172,15 @@ class FrequencyStep:
             rim_and_air = RimAndAir(wheel, air, rim, flow)
         acting = loads(moving, step)
         forms = eigenvalue_rates(moving, U, V, acting, fields, eigenvalues, rim_and_air)
-        tyre = SeededTyre(moving, spin(self.model, step), seeded.attached())
+        attached = seeded.attached()
+        tyre = SeededTyre(moving, spin(self.model, step), attached)
         each = np.split(forms, np.cumsum([len(m.eigenvalues) for m in modes])[:-1])
-        return [
+        mass = (total_mass(moving) + attached.total_kg).imag / COMPLEX_STEP
+        rates = [
             m.combination.rates(its, tyre) if m.combination else its
             for m, its in zip(modes, each, strict=True)
         ]
+        return rates, float(mass)
 
 
 def _model(tyre: Inflated, step: DeckStep, dynamic_Hz: float | None, own: bool) -> Model:

@@ -92,7 +92,7 @@ class Job:
         self.tyre = Inflated(deck, request, section, revolve, list(sector), models, half, U, check)
         copies = self.model.mesh.symmetry.copies
         self.mass_kg = float(copies * 2 * np.pi * mass(self.model).sum().real)
-        self.mass_kg += self.tyre.attached().total_kg
+        self.mass_kg += self.tyre.attached().total_kg.real
         self.factorisations = 0
         self.guess = _on_nodes(start, mesh)
 
@@ -105,8 +105,8 @@ class Job:
             else:
                 work = FrequencyStep(self.tyre, place, step)
                 modes = work.modes()
-                results.append(self._result(step, modes, work.rates(modes)))
-        return results or [self._result(self.steps[-1], [], {})]
+                results.append(self._result(step, modes, *work.rates(modes)))
+        return results or [self._result(self.steps[-1], [], {}, {})]
 
     def press(self) -> dict[str, Any]:
         """Footprints of a job with a road, one per step with a force on it, and modes there."""
@@ -197,10 +197,21 @@ class Job:
         self.factorisations += factorisations
 
     def _result(
-        self, step: DeckStep, modes: list[HarmonicModes], rates: dict[str, list[np.ndarray]]
+        self,
+        step: DeckStep,
+        modes: list[HarmonicModes],
+        rates: dict[str, list[np.ndarray]],
+        mass_rates: dict[str, float],
     ) -> StepResult:
         return StepResult(
-            step.number, step.pressure, self.mass_kg, modes, rates, self.tyre.U, self.factorisations
+            step.number,
+            step.pressure,
+            self.mass_kg,
+            modes,
+            rates,
+            self.tyre.U,
+            self.factorisations,
+            mass_rates,
         )
 
     def _check_time(self) -> None:

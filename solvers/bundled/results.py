@@ -2,7 +2,8 @@
 
 JOB.json: ``steps`` [{step, pressure_Pa, mass_kg, factorisations, modes [{n, frequency_Hz,
 eigenvalue, multiplicity; where doublets have split, which doublet of its harmonic from 0 on,
-and which member of it, 1 or 2}], sensitivities {variable: [d f / d variable, Hz per unit]}}].
+and which member of it, 1 or 2}], sensitivities {variable: [d f / d variable, Hz per unit]},
+mass_sensitivities {variable: kg per unit}}].
 JOB.npz: ``nodes`` (k,), ``points`` (k, 2) R, Z in m, and per step S ``displacement_S`` (k, 3) and
 ``shapes_S`` (modes, k, 3): complex amplitudes of u = Re[U exp(i n Theta)] in r, theta, z, scaled
 to unit modal mass of the whole tyre.
@@ -11,7 +12,7 @@ to unit modal mass of the whole tyre.
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -34,6 +35,7 @@ class StepResult:
     rates: dict[str, list[Array]]  # variable to d lambda per harmonic
     U: Array
     factorisations: int
+    mass_rates: dict[str, float] = field(default_factory=dict)  # variable to d mass, kg
 
 
 def write(stem: Path, model: Model, results: list[StepResult]) -> None:
@@ -72,6 +74,7 @@ def write(stem: Path, model: Model, results: list[StepResult]) -> None:
                 "factorisations": result.factorisations,
                 "modes": lines,
                 "sensitivities": rates,
+                "mass_sensitivities": result.mass_rates,
             }
         )
         arrays[f"displacement_{result.step}"] = result.U

@@ -132,6 +132,7 @@ def test_fits_take_what_is_at_their_pressure(
 ) -> None:
     from tyrecal.measured.targets import with_measured
     from tyrecal.tyre.load import load_case
+    from tyrecal.tyre.values import overridden
 
     lines = [
         "frequency_Hz,2,1,,1,240,0,66.0,0.3",
@@ -146,13 +147,20 @@ def test_fits_take_what_is_at_their_pressure(
     path = tmp_path / "m.csv"
     head = "quantity,c,m,kind,member,pressure_kPa,load_N,value,sigma\n"
     path.write_text(head + "\n".join(lines) + "\n")
-    loaded, left_out = with_measured(load_case(CASES / "p235_75r17.yaml"), path)
-    modes = {(t.c, t.m): (t.frequency_Hz, t.sigma_Hz) for t in loaded.case.targets.modes}
+    case = load_case(CASES / "p235_75r17.yaml")
+    loaded, left_out = with_measured(case, path)
+    states = {(t.pressure_kPa, t.load_N) for t in loaded.case.targets.modes}
+    assert not left_out and states == {(None, None), (239.4, None), (200, None), (None, 4000)}
+    loaded, left_out = with_measured(overridden(case, {"pressure_kPa": 240.0}), path)
+    loaded_mode = loaded.case.targets.modes[-1]
+    assert (loaded_mode.load_N, loaded_mode.symmetry) == (4000, "symmetric")
+    modes = {(t.c, t.m): (t.frequency_Hz, t.sigma_Hz) for t in loaded.case.targets.modes[:-1]}
     assert modes == {(2, 1): pytest.approx((66.2, 0.25)), (5, 0): pytest.approx((130, 0.5))}
+    assert loaded.case.targets.mass is not None and loaded.case.targets.mass.sigma_kg == 0.1
     (pressed,) = loaded.case.targets.footprint
     assert (pressed.vertical_stiffness_N_per_m, pressed.sigma_N_per_m) == (2e5, 4000)
     assert loaded.case.analysis.highest_harmonic == 5
-    assert left_out == ["2 values at 200, 239.4 kPa", "1 frequencies under load", "the mass"]
+    assert left_out == ["2 values at 200, 239.4 kPa"]
     code = run(
         "fit",
         str(CASES / "p235_75r17.yaml"),

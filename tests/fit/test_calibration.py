@@ -20,11 +20,14 @@ from tyrecal.simulate.evaluate.results import Evaluation
 from tyrecal.studies.fit import calibrate as calibrate_module
 from tyrecal.studies.fit.calibrate import calibrate, history_csv
 from tyrecal.studies.fit.crossing import crossing, gap
-from tyrecal.studies.fit.problem import Problem, Target, objective, read_targets
+from tyrecal.studies.fit.problem import Problem, objective
 from tyrecal.studies.fit.result import StartReport, fit_result
 from tyrecal.studies.fit.slsqp import _beyond_crossing
+from tyrecal.studies.fit.targets import Target, read_targets
 from tyrecal.tyre.case import LoadedCase, start_values
+from tyrecal.tyre.case.schema import Targets
 from tyrecal.tyre.load import load_case
+from tyrecal.tyre.state import AS_THE_CASE
 
 from ..chance import Chance
 from ..conftest import CASES
@@ -192,7 +195,7 @@ def test_fixed_variables_stay_and_others_move() -> None:
     assert fit.result["fixed"] == {"C10": START["C10"]}
     with pytest.raises(InputError):
         calibrate(CASE, evaluator(), fixed=START)  # type: ignore[arg-type]
-    without = replace(CASE, case=CASE.case.model_copy(update={"targets": None}))
+    without = replace(CASE, case=CASE.case.model_copy(update={"targets": Targets()}))
     with pytest.raises(InputError):
         calibrate(without, evaluator())  # type: ignore[arg-type]
 
@@ -426,12 +429,16 @@ def test_slopes_at_a_crossing_are_those_of_the_difference(weights: list[float]) 
     far, point = problem.evaluate(START_X + 0.2), problem.evaluate(START_X)
     found = crossing(problem, [far, point], point)
     assert found is not None and found.x is point.x
-    assert found.value == pytest.approx(gap(point), rel=1e-6)
+    assert found.value == pytest.approx(gap(point, AS_THE_CASE), rel=1e-6)
     h = 1e-4
     for k, e in enumerate(h * np.eye(len(START_X))):
-        wanted = gap(problem.evaluate(START_X + e)) - gap(problem.evaluate(START_X - e))
+        wanted = gap(problem.evaluate(START_X + e), AS_THE_CASE) - gap(
+            problem.evaluate(START_X - e), AS_THE_CASE
+        )
         assert found.slopes[k] == pytest.approx(wanted / (2 * h), rel=1e-5)
-    assert found.at(point.x + e) == pytest.approx(gap(problem.evaluate(point.x + e)), abs=1e-6)
+    assert found.at(point.x + e) == pytest.approx(
+        gap(problem.evaluate(point.x + e), AS_THE_CASE), abs=1e-6
+    )
 
 
 def test_the_result_says_what_happened() -> None:

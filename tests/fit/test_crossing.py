@@ -12,6 +12,7 @@ from tyrecal.studies.fit.calibrate import calibrate
 from tyrecal.studies.fit.crossing import crossing, gap, order, pair_clarity
 from tyrecal.studies.fit.problem import Problem
 from tyrecal.studies.fit.slsqp import AT_CROSSING
+from tyrecal.tyre.state import AS_THE_CASE
 
 from .fake import LABELS, POINTS, FakeEvaluator, shape
 from .test_calibration import CASE, START, evaluator
@@ -59,9 +60,9 @@ def test_the_difference_without_coupling_is_found_on_either_side(torsional: floa
     assert found
     alone = FakeEvaluator(tyre.base, tyre.powers, START).evaluate(Question(point.values)).modes[:2]
     f = np.array([mode.frequency_Hz for mode in alone])
-    assert pair_clarity(point) < 1 and abs(gap(point)) > 2 * COUPLING
+    assert pair_clarity(point) < 1 and abs(gap(point, AS_THE_CASE)) > 2 * COUPLING
     assert found.at(at) == pytest.approx(f[0] - f[1], rel=1e-9)
-    assert order(problem, point) == np.sign(f[0] - f[1])
+    assert order(problem, point) == {AS_THE_CASE: np.sign(f[0] - f[1])}
     slopes = [f @ (np.array([1, -1]) * tyre.powers[name][:2]) for name in START]
     assert found.slopes == pytest.approx(slopes, rel=1e-6)
 

@@ -15,7 +15,8 @@ from tyrecal.simulate.evaluate.failure import DeckRefused, EvaluationFailed
 from tyrecal.simulate.modes.label import Label, paired_labels
 from tyrecal.studies.fit.calibrate import calibrate
 from tyrecal.studies.fit.differences import differences
-from tyrecal.studies.fit.problem import Problem, Target, objective, objective_unit
+from tyrecal.studies.fit.problem import Problem, objective
+from tyrecal.studies.fit.targets import Target, objective_unit
 from tyrecal.studies.fit.variable import DesignVariable
 from tyrecal.studies.footprint import footprint_result, press
 
@@ -104,7 +105,7 @@ def test_slopes_are_those_of_the_formula_and_of_central_differences() -> None:
     point = problem.evaluate(x)
     powers = np.array([list(AREA.values()), list(STIFFNESS.values())])
     elasticities = (
-        point.jacobian[-2:] * 0.02 / (point.footprint / [AREA_TRUE, STIFFNESS_TRUE])[:, None]
+        point.jacobian[-2:] * 0.02 / (point.others / [AREA_TRUE, STIFFNESS_TRUE])[:, None]
     )
     assert elasticities == pytest.approx(powers, rel=1e-4, abs=1e-6)
     step = 2e-4
@@ -190,7 +191,7 @@ def test_numbers_are_those_of_a_footprint_at_the_cases_loads() -> None:
     rows = footprint_result(
         {"initial": START}, [], outcomes, {"initial": resolved(CASE).mesh}
     ).content()["rows"]
-    assert list(point.footprint) == [
+    assert list(point.others) == [
         rows[0]["area_m2"],
         rows[0]["vertical_stiffness_N_per_m"],
         rows[1]["area_m2"],

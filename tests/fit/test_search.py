@@ -17,9 +17,11 @@ from tyrecal.studies.fit import least_squares, slsqp
 from tyrecal.studies.fit.calibrate import _tolerance
 from tyrecal.studies.fit.crossing import AXIAL, TORSIONAL, Crossing, crossing
 from tyrecal.studies.fit.differences import differences
-from tyrecal.studies.fit.problem import Point, Target
+from tyrecal.studies.fit.problem import Point
+from tyrecal.studies.fit.targets import Target
 from tyrecal.studies.fit.uncertainty import uncertainty
 from tyrecal.studies.fit.variable import DesignVariable, read_variable
+from tyrecal.tyre.state import AS_THE_CASE
 
 from ..chance import generator
 
@@ -30,7 +32,8 @@ MINIMISE = {"slsqp": slsqp.minimise, "least-squares": least_squares.minimise}
 def pair(difference: float, clarity: float) -> dict:
     """The two [0, 0] modes, the axial one ``difference`` Hz above."""
     hertz = {AXIAL: 40.0 + difference, TORSIONAL: 40.0}
-    return {k: SimpleNamespace(frequency_Hz=f, clarity=clarity) for k, f in hertz.items()}
+    modes = {k: SimpleNamespace(frequency_Hz=f, clarity=clarity) for k, f in hertz.items()}
+    return {AS_THE_CASE: modes}
 
 
 def point(x: Any, r: Any, J: Any, modes: dict | None = None, roughness: float = 0.0) -> Point:
@@ -245,7 +248,7 @@ def test_no_crossing_is_looked_for_where_no_design_lies_beyond(
 
     class OneSided(Paired):
         def evaluate(self, x: Array) -> Point:
-            return replace(super().evaluate(x), modes=pair(3.0, 0.1))
+            return replace(super().evaluate(x), states=pair(3.0, 0.1))
 
     monkeypatch.setattr(slsqp, "crossing", lambda *asked: pytest.fail("looked for one"))
     plain = linear()
@@ -303,8 +306,8 @@ def test_the_tolerance_is_what_slopes_can_tell() -> None:
     areas and stiffnesses 1e-4 of their weighted size."""
     modal = [Target(AXIAL, 40.0), Target(TORSIONAL, 40.0, sigma_Hz=0.5)]
     pressed = [SimpleNamespace(scale=100.0, value=v) for v in (3.0, 4.0)]
-    of = lambda step, targets, footprint=(): _tolerance(
-        SimpleNamespace(difference_step=step, targets=targets, footprint=footprint)  # type: ignore[arg-type]
+    of = lambda step, targets, road=(): _tolerance(
+        SimpleNamespace(difference_step=step, targets=targets, road=road)  # type: ignore[arg-type]
     )
     assert of(None, modal) == of(1e-6, modal) == 1e-3
     assert of(1e-3, modal) == pytest.approx(0.1) and of(1e-3, modal[:1]) == pytest.approx(0.05)
@@ -340,7 +343,7 @@ def test_uncertainty_by_its_formula() -> None:
     targets = [SimpleNamespace(sigma_Hz=s) for s in sigmas]
     variables = [DesignVariable("a", 3.0, 1.0, 9.0), DesignVariable("b", 0.0, -1.0, 3.0, log=False)]
     problem: Any = SimpleNamespace(
-        scale=scale, targets=targets, variables=variables, footprint=[SimpleNamespace(sigma=0.05)]
+        scale=scale, targets=targets, variables=variables, others=[SimpleNamespace(sigma=0.05)]
     )
     J, y = scale[:, None] * slopes, random.normal(size=5)
     at = Point({"a": 3.0, "b": 0.5}, np.zeros(2), scale * y, J, {}, 1.0, 1.0, np.empty(0), 0.0)
@@ -366,7 +369,7 @@ def test_noise_is_what_is_left_over_the_freedom_that_is_left() -> None:
         {"a": 3.0, "b": 3.0}, np.zeros(2), (scale * y)[:n], J[:n], {}, 1.0, 1.0, np.empty(0), 0.0
     )
     none = [SimpleNamespace(sigma_Hz=None)] * 4
-    told: dict[str, Any] = {"variables": variables, "footprint": []}
+    told: dict[str, Any] = {"variables": variables, "others": []}
     problem: Any = SimpleNamespace(scale=scale[:4], targets=none, **told)
     found = uncertainty(problem, point_of(4))
     assert found.noise_Hz == pytest.approx(np.linalg.norm(y[:4]) / np.sqrt(2))

@@ -43,7 +43,7 @@ def rows(labels=LABELS, designs=("initial", "fitted"), pressures=(100.0, 200.0, 
 
 def test_each_mode_is_drawn_in_its_family_and_named_once(tmp_path):
     path = tmp_path / "sweep.png"
-    figure = draw_pressure_sweep(rows(), {Label(2, 0): 79.5}, 240.0)
+    figure = draw_pressure_sweep(rows(), [(Label(2, 0), 240.0, 79.5)])
     save(figure, path)
     with Image.open(path) as image:
         assert image.format == "PNG" and image.size == (1440, 1140)
@@ -61,7 +61,7 @@ def test_each_mode_is_drawn_in_its_family_and_named_once(tmp_path):
 
 
 def test_targets_of_another_pressure_do_not_stretch_the_axis(tmp_path):
-    figure = draw_pressure_sweep(rows(), {Label(2, 0): 79.5}, 500.0)
+    figure = draw_pressure_sweep(rows(), [(Label(2, 0), 500.0, 79.5)])
     save(figure, tmp_path / "sweep.png")
     assert figure.axes[0].get_xlim()[1] < 340
     assert "target" not in [t.get_text() for t in figure.axes[0].get_legend().get_texts()]

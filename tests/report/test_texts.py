@@ -122,7 +122,7 @@ def test_crowded_lines_over_the_pressure(tmp_path: Path) -> None:
         }
         for design, kPa in product(("initial", "fitted"), (100.0, 320.0))
     ]
-    figure = draw_pressure_sweep([PressureRow(**row) for row in rows], {Label(2, 0): 95.0}, 240.0)
+    figure = draw_pressure_sweep([PressureRow(**row) for row in rows], [(Label(2, 0), 240.0, 95.0)])
     save(figure, tmp_path / "pressure.png")
 
 

@@ -36,7 +36,7 @@ from tyrecal.studies.diagnose.observations import Observable, Observations
 from tyrecal.studies.diagnose.tyre_model import TyreModel
 from tyrecal.studies.diagnose.uncertainties import sources
 from tyrecal.studies.emulator import emulator
-from tyrecal.studies.fit.problem import read_targets
+from tyrecal.studies.fit.targets import read_targets
 from tyrecal.studies.fit.variable import DesignVariable, read_variable
 from tyrecal.studies.sample.box import drawn
 from tyrecal.studies.sample.posterior import Posterior

@@ -98,7 +98,7 @@ def test_a_switch_is_true_or_false(
 
 def test_a_free_rim_is_set_by_the_command_line_and_told(tmp_path: Path) -> None:
     """It changes the modes of c <= 1 alone, is noted among what was set, and is no other tyre."""
-    hertz = {}
+    hertz: dict[str, dict[Any, Any]] = {}
     for name, given in (("held", []), ("free", ["--set", "rim.free=true"])):
         folder = tmp_path / name
         case = [str(CASES / "p235_75r17.yaml"), "--mesh", "coarse", "--no-pictures"]

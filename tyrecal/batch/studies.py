@@ -20,6 +20,7 @@ from ..studies import footprint as pressed
 from ..studies import modes as evaluated
 from ..studies import pressure_result
 from ..studies.fit.calibrate import calibrate, history_csv
+from ..studies.fit.targets import states_of
 from ..studies.fitted import NOT_CONVERGED
 from ..studies.result import Failed, Result, ResultPart
 from ..studies.sample import study as sampling
@@ -70,10 +71,12 @@ def fit(state: Studied) -> StudyOutcome:
     state.designs["fitted"] = {n: fitted.fitted.values[n] for n in state.designs["initial"]}
     numbers = {"objective": found.objective_Hz, "mass_kg": found.mass_kg}
     numbers |= {f"variable {name}": each.value for name, each in found.variables.items()}
-    numbers |= {f"fitted_Hz {mode.label}": mode.fitted_Hz for mode in found.modes}
+    for mode in found.modes:
+        where = " ".join(filter(None, (str(mode.label), mode.symmetry, mode.state)))
+        numbers[f"fitted_Hz {where}"] = mode.fitted_Hz
     for each in found.footprint:
-        numbers[f"fitted_{each.quantity} {each.load_N:g} N"] = each.fitted
-    files = _files(state, found, load_N=state.case.case.targets.loads_N or 0.0)
+        numbers[f"fitted_{each.quantity} {each.state}"] = each.fitted
+    files = _files(state, found, **states_of(state.case))
     files["fit_history.csv"] = history_csv(fitted.history)
     if found.is_good:
         return StudyOutcome(quantities=numbers, files=files)

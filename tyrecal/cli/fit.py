@@ -27,7 +27,8 @@ from .terminal import Progress, Terminal
     "--measured",
     type=click.Path(path_type=Path, exists=True, dir_okay=False),
     metavar="FILE",
-    help="Measurements (CSV) at the case's pressure in place of its targets.",
+    help="Measurements (CSV) in place of the case's targets, each in its own state (pressure, load,"
+    " rim); with --pressure-kPa, those at that pressure alone.",
 )
 @click.option(
     "--fix",
@@ -85,7 +86,8 @@ def command(
     from ..report.table import fit_doubts, fit_verdict, shown, tyre_doubts
     from ..simulate.evaluate.cluster import reached
     from ..studies.fit.calibrate import calibrate, check, history_csv
-    from ..studies.fit.problem import Problem, objective_unit
+    from ..studies.fit.problem import Problem
+    from ..studies.fit.targets import objective_unit, states_of
     from ..studies.fitted import NOT_CONVERGED, has_good
 
     terminal = study.terminal
@@ -102,16 +104,16 @@ def command(
         loaded, left_out = with_measured(loaded, measured)
     evaluator = study.evaluator(loaded)
     fixed = {name: values[name] for name in fix}
-    check(Problem(loaded, evaluator, fixed))
-    if not loaded.case.targets.footprint and starts == 1 and evaluator.has_gradients:
+    problem = Problem(loaded, evaluator, fixed)
+    check(problem)
+    alone = len(problem.labels) == starts == 1 and not problem.road
+    if alone and evaluator.has_gradients:
         why = f"a fit from one start asks solver '{evaluator.solver.name}' for one design at a time"
         if scheduler:
             raise click.UsageError(f"--scheduler changes nothing here: {why}; give --starts too")
         options.say_idle(terminal, study.jobs, why)
     files = [measured] if measured else []
-    run = study.run(
-        loaded, "fit", evaluator, measured=files, load_N=loaded.case.targets.loads_N or 0.0
-    )
+    run = study.run(loaded, "fit", evaluator, measured=files, **states_of(loaded))
     unit = objective_unit(loaded)
     with terminal.progress("fit") as bar, reached(scheduler) as evaluator.scheduler:
         points = _Points(terminal, bar, unit)
@@ -122,7 +124,12 @@ def command(
     result = fit.result
     run.write_text("fit_history.csv", history_csv(fit.history))
     terminal.result(result)
-    terminal.show(shown(*fit.found.tables()))
+    tables = fit.found.tables()
+    if fit.found.states:  # each as wide as it needs
+        for table in tables:
+            terminal.show(shown(table))
+    else:
+        terminal.show(shown(*tables))
     terminal.say("\n".join(fit_verdict(result)))
     for each in left_out:
         terminal.note(f"{measured}: not used: {each}")
@@ -133,7 +140,8 @@ def command(
         from ..simulate.evaluate.evaluator import Question
         from ..tyre.values import with_values
 
-        values = fit.fitted.values
+        state = next(iter(fit.fitted.states))
+        values = state.design(loaded, fit.fitted.values)
         modes = sorted(fit.fitted.modes.values(), key=lambda mode: mode.frequency_Hz)
         evaluation = evaluator.evaluate(Question(values))
         shapes = tyre_data(with_values(loaded, values), evaluation, modes)
@@ -141,7 +149,7 @@ def command(
     if pictures:
         from ..report.pictures import draw_fit
 
-        draw_fit(run.new, loaded, values, evaluation, modes, fit.history, unit)
+        draw_fit(run.new, loaded, values, evaluation, modes, fit.history, fit.found)
     good = fit.found.is_good
     earlier = not good and has_good(run.folder / "fit.json")
     run.finish(aside=NOT_CONVERGED if earlier else "")

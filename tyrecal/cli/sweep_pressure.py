@@ -40,8 +40,9 @@ def command(
     tyrecal sweep-pressure cases/p235_75r17.yaml --fitted p235_75r17/fit.json --jobs 2
     tyrecal sweep-pressure cases/p235_75r17.yaml --from-kPa 180 --to-kPa 260 --steps 5 --json
     """
-    from ..studies.fit.problem import read_targets
+    from ..studies.fit.targets import read_targets
     from ..studies.pressure_result import run
+    from ..tyre.state import rim_of
 
     terminal = study.terminal
     case, fitted, study = taken(case, fitted, study)
@@ -61,9 +62,14 @@ def command(
     if pictures:
         from ..report.pressure import draw_pressure_sweep
 
-        targets = {each.label: each.frequency_Hz for each in read_targets(loaded)}
-        figure = draw_pressure_sweep(found.rows, targets, loaded.case.pressure_kPa)
-        figures["pressure_sweep"] = figure
+        measured = [(each, each.state.told(loaded)) for each in read_targets(loaded)]
+        rim = rim_of(loaded)
+        targets = [
+            (each.label, state.pressure_kPa or 0.0, each.frequency_Hz)
+            for each, state in measured
+            if state.rim == rim
+        ]
+        figures["pressure_sweep"] = draw_pressure_sweep(found.rows, targets)
     return study.present(output, found, figures)
 
 

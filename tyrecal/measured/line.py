@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from math import isfinite, nan
 
 from ..simulate.modes.label import Label
-from ..tyre.state import RIMS, Rim
+from ..tyre.case.parts import RimSupport
+from ..tyre.state import RIMS
 from ..units import QUANTITIES
 from .columns import TableColumn
 from .measurement import AS_CASE, Measurement
@@ -88,7 +89,7 @@ class Line:
             raise ValueError(f"c, m, kind and member must be empty for {quantity}")
         return [quantity]
 
-    def _rim(self) -> Rim | None:
+    def _rim(self) -> RimSupport | None:
         """As the case has it where no column says it; fixed where its cell is empty."""
         word = self.cell("rim").strip().lower() or RIMS[0]
         if "rim" not in self.columns or word == AS_CASE:

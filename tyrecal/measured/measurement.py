@@ -7,14 +7,15 @@ from dataclasses import dataclass
 from math import nan
 
 from ..simulate.modes.label import Label
-from ..tyre.state import Rim, TyreState
+from ..tyre.case.parts import RimSupport
+from ..tyre.state import TyreState
 from ..tyre.usual import USUAL_MEASUREMENTS
 
 CSV_COLUMNS = ("quantity", "c", "m", "kind", "member", "pressure_kPa", "load_N", "value", "sigma")
 RIM_COLUMN = "rim"  # where some stand on another rim than the case's
 AS_CASE = "case"
 PRESSURE_RANGE_kPa = (20.0, 2000.0)
-MeasurementKey = tuple[str, Label | None, str, float, float, Rim | None]
+MeasurementKey = tuple[str, Label | None, str, float, float, RimSupport | None]
 
 
 @dataclass(frozen=True)
@@ -30,7 +31,7 @@ class Measurement:
     sigma: float = nan  # standard deviation, NaN where it is not stated
     run: str = ""  # what was mounted and measured once
     place: str = ""  # file and line
-    rim: Rim | None = None  # None: as the case has it
+    rim: RimSupport | None = None  # None: as the case has it
 
     @property
     def key(self) -> MeasurementKey:

@@ -9,7 +9,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter, NullLocator
 
-from ..studies.fit.result import FittedMode
+from ..studies.fit.result import FitResult, FittedMode
+from ..studies.result import in_lines
 from .figure import COLOURS, GREY, MARKERS, headline, in_house_style, new_figure
 
 
@@ -110,4 +111,36 @@ def draw_deviations(modes: Sequence[FittedMode]) -> Figure:
     axes.invert_yaxis()
     axes.set_xlabel("deviation from target, %")
     axes.legend(frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))
+    return figure
+
+
+@in_house_style
+def draw_states(fit: FitResult) -> Figure:
+    """Deviations after a fit over several states, a column a state; bars: one standard deviation of
+    the measured value."""
+    states = list(dict.fromkeys(each.state for each in fit.modes))
+    name = lambda mode: f"{mode.label.said} {mode.symmetry or ''}".rstrip()
+    names = list(dict.fromkeys(map(name, fit.modes)))
+    figure = new_figure(1.6 + 1.7 * len(states), 1.3 + 0.26 * len(names))
+    grid = figure.subplots(1, len(states), sharex=True, sharey=True, squeeze=False)[0]
+    for axes, state in zip(grid, states, strict=True):
+        own = [mode for mode in fit.modes if mode.state == state]
+        rows = [names.index(name(mode)) for mode in own]
+        bars = [100 * (mode.sigma_Hz or 0.0) / mode.target_Hz for mode in own]
+        axes.axvline(0, color=GREY, lw=0.8)
+        axes.errorbar(
+            [mode.deviation_percent for mode in own],
+            rows,
+            xerr=bars,
+            fmt="o",
+            color=COLOURS[0],
+            ecolor=GREY,
+            ms=4,
+            lw=1.0,
+        )
+        axes.set_title(in_lines(state), loc="left", fontsize=8)
+        axes.grid(True, axis="x", color="0.92", lw=0.6)
+    grid[0].set_yticks(range(len(names)), names)
+    grid[0].invert_yaxis()
+    grid[0].set_xlabel("deviation from target, %")
     return figure

@@ -8,10 +8,11 @@ from typing import Any
 
 from ..simulate.evaluate.results import Evaluation
 from ..simulate.modes.label import Label, Mode
+from ..studies.fit.result import FitResult
 from ..tyre.case import LoadedCase
 from ..tyre.resolve import resolved
 from ..tyre.values import with_values
-from .convergence import draw_convergence
+from .convergence import draw_convergence, draw_states
 from .figure import save
 from .revolve import placed
 from .section import draw_section
@@ -49,11 +50,14 @@ def draw_fit(
     evaluation: Evaluation,
     modes: Sequence[Mode],
     history: Sequence[Mapping[str, Any]],
-    unit: str = "Hz",
+    fit: FitResult,
 ) -> None:
-    """The pictures of the fitted design, and convergence.png; ``unit``: of the objective."""
+    """The pictures of the fitted design, convergence.png and, over several states,
+    fit_states.png."""
     draw_evaluation(folder, "fit", with_values(case, values), evaluation, modes)
-    save(draw_convergence(history, unit), folder / "convergence.png")
+    save(draw_convergence(history, fit.objective_unit), folder / "convergence.png")
+    if fit.states and fit.modes:
+        save(draw_states(fit), folder / "fit_states.png")
 
 
 def file_name(label: Label) -> str:

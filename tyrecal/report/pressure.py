@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -21,18 +21,15 @@ Curves = dict[Label, tuple[np.ndarray, np.ndarray, np.ndarray]]
 
 @in_house_style
 def draw_pressure_sweep(
-    rows: Sequence[PressureRow],
-    targets: Mapping[Label, float] | None = None,
-    target_kPa: float = 0.0,
+    rows: Sequence[PressureRow], targets: Sequence[tuple[Label, float, float]] = ()
 ) -> Figure:
     """Frequency over pressure, one column a family, and below the slopes d ln f / d ln p.
 
     rows: of pressure_sweep.json; a design "initial" is dashed, "fitted" solid; c has a colour and
-    a marker. targets: measured Hz by label at ``target_kPa``, crosses where that was swept.
+    a marker. targets: label, kPa and Hz that were measured, crosses where the pressure was swept.
     """
     swept = [row.pressure_kPa for row in rows]
-    if not min(swept) <= target_kPa <= max(swept):
-        targets = None
+    targets = [each for each in targets if min(swept) <= each[1] <= max(swept)]
     designs = {row.design: _curves(rows, row.design) for row in rows}
     labels = sorted({label for curves in designs.values() for label in curves}, key=str)
     columns = {name: [x for x in labels if x.family == name] for name in (*FAMILIES, None)}
@@ -47,9 +44,9 @@ def draw_pressure_sweep(
             for label in columns[name]:
                 if label in curves:
                     _draw(top, bottom, curves[label], design, label.c)
-        for label in columns[name]:
-            if targets and label in targets:
-                top.plot(target_kPa, targets[label], "kx", ms=7, mew=1.5, zorder=4)
+        for label, kPa, hertz in targets:
+            if label in columns[name]:
+                top.plot(kPa, hertz, "kx", ms=7, mew=1.5, zorder=4)
         bottom.axhline(0.5, color=GREY, lw=0.8, ls=":")
         bottom.set_xlabel("inflation pressure, kPa")
     top, bottom = grid[:, 0]

@@ -10,7 +10,7 @@ from rich import table as rich
 from rich.text import Text
 
 from ..simulate.modes.label import Label
-from ..studies.result import Cell, Column, Deviation, Table
+from ..studies.result import Cell, Column, Deviation, Table, state_words
 from ..tyre.usual import USUAL_MEASUREMENTS
 
 CLOSE, FAR = 2.0, 5.0  # % of deviation from a target
@@ -29,6 +29,8 @@ def nearness(modes: Sequence[Mapping[str, Any]]) -> str:
     twice = [mode["deviation_percent"] for mode in modes for _ in range(mode["multiplicity"])]
     rms = (sum(x * x for x in twice) / len(twice)) ** 0.5
     name = f"[{worst['c']},{worst['m']}] {Label(worst['c'], worst['m'], worst['kind']).motion}"
+    if worst.get("pressure_kPa"):
+        name += f" ({state_words(worst['pressure_kPa'], worst['load_N'], worst['rim'])})"
     return (
         f"{len(near)} of {len(modes)} frequencies come within {CLOSE:g} % of their targets (rms"
         f" {rms:.1f} %); farthest off is {name} with {worst['deviation_percent']:+.1f} %"
@@ -38,11 +40,13 @@ def nearness(modes: Sequence[Mapping[str, Any]]) -> str:
 def fit_verdict(result: Mapping[str, Any]) -> list[str]:
     """What the content of fit.json amounts to, in sentences; doubts aside, see `fit_doubts`."""
     ended = "Converged" if result["converged"] else "Ended"
-    words = [f"{ended} at {result['pressure_kPa']:g} kPa, {result['mass_kg']:.2f} kg."]
+    states = result.get("states", ())
+    where = f"in {len(states)} states" if states else f"at {result['pressure_kPa']:g} kPa"
+    words = [f"{ended} {where}, {result['mass_kg']:.2f} kg."]
     if result["modes"]:
         words.append(f"{nearness(result['modes'])}.")
     freedom = sum(mode["multiplicity"] for mode in result["modes"])
-    freedom += len(result.get("footprint", ())) - len(result["variables"])
+    freedom += len(result.get("footprint", ())) + ("mass" in result) - len(result["variables"])
     if result["objective_unit"] == "sigma" and freedom > 0:
         words.append(
             f"chi2 per degree of freedom is {result['objective_Hz'] ** 2 / freedom:.3g}: about 1"

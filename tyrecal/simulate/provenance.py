@@ -25,11 +25,12 @@ def provenance(
     measured: Iterable[Path] = (),
     pressure_kPa: OneOrMore | None = None,
     load_N: OneOrMore = 0.0,
+    rim: Sequence[str] = (),
 ) -> dict[str, Any]:
     """The block ``provenance`` of a result file.
 
-    pressure_kPa (default: the case's), load_N: of the study, several where it has several; measured
-    files in the order of the command. Raises OSError.
+    pressure_kPa, rim (default: the case's), load_N: of the study, several where it has several;
+    measured files in the order of the command. Raises OSError.
     """
     c = case.case
     files = list(measured)
@@ -44,7 +45,7 @@ def provenance(
         "state": {
             "pressure_kPa": _plain(c.pressure_kPa if pressure_kPa is None else pressure_kPa),
             "load_N": _plain(load_N),
-            "rim": _rim(case),
+            "rim": list(rim) or _rim(case),
         },
         "mesh": c.mesh.level,
         "targets": c.targets.source or None,

@@ -38,11 +38,10 @@ from ..simulate.evaluate.evaluator import Evaluator, Question
 from ..simulate.evaluate.failure import DeckRefused, EvaluationFailed
 from ..simulate.modes.find import Found, find_modes
 from ..simulate.modes.label import Label
-from .fit.crossing import AXIAL, TORSIONAL
+from .fit.crossing import AXIAL, PAIR, TORSIONAL
 from .fit.variable import DesignVariable
 
 Array = np.ndarray
-PAIR = (AXIAL, TORSIONAL)
 DEGREES = range(1, 9)
 SPARE_EQUATIONS = 1.3  # equations for each coefficient, at least
 LEAST_DESIGNS = 3  # designs that a bound can be told from

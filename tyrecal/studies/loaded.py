@@ -14,7 +14,7 @@ from ..simulate.modes.find import Found, find_modes
 from ..simulate.modes.label import Label, Mode
 from ..simulate.modes.loaded import Member, ModesAtLoad, Rings, follow, members, rings, state
 from ..tyre.case import LoadedCase
-from .fit.problem import read_targets
+from .fit.targets import target_labels
 
 EXTRA_HARMONICS = 3  # harmonics beyond the case's that may stand among its modes
 EXTRA_MODES = 6  # modes at a load beyond as many as stand for [0,0] to [c,1]
@@ -78,12 +78,16 @@ def load_tyres(
     loads_N: Sequence[float],
     jobs: int = 1,
     notify: Callable[[str, LoadOutcome], None] = lambda design, outcome: None,
+    labels: Sequence[Label] = (),
 ) -> dict[str, LoadOutcome]:
     """Every design (name to values of the variables) at rising loads, one above 0 at least, or why
-    it has no modes. Raises DeckRefused and what else ``Evaluator.press`` raises for wrong input.
+    it has no modes; labels: of the modes to name, else the case's. Raises DeckRefused and what
+    else ``Evaluator.press`` raises for wrong input.
     """
     evaluator.needs_road(modes=True)
-    unloaded = {name: _unloaded(case, evaluator, values) for name, values in designs.items()}
+    unloaded = {
+        name: _unloaded(case, evaluator, values, labels) for name, values in designs.items()
+    }
     able = [name for name, each in unloaded.items() if not isinstance(each, EvaluationFailed)]
     loads = [load for load in loads_N if load]
     answers = evaluator.press_all([designs[name] for name in able], loads, jobs, _count(case))
@@ -108,9 +112,10 @@ def progress(outcome: LoadOutcome) -> tuple[int, EvaluationFailed | None]:
 
 def _wanted(case: LoadedCase, modes: Sequence[Mode]) -> list[Label]:
     """The case's targets or, where it has none, all with m <= 1 up to its highest harmonic."""
-    targets = [target.label for target in read_targets(case)]
     highest = case.case.analysis.highest_harmonic
-    return targets or [m.label for m in modes if m.label.m <= 1 and m.label.c <= highest]
+    return target_labels(case) or [
+        m.label for m in modes if m.label.m <= 1 and m.label.c <= highest
+    ]
 
 
 def _count(case: LoadedCase) -> int:
@@ -119,12 +124,14 @@ def _count(case: LoadedCase) -> int:
 
 
 def _unloaded(
-    case: LoadedCase, evaluator: Evaluator, values: Mapping[str, float]
+    case: LoadedCase, evaluator: Evaluator, values: Mapping[str, float], labels: Sequence[Label]
 ) -> Found | EvaluationFailed:
     """The unloaded tyre's modes with a few harmonics more, the wanted ones surely among them."""
     highest = case.case.analysis.highest_harmonic + EXTRA_HARMONICS
     question = Question({**values, "analysis.highest_harmonic": highest})
-    ((_, found),) = find_modes(evaluator, [question], lambda modes: _wanted(case, modes))
+    ((_, found),) = find_modes(
+        evaluator, [question], lambda place, modes: labels or _wanted(case, modes)
+    )
     if isinstance(found, DeckRefused):
         raise found
     return found

@@ -16,7 +16,7 @@ from ..simulate.modes.find import Found, find_modes
 from ..simulate.modes.follow import follow
 from ..simulate.modes.label import FAMILIES, Label, Mode, labelled
 from ..tyre.case import LoadedCase
-from .fit.problem import read_targets
+from .fit.targets import target_labels
 from .fitted import pressure_name
 from .result import ResultPart
 
@@ -67,7 +67,7 @@ def sweep(
     evaluation that fails is an outcome.
     """
     name = pressure_name(case)
-    wanted = [target.label for target in read_targets(case)]
+    wanted = target_labels(case)
     gradients = (name,) if evaluator.has_gradients else ()
     places = [(design, p) for design in designs for p in pressures_kPa]
     questions = [Question({**designs[design], name: p}, gradients) for design, p in places]

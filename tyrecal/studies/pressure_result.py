@@ -10,7 +10,7 @@ from pydantic import Field
 from ..simulate.evaluate.evaluator import Evaluator
 from ..simulate.modes.label import Label
 from ..tyre.case import LoadedCase
-from .fit.problem import read_targets
+from .fit.targets import target_labels
 from .modes import mode_entry
 from .pressure import Failure, PressureFindings, State, SweepOutcome, findings, sweep
 from .result import (
@@ -155,10 +155,7 @@ def _swept_labels(case: LoadedCase, states: Sequence[State]) -> list[Label]:
     every state, by label."""
     everywhere = set.intersection(*(set(state.frequencies) for state in states))
     more = {x for x in everywhere if x.m <= 1 and x.c <= case.case.analysis.highest_harmonic}
-    return sorted(
-        {*(target.label for target in read_targets(case)), *more},
-        key=lambda x: (x.c, x.m, x.kind or ""),
-    )
+    return sorted({*target_labels(case), *more}, key=lambda x: (x.c, x.m, x.kind or ""))
 
 
 def slopes(states: Sequence[State], labels: Sequence[Label]) -> dict[Label, list[float | None]]:

@@ -85,7 +85,7 @@ class ResultState(ResultPart):
 
     pressure_kPa: float | list[float]
     load_N: float | list[float]
-    rim: str  # how it is held
+    rim: str | list[str]  # how it is held
 
 
 class Provenance(ResultPart):
@@ -252,6 +252,17 @@ class CavityMode(ResultPart):
     def named(self) -> list[str]:
         """The cells of `NAME_COLUMNS`."""
         return ["cavity", self.direction]
+
+
+def state_words(pressure_kPa: float, load_N: float, rim: str) -> str:
+    """160 kPa, 4000 N, rim free"""
+    load = f", {load_N:g} N" if load_N else ""
+    return f"{pressure_kPa:g} kPa{load}, rim {rim if rim != 'springs' else 'on springs'}"
+
+
+def in_lines(words: str) -> str:
+    """A heading over several lines, broken at its commas."""
+    return words.replace(", ", "\n")
 
 
 def csv_text(keys: Sequence[str], rows: Iterable[Mapping[str, Any]], end: str = "\n") -> str:

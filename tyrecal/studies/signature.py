@@ -14,7 +14,7 @@ from ..simulate.evaluate.results import Evaluation
 from ..simulate.modes.label import Label, Mode, paired_labels
 from ..tyre.case import LoadedCase
 from ..tyre.effects import catalogue
-from .fit.problem import read_targets
+from .fit.targets import target_labels
 from .fitted import pressure_name
 
 Array = np.ndarray
@@ -64,7 +64,7 @@ class Plain:
         found = [evaluator.evaluate(Question(state, self.names)) for state in self.states]
         self.mass_kg = found[0].mass_kg
         modes = [_modes(evaluation) for evaluation in found]
-        wanted = [t.label for t in read_targets(case)] or [m for m in modes[0] if m.m < 2]
+        wanted = target_labels(case) or [m for m in modes[0] if m.m < 2]
         self.labels = tuple(label for label in wanted if all(label in each for each in modes))
         self.hertz = np.array([[m[label].frequency_Hz for label in self.labels] for m in modes])
         self.weights = np.sqrt([[m[label].multiplicity for label in self.labels] for m in modes])

@@ -19,6 +19,7 @@ from .case.shape import disagreements, explain, without
 from .case.stations import check_templates, read_stations
 from .effects import EffectRefused
 from .resolve import resolved
+from .state import TyreState
 from .usual import unusual
 
 
@@ -72,7 +73,12 @@ def _read(path: Path, allow_unusual: bool) -> tuple[LoadedCase | None, list[Mist
     except EffectRefused as error:
         document.add(("effects", error.id), error.reason)
         return None, document.mistakes
-    return loaded, []
+    for place, target in enumerate(case.targets.modes):
+        try:
+            TyreState(target.pressure_kPa, 0.0, target.rim).numbers(loaded)
+        except ValueError as error:
+            document.add(("targets", "modes", place, "rim"), str(error))
+    return (None, document.mistakes) if document.mistakes else (loaded, [])
 
 
 def _typed(document: Document, data: dict[str, Any]) -> Case | None:

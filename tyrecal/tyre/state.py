@@ -9,12 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import get_args
 
 from .case.loaded import LoadedCase
+from .case.parts import RimSupport
 
-Rim = Literal["fixed", "springs", "free"]
-RIMS: tuple[Rim, ...] = ("fixed", "springs", "free")
+RIMS: tuple[RimSupport, ...] = get_args(RimSupport)
 SPRINGS = tuple(
     f"{part}{axis}"
     for part, axes in (
@@ -37,7 +37,7 @@ class TyreState:
 
     pressure_kPa: float | None = None
     load_N: float = 0.0
-    rim: Rim | None = None
+    rim: RimSupport | None = None
 
     @property
     def unloaded(self) -> TyreState:
@@ -90,6 +90,9 @@ class TyreState:
         return {**without(case, values, own), **own}
 
 
+AS_THE_CASE = TyreState()
+
+
 def without(
     case: LoadedCase, values: Mapping[str, float], own: Mapping[str, float]
 ) -> dict[str, float]:
@@ -99,7 +102,7 @@ def without(
     return {name: value for name, value in values.items() if name not in taken}
 
 
-def rim_of(case: LoadedCase) -> Rim:
+def rim_of(case: LoadedCase) -> RimSupport:
     """How the case has its rim held; a compliance that a variable sets counts as one."""
     c = case.case
     if c.rim.free or c.effects["wheel_free"]:

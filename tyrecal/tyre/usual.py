@@ -30,7 +30,11 @@ READING_RTOL = 0.05  # readings that differ by less are one: bar and atm
 Slips = Mapping[str, float | Callable[[float], float]]
 """What may have been written instead, and the factor, or the function, to the right unit."""
 ALL_THE_SAME = " (--allow-unusual takes it as it is)"
-_OF_SIGMA = {"sigma_Hz": "frequency_Hz", **{sigma: of for of, sigma in SIGMAS.items()}}
+_OF_SIGMA = {
+    "sigma_Hz": "frequency_Hz",
+    "sigma_kg": "mass_kg",
+    **{sigma: of for of, sigma in SIGMAS.items()},
+}
 
 
 @dataclass(frozen=True)
@@ -178,6 +182,11 @@ USUAL: dict[str, Usual] = {
     "road.loads_N.*": Usual(100, 6e4, "N", LOAD),
     "targets.modes.*.frequency_Hz": USUAL_MEASUREMENTS["frequency_Hz"],
     "targets.modes.*.weight": Usual(0, 1e4, "", least=1e-4),
+    "targets.modes.*.pressure_kPa": Usual(50, 1200, "kPa", PRESSURE),
+    "targets.modes.*.load_N": Usual(100, 6e4, "N", LOAD),
+    "targets.mass.mass_kg": USUAL_MEASUREMENTS["mass_kg"],
+    "targets.mass.weight": Usual(0, 1e4, "", least=1e-4),
+    "targets.footprint.*.pressure_kPa": Usual(50, 1200, "kPa", PRESSURE),
     "targets.footprint.*.load_N": Usual(100, 6e4, "N", LOAD),
     "targets.footprint.*.contact_area_m2": USUAL_MEASUREMENTS["contact_area_m2"],
     "targets.footprint.*.vertical_stiffness_N_per_m": USUAL_MEASUREMENTS[
@@ -260,7 +269,7 @@ def _ranges(
     elif here == "targets" and last in _OF_SIGMA:
         value = number(at(data, keys[:-1]), _OF_SIGMA[last])
         if value and value > 0:
-            whole = USUAL[dotted((*keys[:2], "*", _OF_SIGMA[last]))]
+            whole = USUAL[dotted((*keys[:2], *["*"] * (len(keys) - 3), _OF_SIGMA[last]))]
             yield replace(whole, low=SMALLEST_SIGMA * value, high=LARGEST_SIGMA * value), ""
     else:
         words = tuple(map(str, keys))

@@ -71,6 +71,12 @@ def mass(model: Model) -> csr_array:
     return csr_array(entries, (n, n))
 
 
+def total_mass(model: Model) -> complex:
+    """kg of the whole tyre; its imaginary part carries a number's tangent."""
+    whole = sum(matrices.sum() for _, matrices in mass_matrices(model))
+    return complex(2 * np.pi * model.mesh.symmetry.copies * whole)
+
+
 def mass_matrices(model: Model) -> OfElements:
     """Element masses (e, a, a), kg per radian; cords' are added to those of their rubber."""
     return [(part.connectivity, part.mass) for part in model.parts if part.mass is not None]

@@ -40,9 +40,10 @@ class PointElements:
         return np.asarray(k @ at**2 - eigenvalues * (m @ at**2))
 
     @property
-    def total_kg(self) -> float:
-        """The sum of the masses, each of which is in three components."""
-        return float(self.mass.real.sum()) / 3
+    def total_kg(self) -> complex:
+        """The sum of the masses, each of which is in three components; its imaginary part carries
+        a number's tangent."""
+        return complex(self.mass.sum()) / 3
 
     @property
     def highest(self) -> int:

@@ -66,7 +66,7 @@ def _whole(fits: Sequence[FitResult | None]) -> Iterator[Row]:
     yield Row("objective", "fitted", _cells(fits, _objective))
     yield Row("worst mode", "", _cells(fits, _worst))
     yield Row("converged", "design points", _cells(fits, _end))
-    yield Row("pressure", "", _cells(fits, lambda fit: f"{fit.pressure_kPa:g} kPa"))
+    yield Row("pressure", "", _cells(fits, _pressures))
     yield Row("mass", "tyre without rim", _cells(fits, lambda fit: f"{fit.mass_kg:.2f} kg"))
 
 
@@ -87,6 +87,11 @@ def _end(fit: FitResult) -> str:
     return f"{'yes' if fit.converged else 'no'}, {fit.evaluations}"
 
 
+def _pressures(fit: FitResult) -> str:
+    told = dict.fromkeys(each.pressure_kPa for each in fit.states) or [fit.pressure_kPa]
+    return f"{', '.join(f'{p:g}' for p in told)} kPa"
+
+
 def _worst(fit: FitResult) -> str:
     if not fit.modes:
         return NOTHING
@@ -95,7 +100,9 @@ def _worst(fit: FitResult) -> str:
 
 
 def _aim(mode: FittedMode) -> tuple[str, str]:
-    return f"[{mode.c},{mode.m}]", mode.label.motion
+    return mode.named()[0].removesuffix(" ×2"), ", ".join(
+        filter(None, (mode.label.motion, mode.state))
+    )
 
 
 def _variable(fit: FitResult, name: str) -> str:
@@ -112,11 +119,8 @@ def _variable(fit: FitResult, name: str) -> str:
 def _deviations(fit: FitResult) -> dict[tuple[str, str], float]:
     """In %, by what was aimed at."""
     return {_aim(mode): mode.deviation_percent for mode in fit.modes} | {
-        (
-            f"{each.load_N:g} N",
-            ROAD_QUANTITIES[each.quantity].name.split(",")[0],
-        ): each.deviation_percent
-        for each in fit.footprint
+        (each.state, ROAD_QUANTITIES[each.quantity].name.split(",")[0]): each.deviation_percent
+        for each in fit.others
     }
 
 

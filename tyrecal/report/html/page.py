@@ -25,7 +25,8 @@ from ...studies.loaded_result import LoadSweep
 from ...studies.modes import ModesResult
 from ...studies.pressure_result import PressureSweep
 from ...studies.result import Deviation, Named, Result
-from ..convergence import draw_convergence, draw_deviations
+from ...tyre.case import as_written
+from ..convergence import draw_convergence, draw_deviations, draw_states
 from ..diagnosis_pictures import MAX_SHOWN, MIN_SHOWN_PROBABILITY, draw_residuals
 from ..figure import svg
 from ..footprint import draw_curves, draw_patches
@@ -161,17 +162,19 @@ def _pictures(found: Results, result: Result, draw: Draw) -> Iterator[Markup]:
     """The figures of a study, each with words for who does not see it."""
     fit, file = found.fit, f"{result.stem}.json"
     if isinstance(result, FitResult):
-        if result.modes:
+        if result.modes and not result.states:
             words = "Frequencies over their targets before and after the fit"
             yield draw("deviations", words, file, partial(draw_deviations, result.modes))
+        if result.states:
+            words = "Deviations from the targets after the fit, states side by side"
+            yield draw("states", words, file, partial(draw_states, result))
         if found.history:
             words = "The objective and the variables, design point by design point"
             plot = partial(draw_convergence, found.history, result.objective_unit)
             yield draw("convergence", words, "fit_history.csv", plot)
     elif isinstance(result, PressureSweep):
-        targets = {m.label: m.target_Hz for m in fit.modes} if fit else {}
-        at = fit.pressure_kPa if fit else 0.0
-        plot = partial(draw_pressure_sweep, result.rows, targets, at)
+        targets = fit.over_pressure() if fit else []
+        plot = partial(draw_pressure_sweep, result.rows, targets)
         yield draw("pressure", "Frequencies over the pressure", file, plot)
     elif isinstance(result, LoadSweep):
         plot = partial(draw_load_sweep, result.rows)
@@ -221,7 +224,8 @@ def _shapes(
     if shapes and shapes.load_N:
         heading = f"Mode shapes under {shapes.load_N:g} N, on the tread"
     if shapes and shapes.provenance and shapes.provenance.overrides:
-        changes = (f"{name} = {value:g}" for name, value in shapes.provenance.overrides.items())
+        given = shapes.provenance.overrides.items()
+        changes = (f"{name} = {as_written(value)}" for name, value in given)
         heading += f", with {', '.join(changes)}"
     return {"id": what, "heading": heading, "data": data, "why": why}
 
@@ -229,7 +233,7 @@ def _shapes(
 def _shown_modes(found: Results) -> Iterator[tuple[str, Shapes | None, Sequence[Named]]]:
     """Of each study whose modes are shown: its name, shapes, and the table's modes."""
     if fit := found.fit:
-        yield "fit", found.fit_shapes, fit.modes
+        yield "fit", found.fit_shapes, fit.of_first_state
     if modes := found.get(ModesResult):
         yield "modes", found.modes_shapes, modes.modes
 

@@ -79,6 +79,7 @@ class _Modes(_Tyre):
     modes: list[_Mode]
     gradients: dict[str, Triple]
     displacement: Points
+    mass_gradients: dict[str, Finite] = Field(default_factory=dict)
 
     @model_validator(mode="after")
     def _go_together(self) -> Self:

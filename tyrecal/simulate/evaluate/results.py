@@ -57,7 +57,8 @@ class Evaluation:
     """Modes of one deck at one pressure.
 
     mass_kg: of the tyre without rim; gradients: variable name to d f / d variable (mode,), in
-    Hz per unit of the variable; displacement (k, 3): the inflation's, at ``nodes`` (k,).
+    Hz per unit of the variable; mass_gradients: likewise d mass, kg per unit; displacement (k, 3):
+    the inflation's, at ``nodes`` (k,).
     """
 
     pressure_kPa: float
@@ -66,6 +67,7 @@ class Evaluation:
     gradients: dict[str, Array] = field(default_factory=dict)
     nodes: Array = field(default_factory=lambda: np.empty(0, int))
     displacement: Array = field(default_factory=lambda: np.empty((0, 3)))
+    mass_gradients: dict[str, float] = field(default_factory=dict)
 
 
 def evaluation(answer: dict[str, Any]) -> Evaluation:
@@ -93,4 +95,5 @@ def evaluation(answer: dict[str, Any]) -> Evaluation:
         gradients={name: np.array(slope) for name, slope in answer["gradients"].items()},
         nodes=nodes,
         displacement=displacement,
+        mass_gradients=dict(answer.get("mass_gradients", {})),
     )

@@ -46,7 +46,8 @@ class Solver(Protocol):
 
     def read(self, folder: Path) -> dict[str, Any]:
         """pressure_Pa, mass_kg, modes [{frequency_Hz, multiplicity, n, amplitude}], gradients
-        {variable: [Hz per unit]}, nodes, points, displacement. A doublet that is split is one
+        {variable: [Hz per unit]}, nodes, points, displacement and,
+        for fits to the mass, mass_gradients {variable: kg per unit}. A doublet that is split is one
         mode of multiplicity 2 at the mean frequency, with ``members`` [Hz, Hz].
 
         A solver in three dimensions gives each mode {frequency_Hz, multiplicity 1, displacement

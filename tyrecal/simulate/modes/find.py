@@ -12,7 +12,7 @@ from .label import Label, Mode, paired_labels
 from .match import margin, match
 
 MORE_MODES = (4, 8)  # per harmonic, where a label is not among the modes first asked for
-Wanted = Callable[[Sequence[Mode]], Sequence[Label]]
+Wanted = Callable[[int, Sequence[Mode]], Sequence[Label]]  # of a question's place, and its modes
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ def find_modes(
 ) -> Iterator[tuple[int, ModesAnswer]]:
     """Place and answer of each question as they come, those without a wanted label at the end.
 
-    wanted: labels, or what tells them from the modes.
+    wanted: labels, or what tells them from a question's place and its modes.
     """
     lost = dict.fromkeys(range(len(questions)), EvaluationFailed("lost_label", ""))
     for count in (None, *MORE_MODES):
@@ -53,7 +53,7 @@ def find_modes(
                 continue
             modes = paired_labels(answer.modes)
             try:
-                labels = wanted(modes) if callable(wanted) else wanted
+                labels = wanted(place, modes) if callable(wanted) else wanted
                 yield place, Found(answer, modes, match(modes, labels))
             except EvaluationFailed as error:
                 lost[place] = error

@@ -25,6 +25,7 @@ from ...simulate.evaluate.pool import process_pool
 from ...simulate.modes.label import Label
 from ...tyre.case import LoadedCase
 from ..diagnose.uncertainties import sources
+from ..fit.targets import target_labels
 from .draw import SWAPPED_WITHIN, Truth, draw, tyre
 from .maker import Computed, Maker
 from .protocol import Protocol, read_json, write_json, write_protocol
@@ -87,9 +88,10 @@ def make(
 
 def labels_of(case: LoadedCase) -> list[Label]:
     """The modes that are measured: the case's targets. Raises InputError."""
-    if case.case.targets is None or not case.case.targets.modes:
+    labels = target_labels(case)
+    if not labels:
         raise InputError(f"{case.path}: blind trials measure the case's targets.modes, it has none")
-    return [Label(t.c, t.m, t.kind) for t in case.case.targets.modes]
+    return labels
 
 
 def values(trial: Trial, protocol: Protocol) -> dict[float, dict[Label, tuple[float, ...]]]:

@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...simulate.deck.tyre_design import TyreDesign
-from ...simulate.evaluate.failure import EvaluationFailed
 from ...simulate.modes.find import Found
 from ...tyre.case import LoadedCase
 from ...tyre.case.schema import Rubber, Solid
@@ -50,8 +49,9 @@ def regions(model: TyreModel, x: Array) -> list[SectionPart]:
     design = {**numbers, **taken}
     states = [{**design, "pressure_kPa": p} for p in model.pressures]
     at: dict[float, Found] = {}
-    for pressure, each in zip(model.pressures, problem.modes(states, tuple(numbers)), strict=True):
-        if isinstance(each, EvaluationFailed):
+    answers = problem.modes_of([(state, tuple(numbers)) for state in states])
+    for pressure, each in zip(model.pressures, answers, strict=True):
+        if not isinstance(each, Found):
             raise each
         at[pressure] = each
     result = []

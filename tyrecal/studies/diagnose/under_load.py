@@ -15,7 +15,7 @@ from ...simulate.modes.label import Label
 from ...simulate.modes.loaded import Member
 from ...tyre.case import LoadedCase
 from ...tyre.templates import TemplateFailed
-from ..fit.footprint import ROW
+from ..fit.road import ROW
 from ..footprint import footprint_row
 from ..loaded import load_tyres
 from .tyre_model import asked_for

@@ -14,6 +14,7 @@ from ...simulate.evaluate.executor import executor, in_order
 from ...simulate.evaluate.failure import EvaluationFailed
 from ...tyre.case import LoadedCase
 from ...tyre.case.schema import cannot_fit
+from ..fitted import pressure_name
 from ..result import csv_text
 from . import least_squares, slsqp
 from .problem import Point, Problem
@@ -87,8 +88,8 @@ def calibrate(
 
 
 def check(problem: Problem) -> None:
-    """Raises InputError; DeckRefused where there are footprint targets and the solver has no
-    road."""
+    """Raises InputError; DeckRefused where there are targets on the road and the solver has none,
+    or it cannot express a state of theirs."""
     if not len(problem.scale):
         raise InputError(
             "the case has no targets: there is nothing to fit to; add measured modes to it, as in"
@@ -96,11 +97,20 @@ def check(problem: Problem) -> None:
         )
     if not problem.variables:
         raise InputError("no variable is free: there is nothing to fit")
-    weights = [t.weight for t in problem.targets] + [t.weight for t in problem.footprint]
-    if reason := cannot_fit(weights, len(problem.variables)):
+    if reason := cannot_fit([t.weight for t in problem.measured], len(problem.variables)):
         raise InputError(reason)
-    if problem.footprint:
-        problem.evaluator.needs_road()
+    if problem.road:
+        problem.evaluator.needs_road(modes=any(t.member for t in problem.road))
+    for state in {t.state.unloaded for t in problem.measured}:
+        own = state.numbers(problem.case)
+        for each in problem.variables:
+            if "pressure_kPa" in own and pressure_name(problem.case) == each.name:
+                raise InputError(
+                    f"variable '{each.name}' sets pressure_kPa, which targets state: hold it with"
+                    f" --fix {each.name}"
+                )
+        if own:
+            problem.evaluator.refuse_lacking(problem.evaluator.design.at(own))
 
 
 def _run(problem: Problem, start: Array, method: str) -> StartReport:
@@ -118,7 +128,7 @@ def _tolerance(problem: Problem) -> float:
     """What the projected gradient can be told from 0 by, given how exact the slopes are."""
     modal = SLOPE_NOISE_HZ * (problem.difference_step or 0.0)
     sigma = min((t.sigma_Hz or 1.0 for t in problem.targets), default=1.0)
-    pressed = SLOPE_ERROR * float(np.linalg.norm([t.scale * t.value for t in problem.footprint]))
+    pressed = SLOPE_ERROR * float(np.linalg.norm([t.scale * t.value for t in problem.road]))
     return max(TOLERANCE, modal / sigma + pressed)
 
 

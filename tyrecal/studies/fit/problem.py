@@ -2,13 +2,15 @@
 
 F = sqrt( sum over modes, doublets twice, of w (f_num - f_ref)^2 )
 
-With standard deviations sigma, and footprint targets q (contact areas, vertical stiffnesses):
+With standard deviations sigma, and other targets q (on the road contact areas, vertical
+stiffnesses and modes, and the mass):
 
 F = sqrt( sum over modes, doublets twice, of w ((f_num - f_ref) / sigma)^2
-          + sum over footprint targets of w ((q_num - q_ref) / sigma)^2 )
+          + sum over other targets of w ((q_num - q_ref) / sigma)^2 )
 
 A frequency without sigma counts as one of 1 Hz, so that without any F is equation (1) in Hz; with
-some, F is a number of standard deviations.
+some, F is a number of standard deviations. Each target has its state: a design is evaluated once in
+each state that has one.
 """
 
 from __future__ import annotations
@@ -24,49 +26,36 @@ from ...simulate.evaluate.failure import DeckRefused, EvaluationFailed, SolverUn
 from ...simulate.modes.find import Found, ModesAnswer, find_modes
 from ...simulate.modes.label import Label, Mode
 from ...tyre.case import LoadedCase
+from ...tyre.state import AS_THE_CASE, TyreState, without
 from .differences import STEP, differences
-from .footprint import MAX_SLOPE, PRESS_STEP, press, read_footprint_targets
+from .road import MAX_SLOPE, PRESS_STEP, press
+from .targets import Target, ValueTarget, read_mass_targets, read_road_targets, read_targets
 from .variable import read_variable
 
 Array = np.ndarray
 
 
 @dataclass(frozen=True)
-class Target:
-    """A measured mode: frequency and standard deviation in Hz, weight in the objective."""
-
-    label: Label
-    frequency_Hz: float
-    weight: float = 1.0
-    sigma_Hz: float | None = None
-
-    @property
-    def multiplicity(self) -> int:
-        """How many modes it stands for: doublets count twice."""
-        return 2 if self.label.c else 1
-
-    @property
-    def scale(self) -> float:
-        """Residual per Hz, sqrt(weight multiplicity) / sigma."""
-        return math.sqrt(self.weight * self.multiplicity) / (self.sigma_Hz or 1.0)
-
-
-@dataclass(frozen=True)
 class Point:
     """One evaluated design: coordinates x, residuals sqrt(w) (q - q_ref) / sigma (a doublet's by
-    sqrt 2), their Jacobian by x, the modes that were matched, and the label's margin; of each
-    footprint target its quantity, in its own unit; by how much the objective may jump nearby, as
-    nodes of the tread come to touch the road."""
+    sqrt 2), their Jacobian by x, the modes that were matched in each state, and the labels' margin;
+    of each other target its quantity, in its own unit; by how much the objective may jump nearby,
+    as nodes of the tread come to touch the road."""
 
     values: Mapping[str, float]
     x: Array
     residuals: Array
     jacobian: Array
-    modes: dict[Label, Mode]
+    states: dict[TyreState, dict[Label, Mode]]
     clarity: float
     mass_kg: float
-    footprint: Array
+    others: Array
     roughness: float
+
+    @property
+    def modes(self) -> dict[Label, Mode]:
+        """Those of the case's own state, or of the first one that was measured."""
+        return next(iter(self.states.values()), {})
 
     @property
     def objective(self) -> float:
@@ -95,8 +84,9 @@ class Problem:
     """Evaluates designs for an optimiser, each distinct one once.
 
     notify: called with (number of the point, its values, Point or failure) as they come; jobs: how
-    many neighbours of a point are evaluated at a time, where the solver gives no slopes or presses.
-    targets: the modes'; footprint: those of footprints, whose residuals follow the modes'.
+    many states of a point are evaluated at a time, and how many neighbours, where the solver gives
+    no slopes or presses. measured: all targets, as their residuals stand: ``targets``, the unloaded
+    tyre's modes, then ``others``, on the ``road`` and the ``mass``; labels: of modes by state.
     """
 
     def __init__(
@@ -114,9 +104,16 @@ class Problem:
             for name, v in case.case.variables.items()
             if name not in self.fixed
         ]
-        self.targets, self.footprint = read_targets(case), read_footprint_targets(case)
-        modal, pressed = ([t.scale for t in each] for each in (self.targets, self.footprint))
-        self.scale = np.array(modal + pressed)
+        self.targets, self.road = read_targets(case), read_road_targets(case)
+        self.mass = read_mass_targets(case)
+        self.others = [*self.road, *self.mass]
+        self.measured: list[Target | ValueTarget] = [*self.targets, *self.others]
+        self.scale = np.array([each.scale for each in self.measured])
+        self.labels: dict[TyreState, list[Label]] = {}
+        for target in self.targets:
+            self.labels.setdefault(target.state, []).append(target.label)
+        if not self.labels:  # for the mass, and to see that there is such a tyre
+            self.labels[AS_THE_CASE] = []
         self.lower = np.array([v.scaled(v.lower) for v in self.variables])
         self.upper = np.array([v.scaled(v.upper) for v in self.variables])
         self.difference_step = (
@@ -157,83 +154,124 @@ class Problem:
     def _evaluate(self, values: dict[str, float]) -> Point:
         names = tuple(v.name for v in self.variables)
         exact = self.difference_step is None
-        (answer,) = self.modes([values], names if exact else ())
-        if isinstance(answer, EvaluationFailed):
-            raise answer
-        modes, gradients = answer.wanted, answer.evaluation.gradients
-        order = [modes[t.label] for t in self.targets]
-        frequencies = np.array([m.frequency_Hz for m in order])
+        (found,) = self._in_states([values], names if exact else ())
+        if isinstance(found, EvaluationFailed):
+            raise found
+        measured = self._measured(found)
         if exact:
-            slopes = np.array([[gradients[n][m.position] for n in names] for m in order])
-            slopes = slopes.reshape(len(order), len(names))
-            slopes *= [v.slope(values[v.name]) for v in self.variables]
+            slopes = self.slopes(found, self.targets, values)
+            if self.mass:
+                slopes = np.vstack([slopes, self._mass_slopes(found, values)])
         else:
-            step = self.difference_step or STEP
-            slopes = differences(self.variables, values, step, self._frequencies, frequencies)[1]
+            step, ask = self.difference_step or STEP, self._neighbours
+            slopes = differences(self.variables, values, step, ask, measured)[1]
+        modal, count = len(self.targets), len(self.road)
         pressed = shares = np.empty(0)
-        if self.footprint:
-            ask = lambda designs: press(
-                self.case, self.evaluator, self.footprint, designs, self.jobs
+        if self.road:
+            ask = lambda designs: press(self.case, self.evaluator, self.road, designs, self.jobs)
+            quantities, rises = differences(
+                self.variables, values, PRESS_STEP, ask, steepest=MAX_SLOPE
             )
-            found, rises = differences(self.variables, values, PRESS_STEP, ask, steepest=MAX_SLOPE)
-            pressed, shares = np.split(found, 2)
-            slopes = np.vstack([slopes, rises[: len(pressed)]])
-        wanted = [t.frequency_Hz for t in self.targets] + [t.value for t in self.footprint]
+            pressed, shares = np.split(quantities, 2)
+            slopes = np.vstack([slopes[:modal], rises[:count], slopes[modal:]])
+        others = np.concatenate([pressed, measured[modal:]])
+        wanted = [t.frequency_Hz for t in self.targets] + [t.value for t in self.others]
         x = np.array([v.scaled(values[v.name]) for v in self.variables])
         return Point(
             values,
             x,
-            self.scale * (np.concatenate([frequencies, pressed]) - wanted),
+            self.scale * (np.concatenate([measured[:modal], others]) - wanted),
             self.scale[:, None] * slopes,
-            modes,
-            answer.clarity,
-            answer.evaluation.mass_kg,
-            pressed,
-            float(np.linalg.norm(self.scale[len(order) :] * pressed * shares)),
+            {state: answer.wanted for state, answer in found.items()},
+            min(answer.clarity for answer in found.values()),
+            _mass_kg(found),
+            others,
+            float(np.linalg.norm(self.scale[modal : modal + count] * pressed * shares)),
         )
 
-    def _frequencies(
+    def _measured(self, found: Mapping[TyreState, Found]) -> Array:
+        """Frequencies (targets,) of a design, Hz, and behind them its mass where it is a target."""
+        hertz = [found[t.state].wanted[t.label].frequency_Hz for t in self.targets]
+        return np.array(hertz + [_mass_kg(found) for _ in self.mass])
+
+    def slopes(
+        self,
+        found: Mapping[TyreState, Found],
+        targets: Sequence[Target],
+        values: Mapping[str, float],
+    ) -> Array:
+        """d f / d x (targets, variables), Hz, exact; a state's own numbers hang on no variable."""
+        modes = [(found[t.state], found[t.state].wanted[t.label].position) for t in targets]
+        rows = [[_slope(each, v.name, place) for v in self.variables] for each, place in modes]
+        slopes = np.array(rows, float).reshape(len(rows), len(self.variables))
+        return slopes * [v.slope(values[v.name]) for v in self.variables]
+
+    def _mass_slopes(self, found: Mapping[TyreState, Found], values: Mapping[str, float]) -> Array:
+        """d mass / d x (variables,), kg. Raises DeckRefused where the solver does not tell it."""
+        known: dict[str, float] = {}
+        for each in found.values():  # a variable that one state sets moves the mass in the others
+            known |= each.evaluation.mass_gradients
+        if not known:
+            name = self.evaluator.solver.name
+            raise DeckRefused(f"solver '{name}' gives no slopes of the mass, which is a target")
+        slopes = [known.get(v.name, 0.0) * v.slope(values[v.name]) for v in self.variables]
+        return np.array(slopes)
+
+    def _neighbours(
         self, designs: Sequence[Mapping[str, float]]
     ) -> Iterator[Array | EvaluationFailed]:
-        """Frequencies (targets,) of each design, Hz, or its failure."""
-        for answer in self.modes(designs):
-            if isinstance(answer, EvaluationFailed):
-                yield answer
-            else:
-                yield np.array([answer.wanted[t.label].frequency_Hz for t in self.targets])
+        """`_measured` of each design, or its failure."""
+        for found in self._in_states(designs):
+            yield found if isinstance(found, EvaluationFailed) else self._measured(found)
 
-    def modes(
+    def _in_states(
         self, designs: Sequence[Mapping[str, float]], names: tuple[str, ...] = ()
-    ) -> list[Found | EvaluationFailed]:
-        """Of each design its target modes, or its failure. Raises DeckRefused."""
-        found: list[Found | EvaluationFailed] = []
-        for answer in self.modes_of([(design, names) for design in designs]):
-            if isinstance(answer, DeckRefused):
-                raise answer
-            found.append(answer)
+    ) -> list[dict[TyreState, Found] | EvaluationFailed]:
+        """Of each design its target modes in every state, or its first failure, all asked for at
+        once. Raises DeckRefused."""
+        wanted = [
+            self.question(design, state, names) for design in designs for state in self.labels
+        ]
+        answers = iter(self.modes_of(wanted, [*self.labels.values()] * len(designs)))
+        found: list[dict[TyreState, Found] | EvaluationFailed] = []
+        for _ in designs:
+            here = {state: next(answers) for state in self.labels}
+            for answer in here.values():
+                if isinstance(answer, DeckRefused):
+                    raise answer
+            failed = (each for each in here.values() if isinstance(each, EvaluationFailed))
+            modes = {state: each for state, each in here.items() if isinstance(each, Found)}
+            found.append(next(failed, modes))
         return found
 
+    def question(
+        self, values: Mapping[str, float], state: TyreState, names: tuple[str, ...]
+    ) -> tuple[dict[str, float], tuple[str, ...]]:
+        """A design in a state, and those of the slopes ``names`` that it has there."""
+        own = state.numbers(self.case)
+        left = without(self.case, dict.fromkeys(names, 0.0), own)
+        return state.design(self.case, values), tuple(left)
+
     def modes_of(
-        self, wanted: Sequence[tuple[Mapping[str, float], tuple[str, ...]]]
+        self,
+        wanted: Sequence[tuple[Mapping[str, float], tuple[str, ...]]],
+        labels: Sequence[Sequence[Label]] = (),
     ) -> list[ModesAnswer]:
-        """`modes` of designs, each with the names of its own slopes, refusals among them."""
-        labels = [t.label for t in self.targets]
+        """Of each design, with the names of its own slopes, the modes with its ``labels``, by
+        default those of all targets; failures and refusals among them."""
+        every = [t.label for t in self.targets]
+        tell = lambda place, modes: labels[place] if labels else every
         questions = [Question(*each) for each in wanted]
-        answers = dict(find_modes(self.evaluator, questions, labels, self.jobs))
+        answers = dict(find_modes(self.evaluator, questions, tell, self.jobs))
         return [answers[place] for place in range(len(wanted))]
 
 
-def objective_unit(case: LoadedCase) -> str:
-    """``Hz``, or ``sigma`` where a target has a standard deviation: the objective counts them."""
-    modal = any(target.sigma_Hz for target in read_targets(case))
-    return "sigma" if modal or read_footprint_targets(case) else "Hz"
+def _mass_kg(found: Mapping[TyreState, Found]) -> float:
+    """The tyre's, kg, the same in every state."""
+    return next(iter(found.values())).evaluation.mass_kg
 
 
-def read_targets(case: LoadedCase) -> list[Target]:
-    """Target modes of a case; an empty list where it has none."""
-    if case.case.targets is None:
-        return []
-    return [
-        Target(Label(t.c, t.m, t.kind), t.frequency_Hz, t.weight, t.sigma_Hz)
-        for t in case.case.targets.modes
-    ]
+def _slope(found: Found, name: str, place: int) -> float:
+    """d f / d variable of the mode at a place, Hz per unit of it; 0 where it sets nothing there."""
+    gradient = found.evaluation.gradients.get(name)
+    return 0.0 if gradient is None else float(gradient[place])

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
 import numpy as np
 from pydantic import Field
 
+from ...simulate.modes.label import Label
+from ...tyre.state import AS_THE_CASE
 from ...tyre.values import with_values
 from ..result import (
     NAME_COLUMNS,
@@ -20,17 +22,23 @@ from ..result import (
     ResultPart,
     Table,
     csv_text,
+    in_lines,
+    state_words,
 )
 from . import slsqp
-from .problem import Point, Problem, objective_unit
+from .problem import Point, Problem
+from .states import next_states, plain, state_reports
+from .targets import objective_unit
 from .uncertainty import FitUncertainty, uncertainty
 
 MIN_STEP = 1e-6  # of a scaled variable, below which the fit did not move, or is at a bound
 NEAR_BEST_HZ = 0.05  # of the objective: the fit could have ended there
-ROAD_QUANTITIES = {  # targets on the road
+ROAD_QUANTITIES = {  # targets that are no modes
     "contact_area_m2": Column("contact area, cm²", ".1f", 1e4),
     "vertical_stiffness_N_per_m": Column("vertical stiffness, N/mm", ".1f", 1e-3),
+    "mass_kg": Column("mass, kg", ".2f"),
 }
+MOST_PROPOSED = 4  # states in a table
 HERTZ, RESULT_DIGITS = Column("Hz"), Column("", ".4g")
 
 
@@ -64,26 +72,73 @@ class FittedVariable(ResultPart):
         return f"{percent:.0f}" if percent >= 10 else f"{percent:.2g}"
 
 
+class FittedState(ResultPart):
+    """A state, as `TyreState` with nothing left to the case: what its values add, as standard
+    errors of a fit without it; of one that was not measured, what they would be with it."""
+
+    pressure_kPa: float
+    load_N: float
+    rim: str
+    values: int = 0
+    rms_sigmas: float | None = None
+    standard_errors_without: dict[str, float | None] = Field(default={})
+    standard_errors_with: dict[str, float | None] = Field(default={})
+    ratio: float | None = None  # of the standard errors with it to those without, their mean
+
+    @property
+    def said(self) -> str:
+        """In words."""
+        return state_words(self.pressure_kPa, self.load_N, self.rim)
+
+
 class FittedMode(Named):
-    """A mode that has a target."""
+    """A mode that has a target; in a fit over several states, its own."""
 
     multiplicity: int
     initial_Hz: PositiveNumber
     fitted_Hz: PositiveNumber
     target_Hz: PositiveNumber
     deviation_percent: float
+    sigma_Hz: float | None = None
+    pressure_kPa: float | None = None
+    load_N: float = 0.0
+    rim: str | None = None
+    symmetry: str | None = None
+
+    @property
+    def state(self) -> str:
+        """In words; "" in a fit to one."""
+        if self.pressure_kPa is None:
+            return ""
+        return state_words(self.pressure_kPa, self.load_N, self.rim or "")
+
+    def named(self) -> list[str]:
+        """The cells of `NAME_COLUMNS`."""
+        name, motion = super().named()
+        return [f"{name} {self.symmetry or ''}".rstrip(), motion]
 
 
 class FittedFootprint(ResultPart):
-    """A target on the road, SI."""
+    """A target on the road that is no mode, or the mass, SI."""
 
-    load_N: float
-    quantity: Literal["contact_area_m2", "vertical_stiffness_N_per_m"]
+    load_N: float = 0.0
+    quantity: Literal["contact_area_m2", "vertical_stiffness_N_per_m", "mass_kg"]
     initial: float
     fitted: float
     target: float
     sigma: float | None = None
     deviation_percent: float
+    pressure_kPa: float | None = None
+    rim: str | None = None
+
+    @property
+    def state(self) -> str:
+        """In words, of the mass none; in a fit to one state the load."""
+        if self.quantity == "mass_kg":
+            return ""
+        if self.pressure_kPa is None:
+            return f"{self.load_N:g} N"
+        return state_words(self.pressure_kPa, self.load_N, self.rim or "")
 
 
 class FitResult(Result):
@@ -110,6 +165,9 @@ class FitResult(Result):
     fixed: dict[str, float]
     modes: list[FittedMode]
     footprint: list[FittedFootprint] = Field(default=[])
+    mass: FittedFootprint | None = None
+    states: list[FittedState] = Field(default=[])  # of a fit over several
+    next_states: list[FittedState] = Field(default=[])  # the most telling first
     noise_Hz: float | None = None  # standard deviation of a frequency
     correlations: dict[str, dict[str, float | None]]
     singular_values: list[float]
@@ -124,35 +182,116 @@ class FitResult(Result):
     def csv(self) -> str:
         keys = ["c", "m", "kind", "multiplicity", "initial_Hz", "fitted_Hz", "target_Hz"]
         keys.append("deviation_percent")
-        if self.footprint:
+        if self.others:
             keys += ["load_N", "quantity", "initial", "fitted", "target", "sigma"]
-        return csv_text(keys, (each.model_dump() for each in (*self.modes, *self.footprint)))
+        if self.states:
+            own = ["pressure_kPa", "load_N", "rim", "symmetry", "sigma_Hz"]
+            keys += [key for key in own if key not in keys]
+        rows = (*self.modes, *self.others)
+        return csv_text(keys, (each.model_dump(exclude_unset=True) for each in rows))
+
+    def over_pressure(self) -> list[tuple[Label, float, float]]:
+        """Label, kPa and Hz of the unloaded tyre's targets on the first one's rim."""
+        return [
+            (mode.label, mode.pressure_kPa or self.pressure_kPa, mode.target_Hz)
+            for mode in self.modes
+            if not mode.load_N and mode.rim == self.modes[0].rim
+        ]
+
+    @property
+    def of_first_state(self) -> list[FittedMode]:
+        """The modes whose shapes are kept: of a fit over several states those in the first."""
+        return [mode for mode in self.modes if mode.state == self.modes[0].state]
+
+    @property
+    def others(self) -> list[FittedFootprint]:
+        """All targets but modes."""
+        return [*self.footprint, *([self.mass] if self.mass else [])]
 
     def tables(self) -> list[Table]:
         in_hertz = self.objective_unit == "Hz"
-        units = f"frequencies{' and objective' * in_hertz} in Hz"
+        words = "equation (1)" if in_hertz else "deviations in sigmas"
+        objective = [f"{x:.3f}" for x in (self.initial_objective_Hz, self.objective_Hz)]
+        return [
+            self._side_by_side() if self.states else self._every_target(),
+            self._variables(),
+            Table((), [["objective", words, *objective, "", ""]]),
+            *self._states(),
+        ]
+
+    def numbers(self) -> list[Table]:
+        """Of a fit over several states all targets, a line each."""
+        return [self._every_target()] if self.states else []
+
+    def _every_target(self) -> Table:
         heads = [*NAME_COLUMNS, *map(Column, ("initial", "fitted", "target", "deviation %"))]
+        heads[:0] = [Column("state", "")] * bool(self.states)
         rows: list[list[Any]] = [
             [
+                *[mode.state] * bool(self.states),
                 *mode.named(),
                 *map(HERTZ.cell, (mode.initial_Hz, mode.fitted_Hz, mode.target_Hz)),
                 Deviation(mode.deviation_percent),
             ]
             for mode in self.modes
         ]
-        for each in self.footprint:
+        for each in self.others:
             quantity = ROAD_QUANTITIES[each.quantity]
             figures = map(quantity.cell, (each.initial, each.fitted, each.target))
             off = Deviation(each.deviation_percent)
-            rows.append([f"{each.load_N:g} N", quantity.name, *figures, off])
-        words = "equation (1)" if in_hertz else "deviations in sigmas"
-        objective = [f"{x:.3f}" for x in (self.initial_objective_Hz, self.objective_Hz)]
-        caption = "; ".join(filter(None, (units, str(self.provenance or ""))))
-        return [
-            Table(heads, rows, caption=caption),
-            self._variables(),
-            Table((), [["objective", words, *objective, "", ""]]),
+            place = [each.state, ""] if self.states else [each.state]
+            rows.append([*place, quantity.name, *figures, off])
+        in_hertz = self.objective_unit == "Hz"
+        units = f"frequencies{' and objective' * in_hertz} in Hz"
+        return Table(heads, rows, caption=self._caption(units))
+
+    def _side_by_side(self) -> Table:
+        """Deviations of all targets from fitted values, a column a state."""
+        shown: dict[tuple[str, str], dict[str, Deviation]] = {}
+        for mode in self.modes:
+            name, motion = mode.named()
+            shown.setdefault((name, motion), {})[mode.state] = Deviation(mode.deviation_percent)
+        for each in self.others:
+            name = ROAD_QUANTITIES[each.quantity].name.split(",")[0]
+            shown.setdefault((name, ""), {})[each.state] = Deviation(each.deviation_percent)
+        states = list(dict.fromkeys(state for row in shown.values() for state in row))
+        heads = [*NAME_COLUMNS, *(Column(in_lines(state or "any state")) for state in states)]
+        rows = [[*name, *(row.get(state) for state in states)] for name, row in shown.items()]
+        return Table(heads, rows, caption=self._caption("deviations of fitted values, %"))
+
+    def _caption(self, units: str) -> str:
+        return "; ".join(filter(None, (units, str(self.provenance or ""))))
+
+    def _states(self) -> list[Table]:
+        """What each state adds and, below, which would tell most next."""
+        if not self.states:
+            return []
+        own = {name: each.standard_error for name, each in self.variables.items()}
+        heads = [Column("left out", ""), Column("values", "d"), Column("rms, sigmas")]
+        heads += [Column(in_lines(f"{name}, std. err. %")) for name in own]
+        rows: list[list[Any]] = [
+            [each.said, f"{each.values}", heads[2].cell(each.rms_sigmas)]
+            + [self._percent(n, each.standard_errors_without[n]) for n in own]
+            for each in self.states
         ]
+        rows.insert(0, ["nothing", "", "", *(self._percent(n, error) for n, error in own.items())])
+        tables = [Table(heads, rows, title="What each state adds")]
+        if self.next_states:
+            heads = [Column("added", ""), Column("errors become"), *heads[3:]]
+            rows = [
+                [each.said, f"{100 * (each.ratio or 0.0):.0f} %"]
+                + [self._percent(n, each.standard_errors_with[n]) for n in own]
+                for each in self.next_states[:MOST_PROPOSED]
+            ]
+            tables.append(
+                Table(heads, rows, title="Which state would tell most next, of the same modes")
+            )
+        return tables
+
+    def _percent(self, name: str, error: float | None) -> str | None:
+        """A standard error of a variable, as `FittedVariable.error_percent` has it."""
+        known = self.variables[name].model_copy(update={"standard_error": error})
+        return known.error_percent
 
     def _variables(self) -> Table:
         heads = [Column("variable", ""), Column("", "")]
@@ -189,18 +328,11 @@ def fit_result(
     objectives = [row["objective_Hz"] for row in history]
     known = uncertainty(problem, point)
     names = [v.name for v in problem.variables]
-    pressed = [
-        {
-            "load_N": target.load_N,
-            "quantity": target.quantity,
-            "initial": float(initial.footprint[i]),
-            "fitted": float(point.footprint[i]),
-            "target": target.value,
-            "sigma": target.sigma,
-            "deviation_percent": 100 * (float(point.footprint[i]) / target.value - 1),
-        }
-        for i, target in enumerate(problem.footprint)
-    ]
+    several = {t.state.unloaded for t in problem.measured} != {AS_THE_CASE}
+    several = several or any(t.member for t in problem.road)
+    others = _others(problem, initial, point, several)
+    pressed = [each for each in others if each.quantity != "mass_kg"]
+    mass = [each for each in others if each.quantity == "mass_kg"]
     content = {
         "format": 1,
         "method": method,
@@ -224,8 +356,10 @@ def fit_result(
         "label_margin": point.clarity,
         "variables": _variables(problem, initial, point, known),
         "fixed": dict(problem.fixed),
-        "modes": _modes(problem, initial, point),
+        "modes": _modes(problem, initial, point, several),
         **({"footprint": pressed} if pressed else {}),
+        **({"mass": mass[0]} if mass else {}),
+        **(_states(problem, point, known) if several else {}),
         "noise_Hz": known.noise_Hz,
         "correlations": {
             a: {b: _finite(known.correlations[i, j]) for j, b in enumerate(names)}
@@ -265,21 +399,82 @@ def _variables(
     return variables
 
 
-def _modes(problem: Problem, initial: Point, point: Point) -> list[FittedMode]:
-    return [
-        FittedMode(
-            c=target.label.c,
-            m=target.label.m,
-            kind=target.label.kind,
-            frequency_Hz=point.modes[target.label].frequency_Hz,
-            multiplicity=point.modes[target.label].multiplicity,
-            initial_Hz=initial.modes[target.label].frequency_Hz,
-            fitted_Hz=(fitted := point.modes[target.label].frequency_Hz),
-            target_Hz=target.frequency_Hz,
-            deviation_percent=100 * (fitted / target.frequency_Hz - 1),
-        )
-        for target in problem.targets
+def _modes(problem: Problem, initial: Point, point: Point, several: bool) -> list[FittedMode]:
+    """Those of the unloaded tyre, then those on the road."""
+    found = []
+    for target in problem.targets:
+        before, after = (p.states[target.state][target.label] for p in (initial, point))
+        hertz = (before.frequency_Hz, after.frequency_Hz, target.frequency_Hz)
+        of = _mode(target.label, after.multiplicity, hertz)
+        own = plain(problem, target.state) | {"sigma_Hz": target.sigma_Hz}
+        found.append(FittedMode.model_validate(of | (own if several else {})))
+    for i, road in enumerate(problem.road):
+        if road.member:
+            hertz = (float(initial.others[i]), float(point.others[i]), road.value)
+            own = plain(problem, road.state) | {"symmetry": road.member.symmetry}
+            of = _mode(road.member.label, 1, hertz) | own | {"sigma_Hz": road.sigma}
+            found.append(FittedMode.model_validate(of))
+    return found
+
+
+def _mode(label: Label, multiplicity: int, hertz: tuple[float, float, float]) -> dict[str, Any]:
+    """Of a mode; hertz: initial, fitted, target."""
+    initial, fitted, target = hertz
+    return {
+        **asdict(label),
+        "frequency_Hz": fitted,
+        "multiplicity": multiplicity,
+        "initial_Hz": initial,
+        "fitted_Hz": fitted,
+        "target_Hz": target,
+        "deviation_percent": 100 * (fitted / target - 1),
+    }
+
+
+def _others(problem: Problem, initial: Point, point: Point, several: bool) -> list[FittedFootprint]:
+    """All but modes."""
+    found = []
+    for i, target in enumerate(problem.others):
+        if target.member:
+            continue
+        fitted = float(point.others[i])
+        of = {
+            "load_N": target.state.load_N,
+            "quantity": target.quantity,
+            "initial": float(initial.others[i]),
+            "fitted": fitted,
+            "target": target.value,
+            "sigma": target.sigma,
+            "deviation_percent": 100 * (fitted / target.value - 1),
+        }
+        if target.quantity == "mass_kg":
+            del of["load_N"]
+        elif several:
+            of |= plain(problem, target.state)
+        found.append(FittedFootprint.model_validate(of))
+    return found
+
+
+def _states(problem: Problem, point: Point, known: FitUncertainty) -> dict[str, Any]:
+    """What each adds, and which would tell most next."""
+    measured = [
+        {
+            **plain(problem, each.state),
+            "values": each.values,
+            "rms_sigmas": each.rms_sigmas,
+            "standard_errors_without": each.standard_errors_without,
+        }
+        for each in state_reports(problem, point, known)
     ]
+    more = [
+        {
+            **plain(problem, each.state),
+            "standard_errors_with": each.standard_errors_with,
+            "ratio": each.ratio,
+        }
+        for each in next_states(problem, point, known)
+    ]
+    return {"states": measured, "next_states": more}
 
 
 def _finite(value: float) -> float | None:

@@ -111,8 +111,7 @@ def _descend(
         if side != order(problem, point):
             edge = None
         elif edge or (
-            any(order(problem, p) == -side != 0 for p in seen)
-            and min(map(pair_clarity, seen)) < MIXED
+            any(order(problem, p) != side for p in seen) and min(map(pair_clarity, seen)) < MIXED
         ):
             edge = crossing(problem, seen, reached) or edge
         creeping = point.objective - reached.objective <= CREEPING * point.objective
@@ -135,7 +134,7 @@ def _is_bounded(point: Point, edge: Crossing) -> bool:
     as it is at any bound that holds."""
     normal = edge.slopes / max(float(np.linalg.norm(edge.slopes)), 1e-300)
     along = np.linalg.norm(point.gradient - (point.gradient @ normal) * normal)
-    near = pair_clarity(point) < TELLING
+    near = pair_clarity(point, edge.state) < TELLING
     return near and bool(along <= ALONG * np.linalg.norm(point.gradient))
 
 
@@ -147,9 +146,10 @@ def _restart(
     n = len(point.x)
     G, h = np.vstack([np.eye(n), -np.eye(n)]), [problem.lower - point.x, point.x - problem.upper]
     if edge:
-        side = np.sign(gap(point))
+        apart = gap(point, edge.state)
+        side = np.sign(apart)
         G = np.vstack([G, side * edge.slopes])
-        h.append(np.array([ROOM * abs(gap(point)) - side * edge.at(point.x)]))
+        h.append(np.array([ROOM * abs(apart) - side * edge.at(point.x)]))
     step = damped_step(point.jacobian, point.residuals, damping, G, np.concatenate(h))
     slope = float((point.jacobian.T @ point.residuals) @ step)  # of F^2/2 along it
     seen, share, before = [point], 1.0, 0.5 * point.objective**2
@@ -176,10 +176,10 @@ def _beyond_crossing(
     d of the crossing, see there, is carried to the other side of 0 with the least change of the
     residuals: dx = -(d +- wanted) H^-1 grad d / (grad d . H^-1 grad d).
     """
-    side = order(problem, point)
-    edge = edge or (crossing(problem, [point], point) if side else None)
+    edge = edge or crossing(problem, [point], point)
     if edge is None:
         return
+    side = np.sign(gap(point, edge.state))
     H = point.jacobian.T @ point.jacobian
     H[np.diag_indices(len(H))] += 1e-3 * np.trace(H) / len(H)
     direction = np.linalg.solve(H, edge.slopes)

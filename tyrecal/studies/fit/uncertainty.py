@@ -17,12 +17,14 @@ class FitUncertainty:
     correlations (v, v); singular_values (v,) of the weighted Jacobian by the scaled variables,
     in the objective's unit, largest first: a small one is a combination that the data do not see;
     noise_Hz: the standard deviation of a frequency behind the errors, None where there is no
-    frequency that counts, or it cannot be known."""
+    frequency that counts, or it cannot be known; sigma: of each target in its unit, NaN where it
+    does not count or cannot be known."""
 
     standard_errors: list[float | None]
     correlations: Array
     singular_values: Array
     noise_Hz: float | None
+    sigma: Array
 
 
 def uncertainty(problem: Problem, point: Point) -> FitUncertainty:
@@ -36,13 +38,11 @@ def uncertainty(problem: Problem, point: Point) -> FitUncertainty:
     """
     counts = problem.scale > 0
     J, root = point.jacobian[counts], problem.scale[counts]
-    inverse, seen = _inverse(J.T @ J)
+    inverse, _ = _inverse(J.T @ J)
     sigma = _noise(problem, point, counts, np.einsum("ij,jk,ik->i", J, inverse, J))
-    response = inverse @ (J * root[:, None]).T
-    covariance = (response * sigma**2) @ response.T
+    covariance, seen = fit_covariance(J, root, sigma)
+    errors = standard_errors(problem, point, covariance, seen)
     spread = np.sqrt(np.where(seen & np.isfinite(sigma).all(), np.diag(covariance), np.inf))
-    slopes = [v.slope(point.values[v.name]) for v in problem.variables]
-    errors = [float(s * k) if np.isfinite(s) else None for s, k in zip(spread, slopes, strict=True)]
     with np.errstate(invalid="ignore", divide="ignore"):
         correlations = covariance / np.outer(spread, spread)
         correlations[~seen] = correlations[:, ~seen] = np.nan
@@ -51,7 +51,28 @@ def uncertainty(problem: Problem, point: Point) -> FitUncertainty:
     values[: len(found)] = found
     modal = sigma[: int(counts[: len(problem.targets)].sum())]
     noise = float(np.sqrt(np.mean(modal**2))) if len(modal) else float("nan")
-    return FitUncertainty(errors, correlations, values, noise if np.isfinite(noise) else None)
+    every = np.full(len(problem.scale), np.nan)
+    every[counts] = sigma
+    return FitUncertainty(
+        errors, correlations, values, noise if np.isfinite(noise) else None, every
+    )
+
+
+def fit_covariance(J: Array, root: Array, sigma: Array) -> tuple[Array, Array]:
+    """Covariance (v, v) of the coordinates by rows of the weighted Jacobian, W^(1/2) and sigma of
+    targets, see `uncertainty`; which variables the data see (v,)."""
+    inverse, seen = _inverse(J.T @ J)
+    response = inverse @ (J * root[:, None]).T
+    return (response * sigma**2) @ response.T, seen
+
+
+def standard_errors(
+    problem: Problem, point: Point, covariance: Array, seen: Array
+) -> list[float | None]:
+    """Of each variable in its own unit; None where the data do not tell."""
+    slopes = [v.slope(point.values[v.name]) for v in problem.variables]
+    spread = np.sqrt(np.where(seen, np.diag(covariance), np.inf))
+    return [float(s * k) if np.isfinite(s) else None for s, k in zip(spread, slopes, strict=True)]
 
 
 def _noise(problem: Problem, point: Point, counts: Array, leverage: Array) -> Array:
@@ -61,7 +82,7 @@ def _noise(problem: Problem, point: Point, counts: Array, leverage: Array) -> Ar
     what the targets with a sigma do not determine of them, the others lose as freedom.
     """
     modal = [t.sigma_Hz or np.nan for t in problem.targets]
-    sigma = np.array(modal + [t.sigma for t in problem.footprint])[counts]
+    sigma = np.array(modal + [t.sigma for t in problem.others])[counts]
     unknown = np.isnan(sigma)
     freedom = unknown.sum() - (len(problem.variables) - leverage[~unknown].sum())
     if freedom > 1e-9:  # else the fit goes through every point and says nothing about noise

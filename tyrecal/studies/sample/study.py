@@ -21,7 +21,7 @@ from ..diagnose.tyre_model import TyreModel
 from ..diagnose.uncertainties import Source, calibrated, sources
 from ..emulator import Emulator, emulator, needs_slopes
 from ..fit.calibrate import calibrate
-from ..fit.problem import read_targets
+from ..fit.targets import read_targets
 from ..fit.variable import DesignVariable, read_variable
 from .box import Drawn, grown
 from .chains import needs_emcee
@@ -190,19 +190,19 @@ def noise_of_targets(case: LoadedCase, evaluator: Evaluator) -> float | None:
 
 
 def targets_as_readings(case: LoadedCase, noise_Hz: float | None) -> list[Measurement]:
-    """The case's target modes that have a weight, as they were measured."""
+    """The case's target modes that have a weight, as they were measured, on its own rim."""
     return [
         Measurement(
             "frequency_Hz",
             target.label,
             "",
-            case.case.pressure_kPa,
+            target.state.told(case).pressure_kPa or 0.0,
             0.0,
             target.frequency_Hz,
             target.sigma_Hz or noise_Hz or 0.0,
         )
         for target in read_targets(case)
-        if target.weight
+        if target.weight and not target.state.rim
     ]
 
 

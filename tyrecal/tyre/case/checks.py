@@ -105,18 +105,20 @@ def _targets(data: Mapping[str, Any]) -> Problems:
         if c is not None and highest is not None and c > highest:
             yield ("targets", "modes", i, "c"), f"must be at most highest_harmonic, {highest}"
         label = (c, number(mode, "m"), mode.get("kind"))
-        if WRONG in label or None in label[:2]:
+        state = tuple(mode.get(key) for key in ("pressure_kPa", "rim", "load_N", "symmetry"))
+        if WRONG in (*label, *state) or None in label[:2]:
             continue
-        first = seen.setdefault(label, i)
+        first = seen.setdefault((*label, *state), i)
         if first != i:
             name = f"[{label[0]},{label[1]}]" + (f" {label[2]}" if label[2] else "")
-            yield ("targets", "modes", i), f"the mode {name} is a target already"
+            there = " in this state" if any(state) else ""
+            yield ("targets", "modes", i), f"the mode {name} is a target already{there}"
     for i, target in enumerate(entries(table(data, "targets"), "footprint")):
         load = number(target, "load_N") if isinstance(target, dict) else None
         for quantity in MEASURED_SIGMA:
             if load is None or target.get(quantity) is None:
                 continue
-            first = seen.setdefault((load, quantity), i)
+            first = seen.setdefault((load, number(target, "pressure_kPa"), quantity), i)
             if first != i:
                 yield ("targets", "footprint", i), f"{quantity} at {load:g} N is a target already"
 

@@ -21,6 +21,7 @@ LEAST, LARGEST = 1e-30, 1e15  # beyond, products of numbers leave what a compute
 Moduli = Literal["long_term", "instantaneous"]
 MOST_RELAXED = 0.999  # of a modulus: what is left must be a tyre's
 Element = Literal["CGAX8R", "CGAX8", "CGAX4R"]
+RimSupport = Literal["fixed", "springs", "free"]
 
 
 def _can_be_computed_with(value: float) -> float:

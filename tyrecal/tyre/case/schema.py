@@ -31,6 +31,7 @@ from .parts import (
     Positive,
     RebarLayer,
     Rim,
+    RimSupport,
     RoadSpring,
     Rubber,
     SectionSource,
@@ -46,6 +47,7 @@ Load = Annotated[Positive, Field(ge=LEAST_LOAD_N, le=LARGEST_LOAD_N)]
 MEASURED_SIGMA = {"contact_area_m2": "sigma_m2", "vertical_stiffness_N_per_m": "sigma_N_per_m"}
 """What a footprint target can hold, and the key of its standard deviation."""
 Weight = Annotated[NotNegative, Field(le=1e6)]
+Pressure = Annotated[Number, Field(ge=0, lt=2000)]  # kPa
 
 
 class Analysis(Part):
@@ -141,7 +143,8 @@ class Variable(Part):
 
 class TargetMode(Part):
     """A measured mode [c, m]; ``kind`` tells the two [0, 0] apart; ``sigma_Hz``, its standard
-    deviation, counts as 1 Hz where it is not known."""
+    deviation, counts as 1 Hz where it is not known. Its state, by default the case's: pressure,
+    rim, load on the road; there ``symmetry`` about the patch tells the two of a doublet apart."""
 
     c: Annotated[int, Field(ge=0, le=20)]
     m: Annotated[int, Field(ge=0, le=3)]  # beyond, the belt's motion has no clear order
@@ -149,6 +152,10 @@ class TargetMode(Part):
     frequency_Hz: Frequency
     weight: Weight = 1.0
     sigma_Hz: Positive | None = None
+    pressure_kPa: Pressure | None = None
+    rim: RimSupport | None = None
+    load_N: Load | None = None
+    symmetry: Literal["symmetric", "antisymmetric"] | None = None
 
     @classmethod
     def problems(cls, values: Mapping[str, Any]) -> Iterator[Disagreement]:
@@ -159,12 +166,21 @@ class TargetMode(Part):
             yield "kind", "must be axial or torsional for the mode [0,0]"
         if (c or m) and kind is not None:
             yield "kind", f"must be absent: only [0,0] has a kind, this mode is [{c},{m}]"
+        loaded = [key for key in ("load_N", "symmetry") if values.get(key) is not None]
+        if loaded == ["load_N"]:
+            yield "symmetry", "must be symmetric or antisymmetric (about the patch) under load_N"
+        elif loaded == ["symmetry"]:
+            yield "symmetry", "must be absent without load_N"
+        if "load_N" in loaded and values.get("sigma_Hz") is None:
+            yield "sigma_Hz", "must be given for a mode under load_N"
 
 
 class TargetFootprint(Part):
-    """A measured contact area, or tangent vertical stiffness, at a load, with its sigma."""
+    """A measured contact area, or tangent vertical stiffness, at a load, with its sigma; its
+    pressure, by default the case's."""
 
     load_N: Load
+    pressure_kPa: Pressure | None = None
     contact_area_m2: Positive | None = None
     sigma_m2: Positive | None = None
     vertical_stiffness_N_per_m: Positive | None = None
@@ -189,22 +205,33 @@ class TargetFootprint(Part):
                     yield sigma, f"must be absent: it is of {key}, this target is {given[0]}"
 
 
+class TargetMass(Part):
+    """The measured mass of the tyre without its rim, with its sigma."""
+
+    mass_kg: Positive
+    sigma_kg: Positive
+    weight: Weight = 1.0
+
+
 class Targets(Part):
     """What was measured, and where it comes from."""
 
     source: Text = ""
     modes: list[TargetMode] = Field(default_factory=list)
     footprint: list[TargetFootprint] = Field(default_factory=list)
+    mass: TargetMass | None = None
 
     @property
     def loads_N(self) -> list[float]:
         """Loads at which something was measured, rising."""
-        return sorted({target.load_N for target in self.footprint})
+        modal = {mode.load_N for mode in self.modes if mode.load_N}
+        return sorted(modal | {target.load_N for target in self.footprint})
 
     @property
     def weights(self) -> list[float]:
         """The weight of each."""
-        return [t.weight for t in self.modes] + [t.weight for t in self.footprint]
+        mass = [self.mass.weight] if self.mass else []
+        return [t.weight for t in self.modes] + [t.weight for t in self.footprint] + mass
 
 
 class Uncertainty(Part):
@@ -250,7 +277,7 @@ class Case(Part):
     format: Annotated[int, Field(ge=1, le=1)]  # Literal[1] would take true
     name: Text
     size: Text
-    pressure_kPa: Annotated[Number, Field(ge=0, lt=2000)]
+    pressure_kPa: Pressure
     deck: DeckSource | None = None
     section: SectionSource = SectionSource()
     mesh: Mesh = Mesh(

@@ -130,6 +130,7 @@ def disagreements(data: Mapping[str, Any]) -> Iterator[tuple[Keys, str]]:
     for key, kind in (("modes", TargetMode), ("footprint", TargetFootprint)):
         for i, target in enumerate(entries(table(data, "targets"), key)):
             parts.append((("targets", key, i), target, kind))
+
     parts += [((key,), data.get(key), kind) for key, kind in SINGLE.items()]
     parts.append(((), data, Case))
     for keys, part, kind in parts:

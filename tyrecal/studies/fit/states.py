@@ -1,0 +1,151 @@
+"""What each state of a fit tells of the variables, and which state would tell most next.
+
+Standard errors are those of the linearised fit (see `uncertainty`): without a state its rows of the
+Jacobian are left out; with another one rows are added, of the same modes as the best measured
+unloaded state has, with the same relative standard deviations, at the fitted design.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...simulate.modes.find import Found
+from ...tyre.state import RIMS, TyreState
+from ...tyre.usual import USUAL
+from .problem import Point, Problem
+from .targets import Target
+from .uncertainty import FitUncertainty, fit_covariance, standard_errors
+
+Array = np.ndarray
+STEP_OUT = 1.25  # of pressure, below and above those measured
+ROUNDED_kPa = 10.0  # pressures that are proposed are multiples of it
+Errors = dict[str, float | None]  # by variable
+
+
+@dataclass(frozen=True)
+class StateReport:
+    """A measured state: how many values count, their rms deviation in standard deviations, and the
+    standard errors of a fit without it."""
+
+    state: TyreState
+    values: int
+    rms_sigmas: float | None
+    standard_errors_without: Errors
+
+
+@dataclass(frozen=True)
+class NextState:
+    """A state that was not measured: the standard errors of a fit with it, and their geometric mean
+    over those without it."""
+
+    state: TyreState
+    standard_errors_with: Errors
+    ratio: float
+
+
+def state_reports(problem: Problem, point: Point, known: FitUncertainty) -> list[StateReport]:
+    """Of every measured state, in the order of the targets."""
+    own = [None if t in problem.mass else t.state for t in problem.measured]
+    counts = problem.scale > 0
+    with np.errstate(divide="ignore", invalid="ignore"):
+        off = point.residuals / problem.scale / known.sigma
+    found = []
+    for state in dict.fromkeys(each for each in own if each):
+        here = np.array([each == state for each in own])
+        rest = counts & ~here
+        errors = _errors(
+            problem, point, point.jacobian[rest], problem.scale[rest], known.sigma[rest]
+        )
+        mean = float(np.mean(off[counts & here] ** 2)) if (counts & here).any() else np.nan
+        rms = float(np.sqrt(mean)) if np.isfinite(mean) else None
+        found.append(StateReport(state, int((counts & here).sum()), rms, errors))
+    return found
+
+
+def next_states(problem: Problem, point: Point, known: FitUncertainty) -> list[NextState]:
+    """States of the unloaded tyre that were not measured, the most telling first; none where the
+    solver gives no exact slopes, or the data do not determine the variables as they are."""
+    before = _named(problem, known.standard_errors)
+    if problem.difference_step is not None or not all(before.values()):
+        return []
+    like = _best_measured(problem, known)
+    states = _others(problem)
+    names = tuple(v.name for v in problem.variables)
+    asked = [problem.question(point.values, state, names) for state in states]
+    answers = problem.modes_of(asked, [[t.label for t, _ in like]] * len(states))
+    counts = problem.scale > 0
+    J, root, sigma = point.jacobian[counts], problem.scale[counts], known.sigma[counts]
+    found = []
+    for state, answer in zip(states, answers, strict=True):
+        if not isinstance(answer, Found):
+            continue
+        hertz = np.array([answer.wanted[t.label].frequency_Hz for t, _ in like])
+        scattered = hertz * [relative for _, relative in like]
+        weight = np.sqrt([t.multiplicity for t, _ in like]) / scattered
+        rows = weight[:, None] * problem.slopes(
+            {state: answer}, [Target(t.label, 0.0, state=state) for t, _ in like], point.values
+        )
+        after = _errors(
+            problem,
+            point,
+            np.vstack([J, rows]),
+            np.concatenate([root, weight]),
+            np.concatenate([sigma, scattered]),
+        )
+        both = [(before[v.name], after[v.name]) for v in problem.variables]
+        gained = [np.log(with_it / without) for without, with_it in both if without and with_it]
+        found.append(NextState(state, after, float(np.exp(np.mean(gained)))))
+    return sorted(found, key=lambda each: each.ratio)
+
+
+def _best_measured(problem: Problem, known: FitUncertainty) -> list[tuple[Target, float]]:
+    """Modes of the unloaded state that has most that count, and their relative sigmas."""
+    rows: dict[TyreState, list[tuple[Target, float]]] = {}
+    for target, sigma in zip(problem.targets, known.sigma, strict=False):
+        if np.isfinite(sigma):
+            rows.setdefault(target.state, []).append((target, float(sigma) / target.frequency_Hz))
+    return max(rows.values(), key=len, default=[])
+
+
+def _others(problem: Problem) -> list[TyreState]:
+    """Unloaded states beside those measured: their pressures, and one below and above, on every rim
+    that the case can have."""
+    told = [state.told(problem.case) for state in problem.labels]
+    pressures = sorted(p for p in {state.pressure_kPa for state in told} if p)
+    ends = (pressures[0] / STEP_OUT, pressures[-1] * STEP_OUT)
+    pressures += [ROUNDED_kPa * round(p / ROUNDED_kPa) for p in ends]
+    wanted = [
+        TyreState(p, 0.0, rim)
+        for rim in RIMS
+        for p in pressures
+        if USUAL["pressure_kPa"].holds(p) and TyreState(p, 0.0, rim) not in told
+    ]
+    return [state.of(problem.case) for state in wanted if _possible(problem, state)]
+
+
+def _possible(problem: Problem, state: TyreState) -> bool:
+    try:
+        own = state.numbers(problem.case)
+        design = problem.evaluator.design.at(own)
+    except ValueError:
+        return False
+    return problem.evaluator.solver.capabilities >= design.needs.keys()
+
+
+def _errors(problem: Problem, point: Point, J: Array, root: Array, sigma: Array) -> Errors:
+    covariance, seen = fit_covariance(J, root, sigma)
+    return _named(problem, standard_errors(problem, point, covariance, seen))
+
+
+def _named(problem: Problem, errors: Sequence[float | None]) -> Errors:
+    return {v.name: error for v, error in zip(problem.variables, errors, strict=True)}
+
+
+def plain(problem: Problem, state: TyreState) -> dict[str, Any]:
+    """A state as result files have it, nothing left to the case."""
+    told = state.told(problem.case)
+    return {"pressure_kPa": told.pressure_kPa, "load_N": told.load_N, "rim": told.rim}

@@ -1,0 +1,131 @@
+"""What a fit aims at: measured values, each with its state, standard deviation and weight."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from ...simulate.modes.label import Label
+from ...simulate.modes.loaded import Member
+from ...tyre.case import LoadedCase
+from ...tyre.case.schema import MEASURED_SIGMA
+from ...tyre.state import AS_THE_CASE, TyreState
+
+RIM_WORDS = {"springs": "spindle"}  # of provenance
+
+
+@dataclass(frozen=True)
+class Target:
+    """A measured mode of the unloaded tyre: frequency and standard deviation in Hz, weight in the
+    objective."""
+
+    label: Label
+    frequency_Hz: float
+    weight: float = 1.0
+    sigma_Hz: float | None = None
+    state: TyreState = AS_THE_CASE
+
+    @property
+    def multiplicity(self) -> int:
+        """How many modes it stands for: doublets count twice."""
+        return 2 if self.label.c else 1
+
+    @property
+    def scale(self) -> float:
+        """Residual per Hz, sqrt(weight multiplicity) / sigma."""
+        return math.sqrt(self.weight * self.multiplicity) / (self.sigma_Hz or 1.0)
+
+
+@dataclass(frozen=True)
+class ValueTarget:
+    """Anything else, with its standard deviation in the same unit: on the road a contact area, a
+    tangent vertical stiffness, or the frequency of the mode ``member``; the mass."""
+
+    quantity: str
+    value: float
+    sigma: float
+    weight: float = 1.0
+    state: TyreState = AS_THE_CASE
+    member: Member | None = None
+
+    @property
+    def scale(self) -> float:
+        """Residual per unit of the quantity, sqrt(weight) / sigma."""
+        return math.sqrt(self.weight) / self.sigma
+
+
+def read_targets(case: LoadedCase) -> list[Target]:
+    """Target modes of the unloaded tyre, those as the case is before those in other states."""
+    found = [
+        Target(
+            Label(t.c, t.m, t.kind),
+            t.frequency_Hz,
+            t.weight,
+            t.sigma_Hz,
+            TyreState(t.pressure_kPa, 0.0, t.rim).of(case),
+        )
+        for t in case.case.targets.modes
+        if not t.load_N
+    ]
+    return sorted(found, key=lambda t: t.state != AS_THE_CASE)
+
+
+def target_labels(case: LoadedCase) -> list[Label]:
+    """Of the unloaded tyre's target modes, each once, whatever states they were measured in."""
+    return list(dict.fromkeys(target.label for target in read_targets(case)))
+
+
+def read_road_targets(case: LoadedCase) -> list[ValueTarget]:
+    """Targets on the road: areas and stiffnesses, then modes."""
+    targets = case.case.targets
+    found = [
+        ValueTarget(
+            quantity,
+            getattr(t, quantity),
+            getattr(t, sigma),
+            t.weight,
+            TyreState(t.pressure_kPa, t.load_N).of(case),
+        )
+        for t in targets.footprint
+        for quantity, sigma in MEASURED_SIGMA.items()
+        if getattr(t, quantity) is not None
+    ]
+    return found + [
+        ValueTarget(
+            "frequency_Hz",
+            t.frequency_Hz,
+            t.sigma_Hz or 1.0,
+            t.weight,
+            TyreState(t.pressure_kPa, t.load_N, t.rim).of(case),
+            Member(Label(t.c, t.m, t.kind), t.symmetry or ""),
+        )
+        for t in targets.modes
+        if t.load_N
+    ]
+
+
+def read_mass_targets(case: LoadedCase) -> list[ValueTarget]:
+    """The mass, where it is a target."""
+    mass = case.case.targets.mass
+    return [ValueTarget("mass_kg", mass.mass_kg, mass.sigma_kg, mass.weight)] if mass else []
+
+
+def states_of(case: LoadedCase) -> dict[str, Any]:
+    """The states of all targets, as `provenance` takes them."""
+    others = read_road_targets(case) + read_mass_targets(case)
+    every = [t.state for t in read_targets(case)] + [t.state for t in others]
+    states = dict.fromkeys(state.unloaded for state in every)
+    loads: dict[str, Any] = {"load_N": case.case.targets.loads_N or 0.0}
+    if not states.keys() - {AS_THE_CASE}:
+        return loads
+    told = [state.told(case) for state in states]
+    rims = dict.fromkeys(RIM_WORDS.get(each.rim or "", each.rim) for each in told)
+    return {**loads, "pressure_kPa": sorted({each.pressure_kPa for each in told}), "rim": [*rims]}
+
+
+def objective_unit(case: LoadedCase) -> str:
+    """``Hz``, or ``sigma`` where a target has a standard deviation: the objective counts them."""
+    others = read_road_targets(case) + read_mass_targets(case)
+    modal = any(target.sigma_Hz for target in read_targets(case))
+    return "sigma" if modal or others else "Hz"
