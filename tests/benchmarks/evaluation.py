@@ -4,7 +4,8 @@
 
 The floor: the banded factorisations and back-substitutions that the evaluation made, replayed on
 copies of the same matrices and right-hand sides with nothing around them. Prints the ratio of the
-medians, where the rest of the time goes, and the same for the solver alone without deck and files.
+medians of processor time, where the rest goes, and the same for the solver alone without deck and
+files.
 """
 
 from __future__ import annotations
@@ -20,9 +21,9 @@ from collections import defaultdict
 from pathlib import Path
 
 import numpy as np
-from tyrecal_solvers.bundled import adapter
-from tyrecal_solvers.bundled.modes import lanczos, sensitivity
-from tyrecal_solvers.bundled.section import band, inflation, mechanics
+from tyrecal_solvers.bundled import adapter, frequency_step
+from tyrecal_solvers.bundled.modes import lanczos
+from tyrecal_solvers.bundled.section import band, inflation, kept_fields, mechanics
 
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
@@ -32,43 +33,43 @@ from tyrecal.tyre.load import load_case
 CASE = Path(__file__).parents[2] / "cases" / "p235_75r17.yaml"
 
 
-def record(evaluator: Evaluator, question: Question) -> list[tuple[np.ndarray, list[np.ndarray]]]:
-    """Matrices factorised in one evaluation, each with its right-hand sides."""
-    log: list[tuple[np.ndarray, list[np.ndarray]]] = []
-    plain = band.Cholesky
+FACTORS = (band.Cholesky, kept_fields.KeptCholesky)
+Factored = tuple[type, list[np.ndarray], list[np.ndarray]]  # class, matrices, right-hand sides
 
-    class Recorder(plain):  # type: ignore[valid-type,misc]
-        def __init__(self, matrix: np.ndarray):
-            self.log: list[np.ndarray] = []
-            log.append((matrix.copy(order="F"), self.log))
-            super().__init__(matrix)
 
-        def solve(self, right: np.ndarray) -> np.ndarray:
-            self.log.append(right.copy(order="F"))
-            return super().solve(right)
+def record(evaluator: Evaluator, question: Question) -> list[Factored]:
+    """What is factorised in one evaluation, each with its right-hand sides."""
+    log: list[Factored] = []
+    plain = [(kind, kind.__init__, kind.solve) for kind in FACTORS]
+    for kind, init, solve in plain:
 
-    from tyrecal_solvers.bundled.modes import harmonics
+        def noted(self, *matrices, kind=kind, init=init):
+            self.rights = []
+            log.append((kind, [each.copy(order="F") for each in matrices], self.rights))
+            init(self, *matrices)
 
-    users = (band, inflation, harmonics)
-    for module in users:
-        module.Cholesky = Recorder
+        def solved(self, right, solve=solve):
+            self.rights.append(right.copy(order="F"))
+            return solve(self, right)
+
+        kind.__init__, kind.solve = noted, solved
     try:
         evaluator.evaluate(question)
     finally:
-        for module in users:
-            module.Cholesky = plain
+        for kind, init, solve in plain:
+            kind.__init__, kind.solve = init, solve
     return log
 
 
-def replay(log: list[tuple[np.ndarray, list[np.ndarray]]]) -> float:
+def replay(log: list[Factored]) -> float:
     """Seconds for the recorded factorisations and back-substitutions alone."""
-    copies = [matrix.copy(order="F") for matrix, _ in log]
-    start = time.perf_counter()
-    for matrix, (_, rights) in zip(copies, log, strict=True):
-        factor = band.Cholesky(matrix)
+    copies = [[each.copy(order="F") for each in matrices] for _, matrices, _ in log]
+    start = time.process_time()
+    for (kind, _, rights), matrices in zip(log, copies, strict=True):
+        factor = kind(*matrices)
         for right in rights:
             factor.solve(right)
-    return time.perf_counter() - start
+    return time.process_time() - start
 
 
 def timed_parts(evaluator: Evaluator, question: Question) -> dict[str, float]:
@@ -78,8 +79,8 @@ def timed_parts(evaluator: Evaluator, question: Question) -> dict[str, float]:
         (inflation, "_newton", "inflation"),
         (mechanics, "mass", "mass"),
         (lanczos, "lowest", "eigenproblems"),
-        (sensitivity, "state_rate", "sensitivities"),
-        (sensitivity, "eigenvalue_rates", "sensitivities"),
+        (frequency_step, "state_rate", "slopes"),
+        (frequency_step, "eigenvalue_rates", "slopes"),
         (adapter.Bundled, "write", "writing decks"),
         (adapter.Bundled, "run", "solver, all"),
         (adapter.Bundled, "read", "reading results"),
@@ -90,16 +91,16 @@ def timed_parts(evaluator: Evaluator, question: Question) -> dict[str, float]:
         kept.append((owner, name, original))
 
         def wrapped(*args, original=original, label=label, **kwargs):
-            start = time.perf_counter()
+            start = time.process_time()
             try:
                 return original(*args, **kwargs)
             finally:
-                spent[label] += time.perf_counter() - start
+                spent[label] += time.process_time() - start
 
         setattr(owner, name, wrapped)
-    start = time.perf_counter()
+    start = time.process_time()
     evaluator.evaluate(question)
-    spent["everything"] = time.perf_counter() - start
+    spent["everything"] = time.process_time() - start
     for owner, name, original in kept:
         setattr(owner, name, original)
     return spent
@@ -114,16 +115,17 @@ def main(rounds: int) -> None:
     whole, floor, solver = [], [], []
     parts: dict[str, list[float]] = defaultdict(list)
     for _ in range(rounds):  # interleaved, so that a slow spell of the machine hits both
-        start = time.perf_counter()
+        start = time.process_time()
         evaluator.evaluate(question)
-        whole.append(time.perf_counter() - start)
+        whole.append(time.process_time() - start)
         floor.append(replay(log))
         for label, seconds in timed_parts(evaluator, question).items():
             parts[label].append(seconds)
         solver.append(parts["solver, all"][-1])
     factorisations = len(log)
-    columns = sum(1 if r.ndim == 1 else r.shape[1] for _, rights in log for r in rights)
-    size, width = log[0][0].shape[1], log[0][0].shape[0] - 1
+    columns = sum(1 if r.ndim == 1 else r.shape[1] for _, _, rights in log for r in rights)
+    first = log[0][1][0]
+    size, width = first.shape[1], first.shape[0] - 1
     median = statistics.median
     print(
         f"{size} equations, {width} sub-diagonals: {factorisations} factorisations,"
