@@ -26,7 +26,7 @@ from scipy.sparse import csr_matrix
 from .tread import Points, Tread
 
 Array = np.ndarray
-SAMPLES = 9  # of a span's lines, between which the elastic slip is linear
+SLIP_SAMPLES = 9  # of a span's lines, between which the elastic slip is linear
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class FlatRoad:
     friction: float  # coefficient
     elastic_slip: float  # m
     U: Array  # (k, n, 3), m
-    elastic: Array  # (t, e, j, SAMPLES, 2): slip that is still elastic, m
+    elastic: Array  # (t, e, j, SLIP_SAMPLES, 2): slip that is still elastic, m
     height: float  # of the road, m
 
     def gap(self, points: Points) -> Array:
@@ -64,7 +64,7 @@ class FlatRoad:
         """Along and across (i, j, p, 2) from where slip counts; ``at``: the points' positions."""
         tread, t = points.tread, points.t
         place = (points.angle - tread.begin[t, None, None]) / tread.length[t, None, None]
-        place = np.clip(place * (SAMPLES - 1), 0.0, SAMPLES - 1 - 1e-12)
+        place = np.clip(place * (SLIP_SAMPLES - 1), 0.0, SLIP_SAMPLES - 1 - 1e-12)
         left, own = place.astype(int), self.elastic[t, points.e]
         take = lambda i: np.take_along_axis(own, i[..., None], 2)
         right = (place - left)[..., None]
@@ -101,13 +101,13 @@ class FlatRoad:
 
     def settled(self, contact: Contact) -> FlatRoad:
         """The road after a load was reached: slip counts anew, less the elastic one."""
-        samples = self.tread.everywhere(np.linspace(0.0, 1.0, SAMPLES))
+        samples = self.tread.everywhere(np.linspace(0.0, 1.0, SLIP_SAMPLES))
         at = samples.positions(contact.U)
         slip = self.moved(samples, at) * self.share(samples, contact.height)[0][..., None]
         length = np.maximum(np.linalg.norm(slip, axis=-1, keepdims=True), 1e-300)
         elastic = slip * np.minimum(self.elastic_slip / length, 1.0)
         # beside the patch as at its edge: between samples it is then known up to the edge
-        away = abs(np.arange(SAMPLES)[:, None] - np.arange(SAMPLES)) * 1.0
+        away = abs(np.arange(SLIP_SAMPLES)[:, None] - np.arange(SLIP_SAMPLES)) * 1.0
         inside = at[..., 0] >= contact.height
         nearest = np.where(inside[..., None, :], away, np.inf).argmin(-1)
         elastic = np.take_along_axis(elastic, nearest[..., None], 2)
@@ -233,5 +233,5 @@ def flat_road(
     """The road that just touches a tread displaced by U (k, n, 3), all round alike. X (n, 2): R, Z
     of the section, m."""
     height = float((X[tread.nodes, 0] + U[0, tread.nodes, 0]).max())
-    elastic = np.zeros((len(tread.begin), *tread.ds.shape, SAMPLES, 2))
+    elastic = np.zeros((len(tread.begin), *tread.ds.shape, SLIP_SAMPLES, 2))
     return FlatRoad(tread, stiffness, friction, elastic_slip, U, elastic, height)

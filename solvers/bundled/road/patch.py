@@ -16,7 +16,7 @@ from .contact import Contact
 from .tread import Points
 
 Array = np.ndarray
-SAMPLES = 5  # angles of a span at which the width is looked at
+WIDTH_SAMPLES = 5  # angles of a span at which the width is looked at
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ def _extent(contact: Contact, X: Array) -> tuple[float, float]:
     t, e, first, last = tread.intervals(U, height)
     ends = Points(tread, t, e, last, last - first)
     along = ends.positions(U)[..., 1][ends.weight > 0]
-    samples = tread.everywhere(np.linspace(0.0, 1.0, SAMPLES))
+    samples = tread.everywhere(np.linspace(0.0, 1.0, WIDTH_SAMPLES))
     at = samples.positions(U)
     over, z = at[..., 0] - height, at[..., 2]
     across = np.concatenate([abs(z[over > 0]), abs(_roots(over, z)).ravel()])

@@ -19,8 +19,10 @@ from ..solid3d.circumference import HalfCircle, functions
 
 Array = np.ndarray
 MAX_CONTACT_ANGLE = np.pi / 3  # from the vertical: no span that begins beyond it can touch
-ACROSS = 4  # lines at Gauss points of a line element
-ALONG = 3  # Gauss points between two ends: exact for products of two functions and the depth
+LINES_ACROSS = 4  # lines at Gauss points of a line element
+POINTS_IN_PATCH = (
+    3  # Gauss points between two ends: exact for products of two functions and the depth
+)
 ROOT_STEPS = 4  # of Newton's method, from the root of a parabola
 
 
@@ -56,10 +58,10 @@ class Tread:
         first = np.concatenate([first, np.maximum(first, half)], -1)
         last = np.concatenate([np.minimum(last, half), last], -1)
         last = np.maximum(first, last)
-        g, w = np.polynomial.legendre.leggauss(ALONG)
+        g, w = np.polynomial.legendre.leggauss(POINTS_IN_PATCH)
         middle, half = (first + last)[..., None] / 2, (last - first)[..., None] / 2
         angle, weight = middle + half * g, half * w
-        flat = *first.shape[:2], 4 * ALONG
+        flat = *first.shape[:2], 4 * POINTS_IN_PATCH
         return Points(self, t, e, angle.reshape(flat), weight.reshape(flat))
 
     def intervals(self, U: Array, height: float) -> tuple[Array, Array, Array, Array]:
@@ -217,7 +219,7 @@ class Points:
 
 def tread_of(X: Array, faces: Array, around: HalfCircle) -> Tread:
     """The surface of the line elements ``faces`` (e, a). X (n, 2): R, Z of the section, m."""
-    own = lines(X, faces, ACROSS)
+    own = lines(X, faces, LINES_ACROSS)
     begin, length = around.ends[:-1], np.diff(around.ends)
     near = begin < MAX_CONTACT_ANGLE
     columns = 2 * np.arange(len(begin))[:, None] + np.arange(3)
