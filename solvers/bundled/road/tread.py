@@ -20,9 +20,8 @@ from ..solid3d.circumference import HalfCircle, functions
 Array = np.ndarray
 MAX_CONTACT_ANGLE = np.pi / 3  # from the vertical: no span that begins beyond it can touch
 LINES_ACROSS = 4  # lines at Gauss points of a line element
-POINTS_IN_PATCH = (
-    3  # Gauss points between two ends: exact for products of two functions and the depth
-)
+# Gauss points between two ends: exact for products of two functions and the depth
+POINTS_IN_PATCH = 3
 ROOT_STEPS = 4  # of Newton's method, from the root of a parabola
 
 
