@@ -41,7 +41,7 @@ EFFECT = Effect(
         "and 9 %; [0,0] torsional by 17, axial by 5 %"
     ),
     toggle="lift the tyre off, or turn it between two measurements",
-    aliases=(),
+    aliases=("bead_filler",),
     add=add,
     needs="coupled",
 )
