@@ -36,9 +36,9 @@ EFFECT = Effect(
     high=6e5,
     changes=("*SPRING",),
     signature=(
-        "as under a load of 100 N at 0.55 MN/m: of each [c,1] the member symmetric about the patch "
-        "rises, [1,1] by 25 %, [2,1] by 12 %, the other one stays; both of [c,0] rise, [1,0] by 5 "
-        "and 9 %; [0,0] torsional by 17, axial by 5 %"
+        "at 0.44 MN/m as under a load of 100 N: of each [c,1] the member symmetric about the patch "
+        "rises, [1,1] by 23 %, [2,1] by 10 %, the other one stays; both of [c,0] rise, [1,0] by 5 "
+        "and 7 %; [0,0] torsional by 15, axial by 5 %"
     ),
     toggle="lift the tyre off, or turn it between two measurements",
     aliases=("bead_filler",),
