@@ -67,7 +67,7 @@ class Bundled:
             paths[-1].write_text(text, encoding="utf-8", newline="")
         request = {k: decks.request[k] for k in REQUEST_KEYS if k in decks.request}
         if decks.loads_N:
-            asked = bool(decks.request["loaded_modes"])
+            asked = bool(decks.request.get("loaded_modes"))
             request = {k: v for k, v in request.items() if asked and k == "cavity"}
             if not request:
                 return paths

@@ -22,7 +22,6 @@ from .modes.harmonics import HarmonicModes
 from .modes.wheel import free_along_load
 from .results import StepResult, write
 from .road import footprint_job
-from .road.pressed_cavity import cavity_modes
 from .section.boundary import keeps_half_turn, numbering
 from .section.inflation import equilibrium
 from .section.loads import loads, pressures
@@ -156,6 +155,8 @@ class Job:
         """cavity_Hz of the first wave in the cavity: of the inflated tyre, and in each footprint
         the two, fore-aft and vertical."""
         assert self.tyre.request.cavity
+        from .road.pressed_cavity import cavity_modes  # late: SciPy's splines take 0.3 s
+
         air = read_cavity(self.tyre.section, model.mesh, self.tyre.request.cavity)
         X, U = model.mesh.X, self.tyre.U
         hertz = lambda u, angles: cavity_modes(air, X, u, angles).tolist()

@@ -272,7 +272,9 @@ def test_every_range_is_of_a_number_that_a_case_can_have() -> None:
                 if isinstance(value, float | int):
                     assert USUAL[pattern].holds(value), (keys, value)
     rest = {pattern for pattern in USUAL if pattern not in reached}
-    assert {pattern.split(".")[1] for pattern in rest} <= {"outline", "footprint", "*"}, rest
+    assert {pattern.split(".")[1] for pattern in rest} <= {"outline", "footprint", "mass", "*"}, (
+        rest
+    )
 
 
 def test_a_search_may_try_what_it_likes() -> None:

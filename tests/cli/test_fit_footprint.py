@@ -58,8 +58,9 @@ def test_what_it_writes(
     out, drawn = tmp_path / "out", []
     monkeypatch.setattr(pictures, "draw_fit", lambda *arguments: drawn.append(arguments))
     assert run("fit", case, "--output", str(out)) == 0
-    save(draw_convergence(*drawn[0][-2:]), out / "convergence.png")
-    assert drawn[0][-1] == "sigma" and (out / "convergence.png").stat().st_size > 10_000
+    *_, history, fit = drawn[0]
+    save(draw_convergence(history, fit.objective_unit), out / "convergence.png")
+    assert fit.objective_unit == "sigma" and (out / "convergence.png").stat().st_size > 10_000
     printed, result = capsys.readouterr().out, found(out)
     assert [(row["load_N"], row["quantity"]) for row in result["footprint"]] == [
         (4000, "contact_area_m2"),

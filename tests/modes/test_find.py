@@ -63,7 +63,7 @@ def test_each_has_its_place_those_that_wait_the_last_ones() -> None:
 def test_labels_may_hang_on_the_modes() -> None:
     evaluator = FakeEvaluator(TARGETS, POWERS, START)
     ((_, found),) = find_modes(
-        evaluator, [Question(START)], lambda modes: [m.label for m in modes if m.label.c == 2]
+        evaluator, [Question(START)], lambda _, modes: [m.label for m in modes if m.label.c == 2]
     )
     assert isinstance(found, Found) and set(found.wanted) == {x for x in LABELS if x.c == 2}
 
