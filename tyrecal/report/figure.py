@@ -18,6 +18,7 @@ from PIL import Image
 from ..files import whole
 
 DPI = 150
+COMPRESSION = 3  # of 9: a third of the time of the usual 6, files 19 % larger
 COLOUR_MAP = colormaps["viridis"]
 GREY = "0.45"
 # Okabe and Ito: told apart by colour-blind readers; their yellow is left out, pale on paper
@@ -73,7 +74,7 @@ def save(figure: Figure, path: Path) -> None:
     image = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
     small = image.quantize(256, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
     with whole(path) as partial:
-        small.save(partial, "PNG")
+        small.save(partial, "PNG", compress_level=COMPRESSION)
 
 
 @in_house_style
