@@ -168,9 +168,11 @@ def test_jobs_and_the_record_change_no_byte(tmp_path: Path) -> None:
 def test_more_than_the_tyre_can_bear(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The bundled solver's sentence, and the load that it had reached."""
     out = tmp_path / "out"
-    case = str(coarse_case(tmp_path))
+    case = coarse_case(tmp_path)
+    few = case.read_text().replace("[6, 6, 6, 12, 30, 120]", "[10, 14, 36, 120]")
+    case.write_text(few)  # the last step before it gives up takes many trials
     loads = ["--loads-N", "2000,200000", "--no-pictures", "--allow-unusual"]
-    assert run("footprint", case, "--output", str(out), *loads) == 3
+    assert run("footprint", str(case), "--output", str(out), *loads) == 3
     assert [row["load_N"] for row in result(out)["rows"]] == [2000]
     said = capsys.readouterr().err
     assert "error: initial, 200000 N: " in said and "mm down to the rim)" in said
