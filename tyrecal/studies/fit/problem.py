@@ -40,7 +40,7 @@ class Point:
     """One evaluated design: coordinates x, residuals sqrt(w) (q - q_ref) / sigma (a doublet's by
     sqrt 2), their Jacobian by x, the modes that were matched in each state, and the labels' margin;
     of each other target its quantity, in its own unit; by how much the objective may jump nearby,
-    as nodes of the tread come to touch the road."""
+    as patches do whose edge passes from one element of the tread to the next."""
 
     values: Mapping[str, float]
     x: Array
