@@ -104,7 +104,9 @@ edit(
 edit(
     "unknown_line", "rebar_layers.belt_1.line", "did you mean 'belt2'", "line: belt1", "line: belt3"
 )
-edit("outer_line", "rebar_layers.belt_1.line", "inside the section", "line: belt1", "line: outer")
+edit(
+    "other_line", "rebar_layers.belt_1.line", "not a line of the section", "line: belt1", "line: x"
+)
 edit(
     "rubber_as_cord",
     "rebar_layers.carcass.material",

@@ -40,6 +40,13 @@ def calculix_context(tyre: Tyre) -> dict[str, Any]:
         raise TemplateFailed(
             f"solver.options.ply_thickness_m is '{thickness}', must be a thickness in m"
         )
+    surfaces = tyre.section.names[0], tyre.section.names[-1]
+    for name, layer in c.rebar_layers.items():
+        if layer.line in surfaces:
+            raise TemplateFailed(
+                f"rebar_layers.{name}.line must be inside the section: for CalculiX a ply is a thin"
+                " solid, half of it to either side of its line"
+            )
     level = c.mesh.levels[c.mesh.level]
     sectors = PARTS * c.analysis.sectors
     try:

@@ -253,9 +253,9 @@ def places(data: Mapping[str, Any], section: Section) -> Problems:
     regions = [name for name, _ in section.regions]
     for name, layer in table(data, "rebar_layers").items():
         line = layer.get("line") if isinstance(layer, dict) else None
-        if isinstance(line, str) and line not in lines[1:-1]:
-            hint = suggestion(line, lines[1:-1])
-            yield ("rebar_layers", name, "line"), f"is not a line inside the section{hint}"
+        if isinstance(line, str) and line not in lines:
+            hint = suggestion(line, lines)
+            yield ("rebar_layers", name, "line"), f"is not a line of the section{hint}"
         for j, region in enumerate(entries(layer, "regions")):
             if isinstance(region, str) and region not in regions:
                 hint = suggestion(region, regions)

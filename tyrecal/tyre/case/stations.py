@@ -148,7 +148,7 @@ def _check_section(section: Section) -> None:
             )
     for name, count in section.regions:
         if count < 1:
-            raise SectionError(f"region '{name}' needs at least two stations")
+            raise SectionError(f"region '{name}' has no two stations: it needs one more")
     reach = 1e3 * section.points[-1, 0, 0]  # mm; a tyre of inches, cm or m would pass else
     if not SMALLEST_MM < reach < LARGEST_MM:
         raise SectionError(

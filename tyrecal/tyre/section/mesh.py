@@ -124,9 +124,10 @@ def build_mesh(
                 outer.append(name)
     edges = np.concatenate([[0], np.cumsum(rows)]) * step
     cords = {}
-    for k, line in enumerate(section.names[1:-1], start=1):
+    for k, line in enumerate(section.names):
+        number_of = k or len(section.names)  # solids have those below a million
         cords[line] = {
-            1000000 * k + j // step + 1: tuple(
+            1000000 * number_of + j // step + 1: tuple(
                 number(int(edges[k]), c) for c in range(j, j + step + 1)
             )
             for j in range(0, width - 1, step)

@@ -116,7 +116,9 @@ def regions_of(labels: list[str], rigid: list[bool]) -> tuple[tuple[str, int], .
     # regions share a station: the first one's last, or the first that the rim holds
     ends = [*(s if rigid[s] != rigid[s - 1] else s - 1 for s in starts[1:]), len(labels) - 1]
     counts, last = [], 0
-    for end in ends:
+    for behind, end in zip(reversed(range(len(ends))), ends, strict=True):
+        # a region of one station has the interval before it, the first of all that behind it
+        end = min(max(end, last + 1), len(labels) - 1 - behind)
         counts.append(end - last)
         last = end
     regions = tuple((labels[s], c) for s, c in zip(starts, counts, strict=True))
