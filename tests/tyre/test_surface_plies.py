@@ -38,7 +38,8 @@ def test_a_ply_on_the_inner_surface_is_the_limit_of_one_just_inside() -> None:
         inside, on = ([m.frequency_Hz for m in each.modes] for each in found)
         apart.append(np.array(on) / np.array(inside) - 1)
     assert (apart[1] != 0).all()
-    assert apart[0] == pytest.approx(2 * apart[1], rel=0.05)
+    # terms of second order: a fiftieth, the liner's share of itself
+    assert apart[0] == pytest.approx(2 * apart[1], abs=0.02 * abs(apart[0]).max())
 
 
 def test_plies_on_surfaces_have_elements_of_their_own() -> None:
