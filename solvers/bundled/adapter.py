@@ -43,6 +43,7 @@ class Bundled:
             "modes",
             "gradients",
             "footprint",
+            "footprint_gradients",
             "loaded_modes",
             "vibration_modulus",
             "spindle",
@@ -67,8 +68,10 @@ class Bundled:
             paths[-1].write_text(text, encoding="utf-8", newline="")
         request = {k: decks.request[k] for k in REQUEST_KEYS if k in decks.request}
         if decks.loads_N:
-            asked = bool(decks.request.get("loaded_modes"))
+            asked, slopes = bool(decks.request.get("loaded_modes")), decks.tangents(self.dialect)
             request = {k: v for k, v in request.items() if asked and k == "cavity"}
+            if slopes:
+                request["sensitivities"] = slopes
             if not request:
                 return paths
         else:

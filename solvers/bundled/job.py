@@ -12,22 +12,26 @@ import numpy as np
 from threadpoolctl import ThreadpoolController
 
 from ..errors import RunFailed
-from .deck.keywords import DeckError, Keyword, read_deck
+from .deck.keywords import COMPLEX_STEP, DataLine, DeckError, Keyword, read_deck
 from .deck.request import Request, read_request, read_sector
 from .deck.start import read_start
 from .deck.steps import Deck, DeckStep
 from .frequency_step import FrequencyStep, Inflated
 from .modes.cavity import read_cavity
 from .modes.harmonics import HarmonicModes
+from .modes.sensitivity import state_rate
 from .modes.wheel import free_along_load
 from .results import StepResult, write
 from .road import footprint_job
+from .road.slopes import ROAD_NUMBERS, InflatedTangent
+from .section import mechanics
+from .section.band import Numbering
 from .section.boundary import keeps_half_turn, numbering
 from .section.inflation import equilibrium
 from .section.loads import loads, pressures
-from .section.mechanics import mass
 from .section.mesh import DeckMesh, read_mesh
 from .section.model import Model, build
+from .section.parts.pressure import Pressure
 
 
 def run(folder: Path, job: str, oldjob: str | None, time_limit: float = float("inf")) -> None:
@@ -90,7 +94,7 @@ class Job:
         check = self._check_time
         self.tyre = Inflated(deck, request, section, revolve, list(sector), models, half, U, check)
         copies = self.model.mesh.symmetry.copies
-        self.mass_kg = float(copies * 2 * np.pi * mass(self.model).sum().real)
+        self.mass_kg = float(copies * 2 * np.pi * mechanics.mass(self.model).sum().real)
         self.mass_kg += self.tyre.attached().total_kg.real
         self.factorisations = 0
         self.guess = _on_nodes(start, mesh)
@@ -108,7 +112,8 @@ class Job:
         return results or [self._result(self.steps[-1], [], {}, {})]
 
     def press(self) -> dict[str, Any]:
-        """Footprints of a job with a road, one per step with a force on it, and modes there."""
+        """Footprints of a job with a road, one per step with a force on it, modes and slopes
+        there."""
         assert self.road is not None
         wanted: list[float] = []
         vibrations: dict[float, footprint_job.ModesAtLoad] = {}
@@ -123,7 +128,7 @@ class Job:
                 continue
             if step.procedure.name != "STATIC":
                 raise DeckError(step.procedure.line, "a turning tyre on a road is not honoured")
-            step.held = [row for row in step.held if row.text(0) != self.road.node]
+            step.held = self._off_road(step)
             if not step.forces:
                 self._static(step)
                 continue
@@ -135,21 +140,49 @@ class Job:
                 raise DeckError(row.line, "loads on the road must push it to the tyre, and rise")
         if not wanted:
             raise DeckError(self.steps[-1].procedure.line, "no *CLOAD presses the road")
-        step = [each for each in self.steps if each.procedure.name == "STATIC"][-1]
+        last = max(i for i, each in enumerate(self.steps) if each.procedure.name == "STATIC")
+        step = self.steps[last]
         model = self.tyre.models(None, step.long_term, False)
+        equations, acting = numbering(model, step), pressures(model, step)
         found = footprint_job.press(
             model,
-            numbering(model, step),
-            pressures(model, step),
+            equations,
+            acting,
             self.tyre.U,
             self.road,
             wanted,
             self._check_time,
             vibrations,
+            self._inflated_tangents(model, equations, acting, last),
         )
         if self.tyre.request.cavity:
             found |= self._cavity(model, found)
         return {"pressure_Pa": step.pressure, "mass_kg": self.mass_kg, **found}
+
+    def _off_road(self, step: DeckStep) -> list[DataLine]:
+        """What a step holds but the road."""
+        assert self.road is not None
+        return [row for row in step.held if row.text(0) != self.road.node]
+
+    def _inflated_tangents(
+        self, model: Model, equations: Numbering, acting: list[Pressure], place: int
+    ) -> dict[str, InflatedTangent]:
+        """By variable, of the tyre that the last static step, at its ``place``, presses."""
+        asked = self.tyre.request.sensitivities
+        if not asked:
+            return {}
+        stiffness = mechanics.tangents(model, self.tyre.U, acting, harmonics=False)[0]
+        newton, found = equations.factor(equations.assemble(stiffness)), {}
+        for variable, rows in asked.items():
+            section, revolve, steps = self.tyre.deck.read(rows)
+            step, road = steps[place], footprint_job.read_road(revolve)
+            step.held = self._off_road(step)
+            seeded = build(section, None, step.long_term)
+            loads, rate = pressures(seeded, step), lambda number: np.imag(number) / COMPLEX_STEP
+            U = state_rate(seeded, self.tyre.U, loads, equations, newton)
+            numbers = {name: float(rate(getattr(road, name))) for name in ROAD_NUMBERS}
+            found[variable] = InflatedTangent(seeded, loads, U, numbers)
+        return found
 
     def _cavity(self, model: Model, found: dict[str, Any]) -> dict[str, Any]:
         """cavity_Hz of the first wave in the cavity: of the inflated tyre, and in each footprint

@@ -340,7 +340,7 @@ def test_time_is_looked_at_between_harmonics(
 
 def test_the_adapter_writes_the_decks_and_what_they_cannot_say(tmp_path: Path) -> None:
     """Harmonics up to the highest, and of the rest what the tool asks for; a pressed tyre's deck
-    says all."""
+    says all but the slopes."""
     tangents = {"p": [("modes", 3, 0, 1.0)]}
     decks: Any = SimpleNamespace(
         request={"highest_harmonic": 3, "modes_per_harmonic": 4, "own_frequency": True, "other": 1},
@@ -360,6 +360,11 @@ def test_the_adapter_writes_the_decks_and_what_they_cannot_say(tmp_path: Path) -
     }
     request.unlink()
     decks.loads_N = (100.0,)
+    deck, request = Bundled().write(decks, tmp_path)
+    assert request.name == "press.request.json"
+    assert json.loads(request.read_text()) == {"sensitivities": {"p": [["modes", 3, 0, 1.0]]}}
+    request.unlink()
+    tangents.clear()
     assert Bundled().write(decks, tmp_path) == [deck] and not request.exists()
 
 

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.sparse import csr_matrix
 
 from ...errors import Indefinite, Inverted, NoEquilibrium
 from ..solid3d.gmres import gmres
@@ -49,10 +50,13 @@ class PressedState:
     height: float  # the road's, m
     contact: Contact
     stiffness: float  # vertical, of the tangent, dF / d(deflection), N/m
+    # parts (m/N) and the road's rise that the tangent answers a unit of half its force with
+    unit: tuple[Array, float]
 
 
 class ContactNewton:
-    """Presses a tyre from its inflated state ``U`` (k, n, 3) to rising loads."""
+    """Presses a tyre from its inflated state ``U`` (k, n, 3) to rising loads; ``settled`` is called
+    with each state that slip is to count from."""
 
     def __init__(
         self,
@@ -61,8 +65,9 @@ class ContactNewton:
         road: FlatRoad,
         U: Array,
         check: Callable[[], None],
+        settled: Callable[[ContactNewton, PressedState], None] = lambda work, found: None,
     ):
-        self.tyre, self.symmetry, self.check = tyre, symmetry, check
+        self.tyre, self.symmetry, self.check, self.settled = tyre, symmetry, check, settled
         self.free_radius = road.height
         self.flat = self._flat_height(tyre.model.mesh.X, np.flatnonzero(~symmetry.free.any(1)))
         self.road = road
@@ -105,6 +110,7 @@ class ContactNewton:
             self.parts, self.height, self.load = found.parts, found.height, target
             if self.height <= self.flat:
                 raise NoEquilibrium(f"the tyre is flat on its rim at {target:.4g} N{self.depth()}")
+            self.settled(self, found)
             self.road = self.road.settled(found.contact)
             if target == load:
                 return found
@@ -163,7 +169,9 @@ class ContactNewton:
                 near = max(0.1 * near, CONTACT_FORCE_RTOL)
                 continue
             self._bound = contact.bound(1.0)
-            return PressedState(parts, height, contact, self._stiffness(contact))
+            unit = self._unit(contact)
+            self._slope = -unit[0] / 2, -unit[1] / 2
+            return PressedState(parts, height, contact, 2 / unit[1], unit)
         raise NoEquilibrium("the friction did not settle")
 
     def _softly(
@@ -228,25 +236,26 @@ class ContactNewton:
         self, contact: Contact, force: Array, lacking: float, tolerance: float
     ) -> tuple[Array, float]:
         """Newton's step of the parts and of the road's height."""
-        border = _RoadHeight(self.symmetry, contact)
-        right = -np.append(force.ravel(), lacking * border.scale)
         if self._used > MAX_GMRES_BEFORE_NEW_FACTOR:
             self._form(contact)
-        found, self._used, left = self._solve(border, contact, right, tolerance)
+        tangent = Tangent.of(contact, self.symmetry)
+        step, rise, self._used, left = self.solve(tangent, -force, -lacking, tolerance)
         if not left <= MAX_LINEAR_RESIDUAL:
             raise NoEquilibrium("the tangent is too far from a stable one")
-        return found[:-1].reshape(force.shape), float(found[-1]) * border.scale
+        return step, rise
 
-    def _solve(
-        self, border: _RoadHeight, contact: Contact, right: Array, tolerance: float
-    ) -> tuple[Array, int, float]:
-        factor = self._factor or self._form(contact)
-        shape, scale = self.parts.shape, border.scale
-        touching = contact.matrix()
-        factor.to(self.symmetry.fold(touching))
+    def solve(
+        self, tangent: Tangent, force: Array, lacking: float, tolerance: float
+    ) -> tuple[Array, float, int, float]:
+        """Parts and rise of the road that a tangent answers ``force`` and ``lacking`` with, the
+        iterations, and the relative residual that is left."""
+        factor = self._factor or self._form(tangent.contact)
+        shape, scale = self.parts.shape, max(tangent.stiffness, 1.0) ** -0.5
+        right = np.append(force.ravel(), lacking * scale)
+        factor.to(self.symmetry.fold(tangent.touching))
         # two right-hand sides at once cost little more than one: all wait for the factor's memory
-        answer, first = factor.solve(np.stack([border.by_height, right[:-1].reshape(shape)]))
-        schur = border.stiffness - float((border.of_force * answer).sum())
+        answer, first = factor.solve(np.stack([tangent.by_height, force]))
+        schur = tangent.stiffness - float((tangent.of_force * answer).sum())
         if not schur:
             raise NoEquilibrium("no force answers to the road's height")
 
@@ -255,19 +264,20 @@ class ContactNewton:
             parts, rise = v[:-1].reshape(shape), v[-1] * scale
             V = self.symmetry.spread(parts)
             image = self.symmetry.gather(
-                self.tyre.product(V) + (touching @ V.ravel()).reshape(V.shape)
+                self.tyre.product(V) + (tangent.touching @ V.ravel()).reshape(V.shape)
             )
-            image += border.by_height * rise
-            more = float((border.of_force * parts).sum()) + border.stiffness * rise
+            image += tangent.by_height * rise
+            more = float((tangent.of_force * parts).sum()) + tangent.stiffness * rise
             return np.append(image.ravel(), more * scale)
 
         def precondition(v: Array, y: Array | None = None) -> Array:
             y = factor.solve(v[:-1].reshape(shape)) if y is None else y
-            rise = (v[-1] / scale - float((border.of_force * y).sum())) / schur
+            rise = (v[-1] / scale - float((tangent.of_force * y).sum())) / schur
             return np.append((y - answer * rise).ravel(), rise / scale)
 
         begin = precondition(right, first) / float(np.linalg.norm(right))
-        return gmres(product, precondition, right, tolerance, MAX_GMRES, begin)
+        found, used, left = gmres(product, precondition, right, tolerance, MAX_GMRES, begin)
+        return found[:-1].reshape(shape), float(found[-1]) * scale, used, left
 
     def _form(self, contact: Contact) -> ContactUpdate:
         """The preconditioner at the last state. Raises Indefinite; the one before is gone, as two
@@ -278,24 +288,34 @@ class ContactNewton:
         self._factor = ContactUpdate(Factor(self.order, self.tyre.tangents(np.float32), stiffness))
         return self._factor
 
-    def _stiffness(self, contact: Contact) -> float:
-        """dF / d(deflection): the whole tyre's force against the road's rise, tyre following."""
-        border = _RoadHeight(self.symmetry, contact)
-        unit = np.append(np.zeros(self.parts.size), border.scale)
-        found, _, left = self._solve(border, contact, unit, STIFFNESS_RTOL)
+    def _unit(self, contact: Contact) -> tuple[Array, float]:
+        """Parts and the road's rise that answer a unit of the force of half the tyre."""
+        tangent = Tangent.of(contact, self.symmetry)
+        found, rise, _, left = self.solve(tangent, 0 * self.parts, 1.0, STIFFNESS_RTOL)
         if left > STIFFNESS_RTOL:
             raise NoEquilibrium(f"the vertical stiffness was not found in {MAX_GMRES} iterations")
-        rise = float(found[-1]) * border.scale
-        self._slope = -found[:-1].reshape(self.parts.shape) / 2, -rise / 2
-        return 2 / rise
+        return found, rise
 
 
-class _RoadHeight:
-    """The road's height as one more unknown: its row and column of the tangent, of half the
-    tyre. ``scale`` brings it to the size of the displacements."""
+@dataclass(frozen=True)
+class Tangent:
+    """Of half the tyre: the contact's stiffness, and the road's height as one more unknown, its
+    column and row, on the parts."""
 
-    def __init__(self, symmetry: HalfTurn, contact: Contact):
-        self.by_height = symmetry.gather(contact.by_height())
-        self.of_force = symmetry.gather(contact.force_by_height())
-        self.stiffness = contact.stiffness
-        self.scale = max(self.stiffness, 1.0) ** -0.5
+    contact: Contact
+    touching: csr_matrix  # (k n 3, k n 3), N/m
+    by_height: Array  # (2, f, q, 3), N/m
+    of_force: Array  # (2, f, q, 3), N/m
+    stiffness: float  # N/m
+
+    @classmethod
+    def of(cls, contact: Contact, symmetry: HalfTurn) -> Tangent:
+        """At a contact."""
+        column, row = (symmetry.gather(f) for f in (contact.by_height(), contact.force_by_height()))
+        return cls(contact, contact.matrix(), column, row, contact.stiffness)
+
+    @property
+    def transposed(self) -> Tangent:
+        """The tyre's part is symmetric."""
+        turned = csr_matrix(self.touching.T)
+        return replace(self, touching=turned, by_height=self.of_force, of_force=self.by_height)

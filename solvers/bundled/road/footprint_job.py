@@ -1,7 +1,8 @@
 """The job that presses the inflated tyre on the road: what its deck asks, its steps, its results.
 
 JOB.json: pressure_Pa, mass_kg, free_radius_m, failure, cause, ``footprints`` [load_N, road_N, rim_N
-(x down, y, z), deflection_m, stiffness_N_per_m, contact_area_m2]; with a gas cavity_Hz of the
+(x down, y, z), deflection_m, stiffness_N_per_m, contact_area_m2]; where a request has sensitivities
+``slopes``, by variable those of numbers; with a gas cavity_Hz of the
 cavity's first wave, free and in ``footprints`` (fore-aft, vertical). JOB.npz: nodes, points, angles
 of the whole tyre, and per footprint i the arrays of its patch and the displacement, as NAME_i;
 where modes were asked for: mode_frequency_Hz (m,), mode_shape (m, ring, node, 3) at mode_node,
@@ -38,6 +39,7 @@ from .contact_newton import ContactNewton, PressedState
 from .half_turn_symmetry import HalfTurn
 from .loaded_modes import SPARE, loaded_modes
 from .patch import patch
+from .slopes import InflatedTangent, Slopes
 from .stick import held
 from .tread import tread_of
 
@@ -58,8 +60,8 @@ class RoadData:
 
     node: str  # its reference node
     tread: str  # the tread's surface
-    stiffness: float  # of the overclosure, Pa/m
-    friction: float
+    stiffness: complex | float  # of the overclosure, Pa/m
+    friction: complex | float
     elastic_slip: float  # m
     lengths: Array  # of the elements round half the tyre, rad
 
@@ -91,10 +93,10 @@ def read_road(model: list[Keyword]) -> RoadData | None:
     found = {k.name: k for k in model if k.name in ("SURFACE BEHAVIOR", "FRICTION")}
     if len(found) < 2:
         raise DeckError(pair.line, "the contact needs a *SURFACE BEHAVIOR and a *FRICTION")
-    stiffness = found["SURFACE BEHAVIOR"].only_row().real(0)
-    friction = found["FRICTION"].only_row().real(0)
+    stiffness = found["SURFACE BEHAVIOR"].only_row().number(0)
+    friction = found["FRICTION"].only_row().number(0)
     slip = float(np.real(found["FRICTION"].number("ELASTIC SLIP") or 0.0))
-    if not (stiffness > 0 and friction >= 0 and slip >= MIN_ELASTIC_SLIP):
+    if not (np.real(stiffness) > 0 and np.real(friction) >= 0 and slip >= MIN_ELASTIC_SLIP):
         raise DeckError(
             found["FRICTION"].line,
             "the contact's stiffness must be positive, friction not negative, the elastic slip at"
@@ -150,9 +152,10 @@ def press(
     wanted: list[float],
     check: Callable[[], None],
     vibrations: Mapping[float, ModesAtLoad] = MappingProxyType({}),
+    tangents: Mapping[str, InflatedTangent] = MappingProxyType({}),
 ) -> dict[str, Any]:
     """Footprints at the ``wanted`` loads (N) of a tyre inflated to ``U`` (n, 3), with modes where
-    there are ``vibrations``.
+    there are ``vibrations``, and derivatives by the numbers of the deck that ``tangents`` are of.
 
     Raises DeckError; RunFailed where not even the first load is reached.
     """
@@ -170,11 +173,12 @@ def press(
     tread = model.mesh.faces[data.tread]
     tyre, start = Revolved(model, loads, around), np.multiply.outer(around.turn(0).real, U)
     surface = tread_of(model.mesh.X, tread.connectivity, around)
-    law = data.stiffness, data.friction, data.elastic_slip
+    law = float(np.real(data.stiffness)), float(np.real(data.friction)), data.elastic_slip
     road = flat_road(model.mesh.X, surface, *law, start)
+    slopes = Slopes(tangents, around, tread.connectivity, road)
     try:
         symmetry = HalfTurn(model.mesh, equations.equation < equations.size, around)
-        work = ContactNewton(tyre, symmetry, road, start, check)
+        work = ContactNewton(tyre, symmetry, road, start, check, slopes.follow)
     except Refused as error:
         raise DeckError(0, f"a pressed tyre must be symmetric: {error}") from None
     footprints: list[dict[str, Any]] = []
@@ -183,6 +187,7 @@ def press(
         try:
             found = work.to(load)
             footprint = _footprint(work, found, load, rings)
+            footprint |= slopes.at(work, found, rings)
             if load in vibrations:
                 footprint |= _modes(work, found, vibrations[load], equations, U, rings)
         except (RunFailed, np.linalg.LinAlgError) as error:

@@ -126,15 +126,20 @@ class Evaluator:
         return shape if len(shape) else None
 
     def press(
-        self, values: Mapping[str, float], loads_N: Sequence[float], modes: int = 0
+        self,
+        values: Mapping[str, float],
+        loads_N: Sequence[float],
+        modes: int = 0,
+        gradients: tuple[str, ...] = (),
     ) -> Pressed:
         """One design on the road at rising loads, as far as the solver gets, with so many ``modes``
-        at each.
+        at each; gradients: names of variables whose slopes are wanted (`Footprint.slopes`).
 
         Raises what `evaluate` does; DeckRefused too where the solver has no road.
         """
         self.needs_road(bool(modes))
-        decks = Decks(self._with(values), loads_N=tuple(loads_N), loaded_modes=modes)
+        design = self._with(values)
+        decks = Decks(design, gradients, loads_N=tuple(loads_N), loaded_modes=modes)
         return self._ask(decks, lambda answer, kept: pressed(answer, loads_N, kept, modes))
 
     def needs_road(self, modes: bool = False) -> None:
@@ -246,9 +251,10 @@ class Evaluator:
         loads_N: Sequence[float],
         jobs: int = 1,
         modes: int = 0,
+        gradients: tuple[str, ...] = (),
     ) -> Iterator[Pressed | EvaluationFailed]:
         """`press` for each design, in their order; ``jobs`` at a time."""
-        asked = [(values, loads_N, modes) for values in designs]
+        asked = [(values, loads_N, modes, gradients) for values in designs]
         return _not_refused(self._each("press", asked, jobs))
 
     def _each(self, ask: str, asked: Sequence[tuple[Any, ...]], jobs: int) -> Iterator[Any]:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -32,7 +32,8 @@ class Footprint:
     stick: mode_traction_N (m,), the patch's forces along the road in each shape, their sizes
     summed; and the modes of a patch that slides freely, sliding_frequency_Hz and sliding_shape.
     With a gas in the cavity: cavity_Hz (2,), its first wave fore and aft, and up and down, between
-    rigid walls.
+    rigid walls. slopes: by variable and name, derivatives of the numbers above by those variables
+    that it was asked for.
     """
 
     load_N: float
@@ -58,6 +59,7 @@ class Footprint:
     sliding_frequency_Hz: Array | None = None
     sliding_shape: Array | None = None
     cavity_Hz: Array | None = None
+    slopes: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -121,4 +123,6 @@ def pressed(
 
 def _plain(value: Any) -> Any:
     """Arrays laid out alike, so that sums are too, recorded or not; numbers as floats."""
+    if isinstance(value, Mapping):
+        return value
     return np.ascontiguousarray(value) if np.ndim(value) else float(value)

@@ -17,10 +17,10 @@ class Solver(Protocol):
     """What a solver brings: one class, registered under the entry point group above.
 
     version: of the program that runs, "unknown" where it is not found; part of every record's key.
-    dialect: the template folder of its decks; capabilities: of ``modes``,
-    ``gradients``, ``footprint``, ``loaded_modes``, and what effects need (`Effect.needs`):
-    ``vibration_modulus``, a modulus in the frequency step other than in the static one, and those
-    of `design.tyre.CAPABILITIES`;
+    dialect: the template folder of its decks; capabilities: of ``modes``, ``gradients``,
+    ``footprint``, ``footprint_gradients``, ``loaded_modes``, and what effects need
+    (`Effect.needs`): ``vibration_modulus``, a modulus in the frequency step other than in the
+    static one, and those of `design.tyre.CAPABILITIES`;
     A solver that starts a program has ``command`` too, a list of its words, which is the user's to
     set (`tyrecal.simulate.settings`), never the case's;
     refusals, failures: exceptions of `write`, `run` and `read` for a deck it cannot honour and

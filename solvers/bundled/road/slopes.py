@@ -1,0 +1,165 @@
+"""Exact derivatives of the pressed tyre by numbers of its deck, load after load.
+
+At each load reached, the residual r(y, y0, p) of displacements and road height y is zero; y0 are
+those of the load before, from where slip counts, and p is a number of the deck:
+
+    K dy/dp = -(dr/dp + dr/dy0 dy0/dp),    K = dr/dy
+
+from the inflated tyre on, whose dU/dp is that of vibrations (`modes.sensitivity`). The vertical
+stiffness is 2 / rise, rise = e . s with K s = e, the unit of half the road's force, so that
+
+    d rise/dp = -w . (dK/dp s),    K^T w = e
+
+The tyre's dr and dK are complex steps. The contact has kinks, where points begin to touch or to
+slide: its own are central differences along all that changes it, for which no equation is solved.
+A point that begins to slide is a jump of K, which the derivative of the stiffness is without.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ...errors import NoEquilibrium
+from ..deck.keywords import COMPLEX_STEP
+from ..section.model import Model
+from ..section.parts.part import TyrePart
+from ..solid3d.circumference import HalfCircle
+from ..solid3d.revolved import Revolved
+from .contact import Contact, FlatRoad
+from .contact_newton import MAX_GMRES, ContactNewton, PressedState, Tangent
+from .patch import patch
+from .tread import tread_of
+
+Array = np.ndarray
+Values = dict[str, float]
+RATE_RTOL = 1e-5  # residual of a linear problem, relative
+CONTACT_STEP = 1e-8  # m, of what moves most, in a difference of the contact
+NUMBER_LENGTH = 1e-3  # m, that a relative change of the road's numbers counts as
+ROAD_NUMBERS = ("stiffness", "friction")  # of a `FlatRoad`
+
+
+@dataclass(frozen=True)
+class InflatedTangent:
+    """The inflated tyre and its road with the tangent of a number of the deck."""
+
+    model: Model  # its numbers are complex
+    loads: Sequence[TyrePart]
+    U: Array  # dU/dp (n, 3) of the inflated state
+    road: Mapping[str, float]  # d / dp of `ROAD_NUMBERS`
+
+
+class Slopes:
+    """Follows `ContactNewton` with the derivatives by numbers of the deck, by name, from its road
+    and state at the inflated tyre on."""
+
+    def __init__(
+        self,
+        numbers: Mapping[str, InflatedTangent],
+        around: HalfCircle,
+        faces: Array,
+        road: FlatRoad,
+    ):
+        """faces (e, a): nodes of the tread's line elements."""
+        self.paths = {name: _Path(own, around, faces, road) for name, own in numbers.items()}
+
+    def follow(self, work: ContactNewton, found: PressedState) -> None:
+        """To the state that slip counts from next. Raises NoEquilibrium."""
+        if self.paths:
+            tangent = Tangent.of(found.contact, work.symmetry)
+        for path in self.paths.values():
+            path.follow(work, found, tangent)
+
+    def at(self, work: ContactNewton, found: PressedState, rings: Array) -> dict[str, Any]:
+        """``slopes`` of a footprint's numbers at the last state followed to, whose patch is on
+        nodes at the angles ``rings``, by name; nothing where none was asked for. Raises
+        NoEquilibrium."""
+        if not self.paths:
+            return {}
+        tangent = Tangent.of(found.contact, work.symmetry).transposed
+        parts, lift = _solved(work, tangent, 0 * found.parts, 1.0)
+        unit = work.symmetry.spread(parts), lift
+        rates = {name: path.rates(work, found, unit, rings) for name, path in self.paths.items()}
+        return {"slopes": rates}
+
+
+class _Path:
+    """Derivatives by one number: of the last state, and of the road that slip counts on."""
+
+    def __init__(self, own: InflatedTangent, around: HalfCircle, faces: Array, road: FlatRoad):
+        self.tyre, self.numbers = Revolved(own.model, own.loads, around), own.road
+        self.around, self.faces, X = around, faces, own.model.mesh.X
+        self.X, self.dX = np.real(X), np.imag(X) / COMPLEX_STEP
+        nodes = road.tread.nodes.ravel()
+        crown = nodes[np.argmax(self.X[nodes, 0] + road.U[0, nodes, 0])]
+        self.free_radius = self.height = float(self.dX[crown, 0] + own.U[crown, 0])
+        self.U = np.multiply.outer(around.turn(0).real, own.U)
+        self.elastic = 0 * road.elastic
+        self.since: dict[str, Array | float] = {}  # of the road: the state before
+
+    def follow(self, work: ContactNewton, found: PressedState, tangent: Tangent) -> None:
+        """From the state before to this one."""
+        contact = found.contact
+        self.since = {"U": self.U, "elastic": self.elastic, "height": self.height}
+        self.U, self.height = 0 * self.U, 0.0
+        step, (above, below) = self._beside(contact)
+        force = self.tyre.residual(contact.U).imag / COMPLEX_STEP
+        force += (above.field - below.field) / (2 * step)
+        more = (above.force - below.force) / (2 * step)
+        parts, self.height = _solved(work, tangent, -work.symmetry.gather(force), more / 2)
+        self.U = work.symmetry.spread(parts)
+        step, (above, below) = self._beside(contact)
+        slip = above.road.settled(above).elastic - below.road.settled(below).elastic
+        self.elastic = slip / (2 * step)
+
+    def rates(
+        self, work: ContactNewton, found: PressedState, unit: tuple[Array, float], rings: Array
+    ) -> Values:
+        """d / dp of a footprint's numbers; unit: w on the fields and on the road's height."""
+        W, lift = unit
+        S, rise = work.symmetry.spread(found.unit[0]), found.unit[1]
+        step, contacts = self._beside(found.contact)
+        told = []
+        for sign, each in zip((1, -1), contacts, strict=True):
+            half = patch(each, self.X + sign * step * self.dX, rings)
+            forces = (each.matrix() @ S.ravel()).reshape(S.shape) + rise * each.by_height()
+            load = (each.force_by_height() * S).sum() + rise * each.stiffness
+            bent = (W * forces).sum() + lift * load
+            told.append([2 * half.area.sum(), half.length, half.width, bent])
+        area, length, width, bent = (np.array(told[0]) - told[1]) / (2 * step)
+        self.tyre.residual(found.contact.U + 1j * COMPLEX_STEP * self.U)
+        bent += (W * self.tyre.product(S).imag).sum() / COMPLEX_STEP
+        return {
+            "deflection_m": self.free_radius - self.height,
+            "stiffness_N_per_m": float(found.stiffness**2 / 2 * bent),
+            "contact_area_m2": float(area),
+            "contact_length_m": float(length),
+            "contact_width_m": float(width),
+        }
+
+    def _beside(self, contact: Contact) -> tuple[float, list[Contact]]:
+        """A step of the number, and the contact so far above and below."""
+        road, lengths = contact.road, [self.dX, self.U, self.height, *self.since.values()]
+        lengths += [NUMBER_LENGTH * dn / getattr(road, n) for n, dn in self.numbers.items() if dn]
+        step = CONTACT_STEP / max(*(float(np.abs(each).max()) for each in lengths), 1e-300)
+        beside = []
+        for move in (step, -step):
+            rates = {**self.numbers, **self.since}
+            moved = {name: getattr(road, name) + move * rate for name, rate in rates.items()}
+            if self.dX.any():
+                moved["tread"] = tread_of(self.X + move * self.dX, self.faces, self.around)
+            there = contact.U + move * self.U, contact.height + move * self.height
+            beside.append(replace(road, **moved).forces(*there))
+        return step, beside
+
+
+def _solved(
+    work: ContactNewton, tangent: Tangent, force: Array, lacking: float
+) -> tuple[Array, float]:
+    parts, rise, _, left = work.solve(tangent, force, lacking, RATE_RTOL)
+    if left > RATE_RTOL:
+        raise NoEquilibrium(f"a derivative was not found in {MAX_GMRES} iterations")
+    return parts, rise
