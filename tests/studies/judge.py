@@ -18,6 +18,7 @@ from typing import Any
 
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator
+from tyrecal.tyre.case import LoadedCase
 from tyrecal.tyre.case.parts import Cord, Rubber
 from tyrecal.tyre.load import load_case
 from tyrecal.tyre.values import with_values
@@ -30,15 +31,15 @@ ANGLES = [6, 6, 6, 8, 12, 18, 22, 25, 25, 26, 26]  # degrees, from the patch's m
 CLOSE = 1e-6  # m, between the two deflections
 
 
-def problem(deflections_m: list[float], modes: int) -> dict[str, Any]:
-    """What GetFEM is told."""
-    case = load_case(CASE).case
-    assert case.section.stations
-    rubber = case.materials["rubber"]
+def tyre_told(case: LoadedCase) -> dict[str, Any]:
+    """Numbers of the case: all that a judge knows of the tyre."""
+    c = case.case
+    assert c.section.stations
+    rubber = c.materials["rubber"]
     assert isinstance(rubber, Rubber)
     cords = {}
-    for layer in case.rebar_layers.values():
-        cord = case.materials[layer.material]
+    for layer in c.rebar_layers.values():
+        cord = c.materials[layer.material]
         assert isinstance(cord, Cord)
         cords[layer.line] = {
             "modulus": cord.youngs_modulus_Pa,
@@ -48,15 +49,23 @@ def problem(deflections_m: list[float], modes: int) -> dict[str, Any]:
             "density": cord.density_kg_per_m3,
         }
     return {
-        "stations": str(CASE.with_name(case.section.stations)),
-        "along": [3, 4],
-        "rows": [1, 1, 1, 1],
-        "angles_deg": ANGLES,
-        "pressure": 1e3 * case.pressure_kPa,
+        "stations": str(case.path.with_name(c.section.stations).resolve()),
+        "pressure": 1e3 * c.pressure_kPa,
         "C10": rubber.C10_Pa,
+        "C01": rubber.C01_Pa,
         "D1": rubber.D1_per_Pa,
         "density": rubber.density_kg_per_m3,
         "cords": cords,
+    }
+
+
+def problem(deflections_m: list[float], modes: int) -> dict[str, Any]:
+    """What GetFEM is told."""
+    return {
+        **tyre_told(load_case(CASE)),
+        "along": [3, 4],
+        "rows": [1, 1, 1, 1],
+        "angles_deg": ANGLES,
         "road": ROAD["road.stiffness_Pa_per_m"],
         "contact_cells": 2,
         "help_Pa": [1e7, 1e6, 1e5, 0.0],
@@ -93,8 +102,13 @@ def main() -> None:
     if not found.exists():
         depths = [depth * 1e-3 for depth in options.deflections_mm]
         told.write_text(json.dumps(problem(depths, options.modes), indent=1))
-        script = Path(__file__).with_name("judge_getfem.py")
-        subprocess.run([PYTHON, str(script), str(told), str(found)], check=True)
+        command = [
+            PYTHON,
+            "-m",
+            "tests.studies.judge_getfem",
+            *map(str, map(Path.resolve, (told, found))),
+        ]
+        subprocess.run(command, cwd=ROOT, check=True)
     judge = json.loads(found.read_text())
     evaluator = Evaluator(TyreDesign(with_values(load_case(CASE), ROAD)))
     for each in judge["loads"]:

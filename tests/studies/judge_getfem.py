@@ -1,6 +1,6 @@
 """The tyre on a flat road by GetFEM, of no code of the tool's: force, area, stiffness, modes.
 
-    /usr/bin/python3 tests/studies/judge_getfem.py PROBLEM.json RESULT.json    (python3-getfem)
+    /usr/bin/python3 -m tests.studies.judge_getfem PROBLEM.json RESULT.json    (python3-getfem)
 
 PROBLEM: numbers of the case alone (`judge.py` takes them from it), mesh and deflections. The tyre
 is meshed here, whole, in bricks of 20 nodes: full integration of the distortion, reduced of the
@@ -11,7 +11,6 @@ GetFEM differentiates the energies; Newton's method is below. SI units; x is dow
 
 from __future__ import annotations
 
-import csv
 import json
 import sys
 import time
@@ -20,13 +19,13 @@ from typing import Any
 
 import getfem as gf
 import numpy as np
-from scipy.interpolate import CubicSpline
 from scipy.sparse import csc_matrix
 from scipy.sparse.linalg import LinearOperator, eigsh, splu
 
+from .judge_section import LINES, section
+
 gf.util("trace level", 0)
 gf.util("warning level", 0)
-LINES = ("inner", "ply", "belt1", "belt2", "outer")
 F = "(Id(3)+Grad_u)"
 N = "Normal"
 
@@ -43,37 +42,6 @@ MERIDIAN = f"Normalized({cross(N, ROUND)})"
 CIRCLE = f"Normalized({cross(cross(N, ROUND), N)})"
 TOUCHES = "Heaviside(X(1)+w(1)-H)"
 DEFORMED = f"(Det({F})*Inv({F})'*{N})"  # n da / dA
-
-
-def section(path: str, crown: int, sidewall: int) -> tuple[np.ndarray, np.ndarray]:
-    """Points (line, column, 2) of the whole section, two columns an element, and which columns have
-    belts."""
-    with Path(path).open(newline="") as file:
-        rows = list(csv.DictReader(file))
-    number = lambda row, key: float(row[key] or "nan") * 1e-3
-    table = np.array([[[number(r, f"{k}_{c}_mm") for c in "rz"] for r in rows] for k in LINES])
-    last_belt = int(np.flatnonzero(~np.isnan(table[2, :, 0])).max())
-    first_held = next(i for i, row in enumerate(rows) if row["rigid"] == "1")
-    for k in (2, 3):  # beyond the belts: at the same share of the gap between ply and outside
-        gap = table[4, last_belt] - table[1, last_belt]
-        share = (table[k, last_belt] - table[1, last_belt]) @ gap / (gap @ gap)
-        beyond = slice(last_belt + 1, None)
-        table[k, beyond] = table[1, beyond] + share * (table[4, beyond] - table[1, beyond])
-    steps = np.concatenate(
-        [
-            np.linspace(0, last_belt, 2 * crown + 1),
-            np.linspace(last_belt, first_held, 2 * sidewall + 1)[1:],
-        ]
-    )
-    at = np.arange(len(rows))
-    half = np.empty((len(LINES), len(steps), 2))
-    for part in (steps <= last_belt, steps >= last_belt):
-        low, high = int(steps[part][0]), int(steps[part][-1])
-        own = slice(low, high + 1)
-        half[:, part] = CubicSpline(at[own], table[:, own], axis=1)(steps[part])
-    whole = np.concatenate([half[:, :0:-1] * [1, -1], half], 1)
-    belted = np.concatenate([steps[:0:-1], steps]) <= last_belt + 1e-9
-    return whole, belted
 
 
 class Tyre:

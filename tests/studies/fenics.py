@@ -1,0 +1,220 @@
+"""The bundled solver against FEniCSx and SLEPc: modes of both sections at three pressures.
+
+    apt-get install python3-dolfinx
+    python -m tests.studies.fenics FOLDER > table.md
+
+FOLDER keeps FEniCSx's answers; the same command goes on where it was stopped. FEniCSx's part is
+`judge_fenics.py`, by Debian's own Python. It is given one of three problems:
+
+common: the bundled solver's mesh, elements (serendipity, 2 x 2 points) and laws.
+own elements: numbers of the case alone; cubic triangles on a mesh of its own, integrated in full.
+own laws: the same with cords' nominal strain for their logarithmic one, ln^2 J for (J - 1)^2.
+"""
+
+from __future__ import annotations
+
+import os
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+import argparse
+import hashlib
+import json
+import subprocess
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tyrecal.simulate.deck.tyre_design import TyreDesign
+from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
+from tyrecal.simulate.evaluate.results import HarmonicShape, RawMode
+from tyrecal.simulate.modes.label import Label, Mode, label_modes
+from tyrecal.simulate.modes.match import match
+from tyrecal.simulate.modes.subspace import mac
+from tyrecal.tyre.case import LoadedCase
+from tyrecal.tyre.resolve import resolved
+
+from .calculix import CASES, INITIAL, OPTIMISED, ROOT, at, off, on_common_nodes
+from .judge import PYTHON, tyre_told
+
+Array = np.ndarray
+DESIGNS = {"initial": INITIAL, "optimised": OPTIMISED}
+PRESSURES_kPa = (160.0, 240.0, 320.0)
+NUMERICS = {
+    "inflation": [[1.0, 1e7], [1.0, 1e6], [1.0, 1e5], [1.0, 0.0]],  # share of p, Pa of help
+    "harmonics": [0, 1, 2, 3, 4],
+    "modes": 2,
+}
+LAWS = {"cord_law": "logarithmic", "volume_law": "J - 1"}
+OWN_LAWS = {"cord_law": "nominal", "volume_law": "ln J"}
+OWN_ELEMENTS = {"element": ["P", 3], "quadrature": 6, "full_quadrature": 8}
+OWN_MESH = {"along": [12, 20], "rows": [1, 1, 1, 4]}
+
+
+def common_problem(case: LoadedCase) -> dict[str, Any]:
+    """The bundled solver's discrete problem."""
+    tyre = resolved(case)
+    c, mesh = tyre.case, tyre.mesh
+    place = {number: k for k, number in enumerate(mesh.nodes)}
+    rim = set(mesh.rim)
+    sides = {pair for s in mesh.solids.values() for pair in pairwise((*s[:4], s[0]))}
+    cords = []
+    for layer in c.rebar_layers.values():
+        cord: Any = c.materials[layer.material]
+        assert layer.spacing_m
+        per_area = layer.area_m2 / layer.spacing_m
+        data = [
+            cord.youngs_modulus_Pa * per_area,
+            float(np.radians(layer.angle_deg)),
+            cord.density_kg_per_m3 * per_area,
+        ]
+        for first, *_, last in mesh.cords[layer.line].values():
+            cords.append([place[first], place[last], *data])
+    told = tyre_told(case)
+    return {
+        **{key: told[key] for key in ("pressure", "C10", "C01", "D1", "density")},
+        **{"element": ["S", 2], "quadrature": 3, "full_quadrature": 5, **LAWS, **NUMERICS},
+        "nodes": list(mesh.nodes.values()),
+        "quads": [[place[n] for n in solid] for solid in mesh.solids.values()],
+        "rows": [row for _, row in mesh.cells.values()],
+        "cords": cords,
+        "inner": [[place[mesh.solids[s][3]], place[mesh.solids[s][0]]] for s in mesh.inner],
+        "held": sorted([place[a], place[b]] for a, b in sides if {a, b} <= rim),
+    }
+
+
+def own_problem(case: LoadedCase, laws: dict[str, str]) -> dict[str, Any]:
+    """Numbers of the case, to be meshed by the judge."""
+    return {**tyre_told(case), **OWN_MESH, **OWN_ELEMENTS, **laws, **NUMERICS}
+
+
+def ask(folder: Path, problem: dict[str, Any]) -> dict[str, Any]:
+    """FEniCSx's answer, from the folder where it is known. Raises CalledProcessError."""
+    text = json.dumps(problem, sort_keys=True)
+    name = hashlib.sha256(text.encode()).hexdigest()[:16]
+    told, found = (folder.resolve() / f"{name}{end}" for end in (".problem.json", ".json"))
+    if not found.exists():
+        folder.mkdir(parents=True, exist_ok=True)
+        told.write_text(text, encoding="utf-8")
+        command = [PYTHON, "-m", "tests.studies.judge_fenics", str(told), str(found)]
+        subprocess.run(command, cwd=ROOT, check=True, capture_output=True)
+    answer: dict[str, Any] = json.loads(found.read_text(encoding="utf-8"))
+    return answer
+
+
+def labelled(answer: dict[str, Any], labels: list[Label]) -> dict[str, Mode]:
+    """FEniCSx's modes by the text of their label. Raises EvaluationFailed, ValueError."""
+    points, raw = np.array(answer["points"]), []
+    for mode in answer["modes"]:
+        if mode["eigenvalue"] <= 0:
+            raise ValueError(f"the state is unstable: {mode['eigenvalue']:g} of n = {mode['n']}")
+        amplitude = np.array(mode["cos"]) + 1j * np.array(mode["sin"])
+        shape = HarmonicShape(mode["n"], np.array(answer["corners"]), points, amplitude)
+        frequency = float(np.sqrt(mode["eigenvalue"]) / (2 * np.pi))
+        raw.append(RawMode(frequency, shape, 2 if mode["n"] else 1))
+    return {str(label): mode for label, mode in match(label_modes(raw), labels).items()}
+
+
+@dataclass(frozen=True)
+class Common:
+    """The bundled solver's modes and FEniCSx's on its discrete problem, both tyres' masses, and the
+    largest distance of their inflated states."""
+
+    ours: dict[str, Mode]
+    theirs: dict[str, Mode]
+    mass_kg: tuple[float, float]
+    apart_m: float
+
+    def mac(self, label: str) -> float:
+        a, b = self.ours[label].raw.shape, self.theirs[label].raw.shape
+        assert isinstance(a, HarmonicShape) and isinstance(b, HarmonicShape)
+        return mac(*on_common_nodes(a, b))
+
+
+def targets(case: LoadedCase) -> list[Label]:
+    """The modes that are compared."""
+    assert case.case.targets
+    return [Label(t.c, t.m, t.kind) for t in case.case.targets.modes]
+
+
+def on_common(case: LoadedCase, folder: Path) -> Common:
+    """Both solvers on the bundled one's discrete problem."""
+    answer = Evaluator(TyreDesign(case), "bundled").evaluate(Question({}))
+    ours = match(label_modes(answer.modes), targets(case))
+    same = ask(folder, common_problem(case))
+    numbers = np.array(list(resolved(case).mesh.nodes))[same["corners"]]
+    place = {int(number): k for k, number in enumerate(answer.nodes)}
+    inflated = answer.displacement[[place[int(number)] for number in numbers]]
+    return Common(
+        {str(label): mode for label, mode in ours.items()},
+        labelled(same, targets(case)),
+        (answer.mass_kg, same["mass_kg"]),
+        float(abs(inflated - np.array(same["displacement"])).max()),
+    )
+
+
+@dataclass(frozen=True)
+class Row:
+    """One mode: Hz of the bundled solver; its deviation from FEniCSx, in %, on the three problems;
+    MAC on the common one."""
+
+    mode: str
+    frequency_Hz: float
+    common: float
+    mac: float
+    elements: float
+    laws: float
+
+
+def compare(case: LoadedCase, folder: Path) -> tuple[list[Row], float]:
+    """The case's target modes, and the largest distance of the inflated states, m."""
+    found = on_common(case, folder)
+    own = [
+        labelled(ask(folder, own_problem(case, laws)), targets(case)) for laws in (LAWS, OWN_LAWS)
+    ]
+    rows = []
+    for key, mode in found.ours.items():
+        shares = [off(mode, judge[key]) for judge in (found.theirs, *own)]
+        rows.append(Row(key, mode.frequency_Hz, shares[0], found.mac(key), *shares[1:]))
+    return rows, found.apart_m
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("folder", type=Path)
+    folder = parser.parse_args().folder
+    print(
+        "| case | design | kPa | common problem | smallest MAC | inflated states apart, nm |",
+        end="",
+    )
+    print(" own elements | own laws, too |\n|---|---|---|---|---|---|---|---|")
+    every: list[Row] = []
+    full: list[tuple[str, Row]] = []
+    for name in CASES:
+        for design, values in DESIGNS.items():
+            for pressure in PRESSURES_kPa:
+                rows, apart = compare(at(name, values, pressure), folder)
+                where = f"| {name} | {design} | {pressure:g} |"
+                worst = lambda key, rows=rows: max((getattr(r, key) for r in rows), key=abs)
+                least = min(r.mac for r in rows)
+                print(f"{where} {worst('common'):+.1e} % | {least:.9f} | {1e9 * apart:.2g}", end="")
+                print(f" | {worst('elements'):+.3f} % | {worst('laws'):+.3f} % |", flush=True)
+                every += rows
+                full += [(where, row) for row in rows if design == "initial"]
+    print("\n| case | design | kPa | mode | bundled, Hz | common problem | own elements |", end="")
+    print(" own laws, too |\n|---|---|---|---|---|---|---|---|")
+    for where, r in full:
+        print(f"{where} {r.mode} | {r.frequency_Hz:.4f} | {r.common:+.1e} %", end="")
+        print(f" | {r.elements:+.3f} % | {r.laws:+.3f} % |")
+    most = lambda key: max(abs(getattr(r, key)) for r in every)
+    print(
+        f"\n{len(every)} modes; largest deviation on the common problem {most('common'):.1e} %,"
+        f" with own elements {most('elements'):.3f} %, with own laws, too, {most('laws'):.3f} %"
+    )
+
+
+if __name__ == "__main__":
+    main()

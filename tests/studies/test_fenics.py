@@ -1,0 +1,38 @@
+"""FEniCSx, where Debian's Python has it, finds the bundled solver's modes on a coarse mesh."""
+
+from __future__ import annotations
+
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from tyrecal.tyre.case import with_level
+from tyrecal.tyre.load import load_case
+
+from .calculix import ROOT
+from .fenics import on_common
+from .judge import PYTHON
+
+
+def installed() -> bool:
+    """Debian's Python can import FEniCSx."""
+    try:
+        return not subprocess.run([PYTHON, "-c", "import dolfinx"], capture_output=True).returncode
+    except FileNotFoundError:
+        return False
+
+
+@pytest.mark.slow
+def test_the_same_modes(tmp_path: Path) -> None:
+    """Nine modes to 1e-8, the mass to 1e-11, the inflated states to a nanometre."""
+    if not installed():
+        pytest.skip("FEniCSx is not installed here (apt-get install python3-dolfinx)")
+    case = with_level(load_case(ROOT / "cases" / "p235_75r17.yaml"), "coarse")
+    found = on_common(case, tmp_path)
+    assert len(found.ours) == 9
+    for label, mode in found.ours.items():
+        assert mode.frequency_Hz == pytest.approx(found.theirs[label].frequency_Hz, rel=1e-8)
+        assert found.mac(label) > 1 - 1e-6
+    assert found.apart_m < 1e-9
+    assert found.mass_kg[0] == pytest.approx(found.mass_kg[1], rel=1e-11)
