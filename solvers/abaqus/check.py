@@ -1,0 +1,272 @@
+"""Whether keywords stand as `grammar` has them: what ABAQUS would refuse of a deck, and what is not
+known to the grammar."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cache
+from typing import Protocol
+
+from .grammar import NODES_AND_SECTION, RULES, STEP_PROCEDURES, UNJUDGED, Rule
+
+LONGEST = {"number": 20, "integer": 10, "name": 80}  # characters of a field
+FORM = {
+    "number": re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([EeDd][+-]?\d+)?"),
+    "integer": re.compile(r"[+-]?\d+"),
+    "name": re.compile(r".+"),
+    "freedom": re.compile(r"\d+|ENCASTRE|PINNED|[XYZ]A?SYMM", re.IGNORECASE),
+}
+NUMBERED = {"node": "nset", "element": "elset"}  # kinds of fields that are numbers, or sets of them
+BEGIN_END = {"PART": "END PART", "ASSEMBLY": "END ASSEMBLY", "INSTANCE": "END INSTANCE"}
+GENERATORS = {"NGEN", "NFILL", "NCOPY", "ELGEN", "ELCOPY", "SYMMETRIC MODEL GENERATION"}
+
+
+class Row(Protocol):
+    """A data line."""
+
+    @property
+    def fields(self) -> Sequence[str]:
+        """Between the commas."""
+
+
+class Block(Protocol):
+    """A keyword."""
+
+    @property
+    def name(self) -> str:
+        """In upper case, single blanks."""
+
+    @property
+    def parameters(self) -> Mapping[str, str]:
+        """By upper-case name."""
+
+    @property
+    def rows(self) -> Sequence[Row]:
+        """Its data lines."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What is wrong with a keyword or one of its data lines; sure: ABAQUS refuses it by its
+    manual, else the grammar does not know it."""
+
+    block: Block
+    row: Row | None
+    words: str
+    sure: bool = True
+
+
+@dataclass
+class _Names:
+    """Names given and used, and what elements and nodes there are."""
+
+    given: set[tuple[str, str]] = field(default_factory=set)
+    used: list[tuple[str, str, Block, Row | None]] = field(default_factory=list)
+    nodes: set[str] = field(default_factory=set)
+    types: set[str] = field(default_factory=set)  # of elements
+    bare: list[tuple[Block, str]] = field(default_factory=list)  # sets, the sections they need
+
+
+def findings(blocks: Sequence[Block], before: Sequence[Block] = ()) -> list[Finding]:
+    """What is wrong with the keywords of a job that goes on from the model of another."""
+    names = _Names()
+    for block in before:
+        list(_parameters(block, RULES.get(block.name, Rule("")), names))
+        list(_data(block, RULES.get(block.name, Rule("")), names))
+    names.used.clear()
+    names.bare.clear()
+    found = [*_order(blocks, before)]
+    for block in blocks:
+        if rule := RULES.get(block.name):
+            found += _parameters(block, rule, names)
+            found += _data(block, rule, names)
+    if not any(block.name in BEGIN_END for block in blocks):  # of parts, names have prefixes
+        found += _unnamed(blocks, names)
+    return found
+
+
+def _order(blocks: Sequence[Block], before: Sequence[Block]) -> Iterator[Finding]:
+    """Levels, options of others, what must come after, what may stand once, steps' procedures."""
+    seen = {block.name for block in before}
+    opened: list[Block] = []  # parts, assembly, instance, step, the innermost last
+    parent: Block | None = None
+    once: dict[tuple[int, str], Block] = {}
+    procedure = ""
+    parts = any(block.name == "PART" for block in blocks)
+    for block in blocks:
+        name, inside = block.name, opened[-1].name if opened else ""
+        rule = RULES.get(name)
+        levels = rule.level if rule else UNJUDGED.get(name, "")
+        level = "step" if inside == "STEP" else "part" if inside or not parts else "model"
+        here = {level, "model"} if not parts and not inside else {level}
+        if not levels:
+            yield Finding(block, None, "is not known to the grammar", sure=False)
+        elif not here & set(levels.split()):
+            where = {"step": "a step", "part": "a part or assembly", "model": "the model"}[level]
+            yield Finding(block, None, f"does not belong in {where}")
+        if inside == "STEP" and not procedure:
+            procedure = name
+            if name not in STEP_PROCEDURES:
+                yield Finding(block, None, "stands where the step's procedure must, under *STEP")
+        elif inside == "STEP" and name in STEP_PROCEDURES:
+            yield Finding(block, None, f"is a second procedure of a step of *{procedure}")
+        if rule and rule.under and (parent is None or parent.name not in rule.under):
+            yield Finding(block, None, f"must stand under *{' or *'.join(rule.under)}")
+        if rule and rule.after and not seen & set(rule.after):
+            yield Finding(block, None, f"must come after *{' or *'.join(rule.after)}")
+        if rule and rule.within and inside == "STEP" and procedure not in rule.within:
+            yield Finding(block, None, f"does not belong in a step of *{procedure}")
+        if rule and rule.once:
+            scope = {"job": blocks[0], "step": opened[-1] if opened else None, "parent": parent}
+            if (key := (id(scope[rule.once]), name)) in once:
+                yield Finding(block, None, f"may stand once in a {rule.once}")
+            once[key] = block
+        if name == "STEP" or name in BEGIN_END:
+            opened.append(block)
+            procedure = ""
+        elif name == "END STEP" or name in BEGIN_END.values():
+            if inside != name.removeprefix("END "):
+                yield Finding(block, None, "ends what did not begin last")
+            else:
+                opened.pop()
+        if not (rule and rule.under) and name not in UNJUDGED:
+            parent = block
+        seen.add(name)
+    for block in opened:
+        yield Finding(block, None, f"has no *END {block.name}")
+
+
+def _parameters(block: Block, rule: Rule, names: _Names) -> Iterator[Finding]:
+    for name, value in block.parameters.items():
+        if name not in rule.parameters:
+            yield Finding(block, None, f"its {name} is not known to the grammar", sure=False)
+            continue
+        wanted = rule.parameters[name]
+        if wanted.islower():
+            yield from _value(block, None, wanted, value, names, f"{name}=")
+        elif _named(value) not in wanted.split("|"):
+            words = " or ".join(word or "no value" for word in wanted.split("|"))
+            yield Finding(block, None, f"{name}={value} must be {words}")
+    for group in rule.needs:
+        if not set(group.split("|")) & set(block.parameters):
+            yield Finding(block, None, f"needs {' or '.join(group.split('|'))}")
+    both = [name for name in rule.alone if name in block.parameters]
+    if len(both) > 1:
+        yield Finding(block, None, f"{both[0]} and {both[1]} exclude each other")
+
+
+def _data(block: Block, rule: Rule, names: _Names) -> Iterator[Finding]:
+    """Data lines: their number, then each field."""
+    given = [f"{key}={_named(value)}" for key, value in block.parameters.items()]
+    variant = next((v for k, v in rule.variants.items() if k in (*block.parameters, *given)), None)
+    forms = rule.fields if variant is None else variant
+    lines = (forms,) if isinstance(forms, str) else forms
+    least, most = max(rule.rows[0], len(lines) if len(lines) > 1 else 0), rule.rows[1]
+    least = 0 if "OP=NEW" in given else least  # which takes all that there were away
+    if not least <= len(block.rows) <= most:
+        bounds = f"{least}" if least == most else f"{least} to {most}" if most < 9 else f"{least}"
+        few = "at least " if len(block.rows) < least and most > 9 else ""
+        yield Finding(block, None, f"has {len(block.rows)} data lines, {few}{bounds} must be")
+    if block.name == "ELEMENT":
+        yield from _elements(block, names)
+    if block.name == "NODE":
+        names.nodes |= {row.fields[0].strip() for row in block.rows}
+    for i, row in enumerate(block.rows if lines != ("",) else ()):
+        kinds, rest = _form(lines[min(i, len(lines) - 1)])
+        fields = [text.strip() for text in row.fields]
+        while fields and not fields[-1]:
+            fields.pop()
+        if len(fields) > len(kinds) and not rest:
+            yield Finding(block, row, f"'{fields[len(kinds)]}' is more than its data line holds")
+        for j, (kind, may_lack) in enumerate(kinds):
+            text = fields[j] if j < len(fields) else ""
+            if text:
+                yield from _value(block, row, kind, text, names, "")
+            elif not may_lack:
+                yield Finding(block, row, f"field {j + 1}, a {kind}, is missing")
+        for text in fields[len(kinds) :] if rest else ():
+            if text:
+                yield from _value(block, row, rest, text, names, "")
+
+
+def _value(
+    block: Block, row: Row | None, kind: str, text: str, names: _Names, of: str
+) -> Iterator[Finding]:
+    """One value of a kind; names that it gives or uses are noted."""
+    if kind in ("text", "any"):
+        return
+    if kind.startswith("+"):
+        names.given.add((kind[1:], _named(text)))
+    elif kind in NUMBERED or kind not in FORM:
+        names.used.append((kind, _named(text), block, row))
+    form = kind if kind in FORM else "name"
+    if kind in NUMBERED and text.strip().isdigit():
+        form = "integer"
+    if not FORM[form].fullmatch(text.strip()):
+        what = "is missing" if not text.strip() else f"is no {form}"
+        yield Finding(block, row, f"{of}{text} {what}")
+    elif len(text.strip()) > LONGEST.get(form, 80):
+        yield Finding(block, row, f"{of}{text} has more than {LONGEST.get(form, 80)} characters")
+
+
+def _elements(block: Block, names: _Names) -> Iterator[Finding]:
+    kind = _named(block.parameters.get("TYPE", ""))
+    if kind not in NODES_AND_SECTION:
+        yield Finding(block, None, f"TYPE={kind} is not known to the grammar", sure=False)
+        return
+    count, section = NODES_AND_SECTION[kind]
+    for row in block.rows:
+        if len([text for text in row.fields if text.strip()]) != count + 1:
+            yield Finding(block, row, f"an element {kind} has {count} nodes")
+    names.types.add(kind)
+    if _set(block):
+        names.bare.append((block, section))
+
+
+def _unnamed(blocks: Sequence[Block], names: _Names) -> Iterator[Finding]:
+    """Names that nobody gives, sets whose elements nothing gives properties to."""
+    generated = any(block.name in GENERATORS for block in blocks)
+    for kind, name, block, row in names.used:
+        if kind in NUMBERED and FORM["integer"].fullmatch(name):
+            if kind == "node" and names.nodes and name not in names.nodes and not generated:
+                yield Finding(block, row, f"there is no node {name}")
+        elif (NUMBERED.get(kind, kind), name) not in names.given:
+            yield Finding(block, row, f"there is no {NUMBERED.get(kind, kind)} {name}")
+    of_elements = {_set(block) for block in blocks if block.name == "ELEMENT"}
+    for block, section in names.bare:
+        sets = {_set(other) for other in blocks if other.name == section}
+        if _set(block) not in sets and sets <= of_elements:
+            yield Finding(block, None, f"its elements {_set(block)} have no *{section}")
+    bodies: dict[str, Block] = {}
+    for block in blocks:
+        if block.name == "RIGID BODY" and (tied := _named(block.parameters.get("TIE NSET", ""))):
+            if tied in bodies:
+                yield Finding(block, None, f"the nodes {tied} are of another rigid body already")
+            bodies[tied] = block
+        oriented = block.name == "REBAR LAYER" and "ORIENTATION" in block.parameters
+        if oriented and any(kind.startswith("SFMGAX") for kind in names.types):
+            yield Finding(block, None, "takes no ORIENTATION on axisymmetric elements")
+
+
+def _set(block: Block) -> str:
+    """The element set that it names."""
+    return _named(block.parameters.get("ELSET", ""))
+
+
+@cache
+def _form(text: str) -> tuple[list[tuple[str, bool]], str]:
+    """Kinds of the fields of a data line, whether each may lack, and of all that follow."""
+    kinds: list[tuple[str, bool]] = []
+    for word in text.split():
+        if word.endswith("..."):
+            return kinds, word.removesuffix("...")
+        count, _, kind = word.rpartition("*")
+        kinds += [(kind.removesuffix("?"), kind.endswith("?"))] * int(count or 1)
+    return kinds, ""
+
+
+def _named(text: str) -> str:
+    """A name as ABAQUS compares them."""
+    return " ".join(text.strip().strip('"').upper().split())

@@ -1,0 +1,47 @@
+"""What we write against what ABAQUS' manual says, and mutants of it."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+from tyrecal_solvers.abaqus.check import findings
+from tyrecal_solvers.abaqus.grammar import RULES
+from tyrecal_solvers.bundled.deck.keywords import Keyword, read_keywords
+
+from ..conftest import ROOT
+from . import abaqus_decks, abaqus_mutants
+
+
+def said(keywords: list[Keyword], before: list[Keyword]) -> list[str]:
+    """Findings in words."""
+    return [f"*{found.block.name} {found.words}" for found in findings(keywords, before)]
+
+
+def test_every_deck_of_every_combination_of_options() -> None:
+    """Its section, then the jobs that go on from one that has all that they name."""
+    count = 0
+    for text in abaqus_decks.inflations():
+        assert not said(read_keywords(text), []), text
+        count += 1
+    first = read_keywords(text)
+    for text in (*abaqus_decks.modes(), *abaqus_decks.presses()):
+        assert not said(read_keywords(text), first), text
+        count += 1
+    assert count == 384 + 192 + 32
+
+
+def test_the_grammar_has_every_keyword_and_option_of_the_templates() -> None:
+    """As their texts have them, whatever their conditions."""
+    for path in (ROOT / "templates" / "abaqus").glob("*.j2"):
+        text = re.sub(r"\{%.*?%\}", "", path.read_text(encoding="utf-8"), flags=re.DOTALL)
+        for name, rest in re.findall(r"^\*([A-Z][A-Z ]+)(.*)$", text, re.MULTILINE):
+            assert name in RULES, path
+            for option in re.findall(r", ([A-Z][A-Z\- ]*)", rest):
+                assert option in RULES[name].parameters, f"{path}: *{name}, {option}"
+
+
+def test_mutants_of_our_decks_are_caught(request: pytest.FixtureRequest) -> None:
+    """All of them."""
+    found = abaqus_mutants.draw(60, request.config.getoption("--seed"))
+    assert not [(kind, lines) for kind, caught, lines in found if not caught]
