@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from . import arguments, complete, options
 from .main import EXIT_FIT
 from .terminal import Progress, Terminal
+
+if TYPE_CHECKING:
+    from ..measured.measurement import Measurement
+    from ..studies.fit.calibrate import Fit
 
 
 @click.command()
@@ -28,7 +32,8 @@ from .terminal import Progress, Terminal
     type=click.Path(path_type=Path, exists=True, dir_okay=False),
     metavar="FILE",
     help="Measurements (CSV) in place of the case's targets, each in its own state (pressure, load,"
-    " rim); with --pressure-kPa, those at that pressure alone.",
+    " rim); with --pressure-kPa, those at that pressure alone. Frequencies without c and m get the"
+    " likeliest labels.",
 )
 @click.option(
     "--fix",
@@ -83,12 +88,18 @@ def command(
     tyrecal fit cases/p235_75r17.yaml --starts 20 --seed 1 --jobs 2
     tyrecal fit cases/p235_75r17.yaml --starts 20 --seed 1 --scheduler tcp://10.0.0.1:8786
     """
+    from ..measured.tables import read_measurements
+    from ..measured.targets import with_measured
     from ..report.table import fit_doubts, fit_verdict, shown, tyre_doubts
+    from ..simulate.deck.tyre_design import TyreDesign
     from ..simulate.evaluate.cluster import reached
+    from ..simulate.provenance import provenance
     from ..studies.fit.calibrate import calibrate, check, history_csv
     from ..studies.fit.problem import Problem
     from ..studies.fit.targets import objective_unit, states_of
     from ..studies.fitted import NOT_CONVERGED, has_good
+    from ..studies.labelling.fit import fit_unlabelled
+    from ..studies.labelling.label import label
 
     terminal = study.terminal
     options.not_both(study.jobs, scheduler)
@@ -98,12 +109,18 @@ def command(
         raise click.UsageError(f"--fix {unknown[0]}: no such variable, only {', '.join(values)}")
     loaded = arguments.starting_at(loaded, values)
     left_out: list[str] = []
-    if measured:
-        from ..measured.targets import with_measured
-
-        loaded, left_out = with_measured(loaded, measured)
-    evaluator = study.evaluator(loaded)
     fixed = {name: values[name] for name in fix}
+    files = [measured] if measured else []
+    evaluator, plain = study.evaluator(loaded), loaded
+    run, labelled = None, None
+    if measured:
+        readings = read_measurements(measured, labelled=False)
+        if any(each.is_unlabelled for each in readings):
+            run = study.run(loaded, "fit", evaluator, measured=files)
+            labelled = label(loaded, evaluator, readings, fixed=fixed, jobs=study.jobs)
+        told = labelled.readings if labelled else readings
+        loaded, left_out = with_measured(plain, measured, told)
+        evaluator = evaluator.of(TyreDesign(loaded))
     problem = Problem(loaded, evaluator, fixed)
     check(problem)
     alone = len(problem.labels) == starts == 1 and not problem.road
@@ -112,20 +129,33 @@ def command(
         if scheduler:
             raise click.UsageError(f"--scheduler changes nothing here: {why}; give --starts too")
         options.say_idle(terminal, study.jobs, why)
-    files = [measured] if measured else []
-    run = study.run(loaded, "fit", evaluator, measured=files, **states_of(loaded))
+    if run:
+        run.provenance = provenance(loaded, evaluator.solver, files, **states_of(loaded))
+    else:
+        run = study.run(loaded, "fit", evaluator, measured=files, **states_of(loaded))
     unit = objective_unit(loaded)
     with terminal.progress("fit") as bar, reached(scheduler) as evaluator.scheduler:
         points = _Points(terminal, bar, unit)
-        fit = calibrate(
-            loaded, evaluator, method, fixed, starts, seed, study.jobs, points.notify, bar.at
-        )
+
+        def fit_to(readings: Sequence[Measurement]) -> Fit:
+            nonlocal loaded, left_out
+            if measured and readings:
+                loaded, left_out = with_measured(plain, measured, readings)
+                evaluator.design = TyreDesign(loaded)
+            return calibrate(
+                loaded, evaluator, method, fixed, starts, seed, study.jobs, points.notify, bar.at
+            )
+
+        if labelled:
+            fit = fit_unlabelled(plain, evaluator, readings, labelled, fit_to, fixed, study.jobs)
+        else:
+            fit = fit_to([])
     fit.found = run.write(fit.found)
     result = fit.result
     run.write_text("fit_history.csv", history_csv(fit.history))
     terminal.result(result)
     tables = fit.found.tables()
-    if fit.found.states:  # each as wide as it needs
+    if fit.found.states or fit.found.labels:  # each as wide as it needs
         for table in tables:
             terminal.show(shown(table))
     else:

@@ -1,4 +1,4 @@
-"""tyrecal measured import, sensors"""
+"""tyrecal measured import, sensors, label"""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from . import options
+from . import arguments, options
 from .terminal import Terminal
 
 if TYPE_CHECKING:
@@ -56,6 +56,7 @@ def command() -> None:
     tyrecal measured import table.csv --pressure-kPa 240 --output measured.csv
     tyrecal measured import run1.uff run2.uff run3.uff --pressure-kPa 240 --band 25,135
     tyrecal measured sensors run1.uff --highest-harmonic 6
+    tyrecal measured label cases/p235_75r17.yaml unlabelled.csv
     """
 
 
@@ -194,6 +195,64 @@ def sensors(
         terminal.result(told_apart)
     else:
         terminal.say(sensors_words(told))
+    return 0
+
+
+@command.command("label")
+@options.case_argument
+@click.argument("file", type=click.Path(path_type=Path, exists=True, dir_okay=False))
+@options.every(
+    options.assignments,
+    options.fitted("Expect the variables where this fit of CASE has them, as sure as it is."),
+)
+@options.study
+def label_file(
+    case: Path, file: Path, assignments: tuple[str, ...], fitted: Path | None, study: options.Study
+) -> int:
+    """Tell which mode each frequency without a label (c and m) is, in the measurements CSV FILE, by
+    CASE, and how probable it is.
+
+    Writes labels.json, labels.csv, and labelled.csv: the measurements with the likeliest labels,
+    those left out that are no mode of the tyre. The variables are expected about their start
+    values, within a factor of 1.6 (a standard deviation), or as --fitted says.
+
+    \b
+    tyrecal measured label cases/p235_75r17.yaml unlabelled.csv
+    tyrecal measured label cases/205_60r15.yaml cases/205_60r15_vervoort.csv --fitted fit.json
+    """
+    from ..files import read_json
+    from ..measured.measurement import measurements_csv
+    from ..measured.tables import read_measurements
+    from ..report.table import shown
+    from ..studies.fit.result import FitResult
+    from ..studies.labelling.label import fitted_prior, label
+    from ..studies.labelling.result import labels_result
+
+    loaded, values = study.load(case, assignments)
+    loaded = arguments.starting_at(loaded, values)
+    readings = read_measurements(file, labelled=False)
+    if not any(each.is_unlabelled for each in readings):
+        raise click.UsageError(f"{file}: every frequency has a label")
+    prior, fixed = None, dict[str, float]()
+    if fitted:
+        arguments.fitted_values(fitted, loaded, study.terminal)
+        path = fitted / "fit.json" if fitted.is_dir() else fitted
+        fit = FitResult.model_validate(read_json(path))
+        fixed, prior = fit.fixed, fitted_prior(loaded, fit)
+    evaluator = study.evaluator(loaded)
+    run = study.run(loaded, "measured label", evaluator, "labels", measured=[file])
+    told = label(loaded, evaluator, readings, prior, fixed=fixed, jobs=study.jobs)
+    found = run.write(labels_result(loaded, told))
+    run.write_text("labelled.csv", measurements_csv(told.readings))
+    run.finish()
+    terminal = study.terminal
+    terminal.result(found.content())
+    for table in found.tables():
+        terminal.show(shown(table))
+    terminal.say("\n".join(found.sentences()))
+    for doubt in found.doubts():
+        terminal.warn(doubt)
+    study.finish(run)
     return 0
 
 

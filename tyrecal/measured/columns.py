@@ -54,7 +54,7 @@ def meaning_of(heading: str) -> str | None:
 
 
 def read_columns(
-    headings: Sequence[str], place: str, pressure_kPa: float | None
+    headings: Sequence[str], place: str, pressure_kPa: float | None, labelled: bool = True
 ) -> dict[str, TableColumn]:
     """Columns by meaning, of those that have one; ``pressure_kPa``: where none says it.
 
@@ -78,7 +78,8 @@ def read_columns(
             f"{place}: no column holds a frequency; headings must be like"
             " 'c; m; pressure [bar]; frequency [Hz]'"
         )
-    if "frequency_Hz" in held and "label" not in held and not {"c", "m"} <= held:
+    told = "label" in held or {"c", "m"} <= held
+    if labelled and "frequency_Hz" in held and not told:
         raise InputError(f"{place}: frequencies need the columns c and m, or a column label")
     if "pressure" not in held and pressure_kPa is None and held & {"frequency_Hz", "quantity"}:
         raise InputError(f"{place}: no column holds the pressure; give --pressure-kPa")

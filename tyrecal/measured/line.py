@@ -30,6 +30,7 @@ class Line:
     cells: Mapping[str, str]  # by meaning
     columns: Mapping[str, TableColumn]
     comma: bool  # whether it can be a decimal one
+    labelled: bool = True  # a frequency needs a label
 
     def cell(self, meaning: str) -> str:
         """Empty where there is no such column."""
@@ -67,7 +68,7 @@ class Line:
             label, member = None, ""
             if quantity == "frequency_Hz":
                 label = self._label()
-                member = self._member(label, bool(load))
+                member = self._member(label, bool(load)) if label else ""
             own = self.number("sigma") if sigma and sigma.of in ("", quantity) else nan
             if sigma and sigma.percent:
                 own *= 0.01 * value
@@ -102,8 +103,10 @@ class Line:
             f"rim is '{self.cell('rim')}', must be one of {known} (as the case has it)"
         )
 
-    def _label(self) -> Label:
+    def _label(self) -> Label | None:
         c, m, kind = self.cell("c"), self.cell("m"), self.cell("kind")
+        if not self.labelled and not any(map(self.cell, ("label", "c", "m", "kind", "member"))):
+            return None
         if self.cell("label") and "c" not in self.cells:  # beside c and m it is the mode's number
             match = LABEL.match(self.cell("label"))
             if not match:

@@ -23,7 +23,7 @@ class Measurement:
     """A value that was measured, or the mean of several, in the unit of ``quantity``."""
 
     quantity: str  # one of USUAL_MEASUREMENTS
-    label: Label | None  # None of what is no frequency
+    label: Label | None  # None of what is no frequency, or has none yet
     member: str  # 1 or 2 of a doublet, symmetric or antisymmetric under load; "": one for both
     pressure_kPa: float  # 0 of the mass
     load_N: float
@@ -45,6 +45,11 @@ class Measurement:
         return TyreState(self.pressure_kPa or None, self.load_N, self.rim)
 
     @property
+    def is_unlabelled(self) -> bool:
+        """It is a frequency whose mode nobody told."""
+        return self.quantity == "frequency_Hz" and self.label is None
+
+    @property
     def name(self) -> str:
         """What is measured, in words."""
         return self.label.said if self.label else self.quantity
@@ -64,6 +69,8 @@ class Measurement:
             return f"the load is 0, must be greater than 0 for {self.quantity}"
         if self.rim not in (None, "fixed") and self.quantity != "frequency_Hz":
             return f"rim is {self.rim}, must be fixed or empty for {self.quantity}"
+        if self.is_unlabelled and self.load_N:
+            return "c is '', must be a whole number under load: labels are found of unloaded tyres"
         if self.sigma <= 0:
             return f"sigma is {self.sigma:g}, must be greater than 0"
         return None

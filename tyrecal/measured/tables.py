@@ -28,11 +28,12 @@ MAX_LINES, MAX_CELL = 10_000, 300  # of a file; characters
 OPENED = re.compile(r"^[\[(]\s*\d+$")  # a label that its comma has parted
 
 
-def read_measurements(path: Path) -> list[Measurement]:
+def read_measurements(path: Path, labelled: bool = True) -> list[Measurement]:
     """A table that can be used as it is: the measurements CSV with `CSV_COLUMNS`, or another all of
     whose columns are known, with every sigma; it measures nothing twice.
 
-    Raises InputError with every mistake, each with file and line; OSError.
+    labelled: every frequency needs a label; else those of the unloaded tyre may have none. Raises
+    InputError with every mistake, each with file and line; OSError.
     """
     lines, comma = _lines(path)
     place, headings = lines[0]
@@ -44,8 +45,13 @@ def read_measurements(path: Path) -> list[Measurement]:
             " not the case's, or like label,frequency_Hz,sigma_Hz,pressure_kPa,load_N,rim;"
             " 'tyrecal measured import' makes such a file of other tables"
         )
-    columns = read_columns(headings, place, None)
-    found = _measurements(path, lines, columns, comma, 0.0, _sigma_mistake)
+    columns = read_columns(headings, place, None, labelled=False)
+    found = _measurements(path, lines, columns, comma, 0.0, _sigma_mistake, labelled=False)
+    if labelled and (lacking := next((each for each in found if each.is_unlabelled), None)):
+        raise InputError(
+            f"{lacking.place}: the frequency has no label, c and m; 'tyrecal fit' and 'tyrecal"
+            " measured label' find it"
+        )
     _refuse(_twice(found))
     return found
 
@@ -71,6 +77,7 @@ def _measurements(
     comma: bool,
     pressure_kPa: float,
     more: Callable[[Measurement], str | None] = lambda each: None,
+    labelled: bool = True,
 ) -> list[Measurement]:
     """Of all lines; ``more``: what else may be wrong with one. Raises InputError."""
     if len(lines) == 1:
@@ -87,7 +94,8 @@ def _measurements(
                 hint = '; write labels in quotes, "[1,1]", or in columns c and m' if parted else ""
                 raise ValueError(f"{len(cells)} cells, the headings are {width}{hint}")
             text = {meaning: cells[column.index] for meaning, column in columns.items()}
-            found = list(Line(place, text, columns, comma).measurements(pressure_kPa, f"{path}"))
+            line = Line(place, text, columns, comma, labelled)
+            found = list(line.measurements(pressure_kPa, f"{path}"))
             for each in found:
                 if mistake := each.mistake or more(each):
                     raise ValueError(mistake)
@@ -152,6 +160,8 @@ def _twice(measurements: list[Measurement]) -> Iterator[str]:
     """Lines that measure what another does."""
     seen: dict[tuple[object, ...], Measurement] = {}
     for each in measurements:
+        if each.is_unlabelled:
+            continue
         place = (each.quantity, each.label, each.state)
         first = seen.setdefault((*place, each.member), each)
         if first is not each:

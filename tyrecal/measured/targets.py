@@ -20,14 +20,17 @@ from .tables import read_measurements
 SAME_PRESSURE_kPa = 0.5  # pressures that differ by less are one
 
 
-def with_measured(case: LoadedCase, path: Path) -> tuple[LoadedCase, list[str]]:
+def with_measured(
+    case: LoadedCase, path: Path, labelled: Sequence[Measurement] | None = None
+) -> tuple[LoadedCase, list[str]]:
     """The case with what was measured as targets, each in its state, and what was left out, why.
 
-    Of a doublet with two members of the unloaded tyre their mean. Where the user has set the
-    pressure, or a variable sets it, only what was measured there is taken. Raises InputError where
-    nothing is left, or the case cannot be in a state; OSError.
+    labelled: the file's measurements, where labels were found for those that had none. Of a doublet
+    with two members of the unloaded tyre their mean. Where the user has set the pressure, or a
+    variable sets it, only what was measured there is taken. Raises InputError where nothing is
+    left, or the case cannot be in a state; OSError.
     """
-    readings = read_measurements(path)
+    readings = read_measurements(path) if labelled is None else labelled
     own = case.case.pressure_kPa
     rest = [each for each in readings if each.quantity != "mass_kg"]
     known = [own]  # pressures that differ by little are one

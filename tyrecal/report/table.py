@@ -10,6 +10,7 @@ from rich import table as rich
 from rich.text import Text
 
 from ..simulate.modes.label import Label
+from ..studies.labels import Labels
 from ..studies.result import Cell, Column, Deviation, Table, state_words
 from ..tyre.usual import USUAL_MEASUREMENTS
 
@@ -54,6 +55,8 @@ def fit_verdict(result: Mapping[str, Any]) -> list[str]:
         )
     if len(result["starts"]) > 1:
         words.append(_starts(result))
+    if labels := result.get("labels"):
+        words += [f"{each[0].upper()}{each[1:]}." for each in Labels(**labels).sentences()]
     return words
 
 
@@ -136,6 +139,8 @@ def fit_doubts(result: Mapping[str, Any]) -> list[str]:
     values = result["singular_values"]
     if values and values[-1] < 1e-3 * values[0]:
         doubts.append("the data do not determine all variables: see singular_values in fit.json")
+    if labels := result.get("labels"):
+        doubts += Labels(**labels).doubts()
     return doubts
 
 

@@ -20,6 +20,7 @@ RESULT_TYPES = {  # in the order of a page
     "effects": "tyrecal.studies.effects:Effects",
     "sweep-load": "tyrecal.studies.loaded_result:LoadSweep",
     "sample": "tyrecal.studies.sample.result:SampleResult",
+    "labels": "tyrecal.studies.labels:LabelsResult",
     "diagnose": "tyrecal.studies.diagnose.result:DiagnosisResult",
 }
 

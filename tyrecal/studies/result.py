@@ -117,6 +117,7 @@ class Result(ResultPart):
     command: ClassVar[str] = ""  # where it is not the study
     heading: ClassVar[str] = ""  # on the page
     figures: ClassVar[str] = ""  # "module:function" of a study from outside, see `page`
+    is_seldom: ClassVar[bool] = False  # a page does not say that it is absent
 
     format: Literal[1] = 1
     provenance: Provenance | None = None

@@ -128,7 +128,7 @@ def chapter(found: Results, prefix: str) -> dict[str, Any]:
         "absent": [
             kind.command or name
             for name, kind in result_types().items()
-            if name not in found.studies
+            if name not in found.studies and not kind.is_seldom
         ],
         "studies": [_study(found, each, draw) for each in found.studies.values()],
         "shapes": shapes,

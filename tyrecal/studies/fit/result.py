@@ -12,6 +12,7 @@ from pydantic import Field
 from ...simulate.modes.label import Label
 from ...tyre.state import AS_THE_CASE
 from ...tyre.values import with_values
+from ..labels import Labels
 from ..result import (
     NAME_COLUMNS,
     Column,
@@ -168,6 +169,7 @@ class FitResult(Result):
     mass: FittedFootprint | None = None
     states: list[FittedState] = Field(default=[])  # of a fit over several
     next_states: list[FittedState] = Field(default=[])  # the most telling first
+    labels: Labels | None = None  # of frequencies that came without
     noise_Hz: float | None = None  # standard deviation of a frequency
     correlations: dict[str, dict[str, float | None]]
     singular_values: list[float]
@@ -217,6 +219,7 @@ class FitResult(Result):
             self._variables(),
             Table((), [["objective", words, *objective, "", ""]]),
             *self._states(),
+            *([self.labels.table()] if self.labels else []),
         ]
 
     def numbers(self) -> list[Table]:

@@ -1,0 +1,237 @@
+"""Frequencies without labels: the probability of every labeling, and a fit with the likeliest."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.stats import multivariate_normal, norm
+
+from tyrecal.errors import InputError
+from tyrecal.measured.measurement import Measurement, measurements_csv
+from tyrecal.measured.tables import read_measurements
+from tyrecal.simulate.modes.label import Label
+from tyrecal.studies.fit.calibrate import calibrate
+from tyrecal.studies.fit.problem import Problem
+from tyrecal.studies.labelling.expansion import Expansion, Prior, find_labels
+from tyrecal.studies.labelling.fit import fit_unlabelled
+from tyrecal.studies.labelling.label import Labelled, fitted_prior, label, start_prior
+from tyrecal.studies.labelling.result import labels_told
+from tyrecal.studies.labelling.tree import (
+    DISCREPANCIES,
+    FOREIGN,
+    FOREIGN_MARGIN,
+    MISSED,
+    UNSEEN,
+    VIEWS,
+    Frequencies,
+    Modes,
+    discrepancy,
+    labelings,
+)
+from tyrecal.studies.labels import FOREIGN_WORDS
+from tyrecal.tyre.state import TyreState
+
+from ..chance import generator
+from .test_states import CASE, TRUTH, TyreInStates, case_with, measured
+
+Array = np.ndarray
+OWN = (Label(1, 0), Label(1, 1), Label(2, 0), Label(2, 1))
+
+
+def every_labeling(given: Frequencies, modes: Modes, tau: float) -> Iterator[tuple[Any, float]]:
+    """Each admissible labeling with ln of prior times evidence, from the joint normal density."""
+    count, n = given.allowed.shape
+    C = modes.H @ modes.H.T + discrepancy(modes.labels, tau)
+    width = np.ptp(given.y) + 2 * FOREIGN_MARGIN
+    for own in product(range(-1, n), repeat=count):
+        used = [j for j in own if j >= 0]
+        fits = all(given.allowed[i, j] if j >= 0 else not given.sure[i] for i, j in enumerate(own))
+        if len({*used}) < len(used) or not fits:
+            continue
+        rows = [i for i, j in enumerate(own) if j >= 0]
+        S = C[np.ix_(used, used)] + np.diag(given.s[rows] ** 2)
+        off, gain = given.y[rows] - modes.mu[used], np.linalg.solve(S, C[used]).T
+        ln = multivariate_normal.logpdf(off, None, S) if used else 0.0
+        ln += (count - len(used)) * np.log(FOREIGN / width)
+        mean, P = modes.mu + gain @ off, C - gain @ C[used]
+        within = norm.cdf((given.y.max() - mean) / np.sqrt(np.diag(P)))
+        views = []
+        for sees, p in VIEWS.items():
+            found = [1 - MISSED if sees[each.m] else UNSEEN for each in modes.labels]
+            lost = [MISSED if sees[each.m] else 1 - UNSEEN for each in modes.labels]
+            terms = [
+                np.log(found[j]) if j in used else np.log(1 - within[j] * (1 - lost[j]))
+                for j in range(n)
+            ]
+            views.append(np.log(p) + sum(terms))
+        yield own, float(ln + np.logaddexp.reduce(views))
+
+
+@pytest.mark.numbers
+def test_every_labeling_has_the_probability_of_its_joint_density() -> None:
+    """Three frequencies, one of a known mode, another that can be two: against all labelings."""
+    random = generator("unlabelled")
+    modes = Modes(OWN, np.zeros(4, int), np.log([50, 52, 70, 75]), 0.1 * random.normal(size=(4, 2)))
+    allowed = np.ones((3, 4), bool)
+    allowed[1] = [True, True, False, False]
+    allowed[2] = [False, False, False, True]
+    y = np.log([51.0, 54.0, 74.0])
+    given = Frequencies(y, np.full(3, 0.01), np.zeros(3, int), allowed, np.array([0, 0, 1], bool))
+    found = labelings(given, modes)
+    total: dict[Any, float] = {}
+    for tau in DISCREPANCIES:
+        for own, ln in every_labeling(given, modes, tau):
+            total[own] = total.get(own, 0.0) + np.exp(ln)
+    whole = sum(total.values())
+    told = dict(zip(map(tuple, found.modes.tolist()), found.probabilities, strict=True))
+    assert len(total) == 10
+    for own, value in total.items():
+        assert told.get(own, 0.0) == pytest.approx(value / whole, rel=1e-6, abs=1e-8)
+    assert found.each.sum(1) == pytest.approx(1.0)
+    for i, j in ((0, 1), (1, -1), (2, 3)):
+        share = sum(p for own, p in told.items() if own[i] == j)
+        assert found.each[i, j] == pytest.approx(share)
+
+
+@pytest.mark.numbers
+def test_expansions_go_on_until_the_design_is_found() -> None:
+    """ln f curves with x: the labels are those about the design that the frequencies lead to."""
+    labels = tuple(Label(c, 0) for c in range(1, 6))
+    base, slope = np.log([40.0, 50.0, 62.0, 76.0, 92.0]), np.array([1.0, 0.7, 0.4, 0.3, 0.2])
+
+    def ln_f(x: Array) -> Array:
+        return np.asarray(base + slope * (x + 0.3 * x**2))
+
+    def expand(x: Array) -> Expansion:
+        return Expansion(labels, np.zeros(5, int), ln_f(x), (slope * (1 + 0.6 * x))[:, None])
+
+    y = ln_f(np.array([0.9]))
+
+    def given(at: Expansion) -> Frequencies:
+        every = np.ones((5, 5), bool)
+        return Frequencies(y, np.full(5, 0.005), np.zeros(5, int), every, np.zeros(5, bool))
+
+    prior = Prior(np.zeros(1), np.array([[0.5]]), np.array([-2.0]), np.array([2.0]))
+    found = find_labels(expand, given, prior)
+    assert found.settled and found.labels() == list(labels)
+    assert found.x == pytest.approx(0.9, abs=0.02)
+
+
+STATES = [TyreState(), TyreState(160.0, 0.0, "free")]
+FOREIGN_Hz = 90.0
+
+
+class Tyre(TyreInStates):
+    """With an evaluator's way to other designs of the same tyre."""
+
+    def of(self, design: Any) -> Tyre:
+        return self
+
+
+def with_labels() -> list[Measurement]:
+    """The nine modes of TRUTH in two states, less two."""
+    told = [
+        Measurement(
+            "frequency_Hz",
+            Label(t.c, t.m, t.kind),
+            "",
+            t.pressure_kPa or 240.0,
+            0.0,
+            t.frequency_Hz,
+            0.2,
+            rim=t.rim,
+        )
+        for t in measured(STATES)
+    ]
+    return [each for i, each in enumerate(told) if i not in (3, 12)]
+
+
+def without_labels() -> list[Measurement]:
+    """The same without labels, but for the first one's, and a frequency that is no mode."""
+    first, *rest = with_labels()
+    foreign = replace(first, value=FOREIGN_Hz, label=None)
+    return [first, *(replace(each, label=None) for each in rest), foreign]
+
+
+@pytest.fixture(scope="module")
+def told() -> Labelled:
+    tyre: Any = Tyre()
+    return label(case_with([]), tyre, without_labels())
+
+
+@pytest.mark.numbers
+def test_readings_get_the_labels_of_the_tyre(told: Labelled) -> None:
+    """In two states together; the one that is no mode is left out, and told."""
+    assert told.readings == with_labels()
+    assert [each.value for each in told.foreign] == [FOREIGN_Hz]
+    assert told.found.settled
+    labels = labels_told(CASE, told)
+    assert len(labels.frequencies) == 16 and not labels.doubts()
+    (foreign,) = [each for each in labels.frequencies if each.label is None]
+    assert foreign.frequency_Hz == FOREIGN_Hz and foreign.said == FOREIGN_WORDS
+    for each in labels.frequencies:
+        rest = 1 - each.probability - sum(rival.probability for rival in each.rivals)
+        assert -1e-9 < rest < 0.05
+    assert labels.labelings[0].labels == [each.said for each in labels.frequencies]
+
+
+@pytest.mark.numbers
+def test_a_fit_takes_the_likeliest_labels_and_tells_them(told: Labelled) -> None:
+    tyre: Any = Tyre()
+
+    def fitted(readings: Any) -> Any:
+        assert readings == with_labels()
+        return calibrate(case_with(measured(STATES)), tyre)
+
+    fit = fit_unlabelled(CASE, tyre, without_labels(), told, fitted)
+    for name, truth in TRUTH.items():
+        assert fit.result["variables"][name]["value"] == pytest.approx(truth, rel=1e-3)
+    assert fit.result["labels"]["settled"] and len(fit.result["labels"]["frequencies"]) == 16
+    assert "Labels of frequencies that came without" in [t.title for t in fit.found.tables()]
+
+
+def test_what_a_fit_leaves_open_is_the_prior_of_the_next() -> None:
+    """Its standard errors and correlations; no more than before it."""
+    tyre: Any = Tyre()
+    case = case_with(measured(STATES))
+    fit = calibrate(case, tyre).found
+    prior = fitted_prior(case, fit)
+    found = prior.root @ prior.root.T
+    for i, (name, v) in enumerate(fit.variables.items()):
+        assert np.exp(prior.mean[i]) == pytest.approx(v.value)
+        assert np.sqrt(found[i, i]) == pytest.approx(v.standard_error / v.value)  # type: ignore[operator]
+        other = list(fit.variables)[i - 1]
+        alike = found[i, i - 1] / np.sqrt(found[i, i] * found[i - 1, i - 1])
+        assert alike == pytest.approx(fit.correlations[name][other], abs=1e-9)
+    unseen = fit.variables["C10"].model_copy(update={"standard_error": None})
+    open_ = fit.model_copy(update={"variables": {**fit.variables, "C10": unseen}})
+    wide = start_prior(Problem(case, tyre).variables)
+    root = fitted_prior(case, open_).root
+    assert (root @ root.T)[2, 2] == pytest.approx(wide.root[2, 2] ** 2)
+
+
+def test_files_without_labels(tmp_path: Path) -> None:
+    """Cells or columns of c and m may be empty where labels are looked for, not elsewhere, nor
+    under load; the CSV that is written reads back."""
+    path = tmp_path / "measured.csv"
+    path.write_text("frequency_Hz,sigma_Hz,pressure_kPa,rim\n114,0.5,160,free\n137,0.5,160,free\n")
+    found = read_measurements(path, labelled=False)
+    assert [(each.value, each.label, each.rim) for each in found] == [
+        (114.0, None, "free"),
+        (137.0, None, "free"),
+    ]
+    with pytest.raises(InputError, match="line 2: the frequency has no label, c and m"):
+        read_measurements(path)
+    again = tmp_path / "again.csv"
+    again.write_text(measurements_csv(without_labels()))
+    back = [(each.label, each.value) for each in read_measurements(again, labelled=False)]
+    assert back == [(each.label, pytest.approx(each.value, rel=1e-5)) for each in without_labels()]
+    path.write_text("frequency_Hz,sigma_Hz,pressure_kPa,load_N\n114,0.5,160,4000\n")
+    with pytest.raises(InputError, match="line 2: c is '', must be a whole number under load"):
+        read_measurements(path, labelled=False)

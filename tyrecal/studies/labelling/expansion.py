@@ -1,0 +1,101 @@
+"""Labelings where the model is expanded about their own mean: Gauss-Newton over the likeliest one.
+
+The tree (`tree`) takes ln f to be linear in the design. So the model is expanded anew at the design
+that the likeliest labeling finds, until neither changes: the probabilities are then of slopes where
+the measured values put the tyre, not where the case began.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...simulate.modes.label import Label
+from .tree import Frequencies, Labelings, Modes, labelings
+
+Array = np.ndarray
+
+ROUNDS = 10
+LONGEST_STEP = 0.5  # of a variable's coordinate, between expansions
+SAME_DESIGN = 0.01  # of its prior standard deviations
+
+
+@dataclass(frozen=True)
+class Prior:
+    """What is known of the variables' coordinates: mean (v,), a root (v, v) of the covariance, and
+    bounds (v,)."""
+
+    mean: Array
+    root: Array
+    lower: Array
+    upper: Array
+
+
+@dataclass(frozen=True)
+class Expansion:
+    """The model at a design: label and state (a number) of each mode of a family (those across the
+    belt, and overtones, are told by no list), ln f (n,), slopes (n, v)."""
+
+    labels: tuple[Label, ...]
+    states: Array
+    ln_f: Array
+    slopes: Array
+
+
+@dataclass(frozen=True)
+class Found:
+    """Labelings about the model's ``expansion`` at x (v,), how many it took, and whether another
+    would find the same; else it is the surest of those that take turns."""
+
+    labelings: Labelings
+    expansion: Expansion
+    x: Array
+    rounds: int
+    settled: bool
+
+    def labels(self, place: int = 0) -> list[Label | None]:
+        """Of each measured frequency under the labeling at a place; None: foreign."""
+        own = self.labelings.modes[place]
+        return [self.expansion.labels[j] if j >= 0 else None for j in own]
+
+
+Measured = Callable[
+    [Expansion], Frequencies
+]  # what is admissible hangs on the modes that there are
+
+
+def find_labels(
+    expand: Callable[[Array], Expansion],
+    measured: Measured,
+    prior: Prior,
+    first: Array | None = None,
+) -> Found:
+    """first: where the model is expanded first, by default at the prior's mean. Raises what
+    ``expand`` does."""
+    x, seen = prior.mean if first is None else first, list[Found]()
+    for round_ in range(1, ROUNDS + 1):
+        at = expand(x)
+        slopes = at.slopes
+        modes = Modes(
+            at.labels, at.states, at.ln_f - slopes @ (x - prior.mean), slopes @ prior.root
+        )
+        answer = labelings(measured(at), modes)
+        aim = np.clip(prior.mean + prior.root @ answer.z, prior.lower, prior.upper)
+        step = np.clip(aim - x, -LONGEST_STEP, LONGEST_STEP)
+        near = abs(np.linalg.lstsq(prior.root, step, None)[0]).max(initial=0.0) < SAME_DESIGN
+        found = Found(answer, at, x, round_, near)
+        if near and (not seen or found.labels() == seen[-1].labels()):
+            return found
+        seen.append(found)
+        x = x + step
+    last = seen[ROUNDS // 2 :]
+    return replace(max(last, key=lambda each: each.labelings.probabilities[0]), settled=False)
+
+
+def admissible(labels: Sequence[Label | None], states: Array, at: Expansion) -> Array:
+    """(m, n): the modes that each measured frequency can be, a label or None for unlabelled
+    ones."""
+    same = np.array([[own in (None, label) for label in at.labels] for own in labels])
+    return (states[:, None] == at.states) & same

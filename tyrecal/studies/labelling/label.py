@@ -1,0 +1,211 @@
+"""Labels of measured frequencies by a case: what is known of its variables, its modes in the states
+that they were measured in, and the readings with their likeliest labels."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import ceil
+
+import numpy as np
+
+from ...errors import InputError
+from ...measured.measurement import Measurement
+from ...simulate.deck.tyre_design import TyreDesign
+from ...simulate.evaluate.evaluator import Evaluator, Question
+from ...simulate.evaluate.failure import DeckRefused, EvaluationFailed
+from ...simulate.modes.label import Label, Mode, paired_labels
+from ...tyre.case import LoadedCase
+from ...tyre.state import TyreState
+from ..fit.problem import Problem
+from ..fit.result import FitResult
+from ..fit.variable import DesignVariable, read_variable
+from .expansion import Expansion, Found, Prior, admissible, find_labels
+from .tree import Frequencies
+
+Array = np.ndarray
+
+START_SPREAD = 0.5  # standard deviation of ln of a variable about the case's start value
+BOUNDS_SHARE = 0.25  # likewise of a linear one, of the distance between its bounds
+BAND_ABOVE = 1.25  # of the highest measured frequency, up to which modes are looked for
+MOST_HARMONICS = 20
+MODES_PER_HARMONIC = 3  # at least: both families, and one across the belt that comes between
+
+
+@dataclass(frozen=True)
+class Labelled:
+    """readings: all, with labels, less those that are ``foreign``; frequencies: the readings of the
+    unloaded tyre, rising, as the labelings of ``found`` have them, each a reading or the two of a
+    doublet; start: the model where the variables are expected."""
+
+    readings: list[Measurement]
+    foreign: list[Measurement]
+    frequencies: list[list[Measurement]]
+    found: Found
+    start: Expansion
+
+    @property
+    def labels(self) -> list[Label | None]:
+        """Of ``frequencies``."""
+        return self.found.labels()
+
+
+def start_prior(variables: Sequence[DesignVariable]) -> Prior:
+    """About the case's start values."""
+    spread = [START_SPREAD if v.log else BOUNDS_SHARE for v in variables]
+    return _prior(variables, {v.name: v.start for v in variables}, np.diag(spread))
+
+
+def fitted_prior(case: LoadedCase, fit: FitResult) -> Prior:
+    """What a fit of the case left open of the variables that it did not hold: values, standard
+    errors and correlations; of those that it did not determine as far as `start_prior` says."""
+    values = {name: each.value for name, each in fit.variables.items()}
+    variables = [read_variable(name, case.case.variables[name]) for name in values]
+    wide = np.diag(start_prior(variables).root)
+    spread = np.zeros(len(variables))
+    alike = np.eye(len(variables))
+    for i, v in enumerate(variables):
+        error = fit.variables[v.name].standard_error
+        spread[i] = wide[i] if error is None else min(error / v.slope(values[v.name]), wide[i])
+        for j, other in enumerate(variables[:i]):
+            alike[i, j] = alike[j, i] = fit.correlations.get(v.name, {}).get(other.name) or 0.0
+    power, vectors = np.linalg.eigh(np.outer(spread, spread) * alike)
+    return _prior(variables, values, vectors * np.sqrt(np.maximum(power, 0.0)))
+
+
+def _prior(variables: Sequence[DesignVariable], values: Mapping[str, float], root: Array) -> Prior:
+    mean, lower, upper = (
+        np.array([v.scaled(value) for v, value in zip(variables, own, strict=True)])
+        for own in (
+            [values[v.name] for v in variables],
+            [v.lower for v in variables],
+            [v.upper for v in variables],
+        )
+    )
+    return Prior(mean, root, lower, upper)
+
+
+def label(
+    case: LoadedCase,
+    evaluator: Evaluator,
+    readings: Sequence[Measurement],
+    prior: Prior | None = None,
+    about: Mapping[str, float] | None = None,
+    fixed: Mapping[str, float] | None = None,
+    jobs: int = 1,
+) -> Labelled:
+    """The readings with the likeliest labels, all frequencies of the unloaded tyre told together.
+
+    prior: of the variables that are not ``fixed``, by default `start_prior`; about: the design at
+    which the model is expanded first, by default the prior's mean. Raises InputError where the
+    solver gives no slopes; EvaluationFailed; DeckRefused.
+    """
+    if not evaluator.has_gradients:
+        raise InputError(
+            f"solver '{evaluator.solver.name}' gives no exact slopes of this case, by which labels"
+            " are found: 'tyrecal solvers' shows which one does (gradients)"
+        )
+    problem = Problem(case, evaluator, fixed)
+    prior = prior or start_prior(problem.variables)
+    frequencies = _of_unloaded(case, readings)
+    states = list(dict.fromkeys(each[0].state.of(case) for each in frequencies))
+    place = np.array([states.index(each[0].state.of(case)) for each in frequencies])
+    model = Model(problem, states, max(each[0].value for each in frequencies), jobs)
+    values = [float(np.mean([r.value for r in each])) for each in frequencies]
+    relative = [
+        float(np.hypot.reduce([r.sigma for r in each])) / len(each) / value
+        for each, value in zip(frequencies, values, strict=True)
+    ]
+    known = [each[0].label for each in frequencies]
+
+    def measured(at: Expansion) -> Frequencies:
+        allowed = admissible(known, place, at)
+        told = np.array([own is not None for own in known])
+        return Frequencies(
+            np.log(values), np.array(relative), place, allowed, allowed.any(1) & told
+        )
+
+    start = model.expand(prior.mean)
+    first = prior.mean
+    if about:
+        first = np.array([v.scaled(about[v.name]) for v in problem.variables])
+    found = find_labels(model.expand, measured, prior, first)
+    told = {
+        id(reading): own
+        for each, own in zip(frequencies, found.labels(), strict=True)
+        for reading in each
+    }
+    foreign = [r for r in readings if id(r) in told and told[id(r)] is None]
+    kept = [replace(r, label=told.get(id(r), r.label)) for r in readings if r not in foreign]
+    return Labelled(kept, foreign, frequencies, found, start)
+
+
+def _of_unloaded(case: LoadedCase, readings: Sequence[Measurement]) -> list[list[Measurement]]:
+    """Frequencies by rising value; the two of a doublet with a label together."""
+    groups: dict[tuple[object, ...], list[Measurement]] = {}
+    for i, each in enumerate(readings):
+        across = each.label and each.label.family is None
+        if each.quantity == "frequency_Hz" and not each.load_N and not across:
+            own = each.label or i
+            groups.setdefault((own, each.state.of(case)), []).append(each)
+    return sorted(groups.values(), key=lambda group: group[0].value)
+
+
+class Model:
+    """The modes of a case in ``states``, by its variables, up to above ``highest_Hz``."""
+
+    def __init__(
+        self, problem: Problem, states: Sequence[TyreState], highest_Hz: float, jobs: int = 1
+    ):
+        self.problem, self.states, self.jobs = problem, states, jobs
+        self.top_Hz = BAND_ABOVE * highest_Hz
+        self.harmonics = problem.case.case.analysis.highest_harmonic
+
+    def expand(self, x: Array) -> Expansion:
+        """The model at coordinates x (v,). Raises EvaluationFailed, DeckRefused."""
+        while True:
+            found = self._evaluated(x)
+            tops = [
+                min((m.frequency_Hz for m in modes if m.label.c == self.harmonics), default=0.0)
+                for modes, _ in found
+            ]
+            if min(tops) > self.top_Hz or self.harmonics == MOST_HARMONICS:
+                break
+            more = ceil(self.harmonics * self.top_Hz / max(min(tops), 0.5 * self.top_Hz))
+            self.harmonics = min(max(more, self.harmonics + 1), MOST_HARMONICS)
+        every = [
+            (i, mode, row)
+            for i, (modes, rows) in enumerate(found)
+            for mode, row in zip(modes, rows, strict=True)
+            if mode.label.family
+        ]
+        hertz = np.array([mode.frequency_Hz for _, mode, _ in every])
+        slopes = np.array([row for *_, row in every]) / hertz[:, None]
+        labels = tuple(mode.label for _, mode, _ in every)
+        return Expansion(labels, np.array([i for i, *_ in every]), np.log(hertz), slopes)
+
+    def _evaluated(self, x: Array) -> list[tuple[list[Mode], Array]]:
+        """Of each state the modes and d f / d x (modes, variables)."""
+        problem = self.problem
+        case = problem.case
+        analysis = case.case.analysis.model_copy(update={"highest_harmonic": self.harmonics})
+        wide = replace(case, case=case.case.model_copy(update={"analysis": analysis}))
+        evaluator = problem.evaluator.of(TyreDesign(wide))
+        values = problem.values(x)
+        names = tuple(v.name for v in problem.variables)
+        count = max(case.case.analysis.modes_per_harmonic, MODES_PER_HARMONIC)
+        questions = [
+            Question(*problem.question(values, state, names), count) for state in self.states
+        ]
+        found = []
+        for answer in evaluator.answer_all(questions, self.jobs):
+            if isinstance(answer, EvaluationFailed | DeckRefused):
+                raise answer
+            modes = paired_labels(answer.modes)
+            rows = np.zeros((len(modes), len(names)))
+            for j, v in enumerate(problem.variables):
+                if v.name in answer.gradients:
+                    own = np.asarray(answer.gradients[v.name])[[m.position for m in modes]]
+                    rows[:, j] = own * v.slope(values[v.name])
+            found.append((modes, rows))
+        return found

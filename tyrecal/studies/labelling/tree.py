@@ -1,0 +1,181 @@
+"""Which mode is each unlabelled frequency? The probability of every labeling.
+
+A labeling a gives each measured frequency f_i one of the tyre's modes j = a(i), none of them twice,
+or calls it foreign: of the stand, the rim, the hum of the mains. About an expansion point the model
+says, of ln f of its modes,
+
+    y_i = mu_j + H_j z + e_i,    z ~ N(0, I),    e_i ~ N(0, s_i^2)
+
+z: the design variables by their prior standard deviations, and each mode's discrepancy from the
+model. So the frequencies of a labeling are jointly normal, and integrating over z is exact: one
+frequency after the other, each conditions z for the next (Kalman, J. Basic Engineering 82 (1960)
+35). Prior of a labeling:
+
+    a mode within the band is measured with probability 1 - MISSED; the band ends at the highest
+    measured frequency, above which a mode costs nothing
+    only the modes of one family are, where the shaker or the sensors see one direction (Views)
+    foreign ones are FOREIGN on average (Poisson), anywhere in the band: FOREIGN / width each
+
+The tree of labelings grows a frequency at a time, lowest first, as in tracking of multiple
+hypotheses (Reid, IEEE Trans. Automatic Control 24 (1979) 843); branches a factor of exp(-CUT) below
+the best, or beyond the first BRANCHES, are cut. How far the model may be off is not known: the
+labelings' evidences are means over `DISCREPANCIES`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...simulate.modes.label import FAMILIES, Label
+from ..diagnose.form_error import form_error
+
+Array = np.ndarray
+
+MISSED = 0.2  # probability of a mode within the band
+FOREIGN = 0.5  # frequencies that are no mode, expected
+FOREIGN_MARGIN = 0.1  # of ln f, by which the band of foreign ones is wider than what was measured
+VIEWS = {(True, True): 0.6, (True, False): 0.2, (False, True): 0.2}  # families seen: probability
+UNSEEN = 0.02  # probability of being measured, of a mode of the other family
+DISCREPANCIES = (0.0, 0.01, 0.03, 0.1)  # standard deviations of ln f, each as likely
+ALIKE = 4.0  # waves over which the discrepancy of a family's modes falls by e
+BRANCHES, CUT = 800, 20.0
+FOREIGN_MODE = -1
+
+
+@dataclass(frozen=True)
+class Modes:
+    """The tyre's modes that may have been measured: label and state (a number) of each, mu (n,),
+    expected ln f of the prior's centre; H (n, v), its slopes by the variables, each in prior
+    standard deviations."""
+
+    labels: tuple[Label, ...]
+    states: Array
+    mu: Array
+    H: Array
+
+
+@dataclass(frozen=True)
+class Frequencies:
+    """Measured ones by rising value: y (m,), ln f; s (m,), its standard deviation; the state of
+    each (a number); allowed (m, n): modes that each can be; sure (m,): it is not foreign."""
+
+    y: Array
+    s: Array
+    states: Array
+    allowed: Array
+    sure: Array
+
+
+@dataclass(frozen=True)
+class Labelings:
+    """The most probable first: modes (k, m), -1 of what is foreign; probabilities (k,) of them, and
+    each (m, n + 1) of every mode of a frequency, the last of foreign; z (v,): the variables' mean
+    under the first; discrepancy: the model's, its mean over all."""
+
+    modes: Array
+    probabilities: Array
+    each: Array
+    z: Array
+    discrepancy: float
+
+
+def labelings(measured: Frequencies, modes: Modes) -> Labelings:
+    """Of all labelings that are not cut."""
+    total: dict[tuple[int, ...], float] = {}
+    means: dict[tuple[int, ...], tuple[float, Array]] = {}
+    strata = []
+    for tau in DISCREPANCIES:
+        chosen, ln, mean = _tree(measured, modes, tau)
+        strata.append(np.logaddexp.reduce(ln))
+        for key, value, z in zip(map(tuple, chosen.tolist()), ln, mean, strict=True):
+            total[key] = float(np.logaddexp(total.get(key, -np.inf), value))
+            if value > means.get(key, (-np.inf,))[0]:
+                means[key] = (value, z)
+    keys = sorted(total, key=lambda key: (-total[key], key))
+    ln = np.array([total[key] for key in keys])
+    probabilities = np.exp(ln - np.logaddexp.reduce(ln))
+    each = np.zeros((len(measured.y), len(modes.mu) + 1))
+    for key, p in zip(keys, probabilities, strict=True):
+        each[range(len(key)), key] += p  # -1 is the last column
+    likely = np.exp(np.array(strata) - np.logaddexp.reduce(strata))
+    v = modes.H.shape[1]
+    return Labelings(
+        np.array(keys).reshape(len(keys), -1),
+        probabilities,
+        each,
+        means[keys[0]][1][:v],
+        float(likely @ DISCREPANCIES),
+    )
+
+
+def discrepancy(labels: Sequence[Label], tau: float) -> Array:
+    """Covariance (l, l) of ln f: the error of form of each mode alone, and tau, which goes smoothly
+    over the waves of a family, as what a model lacks does."""
+    c = np.array([label.c for label in labels])
+    family = np.array([FAMILIES.index(label.family or FAMILIES[0]) for label in labels])
+    alike = np.exp(-abs(c[:, None] - c) / ALIKE) * (family[:, None] == family)
+    return np.diag([form_error(label) ** 2 for label in labels]) + tau**2 * alike
+
+
+def _tree(measured: Frequencies, modes: Modes, tau: float) -> tuple[Array, Array, Array]:
+    """Labelings (k, m), ln of prior times evidence (k,) and the means of z (k, v + l)."""
+    different = list(dict.fromkeys(modes.labels))
+    own = np.array([different.index(label) for label in modes.labels])
+    root = np.linalg.cholesky(discrepancy(different, tau))
+    H = np.hstack([modes.H, root[own]])
+    (count, n), k = measured.allowed.shape, H.shape[1]
+    family = np.array([FAMILIES.index(label.family or FAMILIES[0]) for label in modes.labels])
+    sees = np.array(list(VIEWS))[:, family]  # (views, n)
+    found = np.where(sees, 1 - MISSED, UNSEEN)
+    width = float(np.ptp(measured.y)) + 2 * FOREIGN_MARGIN
+
+    ln = np.log(list(VIEWS.values()))[None]  # (branches, views)
+    mean, P = np.zeros((1, k)), np.eye(k)[None]
+    free, chosen = np.ones((1, n), bool), np.empty((1, 0), int)
+    for i in range(count):
+        PH = P @ H.T  # (branches, k, n)
+        variance = np.einsum("nk,bkn->bn", H, PH) + measured.s[i] ** 2
+        off = measured.y[i] - modes.mu - mean @ H.T
+        score = -0.5 * (off**2 / variance + np.log(2 * np.pi * variance))
+        score[~(free & measured.allowed[i])] = -np.inf
+        foreign = -np.inf if measured.sure[i] else np.log(FOREIGN / width)
+        grown = np.concatenate(
+            [
+                ln[:, None] + score[:, :, None] + np.log(found.T),
+                np.broadcast_to(ln[:, None] + foreign, (len(ln), 1, ln.shape[1])),
+            ],
+            axis=1,
+        )
+        total = np.logaddexp.reduce(grown, axis=2).ravel()
+        best = np.argsort(-total, kind="stable")[:BRANCHES]
+        best = best[total[best] > total[best[0]] - CUT]
+        at, mode = np.divmod(best, n + 1)
+        is_mode = mode < n
+        j = np.where(is_mode, mode, 0)
+        column = PH[at, :, j] * is_mode[:, None]
+        gain = column / variance[at, j][:, None]
+        mean = mean[at] + gain * off[at, j][:, None]
+        P = P[at] - gain[:, :, None] * column[:, None, :]
+        ln, free = grown[at, mode], free[at]
+        free[is_mode, j[is_mode]] = False
+        chosen = np.hstack([chosen[at], np.where(is_mode, mode, FOREIGN_MODE)[:, None]])
+    ln = np.logaddexp.reduce(ln + _missing(measured, modes, H, mean, P, free, sees), axis=1)
+    return chosen, ln, mean
+
+
+def _missing(
+    measured: Frequencies, modes: Modes, H: Array, mean: Array, P: Array, free: Array, sees: Array
+) -> Array:
+    """ln of the probability (branches, views) that the ``free`` modes were not measured: each is
+    above the band, or was missed."""
+    from scipy.special import ndtr
+
+    end = np.array([measured.y[measured.states == state].max() for state in modes.states])
+    spread = np.sqrt(np.einsum("nk,bkl,nl->bn", H, P, H, optimize=True))
+    within = ndtr((end - modes.mu - mean @ H.T) / spread)  # (branches, n)
+    lost = np.where(sees, MISSED, 1 - UNSEEN)  # (views, n)
+    each = np.log1p(-within[:, None] * (1 - lost))
+    return np.asarray((each * free[:, None]).sum(2))

@@ -1,0 +1,130 @@
+"""The labels of frequencies that came without, as files and tables have them: labels.json,
+labels.csv, and a part of fit.json."""
+
+from __future__ import annotations
+
+from ..simulate.modes.label import Label
+from .result import Column, PositiveNumber, Result, ResultPart, Table, csv_text, state_words
+
+FOREIGN_WORDS = "no mode of the tyre"
+MOST_RIVALS, LEAST_RIVAL = 4, 0.01  # labels, and labelings, beside the likeliest; probability
+SURE_LABEL = 0.9  # probability below which a label is in doubt
+
+
+class LabelProbability(ResultPart):
+    """A label, or none for what is no mode, and how probable it is."""
+
+    c: int | None = None
+    m: int | None = None
+    kind: str | None = None
+    probability: float
+
+    @property
+    def label(self) -> Label | None:
+        """[c, m]"""
+        return None if self.c is None or self.m is None else Label(self.c, self.m, self.kind)
+
+    @property
+    def said(self) -> str:
+        """In words."""
+        return self.label.said if self.label else FOREIGN_WORDS
+
+
+class LabelledFrequency(LabelProbability):
+    """A measured frequency without a label: the one of the likeliest labeling, with the probability
+    that it is this frequency's; the ``rivals``' too."""
+
+    frequency_Hz: PositiveNumber
+    sigma_Hz: PositiveNumber
+    pressure_kPa: float
+    rim: str
+    expected_Hz: float | None = None  # of the mode, where the variables are expected
+    rivals: list[LabelProbability]
+
+    @property
+    def state(self) -> str:
+        """In words."""
+        return state_words(self.pressure_kPa, 0.0, self.rim)
+
+
+class Labeling(ResultPart):
+    """All labels together, in the order of the frequencies, and their probability."""
+
+    labels: list[str]
+    probability: float
+
+
+class Labels(ResultPart):
+    """Of all frequencies without a label."""
+
+    frequencies: list[LabelledFrequency]
+    labelings: list[Labeling]  # the likeliest first
+    model_off_percent: float  # how far the model is off the tyre, as the frequencies say
+    expansions: int  # of the model
+    settled: bool  # the labels are those of the design that they lead to
+
+    @property
+    def doubtful(self) -> list[LabelledFrequency]:
+        """Frequencies whose label is less than `SURE_LABEL` probable."""
+        return [each for each in self.frequencies if each.probability < SURE_LABEL]
+
+    def table(self) -> Table:
+        """A line a frequency."""
+        heads = [Column("measured in", ""), Column("Hz", ".1f"), Column("mode", "")]
+        heads += [Column("model, Hz", ".1f"), Column("probability, %"), Column("else", "")]
+        rows = [
+            [
+                each.state,
+                f"{each.frequency_Hz:.1f}",
+                each.said,
+                None if each.expected_Hz is None else f"{each.expected_Hz:.1f}",
+                f"{100 * each.probability:.1f}",
+                ", ".join(f"{r.said} {100 * r.probability:.1f} %" for r in each.rivals),
+            ]
+            for each in self.frequencies
+        ]
+        return Table(heads, rows, title="Labels of frequencies that came without")
+
+    def sentences(self) -> list[str]:
+        """What was told."""
+        best = self.labelings[0]
+        told = [f"all these labels together are {best.probability:.1%} probable"]
+        if len(self.labelings) > 1:
+            other = self.labelings[1]
+            told.append(f"next are {', '.join(other.labels)}, {other.probability:.1%}")
+        return told
+
+    def doubts(self) -> list[str]:
+        """What must not be overlooked."""
+        told = []
+        if self.doubtful:
+            where = ", ".join(f"{each.frequency_Hz:g} Hz" for each in self.doubtful)
+            told.append(f"labels less than {SURE_LABEL:.0%} probable: {where}")
+        if not self.settled:
+            told.append(
+                "several labelings each lead to a design at which another is likelier: give labels"
+                " that you know"
+            )
+        return told
+
+
+class LabelsResult(Result):
+    """labels.json"""
+
+    study, stem, command, heading = "labels", "labels", "measured label", "Labels"
+    is_seldom = True
+
+    labels: Labels
+
+    def csv(self) -> str:
+        keys = ["frequency_Hz", "sigma_Hz", "pressure_kPa", "rim", "c", "m", "kind", "probability"]
+        return csv_text([*keys, "expected_Hz"], (f.model_dump() for f in self.labels.frequencies))
+
+    def tables(self) -> list[Table]:
+        return [self.labels.table()]
+
+    def sentences(self) -> list[str]:
+        return self.labels.sentences()
+
+    def doubts(self) -> list[str]:
+        return self.labels.doubts()
