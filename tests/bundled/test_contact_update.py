@@ -9,7 +9,7 @@ from tyrecal_solvers.bundled.road.contact_update import ContactUpdate
 from . import support
 from .conftest import Inflated
 from .contact import ring
-from .test_block_cholesky import LENGTHS, Problem, conjugate_gradients, road_blocks
+from .test_multifrontal import LENGTHS, Problem, conjugate_gradients, road_blocks
 
 Array = np.ndarray
 

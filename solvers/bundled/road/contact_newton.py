@@ -14,10 +14,10 @@ from scipy.sparse import csr_matrix
 from ...errors import Indefinite, Inverted, NoEquilibrium
 from ..solid3d.gmres import gmres
 from ..solid3d.revolved import Revolved
-from .block_cholesky import Elimination, Factor
 from .contact import Bound, Contact, FlatRoad
 from .contact_update import ContactUpdate
 from .half_turn_symmetry import HalfTurn
+from .multifrontal import Elimination, Factor
 
 Array = np.ndarray
 log = logging.getLogger("tyrecal_solvers")
@@ -72,7 +72,7 @@ class ContactNewton:
         self.flat = self._flat_height(tyre.model.mesh.X, np.flatnonzero(~symmetry.free.any(1)))
         self.road = road
         tyre.residual(U)
-        self.order = Elimination([t[0] for t in tyre.tangents()], symmetry)
+        self.order = Elimination(tyre.tangents(np.float32), symmetry)
         self.parts = symmetry.parts(U)
         self.height = self.free_radius
         self.load = 0.0

@@ -15,10 +15,10 @@ import numpy as np
 from scipy.linalg import lu_factor, lu_solve
 from scipy.sparse import csr_matrix
 
-from .block_cholesky import Factor
+from .multifrontal import Factor
 
 Array = np.ndarray
-COLUMNS_AT_ONCE = 64  # columns that a thread forms at a time
+COLUMNS_AT_ONCE = 64  # columns that are formed at a time
 # change of a component's contact stiffness over the stiffest contact, left to GMRES
 MIN_STIFFNESS_CHANGE = 1e-3
 
@@ -29,7 +29,7 @@ class ContactUpdate:
     def __init__(self, factor: Factor):
         self.factor = factor
         self._column = np.full(factor.order.symmetry.mask.size, -1)  # of each dof in Y
-        self._blocks: list[list[Array]] = []  # Y by the times of forming, by the factor's pieces
+        self._blocks: list[list[Array]] = []  # Y by the times of forming, by the factor's fronts
         self._compliance = np.zeros((0, 0))
         self._active = np.zeros(0, int)
 
@@ -55,9 +55,9 @@ class ContactUpdate:
             return
         before = len(self._compliance)
         self._column[dofs] = before + np.arange(len(dofs))
-        # two threads share the work the same way everywhere, so that the bits are the same too
-        some = np.array_split(dofs, min(len(dofs), 2 * -(-len(dofs) // (2 * COLUMNS_AT_ONCE))))
-        pieces = list(self.factor.order.pool.map(self._columns, some))
+        pieces = [
+            self._columns(some) for some in np.array_split(dofs, -(-len(dofs) // COLUMNS_AT_ONCE))
+        ]
         new = [_side_by_side(each) for each in zip(*pieces, strict=True)]
         earlier = [_products(block, new) for block in self._blocks]
         corner = _products(new, new)

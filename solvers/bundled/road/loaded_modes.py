@@ -23,9 +23,9 @@ from ..section.symmetry import HALF_TURN
 from ..solid3d.circumference import Circumference
 from ..solid3d.revolved import Revolved
 from . import davidson
-from .block_cholesky import Elimination, Factor
 from .contact_update import ContactUpdate
 from .half_turn_symmetry import HalfTurn
+from .multifrontal import Elimination, Factor
 
 Array = np.ndarray
 SPARE = 3  # modes of each kind beyond half of the wanted ones
@@ -104,7 +104,7 @@ class _Kind:
         self.tyre, self.symmetry, self.check = tyre, symmetry, check
         self.wheel_kg = wheel_kg
         tangents = tyre.tangents(np.float32)
-        order = Elimination([t[0] for t in tangents], symmetry)
+        order = Elimination(tangents, symmetry)
         check()
         try:
             self.factor = ContactUpdate(Factor(order, tangents, self.symmetry.fold(hold)))

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from itertools import pairwise
 
 import numpy as np
 import pytest
 from scipy.sparse import bsr_matrix, csr_matrix
-from tyrecal_solvers.bundled.road.block_cholesky import Elimination, Factor
 from tyrecal_solvers.bundled.road.half_turn_symmetry import HalfTurn
+from tyrecal_solvers.bundled.road.multifrontal import Elimination, Factor
 from tyrecal_solvers.bundled.solid3d.circumference import half_circle
 from tyrecal_solvers.bundled.solid3d.revolved import Revolved
 from tyrecal_solvers.errors import Indefinite
@@ -45,7 +44,7 @@ class Problem:
         if contact is not None:
             self.contact[: len(contact)] = contact
         tangents = self.tyre.tangents(np.float32)
-        order = Elimination([t[0] for t in tangents], self.symmetry)
+        order = Elimination(tangents, self.symmetry)
         self.factor = Factor(order, tangents, self.folded(self.contact))
 
     def folded(self, contact: Array) -> csr_matrix:
@@ -156,20 +155,37 @@ def test_exact_without_cords(quadratic: bool) -> None:
         np.testing.assert_allclose(back, x, atol=2e-3 * abs(x).max())
 
 
-def test_the_middle_of_the_tread_is_eliminated_last() -> None:
-    """From the edge on, column by column, so that a level touches the next one alone: of eight
-    columns four levels, and each node gone once."""
+def test_boxes_side_by_side_do_not_couple() -> None:
+    """Every free unknown goes once, and what a front leaves goes later; boxes that are no part of
+    each other share no unknown but of those that hold both; each cell is put together once."""
     work = ring((0.2, 0.21, 0.23), 0.04, 8, support.Rubber())
-    around, X = half_circle(LENGTHS), work.model.mesh.X
-    symmetry = work.symmetry(around)
-    order = Elimination([part.connectivity for part in work.model.parts], symmetry)
-    assert len(order.fronts) == 1 + 4  # the first gathers elements, and eliminates nothing
-    gone = [symmetry.nodes[front.nodes[: front.eliminated]] for front in order.fronts]
-    free = np.flatnonzero(work.free.any(1) & (X[:, 1] > -1e-9))
-    assert sorted(np.concatenate(gone)) == sorted(free)
-    for before, after in pairwise(gone[1:]):
-        assert X[before, 1].min() > X[after, 1].max()
-    assert (X[gone[-1], 1] < 0.0101).all() and (abs(X[gone[-1], 1]) < 1e-9).any()
+    tyre, symmetry = work.tyre(half_circle(LENGTHS)), work.symmetry(half_circle(LENGTHS))
+    tyre.residual(np.zeros(symmetry.shape))
+    order = Elimination(tyre.tangents(np.float32), symmetry)
+    fronts = order.fronts
+    gone = np.concatenate([front.own for front in fronts])
+    np.testing.assert_array_equal(np.sort(gone), np.flatnonzero(symmetry.mask))
+    place = np.full(symmetry.mask.size, -1)
+    place[gone] = np.arange(len(gone))
+    holds: list[set[int]] = []  # of each front the fronts inside
+    for front in fronts:
+        assert (place[front.left] > place[front.own].max(initial=-1)).all()
+        holds.append(set(front.inner).union(*(holds[i] for i in front.inner)))
+        for i in front.inner:
+            assert np.isin(fronts[i].left, np.concatenate([front.own, front.left])).all()
+    for i, front in enumerate(fronts):
+        beside = [j for j in range(i) if j not in holds[i]]
+        assert not any(np.isin(front.own, fronts[j].left).any() for j in beside)
+    cells = [
+        (part, column, piece)
+        for front in fronts
+        if front.cells
+        for part in front.parts
+        for column in range(*front.cells[0])
+        for piece in range(*front.cells[1])
+    ]
+    assert len(order.dissection.columns) == 4
+    assert sorted(cells) == list(np.ndindex(2, 4, len(LENGTHS)))
 
 
 def test_linear_elements_with_cords(inflated: Inflated) -> None:
