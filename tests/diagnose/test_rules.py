@@ -62,7 +62,7 @@ def explained(p_value: float, rows: int, variables: int, parameters: int = 1) ->
     the best one is far worse."""
     value = float(chi2.isf(p_value, max(1, rows - variables - parameters)))
     ln, none = np.array([-3.0, -1.0, -2.0]), np.zeros((3, 1))
-    fitted = Fitted(ln, none, np.array([1e4, value, 1e4]), none[:, :, None])
+    fitted = Fitted(ln, none, np.array([1e4, value, 1e4]), none[:, :, None], none[:, :0])
     return Hypothesis("a", 0.5, -1.0, {f"a{i}": ln for i in range(parameters)}, ln, fitted)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from textwrap import fill
 
 import numpy as np
@@ -160,9 +161,9 @@ def _after(d: Diagnosis) -> Array | None:
         return None
     h = d.hypothesis(d.leading)
     i = h.best
-    shift, tilt, _ = d.problem.added({id: e[[i]] for id, e in h.values.items()}, 1)
-    eta, _ = d.problem.plain(h.fitted.d[i])
-    return np.asarray(d.problem.observations.y - eta - shift[0] - tilt[0] @ h.fitted.d[i])
+    problem = replace(d.problem, zeta=float(h.fitted.zeta[i]))
+    eta = problem.predicted({id: e[[i]] for id, e in h.values.items()}, h.fitted.d[[i]])
+    return np.asarray(problem.observations.y - eta[0])
 
 
 def _place(label: Label | None) -> float:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import nullcontext
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -24,7 +25,7 @@ from ..diagnose.diagnosis import Diagnosis, diagnose
 from ..diagnose.evidence import NONE
 from ..diagnose.inverse_problem import Assumed
 from ..diagnose.model import ModelRow, ResponseModel
-from ..diagnose.observations import observe
+from ..diagnose.observations import Observable, Observations, observe
 from ..diagnose.result import diagnosis_result
 from ..diagnose.study import spans_of
 from ..diagnose.tyre_model import TyreModel
@@ -111,12 +112,24 @@ def predicted(
     places = [i for i, (label, p) in enumerate(rows) if label and p == pressure_kPa]
     hypothesis, expansion = found.hypothesis(key), found.problem.expansion
     best = int(np.argmax(hypothesis.posterior))
-    d = hypothesis.fitted.d[best]
-    eta = expansion.plain(expansion.x0 + d)[0]
-    for id, e in hypothesis.values.items():
-        shift, tilt, _ = expansion.nodes[id].at(e[[best]])
-        eta = eta + shift[0] + tilt[0] @ d
-    said = {str(rows[i][0]): round(float(np.exp(eta[i])), 4) for i in places}
+    unknown, eta = np.full(len(places), np.nan), expansion.eta[places]
+    unseen = Observations(
+        tuple(Observable("frequency_Hz", *rows[i]) for i in places),
+        eta,
+        unknown,
+        0.0,
+        unknown,
+        unknown,
+    )
+    there = replace(
+        found.problem,
+        observations=unseen,
+        places=np.array(places),
+        zeta=float(hypothesis.fitted.zeta[best]),
+    )
+    effects = {id: e[[best]] for id, e in hypothesis.values.items()}
+    (eta,) = there.predicted(effects, hypothesis.fitted.d[[best]])
+    said = {str(rows[i][0]): round(float(np.exp(f)), 4) for i, f in zip(places, eta, strict=True)}
     if found.exchanged:  # the laboratory's own labels
         a, b = map(str, found.exchanged)
         said[a], said[b] = said[b], said[a]

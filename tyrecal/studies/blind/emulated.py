@@ -6,7 +6,8 @@ About the centre x0, with t = (x - x0) / reach, |t| <= 1:
 
 q_k: monomials, fitted by least squares to values and Jacobians at designs of a Halton sequence;
 L_j: Lagrange's polynomials of the effect's nodes, 0 among them. Changes by the sources of error
-likewise. Beyond the box the model goes straight on, with the slopes at its nearest point.
+likewise; what couples near modes hardly changes with x, and is that of the nearest design. Beyond
+the box the model goes straight on, with the slopes at its nearest point.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ import numpy as np
 from scipy.stats import qmc
 
 from ..diagnose.expansion import lagrange
-from ..diagnose.model import Answer, Query, ResponseModel, Span
+from ..diagnose.model import Answer, Coupling, Query, ResponseModel, Span
 from ..emulator import up_to
 
 Array = np.ndarray
@@ -75,12 +76,14 @@ class Emulated:
         plain: Polynomial,
         constants: Polynomial,
         effects: Mapping[str, EmulatedEffect],
+        couplings: Sequence[tuple[Array, Coupling | None]] = (),
     ):
         self.model, self.reach = model, reach
         self.variables, self.sources = model.variables, model.sources
         self.start, self.spread = model.start, model.spread
         self.spans: Mapping[str, Span] = {k: s for k, s in model.spans.items() if k in effects}
         self._plain, self._constants, self._effects = plain, constants, effects
+        self._couplings = couplings
 
     def answers(self, points: Sequence[Query]) -> list[Answer | Exception]:
         """From the polynomials; from the model where an effect has none."""
@@ -100,7 +103,12 @@ class Emulated:
         constants = None
         if point.constants:
             constants = self._constants.at(t)[0].reshape(len(eta), -1)
-        return Answer(eta + slope @ (there - t), slope / self.reach, split, constants)
+        coupling = None
+        if point.coupled and self._couplings:
+            coupling = min(self._couplings, key=lambda known: float(abs(known[0] - t).max()))[1]
+        return Answer(
+            eta + slope @ (there - t), slope / self.reach, split, constants, coupling=coupling
+        )
 
 
 def emulate(model: ResponseModel, reach: float = REACH) -> Emulated:
@@ -114,7 +122,10 @@ def emulate(model: ResponseModel, reach: float = REACH) -> Emulated:
     signs = 2 * qmc.Halton(count, seed=SEED).random(PLAIN_DESIGNS) - 1
     signs[0] = 0.0
     designs = [start + reach * t for t in signs]
-    asked = [Query(x, constants=i < SOURCE_DESIGNS) for i, x in enumerate(designs)]
+    asked = [
+        Query(x, constants=i < SOURCE_DESIGNS, coupled=i < SOURCE_DESIGNS)
+        for i, x in enumerate(designs)
+    ]
     plain = model.answers(asked)
     good = [i for i, answer in enumerate(plain) if isinstance(answer, Answer)]
     powers = up_to(count, PLAIN_DEGREE)
@@ -132,7 +143,8 @@ def emulate(model: ResponseModel, reach: float = REACH) -> Emulated:
         found = _effect(model, id, span, signs, designs, plain, reach)
         if found is not None:
             effects[id] = found
-    return Emulated(model, reach, fitted, constants, effects)
+    couplings = [(signs[i], plain[i].coupling) for i in sources]  # type: ignore[union-attr]
+    return Emulated(model, reach, fitted, constants, effects, couplings)
 
 
 def monomials(powers: Array, t: Array) -> Array:

@@ -37,15 +37,19 @@ def repeatability(observations: Observations) -> Array:
     return np.diag(observations.scatter**2) + observations.common**2 * shared
 
 
-def covariance(observations: Observations, constants: Array, form: float | None = None) -> Array:
+def covariance(
+    observations: Observations,
+    constants: Array,
+    form: float | None = None,
+    mixed: Array | None = None,
+) -> Array:
     """Sigma (n, n). constants (n, k): s_k g_k of the rows; form: one relative standard deviation
-    of the model for all modes, None = those on record."""
+    of the model for all modes, None = those on record; mixed (n, n): of coupled modes, see
+    `Veering.weights`."""
     rows = observations.rows
     sizes = np.array([form_error(row.label) if form is None else form for row in rows])
     sizes[[row.label is None for row in rows]] = 0.0  # the mass is a sum: no error of form
-    return (
-        repeatability(observations)
-        + alike(rows) * np.outer(sizes, sizes)
-        + constants @ constants.T
-        + 1e-12 * np.eye(len(rows))
-    )
+    model = alike(rows) * np.outer(sizes, sizes) + constants @ constants.T
+    if mixed is not None:
+        model = mixed @ model @ mixed.T
+    return repeatability(observations) + model + 1e-12 * np.eye(len(rows))

@@ -44,7 +44,7 @@ class Diagnosis:
     """What was found."""
 
     problem: InverseProblem  # as it was solved
-    bare: InverseProblem  # before effects were asked again
+    bare: InverseProblem  # before effects were asked again, near modes coupled as without effects
     variables: tuple[str, ...]
     sources: tuple[str, ...]
     hypotheses: tuple[Hypothesis, ...]
@@ -126,10 +126,11 @@ def diagnose(
             break
         hypotheses = weigh(problem)
     p = probabilities(hypotheses)
-    d = next(h for h in hypotheses if h.key == NONE).fitted.d[0]
+    plain = next(h for h in hypotheses if h.key == NONE).fitted
+    d, bare = plain.d[0], replace(bare, zeta=float(plain.zeta[0]))
     verdict = decide(hypotheses, p, len(where), len(d))
     gap = find_gap(bare, d, tuple(model.variables))
-    P, _, _ = projection(problem, d)
+    P, _, _ = projection(replace(problem, zeta=bare.zeta), d)
     means = {h.key: h.mean() for h in hypotheses if h.values}
     sizes = {key: value[key] for key, value in means.items() if key in value}
     separability = separate(bare, P, sizes)

@@ -19,6 +19,7 @@ import numpy as np
 from .covariance import alike
 from .expansion import Nodes
 from .inverse_problem import InverseProblem
+from .veering import rule
 
 Array = np.ndarray
 NONE: Final = "none"
@@ -28,6 +29,12 @@ RULE_POINTS = {1: 25, 2: 15}  # of the rule in each parameter, by how many effec
 SHARP_FALL = 2.0  # of ln Z from the best point to its neighbours, which asks for more points
 MAX_ZOOMS = 6
 REFIT_STEPS = 6  # of Gauss and Newton, in a model that is quadratic and near its minimum
+COUPLED_STEPS = 4  # more where near modes are coupled
+FAR_BELOW, ABOVE_POINTS = (
+    20.0,
+    1.0,
+)  # of ln Z: what the spline may fall to, and rise above its points
+PAIR_POINTS = 3  # of the rule in what couples modes, that stand for all where effects are paired
 PARTNERS = 4  # singles that are tried with every other
 UNKNOWN = (0.005, 0.01, 0.02, 0.04)  # shift of modes by what no catalogue holds
 INFLATION = (2.0, 4.0)  # all of Sigma's standard deviations
@@ -41,6 +48,13 @@ class Fitted(NamedTuple):
     d: Array  # x - x0 (q, v)
     chi2: Array  # (q,)
     covariance: Array  # of d (q, v, v): the inverse of its posterior information
+    coupled: Array  # (q, k) Z at each zeta of the rule, times exp(-zeta^2 / 2), over that of all
+
+    @property
+    def zeta(self) -> Array:
+        """(q,) by which near modes are coupled, the likeliest; 0 where none are."""
+        count, points = self.coupled.shape
+        return rule()[0][self.coupled.argmax(1)] if points else np.zeros(count)
 
 
 @dataclass(frozen=True)
@@ -79,12 +93,57 @@ class Hypothesis:
 
 
 def refit(
-    problem: InverseProblem, effects: Mapping[str, Array], count: int, extra: Array | None = None
+    problem: InverseProblem,
+    effects: Mapping[str, Array],
+    count: int,
+    extra: Array | None = None,
+    among: Mapping[int, float] | None = None,
 ) -> Fitted:
-    """x re-fitted at each of ``count`` parameters. extra (n, n): more covariance."""
+    """x re-fitted at each of ``count`` parameters, integrated over what couples near modes.
+
+    extra (n, n): more covariance; among: {place in the rule: see `Fitted.coupled`}, where some of
+    its points stand for all.
+    """
+    added = problem.added(effects, count)
+    start = np.zeros((count, len(problem.centre)))
+    plain = _refit(problem, problem, added, extra, start, REFIT_STEPS)
+    if not problem.integrand:
+        return plain
+    points = list(among) if among else list(range(len(problem.integrand)))
+    found = [
+        _refit(problem, problem.integrand[k], added, extra, plain.d, COUPLED_STEPS) for k in points
+    ]
+    ln, d, chi2, covariance = (np.array([each[part] for each in found]) for part in range(4))
+    zeta, between, ln_weights = rule()
+    ln_prior = -(zeta[points, None] ** 2) / 2
+    if among:
+        total = np.logaddexp.reduce(ln + ln_prior) - np.log(sum(among.values()))
+    else:
+        near = np.maximum(ln, ln.max(0) - FAR_BELOW)
+        finer = np.minimum(between @ near, ln.max(0) + ABOVE_POINTS)
+        total = np.logaddexp.reduce(finer + ln_weights[:, None])
+    best, every = np.argmax(ln + ln_prior, axis=0), np.arange(count)
+    p = np.exp(ln + ln_prior - np.logaddexp.reduce(ln + ln_prior))
+    apart = d - d[best, every]
+    spread = covariance + apart[..., :, None] * apart[..., None, :]
+    coupled = np.zeros((count, len(zeta)))
+    coupled[:, points] = np.exp(ln + ln_prior - total).T
+    pooled = np.einsum("kq,kqvw->qvw", p, spread)
+    return Fitted(total, d[best, every], chi2[best, every], pooled, coupled)
+
+
+def _refit(
+    problem: InverseProblem,
+    at: InverseProblem,
+    added: tuple[Array, Array, Array],
+    extra: Array | None,
+    d: Array,
+    steps: int,
+) -> Fitted:
+    """x re-fitted from x0 + d (q, v) with what effects add to uncoupled modes, at one zeta."""
     y = problem.observations.y
-    shift, tilt, split = problem.added(effects, count)
-    S = problem.sigma + problem.law(shift)
+    shift, tilt, split = added
+    S = at.sigma + problem.law(shift @ at.mixed.T if at.zeta else shift)
     if extra is not None:
         S = S + extra
     inverse = np.linalg.inv(S)
@@ -94,14 +153,14 @@ def refit(
     eta0, J0 = problem.plain(np.zeros_like(centre))
     H = problem.expansion.hessian[problem.places]
     by_variable = H.transpose(2, 0, 1).reshape(len(centre), -1)
-    d = np.zeros((count, len(centre)))
-    for step in range(REFIT_STEPS + 1):
+    for step in range(steps + 1):
         bent = (d @ by_variable).reshape(tilt.shape)
-        J = J0 + bent + tilt
-        r = y - eta0 - shift - ((J0 + bent / 2 + tilt) @ d[:, :, None])[:, :, 0]
+        eta = eta0 + shift + ((J0 + bent / 2 + tilt) @ d[:, :, None])[:, :, 0]
+        eta, J, told = at.coupled(eta, J0 + bent + tilt)
+        r = y - eta
         weighted = inverse @ J
         normal = weighted.transpose(0, 2, 1) @ J + information
-        if step == REFIT_STEPS:
+        if step == steps:
             break
         slope = (r[:, None, :] @ weighted)[:, 0] + (centre - d) @ information
         d = d + np.linalg.solve(normal, slope[:, :, None])[:, :, 0]
@@ -110,7 +169,8 @@ def refit(
     _, ln_normal = np.linalg.slogdet(normal * np.outer(problem.spread, problem.spread))
     n = len(y)
     ln_evidence = -(chi2 + ln_det + n * np.log(2 * np.pi) + (off**2).sum(1) + ln_normal) / 2
-    return Fitted(ln_evidence + ln_splits(problem, split), d, chi2, np.linalg.inv(normal))
+    ln_evidence += ln_splits(problem, split) + told
+    return Fitted(ln_evidence, d, chi2, np.linalg.inv(normal), np.zeros((len(d), 0)))
 
 
 def ln_splits(problem: InverseProblem, split: Array) -> Array:
@@ -150,7 +210,11 @@ def _pairs(problem: InverseProblem, singles: Sequence[Hypothesis]) -> list[Hypot
     best = {h.key for h in sorted(singles, key=lambda h: -h.ln_evidence)[:PARTNERS]}
     all_pairs = list(combinations(order, 2))
     tried = [two for two in all_pairs if best & set(two)]
-    return [explain(problem, two, PRIOR_PAIRS / len(all_pairs)) for two in tried]
+    by_id = {h.key: h.fitted.coupled.T @ h.posterior for h in singles}
+    shares = {two: (by_id[two[0]] + by_id[two[1]]) / 2 for two in tried}
+    likely = {two: np.argsort(-share)[:PAIR_POINTS] for two, share in shares.items()}
+    among = {two: {int(k): float(shares[two][k]) for k in places} for two, places in likely.items()}
+    return [explain(problem, two, PRIOR_PAIRS / len(all_pairs), among[two]) for two in tried]
 
 
 def outside(problem: InverseProblem) -> Hypothesis:
@@ -181,12 +245,17 @@ def outside(problem: InverseProblem) -> Hypothesis:
     return Hypothesis(OUTSIDE, PRIOR_OUTSIDE, total, {}, np.zeros(1), best, words)
 
 
-def explain(problem: InverseProblem, ids: Sequence[str], prior: float) -> Hypothesis:
+def explain(
+    problem: InverseProblem,
+    ids: Sequence[str],
+    prior: float,
+    among: Mapping[int, float] | None = None,
+) -> Hypothesis:
     """One or two effects over their ranges; what two add is added up.
 
     Where a peak is narrow, points gather about it: those within two places of the best one give way
     to a rule of their own on the box between, until ln Z falls gently from the best point to its
-    neighbours.
+    neighbours. ``among``: see `refit`.
     """
     box = [problem.expansion.nodes[id].reach for id in ids]
     widths = [high - low for low, high in box]
@@ -196,7 +265,8 @@ def explain(problem: InverseProblem, ids: Sequence[str], prior: float) -> Hypoth
         values = _grid([points for points, _ in rules])
         shares = _grid([w / width for (_, w), width in zip(rules, widths, strict=True)])
         ln_weights = np.log(np.prod(shares, axis=0))
-        fitted = refit(problem, dict(zip(ids, values, strict=True)), values.shape[1])
+        effects = dict(zip(ids, values, strict=True))
+        fitted = refit(problem, effects, values.shape[1], among=among)
         ln = fitted.ln_evidence.reshape([count] * len(ids))
         best = [int(b) for b in np.unravel_index(int(np.argmax(ln)), ln.shape)]
         outer = np.ones(values.shape[1], bool)

@@ -18,7 +18,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from .model import Answer, Query, ResponseModel, Span
+from .model import Answer, Coupling, Query, ResponseModel, Span
 
 Array = np.ndarray
 ONE_SIDED = (0.25, 0.75, 1.0)  # with 0 the Lobatto points of a cubic
@@ -86,6 +86,7 @@ class Expansion:
     constants: Array  # (n, k)
     nodes: Mapping[str, Nodes]  # of effects by id
     failed: Mapping[str, str] = field(default_factory=dict)  # why effects, by id, have no nodes
+    coupling: Coupling | None = None  # of modes by the sources of error
 
     def plain(self, x: Array) -> tuple[Array, Array]:
         """eta (n,) and Jacobian (n, v) without effects."""
@@ -106,7 +107,7 @@ def expand(model: ResponseModel, x0: Array, splits: bool = True) -> Expansion:
     shares = {id: ONE_SIDED_SLOPED if splits else FAR_END for id in at_0}
     shares |= dict.fromkeys(model.sloped, ONE_SIDED_SLOPED)
     values = {id: node_values(model.spans[id], shares.get(id, ())) for id in ids}
-    points = [Query(x0, constants=True, slopes=at_0)]
+    points = [Query(x0, constants=True, slopes=at_0, coupled=True)]
     points += [Query(x0 + side * step) for step in steps for side in (1, -1)]
     asked = [(id, float(e)) for id in ids for e in values[id]]
     points += [_with_effect(model, x0, id, e) for id, e in asked]
@@ -140,7 +141,7 @@ def expand(model: ResponseModel, x0: Array, splits: bool = True) -> Expansion:
             failed[id] = str(next(a for a in found[id].values() if isinstance(a, Exception)))
         else:
             nodes[id] = made
-    return replace(plain, nodes=nodes, failed=failed)
+    return replace(plain, nodes=nodes, failed=failed, coupling=first.coupling)
 
 
 def node_values(span: Span, sloped: Sequence[float] = ()) -> Array:

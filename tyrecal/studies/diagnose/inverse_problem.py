@@ -12,6 +12,7 @@ from .covariance import alike, covariance
 from .expansion import Expansion
 from .model import Span
 from .observations import Observations
+from .veering import Veering, rule, veering
 
 Array = np.ndarray
 
@@ -54,6 +55,7 @@ class InverseProblem:
     changes: tuple[Toggle, ...] = ()  # what was switched in runs 1, 2, ...
     assumed: Assumed = Assumed()
     reduced: Mapping[int, float] = field(default_factory=dict)  # factors of sources of error
+    zeta: float = 0.0  # by which near modes are coupled, in standard deviations
 
     @property
     def constants(self) -> Array:
@@ -66,7 +68,27 @@ class InverseProblem:
     @cached_property
     def sigma(self) -> Array:
         """Sigma (n, n)."""
-        return covariance(self.observations, self.constants, self.assumed.form)
+        return covariance(
+            self.observations, self.constants, self.assumed.form, self.mixed if self.zeta else None
+        )
+
+    @cached_property
+    def integrand(self) -> list[InverseProblem]:
+        """The problem at the points of the rule in zeta; empty where no modes are coupled."""
+        if not self.veering.active:
+            return []
+        return [replace(self, zeta=float(z)) for z in rule()[0]]
+
+    @cached_property
+    def veering(self) -> Veering:
+        """Which rows are coupled."""
+        e = self.expansion
+        return veering(self.observations, self.places, e.eta, e.coupling)
+
+    @cached_property
+    def mixed(self) -> Array:
+        """d ln f of coupled modes by ln f of uncoupled ones (n, n), as they were measured."""
+        return self.veering.weights(self.observations.y, self.zeta)
 
     def only(self, keep: Array) -> InverseProblem:
         """The problem with the rows of a mask (n,) alone."""
@@ -79,7 +101,24 @@ class InverseProblem:
     def plain(self, d: Array) -> tuple[Array, Array]:
         """eta (n,), J (n, v) at x0 + d without effects, whatever was switched."""
         eta, jacobian = self.expansion.plain(self.expansion.x0 + d)
-        return eta[self.places], jacobian[self.places]
+        eta, jacobian, _ = self.coupled(eta[None, self.places], jacobian[None, self.places])
+        return eta[0], jacobian[0]
+
+    def predicted(self, effects: Mapping[str, Array], d: Array) -> Array:
+        """eta (q, n) at x0 + d (q, v) with effects, each (q,)."""
+        plain = replace(self, zeta=0.0)
+        shift, tilt, _ = plain.added(effects, len(d))
+        eta = np.array([plain.plain(each)[0] for each in d]) + shift
+        return self.coupled(eta + np.einsum("qnv,qv->qn", tilt, d), tilt)[0]
+
+    def coupled(self, eta: Array, jacobian: Array) -> tuple[Array, Array, Array]:
+        """eta (q, n) and J (q, n, v) of uncoupled modes as those of coupled ones, and ln
+        probability (q,) of their labels."""
+        if not self.zeta:
+            return eta, jacobian, np.zeros(len(eta))
+        eta, own, part, told = self.veering.mixed(eta, self.zeta)
+        beside = jacobian[:, self.veering.partner]
+        return eta, own[:, :, None] * jacobian + part[:, :, None] * beside, told
 
     def added(self, effects: Mapping[str, Array], count: int) -> tuple[Array, Array, Array]:
         """What effects, each (count,), add: a (q, n), B (q, n, v); the split with them (q, n).
@@ -102,12 +141,18 @@ class InverseProblem:
                     shift[:, rows] += a[:, self.places[rows]]
                     tilt[:, rows] += B[:, self.places[rows]]
                     square[:, rows] += s[:, self.places[rows]] ** 2 - own[rows]
+        if self.zeta:
+            shift, tilt = shift @ self.mixed.T, self.mixed @ tilt
         return shift, tilt, np.sqrt(np.maximum(square, 0.0))
 
     def law(self, shift: Array) -> Array:
         """Covariance (q, n, n) by which an effect's law may be off its shift (q, n)."""
         off = self.assumed.law * shift
-        return np.asarray(off[:, :, None] * off[:, None, :] * alike(self.observations.rows))
+        return np.asarray(off[:, :, None] * off[:, None, :] * self._alike)
+
+    @cached_property
+    def _alike(self) -> Array:
+        return alike(self.observations.rows)
 
 
 def places(observations: Observations, rows: Sequence[tuple]) -> Array:

@@ -40,6 +40,16 @@ class Query:
     effects: Mapping[str, float] = field(default_factory=dict)  # parameter by id, absent: 0
     constants: bool = False  # whether for slopes by the sources of error, too
     slopes: tuple[str, ...] = ()  # effects for slopes by whose parameters, too
+    coupled: bool = False  # whether for what couples modes, too
+
+
+@dataclass(frozen=True)
+class Coupling:
+    """What the sources of error couple modes by, see `veering`."""
+
+    partner: Array  # (n,) row of the other mode at the same pressure, -1: there is none
+    size: Array  # (n,) standard deviation of q over lambda
+    rise: Array  # (n,) of the two modes' mean, for q at one standard deviation
 
 
 @dataclass(frozen=True)
@@ -51,6 +61,7 @@ class Answer:
     split: Array  # (n,) ln of the ratio of a pair's frequencies
     constants: Array | None = None  # (n, k) change by one standard deviation of each source
     slopes: Mapping[str, Array] = field(default_factory=dict)  # (n,) d eta / d e; NaN: unknown
+    coupling: Coupling | None = None
 
 
 class ResponseModel(Protocol):

@@ -12,7 +12,7 @@ size that the diagnosis found on the rest, stand beside.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -121,14 +121,14 @@ def _least_squares(problem: InverseProblem, hold: Array, sizes: Mapping[str, flo
     weight = 1 / np.sqrt(np.mean(fitted.observations.scatter**2))
     for _ in range(LEAST_SQUARES_STEPS):
         J = fitted.plain(d)[1] + fitted.added(effects, 1)[1][0]
-        errors = _predicted_errors(fitted, effects, d[None])[0]
+        errors = (fitted.observations.y - fitted.predicted(effects, d[None]))[0]
         tall = np.vstack([weight * J, np.diag(1 / problem.spread)])
         right = np.concatenate(
             [weight * errors, (problem.centre - problem.expansion.x0 - d) / problem.spread]
         )
         step = np.linalg.lstsq(tall, right, rcond=None)[0]
         d = d + step * min(1.0, MAX_STEP / max(abs(step).max(), 1e-300))
-    return _predicted_errors(out, effects, d[None])[0]
+    return np.asarray(out.observations.y - out.predicted(effects, d[None]))[0]
 
 
 def _errors(
@@ -140,13 +140,9 @@ def _errors(
     """ln measured - ln predicted (q, n) on the held-out rows, at places (q,) of the hypothesis'
     grid; d (q, v): x - x0 there, if not the re-fitted ones."""
     effects = {id: e[places] for id, e in hypothesis.values.items()}
-    return _predicted_errors(out, effects, hypothesis.fitted.d[places] if d is None else d)
-
-
-def _predicted_errors(out: InverseProblem, effects: dict[str, Array], d: Array) -> Array:
-    shift, tilt, _ = out.added(effects, len(d))
-    plain = np.array([out.plain(each)[0] for each in d])
-    return np.asarray(out.observations.y - plain - shift - np.einsum("qnv,qv->qn", tilt, d))
+    zeta = float(hypothesis.fitted.zeta[int(np.argmax(hypothesis.posterior))])
+    d = hypothesis.fitted.d[places] if d is None else d
+    return np.asarray(out.observations.y - replace(out, zeta=zeta).predicted(effects, d))
 
 
 def _placebo(problem: InverseProblem, hold: Array, random: np.random.Generator) -> float:

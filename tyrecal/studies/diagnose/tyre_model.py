@@ -22,14 +22,17 @@ from ...tyre.effects import catalogue
 from ...tyre.templates import TemplateFailed
 from ..fit import problem as fit
 from .expansion import ONE_SIDED_SLOPED, node_values
-from .model import Answer, ModelRow, Query, Span
+from .model import Answer, Coupling, ModelRow, Query, Span
 from .uncertainties import EFFECT_PATH, Source, unit_of, values_of
+from .veering import coupling, partner
 
 Array = np.ndarray
 MASS_STEP = 0.02  # of a logarithm: the mass is linear in areas and densities
 
 MANY_NUMBERS = 100  # of a deck: nodes are among them
 WORTH_A_POOL = 10  # evaluations, for processes to be started
+
+MAY_VEER = 0.15  # of ln f at some pressure, from which modes of one harmonic may veer
 
 QueryKey = tuple[bytes, tuple[tuple[str, float], ...], bool, tuple[str, ...]]  # of a point
 
@@ -142,6 +145,8 @@ class TyreModel:
     ) -> Answer | Exception:
         """The answer with what other points have to say about its slopes."""
         answer = known[_key(point)]
+        if point.coupled and isinstance(answer, Answer):
+            answer = replace(answer, coupling=self._coupling(point.x, answer.eta))
         if isinstance(answer, Answer) and self._is_bare(point):
             plain = known[_key(Query(point.x))]
             if not isinstance(plain, Answer):
@@ -262,6 +267,44 @@ class TyreModel:
                     )
         return Answer(eta, jacobian, split, slopes if point.constants else None, by_effect)
 
+    def _coupling(self, x: Array, eta: Array) -> Coupling | None:
+        """What turned cords couple modes by that are near each other at x; other constants move
+        modes, and couple hardly any. None where there are no such modes."""
+        places = {row: i for i, row in enumerate(self.rows)}
+        mates = np.array([places.get((partner(label), p), -1) for label, p in self.rows])
+        near = {
+            label
+            for i, (label, _) in enumerate(self.rows)
+            if mates[i] >= 0 and abs(eta[i] - eta[mates[i]]) < MAY_VEER
+        }
+        mates[[label not in near for label, _ in self.rows]] = -1
+        turned = [s for s in self.found if any(path.endswith("angle_deg") for path in s.steps)]
+        if not near or not turned:
+            return None
+        own = {**self._plain, **self.values(x)}
+        sides = [
+            {**own, **{k: own[k] + side * step for k, step in source.steps.items() if k in own}}
+            for source in turned
+            for side in (1, -1)
+        ]
+        asked = [{**each, "pressure_kPa": p} for each in sides for p in self.pressures]
+        found = iter(self._modes([(design, ()) for design in asked]))
+        square, rise = np.zeros(len(self.rows)), np.zeros(len(self.rows))
+        for _ in turned:
+            ln_f = [eta.copy(), eta.copy()]
+            for side, p in product((0, 1), self.pressures):
+                answer = next(found)
+                if not isinstance(answer, Found):
+                    raise answer
+                for i, (label, here) in enumerate(self.rows):
+                    if label and mates[i] >= 0 and here == p:
+                        ln_f[side][i] = log(answer.wanted[label].frequency_Hz)
+            pairs = [np.array([values, values[mates]]) for values in (eta, *ln_f)]
+            q, more = coupling(*pairs)
+            square, rise = square + q**2, rise + q**2 * more
+        size = np.where(mates >= 0, np.sqrt(square), 0.0)
+        return Coupling(mates, size, np.where(size > 0, rise / np.maximum(square, 1e-300), 0.0))
+
     def _slope(self, name: str, design: Mapping[str, float]) -> float:
         v = self._variables[name]
         return design[name] if v.scale == "log" else v.upper - v.lower
@@ -302,7 +345,8 @@ class TyreModel:
 
 def _key(point: Query) -> QueryKey:
     """What tells two points apart."""
-    return point.x.tobytes(), tuple(point.effects.items()), point.constants, point.slopes
+    effects = tuple(point.effects.items())
+    return point.x.tobytes(), effects, point.constants, point.slopes
 
 
 def asked_for(case: LoadedCase, labels: Sequence[Label]) -> LoadedCase:

@@ -1,0 +1,136 @@
+"""Two modes of one harmonic near each other, coupled by constants that nobody calibrates.
+
+Uncoupled, their a, b = (2 pi f)^2 cross as a tyre changes: that is what slopes extrapolate. Coupled
+by q they are the eigenvalues of [[a, q], [q, b]] and veer (Leissa, ZAMP 25 (1974)):
+
+    lambda = (a + b)/2 +- D,  D = sqrt(delta^2 + q^2),  delta = (a - b)/2,
+
+(1 +- delta/D)/2 of either uncoupled mode in each. In the basis of the modes at x0 a cord angle adds
+to q in proportion, and hardly to a and b: to first order it does nothing, near a crossing it moves
+both modes by up to q. So q = size * zeta with zeta ~ N(0, 1), one for all pairs and pressures,
+which the evidence integrates over, and (a + b)/2 rises by rise * zeta^2; all lambda in units of the
+pair's at x0.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+
+from ...simulate.modes.label import Label
+from .model import Coupling
+from .observations import Observations
+
+Array = np.ndarray
+LARGEST_ZETA = 4.0
+ZETA_POINTS, ZETA_GRID = 8, 64  # Gauss and Legendre's up to there, and a finer grid between
+NEGLIGIBLE_SHIFT = 5e-4  # shift of ln f at 3 standard deviations of q
+MISLABELLED = 0.01  # of laboratories that give a mode to the label of which it has nothing
+
+
+def partner(label: Label | None) -> Label | None:
+    """The mode of the other family that one of the same harmonic can be coupled with."""
+    if label is None or label.m > 1 or (label.c == 0) != (label.kind is not None):
+        return None
+    if label.kind:
+        return Label(0, 0, "torsional" if label.kind == "axial" else "axial")
+    return Label(label.c, 1 - label.m)
+
+
+def coupling(at_0: Array, above: Array, below: Array) -> tuple[Array, Array]:
+    """|q| and the rise of (a + b)/2 over lambda for a constant, from ln f (2, pressures) of a pair
+    at x0 and where the constant is a standard deviation more and less.
+
+    delta^2 + q^2 is (delta0 + p z)^2 + (q z)^2 there, whichever mode has which label.
+    """
+    scale = at_0.mean(0)
+    squares = [np.exp(2 * (ln_f - scale)) for ln_f in (at_0, above, below)]
+    D2, up, down = (((a - b) / 2) ** 2 for a, b in squares)
+    mean, more, less = (s.mean(0) for s in squares)
+    both = np.maximum((up + down) / 2 - D2, 0.0)
+    p2 = (up - down) ** 2 / np.maximum(16 * D2, 1e-300)
+    return np.sqrt(np.maximum(both - np.minimum(p2, both), 0.0)), (more + less) / 2 - mean
+
+
+@cache
+def rule() -> tuple[Array, Array, Array]:
+    """zeta (k,) above 0, the sign of q does not matter; what ln of an integrand there is on a finer
+    grid (m, k), by an even cubic spline; ln of weight times density (m,)."""
+    from scipy.interpolate import CubicSpline
+
+    zeta = LARGEST_ZETA * (np.polynomial.legendre.leggauss(ZETA_POINTS)[0] + 1) / 2
+    fine = LARGEST_ZETA * (np.arange(ZETA_GRID) + 0.5) / ZETA_GRID
+    even = np.vstack([np.eye(ZETA_POINTS)[::-1], np.eye(ZETA_POINTS)])
+    between = CubicSpline(np.append(-zeta[::-1], zeta), even)(fine)
+    return zeta, between, -(fine**2) / 2 - np.log(np.exp(-(fine**2) / 2).sum())
+
+
+@dataclass(frozen=True)
+class Veering:
+    """Observed rows, and what each may be coupled with."""
+
+    size: Array  # (n,) of q; 0: the row is not coupled
+    rise: Array  # (n,) of (a + b)/2
+    scale: Array  # (n,) ln f that lambda is counted from
+    partner: Array  # (n,) place of the other mode's row, -1 where it was not measured
+    other: Array  # (n,) its ln f at x0
+    side: Array  # (n,) 1: the upper of the two as measured, -1: the lower
+
+    @property
+    def active(self) -> bool:
+        """Whether any pair is near enough to matter."""
+        return bool(self.size.any())
+
+    def mixed(self, eta: Array, zeta: float) -> tuple[Array, Array, Array, Array]:
+        """ln f (q, n) of the coupled modes from those of uncoupled ones (q, n); d ln f by its own
+        ln f and by its partner's (q, n); ln probability (q,) of the labels, each the likelier the
+        more of the mode is its own."""
+        q, on = zeta * self.size, self.size > 0
+        there = np.where(self.partner >= 0, eta[:, self.partner], self.other)
+        a, b = (np.exp(2 * np.clip(ln_f - self.scale, -1, 1)) for ln_f in (eta, there))
+        delta = (a - b) / 2
+        D = np.sqrt(delta**2 + q**2)
+        side = np.where(self.partner >= 0, self.side, np.where(delta < 0, -1.0, 1.0))
+        found = (a + b) / 2 + self.rise * zeta**2 + side * D
+        share = (1 + side * delta / np.where(on, np.maximum(D, 1e-300), 1.0)) / 2  # of its own
+        told = np.log(MISLABELLED + (1 - MISLABELLED) * share[:, on]).mean(1)  # labels go together
+        ln_f = np.where(on, self.scale + np.log(np.maximum(found, 1e-6)) / 2, eta)
+        own = np.where(on, share * a / found, 1.0)
+        part = np.where(on & (self.partner >= 0), (1 - share) * b / found, 0.0)
+        return ln_f, own, part, told
+
+    def weights(self, y: Array, zeta: float) -> Array:
+        """d ln f of coupled modes by ln f of uncoupled ones (n, n), where they are as measured."""
+        own, part = np.ones(len(y)), np.zeros(len(y))
+        apart = (np.exp(2 * (y - self.scale)) - np.exp(2 * (y[self.partner] - self.scale))) / 2
+        r = np.sqrt(np.maximum(1 - (zeta * self.size / np.maximum(abs(apart), 1e-300)) ** 2, 0.0))
+        both = (self.size > 0) & (self.partner >= 0)
+        own[both], part[both] = (1 + r[both]) / 2, (1 - r[both]) / 2
+        found = np.diag(own)
+        found[np.flatnonzero(both), self.partner[both]] = part[both]
+        return found
+
+
+def veering(
+    observations: Observations, places: Array, eta: Array, coupling: Coupling | None
+) -> Veering:
+    """Of observations at ``places`` (n,) among the model's rows, whose ln f at x0 is eta (m,)."""
+    n = len(places)
+    size, rise, partner, side = np.zeros(n), np.zeros(n), np.full(n, -1), np.ones(n)
+    scale, other = eta[places], eta[places]
+    if coupling is None:
+        return Veering(size, rise, scale, partner, other, side)
+    runs = [row.run for row in observations.rows]
+    seen = {key: i for i, key in enumerate(zip(places.tolist(), runs, strict=True))}
+    for i, (place, run) in enumerate(seen):
+        mate, q = int(coupling.partner[place]), float(coupling.size[place])
+        apart = abs(np.sinh(eta[place] - eta[mate]))
+        if mate < 0 or np.hypot(apart, 3 * q) - apart < 2 * NEGLIGIBLE_SHIFT:
+            continue
+        size[i], rise[i] = q, coupling.rise[place]
+        other[i], scale[i] = eta[mate], (eta[place] + eta[mate]) / 2
+        partner[i] = j = seen.get((mate, run), -1)
+        side[i] = 1.0 if j < 0 or observations.y[i] > observations.y[j] else -1.0
+    return Veering(size, rise, scale, partner, other, side)
