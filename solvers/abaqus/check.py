@@ -50,7 +50,7 @@ class Block(Protocol):
 @dataclass(frozen=True)
 class Finding:
     """What is wrong with a keyword or one of its data lines; sure: ABAQUS refuses it by its
-    manual, else the grammar does not know it."""
+    manual, else the grammar does not know it, or the manual does not say what happens."""
 
     block: Block
     row: Row | None
@@ -208,7 +208,8 @@ def _value(
         what = "is missing" if not text.strip() else f"is no {form}"
         yield Finding(block, row, f"{of}{text} {what}")
     elif len(text.strip()) > LONGEST.get(form, 80):
-        yield Finding(block, row, f"{of}{text} has more than {LONGEST.get(form, 80)} characters")
+        words = f"{of}{text} has more than the {LONGEST.get(form, 80)} characters that are read"
+        yield Finding(block, row, words, sure=form == "name")
 
 
 def _elements(block: Block, names: _Names) -> Iterator[Finding]:

@@ -273,7 +273,8 @@ RULES: dict[str, Rule] = {
         once="job",
         variants={
             "REVOLVE": ("6*number", "3*number", "number integer? number? name?"),
-            "REFLECT": ("6*number", "3*number"),
+            "REFLECT=LINE": "6*number",
+            "REFLECT=PLANE": ("6*number", "3*number"),
         },
     ),
     "SYMMETRIC RESULTS TRANSFER": Rule(

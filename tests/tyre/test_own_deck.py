@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from tyrecal.cli.main import main
-from tyrecal.simulate.deck.own import trial
+from tyrecal.simulate.deck.own import asked_by_abaqus, trial
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.tyre.case import start_values
@@ -48,6 +48,28 @@ def frequencies(case: Path) -> np.ndarray:
 @pytest.fixture(scope="module")
 def reference(tmp_path_factory: pytest.TempPathFactory) -> np.ndarray:
     return frequencies(write(tmp_path_factory.mktemp("plain"), own_decks.plain()))
+
+
+def test_what_abaqus_would_refuse(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Nothing of the decks; what is wrong for it and for us is said of each, by file and line."""
+    path = tmp_path / "tyre.inp"
+    for style in (own_decks.plain, *own_decks.STYLES.values()):
+        path.write_text(style())
+        deck = read_own_deck(path, "m")
+        asked = asked_by_abaqus(deck.with_numbers({}))
+        assert not asked["refuses"]
+        assert all("more than the 20 characters" in doubt for doubt in asked["unknown"])
+    text = own_decks.plain().replace("*REBAR LAYER\nCAR", "*ELASTIC\n1e9, 0.3\n*REBAR LAYER\nCAR")
+    path.write_text(text.replace("*END STEP", "*CLOAD\n900001, 1\n*END STEP"))
+    with pytest.raises(SystemExit) as ended:
+        main(["deck", "--check", str(path), "--json"])
+    assert ended.value.code == 2
+    out = json.loads(capsys.readouterr().out)
+    assert re.match(r"tyre.inp, line \d+: \*ELASTIC: must follow", out["refused"])
+    assert [re.sub(r".*?: ", "", words, count=1) for words in out["abaqus"]["refuses"]] == [
+        "*ELASTIC: must stand under *MATERIAL",
+        "*CLOAD: field 3, a number, is missing",
+    ]
 
 
 @pytest.mark.parametrize("style", own_decks.STYLES)

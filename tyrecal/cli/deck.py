@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Mapping
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import click
 
 from . import arguments, options
+from .main import EXIT_INPUT
 from .terminal import Terminal
+
+MOST_SAID = 10  # doubts about a deck
 
 
 @click.command()
@@ -90,27 +95,43 @@ def command(
 
 
 def _check(path: Path, mesh: str, assignments: tuple[str, ...], terminal: Terminal) -> int:
-    """Say what a user's deck holds, and which of its numbers have paths."""
-    from ..simulate.deck.own import trial
+    """Say what a user's deck holds, which of its numbers have paths, and what is wrong with it for
+    the bundled solver and for ABAQUS."""
+    from ..simulate.deck.own import asked_by_abaqus, trial
     from ..tyre.own_deck.found import contents, words
     from ..tyre.own_deck.own_deck import read_own_deck
-    from ..tyre.resolve import resolved
+    from ..tyre.own_deck.text import OwnDeckError
 
+    numbers: Mapping[str, float] = {}
     if path.suffix in (".yaml", ".yml"):
         loaded, _ = arguments.load(path, mesh, assignments, None, terminal, True)
-        if loaded.deck is None:
+        if loaded.deck is None or loaded.case.deck is None:
             raise click.UsageError(f"'{path}' names no deck of your own: 'tyrecal validate' judges")
-        deck, flat, numbers = loaded.deck, resolved(loaded).flat, loaded.case.deck.numbers
+        deck, numbers = loaded.deck, loaded.case.deck.numbers
     else:
         if not path.is_file():
             raise click.UsageError(f"there is no file '{path}'")
         deck = read_own_deck(path)
-        flat, numbers = deck.flat({}), deck.numbers
-    mass_kg = trial(flat)
-    found = contents(deck, flat)
-    terminal.result({"mass_kg": mass_kg, **found, "numbers": dict(numbers)})
-    for sentence in words(found, mass_kg):
-        terminal.say(sentence)
-    for name, value in numbers.items():
-        terminal.say(f"  {name} = {value:g}")
-    return 0
+    asked = asked_by_abaqus(deck.with_numbers(numbers))
+    result: dict[str, Any] = {"abaqus": asked, "refused": None}
+    try:
+        flat = deck.flat(numbers)
+        mass_kg = trial(flat)
+    except OwnDeckError as error:
+        result["refused"] = str(error)
+        terminal.error(f"not honoured: {error}")
+    else:
+        found, numbers = contents(deck, flat), {**deck.numbers, **numbers}
+        result |= {"mass_kg": mass_kg, **found, "numbers": numbers}
+        for sentence in words(found, mass_kg):
+            terminal.say(sentence)
+        for name, value in numbers.items():
+            terminal.say(f"  {name} = {value:g}")
+    terminal.result(result)
+    for sentence in asked["refuses"]:
+        terminal.error(f"ABAQUS refuses by its manual: {sentence}")
+    for sentence in asked["unknown"][:MOST_SAID]:
+        terminal.warn(f"ABAQUS may not take it: {sentence}")
+    if more := len(asked["unknown"][MOST_SAID:]):
+        terminal.warn(f"... and {more} more")
+    return EXIT_INPUT if result["refused"] or asked["refuses"] else 0

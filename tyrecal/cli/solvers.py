@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+from pathlib import Path
 from typing import Any
 
 import click
@@ -12,15 +13,31 @@ from .terminal import Terminal
 
 
 @click.command()
+@click.option(
+    "--selftest",
+    type=click.Choice(["abaqus"]),
+    help="Write decks with expected frequencies, for somebody who has this program to run.",
+)
+@click.option(
+    "--output", type=click.Path(path_type=Path, file_okay=False), help="Folder of the selftest."
+)
 @options.talking
-def command(terminal: Terminal) -> int:
+def command(selftest: str | None, output: Path | None, terminal: Terminal) -> int:
     """List the installed solvers: version, what they can do, why one cannot be used, which program
     each starts, and the settings file that says so.
 
     \b
     tyrecal solvers
     tyrecal fit cases/p235_75r17.yaml --solver bundled
+    tyrecal solvers --selftest abaqus --output for_a_colleague
     """
+    if selftest:
+        from ..simulate.doctor.selftest import write_selftest
+
+        paths = write_selftest(output or Path(f"{selftest}_selftest"))
+        terminal.result([str(path) for path in paths])
+        terminal.say("\n".join(map(str, paths)) + f"\n'{paths[0]}' says what to run")
+        return 0
     from ..report.table import shown, solvers_table
     from ..simulate.evaluate.solver import installed
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from importlib import import_module
 from typing import Any
 
 from ...tyre.own_deck.flat import REFERENCE_NODE, Flat
-from ...tyre.own_deck.text import OwnDeckError, Place
+from ...tyre.own_deck.text import Block, OwnDeckError, Place
 from ...tyre.resolve import Tyre
 
 BEFORE = 3  # lines of the inflation's template before the mesh: heading, its text, *RESTART
@@ -45,6 +46,17 @@ def trial(flat: Flat) -> float:
         return found
     line, words = found
     raise OwnDeckError(_origin(flat, line - 1) or flat.origins[0], words)
+
+
+def asked_by_abaqus(blocks: Sequence[Block]) -> dict[str, list[str]]:
+    """What ABAQUS ``refuses`` of a user's deck by its manual, and what is ``unknown`` to our
+    grammar of it: sentences with file and line."""
+    check = import_module("tyrecal_solvers.abaqus.check")
+    found: dict[str, list[str]] = {"refuses": [], "unknown": []}
+    for each in check.findings(blocks):
+        sentence = str(each.block.refused(each.words, each.row))
+        found["refuses" if each.sure else "unknown"].append(sentence)
+    return found
 
 
 def _origin(flat: Flat, line: int) -> Place | None:
