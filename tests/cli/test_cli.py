@@ -43,7 +43,7 @@ def test_commands_import_what_they_use(tmp_path: Path) -> None:
     out = ["--output", str(tmp_path / "out"), "--store", str(tmp_path / "store"), "--quiet"]
     coarse = ["--mesh", "coarse"]
     never = ("scipy.stats", "scipy.interpolate", "scipy.optimize")
-    never += ("matplotlib", "meshio", "pyuff", "distributed")
+    never += ("matplotlib", "meshio", "pyuff", "distributed", "tyrecal.measured.identify")
     commands: list[tuple[list[str], tuple[str, ...]]] = [
         (["completion", "bash"], ("scipy", "numpy")),
         (["validate", CASE], ("scipy",)),

@@ -98,8 +98,6 @@ def command(
     from ..studies.fit.problem import Problem
     from ..studies.fit.targets import objective_unit, states_of
     from ..studies.fitted import NOT_CONVERGED, has_good
-    from ..studies.labelling.fit import fit_unlabelled
-    from ..studies.labelling.label import label
 
     terminal = study.terminal
     options.not_both(study.jobs, scheduler)
@@ -116,6 +114,8 @@ def command(
     if measured:
         readings = read_measurements(measured, labelled=False)
         if any(each.is_unlabelled for each in readings):
+            from ..studies.labelling.label import label
+
             run = study.run(loaded, "fit", evaluator, measured=files)
             labelled = label(loaded, evaluator, readings, fixed=fixed, jobs=study.jobs)
         told = labelled.readings if labelled else readings
@@ -147,6 +147,8 @@ def command(
             )
 
         if labelled:
+            from ..studies.labelling.fit import fit_unlabelled
+
             fit = fit_unlabelled(plain, evaluator, readings, labelled, fit_to, fixed, study.jobs)
         else:
             fit = fit_to([])
