@@ -33,6 +33,8 @@ GUIDES = [
     "cases/batch.md",
     "cases/cluster.md",
     "cases/measured_data.md",
+    "cases/paper.md",
+    "cases/real_data.md",
     "solvers/README.md",
 ]
 PACKAGED = ("ccx", "chromedriver", "fish")  # by Debian: CI installs them, tests do without

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tyrecal.simulate.modes.label import Label
 from tyrecal.studies.diagnose.gap import _as_number, _contrasts, family
 from tyrecal.studies.diagnose.observations import Observable
 
@@ -68,3 +69,9 @@ def test_a_contrast_without_modes_is_left_out() -> None:
     rows = tuple(row for row in ROWS if row.label and row.label.c == 0)
     names = list(found(rows, np.ones(len(rows))))
     assert names == ["all modes", "growth with pressure, 320 over 160 kPa"]
+
+
+def test_six_modes_at_one_pressure_have_no_growth_with_it() -> None:
+    """Nor what rounding makes of the mean of equal logarithms."""
+    rows = tuple(Observable("frequency_Hz", Label(c, 0), 160.0) for c in range(3, 9))
+    assert not [name for name in found(rows, np.ones(6)) if name.startswith("growth")]

@@ -120,4 +120,5 @@ def tell(name: str, right: Array, stated: Array) -> None:
 
 if __name__ == "__main__":
     numbers = [int(word) for word in sys.argv[1:] if word.isdecimal()]
-    main(*(numbers + [400, 1][len(numbers) :]), "--discrepancy" in sys.argv)
+    sets, first_seed = numbers + [400, 1][len(numbers) :]
+    main(sets, first_seed, "--discrepancy" in sys.argv)

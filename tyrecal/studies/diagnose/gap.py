@@ -188,9 +188,11 @@ def _mean(mask: Array) -> Array:
 
 
 def _slope(mask: Array, x: Array, span: float) -> Array:
-    """Weights of the least-squares slope over x, times ``span``."""
-    off = np.where(mask, x - x[mask].mean(), 0.0) if mask.any() else np.zeros(len(x))
-    return off / (off @ off) * span if off @ off > 0 else np.full(len(x), np.nan)
+    """Weights of the least-squares slope over x, times ``span``; NaN where x is the same in all."""
+    if not mask.any() or not np.ptp(x[mask]):
+        return np.full(len(x), np.nan)
+    off = np.where(mask, x - x[mask].mean(), 0.0)
+    return off / (off @ off) * span
 
 
 def _as_number(name: str) -> tuple[float, str]:

@@ -1,0 +1,93 @@
+"""Figures of the guides' pages on the paper and on real data are those that the tool computes."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+
+import numpy as np
+import pytest
+
+from tyrecal.measured.tables import read_measurements
+from tyrecal.simulate.deck.tyre_design import TyreDesign
+from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
+from tyrecal.simulate.modes.label import Label, paired_labels
+from tyrecal.studies.fit.calibrate import calibrate
+from tyrecal.studies.fit.problem import objective
+from tyrecal.studies.fit.targets import read_targets
+from tyrecal.studies.labelling.label import fitted_prior, label
+from tyrecal.studies.labelling.result import labels_told
+from tyrecal.tyre.case import start_values
+from tyrecal.tyre.load import load_case
+
+from .conftest import CASES
+from .studies.both_columns import COLUMNS, PAPER_HZ
+
+NUMBER = re.compile(r"[+\-]?\d+(?:\.\d+)?")
+
+
+def rows(page: str, start: str) -> list[list[str]]:
+    """Cells of the lines of a page's table that begin so, plain."""
+    text = (CASES / page).read_text(encoding="utf-8")
+    plain = text.replace("\N{MINUS SIGN}", "-").replace("*", "")
+    lines = re.findall(rf"^\| ({start}.*?) \|$", plain, re.M)
+    return [re.split(r" ?\| ", line) for line in lines]
+
+
+def figure(cell: str) -> float:
+    """The first number."""
+    found = NUMBER.search(cell)
+    assert found, cell
+    return float(found[0])
+
+
+def frequencies(values: Mapping[str, float]) -> dict[Label, float]:
+    """Of the paper's tyre."""
+    case = load_case(CASES / "p235_75r17.yaml")
+    answer = Evaluator(TyreDesign(case)).evaluate(Question(values))
+    return {mode.label: mode.frequency_Hz for mode in paired_labels(answer.modes)}
+
+
+def test_table_2_of_the_page_on_the_paper() -> None:
+    """Both columns, deviations and changes; equation (1) of both."""
+    targets = read_targets(load_case(CASES / "p235_75r17.yaml"))
+    start = start_values(load_case(CASES / "p235_75r17.yaml"))
+    hertz = [frequencies({**start, **column}) for column in COLUMNS]
+    told = rows("paper.md", r"\[\d,\d\]")
+    for target, cells, paper in zip(targets, told, np.transpose(PAPER_HZ), strict=True):
+        ours = [each[target.label] for each in hertz]
+        assert cells[0].split()[0] == f"[{target.label.c},{target.label.m}]"
+        expected = [
+            *(
+                x
+                for pair in zip(paper, ours, strict=True)
+                for x in (*pair, 100 * pair[1] / pair[0] - 100)
+            ),
+            100 * paper[1] / paper[0] - 100,
+            100 * ours[1] / ours[0] - 100,
+        ]
+        for cell, value in zip(cells[1:], expected, strict=True):
+            assert figure(cell) == pytest.approx(value, abs=0.06 if "%" in cell else 0.006), cells
+    (last,) = rows("paper.md", r"equation \(1\), Hz")
+    assert [figure(last[i]) for i in (2, 5)] == [
+        pytest.approx(objective(each, targets), abs=0.006) for each in hertz
+    ]
+
+
+@pytest.mark.slow
+@pytest.mark.numbers
+def test_labels_of_the_page_on_real_data() -> None:
+    """What the fitted 205/60R15 says of six frequencies without labels."""
+    case = load_case(CASES / "205_60r15.yaml")
+    evaluator = Evaluator(TyreDesign(case))
+    fixed = {"A_belt": case.case.variables["A_belt"].start}
+    fit = calibrate(case, evaluator, fixed=fixed).found
+    readings = read_measurements(CASES / "205_60r15_vervoort.csv", labelled=False)
+    told = label(case, evaluator, readings, fitted_prior(case, fit), fixed=fixed)
+    table = rows("real_data.md", r"\d{3}")
+    for cells, found in zip(table, labels_told(case, told).frequencies, strict=True):
+        assert figure(cells[0]) == found.frequency_Hz and cells[1] == found.said
+        assert figure(cells[2]) == pytest.approx(found.expected_Hz, abs=0.06)
+        off = 100 * (found.expected_Hz or 0.0) / found.frequency_Hz - 100
+        assert figure(cells[3]) == pytest.approx(off, abs=0.06)
+        assert figure(cells[4]) == pytest.approx(100 * found.probability, abs=1.0)
