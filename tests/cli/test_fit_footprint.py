@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from tyrecal_solvers.bundled.adapter import Bundled
 
 from tyrecal.report import pictures
 from tyrecal.report.convergence import draw_convergence
@@ -131,7 +132,8 @@ def test_too_few_targets(
 
 @pytest.mark.slow
 def test_jobs_change_no_bit(tmp_path: Path) -> None:
-    """The bundled solver; a design and its neighbours, one after the other and two at a time."""
+    """The bundled solver, one after the other and two at a time; its slopes are those of
+    neighbours."""
     path = coarse_case(tmp_path)
     text = path.read_text().replace("[6, 6, 6, 12, 30, 120]", "[10, 14, 36, 120]")
     text = text.replace("120]}", "120], loads_N: [1000]}", 1).replace("4000", "1000")
@@ -144,9 +146,17 @@ def test_jobs_change_no_bit(tmp_path: Path) -> None:
     case = load_case(path)
     held = {"A_belt": 2.118683e-7, "A_carcass": 4.208352e-7}
     points = []
-    for jobs in (1, 2):
-        problem = Problem(case, Evaluator(TyreDesign(case)), held, jobs=jobs)
+    for jobs, solver in ((1, None), (2, None), (2, Differences())):
+        problem = Problem(case, Evaluator(TyreDesign(case), _solver=solver), held, jobs=jobs)
         points.append(problem.evaluate(problem.start()))
     assert (points[0].others == points[1].others).all()
     assert (points[0].jacobian == points[1].jacobian).all()
+    assert (points[0].others == points[2].others).all()
+    assert points[0].jacobian == pytest.approx(points[2].jacobian, rel=1e-2)
     assert 0.001 < points[0].others[0] < 0.02 and points[0].jacobian[-1, 0] > 0
+
+
+class Differences(Bundled):
+    """The bundled solver, did it not tell how a footprint changes."""
+
+    capabilities = Bundled.capabilities - {"footprint_gradients"}

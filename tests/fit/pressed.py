@@ -33,17 +33,14 @@ def power(values: Mapping[str, float], powers: Mapping[str, float]) -> float:
 
 
 class Elastic(Hertz):
-    """``jump``: of the area, relative, where C10 exceeds ``jump_at``."""
-
-    jump, jump_at = 0.0, 0.0
+    """Areas and stiffnesses, as powers of the variables."""
 
     def write(self, decks: Any, folder: Path) -> list[Path]:
         """The real decks; remembers what the formulas need."""
         paths = super().write(decks, folder)
         if decks.loads_N:
-            area = power(decks.values, AREA)
-            area *= 1 + self.jump * (decks.values["C10"] > self.jump_at)
-            self.size, self.factor = area**0.5, power(decks.values, STIFFNESS)
+            self.size = power(decks.values, AREA) ** 0.5
+            self.factor = power(decks.values, STIFFNESS)
         return paths
 
     def footprint(self, load: float) -> dict[str, Any]:

@@ -14,10 +14,8 @@ from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.simulate.evaluate.failure import DeckRefused, EvaluationFailed
 from tyrecal.simulate.modes.label import Label, paired_labels
 from tyrecal.studies.fit.calibrate import calibrate
-from tyrecal.studies.fit.differences import differences
 from tyrecal.studies.fit.problem import Problem, objective
 from tyrecal.studies.fit.targets import Target, objective_unit
-from tyrecal.studies.fit.variable import DesignVariable
 from tyrecal.studies.footprint import footprint_result, press
 
 from .pressed import (
@@ -196,33 +194,6 @@ def test_numbers_are_those_of_a_footprint_at_the_cases_loads() -> None:
         rows[0]["vertical_stiffness_N_per_m"],
         rows[1]["area_m2"],
     ]
-
-
-def test_a_jump_between_neighbours_does_not_spoil_the_slope() -> None:
-    case = case_with([], FOOTPRINT)
-    plain = Problem(case, evaluator(case)).evaluate(START_X)
-    beside = evaluator(case, jump=0.002, jump_at=START["C10"] * (1 + 5e-6))
-    assert Problem(case, beside).evaluate(START_X).jacobian == pytest.approx(
-        plain.jacobian, rel=1e-4
-    )
-    both = lambda designs: [np.array([1.0 + (d["x"] != 1.0)]) for d in designs]
-    with pytest.raises(EvaluationFailed, match="jumps"):
-        differences([DesignVariable("x", 1.0, 0.5, 2.0)], {"x": 1.0}, 1e-5, both, steepest=20.0)
-
-
-@pytest.mark.parametrize("method", ["slsqp", "least-squares"])
-def test_a_minimum_at_a_jump_is_found_and_not_searched_for_ever(method: str) -> None:
-    """The area jumps just before the C10 that the targets want, by less than they can tell."""
-    targets = [area_target(1.001 * AREA_TRUE, 0.02 * AREA_TRUE), FOOTPRINT[1]]
-    case = case_with(exact_modes(0.5), targets)
-    result = calibrate(
-        case, evaluator(case, jump=0.001, jump_at=1.0002 * TRUTH["C10"]), method
-    ).result
-    assert result["converged"] and "jump" in result["message"] and result["evaluations"] <= 15
-    assert result["projected_gradient_norm"] > 1  # no minimum of a smooth function
-    for name, value in TRUTH.items():
-        found = result["variables"][name]
-        assert abs(found["value"] - value) < 0.3 * found["standard_error"]
 
 
 @pytest.mark.parametrize("method", ["slsqp", "least-squares"])

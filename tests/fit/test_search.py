@@ -36,9 +36,9 @@ def pair(difference: float, clarity: float) -> dict:
     return {AS_THE_CASE: modes}
 
 
-def point(x: Any, r: Any, J: Any, modes: dict | None = None, roughness: float = 0.0) -> Point:
+def point(x: Any, r: Any, J: Any, modes: dict | None = None) -> Point:
     x, r, J = (np.array(each, float) for each in (x, r, J))
-    return Point({}, x, r, J, modes or {}, 1.0, 1.0, np.empty(0), roughness)
+    return Point({}, x, r, J, modes or {}, 1.0, 1.0, np.empty(0))
 
 
 class Linear:
@@ -177,18 +177,6 @@ def test_a_step_that_had_to_be_shortened_is_not_whole() -> None:
     assert not whole and 0 < best.x[0] < 0.3 and best.objective < 1
 
 
-def test_where_the_objective_may_jump_few_trials_are_made_of_a_step() -> None:
-    """Three, each of which presses several tyres; elsewhere as many as the line search likes."""
-    counts = []
-    for roughness in (0.0, 1e-9):
-        problem = linear()
-        problem.added = lambda x: 1e3 * bool(x.any())
-        at = point(np.zeros(3), -problem.y, problem.J, roughness=roughness)
-        seen, _ = slsqp._restart(problem, at, 0.1, None)
-        counts.append(sum(bool(p.x.any()) for p in seen))
-    assert counts[1] == slsqp.TRIALS == 3 < counts[0]
-
-
 def test_what_pushes_against_a_bound_does_not_count() -> None:
     """At a bound, to 1e-9 of a coordinate, the gradient counts where it leads inside alone."""
     problem: Any = SimpleNamespace(lower=np.full(2, -1.0), upper=np.full(2, 1.0))
@@ -199,27 +187,6 @@ def test_what_pushes_against_a_bound_does_not_count() -> None:
         assert norm(held, [-3.0 * side, 4.0]) == pytest.approx(4.0)  # lower only outside
         assert norm(held, [3.0 * side, 4.0]) == pytest.approx(5.0)
         assert norm((side * (1 - 1.1e-8), 0.0), [-3.0 * side, 4.0]) == pytest.approx(5.0)
-
-
-def test_what_is_left_to_gain_is_compared_with_the_jumps() -> None:
-    """Residuals that J can make vanish leave half the objective to gain, F - F/2 of the quadratic
-    that touches F at the point: here 5 / 2."""
-    problem: Any = SimpleNamespace(lower=np.full(2, -1.0), upper=np.full(2, 1.0))
-    J = np.array([[2.0, 1.0], [0.0, 3.0]])
-
-    def at_jump(roughness: float, lowered: float = 0.0, x: Any = (0.0, 0.0)) -> bool:
-        return slsqp.is_at_jump(problem, point(x, [3.0, 4.0], J, roughness=roughness), lowered)
-
-    assert not at_jump(0.0) and not at_jump(2.49) and at_jump(2.51)
-    assert at_jump(2.51, 0.62) and not at_jump(2.51, 0.63)
-    # at the lower bound the gradient (6, 15) / 5 pushes outwards: the first variable is held
-    left = 0.5 * (15 / 5) * 15 / 10
-    for wanted, x in ((2.5, (1.0, 0.0)), (left, (-1.0, 0.0)), (left, (0.9e-9 - 1, 0.0))):
-        assert at_jump(1.01 * wanted, 0.0, x) and not at_jump(0.99 * wanted, 0.0, x)
-    mirrored = SimpleNamespace(lower=np.full(2, -1.0), upper=np.full(2, 1.0))
-    there = lambda q, x: slsqp.is_at_jump(mirrored, point(x, [-3.0, -4.0], J, roughness=q))  # type: ignore[arg-type]
-    assert there(1.01 * left, (1.0, 0.0)) and not there(0.99 * left, (1 - 0.9e-9, 0.0))
-    assert there(2.51, (-1.0, 0.0)) and not there(2.49, (-1.0, 0.0))
 
 
 def test_a_crossing_bounds_where_the_gradient_is_normal_to_it() -> None:
@@ -346,7 +313,7 @@ def test_uncertainty_by_its_formula() -> None:
         scale=scale, targets=targets, variables=variables, others=[SimpleNamespace(sigma=0.05)]
     )
     J, y = scale[:, None] * slopes, random.normal(size=5)
-    at = Point({"a": 3.0, "b": 0.5}, np.zeros(2), scale * y, J, {}, 1.0, 1.0, np.empty(0), 0.0)
+    at = Point({"a": 3.0, "b": 0.5}, np.zeros(2), scale * y, J, {}, 1.0, 1.0, np.empty(0))
     found = uncertainty(problem, at)
     B = np.linalg.inv(J.T @ J) @ J.T * scale
     covariance = (B * np.append(sigmas, 0.05) ** 2) @ B.T
@@ -366,7 +333,7 @@ def test_noise_is_what_is_left_over_the_freedom_that_is_left() -> None:
     J = scale[:, None] * J
     variables = [DesignVariable("a", 3.0, 1.0, 9.0), DesignVariable("b", 3.0, 1.0, 9.0)]
     point_of = lambda n: Point(
-        {"a": 3.0, "b": 3.0}, np.zeros(2), (scale * y)[:n], J[:n], {}, 1.0, 1.0, np.empty(0), 0.0
+        {"a": 3.0, "b": 3.0}, np.zeros(2), (scale * y)[:n], J[:n], {}, 1.0, 1.0, np.empty(0)
     )
     none = [SimpleNamespace(sigma_Hz=None)] * 4
     told: dict[str, Any] = {"variables": variables, "others": []}
@@ -429,14 +396,8 @@ def test_a_step_is_a_third_of_the_room_at_most() -> None:
     assert steps == [{}, {"a": round(2 / 3, 9)}] and slopes == pytest.approx(np.array([[2.0]]))
 
 
-def test_a_neighbour_beyond_a_jump_or_without_a_solution_gives_way_to_the_other() -> None:
-    """A jump is a slope of 20 times the quantity and more; without either neighbour there is no
-    slope, and without a licence no question."""
-    jump = lambda v: np.array([1.0 + (2.2 if v["a"] > 0 else 0.0) - 0.5 * v["a"]])
-    (_, slopes), steps = asked_slopes(jump, {"a": 0.0}, steepest=20.0)
-    assert steps == [{}, {"a": 0.2}, {"a": -0.2}] and slopes == pytest.approx(np.array([[-1.0]]))
-    (_, slopes), steps = asked_slopes(jump, {"a": 0.0}, steepest=21.5)
-    assert steps == [{}, {"a": 0.2}] and slopes == pytest.approx(np.array([[21.0]]))
+def test_a_neighbour_without_a_solution_gives_way_to_the_other() -> None:
+    """Without either neighbour there is no slope, and without a licence no question."""
 
     def failing(cause: str, both: bool) -> Any:
         failure = EvaluationFailed(cause, "not there")

@@ -417,9 +417,9 @@ def test_areas_at_two_pressures_are_pressed_in_their_states() -> None:
 
     tyre.press_all = asking  # type: ignore[assignment, method-assign]
     point = Problem(case, tyre).evaluate(np.log(list(pressed.START.values())))
-    assert dict(asked) == {None: [4000.0], 160.0: [4000.0, 6000.0]}
+    assert dict(asked) == {None: [4000.0], 160.0: [6000.0]}
     assert point.others[1] / point.others[0] == pytest.approx(1.5 ** (2 / 3), rel=0.1)
-    assert (point.jacobian[:, 0] != 0).all() and point.roughness > 0
+    assert (point.jacobian[:, 0] != 0).all()
 
 
 def test_the_bundled_solver_tells_the_mass_and_its_slopes() -> None:

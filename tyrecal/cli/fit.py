@@ -123,7 +123,7 @@ def command(
         evaluator = evaluator.of(TyreDesign(loaded))
     problem = Problem(loaded, evaluator, fixed)
     check(problem)
-    alone = len(problem.labels) == starts == 1 and not problem.road
+    alone = len(problem.labels) == starts == 1 and problem.exact_on_road == len(problem.road)
     if alone and evaluator.has_gradients:
         why = f"a fit from one start asks solver '{evaluator.solver.name}' for one design at a time"
         if scheduler:

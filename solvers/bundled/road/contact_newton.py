@@ -205,6 +205,7 @@ class ContactNewton:
             if size <= tolerance * load:
                 return parts, height, contact
             self.iterations += 1
+            log.info("%g N: out of balance by %.0e of it", load, size / load)
             energy = self._energy(contact, load, height) if bound else 0.0
             rough = size > COULOMB_RTOL * load
             step, rise = self._step(

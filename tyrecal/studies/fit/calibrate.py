@@ -63,9 +63,9 @@ def calibrate(
 
     starts: the case's own start and ``starts - 1`` drawn uniformly in the scaled box; drawn
     starts that cannot be evaluated are counted and replaced. jobs: processes for the drawn starts,
-    and for the neighbours of a point of the first one, where the solver gives no slopes or the
-    tyre is pressed. notify is told of every design here, finished of every start. Raises
-    what `check` does; EvaluationFailed when the case's own start cannot be evaluated.
+    and for the neighbours of a point of the first one, where the solver gives no slopes. notify is
+    told of every design here, finished of every start. Raises what `check` does; EvaluationFailed
+    when the case's own start cannot be evaluated.
     """
     problem = Problem(case, evaluator, fixed, notify, jobs)
     check(problem)
@@ -118,7 +118,6 @@ def _run(problem: Problem, start: Array, method: str) -> StartReport:
     tolerance = _tolerance(problem)
     outcome = METHODS[method](problem, start, tolerance)
     converged = slsqp.is_converged(problem, outcome.point, max(10 * TOLERANCE, tolerance))
-    converged = converged or slsqp.is_at_jump(problem, outcome.point)
     converged = converged or outcome.message == slsqp.AT_CROSSING
     values, history = dict(first.values), _history(problem)
     return StartReport(values, outcome.point, outcome.message, converged, history)

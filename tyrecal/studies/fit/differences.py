@@ -21,15 +21,13 @@ def differences(
     step: float,
     ask: Ask,
     centre: Array | None = None,
-    steepest: float = np.inf,
 ) -> tuple[Array, Array]:
     """Quantities q (q,) of a design and their slopes d q / d x (q, variables).
 
     ask: the quantities of designs, in their order, or why there are none; centre: those of the
-    design itself, which is asked for together with its neighbours where they are not known;
-    steepest: d ln q / d x beyond which a quantity jumps between the two.
-    One neighbour a variable: above, or below where that lies beyond the bound, has no solution or
-    is beyond a jump. Raises EvaluationFailed where neither has one, or the design itself has none.
+    design itself, which is asked for together with its neighbours where they are not known.
+    One neighbour a variable: above, or below where that lies beyond the bound or has no solution.
+    Raises EvaluationFailed where neither has one, or the design itself has none.
     """
     columns: dict[int, Array] = {}
     failures: dict[int, EvaluationFailed] = {}
@@ -55,11 +53,7 @@ def differences(
                     raise answer
                 failures[i] = answer
                 continue
-            slope = (answer - centre) / sides[i][side]
-            if (abs(slope) > steepest * abs(centre)).any():
-                failures[i] = EvaluationFailed("no_results", f"jumps on both sides: {slope}")
-                continue
-            columns[i] = slope
+            columns[i] = (answer - centre) / sides[i][side]
     for i in range(len(variables)):
         if i not in columns:
             raise failures[i]

@@ -11,7 +11,7 @@ import numpy as np
 from ...simulate.evaluate.failure import EvaluationFailed
 from .damped_step import damped_step
 from .problem import Point, Problem
-from .slsqp import AT_JUMP, Descent, is_at_jump, is_converged
+from .slsqp import Descent, is_converged
 
 Array = np.ndarray
 MAX_ITERATIONS_LM = 100
@@ -31,8 +31,6 @@ def minimise(problem: Problem, start: Array, tolerance: float) -> Descent:
         if damping > MAX_DAMPING:
             return Descent(point, "no lower objective along any damped step")
         trial = _first_solvable(problem, point, _step(problem, point, damping))
-        if trial and is_at_jump(problem, point, point.objective - trial.objective):
-            return Descent(min(point, trial, key=lambda p: p.objective), AT_JUMP)
         if trial is not None and trial.objective < point.objective:
             point, damping = trial, damping / 5
         else:

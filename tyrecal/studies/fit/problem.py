@@ -28,7 +28,7 @@ from ...simulate.modes.label import Label, Mode
 from ...tyre.case import LoadedCase
 from ...tyre.state import AS_THE_CASE, TyreState, without
 from .differences import STEP, differences
-from .road import MAX_SLOPE, PRESS_STEP, press
+from .road import PRESS_STEP, press, press_with_slopes
 from .targets import Target, ValueTarget, read_mass_targets, read_road_targets, read_targets
 from .variable import read_variable
 
@@ -39,8 +39,7 @@ Array = np.ndarray
 class Point:
     """One evaluated design: coordinates x, residuals sqrt(w) (q - q_ref) / sigma (a doublet's by
     sqrt 2), their Jacobian by x, the modes that were matched in each state, and the labels' margin;
-    of each other target its quantity, in its own unit; by how much the objective may jump nearby,
-    as patches do whose edge passes from one element of the tread to the next."""
+    of each other target its quantity, in its own unit."""
 
     values: Mapping[str, float]
     x: Array
@@ -50,7 +49,6 @@ class Point:
     clarity: float
     mass_kg: float
     others: Array
-    roughness: float
 
     @property
     def modes(self) -> dict[Label, Mode]:
@@ -85,7 +83,7 @@ class Problem:
 
     notify: called with (number of the point, its values, Point or failure) as they come; jobs: how
     many states of a point are evaluated at a time, and how many neighbours, where the solver gives
-    no slopes or presses. measured: all targets, as their residuals stand: ``targets``, the unloaded
+    no slopes. measured: all targets, as their residuals stand: ``targets``, the unloaded
     tyre's modes, then ``others``, on the ``road`` and the ``mass``; labels: of modes by state.
     """
 
@@ -119,6 +117,10 @@ class Problem:
         self.difference_step = (
             None if evaluator.has_gradients else getattr(evaluator.solver, "difference_step", STEP)
         )
+        # how many of the road's targets, the first, have exact slopes: areas and stiffnesses
+        exact = self.road and self.difference_step is None
+        exact = exact and "footprint_gradients" in evaluator.solver.capabilities
+        self.exact_on_road = sum(not t.member for t in self.road) if exact else 0
         self.points: dict[tuple[float, ...], Point | EvaluationFailed] = {}
 
     def start(self) -> Array:
@@ -165,15 +167,9 @@ class Problem:
         else:
             step, ask = self.difference_step or STEP, self._neighbours
             slopes = differences(self.variables, values, step, ask, measured)[1]
-        modal, count = len(self.targets), len(self.road)
-        pressed = shares = np.empty(0)
-        if self.road:
-            ask = lambda designs: press(self.case, self.evaluator, self.road, designs, self.jobs)
-            quantities, rises = differences(
-                self.variables, values, PRESS_STEP, ask, steepest=MAX_SLOPE
-            )
-            pressed, shares = np.split(quantities, 2)
-            slopes = np.vstack([slopes[:modal], rises[:count], slopes[modal:]])
+        modal = len(self.targets)
+        pressed, rises = self._pressed(values)
+        slopes = np.vstack([slopes[:modal], rises, slopes[modal:]])
         others = np.concatenate([pressed, measured[modal:]])
         wanted = [t.frequency_Hz for t in self.targets] + [t.value for t in self.others]
         x = np.array([v.scaled(values[v.name]) for v in self.variables])
@@ -186,8 +182,20 @@ class Problem:
             min(answer.clarity for answer in found.values()),
             _mass_kg(found),
             others,
-            float(np.linalg.norm(self.scale[modal : modal + count] * pressed * shares)),
         )
+
+    def _pressed(self, values: Mapping[str, float]) -> tuple[Array, Array]:
+        """Quantities of the road's targets, and their slopes d q / d x (targets, variables)."""
+        quantities, slopes = np.empty(0), np.empty((0, len(self.variables)))
+        if patches := self.road[: self.exact_on_road]:
+            names = [v.name for v in self.variables]
+            quantities, rates = press_with_slopes(self.case, self.evaluator, patches, values, names)
+            slopes = rates * [v.slope(values[v.name]) for v in self.variables]
+        if others := self.road[self.exact_on_road :]:
+            ask = lambda designs: press(self.case, self.evaluator, others, designs, self.jobs)
+            more = differences(self.variables, values, PRESS_STEP, ask)
+            quantities, slopes = np.append(quantities, more[0]), np.vstack([slopes, more[1]])
+        return quantities, slopes
 
     def _measured(self, found: Mapping[TyreState, Found]) -> Array:
         """Frequencies (targets,) of a design, Hz, and behind them its mass where it is a target."""

@@ -1,12 +1,11 @@
 """Targets on the road: contact areas, vertical stiffnesses and modes at a load.
 
-Every design is pressed, in each state, at all loads of the case's road up to the last one with a
-target, in one run, for friction remembers the loads on the way; for modes at their loads alone.
+Every design is pressed, in each state, at the loads with a target alone, in one run; friction
+remembers the loads on the way, which changes a stiffness by 0.2 % at most.
 
-Areas are reproducible to 1e-12 of themselves, stiffnesses to 1e-10, so slopes over 1e-5 have five
-digits. The bundled solver's are smooth; another's may jump as nodes come to touch or to slide, by a
-node's share of the patch at most. The small step sees the slope of a piece; a jump between two
-neighbours is rare, and known by its steepness.
+Slopes of areas and stiffnesses are the solver's own where it has them. Else, and of modes at a
+load, they are differences: areas are reproducible to 1e-12 of themselves, stiffnesses to 1e-10, so
+that over 1e-5 they have five digits.
 """
 
 from __future__ import annotations
@@ -20,6 +19,7 @@ from ...simulate.evaluate.evaluator import Evaluator
 from ...simulate.evaluate.failure import EvaluationFailed
 from ...simulate.evaluate.pressed import Pressed
 from ...tyre.case import LoadedCase
+from ...tyre.state import without
 from ..footprint import footprint_row
 from ..loaded import LoadedTyre, load_tyres
 from .targets import ValueTarget
@@ -27,10 +27,11 @@ from .targets import ValueTarget
 Array = np.ndarray
 Designs = Sequence[Mapping[str, float]]
 Placed = Mapping[int, ValueTarget]  # targets by their places among all
-Quantities = dict[int, tuple[float, float]]  # by place, and by which share of itself it may jump
+Quantities = dict[int, float]  # by place
 PRESS_STEP = 1e-5  # of a scaled variable: the root of the precision of a stiffness
-MAX_SLOPE = 20.0  # d ln q / d x; a jump of 0.1 % within a step is 100
 ROW = {"contact_area_m2": "area_m2"}  # quantities with another name in a row of a footprint
+# and in a footprint's slopes
+SLOPE = {"vertical_stiffness_N_per_m": "stiffness_N_per_m"}
 
 
 def press(
@@ -40,8 +41,7 @@ def press(
     designs: Designs,
     jobs: int,
 ) -> Iterator[Array | EvaluationFailed]:
-    """Of each design the targets' quantities and, behind them, by which share of itself each may
-    jump (2 targets,): a touching node's share of the patch; or why a load was not reached."""
+    """Of each design the targets' quantities (targets,), or why a load was not reached."""
     answers: list[list[Quantities | EvaluationFailed]] = [[] for _ in designs]
     for state, modal in dict.fromkeys((t.state.unloaded, bool(t.member)) for t in targets):
         here = {
@@ -61,15 +61,45 @@ def press(
                 break
             found |= outcome
         else:
-            yield np.array([found[place] for place in range(len(targets))]).T.ravel()
+            yield np.array([found[place] for place in range(len(targets))])
+
+
+def press_with_slopes(
+    case: LoadedCase,
+    evaluator: Evaluator,
+    targets: Sequence[ValueTarget],
+    values: Mapping[str, float],
+    names: Sequence[str],
+) -> tuple[Array, Array]:
+    """Quantities (targets,) of a design, areas and stiffnesses, and their exact slopes (targets,
+    variables) by the variables ``names``. Raises EvaluationFailed, DeckRefused."""
+    quantities, slopes = np.empty(len(targets)), np.zeros((len(targets), len(names)))
+    for state in dict.fromkeys(t.state.unloaded for t in targets):
+        here = {i: t for i, t in enumerate(targets) if t.state.unloaded == state}
+        design = state.design(case, values)
+        # a state's own numbers hang on no variable
+        left = tuple(without(case, dict.fromkeys(names, 0.0), state.numbers(case)))
+        pressed = evaluator.press(design, _loads(here), gradients=left)
+        if pressed.failed:
+            raise pressed.failed
+        at = {each.load_N: each.slopes for each in pressed.footprints}
+        for place, quantity in _of_patches(case, design, pressed, here).items():
+            own = here[place]
+            rates, name = at[own.state.load_N], SLOPE.get(own.quantity, own.quantity)
+            quantities[place] = quantity
+            slopes[place] = [rates[v][name] if v in rates else 0.0 for v in names]
+    return quantities, slopes
+
+
+def _loads(targets: Placed) -> list[float]:
+    return sorted({t.state.load_N for t in targets.values()})
 
 
 def _footprints(
     case: LoadedCase, evaluator: Evaluator, targets: Placed, designs: Designs, jobs: int
 ) -> Iterator[Quantities | EvaluationFailed]:
-    measured = {t.state.load_N for t in targets.values()}
-    loads = sorted({*measured, *(x for x in case.case.road.loads_N if x <= max(measured))})
-    for values, outcome in zip(designs, evaluator.press_all(designs, loads, jobs), strict=True):
+    outcomes = evaluator.press_all(designs, _loads(targets), jobs)
+    for values, outcome in zip(designs, outcomes, strict=True):
         if isinstance(outcome, EvaluationFailed):
             yield outcome
         elif outcome.failed:
@@ -83,17 +113,15 @@ def _of_patches(
 ) -> Quantities:
     mesh = TyreDesign(case, values).tyre.mesh
     rows = {each.load_N: footprint_row(pressed, each, mesh) for each in pressed.footprints}
-    share = {each.load_N: 1 / len(each.node) for each in pressed.footprints}
     return {
-        place: (rows[t.state.load_N][ROW.get(t.quantity, t.quantity)], share[t.state.load_N])
-        for place, t in targets.items()
+        place: rows[t.state.load_N][ROW.get(t.quantity, t.quantity)] for place, t in targets.items()
     }
 
 
 def _modes(
     case: LoadedCase, evaluator: Evaluator, targets: Placed, designs: Designs, jobs: int
 ) -> Iterator[Quantities | EvaluationFailed]:
-    loads = sorted({t.state.load_N for t in targets.values()})
+    loads = _loads(targets)
     labels = list(dict.fromkeys(t.member.label for t in targets.values() if t.member))
     named = {str(place): values for place, values in enumerate(designs)}
     for outcome in load_tyres(case, evaluator, named, loads, jobs, labels=labels).values():
@@ -110,6 +138,4 @@ def _at_loads(tyre: LoadedTyre, targets: Placed) -> Quantities | EvaluationFaile
     for t in targets.values():
         if t.member and (t.state.load_N, t.member) not in hertz:
             return EvaluationFailed("lost_label", f"no {t.member} at {t.state.load_N:g} N")
-    return {
-        place: (hertz[t.state.load_N, t.member], 0.0) for place, t in targets.items() if t.member
-    }
+    return {place: hertz[t.state.load_N, t.member] for place, t in targets.items() if t.member}

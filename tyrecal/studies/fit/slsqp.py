@@ -24,8 +24,6 @@ EXACT = 1e-3  # Hz, an objective below every measurement's resolution
 DAMPING = 0.1  # mu over the mean diagonal of J^T J, at first
 MOST_TRIALS = 11  # of a step, each shortened to the vertex of a parabola, as Kraft's search does
 SMALLEST_PART = 0.1  # in one shortening
-TRIALS = 3  # of a step, where the objective may jump: each trial presses several tyres
-AT_JUMP = "less is left to gain than areas and stiffnesses jump by"
 ROOM = 0.1  # of the gap of the [0, 0] modes, between a bounded step and where labels change places
 CREEPING = 3e-4  # of the objective, less than ROOM costs: a gain that is not worth another step
 ALONG = 0.1  # of the gradient: as much along the crossing counts as none
@@ -78,21 +76,6 @@ def is_converged(problem: Problem, point: Point, tolerance: float) -> bool:
     return point.objective <= EXACT or projected_gradient(problem, point) <= tolerance
 
 
-def is_at_jump(problem: Problem, point: Point, lowered: float = 0.0) -> bool:
-    """Whether areas and stiffnesses jump by more than is left to gain, and a step from the point
-    ``lowered`` the objective by less than a quarter of that: were it quadratic, a Gauss-Newton
-    step would lower it by (J^T r) . (J^T J)^-1 (J^T r) / 2F, of the variables that no bound holds.
-    """
-    if not point.roughness:
-        return False
-    free = ((point.x > problem.lower + 1e-9) | (point.gradient < 0)) & (
-        (point.x < problem.upper - 1e-9) | (point.gradient > 0)
-    )
-    step = np.linalg.lstsq(point.jacobian[:, free], -point.residuals, rcond=None)[0]
-    gain = -0.5 * float(point.gradient[free] @ step)
-    return gain <= point.roughness and lowered < gain / 4
-
-
 def _descend(
     problem: Problem, point: Point, tolerance: float, known: Point | None = None
 ) -> Descent:
@@ -117,8 +100,6 @@ def _descend(
         creeping = point.objective - reached.objective <= CREEPING * point.objective
         if edge and creeping and _is_bounded(reached, edge):
             return Descent(reached, AT_CROSSING, edge)
-        if is_at_jump(problem, point, point.objective - reached.objective):
-            return Descent(reached, AT_JUMP)
         if reached.objective >= point.objective - 1e-9 * max(point.objective, 1e-3):
             if damping > 1e3 * DAMPING:
                 return Descent(point, "no lower objective along the search direction", edge)
@@ -153,7 +134,7 @@ def _restart(
     step = damped_step(point.jacobian, point.residuals, damping, G, np.concatenate(h))
     slope = float((point.jacobian.T @ point.residuals) @ step)  # of F^2/2 along it
     seen, share, before = [point], 1.0, 0.5 * point.objective**2
-    for _ in range(TRIALS if point.roughness else MOST_TRIALS):
+    for _ in range(MOST_TRIALS):
         try:
             there = problem.evaluate(np.clip(point.x + share * step, problem.lower, problem.upper))
         except EvaluationFailed:  # worse than anything
