@@ -151,7 +151,9 @@ def command(
             considered,
             stage=bar.begin,
         )
-    told = run.write(diagnosis_result(found.diagnosis, found.under_load, found.variables))
+    told = run.write(
+        diagnosis_result(found.diagnosis, found.under_load, found.variables, found.section)
+    )
     parts = parts_data(loaded, [part.region for part in told.section_map])
     run.write_json("diagnosis_section.json", parts)
     words = page(found, loaded.case.name, measured.name)

@@ -37,6 +37,7 @@ def page(study: DiagnosedCase, case: str, measured: str) -> str:
         *_gap(d),
         "## Where does it lie?",
         *_where(d),
+        *_fields(study),
         *_under_load(study),
         "## Which effect?",
         *_which(study),
@@ -183,6 +184,18 @@ def _where(d: Diagnosis) -> Iterator[str]:
             yield "No single part of the section, softer, stiffer, heavier or lighter, explains it."
         finer = " A finer map would be invented." if d.effective_rank else ""
         yield map_resolution(d.effective_rank) + finer
+
+
+def _fields(study: DiagnosedCase) -> Iterator[str]:
+    """What the data say of the section."""
+    rows = [
+        f"| {v.field} | {v.place} | {v.value:+.2g} {v.unit} | {v.sigma:.2g} | {v.before:.2g} |"
+        for v in study.section
+    ]
+    if rows:
+        yield "The section as these data have it, where nothing else is wrong:"
+        head = "| | where | likeliest | standard deviation | before the data |"
+        yield "\n".join([head, "|---|---|---|---|---|", *rows])
 
 
 def _under_load(study: DiagnosedCase) -> Iterator[str]:
@@ -336,7 +349,7 @@ def _next(d: Diagnosis) -> Iterator[str]:
 def _assumptions(study: DiagnosedCase) -> Iterator[str]:
     d = study.diagnosis
     kind = "assumed, as the case states none" if study.assumed_sources else "stated by the case"
-    words = ", ".join(source.words for source in study.sources) or "none"
+    words = ", ".join(source.words for source in study.sources if source.words) or "none"
     yield f"Constants that nobody calibrates, one standard deviation each ({kind}): {words}."
     a = d.problem.assumed
     form = "as recorded for every mode" if a.form is None else f"{100 * a.form:g} % in every mode"

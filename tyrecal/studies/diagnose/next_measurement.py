@@ -19,11 +19,12 @@ from .expansion import Nodes
 from .inverse_problem import InverseProblem, Toggle
 from .model import Answer, ModelRow, Query, ResponseModel
 from .observations import Observable, Observations
+from .section_fields import SECTION
 
 Array = np.ndarray
 MAX_DISTANCE = 40.0
 MIN_PROBABILITY, MAX_EXPLANATIONS = 0.02, 6  # others do not count
-HOURS = dict(toggle=4.0, check=1.0, repeat=2.0, pressure=1.0, harmonics=1.0, weigh=0.25)
+HOURS = dict(cut=8.0, toggle=4.0, check=1.0, repeat=2.0, pressure=1.0, harmonics=1.0, weigh=0.25)
 """Of a laboratory, as an orientation."""
 CHECKED = 0.25  # what is left of a constant's standard deviation when it is measured by itself
 REPEATED = 4  # times, each after dismounting
@@ -87,7 +88,13 @@ def rank(
     now = _look(problem, d, likely, sizes)
     before = now.apart(likely, problem.spread)
     menu: list[tuple[str, float, InverseProblem]] = []
+    of_section = {k: CHECKED for k, name in enumerate(sources) if name.startswith(SECTION)}
+    if of_section:
+        known = replace(problem, reduced={**problem.reduced, **of_section})
+        menu.append(("cut the tyre and measure its section", HOURS["cut"], known))
     for k, source in enumerate(sources):
+        if k in of_section:
+            continue
         known = replace(problem, reduced={**problem.reduced, k: CHECKED})
         menu.append((f"measure by itself: {source.replace('_', ' ')}", HOURS["check"], known))
     o, factor = problem.observations, 1 / np.sqrt(REPEATED)

@@ -4,18 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 
 from ...simulate.deck.tyre_design import TyreDesign
+from ...simulate.evaluate.evaluator import Evaluator
 from ...simulate.modes.find import Found
 from ...tyre.case import LoadedCase
 from ...tyre.case.schema import Rubber, Solid
 from ..fit import problem as fit
-from .tyre_model import TyreModel
+from .model import ModelRow
 
 Array = np.ndarray
 TREAD = "tread"
+MASS_STEP = 0.02  # of a logarithm: the mass is linear in areas and densities
 
 
 @dataclass(frozen=True)
@@ -26,9 +29,23 @@ class SectionPart:
     stiffness: Array  # (n,) d ln f by its logarithm
     mass: Array  # likewise
     material: str  # what the split case calls it
+    rubber: bool = True  # or cords
 
 
-def regions(model: TyreModel, x: Array) -> list[SectionPart]:
+class Parted(Protocol):
+    """A tyre whose parts may be asked for."""
+
+    case: LoadedCase
+    evaluator: Evaluator
+    rows: list[ModelRow]
+    pressures: list[float]
+    jobs: int
+
+    def values(self, x: Array) -> dict[str, float]:
+        """Design variables at x, in their own units."""
+
+
+def regions(model: Parted, x: Array) -> list[SectionPart]:
     """Every region's rubber (the crown's in two: tread and what lies under it), every cord.
 
     One evaluation a pressure, with exact slopes by the constants of each part. Raises
@@ -54,11 +71,21 @@ def regions(model: TyreModel, x: Array) -> list[SectionPart]:
         if not isinstance(each, Found):
             raise each
         at[pressure] = each
+    shares = dict.fromkeys(parts, 0.0)
+    if any(label is None for label, _ in model.rows):
+        paths = [f"materials.{material}.density_kg_per_m3" for material in parts]
+        heavier = [{**states[0], path: (1 + MASS_STEP) * design[path]} for path in paths]
+        plain = at[model.pressures[0]].evaluation.mass_kg
+        for material, each in zip(parts, problem.modes_of([(d, ()) for d in heavier]), strict=True):
+            if not isinstance(each, Found):
+                raise each
+            shares[material] = (each.evaluation.mass_kg / plain - 1) / MASS_STEP
     result = []
     for material, name in parts.items():
         columns = np.zeros((2, len(model.rows)))
         for i, (label, pressure) in enumerate(model.rows):
             if label is None:
+                columns[1, i] = shares[material]
                 continue
             mode, gradients = at[pressure].wanted[label], at[pressure].evaluation.gradients
             f, place = mode.frequency_Hz, mode.position
@@ -67,7 +94,8 @@ def regions(model: TyreModel, x: Array) -> list[SectionPart]:
                 key = path.rpartition(".")[2]
                 sign = -1.0 if key == "D1_per_Pa" else 1.0
                 columns[int(key.startswith("density")), i] += sign * slope
-        result.append(SectionPart(name, columns[0], columns[1], material))
+        rubber = isinstance(materials[material], Rubber)
+        result.append(SectionPart(name, columns[0], columns[1], material, rubber))
     return result
 
 

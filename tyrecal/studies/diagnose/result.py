@@ -6,7 +6,7 @@ What a page does not ask for may be missing from a file that an earlier version 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,7 +19,7 @@ from .gap import projection
 from .observations import Observable
 from .shrinkage import Shrinkage
 from .verdict import VerdictKind
-from .where import PartChange
+from .where import FieldValue, PartChange
 
 if TYPE_CHECKING:
     from .diagnosis import Diagnosis
@@ -155,6 +155,7 @@ class DiagnosisResult(Result):
     gap: GapPart
     under_load: UnderLoadPart | None = None
     section_map: list[PartChange]
+    section_fields: list[FieldValue] = Field(default=[])
     effective_rank: int
     shrinkage: Shrinkage | None
     rung: int
@@ -171,6 +172,7 @@ def diagnosis_result(
     diagnosis: Diagnosis,
     under_load: UnderLoad | None = None,
     calibrated: dict[str, Any] | None = None,
+    section: Sequence[FieldValue] = (),
 ) -> DiagnosisResult:
     """What was found. ``calibrated``: see `calibrated_variables`."""
     d, shown = diagnosis, diagnosis.verdict.key or diagnosis.best
@@ -198,6 +200,7 @@ def diagnosis_result(
         gap=_gap(d, under_load),
         under_load=_under_load(under_load),
         section_map=list(d.parts),
+        section_fields=list(section),
         effective_rank=d.effective_rank,
         shrinkage=d.shrinkage,
         rung=d.rung,

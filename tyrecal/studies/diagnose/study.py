@@ -24,9 +24,11 @@ from .inverse_problem import Assumed, Toggle
 from .model import Answer, Query, Span
 from .observations import Observations, observe
 from .regions import regions
+from .section_told import section_told
 from .tyre_model import TyreModel
 from .uncertainties import EFFECT_PATH, Source, calibrated, sources
 from .under_load import UnderLoad, Values, compare
+from .where import FieldValue
 
 MAX_FREQUENCY_RATIO = 2.0  # between measured and computed; beyond, the unit is wrong
 MAX_MASS_RATIO = 1.5  # as the mass: a rim weighs as much as its tyre
@@ -48,6 +50,11 @@ class DiagnosedCase:
     def variables(self) -> dict[str, Any]:
         """See `calibrated_variables`."""
         return calibrated_variables(self.diagnosis, self.model)
+
+    @property
+    def section(self) -> list[FieldValue]:
+        """See `section_told`."""
+        return section_told(self.model.case, self.sources, self.diagnosis)
 
     @property
     def asked_for(self) -> tuple[str, ...] | None:

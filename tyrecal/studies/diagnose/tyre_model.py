@@ -23,11 +23,13 @@ from ...tyre.templates import TemplateFailed
 from ..fit import problem as fit
 from .expansion import ONE_SIDED_SLOPED, node_values
 from .model import Answer, Coupling, ModelRow, Query, Span
+from .regions import MASS_STEP, regions
+from .section_fields import moved
 from .uncertainties import EFFECT_PATH, Source, unit_of, values_of
 from .veering import coupling, partner
 
 Array = np.ndarray
-MASS_STEP = 0.02  # of a logarithm: the mass is linear in areas and densities
+FIELD_STEP = 0.05  # standard deviations, for the slope
 
 MANY_NUMBERS = 100  # of a deck: nodes are among them
 WORTH_A_POOL = 10  # evaluations, for processes to be started
@@ -161,7 +163,25 @@ class TyreModel:
             if not isinstance(other, Answer):
                 return other
             constants[:, k] += other.eta - answer.eta
+        self._add_fields(point.x, answer.eta, constants)
         return replace(answer, constants=constants)
+
+    def _add_fields(self, x: Array, eta: Array, constants: Array) -> None:
+        """Fill in the columns of the section's fields: of meridian and gauges by a small step, of
+        compounds by the exact slopes of its parts."""
+        known = [(k, each.field) for k, each in enumerate(self.found) if each.field]
+        parts = [p for p in regions(self, x) if p.rubber] if known else []
+        for k, field in known:
+            if field.kind in ("stiffness", "density"):
+                slopes = [p.stiffness if field.kind == "stiffness" else p.mass for p in parts]
+                constants[:, k] = np.array(slopes).T @ field.values
+            else:
+                case = moved(self.case, field, FIELD_STEP)
+                beside = TyreModel(case, self.evaluator, self.rows, [], {}, self.jobs)
+                (answer,) = beside.answers([Query(x)])
+                if isinstance(answer, Exception):
+                    raise answer
+                constants[:, k] = (answer.eta - eta) / FIELD_STEP
 
     def _has_slopes(self, id: str, span: Span) -> bool:
         """Whether the solver gives slopes with an effect."""

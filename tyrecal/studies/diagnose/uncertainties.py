@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from ...tyre.case import LoadedCase, number_at
 from ...tyre.case.schema import Cord, Rubber
 from ...tyre.effects import catalogue
 from ...units import in_engineers_units
+from .section_fields import SectionField, fields, words
 
 DENSITY_PERCENT, MODULUS_PERCENT, SPACING_PERCENT, GAUGE_PERCENT = 1.5, 3.0, 1.0, 3.0
 ANGLE_deg, PRESSURE_kPa = 1.0, 1.0
@@ -39,6 +40,7 @@ class Source:
     name: str
     steps: dict[str, float]  # of a number by its path, in its unit, at one standard deviation
     words: str  # the same for people
+    field: SectionField | None = None  # of the section, which has no steps
 
 
 def sources(case: LoadedCase) -> tuple[list[Source], bool]:
@@ -46,8 +48,17 @@ def sources(case: LoadedCase) -> tuple[list[Source], bool]:
     design variable sets is none: the fit finds it.
 
     Assumed, a standard deviation each: rubber densities 1.5 %, moduli of cords 3 %, spacings 1 %,
-    gauges that the case has 3 %, cord angles 1 degree, pressure 1 kPa.
+    gauges that the case has 3 %, cord angles 1 degree, pressure 1 kPa. Then the section's fields,
+    where the case says what that is known from.
     """
+    found, assumed = _constants(case)
+    of_section = [Source(name, {}, "", field) for name, field in fields(case).items()]
+    if of_section:
+        of_section[0] = replace(of_section[0], words=words(case))
+    return [*found, *of_section], assumed
+
+
+def _constants(case: LoadedCase) -> tuple[list[Source], bool]:
     stated, taken = case.case.uncertainties, calibrated(case)
     if not stated:
         return list(_assumed(case, taken)), True

@@ -29,6 +29,18 @@ class PartChange:
     same_as: tuple[str, ...]  # parts whose effect looks alike
 
 
+@dataclass(frozen=True)
+class FieldValue:
+    """A field at a place of the section, with its standard deviation before and after the data."""
+
+    field: str
+    place: str
+    value: float
+    sigma: float
+    before: float
+    unit: str
+
+
 def section_map(
     problem: InverseProblem, P: Array, residuals: Array, parts: Sequence[SectionPart]
 ) -> tuple[list[PartChange], int]:

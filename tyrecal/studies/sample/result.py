@@ -281,7 +281,7 @@ def result(sample: Sample, seed: int) -> SampleResult:
             )
             for x, height in zip(drawn.optima, drawn.height, strict=True)
         ],
-        uncertain=[source.words for source in sample.sources],
+        uncertain=[source.words for source in sample.sources if source.words],
         noise_Hz=sample.noise_Hz,
     )
 

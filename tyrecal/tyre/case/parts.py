@@ -151,12 +151,13 @@ class Outline(Part):
 class SectionSource(Part):
     """``stations``: the station table, or ``outline``: two curves; CSV, relative to the case file.
 
-    ``gauges`` scale it.
+    ``gauges`` scale it. ``known_from``: how well it is known, so how large its errors are.
     """
 
     stations: Text | None = None
     outline: Outline | None = None
     gauges: list[Gauge] | None = None
+    known_from: Literal["measured", "drawing", "size_code"] | None = None
 
     @property
     def file(self) -> str:

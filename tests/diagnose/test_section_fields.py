@@ -1,0 +1,139 @@
+"""A section that is a little off everywhere: the fields' statistics, and their slopes against the
+model with what they say changed in it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tyrecal.simulate.deck.tyre_design import TyreDesign
+from tyrecal.simulate.evaluate.evaluator import Evaluator
+from tyrecal.studies.diagnose.diagnosis import diagnose
+from tyrecal.studies.diagnose.inverse_problem import Assumed
+from tyrecal.studies.diagnose.model import Answer, Query
+from tyrecal.studies.diagnose.section_fields import (
+    CORRELATION_LENGTH,
+    SECTION,
+    SECTION_SIZES,
+    arc_length,
+    components,
+    fields,
+    moved,
+)
+from tyrecal.studies.diagnose.section_told import section_told
+from tyrecal.studies.diagnose.tyre_model import TyreModel
+from tyrecal.studies.diagnose.uncertainties import sources
+from tyrecal.tyre.case.identity import tyre_sha256
+from tyrecal.tyre.effects.edit import changed, with_part
+from tyrecal.tyre.effects.parts import stations
+
+from ..chance import Chance
+from .test_tyre_model import CASE, LABELS
+from .toy import Toy, problem
+
+pytestmark = pytest.mark.numbers
+STATED = changed(CASE, section=with_part(CASE.case.section, known_from="drawing"))
+ROWS = [*((label, 240.0) for label in LABELS), (None, 0.0)]
+
+
+def test_a_case_that_does_not_say_what_its_section_is_known_from_has_no_fields() -> None:
+    assert not fields(CASE)
+    assert not any(source.field for source in sources(CASE)[0])
+    told = [source.words for source in sources(STATED)[0] if source.field and source.words]
+    assert len(told) == 1 and "meridian 0.8 mm" in told[0]
+
+
+def test_components_have_the_covariance_of_the_field() -> None:
+    """1 up to a correlation length from the rim, 0 on it; between two places as the kernel says."""
+    s = np.linspace(0, 1.1, 56)
+    shapes = components(s)
+    covariance = shapes.T @ shapes
+    assert len(shapes) <= 5
+    assert np.diag(covariance)[s < 0.5] == pytest.approx(1.0, abs=0.02)
+    assert abs(shapes[:, s >= 1]).max() == 0
+    i, j = 20, 10  # far from the crown's mirror image, and from the rim
+    wanted = np.exp(-((s[i] - s[j]) ** 2) / (2 * CORRELATION_LENGTH**2))
+    assert covariance[i, j] == pytest.approx(wanted, abs=0.15)
+
+
+def test_a_section_moves_by_what_is_stated() -> None:
+    """Sums of squares of the components' displacements, amid the sidewall: 0.8 mm, and 4 %."""
+    s = arc_length(STATED)
+    place = int(np.argmin(abs(s - 0.45)))
+    section, square = STATED.section, {"meridian": 0.0, "gauge": 0.0}
+    thick = lambda points: np.linalg.norm(points[-1, place] - points[0, place])
+    for field in fields(STATED).values():
+        if field.kind in square:
+            points = moved(STATED, field, 1.0).section.points
+            off = np.linalg.norm(points[0, place] - section.points[0, place])
+            ratio = thick(points) / thick(section.points) - 1
+            assert abs(ratio) < 1e-9 or field.kind == "gauge"
+            square[field.kind] += float(off if field.kind == "meridian" else ratio) ** 2
+            assert np.nanmax(abs(points - section.points)[:, s > 1]) == 0
+    meridian, gauge, *_ = SECTION_SIZES["drawing"]
+    assert np.sqrt(square["meridian"]) == pytest.approx(meridian, rel=0.02)
+    assert np.sqrt(square["gauge"]) == pytest.approx(gauge, rel=0.02)
+
+
+@pytest.mark.slow
+def test_slopes_of_fields_are_the_model_s_own() -> None:
+    """Meridian and gauge: half of a standard deviation either way. Compounds: all densities up by
+    one per cent are the rubber's density."""
+    found = sources(STATED)[0]
+    model = TyreModel(STATED, Evaluator(TyreDesign(STATED)), ROWS, found, {})
+    (at_0,) = model.answers([Query(model.start, constants=True)])
+    assert isinstance(at_0, Answer) and at_0.constants is not None
+    column = {source.name: at_0.constants[:, k] for k, source in enumerate(found)}
+    for name, field in fields(STATED).items():
+        if name not in (f"{SECTION}meridian 2", f"{SECTION}gauge 1"):
+            continue
+        ln_f = []
+        for side in (0.5, -0.5):
+            off = moved(STATED, field, side)
+            other = TyreModel(off, Evaluator(TyreDesign(off)), ROWS, [], {})
+            (answer,) = other.answers([Query(model.start)])
+            assert isinstance(answer, Answer)
+            ln_f.append(answer.eta)
+        assert abs(column[name]).max() > 3e-3
+        assert column[name] == pytest.approx(ln_f[0] - ln_f[1], abs=0.03 * abs(column[name]).max())
+    names = [n for n in column if n.startswith(f"{SECTION}density")]
+    shapes = np.array([fields(STATED)[n].values for n in names])
+    all_up = np.linalg.solve(shapes.T, np.full(shapes.shape[1], 0.015))  # z of a uniform change
+    together = np.array([column[n] for n in names]).T @ all_up
+    assert together[:-1] == pytest.approx(column["rubber_density"][:-1], abs=2e-5)
+    assert np.log1p(together[-1]) == pytest.approx(column["rubber_density"][-1], abs=2e-6)
+
+
+def test_the_statement_is_none_of_the_tyre() -> None:
+    """The same hash, so that results of either go together."""
+    assert tyre_sha256(STATED) == tyre_sha256(CASE)
+
+
+def test_what_is_told_of_the_section_holds_within_its_standard_deviation(chance: Chance) -> None:
+    """Of drawn fields on the toy, whose sources are those of the case with slopes by chance.
+
+    False failures: 1e-7.
+    """
+    found = sources(STATED)[0]
+    toy, own = Toy(effects=1, bend=0.0), fields(STATED)
+    toy.sources = tuple(source.name for source in found)  # type: ignore[assignment]
+    toy.constants = np.random.default_rng(5).normal(0, 0.005, (len(toy.rows), len(found)))
+    base, off = problem(toy), []
+    for _ in range(10):
+        z = chance.random.normal(size=len(found))
+        y = toy.base + toy.constants @ z + chance.random.normal(0, 0.00224, len(toy.base))
+        seen = base.measured(y).observations
+        stated = Assumed(form=0.001, law=0.0)
+        d = diagnose(toy, toy.rows, seen, assumed=stated)  # type: ignore[arg-type]
+        told = section_told(STATED, found, d)
+        assert {v.field for v in told} == {"meridian", "gauge", "stiffness", "density"}
+        assert all(0 < v.sigma <= v.before for v in told)
+        value = next(v for v in told if v.field == "meridian")
+        place = sum(stations(STATED.section, value.place)) // 2
+        true = 1e3 * sum(
+            own[source.name].values[place] * amount
+            for source, amount in zip(found, z, strict=True)
+            if source.field and source.field.kind == "meridian"
+        )
+        off.append((value.value - true) / value.sigma)
+    chance.normal(off)

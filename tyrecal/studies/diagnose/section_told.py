@@ -1,0 +1,53 @@
+"""What the data say of the section's fields, where nothing else is wrong.
+
+With z ~ N(0, 1) of each component and g its slopes: E z = G^T P r, cov z = I - G^T P G, r what the
+plain calibration leaves and P what it cannot absorb.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ...tyre.case import LoadedCase
+from ...tyre.effects.parts import stations
+from .diagnosis import Diagnosis
+from .evidence import NONE
+from .gap import projection
+from .section_fields import FIELD_KINDS, rubber_parts
+from .uncertainties import Source
+from .where import FieldValue
+
+Array = np.ndarray
+FIELD_UNITS = {"meridian": ("mm", 1e3), "gauge": ("%", 100.0)}  # compounds in per cent, too
+
+
+def section_told(
+    case: LoadedCase, sources: Sequence[Source], diagnosis: Diagnosis
+) -> list[FieldValue]:
+    """Meridian and gauges amid each region, compounds by part; empty without fields."""
+    problem = diagnosis.bare
+    columns = [k for k, source in enumerate(sources) if source.field]
+    if not columns:
+        return []
+    P, _, _ = projection(problem, diagnosis.hypothesis(NONE).fitted.d[0])
+    G = problem.constants[:, columns]
+    if problem.zeta:
+        G = problem.mixed @ G
+    mean, covariance = G.T @ P @ diagnosis.gap.residuals, np.eye(len(columns)) - G.T @ P @ G
+    middles = {name: sum(stations(case.section, name)) // 2 for name, _ in case.section.regions}
+    compounds = {name: i for i, name in enumerate(rubber_parts(case).values())}
+    known = [source.field for source in sources if source.field]
+    result = []
+    for kind in FIELD_KINDS:
+        own = [i for i, field in enumerate(known) if field.kind == kind]
+        values = np.array([known[i].values for i in own])
+        unit, scale = FIELD_UNITS.get(kind, ("%", 100.0))
+        for place, i in (middles if kind in FIELD_UNITS else compounds).items():
+            v = scale * values[:, i]
+            spread = float(np.sqrt(max(v @ covariance[np.ix_(own, own)] @ v, 0.0)))
+            before = float(np.linalg.norm(v))
+            if before:
+                result.append(FieldValue(kind, place, float(v @ mean[own]), spread, before, unit))
+    return result
