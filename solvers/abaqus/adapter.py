@@ -23,9 +23,11 @@ JOB, OLDJOB = "modes", "inflate"
 
 
 class Decks(Protocol):
-    """What the tool hands over; ``options``: the solver's, from the case."""
+    """What the tool hands over; ``options``: the solver's, from the case; ``request``: among what
+    is asked, of a user's deck ``own_deck`` with its units."""
 
     options: Mapping[str, Any]
+    request: Mapping[str, Any]
 
     def texts(self, dialect: str) -> dict[str, str]:
         """File name to text."""
@@ -39,7 +41,7 @@ class Abaqus:
 
     name = "abaqus"
     dialect = "abaqus"
-    capabilities = frozenset({"modes", "vibration_modulus", "spindle"})
+    capabilities = frozenset({"modes", "vibration_modulus", "spindle", "own_deck"})
     refusals = (Refused,)
     failures = (RunFailed,)
 
@@ -65,9 +67,11 @@ class Abaqus:
     def write(self, decks: Decks, folder: Path) -> list[Path]:
         """Write the decks and, beside them, the case's options. Raises ``refusals``."""
         program = self.command if self.version == "unknown" else []
-        paths = [read_options(decks.options).save(folder, program)]
-        for name, text in decks.texts(self.dialect).items():
+        units = decks.request.get("own_deck", {})
+        paths = [read_options(decks.options, **units).save(folder, program)]
+        for name, text in decks.texts("own deck" if units else self.dialect).items():
             paths.append(folder / name)
+            paths[-1].parent.mkdir(parents=True, exist_ok=True)
             paths[-1].write_text(text, encoding="utf-8", newline="")
         read_question(folder / f"{JOB}.inp")  # refused before it runs, not after
         return paths
@@ -86,17 +90,18 @@ class Abaqus:
         asked = read_question(folder / f"{JOB}.inp")
         table = read_dat(folder / f"{JOB}.dat")
         found = checked_modes(folder / f"{JOB}.fil", asked.modes, table)
-        points = cylindrical(found.coordinates)
+        units = load(folder)
+        points = cylindrical(units.length_m * found.coordinates)
         check_revolved(points)
         shapes = components(found.displacement, points[:, 1])
         return {
-            "pressure_Pa": asked.pressure_Pa,
-            "mass_kg": table.mass_kg,
+            "pressure_Pa": asked.pressure * units.mass_kg / units.length_m,
+            "mass_kg": table.mass and table.mass * units.mass_kg,
             "modes": [
                 {
                     "frequency_Hz": float(np.sqrt(value) / (2 * np.pi)),
                     "multiplicity": 1,
-                    "displacement": shape / np.sqrt(mass),
+                    "displacement": shape / np.sqrt(mass * units.mass_kg),
                 }
                 for value, mass, shape in zip(found.eigenvalues, found.masses, shapes, strict=True)
             ],

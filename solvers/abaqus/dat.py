@@ -14,10 +14,10 @@ _MASS = re.compile(rf"TOTAL MASS OF MODEL[\s=:]*({_NUMBER})")
 
 @dataclass(frozen=True)
 class DatTable:
-    """frequencies_Hz: by number of the mode, of the last table; mass_kg: None where unsaid."""
+    """frequencies_Hz: by number of the mode, of the last table; mass: None where unsaid."""
 
     frequencies_Hz: dict[int, float]
-    mass_kg: float | None
+    mass: float | None
 
 
 def read_dat(path: Path) -> DatTable:

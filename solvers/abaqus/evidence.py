@@ -42,7 +42,7 @@ def checked_modes(path: Path, asked: int | None, table: DatTable) -> Modes:
             or not abs(own_Hz[number - 1] - printed_Hz) <= PRINTED_RTOL * printed_Hz
         ):
             raise _failed(f"{path.name} and {dat} disagree on mode {number}")
-    if table.mass_kg is None:
+    if table.mass is None:
         raise _failed(f"{dat} states no TOTAL MASS OF MODEL")
     return found
 

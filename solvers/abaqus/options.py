@@ -16,11 +16,13 @@ OPTIONS_FILE = "abaqus.json"
 @dataclass(frozen=True)
 class Options:
     """licence_wait_s: longest time spent waiting for a licence, 0 = none; licence_first_wait_s: the
-    first wait, each later one twice as long.
+    first wait, each later one twice as long; length_m, mass_kg: the deck's units.
     """
 
     licence_wait_s: float = 600.0
     licence_first_wait_s: float = 5.0
+    length_m: float = 1.0
+    mass_kg: float = 1.0
 
     def save(self, folder: Path, program: Sequence[str] = ()) -> Path:
         """Write them into a run folder, and the ``program``, where no version tells it from others:
@@ -37,17 +39,17 @@ def load(folder: Path) -> Options:
     return Options(**{name: told[name] for name in Options.__dataclass_fields__})
 
 
-def read_options(given: Mapping[str, Any]) -> Options:
-    """Options of a case. Raises Refused."""
-    unknown = sorted(set(given) - set(Options.__dataclass_fields__))
+def read_options(given: Mapping[str, Any], **units: float) -> Options:
+    """Options of a case, and the units of a user's deck. Raises Refused."""
+    smallest = {"licence_wait_s": 0.0, "licence_first_wait_s": 1e-3}
+    unknown = sorted(set(given) - set(smallest))
     if unknown:
-        known = ", ".join(Options.__dataclass_fields__)
+        known = ", ".join(smallest)
         raise Refused(f"solver.options: abaqus has no '{unknown[0]}', only {known}")
-    values = dict(given)
-    for name, least in (("licence_wait_s", 0.0), ("licence_first_wait_s", 1e-3)):
-        value = values.get(name, least)
+    for name, least in smallest.items():
+        value = given.get(name, least)
         if isinstance(value, bool) or not isinstance(value, int | float) or not value >= least:
             raise Refused(
                 f"solver.options.{name} must be a number of at least {least:g}, got {value!r}"
             )
-    return Options(**values)
+    return Options(**given, **units)

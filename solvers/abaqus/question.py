@@ -10,10 +10,10 @@ from ..bundled.deck.keywords import DeckError, read_keywords
 
 @dataclass(frozen=True)
 class AskedModes:
-    """modes: how many, None where a frequency range decides; pressure_Pa: the largest."""
+    """modes: how many, None where a frequency range decides; pressure: the largest, in its unit."""
 
     modes: int | None
-    pressure_Pa: float
+    pressure: float
 
 
 def read_question(path: Path) -> AskedModes:

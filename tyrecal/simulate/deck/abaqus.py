@@ -14,6 +14,7 @@ from ...tyre.case import Case
 from ...tyre.case.parts import Rim, Rubber
 from ...tyre.case.schema import Analysis
 from ...tyre.own_deck.flat import REFERENCE_NODE
+from ...tyre.own_deck.own_deck import UNIT_LENGTH, UNIT_MASS
 from ...tyre.resolve import Tyre
 from ...tyre.section.mesh import SectionMesh
 from .own import own_section
@@ -223,6 +224,9 @@ def _tables(
 def aside(tyre: Tyre) -> dict[str, Any]:
     """What no deck of keywords says: which surfaces hold the gas, whose frequency counts."""
     request: dict[str, Any] = {}
+    if tyre.case.deck:
+        units = tyre.case.deck.units
+        request["own_deck"] = {"length_m": UNIT_LENGTH[units], "mass_kg": UNIT_MASS[units]}
     if "frequency_modulus" in tyre.needs:
         request["own_frequency"] = True
     if "cavity" in tyre.needs:

@@ -5,11 +5,15 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from importlib import import_module
+from math import isclose
 from typing import Any
 
 from ...tyre.own_deck.flat import REFERENCE_NODE, Flat
-from ...tyre.own_deck.text import Block, OwnDeckError, Place
+from ...tyre.own_deck.own_deck import UNIT_LENGTH, UNIT_MASS
+from ...tyre.own_deck.own_text import own_texts
+from ...tyre.own_deck.text import Block, OwnDeckError, Place, named
 from ...tyre.resolve import Tyre
+from ...tyre.templates import TemplateFailed
 
 BEFORE = 3  # lines of the inflation's template before the mesh: heading, its text, *RESTART
 PLACE = re.compile(r"^inflate\.inp, line (\d+): ")
@@ -33,6 +37,75 @@ def own_section(tyre: Tyre) -> dict[str, Any]:
         "materials": [],
         "hourglass": None,
     }
+
+
+def own_jobs(tyre: Tyre) -> tuple[dict[str, str], dict[str, Any]]:
+    """Texts of the job that inflates, which is the user's deck, and of what it includes; and what
+    the job that revolves it takes over: its step, node, sets, surfaces and pressure, in the deck's
+    own units. Raises TemplateFailed."""
+    deck, flat, c = tyre.written.deck, tyre.flat, tyre.case
+    assert deck and c.deck
+    _refuse_unrevolved(tyre)
+    (body,) = (block for block in flat.found.model if block.name == "RIGID BODY")
+    steps = [block.place for block in deck.blocks if block.name == "STEP"]
+    _, row, field = flat.model.pressure[0]
+    pressure = c.pressure_kPa * 1e3 * UNIT_LENGTH[deck.units] / UNIT_MASS[deck.units]
+    if isclose(row.number(field), pressure, rel_tol=1e-12):
+        pressure = row.number(field)
+    files = own_texts(deck, c.deck.numbers, pressure)
+    files["inflate.inp"] = files.pop(deck.path.name)
+    loads = [block for block in flat.found.inflation if block.name == "DSLOAD"]
+    node, (r, z) = flat.model.reference
+    return files, {
+        "step": 1 + steps.index(flat.found.inflation[0].place),
+        "node": node,
+        "r": r,
+        "z": z,
+        "rim": body.need("TIE NSET"),
+        "surfaces": [row.name(0) for block in loads for row in block.rows],
+        "pressure": pressure,
+        "crown": named(c.deck.crown),
+    }
+
+
+def _refuse_unrevolved(tyre: Tyre) -> None:
+    """Raises TemplateFailed where ABAQUS would not revolve the deck as it stands, or into the tyre
+    that the case describes."""
+    deck, flat, c = tyre.written.deck, tyre.flat, tyre.case
+    assert deck and c.deck
+    blocks = {block.name: block for block in deck.blocks}
+    length = UNIT_LENGTH[deck.units]
+    saved = any("WRITE" in block.parameters for block in deck.blocks if block.name == "RESTART")
+    bodies = [block for block in deck.blocks if block.name == "RIGID BODY"]
+    r, z = flat.model.reference[1]
+    point = c.rim.reference_point_m
+    rings = {"spindle", "cavity", "coupled", "rotation"} & set(tyre.needs)
+    why = {
+        "a revolve takes no *PART: have it written without (of ABAQUS/CAE an attribute of the"
+        " model, 'do not use parts and assemblies in input files')": "PART" in blocks,
+        "a half is not revolved: write the whole section": "SYMMETRIC MODEL GENERATION" in blocks,
+        "a revolve goes on from the restart file: put *RESTART, WRITE into the deck": not saved,
+        "a revolve needs the rim again: hold it by one *RIGID BODY with TIE NSET": (
+            len(bodies) != 1 or "TIE NSET" not in bodies[0].parameters
+        ),
+        "the pressure must be a *DSLOAD": any(b.name == "DLOAD" for b in flat.found.inflation),
+        f"it has no node set {c.deck.crown}: name that of its crown in deck.crown": (
+            named(c.deck.crown) not in flat.model.node_sets
+        ),
+        "rim.reference_point_m must be the reference node's place": not (
+            isclose(point.r, r * length, abs_tol=1e-9)
+            and isclose(point.z, z * length, abs_tol=1e-9)
+        ),
+        "analysis.static_moduli must be those of its *STATIC": (
+            (c.analysis.static_moduli == "long_term") != flat.long_term
+        ),
+        f"ABAQUS gets its own text, which has nothing for: {', '.join(sorted(rings))}": bool(rings),
+        "it includes a file of the name of a job": bool(
+            {"inflate.inp", "modes.inp"} & ({*deck.texts} - {deck.path.name})
+        ),
+    }
+    for reason in (words for words, so in why.items() if so):
+        raise TemplateFailed(f"{deck.path.name}: {reason}")
 
 
 def trial(flat: Flat) -> float:

@@ -21,10 +21,11 @@ from .abaqus import aside, context
 from .apart import Apart
 from .calculix import calculix_context
 from .decks import HEADER_LINES, header
-from .own import explained
+from .own import explained, own_jobs
 
 ELEMENTS_A_WAVE = 7.5  # of quadratic ones: the frequencies are right to 0.4 %
 DeckRequest = Mapping[str, Any]  # what is asked of a deck, see `Decks.request`
+OWN_TEXT = "own deck"  # of a user's deck, as it stands
 NEAR_ZERO = 1e-4  # of a variable's span: below, steps are shares of this
 DECK_STEP = 1e-4  # of a variable, to see which numbers of the deck it moves and how fast
 LEADS_OUTSIDE = re.compile(  # but for comments: an absolute path or one upwards, code of one's own
@@ -157,9 +158,10 @@ class TyreDesign:
     def texts(self, dialect: str, request: Mapping[str, Any]) -> dict[str, str]:
         """File name to text, without the header. Raises TemplateFailed."""
         own = self.case.case.templates
-        env = Apart(dialect, self.case.folder / own) if own else environment(dialect, None)
+        shipped = "abaqus" if dialect == OWN_TEXT else dialect
+        env = Apart(dialect, self.case.folder / own) if own else environment(shipped, None)
         texts = DIALECTS[dialect](self.tyre, env, request)
-        if own:
+        if own or dialect == OWN_TEXT:
             for file, text in texts.items():
                 _refuse_outside(file, text)
         return texts
@@ -231,9 +233,18 @@ def _calculix(tyre: Tyre, env: Any, request: DeckRequest) -> dict[str, str]:
     return texts
 
 
+def _own_text(tyre: Tyre, env: Any, request: DeckRequest) -> dict[str, str]:
+    """A user's own deck, and the job that revolves it."""
+    files, inflation = own_jobs(tyre)
+    names = {**context(tyre), "inflation": inflation}
+    names["modes"] = 2 * request["modes_per_harmonic"] * (request["highest_harmonic"] + 1)
+    return {**files, "modes.inp": render(env, "revolve.inp.j2", names)}
+
+
 DIALECTS: dict[str, Callable[[Tyre, Any, DeckRequest], dict[str, str]]] = {
     "abaqus": _abaqus,
     "calculix": _calculix,
+    OWN_TEXT: _own_text,
 }
 _BLOCKS: dict[tuple[int, int], tuple[Any, Any, str]] = {}
 

@@ -32,5 +32,5 @@ class LoadedCase:
     def files(self) -> list[Path]:
         """That the section stands in."""
         if self.deck:
-            return [self.deck.path.parent / name for name in self.deck.files]
+            return [self.deck.path.parent / name for name in self.deck.texts]
         return [self.folder / self.case.section.file]

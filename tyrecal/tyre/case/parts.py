@@ -174,11 +174,13 @@ class DeckSource(Part):
     """An ABAQUS deck of the section, relative to the case file, in m or mm (with t, s, MPa).
 
     ``numbers``: of the marks in its text, by name, and others of its numbers, by path, in its own
-    units; those not given are as the text has them.
+    units; those not given are as the text has them. ``crown``: its set of nodes of the outer
+    surface over the belt, which ABAQUS gives shapes of.
     """
 
     file: Text
     units: Literal["m", "mm"]
+    crown: Text = "CROWN"
     numbers: dict[Text, Number] = Field(default_factory=dict)
 
 

@@ -32,6 +32,7 @@ class OwnDeck:
     path: Path
     units: Units
     blocks: tuple[Block, ...]
+    texts: Mapping[str, str]  # of its files, by name relative to its folder
     _models: dict[tuple[Block, ...], Model] = field(default_factory=dict, repr=False)
     _filled: dict[int, Block] = field(default_factory=dict, repr=False)
 
@@ -59,13 +60,6 @@ class OwnDeck:
             text = numbers_of.assigned(row)[1] if j < 0 else row.text(j)
             found[path] = numbers_of.plain(text)
         return found
-
-    @property
-    def files(self) -> list[str]:
-        """Names of the files that it stands in, relative to its folder."""
-        places = [block.place for block in self.blocks]
-        places += [row.place for block in self.blocks for row in block.rows]
-        return list(dict.fromkeys([self.path.name, *(place.file for place in places)]))
 
     @cached_property
     def sha256(self) -> str:
@@ -128,10 +122,10 @@ class OwnDeck:
 def read_own_deck(path: Path, units: Units | None = None) -> OwnDeck:
     """The deck, its units told by its densities where they are not given. Raises OwnDeckError,
     OSError."""
-    blocks = tuple(read_blocks(path))
+    blocks, texts = read_blocks(path)
     if not blocks:
         raise OwnDeckError(Place(path.name, 1), "there is no keyword in it")
-    return OwnDeck(path, units or recognised(blocks), blocks)
+    return OwnDeck(path, units or recognised(blocks), tuple(blocks), texts)
 
 
 def recognised(blocks: Sequence[Block]) -> Units:

@@ -109,13 +109,17 @@ def named(text: str) -> str:
     return " ".join(text.strip().strip('"').upper().split())
 
 
-def read_blocks(path: Path) -> list[Block]:
-    """The blocks of a deck. Raises OwnDeckError, OSError."""
-    return list(_blocks(path.name, path.parent, (), [MAX_OWN_BYTES]))
+def read_blocks(path: Path) -> tuple[list[Block], dict[str, str]]:
+    """The blocks of a deck, and the texts of its files by name. Raises OwnDeckError, OSError."""
+    texts: dict[str, str] = {}
+    return list(_blocks(path.name, path.parent, (), [MAX_OWN_BYTES], texts)), texts
 
 
-def _blocks(file: str, folder: Path, above: tuple[str, ...], left: list[int]) -> Iterator[Block]:
-    for block in _file_blocks(file, _text(folder / file, Place(file, 1), left)):
+def _blocks(
+    file: str, folder: Path, above: tuple[str, ...], left: list[int], texts: dict[str, str]
+) -> Iterator[Block]:
+    texts[file] = _text(folder / file, Place(file, 1), left)
+    for block in _file_blocks(file, texts[file]):
         if block.name != "INCLUDE":
             yield block
             continue
@@ -130,7 +134,7 @@ def _blocks(file: str, folder: Path, above: tuple[str, ...], left: list[int]) ->
             raise block.refused(f"INPUT={other} is no file in the deck's folder")
         if other in (*above, file) or len(above) >= DEEPEST_INCLUDE:
             raise block.refused(f"INPUT={other} includes itself, or is too deep")
-        yield from _blocks(other, folder, (*above, file), left)
+        yield from _blocks(other, folder, (*above, file), left, texts)
 
 
 def _text(path: Path, place: Place, left: list[int]) -> str:

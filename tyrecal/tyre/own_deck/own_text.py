@@ -1,0 +1,41 @@
+"""A user's deck as its own text: unchanged but for marks, and numbers that are set by a path."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+
+from .numbers import DECK_MARK, assigned, written
+from .own_deck import OwnDeck
+from .text import Row
+
+
+def own_texts(deck: OwnDeck, numbers: Mapping[str, float], pressure: float) -> dict[str, str]:
+    """Text by file name, that it includes too, relative to its folder. pressure: in the deck's own
+    unit, in place of its own where it is another. Raises OwnDeckError."""
+    flat = deck.flat(numbers)
+    places: list[tuple[Row, int, float]] = [
+        (deck.blocks[k].rows[i], j, numbers[path])
+        for path, (k, i, j) in deck.places.items()
+        if path in numbers and numbers[path] != deck.numbers[path]
+    ]
+    places += [(row, i, pressure) for _, row, i in flat.model.pressure if row.number(i) != pressure]
+    lines = {file: text.splitlines(keepends=True) for file, text in deck.texts.items()}
+    for row, j, value in places:
+        own = lines[row.place.file]
+        own[row.place.line - 1] = _with(own[row.place.line - 1], row, j, value)
+    known = {name: numbers[name] for name in deck.marks if name in numbers}
+    return {
+        file: DECK_MARK.sub(lambda m: written(known[m[1]]) if m[1] in known else m[0], "".join(own))
+        for file, own in lines.items()
+    }
+
+
+def _with(line: str, row: Row, index: int, value: float) -> str:
+    """A data line with a number at a field, or NAME = value, the rest as it stands."""
+    if index < 0:
+        return line.replace(assigned(row)[1], written(value))
+    fields = line.rstrip("\r\n").split(",")
+    end = line[len(line.rstrip("\r\n")) :]
+    fields[index] = re.sub(r"\S.*\S|\S", written(value), fields[index], count=1)
+    return ",".join(fields) + end
