@@ -1,22 +1,30 @@
-"""An evaluation with slopes of a user's deck, over that of the case that wrote the deck.
+"""An evaluation with slopes, or a whole fit, of a user's deck over that of the case that wrote it.
 
-python -m tests.benchmarks.own_deck [--mesh LEVEL] [--rounds N]: the deck of
+python -m tests.benchmarks.own_deck [--mesh LEVEL] [--rounds N] [--fit]: the deck of
 `cases/p235_75r17.yaml` is read as anybody's, its nodes in another order, with the same variables;
-processor time, both sides in turn in one process, each design anew.
+processor time, both sides in turn: in one process, each design anew, or with --fit whole commands
+`tyrecal fit --no-pictures --no-store`, with the case's bounds and targets.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
+import resource
 import statistics
+import subprocess
+import sys
 import time
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
+
+import yaml
 
 from tyrecal.simulate.deck.decks import Decks
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
-from tyrecal.tyre.case import start_values, with_level
+from tyrecal.tyre.case import LoadedCase, start_values, with_level
 from tyrecal.tyre.case.own_case import own_case
 from tyrecal.tyre.load import load_case
 from tyrecal.tyre.own_deck.own_deck import read_own_deck
@@ -33,10 +41,52 @@ def shuffled(text: str) -> str:
     return head + "*NODE, NSET=TYRE\n" + "".join(lines[::-1]) + "*NODE, NSET=RIM_REFERENCE\n" + tail
 
 
+def fit_case(case: LoadedCase, own: Path) -> None:
+    """Give a deck's case the variables' starts and bounds, and the targets, of the case."""
+    data = yaml.safe_load(own.read_text(encoding="utf-8"))
+    of = {"A_belt": "A_BELT_CORD", "A_carcass": "A_CARCASS_CORD", "C10": "C10_RUBBER"}
+    data["variables"] = {
+        name: {**variable, "sets": data["variables"][of[name]]["sets"]}
+        for name, variable in case.file_data["variables"].items()
+    }
+    data["targets"] = case.file_data["targets"]
+    own.write_text(yaml.safe_dump(data), encoding="utf-8")
+
+
+def fit_seconds(path: Path, mesh: str) -> tuple[float, dict[str, Any]]:
+    """Processor time of a whole fit, and its result."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    with TemporaryDirectory() as folder:
+        level = ["--mesh", mesh] if mesh else []
+        words = ["fit", str(path), "--no-pictures", "--no-store", "--output", folder, *level]
+        subprocess.run([sys.executable, "-m", "tyrecal", *words, "--quiet"], check=True)
+        found = json.loads((Path(folder) / "fit.json").read_text())
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, found
+
+
+def compare_fits(own: Path, mesh: str, rounds: int) -> None:
+    """Print both medians, their ratio, and how far apart the fits end."""
+    spent: dict[str, list[float]] = {"case": [], "deck": []}
+    results = {}
+    for _ in range(rounds):
+        for name, path, level in (("case", CASE, mesh), ("deck", own, "")):
+            seconds, results[name] = fit_seconds(path, level)
+            spent[name].append(seconds)
+    ratios = [deck / case for case, deck in zip(*spent.values(), strict=True)]
+    for name, found in results.items():
+        print(
+            f"{name}: {statistics.median(spent[name]):.2f} s, {found['evaluations']} evaluations,"
+            f" objective {found['objective_Hz']:.6f} Hz"
+        )
+    print(f"a fit of the deck over one of the case: {statistics.median(ratios):.2f}")
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--mesh", default="refined")
     parser.add_argument("--rounds", type=int, default=5)
+    parser.add_argument("--fit", action="store_true")
     given = parser.parse_args()
     case = with_level(load_case(CASE), given.mesh)
     case = with_values(case, start_values(case))
@@ -47,6 +97,10 @@ def main() -> None:
         path.write_text(shuffled(text), encoding="utf-8")
         deck = read_own_deck(path)
         path.with_suffix(".yaml").write_text(own_case(deck, deck.flat({}), "P235/75R17", None))
+        if given.fit:
+            print(f"{len(deck.flat({}).mesh.nodes)} nodes")
+            fit_case(case, path.with_suffix(".yaml"))
+            return compare_fits(path.with_suffix(".yaml"), given.mesh, given.rounds)
         own = load_case(path.with_suffix(".yaml"))
     sides = {"case": case, "deck": own}
     spent: dict[str, list[float]] = {name: [] for name in sides}
