@@ -43,14 +43,18 @@ def test_the_outline_of_a_section_gives_the_section_again(tmp_path: Path) -> Non
     read = read_outline(write_outline(tmp_path / "o.csv", curves()))
     rim = float(section.points[1, section.rigid][0, 0])
     again = section_of_outline(read, rim_radius=rim, **REST)
-    assert again.regions == section.regions
+    assert again.regions[:3] == section.regions[:3]
     # the carcass' depth is the liner's all over, but at the bead; above, both are one section
-    wall = int(np.argmax(section.points[1, :, 1])) + 1
-    one, other = again.points[:, :wall], section.points[:, :wall]
+    wall = int(np.argmax(section.points[1, :, 1]))
+    shared = [section.names.index(n) for n in ("inner", "ply", "belt1_turn_up", "belt2", "outer")]
+    one, other = again.points[:, :wall], section.points[shared, :wall]
     assert np.array_equal(np.isnan(one), np.isnan(other))
     apart = np.hypot(*np.moveaxis(one - other, 2, 0))
     assert np.nanmax(apart) < 0.4e-3  # stations stand on normals of the inner surface
-    meshes = [build_mesh(s, [8, 1, 6, 8, 2], [1, 1, 1, 2], True) for s in (again, section)]
+    meshes = [
+        build_mesh(again, [8, 1, 6, 8, 2], [1, 1, 1, 2], True),
+        build_mesh(section, [8, 1, 6, 5, 4, 2], [1] * 6, True),
+    ]
     areas = [_area(mesh) for mesh in meshes]
     assert areas[0] == pytest.approx(areas[1], rel=5e-3)
 

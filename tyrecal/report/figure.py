@@ -24,7 +24,8 @@ GREY = "0.45"
 # Okabe and Ito: told apart by colour-blind readers; their yellow is left out, pale on paper
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 
-RUBBER = ("#E3E3E3", "#C9DCEB", "#F5E6C0", "#D3C3B3", "#E2D3E8", "#CFE5CB")  # pale: cords stand out
+RUBBER = ("#E3E3E3", "#C9DCEB", "#F5E6C0", "#D3C3B3", "#E2D3E8", "#CFE5CB", "#F2CFC9")
+# pale: cords stand out
 MARKERS = "os^Dv<>P"
 # a page's style sheet has its own shade of each, light, dark and for print
 THEMED = {colour.lower(): f"var(--s{k})" for k, colour in enumerate(COLOURS)}

@@ -40,7 +40,7 @@ AXIS_LABELS = {"xlabel": "z along the axle, mm", "ylabel": "r from the axle, mm"
 
 @in_house_style
 def draw_section(section: SectionData, name: str, pressure_kPa: float) -> Figure:
-    """Rubber by region, elements, the cords of each layer and what the rim holds, in mm.
+    """Rubber by compound or region, elements, cords of each layer and what the rim holds, in mm.
 
     The belt's edge is repeated four times as large. Where the inflation is known, the inflated
     outline is dashed, at true scale.
@@ -82,12 +82,13 @@ def _draw(axes: Axes, section: SectionData, size: float) -> dict[str, Artist]:
     entries: dict[str, Artist] = {}
     for k, (name, layer) in enumerate(section.cords.items()):
         colour = COLOURS[k % len(COLOURS)]
+        dashed = "-" if k < len(COLOURS) else (0, (2, 1))  # where colours begin again
         lines = LineCollection(
-            _all(layer.lines), color=colour, lw=1.3 * size, capstyle="butt", zorder=3
+            _all(layer.lines), color=colour, lw=1.3 * size, capstyle="butt", ls=dashed, zorder=3
         )
         axes.add_collection(lines)
         words = f"{name.replace('_', ' ')}: {layer.angle_deg:g}° from the meridian"
-        entries[words] = Line2D([], [], color=colour, lw=2)
+        entries[words] = Line2D([], [], color=colour, lw=2, ls=dashed)
     for k, (region, cells) in enumerate(section.areas.items()):
         look: dict[str, Any] = {"fc": RUBBER[k % len(RUBBER)], "ec": "0.62"}
         axes.add_collection(PolyCollection(_all(cells), lw=0.3 * size, **look))

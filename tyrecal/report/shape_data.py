@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
+from ..simulate.deck.abaqus import claimed, solid_claims
 from ..simulate.evaluate.pressed import Pressed
 from ..simulate.evaluate.results import Evaluation, HarmonicShape
 from ..simulate.modes.label import Mode
@@ -140,9 +141,9 @@ def section_data(
     empty: unknown."""
     case = resolved(case).written
     place = {n: np.array([z, r]) * 1e3 for n, (r, z) in mesh.nodes.items()}
-    areas: dict[str, list[Flat]] = {name: [] for name, _ in case.section.regions}
-    for number, (region, _) in mesh.cells.items():
-        areas[region].append(_line(place, mesh.solids[number][:4]))
+    areas: dict[str, list[Flat]] = {}
+    for number, name in areas_of(case, mesh).items():
+        areas.setdefault(name, []).append(_line(place, mesh.solids[number][:4]))
     held = set(mesh.rim)
     around = mesh.outline()
     inflated = None
@@ -164,6 +165,19 @@ def section_data(
         outline=_line(place, around),
         inflated=inflated,
     )
+
+
+def areas_of(case: LoadedCase, mesh: SectionMesh) -> dict[int, str]:
+    """What each element is drawn as: its region, or its compound where there are several."""
+    solids = case.case.solids
+    if len({solid.material for solid in solids}) < 2:
+        order = [name for name, _ in case.section.regions]
+        cells = sorted(mesh.cells.items(), key=lambda cell: order.index(cell[1][0]))
+        return {number: region for number, (region, _) in cells}
+    rows = tuple(case.case.mesh.levels[case.case.mesh.level].rows)
+    claims, lines = solid_claims(case.case), case.section.names
+    found = {n: claimed(claims, lines, rows, *cell) for n, cell in mesh.cells.items()}
+    return {n: solids[i].material for n, i in found.items() if i is not None}
 
 
 def parts_data(case: LoadedCase, named: Iterable[str]) -> DiagnosisSection:

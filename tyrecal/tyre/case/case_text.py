@@ -4,57 +4,52 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Mapping
+import textwrap
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from ruamel.yaml import YAML
 
-from ..section.section import Section, SectionError
+from ..section.section import Section
 from ..templates import environment, render
+from .made_of import MadeOf
 
 ELEMENTS_BY_LEVEL = {"coarse": 14, "default": 28, "refined": 56}  # along the half section, by level
+LETTERS_A_LINE = 118  # letters on a line
 OUTER_ROWS = {"coarse": 1, "default": 3, "refined": 4}  # between the outermost line and the surface
 
 
 def new_case(
     section: Section,
+    made: MadeOf,
     file: str,
     name: str,
     size: str,
     pressure_kPa: float,
     origin: str = "",
     outline: Mapping[str, float] | None = None,
-    carcass_plies: int = 1,
+    loads_N: Sequence[float] = (),
 ) -> str:
     """YAML of a case whose section is ``section``, from ``file`` in the case's folder.
 
-    Lines from the crown to the bead become the carcass (each of ``carcass_plies`` layers), lines
-    that end at the shoulder the belts. origin: a sentence for the heading; outline: the keys of
-    ``section.outline`` but its file. Raises SectionError where no line can be the carcass.
+    origin: a sentence for the heading; outline: the keys of ``section.outline`` but its file;
+    loads_N: of the road, none: as usual for passenger cars.
     """
-    there = ~np.isnan(section.points).any(-1)
-    inside = list(zip(section.names, there, strict=True))[1:-1]
-    plies = [line for line, present in inside if present.all() for _ in range(carcass_plies)]
-    belts = [line for line, present in inside if present[0] and not present.all()]
-    if not plies:
-        raise SectionError(
-            "no line between the surfaces runs from the crown to the bead: the carcass needs one"
-        )
     env = environment("case", None)
-    env.filters["text"] = plain_text
+    env.filters["text"], env.filters["flow"] = plain_text, flow
     names: dict[str, Any] = {
+        "made": made,
         "file": file,
         "name": name,
         "size": size,
         "pressure_kPa": pressure_kPa,
         "origin": origin,
         "outline": outline,
+        "loads_N": loads_N,
         "lines": section.names,
         "regions": [r for r, _ in section.regions],
         "levels": {level: _level(section, level) for level in ELEMENTS_BY_LEVEL},
-        "carcass": _numbered("carcass", plies),
-        "belts": _numbered("belt", belts, always=True),
     }
     return render(env, "case.yaml.j2", names)
 
@@ -67,11 +62,32 @@ def plain_text(words: str) -> str:
     return words if plain else json.dumps(words)
 
 
-def _numbered(word: str, lines: list[str], always: bool = False) -> dict[str, str]:
-    """Layers by name, each with its line."""
-    if len(lines) == 1 and not always:
-        return {word: lines[0]}
-    return {f"{word}_{i}": line for i, line in enumerate(lines, start=1)}
+def flow(part: Any, indent: int) -> str:
+    """A part of a case on as few lines as it takes, ``indent`` blanks before all but the first."""
+    return textwrap.fill(
+        _flow(part),
+        LETTERS_A_LINE - indent,
+        subsequent_indent=(indent + 1) * " ",
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
+
+
+def _flow(part: Any) -> str:
+    if isinstance(part, Mapping):
+        return "{" + ", ".join(f"{key}: {_flow(value)}" for key, value in part.items()) + "}"
+    if isinstance(part, Sequence) and not isinstance(part, str):
+        return "[" + ", ".join(map(_flow, part)) + "]"
+    return part if isinstance(part, str) else _short(part)
+
+
+def _short(value: float) -> str:
+    """A number as one writes it: 0.3, 66.0, 1.9e+11, 2.42e-7."""
+    if isinstance(value, int) or value == 0 or 1e-3 <= abs(value) < 1e5:
+        return repr(value)
+    mantissa, _, power = f"{value:.12e}".partition("e")
+    digits = mantissa.rstrip("0")
+    return f"{digits}{'0' if digits.endswith('.') else ''}e{int(power):+d}"
 
 
 def _level(section: Section, level: str) -> dict[str, Any]:

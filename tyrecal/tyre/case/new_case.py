@@ -13,15 +13,18 @@ from ...errors import InputError
 from ...files import read_bytes
 from ...units import INCH
 from ..load import validate
-from ..section.from_size import build, usual
+from ..section.from_size import build, construction, usual
 from ..section.section import SectionError, refuse_separators
 from ..section.size import TyreSize
 from .case_text import new_case
+from .made_of import constructed, one_rubber
 from .parts import Outline, SectionSource
 from .stations import read_section_of
 
 FLANGE = 17.3e-3  # m, height of the rim's flange, contour J
 PRESSURE_KPA = 250.0  # where nothing says more
+LOAD_SHARES = (0.25, 0.5, 0.75, 1.0, 1.25)  # of what the tyre is rated for
+MOST_LOAD_N = 6e4  # usual on the road
 
 
 @dataclass(frozen=True)
@@ -54,17 +57,26 @@ def from_size(
     except SectionError as error:
         raise InputError(str(error)) from None
     mm = {k: f"{1e3 * getattr(gauges, k):.1f}" for k in ("crown", "sidewall", "bead", "belt")}
+    made = construction(size)
+    section = table.section()
     text = new_case(
-        table.section(),
+        section,
+        constructed(made, section),
         f"{stem}.csv",
         f"{size.text} on a {gauges.rim / INCH:g} inch rim",
         size.text,
         size.pressure_kPa if pressure_kPa is None else pressure_kPa,
-        f"section from the size code, crown {mm['crown']}, sidewall {mm['sidewall']},\n"
-        f"# bead {mm['bead']} mm thick, belt {mm['belt']} mm wide: an estimate to start from.",
-        carcass_plies=2 if size.light_truck else 1,
+        f"section from the size code, as {made.name} tyres are built:\n"
+        f"# crown {mm['crown']}, sidewall {mm['sidewall']}, bead {mm['bead']} mm thick, belt"
+        f" {mm['belt']} mm wide. An estimate to start from.",
+        loads_N=[_rounded(min(share * size.load_N, MOST_LOAD_N)) for share in LOAD_SHARES],
     )
     return Draft(text, f"{stem}.csv", table.csv().encode())
+
+
+def _rounded(load_N: float) -> float:
+    """To two digits."""
+    return float(f"{load_N:.2g}")
 
 
 def from_file(
@@ -86,13 +98,12 @@ def from_file(
         section = read_section_of(source, file.parent)
         text = new_case(
             section,
+            one_rubber(section, 2 if size and size.light_truck else 1),
             file.name,
             size.text + " with a section of its own" if size else file.stem,
             size.text if size else "not given",
             usual_kPa if pressure_kPa is None else pressure_kPa,
-            "",
-            keys,
-            2 if size and size.light_truck else 1,
+            outline=keys,
         )
         return Draft(text, file.name, content)
     except SectionError as error:

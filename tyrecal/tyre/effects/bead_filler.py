@@ -1,22 +1,29 @@
-"""A stiffer filler (apex) above the bead, which a tyre of one rubber does not have."""
+"""A stiffer filler (apex) above the bead; a tyre of one rubber has none."""
 
 from __future__ import annotations
 
 from ..case import LoadedCase
 from .edit import with_part, with_rubbers_at
 from .effect import Effect
-from .parts import lower_sidewall
+from .parts import carcass_line, lower_sidewall, turned_up
 
 
 def add(case: LoadedCase, value: float) -> LoadedCase:
-    """Shear and bulk modulus of the lower sidewall's rubber times 1 + value."""
+    """Shear and bulk modulus of the lower sidewall's rubber times 1 + value: of what lies between
+    the carcass and its turn-up, where it has one."""
     if not value > -1:
         raise ValueError("must be greater than -1")
     factor = 1 + value
+    regions = lower_sidewall(case)
+    between = case.section.names[0], case.section.names[-1]
+    if found := turned_up(case):
+        line, up = found
+        between = carcass_line(case), line
+        regions = [region for region in regions if region in up]
     return with_rubbers_at(
         case,
-        lower_sidewall(case),
-        (case.section.names[0], case.section.names[-1]),
+        regions,
+        between,
         "filler",
         lambda m: with_part(
             m, C10_Pa=factor * m.C10_Pa, C01_Pa=factor * m.C01_Pa, D1_per_Pa=m.D1_per_Pa / factor

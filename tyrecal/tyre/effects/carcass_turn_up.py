@@ -11,7 +11,7 @@ from ..case import LoadedCase
 from ..section.section import Section, fill_lines
 from .edit import unused, with_layers, with_part
 from .effect import Effect
-from .parts import carcass, carcass_line, lower_sidewall, present, rim_edge, stations
+from .parts import carcass, carcass_line, held_regions, lower_sidewall, present, stations, turned_up
 
 
 def add(case: LoadedCase, value: float) -> LoadedCase:
@@ -21,11 +21,12 @@ def add(case: LoadedCase, value: float) -> LoadedCase:
     """
     if not value > 0:
         raise ValueError("must be at least 0")
+    if turned_up(case):
+        raise ValueError("must be 0: the carcass of this case is turned up already, as a layer")
     section, names = case.section, case.section.names
     line = carcass_line(case)
     outside = names[-2]
-    held = [name for name, _ in section.regions if stations(section, name)[1] > rim_edge(section)]
-    regions = [*lower_sidewall(case), *held]
+    regions = [*lower_sidewall(case), *held_regions(section)]
     layers = dict(case.case.rebar_layers)
     if outside != line:
         elsewhere = [name for name, _ in section.regions if name not in regions]

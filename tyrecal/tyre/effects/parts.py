@@ -52,9 +52,51 @@ def belt_lines(case: LoadedCase) -> list[str]:
 
 
 def belts(case: LoadedCase) -> list[str]:
-    """Names of the layers on the belts' lines, from inside to outside. Raises ValueError."""
+    """Names of the layers on the belts' lines, from inside to outside: not those that go round the
+    tyre, as cap plies do, nor turn-ups on what is a belt's line at the crown. Raises ValueError."""
     layers = case.case.rebar_layers
-    return [name for line in belt_lines(case) for name in layers if layers[name].line == line]
+    top = case.section.regions[0][0]
+    found = [
+        name
+        for line in belt_lines(case)
+        for name, layer in layers.items()
+        if layer.line == line and top in (layer.regions or [top]) and layer.angle_deg % 180 != 90
+    ]
+    if not found:
+        raise ValueError("must be 0: this case has no belt, all layers at the crown go round it")
+    return found
+
+
+def tread(case: LoadedCase) -> tuple[str, str]:
+    """Lines between which the tread lies: outside all cords, of one rubber. Raises ValueError."""
+    names, top = case.section.names, case.section.regions[0][0]
+    inner = names.index(belt_lines(case)[-1])
+    owner = None
+    for solid in case.case.solids:
+        low, high = solid.between or (names[0], names[-1])
+        if high == names[-1] and top in (solid.regions or [top]):
+            owner = names.index(low)
+    return names[max(inner, owner or 0)], names[-1]
+
+
+def turned_up(case: LoadedCase) -> tuple[str, list[str]] | None:
+    """The line that the carcass' turn-up lies on and its regions; None where there is none.
+
+    Raises ValueError.
+    """
+    line = carcass_line(case)
+    own = {case.case.rebar_layers[name].material for name in carcass(case)}
+    for layer in case.case.rebar_layers.values():
+        held = set(layer.regions or ()) & set(held_regions(case.section))
+        if layer.line != line and layer.material in own and held:
+            return layer.line, list(layer.regions or ())
+    return None
+
+
+def held_regions(section: Section) -> list[str]:
+    """Regions that the rim holds."""
+    edge = rim_edge(section)
+    return [name for name, _, last in _regions(section) if last > edge]
 
 
 def belt_edge(case: LoadedCase) -> int:

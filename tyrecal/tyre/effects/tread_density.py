@@ -5,17 +5,17 @@ from __future__ import annotations
 from ..case import LoadedCase
 from .edit import with_part, with_rubbers_at
 from .effect import Effect
-from .parts import belt_lines, crown
+from .parts import crown, tread
 
 
 def add(case: LoadedCase, value: float) -> LoadedCase:
-    """Density outside the outer belt times 1 + value."""
+    """Density of the tread, outside belts and under-tread, times 1 + value."""
     if not value > -1:
         raise ValueError("must be greater than -1")
     return with_rubbers_at(
         case,
         crown(case),
-        (belt_lines(case)[-1], case.section.names[-1]),
+        tread(case),
         "tread",
         lambda m: with_part(m, density_kg_per_m3=(1 + value) * m.density_kg_per_m3),
     )

@@ -5,14 +5,14 @@ from __future__ import annotations
 from ..case import LoadedCase
 from .edit import with_gauge
 from .effect import Effect
-from .parts import belt_lines, crown
+from .parts import crown, tread
 
 
 def add(case: LoadedCase, value: float) -> LoadedCase:
-    """Gauge between the outer belt and the surface times 1 - value."""
+    """Gauge of the tread, outside belts and under-tread, times 1 - value."""
     if not -1 <= value <= 0.9:
         raise ValueError("must be between -1 and 0.9 of the tread's gauge")
-    return with_gauge(case, (belt_lines(case)[-1], case.section.names[-1]), crown(case), 1 - value)
+    return with_gauge(case, tread(case), crown(case), 1 - value)
 
 
 EFFECT = Effect(

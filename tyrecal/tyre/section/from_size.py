@@ -1,8 +1,8 @@
 """A section from a size code and a few gauges; what the code leaves open has usual values.
 
-It is an equivalent section: a smooth tread of the rubber's mean thickness, one rubber, the carcass
-in equilibrium, no bead wire. Gauges are estimates, which grow with the nominal width S1; with
-them the published 205/60R15 has its mass. Measure yours.
+The tread is smooth, of its rubber's mean thickness, the carcass in equilibrium. It is turned up
+round the bead: from the rim on it runs on both sides of the filler. Gauges are estimates, which
+grow with the nominal width S1; with them tyres have their usual mass. Measure yours.
 """
 
 from __future__ import annotations
@@ -12,26 +12,33 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
+from .construction import BASE, CAP, LIGHT_TRUCK, PASSENGER, TRUCK, TURN_UP, Construction
 from .gauge_table import GaugeTable
-from .meridian import meridian
+from .meridian import Meridian, meridian
 from .section import SectionError
 from .size import TyreSize
 
-STATIONS = {"crown": 16, "shoulder": 4, "upper_sidewall": 16, "lower_sidewall": 16, "bead": 4}
-"""Intervals between stations by region; the shoulder lies between the two belts' edges."""
-LINE_NAMES = ("inner", "ply", "belt1", "belt2", "outer")
+Array = np.ndarray
+BELTED = {"crown": 16, "belt_edges": 4, "shoulder": 4}
+BELOW = {"upper_sidewall": 16, "lower_sidewall": 10, "filler": 8, "bead": 4}
+"""Intervals between stations by region. Those under the belts end where belts do: two of another
+width are the crown and the shoulder, more have ``belt_edges`` between."""
 WIDEST = 0.53  # of the section height: where a radial tyre is widest
 CROWN_RADIUS = 1.5  # of the carcass, times the section width over the aspect ratio
 SHOULDER = 0.85  # gauge at the wider belt's edge over the crown's
 BUTTRESS = 0.55  # of the arc from the belt to the widest point, where the sidewall's gauge begins
+STRIP = 0.4  # of what lies outside the carcass at the rim: the rim strip outside the turn-up
+NANOMETRE = 1e-9
 
 
 @dataclass(frozen=True)
 class Gauges:
     """Thicknesses and widths, m. crown: inner surface to the tread's, the grooves' volume spread
     over it; sidewall: at the widest point, bead: at the rim's flange, both over all; belt: width
-    of the wider belt along the carcass, the other is ``step`` narrower; rim: width between the
-    flanges; liner: inner surface to carcass; ply, belts: carcass to first belt, first to second."""
+    of the widest belt along the carcass; ``step``: of which others are narrower; rim: width
+    between the flanges; liner: inner surface to carcass; ply: carcass to first belt, or to its
+    turn-up above the filler; belts: from each belt to the next; cap: last belt to cap ply;
+    under_tread: last layer to the tread."""
 
     crown: float
     sidewall: float
@@ -42,42 +49,45 @@ class Gauges:
     ply: float
     belts: float
     step: float
+    cap: float
+    under_tread: float
+
+
+def construction(size: TyreSize) -> Construction:
+    """What a tyre of this size is made of."""
+    return TRUCK if size.truck else LIGHT_TRUCK if size.light_truck else PASSENGER
 
 
 def usual(size: TyreSize, rim: float | None = None) -> Gauges:
     """Usual gauges of a size, on its measuring rim or one of another width, m."""
+    made = construction(size)
     aspect = size.section_height / size.width
-    belt = min(max(0.75 + 0.5 * (0.65 - aspect), 0.75), 0.90) * size.width
-    rim = size.measuring_rim if rim is None else rim
-    if size.light_truck:
-        return Gauges(
-            crown=9.5e-3 + 0.03 * size.width,
-            sidewall=4.5e-3 + 0.015 * size.width,
-            bead=11e-3 + 0.02 * size.width,
-            belt=belt,
-            rim=rim,
-            liner=1.8e-3,
-            ply=1.6e-3,
-            belts=1.5e-3,
-            step=0.015,
+    grown = {
+        name: a + b * size.width
+        for name, (a, b) in (
+            ("crown", made.crown),
+            ("sidewall", made.sidewall),
+            ("bead", made.bead),
         )
+    }
     return Gauges(
-        crown=7e-3 + 0.03 * size.width,
-        sidewall=3e-3 + 0.01 * size.width,
-        bead=8e-3 + 0.02 * size.width,
-        belt=belt,
-        rim=rim,
-        liner=1.2e-3,
-        ply=1.2e-3,
-        belts=1.2e-3,
-        step=0.010,
+        **grown,
+        belt=min(max(0.75 + 0.5 * (0.65 - aspect), 0.75), 0.90) * size.width,
+        rim=size.measuring_rim if rim is None else rim,
+        liner=made.liner,
+        ply=made.ply,
+        belts=made.belt,
+        step=made.step,
+        cap=made.cap_gauge,
+        under_tread=made.under_tread,
     )
 
 
 def build(size: TyreSize, gauges: Gauges) -> GaugeTable:
     """The half section of a size. Raises SectionError, one sentence, where there is none."""
-    g = gauges
-    _check(size, g)
+    g, made = gauges, construction(size)
+    layers = _layers(g, made)
+    _check(size, g, max(depth for depth, _ in layers.values()))
     width, half_belt = size.section_width(g.rim), g.belt / 2
     seat, flange = size.bead_seat_radius, size.flange_radius(g.rim)
     inside_bead = max(0.2 * g.bead, g.liner)
@@ -88,16 +98,13 @@ def build(size: TyreSize, gauges: Gauges) -> GaugeTable:
         belt=half_belt,
         widest=(radius, width / 2 - (g.sidewall - g.liner)),
         rim=(flange, g.rim / 2),
-        seat=seat + 2e-3,
+        # of a 15 degree seat, under the carcass; one of 5 degrees is as good as flat
+        seat=seat + 2e-3 - np.tan(np.radians(15 * size.truck)) * (g.bead - inside_bead),
         offset=g.bead - inside_bead,
     )
-    ends = [0.0, half_belt - g.step / 2, half_belt, line.widest, line.rim, line.end]
-    arc, labels = [0.0], ["crown"]
-    for (name, count), a, b in zip(STATIONS.items(), ends, ends[1:], strict=False):
-        arc += list(a + (b - a) * np.arange(1, count + 1) / count)
-        labels += [name] * count
-    labels[-STATIONS["bead"] - 1] = "bead"  # the rim holds the station that the two share
-    s = np.array(arc)
+    tip = line.rim - made.filler * (line.rim - line.widest)
+    edges = sorted({edge for _, edge in layers.values()})
+    s, labels = _stations([*edges, line.widest, tip, line.rim, line.end])
     buttress = half_belt + BUTTRESS * (line.widest - half_belt)
     total = PchipInterpolator(
         [0, half_belt / 2, half_belt, buttress, line.widest, line.rim, line.end],
@@ -106,17 +113,49 @@ def build(size: TyreSize, gauges: Gauges) -> GaugeTable:
     inside = PchipInterpolator(
         [0, line.widest, line.rim, line.end], [g.liner, g.liner, inside_bead, inside_bead]
     )(s)
-    tiny = 1e-9
-    rows = np.stack(
-        [
-            -inside,
-            np.zeros_like(s),
-            np.where(s <= half_belt + tiny, g.ply, np.nan),
-            np.where(s <= half_belt - g.step / 2 + tiny, g.ply + g.belts, np.nan),
-            total - inside,
-        ]
+    rows = {"inner": -inside, "ply": np.zeros_like(s), "outer": total - inside}
+    for name, (depth, edge) in layers.items():
+        rows[name] = np.where(s <= edge + NANOMETRE, depth, np.nan)
+    filled = (1 - STRIP) * (g.bead - inside_bead)
+    turned = PchipInterpolator(
+        [line.widest, tip, line.rim, line.end], [g.ply, g.ply, filled, filled]
     )
-    table = GaugeTable(LINE_NAMES, "ply", line.at(s), rows, labels, s >= line.rim - tiny)
+    there = s >= (line.widest if made.high else tip) - NANOMETRE
+    rows[TURN_UP][there] = turned(s[there])
+    gauged = np.stack([rows[name] for name in made.lines])
+    table = GaugeTable(made.lines, "ply", line.at(s), gauged, labels, s >= line.rim - NANOMETRE)
+    _check_width(size, table, line, s, width)
+    return table
+
+
+def _layers(g: Gauges, made: Construction) -> dict[str, tuple[float, float]]:
+    """Distance from the carcass and half a width of every line under the tread, m."""
+    belts = made.lines[2 : 2 + len(made.belts)]
+    found = {
+        name: (g.ply + i * g.belts, (belt.share * g.belt - belt.steps * g.step) / 2)
+        for i, (name, belt) in enumerate(zip(belts, made.belts, strict=True))
+    }
+    last = found[belts[-1]][0]
+    if made.cap:
+        last += g.cap
+        found[CAP] = last, g.belt / 2
+    return {**found, BASE: (last + g.under_tread, g.belt / 2)}
+
+
+def _stations(ends: list[float]) -> tuple[Array, list[str]]:
+    """Arcs of the stations of regions that end at ``ends``, and each station's region."""
+    belted = len(ends) - len(BELOW)
+    names = ["crown", *["belt_edges"][: belted - 2], "shoulder"][:belted]
+    counts = {**{name: BELTED[name] for name in names}, **BELOW}
+    arc, labels = [0.0], ["crown"]
+    for (name, count), a, b in zip(counts.items(), [0.0, *ends], ends, strict=False):
+        arc += list(a + (b - a) * np.arange(1, count + 1) / count)
+        labels += [name] * count
+    labels[-BELOW["bead"] - 1] = "bead"  # the rim holds the station that the two share
+    return np.array(arc), labels
+
+
+def _check_width(size: TyreSize, table: GaugeTable, line: Meridian, s: Array, width: float) -> None:
     outside = table.section().points[-1, :, 1]
     at = s[np.argmax(outside)]
     if outside.max() > width / 2 + 1e-5:
@@ -125,13 +164,12 @@ def build(size: TyreSize, gauges: Gauges) -> GaugeTable:
             f"{size.text}: {what} too wide for a section {1e3 * width:.1f} mm wide, the tyre would"
             f" bulge beyond it at {1e3 * at:.0f} mm along the carcass"
         )
-    return table
 
 
-def _check(size: TyreSize, g: Gauges) -> None:
-    """Gauges that no tyre has, in words."""
+def _check(size: TyreSize, g: Gauges, depth: float) -> None:
+    """Gauges that no tyre has, in words. depth: from the carcass to the tread."""
     width = size.section_width(g.rim)
-    least = g.liner + g.ply + g.belts + 1e-3
+    least = g.liner + depth + 1e-3
     for name, value, low, high in (
         ("rim width", g.rim, 0.5 * size.width, 1.1 * size.width),
         ("crown", g.crown, least / SHOULDER, 0.25 * size.section_height),

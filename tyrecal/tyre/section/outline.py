@@ -8,10 +8,12 @@ from pathlib import Path
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-from .from_size import LINE_NAMES, STATIONS
 from .section import Section, SectionError, millimetres, refuse_separators
 
 Array = np.ndarray
+STATIONS = {"crown": 16, "shoulder": 4, "upper_sidewall": 16, "lower_sidewall": 16, "bead": 4}
+"""Intervals between stations by region; the shoulder lies between the two belts' edges."""
+LINE_NAMES = ("inner", "ply", "belt1", "belt2", "outer")
 DENSE = 600  # points of a curve between which it is straight
 HELD = 0.15  # of the inner curve, at its end, where the rays turn to join the curves' ends
 

@@ -21,6 +21,7 @@ from .spline import CubicSpline
 
 Array = np.ndarray
 GAUGE = "_gauge_mm"
+STEPLESS = 1e-9  # m
 GaugeFactor = tuple[tuple[str, ...], tuple[str, str], float]  # regions, (line, line), factor
 
 
@@ -172,23 +173,34 @@ def fill_lines(section: Section) -> Array:
     """Lines (line, station, 2) made whole for a mesh.
 
     Where a line is absent it keeps the fraction of the thickness, between the nearest lines
-    that exist, of the station where it ends, so that element rows run on without a step.
+    that exist, of the station where it ends, so that element rows run on without a step. Between
+    two parts of a line it goes over from the one's fraction to the other's.
     """
     points = section.points.copy()
     present = ~np.isnan(points).any(-1)
+
+    def as_at(near: int, k: int, j: int) -> Array:
+        """Line k at station j as its fraction at ``near`` has it."""
+        both = present[:, j] & present[:, near]
+        above = next(m for m in range(k + 1, len(section.names)) if both[m])
+        start, end = points[k - 1, near], points[above, near]  # already made whole
+        span = end - start
+        fraction = (points[k, near] - start) @ span / (span @ span)
+        found: Array = points[k - 1, j] + fraction * (points[above, j] - points[k - 1, j])
+        return found
+
     for k in range(1, len(section.names) - 1):
         have = np.flatnonzero(present[k])
         if not len(have):
             raise SectionError(f"line '{section.names[k]}' has no station at all")
-        for j in np.flatnonzero(~present[k]):
+        for j in np.flatnonzero(~present[k]).tolist():
             near = have[np.argmin(abs(have - j))]
-            below = k - 1  # already made whole
-            both = present[:, j] & present[:, near]
-            above = next(m for m in range(k + 1, len(section.names)) if both[m])
-            start, end = points[below, near], points[above, near]
-            span = end - start
-            fraction = (points[k, near] - start) @ span / (span @ span)
-            points[k, j] = points[below, j] + fraction * (points[above, j] - points[below, j])
+            points[k, j] = as_at(near, k, j)
+            beyond = have[have > j] if near < j else have[have < j][::-1]
+            if len(beyond):
+                other = as_at(beyond[0], k, j)
+                if abs(other - points[k, j]).max() > STEPLESS:
+                    points[k, j] += (j - near) / (beyond[0] - near) * (other - points[k, j])
     return points
 
 
