@@ -9,7 +9,7 @@ import pytest
 
 from tyrecal.simulate.deck.abaqus import claimed, solid_claims
 from tyrecal.tyre.case import LoadedCase
-from tyrecal.tyre.case.new_case import from_size
+from tyrecal.tyre.case.new_case import from_file, from_size
 from tyrecal.tyre.effects import EffectRefused
 from tyrecal.tyre.load import load_case
 from tyrecal.tyre.resolve import Tyre, resolved
@@ -99,3 +99,12 @@ def test_variables_and_spreads_are_of_the_case(case: LoadedCase, tmp_path: Path)
     rubbers = {f"{name}_C10" for name in CODES[case.case.size].compounds}
     assert rubbers < set(spreads) and spreads["bead_filler_C10"].percent
     assert case.case.road.loads_N == sorted(set(case.case.road.loads_N))
+
+
+def test_the_table_of_a_size_keeps_its_compounds(case: LoadedCase) -> None:
+    """Given again as a section of one's own."""
+    again = from_file(case.folder / "tyre.csv", parse_size(case.case.size), None, None)
+    (case.folder / "again.yaml").write_text(again.text)
+    other = load_case(case.folder / "again.yaml").case
+    for part in ("materials", "solids", "rebar_layers", "variables"):
+        assert getattr(other, part) == getattr(case.case, part)

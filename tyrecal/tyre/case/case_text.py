@@ -64,13 +64,14 @@ def plain_text(words: str) -> str:
 
 def flow(part: Any, indent: int) -> str:
     """A part of a case on as few lines as it takes, ``indent`` blanks before all but the first."""
+    held = _flow(part).replace(": ", ":\0")  # a key and its value stay on one line
     return textwrap.fill(
-        _flow(part),
+        held,
         LETTERS_A_LINE - indent,
         subsequent_indent=(indent + 1) * " ",
         break_long_words=False,
         break_on_hyphens=False,
-    )
+    ).replace("\0", " ")
 
 
 def _flow(part: Any) -> str:

@@ -13,11 +13,12 @@ from ...errors import InputError
 from ...files import read_bytes
 from ...units import INCH
 from ..load import validate
-from ..section.from_size import build, construction, usual
-from ..section.section import SectionError, refuse_separators
+from ..section.construction import PASSENGER, TRUCK
+from ..section.from_size import BELOW, build, construction, usual
+from ..section.section import Section, SectionError, refuse_separators
 from ..section.size import TyreSize
 from .case_text import new_case
-from .made_of import constructed, one_rubber
+from .made_of import MadeOf, constructed, one_rubber
 from .parts import Outline, SectionSource
 from .stations import read_section_of
 
@@ -98,7 +99,7 @@ def from_file(
         section = read_section_of(source, file.parent)
         text = new_case(
             section,
-            one_rubber(section, 2 if size and size.light_truck else 1),
+            _made_of(section, size),
             file.name,
             size.text + " with a section of its own" if size else file.stem,
             size.text if size else "not given",
@@ -113,6 +114,15 @@ def from_file(
         raise InputError(f"{file}: must be text in UTF-8") from None
     except csv.Error as error:
         raise InputError(f"{file}: {error}") from None
+
+
+def _made_of(section: Section, size: TyreSize | None) -> MadeOf:
+    """Of compounds where the lines and regions are those that a size gives, else of one rubber."""
+    regions = {name for name, _ in section.regions}
+    for made in [construction(size)] if size else [PASSENGER, TRUCK]:
+        if section.names == made.lines and regions.issuperset(BELOW):
+            return constructed(made, section)
+    return one_rubber(section, 2 if size and size.light_truck else 1)
 
 
 def _is_outline(file: Path) -> bool:
