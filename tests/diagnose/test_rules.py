@@ -253,6 +253,16 @@ def test_outside_is_half_unknown_effects_and_half_errors_of_reading() -> None:
     )
     ln = lambda extra: refit(p, {}, 1, extra).ln_evidence[0]
     unknown = [ln(size**2 * same) for size in UNKNOWN] + [ln((k**2 - 1) * S) for k in INFLATION]
+    between = np.array(
+        [[0.9 if a.pressure_kPa != b.pressure_kPa else 1.0 for b in rows] for a in rows]
+    )
+    labels, y = [row.label for row in rows], p.observations.y
+    kind = lambda label: "[0,0]" if label.kind else label.family
+    for near in (
+        [[(kind(a) == kind(b)) * np.exp(-((a.c - b.c) ** 2) / 8) for b in labels] for a in labels],
+        np.exp(-2 * (y[:, None] - y) ** 2),
+    ):
+        unknown += [ln(size**2 * between * np.array(near)) for size in UNKNOWN]
     misread = []
     for label in LABELS:
         hit = np.array([row.label == label for row in rows])

@@ -16,9 +16,11 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from .covariance import alike
+from .covariance import BETWEEN_PRESSURES, alike
 from .expansion import Nodes
+from .gap import family
 from .inverse_problem import InverseProblem
+from .observations import Observable
 from .veering import rule
 
 Array = np.ndarray
@@ -37,6 +39,7 @@ FAR_BELOW, ABOVE_POINTS = (
 PAIR_POINTS = 3  # of the rule in what couples modes, that stand for all where effects are paired
 PARTNERS = 4  # singles that are tried with every other
 UNKNOWN = (0.005, 0.01, 0.02, 0.04)  # shift of modes by what no catalogue holds
+SMOOTH_HARMONICS, SMOOTH_LN_F = 2.0, 0.5  # over which trends change
 INFLATION = (2.0, 4.0)  # all of Sigma's standard deviations
 MISREAD = 0.2  # of a frequency whose label is another mode's
 
@@ -80,6 +83,17 @@ class Hypothesis:
     def best(self) -> int:
         """The most probable parameters' place on the grid, its weights aside."""
         return int(np.argmax(self.fitted.ln_evidence))
+
+    @property
+    def at_bound(self) -> list[str]:
+        """Effects whose most probable parameter is the last one of the grid: more would fit
+        better."""
+        ends = {id: (e[self.best], e.min(), e.max()) for id, e in self.values.items()}
+        return [
+            id
+            for id, (e, low, high) in ends.items()
+            if low < high and ((e == high and e > 0) or (e == low and e < 0))
+        ]
 
     def mean(self) -> dict[str, float]:
         """Mean parameters."""
@@ -220,15 +234,23 @@ def _pairs(problem: InverseProblem, singles: Sequence[Hypothesis]) -> list[Hypot
 def outside(problem: InverseProblem) -> Hypothesis:
     """What the catalogue does not hold: half of it unknown effects, half errors of reading.
 
-    Unknown effects shift modes by a random amount each, alike at all pressures, or all of Sigma
-    is too small; an error of reading: one label is another mode's at all pressures. ``words``
-    names the likeliest.
+    Unknown effects shift modes by a random amount each, or smoothly over the harmonic, each family
+    by itself, or smoothly over the frequency, alike at all pressures; or all of Sigma is too small.
+    An error of reading: one label is another mode's at all pressures. ``words`` names the
+    likeliest.
     """
     rows = problem.observations.rows
     same = alike(rows) * [row.label is not None for row in rows]
     unknown: list[tuple[str, Array]] = [
         (f"modes are off by {size:.1%} in a way of their own", size**2 * same) for size in UNKNOWN
     ]
+    pressure = np.array([row.pressure_kPa for row in rows])
+    between = np.where(pressure[:, None] == pressure, 1.0, BETWEEN_PRESSURES)
+    for over, together in _smooth(rows, problem.observations.y):
+        unknown += [
+            (f"modes are off by {size:.1%}, smoothly over {over}", size**2 * between * together)
+            for size in UNKNOWN
+        ]
     scatter = problem.sigma
     unknown += [(f"all scatter is {k:g} times as large", (k**2 - 1) * scatter) for k in INFLATION]
     reading: list[tuple[str, Array]] = []
@@ -243,6 +265,18 @@ def outside(problem: InverseProblem) -> Hypothesis:
     total = float(np.logaddexp.reduce(ln))
     _, words, best = parts[int(np.argmax(ln))]
     return Hypothesis(OUTSIDE, PRIOR_OUTSIDE, total, {}, np.zeros(1), best, words)
+
+
+def _smooth(rows: Sequence[Observable], y: Array) -> list[tuple[str, Array]]:
+    """Correlations (n, n) of modes, y = ln f, by trends, with words for each."""
+    kinds, modal = [family(row) for row in rows], np.array([row.label is not None for row in rows])
+    c = np.array([row.label.c if row.label else 0.0 for row in rows])
+    same = np.array([[a is not None and a == b for b in kinds] for a in kinds])
+    near = lambda x, length: np.exp(-((x[:, None] - x) ** 2) / (2 * length**2))
+    return [
+        ("the harmonic, each family by itself", same * near(c, SMOOTH_HARMONICS)),
+        ("the frequency", np.outer(modal, modal) * near(y, SMOOTH_LN_F)),
+    ]
 
 
 def explain(

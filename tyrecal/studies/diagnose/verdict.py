@@ -34,8 +34,9 @@ def decide(
 ) -> Verdict:
     """The verdict by fixed rules.
 
-    named: p >= 0.7, the fit with it has p > 0.01, p(none) < 0.05; outside: p >= 0.5 and p(none) <
-    0.05, or nothing that fits; no_gap: "none" is likelier than it was before, and likeliest.
+    named: p >= 0.7, the fit with it has p > 0.01, p(none) < 0.05, and no size at the bound of its
+    range; outside: p >= 0.5 and p(none) < 0.05, or nothing that fits; no_gap: "none" is likelier
+    than it was before, and likeliest.
     """
     order = sorted(probabilities, key=lambda key: -probabilities[key])
     totals = np.cumsum([probabilities[key] for key in order])
@@ -53,10 +54,16 @@ def decide(
         return verdict(UNDECIDED, "cannot tell: there are no more data than design variables")
     sure = best is not None and probabilities[best] >= SURE
     if sure and check > CHECK and none < RULED_OUT:
+        assert best is not None
+        if at_bound := by_key[best].at_bound:
+            ids = " and ".join(at_bound)
+            words = f"there is a gap; {best} comes nearest, with {ids} at the bound of its range"
+            return verdict(UNDECIDED, words)
         return verdict(NAMED, f"{best} explains the gap")
     if none < RULED_OUT and (probabilities[OUTSIDE] >= 0.5 or (sure and check <= CHECK)):
-        gap = "there is a gap, and nothing in the catalogue explains it"
-        return verdict(OUTSIDE, f"{gap}: {by_key[OUTSIDE].words}")
+        likely = f"{best} explains most of it and does not fit"
+        gap = likely if sure else "no effect of the catalogue is as likely as something else"
+        return verdict(OUTSIDE, f"there is a gap, and {gap}: {by_key[OUTSIDE].words}")
     if order[0] == NONE and none > PRIOR_NONE:
         return verdict(NO_GAP, "no gap is seen")
     gap = "there is a gap" if none < RULED_OUT else "there may be a gap"
