@@ -26,11 +26,9 @@ FIELD_UNITS = {"meridian": ("mm", 1e3), "gauge": ("%", 100.0)}  # compounds in p
 def section_told(
     case: LoadedCase, sources: Sequence[Source], diagnosis: Diagnosis
 ) -> list[FieldValue]:
-    """Meridian and gauges amid each region, compounds by part; empty without fields."""
+    """Meridian and gauges amid each region, compounds by part."""
     problem = diagnosis.bare
     columns = [k for k, source in enumerate(sources) if source.field]
-    if not columns:
-        return []
     P, _, _ = projection(problem, diagnosis.hypothesis(NONE).fitted.d[0])
     G = problem.constants[:, columns]
     if problem.zeta:

@@ -54,7 +54,8 @@ class DiagnosedCase:
     @property
     def section(self) -> list[FieldValue]:
         """See `section_told`."""
-        return section_told(self.model.case, self.sources, self.diagnosis)
+        stated = any(source.field for source in self.sources)
+        return section_told(self.model.case, self.sources, self.diagnosis) if stated else []
 
     @property
     def asked_for(self) -> tuple[str, ...] | None:
