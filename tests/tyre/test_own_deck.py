@@ -13,13 +13,14 @@ from tyrecal.cli.main import main
 from tyrecal.simulate.deck.own import asked_by_abaqus, trial
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
-from tyrecal.tyre.case import start_values
+from tyrecal.tyre.case import LoadedCase, start_values
 from tyrecal.tyre.case.identity import tyre_sha256
 from tyrecal.tyre.case.own_case import own_case
 from tyrecal.tyre.load import load_case
 from tyrecal.tyre.own_deck.flat import Flat
-from tyrecal.tyre.own_deck.own_deck import read_own_deck
+from tyrecal.tyre.own_deck.own_deck import OwnDeck, Units, read_own_deck
 from tyrecal.tyre.own_deck.text import OwnDeckError
+from tyrecal.tyre.resolve import resolved
 from tyrecal.tyre.values import with_values
 
 from . import own_deck_mutants, own_decks
@@ -210,6 +211,19 @@ def test_a_tyre_is_the_same_however_its_paths_are_written(tmp_path: Path) -> Non
     assert tyre_sha256(load_case(case)) != first
 
 
+def test_validate_reads_a_deck_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    case, asked = write(tmp_path, own_decks.plain()), list[Path]()
+
+    def reading(path: Path, units: Units | None = None) -> OwnDeck:
+        asked.append(path)
+        return read_own_deck(path, units)
+
+    monkeypatch.setattr("tyrecal.tyre.case.deck_file.read_own_deck", reading)
+    with pytest.raises(SystemExit) as ended:
+        main(["validate", str(case)])
+    assert not ended.value.code and len(asked) == 1
+
+
 def test_what_stays_the_same_is_built_once(tmp_path: Path) -> None:
     """A layer's area, a constant, a parameter of either: the mesh is the one that was."""
     (tmp_path / "tyre.inp").write_text(own_decks.parameters())
@@ -239,3 +253,54 @@ def test_studies_take_such_a_case(tmp_path: Path) -> None:
     assert run("modes", str(case), "--set", "effects.bead_filler=0.5") == 2
     assert run("modes", str(case), "--set", "rebar carcass/AREA=3e-7") == 2  # a variable sets it
     assert run("modes", str(case), "--solver", "calculix") == 2
+
+
+def with_parts(folder: Path, **parts: list[str]) -> LoadedCase:
+    """The case of a deck with a tread of its own, whose sets are named."""
+    case = write(folder, own_decks.two_compounds())
+    named = f"  parts: {json.dumps(parts)}\n  numbers: {{"
+    case.write_text(case.read_text().replace("  numbers: {", named))
+    return load_case(case)
+
+
+def test_effects_of_named_parts_change_their_numbers(tmp_path: Path) -> None:
+    """And no other: what the deck says is that of the same numbers set by hand."""
+    parts = {"tread": ["tread"], "bead_filler": ["BODY"], "belts": ["BELT"]}
+    case = with_parts(tmp_path, **parts)
+    assert case.case.deck
+    plain = case.case.deck.numbers
+    of_rubber, of_tread = (f"material {m} / HYPERELASTIC / " for m in ("RUBBER", "TREAD"))
+    for effect, value, expected in (
+        ("tread_density", 0.1, {"material TREAD / DENSITY / density": 1.1}),
+        (
+            "bead_filler",
+            1.0,
+            {f"{of_rubber}{name}": f for name, f in (("C10", 2.0), ("C01", 2.0), ("D1", 0.5))},
+        ),
+        ("belt_angle", 2.0, {"rebar BELT_1 / angle": 68 / 70, "rebar BELT_2 / angle": 112 / 110}),
+        (
+            "temperature",
+            20.0,
+            {f"{of}{name}": 0.85 for of in (of_rubber, of_tread) for name in ("C10", "C01")},
+        ),
+    ):
+        found = resolved(with_values(case, {f"effects.{effect}": value})).case.deck
+        assert found
+        by_hand = {path: factor * plain[path] for path, factor in expected.items()}
+        assert found.numbers == pytest.approx({**plain, **by_hand}, rel=1e-12)
+    with pytest.raises(ValueError, match="cap_ply changes lines or regions of a section"):
+        resolved(with_values(case, {"effects.cap_ply": 1e-5}))
+
+
+@pytest.mark.parametrize(
+    ("parts", "words"),
+    [
+        ({}, r"needs the sets of tread: name them in deck.parts.tread"),
+        ({"tread": ["OTHER"]}, "OTHER is none of TREAD, BODY"),
+    ],
+)
+def test_an_effect_that_knows_no_part_is_refused_by_name(
+    tmp_path: Path, parts: dict[str, list[str]], words: str
+) -> None:
+    with pytest.raises(ValueError, match=words):
+        resolved(with_values(with_parts(tmp_path, **parts), {"effects.tread_density": 0.1}))

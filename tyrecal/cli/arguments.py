@@ -34,9 +34,10 @@ def load(
         if mesh_level:
             case = with_level(case, mesh_level)
         names = set(case.case.variables)
-        numbers = case.case.deck.numbers if case.case.deck else {}
         pairs = [parse_assignment(text) for text in assigned]
-        given = _once([(as_known(name, numbers), value) for name, value in pairs], pressure_kPa)
+        given = _once(
+            [(as_known(name, case.deck_numbers), value) for name, value in pairs], pressure_kPa
+        )
         for name, variable in case.case.variables.items():
             for number in set(variable.sets) & set(given):
                 raise click.UsageError(

@@ -105,9 +105,9 @@ def _check(path: Path, mesh: str, assignments: tuple[str, ...], terminal: Termin
     numbers: Mapping[str, float] = {}
     if path.suffix in (".yaml", ".yml"):
         loaded, _ = arguments.load(path, mesh, assignments, None, terminal, True)
-        if loaded.deck is None or loaded.case.deck is None:
+        if loaded.deck is None:
             raise click.UsageError(f"'{path}' names no deck of your own: 'tyrecal validate' judges")
-        deck, numbers = loaded.deck, loaded.case.deck.numbers
+        deck, numbers = loaded.deck, loaded.deck_numbers
     else:
         if not path.is_file():
             raise click.UsageError(f"there is no file '{path}'")

@@ -12,6 +12,7 @@ from .main import EXIT_INPUT
 from .terminal import Terminal
 
 if TYPE_CHECKING:
+    from ..tyre.case import LoadedCase
     from ..tyre.case.mistakes import Mistake
 
 
@@ -29,10 +30,10 @@ def command(case: Path, allow_unusual: bool, terminal: Terminal) -> int:
     tyrecal validate my.yaml --json
     """
     from ..tyre.case import overruled
-    from ..tyre.load import load_case, validate
+    from ..tyre.load import judged
 
-    mistakes = validate(case, allow_unusual)
-    if not mistakes and (refused := _refused(case, allow_unusual)):
+    loaded, mistakes = judged(case, allow_unusual)
+    if loaded and (refused := _refused(loaded)):
         mistakes = [refused]
     for mistake in mistakes:
         terminal.error(str(mistake))
@@ -48,9 +49,8 @@ def command(case: Path, allow_unusual: bool, terminal: Terminal) -> int:
             for m in mistakes
         ]
     )
-    if mistakes:
+    if mistakes or loaded is None:
         return EXIT_INPUT
-    loaded = load_case(case, allow_unusual)
     for sentence in overruled(loaded):
         terminal.warn(sentence)
     terminal.say(f"{case}: no mistakes")
@@ -59,15 +59,13 @@ def command(case: Path, allow_unusual: bool, terminal: Terminal) -> int:
     return 0
 
 
-def _refused(path: Path, allow_unusual: bool) -> Mistake | None:
+def _refused(loaded: LoadedCase) -> Mistake | None:
     """What the bundled solver refuses of a deck of one's own that is meant for it."""
     from ..simulate.deck.own import trial
     from ..tyre.case.mistakes import Mistake
-    from ..tyre.load import load_case
     from ..tyre.own_deck.text import OwnDeckError
     from ..tyre.resolve import resolved
 
-    loaded = load_case(path, allow_unusual)
     if not loaded.deck or loaded.case.solver.name != "bundled":
         return None
     try:

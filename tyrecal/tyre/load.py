@@ -37,14 +37,21 @@ def validate(path: Path | str, allow_unusual: bool = False) -> list[Mistake]:
 
     Targets that no fit can use are mistakes here, though other studies do without.
     """
+    return judged(path, allow_unusual)[1]
+
+
+def judged(
+    path: Path | str, allow_unusual: bool = False
+) -> tuple[LoadedCase | None, list[Mistake]]:
+    """The case, None where it is wrong, and the mistakes that `validate` finds."""
     loaded, mistakes = _read(Path(path), allow_unusual)
     if loaded and loaded.case.targets.weights and loaded.case.variables:
         reason = cannot_fit(loaded.case.targets.weights, len(loaded.case.variables))
         if reason:
             document = read_document(Path(path))
             document.add(("targets",), reason)
-            return document.mistakes
-    return mistakes
+            return None, document.mistakes
+    return loaded, mistakes
 
 
 def _read(path: Path, allow_unusual: bool) -> tuple[LoadedCase | None, list[Mistake]]:

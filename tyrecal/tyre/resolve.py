@@ -25,21 +25,6 @@ CAPABILITIES = {
 }
 
 
-# effects that know nothing of what the section is made of
-WITHOUT_A_SECTION = (
-    "pressure_offset",
-    "cavity_air",
-    "spindle_lateral",
-    "spindle_radial",
-    "spindle_torsional",
-    "spindle_tilt",
-    "wheel_free",
-    "point_mass",
-    "road_contact",
-    "rotation",
-)
-
-
 @dataclass(frozen=True, eq=False)
 class Tyre:
     """A tyre as it is modelled: of all its effects none is left to apply."""
@@ -60,9 +45,8 @@ class Tyre:
     @cached_property
     def flat(self) -> Flat:
         """The deck of the tyre's section, of a case that names one. Raises OwnDeckError."""
-        deck, source = self.written.deck, self.case.deck
-        assert deck and source
-        return deck.flat(source.numbers)
+        assert self.written.deck
+        return self.written.deck.flat(self.written.deck_numbers)
 
     @cached_property
     def gauged(self) -> Section:
@@ -96,12 +80,8 @@ def resolved(case: LoadedCase) -> Tyre:
     if present:
         case = replace(case, case=case.case.model_copy(update={"effects": dict.fromkeys(IDS, 0.0)}))
     for id in sorted(present, key=IDS.index):
-        if case.deck and id not in WITHOUT_A_SECTION:
-            known = ", ".join(WITHOUT_A_SECTION)
-            reason = f"changes lines or rubbers of a section, a deck has these effects: {known}"
-            raise EffectRefused(id, reason, present[id])
         try:
-            before, case = case, catalogue()[id].add(case, present[id])
+            before, case = case, catalogue()[id].of(case)(case, present[id])
             if (case.section, case.case.section) != (before.section, before.case.section):
                 section_mesh(case.case, _gauged(case.case, case.section))  # refuses what folds over
         except ValueError as error:

@@ -52,7 +52,7 @@ def own_jobs(tyre: Tyre) -> tuple[dict[str, str], dict[str, Any]]:
     pressure = c.pressure_kPa * 1e3 * UNIT_LENGTH[deck.units] / UNIT_MASS[deck.units]
     if isclose(row.number(field), pressure, rel_tol=1e-12):
         pressure = row.number(field)
-    files = own_texts(deck, c.deck.numbers, pressure)
+    files = own_texts(deck, tyre.written.deck_numbers, pressure)
     files["inflate.inp"] = files.pop(deck.path.name)
     loads = [block for block in flat.found.inflation if block.name == "DSLOAD"]
     node, (r, z) = flat.model.reference

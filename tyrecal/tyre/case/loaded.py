@@ -29,6 +29,11 @@ class LoadedCase:
     deck: OwnDeck | None = None  # that the section is of, where the case names one
 
     @property
+    def deck_numbers(self) -> Mapping[str, float]:
+        """Of the deck, by mark or path; none where the case names none."""
+        return self.case.deck.numbers if self.case.deck else {}
+
+    @property
     def files(self) -> list[Path]:
         """That the section stands in."""
         if self.deck:

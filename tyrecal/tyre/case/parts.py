@@ -170,18 +170,27 @@ class SectionSource(Part):
             yield from one_of(values, "stations", "outline")
 
 
+DeckPart = Literal["tread", "bead_filler", "belts"]
+
+
 class DeckSource(Part):
     """An ABAQUS deck of the section, relative to the case file, in m or mm (with t, s, MPa).
 
     ``numbers``: of the marks in its text, by name, and others of its numbers, by path, in its own
     units; those not given are as the text has them. ``crown``: its set of nodes of the outer
-    surface over the belt, which ABAQUS gives shapes of.
+    surface over the belt, which ABAQUS gives shapes of. ``parts``: the
+    element sets of its sections that are the tread, the bead filler, the belts, for effects.
     """
 
     file: Text
     units: Literal["m", "mm"]
     crown: Text = "CROWN"
+    parts: dict[DeckPart, list[Text]] = Field(default_factory=dict)
     numbers: dict[Text, Number] = Field(default_factory=dict)
+
+    def sets(self, part: str) -> list[str]:
+        """Those of a part, as decks compare names; none where it is not named."""
+        return [name.upper() for key, names in self.parts.items() if key == part for name in names]
 
 
 class Level(Part):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from ..case import LoadedCase
+from .deck_numbers import stiffer, with_compounds
 from .edit import with_part, with_rubbers_at
 from .effect import Effect
 from .parts import carcass_line, lower_sidewall, turned_up
@@ -31,6 +32,13 @@ def add(case: LoadedCase, value: float) -> LoadedCase:
     )
 
 
+def add_to_deck(case: LoadedCase, value: float) -> LoadedCase:
+    """The same of the compounds of ``deck.parts.bead_filler``."""
+    if not value > -1:
+        raise ValueError("must be greater than -1")
+    return with_compounds(case, "bead_filler", "HYPERELASTIC", stiffer(1 + value, bulk=True))
+
+
 EFFECT = Effect(
     id="bead_filler",
     place=50,
@@ -48,4 +56,6 @@ EFFECT = Effect(
     toggle="section a tyre of the same build and measure the hardness above the bead",
     aliases=("cap_ply", "belt_width", "belt_angle"),
     add=add,
+    add_to_deck=add_to_deck,
+    part="bead_filler",
 )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from ..case import LoadedCase
+from .deck_numbers import with_angles
 from .edit import with_layers, with_part
 from .effect import Effect
 from .parts import belts
@@ -13,15 +14,24 @@ def add(case: LoadedCase, value: float) -> LoadedCase:
     moved = {}
     for name in belts(case):
         layer = case.case.rebar_layers[name]
-        angle = layer.angle_deg % 180  # a cord has no head
-        if not 0 < abs(90 - angle) + value < 90:
-            raise ValueError(
-                f"must leave a belt cord between circumference and meridian, '{name}' is"
-                f" {abs(90 - angle):g} degrees from the circumference"
-            )
-        side = 1 if angle > 90 else -1
-        moved[name] = with_part(layer, angle_deg=layer.angle_deg + side * value)
+        moved[name] = with_part(layer, angle_deg=_turned(name, layer.angle_deg, value))
     return with_layers(case, moved)
+
+
+def _turned(name: str, angle_deg: float, value: float) -> float:
+    """A belt cord's angle, degrees, ``value`` further from the circumference. Raises ValueError."""
+    angle = angle_deg % 180  # a cord has no head
+    if not 0 < abs(90 - angle) + value < 90:
+        raise ValueError(
+            f"must leave a belt cord between circumference and meridian, '{name}' is"
+            f" {abs(90 - angle):g} degrees from the circumference"
+        )
+    return angle_deg + (value if angle > 90 else -value)
+
+
+def add_to_deck(case: LoadedCase, value: float) -> LoadedCase:
+    """The same of the layers of ``deck.parts.belts``."""
+    return with_angles(case, "belts", lambda name, angle_deg: _turned(name, angle_deg, value))
 
 
 EFFECT = Effect(
@@ -42,4 +52,6 @@ EFFECT = Effect(
     toggle="peel the tread of a tyre of the same build and measure the angle, or X-ray it",
     aliases=("belt_width", "cap_ply", "bead_filler"),
     add=add,
+    add_to_deck=add_to_deck,
+    part="belts",
 )

@@ -30,5 +30,6 @@ EFFECT = Effect(
     toggle="inflate with helium (a seventh of the mass) or sulphur hexafluoride (five times)",
     aliases=("spindle_radial", "carcass_fanning"),
     add=add,
+    add_to_deck=add,
     needs="cavity",
 )

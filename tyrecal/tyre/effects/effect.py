@@ -24,7 +24,9 @@ class Effect:
     that would prove it; aliases: ids of effects that frequencies alone hardly tell from it; add:
     the case with the effect of that parameter (not 0) in it, written in the case's own numbers, or
     ValueError ("must be ...");
-    needs: what a solver must list among its capabilities to express it, "" = nothing.
+    needs: what a solver must list among its capabilities to express it, "" = nothing;
+    add_to_deck: `add` for a case of a user's deck, None = it changes lines or regions of a section;
+    part: of ``deck.parts``, which such a case must name for it, "" = none.
     """
 
     id: str
@@ -40,6 +42,18 @@ class Effect:
     add: Callable[[LoadedCase, float], LoadedCase]
     needs: str = ""
     place: int = 0
+    add_to_deck: Callable[[LoadedCase, float], LoadedCase] | None = None
+    part: str = ""
+
+    def of(self, case: LoadedCase) -> Callable[[LoadedCase, float], LoadedCase]:
+        """Its `add` for a case. Raises ValueError where the case has nothing that it changes."""
+        if case.deck is None or case.case.deck is None:
+            return self.add
+        if self.add_to_deck is None:
+            raise ValueError("changes lines or regions of a section, which a deck has none of")
+        if self.part and not case.case.deck.sets(self.part):
+            raise ValueError(f"needs the sets of {self.part}: name them in deck.parts.{self.part}")
+        return self.add_to_deck
 
     def within(self, capabilities: Collection[str]) -> bool:
         """Whether a solver with these capabilities can express it."""

@@ -31,5 +31,6 @@ EFFECT = Effect(
     toggle="measure again without it, or with twice of it",
     aliases=("tread_density",),
     add=add,
+    add_to_deck=add,
     needs="coupled",
 )

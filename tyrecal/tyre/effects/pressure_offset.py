@@ -32,4 +32,5 @@ EFFECT = Effect(
     toggle="check the gauge against a calibrated one, or measure again with another gauge",
     aliases=("tread_density", "sidewall_gauge"),
     add=add,
+    add_to_deck=add,
 )

@@ -43,5 +43,6 @@ EFFECT = Effect(
     toggle="lift the tyre off, or turn it between two measurements",
     aliases=("bead_filler",),
     add=add,
+    add_to_deck=add,
     needs="coupled",
 )

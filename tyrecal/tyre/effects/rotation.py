@@ -30,5 +30,6 @@ EFFECT = Effect(
     toggle="measure again at another speed, or at rest",
     aliases=("pressure_offset",),
     add=add,
+    add_to_deck=add,
     needs="rotation",
 )

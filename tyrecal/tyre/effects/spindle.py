@@ -24,6 +24,7 @@ def _spindle(key: str, along: str, **entry: Any) -> Effect:
         low=0.0,
         changes=("*SPRING", "*MASS", "*ROTARY INERTIA", "*BOUNDARY"),
         add=add,
+        add_to_deck=add,
         needs="spindle",
         **entry,
     )

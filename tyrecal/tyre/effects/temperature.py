@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from ..case import LoadedCase
+from .deck_numbers import stiffer, with_compounds
 from .edit import with_part, with_rubbers
 from .effect import Effect
 
@@ -11,12 +12,22 @@ PER_KELVIN = -0.0075  # of the shear modulus; filled tread rubbers at 20 to 60 C
 
 def add(case: LoadedCase, value: float) -> LoadedCase:
     """C10 and C01 times 1 - 0.0075 value; the bulk modulus 2 / D1 stays."""
-    factor = 1 + PER_KELVIN * value
-    if not factor > 0:
-        raise ValueError(f"must be less than {-1 / PER_KELVIN:g} K")
+    factor = _factor(value)
     return with_rubbers(
         case, lambda m: with_part(m, C10_Pa=factor * m.C10_Pa, C01_Pa=factor * m.C01_Pa)
     )
+
+
+def _factor(value: float) -> float:
+    factor = 1 + PER_KELVIN * value
+    if not factor > 0:
+        raise ValueError(f"must be less than {-1 / PER_KELVIN:g} K")
+    return factor
+
+
+def add_to_deck(case: LoadedCase, value: float) -> LoadedCase:
+    """The same of all compounds' shear constants."""
+    return with_compounds(case, "", "HYPERELASTIC", stiffer(_factor(value), bulk=False))
 
 
 EFFECT = Effect(
@@ -37,4 +48,5 @@ EFFECT = Effect(
     "(sealed, 15 K warmer, it gains 17 kPa at 240 kPa: +2.5 %)",
     aliases=("dynamic_stiffening", "sidewall_gauge"),
     add=add,
+    add_to_deck=add_to_deck,
 )

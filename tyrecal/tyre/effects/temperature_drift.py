@@ -12,7 +12,7 @@ def add(case: LoadedCase, value: float) -> LoadedCase:
     nominal = case.file_data["pressure_kPa"]
     kelvin = value * (case.case.pressure_kPa - nominal) / 100
     try:
-        return temperature.add(case, kelvin)
+        return temperature.EFFECT.of(case)(case, kelvin)
     except ValueError as error:
         raise ValueError(f"gives {kelvin:g} K at this pressure, which {error}") from None
 
@@ -35,4 +35,5 @@ EFFECT = Effect(
     toggle="measure the first pressure once more at the end of the run",
     aliases=("carcass_fanning",),
     add=add,
+    add_to_deck=add,
 )

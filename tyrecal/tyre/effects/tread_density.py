@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from ..case import LoadedCase
+from .deck_numbers import with_compounds
 from .edit import with_part, with_rubbers_at
 from .effect import Effect
 from .parts import crown, tread
@@ -19,6 +20,13 @@ def add(case: LoadedCase, value: float) -> LoadedCase:
         "tread",
         lambda m: with_part(m, density_kg_per_m3=(1 + value) * m.density_kg_per_m3),
     )
+
+
+def add_to_deck(case: LoadedCase, value: float) -> LoadedCase:
+    """The same of the compounds of ``deck.parts.tread``."""
+    if not value > -1:
+        raise ValueError("must be greater than -1")
+    return with_compounds(case, "tread", "DENSITY", lambda _, number: (1 + value) * number)
 
 
 EFFECT = Effect(
@@ -39,4 +47,6 @@ EFFECT = Effect(
     toggle="weigh the tyre; buff the tread smooth, weigh and measure again",
     aliases=("sidewall_gauge", "pressure_offset"),
     add=add,
+    add_to_deck=add_to_deck,
+    part="tread",
 )

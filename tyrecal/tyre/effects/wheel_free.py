@@ -46,5 +46,6 @@ EFFECT = Effect(
     toggle="bolt the hub to a heavy block, or hang the wheel in soft cords: the other support",
     aliases=("bead_filler",),
     add=add,
+    add_to_deck=add,
     needs="spindle",
 )

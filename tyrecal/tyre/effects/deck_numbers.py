@@ -1,0 +1,79 @@
+"""Effects on a user's deck: numbers of the parts that its case names in ``deck.parts``."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection
+
+from ..case import LoadedCase
+from ..own_deck.flat import Flat
+from ..own_deck.numbers import DIMENSIONS, OF_COMPLIANCE, OF_STRESS
+from .edit import changed, with_part
+
+Change = Callable[[str, float], float]  # of a number, by its field's or its layer's name
+
+
+def stiffer(factor: float, bulk: bool) -> Change:
+    """Shear constants times a factor; with ``bulk`` its modulus too."""
+
+    def change(field: str, number: float) -> float:
+        if DIMENSIONS.get(field) == OF_STRESS:
+            return factor * number
+        return number / factor if bulk and DIMENSIONS.get(field) == OF_COMPLIANCE else number
+
+    return change
+
+
+def with_compounds(case: LoadedCase, part: str, option: str, change: Change) -> LoadedCase:
+    """The case with the numbers of an option of a part's compounds changed, "" = all compounds.
+
+    Raises ValueError where a compound of the part is of others, too, or has marks for numbers.
+    """
+    numbers, flat, sets = _read(case, part)
+    material_of = dict(zip(map(str.upper, flat.sections), flat.materials, strict=True))
+    sets = _known(part, sets, material_of) if part else list(material_of)
+    for name in {material_of[own] for own in sets}:
+        others = [own for own, m in material_of.items() if m == name and own not in sets]
+        if others:
+            raise ValueError(f"needs a material of its own in {part}: {name} is of {others[0]} too")
+        start = f"material {name} / {option} / "
+        paths = [path for path in numbers if path.startswith(start)]
+        if not paths:
+            raise ValueError(f"needs plain numbers of {start.removesuffix(' / ')}, not marks")
+        for path in paths:
+            numbers[path] = change(path.rpartition(" / ")[2], numbers[path])
+    return _with(case, numbers)
+
+
+def with_angles(case: LoadedCase, part: str, change: Change) -> LoadedCase:
+    """The case with the angles of a part's layers changed, by their names. Raises ValueError."""
+    numbers, flat, sets = _read(case, part)
+    sets = _known(part, sets, [ply.set_name.upper() for ply in flat.plies])
+    for ply in flat.plies:
+        if ply.set_name.upper() in sets:
+            path = f"rebar {ply.name} / angle"
+            path = path if path in numbers else f"section {ply.set_name} / {path}"
+            if path not in numbers:
+                raise ValueError(f"needs a plain number for the angle of {ply.name}, not a mark")
+            numbers[path] = change(ply.name, numbers[path])
+    return _with(case, numbers)
+
+
+def _read(case: LoadedCase, part: str) -> tuple[dict[str, float], Flat, list[str]]:
+    assert case.deck and case.case.deck
+    numbers = dict(case.deck_numbers)
+    return numbers, case.deck.flat(numbers), case.case.deck.sets(part)
+
+
+def _known(part: str, sets: list[str], known: Collection[str]) -> list[str]:
+    """The sets of a part. Raises ValueError for one that is no section's."""
+    for name in sets:
+        if name not in known:
+            raise ValueError(
+                f"needs sets of sections in deck.parts.{part}: {name} is none of {', '.join(known)}"
+            )
+    return sets
+
+
+def _with(case: LoadedCase, numbers: dict[str, float]) -> LoadedCase:
+    assert case.case.deck
+    return changed(case, deck=with_part(case.case.deck, numbers=numbers))
