@@ -181,6 +181,8 @@ class Tyre:
         self.N = ufl.FacetNormal(msh)
         constant = lambda: fem.Constant(msh, PETSc.ScalarType(0))
         self.pressure, self.help, self.n = constant(), constant(), constant()
+        self.filler = constant()  # of a ply's stiffness, isotropic: CalculiX's deck needs it
+        self.filler.value = self.p.get("filler", 0.0)
         self.state, change = fem.Function(W), fem.Function(W)  # u0 twice; nothing
         test, trial = ufl.TestFunction(W), ufl.TrialFunction(W)
         forces = self.forces(change, test)
@@ -208,6 +210,8 @@ class Tyre:
         if s.plies:
             stiffness, *along = s.plies[:4]
             inside += cord(F * ufl.as_vector(along), stiffness, self.p["cord_law"])
+            Green = (F.T * F - ufl.Identity(3)) / 2
+            inside += self.filler * stiffness / 2 * ufl.inner(Green, Green)
         stiffness, angle = s.cords[:2]
         c, N = ufl.cos(angle), self.N
         along = ufl.as_vector([-c * N[1], ufl.sin(angle), c * N[0]])
@@ -274,7 +278,7 @@ class Tyre:
         solver.setProblemType(SLEPc.EPS.ProblemType.GHEP)
         solver.setDimensions(wanted + 2)
         solver.setTolerances(1e-12)
-        solver.setTarget(0.0)
+        solver.setTarget(self.p.get("target", 0.0))
         solver.setWhichEigenpairs(SLEPc.EPS.Which.TARGET_MAGNITUDE)
         solver.getST().setType("sinvert")
         by_factors(solver.getST().getKSP())
