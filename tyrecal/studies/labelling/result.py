@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
+from typing import Any
+
 import numpy as np
 
-from ...measured.gather import label_entry
+from ...simulate.modes.label import Label
 from ...tyre.case import LoadedCase
 from ..labels import (
     FOREIGN_WORDS,
@@ -39,7 +42,7 @@ def labels_told(case: LoadedCase, told: Labelled) -> Labels:
         name = lambda n: at.labels[n] if 0 <= n < len(at.labels) else None
         frequencies.append(
             LabelledFrequency(
-                **label_entry(name(j)),
+                **_entry(name(j)),
                 probability=float(found.each[i, j]),
                 frequency_Hz=reading.value,
                 sigma_Hz=reading.sigma,
@@ -47,7 +50,7 @@ def labels_told(case: LoadedCase, told: Labelled) -> Labels:
                 rim=state.rim or "",
                 expected_Hz=None if expected is None else float(np.exp(told.start.ln_f[expected])),
                 rivals=[
-                    LabelProbability(**label_entry(name(n)), probability=float(found.each[i, n]))
+                    LabelProbability(**_entry(name(n)), probability=float(found.each[i, n]))
                     for n in likely
                 ],
             )
@@ -72,3 +75,8 @@ def labels_told(case: LoadedCase, told: Labelled) -> Labels:
 def labels_result(case: LoadedCase, told: Labelled) -> LabelsResult:
     """As a result of its own."""
     return LabelsResult.model_validate({"format": 1, "labels": labels_told(case, told)})
+
+
+def _entry(label: Label | None) -> dict[str, Any]:
+    """c, m and kind, None of what is no mode."""
+    return asdict(label) if label else dict.fromkeys(("c", "m", "kind"))
