@@ -33,6 +33,7 @@ from .judge_section import LINES, section
 
 EQUILIBRIUM = 1e-8  # of the first residual
 MAX_ITERATIONS = 40
+FEW = 100  # elements, that need no fast code
 logging.disable(logging.INFO)  # of the compiler
 
 
@@ -186,11 +187,19 @@ class Tyre:
         self.state, change = fem.Function(W), fem.Function(W)  # u0 twice; nothing
         test, trial = ufl.TestFunction(W), ufl.TrialFunction(W)
         forces = self.forces(change, test)
-        self.force = compiled(forces)
-        self.stiffness = compiled(ufl.derivative(forces, change, trial))
-        self.mass = compiled(self.inertia(trial, test))
+        self.force = self.compiled(forces)
+        self.stiffness = self.compiled(ufl.derivative(forces, change, trial))
+        self.mass = self.compiled(self.inertia(trial, test))
         dofs = fem.locate_dofs_topological(W, 1, section.held)
         self.held = [fem.dirichletbc(fem.Function(W), dofs)]
+
+    def compiled(self, form: Any) -> Any:
+        """A form in machine code; waits for another process that is at it."""
+        level = (
+            "-O2" if len(self.s.cell) > FEW else "-O0"
+        )  # which compiles in a quarter of the time
+        options = {"timeout": 600, "cffi_extra_compile_args": [level]}
+        return fem.form(form, jit_params=options)
 
     def forces(self, change: fem.Function, test: Any) -> Any:
         """Virtual work in both sections, of all but inertia."""
@@ -314,18 +323,13 @@ class Tyre:
     def mass_kg(self) -> float:
         """Of the whole tyre, what the rim holds included."""
         one = ufl.as_vector([1.0, 0, 0])
-        return 2 * np.pi * fem.assemble_scalar(compiled(self.inertia(one, one)))
+        return 2 * np.pi * fem.assemble_scalar(self.compiled(self.inertia(one, one)))
 
 
 def halves(pair: Any) -> tuple[Any, Any]:
     """(a, b) of a field of six components."""
     part = lambda own: ufl.as_vector([pair[i] for i in own])
     return part(range(3)), part(range(3, 6))
-
-
-def compiled(form: Any) -> Any:
-    """A form in machine code; another process may be at the same one."""
-    return fem.form(form, jit_params={"timeout": 600})
 
 
 def by_factors(solver: PETSc.KSP) -> None:
