@@ -9,6 +9,7 @@ import pytest
 
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator
+from tyrecal.simulate.evaluate.store import Store
 from tyrecal.tyre.load import load_case
 
 from ..studies.hertz import coarse_case
@@ -49,8 +50,10 @@ def test_along_all_variables_at_once_they_are_differences(
     load before, where a step of the traction lies between points of the patch: to 1 %."""
     case = load_case(small_case(tmp_path))
     start = {name: case.case.variables[name].start for name in ALONG}
-    evaluator = Evaluator(TyreDesign(case))
-    found = evaluator.press(start, loads, gradients=tuple(start))
+    evaluator = Evaluator(TyreDesign(case), store=Store(tmp_path / "record"))
+    found, again = (evaluator.press(start, loads, gradients=tuple(start)) for _ in range(2))
+    assert (evaluator.counts.runs, evaluator.counts.recorded) == (1, 1)
+    assert [each.slopes for each in again.footprints] == [each.slopes for each in found.footprints]
     above, below = (
         evaluator.press({v: x * np.exp(step * ALONG[v]) for v, x in start.items()}, loads)
         for step in (STEP, -STEP)

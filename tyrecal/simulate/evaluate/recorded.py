@@ -123,6 +123,7 @@ class _Footprint(_Part):
     sliding_frequency_Hz: Triple | None = None
     sliding_shape: Annotated[Any, _shaped(REAL, None, None, None, 3)] | None = None
     cavity_Hz: Annotated[Any, _shaped(REAL, 2, least=0.0)] | None = None
+    slopes: dict[str, dict[str, Finite]] = Field(default_factory=dict)
 
 
 def _shape(array: Any) -> tuple[int, ...]:
