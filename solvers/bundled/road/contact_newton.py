@@ -27,7 +27,8 @@ MAX_NEWTON = 40  # Newton iterations a load
 MAX_GMRES_BEFORE_NEW_FACTOR = 15
 MAX_GMRES = 60
 LINEAR_RTOL = 1e-2  # residual of the linear problem, relative
-STIFFNESS_RTOL = 1e-3  # the same of the vertical stiffness
+SMOOTH_RTOL = 1e-5  # the same of what a fit descends by: the vertical stiffness, and derivatives
+STIFFNESS_RTOL = 1e-3  # of the stiffness at least
 ROUGH_LINEAR_RTOL = 0.3  # residual of the linear problem as long as the contact changes much
 MAX_LINEAR_RESIDUAL = 0.5  # more is left only of a tangent that is far from a stable one
 MAX_SETBACKS = 2  # steps that may fail to halve the residual, with Coulomb's friction
@@ -292,7 +293,7 @@ class ContactNewton:
     def _unit(self, contact: Contact) -> tuple[Array, float]:
         """Parts and the road's rise that answer a unit of the force of half the tyre."""
         tangent = Tangent.of(contact, self.symmetry)
-        found, rise, _, left = self.solve(tangent, 0 * self.parts, 1.0, STIFFNESS_RTOL)
+        found, rise, _, left = self.solve(tangent, 0 * self.parts, 1.0, SMOOTH_RTOL)
         if left > STIFFNESS_RTOL:
             raise NoEquilibrium(f"the vertical stiffness was not found in {MAX_GMRES} iterations")
         return found, rise

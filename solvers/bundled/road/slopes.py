@@ -30,13 +30,12 @@ from ..section.parts.part import TyrePart
 from ..solid3d.circumference import HalfCircle
 from ..solid3d.revolved import Revolved
 from .contact import Contact, FlatRoad
-from .contact_newton import MAX_GMRES, ContactNewton, PressedState, Tangent
+from .contact_newton import MAX_GMRES, SMOOTH_RTOL, ContactNewton, PressedState, Tangent
 from .patch import patch
 from .tread import tread_of
 
 Array = np.ndarray
 Values = dict[str, float]
-RATE_RTOL = 1e-5  # residual of a linear problem, relative
 CONTACT_STEP = 1e-8  # m, of what moves most, in a difference of the contact
 NUMBER_LENGTH = 1e-3  # m, that a relative change of the road's numbers counts as
 ROAD_NUMBERS = ("stiffness", "friction")  # of a `FlatRoad`
@@ -159,7 +158,7 @@ class _Path:
 def _solved(
     work: ContactNewton, tangent: Tangent, force: Array, lacking: float
 ) -> tuple[Array, float]:
-    parts, rise, _, left = work.solve(tangent, force, lacking, RATE_RTOL)
-    if left > RATE_RTOL:
+    parts, rise, _, left = work.solve(tangent, force, lacking, SMOOTH_RTOL)
+    if left > SMOOTH_RTOL:
         raise NoEquilibrium(f"a derivative was not found in {MAX_GMRES} iterations")
     return parts, rise
