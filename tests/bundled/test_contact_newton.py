@@ -258,15 +258,30 @@ def test_elements_that_do_not_mirror_are_refused(tmp_path: Path) -> None:
 def test_an_unreachable_load_keeps_the_others(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A ton of tonnes: the load before it stays, with a sentence why there is no more."""
+    """The load before it stays, with a sentence why there is no more."""
     support.bears(monkeypatch, 1500.0)
-    found = run(tmp_path, (1000.0, 1e7), 0.0)
+    found = run(tmp_path, (1000.0, 1e4), 0.0)
     assert [f["load_N"] for f in found["footprints"]] == [1000.0]
     assert found["cause"] == "no_equilibrium"
     assert re.fullmatch(
         r"no equilibrium between 1000 and \d+ N \(\d+ of \d+ mm down to the rim\): too much",
         found["failure"],
     )
+
+
+def test_an_absurd_load_is_not_tried(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A ton of tonnes: at the stiffness of the load before, many times the way down to the rim."""
+    tried: list[float] = []
+    newton = ContactNewton._newton
+    monkeypatch.setattr(
+        ContactNewton, "_newton", lambda press, load: tried.append(load) or newton(press, load)
+    )
+    found = run(tmp_path, (1000.0, 1e7), 0.0)
+    assert tried == [1000.0]
+    reached = found["footprints"][0]
+    down = reached["deflection_m"] + (1e7 - 1000.0) / reached["stiffness_N_per_m"]
+    assert found["failure"].endswith(f"down by {1e3 * down:.0f} mm")
+    assert found["cause"] == "no_equilibrium"
 
 
 def test_the_time_limit_passes(tmp_path: Path) -> None:
@@ -308,8 +323,9 @@ LENGTHS = np.radians([3.0] * 6 + [12.0, 30.0, 60.0, 60.0])
 
 
 def test_a_first_load_out_of_reach_fails(solid: Round) -> None:
-    with pytest.raises(NoEquilibrium, match="flat on its rim"):
-        solid.press(LENGTHS, 1e10).to(1e7)
+    for load, why in ((1e7, "at its stiffness there it would go down"), (2e4, "flat on its rim")):
+        with pytest.raises(NoEquilibrium, match=why):
+            solid.press(LENGTHS, 1e10).to(load)
 
 
 def test_a_clock_that_runs_out_between_loads(solid: Round) -> None:

@@ -39,6 +39,9 @@ ELASTIC_SLIP_FACTOR = 0.3  # from one elastic slip to the next smaller one
 MIN_STEP_LENGTH = 1 / 64  # step of the line search
 FIRST_COMPLIANCE = 1e-6  # m/N of deflection to begin with: it must touch, and stay small
 MIN_LOAD_STEP = 1 / 16  # share of a load's increase, below which it counts as unreachable
+# of the way down to the rim that a load would need at the last one's stiffness, beyond which it is
+# not tried: no tyre stiffens as much
+MAX_PREDICTED_WAY = 4.0
 # of the section's height that a stiff tyre (`FIRST_COMPLIANCE`) goes down in one step
 MAX_DEFLECTION_STEP = 0.1
 
@@ -89,6 +92,7 @@ class ContactNewton:
 
         Raises NoEquilibrium, also where the road has come to the rim.
         """
+        self._check_reach(load)
         step = min(
             load - self.load,
             MAX_DEFLECTION_STEP * (self.free_radius - self.flat) / FIRST_COMPLIANCE,
@@ -115,7 +119,18 @@ class ContactNewton:
             self.road = self.road.settled(found.contact)
             if target == load:
                 return found
+            self._check_reach(load)
             log.info("%g of %g N are reached%s", target, load, self.depth())
+
+    def _check_reach(self, load: float) -> None:
+        """Raises NoEquilibrium where the stiffness leaves no hope of ``load``."""
+        if self._slope:
+            down = self.free_radius - self.height - (load - self.load) * self._slope[1]
+            if down > MAX_PREDICTED_WAY * (self.free_radius - self.flat):
+                raise NoEquilibrium(
+                    f"no equilibrium between {self.load:.4g} and {load:.4g} N{self.depth()}:"
+                    f" at its stiffness there it would go down by {1e3 * down:.0f} mm"
+                )
 
     def depth(self) -> str:
         """In words, how far down the last load reached has pressed the tyre; "" before any."""
