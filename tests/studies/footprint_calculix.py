@@ -139,8 +139,9 @@ def case_of(run: Run) -> LoadedCase:
 
 
 def meshed(along: Sequence[int], rows: Sequence[int]) -> LoadedCase:
-    """The main case, initial variables."""
-    case = with_values(load_case(CASE), INITIAL)
+    """The main case, initial variables, on a road as hard as CalculiX's."""
+    hard = {"road.stiffness_Pa_per_m": Road().normal}
+    case = with_values(load_case(CASE), INITIAL | hard)
     mesh = case.case.mesh
     level = mesh.levels[mesh.level].model_copy(
         update={
