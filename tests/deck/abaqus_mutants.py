@@ -209,8 +209,8 @@ def deleted(lines: list[str], random: Random) -> list[str]:
 
 
 def data_missing(lines: list[str], random: Random) -> list[str]:
-    """All data lines of a keyword that has some."""
-    may = [k for k in keywords(lines, WITH_DATA) if not lines[k].startswith("*NODE FILE")]
+    """All data lines of a keyword that has some; with OP=NEW it may have none."""
+    may = [k for k in keywords(lines, WITH_DATA) if not re.search("NODE FILE|OP=NEW", lines[k])]
     k = random.choice(may)
     return lines[: k + 1] + lines[end(lines, k) :]
 
