@@ -52,7 +52,7 @@ def made(model: TyreModel, x: np.ndarray, random: np.random.Generator) -> tuple[
     for source in model.found:
         turned = any(path.endswith("angle_deg") for path in source.steps)
         z = float(random.uniform(-3, 3) if turned else random.normal())
-        drawn[source.name] = z
+        drawn[source.name] = round(z, 2)
         for path, step in source.steps.items():
             values[path] = values.get(path, 0.0) + z * step
     own = values["pressure_kPa"] - model.case.case.pressure_kPa
@@ -100,7 +100,7 @@ def main(tyres: int, seed: int) -> None:
         ln_f, drawn = made(model, x, random)
         y = ln_f + random.normal(0, NOISE, len(rows))
         seen = Observations(observables, y, scatter, 0.0, unknown, unknown)
-        told = {"tyre": tyre, "drawn": drawn, "apart": abs(y[0] - y[1])}
+        told = {"tyre": tyre, "drawn": drawn, "apart": round(abs(y[0] - y[1]), 4)}
         for name, known in (("now", expansion), ("slopes", replace(expansion, coupling=None))):
             problem = InverseProblem(
                 seen, known, model.spans, places(seen, rows), model.start, model.spread
@@ -112,7 +112,8 @@ def main(tyres: int, seed: int) -> None:
                 p = probabilities(found)
             verdict = decide(found, p, len(rows), len(x))
             count[name, verdict.kind] += 1
-            told[name] = [verdict.kind, verdict.key or "", p["none"], p["outside"]]
+            chances = round(p["none"], 4), round(p["outside"], 4)
+            told[name] = [verdict.kind, verdict.key or "", *chances]
         print(json.dumps(told), flush=True)
         lines.append(json.dumps(told))
     for name in ("now", "slopes"):
