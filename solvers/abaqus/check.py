@@ -95,6 +95,7 @@ def _order(blocks: Sequence[Block], before: Sequence[Block]) -> Iterator[Finding
     once: dict[tuple[int, str], Block] = {}
     procedure = ""
     parts = any(block.name == "PART" for block in blocks)
+    guessed = False  # whether a keyword above may be what the next ones are options of
     for block in blocks:
         name, inside = block.name, opened[-1].name if opened else ""
         rule = RULES.get(name)
@@ -109,11 +110,13 @@ def _order(blocks: Sequence[Block], before: Sequence[Block]) -> Iterator[Finding
         if inside == "STEP" and not procedure:
             procedure = name
             if name not in STEP_PROCEDURES:
-                yield Finding(block, None, "stands where the step's procedure must, under *STEP")
+                words = "stands where the step's procedure must, under *STEP"
+                yield Finding(block, None, words, sure=bool(levels))
         elif inside == "STEP" and name in STEP_PROCEDURES:
             yield Finding(block, None, f"is a second procedure of a step of *{procedure}")
         if rule and rule.under and (parent is None or parent.name not in rule.under):
-            yield Finding(block, None, f"must stand under *{' or *'.join(rule.under)}")
+            words = f"must stand under *{' or *'.join(rule.under)}"
+            yield Finding(block, None, words, sure=not guessed)
         if rule and rule.after and not seen & set(rule.after):
             yield Finding(block, None, f"must come after *{' or *'.join(rule.after)}")
         if rule and rule.within and inside == "STEP" and procedure not in rule.within:
@@ -131,7 +134,8 @@ def _order(blocks: Sequence[Block], before: Sequence[Block]) -> Iterator[Finding
                 yield Finding(block, None, "ends what did not begin last")
             else:
                 opened.pop()
-        if not (rule and rule.under) and name not in UNJUDGED:
+        guessed = not levels or (guessed and bool(rule and rule.under))
+        if levels and not (rule and rule.under) and name not in UNJUDGED:
             parent = block
         seen.add(name)
     for block in opened:

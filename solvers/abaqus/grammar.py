@@ -192,10 +192,11 @@ RULES: dict[str, Rule] = {
     "DENSITY": Rule("model", fields="number number?", under=OF_MATERIAL, once="parent"),
     "ELASTIC": Rule(
         "model",
-        "TYPE=ISOTROPIC|ISO; MODULI=LONG TERM|INSTANTANEOUS",
+        "TYPE=name; MODULI=LONG TERM|INSTANTANEOUS",
         "number number? number?",
         under=OF_MATERIAL,
         once="parent",
+        variants={"TYPE": "number..."},
     ),
     "HYPERELASTIC": Rule(
         "model",

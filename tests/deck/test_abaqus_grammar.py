@@ -41,6 +41,14 @@ def test_the_grammar_has_every_keyword_and_option_of_the_templates() -> None:
                 assert option in RULES[name].parameters, f"{path}: *{name}, {option}"
 
 
+def test_what_the_grammar_does_not_know_is_a_doubt() -> None:
+    """Neither it nor the options after it are refused for it; ABAQUS has more keywords."""
+    text = next(abaqus_decks.inflations())
+    for old, new in (("*DENSITY", "*PLASTIC\n1.0E6, 0.0\n*DENSITY"), ("*STATIC", "*DYNAMITE")):
+        found = findings(read_keywords(text.replace(old, new, 1)))
+        assert found and not any(each.sure for each in found)
+
+
 def test_mutants_of_our_decks_are_caught(request: pytest.FixtureRequest) -> None:
     """All of them."""
     found = abaqus_mutants.draw(60, request.config.getoption("--seed"))
