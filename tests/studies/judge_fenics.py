@@ -33,7 +33,7 @@ from .judge_section import LINES, section
 
 EQUILIBRIUM = 1e-8  # of the first residual
 MAX_ITERATIONS = 40
-FEW = 100  # elements, that need no fast code
+FEW = 100  # elements: the optimiser takes longer than it saves
 logging.disable(logging.INFO)  # of the compiler
 
 
@@ -195,9 +195,7 @@ class Tyre:
 
     def compiled(self, form: Any) -> Any:
         """A form in machine code; waits for another process that is at it."""
-        level = (
-            "-O2" if len(self.s.cell) > FEW else "-O0"
-        )  # which compiles in a quarter of the time
+        level = "-O2" if len(self.s.cell) > FEW else "-O0"
         options = {"timeout": 600, "cffi_extra_compile_args": [level]}
         return fem.form(form, jit_params=options)
 
