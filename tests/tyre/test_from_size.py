@@ -64,7 +64,18 @@ def coarse(code: str, folder: Path) -> LoadedCase:
     return load_case(path)
 
 
-@pytest.mark.parametrize("code", TWELVE)
+@pytest.mark.parametrize(
+    "code",
+    [
+        "145/80R13",
+        "205/60R15",
+        "255/40R17",
+        "P235/75R17",
+        "31x10.50R15LT",
+        "11R22.5",
+        "315/80R22.5",
+    ],
+)
 def test_the_size_code_gives_sixteen_modes(code: str, tmp_path: Path) -> None:
     case = coarse(code, tmp_path)
     values = start_values(case)
@@ -90,7 +101,7 @@ def test_the_size_code_gives_sixteen_modes(code: str, tmp_path: Path) -> None:
 
 def test_mass_grows_with_the_tyre(tmp_path: Path) -> None:
     masses = []
-    for code in [*TWELVE[:5], *TWELVE[-3:]]:
+    for code in ("145/80R13", "205/55R16", "LT315/70R17", "315/80R22.5"):
         section = built(code)
         elements = [4] * len(section.regions)
         mesh = build_mesh(section, elements, [1] * (len(section.names) - 1), False)
