@@ -32,10 +32,7 @@ SHARP_FALL = 2.0  # of ln Z from the best point to its neighbours, which asks fo
 MAX_ZOOMS = 6
 REFIT_STEPS = 6  # of Gauss and Newton, in a model that is quadratic and near its minimum
 COUPLED_STEPS = 4  # more where near modes are coupled
-FAR_BELOW, ABOVE_POINTS = (
-    20.0,
-    1.0,
-)  # of ln Z: what the spline may fall to, and rise above its points
+FAR_BELOW, ABOVE_POINTS = 20.0, 1.0  # of ln Z: how far a spline may fall, and rise above its points
 PAIR_POINTS = 3  # of the rule in what couples modes, that stand for all where effects are paired
 PARTNERS = 4  # singles that are tried with every other
 UNKNOWN = (0.005, 0.01, 0.02, 0.04)  # shift of modes by what no catalogue holds

@@ -14,6 +14,7 @@ from ruamel.yaml import YAML
 from ..section.section import Section
 from ..templates import environment, render
 from .made_of import MadeOf
+from .parts import SectionOrigin
 
 ELEMENTS_BY_LEVEL = {"coarse": 14, "default": 28, "refined": 56}  # along the half section, by level
 LETTERS_A_LINE = 118  # letters on a line
@@ -27,6 +28,7 @@ def new_case(
     name: str,
     size: str,
     pressure_kPa: float,
+    known_from: SectionOrigin,
     origin: str = "",
     outline: Mapping[str, float] | None = None,
     loads_N: Sequence[float] = (),
@@ -44,6 +46,7 @@ def new_case(
         "name": name,
         "size": size,
         "pressure_kPa": pressure_kPa,
+        "known_from": known_from,
         "origin": origin,
         "outline": outline,
         "loads_N": loads_N,

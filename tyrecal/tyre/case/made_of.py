@@ -144,8 +144,6 @@ def _uncertainties(made: Construction, belts: Mapping[str, Keys]) -> dict[str, K
         "rubber_density": {"sets": densities, "percent": COMPOUND_DENSITY_PERCENT},
         **cords,
         "belt_angles": {"sets": angles, "absolute": BELT_ANGLE_DEG, "signs": signs},
-        "tread_gauge": {"sets": ["effects.tread_wear"], "absolute": 0.1},
-        "sidewall_gauge": {"sets": ["effects.sidewall_gauge"], "absolute": 0.1},
         "pressure": {"sets": ["pressure_kPa"], "absolute": 1.0},
     }
 

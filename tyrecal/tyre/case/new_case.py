@@ -67,6 +67,7 @@ def from_size(
         f"{size.text} on a {gauges.rim / INCH:g} inch rim",
         size.text,
         size.pressure_kPa if pressure_kPa is None else pressure_kPa,
+        "size_code",
         f"section from the size code, as {made.name} tyres are built:\n"
         f"# crown {mm['crown']}, sidewall {mm['sidewall']}, bead {mm['bead']} mm thick, belt"
         f" {mm['belt']} mm wide. An estimate to start from.",
@@ -104,6 +105,7 @@ def from_file(
             size.text + " with a section of its own" if size else file.stem,
             size.text if size else "not given",
             usual_kPa if pressure_kPa is None else pressure_kPa,
+            "drawing",
             outline=keys,
         )
         return Draft(text, file.name, content)

@@ -148,6 +148,9 @@ class Outline(Part):
     belt_step_m: Positive = 0.010
 
 
+SectionOrigin = Literal["measured", "drawing", "size_code"]
+
+
 class SectionSource(Part):
     """``stations``: the station table, or ``outline``: two curves; CSV, relative to the case file.
 
@@ -157,7 +160,7 @@ class SectionSource(Part):
     stations: Text | None = None
     outline: Outline | None = None
     gauges: list[Gauge] | None = None
-    known_from: Literal["measured", "drawing", "size_code"] | None = None
+    known_from: SectionOrigin | None = None
 
     @property
     def file(self) -> str:
