@@ -48,6 +48,7 @@ def test_modes_of_the_case_itself(tmp_path: Path) -> None:
     assert "[0,0]" in page and "Section" in page
 
 
+@pytest.mark.slow
 def test_several_folders(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folders = [str(toy.write(tmp_path / name, f"tyre {name}")) for name in ("one", "two")]
     page = tmp_path / "both.html"

@@ -18,6 +18,7 @@ def said(keywords: list[Keyword], before: list[Keyword]) -> list[str]:
     return [f"*{found.block.name} {found.words}" for found in findings(keywords, before)]
 
 
+@pytest.mark.slow
 def test_every_deck_of_every_combination_of_options() -> None:
     """Its section, then the jobs that go on from one that has all that they name."""
     count = 0

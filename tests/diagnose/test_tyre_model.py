@@ -193,6 +193,7 @@ def test_an_effect_in_the_models_own_data_is_named_with_its_size(tmp_path: Path)
     assert sum(told["probabilities"].values()) == pytest.approx(1, abs=1e-4)
 
 
+@pytest.mark.slow
 def test_a_plain_tyre_has_no_gap(plain: InverseProblem, chance: Chance) -> None:
     """Measured with all that its covariance allows, nothing is named in 49 of 50, and "none" has a
     quarter in 17 of 20 (0.94 of 300 draws); without a mistake it is said.
@@ -202,7 +203,7 @@ def test_a_plain_tyre_has_no_gap(plain: InverseProblem, chance: Chance) -> None:
     d = diagnose(MODEL, ROWS, plain.observations, expansion=plain.expansion)
     assert d.verdict.kind == "no_gap"
     factor, named, quarter = np.linalg.cholesky(plain.sigma), [], []
-    for _ in range(40):
+    for _ in range(25):
         y = plain.observations.y + factor @ chance.random.normal(size=len(ROWS))
         found = weigh(plain.measured(y))
         p = probabilities(found)

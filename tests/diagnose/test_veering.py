@@ -66,6 +66,14 @@ def test_coupled_modes_are_eigenvalues_and_their_slopes(side: float, zeta: float
         assert slope[[i, 1 - i]] == pytest.approx([own[0, i], part[0, 1 - i]], abs=1e-4)
 
 
+def test_rows_without_a_pair_say_nothing_of_labels() -> None:
+    """As those that are held out."""
+    alone = Veering(*np.zeros((3, 2)), np.full(2, -1), np.zeros(2), np.ones(2))
+    with np.errstate(all="raise"):
+        _, own, part, told = alone.mixed(np.array([[0.3, 0.5]]), 1.0)
+    assert told.tolist() == [0.0] and own.tolist() == [[1.0, 1.0]] and not part.any()
+
+
 def test_only_modes_of_one_harmonic_are_partners() -> None:
     assert partner(AXIAL) == TORSIONAL and partner(TORSIONAL) == AXIAL
     assert partner(Label(3, 0)) == Label(3, 1) and partner(Label(3, 1)) == Label(3, 0)

@@ -220,8 +220,8 @@ class Progress:
     def _show(self, done: float, words: str) -> None:
         self._done, now = done, time.monotonic()
         if self._bar:
-            whole = done == int(done)  # shown at once: the next may be done within a blink
-            self._bar.update(self._task, completed=done, description=words, refresh=whole)
+            # at once: the next may be done within a blink
+            self._bar.update(self._task, completed=done, description=words, refresh=True)
         elif self._say and now > self._said + BETWEEN_S:
             self._said = now
             count = f", {int(done)} of {self._total} done" if self._total else ""

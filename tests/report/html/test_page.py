@@ -309,6 +309,7 @@ def test_lists_of_unequal_length(copy: Path, file: str, path: tuple[str | int, .
         text_of(copy)
 
 
+@pytest.mark.slow
 def test_whatever_is_spoilt_the_page_is_whole_or_refused(copy: Path, tmp_path: Path) -> None:
     """Any leaf of any file becomes something else, or goes: no traceback, no broken page."""
     random = Random(1)

@@ -95,7 +95,8 @@ class Veering:
         side = np.where(self.partner >= 0, self.side, np.where(delta < 0, -1.0, 1.0))
         found = (a + b) / 2 + self.rise * zeta**2 + side * D
         share = (1 + side * delta / np.where(on, np.maximum(D, 1e-300), 1.0)) / 2  # of its own
-        told = np.log(MISLABELLED + (1 - MISLABELLED) * share[:, on]).mean(1)  # labels go together
+        each = np.log(MISLABELLED + (1 - MISLABELLED) * share[:, on])
+        told = each.sum(1) / max(on.sum(), 1)  # labels go together
         ln_f = np.where(on, self.scale + np.log(np.maximum(found, 1e-6)) / 2, eta)
         own = np.where(on, share * a / found, 1.0)
         part = np.where(on & (self.partner >= 0), (1 - share) * b / found, 0.0)
