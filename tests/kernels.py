@@ -1,10 +1,11 @@
 """Runs what is quick and marked ``numbers`` under every BLAS kernel that this processor can run.
 
-    python -m tests.kernels [pytest's arguments]
+    python -m tests.kernels [--every] [pytest's arguments]
 
-Each kernel with one thread and with two, but for what `pytest` itself takes: this processor's own
-with one. As many runs at a time as there are cores. A kernel that the processor cannot run, or for
-which the libraries have another's, is said.
+Each kernel once, with one thread and with two in turn, this processor's own with two, as `pytest`
+itself has it with one; ``--every``: all kernels with one and with two. As many runs at a time as
+there are cores. A kernel that the processor cannot run, or for which the libraries have another's,
+is said.
 Exits with 1 where a run failed.
 """
 
@@ -74,13 +75,12 @@ def tested(kernel: str, core: str, threads: int, more: list[str]) -> bool:
 
 def main(more: list[str]) -> int:
     own = run(["-c", ASK], "").stdout.strip()
+    every, more = "--every" in more, [each for each in more if each != "--every"]
+    found = sorted(kernels(own).items(), key=lambda kernel: kernel[1] == own)  # its own last
+    turns = {core: THREADS[(len(found) - i) % 2] for i, (_, core) in enumerate(found)}
     jobs = [
-        (name, core, n, more)
-        for name, core in kernels(own).items()
-        for n in THREADS
-        if (core, n) != (own, 1)
+        (name, core, n, more) for name, core in found for n in THREADS if every or n == turns[core]
     ]
-    print(f"{own}, 1 thread(s): not run, `pytest` does")
     with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
         return not all([*pool.map(lambda job: tested(*job), jobs)])  # a failure stops no other
 

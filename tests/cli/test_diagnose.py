@@ -71,12 +71,6 @@ def test_a_diagnosis_in_files_and_again_from_the_record(
     assert {name: (out / name).read_bytes() for name in FILES} == before
     assert json.loads((out / "run.json").read_text())["diagnose"]["solver_runs"] == 0
     assert "Bead filler" in (out / "report.html").read_text()
-    assert run(*command, "--quiet", "--no-pictures", "--set", "C10=1.1e6") == 0
-    again = json.loads((out / "diagnosis.json").read_text())
-    assert (
-        json.loads((out / "run.json").read_text())["diagnose"]["solver_runs"] > 0
-    )  # from another start
-    assert again["verdict"] == "named" and again["effect"] == "bead_filler"
 
 
 @pytest.mark.slow
