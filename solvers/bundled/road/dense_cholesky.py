@@ -1,8 +1,7 @@
 """Cholesky factors of dense blocks, and their triangles' inverses applied.
 
-Triangles are halved down to small ones, of which the inverses are kept. All that takes time is
-thus in NumPy's products, which leave the interpreter to another thread, as SciPy's triangular
-solvers do not.
+Triangles are halved down to small ones, of which the inverses are kept, so that all that takes time
+is products.
 """
 
 from __future__ import annotations
