@@ -29,7 +29,7 @@ def exact(toy: Toy, effects: dict[str, float]) -> Diagnosis:
 
 
 def told(d: Diagnosis, toy: Toy) -> str:
-    return page(DiagnosedCase(d, (), False, (), (), toy), "tyre", "a.csv")  # type: ignore[arg-type]
+    return page(DiagnosedCase(d, (), False, {}, (), toy), "tyre", "a.csv")  # type: ignore[arg-type]
 
 
 @pytest.fixture(scope="module")

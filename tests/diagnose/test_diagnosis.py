@@ -242,7 +242,7 @@ def test_a_pair_is_told_with_both_sizes() -> None:
     d = diagnosed(toy, {"e0": 0.8, "e1": 0.6}, 7)
     told = diagnosis_result(d).content()
     assert told["effect"] == "e0+e1" and set(told["parameters"]) == {"e0", "e1"}
-    words = page(DiagnosedCase(d, (), False, (), (), toy), "tyre", "a.csv")  # type: ignore[arg-type]
+    words = page(DiagnosedCase(d, (), False, {}, (), toy), "tyre", "a.csv")  # type: ignore[arg-type]
     for size in told["parameters"].values():
         assert size["low"] < size["value"] < size["high"]
         number = f"{size['value']:.3g}"

@@ -241,6 +241,20 @@ def two_compounds() -> str:
     return plain(sections=sections, materials=own + again)
 
 
+def compounds() -> str:
+    """Tread, sidewalls and what the cords are in, each of a compound of its own, all the same."""
+    sections = "*ELSET, ELSET=TREAD, GENERATE\n105, 108\n*ELSET, ELSET=BODY, GENERATE\n1, 12\n"
+    sections += "*ELSET, ELSET=SIDEWALL, GENERATE\n101, 104\n109, 112\n"
+    materials = MATERIALS.format(**SI)
+    rubber = materials[: materials.index("*MATERIAL, NAME=CORD")]
+    materials = materials.removeprefix(rubber)
+    for name in ("TREAD", "SIDEWALL", "BODY"):
+        sections += f"*SOLID SECTION, ELSET={name}, MATERIAL={name}\n"
+        materials += rubber.replace("RUBBER", name)
+    own = SECTIONS.replace("*SOLID SECTION, ELSET=SOLID, MATERIAL=RUBBER\n", sections)
+    return plain(sections=own, materials=materials)
+
+
 def inner_ply(spelled: bool = False) -> str:
     """The carcass on the inner surface; the pressure on the rubber's faces, or on the ply's."""
     text = plain(Tyre(ply_row=0).mesh())

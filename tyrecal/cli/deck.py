@@ -6,13 +6,16 @@ import shutil
 from collections.abc import Mapping
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from . import arguments, options
 from .main import EXIT_INPUT
 from .terminal import Terminal
+
+if TYPE_CHECKING:
+    from ..tyre.own_deck.gauge import Gauges
 
 MOST_SAID = 10  # doubts about a deck
 
@@ -103,11 +106,13 @@ def _check(path: Path, mesh: str, assignments: tuple[str, ...], terminal: Termin
     from ..tyre.own_deck.text import OwnDeckError
 
     numbers: Mapping[str, float] = {}
+    gauges: Gauges = ()
     if path.suffix in (".yaml", ".yml"):
         loaded, _ = arguments.load(path, mesh, assignments, None, terminal, True)
         if loaded.deck is None:
             raise click.UsageError(f"'{path}' names no deck of your own: 'tyrecal validate' judges")
         deck, numbers = loaded.deck, loaded.deck_numbers
+        gauges = loaded.case.deck.thickened if loaded.case.deck else ()
     else:
         if not path.is_file():
             raise click.UsageError(f"there is no file '{path}'")
@@ -115,7 +120,7 @@ def _check(path: Path, mesh: str, assignments: tuple[str, ...], terminal: Termin
     asked = asked_by_abaqus(deck.with_numbers(numbers))
     result: dict[str, Any] = {"abaqus": asked, "refused": None}
     try:
-        flat = deck.flat(numbers)
+        flat = deck.flat(numbers, gauges)
         mass_kg = trial(flat)
     except OwnDeckError as error:
         result["refused"] = str(error)

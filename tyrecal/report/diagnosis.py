@@ -360,8 +360,9 @@ def _assumptions(study: DiagnosedCase) -> Iterator[str]:
     )
     for id, why in d.problem.expansion.failed.items():
         yield f"`{id}` could not be evaluated: {why}."
-    if study.inexpressible:
-        yield f"This solver cannot express {', '.join(f'`{id}`' for id in study.inexpressible)}."
+    for why in dict.fromkeys(study.inexpressible.values()):
+        ids = (f"`{id}`" for id, other in study.inexpressible.items() if other == why)
+        yield f"Not considered, {why}: {', '.join(ids)}."
     if study.calibrated:
         names = ", ".join(f"`{id}`" for id in study.calibrated)
         yield f"Not considered, being calibrated by a variable of the case: {names}."

@@ -184,8 +184,14 @@ def parts_data(case: LoadedCase, named: Iterable[str]) -> DiagnosisSection:
     """The section's parts under the names that they have in the map of parts ``named``."""
     mesh = resolved(case).mesh
     place = {n: np.array([z, r]) * 1e3 for n, (r, z) in mesh.nodes.items()}
-    parts = rubber_parts(case, mesh, {name.split(",")[0] for name in named})
     cords: dict[str, list[Flat]] = {}
+    if isinstance(mesh, OwnDeckMesh):
+        parts = mesh.compounds
+        for ply in mesh.plies:
+            lines = mesh.cords[ply.set_name].values()
+            cords.setdefault(ply.material, []).extend(_line(place, x) for x in lines)
+    else:
+        parts = rubber_parts(case, mesh, {name.split(",")[0] for name in named})
     for layer in case.case.rebar_layers.values():
         lines = mesh.cords[layer.line].values()
         name = f"{layer.material.replace('_', ' ')}s"

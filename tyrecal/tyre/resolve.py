@@ -45,8 +45,8 @@ class Tyre:
     @cached_property
     def flat(self) -> Flat:
         """The deck of the tyre's section, of a case that names one. Raises OwnDeckError."""
-        assert self.written.deck
-        return self.written.deck.flat(self.written.deck_numbers)
+        assert self.written.deck and self.case.deck
+        return self.written.deck.flat(self.written.deck_numbers, self.case.deck.thickened)
 
     @cached_property
     def gauged(self) -> Section:

@@ -99,6 +99,7 @@ def _refuse_unrevolved(tyre: Tyre) -> None:
         "analysis.static_moduli must be those of its *STATIC": (
             (c.analysis.static_moduli == "long_term") != flat.long_term
         ),
+        "its own text has its nodes where they are: deck.gauges must be 1": bool(c.deck.thickened),
         f"ABAQUS gets its own text, which has nothing for: {', '.join(sorted(rings))}": bool(rings),
         "it includes a file of the name of a job": bool(
             {"inflate.inp", "modes.inp"} & ({*deck.texts} - {deck.path.name})

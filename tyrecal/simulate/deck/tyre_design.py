@@ -178,9 +178,7 @@ def _refuse_outside(file: str, text: str) -> None:
 
 
 def _abaqus(tyre: Tyre, env: Any, request: DeckRequest) -> dict[str, str]:
-    names = context(tyre)
-    if not tyre.case.deck:
-        names["mesh_block"] = _mesh_block(env, names["mesh"])
+    names = _with_mesh(tyre, env)
     names["modes"] = 2 * request["modes_per_harmonic"] * (request["highest_harmonic"] + 1)
     names["loads"], names["loaded_modes"] = request["loads_N"], request["loaded_modes"]
     if names["loaded_modes"]:
@@ -191,10 +189,14 @@ def _abaqus(tyre: Tyre, env: Any, request: DeckRequest) -> dict[str, str]:
     if tyre.case.splice.share:
         if names["loads"]:
             raise TemplateFailed("splice: a tyre with a splice cannot be pressed on a road")
-        names = context(_with_splice_of(tyre, tyre.case.splice.share))
-        names["mesh_block"] = _mesh_block(env, names["mesh"])
+        names = _with_mesh(_with_splice_of(tyre, tyre.case.splice.share), env)
         texts["splice.inp"] = render(env, "inflate.inp.j2", names)
     return texts
+
+
+def _with_mesh(tyre: Tyre, env: Any) -> dict[str, Any]:
+    names = context(tyre)
+    return names if tyre.case.deck else {**names, "mesh_block": _mesh_block(env, names["mesh"])}
 
 
 def _with_splice_of(tyre: Tyre, share: float) -> Tyre:

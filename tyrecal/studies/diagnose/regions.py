@@ -11,8 +11,10 @@ import numpy as np
 from ...simulate.deck.tyre_design import TyreDesign
 from ...simulate.evaluate.evaluator import Evaluator
 from ...simulate.modes.find import Found
-from ...tyre.case import LoadedCase
+from ...tyre.case import LoadedCase, number_at
 from ...tyre.case.schema import Rubber, Solid
+from ...tyre.own_deck.numbers import moduli
+from ...tyre.resolve import resolved
 from ..fit import problem as fit
 from .model import ModelRow
 
@@ -46,19 +48,17 @@ class Parted(Protocol):
 
 
 def regions(model: Parted, x: Array) -> list[SectionPart]:
-    """Every region's rubber (the crown's in two: tread and what lies under it), every cord.
+    """Every region's rubber (the crown's in two: tread and what lies under it), every cord; of a
+    user's deck every compound and cord.
 
     One evaluation a pressure, with exact slopes by the constants of each part. Raises
     EvaluationFailed.
     """
-    case, parts = split_by_region(model.case)
-    materials = case.case.materials
-    numbers = {}
-    for material in parts:
-        rubber = isinstance(materials[material], Rubber)
-        keys = ("C10_Pa", "C01_Pa", "D1_per_Pa") if rubber else ("youngs_modulus_Pa",)
-        for key in (*keys, "density_kg_per_m3"):
-            numbers[f"materials.{material}.{key}"] = float(getattr(materials[material], key))
+    case, parts = split_by_region(model.case) if not model.case.deck else _of_deck(model.case)
+    signs = {material: _stiffness_of(case, material) for material in parts}
+    density = {material: _density_of(case, material) for material in parts}
+    paths = (path for material in parts for path in (*signs[material], density[material]))
+    numbers = {path: float(number_at(case, path)) for path in paths}
     evaluator = model.evaluator.of(TyreDesign(case))
     problem = fit.Problem(case, evaluator, jobs=model.jobs)
     own = model.values(x)
@@ -73,8 +73,7 @@ def regions(model: Parted, x: Array) -> list[SectionPart]:
         at[pressure] = each
     shares = dict.fromkeys(parts, 0.0)
     if any(label is None for label, _ in model.rows):
-        paths = [f"materials.{material}.density_kg_per_m3" for material in parts]
-        heavier = [{**states[0], path: (1 + MASS_STEP) * design[path]} for path in paths]
+        heavier = [{**states[0], p: (1 + MASS_STEP) * design[p]} for p in density.values()]
         plain = at[model.pressures[0]].evaluation.mass_kg
         for material, each in zip(parts, problem.modes_of([(d, ()) for d in heavier]), strict=True):
             if not isinstance(each, Found):
@@ -89,14 +88,37 @@ def regions(model: Parted, x: Array) -> list[SectionPart]:
                 continue
             mode, gradients = at[pressure].wanted[label], at[pressure].evaluation.gradients
             f, place = mode.frequency_Hz, mode.position
-            for path in (p for p in numbers if p.startswith(f"materials.{material}.")):
-                slope = gradients[path][place] * design[path] / f
-                key = path.rpartition(".")[2]
-                sign = -1.0 if key == "D1_per_Pa" else 1.0
-                columns[int(key.startswith("density")), i] += sign * slope
-        rubber = isinstance(materials[material], Rubber)
+            slope = {p: gradients[p][place] * design[p] / f for p in numbers}
+            columns[0, i] = sum(sign * slope[path] for path, sign in signs[material].items())
+            columns[1, i] = slope[density[material]]
+        rubber = len(signs[material]) > 1
         result.append(SectionPart(name, columns[0], columns[1], material, rubber))
     return result
+
+
+def _stiffness_of(case: LoadedCase, material: str) -> dict[str, int]:
+    """Paths of a material's moduli, -1 where it is their reciprocal."""
+    if case.deck:
+        return moduli(case.deck_numbers, material)
+    rubber = isinstance(case.case.materials[material], Rubber)
+    signs = {"C10_Pa": 1, "C01_Pa": 1, "D1_per_Pa": -1} if rubber else {"youngs_modulus_Pa": 1}
+    return {f"materials.{material}.{key}": sign for key, sign in signs.items()}
+
+
+def _density_of(case: LoadedCase, material: str) -> str:
+    if case.deck:
+        return f"material {material} / DENSITY / density"
+    return f"materials.{material}.density_kg_per_m3"
+
+
+def _of_deck(case: LoadedCase) -> tuple[LoadedCase, Mapping[str, str]]:
+    """The case of a user's deck, and names of its materials that have plain numbers, not marks."""
+    flat = resolved(case).flat
+    names = dict.fromkeys((*flat.materials, *(ply.material for ply in flat.plies)))
+    able = [
+        m for m in names if _stiffness_of(case, m) and _density_of(case, m) in case.deck_numbers
+    ]
+    return case, dict(zip(able, able, strict=True))
 
 
 def split_by_region(case: LoadedCase) -> tuple[LoadedCase, Mapping[str, str]]:

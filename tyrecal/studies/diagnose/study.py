@@ -13,10 +13,9 @@ from ...measured.measurement import Measurement
 from ...measured.tables import read_measurements
 from ...measured.targets import on_own_rim
 from ...simulate.evaluate.evaluator import Evaluator
-from ...simulate.evaluate.failure import DeckRefused
 from ...tyre.case import LoadedCase
 from ...tyre.case.mistakes import suggestion
-from ...tyre.effects import catalogue
+from ...tyre.effects import Effect, catalogue
 from .calibrated import calibrated_variables
 from .diagnosis import Diagnosis, diagnose
 from .evidence import NONE
@@ -41,7 +40,7 @@ class DiagnosedCase:
     diagnosis: Diagnosis
     sources: tuple[Source, ...]  # of error
     assumed_sources: bool  # whether they were assumed
-    inexpressible: tuple[str, ...]  # effects that the solver cannot express
+    inexpressible: Mapping[str, str]  # effects that solver or case cannot have, and why
     calibrated: tuple[str, ...]  # effects that variables of the case calibrate
     model: TyreModel
     under_load: UnderLoad | None = None  # what was measured there
@@ -130,7 +129,7 @@ def study(
         diagnosis,
         tuple(found),
         assumed_sources,
-        tuple(inexpressible),
+        inexpressible,
         fitted,
         model,
         _under_load(case, evaluator, own, diagnosis, model),
@@ -160,17 +159,12 @@ def _under_load(
 
 def spans_of(
     case: LoadedCase, evaluator: Evaluator, ids: Sequence[str] | None = None
-) -> tuple[dict[str, Span], list[str]]:
-    """Effects that the evaluator's solver can express, and ids of those that it cannot.
-
-    Raises ValueError where one of ``ids`` is no effect; DeckRefused for a deck of one's own.
+) -> tuple[dict[str, Span], dict[str, str]]:
+    """Effects that the evaluator's solver can express, and why it cannot the others, or a case of a
+    user's deck cannot have them. Raises ValueError where one of ``ids`` is no effect.
     """
-    if case.deck:
-        raise DeckRefused(
-            "a diagnosis weighs effects that change lines and rubbers of a section: a deck of one's"
-            " own has none of these"
-        )
-    able, unable = {}, []
+    able: dict[str, Span] = {}
+    unable: dict[str, str] = {}
     for id in ids or ():
         if id not in catalogue():
             raise ValueError(f"'{id}' is not one of the effects{suggestion(id, catalogue())}")
@@ -178,11 +172,24 @@ def spans_of(
         if ids is not None and id not in ids:
             continue
         if not effect.within(evaluator.solver.capabilities):
-            unable.append(id)
+            unable[id] = "this solver cannot express it"
+        elif why := _lacking(case, effect):
+            unable[id] = why
         else:
             base, words = case.case.effects.get(id, 0.0), (effect.unit, effect.title, effect.toggle)
             able[id] = Span(effect.low - base, effect.high - base, *words, base)
     return able, unable
+
+
+def _lacking(case: LoadedCase, effect: Effect) -> str:
+    """What a case of a user's deck lacks for an effect, "" = nothing."""
+    if not case.deck:
+        return ""
+    try:
+        effect.of(case)(case, effect.high / 2 or effect.low / 2)
+    except ValueError as error:
+        return str(error)
+    return ""
 
 
 def parse_change(text: str) -> Toggle:

@@ -298,7 +298,7 @@ class TyreModel:
             if mates[i] >= 0 and abs(eta[i] - eta[mates[i]]) < MAY_VEER
         }
         mates[[label not in near for label, _ in self.rows]] = -1
-        turned = [s for s in self.found if any(path.endswith("angle_deg") for path in s.steps)]
+        turned = [s for s in self.found if any(unit_of(path) == "degrees" for path in s.steps)]
         if not near or not turned:
             return None
         own = {**self._plain, **self.values(x)}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
 from ...tyre.case import LoadedCase, number_at
@@ -85,6 +85,7 @@ def _assumed(case: LoadedCase, taken: set[str]) -> Iterator[Source]:
 def _usual(case: LoadedCase) -> Iterator[tuple[str, str, float, float]]:
     """Name, path, and standard deviation, per cent or absolute."""
     yield "pressure", "pressure_kPa", 0.0, PRESSURE_kPa
+    yield from _of_deck(case.deck_numbers)
     for name, material in case.case.materials.items():
         path = f"materials.{name}."
         if isinstance(material, Rubber):
@@ -101,6 +102,22 @@ def _usual(case: LoadedCase) -> Iterator[tuple[str, str, float, float]]:
         yield name, f"section.gauges.{i}.factor", GAUGE_PERCENT, 0.0
 
 
+def _of_deck(numbers: Mapping[str, float]) -> Iterator[tuple[str, str, float, float]]:
+    """The same of plain numbers of a user's deck, by their paths."""
+    rubbers = {path.split(" / ")[0] for path in numbers if " / HYPERELASTIC / " in path}
+    for path in numbers:
+        *heads, field = path.split(" / ")
+        name = "_".join(head.partition(" ")[2] for head in heads if " " in head)
+        if field == "density" and heads[0] in rubbers:
+            yield f"{name}_density", path, DENSITY_PERCENT, 0.0
+        elif field == "E":
+            yield f"{name}_modulus", path, MODULUS_PERCENT, 0.0
+        elif field == "spacing":
+            yield f"{name}_spacing", path, SPACING_PERCENT, 0.0
+        elif field == "angle":
+            yield f"{name}_angle", path, 0.0, ANGLE_deg
+
+
 def _source(name: str, steps: dict[str, float], percent: float, absolute: float) -> Source:
     unit = unit_of(next(iter(steps)))
     size = f"{percent:g} %" if percent else in_engineers_units(absolute, unit)
@@ -111,6 +128,8 @@ def unit_of(path: str) -> str:
     """The unit of the number at a dotted path, "" where it has none."""
     if path.startswith(EFFECT_PATH):
         return catalogue()[path.removeprefix(EFFECT_PATH)].unit
+    if path.endswith(" / angle"):  # of a user's deck
+        return "degrees"
     return next((unit for end, unit in UNIT_BY_ENDING.items() if path.endswith(f"_{end}")), "")
 
 

@@ -18,7 +18,7 @@ from .mistakes import Keys
 # its targets and uncertainties, solver and templates
 TYRE: dict[str, Any] = {
     "section": {"gauges": True, "outline": True},
-    "deck": {"numbers": True, "parts": True},
+    "deck": {"numbers": True, "parts": True, "gauges": True},
     "materials": True,
     "solids": True,
     "rebar_layers": True,

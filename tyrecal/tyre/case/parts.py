@@ -173,7 +173,14 @@ class SectionSource(Part):
             yield from one_of(values, "stations", "outline")
 
 
-DeckPart = Literal["tread", "bead_filler", "belts"]
+DeckPart = Literal["tread", "sidewall", "bead_filler", "belts"]
+
+
+class DeckGauges(Part):
+    """Factors on the thickness of the deck's parts, from what they lie on to their free surface."""
+
+    tread: Positive = 1.0
+    sidewall: Positive = 1.0
 
 
 class DeckSource(Part):
@@ -182,18 +189,34 @@ class DeckSource(Part):
     ``numbers``: of the marks in its text, by name, and others of its numbers, by path, in its own
     units; those not given are as the text has them. ``crown``: its set of nodes of the outer
     surface over the belt, which ABAQUS gives shapes of. ``parts``: the
-    element sets of its sections that are the tread, the bead filler, the belts, for effects.
+    element sets of its sections that are the tread, the sidewall, the bead filler, the belts, for
+    effects; ``gauges``: of the first two.
     """
 
     file: Text
     units: Literal["m", "mm"]
     crown: Text = "CROWN"
     parts: dict[DeckPart, list[Text]] = Field(default_factory=dict)
+    gauges: DeckGauges = DeckGauges()
     numbers: dict[Text, Number] = Field(default_factory=dict)
 
     def sets(self, part: str) -> list[str]:
         """Those of a part, as decks compare names; none where it is not named."""
         return [name.upper() for key, names in self.parts.items() if key == part for name in names]
+
+    @property
+    def thickened(self) -> tuple[tuple[tuple[str, ...], float], ...]:
+        """Sets of the parts that are not as thick as drawn, each with its factor."""
+        factors = {"tread": self.gauges.tread, "sidewall": self.gauges.sidewall}
+        return tuple((tuple(self.sets(part)), f) for part, f in factors.items() if f != 1)
+
+    @classmethod
+    def problems(cls, values: Mapping[str, Any]) -> Iterator[Disagreement]:
+        gauges, parts = values.get("gauges"), values.get("parts")
+        if isinstance(gauges, DeckGauges) and isinstance(parts, dict):
+            for part, factor in gauges:
+                if factor != 1 and not parts.get(part):
+                    yield "gauges", f"needs the sets of {part}: name them in deck.parts.{part}"
 
 
 class Level(Part):

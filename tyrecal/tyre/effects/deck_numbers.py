@@ -1,4 +1,5 @@
-"""Effects on a user's deck: numbers of the parts that its case names in ``deck.parts``."""
+"""Effects on a user's deck: numbers and gauges of the parts that its case names in
+``deck.parts``."""
 
 from __future__ import annotations
 
@@ -6,7 +7,8 @@ from collections.abc import Callable, Collection
 
 from ..case import LoadedCase
 from ..own_deck.flat import Flat
-from ..own_deck.numbers import DIMENSIONS, OF_COMPLIANCE, OF_STRESS
+from ..own_deck.numbers import DIMENSIONS, OF_COMPLIANCE, OF_STRESS, moduli
+from ..own_deck.text import OwnDeckError
 from .edit import changed, with_part
 
 Change = Callable[[str, float], float]  # of a number, by its field's or its layer's name
@@ -44,6 +46,42 @@ def with_compounds(case: LoadedCase, part: str, option: str, change: Change) -> 
     return _with(case, numbers)
 
 
+def with_prony(case: LoadedCase, shear: float, tau_s: float) -> LoadedCase:
+    """The case with one Prony term in all compounds, which leaves the relaxed state and makes what
+    is faster than ``tau_s`` ``shear`` times as stiff in shear. Raises ValueError."""
+    numbers, flat, _ = _read(case, "")
+    long_term: set[str] = set()
+    material = ""
+    for block in flat.found.model:
+        if block.name == "MATERIAL":
+            material = block.get("NAME")
+        elif block.name == "HYPERELASTIC" and block.get("MODULI") != "INSTANTANEOUS":
+            long_term.add(material)
+    for name in dict.fromkeys(flat.materials):
+        start = f"material {name} / VISCOELASTIC / "
+        own = [path for path in numbers if path.startswith(start)]
+        times = [path for path in own if path.endswith(" / tau")]
+        if not times or name not in long_term:
+            raise ValueError(
+                f"needs a Prony series of {name} in plain numbers, and its MODULI=LONG TERM"
+            )
+        numbers |= dict.fromkeys(own, 0.0) | dict.fromkeys(times, tau_s)
+        numbers[times[0].removesuffix("tau") + "g"] = 1 - 1 / shear
+    return _with(case, numbers)
+
+
+def stresses(case: LoadedCase) -> list[str]:
+    """Paths of the moduli of all materials. Raises ValueError where one has none, but marks."""
+    numbers, flat, _ = _read(case, "")
+    found = []
+    for name in dict.fromkeys((*flat.materials, *(ply.material for ply in flat.plies))):
+        own = [path for path, sign in moduli(numbers, name).items() if sign > 0]
+        if not own:
+            raise ValueError(f"needs plain numbers of material {name}, not marks")
+        found += own
+    return found
+
+
 def with_angles(case: LoadedCase, part: str, change: Change) -> LoadedCase:
     """The case with the angles of a part's layers changed, by their names. Raises ValueError."""
     numbers, flat, sets = _read(case, part)
@@ -56,6 +94,21 @@ def with_angles(case: LoadedCase, part: str, change: Change) -> LoadedCase:
                 raise ValueError(f"needs a plain number for the angle of {ply.name}, not a mark")
             numbers[path] = change(ply.name, numbers[path])
     return _with(case, numbers)
+
+
+def with_thickness(case: LoadedCase, part: str, factor: float) -> LoadedCase:
+    """The case with a part so many times as thick. Raises ValueError."""
+    numbers, flat, sets = _read(case, part)
+    deck = case.case.deck
+    assert case.deck and deck
+    _known(part, sets, [name.upper() for name in flat.sections])
+    thicker = with_part(deck.gauges, **{part: factor * getattr(deck.gauges, part)})
+    deck = with_part(deck, gauges=thicker)
+    try:
+        case.deck.flat(numbers, deck.thickened)
+    except OwnDeckError as error:
+        raise ValueError(f"cannot be: {error.message}") from None
+    return changed(case, deck=deck)
 
 
 def _read(case: LoadedCase, part: str) -> tuple[dict[str, float], Flat, list[str]]:

@@ -7,6 +7,7 @@ from math import pi
 from ..case import LoadedCase
 from ..case.parts import Prony, Rubber
 from ..case.schema import Analysis
+from .deck_numbers import with_prony
 from .edit import changed, with_part, with_rubbers
 from .effect import Effect
 
@@ -34,9 +35,23 @@ def add(case: LoadedCase, value: float) -> LoadedCase:
             prony=[Prony(g=1 - 1 / shear, k=1 - 1 / bulk, tau_s=TAU_S)],
         )
 
-    case = with_rubbers(case, stiffened)
-    relaxed = with_part(analysis, static_moduli="long_term", vibration_frequency_Hz=FREQUENCY_HZ)
-    return changed(case, analysis=relaxed)
+    return _fast(with_rubbers(case, stiffened))
+
+
+def _fast(case: LoadedCase) -> LoadedCase:
+    """The case with its vibration at the frequency that the terms are for."""
+    relaxed = dict(static_moduli="long_term", vibration_frequency_Hz=FREQUENCY_HZ)
+    return changed(case, analysis=with_part(case.case.analysis, **relaxed))
+
+
+def add_to_deck(case: LoadedCase, value: float) -> LoadedCase:
+    """The same of all compounds, by the Prony series that they have."""
+    analysis = case.case.analysis
+    if analysis.static_moduli != "long_term" or analysis.vibration_frequency_Hz is not None:
+        raise ValueError("needs static_moduli: long_term and vibration_frequency_Hz: null")
+    if value < 0:
+        raise ValueError("must leave the vibration at least as stiff as the inflated state")
+    return _fast(with_prony(case, 1 + value, TAU_S))
 
 
 def _moduli(m: Rubber, share: str, long_term: bool, analysis: Analysis) -> tuple[float, float]:
@@ -72,5 +87,6 @@ EFFECT = Effect(
     toggle="excite ten times harder: the modulus of filled rubber falls with strain amplitude",
     aliases=("temperature", "bead_filler"),
     add=add,
+    add_to_deck=add_to_deck,
     needs="vibration_modulus",
 )

@@ -50,7 +50,7 @@ class Effect:
         if case.deck is None or case.case.deck is None:
             return self.add
         if self.add_to_deck is None:
-            raise ValueError("changes lines or regions of a section, which a deck has none of")
+            raise ValueError("changes lines or regions of a section or a law, not a deck's numbers")
         if self.part and not case.case.deck.sets(self.part):
             raise ValueError(f"needs the sets of {self.part}: name them in deck.parts.{self.part}")
         return self.add_to_deck

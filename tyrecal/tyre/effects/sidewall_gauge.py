@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from ..case import LoadedCase
+from .deck_numbers import with_thickness
 from .edit import with_gauge
 from .effect import Effect
 from .parts import sidewall
@@ -10,10 +11,19 @@ from .parts import sidewall
 
 def add(case: LoadedCase, value: float) -> LoadedCase:
     """Thickness of the sidewall, inner to outer surface, times 1 + value."""
+    names = case.section.names
+    return with_gauge(case, (names[0], names[-1]), sidewall(case), _factor(value))
+
+
+def _factor(value: float) -> float:
     if not -0.9 <= value <= 9:
         raise ValueError("must be between -0.9 and 9")
-    names = case.section.names
-    return with_gauge(case, (names[0], names[-1]), sidewall(case), 1 + value)
+    return 1 + value
+
+
+def add_to_deck(case: LoadedCase, value: float) -> LoadedCase:
+    """The same of what ``deck.parts.sidewall`` is thick outside the cords."""
+    return with_thickness(case, "sidewall", _factor(value))
 
 
 EFFECT = Effect(
@@ -33,4 +43,6 @@ EFFECT = Effect(
     toggle="section a tyre of the same build, or probe the sidewall's thickness by ultrasound",
     aliases=("tread_density", "pressure_offset"),
     add=add,
+    add_to_deck=add_to_deck,
+    part="sidewall",
 )

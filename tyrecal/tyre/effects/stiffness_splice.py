@@ -4,23 +4,33 @@ from __future__ import annotations
 
 from ..case import LoadedCase
 from ..case.parts import Rubber
+from .deck_numbers import stresses
 from .edit import changed, with_part
 from .effect import Effect
 
 
 def add(case: LoadedCase, value: float) -> LoadedCase:
     """Rubber (C10, C01) and cords (E) of a sector of the case's width times 1 + value."""
-    if not value > -1:
-        raise ValueError("must be greater than -1")
-    splice = case.case.splice
-    if splice.share:
-        raise ValueError("must be 0 where the case has a splice already")
     numbers = []
     for name, material in case.case.materials.items():
         rubber = isinstance(material, Rubber)
         keys = ("C10_Pa", "C01_Pa") if rubber else ("youngs_modulus_Pa",)
         numbers += [f"materials.{name}.{key}" for key in keys]
+    return _spliced(case, value, numbers)
+
+
+def _spliced(case: LoadedCase, value: float, numbers: list[str]) -> LoadedCase:
+    if not value > -1:
+        raise ValueError("must be greater than -1")
+    splice = case.case.splice
+    if splice.share:
+        raise ValueError("must be 0 where the case has a splice already")
     return changed(case, splice=with_part(splice, share=value, numbers=numbers))
+
+
+def add_to_deck(case: LoadedCase, value: float) -> LoadedCase:
+    """The same of all shear constants and moduli of the deck's materials."""
+    return _spliced(case, value, stresses(case))
 
 
 EFFECT = Effect(
@@ -39,5 +49,6 @@ EFFECT = Effect(
     toggle="find the sector by hand or X-ray; exciting at it and beside it shows each member alone",
     aliases=("point_mass",),
     add=add,
+    add_to_deck=add_to_deck,
     needs="coupled",
 )

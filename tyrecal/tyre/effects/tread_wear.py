@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from ..case import LoadedCase
+from .deck_numbers import with_thickness
 from .edit import with_gauge
 from .effect import Effect
 from .parts import crown, tread
@@ -10,9 +11,18 @@ from .parts import crown, tread
 
 def add(case: LoadedCase, value: float) -> LoadedCase:
     """Gauge of the tread, outside belts and under-tread, times 1 - value."""
+    return with_gauge(case, tread(case), crown(case), _factor(value))
+
+
+def _factor(value: float) -> float:
     if not -1 <= value <= 0.9:
         raise ValueError("must be between -1 and 0.9 of the tread's gauge")
-    return with_gauge(case, tread(case), crown(case), 1 - value)
+    return 1 - value
+
+
+def add_to_deck(case: LoadedCase, value: float) -> LoadedCase:
+    """The same of ``deck.parts.tread``."""
+    return with_thickness(case, "tread", _factor(value))
 
 
 EFFECT = Effect(
@@ -32,4 +42,6 @@ EFFECT = Effect(
     toggle="measure the groove depth; buff the tread by a known depth and measure again",
     aliases=("tread_density", "rim_width"),
     add=add,
+    add_to_deck=add_to_deck,
+    part="tread",
 )

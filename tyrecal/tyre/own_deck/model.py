@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from .grammar import Sorted
-from .scope import MESH_READERS, Element, Point, Scope, faces_of, mirror_of, reflected
+from .scope import MESH_READERS, Element, Point, Scope, corner_areas, faces_of, mirror_of, reflected
 from .text import Block, Row
 
 MERGED = 1e-6  # of the section's size: nodes closer than this are one where they are tied
@@ -327,13 +327,11 @@ class _Builder:
         for number, element in self.root.elements.items():
             if not element.is_solid:
                 continue
-            corners = 3 if len(element.nodes) in (3, 6) else 4
-            X = np.array([points[n] for n in element.nodes[:corners]])
-            along, back = np.roll(X, -1, 0) - X, np.roll(X, 1, 0) - X
-            area = along[:, 0] * back[:, 1] - along[:, 1] * back[:, 0]
-            if (area <= 0).any() or (X[:, 0] < 0).any():
+            area = corner_areas(element, points)
+            beyond = any(points[n][0] < 0 for n in element.nodes)
+            if (area <= 0).any() or beyond:
                 order = "its nodes run clockwise" if (area < 0).all() else "it folds over"
-                what = "it reaches beyond the axle" if (X[:, 0] < 0).any() else order
+                what = "it reaches beyond the axle" if beyond else order
                 raise element.block.refused(f"element {number}: {what}", element.row)
 
     def _pressure(self) -> tuple[list[Face], str, tuple[tuple[Block, Row, int], ...]]:

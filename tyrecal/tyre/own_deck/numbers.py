@@ -133,6 +133,14 @@ def paths(blocks: Sequence[Block]) -> dict[str, tuple[int, int, int]]:
     return found
 
 
+def moduli(numbers: Iterable[str], material: str) -> dict[str, int]:
+    """Paths of a material's moduli, -1 where it is their reciprocal."""
+    signs = {OF_STRESS: 1, OF_COMPLIANCE: -1}
+    own = (path for path in numbers if path.startswith(f"material {material} / "))
+    kinds = {path: DIMENSIONS.get(path.rpartition(" / ")[2]) for path in own}
+    return {path: signs[kind] for path, kind in kinds.items() if kind in signs}
+
+
 def assigned(row: Row) -> tuple[str, str]:
     """Name and expression of a *PARAMETER's data line, without a comment."""
     name, _, value = ",".join(row.fields).partition("#")[0].partition("=")

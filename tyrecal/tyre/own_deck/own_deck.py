@@ -12,6 +12,7 @@ from typing import Any, Literal
 
 from . import numbers as numbers_of
 from .flat import SECTION_OPTIONS, Flat, flatten
+from .gauge import Gauges, thickened
 from .grammar import MESH, NO_EFFECT, Sorted, sort
 from .model import Model, build
 from .text import Block, OwnDeckError, Place, read_blocks
@@ -113,10 +114,13 @@ class OwnDeck:
             self._models[key] = build(found)
         return self._models[key]
 
-    def flat(self, numbers: Mapping[str, float]) -> Flat:
-        """The flat deck with numbers set, in SI units. Raises OwnDeckError."""
+    def flat(self, numbers: Mapping[str, float], gauges: Gauges = ()) -> Flat:
+        """The flat deck with numbers set and ``gauges`` of its parts, in SI units.
+
+        Raises OwnDeckError."""
         found = sort(self.with_numbers(numbers))
-        return flatten(found, self.model(found), UNIT_LENGTH[self.units], UNIT_MASS[self.units])
+        model = thickened(self.model(found), gauges) if gauges else self.model(found)
+        return flatten(found, model, UNIT_LENGTH[self.units], UNIT_MASS[self.units])
 
 
 def read_own_deck(path: Path, units: Units | None = None) -> OwnDeck:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -413,6 +413,14 @@ def faces_of(element: Element) -> Iterator[tuple[str, tuple[int, ...]]]:
         ends = element.nodes[i], element.nodes[(i + 1) % corners]
         middle = element.nodes[corners + i : corners + i + 1]
         yield f"S{i + 1}", (ends[0], *middle, ends[1])
+
+
+def corner_areas(element: Element, points: Mapping[int, Point]) -> np.ndarray:
+    """Twice the area of the triangle at each corner of a solid: all positive, or it folds over."""
+    X = np.array([points[n] for n in element.nodes[: CORNERS_OF[len(element.nodes)]]])
+    along, back = np.roll(X, -1, 0) - X, np.roll(X, 1, 0) - X
+    area: np.ndarray = along[:, 0] * back[:, 1] - along[:, 1] * back[:, 0]
+    return area
 
 
 MESH_READERS: dict[str, Callable[[Scope, Block], None]] = {

@@ -60,6 +60,15 @@ class OwnDeckMesh(SectionMesh):
             found[name] = list(self.cords[ply.set_name].values())[turn::sharing]
         return found
 
+    @property
+    def compounds(self) -> dict[str, list[tuple[int, ...]]]:
+        """Corner nodes of the elements of each."""
+        found: dict[str, list[tuple[int, ...]]] = {}
+        for number, (material, _) in self.cells.items():
+            nodes = self.solids[number]
+            found.setdefault(material, []).append(nodes[: CORNERS_OF[len(nodes)]])
+        return found
+
     def _named(self) -> dict[str, Ply]:
         names = [ply.name for ply in self.plies]
         return {

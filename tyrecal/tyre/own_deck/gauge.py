@@ -1,0 +1,90 @@
+"""Thicker or thinner parts of a deck's section.
+
+A node X of the part moves by (factor - 1) d(X) n(X): d is its distance to that boundary of the part
+which is no free outer surface, n the normal of the outer surface nearest to it. A layer becomes
+``factor`` times as thick; what it shares with other parts, and cords below it, stay.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import lru_cache
+from itertools import pairwise
+
+import numpy as np
+
+from .model import Face, Model
+from .scope import Point, corner_areas, faces_of
+
+Array = np.ndarray
+Sets = tuple[str, ...]  # of a part, in upper case
+Gauges = tuple[tuple[Sets, float], ...]  # factors on the thickness of parts
+
+
+@lru_cache(maxsize=8)
+def thickened(model: Model, factors: Gauges) -> Model:
+    """The section with the thickness of parts times their factors. Raises OwnDeckError where one
+    has no free outer surface, or an element folds over."""
+    nodes = dict(model.nodes)
+    for sets, factor in factors:
+        for n, (r, z) in _growth(model, sets).items():
+            nodes[n] = (nodes[n][0] + (factor - 1) * r, nodes[n][1] + (factor - 1) * z)
+    for number, element in model.elements.items():
+        if element.is_solid and (corner_areas(element, nodes) <= 0).any():
+            raise element.block.refused(f"gauges fold element {number} over", element.row)
+    return replace(model, nodes=nodes)
+
+
+@lru_cache(maxsize=8)
+def _growth(model: Model, sets: Sets) -> Mapping[int, Point]:
+    """Displacement of the part's nodes as it becomes twice as thick."""
+    sections = [s for s in model.solids if s.name.upper() in sets]
+    own = {n for section in sections for n in section.elements}
+    held, pressed = set(model.rim), {face[:2] for face in model.cavity}
+    free = {face[:2] for face in model.boundary if face[:2] not in pressed}
+    outer = list[Face]()
+    beside: dict[frozenset[int], Face] = {}
+    for number in sorted(own):
+        for name, nodes in faces_of(model.elements[number]):
+            face = number, name, nodes
+            if (number, name) in free and not held.issuperset(nodes):
+                outer.append(face)
+            elif beside.pop(frozenset(nodes), None) is None:
+                beside[frozenset(nodes)] = face
+    inner = list(beside.values())  # of one element of the part alone
+    if not outer or not inner:
+        raise sections[0].block.refused(f"a gauge of {sets[0]} needs a free outer surface")
+    members = sorted({n for number in own for n in model.elements[number].nodes})
+    below = {n for _, _, nodes in inner for n in nodes}
+    for ply in model.plies:
+        lines = [model.elements[n].nodes for n in ply.elements]
+        if any(set(members).issuperset(line) and not below.issuperset(line) for line in lines):
+            raise sections[0].block.refused(
+                f"a gauge needs a part outside all cords, {ply.name} lies in {sets[0]}"
+            )
+    X = np.array([model.nodes[n] for n in members])
+    distance, _ = _nearest(X, _segments(model, inner))
+    _, normal = _nearest(X, _segments(model, outer))
+    grown = distance[:, None] * normal
+    return {n: (float(r), float(z)) for n, (r, z) in zip(members, grown, strict=True)}
+
+
+def _segments(model: Model, faces: Sequence[Face]) -> Array:
+    """Straight pieces (s, 2, 2) of faces, the solid on their left."""
+    pairs = [pair for _, _, nodes in faces for pair in pairwise(nodes)]
+    return np.array([[model.nodes[n] for n in pair] for pair in pairs])
+
+
+def _nearest(X: Array, pieces: Array) -> tuple[Array, Array]:
+    """Distance (n,) of points to the nearest piece, and outward normal (n, 2) there: of an end that
+    pieces share, their normals' mean."""
+    start, along = pieces[:, 0], pieces[:, 1] - pieces[:, 0]
+    share = ((X[:, None] - start) * along).sum(-1) / (along**2).sum(-1)
+    foot = start + np.clip(share, 0, 1)[..., None] * along
+    away = np.hypot(*np.moveaxis(X[:, None] - foot, -1, 0))
+    distance = away.min(1)
+    near = away <= distance[:, None] + 1e-9 * np.ptp(pieces)
+    outward = np.column_stack([along[:, 1], -along[:, 0]]) / np.hypot(*along.T)[:, None]
+    normal = near @ outward
+    return distance, normal / np.hypot(*normal.T)[:, None]
