@@ -40,14 +40,13 @@ def small_case(folder: Path) -> Path:
 
 
 @pytest.mark.parametrize(
-    "loads, bounds",
-    [([1000.0], [1e-3]), pytest.param([1000.0, 1500.0], [1e-3, 1e-2], marks=pytest.mark.slow)],
+    "loads", [[1000.0], pytest.param([1000.0, 1500.0], marks=pytest.mark.slow)]
 )
 def test_along_all_variables_at_once_they_are_differences(
-    loads: list[float], bounds: list[float], tmp_path: Path
+    loads: list[float], tmp_path: Path
 ) -> None:
-    """Of the first load to 1e-3 of the largest of them. From the second on slip counts from the
-    load before, where a step of the traction lies between points of the patch: to 1 %."""
+    """To 1e-3 of the largest of them, at the second load too, whose slip counts from the first
+    one's patch."""
     case = load_case(small_case(tmp_path))
     start = {name: case.case.variables[name].start for name in ALONG}
     evaluator = Evaluator(TyreDesign(case), store=Store(tmp_path / "record"))
@@ -58,9 +57,9 @@ def test_along_all_variables_at_once_they_are_differences(
         evaluator.press({v: x * np.exp(step * ALONG[v]) for v, x in start.items()}, loads)
         for step in (STEP, -STEP)
     )
-    states = zip(found.footprints, above.footprints, below.footprints, bounds, strict=True)
-    for at, up, down, bound in states:
+    states = zip(found.footprints, above.footprints, below.footprints, strict=True)
+    for at, up, down in states:
         for name in NAMES:
             each = [at.slopes[v][name] * start[v] * ALONG[v] for v in start]
             difference = (getattr(up, name) - getattr(down, name)) / (2 * STEP)
-            assert abs(sum(each) - difference) < bound * max(map(abs, each)), (at.load_N, name)
+            assert abs(sum(each) - difference) < 1e-3 * max(map(abs, each)), (at.load_N, name)

@@ -26,7 +26,8 @@ from scipy.sparse import csr_matrix
 from .tread import Points, Tread
 
 Array = np.ndarray
-SLIP_SAMPLES = 9  # of a span's lines, between which the elastic slip is linear
+SLIP_SAMPLES = 9  # of a line's patch in a span, between which the elastic slip is linear
+JUST_WITHIN = 1e-9  # of that patch, from its ends
 
 
 @dataclass(frozen=True)
@@ -47,8 +48,20 @@ class FlatRoad:
     friction: float  # coefficient
     elastic_slip: float  # m
     U: Array  # (k, n, 3), m
-    elastic: Array  # (t, e, j, SLIP_SAMPLES, 2): slip that is still elastic, m
+    # (t, e, j, SLIP_SAMPLES, 2): slip that is still elastic, from end to end of `former`, m
+    elastic: Array
     height: float  # of the road, m
+
+    @cached_property
+    def former(self) -> tuple[Array, Array]:
+        """From and to which angle each line was on the road at the last load (t, e, j), rad; both 0
+        where it was not."""
+        t, e, first, last = self.tread.intervals(self.U, self.height)
+        some, ends = last > first, np.zeros((2, *self.elastic.shape[:3]))
+        ends[0, t, e] = np.where(some, first, np.inf).min(-1)
+        ends[1, t, e] = np.where(some, last, -np.inf).max(-1)
+        begin, end = np.where(ends[0] < ends[1], ends, 0.0)
+        return begin, end
 
     def gap(self, points: Points) -> Array:
         """To the road at the last load (i, j, p), 0 where it touched, m."""
@@ -62,10 +75,11 @@ class FlatRoad:
 
     def moved(self, points: Points, at: Array) -> Array:
         """Along and across (i, j, p, 2) from where slip counts; ``at``: the points' positions."""
-        tread, t = points.tread, points.t
-        place = (points.angle - tread.begin[t, None, None]) / tread.length[t, None, None]
+        t, e = points.t, points.e
+        first, last = (each[t, e][..., None] for each in self.former)
+        place = (points.angle - first) / np.where(last > first, last - first, 1.0)
         place = np.clip(place * (SLIP_SAMPLES - 1), 0.0, SLIP_SAMPLES - 1 - 1e-12)
-        left, own = place.astype(int), self.elastic[t, points.e]
+        left, own = place.astype(int), self.elastic[t, e]
         take = lambda i: np.take_along_axis(own, i[..., None], 2)
         right = (place - left)[..., None]
         elastic = take(left) * (1 - right) + take(left + 1) * right
@@ -75,7 +89,7 @@ class FlatRoad:
     def forces(self, U: Array, height: float, bound: Bound | None = None) -> Contact:
         """Forces at a state U (k, n, 3) with the road at ``height`` (m); ``bound``: of Tresca's
         friction, instead of Coulomb's."""
-        points = self.tread.patch(U, height)
+        points = self.tread.patch(U, height, self.former)
         at = points.positions(U)
         normal = self.stiffness * points.area * np.maximum(at[..., 0] - height, 0.0)
         if bound is None:
@@ -101,19 +115,17 @@ class FlatRoad:
 
     def settled(self, contact: Contact) -> FlatRoad:
         """The road after a load was reached: slip counts anew, less the elastic one."""
-        samples = self.tread.everywhere(np.linspace(0.0, 1.0, SLIP_SAMPLES))
-        at = samples.positions(contact.U)
-        slip = self.moved(samples, at) * self.share(samples, contact.height)[0][..., None]
+        road = replace(self, U=contact.U, height=contact.height)
+        begin, end = (each.reshape(-1, each.shape[-1], 1) for each in road.former)
+        # the outermost ones just within the patch, where rounding does not decide whether they are
+        share = np.linspace(JUST_WITHIN, 1.0 - JUST_WITHIN, SLIP_SAMPLES)
+        samples = self.tread.everywhere(share)
+        samples = replace(samples, angle=begin + (end - begin) * share)
+        slip = self.moved(samples, samples.positions(contact.U))
+        slip *= self.share(samples, contact.height)[0][..., None]
         length = np.maximum(np.linalg.norm(slip, axis=-1, keepdims=True), 1e-300)
         elastic = slip * np.minimum(self.elastic_slip / length, 1.0)
-        # beside the patch as at its edge: between samples it is then known up to the edge
-        away = abs(np.arange(SLIP_SAMPLES)[:, None] - np.arange(SLIP_SAMPLES)) * 1.0
-        inside = at[..., 0] >= contact.height
-        nearest = np.where(inside[..., None, :], away, np.inf).argmin(-1)
-        elastic = np.take_along_axis(elastic, nearest[..., None], 2)
-        return replace(
-            self, U=contact.U, elastic=elastic.reshape(self.elastic.shape), height=contact.height
-        )
+        return replace(road, elastic=elastic.reshape(self.elastic.shape))
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,8 @@ from ..solid3d.circumference import HalfCircle, functions
 
 Array = np.ndarray
 MAX_CONTACT_ANGLE = np.pi / 3  # from the vertical: no span that begins beyond it can touch
-LINES_ACROSS = 4  # lines at Gauss points of a line element
+# lines at Gauss points of a line element: as many as an edge needs that crosses a wide one
+LINES_ACROSS = 8
 # Gauss points between two ends: exact for products of two functions and the depth
 POINTS_IN_PATCH = 3
 ROOT_STEPS = 4  # of Newton's method, from the root of a parabola
@@ -49,18 +50,26 @@ class Tread:
         angle = np.repeat(angle[:, None], len(self.M), 1)
         return Points(self, t, e, angle, np.zeros_like(angle))
 
-    def patch(self, U: Array, height: float) -> Points:
-        """Gauss points where a tread displaced by U (k, n, 3) is deeper than ``height`` (m)."""
+    def patch(self, U: Array, height: float, cuts: tuple[Array, Array]) -> Points:
+        """Gauss points where a tread displaced by U (k, n, 3) is deeper than ``height`` (m), in
+        pieces between the ``cuts`` (t, e, j), rad."""
         t, e, first, last = self.intervals(U, height)
         # in halves of the spans, so that they also serve what has a kink at the nodes in between
-        half = (self.begin + self.length / 2)[t, None, None]
-        first = np.concatenate([first, np.maximum(first, half)], -1)
-        last = np.concatenate([np.minimum(last, half), last], -1)
-        last = np.maximum(first, last)
+        half = np.broadcast_to((self.begin + self.length / 2)[t, None, None], first[..., :1].shape)
+        own = (cut[t, e][..., None] for cut in cuts)
+        ends = np.sort(np.concatenate([first, last, half, *own], -1))
+        begin, end = ends[..., :-1], ends[..., 1:]
+        middle = (begin + end) / 2
+        at = middle[..., None]
+        within = (first[..., None, :] < at) & (at < last[..., None, :])
+        size = np.where(within.any(-1), end - begin, 0.0)
+        # the pieces that there are, first
+        order = np.argsort(size == 0.0, axis=-1, kind="stable")
+        order = order[..., : int((size > 0.0).sum(-1).max(initial=1))]
+        middle, size = (np.take_along_axis(each, order, -1)[..., None] for each in (middle, size))
         g, w = np.polynomial.legendre.leggauss(POINTS_IN_PATCH)
-        middle, half = (first + last)[..., None] / 2, (last - first)[..., None] / 2
-        angle, weight = middle + half * g, half * w
-        flat = *first.shape[:2], 4 * POINTS_IN_PATCH
+        flat = *order.shape[:2], order.shape[2] * POINTS_IN_PATCH
+        angle, weight = middle + size / 2 * g, size / 2 * w
         return Points(self, t, e, angle.reshape(flat), weight.reshape(flat))
 
     def intervals(self, U: Array, height: float) -> tuple[Array, Array, Array, Array]:
