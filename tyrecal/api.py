@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from .files import read_json
+from .simulate.deck.decks_design import design_of
 from .simulate.deck.tyre_design import TyreDesign
 from .simulate.evaluate.evaluator import Evaluator, Question
 from .simulate.evaluate.failure import EvaluationFailed
@@ -343,5 +344,5 @@ def _refuse_unusual(
 
 def _evaluator(case: LoadedCase, solver: str, record: Path | str | None) -> Evaluator:
     return Evaluator(
-        TyreDesign(case), solver, store=Store(Path(record).resolve()) if record else None
+        design_of(case), solver, store=Store(Path(record).resolve()) if record else None
     )

@@ -11,20 +11,22 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from .. import own_decks
 from ..errors import Refused, RunFailed
+from ..rings import about_axle, ring_modes
 from .dat import read_dat
 from .evidence import checked_modes
 from .launch import run_job
 from .options import load, read_options
 from .question import read_question
-from .rings import check_revolved, components, cylindrical
 
 JOB, OLDJOB = "modes", "inflate"
 
 
 class Decks(Protocol):
     """What the tool hands over; ``options``: the solver's, from the case; ``request``: among what
-    is asked, of a user's deck ``own_deck`` with its units."""
+    is asked, of a user's deck ``own_deck`` with its units, of those in three dimensions
+    ``own_decks``."""
 
     options: Mapping[str, Any]
     request: Mapping[str, Any]
@@ -41,7 +43,7 @@ class Abaqus:
 
     name = "abaqus"
     dialect = "abaqus"
-    capabilities = frozenset({"modes", "vibration_modulus", "spindle", "own_deck"})
+    capabilities = frozenset({"modes", "vibration_modulus", "spindle", "own_deck", "own_decks"})
     refusals = (Refused,)
     failures = (RunFailed,)
 
@@ -69,44 +71,49 @@ class Abaqus:
         program = self.command if self.version == "unknown" else []
         units = decks.request.get("own_deck", {})
         paths = [read_options(decks.options, **units).save(folder, program)]
+        paths += (own := own_decks.save(decks.request, folder))
         for name, text in decks.texts("own deck" if units else self.dialect).items():
             paths.append(folder / name)
             paths[-1].parent.mkdir(parents=True, exist_ok=True)
             paths[-1].write_text(text, encoding="utf-8", newline="")
-        read_question(folder / f"{JOB}.inp")  # refused before it runs, not after
+        if not own:
+            read_question(folder / f"{JOB}.inp")  # refused before it runs, not after
         return paths
 
     def run(self, folder: Path, time_limit_s: float) -> None:
-        """Run both jobs, ``time_limit_s`` for the two together. Raises ``failures``."""
-        options = load(folder)
-        spent = run_job(OLDJOB, None, self.command, options, folder, time_limit_s)
-        run_job(JOB, OLDJOB, self.command, options, folder, max(time_limit_s - spent, 0.0))
+        """Run all jobs, ``time_limit_s`` for them together. Raises ``failures``."""
+        options, own = load(folder), own_decks.load(folder)
+        for job, before in own.jobs if own else [(OLDJOB, ""), (JOB, OLDJOB)]:
+            left = max(time_limit_s, 0.0)
+            time_limit_s -= run_job(job, before or None, self.command, options, folder, left)
 
     def read(self, folder: Path) -> dict[str, Any]:
         """Results as plain data: each mode a real shape on the crown's nodes.
 
         Raises RunFailed where the results are stale, not whole, or no result.
         """
-        asked = read_question(folder / f"{JOB}.inp")
-        table = read_dat(folder / f"{JOB}.dat")
-        found = checked_modes(folder / f"{JOB}.fil", asked.modes, table)
-        units = load(folder)
-        points = cylindrical(units.length_m * found.coordinates)
-        check_revolved(points)
-        shapes = components(found.displacement, points[:, 1])
+        units, own = load(folder), own_decks.load(folder)
+        job = own.last if own else JOB
+        length_m, mass_kg = (own or units).length_m, (own or units).mass_kg
+        if own:
+            asked, pressure_Pa = own.modes, own.pressure_Pa
+        else:
+            question = read_question(folder / f"{JOB}.inp")
+            asked, pressure_Pa = question.modes, question.pressure * mass_kg / length_m
+        table = read_dat(folder / f"{job}.dat")
+        found = checked_modes(folder / f"{job}.fil", asked, table)
+        points, vectors = length_m * found.coordinates, found.displacement
+        if own:
+            points, turn = about_axle(points)
+            vectors = vectors @ turn.T
+        masses = np.sqrt(found.masses * mass_kg)[:, None, None]
+        places, modes = ring_modes(found.eigenvalues, points, vectors / masses)
         return {
-            "pressure_Pa": asked.pressure * units.mass_kg / units.length_m,
-            "mass_kg": table.mass and table.mass * units.mass_kg,
-            "modes": [
-                {
-                    "frequency_Hz": float(np.sqrt(value) / (2 * np.pi)),
-                    "multiplicity": 1,
-                    "displacement": shape / np.sqrt(mass * units.mass_kg),
-                }
-                for value, mass, shape in zip(found.eigenvalues, found.masses, shapes, strict=True)
-            ],
+            "pressure_Pa": pressure_Pa,
+            "mass_kg": table.mass and table.mass * mass_kg,
+            "modes": modes,
             "gradients": {},
             "nodes": np.empty(0, int),
-            "points": points,
+            "points": places,
             "displacement": np.empty((0, 3)),
         }

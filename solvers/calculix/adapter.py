@@ -15,8 +15,10 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from .. import own_decks
 from ..errors import Refused, RunFailed
 from ..process import end_commands
+from ..rings import about_axle, ring_modes
 from .results import Fields, pairs, read_eigenvalues, read_fields, read_mass
 from .runner import clear, run_job
 
@@ -27,9 +29,11 @@ OPTIONS: dict[str, Any] = {"parallel": 1, "element": "C3D20R", "ply_thickness_m"
 
 
 class Decks(Protocol):
-    """What the tool hands over; ``options``: the solver's, from the case."""
+    """What the tool hands over; ``options``: the solver's, from the case; ``request``: among what
+    is asked, ``own_decks`` of a user's in three dimensions."""
 
     options: Mapping[str, Any]
+    request: Mapping[str, Any]
 
     def texts(self, dialect: str) -> dict[str, str]:
         """File name to text."""
@@ -45,7 +49,7 @@ class CalculiX:
 
     name = "calculix"
     dialect = "calculix"
-    capabilities = frozenset({"modes"})
+    capabilities = frozenset({"modes", "own_decks"})
     refusals = (Refused,)
     failures = (RunFailed,)
     difference_step = 1e-3
@@ -63,9 +67,10 @@ class CalculiX:
         settings = _settings(decks.options)
         if self.version == "unknown":  # else the version tells this program's answers from others'
             settings["command"] = self.command
-        paths = []
+        paths = own_decks.save(decks.request, folder)
         for name, text in decks.texts(self.dialect).items():
             paths.append(folder / name)
+            paths[-1].parent.mkdir(parents=True, exist_ok=True)
             paths[-1].write_text(text, encoding="utf-8", newline="")
         paths.append(folder / SETTINGS)
         paths[-1].write_text(json.dumps(settings), encoding="utf-8", newline="")
@@ -75,6 +80,7 @@ class CalculiX:
         """Run every deck; ``time_limit_s`` is for all of them together. Raises RunFailed."""
         settings = json.loads((folder / SETTINGS).read_text(encoding="utf-8"))
         end = time.monotonic() + time_limit_s
+        own = own_decks.load(folder)
 
         def run_one(job: str, *inputs: str) -> None:
             run_job(folder, job, inputs, self.command, max(0.0, end - time.monotonic()))
@@ -86,6 +92,13 @@ class CalculiX:
             for name in (start, ended):
                 (folder / name).unlink(missing_ok=True)
 
+        if own:
+            texts = [path.relative_to(folder).as_posix() for path in folder.rglob("*.inp")]
+            for job, before in own.jobs:
+                if before:
+                    shutil.copy(folder / f"{before}.rout", folder / f"{job}.rin")
+                run_one(job, *texts, *([f"{job}.rin"] if before else []))
+            return
         _check_rubber(folder / SECTOR)
         jobs, state = [job for _, job in _jobs(folder)], folder / f"{INFLATE}.rout"
         for job in (INFLATE, *jobs):
@@ -109,6 +122,8 @@ class CalculiX:
 
     def read(self, folder: Path) -> dict[str, Any]:
         """Results as plain data, shapes on the section at Theta = 0. Raises RunFailed."""
+        if own := own_decks.load(folder):
+            return _of_own_decks(folder, own)
         modes = []
         jobs = _jobs(folder)
         if not jobs:
@@ -141,6 +156,28 @@ class CalculiX:
             "points": inflated.points[front][:, [0, 2]],
             "displacement": inflated.blocks[0][2][front],
         }
+
+
+def _of_own_decks(folder: Path, own: own_decks.OwnDecks) -> dict[str, Any]:
+    """Results of a user's decks, shapes at the crown's nodes. Raises RunFailed."""
+    table = folder / f"{own.last}.dat"
+    eigenvalues = read_eigenvalues(table, None, own.modes)
+    fields = read_fields(folder / f"{own.last}.frd", static=False)
+    found = {mode: values for mode, name, values in fields.blocks if name == "DISP"}
+    if set(found) != set(range(1, len(eigenvalues) + 1)):
+        raise RunFailed("no_results", f"{own.last}.frd lacks shapes of modes")
+    points, turn = about_axle(own.length_m * fields.points)
+    shapes = np.array([found[mode] for mode in sorted(found)]) / np.sqrt(own.mass_kg)
+    places, modes = ring_modes(eigenvalues, points, shapes @ turn.T)
+    return {
+        "pressure_Pa": own.pressure_Pa,
+        "mass_kg": own.mass_kg * sum(read_mass(table, name) for name in own.mass_sets),
+        "modes": modes,
+        "gradients": {},
+        "nodes": np.empty(0, int),
+        "points": places,
+        "displacement": np.empty((0, 3)),
+    }
 
 
 def _inflated(path: Path) -> tuple[Fields, Array]:

@@ -13,7 +13,7 @@ from ..errors import RunFailed
 
 Array = np.ndarray
 SAME = 1e-4  # relative difference of the two eigenvalues of a pair, at most
-MASS = re.compile(r"total mass for set EVERYTHING and time\s+\S+\s+(\S+)")
+MASS = r"total mass for set {} and time\s+\S+\s+(\S+)"
 
 
 @dataclass
@@ -26,17 +26,20 @@ class Fields:
     blocks: list[tuple[int, str, Array]]
 
 
-def read_eigenvalues(path: Path, diameter: int, asked: int) -> Array:
-    """omega^2 (asked,) in 1/s2, ascending, as .dat has them.
+def read_eigenvalues(path: Path, diameter: int | None, asked: int | None) -> Array:
+    """omega^2 (asked,) in 1/s2, ascending, as .dat has them, of a nodal diameter of a sector; None:
+    of a whole tyre, or as many as there are.
 
     Raises RunFailed: ``no_results`` unless there are as many as asked, ``unstable`` where one is
     not positive.
     """
     text = _text(path)
-    row = re.compile(rf"^ +{diameter} +(\d+)((?: +\S+){{4}}) *$", re.M)
+    which = "" if diameter is None else f" +{diameter}"
+    row = re.compile(rf"^{which} +(\d+)((?: +\S+){{4}}) *$", re.M)
     found = [(int(m[1]), _number(m[2].split()[0], path)) for m in row.finditer(_table(text))]
-    if [number for number, _ in found] != list(range(1, asked + 1)):
-        raise RunFailed("no_results", f"{path.name} has {len(found)} of {asked} modes")
+    count = len(found) if asked is None else asked
+    if not found or [number for number, _ in found] != list(range(1, count + 1)):
+        raise RunFailed("no_results", f"{path.name} has {len(found)} of {asked or 'any'} modes")
     values = np.array([value for _, value in found])
     if not values.any():
         raise RunFailed("no_results", f"{path.name}: all eigenvalues are 0")
@@ -53,11 +56,12 @@ def _table(text: str) -> str:
     return table.partition("P A R T I C I P A T I O N")[0]
 
 
-def read_mass(path: Path) -> float:
-    """Mass of the sector in kg, after the inflation. Raises RunFailed (``no_results``)."""
-    found = MASS.findall(_text(path))
+def read_mass(path: Path, elements: str = "EVERYTHING") -> float:
+    """Mass of a set of elements, in the deck's unit, as it is told last. Raises RunFailed
+    (``no_results``)."""
+    found = re.findall(MASS.format(re.escape(elements)), _text(path))
     if not found:
-        raise RunFailed("no_results", f"{path.name} has no mass")
+        raise RunFailed("no_results", f"{path.name} has no mass of {elements}")
     return _number(found[-1], path)
 
 
@@ -69,8 +73,10 @@ def pairs(eigenvalues: Array, name: str) -> Array:
     return (first + second) / 2
 
 
-def read_fields(path: Path) -> Fields:
-    """A whole .frd file. Raises RunFailed (``no_results``) where it is cut, doubled or empty.
+def read_fields(path: Path, static: bool = True) -> Fields:
+    """A whole .frd file, or that of modes alone in it.
+
+    Raises RunFailed (``no_results``) where it is cut, doubled or empty.
 
     Columns have a fixed width and may touch.
     """
@@ -96,7 +102,7 @@ def read_fields(path: Path) -> Fields:
         elif line.startswith(" -3"):
             if name == "nodes":
                 nodes = dict(kept)
-            elif name.startswith("DISP"):
+            elif name.startswith("DISP") and (mode or static):
                 blocks.append((mode, name, dict(kept)))
             name, kept = "", []
     numbers = [n for n in nodes if blocks and n in blocks[0][2]]

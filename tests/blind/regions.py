@@ -49,13 +49,13 @@ def divided(loaded: LoadedCase, region: str, parts: int) -> tuple[LoadedCase, li
         rebar_layers=layers,
         section=with_part(c.section, gauges=gauges or None),
     )
-    return replace(made, section=replace(section, regions=tuple(regions))), names
+    return replace(made, drawn=replace(section, regions=tuple(regions))), names
 
 
 def moved(loaded: LoadedCase, move: Callable[[Array], Array]) -> LoadedCase:
     """The case with the section's points (line, station, 2) replaced by ``move`` of them."""
     section = loaded.section
-    return replace(loaded, section=replace(section, points=move(section.points.copy())))
+    return replace(loaded, drawn=replace(section, points=move(section.points.copy())))
 
 
 def _named(regions: list[str] | None, region: str, names: list[str]) -> list[str] | None:

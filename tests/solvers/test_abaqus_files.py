@@ -11,8 +11,8 @@ from tyrecal_solvers.abaqus.dat import read_dat
 from tyrecal_solvers.abaqus.fil import read_fil
 from tyrecal_solvers.abaqus.licence import denial, is_queueing
 from tyrecal_solvers.abaqus.options import read_options
-from tyrecal_solvers.abaqus.rings import check_revolved, components, cylindrical
 from tyrecal_solvers.errors import Refused, RunFailed
+from tyrecal_solvers.rings import check_revolved, components, cylindrical
 
 BLANK = " " * 80 + "\n"
 
@@ -189,7 +189,7 @@ def test_nodes_that_are_not_round_the_axle() -> None:
     ring = np.column_stack([0.3 * np.cos(theta), 0 * theta, -0.3 * np.sin(theta)])
     check_revolved(cylindrical(ring))
     for wrong in (ring[:, [1, 0, 2]], ring[:1], ring[:6]):
-        with pytest.raises(RunFailed, match="do not lie round the y axis"):
+        with pytest.raises(RunFailed, match="do not lie round the axle"):
             check_revolved(cylindrical(wrong))
 
 

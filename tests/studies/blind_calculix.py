@@ -100,7 +100,7 @@ def common_problem(case: LoadedCase, faces_at: frozenset[str] = frozenset()) -> 
     tyre = resolved(case)
     c = tyre.case
     plain = c.model_copy(update={"section": c.section.model_copy(update={"gauges": None})})
-    case = replace(tyre.written, case=plain, section=tyre.gauged)
+    case = replace(tyre.written, case=plain, drawn=tyre.gauged)
     return split(case, PLY_THICKNESS_M, faces_at)
 
 

@@ -123,7 +123,7 @@ def split(case: LoadedCase, thickness: float, faces_at: frozenset[str] = frozens
         update={"mesh": mesh, "rebar_layers": layers, "variables": {}, "solids": solids}
     )
     section = replace(case.section, names=tuple(names), points=np.array(points))
-    return replace(case, case=new, section=section)
+    return replace(case, case=new, drawn=section)
 
 
 def straight(*arguments: object) -> SectionMesh:

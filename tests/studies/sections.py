@@ -65,7 +65,7 @@ def wrong_section(case: LoadedCase, random: np.random.Generator) -> LoadedCase:
         ends = np.append(gauge * random.normal(size=4), 0.0)
         thicker[rows] = np.interp(s, np.linspace(0, 1, 5), ends)
     points = carcass + (section.points - carcass) * (1 + thicker[..., None])
-    return replace(case, section=replace(section, points=points + waves[:, None] * normal))
+    return replace(case, drawn=replace(section, points=points + waves[:, None] * normal))
 
 
 @click.command()

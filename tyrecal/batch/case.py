@@ -27,7 +27,7 @@ from typing import Any
 
 from ..errors import InputError
 from ..files import json_text, own_folder, read_bytes, read_json, set_aside, write_runs, write_text
-from ..simulate.deck.tyre_design import TyreDesign
+from ..simulate.deck.decks_design import design_of
 from ..simulate.evaluate.evaluator import Evaluator
 from ..simulate.evaluate.failure import DeckRefused, EvaluationFailed, SolverUnavailable
 from ..simulate.evaluate.sources import sources
@@ -72,7 +72,7 @@ def run_case(task: CaseTask) -> Report:
     try:
         loaded = _loaded(task)
         evaluator = Evaluator(
-            TyreDesign(loaded), task.solver, task.folder / "runs", command=task.command
+            design_of(loaded), task.solver, task.folder / "runs", command=task.command
         )
         question = _question(task, loaded, evaluator)
         report["provenance"] = provenance(loaded, evaluator.solver)

@@ -61,13 +61,13 @@ def command(
         return _check(case, mesh, assignments, terminal)
     from ..files import whole
     from ..simulate.deck.decks import Decks
-    from ..simulate.deck.tyre_design import TyreDesign
+    from ..simulate.deck.decks_design import design_of
     from ..simulate.evaluate.evaluator import Evaluator
     from ..simulate.evaluate.failure import DeckRefused
     from .output import Run
 
     loaded, values = arguments.load(case, mesh, assignments, pressure_kPa, terminal, allow_unusual)
-    design = TyreDesign(loaded, values)
+    design = design_of(loaded, values)
     evaluator = Evaluator(design, solver)
     adapter = evaluator.solver
     evaluator.refuse_lacking(design)

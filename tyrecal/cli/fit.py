@@ -91,7 +91,7 @@ def command(
     from ..measured.tables import read_measurements
     from ..measured.targets import with_measured
     from ..report.table import fit_doubts, fit_verdict, shown, tyre_doubts
-    from ..simulate.deck.tyre_design import TyreDesign
+    from ..simulate.deck.decks_design import design_of
     from ..simulate.evaluate.cluster import reached
     from ..simulate.provenance import provenance
     from ..studies.fit.calibrate import calibrate, check, history_csv
@@ -120,7 +120,7 @@ def command(
             labelled = label(loaded, evaluator, readings, fixed=fixed, jobs=study.jobs)
         told = labelled.readings if labelled else readings
         loaded, left_out = with_measured(plain, measured, told)
-        evaluator = evaluator.of(TyreDesign(loaded))
+        evaluator = evaluator.of(design_of(loaded))
     problem = Problem(loaded, evaluator, fixed)
     check(problem)
     alone = len(problem.labels) == starts == 1 and problem.exact_on_road == len(problem.road)
@@ -141,7 +141,7 @@ def command(
             nonlocal loaded, left_out
             if measured and readings:
                 loaded, left_out = with_measured(plain, measured, readings)
-                evaluator.design = TyreDesign(loaded)
+                evaluator.design = design_of(loaded)
             return calibrate(
                 loaded, evaluator, method, fixed, starts, seed, study.jobs, points.notify, bar.at
             )
@@ -190,7 +190,7 @@ def command(
     study.finish(run)
     file = shlex.quote(str(measured)) if measured else "FILE"
     next_ = f"tyrecal diagnose {shlex.quote(str(case))} --measured {file}"
-    if not loaded.deck:
+    if not loaded.case.deck:
         terminal.say(f"next: {next_} says what the model lacks")
     return 0 if good else EXIT_FIT
 

@@ -60,17 +60,39 @@ def command(case: Path, allow_unusual: bool, terminal: Terminal) -> int:
 
 
 def _refused(loaded: LoadedCase) -> Mistake | None:
-    """What the bundled solver refuses of a deck of one's own that is meant for it."""
+    """What the solver that it is meant for refuses of a deck of one's own, if that is the bundled
+    one, or of decks in three dimensions."""
     from ..simulate.deck.own import trial
     from ..tyre.case.mistakes import Mistake
     from ..tyre.own_deck.text import OwnDeckError
     from ..tyre.resolve import resolved
 
-    if not loaded.deck or loaded.case.solver.name != "bundled":
-        return None
+    own = loaded.deck or loaded.decks
     try:
-        trial(resolved(loaded).flat)
+        if loaded.decks:
+            return _lacking(loaded)
+        if loaded.deck and loaded.case.solver.name == "bundled":
+            trial(resolved(loaded).flat)
     except OwnDeckError as error:
-        file = str(loaded.deck.path.parent / error.place.file)
+        assert own
+        file = str(own.path.parent / error.place.file)
         return Mistake(file, error.place.line, "", "", error.message)
+    return None
+
+
+def _lacking(loaded: LoadedCase) -> Mistake | None:
+    """Why the case's solver cannot run decks in three dimensions. Raises OwnDeckError where they
+    ask for shapes that name no modes."""
+    from ..simulate.deck.decks_design import design_of, output_lines
+    from ..simulate.evaluate.evaluator import Evaluator
+    from ..simulate.evaluate.failure import DeckRefused
+    from ..tyre.case.mistakes import Mistake
+
+    assert loaded.decks
+    evaluator = Evaluator(design_of(loaded))
+    output_lines(loaded.decks, evaluator.solver.dialect)
+    try:
+        evaluator.refuse_lacking(evaluator.design)
+    except DeckRefused as error:
+        return Mistake(str(loaded.path), 0, "solver.name", loaded.case.solver.name, str(error))
     return None

@@ -28,7 +28,10 @@ def draw_evaluation(
     mode, STUDY_mode_C_M[_KIND].png and .vtu.
 
     Only modes known on the whole section are drawn: a 3-D solver gives them on the crown alone.
+    Of a tyre without a section nothing is.
     """
+    if case.drawn is None:
+        return
     mesh = resolved(case).mesh
     moved, modes = placed(evaluation, modes, mesh)
     section = section_data(case, mesh, moved)

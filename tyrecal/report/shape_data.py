@@ -113,20 +113,25 @@ class DiagnosisSection(Result):
 
 def tyre_data(case: LoadedCase, evaluation: Evaluation, modes: Sequence[Mode]) -> dict[str, Any]:
     """The content of fit_shapes.json and modes_shapes.json: the section, and the modes' shapes on
-    its outer surface, from one edge of the bead to the other.
+    its outer surface, from one edge of the bead to the other; of a tyre without a section neither.
 
     A shape is u = Re[amplitude exp(i n Theta)], in r, theta, z; of a pair the member whose crest
     stands at Theta = 0. Modes that are not known on the section are left out.
     """
+    told = {
+        "format": 1,
+        "case": case.case.name,
+        "pressure_kPa": evaluation.pressure_kPa,
+        "variables": {name: list(v.sets) for name, v in case.case.variables.items()},
+    }
+    if case.drawn is None:
+        return {**told, "modes": []}
     mesh = resolved(case).mesh
     moved, modes = placed(evaluation, modes, mesh)
     nodes = mesh.skin()
     R, Z = np.array([mesh.nodes[int(n)] for n in nodes]).T
     return {
-        "format": 1,
-        "case": case.case.name,
-        "pressure_kPa": evaluation.pressure_kPa,
-        "variables": {name: list(v.sets) for name, v in case.case.variables.items()},
+        **told,
         "section": section_data(case, mesh, moved).model_dump(),
         "R_m": _rounded(R),
         "Z_m": _rounded(Z),

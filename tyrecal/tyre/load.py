@@ -18,6 +18,8 @@ from .case.schema import Case, cannot_fit
 from .case.shape import disagreements, explain, without
 from .case.stations import check_templates, read_stations
 from .effects import EffectRefused
+from .own_deck.own_deck import OwnDeck
+from .own_deck.own_decks import OwnDecks
 from .resolve import resolved
 from .state import TyreState
 from .usual import unusual
@@ -60,10 +62,17 @@ def _read(path: Path, allow_unusual: bool) -> tuple[LoadedCase | None, list[Mist
     if data is None:
         return None, document.mistakes
     file_data = deepcopy(data)
+    before = len(document.mistakes)
     deck = read_deck_of(document, data, path.parent)
+    if len(document.mistakes) > before:  # its numbers, which all else names, are not known
+        return None, document.mistakes
     case = _typed(document, data)
     _add(document, disagreements(data))
-    section = section_of(deck, data) if deck else read_stations(document, data, path.parent)
+    section = None
+    if isinstance(deck, OwnDeck):
+        section = section_of(deck, data)
+    elif deck is None:
+        section = read_stations(document, data, path.parent)
     check_templates(document, data, path.parent)
     _add(document, problems(data, section))
     meshable = not (deck or any(m.key.startswith(("mesh", "section")) for m in document.mistakes))
@@ -72,9 +81,10 @@ def _read(path: Path, allow_unusual: bool) -> tuple[LoadedCase | None, list[Mist
         document.add(("section", form), message)
     if not allow_unusual:
         _add(document, unusual(data, section))
-    if case is None or section is None or document.mistakes:
+    if case is None or not (section or isinstance(deck, OwnDecks)) or document.mistakes:
         return None, sorted(document.mistakes, key=lambda m: (m.file != str(path), m.line))
-    loaded = LoadedCase(case, path, section, path.parent, file_data, deck=deck)
+    own = {"decks": deck} if isinstance(deck, OwnDecks) else {"deck": deck}
+    loaded = LoadedCase(case, path, section, path.parent, file_data, **own)
     try:
         resolved(loaded)
     except EffectRefused as error:

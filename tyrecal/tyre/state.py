@@ -64,6 +64,8 @@ class TyreState:
         Raises ValueError where the case cannot be in it.
         """
         state, found = self.of(case), dict[str, float]()
+        if state.rim and case.decks:
+            raise ValueError("must be absent: how the rim is held stands in the decks")
         if state.pressure_kPa is not None:
             found["pressure_kPa"] = state.pressure_kPa
         if state.rim == "springs":

@@ -65,7 +65,7 @@ def set_values(loaded: LoadedCase, values: Mapping[str, float]) -> LoadedCase:
         branch[keys[-1]] = number
     case = _set(loaded.case, tree, ())
     touched = set(tree) - ALONE
-    section = loaded.section
+    section = loaded.drawn
     redrawn = "outline" in tree.get("section", {})
     if redrawn:
         section = read_section_of(case.section, loaded.folder)
@@ -73,9 +73,10 @@ def set_values(loaded: LoadedCase, values: Mapping[str, float]) -> LoadedCase:
         data = case.plain()
         for wrong, reason in problems(data, section):
             raise ValueError(f"{dotted(wrong)} {reason}")
-        if ("mesh" in touched or redrawn) and (message := folds(data, section)):
+        meshed = "mesh" in touched or redrawn
+        if section and meshed and (message := folds(data, section)):
             raise ValueError(message)
-    return replace(loaded, case=case, section=section, as_read=loaded.as_read or loaded)
+    return replace(loaded, case=case, drawn=section, as_read=loaded.as_read or loaded)
 
 
 def overridden(loaded: LoadedCase, values: Mapping[str, float]) -> LoadedCase:
@@ -89,7 +90,7 @@ def unusual_value(loaded: LoadedCase, name: str, value: float) -> str | None:
     """Why no user states ``value`` of a variable, or of the number at a dotted path: what is usual,
     what was probably meant; None where it is usual. Raises ValueError for an unknown name."""
     data = loaded.case.plain()
-    found = (refusal(data, loaded.section, keys, value) for keys in _keys(loaded, name))
+    found = (refusal(data, loaded.drawn, keys, value) for keys in _keys(loaded, name))
     return next((message for message in found if message), None)
 
 

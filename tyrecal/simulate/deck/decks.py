@@ -19,6 +19,11 @@ from ...tyre.templates import TemplateFailed
 LONGEST_NAME = 200  # of a case, as a line of a deck has at most 256 characters
 FIRST = b"** Written by tyrecal: "
 HEADER_LINES = 3
+UNITS_IN_WORDS = {"m": "SI units: m, kg, s, Pa", "mm": "units: mm, t, s, MPa"}
+LEADS_OUTSIDE = re.compile(  # but for comments: an absolute path or one upwards, code of one's own
+    r"^(?!\*\*).*=[ \t]*[\"']?(?:[/\\~@]|\.\.|[a-z]:[/\\]).*|^\*[ \t]*USER[ \t]*SUBROUTINE.*",
+    re.MULTILINE | re.IGNORECASE,
+)
 DeckSlopes = dict[str, list[tuple[str, int, int, float]]]
 
 
@@ -199,11 +204,22 @@ def header(case: LoadedCase) -> str:
     tool; what else asks the same shares the record too, whose keys are of decks `without_header`.
     """
     c = case.case
+    units = case.decks.units if case.decks else "m"
     return (
         f"{FIRST.decode()}{c.name[:LONGEST_NAME]}\n"
         f"** tyre_sha256 {tyre_sha256(case)}, mesh {c.mesh.level}\n"
-        "** SI units: m, kg, s, Pa; angles in degrees, of rebar layers from the meridian\n"
+        f"** {UNITS_IN_WORDS[units]}; angles in degrees, of rebar layers from the meridian\n"
     )
+
+
+def refuse_outside(file: str, text: str) -> None:
+    """Raises TemplateFailed where a deck of somebody's own templates would have the solver read or
+    write elsewhere than in its run folder, compile a program or load a library."""
+    for found in LEADS_OUTSIDE.finditer(text):
+        line = text.count("\n", 0, found.start()) + 1
+        raise TemplateFailed(
+            f"{file}, line {line}: '{found[0].strip():.60}' leads out of the run's folder"
+        )
 
 
 def without_header(text: bytes) -> bytes:

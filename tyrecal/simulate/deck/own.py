@@ -52,7 +52,9 @@ def own_jobs(tyre: Tyre) -> tuple[dict[str, str], dict[str, Any]]:
     pressure = c.pressure_kPa * 1e3 * UNIT_LENGTH[deck.units] / UNIT_MASS[deck.units]
     if isclose(row.number(field), pressure, rel_tol=1e-12):
         pressure = row.number(field)
-    files = own_texts(deck, tyre.written.deck_numbers, pressure)
+    others = [(row, i) for _, row, i in flat.model.pressure if row.number(i) != pressure]
+    numbers = tyre.written.deck_numbers
+    files = own_texts(deck, numbers, [(row, i, pressure) for row, i in others])
     files["inflate.inp"] = files.pop(deck.path.name)
     loads = [block for block in flat.found.inflation if block.name == "DSLOAD"]
     node, (r, z) = flat.model.reference

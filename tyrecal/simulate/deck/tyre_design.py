@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
@@ -20,7 +19,7 @@ from ...tyre.values import set_values
 from .abaqus import aside, context
 from .apart import Apart
 from .calculix import calculix_context
-from .decks import HEADER_LINES, header
+from .decks import HEADER_LINES, header, refuse_outside
 from .own import explained, own_jobs
 
 ELEMENTS_A_WAVE = 7.5  # of quadratic ones: the frequencies are right to 0.4 %
@@ -28,10 +27,6 @@ DeckRequest = Mapping[str, Any]  # what is asked of a deck, see `Decks.request`
 OWN_TEXT = "own deck"  # of a user's deck, as it stands
 NEAR_ZERO = 1e-4  # of a variable's span: below, steps are shares of this
 DECK_STEP = 1e-4  # of a variable, to see which numbers of the deck it moves and how fast
-LEADS_OUTSIDE = re.compile(  # but for comments: an absolute path or one upwards, code of one's own
-    r"^(?!\*\*).*=[ \t]*[\"']?(?:[/\\~@]|\.\.|[a-z]:[/\\]).*|^\*[ \t]*USER[ \t]*SUBROUTINE.*",
-    re.MULTILINE | re.IGNORECASE,
-)
 
 
 class TyreDesign:
@@ -163,18 +158,8 @@ class TyreDesign:
         texts = DIALECTS[dialect](self.tyre, env, request)
         if own or dialect == OWN_TEXT:
             for file, text in texts.items():
-                _refuse_outside(file, text)
+                refuse_outside(file, text)
         return texts
-
-
-def _refuse_outside(file: str, text: str) -> None:
-    """Raises TemplateFailed where a deck of somebody's own templates would have the solver read or
-    write elsewhere than in its run folder, compile a program or load a library."""
-    for found in LEADS_OUTSIDE.finditer(text):
-        line = text.count("\n", 0, found.start()) + 1
-        raise TemplateFailed(
-            f"{file}, line {line}: '{found[0].strip():.60}' leads out of the run's folder"
-        )
 
 
 def _abaqus(tyre: Tyre, env: Any, request: DeckRequest) -> dict[str, str]:

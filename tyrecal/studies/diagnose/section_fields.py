@@ -117,7 +117,7 @@ def moved(case: LoadedCase, field: SectionField, amount: float) -> LoadedCase:
         normal = np.stack([-z, r], 1) / np.hypot(r, z)[:, None]
         outwards = np.sign(((section.points[-1] - section.points[0]) * normal).sum(1))
         points = section.points + amount * (field.values * outwards)[:, None] * normal
-    return replace(case, section=replace(section, points=points))
+    return replace(case, drawn=replace(section, points=points))
 
 
 def _kernel(a: Array, b: Array) -> Array:

@@ -161,8 +161,14 @@ def spans_of(
     case: LoadedCase, evaluator: Evaluator, ids: Sequence[str] | None = None
 ) -> tuple[dict[str, Span], dict[str, str]]:
     """Effects that the evaluator's solver can express, and why it cannot the others, or a case of a
-    user's deck cannot have them. Raises ValueError where one of ``ids`` is no effect.
+    user's deck cannot have them. Raises ValueError where one of ``ids`` is no effect; InputError
+    for decks in three dimensions.
     """
+    if case.decks:
+        raise InputError(
+            "a diagnosis weighs effects, which change a section: this tyre stands in decks in three"
+            " dimensions"
+        )
     able: dict[str, Span] = {}
     unable: dict[str, str] = {}
     for id in ids or ():

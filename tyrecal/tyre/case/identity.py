@@ -59,7 +59,7 @@ def is_of_tyre(path: str) -> bool:
 
 def _content(loaded: LoadedCase) -> dict[str, Any]:
     """The tyre as plain data, without the values of its variables."""
-    case = loaded.case
+    case, own = loaded.case, loaded.deck or loaded.decks
     data: dict[str, Any] = case.model_dump(include=TYRE, exclude_defaults=True)
     data["effects"] = {id: value for id, value in case.effects.items() if value}
     for keys in STATE:
@@ -71,7 +71,7 @@ def _content(loaded: LoadedCase) -> dict[str, Any]:
     return {
         "tyre": _plain(data),
         "variables": {name: sorted(v.sets) for name, v in case.variables.items()},
-        "drawn": loaded.deck.sha256 if loaded.deck else _drawn(loaded.section),
+        "drawn": own.sha256 if own else _drawn(loaded.section),
     }
 
 

@@ -7,10 +7,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ...errors import InputError
 from .schema import Case
 
 if TYPE_CHECKING:
     from ..own_deck.own_deck import OwnDeck
+    from ..own_deck.own_decks import OwnDecks
     from ..section.section import Section
 
 
@@ -20,13 +22,24 @@ class LoadedCase:
 
     case: Case
     path: Path  # of the case file
-    section: Section
+    drawn: Section | None  # None: the tyre stands in decks in three dimensions
     folder: Path  # to which the case's own paths are relative
     file_data: dict[str, Any]  # as the file has it, whatever is set later
     # set by the user since, by name or path, for results to say
     overrides: Mapping[str, float] = field(default_factory=dict)
     as_read: LoadedCase | None = None  # before any number was set; None: none was
     deck: OwnDeck | None = None  # that the section is of, where the case names one
+    decks: OwnDecks | None = None  # in three dimensions, in place of a section
+
+    @property
+    def section(self) -> Section:
+        """The section. Raises InputError where there is none."""
+        if self.drawn is None:
+            raise InputError(
+                f"'{self.path}' has no section, which this needs: its tyre stands in decks in three"
+                " dimensions"
+            )
+        return self.drawn
 
     @property
     def deck_numbers(self) -> Mapping[str, float]:
@@ -36,6 +49,6 @@ class LoadedCase:
     @property
     def files(self) -> list[Path]:
         """That the section stands in."""
-        if self.deck:
-            return [self.deck.path.parent / name for name in self.deck.texts]
+        if own := self.deck or self.decks:
+            return [own.path.parent / name for name in own.texts]
         return [self.folder / self.case.section.file]

@@ -184,16 +184,18 @@ class DeckGauges(Part):
 
 
 class DeckSource(Part):
-    """An ABAQUS deck of the section, relative to the case file, in m or mm (with t, s, MPa).
+    """An ABAQUS deck of the section, relative to the case file, in m or mm (with t, s, MPa); or
+    ``decks`` of the whole tyre in three dimensions, in the order in which they are run.
 
     ``numbers``: of the marks in its text, by name, and others of its numbers, by path, in its own
     units; those not given are as the text has them. ``crown``: its set of nodes of the outer
-    surface over the belt, which ABAQUS gives shapes of. ``parts``: the
-    element sets of its sections that are the tread, the sidewall, the bead filler, the belts, for
-    effects; ``gauges``: of the first two.
+    surface over the belt, which ABAQUS gives shapes of; in three dimensions all round. ``parts``:
+    the element sets of its sections that are the tread, the sidewall, the bead filler, the belts,
+    for effects; ``gauges``: of the first two.
     """
 
-    file: Text
+    file: Text | None = None
+    decks: Annotated[list[Text], Field(min_length=1, max_length=20)] | None = None
     units: Literal["m", "mm"]
     crown: Text = "CROWN"
     parts: dict[DeckPart, list[Text]] = Field(default_factory=dict)
@@ -212,7 +214,11 @@ class DeckSource(Part):
 
     @classmethod
     def problems(cls, values: Mapping[str, Any]) -> Iterator[Disagreement]:
+        yield from one_of(values, "file", "decks")
         gauges, parts = values.get("gauges"), values.get("parts")
+        for key, given in (("parts", parts), ("gauges", gauges)):
+            if values.get("decks") is not None and given not in (None, {}, DeckGauges()):
+                yield key, "must be absent with decks"
         if isinstance(gauges, DeckGauges) and isinstance(parts, dict):
             for part, factor in gauges:
                 if factor != 1 and not parts.get(part):
@@ -282,7 +288,7 @@ class ReferencePoint(Part):
     z: Number
 
 
-def _values(part: Any) -> Mapping[str, Any]:
+def part_values(part: Any) -> Mapping[str, Any]:
     """The values of a part, checked or as in the file; none where it is wrong."""
     if isinstance(part, Part):
         return part.__dict__
@@ -324,7 +330,7 @@ class Rim(Part):
 
     @classmethod
     def problems(cls, values: Mapping[str, Any]) -> Iterator[Disagreement]:
-        spindle, point = (_values(values.get(key)) for key in ("spindle", "reference_point_m"))
+        spindle, point = (part_values(values.get(key)) for key in ("spindle", "reference_point_m"))
         soft, free = any(number(spindle, key) for key in spindle), values.get("free") is True
         if soft and free:
             yield "free", "must be false where the spindle has a compliance"

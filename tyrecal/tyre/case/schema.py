@@ -40,6 +40,7 @@ from .parts import (
     Text,
     number,
     one_of,
+    part_values,
 )
 
 LEAST_LOAD_N, LARGEST_LOAD_N = 1.0, 1e6  # outside, no tyre finds its balance on a road
@@ -263,6 +264,9 @@ OF_A_SECTION = ("section", "mesh", "materials", "solids")
 """What a case must have that is no deck's."""
 IN_A_DECK = ("section", "mesh", "materials", "solids", "rebar_layers", "templates")
 """What stands in the deck, where the case names one."""
+IN_DECKS = ("cavity", "spin_rad_per_s", "point_mass", "road_spring", "splice")
+"""What stands in decks in three dimensions, too."""
+HIGHEST = "highest_harmonic"
 DECK_LEVEL = "deck"
 """The mesh level of a deck: it has its own mesh."""
 
@@ -315,6 +319,22 @@ class Case(Part):
                     yield key, f"must be given{more}"
         else:
             yield from ((key, "must be absent with deck") for key in IN_A_DECK if key in given)
+        if part_values(values.get("deck")).get("decks"):
+            yield from cls._beside_decks(values)
+
+    @classmethod
+    def _beside_decks(cls, values: Mapping[str, Any]) -> Iterator[Disagreement]:
+        """What stands in decks in three dimensions, and not in the case."""
+        for key in IN_DECKS:
+            if cls._is_given(key, values.get(key)):
+                yield key, "must be absent with deck.decks, where it stands"
+        rim = part_values(values.get("rim"))
+        spindle = part_values(rim.get("spindle"))
+        if rim.get("free") is True or any(number(spindle, key) for key in spindle):
+            yield "rim", "must be held: with deck.decks, what moves stands there"
+        usual, said = Analysis().__dict__, part_values(values.get("analysis"))
+        if any(said.get(key, usual[key]) != usual[key] for key in usual.keys() - {HIGHEST}):
+            yield "analysis", f"must say {HIGHEST} alone: with deck.decks, all else stands there"
 
     @classmethod
     def _is_given(cls, key: str, value: Any) -> bool:

@@ -9,12 +9,17 @@ from typing import Annotated, Any, Union, get_args, get_origin
 from pydantic import BaseModel, ValidationError
 
 from .mistakes import Keys, suggestion
-from .parts import WRONG, Cord, Part, RebarLayer, Rim, Rubber, SectionSource
+from .parts import WRONG, Cord, DeckSource, Part, RebarLayer, Rim, Rubber, SectionSource
 from .schema import Case, Road, TargetFootprint, TargetMode, Uncertainty, Variable
 
 UNIONS = (Union, UnionType)
 KINDS: dict[str, type[BaseModel]] = {"rubber": Rubber, "cord": Cord}
-SINGLE: dict[str, type[Part]] = {"section": SectionSource, "rim": Rim, "road": Road}
+SINGLE: dict[str, type[Part]] = {
+    "section": SectionSource,
+    "deck": DeckSource,
+    "rim": Rim,
+    "road": Road,
+}
 MESSAGES = {
     "missing": "must be given",
     "float_type": "must be a number",

@@ -27,7 +27,7 @@ def add(case: LoadedCase, value: float) -> LoadedCase:
     room = min(length[edge], length[end] - length[edge])
     if not abs(value) / 2 < 0.5 * room:
         raise ValueError(f"must be less than {room:.3g} m either way")
-    return replace(case, section=_slid(section, line, edge, end, value / 2))
+    return replace(case, drawn=_slid(section, line, edge, end, value / 2))
 
 
 @lru_cache(maxsize=8)

@@ -34,7 +34,7 @@ def add(case: LoadedCase, value: float) -> LoadedCase:
             if layer.line == outside:
                 own = [region for region in layer.regions or elsewhere if region not in regions]
                 layers[name] = with_part(layer, regions=own)
-        case = replace(case, section=_continued(section, outside, tuple(regions)))
+        case = replace(case, drawn=_continued(section, outside, tuple(regions)))
     for name in carcass(case):
         layer = layers[name]
         layers[unused(f"{name}_turn_up", layers)] = with_part(

@@ -47,6 +47,8 @@ class Effect:
 
     def of(self, case: LoadedCase) -> Callable[[LoadedCase, float], LoadedCase]:
         """Its `add` for a case. Raises ValueError where the case has nothing that it changes."""
+        if case.decks:
+            raise ValueError("changes a section, and the tyre stands in decks in three dimensions")
         if case.deck is None or case.case.deck is None:
             return self.add
         if self.add_to_deck is None:

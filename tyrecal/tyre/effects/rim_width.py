@@ -29,7 +29,7 @@ def add(case: LoadedCase, value: float) -> LoadedCase:
     if not abs(value) / 2 < most:
         raise ValueError(f"must be less than {2 * most:.3g} m either way")
     edges = belt_edge(case), rim_edge(section)
-    return replace(case, section=_mounted(section, line, *edges, value / 2))
+    return replace(case, drawn=_mounted(section, line, *edges, value / 2))
 
 
 @lru_cache(maxsize=8)

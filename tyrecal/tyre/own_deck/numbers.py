@@ -69,6 +69,8 @@ def field_names(block: Block) -> list[str]:
             raise block.refused(f"{laws[0]} and {laws[1]} are two laws")
         order = int(block.parameters.get("N", "1"))
         return LAW_CONSTANTS[laws[0] if laws else "POLYNOMIAL"](order)
+    if block.name == "ELASTIC" and block.get("TYPE", "ISOTROPIC") not in ("ISOTROPIC", "ISO"):
+        return []
     if block.name == "VISCOELASTIC":
         return FIELDS["PRONY" if "TIME" in block.parameters else "TABULAR"]
     return FIELDS.get(block.name, [])

@@ -3,25 +3,27 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 from .numbers import DECK_MARK, assigned, written
 from .own_deck import OwnDeck
 from .text import Row
 
+Setting = tuple[Row, int, float]  # a number of a field of a data line
 
-def own_texts(deck: OwnDeck, numbers: Mapping[str, float], pressure: float) -> dict[str, str]:
-    """Text by file name, that it includes too, relative to its folder. pressure: in the deck's own
-    unit, in place of its own where it is another. Raises OwnDeckError."""
-    flat = deck.flat(numbers)
-    places: list[tuple[Row, int, float]] = [
+
+def own_texts(
+    deck: OwnDeck, numbers: Mapping[str, float], pressures: Iterable[Setting] = ()
+) -> dict[str, str]:
+    """Text by file name, that it includes too, relative to its folder. pressures: in the deck's own
+    unit, in place of its own."""
+    places = [
         (deck.blocks[k].rows[i], j, numbers[path])
         for path, (k, i, j) in deck.places.items()
         if path in numbers and numbers[path] != deck.numbers[path]
     ]
-    places += [(row, i, pressure) for _, row, i in flat.model.pressure if row.number(i) != pressure]
     lines = {file: text.splitlines(keepends=True) for file, text in deck.texts.items()}
-    for row, j, value in places:
+    for row, j, value in (*places, *pressures):
         own = lines[row.place.file]
         own[row.place.line - 1] = _with(own[row.place.line - 1], row, j, value)
     known = {name: numbers[name] for name in deck.marks if name in numbers}

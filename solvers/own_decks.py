@@ -1,0 +1,46 @@
+"""A user's own decks in three dimensions: what is said of them beside their texts."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+OWN_DECKS_FILE = "own_decks.json"
+
+
+@dataclass(frozen=True)
+class OwnDecks:
+    """jobs: each with the one that it goes on from, or ""; modes: asked of the last one, None where
+    a range of frequencies decides; length_m, mass_kg: the decks' units; mass_sets: element sets
+    that have a mass."""
+
+    jobs: list[tuple[str, str]]
+    modes: int | None
+    pressure_Pa: float
+    length_m: float
+    mass_kg: float
+    mass_sets: list[str]
+
+    @property
+    def last(self) -> str:
+        """The job that finds the modes."""
+        return self.jobs[-1][0]
+
+
+def save(request: Mapping[str, Any], folder: Path) -> list[Path]:
+    """Write what a request says of own decks into a run folder; nothing where it is of none."""
+    if "own_decks" not in request:
+        return []
+    path = folder / OWN_DECKS_FILE
+    text = json.dumps(asdict(OwnDecks(**request["own_decks"])), indent=1) + "\n"
+    path.write_text(text, encoding="utf-8", newline="")
+    return [path]
+
+
+def load(folder: Path) -> OwnDecks | None:
+    """What was saved in a run folder; None where it has no own decks. Raises OSError."""
+    path = folder / OWN_DECKS_FILE
+    return OwnDecks(**json.loads(path.read_text(encoding="utf-8"))) if path.exists() else None

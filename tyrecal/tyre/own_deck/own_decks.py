@@ -1,0 +1,193 @@
+"""A user's decks in three dimensions, in the order in which they are run: their numbers, pressure,
+crown and modes. Nothing of the tyre is read out of them: they are the solver's."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from hashlib import sha256
+from pathlib import Path
+
+from .numbers import DECK_MARK
+from .own_deck import UNIT_LENGTH, UNIT_MASS, OwnDeck, Units, read_own_deck
+from .own_text import Setting, own_texts
+from .text import Block, OwnDeckError, Place, Row, named
+
+JOB_FILE = re.compile(r"[A-Za-z0-9_\-]{1,60}\.inp", re.IGNORECASE)  # a file that names a job
+PRESSURE_MARK = "pressure"  # filled with the case's pressure
+PRESSURE_DOF = 8  # of a fluid cavity's reference node
+NAMES_OF_SETS = ("NSET", "NEW SET")
+CONTINUES = {"SYMMETRIC MODEL GENERATION", "SYMMETRIC RESULTS TRANSFER", "IMPORT"}
+
+
+@dataclass(eq=False)
+class OwnDecks:
+    """The decks, all of one folder and in the same units; ``crown``: their node set of the crown's
+    centre line round the tyre, or of several lines."""
+
+    decks: tuple[OwnDeck, ...]
+    crown: str
+
+    @property
+    def path(self) -> Path:
+        """The last one's, which finds the modes."""
+        return self.decks[-1].path
+
+    @property
+    def units(self) -> Units:
+        """Of all of them."""
+        return self.decks[0].units
+
+    @cached_property
+    def blocks(self) -> list[Block]:
+        """Of all, one deck after the other."""
+        return [block for deck in self.decks for block in deck.blocks]
+
+    @cached_property
+    def texts(self) -> dict[str, str]:
+        """By file, relative to their folder."""
+        return {file: text for deck in self.decks for file, text in deck.texts.items()}
+
+    @cached_property
+    def marks(self) -> dict[str, Block]:
+        """But the pressure's."""
+        found = {name: block for deck in self.decks for name, block in deck.marks.items()}
+        return {name: block for name, block in found.items() if name != PRESSURE_MARK}
+
+    @cached_property
+    def numbers(self) -> dict[str, float]:
+        """Plain numbers by path; one that two decks state has a path where they agree."""
+        found: dict[str, set[float]] = {}
+        for deck in self.decks:
+            for path, value in deck.numbers.items():
+                found.setdefault(path, set()).add(value)
+        return {path: min(values) for path, values in found.items() if len(values) == 1}
+
+    @cached_property
+    def sha256(self) -> str:
+        """Hash of all that they say but plain numbers, and of the set that is the crown."""
+        said = [*(deck.sha256 for deck in self.decks), self.crown]
+        return sha256("\n".join(said).encode()).hexdigest()
+
+    @cached_property
+    def jobs(self) -> list[tuple[str, str]]:
+        """Each job and the one before it that it goes on from, "" where it is whole by itself."""
+        found: list[tuple[str, str]] = []
+        for deck in self.decks:
+            reads = any(
+                b.name in CONTINUES or (b.name == "RESTART" and "READ" in b.parameters)
+                for b in deck.blocks
+            )
+            found.append((deck.path.stem, found[-1][0] if found and reads else ""))
+        return found
+
+    @cached_property
+    def modes_step(self) -> list[Block]:
+        """The step of the last deck that finds the modes, *STEP to *END STEP."""
+        steps: list[list[Block]] = []
+        for block in self.decks[-1].blocks:
+            if block.name == "STEP":
+                steps.append([])
+            if steps and (not steps[-1] or steps[-1][-1].name != "END STEP"):
+                steps[-1].append(block)
+        found = [step for step in steps if any(block.name == "FREQUENCY" for block in step)]
+        if len(found) != 1:
+            raise OwnDeckError(
+                Place(self.path.name, 1),
+                f"the last deck finds the modes: it needs one step with *FREQUENCY, it has"
+                f" {len(found)}",
+            )
+        if found[0][-1].name != "END STEP":
+            raise found[0][0].refused("has no *END STEP")
+        return found[0]
+
+    @cached_property
+    def modes(self) -> int | None:
+        """How many are asked for; None where a range of frequencies decides."""
+        row = next(b for b in self.modes_step if b.name == "FREQUENCY").only_row()
+        return None if row.text(1) or row.text(2) or not row.text(0) else row.integer(0)
+
+    @cached_property
+    def solid_sets(self) -> list[str]:
+        """Element sets that have a section, and so a mass."""
+        found = [b.get("ELSET") for b in self.blocks if b.name.endswith(" SECTION")]
+        return list(dict.fromkeys(name for name in found if name))
+
+    @cached_property
+    def pressures(self) -> list[tuple[OwnDeck, Row, int, float]]:
+        """Where a pressure stands, and how large it is over the largest of them.
+
+        None where `PRESSURE_MARK` says where. Raises OwnDeckError where it cannot be told.
+        """
+        if any(PRESSURE_MARK in deck.marks for deck in self.decks):
+            return []
+        found = [(deck, *place) for deck in self.decks for place in _pressures(deck.blocks)]
+        largest = max((abs(value) for *_, value in found), default=0.0)
+        if not largest:
+            raise OwnDeckError(
+                Place(self.decks[0].path.name, 1),
+                "no pressure is found in *DSLOAD, *DLOAD, or *BOUNDARY of the degree of freedom"
+                f" {PRESSURE_DOF}: write {{{{ {PRESSURE_MARK} }}}} for it",
+            )
+        return [(deck, row, i, value / largest) for deck, row, i, value in found if value]
+
+    def filled(self, numbers: Mapping[str, float], pressure_Pa: float) -> dict[str, str]:
+        """The texts with marks, numbers and the pressure set. Raises OwnDeckError."""
+        pressure = pressure_Pa * UNIT_LENGTH[self.units] / UNIT_MASS[self.units]
+        known = {**numbers, PRESSURE_MARK: pressure}
+        files: dict[str, str] = {}
+        for deck in self.decks:
+            for name, block in deck.marks.items():
+                if name not in known:
+                    raise block.refused(f"the mark {name} has no number: give it in deck.numbers")
+            own: list[Setting] = [
+                (row, i, share * pressure)
+                for its, row, i, share in self.pressures
+                if its is deck and abs(row.number(i) / (share * pressure or 1.0) - 1) > 1e-12
+            ]
+            files |= own_texts(deck, known, own)
+        return files
+
+    def check(self, numbers: Mapping[str, float]) -> None:
+        """Raises OwnDeckError where they cannot be run, or have no modes to label."""
+        self.modes  # noqa: B018
+        self.filled(numbers, 1.0)
+
+    @property
+    def node_sets(self) -> list[str]:
+        """Names of all node sets."""
+        given = (block.get(key) for block in self.blocks for key in NAMES_OF_SETS)
+        return list(dict.fromkeys(name for name in given if name))
+
+
+def _pressures(blocks: Sequence[Block]) -> Iterator[tuple[Row, int, float]]:
+    """Row, field and number of each pressure."""
+    for block in blocks:
+        for row in block.rows:
+            if block.name in ("DSLOAD", "DLOAD") and re.fullmatch(r"P\d?", row.name(1)):
+                place = 2
+            elif block.name == "BOUNDARY" and row.text(1) == row.text(2, row.text(1)) == str(
+                PRESSURE_DOF
+            ):
+                place = 3
+            else:
+                continue
+            if row.text(place) and not DECK_MARK.search(row.text(place)):
+                yield row, place, row.number(place)
+
+
+def read_own_decks(paths: Sequence[Path], units: Units, crown: str) -> OwnDecks:
+    """The decks in the order in which they are run. Raises OwnDeckError, OSError; ValueError where
+    their files cannot name jobs."""
+    stems = [path.stem.upper() for path in paths]
+    for path in paths:
+        if not JOB_FILE.fullmatch(path.name) or path.parent != paths[0].parent:
+            raise ValueError(
+                f"'{path.name}' must be FILE.inp, of letters, digits, - and _, in one folder with"
+                " the others, as it names a job"
+            )
+        if stems.count(path.stem.upper()) > 1:
+            raise ValueError(f"'{path.name}' is given twice")
+    return OwnDecks(tuple(read_own_deck(path, units) for path in paths), named(crown))
