@@ -356,7 +356,7 @@ def test_the_placebo_is_what_tyres_without_an_effect_would_show() -> None:
         best = max((explain(there, [id], 1.0) for id in toy.g), key=lambda h: h.ln_evidence)
         assert best.fitted is not None
         e, d = {best.key: best.values[best.key][[best.best]]}, best.fitted.d[best.best]
-        shift, tilt, _ = out.added(e, 1)
+        shift, tilt, *_ = out.added(e, 1)
         after = each[hold] - shift[0] - (out.plain(np.zeros(3))[1] + tilt[0]) @ d
         shares.append(1 - np.sqrt(np.mean(after**2) / np.mean(before**2)))
     found = _placebo(p, hold, np.random.default_rng(7))

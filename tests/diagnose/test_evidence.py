@@ -64,11 +64,42 @@ def test_what_an_effects_law_may_be_off_is_scatter_of_its_own() -> None:
     strict = replace(loose, assumed=Assumed(form=0.001, law=0.0))
     e = np.array([0.4, 1.0])
     found = refit(loose, {"e0": e}, 2)
-    shift, *_ = loose.added({"e0": e}, 2)
-    for i, more in enumerate(loose.law(shift)):
+    for i, more in enumerate(loose.law(loose.added({"e0": e}, 2))):
         own = refit(strict, {"e0": e[i : i + 1]}, 1, more)
         assert more.any() and found.ln_evidence[i] == pytest.approx(own.ln_evidence[0])
     assert refit(loose, {}, 1).ln_evidence == pytest.approx(refit(strict, {}, 1).ln_evidence)
+
+
+def test_what_else_an_effect_is_is_integrated_over() -> None:
+    """z ~ N(0, 1) times a shift that grows as the effect does: as so much more covariance. It is
+    asked for at the ends of the range alone; laws of two effects are off by themselves."""
+    toy, more = flat(pressures=(160.0, 240.0)), generator(7).normal(0, 0.01, 18)
+    toy.spans["e0"] = Span(-1.0, 0.5, second=True)
+    asked, plain = [], toy._answer
+
+    def told(point: Query) -> Answer:
+        if not point.beside:
+            return plain(point)
+        asked.append(point.effects["e0"])
+        return replace(plain(point), beside=2 * point.effects["e0"] * more)
+
+    toy._answer = told  # type: ignore[method-assign]
+    p = problem(toy, assumed=Assumed(form=0.001)).measured(toy.base + 0.4 * toy.g["e0"])
+    assert sorted(asked) == [-1.0, 0.5]
+    e = np.array([-0.5, 0.4])
+    found = refit(p, {"e0": e}, 2)
+    for i in range(2):
+        shift, beside = 0.04 * e[i] * toy.g["e0"], 2 * e[i] * more
+        extra = np.outer(shift, shift) * p._alike + np.outer(beside, beside)
+        bare = replace(p, assumed=Assumed(form=0.001, law=0.0))
+        nodes = {**p.expansion.nodes, "e0": replace(p.expansion.nodes["e0"], beside={})}
+        bare = replace(bare, expansion=replace(p.expansion, nodes=nodes))
+        own = refit(bare, {"e0": e[i : i + 1]}, 1, extra)
+        assert found.ln_evidence[i] == pytest.approx(own.ln_evidence[0])
+    both, one, other = (
+        p.law(p.added(effects, 2)) for effects in ({"e0": e, "e1": e**2}, {"e0": e}, {"e1": e**2})
+    )
+    np.testing.assert_allclose(both, one + other, atol=1e-16)
 
 
 @pytest.mark.parametrize("far", [(0, 0, 0), (2, 2, 2), (-2, 2, 0), (3, 0, -3)])

@@ -61,7 +61,7 @@ def test_splits_count_from_what_the_case_has() -> None:
     for id, e in (("point_mass", 0.03), ("point_mass", -0.04), ("rim_width", 5e-3)):
         (there,) = own.answers([Query(X, {id: e})])
         assert isinstance(there, Answer)
-        _, _, split = problem.added({id: np.array([e])}, 1)
+        _, _, split, *_ = problem.added({id: np.array([e])}, 1)
         assert split[0] == pytest.approx(abs(there.split), abs=5e-5)
     assert split.max() > 3e-3
 

@@ -47,6 +47,7 @@ from tyrecal.studies.diagnose.separability import separate
 from tyrecal.studies.diagnose.study import _reaching
 from tyrecal.studies.diagnose.verdict import decide
 from tyrecal.studies.diagnose.where import section_map
+from tyrecal.tyre.effects import catalogue
 
 from ..chance import generator
 from ..conftest import CASES
@@ -666,8 +667,11 @@ def test_the_guide_says_what_is_assumed() -> None:
     """Of an effect's law, of splits, and that the form's error is the one on record."""
     guide = (CASES / "diagnosis.md").read_text()
     assumed = Assumed()
-    assert f"may be off by {100 * assumed.law:g} % of its own shift" in guide
-    assert assumed.form is None and assumed.split == 0.003
+    laws = [100 * effect.law for effect in catalogue().values()]
+    assert f"may be off by {min(laws):g} to {max(laws):g} % of its own shift" in guide
+    for effect in catalogue().values():
+        assert (effect.beside is not None) == (f"`{effect.id}` (" in guide)
+    assert assumed.law is None and assumed.form is None and assumed.split == 0.003
 
 
 def test_cosines_and_distances_by_their_formula() -> None:

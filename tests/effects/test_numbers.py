@@ -271,3 +271,31 @@ def test_layer_ends_with_its_regions() -> None:
     gone = set(long.splitlines()) - set(found.splitlines())
     assert len(gone) == 2 * (3 + 1)  # the lower sidewall's and the bead's elements, both sides
     assert set(found.splitlines()) < set(long.splitlines())
+
+
+@pytest.mark.parametrize(("id", "value"), [("tread_wear", 0.4), ("tread_density", -0.2)])
+def test_what_else_there_is_to_an_effect_is_no_more_of_it(id: str, value: float) -> None:
+    """Wear that is uneven, voids that take stiffness: the same mass, of which 0.4 of the tread is
+    17 %; wear is even in its mean across, and the tread a little thicker at its edges."""
+    effect = catalogue()[id]
+    assert effect.beside
+    plain, other = (
+        Evaluator(TyreDesign(made)).evaluate(Question({})).mass_kg
+        for made in (effect.add(CASE, value), effect.beside(CASE, value))
+    )
+    assert other == pytest.approx(plain, rel=5e-3)
+
+
+def test_a_higher_filler_stiffens_the_region_above_by_its_share() -> None:
+    """By 10 mm over its length; a section with none above says so."""
+    higher = catalogue()["bead_filler"].beside
+    assert higher
+    made = higher(CASE, 2.0)
+    added = [solid for solid in made.case.solids if solid.regions == ["upper_sidewall"]]
+    own, (above,) = CASE.case.materials["rubber"].C10_Pa, added
+    first = CASE.section.points[PLY]
+    regions = dict(CASE.section.regions)
+    begin = regions["crown"]
+    upper = length(first[begin : begin + regions["upper_sidewall"] + 1])[-1]
+    share = 0.010 / upper
+    assert made.case.materials[above.material].C10_Pa == pytest.approx(own * (1 + 2 * share))

@@ -353,10 +353,14 @@ def _assumptions(study: DiagnosedCase) -> Iterator[str]:
     yield f"Constants that nobody calibrates, one standard deviation each ({kind}): {words}."
     a = d.problem.assumed
     form = "as recorded for every mode" if a.form is None else f"{100 * a.form:g} % in every mode"
+    spans = d.problem.spans
+    laws = sorted({span.law for span in spans.values()})
+    law = f"{100 * laws[0]:g} to {100 * laws[-1]:g}" if a.law is None and laws else "0"
+    second = ", ".join(f"`{id}`" for id, span in spans.items() if span.second) or "none"
     yield (
         f"The model's own form: {form}, correlated {BETWEEN_PRESSURES:g} between pressures; an"
-        f" effect's law may be off by {100 * a.law:g} % of its shift; every tyre splits its pairs"
-        f" by {100 * a.split:g} %."
+        f" effect's law may be off by {law} % of its shift, effect by effect; integrated over what"
+        f" else there is to it: {second}; every tyre splits its pairs by {100 * a.split:g} %."
     )
     for id, why in d.problem.expansion.failed.items():
         yield f"`{id}` could not be evaluated: {why}."

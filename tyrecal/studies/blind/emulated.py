@@ -6,8 +6,9 @@ About the centre x0, with t = (x - x0) / reach, |t| <= 1:
 
 q_k: monomials, fitted by least squares to values and Jacobians at designs of a Halton sequence;
 L_j: Lagrange's polynomials of the effect's nodes, 0 among them. Changes by the sources of error
-likewise; what couples near modes hardly changes with x, and is that of the nearest design. Beyond
-the box the model goes straight on, with the slopes at its nearest point.
+likewise; what couples near modes, and what else an effect's nature leaves open, hardly changes with
+x, and is that of the nearest design, or of the centre. Beyond the box the model goes straight on,
+with the slopes at its nearest point.
 """
 
 from __future__ import annotations
@@ -52,6 +53,7 @@ class EmulatedEffect:
     nodes: Array  # (k,) of the parameter, 0 left out
     added: tuple[Polynomial, ...]  # at each
     split: tuple[Polynomial, ...]
+    beside: Mapping[float, Array]  # (n,) at the ends of the range, see `Answer.beside`
 
     def at(self, e: float, t: Array) -> tuple[Array, Array, Array]:
         """Added eta (n,), slopes (n, v) by t, split (n,) at parameter e."""
@@ -96,19 +98,19 @@ class Emulated:
         there = (point.x - self.start) / self.reach
         t = np.clip(there, -1.0, 1.0)
         eta, slope = self._plain.at(t)
-        split = np.zeros(len(eta))
+        split, beside = np.zeros(len(eta)), None
         for id, e in point.effects.items():
             added, tilt, apart = self._effects[id].at(e, t)
             eta, slope, split = eta + added, slope + tilt, np.hypot(split, apart)
+            beside = self._effects[id].beside.get(e) if point.beside else None
         constants = None
         if point.constants:
             constants = self._constants.at(t)[0].reshape(len(eta), -1)
         coupling = None
         if point.coupled and self._couplings:
             coupling = min(self._couplings, key=lambda known: float(abs(known[0] - t).max()))[1]
-        return Answer(
-            eta + slope @ (there - t), slope / self.reach, split, constants, coupling=coupling
-        )
+        straight, slope = eta + slope @ (there - t), slope / self.reach
+        return Answer(straight, slope, split, constants, coupling=coupling, beside=beside)
 
 
 def emulate(model: ResponseModel, reach: float = REACH) -> Emulated:
@@ -185,7 +187,11 @@ def _effect(
         split.append(_values(up_to(len(signs[0]), 1), where, [a.split for _, a in both]))
     if not nodes:
         return None
-    return EmulatedEffect(np.array(nodes), tuple(added), tuple(split))
+    ends = [e for e in nodes if span.second and e in (span.low, span.high)]
+    asked = model.answers([Query(designs[0], {id: e}, beside=True) for e in ends])
+    beside = {e: a.beside for e, a in zip(ends, asked, strict=True) if isinstance(a, Answer)}
+    known = {e: shift for e, shift in beside.items() if shift is not None}
+    return EmulatedEffect(np.array(nodes), tuple(added), tuple(split), known)
 
 
 def _node_values(span: Span) -> list[float]:

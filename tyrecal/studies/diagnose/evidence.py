@@ -19,7 +19,7 @@ import numpy as np
 from .covariance import BETWEEN_PRESSURES, alike
 from .expansion import Nodes
 from .gap import family
-from .inverse_problem import InverseProblem
+from .inverse_problem import Added, InverseProblem
 from .observations import Observable
 from .veering import rule
 
@@ -146,15 +146,17 @@ def refit(
 def _refit(
     problem: InverseProblem,
     at: InverseProblem,
-    added: tuple[Array, Array, Array],
+    added: Added,
     extra: Array | None,
     d: Array,
     steps: int,
 ) -> Fitted:
     """x re-fitted from x0 + d (q, v) with what effects add to uncoupled modes, at one zeta."""
     y = problem.observations.y
-    shift, tilt, split = added
-    S = at.sigma + problem.law(shift @ at.mixed.T if at.zeta else shift)
+    shift, tilt, split, off, beside = added
+    if at.zeta:
+        added = added._replace(off=off @ at.mixed.T, beside=beside @ at.mixed.T)
+    S = at.sigma + problem.law(added)
     if extra is not None:
         S = S + extra
     inverse = np.linalg.inv(S)

@@ -55,6 +55,7 @@ class Nodes:
     tilt: Array  # (k, n, v) B_k
     split: Array  # (k, n)
     reach: tuple[float, float]  # of the parameter, between nodes that have a solution
+    beside: Mapping[float, Array] = field(default_factory=dict)  # (n,) at far ends, see `Answer`
     anchor: Anchor | None = None
 
     def at(self, e: Array) -> tuple[Array, Array, Array]:
@@ -66,6 +67,14 @@ class Nodes:
             shift = shift + grown[:, None] * (self.anchor.shift - self.anchor.tilt @ self.anchor.d)
             tilt = tilt + grown[:, None, None] * self.anchor.tilt
         return shift, tilt, np.abs(weights @ self.split)
+
+    def beside_at(self, e: Array) -> Array:
+        """By one standard deviation of what else its nature leaves open (q, n): in proportion to
+        the effect."""
+        more = np.zeros((len(e), self.shift.shape[1]))
+        for end, each in self.beside.items():
+            more += np.maximum(e / end, 0.0)[:, None] * each
+        return more
 
     def shift_at(self, e: Array) -> Array:
         """a (q, n) by the nodes alone, at parameters (q,)."""
@@ -172,8 +181,11 @@ def anchored(
 
 
 def _with_effect(model: ResponseModel, x: Array, id: str, e: float) -> Query:
-    """The question for one effect, and its slope where the model has that."""
-    return Query(x, {id: e}, slopes=(id,) if id in model.sloped else ())
+    """The question for one effect, its slope where the model has that, and, at the ends of its
+    range, what else its nature leaves open."""
+    span = model.spans[id]
+    beside = span.second and e in (span.low, span.high)
+    return Query(x, {id: e}, slopes=(id,) if id in model.sloped else (), beside=beside)
 
 
 def _nodes(
@@ -203,6 +215,11 @@ def _nodes(
         np.array([each.jacobian - plain.jacobian for each in answers]),
         np.array([each.split for each in answers]),
         (low, high),
+        {
+            e: each.beside
+            for e, each in zip(map(float, values), answers, strict=True)
+            if e in (low, high) and each.beside is not None
+        },
     )
 
 

@@ -82,7 +82,7 @@ def find_gap(problem: InverseProblem, d: Array, variables: tuple[str, ...]) -> G
     P, inverse, absorbing = projection(problem, d)
     sigma = problem.sigma
     C = sigma @ P @ sigma
-    shift, tilt, _ = problem.added({}, 1)  # of what was switched on purpose
+    shift, tilt, *_ = problem.added({}, 1)  # of what was switched on purpose
     eta, _ = problem.plain(d)
     r = problem.observations.y - eta - shift[0] - tilt[0] @ d
     s, tau = problem.observations.split, problem.observations.split_scatter

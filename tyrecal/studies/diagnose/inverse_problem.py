@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -39,7 +40,17 @@ class Assumed:
 
     form: float | None = None  # model-form error of every mode; None: on record
     split: float = 0.003  # of pairs, by the non-uniformity of this kind of tyre
-    law: float = 0.04  # of an effect's shift of a frequency, by which the real one may be off
+    law: float | None = None  # of an effect's shift, that may be off; None: by effect
+
+
+class Added(NamedTuple):
+    """What effects add at parameters (q,), and how far each of the k may be off it."""
+
+    shift: Array  # (q, n)
+    tilt: Array  # (q, n, v) by x
+    split: Array  # (q, n) of pairs with them
+    off: Array  # (k, q, n) standard deviation of its law, mode by mode
+    beside: Array  # (k, q, n) by one standard deviation of what else its nature leaves open
 
 
 @dataclass(frozen=True)
@@ -107,7 +118,7 @@ class InverseProblem:
     def predicted(self, effects: Mapping[str, Array], d: Array) -> Array:
         """eta (q, n) at x0 + d (q, v) with effects, each (q,)."""
         plain = replace(self, zeta=0.0)
-        shift, tilt, _ = plain.added(effects, len(d))
+        shift, tilt, *_ = plain.added(effects, len(d))
         eta = np.array([plain.plain(each)[0] for each in d]) + shift
         return self.coupled(eta + np.einsum("qnv,qv->qn", tilt, d), tilt)[0]
 
@@ -120,16 +131,16 @@ class InverseProblem:
         beside = jacobian[:, self.veering.partner]
         return eta, own[:, :, None] * jacobian + part[:, :, None] * beside, told
 
-    def added(self, effects: Mapping[str, Array], count: int) -> tuple[Array, Array, Array]:
-        """What effects, each (count,), add: a (q, n), B (q, n, v); the split with them (q, n).
-
-        Squares of splits add up, each counted from the plain tyre's.
-        """
+    def added(self, effects: Mapping[str, Array], count: int) -> Added:
+        """What effects, each (count,), add. Squares of splits add up, each counted from the plain
+        tyre's."""
         n, v = len(self.places), len(self.expansion.x0)
         shift, tilt = np.zeros((count, n)), np.zeros((count, n, v))
         own = self.expansion.split[self.places] ** 2
         square = np.tile(own, (count, 1))
         runs = np.array([row.run for row in self.observations.rows])
+        ids = [id for id in self.expansion.nodes if id in effects or id in self._switched]
+        off, beside = np.zeros((2, len(ids), count, n))
         for run in sorted(set(runs.tolist())):
             rows = np.flatnonzero(runs == run)
             here = dict(effects)
@@ -141,14 +152,26 @@ class InverseProblem:
                     shift[:, rows] += a[:, self.places[rows]]
                     tilt[:, rows] += B[:, self.places[rows]]
                     square[:, rows] += s[:, self.places[rows]] ** 2 - own[rows]
+                    off[ids.index(id)][:, rows] = self._law(id) * a[:, self.places[rows]]
+                    more = self.expansion.nodes[id].beside_at(e)
+                    beside[ids.index(id)][:, rows] = more[:, self.places[rows]]
         if self.zeta:
             shift, tilt = shift @ self.mixed.T, self.mixed @ tilt
-        return shift, tilt, np.sqrt(np.maximum(square, 0.0))
+            off, beside = off @ self.mixed.T, beside @ self.mixed.T
+        return Added(shift, tilt, np.sqrt(np.maximum(square, 0.0)), off, beside)
 
-    def law(self, shift: Array) -> Array:
-        """Covariance (q, n, n) by which an effect's law may be off its shift (q, n)."""
-        off = self.assumed.law * shift
-        return np.asarray(off[:, :, None] * off[:, None, :] * self._alike)
+    def law(self, added: Added) -> Array:
+        """Covariance (q, n, n) by which effects may be off what they add."""
+        by_mode = np.einsum("kqn,kqm->qnm", added.off, added.off) * self._alike
+        return np.asarray(by_mode + np.einsum("kqn,kqm->qnm", added.beside, added.beside))
+
+    def _law(self, id: str) -> float:
+        stated = self.assumed.law
+        return self.spans[id].law if stated is None else stated
+
+    @property
+    def _switched(self) -> list[str]:
+        return [change.id for change in self.changes]
 
     @cached_property
     def _alike(self) -> Array:

@@ -30,6 +30,8 @@ class Span:
     toggle: str = ""
     base: float = 0.0  # what the case has of it; low, high and all parameters count from there
     also: tuple[float, ...] = ()  # beyond the range, at which toggled runs were measured
+    law: float = 0.04  # of its shift of a mode, by which a real one's may be off
+    second: bool = False  # whether there is more to it than its parameter, see `Query.beside`
 
 
 @dataclass(frozen=True)
@@ -41,6 +43,7 @@ class Query:
     constants: bool = False  # whether for slopes by the sources of error, too
     slopes: tuple[str, ...] = ()  # effects for slopes by whose parameters, too
     coupled: bool = False  # whether for what couples modes, too
+    beside: bool = False  # whether for what else the nature of its effect leaves open, too
 
 
 @dataclass(frozen=True)
@@ -62,6 +65,7 @@ class Answer:
     constants: Array | None = None  # (n, k) change by one standard deviation of each source
     slopes: Mapping[str, Array] = field(default_factory=dict)  # (n,) d eta / d e; NaN: unknown
     coupling: Coupling | None = None
+    beside: Array | None = None  # (n,) more eta, by one standard deviation of that
 
 
 class ResponseModel(Protocol):

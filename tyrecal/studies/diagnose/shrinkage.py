@@ -155,10 +155,10 @@ def _placebo(problem: InverseProblem, hold: Array, random: np.random.Generator) 
     best_ln, best = np.full(PLACEBOS, -np.inf), np.zeros((PLACEBOS, int(hold.sum())))
     information = np.diag(problem.spread**-2.0)
 
-    def fitted(shift: Array, tilt: Array) -> tuple[Array, Array]:
+    def fitted(shift: Array, tilt: Array, law: Array | float) -> tuple[Array, Array]:
         """ln evidence but for a constant, and held-out errors, of all placebos."""
         Je = J + tilt
-        S = sigma[np.ix_(keep, keep)] + problem.only(keep).law(shift[None, keep])[0]
+        S = (sigma + law)[np.ix_(keep, keep)]
         inverse = np.linalg.inv(S)
         normal = Je[keep].T @ inverse @ Je[keep] + information
         r = noise - shift
@@ -169,11 +169,12 @@ def _placebo(problem: InverseProblem, hold: Array, random: np.random.Generator) 
         return ln, r[:, hold] - x @ Je[hold].T
 
     zero, flat = np.zeros(n), np.zeros_like(J)
-    _, before = fitted(zero, flat)
+    _, before = fitted(zero, flat, 0.0)
     for id in problem.expansion.nodes:
         values, ln_weights = grid(problem.expansion.nodes[id])
-        shift, tilt, _ = problem.added({id: values}, len(values))
-        lns, errors = zip(*(fitted(shift[q], tilt[q]) for q in range(len(values))), strict=True)
+        added = problem.added({id: values}, len(values))
+        each = zip(added.shift, added.tilt, problem.law(added), strict=True)
+        lns, errors = zip(*(fitted(*of_size) for of_size in each), strict=True)
         ln = np.logaddexp.reduce(np.array(lns) + ln_weights[:, None], axis=0)
         here = np.array(errors)[np.argmax(lns, axis=0), np.arange(PLACEBOS)]
         better = ln > best_ln

@@ -183,7 +183,14 @@ def spans_of(
             unable[id] = why
         else:
             base, words = case.case.effects.get(id, 0.0), (effect.unit, effect.title, effect.toggle)
-            able[id] = Span(effect.low - base, effect.high - base, *words, base)
+            able[id] = Span(
+                effect.low - base,
+                effect.high - base,
+                *words,
+                base,
+                law=effect.law,
+                second=effect.beside is not None and not case.deck,
+            )
     return able, unable
 
 

@@ -20,6 +20,7 @@ from ...tyre.case import LoadedCase, start_values
 from ...tyre.case.schema import TargetMode, Targets
 from ...tyre.effects import catalogue
 from ...tyre.templates import TemplateFailed
+from ...tyre.values import with_values
 from ..fit import problem as fit
 from .expansion import ONE_SIDED_SLOPED, node_values
 from .model import Answer, Coupling, ModelRow, Query, Span
@@ -36,7 +37,7 @@ WORTH_A_POOL = 10  # evaluations, for processes to be started
 
 MAY_VEER = 0.15  # of ln f at some pressure, from which modes of one harmonic may veer
 
-QueryKey = tuple[bytes, tuple[tuple[str, float], ...], bool, tuple[str, ...]]  # of a point
+QueryKey = tuple[bytes, tuple[tuple[str, float], ...], bool, tuple[str, ...]]  # of an evaluation
 
 
 class TyreModel:
@@ -154,6 +155,8 @@ class TyreModel:
             if not isinstance(plain, Answer):
                 return plain
             answer = replace(answer, jacobian=plain.jacobian)
+        if point.beside and isinstance(answer, Answer):
+            answer = replace(answer, beside=self._beside(point, answer.eta))
         if not point.constants or not isinstance(answer, Answer):
             return answer
         assert answer.constants is not None
@@ -165,6 +168,21 @@ class TyreModel:
             constants[:, k] += other.eta - answer.eta
         self._add_fields(point.x, answer.eta, constants)
         return replace(answer, constants=constants)
+
+    def _beside(self, point: Query, eta: Array) -> Array | None:
+        """More eta (n,) by what else the nature of the point's effect leaves open; None where the
+        case cannot have it. The tyre at x is written first, so that all is of its numbers."""
+        ((id, e),) = point.effects.items()
+        own = with_values(self.case, {**self.values(point.x), EFFECT_PATH + id: 0.0})
+        add = catalogue()[id].beside
+        assert add
+        try:
+            made = add(own, self._present.get(id, 0.0) + e)
+        except ValueError:
+            return None
+        other = TyreModel(made, self.evaluator, self.rows, [], {}, self.jobs)
+        (answer,) = other.answers([Query(point.x)])
+        return answer.eta - eta if isinstance(answer, Answer) else None
 
     def _add_fields(self, x: Array, eta: Array, constants: Array) -> None:
         """Fill in the columns of the section's fields: of meridian and gauges by a small step, of

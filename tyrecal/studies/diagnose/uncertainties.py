@@ -48,8 +48,8 @@ def sources(case: LoadedCase) -> tuple[list[Source], bool]:
     design variable sets is none: the fit finds it.
 
     Assumed, a standard deviation each: rubber densities 1.5 %, moduli of cords 3 %, spacings 1 %,
-    gauges that the case has 3 %, cord angles 1 degree, pressure 1 kPa. Then the section's fields,
-    where the case says what that is known from.
+    gauges that the case has 3 %, cord angles 1 degree, pressure 1 kPa. Then the fields of a section
+    that is not exact.
     """
     found, assumed = _constants(case)
     of_section = [Source(name, {}, "", field) for name, field in fields(case).items()]

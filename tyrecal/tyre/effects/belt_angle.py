@@ -54,4 +54,6 @@ EFFECT = Effect(
     add=add,
     add_to_deck=add_to_deck,
     part="belts",
+    # cords turn as a pantograph from crown to edge, where this turns all alike
+    law=0.06,
 )

@@ -74,4 +74,6 @@ EFFECT = Effect(
     toggle="section a tyre of the same build, or X-ray it, and measure the belts",
     aliases=("cap_ply", "belt_angle", "bead_filler"),
     add=add,
+    # belts end in steps, which move by their own amounts
+    law=0.06,
 )

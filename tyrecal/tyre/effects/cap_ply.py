@@ -46,4 +46,6 @@ EFFECT = Effect(
     toggle="section a tyre of the same build, or look the construction up on its sidewall",
     aliases=("belt_width", "bead_filler", "belt_angle"),
     add=add,
+    # full width, edges alone or both; wound at 0 to 5 degrees
+    law=0.10,
 )

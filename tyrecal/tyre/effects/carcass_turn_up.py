@@ -78,4 +78,6 @@ EFFECT = Effect(
     toggle="section a tyre of the same build and measure the height at which the turn-up ends",
     aliases=("rim_width",),
     add=add,
+    # it ends anywhere from the filler's tip to the shoulder
+    law=0.10,
 )

@@ -32,4 +32,6 @@ EFFECT = Effect(
     add=add,
     add_to_deck=add,
     needs="cavity",
+    # a gas in a hollow ring: both laws are known
+    law=0.04,
 )

@@ -89,4 +89,6 @@ EFFECT = Effect(
     add=add,
     add_to_deck=add_to_deck,
     needs="vibration_modulus",
+    # compounds differ in it by a third, and so do parts
+    law=0.08,
 )

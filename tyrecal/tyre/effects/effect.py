@@ -26,7 +26,10 @@ class Effect:
     ValueError ("must be ...");
     needs: what a solver must list among its capabilities to express it, "" = nothing;
     add_to_deck: `add` for a case of a user's deck, None = it changes lines or regions of a section;
-    part: of ``deck.parts``, which such a case must name for it, "" = none.
+    part: of ``deck.parts``, which such a case must name for it, "" = none;
+    law: by how much of its shift of a mode a real one's may be off, as a standard deviation;
+    beside: `add` with one standard deviation more of what else its nature leaves open, as a
+    filler's height, or None: a diagnosis integrates over it.
     """
 
     id: str
@@ -44,6 +47,8 @@ class Effect:
     place: int = 0
     add_to_deck: Callable[[LoadedCase, float], LoadedCase] | None = None
     part: str = ""
+    law: float = 0.04
+    beside: Callable[[LoadedCase, float], LoadedCase] | None = None
 
     def of(self, case: LoadedCase) -> Callable[[LoadedCase, float], LoadedCase]:
         """Its `add` for a case. Raises ValueError where the case has nothing that it changes."""

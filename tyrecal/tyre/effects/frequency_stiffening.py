@@ -34,4 +34,6 @@ EFFECT = Effect(
     aliases=("belt_width", "cap_ply", "bead_filler", "spindle_torsional"),
     add=add,
     needs="frequency_modulus",
+    # compounds differ in it by a third, and so do parts
+    law=0.08,
 )

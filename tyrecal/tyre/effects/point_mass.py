@@ -33,4 +33,6 @@ EFFECT = Effect(
     add=add,
     add_to_deck=add,
     needs="coupled",
+    # a mass is a mass; it may sit beside the middle
+    law=0.04,
 )

@@ -33,4 +33,6 @@ EFFECT = Effect(
     aliases=("tread_density", "sidewall_gauge"),
     add=add,
     add_to_deck=add,
+    # the same pressure everywhere; a gauge may be off by a share, too
+    law=0.04,
 )

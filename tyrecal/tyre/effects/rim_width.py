@@ -93,4 +93,6 @@ EFFECT = Effect(
     toggle="measure the rim between its flanges; mount the tyre on the next wider rim",
     aliases=("carcass_turn_up",),
     add=add,
+    # how the sidewall bends where the flange holds it
+    law=0.05,
 )

@@ -45,4 +45,6 @@ EFFECT = Effect(
     add=add,
     add_to_deck=add,
     needs="coupled",
+    # the patch is no point, and sticks in part
+    law=0.10,
 )

@@ -32,4 +32,6 @@ EFFECT = Effect(
     add=add,
     add_to_deck=add,
     needs="rotation",
+    # Coriolis' forces are exact; the tread's heating is not in them
+    law=0.04,
 )

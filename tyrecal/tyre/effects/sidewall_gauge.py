@@ -45,4 +45,6 @@ EFFECT = Effect(
     add=add,
     add_to_deck=add_to_deck,
     part="sidewall",
+    # thicker in its upper or its lower half, inside or outside the ply
+    law=0.06,
 )

@@ -26,6 +26,8 @@ def _spindle(key: str, along: str, **entry: Any) -> Effect:
         add=add,
         add_to_deck=add,
         needs="spindle",
+        # springs in series; a real clamp's mass moves along by a little
+        law=0.04,
         **entry,
     )
 

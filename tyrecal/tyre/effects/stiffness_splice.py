@@ -51,4 +51,6 @@ EFFECT = Effect(
     add=add,
     add_to_deck=add_to_deck,
     needs="coupled",
+    # plies and tread overlap by widths of their own
+    law=0.10,
 )

@@ -49,4 +49,6 @@ EFFECT = Effect(
     aliases=("dynamic_stiffening", "sidewall_gauge"),
     add=add,
     add_to_deck=add_to_deck,
+    # the tread is warmer than the sidewall, or colder
+    law=0.08,
 )

@@ -36,4 +36,6 @@ EFFECT = Effect(
     aliases=("carcass_fanning",),
     add=add,
     add_to_deck=add,
+    # the tread is warmer than the sidewall, and warming levels off
+    law=0.08,
 )

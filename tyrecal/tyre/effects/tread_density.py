@@ -22,6 +22,20 @@ def add(case: LoadedCase, value: float) -> LoadedCase:
     )
 
 
+def as_voids(case: LoadedCase, value: float) -> LoadedCase:
+    """The same by voids, which take as much stiffness; a compound takes none."""
+    factor = 1 + value
+    return with_rubbers_at(
+        add(case, value),
+        crown(case),
+        tread(case),
+        "voids",
+        lambda m: with_part(
+            m, C10_Pa=factor * m.C10_Pa, C01_Pa=factor * m.C01_Pa, D1_per_Pa=m.D1_per_Pa / factor
+        ),
+    )
+
+
 def add_to_deck(case: LoadedCase, value: float) -> LoadedCase:
     """The same of the compounds of ``deck.parts.tread``."""
     if not value > -1:
@@ -49,4 +63,7 @@ EFFECT = Effect(
     add=add,
     add_to_deck=add_to_deck,
     part="tread",
+    # voids lie in the middle or at the shoulders; what stiffness they take is integrated over
+    law=0.08,
+    beside=as_voids,
 )

@@ -48,4 +48,6 @@ EFFECT = Effect(
     add=add,
     add_to_deck=add,
     needs="spindle",
+    # a rigid mass; cords give it no more than 1 to 2 Hz
+    law=0.04,
 )
