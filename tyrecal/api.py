@@ -238,7 +238,7 @@ def diagnose_case(
     >>> case = load_case("cases/p235_75r17.yaml", mesh="coarse")
     >>> found = diagnose_case(case, "cases/p235_75r17_wheeler.csv", effects=["rim_width"])
     >>> found.verdict.kind, found.verdict.key
-    ('named', 'rim_width')
+    ('undecided', None)
     """
     from .studies.diagnose.study import study
 

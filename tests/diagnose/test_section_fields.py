@@ -6,8 +6,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tyrecal.errors import InputError
 from tyrecal.simulate.deck.tyre_design import TyreDesign
-from tyrecal.simulate.evaluate.evaluator import Evaluator
+from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
+from tyrecal.simulate.modes.find import Found, find_modes
 from tyrecal.studies.diagnose.diagnosis import diagnose
 from tyrecal.studies.diagnose.inverse_problem import Assumed
 from tyrecal.studies.diagnose.model import Answer, Query
@@ -19,6 +21,7 @@ from tyrecal.studies.diagnose.section_fields import (
     components,
     fields,
     moved,
+    with_fields,
 )
 from tyrecal.studies.diagnose.section_told import section_told
 from tyrecal.studies.diagnose.tyre_model import TyreModel
@@ -36,11 +39,26 @@ STATED = changed(CASE, section=with_part(CASE.case.section, known_from="drawing"
 ROWS = [*((label, 240.0) for label in LABELS), (None, 0.0)]
 
 
-def test_a_case_that_does_not_say_what_its_section_is_known_from_has_no_fields() -> None:
-    assert not fields(CASE)
-    assert not any(source.field for source in sources(CASE)[0])
-    told = [source.words for source in sources(STATED)[0] if source.field and source.words]
-    assert len(told) == 1 and "meridian 0.8 mm" in told[0]
+def test_a_case_that_does_not_say_what_its_section_is_known_from_has_it_from_a_drawing() -> None:
+    """And its words say so; an exact one has no fields."""
+    assert not fields(CASE) and not any(source.field for source in sources(CASE)[0])
+    silent = changed(CASE, section=with_part(CASE.case.section, known_from=None))
+    said, unsaid = (
+        [source for source in sources(case)[0] if source.field] for case in (STATED, silent)
+    )
+    assert "drawing: meridian 0.8 mm" in said[0].words
+    assert "drawing, as the case does not say: meridian 0.8 mm" in unsaid[0].words
+    assert not any(source.words for source in (*said[1:], *unsaid[1:]))
+    for a, b in zip(said, unsaid, strict=True):
+        assert a.field and b.field and a.name == b.name
+        np.testing.assert_array_equal(a.field.values, b.field.values)
+
+
+def test_without_a_carcass_from_bead_to_bead_only_an_exact_section_can_be_stated() -> None:
+    case = changed(CASE, rebar_layers={})
+    assert not fields(changed(case, section=with_part(case.case.section, known_from=None)))
+    with pytest.raises(InputError, match=r"section\.known_from must be exact, got drawing"):
+        fields(changed(case, section=with_part(case.case.section, known_from="drawing")))
 
 
 def test_components_have_the_covariance_of_the_field() -> None:
@@ -102,6 +120,14 @@ def test_slopes_of_fields_are_the_model_s_own() -> None:
     together = np.array([column[n] for n in names]).T @ all_up
     assert together[:-1] == pytest.approx(column["rubber_density"][:-1], abs=2e-5)
     assert np.log1p(together[-1]) == pytest.approx(column["rubber_density"][-1], abs=2e-6)
+    z = {name: 0.2 * (-1) ** i for i, name in enumerate(fields(STATED))}  # a tyre as it may be
+    drawn = Evaluator(TyreDesign(with_fields(STATED, z)))
+    ((_, tyre),) = find_modes(drawn, [Question({})], LABELS)
+    assert isinstance(tyre, Found)
+    ln_f = [np.log(tyre.wanted[label].frequency_Hz) for label in LABELS]
+    own = np.append(ln_f, np.log(tyre.evaluation.mass_kg)) - at_0.eta
+    by_slopes = sum(amount * column[name] for name, amount in z.items())
+    assert own == pytest.approx(by_slopes, abs=0.03 * abs(by_slopes).max())
 
 
 def test_the_statement_is_none_of_the_tyre() -> None:

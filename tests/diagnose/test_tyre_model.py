@@ -351,7 +351,7 @@ def test_what_is_assumed_of_constants_is_what_the_guide_says() -> None:
         "densities of rubber 1.5 %, moduli of cords 3 %, spacings 1 %, gauges 3 %, cord angles"
         " 1 degree, pressure 1 kPa"
     ) in guide
-    case = load_case(CASES / "p235_75r17.yaml")
+    case = CASE
     gauge = Gauge(between=["bead", "upper_sidewall"], factor=2.0)
     section = case.case.section.model_copy(update={"gauges": [gauge]})
     bare = case.case.model_copy(update={"uncertainties": {}, "section": section})

@@ -10,6 +10,7 @@ import numpy as np
 
 from ...tyre.case import LoadedCase, start_values
 from ...tyre.values import with_values
+from ..diagnose.section_fields import with_fields
 from ..diagnose.uncertainties import EFFECT_PATH, Source, values_of
 from .laws import EffectLaw
 from .protocol import Protocol
@@ -88,5 +89,5 @@ def tyre(
             known = values.get(path, 0.0 if path.startswith(EFFECT_PATH) else plain[path])
             values[path] = known + truth.constants[source.name] * step
     values.setdefault("pressure_kPa", pressure_kPa)
-    made = with_values(case, values)
+    made = with_fields(with_values(case, values), truth.constants)
     return law.add(made, truth.size) if law else made

@@ -7,16 +7,23 @@ the variance, are sources of error (Rasmussen and Williams, Gaussian Processes, 
 states what its section is known from, and so how large they are:
 
     section: {stations: tyre.csv, known_from: drawing}
+
+One that says nothing is taken as drawn: who cut a tyre would say so, and `tyrecal init` says what
+it made by a size. Only data that were computed with this very section have an exact one.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ...errors import InputError
 from ...tyre.case import LoadedCase
+from ...tyre.case.parts import SectionOrigin
 from ...tyre.case.schema import Rubber
+from ...tyre.effects.edit import with_part
 from ...tyre.effects.parts import carcass_line, rim_edge, stations
 from .regions import split_by_region
 
@@ -24,10 +31,12 @@ Array = np.ndarray
 SECTION = "section "  # with which their names begin
 FIELD_KINDS = ("meridian", "gauge", "stiffness", "density")
 SECTION_SIZES = {  # standard deviations, by judgement: m along the normal, the others relative
+    "exact": (0.0, 0.0, 0.0, 0.0),  # that of the model which made the data
     "measured": (0.3e-3, 0.02, 0.03, 0.01),  # a cut tyre and a scale
     "drawing": (0.8e-3, 0.04, 0.05, 0.01),  # moulds are true, plies and rubber flow
     "size_code": (3e-3, 0.10, 0.10, 0.02),  # tyres of one size from several makers
 }
+UNSAID: SectionOrigin = "drawing"
 CORRELATION_LENGTH = 0.25  # l, of the half meridian
 KEPT_VARIANCE = 0.99  # of the variance
 FIELD_GRID = 200  # points for the components
@@ -42,13 +51,29 @@ class SectionField:
     values: Array  # (stations,) m outwards, or relative; of compounds (parts,)
 
 
+def known_from(case: LoadedCase) -> SectionOrigin:
+    """What the section is known from; "exact" for a user's deck, which has no stations."""
+    return "exact" if case.deck else case.case.section.known_from or UNSAID
+
+
 def fields(case: LoadedCase) -> dict[str, SectionField]:
-    """Components by name; none where the case does not say what its section is known from."""
-    known = case.case.section.known_from
-    if known is None:
+    """Components by name; none of an exact section, nor of one without a carcass to count s by.
+
+    Raises InputError where such a section states what it is known from.
+    """
+    known = known_from(case)
+    if known == "exact":
         return {}
     size = dict(zip(FIELD_KINDS, SECTION_SIZES[known], strict=True))
-    s = arc_length(case)
+    try:
+        s = arc_length(case)
+    except ValueError:
+        if case.case.section.known_from is None:
+            return {}
+        raise InputError(
+            f"section.known_from must be exact, got {known}: no layer of cords runs from bead to"
+            " bead, along which its errors would be smooth"
+        ) from None
     along = components(s)
     split, _ = split_by_region(case)
     region = {solid.material: (solid.regions or [""])[0] for solid in split.case.solids}
@@ -75,13 +100,13 @@ def rubber_parts(case: LoadedCase) -> dict[str, str]:
 
 def words(case: LoadedCase) -> str:
     """What is assumed, for people."""
-    known = case.case.section.known_from
-    if known is None:
-        return ""
+    known = known_from(case)
     meridian, gauge, stiffness, density = SECTION_SIZES[known]
+    unsaid = "" if case.case.section.known_from else ", as the case does not say"
     return (
-        f"section known from {known.replace('_', ' ')}: meridian {1e3 * meridian:g} mm, gauges"
-        f" {gauge:.0%}, compounds' stiffness {stiffness:.0%} and density {density:.0%}, smooth"
+        f"section known from {known.replace('_', ' ')}{unsaid}: meridian {1e3 * meridian:g} mm,"
+        f" gauges {gauge:.0%}, compounds' stiffness {stiffness:.0%} and density {density:.0%},"
+        " smooth"
     )
 
 
@@ -118,6 +143,34 @@ def moved(case: LoadedCase, field: SectionField, amount: float) -> LoadedCase:
         outwards = np.sign(((section.points[-1] - section.points[0]) * normal).sum(1))
         points = section.points + amount * (field.values * outwards)[:, None] * normal
     return replace(case, drawn=replace(section, points=points))
+
+
+def with_fields(case: LoadedCase, amounts: Mapping[str, float]) -> LoadedCase:
+    """The case with so much of each of its components, by name: a tyre as it may be."""
+    known = fields(case)
+    if not known:
+        return case
+    split, _ = split_by_region(case)
+    names = list(rubber_parts(case))
+    off = {kind: np.zeros(len(names)) for kind in ("stiffness", "density")}
+    made = split
+    for name, field in known.items():
+        if field.kind in off:
+            off[field.kind] += amounts[name] * field.values
+        else:
+            made = moved(made, field, amounts[name])
+    materials = dict(split.case.materials)
+    for name, stiffer, denser in zip(names, *np.exp([*off.values()]).tolist(), strict=True):
+        m = materials[name]
+        assert isinstance(m, Rubber)
+        materials[name] = with_part(
+            m,
+            C10_Pa=stiffer * m.C10_Pa,
+            C01_Pa=stiffer * m.C01_Pa,
+            D1_per_Pa=m.D1_per_Pa / stiffer,
+            density_kg_per_m3=denser * m.density_kg_per_m3,
+        )
+    return replace(made, case=made.case.model_copy(update={"materials": materials}))
 
 
 def _kernel(a: Array, b: Array) -> Array:

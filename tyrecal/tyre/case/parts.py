@@ -148,13 +148,14 @@ class Outline(Part):
     belt_step_m: Positive = 0.010
 
 
-SectionOrigin = Literal["measured", "drawing", "size_code"]
+SectionOrigin = Literal["exact", "measured", "drawing", "size_code"]
 
 
 class SectionSource(Part):
     """``stations``: the station table, or ``outline``: two curves; CSV, relative to the case file.
 
-    ``gauges`` scale it. ``known_from``: how well it is known, so how large its errors are.
+    ``gauges`` scale it. ``known_from``: how well it is known, so how large its errors are; None:
+    not said, and taken as a drawing.
     """
 
     stations: Text | None = None
