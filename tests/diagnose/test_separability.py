@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tyrecal.studies.diagnose.separability import Separability, _smallest
+from tyrecal.studies.diagnose.separability import Separability, smallest
 
 
 def judged(distances: np.ndarray, **lambdas: float) -> Separability:
@@ -34,13 +34,13 @@ def test_at_the_limits() -> None:
     assert judged(np.nextafter(just, 0), a=9.0, b=9.0).groups() == [["a", "b"]]
 
 
-def test_the_smallest_that_is_seen() -> None:
+def test_thesmallest_that_is_seen() -> None:
     """lambda grows as the square: 10 is reached at sqrt(10 / a), nearest to 0 on either side; None
     where the whole range stays below."""
     grid = np.linspace(0.0, 2.0, 81)
-    assert _smallest(grid, 1000 * grid**2) == pytest.approx(0.1)
-    assert _smallest(grid, 40 * grid**2) == pytest.approx(0.5)
-    assert _smallest(grid, 2.4 * grid**2) is None
-    assert _smallest(grid, 2.5 * grid**2) == pytest.approx(2.0)
+    assert smallest(grid, 1000 * grid**2) == pytest.approx(0.1)
+    assert smallest(grid, 40 * grid**2) == pytest.approx(0.5)
+    assert smallest(grid, 2.4 * grid**2) is None
+    assert smallest(grid, 2.5 * grid**2) == pytest.approx(2.0)
     both = np.linspace(-2.0, 2.0, 81)
-    assert _smallest(both, np.where(both < 0, 90, 40) * both**2) == pytest.approx(-1 / 3)
+    assert smallest(both, np.where(both < 0, 90, 40) * both**2) == pytest.approx(-1 / 3)

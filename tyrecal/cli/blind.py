@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from . import complete, options
+from . import arguments, complete, options
 from .terminal import Progress, Terminal, resume
 
 folder = click.argument("folder", type=click.Path(path_type=Path, file_okay=False), metavar="DIR")
@@ -34,10 +34,75 @@ def command() -> None:
     """Try the diagnosis on data whose effect is withheld.
 
     \b
+    tyrecal blind power cases/p235_75r17.yaml
     tyrecal blind make trials --case cases/p235_75r17.yaml --effects 60 --none 40 --outside 20
     tyrecal blind answer trials --jobs 2
     tyrecal blind score trials
     """
+
+
+@command.command()
+@options.case_argument
+@click.option(
+    "--pressure-kPa",
+    "pressures",
+    type=click.FloatRange(0, min_open=True),
+    multiple=True,
+    metavar="KPA",
+    help="Measured at this pressure; repeatable (default: 2/3, all and 4/3 of the case's).",
+)
+@click.option(
+    "--noise-percent",
+    type=click.FloatRange(0, 20, min_open=True),
+    default=0.2,
+    show_default=True,
+    metavar="PERCENT",
+    help="Scatter of every frequency.",
+)
+@options.every(options.mesh, options.jobs, options.store, options.allow_unusual)
+@options.talking
+def power(
+    case: Path,
+    pressures: tuple[float, ...],
+    noise_percent: float,
+    mesh: str,
+    jobs: int,
+    store: Path | None,
+    allow_unusual: bool,
+    terminal: Terminal,
+) -> int:
+    """Say which effects could be found on a tyre, and from what size on, before it is measured.
+
+    Modes are the case's targets or, where it has none, [0,0] to [4,0].
+
+    \b
+    tyrecal blind power cases/p235_75r17.yaml --pressure-kPa 160 --pressure-kPa 240
+    """
+    from dataclasses import asdict, replace
+
+    from ..simulate.deck.tyre_design import TyreDesign
+    from ..simulate.evaluate.evaluator import Evaluator
+    from ..simulate.evaluate.store import Store
+    from ..studies.blind.answer import rows_of, tyre_model
+    from ..studies.blind.make import labels_of
+    from ..studies.blind.power import powers, words
+    from ..studies.blind.protocol import Protocol
+    from ..studies.blind.ruler import measure, ruler_of
+
+    loaded, _ = arguments.load(case, mesh, (), None, terminal, allow_unusual)
+    rules = Protocol("", case.name, {}, noise=noise_percent / 100).about(loaded.case.pressure_kPa)
+    if pressures:
+        rules = replace(rules, given_kPa=pressures, held_out_kPa=pressures[0])
+    record = Store(store.resolve()) if store else None
+    evaluator = Evaluator(TyreDesign(loaded), store=record)
+    with terminal.progress("weigh effects") as bar:
+        evaluator.on_progress = bar.at
+        model, rows = tyre_model(loaded, evaluator, rules, jobs), rows_of(loaded, rules)
+        ruler = ruler_of(measure(model, rows), labels_of(loaded))
+    found = powers(ruler, rules)
+    terminal.result({"power": [asdict(each) for each in found]})
+    terminal.say(words(found, ruler, rules, model.spans))
+    return 0
 
 
 @command.command()
@@ -95,10 +160,12 @@ def make(
     from ..simulate.evaluate.evaluator import Evaluator
     from ..simulate.evaluate.store import Store
     from ..studies.blind.answer import rows_of, tyre_model
+    from ..studies.blind.make import labels_of
     from ..studies.blind.make import make as made
     from ..studies.blind.maker import bundled_maker
+    from ..studies.blind.power import powers, words
     from ..studies.blind.protocol import Protocol
-    from ..studies.blind.ruler import measure
+    from ..studies.blind.ruler import measure, ruler_of
     from ..tyre.load import load_case
 
     if not effects + plain + outside:
@@ -113,9 +180,16 @@ def make(
     if drawn:
         maker = replace(maker, laws={id: maker.laws[id] for id in drawn})
     counts = {"effect": effects, "none": plain, "outside": outside}
-    protocol = Protocol(maker.about, case.path.name, counts)
+    protocol = Protocol(maker.about, case.path.name, counts).about(case.case.pressure_kPa)
     evaluator = Evaluator(TyreDesign(case), "bundled", store=store)
-    ruler = lambda: measure(tyre_model(case, evaluator, protocol, jobs), rows_of(case, protocol))
+
+    def ruler() -> dict[str, Any]:
+        model = tyre_model(case, evaluator, protocol, jobs)
+        content = measure(model, rows_of(case, protocol))
+        known = ruler_of(content, labels_of(case))
+        terminal.say(words(powers(known, protocol), known, protocol, model.spans))
+        return content
+
     with terminal.progress("make trials") as bar:
         progress = _progress("made", terminal, bar)
         mark = made(folder, sealed, case, protocol, maker, ruler, jobs, seed, progress)

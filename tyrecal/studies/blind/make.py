@@ -32,6 +32,12 @@ from .protocol import Protocol, read_json, write_json, write_protocol
 from .ruler import write_ruler
 from .seal import SEAL, seal
 
+USUAL_LABELS = (
+    Label(0, 0, "axial"),
+    Label(0, 0, "torsional"),
+    *(Label(c, m) for c in (1, 2, 3) for m in (1, 0)),
+    Label(4, 0),
+)
 MAX_TRIES = 20  # tyres that a trial may draw until one has a solution
 
 
@@ -87,11 +93,9 @@ def make(
 
 
 def labels_of(case: LoadedCase) -> list[Label]:
-    """The modes that are measured: the case's targets. Raises InputError."""
-    labels = target_labels(case)
-    if not labels:
-        raise InputError(f"{case.path}: blind trials measure the case's targets.modes, it has none")
-    return labels
+    """The modes that are measured: the case's targets or, where it has none, those that a modal
+    analysis of any tyre shows."""
+    return target_labels(case) or list(USUAL_LABELS)
 
 
 def values(trial: Trial, protocol: Protocol) -> dict[float, dict[Label, tuple[float, ...]]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 from ...errors import InputError
@@ -28,6 +28,12 @@ class Protocol:
     missing: int = 2  # values a pressure, at most
     swapped: float = 0.05  # share of trials in which two labels are exchanged
     smallest: float = 0.2  # least size, as a share of an effect's range
+
+    def about(self, pressure_kPa: float) -> Protocol:
+        """The same rules at two thirds, all and four thirds of a tyre's pressure, held out between
+        the first two."""
+        low, own, high, between = (round(k * pressure_kPa / 6) for k in (4, 6, 8, 5))
+        return replace(self, given_kPa=(low, own, high), held_out_kPa=between)
 
     @property
     def pressures_kPa(self) -> tuple[float, ...]:

@@ -203,19 +203,23 @@ def write_ruler(folder: Path, content: Mapping[str, Any]) -> None:
 
 def read_ruler(folder: Path, labels: Sequence[Label]) -> Ruler:
     """The ruler of ``folder``. Raises InputError."""
-    content = read_json(folder / RULER_FILE)
-    known: dict[str, Label | None] = {str(label): label for label in labels}
-    known["mass"] = None
     try:
-        numbers = {key: np.array(content[key], float) for key in NUMBERS}
-        signatures = {
-            id: EffectShifts(*(np.array(each[key], float) for key in SIGNATURE))
-            for id, each in content["signatures"].items()
-        }
-        rows = tuple((known[name], float(p)) for name, p in content["rows"])
-        return Ruler(rows, signatures=signatures, **numbers)
+        return ruler_of(read_json(folder / RULER_FILE), labels)
     except (KeyError, ValueError, TypeError) as error:
         raise InputError(f"{folder / RULER_FILE}: not a ruler of these trials ({error})") from None
+
+
+def ruler_of(content: Mapping[str, Any], labels: Sequence[Label]) -> Ruler:
+    """The ruler that `measure` told. Raises KeyError, ValueError, TypeError where it is none."""
+    known: dict[str, Label | None] = {str(label): label for label in labels}
+    known["mass"] = None
+    numbers = {key: np.array(content[key], float) for key in NUMBERS}
+    signatures = {
+        id: EffectShifts(*(np.array(each[key], float) for key in SIGNATURE))
+        for id, each in content["signatures"].items()
+    }
+    rows = tuple((known[name], float(p)) for name, p in content["rows"])
+    return Ruler(rows, signatures=signatures, **numbers)
 
 
 def _words(label: Label | None) -> str:

@@ -80,14 +80,14 @@ def separate(problem: InverseProblem, P: Array, sizes: Mapping[str, float]) -> S
         {id: float(length[id][ends[id]]) for id in ids},
         gram / np.outer(norm, norm),
         distances,
-        {id: _smallest(grids[id], length[id]) for id in ids},
+        {id: smallest(grids[id], length[id]) for id in ids},
     )
 
 
-def _smallest(grid: Array, length: Array) -> float | None:
-    """The least parameter with lambda = 10, between points of the grid by its square root."""
-    seen = np.flatnonzero(length >= VISIBLE)
+def smallest(grid: Array, length: Array, least: float = VISIBLE) -> float | None:
+    """The least parameter with that lambda, between points of the grid by its square root."""
+    seen = np.flatnonzero(length >= least)
     if not len(seen):
         return None
     best = seen[np.argmin(abs(grid[seen]))]
-    return float(grid[best] * np.sqrt(VISIBLE / length[best]))
+    return float(grid[best] * np.sqrt(least / length[best]))

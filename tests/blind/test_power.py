@@ -1,0 +1,60 @@
+"""What could be found before anything is measured, against lambda by its formula."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tyrecal.studies.blind.make import USUAL_LABELS, labels_of
+from tyrecal.studies.blind.power import NAMED_AS_A_RULE, powers, words
+from tyrecal.studies.blind.protocol import Protocol
+from tyrecal.studies.blind.ruler import measure, ruler_of
+from tyrecal.studies.diagnose.separability import VISIBLE
+from tyrecal.tyre.case.schema import Targets
+
+from .toy import CASE, Scale, protocol
+
+SCALE = Scale()
+RULER = ruler_of(measure(SCALE, SCALE.model_rows), labels_of(CASE))
+RULES = protocol()
+FOUND = {power.id: power for power in powers(RULER, RULES)}
+
+
+def lam(id: str, e: float) -> float:
+    """lambda by shift, covariance and projection, of rows that are given."""
+    rows = [i for i, (x, p) in enumerate(SCALE.model_rows) if not x or p in RULES.given_kPa]
+    at = np.array(rows)
+    labels = [SCALE.model_rows[i][0] for i in rows]
+    counts = np.array([2 if label and label.c else 1 for label in labels])
+    P = RULER.projection(np.zeros(3), at, RULER.sigma(at, counts, RULES))
+    shift = np.append(0.0, e * SCALE.g[id])[at]
+    return float(shift @ P @ shift)
+
+
+@pytest.mark.parametrize("id", sorted(SCALE.g))
+def test_sizes_are_where_lambda_is_ten_and_twenty_five(id: str) -> None:
+    power = FOUND[id]
+    assert power.full == pytest.approx(lam(id, 1.0), rel=1e-4)
+    for size, least in ((power.seen, VISIBLE), (power.named, NAMED_AS_A_RULE)):
+        assert (size is None) == (power.full < least)
+        if size is not None:
+            assert lam(id, size) == pytest.approx(least, rel=1e-3)
+
+
+def test_what_is_found_is_said_and_what_is_hidden_too() -> None:
+    text = words(list(FOUND.values()), RULER, RULES, SCALE.spans)
+    assert "at 160, 240, 320 kPa, every value to 0.2% and the mass to 0.5%" in text
+    louder = replace(RULES, noise=1.0, mass=1.0)
+    hidden = words(powers(RULER, louder), RULER, louder, SCALE.spans)
+    last = hidden.splitlines()[-1]
+    assert "within its whole range" in last and all(f"`{id}`" in last for id in SCALE.g)
+
+
+def test_pressures_lie_about_the_tyres_own_and_any_tyre_has_modes() -> None:
+    assert Protocol("", "", {}).about(240.0) == Protocol("", "", {})
+    truck = Protocol("", "", {}).about(830.0)
+    assert truck.given_kPa == (553, 830, 1107) and truck.held_out_kPa == 692
+    bare = replace(CASE, case=CASE.case.model_copy(update={"targets": Targets()}))
+    assert set(labels_of(bare)) == set(labels_of(CASE)) == set(USUAL_LABELS)
