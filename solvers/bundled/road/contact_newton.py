@@ -26,6 +26,7 @@ MAX_NEWTON = 40  # Newton iterations a load
 # GMRES iterations of a step, after which the preconditioner is formed anew
 MAX_GMRES_BEFORE_NEW_FACTOR = 15
 MAX_GMRES = 60
+SAME_FACTOR = 1.1  # of a load, up to which its preconditioner is worth keeping
 LINEAR_RTOL = 1e-2  # residual of the linear problem, relative
 SMOOTH_RTOL = 1e-5  # the same of what a fit descends by: the vertical stiffness, and derivatives
 STIFFNESS_RTOL = 1e-3  # of the stiffness at least
@@ -83,7 +84,8 @@ class ContactNewton:
         self._bound = road.forces(U, self.free_radius).bound(1.0)
         self._factor: ContactUpdate | None = None
         self._used = 0
-        self._stale = False  # the preconditioner is of an earlier load
+        self._stale = False  # the preconditioner is of a load that was much smaller
+        self._formed_at = 0.0  # its load, N
         self._slope: tuple[Array, float] | None = None  # of parts and height by the load
         self.factorisations = self.products = self.iterations = 0
 
@@ -166,7 +168,7 @@ class ContactNewton:
     def _newton(self, load: float) -> PressedState:
         """By Tresca's friction, with the last normal forces, to where Coulomb's converges."""
         parts, height = self.parts, self.height
-        self._stale = self._factor is not None
+        self._stale = self._factor is not None and load > SAME_FACTOR * self._formed_at
         if self._slope:
             parts = parts + (load - self.load) * self._slope[0]
             height += (load - self.load) * self._slope[1]
@@ -300,7 +302,7 @@ class ContactNewton:
         """The preconditioner at the last state. Raises Indefinite; the one before is gone, as two
         at a time would double the memory."""
         self.factorisations += 1
-        self._stale, self._factor = False, None
+        self._stale, self._factor, self._formed_at = False, None, self.load
         stiffness = self.symmetry.fold(contact.matrix(positive=True))
         self._factor = ContactUpdate(Factor(self.order, self.tyre.tangents(np.float32), stiffness))
         return self._factor
