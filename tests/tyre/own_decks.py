@@ -192,9 +192,9 @@ def generated() -> str:
     return plain(mesh + "*RIGID BODY, REF NODE=900001, TIE NSET=RIM\n")
 
 
-def half() -> str:
+def half(whole: Tyre | None = None, more: str = "") -> str:
     """The half of positive z, reflected."""
-    tyre = Tyre()
+    tyre = whole or Tyre()
     keep = {n for n, e in tyre.solids.items() if min(tyre.nodes[m][1] for m in e) > -1e-9}
     keep |= {
         n
@@ -206,12 +206,12 @@ def half() -> str:
     tyre.plies = {
         name: {n: e for n, e in own.items() if n in keep} for name, own in tyre.plies.items()
     }
-    nodes = {n for e in tyre.solids.values() for n in e}
+    nodes = {n for own in (tyre.solids, *tyre.plies.values()) for e in own.values() for n in e}
     tyre.nodes = {
         n: (p[0], 0.0 if abs(p[1]) < 1e-9 else p[1]) for n, p in tyre.nodes.items() if n in nodes
     }
     middle = [n for n, p in tyre.nodes.items() if p[1] == 0.0]
-    mesh = tyre.mesh() + block("*NSET, NSET=MIDDLE", [(n,) for n in middle])
+    mesh = tyre.mesh() + more + block("*NSET, NSET=MIDDLE", [(n,) for n in middle])
     mesh += "*SYMMETRIC MODEL GENERATION, REFLECT=LINE\n0., 0., 0., 1., 0., 0.\n"
     return plain(mesh, step=STEP.replace("900001, 1, 6\n", "900001, 1, 6\nMIDDLE, YSYMM\n"))
 
@@ -225,7 +225,26 @@ def embedded() -> str:
             own[n] = [copies.setdefault(m, m + 50000) for m in nodes]
     for m, copy in copies.items():
         tyre.nodes[copy] = tyre.nodes[m]
-    return plain(tyre.mesh() + "*EMBEDDED ELEMENT, HOST ELSET=SOLID\nCARCASS, BELT\n")
+    return plain(tyre.mesh() + EMBEDDED)
+
+
+def apart(count: int) -> Tyre:
+    """The same with ``count`` elements of the carcass on nodes of their own along its circle, a
+    third of it as many of the belts, wherever the rubber's nodes are."""
+    tyre, a = Tyre(), INNER + (OUTER - INNER) * 2 / ROWS
+    ends = {"CARCASS": (0, COLUMNS), "BELT": BELT}
+    for first, (name, (start, end)) in zip((50_001, 60_001), ends.items(), strict=True):
+        own = count if name == "CARCASS" else count // 3
+        for k, j in enumerate(np.linspace(start, end, 2 * own + 1)):
+            angle = OPENING * (2 * j / COLUMNS - 1)
+            place = float(CENTRE + a * np.cos(angle)), float(a * np.sin(angle))
+            tyre.nodes[first + k] = place
+        along = range(first, first + 2 * own, 2)
+        tyre.plies[name] = {n: [n, n + 1, n + 2] for n in along}
+    return tyre
+
+
+EMBEDDED = "*EMBEDDED ELEMENT, HOST ELSET=SOLID\nCARCASS, BELT\n"
 
 
 def two_compounds() -> str:

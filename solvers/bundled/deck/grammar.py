@@ -24,6 +24,12 @@ SECTION_JOB: dict[str, dict[str, ParameterValues]] = {
     "SECTION CONTROLS": {"NAME": None, "HOURGLASS": ("STIFFNESS",)},
     "HOURGLASS STIFFNESS": {},
     "SURFACE SECTION": {"ELSET": None},
+    "EMBEDDED ELEMENT": {
+        "HOST ELSET": None,
+        "ROUNDOFF TOLERANCE": None,
+        "EXTERIOR TOLERANCE": None,
+        "ABSOLUTE EXTERIOR TOLERANCE": None,
+    },
     "REBAR LAYER": {"GEOMETRY": ("CONSTANT", "ANGULAR")},
     "MATERIAL": {"NAME": None},
     "DENSITY": {},

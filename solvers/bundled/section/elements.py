@@ -116,8 +116,8 @@ class Lines:
 
     connectivity: Array  # (e, a)
     X: Array  # (e, a, 2): R, Z of the nodes, m
-    N: Array  # (g, a)
-    slope: Array  # (e, g, a): dN/ds, 1/m
+    N: Array  # (g, a); of lines in other elements (e, g, h), of the hosts' nodes
+    slope: Array  # (e, g, a) or (e, g, h): dN/ds, 1/m
     R: Array  # (e, g), m
     tangent: Array  # (e, g, 2): dX/ds
     weights: Array  # (e, g): w ds, m
@@ -125,20 +125,29 @@ class Lines:
     def pick(self, rows: Array) -> Lines:
         """Some of the elements."""
         own = {each.name: getattr(self, each.name) for each in fields(self)}
-        return Lines(**{name: v if name == "N" else v[rows] for name, v in own.items()})
+        alike = self.N.ndim == 2
+        return Lines(**{k: v if k == "N" and alike else v[rows] for k, v in own.items()})
 
 
-def lines(X: Array, connectivity: Array, points: int = 2, share: Array | float = 1.0) -> Lines:
-    """Operators along two- or three-node lines in the section; share (e, 1): as for `solids`."""
-    rule = shapes.line(connectivity.shape[1], points)
-    ends = X[connectivity]
+def lines(
+    X: Array,
+    connectivity: Array,
+    points: int = 2,
+    share: Array | float = 1.0,
+    weights: Array | None = None,
+) -> Lines:
+    """Operators along two- or three-node lines in the section; share (e, 1): as for `solids`;
+    weights (e, a, h): of the nodes that they are connected to in their own ones."""
+    ends = X[connectivity] if weights is None else weights @ X[connectivity]
+    rule = shapes.line(ends.shape[1], points)
     dX = np.einsum("ga,eaj->egj", rule.dN[..., 0], ends)
     length = np.sqrt((dX * dX).sum(-1))
+    slope = rule.dN[..., 0] / length[..., None]
     return Lines(
         connectivity,
         ends,
-        rule.N,
-        rule.dN[..., 0] / length[..., None],
+        rule.N if weights is None else rule.N @ weights,
+        slope if weights is None else slope @ weights,
         np.einsum("ga,ea->eg", rule.N, ends[..., 0]),
         dX / length[..., None],
         rule.weights * length * share,

@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 from ...errors import Refused
+from .embedding import Guest
 from .mesh import DeckMesh
 from .shapes import TYPES
-from .symmetry import MirrorHalf
+from .symmetry import SAME_PLACE, MirrorHalf
 
 Array = np.ndarray
 
@@ -26,6 +27,7 @@ def half_mesh(mesh: DeckMesh) -> DeckMesh | None:
 def _half(mesh: DeckMesh) -> DeckMesh | None:
     try:
         symmetry = MirrorHalf(mesh.X)
+        guests = _alike(mesh.guests)
     except Refused:
         return None
     rows = mesh.connectivity
@@ -52,6 +54,8 @@ def _half(mesh: DeckMesh) -> DeckMesh | None:
         connectivity={kind: nodes[keep[kind]] for kind, nodes in rows.items()},
         place=place,
         element_sets=sets,
+        guests=guests,
+        embedded={kind: each.some(keep[kind]) for kind, each in mesh.embedded.items()},
         edges=edges,
         symmetry=symmetry,
         derived={},
@@ -68,11 +72,27 @@ def _own_image(mesh: DeckMesh, symmetry: MirrorHalf, numbers: list[int]) -> bool
     for kind, own in of_kind.items():
         nodes = mesh.connectivity[kind][own]
         images = symmetry.images(nodes)
-        if TYPES[kind].faces:
+        if TYPES[mesh.type_of(kind)].faces:
             nodes, images = np.sort(nodes), np.sort(images)
-        if not (_same(nodes, images) and _halves(symmetry, nodes)):
+        same = _same(nodes, images)
+        if kind in mesh.embedded:  # whose hosts' nodes are in no such order
+            places = mesh.embedded[kind].points_at(mesh.X, mesh.guests)[own].real
+            spots, other = (
+                np.round(x / SAME_PLACE).astype(int).reshape(len(own), -1)
+                for x in (places, places[:, ::-1] * [1, -1])
+            )
+            same = _same(spots, other)
+        if not (same and _halves(symmetry, nodes)):
             return False
     return True
+
+
+def _alike(guests: list[Guest]) -> list[Guest]:
+    """With tangents that move both sides alike. Raises Refused where one has no mirror image."""
+    if not guests:
+        return []
+    X = np.array([guest.X for guest in guests])
+    return [replace(g, X=x) for g, x in zip(guests, MirrorHalf(X).alike(X), strict=True)]
 
 
 def _same(some: Array, others: Array) -> bool:

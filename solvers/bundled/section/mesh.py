@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -12,6 +12,7 @@ import numpy as np
 from ...errors import Inverted
 from ..deck.keywords import DeckError, Keyword
 from . import elements
+from .embedding import Embedded, Guest, embedding
 from .shapes import TYPES
 from .symmetry import Whole
 
@@ -30,6 +31,8 @@ class DeckMesh:
     element_sets: dict[str, list[int]]
     edges: dict[str, Array]  # surface name to rows (e, 2 or 3) of nodes
     reference_nodes: dict[int, list[int]]  # of rigid rims, to the nodes tied to them
+    embedded: dict[str, Embedded] = field(default_factory=dict)  # of lines in other elements
+    guests: list[Guest] = field(default_factory=list)  # their nodes that are no rubber's
     symmetry: Whole = field(default_factory=Whole)  # what the elements stand for
     # what was made of the mesh, by its kind and what it depends on
     derived: dict[tuple[object, ...], Any] = field(default_factory=dict)
@@ -41,6 +44,9 @@ class DeckMesh:
 
     def _block(self, kind: str, rows: Array) -> elements.Solids | elements.Lines:
         share = self.symmetry.share(rows)
+        if kind in self.embedded:
+            weights = self.embedded[kind].weights(self.X, self.guests)
+            return elements.lines(self.X, rows, share=share, weights=weights)
         if not TYPES[kind].faces:
             return elements.lines(self.X, rows, share=share)
         try:
@@ -51,6 +57,10 @@ class DeckMesh:
                 0,
                 f"element {number} has no positive area: it folds over or its nodes run clockwise",
             ) from None
+
+    def type_of(self, kind: str) -> str:
+        """The element type of a block."""
+        return self.embedded[kind].line if kind in self.embedded else kind
 
     @cached_property
     def faces(self) -> dict[str, elements.Lines]:
@@ -64,7 +74,7 @@ class DeckMesh:
 
 
 _MESHES: OrderedDict[tuple[object, ...], DeckMesh] = OrderedDict()
-_TOPOLOGY = {"NODE", "ELEMENT", "NSET", "ELSET", "SURFACE", "RIGID BODY"}
+_TOPOLOGY = {"NODE", "ELEMENT", "NSET", "ELSET", "SURFACE", "RIGID BODY", "EMBEDDED ELEMENT"}
 
 
 def read_mesh(keywords: list[Keyword]) -> DeckMesh:
@@ -107,6 +117,8 @@ def _mesh(keywords: list[Keyword]) -> DeckMesh:
         elif k.name == "ELSET":
             element_sets.setdefault(k.need("ELSET"), []).extend(_members(k, element_sets, place))
     X = np.array(coordinates)
+    tables = {kind: np.array(rows) for kind, rows in connectivity.items()}
+    inside = [k for k in keywords if k.name == "EMBEDDED ELEMENT"]
     edges = {
         k.need("NAME"): _surface(k, connectivity, place, element_sets)
         for k in keywords
@@ -119,8 +131,41 @@ def _mesh(keywords: list[Keyword]) -> DeckMesh:
             if reference not in index or tied not in node_sets:
                 raise DeckError(k.line, f"node {reference} or node set {tied} is not defined")
             bodies[reference] = node_sets[tied]
-    tables = {kind: np.array(rows) for kind, rows in connectivity.items()}
-    return DeckMesh(X, index, tables, place, node_sets, element_sets, edges, bodies)
+    mesh = DeckMesh(X, index, tables, place, node_sets, element_sets, edges, bodies)
+    return _with_embedded(mesh, inside) if inside else mesh
+
+
+def _with_embedded(mesh: DeckMesh, keywords: list[Keyword]) -> DeckMesh:
+    """The mesh without the nodes that move with host elements. Raises DeckError."""
+    found = embedding(keywords, mesh.X, mesh.connectivity, mesh.place, mesh.element_sets)
+    kept = np.setdiff1d(np.arange(len(mesh.X)), list(found.of_node))
+    new = np.full(len(mesh.X), -1)
+    new[kept] = np.arange(len(kept))
+    connectivity, place = {}, dict(mesh.place)
+    for kind, rows in mesh.connectivity.items():
+        own = [number for number, (k, _) in mesh.place.items() if k == kind]
+        own = [number for number in own if number not in found.place]
+        if own:
+            connectivity[kind] = new[rows[[mesh.place[number][1] for number in own]]]
+            place |= {number: (kind, k) for k, number in enumerate(own)}
+    blocks = {kind: block.renumbered(new) for kind, block in found.blocks.items()}
+    for name, rows in mesh.edges.items():
+        if (new[rows] < 0).any():
+            raise DeckError(keywords[0].line, f"surface {name} lies on an embedded element")
+    index = {number: int(new[row]) for number, row in mesh.index.items() if new[row] >= 0}
+    sets = {name: [n for n in nodes if n in index] for name, nodes in mesh.node_sets.items()}
+    return replace(
+        mesh,
+        X=mesh.X[kept],
+        index=index,
+        connectivity=connectivity | {kind: block.rows for kind, block in blocks.items()},
+        place=place | found.place,
+        node_sets=sets,
+        edges={name: new[rows] for name, rows in mesh.edges.items()},
+        reference_nodes={n: [m for m in s if m in index] for n, s in mesh.reference_nodes.items()},
+        embedded=blocks,
+        guests=[guest.renumbered(new) for guest in found.guests],
+    )
 
 
 def _elements(

@@ -39,12 +39,17 @@ def gauss(points: int, dimension: int) -> tuple[np.ndarray, np.ndarray]:
 def quad(nodes: int, points: int) -> Rule:
     """Four-node bilinear or eight-node serendipity quadrilateral with points x points Gauss."""
     xi, weights = gauss(points, 2)
+    return Rule(*_quad_at(nodes, xi), weights)
+
+
+def _quad_at(nodes: int, xi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """N and dN/dxi at points xi (p, 2)."""
     x, y = xi[:, :1], xi[:, 1:]
     a, b = CORNERS.T
     if nodes == 4:
         N = (1 + a * x) * (1 + b * y) / 4
         dN = np.stack([a * (1 + b * y) / 4, b * (1 + a * x) / 4], -1)
-        return Rule(N, dN, weights)
+        return N, dN
     corner = (1 + a * x) * (1 + b * y) * (a * x + b * y - 1) / 4
     corner_x = a * (1 + b * y) * (2 * a * x + b * y) / 4
     corner_y = b * (1 + a * x) * (a * x + 2 * b * y) / 4
@@ -57,7 +62,7 @@ def quad(nodes: int, points: int) -> Rule:
     )
     # steep[0] with s = -1 is the side x = +1 (2-3), s = +1 the side x = -1 (4-1)
     dN = np.stack([np.hstack([corner_x, dx]), np.hstack([corner_y, dy])], -1)
-    return Rule(np.hstack([corner, N]), dN, weights)
+    return np.hstack([corner, N]), dN
 
 
 def _of_triangle(points: int) -> tuple[np.ndarray, np.ndarray]:
@@ -77,14 +82,19 @@ def _of_triangle(points: int) -> tuple[np.ndarray, np.ndarray]:
 def triangle(nodes: int, points: int) -> Rule:
     """Three-node linear or six-node quadratic triangle with 1, 3 or 7 points in all."""
     areal, weights = _of_triangle(points)
+    return Rule(*_triangle_at(nodes, areal), weights)
+
+
+def _triangle_at(nodes: int, areal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """N and dN/dxi at areal coordinates (p, 3)."""
     slope = np.array([[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]])  # dL_i / dxi
     if nodes == 3:
-        return Rule(areal, np.broadcast_to(slope, (points, 3, 2)), weights)
+        return areal, np.broadcast_to(slope, (len(areal), 3, 2))
     after = np.roll(areal, -1, 1)
     N = np.hstack([areal * (2 * areal - 1), 4 * areal * after])
     corner = (4 * areal - 1)[..., None] * slope
     midside = 4 * (areal[..., None] * np.roll(slope, -1, 0) + after[..., None] * slope)
-    return Rule(N, np.concatenate([corner, midside], 1), weights)
+    return N, np.concatenate([corner, midside], 1)
 
 
 def line(nodes: int, points: int) -> Rule:
@@ -110,6 +120,19 @@ class ElementType:
     # terms of the pressure in the element: 1, or 1, R and Z; 0: each point has its own
     pressures: int = 0
     hybrid: bool = False  # does not lock where rubber is incompressible
+
+    def at(self, xi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """A solid's N (p, a) and dN/dxi (p, a, 2) at points xi (p, 2)."""
+        if len(self.faces) == 4:
+            return _quad_at(self.nodes, xi)
+        return _triangle_at(self.nodes, np.column_stack([1 - xi.sum(1), xi]))
+
+    def clipped(self, xi: np.ndarray) -> np.ndarray:
+        """The point xi (2,), or one of a solid's sides where it lies beyond."""
+        if len(self.faces) == 4:
+            return np.clip(xi, -1, 1)
+        areal = np.maximum([1 - xi.sum(), *xi], 0.0)
+        return np.asarray(areal[1:] / areal.sum())
 
 
 TYPES = {

@@ -17,6 +17,7 @@ Sums over the elements of z >= 0 are half of all. What breaks the symmetry is so
 
 from __future__ import annotations
 
+from collections import Counter
 from functools import cached_property
 
 import numpy as np
@@ -31,10 +32,15 @@ EXACT = 1e-12  # m, the last digits of a deck
 
 
 def mirror_images(X: Array) -> Array:
-    """Each node's mirror image (n,) in the middle plane, -1 where there is none; X (n, 2)."""
-    places = np.round(X.real / SAME_PLACE).astype(int).tolist()
-    rows = {(r, z): i for i, (r, z) in enumerate(places)}
-    return np.array([rows.get((r, -z), -1) for r, z in places])
+    """Each node's mirror image (n,) in the middle plane, -1 where there is none; X (n, 2). Of nodes
+    in one place the first is that of the first."""
+    seen: Counter[tuple[int, int]] = Counter()
+    places = []
+    for r, z in np.round(X.real / SAME_PLACE).astype(int).tolist():
+        places.append((r, z, seen[r, z]))
+        seen[r, z] += 1
+    rows = {place: i for i, place in enumerate(places)}
+    return np.array([rows.get((r, -z, k), -1) for r, z, k in places])
 
 
 class Whole:

@@ -300,6 +300,19 @@ def _check_amplitudes(found: Sorted, static: Block) -> None:
             raise block.refused(f"the amplitude {name} ends at {end:g}, it must end at 1")
 
 
+def _tolerances(block: Block, length: float) -> str:
+    """Those of an *EMBEDDED ELEMENT that are given, m."""
+    found = ""
+    for name, scale in (
+        ("ROUNDOFF TOLERANCE", 1.0),
+        ("EXTERIOR TOLERANCE", 1.0),
+        ("ABSOLUTE EXTERIOR TOLERANCE", length),
+    ):
+        if text := block.get(name):
+            found += f", {name}={written(Row(block.place, (text,)).number(0) * scale)}"
+    return found
+
+
 def _mesh(model: Model, length: float) -> FlatMesh:
     known = getattr(model, "_flat", {})
     if length in known:
@@ -357,6 +370,15 @@ def _mesh(model: Model, length: float) -> FlatMesh:
         line(f"*SURFACE, NAME={name}, TYPE=ELEMENT", start)
         for n, face, _ in faces:
             line(f"{n}, {face}", start)
+    for k, each in enumerate(model.embedded, start=1):
+        line(f"*ELSET, ELSET=HOSTS_{k}", each.block.place)
+        _numbers(line, [element_at[n] for n in each.hosts], each.block.place)
+        for j, (row, own_lines) in enumerate(each.lines, start=1):
+            line(f"*ELSET, ELSET=EMBEDDED_{k}_{j}", row.place)
+            _numbers(line, [element_at[n] for n in own_lines], row.place)
+        line(f"*EMBEDDED ELEMENT, HOST ELSET=HOSTS_{k}{_tolerances(each.block, length)}", start)
+        for j, (row, _) in enumerate(each.lines, start=1):
+            line(f"EMBEDDED_{k}_{j}", row.place)
     line(f"*RIGID BODY, REF NODE={REFERENCE_NODE}, TIE NSET=RIM", start)
     made = FlatMesh(
         nodes,

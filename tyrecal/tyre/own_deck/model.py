@@ -27,6 +27,15 @@ class Assigned:
 
 
 @dataclass(frozen=True, eq=False)
+class Embedded:
+    """An *EMBEDDED ELEMENT some of whose nodes are no rubber's: elements of each data line."""
+
+    block: Block
+    hosts: tuple[int, ...]
+    lines: tuple[tuple[Row, tuple[int, ...]], ...]
+
+
+@dataclass(frozen=True, eq=False)
 class Model:
     """Numbers are the deck's own where it has no instances."""
 
@@ -34,6 +43,7 @@ class Model:
     elements: dict[int, Element]
     solids: tuple[Assigned, ...]
     plies: tuple[Assigned, ...]
+    embedded: tuple[Embedded, ...]
     cavity: tuple[Face, ...]  # under the inflation pressure
     cavity_name: str
     pressure: tuple[tuple[Block, Row, int], ...]  # where it stands: data field of each load
@@ -190,6 +200,8 @@ class _Builder:
         self.rim: dict[int, None] = {}
         self.reference: tuple[int, Point] | None = None
         self.same: dict[int, int] = {}  # node to the node that it is one with
+        self.embedded: list[Embedded] = []
+        self.guests: set[int] = set()  # embedded nodes where the rubber has none
         sizes = np.array(list(self.root.nodes.values()) or [(0.0, 0.0)])
         self.near = MERGED * float(np.ptp(sizes, axis=0).max())
 
@@ -221,8 +233,8 @@ class _Builder:
         self._check_areas(used)
         cavity = self._on_solids(pressed, boundary)
         reference = self.reference or (0, (0.0, 0.0))
-        loose = used - {n for e in self.root.elements.values() if e.is_solid for n in e.nodes}
-        if loose:
+        rubber = {n for e in self.root.elements.values() if e.is_solid for n in e.nodes}
+        if loose := used - rubber - self.guests:
             number, element = next(
                 (k, e) for k, e in self.root.elements.items() if e.is_ply and loose & set(e.nodes)
             )
@@ -236,10 +248,11 @@ class _Builder:
             {k: e for k, e in self.root.elements.items() if not e.kind.startswith("RAX")},
             solids,
             plies,
+            tuple(self.embedded),
             cavity,
             name,
             places,
-            tuple(n for n in self.rim if n in used),
+            tuple(n for n in self.rim if n in rubber),
             reference,
             boundary,
             node_sets,
@@ -442,7 +455,12 @@ class _Builder:
             if surface and self._is_rigid(*surface):
                 self.rim |= dict.fromkeys(slaves)
                 continue
-            self._merge(slaves, self._surface_nodes(name, block, row), block, row)
+            for n, distance in self._merge(slaves, self._surface_nodes(name, block, row)).items():
+                raise block.refused(
+                    f"node {n} lies {distance:.3g} from the nearest node that it could be tied to:"
+                    " only nodes in the same place are, mesh both alike",
+                    row,
+                )
 
     def _is_rigid(self, surface: Block, prefix: str) -> bool:
         if surface.get("TYPE") == "NODE":
@@ -455,13 +473,14 @@ class _Builder:
         return bool(members) and all(self.root.elements[n].kind == "RAX2" for n in members)
 
     def _embed(self, block: Block, prefix: str) -> None:
-        """Plies on nodes of their own, which lie where the rubber has nodes."""
+        """Plies on nodes of their own: those where the rubber has nodes are the rubber's."""
         hosts = (
             self.root.elements_in(prefix + block.get("HOST ELSET"), block)
             if block.get("HOST ELSET")
             else [n for n, e in self.root.elements.items() if e.is_solid]
         )
         rubber = list(dict.fromkeys(n for e in hosts for n in self.root.elements[e].nodes))
+        lines, before = [], len(self.guests)
         for row in block.rows:
             for name in filter(None, row.fields):
                 members = self.root.elements_in(prefix + name.strip('"').upper(), block, row)
@@ -469,27 +488,30 @@ class _Builder:
                 if wrong:
                     raise block.refused(f"element {wrong[0]} of {name} is no SFMGAX", row)
                 own = dict.fromkeys(n for e in members for n in self.root.elements[e].nodes)
-                self._merge([n for n in own if n not in set(rubber)], rubber, block, row)
+                own = dict.fromkeys(own.keys() - set(rubber))
+                self.guests |= self._merge(list(own), rubber).keys()
+                lines.append((row, tuple(members)))
+        if len(self.guests) > before:
+            self.embedded.append(Embedded(block, tuple(hosts), tuple(lines)))
 
-    def _merge(self, some: Sequence[int], others: Sequence[int], block: Block, row: Row) -> None:
-        """Each of ``some`` nodes is one with that of ``others`` which lies there."""
+    def _merge(self, some: Sequence[int], others: Sequence[int]) -> dict[int, float]:
+        """Each of ``some`` nodes is one with that of ``others`` which lies there; distance to the
+        nearest of those where none does."""
         from scipy.spatial import KDTree  # late: a quarter of a second
 
         if not some:
-            return
+            return {}
+        far: dict[int, float] = {}
         places = np.array([self.root.nodes[n] for n in others])
         away, nearest = KDTree(places).query(np.array([self.root.nodes[n] for n in some]))
         for n, distance, k in zip(some, away, nearest, strict=True):
             if distance > self.near:
-                raise block.refused(
-                    f"node {n} lies {distance:.3g} from the nearest node that it could be tied to:"
-                    " only nodes in the same place are, mesh both alike",
-                    row,
-                )
-            if n != others[k]:
+                far[n] = float(distance)
+            elif n != others[k]:
                 self.same[n] = others[k]
                 if n in self.rim:
                     self.rim[others[k]] = None
+        return far
 
     def _held(self) -> None:
         """What *BOUNDARY holds: the rim's reference node, the bead, or the plane of a half."""
@@ -572,6 +594,12 @@ class _Builder:
             turned = tuple(image[self.same.get(m, m)] for m in nodes)[::-1]
             both_faces.append((n + further, face, turned))
         self.rim |= dict.fromkeys(image[n] for n in list(self.rim) if n in image)
+        self.guests |= {image[n] for n in self.guests}
+        doubled = lambda numbers: (*numbers, *(n + further for n in numbers))
+        self.embedded = [
+            Embedded(e.block, doubled(e.hosts), tuple((row, doubled(own)) for row, own in e.lines))
+            for e in self.embedded
+        ]
         return tuple(map(both, solids)), tuple(map(both, plies)), both_faces
 
 

@@ -124,10 +124,11 @@ def _cords(layers: list[_Layer]) -> Elastic:
         join(lambda layer: layer.rows.rest),
         join(lambda layer: layer.rows.weights),
     )
+    shared = layers[0].lines.N.ndim == 2
     per_radian = join(lambda layer: layer.mass * layer.lines.R * layer.lines.weights)
     return Elastic(
         join(lambda layer: layer.lines.connectivity),
         rows,
         LogarithmicCord(join(lambda layer: layer.stiffness).ravel()),
-        consistent_mass(layers[0].lines.N, per_radian),
+        consistent_mass(layers[0].lines.N if shared else join(lambda y: y.lines.N), per_radian),
     )

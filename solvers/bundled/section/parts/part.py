@@ -118,7 +118,9 @@ def of_each_component(M: Array, components: Array) -> Array:
 
 
 def consistent_mass(N: Array, weights: Array) -> Array:
-    """Element masses (e, a, a) from N (g, a) and weights (e, g), kg per radian."""
+    """Element masses (e, a, a) from N (g, a) or (e, g, a) and weights (e, g), kg per radian."""
+    if N.ndim == 3:
+        return np.asarray((N * weights[..., None]).swapaxes(1, 2) @ N)
     return np.tensordot(weights, N[:, :, None] * N[:, None, :], 1)
 
 
@@ -260,7 +262,7 @@ class SectionJob:
         rows: dict[str, list[int]] = {}
         for number in self.mesh.element_sets[name]:
             kind, position = self.mesh.place[number]
-            if kind not in kinds:
+            if self.mesh.type_of(kind) not in kinds:
                 raise DeckError(k.line, f"element {number} of type {kind} cannot have *{k.name}")
             rows.setdefault(kind, []).append(position)
         return {kind: np.array(r) for kind, r in rows.items()}

@@ -1,0 +1,124 @@
+"""Cords in elements of another mesh: linear constraints, exact where the field is linear."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from solvers.bundled.deck.keywords import DeckError, read_keywords
+from solvers.bundled.section.embedding import _inverse
+from solvers.bundled.section.mesh import DeckMesh, read_mesh
+from solvers.bundled.section.model import build
+from solvers.bundled.section.parts.cords import LogarithmicCord
+from solvers.bundled.section.parts.elastic import Elastic
+from solvers.bundled.section.shapes import TYPES, solids
+
+HOSTS = {  # two distorted quadrilaterals on top of each other, or the triangles that they are
+    "CGAX4": ((1, 2, 4, 3), (3, 4, 6, 5)),
+    "CGAX3": ((1, 2, 4), (1, 4, 3), (3, 4, 6), (3, 6, 5)),
+}
+NODES = ((0.20, 0.0), (0.30, -0.01), (0.21, 0.05), (0.28, 0.06), (0.19, 0.1), (0.3, 0.11))
+ENDS = np.array([(0.23, 0.005), (0.26, 0.095)])  # of the cords' line
+CORDS = """*SOLID SECTION, ELSET=SOLID, MATERIAL=RUBBER
+*SURFACE SECTION, ELSET=PLY
+*REBAR LAYER
+PLY, 4e-7, 1e-3, 0, CORD, 30
+*MATERIAL, NAME=RUBBER
+*HYPERELASTIC, NEO HOOKE
+8e5, 5e-8
+*DENSITY
+1100
+*MATERIAL, NAME=CORD
+*ELASTIC
+1e10, 0.3
+*DENSITY
+1500
+"""
+
+
+def deck(kind: str, shares: tuple[float, ...], options: str = "", off: float = 0.0) -> str:
+    """Hosts, and a line of cords with nodes at shares of its length; the last one ``off`` in r."""
+    text = "*NODE\n" + "".join(f"{n}, {r}, {z}\n" for n, (r, z) in enumerate(NODES, 1))
+    for k, share in enumerate(shares):
+        r, z = ENDS[0] + share * (ENDS[1] - ENDS[0]) + (off if k + 1 == len(shares) else 0, 0)
+        text += f"{11 + k}, {r:.17g}, {z:.17g}\n"
+    text += f"*ELEMENT, TYPE={kind}, ELSET=SOLID\n"
+    text += "".join(f"{e}, {', '.join(map(str, n))}\n" for e, n in enumerate(HOSTS[kind], 1))
+    text += "*ELEMENT, TYPE=SFMGAX1, ELSET=PLY\n"
+    text += "".join(f"{101 + k}, {11 + k}, {12 + k}\n" for k in range(len(shares) - 1))
+    return text + f"*EMBEDDED ELEMENT, HOST ELSET=SOLID{options}\nPLY\n" + CORDS
+
+
+def mesh_of(*args: object) -> DeckMesh:
+    return read_mesh(read_keywords(deck(*args)))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("name", [kind for kind in solids() if kind in TYPES])
+def test_the_map_is_inverted(name: str) -> None:
+    """In a distorted element with bent sides, and a little outside."""
+    kind, random = TYPES[name], np.random.default_rng(3)
+    square, corner = [(-1, -1), (1, -1), (1, 1), (-1, 1)], [(0, 0), (1, 0), (0, 1)]
+    X = np.array(square if len(kind.faces) == 4 else corner, float)
+    if kind.nodes > len(X):
+        X = np.vstack([X, (X + np.roll(X, -1, 0)) / 2])
+    X = 0.3 + 0.01 * (X + 0.08 * random.uniform(-1, 1, X.shape))
+    for xi in random.uniform(0.05, 0.45, (20, 2)):
+        found = _inverse(kind, X, kind.at(xi[None])[0][0] @ X)
+        assert found == pytest.approx(xi, abs=1e-12)
+
+
+@pytest.mark.parametrize("kind", HOSTS)
+def test_a_linear_field_stretches_cords_as_it_does_the_rubber(kind: str) -> None:
+    """Patch test: W = E A / (2 s) ln^2 |F a|, times the integral of R ds, whatever the line's
+    nodes; and a mass of A rho / s times that."""
+    a, b, c = 0.02, 0.03, -0.01
+    F = np.array([[1 + a, 0, 0], [0, 1 + a, 0], [b, 0, 1 + c]])
+    along = ENDS[1] - ENDS[0]
+    length, alpha = np.hypot(*along), np.radians(30)
+    t = along / length
+    cord = F @ (np.cos(alpha) * np.array([t[0], 0, t[1]]) + np.sin(alpha) * np.array([0, 1, 0]))
+    ring = length * ENDS[:, 0].mean()
+    energy = 1e10 * 4e-7 / 1e-3 / 2 * np.log(np.linalg.norm(cord)) ** 2 * ring
+    for shares in ((0.0, 1.0), (0.0, 0.3, 0.55, 1.0)):
+        model = build(read_keywords(deck(kind, shares)), None, True)
+        R, Z = model.mesh.X.T
+        U = np.stack([a * R, 0 * R, b * R + c * Z], 1)
+        own = [part for part in model.parts if isinstance(part, Elastic)]
+        plies = [part for part in own if isinstance(part.law, LogarithmicCord)]
+        assert sum(p.energy(U) for p in plies) == pytest.approx(energy, rel=1e-12)
+        mass = sum(p.mass.sum() for p in plies if p.mass is not None)
+        assert mass == pytest.approx(4e-7 / 1e-3 * 1500 * ring, rel=1e-12)
+    assert len(model.mesh.index) == len(NODES)  # a guest has no equations
+
+
+def test_a_guest_on_a_side_moves_with_that_side_alone() -> None:
+    """By halves with its ends where it is its midpoint; at a node it is the node."""
+    text = deck("CGAX4", (0.0, 1.0))
+    sides = np.array(NODES)
+    for n, (r, z) in ((11, (sides[2] + sides[3]) / 2), (12, sides[5])):
+        line = next(row for row in text.splitlines() if row.startswith(f"{n}, "))
+        text = text.replace(line, f"{n}, {r:.17g}, {z:.17g}")
+    mesh = read_mesh(read_keywords(text))
+    (block,) = mesh.embedded.values()
+    rows = [mesh.index[n] for n in (3, 4, 6)]
+    assert block.rows.tolist() == [rows]
+    assert block.weights(mesh.X, mesh.guests)[0] == pytest.approx(
+        np.array([[0.5, 0.5, 0], [0, 0, 1]]), abs=1e-12
+    )
+
+
+def test_a_guest_outside_is_refused_beyond_the_tolerance() -> None:
+    """5 % of the mean element by default, or what is asked for; within it moves as if inside."""
+    reach = 0.296 - ENDS[1, 0]  # 2 mm beyond the side of the host at that height
+    mesh = mesh_of("CGAX4", (0.0, 1.0), "", reach - 0.001)
+    (block,) = mesh.embedded.values()
+    weights = block.weights(mesh.X, mesh.guests)
+    assert weights.sum(-1) == pytest.approx(1.0, abs=1e-14)
+    assert weights @ mesh.X[block.rows] == pytest.approx(
+        block.points_at(mesh.X, mesh.guests), abs=1e-14
+    )
+    for options, off in (("", 0.05), (", ABSOLUTE EXTERIOR TOLERANCE=1e-4", reach)):
+        with pytest.raises(DeckError, match=r"outside its hosts|in no host element") as error:
+            mesh_of("CGAX4", (0.0, 1.0), options, off)
+        assert error.value.line == deck("CGAX4", (0.0, 1.0)).splitlines().index("PLY") + 1
+    assert mesh_of("CGAX4", (0.0, 1.0), ", ABSOLUTE EXTERIOR TOLERANCE=0.05", 0.05).guests
