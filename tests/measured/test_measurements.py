@@ -10,7 +10,7 @@ import pytest
 from tyrecal.errors import InputError
 from tyrecal.measured.measurement import measurements_csv
 from tyrecal.measured.tables import read_measurements
-from tyrecal.measured.targets import on_own_rim
+from tyrecal.measured.targets import in_states
 from tyrecal.tyre.load import load_case
 from tyrecal.tyre.state import TyreState
 from tyrecal.tyre.values import with_values
@@ -189,13 +189,13 @@ def test_columns_of_another_table_are_all_known(tmp_path: Path) -> None:
             read(tmp_path, GOOD, header=header)
 
 
-def test_other_studies_take_what_stands_on_the_cases_rim(tmp_path: Path) -> None:
+def test_a_rim_is_told_where_it_is_not_the_cases(tmp_path: Path) -> None:
+    """And refused, line by line, where the case cannot have it."""
     case = load_case(CASES / "p235_75r17.yaml")
-    lines = [f"frequency_Hz,{c},0,,,240,0,79.5,0.2,{rim}" for c, rim in ((2, ""), (3, "free"))]
+    lines = [f"frequency_Hz,{c},0,,,240,0,79.5,0.2,{rim}" for c, rim in ((2, "fixed"), (3, "free"))]
     rows = [*read(tmp_path, *lines, header=RIMS), *read(tmp_path, GOOD)]
-    here, (note,) = on_own_rim(case, rows)
-    assert here == [replace(rows[0], rim=None), rows[2]]
-    assert note.startswith("1 values with the rim free: a fit takes them")
-    here, (note,) = on_own_rim(with_values(case, {"rim.free": True}), rows)
-    assert here == [replace(rows[1], rim=None), rows[2]] and "rim fixed" in note
-    assert on_own_rim(case, rows[2:]) == (rows[2:], [])
+    free = with_values(case, {"rim.free": True})
+    assert [each.rim for each in in_states(case, rows)] == [None, "free", None]
+    assert [each.rim for each in in_states(free, rows)] == ["fixed", None, None]
+    with pytest.raises(InputError, match="line 3: the rim has no springs in this case"):
+        in_states(case, [rows[0], replace(rows[1], rim="springs")])

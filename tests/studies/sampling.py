@@ -44,6 +44,7 @@ from tyrecal.studies.sample.predict import conditional
 from tyrecal.studies.sample.study import _answer, rows_of, run
 from tyrecal.tyre.case import start_values
 from tyrecal.tyre.load import load_case
+from tyrecal.tyre.state import TyreState
 
 Array = np.ndarray
 CASE = load_case(CASES / "p235_75r17.yaml")
@@ -110,8 +111,11 @@ def coverage(count: int, seed: int) -> None:
     )
     given = conditional(measured, sigma, g[:n], others, g[n:])
     white = np.linalg.inv(np.linalg.cholesky(sigma))
-    at, beside = (rows_of(each, made.labels, PRESSURES) for each in (measured, others))
-    density = Posterior(made, states, at, np.zeros(n), white, box(0.7))
+    places = [TyreState(p) for p in PRESSURES]
+    labels = [made.labels] * len(places)
+    at, beside = (rows_of(each, places, labels) for each in (measured, others))
+    first = np.insert(states, 0, 0, axis=1)
+    density = Posterior((made,), first, at, np.zeros(n), white, box(0.7))
     held, predicted, linear = np.zeros(3, int), np.zeros(len(others), int), np.zeros(3, int)
     began = time.process_time()
     for i in range(count):

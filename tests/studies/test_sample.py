@@ -13,10 +13,13 @@ from scipy.signal import lfilter
 from scipy.stats import norm
 
 from tyrecal.errors import InputError
+from tyrecal.measured.measurement import Measurement
 from tyrecal.report.figure import save
 from tyrecal.report.sample import figures
+from tyrecal.simulate.deck.tyre_design import TyreDesign
+from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.simulate.evaluate.failure import EvaluationFailed
-from tyrecal.simulate.modes.label import Label
+from tyrecal.simulate.modes.label import Label, labelled
 from tyrecal.studies.diagnose.observations import Observable, Observations
 from tyrecal.studies.emulator import Evaluated, fitted, spread
 from tyrecal.studies.fit.variable import DesignVariable
@@ -34,11 +37,13 @@ from tyrecal.studies.sample.chains import (
 from tyrecal.studies.sample.posterior import Posterior, optima
 from tyrecal.studies.sample.predict import conditional
 from tyrecal.studies.sample.result import draws_csv, result
-from tyrecal.studies.sample.study import Sample, first_box, targets_as_readings
+from tyrecal.studies.sample.study import Sample, check, first_box, rows_of, run, targets_as_readings
 from tyrecal.tyre.load import load_case
+from tyrecal.tyre.state import SPRINGS, TyreState
 
 from ..chance import Chance, generator
 from ..conftest import CASES
+from ..effects.support import coarse
 
 pytestmark = pytest.mark.numbers
 
@@ -66,7 +71,7 @@ def posterior(
     made = fitted(VARIABLES, LABELS, centre, half, samples)
     rows = np.array([[0, i] for i in range(3)])
     values = eta(np.array([0.0, 0.5])) if y is None else y
-    return Posterior(made, np.zeros((1, 0)), rows, values, np.diag(1 / SIGMA), box)
+    return Posterior((made,), np.zeros((1, 1)), rows, values, np.diag(1 / SIGMA), box)
 
 
 COVARIANCE = np.linalg.inv((J.T / SIGMA**2) @ J)
@@ -91,6 +96,61 @@ def test_a_linear_tyre_has_the_normal_posterior_of_the_closed_form(chance: Chanc
         chance.scatter(each, 1.0)
         chance.distributed(each, "norm")
     chance.mean(z[0] * z[1], 0.0, 0.0)
+
+
+def test_what_each_rim_tells_adds_up() -> None:
+    """Two rims, an emulator each: information and ln p are the sums of both."""
+    other = J @ np.array([[0.2, 0.0], [0.0, 1.5]])
+    one, two = posterior(WIDE), posterior(WIDE, lambda x: 4.5 + x @ other.T)
+    both = Posterior(
+        (*one.emulators, *two.emulators),
+        np.array([[0.0], [1.0]]),
+        np.vstack([one.rows, two.rows + np.array([1, 0])]),
+        np.concatenate([one.y, two.y]),
+        np.diag(1 / np.tile(SIGMA, 2)),
+        WIDE,
+    )
+    x = np.stack([CENTRE, CENTRE + 0.5 * WIDTH])
+    assert both(x) == pytest.approx(one(x) + two(x), abs=1e-6)
+    assert np.allclose(both.information(x), one.information(x) + two.information(x), rtol=1e-6)
+    assert both.evaluations == 2 * one.evaluations and len(both.stated_errors) == 6
+    states = [TyreState(240.0), TyreState(240.0, 0.0, "free")]
+    measured = [Observable("frequency_Hz", LABELS[2], 240.0, rim=rim) for rim in ("free", None)]
+    assert rows_of(measured, states, [LABELS, LABELS[1:]]).tolist() == [[1, 1], [0, 2]]
+
+
+@pytest.mark.slow
+def test_a_tyre_on_two_rims_is_sampled_and_predicted_on_both() -> None:
+    """One variable, one mode a rim, without scatter: the draws hold the start; [0,0] torsional is
+    higher where the wheel hangs, and a wave that moves no rim is the same on both."""
+    case = coarse()
+    alone = {"C10": case.case.variables["C10"]}
+    case = replace(case, case=case.case.model_copy(update={"variables": alone}))
+    label, evaluator = Label(0, 0, "torsional"), Evaluator(TyreDesign(case))
+    readings = []
+    for rim in (None, "free"):
+        values = {"rim.free": rim == "free"}
+        modes = labelled(evaluator.evaluate(Question(values)))
+        hertz = next(mode.frequency_Hz for mode in modes if mode.label == label)
+        readings.append(
+            Measurement("frequency_Hz", label, "", 240.0, 0.0, hertz, 0.005 * hertz, rim=rim)
+        )
+    sample = run(case, evaluator, readings, 2000, at_kPa=(240.0,))
+    told = result(sample, 0)
+    assert told.variables["C10"].low < 1e6 < told.variables["C10"].high
+    at = {(row.label, row.rim): row for row in told.predicted}
+    clamped, hung = at[label, None], at[label, "free"]
+    assert hung.frequency_Hz > 1.8 * clamped.frequency_Hz
+    for row, reading in zip((clamped, hung), readings, strict=True):
+        assert row.measured_Hz == pytest.approx(reading.value)
+    waves = [at[Label(3, 0), rim] for rim in (None, "free")]
+    assert waves[0].frequency_Hz == pytest.approx(waves[1].frequency_Hz, rel=1e-3)
+    titles = [table.title for table in told.tables()[1:]]
+    assert titles == ["Hz at 240 kPa", "Hz at 240 kPa, rim free"]
+    spindle = {"s": case.case.variables["C10"].model_copy(update={"sets": [SPRINGS[0]]})}
+    held = replace(case, case=case.case.model_copy(update={"variables": spindle}))
+    with pytest.raises(InputError, match=r"^s sets what holds the rim"):
+        check(held, evaluator, readings)
 
 
 def test_draws_are_worth_as_many_as_their_autocorrelation_says() -> None:
@@ -231,7 +291,7 @@ def test_a_box_that_cannot_grow_says_why() -> None:
     def rough(box: Array) -> Posterior:
         made = posterior(box)
         errors = np.full(3, 0.02 if not np.allclose(box, first) else 0.5)
-        return replace(made, emulator=replace(made.emulator, stated_errors=errors))
+        return replace(made, emulators=(replace(made.emulators[0], stated_errors=errors),))
 
     found = grown(rough, first, BOUNDS, np.array([0.03, 0.01, 0.03]), 3000, 1)
     assert found.stopped == "the emulator of a larger box may be 2 % off"

@@ -102,6 +102,7 @@ def command(
     if measured is None:
         raise click.UsageError("--measured FILE must be given, or --add EFFECT=VALUE")
     from ..measured.tables import read_measurements
+    from ..measured.targets import in_states
     from ..report.diagnosis import page
     from ..report.shape_data import parts_data
     from ..studies.diagnose.diagnosis import STAGES
@@ -109,6 +110,7 @@ def command(
     from ..studies.diagnose.result import diagnosis_result
     from ..studies.diagnose.study import parse_change
     from ..studies.diagnose.study import study as diagnosed
+    from ..studies.fit.targets import rims_of
     from ..tyre.effects import catalogue
 
     loaded, values = study.load(case, assignments)
@@ -126,7 +128,8 @@ def command(
             arguments.refuse_unusual(loaded, option, name, change.value, False)
     evaluator = study.evaluator(loaded)
     files = [measured, *repeats, *(path for path, _ in changes)]
-    readings = [each for path in files for each in read_measurements(path)]
+    readings = [each for path in files for each in in_states(loaded, read_measurements(path))]
+    states = [each.state for each in readings]
     pressures, at = ({each.pressure_kPa for each in readings}, {each.load_N for each in readings})
     run = study.run(
         loaded,
@@ -135,6 +138,7 @@ def command(
         measured=files,
         pressure_kPa=sorted(pressures),
         load_N=sorted(at),
+        rim=rims_of(loaded, states) if any(each.rim for each in states) else (),
     )
     form = None if form_percent is None else form_percent / 100
     assumed = Assumed(form, split_percent / 100)

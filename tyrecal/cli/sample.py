@@ -15,7 +15,7 @@ from . import arguments, options
     "--measured",
     type=click.Path(path_type=Path, exists=True, dir_okay=False),
     metavar="FILE",
-    help="Measurements (CSV), at any pressures, in place of the case's targets.",
+    help="Measurements (CSV), at any pressures, on any rims, in place of the case's targets.",
 )
 @click.option(
     "--draws",
@@ -66,9 +66,11 @@ def command(
     tyrecal sample my.yaml --measured measured.csv --at-kPa 180 --at-kPa 260 --jobs 2
     """
     from ..report.table import shown
+    from ..studies.fit.targets import rims_of
     from ..studies.sample.chains import needs_emcee
     from ..studies.sample.result import draws_csv, result
     from ..studies.sample.study import SAMPLE_STAGES, check, modal, run
+    from ..tyre.state import AS_THE_CASE
     from .main import EXIT_FIT
 
     terminal = study.terminal
@@ -79,16 +81,22 @@ def command(
         arguments.refuse_unusual(
             loaded, f"--at-kPa {pressure:g}", "pressure_kPa", pressure, study.allow_unusual
         )
-    readings, elsewhere = None, list[str]()
+    readings = None
     if measured:
         from ..measured.tables import read_measurements
-        from ..measured.targets import on_own_rim
+        from ..measured.targets import in_states
 
-        readings, elsewhere = on_own_rim(loaded, read_measurements(measured))
+        readings = in_states(loaded, read_measurements(measured))
     evaluator = study.evaluator(loaded)
     check(loaded, evaluator, readings)
+    states = [each.state for each in modal(readings or ())]
     output = study.run(
-        loaded, "sample", evaluator, measured=[measured] if measured else [], load_N=0.0
+        loaded,
+        "sample",
+        evaluator,
+        measured=[measured] if measured else [],
+        load_N=0.0,
+        rim=rims_of(loaded, [AS_THE_CASE, *states]) if any(each.rim for each in states) else (),
     )
     with terminal.progress("sample", SAMPLE_STAGES) as bar:
         evaluator.on_progress = bar.at
@@ -108,8 +116,6 @@ def command(
     terminal.say("\n".join(found.sentences()))
     if left_out := len(readings or ()) - len(modal(readings or ())):
         terminal.note(f"{measured}: {left_out} values are no frequencies of the unloaded tyre")
-    for each in elsewhere:
-        terminal.note(f"{measured}: not used: {each}")
     doubts = found.doubts()
     for doubt in doubts:
         terminal.warn(doubt)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 from math import hypot
@@ -12,7 +11,7 @@ from ..errors import InputError
 from ..simulate.modes.label import Label
 from ..tyre.case import LoadedCase
 from ..tyre.case.schema import MEASURED_SIGMA, TargetFootprint, TargetMass, TargetMode, Targets
-from ..tyre.state import TyreState, rim_of
+from ..tyre.state import TyreState
 from ..tyre.values import set_values
 from .measurement import Measurement
 from .tables import read_measurements
@@ -85,20 +84,12 @@ def _refuse_states(case: LoadedCase, readings: Sequence[Measurement]) -> None:
         raise InputError("\n".join(mistakes))
 
 
-def on_own_rim(
-    case: LoadedCase, readings: Sequence[Measurement]
-) -> tuple[list[Measurement], list[str]]:
-    """What was measured on the rim that the case has, and what was on others, for studies of that
-    one alone."""
-    own = rim_of(case)
-    here = [replace(each, rim=None) for each in readings if each.rim in (None, own)]
-    others = Counter(each.rim for each in readings if each.rim not in (None, own))
-    notes = [
-        f"{count} values with the rim {rim}: a fit takes them; the rim of this case is {own},"
-        " see --set rim.free=true"
-        for rim, count in others.items()
-    ]
-    return here, notes
+def in_states(case: LoadedCase, readings: Sequence[Measurement]) -> list[Measurement]:
+    """The same with a rim only where it is not held as the case has it. Raises InputError where the
+    case cannot be in a state."""
+    found = [replace(each, rim=each.state.of(case).rim) for each in readings]
+    _refuse_states(case, [each for each in found if each.rim])
+    return found
 
 
 def _modes(case: LoadedCase, readings: Sequence[Measurement]) -> list[TargetMode]:

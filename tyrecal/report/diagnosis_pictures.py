@@ -48,20 +48,21 @@ def draw_residuals(
     after: Array | None = None,
     effect: str = "",
 ) -> Figure:
-    """Residuals of the plain fit over the harmonic, a column a family, a colour a pressure; hollow
+    """Residuals of the plain fit over the harmonic, a column a family, a colour a state; hollow
     (``after``) with the likeliest ``effect`` in the model. Bars (``spread``): one standard
     deviation without a gap."""
-    pressures = sorted({row.pressure_kPa for row in rows if row.label})
+    states = sorted(dict.fromkeys((row.pressure_kPa, row.rim or "") for row in rows if row.label))
     shown = [name for name in SHOWN_FAMILIES if any(family(row) == name for row in rows)]
     figure = new_figure(2.0 + 2.8 * len(shown), 3.8)
     axes = figure.subplots(1, len(shown), sharey=True, squeeze=False)[0]
     for panel, name in zip(axes, shown, strict=True):
         panel.axhline(0, color=GREY, lw=0.8)
-        for k, p in enumerate(pressures):
-            mine = [row.pressure_kPa == p and not row.run and family(row) == name for row in rows]
+        for k, (p, rim) in enumerate(states):
+            here = [(row.pressure_kPa, row.rim or "") == (p, rim) and not row.run for row in rows]
+            mine = [at and family(row) == name for at, row in zip(here, rows, strict=True)]
             chosen = np.flatnonzero(mine).tolist()
             at = np.array([_place(rows[i].label) for i in chosen])
-            at = at + 0.16 * (k - (len(pressures) - 1) / 2)
+            at = at + min(0.16, 0.6 / len(states)) * (k - (len(states) - 1) / 2)
             colour = COLOURS[k % len(COLOURS)]
             panel.errorbar(
                 at,
@@ -71,7 +72,7 @@ def draw_residuals(
                 color=colour,
                 ms=5,
                 lw=1,
-                label=f"{p:g} kPa",
+                label=f"{p:g} kPa" + f", rim {rim}" * bool(rim),
             )
             if after is not None:
                 panel.plot(at, 100 * after[chosen], "o", mfc="white", mec=colour, ms=5, zorder=3)
@@ -90,7 +91,9 @@ def draw_residuals(
     with_effect = f"; hollow: with {effect}" if after is not None else ""
     headline(figure, f"{words}{with_effect}")
     handles, labels = axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=len(pressures), frameon=False)
+    figure.legend(
+        handles, labels, loc="outside lower center", ncols=min(len(states), 3), frameon=False
+    )
     return figure
 
 

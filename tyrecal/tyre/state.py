@@ -28,6 +28,7 @@ SPRINGS = tuple(
 )
 """Numbers of a case that are compliances of what holds its rim."""
 WHEEL_FREE = "effects.wheel_free"
+STANDING = "effects.road_contact"  # which a wheel that hangs freely does not
 
 
 @dataclass(frozen=True)
@@ -78,6 +79,8 @@ class TyreState:
                 SPRINGS, 0.0
             )
             point = case.case.rim.reference_point_m
+            if state.rim == "free":
+                found[STANDING] = 0.0
             if state.rim == "free" and point.r:
                 raise ValueError(
                     "cannot move: rim.reference_point_m must be on the axle, with r = 0, got"

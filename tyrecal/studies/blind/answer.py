@@ -114,12 +114,7 @@ def predicted(
     best = int(np.argmax(hypothesis.posterior))
     unknown, eta = np.full(len(places), np.nan), expansion.eta[places]
     unseen = Observations(
-        tuple(Observable("frequency_Hz", *rows[i]) for i in places),
-        eta,
-        unknown,
-        0.0,
-        unknown,
-        unknown,
+        tuple(Observable.of(rows[i]) for i in places), eta, unknown, 0.0, unknown, unknown
     )
     there = replace(
         found.problem,

@@ -3,7 +3,7 @@
     Sigma = Sigma_rep + Sigma_form + sum_k s_k^2 g_k g_k^T
 
 Sigma_rep: repeatability, with the part that all frequencies of a run share; Sigma_form: what our
-own model is uncertain by (mesh, element), mode by mode, alike at all pressures (0.9) and in all
+own model is uncertain by (mesh, element), mode by mode, alike in all states (0.9) and in all
 runs of the same tyre (0.97); s_k g_k: the constants that nobody calibrates, common to all runs.
 """
 
@@ -24,7 +24,7 @@ def alike(rows: tuple[Observable, ...]) -> Array:
     for i, a in enumerate(rows):
         for j, b in enumerate(rows):
             if a.label == b.label and a.quantity == b.quantity:
-                result[i, j] = BETWEEN_PRESSURES if a.pressure_kPa != b.pressure_kPa else 1.0
+                result[i, j] = BETWEEN_PRESSURES if a.state != b.state else 1.0
                 result[i, j] *= BETWEEN_RUNS if a.run != b.run else 1.0
     return result
 

@@ -234,7 +234,7 @@ def outside(problem: InverseProblem) -> Hypothesis:
     """What the catalogue does not hold: half of it unknown effects, half errors of reading.
 
     Unknown effects shift modes by a random amount each, or smoothly over the harmonic, each family
-    by itself, or smoothly over the frequency, alike at all pressures; or all of Sigma is too small.
+    by itself, or smoothly over the frequency, alike in all states; or all of Sigma is too small.
     An error of reading: one label is another mode's at all pressures. ``words`` names the
     likeliest.
     """
@@ -243,8 +243,9 @@ def outside(problem: InverseProblem) -> Hypothesis:
     unknown: list[tuple[str, Array]] = [
         (f"modes are off by {size:.1%} in a way of their own", size**2 * same) for size in UNKNOWN
     ]
-    pressure = np.array([row.pressure_kPa for row in rows])
-    between = np.where(pressure[:, None] == pressure, 1.0, BETWEEN_PRESSURES)
+    between = np.array(
+        [[1.0 if a.state == b.state else BETWEEN_PRESSURES for b in rows] for a in rows]
+    )
     for over, together in _smooth(rows, problem.observations.y):
         unknown += [
             (f"modes are off by {size:.1%}, smoothly over {over}", size**2 * between * together)

@@ -18,6 +18,7 @@ from .inverse_problem import InverseProblem
 from .observations import Observable
 
 Array = np.ndarray
+AS_CASE = "as the case"  # how the rim is held
 FAMILY_NAMES = {"in-plane": "in-plane", "out-of-plane": "lateral"}
 
 
@@ -25,7 +26,7 @@ FAMILY_NAMES = {"in-plane": "in-plane", "out-of-plane": "lateral"}
 class ResidualGroup:
     """Residuals of some rows."""
 
-    kind: str  # family, harmonic, pressure or mass
+    kind: str  # family, harmonic, pressure, rim or mass
     name: str
     rms_percent: float
     chi2: float
@@ -120,6 +121,8 @@ def _groups(rows: tuple[Observable, ...], r: Array, C: Array) -> list[ResidualGr
         "pressure": [f"{row.pressure_kPa:g}" if row.label else None for row in rows],
         "mass": [None if row.label else "mass" for row in rows],
     }
+    if any(row.rim for row in rows):
+        kinds["rim"] = [(row.rim or AS_CASE) if row.label else None for row in rows]
     result = []
     for kind, names in kinds.items():
         for name in sorted({n for n in names if n}, key=_as_number):

@@ -179,6 +179,6 @@ class InverseProblem:
 
 
 def places(observations: Observations, rows: Sequence[tuple]) -> Array:
-    """Where each observation stands among the model's rows (label or None, pressure)."""
+    """Where each observation stands among the model's rows."""
     known = {row: i for i, row in enumerate(rows)}
-    return np.array([known[row.label, row.pressure_kPa] for row in observations.rows], int)
+    return np.array([known[row.row] for row in observations.rows], int)

@@ -14,6 +14,7 @@ from itertools import combinations
 import numpy as np
 
 from ...simulate.modes.label import Label
+from ...tyre.state import TyreState
 from .evidence import NONE, OUTSIDE, Hypothesis, refit, weigh
 from .inverse_problem import InverseProblem
 from .observations import Observations
@@ -49,21 +50,21 @@ def exchanged(problem: InverseProblem) -> tuple[Label, Label] | None:
 
 def with_exchanged(observations: Observations, a: Label, b: Label) -> Observations:
     """The same values with labels a and b exchanged, wherever both were measured."""
-    where = {(row.label, row.pressure_kPa, row.run): i for i, row in enumerate(observations.rows)}
+    where = {(row.label, row.state, row.run): i for i, row in enumerate(observations.rows)}
     order = np.arange(len(observations.rows))
-    for (label, pressure, run), i in where.items():
-        if label == a and (b, pressure, run) in where:
-            j = where[b, pressure, run]
+    for (label, state, run), i in where.items():
+        if label == a and (b, state, run) in where:
+            j = where[b, state, run]
             order[i], order[j] = j, i
     return observations.at(order)
 
 
 def _near(observations: Observations) -> Iterator[tuple[Label, Label]]:
     """Pairs of labels that lie near each other wherever both were measured."""
-    at: dict[Label, dict[tuple[float, int], float]] = {}
+    at: dict[Label, dict[tuple[TyreState, int], float]] = {}
     for row, y in zip(observations.rows, observations.y.tolist(), strict=True):
         if row.label:
-            at.setdefault(row.label, {})[row.pressure_kPa, row.run] = y
+            at.setdefault(row.label, {})[row.state, row.run] = y
     for a, b in combinations(sorted(at, key=str), 2):
         both = at[a].keys() & at[b].keys()
         if both and max(abs(at[a][k] - at[b][k]) for k in both) < MAX_SWAP_DISTANCE:

@@ -14,9 +14,11 @@ from typing import Protocol
 import numpy as np
 
 from ...simulate.modes.label import Label
+from ...tyre.state import TyreState
 
 Array = np.ndarray
-ModelRow = tuple[Label | None, float]  # a mode, None: the mass; kPa
+Where = float | TyreState  # kPa on the case's own rim, or a state on another
+ModelRow = tuple[Label | None, Where]  # a mode, None: the mass
 
 
 @dataclass(frozen=True)
@@ -66,6 +68,11 @@ class Answer:
     slopes: Mapping[str, Array] = field(default_factory=dict)  # (n,) d eta / d e; NaN: unknown
     coupling: Coupling | None = None
     beside: Array | None = None  # (n,) more eta, by one standard deviation of that
+
+
+def state_of(where: Where) -> TyreState:
+    """The state of a row."""
+    return where if isinstance(where, TyreState) else TyreState(where)
 
 
 class ResponseModel(Protocol):

@@ -170,7 +170,8 @@ def _more_rows(
             offered.append((f"measure the same modes at {p:g} kPa", HOURS["pressure"], more))
     top = max(label.c for label in labels)
     higher = [Label(top + 1, 0), Label(top + 1, 1)]
-    more = [(label, p) for label in higher for p in pressures]
+    measured_in = dict.fromkeys(row.row[1] for row in o.rows if row.label)
+    more = [(label, where) for label in higher for where in measured_in]
     offered.append((f"measure {higher[0]} and {higher[1]}, too", HOURS["harmonics"], more))
     if all(row.label for row in o.rows):
         offered.append(("weigh the tyre", HOURS["weigh"], [(None, 0.0)]))
@@ -201,7 +202,7 @@ def _more_rows(
     result = []
     for words, hours, more in offered:
         at = [rows.index(row) for row in more]
-        new = tuple(Observable("frequency_Hz" if x else "mass_kg", x, p) for x, p in more)
+        new = tuple(map(Observable.of, more))
         size = np.array([scatter if label else MASS_PERCENT / 100 for label, _ in more])
         none, join = np.full(len(more), np.nan), lambda *parts: np.concatenate(parts)
         both = Observations(

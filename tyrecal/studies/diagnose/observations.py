@@ -15,9 +15,12 @@ import numpy as np
 from ...measured.measurement import Measurement
 from ...measured.repeats import PRIOR_REPEATS
 from ...simulate.modes.label import Label
+from ...tyre.case.parts import RimSupport
+from ...tyre.state import TyreState
+from .model import ModelRow, state_of
 
 Array = np.ndarray
-ObservationKey = tuple[str, Label | None, float]
+ObservationKey = tuple[str, Label | None, float, RimSupport | None]
 
 
 @dataclass(frozen=True)
@@ -28,10 +31,29 @@ class Observable:
     label: Label | None  # of the mode; None: the mass
     pressure_kPa: float
     run: int = 0  # 0 is the tyre as it is, in 1, 2, ... something was switched
+    rim: RimSupport | None = None  # None: as the case has it
 
     def __str__(self) -> str:
-        name = str(self.label) if self.label else "mass"
-        return f"{name} at {self.pressure_kPa:g} kPa" if self.label else name
+        if not self.label:
+            return "mass"
+        return f"{self.label} at {self.pressure_kPa:g} kPa" + f", rim {self.rim}" * bool(self.rim)
+
+    @classmethod
+    def of(cls, row: ModelRow) -> Observable:
+        """A mode or the mass that a model is asked of."""
+        label, state = row[0], state_of(row[1])
+        quantity = "frequency_Hz" if label else "mass_kg"
+        return cls(quantity, label, state.pressure_kPa or 0.0, rim=state.rim)
+
+    @property
+    def state(self) -> TyreState:
+        """What the tyre was in."""
+        return TyreState(self.pressure_kPa, 0.0, self.rim)
+
+    @property
+    def row(self) -> ModelRow:
+        """What a model is asked of."""
+        return self.label, self.state if self.rim else self.pressure_kPa
 
 
 @dataclass(frozen=True)
@@ -78,8 +100,8 @@ def observe(
     runs = [scattered, *(_stated(run) for run in used[1 + len(repeats) :])]
     rows, numbers = [], []
     for index, run in enumerate(runs):
-        for key in sorted({key[:3] for key in run}, key=_order):
-            rows.append(Observable(key[0], key[1], key[2], index))
+        for key in sorted({key[:4] for key in run}, key=_order):
+            rows.append(Observable(key[0], key[1], key[2], index, key[3]))
             numbers.append(_pair(run, key, split))
     table = np.array(numbers, float).reshape(-1, 4).T
     return Observations(
@@ -88,7 +110,7 @@ def observe(
 
 
 def _used(run: Sequence[Measurement], left_out: list[str]) -> dict[tuple[str, ...], Measurement]:
-    """Readings by (quantity, label, pressure, member); of two members, 1 is the lower."""
+    """Readings by (quantity, label, pressure, rim, member); of two members, 1 is the lower."""
     found: dict[tuple, Measurement] = {}
     for each in run:
         if each.load_N or each.quantity not in ("frequency_Hz", "mass_kg"):
@@ -96,9 +118,9 @@ def _used(run: Sequence[Measurement], left_out: list[str]) -> dict[tuple[str, ..
             left_out.append(f"{Path(each.place).name}, {what}: not used by the diagnosis")
             continue
         pressure = each.pressure_kPa if each.label else 0.0
-        found[each.quantity, each.label, pressure, each.member] = each
-    for key in [key for key in found if key[3] == "1"]:
-        twin = (*key[:3], "2")
+        found[each.quantity, each.label, pressure, each.rim, each.member] = each
+    for key in [key for key in found if key[4] == "1"]:
+        twin = (*key[:4], "2")
         if twin in found and found[twin].value < found[key].value:
             found[key], found[twin] = found[twin], found[key]
     return found
@@ -118,7 +140,7 @@ def _unrepeated(runs: Sequence[dict]) -> Iterator[str]:
 
 
 def _names(keys: Sequence[ObservationKey]) -> str:
-    return ", ".join(dict.fromkeys(str(Observable(key[0], key[1], key[2])) for key in keys))
+    return ", ".join(dict.fromkeys(str(Observable(*key[:3], rim=key[3])) for key in keys))
 
 
 def _stated(run: dict) -> dict:
@@ -164,4 +186,5 @@ def _pair(run: dict, key: ObservationKey, split: float) -> tuple[float, float, f
 
 def _order(key: ObservationKey) -> tuple:
     label = key[1]
-    return (key[2], label is None, (label.c, label.m, label.kind or "") if label else ())
+    mode = (label.c, label.m, label.kind or "") if label else ()
+    return (key[2], key[3] or "", label is None, mode)

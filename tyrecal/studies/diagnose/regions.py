@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
 
@@ -15,8 +15,9 @@ from ...tyre.case import LoadedCase, number_at
 from ...tyre.case.schema import Rubber, Solid
 from ...tyre.own_deck.numbers import moduli
 from ...tyre.resolve import resolved
+from ...tyre.state import TyreState
 from ..fit import problem as fit
-from .model import ModelRow
+from .model import ModelRow, state_of
 
 Array = np.ndarray
 TREAD = "tread"
@@ -40,18 +41,23 @@ class Parted(Protocol):
     case: LoadedCase
     evaluator: Evaluator
     rows: list[ModelRow]
-    pressures: list[float]
+    states: list[TyreState]
     jobs: int
 
     def values(self, x: Array) -> dict[str, float]:
         """Design variables at x, in their own units."""
+
+    def in_state(
+        self, state: TyreState, design: Mapping[str, float], names: Sequence[str] = ()
+    ) -> tuple[dict[str, float], tuple[str, ...]]:
+        """A design in a state, and those of the slopes ``names`` that it has there."""
 
 
 def regions(model: Parted, x: Array) -> list[SectionPart]:
     """Every region's rubber (the crown's in two: tread and what lies under it), every cord; of a
     user's deck every compound and cord.
 
-    One evaluation a pressure, with exact slopes by the constants of each part. Raises
+    One evaluation a state, with exact slopes by the constants of each part. Raises
     EvaluationFailed.
     """
     case, parts = split_by_region(model.case) if not model.case.deck else _of_deck(model.case)
@@ -64,17 +70,16 @@ def regions(model: Parted, x: Array) -> list[SectionPart]:
     own = model.values(x)
     taken = {path: own[name] for name, v in case.case.variables.items() for path in v.sets}
     design = {**numbers, **taken}
-    states = [{**design, "pressure_kPa": p} for p in model.pressures]
-    at: dict[float, Found] = {}
-    answers = problem.modes_of([(state, tuple(numbers)) for state in states])
-    for pressure, each in zip(model.pressures, answers, strict=True):
+    asked = [model.in_state(state, design, list(numbers)) for state in model.states]
+    at: dict[TyreState, Found] = {}
+    for state, each in zip(model.states, problem.modes_of(asked), strict=True):
         if not isinstance(each, Found):
             raise each
-        at[pressure] = each
+        at[state] = each
     shares = dict.fromkeys(parts, 0.0)
     if any(label is None for label, _ in model.rows):
-        heavier = [{**states[0], p: (1 + MASS_STEP) * design[p]} for p in density.values()]
-        plain = at[model.pressures[0]].evaluation.mass_kg
+        heavier = [{**asked[0][0], p: (1 + MASS_STEP) * design[p]} for p in density.values()]
+        plain = at[model.states[0]].evaluation.mass_kg
         for material, each in zip(parts, problem.modes_of([(d, ()) for d in heavier]), strict=True):
             if not isinstance(each, Found):
                 raise each
@@ -82,11 +87,12 @@ def regions(model: Parted, x: Array) -> list[SectionPart]:
     result = []
     for material, name in parts.items():
         columns = np.zeros((2, len(model.rows)))
-        for i, (label, pressure) in enumerate(model.rows):
+        for i, (label, where) in enumerate(model.rows):
             if label is None:
                 columns[1, i] = shares[material]
                 continue
-            mode, gradients = at[pressure].wanted[label], at[pressure].evaluation.gradients
+            answer = at[state_of(where)]
+            mode, gradients = answer.wanted[label], answer.evaluation.gradients
             f, place = mode.frequency_Hz, mode.position
             slope = {p: gradients[p][place] * design[p] / f for p in numbers}
             columns[0, i] = sum(sign * slope[path] for path, sign in signs[material].items())

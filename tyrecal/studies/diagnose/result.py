@@ -25,7 +25,10 @@ if TYPE_CHECKING:
     from .diagnosis import Diagnosis
     from .under_load import UnderLoad
 
-ROW_PATTERN = re.compile(r"\[(\d{1,3}),(\d{1,3})\](?: (axial|torsional))? at ([\d.]{1,9}) kPa")
+ROW_PATTERN = re.compile(
+    r"\[(\d{1,3}),(\d{1,3})\](?: (axial|torsional))? at ([\d.]{1,9}) kPa"
+    r"(?:, rim (fixed|springs|free))?"
+)
 LEAST_PROBABILITY = 1e-6  # of an effect that is listed
 
 
@@ -63,8 +66,9 @@ class Residual(ResultPart):
         found = ROW_PATTERN.fullmatch(self.row)
         if not found:
             return None
-        c, m, kind, pressure = found.groups()
-        return Observable("frequency", Label(int(c), int(m), kind), float(pressure), self.run)
+        c, m, kind, pressure, rim = found.groups()
+        label = Label(int(c), int(m), kind)
+        return Observable("frequency", label, float(pressure), self.run, rim)  # type: ignore[arg-type]
 
 
 class GroupTest(ResultPart):
@@ -94,6 +98,7 @@ class GapPart(ResultPart):
     by_family: dict[str, float] = Field(default={})
     by_harmonic: dict[str, float] = Field(default={})
     by_pressure: dict[str, float] = Field(default={})
+    by_rim: dict[str, float] = Field(default={})  # where it was held in several ways
     by_load: dict[str, float] = Field(default={})
     groups: list[GroupTest] = Field(default=[])
     contrasts: list[ContrastPart] = Field(default=[])
@@ -220,7 +225,7 @@ def _gap(diagnosis: Diagnosis, under_load: UnderLoad | None) -> GapPart:
     gap, rows = diagnosis.gap, diagnosis.problem.observations.rows
     by = {
         kind: {g.name: g.rms_percent for g in gap.groups if g.kind == kind}
-        for kind in ("family", "harmonic", "pressure")
+        for kind in ("family", "harmonic", "pressure", "rim")
     }
     loads = sorted({row.load_N for row in under_load.rows}) if under_load else []
     rms = {load: under_load.rms_percent(NONE, load) for load in loads} if under_load else {}
@@ -232,6 +237,7 @@ def _gap(diagnosis: Diagnosis, under_load: UnderLoad | None) -> GapPart:
         by_family=by["family"],
         by_harmonic=by["harmonic"],
         by_pressure=by["pressure"],
+        **({"by_rim": by["rim"]} if by["rim"] else {}),
         by_load={f"{load:g}": value for load, value in rms.items() if value is not None},
         groups=[
             GroupTest(kind=g.kind, name=g.name, p_value=g.p_value, holm=g.corrected)

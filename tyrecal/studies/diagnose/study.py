@@ -11,7 +11,7 @@ from typing import Any
 from ...errors import InputError
 from ...measured.measurement import Measurement
 from ...measured.tables import read_measurements
-from ...measured.targets import on_own_rim
+from ...measured.targets import in_states
 from ...simulate.evaluate.evaluator import Evaluator
 from ...tyre.case import LoadedCase
 from ...tyre.case.mistakes import suggestion
@@ -82,22 +82,16 @@ def study(
     EvaluationFailed, and what ``Evaluator.evaluate`` raises.
     """
     switched = [path for path, _ in toggled]
-    told = {path: read_measurements(path) for path in (measured, *repeats, *switched)}
-    runs = {path: on_own_rim(case, readings)[0] for path, readings in told.items()}
-    elsewhere = [
-        f"{path.name}: {note}"
-        for path, readings in told.items()
-        for note in on_own_rim(case, readings)[1]
-    ]
-    _check_copies([measured, *repeats, *switched], runs)
+    paths = [measured, *repeats, *switched]
+    runs = {path: in_states(case, read_measurements(path)) for path in paths}
+    _check_copies(paths, runs)
     observations = observe(
         runs[measured],
         [runs[path] for path in repeats],
         [runs[path] for path in switched],
         assumed.split,
     )
-    observations = replace(observations, left_out=(*observations.left_out, *elsewhere))
-    rows = list(dict.fromkeys((row.label, row.pressure_kPa) for row in observations.rows))
+    rows = list(dict.fromkeys(row.row for row in observations.rows))
     if not any(label for label, _ in rows):
         raise InputError(f"{measured}: there is no frequency of the unloaded tyre in it")
     ids = list(catalogue()) if effects is None else list(effects)
@@ -145,7 +139,7 @@ def _under_load(
 ) -> UnderLoad | None:
     """What was measured on a road, against the calibrated tyre and the one with the effect that is
     named or, where there is a gap, likeliest."""
-    readings = [each for run in runs for each in run if each.load_N]
+    readings = [each for run in runs for each in run if each.load_N and not each.rim]
     if not readings:
         return None
     tyres: dict[str, Values] = {}
@@ -247,10 +241,7 @@ def _reaching(span: Span, change: Toggle) -> Span:
 
 def _check_copies(paths: Sequence[Path], runs: Mapping[Path, Sequence[Measurement]]) -> None:
     """Raises InputError where two runs are the same to the last digit."""
-    told = [
-        [(r.quantity, r.label, r.member, r.pressure_kPa, r.load_N, r.value) for r in runs[path]]
-        for path in paths
-    ]
+    told = [[(*r.key, r.value) for r in runs[path]] for path in paths]
     for k, path in enumerate(paths):
         if told[k] in told[:k]:
             first = paths[told.index(told[k])]
@@ -278,7 +269,7 @@ def check_units(
     at = dict(zip(model.rows, answer.eta.tolist(), strict=True))
     values = zip(observations.rows, observations.y, strict=True)
     for row, y in sorted(values, key=lambda each: each[0].label is None):  # frequencies first
-        ratio = exp(y - at[row.label, row.pressure_kPa])
+        ratio = exp(y - at[row.row])
         if row.label and not 1 / MAX_FREQUENCY_RATIO < ratio < MAX_FREQUENCY_RATIO:
             raise InputError(
                 f"{runs[row.run]}: {row} was measured {ratio:.2g} times as high as the model has"

@@ -19,11 +19,12 @@ from ...simulate.modes.label import Label
 from ...tyre.case import LoadedCase, start_values
 from ...tyre.case.schema import TargetMode, Targets
 from ...tyre.effects import catalogue
+from ...tyre.state import TyreState, without
 from ...tyre.templates import TemplateFailed
 from ...tyre.values import with_values
 from ..fit import problem as fit
 from .expansion import ONE_SIDED_SLOPED, node_values
-from .model import Answer, Coupling, ModelRow, Query, Span
+from .model import Answer, Coupling, ModelRow, Query, Span, state_of
 from .regions import MASS_STEP, regions
 from .section_fields import moved
 from .uncertainties import EFFECT_PATH, Source, unit_of, values_of
@@ -41,7 +42,7 @@ QueryKey = tuple[bytes, tuple[tuple[str, float], ...], bool, tuple[str, ...]]  #
 
 
 class TyreModel:
-    """ln f of the modes ``rows`` (label, pressure in kPa), and ln mass where the label is None.
+    """ln f of the modes ``rows`` (label, where), and ln mass where the label is None.
 
     case: its variables are x; found: sources of error; spans: effects that may be asked for;
     jobs: evaluations at a time. Raises DeckRefused where the solver has no exact slopes.
@@ -69,7 +70,10 @@ class TyreModel:
         self.rows, self.found, self.jobs = list(rows), found, jobs
         self.spans: Mapping[str, Span] = spans
         self._present = case.case.effects
-        self.pressures = sorted({p for label, p in rows if label}) or [case.case.pressure_kPa]
+        found_in = {state_of(where) for label, where in rows if label}
+        self.states = sorted(found_in, key=lambda s: (s.pressure_kPa, s.rim or "")) or [
+            TyreState(case.case.pressure_kPa)
+        ]
         labels = sorted({label for label, _ in rows if label}, key=str)
         case = asked_for(case, labels)
         self.case = case
@@ -121,7 +125,7 @@ class TyreModel:
         return {**self.values(point.x), **effects}
 
     def answers(self, points: Sequence[Query]) -> list[Answer | Exception]:
-        """Each point at every pressure, all in one batch, ``jobs`` evaluations at a time.
+        """Each point in every state, all in one batch, ``jobs`` evaluations at a time.
 
         A plain point that the solver refuses raises DeckRefused. With an effect that it gives no
         slopes with, the plain tyre's at the same x stand for them. Slopes by sources that are
@@ -236,19 +240,29 @@ class TyreModel:
     def _evaluated(self, points: Sequence[Query]) -> list[Answer | Exception]:
         """Distinct points, slopes with those that have them."""
         wanted = []
-        for point, pressure in product(points, self.pressures):
+        for point, state in product(points, self.states):
             known = dict(self._plain) if point.constants else {}
             slopes = [EFFECT_PATH + id for id in point.slopes]
             names = () if self._is_bare(point) else (*self.variables, *known, *slopes)
             at_0 = {EFFECT_PATH + id: self._present.get(id, 0.0) for id in point.slopes}
-            design = {**known, "pressure_kPa": pressure, **at_0, **self.design(point)}
-            wanted.append((design, names))
+            wanted.append(self.in_state(state, {**known, **at_0, **self.design(point)}, names))
         found = self._modes(wanted)
-        per, results = len(self.pressures), []
+        per, results = len(self.states), []
         for i, point in enumerate(points):
             here = slice(i * per, (i + 1) * per)
             results.append(self._answer(point, [design for design, _ in wanted[here]], found[here]))
         return results
+
+    def in_state(
+        self, state: TyreState, design: Mapping[str, float], names: Sequence[str] = ()
+    ) -> tuple[dict[str, float], tuple[str, ...]]:
+        """A design in a state, which wins over an effect that holds the rim otherwise, and those
+        of the slopes ``names`` that it has there."""
+        held = replace(state, pressure_kPa=None).numbers(self.case)
+        pressure = state.told(self.case).pressure_kPa or 0.0
+        left = without(self.case, dict.fromkeys(names, 0.0), held)
+        there = {**without(self.case, design, held), "pressure_kPa": pressure, **held}
+        return there, tuple(name for name in left if name not in held)
 
     def _modes(
         self, wanted: Sequence[tuple[dict[str, float], tuple[str, ...]]]
@@ -277,31 +291,33 @@ class TyreModel:
             if not isinstance(each, Found):
                 return each
             found.append(each)
-        at = dict(zip(self.pressures, zip(designs, found, strict=True), strict=True))
+        at = dict(zip(self.states, zip(designs, found, strict=True), strict=True))
         eta, jacobian = np.zeros(len(self.rows)), np.zeros((len(self.rows), len(self.variables)))
         slopes, split = np.zeros((len(self.rows), len(self.found))), np.zeros(len(self.rows))
         by_effect = {id: np.full(len(self.rows), np.nan) for id in point.slopes}  # not the mass
-        for i, (label, pressure) in enumerate(self.rows):
+        for i, (label, where) in enumerate(self.rows):
             if label is None:
                 eta[i] = log(found[0].evaluation.mass_kg)
                 jacobian[i], slopes[i] = self._mass_slopes(point.x)
                 continue
-            design, answer = at[pressure]
-            evaluation, modes = answer.evaluation, answer.wanted
+            design, answer = at[state_of(where)]
+            gradients, modes = answer.evaluation.gradients, answer.wanted
             f, place = modes[label].frequency_Hz, modes[label].position
             eta[i] = log(f)
             if members := modes[label].raw.members:
                 eta[i], split[i] = log(members[0] * members[1]) / 2, log(members[1] / members[0])
             for id, slope in by_effect.items():
-                slope[i] = evaluation.gradients[EFFECT_PATH + id][place] / f
-            for j, name in enumerate(self.variables if evaluation.gradients else ()):
-                jacobian[i, j] = evaluation.gradients[name][place] * self._slope(name, design) / f
+                path = EFFECT_PATH + id  # a state may hold it at 0
+                slope[i] = gradients[path][place] / f if path in gradients else 0.0
+            for j, name in enumerate(self.variables):
+                if name in gradients:
+                    jacobian[i, j] = gradients[name][place] * self._slope(name, design) / f
             if point.constants:
                 for k, source in enumerate(self.found):
                     slopes[i, k] = sum(
-                        step * evaluation.gradients[path][place] / f
+                        step * gradients[path][place] / f
                         for path, step in source.steps.items()
-                        if not path.startswith(EFFECT_PATH)
+                        if path in gradients
                     )
         return Answer(eta, jacobian, split, slopes if point.constants else None, by_effect)
 
@@ -309,7 +325,7 @@ class TyreModel:
         """What turned cords couple modes by that are near each other at x; other constants move
         modes, and couple hardly any. None where there are no such modes."""
         places = {row: i for i, row in enumerate(self.rows)}
-        mates = np.array([places.get((partner(label), p), -1) for label, p in self.rows])
+        mates = np.array([places.get((partner(label), w), -1) for label, w in self.rows])
         near = {
             label
             for i, (label, _) in enumerate(self.rows)
@@ -325,17 +341,17 @@ class TyreModel:
             for source in turned
             for side in (1, -1)
         ]
-        asked = [{**each, "pressure_kPa": p} for each in sides for p in self.pressures]
-        found = iter(self._modes([(design, ()) for design in asked]))
+        asked = [self.in_state(state, each) for each in sides for state in self.states]
+        found = iter(self._modes(asked))
         square, rise = np.zeros(len(self.rows)), np.zeros(len(self.rows))
         for _ in turned:
             ln_f = [eta.copy(), eta.copy()]
-            for side, p in product((0, 1), self.pressures):
+            for side, state in product((0, 1), self.states):
                 answer = next(found)
                 if not isinstance(answer, Found):
                     raise answer
-                for i, (label, here) in enumerate(self.rows):
-                    if label and mates[i] >= 0 and here == p:
+                for i, (label, where) in enumerate(self.rows):
+                    if label and mates[i] >= 0 and state_of(where) == state:
                         ln_f[side][i] = log(answer.wanted[label].frequency_Hz)
             pairs = [np.array([values, values[mates]]) for values in (eta, *ln_f)]
             q, more = coupling(*pairs)
@@ -353,13 +369,14 @@ class TyreModel:
         From neighbours, found once: the mass is m0 + sum of m_j times the value of variable j.
         """
         if self._mass is None:
-            own = {**self._plain, **self.values(x), "pressure_kPa": self.pressures[0]}
+            beside = lambda design: self.in_state(self.states[0], design)[0]
+            own = beside({**self._plain, **self.values(x)})
             designs = [own]
-            designs += [{**own, **self.values(x + d)} for d in MASS_STEP * np.eye(len(x))]
+            designs += [beside({**own, **self.values(x + d)}) for d in MASS_STEP * np.eye(len(x))]
             for source in self.found:
                 steps = {k: s for k, s in source.steps.items() if not k.startswith(EFFECT_PATH)}
                 steps.pop("pressure_kPa", None)
-                designs.append({**own, **{k: own[k] + s for k, s in steps.items()}})
+                designs.append(beside({**own, **{k: own[k] + s for k, s in steps.items()}}))
             masses = []
             for each in self._modes([(design, ()) for design in designs]):
                 if not isinstance(each, Found):

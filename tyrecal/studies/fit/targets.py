@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -119,9 +120,14 @@ def states_of(case: LoadedCase) -> dict[str, Any]:
     loads: dict[str, Any] = {"load_N": case.case.targets.loads_N or 0.0}
     if not states.keys() - {AS_THE_CASE}:
         return loads
-    told = [state.told(case) for state in states]
-    rims = dict.fromkeys(RIM_WORDS.get(each.rim or "", each.rim) for each in told)
-    return {**loads, "pressure_kPa": sorted({each.pressure_kPa for each in told}), "rim": [*rims]}
+    pressures = {state.told(case).pressure_kPa for state in states}
+    return {**loads, "pressure_kPa": sorted(pressures), "rim": rims_of(case, states)}
+
+
+def rims_of(case: LoadedCase, states: Iterable[TyreState]) -> list[str]:
+    """How their rims are held, as `provenance` takes it."""
+    told = (state.told(case).rim or "" for state in states)
+    return list(dict.fromkeys(RIM_WORDS.get(rim, rim) for rim in told))
 
 
 def objective_unit(case: LoadedCase) -> str:

@@ -46,7 +46,7 @@ def drawn(posterior: Posterior, bounds: Array, count: int, seed: int) -> Drawn:
     likely = best[height > height[0] - LIKELY]
     chains = walk(posterior, likely, np.linalg.inv(information + flat), count, seed)
     edges = shares_at_edge(chains.flat, posterior.box, bounds)
-    asked = posterior.emulator.evaluations + posterior.emulator.failed
+    asked = posterior.evaluations
     return Drawn(posterior, best, height, covariance, chains, edges, 1, asked, "")
 
 
@@ -100,9 +100,8 @@ def grown(
                 raise
             stopped = f"a larger box has no emulator: {failure}"
             break
-        emulator = posterior.emulator
-        evaluations = emulator.evaluations + emulator.failed  # those of smaller boxes among them
-        error = emulator.stated_errors[posterior.rows[:, 1]]
+        evaluations = posterior.evaluations  # those of smaller boxes among them
+        error = posterior.stated_errors
         if last and (error > tolerance).any():
             stopped = f"the emulator of a larger box may be {100 * error.max():.2g} % off"
             break

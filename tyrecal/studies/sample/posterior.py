@@ -26,12 +26,13 @@ FIRST_DAMPING, STIFFEST = 1e-3, 1e6  # of a step, in units of the information
 class Posterior:
     """Its logarithm, for many x at a time.
 
-    states: values of the emulator's further coordinates, one row a state (pressures); rows (n, 2):
-    of every measured value the places of its state and its label; y (n,), whitened (n, n): W with
-    W^T W = Sigma^-1; box (v, 2): within it alone the density is known.
+    emulators: one for each way of holding the rim; states (s, 1 + k): which of them, and values of
+    its further coordinates (pressure); rows (n, 2): of every measured value the places of its state
+    and its label; y (n,), whitened (n, n): W with W^T W = Sigma^-1; box (v, 2): within it alone the
+    density is known.
     """
 
-    emulator: Emulator
+    emulators: tuple[Emulator, ...]
     states: Array
     rows: Array
     y: Array
@@ -72,7 +73,18 @@ class Posterior:
     @cached_property
     def _at_states(self) -> list[Emulator]:
         """Of the variables alone, state by state."""
-        return [self.emulator.restricted(state) for state in self.states]
+        return [self.emulators[int(which)].restricted(at) for which, *at in self.states]
+
+    @property
+    def stated_errors(self) -> Array:
+        """Of the measured values (n,), by their emulators."""
+        found = [self._at_states[state].stated_errors[label] for state, label in self.rows]
+        return np.array(found)
+
+    @property
+    def evaluations(self) -> int:
+        """Designs that the emulators asked for."""
+        return sum(each.evaluations + each.failed for each in self.emulators)
 
     @cached_property
     def optima(self) -> tuple[Array, Array]:

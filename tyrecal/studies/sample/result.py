@@ -71,6 +71,7 @@ class PredictedRow(Named):
     """A frequency of the tyre at a pressure; ``frequency_Hz`` is its median."""
 
     pressure_kPa: float
+    rim: str | None = None  # where it is not held as the case has it
     low: float
     high: float
     mean: float
@@ -87,7 +88,7 @@ class Optimum(ResultPart):
 
 
 class EmulatorFacts(ResultPart):
-    """The emulator of the last box; errors are relative."""
+    """The emulators of the last box, one a rim; errors are relative, of the worst."""
 
     evaluations: int
     failed: int
@@ -143,7 +144,8 @@ class SampleResult(Result):
         return self
 
     def csv(self) -> str:
-        keys = ["c", "m", "kind", "pressure_kPa", "frequency_Hz", "low", "high", "mean"]
+        rim = ["rim"] * any(row.rim for row in self.predicted)
+        keys = ["c", "m", "kind", "pressure_kPa", *rim, "frequency_Hz", "low", "high", "mean"]
         keys += ["standard_error", "measured_Hz", "sigma_Hz"]
         return csv_text(keys, (row.model_dump() for row in self.predicted))
 
@@ -161,8 +163,9 @@ class SampleResult(Result):
         hertz = Column("Hz", ".2f")
         heads = [*NAME_COLUMNS, *map(Column, ("measured", "median", "90 % from", "to", "linear ±"))]
         tables = []
-        for pressure in dict.fromkeys(row.pressure_kPa for row in self.predicted):
-            own = [row for row in self.predicted if row.pressure_kPa == pressure]
+        for state in dict.fromkeys((row.pressure_kPa, row.rim) for row in self.predicted):
+            own = [row for row in self.predicted if (row.pressure_kPa, row.rim) == state]
+            pressure, rim = state
             rows = [
                 [
                     *row.named(),
@@ -171,7 +174,8 @@ class SampleResult(Result):
                 ]
                 for row in own
             ]
-            tables.append(Table(heads, rows, f"Hz at {pressure:g} kPa"))
+            held = f", rim {rim}" if rim else ""
+            tables.append(Table(heads, rows, f"Hz at {pressure:g} kPa{held}"))
         return tables
 
     def sentences(self) -> list[str]:
@@ -227,7 +231,7 @@ class SampleResult(Result):
 def result(sample: Sample, seed: int) -> SampleResult:
     """What stands in sample.json."""
     drawn, names = sample.drawn, [v.name for v in sample.variables]
-    chains, made, box = drawn.chains, drawn.posterior.emulator, drawn.posterior.box
+    chains, made, box = drawn.chains, drawn.posterior.emulators, drawn.posterior.box
     flat, thin = chains.flat, chains.thinned
     return SampleResult(
         format=1,
@@ -239,11 +243,11 @@ def result(sample: Sample, seed: int) -> SampleResult:
         },
         predicted=_predicted(sample),
         emulator=EmulatorFacts(
-            evaluations=made.evaluations,
-            failed=made.failed,
-            degree=int(made.degrees.sum(1).max()),
-            median_error=made.median_error,
-            stated_error=made.stated_error,
+            evaluations=sum(each.evaluations for each in made),
+            failed=sum(each.failed for each in made),
+            degree=max(int(each.degrees.sum(1).max()) for each in made),
+            median_error=max(each.median_error for each in made),
+            stated_error=max(each.stated_error for each in made),
             share_of_sigma=sample.rough,
             boxes=drawn.boxes,
             evaluations_of_all=drawn.evaluations,
@@ -327,7 +331,7 @@ def _variable(sample: Sample, j: int) -> SampledVariable:
 
 def _predicted(sample: Sample) -> list[PredictedRow]:
     measured = {
-        (row.label, row.pressure_kPa): (float(np.exp(y)), float(scatter * np.exp(y)))
+        (row.label, row.state): (float(np.exp(y)), float(scatter * np.exp(y)))
         for row, y, scatter in zip(
             sample.observations.rows,
             sample.observations.y,
@@ -339,7 +343,7 @@ def _predicted(sample: Sample) -> list[PredictedRow]:
     low, median, high = np.quantile(hertz, [LOW, 0.5, HIGH], axis=0)
     found = []
     for i, row in enumerate(sample.rows):
-        value, sigma = measured.get((row.label, row.pressure_kPa), (None, None))
+        value, sigma = measured.get((row.label, row.state), (None, None))
         assert row.label
         found.append(
             PredictedRow(
@@ -347,6 +351,7 @@ def _predicted(sample: Sample) -> list[PredictedRow]:
                 m=row.label.m,
                 kind=row.label.kind,
                 pressure_kPa=row.pressure_kPa,
+                **({"rim": row.rim} if row.rim else {}),
                 frequency_Hz=float(median[i]),
                 low=float(low[i]),
                 high=float(high[i]),

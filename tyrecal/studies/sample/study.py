@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from ...errors import InputError
 from ...measured.measurement import Measurement
+from ...simulate.deck.tyre_design import TyreDesign
 from ...simulate.evaluate.evaluator import Evaluator
 from ...tyre.case import LoadedCase
+from ...tyre.case.parts import RimSupport
+from ...tyre.state import SPRINGS, WHEEL_FREE, TyreState
+from ...tyre.values import set_values
 from ..diagnose.covariance import covariance
 from ..diagnose.inverse_problem import Assumed, places
-from ..diagnose.model import Answer, ModelRow, Query
+from ..diagnose.model import Answer, Query
 from ..diagnose.observations import Observable, Observations, observe
 from ..diagnose.plain_fit import plain_fit
 from ..diagnose.study import check_units
@@ -70,8 +74,8 @@ def run(
     """Sample the case's variables under ``readings``; None: under its targets.
 
     at_kPa: pressures to predict at beside those of the case and of the readings, ``()``: a fifth
-    below and above the case's. Raises InputError; EvaluationFailed where the start or the first box
-    cannot be evaluated.
+    below and above the case's; on every rim that the case or a reading has. Raises InputError;
+    EvaluationFailed where the start or the first box cannot be evaluated.
     """
     check(case, evaluator, readings)
     stage(SAMPLE_STAGES[0])
@@ -79,9 +83,7 @@ def run(
     if readings is None:
         readings = targets_as_readings(case, noise)
     observations = observe(modal(readings), split=Assumed().split)
-    known: list[ModelRow] = list(
-        dict.fromkeys((r.label, r.pressure_kPa) for r in observations.rows)
-    )
+    known = list(dict.fromkeys(row.row for row in observations.rows))
     found, _ = sources(case)
     model = TyreModel(case, evaluator, known, found, {}, jobs)
     check_units(model, observations, ["what was measured"])
@@ -93,26 +95,38 @@ def run(
     sigma = covariance(observations, constants)
     spread, white = np.sqrt(np.diag(sigma)), np.linalg.inv(np.linalg.cholesky(sigma))
 
-    pressures = _pressures(case, model.pressures, at_kPa)
+    pressures = _pressures(case, {row.pressure_kPa for row in observations.rows}, at_kPa)
+    rims = list(dict.fromkeys([None, *(row.rim for row in observations.rows)]))
+    tyres = [_held(model, rim) for rim in rims]
     variables = tuple(read_variable(n, v) for n, v in model.case.case.variables.items())
     bounds = np.array([[v.scaled(v.lower), v.scaled(v.upper)] for v in variables])
     ends = DesignVariable(PRESSURE_NAME, case.case.pressure_kPa, min(pressures), max(pressures))
-    states = np.array([[ends.scaled(p)] for p in pressures])[:, : len(pressures) > 1]
-    asked = (*variables, *[ends] * states.shape[1])
+    states = [TyreState(p, 0.0, rim) for rim in rims for p in pressures]
+    others = [ends] * (len(pressures) > 1)  # coordinates beside the variables
+    coordinates = np.array(
+        [[rims.index(s.rim), *(v.scaled(s.pressure_kPa or 0.0) for v in others)] for s in states]
+    )
     labels = sorted({row.label for row in observations.rows if row.label}, key=str)
+    on_rim = [np.array([row.rim == rim for row in observations.rows]) for rim in rims]
+    before: list[Emulator | None] = [None] * len(rims)
 
-    before: Emulator | None = None
+    def made_on(rim: int, box: Array) -> Emulator:
+        whole = np.vstack([box, *([[v.scaled(v.lower), v.scaled(v.upper)]] for v in others)])
+        own = [row.label for row, here in zip(observations.rows, on_rim[rim], strict=True) if here]
+        for each in EACH:
+            asked = (*variables, *others)
+            made = before[rim] = emulator(
+                tyres[rim], asked, whole, labels, each * len(asked), jobs, before[rim]
+            )
+            errors = made.stated_errors[[made.labels.index(label) for label in own if label]]
+            if (errors <= ROUGH * spread[on_rim[rim]]).all():
+                break
+        return made
 
     def ask(box: Array) -> Posterior:
-        nonlocal before
-        whole = np.vstack([box, *[states[[0, -1]].T] * states.shape[1]])
-        for each in EACH:
-            count = each * len(asked)
-            made = before = emulator(model.evaluator, asked, whole, labels, count, jobs, before)
-            at = rows_of(observations.rows, made.labels, pressures)
-            if (made.stated_errors[at[:, 1]] <= ROUGH * spread).all():
-                break
-        return Posterior(made, states, at, observations.y, white, box)
+        made = tuple(made_on(rim, box) for rim in range(len(rims)))
+        at = rows_of(observations.rows, states, [made[rims.index(s.rim)].labels for s in states])
+        return Posterior(made, coordinates, at, observations.y, white, box)
 
     J = white @ answer.jacobian[where]
     drawn = grown(
@@ -126,16 +140,17 @@ def run(
     )
     stage(SAMPLE_STAGES[3])
     posterior, best = drawn.posterior, drawn.optima[0]
+    known_in = [posterior.emulators[rims.index(state.rim)].labels for state in states]
     rows = tuple(
-        Observable("frequency_Hz", label, p)
-        for p in pressures
-        for label in posterior.emulator.labels
+        Observable("frequency_Hz", label, state.pressure_kPa or 0.0, rim=state.rim)
+        for state, own in zip(states, known_in, strict=True)
+        for label in own
     )
-    others: list[ModelRow] = [(row.label, row.pressure_kPa) for row in rows]
-    there = _answer(TyreModel(case, evaluator, others, found, {}, jobs), best)
+    asked_of = [row.row for row in rows]
+    there = _answer(TyreModel(case, evaluator, asked_of, found, {}, jobs), best)
     assert there.constants is not None
     given = conditional(observations.rows, sigma, constants, rows, there.constants)
-    at = rows_of(rows, posterior.emulator.labels, pressures)
+    at = rows_of(rows, states, known_in)
     thin = drawn.chains.thinned
     off = observations.y - posterior.ln_f(thin, posterior.rows)
     J, other = (posterior.slopes(best[None], which)[0] for which in (posterior.rows, at))
@@ -148,7 +163,7 @@ def run(
         rows,
         given.drawn(posterior.ln_f(thin, at), off, seed),
         given.sigma(J, other, drawn.covariance),
-        float((posterior.emulator.stated_errors[posterior.rows[:, 1]] / spread).max()),
+        float((posterior.stated_errors / spread).max()),
         noise,
     )
 
@@ -164,6 +179,13 @@ def check(case: LoadedCase, evaluator: Evaluator, readings: Sequence[Measurement
             "a variable of the case sets pressure_kPa, which the measurements state: take it out"
             " of the variables"
         )
+    rims = {reading.rim for reading in readings or targets_as_readings(case, None)} - {None}
+    for name, variable in case.case.variables.items():
+        if rims and not {*SPRINGS, WHEEL_FREE}.isdisjoint(variable.sets):
+            raise InputError(
+                f"{name} sets what holds the rim, of which the measurements have several: take it"
+                " out of the variables, or what was measured on another rim out of the file"
+            )
     if not (read_targets(case) if readings is None else modal(readings)):
         raise InputError("there is no frequency of the unloaded tyre to sample the variables by")
 
@@ -190,7 +212,7 @@ def noise_of_targets(case: LoadedCase, evaluator: Evaluator) -> float | None:
 
 
 def targets_as_readings(case: LoadedCase, noise_Hz: float | None) -> list[Measurement]:
-    """The case's target modes that have a weight, as they were measured, on its own rim."""
+    """The case's target modes that have a weight, as they were measured."""
     return [
         Measurement(
             "frequency_Hz",
@@ -200,9 +222,10 @@ def targets_as_readings(case: LoadedCase, noise_Hz: float | None) -> list[Measur
             0.0,
             target.frequency_Hz,
             target.sigma_Hz or noise_Hz or 0.0,
+            rim=target.state.rim,
         )
         for target in read_targets(case)
-        if target.weight and not target.state.rim
+        if target.weight
     ]
 
 
@@ -219,10 +242,17 @@ def first_box(
 
 
 def rows_of(
-    rows: Sequence[Observable], labels: Sequence[object], pressures: Sequence[float]
+    rows: Sequence[Observable], states: Sequence[TyreState], labels: Sequence[Sequence[object]]
 ) -> Array:
-    """Places (n, 2) of rows among pressures and an emulator's labels."""
-    return np.array([[pressures.index(r.pressure_kPa), labels.index(r.label)] for r in rows])
+    """Places (n, 2) of rows among states and the labels of the state's emulator."""
+    where = [states.index(row.state) for row in rows]
+    return np.array([[k, labels[k].index(r.label)] for k, r in zip(where, rows, strict=True)])
+
+
+def _held(model: TyreModel, rim: RimSupport | None) -> Evaluator:
+    """The evaluator of the tyre with its rim so; None: as the case has it."""
+    held = TyreState(rim=rim).numbers(model.case)
+    return model.evaluator.of(TyreDesign(set_values(model.case, held))) if held else model.evaluator
 
 
 def _answer(model: TyreModel, x: Array) -> Answer:
@@ -232,7 +262,7 @@ def _answer(model: TyreModel, x: Array) -> Answer:
     return answer
 
 
-def _pressures(case: LoadedCase, measured: Sequence[float], at_kPa: Sequence[float]) -> list[float]:
+def _pressures(case: LoadedCase, measured: Iterable[float], at_kPa: Sequence[float]) -> list[float]:
     """Of the measurements, the case, and those asked for, rising."""
     own = case.case.pressure_kPa
     return sorted({*measured, own, *(at_kPa or [factor * own for factor in OTHER_PRESSURES])})
