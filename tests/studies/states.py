@@ -131,10 +131,14 @@ class Area:
     def monomials(self, t: Array) -> Array:
         return np.asarray(np.prod(t[:, None, :] ** self.powers, axis=2))
 
-    def at(self, values: Mapping[str, float]) -> float:
-        """m2"""
-        t = np.log([values[name] for name in START]) - self.start
-        return float(np.exp(self.monomials(t[None])[0] @ self.coefficients))
+    def at(self, values: Mapping[str, float]) -> tuple[float, Array]:
+        """m2, and slopes by `START`'s variables."""
+        x = [values[name] for name in START]
+        t = np.log(x) - self.start
+        area = float(np.exp(self.monomials(t[None])[0] @ self.coefficients))
+        lower = np.maximum(self.powers - np.eye(len(t), dtype=int)[:, None], 0)  # (v, k, v)
+        rise = np.einsum("kv,vk,k->v", self.powers, np.prod(t**lower, axis=2), self.coefficients)
+        return area, area * rise / x
 
 
 class EmulatedEvaluator:
@@ -193,11 +197,13 @@ def coverage(count: int, seed: int) -> None:
     print(f"area: {area.rms:.2%} off a quadratic", flush=True)
     tyre: Any = EmulatedEvaluator(made)
 
-    def press(case: Any, evaluator: Any, targets: Any, designs: Any, jobs: int) -> Iterator[Array]:
-        for values in designs:
-            yield np.array([area.at(values), 1e-9])
+    def press(
+        case: Any, evaluator: Any, targets: Any, values: Mapping[str, float], names: Sequence[str]
+    ) -> tuple[Array, Array]:
+        found, slopes = area.at(values)
+        return np.array([found]), slopes[None, [list(START).index(name) for name in names]]
 
-    problem_module.press = press
+    problem_module.press_with_slopes = press
     held, alone = np.zeros(len(START), int), np.zeros(len(START), int)
     ratios, unconverged = [], 0
     for i in range(count):
@@ -207,7 +213,7 @@ def coverage(count: int, seed: int) -> None:
         for state, each in made.items():
             exact = np.exp(each.ln_f(truth[None])[0])[[each.labels.index(x) for x in LABELS]]
             noisy[state] = list(exact * (1 + RELATIVE_SIGMA * random.normal(size=len(exact))))
-        measured = area.at(values) * (1 + AREA_SIGMA * random.normal())
+        measured = area.at(values)[0] * (1 + AREA_SIGMA * random.normal())
         errors = []
         for chosen, hits in ((noisy, held), ({AS_THE_CASE: noisy[AS_THE_CASE]}, alone)):
             result = calibrate(case_with(CASE, chosen, measured), tyre).result
