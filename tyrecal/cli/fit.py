@@ -96,7 +96,7 @@ def command(
     from ..simulate.provenance import provenance
     from ..studies.fit.calibrate import calibrate, check, history_csv
     from ..studies.fit.problem import Problem
-    from ..studies.fit.targets import objective_unit, states_of
+    from ..studies.fit.targets import objective_unit, read_targets, states_of
     from ..studies.fitted import NOT_CONVERGED, has_good
 
     terminal = study.terminal
@@ -190,7 +190,7 @@ def command(
     study.finish(run)
     file = shlex.quote(str(measured)) if measured else "FILE"
     next_ = f"tyrecal diagnose {shlex.quote(str(case))} --measured {file}"
-    if not loaded.case.deck:
+    if not loaded.case.deck and read_targets(loaded):
         terminal.say(f"next: {next_} says what the model lacks")
     return 0 if good else EXIT_FIT
 

@@ -42,7 +42,8 @@ def fit_verdict(result: Mapping[str, Any]) -> list[str]:
     """What the content of fit.json amounts to, in sentences; doubts aside, see `fit_doubts`."""
     ended = "Converged" if result["converged"] else "Ended"
     states = result.get("states", ())
-    where = f"in {len(states)} states" if states else f"at {result['pressure_kPa']:g} kPa"
+    count = "one state" if len(states) == 1 else f"{len(states)} states"
+    where = f"in {count}" if states else f"at {result['pressure_kPa']:g} kPa"
     words = [f"{ended} {where}, {result['mass_kg']:.2f} kg."]
     if result["modes"]:
         words.append(f"{nearness(result['modes'])}.")

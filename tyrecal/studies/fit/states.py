@@ -2,7 +2,7 @@
 
 Standard errors are those of the linearised fit (see `uncertainty`): without a state its rows of the
 Jacobian are left out; with another one rows are added, of the same modes as the best measured
-unloaded state has, with the same relative standard deviations, at the fitted design.
+state has, with the same relative standard deviations, at the fitted design.
 """
 
 from __future__ import annotations
@@ -14,10 +14,11 @@ from typing import Any
 import numpy as np
 
 from ...simulate.modes.find import Found
+from ...simulate.modes.label import Label
 from ...tyre.state import RIMS, TyreState
 from ...tyre.usual import USUAL
 from .problem import Point, Problem
-from .targets import Target
+from .targets import Target, ValueTarget
 from .uncertainty import FitUncertainty, fit_covariance, standard_errors
 
 Array = np.ndarray
@@ -73,7 +74,7 @@ def next_states(problem: Problem, point: Point, known: FitUncertainty) -> list[N
     if problem.difference_step is not None or not all(before.values()):
         return []
     like = _best_measured(problem, known)
-    states = _others(problem)
+    states = _others(problem) if like else []
     names = tuple(v.name for v in problem.variables)
     asked = [problem.question(point.values, state, names) for state in states]
     answers = problem.modes_of(asked, [[t.label for t, _ in like]] * len(states))
@@ -103,19 +104,27 @@ def next_states(problem: Problem, point: Point, known: FitUncertainty) -> list[N
 
 
 def _best_measured(problem: Problem, known: FitUncertainty) -> list[tuple[Target, float]]:
-    """Modes of the unloaded state that has most that count, and their relative sigmas."""
-    rows: dict[TyreState, list[tuple[Target, float]]] = {}
-    for target, sigma in zip(problem.targets, known.sigma, strict=False):
+    """Modes of the state that has most that count, and their relative sigmas; of one under a load,
+    each mode once, where no unloaded one was measured."""
+    rows: dict[TyreState, dict[Label, tuple[Target, float]]] = {}
+    for each, sigma in zip(problem.measured, known.sigma, strict=True):
+        if isinstance(each, ValueTarget):
+            if not each.member:
+                continue
+            each = Target(each.member.label, each.value, state=each.state)
         if np.isfinite(sigma):
-            rows.setdefault(target.state, []).append((target, float(sigma) / target.frequency_Hz))
-    return max(rows.values(), key=len, default=[])
+            own = rows.setdefault(each.state, {})
+            own.setdefault(each.label, (each, float(sigma) / each.frequency_Hz))
+    unloaded = [own for state, own in rows.items() if not state.load_N]
+    return [*max(unloaded or rows.values(), key=len, default={}).values()]
 
 
 def _others(problem: Problem) -> list[TyreState]:
     """Unloaded states beside those measured: their pressures, and one below and above, on every rim
     that the case can have."""
-    told = [state.told(problem.case) for state in problem.labels]
-    pressures = sorted(p for p in {state.pressure_kPa for state in told} if p)
+    told = [state.told(problem.case) for state, labels in problem.labels.items() if labels]
+    measured = [t.state.told(problem.case) for t in problem.measured if t not in problem.mass]
+    pressures = sorted(p for p in {state.pressure_kPa for state in measured} if p)
     ends = (pressures[0] / STEP_OUT, pressures[-1] * STEP_OUT)
     pressures += [ROUNDED_kPa * round(p / ROUNDED_kPa) for p in ends]
     wanted = [
