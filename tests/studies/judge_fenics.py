@@ -33,16 +33,22 @@ from .judge_section import LINES, section
 
 EQUILIBRIUM = 1e-8  # of the first residual
 MAX_ITERATIONS = 40
+TRUE_STRESS = "true stress"  # a law of cords
 FEW = 100  # elements: the optimiser takes longer than it saves
 logging.disable(logging.INFO)  # of the compiler
 
 
 def gradient(u: Any, g: Any, r: Any) -> Any:
     """F in (r, theta, z) from u and its derivative by Theta."""
+    return ufl.Identity(3) + moved(u, g, r)
+
+
+def moved(u: Any, g: Any, r: Any) -> Any:
+    """F - 1."""
     du = ufl.grad(u)
     hoop = [(g[0] - u[1]) / r, (g[1] + u[0]) / r, g[2] / r]
     rows = [[du[i, 0], hoop[i], du[i, 1]] for i in range(3)]
-    return ufl.Identity(3) + ufl.as_matrix(rows)
+    return ufl.as_matrix(rows)
 
 
 def rubber(F: Any, c: dict[str, Any], volume: str) -> Any:
@@ -56,7 +62,10 @@ def rubber(F: Any, c: dict[str, Any], volume: str) -> Any:
 
 
 def cord(q: Any, stiffness: Any, law: str) -> Any:
-    """Energy of cords that are carried to q: E A / 2 s or E A / 2 s t times a strain squared."""
+    """Energy of cords that are carried to q: E A / 2 s or E A / 2 s t times a strain squared; of
+    `TRUE_STRESS`, which `tension` has, none."""
+    if law == TRUE_STRESS:
+        return 0 * stiffness
     square = ufl.dot(q, q)
     strain = {
         "logarithmic": ufl.ln(square) / 2,
@@ -64,6 +73,15 @@ def cord(q: Any, stiffness: Any, law: str) -> Any:
         "Green": (square - 1) / 2,  # St Venant and Kirchhoff
     }[law]
     return stiffness * strain**2 / 2
+
+
+def tension(q: Any, stiffness: Any) -> Any:
+    """Pull of cords that are carried to q, as ABAQUS's manual states rebars of surface elements
+    (Theory Guide, 3.7.3): true stress is E times the logarithmic strain, and the rebar's volume
+    stays, so that its area is A over the stretch."""
+    stretch = ufl.sqrt(ufl.dot(q, q))
+    stress_times_area = stiffness * ufl.ln(stretch) / stretch
+    return stress_times_area * q / stretch
 
 
 class Section:
@@ -206,6 +224,9 @@ class Tyre:
         energy = sum(self.energy(u, g) for u, g in there)
         work = ufl.derivative(energy, change, test)
         work += sum(self.gas(u, g, v) for (u, g), v in zip(there, (va, vb), strict=True))
+        if self.p["cord_law"] == TRUE_STRESS:
+            moves = (va, -self.n * vb), (vb, self.n * va)
+            work += sum(self.pull(*at, *by) for at, by in zip(there, moves, strict=True))
         # slack cords do not bear yet: a stiffness that is taken away again
         moved = self.state + change
         return work + self.help * ufl.inner(ufl.grad(moved), ufl.grad(test)) * self.R * self.dx
@@ -219,11 +240,20 @@ class Tyre:
             inside += cord(F * ufl.as_vector(along), stiffness, self.p["cord_law"])
             Green = (F.T * F - ufl.Identity(3)) / 2
             inside += self.filler * stiffness / 2 * ufl.inner(Green, Green)
-        stiffness, angle = s.cords[:2]
-        c, N = ufl.cos(angle), self.N
-        along = ufl.as_vector([-c * N[1], ufl.sin(angle), c * N[0]])
-        lines = cord(F * along, stiffness, self.p["cord_law"])
+        lines = cord(F * self.along, s.cords[0], self.p["cord_law"])
         return inside * self.R * self.dx + self.on_lines(lines)
+
+    @property
+    def along(self) -> Any:
+        """Direction of the cords on a line."""
+        angle, N = self.s.cords[1], self.N
+        c = ufl.cos(angle)
+        return ufl.as_vector([-c * N[1], ufl.sin(angle), c * N[0]])
+
+    def pull(self, u: Any, g: Any, v: Any, dg: Any) -> Any:
+        """Virtual work of the cords' tension."""
+        F, dF = gradient(u, g, self.R), moved(v, dg, self.R)
+        return self.on_lines(ufl.dot(tension(F * self.along, self.s.cords[0]), dF * self.along))
 
     def on_lines(self, per_area: Any) -> Any:
         """Integral over the cord lines of what the element inside each has."""
