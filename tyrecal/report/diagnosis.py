@@ -8,7 +8,7 @@ from typing import Any
 from ..studies.diagnose.covariance import BETWEEN_PRESSURES
 from ..studies.diagnose.diagnosis import Diagnosis
 from ..studies.diagnose.evidence import NONE, OUTSIDE
-from ..studies.diagnose.gap import AS_CASE
+from ..studies.diagnose.gap import OWN_RIM
 from ..studies.diagnose.study import DiagnosedCase
 from ..studies.diagnose.under_load import LoadedRow
 from ..studies.diagnose.verdict import NAMED, NO_GAP, UNDECIDED
@@ -60,7 +60,7 @@ def _counted(d: Diagnosis) -> str:
     modes = len({row.label for row in rows if row.label})
     at = ", ".join(f"{p:g}" for p in pressures)
     runs = 1 + len(d.problem.changes)
-    rims = dict.fromkeys(row.rim or AS_CASE for row in rows if row.label)
+    rims = dict.fromkeys(row.rim or OWN_RIM for row in rows if row.label)
     held = f", rim {' and '.join(rims)}" if len(rims) > 1 else ""
     return f"{modes} modes at {at} kPa{held}" + (f", {runs} runs" if runs > 1 else "")
 

@@ -18,7 +18,7 @@ from .inverse_problem import InverseProblem
 from .observations import Observable
 
 Array = np.ndarray
-AS_CASE = "as the case"  # how the rim is held
+OWN_RIM = "as the case"  # how the rim is held
 FAMILY_NAMES = {"in-plane": "in-plane", "out-of-plane": "lateral"}
 
 
@@ -122,7 +122,7 @@ def _groups(rows: tuple[Observable, ...], r: Array, C: Array) -> list[ResidualGr
         "mass": [None if row.label else "mass" for row in rows],
     }
     if any(row.rim for row in rows):
-        kinds["rim"] = [(row.rim or AS_CASE) if row.label else None for row in rows]
+        kinds["rim"] = [(row.rim or OWN_RIM) if row.label else None for row in rows]
     result = []
     for kind, names in kinds.items():
         for name in sorted({n for n in names if n}, key=_as_number):
