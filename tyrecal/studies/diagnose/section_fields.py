@@ -52,8 +52,8 @@ class SectionField:
 
 
 def known_from(case: LoadedCase) -> SectionOrigin:
-    """What the section is known from; "exact" for a user's deck, which has no stations."""
-    return "exact" if case.deck else case.case.section.known_from or UNSAID
+    """What the section is known from; "exact" for a user's decks, which have no stations."""
+    return "exact" if case.deck or case.decks else case.case.section.known_from or UNSAID
 
 
 def fields(case: LoadedCase) -> dict[str, SectionField]:

@@ -183,7 +183,7 @@ def spans_of(
                 *words,
                 base,
                 law=effect.law,
-                second=effect.beside is not None and not case.deck,
+                second=effect.beside is not None and not (case.deck or case.decks),
             )
     return able, unable
 

@@ -43,7 +43,7 @@ def at_shoulders(case: LoadedCase, value: float) -> LoadedCase:
     points[inner + 1 :, : last + 1] = (
         base + (points[inner + 1 :, : last + 1] - base) * left[:, None]
     )
-    return replace(worn, section=replace(section, points=points))
+    return replace(worn, drawn=replace(section, points=points))
 
 
 EFFECT = Effect(
