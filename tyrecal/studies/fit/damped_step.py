@@ -1,12 +1,12 @@
-"""The step that both methods take: Gauss and Newton's, damped, within linear bounds.
+"""Steps within linear bounds: Gauss and Newton's, damped, and of any positive definite Hessian.
 
     min |r + J d|^2 + mu |d|^2 tr(J^T J) / v   where   G d >= h
 
 of v variables (Nocedal and Wright, Numerical Optimization, sec. 10.3). In coordinates y, d = F
-(J^T J + ...)^(-1/2) y with the objective F = |r|, its matrix is the identity: the step is the
-point of the polyhedron that is nearest to where it would lead without bounds, Lawson and Hanson's
-least distance. This is what SLSQP does first (Kraft, DFVLR-FB 88-28); `scipy.optimize`, whose
-import takes as long as an evaluation, is not needed for it.
+H^(-1/2) y with the objective F = |r| and H = J^T J + ..., its matrix is the identity: the step is
+the point of the polyhedron that is nearest to where it would lead without bounds, Lawson and
+Hanson's least distance, as in SLSQP (Kraft, DFVLR-FB 88-28); `scipy.optimize`, whose import takes
+as long as an evaluation, is not needed for it.
 """
 
 from __future__ import annotations
@@ -21,9 +21,14 @@ def damped_step(J: Array, r: Array, damping: float, G: Array, h: Array) -> Array
     """d (v,) for ``damping`` mu; no step where G d >= h has no solution."""
     H = J.T @ J
     H[np.diag_indices(len(H))] += damping * np.trace(H) / len(H)
-    turn = max(float(np.linalg.norm(r)), 1e-300) * np.linalg.inv(np.linalg.cholesky(H)).T
-    scale = max(float(r @ r), 1e-300)
-    return np.asarray(turn @ nearest(-turn.T @ (J.T @ r) / scale, G @ turn, h))
+    return quadratic_step(H, J.T @ r, max(float(np.linalg.norm(r)), 1e-300), G, h)
+
+
+def quadratic_step(H: Array, g: Array, size: float, G: Array, h: Array) -> Array:
+    """d (v,) of the least g . d + d . H d / 2 where G d >= h; ``size`` F of the residuals. Raises
+    LinAlgError where H is not positive definite."""
+    turn = size * np.linalg.inv(np.linalg.cholesky(H)).T
+    return np.asarray(turn @ nearest(-turn.T @ g / size**2, G @ turn, h))
 
 
 def nearest(to: Array, G: Array, h: Array) -> Array:

@@ -8,14 +8,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...simulate.evaluate.failure import EvaluationFailed
 from .damped_step import damped_step
 from .problem import Point, Problem
-from .slsqp import Descent, is_converged
+from .slsqp import Descent, first_solvable, is_converged
 
 Array = np.ndarray
 MAX_ITERATIONS_LM = 100
-HALVINGS = 5  # of a step towards a design without a solution
 START_DAMPING, MAX_DAMPING = 0.1, 1e8  # mu at first, and where no step is left to try
 
 
@@ -30,22 +28,12 @@ def minimise(problem: Problem, start: Array, tolerance: float) -> Descent:
             return Descent(point, "converged")
         if damping > MAX_DAMPING:
             return Descent(point, "no lower objective along any damped step")
-        trial = _first_solvable(problem, point, _step(problem, point, damping))
+        trial = first_solvable(problem, point, _step(problem, point, damping))
         if trial is not None and trial.objective < point.objective:
             point, damping = trial, damping / 5
         else:
             damping *= 4
     return Descent(point, f"stopped after {MAX_ITERATIONS_LM} steps")
-
-
-def _first_solvable(problem: Problem, point: Point, step: Array) -> Point | None:
-    """The first design with a solution on the way back along ``step``, halved each time."""
-    for halvings in range(HALVINGS):
-        try:
-            return problem.evaluate(point.x + step / 2**halvings)
-        except EvaluationFailed:
-            continue
-    return None
 
 
 def _step(problem: Problem, point: Point, damping: float) -> Array:

@@ -1,9 +1,10 @@
-"""SLSQP on the design variables, restarted in the Gauss-Newton metric of each point it reaches.
+"""Sequential least-squares quadratic programming on the design variables.
 
-Raw variables of sizes 1e-7 and 1e6 stop SLSQP at its start, and its identity first Hessian sends
-it to the bounds. So each restart works in coordinates in which the Hessian of F^2/2 is the identity
-but for the residuals' curvature (`damped_step`; Nocedal and Wright, Numerical Optimization, ch. 10
-and 18), and is SLSQP's first iteration; bounds become linear constraints.
+Each step minimises a model of second order of the residuals, with the curvature that the designs
+seen so far tell (`curvature`), within the bounds, damped as Levenberg and Marquardt's are, by how
+much of the promised decrease comes true (Nocedal and Wright, Numerical Optimization, ch. 10 and
+18). Its first Hessian is Gauss and Newton's: raw variables of sizes 1e-7 and 1e6 would stop a
+quasi-Newton method at its start, and an identity would send it to the bounds.
 """
 
 from __future__ import annotations
@@ -15,15 +16,16 @@ import numpy as np
 
 from ...simulate.evaluate.failure import EvaluationFailed
 from .crossing import MIXED, TELLING, Crossing, crossing, gap, order, pair_clarity
-from .damped_step import damped_step
+from .curvature import curved_step, foreseen, with_secant
 from .problem import Point, Problem
 
 Array = np.ndarray
-RESTARTS = 40
+MOST_DESIGNS = 100
 EXACT = 1e-3  # Hz, an objective below every measurement's resolution
-DAMPING = 0.1  # mu over the mean diagonal of J^T J, at first
-MOST_TRIALS = 11  # of a step, each shortened to the vertex of a parabola, as Kraft's search does
-SMALLEST_PART = 0.1  # in one shortening
+LEAST_GAIN = 1e-9  # of the squared objective, promised by a step: below, none is lower
+DAMPING, LEAST_DAMPING = 0.01, 1e-6  # mu over the mean diagonal of J^T J, at first and at last
+KEPT_WELL, KEPT_BADLY = 0.7, 0.25  # shares of a promised decrease: above mu falls, below it rises
+HALVINGS = 5  # of a step towards a design without a solution
 ROOM = 0.1  # of the gap of the [0, 0] modes, between a bounded step and where labels change places
 CREEPING = 3e-4  # of the objective, less than ROOM costs: a gain that is not worth another step
 ALONG = 0.1  # of the gradient: as much along the crossing counts as none
@@ -80,12 +82,20 @@ def _descend(
     problem: Problem, point: Point, tolerance: float, known: Point | None = None
 ) -> Descent:
     """SLSQP from ``point`` to its end, or back on the side of ``known``, no lower."""
-    damping, message = DAMPING, "restarts used up"
+    damping, message = DAMPING, "designs used up"
+    curvature = np.zeros((*point.jacobian.shape, len(point.x)))
     edge: Crossing | None = None
-    for _ in range(RESTARTS):
+    for _ in range(MOST_DESIGNS):
         if is_converged(problem, point, tolerance):
             return Descent(point, "converged")
-        seen, full_step = _restart(problem, point, damping, edge)
+        step = _step(problem, point, curvature, damping, edge)
+        if promised(point, curvature, step) <= LEAST_GAIN * max(point.objective, EXACT) ** 2:
+            return Descent(point, "no lower objective along the search direction", edge)
+        there = first_solvable(problem, point, step)
+        if there is None:
+            damping *= 4
+            continue
+        seen = [point, there]
         reached = min(seen, key=lambda p: p.objective)
         side = order(problem, reached)
         back = known is not None and side == order(problem, known)
@@ -100,12 +110,13 @@ def _descend(
         creeping = point.objective - reached.objective <= CREEPING * point.objective
         if edge and creeping and _is_bounded(reached, edge):
             return Descent(reached, AT_CROSSING, edge)
-        if reached.objective >= point.objective - 1e-9 * max(point.objective, 1e-3):
-            if damping > 1e3 * DAMPING:
-                return Descent(point, "no lower objective along the search direction", edge)
-            damping *= 10
-            continue
-        damping *= 0.3 if full_step else 2.0
+        change, gain = there.x - point.x, point.objective**2 - there.objective**2
+        wanted = promised(point, curvature, change)
+        if not gain >= KEPT_BADLY * wanted:
+            damping *= 4
+        elif gain > KEPT_WELL * wanted:
+            damping = max(0.1 * damping, LEAST_DAMPING)
+        curvature = with_secant(curvature, change, there.jacobian - point.jacobian)
         point = reached
     return Descent(point, message, edge)
 
@@ -119,11 +130,27 @@ def _is_bounded(point: Point, edge: Crossing) -> bool:
     return near and bool(along <= ALONG * np.linalg.norm(point.gradient))
 
 
-def _restart(
-    problem: Problem, point: Point, damping: float, edge: Crossing | None
-) -> tuple[list[Point], bool]:
-    """One SLSQP iteration on this side of ``edge``; the points seen and whether the first step,
-    taken whole, was the best."""
+def promised(point: Point, curvature: Array, change: Array) -> float:
+    """By how much F^2 falls by the model."""
+    r = foreseen(point.jacobian, point.residuals, curvature, change)
+    return float(point.objective**2 - r @ r)
+
+
+def first_solvable(problem: Problem, point: Point, step: Array) -> Point | None:
+    """The first design with a solution on the way back along ``step``, halved each time."""
+    for halvings in range(HALVINGS):
+        x = point.x + step / 2**halvings
+        try:
+            return problem.evaluate(np.clip(x, problem.lower, problem.upper))
+        except EvaluationFailed:
+            continue
+    return None
+
+
+def _step(
+    problem: Problem, point: Point, curvature: Array, damping: float, edge: Crossing | None
+) -> Array:
+    """The step on this side of ``edge``."""
     n = len(point.x)
     G, h = np.vstack([np.eye(n), -np.eye(n)]), [problem.lower - point.x, point.x - problem.upper]
     if edge:
@@ -131,22 +158,8 @@ def _restart(
         side = np.sign(apart)
         G = np.vstack([G, side * edge.slopes])
         h.append(np.array([ROOM * abs(apart) - side * edge.at(point.x)]))
-    step = damped_step(point.jacobian, point.residuals, damping, G, np.concatenate(h))
-    slope = float((point.jacobian.T @ point.residuals) @ step)  # of F^2/2 along it
-    seen, share, before = [point], 1.0, 0.5 * point.objective**2
-    for _ in range(MOST_TRIALS):
-        try:
-            there = problem.evaluate(np.clip(point.x + share * step, problem.lower, problem.upper))
-        except EvaluationFailed:  # worse than anything
-            rise = np.inf
-        else:
-            seen.append(there)
-            rise = 0.5 * there.objective**2 - before
-        if rise <= 0.1 * share * slope:
-            break
-        share *= max(share * slope / (2 * (share * slope - rise)), SMALLEST_PART)
-    best = min(seen, key=lambda p: p.objective)
-    return seen, len(seen) > 1 and best is seen[1]
+    J, r = point.jacobian, point.residuals
+    return curved_step(J, r, curvature, damping, G, np.concatenate(h))
 
 
 def _beyond_crossing(

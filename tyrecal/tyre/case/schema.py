@@ -339,7 +339,7 @@ class Case(Part):
     @classmethod
     def _is_given(cls, key: str, value: Any) -> bool:
         """Whether a key has a value of its own."""
-        return bool(value) and value != cls.model_fields[key].get_default()
+        return bool(value) and value != cls.model_fields[key].default
 
     def plain(self) -> dict[str, Any]:
         """The case as plain data, defaults and all."""

@@ -1,0 +1,59 @@
+"""The residuals' curvature, from how their slopes change between designs, and the step with it.
+
+    r(x + d) ~ r + J d + d^T C d / 2
+
+C (m, v, v) of m residuals and v variables is 0 at first. Each design that is seen changes it as
+little as it must for C s = J(x + s) - J(x): Powell's symmetric form of Broyden's secant, residual
+by residual (Dennis and Schnabel, Numerical Methods for Unconstrained Optimization, sec. 9.1 and
+10.3). What Gauss and Newton leave out of the Hessian of |r|^2 / 2, sum of r_i C_i, costs a third of
+the designs where a fit starts far off or its residuals do not vanish.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .damped_step import quadratic_step
+
+Array = np.ndarray
+MOST_NEWTON_STEPS = 20  # on the model, which no evaluation is asked for
+LEAST_MOVE = 1e-7  # of a coordinate
+MOST_HALVINGS = 12
+
+
+def with_secant(C: Array, s: Array, change: Array) -> Array:
+    """C after a design at x + s, whose slopes differ by ``change`` (m, v) from those at x."""
+    left, length = change - C @ s, s @ s
+    pushed = left[:, :, None] * s
+    both = pushed + pushed.swapaxes(1, 2)
+    return np.asarray((both - (left @ s)[:, None, None] * np.outer(s, s) / length) / length + C)
+
+
+def foreseen(J: Array, r: Array, C: Array, d: Array) -> Array:
+    """r(x + d) by the model."""
+    return np.asarray(r + J @ d + C @ d @ d / 2)
+
+
+def curved_step(J: Array, r: Array, C: Array, damping: float, G: Array, h: Array) -> Array:
+    """d (v,) of the least |r(x + d)|^2 + mu |d|^2 tr(J^T J) / v where G d >= h; ``damping``: mu.
+
+    By Newton's method on the model, each step halved until the model falls, and Gauss and Newton's
+    where its Hessian is not positive definite."""
+    v = J.shape[1]
+    weight = damping * np.trace(J.T @ J) / v
+    value = lambda d: np.sum(foreseen(J, r, C, d) ** 2) + weight * d @ d
+    d = np.zeros(v)
+    for _ in range(MOST_NEWTON_STEPS):
+        at, slopes = foreseen(J, r, C, d), J + C @ d
+        H, g = slopes.T @ slopes + weight * np.eye(v), slopes.T @ at + weight * d
+        size = max(float(np.linalg.norm(at)), 1e-300)
+        try:
+            whole = quadratic_step(H + np.tensordot(at, C, 1), g, size, G, h - G @ d)
+        except np.linalg.LinAlgError:
+            whole = quadratic_step(H, g, size, G, h - G @ d)
+        parts = (whole / 2**k for k in range(MOST_HALVINGS))
+        move = next((part for part in parts if value(d + part) < value(d)), np.zeros(v))
+        d = d + move
+        if abs(move).max() < LEAST_MOVE:
+            break
+    return d
