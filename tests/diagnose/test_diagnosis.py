@@ -14,7 +14,7 @@ from tyrecal.report.diagnosis import page
 from tyrecal.simulate.modes.label import Label
 from tyrecal.simulate.modes.loaded import Member
 from tyrecal.studies.diagnose.diagnosis import STAGES, Diagnosis, diagnose
-from tyrecal.studies.diagnose.evidence import explain, grid, refit, weigh
+from tyrecal.studies.diagnose.evidence import explain, grid, refit
 from tyrecal.studies.diagnose.expansion import anchored, expand
 from tyrecal.studies.diagnose.inverse_problem import Assumed, Toggle
 from tyrecal.studies.diagnose.model import Answer, Query, Span
@@ -22,6 +22,7 @@ from tyrecal.studies.diagnose.next_measurement import rank
 from tyrecal.studies.diagnose.observations import Observable
 from tyrecal.studies.diagnose.regions import SectionPart
 from tyrecal.studies.diagnose.result import diagnosis_result
+from tyrecal.studies.diagnose.several import weigh
 from tyrecal.studies.diagnose.shrinkage import _placebo, held_out, shrink
 from tyrecal.studies.diagnose.study import DiagnosedCase
 from tyrecal.studies.diagnose.under_load import LoadedRow, UnderLoad
@@ -171,7 +172,7 @@ def test_an_anchor_is_exact_where_it_was_asked_and_absent_without_the_effect() -
     bare = expand(toy, np.zeros(3))
     x = np.array([0.4, -0.3, 0.2])
     toy.bend = toy.bend * 1.5  # the model at hand departs from what was expanded
-    found = anchored(bare, toy, {"e0": (0.6, x)})
+    found = anchored(bare, toy, [Query(x, {"e0": 0.6})])
     (answer,) = toy.answers([Query(x, {"e0": 0.6})])
     assert isinstance(answer, Answer)
     eta, J = found.plain(x)
@@ -185,6 +186,31 @@ def test_an_anchor_is_exact_where_it_was_asked_and_absent_without_the_effect() -
     far, _, _ = found.nodes["e0"].at(np.array([1.0]))
     near, _, _ = bare.nodes["e0"].at(np.array([1.0]))
     assert abs(far - near).max() <= abs(found.nodes["e0"].anchor.shift).max() * 3  # type: ignore[union-attr]
+
+
+def test_what_two_effects_do_together_is_asked() -> None:
+    """Exact where they were asked, what each is alone where the other is absent; and of effects
+    whose product shifts modes too, exact at all sizes up to there."""
+
+    class Product(Toy):
+        def _answer(self, point: Query) -> Answer:
+            found = super()._answer(point)
+            both = point.effects.get("e0", 0.0) * point.effects.get("e1", 0.0)
+            return replace(found, eta=found.eta + 0.02 * both)
+
+    toy, d = Product(effects=3, bend=0.0), np.array([0.2, -0.1, 0.1])
+    bare = expand(toy, np.zeros(3))
+    met = anchored(bare, toy, [Query(d, {"e0": 0.8, "e1": 0.5})])
+    asked = replace(problem(toy), expansion=met)
+    for e in ((0.8, 0.5), (0.4, 0.25), (0.8, 0.0), (0.0, 0.5)):
+        effects = dict(zip(("e0", "e1"), e, strict=True))
+        (answer,) = toy.answers([Query(d, effects)])
+        assert isinstance(answer, Answer)
+        at = {id: np.array([size]) for id, size in effects.items()}
+        assert asked.predicted(at, d[None])[0] == pytest.approx(answer.eta, abs=1e-9)
+    without = asked.added({"e0": np.array([0.8]), "e2": np.array([0.3])}, 1)[0]
+    plain = replace(asked, expansion=bare).added({"e0": np.array([0.8]), "e2": np.array([0.3])}, 1)
+    assert without == pytest.approx(plain[0])
 
 
 def test_narrow_peaks_are_integrated() -> None:

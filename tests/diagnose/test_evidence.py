@@ -11,20 +11,13 @@ from numpy.polynomial.hermite import hermgauss
 from scipy.stats import chi2, multivariate_normal, ncx2
 
 from tyrecal.studies.diagnose.covariance import covariance
-from tyrecal.studies.diagnose.evidence import (
-    NONE,
-    PRIOR_NONE,
-    Hypothesis,
-    explain,
-    probabilities,
-    refit,
-    weigh,
-)
+from tyrecal.studies.diagnose.evidence import NONE, Hypothesis, explain, refit
 from tyrecal.studies.diagnose.gap import find_gap, projection
 from tyrecal.studies.diagnose.inverse_problem import Assumed, Toggle
 from tyrecal.studies.diagnose.label_swap import exchanged, with_exchanged
 from tyrecal.studies.diagnose.model import Answer, Query, Span
 from tyrecal.studies.diagnose.separability import separate
+from tyrecal.studies.diagnose.several import PRIOR_NONE, probabilities, weigh
 from tyrecal.studies.diagnose.verdict import decide
 
 from ..chance import Chance, generator

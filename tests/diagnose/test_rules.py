@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from math import comb
 from types import SimpleNamespace
 from typing import Any
 
@@ -23,7 +24,6 @@ from tyrecal.studies.diagnose.evidence import (
     ln_splits,
     outside,
     refit,
-    weigh,
 )
 from tyrecal.studies.diagnose.expansion import (
     Expansion,
@@ -44,6 +44,7 @@ from tyrecal.studies.diagnose.observations import Observable, Observations
 from tyrecal.studies.diagnose.plain_fit import plain_fit
 from tyrecal.studies.diagnose.regions import SectionPart
 from tyrecal.studies.diagnose.separability import separate
+from tyrecal.studies.diagnose.several import priors, weigh
 from tyrecal.studies.diagnose.study import _reaching
 from tyrecal.studies.diagnose.verdict import decide
 from tyrecal.studies.diagnose.where import section_map
@@ -83,8 +84,8 @@ def test_named_is_what_is_sure_and_fits_and_nothing_rules_out() -> None:
     assert judged(0.9, 0.04, p_value=0.011).kind == "named"
     assert judged(0.9, 0.04, p_value=0.009).kind == "outside"
     assert judged(0.69, 0.04, p_value=0.009).kind == "undecided"
-    for parameters in (1, 2):  # freedom: rows less variables less parameters, one at least
-        for rows in (4, 20):
+    for parameters in (1, 2):  # freedom: rows less variables less parameters
+        for rows in (7, 20):
             verdict = judged(0.9, 0.0, p_value=0.3, rows=rows, parameters=parameters)
             assert verdict.check == pytest.approx(0.3)
 
@@ -116,7 +117,9 @@ def test_candidates_hold_nine_tenths() -> None:
 
 def test_no_more_data_than_variables_tell_nothing() -> None:
     assert "no more data" in judged(0.9, 0.0, rows=3).words
-    assert judged(0.9, 0.0, rows=4).kind == "named"
+    for parameters in (1, 2):  # one degree of freedom is left, or two
+        one, two = (judged(0.9, 0.0, rows=n + parameters, parameters=parameters) for n in (4, 5))
+        assert (one.kind, two.kind) == ("undecided", "named") and "so few data" in one.words
     empty = decide([], {"none": 0.9, "outside": 0.1}, 20, 3)
     assert empty.kind == "no_gap" and empty.check == 1.0
 
@@ -298,15 +301,22 @@ def test_peaks_of_a_pair_are_integrated() -> None:
 
 
 def test_prior_probabilities_are_one_together() -> None:
-    """A quarter for none, a tenth for what is outside, 3 % for all pairs, tried or not."""
+    """A quarter for none, a tenth for what is outside; of the rest each further effect has a tenth
+    of what one less has, over all sets, tried or not."""
     toy = Toy(effects=6, pressures=(240.0,))
     base = problem(toy)
     found = {h.key: h for h in weigh(base.measured(drawn(toy, base, generator(1), {}, 0.3)))}
     assert found["none"].prior == 0.25 and found["outside"].prior == 0.1
     singles = [h for key, h in found.items() if key in toy.spans]
     pairs = [h for key, h in found.items() if "+" in key]
-    assert sum(h.prior for h in singles) == pytest.approx(0.62)
-    assert [h.prior for h in pairs] == pytest.approx([0.03 / 15] * 14)
+    assert sum(h.prior for h in singles) == pytest.approx(0.65 / 1.11)
+    pairs = [h for h in pairs if h.key.count("+") == 1]
+    assert [h.prior for h in pairs] == pytest.approx([0.065 / 1.11 / 15] * 14)
+    for further in (0.1, 0.5):
+        prior = priors(25, further)
+        shares = {k: each * comb(25, k) for k, each in prior.items()}
+        assert sum(shares.values()) == pytest.approx(0.65)
+        assert [shares[k] / shares[k - 1] for k in (2, 3)] == pytest.approx([further] * 2)
     best = sorted(singles, key=lambda h: -h.ln_evidence)[:4]
     left = {h.key for h in singles} - {h.key for h in best}  # of these two no pair is tried
     assert "+".join(sorted(left)) not in found

@@ -20,7 +20,6 @@ from tyrecal.simulate.evaluate.failure import DeckRefused
 from tyrecal.simulate.modes.label import Label
 from tyrecal.studies.diagnose.add import add
 from tyrecal.studies.diagnose.diagnosis import diagnose
-from tyrecal.studies.diagnose.evidence import probabilities, weigh
 from tyrecal.studies.diagnose.expansion import expand
 from tyrecal.studies.diagnose.gap import find_gap, projection
 from tyrecal.studies.diagnose.inverse_problem import Assumed, InverseProblem, Toggle, places
@@ -29,6 +28,7 @@ from tyrecal.studies.diagnose.observations import Observable, Observations, obse
 from tyrecal.studies.diagnose.regions import regions
 from tyrecal.studies.diagnose.result import diagnosis_result
 from tyrecal.studies.diagnose.separability import separate
+from tyrecal.studies.diagnose.several import probabilities, weigh
 from tyrecal.studies.diagnose.study import check_units, parse_change, spans_of, study
 from tyrecal.studies.diagnose.tyre_model import TyreModel, _key
 from tyrecal.studies.diagnose.uncertainties import DENSITY_PERCENT, PRESSURE_kPa, sources, values_of

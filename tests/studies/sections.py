@@ -26,7 +26,6 @@ import numpy as np
 
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator
-from tyrecal.studies.diagnose.evidence import probabilities, weigh
 from tyrecal.studies.diagnose.expansion import expand
 from tyrecal.studies.diagnose.gap import projection
 from tyrecal.studies.diagnose.inverse_problem import InverseProblem, places
@@ -35,6 +34,7 @@ from tyrecal.studies.diagnose.observations import Observable, Observations
 from tyrecal.studies.diagnose.regions import regions
 from tyrecal.studies.diagnose.section_fields import SECTION_SIZES, UNSAID, arc_length
 from tyrecal.studies.diagnose.separability import separate
+from tyrecal.studies.diagnose.several import probabilities, weigh
 from tyrecal.studies.diagnose.study import spans_of
 from tyrecal.studies.diagnose.tyre_model import TyreModel
 from tyrecal.studies.diagnose.uncertainties import sources

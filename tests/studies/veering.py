@@ -25,11 +25,11 @@ from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator
 from tyrecal.simulate.modes.find import Found
 from tyrecal.simulate.modes.label import Label
-from tyrecal.studies.diagnose.evidence import probabilities, weigh
 from tyrecal.studies.diagnose.expansion import expand
 from tyrecal.studies.diagnose.inverse_problem import InverseProblem, places
 from tyrecal.studies.diagnose.model import ModelRow, Query
 from tyrecal.studies.diagnose.observations import Observable, Observations
+from tyrecal.studies.diagnose.several import probabilities, weigh
 from tyrecal.studies.diagnose.study import spans_of
 from tyrecal.studies.diagnose.tyre_model import TyreModel
 from tyrecal.studies.diagnose.uncertainties import sources

@@ -59,6 +59,14 @@ file = click.Path(path_type=Path, exists=True, dir_okay=False)
     help="Split of pairs that every such tyre has.",
 )
 @click.option(
+    "--further",
+    type=click.FloatRange(0, 1),
+    default=0.1,
+    show_default=True,
+    metavar="SHARE",
+    help="Prior of two effects over that of one, and of three over that of two.",
+)
+@click.option(
     "--add",
     metavar="EFFECT=VALUE",
     shell_complete=complete.effect_values,
@@ -76,6 +84,7 @@ def command(
     without: tuple[str, ...],
     form_percent: float | None,
     split_percent: float,
+    further: float,
     add: str | None,
     pictures: bool,
     study: options.Study,
@@ -141,7 +150,7 @@ def command(
         rim=rims_of(loaded, states) if any(each.rim for each in states) else (),
     )
     form = None if form_percent is None else form_percent / 100
-    assumed = Assumed(form, split_percent / 100)
+    assumed = Assumed(form, split_percent / 100, further=further)
     with terminal.progress("diagnose", STAGES) as bar:
         evaluator.on_progress = bar.at
         found = diagnosed(

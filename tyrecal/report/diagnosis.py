@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from ..studies.diagnose.constants_told import constants_told
 from ..studies.diagnose.covariance import BETWEEN_PRESSURES
 from ..studies.diagnose.diagnosis import Diagnosis
-from ..studies.diagnose.evidence import NONE, OUTSIDE
+from ..studies.diagnose.evidence import COVERAGE, NONE, OUTSIDE, PRIOR_OUTSIDE
 from ..studies.diagnose.gap import OWN_RIM
+from ..studies.diagnose.several import PRIOR_NONE, present
 from ..studies.diagnose.study import DiagnosedCase
 from ..studies.diagnose.under_load import LoadedRow
 from ..studies.diagnose.verdict import NAMED, NO_GAP, UNDECIDED
@@ -28,9 +30,9 @@ def page(study: DiagnosedCase, case: str, measured: str) -> str:
     """The page as Markdown."""
     d = study.diagnosis
     parts = [
-        f"# The model of {case} against its measurements"
-        if d.verdict.kind == NO_GAP
-        else f"# What the model of {case} lacks",
+        f"# What the model of {case} lacks"
+        if d.verdict.kind == NAMED
+        else f"# The model of {case} against its measurements",
         f"Measurements: {measured}, {_counted(d)}.",
         f"## {_headline(study)}",
         *_answer(study),
@@ -76,7 +78,8 @@ def _title(study: DiagnosedCase, key: str) -> str:
 def _headline(study: DiagnosedCase) -> str:
     v = study.diagnosis.verdict
     if v.kind == NAMED and v.key:
-        return f"Named: {_title(study, v.key)}"
+        others = " or ".join(_title(study, each.id) for each in v.also)
+        return f"Named: {_title(study, v.key)}" + (f", and perhaps {others}" if others else "")
     if v.kind == UNDECIDED:
         return "Undecided"
     return "No gap is seen" if v.kind == NO_GAP else "Outside the catalogue"
@@ -97,11 +100,16 @@ def _answer(study: DiagnosedCase) -> Iterator[str]:
     if v.kind == NAMED and v.key:
         ids = v.key.split("+")
         sizes = "; ".join(_sized(d, v.key, id) for id in ids)
-        explain = "explain" if len(ids) > 1 else "explains"
+        are = "are" if len(ids) > 1 else "is"
         yield (
-            f"{_title(study, v.key)} (`{v.key}`) {explain} the gap with probability"
-            f" {p[v.key]:.2f}; {sizes}."
+            f"{_title(study, v.key)} (`{v.key}`) {are} part of the explanation with probability"
+            f" {present(p, ids):.2f}, alone with {p[v.key]:.2f}; {sizes}."
         )
+        for each in v.also:
+            yield (
+                f"Perhaps there too: {_title(study, each.id)} (`{each.id}`), probability"
+                f" {each.probability:.2f}."
+            )
     elif v.kind == NO_GAP:
         yield (
             "What calibration leaves is no more than repeatability, the model's own form and the"
@@ -114,6 +122,8 @@ def _answer(study: DiagnosedCase) -> Iterator[str]:
         more = len(v.candidates) - SHOWN
         tail = f" and {more} more" if more > 0 else ""
         yield f"90 % of the probability lies with {names}{tail}."
+    yield _robust(d)
+    yield from _constants(d)
     if v.kind == NAMED:
         yield f"Rung {d.rung} of 4 on the ladder of proof: {RUNGS[d.rung]}."
         if d.rung < 4 and v.key:
@@ -124,6 +134,34 @@ def _answer(study: DiagnosedCase) -> Iterator[str]:
             )
 
 
+def _robust(d: Diagnosis) -> str:
+    """What the verdict hangs on."""
+    found, key = d.robustness, d.verdict.key or d.verdict.best
+    words = {NO_GAP: "no effect", OUTSIDE: "something outside"}
+    of = words.get(d.verdict.kind, f"`{key}`")
+    between = f"the probability of {of} lies between {found.low:.2f} and {found.high:.2f}"
+    if found.robust:
+        return (
+            f"Robust: with every prior and every constant's standard deviation half and twice as"
+            f" large, without the model's own error of form, and with each mode left out, the"
+            f" verdict is the same; {between}."
+        )
+    more = len(found.hangs_on) - SHOWN
+    tail = f"; and {more} more" if more > 0 else ""
+    return f"The verdict hangs on {'; '.join(found.hangs_on[:SHOWN])}{tail}. In all, {between}."
+
+
+def _constants(d: Diagnosis) -> Iterator[str]:
+    """Constants that the data move, told and not named."""
+    moved = [each for each in constants_told(d) if abs(each.shift_in_sd) >= 1]
+    if moved:
+        names = ", ".join(f"{e.name.replace('_', ' ')} {e.shift_in_sd:+.1f}" for e in moved[:SHOWN])
+        yield (
+            "No causes, but where the data move what is uncertain anyway by one of its standard"
+            f" deviations or more: {names}."
+        )
+
+
 def _sized(d: Diagnosis, key: str, id: str) -> str:
     """The size of the effect ``id`` of ``key`` amid a sentence."""
     q, base = d.parameter(key, id), d.problem.spans[id].base
@@ -132,7 +170,10 @@ def _sized(d: Diagnosis, key: str, id: str) -> str:
     held = f", counting the {has} that the case has already" if base else ""
     unit, factor = said(q["unit"])
     value, low, high = (f"{factor * q[key]:.3g}" for key in ("value", "low", "high"))
-    return f"{whose} is {f'{value} {unit}'.rstrip()}, 90 % between {low} and {high}{held}"
+    sd = d.problem.spans[id].stated
+    times = abs(q["value"] - base) / sd if sd else 0.0
+    beyond = f", {times:.1f} times the standard deviation that the case states" if sd else ""
+    return f"{whose} is {f'{value} {unit}'.rstrip()}, 90 % between {low} and {high}{beyond}{held}"
 
 
 def _gap(d: Diagnosis) -> Iterator[str]:
@@ -365,6 +406,17 @@ def _assumptions(study: DiagnosedCase) -> Iterator[str]:
         f" effect's law may be off by {law} % of its shift, effect by effect; integrated over what"
         f" else there is to it: {second}; every tyre splits its pairs by {100 * a.split:g} %."
     )
+    yield (
+        f"Before the data: no effect {PRIOR_NONE:g}, something outside the catalogue"
+        f" {PRIOR_OUTSIDE:g}; of the rest two effects have {a.further:g} of the probability of one,"
+        " three that of two."
+    )
+    stated = [f"`{id}`" for id, span in d.problem.spans.items() if span.stated]
+    if stated:
+        yield (
+            f"The case states {', '.join(stated)} as uncertain: within {COVERAGE:g} standard"
+            " deviations they are constants like the others, beyond they are effects."
+        )
     for id, why in d.problem.expansion.failed.items():
         yield f"`{id}` could not be evaluated: {why}."
     for why in dict.fromkeys(study.inexpressible.values()):

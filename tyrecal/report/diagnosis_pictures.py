@@ -22,6 +22,12 @@ Array = np.ndarray
 SHOWN_FAMILIES = ("[0,0]", "in-plane", "lateral")
 MAX_SHOWN = 12  # explanations
 MIN_SHOWN_PROBABILITY = 0.005  # of one that is shown
+PROBABILITY_TITLES = {
+    "named": "What explains the gap",
+    "undecided": "Undecided: how likely each explanation is",
+    "no_gap": "No gap is seen: how likely each effect is",
+    "outside": "Outside the catalogue: how likely each explanation is",
+}
 MAX_LETTERS = 24  # letters of a bar's name in a line
 
 
@@ -118,12 +124,11 @@ def draw_probabilities(d: Diagnosis) -> Figure:
     for y, value, h in zip(place, p, order, strict=True):
         axes.text(max(value, h.prior) + 0.01, y, f"{value:.2f}", va="center", fontsize=8)
     axes.axvline(0.7, color=GREY, lw=0.8, ls=":")
-    axes.text(0.71, -0.45, "named from here on", fontsize=8, color="0.3")
+    axes.text(0.71, -0.45, "named from here on,\nalone or summed", fontsize=8, color="0.3")
     axes.set_yticks(place, [fill(_short(d, h.key), 2 * MAX_LETTERS) for h in order])
     axes.set_xlim(0, max(1.0, 1.1 * max(p)))
     axes.set_xlabel("probability")
-    words = "What explains the gap" if d.leading else "No gap is seen: how likely each effect is"
-    axes.set_title(words, loc="left")
+    axes.set_title(PROBABILITY_TITLES[d.verdict.kind], loc="left")
     axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), frameon=False, borderaxespad=0.2)
     return figure
 

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from ...studies.diagnose.result import DiagnosisResult
+from ...studies.diagnose.several import present
 from ...studies.effects import EffectResult, Effects
 from ...studies.fit.result import FitResult
 from ...studies.modes import ModesResult
@@ -66,7 +67,14 @@ def diagnosis_words(found: DiagnosisResult) -> list[str]:
     gap = found.verdict != "no_gap"
     words = [sentence(VERDICT_WORDS[found.verdict] + (f": {found.words}" if gap else ""))]
     if found.effect:
-        words[0] += f" Probability {found.probabilities.get(found.effect, 0.0):.2f}."
+        words[0] += f" Probability {present(found.probabilities, found.effect.split('+')):.2f}."
+    if found.robust:
+        least, most = found.robust.range
+        words.append(
+            f"Robust: {least:.2f} to {most:.2f} with other priors and standard deviations."
+            if found.robust.robust
+            else sentence(f"It hangs on {found.robust.hangs_on[0]}")
+        )
     if found.effect and found.parameter:
         p = found.parameter
         unit, factor = said(p.unit)

@@ -4,29 +4,33 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 from typing import Any
 
 import numpy as np
 
 from ...simulate.modes.label import Label
-from .evidence import NONE, Hypothesis, probabilities, weigh
+from .evidence import NONE, Hypothesis, quantile
 from .expansion import Expansion, anchored, expand
 from .gap import Gap, find_gap, projection
 from .inverse_problem import Assumed, InverseProblem, Toggle, places
 from .label_swap import exchanged, with_exchanged
-from .model import ModelRow, ResponseModel
+from .model import ModelRow, Query, ResponseModel
 from .next_measurement import Choice, rank
 from .observations import Observations
 from .plain_fit import plain_fit
 from .regions import SectionPart
+from .robustness import Robustness, robustness
 from .separability import Separability, separate
+from .several import probabilities, weigh
 from .shrinkage import Shrinkage, shrink
-from .verdict import NAMED, NO_GAP, Verdict, decide
+from .verdict import NAMED, NO_GAP, Verdict, decide, holds
 from .where import PartChange, section_map
 
 Array = np.ndarray
 IN_PLAY_WITHIN = 8.0  # ln evidence behind the best, up to which an effect is asked again
 MAX_IN_PLAY = 6
+MAX_JOINT, CARRIES_WEIGHT = 3, 0.02  # sets of effects that are asked together; probability of one
 MAX_ROUNDS = 2
 STAGES = (
     "calibrate and ask each effect",
@@ -57,6 +61,7 @@ class Diagnosis:
     shrinkage: Shrinkage | None
     rung: int  # of the ladder of proof, 1 to 4
     choices: tuple[Choice, ...]
+    robustness: Robustness  # of the verdict
     exchanged: tuple[Label, Label] | None = None  # labels that were put right before all else
 
     def hypothesis(self, key: str) -> Hypothesis:
@@ -65,24 +70,31 @@ class Diagnosis:
 
     @property
     def best(self) -> str | None:
-        """The likeliest effect or pair, named or not; None where the catalogue is empty."""
+        """The likeliest effects, named or not; None where the catalogue is empty."""
         keys = [h.key for h in self.hypotheses if h.values]
         return max(keys, key=lambda key: self.probabilities[key], default=None)
 
     @property
     def leading(self) -> str | None:
-        """The effect or pair that is named or, where there may be a gap, likeliest; else None."""
-        return self.verdict.key or (self.best if self.verdict.kind != NO_GAP else None)
+        """The likeliest explanation that has all that is named or, where there may be a gap, of
+        all; else None."""
+        return self.verdict.best if self.verdict.kind != NO_GAP else None
 
     def parameter(self, key: str, id: str = "") -> dict[str, Any]:
         """Mean and 90 % interval of the effect ``id`` of ``key``, the first by default, with its
-        unit; what the case has of it is counted in."""
-        hypothesis, id = self.hypothesis(key), id or key.split("+")[0]
+        unit, whatever else there is; what the case has of it is counted in."""
+        id = id or key.split("+")[0]
         span = self.problem.spans[id]
+        with_it = [h for h in self.hypotheses if h.values and holds(h.key, key)]
+        e = np.concatenate([h.values[id] for h in with_it])
+        ln = np.array([h.ln_evidence + np.log(h.prior) for h in with_it])
+        weights = np.exp(ln - ln.max())
+        p = np.concatenate([w * h.posterior for w, h in zip(weights, with_it, strict=True)])
+        p = p / p.sum()
         return {
-            "value": span.base + hypothesis.mean()[id],
-            "low": span.base + hypothesis.quantile(id, 0.05),
-            "high": span.base + hypothesis.quantile(id, 0.95),
+            "value": span.base + float(p @ e),
+            "low": span.base + quantile(e, p, 0.05),
+            "high": span.base + quantile(e, p, 0.95),
             "unit": span.unit,
         }
 
@@ -137,7 +149,8 @@ def diagnose(
     stage(STAGES[2])
     regions = list(parts(problem.expansion.x0 + d)) if parts else []
     found, effective_rank = section_map(bare, P, gap.residuals, regions)
-    shrinkage = shrink(problem, verdict.key, seed) if problem.expansion.nodes else None
+    named = verdict.best if verdict.key else None
+    shrinkage = shrink(problem, named, seed) if problem.expansion.nodes else None
     stage(STAGES[3])
     choices = rank(bare, d, p, means, model.sources, further)
     return Diagnosis(
@@ -155,6 +168,7 @@ def diagnose(
         shrinkage,
         _rung(verdict, shrinkage, problem),
         tuple(choices),
+        robustness(problem, hypotheses, verdict, tuple(model.sources)),
         labels,
     )
 
@@ -163,26 +177,47 @@ def _asked_again(
     problem: InverseProblem, model: ResponseModel, hypotheses: Sequence[Hypothesis]
 ) -> tuple[InverseProblem, bool]:
     """The problem with the model asked where the effects in play have their re-fits, each at its
-    likeliest size, and whether anything was left to ask."""
-    singles = [h for h in hypotheses if h.key in problem.expansion.nodes]
+    likeliest size, and those of likely sets two by two; whether anything was left to ask."""
+    expansion = problem.expansion
+    singles = [h for h in hypotheses if h.key in expansion.nodes]
     best = max(h.ln_evidence for h in hypotheses)
     play = [h for h in singles if h.ln_evidence > best - IN_PLAY_WITHIN]
     play = sorted(play, key=lambda h: -h.ln_evidence)[:MAX_IN_PLAY]
-    wanted: dict[str, tuple[float, Array]] = {}
+    p = probabilities(hypotheses)
+    sets = [h for h in hypotheses if len(h.values) > 1 and p[h.key] > CARRIES_WEIGHT]
+    play += sorted(sets, key=lambda h: -p[h.key])[:MAX_JOINT]
+    wanted: dict[tuple[str, ...], Query] = {}
     for h in play:
-        nodes, d = problem.expansion.nodes[h.key], h.fitted.d[h.best]
-        e, width = float(h.values[h.key][h.best]), nodes.reach[1] - nodes.reach[0]
-        asked = [(float(each), np.zeros_like(d)) for each in nodes.values]  # 0 among them
-        asked += [(nodes.anchor.e, nodes.anchor.d)] if nodes.anchor else []
-        near = KNOWN_WITHIN * width
-        if not any(
-            abs(e - size) < near and (size == 0 or abs(d - at).max() < KNOWN_WITHIN)
-            for size, at in asked
-        ):
-            wanted[h.key] = e, problem.expansion.x0 + d
+        d = h.fitted.d[h.best]
+        size = {id: float(e[h.best]) for id, e in h.values.items()}
+        for ids in combinations(size, min(len(size), 2)):
+            here = {id: size[id] for id in ids}
+            if ids not in wanted and not _known(expansion, here, d):
+                wanted[ids] = Query(expansion.x0 + d, here)
     if not wanted:
         return problem, False
-    return replace(problem, expansion=anchored(problem.expansion, model, wanted)), True
+    return replace(problem, expansion=anchored(expansion, model, list(wanted.values()))), True
+
+
+def _known(expansion: Expansion, size: Mapping[str, float], d: Array) -> bool:
+    """Whether these effects were asked as near as `KNOWN_WITHIN`; one of 0 is none."""
+    near = {}
+    for id in size:
+        low, high = expansion.nodes[id].reach
+        near[id] = KNOWN_WITHIN * (high - low)
+    if len(size) > 1:
+        joint = expansion.joint.get(tuple(size))
+        small = any(abs(e) < near[id] for id, e in size.items())
+        there = zip(size.items(), joint.e, strict=True) if joint else ()
+        same = joint and abs(d - joint.d).max() < KNOWN_WITHIN
+        return small or bool(same and all(abs(e - at) < near[id] for (id, e), at in there))
+    ((id, e),) = size.items()
+    nodes = expansion.nodes[id]
+    asked = [(float(each), np.zeros_like(d)) for each in nodes.values]  # 0 among them
+    asked += [(nodes.anchor.e, nodes.anchor.d)] if nodes.anchor else []
+    return any(
+        abs(e - at) < near[id] and (at == 0 or abs(d - x).max() < KNOWN_WITHIN) for at, x in asked
+    )
 
 
 def _rung(verdict: Verdict, shrinkage: Shrinkage | None, problem: InverseProblem) -> int:
@@ -191,7 +226,8 @@ def _rung(verdict: Verdict, shrinkage: Shrinkage | None, problem: InverseProblem
 
     3, agreement with an independent measurement of the parameter, is the engineer's to state.
     """
-    if verdict.kind == NAMED and verdict.key in [change.id for change in problem.changes]:
+    switched = {change.id for change in problem.changes}
+    if verdict.key and set(verdict.key.split("+")) <= switched:
         return 4
     proven = shrinkage is not None and verdict.kind == NAMED
     return 2 if proven and shrinkage and shrinkage.fraction > shrinkage.placebo_95 else 1

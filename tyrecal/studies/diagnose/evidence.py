@@ -10,8 +10,8 @@ Z = integral of Z(e) p(e) de, p(e) uniform over the range, by Gauss and Legendre
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from itertools import combinations
+from dataclasses import dataclass, field
+from itertools import product
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -26,15 +26,14 @@ from .veering import rule
 Array = np.ndarray
 NONE: Final = "none"
 OUTSIDE: Final = "outside"
-PRIOR_NONE, PRIOR_OUTSIDE, PRIOR_PAIRS = 0.25, 0.10, 0.03  # the singles share the rest
-RULE_POINTS = {1: 25, 2: 15}  # of the rule in each parameter, by how many effects there are
+PRIOR_OUTSIDE: Final = 0.10
+RULE_POINTS = {1: 25, 2: 15, 3: 9}  # of the rule in each parameter, by how many effects there are
+COVERAGE = 2.0  # standard deviations within which a stated number may be off (GUM, k = 2)
 SHARP_FALL = 2.0  # of ln Z from the best point to its neighbours, which asks for more points
 MAX_ZOOMS = 6
 REFIT_STEPS = 6  # of Gauss and Newton, in a model that is quadratic and near its minimum
 COUPLED_STEPS = 4  # more where near modes are coupled
 FAR_BELOW, ABOVE_POINTS = 20.0, 1.0  # of ln Z: how far a spline may fall, and rise above its points
-PAIR_POINTS = 3  # of the rule in what couples modes, that stand for all where effects are paired
-PARTNERS = 4  # singles that are tried with every other
 UNKNOWN = (0.005, 0.01, 0.02, 0.04)  # shift of modes by what no catalogue holds
 SMOOTH_HARMONICS, SMOOTH_LN_F = 2.0, 0.5  # over which trends change
 INFLATION = (2.0, 4.0)  # all of Sigma's standard deviations
@@ -61,13 +60,15 @@ class Fitted(NamedTuple):
 class Hypothesis:
     """An explanation, over the grid (q,) of its parameters."""
 
-    key: str  # "none", "outside", an id, "id1+id2"
+    key: str  # "none", "outside", an id, "id1+id2", "id1+id2+id3"
     prior: float
     ln_evidence: float
     values: Mapping[str, Array]  # parameters (q,) by id
     ln_weights: Array  # ln of weight times prior density (q,)
     fitted: Fitted
     words: str = ""
+    ends: Mapping[str, tuple[float, float]] = field(default_factory=dict)  # of the grid, by id
+    stated: Mapping[str, float] = field(default_factory=dict)  # by id, see `Span.stated`
 
     @property
     def posterior(self) -> Array:
@@ -85,12 +86,26 @@ class Hypothesis:
     def at_bound(self) -> list[str]:
         """Effects whose most probable parameter is the last one of the grid: more would fit
         better."""
-        ends = {id: (e[self.best], e.min(), e.max()) for id, e in self.values.items()}
-        return [
-            id
-            for id, (e, low, high) in ends.items()
-            if low < high and ((e == high and e > 0) or (e == low and e < 0))
-        ]
+        found = []
+        for id, values in self.values.items():
+            e = values[self.best]
+            low, high = self.ends.get(id, (values.min(), values.max()))
+            if low < high and ((e == high and e > 0) or (e == low and e < 0)):
+                found.append(id)
+        return found
+
+    def shares(self, p: Array) -> dict[str, float]:
+        """What of ``p`` (q,) over the grid is whose, by key: a size within `COVERAGE` standard
+        deviations of what the case states is that constant's, and no effect."""
+        ids = self.key.split("+")
+        off = [abs(self.values[id]) > COVERAGE * sd for id, sd in self.stated.items()]
+        found: dict[str, float] = {}
+        for beyond in product((True, False), repeat=len(off)):
+            here = [x == y for x, y in zip(off, beyond, strict=True)]
+            within = {id for id, far in zip(self.stated, beyond, strict=True) if not far}
+            key = "+".join(id for id in ids if id not in within) or NONE
+            found[key] = float(p[np.all(here, axis=0)].sum()) if here else float(p.sum())
+        return found
 
     def mean(self) -> dict[str, float]:
         """Mean parameters."""
@@ -98,9 +113,14 @@ class Hypothesis:
 
     def quantile(self, id: str, share: float) -> float:
         """The parameter below which ``share`` of the probability lies."""
-        order = np.argsort(self.values[id], kind="stable")
-        e, p = self.values[id][order], self.posterior[order]
-        return float(np.interp(share, np.cumsum(p) - p / 2, e))
+        return quantile(self.values[id], self.posterior, share)
+
+
+def quantile(values: Array, p: Array, share: float) -> float:
+    """The value below which ``share`` of the probabilities p (q,) lies."""
+    order = np.argsort(values, kind="stable")
+    values, p = values[order], p[order]
+    return float(np.interp(share, np.cumsum(p) - p / 2, values))
 
 
 def refit(
@@ -112,8 +132,8 @@ def refit(
 ) -> Fitted:
     """x re-fitted at each of ``count`` parameters, integrated over what couples near modes.
 
-    extra (n, n): more covariance; among: {place in the rule: see `Fitted.coupled`}, where some of
-    its points stand for all.
+    extra (n, n) or (q, n, n): more covariance; among: {place in the rule: see `Fitted.coupled`},
+    where some of its points stand for all.
     """
     added = problem.added(effects, count)
     start = np.zeros((count, len(problem.centre)))
@@ -200,36 +220,6 @@ def ln_splits(problem: InverseProblem, split: Array) -> Array:
     return np.asarray((ln - np.log(tau) - np.log(2 * np.pi) / 2).sum(1))
 
 
-def weigh(problem: InverseProblem, pairs: bool = True) -> list[Hypothesis]:
-    """Every hypothesis with its evidence: none, outside, singles, pairs of the best with all."""
-    ids = list(problem.expansion.nodes)
-    plain = refit(problem, {}, 1)
-    none = Hypothesis(NONE, PRIOR_NONE, float(plain.ln_evidence[0]), {}, np.zeros(1), plain)
-    prior = 1 - PRIOR_NONE - PRIOR_OUTSIDE - (PRIOR_PAIRS if len(ids) > 1 and pairs else 0)
-    singles = [explain(problem, [id], prior / len(ids)) for id in ids]
-    return [none, outside(problem), *singles, *(_pairs(problem, singles) if pairs else [])]
-
-
-def probabilities(hypotheses: Sequence[Hypothesis]) -> dict[str, float]:
-    """Posterior probability by key; they sum to 1."""
-    ln = np.array([h.ln_evidence + np.log(h.prior) for h in hypotheses])
-    p = np.exp(ln - ln.max())
-    return {h.key: float(x) for h, x in zip(hypotheses, p / p.sum(), strict=True)}
-
-
-def _pairs(problem: InverseProblem, singles: Sequence[Hypothesis]) -> list[Hypothesis]:
-    """Forward stepping: the best singles, each with every other effect."""
-    order = [h.key for h in singles]
-    best = {h.key for h in sorted(singles, key=lambda h: -h.ln_evidence)[:PARTNERS]}
-    all_pairs = list(combinations(order, 2))
-    tried = [two for two in all_pairs if best & set(two)]
-    by_id = {h.key: h.fitted.coupled.T @ h.posterior for h in singles}
-    shares = {two: (by_id[two[0]] + by_id[two[1]]) / 2 for two in tried}
-    likely = {two: np.argsort(-share)[:PAIR_POINTS] for two, share in shares.items()}
-    among = {two: {int(k): float(shares[two][k]) for k in places} for two, places in likely.items()}
-    return [explain(problem, two, PRIOR_PAIRS / len(all_pairs), among[two]) for two in tried]
-
-
 def outside(problem: InverseProblem) -> Hypothesis:
     """What the catalogue does not hold: half of it unknown effects, half errors of reading.
 
@@ -257,14 +247,13 @@ def outside(problem: InverseProblem) -> Hypothesis:
     for label in sorted({row.label for row in rows if row.label}, key=str):
         hit = np.array([row.label == label for row in rows])
         reading.append((f"{label.said} is misread", MISREAD**2 * same * np.outer(hit, hit)))
-    parts: list[tuple[float, str, Fitted]] = []
-    for group in (unknown, reading):
-        for words, extra in group:
-            parts.append((0.5 / len(group), words, refit(problem, {}, 1, extra)))
-    ln = np.array([np.log(p) + f.ln_evidence[0] for p, _, f in parts])
-    total = float(np.logaddexp.reduce(ln))
-    _, words, best = parts[int(np.argmax(ln))]
-    return Hypothesis(OUTSIDE, PRIOR_OUTSIDE, total, {}, np.zeros(1), best, words)
+    both = [*unknown, *reading]
+    fitted = refit(problem, {}, len(both), np.array([extra for _, extra in both]))
+    shares = [0.5 / len(group) for group in (unknown, reading) for _ in group]
+    ln = fitted.ln_evidence + np.log(shares)
+    total, k = float(np.logaddexp.reduce(ln)), int(np.argmax(ln))
+    best = Fitted(*(part[k : k + 1] for part in fitted))
+    return Hypothesis(OUTSIDE, PRIOR_OUTSIDE, total, {}, np.zeros(1), best, both[k][0])
 
 
 def _smooth(rows: Sequence[Observable], y: Array) -> list[tuple[str, Array]]:
@@ -285,7 +274,7 @@ def explain(
     prior: float,
     among: Mapping[int, float] | None = None,
 ) -> Hypothesis:
-    """One or two effects over their ranges; what two add is added up.
+    """One to three effects over their ranges; what they add is added up.
 
     Where a peak is narrow, points gather about it: those within two places of the best one give way
     to a rule of their own on the box between, until ln Z falls gently from the best point to its
@@ -318,7 +307,16 @@ def explain(
     joined = Fitted(*parts)
     total = float(np.logaddexp.reduce(joined.ln_evidence + ln_weights))
     by_id = dict(zip(ids, values, strict=True))
-    return Hypothesis("+".join(ids), prior, total, by_id, ln_weights, joined)
+    return Hypothesis(
+        "+".join(ids),
+        prior,
+        total,
+        by_id,
+        ln_weights,
+        joined,
+        ends={id: (float(e.min()), float(e.max())) for id, e in by_id.items()},
+        stated={id: problem.spans[id].stated for id in ids if problem.spans[id].stated},
+    )
 
 
 def _fall(ln: Array, best: Sequence[int]) -> float:

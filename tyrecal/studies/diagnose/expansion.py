@@ -8,7 +8,8 @@ a_i, B_i: polynomials in e_i through its nodes, 0 at e_i = 0: differences of wha
 x0 with and without the effect; a_i has its slopes there, too, where the model gives them (Hermite).
 An effect that is in play is asked once more where its re-fit lies, at x_a, e_a: what the expansion
 is off by there, eta_a and J_a, it gains (e / e_a)^3 times (once beyond e_a), being itself off by
-terms of third order. Effects add up.
+terms of third order. Effects add up, but for pairs that were asked together at e_i, e_j: what the
+sum is off by there, it gains e_i e_j / (that) times (no more beyond).
 """
 
 from __future__ import annotations
@@ -42,6 +43,22 @@ class Anchor:
     d: Array  # (v,) x - x0
     shift: Array  # (n,)
     tilt: Array  # (n, v)
+
+
+@dataclass(frozen=True)
+class Joint:
+    """Where two effects were asked together, and what their sum is off by there."""
+
+    e: tuple[float, float]
+    d: Array  # (v,) x - x0
+    shift: Array  # (n,)
+    tilt: Array  # (n, v)
+
+    def at(self, first: Array, second: Array) -> tuple[Array, Array]:
+        """What it adds to a (q, n) and B (q, n, v) at parameters (q,)."""
+        grown = np.clip(first / self.e[0], 0, 1) * np.clip(second / self.e[1], 0, 1)
+        shift = grown[:, None] * (self.shift - self.tilt @ self.d)
+        return shift, grown[:, None, None] * self.tilt
 
 
 @dataclass(frozen=True)
@@ -96,6 +113,7 @@ class Expansion:
     nodes: Mapping[str, Nodes]  # of effects by id
     failed: Mapping[str, str] = field(default_factory=dict)  # why effects, by id, have no nodes
     coupling: Coupling | None = None  # of modes by the sources of error
+    joint: Mapping[tuple[str, ...], Joint] = field(default_factory=dict)  # of two effects
 
     def plain(self, x: Array) -> tuple[Array, Array]:
         """eta (n,) and Jacobian (n, v) without effects."""
@@ -163,21 +181,28 @@ def node_values(span: Span, sloped: Sequence[float] = ()) -> Array:
     return np.sort([*(far * np.array(sloped or ONE_SIDED)), *span.also])
 
 
-def anchored(
-    expansion: Expansion, model: ResponseModel, wanted: Mapping[str, tuple[float, Array]]
-) -> Expansion:
-    """The expansion with effects asked again at {id: (parameter, x (v,))}; one that has no
-    solution there stays as it was."""
-    answers = model.answers([Query(x, {id: e}) for id, (e, x) in wanted.items()])
-    nodes = dict(expansion.nodes)
-    for (id, (e, x)), answer in zip(wanted.items(), answers, strict=True):
-        if isinstance(answer, Answer):
-            own, d = replace(nodes[id], anchor=None), x - expansion.x0
-            eta, jacobian = expansion.plain(x)
-            shift, tilt, _ = own.at(np.array([e]))
-            off = answer.eta - eta - shift[0] - tilt[0] @ d
-            nodes[id] = replace(own, anchor=Anchor(e, d, off, answer.jacobian - jacobian - tilt[0]))
-    return replace(expansion, nodes=nodes)
+def anchored(expansion: Expansion, model: ResponseModel, wanted: Sequence[Query]) -> Expansion:
+    """The expansion with one or two effects asked again at each of these points; one that has no
+    solution there stays as it was. What an effect alone gains, those with others know."""
+    nodes, joint = dict(expansion.nodes), dict(expansion.joint)
+    asked = list(zip(wanted, model.answers(wanted), strict=True))
+    for point, answer in sorted(asked, key=lambda each: len(each[0].effects)):
+        if not isinstance(answer, Answer):
+            continue
+        (id, e), *others = point.effects.items()
+        d = point.x - expansion.x0
+        eta, jacobian = expansion.plain(point.x)
+        shift, tilt = answer.eta - eta, answer.jacobian - jacobian
+        for each, size in point.effects.items():
+            own = nodes[each] if others else replace(nodes[each], anchor=None)
+            a, B, _ = own.at(np.array([size]))
+            shift, tilt = shift - a[0] - B[0] @ d, tilt - B[0]
+        if others:
+            ((other, size),) = others
+            joint[id, other] = Joint((e, size), d, shift, tilt)
+        else:
+            nodes[id] = replace(nodes[id], anchor=Anchor(e, d, shift, tilt))
+    return replace(expansion, nodes=nodes, joint=joint)
 
 
 def _with_effect(model: ResponseModel, x: Array, id: str, e: float) -> Query:

@@ -41,6 +41,7 @@ class Assumed:
     form: float | None = None  # model-form error of every mode; None: on record
     split: float = 0.003  # of pairs, by the non-uniformity of this kind of tyre
     law: float | None = None  # of an effect's shift, that may be off; None: by effect
+    further: float = 0.1  # probability of a further effect over that of one less, from one on
 
 
 class Added(NamedTuple):
@@ -155,6 +156,11 @@ class InverseProblem:
                     off[ids.index(id)][:, rows] = self._law(id) * a[:, self.places[rows]]
                     more = self.expansion.nodes[id].beside_at(e)
                     beside[ids.index(id)][:, rows] = more[:, self.places[rows]]
+            for both, joint in self.expansion.joint.items():
+                if set(both) <= set(here):
+                    a, B = joint.at(*(here[id] for id in both))
+                    shift[:, rows] += a[:, self.places[rows]]
+                    tilt[:, rows] += B[:, self.places[rows]]
         if self.zeta:
             shift, tilt = shift @ self.mixed.T, self.mixed @ tilt
             off, beside = off @ self.mixed.T, beside @ self.mixed.T

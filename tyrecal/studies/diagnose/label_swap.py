@@ -15,9 +15,10 @@ import numpy as np
 
 from ...simulate.modes.label import Label
 from ...tyre.state import TyreState
-from .evidence import NONE, OUTSIDE, Hypothesis, refit, weigh
+from .evidence import NONE, OUTSIDE, Hypothesis, refit
 from .inverse_problem import InverseProblem
 from .observations import Observations
+from .several import weigh
 
 Array = np.ndarray
 SWAP_PROBABILITY = 0.05  # of laboratories' files, two of their labels

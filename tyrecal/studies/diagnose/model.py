@@ -34,6 +34,7 @@ class Span:
     also: tuple[float, ...] = ()  # beyond the range, at which toggled runs were measured
     law: float = 0.04  # of its shift of a mode, by which a real one's may be off
     second: bool = False  # whether there is more to it than its parameter, see `Query.beside`
+    stated: float = 0.0  # standard deviation of it by the case's uncertainties; 0: it states none
 
 
 @dataclass(frozen=True)

@@ -14,11 +14,12 @@ from pydantic import Field
 
 from ...simulate.modes.label import Label
 from ..result import Result, ResultPart
+from .constants_told import ConstantShift, constants_told
 from .evidence import NONE, OUTSIDE
 from .gap import projection
 from .observations import Observable
 from .shrinkage import Shrinkage
-from .verdict import VerdictKind
+from .verdict import Further, VerdictKind, holds
 from .where import FieldValue, PartChange
 
 if TYPE_CHECKING:
@@ -136,6 +137,14 @@ class NextMeasurement(ResultPart):
     hours: float
 
 
+class RobustPart(ResultPart):
+    """What the verdict hangs on."""
+
+    robust: bool
+    hangs_on: list[str]
+    range: list[float]  # of the probability of what is named, or else said
+
+
 class DiagnosisResult(Result):
     """diagnosis.json"""
 
@@ -145,7 +154,10 @@ class DiagnosisResult(Result):
     words: str
     effect: str | None
     parameter: Explained | None
-    parameters: dict[str, EffectSize] = Field(default={})  # of every effect of a pair
+    parameters: dict[str, EffectSize] = Field(default={})  # of every effect of several
+    also: list[Further] = Field(default=[])  # perhaps there too
+    constants: list[ConstantShift] = Field(default=[])
+    robust: RobustPart | None = None
     likeliest: str | None = None
     calibrated: dict[str, Any] | None = None  # see `calibrated_variables`
     probabilities: dict[str, float]
@@ -188,11 +200,17 @@ def diagnosis_result(
         effect=d.verdict.key,
         parameter=_explained(d, shown),
         parameters={
-            id: EffectSize(**d.parameter(key, id))
-            for key in [shown]
-            if key
-            for id in key.split("+")
+            id: EffectSize(**d.parameter(shown, id))
+            for id in d.problem.spans
+            if shown and holds(shown, id)
         },
+        also=list(d.verdict.also),
+        constants=constants_told(d),
+        robust=RobustPart(
+            robust=d.robustness.robust,
+            hangs_on=list(d.robustness.hangs_on),
+            range=[d.robustness.low, d.robustness.high],
+        ),
         likeliest=d.best,
         probabilities=_listed(d.probabilities),
         candidate_set=list(d.verdict.candidates),

@@ -12,12 +12,12 @@ size that the diagnosis found on the rest, stand beside.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
 
-from .evidence import NONE, Hypothesis, grid, weigh
+from .evidence import NONE, Hypothesis, explain, grid, refit
 from .inverse_problem import InverseProblem
 from .observations import Observable
 from .plain_fit import MAX_STEP
@@ -44,6 +44,7 @@ class Shrinkage:
     after_sigma: float
     least_squares_before_percent: float  # of calibrations as usual
     least_squares_after_percent: float
+    each: Mapping[str, float] = field(default_factory=dict)  # R of an effect beside the others
 
 
 def held_out(rows: Sequence[Observable]) -> tuple[Array, str]:
@@ -78,12 +79,14 @@ def shrink(problem: InverseProblem, key: str | None = None, seed: int = 0) -> Sh
     if not problem.expansion.nodes or hold.sum() == 0 or keep.sum() <= v + 1:
         return None
     fitted = problem.only(keep)
-    hypotheses = {h.key: h for h in weigh(fitted, pairs=bool(key and "+" in key))}
-    singles = [h for name, h in hypotheses.items() if name in problem.expansion.nodes]
-    chosen = hypotheses.get(key or "") or max(singles, key=lambda h: h.ln_evidence)
+    plain = refit(fitted, {}, 1)
+    none = Hypothesis(NONE, 1.0, float(plain.ln_evidence[0]), {}, np.zeros(1), plain)
+    asked = [key.split("+")] if key else [[id] for id in problem.expansion.nodes]
+    found = [explain(fitted, ids, 1.0) for ids in asked]
+    chosen = max(found, key=lambda h: h.ln_evidence)
     out = problem.only(hold)
-    before = _errors(out, hypotheses[NONE], [0])[0]
-    after = _errors(out, chosen, [int(np.argmax(chosen.posterior))])[0]
+    likeliest = lambda h: _errors(out, h, [int(np.argmax(h.posterior))])[0]
+    before, after = _errors(out, none, [0])[0], likeliest(chosen)
     random = np.random.default_rng(seed)
     places = random.choice(len(chosen.posterior), DRAWS, p=chosen.posterior)
     normal = partial(random.multivariate_normal, method="cholesky")
@@ -91,6 +94,12 @@ def shrink(problem: InverseProblem, key: str | None = None, seed: int = 0) -> Sh
     samples = _errors(out, chosen, places, drawn)
     spread = np.sqrt(np.diag(out.sigma))
     rms = lambda e: np.sqrt(np.mean(np.square(e), axis=-1))
+    several = list(chosen.values) if len(chosen.values) > 1 else []
+    others = {id: [each for each in several if each != id] for id in several}
+    each = {
+        id: float(1 - rms(after) / rms(likeliest(explain(fitted, rest, 1.0))))
+        for id, rest in others.items()
+    }
     ratios = 1 - rms(samples) / rms(before)
     low, high = np.quantile(ratios, [0.05, 0.95])
     return Shrinkage(
@@ -107,6 +116,7 @@ def shrink(problem: InverseProblem, key: str | None = None, seed: int = 0) -> Sh
         float(rms(after / spread)),
         float(100 * rms(_least_squares(problem, hold, {}))),
         float(100 * rms(_least_squares(problem, hold, chosen.mean()))),
+        each,
     )
 
 

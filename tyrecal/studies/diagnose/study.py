@@ -165,6 +165,7 @@ def spans_of(
         )
     able: dict[str, Span] = {}
     unable: dict[str, str] = {}
+    stated = {path: abs(step) for each in sources(case)[0] for path, step in each.steps.items()}
     for id in ids or ():
         if id not in catalogue():
             raise ValueError(f"'{id}' is not one of the effects{suggestion(id, catalogue())}")
@@ -183,6 +184,7 @@ def spans_of(
                 *words,
                 base,
                 law=effect.law,
+                stated=stated.get(EFFECT_PATH + id, 0.0),
                 second=effect.beside is not None and not (case.deck or case.decks),
             )
     return able, unable

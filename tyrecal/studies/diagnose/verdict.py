@@ -8,14 +8,24 @@ from typing import Final, Literal
 
 import numpy as np
 
-from .evidence import NONE, OUTSIDE, PRIOR_NONE, Hypothesis
+from .evidence import NONE, OUTSIDE, Hypothesis
 from .gap import chi2_tail
+from .several import PRIOR_NONE, before, present
 
 VerdictKind = Literal["named", "undecided", "no_gap", "outside"]
 NAMED: Final = "named"
 UNDECIDED: Final = "undecided"
 NO_GAP: Final = "no_gap"
 SURE, RULED_OUT, CHECK, SET = 0.7, 0.05, 0.01, 0.9
+PERHAPS = 0.1  # probability of a further effect, from which it is told
+
+
+@dataclass(frozen=True)
+class Further:
+    """An effect that is perhaps there beside those that are named."""
+
+    id: str
+    probability: float
 
 
 @dataclass(frozen=True)
@@ -23,10 +33,12 @@ class Verdict:
     """What may be said."""
 
     kind: VerdictKind
-    key: str | None  # of what is named, an id or "id1+id2"
+    key: str | None  # of what is named, "id1", "id1+id2", ...: whatever else there is
     candidates: tuple[str, ...]  # keys that hold 90 % of the probability together
     check: float  # p-value of the likeliest effect's own fit
     words: str  # one sentence
+    best: str | None = None  # the likeliest explanation, of those that have what is named
+    also: tuple[Further, ...] = ()  # perhaps there too, likeliest first
 
 
 def decide(
@@ -34,9 +46,10 @@ def decide(
 ) -> Verdict:
     """The verdict by fixed rules.
 
-    named: p >= 0.7, the fit with it has p > 0.01, p(none) < 0.05, and no size at the bound of its
-    range; outside: p >= 0.5 and p(none) < 0.05, or nothing that fits; no_gap: "none" is likelier
-    than it was before, and likeliest.
+    named: the most effects of which p >= 0.7 that they are there, alone or with others; the
+    likeliest fit with them has p > 0.01, p(none) < 0.05, two degrees of freedom are left, and no
+    size is at the bound of its range; outside: p >= 0.5 and p(none) < 0.05, or nothing that fits;
+    no_gap: "none" is likelier than it was before, and likeliest.
     """
     order = sorted(probabilities, key=lambda key: -probabilities[key])
     totals = np.cumsum([probabilities[key] for key in order])
@@ -44,30 +57,72 @@ def decide(
     effects = [key for key in order if key not in (NONE, OUTSIDE)]
     none = probabilities[NONE]
     by_key = {h.key: h for h in hypotheses}
-    best = effects[0] if effects else None
+    sure = most_sure(probabilities)
+    # the likeliest explanation that has all of them, or of all
+    best = next((key for key in effects if not sure or holds(key, sure)), None)
     check = _check(by_key[best], rows, variables) if best else 1.0
 
-    def verdict(kind: VerdictKind, words: str) -> Verdict:
-        return Verdict(kind, best if kind == NAMED else None, tuple(candidates), check, words)
+    def verdict(kind: VerdictKind, words: str, also: Sequence[Further] = ()) -> Verdict:
+        key = sure if kind == NAMED else None
+        return Verdict(kind, key, tuple(candidates), check, words, best, tuple(also))
 
     if rows <= variables:
         return verdict(UNDECIDED, "cannot tell: there are no more data than design variables")
-    sure = best is not None and probabilities[best] >= SURE
-    if sure and check > CHECK and none < RULED_OUT:
-        assert best is not None
-        if at_bound := by_key[best].at_bound:
+    if best and sure and check > CHECK and none < RULED_OUT:
+        if at_bound := [id for id in by_key[best].at_bound if holds(sure, id)]:
             ids = " and ".join(at_bound)
             words = f"there is a gap; {best} comes nearest, with {ids} at the bound of its range"
             return verdict(UNDECIDED, words)
-        return verdict(NAMED, f"{best} explains the gap")
+        if rows - variables - len(by_key[best].values) < 2:
+            words = f"there is a gap; {best} comes nearest, but with so few data others would, too"
+            return verdict(UNDECIDED, words)
+        also = perhaps(probabilities, sure)
+        words = " and ".join(sure.split("+")) + (" explain" if "+" in sure else " explains")
+        words += " the gap"
+        words += f", perhaps with {' or '.join(each.id for each in also)}" if also else ""
+        return verdict(NAMED, words, also)
     if none < RULED_OUT and (probabilities[OUTSIDE] >= 0.5 or (sure and check <= CHECK)):
-        likely = f"{best} explains most of it and does not fit"
-        gap = likely if sure else "no effect of the catalogue is as likely as something else"
-        return verdict(OUTSIDE, f"there is a gap, and {gap}: {by_key[OUTSIDE].words}")
-    if order[0] == NONE and none > PRIOR_NONE:
+        words = f"there is a gap; {_falls_short(best, check)}; likelier is that"
+        return verdict(OUTSIDE, f"{words} {by_key[OUTSIDE].words}")
+    if order[0] == NONE and none > before(hypotheses).get(NONE, PRIOR_NONE):
         return verdict(NO_GAP, "no gap is seen")
     gap = "there is a gap" if none < RULED_OUT else "there may be a gap"
     return verdict(UNDECIDED, f"{gap}, its cause is undecided")
+
+
+def holds(key: str, ids: str) -> bool:
+    """Whether an explanation has all of these effects."""
+    return set(ids.split("+")) <= set(key.split("+"))
+
+
+def most_sure(probabilities: Mapping[str, float]) -> str | None:
+    """The most effects, as a key that was weighed, that are there with p >= 0.7 together, the
+    likeliest of as many; None where no effect is."""
+    keys = [key for key in probabilities if key not in (NONE, OUTSIDE)]
+    found = [
+        (key.count("+"), p, key)
+        for key in keys
+        if (p := present(probabilities, key.split("+"))) >= SURE
+    ]
+    return max(found)[2] if found else None
+
+
+def perhaps(probabilities: Mapping[str, float], named: str) -> list[Further]:
+    """Effects beside those that are named, p >= 0.1 that they are there too, likeliest first."""
+    ids = named.split("+")
+    others = {id for key in probabilities for id in key.split("+")} - {*ids, NONE, OUTSIDE}
+    also = [Further(id, present(probabilities, [*ids, id])) for id in others]
+    likely = [each for each in also if each.probability >= PERHAPS]
+    return sorted(likely, key=lambda each: (-each.probability, each.id))
+
+
+def _falls_short(best: str | None, check: float) -> str:
+    """What the catalogue's likeliest explanation lacks."""
+    if best is None:
+        return "the catalogue has nothing that could explain it"
+    if check <= CHECK:
+        return f"{best} comes nearest in the catalogue and does not fit"
+    return f"{best} would fit"
 
 
 def _check(hypothesis: Hypothesis, rows: int, variables: int) -> float:

@@ -1,0 +1,191 @@
+"""Several effects at once, and constants: which, how surely; on a tyre in closed form."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tyrecal.report.diagnosis import page
+from tyrecal.studies.diagnose.constants_told import constants_told
+from tyrecal.studies.diagnose.diagnosis import Diagnosis, diagnose
+from tyrecal.studies.diagnose.evidence import COVERAGE, explain
+from tyrecal.studies.diagnose.result import diagnosis_result
+from tyrecal.studies.diagnose.robustness import robustness
+from tyrecal.studies.diagnose.several import before, most_like, present, probabilities, weigh
+from tyrecal.studies.diagnose.study import DiagnosedCase
+from tyrecal.studies.diagnose.verdict import Further, decide, most_sure, perhaps
+
+from ..chance import generator
+from .toy import Toy, drawn, problem
+
+pytestmark = pytest.mark.numbers
+
+
+def exact(toy: Toy, effects: dict[str, float], **keys: Any) -> Diagnosis:
+    """Of data of the toy's own without scatter."""
+    base = problem(toy)
+    y = toy.base + sum(e * toy.g[id] for id, e in effects.items())
+    observations = base.measured(y).observations
+    return diagnose(toy, toy.rows, observations, assumed=base.assumed, **keys)
+
+
+def test_the_most_effects_that_are_sure_are_named_whatever_else_there_is() -> None:
+    p = {"a": 0.45, "a+b": 0.3, "a+c": 0.12, "b": 0.03, "none": 0.02, "outside": 0.08}
+    assert present(p, ["a"]) == pytest.approx(0.87) and most_sure(p) == "a"
+    found = {each.id: each.probability for each in perhaps(p, "a")}
+    assert list(found) == ["b", "c"] and list(found.values()) == pytest.approx([0.3, 0.12])
+    assert most_sure({**p, "a+b": 0.7, "a": 0.05}) == "a+b"
+    assert most_sure({"a": 0.4, "b": 0.4, "none": 0.2}) is None
+
+
+def test_three_effects_are_found() -> None:
+    """Each seen many times over, in data without scatter, whatever lies outside the catalogue."""
+    toy = Toy(effects=5, size=0.02, bend=0.0, pressures=(160.0, 320.0))
+    base = problem(toy)
+    truth = {"e0": 0.8, "e2": 0.7, "e4": 0.9}
+    y = toy.base + sum(e * toy.g[id] for id, e in truth.items())
+    found = weigh(base.measured(y))
+    p = probabilities(found)
+    assert decide(found, p, len(y), 3).key == "e0+e2+e4" and p["e0+e2+e4"] > 0.9
+    best = next(h for h in found if h.key == "e0+e2+e4")
+    assert best.mean() == pytest.approx(truth, abs=0.1)
+
+
+def test_a_third_effect_is_looked_for_where_the_rest_of_the_gap_is_like_it() -> None:
+    """Of data without scatter, in a linear model: the one that is there, before all others."""
+    toy = Toy(effects=8, bend=0.0)
+    for id in toy.tilt:
+        toy.tilt[id] = 0 * toy.tilt[id]
+    base = problem(toy)
+    p = base.measured(toy.base + 0.8 * toy.g["e1"] + 0.5 * toy.g["e4"] + 0.6 * toy.g["e7"])
+    assert most_like(p, explain(p, ["e1", "e4"], 1.0))[0] == "e7"
+
+
+def test_a_size_that_the_case_states_as_possible_is_a_constant() -> None:
+    """Within two of its standard deviations it counts to what is without the effect, before the
+    data and after; the sum stays 1, and nothing changes where nothing is stated."""
+    toy = Toy(effects=3, size=0.03)
+    base = problem(toy)
+    p = base.measured(toy.base + 0.3 * toy.g["e0"])
+    spans = {**toy.spans, "e0": replace(toy.spans["e0"], stated=0.2)}
+    stated = replace(p, spans=spans)
+    plain, found = weigh(p), weigh(stated)
+    one, other = probabilities(plain), probabilities(found)
+    assert sum(other.values()) == pytest.approx(1) and sum(one.values()) == pytest.approx(1)
+    h = next(h for h in plain if h.key == "e0")
+    far = abs(h.values["e0"]) > COVERAGE * 0.2
+    assert other["e0"] == pytest.approx(one["e0"] * h.posterior[far].sum(), abs=1e-9)
+    assert one["e0"] > 0.7 > 0.1 > other["e0"] and other["none"] > 0.7
+    prior = before(found)
+    assert prior["e0"] == pytest.approx(before(plain)["e0"] * 0.6, rel=0.05)
+    assert prior["none"] > before(plain)["none"]
+    assert decide(plain, one, len(base.places), 3).key == "e0"
+    assert decide(found, other, len(base.places), 3).kind == "no_gap"
+
+
+def test_what_the_data_say_of_constants() -> None:
+    """Of a tyre whose gauge is off by two standard deviations: E z in closed form, and never an
+    effect's name."""
+    toy = Toy(effects=2, bend=0.0)
+    toy.constants = 3 * toy.constants
+    base = problem(toy)
+    y = toy.base + 2 * toy.constants[:, 1]
+    d = diagnose(toy, toy.rows, base.measured(y).observations, assumed=base.assumed)
+    assert d.verdict.kind == "no_gap"
+    told = {each.name: each.shift_in_sd for each in constants_told(d)}
+    whole = base.sigma + toy.J @ toy.J.T
+    wanted = toy.constants.T @ np.linalg.inv(whole) @ (y - toy.base)
+    assert [told[name] for name in toy.sources] == pytest.approx(wanted, abs=0.01)
+    assert next(iter(told)) == "gauge" and 1.5 < told["gauge"] < 2
+    result = diagnosis_result(d).content()
+    assert result["constants"][0]["name"] == "gauge" and result["effect"] is None
+
+
+def test_several_effects_are_told_with_what_each_shrinks() -> None:
+    d = exact(Toy(effects=2, size=0.05, pressures=(160.0, 240.0)), {"e0": 0.8, "e1": 0.6})
+    assert d.verdict.key == "e0+e1" and d.leading == "e0+e1"
+    told = diagnosis_result(d).content()
+    assert set(told["parameters"]) == {"e0", "e1"} and told["also"] == []
+    assert set(told["shrinkage"]["each"]) == {"e0", "e1"}
+    assert min(told["shrinkage"]["each"].values()) > 0.3
+
+
+def test_an_effect_that_others_may_stand_beside_has_one_size() -> None:
+    """Over all explanations that have it, by their probabilities."""
+    toy = Toy(effects=4, size=0.012, pressures=(240.0,))
+    base = problem(toy)
+    y = drawn(toy, base, generator("beside"), {"e0": 0.9, "e1": 0.3}, 0.3)
+    d = diagnose(toy, toy.rows, base.measured(y).observations, assumed=base.assumed)
+    keys = [h for h in d.hypotheses if "e0" in h.key.split("+")]
+    weights = np.array([h.prior * np.exp(h.ln_evidence - keys[0].ln_evidence) for h in keys])
+    means = [h.mean()["e0"] for h in keys]
+    assert d.parameter("e0")["value"] == pytest.approx(weights @ means / weights.sum())
+
+
+def test_what_a_strong_verdict_hangs_on() -> None:
+    """On nothing; its probability over priors of none, half and twice as large, lies inside."""
+    d = exact(Toy(effects=3, size=0.05, pressures=(160.0, 240.0)), {"e0": 0.8})
+    assert d.verdict.key == "e0" and d.robustness.robust and not d.robustness.hangs_on
+    assert 0.9 < d.robustness.low <= present(d.probabilities, ["e0"]) <= d.robustness.high <= 1
+    told = diagnosis_result(d).content()["robust"]
+    assert told == {"robust": True, "hangs_on": [], "range": [d.robustness.low, d.robustness.high]}
+
+
+def test_what_a_verdict_by_a_constant_hangs_on() -> None:
+    """A gauge that looks like e0: e0 is named while that is thought to be well known, and not where
+    it is known half as well; every probability comes from the priors as they should."""
+    toy = Toy(effects=2, bend=0.0, pressures=(160.0, 240.0))
+    toy.constants = np.stack([toy.constants[:, 0], 0.16 * toy.g["e0"]], 1)
+    d = exact(toy, {"e0": 0.7})
+    assert d.verdict.key == "e0"
+    found = d.robustness
+    assert "the standard deviation of gauge twice as large: undecided" in found.hangs_on
+    assert not any("half as large" in each and "gauge" in each for each in found.hangs_on)
+    p = d.probabilities["none"]
+    assert found.low < 1 - 2 * p / (1 + p)
+
+
+def test_the_range_is_that_of_the_priors_where_nothing_else_is_in_doubt() -> None:
+    """Data that are far beyond their form, laws and constants: p / (p + k (1 - p)) and its like,
+    computed from the evidences."""
+    toy = Toy(effects=2, size=0.02, bend=0.0)
+    base = problem(toy)
+    found = weigh(base.measured(toy.base + 0.3 * toy.g["e0"]))
+    p = probabilities(found)
+    verdict = decide(found, p, len(base.places), 3)
+    ranges = []
+    for keys in (["none"], ["outside"], ["e0+e1"], ["e0", "e0+e1"]):
+        for factor in (0.5, 2.0):
+            total = sum(each * (factor if key in keys else 1) for key, each in p.items())
+            e0 = sum(p[key] * (factor if key in keys else 1) for key in ("e0", "e0+e1"))
+            ranges.append(e0 / total)
+    judged = robustness(base.measured(toy.base + 0.3 * toy.g["e0"]), found, verdict, toy.sources)
+    assert judged.low <= min(ranges) + 1e-9 and max(ranges) - 1e-9 <= judged.high
+
+
+def test_the_page_says_what_it_hangs_on_and_what_is_perhaps_there_first() -> None:
+    toy = Toy(effects=2, bend=0.0, pressures=(160.0, 240.0))
+    toy.constants = np.stack([toy.constants[:, 0], 0.16 * toy.g["e0"]], 1)
+    spans = {**toy.spans, "e0": replace(toy.spans["e0"], stated=0.2)}
+    toy.spans = spans
+    d = exact(toy, {"e0": 0.7})
+    also = replace(d.verdict, also=(Further("e1", 0.25),))
+    words = page(
+        DiagnosedCase(replace(d, verdict=also), (), False, {}, (), toy),  # type: ignore[arg-type]
+        "tyre",
+        "a.csv",
+    )
+    first = words.partition("## Is there a gap?")[0]
+    assert "## Named: e0, and perhaps e1" in first
+    assert "Perhaps there too: e1 (`e1`), probability 0.25." in first
+    assert "The verdict hangs on the standard deviation of gauge twice as large" in first
+    assert "times the standard deviation that the case states" in first
+    assert f"between {d.robustness.low:.2f} and {d.robustness.high:.2f}" in first
+    assert "The case states `e0` as uncertain: within 2 standard deviations" in words
+    plain = exact(toy, {"e0": 0.01})
+    told = page(DiagnosedCase(plain, (), False, {}, (), toy), "tyre", "a.csv")  # type: ignore[arg-type]
+    assert told.startswith("# The model of tyre against its measurements")
+    assert "the probability of no effect lies between" in told

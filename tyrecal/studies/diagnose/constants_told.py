@@ -1,0 +1,45 @@
+"""What the data say of the constants that nobody calibrates: told, and never named as a cause.
+
+With z ~ N(0, 1) of each and g its slopes: E z = G^T P r, r the residual of the likeliest fit. An
+effect that the case states as uncertain (``uncertainties``) is such a constant as far as that
+reaches (`evidence.COVERAGE`); only what is beyond is an effect.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from .evidence import NONE
+from .gap import projection
+from .section_fields import SECTION
+
+if TYPE_CHECKING:
+    from .diagnosis import Diagnosis
+
+
+@dataclass(frozen=True)
+class ConstantShift:
+    """A constant by its likeliest shift."""
+
+    name: str
+    shift_in_sd: float  # of the standard deviation that is stated or assumed
+
+
+def constants_told(diagnosis: Diagnosis) -> list[ConstantShift]:
+    """Every source of error but the section's fields, with what is named or leads in the model;
+    the largest shift first."""
+    found = diagnosis.hypothesis(diagnosis.leading or NONE)
+    best = found.best
+    problem = replace(diagnosis.problem, zeta=float(found.fitted.zeta[best]))
+    d = found.fitted.d[best]
+    effects = {id: e[[best]] for id, e in found.values.items()}
+    r = problem.observations.y - problem.predicted(effects, d[None])[0]
+    P, _, _ = projection(problem, d)
+    G = problem.mixed @ problem.constants if problem.zeta else problem.constants
+    told = [
+        ConstantShift(name, float(z))
+        for name, z in zip(diagnosis.sources, G.T @ P @ r, strict=True)
+        if not name.startswith(SECTION)
+    ]
+    return sorted(told, key=lambda each: -abs(each.shift_in_sd))

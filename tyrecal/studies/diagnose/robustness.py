@@ -1,0 +1,169 @@
+"""What a verdict hangs on: the same data, judged with other numbers than were assumed.
+
+Every prior, every constant's standard deviation and what laws are off half and twice as large, the
+model's own form and the section beyond doubt, each label left out in turn. The scatter of the data
+stands, of which the check of the fit speaks. Hypotheses that carry weight are weighed anew from the
+values and slopes that are there, those of several effects on the part of their grid that does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .evidence import NONE, OUTSIDE, Fitted, Hypothesis, explain, outside, refit
+from .inverse_problem import InverseProblem
+from .section_fields import SECTION
+from .several import coupled_most, present, probabilities
+from .verdict import NAMED, NO_GAP, UNDECIDED, Verdict, decide, holds
+
+Array = np.ndarray
+FACTORS = {0.5: "half", 2.0: "twice"}
+LEAST_WEIGHED = 1e-5  # of the likeliest explanation's probability, from which one is weighed again
+MOST_WEIGHED = 20  # explanations
+KEPT_BELOW = 8.0  # of ln posterior of a grid's points below the best, that are
+JUDGED = {NAMED: "named", UNDECIDED: "undecided", NO_GAP: "no gap", "outside": "outside"}
+
+
+@dataclass(frozen=True)
+class Robustness:
+    """Of a verdict."""
+
+    robust: bool  # it is the same with all of these numbers
+    hangs_on: tuple[str, ...]  # what changes it, and to what
+    low: float  # range of the probability of what it says, see `said`
+    high: float
+
+
+def robustness(
+    problem: InverseProblem,
+    hypotheses: Sequence[Hypothesis],
+    verdict: Verdict,
+    sources: Sequence[str],
+) -> Robustness:
+    """Of the verdict on these hypotheses. sources: names of the sources of error."""
+    kept = _weighty(hypotheses)
+    p = [said(probabilities(hypotheses), verdict)]
+    changes: list[str] = []
+    for words, judged, rows in _variants(problem, kept, verdict, sources):
+        found = probabilities(judged)
+        p.append(said(found, verdict))
+        other = decide(judged, found, rows, len(problem.centre))
+        if (other.kind, other.key) != (verdict.kind, verdict.key):
+            changes.append(f"{words}: {_judged(other)}")
+    return Robustness(not changes, tuple(changes), min(p), max(p))
+
+
+def said(p: Mapping[str, float], verdict: Verdict) -> float:
+    """The probability of what a verdict says: that what is named, or else likeliest, is there;
+    that nothing is; that something outside is."""
+    if verdict.kind in (NAMED, UNDECIDED):
+        key = verdict.key or verdict.best
+        return present(p, key.split("+")) if key else 0.0
+    return p[NONE if verdict.kind == NO_GAP else OUTSIDE]
+
+
+def _variants(
+    problem: InverseProblem, kept: Sequence[Hypothesis], verdict: Verdict, sources: Sequence[str]
+) -> Iterator[tuple[str, list[Hypothesis], int]]:
+    """What is other, the hypotheses then, and how many rows speak."""
+    count = len(problem.places)
+    for words, of in _priors(verdict):
+        for factor, times in FACTORS.items():
+            found = [replace(h, prior=h.prior * factor ** of(h)) for h in kept]
+            yield f"the prior of {words} {times} as large", found, count
+    for words, other in _problems(problem, sources):
+        found = [_again(other, h) for h in kept]
+        yield words, found, len(other.places)
+
+
+def _priors(verdict: Verdict) -> Iterator[tuple[str, Callable[[Hypothesis], int]]]:
+    """Priors in words, and how many times a hypothesis has the factor."""
+    yield "no effect", lambda h: int(h.key == NONE)
+    yield "what is outside the catalogue", lambda h: int(h.key == OUTSIDE)
+    yield "every further effect", lambda h: max(len(h.values) - 1, 0)
+    if key := verdict.key or verdict.best:
+        words = " and ".join(key.split("+"))
+        yield words, lambda h: int(bool(h.values) and holds(h.key, key))
+
+
+def _problems(
+    problem: InverseProblem, sources: Sequence[str]
+) -> Iterator[tuple[str, InverseProblem]]:
+    """What is other, in words, and the problem then."""
+    o = problem.observations
+    of_section = [k for k, name in enumerate(sources) if name.startswith(SECTION)]
+    constants = {
+        name.replace("_", " "): [k] for k, name in enumerate(sources) if k not in of_section
+    }
+    if len(constants) > 1:
+        constants["all constants"] = [k for (k,) in constants.values()]
+    if of_section:
+        constants["the section"] = of_section
+        yield "the section beyond doubt", _scaled(problem, of_section, 0.0)
+    for factor, times in FACTORS.items():
+        for name, places in constants.items():
+            words = f"the standard deviation of {name} {times} as large"
+            yield words, _scaled(problem, places, factor)
+        yield f"what laws of effects are off {times} as large", _looser(problem, factor)
+    yield (
+        "the model's own form beyond doubt",
+        replace(problem, assumed=replace(problem.assumed, form=0.0)),
+    )
+    for label in sorted({row.label for row in o.rows if row.label}, key=str):
+        keep = np.array([row.label != label for row in o.rows])
+        if keep.any():
+            yield f"without {label.said}", problem.only(keep)
+
+
+def _looser(problem: InverseProblem, factor: float) -> InverseProblem:
+    """The problem with what effects' laws may be off times a factor."""
+    assumed, spans = problem.assumed, problem.spans
+    if assumed.law is not None:
+        return replace(problem, assumed=replace(assumed, law=factor * assumed.law))
+    return replace(
+        problem, spans={id: replace(each, law=factor * each.law) for id, each in spans.items()}
+    )
+
+
+def _scaled(problem: InverseProblem, places: Sequence[int], factor: float) -> InverseProblem:
+    """The problem with the standard deviations of some sources of error times a factor."""
+    return replace(problem, reduced={**problem.reduced, **dict.fromkeys(places, factor)})
+
+
+def _weighty(hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
+    """Those that carry weight, none and outside always; of sets of effects the points that do."""
+    ln = {h.key: h.ln_evidence + np.log(h.prior) for h in hypotheses}
+    least = max(ln.values()) + np.log(LEAST_WEIGHED)
+    likely = [h for h in hypotheses if h.values and ln[h.key] > least]
+    likely = sorted(likely, key=lambda h: -ln[h.key])[:MOST_WEIGHED]
+    kept = [h for h in hypotheses if not h.values]
+    for h in likely:
+        p = h.posterior
+        on = p > p.max() * np.exp(-KEPT_BELOW)
+        if len(h.values) > 1:
+            values = {id: e[on] for id, e in h.values.items()}
+            fitted = Fitted(*(each[on] for each in h.fitted))
+            h = replace(h, values=values, ln_weights=h.ln_weights[on], fitted=fitted)
+        kept.append(h)
+    return kept
+
+
+def _again(problem: InverseProblem, h: Hypothesis) -> Hypothesis:
+    """A hypothesis beside another problem."""
+    if h.key == OUTSIDE:
+        return replace(outside(problem), prior=h.prior)
+    among = coupled_most([h])
+    if len(h.values) == 1:
+        return explain(problem, list(h.values), h.prior, among)
+    fitted = refit(problem, h.values, len(h.ln_weights), among=among)
+    total = float(np.logaddexp.reduce(fitted.ln_evidence + h.ln_weights))
+    return replace(h, ln_evidence=total, fitted=fitted)
+
+
+def _judged(verdict: Verdict) -> str:
+    """A verdict in a few words."""
+    words = JUDGED[verdict.kind]
+    return f"{words}: {' and '.join(verdict.key.split('+'))}" if verdict.key else words

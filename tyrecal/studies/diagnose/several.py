@@ -1,0 +1,142 @@
+"""How many effects a tyre has, and which: hypotheses of one, two and three, built forwards.
+
+Before the data: none 0.25, outside the catalogue 0.10; of the rest two effects have the share
+``further`` of one's, three that of two's, and all sets of as many effects the same. Of 25 effects
+there are 300 pairs and 2300 triples; tried are the likeliest singles with every other effect, and,
+where pairs carry weight, these with whatever the rest of the gap is most like.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from math import comb
+from typing import Final
+
+import numpy as np
+
+from .evidence import NONE, OUTSIDE, PRIOR_OUTSIDE, Hypothesis, explain, grid, outside, refit
+from .inverse_problem import InverseProblem
+
+Array = np.ndarray
+PRIOR_NONE: Final = 0.25
+MOST_EFFECTS = 3
+COUPLED_POINTS = 3  # of the rule in what couples modes, that stand for all from two effects on
+PARTNERS = 4  # singles that are tried with every other
+BASES, BASES_WITHIN = 3, 3.0  # pairs that a third is added to; ln probability behind the best
+THIRDS = 4  # effects that are added to each
+
+
+def weigh(problem: InverseProblem, pairs: bool = True) -> list[Hypothesis]:
+    """Every hypothesis with its evidence; ``pairs``: of two and three effects, too."""
+    ids = list(problem.expansion.nodes)
+    prior = priors(len(ids), problem.assumed.further, MOST_EFFECTS if pairs else 1)
+    plain = refit(problem, {}, 1)
+    none = Hypothesis(NONE, PRIOR_NONE, float(plain.ln_evidence[0]), {}, np.zeros(1), plain)
+    found = [none, outside(problem), *(explain(problem, [id], prior[1]) for id in ids)]
+    for count in range(2, len(prior) + 1):
+        found += _with_one_more(problem, found, count, prior[count])
+    return found
+
+
+def priors(effects: int, further: float, most: int = MOST_EFFECTS) -> dict[int, float]:
+    """Prior of each set of 1, 2, ... of so many effects: they sum to 0.65 over all sets."""
+    counts = range(1, min(most if further else 1, effects) + 1)
+    total = sum(further ** (k - 1) for k in counts)
+    rest = 1 - PRIOR_NONE - PRIOR_OUTSIDE
+    return {k: rest * further ** (k - 1) / total / comb(effects, k) for k in counts}
+
+
+def probabilities(hypotheses: Sequence[Hypothesis]) -> dict[str, float]:
+    """Posterior probability by key; they sum to 1. See `Hypothesis.shares`."""
+    ln = np.array([h.ln_evidence + np.log(h.prior) for h in hypotheses])
+    p = np.exp(ln - ln.max())
+    return _by_key(hypotheses, p / p.sum(), lambda h: h.posterior)
+
+
+def before(hypotheses: Sequence[Hypothesis]) -> dict[str, float]:
+    """Prior probability by key, of what was weighed."""
+    return _by_key(
+        hypotheses, np.array([h.prior for h in hypotheses]), lambda h: np.exp(h.ln_weights)
+    )
+
+
+def present(p: Mapping[str, float], ids: Sequence[str]) -> float:
+    """Probability that all of these effects are there, whatever else is."""
+    return sum(each for key, each in p.items() if set(ids) <= set(key.split("+")))
+
+
+def _by_key(
+    hypotheses: Sequence[Hypothesis], p: Array, over: Callable[[Hypothesis], Array]
+) -> dict[str, float]:
+    found = {h.key: 0.0 for h in hypotheses}
+    for h, whole in zip(hypotheses, p.tolist(), strict=True):
+        if not h.stated:
+            found[h.key] += whole
+            continue
+        for key, share in h.shares(over(h)).items():
+            found[key if key in found else h.key] += whole * share
+    return found
+
+
+def _with_one_more(
+    problem: InverseProblem, found: Sequence[Hypothesis], count: int, prior: float
+) -> list[Hypothesis]:
+    """Sets of ``count`` effects: the likeliest of one less, each with others."""
+    order = [h.key for h in found if h.key in problem.expansion.nodes]
+    singles = {h.key: h for h in found if h.key in order}
+    fewer = [h for h in found if len(h.values) == count - 1]
+    fewer = sorted(fewer, key=lambda h: -h.ln_evidence)
+    if count == 2:
+        wanted = {frozenset((h.key, id)) for h in fewer[:PARTNERS] for id in order if id != h.key}
+    else:
+        ln = {h.key: h.ln_evidence + np.log(h.prior) for h in found if h.key != OUTSIDE}
+        likely = [h for h in fewer[:BASES] if ln[h.key] > max(ln.values()) - BASES_WITHIN]
+        wanted = {frozenset((*h.values, id)) for h in likely for id in most_like(problem, h)}
+    sets = [[id for id in order if id in each] for each in wanted]
+    result = []
+    for ids in sorted(sets, key=lambda ids: [order.index(id) for id in ids]):
+        result.append(explain(problem, ids, prior, coupled_most([singles[id] for id in ids])))
+    return result
+
+
+def coupled_most(known: Sequence[Hypothesis]) -> dict[int, float]:
+    """The points of the rule in what couples modes that stand for all, with their shares on the
+    mean of some hypotheses; empty where none are coupled."""
+    share = np.mean([h.fitted.coupled.T @ h.posterior for h in known], axis=0)
+    return {int(k): float(share[k]) for k in np.argsort(-share)[:COUPLED_POINTS]}
+
+
+def most_like(problem: InverseProblem, base: Hypothesis) -> list[str]:
+    """Effects by what they would gain beside those of ``base``, the first `THIRDS`.
+
+    With r the residual of its likeliest fit and P what neither calibration nor the sizes that it
+    has already absorb, c of one more effect gains c^T P r - c^T P c / 2 in ln likelihood.
+    """
+    best = base.best
+    problem = replace(problem, zeta=float(base.fitted.zeta[best]))
+    sizes = {id: float(e[best]) for id, e in base.values.items()}
+    at = {id: np.array([e]) for id, e in sizes.items()}
+    d = base.fitted.d[best]
+    added = problem.added(at, 1)
+    inverse = np.linalg.inv(problem.sigma + problem.law(added)[0])
+    columns, information = [problem.plain(d)[1] + added.tilt[0]], [problem.spread**-2.0]
+    for id, e in sizes.items():
+        low, high = problem.expansion.nodes[id].reach
+        ends = {**at, id: np.array([max(low, e - (high - low) / 50)])}
+        other = {**at, id: np.array([min(high, e + (high - low) / 50)])}
+        rise = (problem.added(other, 1).shift - problem.added(ends, 1).shift)[0]
+        width = float(other[id][0] - ends[id][0])
+        columns.append(rise[:, None] / width)
+        information.append(np.array([12 / (high - low) ** 2]))  # of a uniform distribution
+    J = np.hstack(columns)
+    inner = J.T @ inverse @ J + np.diag(np.concatenate(information))
+    P = inverse - inverse @ J @ np.linalg.solve(inner, J.T @ inverse)
+    r = problem.observations.y - problem.predicted(at, d[None])[0]
+    gains = {}
+    for id, nodes in problem.expansion.nodes.items():
+        if id not in sizes:
+            points, _ = grid(nodes)
+            c = problem.added({id: points}, len(points)).shift - problem.added({}, 1).shift
+            gains[id] = float((c @ P @ r - np.einsum("qn,nm,qm->q", c, P, c) / 2).max())
+    return sorted(gains, key=lambda id: -gains[id])[:THIRDS]
