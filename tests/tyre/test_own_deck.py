@@ -67,6 +67,11 @@ def test_what_abaqus_would_refuse(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert ended.value.code == 2
     out = json.loads(capsys.readouterr().out)
     assert re.match(r"tyre.inp, line \d+: \*ELASTIC: must follow", out["refused"])
+    assert [re.sub(r".*?: ", "", words, count=1) for words in out["calculix"]] == [
+        "*ELEMENT: its axisymmetric elements (CAX) do not twist, as belts make a tyre do",
+        "*ELEMENT: it has no rebar: cords are solids of a stiff direction there",
+        "*VISCOELASTIC: its hyperelastic rubber does not relax",
+    ]
     assert [re.sub(r".*?: ", "", words, count=1) for words in out["abaqus"]["refuses"]] == [
         "*ELASTIC: must stand under *MATERIAL",
         "*CLOAD: field 3, a number, is missing",

@@ -99,8 +99,8 @@ def command(
 
 def _check(path: Path, mesh: str, assignments: tuple[str, ...], terminal: Terminal) -> int:
     """Say what a user's deck holds, which of its numbers have paths, and what is wrong with it for
-    the bundled solver and for ABAQUS."""
-    from ..simulate.deck.own import asked_by_abaqus, trial
+    the bundled solver and for ABAQUS, and what CalculiX has nothing for."""
+    from ..simulate.deck.own import asked_by_abaqus, lacking_in_calculix, trial
     from ..tyre.own_deck.found import contents, words
     from ..tyre.own_deck.own_deck import read_own_deck
     from ..tyre.own_deck.text import OwnDeckError
@@ -117,8 +117,9 @@ def _check(path: Path, mesh: str, assignments: tuple[str, ...], terminal: Termin
         if not path.is_file():
             raise click.UsageError(f"there is no file '{path}'")
         deck = read_own_deck(path)
-    asked = asked_by_abaqus(deck.with_numbers(numbers))
-    result: dict[str, Any] = {"abaqus": asked, "refused": None}
+    blocks = deck.with_numbers(numbers)
+    asked, lacking = asked_by_abaqus(blocks), lacking_in_calculix(blocks)
+    result: dict[str, Any] = {"abaqus": asked, "calculix": lacking, "refused": None}
     try:
         flat = deck.flat(numbers, gauges)
         mass_kg = trial(flat)
@@ -139,4 +140,6 @@ def _check(path: Path, mesh: str, assignments: tuple[str, ...], terminal: Termin
         terminal.warn(f"ABAQUS may not take it: {sentence}")
     if more := len(asked["unknown"][MOST_SAID:]):
         terminal.warn(f"... and {more} more")
+    for sentence in lacking:
+        terminal.say(f"CalculiX does not honour: {sentence}")
     return EXIT_INPUT if result["refused"] or asked["refuses"] else 0

@@ -135,6 +135,12 @@ def asked_by_abaqus(blocks: Sequence[Block]) -> dict[str, list[str]]:
     return found
 
 
+def lacking_in_calculix(blocks: Sequence[Block]) -> list[str]:
+    """What CalculiX has nothing for: sentences with file and line."""
+    check = import_module("tyrecal_solvers.calculix.check")
+    return [str(block.refused(why)) for block, why in check.lacking(blocks)]
+
+
 def _origin(flat: Flat, line: int) -> Place | None:
     """Where a line of the flat mesh and materials comes from."""
     return flat.origins[line] if 0 <= line < len(flat.origins) else None
