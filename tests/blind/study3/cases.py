@@ -1,0 +1,123 @@
+"""The cases that study 3's tyres are diagnosed with: as `tyrecal init SIZE` writes them (foreign),
+or with the maker's own section as its drawing has it (own)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from tyrecal.simulate.modes.label import Label
+from tyrecal.tyre.case import LoadedCase
+from tyrecal.tyre.case.new_case import from_file, from_size
+from tyrecal.tyre.load import load_case
+from tyrecal.tyre.section.from_size import BELOW, BELTED
+from tyrecal.tyre.section.gauge_table import GaugeTable
+from tyrecal.tyre.section.size import parse_size
+
+from .section import VOID, Mould, at, carcass, mould
+
+LABELS = [
+    Label(0, 0, "axial"),
+    Label(0, 0, "torsional"),
+    Label(1, 1),
+    Label(1, 0),
+    Label(2, 1),
+    Label(2, 0),
+    Label(3, 1),
+    Label(3, 0),
+    Label(4, 0),
+]
+
+
+@dataclass(frozen=True)
+class Group:
+    """A size, and whose section it is diagnosed with; kPa that are given, and held out."""
+
+    size: str
+    own: bool
+    given_kPa: tuple[float, ...] = (160.0, 240.0, 320.0)
+    held_out_kPa: float = 200.0
+
+    @property
+    def name(self) -> str:
+        """Of its folder."""
+        size = self.size.lower().replace("/", "_").replace(".", "_")
+        return f"{size}_{'own' if self.own else 'foreign'}"
+
+    @property
+    def off(self) -> tuple[float, float]:
+        """How far tyres are from the mould, one standard deviation: m, and a share of gauges. The
+        own section is from a drawing; makers of one size differ by more, besides their rules."""
+        return (0.8e-3, 0.04) if self.own else (1.5e-3, 0.06)
+
+
+CAR, TRUCK = {}, {"given_kPa": (500.0, 720.0, 850.0), "held_out_kPa": 620.0}
+SIZES = {"175/70R13": CAR, "205/60R15": CAR, "P235/75R17": CAR, "275/40R20": CAR, "11R22.5": TRUCK}
+GROUPS = [
+    Group(size, own, **pressures) for size, pressures in SIZES.items() for own in (True, False)
+]  # type: ignore[arg-type]
+
+
+def written(group: Group, folder: Path, frequencies_Hz: dict[str, float]) -> LoadedCase:
+    """The case of a group, in ``folder``; frequencies: about what the tyre has, as its targets."""
+    size = parse_size(group.size)
+    if group.own:
+        stations = folder / f"{group.name}.csv"
+        stations.write_text(stations_of(mould(group.size)).csv(), encoding="utf-8", newline="")
+        draft = from_file(stations, size, None, None)
+    else:
+        draft = from_size(size, {}, None, group.name)
+        (folder / draft.file).write_bytes(draft.content)
+    lines = ["", "targets:", "  modes:"]
+    for label in LABELS:
+        kind = f"kind: {label.kind}, " if label.kind else ""
+        f = frequencies_Hz[str(label)]
+        lines.append(
+            f"    - {{c: {label.c}, m: {label.m}, {kind}frequency_Hz: {f:.0f}, sigma_Hz: 1.0}}"
+        )
+    path = folder / f"{group.name}.yaml"
+    path.write_text(draft.text + "\n".join(lines) + "\n", encoding="utf-8")
+    return load_case(path, allow_unusual=True)
+
+
+def stations_of(m: Mould) -> GaugeTable:
+    """The mould's lines as a drawing has them that a user digitised: a smooth tread of the
+    pattern's mean thickness, the turned-up ply from the widest point (of a truck the filler's
+    tip) on."""
+    marks = carcass(m)[2]
+    truck = parse_size(m.size).truck
+    edges = sorted(set(m.belts))
+    ends = [*edges, marks["widest"], marks["filler"], marks["rim"], marks["end"]]
+    names = ["crown", "belt_edges", "shoulder"] if len(edges) > 2 else ["crown", "shoulder"]
+    counts = {**{name: BELTED[name] for name in names}, **BELOW}
+    arc, labels = [0.0], ["crown"]
+    for (name, count), a, b in zip(counts.items(), [0.0, *ends], ends, strict=False):
+        arc += list(a + (b - a) * np.arange(1, count + 1) / count)
+        labels += [name] * count
+    labels[-BELOW["bead"] - 1] = "bead"
+    s = np.array(arc)
+    made = at(m, s)
+    offset = dict(zip(m.lines, made.offsets, strict=True))
+    belted = lambda edge: s <= edge + 1e-9
+    pattern = offset["outer"] - offset["groove"]
+    smooth = offset["outer"] - VOID * pattern * np.clip(
+        (1.3 * max(edges) - s) / (0.3 * max(edges)), 0, 1
+    )
+    rows = {"inner": offset["inner"], "ply": 0 * s}
+    for k, edge in enumerate(m.belts, 1):
+        rows["belt1_turn_up" if k == 1 else f"belt{k}"] = np.where(
+            belted(edge), offset[f"belt_{k}"], np.nan
+        )
+    if not truck:
+        rows["cap"] = np.where(belted(max(edges)), offset["cap"], np.nan)
+    rows["base"] = np.where(belted(max(edges)), offset["base"], np.nan)
+    turned = s >= marks["filler" if truck else "widest"] - 1e-9
+    rows["belt1_turn_up"] = np.where(turned, offset["belt_1"], rows["belt1_turn_up"])
+    rows["outer"] = smooth
+    carcass_line = made.points[m.lines.index("ply")]
+    rigid = s >= marks["rim"] - 1e-9
+    return GaugeTable(
+        tuple(rows), "ply", carcass_line, np.stack(list(rows.values())), labels, rigid
+    )

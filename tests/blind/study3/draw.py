@@ -1,0 +1,93 @@
+"""What is true of each tyre of study 3, drawn at random, and the tyre itself."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tyrecal.studies.blind.draw import Truth, draw, tyre
+from tyrecal.studies.blind.protocol import Protocol
+from tyrecal.studies.diagnose.uncertainties import sources
+from tyrecal.tyre.case import LoadedCase
+
+from .cases import Group
+from .laws import OUTSIDE, OwnLaw, laws, rim_width
+from .section import columns, mould, off
+from .tyre import Tyre, tyre_of
+
+EFFECTS_OF = {"none": 0, "one": 1, "two": 2, "three": 3, "outside": 0}
+SEAT_m, GAUGE_kPa, ROOM_K = 0.4e-3, 0.5, 1.0  # of a mounting: beads apart, pressure, temperature
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """truth: with kind "several" where effects are more than one, its law their ids joined by +;
+    effects: sizes by id, of a family outside the catalogue too; mounting: seed; again: whether the
+    same tyre is another trial as well."""
+
+    truth: Truth
+    effects: dict[str, float]
+    mounting: int
+    again: str = ""
+
+
+def known_laws(group: Group) -> tuple[dict[str, OwnLaw], dict[str, OwnLaw]]:
+    """Effects, and families outside, that this tyre can have."""
+    truck = "22.5" in group.size
+    outside = {k: law for k, law in OUTSIDE.items() if not (truck and k == "shrunk_cords")}
+    return laws(), outside  # of a truck no cord is textile
+
+
+def drawn(
+    protocol: Protocol, case: LoadedCase, group: Group, counts: Mapping[str, int], seed: int
+) -> list[Drawn]:
+    """All trials by the order of their ids. counts: by kind (`EFFECTS_OF`), and "again": tyres of
+    one effect that are mounted and measured once more."""
+    random = np.random.default_rng(seed)
+    effects, outside = known_laws(group)
+    found = []
+    kinds = [kind for kind in EFFECTS_OF for _ in range(counts.get(kind, 0))]
+    for kind in kinds:
+        rules = replace(protocol, counts={"none": 1})
+        (truth,) = draw(rules, case, sources(case)[0], {}, {}, int(random.integers(2**63)))
+        known = outside if kind == "outside" else effects
+        number = 1 if kind == "outside" else EFFECTS_OF[kind]
+        ids = sorted(random.choice(sorted(known), number, replace=False).tolist())
+        sizes = {id: known[id].drawn(random, protocol.smallest) for id in ids}
+        said = {"one": "effect", "two": "several", "three": "several"}.get(kind, kind)
+        size = next(iter(sizes.values()), 0.0)
+        truth = replace(truth, kind=said, law="+".join(ids), size=size)
+        found.append(Drawn(truth, sizes, int(random.integers(2**63))))
+    ones = [each for each in found if each.truth.kind == "effect"]
+    for each in ones[: counts.get("again", 0)]:
+        other = replace(
+            each.truth, id=random.bytes(6).hex(), scatter=int(random.integers(2**63)), swapped=False
+        )
+        found.append(Drawn(other, each.effects, int(random.integers(2**63)), again=each.truth.id))
+    return sorted(found, key=lambda each: each.truth.id)
+
+
+def made(each: Drawn, case: LoadedCase, group: Group, without: tuple[str, ...] = ()) -> Tyre:
+    """The tyre, some of its effects left out. Raises ValueError where no such tyre can be.
+
+    Its own geometry goes with its constants, so that the same tyre mounted again has it, too.
+    """
+    truth = each.truth
+    found, _ = sources(case)
+    nominal = case.file_data["pressure_kPa"]
+    plain = tyre(truth, case, found, nominal, None)
+    moulded = mould(group.size)
+    constants = np.array([*truth.variables.values(), *truth.constants.values()])
+    random = np.random.default_rng(np.frombuffer(constants.tobytes(), np.uint32))
+    built = tyre_of(plain, off(moulded, random, *group.off), columns(moulded))
+    mounting = np.random.default_rng(each.mounting)
+    built = rim_width(built, SEAT_m * mounting.normal())
+    shift = built.shift_Pa + 1e3 * GAUGE_kPa * mounting.normal()
+    built = replace(built, shift_Pa=shift, kelvin=ROOM_K * mounting.normal())
+    effects, outside = known_laws(group)
+    for id, size in each.effects.items():
+        if id not in without:
+            built = {**effects, **outside}[id].add(built, size)
+    return built

@@ -1,0 +1,172 @@
+"""What is the matter with tyres of study 3, written on the maker's own tyre.
+
+Parameters mean what the catalogue's do and have its ranges; how they enter is the maker's own. Four
+families that no catalogue holds, each with what it is in a workshop's words. They were chosen
+before any diagnosis of theirs was run, and nothing was tuned on them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from math import pi
+
+import numpy as np
+
+from tyrecal.tyre.effects import catalogue
+
+from .tyre import Tyre, tempered
+
+Law = Callable[[Tyre, float], Tyre]
+
+
+@dataclass(frozen=True)
+class OwnLaw:
+    """A parameter's range, and what it does."""
+
+    low: float
+    high: float
+    add: Law
+
+    def drawn(self, random: np.random.Generator, smallest: float) -> float:
+        """Uniform over ``smallest`` to 1 of the range, on a side drawn by chance."""
+        end = float(random.choice([end for end in (self.low, self.high) if end]))
+        return end * float(random.uniform(smallest, 1.0))
+
+
+def bead_filler(tyre: Tyre, e: float) -> Tyre:
+    """A harder compound, which a higher filler goes with: a maker who stiffens does both."""
+    taller = replace(tyre.mould, filler=tyre.mould.filler * (1 + 0.05 * e))
+    return tempered(replace(tyre, mould=taller), "bead_filler", 1 + 0.9 * e)
+
+
+def tread_density(tyre: Tyre, e: float) -> Tyre:
+    """More or fewer voids: mass and stiffness of the pattern, not of what lies under the grooves,
+    the whole tread's mass times 1 + e."""
+    m = tyre.mould
+    whole = m.base + m.skid * (1 - tyre.void)
+    return replace(tyre, void=tyre.void - e * whole / m.skid)
+
+
+def tread_wear(tyre: Tyre, e: float) -> Tyre:
+    """Shoulders wear more than the middle."""
+    return replace(tyre, mould=replace(tyre.mould, worn=e))
+
+
+def belt_angle(tyre: Tyre, e: float) -> Tyre:
+    """Cut at a wrong angle, as many cords a length of the cut: E A / s with 1 / cos of the turn;
+    the inner belts by a tenth more than the outer ones."""
+    cords = dict(tyre.cords)
+    for name in (name for name in cords if name.startswith("belt")):
+        own = cords[name]
+        turn = np.radians(e) * (1.1 if int(name.split("_")[1]) % 2 else 0.9)
+        angle = own.angle - turn if own.angle <= pi / 2 else own.angle + turn
+        cords[name] = replace(own, angle=angle, stiffness=own.stiffness / float(np.cos(turn)))
+    return replace(tyre, cords=cords)
+
+
+def belt_width(tyre: Tyre, e: float) -> Tyre:
+    """The wider belts by a fifth more, the narrow ones less; the mould is as it was."""
+    m = tyre.mould
+    widest = max(m.belts)
+    belts = tuple(b + (0.6 if b == widest else 0.4) * e for b in m.belts)
+    return replace(tyre, mould=replace(m, belts=belts, cap=m.cap + 0.5 * e))
+
+
+def rim_width(tyre: Tyre, e: float) -> Tyre:
+    """Beads apart by e, the section as the dimensions' rule has it: 0.4 e wider, and lower by what
+    the carcass' length leaves."""
+    m = tyre.mould
+    (r, z), (rim_r, rim_z), (seat_r, seat_z) = m.widest, m.rim, m.seat
+    return replace(
+        tyre,
+        mould=replace(
+            m,
+            widest=(r - 0.05 * e, z + 0.2 * e),
+            rim=(rim_r, rim_z + e / 2),
+            seat=(seat_r, seat_z + e / 2),
+        ),
+    )
+
+
+def sidewall_gauge(tyre: Tyre, e: float) -> Tyre:
+    """Rubber outside the carcass, most where the section is widest."""
+    m = tyre.mould
+    return replace(tyre, mould=replace(m, blown=1.25 * e * m.sidewall / (m.sidewall - m.liner)))
+
+
+def pressure_offset(tyre: Tyre, e: float) -> Tyre:
+    """A gauge whose scale is off: a share of the pressure, e kPa at the case's."""
+    return replace(tyre, gauge=1e3 * e / tyre.nominal_Pa)
+
+
+def temperature(tyre: Tyre, e: float) -> Tyre:
+    """Exponential in static and vibrating rubber, each by its own rate, and in textile cords."""
+    return replace(tyre, kelvin=tyre.kelvin + e)
+
+
+def temperature_drift(tyre: Tyre, e: float) -> Tyre:
+    """A run of pressures warms the tyre towards a temperature."""
+    return replace(tyre, drift=e)
+
+
+def cap_ply(tyre: Tyre, e: float) -> Tyre:
+    """Wound over the cap's width, its edges by three tenths denser."""
+    return replace(tyre, cap=e)
+
+
+def carcass_fanning(tyre: Tyre, e: float) -> Tyre:
+    """A/s by a power of the radius, from element to element, the turned-up ply's too."""
+    return replace(tyre, fan=e)
+
+
+def parted_belts(tyre: Tyre, e: float) -> Tyre:
+    """The belts have parted at their edges: over e m the rubber between holds next to nothing."""
+    return replace(tyre, parted=e)
+
+
+def unseated_bead(tyre: Tyre, e: float) -> Tyre:
+    """The tyre was mounted dry: over e m below the flange's top the bead does not touch the rim."""
+    return replace(tyre, unseated=e)
+
+
+def shrunk_cords(tyre: Tyre, e: float) -> Tyre:
+    """Not post-inflated: textile cords of carcass and cap shrank in cooling, steel did not."""
+    cords = {name: replace(c, prestrain=-e) if c.textile else c for name, c in tyre.cords.items()}
+    return replace(tyre, cords=cords)
+
+
+def sealant(tyre: Tyre, e: float) -> Tyre:
+    """A layer on the inside under the belt that seals punctures: mass, and no stiffness."""
+    return replace(tyre, lining=e)
+
+
+def laws() -> dict[str, OwnLaw]:
+    """By the catalogue's ids, with its ranges."""
+    known = catalogue()
+    return {
+        add.__name__: OwnLaw(known[add.__name__].low, known[add.__name__].high, add)
+        for add in (
+            bead_filler,
+            tread_density,
+            tread_wear,
+            belt_angle,
+            belt_width,
+            rim_width,
+            sidewall_gauge,
+            pressure_offset,
+            temperature,
+            temperature_drift,
+            cap_ply,
+            carcass_fanning,
+        )
+    }
+
+
+OUTSIDE: Mapping[str, OwnLaw] = {
+    "parted_belts": OwnLaw(0.0, 0.03, parted_belts),
+    "unseated_bead": OwnLaw(0.0, 0.012, unseated_bead),
+    "shrunk_cords": OwnLaw(0.0, 0.02, shrunk_cords),
+    "sealant": OwnLaw(0.0, 6.0, sealant),
+}
+"""kg/m2 and m: about 1.5 kg of sealant in a 205/60R15, and belts parted over a fifth of a half."""

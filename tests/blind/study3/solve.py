@@ -1,0 +1,313 @@
+"""Modes of half a tyre at several pressures by FEniCSx: a process that answers line by line.
+
+    /usr/bin/python3 -m tests.blind.study3.solve     (Debian: python3-dolfinx 0.5.2)
+
+One problem of JSON a line in, one answer a line out. A tyre looks the same after half a turn about
+a radius: (theta, z) -> (-theta, -z) maps cords on themselves. So of a vibration
+a cos(n Theta) - b sin(n Theta) about the inflated state half the section is enough, with
+a_theta = a_z = b_r = 0 at the crown's middle, and each pair of modes is found once. With
+g = du/dTheta the second variation of the energy is, in the frame of the reference angle,
+
+    A_uu(u, u) / 2 + A_gu(g, u) + A_gg(g, g) / 2,    section A: u = a, g = -n b;  B: u = b, g = n a
+
+    K(n) = [A_uu + n^2 A_gg, n S; -n S, A_uu + n^2 A_gg],   S = A_gu - A_gu^T
+
+so three matrices a pressure serve all n. What relaxes in the inflation comes back in the vibration
+as shear from the inflated state on: 2 C10' |dev sym(dF F0^-1)|^2. Forms are compiled and set up
+once for a mesh's connectivity; coordinates and constants change in place. SI units.
+"""
+
+from __future__ import annotations
+
+import json
+import logging
+import sys
+import time
+from typing import Any
+
+import numpy as np
+import ufl
+from dolfinx import fem, mesh
+from dolfinx.fem import petsc
+from mpi4py import MPI
+from petsc4py import PETSc
+from scipy.sparse import bmat, csr_matrix
+from scipy.sparse.linalg import LinearOperator, eigsh
+
+from ...studies.judge_fenics import by_factors, cord, gradient, rubber
+
+Array = np.ndarray
+EQUILIBRIUM = 1e-8  # of the first residual
+MAX_ITERATIONS = 30
+HELP_Pa = (1e7, 1e6, 1e5, 0.0)  # slack cords do not bear yet: stiffness that is taken away again
+QUADRATURE = 6
+CELL = ("C10", "D1", "density", "dynamic_C10", "hoop_Pa", "lining")
+LINE = ("stiffness", "angle", "area_density", "prestrain")  # of the line above a cell
+logging.disable(logging.INFO)  # of the compiler
+
+
+class Tyre:
+    """Forms of one connectivity."""
+
+    def __init__(self, problem: dict[str, Any]) -> None:
+        cells, nodes = np.array(problem["cells"]), np.array(problem["nodes"])
+        curved = ufl.Mesh(ufl.VectorElement("Lagrange", "triangle", 2))
+        self.mesh = msh = mesh.create_mesh(MPI.COMM_SELF, cells, nodes, curved)
+        self.order = np.array(msh.geometry.input_global_indices)
+        self.cell = np.array(msh.topology.original_cell_index)
+        for pair in ((1, 0), (1, 2), (2, 0)):
+            msh.topology.create_connectivity(*pair)
+        self.laws = problem["cord_law"], problem["volume_law"]
+        constant = fem.FunctionSpace(msh, ("DG", 0))
+        self.data = {key: fem.Function(constant) for key in (*CELL, *LINE)}
+        self.W = W = fem.VectorFunctionSpace(msh, ("P", problem["degree"]), 3)
+        self.state, self.g = fem.Function(W), fem.Function(W)  # u0; 0
+        constants = [fem.Constant(msh, PETSc.ScalarType(0)) for _ in range(3)]
+        self.pressure, self.help, self.vibrates = constants
+        facets = self._facets()
+        found = {key: [facets[frozenset(e)] for e in problem[key]] for key in ("lines", "inner")}
+        tags = {f: 1 for f in found["lines"]} | {f: 2 for f in found["inner"]}
+        numbers, values = np.array(sorted(tags.items()), np.int32).T.copy()
+        metadata = {"quadrature_degree": QUADRATURE}
+        data = {"subdomain_data": mesh.meshtags(msh, 1, numbers, values), "metadata": metadata}
+        self.dx = ufl.Measure("dx", msh, metadata=metadata)
+        self.dS, self.ds = ufl.Measure("dS", msh, **data), ufl.Measure("ds", msh, **data)
+        fixed = lambda key: fem.locate_dofs_topological(
+            W, 1, np.array([facets[frozenset(e)] for e in problem[key]], np.int32)
+        )
+        held, crown = fixed("held"), fixed("crown")
+        self.free = []  # of a, and of b
+        for components in ((1, 2), (0,)):
+            gone = np.zeros((W.dofmap.index_map.size_local, 3), bool)
+            gone[held] = True
+            for k in components:
+                gone[crown, k] = True
+            self.free.append(np.flatnonzero(~gone.ravel()))
+        self._forms()
+
+    def _facets(self) -> dict[frozenset[int], int]:
+        """Facets by the problem's numbers of their two ends."""
+        top, geometry = self.mesh.topology, self.mesh.geometry
+        ends, corners = top.connectivity(1, 0), top.connectivity(2, 0)
+        number = np.empty(top.index_map(0).size_local, int)
+        for c in range(len(self.cell)):
+            number[corners.links(c)] = self.order[geometry.dofmap.links(c)[:3]]
+        self.number = number
+        count = top.index_map(1).size_local
+        return {frozenset(number[ends.links(f)].tolist()): f for f in range(count)}
+
+    def _forms(self) -> None:
+        W, u, g = self.W, self.state, self.g
+        v, w = ufl.TestFunction(W), ufl.TrialFunction(W)
+        self.R = R = ufl.SpatialCoordinate(self.mesh)[0]
+        energy = self._energy(u, g)
+        by_u, by_g = ufl.derivative(energy, u, v), ufl.derivative(energy, g, v)
+        gas = self._gas(u, g, v)
+        support = self.help * ufl.inner(ufl.grad(u), ufl.grad(v)) * R * self.dx
+        options = {"timeout": 900, "cffi_extra_compile_args": ["-O1"]}
+        form = lambda each: fem.form(each, jit_params=options)
+        self.force = form(by_u + gas + support)
+        inverse = ufl.inv(gradient(u, g, R))
+        # of the inflated state's gradient: dF F0^-1, by a change of u and by one of g
+
+        def by_change(a: Any) -> Any:
+            d, hoop = ufl.grad(a), (-a[1] / R, a[0] / R, 0)
+            return ufl.as_matrix([[d[i, 0], hoop[i], d[i, 1]] for i in range(3)]) * inverse
+
+        by_turn = lambda b: ufl.as_matrix([[0, b[i] / R, 0] for i in range(3)]) * inverse
+        shear = lambda h: ufl.dev(ufl.sym(h))
+        stiff = 4 * self.data["dynamic_C10"] * R
+        more = lambda one, two: stiff * ufl.inner(shear(one), shear(two)) * self.dx
+        static = ufl.derivative(by_u + gas + support, u, w)
+        gu, gg = ufl.derivative(by_g, u, w), ufl.derivative(by_g, g, w)
+        self.uu = form(static + self.vibrates * more(by_change(v), by_change(w)))
+        self.gu = form(gu + more(by_turn(v), by_change(w)))
+        self.gg = form(gg + more(by_turn(v), by_turn(w)))
+        self.ug_gas = form(ufl.derivative(gas, g, w))
+        self.mass = form(self._inertia(w, v))
+        one = ufl.as_vector([1.0, 0, 0])
+        self.weight = form(self._inertia(one, one))
+
+    def _on_lines(self, per_area: Any) -> Any:
+        """Of the two triangles at a line the outer one's data are 0."""
+        return per_area * self.R("+") * self.dS(1)
+
+    def _energy(self, u: Any, g: Any) -> Any:
+        """J per radian."""
+        cord_law, volume_law = self.laws
+        d, F = self.data, gradient(u, g, self.R)
+        hoop = cord(F * ufl.as_vector([0, 1.0, 0]), d["hoop_Pa"], cord_law)
+        both = {key: d[key]("+") + d[key]("-") for key in LINE}
+        N, c = ufl.FacetNormal(self.mesh)("+"), ufl.cos(both["angle"])
+        side = ufl.as_vector([-c * N[1], ufl.sin(both["angle"]), c * N[0]])
+        # the facet's normal may point either way: outwards is where the radius or z grows; a cord
+        # that leans to the other side is its mirror image, told by the data of the inner triangle
+        inner = ufl.conditional(ufl.gt(d["area_density"]("+"), 0.0), 1.0, -1.0)
+        along = ufl.as_vector([inner * side[0], side[1], inner * side[2]])
+        q = F("+") * along
+        strain = {"nominal": ufl.sqrt(ufl.dot(q, q)) - 1, "logarithmic": ufl.ln(ufl.dot(q, q)) / 2}[
+            cord_law
+        ]
+        lines = both["stiffness"] * (strain - both["prestrain"]) ** 2 / 2
+        inside = rubber(F, {**d, "C01": 0.0}, volume_law) + hoop
+        return inside * self.R * self.dx + self._on_lines(lines)
+
+    def _gas(self, u: Any, g: Any, v: Any) -> Any:
+        """Virtual work that the gas takes: p n da = p cof(F) N dA on the deformed surface."""
+        F, N = gradient(u, g, self.R), ufl.FacetNormal(self.mesh)
+        r, t, z = (F[:, k] for k in range(3))
+        area = N[0] * ufl.cross(t, z) + N[1] * ufl.cross(r, t)
+        return self.pressure * ufl.dot(v, area) * self.R * self.ds(2)
+
+    def _inertia(self, u: Any, v: Any) -> Any:
+        d, product = self.data, ufl.inner(u, v)
+        inside = d["density"] * product * self.R * self.dx
+        inside += d["lining"] * product * self.R * self.ds(2)
+        cords = d["area_density"]("+") + d["area_density"]("-")
+        return inside + self._on_lines(cords * product("+"))
+
+    def put(self, problem: dict[str, Any]) -> None:
+        """Another tyre of the same connectivity."""
+        self.mesh.geometry.x[:, :2] = np.array(problem["nodes"])[self.order]
+        self.points = np.array(problem["nodes"])[self.number]
+        self.state.x.array[:] = 0.0
+        self._constants(problem)
+
+    def _constants(self, values: dict[str, Any]) -> None:
+        for key, function in self.data.items():
+            if key in values:
+                function.x.array[:] = np.asarray(values[key], float)[self.cell]
+
+    def inflate(self, helps: tuple[float, ...]) -> int:
+        """Newton's method at the pressure; iterations taken. Raises RuntimeError."""
+        free, taken, self.vibrates.value = self.free[0], 0, 0.0
+        solver = PETSc.KSP().create(MPI.COMM_SELF)
+        by_factors(solver)
+        for help_Pa in helps:
+            self.help.value = help_Pa
+            sizes: list[float] = []
+            for _ in range(MAX_ITERATIONS):
+                residual = petsc.assemble_vector(self.force).array[free]
+                sizes.append(float(np.linalg.norm(residual)))
+                if sizes[-1] <= EQUILIBRIUM * self.scale(sizes):
+                    break
+                K = sparse(self.uu)[free][:, free].tocsr()
+                matrix = petsc_of(K)
+                solver.setOperators(matrix)
+                b, x = matrix.createVecLeft(), matrix.createVecRight()
+                b.array[:] = residual
+                solver.solve(b, x)
+                self.state.x.array[free] -= x.array
+                taken += 1
+            else:
+                raise RuntimeError(f"no equilibrium: of {sizes[0]:g} N {sizes[-1]:g} are left")
+        return taken
+
+    def scale(self, sizes: list[float]) -> float:
+        """The pressure's own force, N: what a residual is compared with."""
+        return max(sizes[0], 1e-3 * self.pressure.value)
+
+    def modes(self, harmonics: list[int], count: int) -> list[dict[str, Any]]:
+        """The lowest of each harmonic."""
+        (fa, fb), self.vibrates.value = self.free, 1.0
+        uu, gu, gg, gas, M = map(sparse, (self.uu, self.gu, self.gg, self.ug_gas, self.mass))
+        uu = (uu + uu.T) / 2  # the gas' part is symmetric but for its quadrature, as ends are held
+        S = gu - gu.T - (gas - gas.T) / 2
+        found = []
+        mass = bmat([[M[fa][:, fa], None], [None, M[fb][:, fb]]], "csr")
+        for n in harmonics:
+            D, off = uu + n * n * gg, n * S[fa][:, fb]
+            K = bmat([[D[fa][:, fa], off], [off.T, D[fb][:, fb]]], "csr")
+            values, vectors = lowest(K, mass, count + 1 if n else count + 2)
+            for value, vector in list(zip(values, vectors.T, strict=True))[: count + (n == 0)]:
+                pair = np.zeros((2, self.state.x.array.size))
+                pair[0, fa], pair[1, fb] = vector[: len(fa)], vector[len(fa) :]
+                a, b = (self.at_corners(part) for part in pair)
+                found.append(
+                    {"n": n, "eigenvalue": float(value), "cos": a.tolist(), "sin": b.tolist()}
+                )
+        return found
+
+    def at_corners(self, field: Array) -> Array:
+        """Values (k, 3) at the elements' corners."""
+        top, whole = self.mesh.topology.connectivity(2, 0), np.empty((len(self.number), 3))
+        values = field.reshape(-1, 3)
+        for c in range(len(self.cell)):
+            whole[top.links(c)] = values[self.W.dofmap.cell_dofs(c)[:3]]
+        return whole
+
+    def mass_kg(self) -> float:
+        """Of both halves."""
+        return 4 * np.pi * float(fem.assemble_scalar(self.weight))
+
+    def answer(self, problem: dict[str, Any]) -> dict[str, Any]:
+        """Modes at each state of the problem, in its order. Raises RuntimeError."""
+        started = time.process_time()
+        self.put(problem)
+        states, helps = [], HELP_Pa
+        for state in problem["states"]:
+            self._constants(state)
+            self.pressure.value = state["pressure"]
+            iterations, helps = self.inflate(helps), (0.0,)
+            modes = self.modes(problem["harmonics"], problem["modes"])
+            states.append({"modes": modes, "iterations": iterations})
+        return {
+            "corners": self.number.tolist(),
+            "points": self.points.tolist(),
+            "mass_kg": self.mass_kg(),
+            "equations": len(self.free[0]) + len(self.free[1]),
+            "states": states,
+            "seconds": time.process_time() - started,
+        }
+
+
+def sparse(form: Any) -> csr_matrix:
+    matrix = petsc.assemble_matrix(form)
+    matrix.assemble()
+    indices, columns, values = matrix.getValuesCSR()
+    return csr_matrix((values, columns, indices), matrix.size)
+
+
+def petsc_of(K: csr_matrix) -> PETSc.Mat:
+    return PETSc.Mat().createAIJ(K.shape, csr=(K.indptr, K.indices, K.data), comm=MPI.COMM_SELF)
+
+
+def lowest(K: csr_matrix, M: csr_matrix, count: int) -> tuple[Array, Array]:
+    """Eigenvalues (count,) that are nearest to 0, rising, and their vectors (n, count)."""
+    solver, matrix = PETSc.KSP().create(MPI.COMM_SELF), petsc_of(K)
+    by_factors(solver)
+    solver.setOperators(matrix)
+    b, x = matrix.createVecLeft(), matrix.createVecRight()
+
+    def solved(right: Array) -> Array:
+        b.array[:] = right.ravel()
+        solver.solve(b, x)
+        return np.array(x.array)
+
+    start = np.random.default_rng(1).normal(size=K.shape[0])
+    inverse = LinearOperator(K.shape, matvec=solved, dtype=float)
+    values, vectors = eigsh(K, count, M, sigma=0.0, OPinv=inverse, v0=start, tol=1e-9)
+    order = np.argsort(values)
+    return values[order], vectors[:, order]
+
+
+def main() -> None:
+    known: dict[str, Tyre] = {}
+    for line in sys.stdin:
+        problem = json.loads(line)
+        try:
+            key = json.dumps(
+                [problem[k] for k in ("cells", "lines", "inner", "held", "crown")]
+                + [problem["degree"], problem["cord_law"], problem["volume_law"]]
+            )
+            if key not in known:
+                known.clear()
+                known[key] = Tyre(problem)
+            answer = known[key].answer(problem)
+        except (RuntimeError, ArithmeticError) as failure:
+            answer = {"failed": str(failure)}
+        print(json.dumps(answer), flush=True)
+
+
+if __name__ == "__main__":
+    main()
