@@ -110,7 +110,7 @@ def _check(path: Path, mesh: str, assignments: tuple[str, ...], terminal: Termin
     if path.suffix in (".yaml", ".yml"):
         loaded, _ = arguments.load(path, mesh, assignments, None, terminal, True)
         if loaded.deck is None:
-            raise click.UsageError(f"'{path}' names no deck of your own: 'tyrecal validate' judges")
+            raise click.UsageError(f"'{path}' names no section deck: 'tyrecal validate' judges it")
         deck, numbers = loaded.deck, loaded.deck_numbers
         gauges = loaded.case.deck.thickened if loaded.case.deck else ()
     else:

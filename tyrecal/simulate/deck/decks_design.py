@@ -65,7 +65,8 @@ class DecksDesign:
     @property
     def needs(self) -> dict[str, str]:
         """A solver that reads them."""
-        return {"own_decks": "decks in three dimensions; 'tyrecal solvers' shows which one can"}
+        words = "decks in three dimensions; 'tyrecal solvers' shows which one can (own_decks)"
+        return {"own_decks": words}
 
     @property
     def solver(self) -> SolverChoice:

@@ -41,6 +41,7 @@ BELT = 0.94  # of the largest radius: a belt is nearly flat, a sidewall leaves t
 DEGREE = 3
 CONDITION = 30.0  # of the polynomials on the points at hand; fewer rings carry a lower degree
 HIGHEST_HARMONIC = 12  # that is looked for in sampled shapes
+ALIASED = 1e-4  # of what a harmonic holds: solvers print angles and shapes with six digits
 SUBSTANTIAL = 0.2  # share of the belt's motion below which a mode cannot claim an order
 TAKES_PART = 0.1  # the belt's mean square motion over that of all points, likewise
 # column of z P0 on c = 0; columns 0 to 3 are the orders, 0 on c = 0 being theta P0
@@ -297,7 +298,7 @@ def _ring_energy(shape: RingShape) -> tuple[int, Array]:
     if not on_belt:
         raise ValueError("a label needs motion measured at four points of the belt or more")
     # harmonics that the angles cannot tell apart hold the same: the lowest is meant
-    c = int(np.argmax(held > (1 - 1e-9) * held.max()))
+    c = int(np.argmax(held > (1 - ALIASED) * held.max()))
     return c, energy[c]
 
 
