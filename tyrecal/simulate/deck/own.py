@@ -8,7 +8,8 @@ from importlib import import_module
 from math import isclose
 from typing import Any
 
-from ...tyre.own_deck.flat import REFERENCE_NODE, Flat
+from ...tyre.own_deck.flat import Flat
+from ...tyre.own_deck.flat_mesh import REFERENCE_NODE
 from ...tyre.own_deck.own_deck import UNIT_LENGTH, UNIT_MASS
 from ...tyre.own_deck.own_text import own_texts
 from ...tyre.own_deck.text import Block, OwnDeckError, Place, named

@@ -7,18 +7,15 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
+from .flat_mesh import FlatMesh, flat_mesh
 from .grammar import MATERIAL, Sorted
-from .model import Assigned, Face, Model
+from .model import Assigned, Model
 from .numbers import DIMENSIONS, named_fields, written
-from .scope import Point
-from .text import Block, OwnDeckError, Place, Row
+from .text import Block, Place, Row
 
-REFERENCE_NODE = 900001
-OVER_THE_BELT = 0.94  # of the largest radius: nodes of the outer surface beyond are the crown's
 SECTION_OPTIONS = ("HOURGLASS STIFFNESS", "REBAR LAYER")
 
 
@@ -34,36 +31,6 @@ class Ply:
     angular: bool
     angle_deg: float
     elements: tuple[int, ...]  # numbers in the flat deck
-
-
-@dataclass(frozen=True, eq=False)
-class FlatMesh:
-    """Nodes and elements under the flat deck's numbers, m.
-
-    outer, inner: nodes of the outer and of the inner surface in order, from -z to +z; around: of
-    all the boundary, closed, from the inner surface's first on.
-    """
-
-    nodes: dict[int, Point]
-    solids: dict[int, tuple[int, ...]]
-    plies: dict[int, tuple[int, ...]]
-    section_of: dict[int, int]  # solid to its place among the solid sections
-    rim: tuple[int, ...]
-    cavity: tuple[Face, ...]
-    tread: tuple[Face, ...]
-    outer: tuple[int, ...]
-    inner: tuple[int, ...]
-    around: tuple[int, ...]
-    reference: Point
-    element_at: dict[int, int]  # the deck's number of an element to the flat one
-    lines: tuple[str, ...]
-    origins: tuple[Place, ...]
-
-    @cached_property
-    def crown(self) -> tuple[int, ...]:
-        """Nodes of the outer surface over the belt."""
-        most = max(self.nodes[n][0] for n in self.outer)
-        return tuple(n for n in self.outer if self.nodes[n][0] > OVER_THE_BELT * most)
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +64,7 @@ class Flat:
 def flatten(found: Sorted, model: Model, length: float, mass: float) -> Flat:
     """The flat deck of a model whose units of length and mass are so many m and kg. Raises
     OwnDeckError."""
-    mesh = _mesh(model, length)
+    mesh = flat_mesh(model, length)
     write = _Writer(length, mass)
     blocks = _materials(found.model)
     options = _options(found.model)
@@ -298,137 +265,3 @@ def _check_amplitudes(found: Sorted, static: Block) -> None:
         end = float(np.interp(period, numbers[::2], numbers[1::2]))
         if end != 1.0:
             raise block.refused(f"the amplitude {name} ends at {end:g}, it must end at 1")
-
-
-def _tolerances(block: Block, length: float) -> str:
-    """Those of an *EMBEDDED ELEMENT that are given, m."""
-    found = ""
-    for name, scale in (
-        ("ROUNDOFF TOLERANCE", 1.0),
-        ("EXTERIOR TOLERANCE", 1.0),
-        ("ABSOLUTE EXTERIOR TOLERANCE", length),
-    ):
-        if text := block.get(name):
-            found += f", {name}={written(Row(block.place, (text,)).number(0) * scale)}"
-    return found
-
-
-def _mesh(model: Model, length: float) -> FlatMesh:
-    known = getattr(model, "_flat", {})
-    if length in known:
-        mesh: FlatMesh = known[length]
-        return mesh
-    number = {n: k for k, n in enumerate(sorted(model.nodes), start=1)}
-    nodes = {number[n]: (length * r, length * z) for n, (r, z) in sorted(model.nodes.items())}
-    lines, origins = list[str](), list[Place]()
-
-    def line(text: str, place: Place) -> None:
-        lines.append(text)
-        origins.append(place)
-
-    start = model.solids[0].block.place
-    line("*NODE, NSET=TYRE", start)
-    for n, (r, z) in nodes.items():
-        line(f"{n}, {r!r}, {z!r}", start)
-    r, z = model.reference[1]
-    reference = (length * r, length * z)
-    line("*NODE, NSET=RIM_REFERENCE", start)
-    line(f"{REFERENCE_NODE}, {reference[0]!r}, {reference[1]!r}", start)
-    element_at = {n: k for k, n in enumerate(sorted(model.elements), start=1)}
-    solids, plies, section_of = {}, {}, {}
-    for word, group in (("SOLID", model.solids), ("PLY", model.plies)):
-        for k, section in enumerate(group, start=1):
-            kinds: dict[str, list[int]] = {}
-            for n in section.elements:
-                kinds.setdefault(model.elements[n].kind, []).append(n)
-            for kind, members in kinds.items():
-                first = model.elements[members[0]]
-                line(f"*ELEMENT, TYPE={kind}, ELSET={word}_{k}", first.block.place)
-                for n in members:
-                    element = model.elements[n]
-                    own = tuple(number[each] for each in element.nodes)
-                    if word == "SOLID":
-                        solids[element_at[n]], section_of[element_at[n]] = own, k - 1
-                    else:
-                        plies[element_at[n]] = own
-                    line(", ".join(map(str, (element_at[n], *own))), element.row.place)
-    rim = tuple(sorted(number[n] for n in model.rim))
-    renumbered = lambda face: (element_at[face[0]], face[1], tuple(number[n] for n in face[2]))
-    cavity = [renumbered(face) for face in model.cavity]
-    boundary = [renumbered(face) for face in model.boundary]
-    held, under = set(rim), {face[:2] for face in cavity}
-    tread = [f for f in boundary if f[:2] not in under and not held.issuperset(f[2])]
-    if not tread:
-        raise OwnDeckError(start, "no free surface of the rubber is left for the tread")
-    outer, inner = _chain(tread, nodes), _chain(cavity, nodes)
-    line("*NSET, NSET=RIM", start)
-    _numbers(line, rim, start)
-    most = max(nodes[n][0] for n in outer)
-    line("*NSET, NSET=CROWN", start)
-    _numbers(line, [n for n in outer if nodes[n][0] > OVER_THE_BELT * most], start)
-    for name, faces in (("CAVITY", cavity), ("TREAD", tread)):
-        line(f"*SURFACE, NAME={name}, TYPE=ELEMENT", start)
-        for n, face, _ in faces:
-            line(f"{n}, {face}", start)
-    for k, each in enumerate(model.embedded, start=1):
-        line(f"*ELSET, ELSET=HOSTS_{k}", each.block.place)
-        _numbers(line, [element_at[n] for n in each.hosts], each.block.place)
-        for j, (row, own_lines) in enumerate(each.lines, start=1):
-            line(f"*ELSET, ELSET=EMBEDDED_{k}_{j}", row.place)
-            _numbers(line, [element_at[n] for n in own_lines], row.place)
-        line(f"*EMBEDDED ELEMENT, HOST ELSET=HOSTS_{k}{_tolerances(each.block, length)}", start)
-        for j, (row, _) in enumerate(each.lines, start=1):
-            line(f"EMBEDDED_{k}_{j}", row.place)
-    line(f"*RIGID BODY, REF NODE={REFERENCE_NODE}, TIE NSET=RIM", start)
-    made = FlatMesh(
-        nodes,
-        solids,
-        plies,
-        section_of,
-        rim,
-        tuple(cavity),
-        tuple(tread),
-        tuple(outer),
-        tuple(inner),
-        tuple(_around(boundary, inner)),
-        reference,
-        element_at,
-        tuple(lines),
-        tuple(origins),
-    )
-    object.__setattr__(model, "_flat", {**known, length: made})
-    return made
-
-
-def _around(boundary: Sequence[Face], inner: Sequence[int]) -> list[int]:
-    """The boundary that the inner surface is part of, along that."""
-    following = {face[2][0]: face[2][1:] for face in boundary}
-    chain = [inner[0] if inner[0] in following else boundary[0][2][0]]
-    while len(chain) == 1 or chain[-1] != chain[0]:
-        if chain[-1] not in following or len(chain) > 3 * len(boundary):
-            break
-        chain += following[chain[-1]]
-    return chain if chain[1] == inner[1] else chain[::-1]
-
-
-def _numbers(line: object, numbers: Sequence[int], place: Place) -> None:
-    for k in range(0, len(numbers), 12):
-        line(", ".join(map(str, numbers[k : k + 12])), place)  # type: ignore[operator]
-
-
-def _chain(faces: Sequence[Face], nodes: Mapping[int, Point]) -> list[int]:
-    """Nodes of the longest chain of faces, from -z to +z."""
-    following = {face[2][0]: face[2] for face in faces}
-    ends = {face[2][-1] for face in faces}
-    best = list[int]()
-    for start in [n for n in following if n not in ends] or [faces[0][2][0]]:
-        chain, seen = [start], {start}
-        while chain[-1] in following:
-            further = following[chain[-1]][1:]
-            chain += further
-            if further[-1] in seen:
-                break
-            seen.add(further[-1])
-        if len(chain) > len(best):
-            best = chain
-    return best if nodes[best[0]][1] <= nodes[best[-1]][1] else best[::-1]

@@ -14,8 +14,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from .model import Face, Model
+from .model import Model
 from .scope import Point, corner_areas, faces_of
+from .surfaces import Face
 
 Array = np.ndarray
 Sets = tuple[str, ...]  # of a part, in upper case

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from .text import Block, Row, named
+from .text import Block, Row
 
 Point = tuple[float, float]
 CORNERS_OF = {3: 3, 4: 4, 6: 3, 8: 4}  # of solids by their number of nodes
@@ -55,10 +55,6 @@ class Scope:
     )
     system: tuple[Point, Point] = (0.0, 0.0), (1.0, 0.0)  # origin, direction of its first axis
     _asked: list[str] = field(default_factory=list)
-
-    def read(self, block: Block) -> None:
-        """What a mesh keyword adds. Raises OwnDeckError."""
-        MESH_READERS[block.name](self, block)
 
     def nodes_in(self, name: str, block: Block, row: Row | None = None) -> list[int]:
         """Nodes of a set, or the node of this number."""
@@ -118,153 +114,6 @@ class Scope:
         self.elements[number] = Element(kind, nodes, block, row)
 
 
-def _node(scope: Scope, block: Block) -> None:
-    """Number, r, z in the *SYSTEM of the moment."""
-    (r0, z0), (c, s) = scope.system
-    numbers = []
-    for row in block.rows:
-        r, z = row.number(1, 0.0), row.number(2, 0.0)
-        if any(row.fields[3:]) and row.number(3, 0.0):
-            raise block.refused("a third coordinate is not honoured: a section lies in r, z", row)
-        if any(row.fields[4:]):
-            raise block.refused(f"data '{row.fields[4]}' is not honoured", row)
-        point = (
-            (r, z) if (r0, z0, c, s) == (0, 0, 1, 0) else (r0 + c * r - s * z, z0 + s * r + c * z)
-        )
-        number = row.integer(0)
-        scope.place(block, row, number, point)
-        numbers.append(number)
-    scope.add_nodes(block, numbers)
-
-
-def _system(scope: Scope, block: Block) -> None:
-    """Origin and a point on the first axis, of coordinates that follow; none: the deck's own."""
-    if not block.rows:
-        scope.system = (0.0, 0.0), (1.0, 0.0)
-        return
-    row = block.rows[0]
-    x = [row.number(i, 0.0) for i in range(6)]
-    if x[2] or x[5] or (len(block.rows) > 1 and any(block.rows[1].fields)):
-        raise block.refused("a system out of the plane of the section is not honoured")
-    dr, dz = (x[3] - x[0], x[4] - x[1]) if any(row.fields[3:]) else (1.0, 0.0)
-    size = float(np.hypot(dr, dz))
-    if not size:
-        raise block.refused("its two points are one", row)
-    scope.system = (x[0], x[1]), (dr / size, dz / size)
-
-
-def _ngen(scope: Scope, block: Block) -> None:
-    """First and last node, increment of the numbers: on a straight line, or on an arc about a
-    node or a point."""
-    numbers: list[int] = []
-    for row in block.rows:
-        first, last, step = row.integer(0), row.integer(1), row.integer(2, 1)
-        for n in (first, last):
-            if n not in scope.nodes:
-                raise block.refused(f"node {n} is not defined above", row)
-        if not step or (last - first) % step or (last - first) // step < 1:
-            raise block.refused(f"{first} to {last} is no whole number of steps {step}", row)
-        count = (last - first) // step
-        a, b = np.array(scope.nodes[first]), np.array(scope.nodes[last])
-        for k in range(1, count):
-            share = k / count
-            if block.get("LINE") == "C":
-                point = _on_arc(scope, block, row, a, b, share)
-            else:
-                point = _between(a, b, share)
-            scope.place(block, row, first + k * step, point)
-        numbers += range(first, last + (1 if step > 0 else -1), step)
-        if block.get("LINE") != "C" and any(row.fields[3:]):
-            raise block.refused("a point of a curve needs LINE=C", row)
-    scope.add_nodes(block, numbers)
-
-
-def _between(a: np.ndarray, b: np.ndarray, share: float) -> Point:
-    r, z = a + share * (b - a)
-    return float(r), float(z)
-
-
-def _on_arc(
-    scope: Scope, block: Block, row: Row, a: np.ndarray, b: np.ndarray, share: float
-) -> Point:
-    centre = scope.nodes.get(row.integer(3)) if row.text(3) else (row.number(4), row.number(5))
-    if centre is None:
-        raise block.refused(f"node {row.text(3)} is not defined above", row)
-    if any(row.fields[7:9]):
-        raise block.refused("a normal of the arc is not honoured: the shorter arc is taken", row)
-    c = np.array(centre)
-    u, v = a - c, b - c
-    radius, other = np.hypot(*u), np.hypot(*v)
-    if abs(radius - other) > 1e-6 * radius or not radius:
-        raise block.refused("the arc's ends are not equally far from its centre", row)
-    angle = np.arctan2(u[0] * v[1] - u[1] * v[0], u @ v) * share
-    cos, sin = np.cos(angle), np.sin(angle)
-    return float(c[0] + cos * u[0] - sin * u[1]), float(c[1] + sin * u[0] + cos * u[1])
-
-
-def _nfill(scope: Scope, block: Block) -> None:
-    """Two sets, intervals between, increment: nodes on straight lines between their nodes."""
-    bias = Row(block.place, (block.parameters.get("BIAS", "1"),)).number(0)
-    if bias <= 0:
-        raise block.refused("BIAS must be positive")
-    numbers: list[int] = []
-    for row in block.rows:
-        sets = [scope.nodes_in(row.name(i), block, row) for i in (0, 1)]
-        pairs = [
-            members if _unsorted(scope, row.name(i)) else sorted(members)
-            for i, members in enumerate(sets)
-        ]
-        if len(pairs[0]) != len(pairs[1]):
-            raise block.refused(f"the sets have {len(pairs[0])} and {len(pairs[1])} nodes", row)
-        count, step = row.integer(2), row.integer(3, 1)
-        if count < 1:
-            raise block.refused("the number of intervals must be 1 or more", row)
-        lengths = bias ** -np.arange(count)  # each is bias times the one behind it
-        shares = np.cumsum(lengths) / lengths.sum()
-        for first, last in zip(*pairs, strict=True):
-            if first + count * step != last:
-                raise block.refused(
-                    f"{count} steps of {step} do not lead from {first} to {last}", row
-                )
-            a, b = np.array(scope.nodes[first]), np.array(scope.nodes[last])
-            for k in range(1, count):
-                scope.place(block, row, first + k * step, _between(a, b, shares[k - 1]))
-            numbers += range(first, last + (1 if step > 0 else -1), step)
-    scope.add_nodes(block, numbers)
-
-
-def _unsorted(scope: Scope, name: str) -> bool:
-    return any("UNSORTED" in block.parameters for block, _ in scope.node_sets.get(name, ()))
-
-
-def _ncopy(scope: Scope, block: Block) -> None:
-    """Copies of a set, shifted, or mirrored about a line."""
-    shift = Row(block.place, (block.need("CHANGE NUMBER"),)).integer(0)
-    old = scope.nodes_in(block.need("OLD SET"), block)
-    times = Row(block.place, (block.parameters.get("MULTIPLE", "1"),)).integer(0)
-    if ("SHIFT" in block.parameters) == ("REFLECT" in block.parameters):
-        raise block.refused("needs SHIFT or REFLECT=LINE")
-    move: Callable[[Point, int], Point]
-    if "SHIFT" in block.parameters:
-        if not 1 <= len(block.rows) <= 2 or (len(block.rows) == 2 and block.rows[1].number(6, 0.0)):
-            raise block.refused("a shift is a line of displacements; a rotation is not honoured")
-        dr, dz = (block.rows[0].number(i, 0.0) for i in (0, 1))
-        if block.rows[0].number(2, 0.0):
-            raise block.refused("a shift out of the section is not honoured", block.rows[0])
-        move = lambda point, k: (point[0] + k * dr, point[1] + k * dz)
-    else:
-        mirror = mirror_of(block)
-        move = lambda point, k: mirror(point)
-        if times != 1:
-            raise block.refused("MULTIPLE goes with SHIFT")
-    new = []
-    for k in range(1, times + 1):
-        for n in old:
-            scope.place(block, None, n + k * shift, move(scope.nodes[n], k))
-            new.append(n + k * shift)
-    scope.add_nodes(block, new, "NEW SET")
-
-
 def mirror_of(block: Block) -> Callable[[Point], Point]:
     """The mirror image about a line through two points, r, z, 0 each; on the first line, or on
     two."""
@@ -284,116 +133,6 @@ def mirror_of(block: Block) -> Callable[[Point], Point]:
         return float(ar + r), float(az + z)
 
     return mirror
-
-
-def _nset(scope: Scope, block: Block) -> None:
-    name = block.need("NSET")
-    if of := block.get("ELSET"):
-        nodes = lambda: [n for e in scope.elements_in(of, block) for n in scope.elements[e].nodes]
-        scope._add(scope.node_sets, name, block, nodes)
-        return
-    scope._add(
-        scope.node_sets, name, block, lambda: _listed(scope, block, scope.nodes_in, scope.nodes)
-    )
-
-
-def _elset(scope: Scope, block: Block) -> None:
-    name = block.need("ELSET")
-    scope._add(
-        scope.element_sets,
-        name,
-        block,
-        lambda: _listed(scope, block, scope.elements_in, scope.elements),
-    )
-
-
-def _listed(scope: Scope, block: Block, members: Callable, known: dict) -> list[int]:
-    """Members of a set's data lines: numbers and names of other sets, or first, last, step."""
-    found: list[int] = []
-    what = "node" if block.name == "NSET" else "element"
-    for row in block.rows:
-        if "GENERATE" in block.parameters:
-            first, last, step = row.integer(0), row.integer(1), row.integer(2, 1)
-            if step < 1 or last < first or (last - first) % step:
-                raise block.refused(f"{first} to {last} is no whole number of steps {step}", row)
-            some = list(range(first, last + 1, step))
-        else:
-            some = []
-            for text in filter(None, row.fields):
-                if text.isdigit():
-                    some.append(int(text))
-                else:
-                    some += members(named(text), block, row)
-        missing = [n for n in some if n not in known]
-        if missing:
-            raise block.refused(f"{what} {missing[0]} of the set is not defined", row)
-        found += some
-    return found
-
-
-def _element(scope: Scope, block: Block) -> None:
-    kind = block.need("TYPE")
-    count = nodes_of(kind)
-    if count is None:
-        raise block.refused(
-            f"TYPE={kind} is no element of a revolved tyre: CGAX for rubber, SFMGAX for plies, RAX2"
-            " for a rim"
-        )
-    numbers = []
-    for row in block.rows:
-        fields = [field for field in row.fields if field]
-        if len(fields) != count + 1:
-            raise block.refused(f"a {kind} element has {count} nodes, got {len(fields) - 1}", row)
-        number = row.integer(0)
-        nodes = tuple(Row(row.place, (text,)).integer(0) for text in fields[1:])
-        scope.make(block, row, number, kind, nodes)
-        numbers.append(number)
-    scope.add_elements(block, numbers)
-
-
-def _elgen(scope: Scope, block: Block) -> None:
-    """Master element; elements of a row with increments of nodes and of numbers; rows likewise."""
-    made: list[int] = []
-    for row in block.rows:
-        master = row.integer(0)
-        if master not in scope.elements:
-            raise block.refused(f"element {master} is not defined above", row)
-        element = scope.elements[master]
-        if any(row.fields[7:]):
-            raise block.refused("layers of elements are not honoured in a section", row)
-        along, nodes, numbers = row.integer(1), row.integer(2, 1), row.integer(3, 1)
-        rows, row_nodes, row_numbers = row.integer(4, 1), row.integer(5, 1), row.integer(6, 1)
-        if along < 1 or rows < 1:
-            raise block.refused("the numbers of elements and of rows must be 1 or more", row)
-        for j in range(rows):
-            for i in range(along):
-                number = master + i * numbers + j * row_numbers
-                made.append(number)
-                if i or j:
-                    shifted = (n + i * nodes + j * row_nodes for n in element.nodes)
-                    scope.make(block, row, number, element.kind, tuple(shifted))
-    scope.add_elements(block, made)
-
-
-def _elcopy(scope: Scope, block: Block) -> None:
-    """Copies of a set, on nodes of shifted numbers; of mirrored nodes in the reverse order."""
-    one = lambda name: Row(block.place, (block.need(name),)).integer(0)
-    shift, nodes = one("ELEMENT SHIFT"), one("SHIFT NODES")
-    made = []
-    for n in scope.elements_in(block.need("OLD SET"), block):
-        element = scope.elements[n]
-        shifted = tuple(node + nodes for node in element.nodes)
-        if "REFLECT" in block.parameters:
-            shifted = reflected(element, shifted)
-        scope.make(
-            block,
-            element.row if not block.rows else block.rows[0],
-            n + shift,
-            element.kind,
-            shifted,
-        )
-        made.append(n + shift)
-    scope.add_elements(block, made, "NEW SET")
 
 
 def reflected(element: Element, nodes: tuple[int, ...]) -> tuple[int, ...]:
@@ -421,17 +160,3 @@ def corner_areas(element: Element, points: Mapping[int, Point]) -> np.ndarray:
     along, back = np.roll(X, -1, 0) - X, np.roll(X, 1, 0) - X
     area: np.ndarray = along[:, 0] * back[:, 1] - along[:, 1] * back[:, 0]
     return area
-
-
-MESH_READERS: dict[str, Callable[[Scope, Block], None]] = {
-    "NODE": _node,
-    "SYSTEM": _system,
-    "NGEN": _ngen,
-    "NFILL": _nfill,
-    "NCOPY": _ncopy,
-    "NSET": _nset,
-    "ELEMENT": _element,
-    "ELGEN": _elgen,
-    "ELCOPY": _elcopy,
-    "ELSET": _elset,
-}

@@ -1,0 +1,143 @@
+"""Parts and instances made one: nodes, elements and sets, and the options that act on them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+
+from .generation import MESH_READERS, read
+from .scope import Element, Scope
+from .text import Block
+
+
+@dataclass
+class Assembly:
+    """What stands in the deck, parts under their instances' names."""
+
+    root: Scope = field(default_factory=Scope)
+    sections: list[tuple[Block, str]] = field(default_factory=list)  # with names' prefix
+    surfaces: dict[str, tuple[Block, str]] = field(default_factory=dict)
+    rules: list[tuple[Block, str]] = field(default_factory=list)  # rigid bodies, ties, embedded
+    held: list[Block] = field(default_factory=list)
+    reflect: Block | None = None
+
+
+@dataclass
+class Part:
+    """A *PART."""
+
+    block: Block
+    scope: Scope
+    other: list[Block] = field(default_factory=list)
+    instances: dict[str, tuple[dict[int, int], dict[int, int]]] = field(default_factory=dict)
+
+
+def collect(blocks: Sequence[Block]) -> Assembly:
+    """The deck's. Raises OwnDeckError."""
+    made, parts = Assembly(), dict[str, Part]()
+    part: Part | None = None
+    instance = False
+    for block in blocks:
+        if instance and block.name != "END INSTANCE":
+            raise block.refused("stands in an *INSTANCE: give it in the *PART")
+        if block.name == "PART":
+            name = block.need("NAME")
+            if name in parts:
+                raise block.refused(f"the part {name} is defined twice")
+            part = parts[name] = Part(block, Scope(name))
+        elif block.name == "END PART":
+            part = None
+        elif block.name == "INSTANCE":
+            instance = True
+            _instance(made, parts, block)
+        elif block.name == "END INSTANCE":
+            instance = False
+        elif part is not None:
+            if block.name in MESH_READERS:
+                read(part.scope, block)
+            part.other.append(block)
+        elif block.name in MESH_READERS and not block.get("INSTANCE"):
+            read(made.root, block)
+        else:
+            _other(made, block, "", parts)
+    for each in parts.values():
+        if not each.instances:
+            raise each.block.refused("no *INSTANCE of it is in the assembly")
+    return made
+
+
+def _instance(made: Assembly, parts: dict[str, Part], block: Block) -> None:
+    """Put a part's nodes, elements, sets and options in the model under INSTANCE.NAME."""
+    name, part = block.need("NAME"), parts.get(block.need("PART"))
+    if part is None:
+        raise block.refused(f"the part {block.get('PART')} is not defined above")
+    if any(name in each.instances for each in parts.values()):
+        raise block.refused(f"the instance {name} is defined twice")
+    dr = block.rows[0].number(0, 0.0) if block.rows else 0.0
+    dz = block.rows[0].number(1, 0.0) if block.rows else 0.0
+    if len(block.rows) > 2 or (len(block.rows) == 2 and block.rows[1].number(6, 0.0)):
+        raise block.refused("a rotation of an instance is not honoured")
+    root, own = made.root, part.scope
+    more = max(root.nodes, default=0) if root.nodes.keys() & own.nodes.keys() else 0
+    further = max(root.elements, default=0) if root.elements.keys() & own.elements.keys() else 0
+    nodes = {n: n + more for n in own.nodes}
+    elements = {n: n + further for n in own.elements}
+    for n, (r, z) in own.nodes.items():
+        root.nodes[nodes[n]] = (r + dr, z + dz)
+    for n, e in own.elements.items():
+        moved = tuple(nodes[each] for each in e.nodes)
+        root.elements[elements[n]] = Element(e.kind, moved, e.block, e.row)
+    part.instances[name] = nodes, elements
+    for sets, own_sets, numbers, members in (
+        (root.node_sets, own.node_sets, nodes, own.nodes_in),
+        (root.element_sets, own.element_sets, elements, own.elements_in),
+    ):
+        for each, defined in own_sets.items():
+            of = _mapped(members, each, defined[0][0], numbers)
+            sets[f"{name}.{each}"] = [(defined[0][0], of)]
+        for n, m in numbers.items():
+            sets[f"{name}.{n}"] = [(block, lambda m=m: [m])]  # type: ignore[misc]
+    for other in part.other:
+        if other.name not in MESH_READERS:
+            _other(made, other, f"{name}.", parts)
+
+
+def _mapped(
+    members: Callable[[str, Block], list[int]], name: str, block: Block, numbers: dict[int, int]
+) -> Callable[[], list[int]]:
+    return lambda: [numbers[n] for n in members(name, block)]
+
+
+def _other(made: Assembly, block: Block, prefix: str, parts: dict[str, Part]) -> None:
+    name = block.name
+    if name in ("NSET", "ELSET"):  # of an instance, from outside it
+        for part in parts.values():
+            if numbers := part.instances.get(block.get("INSTANCE")):
+                what = 0 if name == "NSET" else 1
+                own = block.need(name)
+                inside = replace(
+                    part.scope,
+                    node_sets={k: v for k, v in part.scope.node_sets.items() if k != own},
+                    element_sets={k: v for k, v in part.scope.element_sets.items() if k != own},
+                )
+                read(inside, block)
+                members = (inside.nodes_in, inside.elements_in)[what]
+                sets = (made.root.node_sets, made.root.element_sets)[what]
+                of = _mapped(members, own, block, numbers[what])
+                sets.setdefault(own, []).append((block, of))
+                return
+        raise block.refused(f"the instance {block.get('INSTANCE')} is not defined above")
+    if name in ("SOLID SECTION", "SURFACE SECTION"):
+        made.sections.append((block, prefix))
+    elif name == "SURFACE":
+        if prefix + block.need("NAME") in made.surfaces:
+            raise block.refused(f"the surface {block.get('NAME')} is defined twice")
+        made.surfaces[prefix + block.need("NAME")] = block, prefix
+    elif name in ("RIGID BODY", "TIE", "EMBEDDED ELEMENT"):
+        made.rules.append((block, prefix))
+    elif name == "BOUNDARY":
+        made.held.append(block)
+    elif name == "SYMMETRIC MODEL GENERATION":
+        if made.reflect:
+            raise block.refused("stands there twice")
+        made.reflect = block

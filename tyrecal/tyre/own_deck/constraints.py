@@ -1,0 +1,192 @@
+"""What the rim holds, and plies that are tied to or embedded in rubber."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from .assembly import Assembly
+from .grammar import Sorted
+from .scope import Point, mirror_of
+from .surfaces import is_rigid, surface_nodes
+from .text import Block, Row
+
+MERGED = 1e-6  # of the section's size: nodes closer than this are one where they are tied
+
+
+@dataclass(frozen=True, eq=False)
+class Embedded:
+    """An *EMBEDDED ELEMENT some of whose nodes are no rubber's: elements of each data line."""
+
+    block: Block
+    hosts: tuple[int, ...]
+    lines: tuple[tuple[Row, tuple[int, ...]], ...]
+
+
+class Constraints:
+    """Of a deck. rim: nodes that it holds; reference: its node; same: node to the node that it is
+    one with; guests: embedded nodes where the rubber has none. Raises OwnDeckError."""
+
+    def __init__(self, made: Assembly, found: Sorted):
+        self.made, self.found, self.root = made, found, made.root
+        self.rim: dict[int, None] = {}
+        self.reference: tuple[int, Point] | None = None
+        self.same: dict[int, int] = {}
+        self.embedded: list[Embedded] = []
+        self.guests: set[int] = set()
+        sizes = np.array(list(self.root.nodes.values()) or [(0.0, 0.0)])
+        self.near = MERGED * float(np.ptp(sizes, axis=0).max())
+        self._rules()
+        self._held()
+
+    def _rules(self) -> None:
+        """Rigid bodies, then what is tied or embedded."""
+        for block, prefix in self.made.rules:
+            if block.name == "RIGID BODY":
+                self._rigid(block, prefix)
+        for block, prefix in self.made.rules:
+            if block.name == "TIE":
+                self._tie(block, prefix)
+            elif block.name == "EMBEDDED ELEMENT":
+                self._embed(block, prefix)
+
+    def _rigid(self, block: Block, prefix: str) -> None:
+        if self.reference:
+            raise block.refused("one rigid body is honoured, the rim")
+        name = block.need("REF NODE")
+        reference = self.root.nodes_in(prefix + name, block)
+        if len(reference) != 1:
+            raise block.refused(f"REF NODE={name} is {len(reference)} nodes, one is needed")
+        self.reference = reference[0], self.root.nodes[reference[0]]
+        if not (block.get("TIE NSET") or block.get("ELSET")):
+            raise block.refused("needs TIE NSET= or ELSET=")
+        if tied := block.get("TIE NSET"):
+            self.rim |= dict.fromkeys(self.root.nodes_in(prefix + tied, block))
+        if body := block.get("ELSET"):
+            for n in self.root.elements_in(prefix + body, block):
+                self.rim |= dict.fromkeys(self.root.elements[n].nodes)
+        self.rim.pop(reference[0], None)
+
+    def _tie(self, block: Block, prefix: str) -> None:
+        """The bead on the rim's elements, or two surfaces of the same places."""
+        for row in block.rows:
+            slaves = surface_nodes(self.made, prefix + row.name(0), block, row)
+            name = prefix + row.name(1)
+            surface = self.made.surfaces.get(name)
+            if surface and is_rigid(self.made, *surface):
+                self.rim |= dict.fromkeys(slaves)
+                continue
+            for n, distance in self._merge(
+                slaves, surface_nodes(self.made, name, block, row)
+            ).items():
+                raise block.refused(
+                    f"node {n} lies {distance:.3g} from the nearest node that it could be tied to:"
+                    " only nodes in the same place are, mesh both alike",
+                    row,
+                )
+
+    def _embed(self, block: Block, prefix: str) -> None:
+        """Plies on nodes of their own: those where the rubber has nodes are the rubber's."""
+        hosts = (
+            self.root.elements_in(prefix + block.get("HOST ELSET"), block)
+            if block.get("HOST ELSET")
+            else [n for n, e in self.root.elements.items() if e.is_solid]
+        )
+        rubber = list(dict.fromkeys(n for e in hosts for n in self.root.elements[e].nodes))
+        lines, before = [], len(self.guests)
+        for row in block.rows:
+            for name in filter(None, row.fields):
+                members = self.root.elements_in(prefix + name.strip('"').upper(), block, row)
+                wrong = [n for n in members if not self.root.elements[n].is_ply]
+                if wrong:
+                    raise block.refused(f"element {wrong[0]} of {name} is no SFMGAX", row)
+                own = dict.fromkeys(n for e in members for n in self.root.elements[e].nodes)
+                own = dict.fromkeys(own.keys() - set(rubber))
+                self.guests |= self._merge(list(own), rubber).keys()
+                lines.append((row, tuple(members)))
+        if len(self.guests) > before:
+            self.embedded.append(Embedded(block, tuple(hosts), tuple(lines)))
+
+    def _merge(self, some: Sequence[int], others: Sequence[int]) -> dict[int, float]:
+        """Each of ``some`` nodes is one with that of ``others`` which lies there; distance to the
+        nearest of those where none does."""
+        from scipy.spatial import KDTree  # late: a quarter of a second
+
+        if not some:
+            return {}
+        far: dict[int, float] = {}
+        places = np.array([self.root.nodes[n] for n in others])
+        away, nearest = KDTree(places).query(np.array([self.root.nodes[n] for n in some]))
+        for n, distance, k in zip(some, away, nearest, strict=True):
+            if distance > self.near:
+                far[n] = float(distance)
+            elif n != others[k]:
+                self.same[n] = others[k]
+                if n in self.rim:
+                    self.rim[others[k]] = None
+        return far
+
+    def _held(self) -> None:
+        """What *BOUNDARY holds: the rim's reference node, the bead, or the plane of a half."""
+        blocks = [*self.made.held, *(b for b in self.found.inflation if b.name == "BOUNDARY")]
+        fixed: dict[int, set[int]] = {}
+        for block in blocks:
+            for row in block.rows:
+                freedoms = _freedoms(block, row)
+                for n in self.root.nodes_in(row.name(0), block, row):
+                    fixed.setdefault(n, set()).update(freedoms)
+        if self.reference:
+            own = fixed.pop(self.reference[0], set())
+            if not {1, 2, 6} <= own:
+                raise self.made.rules[0][0].refused(
+                    f"*BOUNDARY must hold the rim's node {self.reference[0]} in 1, 2 and 6"
+                )
+        solid = {n for e in self.root.elements.values() for n in e.nodes}
+        for n, freedoms in fixed.items():
+            if n not in solid:
+                continue
+            point = self.root.nodes[n]
+            if {1, 2} <= freedoms and (5 in freedoms or n in self.rim):
+                self.rim[n] = None
+            elif n in self.rim or (
+                freedoms <= {2, 4, 6} and self.made.reflect and self.on_plane(point)
+            ):
+                continue
+            else:
+                block, row = self._where(n, blocks)
+                hint = (
+                    "a half is made whole by *SYMMETRIC MODEL GENERATION, REFLECT=LINE"
+                    if freedoms <= {2, 4, 6}
+                    else "a rim holds 1, 2 and 5 (ENCASTRE)"
+                )
+                raise block.refused(f"node {n} is held in {sorted(freedoms)} only: {hint}", row)
+
+    def _where(self, number: int, blocks: Sequence[Block]) -> tuple[Block, Row]:
+        return next(
+            (block, row)
+            for block in blocks
+            for row in block.rows
+            if number in self.root.nodes_in(row.name(0), block, row)
+        )
+
+    def on_plane(self, point: Point) -> bool:
+        assert self.made.reflect
+        r, z = mirror_of(self.made.reflect)(point)
+        return max(abs(r - point[0]), abs(z - point[1])) <= self.near
+
+
+def _freedoms(block: Block, row: Row) -> set[int]:
+    """Degrees of freedom that a data line holds at 0."""
+    kind = row.name(1)
+    named = {"ENCASTRE": range(1, 7), "PINNED": range(1, 4), "YSYMM": (2, 4, 6)}
+    if kind in named:
+        return set(named[kind])
+    first = row.integer(1)
+    last = row.integer(2, first)
+    if not 1 <= first <= last <= 6:
+        raise block.refused(f"{first} to {last} are no degrees of freedom of a section", row)
+    if row.number(3, 0.0):
+        raise block.refused("only displacements of 0 are honoured", row)
+    return set(range(first, last + 1))
