@@ -142,7 +142,7 @@ def test_what_a_verdict_by_a_constant_hangs_on() -> None:
     d = exact(toy, {"e0": 0.7})
     assert d.verdict.key == "e0"
     found = d.robustness
-    assert "the standard deviation of gauge twice as large: undecided" in found.hangs_on
+    assert "the standard deviation of gauge twice as large (then undecided)" in found.hangs_on
     assert not any("half as large" in each and "gauge" in each for each in found.hangs_on)
     p = d.probabilities["none"]
     assert found.low < 1 - 2 * p / (1 + p)

@@ -24,7 +24,7 @@ FACTORS = {0.5: "half", 2.0: "twice"}
 LEAST_WEIGHED = 1e-5  # of the likeliest explanation's probability, from which one is weighed again
 MOST_WEIGHED = 20  # explanations
 KEPT_BELOW = 8.0  # of ln posterior of a grid's points below the best, that are
-JUDGED = {NAMED: "named", UNDECIDED: "undecided", NO_GAP: "no gap", "outside": "outside"}
+JUDGED = {UNDECIDED: "undecided", NO_GAP: "no gap", "outside": "outside the catalogue"}
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ def robustness(
         p.append(said(found, verdict))
         other = decide(judged, found, rows, len(problem.centre))
         if (other.kind, other.key) != (verdict.kind, verdict.key):
-            changes.append(f"{words}: {_judged(other)}")
+            changes.append(f"{words} ({_judged(other)})")
     return Robustness(not changes, tuple(changes), min(p), max(p))
 
 
@@ -165,5 +165,5 @@ def _again(problem: InverseProblem, h: Hypothesis) -> Hypothesis:
 
 def _judged(verdict: Verdict) -> str:
     """A verdict in a few words."""
-    words = JUDGED[verdict.kind]
-    return f"{words}: {' and '.join(verdict.key.split('+'))}" if verdict.key else words
+    named = f"{' and '.join(verdict.key.split('+'))} named" if verdict.key else ""
+    return f"then {named or JUDGED[verdict.kind]}"
