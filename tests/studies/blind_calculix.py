@@ -54,6 +54,7 @@ from tyrecal.tyre.resolve import resolved
 from tyrecal.tyre.values import with_values
 
 from ..blind.laws import other_laws
+from ..effects.support import exact
 from .calculix import common, modes_of, split
 
 Array = np.ndarray
@@ -75,7 +76,7 @@ def meshed(case: LoadedCase) -> LoadedCase:
 @cache
 def base() -> LoadedCase:
     """The tyre of the trials."""
-    return meshed(load_case(ROOT / "cases" / "p235_75r17.yaml"))
+    return meshed(exact(load_case(ROOT / "cases" / "p235_75r17.yaml")))
 
 
 def training(count: int) -> list[dict[str, float]]:

@@ -26,6 +26,7 @@ from dataclasses import replace
 import numpy as np
 
 from tests.conftest import CASES
+from tests.effects.support import exact
 from tyrecal.measured.tables import read_measurements
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
@@ -47,7 +48,7 @@ from tyrecal.tyre.load import load_case
 from tyrecal.tyre.state import TyreState
 
 Array = np.ndarray
-CASE = load_case(CASES / "p235_75r17.yaml")
+CASE = exact(load_case(CASES / "p235_75r17.yaml"))
 VARIABLES = [read_variable(name, v) for name, v in CASE.case.variables.items()]
 LABELS = [target.label for target in read_targets(CASE)]
 PRESSURES = [192.0, 240.0, 288.0]
