@@ -91,6 +91,13 @@ def study(
         [runs[path] for path in switched],
         assumed.split,
     )
+    elsewhere = {
+        f"{path.name}: what was measured under load with the rim {each.rim}: not compared": None
+        for path, run in runs.items()
+        for each in run
+        if each.load_N and each.rim
+    }
+    observations = replace(observations, left_out=(*observations.left_out, *elsewhere))
     rows = list(dict.fromkeys(row.row for row in observations.rows))
     if not any(label for label, _ in rows):
         raise InputError(f"{measured}: there is no frequency of the unloaded tyre in it")
