@@ -135,11 +135,11 @@ def examine(text: str, long_term: bool) -> float | tuple[int, str]:
     """The mass, kg, of the tyre in a section job's model, or a refusal: its line and words."""
     from .deck.grammar import check
     from .deck.keywords import DeckError, read_keywords
-    from .section.mechanics import mass
+    from .section.mechanics import total_mass
     from .section.model import build
 
     try:
         section, _ = check(read_keywords(text), False)
-        return float(2 * np.pi * mass(build(section, None, long_term)).sum().real)
+        return total_mass(build(section, None, long_term)).real
     except DeckError as error:
         return int(error.line), str(error).partition(": ")[2]

@@ -22,8 +22,7 @@ from .modes.harmonics import HarmonicModes
 from .modes.sensitivity import state_rate
 from .modes.wheel import free_along_load
 from .results import StepResult, write
-from .road import footprint_job
-from .road.slopes import ROAD_NUMBERS, InflatedTangent
+from .road.road_data import ROAD_NUMBERS, InflatedTangent, ModesAtLoad, read_road
 from .section import mechanics
 from .section.band import Numbering
 from .section.boundary import keeps_half_turn, numbering
@@ -49,6 +48,8 @@ def run(folder: Path, job: str, oldjob: str | None, time_limit: float = float("i
         analysis = Job(deck, request, deadline, sector, start)
         try:
             if analysis.road is not None:
+                from .road import footprint_job  # late: only what is pressed needs it
+
                 footprint_job.write(folder / job, analysis.model, analysis.press())
             else:
                 write(folder / job, analysis.model, analysis.run())
@@ -83,7 +84,7 @@ class Job:
         start: np.ndarray | None = None,
     ):
         section, revolve, self.steps = deck.read([])
-        self.deadline, self.road = deadline, footprint_job.read_road(revolve)
+        self.deadline, self.road = deadline, read_road(revolve)
         mesh, half = read_mesh(section), False
         if self.road is None:
             filled = [section, list(sector)] if sector else [section]
@@ -93,9 +94,8 @@ class Job:
         U = np.zeros((len(mesh.X), 3))
         check = self._check_time
         self.tyre = Inflated(deck, request, section, revolve, list(sector), models, half, U, check)
-        copies = self.model.mesh.symmetry.copies
-        self.mass_kg = float(copies * 2 * np.pi * mechanics.mass(self.model).sum().real)
-        self.mass_kg += self.tyre.attached().total_kg.real
+        self.mass_kg = float(mechanics.total_mass(self.model).real)
+        self.mass_kg += float(self.tyre.attached().total_kg.real)
         self.factorisations = 0
         self.guess = _on_nodes(start, mesh)
 
@@ -116,7 +116,7 @@ class Job:
         there."""
         assert self.road is not None
         wanted: list[float] = []
-        vibrations: dict[float, footprint_job.ModesAtLoad] = {}
+        vibrations: dict[float, ModesAtLoad] = {}
         for step in self.steps:
             if step.centrifugal:
                 raise DeckError(step.procedure.line, "a turning tyre on a road is not honoured")
@@ -144,6 +144,8 @@ class Job:
         step = self.steps[last]
         model = self.tyre.models(None, step.long_term, False)
         equations, acting = numbering(model, step), pressures(model, step)
+        from .road import footprint_job  # late, as in `run`
+
         found = footprint_job.press(
             model,
             equations,
@@ -175,7 +177,7 @@ class Job:
         newton, found = equations.factor(equations.assemble(stiffness)), {}
         for variable, rows in asked.items():
             section, revolve, steps = self.tyre.deck.read(rows)
-            step, road = steps[place], footprint_job.read_road(revolve)
+            step, road = steps[place], read_road(revolve)
             step.held = self._off_road(step)
             seeded = build(section, None, step.long_term)
             loads, rate = pressures(seeded, step), lambda number: np.imag(number) / COMPLEX_STEP
@@ -200,7 +202,7 @@ class Job:
         free, _ = hertz(np.stack([U, U]), np.array([0.0, np.pi]))
         return {"cavity_Hz": free, "footprints": footprints}
 
-    def _vibrating(self, step: DeckStep) -> footprint_job.ModesAtLoad:
+    def _vibrating(self, step: DeckStep) -> ModesAtLoad:
         """What a *FREQUENCY step on the road asks for."""
         assert self.road is not None
         line, row = step.procedure.line, step.procedure.only_row()
@@ -217,7 +219,7 @@ class Job:
         dynamic_Hz = step.procedure.number("PROPERTY EVALUATION")
         model = self.tyre.models(dynamic_Hz, step.long_term, False)
         wheel_kg = free_along_load(self.tyre.revolve, self.model.mesh, step)
-        return footprint_job.ModesAtLoad(model, row.integer(0), nodes, wheel_kg)
+        return ModesAtLoad(model, row.integer(0), nodes, wheel_kg)
 
     def _static(self, step: DeckStep) -> None:
         self._check_time()

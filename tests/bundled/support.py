@@ -17,6 +17,7 @@ from tyrecal_solvers.bundled.section.band import Numbering
 from tyrecal_solvers.bundled.section.model import Model
 from tyrecal_solvers.bundled.section.parts.pressure import Pressure
 from tyrecal_solvers.bundled.section.parts.spin import spinning
+from tyrecal_solvers.bundled.section.sparse import Sparse
 from tyrecal_solvers.errors import NoEquilibrium
 
 from tyrecal.tyre.section.mesh import build_mesh
@@ -37,6 +38,11 @@ def bears(patch: pytest.MonkeyPatch, most_N: float) -> None:
         return newton(press, load)
 
     patch.setattr(ContactNewton, "_newton", at_most)
+
+
+def full(matrix: Sparse) -> Array:
+    """All its entries (n, n)."""
+    return matrix @ np.eye(len(matrix.starts) - 1)
 
 
 @dataclass(frozen=True)

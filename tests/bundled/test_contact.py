@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from tyrecal_solvers.bundled.deck.keywords import DeckError, read_keywords
 from tyrecal_solvers.bundled.road.contact import Bound, Contact, FlatRoad
-from tyrecal_solvers.bundled.road.footprint_job import read_road
 from tyrecal_solvers.bundled.road.patch import patch
+from tyrecal_solvers.bundled.road.road_data import read_road
 from tyrecal_solvers.bundled.solid3d.circumference import Circumference, half_circle
 from tyrecal_solvers.bundled.solid3d.gmres import gmres
 

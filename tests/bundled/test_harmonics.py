@@ -25,7 +25,7 @@ def test_modes_are_the_lowest(inflated: Inflated, n: int) -> None:
     K0, K1, K2 = support.matrices(m, inflated.U, inflated.loads)
     K = (K0 + 1j * n * K1 + n * n * K2)[free][:, free]
     mass = mechanics.mass(m)
-    M = np.kron(mass.toarray(), np.eye(3))[free][:, free]
+    M = np.kron(support.full(mass), np.eye(3))[free][:, free]
     wanted = eigh(K, M, eigvals_only=True, subset_by_index=[0, 5])
     number = support.numbering(m, inflated.held)
     vibration = harmonics.Vibration(m, inflated.U, inflated.loads, number, 0.0)

@@ -63,7 +63,7 @@ def test_secular_equation(
     a = on_crown(inflated, mass, spring)
     modes = coupled.attached_modes(vibration, a, WAVES, COUNT)
     free = ~inflated.held.ravel()
-    M = csr_array(np.kron(vibration.mass.toarray(), np.eye(3))[free][:, free])
+    M = csr_array(np.kron(support.full(vibration.mass), np.eye(3))[free][:, free])
     whole = support.matrices(inflated.model, inflated.U, inflated.loads)
     K0, K1, K2 = (csr_array(K[free][:, free]) for K in whole)
     p = np.zeros((len(free), 3))
@@ -366,7 +366,7 @@ class Bricks:
             NN = self.weights[s] * np.outer(self.N[s], self.N[s])
             plain[np.ix_(cols, cols)] += NN
             more[np.ix_(cols, cols)] += self.inside[s] * NN
-        M, other = (np.asarray(m.toarray()) for m in self.mass)
+        M, other = (support.full(m) for m in self.mass)
         whole = kron(csr_array(plain), kron(M, np.eye(3))) + kron(
             csr_array(more), kron(other - M, np.eye(3))
         )

@@ -69,8 +69,8 @@ def test_free_ring_stands_still_in_the_ground_frame() -> None:
     assert abs(U).max() > 1e-5
     K0, K1, K2 = support.matrices(m, U, [])
     K = K0 + 1j * K1 + K2
-    M = np.kron(mechanics.mass(m).toarray(), np.eye(3))
-    C = 2j * spin * np.kron(mechanics.mass(m).toarray(), SPIN_AXIS)
+    M = np.kron(support.full(mechanics.mass(m)), np.eye(3))
+    C = 2j * spin * np.kron(support.full(mechanics.mass(m)), SPIN_AXIS)
     shift = np.tile([1.0, 1j, 0.0], len(U))
     left = (K + spin * C - spin**2 * M) @ shift
     assert np.linalg.norm(left) < 1e-12 * np.linalg.norm(K) * np.linalg.norm(shift)
@@ -92,7 +92,7 @@ def test_waves_are_the_lowest(inflated: Inflated, n: int) -> None:
     free = ~inflated.held.ravel()
     K0, K1, K2 = support.matrices(m, U, inflated.loads)
     K = (K0 + 1j * n * K1 + n * n * K2)[free][:, free]
-    mass = mechanics.mass(m).toarray()
+    mass = support.full(mechanics.mass(m))
     M, C = np.kron(mass, np.eye(3)), 2j * spin * np.kron(mass, SPIN_AXIS)
     M, C = M[free][:, free], C[free][:, free]
     for sign in (1, -1):

@@ -74,11 +74,11 @@ def test_on_a_soft_spring_tyre_and_wheel_move_as_one(motion: str) -> None:
     X = tyre.model.mesh.X + tyre.U[:, [0, 2]]
     mass = mechanics.mass(tyre.model)
     r, w, z = X[:, 0], tyre.U[:, 1], X[:, 1]
-    polar = 2 * np.pi * (r @ mass @ r + w @ mass @ w)
+    polar = 2 * np.pi * (r @ (mass @ r) + w @ (mass @ w))
     own = {
-        "axial": 2 * np.pi * mass.sum(),
+        "axial": 2 * np.pi * mass.entries.sum(),
         "spin": polar,
-        "tilt": polar / 2 + 2 * np.pi * z @ mass @ z,
+        "tilt": polar / 2 + 2 * np.pi * z @ (mass @ z),
     }
     own["radial"] = own["axial"]
     k = STEEL[motion] + own[motion]  # omega = 1 rad/s

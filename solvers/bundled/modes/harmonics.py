@@ -12,7 +12,6 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
-from scipy.sparse import csr_array
 
 from ...errors import Indefinite, RunFailed
 from ..section import mechanics
@@ -120,7 +119,7 @@ class Vibration:
         self._parts = parts
         self._bands = [[numbering.assemble(p) for p in three] for three in parts]
         self.weights = np.array([1.0] + [0.0] * (len(parts) - 1))
-        self.mass: csr_array = mechanics.mass(model)
+        self.mass = mechanics.mass(model)
         self._X = model.mesh.X.real
         self._symmetry = model.mesh.symmetry
         self._forces = U

@@ -10,10 +10,9 @@ with its number p + i h dp, at the state u + i h v; no second derivative is writ
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.sparse import csr_array
 
 from ..deck.keywords import COMPLEX_STEP
 from ..section import mechanics
@@ -21,6 +20,7 @@ from ..section.kept_fields import Coordinates, Factor
 from ..section.model import Model
 from ..section.parts.part import IN_PLANE, ModeShapes, TyrePart
 from ..section.parts.spin import Spin
+from ..section.sparse import Sparse
 from .cavity import GasCavity, coupling
 from .wheel import Wheel
 
@@ -74,7 +74,9 @@ def eigenvalue_rates(
     M = mechanics.mass(model)
     total -= eigenvalues * _energies(M, fields).sum(1)
     if spins:  # of all parts at once, their mass being there
-        total -= _energies(spins[0].spin2 * M, fields) @ np.diag(IN_PLANE)
+        total -= _energies(replace(M, entries=spins[0].spin2 * M.entries), fields) @ np.diag(
+            IN_PLANE
+        )
     total *= copies
     if rim_and_air:
         total += rim_and_air.forms(model, state, loads, fields, eigenvalues)
@@ -131,13 +133,12 @@ class RimAndAir:
         return total
 
 
-def _energies(M: csr_array, fields: ModeShapes) -> Array:
+def _energies(M: Sparse, fields: ModeShapes) -> Array:
     """u^T M u (m, 3) per mode and component; of real shapes only p's tangent, imaginary."""
-    if not (fields.complex or np.iscomplexobj(M.data)):
+    if not (fields.complex or np.iscomplexobj(M.entries)):
         return np.zeros((len(fields.modes), 3), complex)
     if not fields.complex:
-        M = csr_array((M.data.imag, M.indices, M.indptr), M.shape)
-        M.eliminate_zeros()
+        M = M.imag
     energy: Array = np.zeros((len(fields.n), 3), fields.real.dtype)
     for part in (fields.real, fields.imag):
         u = np.moveaxis(part, 0, -1)  # (nodes, 3, shapes)

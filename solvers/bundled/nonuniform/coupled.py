@@ -11,7 +11,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import eigh
 
 from ..modes.harmonics import Combination, HarmonicModes, SeededTyre, Vibration
 from ..section.point_elements import PointElements
@@ -101,6 +100,8 @@ def attached_modes(
     K = fewer.T @ (basis.eigenvalues[:, None] * fewer)
     K += at.T @ (attached.stiffness.real[:, None] * at)
     M = np.eye(len(K)) + at.T @ (attached.mass.real[:, None] * at)
+    from scipy.linalg import eigh  # late: a tyre that is the same all round needs none of it
+
     values, vectors = eigh(K, M)
     return named(basis, values, fewer @ vectors, harmonics, count, p)
 

@@ -17,7 +17,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import eigh
 
 from ..deck.keywords import COMPLEX_STEP
 from ..modes.harmonics import HarmonicModes, SeededTyre, Vibration
@@ -135,5 +134,7 @@ def _quadratic(K: Array, C: Array) -> tuple[Array, Array]:
     """
     one = np.eye(len(K))
     left = np.block([[-C, one], [one, 0 * one]])
+    from scipy.linalg import eigh  # late: a tyre that stands needs none of it
+
     inverse, x = eigh(left, np.diag(np.concatenate([K, np.ones(len(K))])))
     return 1 / inverse, x[: len(K)]

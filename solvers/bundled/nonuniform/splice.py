@@ -104,7 +104,7 @@ class FullCircle:
         around = tyre.around
         share = sector.share(_angles(len(around.weights)), 2 * highest)
         self._waves = around.N.T @ ((around.weights * share)[:, None] * around.N)
-        self._plain = vibration.mass * (2 * np.pi / len(around.angles))
+        self._each = 2 * np.pi / len(around.angles)  # rad
         self._more = mass(sector.model) - vibration.mass
 
     def turning(self, turn: float) -> FullCircle:
@@ -148,8 +148,8 @@ class FullCircle:
         """M~ u, kg m."""
         flat = field.swapaxes(0, 1).reshape(self.free.shape[0], -1)
         shape = self.free.shape[0], len(field), 3
-        image = (self._plain @ flat).reshape(shape)
-        if self._more.nnz and abs(self._more).max():
+        image = (self._each * (self.vibration.mass @ flat)).reshape(shape)
+        if self._more.entries.any():
             image = image + np.einsum(
                 "kj,njc->nkc", self._waves, (self._more @ flat).reshape(shape)
             )

@@ -16,7 +16,7 @@ from __future__ import annotations
 import json
 import logging
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import Refused, RunFailed
-from ..deck.keywords import DeckError, Keyword
+from ..deck.keywords import DeckError
 from ..modes.harmonics import Vibration, lowest_of_all
 from ..section.band import Numbering
 from ..section.model import Model
@@ -39,108 +39,18 @@ from .contact_newton import ContactNewton, PressedState
 from .half_turn_symmetry import HalfTurn
 from .loaded_modes import SPARE, loaded_modes
 from .patch import patch
-from .slopes import InflatedTangent, Slopes
+from .road_data import InflatedTangent, ModesAtLoad, RoadData
+from .slopes import Slopes
 from .stick import held
 from .tread import tread_of
 
 Array = np.ndarray
 log = logging.getLogger("tyrecal_solvers")
 PATCH_ARRAYS = ("ring", "node", "along_m", "across_m", "pressure_Pa", "area_m2", "traction_Pa")
-MIN_ELASTIC_SLIP = 1e-6  # m, before friction is full: harder sticks are not reached
-
 MODE_ARRAYS = (
     *("mode_frequency_Hz", "mode_node", "mode_shape"),
     *("mode_traction_N", "sliding_frequency_Hz", "sliding_shape"),
 )
-
-
-@dataclass(frozen=True)
-class RoadData:
-    """What a deck says of the road."""
-
-    node: str  # its reference node
-    tread: str  # the tread's surface
-    stiffness: complex | float  # of the overclosure, Pa/m
-    friction: complex | float
-    elastic_slip: float  # m
-    lengths: Array  # of the elements round half the tyre, rad
-
-
-@dataclass(frozen=True)
-class ModesAtLoad:
-    """Modes wanted at a load."""
-
-    model: Model
-    count: int
-    nodes: Array  # rows at which their shapes are wanted
-    wheel_kg: float | None = None  # of a wheel that is free along the load
-
-
-def read_road(model: list[Keyword]) -> RoadData | None:
-    """The road of a revolve job's model, or None where it has none. Raises DeckError."""
-    pairs = [k for k in model if k.name == "CONTACT PAIR"]
-    if not pairs:
-        return None
-    pair = pairs[0]
-    if len(pairs) > 1:
-        raise DeckError(pairs[1].line, "one *CONTACT PAIR is honoured, of the tread and the road")
-    tread, surface = (pair.only_row().text(i).upper() for i in (0, 1))
-    bodies = [k for k in model if k.name == "RIGID BODY" and k.get("ANALYTICAL SURFACE") == surface]
-    roads = [k for k in model if k.name == "SURFACE" and k.get("NAME") == surface]
-    if not bodies or not roads:
-        raise DeckError(pair.line, f"{surface} is no analytical surface of a *RIGID BODY")
-    _check_flat(roads[0])
-    found = {k.name: k for k in model if k.name in ("SURFACE BEHAVIOR", "FRICTION")}
-    if len(found) < 2:
-        raise DeckError(pair.line, "the contact needs a *SURFACE BEHAVIOR and a *FRICTION")
-    stiffness = found["SURFACE BEHAVIOR"].only_row().number(0)
-    friction = found["FRICTION"].only_row().number(0)
-    slip = float(np.real(found["FRICTION"].number("ELASTIC SLIP") or 0.0))
-    if not (np.real(stiffness) > 0 and np.real(friction) >= 0 and slip >= MIN_ELASTIC_SLIP):
-        raise DeckError(
-            found["FRICTION"].line,
-            "the contact's stiffness must be positive, friction not negative, the elastic slip at"
-            f" least {MIN_ELASTIC_SLIP:g} m",
-        )
-    return RoadData(
-        bodies[0].need("REF NODE"), tread, stiffness, friction, slip, _half_lengths(model)
-    )
-
-
-def _check_flat(surface: Keyword) -> None:
-    """A line along the axle, swept along the rolling direction, at one distance from the axle."""
-    rows = surface.rows
-    if surface.get("TYPE") != "CYLINDER" or len(rows) != 4:
-        raise DeckError(surface.line, "the road is an analytical surface of TYPE=CYLINDER")
-    axes = [rows[0].real(i) for i in range(6)]
-    sweep = [rows[1].real(i) for i in range(3)]
-    H = axes[0]
-    flat = axes == [H, 0.0, 0.0, H, 1.0, 0.0] and sweep == [H, 0.0, -1.0] and H > 0
-    straight = [rows[2].text(0).upper(), rows[3].text(0).upper()] == ["START", "LINE"]
-    level = not (rows[2].number(2) or rows[3].number(2))
-    if not (flat and straight and level):
-        raise DeckError(surface.line, "only a flat road across the first axis is honoured")
-
-
-def _half_lengths(model: list[Keyword]) -> Array:
-    """Lengths (rad) of the elements from the road's side to the top."""
-    generation = next(k for k in model if k.name == "SYMMETRIC MODEL GENERATION")
-    lengths: list[float] = []
-    for row in generation.rows[2:]:
-        count = row.integer(1)
-        if row.number(2, 1.0) != 1.0:
-            raise DeckError(row.line, "a bias of the elements' lengths is not honoured")
-        lengths += [row.real(0) / count] * count
-    half = np.array(lengths[: len(lengths) // 2])
-    if len(lengths) % 2 or not np.allclose(half, lengths[: len(half) - 1 : -1]):
-        raise DeckError(
-            generation.line, "the elements round a pressed tyre must mirror at 180 degrees"
-        )
-    if len(half) < 2:
-        raise DeckError(
-            generation.line, "a pressed tyre needs four elements round its circumference at least"
-        )
-    return np.radians(half)
 
 
 def press(

@@ -17,38 +17,26 @@ A point that begins to slide is a jump of K, which the derivative of the stiffne
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from ...errors import NoEquilibrium
 from ..deck.keywords import COMPLEX_STEP
-from ..section.model import Model
-from ..section.parts.part import TyrePart
 from ..solid3d.circumference import HalfCircle
 from ..solid3d.revolved import Revolved
 from .contact import Contact, FlatRoad
 from .contact_newton import MAX_GMRES, SMOOTH_RTOL, ContactNewton, PressedState, Tangent
 from .patch import patch
+from .road_data import InflatedTangent
 from .tread import tread_of
 
 Array = np.ndarray
 Values = dict[str, float]
 CONTACT_STEP = 1e-8  # m, of what moves most, in a difference of the contact
 NUMBER_LENGTH = 1e-3  # m, that a relative change of the road's numbers counts as
-ROAD_NUMBERS = ("stiffness", "friction")  # of a `FlatRoad`
-
-
-@dataclass(frozen=True)
-class InflatedTangent:
-    """The inflated tyre and its road with the tangent of a number of the deck."""
-
-    model: Model  # its numbers are complex
-    loads: Sequence[TyrePart]
-    U: Array  # dU/dp (n, 3) of the inflated state
-    road: Mapping[str, float]  # d / dp of `ROAD_NUMBERS`
 
 
 class Slopes:

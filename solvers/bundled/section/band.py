@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.linalg.lapack import dpbtrf, dpbtrs, zpbtrf, zpbtrs
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from ...errors import Indefinite
+from ..compiled import LAPACK
+from .sparse import Sparse, narrow_order
 
 Array = np.ndarray
 
@@ -26,9 +25,10 @@ class Numbering:
         cols = np.concatenate([np.tile(c, (1, c.shape[1])).ravel() for c in connectivities])
         touching = np.asarray(free.any(1))
         keep = touching[rows] & touching[cols]
-        graph = csr_array((np.ones(keep.sum(), np.int8), (rows[keep], cols[keep])), (n, n))
-        orders: list[Array] = [np.arange(n), reverse_cuthill_mckee(graph, symmetric_mode=True)]
-        nodes = min(orders, key=lambda order: _spread(graph, order))
+        pairs = np.unique(rows[keep] * n + cols[keep])
+        pairs = np.stack([pairs // n, pairs % n], 1)
+        orders = [np.arange(n), narrow_order(pairs, n)]
+        nodes = min(orders, key=lambda order: _spread(pairs, order))
         if end is not None:
             there = np.flatnonzero(end[nodes[touching[nodes]]])
             if 2 * there.sum() < len(there) * touching.sum():  # nearer to the first node
@@ -102,18 +102,17 @@ class Numbering:
         """Factor of an assembled band, which it overwrites. Raises Indefinite."""
         return Cholesky(band)
 
-    def times(self, mass: csr_array, x: Array) -> Array:
+    def times(self, mass: Sparse, x: Array) -> Array:
         """M x for (size,) or (size, b); ``mass`` (n, n) is that of each component."""
         full = self.spread(x)
         return self.gather((mass @ full.reshape(len(full), -1)).reshape(full.shape))
 
 
-def _spread(graph: csr_array, order: Array) -> int:
+def _spread(pairs: Array, order: Array) -> int:
     """Largest distance of two connected nodes in an order."""
     place = np.empty(len(order), int)
     place[order] = np.arange(len(order))
-    rows, cols = graph.nonzero()
-    return int(abs(place[rows] - place[cols]).max(initial=0))
+    return int(abs(np.diff(place[pairs])).max(initial=0))
 
 
 class Cholesky:
@@ -123,12 +122,12 @@ class Cholesky:
     """
 
     def __init__(self, band: Array):
-        self._solve = zpbtrs if np.iscomplexobj(band) else dpbtrs
-        factorise = zpbtrf if np.iscomplexobj(band) else dpbtrf
+        self._solve = LAPACK.zpbtrs if np.iscomplexobj(band) else LAPACK.dpbtrs
+        factorise = LAPACK.zpbtrf if np.iscomplexobj(band) else LAPACK.dpbtrf
         self._factor, info = factorise(band, lower=1, overwrite_ab=1)
         if info:
             raise Indefinite(f"pivot {info} of {band.shape[1]} is not positive")
 
     def solve(self, right: Array) -> Array:
         """K^-1 right for (size,) or (size, b)."""
-        return self._solve(self._factor, right, lower=1)[0]
+        return np.asarray(self._solve(self._factor, right, lower=1)[0])

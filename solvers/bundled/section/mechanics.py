@@ -9,11 +9,11 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from scipy.sparse import csr_array
 
 from .band import Numbering
 from .model import Model
 from .parts.part import TyrePart
+from .sparse import Sparse
 
 Array = np.ndarray
 OfElements = list[tuple[Array, Array]]  # connectivities with vectors or matrices of elements
@@ -58,17 +58,9 @@ def tangents(
     return three
 
 
-def mass(model: Model) -> csr_array:
+def mass(model: Model) -> Sparse:
     """Consistent mass (n, n), kg per radian, the same for each displacement component."""
-    n = len(model.mesh.X)
-    rows, cols, values = [], [], []
-    for connectivity, matrices in mass_matrices(model):
-        a = connectivity.shape[1]
-        rows.append(np.repeat(connectivity, a, 1).ravel())
-        cols.append(np.tile(connectivity, (1, a)).ravel())
-        values.append(matrices.ravel())
-    entries = np.concatenate(values), (np.concatenate(rows), np.concatenate(cols))
-    return csr_array(entries, (n, n))
+    return Sparse.assembled(mass_matrices(model), len(model.mesh.X))
 
 
 def total_mass(model: Model) -> complex:

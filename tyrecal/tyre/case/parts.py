@@ -61,7 +61,9 @@ def one_of(values: Mapping[str, Any], first: str, second: str) -> Iterator[Disag
 class Part(BaseModel):
     """A part of the case: known keys only, text is never a number, every number finite."""
 
-    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, frozen=True)
+    model_config = ConfigDict(
+        extra="forbid", strict=True, allow_inf_nan=False, frozen=True, defer_build=True
+    )
 
     @classmethod
     def problems(cls, values: Mapping[str, Any]) -> Iterator[Disagreement]:

@@ -15,7 +15,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy.sparse import csr_matrix
 
 from ...deck.keywords import DeckError, Keyword
 from ..materials import Material, ModulusTable
@@ -86,6 +85,8 @@ class AtStations(ABC):
     def __init__(self, connectivity: Array, nodes: int):
         self.connectivity = connectivity
         self.dofs = (3 * connectivity[..., None] + np.arange(3)).reshape(len(connectivity), -1)
+        from scipy.sparse import csr_matrix  # late: a section needs none of it
+
         size = self.dofs.size
         ones = (np.ones(size), (self.dofs.ravel(), np.arange(size)))
         self._assembly = csr_matrix(ones, shape=(3 * nodes, size))

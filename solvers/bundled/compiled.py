@@ -1,0 +1,29 @@
+"""SciPy's compiled routines without the packages round them, whose imports take as long as two
+evaluations: `scipy.linalg` and `scipy.sparse` bring f2py, unittest and half of NumPy along."""
+
+from __future__ import annotations
+
+import sys
+from importlib import import_module
+from importlib.machinery import EXTENSION_SUFFIXES, ExtensionFileLoader, FileFinder
+from importlib.util import module_from_spec
+from pathlib import Path
+from types import ModuleType
+
+import scipy
+
+
+def compiled(name: str) -> ModuleType:
+    """An extension module of SciPy by its dotted name; through its package where it has no file.
+
+    It is the same one for who imports the package before or later."""
+    folder = Path(scipy.__file__).parent.joinpath(*name.split(".")[1:-1])
+    found = FileFinder(str(folder), (ExtensionFileLoader, EXTENSION_SUFFIXES)).find_spec(name)
+    if name in sys.modules or found is None or found.loader is None:
+        return import_module(name)
+    module = sys.modules[name] = module_from_spec(found)
+    found.loader.exec_module(module)
+    return module
+
+
+LAPACK = compiled("scipy.linalg._flapack")

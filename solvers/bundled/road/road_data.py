@@ -1,0 +1,116 @@
+"""What a job says of the road, of modes there and its numbers' tangents: plain data, so that a tyre
+that is not pressed needs nothing else of the road."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..deck.keywords import DeckError, Keyword
+from ..section.model import Model
+from ..section.parts.part import TyrePart
+
+Array = np.ndarray
+MIN_ELASTIC_SLIP = 1e-6  # m, before friction is full: harder sticks are not reached
+ROAD_NUMBERS = ("stiffness", "friction")  # of a `FlatRoad`
+
+
+@dataclass(frozen=True)
+class RoadData:
+    """What a deck says of the road."""
+
+    node: str  # its reference node
+    tread: str  # the tread's surface
+    stiffness: complex | float  # of the overclosure, Pa/m
+    friction: complex | float
+    elastic_slip: float  # m
+    lengths: Array  # of the elements round half the tyre, rad
+
+
+@dataclass(frozen=True)
+class ModesAtLoad:
+    """Modes wanted at a load."""
+
+    model: Model
+    count: int
+    nodes: Array  # rows at which their shapes are wanted
+    wheel_kg: float | None = None  # of a wheel that is free along the load
+
+
+def read_road(model: list[Keyword]) -> RoadData | None:
+    """The road of a revolve job's model, or None where it has none. Raises DeckError."""
+    pairs = [k for k in model if k.name == "CONTACT PAIR"]
+    if not pairs:
+        return None
+    pair = pairs[0]
+    if len(pairs) > 1:
+        raise DeckError(pairs[1].line, "one *CONTACT PAIR is honoured, of the tread and the road")
+    tread, surface = (pair.only_row().text(i).upper() for i in (0, 1))
+    bodies = [k for k in model if k.name == "RIGID BODY" and k.get("ANALYTICAL SURFACE") == surface]
+    roads = [k for k in model if k.name == "SURFACE" and k.get("NAME") == surface]
+    if not bodies or not roads:
+        raise DeckError(pair.line, f"{surface} is no analytical surface of a *RIGID BODY")
+    _check_flat(roads[0])
+    found = {k.name: k for k in model if k.name in ("SURFACE BEHAVIOR", "FRICTION")}
+    if len(found) < 2:
+        raise DeckError(pair.line, "the contact needs a *SURFACE BEHAVIOR and a *FRICTION")
+    stiffness = found["SURFACE BEHAVIOR"].only_row().number(0)
+    friction = found["FRICTION"].only_row().number(0)
+    slip = float(np.real(found["FRICTION"].number("ELASTIC SLIP") or 0.0))
+    if not (np.real(stiffness) > 0 and np.real(friction) >= 0 and slip >= MIN_ELASTIC_SLIP):
+        raise DeckError(
+            found["FRICTION"].line,
+            "the contact's stiffness must be positive, friction not negative, the elastic slip at"
+            f" least {MIN_ELASTIC_SLIP:g} m",
+        )
+    return RoadData(
+        bodies[0].need("REF NODE"), tread, stiffness, friction, slip, _half_lengths(model)
+    )
+
+
+def _check_flat(surface: Keyword) -> None:
+    """A line along the axle, swept along the rolling direction, at one distance from the axle."""
+    rows = surface.rows
+    if surface.get("TYPE") != "CYLINDER" or len(rows) != 4:
+        raise DeckError(surface.line, "the road is an analytical surface of TYPE=CYLINDER")
+    axes = [rows[0].real(i) for i in range(6)]
+    sweep = [rows[1].real(i) for i in range(3)]
+    H = axes[0]
+    flat = axes == [H, 0.0, 0.0, H, 1.0, 0.0] and sweep == [H, 0.0, -1.0] and H > 0
+    straight = [rows[2].text(0).upper(), rows[3].text(0).upper()] == ["START", "LINE"]
+    level = not (rows[2].number(2) or rows[3].number(2))
+    if not (flat and straight and level):
+        raise DeckError(surface.line, "only a flat road across the first axis is honoured")
+
+
+def _half_lengths(model: list[Keyword]) -> Array:
+    """Lengths (rad) of the elements from the road's side to the top."""
+    generation = next(k for k in model if k.name == "SYMMETRIC MODEL GENERATION")
+    lengths: list[float] = []
+    for row in generation.rows[2:]:
+        count = row.integer(1)
+        if row.number(2, 1.0) != 1.0:
+            raise DeckError(row.line, "a bias of the elements' lengths is not honoured")
+        lengths += [row.real(0) / count] * count
+    half = np.array(lengths[: len(lengths) // 2])
+    if len(lengths) % 2 or not np.allclose(half, lengths[: len(half) - 1 : -1]):
+        raise DeckError(
+            generation.line, "the elements round a pressed tyre must mirror at 180 degrees"
+        )
+    if len(half) < 2:
+        raise DeckError(
+            generation.line, "a pressed tyre needs four elements round its circumference at least"
+        )
+    return np.radians(half)
+
+
+@dataclass(frozen=True)
+class InflatedTangent:
+    """The inflated tyre and its road with the tangent of a number of the deck."""
+
+    model: Model  # its numbers are complex
+    loads: Sequence[TyrePart]
+    U: Array  # dU/dp (n, 3) of the inflated state
+    road: Mapping[str, float]  # d / dp of `ROAD_NUMBERS`
