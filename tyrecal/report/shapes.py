@@ -22,7 +22,7 @@ from .revolve import motion, swept
 Array = np.ndarray
 
 ANGLES = 72
-MAX_MERIDIAN_POINTS = 49  # more are not seen
+MAX_MERIDIAN_POINTS = 33  # more are not seen
 MAX_MOTION = 0.12  # displacement in the picture over the tyre's radius
 LINE_WIDTH = 0.009  # inches: meridians in bold
 NEARER = 0.1  # inches: these, to the viewer, so that only other parts of the tyre hide them

@@ -27,6 +27,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import reduce
 from itertools import combinations_with_replacement
 from math import log
 
@@ -333,7 +334,8 @@ def products(degrees: Array, t: Array, by: int = -1) -> Array:
     table = legendre.legvander(t, highest)  # (p, v, degree + 1)
     if by >= 0:
         table[:, by] = legendre.legval(t[:, by], legendre.legder(np.eye(highest + 1))).T
-    return np.asarray(np.prod(table[:, range(t.shape[1]), degrees], axis=2))
+    factors = (table[:, j, own] for j, own in enumerate(degrees.T))
+    return reduce(np.multiply, factors, np.ones((len(t), len(degrees))))
 
 
 def spread(count: int, dimensions: int) -> Array:

@@ -15,6 +15,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import ceil
+from typing import Any
 
 import numpy as np
 
@@ -107,7 +108,27 @@ def walk(
         if not outside.any():
             break
         width *= 0.9
-    moves = [(emcee.moves.DEMove(), 0.9), (emcee.moves.DEMove(gamma0=1.0), 0.1)]
+
+    class Together(emcee.moves.DEMove):
+        """emcee's move, but that who is accepted is drawn for all walkers at a time: one by one,
+        as its own, takes longer than the density. The same draws."""
+
+        def propose(self, model: Any, state: Any) -> tuple[Any, Array]:
+            self.setup(state.coords)
+            accepted = np.zeros(len(state.coords), bool)
+            half = np.arange(len(accepted)) % 2
+            model.random.shuffle(half)
+            for own in (half == 0, half == 1):
+                others = [state.coords[~own]]
+                there, _ = self.get_proposal(state.coords[own], others, model.random)
+                height, _ = model.compute_log_prob_fn(there)
+                chance = np.log(model.random.rand(len(there)))
+                accepted[own] = height - state.log_prob[own] > chance
+                moved = emcee.State(there, log_prob=height)
+                state = self.update(state, moved, accepted, own)
+            return state, accepted
+
+    moves = [(Together(), 0.9), (Together(gamma0=1.0), 0.1)]
     sampler = emcee.EnsembleSampler(number, size, density, moves=moves, vectorize=True)
     # its own looks at every value by itself, which takes longer than the density
     sampler.compute_log_prob = lambda x: (density(x), None)
