@@ -14,7 +14,7 @@ import numpy as np
 from .. import own_decks
 from ..errors import Refused, RunFailed
 from ..rings import about_axle, ring_modes
-from .dat import read_dat
+from .dat import DatTable, read_dat
 from .evidence import checked_modes
 from .launch import run_job
 from .options import load, read_options
@@ -101,13 +101,17 @@ class Abaqus:
             question = read_question(folder / f"{JOB}.inp")
             asked, pressure_Pa = question.modes, question.pressure * mass_kg / length_m
         table = read_dat(folder / f"{job}.dat")
+        if own:  # the mass is told with the model, not where a job only goes on
+            tables = [read_dat(folder / f"{each}.dat") for each, _ in own.jobs]
+            masses = [each.mass for each in tables if each.mass is not None]
+            table = DatTable(table.frequencies_Hz, masses[-1] if masses else None)
         found = checked_modes(folder / f"{job}.fil", asked, table)
         points, vectors = length_m * found.coordinates, found.displacement
         if own:
             points, turn = about_axle(points)
             vectors = vectors @ turn.T
-        masses = np.sqrt(found.masses * mass_kg)[:, None, None]
-        places, modes = ring_modes(found.eigenvalues, points, vectors / masses)
+        norms = np.sqrt(found.masses * mass_kg)[:, None, None]
+        places, modes = ring_modes(found.eigenvalues, points, vectors / norms)
         return {
             "pressure_Pa": pressure_Pa,
             "mass_kg": table.mass and table.mass * mass_kg,

@@ -39,7 +39,13 @@ def _modes(inflation: str, step: str) -> None:
     from tyrecal.tyre.load import load_case
     from tyrecal.tyre.own_deck.own_deck import read_own_deck
 
-    asked = ["*FILE FORMAT, ASCII", "*NODE FILE, NSET=CROWN", "U", "*MODAL FILE", "*END STEP"]
+    asked = [
+        "*FILE FORMAT, ASCII",
+        "*NODE FILE, NSET=CROWN",
+        "U, COORD",
+        "*MODAL FILE",
+        "*END STEP",
+    ]
     assert step.splitlines()[-5:] == asked
     c10 = float(re.findall(r"NEO HOOKE\n([^,]+),", inflation)[0])
     pressure = float(re.findall(r"RUBBER, P6, (\S+)", inflation)[0])
@@ -73,7 +79,8 @@ def _modes(inflation: str, step: str) -> None:
             modes.append(((2 * np.pi * mode.frequency_Hz) ** 2, np.einsum("kc,cxk->kx", u, axes)))
     modes.sort(key=lambda mode: mode[0])
     values = [value for value, _ in modes[:wanted]]
-    Path("modes.dat").write_text(dat(values, answer.mass_kg))
+    Path("inflate.dat").write_text(dat([], answer.mass_kg))
+    Path("modes.dat").write_text(dat(values, 0.0).replace("TOTAL MASS", ""))
     Path("modes.fil").write_text(fil(points, values, [u for _, u in modes[:wanted]]))
 
 

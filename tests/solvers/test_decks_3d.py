@@ -222,8 +222,8 @@ def test_modes_on_abaqus_are_the_twins(tmp_path: Path, capsys: pytest.CaptureFix
     case = case_of(tmp_path, modes=decks_3d.modes(calculix=False))
     command = ("--solver", "abaqus", "--solver-command", f"{sys.executable} {STANDIN}")
     given = ("--set", "C10=4e6", "--pressure-kPa", "60", "--json", "--no-store")
-    given += ("--output", str(tmp_path / "modes"))
-    found = frequencies(capsys, "modes", str(case), *given, *command)
+    where = ("--output", str(tmp_path / "modes"))
+    found = frequencies(capsys, "modes", str(case), *given, *where, *command)
     expected = twin(tmp_path, 4e6, 6e4, capsys)
     assert {*found} >= {"0,0 axial", "0,0 torsional", "1,1", "2,1", "3,1"}
     for label, hertz in found.items():
@@ -238,7 +238,6 @@ def test_modes_on_abaqus_are_the_twins(tmp_path: Path, capsys: pytest.CaptureFix
         (("modes", "--load-N", "3000"), "cannot find modes of a tyre on a road"),
         (("sample",), "gives no exact slopes"),
         (("diagnose", "--measured"), "stands in decks in three dimensions"),
-        (("deck", "--check"), "names no section deck"),
         (("modes", "--set", "rim.free=true"), "must be held"),
     ],
 )
@@ -248,10 +247,35 @@ def test_what_needs_a_section_is_refused(
     case, measured = case_of(tmp_path), tmp_path / "measured.csv"
     measured.write_text("label,frequency_Hz,sigma_Hz,pressure_kPa,load_N\n[2;1],121,1,50,0\n")
     given = [str(measured)] if command[0] == "diagnose" else []
-    output = [] if "--check" in command else ["--output", str(tmp_path / "out")]
+    output = ("--output", str(tmp_path / "out"))
     assert run(*command, *given, str(case), *output) == 2
     *_, last = capsys.readouterr().err.splitlines()
     assert words in last
+
+
+def test_a_check_says_what_is_known_and_added(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """And the decks are written with folders of what they include."""
+    (tmp_path / "parts").mkdir()
+    (tmp_path / "parts" / "mesh.inp").write_text(TEXTS["mesh.inp"])
+    inflate = TEXTS["inflate.inp"].replace("mesh.inp", "parts/mesh.inp")
+    case = str(case_of(tmp_path, inflate=inflate))
+    assert run("deck", "--check", case, "--json") == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["jobs"] == [["inflate", ""], ["modes", "inflate"]]
+    assert (told["modes"], told["crown"]) == (10, "CROWN")
+    line = line_of(inflate, "RUBBER, P6")
+    assert told["pressure"] == [f"inflate.inp, line {line}", "modes.inp, line 7"]
+    assert told["numbers"] == {
+        "C10": 4.5e6,
+        "material RUBBER / HYPERELASTIC / D1": 1e-8,
+        "material RUBBER / DENSITY / density": 1100.0,
+    }
+    assert set(told["added"]) == {"abaqus", "calculix"}
+    assert run("deck", case, "--solver", "abaqus", "--output", str(tmp_path / "out")) == 0
+    written = (tmp_path / "out" / "parts" / "mesh.inp").read_bytes()
+    assert without_header(written).decode() == TEXTS["mesh.inp"]
 
 
 def test_the_example_is_the_tests_own() -> None:

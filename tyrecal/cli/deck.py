@@ -15,6 +15,10 @@ from .main import EXIT_INPUT
 from .terminal import Terminal
 
 if TYPE_CHECKING:
+    from ..tyre.case import LoadedCase
+    from ..tyre.own_deck.own_decks import OwnDecks
+
+if TYPE_CHECKING:
     from ..tyre.own_deck.gauge import Gauges
 
 MOST_SAID = 10  # doubts about a deck
@@ -59,7 +63,7 @@ def command(
     """
     if check:
         return _check(case, mesh, assignments, terminal)
-    from ..files import whole
+    from ..files import own_folder, whole
     from ..simulate.deck.decks import Decks
     from ..simulate.deck.decks_design import design_of
     from ..simulate.evaluate.evaluator import Evaluator
@@ -86,8 +90,11 @@ def command(
             raise DeckRefused(str(error)) from None
         run = Run(case, output, "deck", adapter)  # what is refused leaves the folder untouched
         for path in written:
-            paths.append(str(run.folder / path.name))
-            with whole(run.folder / path.name) as partial:
+            place = run.folder / path.relative_to(fresh)  # what a deck includes may lie in folders
+            for above in reversed(place.relative_to(run.folder).parents[:-1]):
+                own_folder(run.folder / above)
+            paths.append(str(place))
+            with whole(place) as partial:
                 shutil.copyfile(path, partial)
     run.finish()
     terminal.result(paths)
@@ -109,8 +116,10 @@ def _check(path: Path, mesh: str, assignments: tuple[str, ...], terminal: Termin
     gauges: Gauges = ()
     if path.suffix in (".yaml", ".yml"):
         loaded, _ = arguments.load(path, mesh, assignments, None, terminal, True)
+        if loaded.decks:
+            return _check_decks(loaded, loaded.decks, terminal)
         if loaded.deck is None:
-            raise click.UsageError(f"'{path}' names no section deck: 'tyrecal validate' judges it")
+            raise click.UsageError(f"'{path}' names no deck of your own: 'tyrecal validate' judges")
         deck, numbers = loaded.deck, loaded.deck_numbers
         gauges = loaded.case.deck.thickened if loaded.case.deck else ()
     else:
@@ -143,3 +152,32 @@ def _check(path: Path, mesh: str, assignments: tuple[str, ...], terminal: Termin
     for sentence in lacking:
         terminal.say(f"CalculiX does not honour: {sentence}")
     return EXIT_INPUT if result["refused"] or asked["refuses"] else 0
+
+
+def _check_decks(loaded: LoadedCase, decks: OwnDecks, terminal: Terminal) -> int:
+    """Say what is known of decks in three dimensions, and what is added to them."""
+    from ..simulate.deck.decks_design import OUTPUT, added_words
+
+    numbers = loaded.deck_numbers
+    places = [f"{row.place.file}, line {row.place.line}" for _, row, *_ in decks.pressures]
+    added = {solver: added_words(decks, solver) for solver in OUTPUT}
+    jobs = [f"{job}, which goes on from {old}" if old else job for job, old in decks.jobs]
+    terminal.say(f"jobs: {'; '.join(jobs)}; units {decks.units}")
+    terminal.say(f"modes: {decks.modes or 'those in a range'}, named by the node set {decks.crown}")
+    terminal.say(f"pressure: {'; '.join(places) or 'by its mark'}")
+    for name, value in numbers.items():
+        terminal.say(f"  {name} = {value:g}")
+    for solver, words in added.items():
+        terminal.say(f"{solver}: {words or 'nothing is added'}")
+    terminal.result(
+        {
+            "jobs": decks.jobs,
+            "units": decks.units,
+            "modes": decks.modes,
+            "crown": decks.crown,
+            "pressure": places,
+            "numbers": dict(numbers),
+            "added": added,
+        }
+    )
+    return 0

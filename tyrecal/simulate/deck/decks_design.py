@@ -121,8 +121,7 @@ def output_lines(decks: OwnDecks, dialect: str) -> list[str]:
                 f"in the step of the modes only NSET={decks.crown} is asked for, with U: shapes"
                 " there name the modes"
             )
-    node_file = [] if asked else [f"*NODE FILE, NSET={decks.crown}", "U"]
-    return OUTPUT[dialect](decks, node_file) if dialect in OUTPUT else node_file
+    return OUTPUT[dialect](decks, bool(asked)) if dialect in OUTPUT else []
 
 
 def added_words(decks: OwnDecks, dialect: str) -> str:
@@ -133,26 +132,27 @@ def added_words(decks: OwnDecks, dialect: str) -> str:
     )
 
 
-def _abaqus(decks: OwnDecks, node_file: list[str]) -> list[str]:
-    """Shapes as text in the results file, and eigenvalues with them."""
+def _abaqus(decks: OwnDecks, asked: bool) -> list[str]:
+    """Shapes and places as text in the results file, and eigenvalues with them."""
     ascii_file = any(
         block.name == "FILE FORMAT" and "ASCII" in block.parameters for block in decks.blocks
     )
     modal = any(block.name == "MODAL FILE" for block in decks.modes_step)
     return [
         *([] if ascii_file else ["*FILE FORMAT, ASCII"]),
-        *node_file,
+        *([] if asked else [f"*NODE FILE, NSET={decks.crown}", "U, COORD"]),
         *([] if modal else ["*MODAL FILE"]),
     ]
 
 
-def _calculix(decks: OwnDecks, node_file: list[str]) -> list[str]:
+def _calculix(decks: OwnDecks, asked: bool) -> list[str]:
     """Shapes, and the masses of all that has a section."""
     masses = ([f"*EL PRINT, ELSET={name}, TOTALS=ONLY", "EMAS"] for name in decks.solid_sets)
-    return [*node_file, *(line for each in masses for line in each)]
+    shapes = [] if asked else [f"*NODE FILE, NSET={decks.crown}", "U"]
+    return [*shapes, *(line for each in masses for line in each)]
 
 
-OUTPUT: dict[str, Callable[[OwnDecks, list[str]], list[str]]] = {
+OUTPUT: dict[str, Callable[[OwnDecks, bool], list[str]]] = {
     "abaqus": _abaqus,
     "calculix": _calculix,
 }

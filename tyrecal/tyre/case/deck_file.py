@@ -47,7 +47,7 @@ def read_deck_of(
             given |= marked_numbers(deck.marks, given, variable)
         if isinstance(deck, OwnDeck):
             deck.flat(given)
-        elif deck.crown not in deck.node_sets:
+        elif deck.crown.rpartition(".")[2] not in deck.node_sets:  # INSTANCE.SET
             hint = suggestion(deck.crown, deck.node_sets)
             document.add(("deck", "crown"), f"is no node set of the decks{hint}")
             return None
