@@ -1,11 +1,13 @@
 """The pressed tyre by GetFEM and by the bundled solver: force, area, stiffness, equally deep.
 
     python -m tests.studies.judge FOLDER [--deflections-mm 10 18] [--modes 12]
+        [--road-Pa-per-m 1e10] [--along 3 4] [--angles-deg 6 6 6 8 ...]
 
 GetFEM's part (`judge_getfem.py`, by Debian's own Python and python3-getfem) is given numbers of the
 case alone: stations, constants, cords. It is run once a FOLDER; the bundled solver each time, at
 loads that bring it to GetFEM's deflections. No friction in either, one row between lines and the
-case's default mesh; the road has 1e10 Pa/m in both.
+case's default mesh; the road is as stiff in both. ``--along``, ``--angles-deg``: GetFEM's elements
+along the crown and the sidewall of half the section, and from the patch's middle to the top.
 """
 
 from __future__ import annotations
@@ -26,7 +28,6 @@ from tyrecal.tyre.values import with_values
 ROOT = Path(__file__).parents[2]
 CASE = ROOT / "cases" / "p235_75r17.yaml"
 PYTHON = "/usr/bin/python3"  # that Debian's python3-getfem is of
-ROAD = {"road.friction": 0.0, "road.stiffness_Pa_per_m": 1e10}
 ANGLES = [6, 6, 6, 8, 12, 18, 22, 25, 25, 26, 26]  # degrees, from the patch's middle to the top
 CLOSE = 1e-6  # m, between the two deflections
 
@@ -59,19 +60,19 @@ def tyre_told(case: LoadedCase) -> dict[str, Any]:
     }
 
 
-def problem(deflections_m: list[float], modes: int) -> dict[str, Any]:
+def problem(options: argparse.Namespace) -> dict[str, Any]:
     """What GetFEM is told."""
     return {
         **tyre_told(load_case(CASE)),
-        "along": [3, 4],
+        "along": options.along,
         "rows": [1, 1, 1, 1],
-        "angles_deg": ANGLES,
-        "road": ROAD["road.stiffness_Pa_per_m"],
+        "angles_deg": options.angles_deg,
+        "road": options.road_Pa_per_m,
         "contact_cells": 2,
         "help_Pa": [1e7, 1e6, 1e5, 0.0],
-        "deflections_m": deflections_m,
+        "deflections_m": [depth * 1e-3 for depth in options.deflections_mm],
         "steps": 1,
-        "modes": modes,
+        "modes": options.modes,
     }
 
 
@@ -96,12 +97,14 @@ def main() -> None:
     parser.add_argument("folder", type=Path)
     parser.add_argument("--deflections-mm", type=float, nargs="+", default=[10.0, 18.0])
     parser.add_argument("--modes", type=int, default=0, help="of GetFEM's, minutes more each load")
+    parser.add_argument("--road-Pa-per-m", type=float, default=1e10)
+    parser.add_argument("--along", type=int, nargs=2, default=[3, 4])
+    parser.add_argument("--angles-deg", type=float, nargs="+", default=ANGLES)
     options = parser.parse_args()
     options.folder.mkdir(parents=True, exist_ok=True)
     told, found = options.folder / "problem.json", options.folder / "getfem.json"
     if not found.exists():
-        depths = [depth * 1e-3 for depth in options.deflections_mm]
-        told.write_text(json.dumps(problem(depths, options.modes), indent=1))
+        told.write_text(json.dumps(problem(options), indent=1))
         command = [
             PYTHON,
             "-m",
@@ -110,7 +113,8 @@ def main() -> None:
         ]
         subprocess.run(command, cwd=ROOT, check=True)
     judge = json.loads(found.read_text())
-    evaluator = Evaluator(TyreDesign(with_values(load_case(CASE), ROAD)))
+    road = {"road.friction": 0.0, "road.stiffness_Pa_per_m": json.loads(told.read_text())["road"]}
+    evaluator = Evaluator(TyreDesign(with_values(load_case(CASE), road)))
     for each in judge["loads"]:
         print(f"{1e3 * each['deflection_m']:g} mm")
         for key, value in at_deflection(evaluator, each["deflection_m"], each["force_N"]).items():
