@@ -10,11 +10,16 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tyrecal.errors import InputError
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.simulate.modes.label import label_modes
 from tyrecal.simulate.modes.match import match
 from tyrecal.studies.blind.make import labels_of
+from tyrecal.studies.blind.maker import Computed
+from tyrecal.studies.blind.protocol import read_json
+from tyrecal.studies.blind.ruler import Difficulty
+from tyrecal.studies.blind.seal import TRUTH
 from tyrecal.tyre.case import LoadedCase, with_level
 from tyrecal.tyre.load import load_case
 
@@ -22,8 +27,11 @@ from ..studies.judge import tyre_told
 from ..studies.judge_section import LINES
 from ..studies.judge_section import section as stations_section
 from ..studies.test_fenics import installed
+from .study3 import make as making
 from .study3.cases import LABELS, SIZES, Group, written
+from .study3.draw import known_laws
 from .study3.maker import Fenics, modes
+from .study3.score import Scored, figures
 from .study3.section import Section, columns, mould, off, section
 from .study3.tyre import Mesh, Tyre, problem, tyre_of
 
@@ -60,20 +68,102 @@ def test_a_section_has_the_size_s_dimensions_and_no_folded_element(size: str) ->
 
 
 def test_tyres_of_one_mould_differ_by_what_is_stated() -> None:
-    """Root mean square over 200 tyres of the meridian's mean distance, to a quarter: their waves
-    are scaled by a normal number, whose mean square scatters by 10 %.
+    """Root mean square over 80 tyres of the meridian's mean distance, to 40 %: the waves are
+    scaled by a normal number, whose mean square scatters by 16 %, its root by 8 %, and lie closer
+    to one another over the columns than over the arc.
 
-    False failures: 1e-2 of a percent, none with this seed.
+    False failures: below 1e-4, and the seed is given.
     """
     m = mould("205/60R15")
     counts, random = columns(m), np.random.default_rng(5)
     known, apart = section(m, counts), []
-    for _ in range(200):
+    for _ in range(80):
         other = section(
             replace(off(m, random, 1e-3, 0.0), filler=m.filler, turn_up=m.turn_up), counts
         )
         apart.append(np.mean(np.sum((other.points[1] - known.points[1]) ** 2, 1)))
-    assert np.sqrt(np.mean(apart)) == pytest.approx(1e-3, rel=0.25)
+    assert np.sqrt(np.mean(apart)) == pytest.approx(1e-3, rel=0.4)
+
+
+@pytest.mark.parametrize("size", ["205/60R15", "11R22.5"])
+def test_a_law_says_nothing_at_0_and_something_at_its_ends(size: str, tmp_path: Path) -> None:
+    """Whether it moves nodes, cells or constants, at the pressures of a study."""
+    sound, group = tyre(size, tmp_path), Group(size, True)
+    asked = lambda tyre: problem(tyre, [0.8e-3 * sound.nominal_Pa, 1.2e-3 * sound.nominal_Pa])
+    plain = asked(sound)
+    for law in [law for known in known_laws(group) for law in known.values()]:
+        assert asked(law.add(sound, 0.0)) == plain
+        for end in {law.low, law.high} - {0.0}:
+            assert asked(law.add(sound, end)) != plain
+
+
+def toy(fenics: Fenics, told: Tyre, pressures: list[float], labels: list[Any]) -> dict[float, Any]:
+    """Frequencies that a few of the tyre's numbers set."""
+    f = np.log(50.0) + 0.01 * told.cap / 1e6 + 0.1 * told.kelvin / 15 + told.mould.belts[0]
+    return {p: Computed({x: (f, f) for x in labels}, np.log(10.0)) for p in pressures}
+
+
+def test_trials_of_all_kinds_are_drawn_sealed_and_made_again_alike(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(making, "computed", toy)
+    monkeypatch.setattr(making, "frequencies_Hz", lambda case: {str(x): 50.0 for x in LABELS})
+    group = Group("205/60R15", True)
+    counts = {"none": 1, "one": 2, "two": 2, "three": 1, "outside": 1, "again": 1}
+    truths = []
+    for name in ("a", "b"):
+        folder, sealed = tmp_path / name, tmp_path / f"{name}-truth"
+        making.make(folder, sealed, group, counts, seed=7, ruler=lambda case, rules: {})
+        truths.append(read_json(sealed / TRUTH))
+        assert truths[-1].pop("nonce") not in "".join(p.read_text() for p in folder.glob("*.json"))
+    assert truths[0] == truths[1]
+    trials = truths[0]["trials"]
+    assert sorted(len(t["effects"]) for t in trials if t["kind"] != "outside") == [
+        0,
+        1,
+        1,
+        1,
+        2,
+        2,
+        3,
+    ]
+    assert all(set(t["members"]) == set(t["effects"]) for t in trials if t["kind"] == "several")
+    (twin,) = [t for t in trials if t["again"]]
+    (first,) = [t for t in trials if t["id"] == twin["again"]]
+    assert twin["constants"] == first["constants"] and twin["effects"] == first["effects"]
+    assert twin["with_effect"] != first["with_effect"]  # another mounting
+    assert {p.stem for p in (tmp_path / "a" / "trials").iterdir()} == {t["id"] for t in trials}
+    with pytest.raises(InputError, match="sealed trials already"):
+        making.make(tmp_path / "a", tmp_path / "a-truth", group, counts)
+
+
+def answered(effects: str, top: str, lam: float = 30.0, **more: Any) -> Scored:
+    """A trial by hand; "a" cannot be told from "like_a"."""
+    ids = tuple(effects.split("+")) if effects else ()
+    hard = {id: Difficulty(lam, lam, (id, f"like_{id}"), 1.0) for id in ids}
+    kind = {0: "none", 1: "effect"}.get(len(ids), "several")
+    named = None if top in ("none", "outside") else top
+    verdict = {"none": "no_gap", "outside": "outside"}.get(top, "named")
+    rest = (named, True, (top,), 0.9, frozenset(top.split("+")), True, (), 1.0, 0.5, "")
+    return replace(Scored("", kind, ids, hard, verdict, *rest), **more)
+
+
+def test_one_of_several_effects_is_named_for_its_group_and_for_one_truth_only() -> None:
+    assert answered("a+b", "like_b+a").right and answered("a", "like_a").right
+    assert answered("", "none").right and not answered("a+b", "a").right
+    assert answered("a+b", "a").found(["a"]) == 1 and answered("a+b", "c").found(["c"]) == 0
+    assert answered("a+b", "a+like_a").found(["a", "like_a"]) == 1
+    assert not answered("a", "a+b").right
+
+
+def test_a_rate_counts_its_own_trials_and_few_are_not_shown() -> None:
+    pairs = [answered("a+b", "a+b")] * 45 + [answered("a+b", "c")] * 15
+    weak = [answered("a+b", "none", lam=3.0)] * 100
+    said = figures(pairs + weak, 60)
+    name = "two effects, each lambda from 15: all in the 90 % set"
+    assert said[name] == "45 of 60, 75 % (62 to 85)"
+    assert said["named: right, or in part of several"].startswith("45 of 60")
+    assert figures(pairs[1:], 60)[name] == "not shown (59)"
 
 
 def on_the_same_stations(case: LoadedCase) -> dict[str, Any]:

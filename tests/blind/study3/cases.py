@@ -16,7 +16,7 @@ from tyrecal.tyre.section.from_size import BELOW, BELTED
 from tyrecal.tyre.section.gauge_table import GaugeTable
 from tyrecal.tyre.section.size import parse_size
 
-from .section import VOID, Mould, at, carcass, mould
+from .section import TREAD, VOID, Mould, at, carcass, mould
 
 LABELS = [
     Label(0, 0, "axial"),
@@ -103,7 +103,7 @@ def stations_of(m: Mould) -> GaugeTable:
     belted = lambda edge: s <= edge + 1e-9
     pattern = offset["outer"] - offset["groove"]
     smooth = offset["outer"] - VOID * pattern * np.clip(
-        (1.3 * max(edges) - s) / (0.3 * max(edges)), 0, 1
+        (TREAD * max(edges) - s) / ((TREAD - 1) * max(edges)), 0, 1
     )
     rows = {"inner": offset["inner"], "ply": 0 * s}
     for k, edge in enumerate(m.belts, 1):

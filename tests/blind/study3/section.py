@@ -20,6 +20,7 @@ from tyrecal.tyre.section.size import parse_size
 
 Array = np.ndarray
 VOID = 0.3  # of the pattern's volume
+SKIM, TREAD = 1.15, 1.3  # how far belt skim and tread go, of the widest belt
 COLUMN = 0.0095  # about an element's length along the section
 CURVE_POINTS = 400
 
@@ -182,8 +183,9 @@ def carcass(m: Mould) -> tuple[Array, Array, dict[str, float]]:
 
 def breaks(m: Mould, marks: dict[str, float]) -> list[float]:
     """s where parts begin or end, from the crown on."""
-    edges = [*m.belts, m.cap, 1.3 * max(m.belts)]
-    ends = sorted([*edges, *(marks[k] for k in ("turn_up", "filler", "rim", "end"))])
+    half, tip, rim = max(m.belts), marks["filler"], marks["rim"]
+    edges = [*m.belts, m.cap, SKIM * half, TREAD * half]
+    ends = sorted([*edges, marks["turn_up"], tip, (tip + rim) / 2, rim, marks["end"]])
     return [0.0, *(b for a, b in zip([0.0, *ends], ends, strict=False) if b - a > 1e-4)]
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from tyrecal.tyre.case import LoadedCase
 from tyrecal.tyre.case.schema import Cord, Rubber
 
-from .section import VOID, Mould, Section, section
+from .section import SKIM, TREAD, VOID, Mould, Section, section
 
 Array = np.ndarray
 HARMONICS, MODES, DEGREE = [0, 1, 2, 3, 4], 3, 3
@@ -188,7 +188,7 @@ def _state(tyre: Tyre, mesh: Mesh, nominal: float) -> dict[str, Any]:
     of = lambda key: np.array([[getattr(tyre.compounds[x], key) for x in row] for row in names])
     C10, viscous = static * of("C10"), dynamic * of("dynamic")
     D1, density, hoop = of("D1") / static, of("density"), np.zeros(shape)
-    pattern = (slice(shape[0] - 1, None), s < 1.3 * marks["belt"])
+    pattern = (slice(shape[0] - 1, None), s < TREAD * marks["belt"])
     solid = 1 - tyre.void
     C10[pattern] *= solid**BLOCKS
     viscous[pattern] *= solid**BLOCKS
@@ -264,11 +264,11 @@ def material_names(mesh: Mesh, tyre: Tyre) -> Array:
     m, marks, s = tyre.mould, mesh.section.marks, mesh.middle
     names = np.full((mesh.rows, len(s)), "sidewall", dtype=object)
     names[0] = "inner_liner"
-    belted, filled = s < 1.15 * marks["belt"], s > marks["filler"]
+    belted, filled = s < SKIM * marks["belt"], s > marks["filler"]
     cap, base = m.lines.index("cap"), m.lines.index("base")
     names[1:cap, belted] = "belt_skim"
     names[cap:base, belted] = "under_tread"
-    names[base:, s < 1.3 * marks["belt"]] = "tread"
+    names[base:, s < TREAD * marks["belt"]] = "tread"
     names[1, filled] = "bead_filler"
     strip = s > (marks["filler"] + marks["rim"]) / 2
     names[2:, strip] = "rim_strip"

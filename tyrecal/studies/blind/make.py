@@ -77,7 +77,7 @@ def make(
     for path in (*folder.rglob("*"), sealed / "made", sealed / "record"):
         refuse_link(path)
     write_ruler(folder, ruler())
-    seed = _seed(sealed, seed)
+    seed = kept_seed(sealed, seed)
     found, _ = sources(case)
     truths = draw(protocol, case, found, maker.laws, maker.outside, seed)
     work = partial(_resumed, sealed, protocol, case, maker)
@@ -86,10 +86,12 @@ def make(
         for trial in (pool.map if pool else map)(work, truths):
             trials.append(trial)
             on_progress(len(trials), len(truths))
-    _copy(case, folder)
+    copy_case(case, folder)
     write_protocol(folder, protocol)
-    _write_trials(folder, protocol, trials)
-    return seal(folder, sealed, {"seed": seed, "trials": [_sealed(t, protocol) for t in trials]})
+    write_trials(folder, protocol, trials)
+    return seal(
+        folder, sealed, {"seed": seed, "trials": [sealed_trial(t, protocol) for t in trials]}
+    )
 
 
 def labels_of(case: LoadedCase) -> list[Label]:
@@ -131,10 +133,10 @@ def _resumed(
     asked = json.dumps([asdict(truth), asdict(protocol), maker.about], sort_keys=True)
     path = sealed / "made" / f"{sha256(asked.encode()).hexdigest()[:16]}.json"
     if path.exists():
-        return _read(read_json(path), labels_of(case))
+        return read_trial(read_json(path), labels_of(case))
     path.parent.mkdir(exist_ok=True)
     trial = _make(protocol, case, maker, truth)
-    write_json(path, _plain(trial))
+    write_json(path, plain_trial(trial))
     return trial
 
 
@@ -192,7 +194,7 @@ def _swap(
             here[a], here[b] = here[b], here[a]
 
 
-def _write_trials(folder: Path, protocol: Protocol, trials: list[Trial]) -> None:
+def write_trials(folder: Path, protocol: Protocol, trials: list[Trial]) -> None:
     """One CSV a trial, all of the same form, digits and time."""
     (folder / "trials").mkdir(exist_ok=True)
     for trial in trials:
@@ -217,7 +219,7 @@ def _write_trials(folder: Path, protocol: Protocol, trials: list[Trial]) -> None
         os.utime(path, (0, 0))
 
 
-def _plain(trial: Trial) -> dict[str, Any]:
+def plain_trial(trial: Trial) -> dict[str, Any]:
     """One trial without noise, for JSON."""
     tables = {}
     for key, computed in (("with_effect", trial.with_effect), ("without", trial.without)):
@@ -232,8 +234,8 @@ def _plain(trial: Trial) -> dict[str, Any]:
     return {**asdict(trial.truth), "tries": trial.tries, **tables}
 
 
-def _read(content: dict[str, Any], labels: list[Label]) -> Trial:
-    """The trial that `_plain` wrote."""
+def read_trial(content: dict[str, Any], labels: list[Label]) -> Trial:
+    """The trial that `plain_trial` wrote."""
     tables: dict[str, dict[float, Computed]] = {"with_effect": {}, "without": {}}
     for key, table in tables.items():
         for entry in content.pop(key):
@@ -243,16 +245,16 @@ def _read(content: dict[str, Any], labels: list[Label]) -> Trial:
     return Trial(Truth(**content), tries, **tables)
 
 
-def _sealed(trial: Trial, protocol: Protocol) -> dict[str, Any]:
+def sealed_trial(trial: Trial, protocol: Protocol) -> dict[str, Any]:
     """One trial of the truth, with what was held out as it was measured."""
     read = values(trial, protocol)[protocol.held_out_kPa]
     held_out = {
         str(label): [f for f in members if np.isfinite(f)] for label, members in read.items()
     }
-    return {**_plain(trial), "held_out": held_out}
+    return {**plain_trial(trial), "held_out": held_out}
 
 
-def _seed(sealed: Path, seed: int | None) -> int:
+def kept_seed(sealed: Path, seed: int | None) -> int:
     path = sealed / "seed.json"
     if path.exists():
         known = int(read_json(path)["seed"])
@@ -264,7 +266,7 @@ def _seed(sealed: Path, seed: int | None) -> int:
     return seed
 
 
-def _copy(case: LoadedCase, folder: Path) -> None:
+def copy_case(case: LoadedCase, folder: Path) -> None:
     """The case file and what it names, for who answers."""
     target = folder / "case"
     target.mkdir(exist_ok=True)

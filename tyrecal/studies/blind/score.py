@@ -102,7 +102,7 @@ def scored(
     key = truth["law"] if truth["kind"] == "effect" else truth["kind"]
     hard = Difficulty(0.0, 0.0, (key,), None)
     if truth["kind"] != "none":
-        shift, split = _true_shift(truth, ruler, places, labels)
+        shift, split = true_shift(truth, ruler, places, labels)
         hard = difficulty(ruler, protocol, truth["law"], d, places, counts, shift, split)
     group = hard.group if truth["kind"] == "effect" else (key,)
     told = answer["diagnosis"]
@@ -130,8 +130,8 @@ def scored(
         sum(p.get(k, 0.0) for k in group),
         key in told["candidate_set"],
         held,
-        _rms(truth["held_out"], out["plain_Hz"]),
-        _rms(truth["held_out"], out["with_effect_Hz"] or out["plain_Hz"]),
+        held_out_error(truth["held_out"], out["plain_Hz"]),
+        held_out_error(truth["held_out"], out["with_effect_Hz"] or out["plain_Hz"]),
         guesses(ruler, y, places, sigma),
     )
 
@@ -150,7 +150,7 @@ def means(readings: Sequence[Measurement], ruler: Ruler) -> tuple[Array, Array, 
     )
 
 
-def _true_shift(
+def true_shift(
     truth: Mapping[str, Any], ruler: Ruler, places: Array, labels: Sequence[Label]
 ) -> tuple[Array, Array]:
     """What the effect moved (n,), and how far it split pairs (n,), from runs without noise."""
@@ -167,7 +167,9 @@ def _true_shift(
     return after.mean(1) - before.mean(1), apart[0] - apart[1]
 
 
-def _rms(measured: Mapping[str, Sequence[float]], predicted: Mapping[str, float]) -> float:
+def held_out_error(
+    measured: Mapping[str, Sequence[float]], predicted: Mapping[str, float]
+) -> float:
     """Of ln measured (mean of members) - ln predicted."""
     errors = [
         np.mean(np.log(values)) - log(predicted[name])

@@ -1,0 +1,94 @@
+"""Blind study 3, group by group: a size and whose section it is diagnosed with.
+
+    python -m tests.blind.study3 groups
+    python -m tests.blind.study3 make DIR 205_60r15_own --one 30 --two 16 --jobs 2
+    python -m tests.blind.study3 answer DIR 205_60r15_own --jobs 2
+    python -m tests.blind.study3 score DIR > table.md        # of all groups that are answered
+    python -m tests.blind.study3 mesh 205/60R15              # the maker's own mesh error
+
+Trials lie in DIR/GROUP, their truth in DIR-truth/GROUP. `make` and `answer` go on where they were
+stopped; without --seed the seed is a secret, kept with the truth.
+"""
+
+from __future__ import annotations
+
+import os
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+import argparse
+import sys
+from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from tyrecal.simulate.deck.tyre_design import TyreDesign
+from tyrecal.simulate.evaluate.evaluator import Evaluator
+from tyrecal.studies.blind.answer import answer, case_of, rows_of, tyre_model
+from tyrecal.studies.blind.protocol import read_protocol
+from tyrecal.studies.blind.seal import ANSWERS
+
+from .cases import GROUPS, LABELS, written
+from .make import FENICS, make
+from .maker import computed
+from .score import scored, table
+from .section import COLUMN, columns, mould
+from .tyre import tyre_of
+
+COUNTS = {"none": 12, "one": 30, "two": 16, "three": 12, "outside": 12, "again": 4}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("what", choices=("groups", "make", "answer", "score", "mesh"))
+    parser.add_argument("folder", nargs="?", help="DIR; of mesh the size")
+    parser.add_argument("group", nargs="?")
+    parser.add_argument("--jobs", type=int, default=1)
+    parser.add_argument("--seed", type=int)
+    for kind, count in COUNTS.items():
+        parser.add_argument(f"--{kind}", type=int, default=count)
+    o = parser.parse_args()
+    told = lambda done, all: print(f"{done} of {all}", file=sys.stderr, flush=True)
+    groups = {group.name: group for group in GROUPS}
+    if o.what == "groups":
+        print("\n".join(groups))
+    elif o.what == "mesh":
+        mesh(o.folder)
+    elif o.what == "score":
+        folder = Path(o.folder)
+        answered = [g for g in GROUPS if (folder / g.name / ANSWERS).exists()]
+        sealed = folder.with_name(folder.name + "-truth")
+        every = {g: scored(folder / g.name, sealed / g.name) for g in answered}
+        print(table(every))
+    else:
+        folder = Path(o.folder) / o.group
+        sealed = Path(o.folder).with_name(Path(o.folder).name + "-truth") / o.group
+        if o.what == "make":
+            counts = {kind: getattr(o, kind) for kind in COUNTS}
+            print(make(folder, sealed, groups[o.group], counts, o.jobs, o.seed, told))
+        else:
+            case, protocol = case_of(folder), read_protocol(folder)
+            model = tyre_model(case, Evaluator(TyreDesign(case)), protocol, o.jobs)
+            print(answer(folder, model, rows_of(case, protocol), o.jobs, told))
+
+
+def mesh(size: str) -> None:
+    """Modes of the mould at the group's first pressure, with elements half as long."""
+    group = next(g for g in GROUPS if g.size == size)
+    with TemporaryDirectory() as folder:
+        case = written(replace(group, own=False), Path(folder), {str(x): 50.0 for x in LABELS})
+    found = []
+    for element in (COLUMN, COLUMN / 2):
+        tyre = tyre_of(case, mould(size), columns(mould(size), element))
+        (state,) = computed(FENICS, tyre, [group.given_kPa[1]], LABELS).values()
+        found.append(np.array([state.ln_f[label][0] for label in LABELS]))
+    FENICS.close()
+    off = 100 * (found[0] - found[1])
+    print(f"| {size} | " + " | ".join(f"{x:+.3f}" for x in off) + f" | {abs(off).max():.3f} % |")
+
+
+if __name__ == "__main__":
+    main()

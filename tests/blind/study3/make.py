@@ -1,0 +1,165 @@
+"""Study 3's trials: tyres drawn, computed by FEniCSx, sealed, measured alike. A group at a time."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from contextlib import nullcontext
+from dataclasses import asdict, replace
+from functools import partial
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tyrecal.errors import InputError
+from tyrecal.simulate.deck.tyre_design import TyreDesign
+from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
+from tyrecal.simulate.evaluate.failure import EvaluationFailed
+from tyrecal.simulate.evaluate.pool import process_pool
+from tyrecal.simulate.modes.label import label_modes
+from tyrecal.simulate.modes.match import match
+from tyrecal.studies.blind.answer import rows_of, tyre_model
+from tyrecal.studies.blind.draw import draw
+from tyrecal.studies.blind.make import (
+    MAX_TRIES,
+    Trial,
+    copy_case,
+    kept_seed,
+    plain_trial,
+    read_trial,
+    sealed_trial,
+    write_trials,
+)
+from tyrecal.studies.blind.maker import Computed
+from tyrecal.studies.blind.protocol import Protocol, read_json, write_json, write_protocol
+from tyrecal.studies.blind.ruler import measure, write_ruler
+from tyrecal.studies.blind.seal import SEAL, seal
+from tyrecal.studies.diagnose.uncertainties import sources
+from tyrecal.tyre.case import LoadedCase
+
+from .cases import LABELS, Group, written
+from .draw import Drawn, drawn, made
+from .maker import ABOUT, Fenics, computed
+
+FENICS = Fenics()  # of this process
+Members = dict[str, dict[float, Computed]]
+
+
+def make(
+    folder: Path,
+    sealed: Path,
+    group: Group,
+    counts: Mapping[str, int],
+    jobs: int = 1,
+    seed: int | None = None,
+    on_progress: Callable[[int, int], None] = lambda done, all: None,
+    ruler: Callable[[LoadedCase, Protocol], Mapping[str, Any]] | None = None,
+) -> str:
+    """The group's trials in ``folder`` and their truth in ``sealed``; returns the seal's sha256.
+    Goes on where it was stopped. Raises InputError."""
+    if (folder / SEAL).exists():
+        raise InputError(f"{folder} holds sealed trials already; make others in another folder")
+    folder.mkdir(parents=True, exist_ok=True)
+    sealed.mkdir(parents=True, exist_ok=True)
+    case = case_in(sealed, group)
+    protocol = Protocol(
+        ABOUT,
+        case.path.name,
+        dict(counts),
+        given_kPa=group.given_kPa,
+        held_out_kPa=group.held_out_kPa,
+    )
+    write_ruler(folder, (ruler or measured)(case, protocol))
+    seed = kept_seed(sealed, seed)
+    every = drawn(protocol, case, group, counts, seed)
+    work = partial(one, sealed, protocol, case, group)
+    found = []
+    with process_pool(jobs) if jobs > 1 else nullcontext() as pool:
+        for each in (pool.map if pool else map)(work, every):
+            found.append(each)
+            on_progress(len(found), len(every))
+    FENICS.close()
+    copy_case(case, folder)
+    write_protocol(folder, protocol)
+    write_trials(folder, protocol, [trial for trial, _ in found])
+    truth = [
+        {**sealed_trial(trial, protocol), **about(each), "members": shifts(trial, members)}
+        for each, (trial, members) in zip(every, found, strict=True)
+    ]
+    return seal(folder, sealed, {"seed": seed, "group": asdict(group), "trials": truth})
+
+
+def case_in(sealed: Path, group: Group) -> LoadedCase:
+    """The group's case; its targets are the bundled solver's own modes, to a hertz."""
+    case = written(group, sealed, {str(label): 50.0 for label in LABELS})
+    return written(group, sealed, frequencies_Hz(case))
+
+
+def frequencies_Hz(case: LoadedCase) -> dict[str, float]:
+    """Of the case as it stands, by label."""
+    modes = Evaluator(TyreDesign(case)).evaluate(Question({})).modes
+    found = match(label_modes(modes), LABELS)
+    return {str(label): mode.frequency_Hz for label, mode in found.items()}
+
+
+def measured(case: LoadedCase, protocol: Protocol) -> Mapping[str, Any]:
+    """The ruler, by the diagnosis' own model."""
+    model = tyre_model(case, Evaluator(TyreDesign(case)), protocol)
+    return measure(model, rows_of(case, protocol))
+
+
+def about(each: Drawn) -> dict[str, Any]:
+    """What a truth of several effects holds besides."""
+    return {"effects": each.effects, "mounting": each.mounting, "again": each.again}
+
+
+def one(
+    sealed: Path, protocol: Protocol, case: LoadedCase, group: Group, each: Drawn
+) -> tuple[Trial, Members]:
+    """A trial as it was made before it was stopped, or made now, and the same tyre without each of
+    its effects in turn where it has several."""
+    asked = json.dumps([asdict(each), asdict(group), protocol.maker], sort_keys=True)
+    path = sealed / "made" / f"{sha256(asked.encode()).hexdigest()[:16]}.json"
+    if not path.exists():
+        path.parent.mkdir(exist_ok=True)
+        trial, members = _made(protocol, case, group, each)
+        others = {
+            id: plain_trial(replace(trial, without=c))["without"] for id, c in members.items()
+        }
+        write_json(path, {"trial": plain_trial(trial), "members": others})
+    content = read_json(path)
+    trial = read_trial(dict(content["trial"]), LABELS)
+    members = {
+        id: read_trial({**content["trial"], "without": table}, LABELS).without
+        for id, table in content["members"].items()
+    }
+    return trial, members
+
+
+def _made(protocol: Protocol, case: LoadedCase, group: Group, each: Drawn) -> tuple[Trial, Members]:
+    """Its tyre drawn again where it has no solution."""
+    random = np.random.default_rng(each.truth.scatter + 1)
+    pressures = list(protocol.pressures_kPa)
+    run = lambda *without: computed(FENICS, made(each, case, group, without), pressures, LABELS)
+    for tries in range(1, MAX_TRIES + 1):
+        try:
+            whole = run()
+            ids = sorted(each.effects)
+            members = {id: run(id) for id in ids} if len(ids) > 1 else {}
+            return Trial(each.truth, tries, whole, run(*ids) if ids else whole), members
+        except (EvaluationFailed, ValueError) as failure:
+            last = failure
+        rules, found = replace(protocol, counts={"none": 1}), sources(case)[0]
+        (other,) = draw(rules, case, found, {}, {}, int(random.integers(2**63)))
+        truth = replace(each.truth, variables=other.variables, constants=other.constants)
+        each = replace(each, truth=truth)
+    raise InputError(f"no tyre with {each.truth.law or 'these constants'} has a solution: {last}")
+
+
+def shifts(trial: Trial, members: Members) -> dict[str, Any]:
+    """What each of several effects moves while the others are there: tables as ``without``."""
+    return {
+        id: plain_trial(replace(trial, without=table))["without"] for id, table in members.items()
+    }

@@ -1,0 +1,225 @@
+"""Study 3 scored: tyres of none to three effects, and outside the catalogue, against the answers.
+
+lambda of one effect of several: of what it moves while the others are there, against the ruler's
+full covariance. Its group: the effect, and those that the ruler cannot tell from it. A rate with
+too few trials is not shown.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import log
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tyrecal.measured.tables import read_measurements
+from tyrecal.studies.blind.answer import case_of
+from tyrecal.studies.blind.make import labels_of
+from tyrecal.studies.blind.protocol import Protocol, read_json, read_protocol
+from tyrecal.studies.blind.ruler import Difficulty, Ruler, difficulty, read_ruler
+from tyrecal.studies.blind.score import held_out_error, means, true_shift
+from tyrecal.studies.blind.seal import open_truth
+from tyrecal.studies.blind.statistics import calibration_error, calibration_quantile
+from tyrecal.studies.blind.tables import rate
+
+from .cases import Group
+
+LEAST, LEAST_A_SIZE, LEAST_ROBUST = 60, 40, 100  # trials of a rate that is shown
+ONE, EACH = 25.0, 15.0  # lambda from which one effect, and each of a pair, should be found
+SIGNIFICANT = 0.95
+
+
+@dataclass(frozen=True)
+class Scored:
+    """A trial and its answer. hard: of each effect; ranked: keys by falling probability, an id, ids
+    joined by +, none or outside; stated: the first one's; right: the first one is the truth by
+    groups; held: whether each named and true effect's interval holds what it is worth in the
+    catalogue's law; before, after: rms error held out, in ln f."""
+
+    id: str
+    kind: str  # none, effect, several or outside
+    effects: tuple[str, ...]
+    hard: Mapping[str, Difficulty]
+    verdict: str
+    named: str | None
+    robust: bool
+    ranked: tuple[str, ...]
+    stated: float
+    candidates: frozenset[str]  # ids, none and outside in the 90 % set
+    in_set: bool
+    held: tuple[bool, ...]
+    before: float
+    after: float
+    again: str
+
+    def found(self, ids: Sequence[str]) -> int:
+        """How many true effects are among ids, by their groups, an id for one effect."""
+        left, count = list(ids), 0
+        for effect in self.effects:
+            match = next((id for id in left if id in self.hard[effect].group), None)
+            if match:
+                left.remove(match)
+                count += 1
+        return count
+
+    @property
+    def right(self) -> bool:
+        """The likeliest answer is the truth."""
+        return self.says(self.ranked[0])
+
+    def says(self, key: str) -> bool:
+        """A key is the truth, by groups."""
+        ids = key.split("+")
+        if not self.effects:
+            return key == self.kind
+        return self.found(ids) == len(self.effects) == len(ids)
+
+    @property
+    def shrinkage(self) -> float:
+        return 1 - self.after / self.before
+
+
+def scored(folder: Path, sealed: Path) -> list[Scored]:
+    """Every trial of a group. Raises InputError."""
+    content, protocol = open_truth(folder, sealed), read_protocol(folder)
+    labels = labels_of(case_of(folder))
+    ruler = read_ruler(folder, labels)
+    told = lambda truth: read_json(folder / "answers" / f"{truth['id']}.json")
+    return [one(t, told(t), folder, ruler, protocol, labels) for t in content["trials"]]
+
+
+def one(
+    truth: Mapping[str, Any],
+    answer: Mapping[str, Any],
+    folder: Path,
+    ruler: Ruler,
+    protocol: Protocol,
+    labels: Sequence[Any],
+) -> Scored:
+    """One trial."""
+    readings = read_measurements(folder / "trials" / f"{truth['id']}.csv")
+    _, places, counts = means(readings, ruler)
+    d = np.array([log(v) for v in truth["variables"].values()]) - ruler.x0
+    hard = {}
+    effects = tuple(sorted(truth["effects"])) if truth["kind"] != "outside" else ()
+    for id in effects:
+        table = truth["members"].get(id, truth["without"])
+        shift, split = true_shift({**truth, "without": table}, ruler, places, labels)
+        hard[id] = difficulty(ruler, protocol, id, d, places, counts, shift, split)
+    told, out = answer["diagnosis"], answer["held_out"]
+    p = told["probabilities"]
+    ranked = tuple(sorted(p, key=lambda k: -p[k]))
+    named = told["effect"]
+    sizes = told["parameters"] if named else {}
+    equal = {id: h.equivalent for id, h in hard.items()}
+    error = lambda key: held_out_error(truth["held_out"], out[key] or out["plain_Hz"])
+    found = Scored(
+        truth["id"],
+        truth["kind"],
+        effects,
+        hard,
+        told["verdict"],
+        named,
+        bool((told.get("robust") or {}).get("robust")),
+        ranked,
+        p[ranked[0]],
+        frozenset(id for key in told["candidate_set"] for id in key.split("+")),
+        False,
+        tuple(
+            sizes[id]["low"] <= value <= sizes[id]["high"]
+            for id, value in equal.items()
+            if id in sizes and value is not None
+        ),
+        error("plain_Hz"),
+        error("with_effect_Hz"),
+        truth["again"],
+    )
+    keys = told["candidate_set"]
+    return Scored(**{**vars(found), "in_set": any(found.says(key) for key in keys)})
+
+
+def table(groups: Mapping[Group, Sequence[Scored]]) -> str:
+    """All figures as Markdown, by whose section it was, then by size."""
+    parts = {"own section": [], "foreign section": []}  # type: dict[str, list[Scored]]
+    sizes: dict[str, list[Scored]] = {}
+    for group, trials in groups.items():
+        parts["own section" if group.own else "foreign section"] += trials
+        sizes.setdefault(group.size, []).extend(trials)
+    lines = []
+    for columns, least in ((parts, LEAST), (sizes, LEAST_A_SIZE)):
+        rows = [figures(trials, least) for trials in columns.values()]
+        lines += [f"| what | {' | '.join(columns)} |", "|---" * (1 + len(columns)) + "|"]
+        lines += [f"| {name} | {' | '.join(row[name] for row in rows)} |" for name in rows[0]]
+        lines.append("")
+    return "\n".join(lines)
+
+
+def figures(trials: Sequence[Scored], least: int) -> dict[str, str]:
+    """By what the issue asks, in words."""
+    shown = lambda flags, low=least: _shown(list(flags), low)
+    of = lambda kind: [t for t in trials if t.kind == kind]
+    none, outside, single = of("none"), of("outside"), of("effect")
+    lam = lambda t: min((h.lam for h in t.hard.values()), default=0.0)
+    strong = [t for t in single if lam(t) >= ONE]
+    pairs, three = ([t for t in of("several") if len(t.effects) == n] for n in (2, 3))
+    named = [t for t in trials if t.verdict == "named" and t.named]
+    in_part = lambda t: t.found((t.named or "").split("+")) > 0
+    rows = {"no effect: accused": shown(t.verdict == "named" for t in none)}
+    for low, high in ((0, 4), (4, 10), (10, ONE), (ONE, np.inf)):
+        here = [t.right for t in single if low <= lam(t) < high]
+        rows[f"one effect, lambda {low:g} to {high:g}: top 1 by group"] = shown(here)
+    for words, several in (("two", pairs), ("three", three)):
+        here = [t for t in several if lam(t) >= EACH]
+        rows |= {
+            f"{words} effects, each lambda from {EACH:g}: all in the 90 % set": shown(
+                t.found(sorted(t.candidates)) == len(t.effects) for t in here
+            ),
+            f"{words}: one of them named first": shown(
+                t.found(t.ranked[0].split("+")[:1]) > 0 for t in here
+            ),
+            f"{words}: likeliest is the truth": shown(t.right for t in here),
+            f"{words}: called outside": shown(t.verdict == "outside" for t in here),
+        }
+    robust = [t for t in named if t.robust]
+    stated, right = (
+        np.array([getattr(t, key) for t in trials], float) for key in ("stated", "right")
+    )
+    proven = [t.shrinkage for t in strong if t.verdict == "named"]
+    chance = float(np.quantile([t.shrinkage for t in none], SIGNIFICANT)) if none else np.nan
+    first = {t.id: t for t in trials}
+    again = [(t, first[t.again]) for t in trials if t.again in first]
+    enough = len(proven) >= least
+    middle = f"{np.median(proven):.2f} (chance {chance:.2f})" if enough else _few(len(proven))
+    return rows | {
+        "named: right, or in part of several": shown(in_part(t) for t in named),
+        "named and called robust: likewise": shown((in_part(t) for t in robust), LEAST_ROBUST),
+        "outside: said so, or undecided": shown(
+            t.verdict in ("outside", "undecided") for t in outside
+        ),
+        "outside: named": shown(t.verdict == "named" for t in outside),
+        "calibration error (95 % quantile)": f"{calibration_error(stated, right):.3f}"
+        f" ({calibration_quantile(stated):.3f})"
+        if len(trials) >= least
+        else _few(len(trials)),
+        "90 % set holds the truth": shown(t.in_set for t in trials),
+        "90 % interval holds the size": shown(held for t in trials for held in t.held),
+        f"held out, named, lambda from {ONE:g}: median shrinkage": middle,
+        "mounted again: the same verdict": shown(
+            (a.verdict, a.named) == (b.verdict, b.named) for a, b in again
+        ),
+    }
+
+
+def _shown(flags: Sequence[bool], least: int) -> str:
+    if len(flags) < least:
+        return _few(len(flags))
+    found = rate(flags)
+    share, low, high = (f"{100 * found[key]:.0f}" for key in ("share", "low", "high"))
+    return f"{found['right']} of {found['count']}, {share} % ({low} to {high})"
+
+
+def _few(count: int) -> str:
+    return f"not shown ({count})"
