@@ -28,7 +28,7 @@ from ..studies.judge_section import LINES
 from ..studies.judge_section import section as stations_section
 from ..studies.test_fenics import installed
 from .study3 import make as making
-from .study3.cases import LABELS, SIZES, Group, written
+from .study3.cases import SIZES, Group, written
 from .study3.draw import known_laws
 from .study3.maker import Fenics, modes
 from .study3.score import Scored, figures
@@ -50,7 +50,7 @@ def fenics() -> Iterator[Fenics]:
 
 def tyre(size: str, folder: Path) -> Tyre:
     """As the maker builds it with the numbers of the case that `tyrecal init` writes."""
-    case = written(Group(size, False), folder, {str(label): 50.0 for label in LABELS})
+    case = written(Group(size, False), folder)
     return tyre_of(case, mould(size), columns(mould(size)))
 
 
@@ -107,7 +107,6 @@ def test_trials_of_all_kinds_are_drawn_sealed_and_made_again_alike(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(making, "computed", toy)
-    monkeypatch.setattr(making, "frequencies_Hz", lambda case: {str(x): 50.0 for x in LABELS})
     group = Group("205/60R15", True)
     counts = {"none": 1, "one": 2, "two": 2, "three": 1, "outside": 1, "again": 1}
     truths = []

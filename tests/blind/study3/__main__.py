@@ -79,7 +79,7 @@ def mesh(size: str) -> None:
     """Modes of the mould at the group's first pressure, with elements half as long."""
     group = next(g for g in GROUPS if g.size == size)
     with TemporaryDirectory() as folder:
-        case = written(replace(group, own=False), Path(folder), {str(x): 50.0 for x in LABELS})
+        case = written(replace(group, own=False), Path(folder))
     found = []
     for element in (COLUMN, COLUMN / 2):
         tyre = tyre_of(case, mould(size), columns(mould(size), element))

@@ -8,9 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from tyrecal.simulate.modes.label import Label
+from tyrecal.studies.blind.make import USUAL_LABELS
 from tyrecal.tyre.case import LoadedCase
 from tyrecal.tyre.case.new_case import from_file, from_size
+from tyrecal.tyre.effects.edit import changed, with_part
 from tyrecal.tyre.load import load_case
 from tyrecal.tyre.section.from_size import BELOW, BELTED
 from tyrecal.tyre.section.gauge_table import GaugeTable
@@ -18,17 +19,7 @@ from tyrecal.tyre.section.size import parse_size
 
 from .section import TREAD, VOID, Mould, at, carcass, mould
 
-LABELS = [
-    Label(0, 0, "axial"),
-    Label(0, 0, "torsional"),
-    Label(1, 1),
-    Label(1, 0),
-    Label(2, 1),
-    Label(2, 0),
-    Label(3, 1),
-    Label(3, 0),
-    Label(4, 0),
-]
+LABELS = list(USUAL_LABELS)
 
 
 @dataclass(frozen=True)
@@ -60,8 +51,8 @@ GROUPS = [
 ]  # type: ignore[arg-type]
 
 
-def written(group: Group, folder: Path, frequencies_Hz: dict[str, float]) -> LoadedCase:
-    """The case of a group, in ``folder``; frequencies: about what the tyre has, as its targets."""
+def written(group: Group, folder: Path) -> LoadedCase:
+    """The case of a group, in ``folder``."""
     size = parse_size(group.size)
     if group.own:
         stations = folder / f"{group.name}.csv"
@@ -70,16 +61,15 @@ def written(group: Group, folder: Path, frequencies_Hz: dict[str, float]) -> Loa
     else:
         draft = from_size(size, {}, None, group.name)
         (folder / draft.file).write_bytes(draft.content)
-    lines = ["", "targets:", "  modes:"]
-    for label in LABELS:
-        kind = f"kind: {label.kind}, " if label.kind else ""
-        f = frequencies_Hz[str(label)]
-        lines.append(
-            f"    - {{c: {label.c}, m: {label.m}, {kind}frequency_Hz: {f:.0f}, sigma_Hz: 1.0}}"
-        )
     path = folder / f"{group.name}.yaml"
-    path.write_text(draft.text + "\n".join(lines) + "\n", encoding="utf-8")
+    path.write_text(draft.text, encoding="utf-8")
     return load_case(path, allow_unusual=True)
+
+
+def with_exact_section(case: LoadedCase) -> LoadedCase:
+    """The case without doubt about its section, which the maker's tyres do not have: they differ by
+    laws of their own."""
+    return changed(case, section=with_part(case.case.section, known_from="exact"))
 
 
 def stations_of(m: Mould) -> GaugeTable:

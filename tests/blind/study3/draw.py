@@ -12,7 +12,7 @@ from tyrecal.studies.blind.protocol import Protocol
 from tyrecal.studies.diagnose.uncertainties import sources
 from tyrecal.tyre.case import LoadedCase
 
-from .cases import Group
+from .cases import Group, with_exact_section
 from .laws import OUTSIDE, OwnLaw, laws, rim_width
 from .section import columns, mould, off
 from .tyre import Tyre, tyre_of
@@ -47,11 +47,11 @@ def drawn(
     one effect that are mounted and measured once more."""
     random = np.random.default_rng(seed)
     effects, outside = known_laws(group)
-    found = []
+    known_sources, found = sources(with_exact_section(case))[0], []
     kinds = [kind for kind in EFFECTS_OF for _ in range(counts.get(kind, 0))]
     for kind in kinds:
         rules = replace(protocol, counts={"none": 1})
-        (truth,) = draw(rules, case, sources(case)[0], {}, {}, int(random.integers(2**63)))
+        (truth,) = draw(rules, case, known_sources, {}, {}, int(random.integers(2**63)))
         known = outside if kind == "outside" else effects
         number = 1 if kind == "outside" else EFFECTS_OF[kind]
         ids = sorted(random.choice(sorted(known), number, replace=False).tolist())
@@ -74,7 +74,7 @@ def made(each: Drawn, case: LoadedCase, group: Group, without: tuple[str, ...] =
 
     Its own geometry goes with its constants, so that the same tyre mounted again has it, too.
     """
-    truth = each.truth
+    truth, case = each.truth, with_exact_section(case)
     found, _ = sources(case)
     nominal = case.file_data["pressure_kPa"]
     plain = tyre(truth, case, found, nominal, None)

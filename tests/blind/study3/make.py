@@ -15,11 +15,9 @@ import numpy as np
 
 from tyrecal.errors import InputError
 from tyrecal.simulate.deck.tyre_design import TyreDesign
-from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
+from tyrecal.simulate.evaluate.evaluator import Evaluator
 from tyrecal.simulate.evaluate.failure import EvaluationFailed
 from tyrecal.simulate.evaluate.pool import process_pool
-from tyrecal.simulate.modes.label import label_modes
-from tyrecal.simulate.modes.match import match
 from tyrecal.studies.blind.answer import rows_of, tyre_model
 from tyrecal.studies.blind.draw import draw
 from tyrecal.studies.blind.make import (
@@ -39,7 +37,7 @@ from tyrecal.studies.blind.seal import SEAL, seal
 from tyrecal.studies.diagnose.uncertainties import sources
 from tyrecal.tyre.case import LoadedCase
 
-from .cases import LABELS, Group, written
+from .cases import LABELS, Group, with_exact_section, written
 from .draw import Drawn, drawn, made
 from .maker import ABOUT, Fenics, computed
 
@@ -63,7 +61,7 @@ def make(
         raise InputError(f"{folder} holds sealed trials already; make others in another folder")
     folder.mkdir(parents=True, exist_ok=True)
     sealed.mkdir(parents=True, exist_ok=True)
-    case = case_in(sealed, group)
+    case = written(group, sealed)
     protocol = Protocol(
         ABOUT,
         case.path.name,
@@ -89,19 +87,6 @@ def make(
         for each, (trial, members) in zip(every, found, strict=True)
     ]
     return seal(folder, sealed, {"seed": seed, "group": asdict(group), "trials": truth})
-
-
-def case_in(sealed: Path, group: Group) -> LoadedCase:
-    """The group's case; its targets are the bundled solver's own modes, to a hertz."""
-    case = written(group, sealed, {str(label): 50.0 for label in LABELS})
-    return written(group, sealed, frequencies_Hz(case))
-
-
-def frequencies_Hz(case: LoadedCase) -> dict[str, float]:
-    """Of the case as it stands, by label."""
-    modes = Evaluator(TyreDesign(case)).evaluate(Question({})).modes
-    found = match(label_modes(modes), LABELS)
-    return {str(label): mode.frequency_Hz for label, mode in found.items()}
 
 
 def measured(case: LoadedCase, protocol: Protocol) -> Mapping[str, Any]:
@@ -151,7 +136,7 @@ def _made(protocol: Protocol, case: LoadedCase, group: Group, each: Drawn) -> tu
             return Trial(each.truth, tries, whole, run(*ids) if ids else whole), members
         except (EvaluationFailed, ValueError) as failure:
             last = failure
-        rules, found = replace(protocol, counts={"none": 1}), sources(case)[0]
+        rules, found = replace(protocol, counts={"none": 1}), sources(with_exact_section(case))[0]
         (other,) = draw(rules, case, found, {}, {}, int(random.integers(2**63)))
         truth = replace(each.truth, variables=other.variables, constants=other.constants)
         each = replace(each, truth=truth)
