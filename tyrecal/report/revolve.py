@@ -26,8 +26,8 @@ MAX_NODE_DISTANCE = 1e-3  # m, within which a node of another mesh stands for on
 def placed(
     evaluation: Evaluation, modes: Sequence[Mode], mesh: SectionMesh
 ) -> tuple[dict[int, Array], list[Mode]]:
-    """The inflation's displacement, r, theta, z in m, by node of the mesh, and the modes with their
-    shapes on its nodes; both empty where they are not known there.
+    """The inflation's displacement, r, theta, z in m, by node of the rubber, and the modes with
+    their shapes on its nodes; both empty where they are not known there.
 
     Where a solver has nodes or numbers of its own, each node takes what is known nearest to it.
     """
@@ -35,17 +35,19 @@ def placed(
     known = [shape for shape in shapes if isinstance(shape, HarmonicShape)]
     if not known or len(known) < len(shapes):
         return {}, []
-    nodes, places = np.array(list(mesh.nodes)), np.array(list(mesh.nodes.values()))
+    of_rubber = {n for element in mesh.solids.values() for n in element}
+    own = {n: place for n, place in mesh.nodes.items() if n in of_rubber}
+    nodes, places = np.array(list(own)), np.array(list(own.values()))
     there = known[0].points
     row_of = {number: row for row, number in enumerate(known[0].nodes.tolist())}
-    rows = np.array([row_of.get(number, 0) for number in mesh.nodes])
+    rows = np.array([row_of.get(number, 0) for number in own])
     if abs(there[rows] - places).max() > EQUAL_POINTS:
         from scipy.spatial import KDTree  # late: a quarter of a second
 
         away, rows = KDTree(there).query(places)
         if away.max() > MAX_NODE_DISTANCE:
             return {}, []
-    moved = dict(zip(mesh.nodes, evaluation.displacement[rows], strict=True))
+    moved = dict(zip(own, evaluation.displacement[rows], strict=True))
     on_mesh = (HarmonicShape(s.n, nodes, places, s.amplitude[rows]) for s in known)
     return moved, [
         replace(mode, raw=replace(mode.raw, shape=shape))

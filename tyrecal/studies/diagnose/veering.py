@@ -106,7 +106,7 @@ class Veering:
         """d ln f of coupled modes by ln f of uncoupled ones (n, n), where they are as measured."""
         own, part = np.ones(len(y)), np.zeros(len(y))
         apart = (np.exp(2 * (y - self.scale)) - np.exp(2 * (y[self.partner] - self.scale))) / 2
-        r = np.sqrt(np.maximum(1 - (zeta * self.size / np.maximum(abs(apart), 1e-300)) ** 2, 0.0))
+        r = np.sqrt(1 - np.minimum(zeta * self.size / np.maximum(abs(apart), 1e-300), 1.0) ** 2)
         both = (self.size > 0) & (self.partner >= 0)
         own[both], part[both] = (1 + r[both]) / 2, (1 - r[both]) / 2
         found = np.diag(own)
