@@ -119,7 +119,7 @@ class OwnDecks:
     def pressures(self) -> list[tuple[OwnDeck, Row, int, float]]:
         """Where a pressure stands, and how large it is over the largest of them.
 
-        None where `PRESSURE_MARK` says where. Raises OwnDeckError where it cannot be told.
+        Empty where `PRESSURE_MARK` says where. Raises OwnDeckError where it cannot be told.
         """
         if any(PRESSURE_MARK in deck.marks for deck in self.decks):
             return []
