@@ -86,15 +86,18 @@ def test_tyres_of_one_mould_differ_by_what_is_stated() -> None:
 
 
 @pytest.mark.parametrize("size", ["205/60R15", "11R22.5"])
-def test_a_law_says_nothing_at_0_and_something_at_its_ends(size: str, tmp_path: Path) -> None:
-    """Whether it moves nodes, cells or constants, at the pressures of a study."""
+def test_a_law_says_nothing_at_0_and_something_else_at_every_size(
+    size: str, tmp_path: Path
+) -> None:
+    """Whether it moves nodes, cells or constants, at two pressures; the least size drawn, too."""
     sound, group = tyre(size, tmp_path), Group(size, True)
     asked = lambda tyre: problem(tyre, [0.8e-3 * sound.nominal_Pa, 1.2e-3 * sound.nominal_Pa])
     plain = asked(sound)
     for law in [law for known in known_laws(group) for law in known.values()]:
         assert asked(law.add(sound, 0.0)) == plain
-        for end in {law.low, law.high} - {0.0}:
-            assert asked(law.add(sound, end)) != plain
+        sizes = [share * end for end in {law.low, law.high} - {0.0} for share in (0.2, 1.0)]
+        every = [plain, *(asked(law.add(sound, e)) for e in sizes)]
+        assert all(a != b for i, a in enumerate(every) for b in every[:i])
 
 
 def toy(fenics: Fenics, told: Tyre, pressures: list[float], labels: list[Any]) -> dict[float, Any]:

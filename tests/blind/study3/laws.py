@@ -126,8 +126,9 @@ def parted_belts(tyre: Tyre, e: float) -> Tyre:
 
 
 def unseated_bead(tyre: Tyre, e: float) -> Tyre:
-    """The tyre was mounted dry: over e m below the flange's top the bead does not touch the rim."""
-    return replace(tyre, unseated=e)
+    """The tyre was mounted dry: over a share e of the bead, from the flange's top, there
+    is a gap to the rim."""
+    return replace(tyre, mould=replace(tyre.mould, unseated=e))
 
 
 def shrunk_cords(tyre: Tyre, e: float) -> Tyre:
@@ -165,8 +166,9 @@ def laws() -> dict[str, OwnLaw]:
 
 OUTSIDE: Mapping[str, OwnLaw] = {
     "parted_belts": OwnLaw(0.0, 0.03, parted_belts),
-    "unseated_bead": OwnLaw(0.0, 0.012, unseated_bead),
-    "shrunk_cords": OwnLaw(0.0, 0.02, shrunk_cords),
+    "unseated_bead": OwnLaw(0.0, 0.8, unseated_bead),
+    "shrunk_cords": OwnLaw(0.0, 0.01, shrunk_cords),
     "sealant": OwnLaw(0.0, 6.0, sealant),
 }
-"""kg/m2 and m: about 1.5 kg of sealant in a 205/60R15, and belts parted over a fifth of a half."""
+"""m of belt, a share of the bead, strain, kg/m2: at most a third of half a belt, and 1.8 kg of
+sealant in a 205/60R15."""

@@ -60,6 +60,7 @@ class Mould:
     thinner_inside: tuple[float, ...] = (0.0, 0.0)
     worn: float = 0.0  # of skid and base, more towards the shoulder
     blown: float = 0.0  # share more outside the carcass about the widest point
+    unseated: float = 0.0  # share of the bead, from the flange's top, that the rim does not hold
 
     @property
     def crown_gauge(self) -> float:
@@ -146,7 +147,7 @@ def arc_like(p: Array, q: Array, a: float, b: float) -> Array:
 class Section:
     """Lines by columns: points (lines, columns, 2), r and z; offsets (lines, columns) from the
     carcass; s (columns,) of the carcass; marks by name: s of the belts' edges, the filler's tip,
-    the turn-up's end, the rim, the end."""
+    the turn-up's end, the rim, where it holds, the end."""
 
     mould: Mould
     points: Array
@@ -170,6 +171,7 @@ def carcass(m: Mould) -> tuple[Array, Array, dict[str, float]]:
     s = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
     place = lambda k: float(s[k * (CURVE_POINTS - 1)])
     marks = {"belt": half, "widest": place(2), "rim": place(3), "end": place(4)}
+    marks["held"] = marks["rim"] + m.unseated * (marks["end"] - marks["rim"])
     below = (marks["belt"] < s) & (s <= marks["rim"])
     at = lambda height: float(np.interp(-(m.rim[0] + height), -line[below, 0], s[below]))
     marks |= {"filler": at(m.filler), "turn_up": at(m.turn_up)}
@@ -185,7 +187,7 @@ def breaks(m: Mould, marks: dict[str, float]) -> list[float]:
     """s where parts begin or end, from the crown on."""
     half, tip, rim = max(m.belts), marks["filler"], marks["rim"]
     edges = [*m.belts, m.cap, SKIM * half, TREAD * half]
-    ends = sorted([*edges, marks["turn_up"], tip, (tip + rim) / 2, rim, marks["end"]])
+    ends = sorted([*edges, marks["turn_up"], tip, (tip + rim) / 2, marks["held"], marks["end"]])
     return [0.0, *(b for a, b in zip([0.0, *ends], ends, strict=False) if b - a > 1e-4)]
 
 

@@ -54,8 +54,7 @@ class Tyre:
     """wires: E A of a bead, N, and their kg/m; shift_Pa: what a gauge is off at all pressures;
     nominal_Pa: pressure of the case. The rest is 0 in a sound tyre: kelvin above the case's
     temperature, drift in kelvin per 100 kPa, gauge as a share of the pressure, cap N/m more, fan:
-    A/s falls as (bead radius / r)^fan, parted: m of belt edge, unseated: m of the flange, lining in
-    kg/m2 under the belt."""
+    A/s falls as (bead radius / r)^fan, parted: m of belt edge, lining: kg/m2 under the belt."""
 
     mould: Mould
     columns: tuple[int, ...]
@@ -71,7 +70,6 @@ class Tyre:
     cap: float = 0.0
     fan: float = 0.0
     parted: float = 0.0
-    unseated: float = 0.0
     lining: float = 0.0
 
 
@@ -111,7 +109,7 @@ def problem(tyre: Tyre, pressures_kPa: list[float], each: int = 1) -> dict[str, 
     made = section(tyre.mould, counts)
     mesh = Mesh.of(made)
     states = [_state(tyre, mesh, 1e3 * p) for p in pressures_kPa]
-    return {**mesh.told(made.marks["rim"] + tyre.unseated), **OWN_LAWS, "states": states} | {
+    return {**mesh.told(made.marks["held"]), **OWN_LAWS, "states": states} | {
         "harmonics": HARMONICS,
         "modes": MODES,
         "degree": DEGREE,
@@ -194,12 +192,14 @@ def _state(tyre: Tyre, mesh: Mesh, nominal: float) -> dict[str, Any]:
     viscous[pattern] *= solid**BLOCKS
     D1[pattern] /= solid**BLOCKS
     density[pattern] *= solid
-    if tyre.parted:
-        inner, outer = (mesh.section.mould.lines.index(f"belt_{k}") for k in _widest_two(m))
-        edge = min(m.belts[k - 1] for k in _widest_two(m))
-        there = (slice(min(inner, outer), max(inner, outer)), (s > edge - tyre.parted) & (s < edge))
-        C10[there] *= SEPARATED
-        viscous[there] *= SEPARATED
+    if tyre.parted:  # of an element at the end of what has parted, its share
+        pair = _widest_two(m)
+        rows = slice(*(m.lines.index(f"belt_{k}") for k in pair))
+        edge, ends = min(m.belts[k - 1] for k in pair), mesh.section.s[::2]
+        over = np.clip(ends[1:], None, edge) - np.clip(ends[:-1], edge - tyre.parted, None)
+        left = 1 - (1 - SEPARATED) * np.clip(over / np.diff(ends), 0, 1)
+        C10[rows] *= left
+        viscous[rows] *= left
     core = s > marks["rim"]
     area = mesh.areas()[1][core].sum()
     hoop[1, core] = tyre.wires[0] / area
