@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from math import sqrt
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -21,11 +22,12 @@ from tyrecal.simulate.evaluate.failure import DeckRefused, EvaluationFailed
 from tyrecal.simulate.evaluate.results import Evaluation
 from tyrecal.simulate.modes.find import find_modes
 from tyrecal.simulate.modes.label import Label
+from tyrecal.simulate.modes.loaded import Member
 from tyrecal.studies.fit.calibrate import Fit, calibrate, check
 from tyrecal.studies.fit.crossing import AXIAL, TORSIONAL, crossing, order, pair_clarity
 from tyrecal.studies.fit.problem import Point, Problem
-from tyrecal.studies.fit.states import next_states
-from tyrecal.studies.fit.targets import read_targets, target_labels
+from tyrecal.studies.fit.states import _best_measured, next_states
+from tyrecal.studies.fit.targets import Target, ValueTarget, read_targets, target_labels
 from tyrecal.studies.fit.uncertainty import uncertainty
 from tyrecal.tyre.case import LoadedCase, start_values, with_level
 from tyrecal.tyre.case.schema import TargetMass, TargetMode, Targets, Variable
@@ -249,6 +251,26 @@ def test_the_next_state_is_the_one_whose_fit_would_be_best() -> None:
         assert list(each.standard_errors_with.values()) == pytest.approx(after, rel=1e-3)
         ratio = np.exp(np.mean(np.log(np.array(after) / before)))
         assert each.ratio == pytest.approx(ratio, rel=1e-3) and ratio < 1
+
+
+def test_modes_under_a_load_are_like_those_of_a_next_state() -> None:
+    """Each once, where no unloaded state was measured; the tyre's own is then one to propose."""
+    at_load = TyreState(None, 4000.0)
+    told = [
+        ValueTarget("frequency_Hz", 80.0, 0.4, state=at_load, member=Member(Label(2, 0), side))
+        for side in ("symmetric", "antisymmetric")
+    ]
+    area = ValueTarget("contact_area_m2", 0.02, 1e-4, state=at_load)
+    free = TyreState(None, 0.0, "free")
+    hung = Target(Label(3, 0), 100.0, state=free)
+    sigma = np.array([0.4, 0.6, 1e-4, 0.5])
+    some = lambda *rows: SimpleNamespace(measured=list(rows))
+    known = lambda *which: SimpleNamespace(sigma=sigma[list(which)])
+    ((mode, relative),) = _best_measured(some(*told, area), known(0, 1, 2))  # type: ignore[arg-type]
+    assert (mode.label, mode.multiplicity, relative) == (Label(2, 0), 2, 0.4 / 80.0)
+    ((mode, relative),) = _best_measured(some(*told, hung), known(0, 1, 3))  # type: ignore[arg-type]
+    assert (mode, relative) == (hung, 0.005)
+    assert _best_measured(some(area), known(2)) == []  # type: ignore[arg-type]
 
 
 def test_no_state_is_proposed_that_cannot_be_computed() -> None:

@@ -3,6 +3,7 @@
     python -m tests.studies.states coverage [data sets] [seed]
     python -m tests.studies.states errors
     python -m tests.studies.states cost [--area]
+    python -m tests.studies.states loaded FOLDER
 
 The main case, nine modes at 160, 240 and 320 kPa with the rim fixed and free, sigma 0.5 %, and the
 contact area at 4 kN and 240 kPa, sigma 2 %.
@@ -19,14 +20,22 @@ those of as many repeats of 240 kPa with the rim fixed.
 
 cost: processor time of the fit over all states over the sum of fits of each alone, on the coarse
 mesh, by the model itself; with --area the area is one more target of 240 kPa, rim fixed, in both.
+
+loaded: a fit to modes under 4 kN alone, as a user makes it: `modes --load-N` of a truth, scatter of
+0.5 %, and `fit --measured`, coarse mesh, three variables; processor time of both.
 """
 
 from __future__ import annotations
 
+import json
+import resource
+import subprocess
 import sys
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
+from random import Random
 from typing import Any
 
 import numpy as np
@@ -283,6 +292,36 @@ def cost(with_area: bool) -> None:
     )
 
 
+def loaded(folder: Path) -> None:
+    """A fit to modes under a load."""
+    case, truth = str(CASES / "p235_75r17.yaml"), {"A_carcass": 4e-7, "C10": 9e5}
+    sets = [word for name, value in truth.items() for word in ("--set", f"{name}={value}")]
+    common = ["--mesh", "coarse", "--no-store", "--quiet"]
+    asked = ["--load-N", f"{LOAD_N:g}", *sets, *common, "--output", str(folder / "truth")]
+    subprocess.run([sys.executable, "-m", "tyrecal", "modes", case, *asked], check=True)
+    told = json.loads((folder / "truth" / "modes.json").read_text(encoding="utf-8"))
+    rows, scatter = ["quantity,c,m,kind,member,pressure_kPa,load_N,value,sigma"], Random(1)
+    for mode in (mode for mode in told["modes"] if mode["c"] <= 4 and mode["m"] <= 1):
+        sigma = RELATIVE_SIGMA * mode["frequency_Hz"]
+        place = f"{mode['c']},{mode['m']},{mode['kind'] or ''},{mode['symmetry']},240,{LOAD_N:g}"
+        value = mode["frequency_Hz"] + sigma * scatter.gauss(0, 1)
+        rows.append(f"frequency_Hz,{place},{value:.3f},{sigma:.3f}")
+    table = folder / "loaded.csv"
+    table.write_text("\n".join(rows) + "\n", encoding="utf-8")
+    options = ["--measured", str(table), *common, "--no-pictures", "--output", str(folder / "fit")]
+    subprocess.run([sys.executable, "-m", "tyrecal", "fit", case, *options], check=True)
+    found = json.loads((folder / "fit" / "fit.json").read_text(encoding="utf-8"))
+    count, left = len(rows) - 1, found["objective_Hz"]
+    print(f"{count} modes, {found['evaluations']} design points, {left:.2f} sigmas left")
+    for name, v in found["variables"].items():
+        off = (v["value"] - truth.get(name, v["initial"])) / v["standard_error"]
+        percent = 100 * v["standard_error"] / v["value"]
+        print(f"{name}: {v['value']:.4g} +- {percent:.0f} %, off by {off:+.1f} standard errors")
+    for each in found["next_states"]:
+        print(each)
+    print(f"{resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime:.0f} s of both commands")
+
+
 if __name__ == "__main__":
     what, *rest = sys.argv[1:]
     if what == "coverage":
@@ -290,5 +329,7 @@ if __name__ == "__main__":
         coverage(*(numbers + [400, 1][len(numbers) :]))
     elif what == "errors":
         errors()
+    elif what == "loaded":
+        loaded(Path(rest[0]))
     else:
         cost("--area" in rest)
