@@ -22,6 +22,7 @@ from tyrecal.tyre.load import load_case
 
 from .conftest import CASES
 from .studies.both_columns import COLUMNS, PAPER_HZ
+from .studies.pages import differences, recorded
 
 NUMBER = re.compile(r"[+\-]?\d+(?:\.\d+)?")
 
@@ -72,6 +73,11 @@ def test_table_2_of_the_page_on_the_paper() -> None:
     assert [figure(last[i]) for i in (2, 5)] == [
         pytest.approx(objective(each, targets), abs=0.006) for each in hertz
     ]
+
+
+def test_every_figure_is_the_recorded_one_rounded() -> None:
+    """Of what `python -m tests.studies.pages FOLDER` found last."""
+    assert not list(differences(recorded()))
 
 
 @pytest.mark.slow
