@@ -50,7 +50,7 @@ class Fenics:
             raise InputError("FEniCSx does not answer: apt-get install python3-dolfinx")
         answer: dict[str, Any] = json.loads(line)
         if "failed" in answer:
-            raise EvaluationFailed(answer["failed"])
+            raise EvaluationFailed("no_equilibrium", answer["failed"])
         return answer
 
     def close(self) -> None:
@@ -68,7 +68,7 @@ def modes(answer: dict[str, Any], state: dict[str, Any], labels: list[Label]) ->
     raw = []
     for mode in state["modes"]:
         if mode["eigenvalue"] <= 0:
-            raise EvaluationFailed(f"unstable: {mode['eigenvalue']:g} of n = {mode['n']}")
+            raise EvaluationFailed("unstable", f"{mode['eigenvalue']:g} of n = {mode['n']}")
         own = np.array(mode["cos"]) + 1j * np.array(mode["sin"])
         # (theta, z) -> (-theta, -z): u_r as it is, u_theta and u_z with the other sign
         both = np.concatenate([own, own.conj() * [1, -1, -1]])
