@@ -301,17 +301,17 @@ def test_peaks_of_a_pair_are_integrated() -> None:
 
 
 def test_prior_probabilities_are_one_together() -> None:
-    """A quarter for none, a tenth for what is outside; of the rest each further effect has a tenth
-    of what one less has, over all sets, tried or not."""
+    """A quarter for none, a tenth for what is outside; of the rest each further effect has a
+    twentieth of what one less has, over all sets, tried or not."""
     toy = Toy(effects=6, pressures=(240.0,))
     base = problem(toy)
     found = {h.key: h for h in weigh(base.measured(drawn(toy, base, generator(1), {}, 0.3)))}
     assert found["none"].prior == 0.25 and found["outside"].prior == 0.1
     singles = [h for key, h in found.items() if key in toy.spans]
     pairs = [h for key, h in found.items() if "+" in key]
-    assert sum(h.prior for h in singles) == pytest.approx(0.65 / 1.11)
+    assert sum(h.prior for h in singles) == pytest.approx(0.65 / 1.0525)
     pairs = [h for h in pairs if h.key.count("+") == 1]
-    assert [h.prior for h in pairs] == pytest.approx([0.065 / 1.11 / 15] * 14)
+    assert [h.prior for h in pairs] == pytest.approx([0.0325 / 1.0525 / 15] * 14)
     for further in (0.1, 0.5):
         prior = priors(25, further)
         shares = {k: each * comb(25, k) for k, each in prior.items()}

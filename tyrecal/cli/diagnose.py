@@ -61,7 +61,7 @@ file = click.Path(path_type=Path, exists=True, dir_okay=False)
 @click.option(
     "--further",
     type=click.FloatRange(0, 1),
-    default=0.1,
+    default=0.05,
     show_default=True,
     metavar="SHARE",
     help="Prior of two effects over that of one, and of three over that of two.",

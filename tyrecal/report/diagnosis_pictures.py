@@ -14,6 +14,7 @@ from ..studies.diagnose.diagnosis import Diagnosis
 from ..studies.diagnose.evidence import NONE, OUTSIDE
 from ..studies.diagnose.gap import family
 from ..studies.diagnose.observations import Observable
+from ..studies.diagnose.several import before
 from .figure import COLOURS, GREY, headline, in_house_style, new_figure
 from .section import draw_section_map
 from .shape_data import DiagnosisSection
@@ -118,11 +119,10 @@ def draw_probabilities(d: Diagnosis) -> Figure:
     colours = ["0.6" if h.key in (NONE, OUTSIDE) else COLOURS[0] for h in order]
     p = [d.probabilities[h.key] for h in order]
     axes.barh(place, p, color=colours, height=0.7)
-    axes.plot(
-        [h.prior for h in order], place, "|", color="black", ms=13, mew=1.5, label="before the data"
-    )
-    for y, value, h in zip(place, p, order, strict=True):
-        axes.text(max(value, h.prior) + 0.01, y, f"{value:.2f}", va="center", fontsize=8)
+    prior = [before(d.hypotheses)[h.key] for h in order]
+    axes.plot(prior, place, "|", color="black", ms=13, mew=1.5, label="before the data")
+    for y, value, least in zip(place, p, prior, strict=True):
+        axes.text(max(value, least) + 0.01, y, f"{value:.2f}", va="center", fontsize=8)
     axes.axvline(0.7, color=GREY, lw=0.8, ls=":")
     axes.text(0.71, -0.45, "named from here on,\nalone or summed", fontsize=8, color="0.3")
     axes.set_yticks(place, [fill(_short(d, h.key), 2 * MAX_LETTERS) for h in order])

@@ -41,7 +41,7 @@ class Assumed:
     form: float | None = None  # model-form error of every mode; None: on record
     split: float = 0.003  # of pairs, by the non-uniformity of this kind of tyre
     law: float | None = None  # of an effect's shift, that may be off; None: by effect
-    further: float = 0.1  # probability of a further effect over that of one less, from one on
+    further: float = 0.05  # probability of a further effect over that of one less, from one on
 
 
 class Added(NamedTuple):

@@ -53,7 +53,7 @@ def robustness(
         other = decide(judged, found, rows, len(problem.centre))
         if (other.kind, other.key) != (verdict.kind, verdict.key):
             changes.append(f"{words} ({_judged(other)})")
-    return Robustness(not changes, tuple(changes), min(p), max(p))
+    return Robustness(not changes, tuple(changes), min(p), min(max(p), 1.0))
 
 
 def said(p: Mapping[str, float], verdict: Verdict) -> float:
