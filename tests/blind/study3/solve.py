@@ -39,8 +39,10 @@ from ...studies.judge_fenics import by_factors, cord, gradient, rubber
 Array = np.ndarray
 EQUILIBRIUM = 1e-8  # of the first residual
 MAX_ITERATIONS = 30
-HELP_Pa = (1e7, 1e6, 1e5, 0.0)  # slack cords do not bear yet: stiffness that is taken away again
+RISE, SHORTEST_m = 1e3, 1e-9  # of a residual in a step, which is halved else
+HELP = (500.0, 50.0, 5.0, 0.5, 0.0)  # of the pressure: slack cords do not bear yet
 QUADRATURE = 6
+BUCKLED = 0.02  # share of its stiffness that a cord has in compression, by the makers' own law
 CELL = ("C10", "D1", "density", "dynamic_C10", "hoop_Pa", "lining")
 LINE = ("stiffness", "angle", "area_density", "prestrain")  # of the line above a cell
 logging.disable(logging.INFO)  # of the compiler
@@ -148,7 +150,9 @@ class Tyre:
         strain = {"nominal": ufl.sqrt(ufl.dot(q, q)) - 1, "logarithmic": ufl.ln(ufl.dot(q, q)) / 2}[
             cord_law
         ]
-        lines = both["stiffness"] * (strain - both["prestrain"]) ** 2 / 2
+        taut = strain - both["prestrain"]
+        bears = ufl.conditional(ufl.lt(taut, 0.0), BUCKLED if cord_law == "nominal" else 1.0, 1.0)
+        lines = bears * both["stiffness"] * taut**2 / 2
         inside = rubber(F, {**d, "C01": 0.0}, volume_law) + hoop
         return inside * self.R * self.dx + self._on_lines(lines)
 
@@ -183,29 +187,34 @@ class Tyre:
         free, taken, self.vibrates.value = self.free[0], 0, 0.0
         solver = PETSc.KSP().create(MPI.COMM_SELF)
         by_factors(solver)
-        for help_Pa in helps:
-            self.help.value = help_Pa
-            sizes: list[float] = []
+        left = lambda: petsc.assemble_vector(self.force).array[free]
+        for share in helps:
+            self.help.value = share * self.pressure.value
+            residual, first = left(), 0.0
             for _ in range(MAX_ITERATIONS):
-                residual = petsc.assemble_vector(self.force).array[free]
-                sizes.append(float(np.linalg.norm(residual)))
-                if sizes[-1] <= EQUILIBRIUM * self.scale(sizes):
+                size = float(np.linalg.norm(residual))
+                first = first or max(size, 1e-3 * self.pressure.value)
+                if size <= EQUILIBRIUM * first:
                     break
-                K = sparse(self.uu)[free][:, free].tocsr()
-                matrix = petsc_of(K)
+                matrix = petsc_of(sparse(self.uu)[free][:, free].tocsr())
                 solver.setOperators(matrix)
                 b, x = matrix.createVecLeft(), matrix.createVecRight()
                 b.array[:] = residual
                 solver.solve(b, x)
-                self.state.x.array[free] -= x.array
-                taken += 1
+                step = np.array(x.array)
+                self.state.x.array[free] -= step
+                residual, taken = left(), taken + 1
+                while not np.linalg.norm(residual) < RISE * first:  # too far: an element is folded
+                    step /= 2
+                    if abs(step).max() < SHORTEST_m:
+                        break
+                    self.state.x.array[free] += step
+                    residual = left()
             else:
-                raise RuntimeError(f"no equilibrium: of {sizes[0]:g} N {sizes[-1]:g} are left")
+                raise RuntimeError(
+                    f"no equilibrium: of {first:g} N {size:g} are left, with {share:g} of help"
+                )
         return taken
-
-    def scale(self, sizes: list[float]) -> float:
-        """The pressure's own force, N: what a residual is compared with."""
-        return max(sizes[0], 1e-3 * self.pressure.value)
 
     def modes(self, harmonics: list[int], count: int) -> list[dict[str, Any]]:
         """The lowest of each harmonic."""
@@ -244,7 +253,7 @@ class Tyre:
         """Modes at each state of the problem, in its order. Raises RuntimeError."""
         started = time.process_time()
         self.put(problem)
-        states, helps = [], HELP_Pa
+        states, helps = [], HELP
         for state in problem["states"]:
             self._constants(state)
             self.pressure.value = state["pressure"]
