@@ -202,7 +202,7 @@ def evaluate_footprint(
     >>> case = load_case("cases/p235_75r17.yaml", mesh="coarse")
     >>> (at_1_kN,) = evaluate_footprint(case, [1000])
     >>> f"{1e4 * at_1_kN['area_m2']:.0f} cm2, {1e3 * at_1_kN['deflection_m']:.1f} mm"
-    '40 cm2, 5.4 mm'
+    '41 cm2, 5.4 mm'
     """
     from .studies.footprint import footprint_row
 

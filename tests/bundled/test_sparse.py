@@ -66,7 +66,7 @@ def test_neighbours_stand_nearly_as_near_as_scipy_puts_them() -> None:
 
 def test_routines_are_scipys_whoever_comes_first() -> None:
     """The same module before and after its package is imported, and the package works with it."""
-    ours = "from tyrecal_solvers.bundled.compiled import LAPACK, compiled"
+    ours = "from tyrecal_solvers.bundled.section.compiled import LAPACK, compiled"
     whole = "import scipy.linalg, scipy.sparse, sys"
     same = "assert LAPACK is scipy.linalg.lapack._flapack, LAPACK"
     known = "sys.modules['scipy.sparse._sparsetools']"

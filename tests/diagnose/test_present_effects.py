@@ -95,7 +95,9 @@ def test_a_part_of_an_effect_in_the_case_leaves_the_rest_to_be_found(tmp_path: P
     )
     sizes = [each.diagnosis.parameter("bead_filler") for each in (none, some)]
     assert sizes[1]["low"] < truth < sizes[1]["high"]
-    assert sizes[1]["value"] == pytest.approx(sizes[0]["value"], rel=0.1)
+    deviation = max(each["high"] - each["low"] for each in sizes) / (2 * 1.645)
+    # the law may be off for all of the effect, or for what the case lacks of it alone
+    assert sizes[1]["value"] == pytest.approx(sizes[0]["value"], abs=deviation)
     seen = [
         diagnosis_result(each.diagnosis).smallest_visible["bead_filler"] for each in (none, some)
     ]

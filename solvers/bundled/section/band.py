@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...errors import Indefinite
-from ..compiled import LAPACK
+from .compiled import LAPACK
 from .sparse import Sparse, narrow_order
 
 Array = np.ndarray

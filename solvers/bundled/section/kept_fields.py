@@ -16,8 +16,8 @@ from __future__ import annotations
 import numpy as np
 
 from ...errors import Indefinite
-from ..compiled import LAPACK
 from .band import Cholesky, Numbering
+from .compiled import LAPACK
 from .mechanics import OfElements
 from .sparse import Sparse
 from .symmetry import MirrorHalf

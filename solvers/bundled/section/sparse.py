@@ -7,7 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from ..compiled import compiled
+from .compiled import compiled
 
 Array = np.ndarray
 _add_products = compiled("scipy.sparse._sparsetools").csr_matvecs
