@@ -49,7 +49,12 @@ def test_all_that_is_offered_is_there_and_nothing_else() -> None:
         tyrecal.fit_everything  # noqa: B018
 
 
-@pytest.mark.parametrize("name", [*FUNCTIONS, ""])
+SLOW = {"diagnose_case"}
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=[pytest.mark.slow] * (n in SLOW)) for n in [*FUNCTIONS, ""]]
+)
 def test_the_example_of(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """``with_values`` is shown with ``load_case``; "": the package's own."""
     monkeypatch.chdir(ROOT)

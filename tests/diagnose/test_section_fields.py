@@ -135,6 +135,7 @@ def test_the_statement_is_none_of_the_tyre() -> None:
     assert tyre_sha256(STATED) == tyre_sha256(CASE)
 
 
+@pytest.mark.slow
 def test_what_is_told_of_the_section_holds_within_its_standard_deviation(chance: Chance) -> None:
     """Of drawn fields on the toy, whose sources are those of the case with slopes by chance.
 

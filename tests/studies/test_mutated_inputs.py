@@ -15,7 +15,12 @@ def kinds(tmp_path_factory: pytest.TempPathFactory) -> Kinds:
     return Kinds(tmp_path_factory.mktemp("mutated") / "inputs")
 
 
-@pytest.mark.parametrize("kind", NAMES)
+SLOW = {"folders"}
+
+
+@pytest.mark.parametrize(
+    "kind", [pytest.param(n, marks=[pytest.mark.slow] * (n in SLOW)) for n in NAMES]
+)
 def test_no_mutated_input_breaks_anything(kind: str, kinds: Kinds) -> None:
     found = list(trials(kinds, kind, list(range(12)), seed=2))
     assert [each for each in found if each["fault"]] == [] and len(found) == 12

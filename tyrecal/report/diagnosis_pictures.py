@@ -129,7 +129,7 @@ def draw_probabilities(d: Diagnosis) -> Figure:
     axes.set_xlim(0, max(1.0, 1.1 * max(p)))
     axes.set_xlabel("probability")
     axes.set_title(PROBABILITY_TITLES[d.verdict.kind], loc="left")
-    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), frameon=False, borderaxespad=0.2)
+    figure.legend(*axes.get_legend_handles_labels(), loc="outside lower right", frameon=False)
     return figure
 
 

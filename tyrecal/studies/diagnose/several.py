@@ -63,7 +63,8 @@ def before(hypotheses: Sequence[Hypothesis]) -> dict[str, float]:
 
 def present(p: Mapping[str, float], ids: Sequence[str]) -> float:
     """Probability that all of these effects are there, whatever else is."""
-    return sum(each for key, each in p.items() if set(ids) <= set(key.split("+")))
+    total = sum(each for key, each in p.items() if set(ids) <= set(key.split("+")))
+    return min(total, 1.0)  # rounded
 
 
 def _by_key(
