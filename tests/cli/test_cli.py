@@ -54,12 +54,12 @@ def test_commands_import_what_they_use(tmp_path: Path) -> None:
             ["sweep-pressure", CASE, *coarse, "--no-pictures", *out],
             ("scipy.linalg", "scipy.sparse"),
         ),
+        (["fit", CASE, *coarse, "--no-pictures", *out], ("scipy.linalg", "scipy.sparse")),
         (["deck", CASE, *out[:2]], ()),
         (["footprint", CASE, "--help"], ()),
         (["doctor"], ()),
         (["store", str(tmp_path / "store"), "--verify"], ()),
         (["batch", CASE, "--studies", "modes", "--output", str(tmp_path)], ()),
-        (["fit", CASE, *coarse, "--no-pictures", *out], ()),
     ]
     for process in (commands, [(["modes", CASE, *coarse, *out], ("scipy",))]):  # the record answers
         code = (

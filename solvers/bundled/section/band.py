@@ -25,7 +25,8 @@ class Numbering:
         cols = np.concatenate([np.tile(c, (1, c.shape[1])).ravel() for c in connectivities])
         touching = np.asarray(free.any(1))
         keep = touching[rows] & touching[cols]
-        pairs = np.unique(rows[keep] * n + cols[keep])
+        pairs = np.sort(rows[keep] * n + cols[keep])
+        pairs = pairs[np.diff(pairs, prepend=-1) > 0]  # np.unique loads NumPy's masked arrays
         pairs = np.stack([pairs // n, pairs % n], 1)
         orders = [np.arange(n), narrow_order(pairs, n)]
         nodes = min(orders, key=lambda order: _spread(pairs, order))
