@@ -13,7 +13,7 @@ import numpy as np
 from ...simulate.deck.decks import Decks
 from ...simulate.deck.tyre_design import TyreDesign
 from ...simulate.evaluate.evaluator import Evaluator
-from ...simulate.evaluate.failure import DeckRefused
+from ...simulate.evaluate.failure import DeckRefused, EvaluationFailed
 from ...simulate.modes.find import Found, ModesAnswer
 from ...simulate.modes.label import Label
 from ...tyre.case import LoadedCase, start_values
@@ -144,6 +144,20 @@ class TyreModel:
         known = dict(zip(asked, self._evaluated(list(asked.values())), strict=True))
         return [self._completed(point, known, steps) for point in points]
 
+    def values_at(self, x: Array) -> Array:
+        """eta (n,) alone, without slopes. Raises DeckRefused, EvaluationFailed."""
+        found = []
+        asked = [self.in_state(state, self.values(x))[0] for state in self.states]
+        for each in self._modes([(design, ()) for design in asked]):
+            if not isinstance(each, Found):
+                raise each
+            found.append(each)
+        at = dict(zip(self.states, found, strict=True))
+        mass_kg = found[0].evaluation.mass_kg
+        return np.array(
+            [_ln(label, at[state_of(w)]) if label else log(mass_kg) for label, w in self.rows]
+        )
+
     def _completed(
         self,
         point: Query,
@@ -184,9 +198,10 @@ class TyreModel:
             made = add(own, self._present.get(id, 0.0) + e)
         except ValueError:
             return None
-        other = TyreModel(made, self.evaluator, self.rows, [], {}, self.jobs)
-        (answer,) = other.answers([Query(point.x)])
-        return answer.eta - eta if isinstance(answer, Answer) else None
+        try:
+            return self._of(made).values_at(point.x) - eta
+        except EvaluationFailed:
+            return None
 
     def _add_fields(self, x: Array, eta: Array, constants: Array) -> None:
         """Fill in the columns of the section's fields: of meridian and gauges by a small step, of
@@ -198,12 +213,12 @@ class TyreModel:
                 slopes = [p.stiffness if field.kind == "stiffness" else p.mass for p in parts]
                 constants[:, k] = np.array(slopes).T @ field.values
             else:
-                case = moved(self.case, field, FIELD_STEP)
-                beside = TyreModel(case, self.evaluator, self.rows, [], {}, self.jobs)
-                (answer,) = beside.answers([Query(x)])
-                if isinstance(answer, Exception):
-                    raise answer
-                constants[:, k] = (answer.eta - eta) / FIELD_STEP
+                other = self._of(moved(self.case, field, FIELD_STEP))
+                constants[:, k] = (other.values_at(x) - eta) / FIELD_STEP
+
+    def _of(self, case: LoadedCase) -> TyreModel:
+        """The same of another tyre without sources of error or effects."""
+        return TyreModel(case, self.evaluator, self.rows, [], {}, self.jobs)
 
     def _has_slopes(self, id: str, span: Span) -> bool:
         """Whether the solver gives slopes with an effect."""
@@ -303,9 +318,9 @@ class TyreModel:
             design, answer = at[state_of(where)]
             gradients, modes = answer.evaluation.gradients, answer.wanted
             f, place = modes[label].frequency_Hz, modes[label].position
-            eta[i] = log(f)
+            eta[i] = _ln(label, answer)
             if members := modes[label].raw.members:
-                eta[i], split[i] = log(members[0] * members[1]) / 2, log(members[1] / members[0])
+                split[i] = log(members[1] / members[0])
             for id, slope in by_effect.items():
                 path = EFFECT_PATH + id  # a state may hold it at 0
                 slope[i] = gradients[path][place] / f if path in gradients else 0.0
@@ -396,6 +411,13 @@ class TyreModel:
         step = after - before
         log_scaled = [v.scale == "log" for v in self._variables.values()]
         return np.where(log_scaled, np.expm1(step), step)
+
+
+def _ln(label: Label, found: Found) -> float:
+    """ln f of a mode, of a pair the mean."""
+    mode = found.wanted[label]
+    members = mode.raw.members
+    return log(members[0] * members[1]) / 2 if members else log(mode.frequency_Hz)
 
 
 def _key(point: Query) -> QueryKey:
