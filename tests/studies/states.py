@@ -242,7 +242,7 @@ def coverage(count: int, seed: int) -> None:
     print(f"{unconverged} of {2 * count} fits did not converge")
     print(f"outside {low} to {high} by chance: {false:.1e} each variable")
     ratio = np.median(ratios)
-    print(f"standard error of A_carcass over six repeats' of one state: median {ratio:.2f}")
+    print(f"standard error of A_carcass over six repeats' of one state: median {ratio:.3f}")
 
 
 def errors() -> None:
