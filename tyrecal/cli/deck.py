@@ -16,10 +16,8 @@ from .terminal import Terminal
 
 if TYPE_CHECKING:
     from ..tyre.case import LoadedCase
-    from ..tyre.own_deck.own_decks import OwnDecks
-
-if TYPE_CHECKING:
     from ..tyre.own_deck.gauge import Gauges
+    from ..tyre.own_deck.own_decks import OwnDecks
 
 MOST_SAID = 10  # doubts about a deck
 

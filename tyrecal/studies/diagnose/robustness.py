@@ -53,7 +53,7 @@ def robustness(
         other = decide(judged, found, rows, len(problem.centre))
         if (other.kind, other.key) != (verdict.kind, verdict.key):
             changes.append(f"{words} ({_judged(other)})")
-    return Robustness(not changes, tuple(changes), min(p), min(max(p), 1.0))
+    return Robustness(not changes, tuple(changes), min(p), max(p))
 
 
 def said(p: Mapping[str, float], verdict: Verdict) -> float:
@@ -62,7 +62,7 @@ def said(p: Mapping[str, float], verdict: Verdict) -> float:
     if verdict.kind in (NAMED, UNDECIDED):
         key = verdict.key or verdict.best
         return present(p, key.split("+")) if key else 0.0
-    return p[NONE if verdict.kind == NO_GAP else OUTSIDE]
+    return present(p, [NONE if verdict.kind == NO_GAP else OUTSIDE])
 
 
 def _variants(
@@ -107,7 +107,7 @@ def _problems(
         for name, places in constants.items():
             words = f"the standard deviation of {name} {times} as large"
             yield words, _scaled(problem, places, factor)
-        yield f"what laws of effects are off {times} as large", _looser(problem, factor)
+        yield f"the allowance for effects' laws {times} as large", _looser(problem, factor)
     yield (
         "the model's own form beyond doubt",
         replace(problem, assumed=replace(problem.assumed, form=0.0)),
