@@ -113,3 +113,20 @@ def test_workers_that_were_ended_are_not_ended_again(monkeypatch: pytest.MonkeyP
     assert sorted(ended) == ["at work", "idle"]
     end_workers()
     assert sorted(ended) == ["at work", "at work", "idle"]
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no processes are forked here")
+def test_a_forked_process_leaves_its_parents_workers_alone() -> None:
+    tasks = [5.0, 7.0, 1.0]
+    list(Processes(2).each(square, tasks))
+    workers = {process.pid for process in active_children()}
+    child = os.fork()
+    if not child:
+        try:
+            end_workers()
+            os._exit(0)
+        finally:
+            os._exit(1)
+    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
+    assert workers and {process.pid for process in active_children()} == workers
+    assert list(in_order(Processes(2).each(square, tasks))) == [t**2 for t in tasks]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from concurrent.futures import Future
 from concurrent.futures.process import BrokenProcessPool
@@ -83,6 +84,18 @@ def _until_one_dies(
 
 _idle: dict[int, Pool] = {}
 _at_work: set[Pool] = set()
+_of_parent: list[Pool] = []  # kept: collected, they would write to the parent's pipes
+
+
+def _leave_to_parent() -> None:
+    """A forked process neither uses nor ends the workers of its parent."""
+    _of_parent.extend([*_at_work, *_idle.values()])
+    _at_work.clear()
+    _idle.clear()
+
+
+if hasattr(os, "register_at_fork"):  # not on Windows
+    os.register_at_fork(after_in_child=_leave_to_parent)
 
 
 def end_workers() -> None:
