@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection, TriMesh
+from matplotlib.collections import Collection, LineCollection, TriMesh
 from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 from matplotlib.tri import Triangulation
@@ -38,7 +37,7 @@ def draw_mode(path: Path, mode: Mode, mesh: SectionMesh, scale: float | None = N
     of the radius. Raises InputError.
     """
     surface = _surface(mode, mesh, scale)
-    figure, sheet = _sheet(9.2, 5.7)
+    sheet = _Sheet(new_figure(9.2, 5.7, None))
     for name, x, y, half, below, elevation, azimuth in (
         ("top", 1.9, 4.55, 1.85, 0.95, 90, -90),
         ("front, along the axle", 1.9, 1.8, 1.85, 1.68, 0, -90),
@@ -49,7 +48,7 @@ def draw_mode(path: Path, mode: Mode, mesh: SectionMesh, scale: float | None = N
         sheet.text(x, y - below, name, ha="center", va="center", color="0.3")
     sheet.text(4.6, 5.5, title(mode), ha="center", va="center", fontsize=11)
     _key(sheet, [mode], (5.6, 5.2))
-    save(figure, path)
+    save(sheet.figure, path)
 
 
 @in_house_style
@@ -57,31 +56,37 @@ def draw_modes_overview(path: Path, modes: Sequence[Mode], mesh: SectionMesh) ->
     """Draw up to nine modes, lowest first, in perspective on one sheet. Raises InputError."""
     lowest = sorted(modes, key=lambda mode: mode.frequency_Hz)[:9]
     height = 0.9 + 3.2 * -(-len(lowest) // 3)
-    figure, sheet = _sheet(9.0, height)
+    sheet = _Sheet(new_figure(9.0, height, None))
     for k, mode in enumerate(lowest):
         x, y = 1.5 + 3 * (k % 3), height - 1.8 - 3.2 * (k // 3)
         _view(sheet, _surface(mode, mesh, None), (x, y), 1.45, *PERSPECTIVE)
         sheet.text(x, y + 1.38, title(mode).replace(" - ", "\n"), ha="center")
     _key(sheet, lowest, (0.3, 0.3))
-    save(figure, path)
+    save(sheet.figure, path)
 
 
-def _sheet(width: float, height: float) -> tuple[Figure, Axes]:
-    """One plane for all views, in inches from its lower left corner: axes cost more than faces."""
-    figure = new_figure(width, height, None)
-    sheet = figure.add_axes((0, 0, 1, 1))
-    sheet.set_axis_off()
-    sheet.set(xlim=(0, width), ylim=(0, height))
-    return figure, sheet
+@dataclass(frozen=True)
+class _Sheet:
+    """A figure without axes, which cost more than faces: all in inches from its lower left."""
+
+    figure: Figure
+
+    def add(self, collection: Collection) -> None:
+        collection.set_transform(self.figure.dpi_scale_trans)
+        self.figure.add_artist(collection)
+
+    def text(self, x: float, y: float, words: str, **look: Any) -> None:
+        self.figure.text(x, y, words, transform=self.figure.dpi_scale_trans, **look)
 
 
-def _key(sheet: Axes, modes: Sequence[Mode], words_at: tuple[float, float]) -> None:
+def _key(sheet: _Sheet, modes: Sequence[Mode], words_at: tuple[float, float]) -> None:
     """What the colours are, at the foot, and the lines, in inches from the lower left corner."""
-    left, right, low, high = bar = 5.9, 8.3, 0.3, 0.38
-    limits = sheet.viewLim.frozen()
-    shades = np.linspace(0, 1, 256)[None]
-    sheet.imshow(shades, COLOUR_MAP, extent=bar, aspect="auto", interpolation="nearest")
-    sheet.set(xlim=limits.intervalx, ylim=limits.intervaly)
+    left, right, low, high = 5.9, 8.3, 0.3, 0.38
+    shades = np.linspace(0, 1, 65)
+    x, y = np.meshgrid(left + shades * (right - left), [low, high])
+    cells = np.arange(64)[:, None] + [0, 1, 66, 65]
+    colours = COLOUR_MAP(np.tile(shades, 2))
+    sheet.add(TriMesh(Triangulation(x.ravel(), y.ravel(), _halves(cells)), facecolors=colours))
     words: dict[str, Any] = {"fontsize": 8, "color": "0.3"}
     for share in (0, 0.5, 1):
         at = left + share * (right - left)
@@ -144,7 +149,7 @@ def title(mode: Mode) -> str:
 
 
 def _view(
-    sheet: Axes,
+    sheet: _Sheet,
     surface: _Surface,
     centre: tuple[float, float],
     half: float,
@@ -160,8 +165,8 @@ def _view(
     rest, moved = (points @ screen + [*centre, 0] for points in (surface.rest, surface.moved))
     seen = replace(surface, rest=rest, moved=moved)
     through_rim = 0.01 < abs(viewer[1]) < 0.99
-    sheet.add_collection(_faces(seen, through_rim), autolim=False)
-    sheet.add_collection(_outline(seen), autolim=False)
+    sheet.add(_faces(seen, through_rim))
+    sheet.add(_outline(seen))
 
 
 def _faces(seen: _Surface, through_rim: bool) -> TriMesh:
