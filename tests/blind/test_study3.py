@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,7 @@ from tyrecal.studies.blind.protocol import read_json
 from tyrecal.studies.blind.ruler import Difficulty
 from tyrecal.studies.blind.seal import TRUTH
 from tyrecal.tyre.case import LoadedCase, with_level
+from tyrecal.tyre.effects import catalogue
 from tyrecal.tyre.load import load_case
 
 from ..studies.judge import tyre_told
@@ -33,7 +35,7 @@ from .study3.draw import known_laws
 from .study3.maker import Fenics, modes
 from .study3.score import Scored, figures
 from .study3.section import Section, columns, mould, off, section
-from .study3.tyre import Mesh, Tyre, problem, tyre_of
+from .study3.tyre import Mesh, Tyre, on_springs, problem, tyre_of
 
 ROOT = Path(__file__).parents[2]
 ALIKE = {"harmonics": [0, 1, 2, 3, 4], "modes": 3, "degree": 3}
@@ -100,7 +102,9 @@ def test_a_law_says_nothing_at_0_and_something_else_at_every_size(
         assert all(a != b for i, a in enumerate(every) for b in every[:i])
 
 
-def toy(fenics: Fenics, told: Tyre, pressures: list[float], labels: list[Any]) -> dict[float, Any]:
+def toy(
+    fenics: Fenics, told: Tyre, pressures: list[float], labels: list[Any], near: bool
+) -> dict[float, Any]:
     """Frequencies that a few of the tyre's numbers set."""
     f = np.log(50.0) + 0.01 * told.cap / 1e6 + 0.1 * told.kelvin / 15 + told.mould.belts[0]
     return {p: Computed({x: (f, f) for x in labels}, np.log(10.0)) for p in pressures}
@@ -190,13 +194,29 @@ def on_the_same_stations(case: LoadedCase) -> dict[str, Any]:
     state |= {"stiffness": table["k"].ravel().tolist(), "angle": table["angle"].ravel().tolist()}
     state |= {"area_density": table["m"].ravel().tolist(), "pressure": told["pressure"]}
     laws_alike = {"cord_law": "logarithmic", "volume_law": "J - 1"}
-    return {**mesh.told(np.inf), **laws_alike, **ALIKE, "states": [state]}
+    rim, soft = case.case.rim, case.case.rim.spindle
+    spindle = {
+        "lateral": soft.lateral_m_per_N,
+        "radial": soft.radial_m_per_N,
+        "torsional": soft.torsional_rad_per_N_m,
+        "tilt": soft.tilt_rad_per_N_m,
+    }
+    inertia = (rim.mass_kg, rim.polar_inertia_kg_m2, rim.diametral_inertia_kg_m2)
+    wheel = on_springs(SimpleNamespace(spindle=spindle, wheel=inertia))
+    return {**mesh.told(np.inf), **laws_alike, **ALIKE, "states": [state], "wheel": wheel}
 
 
 @pytest.mark.slow
-def test_on_the_same_stations_with_the_same_laws_both_solvers_agree(fenics: Fenics) -> None:
-    """Within 0.5 %: what is left are elements, and how stations are joined."""
+@pytest.mark.parametrize("soft", [0.0, 1.0])
+def test_on_the_same_stations_with_the_same_laws_both_solvers_agree(
+    fenics: Fenics, soft: float
+) -> None:
+    """Within 0.5 %: what is left are elements, and how stations are joined. soft: compliances of
+    the spindle, all at once, as a share of the catalogue's ends."""
     case = with_level(load_case(ROOT / "cases" / "p235_75r17.yaml"), "default")
+    for id in catalogue():
+        if soft and id.startswith("spindle_"):
+            case = catalogue()[id].add(case, soft * catalogue()[id].high)
     labels = labels_of(case)
     answer = Evaluator(TyreDesign(case), "bundled").evaluate(Question({}))
     ours = match(label_modes(answer.modes), labels)
@@ -204,6 +224,28 @@ def test_on_the_same_stations_with_the_same_laws_both_solvers_agree(fenics: Feni
     theirs = modes(found, found["states"][0], labels)
     for label in labels:
         assert theirs[label] == pytest.approx(ours[label].frequency_Hz, rel=5e-3)
+
+
+@pytest.mark.slow
+def test_a_wheel_that_nothing_holds_moves_with_its_tyre_as_a_rigid_body(
+    tmp_path: Path, fenics: Fenics
+) -> None:
+    """Along the axle by k / m; in four directions by eigenvalues that are nothing beside a tyre's
+    own. So gas, cords and what turns in a turn are complete; a wheel on stiff springs is held."""
+    asked = {**problem(tyre("205/60R15", tmp_path), [240.0]), "harmonics": [0, 1]}
+    soft, mass = 1e-3, 1e-3
+    ways = ("lateral", "radial", "torsional", "tilt")
+    lowest = lambda answer, n: [
+        mode["eigenvalue"] for mode in answer["states"][0]["modes"] if mode["n"] == n
+    ]
+    held = fenics.ask(asked)
+    free = fenics.ask({**asked, "wheel": dict.fromkeys(ways, (soft, mass))})
+    firm = fenics.ask({**asked, "wheel": dict.fromkeys(ways, (1e13, mass))})
+    assert lowest(free, 0)[0] == pytest.approx(soft / (held["mass_kg"] + mass), rel=0.02)
+    for n in (0, 1):
+        assert max(map(abs, lowest(free, n)[:2])) < 1e-6 * lowest(held, n)[0]
+        assert lowest(free, n)[2] > lowest(held, n)[1]
+        assert lowest(firm, n) == pytest.approx(lowest(held, n), rel=1e-5)
 
 
 @pytest.mark.slow

@@ -3,6 +3,7 @@ or with the maker's own section as its drawing has it (own)."""
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -51,8 +52,11 @@ GROUPS = [
 ]  # type: ignore[arg-type]
 
 
+KNOWN = {"C10": 5, "density": 1.0}  # percent, of one's own compounds
+
+
 def written(group: Group, folder: Path) -> LoadedCase:
-    """The case of a group, in ``folder``."""
+    """The case of a group, in ``folder``; whoever has a section's drawing knows its compounds."""
     size = parse_size(group.size)
     if group.own:
         stations = folder / f"{group.name}.csv"
@@ -62,7 +66,12 @@ def written(group: Group, folder: Path) -> LoadedCase:
         draft = from_size(size, {}, None, group.name)
         (folder / draft.file).write_bytes(draft.content)
     path = folder / f"{group.name}.yaml"
-    path.write_text(draft.text, encoding="utf-8")
+    text = draft.text
+    if group.own:
+        for what, percent in KNOWN.items():
+            text, found = re.subn(rf"(_{what}: {{[^}}]*percent: )[0-9.]+", rf"\g<1>{percent}", text)
+            assert found
+    path.write_text(text, encoding="utf-8")
     return load_case(path, allow_unusual=True)
 
 

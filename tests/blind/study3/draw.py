@@ -13,10 +13,11 @@ from tyrecal.studies.diagnose.uncertainties import sources
 from tyrecal.tyre.case import LoadedCase
 
 from .cases import Group, with_exact_section
-from .laws import OUTSIDE, OwnLaw, laws, rim_width
+from .laws import CLAMP, OUTSIDE, OwnLaw, laws, rim_width
 from .section import columns, mould, off
 from .tyre import Tyre, tyre_of
 
+CLAMPED = 0.5  # share of effects of the wheel's clamp, which a doubtful section hides least
 EFFECTS_OF = {"none": 0, "one": 1, "two": 2, "three": 3, "outside": 0}
 SEAT_m, GAUGE_kPa, ROOM_K = 0.4e-3, 0.5, 1.0  # of a mounting: beads apart, pressure, temperature
 
@@ -54,7 +55,12 @@ def drawn(
         (truth,) = draw(rules, case, known_sources, {}, {}, int(random.integers(2**63)))
         known = outside if kind == "outside" else effects
         number = 1 if kind == "outside" else EFFECTS_OF[kind]
-        ids = sorted(random.choice(sorted(known), number, replace=False).tolist())
+        names, clamped = sorted(known), len(set(CLAMP) & set(known))
+        share = CLAMPED if clamped else 0.0
+        chances = [
+            share / clamped if id in CLAMP else (1 - share) / (len(names) - clamped) for id in names
+        ]
+        ids = sorted(random.choice(names, number, replace=False, p=chances).tolist())
         sizes = {id: known[id].drawn(random, protocol.smallest) for id in ids}
         said = {"one": "effect", "two": "several", "three": "several"}.get(kind, kind)
         size = next(iter(sizes.values()), 0.0)

@@ -34,6 +34,16 @@ class OwnLaw:
         return end * float(random.uniform(smallest, 1.0))
 
 
+def dynamic_stiffening(tyre: Tyre, e: float) -> Tyre:
+    """Compounds by their share of filler: treads by a fifth more, the rest by a tenth less."""
+    own = lambda name: 1.2 if name in ("tread", "under_tread") else 0.9
+    compounds = {
+        name: replace(m, dynamic=(m.C10 + m.dynamic) * (1 + own(name) * e) - m.C10)
+        for name, m in tyre.compounds.items()
+    }
+    return replace(tyre, compounds=compounds) if e else tyre
+
+
 def bead_filler(tyre: Tyre, e: float) -> Tyre:
     """A harder compound, which a higher filler goes with: a maker who stiffens does both."""
     taller = replace(tyre.mould, filler=tyre.mould.filler * (1 + 0.05 * e))
@@ -120,6 +130,25 @@ def carcass_fanning(tyre: Tyre, e: float) -> Tyre:
     return replace(tyre, fan=e)
 
 
+def _spindle(way: str) -> Law:
+    """What clamps the wheel is softer, and its hub, a fifth of the wheel's mass that no case knows,
+    moves with it."""
+
+    def add(tyre: Tyre, e: float) -> Tyre:
+        mass, polar, diametral = tyre.wheel
+        return replace(
+            tyre,
+            spindle={**tyre.spindle, way: tyre.spindle.get(way, 0.0) + e},
+            wheel=(1.2 * mass, 1.05 * polar, 1.1 * diametral) if not tyre.spindle else tyre.wheel,
+        )
+
+    add.__name__ = f"spindle_{way}"
+    return add
+
+
+CLAMP = tuple(f"spindle_{way}" for way in ("lateral", "radial", "torsional", "tilt"))
+
+
 def parted_belts(tyre: Tyre, e: float) -> Tyre:
     """The belts have parted at their edges: over e m the rubber between holds next to nothing."""
     return replace(tyre, parted=e)
@@ -148,6 +177,7 @@ def laws() -> dict[str, OwnLaw]:
     return {
         add.__name__: OwnLaw(known[add.__name__].low, known[add.__name__].high, add)
         for add in (
+            dynamic_stiffening,
             bead_filler,
             tread_density,
             tread_wear,
@@ -160,6 +190,7 @@ def laws() -> dict[str, OwnLaw]:
             temperature_drift,
             cap_ply,
             carcass_fanning,
+            *(_spindle(id.removeprefix("spindle_")) for id in CLAMP),
         )
     }
 

@@ -127,7 +127,9 @@ def _made(protocol: Protocol, case: LoadedCase, group: Group, each: Drawn) -> tu
     """Its tyre drawn again where it has no solution."""
     random = np.random.default_rng(each.truth.scatter + 1)
     pressures = list(protocol.pressures_kPa)
-    run = lambda *without: computed(FENICS, made(each, case, group, without), pressures, LABELS)
+    run = lambda *without: computed(
+        FENICS, made(each, case, group, without), pressures, LABELS, near=bool(without)
+    )
     for tries in range(1, MAX_TRIES + 1):
         try:
             whole = run()

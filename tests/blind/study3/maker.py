@@ -80,10 +80,11 @@ def modes(answer: dict[str, Any], state: dict[str, Any], labels: list[Label]) ->
 
 
 def computed(
-    fenics: Fenics, tyre: Tyre, pressures_kPa: list[float], labels: list[Label]
+    fenics: Fenics, tyre: Tyre, pressures_kPa: list[float], labels: list[Label], near: bool = False
 ) -> dict[float, Computed]:
-    """By pressure, without noise. Raises EvaluationFailed, ValueError."""
-    answer = fenics.ask(problem(tyre, pressures_kPa))
+    """By pressure, without noise; near: nearly the tyre asked before. Raises EvaluationFailed,
+    ValueError."""
+    answer = fenics.ask({**problem(tyre, pressures_kPa), "near": near})
     found = {}
     for p, state in zip(pressures_kPa, answer["states"], strict=True):
         ln_f = {label: float(np.log(f)) for label, f in modes(answer, state, labels).items()}

@@ -13,8 +13,14 @@ g = du/dTheta the second variation of the energy is, in the frame of the referen
     K(n) = [A_uu + n^2 A_gg, n S; -n S, A_uu + n^2 A_gg],   S = A_gu - A_gu^T
 
 so three matrices a pressure serve all n. What relaxes in the inflation comes back in the vibration
-as shear from the inflated state on: 2 C10' |dev sym(dF F0^-1)|^2. Forms are compiled and set up
-once for a mesh's connectivity; coordinates and constants change in place. SI units.
+as shear from the inflated state on: 2 C10' |dev sym(dF F0^-1)|^2.
+
+A wheel on springs moves what is held as a rigid body: rows and columns of K by its motions q, and
+1/2 q^2 of a turn moves points by u2 = omega x (omega x r), on which the rim's forces F do work. The
+gas does no work on a rim that moves, as its surface keeps its shape and ends at the tyre's.
+
+Forms are compiled and set up once for a mesh's connectivity; coordinates and constants change in
+place. SI units.
 """
 
 from __future__ import annotations
@@ -60,6 +66,7 @@ class Tyre:
         for pair in ((1, 0), (1, 2), (2, 0)):
             msh.topology.create_connectivity(*pair)
         self.laws = problem["cord_law"], problem["volume_law"]
+        self.equilibria: list[Array] = []  # of the tyre answered last, by state
         constant = fem.FunctionSpace(msh, ("DG", 0))
         self.data = {key: fem.Function(constant) for key in (*CELL, *LINE)}
         self.W = W = fem.VectorFunctionSpace(msh, ("P", problem["degree"]), 3)
@@ -77,11 +84,11 @@ class Tyre:
         fixed = lambda key: fem.locate_dofs_topological(
             W, 1, np.array([facets[frozenset(e)] for e in problem[key]], np.int32)
         )
-        held, crown = fixed("held"), fixed("crown")
+        self.held, crown = fixed("held"), fixed("crown")
         self.free = []  # of a, and of b
         for components in ((1, 2), (0,)):
             gone = np.zeros((W.dofmap.index_map.size_local, 3), bool)
-            gone[held] = True
+            gone[self.held] = True
             for k in components:
                 gone[crown, k] = True
             self.free.append(np.flatnonzero(~gone.ravel()))
@@ -216,8 +223,35 @@ class Tyre:
                 )
         return taken
 
-    def modes(self, harmonics: list[int], count: int) -> list[dict[str, Any]]:
-        """The lowest of each harmonic."""
+    def motions(self, n: int) -> dict[str, tuple[Array, Array, float]]:
+        """Of a wheel, by direction: a and b of what it holds, and the work on u2 of a turn by 1,
+        N m per radian."""
+        R, z = self.W.tabulate_dof_coordinates()[self.held, :2].T
+        force = petsc.assemble_vector(self.force).array.reshape(-1, 3)[self.held]
+        one, none = np.ones_like(R), np.zeros_like(R)
+
+        def whole(*components: Array) -> Array:
+            field = np.zeros((self.state.x.array.size // 3, 3))
+            field[self.held] = np.stack(components, -1)
+            return field.ravel()
+
+        still, turned = whole(none, none, none), -float(force[:, 0] @ R)
+        if n == 0:
+            return {
+                "lateral": (still, whole(none, none, one), 0.0),
+                "torsional": (still, whole(none, R, none), turned),
+            }
+        if n > 1:
+            return {}
+        return {
+            "radial": (whole(one, none, none), whole(none, one, none), 0.0),
+            "tilt": (whole(none, z, none), whole(-z, none, R), turned - 2 * float(force[:, 2] @ z)),
+        }
+
+    def modes(
+        self, harmonics: list[int], count: int, wheel: dict[str, list[float]]
+    ) -> list[dict[str, Any]]:
+        """The lowest of each harmonic. wheel: stiffness and inertia by direction that gives way."""
         (fa, fb), self.vibrates.value = self.free, 1.0
         uu, gu, gg, gas, M = map(sparse, (self.uu, self.gu, self.gg, self.ug_gas, self.mass))
         uu = (uu + uu.T) / 2  # the gas' part is symmetric but for its quadrature, as ends are held
@@ -226,11 +260,21 @@ class Tyre:
         mass = bmat([[M[fa][:, fa], None], [None, M[fb][:, fb]]], "csr")
         for n in harmonics:
             D, off = uu + n * n * gg, n * S[fa][:, fb]
-            K = bmat([[D[fa][:, fa], off], [off.T, D[fb][:, fb]]], "csr")
-            values, vectors = lowest(K, mass, count + 1 if n else count + 2)
+            K, inertia = bmat([[D[fa][:, fa], off], [off.T, D[fb][:, fb]]], "csr"), mass
+            moved = [(wheel[way], *q) for way, q in self.motions(n).items() if way in wheel]
+            if moved:
+                radians = (2 if n else 4) * np.pi  # of both halves; n > 0: cos^2 over the turn
+                stiff, heavy = (np.diag([own[k] / radians for own, *_ in moved]) for k in (0, 1))
+                stiff += np.diag([work for *_, work in moved])
+                a, b = (np.stack([q[k] for q in moved], -1) for k in (1, 2))
+                K = with_motions(K, D @ a + n * (S @ b), D @ b + n * (S.T @ a), a, b, stiff, fa, fb)
+                inertia = with_motions(mass, M @ a, M @ b, a, b, heavy, fa, fb)
+            values, vectors = lowest(K, inertia, count + 1 if n else count + 2)
             for value, vector in list(zip(values, vectors.T, strict=True))[: count + (n == 0)]:
                 pair = np.zeros((2, self.state.x.array.size))
-                pair[0, fa], pair[1, fb] = vector[: len(fa)], vector[len(fa) :]
+                pair[0, fa], pair[1, fb] = vector[: len(fa)], vector[len(fa) :][: len(fb)]
+                for q, (_, a, b, _) in zip(vector[len(fa) + len(fb) :], moved, strict=True):
+                    pair += q * np.array([a, b])
                 a, b = (self.at_corners(part) for part in pair)
                 found.append(
                     {"n": n, "eigenvalue": float(value), "cos": a.tolist(), "sin": b.tolist()}
@@ -250,15 +294,21 @@ class Tyre:
         return 4 * np.pi * float(fem.assemble_scalar(self.weight))
 
     def answer(self, problem: dict[str, Any]) -> dict[str, Any]:
-        """Modes at each state of the problem, in its order. Raises RuntimeError."""
+        """Modes at each state of the problem, in its order. With "near", Newton's method starts
+        from the equilibria of the tyre before, at the same states. Raises RuntimeError."""
         started = time.process_time()
         self.put(problem)
-        states, helps = [], HELP
-        for state in problem["states"]:
+        near = self.equilibria if problem.get("near") else []
+        near = near if len(near) == len(problem["states"]) else []
+        states, helps, self.equilibria = [], (0.0,) if near else HELP, []
+        for k, state in enumerate(problem["states"]):
             self._constants(state)
             self.pressure.value = state["pressure"]
+            if near:
+                self.state.x.array[:] = near[k]
             iterations, helps = self.inflate(helps), (0.0,)
-            modes = self.modes(problem["harmonics"], problem["modes"])
+            self.equilibria.append(self.state.x.array.copy())
+            modes = self.modes(problem["harmonics"], problem["modes"], problem.get("wheel", {}))
             states.append({"modes": modes, "iterations": iterations})
         return {
             "corners": self.number.tolist(),
@@ -277,6 +327,15 @@ def sparse(form: Any) -> csr_matrix:
     return csr_matrix((values, columns, indices), matrix.size)
 
 
+def with_motions(
+    K: csr_matrix, Ka: Array, Kb: Array, a: Array, b: Array, own: Array, fa: Array, fb: Array
+) -> csr_matrix:
+    """K of the free equations and of rigid motions (a, b), on which the whole's answer is (Ka, Kb);
+    own: what is the motions' besides."""
+    column = csr_matrix(np.concatenate([Ka[fa], Kb[fb]]))
+    return bmat([[K, column], [column.T, a.T @ Ka + b.T @ Kb + own]], "csr")
+
+
 def petsc_of(K: csr_matrix) -> PETSc.Mat:
     return PETSc.Mat().createAIJ(K.shape, csr=(K.indptr, K.indices, K.data), comm=MPI.COMM_SELF)
 
@@ -285,6 +344,9 @@ def lowest(K: csr_matrix, M: csr_matrix, count: int) -> tuple[Array, Array]:
     """Eigenvalues (count,) that are nearest to 0, rising, and their vectors (n, count)."""
     solver, matrix = PETSc.KSP().create(MPI.COMM_SELF), petsc_of(K)
     by_factors(solver)
+    solver.getPC().setType("cholesky")  # L D L^T, half of the work
+    solver.getPC().setFactorSolverType("mumps")
+    matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
     solver.setOperators(matrix)
     b, x = matrix.createVecLeft(), matrix.createVecRight()
 
@@ -295,7 +357,7 @@ def lowest(K: csr_matrix, M: csr_matrix, count: int) -> tuple[Array, Array]:
 
     start = np.random.default_rng(1).normal(size=K.shape[0])
     inverse = LinearOperator(K.shape, matvec=solved, dtype=float)
-    values, vectors = eigsh(K, count, M, sigma=0.0, OPinv=inverse, v0=start, tol=1e-9)
+    values, vectors = eigsh(K, count, M, sigma=0.0, OPinv=inverse, v0=start, tol=1e-8, ncv=10)
     order = np.argsort(values)
     return values[order], vectors[:, order]
 

@@ -6,7 +6,8 @@ all else is the maker's own. `problem` is what `solve.py` is told.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from math import atan, exp, radians
 from typing import Any
@@ -54,7 +55,9 @@ class Tyre:
     """wires: E A of a bead, N, and their kg/m; shift_Pa: what a gauge is off at all pressures;
     nominal_Pa: pressure of the case. The rest is 0 in a sound tyre: kelvin above the case's
     temperature, drift in kelvin per 100 kPa, gauge as a share of the pressure, cap N/m more, fan:
-    A/s falls as (bead radius / r)^fan, parted: m of belt edge, lining: kg/m2 under the belt."""
+    A/s falls as (bead radius / r)^fan, parted: m of belt edge, lining: kg/m2 under the belt,
+    spindle: compliance by direction, m/N or rad/(N m); wheel: its mass, kg, and moments of inertia,
+    polar and diametral, kg m2, which no other tyre feels."""
 
     mould: Mould
     columns: tuple[int, ...]
@@ -71,6 +74,8 @@ class Tyre:
     fan: float = 0.0
     parted: float = 0.0
     lining: float = 0.0
+    spindle: Mapping[str, float] = field(default_factory=dict)
+    wheel: tuple[float, float, float] = (15.0, 0.43, 0.27)
 
 
 def tyre_of(case: LoadedCase, mould: Mould, columns: list[int]) -> Tyre:
@@ -98,8 +103,16 @@ def tyre_of(case: LoadedCase, mould: Mould, columns: list[int]) -> Tyre:
                 E * per_m, radians(layer.angle_deg), density * per_m, TEXTILE_Pa > E
             )
     shift = 1e3 * (c.pressure_kPa - case.file_data["pressure_kPa"])
+    rim = c.rim
     return Tyre(
-        mould, tuple(columns), compounds, cords, wires, 1e3 * case.file_data["pressure_kPa"], shift
+        mould,
+        tuple(columns),
+        compounds,
+        cords,
+        wires,
+        1e3 * case.file_data["pressure_kPa"],
+        shift,
+        wheel=(rim.mass_kg, rim.polar_inertia_kg_m2, rim.diametral_inertia_kg_m2),
     )
 
 
@@ -113,7 +126,15 @@ def problem(tyre: Tyre, pressures_kPa: list[float], each: int = 1) -> dict[str, 
         "harmonics": HARMONICS,
         "modes": MODES,
         "degree": DEGREE,
+        "wheel": on_springs(tyre),
     }
+
+
+def on_springs(tyre: Tyre) -> dict[str, list[float]]:
+    """Stiffness and inertia of a wheel by the direction in which it gives way."""
+    mass, polar, diametral = tyre.wheel
+    inertia = {"lateral": mass, "torsional": polar, "radial": mass, "tilt": diametral}
+    return {way: [1 / soft, inertia[way]] for way, soft in tyre.spindle.items() if soft}
 
 
 @dataclass(frozen=True)
