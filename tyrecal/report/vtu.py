@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import zlib
-from base64 import b64encode
 from collections.abc import Mapping
 from pathlib import Path
 
+import meshio
 import numpy as np
 
 from ..files import whole
@@ -15,9 +14,6 @@ from ..simulate.modes.label import Mode
 from ..tyre.section.mesh import SectionMesh
 from .revolve import cartesian, motion, swept
 
-HEXAHEDRON = 12  # VTK's number
-TYPES = {"f": ("Float64", "<f8"), "i": ("Int64", "<i8"), "u": ("UInt8", "u1")}
-COMPRESSION = 1  # of 9: a third of the time of the usual 6, files as large within 7 %
 MAX_ANGLE = np.radians(5.0)  # between rings of points of the pressed tyre
 
 
@@ -84,38 +80,17 @@ def _write(
     path: Path, quads: np.ndarray, points: np.ndarray, fields: dict[str, np.ndarray]
 ) -> None:
     """Points and fields (node, angle, ...) on corner nodes swept round, elements between them."""
-    count = points.shape[0] * points.shape[1]
-    cells = _hexahedra(quads, points.shape[1])
-    offsets = np.arange(1, len(cells) + 1) * cells.shape[1]
-    flat = {name: field.reshape(count, *field.shape[2:]) for name, field in fields.items()}
-    lines = [
-        '<VTKFile type="UnstructuredGrid" version="1.0" byte_order="LittleEndian"'
-        ' header_type="UInt32" compressor="vtkZLibDataCompressor">',
-        f'<UnstructuredGrid><Piece NumberOfPoints="{count}" NumberOfCells="{len(cells)}">',
-        f"<Points>{_array('Points', points.reshape(count, 3))}</Points>",
-        "<Cells>",
-        _array("connectivity", cells.ravel()),
-        _array("offsets", offsets),
-        _array("types", np.full(len(cells), HEXAHEDRON, np.uint8)),
-        "</Cells>",
-        f"<PointData>{''.join(_array(name, field) for name, field in flat.items())}</PointData>",
-        "</Piece></UnstructuredGrid></VTKFile>",
-        "",
-    ]
+    flat = lambda field: np.float32(
+        field.reshape(points.shape[0] * points.shape[1], *field.shape[2:])
+    )
+    tyre = meshio.Mesh(
+        flat(points),
+        [("hexahedron", np.int32(_hexahedra(quads, points.shape[1])))],
+        point_data={name: flat(field) for name, field in fields.items()},
+    )
+    # single precision and no compression: smaller than double with it, in a twentieth of the time
     with whole(path) as partial:
-        partial.write_text("\n".join(lines), encoding="ascii")
-
-
-def _array(name: str, values: np.ndarray) -> str:
-    """A DataArray of VTK's XML: base64 of the header (blocks, their size, that of a partial last
-    one, compressed size) and of the one block, compressed."""
-    kind, stored = TYPES[values.dtype.kind]
-    parts = "" if values.ndim == 1 else f' NumberOfComponents="{values.shape[1]}"'
-    plain = values.astype(stored).tobytes()
-    packed = zlib.compress(plain, COMPRESSION)
-    header = np.array([1, len(plain), 0, len(packed)], "<u4").tobytes()
-    text = (b64encode(header) + b64encode(packed)).decode()
-    return f'<DataArray type="{kind}" Name="{name}"{parts} format="binary">{text}</DataArray>'
+        tyre.write(partial, file_format="vtu", compression=None)
 
 
 def _hexahedra(quads: np.ndarray, sectors: int) -> np.ndarray:
