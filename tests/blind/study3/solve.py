@@ -306,7 +306,14 @@ class Tyre:
             self.pressure.value = state["pressure"]
             if near:
                 self.state.x.array[:] = near[k]
-            iterations, helps = self.inflate(helps), (0.0,)
+            try:
+                iterations = self.inflate(helps)
+            except RuntimeError:
+                if not near:
+                    raise
+                near, self.state.x.array[:] = [], 0.0
+                iterations = self.inflate(HELP)
+            helps = (0.0,)
             self.equilibria.append(self.state.x.array.copy())
             modes = self.modes(problem["harmonics"], problem["modes"], problem.get("wheel", {}))
             states.append({"modes": modes, "iterations": iterations})
