@@ -20,6 +20,7 @@ FORM = {
 }
 NUMBERED = {"node": "nset", "element": "elset"}  # kinds of fields that are numbers, or sets of them
 BEGIN_END = {"PART": "END PART", "ASSEMBLY": "END ASSEMBLY", "INSTANCE": "END INSTANCE"}
+HOLDS_LAYERS_IN_3D = re.compile(r"(SF)?M(3D|CL)|S\d")
 GENERATORS = {"NGEN", "NFILL", "NCOPY", "ELGEN", "ELCOPY", "SYMMETRIC MODEL GENERATION"}
 
 
@@ -82,7 +83,9 @@ def findings(blocks: Sequence[Block], before: Sequence[Block] = ()) -> list[Find
         if rule := RULES.get(block.name):
             found += _parameters(block, rule, names)
             found += _data(block, rule, names)
-    if not any(block.name in BEGIN_END for block in blocks):  # of parts, names have prefixes
+    if not any(
+        block.name in BEGIN_END for block in (*before, *blocks)
+    ):  # of parts, names have prefixes
         found += _unnamed(blocks, names)
     return found
 
@@ -250,9 +253,15 @@ def _unnamed(blocks: Sequence[Block], names: _Names) -> Iterator[Finding]:
             if tied in bodies:
                 yield Finding(block, None, f"the nodes {tied} are of another rigid body already")
             bodies[tied] = block
-        oriented = block.name == "REBAR LAYER" and "ORIENTATION" in block.parameters
+        if block.name != "REBAR LAYER":
+            continue
+        oriented = "ORIENTATION" in block.parameters
         if oriented and any(kind.startswith("SFMGAX") for kind in names.types):
             yield Finding(block, None, "takes no ORIENTATION on axisymmetric elements")
+        fanned = _named(block.parameters.get("GEOMETRY", "")) in ("ANGULAR", "LIFT EQUATION")
+        if fanned and not oriented and any(map(HOLDS_LAYERS_IN_3D.match, names.types)):
+            words = "needs an ORIENTATION, a cylindrical one, on elements in three dimensions"
+            yield Finding(block, None, words)
 
 
 def _set(block: Block) -> str:

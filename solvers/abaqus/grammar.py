@@ -130,6 +130,7 @@ RULES: dict[str, Rule] = {
     "ORIENTATION": Rule(
         "part", "NAME=+orientation; DEFINITION=name; SYSTEM=name", "number...", needs=("NAME",)
     ),
+    "TRANSFORM": Rule("part", "NSET=nset; TYPE=R|C|S", "6*number?", rows=ONE_ROW, needs=("NSET",)),
     "SOLID SECTION": Rule(
         "part",
         "ELSET=elset; MATERIAL=material; CONTROLS=controls; ORIENTATION=orientation; COMPOSITE",
@@ -146,6 +147,29 @@ RULES: dict[str, Rule] = {
         needs=("NAME",),
     ),
     "SURFACE SECTION": Rule("part", "ELSET=elset; DENSITY=number", rows=NO_ROWS, needs=("ELSET",)),
+    "MEMBRANE SECTION": Rule(
+        "part",
+        (
+            "ELSET=elset; MATERIAL=material; CONTROLS=controls; DENSITY=number; NODAL THICKNESS; "
+            "MEMBRANE THICKNESS=name; ORIENTATION=orientation; POISSON=number"
+        ),
+        "number? integer?",
+        rows=(0, 1),
+        needs=("ELSET", "MATERIAL"),
+        alone=("NODAL THICKNESS", "MEMBRANE THICKNESS"),
+    ),
+    "SHELL SECTION": Rule(
+        "part",
+        (
+            "ELSET=elset; MATERIAL=material; COMPOSITE; CONTROLS=controls; DENSITY=number; "
+            "NODAL THICKNESS; OFFSET=any; ORIENTATION=orientation; POISSON=any; "
+            "SECTION INTEGRATION=SIMPSON|GAUSS; SHELL THICKNESS=name; THICKNESS MODULUS=number"
+        ),
+        "number...",
+        rows=ANY_ROWS,
+        needs=("ELSET", "MATERIAL|COMPOSITE"),
+        variants={"COMPOSITE": "number? integer? name any..."},
+    ),
     "REBAR LAYER": Rule(
         "part",
         "GEOMETRY=CONSTANT|ANGULAR|LIFT EQUATION; ORIENTATION=orientation",
@@ -219,6 +243,19 @@ RULES: dict[str, Rule] = {
         variants={"TIME=PRONY": "3*number", "FREQUENCY=TABULAR": "5*number"},
     ),
     "ACOUSTIC MEDIUM": Rule("model", "BULK MODULUS", "number 2*number?", under=OF_MATERIAL),
+    "FLUID BEHAVIOR": Rule("model", "NAME=+fluid; USER", rows=NO_ROWS, needs=("NAME",)),
+    "FLUID CAVITY": Rule(
+        "part model",
+        (
+            "NAME=name; REF NODE=node; BEHAVIOR=fluid; MIXTURE=name; ADDED VOLUME=number; "
+            "ADIABATIC; AMBIENT PRESSURE=number; AMBIENT TEMPERATURE=number; "
+            "CHECK NORMALS=YES|NO; MINIMUM VOLUME=any; SURFACE=surface"
+        ),
+        "number?",
+        rows=ANY_ROWS,
+        needs=("NAME", "REF NODE", "BEHAVIOR|MIXTURE", "SURFACE|ADDED VOLUME"),
+        alone=("BEHAVIOR", "MIXTURE"),
+    ),
     "AMPLITUDE": Rule(
         "model",
         (
@@ -374,7 +411,8 @@ RULES: dict[str, Rule] = {
     ),
     "END STEP": Rule("step", rows=NO_ROWS),
 }
-# that ask for output or say how to iterate: their parameters and data are not judged
+# that ask for output, say how to iterate, or that we never write: their parameters and data are
+# not judged
 UNJUDGED = {
     **dict.fromkeys(
         (
@@ -386,20 +424,51 @@ UNJUDGED = {
         "model step",
     ),
     "PARAMETER": "model part",
+    # of decks in three dimensions
+    **dict.fromkeys(("EXPANSION", "CAPACITY", "MOLECULAR WEIGHT"), "model"),
+    **dict.fromkeys(("INITIAL CONDITIONS", "PHYSICAL CONSTANTS"), "model"),
+    **dict.fromkeys(("MPC", "EQUATION", "COUPLING", "KINEMATIC", "DISTRIBUTING"), "part model"),
+    **dict.fromkeys(("TEMPERATURE", "MODEL CHANGE"), "step"),
 }
-# of elements, how many nodes they have and what gives them properties
-NODES_AND_SECTION: dict[str, tuple[int, str]] = {
-    **{
-        name: (int(name[4]), "SOLID SECTION")
-        for name in (
-            *("CGAX3", "CGAX3H", "CGAX4", "CGAX4H", "CGAX4R", "CGAX4RH", "CGAX6", "CGAX6H"),
-            *("CGAX8", "CGAX8H", "CGAX8R", "CGAX8RH"),
-        )
+# what gives elements properties, and types of elements by how many nodes they have
+TYPES_BY_SECTION: dict[str, dict[int, str]] = {
+    "SOLID SECTION": {
+        2: "T3D2",
+        3: "CGAX3 CGAX3H",
+        4: "CGAX4 CGAX4H CGAX4R CGAX4RH C3D4 C3D4H",
+        6: "CGAX6 CGAX6H C3D6 C3D6H",
+        8: "CGAX8 CGAX8H CGAX8R CGAX8RH C3D8 C3D8H C3D8I C3D8IH C3D8R C3D8RH",
+        10: "C3D10 C3D10H C3D10M C3D10MH",
+        12: "CCL12 CCL12H",
+        15: "C3D15 C3D15H",
+        18: "CCL18 CCL18H",
+        20: "C3D20 C3D20H C3D20R C3D20RH",
+        24: "CCL24 CCL24H CCL24R CCL24RH",
     },
-    "SFMGAX1": (2, "SURFACE SECTION"),
-    "SFMGAX2": (3, "SURFACE SECTION"),
-    "RAX2": (2, "RIGID BODY"),
-    "MASS": (1, "MASS"),
-    "ROTARYI": (1, "ROTARY INERTIA"),
-    "SPRING1": (1, "SPRING"),
+    "SURFACE SECTION": {
+        2: "SFMGAX1",
+        3: "SFMGAX2 SFM3D3",
+        4: "SFM3D4 SFM3D4R",
+        6: "SFM3D6 SFMCL6",
+        8: "SFM3D8 SFM3D8R",
+        9: "SFMCL9",
+    },
+    "MEMBRANE SECTION": {
+        3: "M3D3",
+        4: "M3D4 M3D4R",
+        6: "M3D6 MCL6",
+        8: "M3D8 M3D8R",
+        9: "M3D9 M3D9R MCL9",
+    },
+    "SHELL SECTION": {3: "S3 S3R", 4: "S4 S4R", 8: "S8R"},
+    "RIGID BODY": {2: "RAX2", 3: "R3D3", 4: "R3D4"},
+    "MASS": {1: "MASS"},
+    "ROTARY INERTIA": {1: "ROTARYI"},
+    "SPRING": {1: "SPRING1"},
+}
+NODES_AND_SECTION: dict[str, tuple[int, str]] = {
+    name: (count, section)
+    for section, counts in TYPES_BY_SECTION.items()
+    for count, names in counts.items()
+    for name in names.split()
 }

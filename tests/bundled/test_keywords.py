@@ -233,10 +233,12 @@ def test_a_layer_fans_out_with_the_radius() -> None:
         ("1E-3", "-1E-3", 23, "area and spacing of a layer must be positive"),
         ("CORD, 90.0", "GUM, 90.0", 23, "material GUM of a rebar layer is not *ELASTIC"),
         ("CORD, 90.0", "GLUE, 90.0", 22, "material GLUE is not defined"),
+        ("0.3\n", "0.3\n*VISCOELASTIC, TIME=PRONY\n.1, 0., 1.\n", 23, "cords do not relax"),
         ("*SURFACE SECTION, ELSET=PLY\n", "", 21, "*REBAR LAYER must follow a *SURFACE SECTION"),
         ("SECTION, ELSET=PLY", "SECTION, ELSET=BELT", 21, "element set BELT is not defined"),
         ("SECTION, ELSET=PLY", "SECTION, ELSET=RUBBER", 21, "of type CGAX4R cannot have *SURFACE"),
         ("1E9", "-1E9", 25, "Young's modulus"),
+        ("0.3\n", "0.3\n*HYPERELASTIC, NEO HOOKE\n1., .1\n", 24, "CORD has two laws"),
     ],
 )
 def test_layers_that_are_refused(old: str, new: str, line: int, words: str) -> None:

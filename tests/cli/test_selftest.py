@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -44,3 +45,9 @@ def test_pairs_of_decks_and_what_they_should_give(
         if folder == "plain":
             found = {row["mode"]: float(row["frequency_Hz"]) for row in rows}
             assert found == {k: pytest.approx(v, rel=1e-4) for k, v in RECORDED_HZ.items()}
+    for row in rows:  # of the angular layer by its readings; with one spacing it is the plain one
+        line = re.findall(rf"^ *{re.escape(row['mode'])} +([\d. ]+)", page, re.MULTILINE)[1]
+        manual, one, radians, metres = map(float, line.split())
+        assert manual == pytest.approx(float(row["frequency_Hz"]), abs=6e-4)
+        assert one == pytest.approx(found[row["mode"]], abs=6e-4)
+        assert manual > 1.001 * one and one > 1.2 * radians > 1.2 * metres

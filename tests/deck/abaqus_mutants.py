@@ -1,4 +1,5 @@
-"""Mutants of the decks that we write for ABAQUS: each breaks one thing that its manual asks.
+"""Mutants of the decks that we write for ABAQUS, and of a user's in three dimensions: each breaks
+one thing that its manual asks.
 
 python -m tests.deck.abaqus_mutants [--count N] [--seed S]: how many of each kind the grammar of
 `solvers/abaqus/grammar.py` catches. The kinds are of texts, and know nothing of the grammar.
@@ -17,6 +18,7 @@ from random import Random
 from tyrecal_solvers.abaqus.check import findings
 from tyrecal_solvers.bundled.deck.keywords import DeckError, read_keywords
 
+from ..solvers import decks_3d
 from ..tyre.own_deck_mutants import misspelt
 from . import abaqus_decks
 
@@ -95,6 +97,8 @@ NUMBERS: tuple[str, ...] = (
     "CLOAD",
     "MASS",
 )
+AFTER = {"inflate": ("modes", "press"), "ring": ("ring's modes",)}  # that go on from a job
+SHAPES = "*NODE FILE, NSET=CROWN\nU, COORD\n*MODAL FILE\n*END STEP"
 EXCLUDED = {
     "HYPERELASTIC": ("NEO HOOKE", "OGDEN"),
     "FRICTION": ("ROUGH", "LAGRANGE"),
@@ -294,10 +298,13 @@ KINDS: dict[str, Mutant] = {
 @cache
 def decks() -> dict[str, list[str]]:
     """The texts by their job."""
+    inflated = decks_3d.inflate().replace(decks_3d.MARKED, "4.5E6")
     return {
         "inflate": list(abaqus_decks.inflations()),
         "modes": list(abaqus_decks.modes()),
         "press": list(abaqus_decks.presses()),
+        "ring": [decks_3d.mesh().replace(",\n", ", ") + inflated[inflated.index("*SOLID") :]],
+        "ring's modes": [decks_3d.modes(calculix=False).replace("*END STEP", SHAPES)],
     }
 
 
@@ -308,9 +315,10 @@ def caught(job: str, lines: list[str]) -> bool:
         found = read_keywords("\n".join(lines))
     except DeckError:
         return True
-    if job != "inflate":
-        return bool(findings(found, read_keywords(decks()["inflate"][-1])))
-    after = [decks()[other][0] for other in ("modes", "press")]
+    before = next((first for first, jobs in AFTER.items() if job in jobs), None)
+    if before:
+        return bool(findings(found, read_keywords(decks()[before][-1])))
+    after = [decks()[other][0] for other in AFTER[job]]
     return bool(findings(found) or any(findings(read_keywords(text), found) for text in after))
 
 

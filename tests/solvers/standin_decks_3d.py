@@ -39,14 +39,9 @@ def _modes(inflation: str, step: str) -> None:
     from tyrecal.tyre.load import load_case
     from tyrecal.tyre.own_deck.own_deck import read_own_deck
 
-    asked = [
-        "*FILE FORMAT, ASCII",
-        "*NODE FILE, NSET=CROWN",
-        "U, COORD",
-        "*MODAL FILE",
-        "*END STEP",
-    ]
-    assert step.splitlines()[-5:] == asked
+    asked = ["*NODE FILE, NSET=CROWN", "U, COORD", "*MODAL FILE", "*END STEP"]
+    assert step.splitlines()[-4:] == asked
+    assert "*FILE FORMAT, ASCII\n*STEP" in inflation and "FILE FORMAT" not in step
     c10 = float(re.findall(r"NEO HOOKE\n([^,]+),", inflation)[0])
     pressure = float(re.findall(r"RUBBER, P6, (\S+)", inflation)[0])
     wanted = int(re.findall(r"FREQUENCY\n(\d+)", step)[0])

@@ -58,7 +58,7 @@ def lines_with(text: str, pattern: str) -> list[int]:
 
 def misspelt(word: str, random: Random) -> str:
     """With a letter gone, doubled or exchanged."""
-    letters = [k for k, c in enumerate(word) if c.isalpha()]
+    letters = [k for k, c in enumerate(word) if c.isalpha() and c not in "qQ"]
     k = random.choice(letters[1:] or letters)
     return random.choice(
         (word[:k] + word[k + 1 :], word[:k] + word[k] + word[k:], word[:k] + "q" + word[k + 1 :])

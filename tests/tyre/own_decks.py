@@ -393,7 +393,7 @@ def rax_rim() -> str:
     text += "*ELEMENT, TYPE=RAX2, ELSET=RIM_ELEMENTS\n9001, 800001, 800002\n9002, 800003, 800004\n"
     text = text.replace("TIE NSET=RIM", "ELSET=RIM_ELEMENTS")
     text += "*SURFACE, NAME=BEAD, TYPE=NODE\nRIM\n*SURFACE, NAME=FLANGE\nRIM_ELEMENTS, SPOS\n"
-    return plain(text + "*TIE, NAME=SEAT\nBEAD, FLANGE\n")
+    return plain(text + "*TIE, NAME=SEAT, ADJUST=NO, POSITION TOLERANCE=0.04\nBEAD, FLANGE\n")
 
 
 STYLES: dict[str, Callable[[], str]] = {

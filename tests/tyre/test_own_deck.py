@@ -19,6 +19,7 @@ from tyrecal.tyre.case.own_case import own_case
 from tyrecal.tyre.load import load_case
 from tyrecal.tyre.own_deck.flat import Flat
 from tyrecal.tyre.own_deck.own_deck import OwnDeck, Units, read_own_deck
+from tyrecal.tyre.own_deck.own_text import own_texts
 from tyrecal.tyre.own_deck.text import OwnDeckError
 from tyrecal.tyre.resolve import resolved
 from tyrecal.tyre.values import with_values
@@ -91,6 +92,20 @@ def test_included_files(reference: np.ndarray, tmp_path: Path) -> None:
     (tmp_path / "parts" / "mesh.inp").write_text(text[:at])
     found = frequencies(write(tmp_path, "*include, Input=parts/mesh.inp\n" + text[at:]))
     assert found == pytest.approx(reference, rel=1e-12)
+    (tmp_path / "tyre.inp").write_text(text)
+    whole = read_own_deck(tmp_path / "tyre.inp").flat({}).text
+    head, data = text[: text.index("1001,")], text[text.index("1001,") : text.index("*NODE\n")]
+    (tmp_path / "nodes.txt").write_bytes(b"** in \x85 mm\n" + data.encode())
+    for taken in (f"{head}*INCLUDE, INPUT=nodes.txt\n", f"{head.rstrip()}, input = nodes.txt\n"):
+        rest = text[len(head) + len(data) :]
+        (tmp_path / "tyre.inp").write_text(taken + rest, newline="\r\n")
+        deck = read_own_deck(tmp_path / "tyre.inp")
+        assert deck.flat({}).text == whole
+        assert own_texts(deck, {})["nodes.txt"].endswith(data)
+    (tmp_path / "nodes.txt").write_text("*NODE\n" + data)
+    with pytest.raises(OwnDeckError, match=r"^nodes.txt, line 1: .* in a file of data lines"):
+        read_own_deck(tmp_path / "tyre.inp")
+    (tmp_path / "tyre.inp").write_text("*include, Input=parts/mesh.inp\n" + text[at:])
     (tmp_path / "parts" / "mesh.inp").write_text(text[:at] + "*NOD\n")
     with pytest.raises(OwnDeckError, match=r"^parts/mesh.inp, line \d+: \*NOD: .*\*NODE"):
         read_own_deck(tmp_path / "tyre.inp").flat({})
@@ -134,6 +149,13 @@ def test_marks_and_paths_have_exact_slopes(tmp_path: Path) -> None:
         assert slopes[name] == pytest.approx((up - down) / (2 * h), rel=1e-5, abs=1e-6 / value)
 
 
+def test_a_parameter_is_set_behind_its_sign(tmp_path: Path) -> None:
+    path = tmp_path / "tyre.inp"
+    path.write_text("*PARAMETER\np2 =2 # two\n" + own_decks.plain())
+    written = own_texts(read_own_deck(path), {"parameter / p2": 2.5})["tyre.inp"]
+    assert written == path.read_text().replace("=2 #", "=2.5 #")
+
+
 REFUSED = {
     "SOLID SECTION, ELSET=SOLID": (
         "SOLID SECTION, ELSET=SOLIDS",
@@ -152,6 +174,8 @@ REFUSED = {
     ),
     "*END STEP": ("", "cut off"),
     "TYPE=CGAX8R": ("TYPE=CPS8R", "no element of a revolved tyre"),
+    "*ELASTIC": ("*ELASTIC, MODULI=INSTANTANEOUS", "only LONG TERM"),
+    "*DSLOAD": ("*BOUNDARY, OP=NEW\n1001, ENCASTRE\n*DSLOAD", "must stand at every \\*BOUNDARY"),
 }
 
 
@@ -164,6 +188,30 @@ def test_refused_by_line(text: str, tmp_path: Path) -> None:
     path.write_text(whole.replace(text, other, 1))
     with pytest.raises(OwnDeckError, match=r"^tyre.inp, line \d+: .*" + words):
         trial(read_own_deck(path).flat({}))
+
+
+def test_a_seat_far_from_the_rim_is_refused(tmp_path: Path) -> None:
+    """*TIE leaves nodes free that lie beyond its tolerance, and moves those within it."""
+    path, tied = tmp_path / "tyre.inp", own_decks.rax_rim()
+    for seat in ("ADJUST=NO, POSITION TOLERANCE=0.01", "POSITION TOLERANCE=0.04"):
+        path.write_text(tied.replace("ADJUST=NO, POSITION TOLERANCE=0.04", seat))
+        with pytest.raises(OwnDeckError, match=r"line \d+: \*TIE: node \d+ lies .* from the rim"):
+            read_own_deck(path).flat({})
+
+
+def test_what_a_step_releases_is_free(tmp_path: Path) -> None:
+    """By OP=NEW, in the step that inflates or in one before."""
+    text = own_decks.plain()
+    held = text.replace("*STEP", "*BOUNDARY\n1005, ENCASTRE\n900001, 1, 6\n*STEP")
+    first = "*STEP\n*STATIC\n1., 1.\n*BOUNDARY, OP=NEW\n900001, 1, 6\n*END STEP\n*STEP"
+    for each, more in (
+        (text, 0),
+        (held, 1),
+        (held.replace("*BOUNDARY\n900001", "*BOUNDARY, OP=NEW\n900001"), 0),
+        (held.replace("*STEP", first, 1), 0),
+    ):
+        (tmp_path / "tyre.inp").write_text(each)
+        assert len(read_own_deck(tmp_path / "tyre.inp").flat({}).mesh.rim) == 26 + more
 
 
 def test_laws_and_elements_in_either_units(tmp_path: Path) -> None:

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from ..tyre.case import LoadedCase
     from ..tyre.own_deck.gauge import Gauges
     from ..tyre.own_deck.own_decks import OwnDecks
+    from ..tyre.own_deck.text import Block
 
 MOST_SAID = 10  # doubts about a deck
 
@@ -115,7 +116,10 @@ def _check(path: Path, mesh: str, assignments: tuple[str, ...], terminal: Termin
     if path.suffix in (".yaml", ".yml"):
         loaded, _ = arguments.load(path, mesh, assignments, None, terminal, True)
         if loaded.decks:
-            return _check_decks(loaded, loaded.decks, terminal)
+            found = known_of_decks(loaded, loaded.decks, terminal)
+            terminal.result(found)
+            refused = found["abaqus"]["refuses"] and loaded.case.solver.name != "calculix"
+            return EXIT_INPUT if refused else 0
         if loaded.deck is None:
             raise click.UsageError(f"'{path}' names no deck of your own: 'tyrecal validate' judges")
         deck, numbers = loaded.deck, loaded.deck_numbers
@@ -141,6 +145,14 @@ def _check(path: Path, mesh: str, assignments: tuple[str, ...], terminal: Termin
         for name, value in numbers.items():
             terminal.say(f"  {name} = {value:g}")
     terminal.result(result)
+    _say_what_solvers_take(asked, lacking, terminal)
+    return EXIT_INPUT if result["refused"] or asked["refuses"] else 0
+
+
+def _say_what_solvers_take(
+    asked: dict[str, list[str]], lacking: list[str], terminal: Terminal
+) -> None:
+    """What ABAQUS and CalculiX have against decks."""
     for sentence in asked["refuses"]:
         terminal.error(f"ABAQUS refuses by its manual: {sentence}")
     for sentence in asked["unknown"][:MOST_SAID]:
@@ -149,14 +161,24 @@ def _check(path: Path, mesh: str, assignments: tuple[str, ...], terminal: Termin
         terminal.warn(f"... and {more} more")
     for sentence in lacking:
         terminal.say(f"CalculiX does not honour: {sentence}")
-    return EXIT_INPUT if result["refused"] or asked["refuses"] else 0
 
 
-def _check_decks(loaded: LoadedCase, decks: OwnDecks, terminal: Terminal) -> int:
-    """Say what is known of decks in three dimensions, and what is added to them."""
+def known_of_decks(loaded: LoadedCase, decks: OwnDecks, terminal: Terminal) -> dict[str, Any]:
+    """Say what is known of decks in three dimensions, what is added to them, what ABAQUS refuses of
+    them by its manual, and what CalculiX has nothing for; the same as data."""
     from ..simulate.deck.decks_design import OUTPUT, added_words
+    from ..simulate.deck.own import asked_by_abaqus, lacking_in_calculix
 
     numbers = loaded.deck_numbers
+    jobs_blocks = decks.with_numbers(numbers, 1e3 * loaded.case.pressure_kPa)
+    asked: dict[str, list[str]] = {"refuses": [], "unknown": []}
+    before: list[Block] = []
+    for (_, old), blocks in zip(decks.jobs, jobs_blocks, strict=True):
+        before = before if old else []
+        for kind, sentences in asked_by_abaqus(blocks, before).items():
+            asked[kind] += sentences
+        before = [*before, *blocks]
+    lacking = lacking_in_calculix(before)
     places = [f"{row.place.file}, line {row.place.line}" for _, row, *_ in decks.pressures]
     added = {solver: added_words(decks, solver) for solver in OUTPUT}
     jobs = [f"{job}, which goes on from {old}" if old else job for job, old in decks.jobs]
@@ -167,15 +189,15 @@ def _check_decks(loaded: LoadedCase, decks: OwnDecks, terminal: Terminal) -> int
         terminal.say(f"  {name} = {value:g}")
     for solver, words in added.items():
         terminal.say(f"{solver}: {words or 'nothing is added'}")
-    terminal.result(
-        {
-            "jobs": decks.jobs,
-            "units": decks.units,
-            "modes": decks.modes,
-            "crown": decks.crown,
-            "pressure": places,
-            "numbers": dict(numbers),
-            "added": added,
-        }
-    )
-    return 0
+    _say_what_solvers_take(asked, lacking, terminal)
+    return {
+        "jobs": decks.jobs,
+        "units": decks.units,
+        "modes": decks.modes,
+        "crown": decks.crown,
+        "pressure": places,
+        "numbers": dict(numbers),
+        "added": added,
+        "abaqus": asked,
+        "calculix": lacking,
+    }

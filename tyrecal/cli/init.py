@@ -15,6 +15,8 @@ from .terminal import Terminal
 
 if TYPE_CHECKING:
     from ..tyre.case.new_case import Draft
+    from ..tyre.own_deck.own_deck import OwnDeck
+    from ..tyre.own_deck.own_decks import OwnDecks
 
 POSITIVE = click.FloatRange(min=0, min_open=True)
 
@@ -40,10 +42,17 @@ def _length(flag: str, text: str, unit: str = "mm") -> Any:
 )
 @click.option(
     "--deck",
-    "deck_file",
+    "deck_files",
     type=click.Path(path_type=Path, exists=True, dir_okay=False),
+    multiple=True,
     metavar="FILE.inp",
-    help="ABAQUS deck of your own axisymmetric section.",
+    help="ABAQUS deck of your own axisymmetric section; or those of your tyre in three dimensions,"
+    " in the order in which they are run, each with --deck.",
+)
+@click.option(
+    "--crown-set",
+    metavar="NSET",
+    help="Of decks in three dimensions: the node set round the tyre (default: CROWN).",
 )
 @click.option(
     "--units",
@@ -75,7 +84,8 @@ def _length(flag: str, text: str, unit: str = "mm") -> Any:
 def command(
     size: str | None,
     file: Path | None,
-    deck_file: Path | None,
+    deck_files: tuple[Path, ...],
+    crown_set: str | None,
     units: Literal["m", "mm"] | None,
     crown_mm: float | None,
     sidewall_mm: float | None,
@@ -100,18 +110,21 @@ def command(
     tyrecal init P235/75R17 --section my_stations.csv --output my_tyre.yaml
     tyrecal init 205/60R15 --section my_outline.csv --belt-width-mm 160 --output my_outline.yaml
     tyrecal init --deck my_tyre.inp
+    tyrecal init --deck inflate.inp --deck modes.inp --crown-set TREAD_LINE
     """
     from ..tyre.case.new_case import from_file, from_size
+    from ..tyre.own_deck.own_deck import read_own_deck
+    from ..tyre.own_deck.own_decks import read_own_decks, stands_in_space
     from ..tyre.section.size import parse_size
     from ..tyre.usual import ALL_THE_SAME, GAUGES, USUAL
     from ..units import INCH
 
-    if size is None and file is None and deck_file is None:
+    if size is None and file is None and not deck_files:
         raise click.UsageError(
             "give a SIZE, as in 'tyrecal init 205/60R15', --section FILE or --deck FILE.inp"
         )
-    if units and not deck_file:
-        raise click.UsageError("--units goes with --deck")
+    if (units or crown_set) and not deck_files:
+        raise click.UsageError(f"--{'units' if units else 'crown-set'} goes with --deck")
     usual = {**GAUGES, "pressure_kPa": USUAL["pressure_kPa"]}
     stated = click.get_current_context().params
     for name, each in [] if allow_unusual else usual.items():
@@ -119,11 +132,18 @@ def command(
             option = name.replace("_", "-")
             raise click.UsageError(f"--{option} {stated[name]:g}: {message}{ALL_THE_SAME}")
     tyre = parse_size(size) if size is not None else None
-    if deck_file is not None:
+    if deck_files:
         if file or lengths_given(stated):
             raise click.UsageError("with --deck the file holds the tyre's shape and thicknesses")
         words = tyre.text if tyre else "not given"
-        _from_deck(deck_file, units, words, pressure_kPa, output, pictures, force, terminal)
+        read = read_own_deck(deck_files[0], units)
+        if len(deck_files) > 1 or stands_in_space(read):
+            decks = read_own_decks(deck_files, read.units, crown_set or "CROWN")
+            _from_decks(decks, words, pressure_kPa, output, force, terminal)
+        elif crown_set:
+            raise click.UsageError("--crown-set is of decks in three dimensions")
+        else:
+            _from_deck(read, words, pressure_kPa, output, pictures, force, terminal)
         return 0
     given = {"crown": crown_mm, "sidewall": sidewall_mm, "bead": bead_mm, "belt": belt_width_mm}
     lengths = {key: 1e-3 * value for key, value in given.items() if value is not None}
@@ -197,8 +217,7 @@ def lengths_given(stated: dict[str, Any]) -> bool:
 
 
 def _from_deck(
-    file: Path,
-    units: Literal["m", "mm"] | None,
+    deck: OwnDeck,
     size: str,
     pressure_kPa: float | None,
     output: Path | None,
@@ -212,9 +231,7 @@ def _from_deck(
     from ..tyre.case.own_case import own_case
     from ..tyre.load import load_case
     from ..tyre.own_deck.found import contents, words
-    from ..tyre.own_deck.own_deck import read_own_deck
 
-    deck = read_own_deck(file, units)
     if deck.marks:
         name, block = next(iter(deck.marks.items()))
         raise block.refused(
@@ -223,13 +240,7 @@ def _from_deck(
         )
     flat = deck.flat({})
     text = own_case(deck, flat, size, pressure_kPa)
-    target = output or file.with_suffix(".yaml")
-    if target.resolve().parent != file.resolve().parent:
-        raise click.UsageError(f"--output '{target}': the case stands in its deck's folder")
-    picture = target.with_suffix(".png") if pictures else None
-    for path in [target, *([picture] if picture else [])]:
-        if path.exists() and not force:
-            raise InputError(f"'{path}' exists already; give --force to write over it")
+    target, picture = _beside(deck.path, output, pictures, force)
     mass_kg = trial(flat)
     with whole(target) as partial:
         partial.write_text(text, encoding="utf-8")
@@ -241,3 +252,40 @@ def _from_deck(
     if picture:
         _draw(loaded, picture, terminal)
     terminal.say(f"next: tyrecal modes {shlex.quote(str(target))}")
+
+
+def _from_decks(
+    decks: OwnDecks,
+    size: str,
+    pressure_kPa: float | None,
+    output: Path | None,
+    force: bool,
+    terminal: Terminal,
+) -> None:
+    """Write the case of decks in three dimensions beside them, and say what is known of them."""
+    from ..files import whole
+    from ..tyre.case.own_case import own_decks_case
+    from ..tyre.load import load_case
+    from .deck import known_of_decks
+
+    text = own_decks_case(decks, size, pressure_kPa)
+    target, _ = _beside(decks.path, output, False, force)
+    with whole(target) as partial:
+        partial.write_text(text, encoding="utf-8")
+    loaded = load_case(target, allow_unusual=True)
+    terminal.result({"case": str(target), **known_of_decks(loaded, decks, terminal)})
+    terminal.say(f"next: tyrecal modes {shlex.quote(str(target))} --solver abaqus")
+
+
+def _beside(
+    file: Path, output: Path | None, pictures: bool, force: bool
+) -> tuple[Path, Path | None]:
+    """Where the case of a deck goes, and its picture. Raises InputError, UsageError."""
+    target = output or file.with_suffix(".yaml")
+    if target.resolve().parent != file.resolve().parent:
+        raise click.UsageError(f"--output '{target}': the case stands in its deck's folder")
+    picture = target.with_suffix(".png") if pictures else None
+    for path in [target, *([picture] if picture else [])]:
+        if path.exists() and not force:
+            raise InputError(f"'{path}' exists already; give --force to write over it")
+    return target, picture

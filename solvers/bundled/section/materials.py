@@ -113,6 +113,8 @@ def read_materials(keywords: list[Keyword]) -> dict[str, Material]:
             if current is None:
                 raise DeckError(k.line, f"*{k.name} must follow a *MATERIAL")
             _READERS[k.name](current, k)
+            if current.rubber is not None and current.youngs_modulus is not None:
+                raise DeckError(current.line, f"material {current.name} has two laws")
     return materials
 
 

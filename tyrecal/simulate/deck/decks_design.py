@@ -10,12 +10,14 @@ from ...tyre.case import LoadedCase
 from ...tyre.case.schema import SolverChoice
 from ...tyre.own_deck.own_deck import UNIT_LENGTH, UNIT_MASS
 from ...tyre.own_deck.own_decks import OwnDecks
-from ...tyre.own_deck.text import OwnDeckError, named
+from ...tyre.own_deck.text import OwnDeckError, Place, named
 from ...tyre.resolve import resolved
 from ...tyre.templates import TemplateFailed
 from ...tyre.values import set_values
 from .decks import Design, header, refuse_outside
 from .tyre_design import TyreDesign
+
+Added = dict[Place, list[str]]  # lines that are written before these places
 
 
 class DecksDesign:
@@ -92,11 +94,9 @@ class DecksDesign:
             added = output_lines(self.decks, dialect)
         except OwnDeckError as error:
             raise TemplateFailed(str(error)) from None
-        file, line = self.decks.modes_step[-1].place
-        lines = files[file].splitlines(keepends=True)
-        files[file] = "".join(
-            [*lines[: line - 1], *(f"{each}\n" for each in added), *lines[line - 1 :]]
-        )
+        for (file, line), more in sorted(added.items(), reverse=True):  # the last lines first
+            lines = files[file].split("\n")
+            files[file] = "\n".join([*lines[: line - 1], *more, *lines[line - 1 :]])
         for name, text in files.items():
             refuse_outside(name, text)
         return files
@@ -107,52 +107,62 @@ def design_of(case: LoadedCase, values: Mapping[str, float] | None = None) -> De
     return DecksDesign(case, values) if case.decks else TyreDesign(case, values)
 
 
-def output_lines(decks: OwnDecks, dialect: str) -> list[str]:
-    """What the step of the modes must ask for besides, so that its modes can be labelled.
+def output_lines(decks: OwnDecks, dialect: str) -> Added:
+    """What the decks must say besides, so that the modes' shapes and the mass can be read.
 
-    Raises OwnDeckError where it asks for shapes of other nodes.
+    Raises OwnDeckError where the step of the modes asks for other shapes.
     """
+    of_nodes, others = OUTPUT.get(dialect, (("U",), None))
     asked = [block for block in decks.modes_step if block.name == "NODE FILE"]
     for block in asked:
-        if block.get("NSET") != decks.crown or "U" not in map(
-            named, (field for row in block.rows for field in row.fields)
-        ):
+        fields = {named(field) for row in block.rows for field in row.fields}
+        whole = set(block.parameters) <= {"NSET", "GLOBAL"} and block.get("GLOBAL") != "NO"
+        if block.get("NSET") != decks.crown or not whole or not {*of_nodes} <= fields:
             raise block.refused(
-                f"in the step of the modes only NSET={decks.crown} is asked for, with U: shapes"
-                " there name the modes"
+                f"in the step of the modes only NSET={decks.crown} is asked for, with"
+                f" {' and '.join(of_nodes)} of all modes in global directions: shapes there name"
+                " the modes"
             )
-    return OUTPUT[dialect](decks, bool(asked)) if dialect in OUTPUT else []
+    if others is None:
+        return {}
+    shapes = [] if asked else [f"*NODE FILE, NSET={decks.crown}", ", ".join(of_nodes)]
+    added = others(decks)
+    end = decks.modes_step[-1].place
+    added[end] = shapes + added.get(end, [])
+    return {place: lines for place, lines in added.items() if lines}
 
 
 def added_words(decks: OwnDecks, dialect: str) -> str:
     """What is added, and where, in words; "" where nothing is. Raises OwnDeckError."""
-    added, (file, line) = output_lines(decks, dialect), decks.modes_step[-1].place
-    return f"{file}, line {line}: added before it, to label modes: {' / '.join(added)}" * bool(
-        added
+    return "; ".join(
+        f"{file}, line {line}: added before it, to label modes: {' / '.join(more)}"
+        for (file, line), more in output_lines(decks, dialect).items()
     )
 
 
-def _abaqus(decks: OwnDecks, asked: bool) -> list[str]:
-    """Shapes and places as text in the results file, and eigenvalues with them."""
-    ascii_file = any(
-        block.name == "FILE FORMAT" and "ASCII" in block.parameters for block in decks.blocks
-    )
-    modal = any(block.name == "MODAL FILE" for block in decks.modes_step)
-    return [
-        *([] if ascii_file else ["*FILE FORMAT, ASCII"]),
-        *([] if asked else [f"*NODE FILE, NSET={decks.crown}", "U, COORD"]),
-        *([] if modal else ["*MODAL FILE"]),
-    ]
+def _abaqus(decks: OwnDecks) -> Added:
+    """Eigenvalues beside the shapes, and the file that holds them as text: once in an analysis,
+    "and the format cannot be changed upon restart" (manual, *FILE FORMAT)."""
+    blocks = [block for deck in decks.restarted for block in deck.blocks]
+    formats = [block for block in blocks if block.name == "FILE FORMAT"]
+    if formats and "ASCII" not in formats[0].parameters:
+        raise formats[0].refused("must say ASCII: shapes are read from the results file as text")
+    first = next(block for block in blocks if block.name == "STEP").place
+    told = any(block.name == "MODAL FILE" for block in decks.modes_step)
+    return {
+        first: [] if formats else ["*FILE FORMAT, ASCII"],
+        decks.modes_step[-1].place: [] if told else ["*MODAL FILE"],
+    }
 
 
-def _calculix(decks: OwnDecks, asked: bool) -> list[str]:
-    """Shapes, and the masses of all that has a section."""
+def _calculix(decks: OwnDecks) -> Added:
+    """The masses of all that has a section."""
     masses = ([f"*EL PRINT, ELSET={name}, TOTALS=ONLY", "EMAS"] for name in decks.solid_sets)
-    shapes = [] if asked else [f"*NODE FILE, NSET={decks.crown}", "U"]
-    return [*shapes, *(line for each in masses for line in each)]
+    return {decks.modes_step[-1].place: [line for each in masses for line in each]}
 
 
-OUTPUT: dict[str, Callable[[OwnDecks, bool], list[str]]] = {
-    "abaqus": _abaqus,
-    "calculix": _calculix,
+# by dialect: what is printed of the crown's nodes, and what else
+OUTPUT: dict[str, tuple[tuple[str, ...], Callable[[OwnDecks], Added] | None]] = {
+    "abaqus": (("U", "COORD"), _abaqus),
+    "calculix": (("U",), _calculix),
 }

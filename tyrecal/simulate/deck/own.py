@@ -125,12 +125,12 @@ def trial(flat: Flat) -> float:
     raise OwnDeckError(_origin(flat, line - 1) or flat.origins[0], words)
 
 
-def asked_by_abaqus(blocks: Sequence[Block]) -> dict[str, list[str]]:
-    """What ABAQUS ``refuses`` of a user's deck by its manual, and what is ``unknown`` to our
-    grammar of it: sentences with file and line."""
+def asked_by_abaqus(blocks: Sequence[Block], before: Sequence[Block] = ()) -> dict[str, list[str]]:
+    """What ABAQUS ``refuses`` of a user's deck, which goes on from the model of others, by its
+    manual, and what is ``unknown`` to our grammar of it: sentences with file and line."""
     check = import_module("tyrecal_solvers.abaqus.check")
     found: dict[str, list[str]] = {"refuses": [], "unknown": []}
-    for each in check.findings(blocks):
+    for each in check.findings(blocks, before):
         sentence = str(each.block.refused(each.words, each.row))
         found["refuses" if each.sure else "unknown"].append(sentence)
     return found

@@ -4,7 +4,9 @@ they should have, and a page that says what to send back."""
 from __future__ import annotations
 
 from dataclasses import replace
+from math import degrees
 from pathlib import Path
+from typing import Any
 
 from ...files import whole
 from ...tyre.case import LoadedCase
@@ -12,14 +14,22 @@ from ...tyre.load import load_case
 from ..deck.decks import Decks
 from ..deck.tyre_design import TyreDesign
 from ..evaluate.evaluator import Evaluator, Question
+from ..evaluate.results import Evaluation
 from ..modes.label import labelled
 from .self_check import CASE
 
-# degrees between the carcass cords of the second pair, 1 mm apart at a radius of 0.3 m
+# between the carcass cords of the second pair, 1 mm apart at a radius of 0.3 m; in degrees, says
+# the manual, times the distance from the axle
 FANNED_DEG = 0.19
+READINGS: dict[str, dict[str, Any]] = {  # of *REBAR LAYER, GEOMETRY=ANGULAR, by what it would mean
+    "manual": {"geometry": "angular", "spacing_m": None, "spacing_deg": FANNED_DEG},
+    "one spacing": {"spacing_m": 1e-3},
+    "radians": {"geometry": "angular", "spacing_m": None, "spacing_deg": degrees(FANNED_DEG)},
+    "metres": {"spacing_m": FANNED_DEG},
+}
 PAGE = """A selftest of tyrecal's decks on ABAQUS/Standard
 
-1. In each of the folders {folders} run, with any release from 6.14 on,
+1. In each of the folders plain and angular run, with any release from 6.14 on,
 
        abaqus job=inflate interactive
        abaqus job=modes oldjob=inflate interactive
@@ -29,50 +39,86 @@ PAGE = """A selftest of tyrecal's decks on ABAQUS/Standard
    Expected, of the solver that comes with tyrecal, whose section is the same mesh and whose
    circumference is exact:
 
-{tables}
+{plain}
    Within 1 % of them, the decks say what they should. The list holds other modes between and
    above these, of more waves round the tyre.
-3. Send back, of each folder: inflate.dat, inflate.msg, inflate.sta, modes.dat, modes.msg,
+3. In the folder angular the carcass has *REBAR LAYER, GEOMETRY=ANGULAR with the number {deg:g}.
+   Which column its frequencies are tells how the revolve reads that: in degrees times the
+   distance from the axle, as the manual says; as one spacing of 1 mm; in radians; as metres.
+
+{angular}
+   The first two differ less than the mesh may: there divide by the frequency of the same mode in
+   the folder plain. {told} comes to {ratio:.4f} by the manual, to 1.0000 with one spacing. TOTAL
+   MASS OF MODEL in inflate.dat tells the section's reading by itself, that in modes.dat the
+   revolve's. A job that stops for want of an orientation is an answer, too: the manual asks for
+   a cylindrical one in three dimensions, which the revolve should make.
+4. Send back, of each folder: inflate.dat, inflate.msg, inflate.sta, modes.dat, modes.msg,
    modes.sta, modes.fil, and what 'abaqus information=release' prints. Where a job stops, its
    ***ERROR lines in .dat or .msg are what we want; stop there, change nothing.
 
-What it answers: whether ABAQUS accepts the decks as they are; whether the revolve takes the node
-set CROWN along and turns about y; whether shapes get into modes.fil without SIM=NO; where the
-.dat file states the total mass, {mass_kg:.4f} kg here; and, from the folder angular, whether a
-revolve gives a *REBAR LAYER, GEOMETRY=ANGULAR the cylindrical orientation that its manual asks
-for.
+What it answers besides: whether ABAQUS accepts the decks as they are; whether the revolve takes the
+node set CROWN along and turns about y; whether shapes get into modes.fil without SIM=NO; and where
+the .dat file states the total mass, {mass_kg:.4f} kg in the folder plain.
 """
 
 
 def write_selftest(folder: Path) -> list[Path]:
     """Write the pairs and the page into a folder; the files. Raises InputError, OSError."""
-    plain, paths, tables = load_case(CASE), list[Path](), ""
-    cases = {"plain": plain, "angular": _fanned(plain)}
+    plain, paths = load_case(CASE), list[Path]()
+    cases = {"plain": plain, "angular": _with_carcass(plain, READINGS["manual"])}
     for name, case in cases.items():
-        design = TyreDesign(case)
-        answer = Evaluator(design, "bundled").evaluate(Question({}))
-        rows = [(f"{m.label}", m.frequency_Hz, m.multiplicity) for m in labelled(answer)]
-        files = Decks(design).texts("abaqus")
+        files = Decks(TyreDesign(case)).texts("abaqus")
         files["expected.csv"] = "mode,frequency_Hz,modes\n" + "".join(
-            f'"{label}",{hertz:.4f},{count}\n' for label, hertz, count in rows
+            f'"{mode.label}",{mode.frequency_Hz:.4f},{mode.multiplicity}\n'
+            for mode in labelled(_answer(case))
         )
-        lines = [
-            f"       {label:16} {hertz:9.3f} Hz  {'twice' * (n == 2)}" for label, hertz, n in rows
-        ]
-        tables += "\n".join([f"   {name}:", *map(str.rstrip, lines)]) + "\n"
         for file, text in files.items():
             paths.append(_written(folder / name / file, text))
+    answer = _answer(plain)
+    found = {each: _answer(_with_carcass(plain, how)) for each, how in READINGS.items()}
+    told = str(labelled(answer)[-1].label)
     asked = 2 * plain.case.analysis.modes_per_harmonic * (plain.case.analysis.highest_harmonic + 1)
     page = PAGE.format(
-        folders=" and ".join(cases), modes=asked, tables=tables, mass_kg=answer.mass_kg
+        modes=asked,
+        plain=_table({"Hz": answer}),
+        angular=_table(found),
+        deg=FANNED_DEG,
+        told=told,
+        ratio=_hertz(found["manual"])[told] / _hertz(answer)[told],
+        mass_kg=answer.mass_kg,
     )
     return [_written(folder / "README.txt", page), *paths]
 
 
-def _fanned(case: LoadedCase) -> LoadedCase:
-    """The tyre with a carcass whose cords fan out with the radius."""
+def _answer(case: LoadedCase) -> Evaluation:
+    return Evaluator(TyreDesign(case), "bundled").evaluate(Question({}))
+
+
+def _hertz(answer: Evaluation) -> dict[str, float]:
+    """Frequencies by label."""
+    return {str(mode.label): mode.frequency_Hz for mode in labelled(answer)}
+
+
+def _table(found: dict[str, Evaluation]) -> str:
+    """Frequencies and masses, a column each."""
+    first = next(iter(found.values()))
+    twice = {str(mode.label): "  twice" * (mode.multiplicity == 2) for mode in labelled(first)}
+    rows = [("", "", *found)]
+    rows += [
+        (label, words, *(f"{_hertz(each)[label]:.3f}" for each in found.values()))
+        for label, words in twice.items()
+    ]
+    rows.append(("total mass, kg", "", *(f"{each.mass_kg:.4f}" for each in found.values())))
+    lines = (
+        f"       {label:16}" + "".join(f"{text:>13}" for text in texts) + words
+        for label, words, *texts in rows
+    )
+    return "\n".join(line.rstrip() for line in lines) + "\n"
+
+
+def _with_carcass(case: LoadedCase, update: dict[str, Any]) -> LoadedCase:
+    """The tyre with other numbers of its carcass."""
     layers = dict(case.case.rebar_layers)
-    update = {"geometry": "angular", "spacing_m": None, "spacing_deg": FANNED_DEG}
     layers["carcass"] = layers["carcass"].model_copy(update=update)
     return replace(case, case=case.case.model_copy(update={"rebar_layers": layers}))
 

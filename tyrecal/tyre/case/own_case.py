@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping, Sequence
 from typing import Any
 
+from ...errors import InputError
 from ..own_deck.flat import Flat
 from ..own_deck.own_deck import OwnDeck
+from ..own_deck.own_decks import OwnDecks
 from ..templates import environment, render
 from .case_text import plain_text
 
@@ -16,48 +19,94 @@ RANGE = 5.0  # a variable's bounds over its start, and under it
 def own_case(deck: OwnDeck, flat: Flat, size: str, pressure_kPa: float | None) -> str:
     """YAML of a case whose deck is ``deck``: what a fit most often changes is a variable, the
     layers' areas and the rubbers' first constants."""
+    r, z = flat.mesh.reference
+    return _text(
+        [deck],
+        deck.numbers,
+        size,
+        flat.pressure_Pa / 1e3 if pressure_kPa is None else pressure_kPa,
+        _variables(deck.numbers, {ply.name: ply.material for ply in flat.plies}, flat.materials),
+        static_moduli="long_term" if flat.long_term else "instantaneous",
+        r=r,
+        z=z,
+    )
+
+
+def own_decks_case(decks: OwnDecks, size: str, pressure_kPa: float | None) -> str:
+    """The same of decks in three dimensions. Raises InputError where they do not tell the crown or
+    the pressure."""
+    if decks.crown.rpartition(".")[2] not in decks.node_sets:
+        known = ", ".join(decks.node_sets)
+        raise InputError(
+            f"the decks have no node set {decks.crown}: name that of the crown's centre line by"
+            f" --crown-set; they have {known or 'none'}"
+        )
+    decks.check({})
+    if pressure_kPa is None and not decks.pressures:
+        raise InputError("the decks have a mark in place of the pressure: give --pressure-kPa")
+    blocks = decks.blocks
+    layers = {r.name(0): r.name(4) for b in blocks if b.name == "REBAR LAYER" for r in b.rows}
+    materials = [b.get("NAME") for b in blocks if b.name == "MATERIAL"]
+    return _text(
+        decks.decks,
+        decks.numbers,
+        size,
+        decks.pressure_Pa / 1e3 if pressure_kPa is None else pressure_kPa,
+        _variables(decks.numbers, layers, materials),
+        crown=decks.crown,
+    )
+
+
+def _text(
+    decks: Sequence[OwnDeck],
+    numbers: Mapping[str, float],
+    size: str,
+    pressure_kPa: float,
+    variables: Mapping[str, Sequence[str]],
+    **more: Any,
+) -> str:
     env = environment("case", None)
     env.filters["text"] = plain_text
-    r, z = flat.mesh.reference
     names: dict[str, Any] = {
-        "file": deck.path.name,
-        "units": deck.units,
-        "name": deck.path.stem,
+        "files": [deck.path.name for deck in decks],
+        "decks": "crown" in more,
+        "units": decks[0].units,
+        "name": decks[-1].path.stem,
         "size": size,
-        "pressure_kPa": flat.pressure_Pa / 1e3 if pressure_kPa is None else pressure_kPa,
-        "static_moduli": "long_term" if flat.long_term else "instantaneous",
-        "r": r,
-        "z": z,
+        "pressure_kPa": pressure_kPa,
         "variables": [
             {
                 "name": name,
                 "sets": paths,
-                "start": deck.numbers[paths[0]],
-                "lower": deck.numbers[paths[0]] / RANGE,
-                "upper": deck.numbers[paths[0]] * RANGE,
+                "start": numbers[paths[0]],
+                "lower": numbers[paths[0]] / RANGE,
+                "upper": numbers[paths[0]] * RANGE,
             }
-            for name, paths in _variables(deck, flat).items()
+            for name, paths in variables.items()
         ],
+        **more,
     }
     return render(env, "own_deck.yaml.j2", names)
 
 
-def _variables(deck: OwnDeck, flat: Flat) -> dict[str, list[str]]:
-    """Paths by the name of the variable that sets them: layers of one cord and area are one."""
+def _variables(
+    numbers: Mapping[str, float], cords: Mapping[str, str], materials: Sequence[str]
+) -> dict[str, list[str]]:
+    """Paths by the name of the variable that sets them: layers of one cord and area are one.
+    cords: the material of each layer."""
     found: dict[str, list[str]] = {}
     groups: dict[tuple[str, float], list[str]] = {}
-    for path, value in deck.numbers.items():
+    for path, value in numbers.items():
         head, _, field = path.rpartition(" / ")
         if field == "area":
-            name = head.rpartition("rebar ")[2]
-            of = next((ply.material for ply in flat.plies if ply.name == name), "")
+            of = cords.get(head.rpartition("rebar ")[2], "")
             groups.setdefault((of, value), []).append(path)
     for (material, _), paths in groups.items():
         found[_name(f"A_{material}", found)] = paths
-    for material in dict.fromkeys(flat.materials):
+    for material in dict.fromkeys(materials):
         for field in ("C10", "mu", "mu1"):
             path = f"material {material} / HYPERELASTIC / {field}"
-            if deck.numbers.get(path, 0.0) > 0:
+            if numbers.get(path, 0.0) > 0:
                 found[_name(f"{field}_{material}", found)] = [path]
     return found
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from .assembly import Assembly
 from .grammar import Sorted
-from .scope import Point, mirror_of
+from .scope import Point, mirror_of, nearest
 from .surfaces import is_rigid, surface_nodes
 from .text import Block, Row
 
@@ -76,7 +76,7 @@ class Constraints:
             name = prefix + row.name(1)
             surface = self.made.surfaces.get(name)
             if surface and is_rigid(self.made, *surface):
-                self.rim |= dict.fromkeys(slaves)
+                self._seat(slaves, surface, block, row)
                 continue
             for n, distance in self._merge(
                 slaves, surface_nodes(self.made, name, block, row)
@@ -86,6 +86,31 @@ class Constraints:
                     " only nodes in the same place are, mesh both alike",
                     row,
                 )
+
+    def _seat(
+        self, slaves: Sequence[int], surface: tuple[Block, str], block: Block, row: Row
+    ) -> None:
+        """Nodes on the rim's elements, or as far from them as they may be without being moved."""
+        option, prefix = surface
+        segments = [
+            self.root.elements[n].nodes
+            for line in option.rows
+            for n in self.root.elements_in(prefix + line.name(0), option, line)
+        ]
+        ends = np.array([[self.root.nodes[n] for n in pair] for pair in segments])
+        away, _ = nearest(np.array([self.root.nodes[n] for n in slaves]), ends)
+        given = block.parameters.get("POSITION TOLERANCE", "")
+        allowed = Row(block.place, (given,)).number(0) if given else 0.0
+        if block.get("ADJUST") != "NO":
+            allowed = 0.0
+        for n, distance in zip(slaves, away, strict=True):
+            if distance > max(allowed, self.near):
+                raise block.refused(
+                    f"node {n} lies {distance:.3g} from the rim: ABAQUS leaves it free, or moves"
+                    " it there; with ADJUST=NO and a POSITION TOLERANCE as large it is held",
+                    row,
+                )
+        self.rim |= dict.fromkeys(slaves)
 
     def _embed(self, block: Block, prefix: str) -> None:
         """Plies on nodes of their own: those where the rubber has nodes are the rubber's."""

@@ -15,7 +15,7 @@ from itertools import pairwise
 import numpy as np
 
 from .model import Model
-from .scope import Point, corner_areas, faces_of
+from .scope import Point, corner_areas, faces_of, nearest
 from .surfaces import Face
 
 Array = np.ndarray
@@ -65,8 +65,8 @@ def _growth(model: Model, sets: Sets) -> Mapping[int, Point]:
                 f"a gauge needs a part outside all cords, {ply.name} lies in {sets[0]}"
             )
     X = np.array([model.nodes[n] for n in members])
-    distance, _ = _nearest(X, _segments(model, inner))
-    _, normal = _nearest(X, _segments(model, outer))
+    distance, _ = nearest(X, _segments(model, inner))
+    _, normal = nearest(X, _segments(model, outer))
     grown = distance[:, None] * normal
     return {n: (float(r), float(z)) for n, (r, z) in zip(members, grown, strict=True)}
 
@@ -75,17 +75,3 @@ def _segments(model: Model, faces: Sequence[Face]) -> Array:
     """Straight pieces (s, 2, 2) of faces, the solid on their left."""
     pairs = [pair for _, _, nodes in faces for pair in pairwise(nodes)]
     return np.array([[model.nodes[n] for n in pair] for pair in pairs])
-
-
-def _nearest(X: Array, pieces: Array) -> tuple[Array, Array]:
-    """Distance (n,) of points to the nearest piece, and outward normal (n, 2) there: of an end that
-    pieces share, their normals' mean."""
-    start, along = pieces[:, 0], pieces[:, 1] - pieces[:, 0]
-    share = ((X[:, None] - start) * along).sum(-1) / (along**2).sum(-1)
-    foot = start + np.clip(share, 0, 1)[..., None] * along
-    away = np.hypot(*np.moveaxis(X[:, None] - foot, -1, 0))
-    distance = away.min(1)
-    near = away <= distance[:, None] + 1e-9 * np.ptp(pieces)
-    outward = np.column_stack([along[:, 1], -along[:, 0]]) / np.hypot(*along.T)[:, None]
-    normal = near @ outward
-    return distance, normal / np.hypot(*normal.T)[:, None]

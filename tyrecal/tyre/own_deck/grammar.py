@@ -66,7 +66,7 @@ MESH: dict[str, dict[str, Values]] = {
 }
 MATERIAL: dict[str, dict[str, Values]] = {
     "DENSITY": {},
-    "ELASTIC": {"TYPE": ("ISOTROPIC", "ISO"), "MODULI": ("LONG TERM", "INSTANTANEOUS")},
+    "ELASTIC": {"TYPE": ("ISOTROPIC", "ISO"), "MODULI": ("LONG TERM",)},
     "HYPERELASTIC": {
         "NEO HOOKE": ("",),
         "MOONEY-RIVLIN": ("",),
@@ -228,6 +228,11 @@ def _step(step: list[Block], found: Sorted) -> None:
         else:
             _check(block, STEP_LEVEL, "a step")
             kept.append(block)
+    held = [block for block in kept if block.name == "BOUNDARY"]
+    if new := [block for block in held if block.get("OP") == "NEW"]:
+        if len(new) < len(held):
+            raise new[0].refused("OP=NEW must stand at every *BOUNDARY of the step, or at none")
+        found.model = [block for block in found.model if block.name != "BOUNDARY"]  # released
     procedures = [block for block in kept if block.name == "STATIC"]
     if len(procedures) != 1:
         raise step[0].refused("needs one *STATIC")
@@ -236,7 +241,6 @@ def _step(step: list[Block], found: Sorted) -> None:
             raise step[0].refused("inflates: it needs NLGEOM=YES")
         found.inflation = kept
         return
-    held = [block for block in kept if block.name == "BOUNDARY"]
     found.model.extend(held)  # what an earlier step holds, stays held
 
 

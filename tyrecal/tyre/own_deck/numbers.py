@@ -110,12 +110,12 @@ def paths(blocks: Sequence[Block]) -> dict[str, tuple[int, int, int]]:
         elif block.name == "PARAMETER":
             for i, row in enumerate(block.rows):
                 name, value = assigned(row)
-                if _plain(value):
+                if plain_number(value):
                     found[f"parameter / {name}"] = place, i, -1
             continue
         for name, i, j in named_fields(block):
             row = block.rows[i]
-            if not _plain(row.text(j)):
+            if not plain_number(row.text(j)):
                 continue
             if block.name == "REBAR LAYER":
                 own = row.name(0)
@@ -149,7 +149,8 @@ def assigned(row: Row) -> tuple[str, str]:
     return name.strip(), value.strip()
 
 
-def _plain(text: str) -> bool:
+def plain_number(text: str) -> bool:
+    """Whether a field is a finite number as it stands."""
     try:
         value = float(text.replace("D", "E").replace("d", "e"))
     except ValueError:

@@ -10,15 +10,18 @@ from functools import cached_property
 from hashlib import sha256
 from pathlib import Path
 
-from .numbers import DECK_MARK
+from .numbers import DECK_MARK, plain_number
 from .own_deck import UNIT_LENGTH, UNIT_MASS, OwnDeck, Units, read_own_deck
 from .own_text import Setting, own_texts
 from .text import Block, OwnDeckError, Place, Row, named
 
 JOB_FILE = re.compile(r"[A-Za-z0-9_\-]{1,60}\.inp", re.IGNORECASE)  # a file that names a job
 PRESSURE_MARK = "pressure"  # filled with the case's pressure
+MARK_IT = f"write {{{{ {PRESSURE_MARK} }}}} in its place"
 PRESSURE_DOF = 8  # of a fluid cavity's reference node
 NAMES_OF_SETS = ("NSET", "NEW SET")
+NO_PRESSURE = "HP", "NU"  # in the names of loads that differ from place to place
+OF_VOLUMES = re.compile(r"C3D|CCL|DC3D|(SF)?M(3D|CL)|S\d")  # types of elements in 3-D
 CONTINUES = {"SYMMETRIC MODEL GENERATION", "SYMMETRIC RESULTS TRANSFER", "IMPORT"}
 
 
@@ -73,14 +76,24 @@ class OwnDecks:
 
     @cached_property
     def jobs(self) -> list[tuple[str, str]]:
-        """Each job and the one before it that it goes on from, "" where it is whole by itself."""
+        """Each job and the one before it that it goes on from, "" where it is whole by itself.
+
+        Raises OwnDeckError where the first goes on from a job that is not among them."""
         found: list[tuple[str, str]] = []
         for deck in self.decks:
-            reads = any(
-                b.name in CONTINUES or (b.name == "RESTART" and "READ" in b.parameters)
-                for b in deck.blocks
-            )
-            found.append((deck.path.stem, found[-1][0] if found and reads else ""))
+            reads = next((b for b in deck.blocks if b.name in CONTINUES or _restarts(b)), None)
+            if reads and not found:
+                raise reads.refused("goes on from a job that no deck before this one is of")
+            found.append((deck.path.stem, found[-1][0] if reads else ""))
+        return found
+
+    @cached_property
+    def restarted(self) -> list[OwnDeck]:
+        """The last deck and those before it whose analysis it goes on with by *RESTART, in their
+        order: for ABAQUS one analysis, which has one format of its results file."""
+        found = [self.decks[-1]]
+        while any(map(_restarts, found[0].blocks)):
+            found.insert(0, self.decks[self.decks.index(found[0]) - 1])
         return found
 
     @cached_property
@@ -123,19 +136,34 @@ class OwnDecks:
         """
         if any(PRESSURE_MARK in deck.marks for deck in self.decks):
             return []
-        found = [(deck, *place) for deck in self.decks for place in _pressures(deck.blocks)]
+        ends = _ends_of_amplitudes(self.blocks)
+        found = [(deck, *place) for deck in self.decks for place in _pressures(deck.blocks, ends)]
         largest = max((abs(value) for *_, value in found), default=0.0)
         if not largest:
             raise OwnDeckError(
                 Place(self.decks[0].path.name, 1),
                 "no pressure is found in *DSLOAD, *DLOAD, or *BOUNDARY of the degree of freedom"
-                f" {PRESSURE_DOF}: write {{{{ {PRESSURE_MARK} }}}} for it",
+                f" {PRESSURE_DOF}: {MARK_IT}",
             )
         return [(deck, row, i, value / largest) for deck, row, i, value in found if value]
 
+    @property
+    def pressure_Pa(self) -> float:
+        """The largest of theirs. Raises OwnDeckError."""
+        own = max(abs(row.number(i)) for _, row, i, _ in self.pressures)
+        return own * UNIT_MASS[self.units] / UNIT_LENGTH[self.units]
+
+    def with_numbers(self, numbers: Mapping[str, float], pressure_Pa: float) -> list[list[Block]]:
+        """The blocks of each deck with marks and numbers set. Raises OwnDeckError."""
+        known = {**numbers, PRESSURE_MARK: self._in_own_units(pressure_Pa)}
+        return [deck.with_numbers(known) for deck in self.decks]
+
+    def _in_own_units(self, pressure_Pa: float) -> float:
+        return pressure_Pa * UNIT_LENGTH[self.units] / UNIT_MASS[self.units]
+
     def filled(self, numbers: Mapping[str, float], pressure_Pa: float) -> dict[str, str]:
         """The texts with marks, numbers and the pressure set. Raises OwnDeckError."""
-        pressure = pressure_Pa * UNIT_LENGTH[self.units] / UNIT_MASS[self.units]
+        pressure = self._in_own_units(pressure_Pa)
         known = {**numbers, PRESSURE_MARK: pressure}
         files: dict[str, str] = {}
         for deck in self.decks:
@@ -152,7 +180,7 @@ class OwnDecks:
 
     def check(self, numbers: Mapping[str, float]) -> None:
         """Raises OwnDeckError where they cannot be run, or have no modes to label."""
-        self.modes  # noqa: B018
+        self.modes, self.jobs  # noqa: B018
         self.filled(numbers, 1.0)
 
     @property
@@ -162,11 +190,33 @@ class OwnDecks:
         return list(dict.fromkeys(name for name in given if name))
 
 
-def _pressures(blocks: Sequence[Block]) -> Iterator[tuple[Row, int, float]]:
-    """Row, field and number of each pressure."""
+def stands_in_space(deck: OwnDeck) -> bool:
+    """Whether a deck is of a tyre in three dimensions."""
+    return any(
+        OF_VOLUMES.match(block.get("TYPE")) for block in deck.blocks if block.name == "ELEMENT"
+    )
+
+
+def _restarts(block: Block) -> bool:
+    """Whether its job goes on with the analysis of another."""
+    return block.name == "RESTART" and "READ" in block.parameters
+
+
+def _ends_of_amplitudes(blocks: Sequence[Block]) -> dict[str, str]:
+    """The last value of each *AMPLITUDE, as it stands."""
+    tables = (block for block in blocks if block.name == "AMPLITUDE" and block.rows)
+    return {b.get("NAME"): [*filter(None, b.rows[-1].fields), ""][-2] for b in tables}
+
+
+def _pressures(
+    blocks: Sequence[Block], ends: Mapping[str, str]
+) -> Iterator[tuple[Row, int, float]]:
+    """Row, field and number of each pressure. Raises OwnDeckError where that is not the pressure
+    that acts at a step's end."""
     for block in blocks:
         for row in block.rows:
-            if block.name in ("DSLOAD", "DLOAD") and re.fullmatch(r"P\d?", row.name(1)):
+            kind = row.name(1)
+            if block.name in ("DSLOAD", "DLOAD") and re.fullmatch(r"H?P\d?(NU)?", kind):
                 place = 2
             elif block.name == "BOUNDARY" and row.text(1) == row.text(2, row.text(1)) == str(
                 PRESSURE_DOF
@@ -174,8 +224,19 @@ def _pressures(blocks: Sequence[Block]) -> Iterator[tuple[Row, int, float]]:
                 place = 3
             else:
                 continue
-            if row.text(place) and not DECK_MARK.search(row.text(place)):
-                yield row, place, row.number(place)
+            text = row.text(place)
+            if not text or DECK_MARK.search(text):
+                continue
+            name = block.get("AMPLITUDE")
+            if any(word in kind for word in NO_PRESSURE) or not plain_number(text):
+                raise block.refused(f"{kind}, {text} is no plain pressure: {MARK_IT}", row)
+            if name and not (plain_number(ends.get(name, "")) and float(ends[name]) == 1.0):
+                raise block.refused(
+                    f"the amplitude {name} does not end at 1, so that {text} is not the pressure"
+                    f" that acts: {MARK_IT}",
+                    row,
+                )
+            yield row, place, row.number(place)
 
 
 def read_own_decks(paths: Sequence[Path], units: Units, crown: str) -> OwnDecks:

@@ -22,13 +22,15 @@ def own_texts(
         for path, (k, i, j) in deck.places.items()
         if path in numbers and numbers[path] != deck.numbers[path]
     ]
-    lines = {file: text.splitlines(keepends=True) for file, text in deck.texts.items()}
+    lines = {file: text.split("\n") for file, text in deck.texts.items()}
     for row, j, value in (*places, *pressures):
         own = lines[row.place.file]
         own[row.place.line - 1] = _with(own[row.place.line - 1], row, j, value)
     known = {name: numbers[name] for name in deck.marks if name in numbers}
     return {
-        file: DECK_MARK.sub(lambda m: written(known[m[1]]) if m[1] in known else m[0], "".join(own))
+        file: DECK_MARK.sub(
+            lambda m: written(known[m[1]]) if m[1] in known else m[0], "\n".join(own)
+        )
         for file, own in lines.items()
     }
 
@@ -36,8 +38,8 @@ def own_texts(
 def _with(line: str, row: Row, index: int, value: float) -> str:
     """A data line with a number at a field, or NAME = value, the rest as it stands."""
     if index < 0:
-        return line.replace(assigned(row)[1], written(value))
-    fields = line.rstrip("\r\n").split(",")
-    end = line[len(line.rstrip("\r\n")) :]
+        name, _, rest = line.partition("=")
+        return f"{name}={rest.replace(assigned(row)[1], written(value), 1)}"
+    fields = line.split(",")
     fields[index] = re.sub(r"\S.*\S|\S", written(value), fields[index], count=1)
-    return ",".join(fields) + end
+    return ",".join(fields)

@@ -160,3 +160,17 @@ def corner_areas(element: Element, points: Mapping[int, Point]) -> np.ndarray:
     along, back = np.roll(X, -1, 0) - X, np.roll(X, 1, 0) - X
     area: np.ndarray = along[:, 0] * back[:, 1] - along[:, 1] * back[:, 0]
     return area
+
+
+def nearest(X: np.ndarray, pieces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Distance (n,) of points to the nearest piece, and outward normal (n, 2) there: of an end that
+    pieces share, their normals' mean."""
+    start, along = pieces[:, 0], pieces[:, 1] - pieces[:, 0]
+    share = ((X[:, None] - start) * along).sum(-1) / (along**2).sum(-1)
+    foot = start + np.clip(share, 0, 1)[..., None] * along
+    away = np.hypot(*np.moveaxis(X[:, None] - foot, -1, 0))
+    distance = away.min(1)
+    near = away <= distance[:, None] + 1e-9 * np.ptp(pieces)
+    outward = np.column_stack([along[:, 1], -along[:, 0]]) / np.hypot(*along.T)[:, None]
+    normal = near @ outward
+    return distance, normal / np.hypot(*normal.T)[:, None]

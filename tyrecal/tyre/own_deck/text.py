@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
@@ -111,78 +111,101 @@ def named(text: str) -> str:
 
 def read_blocks(path: Path) -> tuple[list[Block], dict[str, str]]:
     """The blocks of a deck, and the texts of its files by name. Raises OwnDeckError, OSError."""
-    texts: dict[str, str] = {}
-    return list(_blocks(path.name, path.parent, (), [MAX_OWN_BYTES], texts)), texts
+    reader = _Reader(path.parent)
+    reader.read(path.name, Place(path.name, 1))
+    reader.close()
+    return reader.blocks, reader.texts
 
 
-def _blocks(
-    file: str, folder: Path, above: tuple[str, ...], left: list[int], texts: dict[str, str]
-) -> Iterator[Block]:
-    texts[file] = _text(folder / file, Place(file, 1), left)
-    for block in _file_blocks(file, texts[file]):
-        if block.name != "INCLUDE":
-            yield block
-            continue
+class _Reader:
+    """Of a deck and the files that it takes in: a file of data goes on where the line stands."""
+
+    def __init__(self, folder: Path):
+        self.folder = folder
+        self.left = MAX_OWN_BYTES
+        self.blocks: list[Block] = []
+        self.texts: dict[str, str] = {}
+        self.opened: tuple[str, Place, dict[str, str]] | None = None  # the keyword, its place ...
+        self.rows: list[Row] = []
+
+    def close(self) -> None:
+        """The keyword that is open has all its data."""
+        if self.opened:
+            self.blocks.append(Block(*self.opened, tuple(self.rows)))
+        self.rows = []
+
+    def read(
+        self, file: str, asked: Place, above: tuple[str, ...] = (), data: bool = False
+    ) -> None:
+        """All lines of a file; ``data``: none of them a keyword."""
+        self.texts[file] = text = self._text(file, asked)
+        for start, line in _lines(file, text, lambda: self.opened[0] if self.opened else ""):
+            if not line.startswith("*"):
+                if self.opened is None:
+                    raise OwnDeckError(start, f"data '{line[:40]}' before the first keyword")
+                self.rows.append(_row(start, line))
+                continue
+            keyword = _keyword(start, line)
+            if data:
+                raise Block(*keyword, ()).refused("stands in a file of data lines")
+            name, _, parameters = keyword
+            if name != "INCLUDE":
+                self.close()
+                self.opened = name, start, {k: v for k, v in parameters.items() if k != "INPUT"}
+            if name == "INCLUDE" or "INPUT" in parameters:
+                other = self._other(Block(*keyword, ()), (*above, file))
+                self.read(other, start, (*above, file), name != "INCLUDE")
+
+    def _other(self, block: Block, above: tuple[str, ...]) -> str:
+        """The name of the file that a keyword takes in."""
         other = block.parameters.get("INPUT", "").strip().strip('"')
-        if not other or set(block.parameters) != {"INPUT"} or block.rows:
+        if not other or (block.name == "INCLUDE" and len(block.parameters) > 1):
             raise block.refused("takes INPUT=FILE and nothing else")
         path = Path(other)
         if path.is_absolute() or ".." in path.parts or "\\" in other:
             raise block.refused(f"INPUT={other} leads out of the deck's folder: copy it there")
-        inside = (folder / path).resolve().is_relative_to(folder.resolve())
-        if not inside or not (folder / path).is_file():
+        inside = (self.folder / path).resolve().is_relative_to(self.folder.resolve())
+        if not inside or not (self.folder / path).is_file():
             raise block.refused(f"INPUT={other} is no file in the deck's folder")
-        if other in (*above, file) or len(above) >= DEEPEST_INCLUDE:
+        if other in above or len(above) > DEEPEST_INCLUDE:
             raise block.refused(f"INPUT={other} includes itself, or is too deep")
-        yield from _blocks(other, folder, (*above, file), left, texts)
+        return other
+
+    def _text(self, file: str, place: Place) -> str:
+        with (self.folder / file).open("rb") as stream:
+            content = stream.read(self.left + 1)
+        self.left -= len(content)
+        if self.left < 0:
+            raise OwnDeckError(place, f"decks of more than {MAX_OWN_BYTES / 1e6:g} MB are not read")
+        try:
+            return content.decode("utf-8-sig")
+        except UnicodeDecodeError:
+            return content.decode("latin-1")  # of a heading's umlauts; keywords are plain letters
 
 
-def _text(path: Path, place: Place, left: list[int]) -> str:
-    with path.open("rb") as stream:
-        content = stream.read(left[0] + 1)
-    left[0] -= len(content)
-    if left[0] < 0:
-        raise OwnDeckError(place, f"decks of more than {MAX_OWN_BYTES / 1e6:g} MB are not read")
-    try:
-        return content.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        return content.decode("latin-1")  # of a heading's umlauts; keywords are plain letters
-
-
-def _file_blocks(file: str, text: str) -> Iterator[Block]:
-    """The blocks of one file."""
-    block: tuple[str, Place, dict[str, str]] | None = None
-    rows: list[Row] = []
-    pending, start, keyword = "", Place(file, 0), False
-    for count, raw in enumerate(text.splitlines(), start=1):
+def _lines(file: str, text: str, keyword: Callable[[], str]) -> Iterator[tuple[Place, str]]:
+    """Keyword and data lines of a text with what continues them, and where they begin, without
+    comments; ``keyword``: that whose data a line is."""
+    pending, start = "", Place(file, 0)
+    for count, raw in enumerate(text.split("\n"), start=1):
         line = raw.strip()
         if line.startswith("**") or not line:
             continue
-        if pending and not (not keyword and line.startswith("*")):
+        if pending and (pending.startswith("*") or not line.startswith("*")):
             line = pending + line
         else:
             if pending:  # a data line that ended in a comma, of which no more comes
-                rows.append(_row(start, pending))
-            start, keyword = Place(file, count), line.startswith("*")
+                yield start, pending
+            start = Place(file, count)
         pending = ""
-        data_of = block[0] if block and not keyword else ""
-        if line.endswith(",") and (keyword or data_of in ("ELEMENT", "ELCOPY")):
+        if line.endswith(",") and (line.startswith("*") or keyword() in ("ELEMENT", "ELCOPY")):
             pending = line
-            continue
-        if not keyword:
-            if block is None:
-                raise OwnDeckError(start, f"data '{line[:40]}' before the first keyword")
-            rows.append(_row(start, line))
-            continue
-        if block:
-            yield Block(*block, tuple(rows))
-        block, rows = _keyword(start, line), []
-    if pending and keyword:
+        else:
+            yield start, line
+    if pending.startswith("*"):
         raise OwnDeckError(start, f"'{pending[:60]}' ends in a comma, but the file ends there")
     if pending:
-        rows.append(_row(start, pending))
-    if block:
-        yield Block(*block, tuple(rows))
+        yield start, pending
 
 
 def _row(place: Place, line: str) -> Row:

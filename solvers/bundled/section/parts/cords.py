@@ -103,6 +103,9 @@ def _layer(job: SectionJob, k: Keyword, row: DataLine, lines: Lines) -> _Layer:
         raise DeckError(row.line, "the position of a layer in a surface element is 0.0")
     if material.youngs_modulus is None:
         raise DeckError(row.line, f"material {material.name} of a rebar layer is not *ELASTIC")
+    if material.prony or material.table is not None:
+        words = f"material {material.name} of a rebar layer is *VISCOELASTIC: cords do not relax"
+        raise DeckError(row.line, words)
     if not (np.real(area) > 0 and np.real(spacing) > 0):
         raise DeckError(row.line, "area and spacing of a layer must be positive")
     angle = row.number(5, 0.0) * np.pi / 180
