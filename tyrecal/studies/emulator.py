@@ -27,12 +27,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import reduce
+from functools import cached_property
 from itertools import combinations_with_replacement
 from math import log
 
 import numpy as np
-from numpy.polynomial import legendre
 
 from ..errors import InputError
 from ..simulate.evaluate.evaluator import Evaluator, Question
@@ -102,6 +101,10 @@ class Emulator:
         hertz = np.exp(self.ln_f(x[None])[0])
         return dict(zip(self.labels, hertz.tolist(), strict=True))
 
+    @cached_property
+    def _pair(self) -> tuple[int, int] | None:
+        return places(self.labels)
+
     @property
     def evaluations(self) -> int:
         """Of designs that could be evaluated."""
@@ -131,8 +134,16 @@ class Emulator:
 
     def ln_f(self, x: Array) -> Array:
         """ln f (p, n) at designs x (p, v), whether they are in the box or not."""
-        q = products(self.degrees, (x - self.centre) / self.half) @ self.coefficients
-        return unpaired(self.labels, q[:, :-1], q[:, -1])
+        return self.ln_f_of(self.products(x))
+
+    def products(self, x: Array) -> Array:
+        """What all polynomials are made of, (p, k) at designs x (p, v), at any `restricted`."""
+        return products(self.degrees, (x - self.centre) / self.half)
+
+    def ln_f_of(self, terms: Array) -> Array:
+        """`ln_f` of the designs that have these ``products``."""
+        q = terms @ self.coefficients
+        return unpaired(self._pair, q[:, :-1], q[:, -1])
 
     def slopes(self, x: Array) -> Array:
         """d ln f / d x (p, n, v) at designs x (p, v)."""
@@ -140,10 +151,9 @@ class Emulator:
         q = products(self.degrees, t) @ self.coefficients
         rise = [products(self.degrees, t, j) @ self.coefficients for j in range(len(self.half))]
         found = np.stack(rise, 2)[:, :-1] / self.half
-        if (pair := places(self.labels)) is not None:
-            a, b = (
-                pair  # the slope of sqrt(s) is that of s over 2 sqrt(s); none where s is cut at 0
-            )
+        if self._pair is not None:
+            # the slope of sqrt(s) is that of s over 2 sqrt(s); none where s is cut at 0
+            a, b = self._pair
             root = np.sqrt(np.where(q[:, b] > SEEN**2, q[:, b], np.inf))
             root *= np.where(q[:, -1] < 0, -1.0, 1.0)
             mean, gap = found[:, a].copy(), found[:, b] / (2 * root[:, None])
@@ -231,7 +241,8 @@ def fitted(
     t = np.array([(each.x - centre) / half for each in samples])
     own = np.array([[each.ln_f[label] for label in labels] for each in samples])
     rise = np.array([[each.slopes[label] * half for label in labels] for each in samples])
-    value, slope = paired(labels, own, rise)
+    pair = places(labels)
+    value, slope = paired(pair, own, rise)
     apart = np.array([each.apart for each in samples])
     equations = np.concatenate([value, *np.moveaxis(slope, 2, 0)])
     best: Emulator | None = None
@@ -241,7 +252,7 @@ def fitted(
             break
         rows = [products(degrees, t), *(products(degrees, t, j) for j in range(t.shape[1]))]
         coefficients, left_out = _left_out(np.concatenate(rows), equations, len(samples))
-        error = abs(unpaired(labels, value - left_out, apart) - own)
+        error = abs(unpaired(pair, value - left_out, apart) - own)
         stated = bound(error.max(1))
         if best is None or stated < best.stated_error:
             few = (degrees.sum(1) <= SIDE_DEGREE).sum()
@@ -268,13 +279,11 @@ def _left_out(matrix: Array, equations: Array, count: int) -> tuple[Array, Array
     """Coefficients (k, n), and residuals (count, n) of the values of each design left out."""
     orthonormal, triangle = np.linalg.qr(matrix)
     a = np.linalg.lstsq(triangle, orthonormal.T @ equations, None)[0]
-    residual = equations - matrix @ a
-    found = []
-    for i in range(count):
-        own = orthonormal[i::count]  # its value, and its slopes
-        rest = np.eye(len(own)) - own @ own.T
-        found.append(np.linalg.lstsq(rest, residual[i::count], None)[0][0])
-    return a, np.array(found)
+    of_designs = lambda rows: rows.reshape(-1, count, rows.shape[1]).swapaxes(0, 1)
+    own = of_designs(orthonormal)  # (count, 1 + v, k): of its value, and of its slopes
+    rest = np.eye(own.shape[1]) - own @ own.swapaxes(1, 2)
+    residual = of_designs(equations - matrix @ a)
+    return a, (np.linalg.pinv(rest, hermitian=True)[:, :1] @ residual)[:, 0]
 
 
 def bound(errors: Array) -> float:
@@ -297,11 +306,11 @@ def places(labels: Sequence[Label]) -> tuple[int, int] | None:
     return labels.index(AXIAL), labels.index(TORSIONAL)
 
 
-def paired(labels: Sequence[Label], ln_f: Array, slopes: Array) -> tuple[Array, Array]:
-    """q (p, n) and d q / d t (p, n, v) of ln f and its slopes: m and s in the places of the two
+def paired(pair: tuple[int, int] | None, ln_f: Array, slopes: Array) -> tuple[Array, Array]:
+    """q (p, n) and d q / d t (p, n, v) of ln f and its slopes: m and s in the `places` of the two
     [0, 0] modes."""
     q, slope = ln_f.copy(), slopes.copy()
-    if (pair := places(labels)) is not None:
+    if pair is not None:
         a, b = pair
         gap, rise = q[:, a] - q[:, b], slope[:, a] - slope[:, b]
         q[:, a], q[:, b] = (q[:, a] + q[:, b]) / 2, gap**2
@@ -309,10 +318,10 @@ def paired(labels: Sequence[Label], ln_f: Array, slopes: Array) -> tuple[Array, 
     return q, slope
 
 
-def unpaired(labels: Sequence[Label], q: Array, apart: Array) -> Array:
-    """ln f (p, n) of what is smooth, q (p, n); apart (p,): d."""
+def unpaired(pair: tuple[int, int] | None, q: Array, apart: Array) -> Array:
+    """ln f (p, n) of what is smooth, q (p, n); pair: the `places`; apart (p,): d."""
     found = q.copy()
-    if (pair := places(labels)) is not None:
+    if pair is not None:
         a, b = pair
         gap = np.where(apart < 0, -1.0, 1.0) * np.sqrt(np.maximum(q[:, b], 0.0))
         found[:, a], found[:, b] = q[:, a] + gap / 2, q[:, a] - gap / 2
@@ -330,12 +339,28 @@ def up_to(count: int, degree: int) -> Array:
 
 def products(degrees: Array, t: Array, by: int = -1) -> Array:
     """P_k(t) (p, k) at t (p, v), or their slopes by one coordinate."""
-    highest = int(degrees.max(initial=0))
-    table = legendre.legvander(t, highest)  # (p, v, degree + 1)
-    if by >= 0:
-        table[:, by] = legendre.legval(t[:, by], legendre.legder(np.eye(highest + 1))).T
-    factors = (table[:, j, own] for j, own in enumerate(degrees.T))
-    return reduce(np.multiply, factors, np.ones((len(t), len(degrees))))
+    P = legendre(t, int(degrees.max(initial=0)))
+    found = np.ones((len(degrees), len(t)))
+    for j, own in enumerate(degrees.T):
+        found *= (_rates(P) if j == by else P)[own, j]
+    return found.T
+
+
+def legendre(t: Array, highest: int) -> Array:
+    """P_n(t) (highest + 1, v, p): (n + 1) P_n+1 = (2 n + 1) t P_n - n P_n-1 (Bonnet)."""
+    P = np.ones((highest + 1, *t.T.shape))
+    P[1:2] = t.T
+    for n in range(1, highest):
+        P[n + 1] = ((2 * n + 1) / (n + 1) * t.T) * P[n] - n / (n + 1) * P[n - 1]
+    return P
+
+
+def _rates(P: Array) -> Array:
+    """P'_n of `legendre`: P'_n+1 = P'_n-1 + (2 n + 1) P_n."""
+    rates = np.zeros_like(P)
+    for n in range(len(P) - 1):
+        rates[n + 1] = (rates[n - 1] if n else 0.0) + (2 * n + 1) * P[n]
+    return rates
 
 
 def spread(count: int, dimensions: int) -> Array:

@@ -17,7 +17,9 @@ import numpy as np
 from ..emulator import Emulator, spread
 
 Array = np.ndarray
+AT_ONCE = 512  # designs: what is computed of them stays in the processor's cache
 STARTS, STEPS = 64, 60  # of `optima`
+AT_OPTIMUM = 1e-6  # standard deviations: starts as near as this have arrived
 SAME_OPTIMUM = 0.1  # standard deviations: optima closer than this are one
 FIRST_DAMPING, STIFFEST = 1e-3, 1e6  # of a step, in units of the information
 
@@ -55,10 +57,14 @@ class Posterior:
     def ln_f(self, x: Array, rows: Array) -> Array:
         """ln f (p, n) of rows of states and labels at x (p, v)."""
         found = np.empty((len(x), len(rows)))
-        for state, emulator in enumerate(self._at_states):
-            own = rows[:, 0] == state
-            if own.any():
-                found[:, own] = emulator.ln_f(x)[:, rows[own, 1]]
+        for first in range(0, len(x), AT_ONCE):
+            here, terms = slice(first, first + AT_ONCE), {}
+            for state in sorted(set(rows[:, 0].tolist())):
+                emulator, own = self._at_states[state], rows[:, 0] == state
+                which = self.states[state, 0]
+                if which not in terms:  # the same for all states of one emulator
+                    terms[which] = emulator.products(x[here])
+                found[here, own] = emulator.ln_f_of(terms[which])[:, rows[own, 1]]
         return found
 
     def slopes(self, x: Array, rows: Array) -> Array:
@@ -116,11 +122,12 @@ def optima(posterior: Posterior) -> tuple[Array, Array]:
         scale = np.einsum("pvv->pv", H) * (1 + damping[:, None]) + 1e-300
         H = np.where(free, H, 0.0)
         H[:, range(len(low)), range(len(low))] = scale
-        step = np.linalg.solve(H, np.where(held, 0.0, pull)[:, :, None])[:, :, 0]
+        pull = np.where(held, 0.0, pull)
+        step = np.linalg.solve(H, pull[:, :, None])[:, :, 0]
+        if (pull * step).sum(1).max() < AT_OPTIMUM**2:
+            break
         trial = np.clip(x + step, low, high)
         there = posterior(trial)
-        if abs(trial - x).max() < 1e-10 * np.ptp(posterior.box):
-            break
         better = there > value
         x, value = np.where(better[:, None], trial, x), np.where(better, there, value)
         damping = np.where(better, damping / 5, np.minimum(damping * 4, STIFFEST))
