@@ -107,7 +107,8 @@ def test_time_is_looked_at_for_every_harmonic_of_what_is_attached(
     attached = on_crown(inflated, 0.05)
     coupled.attached_modes(vibration, attached, [0, 7], 1, lambda: looks.append(1))
     assert len(looks) == max(SECTORS, 7) + 1
-    families = [coupled._with_response(vibration, n, 1, attached) for n in (0, 1)]
+    force = coupled._unit_forces(vibration.numbering, attached)
+    families = [coupled._with_response(vibration, n, 1, force) for n in (0, 1)]
     assert [np.iscomplexobj(family.shapes) for family in families] == [False, True]
 
 
@@ -206,7 +207,9 @@ def test_few_fields_stand_for_those_far_above(random: np.random.Generator) -> No
     """Masses and springs on 400 fields: those that stand for the high ones leave the lowest modes
     as they are, to ninefold's sixth power; all are orthonormal."""
     eigenvalues, p = np.linspace(1.0, 40.0, 400) ** 2, random.normal(size=(3, 400))
-    fewer = coupled._reduced(eigenvalues, p, 20)
+    low, high, rest = coupled._reduced(eigenvalues, p, 20)
+    fewer = np.zeros((400, len(low) + rest.shape[1]))
+    fewer[low, range(len(low))], fewer[high, len(low) :] = 1.0, rest
     assert fewer.shape[1] < 100
     np.testing.assert_allclose(fewer.T @ fewer, np.eye(fewer.shape[1]), atol=1e-12)
     mass, spring = np.diag([0.0, 1e-2, 1e-3]), np.diag([3.0, 0.0, 1.0])
@@ -225,8 +228,10 @@ def test_the_response_to_what_is_attached_is_among_the_fields() -> None:
         outside = np.flatnonzero(work.model.mesh.X[:, 0] > 0.2299)[[0, 0, 1, 1]]
         nothing = np.zeros(4, complex)
         at = PointElements(outside, np.array([0, 2, 0, 0]), nothing, nothing, SECTORS)
-        assert len(coupled._with_response(still, 1, 2, at).shapes) == 2 + 3
-        assert len(coupled._with_response(still, 0, 0, at).shapes) == 3
+        force = coupled._unit_forces(still.numbering, at)
+        np.testing.assert_allclose(force.T @ force, np.eye(3), atol=1e-12)
+        assert len(coupled._with_response(still, 1, 2, force).shapes) == 2 + 3
+        assert len(coupled._with_response(still, 0, 0, force).shapes) == 3
 
 
 def test_the_series_of_a_sector_is_one_in_it_and_zero_elsewhere() -> None:

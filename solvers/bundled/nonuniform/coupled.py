@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..modes.harmonics import Combination, HarmonicModes, SeededTyre, Vibration
+from ..section.kept_fields import Coordinates
 from ..section.point_elements import PointElements
 
 Array = np.ndarray
@@ -46,24 +47,25 @@ class Basis:
 
     def __init__(self, families: list[Family]):
         self.families = families
-        self.place = []  # (family, index in it, c)
-        for f, family in enumerate(families):
-            for c in (1.0, 1j) if family.n else (1.0,):
-                self.place += [(f, k, c) for k in range(len(family.eigenvalues))]
-        self.eigenvalues = np.array([families[f].eigenvalues[k] for f, k, _ in self.place])
+        own = [np.tile(each.eigenvalues, 2 if each.n else 1) for each in families]
+        ends = np.cumsum([len(each) for each in own])
+        self._rows = [slice(end - len(each), end) for each, end in zip(own, ends, strict=True)]
+        self.eigenvalues = np.concatenate(own)
+
+    def amplitudes(self, f: int, vectors: Array) -> Array:
+        """c (k, m) of the f-th family's fields, of fields given by vectors (fields, m)."""
+        own, family = vectors[self._rows[f]] + 0j, self.families[f]
+        count = len(family.eigenvalues)
+        return own[:count] + 1j * own[count:] if family.n else own
 
     def energy(self, vectors: Array) -> Array:
         """Stiffness energy (families, m), 2 J, of fields given by vectors (fields, m)."""
-        whole = np.zeros((len(self.families), vectors.shape[1]))
-        np.add.at(whole, [f for f, _, _ in self.place], self.eigenvalues[:, None] * vectors**2)
-        return whole
+        return np.array([self.eigenvalues[rows] @ vectors[rows] ** 2 for rows in self._rows])
 
     def part(self, f: int, vectors: Array) -> Array:
         """Of fields given by vectors (fields, m): the shapes (m, nodes, 3) of the f-th family,
         unit mass as in it."""
-        rows = [i for i, place in enumerate(self.place) if place[0] == f]
-        c = np.array([self.place[i][2] for i in rows])[:, None] * vectors[rows]
-        return np.tensordot(c.T, self.families[f].shapes[[self.place[i][1] for i in rows]], 1)
+        return np.tensordot(self.amplitudes(f, vectors).T, self.families[f].shapes, 1)
 
     def at_zero(self, attached: PointElements) -> Array:
         """Displacement (d, fields) of the attached components."""
@@ -87,27 +89,30 @@ def attached_modes(
     K + k p p^T and M + m p p^T, p the displacement that carries k or m, summed up to the highest
     harmonic that the sectors carry. Raises RunFailed.
     """
-    families = []
+    families, force = [], _unit_forces(vibration.numbering, attached)
     for n in range(max([attached.highest, *harmonics]) + 1):
         check()
         own = count + 1 if n <= max(harmonics) + SPARE_HARMONICS else 0
-        families.append(_with_response(vibration, n, own, attached))
+        families.append(_with_response(vibration, n, own, force))
     basis = Basis(families)
     p = basis.at_zero(attached)
     looked = CANDIDATES_PER_MODE * len(_seats(harmonics, count)) + 10
-    fewer = _reduced(basis.eigenvalues, p, looked)
-    at = p @ fewer
-    K = fewer.T @ (basis.eigenvalues[:, None] * fewer)
+    low, high, rest = _reduced(basis.eigenvalues, p, looked)
+    from scipy.linalg import block_diag, eigh  # late: a tyre alike all round needs none of it
+
+    at = np.hstack([p[:, low], p[:, high] @ rest])
+    K = block_diag(np.diag(basis.eigenvalues[low]), rest.T * basis.eigenvalues[high] @ rest)
     K += at.T @ (attached.stiffness.real[:, None] * at)
     M = np.eye(len(K)) + at.T @ (attached.mass.real[:, None] * at)
-    from scipy.linalg import eigh  # late: a tyre that is the same all round needs none of it
+    values, found = eigh(K, M)
+    vectors = np.empty((len(basis.eigenvalues), min(looked, len(values))))
+    vectors[low], vectors[high] = found[: len(low), :looked], rest @ found[len(low) :, :looked]
+    return named(basis, values[:looked], vectors, harmonics, count, p)
 
-    values, vectors = eigh(K, M)
-    return named(basis, values, fewer @ vectors, harmonics, count, p)
 
-
-def _reduced(eigenvalues: Array, p: Array, looked: int) -> Array:
-    """Orthonormal combinations (fields, k) of fields that hold the ``looked`` lowest coupled modes.
+def _reduced(eigenvalues: Array, p: Array, looked: int) -> tuple[Array, Array, Array]:
+    """Places of the low fields and of the high ones, and orthonormal combinations (high, k) of
+    these, that together hold the ``looked`` lowest coupled modes.
 
     The low fields themselves; of the many high ones D^-1 p^T, D^-2 p^T, ...: Lanczos' vectors of
     the forces that attached masses and springs exert on them.
@@ -116,19 +121,26 @@ def _reduced(eigenvalues: Array, p: Array, looked: int) -> Array:
     low, high = np.flatnonzero(eigenvalues <= limit), np.flatnonzero(eigenvalues > limit)
     relative = limit / eigenvalues[high, None]
     moments = np.hstack([relative**k * p[:, high].T for k in range(1, STATIC_MOMENTS + 1)])
-    rest = np.linalg.qr(moments)[0]
-    whole = np.zeros((len(eigenvalues), len(low) + rest.shape[1]))
-    whole[low, range(len(low))] = 1.0
-    whole[high, len(low) :] = rest
-    return whole
+    return low, high, np.linalg.qr(moments)[0]
 
 
-def _with_response(vibration: Vibration, n: int, count: int, attached: PointElements) -> Family:
-    """Modes of harmonic n and the static response to unit forces on the attached components."""
-    factor, numbering = vibration.factor(n), vibration.numbering
+def _unit_forces(numbering: Coordinates, attached: PointElements) -> Array:
+    """Coordinates (size, k), orthonormal, that span unit forces on the attached components."""
     force = np.zeros((*numbering.free.shape, len(attached.rows)))
     force[attached.rows, attached.components, range(len(attached.rows))] = 1.0
     force = numbering.apart(force)
+    loaded = np.flatnonzero(force.any(1))
+    across, sizes, _ = np.linalg.svd(force[loaded], full_matrices=False)
+    across = across[:, sizes > MIN_RESPONSE_SHARE * sizes[0]]
+    found = np.zeros((len(force), across.shape[1]))
+    found[loaded] = across
+    return found
+
+
+def _with_response(vibration: Vibration, n: int, count: int, force: Array) -> Family:
+    """Modes of harmonic n and the static response to forces (size, k) on the attached
+    components."""
+    factor, numbering = vibration.factor(n), vibration.numbering
     response = factor.solve(force)
     gives, directions = np.linalg.eigh(force.conj().T @ response)
     directions = directions[:, gives > MIN_RESPONSE_SHARE * gives[-1]]
@@ -199,26 +211,25 @@ def named(
 ) -> list[HarmonicModes]:
     """Coupled modes, eigenvalues (m,) rising and vectors (fields, m), by the plain modes of
     which they hold most; of a doublet's two the lower comes first. p (d, fields)."""
-    held: dict[tuple[int, int], Array] = {}
-    for row, (f, k, _) in enumerate(basis.place):
-        key = basis.families[f].n, k
-        held[key] = held.get(key, 0.0) + vectors[row] ** 2
+    place = {family.n: f for f, family in enumerate(basis.families)}
+    held = {
+        (n, k): abs(amplitude) ** 2
+        for n in harmonics
+        for k, amplitude in enumerate(basis.amplitudes(place[n], vectors))
+    }
     told = tell(held, harmonics, count)
-    result = []
+    order = [j for n in harmonics for j in told[n]]
+    values, vectors = values[order], vectors[:, order]
+    which, mode = np.nonzero(basis.energy(vectors) > MIN_ENERGY_SHARE * values)
+    parts = [basis.part(f, vectors[:, mode[which == f]]) for f in np.unique(which).tolist()]
+    n_of = np.array([family.n for family in basis.families])
+    whole = CoupledShapes(mode, n_of[which], np.concatenate(parts), values, p @ vectors)
+    result, first = [], 0
     for n in harmonics:
-        mine = told[n]
-        own = next(i for i, family in enumerate(basis.families) if family.n == n)
-        share = basis.energy(vectors[:, mine]).T / values[mine][:, None]
-        mode, which = np.nonzero(share > MIN_ENERGY_SHARE)
-        parts = {i: basis.part(i, vectors[:, mine]) for i in {own, *which.tolist()}}
-        combination = CoupledShapes(
-            mode,
-            np.array([basis.families[i].n for i in which]),
-            np.array([parts[i][j] for j, i in zip(mode, which.tolist(), strict=True)]),
-            values[mine],
-            p @ vectors[:, mine],
-        )
-        result.append(split(n, values[mine], parts[own], combination))
+        mine = slice(first, first + len(told[n]))
+        own = basis.part(place[n], vectors[:, mine])
+        result.append(split(n, values[mine], own, whole.where(mine)))
+        first = mine.stop
     return result
 
 
