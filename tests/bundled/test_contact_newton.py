@@ -438,7 +438,7 @@ def test_nearly_the_same_load_again(solid: Round) -> None:
 def test_a_stiffness_that_is_not_found_is_no_number(
     solid: Round, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(contact_newton, "STIFFNESS_RTOL", 1e-30)
+    monkeypatch.setattr(contact_newton, "MAX_UNIT_RESIDUAL", 1e-30)
     with pytest.raises(NoEquilibrium, match="vertical stiffness was not found in 60 iterations"):
         solid.press(LENGTHS, 1e10).to(50.0)
 

@@ -28,9 +28,10 @@ MAX_GMRES_BEFORE_NEW_FACTOR = 15
 MAX_GMRES = 60
 SAME_FACTOR = 1.1  # of a load, up to which its preconditioner is worth keeping
 LINEAR_RTOL = 1e-2  # residual of the linear problem, relative
-SMOOTH_RTOL = 1e-5  # the same of what a fit descends by: the vertical stiffness, and derivatives
-STIFFNESS_RTOL = 1e-3  # of the stiffness at least
-ROUGH_LINEAR_RTOL = 0.3  # residual of the linear problem as long as the contact changes much
+SMOOTH_RTOL = 1e-5  # the same of derivatives, by which a fit descends
+UNIT_RTOL = 1e-4  # the same of the vertical stiffness, which is off by about its square
+MAX_UNIT_RESIDUAL = 1e-3  # of the same
+ROUGH_LINEAR_RTOL = 0.1  # residual of the linear problem as long as the contact changes much
 MAX_LINEAR_RESIDUAL = 0.5  # more is left only of a tangent that is far from a stable one
 MAX_SETBACKS = 2  # steps that may fail to halve the residual, with Coulomb's friction
 COULOMB_RTOL = 1e-2  # residual over the load, before Coulomb's friction is tried
@@ -166,7 +167,8 @@ class ContactNewton:
         return self.tyre.potential() + contact.energy + load / 2 * height
 
     def _newton(self, load: float) -> PressedState:
-        """By Tresca's friction, with the last normal forces, to where Coulomb's converges."""
+        """With Coulomb's friction from where the last load's stiffness points; where that does not
+        converge, by Tresca's friction, with the last normal forces, to where it does."""
         parts, height = self.parts, self.height
         self._stale = self._factor is not None and load > SAME_FACTOR * self._formed_at
         if self._slope:
@@ -174,23 +176,34 @@ class ContactNewton:
             height += (load - self.load) * self._slope[1]
         else:
             height -= FIRST_COMPLIANCE * load
-        bound, near = self._bound, COULOMB_RTOL
-        for attempt in range(MAX_NEWTON):
-            reached = near if attempt else FRICTION_BOUND_RTOL
+        found = self._by_coulomb(parts, height, load) if self._slope else None
+        bound, reached = self._bound, FRICTION_BOUND_RTOL
+        for _ in range(MAX_NEWTON):
+            if found:
+                break
             parts, height, contact = self._softly(parts, height, load, bound, reached)
             bound = contact.bound(self.road.share(contact.points, height)[0])
-            if not attempt:
-                continue  # what newly touches had no friction yet
-            try:
-                parts, height, contact = self._settle(parts, height, load, None, CONTACT_FORCE_RTOL)
-            except NoEquilibrium:
-                near = max(0.1 * near, CONTACT_FORCE_RTOL)
+            if reached > COULOMB_RTOL:
+                reached = COULOMB_RTOL  # what newly touches had no friction yet
                 continue
-            self._bound = contact.bound(1.0)
-            unit = self._unit(contact)
-            self._slope = -unit[0] / 2, -unit[1] / 2
-            return PressedState(parts, height, contact, 2 / unit[1], unit)
-        raise NoEquilibrium("the friction did not settle")
+            found = self._by_coulomb(parts, height, load)
+            reached = max(0.1 * reached, CONTACT_FORCE_RTOL)
+        if not found:
+            raise NoEquilibrium("the friction did not settle")
+        parts, height, contact = found
+        self._bound = contact.bound(1.0)
+        unit = self._unit(contact)
+        self._slope = -unit[0] / 2, -unit[1] / 2
+        return PressedState(parts, height, contact, 2 / unit[1], unit)
+
+    def _by_coulomb(
+        self, parts: Array, height: float, load: float
+    ) -> tuple[Array, float, Contact] | None:
+        """The equilibrium, None where Newton's method does not converge from there."""
+        try:
+            return self._settle(parts, height, load, None, CONTACT_FORCE_RTOL)
+        except NoEquilibrium:
+            return None
 
     def _softly(
         self, parts: Array, height: float, load: float, bound: Bound, tolerance: float
@@ -215,17 +228,17 @@ class ContactNewton:
         Coulomb's friction it is left as soon as it does not converge."""
         force, lacking, contact = self._state(parts, height, load, bound)
         size = float(np.hypot(np.linalg.norm(force), lacking))
-        if bound is None and self._stale:
-            self._form(contact)
         setbacks = 0
         for _ in range(MAX_NEWTON):
             self.check()
             if size <= tolerance * load:
                 return parts, height, contact
+            rough = size > COULOMB_RTOL * load
+            if bound is None and self._stale and not rough:
+                self._form(contact)
             self.iterations += 1
             log.info("%g N: out of balance by %.0e of it", load, size / load)
             energy = self._energy(contact, load, height) if bound else 0.0
-            rough = size > COULOMB_RTOL * load
             step, rise = self._step(
                 contact, force, lacking, ROUGH_LINEAR_RTOL if rough else LINEAR_RTOL
             )
@@ -310,8 +323,8 @@ class ContactNewton:
     def _unit(self, contact: Contact) -> tuple[Array, float]:
         """Parts and the road's rise that answer a unit of the force of half the tyre."""
         tangent = Tangent.of(contact, self.symmetry)
-        found, rise, _, left = self.solve(tangent, 0 * self.parts, 1.0, SMOOTH_RTOL)
-        if left > STIFFNESS_RTOL:
+        found, rise, _, left = self.solve(tangent, 0 * self.parts, 1.0, UNIT_RTOL)
+        if left > MAX_UNIT_RESIDUAL:
             raise NoEquilibrium(f"the vertical stiffness was not found in {MAX_GMRES} iterations")
         return found, rise
 

@@ -7,6 +7,7 @@ is products.
 from __future__ import annotations
 
 import numpy as np
+from scipy.linalg.blas import ssyrk
 from scipy.linalg.lapack import spotrf, strtrs
 
 from ...errors import Indefinite
@@ -54,3 +55,8 @@ def divide_transposed(L: Array, B: Array) -> None:
     divide_transposed(L[h:, h:], B[h:])
     B[:h] -= L[h:, :h].T @ B[h:]
     divide_transposed(L[:h, :h], B[:h])
+
+
+def less_square(A: Array, X: Array) -> Array:
+    """The lower triangle of A, in rows one after the other, less that of X^T X, in A's place."""
+    return ssyrk(-1.0, X, 1.0, A.T, trans=1, lower=0, overwrite_c=1).T if len(A) else A

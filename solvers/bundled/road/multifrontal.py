@@ -14,7 +14,7 @@ import numpy as np
 from scipy.sparse import csr_matrix
 
 from ..section.symmetry import MIRROR_SIGNS
-from .dense_cholesky import cholesky, divide, divide_transposed
+from .dense_cholesky import cholesky, divide, divide_transposed, less_square
 from .dissection import Column, Dissection, Front, Kind, Range
 from .half_turn_symmetry import ODD, HalfTurn
 
@@ -137,10 +137,10 @@ class Factor:
             later = held.col >= own.start
             row, col = held.row[later], np.searchsorted(here, held.col[later])
             whole[col, row] += held.data[later]
-            first, onward = whole[:n, :n].T.copy("F"), whole[n:, :n].T.copy("F")
+            first, onward = whole[:n, :n].copy("F"), whole[n:, :n].T.copy("F")
             cholesky(first)
             divide(first, onward)
-            rests[i] = left, whole[n:, n:] - onward.T @ onward
+            rests[i] = left, less_square(whole[n:, n:].copy(), onward)
             self._steps.append((own, left, first, onward))
 
     def solve(self, right: Array) -> Array:
@@ -190,7 +190,8 @@ def _within_parts(contact: csr_matrix, fronts: list[Front]) -> csr_matrix:
 
 
 def _add(whole: Array, here: Array, some: Array, block: Array) -> None:
-    """Add a block between ``some`` of the unknowns ``here`` to the whole, run by run."""
+    """Add the lower triangle of a block between ``some`` of the unknowns ``here`` to that of the
+    whole, run by run."""
     at = np.searchsorted(here, some)
     cuts = np.flatnonzero(np.diff(at) != 1) + 1
     runs = [
@@ -198,8 +199,9 @@ def _add(whole: Array, here: Array, some: Array, block: Array) -> None:
         for a, b in pairwise([0, *cuts.tolist(), len(at)])
         if a < b
     ]
-    for (source, target), (across, beyond) in product(runs, runs):
-        whole[target, beyond] += block[source, across]
+    for i, (source, target) in enumerate(runs):
+        for across, beyond in runs[: i + 1]:
+            whole[target, beyond] += block[source, across]
 
 
 def _fold(column: Column, kind: Kind, g: int, h: int) -> csr_matrix:
