@@ -18,7 +18,6 @@ from tyrecal.studies.diagnose.evidence import explain, grid, refit
 from tyrecal.studies.diagnose.expansion import anchored, expand
 from tyrecal.studies.diagnose.inverse_problem import Assumed, Toggle
 from tyrecal.studies.diagnose.model import Answer, Query, Span
-from tyrecal.studies.diagnose.next_measurement import rank
 from tyrecal.studies.diagnose.observations import Observable
 from tyrecal.studies.diagnose.regions import SectionPart
 from tyrecal.studies.diagnose.result import diagnosis_result
@@ -142,29 +141,6 @@ def test_a_toggle_that_parts_twins_comes_first_and_does() -> None:
     both = base.measured(np.concatenate([y, y - 0.7 * toy.g["e0"] + noise])).observations
     after = diagnose(toy, toy.rows, both, (Toggle("e0", 0.0),), base.assumed)
     assert after.verdict.kind == "named" and after.verdict.key == "e0" and after.rung == 4
-
-
-@pytest.mark.parametrize("size", [0.003, 0.012])
-def test_four_measurements_gain_what_half_the_scatter_does(size: float) -> None:
-    """The gain of measuring all again, by the formula that the module states, without its code;
-    of large effects what is beyond a distance of 40 gains nothing."""
-    toy = Toy(effects=2, size=size)
-    p = problem(toy, noise=0.01)
-    sizes = {id: {id: 1.0} for id in ("e0", "e1")}
-    likely = {"e0": 0.5, "e1": 0.3}
-
-    def apart(noise: float) -> float:
-        S = problem(toy, noise=noise).sigma
-        inverse = np.linalg.inv(S)
-        J = toy.J
-        fit = np.linalg.solve(J.T @ inverse @ J + np.diag(toy.spread**-2.0), J.T @ inverse)
-        off = toy.g["e0"] - toy.g["e1"]
-        return float(2 * 0.5 * 0.3 * min(off @ (inverse - inverse @ J @ fit) @ off, 40.0))
-
-    (again,) = [c for c in rank(p, np.zeros(3), likely, sizes, ()) if "all 4 times" in c.what]
-    assert again.hours == 6.0 and 0.1 < apart(0.01) < apart(0.005)
-    assert (apart(0.005) == 12.0) == (size > 0.01)
-    assert again.gain == pytest.approx((apart(0.005) - apart(0.01)) / 6.0, rel=1e-3)
 
 
 def test_an_anchor_is_exact_where_it_was_asked_and_absent_without_the_effect() -> None:

@@ -39,7 +39,7 @@ from tyrecal.studies.diagnose.gap import ResidualGroup, _chi2, _corrected, find_
 from tyrecal.studies.diagnose.inverse_problem import Assumed, Toggle
 from tyrecal.studies.diagnose.label_swap import _near
 from tyrecal.studies.diagnose.model import Answer, Query, Span
-from tyrecal.studies.diagnose.next_measurement import rank
+from tyrecal.studies.diagnose.next_measurement import CHECKED, Look, rank
 from tyrecal.studies.diagnose.observations import Observable, Observations
 from tyrecal.studies.diagnose.plain_fit import plain_fit
 from tyrecal.studies.diagnose.regions import SectionPart
@@ -558,8 +558,8 @@ def test_the_menu_of_measurements() -> None:
     mass where it is not known; a likely effect switched off, sources by themselves."""
     toy = Toy(effects=3, pressures=(200.0, 250.0))
     p = problem(toy)
-    sizes = {id: {id: 0.5} for id in toy.spans}
-    likely = {"none": 0.4, "e0": 0.3, "e1": 0.279, "e2": 0.021, "outside": 0.0}
+    sizes = {id: {id: np.array([0.4, 0.6])} for id in toy.spans}
+    likely = {"none": 0.4, "e0": 0.3, "e1": 0.294, "e2": 0.006, "outside": 0.0}
     toy.spans["e0"] = Span(0, 1, toggle="take e0 out")
     p = replace(p, spans=toy.spans)
     rows: list = []
@@ -574,22 +574,23 @@ def test_the_menu_of_measurements() -> None:
         answers = lambda points: [answer, *map(moved, points[1:])]
         return SimpleNamespace(answers=answers, sloped_at_0=())
 
-    found = rank(p, np.zeros(3), likely, sizes, ("rubber_density",), further)
+    found = rank(p, np.zeros(3), likely, sizes, ("rubber_density", "section gauge 1"), further)
     assert {c.what: c.hours for c in found} == {
         "measure by itself: rubber density": 1.0,
-        "measure all 4 times, dismounted in between": 6.0,
+        "cut the tyre and measure its section": 8.0,
+        "dismount the tyre, mount it again and measure all once more": 3.0,
         "take e0 out": 4.0,
         "measure again without e1": 4.0,
         "measure again without e2": 4.0,
         "measure the same modes at 320 kPa": 1.0,
         "measure [5,0] and [5,1], too": 1.0,
-        "weigh the tyre": 0.25,
+        "weigh the tyre": 0.1,
     }
     assert [c.gain for c in found] == sorted((c.gain for c in found), reverse=True)
     assert all(c.gain > -1e-9 for c in found)
-    few = rank(p, np.zeros(3), {**likely, "e1": 0.28, "e2": 0.02}, sizes, ())
+    few = rank(p, np.zeros(3), {**likely, "e1": 0.295, "e2": 0.005}, sizes, ())
     assert not any("e2" in c.what for c in few)
-    assert rank(p, np.zeros(3), {"e0": 0.99, "none": 0.01}, sizes, ()) == []
+    assert rank(p, np.zeros(3), {"e0": 0.995, "none": 0.005}, sizes, ()) == []
     assert rank(p, np.zeros(3), {"e0": 0.5, "strange": 0.5}, sizes, ()) == []
 
 
@@ -602,7 +603,7 @@ def test_what_further_rows_gain_from_an_effect_whose_slope_at_0_is_known() -> No
     toy.tilt["e1"], toy.splits["e1"] = np.zeros((len(toy.rows), 3)), np.zeros(len(toy.rows))
     p = problem(toy)
     likely = {"none": 0.4, "e0": 0.3, "e0+e1": 0.3}
-    sizes = {"e0": {"e0": 0.5}, "e0+e1": {"e0": 1.0, "e1": 0.5}}
+    sizes = {"e0": {"e0": np.array([0.5])}, "e0+e1": {"e0": np.array([1.0]), "e1": np.array([0.5])}}
     asked: list[Query] = []
 
     def ranked(model: Any) -> float:
@@ -630,29 +631,102 @@ def test_what_further_rows_gain_from_an_effect_whose_slope_at_0_is_known() -> No
     assert asked[0].slopes == ("e0",) and asked[0].constants
 
 
+def informed(p: Sequence[float], squared: Array) -> float:
+    """The bound of information on explanations of one size each, squares of distances apart."""
+    share = np.array(p) / sum(p)
+    return float(-share @ np.log(np.exp(-squared / 8) @ share))
+
+
 def test_the_gains_of_what_is_switched_and_checked_by_their_formula() -> None:
-    """A run more without e0, and a source of error at a quarter of its deviation."""
+    """A run more without e0, and a source of error at a quarter of its deviation: further data tell
+    what all of them tell less what the first did."""
     toy = Toy(effects=2, size=0.003, bend=0.0, pressures=(240.0,))
     toy.tilt = {id: 0 * tilt for id, tilt in toy.tilt.items()}
     p = problem(toy)
-    sizes, likely = {id: {id: 1.0} for id in ("e0", "e1")}, {"e0": 0.5, "e1": 0.3}
+    sizes, likely = {id: {id: np.ones(1)} for id in ("e0", "e1")}, {"e0": 0.5, "e1": 0.3}
     found = {c.what: c for c in rank(p, np.zeros(3), likely, sizes, toy.sources)}
 
     def apart(S: Array, J: Array, off: Array) -> float:
         whole = S + J @ np.diag(toy.spread**2) @ J.T
-        return float(2 * 0.5 * 0.3 * off @ np.linalg.inv(whole) @ off)
+        return float(off @ np.linalg.inv(whole) @ off)
+
+    def bound(squared: float) -> float:
+        return informed((0.5, 0.3), squared * (1 - np.eye(2)))
 
     off = toy.g["e0"] - toy.g["e1"]
     now = apart(p.sigma, toy.J, off)
-    reduced = 0.0625 * np.outer(toy.constants[:, 1], toy.constants[:, 1])
-    S = p.sigma - 15 * reduced
+    left = CHECKED**2 / (1 + CHECKED**2)  # of its variance
+    S = p.sigma - (1 - left) * np.outer(toy.constants[:, 1], toy.constants[:, 1])
     checked = found["measure by itself: gauge"]
-    assert checked.gain == pytest.approx(apart(S, toy.J, off) - now, rel=1e-6)
+    assert checked.gain == pytest.approx(bound(apart(S, toy.J, off) - now), rel=1e-6)
     both = problem(toy, changes=(Toggle("e0", 0.0),))
     twice = np.vstack([toy.J, toy.J])
-    moved = np.concatenate([off, -toy.g["e1"]])
-    switched = found["measure again without e0"]
-    assert switched.gain == pytest.approx((apart(both.sigma, twice, moved) - now) / 4, rel=1e-6)
+    for words, moved, hours in (
+        ("measure again without e0", -toy.g["e1"], 4.0),
+        ("dismount the tyre, mount it again and measure all once more", off, 3.0),
+    ):
+        squared = apart(both.sigma, twice, np.concatenate([off, moved])) - now
+        assert found[words].gain == pytest.approx(bound(squared) / hours, rel=1e-6)
+
+
+def test_information_is_none_of_what_is_known_and_at_most_what_is_open() -> None:
+    """Beside the whole integral of two explanations, a normal distribution each, it is a lower
+    bound; it grows with what is measured; and a reading that shows no effect tells nothing."""
+    open_ = -0.6 * np.log(0.6) - 0.4 * np.log(0.4)
+    y, before = np.linspace(-9, 29, 20001), 0.0
+    for off in (1e-6, 0.5, 1.0, 2.0, 4.0, 8.0, 20.0):
+        shifts = {"a": np.zeros((1, 2)), "b": np.array([[0.0, off]])}
+        one = Look(np.eye(2), np.zeros((2, 1)), shifts)
+        found = one.information(1, {"a": 0.6, "b": 0.4}, np.ones(1))
+        normal = lambda m: np.exp(-((y - m) ** 2) / 2) / np.sqrt(2 * np.pi)
+        both = 0.6 * normal(0) + 0.4 * normal(off)
+        left = lambda p, both=both: -p * np.log(np.maximum(p / both, 1e-300))
+        rest = np.trapezoid(left(0.6 * normal(0)) + left(0.4 * normal(off)), y)
+        assert before <= found <= open_ - rest + 1e-9
+        before = found
+    assert found == pytest.approx(open_, rel=1e-9)
+    known = Look(
+        np.array([[1.0, 1.0], [1.0, 1.0 + 1e-9]]),
+        np.zeros((2, 1)),
+        shifts | {"b": np.array([[20.0, 20.0]])},
+    )
+    assert abs(known.information(1, {"a": 0.6, "b": 0.4}, np.ones(1))) < 1e-9
+    wide = {"a": np.zeros((7, 2)), "b": np.linspace([0, 0], [0, 9.0], 7)}
+    spread = Look(np.eye(2), np.zeros((2, 1)), wide | {"a": wide["b"]})
+    assert abs(spread.information(1, {"a": 0.6, "b": 0.4}, np.ones(1))) < 1e-9  # alike in both
+
+
+def test_tools_of_a_laboratory_are_offered_for_what_they_show() -> None:
+    """The rim's width at an effect of the rim; a clamp without all that gives way; helium for air;
+    and the one that shows the likelier explanation first."""
+    toy = Toy(effects=5, pressures=(240.0,))
+    names = dict(
+        zip(
+            toy.g,
+            ("rim_width", "spindle_tilt", "wheel_free", "cavity_air", "belt_angle"),
+            strict=True,
+        )
+    )
+    for each in (toy.g, toy.tilt, toy.spans, toy.splits):
+        for old, new in names.items():
+            each[new] = each.pop(old)
+    p = problem(toy)
+    sizes = {id: {id: np.array([0.4, 0.5, 0.6])} for id in toy.spans}
+    likely = {"none": 0.4, "rim_width": 0.2, "spindle_tilt": 0.15, "wheel_free": 0.15}
+    found = rank(p, np.zeros(3), likely, sizes, ())
+    assert {c.what: c.hours for c in found} == {
+        "measure the rim between its flanges": 0.2,
+        "clamp the rim rigidly in place of the spindle and measure again": 3.0,
+        "dismount the tyre, mount it again and measure all once more": 3.0,
+    }
+    assert "rim" in found[0].what
+    air = rank(p, np.zeros(3), {"none": 0.5, "cavity_air": 0.3, "belt_angle": 0.2}, sizes, ())
+    assert {c.what: c.hours for c in air} == {
+        "cut the tyre and measure its section": 8.0,
+        "inflate with helium and measure again": 1.0,
+        "dismount the tyre, mount it again and measure all once more": 3.0,
+    }
+    assert all(c.gain > 0 for c in (*found, *air))
 
 
 def test_a_change_counts_from_what_the_case_has() -> None:
@@ -716,7 +790,8 @@ def test_the_gains_of_further_rows_by_their_formula() -> None:
     toy.tilt = {id: 0 * tilt for id, tilt in toy.tilt.items()}
     p = problem(toy)
     p = replace(p, observations=replace(p.observations, scatter=np.linspace(1e-3, 3e-3, 9)))
-    sizes, likely = {id: {id: 0.5} for id in ("e0", "e1")}, {"e0": 0.4, "e1": 0.3, "none": 0.2}
+    sizes = {id: {id: np.array([0.5])} for id in ("e0", "e1")}
+    likely = {"e0": 0.4, "e1": 0.3, "none": 0.2}
     random = generator("rows")
     eta, J, c = random.normal(size=50), random.normal(size=(50, 3)), random.normal(size=(50, 2))
     moved = {"e0": random.normal(0, 0.002, 50), "e1": random.normal(0, 0.002, 50)}
@@ -737,7 +812,7 @@ def test_the_gains_of_further_rows_by_their_formula() -> None:
     assert len(found) == 7  # repeats, two toggles, 160 and 320 kPa, harmonics, the mass
     assert found.keys() > {"measure the same modes at 160 kPa", "measure the same modes at 320 kPa"}
 
-    def apart(at: list[int], form: float) -> float:
+    def apart(at: list[int], form: float) -> Array:
         whole = np.vstack([toy.J, J[at]])
         constants = np.vstack([toy.constants, 0.003 * c[at]])
         noise = [*np.linspace(1e-3, 3e-3, 9), *(2e-3 if rows[i][0] else 0.005 for i in at)]
@@ -751,12 +826,11 @@ def test_the_gains_of_further_rows_by_their_formula() -> None:
         g = {id: 0.5 * np.append(toy.g[id], moved[id][at]) for id in moved}
         g["none"] = np.zeros(len(whole))
         off = lambda a, b: (g[a] - g[b]) @ np.linalg.inv(S) @ (g[a] - g[b])
-        pairs = (("e0", "e1"), ("e0", "none"), ("e1", "none"))
-        return float(sum(2 * likely[a] * likely[b] * off(a, b) for a, b in pairs))
+        return np.array([[off(a, b) for b in likely] for a in likely])
 
     now = apart([], 0.001)
     for what, hours, at, form in (
-        ("weigh the tyre", 0.25, [rows.index((None, 0.0))], 0.0),
+        ("weigh the tyre", 0.1, [rows.index((None, 0.0))], 0.0),
         (
             "measure [5,0] and [5,1], too",
             1.0,
@@ -770,17 +844,17 @@ def test_the_gains_of_further_rows_by_their_formula() -> None:
             0.001,
         ),
     ):
-        gain = (apart(at, form) - now) / hours
+        gain = informed(list(likely.values()), apart(at, form) - now) / hours
         assert found[what].gain == pytest.approx(gain, rel=1e-6), what
 
 
 def test_what_is_not_asked_twice_or_has_no_answer_is_not_offered() -> None:
     """Pressures nearer than 60 kPa to one measured; the mass where it is known; nothing where the
-    model fails; six explanations at most."""
-    toy = Toy(effects=8, pressures=(220.0, 260.0))
+    model fails; ten explanations at most."""
+    toy = Toy(effects=12, pressures=(220.0, 260.0))
     p = problem(toy)
-    sizes = {id: {id: 0.5} for id in toy.spans}
-    likely = {id: 0.1 + 0.001 * i for i, id in enumerate(sizes)}
+    sizes = {id: {id: np.array([0.5])} for id in toy.spans}
+    likely = {id: 0.07 + 0.001 * i for i, id in enumerate(sizes)}
     asked: list = []
 
     def further(wanted: list) -> Any:
@@ -788,10 +862,10 @@ def test_what_is_not_asked_twice_or_has_no_answer_is_not_offered() -> None:
         return SimpleNamespace(answers=lambda q: [ValueError("no")] * len(q), sloped_at_0=())
 
     words = [c.what for c in rank(p, np.zeros(3), likely, sizes, (), further)]
-    assert sorted(what for what in words if "again" in what) == [
-        f"measure again without e{i}" for i in range(2, 8)
+    assert sorted(what for what in words if "without" in what) == [
+        *(f"measure again without e{i}" for i in (10, 11, *range(2, 10)))
     ]
-    assert len(words) == 7  # and repeats
+    assert len(words) == 11  # and mounted again
     (rows,) = asked
     assert {pressure for _, pressure in rows} == {160.0, 320.0, 220.0, 260.0, 0.0}
     o = p.observations

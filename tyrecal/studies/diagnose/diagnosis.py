@@ -16,7 +16,7 @@ from .gap import Gap, find_gap, projection
 from .inverse_problem import Assumed, InverseProblem, Toggle, places
 from .label_swap import exchanged, with_exchanged
 from .model import ModelRow, Query, ResponseModel
-from .next_measurement import Choice, rank
+from .next_measurement import SIZES, Choice, rank
 from .observations import Observations
 from .plain_fit import plain_fit
 from .regions import SectionPart
@@ -152,7 +152,8 @@ def diagnose(
     named = verdict.best if verdict.key else None
     shrinkage = shrink(problem, named, seed) if problem.expansion.nodes else None
     stage(STAGES[3])
-    choices = rank(bare, d, p, means, model.sources, further)
+    typical = {h.key: h.typical(SIZES) for h in hypotheses if h.values}
+    choices = rank(bare, d, p, typical, model.sources, further)
     return Diagnosis(
         problem,
         bare,

@@ -107,6 +107,12 @@ class Hypothesis:
             found[key] = float(p[np.all(here, axis=0)].sum()) if here else float(p.sum())
         return found
 
+    def typical(self, count: int) -> dict[str, Array]:
+        """Equally probable parameters (count,)."""
+        below = np.cumsum(self.posterior)
+        at = np.searchsorted(below, below[-1] * (np.arange(count) + 0.5) / count)
+        return {id: e[at] for id, e in self.values.items()}
+
     def mean(self) -> dict[str, float]:
         """Mean parameters."""
         return {id: float(self.posterior @ e) for id, e in self.values.items()}

@@ -1,8 +1,16 @@
-"""The measurement worth making next: what each would add to telling the explanations apart.
+"""The measurement worth making next: what each is expected to tell of which explanation holds.
 
-Gain of a choice: the rise of sum over explanations i, j of p_i p_j min(delta_ij^2, 40) for an hour
-of work, where delta_ij^2 = |P^1/2 (g_i - g_j)|^2, "none" having g = 0. (A distance beyond 40 is as
-good as certain.)
+Gain of a choice: information for an hour of work. With the x of the fit integrated out, data that
+are there (1) and further ones (2) are jointly normal, in
+
+    S = Sigma + J Sx^2 J^T,   C = S_22 - S_21 S_11^-1 S_12,   u = C^-1/2 (g_2 - S_21 S_11^-1 g_1)
+
+where g is what an explanation of some size adds: further data are N(u, I), whatever the known ones
+are. Their information on the explanation is that on explanation and size, less that on the size of
+a known one, each by its lower bound of Kolchinsky and Tracey (Entropy 19 (2017) 361), exact for
+what is alike and for what is far apart:
+
+    I = -sum_a w_a ln (sum_b w_b exp(-|u_a - u_b|^2 / 8))
 """
 
 from __future__ import annotations
@@ -22,12 +30,49 @@ from .observations import Observable, Observations
 from .section_fields import SECTION
 
 Array = np.ndarray
-MAX_DISTANCE = 40.0
-MIN_PROBABILITY, MAX_EXPLANATIONS = 0.02, 6  # others do not count
-HOURS = dict(cut=8.0, toggle=4.0, check=1.0, repeat=2.0, pressure=1.0, harmonics=1.0, weigh=0.25)
+Sizes = Mapping[str, Array]  # equally probable parameters (q,) of an explanation's effects, by id
+MIN_PROBABILITY, MAX_EXPLANATIONS = 0.005, 10  # others do not count
+SIZES = 7  # of each explanation
+HOURS = dict(
+    weigh=0.1,
+    rim=0.2,
+    calliper=0.5,
+    pressure=1.0,
+    helium=1.0,
+    harmonics=1.0,
+    check=1.0,
+    mount=3.0,
+    clamp=3.0,
+    toggle=4.0,
+    cut=8.0,
+)
 """Of a laboratory, as an orientation."""
-CHECKED = 0.25  # what is left of a constant's standard deviation when it is measured by itself
-REPEATED = 4  # times, each after dismounting
+READ = {
+    "rim": ("measure the rim between its flanges", {"rim_width"}),
+    "calliper": ("check gauges and widths with a calliper", {"tread_wear", "sidewall_gauge"}),
+    "cut": (
+        "cut the tyre and measure its section",
+        {
+            "bead_filler",
+            "cap_ply",
+            "belt_angle",
+            "belt_width",
+            "carcass_fanning",
+            "carcass_turn_up",
+        },
+    ),
+}
+"""What shows the size of which effects itself."""
+HELD_BY = {  # effects that a rigid clamp is without
+    "spindle_lateral",
+    "spindle_radial",
+    "spindle_torsional",
+    "spindle_tilt",
+    "wheel_free",
+}
+CAVITY_GAS, HELIUM = "cavity_air", 0.14  # a seventh of the mass
+READING = 0.1  # of an effect's range, by which such a reading may be off
+CHECKED = 0.25  # of a constant's standard deviation, likewise
 OFFERED_kPa = (160.0, 200.0, 240.0, 280.0, 320.0)
 FAR_kPa = 60.0  # from every pressure measured so far, for a new one to be offered
 MASS_PERCENT = 0.5
@@ -39,43 +84,45 @@ class Choice:
 
     what: str
     hours: float  # an orientation
-    gain: float  # per hour
+    gain: float  # information in nats per hour
 
 
 @dataclass(frozen=True)
-class _Look:
-    """What a set of rows shows."""
+class Look:
+    """What a set of rows shows, those that are there first."""
 
     sigma: Array  # (n, n)
     jacobian: Array  # (n, v)
-    shifts: Mapping[str, Array]  # (n,) of each explanation
+    shifts: Mapping[str, Array]  # (q, n) of each explanation at its sizes
 
-    def apart(self, likely: Mapping[str, float], spread: Array) -> float:
-        """sum over i, j of p_i p_j min(delta_ij^2, 40)."""
-        inverse = np.linalg.inv(self.sigma)
-        J = self.jacobian
-        inner = np.linalg.solve(J.T @ inverse @ J + np.diag(spread**-2.0), J.T @ inverse)
-        P = inverse - inverse @ J @ inner
-        keys, total = list(likely), 0.0
-        for i, a in enumerate(keys):
-            for b in keys[:i]:
-                off = self.shifts[a] - self.shifts[b]
-                total += 2 * likely[a] * likely[b] * min(float(off @ P @ off), MAX_DISTANCE)
-        return total
+    def information(self, known: int, likely: Mapping[str, float], spread: Array) -> float:
+        """Of what comes after the ``known`` rows, in nats; spread (v,): of x."""
+        S = self.sigma + (self.jacobian * spread**2) @ self.jacobian.T
+        foretold = np.linalg.solve(S[:known, :known], S[:known, known:])
+        root = np.linalg.cholesky(S[known:, known:] - S[known:, :known] @ foretold)
+        g = np.vstack([self.shifts[key] for key in likely])
+        u = np.linalg.solve(root, (g[:, known:] - g[:, :known] @ foretold).T).T
+        count = [len(self.shifts[key]) for key in likely]
+        own = np.repeat(np.arange(len(count)), count)
+        p = np.array(list(likely.values())) / sum(likely.values())
+        w = (p / count)[own]
+        alike = np.exp(-((u[:, None] - u) ** 2).sum(2) / 8)
+        within = (alike * (own[:, None] == own)) @ w / p[own]
+        return float(w @ np.log(within / (alike @ w)))
 
 
 def rank(
     problem: InverseProblem,
     d: Array,
     probabilities: Mapping[str, float],
-    sizes: Mapping[str, Mapping[str, float]],
+    sizes: Mapping[str, Sizes],
     sources: Sequence[str],
     further: Callable[[list[ModelRow]], ResponseModel] | None = None,
 ) -> list[Choice]:
     """The menu by falling gain, at the plain fit x0 + d.
 
-    sizes: parameters by explanation and id; sources: names of the sources of error; further: a
-    model of other rows of the same tyre. Empty where one explanation stands alone.
+    sizes: by explanation; sources: names of the sources of error; further: a model of other rows
+    of the same tyre. Empty where one explanation stands alone.
     """
     likely = {
         key: p
@@ -85,62 +132,113 @@ def rank(
     likely = dict(sorted(likely.items(), key=lambda item: -item[1])[:MAX_EXPLANATIONS])
     if len(likely) < 2:
         return []
-    now = _look(problem, d, likely, sizes)
-    before = now.apart(likely, problem.spread)
-    menu: list[tuple[str, float, InverseProblem]] = []
-    of_section = {k: CHECKED for k, name in enumerate(sources) if name.startswith(SECTION)}
-    if of_section:
-        known = replace(problem, reduced={**problem.reduced, **of_section})
-        menu.append(("cut the tyre and measure its section", HOURS["cut"], known))
+    problem = replace(problem, zeta=0.0)
+    of = {key: sizes.get(key, {}) for key in likely}
+    now = look(problem, d, of)
+    offered: list[tuple[str, float, Look]] = []
+    of_section = [k for k, name in enumerate(sources) if name.startswith(SECTION)]
     for k, source in enumerate(sources):
-        if k in of_section:
-            continue
-        known = replace(problem, reduced={**problem.reduced, k: CHECKED})
-        menu.append((f"measure by itself: {source.replace('_', ' ')}", HOURS["check"], known))
-    o, factor = problem.observations, 1 / np.sqrt(REPEATED)
-    finer = replace(o, scatter=o.scatter * factor, common=o.common * factor)
-    words = f"measure all {REPEATED} times, dismounted in between"
-    repeated = replace(problem, observations=finer)
-    menu.append((words, HOURS["repeat"] * (REPEATED - 1), repeated))
-    for id in dict.fromkeys(id for key in likely if key != NONE for id in sizes[key]):
-        span = problem.spans.get(id)
-        words = (span.toggle if span else "") or f"measure again without {id}"
-        menu.append((words, HOURS["toggle"], _switched(problem, id)))
-    offered = [(words, hours, _look(other, d, likely, sizes)) for words, hours, other in menu]
+        if k not in of_section:
+            words = f"measure by itself: {source.replace('_', ' ')}"
+            offered.append((words, HOURS["check"], with_readings(problem, now, of, [], [k])))
+    ids = list(dict.fromkeys(id for each in of.values() for id in each))
+    for tool, (words, shown) in READ.items():
+        here, known = [id for id in ids if id in shown], of_section if tool == "cut" else []
+        if here or known:
+            offered.append((words, HOURS[tool], with_readings(problem, now, of, here, known)))
+    words = "dismount the tyre, mount it again and measure all once more"
+    offered.append((words, HOURS["mount"], again(problem, now, d, of)))
+    if clamped := [id for id in ids if id in HELD_BY]:
+        words = "clamp the rim rigidly in place of the spindle and measure again"
+        changes = [_absent(problem, id) for id in clamped]
+        offered.append((words, HOURS["clamp"], again(problem, now, d, of, changes)))
+    every = HELD_BY.union(*(shown for _, shown in READ.values()))
+    for id in (id for id in ids if id not in every):
+        change, tool = _absent(problem, id), "toggle"
+        toggle = problem.spans[id].toggle if id in problem.spans else ""
+        words = toggle or f"measure again without {id}"
+        if id == CAVITY_GAS:
+            words, tool = "inflate with helium and measure again", "helium"
+            change = replace(change, value=HELIUM, times=True)
+        offered.append((words, HOURS[tool], again(problem, now, d, of, [change])))
     if further:
-        offered += _more_rows(problem, now, likely, sizes, further)
+        offered += _more_rows(problem, now, d, of, further)
+    there = len(now.sigma)
     choices = [
-        Choice(what, hours, (look.apart(likely, problem.spread) - before) / hours)
-        for what, hours, look in offered
+        Choice(what, hours, after.information(there, likely, problem.spread) / hours)
+        for what, hours, after in offered
     ]
     return sorted(choices, key=lambda choice: -choice.gain)
 
 
-def _look(
+def _absent(problem: InverseProblem, id: str) -> Toggle:
+    return Toggle(id, 0.0, base=problem.spans[id].base if id in problem.spans else 0.0)
+
+
+def look(problem: InverseProblem, d: Array, sizes: Mapping[str, Sizes]) -> Look:
+    """At the rows that are there."""
+    shifts = {key: _shifts(problem, each, d) for key, each in sizes.items()}
+    return Look(problem.sigma, problem.plain(d)[1], shifts)
+
+
+def _shifts(problem: InverseProblem, sizes: Sizes, d: Array) -> Array:
+    """What an explanation adds (q, n) at x0 + d."""
+    added = problem.added(sizes, _count(sizes))
+    return np.asarray(added.shift + added.tilt @ d)
+
+
+def _count(sizes: Sizes) -> int:
+    return max((len(each) for each in sizes.values()), default=1)
+
+
+def with_readings(
     problem: InverseProblem,
+    now: Look,
+    sizes: Mapping[str, Sizes],
+    ids: Sequence[str],
+    sources: Sequence[int],
+) -> Look:
+    """With readings of effects' sizes, over their ranges, and of sources of error themselves."""
+    n, m = len(now.sigma), len(ids) + len(sources)
+    spans = [problem.spans[id] for id in ids]
+    far = [max(abs(span.low), abs(span.high)) for span in spans]
+    sigma = np.zeros((n + m, n + m))
+    sigma[:n, :n] = now.sigma
+    sigma[:n, n + len(ids) :] = problem.constants[:, list(sources)]
+    sigma[n + len(ids) :, :n] = sigma[:n, n + len(ids) :].T
+    own = [READING**2 + (span.stated / end) ** 2 for span, end in zip(spans, far, strict=True)]
+    sigma[range(n, n + m), range(n, n + m)] = own + [1 + CHECKED**2] * len(sources)
+    shifts = {}
+    for key, each in sizes.items():
+        more = np.zeros((_count(each), m))
+        for i, (id, end) in enumerate(zip(ids, far, strict=True)):
+            more[:, i] = each.get(id, 0.0) / end
+        shifts[key] = np.hstack([now.shifts[key], more])
+    return Look(sigma, np.vstack([now.jacobian, np.zeros((m, len(problem.centre)))]), shifts)
+
+
+def again(
+    problem: InverseProblem,
+    now: Look,
     d: Array,
-    likely: Mapping[str, float],
-    sizes: Mapping[str, Mapping[str, float]],
-) -> _Look:
-    shifts = {
-        key: problem.added({id: np.array([e]) for id, e in sizes.get(key, {}).items()}, 1)[0][0]
-        for key in likely
-    }
-    return _Look(problem.sigma, problem.plain(d)[1], shifts)
-
-
-def _switched(problem: InverseProblem, id: str) -> InverseProblem:
-    """The problem with one run more, in which the effect is absent."""
-    run = 1 + len(problem.changes)
-    first = np.array([row.run == 0 for row in problem.observations.rows])
-    o = problem.observations
-    join = lambda values: np.concatenate([values, values[first]])
+    sizes: Mapping[str, Sizes],
+    changes: Sequence[Toggle] = (),
+) -> Look:
+    """With one run more, in which something was switched."""
+    o, run = problem.observations, 1 + max(row.run for row in problem.observations.rows)
+    first = np.array([row.run == 0 for row in o.rows])
+    more = np.concatenate([np.arange(len(first)), np.flatnonzero(first)])
     rows = (*o.rows, *(replace(row, run=run) for row in o.only(first).rows))
-    numbers = (join(o.y), join(o.scatter), o.common, join(o.split), join(o.split_scatter))
-    both = Observations(rows, *numbers)
-    base = problem.spans[id].base if id in problem.spans else 0.0
-    changes = (*problem.changes, Toggle(id, 0.0, base=base))
-    return replace(problem, observations=both, places=join(problem.places), changes=changes)
+    both = replace(o.at(more), rows=rows)
+    shifts = {}
+    for key, each in sizes.items():
+        switched = dict(each)
+        for change in changes:
+            switched = change.applied(switched, _count(each))
+        later = _shifts(problem, switched, d)[:, first]
+        shifts[key] = np.hstack([now.shifts[key], later])
+    sigma = covariance(both, problem.constants[more], problem.assumed.form)
+    return Look(sigma, now.jacobian[more], shifts)
 
 
 def _along(nodes: Nodes, e: float, slope: Array) -> Array:
@@ -152,14 +250,21 @@ def _along(nodes: Nodes, e: float, slope: Array) -> Array:
     return np.nan_to_num(slope) * e * share
 
 
+def _grown(shifts: Array, mean: Array) -> Array:
+    """How much of the shift (n,) at the mean size there is at the others (q,)."""
+    whole = mean @ mean
+    return np.asarray(shifts @ mean / whole) if whole > 0 else np.ones(len(shifts))
+
+
 def _more_rows(
     problem: InverseProblem,
-    now: _Look,
-    likely: Mapping[str, float],
-    sizes: Mapping[str, Mapping[str, float]],
+    now: Look,
+    d: Array,
+    sizes: Mapping[str, Sizes],
     further: Callable[[list[ModelRow]], ResponseModel],
-) -> list[tuple[str, float, _Look]]:
-    """Other pressures, higher harmonics and the mass, as far as the model has an answer."""
+) -> list[tuple[str, float, Look]]:
+    """Other pressures, higher harmonics and the mass, as far as the model has an answer at the
+    explanations' mean sizes."""
     o = problem.observations
     labels = sorted({row.label for row in o.rows if row.label}, key=str)
     pressures = sorted({row.pressure_kPa for row in o.rows if row.label})
@@ -177,27 +282,28 @@ def _more_rows(
         offered.append(("weigh the tyre", HOURS["weigh"], [(None, 0.0)]))
     rows = list(dict.fromkeys(row for _, _, more in offered for row in more))
     model = further(rows)
-    x0 = problem.expansion.x0
-    effects = [sizes.get(key, {}) for key in likely]
-    lines = tuple({id: 0.0 for each in effects for id in each if id in model.sloped_at_0})
-    points = [Query(x0, constants=True, slopes=lines)]
-    points += [Query(x0, {id: e for id, e in each.items() if id not in lines}) for each in effects]
+    x = problem.expansion.x0 + d
+    means = [{id: float(e.mean()) for id, e in each.items()} for each in sizes.values()]
+    lines = tuple({id: 0.0 for each in means for id in each if id in model.sloped_at_0})
+    points = [Query(x, constants=True, slopes=lines)]
+    points += [Query(x, {id: e for id, e in each.items() if id not in lines}) for each in means]
     answers = model.answers(points)
     if not all(isinstance(answer, Answer) for answer in answers):
         return []
     plain, *others = [answer for answer in answers if isinstance(answer, Answer)]
     assert plain.constants is not None
-    added = {
-        key: sum(
+    added = {}
+    for (key, each), mean, other in zip(sizes.items(), means, others, strict=True):
+        here = sum(
             (
-                _along(problem.expansion.nodes[id], each[id], plain.slopes[id])
+                _along(problem.expansion.nodes[id], mean[id], plain.slopes[id])
                 for id in lines
-                if id in each
+                if id in mean
             ),
             other.eta - plain.eta,
         )
-        for key, each, other in zip(likely, effects, others, strict=True)
-    }
+        at_mean = _shifts(problem, {id: np.array([e]) for id, e in mean.items()}, d)[0]
+        added[key] = _grown(_shifts(problem, each, d), at_mean)[:, None] * here
     scatter = float(np.median(o.scatter))
     result = []
     for words, hours, more in offered:
@@ -214,8 +320,8 @@ def _more_rows(
             join(o.split_scatter, none),
         )
         constants = np.vstack([problem.constants, plain.constants[at]])
-        shifts = {key: np.concatenate([now.shifts[key], added[key][at]]) for key in likely}
+        shifts = {key: np.hstack([now.shifts[key], added[key][:, at]]) for key in sizes}
         jacobian = np.vstack([now.jacobian, plain.jacobian[at]])
         sigma = covariance(both, constants, problem.assumed.form)
-        result.append((words, hours, _Look(sigma, jacobian, shifts)))
+        result.append((words, hours, Look(sigma, jacobian, shifts)))
     return result
