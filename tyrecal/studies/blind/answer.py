@@ -23,6 +23,7 @@ from ...tyre.case import LoadedCase
 from ...tyre.load import load_case
 from ..diagnose.diagnosis import Diagnosis, diagnose
 from ..diagnose.evidence import NONE
+from ..diagnose.expansion import Expansion, expand
 from ..diagnose.inverse_problem import Assumed
 from ..diagnose.model import ModelRow, ResponseModel
 from ..diagnose.observations import Observable, Observations, observe
@@ -75,7 +76,8 @@ def answer(
     answers = folder / "answers"
     own_folder(answers)
     waiting = [t for t in trials if not (answers / f"{t.stem}.json").exists()]
-    work = partial(one_answer, model, list(rows), protocol)
+    known = expand(model, model.start)
+    work = partial(one_answer, model, list(rows), protocol, known)
     before = len(trials) - len(waiting)
     with process_pool(jobs) if jobs > 1 and len(waiting) > 1 else nullcontext() as pool:
         contents = (pool.map if pool else map)(work, waiting)
@@ -86,11 +88,12 @@ def answer(
 
 
 def one_answer(
-    model: ResponseModel, rows: list[ModelRow], protocol: Protocol, trial: Path
+    model: ResponseModel, rows: list[ModelRow], protocol: Protocol, known: Expansion, trial: Path
 ) -> dict[str, Any]:
-    """The diagnosis of one file of measurements, and what it predicts at the held-out pressure."""
+    """The diagnosis of one file of measurements, and what it predicts at the held-out pressure;
+    known: about the start, for all trials."""
     observations = observe(read_measurements(trial), split=protocol.split)
-    found = diagnose(model, rows, observations, assumed=Assumed(split=protocol.split))
+    found = diagnose(model, rows, observations, assumed=Assumed(split=protocol.split), known=known)
     told = diagnosis_result(found).content()
     told.pop("next_measurements"), told.pop("section_map")
     key = told["effect"] or told["likeliest"]

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...simulate.modes.label import Label
 from .evidence import NONE, Hypothesis, quantile
-from .expansion import Expansion, anchored, expand
+from .expansion import Expansion, anchored, carried, expand
 from .gap import Gap, find_gap, projection
 from .inverse_problem import Assumed, InverseProblem, Toggle, places
 from .label_swap import exchanged, with_exchanged
@@ -108,6 +108,7 @@ def diagnose(
     parts: Callable[[Array], Sequence[SectionPart]] | None = None,
     further: Callable[[list[ModelRow]], ResponseModel] | None = None,
     expansion: Expansion | None = None,
+    known: Expansion | None = None,
     seed: int = 0,
     stage: Callable[[str], None] = lambda stage: None,
 ) -> Diagnosis:
@@ -115,21 +116,26 @@ def diagnose(
 
     changes: what was switched in runs 1, 2, ...; parts: slopes by the section's parts at x;
     further: a model of other rows, for the next measurement; expansion: of an earlier call with
-    the same model, near whose x0 the fit lies; stage: hears of each of ``STAGES``. Raises the
-    model's failure where the plain tyre has no solution.
+    the same model, near whose x0 the fit lies; known: of the same model anywhere, from where
+    effects are carried to the fit and only the likeliest are asked there; stage: hears of each of
+    ``STAGES``. Raises the model's failure where the plain tyre has no solution.
     """
+
+    def fitted(observations: Observations) -> Expansion:
+        x0 = plain_fit(model, observations, where, assumed.form, known)
+        return carried(known, model, x0) if known else expand(model, x0, splits)
+
     where, splits = places(observations, rows), bool(np.isfinite(observations.split).any())
     stage(STAGES[0])
     if expansion is None:
-        expansion = expand(model, plain_fit(model, observations, where, assumed.form), splits)
+        expansion = fitted(observations)
     problem = InverseProblem(
         observations, expansion, model.spans, where, model.start, model.spread, changes, assumed
     )
     labels = exchanged(problem) if len(where) > len(model.start) else None
     if labels:
         observations = with_exchanged(observations, *labels)
-        expansion = expand(model, plain_fit(model, observations, where, assumed.form), splits)
-        problem = replace(problem, observations=observations, expansion=expansion)
+        problem = replace(problem, observations=observations, expansion=fitted(observations))
     hypotheses, bare = weigh(problem), problem
     stage(STAGES[1])
     for _ in range(MAX_ROUNDS if expansion.nodes else 0):

@@ -171,6 +171,36 @@ def expand(model: ResponseModel, x0: Array, splits: bool = True) -> Expansion:
     return replace(plain, nodes=nodes, failed=failed, coupling=first.coupling)
 
 
+def carried(known: Expansion, model: ResponseModel, x0: Array) -> Expansion:
+    """The expansion about another x0, where the plain tyre is asked: effects follow ``known``'s B,
+    and are off by a term of second order in x0; curvature and sources of error stay.
+
+    For many tyres of one case. Raises what the model answered where it has no solution at x0.
+    """
+    (first,) = model.answers([Query(x0, coupled=True)])
+    if isinstance(first, Exception):
+        raise first
+    step, nodes = x0 - known.x0, {}
+    for id, own in known.nodes.items():
+        steeper = derivatives(own.values) @ (own.tilt @ step)
+        nodes[id] = replace(
+            own,
+            shift=own.shift + own.tilt @ step,
+            slope=own.slope + steeper * own.sloped[:, None],
+            anchor=None,
+        )
+    return replace(
+        known,
+        x0=x0,
+        eta=first.eta,
+        jacobian=first.jacobian,
+        split=first.split,
+        nodes=nodes,
+        coupling=first.coupling,
+        joint={},
+    )
+
+
 def node_values(span: Span, sloped: Sequence[float] = ()) -> Array:
     """Where an effect is asked: parameters other than 0, rising; where its slopes are asked, too,
     of a one-sided range at the shares ``sloped``."""
@@ -298,6 +328,15 @@ def hermite(nodes: Array, sloped: Array, e: Array) -> tuple[Array, Array]:
             slopes[:, i] = values[:, i] * (e[:, 0] - here)
             values[:, i] -= slopes[:, i] * np.sum(times / (here - others))
     return values, slopes
+
+
+def derivatives(nodes: Array) -> Array:
+    """d l_j / d e (k, k) of Lagrange's polynomials l_j at the nodes (k,)."""
+    apart = nodes[:, None] - nodes + np.eye(len(nodes))
+    weights = np.prod(apart, axis=1)
+    found = weights[:, None] / weights / apart
+    np.fill_diagonal(found, 0.0)
+    return found - np.diag(found.sum(axis=1))
 
 
 def lagrange(nodes: Array, e: Array) -> Array:
