@@ -552,13 +552,13 @@ def test_a_load_starts_along_the_slope_of_the_last_one(
     """The first one by a micrometre per newton."""
     press = solid.press(LENGTHS, 1e10)
     started: list[tuple[Array, float]] = []
-    softly = ContactNewton._softly
+    settle = ContactNewton._settle
 
     def note(self: ContactNewton, parts: Array, height: float, *rest: Any) -> Any:
         started.append((parts, height))
-        return softly(self, parts, height, *rest)
+        return settle(self, parts, height, *rest)
 
-    monkeypatch.setattr(ContactNewton, "_softly", note)
+    monkeypatch.setattr(ContactNewton, "_settle", note)
     rest, free = press.parts, press.free_radius
     first = press.to(50.0)
     np.testing.assert_array_equal(started[0][0], rest)

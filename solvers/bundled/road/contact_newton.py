@@ -26,12 +26,13 @@ MAX_NEWTON = 40  # Newton iterations a load
 # GMRES iterations of a step, after which the preconditioner is formed anew
 MAX_GMRES_BEFORE_NEW_FACTOR = 15
 MAX_GMRES = 60
+NEAR_LOAD = 2.0  # of a load, up to which Coulomb's friction is tried at once
 SAME_FACTOR = 1.1  # of a load, up to which its preconditioner is worth keeping
 LINEAR_RTOL = 1e-2  # residual of the linear problem, relative
 SMOOTH_RTOL = 1e-5  # the same of derivatives, by which a fit descends
 UNIT_RTOL = 1e-4  # the same of the vertical stiffness, which is off by about its square
 MAX_UNIT_RESIDUAL = 1e-3  # of the same
-ROUGH_LINEAR_RTOL = 0.1  # residual of the linear problem as long as the contact changes much
+ROUGH_LINEAR_RTOL = 0.3  # residual of the linear problem as long as the contact changes much
 MAX_LINEAR_RESIDUAL = 0.5  # more is left only of a tangent that is far from a stable one
 MAX_SETBACKS = 2  # steps that may fail to halve the residual, with Coulomb's friction
 COULOMB_RTOL = 1e-2  # residual over the load, before Coulomb's friction is tried
@@ -176,7 +177,8 @@ class ContactNewton:
             height += (load - self.load) * self._slope[1]
         else:
             height -= FIRST_COMPLIANCE * load
-        found = self._by_coulomb(parts, height, load) if self._slope else None
+        near = load <= NEAR_LOAD * self.load
+        found = self._by_coulomb(parts, height, load) if near else None
         bound, reached = self._bound, FRICTION_BOUND_RTOL
         for _ in range(MAX_NEWTON):
             if found:
