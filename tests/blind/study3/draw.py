@@ -24,13 +24,15 @@ SEAT_m, GAUGE_kPa, ROOM_K = 0.4e-3, 0.5, 1.0  # of a mounting: beads apart, pres
 
 @dataclass(frozen=True)
 class Drawn:
-    """truth: with kind "several" where effects are more than one, its law their ids joined by +;
-    effects: sizes by id, of a family outside the catalogue too; mounting: seed; again: whether the
-    same tyre is another trial as well."""
+    """kind: of `EFFECTS_OF`; truth: with kind "several" where effects are more than one, its law
+    their ids joined by +; effects: sizes by id, of a family outside the catalogue too; mounting,
+    redraw: seeds; again: the trial that measured the same tyre first."""
 
+    kind: str
     truth: Truth
     effects: dict[str, float]
     mounting: int
+    redraw: int
     again: str = ""
 
 
@@ -47,32 +49,50 @@ def drawn(
     """All trials by the order of their ids. counts: by kind (`EFFECTS_OF`), and "again": tyres of
     one effect that are mounted and measured once more."""
     random = np.random.default_rng(seed)
-    effects, outside = known_laws(group)
-    known_sources, found = sources(with_exact_section(case))[0], []
     kinds = [kind for kind in EFFECTS_OF for _ in range(counts.get(kind, 0))]
-    for kind in kinds:
-        rules = replace(protocol, counts={"none": 1})
-        (truth,) = draw(rules, case, known_sources, {}, {}, int(random.integers(2**63)))
-        known = outside if kind == "outside" else effects
-        number = 1 if kind == "outside" else EFFECTS_OF[kind]
-        names, clamped = sorted(known), len(set(CLAMP) & set(known))
-        share = CLAMPED if clamped else 0.0
-        chances = [
-            share / clamped if id in CLAMP else (1 - share) / (len(names) - clamped) for id in names
-        ]
-        ids = sorted(random.choice(names, number, replace=False, p=chances).tolist())
-        sizes = {id: known[id].drawn(random, protocol.smallest) for id in ids}
-        said = {"one": "effect", "two": "several", "three": "several"}.get(kind, kind)
-        size = next(iter(sizes.values()), 0.0)
-        truth = replace(truth, kind=said, law="+".join(ids), size=size)
-        found.append(Drawn(truth, sizes, int(random.integers(2**63))))
-    ones = [each for each in found if each.truth.kind == "effect"]
+    found = [one_drawn(protocol, case, group, kind, random) for kind in kinds]
+    ones = [each for each in found if each.kind == "one"]
     for each in ones[: counts.get("again", 0)]:
         other = replace(
             each.truth, id=random.bytes(6).hex(), scatter=int(random.integers(2**63)), swapped=False
         )
-        found.append(Drawn(other, each.effects, int(random.integers(2**63)), again=each.truth.id))
+        again = replace(each, truth=other, mounting=int(random.integers(2**63)))
+        found.append(replace(again, again=each.truth.id))
     return sorted(found, key=lambda each: each.truth.id)
+
+
+def one_drawn(
+    protocol: Protocol, case: LoadedCase, group: Group, kind: str, random: np.random.Generator
+) -> Drawn:
+    """A trial of a kind."""
+    rules, known_sources = replace(protocol, counts={"none": 1}), sources(with_exact_section(case))
+    (truth,) = draw(rules, case, known_sources[0], {}, {}, int(random.integers(2**63)))
+    effects, outside = known_laws(group)
+    known = outside if kind == "outside" else effects
+    number = 1 if kind == "outside" else EFFECTS_OF[kind]
+    names, clamped = sorted(known), len(set(CLAMP) & set(known))
+    share = CLAMPED if clamped else 0.0
+    chances = [
+        share / clamped if id in CLAMP else (1 - share) / (len(names) - clamped) for id in names
+    ]
+    ids = sorted(random.choice(names, number, replace=False, p=chances).tolist())
+    sizes = {id: known[id].drawn(random, protocol.smallest) for id in ids}
+    said = {"one": "effect", "two": "several", "three": "several"}.get(kind, kind)
+    size = next(iter(sizes.values()), 0.0)
+    truth = replace(truth, kind=said, law="+".join(ids), size=size)
+    return Drawn(kind, truth, sizes, *(int(random.integers(2**63)) for _ in range(2)))
+
+
+def drawn_anew(
+    each: Drawn, protocol: Protocol, case: LoadedCase, group: Group, tries: int
+) -> Drawn:
+    """Another tyre of its kind for a trial whose tyre has no solution, the same for whoever is
+    measured again; tries: how many had none."""
+    random = np.random.default_rng([each.redraw, tries])
+    other = one_drawn(protocol, case, group, each.kind, random)
+    own = each.truth
+    truth = replace(other.truth, id=own.id, scatter=own.scatter, swapped=own.swapped)
+    return replace(each, truth=truth, effects=other.effects)
 
 
 def made(each: Drawn, case: LoadedCase, group: Group, without: tuple[str, ...] = ()) -> Tyre:

@@ -11,15 +11,12 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from tyrecal.errors import InputError
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator
 from tyrecal.simulate.evaluate.failure import EvaluationFailed
 from tyrecal.simulate.evaluate.pool import process_pool
 from tyrecal.studies.blind.answer import rows_of, tyre_model
-from tyrecal.studies.blind.draw import draw
 from tyrecal.studies.blind.make import (
     MAX_TRIES,
     Trial,
@@ -34,15 +31,16 @@ from tyrecal.studies.blind.maker import Computed
 from tyrecal.studies.blind.protocol import Protocol, read_json, write_json, write_protocol
 from tyrecal.studies.blind.ruler import measure, write_ruler
 from tyrecal.studies.blind.seal import SEAL, seal
-from tyrecal.studies.diagnose.uncertainties import sources
 from tyrecal.tyre.case import LoadedCase
 
-from .cases import LABELS, Group, with_exact_section, written
-from .draw import Drawn, drawn, made
+from .cases import LABELS, Group, written
+from .draw import Drawn, drawn, drawn_anew, made
 from .maker import ABOUT, Fenics, computed
 
 FENICS = Fenics()  # of this process
 Members = dict[str, dict[float, Computed]]
+Made = tuple[Trial, dict[str, float], Members]
+"""A trial, its effects' sizes, and the same tyre without each of several in turn."""
 
 
 def make(
@@ -81,10 +79,16 @@ def make(
     FENICS.close()
     copy_case(case, folder)
     write_protocol(folder, protocol)
-    write_trials(folder, protocol, [trial for trial, _ in found])
+    write_trials(folder, protocol, [trial for trial, *_ in found])
     truth = [
-        {**sealed_trial(trial, protocol), **about(each), "members": shifts(trial, members)}
-        for each, (trial, members) in zip(every, found, strict=True)
+        {
+            **sealed_trial(trial, protocol),
+            "effects": effects,
+            "mounting": each.mounting,
+            "again": each.again,
+            "members": shifts(trial, members),
+        }
+        for each, (trial, effects, members) in zip(every, found, strict=True)
     ]
     return seal(folder, sealed, {"seed": seed, "group": asdict(group), "trials": truth})
 
@@ -95,37 +99,28 @@ def measured(case: LoadedCase, protocol: Protocol) -> Mapping[str, Any]:
     return measure(model, rows_of(case, protocol))
 
 
-def about(each: Drawn) -> dict[str, Any]:
-    """What a truth of several effects holds besides."""
-    return {"effects": each.effects, "mounting": each.mounting, "again": each.again}
-
-
-def one(
-    sealed: Path, protocol: Protocol, case: LoadedCase, group: Group, each: Drawn
-) -> tuple[Trial, Members]:
-    """A trial as it was made before it was stopped, or made now, and the same tyre without each of
-    its effects in turn where it has several."""
+def one(sealed: Path, protocol: Protocol, case: LoadedCase, group: Group, each: Drawn) -> Made:
+    """A trial as it was made before it was stopped, or made now."""
     asked = json.dumps([asdict(each), asdict(group), protocol.maker], sort_keys=True)
     path = sealed / "made" / f"{sha256(asked.encode()).hexdigest()[:16]}.json"
     if not path.exists():
         path.parent.mkdir(exist_ok=True)
-        trial, members = _made(protocol, case, group, each)
+        trial, effects, members = _made(protocol, case, group, each)
         others = {
             id: plain_trial(replace(trial, without=c))["without"] for id, c in members.items()
         }
-        write_json(path, {"trial": plain_trial(trial), "members": others})
+        write_json(path, {"trial": plain_trial(trial), "effects": effects, "members": others})
     content = read_json(path)
     trial = read_trial(dict(content["trial"]), LABELS)
     members = {
         id: read_trial({**content["trial"], "without": table}, LABELS).without
         for id, table in content["members"].items()
     }
-    return trial, members
+    return trial, content["effects"], members
 
 
-def _made(protocol: Protocol, case: LoadedCase, group: Group, each: Drawn) -> tuple[Trial, Members]:
+def _made(protocol: Protocol, case: LoadedCase, group: Group, each: Drawn) -> Made:
     """Its tyre drawn again where it has no solution."""
-    random = np.random.default_rng(each.truth.scatter + 1)
     pressures = list(protocol.pressures_kPa)
     run = lambda *without: computed(
         FENICS, made(each, case, group, without), pressures, LABELS, near=bool(without)
@@ -135,14 +130,12 @@ def _made(protocol: Protocol, case: LoadedCase, group: Group, each: Drawn) -> tu
             whole = run()
             ids = sorted(each.effects)
             members = {id: run(id) for id in ids} if len(ids) > 1 else {}
-            return Trial(each.truth, tries, whole, run(*ids) if ids else whole), members
+            trial = Trial(each.truth, tries, whole, run(*ids) if ids else whole)
+            return trial, each.effects, members
         except (EvaluationFailed, ValueError) as failure:
             last = failure
-        rules, found = replace(protocol, counts={"none": 1}), sources(with_exact_section(case))[0]
-        (other,) = draw(rules, case, found, {}, {}, int(random.integers(2**63)))
-        truth = replace(each.truth, variables=other.variables, constants=other.constants)
-        each = replace(each, truth=truth)
-    raise InputError(f"no tyre with {each.truth.law or 'these constants'} has a solution: {last}")
+        each = drawn_anew(each, protocol, case, group, tries)
+    raise InputError(f"no tyre of kind {each.kind} has a solution: {last}")
 
 
 def shifts(trial: Trial, members: Members) -> dict[str, Any]:

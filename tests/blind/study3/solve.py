@@ -20,7 +20,7 @@ A wheel on springs moves what is held as a rigid body: rows and columns of K by 
 gas does no work on a rim that moves, as its surface keeps its shape and ends at the tyre's.
 
 Forms are compiled and set up once for a mesh's connectivity; coordinates and constants change in
-place. SI units.
+place. What PETSc allocates is destroyed by name: left to Python, it stays. SI units.
 """
 
 from __future__ import annotations
@@ -194,7 +194,7 @@ class Tyre:
         free, taken, self.vibrates.value = self.free[0], 0, 0.0
         solver = PETSc.KSP().create(MPI.COMM_SELF)
         by_factors(solver)
-        left = lambda: petsc.assemble_vector(self.force).array[free]
+        left = lambda: assembled(self.force)[free]
         for share in helps:
             self.help.value = share * self.pressure.value
             residual, first = left(), 0.0
@@ -209,6 +209,8 @@ class Tyre:
                 b.array[:] = residual
                 solver.solve(b, x)
                 step = np.array(x.array)
+                for each in (matrix, b, x):
+                    each.destroy()
                 self.state.x.array[free] -= step
                 residual, taken = left(), taken + 1
                 while not np.linalg.norm(residual) < RISE * first:  # too far: an element is folded
@@ -218,16 +220,18 @@ class Tyre:
                     self.state.x.array[free] += step
                     residual = left()
             else:
+                solver.destroy()
                 raise RuntimeError(
                     f"no equilibrium: of {first:g} N {size:g} are left, with {share:g} of help"
                 )
+        solver.destroy()
         return taken
 
     def motions(self, n: int) -> dict[str, tuple[Array, Array, float]]:
         """Of a wheel, by direction: a and b of what it holds, and the work on u2 of a turn by 1,
         N m per radian."""
         R, z = self.W.tabulate_dof_coordinates()[self.held, :2].T
-        force = petsc.assemble_vector(self.force).array.reshape(-1, 3)[self.held]
+        force = assembled(self.force).reshape(-1, 3)[self.held]
         one, none = np.ones_like(R), np.zeros_like(R)
 
         def whole(*components: Array) -> Array:
@@ -331,7 +335,16 @@ def sparse(form: Any) -> csr_matrix:
     matrix = petsc.assemble_matrix(form)
     matrix.assemble()
     indices, columns, values = matrix.getValuesCSR()
-    return csr_matrix((values, columns, indices), matrix.size)
+    found = csr_matrix((values, columns, indices), matrix.size)
+    matrix.destroy()
+    return found
+
+
+def assembled(form: Any) -> Array:
+    vector = petsc.assemble_vector(form)
+    values = np.array(vector.array)
+    vector.destroy()
+    return values
 
 
 def with_motions(
@@ -365,6 +378,8 @@ def lowest(K: csr_matrix, M: csr_matrix, count: int) -> tuple[Array, Array]:
     start = np.random.default_rng(1).normal(size=K.shape[0])
     inverse = LinearOperator(K.shape, matvec=solved, dtype=float)
     values, vectors = eigsh(K, count, M, sigma=0.0, OPinv=inverse, v0=start, tol=1e-8, ncv=10)
+    for each in (solver, matrix, b, x):
+        each.destroy()
     order = np.argsort(values)
     return values[order], vectors[:, order]
 
