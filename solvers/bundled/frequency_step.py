@@ -172,7 +172,7 @@ class FrequencyStep:
             rim_and_air = RimAndAir(wheel, air, rim, flow)
         acting = loads(moving, step)
         forms = eigenvalue_rates(moving, U, V, acting, fields, eigenvalues, rim_and_air)
-        attached = seeded.attached()
+        attached = read_point_elements(revolve, moving.mesh)
         tyre = SeededTyre(moving, spin(self.model, step), attached)
         each = np.split(forms, np.cumsum([len(m.eigenvalues) for m in modes])[:-1])
         mass = (total_mass(moving) + attached.total_kg).imag / COMPLEX_STEP

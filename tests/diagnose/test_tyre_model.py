@@ -425,14 +425,13 @@ def test_coordinates_of_a_linear_and_a_logarithmic_variable() -> None:
     assert own._slope("C10", there) == 8e5 and own._slope("A_belt", there) == there["A_belt"]
     with_more = own.design(Query(own.start, {"frequency_stiffening": 0.3}))
     assert with_more["effects.frequency_stiffening"] == 0.3
-    shares = np.array([0.2, 0.3, 0.1])
-    own._mass = own.start, shares, np.zeros(0)
-    x, step = own.start + np.array([0.1, -0.2, 0.3]), 1e-6 * np.eye(3)
-    mass = lambda x: np.log(1 + shares @ own._rise(own.start, x))
-    wanted = [(mass(x + d) - mass(x - d)) / 2e-6 for d in step]
-    assert own._mass_slopes(x)[0] == pytest.approx(wanted, rel=1e-6)
-    rise = own._rise(own.start, own.start + 0.1)
-    assert rise == pytest.approx([np.expm1(0.1), np.expm1(0.1), 0.1])
+
+
+def test_a_solver_that_gives_no_slopes_of_the_mass_is_refused_where_that_was_measured() -> None:
+    silent = SimpleNamespace(mass_kg=10.0, gradients={"C10": np.ones(1)}, mass_gradients={})
+    own = TyreModel(CASE, Evaluator(TyreDesign(CASE)), [(None, 0.0)], [], {})
+    with pytest.raises(DeckRefused, match="gives no slopes of the mass, which was measured"):
+        own._mass_slopes(own.start, [SimpleNamespace(evaluation=silent)])  # type: ignore[list-item]
 
 
 def test_what_is_not_even_near_the_model_is_refused() -> None:

@@ -111,7 +111,7 @@ def _gauged(case: Case, section: Section) -> Section:
     )
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=32)  # of a tyre with as many fields of its section, each to either side
 def _mesh(
     section: Section,
     elements: tuple[int, ...],

@@ -211,13 +211,14 @@ def seed(keywords: list[Keyword], tangents: list[tuple[int, int, float]]) -> lis
         first = keyword.lines[0][0] if keyword.lines else 0
         last = keyword.lines[-1][0] if keyword.lines else -1
         inside = [line for line in by_line if first <= line <= last]
-        numbers = {line for line, _ in keyword.lines} if inside else set()
-        own = {line: by_line.pop(line) for line in inside if line in numbers}
+        texts = dict(keyword.lines) if inside else {}
+        own = {line: by_line.pop(line) for line in inside if line in texts}
         copy = Keyword(keyword.name, keyword.line, keyword.parameters, keyword.lines, own)
-        for row in copy.rows if own else ():
-            if any(index >= len(row.fields) for index in row.tangents):
+        for line, fields in own.items():
+            if max(fields) > texts[line].count(","):
                 raise DeckError(
-                    row.line, "a sensitivity is asked for, but the line has no such field"
+                    LineNumber(line, keyword.line.job),
+                    "a sensitivity is asked for, but the line has no such field",
                 )
         result.append(copy if own else keyword)
     if by_line:

@@ -19,9 +19,17 @@ def half_mesh(mesh: DeckMesh) -> DeckMesh | None:
     """The same nodes with half of the elements, and those of the sets and surfaces that are their
     own mirror images; remembered with the mesh. None: a node has no mirror image."""
     if ("half",) not in mesh.derived:
-        mesh.derived["half",] = _half(mesh)
+        mesh.derived["half",] = _half_like(mesh, mesh.like) if mesh.like else _half(mesh)
     known: DeckMesh | None = mesh.derived["half",]
     return known
+
+
+def _half_like(mesh: DeckMesh, like: DeckMesh) -> DeckMesh | None:
+    """That of a mesh whose nodes' tangents alone are others."""
+    if (half := half_mesh(like)) is None:
+        return None
+    assert isinstance(half.symmetry, MirrorHalf)
+    return replace(half, X=half.symmetry.alike(mesh.X), derived={})
 
 
 def _half(mesh: DeckMesh) -> DeckMesh | None:

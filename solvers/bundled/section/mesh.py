@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import Inverted
-from ..deck.keywords import DeckError, Keyword
+from ..deck.keywords import COMPLEX_STEP, DeckError, Keyword
 from . import elements
 from .embedding import Embedded, Guest, embedding
 from .shapes import TYPES
@@ -34,6 +34,7 @@ class DeckMesh:
     embedded: dict[str, Embedded] = field(default_factory=dict)  # of lines in other elements
     guests: list[Guest] = field(default_factory=list)  # their nodes that are no rubber's
     symmetry: Whole = field(default_factory=Whole)  # what the elements stand for
+    like: DeckMesh | None = None  # the same without the tangents of X
     # what was made of the mesh, by its kind and what it depends on
     derived: dict[tuple[object, ...], Any] = field(default_factory=dict)
 
@@ -80,7 +81,8 @@ _TOPOLOGY = {"NODE", "ELEMENT", "NSET", "ELSET", "SURFACE", "RIGID BODY", "EMBED
 def read_mesh(keywords: list[Keyword]) -> DeckMesh:
     """The mesh of a section job, remembered while its blocks stay the same. Raises DeckError."""
     topology = [k for k in keywords if k.name in _TOPOLOGY]
-    if any(k.tangents for k in topology):
+    seeded = [k for k in topology if k.tangents]
+    if any(k.name != "NODE" for k in seeded):
         return _mesh(topology)
     key = tuple(k.identity for k in topology)
     known = _MESHES.get(key)
@@ -88,7 +90,26 @@ def read_mesh(keywords: list[Keyword]) -> DeckMesh:
     _MESHES.move_to_end(key)
     while len(_MESHES) > 8:
         _MESHES.popitem(last=False)
-    return mesh
+    if seeded and mesh.embedded:  # whose hosts' nodes move the places of others
+        return _mesh(topology)
+    return _with_tangents(mesh, seeded) if seeded else mesh
+
+
+def _with_tangents(mesh: DeckMesh, seeded: list[Keyword]) -> DeckMesh:
+    """The mesh with the tangents of its nodes' coordinates: the same elements and sets."""
+    moved = [
+        (mesh.index[int(text.partition(",")[0])], place - 1, tangent)
+        for k in seeded
+        for line, text in k.lines
+        for place, tangent in k.tangents.get(line, {}).items()
+        if place in (1, 2)  # R and Z
+    ]
+    rate = np.zeros_like(mesh.X)
+    if moved:
+        nodes, components, tangents = zip(*moved, strict=True)
+        rate[list(nodes), list(components)] = tangents
+    X = mesh.X + 1j * COMPLEX_STEP * rate
+    return replace(mesh, X=X, like=mesh, derived={})
 
 
 def _mesh(keywords: list[Keyword]) -> DeckMesh:

@@ -176,7 +176,7 @@ def _surface(
     ]
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=32)
 def _tables(
     mesh: SectionMesh,
     lines: tuple[str, ...],

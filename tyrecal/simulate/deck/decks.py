@@ -169,10 +169,11 @@ def _slopes(file: str, above: str, below: str, width: float) -> list[tuple[int, 
     first, second = above.splitlines(), below.splitlines()
     if len(first) != len(second):
         raise TemplateFailed(f"{file}: its number of lines depends on a variable: no derivative")
-    rows = []
-    for line in [i for i, (a, b) in enumerate(zip(first, second, strict=True), 1) if a != b]:
-        one, other = first[line - 1], second[line - 1]
-        if one.startswith("**") or _keyword_over(first, line) == "*HEADING":
+    rows, keyword = [], ""  # that the line stands under, or is
+    for line, (one, other) in enumerate(zip(first, second, strict=True), 1):
+        if one.startswith("*") and not one.startswith("**"):
+            keyword = one.split(",")[0].upper()
+        if one == other or one.startswith("**") or keyword == "*HEADING":
             continue
         try:
             if one.startswith("*"):
@@ -189,12 +190,6 @@ def _slopes(file: str, above: str, below: str, width: float) -> list[tuple[int, 
                 " of a data line: it has no exact derivative"
             ) from None
     return rows
-
-
-def _keyword_over(lines: list[str], line: int) -> str:
-    """The keyword that a 1-based line stands under, or is."""
-    words = (text.split(",")[0].upper() for text in reversed(lines[:line]))
-    return next((word for word in words if word.startswith("*") and not word.startswith("**")), "")
 
 
 def header(case: LoadedCase) -> str:

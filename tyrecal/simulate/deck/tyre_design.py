@@ -240,7 +240,7 @@ def _mesh_block(env: Any, mesh: dict[str, Any]) -> str:
     """The mesh's text, which stays the same from one evaluation of a fit to the next."""
     key = id(env), id(mesh)
     if key not in _BLOCKS or env.auto_reload:
-        if len(_BLOCKS) >= 8:
+        if len(_BLOCKS) >= 32:
             _BLOCKS.clear()
         text = render(env, "mesh.inp.j2", {"mesh": mesh}).rstrip("\n")
         _BLOCKS[key] = env, mesh, text  # holding both keeps their ids from being reused

@@ -21,7 +21,6 @@ from .model import ModelRow, state_of
 
 Array = np.ndarray
 TREAD = "tread"
-MASS_STEP = 0.02  # of a logarithm: the mass is linear in areas and densities
 
 
 @dataclass(frozen=True)
@@ -76,20 +75,14 @@ def regions(model: Parted, x: Array) -> list[SectionPart]:
         if not isinstance(each, Found):
             raise each
         at[state] = each
-    shares = dict.fromkeys(parts, 0.0)
-    if any(label is None for label, _ in model.rows):
-        heavier = [{**asked[0][0], p: (1 + MASS_STEP) * design[p]} for p in density.values()]
-        plain = at[model.states[0]].evaluation.mass_kg
-        for material, each in zip(parts, problem.modes_of([(d, ()) for d in heavier]), strict=True):
-            if not isinstance(each, Found):
-                raise each
-            shares[material] = (each.evaluation.mass_kg / plain - 1) / MASS_STEP
+    weighed = at[model.states[0]].evaluation
     result = []
     for material, name in parts.items():
         columns = np.zeros((2, len(model.rows)))
         for i, (label, where) in enumerate(model.rows):
             if label is None:
-                columns[1, i] = shares[material]
+                path = density[material]
+                columns[1, i] = weighed.mass_gradients[path] * design[path] / weighed.mass_kg
                 continue
             answer = at[state_of(where)]
             mode, gradients = answer.wanted[label], answer.evaluation.gradients

@@ -29,7 +29,8 @@ from .regions import split_by_region
 
 Array = np.ndarray
 SECTION = "section "  # with which their names begin
-FIELD_KINDS = ("meridian", "gauge", "stiffness", "density")
+OF_COMPOUNDS = ("stiffness", "density")
+FIELD_KINDS = ("meridian", "gauge", *OF_COMPOUNDS)
 SECTION_SIZES = {  # standard deviations, by judgement: m along the normal, the others relative
     "exact": (0.0, 0.0, 0.0, 0.0),  # that of the model which made the data
     "measured": (0.3e-3, 0.02, 0.03, 0.01),  # a cut tyre and a scale
@@ -49,6 +50,11 @@ class SectionField:
 
     kind: str
     values: Array  # (stations,) m outwards, or relative; of compounds (parts,)
+
+    @property
+    def moves(self) -> bool:
+        """Whether it moves points of the section."""
+        return self.kind not in OF_COMPOUNDS
 
 
 def known_from(case: LoadedCase) -> SectionOrigin:
@@ -152,7 +158,7 @@ def with_fields(case: LoadedCase, amounts: Mapping[str, float]) -> LoadedCase:
         return case
     split, _ = split_by_region(case)
     names = list(rubber_parts(case))
-    off = {kind: np.zeros(len(names)) for kind in ("stiffness", "density")}
+    off = {kind: np.zeros(len(names)) for kind in OF_COMPOUNDS}
     made = split
     for name, field in known.items():
         if field.kind in off:

@@ -11,7 +11,6 @@ from math import exp, log, sqrt
 import numpy as np
 
 from ...simulate.deck.decks import Decks
-from ...simulate.deck.tyre_design import TyreDesign
 from ...simulate.evaluate.evaluator import Evaluator
 from ...simulate.evaluate.failure import DeckRefused, EvaluationFailed
 from ...simulate.modes.find import Found, ModesAnswer
@@ -25,14 +24,13 @@ from ...tyre.values import with_values
 from ..fit import problem as fit
 from .expansion import ONE_SIDED_SLOPED, node_values
 from .model import Answer, Coupling, ModelRow, Query, Span, state_of
-from .regions import MASS_STEP, regions
-from .section_fields import moved
+from .regions import regions
+from .section_design import SectionDesign
+from .section_fields import OF_COMPOUNDS
 from .uncertainties import EFFECT_PATH, Source, unit_of, values_of
 from .veering import coupling, partner
 
 Array = np.ndarray
-FIELD_STEP = 0.05  # standard deviations, for the slope
-
 MANY_NUMBERS = 100  # of a deck: nodes are among them
 WORTH_A_POOL = 10  # evaluations, for processes to be started
 
@@ -77,7 +75,8 @@ class TyreModel:
         labels = sorted({label for label, _ in rows if label}, key=str)
         case = asked_for(case, labels)
         self.case = case
-        self.evaluator = evaluator = evaluator.of(TyreDesign(case))
+        self._moved = {each.name: each.field for each in found if each.field and each.field.moves}
+        self.evaluator = evaluator = evaluator.of(SectionDesign(case, self._moved))
         self._fit = fit.Problem(case, evaluator, jobs=jobs)
         self._variables = case.case.variables
         self.variables: Sequence[str] = list(self._variables)
@@ -90,7 +89,6 @@ class TyreModel:
         self._plain = values_of(case, found)
         self._plain.setdefault("pressure_kPa", case.case.pressure_kPa)
         self._slopeless = {id for id, span in spans.items() if not self._has_slopes(id, span)}
-        self._mass: tuple[Array, Array, Array] | None = None
 
     @cached_property
     def sloped(self) -> Collection[str]:
@@ -184,7 +182,7 @@ class TyreModel:
             if not isinstance(other, Answer):
                 return other
             constants[:, k] += other.eta - answer.eta
-        self._add_fields(point.x, answer.eta, constants)
+        self._add_compounds(point.x, constants)
         return replace(answer, constants=constants)
 
     def _beside(self, point: Query, eta: Array) -> Array | None:
@@ -203,18 +201,14 @@ class TyreModel:
         except EvaluationFailed:
             return None
 
-    def _add_fields(self, x: Array, eta: Array, constants: Array) -> None:
-        """Fill in the columns of the section's fields: of meridian and gauges by a small step, of
-        compounds by the exact slopes of its parts."""
+    def _add_compounds(self, x: Array, constants: Array) -> None:
+        """Fill in the columns of the compounds' fields, by the slopes of the section's parts."""
         known = [(k, each.field) for k, each in enumerate(self.found) if each.field]
+        known = [(k, field) for k, field in known if field.kind in OF_COMPOUNDS]
         parts = [p for p in regions(self, x) if p.rubber] if known else []
         for k, field in known:
-            if field.kind in ("stiffness", "density"):
-                slopes = [p.stiffness if field.kind == "stiffness" else p.mass for p in parts]
-                constants[:, k] = np.array(slopes).T @ field.values
-            else:
-                other = self._of(moved(self.case, field, FIELD_STEP))
-                constants[:, k] = (other.values_at(x) - eta) / FIELD_STEP
+            slopes = [p.stiffness if field.kind == "stiffness" else p.mass for p in parts]
+            constants[:, k] = np.array(slopes).T @ field.values
 
     def _of(self, case: LoadedCase) -> TyreModel:
         """The same of another tyre without sources of error or effects."""
@@ -255,8 +249,9 @@ class TyreModel:
     def _evaluated(self, points: Sequence[Query]) -> list[Answer | Exception]:
         """Distinct points, slopes with those that have them."""
         wanted = []
+        constants = {**self._plain, **dict.fromkeys(self._moved, 0.0)}
         for point, state in product(points, self.states):
-            known = dict(self._plain) if point.constants else {}
+            known = constants if point.constants else {}
             slopes = [EFFECT_PATH + id for id in point.slopes]
             names = () if self._is_bare(point) else (*self.variables, *known, *slopes)
             at_0 = {EFFECT_PATH + id: self._present.get(id, 0.0) for id in point.slopes}
@@ -313,7 +308,7 @@ class TyreModel:
         for i, (label, where) in enumerate(self.rows):
             if label is None:
                 eta[i] = log(found[0].evaluation.mass_kg)
-                jacobian[i], slopes[i] = self._mass_slopes(point.x)
+                jacobian[i], slopes[i] = self._mass_slopes(point.x, found)
                 continue
             design, answer = at[state_of(where)]
             gradients, modes = answer.evaluation.gradients, answer.wanted
@@ -331,7 +326,7 @@ class TyreModel:
                 for k, source in enumerate(self.found):
                     slopes[i, k] = sum(
                         step * gradients[path][place] / f
-                        for path, step in source.steps.items()
+                        for path, step in _steps(source).items()
                         if path in gradients
                     )
         return Answer(eta, jacobian, split, slopes if point.constants else None, by_effect)
@@ -374,43 +369,27 @@ class TyreModel:
         size = np.where(mates >= 0, np.sqrt(square), 0.0)
         return Coupling(mates, size, np.where(size > 0, rise / np.maximum(square, 1e-300), 0.0))
 
+    def _mass_slopes(self, x: Array, found: Sequence[Found]) -> tuple[Array, Array]:
+        """d ln mass by x (v,) and by the sources of error (k,). Raises DeckRefused where the solver
+        does not tell them."""
+        mass_kg, values, rates = found[0].evaluation.mass_kg, self.values(x), dict[str, float]()
+        for each in found:  # a number that one state sets moves the mass in the others
+            rates |= each.evaluation.mass_gradients
+            if each.evaluation.gradients.keys() != each.evaluation.mass_gradients.keys():
+                raise DeckRefused(
+                    f"solver '{self.evaluator.solver.name}' gives no slopes of the mass, which was"
+                    " measured"
+                )
+        by_x = [rates.get(name, 0.0) * self._slope(name, values) for name in self.variables]
+        by_source = [
+            sum(step * rates.get(path, 0.0) for path, step in _steps(source).items())
+            for source in self.found
+        ]
+        return np.array(by_x) / mass_kg, np.array(by_source) / mass_kg
+
     def _slope(self, name: str, design: Mapping[str, float]) -> float:
         v = self._variables[name]
         return design[name] if v.scale == "log" else v.upper - v.lower
-
-    def _mass_slopes(self, x: Array) -> tuple[Array, Array]:
-        """d ln mass by x (v,) and by the sources of error (k,).
-
-        From neighbours, found once: the mass is m0 + sum of m_j times the value of variable j.
-        """
-        if self._mass is None:
-            beside = lambda design: self.in_state(self.states[0], design)[0]
-            own = beside({**self._plain, **self.values(x)})
-            designs = [own]
-            designs += [beside({**own, **self.values(x + d)}) for d in MASS_STEP * np.eye(len(x))]
-            for source in self.found:
-                steps = {k: s for k, s in source.steps.items() if not k.startswith(EFFECT_PATH)}
-                steps.pop("pressure_kPa", None)
-                designs.append(beside({**own, **{k: own[k] + s for k, s in steps.items()}}))
-            masses = []
-            for each in self._modes([(design, ()) for design in designs]):
-                if not isinstance(each, Found):
-                    raise each
-                masses.append(each.evaluation.mass_kg)
-            mass = np.array(masses)
-            count, ratio = len(x), mass[1:] / mass[0]
-            rise = self._rise(x, x + MASS_STEP)
-            self._mass = x, (ratio[:count] - 1) / rise, np.log(ratio[count:])
-        there, shares, sources = self._mass
-        rise = self._rise(there, x)
-        growth = np.where([v.scale == "log" for v in self._variables.values()], 1 + rise, 1.0)
-        return shares * growth / (1 + shares @ rise), sources
-
-    def _rise(self, before: Array, after: Array) -> Array:
-        """Relative rise of log variables, rise of x of linear ones."""
-        step = after - before
-        log_scaled = [v.scale == "log" for v in self._variables.values()]
-        return np.where(log_scaled, np.expm1(step), step)
 
 
 def _ln(label: Label, found: Found) -> float:
@@ -418,6 +397,11 @@ def _ln(label: Label, found: Found) -> float:
     mode = found.wanted[label]
     members = mode.raw.members
     return log(members[0] * members[1]) / 2 if members else log(mode.frequency_Hz)
+
+
+def _steps(source: Source) -> Mapping[str, float]:
+    """Of numbers by path, or of the field of the section that it is."""
+    return {source.name: 1.0} if source.field else source.steps
 
 
 def _key(point: Query) -> QueryKey:

@@ -11,7 +11,7 @@ from __future__ import annotations
 import csv
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -48,6 +48,17 @@ class Section:
     regions: tuple[tuple[str, int], ...]
     rigid: Array
     outline: tuple[Array, ...] = ()
+
+    @cached_property
+    def _content(self) -> tuple[object, ...]:
+        curves = tuple(curve.tobytes() for curve in (self.points, self.rigid, *self.outline))
+        return self.names, self.regions, curves
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Section) and self._content == other._content
+
+    def __hash__(self) -> int:
+        return hash(self._content)
 
 
 def read_section(path: Path) -> Section:
@@ -235,7 +246,7 @@ def resample(section: Section, intervals: list[int]) -> tuple[Array, list[str], 
     return out, names, section.rigid[floor] & section.rigid[ceil], present
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=32)
 def with_gauges(section: Section, gauges: tuple[GaugeFactor, ...]) -> Section:
     """``section`` with thicknesses multiplied by the factors; no regions named = all of them.
 
