@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -72,6 +73,25 @@ def test_a_diagnosis_in_files_and_again_from_the_record(
     assert {name: (out / name).read_bytes() for name in FILES} == before
     assert json.loads((out / "run.json").read_text())["diagnose"]["solver_runs"] == 0
     assert "Bead filler" in (out / "report.html").read_text()
+
+
+@pytest.mark.slow
+def test_frequencies_without_labels_are_evidence(
+    coarse: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Two modes without labels: told beside what is named, in file and page."""
+    file, out = measured(coarse, tmp_path / "m.csv", bead_filler=2.0), tmp_path / "out"
+    lines = [line for line in file.read_text().splitlines() if ",180," not in line]
+    bare = [re.sub(r"_Hz,[23],1,", "_Hz,,,", line) for line in lines]
+    file.write_text("\n".join(bare) + "\n")
+    given = ["--measured", str(file), *EFFECTS[:2], "--no-pictures", "--output", str(out)]
+    assert run("diagnose", str(coarse), *given, "--json") == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["verdict"] == "named" and told["effect"] == "bead_filler"
+    assert told["parameter"]["low"] < 2.0 < told["parameter"]["high"]
+    labels = [each for each in told["labels"]["frequencies"] if each["probability"] > 0.9]
+    assert [(each["c"], each["m"]) for each in labels] == [(2, 1), (3, 1)]
+    assert "## Which labels?" in (out / "diagnosis.md").read_text()
 
 
 @pytest.mark.slow

@@ -81,9 +81,11 @@ def test_a_fit_to_frequencies_without_labels(
 def test_labels_are_asked_for_where_they_are_needed(
     unlabelled: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Of other commands, with the one that finds them; nothing is labelled twice."""
-    assert run("diagnose", CASE, "--measured", str(unlabelled), "--output", str(tmp_path)) == 2
-    assert "tyrecal measured label" in capsys.readouterr().err
+    """Of other commands and files, with those that find them; nothing is labelled twice."""
+    labelled = ["--measured", str(CASES / "p235_75r17_wheeler.csv"), "--output", str(tmp_path)]
+    for more in (["--repeats", str(unlabelled)], ["--toggled", str(unlabelled), "spindle_tilt=0"]):
+        assert run("diagnose", CASE, *labelled, *more) == 2
+        assert "tyrecal measured label" in capsys.readouterr().err
     other = str(CASES / "p235_75r17_wheeler.csv")
     assert run("measured", "label", CASE, other, "--output", str(tmp_path)) == 2
     assert "every frequency has a label" in capsys.readouterr().err

@@ -44,8 +44,11 @@ Array = np.ndarray
 OWN = (Label(1, 0), Label(1, 1), Label(2, 0), Label(2, 1))
 
 
-def every_labeling(given: Frequencies, modes: Modes, tau: float) -> Iterator[tuple[Any, float]]:
-    """Each admissible labeling with ln of prior times evidence, from the joint normal density."""
+def every_labeling(
+    given: Frequencies, modes: Modes, tau: float
+) -> Iterator[tuple[Any, float, float]]:
+    """Each admissible labeling with ln of prior times evidence, and ln of the evidence of what is
+    labelled, from the joint normal density."""
     count, n = given.allowed.shape
     C = modes.H @ modes.H.T + discrepancy(modes.labels, tau)
     width = np.ptp(given.y) + 2 * FOREIGN_MARGIN
@@ -57,8 +60,8 @@ def every_labeling(given: Frequencies, modes: Modes, tau: float) -> Iterator[tup
         rows = [i for i, j in enumerate(own) if j >= 0]
         S = C[np.ix_(used, used)] + np.diag(given.s[rows] ** 2)
         off, gain = given.y[rows] - modes.mu[used], np.linalg.solve(S, C[used]).T
-        ln = multivariate_normal.logpdf(off, None, S) if used else 0.0
-        ln += (count - len(used)) * np.log(FOREIGN / width)
+        of_labelled = float(multivariate_normal.logpdf(off, None, S)) if used else 0.0
+        ln = of_labelled + (count - len(used)) * np.log(FOREIGN / width)
         mean, P = modes.mu + gain @ off, C - gain @ C[used]
         within = norm.cdf((given.y.max() - mean) / np.sqrt(np.diag(P)))
         views = []
@@ -70,7 +73,7 @@ def every_labeling(given: Frequencies, modes: Modes, tau: float) -> Iterator[tup
                 for j in range(n)
             ]
             views.append(np.log(p) + sum(terms))
-        yield own, float(ln + np.logaddexp.reduce(views))
+        yield own, float(ln + np.logaddexp.reduce(views)), of_labelled
 
 
 @pytest.mark.numbers
@@ -85,15 +88,26 @@ def test_every_labeling_has_the_probability_of_its_joint_density() -> None:
     given = Frequencies(y, np.full(3, 0.01), np.zeros(3, int), allowed, np.array([0, 0, 1], bool))
     found = labelings(given, modes)
     total: dict[Any, float] = {}
+    evidence: dict[Any, float] = {}
     for tau in DISCREPANCIES:
-        for own, ln in every_labeling(given, modes, tau):
+        for own, ln, of_labelled in every_labeling(given, modes, tau):
             total[own] = total.get(own, 0.0) + np.exp(ln)
+            evidence[own] = evidence.get(own, 0.0) + np.exp(of_labelled)
     whole = sum(total.values())
     told = dict(zip(map(tuple, found.modes.tolist()), found.probabilities, strict=True))
     assert len(total) == 10
     for own, value in total.items():
         assert told.get(own, 0.0) == pytest.approx(value / whole, rel=1e-6, abs=1e-8)
     assert found.each.sum(1) == pytest.approx(1.0)
+    for own, ln_prior in zip(map(tuple, found.modes[:3].tolist()), found.ln_prior, strict=False):
+        assert ln_prior == pytest.approx(np.log(total[own] / evidence[own]), abs=1e-6)
+    anew = found.weighed_anew(np.array([0.2, 0.8]))
+    first = found.probabilities[:2].sum()
+    expected = [0.2 * first, 0.8 * first, *found.probabilities[2:]]
+    assert anew.probabilities == pytest.approx(np.sort(expected)[::-1])
+    shares = dict(zip(map(tuple, anew.modes.tolist()), anew.probabilities, strict=True))
+    assert [shares[tuple(own)] for own in found.modes.tolist()] == pytest.approx(expected)
+    assert anew.each.sum(1) == pytest.approx(1.0)
     for i, j in ((0, 1), (1, -1), (2, 3)):
         share = sum(p for own, p in told.items() if own[i] == j)
         assert found.each[i, j] == pytest.approx(share)
@@ -169,7 +183,11 @@ def told() -> Labelled:
 def test_readings_get_the_labels_of_the_tyre(told: Labelled) -> None:
     """In two states together; the one that is no mode is left out, and told."""
     assert told.readings == with_labels()
-    assert [each.value for each in told.foreign] == [FOREIGN_Hz]
+    left = [own for own, x in zip(told.frequencies, told.labels, strict=True) if x is None]
+    assert [each.value for (each,) in left] == [FOREIGN_Hz]
+    second = [label for label in told.found.labels(1) if label]
+    in_order = sorted(told.under(1), key=lambda each: each.value)
+    assert [each.label for each in in_order] == second != [x for x in told.labels if x]
     assert told.found.settled
     labels = labels_told(CASE, told)
     assert len(labels.frequencies) == 16 and not labels.doubts()

@@ -13,7 +13,7 @@ file = click.Path(path_type=Path, exists=True, dir_okay=False)
 
 @click.command()
 @options.every(options.case_argument, options.assignments)
-@click.option("--measured", type=file, metavar="FILE", help="Measurements (CSV).")
+@click.option("--measured", type=file, metavar="FILE", help="Measurements (CSV), labels or not.")
 @click.option(
     "--repeats",
     multiple=True,
@@ -137,7 +137,11 @@ def command(
             arguments.refuse_unusual(loaded, option, name, change.value, False)
     evaluator = study.evaluator(loaded)
     files = [measured, *repeats, *(path for path, _ in changes)]
-    readings = [each for path in files for each in in_states(loaded, read_measurements(path))]
+    readings = [
+        each
+        for path in files
+        for each in in_states(loaded, read_measurements(path, labelled=path != measured))
+    ]
     states = [each.state for each in readings]
     pressures, at = ({each.pressure_kPa for each in readings}, {each.load_N for each in readings})
     run = study.run(
@@ -165,7 +169,9 @@ def command(
             stage=bar.begin,
         )
     told = run.write(
-        diagnosis_result(found.diagnosis, found.under_load, found.variables, found.section)
+        diagnosis_result(
+            found.diagnosis, found.under_load, found.variables, found.section, found.labels
+        )
     )
     parts = parts_data(loaded, [part.region for part in told.section_map])
     run.write_json("diagnosis_section.json", parts)
@@ -180,6 +186,8 @@ def command(
     run.finish()
     terminal.result(told.content())
     terminal.say(words)
+    for doubt in told.labels.doubts() if told.labels else ():
+        terminal.warn(doubt)
     study.finish(run)
     return 0
 

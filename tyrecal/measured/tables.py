@@ -49,8 +49,8 @@ def read_measurements(path: Path, labelled: bool = True) -> list[Measurement]:
     found = _measurements(path, lines, columns, comma, 0.0, _sigma_mistake, labelled=False)
     if labelled and (lacking := next((each for each in found if each.is_unlabelled), None)):
         raise InputError(
-            f"{lacking.place}: the frequency has no label, c and m; 'tyrecal fit' and 'tyrecal"
-            " measured label' find it"
+            f"{lacking.place}: the frequency has no label, c and m; --measured of 'tyrecal fit' and"
+            " 'tyrecal diagnose', and 'tyrecal measured label' find it"
         )
     _refuse(_twice(found))
     return found

@@ -36,6 +36,7 @@ def page(study: DiagnosedCase, case: str, measured: str) -> str:
         f"Measurements: {measured}, {_counted(d)}.",
         f"## {_headline(study)}",
         *_answer(study),
+        *_labels(study),
         "## Is there a gap?",
         *_gap(d),
         "## Where does it lie?",
@@ -134,6 +135,22 @@ def _answer(study: DiagnosedCase) -> Iterator[str]:
             )
 
 
+def _labels(study: DiagnosedCase) -> Iterator[str]:
+    """Of frequencies that came without."""
+    if study.labels is None:
+        return
+    table = study.labels.table()
+    rows = [[column.name for column in table.columns], ["---"] * len(table.columns), *table.rows]
+    yield "## Which labels?"
+    yield "\n".join(f"| {' | '.join(str(cell or '') for cell in row)} |" for row in rows)
+    told = "; ".join(study.labels.sentences())
+    yield (
+        f"{told[0].upper()}{told[1:]}. These labels are told together with the effects, whose"
+        " probabilities are averages over all labelings of at least 1 % about the plain tyre; all"
+        " else is told with the likeliest."
+    )
+
+
 def _robust(d: Diagnosis) -> str:
     """What the verdict hangs on."""
     found, key = d.robustness, d.verdict.key or d.verdict.best
@@ -141,10 +158,11 @@ def _robust(d: Diagnosis) -> str:
     of = words.get(d.verdict.kind, f"`{key}`")
     between = f"the probability of {of} lies between {found.low:.2f} and {found.high:.2f}"
     if found.robust:
+        labels = " and under every likely labeling," if len(d.readings) > 1 else ""
         return (
             f"Robust: with every prior and every constant's standard deviation half and twice as"
-            f" large, without the model's own error of form, and with each mode left out, the"
-            f" verdict is the same; {between}."
+            f" large, without the model's own error of form, and with each mode left out,{labels}"
+            f" the verdict is the same; {between}."
         )
     more = len(found.hangs_on) - SHOWN
     tail = f"; and {more} more" if more > 0 else ""

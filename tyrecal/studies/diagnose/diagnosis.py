@@ -15,6 +15,7 @@ from .expansion import Expansion, anchored, carried, expand
 from .gap import Gap, find_gap, projection
 from .inverse_problem import Assumed, InverseProblem, Toggle, places
 from .label_swap import exchanged, with_exchanged
+from .labelings import NEGLIGIBLE, Reading, averaged, over_labels, shares
 from .model import ModelRow, Query, ResponseModel
 from .next_measurement import SIZES, Choice, rank
 from .observations import Observations
@@ -22,7 +23,7 @@ from .plain_fit import plain_fit
 from .regions import SectionPart
 from .robustness import Robustness, robustness
 from .separability import Separability, separate
-from .several import probabilities, weigh
+from .several import probabilities, weigh, with_sets
 from .shrinkage import Shrinkage, shrink
 from .verdict import NAMED, NO_GAP, Verdict, decide, holds
 from .where import PartChange, section_map
@@ -63,6 +64,7 @@ class Diagnosis:
     choices: tuple[Choice, ...]
     robustness: Robustness  # of the verdict
     exchanged: tuple[Label, Label] | None = None  # labels that were put right before all else
+    readings: tuple[float, ...] = (1.0,)  # their probabilities; all else is of the likeliest
 
     def hypothesis(self, key: str) -> Hypothesis:
         """The hypothesis of that key."""
@@ -102,7 +104,7 @@ class Diagnosis:
 def diagnose(
     model: ResponseModel,
     rows: Sequence[ModelRow],
-    observations: Observations,
+    observations: Observations | Sequence[Reading],
     changes: tuple[Toggle, ...] = (),
     assumed: Assumed = Assumed(),  # noqa: B008
     parts: Callable[[Array], Sequence[SectionPart]] | None = None,
@@ -114,39 +116,45 @@ def diagnose(
 ) -> Diagnosis:
     """Diagnose observations with a model of ``rows`` (label or None, kPa).
 
+    observations: or readings of them where frequencies came without labels, see `labelings`;
     changes: what was switched in runs 1, 2, ...; parts: slopes by the section's parts at x;
     further: a model of other rows, for the next measurement; expansion: of an earlier call with
     the same model, near whose x0 the fit lies; known: of the same model anywhere, from where
     effects are carried to the fit and only the likeliest are asked there; stage: hears of each of
     ``STAGES``. Raises the model's failure where the plain tyre has no solution.
     """
-
-    def fitted(observations: Observations) -> Expansion:
-        x0 = plain_fit(model, observations, where, assumed.form, known)
-        return carried(known, model, x0) if known else expand(model, x0, splits)
-
-    where, splits = places(observations, rows), bool(np.isfinite(observations.split).any())
+    labelled = isinstance(observations, Observations)
+    readings = [Reading(observations)] if isinstance(observations, Observations) else observations
     stage(STAGES[0])
-    if expansion is None:
-        expansion = fitted(observations)
-    problem = InverseProblem(
-        observations, expansion, model.spans, where, model.start, model.spread, changes, assumed
-    )
-    labels = exchanged(problem) if len(where) > len(model.start) else None
-    if labels:
-        observations = with_exchanged(observations, *labels)
-        problem = replace(problem, observations=observations, expansion=fitted(observations))
-    hypotheses, bare = weigh(problem), problem
+    bares, labels = list[InverseProblem](), None
+    for reading in readings:
+        bare = _calibrated(model, rows, reading.observations, changes, assumed, expansion, known)
+        labels = exchanged(bare) if labelled and len(bare.places) > len(model.start) else None
+        if labels:
+            there = with_exchanged(bare.observations, *labels)
+            bare = _calibrated(model, rows, there, changes, assumed, None, known)
+        bares.append(bare)
+        known, expansion = known or bare.expansion, None
     stage(STAGES[1])
-    for _ in range(MAX_ROUNDS if expansion.nodes else 0):
-        problem, changed = _asked_again(problem, model, hypotheses)
-        if not changed:
-            break
-        hypotheses = weigh(problem)
-    p = probabilities(hypotheses)
+    first = [weigh(bare) for bare in bares]
+    share = shares(readings, first)
+    kept = np.flatnonzero(share > NEGLIGIBLE).tolist()
+    settled = [_settled(bares[k], model, first[k]) for k in kept]
+    every = [h for _, own in settled for h in own]
+    found = [with_sets(problem, own, every) for problem, own in settled]
+    readings = [readings[k] for k in kept]
+    among = shares(readings, found)
+    share[:], share[kept] = 0.0, among
+    best = int(np.argmax(among))
+    bare, problem, hypotheses = bares[kept[best]], settled[best][0], found[best]
+    p = averaged(among, found)
     plain = next(h for h in hypotheses if h.key == NONE).fitted
     d, bare = plain.d[0], replace(bare, zeta=float(plain.zeta[0]))
-    verdict = decide(hypotheses, p, len(where), len(d))
+    verdict = decide(hypotheses, p, len(bare.places), len(d))
+    alone = decide(hypotheses, probabilities(hypotheses), len(bare.places), len(d))
+    robust = robustness(problem, hypotheses, alone, tuple(model.sources))
+    if len(readings) > 1:
+        robust = over_labels(robust, readings, found, among, verdict, len(d))
     gap = find_gap(bare, d, tuple(model.variables))
     P, _, _ = projection(replace(problem, zeta=bare.zeta), d)
     means = {h.key: h.mean() for h in hypotheses if h.values}
@@ -154,7 +162,7 @@ def diagnose(
     separability = separate(bare, P, sizes)
     stage(STAGES[2])
     regions = list(parts(problem.expansion.x0 + d)) if parts else []
-    found, effective_rank = section_map(bare, P, gap.residuals, regions)
+    mapped, effective_rank = section_map(bare, P, gap.residuals, regions)
     named = verdict.best if verdict.key else None
     shrinkage = shrink(problem, named, seed) if problem.expansion.nodes else None
     stage(STAGES[3])
@@ -170,14 +178,46 @@ def diagnose(
         verdict,
         gap,
         separability,
-        tuple(found),
+        tuple(mapped),
         effective_rank,
         shrinkage,
         _rung(verdict, shrinkage, problem),
         tuple(choices),
-        robustness(problem, hypotheses, verdict, tuple(model.sources)),
+        robust,
         labels,
+        tuple(share.tolist()),
     )
+
+
+def _calibrated(
+    model: ResponseModel,
+    rows: Sequence[ModelRow],
+    observations: Observations,
+    changes: tuple[Toggle, ...],
+    assumed: Assumed,
+    expansion: Expansion | None,
+    known: Expansion | None,
+) -> InverseProblem:
+    """Observations beside the model, expanded about the plain tyre that fits them."""
+    where, splits = places(observations, rows), bool(np.isfinite(observations.split).any())
+    if expansion is None:
+        x0 = plain_fit(model, observations, where, assumed.form, known)
+        expansion = carried(known, model, x0) if known else expand(model, x0, splits)
+    return InverseProblem(
+        observations, expansion, model.spans, where, model.start, model.spread, changes, assumed
+    )
+
+
+def _settled(
+    problem: InverseProblem, model: ResponseModel, hypotheses: list[Hypothesis]
+) -> tuple[InverseProblem, list[Hypothesis]]:
+    """The problem with the model asked again for hypotheses in play, and all weighed by it."""
+    for _ in range(MAX_ROUNDS if problem.expansion.nodes else 0):
+        problem, changed = _asked_again(problem, model, hypotheses)
+        if not changed:
+            break
+        hypotheses = weigh(problem)
+    return problem, hypotheses
 
 
 def _asked_again(

@@ -13,6 +13,7 @@ import numpy as np
 from pydantic import Field
 
 from ...simulate.modes.label import Label
+from ..labels import Labels
 from ..result import Result, ResultPart
 from .constants_told import ConstantShift, constants_told
 from .evidence import NONE, OUTSIDE
@@ -181,6 +182,7 @@ class DiagnosisResult(Result):
     bias_percent: dict[str, dict[str, float]] = Field(default={})
     next_measurements: list[NextMeasurement]
     exchanged_labels: list[str] = Field(default=[])
+    labels: Labels | None = None  # of frequencies that came without
     left_out: list[str] = Field(default=[])
     not_evaluated: dict[str, str] = Field(default={})
 
@@ -190,6 +192,7 @@ def diagnosis_result(
     under_load: UnderLoad | None = None,
     calibrated: dict[str, Any] | None = None,
     section: Sequence[FieldValue] = (),
+    labels: Labels | None = None,
 ) -> DiagnosisResult:
     """What was found. ``calibrated``: see `calibrated_variables`."""
     d, shown = diagnosis, diagnosis.verdict.key or diagnosis.best
@@ -233,6 +236,7 @@ def diagnosis_result(
             NextMeasurement(what=c.what, gain=c.gain, hours=c.hours) for c in d.choices
         ],
         exchanged_labels=[str(label) for label in d.exchanged or ()],
+        labels=labels,
         left_out=list(d.problem.observations.left_out),
         not_evaluated=dict(d.problem.expansion.failed),
     )

@@ -52,7 +52,7 @@ def robustness(
         p.append(said(found, verdict))
         other = decide(judged, found, rows, len(problem.centre))
         if (other.kind, other.key) != (verdict.kind, verdict.key):
-            changes.append(f"{words} ({_judged(other)})")
+            changes.append(f"{words} ({in_words(other)})")
     return Robustness(not changes, tuple(changes), min(p), max(p))
 
 
@@ -163,7 +163,7 @@ def _again(problem: InverseProblem, h: Hypothesis) -> Hypothesis:
     return replace(h, ln_evidence=total, fitted=fitted)
 
 
-def _judged(verdict: Verdict) -> str:
+def in_words(verdict: Verdict) -> str:
     """A verdict in a few words."""
     named = f"{' and '.join(verdict.key.split('+'))} named" if verdict.key else ""
     return f"then {named or JUDGED[verdict.kind]}"

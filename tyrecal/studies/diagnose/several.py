@@ -101,6 +101,21 @@ def _with_one_more(
     return result
 
 
+def with_sets(
+    problem: InverseProblem, found: Sequence[Hypothesis], others: Sequence[Hypothesis]
+) -> list[Hypothesis]:
+    """The hypotheses, and sets of effects of ``others`` that are not among them."""
+    by_key = {h.key: h for h in found}
+    more = {h.key: h for h in others if h.key not in by_key}
+    return [
+        *found,
+        *(
+            explain(problem, list(h.values), h.prior, coupled_most([by_key[id] for id in h.values]))
+            for h in more.values()
+        ),
+    ]
+
+
 def coupled_most(known: Sequence[Hypothesis]) -> dict[int, float]:
     """The points of the rule in what couples modes that stand for all, with their shares on the
     mean of some hypotheses; empty where none are coupled."""

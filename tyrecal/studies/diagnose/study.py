@@ -16,10 +16,14 @@ from ...simulate.evaluate.evaluator import Evaluator
 from ...tyre.case import LoadedCase
 from ...tyre.case.mistakes import suggestion
 from ...tyre.effects import Effect, catalogue
+from ..labelling.label import label
+from ..labelling.result import labels_told
+from ..labels import Labels
 from .calibrated import calibrated_variables
 from .diagnosis import Diagnosis, diagnose
 from .evidence import NONE
 from .inverse_problem import Assumed, Toggle
+from .labelings import Reading, likely, weighed_anew
 from .model import Answer, Query, Span
 from .observations import Observations, observe
 from .regions import regions
@@ -44,6 +48,7 @@ class DiagnosedCase:
     calibrated: tuple[str, ...]  # effects that variables of the case calibrate
     model: TyreModel
     under_load: UnderLoad | None = None  # what was measured there
+    labels: Labels | None = None  # of frequencies that came without
 
     @property
     def variables(self) -> dict[str, Any]:
@@ -83,23 +88,23 @@ def study(
     """
     switched = [path for path, _ in toggled]
     paths = [measured, *repeats, *switched]
-    runs = {path: in_states(case, read_measurements(path)) for path in paths}
+    given = read_measurements(measured, labelled=False)
+    runs = {path: in_states(case, read_measurements(path)) for path in paths[1:]}
+    runs[measured] = in_states(case, given)
     _check_copies(paths, runs)
-    observations = observe(
-        runs[measured],
-        [runs[path] for path in repeats],
-        [runs[path] for path in switched],
-        assumed.split,
-    )
     elsewhere = {
         f"{path.name}: what was measured under load with the rim {each.rim}: not compared": None
-        for path, run in runs.items()
-        for each in run
+        for path in paths
+        for each in runs[path]
         if each.load_N and each.rim
     }
-    observations = replace(observations, left_out=(*observations.left_out, *elsewhere))
-    rows = list(dict.fromkeys(row.row for row in observations.rows))
-    if not any(label for label, _ in rows):
+
+    def observed(run: Sequence[Measurement]) -> Observations:
+        again, toggles = ([runs[path] for path in group] for group in (repeats, switched))
+        found = observe(run, again, toggles, assumed.split)
+        return replace(found, left_out=(*found.left_out, *elsewhere))
+
+    if not any(each.quantity == "frequency_Hz" and not each.load_N for each in given):
         raise InputError(f"{measured}: there is no frequency of the unloaded tyre in it")
     ids = list(catalogue()) if effects is None else list(effects)
     fitted = tuple(id for id in ids if EFFECT_PATH + id in calibrated(case))
@@ -108,17 +113,22 @@ def study(
             "a variable of the case sets pressure_kPa, which a diagnosis takes from the"
             " measurements: consider the effect pressure_offset instead"
         )
+    told, readings = None, [Reading(observed(runs[measured]))]
+    if any(each.is_unlabelled for each in given):
+        told = label(case, evaluator, given, jobs=jobs)
+        readings = likely(told, lambda run: observed(in_states(case, run)))
+    rows = list(dict.fromkeys(row.row for each in readings for row in each.observations.rows))
     spans, inexpressible = spans_of(case, evaluator, [id for id in ids if id not in fitted])
     changes = tuple(_counted_from(change, spans) for _, change in toggled)
     for change in changes:
         spans[change.id] = _reaching(spans[change.id], change)
     found, assumed_sources = sources(case)
     model = TyreModel(case, evaluator, rows, found, spans, jobs)
-    check_units(model, observations, [str(measured), *map(str, switched)], changes)
+    check_units(model, readings[0].observations, [str(measured), *map(str, switched)], changes)
     diagnosis = diagnose(
         model,
         rows,
-        observations,
+        readings if told else readings[0].observations,
         changes,
         assumed,
         parts=(lambda x: regions(model, x)) if section_map else None,
@@ -134,6 +144,7 @@ def study(
         fitted,
         model,
         _under_load(case, evaluator, own, diagnosis, model),
+        labels_told(case, weighed_anew(told, diagnosis.readings)) if told else None,
     )
 
 

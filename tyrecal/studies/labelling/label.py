@@ -34,12 +34,11 @@ MODES_PER_HARMONIC = 3  # at least: both families, and one across the belt that 
 
 @dataclass(frozen=True)
 class Labelled:
-    """readings: all, with labels, less those that are ``foreign``; frequencies: the readings of the
-    unloaded tyre, rising, as the labelings of ``found`` have them, each a reading or the two of a
-    doublet; start: the model where the variables are expected."""
+    """given: all readings as they came; frequencies: those of the unloaded tyre, rising, as the
+    labelings of ``found`` have them, each a reading or the two of a doublet; start: the model where
+    the variables are expected."""
 
-    readings: list[Measurement]
-    foreign: list[Measurement]
+    given: Sequence[Measurement]
     frequencies: list[list[Measurement]]
     found: Found
     start: Expansion
@@ -48,6 +47,21 @@ class Labelled:
     def labels(self) -> list[Label | None]:
         """Of ``frequencies``."""
         return self.found.labels()
+
+    @property
+    def readings(self) -> list[Measurement]:
+        """With the likeliest labels, see `under`."""
+        return self.under(0)
+
+    def under(self, place: int) -> list[Measurement]:
+        """The readings with the labels of the labeling at a place, less those that are foreign."""
+        told = {
+            id(reading): own
+            for each, own in zip(self.frequencies, self.found.labels(place), strict=True)
+            for reading in each
+        }
+        kept = [r for r in self.given if id(r) not in told or told[id(r)]]
+        return [replace(r, label=told.get(id(r), r.label)) for r in kept]
 
 
 def start_prior(variables: Sequence[DesignVariable]) -> Prior:
@@ -130,14 +144,7 @@ def label(
     if about:
         first = np.array([v.scaled(about[v.name]) for v in problem.variables])
     found = find_labels(model.expand, measured, prior, first)
-    told = {
-        id(reading): own
-        for each, own in zip(frequencies, found.labels(), strict=True)
-        for reading in each
-    }
-    foreign = [r for r in readings if id(r) in told and told[id(r)] is None]
-    kept = [replace(r, label=told.get(id(r), r.label)) for r in readings if r not in foreign]
-    return Labelled(kept, foreign, frequencies, found, start)
+    return Labelled(readings, frequencies, found, start)
 
 
 def _of_unloaded(case: LoadedCase, readings: Sequence[Measurement]) -> list[list[Measurement]]:

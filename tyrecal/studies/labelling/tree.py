@@ -25,7 +25,7 @@ labelings' evidences are means over `DISCREPANCIES`.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -72,43 +72,69 @@ class Frequencies:
 @dataclass(frozen=True)
 class Labelings:
     """The most probable first: modes (k, m), -1 of what is foreign; probabilities (k,) of them, and
-    each (m, n + 1) of every mode of a frequency, the last of foreign; z (v,): the variables' mean
-    under the first; discrepancy: the model's, its mean over all."""
+    each (m, n + 1) of every mode of a frequency, the last of foreign; ln_prior (k,): what of a
+    labeling's weight is not the evidence of its labelled frequencies, but for a constant; z (v,):
+    the variables' mean under the first; discrepancy: the model's, its mean over all."""
 
     modes: Array
     probabilities: Array
     each: Array
+    ln_prior: Array
     z: Array
     discrepancy: float
+
+    def weighed_anew(self, shares: Array) -> Labelings:
+        """The first ones sharing otherwise, ``shares`` (first,), what they have together."""
+        first = len(shares)
+        p = np.append(self.probabilities[:first].sum() * shares, self.probabilities[first:])
+        order = np.argsort(-p, kind="stable")
+        modes, p = self.modes[order], p[order]
+        return replace(
+            self,
+            modes=modes,
+            probabilities=p,
+            each=_of_each(modes, p, self.each.shape),
+            ln_prior=self.ln_prior[order],
+        )
 
 
 def labelings(measured: Frequencies, modes: Modes) -> Labelings:
     """Of all labelings that are not cut."""
     total: dict[tuple[int, ...], float] = {}
+    evidence: dict[tuple[int, ...], float] = {}
     means: dict[tuple[int, ...], tuple[float, Array]] = {}
     strata = []
     for tau in DISCREPANCIES:
-        chosen, ln, mean = _tree(measured, modes, tau)
+        chosen, ln, of_labelled, mean = _tree(measured, modes, tau)
         strata.append(np.logaddexp.reduce(ln))
-        for key, value, z in zip(map(tuple, chosen.tolist()), ln, mean, strict=True):
+        keys = map(tuple, chosen.tolist())
+        for key, value, own, z in zip(keys, ln, of_labelled, mean, strict=True):
             total[key] = float(np.logaddexp(total.get(key, -np.inf), value))
+            evidence[key] = float(np.logaddexp(evidence.get(key, -np.inf), own))
             if value > means.get(key, (-np.inf,))[0]:
                 means[key] = (value, z)
-    keys = sorted(total, key=lambda key: (-total[key], key))
-    ln = np.array([total[key] for key in keys])
+    order = sorted(total, key=lambda key: (-total[key], key))
+    ln = np.array([total[key] for key in order])
     probabilities = np.exp(ln - np.logaddexp.reduce(ln))
-    each = np.zeros((len(measured.y), len(modes.mu) + 1))
-    for key, p in zip(keys, probabilities, strict=True):
-        each[range(len(key)), key] += p  # -1 is the last column
+    found = np.array(order).reshape(len(order), -1)
     likely = np.exp(np.array(strata) - np.logaddexp.reduce(strata))
     v = modes.H.shape[1]
     return Labelings(
-        np.array(keys).reshape(len(keys), -1),
+        found,
         probabilities,
-        each,
-        means[keys[0]][1][:v],
+        _of_each(found, probabilities, (len(measured.y), len(modes.mu) + 1)),
+        ln - [evidence[key] for key in order],
+        means[order[0]][1][:v],
         float(likely @ DISCREPANCIES),
     )
+
+
+def _of_each(modes: Array, probabilities: Array, shape: tuple[int, ...]) -> Array:
+    """(m, n + 1), see `Labelings`."""
+    each = np.zeros(shape)
+    for own, p in zip(modes, probabilities, strict=True):
+        each[range(len(own)), own] += p  # -1 is the last column
+    return each
 
 
 def discrepancy(labels: Sequence[Label], tau: float) -> Array:
@@ -120,8 +146,9 @@ def discrepancy(labels: Sequence[Label], tau: float) -> Array:
     return np.diag([form_error(label) ** 2 for label in labels]) + tau**2 * alike
 
 
-def _tree(measured: Frequencies, modes: Modes, tau: float) -> tuple[Array, Array, Array]:
-    """Labelings (k, m), ln of prior times evidence (k,) and the means of z (k, v + l)."""
+def _tree(measured: Frequencies, modes: Modes, tau: float) -> tuple[Array, Array, Array, Array]:
+    """Labelings (k, m), ln of prior times evidence (k,), ln of the evidence of their labelled
+    frequencies (k,) and the means of z (k, v + l)."""
     different = list(dict.fromkeys(modes.labels))
     own = np.array([different.index(label) for label in modes.labels])
     root = np.linalg.cholesky(discrepancy(different, tau))
@@ -133,7 +160,7 @@ def _tree(measured: Frequencies, modes: Modes, tau: float) -> tuple[Array, Array
     width = float(np.ptp(measured.y)) + 2 * FOREIGN_MARGIN
 
     ln = np.log(list(VIEWS.values()))[None]  # (branches, views)
-    mean, P = np.zeros((1, k)), np.eye(k)[None]
+    of_labelled, mean, P = np.zeros(1), np.zeros((1, k)), np.eye(k)[None]
     free, chosen = np.ones((1, n), bool), np.empty((1, 0), int)
     for i in range(count):
         PH = P @ H.T  # (branches, k, n)
@@ -155,6 +182,7 @@ def _tree(measured: Frequencies, modes: Modes, tau: float) -> tuple[Array, Array
         at, mode = np.divmod(best, n + 1)
         is_mode = mode < n
         j = np.where(is_mode, mode, 0)
+        of_labelled = of_labelled[at] + np.where(is_mode, score[at, j], 0.0)
         column = PH[at, :, j] * is_mode[:, None]
         gain = column / variance[at, j][:, None]
         mean = mean[at] + gain * off[at, j][:, None]
@@ -163,7 +191,7 @@ def _tree(measured: Frequencies, modes: Modes, tau: float) -> tuple[Array, Array
         free[is_mode, j[is_mode]] = False
         chosen = np.hstack([chosen[at], np.where(is_mode, mode, FOREIGN_MODE)[:, None]])
     ln = np.logaddexp.reduce(ln + _missing(measured, modes, H, mean, P, free, sees), axis=1)
-    return chosen, ln, mean
+    return chosen, ln, of_labelled, mean
 
 
 def _missing(

@@ -1,0 +1,119 @@
+"""Frequencies without labels as evidence: explanations h, averaged over likely labelings a.
+
+    P(h | y) ~ P(h) sum over a of P(a) Z(y_a | h),   P(a | y) ~ P(a) sum over h of P(h) Z(y_a | h)
+
+y_a: the frequencies with the labels of a, less those that are foreign under it; Z: `evidence`, by
+one covariance for all. So a labeling that an effect makes likelier counts under that effect. P(a):
+what of the tree's weight of a is not its own evidence of y_a (`labelling.tree`): modes that were
+missed, foreign frequencies, the views, about the plain tyre. Labelings are looked for about that
+too, its modes off smoothly; those that have `LEAST_PROBABLE` are weighed, the first
+`MOST_READINGS`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...measured.measurement import Measurement
+from ...simulate.modes.label import Label
+from ..labelling.label import Labelled
+from ..labels import FOREIGN_WORDS
+from .evidence import Hypothesis
+from .observations import Observations
+from .robustness import Robustness, in_words, said
+from .several import probabilities
+from .verdict import Verdict, decide
+
+Array = np.ndarray
+LEAST_PROBABLE, MOST_READINGS = 0.01, 5
+NEGLIGIBLE = 1e-6  # probability of a reading for which the model is not asked again
+
+
+@dataclass(frozen=True)
+class Reading:
+    """What was measured under one labeling: ln P(a), and the labels of frequencies, in words, that
+    came without."""
+
+    observations: Observations
+    ln_prior: float = 0.0
+    labels: Sequence[tuple[str, Label | None]] = ()
+
+
+def likely(told: Labelled, observed: Callable[[list[Measurement]], Observations]) -> list[Reading]:
+    """The readings to be weighed, the tree's likeliest first."""
+    found = told.found.labelings
+    count = max(1, int((found.probabilities[:MOST_READINGS] >= LEAST_PROBABLE).sum()))
+    hertz = [None if own.label else f"{own.value:.4g} Hz" for own, *_ in told.frequencies]
+    return [
+        Reading(
+            observed(told.under(k)),
+            float(found.ln_prior[k]),
+            [(f, x) for f, x in zip(hertz, told.found.labels(k), strict=True) if f],
+        )
+        for k in range(count)
+    ]
+
+
+def weighed_anew(told: Labelled, p: Sequence[float]) -> Labelled:
+    """The labelings with the probabilities ``p`` of the first ones' readings."""
+    anew = told.found.labelings.weighed_anew(np.array(p))
+    return replace(told, found=replace(told.found, labelings=anew))
+
+
+def shares(readings: Sequence[Reading], found: Sequence[Sequence[Hypothesis]]) -> Array:
+    """P(a | y) (a,) by the hypotheses under each reading."""
+    ln = np.array(
+        [
+            own.ln_prior + np.logaddexp.reduce([h.ln_evidence + np.log(h.prior) for h in here])
+            for own, here in zip(readings, found, strict=True)
+        ]
+    )
+    return np.asarray(np.exp(ln - np.logaddexp.reduce(ln)))
+
+
+def averaged(p: Array, found: Sequence[Sequence[Hypothesis]]) -> dict[str, float]:
+    """P(h | y) by key, of readings that have ``p``."""
+    total: dict[str, float] = {}
+    for share, here in zip(p.tolist(), found, strict=True):
+        for key, own in probabilities(here).items():
+            total[key] = total.get(key, 0.0) + share * own
+    return total
+
+
+def over_labels(
+    alone: Robustness,
+    readings: Sequence[Reading],
+    found: Sequence[Sequence[Hypothesis]],
+    p: Array,
+    verdict: Verdict,
+    variables: int,
+) -> Robustness:
+    """What a verdict over all readings hangs on: on labels, too, where another verdict holds under
+    a reading that has `LEAST_PROBABLE`. alone: of the verdict under the likeliest reading."""
+    best = int(np.argmax(p))
+    same, changes = True, list[str]()
+    between = [said(averaged(p, found), verdict)]
+    for k in np.flatnonzero(p >= LEAST_PROBABLE).tolist():
+        here = probabilities(found[k])
+        between.append(said(here, verdict))
+        other = decide(found[k], here, len(readings[k].observations.rows), variables)
+        if (other.kind, other.key) != (verdict.kind, verdict.key):
+            same = same and k != best
+            changes.append(f"{_told(readings, p, k, best)}, {in_words(other)})")
+    if same:  # else what the likeliest one hangs on is another verdict
+        between += [alone.low, alone.high]
+        changes += alone.hangs_on
+    return Robustness(not changes, tuple(changes), min(between), max(between))
+
+
+def _told(readings: Sequence[Reading], p: Array, k: int, best: int) -> str:
+    """A reading by what it has otherwise than the likeliest one, or the next where it is that."""
+    other = best if k != best else int(np.argsort(-p, kind="stable")[1])
+    own = readings[k].labels
+    differ = [each for each in own if each not in readings[other].labels]
+    hertz = ", ".join(f for f, _ in differ)
+    words = ", ".join(label.said if label else FOREIGN_WORDS for _, label in differ)
+    return f"the label of {hertz} ({words}, {p[k]:.2f} probable"
