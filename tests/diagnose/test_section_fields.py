@@ -3,6 +3,8 @@ model with what they say changed in it."""
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -20,6 +22,7 @@ from tyrecal.studies.diagnose.section_fields import (
     arc_length,
     components,
     fields,
+    filler_tip,
     moved,
     with_fields,
 )
@@ -27,13 +30,17 @@ from tyrecal.studies.diagnose.section_told import section_told
 from tyrecal.studies.diagnose.tyre_model import TyreModel
 from tyrecal.studies.diagnose.uncertainties import sources
 from tyrecal.tyre.case.identity import tyre_sha256
+from tyrecal.tyre.case.new_case import from_size
 from tyrecal.tyre.effects.edit import changed, with_part
-from tyrecal.tyre.effects.parts import stations
+from tyrecal.tyre.effects.parts import belt_edge, carcass_line, rim_edge, stations
+from tyrecal.tyre.load import load_case
+from tyrecal.tyre.section.size import parse_size
 
 from ..chance import Chance
 from .test_tyre_model import CASE, LABELS
 from .toy import Toy, problem
 
+Array = np.ndarray
 pytestmark = pytest.mark.numbers
 STATED = changed(CASE, section=with_part(CASE.case.section, known_from="drawing"))
 ROWS = [*((label, 240.0) for label in LABELS), (None, 0.0)]
@@ -74,6 +81,38 @@ def test_components_have_the_covariance_of_the_field() -> None:
     assert covariance[i, j] == pytest.approx(wanted, abs=0.15)
 
 
+def test_a_filler_s_tip_goes_along_the_carcass_and_the_surfaces_stay(tmp_path: Path) -> None:
+    """9 mm towards the crown by a standard deviation, here a tenth of it: along surfaces but for
+    their turns from station to station. Neither belt nor rim moves. The shipped case, of one
+    rubber, has no filler."""
+    assert not any("filler" in name for name in fields(STATED))
+    draft = from_size(parse_size("205/60R15"), {}, None, "made")
+    (tmp_path / draft.file).write_bytes(draft.content)
+    (tmp_path / "made.yaml").write_text(draft.text, encoding="utf-8")
+    case = load_case(tmp_path / "made.yaml")
+    (field,) = [each for name, each in fields(case).items() if "filler" in name]
+    before, after = case.section, moved(case, field, 0.1).section
+    tip, edge, rim = filler_tip(case), belt_edge(case), rim_edge(case.section)
+    assert tip is not None
+    place = before.names.index(carcass_line(case))
+    arc = lambda p: np.hypot(*np.diff(p[place], axis=0).T).cumsum()
+    assert arc(before.points)[tip - 1] - arc(after.points)[tip - 1] == pytest.approx(9e-4, rel=0.01)
+    np.testing.assert_array_equal(after.points[:, : edge + 1], before.points[:, : edge + 1])
+    np.testing.assert_array_equal(after.points[:, rim:], before.points[:, rim:])
+    for line in (0, place, -1):
+        old, new = before.points[line], after.points[line]
+        near = np.hypot(*(new[:, None] - densely(old)).transpose(2, 0, 1)).min(1)
+        angle = np.unwrap(np.arctan2(*np.diff(old, axis=0).T))
+        assert near.max() < 0.9e-3 * abs(np.diff(angle))[edge:rim].max()
+
+
+def densely(line: Array) -> Array:
+    """A line's points with a hundred more between any two."""
+    at = np.arange(len(line))
+    many = np.linspace(0, at[-1], 100 * at[-1] + 1)
+    return np.stack([np.interp(many, at, line[:, k]) for k in range(2)], 1)
+
+
 def test_a_section_moves_by_what_is_stated() -> None:
     """Sums of squares of the components' displacements, amid the sidewall: 0.8 mm, and 4 %."""
     s = arc_length(STATED)
@@ -88,7 +127,7 @@ def test_a_section_moves_by_what_is_stated() -> None:
             assert abs(ratio) < 1e-9 or field.kind == "gauge"
             square[field.kind] += float(off if field.kind == "meridian" else ratio) ** 2
             assert np.nanmax(abs(points - section.points)[:, s > 1]) == 0
-    meridian, gauge, *_ = SECTION_SIZES["drawing"]
+    meridian, _, gauge, *_ = SECTION_SIZES["drawing"]
     assert np.sqrt(square["meridian"]) == pytest.approx(meridian, rel=0.02)
     assert np.sqrt(square["gauge"]) == pytest.approx(gauge, rel=0.02)
 

@@ -1,17 +1,17 @@
 """Half a tyre's section from a size code by arcs, as moulds are drawn: the makers' of study 3.
 
 Nothing of `tyrecal.tyre.section` but what the code says of diameter, width and rim. The carcass is
-an arc over the crown, then two cubic curves with the handles of circular arcs, tangent to one
-another at the belt's edge, at the widest point and at the rim. Real parts: a tread with grooves of
-their own depth, under-tread, cap ply, belts of different widths, a bead filler that tapers to a
-tip, a turned-up ply, wires in the bead. Lengths in m.
+two arcs, tangent to one another, to the crown and to the widest point's radius, as many a mould's
+is; below, cubic curves with the handles of circular arcs, tangent at the rim. Real parts: a tread
+with grooves of their own depth, under-tread, cap ply, belts of different widths, a bead filler that
+tapers to a tip, a turned-up ply, wires in the bead. Lengths in m.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import atan2, cos, sin, tan
+from math import asin, atan2, cos, sin, tan
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
@@ -102,7 +102,7 @@ def mould(text: str) -> Mould:
         widest=(size.rim_code * 0.0127 + 0.505 * H, S / 2 - sidewall + liner),
         rim=(flange, rim),
         seat=(flange - deep, rim - 0.35 * deep),
-        lean=0.4,
+        lean=0.5,
         liner=liner,
         ply=ply,
         belt=belt,
@@ -112,7 +112,7 @@ def mould(text: str) -> Mould:
         skid=skid,
         sidewall=sidewall,
         bead=bead,
-        filler=0.33 * H if truck else 0.3 * H,
+        filler=0.33 * H if truck else 0.25 * H,
         turn_up=0.4 * H if truck else 0.52 * H,
     )
 
@@ -159,11 +159,14 @@ class Section:
 def carcass(m: Mould) -> tuple[Array, Array, dict[str, float]]:
     """s (k,), points (k, 2) of the carcass, and the marks on it."""
     r0, R, half = m.crown - m.crown_gauge + m.liner, m.arc, max(m.belts)
-    x = np.linspace(0, half / R, CURVE_POINTS)
-    crown = np.stack([r0 - R * (1 - np.cos(x)), R * np.sin(x)], 1)
     widest, rim, seat = (np.array(p) for p in (m.widest, m.rim, m.seat))
-    down = -np.pi / 2
-    upper = arc_like(crown[-1], widest, -half / R, down)
+    # both arcs' centres lie (R - q) apart: (w_r - r0 + R)^2 + (w_z - q)^2 = (R - q)^2
+    low, wide = widest[0] - r0 + R, widest[1]
+    q = (R * R - low * low - wide * wide) / (2 * (R - wide))
+    meet, down = asin((wide - q) / (R - q)), -np.pi / 2
+    x, y = np.linspace(0, meet, CURVE_POINTS), np.linspace(meet, np.pi / 2, CURVE_POINTS)
+    crown = np.stack([r0 - R * (1 - np.cos(x)), R * np.sin(x)], 1)
+    upper = np.stack([widest[0] + q * np.cos(y), wide - q + q * np.sin(y)], 1)
     lower = arc_like(widest, rim, down, down - m.lean)
     chord = seat - rim
     end = arc_like(rim, seat, down - m.lean, atan2(chord[0], chord[1]) + 1e-3)

@@ -48,7 +48,6 @@ MAX_ITERATIONS = 30
 RISE, SHORTEST_m = 1e3, 1e-9  # of a residual in a step, which is halved else
 HELP = (500.0, 50.0, 5.0, 0.5, 0.0)  # of the pressure: slack cords do not bear yet
 QUADRATURE = 6
-BUCKLED = 0.02  # share of its stiffness that a cord has in compression, by the makers' own law
 CELL = ("C10", "D1", "density", "dynamic_C10", "hoop_Pa", "lining")
 LINE = ("stiffness", "angle", "area_density", "prestrain")  # of the line above a cell
 logging.disable(logging.INFO)  # of the compiler
@@ -157,9 +156,7 @@ class Tyre:
         strain = {"nominal": ufl.sqrt(ufl.dot(q, q)) - 1, "logarithmic": ufl.ln(ufl.dot(q, q)) / 2}[
             cord_law
         ]
-        taut = strain - both["prestrain"]
-        bears = ufl.conditional(ufl.lt(taut, 0.0), BUCKLED if cord_law == "nominal" else 1.0, 1.0)
-        lines = bears * both["stiffness"] * taut**2 / 2
+        lines = both["stiffness"] * (strain - both["prestrain"]) ** 2 / 2
         inside = rubber(F, {**d, "C01": 0.0}, volume_law) + hoop
         return inside * self.R * self.dx + self._on_lines(lines)
 

@@ -3,8 +3,9 @@
 Each is a Gaussian random field over s, the arc length of the carcass from the crown (0) to where
 the rim holds it (1), alike on both sides, its covariance exp(-(s - s')^2 / (2 l^2)) in units of its
 variance; meridian and gauges are 0 at the rim. Karhunen and Loeve's components of it, with 99 % of
-the variance, are sources of error (Rasmussen and Williams, Gaussian Processes, sec. 4.3). The case
-states what its section is known from, and so how large they are:
+the variance, are sources of error (Rasmussen and Williams, Gaussian Processes, sec. 4.3). Besides,
+a bead filler of a rubber of its own may be higher: by that modes across the wheel rise less with
+the pressure. The case states what its section is known from, and so how large they are:
 
     section: {stations: tyre.csv, known_from: drawing}
 
@@ -24,18 +25,20 @@ from ...tyre.case import LoadedCase
 from ...tyre.case.parts import SectionOrigin
 from ...tyre.case.schema import Rubber
 from ...tyre.effects.edit import with_part
-from ...tyre.effects.parts import carcass_line, rim_edge, stations
+from ...tyre.effects.parts import belt_edge, carcass_line, rim_edge, stations, turned_up
 from .regions import split_by_region
 
 Array = np.ndarray
 SECTION = "section "  # with which their names begin
 OF_COMPOUNDS = ("stiffness", "density")
-FIELD_KINDS = ("meridian", "gauge", *OF_COMPOUNDS)
-SECTION_SIZES = {  # standard deviations, by judgement: m along the normal, the others relative
-    "exact": (0.0, 0.0, 0.0, 0.0),  # that of the model which made the data
-    "measured": (0.3e-3, 0.02, 0.03, 0.01),  # a cut tyre and a scale
-    "drawing": (0.8e-3, 0.04, 0.05, 0.01),  # moulds are true, plies and rubber flow
-    "size_code": (3e-3, 0.10, 0.10, 0.02),  # tyres of one size from several makers
+FIELD_KINDS = ("meridian", "filler", "gauge", *OF_COMPOUNDS)
+# standard deviations, by judgement: m along the normal, m of the filler's tip along the carcass
+# (fillers of one size reach 30 to 60 mm above the rim), the others relative
+SECTION_SIZES = {
+    "exact": (0.0, 0.0, 0.0, 0.0, 0.0),  # that of the model which made the data
+    "measured": (0.3e-3, 1e-3, 0.02, 0.03, 0.01),  # a cut tyre and a scale
+    "drawing": (0.8e-3, 2e-3, 0.04, 0.05, 0.01),  # moulds are true, plies and rubber flow
+    "size_code": (3e-3, 9e-3, 0.10, 0.10, 0.02),  # tyres of one size from several makers
 }
 UNSAID: SectionOrigin = "drawing"
 CORRELATION_LENGTH = 0.25  # l, of the half meridian
@@ -49,7 +52,7 @@ class SectionField:
     """One component at one standard deviation."""
 
     kind: str
-    values: Array  # (stations,) m outwards, or relative; of compounds (parts,)
+    values: Array  # (stations,) m outwards, towards the crown, or relative; of compounds (parts,)
 
     @property
     def moves(self) -> bool:
@@ -90,7 +93,13 @@ def fields(case: LoadedCase) -> dict[str, SectionField]:
         COMPOUNDS_ALIKE + (1 - COMPOUNDS_ALIKE) * np.eye(len(rubbers))
     )
     compounds = np.linalg.cholesky(alike).T
-    by_kind = {"meridian": along, "gauge": along, "stiffness": compounds, "density": compounds}
+    by_kind = {
+        "meridian": along,
+        "filler": higher_filler(case),
+        "gauge": along,
+        "stiffness": compounds,
+        "density": compounds,
+    }
     return {
         f"{SECTION}{kind} {i}": SectionField(kind, size[kind] * values)
         for kind, shapes in by_kind.items()
@@ -107,13 +116,38 @@ def rubber_parts(case: LoadedCase) -> dict[str, str]:
 def words(case: LoadedCase) -> str:
     """What is assumed, for people."""
     known = known_from(case)
-    meridian, gauge, stiffness, density = SECTION_SIZES[known]
+    meridian, filler, gauge, stiffness, density = SECTION_SIZES[known]
+    tip = f" bead filler's tip {1e3 * filler:g} mm," if len(higher_filler(case)) else ""
     unsaid = "" if case.case.section.known_from else ", as the case does not say"
     return (
         f"section known from {known.replace('_', ' ')}{unsaid}: meridian {1e3 * meridian:g} mm,"
-        f" gauges {gauge:.0%}, compounds' stiffness {stiffness:.0%} and density {density:.0%},"
+        f"{tip} gauges {gauge:.0%}, compounds' stiffness {stiffness:.0%} and density {density:.0%},"
         " smooth"
     )
+
+
+def filler_tip(case: LoadedCase) -> int | None:
+    """Station at which the bead filler ends, a rubber of its own between the carcass and its
+    turn-up; None where there is none. Raises ValueError without a carcass."""
+    line = (turned_up(case) or ("",))[0]
+    for solid in case.case.solids:
+        if solid.between == [carcass_line(case), line] and solid.regions:
+            return min(stations(case.section, name)[0] for name in solid.regions)
+    return None
+
+
+def higher_filler(case: LoadedCase) -> Array:
+    """How far stations go along the carcass as the filler's tip does so by 1: (1, stations), or
+    (0, stations) without a filler. Those up to the turn-up's end (the belt's, where it is the tip)
+    and down to the rim go in proportion."""
+    s, tip = arc_length(case), filler_tip(case)
+    if tip is None:
+        return np.empty((0, len(s)))
+    found = turned_up(case)
+    assert found
+    end = min(stations(case.section, name)[0] for name in found[1])
+    above = end if end < tip else belt_edge(case)
+    return np.interp(s, s[[above, tip, rim_edge(case.section)]], [0.0, 1.0, 0.0])[None]
 
 
 def arc_length(case: LoadedCase) -> Array:
@@ -138,11 +172,17 @@ def components(s: Array) -> Array:
 
 
 def moved(case: LoadedCase, field: SectionField, amount: float) -> LoadedCase:
-    """The case with so much of a component of its meridian or its gauges."""
+    """The case with so much of a component of its meridian, filler or gauges."""
     section = case.section
     carcass = section.points[section.names.index(carcass_line(case))]
     if field.kind == "gauge":
         points = carcass + (section.points - carcass) * (1 + amount * field.values)[:, None]
+    elif field.kind == "filler":
+        # surfaces keep their shape, lines inside their distance from the carcass
+        arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(carcass, axis=0).T))])
+        along = np.stack([np.gradient(carcass, arc, axis=0)] * len(section.names))
+        along[[0, -1]] = np.gradient(section.points[[0, -1]], arc, axis=1)
+        points = section.points - amount * field.values[:, None] * along
     else:
         r, z = np.gradient(carcass, axis=0).T
         normal = np.stack([-z, r], 1) / np.hypot(r, z)[:, None]

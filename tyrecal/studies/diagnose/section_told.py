@@ -15,18 +15,18 @@ from ...tyre.effects.parts import stations
 from .diagnosis import Diagnosis
 from .evidence import NONE
 from .gap import projection
-from .section_fields import FIELD_KINDS, rubber_parts
+from .section_fields import FIELD_KINDS, filler_tip, rubber_parts
 from .uncertainties import Source
 from .where import FieldValue
 
 Array = np.ndarray
-FIELD_UNITS = {"meridian": ("mm", 1e3), "gauge": ("%", 100.0)}  # compounds in per cent, too
+UNITS = {"meridian": ("mm", 1e3), "filler": ("mm", 1e3)}  # the others in per cent
 
 
 def section_told(
     case: LoadedCase, sources: Sequence[Source], diagnosis: Diagnosis
 ) -> list[FieldValue]:
-    """Meridian and gauges amid each region, compounds by part."""
+    """Meridian and gauges amid each region, the filler's tip, compounds by part."""
     problem = diagnosis.bare
     columns = [k for k, source in enumerate(sources) if source.field]
     P, _, _ = projection(problem, diagnosis.hypothesis(NONE).fitted.d[0])
@@ -37,12 +37,15 @@ def section_told(
     middles = {name: sum(stations(case.section, name)) // 2 for name, _ in case.section.regions}
     compounds = {name: i for i, name in enumerate(rubber_parts(case).values())}
     known = [source.field for source in sources if source.field]
+    places = {"meridian": middles, "gauge": middles}
+    if (tip := filler_tip(case)) is not None:
+        places["filler"] = {"tip": tip}
     result = []
     for kind in FIELD_KINDS:
         own = [i for i, field in enumerate(known) if field.kind == kind]
         values = np.array([known[i].values for i in own])
-        unit, scale = FIELD_UNITS.get(kind, ("%", 100.0))
-        for place, i in (middles if kind in FIELD_UNITS else compounds).items():
+        unit, scale = UNITS.get(kind, ("%", 100.0))
+        for place, i in places.get(kind, compounds).items() if own else ():
             v = scale * values[:, i]
             spread = float(np.sqrt(max(v @ covariance[np.ix_(own, own)] @ v, 0.0)))
             before = float(np.linalg.norm(v))
