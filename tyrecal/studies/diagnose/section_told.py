@@ -20,7 +20,7 @@ from .uncertainties import Source
 from .where import FieldValue
 
 Array = np.ndarray
-UNITS = {"meridian": ("mm", 1e3), "filler": ("mm", 1e3)}  # the others in per cent
+FIELD_UNITS = {"meridian": ("mm", 1e3), "filler": ("mm", 1e3)}  # the others in per cent
 
 
 def section_told(
@@ -44,7 +44,7 @@ def section_told(
     for kind in FIELD_KINDS:
         own = [i for i, field in enumerate(known) if field.kind == kind]
         values = np.array([known[i].values for i in own])
-        unit, scale = UNITS.get(kind, ("%", 100.0))
+        unit, scale = FIELD_UNITS.get(kind, ("%", 100.0))
         for place, i in places.get(kind, compounds).items() if own else ():
             v = scale * values[:, i]
             spread = float(np.sqrt(max(v @ covariance[np.ix_(own, own)] @ v, 0.0)))
