@@ -12,6 +12,8 @@ from tyrecal.report.diagnosis import page
 from tyrecal.studies.diagnose.constants_told import constants_told
 from tyrecal.studies.diagnose.diagnosis import Diagnosis, diagnose
 from tyrecal.studies.diagnose.evidence import COVERAGE, explain
+from tyrecal.studies.diagnose.expansion import anchored
+from tyrecal.studies.diagnose.model import Query
 from tyrecal.studies.diagnose.result import diagnosis_result
 from tyrecal.studies.diagnose.robustness import robustness
 from tyrecal.studies.diagnose.several import before, most_like, present, probabilities, weigh
@@ -52,6 +54,38 @@ def test_three_effects_are_found() -> None:
     assert decide(found, p, len(y), 3).key == "e0+e2+e4" and p["e0+e2+e4"] > 0.9
     best = next(h for h in found if h.key == "e0+e2+e4")
     assert best.mean() == pytest.approx(truth, abs=0.1)
+
+
+@pytest.mark.parametrize("sizes", [{}, {"e1": 0.4}, {"e0": 0.8, "e2": 0.7}])
+def test_few_points_are_enough_for_sets_that_do_not_matter(sizes: dict[str, float]) -> None:
+    """ln Z within 0.5 of that by the full rule, whose narrow peaks it finds; probabilities within
+    1e-3 of those where every set has the full rule."""
+    toy = Toy(effects=5)
+    p = problem(toy).measured(toy.base + sum(e * toy.g[id] for id, e in sizes.items()))
+    found = weigh(p)
+    several = [h for h in found if len(h.values) > 1]
+    assert any(h.few for h in several)
+    full = {h.key: explain(p, list(h.values), h.prior) for h in several}
+    for h in several:
+        assert h.ln_evidence == pytest.approx(full[h.key].ln_evidence, abs=0.5 if h.few else 1e-9)
+    every = probabilities([full.get(h.key, h) for h in found])
+    assert probabilities(found) == pytest.approx(every, abs=1e-3)
+
+
+def test_what_the_model_was_asked_nothing_more_of_stands() -> None:
+    """As weighed anew: after one effect was asked again, and after two were together."""
+    toy = Toy(effects=3, bend=0.05)
+    base = problem(toy, x0=np.array([0.1, 0.0, -0.1]))
+    base = base.measured(toy.base + 0.6 * toy.g["e0"] + 0.5 * toy.g["e2"])
+    first, x = weigh(base), base.expansion.x0 + 0.2
+    for asked in ({"e0": 0.6}, {"e0": 0.6, "e2": 0.5}):
+        again = replace(base, expansion=anchored(base.expansion, toy, [Query(x, asked)]))
+        later, anew = weigh(again, before=(base, first)), weigh(again)
+        assert [h.key for h in later] == [h.key for h in anew]
+        for h, other in zip(later, anew, strict=True):
+            assert h.ln_evidence == pytest.approx(other.ln_evidence, abs=1e-12)
+        stood = {h.key for h in later if any(h is each for each in first)}
+        assert stood and not any(set(asked) <= set(key.split("+")) for key in stood)
 
 
 def test_a_third_effect_is_looked_for_where_the_rest_of_the_gap_is_like_it() -> None:

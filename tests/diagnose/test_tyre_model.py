@@ -511,17 +511,18 @@ def with_slopes(case: LoadedCase, ids: Sequence[str]) -> TyreModel:
 
 
 def test_slopes_by_effects_against_differences() -> None:
-    """By the parameter at any size but 0, none of the mass; no effect that moves nodes, none that
-    parts pairs far."""
+    """By the parameter at any size but 0, none of the mass; of effects that move nodes, too, but
+    none that parts pairs far."""
     own = with_slopes(WIDE, ("bead_filler", "temperature", SPLICE, "rotation", "rim_width"))
-    assert own.sloped == {"bead_filler", "temperature"} and own.sloped_at_0 == {SPLICE}
-    id, e, step = "bead_filler", 0.5, 5e-4
-    points = [Query(X, {id: e + step}), Query(X, {id: e - step}), Query(X, {id: e}, slopes=(id,))]
-    above, below, found = own.answers(points)
-    assert isinstance(above, Answer) and isinstance(below, Answer) and isinstance(found, Answer)
-    two = (above.eta - below.eta)[:-1] / (2 * step)
-    assert found.slopes[id][:-1] == pytest.approx(two, rel=1e-4, abs=1e-6)
-    assert np.isnan(found.slopes[id][-1]) and above.slopes == {}
+    assert own.sloped == {"bead_filler", "temperature", "rim_width"}
+    assert own.sloped_at_0 == {SPLICE}
+    for id, e, step in (("bead_filler", 0.5, 5e-4), ("rim_width", 6e-3, 1e-5)):
+        points = [Query(X, {id: e + side * step}) for side in (1, -1)]
+        above, below, found = own.answers([*points, Query(X, {id: e}, slopes=(id,))])
+        assert isinstance(above, Answer) and isinstance(below, Answer) and isinstance(found, Answer)
+        two = (above.eta - below.eta)[:-1] / (2 * step)
+        assert found.slopes[id][:-1] == pytest.approx(two, rel=1e-4, abs=1e-6)
+        assert np.isnan(found.slopes[id][-1]) and above.slopes == {}
 
 
 @pytest.mark.slow

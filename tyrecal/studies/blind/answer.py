@@ -93,9 +93,10 @@ def one_answer(
     """The diagnosis of one file of measurements, and what it predicts at the held-out pressure;
     known: about the start, for all trials."""
     observations = observe(read_measurements(trial), split=protocol.split)
-    found = diagnose(model, rows, observations, assumed=Assumed(split=protocol.split), known=known)
+    assumed = Assumed(split=protocol.split)
+    found = diagnose(model, rows, observations, assumed=assumed, known=known, ranked=False)
     told = diagnosis_result(found).content()
-    told.pop("next_measurements"), told.pop("section_map")
+    told.pop("next_measurements"), told.pop("section_map")  # empty: neither was asked for
     key = told["effect"] or told["likeliest"]
     return {
         "diagnosis": told,

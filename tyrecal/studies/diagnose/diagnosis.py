@@ -109,6 +109,7 @@ def diagnose(
     assumed: Assumed = Assumed(),  # noqa: B008
     parts: Callable[[Array], Sequence[SectionPart]] | None = None,
     further: Callable[[list[ModelRow]], ResponseModel] | None = None,
+    ranked: bool = True,
     expansion: Expansion | None = None,
     known: Expansion | None = None,
     seed: int = 0,
@@ -118,10 +119,11 @@ def diagnose(
 
     observations: or readings of them where frequencies came without labels, see `labelings`;
     changes: what was switched in runs 1, 2, ...; parts: slopes by the section's parts at x;
-    further: a model of other rows, for the next measurement; expansion: of an earlier call with
-    the same model, near whose x0 the fit lies; known: of the same model anywhere, from where
-    effects are carried to the fit and only the likeliest are asked there; stage: hears of each of
-    ``STAGES``. Raises the model's failure where the plain tyre has no solution.
+    further: a model of other rows, for the next measurement; ranked: whether `choices` are wanted;
+    expansion: of an earlier call with the same model, near whose x0 the fit lies; known: of the
+    same model anywhere, from where effects are carried to the fit and only the likeliest are asked
+    there; stage: hears of each of ``STAGES``. Raises the model's failure where the plain tyre has
+    no solution.
     """
     labelled = isinstance(observations, Observations)
     readings = [Reading(observations)] if isinstance(observations, Observations) else observations
@@ -167,7 +169,7 @@ def diagnose(
     shrinkage = shrink(problem, named, seed) if problem.expansion.nodes else None
     stage(STAGES[3])
     typical = {h.key: h.typical(SIZES) for h in hypotheses if h.values}
-    choices = rank(bare, d, p, typical, model.sources, further)
+    choices = rank(bare, d, p, typical, model.sources, further) if ranked else []
     return Diagnosis(
         problem,
         bare,
@@ -213,10 +215,10 @@ def _settled(
 ) -> tuple[InverseProblem, list[Hypothesis]]:
     """The problem with the model asked again for hypotheses in play, and all weighed by it."""
     for _ in range(MAX_ROUNDS if problem.expansion.nodes else 0):
-        problem, changed = _asked_again(problem, model, hypotheses)
+        again, changed = _asked_again(problem, model, hypotheses)
         if not changed:
             break
-        hypotheses = weigh(problem)
+        problem, hypotheses = again, weigh(again, before=(problem, hypotheses))
     return problem, hypotheses
 
 

@@ -28,6 +28,7 @@ NONE: Final = "none"
 OUTSIDE: Final = "outside"
 PRIOR_OUTSIDE: Final = 0.10
 RULE_POINTS = {1: 25, 2: 15, 3: 9}  # of the rule in each parameter, by how many effects there are
+FEW_POINTS = {2: 7, 3: 5}  # that show which sets of effects matter: ln Z within 0.5
 COVERAGE = 2.0  # standard deviations within which a stated number may be off (GUM, k = 2)
 SHARP_FALL = 2.0  # of ln Z from the best point to its neighbours, which asks for more points
 MAX_ZOOMS = 6
@@ -69,6 +70,7 @@ class Hypothesis:
     words: str = ""
     ends: Mapping[str, tuple[float, float]] = field(default_factory=dict)  # of the grid, by id
     stated: Mapping[str, float] = field(default_factory=dict)  # by id, see `Span.stated`
+    few: bool = False  # whether its grid has `FEW_POINTS`
 
     @property
     def posterior(self) -> Array:
@@ -279,16 +281,17 @@ def explain(
     ids: Sequence[str],
     prior: float,
     among: Mapping[int, float] | None = None,
+    few: bool = False,
 ) -> Hypothesis:
     """One to three effects over their ranges; what they add is added up.
 
     Where a peak is narrow, points gather about it: those within two places of the best one give way
     to a rule of their own on the box between, until ln Z falls gently from the best point to its
-    neighbours. ``among``: see `refit`.
+    neighbours. ``among``: see `refit`; few: by few points.
     """
     box = [problem.expansion.nodes[id].reach for id in ids]
     widths = [high - low for low, high in box]
-    count, kept = RULE_POINTS[len(ids)], []
+    count, kept = (FEW_POINTS if few else RULE_POINTS)[len(ids)], []
     for zoom in range(MAX_ZOOMS + 1):
         rules = [_rule(low, high, count) for low, high in box]
         values = _grid([points for points, _ in rules])
@@ -322,6 +325,7 @@ def explain(
         joined,
         ends={id: (float(e.min()), float(e.max())) for id, e in by_id.items()},
         stated={id: problem.spans[id].stated for id in ids if problem.spans[id].stated},
+        few=few,
     )
 
 

@@ -168,8 +168,9 @@ class InverseProblem:
 
     def law(self, added: Added) -> Array:
         """Covariance (q, n, n) by which effects may be off what they add."""
-        by_mode = np.einsum("kqn,kqm->qnm", added.off, added.off) * self._alike
-        return np.asarray(by_mode + np.einsum("kqn,kqm->qnm", added.beside, added.beside))
+        off, beside = (each.transpose(1, 2, 0) for each in (added.off, added.beside))
+        by_mode = off @ off.swapaxes(1, 2) * self._alike
+        return np.asarray(by_mode + beside @ beside.swapaxes(1, 2))
 
     def _law(self, id: str) -> float:
         stated = self.assumed.law

@@ -25,18 +25,41 @@ COUPLED_POINTS = 3  # of the rule in what couples modes, that stand for all from
 PARTNERS = 4  # singles that are tried with every other
 BASES, BASES_WITHIN = 3, 3.0  # pairs that a third is added to; ln probability behind the best
 THIRDS = 4  # effects that are added to each
+NEGLIGIBLE = 8.0  # ln probability of a set behind the best of fewer, for few points to be enough
 
 
-def weigh(problem: InverseProblem, pairs: bool = True) -> list[Hypothesis]:
-    """Every hypothesis with its evidence; ``pairs``: of two and three effects, too."""
+def weigh(
+    problem: InverseProblem,
+    pairs: bool = True,
+    before: tuple[InverseProblem, Sequence[Hypothesis]] | None = None,
+) -> list[Hypothesis]:
+    """Every hypothesis with its evidence; ``pairs``: of two and three effects, too; before: of the
+    same problem with less asked of the model, whose other hypotheses stand."""
+    stand = _standing(problem, *before) if before else {}
     ids = list(problem.expansion.nodes)
     prior = priors(len(ids), problem.assumed.further, MOST_EFFECTS if pairs else 1)
     plain = refit(problem, {}, 1)
     none = Hypothesis(NONE, PRIOR_NONE, float(plain.ln_evidence[0]), {}, np.zeros(1), plain)
-    found = [none, outside(problem), *(explain(problem, [id], prior[1]) for id in ids)]
+    found = [none, outside(problem)]
+    found += [stand.get(id) or explain(problem, [id], prior[1]) for id in ids]
     for count in range(2, len(prior) + 1):
-        found += _with_one_more(problem, found, count, prior[count])
+        found += _with_one_more(problem, found, count, prior[count], stand)
     return found
+
+
+def _standing(
+    problem: InverseProblem, before: InverseProblem, hypotheses: Sequence[Hypothesis]
+) -> dict[str, Hypothesis]:
+    """By key, those of whose effects the model has been asked nothing more since."""
+    now, then = problem.expansion, before.expansion
+    new = {frozenset([id]) for id, nodes in now.nodes.items() if nodes is not then.nodes[id]}
+    new |= {frozenset(ids) for ids, each in now.joint.items() if each is not then.joint.get(ids)}
+    switched = {change.id for change in problem.changes}  # which all tyres have in some run
+    return {
+        h.key: h
+        for h in hypotheses
+        if h.values and not any(asked <= {*h.values, *switched} for asked in new)
+    }
 
 
 def priors(effects: int, further: float, most: int = MOST_EFFECTS) -> dict[int, float]:
@@ -81,9 +104,14 @@ def _by_key(
 
 
 def _with_one_more(
-    problem: InverseProblem, found: Sequence[Hypothesis], count: int, prior: float
+    problem: InverseProblem,
+    found: Sequence[Hypothesis],
+    count: int,
+    prior: float,
+    stand: Mapping[str, Hypothesis],
 ) -> list[Hypothesis]:
-    """Sets of ``count`` effects: the likeliest of one less, each with others."""
+    """Sets of ``count`` effects: the likeliest of one less, each with others; ``stand``: by key,
+    those that are known."""
     order = [h.key for h in found if h.key in problem.expansion.nodes]
     singles = {h.key: h for h in found if h.key in order}
     fewer = [h for h in found if len(h.values) == count - 1]
@@ -95,9 +123,13 @@ def _with_one_more(
         likely = [h for h in fewer[:BASES] if ln[h.key] > max(ln.values()) - BASES_WITHIN]
         wanted = {frozenset((*h.values, id)) for h in likely for id in most_like(problem, h)}
     sets = [[id for id in order if id in each] for each in wanted]
-    result = []
+    most, result = max(h.ln_evidence + np.log(h.prior) for h in found), []
     for ids in sorted(sets, key=lambda ids: [order.index(id) for id in ids]):
-        result.append(explain(problem, ids, prior, coupled_most([singles[id] for id in ids])))
+        among = coupled_most([singles[id] for id in ids])
+        h = stand.get("+".join(ids)) or explain(problem, ids, prior, among, few=True)
+        if h.few and h.ln_evidence + np.log(prior) > most - NEGLIGIBLE:
+            h = explain(problem, ids, prior, among)
+        result.append(h)
     return result
 
 

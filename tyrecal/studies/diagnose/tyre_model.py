@@ -31,7 +31,6 @@ from .uncertainties import EFFECT_PATH, Source, unit_of, values_of
 from .veering import coupling, partner
 
 Array = np.ndarray
-MANY_NUMBERS = 100  # of a deck: nodes are among them
 WORTH_A_POOL = 10  # evaluations, for processes to be started
 
 MAY_VEER = 0.15  # of ln f at some pressure, from which modes of one harmonic may veer
@@ -92,7 +91,7 @@ class TyreModel:
 
     @cached_property
     def sloped(self) -> Collection[str]:
-        """Effects with whose parameter a few numbers of the decks change."""
+        """Effects with whose parameter numbers of the decks change, and no keywords."""
         sizes = {
             id: map(float, node_values(span, ONE_SIDED_SLOPED)) for id, span in self.spans.items()
         }
@@ -223,18 +222,16 @@ class TyreModel:
             return True
 
     def _moves(self, id: str, sizes: Iterable[float]) -> bool:
-        """Whether a few numbers of the decks are all that changes with an effect, about each of
-        the sizes: a slope by where nodes are takes as long as an evaluation. Not where waves part
-        so far that the slope of a pair's mean is none of its geometric mean."""
+        """Whether numbers of the decks are all that changes with an effect, about each of the
+        sizes. Not where waves part so far that the slope of a pair's mean is none of its geometric
+        mean."""
         if catalogue()[id].needs == "rotation":
             return False
         path, base = EFFECT_PATH + id, self._present.get(id, 0.0)
         try:
             for e in sizes:
                 design = self.evaluator.design.at({path: base + e})
-                moved = Decks(design, (path,)).tangents(self.evaluator.solver.dialect)[path]
-                if len(moved) > MANY_NUMBERS:
-                    return False
+                Decks(design, (path,)).tangents(self.evaluator.solver.dialect)
         except (ValueError, TemplateFailed):
             return False
         return True

@@ -87,19 +87,21 @@ class Veering:
         """ln f (q, n) of the coupled modes from those of uncoupled ones (q, n); d ln f by its own
         ln f and by its partner's (q, n); ln probability (q,) of the labels, each the likelier the
         more of the mode is its own."""
-        q, on = zeta * self.size, self.size > 0
-        there = np.where(self.partner >= 0, eta[:, self.partner], self.other)
-        a, b = (np.exp(2 * np.clip(ln_f - self.scale, -1, 1)) for ln_f in (eta, there))
+        on = np.flatnonzero(self.size)
+        q, mate, scale = zeta * self.size[on], self.partner[on], self.scale[on]
+        there = np.where(mate >= 0, eta[:, mate], self.other[on])
+        a, b = (np.exp(2 * np.clip(ln_f - scale, -1, 1)) for ln_f in (eta[:, on], there))
         delta = (a - b) / 2
         D = np.sqrt(delta**2 + q**2)
-        side = np.where(self.partner >= 0, self.side, np.where(delta < 0, -1.0, 1.0))
-        found = (a + b) / 2 + self.rise * zeta**2 + side * D
-        share = (1 + side * delta / np.where(on, np.maximum(D, 1e-300), 1.0)) / 2  # of its own
-        each = np.log(MISLABELLED + (1 - MISLABELLED) * share[:, on])
-        told = each.sum(1) / max(on.sum(), 1)  # labels go together
-        ln_f = np.where(on, self.scale + np.log(np.maximum(found, 1e-6)) / 2, eta)
-        own = np.where(on, share * a / found, 1.0)
-        part = np.where(on & (self.partner >= 0), (1 - share) * b / found, 0.0)
+        side = np.where(mate >= 0, self.side[on], np.where(delta < 0, -1.0, 1.0))
+        found = (a + b) / 2 + self.rise[on] * zeta**2 + side * D
+        share = (1 + side * delta / np.maximum(D, 1e-300)) / 2  # of its own
+        each = np.log(MISLABELLED + (1 - MISLABELLED) * share)
+        told = each.sum(1) / max(len(on), 1)  # labels go together
+        ln_f, own, part = eta.copy(), np.ones_like(eta), np.zeros_like(eta)
+        ln_f[:, on] = scale + np.log(np.maximum(found, 1e-6)) / 2
+        own[:, on] = share * a / found
+        part[:, on] = np.where(mate >= 0, (1 - share) * b / found, 0.0)
         return ln_f, own, part, told
 
     def weights(self, y: Array, zeta: float) -> Array:
