@@ -80,7 +80,7 @@ def mould(text: str) -> Mould:
     size = parse_size(text)
     S, H = size.section_width(size.measuring_rim), size.section_height
     truck = size.truck
-    flange = size.flange_radius(size.measuring_rim)
+    flange, widest = size.flange_radius(size.measuring_rim), size.rim_code * 0.0127 + 0.505 * H
     bead = 0.105 * size.measuring_rim + (0.007 if truck else -0.004)
     sidewall = 0.03 * S + (0.0055 if truck else -0.0012)
     half = 0.5 * S * (0.8 if truck else min(0.94, max(0.76, 0.74 + 0.55 * (0.65 - H / size.width))))
@@ -99,7 +99,7 @@ def mould(text: str) -> Mould:
         arc=2.4 * S if truck else 1.9 * S * S / H * 0.85,
         belts=tuple(half * w for w in widths),
         cap=half * (0.55 if truck else 0.97),
-        widest=(size.rim_code * 0.0127 + 0.505 * H, S / 2 - sidewall + liner),
+        widest=(widest, S / 2 - sidewall + liner),
         rim=(flange, rim),
         seat=(flange - deep, rim - 0.35 * deep),
         lean=0.5,
@@ -112,7 +112,7 @@ def mould(text: str) -> Mould:
         skid=skid,
         sidewall=sidewall,
         bead=bead,
-        filler=0.33 * H if truck else 0.25 * H,
+        filler=(0.6 if truck else 0.5) * (widest - flange),
         turn_up=0.4 * H if truck else 0.52 * H,
     )
 
