@@ -15,7 +15,7 @@ from .expansion import Expansion, anchored, carried, expand
 from .gap import Gap, find_gap, projection
 from .inverse_problem import Assumed, InverseProblem, Toggle, places
 from .label_swap import exchanged, with_exchanged
-from .labelings import NEGLIGIBLE, Reading, averaged, over_labels, shares
+from .labelings import REFUTED, Reading, averaged, over_labels, shares
 from .model import ModelRow, Query, ResponseModel
 from .next_measurement import SIZES, Choice, rank
 from .observations import Observations
@@ -140,7 +140,7 @@ def diagnose(
     stage(STAGES[1])
     first = [weigh(bare) for bare in bares]
     share = shares(readings, first)
-    kept = np.flatnonzero(share > NEGLIGIBLE).tolist()
+    kept = np.flatnonzero(share > REFUTED).tolist()
     settled = [_settled(bares[k], model, first[k]) for k in kept]
     every = [h for _, own in settled for h in own]
     found = [with_sets(problem, own, every) for problem, own in settled]

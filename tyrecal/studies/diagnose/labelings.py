@@ -29,7 +29,7 @@ from .verdict import Verdict, decide
 
 Array = np.ndarray
 LEAST_PROBABLE, MOST_READINGS = 0.01, 5
-NEGLIGIBLE = 1e-6  # probability of a reading for which the model is not asked again
+REFUTED = 1e-6  # probability of a reading for which the model is not asked again
 
 
 @dataclass(frozen=True)
