@@ -137,20 +137,23 @@ def refit(
     count: int,
     extra: Array | None = None,
     among: Mapping[int, float] | None = None,
+    near: Array | None = None,
 ) -> Fitted:
     """x re-fitted at each of ``count`` parameters, integrated over what couples near modes.
 
     extra (n, n) or (q, n, n): more covariance; among: {place in the rule: see `Fitted.coupled`},
-    where some of its points stand for all.
+    where some of its points stand for all; near: x - x0 (q, v) near which it is known to lie.
     """
     added = problem.added(effects, count)
-    start = np.zeros((count, len(problem.centre)))
-    plain = _refit(problem, problem, added, extra, start, REFIT_STEPS)
-    if not problem.integrand:
-        return plain
+    if near is None or not problem.integrand:
+        start = np.zeros((count, len(problem.centre))) if near is None else near
+        plain = _refit(problem, problem, added, extra, start, REFIT_STEPS)
+        if not problem.integrand:
+            return plain
+        near = plain.d
     points = list(among) if among else list(range(len(problem.integrand)))
     found = [
-        _refit(problem, problem.integrand[k], added, extra, plain.d, COUPLED_STEPS) for k in points
+        _refit(problem, problem.integrand[k], added, extra, near, COUPLED_STEPS) for k in points
     ]
     ln, d, chi2, covariance = (np.array([each[part] for each in found]) for part in range(4))
     zeta, between, ln_weights = rule()
@@ -158,8 +161,8 @@ def refit(
     if among:
         total = np.logaddexp.reduce(ln + ln_prior) - np.log(sum(among.values()))
     else:
-        near = np.maximum(ln, ln.max(0) - FAR_BELOW)
-        finer = np.minimum(between @ near, ln.max(0) + ABOVE_POINTS)
+        lifted = np.maximum(ln, ln.max(0) - FAR_BELOW)
+        finer = np.minimum(between @ lifted, ln.max(0) + ABOVE_POINTS)
         total = np.logaddexp.reduce(finer + ln_weights[:, None])
     best, every = np.argmax(ln + ln_prior, axis=0), np.arange(count)
     p = np.exp(ln + ln_prior - np.logaddexp.reduce(ln + ln_prior))

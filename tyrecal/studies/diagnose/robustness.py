@@ -3,7 +3,7 @@
 Every prior, every constant's standard deviation and what laws are off half and twice as large, the
 model's own form and the section beyond doubt, each label left out in turn. The scatter of the data
 stands, of which the check of the fit speaks. Hypotheses that carry weight are weighed anew from the
-values and slopes that are there, those of several effects on the part of their grid that does.
+values and slopes that are there, on their grids, of several effects on the part that does.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .evidence import NONE, OUTSIDE, Fitted, Hypothesis, explain, outside, refit
+from .evidence import NONE, OUTSIDE, Fitted, Hypothesis, outside, refit
 from .inverse_problem import InverseProblem
 from .section_fields import SECTION
 from .several import coupled_most, present, probabilities
@@ -155,10 +155,8 @@ def _again(problem: InverseProblem, h: Hypothesis) -> Hypothesis:
     """A hypothesis beside another problem."""
     if h.key == OUTSIDE:
         return replace(outside(problem), prior=h.prior)
-    among = coupled_most([h])
-    if len(h.values) == 1:
-        return explain(problem, list(h.values), h.prior, among)
-    fitted = refit(problem, h.values, len(h.ln_weights), among=among)
+    d, among = h.fitted.d, coupled_most([h])
+    fitted = refit(problem, h.values, len(d), among=among, near=d)
     total = float(np.logaddexp.reduce(fitted.ln_evidence + h.ln_weights))
     return replace(h, ln_evidence=total, fitted=fitted)
 

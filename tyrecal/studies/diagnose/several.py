@@ -25,7 +25,7 @@ COUPLED_POINTS = 3  # of the rule in what couples modes, that stand for all from
 PARTNERS = 4  # singles that are tried with every other
 BASES, BASES_WITHIN = 3, 3.0  # pairs that a third is added to; ln probability behind the best
 THIRDS = 4  # effects that are added to each
-NEGLIGIBLE = 8.0  # ln probability of a set behind the best of fewer, for few points to be enough
+FEW_ENOUGH = 8.0  # ln probability of a set behind the best of fewer, for few points to be enough
 
 
 def weigh(
@@ -127,7 +127,7 @@ def _with_one_more(
     for ids in sorted(sets, key=lambda ids: [order.index(id) for id in ids]):
         among = coupled_most([singles[id] for id in ids])
         h = stand.get("+".join(ids)) or explain(problem, ids, prior, among, few=True)
-        if h.few and h.ln_evidence + np.log(prior) > most - NEGLIGIBLE:
+        if h.few and h.ln_evidence + np.log(prior) > most - FEW_ENOUGH:
             h = explain(problem, ids, prior, among)
         result.append(h)
     return result
