@@ -83,16 +83,19 @@ def with_exact_section(case: LoadedCase) -> LoadedCase:
 
 def stations_of(m: Mould) -> GaugeTable:
     """The mould's lines as a drawing has them that a user digitised: a smooth tread of the
-    pattern's mean thickness, the turned-up ply from the widest point (of a truck the filler's
-    tip) on."""
+    pattern's mean thickness, the turned-up ply from the widest point on, of a truck from where it
+    ends, at the first third of the filler's stations, where an element begins."""
     marks = carcass(m)[2]
     truck = parse_size(m.size).truck
     edges = sorted(set(m.belts))
     ends = [*edges, marks["widest"], marks["filler"], marks["rim"], marks["end"]]
     names = ["crown", "belt_edges", "shoulder"] if len(edges) > 2 else ["crown", "shoulder"]
-    counts = {**{name: BELTED[name] for name in names}, **BELOW}
+    counts = [*((name, BELTED[name]) for name in names), *BELOW.items()]
+    if truck:
+        ends.insert(-2, marks["turn_up"])
+        counts[-2:-1] = [("filler", 4), ("filler", 8)]
     arc, labels = [0.0], ["crown"]
-    for (name, count), a, b in zip(counts.items(), [0.0, *ends], ends, strict=False):
+    for (name, count), a, b in zip(counts, [0.0, *ends], ends, strict=False):
         arc += list(a + (b - a) * np.arange(1, count + 1) / count)
         labels += [name] * count
     labels[-BELOW["bead"] - 1] = "bead"
@@ -112,7 +115,7 @@ def stations_of(m: Mould) -> GaugeTable:
     if not truck:
         rows["cap"] = np.where(belted(max(edges)), offset["cap"], np.nan)
     rows["base"] = np.where(belted(max(edges)), offset["base"], np.nan)
-    turned = s >= marks["filler" if truck else "widest"] - 1e-9
+    turned = s >= marks["turn_up" if truck else "widest"] - 1e-9
     rows["belt1_turn_up"] = np.where(turned, offset["belt_1"], rows["belt1_turn_up"])
     rows["outer"] = smooth
     carcass_line = made.points[m.lines.index("ply")]

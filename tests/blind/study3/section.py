@@ -76,14 +76,18 @@ class Mould:
 
 
 def mould(text: str) -> Mould:
-    """Of a size code, by usual proportions of cut tyres."""
+    """Of a size code, by usual proportions of cut tyres: belts narrower than the tread, which is
+    about 0.8 S wide on a truck; beads that grow with the section, not with the rim; of a truck a
+    turned-up ply that ends below its filler's tip, as cords that end above it would part there,
+    and a carcass that leans 25 to 35 degrees at a quarter of the height and less at the rim."""
     size = parse_size(text)
     S, H = size.section_width(size.measuring_rim), size.section_height
     truck = size.truck
     flange, widest = size.flange_radius(size.measuring_rim), size.rim_code * 0.0127 + 0.505 * H
-    bead = 0.105 * size.measuring_rim + (0.007 if truck else -0.004)
+    bead = (0.105 if truck else 0.057) * S
     sidewall = 0.03 * S + (0.0055 if truck else -0.0012)
-    half = 0.5 * S * (0.8 if truck else min(0.94, max(0.76, 0.74 + 0.55 * (0.65 - H / size.width))))
+    belted = 0.72 if truck else min(0.84, max(0.76, 0.74 + 0.55 * (0.65 - H / size.width)))
+    half = 0.5 * S * belted
     widths = (0.72, 1.0, 0.88, 0.72) if truck else (1.0, 0.9)
     gauges = (
         (0.0032, 0.0024, 0.0024, 0.0014, 0.003, 0.003, 0.0165)
@@ -93,16 +97,17 @@ def mould(text: str) -> Mould:
     liner, ply, belt, cover, under, base, skid = gauges
     rim = size.measuring_rim / 2 - 0.7 * bead
     deep = flange - size.bead_seat_radius - (0.004 if truck else 0.003)
+    lean = 0.4 if truck else 0.5
     return Mould(
         text,
         size.overall_diameter / 2,
-        arc=2.4 * S if truck else 1.9 * S * S / H * 0.85,
+        arc=2.4 * S if truck else min(1.615 * S / H, 3.2) * S,
         belts=tuple(half * w for w in widths),
         cap=half * (0.55 if truck else 0.97),
         widest=(widest, S / 2 - sidewall + liner),
         rim=(flange, rim),
-        seat=(flange - deep, rim - 0.35 * deep),
-        lean=0.5,
+        seat=(flange - deep, rim - tan(lean) * deep),
+        lean=lean,
         liner=liner,
         ply=ply,
         belt=belt,
@@ -112,8 +117,8 @@ def mould(text: str) -> Mould:
         skid=skid,
         sidewall=sidewall,
         bead=bead,
-        filler=(0.6 if truck else 0.5) * (widest - flange),
-        turn_up=0.4 * H if truck else 0.52 * H,
+        filler=0.35 * H if truck else 0.5 * (widest - flange),
+        turn_up=0.2 * H if truck else 0.52 * H,
     )
 
 
@@ -134,8 +139,7 @@ def off(known: Mould, random: np.random.Generator, meridian: float, gauge: float
 def arc_like(p: Array, q: Array, a: float, b: float) -> Array:
     """Points of a cubic curve from p to q, its tangent turning from angle a to b, (cos, sin) being
     (z, r): handles as a circular arc between them has."""
-    turn = b - a
-    reach = np.linalg.norm(q - p) / (2 * sin(abs(turn) / 2)) * 4 / 3 * tan(abs(turn) / 4)
+    reach = np.linalg.norm(q - p) / (3 * cos((b - a) / 4) ** 2)
     along = [np.array([sin(x), cos(x)]) for x in (a, b)]
     t = np.linspace(0, 1, CURVE_POINTS)[:, None]
     one, two = p + reach * along[0], q - reach * along[1]
@@ -169,7 +173,7 @@ def carcass(m: Mould) -> tuple[Array, Array, dict[str, float]]:
     upper = np.stack([widest[0] + q * np.cos(y), wide - q + q * np.sin(y)], 1)
     lower = arc_like(widest, rim, down, down - m.lean)
     chord = seat - rim
-    end = arc_like(rim, seat, down - m.lean, atan2(chord[0], chord[1]) + 1e-3)
+    end = arc_like(rim, seat, down - m.lean, atan2(chord[0], chord[1]))
     line = np.concatenate([crown, upper[1:], lower[1:], end[1:]])
     s = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
     place = lambda k: float(s[k * (CURVE_POINTS - 1)])
