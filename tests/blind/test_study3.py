@@ -21,7 +21,7 @@ from tyrecal.studies.blind.make import labels_of
 from tyrecal.studies.blind.maker import Computed
 from tyrecal.studies.blind.protocol import read_json
 from tyrecal.studies.blind.ruler import Difficulty
-from tyrecal.studies.blind.seal import TRUTH
+from tyrecal.studies.blind.seal import SEAL, TRUTH
 from tyrecal.tyre.case import LoadedCase, with_level
 from tyrecal.tyre.effects import catalogue
 from tyrecal.tyre.load import load_case
@@ -179,6 +179,12 @@ def test_trials_of_all_kinds_are_drawn_sealed_and_made_again_alike(
     assert twin["with_effect"] != first["with_effect"]  # another mounting
     assert any(t["tries"] > 1 for t in trials)
     assert {p.stem for p in (tmp_path / "a" / "trials").iterdir()} == {t["id"] for t in trials}
+    # stopped before it was sealed, it goes on with what it has, and asks nothing again
+    (tmp_path / "b" / SEAL).unlink()
+    monkeypatch.setattr(making, "computed", None)
+    making.make(tmp_path / "b", tmp_path / "b-truth", group, counts, ruler=None)
+    again = read_json(tmp_path / "b-truth" / TRUTH)
+    assert again.pop("nonce") and again == truths[1]
     with pytest.raises(InputError, match="sealed trials already"):
         making.make(tmp_path / "a", tmp_path / "a-truth", group, counts)
 

@@ -29,7 +29,7 @@ from tyrecal.studies.blind.make import (
 )
 from tyrecal.studies.blind.maker import Computed
 from tyrecal.studies.blind.protocol import Protocol, read_json, write_json, write_protocol
-from tyrecal.studies.blind.ruler import measure, write_ruler
+from tyrecal.studies.blind.ruler import RULER_FILE, measure, write_ruler
 from tyrecal.studies.blind.seal import SEAL, seal
 from tyrecal.tyre.case import LoadedCase
 
@@ -67,7 +67,8 @@ def make(
         given_kPa=group.given_kPa,
         held_out_kPa=group.held_out_kPa,
     )
-    write_ruler(folder, (ruler or measured)(case, protocol))
+    if not (folder / RULER_FILE).exists():
+        write_ruler(folder, (ruler or partial(measured, jobs=jobs))(case, protocol))
     seed = kept_seed(sealed, seed)
     every = drawn(protocol, case, group, counts, seed)
     work = partial(one, sealed, protocol, case, group)
@@ -93,9 +94,9 @@ def make(
     return seal(folder, sealed, {"seed": seed, "group": asdict(group), "trials": truth})
 
 
-def measured(case: LoadedCase, protocol: Protocol) -> Mapping[str, Any]:
+def measured(case: LoadedCase, protocol: Protocol, jobs: int = 1) -> Mapping[str, Any]:
     """The ruler, by the diagnosis' own model."""
-    model = tyre_model(case, Evaluator(TyreDesign(case)), protocol)
+    model = tyre_model(case, Evaluator(TyreDesign(case)), protocol, jobs)
     return measure(model, rows_of(case, protocol))
 
 
