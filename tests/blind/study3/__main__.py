@@ -35,7 +35,7 @@ from .cases import GROUPS, LABELS, written
 from .make import FENICS, make
 from .maker import computed
 from .score import scored, table
-from .section import COLUMN, columns, mould
+from .section import columns, mould
 from .tyre import tyre_of
 
 COUNTS = {"none": 12, "one": 30, "two": 16, "three": 12, "outside": 12, "again": 4}
@@ -81,8 +81,8 @@ def mesh(size: str) -> None:
     with TemporaryDirectory() as folder:
         case = written(replace(group, own=False), Path(folder))
     found = []
-    for element in (COLUMN, COLUMN / 2):
-        tyre = tyre_of(case, mould(size), columns(mould(size), element))
+    for times in (1, 2):
+        tyre = tyre_of(case, mould(size), columns(mould(size), times))
         (state,) = computed(FENICS, tyre, [group.given_kPa[1]], LABELS).values()
         found.append(np.array([state.ln_f[label][0] for label in LABELS]))
     FENICS.close()

@@ -21,7 +21,7 @@ from tyrecal.tyre.section.size import parse_size
 Array = np.ndarray
 VOID = 0.3  # of the pattern's volume
 SKIM, TREAD = 1.15, 1.3  # how far belt skim and tread go, of the widest belt
-COLUMN = 0.0095  # about an element's length along the section
+COLUMN = {False: 0.0095, True: 0.0125}  # m, about an element's length; True: of a truck
 CURVE_POINTS = 400
 
 
@@ -198,9 +198,9 @@ def breaks(m: Mould, marks: dict[str, float]) -> list[float]:
     return [0.0, *(b for a, b in zip([0.0, *ends], ends, strict=False) if b - a > 1e-4)]
 
 
-def columns(m: Mould, element: float = COLUMN) -> list[int]:
-    """Elements between breaks."""
-    ends = np.diff(breaks(m, carcass(m)[2]))
+def columns(m: Mould, times: int = 1) -> list[int]:
+    """Elements between breaks; ``times`` as many along the section."""
+    ends, element = np.diff(breaks(m, carcass(m)[2])), COLUMN[parse_size(m.size).truck] / times
     return [max(1, round(float(d) / element)) for d in ends]
 
 

@@ -374,7 +374,7 @@ def lowest(K: csr_matrix, M: csr_matrix, count: int) -> tuple[Array, Array]:
 
     start = np.random.default_rng(1).normal(size=K.shape[0])
     inverse = LinearOperator(K.shape, matvec=solved, dtype=float)
-    values, vectors = eigsh(K, count, M, sigma=0.0, OPinv=inverse, v0=start, tol=1e-8, ncv=10)
+    values, vectors = eigsh(K, count, M, sigma=0.0, OPinv=inverse, v0=start, tol=1e-5, ncv=10)
     for each in (solver, matrix, b, x):
         each.destroy()
     order = np.argsort(values)
