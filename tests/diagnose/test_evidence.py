@@ -10,12 +10,13 @@ import pytest
 from numpy.polynomial.hermite import hermgauss
 from scipy.stats import chi2, multivariate_normal, ncx2
 
-from tyrecal.studies.diagnose.covariance import covariance
+from tyrecal.studies.diagnose.covariance import covariance, model_form
 from tyrecal.studies.diagnose.evidence import NONE, Hypothesis, explain, refit
 from tyrecal.studies.diagnose.gap import find_gap, projection
 from tyrecal.studies.diagnose.inverse_problem import Assumed, Toggle
 from tyrecal.studies.diagnose.label_swap import exchanged, with_exchanged
 from tyrecal.studies.diagnose.model import Answer, Query, Span
+from tyrecal.studies.diagnose.observations import Observable
 from tyrecal.studies.diagnose.separability import separate
 from tyrecal.studies.diagnose.several import PRIOR_NONE, probabilities, weigh
 from tyrecal.studies.diagnose.verdict import decide
@@ -434,12 +435,27 @@ def test_covariance_is_what_it_says() -> None:
     """Model-form error: 0.9 between pressures, 0.97 between runs, none between modes."""
     toy = Toy(pressures=(160.0, 240.0))
     p = problem(toy, changes=(Toggle("e0", 0.0),), noise=1e-9)
-    S = covariance(p.observations, 0 * p.constants, form=0.01) / 1e-4
+    S = covariance(p.observations, 0 * p.constants, 0.0, form=0.01) / 1e-4
     n = len(toy.base)
     assert S[0, len(LABELS)] == pytest.approx(0.9)
     assert S[0, n] == pytest.approx(0.97)
     assert S[0, n + len(LABELS)] == pytest.approx(0.9 * 0.97)
     assert S[0, 1] == 0 and np.linalg.eigvalsh(S).min() > 0
+
+
+def test_material_laws_are_off_mode_by_mode_smoothly_over_the_pressure() -> None:
+    """3 % beside the form on record, 0.4 in ln p apart: exp(-0.4^2 / (2 0.5^2)) alike; a stated
+    form stands for both; the mass has neither."""
+    toy = Toy(pressures=(160.0, 160.0 * np.exp(0.4)))
+    p = problem(toy, noise=1e-9)
+    mass = Observable("mass_kg", None, 0.0)
+    rows = (*p.observations.rows, mass)
+    added = model_form(rows, 0.03) - model_form(rows, 0.0)
+    n = len(LABELS)
+    assert added[0, 0] == added[n, n] == pytest.approx(0.03**2)
+    assert added[0, n] == pytest.approx(0.03**2 * np.exp(-(0.4**2) / 0.5))
+    assert not added[0, 1] and not added[-1].any() and np.linalg.eigvalsh(added).min() > -1e-12
+    assert np.array_equal(model_form(rows, 0.03, form=0.01), model_form(rows, 0.0, form=0.01))
 
 
 def test_an_effects_law_that_is_off_is_still_the_effect(chance: Chance) -> None:

@@ -36,6 +36,7 @@ class Toy:
     variables = ("A", "B", "C")
     sloped: Collection[str] = ()
     sloped_at_0: Collection[str] = ()
+    material_laws = 0.0
 
     def __init__(
         self,

@@ -105,12 +105,12 @@ def coverage(count: int, seed: int) -> None:
     n, scatter = len(measured), np.full(len(measured), RELATIVE_SIGMA)
     nothing = np.full(n, np.nan)
     observations = Observations(measured, np.zeros(n), scatter, 0.0, nothing, nothing)
-    sigma = covariance(observations, g[:n])
+    sigma = covariance(observations, g[:n], 0.0)
     form = np.array([form_error(row.label) for row in rows])
     common = np.linalg.cholesky(
         alike(rows) * np.outer(form, form) + g @ g.T + 1e-14 * np.eye(len(rows))
     )
-    given = conditional(measured, sigma, g[:n], others, g[n:])
+    given = conditional(measured, sigma, g[:n], others, g[n:], 0.0)
     white = np.linalg.inv(np.linalg.cholesky(sigma))
     places = [TyreState(p) for p in PRESSURES]
     labels = [made.labels] * len(places)

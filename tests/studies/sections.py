@@ -55,7 +55,7 @@ DETECTABLE = 25.0  # lambda
 
 def wrong_section(case: LoadedCase, random: np.random.Generator) -> LoadedCase:
     """The case with another section than it says, by the law above."""
-    meridian, gauge, _, _ = SECTION_SIZES[UNSAID]
+    meridian, _, gauge, _, _ = SECTION_SIZES[UNSAID]
     s, section = np.clip(arc_length(case), 0, 1), case.section
     line = section.names.index(carcass_line(case))
     waves = sum(random.normal() / k * np.sin(k * np.pi * (1 - s) / 2) for k in (1, 2, 3, 4))
@@ -84,7 +84,9 @@ def main(tyres: int, seed: int) -> None:
     model = TyreModel(case, evaluator, rows, found, spans_of(case, evaluator)[0])
     stated = replace(expand(model, model.start, False), coupling=None)
     fields = np.array([source.field is not None for source in found])
-    exact = replace(stated, constants=np.where(fields, 0.0, stated.constants))
+    exact = replace(
+        stated, constants=np.where(fields, 0.0, stated.constants), material_laws=0.0
+    )
     turned = [any(path.endswith("angle_deg") for path in source.steps) for source in found]
     constants = stated.constants[:, ~fields & ~np.array(turned)]
     parts = [part for part in regions(model, model.start) if part.rubber]
@@ -115,7 +117,7 @@ def main(tyres: int, seed: int) -> None:
         d = random.uniform(-APART, APART, 3)
         plain, _ = stated.plain(stated.x0 + d)
         y = plain + constants @ random.normal(size=constants.shape[1]) + answer.eta - stated.eta
-        sizes = np.array(SECTION_SIZES[UNSAID][2:])[:, None] * random.normal(
+        sizes = np.array(SECTION_SIZES[UNSAID][3:])[:, None] * random.normal(
             size=compounds.shape[:2]
         )
         y += np.einsum("kp,kpn->n", sizes, compounds) + random.normal(0, NOISE, len(rows))

@@ -375,9 +375,12 @@ def test_predictions_are_the_conditional_of_the_joint_normal_distribution() -> N
     scatter = np.diag([1e-4, 2e-4, 1e-4])
     alike = np.kron(np.array([[1.0, 0.9, 0.9], [0.9, 1.0, 0.9], [0.9, 0.9, 1.0]]), np.eye(3))
     whole = alike * np.outer(np.tile(form, 3), np.tile(form, 3))
+    ln_p = np.log([240.0, 200.0, 280.0])
+    near = np.exp(-2 * (ln_p[:, None] - ln_p) ** 2)  # length 0.5
+    whole += 0.002**2 * np.kron(near, np.eye(3))
     whole += np.vstack([g, other]) @ np.vstack([g, other]).T
     whole[:3, :3] += scatter
-    found = conditional(here, whole[:3, :3], g, there, other)
+    found = conditional(here, whole[:3, :3], g, there, other, 0.002)
     precision = np.linalg.inv(whole)
     assert np.allclose(found.covariance, np.linalg.inv(precision[3:, 3:]), rtol=1e-6, atol=1e-15)
     assert np.allclose(found.pull, -found.covariance @ precision[3:, :3], atol=1e-8)
@@ -392,7 +395,7 @@ def test_drawn_predictions_have_that_mean_and_covariance(chance: Chance) -> None
     here, there = rows((240.0,)), rows((200.0, 280.0))
     g, other = chance.random.normal(0, 0.01, (3, 2)), chance.random.normal(0, 0.01, (6, 2))
     sigma = g @ g.T + 1e-4 * np.eye(3)
-    found = conditional(here, sigma, g, there, other)
+    found = conditional(here, sigma, g, there, other, 0.0)
     eta, off = np.tile(np.arange(6.0), (2000, 1)), np.tile([0.01, -0.02, 0.03], (2000, 1))
     x = found.drawn(eta, off, int(chance.random.integers(2**31)))
     middle = eta[0] + found.pull @ off[0]

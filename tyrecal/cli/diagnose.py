@@ -48,7 +48,8 @@ file = click.Path(path_type=Path, exists=True, dir_okay=False)
     "--form-percent",
     type=click.FloatRange(0, 20),
     metavar="PERCENT",
-    help="Error of the model's own form in every frequency (default: on record, mode by mode).",
+    help="Error of the model's own form in every frequency (default: of its mesh, mode by mode, and"
+    " of material laws, where the section is not exact).",
 )
 @click.option(
     "--split-percent",

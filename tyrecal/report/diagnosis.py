@@ -415,14 +415,19 @@ def _assumptions(study: DiagnosedCase) -> Iterator[str]:
     yield f"Constants that nobody calibrates, one standard deviation each ({kind}): {words}."
     a = d.problem.assumed
     form = "as recorded for every mode" if a.form is None else f"{100 * a.form:g} % in every mode"
+    form += f", correlated {BETWEEN_PRESSURES:g} between pressures"
+    if a.form is None and (material := d.problem.expansion.material_laws):
+        form += (
+            f", and {100 * material:g} % in every mode by material laws, smooth over the pressure"
+        )
     spans = d.problem.spans
     laws = sorted({span.law for span in spans.values()})
     law = f"{100 * laws[0]:g} to {100 * laws[-1]:g}" if a.law is None and laws else "0"
     second = ", ".join(f"`{id}`" for id, span in spans.items() if span.second) or "none"
     yield (
-        f"The model's own form: {form}, correlated {BETWEEN_PRESSURES:g} between pressures; an"
-        f" effect's law may be off by {law} % of its shift, effect by effect; integrated over what"
-        f" else there is to it: {second}; every tyre splits its pairs by {100 * a.split:g} %."
+        f"The model's own form: {form}; an effect's law may be off by {law} % of its shift, effect"
+        f" by effect; integrated over what else there is to it: {second}; every tyre splits its"
+        f" pairs by {100 * a.split:g} %."
     )
     yield (
         f"Before the data: no effect {PRIOR_NONE:g}, something outside the catalogue"

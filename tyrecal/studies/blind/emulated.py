@@ -83,6 +83,7 @@ class Emulated:
         self.model, self.reach = model, reach
         self.variables, self.sources = model.variables, model.sources
         self.start, self.spread = model.start, model.spread
+        self.material_laws = model.material_laws
         self.spans: Mapping[str, Span] = {k: s for k, s in model.spans.items() if k in effects}
         self._plain, self._constants, self._effects = plain, constants, effects
         self._couplings = couplings

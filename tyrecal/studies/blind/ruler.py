@@ -22,8 +22,8 @@ import numpy as np
 
 from ...errors import InputError
 from ...simulate.modes.label import Label
-from ..diagnose.form_error import form_error
-from ..diagnose.model import Answer, ModelRow, Query, ResponseModel
+from ..diagnose.form_error import LAWS_LENGTH, form_error
+from ..diagnose.model import Answer, ModelRow, Query, ResponseModel, state_of
 from .protocol import Protocol, read_json, write_json
 
 Array = np.ndarray
@@ -72,6 +72,7 @@ class Ruler:
     hessian: Array  # (n, v, v)
     constants: Array  # (n, k) change by one standard deviation of each
     signatures: Mapping[str, EffectShifts]
+    material_laws: float = 0.0  # standard deviation of every mode
 
     def sigma(
         self, places: Array, counts: Array, protocol: Protocol, constants: bool = True
@@ -86,8 +87,11 @@ class Ruler:
         same = np.array([[a[0] == b[0] for b in rows] for a in rows])
         alike = np.where(np.eye(len(rows), dtype=bool), 1.0, BETWEEN_PRESSURES) * same
         form = np.array([form_error(label) for label, _ in rows])
+        ln_p = np.log([state_of(where).pressure_kPa or 1.0 for _, where in rows])
+        near = np.exp(-(((ln_p[:, None] - ln_p) / LAWS_LENGTH) ** 2) / 2)
+        laws = self.material_laws**2 * near * same * np.outer(~weighed, ~weighed)
         g = self.constants[places]
-        return np.asarray(scatter + alike * np.outer(form, form) + g @ g.T)
+        return np.asarray(scatter + alike * np.outer(form, form) + laws + g @ g.T)
 
     def plain(self, d: Array, places: Array) -> tuple[Array, Array]:
         """eta (n,), J (n, v) at x0 + d without effects."""
@@ -193,6 +197,7 @@ def measure(model: ResponseModel, rows: Sequence[ModelRow]) -> dict[str, Any]:
         "hessian": _rounded(hessian),
         "constants": _rounded(first.constants),
         "signatures": signatures,
+        "material_laws": model.material_laws,
     }
 
 
@@ -219,7 +224,8 @@ def ruler_of(content: Mapping[str, Any], labels: Sequence[Label]) -> Ruler:
         for id, each in content["signatures"].items()
     }
     rows = tuple((known[name], float(p)) for name, p in content["rows"])
-    return Ruler(rows, signatures=signatures, **numbers)
+    laws = float(content.get("material_laws", 0.0))  # none in rulers of earlier studies
+    return Ruler(rows, signatures=signatures, material_laws=laws, **numbers)
 
 
 def _words(label: Label | None) -> str:

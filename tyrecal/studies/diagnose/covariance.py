@@ -3,15 +3,16 @@
     Sigma = Sigma_rep + Sigma_form + sum_k s_k^2 g_k g_k^T
 
 Sigma_rep: repeatability, with the part that all frequencies of a run share; Sigma_form: what our
-own model is uncertain by (mesh, element), mode by mode, alike in all states (0.9) and in all
-runs of the same tyre (0.97); s_k g_k: the constants that nobody calibrates, common to all runs.
+own model is uncertain by, mode by mode: mesh and element, alike in all states (0.9), and material
+laws, alike at near pressures, both alike in all runs of the same tyre (0.97); s_k g_k: the
+constants that nobody calibrates, common to all runs.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from .form_error import form_error
+from .form_error import form_error, laws_alike
 from .observations import Observable, Observations
 
 Array = np.ndarray
@@ -20,12 +21,19 @@ BETWEEN_PRESSURES, BETWEEN_RUNS = 0.9, 0.97
 
 def alike(rows: tuple[Observable, ...]) -> Array:
     """Correlation (n, n) of what belongs to a mode: 1 on the diagonal, 0 between modes."""
+    states = np.array(
+        [[1.0 if a.state == b.state else BETWEEN_PRESSURES for b in rows] for a in rows]
+    )
+    return states * of_a_mode(rows)
+
+
+def of_a_mode(rows: tuple[Observable, ...]) -> Array:
+    """The same (n, n) of what is alike in all states."""
     result = np.zeros((len(rows), len(rows)))
     for i, a in enumerate(rows):
         for j, b in enumerate(rows):
             if a.label == b.label and a.quantity == b.quantity:
-                result[i, j] = BETWEEN_PRESSURES if a.state != b.state else 1.0
-                result[i, j] *= BETWEEN_RUNS if a.run != b.run else 1.0
+                result[i, j] = BETWEEN_RUNS if a.run != b.run else 1.0
     return result
 
 
@@ -37,19 +45,30 @@ def repeatability(observations: Observations) -> Array:
     return np.diag(observations.scatter**2) + observations.common**2 * shared
 
 
+def model_form(rows: tuple[Observable, ...], laws: float, form: float | None = None) -> Array:
+    """Sigma_form (n, n). laws: standard deviation of every mode by material laws; form: one of the
+    model for all modes in place of it and of those on record."""
+    modes = np.array([row.label is not None for row in rows], float)  # the mass is a sum
+    sizes = modes * [form_error(row.label) if form is None else form for row in rows]
+    by_mesh = alike(rows) * np.outer(sizes, sizes)
+    if form is not None:
+        return by_mesh
+    pressures = np.array([row.pressure_kPa if row.label else 1.0 for row in rows])
+    by_laws = of_a_mode(rows) * laws_alike(pressures) * np.outer(modes, modes)
+    return np.asarray(by_mesh + laws**2 * by_laws)
+
+
 def covariance(
     observations: Observations,
     constants: Array,
+    laws: float,
     form: float | None = None,
     mixed: Array | None = None,
 ) -> Array:
-    """Sigma (n, n). constants (n, k): s_k g_k of the rows; form: one relative standard deviation
-    of the model for all modes, None = those on record; mixed (n, n): of coupled modes, see
-    `Veering.weights`."""
+    """Sigma (n, n). constants (n, k): s_k g_k of the rows; laws, form: see `model_form`; mixed
+    (n, n): of coupled modes, see `Veering.weights`."""
     rows = observations.rows
-    sizes = np.array([form_error(row.label) if form is None else form for row in rows])
-    sizes[[row.label is None for row in rows]] = 0.0  # the mass is a sum: no error of form
-    model = alike(rows) * np.outer(sizes, sizes) + constants @ constants.T
+    model = model_form(rows, laws, form) + constants @ constants.T
     if mixed is not None:
         model = mixed @ model @ mixed.T
     return repeatability(observations) + model + 1e-12 * np.eye(len(rows))

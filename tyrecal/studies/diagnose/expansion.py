@@ -114,6 +114,7 @@ class Expansion:
     failed: Mapping[str, str] = field(default_factory=dict)  # why effects, by id, have no nodes
     coupling: Coupling | None = None  # of modes by the sources of error
     joint: Mapping[tuple[str, ...], Joint] = field(default_factory=dict)  # of two effects
+    material_laws: float = 0.0  # see `ResponseModel`
 
     def plain(self, x: Array) -> tuple[Array, Array]:
         """eta (n,) and Jacobian (n, v) without effects."""
@@ -149,7 +150,16 @@ def expand(model: ResponseModel, x0: Array, splits: bool = True) -> Expansion:
             hessian[:, :, i] = (above.jacobian - below.jacobian) / (2 * CURVATURE_STEP)
     hessian = (hessian + hessian.transpose(0, 2, 1)) / 2
     assert first.constants is not None
-    plain = Expansion(x0, first.eta, first.jacobian, hessian, first.split, first.constants, {})
+    plain = Expansion(
+        x0,
+        first.eta,
+        first.jacobian,
+        hessian,
+        first.split,
+        first.constants,
+        {},
+        material_laws=model.material_laws,
+    )
     nodes, failed = {}, {}
     replies = dict(zip(asked, answers[1 + 2 * count :], strict=True))
     found = {id: {float(e): replies[id, float(e)] for e in values[id]} | {0.0: first} for id in ids}

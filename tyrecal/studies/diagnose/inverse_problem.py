@@ -38,7 +38,7 @@ class Toggle:
 class Assumed:
     """Numbers, all of them relative, that the diagnosis takes for granted and states."""
 
-    form: float | None = None  # model-form error of every mode; None: on record
+    form: float | None = None  # model-form error of every mode; None: on record, and laws
     split: float = 0.003  # of pairs, by the non-uniformity of this kind of tyre
     law: float | None = None  # of an effect's shift, that may be off; None: by effect
     further: float = 0.05  # probability of a further effect over that of one less, from one on
@@ -80,9 +80,15 @@ class InverseProblem:
     @cached_property
     def sigma(self) -> Array:
         """Sigma (n, n)."""
-        return covariance(
-            self.observations, self.constants, self.assumed.form, self.mixed if self.zeta else None
-        )
+        mixed = self.mixed if self.zeta else None
+        return self.covariance(self.observations, self.constants, mixed)
+
+    def covariance(
+        self, observations: Observations, constants: Array, mixed: Array | None = None
+    ) -> Array:
+        """The same of other observations, whose constants (m, k) are given."""
+        laws = self.expansion.material_laws
+        return covariance(observations, constants, laws, self.assumed.form, mixed)
 
     @cached_property
     def integrand(self) -> list[InverseProblem]:

@@ -84,6 +84,7 @@ class ResponseModel(Protocol):
     spread: Array  # (v,) its standard deviation
     sources: Sequence[str]  # names of the sources of error
     spans: Mapping[str, Span]  # effects by id
+    material_laws: float  # standard deviation of ln f by laws other than its own
 
     @property
     def sloped(self) -> Collection[str]:

@@ -21,7 +21,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...simulate.modes.label import Label
-from .covariance import covariance
 from .evidence import NONE, OUTSIDE
 from .expansion import Nodes
 from .inverse_problem import InverseProblem, Toggle
@@ -237,7 +236,7 @@ def again(
             switched = change.applied(switched, _count(each))
         later = _shifts(problem, switched, d)[:, first]
         shifts[key] = np.hstack([now.shifts[key], later])
-    sigma = covariance(both, problem.constants[more], problem.assumed.form)
+    sigma = problem.covariance(both, problem.constants[more])
     return Look(sigma, now.jacobian[more], shifts)
 
 
@@ -322,6 +321,6 @@ def _more_rows(
         constants = np.vstack([problem.constants, plain.constants[at]])
         shifts = {key: np.hstack([now.shifts[key], added[key][:, at]]) for key in sizes}
         jacobian = np.vstack([now.jacobian, plain.jacobian[at]])
-        sigma = covariance(both, constants, problem.assumed.form)
+        sigma = problem.covariance(both, constants)
         result.append((words, hours, Look(sigma, jacobian, shifts)))
     return result

@@ -68,9 +68,11 @@ def plain_fit(
         if isinstance(answer, Exception):
             raise answer
         assert answer.constants is not None
-        inverse = np.linalg.inv(covariance(observed, answer.constants[rows], form))
+        inverse = np.linalg.inv(
+            covariance(observed, answer.constants[rows], model.material_laws, form)
+        )
         return descended(x, told, answer)
-    inverse = np.linalg.inv(covariance(observed, known.constants[rows], form))
+    inverse = np.linalg.inv(covariance(observed, known.constants[rows], model.material_laws, form))
     said = lambda x: Answer(*known.plain(x), known.split)
     near = descended(x, said, said(x))
     answer = told(near)

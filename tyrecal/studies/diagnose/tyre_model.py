@@ -23,10 +23,11 @@ from ...tyre.templates import TemplateFailed
 from ...tyre.values import with_values
 from ..fit import problem as fit
 from .expansion import ONE_SIDED_SLOPED, node_values
+from .form_error import MATERIAL_LAWS
 from .model import Answer, Coupling, ModelRow, Query, Span, state_of
 from .regions import regions
 from .section_design import SectionDesign
-from .section_fields import OF_COMPOUNDS
+from .section_fields import OF_COMPOUNDS, known_from
 from .uncertainties import EFFECT_PATH, Source, unit_of, values_of
 from .veering import coupling, partner
 
@@ -80,6 +81,7 @@ class TyreModel:
         self._variables = case.case.variables
         self.variables: Sequence[str] = list(self._variables)
         self.sources: Sequence[str] = [source.name for source in found]
+        self.material_laws = 0.0 if known_from(case) == "exact" else MATERIAL_LAWS
         self.start = np.array([self._scaled(n, v) for n, v in start_values(case).items()])
         wide = [
             log(v.upper / v.lower) if v.scale == "log" else 1.0 for v in self._variables.values()

@@ -17,8 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..diagnose.covariance import alike
-from ..diagnose.form_error import form_error
+from ..diagnose.covariance import model_form
 from ..diagnose.observations import Observable
 
 Array = np.ndarray
@@ -52,11 +51,12 @@ def conditional(
     constants: Array,
     others: tuple[Observable, ...],
     other_constants: Array,
+    laws: float,
 ) -> Conditional:
-    """sigma (n, n): of the measured rows; constants (n, k), other_constants (m, k): s_k g_k."""
+    """sigma (n, n): of the measured rows; constants (n, k), other_constants (m, k): s_k g_k; laws:
+    see `model_form`."""
     every, n = measured + others, len(measured)
-    form = np.array([form_error(row.label) for row in every])
     g = np.vstack([constants, other_constants])
-    common = alike(every) * np.outer(form, form) + g @ g.T
+    common = model_form(every, laws) + g @ g.T
     pull = np.linalg.solve(sigma, common[:n, n:]).T
     return Conditional(pull, common[n:, n:] - pull @ common[:n, n:])

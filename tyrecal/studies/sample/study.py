@@ -92,7 +92,7 @@ def run(
     answer = _answer(model, x)
     assert answer.constants is not None
     constants = answer.constants[where]
-    sigma = covariance(observations, constants)
+    sigma = covariance(observations, constants, model.material_laws)
     spread, white = np.sqrt(np.diag(sigma)), np.linalg.inv(np.linalg.cholesky(sigma))
 
     pressures = _pressures(case, {row.pressure_kPa for row in observations.rows}, at_kPa)
@@ -149,7 +149,9 @@ def run(
     asked_of = [row.row for row in rows]
     there = _answer(TyreModel(case, evaluator, asked_of, found, {}, jobs), best)
     assert there.constants is not None
-    given = conditional(observations.rows, sigma, constants, rows, there.constants)
+    given = conditional(
+        observations.rows, sigma, constants, rows, there.constants, model.material_laws
+    )
     at = rows_of(rows, states, known_in)
     thin = drawn.chains.thinned
     off = observations.y - posterior.ln_f(thin, posterior.rows)
