@@ -320,8 +320,8 @@ CLAIMS: list[tuple[str, str, Callable[[Record], list[float]]]] = [
     ),
     (
         "real_data",
-        "*outside the catalogue*: {} % left, p = {}e-8",
-        of("diagnosed, section exact", "rms %", ("p", 1e8)),
+        "*outside the catalogue*: {} % left, p = {}e-12",
+        of("diagnosed, section exact", "rms %", ("p", 1e12)),
     ),
     (
         "real_data",

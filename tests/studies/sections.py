@@ -84,9 +84,7 @@ def main(tyres: int, seed: int) -> None:
     model = TyreModel(case, evaluator, rows, found, spans_of(case, evaluator)[0])
     stated = replace(expand(model, model.start, False), coupling=None)
     fields = np.array([source.field is not None for source in found])
-    exact = replace(
-        stated, constants=np.where(fields, 0.0, stated.constants), material_laws=0.0
-    )
+    exact = replace(stated, constants=np.where(fields, 0.0, stated.constants), material_laws=0.0)
     turned = [any(path.endswith("angle_deg") for path in source.steps) for source in found]
     constants = stated.constants[:, ~fields & ~np.array(turned)]
     parts = [part for part in regions(model, model.start) if part.rubber]

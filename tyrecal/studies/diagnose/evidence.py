@@ -32,8 +32,9 @@ FEW_POINTS = {2: 7, 3: 5}  # that show which sets of effects matter: ln Z within
 COVERAGE = 2.0  # standard deviations within which a stated number may be off (GUM, k = 2)
 SHARP_FALL = 2.0  # of ln Z from the best point to its neighbours, which asks for more points
 MAX_ZOOMS = 6
-REFIT_STEPS = 6  # of Gauss and Newton, in a model that is quadratic and near its minimum
-COUPLED_STEPS = 4  # more where near modes are coupled
+REFIT_STEPS = 16  # of Gauss and Newton, halved where they rise, in a model that is quadratic
+COUPLED_STEPS = 8  # more where near modes are coupled
+REFITTED = 1e-5  # of x, a step that is not worth taking
 FAR_BELOW, ABOVE_POINTS = 20.0, 1.0  # of ln Z: how far a spline may fall, and rise above its points
 UNKNOWN = (0.005, 0.01, 0.02, 0.04)  # shift of modes by what no catalogue holds
 SMOOTH_HARMONICS, SMOOTH_LN_F = 2.0, 0.5  # over which trends change
@@ -197,18 +198,32 @@ def _refit(
     eta0, J0 = problem.plain(np.zeros_like(centre))
     H = problem.expansion.hessian[problem.places]
     by_variable = H.transpose(2, 0, 1).reshape(len(centre), -1)
-    for step in range(steps + 1):
+    best: tuple[Array, ...] | None = None
+    share = np.ones(len(d))
+    while True:
         bent = (d @ by_variable).reshape(tilt.shape)
         eta = eta0 + shift + ((J0 + bent / 2 + tilt) @ d[:, :, None])[:, :, 0]
         eta, J, told = at.coupled(eta, J0 + bent + tilt)
         r = y - eta
-        weighted = inverse @ J
-        normal = weighted.transpose(0, 2, 1) @ J + information
-        if step == steps:
+        weighted = inverse @ np.concatenate([J, r[:, :, None]], 2)
+        both = weighted.transpose(0, 2, 1) @ J
+        chi2, off = (weighted[:, :, -1] * r).sum(1), (d - centre) / problem.spread
+        slope = both[:, -1] - off / problem.spread
+        misfit = chi2 + (off**2).sum(1)
+        here: tuple[Array, ...] = (misfit, d, chi2, told, both[:, :-1] + information, slope)
+        if best is not None:  # where the misfit rose, from the best point half as far
+            rose = here[0] > best[0]
+            share = np.where(rose, share / 2, 1.0)
+            here = tuple(
+                np.where(rose.reshape(-1, *[1] * (new.ndim - 1)), old, new)
+                for new, old in zip(here, best, strict=True)
+            )
+        best = here
+        _, d, chi2, told, normal, slope = best
+        step = share[:, None] * np.linalg.solve(normal, slope[:, :, None])[:, :, 0]
+        if not steps or abs(step).max() < REFITTED:
             break
-        slope = (r[:, None, :] @ weighted)[:, 0] + (centre - d) @ information
-        d = d + np.linalg.solve(normal, slope[:, :, None])[:, :, 0]
-    chi2 = ((r[:, None, :] @ inverse)[:, 0] * r).sum(1)
+        d, steps = d + step, steps - 1
     off = (d - centre) / problem.spread
     _, ln_normal = np.linalg.slogdet(normal * np.outer(problem.spread, problem.spread))
     n = len(y)

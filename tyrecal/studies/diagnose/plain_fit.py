@@ -13,6 +13,7 @@ from .observations import Observations
 
 Array = np.ndarray
 MAX_STEPS, MAX_STEP, CLOSE_ENOUGH = 12, 0.7, 0.02
+MAX_COVARIANCES, SAME_COVARIANCE = 4, 0.1  # of x, within which constants stand for one another
 
 
 def plain_fit(
@@ -25,6 +26,7 @@ def plain_fit(
     """x (v,) by damped Gauss-Newton steps from the start; a step has at most ``MAX_STEP`` in any x.
 
     It ends within ``CLOSE_ENOUGH`` of the minimum: the expansion about x goes the rest of the way.
+    The covariance is that of the constants at the start and, where x has gone far, anew from there.
     known: of the model about its start, on which the fit goes first. Raises the model's own failure
     where the start has no solution.
     """
@@ -59,23 +61,29 @@ def plain_fit(
                 return x
         return x
 
-    def told(x: Array) -> Answer | Exception:
-        return model.answers([Query(x)])[0]
+    def told(x: Array, constants: bool = False) -> Answer | Exception:
+        return model.answers([Query(x, constants=constants)])[0]
+
+    def weights(constants: Array) -> Array:
+        sigma = covariance(observed, constants[rows], model.material_laws, form)
+        return np.asarray(np.linalg.inv(sigma))
 
     x = np.array(model.start, float)
-    if known is None:
-        (answer,) = model.answers([Query(x, constants=True)])
+    if known is not None:
+        inverse = weights(known.constants)
+        said = lambda x: Answer(*known.plain(x), known.split)
+        near = descended(x, said, said(x))
+        answer = told(near)
+        if isinstance(answer, Answer):
+            return descended(near, told, answer)
+        return descended(x, told, said(x))
+    for again in range(MAX_COVARIANCES):
+        answer = told(x, constants=True)
         if isinstance(answer, Exception):
             raise answer
         assert answer.constants is not None
-        inverse = np.linalg.inv(
-            covariance(observed, answer.constants[rows], model.material_laws, form)
-        )
-        return descended(x, told, answer)
-    inverse = np.linalg.inv(covariance(observed, known.constants[rows], model.material_laws, form))
-    said = lambda x: Answer(*known.plain(x), known.split)
-    near = descended(x, said, said(x))
-    answer = told(near)
-    if isinstance(answer, Answer):
-        return descended(near, told, answer)
-    return descended(x, told, said(x))
+        inverse, before = weights(answer.constants), x
+        x = descended(x, told, answer)
+        if abs(x - before).max() < SAME_COVARIANCE:
+            return before if again else x
+    return x
