@@ -104,15 +104,15 @@ def test_waves_beyond_the_elements(highest: int) -> None:
 
 def test_what_waves_stand_for() -> None:
     """The elements up to the first beyond 10 degrees, 45 degrees away at the farthest, and one more
-    of the last one's length; 7 waves, or 3 more than elements of the deck hold; none where no
+    of the last one's length; 9 waves, or 5 more than elements of the deck hold; none where no
     element is short."""
     deck = np.radians([4, 4, 4, 5, 8, 17, 45, 93])
     around = waves_beyond(deck)
     ends = np.degrees(around.ends)
     np.testing.assert_allclose(ends, [0, 4, 8, 12, 17, 25, 33])
-    assert len(around.even) == 12 + 8
+    assert len(around.even) == 12 + 10
     fine = waves_beyond(np.radians([5.0] * 36))
-    assert fine.ends[-1] == pytest.approx(np.radians(50.0)) and len(fine.even) == 20 + 9 + 3 + 1
+    assert fine.ends[-1] == pytest.approx(np.radians(50.0)) and len(fine.even) == 20 + 9 + 5 + 1
     assert not waves_beyond(np.radians([20.0] * 9)).waves.size
 
 

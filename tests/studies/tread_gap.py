@@ -17,6 +17,7 @@ from ..solvers.press_deck import OUTER_NODES
 from ..solvers.press_results import read_press
 
 Array = np.ndarray
+GAUSS = np.polynomial.legendre.leggauss(3)
 CROWN_M = 0.09  # half of what can touch, from the middle
 
 
@@ -25,24 +26,73 @@ def sunk_in(folder: Path, stiffness: float) -> list[float]:
 
     The overclosure's mean over the faces' 3 x 3 Gauss points less force / (stiffness area).
     """
-    fields, heights = read_fields(folder / "press.frd"), road_heights(folder)
-    place = {int(n): i for i, n in enumerate(fields.nodes)}
-    faces = np.array([[place[n] for n in face] for face in tread_faces(folder)])
-    g, w = np.polynomial.legendre.leggauss(3)
-    N, by_a, by_b = serendipity(*(x.ravel() for x in np.meshgrid(g, g)))
-    weights = np.outer(w, w).ravel()
     kept = []
-    for height, row, (_, _, moved) in zip(heights, read_press(folder), fields.blocks, strict=True):
-        corners = (fields.points + moved)[faces]
-        if faces.shape[1] == 4:
-            corners = np.concatenate([corners, (corners + np.roll(corners, -1, 1)) / 2], 1)
-        over = (N @ corners)[..., 0] - height
-        area = np.linalg.norm(np.cross(by_a @ corners, by_b @ corners), axis=-1) * weights
+    for row, (_, over, area) in zip(read_press(folder), on_faces(folder, *GAUSS), strict=True):
         touching = over > 0
         whole = 2 * area[touching].sum()
         mean = 2 * (over * area)[touching].sum() / whole
         kept.append(float(mean - row.force_N / (stiffness * whole)))
     return kept
+
+
+def on_faces(folder: Path, places: Array, weights: Array) -> list[tuple[Array, Array, Array]]:
+    """Per deflection of a CalculiX run, at ``places`` (p,) by themselves of -1..1 of every face:
+    where they are (face, p p, 3), their overclosure, m, and area, m2, by ``weights`` (p,)."""
+    fields = read_fields(folder / "press.frd")
+    place = {int(n): i for i, n in enumerate(fields.nodes)}
+    faces = np.array([[place[n] for n in face] for face in tread_faces(folder)])
+    N, by_a, by_b = serendipity(*(x.ravel() for x in np.meshgrid(places, places)))
+    found = []
+    for height, (_, _, moved) in zip(road_heights(folder), fields.blocks, strict=True):
+        corners = (fields.points + moved)[faces]
+        if faces.shape[1] == 4:
+            corners = np.concatenate([corners, (corners + np.roll(corners, -1, 1)) / 2], 1)
+        x = N @ corners
+        area = np.linalg.norm(np.cross(by_a @ corners, by_b @ corners), axis=-1)
+        found.append((x, x[..., 0] - height, area * np.outer(weights, weights).ravel()))
+    return found
+
+
+def areas_of_surface(folder: Path) -> list[float]:
+    """Per deflection, area (m2) of what of the faces lies below the road, edges inside them."""
+    n = 60
+    middles, equal = (np.arange(n) + 0.5) * 2 / n - 1, np.full(n, 2 / n)
+    return [float(2 * area[over > 0].sum()) for _, over, area in on_faces(folder, middles, equal)]
+
+
+def areas_between(folder: Path) -> list[tuple[float, float]]:
+    """`area_between` per deflection by the faces' 3 x 3 Gauss points, of both sides' mean."""
+    start = read_fields(folder / "press.frd")
+    place = {int(n): i for i, n in enumerate(start.nodes)}
+    corners = start.points[[[place[n] for n in face] for face in tread_faces(folder)]]
+    N, _, _ = serendipity(*(x.ravel() for x in np.meshgrid(GAUSS[0], GAUSS[0])))
+    X = (N @ corners).reshape(-1, 3)
+    turn = np.round(np.degrees(-np.arctan2(X[:, 1], X[:, 0])), 1)
+    found = []
+    for x, over, _ in on_faces(folder, *GAUSS):
+        x, gap, sides = x.reshape(-1, 3), over.ravel(), []
+        for side in (1, -1):
+            rings = [
+                [i for i in np.argsort(side * X[:, 2]) if turn[i] == t and side * X[i, 2] > 0]
+                for t in np.unique(turn)
+            ]
+            assert len({len(ring) for ring in rings}) == 1
+            sides.append(area_between(-x[rings, 1], side * x[rings, 2], gap[rings]))
+        found.append(tuple(np.mean(sides, axis=0).tolist()))
+    return found
+
+
+def area_between(along: Array, across: Array, over: Array) -> tuple[float, float]:
+    """Least and largest area (m2) of a convex patch of four such quarters as `area_of_gap` has:
+    its edge lies between the last point of a row that touches and the next one, and the width
+    falls from row to row."""
+    touching = over > 0
+    rows = int(touching[:, 0].sum())
+    last = [int(np.flatnonzero(row)[-1]) for row in touching[:rows]]
+    y = along[: rows + 1, 0]
+    inner, outer = (across[range(rows), np.add(last, more)] for more in (0, 1))
+    least = inner[0] * y[0] + trapezoid(inner, y[:-1])
+    return float(4 * least), float(4 * outer @ np.diff([0.0, *y[1:]]))
 
 
 def area_of_gap(along: Array, across: Array, over: Array) -> float:

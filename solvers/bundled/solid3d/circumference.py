@@ -23,7 +23,8 @@ FARTHEST_ELEMENT = np.radians(45.0)  # from its middle, but for the last one
 WAVE_BY_ELEMENTS = (
     2 * np.pi / 7.5
 )  # of the highest harmonic, over the elements' length that hold it
-LEAST_WAVES = 7
+MORE_WAVES = 5  # than a mode's own, for a pressed tyre mixes them
+LEAST_WAVES = 4 + MORE_WAVES
 SPARE_WAVE_POINTS = 8  # Gauss points of the waves beyond those that their products need
 
 
@@ -135,7 +136,7 @@ def waves_beyond(lengths: Array) -> HalfCircle:
     if not near:
         return half_circle(lengths)
     holds = WAVE_BY_ELEMENTS / float(max(lengths))
-    return half_circle(np.array([*near, near[-1]]), max(LEAST_WAVES, 3 + int(holds)))
+    return half_circle(np.array([*near, near[-1]]), max(LEAST_WAVES, MORE_WAVES + int(holds)))
 
 
 def _waves(join: float, highest: int) -> Array:
