@@ -44,7 +44,7 @@ from tyrecal.tyre.values import with_values
 from ..solvers.press_deck import Angles, Road, press_texts
 from ..solvers.press_results import read_press, read_radius, run_press
 from .calculix import common
-from .tread_gap import area_of_gap, areas_between, areas_of_gap, areas_of_surface, outside, sunk_in
+from .tread_gap import FINE, GAUSS, area_of_gap, areas_below, areas_of_gap, outside, sunk_in
 
 Array = np.ndarray
 ROOT = Path(__file__).parents[2]
@@ -188,7 +188,7 @@ def solve(run: Run, folder: Path, limit_s: float) -> dict[str, Any]:
         deck(run, run.deflections_m, radius, folder)
         run_press(folder, ["ccx"], limit_s)
         kept, gaps = sunk_in(folder, run.road.normal), areas_of_gap(folder)
-        told = areas_of_surface(folder), areas_between(folder)
+        told = areas_below(folder, *GAUSS), areas_below(folder, *FINE)
         rows = zip(read_press(folder), kept, gaps, *told, strict=True)
     except RunFailed as failure:
         return {"failed": f"{failure.cause}: {failure}"}
@@ -201,10 +201,10 @@ def solve(run: Run, folder: Path, limit_s: float) -> dict[str, Any]:
                 "deflection_m": row.deflection_m - kept,
                 "kept_m": kept,
                 "area_of_gap_m2": area,
+                "area_of_gauss_points_m2": points,
                 "area_of_surface_m2": surface,
-                "area_between_m2": between,
             }
-            for row, kept, area, surface, between in rows
+            for row, kept, area, points, surface in rows
         ],
         "wall_s": time.monotonic() - start,
         "cpu_s": used.ru_utime + used.ru_stime,

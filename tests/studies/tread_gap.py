@@ -18,6 +18,7 @@ from ..solvers.press_results import read_press
 
 Array = np.ndarray
 GAUSS = np.polynomial.legendre.leggauss(3)
+FINE = (np.arange(60) + 0.5) / 30 - 1, np.full(60, 1 / 30)
 CROWN_M = 0.09  # half of what can touch, from the middle
 
 
@@ -53,46 +54,9 @@ def on_faces(folder: Path, places: Array, weights: Array) -> list[tuple[Array, A
     return found
 
 
-def areas_of_surface(folder: Path) -> list[float]:
-    """Per deflection, area (m2) of what of the faces lies below the road, edges inside them."""
-    n = 60
-    middles, equal = (np.arange(n) + 0.5) * 2 / n - 1, np.full(n, 2 / n)
-    return [float(2 * area[over > 0].sum()) for _, over, area in on_faces(folder, middles, equal)]
-
-
-def areas_between(folder: Path) -> list[tuple[float, float]]:
-    """`area_between` per deflection by the faces' 3 x 3 Gauss points, of both sides' mean."""
-    start = read_fields(folder / "press.frd")
-    place = {int(n): i for i, n in enumerate(start.nodes)}
-    corners = start.points[[[place[n] for n in face] for face in tread_faces(folder)]]
-    N, _, _ = serendipity(*(x.ravel() for x in np.meshgrid(GAUSS[0], GAUSS[0])))
-    X = (N @ corners).reshape(-1, 3)
-    turn = np.round(np.degrees(-np.arctan2(X[:, 1], X[:, 0])), 1)
-    found = []
-    for x, over, _ in on_faces(folder, *GAUSS):
-        x, gap, sides = x.reshape(-1, 3), over.ravel(), []
-        for side in (1, -1):
-            rings = [
-                [i for i in np.argsort(side * X[:, 2]) if turn[i] == t and side * X[i, 2] > 0]
-                for t in np.unique(turn)
-            ]
-            assert len({len(ring) for ring in rings}) == 1
-            sides.append(area_between(-x[rings, 1], side * x[rings, 2], gap[rings]))
-        found.append(tuple(np.mean(sides, axis=0).tolist()))
-    return found
-
-
-def area_between(along: Array, across: Array, over: Array) -> tuple[float, float]:
-    """Least and largest area (m2) of a convex patch of four such quarters as `area_of_gap` has:
-    its edge lies between the last point of a row that touches and the next one, and the width
-    falls from row to row."""
-    touching = over > 0
-    rows = int(touching[:, 0].sum())
-    last = [int(np.flatnonzero(row)[-1]) for row in touching[:rows]]
-    y = along[: rows + 1, 0]
-    inner, outer = (across[range(rows), np.add(last, more)] for more in (0, 1))
-    least = inner[0] * y[0] + trapezoid(inner, y[:-1])
-    return float(4 * least), float(4 * outer @ np.diff([0.0, *y[1:]]))
+def areas_below(folder: Path, places: Array, weights: Array) -> list[float]:
+    """Per deflection, area (m2) of what of the faces lies below the road, told at ``places``."""
+    return [float(2 * area[over > 0].sum()) for _, over, area in on_faces(folder, places, weights)]
 
 
 def area_of_gap(along: Array, across: Array, over: Array) -> float:
