@@ -85,12 +85,12 @@ def mould(text: str) -> Mould:
     truck = size.truck
     flange, widest = size.flange_radius(size.measuring_rim), size.rim_code * 0.0127 + 0.505 * H
     bead = (0.105 if truck else 0.057) * S
-    sidewall = 0.03 * S + (0.0055 if truck else -0.0012)
+    sidewall = 0.03 * S + (0.003 if truck else -0.0012)
     belted = 0.72 if truck else min(0.84, max(0.76, 0.74 + 0.55 * (0.65 - H / size.width)))
     half = 0.5 * S * belted
     widths = (0.72, 1.0, 0.88, 0.72) if truck else (1.0, 0.9)
     gauges = (
-        (0.0032, 0.0024, 0.0024, 0.0014, 0.003, 0.003, 0.0165)
+        (0.0032, 0.0024, 0.0024, 0.0014, 0.0025, 0.0025, 0.0135)
         if truck
         else (0.0013, 0.0013, 0.00125, 0.001, 0.0014, 0.0016, 0.008)
     )
