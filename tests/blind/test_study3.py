@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import json
+import lzma
+import tarfile
 from collections.abc import Iterator
 from dataclasses import replace
+from hashlib import sha256
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -40,6 +44,7 @@ from .study3.tyre import Mesh, Tyre, on_springs, problem, tyre_of
 
 ROOT = Path(__file__).parents[2]
 ALIKE = {"harmonics": [0, 1, 2, 3, 4], "modes": 3, "degree": 3}
+RECORDED = Path(__file__).parents[1] / "benchmarks" / "study_3"
 
 
 @pytest.fixture(scope="module")
@@ -318,3 +323,14 @@ def test_the_mass_is_that_of_the_section_s_own_integral(tmp_path: Path, fenics: 
 
     whole = (4 * mass(2) - mass(1)) / 3
     assert fenics.ask(asked)["mass_kg"] == pytest.approx(whole, rel=2e-4)
+
+
+@pytest.mark.parametrize("group", sorted(RECORDED.iterdir()), ids=lambda group: group.name)
+def test_recorded_trials_are_those_that_were_sealed(group: Path) -> None:
+    """The truth has its hash, and a trial for each file that is answered."""
+    truth = lzma.decompress((group / "truth.json.xz").read_bytes())
+    assert sha256(truth).hexdigest() == read_json(group / SEAL)["sha256"]
+    with tarfile.open(group / "trials.tar.xz") as archive:
+        files = {Path(name) for name in archive.getnames() if name.endswith(".csv")}
+    trials = {path.stem for path in files if path.parent.name == "trials"}
+    assert trials == {trial["id"] for trial in json.loads(truth)["trials"]}

@@ -431,13 +431,13 @@ def test_a_known_change_is_in_every_hypothesis(chance: Chance) -> None:
     chance.often(none, 0.9)
 
 
-def test_a_refit_never_ends_above_where_it_began(chance: Chance) -> None:
-    """Where the model bends and nothing fits undamped steps jump from side to side; near a minimum
-    none is left to take. Certain."""
+def test_a_refit_never_ends_above_where_it_began() -> None:
+    """Where the model bends and nothing fits undamped steps jump from side to side."""
+    random = generator("refit")
     for _ in range(20):
         toy = Toy(effects=0, bend=0.3, pressures=(240.0,))
         p = problem(toy, assumed=Assumed(form=0.02))
-        p = p.measured(toy.base + chance.random.normal(0, 0.3, len(toy.base)))
+        p = p.measured(toy.base + random.normal(0, 0.3, len(toy.base)))
         inverse, start = np.linalg.inv(p.sigma), p.centre - p.expansion.x0
 
         def misfit(d: np.ndarray) -> float:
