@@ -34,7 +34,7 @@ SHARP_FALL = 2.0  # of ln Z from the best point to its neighbours, which asks fo
 MAX_ZOOMS = 6
 REFIT_STEPS = 16  # of Gauss and Newton, halved where they rise, in a model that is quadratic
 COUPLED_STEPS = 8  # more where near modes are coupled
-REFITTED = 1e-5  # of x, a step that is not worth taking
+REFITTED = 1e-6  # of the misfit, a fall that is not worth a step
 FAR_BELOW, ABOVE_POINTS = 20.0, 1.0  # of ln Z: how far a spline may fall, and rise above its points
 UNKNOWN = (0.005, 0.01, 0.02, 0.04)  # shift of modes by what no catalogue holds
 SMOOTH_HARMONICS, SMOOTH_LN_F = 2.0, 0.5  # over which trends change
@@ -214,14 +214,12 @@ def _refit(
         if best is not None:  # where the misfit rose, from the best point half as far
             rose = here[0] > best[0]
             share = np.where(rose, share / 2, 1.0)
-            here = tuple(
-                np.where(rose.reshape(-1, *[1] * (new.ndim - 1)), old, new)
-                for new, old in zip(here, best, strict=True)
-            )
+            for new, old in zip(here, best, strict=True):
+                new[rose] = old[rose]
         best = here
         _, d, chi2, told, normal, slope = best
         step = share[:, None] * np.linalg.solve(normal, slope[:, :, None])[:, :, 0]
-        if not steps or abs(step).max() < REFITTED:
+        if not steps or (step * slope).sum(1).max() < REFITTED:
             break
         d, steps = d + step, steps - 1
     off = (d - centre) / problem.spread
