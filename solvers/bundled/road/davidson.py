@@ -8,6 +8,7 @@ keeps three blocks where this keeps all, and goes on where K is not positive.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -22,41 +23,68 @@ NOT_STABLE = "the pressed tyre is not stable: its stiffness is not positive"
 MIN_LENGTH2 = 1e-10  # of a direction's squared length, below which it is in the basis already
 
 
-def lowest(
-    product: Operator, mass: Operator, inverse: Operator, start: Array, count: int
-) -> tuple[Array, Array]:
-    """The ``count`` lowest eigenvalues, ascending, and vectors (count, size), x^T M x = 1.
+@dataclass(frozen=True)
+class Basis:
+    """Vectors (b, size), M-orthonormal, and K times them."""
 
-    Operators take blocks (b, size); ``inverse``: about K^-1, symmetric; start (b, size).
+    vectors: Array
+    images: Array
+
+    def turned(self, turn: Array) -> Basis:
+        """Of combinations, ``turn`` (b', b)."""
+        return Basis(turn @ self.vectors, turn @ self.images)
+
+    def joined(self, other: Basis) -> Basis:
+        """Of both."""
+        vectors = np.concatenate([self.vectors, other.vectors])
+        return Basis(vectors, np.concatenate([self.images, other.images]))
+
+
+def basis_of(fields: Array, product: Operator, mass: Operator) -> Basis:
+    """Of what fields (b, size) span."""
+    vectors = _orthonormal(fields, np.empty((0, fields.shape[1])), mass)
+    return Basis(vectors, product(vectors))
+
+
+def lowest(
+    product: Operator, mass: Operator, inverse: Operator, start: Basis, count: int
+) -> tuple[Array, Array, Basis]:
+    """The ``count`` lowest eigenvalues, ascending, vectors (count, size), x^T M x = 1, and the
+    basis that has them, from which a matrix near K may start.
+
+    Operators take blocks (b, size); ``inverse``: about K^-1, symmetric.
     Raises RunFailed, unstable where K is not positive.
     """
-    V, W = np.empty((2, 0, start.shape[1]))
-    H = np.empty((0, 0))
-    block = _orthonormal(start, V, mass)
-    if len(block) < count:
-        raise RunFailed("crashed", f"{len(start)} fields to start from do not span {count} modes")
+    if len(start.vectors) < count:
+        have = f"{len(start.vectors)} directions to start from"
+        raise RunFailed("crashed", f"{have} for {count} modes")
+    basis, H = start, start.vectors @ start.images.T
+    error, before = np.full(count, np.inf), np.zeros(count)
     for _ in range(MAX_BLOCKS):
-        image = product(block)
-        V, W = np.concatenate([V, block]), np.concatenate([W, image])
-        column = V @ image.T
-        H = np.block([[H, column[: len(H)]], [column[: len(H)].T, column[len(H) :]]])
         values, turn = np.linalg.eigh((H + H.T) / 2)
         if values[0] <= 0:
             raise RunFailed("unstable", NOT_STABLE)
-        lowest, turn_lowest = values[:count], turn[:, :count].T
-        x = turn_lowest @ V
-        residual = turn_lowest @ W - lowest[:, None] * mass(x)
+        lowest = values[:count]
+        # asked again of what has not converged, and where the basis has found a lower one
+        left = (error > EIGENVALUE_RTOL) | (before - lowest > EIGENVALUE_RTOL * lowest)
+        ritz = basis.turned(turn[:, :count].T)
+        residual = ritz.images[left] - lowest[left, None] * mass(ritz.vectors[left])
         step = inverse(residual)
         # the residual in the norm of K^-1, squared: the eigenvalue's error, relative
-        error = np.einsum("cs,cs->c", residual, step) / lowest
+        error[left] = np.einsum("cs,cs->c", residual, step) / lowest[left]
         if (error <= EIGENVALUE_RTOL).all():
-            return lowest, x
-        if len(V) + count > MAX_BASIS_PER_MODE * count:
-            best = turn[:, : MAX_BASIS_PER_MODE * count // 2].T
-            V, W, H = best @ V, best @ W, np.diag(values[: len(best)])
-        block = _orthonormal(step[error > EIGENVALUE_RTOL], V, mass)
+            return lowest, ritz.vectors, basis
+        before = lowest
+        if len(basis.vectors) + count > MAX_BASIS_PER_MODE * count:
+            kept = MAX_BASIS_PER_MODE * count // 2
+            basis, H = basis.turned(turn[:, :kept].T), np.diag(values[:kept])
+        block = _orthonormal(step[error[left] > EIGENVALUE_RTOL], basis.vectors, mass)
         if not len(block):
             break
+        new = Basis(block, product(block))
+        basis = basis.joined(new)
+        column = basis.vectors @ new.images.T
+        H = np.block([[H, column[: len(H)]], [column[: len(H)].T, column[len(H) :]]])
     raise RunFailed(
         "crashed",
         f"{count} modes of the pressed tyre did not converge: {(error > EIGENVALUE_RTOL).sum()} are"

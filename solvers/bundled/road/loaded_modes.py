@@ -11,6 +11,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
+from itertools import pairwise
 
 import numpy as np
 from scipy.sparse import csr_matrix
@@ -61,7 +63,7 @@ def loaded_modes(
     def kind(parity: int, wanted: int) -> list[tuple[Array, Array]]:
         symmetry = HalfTurn(tyre.model.mesh, pressed.free, pressed.around, parity)
         its = _Kind(tyre, symmetry, holds[0], unloaded, wheel_kg if parity == 1 else None, check)
-        return [its.lowest(hold, wanted) for hold in holds]
+        return its.lowest(holds, wanted)
 
     wanted = {1: count // 2 + SPARE, -1: count // 2 + SPARE}
     kinds = {parity: kind(parity, number) for parity, number in wanted.items()}
@@ -115,17 +117,30 @@ class _Kind:
         down = np.stack([turn.real, -turn.imag, 0 * turn.real], -1)
         self.down = down * ~symmetry.free  # the rim's nodes (k, n, 3), by 1 m
 
-    def lowest(self, hold: csr_matrix, count: int) -> tuple[Array, Array]:
-        """omega^2 (count,) and shapes (count, k, n, 3)."""
-        self.factor.to(self.symmetry.fold(hold))
-        weigh, kg = Inertia(self.tyre.model, self.symmetry.around), self.wheel_kg or 0.0
-        stiffness = self._each(
-            lambda V: self.tyre.product(V) + (hold @ V.ravel()).reshape(V.shape), 0.0
-        )
-        inverse, start = self._inverse(hold)
-        x = davidson.lowest(stiffness, self._each(weigh, kg / 2), inverse, start, count)
-        shapes = [self._field(row) for row in x[1]]
-        return x[0], np.array(shapes) / np.sqrt(2)  # the half tyre has half of the modal mass
+    def lowest(self, holds: Sequence[csr_matrix], count: int) -> list[tuple[Array, Array]]:
+        """Of each hold omega^2 (count,) and shapes (count, k, n, 3); each starts from what the one
+        before has found."""
+        kg = self.wheel_kg or 0.0
+        inertia = self._each(Inertia(self.tyre.model, self.symmetry.around), kg / 2)
+        found: list[tuple[Array, Array]] = []
+        basis = None
+        for before, hold in pairwise([holds[0], *holds]):
+            self.factor.to(self.symmetry.fold(hold))
+            stiffness = self._each(partial(self._forces_of, hold), 0.0)
+            inverse, start = self._inverse(hold)
+            if basis is None:
+                basis = davidson.basis_of(start, stiffness, inertia)
+            else:
+                images = self._each(partial(_times, hold - before), 0.0)(basis.vectors)
+                basis = davidson.Basis(basis.vectors, basis.images + images)
+            values, x, basis = davidson.lowest(stiffness, inertia, inverse, basis, count)
+            # the half tyre has half of the modal mass
+            found.append((values, np.array([self._field(row) for row in x]) / np.sqrt(2)))
+        return found
+
+    def _forces_of(self, hold: csr_matrix, V: Array) -> Array:
+        """The tyre's and the hold's (k, n, 3), N/m."""
+        return self.tyre.product(V) + _times(hold, V)
 
     def _field(self, vector: Array) -> Array:
         size = self.symmetry.mask.size
@@ -160,9 +175,7 @@ class _Kind:
         if self.wheel_kg is None:
             return inner, start
         # the wheel eliminated last: what follows its shift, and the stiffness that is left
-        border = self._forces(
-            self.tyre.product(self.down) + (hold @ self.down.ravel()).reshape(self.down.shape)
-        )
+        border = self._forces(self._forces_of(hold, self.down))
         follows = inner(border[None, :-1])[0]
         left = border[-1] - border[:-1] @ follows
 
@@ -172,6 +185,11 @@ class _Kind:
             return np.column_stack([y - np.outer(shift, follows), shift])
 
         return bordered, np.vstack([np.pad(start, ((0, 0), (0, 1))), np.append(-follows, 1.0)])
+
+
+def _times(hold: csr_matrix, V: Array) -> Array:
+    """A hold's forces on the field V (k, n, 3), of its shape."""
+    return (hold @ V.ravel()).reshape(V.shape)
 
 
 class Inertia:

@@ -208,6 +208,9 @@ class Tyre:
                 step = np.array(x.array)
                 for each in (matrix, b, x):
                     each.destroy()
+                if not np.isfinite(step).all():
+                    solver.destroy()
+                    raise RuntimeError(f"the stiffness is singular, with {share:g} of help")
                 self.state.x.array[free] -= step
                 residual, taken = left(), taken + 1
                 while not np.linalg.norm(residual) < RISE * first:  # too far: an element is folded
