@@ -143,22 +143,23 @@ def one(
 
 def table(groups: Mapping[Group, Sequence[Scored]]) -> str:
     """All figures as Markdown, by whose section it was, then by size."""
-    parts = {"own section": [], "foreign section": []}  # type: dict[str, list[Scored]]
+    parts: dict[str, list[Scored]] = {"own section": [], "foreign section": [], "both": []}
     sizes: dict[str, list[Scored]] = {}
     for group, trials in groups.items():
         parts["own section" if group.own else "foreign section"] += trials
+        parts["both"] += trials
         sizes.setdefault(group.size, []).extend(trials)
     lines = []
-    for columns, least in ((parts, LEAST), (sizes, LEAST_A_SIZE)):
-        rows = [figures(trials, least) for trials in columns.values()]
+    for columns, least, quantile in ((parts, LEAST, 0.95), (sizes, LEAST_A_SIZE, 0.99)):
+        rows = [figures(trials, least, quantile) for trials in columns.values()]
         lines += [f"| what | {' | '.join(columns)} |", "|---" * (1 + len(columns)) + "|"]
         lines += [f"| {name} | {' | '.join(row[name] for row in rows)} |" for name in rows[0]]
         lines.append("")
     return "\n".join(lines)
 
 
-def figures(trials: Sequence[Scored], least: int) -> dict[str, str]:
-    """By what the issue asks, in words."""
+def figures(trials: Sequence[Scored], least: int, quantile: float = 0.95) -> dict[str, str]:
+    """By what the issue asks, in words; quantile: of a calibrated answerer's calibration error."""
     shown = lambda flags, low=least: _shown(list(flags), low)
     of = lambda kind: [t for t in trials if t.kind == kind]
     none, outside, single = of("none"), of("outside"), of("effect")
@@ -200,8 +201,9 @@ def figures(trials: Sequence[Scored], least: int) -> dict[str, str]:
             t.verdict in ("outside", "undecided") for t in outside
         ),
         "outside: named": shown(t.verdict == "named" for t in outside),
-        "calibration error (95 % quantile)": f"{calibration_error(stated, right):.3f}"
-        f" ({calibration_quantile(stated):.3f})"
+        f"calibration error ({100 * quantile:g} % quantile)": (
+            f"{calibration_error(stated, right):.3f} ({calibration_quantile(stated, quantile):.3f})"
+        )
         if len(trials) >= least
         else _few(len(trials)),
         "90 % set holds the truth": shown(t.in_set for t in trials),
