@@ -223,6 +223,19 @@ def test_a_rate_counts_its_own_trials_and_few_are_not_shown() -> None:
     assert figures(pairs[1:], 60)[name] == "not shown (59)"
 
 
+def test_shrinkage_is_of_what_was_named_and_strong_and_exchanged_labels_count_for_nothing() -> None:
+    """0.8 by least squares, 0.5 by the diagnosis' own fit; sound tyres by chance to 0.25."""
+    named = [answered("a", "a", usual=(1.0, 0.2))] * 60
+    weak, undecided = answered("a", "a", lam=9.0), answered("a", "a", verdict="undecided")
+    sound = [answered("", "none", usual=(1.0, 0.75), after=0.9)] * 5
+    said = figures([*named, answered("a", "a"), weak, undecided, *sound], 60)
+    start, end = "held out by ", ", named, lambda from 25: median shrinkage"
+    assert said[f"{start}least squares{end}"] == "0.80 (chance 0.25)"
+    assert said[f"{start}the diagnosis{end}"] == "0.50 (chance 0.10)"
+    few = figures([*named[1:], answered("a", "a"), *sound], 60)
+    assert few[f"{start}least squares{end}"] == "not shown (59)"
+
+
 def on_the_same_stations(case: LoadedCase) -> dict[str, Any]:
     """The case's own stations and laws, for the maker's solver: nothing of its sections."""
     told = tyre_told(case)

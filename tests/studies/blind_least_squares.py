@@ -14,6 +14,7 @@ import json
 import lzma
 import tarfile
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -21,7 +22,8 @@ from typing import Any
 import numpy as np
 
 from tyrecal.measured.tables import read_measurements
-from tyrecal.studies.blind.protocol import read_protocol
+from tyrecal.simulate.modes.label import Label
+from tyrecal.studies.blind.protocol import Protocol, read_protocol
 from tyrecal.studies.blind.ruler import EffectShifts, Ruler, read_ruler
 from tyrecal.studies.blind.score import Scored, case_of, labels_of, means, score
 from tyrecal.studies.blind.seal import open_truth
@@ -61,24 +63,30 @@ def errors(folder: Path, trials: Sequence[Scored]) -> dict[str, Array]:
         told = json.loads((folder / "answers" / f"{own.id}.json").read_text())["diagnosis"]
         key = (told["effect"] or told["likeliest"]).split("+")[0]
         y, places, _ = means(read_measurements(folder / "trials" / f"{own.id}.csv"), ruler)
-        modal = np.array([ruler.rows[i][0] is not None for i in places])
-        out = {
-            ruler.rows.index((label, protocol.held_out_kPa)): np.log(hertz).mean()
-            for label in labels
-            if (hertz := truth["held_out"].get(str(label)))
-        }
-        found[own.kind].append(
-            [
-                _rms(ruler, y[modal], places[modal], out, effects)
-                for effects in ({}, {key: told["parameter"]["value"]})
-            ]
-        )
+        out = held_out(truth, ruler, protocol, labels)
+        error = partial(held_out_rms, ruler, y, places, out)
+        found[own.kind].append([error({}), error({key: told["parameter"]["value"]})])
     return {kind: np.array(rows) for kind, rows in found.items()}
 
 
-def _rms(
-    ruler: Ruler, y: Array, places: Array, out: Mapping[int, Any], effects: Mapping[str, float]
+def held_out(
+    truth: Mapping[str, Any], ruler: Ruler, protocol: Protocol, labels: Sequence[Label]
+) -> dict[int, float]:
+    """ln f by row of the ruler of what was measured at the held-out pressure."""
+    return {
+        ruler.rows.index((label, protocol.held_out_kPa)): float(np.log(hertz).mean())
+        for label in labels
+        if (hertz := truth["held_out"].get(str(label)))
+    }
+
+
+def held_out_rms(
+    ruler: Ruler, y: Array, places: Array, out: Mapping[int, float], effects: Mapping[str, float]
 ) -> float:
+    """Error (rms, in ln f) of what least squares of the modes among y (n,), with effects at their
+    sizes, say of the rows ``out``."""
+    modal = np.array([ruler.rows[i][0] is not None for i in places])
+    y, places = y[modal], places[modal]
     d, spread = np.zeros(len(ruler.x0)), np.diag(ruler.spread**-2.0) * 0.002**2
     for _ in range(STEPS):
         eta, J = ruler.plain(d, places)

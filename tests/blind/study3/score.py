@@ -8,7 +8,7 @@ too few trials is not shown.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import log
 from pathlib import Path
 from typing import Any
@@ -25,6 +25,7 @@ from tyrecal.studies.blind.seal import open_truth
 from tyrecal.studies.blind.statistics import calibration_error, calibration_quantile
 from tyrecal.studies.blind.tables import rate
 
+from ...studies.blind_least_squares import held_out, held_out_rms
 from .cases import Group
 
 LEAST, LEAST_A_SIZE, LEAST_ROBUST = 60, 40, 100  # trials of a rate that is shown
@@ -37,7 +38,8 @@ class Scored:
     """A trial and its answer. hard: of each effect; ranked: keys by falling probability, an id, ids
     joined by +, none or outside; stated: the first one's; right: the first one is the truth by
     groups; held: whether each named and true effect's interval holds what it is worth in the
-    catalogue's law; before, after: rms error held out, in ln f."""
+    catalogue's law; before, after: rms error held out, in ln f; usual: the same of least squares,
+    without and with what is likeliest, None where labels are exchanged."""
 
     id: str
     kind: str  # none, effect, several or outside
@@ -54,6 +56,7 @@ class Scored:
     before: float
     after: float
     again: str
+    usual: tuple[float, float] | None = None
 
     def found(self, ids: Sequence[str]) -> int:
         """How many true effects are among ids, by their groups, an id for one effect."""
@@ -81,6 +84,12 @@ class Scored:
     def shrinkage(self) -> float:
         return 1 - self.after / self.before
 
+    @property
+    def usual_shrinkage(self) -> float:
+        """NaN where labels are exchanged."""
+        without, with_ = self.usual or (1.0, np.nan)
+        return 1 - with_ / without
+
 
 def scored(folder: Path, sealed: Path) -> list[Scored]:
     """Every trial of a group. Raises InputError."""
@@ -101,7 +110,7 @@ def one(
 ) -> Scored:
     """One trial."""
     readings = read_measurements(folder / "trials" / f"{truth['id']}.csv")
-    _, places, counts = means(readings, ruler)
+    y, places, counts = means(readings, ruler)
     d = np.array([log(v) for v in truth["variables"].values()]) - ruler.x0
     hard = {}
     effects = tuple(sorted(truth["effects"])) if truth["kind"] != "outside" else ()
@@ -137,8 +146,13 @@ def one(
         error("with_effect_Hz"),
         truth["again"],
     )
-    keys = told["candidate_set"]
-    return Scored(**{**vars(found), "in_set": any(found.says(key) for key in keys)})
+    in_set = any(found.says(key) for key in told["candidate_set"])
+    if truth["swapped"] or told["exchanged_labels"]:
+        return replace(found, in_set=in_set)
+    there = held_out(truth, ruler, protocol, labels)
+    with_effects = {id: each["value"] for id, each in told["parameters"].items()}
+    without, with_ = (held_out_rms(ruler, y, places, there, e) for e in ({}, with_effects))
+    return replace(found, in_set=in_set, usual=(without, with_))
 
 
 def table(groups: Mapping[Group, Sequence[Scored]]) -> str:
@@ -188,12 +202,9 @@ def figures(trials: Sequence[Scored], least: int, quantile: float = 0.95) -> dic
     stated, right = (
         np.array([getattr(t, key) for t in trials], float) for key in ("stated", "right")
     )
-    proven = [t.shrinkage for t in strong if t.verdict == "named"]
-    chance = float(np.quantile([t.shrinkage for t in none], SIGNIFICANT)) if none else np.nan
+    proven = [t for t in strong if t.verdict == "named"]
     first = {t.id: t for t in trials}
     again = [(t, first[t.again]) for t in trials if t.again in first]
-    enough = len(proven) >= least
-    middle = f"{np.median(proven):.2f} (chance {chance:.2f})" if enough else _few(len(proven))
     return rows | {
         "named: right, or in part of several": shown(in_part(t) for t in named),
         "named and called robust: likewise": shown((in_part(t) for t in robust), LEAST_ROBUST),
@@ -208,7 +219,12 @@ def figures(trials: Sequence[Scored], least: int, quantile: float = 0.95) -> dic
         else _few(len(trials)),
         "90 % set holds the truth": shown(t.in_set for t in trials),
         "90 % interval holds the size": shown(held for t in trials for held in t.held),
-        f"held out, named, lambda from {ONE:g}: median shrinkage": middle,
+        **{
+            f"held out by {how}, named, lambda from {ONE:g}: median shrinkage": _middle(
+                [getattr(t, of) for t in proven], [getattr(t, of) for t in none], least
+            )
+            for how, of in (("least squares", "usual_shrinkage"), ("the diagnosis", "shrinkage"))
+        },
         "mounted again: the same verdict": shown(
             (a.verdict, a.named) == (b.verdict, b.named) for a, b in again
         ),
@@ -221,6 +237,14 @@ def _shown(flags: Sequence[bool], least: int) -> str:
     found = rate(flags)
     share, low, high = (f"{100 * found[key]:.0f}" for key in ("share", "low", "high"))
     return f"{found['right']} of {found['count']}, {share} % ({low} to {high})"
+
+
+def _middle(shrinks: Sequence[float], sound: Sequence[float], least: int) -> str:
+    """The median, and what sound tyres reach by chance; NaN counts for nothing."""
+    known, chance = (np.array(each)[np.isfinite(each)] for each in (shrinks, sound))
+    if len(known) < least:
+        return _few(len(known))
+    return f"{np.median(known):.2f} (chance {np.quantile(chance, SIGNIFICANT):.2f})"
 
 
 def _few(count: int) -> str:
