@@ -24,6 +24,7 @@ from tyrecal.studies.diagnose.section_fields import (
     fields,
     filler_tip,
     moved,
+    sizes,
     with_fields,
 )
 from tyrecal.studies.diagnose.section_told import section_told
@@ -59,6 +60,20 @@ def test_a_case_that_does_not_say_what_its_section_is_known_from_has_it_from_a_d
     for a, b in zip(said, unsaid, strict=True):
         assert a.field and b.field and a.name == b.name
         np.testing.assert_array_equal(a.field.values, b.field.values)
+
+
+def test_a_tall_section_of_a_size_code_is_off_in_proportion(tmp_path: Path) -> None:
+    """A truck's is 0.207 m high from the rim on: 3 and 9 mm of a car's, times 0.207 / 0.15."""
+    lengths = {}
+    for code in ("205/60R15", "11R22.5"):
+        draft = from_size(parse_size(code), {}, None, "tyre")
+        (tmp_path / draft.file).write_bytes(draft.content)
+        (tmp_path / "tyre.yaml").write_text(draft.text, encoding="utf-8")
+        lengths[code] = sizes(load_case(tmp_path / "tyre.yaml", allow_unusual=True))
+    assert lengths["205/60R15"] == SECTION_SIZES["size_code"]
+    assert lengths["11R22.5"][:2] == pytest.approx((4.13e-3, 12.4e-3), rel=0.01)
+    assert lengths["11R22.5"][2:] == SECTION_SIZES["size_code"][2:]
+    assert sizes(STATED) == SECTION_SIZES["drawing"]
 
 
 def test_without_a_carcass_from_bead_to_bead_only_an_exact_section_can_be_stated() -> None:

@@ -40,6 +40,9 @@ SECTION_SIZES = {
     "drawing": (0.8e-3, 2e-3, 0.04, 0.05, 0.01),  # moulds are true, plies and rubber flow
     "size_code": (3e-3, 9e-3, 0.10, 0.10, 0.02),  # tyres of one size from several makers
 }
+CAR_HEIGHT = (
+    0.15  # m of carcass above the rim, beyond which lengths by a size code are in proportion
+)
 UNSAID: SectionOrigin = "drawing"
 CORRELATION_LENGTH = 0.25  # l, of the half meridian
 KEPT_VARIANCE = 0.99  # of the variance
@@ -73,7 +76,6 @@ def fields(case: LoadedCase) -> dict[str, SectionField]:
     known = known_from(case)
     if known == "exact":
         return {}
-    size = dict(zip(FIELD_KINDS, SECTION_SIZES[known], strict=True))
     try:
         s = arc_length(case)
     except ValueError:
@@ -83,6 +85,7 @@ def fields(case: LoadedCase) -> dict[str, SectionField]:
             f"section.known_from must be exact, got {known}: no layer of cords runs from bead to"
             " bead, along which its errors would be smooth"
         ) from None
+    size = dict(zip(FIELD_KINDS, sizes(case), strict=True))
     along = components(s)
     split, _ = split_by_region(case)
     region = {solid.material: (solid.regions or [""])[0] for solid in split.case.solids}
@@ -107,6 +110,16 @@ def fields(case: LoadedCase) -> dict[str, SectionField]:
     }
 
 
+def sizes(case: LoadedCase) -> tuple[float, ...]:
+    """Standard deviations, of the section's own size. Raises ValueError without a carcass."""
+    known = known_from(case)
+    meridian, filler, *others = SECTION_SIZES[known]
+    carcass = case.section.points[case.section.names.index(carcass_line(case))]
+    height = float(np.ptp(carcass[: rim_edge(case.section) + 1, 0]))
+    taller = max(1.0, height / CAR_HEIGHT) if known == "size_code" else 1.0
+    return (taller * meridian, taller * filler, *others)
+
+
 def rubber_parts(case: LoadedCase) -> dict[str, str]:
     """Names of the parts of rubber by material, as `split_by_region` has them."""
     split, parts = split_by_region(case)
@@ -116,11 +129,11 @@ def rubber_parts(case: LoadedCase) -> dict[str, str]:
 def words(case: LoadedCase) -> str:
     """What is assumed, for people."""
     known = known_from(case)
-    meridian, filler, gauge, stiffness, density = SECTION_SIZES[known]
-    tip = f" bead filler's tip {1e3 * filler:g} mm," if len(higher_filler(case)) else ""
+    meridian, filler, gauge, stiffness, density = sizes(case)
+    tip = f" bead filler's tip {1e3 * filler:.2g} mm," if len(higher_filler(case)) else ""
     unsaid = "" if case.case.section.known_from else ", as the case does not say"
     return (
-        f"section known from {known.replace('_', ' ')}{unsaid}: meridian {1e3 * meridian:g} mm,"
+        f"section known from {known.replace('_', ' ')}{unsaid}: meridian {1e3 * meridian:.2g} mm,"
         f"{tip} gauges {gauge:.0%}, compounds' stiffness {stiffness:.0%} and density {density:.0%},"
         " smooth"
     )
