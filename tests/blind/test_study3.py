@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from types import SimpleNamespace
 from typing import Any
 
@@ -23,20 +24,22 @@ from tyrecal.simulate.modes.label import label_modes
 from tyrecal.simulate.modes.match import match
 from tyrecal.studies.blind.make import labels_of
 from tyrecal.studies.blind.maker import Computed
-from tyrecal.studies.blind.protocol import read_json
-from tyrecal.studies.blind.ruler import Difficulty
+from tyrecal.studies.blind.protocol import read_json, read_protocol
+from tyrecal.studies.blind.ruler import Difficulty, read_ruler
 from tyrecal.studies.blind.seal import SEAL, TRUTH
 from tyrecal.tyre.case import LoadedCase, with_level
 from tyrecal.tyre.effects import catalogue
 from tyrecal.tyre.load import load_case
 
+from ..chance import Chance
+from ..studies.blind_least_squares import SAFE
 from ..studies.judge import tyre_told
 from ..studies.judge_section import LINES
 from ..studies.judge_section import section as stations_section
 from ..studies.test_fenics import installed
 from .study3 import make as making
 from .study3.cases import GROUPS, LABELS, SIZES, Group, written
-from .study3.draw import known_laws
+from .study3.draw import EFFECTS_OF, foreseen, known_laws, one_drawn
 from .study3.maker import Fenics, computed, modes
 from .study3.score import Scored, figures
 from .study3.section import Section, columns, mould, off, section
@@ -192,6 +195,30 @@ def test_trials_of_all_kinds_are_drawn_sealed_and_made_again_alike(
     assert again.pop("nonce") and again == truths[1]
     with pytest.raises(InputError, match="sealed trials already"):
         making.make(tmp_path / "a", tmp_path / "a-truth", group, counts)
+
+
+def test_strong_effects_are_those_of_which_the_ruler_foresees_enough(chance: Chance) -> None:
+    """Of the recorded ruler: each strong one's lambda is 25 or more, each of a pair's 15; of any
+    size some are below. A size of none moves nothing. False failures: 1e-7."""
+    group = next(group for group in GROUPS if group.name == "205_60r15_own")
+    with TemporaryDirectory() as place:
+        with tarfile.open(RECORDED / group.name / "trials.tar.xz") as archive:
+            archive.extractall(place, **SAFE)
+        folder = Path(place)
+        case = load_case(folder / "case" / f"{group.name}.yaml", allow_unusual=True)
+        ruler = read_ruler(folder, labels_of(case))
+    rules = read_protocol(RECORDED / group.name)
+    lam: dict[str, list[float]] = {}
+    for kind, count in {"one": 40, "one_strong": 20, "two_strong": 10}.items():
+        trials = [one_drawn(rules, case, group, kind, chance.random, ruler) for _ in range(count)]
+        seen = [
+            foreseen(ruler, rules, t.truth, id, e) for t in trials for id, e in t.effects.items()
+        ]
+        lam[kind] = seen
+        assert len(seen) == count * EFFECTS_OF[kind]
+    assert min(lam["one_strong"]) >= 25 and min(lam["two_strong"]) >= 15
+    chance.often(np.array(lam["one"]) < 25, 0.3, 0.95)  # it is about 0.65
+    assert foreseen(ruler, rules, trials[0].truth, "bead_filler", 0.0) == 0.0
 
 
 def answered(effects: str, top: str, lam: float = 30.0, **more: Any) -> Scored:

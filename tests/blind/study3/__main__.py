@@ -1,7 +1,7 @@
 """Blind study 3, group by group: a size and whose section it is diagnosed with.
 
     python -m tests.blind.study3 groups
-    python -m tests.blind.study3 make DIR 205_60r15_own --one 30 --two 16 --jobs 2
+    python -m tests.blind.study3 make DIR 205_60r15_own --one_strong 30 --two 16 --jobs 2
     python -m tests.blind.study3 answer DIR 205_60r15_own --jobs 2
     python -m tests.blind.study3 score DIR > table.md        # of all groups that are answered
     python -m tests.blind.study3 mesh 205/60R15              # the maker's own mesh error
@@ -38,7 +38,8 @@ from .score import scored, table
 from .section import columns, mould
 from .tyre import tyre_of
 
-COUNTS = {"none": 12, "one": 30, "two": 16, "three": 12, "outside": 12, "again": 4}
+COUNTS = {"none": 12, "one": 12, "one_strong": 20, "two": 4, "two_strong": 14, "three": 4}
+COUNTS |= {"outside": 6, "again": 2}
 
 
 def main() -> None:

@@ -7,18 +7,24 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tyrecal.errors import InputError
 from tyrecal.studies.blind.draw import Truth, draw, tyre
 from tyrecal.studies.blind.protocol import Protocol
+from tyrecal.studies.blind.ruler import Ruler, difficulty
 from tyrecal.studies.diagnose.uncertainties import sources
 from tyrecal.tyre.case import LoadedCase
 
 from .cases import Group, with_exact_section
 from .laws import CLAMP, OUTSIDE, OwnLaw, laws, rim_width
+from .score import EACH, ONE
 from .section import columns, mould, off
 from .tyre import Tyre, tyre_of
 
 CLAMPED = 0.5  # share of effects of the wheel's clamp, which a doubtful section hides least
 EFFECTS_OF = {"none": 0, "one": 1, "two": 2, "three": 3, "outside": 0}
+EFFECTS_OF |= {"one_strong": 1, "two_strong": 2}
+LEAST = {"one_strong": ONE, "two_strong": EACH}  # lambda that is foreseen of each effect
+MAX_DRAWS = 10_000
 SEAT_m, GAUGE_kPa, ROOM_K = 0.4e-3, 0.5, 1.0  # of a mounting: beads apart, pressure, temperature
 
 
@@ -44,14 +50,19 @@ def known_laws(group: Group) -> tuple[dict[str, OwnLaw], dict[str, OwnLaw]]:
 
 
 def drawn(
-    protocol: Protocol, case: LoadedCase, group: Group, counts: Mapping[str, int], seed: int
+    protocol: Protocol,
+    case: LoadedCase,
+    group: Group,
+    counts: Mapping[str, int],
+    seed: int,
+    ruler: Ruler | None = None,
 ) -> list[Drawn]:
     """All trials by the order of their ids. counts: by kind (`EFFECTS_OF`), and "again": tyres of
-    one effect that are mounted and measured once more."""
+    one effect that are mounted and measured once more. ruler: for kinds that are strong."""
     random = np.random.default_rng(seed)
     kinds = [kind for kind in EFFECTS_OF for _ in range(counts.get(kind, 0))]
-    found = [one_drawn(protocol, case, group, kind, random) for kind in kinds]
-    ones = [each for each in found if each.kind == "one"]
+    found = [one_drawn(protocol, case, group, kind, random, ruler) for kind in kinds]
+    ones = [each for each in found if EFFECTS_OF[each.kind] == 1]
     for each in ones[: counts.get("again", 0)]:
         other = replace(
             each.truth, id=random.bytes(6).hex(), scatter=int(random.integers(2**63)), swapped=False
@@ -62,9 +73,15 @@ def drawn(
 
 
 def one_drawn(
-    protocol: Protocol, case: LoadedCase, group: Group, kind: str, random: np.random.Generator
+    protocol: Protocol,
+    case: LoadedCase,
+    group: Group,
+    kind: str,
+    random: np.random.Generator,
+    ruler: Ruler | None,
 ) -> Drawn:
-    """A trial of a kind."""
+    """A trial of a kind; a strong one's effects are drawn until the ruler foresees enough lambda of
+    each. Raises InputError where it never does."""
     rules, known_sources = replace(protocol, counts={"none": 1}), sources(with_exact_section(case))
     (truth,) = draw(rules, case, known_sources[0], {}, {}, int(random.integers(2**63)))
     effects, outside = known_laws(group)
@@ -75,21 +92,50 @@ def one_drawn(
     chances = [
         share / clamped if id in CLAMP else (1 - share) / (len(names) - clamped) for id in names
     ]
-    ids = sorted(random.choice(names, number, replace=False, p=chances).tolist())
-    sizes = {id: known[id].drawn(random, protocol.smallest) for id in ids}
-    said = {"one": "effect", "two": "several", "three": "several"}.get(kind, kind)
+    for _ in range(MAX_DRAWS):
+        ids = sorted(random.choice(names, number, replace=False, p=chances).tolist())
+        sizes = {id: known[id].drawn(random, protocol.smallest) for id in ids}
+        if kind not in LEAST:
+            break
+        assert ruler is not None
+        seen = [foreseen(ruler, protocol, truth, id, size) for id, size in sizes.items()]
+        if min(seen) >= LEAST[kind]:
+            break
+    else:
+        raise InputError(f"no effects of kind {kind} could be seen, by the ruler")
+    said = {0: kind, 1: "effect"}.get(EFFECTS_OF[kind], "several")
     size = next(iter(sizes.values()), 0.0)
     truth = replace(truth, kind=said, law="+".join(ids), size=size)
     return Drawn(kind, truth, sizes, *(int(random.integers(2**63)) for _ in range(2)))
 
 
+def foreseen(ruler: Ruler, protocol: Protocol, truth: Truth, id: str, size: float) -> float:
+    """lambda of the catalogue's effect of this size on a tyre with all of its labels; 0 where the
+    ruler does not know it."""
+    signature = ruler.signatures.get(id)
+    if signature is None:
+        return 0.0
+    places = np.array([i for i, (_, p) in enumerate(ruler.rows) if p != protocol.held_out_kPa])
+    labels = [ruler.rows[i][0] for i in places]
+    counts = np.array([2 if label and label.c else 1 for label in labels])
+    d = np.log([*truth.variables.values()]) - ruler.x0
+    sizes, shift, split = signature.grid(d, places)
+    at = lambda table: np.array([np.interp(size, sizes, column) for column in table.T])
+    return difficulty(ruler, protocol, id, d, places, counts, at(shift), at(split)).lam
+
+
 def drawn_anew(
-    each: Drawn, protocol: Protocol, case: LoadedCase, group: Group, tries: int
+    each: Drawn,
+    protocol: Protocol,
+    case: LoadedCase,
+    group: Group,
+    tries: int,
+    ruler: Ruler | None = None,
 ) -> Drawn:
     """Another tyre of its kind for a trial whose tyre has no solution, the same for whoever is
     measured again; tries: how many had none."""
     random = np.random.default_rng([each.redraw, tries])
-    other = one_drawn(protocol, case, group, each.kind, random)
+    other = one_drawn(protocol, case, group, each.kind, random, ruler)
     own = each.truth
     truth = replace(other.truth, id=own.id, scatter=own.scatter, swapped=own.swapped)
     return replace(each, truth=truth, effects=other.effects)

@@ -22,6 +22,7 @@ from tyrecal.studies.blind.make import (
     Trial,
     copy_case,
     kept_seed,
+    labels_of,
     plain_trial,
     read_trial,
     sealed_trial,
@@ -29,12 +30,12 @@ from tyrecal.studies.blind.make import (
 )
 from tyrecal.studies.blind.maker import Computed
 from tyrecal.studies.blind.protocol import Protocol, read_json, write_json, write_protocol
-from tyrecal.studies.blind.ruler import RULER_FILE, measure, write_ruler
+from tyrecal.studies.blind.ruler import RULER_FILE, Ruler, measure, read_ruler, write_ruler
 from tyrecal.studies.blind.seal import SEAL, seal
 from tyrecal.tyre.case import LoadedCase
 
 from .cases import LABELS, Group, written
-from .draw import Drawn, drawn, drawn_anew, made
+from .draw import LEAST, Drawn, drawn, drawn_anew, made
 from .maker import ABOUT, Fenics, computed
 
 FENICS = Fenics()  # of this process
@@ -70,8 +71,10 @@ def make(
     if not (folder / RULER_FILE).exists():
         write_ruler(folder, (ruler or partial(measured, jobs=jobs))(case, protocol))
     seed = kept_seed(sealed, seed)
-    every = drawn(protocol, case, group, counts, seed)
-    work = partial(one, sealed, protocol, case, group)
+    strong = any(counts.get(kind) for kind in LEAST)
+    known = read_ruler(folder, labels_of(case)) if strong else None
+    every = drawn(protocol, case, group, counts, seed, known)
+    work = partial(one, sealed, protocol, case, group, known)
     found = []
     with process_pool(jobs) if jobs > 1 else nullcontext() as pool:
         for each in (pool.map if pool else map)(work, every):
@@ -100,13 +103,20 @@ def measured(case: LoadedCase, protocol: Protocol, jobs: int = 1) -> Mapping[str
     return measure(model, rows_of(case, protocol))
 
 
-def one(sealed: Path, protocol: Protocol, case: LoadedCase, group: Group, each: Drawn) -> Made:
+def one(
+    sealed: Path,
+    protocol: Protocol,
+    case: LoadedCase,
+    group: Group,
+    ruler: Ruler | None,
+    each: Drawn,
+) -> Made:
     """A trial as it was made before it was stopped, or made now."""
     asked = json.dumps([asdict(each), asdict(group), protocol.maker], sort_keys=True)
     path = sealed / "made" / f"{sha256(asked.encode()).hexdigest()[:16]}.json"
     if not path.exists():
         path.parent.mkdir(exist_ok=True)
-        trial, effects, members = _made(protocol, case, group, each)
+        trial, effects, members = _made(protocol, case, group, ruler, each)
         others = {
             id: plain_trial(replace(trial, without=c))["without"] for id, c in members.items()
         }
@@ -120,7 +130,9 @@ def one(sealed: Path, protocol: Protocol, case: LoadedCase, group: Group, each: 
     return trial, content["effects"], members
 
 
-def _made(protocol: Protocol, case: LoadedCase, group: Group, each: Drawn) -> Made:
+def _made(
+    protocol: Protocol, case: LoadedCase, group: Group, ruler: Ruler | None, each: Drawn
+) -> Made:
     """Its tyre drawn again where it has no solution."""
     pressures = list(protocol.pressures_kPa)
     run = lambda *without: computed(
@@ -135,7 +147,7 @@ def _made(protocol: Protocol, case: LoadedCase, group: Group, each: Drawn) -> Ma
             return trial, each.effects, members
         except (EvaluationFailed, ValueError) as failure:
             last = failure
-        each = drawn_anew(each, protocol, case, group, tries)
+        each = drawn_anew(each, protocol, case, group, tries, ruler)
     raise InputError(f"no tyre of kind {each.kind} has a solution: {last}")
 
 
