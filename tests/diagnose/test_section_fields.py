@@ -29,7 +29,7 @@ from tyrecal.studies.diagnose.section_fields import (
 )
 from tyrecal.studies.diagnose.section_told import section_told
 from tyrecal.studies.diagnose.tyre_model import TyreModel
-from tyrecal.studies.diagnose.uncertainties import sources
+from tyrecal.studies.diagnose.uncertainties import RIM_WIDTH, sources
 from tyrecal.tyre.case.identity import tyre_sha256
 from tyrecal.tyre.case.new_case import from_size
 from tyrecal.tyre.effects.edit import changed, with_part
@@ -74,6 +74,25 @@ def test_a_tall_section_of_a_size_code_is_off_in_proportion(tmp_path: Path) -> N
     assert lengths["11R22.5"][:2] == pytest.approx((4.13e-3, 12.4e-3), rel=0.01)
     assert lengths["11R22.5"][2:] == SECTION_SIZES["size_code"][2:]
     assert sizes(STATED) == SECTION_SIZES["drawing"]
+
+
+def test_beads_are_held_as_far_apart_as_the_section_is_known_unless_the_case_states_it(
+    tmp_path: Path,
+) -> None:
+    """As half of a rim_width by the size; by a case's own number where it has one, once."""
+    draft = from_size(parse_size("205/60R15"), {}, None, "tyre")
+    (tmp_path / draft.file).write_bytes(draft.content)
+    (tmp_path / "tyre.yaml").write_text(draft.text, encoding="utf-8")
+    case = load_case(tmp_path / "tyre.yaml")
+    known = lambda origin: changed(case, section=with_part(case.case.section, known_from=origin))
+    steps = lambda case: [s.steps[RIM_WIDTH] for s in sources(case)[0] if RIM_WIDTH in s.steps]
+    sizes = {"exact": [], "measured": [0.5e-3], "drawing": [1e-3], "size_code": [5e-3]}
+    assert {origin: steps(known(origin)) for origin in sizes} == sizes
+    assert steps(known(None)) == sizes["drawing"]
+    (seat,) = [s for s in sources(known("size_code"))[0] if RIM_WIDTH in s.steps]
+    assert seat.words == "bead seat distance 5 mm"
+    own = case.file_data["uncertainties"] | {"rim": {"sets": [RIM_WIDTH], "absolute": 2e-3}}
+    assert steps(changed(case, uncertainties=own)) == [2e-3]
 
 
 def test_without_a_carcass_from_bead_to_bead_only_an_exact_section_can_be_stated() -> None:

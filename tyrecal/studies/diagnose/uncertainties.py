@@ -9,11 +9,15 @@ from ...tyre.case import LoadedCase, number_at
 from ...tyre.case.schema import Cord, Rubber
 from ...tyre.effects import catalogue
 from ...units import in_engineers_units
-from .section_fields import SectionField, fields, words
+from .section_fields import SectionField, fields, known_from, words
 
 DENSITY_PERCENT, MODULUS_PERCENT, SPACING_PERCENT, GAUGE_PERCENT = 1.5, 3.0, 1.0, 3.0
 ANGLE_deg, PRESSURE_kPa = 1.0, 1.0
 EFFECT_PATH = "effects."
+RIM_WIDTH = EFFECT_PATH + "rim_width"
+# m between the places where the rim holds the beads: by their build as well as by the rim's width;
+# by judgement, 2.5 mm a side from one maker of a size to another
+BEAD_SEAT_DISTANCE = {"exact": 0.0, "measured": 0.5e-3, "drawing": 1e-3, "size_code": 5e-3}
 UNIT_BY_ENDING = {  # by a key's end, the longer first
     "kg_per_m3": "kg/m3",
     "kg_m2": "kg m2",
@@ -48,13 +52,17 @@ def sources(case: LoadedCase) -> tuple[list[Source], bool]:
     design variable sets is none: the fit finds it.
 
     Assumed, a standard deviation each: rubber densities 1.5 %, moduli of cords 3 %, spacings 1 %,
-    gauges that the case has 3 %, cord angles 1 degree, pressure 1 kPa. Then the fields of a section
-    that is not exact.
+    gauges that the case has 3 %, cord angles 1 degree, pressure 1 kPa. Then, of a section that is
+    not exact, how far apart the rim holds the beads, unless the case states `effects.rim_width`,
+    and the section's fields.
     """
     found, assumed = _constants(case)
     of_section = [Source(name, {}, "", field) for name, field in fields(case).items()]
     if of_section:
         of_section[0] = replace(of_section[0], words=words(case))
+        if not any(RIM_WIDTH in source.steps for source in found):
+            seat = BEAD_SEAT_DISTANCE[known_from(case)]
+            found.append(_source("bead_seat_distance", {RIM_WIDTH: seat}, 0.0, seat))
     return [*found, *of_section], assumed
 
 
