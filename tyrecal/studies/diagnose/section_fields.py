@@ -40,9 +40,7 @@ SECTION_SIZES = {
     "drawing": (0.8e-3, 2e-3, 0.04, 0.05, 0.01),  # moulds are true, plies and rubber flow
     "size_code": (3e-3, 9e-3, 0.10, 0.10, 0.02),  # tyres of one size from several makers
 }
-CAR_HEIGHT = (
-    0.15  # m of carcass above the rim, beyond which lengths by a size code are in proportion
-)
+CAR_HEIGHT = 0.15  # m of carcass above the rim; beyond, lengths by a size code are in proportion
 UNSAID: SectionOrigin = "drawing"
 CORRELATION_LENGTH = 0.25  # l, of the half meridian
 KEPT_VARIANCE = 0.99  # of the variance
