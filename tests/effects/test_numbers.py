@@ -299,3 +299,22 @@ def test_a_higher_filler_stiffens_the_region_above_by_its_share() -> None:
     upper = length(first[begin : begin + regions["upper_sidewall"] + 1])[-1]
     share = 0.010 / upper
     assert made.case.materials[above.material].C10_Pa == pytest.approx(own * (1 + 2 * share))
+
+
+def test_a_cap_ply_may_reach_the_edge_of_the_widest_belt() -> None:
+    """As much heavier as that belt's area is larger; where belts end together there is none."""
+    effect = catalogue()["cap_ply"]
+    assert effect.beside
+    with pytest.raises(ValueError, match="no belt is wider than the outer one"):
+        effect.beside(CASE, 1e6)
+    stepped = load_case(CASES / "205_60r15.yaml")
+    plain, own, wider = (
+        Evaluator(TyreDesign(made)).evaluate(Question({})).mass_kg
+        for made in (stepped, effect.add(stepped, 1e6), effect.beside(stepped, 1e6))
+    )
+    area = {}
+    for name in ("belt1", "belt2"):
+        line = stepped.section.points[stepped.section.names.index(name)]
+        r, z = line[~np.isnan(line[:, 0])].T
+        area[name] = np.hypot(np.diff(r), np.diff(z)) @ (r[1:] + r[:-1])
+    assert (wider - plain) / (own - plain) == pytest.approx(area["belt1"] / area["belt2"], rel=1e-3)

@@ -6,7 +6,7 @@ from ..case import LoadedCase
 from ..case.parts import Cord, RebarLayer
 from .edit import changed, unused, with_layers
 from .effect import Effect
-from .parts import belt_lines
+from .parts import belt_lines, present
 
 NYLON = Cord(kind="cord", youngs_modulus_Pa=3.5e9, poissons_ratio=0.3, density_kg_per_m3=1140.0)
 SPACING_M = 1e-3
@@ -14,11 +14,26 @@ SPACING_M = 1e-3
 
 def add(case: LoadedCase, value: float) -> LoadedCase:
     """A nylon layer on the outer belt's line, at 90 degrees, of stiffness E A / s = value."""
+    return _over(case, belt_lines(case)[-1], value)
+
+
+def to_the_edge(case: LoadedCase, value: float) -> LoadedCase:
+    """The same on the widest belt's line, so that it holds the edges of all belts. Raises
+    ValueError where none is wider than the outer one."""
+    lines = belt_lines(case)
+    length = dict(zip(case.section.names, present(case.section).sum(1), strict=True))
+    widest = max(lines, key=lambda line: int(length[line]))
+    if length[widest] == length[lines[-1]]:
+        raise ValueError("must be 0: no belt is wider than the outer one")
+    return _over(case, widest, value)
+
+
+def _over(case: LoadedCase, line: str, value: float) -> LoadedCase:
     if not value > 0:
         raise ValueError("must be at least 0")
     material = unused("cap_ply_cord", case.case.materials)
     layer = RebarLayer(
-        line=belt_lines(case)[-1],
+        line=line,
         material=material,
         area_m2=value * SPACING_M / NYLON.youngs_modulus_Pa,
         spacing_m=SPACING_M,
@@ -46,6 +61,7 @@ EFFECT = Effect(
     toggle="section a tyre of the same build, or look the construction up on its sidewall",
     aliases=("belt_width", "bead_filler", "belt_angle"),
     add=add,
-    # full width, edges alone or both; wound at 0 to 5 degrees
+    # one layer or more at the edges; wound at 0 to 5 degrees; its width is integrated over
     law=0.10,
+    beside=to_the_edge,
 )
