@@ -4,6 +4,7 @@
     python -m tests.blind.study3 make DIR 205_60r15_own --one_strong 30 --two 16 --jobs 2
     python -m tests.blind.study3 answer DIR 205_60r15_own --jobs 2
     python -m tests.blind.study3 score DIR > table.md        # of all groups that are answered
+    python -m tests.blind.study3 power DIR > table.md        # what could be found, by its rulers
     python -m tests.blind.study3 mesh 205/60R15              # the maker's own mesh error
 
 Trials lie in DIR/GROUP, their truth in DIR-truth/GROUP. `make` and `answer` go on where they were
@@ -19,6 +20,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import argparse
 import sys
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -28,10 +30,13 @@ import numpy as np
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator
 from tyrecal.studies.blind.answer import answer, case_of, rows_of, tyre_model
+from tyrecal.studies.blind.make import labels_of
+from tyrecal.studies.blind.power import NAMED_AS_A_RULE, Power, powers
 from tyrecal.studies.blind.protocol import read_protocol
-from tyrecal.studies.blind.seal import ANSWERS
+from tyrecal.studies.blind.ruler import read_ruler
+from tyrecal.studies.blind.seal import ANSWERS, SEAL
 
-from .cases import GROUPS, LABELS, written
+from .cases import GROUPS, LABELS, Group, written
 from .make import FENICS, make
 from .maker import computed
 from .score import scored, table
@@ -44,7 +49,7 @@ COUNTS |= {"outside": 6, "again": 2}
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("what", choices=("groups", "make", "answer", "score", "mesh"))
+    parser.add_argument("what", choices=("groups", "make", "answer", "score", "power", "mesh"))
     parser.add_argument("folder", nargs="?", help="DIR; of mesh the size")
     parser.add_argument("group", nargs="?")
     parser.add_argument("--jobs", type=int, default=1)
@@ -58,6 +63,8 @@ def main() -> None:
         print("\n".join(groups))
     elif o.what == "mesh":
         mesh(o.folder)
+    elif o.what == "power":
+        print(power(Path(o.folder)))
     elif o.what == "score":
         folder = Path(o.folder)
         answered = [g for g in GROUPS if (folder / g.name / ANSWERS).exists()]
@@ -74,6 +81,28 @@ def main() -> None:
             case, protocol = case_of(folder), read_protocol(folder)
             model = tyre_model(case, Evaluator(TyreDesign(case)), protocol, o.jobs)
             print(answer(folder, model, rows_of(case, protocol), o.jobs, told))
+
+
+def power(folder: Path) -> str:
+    """lambda of each effect at the far end of its range, by group, from the tyres' rulers; in
+    parentheses where that is too little to be named as a rule."""
+    found = {}
+    for group in (g for g in GROUPS if (folder / g.name / SEAL).exists()):
+        trials = folder / group.name
+        ruler = read_ruler(trials, labels_of(case_of(trials)))
+        found[group] = {each.id: each for each in powers(ruler, read_protocol(trials))}
+    ids = sorted(set[str]().union(*found.values()), key=lambda id: -lambdas(found, id)[0])
+    heads = [f"{group.size} {'own' if group.own else 'foreign'}" for group in found]
+    lines = [f"| effect | {' | '.join(heads)} |", "|---" * (1 + len(heads)) + "|"]
+    for id in ids:
+        cells = [f"{x:.0f}" if x >= NAMED_AS_A_RULE else f"({x:.0f})" for x in lambdas(found, id)]
+        lines.append(f"| {id} | {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
+def lambdas(found: Mapping[Group, Mapping[str, Power]], id: str) -> list[float]:
+    """By group; 0 where it was not weighed."""
+    return [each[id].full if id in each else 0.0 for each in found.values()]
 
 
 def mesh(size: str) -> None:

@@ -1,0 +1,119 @@
+"""An earlier blind study's trials, answered by today's diagnosis.
+
+    python -m tests.studies.answered_again DIR blind_study_2 exact --jobs 2
+    python -m tests.studies.answered_again DIR blind_study_2 drawing --jobs 2
+    python -m tests.studies.answered_again DIR blind_study_2           # the table
+
+Those tyres' sections are the case's own (`exact`); the second line answers as if they had been
+taken from a drawing, the default, so that what this costs is seen. Effects are the ones that the
+study's answers weighed. DIR keeps what was answered; the same command goes on from there.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import click
+
+from tyrecal.simulate.deck.tyre_design import TyreDesign
+from tyrecal.simulate.evaluate.evaluator import Evaluator
+from tyrecal.simulate.evaluate.store import Store
+from tyrecal.studies.blind.answer import answer, case_of, rows_of, tyre_model
+from tyrecal.studies.blind.emulated import emulate
+from tyrecal.studies.blind.protocol import read_protocol
+from tyrecal.studies.blind.score import score
+from tyrecal.studies.blind.tables import summary
+from tyrecal.studies.diagnose.evidence import NONE, OUTSIDE
+
+from .blind_least_squares import STUDIES, unpacked
+
+ORIGINS = "exact", "drawing"
+STATED = "section:\n", "section:\n  known_from: {}\n"
+SHARES = {
+    "false alarms": "false_alarms",
+    "named verdicts that are right": "named_right",
+    "outside: said so": "outside_recognised",
+    "outside: named": "outside_named",
+    "90 % set holds the truth": "set_holds_truth",
+    "90 % interval holds the size": "interval_holds_parameter",
+}
+
+
+def weighed(answers: Path) -> list[str]:
+    """Effects that the answers on record weighed."""
+    keys: set[str] = set()
+    for path in answers.glob("*.json"):
+        told = json.loads(path.read_text())["diagnosis"]["probabilities"]
+        keys.update(id for key in told for id in key.split("+"))
+    return sorted(keys - {NONE, OUTSIDE})
+
+
+def answered(study: Path, folder: Path, origin: str, jobs: int) -> str:
+    """Answer what has no answer yet; the hash of all."""
+    trials = folder / study.name / origin / "trials"
+    marked = trials / "weighed.json"
+    if not marked.exists():
+        trials.parent.mkdir(parents=True, exist_ok=True)
+        unpacked(study, trials)
+        marked.write_text(json.dumps(weighed(trials / "answers")))
+        for path in (trials / "answers").glob("*.json"):
+            path.unlink()
+        case = trials / "case" / read_protocol(trials).case
+        text = case.read_text()
+        assert STATED[0] in text
+        case.write_text(text.replace(STATED[0], STATED[1].format(origin), 1))
+    case, protocol = case_of(trials), read_protocol(trials)
+    evaluator = Evaluator(TyreDesign(case), store=Store((folder / "record").resolve()))
+    model = tyre_model(case, evaluator, protocol, jobs, json.loads(marked.read_text()))
+    told = lambda done, all: print(f"{done} of {all}", file=sys.stderr, flush=True)
+    return answer(trials, emulate(model), rows_of(case, protocol), jobs, told)
+
+
+def figures(of: dict[str, Any]) -> Iterator[tuple[str, str]]:
+    """What a study is judged by, in words."""
+    for band in of["by_band"][1:]:
+        here = f"{band['low']:g} to {band['high']:g}" if band["high"] else f"{band['low']:g} on"
+        yield f"top 1 by group, band {here}", _share(band["top_1_group"])
+    for words, key in SHARES.items():
+        if of[key]["count"]:
+            yield words, _share(of[key])
+    yield "mean probability on the true group", f"{of['mean_probability_on_group']:.2f}"
+    error, chance = of["calibration_error"], of["calibration_error_95"]
+    yield "calibration error (95 % of a calibrated answerer)", f"{error:.3f} ({chance:.3f})"
+    held = of["held_out"]
+    shrinks = f"{held['median_shrinkage']:.2f} ({held['placebo_95']:.2f})"
+    yield "held-out error shrinks by, median (placebo)", shrinks
+
+
+def _share(rate: dict[str, Any]) -> str:
+    return f"{rate['right']} of {rate['count']}, {100 * rate['share']:.1f} %"
+
+
+@click.command()
+@click.argument("folder", type=click.Path(path_type=Path))
+@click.argument("study", type=click.Choice([study.name for study in STUDIES]))
+@click.argument("origin", type=click.Choice(ORIGINS), required=False)
+@click.option("--jobs", default=1)
+def main(folder: Path, study: str, origin: str | None, jobs: int) -> None:
+    """Answer, or tell the figures of what is answered beside those on record."""
+    own = next(each for each in STUDIES if each.name == study)
+    if origin:
+        print(answered(own, folder, origin, jobs))
+        return
+    columns = {"recorded": dict(figures(json.loads((own / "score.json").read_text())))}
+    for origin in ORIGINS:
+        trials = folder / study / origin / "trials"
+        if (trials / "answers.json").exists():
+            found = score(trials, trials.with_name("trials-truth"))
+            columns[origin] = dict(figures(summary(found)))
+    print(f"| {study} | {' | '.join(columns)} |\n{'|---' * (1 + len(columns))}|")
+    for row in columns["recorded"]:
+        print(f"| {row} | {' | '.join(each[row] for each in columns.values())} |")
+
+
+if __name__ == "__main__":
+    main()
