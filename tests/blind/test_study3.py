@@ -22,6 +22,7 @@ from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.simulate.evaluate.failure import EvaluationFailed
 from tyrecal.simulate.modes.label import label_modes
 from tyrecal.simulate.modes.match import match
+from tyrecal.studies.blind.answer import answer, case_of, rows_of, tyre_model
 from tyrecal.studies.blind.make import labels_of
 from tyrecal.studies.blind.maker import Computed
 from tyrecal.studies.blind.protocol import read_json, read_protocol
@@ -32,7 +33,7 @@ from tyrecal.tyre.effects import catalogue
 from tyrecal.tyre.load import load_case
 
 from ..chance import Chance
-from ..studies.blind_least_squares import SAFE
+from ..studies.blind_least_squares import SAFE, unpacked
 from ..studies.judge import tyre_told
 from ..studies.judge_section import LINES
 from ..studies.judge_section import section as stations_section
@@ -374,3 +375,27 @@ def test_recorded_trials_are_those_that_were_sealed(group: Path) -> None:
         files = {Path(name) for name in archive.getnames() if name.endswith(".csv")}
     trials = {path.stem for path in files if path.parent.name == "trials"}
     assert trials == {trial["id"] for trial in json.loads(truth)["trials"]}
+
+
+@pytest.mark.slow
+def test_three_answers_on_record_are_given_again(tmp_path: Path) -> None:
+    """The first three of a group by name, by today's diagnosis."""
+    folder = tmp_path / "trials"
+    unpacked(RECORDED / "175_70r13_own", folder)
+    recorded = {}
+    for place, path in enumerate(sorted((folder / "answers").glob("*.json"))):
+        if place < 3:
+            recorded[path.name] = read_json(path)["diagnosis"]
+        else:
+            (folder / "trials" / f"{path.stem}.csv").unlink()
+        path.unlink()
+    case, protocol = case_of(folder), read_protocol(folder)
+    model = tyre_model(case, Evaluator(TyreDesign(case)), protocol)
+    answer(folder, model, rows_of(case, protocol))
+    for name, before in recorded.items():
+        now = read_json(folder / "answers" / name)["diagnosis"]
+        assert (now["verdict"], now["effect"]) == (before["verdict"], before["effect"])
+        keys = now["probabilities"].keys() | before["probabilities"].keys()
+        for key in keys:
+            then, again = (each["probabilities"].get(key, 0.0) for each in (before, now))
+            assert again == pytest.approx(then, abs=0.02), (name, key)

@@ -242,7 +242,7 @@ def _shown(flags: Sequence[bool], least: int) -> str:
 def _middle(shrinks: Sequence[float], sound: Sequence[float], least: int) -> str:
     """The median, and what sound tyres reach by chance; NaN counts for nothing."""
     known, chance = (np.array(each)[np.isfinite(each)] for each in (shrinks, sound))
-    if len(known) < least:
+    if len(known) < least or not len(chance):
         return _few(len(known))
     return f"{np.median(known):.2f} (chance {np.quantile(chance, SIGNIFICANT):.2f})"
 
