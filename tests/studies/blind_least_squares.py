@@ -35,16 +35,19 @@ STEPS, LONGEST = 20, 0.5
 SAFE: Any = {"filter": "data"} if hasattr(tarfile, "data_filter") else {}  # from 3.11.4 on
 
 
-def unpacked(study: Path, folder: Path) -> None:
-    """The study as it lay after the answers in ``folder``, its truth beside it."""
-    folder.mkdir()
-    for name in ("trials", "answers"):
-        with tarfile.open(study / f"{name}.tar.xz") as archive:
-            archive.extractall(folder, **SAFE)
-    for name in ("protocol.json", "seal.json"):
-        (folder / name).write_bytes((study / name).read_bytes())
-    truth = folder.with_name("trials-truth")
-    truth.mkdir()
+def unpacked(study: Path, folder: Path, sealed: Path | None = None) -> None:
+    """The study as it lay after the answers in ``folder``, its truth in ``sealed``, by default
+    beside it."""
+    folder.mkdir(parents=True)
+    for archive in ("trials.tar.xz", "answers.tar.xz"):
+        if (study / archive).exists():
+            with tarfile.open(study / archive) as files:
+                files.extractall(folder, **SAFE)
+    for name in ("protocol.json", "seal.json", "answers.json"):
+        if (study / name).exists():
+            (folder / name).write_bytes((study / name).read_bytes())
+    truth = sealed or folder.with_name(f"{folder.name}-truth")
+    truth.mkdir(parents=True)
     (truth / "truth.json").write_bytes(lzma.decompress((study / "truth.json.xz").read_bytes()))
 
 

@@ -3,6 +3,7 @@
     python -m tests.blind.study3 groups
     python -m tests.blind.study3 make DIR 205_60r15_own --one_strong 30 --two 16 --jobs 2
     python -m tests.blind.study3 answer DIR 205_60r15_own --jobs 2
+    python -m tests.blind.study3 unpack DIR                  # all that is on record, truth beside
     python -m tests.blind.study3 score DIR > table.md        # of all groups that are answered
     python -m tests.blind.study3 power DIR > table.md        # what could be found, by its rulers
     python -m tests.blind.study3 mesh 205/60R15              # the maker's own mesh error
@@ -36,7 +37,8 @@ from tyrecal.studies.blind.protocol import read_protocol
 from tyrecal.studies.blind.ruler import read_ruler
 from tyrecal.studies.blind.seal import ANSWERS, SEAL
 
-from .cases import GROUPS, LABELS, Group, written
+from ...studies.blind_least_squares import unpacked
+from .cases import GROUPS, LABELS, RECORDED, Group, written
 from .make import FENICS, make
 from .maker import computed
 from .score import scored, table
@@ -45,11 +47,12 @@ from .tyre import tyre_of
 
 COUNTS = {"none": 12, "one": 12, "one_strong": 20, "two": 4, "two_strong": 14, "three": 4}
 COUNTS |= {"outside": 6, "again": 2}
+COMMANDS = "groups", "make", "answer", "unpack", "score", "power", "mesh"
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("what", choices=("groups", "make", "answer", "score", "power", "mesh"))
+    parser.add_argument("what", choices=COMMANDS)
     parser.add_argument("folder", nargs="?", help="DIR; of mesh the size")
     parser.add_argument("group", nargs="?")
     parser.add_argument("--jobs", type=int, default=1)
@@ -65,15 +68,15 @@ def main() -> None:
         mesh(o.folder)
     elif o.what == "power":
         print(power(Path(o.folder)))
+    elif o.what == "unpack":
+        for group in (each for each in RECORDED.iterdir() if each.is_dir()):
+            unpacked(group, Path(o.folder) / group.name, sealed_in(o.folder) / group.name)
     elif o.what == "score":
-        folder = Path(o.folder)
-        answered = [g for g in GROUPS if (folder / g.name / ANSWERS).exists()]
-        sealed = folder.with_name(folder.name + "-truth")
-        every = {g: scored(folder / g.name, sealed / g.name) for g in answered}
-        print(table(every))
+        answered = [g for g in GROUPS if (Path(o.folder) / g.name / ANSWERS).exists()]
+        of = lambda g: scored(Path(o.folder) / g.name, sealed_in(o.folder) / g.name)
+        print(table({g: of(g) for g in answered}))
     else:
-        folder = Path(o.folder) / o.group
-        sealed = Path(o.folder).with_name(Path(o.folder).name + "-truth") / o.group
+        folder, sealed = Path(o.folder) / o.group, sealed_in(o.folder) / o.group
         if o.what == "make":
             counts = {kind: getattr(o, kind) for kind in COUNTS}
             print(make(folder, sealed, groups[o.group], counts, o.jobs, o.seed, told))
@@ -81,6 +84,11 @@ def main() -> None:
             case, protocol = case_of(folder), read_protocol(folder)
             model = tyre_model(case, Evaluator(TyreDesign(case)), protocol, o.jobs)
             print(answer(folder, model, rows_of(case, protocol), o.jobs, told))
+
+
+def sealed_in(folder: str) -> Path:
+    """Where the truth of all groups lies."""
+    return Path(folder).with_name(f"{Path(folder).name}-truth")
 
 
 def power(folder: Path) -> str:

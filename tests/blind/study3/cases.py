@@ -21,6 +21,7 @@ from tyrecal.tyre.section.size import parse_size
 from .section import TREAD, VOID, Mould, at, carcass, mould
 
 LABELS = list(USUAL_LABELS)
+RECORDED = Path(__file__).parents[2] / "benchmarks" / "study_3"
 
 
 @dataclass(frozen=True)
