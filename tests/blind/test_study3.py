@@ -42,7 +42,7 @@ from .study3 import make as making
 from .study3.cases import GROUPS, LABELS, RECORDED, SIZES, Group, written
 from .study3.draw import EFFECTS_OF, foreseen, known_laws, one_drawn
 from .study3.maker import Fenics, computed, modes
-from .study3.score import Scored, figures
+from .study3.score import Scored, figures, misses
 from .study3.section import Section, columns, mould, off, section
 from .study3.tyre import Mesh, Tyre, on_springs, problem, tyre_of
 
@@ -262,6 +262,15 @@ def test_shrinkage_is_of_what_was_named_and_strong_and_exchanged_labels_count_fo
     assert said[f"{start}the diagnosis{end}"] == "0.50 (chance 0.10)"
     few = figures([*named[1:], answered("a", "a"), *sound], 60)
     assert few[f"{start}least squares{end}"] == "not shown (59)"
+
+
+def test_misses_are_what_was_named_wrongly_and_what_should_have_been_found() -> None:
+    right = [answered("a", "a"), answered("a+b", "a+b"), answered("", "none")]
+    weak = answered("a", "none", lam=9.0)
+    wrong = [answered("a", "c"), answered("a+b", "a"), answered("a", "none"), answered("", "a")]
+    words = misses({Group("205/60R15", True): [*right, weak, *wrong]}).splitlines()[2:]
+    assert [line.split(" | ")[2] for line in words] == ["a", "a+b", "a", "none"]
+    assert [line.split(" | ")[5] for line in words] == ["c", "a", "", "a"]
 
 
 def on_the_same_stations(case: LoadedCase) -> dict[str, Any]:

@@ -4,7 +4,7 @@
     python -m tests.blind.study3 make DIR 205_60r15_own --one_strong 30 --two 16 --jobs 2
     python -m tests.blind.study3 answer DIR 205_60r15_own --jobs 2
     python -m tests.blind.study3 unpack DIR                  # all that is on record, truth beside
-    python -m tests.blind.study3 score DIR > table.md        # of all groups that are answered
+    python -m tests.blind.study3 score DIR > table.md        # of all answered, but LEARNED_FROM
     python -m tests.blind.study3 power DIR > table.md        # what could be found, by its rulers
     python -m tests.blind.study3 mesh 205/60R15              # the maker's own mesh error
 
@@ -38,10 +38,10 @@ from tyrecal.studies.blind.ruler import read_ruler
 from tyrecal.studies.blind.seal import ANSWERS, SEAL
 
 from ...studies.blind_least_squares import unpacked
-from .cases import GROUPS, LABELS, RECORDED, Group, written
+from .cases import GROUPS, LABELS, LEARNED_FROM, RECORDED, Group, written
 from .make import FENICS, make
 from .maker import computed
-from .score import scored, table
+from .score import misses, scored, table
 from .section import columns, mould
 from .tyre import tyre_of
 
@@ -72,9 +72,11 @@ def main() -> None:
         for group in (each for each in RECORDED.iterdir() if each.is_dir()):
             unpacked(group, Path(o.folder) / group.name, sealed_in(o.folder) / group.name)
     elif o.what == "score":
-        answered = [g for g in GROUPS if (Path(o.folder) / g.name / ANSWERS).exists()]
+        counted = [g for g in GROUPS if g.name != LEARNED_FROM]
+        answered = [g for g in counted if (Path(o.folder) / g.name / ANSWERS).exists()]
         of = lambda g: scored(Path(o.folder) / g.name, sealed_in(o.folder) / g.name)
-        print(table({g: of(g) for g in answered}))
+        found = {g: of(g) for g in answered}
+        print(table(found), misses(found), sep="\n")
     else:
         folder, sealed = Path(o.folder) / o.group, sealed_in(o.folder) / o.group
         if o.what == "make":

@@ -22,6 +22,7 @@ from .section import TREAD, VOID, Mould, at, carcass, mould
 
 LABELS = list(USUAL_LABELS)
 RECORDED = Path(__file__).parents[2] / "benchmarks" / "study_3"
+LEARNED_FROM = "205_60r15_foreign"  # answered and opened while the answerer could still change
 
 
 @dataclass(frozen=True)

@@ -231,6 +231,24 @@ def figures(trials: Sequence[Scored], least: int, quantile: float = 0.95) -> dic
     }
 
 
+def misses(groups: Mapping[Group, Sequence[Scored]]) -> str:
+    """What was named wrongly or in part, and what was not found though it moved enough."""
+    heads = "group", "trial", "truth", "lambda of each", "verdict", "named", "likeliest"
+    lines = [f"| missed: {' | '.join(heads)} |", "|---" * len(heads) + "|"]
+    for group, trials in groups.items():
+        for t in trials:
+            wrong = t.verdict == "named" and not t.says(t.named or "")
+            least = ONE if len(t.effects) == 1 else EACH
+            hidden = t.effects and min(h.lam for h in t.hard.values()) >= least and not t.right
+            if wrong or hidden:
+                truth = "+".join(t.effects) or t.kind
+                sizes = ", ".join(f"{h.lam:.0f}" for h in t.hard.values())
+                likely = f"{t.ranked[0]} {t.stated:.2f}"
+                cells = group.name, t.id, truth, sizes, t.verdict, t.named or "", likely
+                lines.append(f"| {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
 def _shown(flags: Sequence[bool], least: int) -> str:
     if len(flags) < least:
         return _few(len(flags))
