@@ -90,7 +90,9 @@ def own_frequencies(case: LoadedCase, pressures: list[float]) -> dict[float, dic
     return found
 
 
-@pytest.mark.parametrize("group", GROUPS, ids=lambda group: group.name)
+@pytest.mark.parametrize(
+    "group", [g for g in GROUPS if g.series == 1], ids=lambda group: group.name
+)
 def test_the_model_of_every_group_inflates_and_has_its_modes(group: Group, tmp_path: Path) -> None:
     """At all pressures of the study; a stiffer state has higher frequencies."""
     pressures = sorted([*group.given_kPa, group.held_out_kPa])
@@ -210,14 +212,15 @@ def test_strong_effects_are_those_of_which_the_ruler_foresees_enough(chance: Cha
         ruler = read_ruler(folder, labels_of(case))
     rules = read_protocol(RECORDED / group.name)
     lam: dict[str, list[float]] = {}
-    for kind, count in {"one": 40, "one_strong": 20, "two_strong": 10}.items():
+    for kind, count in {"one": 40, "one_strong": 20, "two_strong": 10, "three_strong": 5}.items():
         trials = [one_drawn(rules, case, group, kind, chance.random, ruler) for _ in range(count)]
         seen = [
             foreseen(ruler, rules, t.truth, id, e) for t in trials for id, e in t.effects.items()
         ]
         lam[kind] = seen
         assert len(seen) == count * EFFECTS_OF[kind]
-    assert min(lam["one_strong"]) >= 25 and min(lam["two_strong"]) >= 15
+    assert min(lam["one_strong"]) >= 25
+    assert min(lam["two_strong"] + lam["three_strong"]) >= 15
     chance.often(np.array(lam["one"]) < 25, 0.3, 0.95)  # it is about 0.65
     assert foreseen(ruler, rules, trials[0].truth, "bead_filler", 0.0) == 0.0
 

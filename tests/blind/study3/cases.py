@@ -27,10 +27,12 @@ LEARNED_FROM = "205_60r15_foreign"  # answered and opened while the answerer cou
 
 @dataclass(frozen=True)
 class Group:
-    """A size, and whose section it is diagnosed with; kPa that are given, and held out."""
+    """A size, and whose section it is diagnosed with; kPa that are given, and held out; further
+    trials of the same are another series."""
 
     size: str
     own: bool
+    series: int = 1
     given_kPa: tuple[float, ...] = (160.0, 240.0, 320.0)
     held_out_kPa: float = 200.0
 
@@ -38,7 +40,8 @@ class Group:
     def name(self) -> str:
         """Of its folder."""
         size = self.size.lower().replace("/", "_").replace(".", "_")
-        return f"{size}_{'own' if self.own else 'foreign'}"
+        series = f"_{self.series}" if self.series > 1 else ""
+        return f"{size}_{'own' if self.own else 'foreign'}{series}"
 
     @property
     def off(self) -> tuple[float, float]:
@@ -50,8 +53,11 @@ class Group:
 CAR, TRUCK = {}, {"given_kPa": (500.0, 720.0, 850.0), "held_out_kPa": 620.0}
 SIZES = {"175/70R13": CAR, "205/60R15": CAR, "P235/75R17": CAR, "275/40R20": CAR, "11R22.5": TRUCK}
 GROUPS = [
-    Group(size, own, **pressures) for size, pressures in SIZES.items() for own in (True, False)
-]  # type: ignore[arg-type]
+    Group(size, own, series, **pressures)  # type: ignore[arg-type]
+    for series in (1, 2)
+    for size, pressures in SIZES.items()
+    for own in (True, False)
+]
 
 
 KNOWN = {"C10": 5, "density": 1.0}  # percent, of one's own compounds

@@ -22,8 +22,12 @@ from .tyre import Tyre, tyre_of
 
 CLAMPED = 0.5  # share of effects of the wheel's clamp, which a doubtful section hides least
 EFFECTS_OF = {"none": 0, "one": 1, "two": 2, "three": 3, "outside": 0}
-EFFECTS_OF |= {"one_strong": 1, "two_strong": 2}
-LEAST = {"one_strong": ONE, "two_strong": EACH}  # lambda that is foreseen of each effect
+EFFECTS_OF |= {"one_strong": 1, "two_strong": 2, "three_strong": 3}
+LEAST = {
+    "one_strong": ONE,
+    "two_strong": EACH,
+    "three_strong": EACH,
+}  # lambda that is foreseen of each effect
 MAX_DRAWS = 10_000
 SEAT_m, GAUGE_kPa, ROOM_K = 0.4e-3, 0.5, 1.0  # of a mounting: beads apart, pressure, temperature
 
