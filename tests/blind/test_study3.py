@@ -107,7 +107,7 @@ def test_the_maker_s_tyre_is_that_of_its_drawing(size: str, tmp_path: Path, feni
     """Diagnosed with its own section, as that is drawn: frequencies within 8 %, as elements, laws
     of rubber and cords and the parts of bead and tread differ; their growth with pressure, which
     no scale of a stiffness hides, within 1 %."""
-    group = Group(size, True, **SIZES[size])
+    group = Group(size, True)
     pressures = sorted([*group.given_kPa, group.held_out_kPa])
     ours = own_frequencies(written(group, tmp_path), pressures)
     theirs = computed(fenics, tyre(size, tmp_path), pressures, LABELS)

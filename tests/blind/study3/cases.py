@@ -24,17 +24,18 @@ LABELS = list(USUAL_LABELS)
 RECORDED = Path(__file__).parents[2] / "benchmarks" / "study_3"
 LEARNED_FROM = "205_60r15_foreign"  # answered and opened while the answerer could still change
 
+CAR, TRUCK = ((160.0, 240.0, 320.0), 200.0), ((500.0, 720.0, 850.0), 620.0)  # kPa given, held out
+SIZES = {"175/70R13": CAR, "205/60R15": CAR, "P235/75R17": CAR, "275/40R20": CAR, "11R22.5": TRUCK}
+
 
 @dataclass(frozen=True)
 class Group:
-    """A size, and whose section it is diagnosed with; kPa that are given, and held out; further
-    trials of the same are another series."""
+    """A size, and whose section it is diagnosed with; further trials of the same are another
+    series."""
 
     size: str
     own: bool
     series: int = 1
-    given_kPa: tuple[float, ...] = (160.0, 240.0, 320.0)
-    held_out_kPa: float = 200.0
 
     @property
     def name(self) -> str:
@@ -44,20 +45,21 @@ class Group:
         return f"{size}_{'own' if self.own else 'foreign'}{series}"
 
     @property
+    def given_kPa(self) -> tuple[float, ...]:
+        return SIZES[self.size][0]
+
+    @property
+    def held_out_kPa(self) -> float:
+        return SIZES[self.size][1]
+
+    @property
     def off(self) -> tuple[float, float]:
         """How far tyres are from the mould, one standard deviation: m, and a share of gauges. The
         own section is from a drawing; makers of one size differ by more, besides their rules."""
         return (0.8e-3, 0.04) if self.own else (1.5e-3, 0.06)
 
 
-CAR, TRUCK = {}, {"given_kPa": (500.0, 720.0, 850.0), "held_out_kPa": 620.0}
-SIZES = {"175/70R13": CAR, "205/60R15": CAR, "P235/75R17": CAR, "275/40R20": CAR, "11R22.5": TRUCK}
-GROUPS = [
-    Group(size, own, series, **pressures)  # type: ignore[arg-type]
-    for series in (1, 2)
-    for size, pressures in SIZES.items()
-    for own in (True, False)
-]
+GROUPS = [Group(size, own, series) for series in (1, 2) for size in SIZES for own in (True, False)]
 
 
 KNOWN = {"C10": 5, "density": 1.0}  # percent, of one's own compounds

@@ -184,8 +184,8 @@ def figures(trials: Sequence[Scored], least: int, quantile: float = 0.95) -> dic
     in_part = lambda t: t.found((t.named or "").split("+")) > 0
     rows = {"no effect: accused": shown(t.verdict == "named" for t in none)}
     for low, high in ((0, 4), (4, 10), (10, ONE), (ONE, np.inf)):
-        here = [t.right for t in single if low <= lam(t) < high]
-        rows[f"one effect, lambda {low:g} to {high:g}: top 1 by group"] = shown(here)
+        words = f"one effect, lambda {low:g} to {high:g}: top 1 by group"
+        rows[words] = shown(t.right for t in single if low <= lam(t) < high)
     for words, several in (("two", pairs), ("three", three)):
         here = [t for t in several if lam(t) >= EACH]
         rows |= {
