@@ -11,7 +11,7 @@ import pytest
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator
 from tyrecal.simulate.modes.label import Label
-from tyrecal.studies.diagnose.evidence import _refit, explain, refit
+from tyrecal.studies.diagnose.evidence import explain, refit, refit_at
 from tyrecal.studies.diagnose.inverse_problem import InverseProblem
 from tyrecal.studies.diagnose.model import Answer, Coupling, Query
 from tyrecal.studies.diagnose.tyre_model import TyreModel
@@ -142,7 +142,7 @@ def test_the_evidence_is_the_integral_over_what_couples(z: float) -> None:
     p = problem(toy, toy.coupled(z))
     zeta = (np.arange(80) + 0.5) / 20
     added, start = p.added({}, 1), np.zeros((1, 3))
-    fine = [_refit(p, replace(p, zeta=at), added, None, start, 10) for at in zeta.tolist()]
+    fine = [refit_at(p, replace(p, zeta=at), added, None, start, 10) for at in zeta.tolist()]
     ln, prior = np.array([each.ln_evidence[0] for each in fine]), -(zeta**2) / 2
     known = np.logaddexp.reduce(ln + prior) - np.logaddexp.reduce(prior)
     assert refit(p, {}, 1).ln_evidence[0] == pytest.approx(known, abs=0.2)

@@ -10,6 +10,8 @@ constants that nobody calibrates, common to all runs.
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 from .form_error import form_error, laws_alike
@@ -19,6 +21,7 @@ Array = np.ndarray
 BETWEEN_PRESSURES, BETWEEN_RUNS = 0.9, 0.97
 
 
+@lru_cache(64)
 def alike(rows: tuple[Observable, ...]) -> Array:
     """Correlation (n, n) of what belongs to a mode: 1 on the diagonal, 0 between modes."""
     states = np.array(
@@ -27,6 +30,7 @@ def alike(rows: tuple[Observable, ...]) -> Array:
     return states * of_a_mode(rows)
 
 
+@lru_cache(64)
 def of_a_mode(rows: tuple[Observable, ...]) -> Array:
     """The same (n, n) of what is alike in all states."""
     result = np.zeros((len(rows), len(rows)))

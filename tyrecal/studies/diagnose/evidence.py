@@ -9,7 +9,7 @@ Z = integral of Z(e) p(e) de, p(e) uniform over the range, by Gauss and Legendre
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
 from typing import Final, NamedTuple
@@ -148,23 +148,17 @@ def refit(
     added = problem.added(effects, count)
     if near is None or not problem.integrand:
         start = np.zeros((count, len(problem.centre))) if near is None else near
-        plain = _refit(problem, problem, added, extra, start, REFIT_STEPS)
+        plain = refit_at(problem, problem, added, extra, start, REFIT_STEPS)
         if not problem.integrand:
             return plain
         near = plain.d
     points = list(among) if among else list(range(len(problem.integrand)))
     found = [
-        _refit(problem, problem.integrand[k], added, extra, near, COUPLED_STEPS) for k in points
+        refit_at(problem, problem.integrand[k], added, extra, near, COUPLED_STEPS) for k in points
     ]
     ln, d, chi2, covariance = (np.array([each[part] for each in found]) for part in range(4))
-    zeta, between, ln_weights = rule()
+    zeta, total = rule()[0], over_zeta(ln, among)
     ln_prior = -(zeta[points, None] ** 2) / 2
-    if among:
-        total = np.logaddexp.reduce(ln + ln_prior) - np.log(sum(among.values()))
-    else:
-        lifted = np.maximum(ln, ln.max(0) - FAR_BELOW)
-        finer = np.minimum(between @ lifted, ln.max(0) + ABOVE_POINTS)
-        total = np.logaddexp.reduce(finer + ln_weights[:, None])
     best, every = np.argmax(ln + ln_prior, axis=0), np.arange(count)
     p = np.exp(ln + ln_prior - np.logaddexp.reduce(ln + ln_prior))
     apart = d - d[best, every]
@@ -175,7 +169,36 @@ def refit(
     return Fitted(total, d[best, every], chi2[best, every], pooled, coupled)
 
 
-def _refit(
+def over_zeta(ln: Array, among: Mapping[int, float] | None = None) -> Array:
+    """ln of the integral (q,) over what couples near modes of an integrand whose ln at the points
+    of the rule, or those ``among`` that stand for all, is ln (k, q)."""
+    zeta, between, ln_weights = rule()
+    if among:
+        ln_prior = -(zeta[list(among), None] ** 2) / 2
+        return np.asarray(np.logaddexp.reduce(ln + ln_prior) - np.log(sum(among.values())))
+    lifted = np.maximum(ln, ln.max(0) - FAR_BELOW)
+    finer = np.minimum(between @ lifted, ln.max(0) + ABOVE_POINTS)
+    return np.asarray(np.logaddexp.reduce(finer + ln_weights[:, None]))
+
+
+def model_of(
+    problem: InverseProblem, at: InverseProblem, added: Added
+) -> Callable[[Array], tuple[Array, Array, Array]]:
+    """eta (q, n), its slopes (q, n, v) and ln p of its labels (q,) by d (q, v), with what effects
+    add to uncoupled modes, coupled as ``at`` has them."""
+    eta0, J0 = problem.plain(np.zeros_like(problem.centre))
+    H = problem.expansion.hessian[problem.places]
+    by_variable = H.transpose(2, 0, 1).reshape(len(problem.centre), -1)
+
+    def model(d: Array) -> tuple[Array, Array, Array]:
+        bent = (d @ by_variable).reshape(added.tilt.shape)
+        eta = eta0 + added.shift + ((J0 + bent / 2 + added.tilt) @ d[:, :, None])[:, :, 0]
+        return at.coupled(eta, J0 + bent + added.tilt)
+
+    return model
+
+
+def refit_at(
     problem: InverseProblem,
     at: InverseProblem,
     added: Added,
@@ -184,26 +207,18 @@ def _refit(
     steps: int,
 ) -> Fitted:
     """x re-fitted from x0 + d (q, v) with what effects add to uncoupled modes, at one zeta."""
-    y = problem.observations.y
-    shift, tilt, split, off, beside = added
-    if at.zeta:
-        added = added._replace(off=off @ at.mixed.T, beside=beside @ at.mixed.T)
-    S = at.sigma + problem.law(added)
+    y, model = problem.observations.y, model_of(problem, at, added)
+    S = at.sigma + problem.law(at.with_mixed_laws(added))
     if extra is not None:
         S = S + extra
     inverse = np.linalg.inv(S)
     _, ln_det = np.linalg.slogdet(S)
     centre = problem.centre - problem.expansion.x0
     information = np.diag(problem.spread**-2.0)
-    eta0, J0 = problem.plain(np.zeros_like(centre))
-    H = problem.expansion.hessian[problem.places]
-    by_variable = H.transpose(2, 0, 1).reshape(len(centre), -1)
     best: tuple[Array, ...] | None = None
     share = np.ones(len(d))
     while True:
-        bent = (d @ by_variable).reshape(tilt.shape)
-        eta = eta0 + shift + ((J0 + bent / 2 + tilt) @ d[:, :, None])[:, :, 0]
-        eta, J, told = at.coupled(eta, J0 + bent + tilt)
+        eta, J, told = model(d)
         r = y - eta
         weighted = inverse @ np.concatenate([J, r[:, :, None]], 2)
         both = weighted.transpose(0, 2, 1) @ J
@@ -226,7 +241,7 @@ def _refit(
     _, ln_normal = np.linalg.slogdet(normal * np.outer(problem.spread, problem.spread))
     n = len(y)
     ln_evidence = -(chi2 + ln_det + n * np.log(2 * np.pi) + (off**2).sum(1) + ln_normal) / 2
-    ln_evidence += ln_splits(problem, split) + told
+    ln_evidence += ln_splits(problem, added.split) + told
     return Fitted(ln_evidence, d, chi2, np.linalg.inv(normal), np.zeros((len(d), 0)))
 
 
@@ -244,40 +259,61 @@ def ln_splits(problem: InverseProblem, split: Array) -> Array:
     return np.asarray((ln - np.log(tau) - np.log(2 * np.pi) / 2).sum(1))
 
 
+class Family(NamedTuple):
+    """What lies outside the catalogue: more covariance (n, n) of ln f, in words."""
+
+    words: str
+    extra: Array
+    reading: bool  # an error of reading, not of the model
+
+
 def outside(problem: InverseProblem) -> Hypothesis:
-    """What the catalogue does not hold: half of it unknown effects, half errors of reading.
+    """What the catalogue does not hold; ``words`` names the likeliest."""
+    known = families(problem)
+    fitted = refit(problem, {}, len(known), np.array([each.extra for each in known]))
+    ln = fitted.ln_evidence + ln_shares(known)
+    total, k = float(np.logaddexp.reduce(ln)), int(np.argmax(ln))
+    best = Fitted(*(part[k : k + 1] for part in fitted))
+    return Hypothesis(OUTSIDE, PRIOR_OUTSIDE, total, {}, np.zeros(1), best, known[k].words)
+
+
+def families(problem: InverseProblem) -> list[Family]:
+    """Unknown effects and errors of reading.
 
     Unknown effects shift modes by a random amount each, or smoothly over the harmonic, each family
     by itself, or smoothly over the frequency, alike in all states; or all of Sigma is too small.
-    An error of reading: one label is another mode's at all pressures. ``words`` names the
-    likeliest.
+    An error of reading: one label is another mode's at all pressures.
     """
     rows = problem.observations.rows
     same = alike(rows) * [row.label is not None for row in rows]
-    unknown: list[tuple[str, Array]] = [
-        (f"modes are off by {size:.1%} in a way of their own", size**2 * same) for size in UNKNOWN
+    found = [
+        Family(f"modes are off by {size:.1%} in a way of their own", size**2 * same, False)
+        for size in UNKNOWN
     ]
     between = np.array(
         [[1.0 if a.state == b.state else BETWEEN_PRESSURES for b in rows] for a in rows]
     )
     for over, together in _smooth(rows, problem.observations.y):
-        unknown += [
-            (f"modes are off by {size:.1%}, smoothly over {over}", size**2 * between * together)
+        words = f"smoothly over {over}"
+        found += [
+            Family(f"modes are off by {size:.1%}, {words}", size**2 * between * together, False)
             for size in UNKNOWN
         ]
-    scatter = problem.sigma
-    unknown += [(f"all scatter is {k:g} times as large", (k**2 - 1) * scatter) for k in INFLATION]
-    reading: list[tuple[str, Array]] = []
+    found += [
+        Family(f"all scatter is {k:g} times as large", (k**2 - 1) * problem.sigma, False)
+        for k in INFLATION
+    ]
     for label in sorted({row.label for row in rows if row.label}, key=str):
         hit = np.array([row.label == label for row in rows])
-        reading.append((f"{label.said} is misread", MISREAD**2 * same * np.outer(hit, hit)))
-    both = [*unknown, *reading]
-    fitted = refit(problem, {}, len(both), np.array([extra for _, extra in both]))
-    shares = [0.5 / len(group) for group in (unknown, reading) for _ in group]
-    ln = fitted.ln_evidence + np.log(shares)
-    total, k = float(np.logaddexp.reduce(ln)), int(np.argmax(ln))
-    best = Fitted(*(part[k : k + 1] for part in fitted))
-    return Hypothesis(OUTSIDE, PRIOR_OUTSIDE, total, {}, np.zeros(1), best, both[k][0])
+        misread = MISREAD**2 * same * np.outer(hit, hit)
+        found.append(Family(f"{label.said} is misread", misread, True))
+    return found
+
+
+def ln_shares(known: Sequence[Family]) -> Array:
+    """ln of what each has of the prior: half for unknown effects, half for errors of reading."""
+    reading = np.array([each.reading for each in known])
+    return np.asarray(-np.log(2 * np.where(reading, reading.sum(), (~reading).sum())))
 
 
 def _smooth(rows: Sequence[Observable], y: Array) -> list[tuple[str, Array]]:

@@ -167,16 +167,29 @@ class InverseProblem:
                     a, B = joint.at(*(here[id] for id in both))
                     shift[:, rows] += a[:, self.places[rows]]
                     tilt[:, rows] += B[:, self.places[rows]]
+        found = Added(shift, tilt, np.sqrt(np.maximum(square, 0.0)), off, beside)
         if self.zeta:
-            shift, tilt = shift @ self.mixed.T, self.mixed @ tilt
-            off, beside = off @ self.mixed.T, beside @ self.mixed.T
-        return Added(shift, tilt, np.sqrt(np.maximum(square, 0.0)), off, beside)
+            found = self.with_mixed_laws(found)
+            found = found._replace(shift=shift @ self.mixed.T, tilt=self.mixed @ tilt)
+        return found
+
+    def with_mixed_laws(self, added: Added) -> Added:
+        """What effects may be off by as coupled modes have it."""
+        if not self.zeta:
+            return added
+        off, beside = (each @ self.mixed.T for each in (added.off, added.beside))
+        return added._replace(off=off, beside=beside)
 
     def law(self, added: Added) -> Array:
         """Covariance (q, n, n) by which effects may be off what they add."""
+        by_mode, beside = self.laws(added)
+        return by_mode + beside
+
+    def laws(self, added: Added) -> tuple[Array, Array]:
+        """The same in two: by their laws mode by mode, and by what their nature leaves open."""
         off, beside = (each.transpose(1, 2, 0) for each in (added.off, added.beside))
         by_mode = off @ off.swapaxes(1, 2) * self._alike
-        return np.asarray(by_mode + beside @ beside.swapaxes(1, 2))
+        return np.asarray(by_mode), np.asarray(beside @ beside.swapaxes(1, 2))
 
     def _law(self, id: str) -> float:
         stated = self.assumed.law

@@ -2,8 +2,8 @@
 
 Every prior, every constant's standard deviation and what laws are off half and twice as large, the
 model's own form and the section beyond doubt, each label left out in turn. The scatter of the data
-stands, of which the check of the fit speaks. Hypotheses that carry weight are weighed anew from the
-values and slopes that are there, on their grids, of several effects on the part that does.
+stands, of which the check of the fit speaks. Hypotheses that carry weight are weighed anew about
+their fits, on their grids, of several effects on the part that does.
 """
 
 from __future__ import annotations
@@ -13,8 +13,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .evidence import NONE, OUTSIDE, Fitted, Hypothesis, outside, refit
+from .evidence import NONE, OUTSIDE, Fitted, Hypothesis, families, ln_shares, refit
 from .inverse_problem import InverseProblem
+from .reweighed import Changed, lines, reweighed
 from .section_fields import SECTION
 from .several import coupled_most, present, probabilities
 from .verdict import NAMED, NO_GAP, UNDECIDED, Verdict, decide, holds
@@ -74,9 +75,9 @@ def _variants(
         for factor, times in FACTORS.items():
             found = [replace(h, prior=h.prior * factor ** of(h)) for h in kept]
             yield f"the prior of {words} {times} as large", found, count
-    for words, other in _problems(problem, sources):
-        found = [_again(other, h) for h in kept]
-        yield words, found, len(other.places)
+    again = [_outside(problem, h) if h.key == OUTSIDE else _known(problem, h) for h in kept]
+    for other in _changes(problem, sources):
+        yield other.words, [weighed(other) for weighed in again], int(other.keep.sum())
 
 
 def _priors(verdict: Verdict) -> Iterator[tuple[str, Callable[[Hypothesis], int]]]:
@@ -89,11 +90,10 @@ def _priors(verdict: Verdict) -> Iterator[tuple[str, Callable[[Hypothesis], int]
         yield words, lambda h: int(bool(h.values) and holds(h.key, key))
 
 
-def _problems(
-    problem: InverseProblem, sources: Sequence[str]
-) -> Iterator[tuple[str, InverseProblem]]:
-    """What is other, in words, and the problem then."""
-    o = problem.observations
+def _changes(problem: InverseProblem, sources: Sequence[str]) -> Iterator[Changed]:
+    """What may be other."""
+    rows = problem.observations.rows
+    every = np.ones(len(rows), bool)
     of_section = [k for k, name in enumerate(sources) if name.startswith(SECTION)]
     constants = {
         name.replace("_", " "): [k] for k, name in enumerate(sources) if k not in of_section
@@ -102,30 +102,18 @@ def _problems(
         constants["all constants"] = [k for (k,) in constants.values()]
     if of_section:
         constants["the section"] = of_section
-        yield "the section beyond doubt", _scaled(problem, of_section, 0.0)
+        yield Changed("the section beyond doubt", _scaled(problem, of_section, 0.0), every)
     for factor, times in FACTORS.items():
         for name, places in constants.items():
             words = f"the standard deviation of {name} {times} as large"
-            yield words, _scaled(problem, places, factor)
-        yield f"the allowance for effects' laws {times} as large", _looser(problem, factor)
-    yield (
-        "the model's own form beyond doubt",
-        replace(problem, assumed=replace(problem.assumed, form=0.0)),
-    )
-    for label in sorted({row.label for row in o.rows if row.label}, key=str):
-        keep = np.array([row.label != label for row in o.rows])
+            yield Changed(words, _scaled(problem, places, factor), every)
+        yield Changed(f"the allowance for effects' laws {times} as large", problem, every, factor)
+    sure = replace(problem, assumed=replace(problem.assumed, form=0.0))
+    yield Changed("the model's own form beyond doubt", sure, every)
+    for label in sorted({row.label for row in rows if row.label}, key=str):
+        keep = np.array([row.label != label for row in rows])
         if keep.any():
-            yield f"without {label.said}", problem.only(keep)
-
-
-def _looser(problem: InverseProblem, factor: float) -> InverseProblem:
-    """The problem with what effects' laws may be off times a factor."""
-    assumed, spans = problem.assumed, problem.spans
-    if assumed.law is not None:
-        return replace(problem, assumed=replace(assumed, law=factor * assumed.law))
-    return replace(
-        problem, spans={id: replace(each, law=factor * each.law) for id, each in spans.items()}
-    )
+            yield Changed(f"without {label.said}", problem, keep)
 
 
 def _scaled(problem: InverseProblem, places: Sequence[int], factor: float) -> InverseProblem:
@@ -151,14 +139,33 @@ def _weighty(hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
     return kept
 
 
-def _again(problem: InverseProblem, h: Hypothesis) -> Hypothesis:
-    """A hypothesis beside another problem."""
-    if h.key == OUTSIDE:
-        return replace(outside(problem), prior=h.prior)
-    d, among = h.fitted.d, coupled_most([h])
-    fitted = refit(problem, h.values, len(d), among=among, near=d)
-    total = float(np.logaddexp.reduce(fitted.ln_evidence + h.ln_weights))
-    return replace(h, ln_evidence=total, fitted=fitted)
+def _known(problem: InverseProblem, h: Hypothesis) -> Callable[[Changed], Hypothesis]:
+    """How a hypothesis is weighed anew."""
+    among = coupled_most([h])
+    fits = lines(problem, h.values, h.fitted.d, among)
+
+    def weighed(other: Changed) -> Hypothesis:
+        ln, chi2 = reweighed(fits, other, among)
+        total = float(np.logaddexp.reduce(ln + h.ln_weights))
+        return replace(h, ln_evidence=total, fitted=h.fitted._replace(ln_evidence=ln, chi2=chi2))
+
+    return weighed
+
+
+def _outside(problem: InverseProblem, h: Hypothesis) -> Callable[[Changed], Hypothesis]:
+    """The same of what is outside the catalogue; a reading that is left out is no error."""
+    extra = np.array([each.extra for each in families(problem)])
+    fits = lines(problem, {}, refit(problem, {}, len(extra), extra).d, extra=extra)
+
+    def weighed(other: Changed) -> Hypothesis:
+        known = families(other.problem)
+        extra = np.array([each.extra for each in known])
+        ln, _ = reweighed(fits, other, extra=extra)
+        there = np.array([each[np.ix_(other.keep, other.keep)].any() for each in extra])
+        shares = ln_shares([each for each, on in zip(known, there, strict=True) if on])
+        return replace(h, ln_evidence=float(np.logaddexp.reduce(ln[there] + shares)))
+
+    return weighed
 
 
 def in_words(verdict: Verdict) -> str:

@@ -1,0 +1,95 @@
+"""Evidence of fits that are known, by another covariance or with rows left out.
+
+About a fit eta is linear in x, whose prior is normal with spread S_x: integrated over x
+
+    ln Z = -r^T T^-1 r / 2 - ln|2 pi T| / 2 + ln p(labels) + ln p(splits),   T = S + J S_x J^T,
+
+r: what is left of the data at the prior's centre by these slopes (Bishop, Pattern Recognition and
+Machine Learning, 2.115). Where the fit is the best one this is Laplace's approximation itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from .evidence import COUPLED_STEPS, ln_splits, model_of, over_zeta, refit_at
+from .inverse_problem import InverseProblem
+from .veering import rule
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True)
+class Changed:
+    """The same data seen otherwise. words: what is other."""
+
+    words: str
+    problem: InverseProblem  # of the same rows
+    keep: Array  # (n,) rows that count
+    laws: float = 1.0  # times which effects' laws may be off
+
+
+@dataclass(frozen=True)
+class Line:
+    """An explanation at parameters (q,) about its re-fits, near modes coupled in one way."""
+
+    place: int | None  # in the rule of what couples them; None: none are
+    residual: Array  # (q, n) at the centre of x
+    slopes: Array  # (q, n, v) by standard deviations of x
+    by_law: Array  # (q, n, n) covariance of what effects' laws are off by
+    beside: Array  # (q, n, n) of what their nature leaves open
+    told: Array  # (q,) ln p of labels
+    split: Array  # (q, n) of pairs
+
+    def ln_evidence(self, other: Changed, extra: Array | None) -> tuple[Array, Array]:
+        """ln Z and chi2 of the data (q,). extra (q, n, n): more covariance."""
+        problem, keep = other.problem, other.keep
+        at = problem if self.place is None else problem.integrand[self.place]
+        S = at.sigma + other.laws**2 * self.by_law + self.beside
+        S = (S if extra is None else S + extra)[:, keep][:, :, keep]
+        r, J = self.residual[:, keep], self.slopes[:, keep]
+        T = S + J @ J.transpose(0, 2, 1)
+        w = np.linalg.solve(T, r[:, :, None])
+        whole, taken = (w[:, :, 0] * r).sum(1), (J.transpose(0, 2, 1) @ w)[:, :, 0]
+        ln = -(whole + np.linalg.slogdet(T)[1] + keep.sum() * np.log(2 * np.pi)) / 2
+        ln += self.told + ln_splits(problem.only(keep), self.split[:, keep])
+        return ln, whole - (taken**2).sum(1)
+
+
+def lines(
+    problem: InverseProblem,
+    effects: Mapping[str, Array],
+    near: Array,
+    among: Mapping[int, float] | None = None,
+    extra: Array | None = None,
+) -> list[Line]:
+    """About the re-fits that lie near x - x0 (q, v); the rest as in `refit`."""
+    added, found = problem.added(effects, len(near)), []
+    places: list[int | None] = [*(among or range(len(problem.integrand)))]
+    for k in places or [None]:
+        at = problem if k is None else problem.integrand[k]
+        d = refit_at(problem, at, added, extra, near, COUPLED_STEPS).d
+        eta, J, told = model_of(problem, at, added)(d)
+        back = d - (problem.centre - problem.expansion.x0)
+        residual = problem.observations.y - eta + (J @ back[:, :, None])[:, :, 0]
+        laws = problem.laws(at.with_mixed_laws(added))
+        found.append(Line(k, residual, J * problem.spread, *laws, told, added.split))
+    return found
+
+
+def reweighed(
+    known: list[Line],
+    other: Changed,
+    among: Mapping[int, float] | None = None,
+    extra: Array | None = None,
+) -> tuple[Array, Array]:
+    """ln Z, and chi2 of the likeliest way in which near modes are coupled, (q,)."""
+    ln, chi2 = map(np.array, zip(*(line.ln_evidence(other, extra) for line in known), strict=True))
+    if known[0].place is None:
+        return ln[0], chi2[0]
+    zeta = np.array([rule()[0][line.place] for line in known if line.place is not None])
+    best = (ln - zeta[:, None] ** 2 / 2).argmax(0)
+    return over_zeta(ln, among), chi2[best, np.arange(len(best))]
