@@ -42,7 +42,7 @@ from .study3 import make as making
 from .study3.cases import GROUPS, LABELS, RECORDED, SIZES, Group, written
 from .study3.draw import EFFECTS_OF, foreseen, known_laws, one_drawn
 from .study3.maker import Fenics, computed, modes
-from .study3.score import Scored, figures, misses
+from .study3.score import Scored, figures, foretold, misses
 from .study3.section import Section, columns, mould, off, section
 from .study3.tyre import Mesh, Tyre, on_springs, problem, tyre_of
 
@@ -274,6 +274,15 @@ def test_misses_are_what_was_named_wrongly_and_what_should_have_been_found() -> 
     words = misses({Group("205/60R15", True): [*right, weak, *wrong]}).splitlines()[2:]
     assert [line.split(" | ")[2] for line in words] == ["a", "a+b", "a", "none"]
     assert [line.split(" | ")[5] for line in words] == ["c", "a", "", "a"]
+
+
+def test_what_was_foretold_is_the_tyre_s_own_frequency() -> None:
+    """At the pressure held out, the mean of a pair, without noise; old answers foretell nothing."""
+    at = lambda p, f: {"pressure_kPa": p, "ln_f": {"[1,0]": np.log(f), "[2,0]": np.log(f) + 1}}
+    truth = {"with_effect": [at(160.0, [9.0, 9.0]), at(200.0, [9.9, 10.1])]}
+    told = {"[1,0]": [9.5, 9.0, 10.1], "[2,0]": [10.0, 9.9, 10.1]}
+    assert foretold(truth, {"expected_Hz": told}, 200.0) == (True, False)
+    assert foretold(truth, {}, 200.0) == ()
 
 
 def on_the_same_stations(case: LoadedCase) -> dict[str, Any]:

@@ -39,7 +39,8 @@ class Scored:
     joined by +, none or outside; stated: the first one's; right: the first one is the truth by
     groups; held: whether each named and true effect's interval holds what it is worth in the
     catalogue's law; before, after: rms error held out, in ln f; usual: the same of least squares,
-    without and with what is likeliest, None where labels are exchanged."""
+    without and with what is likeliest, None where labels are exchanged; foretold: whether each
+    frequency held out lies in its interval, where the answer has any."""
 
     id: str
     kind: str  # none, effect, several or outside
@@ -57,6 +58,7 @@ class Scored:
     after: float
     again: str
     usual: tuple[float, float] | None = None
+    foretold: tuple[bool, ...] = ()
 
     def found(self, ids: Sequence[str]) -> int:
         """How many true effects are among ids, by their groups, an id for one effect."""
@@ -147,12 +149,24 @@ def one(
         truth["again"],
     )
     in_set = any(found.says(key) for key in told["candidate_set"])
+    found = replace(found, in_set=in_set, foretold=foretold(truth, out, protocol.held_out_kPa))
     if truth["swapped"] or told["exchanged_labels"]:
-        return replace(found, in_set=in_set)
+        return found
     there = held_out(truth, ruler, protocol, labels)
     with_effects = {id: each["value"] for id, each in told["parameters"].items()}
     without, with_ = (held_out_rms(ruler, y, places, there, e) for e in ({}, with_effects))
-    return replace(found, in_set=in_set, usual=(without, with_))
+    return replace(found, usual=(without, with_))
+
+
+def foretold(
+    truth: Mapping[str, Any], out: Mapping[str, Any], pressure_kPa: float
+) -> tuple[bool, ...]:
+    """Whether the tyre's own frequencies, without noise, lie in the intervals of an answer."""
+    (true,) = [each for each in truth["with_effect"] if each["pressure_kPa"] == pressure_kPa]
+    return tuple(
+        low <= np.exp(np.mean(true["ln_f"][name])) <= high
+        for name, (_, low, high) in out.get("expected_Hz", {}).items()
+    )
 
 
 def table(groups: Mapping[Group, Sequence[Scored]]) -> str:
@@ -219,6 +233,9 @@ def figures(trials: Sequence[Scored], least: int, quantile: float = 0.95) -> dic
         else _few(len(trials)),
         "90 % set holds the truth": shown(t.in_set for t in trials),
         "90 % interval holds the size": shown(held for t in trials for held in t.held),
+        "90 % interval holds the frequency held out": shown(
+            inside for t in trials for inside in t.foretold
+        ),
         **{
             f"held out by {how}, named, lambda from {ONE:g}: median shrinkage": _middle(
                 [getattr(t, of) for t in proven], [getattr(t, of) for t in none], least

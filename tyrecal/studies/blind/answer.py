@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import nullcontext
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -26,11 +25,12 @@ from ..diagnose.evidence import NONE
 from ..diagnose.expansion import Expansion, expand
 from ..diagnose.inverse_problem import Assumed
 from ..diagnose.model import ModelRow, ResponseModel
-from ..diagnose.observations import Observable, Observations, observe
+from ..diagnose.observations import observe
 from ..diagnose.result import diagnosis_result
 from ..diagnose.study import spans_of
 from ..diagnose.tyre_model import TyreModel
 from ..diagnose.uncertainties import sources
+from ..diagnose.unmeasured import expected, likeliest
 from .make import labels_of
 from .protocol import Protocol, read_protocol, write_json
 from .seal import refuse_open_truth, seal_answers
@@ -105,6 +105,7 @@ def one_answer(
             "effect": key,
             "plain_Hz": predicted(found, rows, protocol.held_out_kPa, NONE),
             "with_effect_Hz": predicted(found, rows, protocol.held_out_kPa, key) if key else None,
+            "expected_Hz": intervals(found, rows, protocol.held_out_kPa),
         },
     }
 
@@ -113,23 +114,33 @@ def predicted(
     found: Diagnosis, rows: Sequence[ModelRow], pressure_kPa: float, key: str
 ) -> dict[str, float]:
     """Hz by label at a pressure that was not fitted, by a hypothesis at its best parameters."""
-    places = [i for i, (label, p) in enumerate(rows) if label and p == pressure_kPa]
-    hypothesis, expansion = found.hypothesis(key), found.problem.expansion
-    best = int(np.argmax(hypothesis.posterior))
-    unknown, eta = np.full(len(places), np.nan), expansion.eta[places]
-    unseen = Observations(
-        tuple(Observable.of(rows[i]) for i in places), eta, unknown, 0.0, unknown, unknown
-    )
-    there = replace(
-        found.problem,
-        observations=unseen,
-        places=np.array(places),
-        zeta=float(hypothesis.fitted.zeta[best]),
-    )
-    effects = {id: e[[best]] for id, e in hypothesis.values.items()}
-    (eta,) = there.predicted(effects, hypothesis.fitted.d[[best]])
-    said = {str(rows[i][0]): round(float(np.exp(f)), 4) for i, f in zip(places, eta, strict=True)}
-    if found.exchanged:  # the laboratory's own labels
+    places = places_at(rows, pressure_kPa)
+    eta = likeliest(found.problem, found.hypothesis(key), rows, places)
+    return _by_label(found, rows, places, [round(float(np.exp(f)), 4) for f in eta])
+
+
+def intervals(
+    found: Diagnosis, rows: Sequence[ModelRow], pressure_kPa: float
+) -> dict[str, list[float]]:
+    """Hz by label as they are expected beside what was measured, by all explanations, with the ends
+    of their 90 % intervals."""
+    places = places_at(rows, pressure_kPa)
+    told = expected(found.problem, found.hypotheses, rows, places)
+    three = np.exp([told.mean, *told.interval()]).T
+    return _by_label(found, rows, places, [[round(f, 4) for f in each] for each in three.tolist()])
+
+
+def places_at(rows: Sequence[ModelRow], pressure_kPa: float) -> np.ndarray:
+    """Of the modes at a pressure."""
+    return np.array([i for i, (label, p) in enumerate(rows) if label and p == pressure_kPa])
+
+
+def _by_label(
+    found: Diagnosis, rows: Sequence[ModelRow], places: np.ndarray, each: Sequence[Any]
+) -> dict[str, Any]:
+    """By the laboratory's own labels."""
+    said = {str(rows[i][0]): value for i, value in zip(places, each, strict=True)}
+    if found.exchanged:
         a, b = map(str, found.exchanged)
         said[a], said[b] = said[b], said[a]
     return said

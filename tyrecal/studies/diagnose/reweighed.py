@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .evidence import COUPLED_STEPS, ln_splits, model_of, over_zeta, refit_at
-from .inverse_problem import InverseProblem
+from .inverse_problem import Added, InverseProblem
 from .veering import rule
 
 Array = np.ndarray
@@ -44,11 +44,15 @@ class Line:
     told: Array  # (q,) ln p of labels
     split: Array  # (q, n) of pairs
 
+    def covariance(self, problem: InverseProblem, laws: float = 1.0) -> Array:
+        """S (q, n, n)."""
+        at = problem if self.place is None else problem.integrand[self.place]
+        return np.asarray(at.sigma + laws**2 * self.by_law + self.beside)
+
     def ln_evidence(self, other: Changed, extra: Array | None) -> tuple[Array, Array]:
         """ln Z and chi2 of the data (q,). extra (q, n, n): more covariance."""
         problem, keep = other.problem, other.keep
-        at = problem if self.place is None else problem.integrand[self.place]
-        S = at.sigma + other.laws**2 * self.by_law + self.beside
+        S = self.covariance(problem, other.laws)
         S = (S if extra is None else S + extra)[:, keep][:, :, keep]
         r, J = self.residual[:, keep], self.slopes[:, keep]
         T = S + J @ J.transpose(0, 2, 1)
@@ -72,12 +76,18 @@ def lines(
     for k in places or [None]:
         at = problem if k is None else problem.integrand[k]
         d = refit_at(problem, at, added, extra, near, COUPLED_STEPS).d
-        eta, J, told = model_of(problem, at, added)(d)
-        back = d - (problem.centre - problem.expansion.x0)
-        residual = problem.observations.y - eta + (J @ back[:, :, None])[:, :, 0]
-        laws = problem.laws(at.with_mixed_laws(added))
-        found.append(Line(k, residual, J * problem.spread, *laws, told, added.split))
+        found.append(line_about(problem, added, d, k))
     return found
+
+
+def line_about(problem: InverseProblem, added: Added, d: Array, place: int | None) -> Line:
+    """About x - x0 = d (q, v), with what effects add."""
+    at = problem if place is None else problem.integrand[place]
+    eta, J, told = model_of(problem, at, added)(d)
+    back = d - (problem.centre - problem.expansion.x0)
+    residual = problem.observations.y - eta + (J @ back[:, :, None])[:, :, 0]
+    laws = problem.laws(at.with_mixed_laws(added))
+    return Line(place, residual, J * problem.spread, *laws, told, added.split)
 
 
 def reweighed(

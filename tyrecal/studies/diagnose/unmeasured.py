@@ -1,0 +1,127 @@
+"""What an explanation says of modes that were not measured, and how sure that is.
+
+Of rows that are jointly normal, covariance T as in `reweighed`, those measured are known:
+
+    E y' = m' + T'm T_mm^-1 (y - m),   var y' = T'' - T'm T_mm^-1 T_m'
+
+(Rasmussen and Williams, Gaussian Processes for Machine Learning, eq. 2.19), m at the prior's
+centre: so what the data say of constants and of the section is carried over. Over the sizes of
+effects, and over explanations, means and variances are pooled.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .evidence import OUTSIDE, Hypothesis
+from .inverse_problem import InverseProblem
+from .model import ModelRow
+from .observations import Observable, Observations
+from .reweighed import Line, line_about
+
+Array = np.ndarray
+NEGLIGIBLE = 1e-3  # of the likeliest size's, and explanation's, probability
+WORTH_COUPLING = 0.01  # share of a way in which near modes may be coupled, from which it counts
+HALF_90 = 1.6449  # of a 90 % interval, in standard deviations of a normal distribution
+
+
+@dataclass(frozen=True)
+class Expected:
+    """ln values of rows (m,), of the tyre itself, without scatter of a measurement."""
+
+    mean: Array
+    deviation: Array
+
+    def interval(self) -> tuple[Array, Array]:
+        """Between which they lie with 90 %."""
+        half = HALF_90 * self.deviation
+        return self.mean - half, self.mean + half
+
+
+def expected(
+    problem: InverseProblem,
+    hypotheses: Sequence[Hypothesis],
+    rows: Sequence[ModelRow],
+    places: Array,
+) -> Expected:
+    """Of rows of the model at its ``places`` (m,), by all that the catalogue explains them by."""
+    known = [h for h in hypotheses if h.key != OUTSIDE]
+    ln = np.array([h.ln_evidence + np.log(h.prior) for h in known])
+    p = np.exp(ln - ln.max())
+    kept = np.flatnonzero(p > NEGLIGIBLE)
+    each = [expected_by(problem, known[k], rows, places) for k in kept]
+    return _pooled(
+        p[kept], np.array([e.mean for e in each]), np.array([e.deviation**2 for e in each])
+    )
+
+
+def likeliest(
+    problem: InverseProblem, hypothesis: Hypothesis, rows: Sequence[ModelRow], places: Array
+) -> Array:
+    """ln values (m,) of rows of the model at its ``places``, at an explanation's likeliest sizes
+    and variables, constants as they are stated."""
+    best = int(np.argmax(hypothesis.posterior))
+    eta, unknown = problem.expansion.eta[places], np.full(len(places), np.nan)
+    unseen = tuple(Observable.of(rows[i]) for i in places)
+    there = replace(
+        problem,
+        observations=Observations(unseen, eta, 0 * eta, 0.0, unknown, unknown),
+        places=places,
+        zeta=float(hypothesis.fitted.zeta[best]),
+    )
+    effects = {id: e[[best]] for id, e in hypothesis.values.items()}
+    return there.predicted(effects, hypothesis.fitted.d[[best]])[0]
+
+
+def expected_by(
+    problem: InverseProblem, hypothesis: Hypothesis, rows: Sequence[ModelRow], places: Array
+) -> Expected:
+    """The same by one explanation."""
+    p = hypothesis.posterior
+    on = np.flatnonzero(p > NEGLIGIBLE * p.max())
+    d = hypothesis.fitted.d[on]
+    measured, count = problem.observations, len(problem.places)
+    none = np.full(len(places), np.nan)
+    joint = replace(
+        problem,
+        places=np.append(problem.places, places),
+        observations=replace(
+            measured,
+            rows=(*measured.rows, *(Observable.of(rows[i]) for i in places)),
+            y=np.append(measured.y, likeliest(problem, hypothesis, rows, places)),
+            scatter=np.append(measured.scatter, np.zeros(len(places))),
+            split=np.append(measured.split, none),
+            split_scatter=np.append(measured.split_scatter, none),
+        ),
+    )
+    added = joint.added({id: e[on] for id, e in hypothesis.values.items()}, len(on))
+    share = hypothesis.fitted.coupled[on]  # by how near modes are coupled, where any are
+    points: list[int | None] = [
+        k for k in range(share.shape[1]) if joint.integrand and share[:, k].max() > WORTH_COUPLING
+    ]
+    each = [_conditional(line_about(joint, added, d, k), joint, count) for k in points or [None]]
+    weights = p[on] * (share.T[[k for k in points if k is not None]] if points else 1.0)
+    mean, variance = (np.concatenate(part) for part in zip(*each, strict=True))
+    return _pooled(weights.ravel(), mean, variance)
+
+
+def _conditional(line: Line, problem: InverseProblem, count: int) -> tuple[Array, Array]:
+    """Mean and variance (q, m) of all rows but the first ``count``, which are known."""
+    T = line.covariance(problem) + line.slopes @ line.slopes.transpose(0, 2, 1)
+    known, beside = T[:, :count, :count], T[:, :count, count:]
+    gain = np.linalg.solve(known, beside).transpose(0, 2, 1)
+    r = line.residual[:, :, None]
+    mean = problem.observations.y[count:] - (r[:, count:] - gain @ r[:, :count])[:, :, 0]
+    taken = np.einsum("qmn,qnm->qm", gain, beside)
+    return mean, np.diagonal(T, axis1=1, axis2=2)[:, count:] - taken
+
+
+def _pooled(p: Array, mean: Array, variance: Array) -> Expected:
+    """Of means and variances (q, m) that are as probable as p (q,)."""
+    p = p / p.sum()
+    middle = p @ mean
+    spread = p @ (np.maximum(variance, 0.0) + (mean - middle) ** 2)
+    return Expected(middle, np.sqrt(spread))
