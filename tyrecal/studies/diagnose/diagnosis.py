@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 
 from ...simulate.modes.label import Label
-from .evidence import NONE, Hypothesis, quantile
+from .evidence import NONE, Hypothesis, quantile, refit
 from .expansion import Expansion, anchored, carried, expand
-from .gap import Gap, find_gap, projection
+from .gap import Gap, chi2_tail, find_gap, projection
 from .inverse_problem import Assumed, InverseProblem, Toggle, places
-from .label_swap import exchanged, with_exchanged
+from .label_swap import exchange_shifts, exchanged, with_exchanged
 from .labelings import REFUTED, Reading, averaged, over_labels, shares
 from .model import ModelRow, Query, ResponseModel
 from .next_measurement import SIZES, Choice, rank
@@ -25,7 +25,7 @@ from .robustness import Robustness, robustness
 from .separability import Separability, separate
 from .several import probabilities, weigh, with_sets
 from .shrinkage import Shrinkage, shrink
-from .verdict import NAMED, NO_GAP, Verdict, decide, holds
+from .verdict import CHECK, NAMED, NO_GAP, Verdict, decide, holds
 from .where import PartChange, section_map
 
 Array = np.ndarray
@@ -33,6 +33,7 @@ IN_PLAY_WITHIN = 8.0  # ln evidence behind the best, up to which an effect is as
 MAX_IN_PLAY = 6
 MAX_JOINT, CARRIES_WEIGHT = 3, 0.02  # sets of effects that are asked together; probability of one
 MAX_ROUNDS = 2
+CARRIED_WITHIN = 0.7  # of x, from where effects are followed by their slopes
 STAGES = (
     "calibrate and ask each effect",
     "ask the likeliest effects again",
@@ -200,14 +201,34 @@ def _calibrated(
     expansion: Expansion | None,
     known: Expansion | None,
 ) -> InverseProblem:
-    """Observations beside the model, expanded about the plain tyre that fits them."""
+    """Observations beside the model, expanded about the plain tyre that fits them.
+
+    Where none does, an effect or an exchange of labels may have driven it far off: then about the
+    tyre that fits them if any of these may have moved them.
+    """
     where, splits = places(observations, rows), bool(np.isfinite(observations.split).any())
-    if expansion is None:
+    given = expansion
+    if given is None:
         x0 = plain_fit(model, observations, where, assumed.form, known)
         expansion = carried(known, model, x0) if known else expand(model, x0, splits)
-    return InverseProblem(
+    assert expansion is not None
+    problem = InverseProblem(
         observations, expansion, model.spans, where, model.start, model.spread, changes, assumed
     )
+    if given is not None or _fits(problem):
+        return problem
+    shifts = (known or expansion).range_shifts(where)
+    moved = np.hstack([shifts, exchange_shifts(observations)])
+    x0 = plain_fit(model, observations, where, assumed.form, known, moved)
+    near = known or abs(x0 - expansion.x0).max() < CARRIED_WITHIN
+    expansion = carried(known or expansion, model, x0) if near else expand(model, x0, splits)
+    return replace(problem, expansion=expansion)
+
+
+def _fits(problem: InverseProblem) -> bool:
+    """Whether the plain tyre does; as it does where it has as many variables as data."""
+    freedom = len(problem.places) - len(problem.centre)
+    return freedom <= 0 or chi2_tail(float(refit(problem, {}, 1).chi2[0]), freedom) > CHECK
 
 
 def _settled(

@@ -85,6 +85,12 @@ class Nodes:
             tilt = tilt + grown[:, None, None] * self.anchor.tilt
         return shift, tilt, np.abs(weights @ self.split)
 
+    def range_shifts(self) -> Array:
+        """Shifts (k, n) at the ends of its range over the square root of 3 k: what they make normal
+        has the mean square of an effect that is uniform over the range."""
+        ends = np.array([end for end in self.reach if end])
+        return self.shift_at(ends) / np.sqrt(3 * len(ends))
+
     def beside_at(self, e: Array) -> Array:
         """By one standard deviation of what else its nature leaves open (q, n): in proportion to
         the effect."""
@@ -121,6 +127,12 @@ class Expansion:
         d = x - self.x0
         bent = np.einsum("nvw,w->nv", self.hessian, d)
         return self.eta + self.jacobian @ d + bent @ d / 2, self.jacobian + bent
+
+    def range_shifts(self, places: Array) -> Array:
+        """What every effect may do to the rows ``places`` (n,) over its range, as so many more
+        constants (n, k)."""
+        every = [each.range_shifts()[:, places] for each in self.nodes.values()]
+        return np.vstack([np.zeros((0, len(places))), *every]).T
 
 
 def expand(model: ResponseModel, x0: Array, splits: bool = True) -> Expansion:

@@ -23,7 +23,7 @@ from .several import weigh
 Array = np.ndarray
 SWAP_PROBABILITY = 0.05  # of laboratories' files, two of their labels
 MAX_SWAP_DISTANCE = 0.30  # relative distance of modes that could be taken for one another
-MIN_GAIN = 3.0  # in ln of evidence of the plain tyre, from which a reading is worth a closer look
+MIN_GAIN = 3.0  # in ln of evidence without effects, from which a reading is worth a closer look
 
 
 def exchanged(problem: InverseProblem) -> tuple[Label, Label] | None:
@@ -31,12 +31,16 @@ def exchanged(problem: InverseProblem) -> tuple[Label, Label] | None:
 
     problem: expanded about a fit of the file as it is.
     """
-    plain = float(refit(problem, {}, 1).ln_evidence[0])
+    shifts = problem.expansion.range_shifts(problem.places)
+    # without effects, and with any of them as scatter: neither sees every exchange
+    scatters = None, shifts @ shifts.T
+    seen = lambda p: np.array([refit(p, {}, 1, extra).ln_evidence[0] for extra in scatters])
+    plain = seen(problem)
     readings = list(_near(problem.observations))
     found: list[tuple[Label, Label]] = []
     for a, b in readings:
         other = replace(problem, observations=with_exchanged(problem.observations, a, b))
-        if float(refit(other, {}, 1).ln_evidence[0]) > plain + MIN_GAIN:
+        if np.any(seen(other) > plain + MIN_GAIN):
             found.append((a, b))
     if not found:
         return None
@@ -47,6 +51,13 @@ def exchanged(problem: InverseProblem) -> tuple[Label, Label] | None:
         if ln > most:
             best, most = (a, b), ln
     return best
+
+
+def exchange_shifts(observations: Observations) -> Array:
+    """What each exchange of labels near each other would have done to the observations, (n, k)."""
+    y = observations.y
+    found = [with_exchanged(observations, a, b).y - y for a, b in _near(observations)]
+    return np.array(found).reshape(-1, len(y)).T
 
 
 def with_exchanged(observations: Observations, a: Label, b: Label) -> Observations:

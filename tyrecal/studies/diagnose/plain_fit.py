@@ -22,17 +22,20 @@ def plain_fit(
     places: Array,
     form: float | None = None,
     known: Expansion | None = None,
+    moved: Array | None = None,
 ) -> Array:
     """x (v,) by damped Gauss-Newton steps from the start; a step has at most ``MAX_STEP`` in any x.
 
     It ends within ``CLOSE_ENOUGH`` of the minimum: the expansion about x goes the rest of the way.
     The covariance is that of the constants at the start and, where x has gone far, anew from there.
-    known: of the model about its start, on which the fit goes first. Raises the model's own failure
-    where the start has no solution.
+    known: of the model about its start, on which the fit goes first; moved (n, k): what else may
+    have moved the observations, as more constants. Raises the model's own failure where the start
+    has no solution.
     """
     run0 = np.array([row.run == 0 for row in observations.rows])
     rows, observed = places[run0], observations.only(run0)
     information = np.diag(model.spread**-2.0)
+    more = np.zeros((len(rows), 0)) if moved is None else moved[run0]
 
     def descended(x: Array, asked: Callable[[Array], Answer | Exception], answer: Answer) -> Array:
         """From x, where ``answer`` is the model's."""
@@ -65,7 +68,8 @@ def plain_fit(
         return model.answers([Query(x, constants=constants)])[0]
 
     def weights(constants: Array) -> Array:
-        sigma = covariance(observed, constants[rows], model.material_laws, form)
+        sources = np.hstack([constants[rows], more])
+        sigma = covariance(observed, sources, model.material_laws, form)
         return np.asarray(np.linalg.inv(sigma))
 
     x = np.array(model.start, float)

@@ -1,0 +1,110 @@
+"""Effects so strong, or labels so wrong, that the plain tyre that fits them is no tyre."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tyrecal.studies.diagnose.diagnosis import Diagnosis, diagnose
+from tyrecal.studies.diagnose.evidence import refit
+from tyrecal.studies.diagnose.expansion import expand
+from tyrecal.studies.diagnose.inverse_problem import Assumed
+from tyrecal.studies.diagnose.label_swap import exchange_shifts, with_exchanged
+from tyrecal.studies.diagnose.model import Answer, Query, Span
+from tyrecal.studies.diagnose.plain_fit import plain_fit
+
+from .toy import LABELS, Toy, problem
+
+pytestmark = pytest.mark.numbers
+
+X = np.array([0.2, -0.1, 0.15])
+ASSUMED = Assumed(form=0.001, law=0.02)
+
+
+class Strong(Toy):
+    """Effects of up to 30 % of a frequency, near to what variables do, in a model that bends."""
+
+    def __init__(self) -> None:
+        super().__init__(effects=3, size=0.02, bend=0.05)
+        self.g["e0"] = self.J @ [1.5, -1.0, 0.8] + 5 * self.g["e0"]
+
+    def measured(self, **effects: float) -> np.ndarray:
+        (answer,) = self.answers([Query(X, effects)])
+        assert isinstance(answer, Answer)
+        return answer.eta
+
+
+def diagnosed(toy: Toy, y: np.ndarray, known: bool) -> Diagnosis:
+    p = problem(toy, y, assumed=ASSUMED)
+    about = expand(toy, np.zeros(3)) if known else None
+    return diagnose(toy, toy.rows, p.observations, assumed=ASSUMED, known=about)
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_a_strong_effect_does_not_drive_the_expansion_away(known: bool) -> None:
+    """The plain fit is ten times as far from the truth as the tyre that the model is expanded
+    about; the effect is named, at its size and with its variables."""
+    toy = Strong()
+    y = toy.measured(e0=0.9)
+    p = problem(toy, y, assumed=ASSUMED)
+    astray = abs(plain_fit(toy, p.observations, p.places, 0.001) - X).max()
+    d = diagnosed(toy, y, known)
+    x0 = d.problem.expansion.x0
+    assert astray > 0.8 and abs(x0 - X).max() < 0.2
+    assert d.verdict.key == "e0" and d.probabilities["e0"] > 0.8
+    assert d.parameter("e0")["value"] == pytest.approx(0.9, abs=0.02)
+    h = d.hypothesis("e0")
+    assert x0 + h.fitted.d[h.best] == pytest.approx(X, abs=0.05)
+
+
+def test_a_tyre_that_fits_is_expanded_about_its_own_fit() -> None:
+    toy = Strong()
+    p = problem(toy, toy.measured(), assumed=ASSUMED)
+    d = diagnosed(toy, toy.measured(), False)
+    own = plain_fit(toy, p.observations, p.places, 0.001)
+    assert d.problem.expansion.x0.tolist() == own.tolist()
+
+
+def test_labels_that_are_exchanged_are_found_beside_a_strong_effect() -> None:
+    toy, n = Strong(), len(LABELS)
+    a, b = LABELS[6], LABELS[7]
+    y = toy.measured(e0=0.9)
+    toy.base[7::n] += 0.06 + y[6::n] - y[7::n]  # 6 % apart, with the effect
+    p = problem(toy, toy.measured(e0=0.9), assumed=ASSUMED)
+    wrong = with_exchanged(p.observations, a, b)
+    d = diagnose(toy, toy.rows, wrong, assumed=ASSUMED)
+    assert d.exchanged == (a, b) and d.verdict.key == "e0"
+
+
+def test_what_an_exchange_of_labels_does_stands_beside_the_constants() -> None:
+    """With any share of it in the data the fit stays where it is."""
+    toy = Toy(effects=0, bend=0.0)
+    toy.base[3 :: len(LABELS)] = toy.base[2 :: len(LABELS)] + 0.05
+    p = problem(toy, toy.base + toy.J @ X)
+    found = exchange_shifts(p.observations)
+    assert len(found) == len(p.places) and np.all((abs(found) > 0).sum(0) == 2 * 3)
+    assert found.sum(0) == pytest.approx(0.0, abs=1e-12)  # what one gains the other loses
+    half = p.observations.y + found @ np.full(found.shape[1], 0.5)
+    there = replace(p.observations, y=half)
+    with_, without = (plain_fit(toy, there, p.places, 0.001, moved=m) for m in (found, None))
+    assert abs(with_ - X).max() < 0.05 < abs(without - X).max()
+
+
+def test_an_effect_s_range_as_a_constant_has_its_mean_square() -> None:
+    """Of a shift in proportion to an effect uniform over 0 to 1, or -0.5 to 1."""
+    for low in (0.0, -0.5):
+        toy = Toy(effects=1, bend=0.0)
+        toy.spans = {"e0": Span(low, 1.0)}
+        (nodes,) = expand(toy, np.zeros(3)).nodes.values()
+        mean = {0.0: 1 / 3, -0.5: (1 + 0.25) / 6}[low]
+        assert (nodes.range_shifts() ** 2).sum(0) == pytest.approx(mean * toy.g["e0"] ** 2)
+
+
+def test_no_fit_is_asked_for_where_data_are_fewer_than_variables() -> None:
+    toy = Toy(effects=1, pressures=(240.0,))
+    p = problem(toy, toy.base + 0.3)
+    few = p.only(np.arange(len(p.places)) < 2)
+    d = diagnose(toy, toy.rows, few.observations, assumed=ASSUMED)
+    assert d.verdict.kind == "undecided" and np.isfinite(refit(few, {}, 1).chi2).all()
