@@ -279,10 +279,14 @@ def test_misses_are_what_was_named_wrongly_and_what_should_have_been_found() -> 
 def test_what_was_foretold_is_the_tyre_s_own_frequency() -> None:
     """At the pressure held out, the mean of a pair, without noise; old answers foretell nothing."""
     at = lambda p, f: {"pressure_kPa": p, "ln_f": {"[1,0]": np.log(f), "[2,0]": np.log(f) + 1}}
-    truth = {"with_effect": [at(160.0, [9.0, 9.0]), at(200.0, [9.9, 10.1])]}
+    truth = {"swapped": False, "with_effect": [at(160.0, [9.0, 9.0]), at(200.0, [9.9, 10.1])]}
     told = {"[1,0]": [9.5, 9.0, 10.1], "[2,0]": [10.0, 9.9, 10.1]}
     assert foretold(truth, {"expected_Hz": told}, 200.0) == (True, False)
-    assert foretold(truth, {}, 200.0) == ()
+    assert foretold(truth, {}, 200.0) == foretold({"swapped": True}, {}, 200.0) == ()
+    said = lambda flags: figures([answered("a", "a", foretold=flags)] * 60, 60)
+    name = "90 % intervals hold frequencies held out"
+    assert said((True, False))[name] == "50 % of 60 trials' (50 to 50)"
+    assert said(())[name] == "not shown (0)"
 
 
 def on_the_same_stations(case: LoadedCase) -> dict[str, Any]:

@@ -161,7 +161,10 @@ def one(
 def foretold(
     truth: Mapping[str, Any], out: Mapping[str, Any], pressure_kPa: float
 ) -> tuple[bool, ...]:
-    """Whether the tyre's own frequencies, without noise, lie in the intervals of an answer."""
+    """Whether the tyre's own frequencies, without noise, lie in the intervals of an answer; nothing
+    where its labels were exchanged, by which intervals are told."""
+    if truth["swapped"]:
+        return ()
     (true,) = [each for each in truth["with_effect"] if each["pressure_kPa"] == pressure_kPa]
     return tuple(
         low <= np.exp(np.mean(true["ln_f"][name])) <= high
@@ -233,8 +236,8 @@ def figures(trials: Sequence[Scored], least: int, quantile: float = 0.95) -> dic
         else _few(len(trials)),
         "90 % set holds the truth": shown(t.in_set for t in trials),
         "90 % interval holds the size": shown(held for t in trials for held in t.held),
-        "90 % interval holds the frequency held out": shown(
-            inside for t in trials for inside in t.foretold
+        "90 % intervals hold frequencies held out": _mean_share(
+            [t.foretold for t in trials if t.foretold and t.kind != "outside"], least
         ),
         **{
             f"held out by {how}, named, lambda from {ONE:g}: median shrinkage": _middle(
@@ -272,6 +275,15 @@ def _shown(flags: Sequence[bool], least: int) -> str:
     found = rate(flags)
     share, low, high = (f"{100 * found[key]:.0f}" for key in ("share", "low", "high"))
     return f"{found['right']} of {found['count']}, {share} % ({low} to {high})"
+
+
+def _mean_share(flags: Sequence[Sequence[bool]], least: int) -> str:
+    """Of all flags; its 95 % bounds by the scatter from trial to trial, whose flags go together."""
+    if len(flags) < least:
+        return _few(len(flags))
+    each = np.array([np.mean(own) for own in flags])
+    share, off = 100 * each.mean(), 196 * each.std(ddof=1) / np.sqrt(len(each))
+    return f"{share:.0f} % of {len(each)} trials' ({share - off:.0f} to {share + off:.0f})"
 
 
 def _middle(shrinks: Sequence[float], sound: Sequence[float], least: int) -> str:

@@ -122,8 +122,8 @@ def predicted(
 def intervals(
     found: Diagnosis, rows: Sequence[ModelRow], pressure_kPa: float
 ) -> dict[str, list[float]]:
-    """Hz by label as they are expected beside what was measured, by all explanations, with the ends
-    of their 90 % intervals."""
+    """Hz by label as all explanations of the catalogue together expect them beside what was
+    measured, with the ends of their 90 % intervals."""
     places = places_at(rows, pressure_kPa)
     told = expected(found.problem, found.hypotheses, rows, places)
     three = np.exp([told.mean, *told.interval()]).T
@@ -131,8 +131,8 @@ def intervals(
 
 
 def places_at(rows: Sequence[ModelRow], pressure_kPa: float) -> np.ndarray:
-    """Of the modes at a pressure."""
-    return np.array([i for i, (label, p) in enumerate(rows) if label and p == pressure_kPa])
+    """Places among the rows of the modes at a pressure."""
+    return np.array([i for i, (label, p) in enumerate(rows) if label and p == pressure_kPa], int)
 
 
 def _by_label(

@@ -21,16 +21,18 @@ Array = np.ndarray
 BETWEEN_PRESSURES, BETWEEN_RUNS = 0.9, 0.97
 
 
-@lru_cache(64)
+@lru_cache(16)
 def alike(rows: tuple[Observable, ...]) -> Array:
     """Correlation (n, n) of what belongs to a mode: 1 on the diagonal, 0 between modes."""
     states = np.array(
         [[1.0 if a.state == b.state else BETWEEN_PRESSURES for b in rows] for a in rows]
     )
-    return states * of_a_mode(rows)
+    result = states * of_a_mode(rows)
+    result.flags.writeable = False  # kept for all who ask
+    return np.asarray(result)
 
 
-@lru_cache(64)
+@lru_cache(16)
 def of_a_mode(rows: tuple[Observable, ...]) -> Array:
     """The same (n, n) of what is alike in all states."""
     result = np.zeros((len(rows), len(rows)))
@@ -38,15 +40,17 @@ def of_a_mode(rows: tuple[Observable, ...]) -> Array:
         for j, b in enumerate(rows):
             if a.label == b.label and a.quantity == b.quantity:
                 result[i, j] = BETWEEN_RUNS if a.run != b.run else 1.0
+    result.flags.writeable = False
     return result
 
 
 def repeatability(observations: Observations) -> Array:
-    """Sigma_rep (n, n)."""
-    rows = observations.rows
+    """Sigma_rep (n, n); rows without scatter were not measured."""
+    rows, scatter = observations.rows, observations.scatter
     run = np.array([row.run if row.label else -1 for row in rows])
+    run = np.where(scatter > 0, run, -1)
     shared = (run[:, None] == run) & (run >= 0)[:, None]
-    return np.diag(observations.scatter**2) + observations.common**2 * shared
+    return np.diag(scatter**2) + observations.common**2 * shared
 
 
 def model_form(rows: tuple[Observable, ...], laws: float, form: float | None = None) -> Array:

@@ -167,11 +167,10 @@ class InverseProblem:
                     a, B = joint.at(*(here[id] for id in both))
                     shift[:, rows] += a[:, self.places[rows]]
                     tilt[:, rows] += B[:, self.places[rows]]
-        found = Added(shift, tilt, np.sqrt(np.maximum(square, 0.0)), off, beside)
         if self.zeta:
-            found = self.with_mixed_laws(found)
-            found = found._replace(shift=shift @ self.mixed.T, tilt=self.mixed @ tilt)
-        return found
+            shift, tilt = shift @ self.mixed.T, self.mixed @ tilt
+        split = np.sqrt(np.maximum(square, 0.0))
+        return self.with_mixed_laws(Added(shift, tilt, split, off, beside))
 
     def with_mixed_laws(self, added: Added) -> Added:
         """What effects may be off by as coupled modes have it."""

@@ -31,6 +31,12 @@ class Changed:
     keep: Array  # (n,) rows that count
     laws: float = 1.0  # times which effects' laws may be off
 
+    @property
+    def parts_near_modes(self) -> bool:
+        """Whether a row that is left out is one of two that are coupled: what is told of their
+        labels, and what the other is mixed with, is then not what it was."""
+        return bool(self.problem.veering.size[~self.keep].any())
+
 
 @dataclass(frozen=True)
 class Line:
@@ -70,7 +76,8 @@ def lines(
     among: Mapping[int, float] | None = None,
     extra: Array | None = None,
 ) -> list[Line]:
-    """About the re-fits that lie near x - x0 (q, v); the rest as in `refit`."""
+    """One for each point of the rule in what couples near modes, or one if none are, about re-fits
+    that start from x - x0 = near (q, v); the rest as in `refit`."""
     added, found = problem.added(effects, len(near)), []
     places: list[int | None] = [*(among or range(len(problem.integrand)))]
     for k in places or [None]:

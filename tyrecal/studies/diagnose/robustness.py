@@ -13,7 +13,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .evidence import NONE, OUTSIDE, Fitted, Hypothesis, families, ln_shares, refit
+from .evidence import (
+    NONE,
+    OUTSIDE,
+    REFIT_STEPS,
+    Fitted,
+    Hypothesis,
+    families,
+    ln_shares,
+    outside,
+    refit,
+    refit_at,
+)
 from .inverse_problem import InverseProblem
 from .reweighed import Changed, lines, reweighed
 from .section_fields import SECTION
@@ -75,9 +86,10 @@ def _variants(
         for factor, times in FACTORS.items():
             found = [replace(h, prior=h.prior * factor ** of(h)) for h in kept]
             yield f"the prior of {words} {times} as large", found, count
-    again = [_outside(problem, h) if h.key == OUTSIDE else _known(problem, h) for h in kept]
-    for other in _changes(problem, sources):
-        yield other.words, [weighed(other) for weighed in again], int(other.keep.sum())
+    changes = list(_changes(problem, sources))
+    again = [_again(problem, h, changes) for h in kept]
+    for other, *found in zip(changes, *again, strict=True):
+        yield other.words, found, int(other.keep.sum())
 
 
 def _priors(verdict: Verdict) -> Iterator[tuple[str, Callable[[Hypothesis], int]]]:
@@ -139,33 +151,46 @@ def _weighty(hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
     return kept
 
 
-def _known(problem: InverseProblem, h: Hypothesis) -> Callable[[Changed], Hypothesis]:
-    """How a hypothesis is weighed anew."""
-    among = coupled_most([h])
-    fits = lines(problem, h.values, h.fitted.d, among)
-
-    def weighed(other: Changed) -> Hypothesis:
-        ln, chi2 = reweighed(fits, other, among)
+def _again(problem: InverseProblem, h: Hypothesis, changes: Sequence[Changed]) -> list[Hypothesis]:
+    """A hypothesis weighed anew with each change."""
+    if h.key == OUTSIDE:
+        return _outside(problem, h, changes)
+    d, among, found = h.fitted.d, coupled_most([h]), []
+    fits = lines(problem, h.values, d, among)
+    for other in changes:
+        if other.parts_near_modes:
+            fewer = other.problem.only(other.keep)
+            anew = refit(fewer, h.values, len(d), among=among, near=d)
+            ln, chi2 = anew.ln_evidence, anew.chi2
+        else:
+            ln, chi2 = reweighed(fits, other, among)
         total = float(np.logaddexp.reduce(ln + h.ln_weights))
-        return replace(h, ln_evidence=total, fitted=h.fitted._replace(ln_evidence=ln, chi2=chi2))
+        fitted = h.fitted._replace(ln_evidence=ln, chi2=chi2)
+        found.append(replace(h, ln_evidence=total, fitted=fitted))
+    return found
 
-    return weighed
 
-
-def _outside(problem: InverseProblem, h: Hypothesis) -> Callable[[Changed], Hypothesis]:
-    """The same of what is outside the catalogue; a reading that is left out is no error."""
-    extra = np.array([each.extra for each in families(problem)])
-    fits = lines(problem, {}, refit(problem, {}, len(extra), extra).d, extra=extra)
-
-    def weighed(other: Changed) -> Hypothesis:
-        known = families(other.problem)
-        extra = np.array([each.extra for each in known])
-        ln, _ = reweighed(fits, other, extra=extra)
-        there = np.array([each[np.ix_(other.keep, other.keep)].any() for each in extra])
-        shares = ln_shares([each for each, on in zip(known, there, strict=True) if on])
-        return replace(h, ln_evidence=float(np.logaddexp.reduce(ln[there] + shares)))
-
-    return weighed
+def _outside(
+    problem: InverseProblem, h: Hypothesis, changes: Sequence[Changed]
+) -> list[Hypothesis]:
+    """The same of what is outside the catalogue, but for families that say nothing of the rows that
+    count, as that a label is misread which is left out."""
+    extra = np.array([family.extra for family in families(problem)])
+    added, start = problem.added({}, len(extra)), np.zeros((len(extra), len(problem.centre)))
+    near = refit_at(problem, problem, added, extra, start, REFIT_STEPS).d
+    fits, found = lines(problem, {}, near, extra=extra), []
+    for other in changes:
+        if other.parts_near_modes:
+            total = outside(other.problem.only(other.keep)).ln_evidence
+        else:
+            now = families(other.problem)
+            more = np.array([family.extra for family in now])
+            ln, _ = reweighed(fits, other, extra=more)
+            there = np.array([each[np.ix_(other.keep, other.keep)].any() for each in more])
+            shares = ln_shares([family for family, on in zip(now, there, strict=True) if on])
+            total = float(np.logaddexp.reduce(ln[there] + shares))
+        found.append(replace(h, ln_evidence=total))
+    return found
 
 
 def in_words(verdict: Verdict) -> str:

@@ -15,12 +15,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.polynomial.legendre import leggauss
 
 from .evidence import OUTSIDE, Hypothesis
 from .inverse_problem import InverseProblem
 from .model import ModelRow
 from .observations import Observable, Observations
 from .reweighed import Line, line_about
+from .veering import ZETA_POINTS, rule
 
 Array = np.ndarray
 NEGLIGIBLE = 1e-3  # of the likeliest size's, and explanation's, probability
@@ -66,20 +68,18 @@ def likeliest(
     best = int(np.argmax(hypothesis.posterior))
     eta, unknown = problem.expansion.eta[places], np.full(len(places), np.nan)
     unseen = tuple(Observable.of(rows[i]) for i in places)
-    there = replace(
-        problem,
-        observations=Observations(unseen, eta, 0 * eta, 0.0, unknown, unknown),
-        places=places,
-        zeta=float(hypothesis.fitted.zeta[best]),
-    )
+    observations = Observations(unseen, eta, 0 * eta, 0.0, unknown, unknown)
     effects = {id: e[[best]] for id, e in hypothesis.values.items()}
-    return there.predicted(effects, hypothesis.fitted.d[[best]])[0]
+    d, zeta = hypothesis.fitted.d[[best]], float(hypothesis.fitted.zeta[best])
+    there = replace(problem, observations=observations, places=places, zeta=0.0)
+    uncoupled = there.predicted(effects, d)[0]  # which of two is the upper there
+    return replace(there.measured(uncoupled), zeta=zeta).predicted(effects, d)[0]
 
 
 def expected_by(
     problem: InverseProblem, hypothesis: Hypothesis, rows: Sequence[ModelRow], places: Array
 ) -> Expected:
-    """The same by one explanation."""
+    """`expected` by one explanation."""
     p = hypothesis.posterior
     on = np.flatnonzero(p > NEGLIGIBLE * p.max())
     d = hypothesis.fitted.d[on]
@@ -98,14 +98,24 @@ def expected_by(
         ),
     )
     added = joint.added({id: e[on] for id, e in hypothesis.values.items()}, len(on))
-    share = hypothesis.fitted.coupled[on]  # by how near modes are coupled, where any are
-    points: list[int | None] = [
-        k for k in range(share.shape[1]) if joint.integrand and share[:, k].max() > WORTH_COUPLING
-    ]
-    each = [_conditional(line_about(joint, added, d, k), joint, count) for k in points or [None]]
-    weights = p[on] * (share.T[[k for k in points if k is not None]] if points else 1.0)
+    ways = (
+        _coupled(hypothesis.fitted.coupled[on]) if joint.integrand else [(None, np.ones(len(on)))]
+    )
+    each = [_conditional(line_about(joint, added, d, k), joint, count) for k, _ in ways]
+    weights = np.concatenate([p[on] * share for _, share in ways])
     mean, variance = (np.concatenate(part) for part in zip(*each, strict=True))
-    return _pooled(weights.ravel(), mean, variance)
+    return _pooled(weights, mean, variance)
+
+
+def _coupled(coupled: Array) -> list[tuple[int | None, Array]]:
+    """Places in the rule of ways in which near modes may be coupled, with the share (q,) of each,
+    by `Fitted.coupled`; where no near modes were measured, as before any measurement."""
+    zeta, weights = rule()[0], leggauss(ZETA_POINTS)[1]
+    if not coupled.shape[1]:
+        coupled = np.tile(np.exp(-(zeta**2) / 2), (len(coupled), 1))
+    share = coupled * weights
+    share = share / share.sum(1, keepdims=True)
+    return [(k, share[:, k]) for k in range(len(zeta)) if share[:, k].max() > WORTH_COUPLING]
 
 
 def _conditional(line: Line, problem: InverseProblem, count: int) -> tuple[Array, Array]:
