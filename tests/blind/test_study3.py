@@ -39,6 +39,7 @@ from ..studies.judge_section import LINES
 from ..studies.judge_section import section as stations_section
 from ..studies.test_fenics import installed
 from .study3 import make as making
+from .study3.__main__ import result
 from .study3.cases import GROUPS, LABELS, RECORDED, SIZES, Group, written
 from .study3.draw import EFFECTS_OF, foreseen, known_laws, one_drawn
 from .study3.maker import Fenics, computed, modes
@@ -267,6 +268,30 @@ def test_shrinkage_is_of_what_was_named_and_strong_and_exchanged_labels_count_fo
     assert few[f"{start}least squares{end}"] == "not shown (59)"
 
 
+def test_what_is_named_likeliest_may_be_there_with_others() -> None:
+    """Right in part by all that it names, sure by all explanations that have it."""
+    part = answered("a+b", "a", stated=0.5, there=0.9)
+    assert part.in_part and not part.right
+    assert not answered("a", "a+b").in_part and not answered("a", "none").in_part
+    assert answered("", "none").in_part and not answered("", "a").in_part
+    said = figures([part] * 60, 60)
+    assert said["calibration error (95 % quantile)"].startswith("0.500 ")
+    name = "the same of what is named likeliest, whatever else is there"
+    assert said[name].startswith("0.100 ")
+
+
+def test_outside_counts_by_what_it_moved() -> None:
+    seen = replace(
+        answered("", "outside"),
+        kind="outside",
+        hard={"outside": Difficulty(30.0, 30.0, ("outside",), None)},
+    )
+    weak = replace(seen, hard={"outside": Difficulty(3.0, 3.0, ("outside",), None)})
+    said = figures([seen] * 60 + [replace(weak, verdict="no_gap")] * 60, 60)
+    assert said["outside: said so, or undecided"].startswith("60 of 120")
+    assert said["outside, lambda from 25: said so, or undecided"].startswith("60 of 60")
+
+
 def test_misses_are_what_was_named_wrongly_and_what_should_have_been_found() -> None:
     right = [answered("a", "a"), answered("a+b", "a+b"), answered("", "none")]
     weak = answered("a", "none", lam=9.0)
@@ -400,6 +425,12 @@ def test_recorded_trials_are_those_that_were_sealed(group: Path) -> None:
         files = {Path(name) for name in archive.getnames() if name.endswith(".csv")}
     trials = {path.stem for path in files if path.parent.name == "trials"}
     assert trials == {trial["id"] for trial in json.loads(truth)["trials"]}
+
+
+def test_the_tables_on_record_are_what_the_scorer_says(tmp_path: Path) -> None:
+    for group in ON_RECORD:
+        unpacked(group, tmp_path / "all" / group.name, tmp_path / "all-truth" / group.name)
+    assert result(tmp_path / "all") + "\n" == (RECORDED / "RESULT.md").read_text(encoding="utf-8")
 
 
 @pytest.mark.slow

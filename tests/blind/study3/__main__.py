@@ -72,11 +72,7 @@ def main() -> None:
         for group in (each for each in RECORDED.iterdir() if each.is_dir()):
             unpacked(group, Path(o.folder) / group.name, sealed_in(o.folder) / group.name)
     elif o.what == "score":
-        counted = [g for g in GROUPS if g.name != LEARNED_FROM]
-        answered = [g for g in counted if (Path(o.folder) / g.name / ANSWERS).exists()]
-        of = lambda g: scored(Path(o.folder) / g.name, sealed_in(o.folder) / g.name)
-        found = {g: of(g) for g in answered}
-        print(table(found), misses(found), sep="\n")
+        print(result(Path(o.folder)))
     else:
         folder, sealed = Path(o.folder) / o.group, sealed_in(o.folder) / o.group
         if o.what == "make":
@@ -91,6 +87,21 @@ def main() -> None:
 def sealed_in(folder: str) -> Path:
     """Where the truth of all groups lies."""
     return Path(folder).with_name(f"{Path(folder).name}-truth")
+
+
+def result(folder: Path) -> str:
+    """Tables of all series whose groups are answered, but for the one that was learned from."""
+    counted = [g for g in GROUPS if g.name != LEARNED_FROM and (folder / g.name / ANSWERS).exists()]
+    parts = ["# Blind study 3, as it was answered", ""]
+    for series in sorted({g.series for g in counted}):
+        found = {
+            g: scored(folder / g.name, sealed_in(str(folder)) / g.name)
+            for g in counted
+            if g.series == series
+        }
+        names = ", ".join(g.name for g in found)
+        parts += [f"## Series {series}", "", f"{names}.", "", table(found), misses(found), ""]
+    return "\n".join(parts).rstrip()
 
 
 def power(folder: Path) -> str:

@@ -35,8 +35,9 @@ SIGNIFICANT = 0.95
 
 @dataclass(frozen=True)
 class Scored:
-    """A trial and its answer. hard: of each effect; ranked: keys by falling probability, an id, ids
-    joined by +, none or outside; stated: the first one's; right: the first one is the truth by
+    """A trial and its answer. hard: of each effect, or of what is outside the catalogue; ranked:
+    keys by falling probability, an id, ids joined by +, none or outside; stated: the first one's;
+    there: that of all that it names, whatever else there is; right: the first one is the truth by
     groups; held: whether each named and true effect's interval holds what it is worth in the
     catalogue's law; before, after: rms error held out, in ln f; usual: the same of least squares,
     without and with what is likeliest, None where labels are exchanged; foretold: whether each
@@ -59,6 +60,7 @@ class Scored:
     again: str
     usual: tuple[float, float] | None = None
     foretold: tuple[bool, ...] = ()
+    there: float = 1.0
 
     def found(self, ids: Sequence[str]) -> int:
         """How many true effects are among ids, by their groups, an id for one effect."""
@@ -74,6 +76,12 @@ class Scored:
     def right(self) -> bool:
         """The likeliest answer is the truth."""
         return self.says(self.ranked[0])
+
+    @property
+    def in_part(self) -> bool:
+        """All that the likeliest answer names is there, whatever else is."""
+        ids = self.ranked[0].split("+")
+        return self.right or self.found(ids) == len(ids)
 
     def says(self, key: str) -> bool:
         """A key is the truth, by groups."""
@@ -120,6 +128,9 @@ def one(
         table = truth["members"].get(id, truth["without"])
         shift, split = true_shift({**truth, "without": table}, ruler, places, labels)
         hard[id] = difficulty(ruler, protocol, id, d, places, counts, shift, split)
+    if truth["kind"] == "outside":
+        shift, split = true_shift(truth, ruler, places, labels)
+        hard["outside"] = difficulty(ruler, protocol, "outside", d, places, counts, shift, split)
     told, out = answer["diagnosis"], answer["held_out"]
     p = told["probabilities"]
     ranked = tuple(sorted(p, key=lambda k: -p[k]))
@@ -149,7 +160,12 @@ def one(
         truth["again"],
     )
     in_set = any(found.says(key) for key in told["candidate_set"])
-    found = replace(found, in_set=in_set, foretold=foretold(truth, out, protocol.held_out_kPa))
+    found = replace(
+        found,
+        in_set=in_set,
+        foretold=foretold(truth, out, protocol.held_out_kPa),
+        there=sum(p[key] for key in p if set(ranked[0].split("+")) <= set(key.split("+"))),
+    )
     if truth["swapped"] or told["exchanged_labels"]:
         return found
     there = held_out(truth, ruler, protocol, labels)
@@ -195,10 +211,10 @@ def figures(trials: Sequence[Scored], least: int, quantile: float = 0.95) -> dic
     of = lambda kind: [t for t in trials if t.kind == kind]
     none, outside, single = of("none"), of("outside"), of("effect")
     lam = lambda t: min((h.lam for h in t.hard.values()), default=0.0)
-    strong = [t for t in single if lam(t) >= ONE]
+    strong, seen = ([t for t in those if lam(t) >= ONE] for those in (single, outside))
     pairs, three = ([t for t in of("several") if len(t.effects) == n] for n in (2, 3))
     named = [t for t in trials if t.verdict == "named" and t.named]
-    in_part = lambda t: t.found((t.named or "").split("+")) > 0
+    some = lambda t: t.found((t.named or "").split("+")) > 0
     rows = {"no effect: accused": shown(t.verdict == "named" for t in none)}
     for low, high in ((0, 4), (4, 10), (10, ONE), (ONE, np.inf)):
         words = f"one effect, lambda {low:g} to {high:g}: top 1 by group"
@@ -216,24 +232,29 @@ def figures(trials: Sequence[Scored], least: int, quantile: float = 0.95) -> dic
             f"{words}: called outside": shown(t.verdict == "outside" for t in here),
         }
     robust = [t for t in named if t.robust]
-    stated, right = (
-        np.array([getattr(t, key) for t in trials], float) for key in ("stated", "right")
+    calibrated = lambda stated, right: _calibration(
+        *(np.array([getattr(t, key) for t in trials], float) for key in (stated, right)),
+        least,
+        quantile,
     )
     proven = [t for t in strong if t.verdict == "named"]
     first = {t.id: t for t in trials}
     again = [(t, first[t.again]) for t in trials if t.again in first]
     return rows | {
-        "named: right, or in part of several": shown(in_part(t) for t in named),
-        "named and called robust: likewise": shown((in_part(t) for t in robust), LEAST_ROBUST),
-        "outside: said so, or undecided": shown(
-            t.verdict in ("outside", "undecided") for t in outside
+        "named: right, or in part of several": shown(some(t) for t in named),
+        "named and called robust: likewise": shown((some(t) for t in robust), LEAST_ROBUST),
+        **{
+            f"outside{words}: {said}": shown(t.verdict in verdicts for t in those)
+            for words, those in (("", outside), (f", lambda from {ONE:g}", seen))
+            for said, verdicts in (
+                ("said so, or undecided", ("outside", "undecided")),
+                ("named", ("named",)),
+            )
+        },
+        f"calibration error ({100 * quantile:g} % quantile)": calibrated("stated", "right"),
+        "the same of what is named likeliest, whatever else is there": calibrated(
+            "there", "in_part"
         ),
-        "outside: named": shown(t.verdict == "named" for t in outside),
-        f"calibration error ({100 * quantile:g} % quantile)": (
-            f"{calibration_error(stated, right):.3f} ({calibration_quantile(stated, quantile):.3f})"
-        )
-        if len(trials) >= least
-        else _few(len(trials)),
         "90 % set holds the truth": shown(t.in_set for t in trials),
         "90 % interval holds the size": shown(held for t in trials for held in t.held),
         "90 % intervals hold frequencies held out": _mean_share(
@@ -275,6 +296,13 @@ def _shown(flags: Sequence[bool], least: int) -> str:
     found = rate(flags)
     share, low, high = (f"{100 * found[key]:.0f}" for key in ("share", "low", "high"))
     return f"{found['right']} of {found['count']}, {share} % ({low} to {high})"
+
+
+def _calibration(stated: np.ndarray, right: np.ndarray, least: int, quantile: float) -> str:
+    if len(stated) < least:
+        return _few(len(stated))
+    error, chance = calibration_error(stated, right), calibration_quantile(stated, quantile)
+    return f"{error:.3f} ({chance:.3f})"
 
 
 def _mean_share(flags: Sequence[Sequence[bool]], least: int) -> str:
