@@ -280,6 +280,13 @@ def test_what_is_named_likeliest_may_be_there_with_others() -> None:
     assert said[name].startswith("0.100 ")
 
 
+def test_what_is_named_besides_and_is_not_there_counts() -> None:
+    trials = [answered("a", "a+b")] * 20 + [answered("a+b", "a")] * 20 + [answered("a", "c")] * 20
+    said = figures(trials, 60)
+    assert said["named: right, or in part of several"].startswith("40 of 60")
+    assert said["named: all of it is there"].startswith("20 of 60")
+
+
 def test_outside_counts_by_what_it_moved() -> None:
     seen = replace(
         answered("", "outside"),

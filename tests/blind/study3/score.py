@@ -215,6 +215,7 @@ def figures(trials: Sequence[Scored], least: int, quantile: float = 0.95) -> dic
     pairs, three = ([t for t in of("several") if len(t.effects) == n] for n in (2, 3))
     named = [t for t in trials if t.verdict == "named" and t.named]
     some = lambda t: t.found((t.named or "").split("+")) > 0
+    every = lambda t: t.found((t.named or "").split("+")) == len((t.named or "").split("+"))
     rows = {"no effect: accused": shown(t.verdict == "named" for t in none)}
     for low, high in ((0, 4), (4, 10), (10, ONE), (ONE, np.inf)):
         words = f"one effect, lambda {low:g} to {high:g}: top 1 by group"
@@ -242,6 +243,7 @@ def figures(trials: Sequence[Scored], least: int, quantile: float = 0.95) -> dic
     again = [(t, first[t.again]) for t in trials if t.again in first]
     return rows | {
         "named: right, or in part of several": shown(some(t) for t in named),
+        "named: all of it is there": shown(every(t) for t in named),
         "named and called robust: likewise": shown((some(t) for t in robust), LEAST_ROBUST),
         **{
             f"outside{words}: {said}": shown(t.verdict in verdicts for t in those)
