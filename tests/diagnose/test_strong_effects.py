@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tyrecal.simulate.evaluate.failure import EvaluationFailed
 from tyrecal.studies.diagnose.diagnosis import Diagnosis, diagnose
 from tyrecal.studies.diagnose.evidence import refit
 from tyrecal.studies.diagnose.expansion import expand
@@ -57,6 +58,24 @@ def test_a_strong_effect_does_not_drive_the_expansion_away(known: bool) -> None:
     assert d.parameter("e0")["value"] == pytest.approx(0.9, abs=0.02)
     h = d.hypothesis("e0")
     assert x0 + h.fitted.d[h.best] == pytest.approx(X, abs=0.05)
+
+
+class Bounded(Strong):
+    """The last step of the fit leads to where the plain tyre has no solution."""
+
+    def _answer(self, point: Query) -> Answer:
+        if point.coupled and abs(point.x - X).max() < 0.2:
+            return EvaluationFailed("no_equilibrium", "none")  # type: ignore[return-value]
+        return super()._answer(point)
+
+
+def test_where_there_is_no_tyre_to_expand_about_the_first_expansion_stays() -> None:
+    toy = Bounded()
+    y = toy.measured(e0=0.9)
+    d = diagnosed(toy, y, True)
+    p = problem(toy, y, assumed=ASSUMED)
+    own = plain_fit(toy, p.observations, p.places, 0.001, expand(toy, np.zeros(3)))
+    assert d.problem.expansion.x0.tolist() == own.tolist()
 
 
 def test_a_tyre_that_fits_is_expanded_about_its_own_fit() -> None:

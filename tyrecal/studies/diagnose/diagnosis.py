@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from ...errors import InputError
+from ...simulate.evaluate.failure import EvaluationFailed
 from ...simulate.modes.label import Label
 from .evidence import NONE, Hypothesis, quantile, refit
 from .expansion import Expansion, anchored, carried, expand
@@ -221,8 +223,11 @@ def _calibrated(
     moved = np.hstack([shifts, exchange_shifts(observations)])
     x0 = plain_fit(model, observations, where, assumed.form, known, moved)
     near = known or abs(x0 - expansion.x0).max() < CARRIED_WITHIN
-    expansion = carried(known or expansion, model, x0) if near else expand(model, x0, splits)
-    return replace(problem, expansion=expansion)
+    try:
+        there = carried(known or expansion, model, x0) if near else expand(model, x0, splits)
+    except (EvaluationFailed, InputError):  # there is no such tyre
+        return problem
+    return replace(problem, expansion=there)
 
 
 def _fits(problem: InverseProblem) -> bool:
