@@ -41,7 +41,7 @@ from ..studies.test_fenics import installed
 from .study3 import make as making
 from .study3.__main__ import result
 from .study3.cases import GROUPS, LABELS, RECORDED, SIZES, Group, written
-from .study3.draw import EFFECTS_OF, foreseen, known_laws, one_drawn
+from .study3.draw import EFFECTS_OF, foreseen, further, known_laws, one_drawn
 from .study3.maker import Fenics, computed, modes
 from .study3.score import Scored, figures, foretold, misses
 from .study3.section import Section, columns, mould, off, section
@@ -199,6 +199,14 @@ def test_trials_of_all_kinds_are_drawn_sealed_and_made_again_alike(
     assert again.pop("nonce") and again == truths[1]
     with pytest.raises(InputError, match="sealed trials already"):
         making.make(tmp_path / "a", tmp_path / "a-truth", group, counts)
+
+
+def test_what_the_rules_tell_of_further_effects_is_the_counts_mean_number() -> None:
+    for f in (0.05, 0.4, 1.0):
+        one, two, three = (int(10_000 * f**k) for k in range(3))
+        counts = {"none": 7, "outside": 3, "one": one - 10, "again": 10, "two_strong": two}
+        assert further({**counts, "three": three}) == pytest.approx(f, rel=1e-3)
+    assert further({"one": 5, "none": 2}) == 0.0
 
 
 def test_strong_effects_are_those_of_which_the_ruler_foresees_enough(chance: Chance) -> None:

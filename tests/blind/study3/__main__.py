@@ -39,6 +39,7 @@ from tyrecal.studies.blind.seal import ANSWERS, SEAL
 
 from ...studies.blind_least_squares import unpacked
 from .cases import GROUPS, LABELS, LEARNED_FROM, RECORDED, Group, written
+from .draw import further
 from .make import FENICS, make
 from .maker import computed
 from .score import misses, scored, table
@@ -81,7 +82,8 @@ def main() -> None:
         else:
             case, protocol = case_of(folder), read_protocol(folder)
             model = tyre_model(case, Evaluator(TyreDesign(case)), protocol, o.jobs)
-            print(answer(folder, model, rows_of(case, protocol), o.jobs, told))
+            told_of = further(protocol.counts)
+            print(answer(folder, model, rows_of(case, protocol), o.jobs, told, told_of))
 
 
 def sealed_in(folder: str) -> Path:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from math import sqrt
 
 import numpy as np
 
@@ -44,6 +45,17 @@ class Drawn:
     mounting: int
     redraw: int
     again: str = ""
+
+
+def further(counts: Mapping[str, int]) -> float:
+    """Tyres with two effects over those with one, and with three over those with two, of which the
+    mean number of effects is that of ``counts`` (`Protocol.counts`): what the rules tell whoever
+    answers, f in (1 + 2 f + 3 f^2) / (1 + f + f^2) = mean."""
+    numbers = {**EFFECTS_OF, "again": 1}
+    have = {kind: count for kind, count in counts.items() if numbers[kind]}
+    mean = sum(numbers[kind] * count for kind, count in have.items()) / sum(have.values())
+    a, b, c = 3 - mean, 2 - mean, 1 - mean
+    return (-b + sqrt(b * b - 4 * a * c)) / (2 * a)
 
 
 def known_laws(group: Group) -> tuple[dict[str, OwnLaw], dict[str, OwnLaw]]:

@@ -65,10 +65,11 @@ def answer(
     rows: Sequence[ModelRow],
     jobs: int = 1,
     on_progress: Callable[[int, int], None] = lambda done, all: None,
+    further: float = Assumed.further,
 ) -> str:
     """Answer every trial that has no answer yet; returns the sha256 of all answers.
 
-    Raises InputError where the truth lies among the trials.
+    further: see `Assumed`, where the maker says how many effects tyres have. Raises InputError where the truth lies among the trials.
     """
     refuse_open_truth(folder)
     protocol = read_protocol(folder)
@@ -77,7 +78,7 @@ def answer(
     own_folder(answers)
     waiting = [t for t in trials if not (answers / f"{t.stem}.json").exists()]
     known = expand(model, model.start)
-    work = partial(one_answer, model, list(rows), protocol, known)
+    work = partial(one_answer, model, list(rows), protocol, known, further)
     before = len(trials) - len(waiting)
     with process_pool(jobs) if jobs > 1 and len(waiting) > 1 else nullcontext() as pool:
         contents = (pool.map if pool else map)(work, waiting)
@@ -88,17 +89,23 @@ def answer(
 
 
 def one_answer(
-    model: ResponseModel, rows: list[ModelRow], protocol: Protocol, known: Expansion, trial: Path
+    model: ResponseModel,
+    rows: list[ModelRow],
+    protocol: Protocol,
+    known: Expansion,
+    further: float,
+    trial: Path,
 ) -> dict[str, Any]:
     """The diagnosis of one file of measurements, and what it predicts at the held-out pressure;
     known: about the start, for all trials."""
     observations = observe(read_measurements(trial), split=protocol.split)
-    assumed = Assumed(split=protocol.split)
+    assumed = Assumed(split=protocol.split, further=further)
     found = diagnose(model, rows, observations, assumed=assumed, known=known, ranked=False)
     told = diagnosis_result(found).content()
     told.pop("next_measurements"), told.pop("section_map")  # empty: neither was asked for
     key = told["effect"] or told["likeliest"]
     return {
+        "further": further,
         "diagnosis": told,
         "held_out": {
             "pressure_kPa": protocol.held_out_kPa,
