@@ -28,6 +28,7 @@ from tyrecal.studies.blind.maker import Computed
 from tyrecal.studies.blind.protocol import read_json, read_protocol
 from tyrecal.studies.blind.ruler import Difficulty, read_ruler
 from tyrecal.studies.blind.seal import SEAL, TRUTH
+from tyrecal.studies.diagnose.several import priors
 from tyrecal.tyre.case import LoadedCase, with_level
 from tyrecal.tyre.effects import catalogue
 from tyrecal.tyre.load import load_case
@@ -41,7 +42,8 @@ from ..studies.test_fenics import installed
 from .study3 import make as making
 from .study3.__main__ import result
 from .study3.cases import GROUPS, LABELS, RECORDED, SIZES, Group, written
-from .study3.draw import EFFECTS_OF, foreseen, further, known_laws, one_drawn
+from .study3.draw import foreseen, known_laws, one_drawn
+from .study3.kinds import EFFECTS_OF, further, told
 from .study3.maker import Fenics, computed, modes
 from .study3.score import Scored, figures, foretold, misses
 from .study3.section import Section, columns, mould, off, section
@@ -207,6 +209,25 @@ def test_what_the_rules_tell_of_further_effects_is_the_counts_mean_number() -> N
         counts = {"none": 7, "outside": 3, "one": one - 10, "again": 10, "two_strong": two}
         assert further({**counts, "three": three}) == pytest.approx(f, rel=1e-3)
     assert further({"one": 5, "none": 2}) == 0.0
+
+
+def test_answers_are_weighed_again_as_if_they_had_been_told_of_further_effects() -> None:
+    """By Bayes' rule about the priors that the diagnosis has of so many effects."""
+    ids, likelihood = ["a", "b", "c"], {"none": 1.0, "outside": 2.0, "a": 5.0, "a+b": 40.0}
+    likelihood |= {"a+b+c": 90.0}
+
+    def posterior(f: float) -> dict[str, float]:
+        prior = {key: priors(len(ids), f)[key.count("+") + 1] for key in likelihood}
+        prior |= {"none": 0.25, "outside": 0.10}
+        whole = sum(likelihood[key] * prior[key] for key in prior)
+        return {key: likelihood[key] * prior[key] / whole for key in prior}
+
+    assert told(posterior(0.05), 0.05, 0.6) == pytest.approx(posterior(0.6))
+    again = replace(answered("a+b", "a", stated=1.0), told=answered("a+b", "a+b", stated=1.0))
+    said = figures([again] * 60, 60)
+    assert said["calibration error (95 % quantile)"].startswith("1.000 ")
+    assert said["the same, told how many effects tyres have"].startswith("0.000 ")
+    assert said["90 % set holds the truth, told so"].startswith("60 of 60")
 
 
 def test_strong_effects_are_those_of_which_the_ruler_foresees_enough(chance: Chance) -> None:

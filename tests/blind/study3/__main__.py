@@ -39,7 +39,7 @@ from tyrecal.studies.blind.seal import ANSWERS, SEAL
 
 from ...studies.blind_least_squares import unpacked
 from .cases import GROUPS, LABELS, LEARNED_FROM, RECORDED, Group, written
-from .draw import further
+from .kinds import further
 from .make import FENICS, make
 from .maker import computed
 from .score import misses, scored, table

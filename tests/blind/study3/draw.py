@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from math import sqrt
 
 import numpy as np
 
@@ -16,14 +15,13 @@ from tyrecal.studies.diagnose.uncertainties import sources
 from tyrecal.tyre.case import LoadedCase
 
 from .cases import Group, with_exact_section
+from .kinds import EFFECTS_OF
 from .laws import CLAMP, OUTSIDE, OwnLaw, laws, rim_width
 from .score import EACH, ONE
 from .section import columns, mould, off
 from .tyre import Tyre, tyre_of
 
 CLAMPED = 0.5  # share of effects of the wheel's clamp, which a doubtful section hides least
-EFFECTS_OF = {"none": 0, "one": 1, "two": 2, "three": 3, "outside": 0}
-EFFECTS_OF |= {"one_strong": 1, "two_strong": 2, "three_strong": 3}
 LEAST = {
     "one_strong": ONE,
     "two_strong": EACH,
@@ -45,17 +43,6 @@ class Drawn:
     mounting: int
     redraw: int
     again: str = ""
-
-
-def further(counts: Mapping[str, int]) -> float:
-    """Tyres with two effects over those with one, and with three over those with two, of which the
-    mean number of effects is that of ``counts`` (`Protocol.counts`): what the rules tell whoever
-    answers, f in (1 + 2 f + 3 f^2) / (1 + f + f^2) = mean."""
-    numbers = {**EFFECTS_OF, "again": 1}
-    have = {kind: count for kind, count in counts.items() if numbers[kind]}
-    mean = sum(numbers[kind] * count for kind, count in have.items()) / sum(have.values())
-    a, b, c = 3 - mean, 2 - mean, 1 - mean
-    return (-b + sqrt(b * b - 4 * a * c)) / (2 * a)
 
 
 def known_laws(group: Group) -> tuple[dict[str, OwnLaw], dict[str, OwnLaw]]:

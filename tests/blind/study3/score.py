@@ -24,9 +24,13 @@ from tyrecal.studies.blind.score import held_out_error, means, true_shift
 from tyrecal.studies.blind.seal import open_truth
 from tyrecal.studies.blind.statistics import calibration_error, calibration_quantile
 from tyrecal.studies.blind.tables import rate
+from tyrecal.studies.diagnose.inverse_problem import Assumed
+from tyrecal.studies.diagnose.several import present
+from tyrecal.studies.diagnose.verdict import SET
 
 from ...studies.blind_least_squares import held_out, held_out_rms
 from .cases import Group
+from .kinds import further, told
 
 LEAST, LEAST_A_SIZE, LEAST_ROBUST = 60, 40, 100  # trials of a rate that is shown
 ONE, EACH = 25.0, 15.0  # lambda from which one effect, and each of a pair, should be found
@@ -41,7 +45,8 @@ class Scored:
     groups; held: whether each named and true effect's interval holds what it is worth in the
     catalogue's law; before, after: rms error held out, in ln f; usual: the same of least squares,
     without and with what is likeliest, None where labels are exchanged; foretold: whether each
-    frequency held out lies in its interval, where the answer has any."""
+    frequency held out lies in its interval, where the answer has any; told: the same, its answer
+    weighed again as if the rules had told it how many effects tyres have."""
 
     id: str
     kind: str  # none, effect, several or outside
@@ -61,6 +66,7 @@ class Scored:
     usual: tuple[float, float] | None = None
     foretold: tuple[bool, ...] = ()
     there: float = 1.0
+    told: Scored | None = None
 
     def found(self, ids: Sequence[str]) -> int:
         """How many true effects are among ids, by their groups, an id for one effect."""
@@ -131,11 +137,9 @@ def one(
     if truth["kind"] == "outside":
         shift, split = true_shift(truth, ruler, places, labels)
         hard["outside"] = difficulty(ruler, protocol, "outside", d, places, counts, shift, split)
-    told, out = answer["diagnosis"], answer["held_out"]
-    p = told["probabilities"]
-    ranked = tuple(sorted(p, key=lambda k: -p[k]))
-    named = told["effect"]
-    sizes = told["parameters"] if named else {}
+    said, out = answer["diagnosis"], answer["held_out"]
+    p, named = said["probabilities"], said["effect"]
+    sizes = said["parameters"] if named else {}
     equal = {id: h.equivalent for id, h in hard.items()}
     error = lambda key: held_out_error(truth["held_out"], out[key] or out["plain_Hz"])
     found = Scored(
@@ -143,12 +147,12 @@ def one(
         truth["kind"],
         effects,
         hard,
-        told["verdict"],
+        said["verdict"],
         named,
-        bool((told.get("robust") or {}).get("robust")),
-        ranked,
-        p[ranked[0]],
-        frozenset(id for key in told["candidate_set"] for id in key.split("+")),
+        bool((said.get("robust") or {}).get("robust")),
+        (),
+        0.0,
+        frozenset(),
         False,
         tuple(
             sizes[id]["low"] <= value <= sizes[id]["high"]
@@ -159,19 +163,33 @@ def one(
         error("with_effect_Hz"),
         truth["again"],
     )
-    in_set = any(found.says(key) for key in told["candidate_set"])
+    more = further(protocol.counts)
     found = replace(
-        found,
-        in_set=in_set,
+        weighed(found, p),
         foretold=foretold(truth, out, protocol.held_out_kPa),
-        there=sum(p[key] for key in p if set(ranked[0].split("+")) <= set(key.split("+"))),
+        told=weighed(found, told(p, answer.get("further", Assumed.further), more)),
     )
-    if truth["swapped"] or told["exchanged_labels"]:
+    if truth["swapped"] or said["exchanged_labels"]:
         return found
     there = held_out(truth, ruler, protocol, labels)
-    with_effects = {id: each["value"] for id, each in told["parameters"].items()}
+    with_effects = {id: each["value"] for id, each in said["parameters"].items()}
     without, with_ = (held_out_rms(ruler, y, places, there, e) for e in ({}, with_effects))
     return replace(found, usual=(without, with_))
+
+
+def weighed(trial: Scored, p: Mapping[str, float]) -> Scored:
+    """The trial with what was said by key of how probable it is."""
+    ranked = tuple(sorted(p, key=lambda key: -p[key]))
+    totals = np.cumsum([p[key] for key in ranked])
+    candidates = ranked[: int(np.searchsorted(totals, SET)) + 1]
+    return replace(
+        trial,
+        ranked=ranked,
+        stated=p[ranked[0]],
+        there=present(p, ranked[0].split("+")),
+        candidates=frozenset(id for key in candidates for id in key.split("+")),
+        in_set=any(trial.says(key) for key in candidates),
+    )
 
 
 def foretold(
@@ -233,11 +251,12 @@ def figures(trials: Sequence[Scored], least: int, quantile: float = 0.95) -> dic
             f"{words}: called outside": shown(t.verdict == "outside" for t in here),
         }
     robust = [t for t in named if t.robust]
-    calibrated = lambda stated, right: _calibration(
-        *(np.array([getattr(t, key) for t in trials], float) for key in (stated, right)),
+    calibrated = lambda of, stated, right: _calibration(
+        *(np.array([getattr(t, key) for t in of], float) for key in (stated, right)),
         least,
         quantile,
     )
+    told_so = [t.told or t for t in trials]
     proven = [t for t in strong if t.verdict == "named"]
     first = {t.id: t for t in trials}
     again = [(t, first[t.again]) for t in trials if t.again in first]
@@ -253,11 +272,13 @@ def figures(trials: Sequence[Scored], least: int, quantile: float = 0.95) -> dic
                 ("named", ("named",)),
             )
         },
-        f"calibration error ({100 * quantile:g} % quantile)": calibrated("stated", "right"),
+        f"calibration error ({100 * quantile:g} % quantile)": calibrated(trials, "stated", "right"),
+        "the same, told how many effects tyres have": calibrated(told_so, "stated", "right"),
         "the same of what is named likeliest, whatever else is there": calibrated(
-            "there", "in_part"
+            trials, "there", "in_part"
         ),
         "90 % set holds the truth": shown(t.in_set for t in trials),
+        "90 % set holds the truth, told so": shown(t.in_set for t in told_so),
         "90 % interval holds the size": shown(held for t in trials for held in t.held),
         "90 % intervals hold frequencies held out": _mean_share(
             [t.foretold for t in trials if t.foretold and t.kind != "outside"], least

@@ -69,7 +69,8 @@ def answer(
 ) -> str:
     """Answer every trial that has no answer yet; returns the sha256 of all answers.
 
-    further: see `Assumed`, where the maker says how many effects tyres have. Raises InputError where the truth lies among the trials.
+    further: see `Assumed`; for rules that tell how many effects tyres have. Raises InputError
+    where the truth lies among the trials.
     """
     refuse_open_truth(folder)
     protocol = read_protocol(folder)

@@ -1,0 +1,37 @@
+"""Kinds of trials, and what their numbers tell of how many effects a tyre has."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import sqrt
+
+from tyrecal.studies.diagnose.evidence import NONE, OUTSIDE
+from tyrecal.studies.diagnose.several import MOST_EFFECTS
+
+EFFECTS_OF = {"none": 0, "one": 1, "two": 2, "three": 3, "outside": 0}
+EFFECTS_OF |= {"one_strong": 1, "two_strong": 2, "three_strong": 3}
+
+
+def further(counts: Mapping[str, int]) -> float:
+    """Tyres with two effects over those with one, and with three over those with two, of which the
+    mean number of effects is that of ``counts`` (`Protocol.counts`): what the rules tell whoever
+    answers, f in (1 + 2 f + 3 f^2) / (1 + f + f^2) = mean."""
+    numbers = {**EFFECTS_OF, "again": 1}
+    have = {kind: count for kind, count in counts.items() if numbers[kind]}
+    mean = sum(numbers[kind] * count for kind, count in have.items()) / sum(have.values())
+    a, b, c = 3 - mean, 2 - mean, 1 - mean
+    return (-b + sqrt(b * b - 4 * a * c)) / (2 * a)
+
+
+def told(p: Mapping[str, float], before: float, after: float) -> dict[str, float]:
+    """Probabilities by key as they were answered with one prior of a further effect, by another:
+    what has more effects is as much likelier as it was before the data."""
+    total = lambda f: sum(f**k for k in range(MOST_EFFECTS))
+    times = {
+        key: 1.0
+        if key in (NONE, OUTSIDE)
+        else (after / before) ** key.count("+") * total(before) / total(after)
+        for key in p
+    }
+    whole = sum(p[key] * times[key] for key in p)
+    return {key: p[key] * times[key] / whole for key in p}
