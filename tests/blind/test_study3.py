@@ -26,9 +26,8 @@ from tyrecal.studies.blind.answer import answer, case_of, rows_of, tyre_model
 from tyrecal.studies.blind.make import labels_of
 from tyrecal.studies.blind.maker import Computed
 from tyrecal.studies.blind.protocol import read_json, read_protocol
-from tyrecal.studies.blind.ruler import Difficulty, read_ruler
+from tyrecal.studies.blind.ruler import read_ruler
 from tyrecal.studies.blind.seal import SEAL, TRUTH
-from tyrecal.studies.diagnose.several import priors
 from tyrecal.tyre.case import LoadedCase, with_level
 from tyrecal.tyre.effects import catalogue
 from tyrecal.tyre.load import load_case
@@ -43,9 +42,8 @@ from .study3 import make as making
 from .study3.__main__ import result
 from .study3.cases import GROUPS, LABELS, RECORDED, SIZES, Group, written
 from .study3.draw import foreseen, known_laws, one_drawn
-from .study3.kinds import EFFECTS_OF, further, told
+from .study3.kinds import EFFECTS_OF, further
 from .study3.maker import Fenics, computed, modes
-from .study3.score import Scored, figures, foretold, misses
 from .study3.section import Section, columns, mould, off, section
 from .study3.tyre import Mesh, Tyre, on_springs, problem, tyre_of
 
@@ -211,25 +209,6 @@ def test_what_the_rules_tell_of_further_effects_is_the_counts_mean_number() -> N
     assert further({"one": 5, "none": 2}) == 0.0
 
 
-def test_answers_are_weighed_again_as_if_they_had_been_told_of_further_effects() -> None:
-    """By Bayes' rule about the priors that the diagnosis has of so many effects."""
-    ids, likelihood = ["a", "b", "c"], {"none": 1.0, "outside": 2.0, "a": 5.0, "a+b": 40.0}
-    likelihood |= {"a+b+c": 90.0}
-
-    def posterior(f: float) -> dict[str, float]:
-        prior = {key: priors(len(ids), f)[key.count("+") + 1] for key in likelihood}
-        prior |= {"none": 0.25, "outside": 0.10}
-        whole = sum(likelihood[key] * prior[key] for key in prior)
-        return {key: likelihood[key] * prior[key] / whole for key in prior}
-
-    assert told(posterior(0.05), 0.05, 0.6) == pytest.approx(posterior(0.6))
-    again = replace(answered("a+b", "a", stated=1.0), told=answered("a+b", "a+b", stated=1.0))
-    said = figures([again] * 60, 60)
-    assert said["calibration error (95 % quantile)"].startswith("1.000 ")
-    assert said["the same, told how many effects tyres have"].startswith("0.000 ")
-    assert said["90 % set holds the truth, told so"].startswith("60 of 60")
-
-
 def test_strong_effects_are_those_of_which_the_ruler_foresees_enough(chance: Chance) -> None:
     """Of the recorded ruler: each strong one's lambda is 25 or more, each of a pair's 15; of any
     size some are below. A size of none moves nothing. False failures: 1e-7."""
@@ -253,101 +232,6 @@ def test_strong_effects_are_those_of_which_the_ruler_foresees_enough(chance: Cha
     assert min(lam["two_strong"] + lam["three_strong"]) >= 15
     chance.often(np.array(lam["one"]) < 25, 0.3, 0.95)  # it is about 0.65
     assert foreseen(ruler, rules, trials[0].truth, "bead_filler", 0.0) == 0.0
-
-
-def answered(effects: str, top: str, lam: float = 30.0, **more: Any) -> Scored:
-    """A trial by hand; "a" cannot be told from "like_a"."""
-    ids = tuple(effects.split("+")) if effects else ()
-    hard = {id: Difficulty(lam, lam, (id, f"like_{id}"), 1.0) for id in ids}
-    kind = {0: "none", 1: "effect"}.get(len(ids), "several")
-    named = None if top in ("none", "outside") else top
-    verdict = {"none": "no_gap", "outside": "outside"}.get(top, "named")
-    rest = (named, True, (top,), 0.9, frozenset(top.split("+")), True, (), 1.0, 0.5, "")
-    return replace(Scored("", kind, ids, hard, verdict, *rest), **more)
-
-
-def test_one_of_several_effects_is_named_for_its_group_and_for_one_truth_only() -> None:
-    assert answered("a+b", "like_b+a").right and answered("a", "like_a").right
-    assert answered("", "none").right and not answered("a+b", "a").right
-    assert answered("a+b", "a").found(["a"]) == 1 and answered("a+b", "c").found(["c"]) == 0
-    assert answered("a+b", "a+like_a").found(["a", "like_a"]) == 1
-    assert not answered("a", "a+b").right
-
-
-def test_a_rate_counts_its_own_trials_and_few_are_not_shown() -> None:
-    pairs = [answered("a+b", "a+b")] * 45 + [answered("a+b", "c")] * 15
-    weak = [answered("a+b", "none", lam=3.0)] * 100
-    said = figures(pairs + weak, 60)
-    name = "two effects, each lambda from 15: all in the 90 % set"
-    assert said[name] == "45 of 60, 75 % (62 to 85)"
-    assert said["named: right, or in part of several"].startswith("45 of 60")
-    assert figures(pairs[1:], 60)[name] == "not shown (59)"
-
-
-def test_shrinkage_is_of_what_was_named_and_strong_and_exchanged_labels_count_for_nothing() -> None:
-    """0.8 by least squares, 0.5 by the diagnosis' own fit; sound tyres by chance to 0.25."""
-    named = [answered("a", "a", usual=(1.0, 0.2))] * 60
-    weak, undecided = answered("a", "a", lam=9.0), answered("a", "a", verdict="undecided")
-    sound = [answered("", "none", usual=(1.0, 0.75), after=0.9)] * 5
-    said = figures([*named, answered("a", "a"), weak, undecided, *sound], 60)
-    start, end = "held out by ", ", named, lambda from 25: median shrinkage"
-    assert said[f"{start}least squares{end}"] == "0.80 (chance 0.25)"
-    assert said[f"{start}the diagnosis{end}"] == "0.50 (chance 0.10)"
-    few = figures([*named[1:], answered("a", "a"), *sound], 60)
-    assert few[f"{start}least squares{end}"] == "not shown (59)"
-
-
-def test_what_is_named_likeliest_may_be_there_with_others() -> None:
-    """Right in part by all that it names, sure by all explanations that have it."""
-    part = answered("a+b", "a", stated=0.5, there=0.9)
-    assert part.in_part and not part.right
-    assert not answered("a", "a+b").in_part and not answered("a", "none").in_part
-    assert answered("", "none").in_part and not answered("", "a").in_part
-    said = figures([part] * 60, 60)
-    assert said["calibration error (95 % quantile)"].startswith("0.500 ")
-    name = "the same of what is named likeliest, whatever else is there"
-    assert said[name].startswith("0.100 ")
-
-
-def test_what_is_named_besides_and_is_not_there_counts() -> None:
-    trials = [answered("a", "a+b")] * 20 + [answered("a+b", "a")] * 20 + [answered("a", "c")] * 20
-    said = figures(trials, 60)
-    assert said["named: right, or in part of several"].startswith("40 of 60")
-    assert said["named: all of it is there"].startswith("20 of 60")
-
-
-def test_outside_counts_by_what_it_moved() -> None:
-    seen = replace(
-        answered("", "outside"),
-        kind="outside",
-        hard={"outside": Difficulty(30.0, 30.0, ("outside",), None)},
-    )
-    weak = replace(seen, hard={"outside": Difficulty(3.0, 3.0, ("outside",), None)})
-    said = figures([seen] * 60 + [replace(weak, verdict="no_gap")] * 60, 60)
-    assert said["outside: said so, or undecided"].startswith("60 of 120")
-    assert said["outside, lambda from 25: said so, or undecided"].startswith("60 of 60")
-
-
-def test_misses_are_what_was_named_wrongly_and_what_should_have_been_found() -> None:
-    right = [answered("a", "a"), answered("a+b", "a+b"), answered("", "none")]
-    weak = answered("a", "none", lam=9.0)
-    wrong = [answered("a", "c"), answered("a+b", "a"), answered("a", "none"), answered("", "a")]
-    words = misses({Group("205/60R15", True): [*right, weak, *wrong]}).splitlines()[2:]
-    assert [line.split(" | ")[2] for line in words] == ["a", "a+b", "a", "none"]
-    assert [line.split(" | ")[5] for line in words] == ["c", "a", "", "a"]
-
-
-def test_what_was_foretold_is_the_tyre_s_own_frequency() -> None:
-    """At the pressure held out, the mean of a pair, without noise; old answers foretell nothing."""
-    at = lambda p, f: {"pressure_kPa": p, "ln_f": {"[1,0]": np.log(f), "[2,0]": np.log(f) + 1}}
-    truth = {"swapped": False, "with_effect": [at(160.0, [9.0, 9.0]), at(200.0, [9.9, 10.1])]}
-    told = {"[1,0]": [9.5, 9.0, 10.1], "[2,0]": [10.0, 9.9, 10.1]}
-    assert foretold(truth, {"expected_Hz": told}, 200.0) == (True, False)
-    assert foretold(truth, {}, 200.0) == foretold({"swapped": True}, {}, 200.0) == ()
-    said = lambda flags: figures([answered("a", "a", foretold=flags)] * 60, 60)
-    name = "90 % intervals hold frequencies held out"
-    assert said((True, False))[name] == "50 % of 60 trials' (50 to 50)"
-    assert said(())[name] == "not shown (0)"
 
 
 def on_the_same_stations(case: LoadedCase) -> dict[str, Any]:

@@ -2,11 +2,13 @@
 
     python -m tests.studies.answered_again DIR blind_study_2 exact --jobs 2
     python -m tests.studies.answered_again DIR blind_study_2 drawing --jobs 2
+    python -m tests.studies.answered_again DIR blind_study_2 exact --every 5    # of five trials one
     python -m tests.studies.answered_again DIR blind_study_2           # the table
 
 Those tyres' sections are the case's own (`exact`); the second line answers as if they had been
 taken from a drawing, the default, so that what this costs is seen. Effects are the ones that the
-study's answers weighed. DIR keeps what was answered; the same command goes on from there.
+study's answers weighed. DIR keeps what was answered; the same command goes on from there. Each
+column is of the trials that both origins answered, the recorded one, too.
 """
 
 from __future__ import annotations
@@ -25,7 +27,8 @@ from tyrecal.simulate.evaluate.store import Store
 from tyrecal.studies.blind.answer import answer, case_of, rows_of, tyre_model
 from tyrecal.studies.blind.emulated import emulate
 from tyrecal.studies.blind.protocol import read_protocol
-from tyrecal.studies.blind.score import score
+from tyrecal.studies.blind.score import Scored, rescored, score
+from tyrecal.studies.blind.seal import ANSWERS, check_answers
 from tyrecal.studies.blind.tables import summary
 from tyrecal.studies.diagnose.evidence import NONE, OUTSIDE
 
@@ -52,8 +55,8 @@ def weighed(answers: Path) -> list[str]:
     return sorted(keys - {NONE, OUTSIDE})
 
 
-def answered(study: Path, folder: Path, origin: str, jobs: int) -> str:
-    """Answer what has no answer yet; the hash of all."""
+def answered(study: Path, folder: Path, origin: str, jobs: int, every: int) -> str:
+    """Answer what has no answer yet, of ``every`` so many trials by name one; the hash of all."""
     trials = folder / study.name / origin / "trials"
     marked = trials / "weighed.json"
     if not marked.exists():
@@ -62,6 +65,9 @@ def answered(study: Path, folder: Path, origin: str, jobs: int) -> str:
         marked.write_text(json.dumps(weighed(trials / "answers")))
         for path in (trials / "answers").glob("*.json"):
             path.unlink()
+        for place, path in enumerate(sorted((trials / "trials").glob("*.csv"))):
+            if place % every:
+                path.unlink()
         case = trials / "case" / read_protocol(trials).case
         text = case.read_text()
         assert STATED[0] in text
@@ -71,6 +77,21 @@ def answered(study: Path, folder: Path, origin: str, jobs: int) -> str:
     model = tyre_model(case, evaluator, protocol, jobs, json.loads(marked.read_text()))
     told = lambda done, all: print(f"{done} of {all}", file=sys.stderr, flush=True)
     return answer(trials, emulate(model), rows_of(case, protocol), jobs, told)
+
+
+def compared(study: Path, folder: Path) -> dict[str, list[Scored]]:
+    """The answers on record and those of each origin, of the trials that all of these have."""
+    recorded = folder / "recorded" / "trials"
+    if not recorded.exists():
+        unpacked(study, recorded)
+    sealed = recorded.with_name("trials-truth")
+    found = {"recorded": score(recorded, sealed)}
+    for origin in ORIGINS:
+        trials = folder / origin / "trials"
+        if (trials / ANSWERS).exists():
+            found[origin] = rescored(recorded, sealed, check_answers(trials))
+    common = set.intersection(*({t.id for t in those} for those in found.values()))
+    return {name: [t for t in those if t.id in common] for name, those in found.items()}
 
 
 def figures(of: dict[str, Any]) -> Iterator[tuple[str, str]]:
@@ -98,18 +119,15 @@ def _share(rate: dict[str, Any]) -> str:
 @click.argument("study", type=click.Choice([study.name for study in STUDIES]))
 @click.argument("origin", type=click.Choice(ORIGINS), required=False)
 @click.option("--jobs", default=1)
-def main(folder: Path, study: str, origin: str | None, jobs: int) -> None:
+@click.option("--every", default=1)
+def main(folder: Path, study: str, origin: str | None, jobs: int, every: int) -> None:
     """Answer, or tell the figures of what is answered beside those on record."""
     own = next(each for each in STUDIES if each.name == study)
     if origin:
-        print(answered(own, folder, origin, jobs))
+        print(answered(own, folder, origin, jobs, every))
         return
-    columns = {"recorded": dict(figures(json.loads((own / "score.json").read_text())))}
-    for origin in ORIGINS:
-        trials = folder / study / origin / "trials"
-        if (trials / "answers.json").exists():
-            found = score(trials, trials.with_name("trials-truth"))
-            columns[origin] = dict(figures(summary(found)))
+    found = compared(own, folder / study)
+    columns = {name: dict(figures(summary(trials))) for name, trials in found.items()}
     print(f"| {study} | {' | '.join(columns)} |\n{'|---' * (1 + len(columns))}|")
     for row in columns["recorded"]:
         print(f"| {row} | {' | '.join(each[row] for each in columns.values())} |")
