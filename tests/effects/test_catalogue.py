@@ -15,6 +15,7 @@ from tyrecal.simulate.deck.decks import Decks
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.simulate.evaluate.failure import DeckRefused, EvaluationFailed
+from tyrecal.studies.diagnose.study import spans_of
 from tyrecal.studies.fit.calibrate import calibrate
 from tyrecal.tyre.case import CaseError
 from tyrecal.tyre.effects import IDS, Effect, catalogue
@@ -38,6 +39,18 @@ def test_entry_is_complete(effect: Effect) -> None:
     assert effect.low < effect.high and effect.low <= 0 <= effect.high
     assert all((effect.title, effect.symbol, effect.changes, effect.signature, effect.toggle))
     assert set(effect.aliases) <= set(IDS)
+
+
+@each
+def test_a_range_is_a_passenger_tyre_s_and_a_run_warms_a_truck_s_by_no_more(effect: Effect) -> None:
+    """From two thirds to four thirds of the pressure, whatever that is."""
+    assert effect.range_on(CASE) == (effect.low, effect.high)
+    truck = replace(CASE, file_data={**CASE.file_data, "pressure_kPa": 720.0})
+    times = 1 / 3 if effect.id == "temperature_drift" else 1.0
+    assert effect.range_on(truck) == pytest.approx((times * effect.low, times * effect.high))
+    spans, _ = spans_of(truck, Evaluator(TyreDesign(truck)), [effect.id])
+    span = spans.get(effect.id)  # road contact and the like, where a solver has them
+    assert span is None or (span.low, span.high) == pytest.approx(effect.range_on(truck))
 
 
 def test_a_case_without_effects_is_the_very_case() -> None:

@@ -27,7 +27,9 @@ def main(case_file: str, fit_file: str) -> None:
     run = Plain(case, Evaluator(TyreDesign(case)), values, PRESSURES_KPA)
     one = Plain(case, Evaluator(TyreDesign(case)), values, (case.case.pressure_kPa,))
     known = run.evaluator.solver.capabilities
-    sizes = {id: stated_size(id) for id, effect in catalogue().items() if effect.within(known)}
+    sizes = {
+        id: stated_size(id, case) for id, effect in catalogue().items() if effect.within(known)
+    }
     several = [run.signature(id, size) for id, size in sizes.items()]
     single = [one.signature(id, size) for id, size in sizes.items()]
     small = [[p.signature(id, 0.1 * size) for id, size in sizes.items()] for p in (run, one)]

@@ -206,7 +206,7 @@ def run(
     ``Evaluator.evaluate`` does for the plain tyre.
     """
     plain = Plain(case, evaluator, values, pressures_kPa)
-    sizes = {each.id: stated_size(each.id) if size is None else size for each in entries}
+    sizes = {each.id: stated_size(each.id, case) if size is None else size for each in entries}
     rows, failed, signatures = [], [], []
     for entry, signature in zip(entries, plain.signatures(sizes, jobs), strict=True):
         if isinstance(signature, EvaluationFailed):

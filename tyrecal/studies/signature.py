@@ -151,10 +151,10 @@ class Plain:
         return float(value + step * self.steps[place])
 
 
-def stated_size(id: str) -> float:
-    """The end of an effect's range that is further from 0."""
-    effect = catalogue()[id]
-    return max(effect.high, effect.low, key=abs)
+def stated_size(id: str, case: LoadedCase) -> float:
+    """The end of an effect's range on this tyre that is further from 0."""
+    low, high = catalogue()[id].range_on(case)
+    return max(high, low, key=abs)
 
 
 def rms(percent: Array) -> float:

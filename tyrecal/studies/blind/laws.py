@@ -31,10 +31,10 @@ class EffectLaw:
         return float(random.choice(ends) * random.uniform(smallest, 1.0))
 
 
-def catalogue_laws(capabilities: frozenset[str]) -> dict[str, EffectLaw]:
+def catalogue_laws(case: LoadedCase, capabilities: frozenset[str]) -> dict[str, EffectLaw]:
     """The catalogue's own, of effects that a solver with these capabilities can express."""
     return {
-        id: EffectLaw(e.low, e.high, e.add)
+        id: EffectLaw(*e.range_on(case), e.add)
         for id, e in catalogue().items()
         if e.within(capabilities)
     }

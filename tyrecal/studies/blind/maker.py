@@ -69,6 +69,8 @@ class SolverMaker:
 
 def bundled_maker(case: LoadedCase, store: Store | None = None) -> SolverMaker:
     """The diagnosis' own model, mesh and laws."""
-    laws = catalogue_laws(frozenset(Evaluator(TyreDesign(case), "bundled").solver.capabilities))
+    laws = catalogue_laws(
+        case, frozenset(Evaluator(TyreDesign(case), "bundled").solver.capabilities)
+    )
     about = "bundled solver, the diagnosis' own mesh and the catalogue's laws: an inverse crime"
     return SolverMaker(about, "bundled", laws, OUTSIDE_FAMILIES, store)

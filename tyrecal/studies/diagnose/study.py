@@ -196,9 +196,10 @@ def spans_of(
             unable[id] = why
         else:
             base, words = case.case.effects.get(id, 0.0), (effect.unit, effect.title, effect.toggle)
+            low, high = effect.range_on(case)
             able[id] = Span(
-                effect.low - base,
-                effect.high - base,
+                low - base,
+                high - base,
                 *words,
                 base,
                 law=effect.law,

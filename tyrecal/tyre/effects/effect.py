@@ -11,6 +11,8 @@ from ...errors import InputError
 if TYPE_CHECKING:
     from ..case import LoadedCase
 
+PASSENGER_kPa = 240.0  # of the tyres that the catalogue's ranges are of
+
 
 @dataclass(frozen=True)
 class Effect:
@@ -28,6 +30,7 @@ class Effect:
     add_to_deck: `add` for a case of a user's deck, None = it changes lines or regions of a section;
     part: of ``deck.parts``, which such a case must name for it, "" = none;
     law: by how much of its shift of a mode a real one's may be off, as a standard deviation;
+    per_kPa: whether its parameter is of a run of pressures, per kPa: see `range_on`;
     beside: `add` with one standard deviation more of what else its nature leaves open, as a
     filler's height, or None: a diagnosis integrates over it.
     """
@@ -49,6 +52,13 @@ class Effect:
     part: str = ""
     law: float = 0.04
     beside: Callable[[LoadedCase, float], LoadedCase] | None = None
+    per_kPa: bool = False
+
+    def range_on(self, case: LoadedCase) -> tuple[float, float]:
+        """low, high on a tyre: of a run about its own pressure, the same from end to end."""
+        pressure = case.file_data["pressure_kPa"] if self.per_kPa else 0.0
+        times = PASSENGER_kPa / pressure if pressure else 1.0
+        return times * self.low, times * self.high
 
     def of(self, case: LoadedCase) -> Callable[[LoadedCase, float], LoadedCase]:
         """Its `add` for a case. Raises ValueError where the case has nothing that it changes."""

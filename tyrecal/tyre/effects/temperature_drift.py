@@ -23,9 +23,10 @@ EFFECT = Effect(
     title="Temperature drift over the run of pressures",
     symbol="dT'",
     unit="K per 100 kPa",
-    # a few degrees of warming in a run from 160 to 320 kPa
+    # a few degrees of warming in a run from 160 to 320 kPa, and in a truck's from 480 to 960
     low=-5.0,
     high=5.0,
+    per_kPa=True,
     changes=("*HYPERELASTIC",),
     signature=(
         "nothing at the case's own pressure, below it all up, above it all down by the "
