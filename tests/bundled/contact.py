@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from tyrecal_solvers.bundled.road.contact import FlatRoad, flat_road
@@ -15,10 +15,15 @@ from tyrecal_solvers.bundled.section.parts.pressure import Pressure
 from tyrecal_solvers.bundled.solid3d.circumference import HalfCircle, half_circle
 from tyrecal_solvers.bundled.solid3d.revolved import Revolved
 
+from tyrecal.tyre.case import LoadedCase
+from tyrecal.tyre.load import load_case
+
+from ..conftest import CASES
 from . import support
 from .support import Rubber
 
 Array = np.ndarray
+ANGLES = [4.0, 4.0, 4.0, 5.0, 8.0, 15.0, 40.0, 100.0]  # degrees, half the tyre
 
 
 @dataclass(frozen=True)
@@ -121,3 +126,25 @@ def graded(first: float, ratio: float, total: float, largest: float = np.inf) ->
     excess = sum(lengths) - total
     shares = np.array(lengths) - first  # the first ones keep theirs
     return np.array(lengths) - excess * shares / shares.sum()
+
+
+def coarse_case(**road: object) -> LoadedCase:
+    """The main case on a coarse mesh and few elements round the tyre."""
+    loaded = load_case(CASES / "p235_75r17.yaml")
+    case = loaded.case
+    level = case.mesh.levels["default"].model_copy(
+        update={
+            "elements": {"crown": 3, "upper_sidewall": 2, "lower_sidewall": 2, "bead": 1},
+            "rows": [1, 1, 1, 1],
+            "grading": None,
+        }
+    )
+    return replace(
+        loaded,
+        case=case.model_copy(
+            update={
+                "mesh": case.mesh.model_copy(update={"levels": {"default": level}}),
+                "road": case.road.model_copy(update={"element_angles_deg": ANGLES, **road}),
+            }
+        ),
+    )

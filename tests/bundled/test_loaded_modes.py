@@ -1,4 +1,4 @@
-"""Modes of the pressed tyre: against harmonics and dense algebra, the hold, what decks may ask."""
+"""Modes of the pressed tyre: against its harmonics, the hold, what decks may ask."""
 
 from __future__ import annotations
 
@@ -10,12 +10,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.linalg import eigh
 from scipy.sparse import csr_matrix
 from tyrecal_solvers.bundled import job
 from tyrecal_solvers.bundled.deck.keywords import DeckError
 from tyrecal_solvers.bundled.modes.harmonics import HarmonicModes, Vibration
-from tyrecal_solvers.bundled.road import davidson, footprint_job, stick
+from tyrecal_solvers.bundled.road import footprint_job, stick
 from tyrecal_solvers.bundled.road import loaded_modes as loaded_modes_module
 from tyrecal_solvers.bundled.road.contact_newton import ContactNewton, PressedState
 from tyrecal_solvers.bundled.road.loaded_modes import (
@@ -35,8 +34,7 @@ from tyrecal.simulate.deck.tyre_design import TyreDesign
 
 from ..chance import generator
 from . import support
-from .contact import Round, ring
-from .test_contact_newton import coarse_case
+from .contact import Round, coarse_case, ring
 
 pytestmark = pytest.mark.numbers
 
@@ -347,87 +345,6 @@ def test_an_unstable_state_fails_by_its_name(tyre: Round, pressed: State) -> Non
     pushed = -10 * pressed.hold
     with pytest.raises(RunFailed, match="not stable"):
         modes(tyre, pressed.U, pushed, pressed.around, 4)
-
-
-def block(matrix: Array) -> davidson.Operator:
-    return lambda x: x @ matrix
-
-
-def matrices(random: np.random.Generator) -> tuple[Array, Array]:
-    A, B = random.normal(size=(2, 120, 120))
-    return A @ A.T / 100 + np.diag(np.arange(1.0, 121.0)), B @ B.T / 1000 + np.eye(120)
-
-
-def lowest(
-    K: Array, M: Array, inverse: Array, fields: Array, count: int
-) -> tuple[Array, Array, davidson.Basis]:
-    start = davidson.basis_of(fields, block(K), block(M))
-    return davidson.lowest(block(K), block(M), block(inverse), start, count)
-
-
-def test_davidson_against_dense_algebra(random: np.random.Generator) -> None:
-    """An inverse that is off by a tenth, a start of noise, a basis that is cut down on the way."""
-    K, M = matrices(random)
-    rough = np.linalg.inv(K + 0.1 * np.diag(np.diag(K)))
-    values, x, basis = lowest(K, M, rough, random.normal(size=(6, 120)), 5)
-    np.testing.assert_allclose(values, eigh(K, M, eigvals_only=True)[:5], rtol=1e-8)
-    np.testing.assert_allclose(x @ M @ x.T, np.eye(5), atol=1e-8)
-    np.testing.assert_allclose(basis.images, basis.vectors @ K, atol=1e-9 * np.linalg.norm(K))
-
-
-def test_davidson_goes_on_from_the_basis_of_a_matrix_near_by(random: np.random.Generator) -> None:
-    """Springs at four places, another lowest mode by it: the same as from dense algebra, with fewer
-    products than from the start."""
-    K, M = matrices(random)
-    rough = np.linalg.inv(K + 0.1 * np.diag(np.diag(K)))
-    fields = random.normal(size=(6, 120))
-    basis = lowest(K, M, rough, fields, 5)[2]
-    springs = np.diag(np.where(np.arange(120) < 4, [3.0] * 120, 0.0))
-    exact = eigh(K + springs, M, eigvals_only=True)[:5]
-
-    def products(start: davidson.Basis) -> int:
-        taken: list[int] = []
-
-        def product(x: Array) -> Array:
-            taken.append(len(x))
-            return x @ (K + springs)
-
-        values, x, _ = davidson.lowest(product, block(M), block(rough), start, 5)
-        np.testing.assert_allclose(values, exact, rtol=1e-8)
-        np.testing.assert_allclose(x @ M @ x.T, np.eye(5), atol=1e-8)
-        return sum(taken)
-
-    near = davidson.Basis(basis.vectors, basis.images + basis.vectors @ springs)
-    anew = davidson.basis_of(fields, block(K + springs), block(M))
-    assert products(near) < products(anew)
-
-
-def test_davidson_fails_by_name(
-    random: np.random.Generator, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    K, M = matrices(random)
-    fields = random.normal(size=(4, 120))
-    with pytest.raises(RunFailed, match="not positive"):
-        lowest(K - 50 * np.eye(120), M, np.eye(120), fields, 3)
-    with pytest.raises(RunFailed, match="1 directions to start from for 3 modes"):
-        lowest(K, M, np.eye(120), np.repeat(fields[:1], 4, 0), 3)
-    monkeypatch.setattr(davidson, "MAX_BLOCKS", 2)
-    with pytest.raises(RunFailed, match="did not converge"):
-        lowest(K, M, np.eye(120), fields, 3)
-
-
-def test_only_new_directions_are_taken_into_a_basis(random: np.random.Generator) -> None:
-    """Of six fields, two in the basis, one of the others' sum and one a thousandfold: two are new,
-    M-orthonormal to the basis and to each other; none of those in the basis alone."""
-    _, M = matrices(random)
-    V = davidson._orthonormal(random.normal(size=(3, 120)), np.empty((0, 120)), block(M))
-    a, b = random.normal(size=(2, 120))
-    fields = np.array([V[0], V[1] - 2 * V[2], a, b, a + b + V[0], 1e3 * b])
-    new = davidson._orthonormal(fields, V, block(M))
-    basis = np.concatenate([V, new])
-    np.testing.assert_allclose(basis @ M @ basis.T, np.eye(5), atol=1e-9)
-    assert np.linalg.matrix_rank(np.concatenate([basis, [a], [b]]), 1e-6) == 5
-    assert not len(davidson._orthonormal(fields[:2], V, block(M)))
 
 
 LOADS = (1000.0,)
