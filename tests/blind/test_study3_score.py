@@ -12,8 +12,8 @@ from tyrecal.studies.blind.ruler import Difficulty
 from tyrecal.studies.diagnose.several import priors
 
 from .study3.cases import Group
-from .study3.kinds import told
-from .study3.score import Scored, figures, foretold, misses
+from .study3.kinds import weighed_again
+from .study3.score import Scored, figures, foretold, misses, table
 
 
 def answered(effects: str, top: str, lam: float = 30.0, **more: Any) -> Scored:
@@ -122,9 +122,19 @@ def test_answers_are_weighed_again_as_if_they_had_been_told_of_further_effects()
         whole = sum(likelihood[key] * prior[key] for key in prior)
         return {key: likelihood[key] * prior[key] / whole for key in prior}
 
-    assert told(posterior(0.05), 0.05, 0.6) == pytest.approx(posterior(0.6))
-    again = replace(answered("a+b", "a", stated=1.0), told=answered("a+b", "a+b", stated=1.0))
+    assert weighed_again(posterior(0.05), 0.05, 0.6) == pytest.approx(posterior(0.6))
+    again = replace(answered("a+b", "a", stated=1.0), if_told=answered("a+b", "a+b", stated=1.0))
     said = figures([again] * 60, 60)
     assert said["calibration error (95 % quantile)"].startswith("1.000 ")
     assert said["the same, told how many effects tyres have"].startswith("0.000 ")
     assert said["90 % set holds the truth, told so"].startswith("60 of 60")
+
+
+def test_few_trials_are_shown_where_that_is_asked_for() -> None:
+    """Robust verdicts and sizes too; a scatter needs two."""
+    trials = [answered("a", "a", foretold=(True,))]
+    few, all = (table({Group("205/60R15", True): trials}, least) for least in (None, 1))
+    row = "named and called robust: likewise"
+    assert f"| {row} | not shown (1)" in few
+    assert f"| {row} | 1 of 1, 100 % (3 to 100)" in all
+    assert all.count("| 90 % intervals hold frequencies held out | not shown (1)") == 2

@@ -5,6 +5,7 @@
     python -m tests.blind.study3 answer DIR 205_60r15_own --jobs 2
     python -m tests.blind.study3 unpack DIR                  # all that is on record, truth beside
     python -m tests.blind.study3 score DIR > table.md        # of all answered, but LEARNED_FROM
+    python -m tests.blind.study3 score DIR 11r22_5_own --least 1   # of one, few trials shown too
     python -m tests.blind.study3 power DIR > table.md        # what could be found, by its rulers
     python -m tests.blind.study3 mesh 205/60R15              # the maker's own mesh error
 
@@ -58,6 +59,7 @@ def main() -> None:
     parser.add_argument("group", nargs="?")
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--seed", type=int)
+    parser.add_argument("--least", type=int)
     for kind, count in COUNTS.items():
         parser.add_argument(f"--{kind}", type=int, default=count)
     o = parser.parse_args()
@@ -73,7 +75,7 @@ def main() -> None:
         for group in (each for each in RECORDED.iterdir() if each.is_dir()):
             unpacked(group, Path(o.folder) / group.name, sealed_in(o.folder) / group.name)
     elif o.what == "score":
-        print(result(Path(o.folder)))
+        print(result(Path(o.folder), o.group, o.least))
     else:
         folder, sealed = Path(o.folder) / o.group, sealed_in(o.folder) / o.group
         if o.what == "make":
@@ -82,8 +84,8 @@ def main() -> None:
         else:
             case, protocol = case_of(folder), read_protocol(folder)
             model = tyre_model(case, Evaluator(TyreDesign(case)), protocol, o.jobs)
-            told_of = further(protocol.counts)
-            print(answer(folder, model, rows_of(case, protocol), o.jobs, told, told_of))
+            more = further(protocol.counts)
+            print(answer(folder, model, rows_of(case, protocol), o.jobs, told, more))
 
 
 def sealed_in(folder: str) -> Path:
@@ -91,9 +93,11 @@ def sealed_in(folder: str) -> Path:
     return Path(folder).with_name(f"{Path(folder).name}-truth")
 
 
-def result(folder: Path) -> str:
-    """Tables of all series whose groups are answered, but for the one that was learned from."""
-    counted = [g for g in GROUPS if g.name != LEARNED_FROM and (folder / g.name / ANSWERS).exists()]
+def result(folder: Path, group: str | None = None, least: int | None = None) -> str:
+    """Tables of all series whose groups are answered, but for the one that was learned from, or of
+    one group; least: see `table`."""
+    wanted = [g for g in GROUPS if (g.name == group if group else g.name != LEARNED_FROM)]
+    counted = [g for g in wanted if (folder / g.name / ANSWERS).exists()]
     parts = ["# Blind study 3, as it was answered", ""]
     for series in sorted({g.series for g in counted}):
         found = {
@@ -102,7 +106,15 @@ def result(folder: Path) -> str:
             if g.series == series
         }
         names = ", ".join(g.name for g in found)
-        parts += [f"## Series {series}", "", f"{names}.", "", table(found), misses(found), ""]
+        parts += [
+            f"## Series {series}",
+            "",
+            f"{names}.",
+            "",
+            table(found, least),
+            misses(found),
+            "",
+        ]
     return "\n".join(parts).rstrip()
 
 

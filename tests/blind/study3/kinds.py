@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from math import sqrt
 
 from tyrecal.studies.diagnose.evidence import NONE, OUTSIDE
-from tyrecal.studies.diagnose.several import MOST_EFFECTS
+from tyrecal.studies.diagnose.several import MOST_EFFECTS, priors
 
 EFFECTS_OF = {"none": 0, "one": 1, "two": 2, "three": 3, "outside": 0}
 EFFECTS_OF |= {"one_strong": 1, "two_strong": 2, "three_strong": 3}
@@ -23,15 +23,11 @@ def further(counts: Mapping[str, int]) -> float:
     return (-b + sqrt(b * b - 4 * a * c)) / (2 * a)
 
 
-def told(p: Mapping[str, float], before: float, after: float) -> dict[str, float]:
+def weighed_again(p: Mapping[str, float], before: float, after: float) -> dict[str, float]:
     """Probabilities by key as they were answered with one prior of a further effect, by another:
-    what has more effects is as much likelier as it was before the data."""
-    total = lambda f: sum(f**k for k in range(MOST_EFFECTS))
-    times = {
-        key: 1.0
-        if key in (NONE, OUTSIDE)
-        else (after / before) ** key.count("+") * total(before) / total(after)
-        for key in p
-    }
-    whole = sum(p[key] * times[key] for key in p)
-    return {key: p[key] * times[key] / whole for key in p}
+    Bayes' rule about `several.priors`, of which the number of effects in the catalogue cancels."""
+    old, new = (priors(MOST_EFFECTS, further) for further in (before, after))
+    times = {k: new.get(k, 0.0) / old[k] for k in old}
+    sets = {key: 1.0 if key in (NONE, OUTSIDE) else times[key.count("+") + 1] for key in p}
+    whole = sum(p[key] * sets[key] for key in p)
+    return {key: p[key] * sets[key] / whole for key in p}

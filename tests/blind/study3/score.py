@@ -30,7 +30,7 @@ from tyrecal.studies.diagnose.verdict import SET
 
 from ...studies.blind_least_squares import held_out, held_out_rms
 from .cases import Group
-from .kinds import further, told
+from .kinds import further, weighed_again
 
 LEAST, LEAST_A_SIZE, LEAST_ROBUST = 60, 40, 100  # trials of a rate that is shown
 ONE, EACH = 25.0, 15.0  # lambda from which one effect, and each of a pair, should be found
@@ -45,8 +45,8 @@ class Scored:
     groups; held: whether each named and true effect's interval holds what it is worth in the
     catalogue's law; before, after: rms error held out, in ln f; usual: the same of least squares,
     without and with what is likeliest, None where labels are exchanged; foretold: whether each
-    frequency held out lies in its interval, where the answer has any; told: the same, its answer
-    weighed again as if the rules had told it how many effects tyres have."""
+    frequency held out lies in its interval, where the answer has any; if_told: the same, its
+    answer weighed again as if the rules had told it how many effects tyres have."""
 
     id: str
     kind: str  # none, effect, several or outside
@@ -66,7 +66,7 @@ class Scored:
     usual: tuple[float, float] | None = None
     foretold: tuple[bool, ...] = ()
     there: float = 1.0
-    told: Scored | None = None
+    if_told: Scored | None = None
 
     def found(self, ids: Sequence[str]) -> int:
         """How many true effects are among ids, by their groups, an id for one effect."""
@@ -163,11 +163,11 @@ def one(
         error("with_effect_Hz"),
         truth["again"],
     )
-    more = further(protocol.counts)
+    again = weighed_again(p, answer.get("further", Assumed.further), further(protocol.counts))
     found = replace(
         weighed(found, p),
         foretold=foretold(truth, out, protocol.held_out_kPa),
-        told=weighed(found, told(p, answer.get("further", Assumed.further), more)),
+        if_told=weighed(found, again),
     )
     if truth["swapped"] or said["exchanged_labels"]:
         return found
@@ -206,8 +206,9 @@ def foretold(
     )
 
 
-def table(groups: Mapping[Group, Sequence[Scored]]) -> str:
-    """All figures as Markdown, by whose section it was, then by size."""
+def table(groups: Mapping[Group, Sequence[Scored]], least: int | None = None) -> str:
+    """All figures as Markdown, by whose section it was, then by size; least: trials of a rate that
+    is shown, `LEAST` and the like by default."""
     parts: dict[str, list[Scored]] = {"own section": [], "foreign section": [], "both": []}
     sizes: dict[str, list[Scored]] = {}
     for group, trials in groups.items():
@@ -215,15 +216,18 @@ def table(groups: Mapping[Group, Sequence[Scored]]) -> str:
         parts["both"] += trials
         sizes.setdefault(group.size, []).extend(trials)
     lines = []
-    for columns, least, quantile in ((parts, LEAST, 0.95), (sizes, LEAST_A_SIZE, 0.99)):
-        rows = [figures(trials, least, quantile) for trials in columns.values()]
+    for columns, own, quantile in ((parts, LEAST, 0.95), (sizes, LEAST_A_SIZE, 0.99)):
+        enough = (own, quantile, LEAST_ROBUST) if least is None else (least, quantile, least)
+        rows = [figures(trials, *enough) for trials in columns.values()]
         lines += [f"| what | {' | '.join(columns)} |", "|---" * (1 + len(columns)) + "|"]
         lines += [f"| {name} | {' | '.join(row[name] for row in rows)} |" for name in rows[0]]
         lines.append("")
     return "\n".join(lines)
 
 
-def figures(trials: Sequence[Scored], least: int, quantile: float = 0.95) -> dict[str, str]:
+def figures(
+    trials: Sequence[Scored], least: int, quantile: float = 0.95, least_robust: int = LEAST_ROBUST
+) -> dict[str, str]:
     """By what the issue asks, in words; quantile: of a calibrated answerer's calibration error."""
     shown = lambda flags, low=least: _shown(list(flags), low)
     of = lambda kind: [t for t in trials if t.kind == kind]
@@ -256,14 +260,14 @@ def figures(trials: Sequence[Scored], least: int, quantile: float = 0.95) -> dic
         least,
         quantile,
     )
-    told_so = [t.told or t for t in trials]
+    if_told = [t.if_told or t for t in trials]
     proven = [t for t in strong if t.verdict == "named"]
     first = {t.id: t for t in trials}
     again = [(t, first[t.again]) for t in trials if t.again in first]
     return rows | {
         "named: right, or in part of several": shown(some(t) for t in named),
         "named: all of it is there": shown(every(t) for t in named),
-        "named and called robust: likewise": shown((some(t) for t in robust), LEAST_ROBUST),
+        "named and called robust: likewise": shown((some(t) for t in robust), least_robust),
         **{
             f"outside{words}: {said}": shown(t.verdict in verdicts for t in those)
             for words, those in (("", outside), (f", lambda from {ONE:g}", seen))
@@ -273,12 +277,12 @@ def figures(trials: Sequence[Scored], least: int, quantile: float = 0.95) -> dic
             )
         },
         f"calibration error ({100 * quantile:g} % quantile)": calibrated(trials, "stated", "right"),
-        "the same, told how many effects tyres have": calibrated(told_so, "stated", "right"),
+        "the same, told how many effects tyres have": calibrated(if_told, "stated", "right"),
         "the same of what is named likeliest, whatever else is there": calibrated(
             trials, "there", "in_part"
         ),
         "90 % set holds the truth": shown(t.in_set for t in trials),
-        "90 % set holds the truth, told so": shown(t.in_set for t in told_so),
+        "90 % set holds the truth, told so": shown(t.in_set for t in if_told),
         "90 % interval holds the size": shown(held for t in trials for held in t.held),
         "90 % intervals hold frequencies held out": _mean_share(
             [t.foretold for t in trials if t.foretold and t.kind != "outside"], least
@@ -330,7 +334,7 @@ def _calibration(stated: np.ndarray, right: np.ndarray, least: int, quantile: fl
 
 def _mean_share(flags: Sequence[Sequence[bool]], least: int) -> str:
     """Of all flags; its 95 % bounds by the scatter from trial to trial, whose flags go together."""
-    if len(flags) < least:
+    if len(flags) < max(least, 2):
         return _few(len(flags))
     each = np.array([np.mean(own) for own in flags])
     share, off = 100 * each.mean(), 196 * each.std(ddof=1) / np.sqrt(len(each))

@@ -76,21 +76,21 @@ def score(folder: Path, sealed: Path) -> list[Scored]:
 
 def rescored(folder: Path, sealed: Path, answers: Sequence[Path]) -> list[Scored]:
     """Other answers, to some of the trials of a folder whose own are sealed. Raises InputError."""
-    content, told = open_truth(folder, sealed), {path.stem: path for path in answers}
+    content, answered = open_truth(folder, sealed), {path.stem: path for path in answers}
     protocol = read_protocol(folder)
     labels = labels_of(case_of(folder))
     ruler = read_ruler(folder, labels)
     return [
         scored(
             truth,
-            read_json(told[truth["id"]]),
+            read_json(answered[truth["id"]]),
             read_measurements(folder / "trials" / f"{truth['id']}.csv"),
             ruler,
             protocol,
             labels,
         )
         for truth in content["trials"]
-        if truth["id"] in told
+        if truth["id"] in answered
     ]
 
 

@@ -30,7 +30,7 @@ class Effect:
     add_to_deck: `add` for a case of a user's deck, None = it changes lines or regions of a section;
     part: of ``deck.parts``, which such a case must name for it, "" = none;
     law: by how much of its shift of a mode a real one's may be off, as a standard deviation;
-    per_kPa: whether its parameter is of a run of pressures, per kPa: see `range_on`;
+    per_kPa: whether its parameter is a change over the pressure: see `range_on`;
     beside: `add` with one standard deviation more of what else its nature leaves open, as a
     filler's height, or None: a diagnosis integrates over it.
     """
@@ -55,7 +55,8 @@ class Effect:
     per_kPa: bool = False
 
     def range_on(self, case: LoadedCase) -> tuple[float, float]:
-        """low, high on a tyre: of a run about its own pressure, the same from end to end."""
+        """low, high on this tyre. What goes with the pressure is the same from two thirds to four
+        thirds of the tyre's own as on a passenger tyre, so less per kPa where that is higher."""
         pressure = case.file_data["pressure_kPa"] if self.per_kPa else 0.0
         times = PASSENGER_kPa / pressure if pressure else 1.0
         return times * self.low, times * self.high
