@@ -97,6 +97,27 @@ def test_signature_in_files(
     assert (out / "effect_rim_width.png").stat().st_size > 10_000
 
 
+def test_words_and_signature_have_the_range_on_that_tyre(
+    coarse: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """At 400 kPa a run warms by as much as at 240: by less per 100 kPa."""
+    path = Path(coarse)
+    text = path.read_text().replace("\npressure_kPa: 240", "\npressure_kPa: 400")
+    path.write_text(text)
+    arguments = [
+        "effects",
+        "temperature_drift",
+        "--case",
+        coarse,
+        "--output",
+        str(tmp_path / "out"),
+    ]
+    assert run(*arguments, "--pressures-kPa", "300,400", "--no-pictures") == 0
+    assert "-3 to 3 K per 100 kPa" in capsys.readouterr().out
+    (entry,) = json.loads((tmp_path / "out" / "effects.json").read_text())
+    assert (entry["low"], entry["high"], entry["value"]) == pytest.approx((-3.0, 3.0, 3.0))
+
+
 def test_signatures_are_the_same_bytes_from_worker_processes(coarse: str, tmp_path: Path) -> None:
     arguments = ["effects", "rim_width", "--case", coarse, "--no-pictures", "--quiet"]
     for jobs in ("1", "2"):

@@ -77,8 +77,8 @@ def command(
             raise click.UsageError(f"{option} needs a --case")
     solvers = installed()
     chosen = [name] if name else IDS
-    entries = [CatalogueEntry.of(catalogue()[id], solvers) for id in chosen]
     if not case:
+        entries = [CatalogueEntry.of(catalogue()[id], solvers) for id in chosen]
         terminal.result([each.model_dump(exclude_unset=True) for each in entries])
         if name and not terminal.as_json:
             terminal.say(effect_text(entries[0]))
@@ -100,6 +100,7 @@ def command(
     if fitted:
         values = arguments.fitted_values(fitted, loaded, terminal)
     output = study.run(loaded, "effects", evaluator, pressure_kPa=kPa)
+    entries = [CatalogueEntry.of(catalogue()[id], solvers, loaded) for id in chosen]
     if name and not terminal.as_json:
         terminal.say(effect_text(entries[0]) + "\n")
     able = [each for each in entries if name or adapter.name in each.solvers]

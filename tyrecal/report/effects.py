@@ -33,8 +33,8 @@ def effect_text(entry: CatalogueEntry) -> str:
     unit = f" {entry.unit}" if entry.unit else ""
     size = max(entry.high, entry.low, key=abs)
     rows = {
-        "parameter": f"{entry.symbol}, {entry.low:g} to {entry.high:g}{unit}; 0: absent",
-        "case file": f"effects: {{{entry.id}: {size:g}}}",
+        "parameter": f"{entry.symbol}, {entry.low:.4g} to {entry.high:.4g}{unit}; 0: absent",
+        "case file": f"effects: {{{entry.id}: {size:.4g}}}",
         "in the deck": ", ".join(entry.changes),
         "modes": entry.signature,
         "proof": entry.toggle,

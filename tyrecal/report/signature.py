@@ -36,7 +36,7 @@ def draw_signature(found: Signature) -> Figure:
         axes.set_title(f"{found.pressures_kPa[k]:g} kPa", loc="left", fontsize=9, color="0.3")
     figure.supylabel("change of frequency, %", fontsize=9)
     panels[-1].set_xticks(places, [label.said.replace(" ", "\n") for label in found.labels])
-    size = f"{effect.symbol} = {found.value:g} {effect.unit}".strip()
+    size = f"{effect.symbol} = {found.value:.4g} {effect.unit}".strip()
     absorbed = f": calibration absorbs {100 * found.absorbed:.1f} %" if found.absorbed else ""
     headline(figure, f"{effect.title}, {size}{absorbed}")
     handles, labels = panels[0].get_legend_handles_labels()

@@ -85,15 +85,19 @@ class CatalogueEntry(ResultPart):
     solvers: list[str]  # those installed that can express it
 
     @classmethod
-    def of(cls, effect: Effect, solvers: Sequence[Mapping[str, Any]]) -> CatalogueEntry:
-        """``solvers``: those installed, as `solver.installed` says."""
+    def of(
+        cls, effect: Effect, solvers: Sequence[Mapping[str, Any]], case: LoadedCase | None = None
+    ) -> CatalogueEntry:
+        """``solvers``: those installed, as `solver.installed` says; case: of whose tyre the range
+        is, a passenger tyre's by default."""
+        low, high = effect.range_on(case) if case else (effect.low, effect.high)
         return cls(
             id=effect.id,
             title=effect.title,
             symbol=effect.symbol,
             unit=effect.unit,
-            low=effect.low,
-            high=effect.high,
+            low=low,
+            high=high,
             about=about(effect),
             changes=list(effect.changes),
             signature=effect.signature,
@@ -144,7 +148,7 @@ class Effects(Result):
         if not self.rows:
             return []
         percent, absorbed = Column("before %"), Column("absorbed %", ".1f", 100.0)
-        size, mass = Column("size", "g"), Column("kg", "+.2f")
+        size, mass = Column("size", ".4g"), Column("kg", "+.2f")
         rows = [
             [
                 each.id,
