@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from tyrecal.simulate.evaluate.failure import EvaluationFailed
+from tyrecal.simulate.modes.label import Label
 from tyrecal.studies.diagnose.diagnosis import Diagnosis, diagnose
 from tyrecal.studies.diagnose.evidence import refit
 from tyrecal.studies.diagnose.expansion import expand
@@ -95,6 +96,30 @@ def test_labels_that_are_exchanged_are_found_beside_a_strong_effect() -> None:
     wrong = with_exchanged(p.observations, a, b)
     d = diagnose(toy, toy.rows, wrong, assumed=ASSUMED)
     assert d.exchanged == (a, b) and d.verdict.key == "e0"
+
+
+class Springs(Toy):
+    """Two effects that lower one mode each past the next lower one, as soft clamps do."""
+
+    def __init__(self) -> None:
+        super().__init__(effects=4, size=0.01)
+        for id, label in (("e0", Label(2, 1)), ("e1", Label(3, 1))):
+            self.g[id] = np.tile([-0.25 * (each == label) for each in LABELS], 3)
+
+
+@pytest.mark.parametrize("exchange", [False, True])
+def test_two_strong_effects_are_told_from_an_exchange_of_labels(exchange: bool) -> None:
+    """Beside no single effect the file fits as it is; exchanged labels take off some of that."""
+    toy = Springs()
+    (answer,) = toy.answers([Query(X, {"e0": 0.9, "e1": 0.8})])
+    assert isinstance(answer, Answer)
+    given = problem(toy, answer.eta, assumed=ASSUMED).observations
+    a, b = Label(0, 0, "axial"), Label(0, 0, "torsional")
+    if exchange:
+        given = with_exchanged(given, a, b)
+    d = diagnose(toy, toy.rows, given, assumed=ASSUMED)
+    assert d.exchanged == ((a, b) if exchange else None)
+    assert d.verdict.key == "e0+e1"
 
 
 def test_what_an_exchange_of_labels_does_stands_beside_the_constants() -> None:

@@ -44,10 +44,11 @@ def exchanged(problem: InverseProblem) -> tuple[Label, Label] | None:
             found.append((a, b))
     if not found:
         return None
-    best, most = None, _all(weigh(problem, pairs=False)) + float(np.log(1 - SWAP_PROBABILITY))
+    # with sets of effects: two strong ones, beside which no single one fits, look like an exchange
+    best, most = None, _all(weigh(problem)) + float(np.log(1 - SWAP_PROBABILITY))
     for a, b in found:
         other = replace(problem, observations=with_exchanged(problem.observations, a, b))
-        ln = _all(weigh(other, pairs=False)) + float(np.log(SWAP_PROBABILITY / len(readings)))
+        ln = _all(weigh(other)) + float(np.log(SWAP_PROBABILITY / len(readings)))
         if ln > most:
             best, most = (a, b), ln
     return best
