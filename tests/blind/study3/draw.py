@@ -45,11 +45,11 @@ class Drawn:
     again: str = ""
 
 
-def known_laws(group: Group) -> tuple[dict[str, OwnLaw], dict[str, OwnLaw]]:
+def known_laws(case: LoadedCase, group: Group) -> tuple[dict[str, OwnLaw], dict[str, OwnLaw]]:
     """Effects, and families outside, that this tyre can have."""
     truck = "22.5" in group.size
     outside = {k: law for k, law in OUTSIDE.items() if not (truck and k == "shrunk_cords")}
-    return laws(), outside  # of a truck no cord is textile
+    return laws(case), outside  # of a truck no cord is textile
 
 
 def drawn(
@@ -87,7 +87,7 @@ def one_drawn(
     each. Raises InputError where it never does."""
     rules, known_sources = replace(protocol, counts={"none": 1}), sources(with_exact_section(case))
     (truth,) = draw(rules, case, known_sources[0], {}, {}, int(random.integers(2**63)))
-    effects, outside = known_laws(group)
+    effects, outside = known_laws(case, group)
     known = outside if kind == "outside" else effects
     number = 1 if kind == "outside" else EFFECTS_OF[kind]
     names, clamped = sorted(known), len(set(CLAMP) & set(known))
@@ -161,7 +161,7 @@ def made(each: Drawn, case: LoadedCase, group: Group, without: tuple[str, ...] =
     built = rim_width(built, SEAT_m * mounting.normal())
     shift = built.shift_Pa + 1e3 * GAUGE_kPa * mounting.normal()
     built = replace(built, shift_Pa=shift, kelvin=ROOM_K * mounting.normal())
-    effects, outside = known_laws(group)
+    effects, outside = known_laws(case, group)
     for id, size in each.effects.items():
         if id not in without:
             built = {**effects, **outside}[id].add(built, size)

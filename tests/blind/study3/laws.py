@@ -13,6 +13,7 @@ from math import pi
 
 import numpy as np
 
+from tyrecal.tyre.case import LoadedCase
 from tyrecal.tyre.effects import catalogue
 
 from .tyre import Tyre, tempered
@@ -171,11 +172,11 @@ def sealant(tyre: Tyre, e: float) -> Tyre:
     return replace(tyre, lining=e)
 
 
-def laws() -> dict[str, OwnLaw]:
-    """By the catalogue's ids, with its ranges."""
+def laws(case: LoadedCase) -> dict[str, OwnLaw]:
+    """By the catalogue's ids, with its ranges on this tyre."""
     known = catalogue()
     return {
-        add.__name__: OwnLaw(known[add.__name__].low, known[add.__name__].high, add)
+        add.__name__: OwnLaw(*known[add.__name__].range_on(case), add)
         for add in (
             dynamic_stiffening,
             bead_filler,

@@ -30,7 +30,7 @@ class Effect:
     add_to_deck: `add` for a case of a user's deck, None = it changes lines or regions of a section;
     part: of ``deck.parts``, which such a case must name for it, "" = none;
     law: by how much of its shift of a mode a real one's may be off, as a standard deviation;
-    per_kPa: whether its parameter is a change over the pressure: see `range_on`;
+    pressure_power: of the tyre's own pressure, with which its range goes: see `range_on`;
     beside: `add` with one standard deviation more of what else its nature leaves open, as a
     filler's height, or None: a diagnosis integrates over it.
     """
@@ -52,13 +52,15 @@ class Effect:
     part: str = ""
     law: float = 0.04
     beside: Callable[[LoadedCase, float], LoadedCase] | None = None
-    per_kPa: bool = False
+    pressure_power: int = 0
 
     def range_on(self, case: LoadedCase) -> tuple[float, float]:
-        """low, high on this tyre. What goes with the pressure is the same from two thirds to four
-        thirds of the tyre's own as on a passenger tyre, so less per kPa where that is higher."""
-        pressure = case.file_data["pressure_kPa"] if self.per_kPa else 0.0
-        times = PASSENGER_kPa / pressure if pressure else 1.0
+        """low, high on this tyre: with its pressure to the power of `pressure_power` over that of a
+        passenger tyre, whose stiffness goes with it. So a compliance of the clamp (-1) takes the
+        same share of a mode's frequency, a gauge (1) is off by the same share, and a run from two
+        thirds to four thirds of the pressure warms the tyre as much (K per 100 kPa, -1)."""
+        pressure = case.file_data["pressure_kPa"] or PASSENGER_kPa
+        times = (pressure / PASSENGER_kPa) ** self.pressure_power
         return times * self.low, times * self.high
 
     def of(self, case: LoadedCase) -> Callable[[LoadedCase, float], LoadedCase]:

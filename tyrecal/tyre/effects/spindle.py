@@ -22,6 +22,7 @@ def _spindle(key: str, along: str, **entry: Any) -> Effect:
     return Effect(
         title=f"{direction.capitalize()} compliance of the spindle",
         low=0.0,
+        pressure_power=-1,
         changes=("*SPRING", "*MASS", "*ROTARY INERTIA", "*BOUNDARY"),
         add=add,
         add_to_deck=add,

@@ -26,7 +26,7 @@ EFFECT = Effect(
     # a few degrees of warming in a run from 160 to 320 kPa, and in a truck's from 480 to 960
     low=-5.0,
     high=5.0,
-    per_kPa=True,
+    pressure_power=-1,
     changes=("*HYPERELASTIC",),
     signature=(
         "nothing at the case's own pressure, below it all up, above it all down by the "
