@@ -7,8 +7,9 @@
 
 Those tyres' sections are the case's own (`exact`); the second line answers as if they had been
 taken from a drawing, the default, so that what this costs is seen. Effects are the ones that the
-study's answers weighed. DIR keeps what was answered; the same command goes on from there. Each
-column is of the trials that both origins answered, the recorded one, too.
+study's answers weighed; that tyres have one at most is told, as the rules tell it. DIR keeps what
+was answered; the same command goes on from there. Each column is of the trials that both origins
+answered, the recorded one, too.
 """
 
 from __future__ import annotations
@@ -32,6 +33,7 @@ from tyrecal.studies.blind.seal import ANSWERS, check_answers
 from tyrecal.studies.blind.tables import summary
 from tyrecal.studies.diagnose.evidence import NONE, OUTSIDE
 
+from ..blind.study3.kinds import further
 from .blind_least_squares import STUDIES, unpacked
 
 ORIGINS = "exact", "drawing"
@@ -76,7 +78,8 @@ def answered(study: Path, folder: Path, origin: str, jobs: int, every: int) -> s
     evaluator = Evaluator(TyreDesign(case), store=Store((folder / "record").resolve()))
     model = tyre_model(case, evaluator, protocol, jobs, json.loads(marked.read_text()))
     told = lambda done, all: print(f"{done} of {all}", file=sys.stderr, flush=True)
-    return answer(trials, emulate(model), rows_of(case, protocol), jobs, told)
+    more = further(protocol.counts)
+    return answer(trials, emulate(model), rows_of(case, protocol), jobs, told, more)
 
 
 def compared(study: Path, folder: Path) -> dict[str, list[Scored]]:

@@ -15,8 +15,9 @@ EFFECTS_OF |= {"one_strong": 1, "two_strong": 2, "three_strong": 3}
 def further(counts: Mapping[str, int]) -> float:
     """Tyres with two effects over those with one, and with three over those with two, of which the
     mean number of effects is that of ``counts`` (`Protocol.counts`): what the rules tell whoever
-    answers, f in (1 + 2 f + 3 f^2) / (1 + f + f^2) = mean."""
-    numbers = {**EFFECTS_OF, "again": 1}
+    answers, f in (1 + 2 f + 3 f^2) / (1 + f + f^2) = mean. 0 in the studies before, whose tyres
+    have one effect at most."""
+    numbers = {**EFFECTS_OF, "again": 1, "effect": 1}
     have = {kind: count for kind, count in counts.items() if numbers[kind]}
     mean = sum(numbers[kind] * count for kind, count in have.items()) / sum(have.values())
     a, b, c = 3 - mean, 2 - mean, 1 - mean
