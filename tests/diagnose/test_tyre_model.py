@@ -16,7 +16,7 @@ from tyrecal.errors import InputError
 from tyrecal.measured.tables import read_measurements
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator
-from tyrecal.simulate.evaluate.failure import DeckRefused
+from tyrecal.simulate.evaluate.failure import DeckRefused, EvaluationFailed, SolverUnavailable
 from tyrecal.simulate.modes.label import Label
 from tyrecal.studies.diagnose.add import add
 from tyrecal.studies.diagnose.diagnosis import diagnose
@@ -481,6 +481,20 @@ def test_a_model_without_an_answer_says_why_before_anything_is_judged() -> None:
     # what is as in the case, or a factor, is no other tyre
     check([answer], replace(switched, value=0.02), replace(switched, times=True))
     assert asked_for == [[{}], *[[{}, {"point_mass": pytest.approx(0.03)}]] * 2, [{}]]
+
+
+def test_a_denied_licence_ends_the_study_and_is_no_answer_about_an_effect(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """An effect that had no licence would be left out as if there were no such tyre."""
+    own = TyreModel(CASE, Evaluator(TyreDesign(CASE)), ROWS, [], {})
+    failures = [EvaluationFailed("no_equilibrium", "of 1 N 1 is left")]
+    monkeypatch.setattr(own._fit, "modes_of", lambda wanted: failures * len(wanted))
+    asked = [Query(X, {"point_mass": 0.05})]
+    assert own.answers(asked) == failures
+    failures[:] = [EvaluationFailed("licence", "all tokens are in use")]
+    with pytest.raises(SolverUnavailable, match="all tokens are in use"):
+        own.answers(asked)
 
 
 def test_an_effect_without_slopes_takes_the_plain_tyres() -> None:

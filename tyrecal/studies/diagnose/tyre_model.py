@@ -12,7 +12,7 @@ import numpy as np
 
 from ...simulate.deck.decks import Decks
 from ...simulate.evaluate.evaluator import Evaluator
-from ...simulate.evaluate.failure import DeckRefused, EvaluationFailed
+from ...simulate.evaluate.failure import DeckRefused, EvaluationFailed, SolverUnavailable
 from ...simulate.modes.find import Found, ModesAnswer
 from ...simulate.modes.label import Label
 from ...tyre.case import LoadedCase, start_values
@@ -126,7 +126,8 @@ class TyreModel:
     def answers(self, points: Sequence[Query]) -> list[Answer | Exception]:
         """Each point in every state, all in one batch, ``jobs`` evaluations at a time.
 
-        A plain point that the solver refuses raises DeckRefused. With an effect that it gives no
+        A plain point that the solver refuses raises DeckRefused, a licence that is denied
+        SolverUnavailable: what was answered is in the record. With an effect that it gives no
         slopes with, the plain tyre's at the same x stand for them. Slopes by sources that are
         effects: one step of each, one way.
         """
@@ -280,6 +281,9 @@ class TyreModel:
         # the longest first, so that the last ones end together
         order = sorted(range(len(wanted)), key=lambda i: -self._effort(wanted[i][0]))
         found = self._fit.modes_of([wanted[i] for i in order])
+        for each in found:
+            if isinstance(each, EvaluationFailed) and each.cause == "licence":
+                raise SolverUnavailable(str(each))  # it says nothing about the tyre
         return [found[place] for place in np.argsort(order)]
 
     def _effort(self, design: Mapping[str, float]) -> int:
