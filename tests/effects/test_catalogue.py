@@ -47,9 +47,8 @@ def test_a_range_is_a_passenger_tyre_s_and_of_some_goes_with_the_pressure(effect
     third of it, is measured by a gauge off by as large a share, and warms by no more in its run."""
     assert effect.range_on(CASE) == (effect.low, effect.high)
     truck = replace(CASE, file_data={**CASE.file_data, "pressure_kPa": 720.0})
-    clamp = effect.id.startswith("spindle")
-    times = 1 / 3 if clamp or effect.id == "temperature_drift" else 1.0
-    times = 3.0 if effect.id == "pressure_offset" else times
+    third = effect.id.startswith("spindle") or effect.id == "temperature_drift"
+    times = 1 / 3 if third else 3.0 if effect.id == "pressure_offset" else 1.0
     assert effect.range_on(truck) == pytest.approx((times * effect.low, times * effect.high))
     spans, _ = spans_of(truck, Evaluator(TyreDesign(truck)), [effect.id])
     span = spans.get(effect.id)  # road contact and the like, where a solver has them

@@ -185,7 +185,8 @@ def main(tyres: int, seed: int) -> None:
         told[WAYS[3]] = judged(whole, partly, id)
         certain = [observed(observables, own.y, own.truth), readings[0].observations]
         for way, o in zip((WAYS[0], WAYS[2]), certain, strict=True):
-            swapped = exchanged(replace(whole, observations=o, places=places(o, rows)))
+            there = replace(whole, observations=o, places=places(o, rows))
+            swapped = exchanged(there, weigh(there))
             o = with_exchanged(o, *swapped) if swapped else o
             told[way] = judged(whole, [Reading(o)], id)
         for key, found in (("right", rows_of), ("right, partly", rows_partly)):

@@ -23,6 +23,11 @@ class EvaluationFailed(TyrecalError):
         super().__init__(words + (f" (run kept in {folder})" if folder else ""))
         self.cause, self.words, self.folder = cause, words, folder
 
+    @property
+    def denied(self) -> bool:
+        """Whether there was no licence, which says nothing about the design."""
+        return self.cause == "licence"
+
     def __reduce__(self) -> tuple[type[EvaluationFailed], tuple[str, str, Path | None]]:
         return type(self), (self.cause, self.words, self.folder)
 

@@ -131,17 +131,20 @@ def diagnose(
     labelled = isinstance(observations, Observations)
     readings = [Reading(observations)] if isinstance(observations, Observations) else observations
     stage(STAGES[0])
-    bares, labels = list[InverseProblem](), None
+    bares, first, labels = list[InverseProblem](), list[list[Hypothesis]](), None
     for reading in readings:
         bare = _calibrated(model, rows, reading.observations, changes, assumed, expansion, known)
-        labels = exchanged(bare) if labelled and len(bare.places) > len(model.start) else None
+        hypotheses = weigh(bare)
+        enough = labelled and len(bare.places) > len(model.start)
+        labels = exchanged(bare, hypotheses) if enough else None
         if labels:
             there = with_exchanged(bare.observations, *labels)
             bare = _calibrated(model, rows, there, changes, assumed, None, known)
+            hypotheses = weigh(bare)
         bares.append(bare)
+        first.append(hypotheses)
         known, expansion = known or bare.expansion, None
     stage(STAGES[1])
-    first = [weigh(bare) for bare in bares]
     share = shares(readings, first)
     kept = np.flatnonzero(share > REFUTED).tolist()
     settled = [_settled(bares[k], model, first[k]) for k in kept]

@@ -7,7 +7,7 @@ the reading is inferred with them: P(reading) times the sum over hypotheses of p
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import combinations
 
@@ -26,10 +26,12 @@ MAX_SWAP_DISTANCE = 0.30  # relative distance of modes that could be taken for o
 MIN_GAIN = 3.0  # in ln of evidence without effects, from which a reading is worth a closer look
 
 
-def exchanged(problem: InverseProblem) -> tuple[Label, Label] | None:
+def exchanged(
+    problem: InverseProblem, hypotheses: Sequence[Hypothesis]
+) -> tuple[Label, Label] | None:
     """The labels that have most probably taken each other's place at all pressures, None if none.
 
-    problem: expanded about a fit of the file as it is.
+    problem: expanded about a fit of the file as it is; hypotheses: of that file, all of them.
     """
     shifts = problem.expansion.range_shifts(problem.places)
     # without effects, and with any of them as scatter: neither sees every exchange
@@ -45,7 +47,7 @@ def exchanged(problem: InverseProblem) -> tuple[Label, Label] | None:
     if not found:
         return None
     # with sets of effects: two strong ones, beside which no single one fits, look like an exchange
-    best, most = None, _all(weigh(problem)) + float(np.log(1 - SWAP_PROBABILITY))
+    best, most = None, _all(hypotheses) + float(np.log(1 - SWAP_PROBABILITY))
     for a, b in found:
         other = replace(problem, observations=with_exchanged(problem.observations, a, b))
         ln = _all(weigh(other)) + float(np.log(SWAP_PROBABILITY / len(readings)))
@@ -84,7 +86,7 @@ def _near(observations: Observations) -> Iterator[tuple[Label, Label]]:
             yield a, b
 
 
-def _all(hypotheses: list[Hypothesis]) -> float:
+def _all(hypotheses: Sequence[Hypothesis]) -> float:
     """ln of the sum of prior times evidence, what lies outside the catalogue left aside: it fits
     anything."""
     known = [h for h in hypotheses if h.key != OUTSIDE]

@@ -282,8 +282,8 @@ class TyreModel:
         order = sorted(range(len(wanted)), key=lambda i: -self._effort(wanted[i][0]))
         found = self._fit.modes_of([wanted[i] for i in order])
         for each in found:
-            if isinstance(each, EvaluationFailed) and each.cause == "licence":
-                raise SolverUnavailable(str(each))  # it says nothing about the tyre
+            if isinstance(each, EvaluationFailed) and each.denied:
+                raise SolverUnavailable(str(each))
         return [found[place] for place in np.argsort(order)]
 
     def _effort(self, design: Mapping[str, float]) -> int:

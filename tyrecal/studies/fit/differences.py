@@ -49,7 +49,7 @@ def differences(
             centre = first
         for i, answer in zip(asked, answers, strict=True):
             if isinstance(answer, EvaluationFailed):
-                if answer.cause == "licence":  # says nothing about the design
+                if answer.denied:
                     raise answer
                 failures[i] = answer
                 continue

@@ -143,7 +143,7 @@ class Problem:
             try:
                 self.points[key] = self._evaluate(values)
             except EvaluationFailed as failure:
-                if failure.cause == "licence":  # says nothing about the design
+                if failure.denied:
                     raise SolverUnavailable(str(failure)) from None
                 self.points[key] = failure
             if self.notify:
