@@ -418,7 +418,8 @@ def _assumptions(study: DiagnosedCase) -> Iterator[str]:
     form += f", correlated {BETWEEN_PRESSURES:g} between pressures"
     if a.form is None and (material := d.problem.expansion.material_laws):
         form += (
-            f", and {100 * material:g} % in every mode by material laws, smooth over the pressure"
+            f", and by material laws, smooth over the pressure, {100 * material:g} % in all modes"
+            " alike, as much in each family and as much in every mode by itself"
         )
     spans = d.problem.spans
     laws = sorted({span.law for span in spans.values()})

@@ -59,7 +59,9 @@ class Group:
         return (0.8e-3, 0.04) if self.own else (1.5e-3, 0.06)
 
 
-GROUPS = [Group(size, own, series) for series in (1, 2) for size in SIZES for own in (True, False)]
+GROUPS = [
+    Group(size, own, series) for series in (1, 2, 3) for size in SIZES for own in (True, False)
+]
 
 
 KNOWN = {"C10": 5, "density": 1.0}  # percent, of one's own compounds

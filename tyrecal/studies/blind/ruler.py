@@ -72,7 +72,8 @@ class Ruler:
     hessian: Array  # (n, v, v)
     constants: Array  # (n, k) change by one standard deviation of each
     signatures: Mapping[str, EffectShifts]
-    material_laws: float = 0.0  # standard deviation of every mode
+    material_laws: float = 0.0  # standard deviation of each part
+    laws_shared: bool = False  # by a family, and by all modes, too
 
     def sigma(
         self, places: Array, counts: Array, protocol: Protocol, constants: bool = True
@@ -80,16 +81,20 @@ class Ruler:
         """Covariance (n, n) of rows that are means of ``counts`` (n,) values; constants False:
         repeatability alone."""
         rows = [self.rows[i] for i in places]
-        weighed = np.array([label is None for label, _ in rows])
+        labels = [label for label, _ in rows]
+        weighed = np.array([label is None for label in labels])
         scatter = np.diag(np.where(weighed, protocol.mass, protocol.noise) ** 2 / counts)
         if not constants:
             return np.asarray(scatter)
-        same = np.array([[a[0] == b[0] for b in rows] for a in rows])
+        same = np.array([[a == b for b in labels] for a in labels])
         alike = np.where(np.eye(len(rows), dtype=bool), 1.0, BETWEEN_PRESSURES) * same
-        form = np.array([form_error(label) for label, _ in rows])
+        form = np.array([form_error(label) for label in labels])
         ln_p = np.log([state_of(where).pressure_kPa or 1.0 for _, where in rows])
         near = np.exp(-(((ln_p[:, None] - ln_p) / LAWS_LENGTH) ** 2) / 2)
-        laws = self.material_laws**2 * near * same * np.outer(~weighed, ~weighed)
+        families = [label.family if label else None for label in labels]
+        kin = np.array([[a is not None and a == b for b in families] for a in families])
+        parts = same + (kin + 1.0 if self.laws_shared else 0.0)
+        laws = self.material_laws**2 * parts * near * np.outer(~weighed, ~weighed)
         g = self.constants[places]
         return np.asarray(scatter + alike * np.outer(form, form) + laws + g @ g.T)
 
@@ -198,6 +203,7 @@ def measure(model: ResponseModel, rows: Sequence[ModelRow]) -> dict[str, Any]:
         "constants": _rounded(first.constants),
         "signatures": signatures,
         "material_laws": model.material_laws,
+        "laws_shared": True,
     }
 
 
@@ -225,7 +231,8 @@ def ruler_of(content: Mapping[str, Any], labels: Sequence[Label]) -> Ruler:
     }
     rows = tuple((known[name], float(p)) for name, p in content["rows"])
     laws = float(content.get("material_laws", 0.0))  # none in rulers of earlier studies
-    return Ruler(rows, signatures=signatures, material_laws=laws, **numbers)
+    shared = bool(content.get("laws_shared"))
+    return Ruler(rows, signatures=signatures, material_laws=laws, laws_shared=shared, **numbers)
 
 
 def _words(label: Label | None) -> str:

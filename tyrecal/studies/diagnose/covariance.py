@@ -3,9 +3,9 @@
     Sigma = Sigma_rep + Sigma_form + sum_k s_k^2 g_k g_k^T
 
 Sigma_rep: repeatability, with the part that all frequencies of a run share; Sigma_form: what our
-own model is uncertain by, mode by mode: mesh and element, alike in all states (0.9), and material
-laws, alike at near pressures, both alike in all runs of the same tyre (0.97); s_k g_k: the
-constants that nobody calibrates, common to all runs.
+own model is uncertain by: mesh and element, mode by mode and alike in all states (0.9), and
+material laws (`laws_alike`), both alike in all runs of the same tyre (0.97); s_k g_k: the constants
+that nobody calibrates, common to all runs.
 """
 
 from __future__ import annotations
@@ -24,24 +24,32 @@ BETWEEN_PRESSURES, BETWEEN_RUNS = 0.9, 0.97
 @lru_cache(16)
 def alike(rows: tuple[Observable, ...]) -> Array:
     """Correlation (n, n) of what belongs to a mode: 1 on the diagonal, 0 between modes."""
-    states = np.array(
-        [[1.0 if a.state == b.state else BETWEEN_PRESSURES for b in rows] for a in rows]
-    )
-    result = states * of_a_mode(rows)
+    result = np.zeros((len(rows), len(rows)))
+    for i, a in enumerate(rows):
+        for j, b in enumerate(rows):
+            if a.label == b.label and a.quantity == b.quantity:
+                result[i, j] = 1.0 if a.state == b.state else BETWEEN_PRESSURES
+    result *= between_runs(rows)
+    result.flags.writeable = False
+    return result
+
+
+@lru_cache(16)
+def between_runs(rows: tuple[Observable, ...]) -> Array:
+    """The same (n, n) of what is alike in all modes and states."""
+    run = np.array([row.run for row in rows])
+    result = np.where(run[:, None] == run, 1.0, BETWEEN_RUNS)
     result.flags.writeable = False  # kept for all who ask
     return np.asarray(result)
 
 
 @lru_cache(16)
-def of_a_mode(rows: tuple[Observable, ...]) -> Array:
-    """The same (n, n) of what is alike in all states."""
-    result = np.zeros((len(rows), len(rows)))
-    for i, a in enumerate(rows):
-        for j, b in enumerate(rows):
-            if a.label == b.label and a.quantity == b.quantity:
-                result[i, j] = BETWEEN_RUNS if a.run != b.run else 1.0
+def by_laws(rows: tuple[Observable, ...]) -> Array:
+    """What material laws do (n, n), by the variance of each part; see `laws_alike`."""
+    pressures = np.array([row.pressure_kPa if row.label else 1.0 for row in rows])
+    result = between_runs(rows) * laws_alike([row.label for row in rows], pressures)
     result.flags.writeable = False
-    return result
+    return np.asarray(result)
 
 
 def repeatability(observations: Observations) -> Array:
@@ -54,16 +62,14 @@ def repeatability(observations: Observations) -> Array:
 
 
 def model_form(rows: tuple[Observable, ...], laws: float, form: float | None = None) -> Array:
-    """Sigma_form (n, n). laws: standard deviation of every mode by material laws; form: one of the
-    model for all modes in place of it and of those on record."""
+    """Sigma_form (n, n). laws: standard deviation of each part of what material laws do; form: one
+    of the model for all modes in place of it and of those on record."""
     modes = np.array([row.label is not None for row in rows], float)  # the mass is a sum
     sizes = modes * [form_error(row.label) if form is None else form for row in rows]
     by_mesh = alike(rows) * np.outer(sizes, sizes)
     if form is not None:
         return by_mesh
-    pressures = np.array([row.pressure_kPa if row.label else 1.0 for row in rows])
-    by_laws = of_a_mode(rows) * laws_alike(pressures) * np.outer(modes, modes)
-    return np.asarray(by_mesh + laws**2 * by_laws)
+    return np.asarray(by_mesh + laws**2 * by_laws(rows))
 
 
 def covariance(

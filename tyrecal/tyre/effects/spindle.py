@@ -5,8 +5,24 @@ from __future__ import annotations
 from typing import Any
 
 from ..case import LoadedCase
-from .edit import on_spindle
+from .edit import changed, on_spindle, with_part
 from .effect import Effect
+
+# of wheel and hub, times what is stated, one standard deviation by judgement: how much of a hub
+# goes along is seldom weighed; it is near the axle
+MASS, INERTIA = 1.2, 1.1
+
+
+def heavier(case: LoadedCase) -> LoadedCase:
+    """The case with more of the hub moving with the wheel."""
+    rim = case.case.rim
+    more = with_part(
+        rim,
+        mass_kg=MASS * rim.mass_kg,
+        polar_inertia_kg_m2=INERTIA * rim.polar_inertia_kg_m2,
+        diametral_inertia_kg_m2=INERTIA * rim.diametral_inertia_kg_m2,
+    )
+    return changed(case, rim=more)
 
 
 def _spindle(key: str, along: str, **entry: Any) -> Effect:
@@ -27,8 +43,8 @@ def _spindle(key: str, along: str, **entry: Any) -> Effect:
         add=add,
         add_to_deck=add,
         needs="spindle",
-        # springs in series; a real clamp's mass moves along by a little
-        law=0.04,
+        law=0.04,  # springs in series; its mass is integrated over
+        beside=lambda case, value: heavier(add(case, value)),
         **entry,
     )
 
