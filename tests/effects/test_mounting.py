@@ -1,4 +1,4 @@
-"""A wider rim against the same tyre whose beads are really pushed apart by the solver."""
+"""How a tyre is mounted: a rim whose beads are really pushed apart, a hub that goes along."""
 
 from __future__ import annotations
 
@@ -8,7 +8,11 @@ from tyrecal_solvers.bundled.section import inflation
 
 from tyrecal.simulate.deck.decks import Decks
 from tyrecal.simulate.deck.tyre_design import TyreDesign
+from tyrecal.simulate.evaluate.evaluator import Evaluator
+from tyrecal.simulate.modes.label import Label
+from tyrecal.studies.diagnose.tyre_model import TyreModel
 from tyrecal.tyre.case import LoadedCase
+from tyrecal.tyre.effects import catalogue
 from tyrecal.tyre.resolve import resolved
 from tyrecal.tyre.values import with_values
 
@@ -16,6 +20,14 @@ from ..bundled import support
 from .support import CASE
 
 Array = np.ndarray
+
+
+RIGID = {
+    "lateral": Label(0, 0, "axial"),
+    "torsional": Label(0, 0, "torsional"),
+    "tilt": Label(1, 1),
+    "radial": Label(1, 0),
+}
 
 
 def frequencies(case: LoadedCase, start: dict[int, tuple[float, float]] | None = None) -> Array:
@@ -43,3 +55,19 @@ def test_bent_section_is_the_mounted_one_but_for_small_stresses(value: float) ->
     mounted, bent = frequencies(CASE, start) / plain - 1, frequencies(wide) / plain - 1
     assert abs(mounted).max() > 0.05
     assert bent == pytest.approx(mounted, abs=2e-3)
+
+
+@pytest.mark.parametrize("way", RIGID)
+def test_more_of_the_hub_goes_along_where_its_clamp_gives_way(way: str) -> None:
+    """That direction's mode falls, by more where the pressure has raised it; no other does."""
+    effect = catalogue()[f"spindle_{way}"]
+    assert effect.beside
+    rows = [(label, kPa) for kPa in (160.0, 320.0) for label in RIGID.values()]
+    stated, heavier = (
+        TyreModel(made, Evaluator(TyreDesign(made)), rows, [], {})
+        for made in (effect.add(CASE, effect.high), effect.beside(CASE, effect.high))
+    )
+    fall = stated.values_at(stated.start) - heavier.values_at(heavier.start)
+    own = np.array([label == RIGID[way] for label, _ in rows])
+    low, high = fall[own]
+    assert 2e-4 < low < high and abs(fall[~own]).max() < 1e-4
