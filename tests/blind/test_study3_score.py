@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from math import exp, log
 from typing import Any
 
 import numpy as np
 import pytest
 
-from tyrecal.studies.blind.ruler import Difficulty
+from tyrecal.simulate.modes.label import Label
+from tyrecal.studies.blind.ruler import Difficulty, Ruler
 from tyrecal.studies.diagnose.several import priors
 
 from .study3.cases import Group
 from .study3.kinds import weighed_again
+from .study3.rises import risen
 from .study3.score import Scored, figures, foretold, misses, table
 
 
@@ -138,3 +141,18 @@ def test_few_trials_are_shown_where_that_is_asked_for() -> None:
     assert f"| {row} | not shown (1)" in few
     assert f"| {row} | 1 of 1, 100 % (3 to 100)" in all
     assert all.count("| 90 % intervals hold frequencies held out | not shown (1)") == 2
+
+
+def test_a_rise_is_the_tyre_s_own_beyond_the_model_s_at_its_numbers() -> None:
+    """ln f = x + 2 g + ln p / 2 in the model; the tyre's first member 1 % higher at 320 kPa."""
+    label, rows = Label(1, 0), [(None, 0.0), (Label(1, 0), 160.0), (Label(1, 0), 320.0)]
+    eta = np.array([0.0, *np.log([160.0, 320.0]) / 2])
+    J, g = np.array([[0.0], [1.0], [1.0]]), np.array([[0.0, 9.0], [2.0, 9.0], [2.0, 9.0]])
+    ruler = Ruler(tuple(rows), np.zeros(1), np.ones(1), eta, J, np.zeros((3, 1, 1)), g, {})
+    values = {p: 0.3 + 2 * 0.5 + log(p) / 2 for p in (160.0, 320.0)}
+    table = [
+        {"pressure_kPa": 320.0, "ln_f": {str(label): [values[320.0] + 0.01, values[320.0] + 0.01]}},
+        {"pressure_kPa": 160.0, "ln_f": {str(label): [values[160.0]] * 2}},
+    ]
+    truth = {"variables": {"A": exp(0.3)}, "constants": {"density": 0.5}, "without": table}
+    assert risen(ruler, ["density"], truth) == {label: pytest.approx(0.01)}

@@ -7,6 +7,7 @@
     python -m tests.blind.study3 score DIR > table.md        # of all answered, but LEARNED_FROM
     python -m tests.blind.study3 score DIR 11r22_5_own --least 1   # of one, few trials shown too
     python -m tests.blind.study3 power DIR > table.md        # what could be found, by its rulers
+    python -m tests.blind.study3 rises DIR > table.md        # how far laws are off over the run
     python -m tests.blind.study3 mesh 205/60R15              # the maker's own mesh error
 
 Trials lie in DIR/GROUP, their truth in DIR-truth/GROUP. `make` and `answer` go on where they were
@@ -43,13 +44,14 @@ from .cases import GROUPS, LABELS, LEARNED_FROM, RECORDED, Group, written
 from .kinds import further
 from .make import FENICS, make
 from .maker import computed
+from .rises import rises, table_of_rises
 from .score import misses, scored, table
 from .section import columns, mould
 from .tyre import tyre_of
 
 COUNTS = {"none": 12, "one": 12, "one_strong": 20, "two": 4, "two_strong": 14, "three": 4}
 COUNTS |= {"three_strong": 0, "outside": 6, "again": 2}
-COMMANDS = "groups", "make", "answer", "unpack", "score", "power", "mesh"
+COMMANDS = "groups", "make", "answer", "unpack", "score", "power", "rises", "mesh"
 
 
 def main() -> None:
@@ -71,6 +73,10 @@ def main() -> None:
         mesh(o.folder)
     elif o.what == "power":
         print(power(Path(o.folder)))
+    elif o.what == "rises":
+        made = [g for g in GROUPS if (Path(o.folder) / g.name / SEAL).exists()]
+        found = {g: rises(Path(o.folder) / g.name, sealed_in(o.folder) / g.name) for g in made}
+        print(table_of_rises(found))
     elif o.what == "unpack":
         for group in (each for each in RECORDED.iterdir() if each.is_dir()):
             unpacked(group, Path(o.folder) / group.name, sealed_in(o.folder) / group.name)
