@@ -377,7 +377,9 @@ def test_predictions_are_the_conditional_of_the_joint_normal_distribution() -> N
     whole = alike * np.outer(np.tile(form, 3), np.tile(form, 3))
     ln_p = np.log([240.0, 200.0, 280.0])
     near = np.exp(-2 * (ln_p[:, None] - ln_p) ** 2)  # length 0.5
-    whole += 0.002**2 * np.kron(near, np.eye(3))
+    in_plane = np.array([label.m == 0 for label in LABELS])
+    shared = 1.0 + (in_plane[:, None] == in_plane)  # by all modes, and by a family
+    whole += 0.002**2 * np.kron(near, shared + np.eye(3))
     whole += np.vstack([g, other]) @ np.vstack([g, other]).T
     whole[:3, :3] += scatter
     found = conditional(here, whole[:3, :3], g, there, other, 0.002)

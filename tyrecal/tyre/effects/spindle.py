@@ -10,7 +10,7 @@ from .effect import Effect
 
 # of wheel and hub, times what is stated, one standard deviation by judgement: how much of a hub
 # goes along is seldom weighed; it is near the axle
-MASS, INERTIA = 1.2, 1.1
+HUB_MASS, HUB_INERTIA = 1.2, 1.1
 
 
 def heavier(case: LoadedCase) -> LoadedCase:
@@ -18,9 +18,9 @@ def heavier(case: LoadedCase) -> LoadedCase:
     rim = case.case.rim
     more = with_part(
         rim,
-        mass_kg=MASS * rim.mass_kg,
-        polar_inertia_kg_m2=INERTIA * rim.polar_inertia_kg_m2,
-        diametral_inertia_kg_m2=INERTIA * rim.diametral_inertia_kg_m2,
+        mass_kg=HUB_MASS * rim.mass_kg,
+        polar_inertia_kg_m2=HUB_INERTIA * rim.polar_inertia_kg_m2,
+        diametral_inertia_kg_m2=HUB_INERTIA * rim.diametral_inertia_kg_m2,
     )
     return changed(case, rim=more)
 
