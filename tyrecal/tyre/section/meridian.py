@@ -31,6 +31,7 @@ Array = np.ndarray
 STEPS_A_PART = 200  # of each part
 EXPONENTS = np.log([1.0, 40.0])  # of the belt's share: from a roof to nearly a step
 MAX_RIM_SLOPE = np.tan(np.radians(75))  # of the carcass at the rim, from the wheel's plane
+SHARPEST_TURN = 0.6  # of the carcass at the seat: its curvature times the gauge outside it
 
 
 @dataclass(frozen=True)
@@ -78,8 +79,9 @@ def meridian(
         raise SectionError(f"a rim {2e3 * rim[1]:.0f} mm wide is too narrow for the tyre")
     x = np.linspace(0, height, STEPS_A_PART + 1)[1:]
     lower = np.stack([upper[-1, 0] - x, widest[1] - curvature / 2 * x**2 + cubic * x**3], -1)
-    # held by the rim: an arc that turns upright, down to the seat
-    turn = np.linspace(lean, 0, STEPS_A_PART // 4 + 1)[1:]
+    # held by the rim: it turns upright, down to the seat, as far as the surface outside allows
+    upright = max(0.0, lean - SHARPEST_TURN * (rim[0] - seat) / offset)
+    turn = np.linspace(lean, upright, STEPS_A_PART // 4 + 1)[1:]
     down = (rim[0] - seat) * np.linspace(0, 1, STEPS_A_PART // 4 + 1)[1:]
     steps = np.diff(down, prepend=0.0)
     held = np.stack([rim[0] - down, z - np.cumsum(np.tan(turn) * steps)], -1)
