@@ -119,18 +119,14 @@ def mass_band_kg(size: TyreSize) -> tuple[float, float]:
     return (1 - share) * mass, (1 + share) * mass
 
 
-def quicker(case: str, filler: bool) -> str:
+def quicker(case: str) -> str:
     """The case with fewer elements round the tyre and along its coarse section, for the road: a
-    205/55R16 is 1.3 % stiffer so (245.5 in place of 242.3 N/mm), in half of the time. filler:
-    along it too, whose plies are no steel."""
+    205/55R16 is 1.3 % stiffer so (245.5 in place of 242.3 N/mm), in half of the time."""
     words = ("elements: {", "}")
     start = case.index(words[0], case.index("coarse:"))
     end = case.index(words[1], start)
     elements = case[start:end]
-    fewer = {"crown": 4, "upper_sidewall": 2, "lower_sidewall": 1}
-    if filler:
-        fewer["filler"] = 1
-    for region, most in fewer.items():
+    for region, most in (("crown", 4), ("upper_sidewall", 2), ("lower_sidewall", 1), ("filler", 1)):
         elements = re.sub(rf"\b{region}: \d+", f"{region}: {most}", elements)
     angles = "element_angles_deg: [5.0, 6.0, 9.0, 20.0, 50.0, 90.0]"
     return (case[:start] + elements + case[end:]).replace("road:\n", f"road:\n  {angles}\n")
@@ -165,7 +161,7 @@ def computed(code: str) -> dict[str, Any]:
             (m["c"], m["m"], m["kind"], round(m["frequency_Hz"], 2)) for m in modes["modes"]
         ]
         case = Path(folder, "tyre.yaml")
-        case.write_text(quicker(case.read_text(), not size.truck))
+        case.write_text(quicker(case.read_text()))
         pressed = tyrecal("footprint", "tyre.yaml", "--loads-N", f"{size.load_N:.0f}", *quick)
         if "error" in pressed:
             return {**row, **pressed}

@@ -6,7 +6,6 @@ import json
 import re
 import textwrap
 from collections.abc import Mapping, Sequence
-from math import ceil
 from typing import Any
 
 import numpy as np
@@ -20,10 +19,6 @@ from .parts import SectionOrigin
 ELEMENTS_BY_LEVEL = {"coarse": 14, "default": 28, "refined": 56}  # along the half section, by level
 LETTERS_A_LINE = 118  # letters on a line
 OUTER_ROWS = {"coarse": 1, "default": 3, "refined": 4}  # between the outermost line and the surface
-# m, of an element between two cord lines: a truck's filler does not compress and its steel plies
-# do not stretch, so that elements of 13 by 20 mm are up to a sixth too stiff in lateral modes
-ROW_THICKNESS = {"coarse": 4.5e-3, "default": 4.5e-3, "refined": 3e-3}
-LONGEST_OF_ROWS = 10e-3
 
 
 def new_case(
@@ -100,20 +95,14 @@ def _short(value: float) -> str:
 
 
 def _level(section: Section, level: str) -> dict[str, Any]:
-    """Elements of about the same length, at least one a region; a row between lines, more and
-    shorter ones where two cord lines are far apart; rows thinner towards the road."""
+    """Elements of about the same length, at least one a region; rows thinner towards the road."""
     middle = section.points[0]
     arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(middle, axis=0).T))])
-    gaps = np.hypot(*np.moveaxis(np.diff(section.points[1:-1], axis=0), 2, 0))
-    needed = np.rint(np.nan_to_num(gaps) / ROW_THICKNESS[level]).astype(int)
     elements, start = {}, 0
     for region, count in section.regions:
-        length = arc[start + count] - arc[start]
-        elements[region] = max(1, round(ELEMENTS_BY_LEVEL[level] * length / arc[-1]))
-        if needed[:, start : start + count + 1].max(initial=0) > 1:
-            elements[region] = max(elements[region], ceil(length / LONGEST_OF_ROWS))
+        share = (arc[start + count] - arc[start]) / arc[-1]
+        elements[region] = max(1, round(ELEMENTS_BY_LEVEL[level] * share))
         start += count
-    inside = [1, *(max(1, int(most)) for most in needed.max(1))][: len(section.names) - 2]
-    rows = [*inside, OUTER_ROWS[level]]
+    rows = [1] * (len(section.names) - 2) + [OUTER_ROWS[level]]
     grading = [1.0] * (len(rows) - 1) + [0.7] if rows[-1] > 1 else None
     return {"elements": elements, "rows": rows, "grading": grading}
