@@ -30,6 +30,8 @@ from tyrecal.studies.diagnose.section_fields import (
 from tyrecal.studies.diagnose.section_told import section_told
 from tyrecal.studies.diagnose.tyre_model import TyreModel
 from tyrecal.studies.diagnose.uncertainties import RIM_WIDTH, sources
+from tyrecal.studies.modes import modes_result
+from tyrecal.tyre.case import LoadedCase, start_values
 from tyrecal.tyre.case.identity import tyre_sha256
 from tyrecal.tyre.case.new_case import from_size
 from tyrecal.tyre.effects.edit import changed, with_part
@@ -226,7 +228,7 @@ def test_what_is_told_of_the_section_holds_within_its_standard_deviation(chance:
         stated = Assumed(form=0.001, law=0.0)
         d = diagnose(toy, toy.rows, seen, assumed=stated)  # type: ignore[arg-type]
         told = section_told(STATED, found, d)
-        assert {v.field for v in told} == {"meridian", "gauge", "stiffness", "density"}
+        assert {v.field for v in told} == {"meridian", "hold", "gauge", "stiffness", "density"}
         assert all(0 < v.sigma <= v.before for v in told)
         value = next(v for v in told if v.field == "meridian")
         place = sum(stations(STATED.section, value.place)) // 2
@@ -237,3 +239,32 @@ def test_what_is_told_of_the_section_holds_within_its_standard_deviation(chance:
         )
         off.append((value.value - true) / value.sigma)
     chance.normal(off)
+
+
+def test_a_bead_that_yields_is_held_further_down(tmp_path: Path) -> None:
+    """Whether the rim holds the whole bead or its surface is what two standard deviations of its
+    hold are, in every mode to a quarter of the largest shift; the belt does not move."""
+    draft = from_size(parse_size("205/60R15"), {}, None, "made")
+    (tmp_path / draft.file).write_bytes(draft.content)
+    (tmp_path / "made.yaml").write_text(draft.text.replace("level: default", "level: coarse"))
+    surface = load_case(tmp_path / "made.yaml")
+    assert surface.case.rim.holds == "bead_surface"
+    whole = changed(surface, rim=with_part(surface.case.rim, holds="whole_bead"))
+    (field,) = [each for each in fields(whole).values() if each.kind == "hold"]
+    assert not [each for each in fields(CASE).values() if each.kind == "hold"]  # exact
+    lower = moved(whole, field, -2.0)
+    edge = belt_edge(whole)
+    np.testing.assert_array_equal(
+        lower.section.points[:, : edge + 1], whole.section.points[:, : edge + 1]
+    )
+    held, yields, slid = (frequencies(case) for case in (whole, surface, lower))
+    shift, alike = np.log(yields / held), np.log(slid / held)
+    assert shift[0] < -0.04 and (shift < 0).all()
+    assert alike == pytest.approx(shift, abs=0.25 * abs(shift).max())
+
+
+def frequencies(case: LoadedCase) -> Array:
+    """Hz by label."""
+    found = Evaluator(TyreDesign(case)).evaluate(Question(start_values(case)))
+    labels = modes_result(case, start_values(case), found)[0].modes
+    return np.array([m.frequency_Hz for m in sorted(labels, key=lambda m: (m.c, m.m, str(m.kind)))])

@@ -93,9 +93,16 @@ def _draw(axes: Axes, section: SectionData, size: float) -> dict[str, Artist]:
         look: dict[str, Any] = {"fc": RUBBER[k % len(RUBBER)], "ec": "0.62"}
         axes.add_collection(PolyCollection(_all(cells), lw=0.3 * size, **look))
         entries[region.replace("_", " ")] = Patch(**look)
-    look = {"fc": "none", "ec": "0.25", "hatch": "/////", "lw": 0.0}
-    axes.add_collection(PolyCollection(_all(section.rim), **look))
-    entries["held by the rim"] = Patch(**look)
+    held = _all(section.rim)
+    faces = [line for line in held if len(line) == 2]
+    if faces:
+        at_rim: dict[str, Any] = {"color": "0.25", "lw": 2.4 * size}
+        axes.add_collection(LineCollection(faces, capstyle="butt", zorder=2, **at_rim))
+        entries["held by the rim"] = Line2D([], [], **at_rim)
+    else:
+        look = {"fc": "none", "ec": "0.25", "hatch": "/////", "lw": 0.0}
+        axes.add_collection(PolyCollection(held, **look))
+        entries["held by the rim"] = Patch(**look)
     return entries
 
 

@@ -53,8 +53,8 @@ class Cords(ResultPart):
 
 
 class SectionData(ResultPart):
-    """The section as elements by region, cords by layer, what the rim holds, and its outline
-    before and after the inflation."""
+    """The section as elements by region, cords by layer, what the rim holds (elements, or faces as
+    lines), and its outline before and after the inflation."""
 
     areas: dict[str, list[Flat]]
     cords: dict[str, Cords]
@@ -149,7 +149,6 @@ def section_data(
     areas: dict[str, list[Flat]] = {}
     for number, name in areas_of(case, mesh).items():
         areas.setdefault(name, []).append(_line(place, mesh.solids[number][:4]))
-    held = set(mesh.rim)
     around = mesh.outline()
     inflated = None
     if displacement:
@@ -166,10 +165,23 @@ def section_data(
     return SectionData(
         areas=areas,
         cords=cords,
-        rim=[_line(place, n[:4]) for n in mesh.solids.values() if held.issuperset(n)],
+        rim=[_line(place, nodes) for nodes in _held(mesh)],
         outline=_line(place, around),
         inflated=inflated,
     )
+
+
+def _held(mesh: SectionMesh) -> list[tuple[int, ...]]:
+    """Corners of the elements that the rim holds, and ends of the faces of others."""
+    held, found = set(mesh.rim), []
+    for nodes in mesh.solids.values():
+        corners = nodes[: 4 if len(nodes) in (4, 8) else 3]
+        if held.issuperset(nodes):
+            found.append(corners)
+        else:
+            faces = zip(corners, (*corners[1:], corners[0]), strict=True)
+            found += [face for face in faces if held.issuperset(face)]
+    return found
 
 
 def areas_of(case: LoadedCase, mesh: SectionMesh) -> dict[int, str]:

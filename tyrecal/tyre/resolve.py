@@ -95,7 +95,8 @@ def section_mesh(case: Case, gauged: Section) -> SectionMesh:
     elements = tuple(level.elements[name] for name, _ in gauged.regions)
     grading = tuple(level.grading) if level.grading else None
     quadratic = case.mesh.element.startswith("CGAX8")
-    return _mesh(gauged, elements, tuple(level.rows), quadratic, grading)
+    whole_bead = case.rim.holds == "whole_bead"
+    return _mesh(gauged, elements, tuple(level.rows), quadratic, grading, whole_bead)
 
 
 @lru_cache(maxsize=8)
@@ -118,5 +119,7 @@ def _mesh(
     rows: tuple[int, ...],
     quadratic: bool,
     grading: tuple[float, ...] | None,
+    whole_bead: bool,
 ) -> SectionMesh:
-    return build_mesh(section, list(elements), list(rows), quadratic, list(grading or ()) or None)
+    grades = list(grading or ()) or None
+    return build_mesh(section, list(elements), list(rows), quadratic, grades, whole_bead)

@@ -66,6 +66,7 @@ def build_sector(
     quadratic: bool,
     sectors: int,
     thickness: float,
+    whole_bead: bool = True,
 ) -> Sector:
     """A sector of 360/``sectors`` degrees, one element long, with plies of ``thickness`` (m).
 
@@ -75,7 +76,7 @@ def build_sector(
     thin = [1] * len(rows[1:])
     counts = interleaved(list(rows), thin)
     grades = interleaved(list(grading or (1.0,) * len(rows)), [1.0] * len(thin))
-    mesh = build_mesh(split, list(elements), counts, False, grades)
+    mesh = build_mesh(split, list(elements), counts, False, grades, whole_bead)
     plies = np.cumsum(counts)[0:-1:2]  # the thin row over each line
     row_of = {}
     for number, (_, row) in mesh.cells.items():

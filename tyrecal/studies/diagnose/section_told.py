@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...tyre.case import LoadedCase
-from ...tyre.effects.parts import stations
+from ...tyre.effects.parts import rim_edge, stations
 from .diagnosis import Diagnosis
 from .evidence import NONE
 from .gap import projection
@@ -20,13 +20,17 @@ from .uncertainties import Source
 from .where import FieldValue
 
 Array = np.ndarray
-FIELD_UNITS = {"meridian": ("mm", 1e3), "filler": ("mm", 1e3)}  # the others in per cent
+FIELD_UNITS = {
+    "meridian": ("mm", 1e3),
+    "filler": ("mm", 1e3),
+    "hold": ("mm", 1e3),
+}  # the others in per cent
 
 
 def section_told(
     case: LoadedCase, sources: Sequence[Source], diagnosis: Diagnosis
 ) -> list[FieldValue]:
-    """Meridian and gauges amid each region, the filler's tip, compounds by part."""
+    """Meridian and gauges amid each region, the filler's tip, the rim's hold, compounds by part."""
     problem = diagnosis.bare
     columns = [k for k, source in enumerate(sources) if source.field]
     P, _, _ = projection(problem, diagnosis.hypothesis(NONE).fitted.d[0])
@@ -37,7 +41,7 @@ def section_told(
     middles = {name: sum(stations(case.section, name)) // 2 for name, _ in case.section.regions}
     compounds = {name: i for i, name in enumerate(rubber_parts(case).values())}
     known = [source.field for source in sources if source.field]
-    places = {"meridian": middles, "gauge": middles}
+    places = {"meridian": middles, "gauge": middles, "hold": {"rim": rim_edge(case.section)}}
     if (tip := filler_tip(case)) is not None:
         places["filler"] = {"tip": tip}
     result = []

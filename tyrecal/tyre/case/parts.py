@@ -21,6 +21,7 @@ LEAST, LARGEST = 1e-30, 1e15  # beyond, products of numbers leave what a compute
 Moduli = Literal["long_term", "instantaneous"]
 MOST_RELAXED = 0.999  # of a modulus: what is left must be a tyre's
 Element = Literal["CGAX8R", "CGAX8", "CGAX4R"]
+Holds = Literal["whole_bead", "bead_surface"]
 RimSupport = Literal["fixed", "springs", "free"]
 
 
@@ -315,11 +316,14 @@ class Spindle(Part):
 class Rim(Part):
     """The rigid rim; its reference point is the wheel's centre.
 
-    In a vibration it moves on its ``spindle``, or is ``free``; its own mass and moments of
-    inertia (polar: about the axle) are then those of wheel and hub, by default of steel, 17 inch.
+    Where the section's stations say so it holds the bead through its whole thickness, or the
+    surface of it that touches the rim: its outside and its end. In a vibration it moves on its
+    ``spindle``, or is ``free``; its own mass and moments of inertia (polar: about the axle) are
+    then those of wheel and hub, by default of steel, 17 inch.
     """
 
     reference_point_m: ReferencePoint
+    holds: Holds = "whole_bead"
     mass_kg: Positive = 15.0
     polar_inertia_kg_m2: Positive = 0.43
     diametral_inertia_kg_m2: Positive = 0.27

@@ -81,12 +81,14 @@ def build_mesh(
     rows: list[int],
     quadratic: bool,
     grading: list[float] | None = None,
+    whole_bead: bool = True,
 ) -> SectionMesh:
     """Mesh ``section`` with ``elements`` per region (half section) and ``rows`` between lines.
 
     ``grading``: thickness of a row over that of the row inside it, per gap between two lines.
 
-    Quadratic: 8-node elements, their midside nodes on the section's own curves.
+    Quadratic: 8-node elements, their midside nodes on the section's own curves. The rim holds the
+    ``whole_bead`` where stations are rigid, or its outside and its end.
     Raises SectionError when an element folds over.
     """
     step = 2 if quadratic else 1
@@ -107,7 +109,7 @@ def build_mesh(
     for j in range(width):
         for i in range(0, height, step if j % step else 1):
             nodes[number(i, j)] = (float(grid[i, j, 0]), float(grid[i, j, 1]))
-            if rigid[j]:
+            if rigid[j] and (whole_bead or i == height - 1 or j in (0, width - 1)):
                 rim.append(number(i, j))
     solids, cells, inner, outer = {}, {}, [], []
     for j in range(0, width - 1, step):
