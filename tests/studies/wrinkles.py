@@ -4,8 +4,8 @@
 
 A layer under the compression N per width, in rubber of shear modulus G on both sides, gives way
 sideways in waves of the wave number q from N = 2 G / q on (the rubber resists with 2 G q): at any
-N, if the mesh has waves that are short enough. Printed: [0,0] axial and torsional, [1,1] and [4,0] of
-the tyre that `tyrecal init` writes, in Hz, at a twentieth of its pressure and at all of it, with
+N, if the mesh has waves that are short enough. Printed: [0,0] axial and torsional, [1,1] and [4,0]
+of the tyre that `tyrecal init` writes, in Hz, at a twentieth of its pressure and at all of it, with
 the whole bead held and with its surface, with more and more elements and rows between the plies.
 """
 

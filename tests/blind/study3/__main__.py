@@ -8,7 +8,7 @@
     python -m tests.blind.study3 score DIR 11r22_5_own --least 1   # of one, few trials shown too
     python -m tests.blind.study3 power DIR > table.md        # what could be found, by its rulers
     python -m tests.blind.study3 rises DIR > table.md        # how far laws are off over the run
-    python -m tests.blind.study3 mesh 205/60R15              # the maker's own mesh error
+    python -m tests.blind.study3 mesh 205/60R15              # the maker's mesh error, and the model
 
 Trials lie in DIR/GROUP, their truth in DIR-truth/GROUP. `make` and `answer` go on where they were
 stopped; without --seed the seed is a secret, kept with the truth.
@@ -38,6 +38,8 @@ from tyrecal.studies.blind.power import NAMED_AS_A_RULE, Power, powers
 from tyrecal.studies.blind.protocol import read_protocol
 from tyrecal.studies.blind.ruler import read_ruler
 from tyrecal.studies.blind.seal import ANSWERS, SEAL
+from tyrecal.studies.diagnose.tyre_model import TyreModel
+from tyrecal.tyre.effects.edit import changed, with_part
 
 from ...studies.blind_least_squares import unpacked
 from .cases import GROUPS, LABELS, LEARNED_FROM, RECORDED, Group, written
@@ -147,18 +149,28 @@ def lambdas(found: Mapping[Group, Mapping[str, Power]], id: str) -> list[float]:
 
 
 def mesh(size: str) -> None:
-    """Modes of the mould at the group's first pressure, with elements half as long."""
+    """What the mould's modes at the group's second pressure, per cent, are above those with
+    elements half as long, and what the model's with this section are above them."""
     group = next(g for g in GROUPS if g.size == size)
     with TemporaryDirectory() as folder:
-        case = written(replace(group, own=False), Path(folder))
-    found = []
+        case = written(replace(group, own=True), Path(folder))
+    pressure, found = group.given_kPa[1], []
     for times in (1, 2):
         tyre = tyre_of(case, mould(size), columns(mould(size), times))
-        (state,) = computed(FENICS, tyre, [group.given_kPa[1]], LABELS).values()
+        (state,) = computed(FENICS, tyre, [pressure], LABELS).values()
         found.append(np.array([state.ln_f[label][0] for label in LABELS]))
     FENICS.close()
-    off = 100 * (found[0] - found[1])
-    print(f"| {size} | " + " | ".join(f"{x:+.3f}" for x in off) + f" | {abs(off).max():.3f} % |")
+    off = {"elements half as long": found[0] - found[1]}
+    for holds in ("whole_bead", "bead_surface"):
+        held = changed(case, rim=with_part(case.case.rim, holds=holds))
+        model = TyreModel(
+            held, Evaluator(TyreDesign(held)), [(label, pressure) for label in LABELS], [], {}
+        )
+        off[f"model, {holds.replace('_', ' ')}"] = model.values_at(model.start) - found[0]
+    print(f"| size, {pressure:g} kPa | what | " + " | ".join(map(str, LABELS)) + " |")
+    print("|---" * (2 + len(LABELS)) + "|")
+    for what, shift in off.items():
+        print(f"| {size} | {what} | " + " | ".join(f"{100 * x:+.2f}" for x in shift) + " |")
 
 
 if __name__ == "__main__":
