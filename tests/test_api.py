@@ -125,6 +125,7 @@ tyrecal.fit_case(case, method=1)  # WRONG
 tyrecal.fit_everything(case)  # WRONG
 """
         + "".join(f"reveal_type(tyrecal.{name})\n" for name in tyrecal.__all__)
+        + f"# {tmp_path}: else mypy may have it from its cache, by another path\n"
     )
     done = subprocess.run(
         [sys.executable, "-m", "mypy", "--strict", "--follow-imports=silent", str(program)],
