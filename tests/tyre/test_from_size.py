@@ -88,7 +88,7 @@ def test_the_size_code_gives_sixteen_modes(code: str, tmp_path: Path) -> None:
     assert result.pressure_kPa == parse_size(code).pressure_kPa
     if code in MASSES:
         assert result.mass_kg == pytest.approx(MASSES[code], rel=0.1)
-    # what the standards state are dimensions of the inflated tyre, of the width within 4 %
+    # what the standards state are dimensions of the inflated tyre: the section grows little
     mesh = resolved(case).mesh
     nodes = [i for i, n in enumerate(evaluation.nodes.tolist()) if n in mesh.nodes]
     at = np.array([mesh.nodes[evaluation.nodes.tolist()[i]] for i in nodes])
@@ -96,7 +96,7 @@ def test_the_size_code_gives_sixteen_modes(code: str, tmp_path: Path) -> None:
     size = parse_size(code)
     assert 2 * moved[:, 0].max() == pytest.approx(size.overall_diameter, rel=0.005)
     width = size.section_width(usual(size).rim)
-    assert np.ptp(moved[:, 1]) == pytest.approx(width, rel=0.03)
+    assert np.ptp(moved[:, 1]) == pytest.approx(width, rel=0.015)
 
 
 def test_mass_grows_with_the_tyre(tmp_path: Path) -> None:

@@ -64,6 +64,7 @@ GROUPS = [
 ]
 
 
+SURFACE_HELD = 4  # the series from which on cases hold the bead's surface, as the makers do
 KNOWN = {"C10": 5, "density": 1.0}  # percent, of one's own compounds
 
 
@@ -79,6 +80,9 @@ def written(group: Group, folder: Path) -> LoadedCase:
         (folder / draft.file).write_bytes(draft.content)
     path = folder / f"{group.name}.yaml"
     text = draft.text
+    if group.series >= SURFACE_HELD:
+        text = text.replace("holds: whole_bead", "holds: bead_surface")
+        assert "holds: bead_surface" in text
     if group.own:
         for what, percent in KNOWN.items():
             text, found = re.subn(rf"(_{what}: {{[^}}]*percent: )[0-9.]+", rf"\g<1>{percent}", text)
