@@ -20,6 +20,7 @@ from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.simulate.evaluate.results import Evaluation
 from tyrecal.simulate.modes.label import Label, Mode, label_modes
 from tyrecal.tyre.case import LoadedCase, start_values
+from tyrecal.tyre.effects.edit import changed, with_part
 from tyrecal.tyre.load import load_case
 from tyrecal.tyre.resolve import resolved
 from tyrecal.tyre.section.mesh import SectionMesh, build_mesh
@@ -150,6 +151,21 @@ def test_section_of_linear_elements(tyre, tmp_path):
     save(figure, tmp_path / "section.png")
     size = map(int, figure.bbox.size)
     assert 0.05 < ink(tmp_path / "section.png", *size, 200_000) < 0.3
+
+
+@pytest.mark.parametrize("holds", ["whole_bead", "bead_surface"])
+def test_what_the_rim_holds_is_drawn(tyre, holds):
+    """The elements of a whole bead and nothing beside; of its surface the lines of the outline."""
+    rim = with_part(tyre.case.case.rim, holds=holds)
+    case = changed(tyre.case, rim=rim)
+    mesh = resolved(case).mesh
+    held = [np.reshape(each, (-1, 2)) for each in section_data(case, mesh, {}).rim]
+    corners = {4} if holds == "whole_bead" else {2}
+    assert {len(each) for each in held} == corners
+    drawn = np.concatenate(held)
+    for n in {n for solid in mesh.solids.values() for n in solid[:4]} & set(mesh.rim):
+        r, z = mesh.nodes[n]
+        assert abs(drawn - [1e3 * z, 1e3 * r]).sum(1).min() < 2e-3
 
 
 @pytest.mark.parametrize("failed", [(), (3,), range(1, 9)], ids=["none", "one", "all"])

@@ -12,7 +12,6 @@ the whole bead held and with its surface, with more and more elements and rows b
 from __future__ import annotations
 
 import argparse
-from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -24,6 +23,7 @@ from tyrecal.studies.modes import modes_result
 from tyrecal.tyre.case import LoadedCase, start_values
 from tyrecal.tyre.case.new_case import from_size
 from tyrecal.tyre.case.parts import Level
+from tyrecal.tyre.effects.edit import changed, with_part
 from tyrecal.tyre.load import load_case
 from tyrecal.tyre.section.size import parse_size
 
@@ -41,8 +41,8 @@ def finer(case: LoadedCase, along: int, rows: int) -> LoadedCase:
         rows=[*(rows * n for n in default.rows[:-1]), default.rows[-1]],
         grading=default.grading,
     )
-    meshed = mesh.model_copy(update={"levels": {**mesh.levels, "finer": level}, "level": "finer"})
-    return replace(case, case=case.case.model_copy(update={"mesh": meshed}))
+    levels = {**mesh.levels, "finer": level}
+    return changed(case, mesh=with_part(mesh, levels=levels, level="finer"))
 
 
 def told(case: LoadedCase, pressure_kPa: float) -> str:
@@ -66,8 +66,7 @@ def main(codes: list[str]) -> None:
             Path(folder, "tyre.yaml").write_text(draft.text)
             case = load_case(Path(folder, "tyre.yaml"))
         for holds in ("whole_bead", "bead_surface"):
-            rim = case.case.rim.model_copy(update={"holds": holds})
-            held = replace(case, case=case.case.model_copy(update={"rim": rim}))
+            held = changed(case, rim=with_part(case.case.rim, holds=holds))
             for share in (LOW, 1.0):
                 kPa = share * case.case.pressure_kPa
                 for along, rows in MESHES:

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from solvers.bundled.section.shapes import quad
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.studies.modes import modes_result
@@ -56,11 +57,11 @@ def built(code: str) -> Section:
     return build(size, usual(size)).section()
 
 
-def coarse(code: str, folder: Path) -> LoadedCase:
+def case_of(code: str, folder: Path, level: str = "coarse") -> LoadedCase:
     draft = from_size(parse_size(code), {}, None, "tyre")
     (folder / draft.file).write_bytes(draft.content)
     path = folder / "tyre.yaml"
-    path.write_text(draft.text.replace("level: default", "level: coarse"))
+    path.write_text(draft.text.replace("level: default", f"level: {level}"))
     return load_case(path)
 
 
@@ -77,7 +78,7 @@ def coarse(code: str, folder: Path) -> LoadedCase:
     ],
 )
 def test_the_size_code_gives_sixteen_modes(code: str, tmp_path: Path) -> None:
-    case = coarse(code, tmp_path)
+    case = case_of(code, tmp_path)
     values = start_values(case)
     evaluation = Evaluator(TyreDesign(case)).evaluate(Question(values))
     result, _ = modes_result(case, values, evaluation)
@@ -97,6 +98,28 @@ def test_the_size_code_gives_sixteen_modes(code: str, tmp_path: Path) -> None:
     assert 2 * moved[:, 0].max() == pytest.approx(size.overall_diameter, rel=0.005)
     width = size.section_width(usual(size).rim)
     assert np.ptp(moved[:, 1]) == pytest.approx(width, rel=0.015)
+
+
+@pytest.mark.parametrize("code", [*TWELVE, "305/70R22.5", "315/70R22.5", "385/65R22.5"])
+@pytest.mark.parametrize("level", ["coarse", "default", "refined"])
+def test_every_mesh_that_is_written_unfolds(code: str, level: str, tmp_path: Path) -> None:
+    """Held by the rim, too, where the surface outside a carcass that turns upright runs short."""
+    mesh = resolved(case_of(code, tmp_path, level)).mesh
+    corners = np.array([[mesh.nodes[n] for n in nodes] for nodes in mesh.solids.values()])
+    jacobian = np.einsum("gax,eai->gexi", quad(8, 3).dN, corners)
+    assert (np.linalg.det(jacobian) > 0).all()
+
+
+@pytest.mark.parametrize("quadratic", [True, False])
+def test_the_surface_of_a_bead_is_its_outside_and_its_end(quadratic: bool) -> None:
+    """Where the rim holds the whole bead it holds these, too."""
+    section = built("205/60R15")
+    mesh = lambda whole: build_mesh(section, [4, 1, 3, 2, 2, 2], [1] * 6, quadratic, None, whole)
+    whole, surface = mesh(True), mesh(False)
+    assert set(surface.rim) < set(whole.rim)
+    columns = [n // 1000 for n in whole.nodes]
+    ends = {n for n in whole.nodes if n // 1000 in (min(columns), max(columns))}
+    assert set(surface.rim) == set(whole.rim) & (ends | set(whole.outer_nodes))
 
 
 def test_mass_grows_with_the_tyre(tmp_path: Path) -> None:

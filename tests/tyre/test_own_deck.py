@@ -13,7 +13,7 @@ from tyrecal.cli.main import main
 from tyrecal.simulate.deck.own import asked_by_abaqus, trial
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
-from tyrecal.tyre.case import LoadedCase, start_values
+from tyrecal.tyre.case import CaseError, LoadedCase, start_values
 from tyrecal.tyre.case.identity import tyre_sha256
 from tyrecal.tyre.case.own_case import own_case
 from tyrecal.tyre.load import load_case
@@ -306,6 +306,14 @@ def test_studies_take_such_a_case(tmp_path: Path) -> None:
     assert run("modes", str(case), "--set", "effects.bead_filler=0.5") == 2
     assert run("modes", str(case), "--set", "rebar carcass/AREA=3e-7") == 2  # a variable sets it
     assert run("modes", str(case), "--solver", "calculix") == 2
+
+
+def test_a_deck_says_itself_what_the_rim_holds(tmp_path: Path) -> None:
+    path = write(tmp_path, own_decks.plain())
+    assert "rim:\n" in path.read_text()
+    path.write_text(path.read_text().replace("rim:\n", "rim:\n  holds: bead_surface\n"))
+    with pytest.raises(CaseError, match=r"rim.*must not say holds with deck"):
+        load_case(path)
 
 
 def with_parts(folder: Path, **parts: list[str]) -> LoadedCase:

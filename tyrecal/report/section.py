@@ -94,14 +94,14 @@ def _draw(axes: Axes, section: SectionData, size: float) -> dict[str, Artist]:
         axes.add_collection(PolyCollection(_all(cells), lw=0.3 * size, **look))
         entries[region.replace("_", " ")] = Patch(**look)
     held = _all(section.rim)
-    faces = [line for line in held if len(line) == 2]
-    if faces:
+    sides, elements = [each for each in held if len(each) == 2], [e for e in held if len(e) > 2]
+    if sides:
         at_rim: dict[str, Any] = {"color": "0.25", "lw": 2.4 * size}
-        axes.add_collection(LineCollection(faces, capstyle="butt", zorder=2, **at_rim))
+        axes.add_collection(LineCollection(sides, zorder=2, **at_rim))
         entries["held by the rim"] = Line2D([], [], **at_rim)
-    else:
+    if elements:
         look = {"fc": "none", "ec": "0.25", "hatch": "/////", "lw": 0.0}
-        axes.add_collection(PolyCollection(held, **look))
+        axes.add_collection(PolyCollection(elements, **look))
         entries["held by the rim"] = Patch(**look)
     return entries
 

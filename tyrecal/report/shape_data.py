@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -53,8 +54,8 @@ class Cords(ResultPart):
 
 
 class SectionData(ResultPart):
-    """The section as elements by region, cords by layer, what the rim holds (elements, or faces as
-    lines), and its outline before and after the inflation."""
+    """The section as elements by region, cords by layer, what the rim holds (elements, and lines of
+    the outline of others), and its outline before and after the inflation."""
 
     areas: dict[str, list[Flat]]
     cords: dict[str, Cords]
@@ -165,23 +166,21 @@ def section_data(
     return SectionData(
         areas=areas,
         cords=cords,
-        rim=[_line(place, nodes) for nodes in _held(mesh)],
+        rim=[_line(place, nodes) for nodes in _held(mesh, around)],
         outline=_line(place, around),
         inflated=inflated,
     )
 
 
-def _held(mesh: SectionMesh) -> list[tuple[int, ...]]:
-    """Corners of the elements that the rim holds, and ends of the faces of others."""
-    held, found = set(mesh.rim), []
-    for nodes in mesh.solids.values():
-        corners = nodes[: 4 if len(nodes) in (4, 8) else 3]
-        if held.issuperset(nodes):
-            found.append(corners)
-        else:
-            faces = zip(corners, (*corners[1:], corners[0]), strict=True)
-            found += [face for face in faces if held.issuperset(face)]
-    return found
+def _held(mesh: SectionMesh, around: list[int]) -> list[tuple[int, ...]]:
+    """Corners of the elements that the rim holds, and the lines of the outline that it holds of
+    others."""
+    held = set(mesh.rim)
+    whole = [nodes for nodes in mesh.solids.values() if held.issuperset(nodes)]
+    sides = pairwise([*around, *around[:1]])
+    of_whole = set[int]().union(*whole)
+    lines = [side for side in sides if held.issuperset(side) and not of_whole.issuperset(side)]
+    return [nodes[:4] for nodes in whole] + lines
 
 
 def areas_of(case: LoadedCase, mesh: SectionMesh) -> dict[int, str]:

@@ -95,8 +95,8 @@ def section_mesh(case: Case, gauged: Section) -> SectionMesh:
     elements = tuple(level.elements[name] for name, _ in gauged.regions)
     grading = tuple(level.grading) if level.grading else None
     quadratic = case.mesh.element.startswith("CGAX8")
-    whole_bead = case.rim.holds == "whole_bead"
-    return _mesh(gauged, elements, tuple(level.rows), quadratic, grading, whole_bead)
+    rows, whole_bead = tuple(level.rows), case.rim.holds_whole_bead
+    return _mesh(gauged, elements, rows, quadratic, grading, whole_bead)
 
 
 @lru_cache(maxsize=8)

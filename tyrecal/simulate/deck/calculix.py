@@ -58,7 +58,7 @@ def calculix_context(tyre: Tyre) -> dict[str, Any]:
             element != "C3D8",
             sectors,
             thickness,
-            c.rim.holds == "whole_bead",
+            c.rim.holds_whole_bead,
         )
     except SectionError as error:
         raise TemplateFailed(f"plies of {thickness} m do not fit: {error}") from None

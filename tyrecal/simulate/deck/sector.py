@@ -66,7 +66,7 @@ def build_sector(
     quadratic: bool,
     sectors: int,
     thickness: float,
-    whole_bead: bool = True,
+    whole_bead: bool,
 ) -> Sector:
     """A sector of 360/``sectors`` degrees, one element long, with plies of ``thickness`` (m).
 

@@ -15,16 +15,12 @@ from ...tyre.effects.parts import rim_edge, stations
 from .diagnosis import Diagnosis
 from .evidence import NONE
 from .gap import projection
-from .section_fields import FIELD_KINDS, filler_tip, rubber_parts
+from .section_fields import ALONG_CARCASS, FIELD_KINDS, filler_tip, rubber_parts
 from .uncertainties import Source
 from .where import FieldValue
 
 Array = np.ndarray
-FIELD_UNITS = {
-    "meridian": ("mm", 1e3),
-    "filler": ("mm", 1e3),
-    "hold": ("mm", 1e3),
-}  # the others in per cent
+FIELD_UNITS = dict.fromkeys(("meridian", *ALONG_CARCASS), ("mm", 1e3))  # the others in per cent
 
 
 def section_told(

@@ -21,7 +21,7 @@ LEAST, LARGEST = 1e-30, 1e15  # beyond, products of numbers leave what a compute
 Moduli = Literal["long_term", "instantaneous"]
 MOST_RELAXED = 0.999  # of a modulus: what is left must be a tyre's
 Element = Literal["CGAX8R", "CGAX8", "CGAX4R"]
-Holds = Literal["whole_bead", "bead_surface"]
+WHOLE_BEAD: Literal["whole_bead"] = "whole_bead"
 RimSupport = Literal["fixed", "springs", "free"]
 
 
@@ -323,12 +323,17 @@ class Rim(Part):
     """
 
     reference_point_m: ReferencePoint
-    holds: Holds = "whole_bead"
+    holds: Literal["whole_bead", "bead_surface"] = WHOLE_BEAD
     mass_kg: Positive = 15.0
     polar_inertia_kg_m2: Positive = 0.43
     diametral_inertia_kg_m2: Positive = 0.27
     spindle: Spindle = Spindle()
     free: bool = False
+
+    @property
+    def holds_whole_bead(self) -> bool:
+        """Whether it holds a bead through its thickness."""
+        return self.holds == WHOLE_BEAD
 
     @property
     def moves(self) -> bool:

@@ -14,6 +14,7 @@ from pydantic import AfterValidator, Field
 
 from ..plugins import IDS
 from .parts import (
+    WHOLE_BEAD,
     WRONG,
     Cavity,
     Cord,
@@ -319,6 +320,8 @@ class Case(Part):
                     yield key, f"must be given{more}"
         else:
             yield from ((key, "must be absent with deck") for key in IN_A_DECK if key in given)
+            if part_values(values.get("rim")).get("holds", WHOLE_BEAD) != WHOLE_BEAD:
+                yield "rim", "must not say holds with deck, which names the nodes that it holds"
         if part_values(values.get("deck")).get("decks"):
             yield from cls._beside_decks(values)
 
