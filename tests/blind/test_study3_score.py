@@ -49,14 +49,17 @@ def test_a_rate_counts_its_own_trials_and_few_are_not_shown() -> None:
 
 
 def test_shrinkage_is_of_what_was_named_and_strong_and_exchanged_labels_count_for_nothing() -> None:
-    """0.8 by least squares, 0.5 by the diagnosis' own fit; sound tyres by chance to 0.25."""
-    named = [answered("a", "a", usual=(1.0, 0.2))] * 60
+    """0.8 by least squares, 0.9 at most, 0.5 by the diagnosis' own fit; sound tyres by chance to
+    0.25."""
+    named = [answered("a", "a", usual=(1.0, 0.2), least=0.1)] * 60
     weak, undecided = answered("a", "a", lam=9.0), answered("a", "a", verdict="undecided")
     sound = [answered("", "none", usual=(1.0, 0.75), after=0.9)] * 5
     said = figures([*named, answered("a", "a"), weak, undecided, *sound], 60)
     start, end = "held out by ", ", named, lambda from 25: median shrinkage"
     assert said[f"{start}least squares{end}"] == "0.80 (chance 0.25)"
     assert said[f"{start}the diagnosis{end}"] == "0.50 (chance 0.10)"
+    known = "least squares that know the effect and its best size"
+    assert said[f"{start}{known}{end}"] == "0.90"
     few = figures([*named[1:], answered("a", "a"), *sound], 60)
     assert few[f"{start}least squares{end}"] == "not shown (59)"
 

@@ -35,6 +35,12 @@ from .kinds import further, weighed_again
 LEAST, LEAST_A_SIZE, LEAST_ROBUST = 60, 40, 100  # trials of a rate that is shown
 ONE, EACH = 25.0, 15.0  # lambda from which one effect, and each of a pair, should be found
 SIGNIFICANT = 0.95
+SHRINKAGES = {
+    "least squares": "usual_shrinkage",
+    "least squares that know the effect and its best size": "most_shrinkage",
+    "the diagnosis": "shrinkage",
+}
+SIZES_TRIED = 41  # of an effect, for the one that errs least
 
 
 @dataclass(frozen=True)
@@ -44,7 +50,8 @@ class Scored:
     there: that of all that it names, whatever else there is; right: the first one is the truth by
     groups; held: whether each named and true effect's interval holds what it is worth in the
     catalogue's law; before, after: rms error held out, in ln f; usual: the same of least squares,
-    without and with what is likeliest, None where labels are exchanged; foretold: whether each
+    without and with what is likeliest, None where labels are exchanged; least: with a strong single
+    effect that is there, at the size that errs least, which nobody can know; foretold: whether each
     frequency held out lies in its interval, where the answer has any; if_told: the same, its
     answer weighed again as if the rules had told it how many effects tyres have."""
 
@@ -64,6 +71,7 @@ class Scored:
     after: float
     again: str
     usual: tuple[float, float] | None = None
+    least: float = np.nan
     foretold: tuple[bool, ...] = ()
     there: float = 1.0
     if_told: Scored | None = None
@@ -105,6 +113,11 @@ class Scored:
         """NaN where labels are exchanged."""
         without, with_ = self.usual or (1.0, np.nan)
         return 1 - with_ / without
+
+    @property
+    def most_shrinkage(self) -> float:
+        """What `usual_shrinkage` could be at most; NaN where it is not known."""
+        return 1 - self.least / (self.usual or (1.0,))[0]
 
 
 def scored(folder: Path, sealed: Path) -> list[Scored]:
@@ -173,8 +186,13 @@ def one(
         return found
     there = held_out(truth, ruler, protocol, labels)
     with_effects = {id: each["value"] for id, each in said["parameters"].items()}
-    without, with_ = (held_out_rms(ruler, y, places, there, e) for e in ({}, with_effects))
-    return replace(found, usual=(without, with_))
+    rms = lambda sizes: held_out_rms(ruler, y, places, there, sizes)
+    found = replace(found, usual=(rms({}), rms(with_effects)))
+    if len(effects) != 1 or hard[effects[0]].lam < ONE or effects[0] not in ruler.signatures:
+        return found
+    (id,) = effects
+    sizes = np.linspace(*ruler.signatures[id].sizes[[0, -1]], SIZES_TRIED)
+    return replace(found, least=min(rms({id: float(e)}) for e in sizes))
 
 
 def weighed(trial: Scored, p: Mapping[str, float]) -> Scored:
@@ -291,7 +309,7 @@ def figures(
             f"held out by {how}, named, lambda from {ONE:g}: median shrinkage": _middle(
                 [getattr(t, of) for t in proven], [getattr(t, of) for t in none], least
             )
-            for how, of in (("least squares", "usual_shrinkage"), ("the diagnosis", "shrinkage"))
+            for how, of in SHRINKAGES.items()
         },
         "mounted again: the same verdict": shown(
             (a.verdict, a.named) == (b.verdict, b.named) for a, b in again
@@ -342,11 +360,13 @@ def _mean_share(flags: Sequence[Sequence[bool]], least: int) -> str:
 
 
 def _middle(shrinks: Sequence[float], sound: Sequence[float], least: int) -> str:
-    """The median, and what sound tyres reach by chance; NaN counts for nothing."""
+    """The median, and what sound tyres reach by chance, where that is known; NaN counts for
+    nothing."""
     known, chance = (np.array(each)[np.isfinite(each)] for each in (shrinks, sound))
-    if len(known) < least or not len(chance):
+    if len(known) < least:
         return _few(len(known))
-    return f"{np.median(known):.2f} (chance {np.quantile(chance, SIGNIFICANT):.2f})"
+    by_chance = f" (chance {np.quantile(chance, SIGNIFICANT):.2f})" if len(chance) else ""
+    return f"{np.median(known):.2f}{by_chance}"
 
 
 def _few(count: int) -> str:
