@@ -70,8 +70,7 @@ def decide(
         return verdict(UNDECIDED, "cannot tell: there are no more data than design variables")
     if best and sure and check > CHECK and none < RULED_OUT:
         if at_bound := [id for id in by_key[best].at_bound if holds(sure, id)]:
-            ids = " and ".join(at_bound)
-            words = f"there is a gap; {best} comes nearest, with {ids} at the bound of its range"
+            words = f"there is a gap; {best} comes nearest{_with_at_bound(at_bound)}"
             return verdict(UNDECIDED, words)
         if rows - variables - len(by_key[best].values) < 2:
             words = f"there is a gap; {best} comes nearest, but with so few data others would, too"
@@ -82,8 +81,9 @@ def decide(
         words += f", perhaps with {' or '.join(each.id for each in also)}" if also else ""
         return verdict(NAMED, words, also)
     if none < RULED_OUT and (probabilities[OUTSIDE] >= 0.5 or (sure and check <= CHECK)):
-        words = f"there is a gap; {_falls_short(best, check)}; likelier is that"
-        return verdict(OUTSIDE, f"{words} {by_key[OUTSIDE].words}")
+        nearest = _falls_short(best, check) + _with_at_bound(by_key[best].at_bound if best else [])
+        words = f"there is a gap; {nearest}; likelier is that {by_key[OUTSIDE].words}"
+        return verdict(OUTSIDE, words)
     if order[0] == NONE and none > before(hypotheses).get(NONE, PRIOR_NONE):
         return verdict(NO_GAP, "no gap is seen")
     gap = "there is a gap" if none < RULED_OUT else "there may be a gap"
@@ -114,6 +114,11 @@ def perhaps(probabilities: Mapping[str, float], named: str) -> list[Further]:
     also = [Further(id, present(probabilities, [*ids, id])) for id in others]
     likely = [each for each in also if each.probability >= PERHAPS]
     return sorted(likely, key=lambda each: (-each.probability, each.id))
+
+
+def _with_at_bound(ids: Sequence[str]) -> str:
+    """Effects of an explanation whose size is the last of its range: more would fit better."""
+    return f", with {' and '.join(ids)} at the bound of its range" if ids else ""
 
 
 def _falls_short(best: str | None, check: float) -> str:
