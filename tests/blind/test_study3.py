@@ -23,7 +23,7 @@ from tyrecal.simulate.evaluate.failure import EvaluationFailed
 from tyrecal.simulate.modes.label import label_modes
 from tyrecal.simulate.modes.match import match
 from tyrecal.studies.blind.answer import answer, case_of, rows_of, tyre_model
-from tyrecal.studies.blind.make import labels_of
+from tyrecal.studies.blind.make import Trial, labels_of
 from tyrecal.studies.blind.maker import Computed
 from tyrecal.studies.blind.protocol import read_json, read_protocol
 from tyrecal.studies.blind.ruler import read_ruler
@@ -41,8 +41,9 @@ from ..studies.test_fenics import installed
 from .study3 import make as making
 from .study3.__main__ import result
 from .study3.cases import GROUPS, LABELS, RECORDED, SIZES, Group, written
-from .study3.draw import foreseen, known_laws, one_drawn
+from .study3.draw import evident, foreseen, known_laws, one_drawn
 from .study3.kinds import EFFECTS_OF, further
+from .study3.laws import EVIDENT
 from .study3.maker import Fenics, computed, modes
 from .study3.section import Section, columns, mould, off, section
 from .study3.tyre import Mesh, Tyre, on_springs, problem, tyre_of
@@ -233,6 +234,25 @@ def test_strong_effects_are_those_of_which_the_ruler_foresees_enough(chance: Cha
     assert min(lam["two_strong"] + lam["three_strong"]) >= 15
     chance.often(np.array(lam["one"]) < 25, 0.3, 0.95)  # it is about 0.65
     assert foreseen(ruler, rules, trials[0].truth, "bead_filler", 0.0) == 0.0
+
+
+def test_what_is_evident_outside_the_catalogue_moves_as_much_as_one_effect(
+    chance: Chance, tmp_path: Path
+) -> None:
+    """Of the recorded ruler: the first mode 10 % lower at all pressures is evident, 0.1 % lower
+    is not; sizes are the far ends of their ranges."""
+    group = next(group for group in GROUPS if group.name == "205_60r15_own")
+    unpacked(RECORDED / group.name, tmp_path / "trials")
+    case, rules = case_of(tmp_path / "trials"), read_protocol(RECORDED / group.name)
+    ruler = read_ruler(tmp_path / "trials", labels_of(case))
+    drawn = one_drawn(rules, case, group, "outside_strong", chance.random, None)
+    (law,) = (EVIDENT[id] for id in drawn.effects)
+    assert drawn.truth.kind == "outside" and 0.6 <= drawn.truth.size / law.high <= 1
+    sound = {p: Computed({label: (3.0, 3.0) for label in LABELS}, 2.0) for p in rules.pressures_kPa}
+    for lower, seen in ((0.1, True), (0.001, False)):
+        ln_f = {label: (3.0 - lower * (label == LABELS[0]),) * 2 for label in LABELS}
+        moved = {p: Computed(ln_f, 2.0) for p in rules.pressures_kPa}
+        assert evident(Trial(drawn.truth, 1, moved, sound), rules, ruler) == seen
 
 
 def on_the_same_stations(case: LoadedCase) -> dict[str, Any]:

@@ -60,7 +60,10 @@ class Group:
 
 
 GROUPS = [
-    Group(size, own, series) for series in (1, 2, 3, 4, 5) for size in SIZES for own in (True, False)
+    Group(size, own, series)
+    for series in (1, 2, 3, 4, 5, 6)
+    for size in SIZES
+    for own in (True, False)
 ]
 
 

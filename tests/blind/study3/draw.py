@@ -9,14 +9,16 @@ import numpy as np
 
 from tyrecal.errors import InputError
 from tyrecal.studies.blind.draw import Truth, draw, tyre
+from tyrecal.studies.blind.make import Trial, plain_trial
 from tyrecal.studies.blind.protocol import Protocol
 from tyrecal.studies.blind.ruler import Ruler, difficulty
+from tyrecal.studies.blind.score import true_shift
 from tyrecal.studies.diagnose.uncertainties import sources
 from tyrecal.tyre.case import LoadedCase
 
 from .cases import Group, with_exact_section
 from .kinds import EFFECTS_OF
-from .laws import CLAMP, OUTSIDE, OwnLaw, laws, rim_width
+from .laws import CLAMP, EVIDENT, EVIDENT_FROM, OUTSIDE, OwnLaw, laws, rim_width
 from .score import EACH, ONE
 from .section import columns, mould, off
 from .tyre import Tyre, tyre_of
@@ -88,8 +90,9 @@ def one_drawn(
     rules, known_sources = replace(protocol, counts={"none": 1}), sources(with_exact_section(case))
     (truth,) = draw(rules, case, known_sources[0], {}, {}, int(random.integers(2**63)))
     effects, outside = known_laws(case, group)
-    known = outside if kind == "outside" else effects
-    number = 1 if kind == "outside" else EFFECTS_OF[kind]
+    known = {"outside": outside, "outside_strong": EVIDENT}.get(kind, effects)
+    number = EFFECTS_OF[kind] or int(kind != "none")
+    smallest = EVIDENT_FROM if kind == "outside_strong" else protocol.smallest
     names, clamped = sorted(known), len(set(CLAMP) & set(known))
     share = CLAMPED if clamped else 0.0
     chances = [
@@ -97,16 +100,16 @@ def one_drawn(
     ]
     for _ in range(MAX_DRAWS):
         ids = sorted(random.choice(names, number, replace=False, p=chances).tolist())
-        sizes = {id: known[id].drawn(random, protocol.smallest) for id in ids}
+        sizes = {id: known[id].drawn(random, smallest) for id in ids}
         if kind not in LEAST:
             break
         assert ruler is not None
-        seen = [foreseen(ruler, protocol, truth, id, size) for id, size in sizes.items()]
-        if min(seen) >= LEAST[kind]:
+        lam = [foreseen(ruler, protocol, truth, id, size) for id, size in sizes.items()]
+        if min(lam) >= LEAST[kind]:
             break
     else:
         raise InputError(f"no effects of kind {kind} could be seen, by the ruler")
-    said = {0: kind, 1: "effect"}.get(EFFECTS_OF[kind], "several")
+    said = {0: kind.removesuffix("_strong"), 1: "effect"}.get(EFFECTS_OF[kind], "several")
     size = next(iter(sizes.values()), 0.0)
     truth = replace(truth, kind=said, law="+".join(ids), size=size)
     return Drawn(kind, truth, sizes, *(int(random.integers(2**63)) for _ in range(2)))
@@ -118,13 +121,34 @@ def foreseen(ruler: Ruler, protocol: Protocol, truth: Truth, id: str, size: floa
     signature = ruler.signatures.get(id)
     if signature is None:
         return 0.0
-    places = np.array([i for i, (_, p) in enumerate(ruler.rows) if p != protocol.held_out_kPa])
+    places, d = measured_places(ruler, protocol), np.log([*truth.variables.values()]) - ruler.x0
+    sizes, shift, split = signature.grid(d, places)
+    at = lambda table: np.array([np.interp(size, sizes, column) for column in table.T])
+    return seen(ruler, protocol, truth, at(shift), at(split))
+
+
+def measured_places(ruler: Ruler, protocol: Protocol) -> np.ndarray:
+    """The ruler's rows (n,) at the pressures that are given."""
+    return np.array([i for i, (_, p) in enumerate(ruler.rows) if p != protocol.held_out_kPa])
+
+
+def seen(
+    ruler: Ruler, protocol: Protocol, truth: Truth, shift: np.ndarray, split: np.ndarray
+) -> float:
+    """lambda of what moves `measured_places` by shift (n,), and pairs apart by split (n,)."""
+    places = measured_places(ruler, protocol)
     labels = [ruler.rows[i][0] for i in places]
     counts = np.array([2 if label and label.c else 1 for label in labels])
     d = np.log([*truth.variables.values()]) - ruler.x0
-    sizes, shift, split = signature.grid(d, places)
-    at = lambda table: np.array([np.interp(size, sizes, column) for column in table.T])
-    return difficulty(ruler, protocol, id, d, places, counts, at(shift), at(split)).lam
+    return difficulty(ruler, protocol, truth.law, d, places, counts, shift, split).lam
+
+
+def evident(trial: Trial, protocol: Protocol, ruler: Ruler | None) -> bool:
+    """Whether what is outside the catalogue moves as much as one effect that should be found."""
+    assert ruler is not None
+    labels = [label for label, _ in ruler.rows if label]
+    told, places = plain_trial(trial), measured_places(ruler, protocol)
+    return seen(ruler, protocol, trial.truth, *true_shift(told, ruler, places, labels)) >= ONE
 
 
 def drawn_anew(

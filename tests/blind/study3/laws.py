@@ -204,3 +204,10 @@ OUTSIDE: Mapping[str, OwnLaw] = {
 }
 """m of belt, a share of the bead, strain, kg/m2: at most a third of half a belt, and 1.8 kg of
 sealant in a 205/60R15."""
+EVIDENT: Mapping[str, OwnLaw] = {
+    "parted_belts": OwnLaw(0.0, 0.06, parted_belts),
+    "unseated_bead": OUTSIDE["unseated_bead"],
+}
+"""Those that move modes enough to be seen, from `EVIDENT_FROM` of these ranges on: belts part by
+some centimetres before a tyre fails."""
+EVIDENT_FROM = 0.6

@@ -35,7 +35,7 @@ from tyrecal.studies.blind.seal import SEAL, seal
 from tyrecal.tyre.case import LoadedCase
 
 from .cases import LABELS, Group, written
-from .draw import LEAST, Drawn, drawn, drawn_anew, made
+from .draw import Drawn, drawn, drawn_anew, evident, made
 from .maker import ABOUT, Fenics, computed
 
 FENICS = Fenics()  # of this process
@@ -71,7 +71,7 @@ def make(
     if not (folder / RULER_FILE).exists():
         write_ruler(folder, (ruler or partial(measured, jobs=jobs))(case, protocol))
     seed = kept_seed(sealed, seed)
-    strong = any(counts.get(kind) for kind in LEAST)
+    strong = any(count for kind, count in counts.items() if kind.endswith("_strong"))
     known = read_ruler(folder, labels_of(case)) if strong else None
     every = drawn(protocol, case, group, counts, seed, known)
     work = partial(one, sealed, protocol, case, group, known)
@@ -133,22 +133,25 @@ def one(
 def _made(
     protocol: Protocol, case: LoadedCase, group: Group, ruler: Ruler | None, each: Drawn
 ) -> Made:
-    """Its tyre drawn again where it has no solution."""
+    """Its tyre drawn again where it has no solution, or what should be evident is not."""
     pressures = list(protocol.pressures_kPa)
     run = lambda *without: computed(
         FENICS, made(each, case, group, without), pressures, LABELS, near=bool(without)
     )
+    last: Exception | str = ""
     for tries in range(1, MAX_TRIES + 1):
         try:
             whole = run()
             ids = sorted(each.effects)
             members = {id: run(id) for id in ids} if len(ids) > 1 else {}
             trial = Trial(each.truth, tries, whole, run(*ids) if ids else whole)
-            return trial, each.effects, members
+            if each.kind != "outside_strong" or evident(trial, protocol, ruler):
+                return trial, each.effects, members
+            last = f"{each.truth.law} moves too little"
         except (EvaluationFailed, ValueError) as failure:
             last = failure
         each = drawn_anew(each, protocol, case, group, tries, ruler)
-    raise InputError(f"no tyre of kind {each.kind} has a solution: {last}")
+    raise InputError(f"no tyre of kind {each.kind} was found: {last}")
 
 
 def shifts(trial: Trial, members: Members) -> dict[str, Any]:
