@@ -31,6 +31,7 @@ def changes(p: InverseProblem) -> list[Changed]:
         Changed("a constant", twice, every),
         Changed("laws", p, every, 2.0),
         Changed("form", sure, every),
+        *(Changed("starts", replace(p, spread=k * p.spread), every) for k in (0.5, 2.0)),
         Changed("a label", p, fewer),
         Changed("two", twice, fewer),
     ]

@@ -21,6 +21,7 @@ from tyrecal.studies.fit.problem import Point
 from tyrecal.studies.fit.targets import Target
 from tyrecal.studies.fit.uncertainty import uncertainty
 from tyrecal.studies.fit.variable import DesignVariable, read_variable
+from tyrecal.tyre.case.schema import Variable
 from tyrecal.tyre.state import AS_THE_CASE
 
 from ..chance import generator
@@ -313,8 +314,8 @@ def test_a_variable_stays_next_to_0_where_it_moves_effects_alone() -> None:
     """Most effects leave the deck at 0, and have no slope there; other numbers have one."""
 
     def made(sets: list[str], lower: float, upper: float, start: float = 0.0) -> DesignVariable:
-        told = {"sets": sets, "lower": lower, "upper": upper, "start": start, "scale": "linear"}
-        return read_variable("x", SimpleNamespace(**told))  # type: ignore[arg-type]
+        told = Variable(sets=sets, lower=lower, upper=upper, start=start, scale="linear")
+        return read_variable("x", told)
 
     both, other = ["effects.a", "effects.b"], ["effects.a", "pressure_kPa"]
     near = made(both, 0.0, 2.0)
@@ -388,6 +389,23 @@ def test_a_variables_coordinate_and_back(log: bool) -> None:
             assert v.slope(value) == pytest.approx(rise, rel=1e-6)
     assert v.value(v.scaled(0.7)) == 0.7
     assert v.value(v.scaled(2.3) + 1) == 2.3 and v.value(v.scaled(0.3) - 1) == 0.3
+
+
+def test_how_well_a_start_is_known() -> None:
+    """As stated, else by 0.5 of a logarithm; never worse than uniformly within the bounds, as of a
+    linear variable that says nothing."""
+    spread = lambda log, lower, upper, percent=None: (
+        DesignVariable("x", 2.0, lower, upper, log, percent).spread
+    )
+    assert spread(True, 0.2, 20.0) == 0.5
+    assert spread(True, 0.2, 20.0, 20.0) == pytest.approx(np.log(1.2))
+    assert spread(True, 0.2, 20.0, 900.0) == pytest.approx(np.log(100) / 12**0.5)
+    assert spread(True, 1.9, 2.1) == pytest.approx(np.log(2.1 / 1.9) / 12**0.5)
+    assert spread(False, 1.0, 5.0) == pytest.approx(1 / 12**0.5)
+    assert spread(False, 1.0, 5.0, 10.0) == pytest.approx(0.2 / 4)
+    assert (
+        read_variable("x", Variable(sets=["a"], start=2, lower=1, upper=5, percent=7)).percent == 7
+    )
 
 
 def asked_slopes(ask: Any, start: dict[str, float], step: float = 0.1, **how: Any) -> Any:

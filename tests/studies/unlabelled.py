@@ -31,9 +31,8 @@ from tyrecal.studies.blind.statistics import (
 )
 from tyrecal.studies.emulator import Emulator, emulator
 from tyrecal.studies.fit.targets import target_labels
-from tyrecal.studies.fit.variable import read_variable
+from tyrecal.studies.fit.variable import START_SPREAD, read_variable
 from tyrecal.studies.labelling.expansion import Expansion, Prior, admissible, find_labels
-from tyrecal.studies.labelling.label import START_SPREAD
 from tyrecal.studies.labelling.tree import DISCREPANCIES, FOREIGN_MARGIN, Frequencies, discrepancy
 from tyrecal.tyre.load import load_case
 

@@ -53,8 +53,8 @@ from tyrecal.studies.diagnose.tyre_model import TyreModel
 from tyrecal.studies.diagnose.uncertainties import sources
 from tyrecal.studies.diagnose.verdict import decide
 from tyrecal.studies.fit.targets import target_labels
+from tyrecal.studies.fit.variable import START_SPREAD
 from tyrecal.studies.labelling.expansion import Expansion, Prior, admissible, find_labels
-from tyrecal.studies.labelling.label import START_SPREAD
 from tyrecal.studies.labelling.tree import FOREIGN_MARGIN, Frequencies
 from tyrecal.tyre.effects.edit import changed, with_part
 

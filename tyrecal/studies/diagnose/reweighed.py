@@ -1,4 +1,4 @@
-"""Evidence of fits that are known, by another covariance or with rows left out.
+"""Evidence of fits that are known, by another covariance, another prior of x or with rows left out.
 
 About a fit eta is linear in x, whose prior is normal with spread S_x: integrated over x
 
@@ -44,7 +44,7 @@ class Line:
 
     place: int | None  # in the rule of what couples them; None: none are
     residual: Array  # (q, n) at the centre of x
-    slopes: Array  # (q, n, v) by standard deviations of x
+    slopes: Array  # (q, n, v) by x
     by_law: Array  # (q, n, n) covariance of what effects' laws are off by
     beside: Array  # (q, n, n) of what their nature leaves open
     told: Array  # (q,) ln p of labels
@@ -60,7 +60,7 @@ class Line:
         problem, keep = other.problem, other.keep
         S = self.covariance(problem, other.laws)
         S = (S if extra is None else S + extra)[:, keep][:, :, keep]
-        r, J = self.residual[:, keep], self.slopes[:, keep]
+        r, J = self.residual[:, keep], self.slopes[:, keep] * problem.spread
         T = S + J @ J.transpose(0, 2, 1)
         w = np.linalg.solve(T, r[:, :, None])
         whole, taken = (w[:, :, 0] * r).sum(1), (J.transpose(0, 2, 1) @ w)[:, :, 0]
@@ -94,7 +94,7 @@ def line_about(problem: InverseProblem, added: Added, d: Array, place: int | Non
     back = d - (problem.centre - problem.expansion.x0)
     residual = problem.observations.y - eta + (J @ back[:, :, None])[:, :, 0]
     laws = problem.laws(at.with_mixed_laws(added))
-    return Line(place, residual, J * problem.spread, *laws, told, added.split)
+    return Line(place, residual, J, *laws, told, added.split)
 
 
 def reweighed(

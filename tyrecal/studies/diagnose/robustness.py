@@ -1,9 +1,10 @@
 """What a verdict hangs on: the same data, judged with other numbers than were assumed.
 
-Every prior, every constant's standard deviation and what laws are off half and twice as large, the
-model's own form and the section beyond doubt, each label left out in turn. The scatter of the data
-stands, of which the check of the fit speaks. Hypotheses that carry weight are weighed anew about
-their fits, on their grids, of several effects on the part that does.
+Every prior, every constant's standard deviation, what laws are off and how far variables may be
+from their start half and twice as large, the model's own form and the section beyond doubt, each
+label left out in turn. The scatter of the data stands, of which the check of the fit speaks.
+Hypotheses that carry weight are weighed anew about their fits, on their grids, of several effects
+on the part that does.
 """
 
 from __future__ import annotations
@@ -120,6 +121,8 @@ def _changes(problem: InverseProblem, sources: Sequence[str]) -> Iterator[Change
             words = f"the standard deviation of {name} {times} as large"
             yield Changed(words, _scaled(problem, places, factor), every)
         yield Changed(f"the allowance for effects' laws {times} as large", problem, every, factor)
+        looser = replace(problem, spread=factor * problem.spread)
+        yield Changed(f"what variables may be off their start {times} as large", looser, every)
     sure = replace(problem, assumed=replace(problem.assumed, form=0.0))
     yield Changed("the model's own form beyond doubt", sure, every)
     for label in sorted({row.label for row in rows if row.label}, key=str):

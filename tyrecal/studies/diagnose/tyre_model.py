@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from itertools import product
-from math import exp, log, sqrt
+from math import exp, log
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from ...tyre.state import TyreState, without
 from ...tyre.templates import TemplateFailed
 from ...tyre.values import with_values
 from ..fit import problem as fit
+from ..fit.variable import read_variable
 from .expansion import ONE_SIDED_SLOPED, node_values
 from .form_error import MATERIAL_LAWS
 from .model import Answer, Coupling, ModelRow, Query, Span, state_of
@@ -83,10 +84,7 @@ class TyreModel:
         self.sources: Sequence[str] = [source.name for source in found]
         self.material_laws = 0.0 if known_from(case) == "exact" else MATERIAL_LAWS
         self.start = np.array([self._scaled(n, v) for n, v in start_values(case).items()])
-        wide = [
-            log(v.upper / v.lower) if v.scale == "log" else 1.0 for v in self._variables.values()
-        ]
-        self.spread = np.array(wide) / sqrt(12)  # of a uniform distribution within the bounds
+        self.spread = np.array([read_variable(n, v).spread for n, v in self._variables.items()])
         self._plain = values_of(case, found)
         self._plain.setdefault("pressure_kPa", case.case.pressure_kPa)
         self._slopeless = {id for id, span in spans.items() if not self._has_slopes(id, span)}

@@ -120,7 +120,8 @@ def _coupled(coupled: Array) -> list[tuple[int | None, Array]]:
 
 def _conditional(line: Line, problem: InverseProblem, count: int) -> tuple[Array, Array]:
     """Mean and variance (q, m) of all rows but the first ``count``, which are known."""
-    T = line.covariance(problem) + line.slopes @ line.slopes.transpose(0, 2, 1)
+    J = line.slopes * problem.spread
+    T = line.covariance(problem) + J @ J.transpose(0, 2, 1)
     known, beside = T[:, :count, :count], T[:, :count, count:]
     gain = np.linalg.solve(known, beside).transpose(0, 2, 1)
     r = line.residual[:, :, None]

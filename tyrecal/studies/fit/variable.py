@@ -8,16 +8,31 @@ from dataclasses import dataclass
 from ...simulate.deck.tyre_design import NEAR_ZERO
 from ...tyre.case.schema import Variable
 
+START_SPREAD = 0.5  # of ln of a variable that the case says no more of: 2.7 times at most, of 95 %
+
 
 @dataclass(frozen=True)
 class DesignVariable:
-    """A design variable: bounds in its own unit; ``log`` scaled inside the optimiser or not."""
+    """A design variable: bounds in its own unit; ``log`` scaled inside the optimiser or not;
+    percent: standard deviation of its start, None where it is not stated."""
 
     name: str
     start: float
     lower: float
     upper: float
     log: bool = True
+    percent: float | None = None
+
+    @property
+    def spread(self) -> float:
+        """Standard deviation of the coordinate about the start's, before any measurement; at most
+        that of a uniform distribution within the bounds."""
+        width = self.scaled(self.upper) - self.scaled(self.lower)
+        stated = START_SPREAD if self.log else width
+        if self.percent:
+            share = self.percent / 100
+            stated = math.log1p(share) if self.log else share * abs(self.start) / self.slope(0.0)
+        return min(stated, width / math.sqrt(12))
 
     def scaled(self, value: float) -> float:
         """The optimiser's coordinate of a value."""
@@ -41,4 +56,5 @@ def read_variable(name: str, v: Variable) -> DesignVariable:
     effect = all(path.startswith("effects.") for path in v.sets)
     least = NEAR_ZERO * max(abs(v.lower), abs(v.upper)) if effect else 0.0
     lower, upper = v.lower or least, v.upper or -least
-    return DesignVariable(name, min(max(v.start, lower), upper), lower, upper, v.scale == "log")
+    start = min(max(v.start, lower), upper)
+    return DesignVariable(name, start, lower, upper, v.scale == "log", v.percent)

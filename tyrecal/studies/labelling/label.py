@@ -25,8 +25,6 @@ from .tree import Frequencies
 
 Array = np.ndarray
 
-START_SPREAD = 0.5  # standard deviation of ln of a variable about the case's start value
-BOUNDS_SHARE = 0.25  # likewise of a linear one, of the distance between its bounds
 BAND_ABOVE = 1.25  # of the highest measured frequency, up to which modes are looked for
 MOST_HARMONICS = 20
 MODES_PER_HARMONIC = 3  # at least: both families, and one across the belt that comes between
@@ -66,8 +64,8 @@ class Labelled:
 
 def start_prior(variables: Sequence[DesignVariable]) -> Prior:
     """About the case's start values."""
-    spread = [START_SPREAD if v.log else BOUNDS_SHARE for v in variables]
-    return _prior(variables, {v.name: v.start for v in variables}, np.diag(spread))
+    root = np.diag([v.spread for v in variables])
+    return _prior(variables, {v.name: v.start for v in variables}, root)
 
 
 def fitted_prior(case: LoadedCase, fit: FitResult) -> Prior:

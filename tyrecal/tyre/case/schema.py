@@ -122,12 +122,14 @@ def cannot_fit(weights: Sequence[float], free: int) -> str | None:
 
 
 class Variable(Part):
-    """A design variable: the numbers it sets (dotted paths), its start and its bounds."""
+    """A design variable: the numbers it sets (dotted paths), its start, its bounds, how far a
+    search may go, and how well its start is known, one standard deviation."""
 
     sets: Annotated[list[str], Field(min_length=1)]
     start: Number
     lower: Number
     upper: Number
+    percent: Positive | None = None
     scale: Literal["log", "linear"] = "log"
 
     @classmethod
