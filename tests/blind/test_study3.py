@@ -32,7 +32,7 @@ from tyrecal.tyre.case import LoadedCase, with_level
 from tyrecal.tyre.effects import catalogue
 from tyrecal.tyre.load import load_case
 
-from ..chance import Chance
+from ..chance import Chance, generator
 from ..studies.blind_least_squares import SAFE, unpacked
 from ..studies.judge import tyre_told
 from ..studies.judge_section import LINES
@@ -236,16 +236,14 @@ def test_strong_effects_are_those_of_which_the_ruler_foresees_enough(chance: Cha
     assert foreseen(ruler, rules, trials[0].truth, "bead_filler", 0.0) == 0.0
 
 
-def test_what_is_evident_outside_the_catalogue_moves_as_much_as_one_effect(
-    chance: Chance, tmp_path: Path
-) -> None:
+def test_what_is_evident_outside_the_catalogue_moves_as_much_as_one_effect(tmp_path: Path) -> None:
     """Of the recorded ruler: the first mode 10 % lower at all pressures is evident, 0.1 % lower
     is not; sizes are the far ends of their ranges."""
     group = next(group for group in GROUPS if group.name == "205_60r15_own")
     unpacked(RECORDED / group.name, tmp_path / "trials")
     case, rules = case_of(tmp_path / "trials"), read_protocol(RECORDED / group.name)
     ruler = read_ruler(tmp_path / "trials", labels_of(case))
-    drawn = one_drawn(rules, case, group, "outside_strong", chance.random, None)
+    drawn = one_drawn(rules, case, group, "outside_strong", generator("evident"), None)
     (law,) = (EVIDENT[id] for id in drawn.effects)
     assert drawn.truth.kind == "outside" and 0.6 <= drawn.truth.size / law.high <= 1
     sound = {p: Computed({label: (3.0, 3.0) for label in LABELS}, 2.0) for p in rules.pressures_kPa}
