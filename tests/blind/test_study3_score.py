@@ -93,6 +93,10 @@ def test_outside_counts_by_what_it_moved() -> None:
     said = figures([seen] * 60 + [replace(weak, verdict="no_gap")] * 60, 60)
     assert said["outside: said so, or undecided"].startswith("60 of 120")
     assert said["outside, lambda from 25: said so, or undecided"].startswith("60 of 60")
+    alias = replace(seen, hard={"outside": Difficulty(30.0, 8.0, ("outside", "a"), None)})
+    said = figures([seen] * 60 + [replace(alias, verdict="named")] * 20, 60)
+    assert said["outside, lambda from 25: named"].startswith("20 of 80")
+    assert said["outside, lambda from 25, like no effect: named"].startswith("0 of 60")
 
 
 def test_misses_are_what_was_named_wrongly_and_what_should_have_been_found() -> None:

@@ -19,7 +19,7 @@ from tyrecal.measured.tables import read_measurements
 from tyrecal.studies.blind.answer import case_of
 from tyrecal.studies.blind.make import labels_of
 from tyrecal.studies.blind.protocol import Protocol, read_json, read_protocol
-from tyrecal.studies.blind.ruler import Difficulty, Ruler, difficulty, read_ruler
+from tyrecal.studies.blind.ruler import MIN_LAMBDA_APART, Difficulty, Ruler, difficulty, read_ruler
 from tyrecal.studies.blind.score import held_out_error, means, true_shift
 from tyrecal.studies.blind.seal import open_truth
 from tyrecal.studies.blind.statistics import calibration_error, calibration_quantile
@@ -252,6 +252,7 @@ def figures(
     none, outside, single = of("none"), of("outside"), of("effect")
     lam = lambda t: min((h.lam for h in t.hard.values()), default=0.0)
     strong, seen = ([t for t in those if lam(t) >= ONE] for those in (single, outside))
+    unlike = [t for t in seen if t.hard["outside"].nearest >= MIN_LAMBDA_APART]
     pairs, three = ([t for t in of("several") if len(t.effects) == n] for n in (2, 3))
     named = [t for t in trials if t.verdict == "named" and t.named]
     some = lambda t: t.found((t.named or "").split("+")) > 0
@@ -288,7 +289,11 @@ def figures(
         "named and called robust: likewise": shown((some(t) for t in robust), least_robust),
         **{
             f"outside{words}: {said}": shown(t.verdict in verdicts for t in those)
-            for words, those in (("", outside), (f", lambda from {ONE:g}", seen))
+            for words, those in (
+                ("", outside),
+                (f", lambda from {ONE:g}", seen),
+                (f", lambda from {ONE:g}, like no effect", unlike),
+            )
             for said, verdicts in (
                 ("said so, or undecided", ("outside", "undecided")),
                 ("named", ("named",)),
