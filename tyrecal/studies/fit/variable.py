@@ -28,10 +28,12 @@ class DesignVariable:
         """Standard deviation of the coordinate about the start's, before any measurement; at most
         that of a uniform distribution within the bounds."""
         width = self.scaled(self.upper) - self.scaled(self.lower)
-        stated = START_SPREAD if self.log else width
-        if self.percent:
-            share = self.percent / 100
-            stated = math.log1p(share) if self.log else share * abs(self.start) / self.slope(0.0)
+        if self.percent is None:
+            stated = START_SPREAD if self.log else width
+        elif self.log:
+            stated = math.log1p(self.percent / 100)
+        else:
+            stated = self.percent / 100 * abs(self.start) / (self.upper - self.lower)
         return min(stated, width / math.sqrt(12))
 
     def scaled(self, value: float) -> float:
