@@ -302,6 +302,7 @@ def tell(lines: list[dict]) -> None:
         "all": lines,
         "not settled by the first measurement": choice,
         "of these, settled once all is measured": could,
+        "of these, with the cheapest set": [x for x in could if "hindsight" in x],
         "of these, settled by the plan": [x for x in could if x["plan"]["hours"]],
     }
     heads = "tyres", "number", "way", "verdict reached", "right of these", "mean, median h"

@@ -6,6 +6,7 @@
     python -m tests.blind.study3 unpack DIR                  # all that is on record, truth beside
     python -m tests.blind.study3 score DIR > table.md        # of all answered, but LEARNED_FROM
     python -m tests.blind.study3 score DIR 11r22_5_own --least 1   # of one, few trials shown too
+    python -m tests.blind.study3 score DIR --series 4 5 --least 1  # of two series together
     python -m tests.blind.study3 power DIR > table.md        # what could be found, by its rulers
     python -m tests.blind.study3 rises DIR > table.md        # how far laws are off over the run
     python -m tests.blind.study3 mesh 205/60R15              # the maker's mesh error, and the model
@@ -23,7 +24,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import argparse
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -64,6 +65,7 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--seed", type=int)
     parser.add_argument("--least", type=int)
+    parser.add_argument("--series", type=int, nargs="+", default=())
     for kind, count in COUNTS.items():
         parser.add_argument(f"--{kind}", type=int, default=count)
     o = parser.parse_args()
@@ -83,7 +85,7 @@ def main() -> None:
         for group in (each for each in RECORDED.iterdir() if each.is_dir()):
             unpacked(group, Path(o.folder) / group.name, sealed_in(o.folder) / group.name)
     elif o.what == "score":
-        print(result(Path(o.folder), o.group, o.least))
+        print(result(Path(o.folder), o.group, o.least, o.series))
     else:
         folder, sealed = Path(o.folder) / o.group, sealed_in(o.folder) / o.group
         if o.what == "make":
@@ -101,21 +103,23 @@ def sealed_in(folder: str) -> Path:
     return Path(folder).with_name(f"{Path(folder).name}-truth")
 
 
-def result(folder: Path, group: str | None = None, least: int | None = None) -> str:
+def result(
+    folder: Path, group: str | None = None, least: int | None = None, together: Sequence[int] = ()
+) -> str:
     """Tables of all series whose groups are answered, but for the one that was learned from, or of
-    one group; least: see `table`."""
+    one group, or of the series ``together`` as if they were one; least: see `table`."""
     wanted = [g for g in GROUPS if (g.name == group if group else g.name != LEARNED_FROM)]
     counted = [g for g in wanted if (folder / g.name / ANSWERS).exists()]
     parts = ["# Blind study 3, as it was answered", ""]
-    for series in sorted({g.series for g in counted}):
+    for series in [together] if together else [(n,) for n in sorted({g.series for g in counted})]:
         found = {
             g: scored(folder / g.name, sealed_in(str(folder)) / g.name)
             for g in counted
-            if g.series == series
+            if g.series in series
         }
         names = ", ".join(g.name for g in found)
         parts += [
-            f"## Series {series}",
+            f"## Series {' and '.join(map(str, series))}",
             "",
             f"{names}.",
             "",
