@@ -261,7 +261,7 @@ def test_colours(environment: dict[str, str], red: bool) -> None:
             ["rim.reference_point_m.r=", "rim.reference_point_m.z="],
         ),
         ("modes cases/p235_75r17.yaml --set effects.cap", ["effects.cap_ply="]),
-        ("effects bead", ["bead_filler"]),
+        ("effects bead_f", ["bead_filler"]),
         ("diagnose cases/p235_75r17.yaml --effect tread_", ["tread_density", "tread_wear"]),
         ("diagnose cases/p235_75r17.yaml --add rim", ["rim_width="]),
         ("modes no_such.yaml --set A", []),

@@ -44,7 +44,7 @@ TYPED = {
     "tyrecal fit a,b.yaml --mesh=ref": "tyrecal fit a,b.yaml --mesh=refined ",
     "tyrecal modes a,b.yaml --set=A_b": "tyrecal modes a,b.yaml --set=A_belt=",
     "tyrecal fit --set C10=1 --mesh=coarse a": "tyrecal fit --set C10=1 --mesh=coarse a,b.yaml ",
-    "tyrecal effects bead": "tyrecal effects bead_filler ",
+    "tyrecal effects bead_f": "tyrecal effects bead_filler ",
     "tyrecal report dee": "tyrecal report deep/",
 }
 

@@ -184,6 +184,8 @@ def test_case_file_holds_effects_and_varies_them(case_folder) -> None:
         ("sidewall_gauge", -0.95),
         ("sidewall_gauge", 9.0),  # the section folds over
         ("rim_width", 0.1),
+        ("bead_seat", -0.1),
+        ("bead_seat", 1.0),
         ("pressure_offset", -161.0),
         ("temperature", 134.0),
         ("temperature_drift", -170.0),

@@ -16,6 +16,7 @@ from tyrecal.simulate.modes.label import Label
 from tyrecal.tyre.case import LoadedCase
 from tyrecal.tyre.case.parts import Cord, Gauge, RebarLayer
 from tyrecal.tyre.effects import catalogue
+from tyrecal.tyre.effects.bead_seat import LEAST
 from tyrecal.tyre.load import load_case
 from tyrecal.tyre.resolve import resolved
 from tyrecal.tyre.section.section import fill_lines
@@ -28,6 +29,7 @@ PLY = CASE.section.names.index("ply")
 RIM = int(np.flatnonzero(CASE.section.rigid)[0])
 EDGE = int(np.flatnonzero(~np.isnan(CASE.section.points[-2, :, 0]))[-1])
 FINE = load_case(CASES / "p235_75r17.yaml")
+NOTHING, BARELY = {"bead_seat": 1e-12}, {"bead_seat": 1e-9}
 AREAS = {
     name: layer.area_m2 / layer.spacing_m * CASE.case.materials[layer.material].density_kg_per_m3
     for name, layer in CASE.case.rebar_layers.items()
@@ -178,6 +180,61 @@ def test_wider_rim_bends_the_carcass_and_does_not_stretch_it() -> None:
     assert thickness[1] == pytest.approx(thickness[0], rel=1e-9)
 
 
+def test_a_bead_that_does_not_sit_is_one_whose_table_says_so() -> None:
+    """Its first stations free: elements, materials and cords are the bead's. Stations are so near
+    that chords are as long as the arc."""
+    table, bead = CASE.section, len(CASE.section.rigid) - 1 - RIM
+    free = bead // 2
+    rigid = table.rigid.copy()
+    rigid[RIM : RIM + free] = False
+    regions = (*table.regions[:-1], ("bead_gap", free), ("bead", bead - free))
+    level = CASE.case.mesh.levels["default"]
+    levels = {"default": level.model_copy(update={"elements": {**level.elements, "bead_gap": 1}})}
+    mesh = CASE.case.mesh.model_copy(update={"levels": levels})
+    by_hand = replace(
+        CASE,
+        case=CASE.case.model_copy(update={"mesh": mesh}),
+        drawn=replace(table, regions=regions, rigid=rigid),
+    )
+    lengths = length(table.points[PLY])[RIM:] - length(table.points[PLY])[RIM]
+    share = (float(lengths[free] / lengths[-1]) - LEAST) / (1 - LEAST)
+    found, expected = frequencies(bead_seat=share), frequencies(by_hand)
+    assert list(found.values()) == pytest.approx(list(expected.values()), rel=1e-6)
+
+
+def test_a_bead_that_nearly_sits_is_one_that_does_and_weighs_the_same() -> None:
+    """But for a fiftieth of the bead and what its elements add to a coarse mesh, 1 % of it."""
+    plain, barely, nearly = (frequencies(**given) for given in ({}, NOTHING, BARELY))
+    assert list(barely.values()) == pytest.approx(list(plain.values()), rel=0.01)
+    assert list(nearly.values()) == pytest.approx(list(barely.values()), rel=1e-8)
+    assert mass(bead_seat=0.8) == pytest.approx(mass(), rel=1e-4)
+
+
+def test_what_the_rim_lets_go_may_have_cords_rubbers_and_gauges_of_its_own() -> None:
+    case = with_values(CASE, {"effects.bead_seat": 0.5})
+    parts = CASE.case
+    layer = parts.rebar_layers["carcass"]
+    bead_only = layer.model_copy(update={"regions": ["bead"]})
+    solid = parts.solids[0].model_copy(update={"regions": ["bead"]})
+    gauge = Gauge(between=["inner", "ply"], regions=["bead"], factor=1.1)
+    case = replace(
+        case,
+        case=case.case.model_copy(
+            update={
+                "rebar_layers": {**parts.rebar_layers, "wires": bead_only},
+                "solids": [*parts.solids, solid],
+                "section": parts.section.model_copy(update={"gauges": [gauge]}),
+            }
+        ),
+    )
+    written = resolved(case).written.case
+    both = ["bead", "bead_gap"]
+    assert written.rebar_layers["wires"].regions == both
+    assert written.rebar_layers["carcass"].regions is None
+    assert written.solids[-1].regions == both and written.solids[0].regions is None
+    assert written.section.gauges and written.section.gauges[0].regions == both
+
+
 # the vibration's modulus
 
 
@@ -218,6 +275,11 @@ RISES = {
     "temperature": -5.0,
     "temperature_drift": 2.0,  # colder below the case's pressure
 }
+
+
+def test_every_mode_falls_where_a_bead_does_not_sit() -> None:
+    plain, with_it = frequencies(), frequencies(bead_seat=0.5)
+    assert all(with_it[label] < f for label, f in plain.items())
 
 
 @pytest.mark.parametrize("id", RISES)

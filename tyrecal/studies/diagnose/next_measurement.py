@@ -35,6 +35,7 @@ SIZES = 7  # of each explanation
 HOURS = dict(
     weigh=0.1,
     rim=0.2,
+    seat=0.2,
     calliper=0.5,
     pressure=1.0,
     helium=1.0,
@@ -48,6 +49,7 @@ HOURS = dict(
 """Of a laboratory, as an orientation."""
 READ = {
     "rim": ("measure the rim between its flanges", {"rim_width"}),
+    "seat": ("look how level the moulded line runs with the flange", {"bead_seat"}),
     "calliper": ("check gauges and widths with a calliper", {"tread_wear", "sidewall_gauge"}),
     "cut": (
         "cut the tyre and measure its section",

@@ -1,0 +1,105 @@
+"""The bead does not sit: there is a gap between it and the rim, from the flange's top down."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+
+from ..case import LoadedCase
+from ..section.section import Section, fill_lines
+from ..section.spline import CubicSpline
+from .edit import changed, unused, with_part
+from .effect import Effect
+from .parts import carcass_line, held_regions, present, rim_edge, stations
+
+LEAST = 0.02  # of the bead: slivers of elements fold over, and count as a finer mesh
+
+
+def add(case: LoadedCase, value: float) -> LoadedCase:
+    """The rim lets go of a share ``value`` of the bead's length, which keeps all that it is made
+    of: a region of its own, with as many elements as the bead has."""
+    if not 0 <= value < 1:
+        raise ValueError("must be at least 0 and less than 1")
+    section = case.section
+    bead = held_regions(section)[0]
+    if stations(section, bead)[0] != rim_edge(section):
+        raise ValueError(f"must be 0: what the rim holds begins within region '{bead}'")
+    gap = unused(f"{bead}_gap", [name for name, _ in section.regions])
+
+    def wider(regions: list[str] | None) -> list[str] | None:
+        return [*regions, gap] if regions and bead in regions else regions
+
+    own = case.case
+    return changed(
+        replace(case, drawn=_let_go(section, carcass_line(case), bead, gap, value)),
+        solids=[with_part(solid, regions=wider(solid.regions)) for solid in own.solids],
+        rebar_layers={
+            name: with_part(layer, regions=wider(layer.regions))
+            for name, layer in own.rebar_layers.items()
+        },
+        section=with_part(
+            own.section,
+            gauges=[
+                with_part(gauge, regions=wider(gauge.regions)) for gauge in own.section.gauges or []
+            ],
+        ),
+        mesh=with_part(
+            own.mesh,
+            levels={
+                name: with_part(level, elements={**level.elements, gap: level.elements[bead]})
+                for name, level in own.mesh.levels.items()
+            },
+        ),
+    )
+
+
+@lru_cache(maxsize=8)
+def _let_go(section: Section, carcass: str, bead: str, gap: str, share: float) -> Section:
+    """The section with region ``gap`` above ``bead``, of a share of its length along the carcass;
+    both have as many stations as the bead had."""
+    first, last = stations(section, bead)
+    whole = fill_lines(section)[:, first : last + 1].swapaxes(0, 1)
+    steps = np.diff(whole[:, section.names.index(carcass)], axis=0)
+    along = np.concatenate([[0.0], np.cumsum(np.hypot(*steps.T))])
+    count = last - first
+    edge = (share + LEAST * (1 - share)) * along[-1]
+    at = np.concatenate(
+        [np.linspace(0, edge, count + 1), np.linspace(edge, along[-1], count + 1)[1:]]
+    )
+    points = CubicSpline(along, whole)(at).swapaxes(0, 1)
+    points[~present(section)[:, first : last + 1].all(1)] = np.nan
+    points[:, 0] = section.points[:, first]
+    k = section.regions.index((bead, count))
+    return replace(
+        section,
+        points=np.concatenate(
+            [section.points[:, :first], points, section.points[:, last + 1 :]], 1
+        ),
+        regions=(*section.regions[:k], (gap, count), *section.regions[k:]),
+        rigid=np.insert(section.rigid, first, np.zeros(count, bool)),
+    )
+
+
+EFFECT = Effect(
+    id="bead_seat",
+    place=125,
+    title="Bead seat",
+    symbol="g",
+    unit="",
+    # a bead that was mounted dry stops on its way up the rim; one that hardly holds leaks
+    low=0.0,
+    high=0.8,
+    changes=("*NODE", "*ELEMENT", "*BOUNDARY"),
+    signature=(
+        "all down, [0,0] torsional and [1,1] 4 %, [0,0] lateral and [2,1] 3 %, the rest 1 to 2 %"
+        " at g = 0.8; a re-fit leaves [1,1] 2 % too low, [1,0] as much too high"
+    ),
+    toggle="let the air out, wet both beads with soap, inflate until they snap onto their seats,"
+    " and look that the moulded line runs level with the flange all round",
+    aliases=(),
+    add=add,
+    # how far a bead rolls about its wires: they are a ring here, as thin as their line
+    law=0.15,
+)
