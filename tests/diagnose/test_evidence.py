@@ -453,14 +453,16 @@ def test_a_refit_never_ends_above_where_it_began() -> None:
 
 
 def test_covariance_is_what_it_says() -> None:
-    """Model-form error: 0.9 between pressures, 0.97 between runs, none between modes."""
+    """Model-form error: exp(-ln(1.5)^2 / (2 1.6^2)) between 160 and 240 kPa, 0.97 between runs,
+    none between modes."""
     toy = Toy(pressures=(160.0, 240.0))
     p = problem(toy, changes=(Toggle("e0", 0.0),), noise=1e-9)
     S = covariance(p.observations, 0 * p.constants, 0.0, form=0.01) / 1e-4
     n = len(toy.base)
-    assert S[0, len(LABELS)] == pytest.approx(0.9)
+    smooth = np.exp(-(np.log(1.5) ** 2) / (2 * 1.6**2))
+    assert S[0, len(LABELS)] == pytest.approx(smooth)
     assert S[0, n] == pytest.approx(0.97)
-    assert S[0, n + len(LABELS)] == pytest.approx(0.9 * 0.97)
+    assert S[0, n + len(LABELS)] == pytest.approx(0.97 * smooth)
     assert S[0, 1] == 0 and np.linalg.eigvalsh(S).min() > 0
 
 

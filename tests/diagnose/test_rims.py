@@ -15,7 +15,7 @@ from tyrecal.report.diagnosis_pictures import draw_residuals
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator
 from tyrecal.simulate.modes.label import Label
-from tyrecal.studies.diagnose.covariance import BETWEEN_PRESSURES, alike
+from tyrecal.studies.diagnose.covariance import BETWEEN_SUPPORTS, alike
 from tyrecal.studies.diagnose.model import Answer, ModelRow, Query
 from tyrecal.studies.diagnose.observations import Observable, observe
 from tyrecal.studies.diagnose.result import Residual, diagnosis_result
@@ -74,7 +74,7 @@ def test_an_observation_says_its_rim(tmp_path: Path) -> None:
         key=lambda row: (row[1] == FREE, row[0].c, row[0].m, row[0].kind or ""),  # type: ignore[union-attr]
     )
     same = alike(rows)
-    assert same[0, 5] == same[4, 9] == BETWEEN_PRESSURES and same[0, 6] == 0
+    assert same[0, 5] == same[4, 9] == BETWEEN_SUPPORTS and same[0, 6] == 0
     assert str(rows[9]) == "[2,0] at 240 kPa, rim free"
     for row in rows:
         told = Residual(row=str(row), run=0, percent=1.0, sigma_percent=1.0).of

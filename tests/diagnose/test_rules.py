@@ -823,7 +823,10 @@ def test_the_gains_of_further_rows_by_their_formula() -> None:
         same = np.eye(len(whole))
         for k, i in enumerate(at):
             if rows[i][0] in LABELS:
-                same[9 + k, LABELS.index(rows[i][0])] = same[LABELS.index(rows[i][0]), 9 + k] = 0.9
+                mode = LABELS.index(rows[i][0])
+                same[9 + k, mode] = same[mode, 9 + k] = np.exp(
+                    -(np.log(rows[i][1] / 240.0) ** 2) / (2 * 1.6**2)
+                )
         S = np.diag(np.square(noise)) + same * np.outer(sizes, sizes) + constants @ constants.T
         S = S + 1e-12 * np.eye(len(S)) + whole @ np.diag(toy.spread**2) @ whole.T
         g = {id: 0.5 * np.append(toy.g[id], moved[id][at]) for id in moved}

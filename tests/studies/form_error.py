@@ -5,7 +5,9 @@
 For each variant: d = ln f_variant - ln f_default of all modes at three pressures; what the three
 design variables can absorb is taken out by least squares, as a calibration would; the rest is the
 error of form. Printed: its rms over variants and pressures, per mode, in per cent, times
-sqrt(n / (n - v)) for the directions that were taken out. No measured data enter.
+sqrt(n / (n - v)) for the directions that were taken out. Then the length of ln p over which d is
+alike: rho = sum d d' / sqrt(sum d^2 sum d'^2) of two pressures is exp(-(ln p - ln p')^2 / (2 l^2)).
+No measured data enter.
 """
 
 from __future__ import annotations
@@ -26,6 +28,7 @@ from tyrecal.tyre.case.parts import Level
 from tyrecal.tyre.load import load_case
 
 PRESSURES = (160.0, 240.0, 320.0)
+Array = np.ndarray
 LABELS = [Label(0, 0, "axial"), Label(0, 0, "torsional")]
 LABELS += [Label(c, m) for c in range(1, 7) for m in (0, 1)]
 FITTED = {"A_belt": 2.543e-7, "A_carcass": 6.198e-8, "C10": 6.526e5}
@@ -68,24 +71,37 @@ def answer(case: LoadedCase) -> Answer:
 
 
 def main() -> None:
-    for label, percent in computed(print).items():
+    by_mode, length = computed(print)
+    for label, percent in by_mode.items():
         print(f'    "{label}": {percent:.2f},')
+    print(f"alike over {length:.1f} of ln p")
 
 
-def computed(tell: Callable[[str], None] = lambda line: None) -> dict[str, float]:
-    """Per cent by mode."""
+def computed(tell: Callable[[str], None] = lambda line: None) -> tuple[dict[str, float], float]:
+    """Per cent by mode, and the length of ln p."""
     case = load_case(CASES / "p235_75r17.yaml")
     plain = answer(case)
-    J, squares = plain.jacobian, []
+    J, squares, errors = plain.jacobian, [], []
     n, v = J.shape
     for name, variant in variants(case).items():
         d = answer(variant).eta - plain.eta
+        errors.append(d.reshape(len(PRESSURES), -1))
         rest = d - J @ np.linalg.lstsq(J, d, rcond=None)[0]
         squares.append(rest.reshape(len(PRESSURES), -1) ** 2)
         raw, left = (100 * np.sqrt(np.mean(x**2)) for x in (d, rest))
         tell(f"{name}: rms {raw:.2f} %, {left:.2f} % after calibration")
     per_mode = np.sqrt(np.mean(squares, axis=(0, 1)) * n / (n - v))
-    return {str(x): max(FLOOR, 100 * sigma) for x, sigma in zip(LABELS, per_mode, strict=True)}
+    percent = {str(x): max(FLOOR, 100 * sigma) for x, sigma in zip(LABELS, per_mode, strict=True)}
+    return percent, alike_over(np.concatenate(errors, axis=1))
+
+
+def alike_over(d: Array) -> float:
+    """l by least squares of -ln rho = (ln p - ln p')^2 / (2 l^2), errors (pressures, n)."""
+    size = np.sqrt((d**2).sum(1))
+    rho = (d @ d.T) / np.outer(size, size)
+    pairs = np.triu_indices(len(d), 1)
+    half = np.log(np.divide.outer(PRESSURES, PRESSURES))[pairs] ** 2 / 2
+    return float(np.sqrt(half @ half / (half @ -np.log(rho[pairs]))))
 
 
 if __name__ == "__main__":

@@ -6,7 +6,6 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from ..studies.diagnose.constants_told import constants_told
-from ..studies.diagnose.covariance import BETWEEN_PRESSURES
 from ..studies.diagnose.diagnosis import Diagnosis
 from ..studies.diagnose.evidence import COVERAGE, NONE, OUTSIDE, PRIOR_OUTSIDE
 from ..studies.diagnose.gap import OWN_RIM
@@ -415,7 +414,7 @@ def _assumptions(study: DiagnosedCase) -> Iterator[str]:
     yield f"Constants that nobody calibrates, one standard deviation each ({kind}): {words}."
     a = d.problem.assumed
     form = "as recorded for every mode" if a.form is None else f"{100 * a.form:g} % in every mode"
-    form += f", correlated {BETWEEN_PRESSURES:g} between pressures"
+    form += ", smooth over the pressure"
     if a.form is None and (material := d.problem.expansion.material_laws):
         form += (
             f", and by material laws, smooth over the pressure, {100 * material:g} % in all modes"

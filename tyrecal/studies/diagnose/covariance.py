@@ -3,35 +3,41 @@
     Sigma = Sigma_rep + Sigma_form + sum_k s_k^2 g_k g_k^T
 
 Sigma_rep: repeatability, with the part that all frequencies of a run share; Sigma_form: what our
-own model is uncertain by: mesh and element, mode by mode and alike in all states (0.9), and
-material laws (`laws_alike`), both alike in all runs of the same tyre (0.97); s_k g_k: the constants
+own model is uncertain by: mesh and element, mode by mode, smoothly over the pressure and alike under
+other loads and rims (0.9), and material laws (`laws_alike`), both alike in all runs of the same
+tyre (0.97); s_k g_k: the constants
 that nobody calibrates, common to all runs.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
 
-from .form_error import form_error, laws_alike
+from .form_error import FORM_LENGTH, at_pressures, form_error, laws_alike
 from .observations import Observable, Observations
 
 Array = np.ndarray
-BETWEEN_PRESSURES, BETWEEN_RUNS = 0.9, 0.97
+BETWEEN_SUPPORTS, BETWEEN_RUNS = 0.9, 0.97
 
 
 @lru_cache(16)
 def alike(rows: tuple[Observable, ...]) -> Array:
     """Correlation (n, n) of what belongs to a mode: 1 on the diagonal, 0 between modes."""
-    result = np.zeros((len(rows), len(rows)))
-    for i, a in enumerate(rows):
-        for j, b in enumerate(rows):
-            if a.label == b.label and a.quantity == b.quantity:
-                result[i, j] = 1.0 if a.state == b.state else BETWEEN_PRESSURES
-    result *= between_runs(rows)
+    held = [replace(row.state, pressure_kPa=None) for row in rows]
+    alike_held = np.array([[1.0 if a == b else BETWEEN_SUPPORTS for b in held] for a in held])
+    smooth = at_pressures(_pressures_kPa(rows), FORM_LENGTH)
+    result = of_one_mode(rows) * alike_held * smooth * between_runs(rows)
     result.flags.writeable = False
-    return result
+    return np.asarray(result)
+
+
+def of_one_mode(rows: tuple[Observable, ...]) -> Array:
+    """Whether two rows (n, n) are of one mode."""
+    modes = [(row.label, row.quantity) for row in rows]
+    return np.array([[a == b for b in modes] for a in modes])
 
 
 @lru_cache(16)
@@ -46,10 +52,15 @@ def between_runs(rows: tuple[Observable, ...]) -> Array:
 @lru_cache(16)
 def by_laws(rows: tuple[Observable, ...]) -> Array:
     """What material laws do (n, n), by the variance of each part; see `laws_alike`."""
-    pressures = np.array([row.pressure_kPa if row.label else 1.0 for row in rows])
-    result = between_runs(rows) * laws_alike([row.label for row in rows], pressures)
+    laws = laws_alike([row.label for row in rows], _pressures_kPa(rows))
+    result = between_runs(rows) * laws
     result.flags.writeable = False
     return np.asarray(result)
+
+
+def _pressures_kPa(rows: tuple[Observable, ...]) -> Array:
+    """(n,), 1 of a mass, which has none."""
+    return np.array([row.pressure_kPa if row.label else 1.0 for row in rows])
 
 
 def repeatability(observations: Observations) -> Array:

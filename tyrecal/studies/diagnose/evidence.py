@@ -16,7 +16,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from .covariance import BETWEEN_PRESSURES, alike
+from .covariance import between_runs, of_one_mode
 from .expansion import Nodes
 from .gap import family
 from .inverse_problem import Added, InverseProblem
@@ -37,6 +37,7 @@ COUPLED_STEPS = 8  # more where near modes are coupled
 REFITTED = 1e-6  # of the misfit, a fall that is not worth a step
 FAR_BELOW, ABOVE_POINTS = 20.0, 1.0  # of ln Z: how far a spline may fall, and rise above its points
 UNKNOWN = (0.005, 0.01, 0.02, 0.04)  # shift of modes by what no catalogue holds
+UNKNOWN_ALIKE = 0.9  # correlation of such a shift of a mode in two states
 SMOOTH_HARMONICS, SMOOTH_LN_F = 2.0, 0.5  # over which trends change
 INFLATION = (2.0, 4.0)  # all of Sigma's standard deviations
 MISREAD = 0.2  # of a frequency whose label is another mode's
@@ -285,14 +286,14 @@ def families(problem: InverseProblem) -> list[Family]:
     An error of reading: one label is another mode's at all pressures.
     """
     rows = problem.observations.rows
-    same = alike(rows) * [row.label is not None for row in rows]
+    between = np.array([[1.0 if a.state == b.state else UNKNOWN_ALIKE for b in rows] for a in rows])
+    same = (
+        of_one_mode(rows) * between * between_runs(rows) * [row.label is not None for row in rows]
+    )
     found = [
         Family(f"modes are off by {size:.1%} in a way of their own", size**2 * same, False)
         for size in UNKNOWN
     ]
-    between = np.array(
-        [[1.0 if a.state == b.state else BETWEEN_PRESSURES for b in rows] for a in rows]
-    )
     for over, together in _smooth(rows, problem.observations.y):
         words = f"smoothly over {over}"
         found += [

@@ -34,6 +34,9 @@ PERCENT = {
     "[6,1]": 0.16,
 }
 OTHERS = 0.44  # of modes that the study has not: as the worst of those that it has
+FORM_LENGTH = (
+    1.6  # l, of ln p, over which mesh and element do the same to a mode: likewise computed
+)
 # of ln f of a tyre that is none of our own computing, by judgement, each: what all modes share,
 # what a family's do, and what is a mode's own
 MATERIAL_LAWS = 0.003
@@ -45,15 +48,20 @@ def form_error(label: Label | None) -> float:
     return 0.0 if label is None else PERCENT.get(str(label), OTHERS) / 100
 
 
+def at_pressures(pressures_kPa: Array, length: float) -> Array:
+    """Correlation (n, n) of what changes smoothly with the pressure, at pressures (n,):
+    exp(-(ln p - ln p')^2 / (2 l^2)), l = ``length``."""
+    far = np.log(pressures_kPa[:, None] / pressures_kPa)
+    return np.asarray(np.exp(-(far**2) / (2 * length**2)))
+
+
 def laws_alike(labels: Sequence[Label | None], pressures_kPa: Array) -> Array:
     """Covariance (n, n) of what laws do to modes at pressures (n,), each part of variance 1: over
-    all modes, within a family, and within a mode, exp(-(ln p - ln p')^2 / (2 l^2)) between
-    pressures; 0 of what is no mode."""
-    far = np.log(pressures_kPa[:, None] / pressures_kPa)
+    all modes, within a family, and within a mode; 0 of what is no mode."""
     modes = np.array([label is not None for label in labels], float)
     of_families = _same([label and label.family for label in labels])
     alike = np.outer(modes, modes) + of_families + _same(labels)
-    return np.asarray(alike * np.exp(-(far**2) / (2 * LAWS_LENGTH**2)))
+    return np.asarray(alike * at_pressures(pressures_kPa, LAWS_LENGTH))
 
 
 def _same(of: Sequence[object]) -> Array:

@@ -98,7 +98,7 @@ EFFECT = Effect(
     ),
     toggle="let the air out, wet both beads with soap, inflate until they snap onto their seats,"
     " and look that the moulded line runs level with the flange all round",
-    aliases=(),
+    aliases=("rim_width",),
     add=add,
     # how far a bead rolls about its wires: they are a ring here, as thin as their line
     law=0.15,
