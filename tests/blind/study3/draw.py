@@ -188,5 +188,5 @@ def made(each: Drawn, case: LoadedCase, group: Group, without: tuple[str, ...] =
     effects, outside = known_laws(case, group)
     for id, size in each.effects.items():
         if id not in without:
-            built = {**effects, **outside}[id].add(built, size)
+            built = {**effects, **outside, **EVIDENT}[id].add(built, size)
     return built

@@ -1,8 +1,9 @@
 """What is the matter with tyres of study 3, written on the maker's own tyre.
 
-Parameters mean what the catalogue's do and have its ranges; how they enter is the maker's own. Four
+Parameters mean what the catalogue's do and have its ranges; how they enter is the maker's own. Six
 families that no catalogue holds, each with what it is in a workshop's words. They were chosen
-before any diagnosis of theirs was run, and nothing was tuned on them.
+before any diagnosis of theirs was run, and nothing was tuned on them. (A seventh was a bead that
+does not sit, over up to four fifths of it: outside in the series up to 6, and in the catalogue now.)
 """
 
 from __future__ import annotations
@@ -131,6 +132,11 @@ def carcass_fanning(tyre: Tyre, e: float) -> Tyre:
     return replace(tyre, fan=e)
 
 
+def bead_seat(tyre: Tyre, e: float) -> Tyre:
+    """The rim does not touch the outside of a share e of the bead, from the flange's top on."""
+    return replace(tyre, mould=replace(tyre.mould, unseated=e))
+
+
 def _spindle(way: str) -> Law:
     """What clamps the wheel is softer, and its hub, a fifth of the wheel's mass that no case knows,
     moves with it."""
@@ -155,12 +161,6 @@ def parted_belts(tyre: Tyre, e: float) -> Tyre:
     return replace(tyre, parted=e)
 
 
-def unseated_bead(tyre: Tyre, e: float) -> Tyre:
-    """The tyre was mounted dry: over a share e of the bead, from the flange's top, there
-    is a gap to the rim."""
-    return replace(tyre, mould=replace(tyre.mould, unseated=e))
-
-
 def shrunk_cords(tyre: Tyre, e: float) -> Tyre:
     """Not post-inflated: textile cords of carcass and cap shrank in cooling, steel did not."""
     cords = {name: replace(c, prestrain=-e) if c.textile else c for name, c in tyre.cords.items()}
@@ -170,6 +170,25 @@ def shrunk_cords(tyre: Tyre, e: float) -> Tyre:
 def sealant(tyre: Tyre, e: float) -> Tyre:
     """A layer on the inside under the belt that seals punctures: mass, and no stiffness."""
     return replace(tyre, lining=e)
+
+
+def high_flange(tyre: Tyre, e: float) -> Tyre:
+    """A rim whose flange holds the sidewall e m further up, as a ring that clamps beads does."""
+    m = tyre.mould
+    bead = float(np.hypot(*np.subtract(m.rim, m.seat)))
+    return replace(tyre, mould=replace(m, unseated=-e / bead))
+
+
+def aged_skim(tyre: Tyre, e: float) -> Tyre:
+    """Years of heat and air have hardened the rubber between the belts, which holds most sulphur:
+    its modulus times 1 + e."""
+    return tempered(tyre, "belt_skim", 1 + e)
+
+
+def sticking_gauge(tyre: Tyre, e: float) -> Tyre:
+    """Its pointer stays behind as air is let out to a test's lower pressures: right at the case's
+    pressure and above, below it a share e more is in the tyre than wanted."""
+    return replace(tyre, left_in=e)
 
 
 def laws(case: LoadedCase) -> dict[str, OwnLaw]:
@@ -191,6 +210,7 @@ def laws(case: LoadedCase) -> dict[str, OwnLaw]:
             temperature_drift,
             cap_ply,
             carcass_fanning,
+            bead_seat,
             *(_spindle(id.removeprefix("spindle_")) for id in CLAMP),
         )
     }
@@ -198,16 +218,16 @@ def laws(case: LoadedCase) -> dict[str, OwnLaw]:
 
 OUTSIDE: Mapping[str, OwnLaw] = {
     "parted_belts": OwnLaw(0.0, 0.03, parted_belts),
-    "unseated_bead": OwnLaw(0.0, 0.8, unseated_bead),
     "shrunk_cords": OwnLaw(0.0, 0.01, shrunk_cords),
     "sealant": OwnLaw(0.0, 6.0, sealant),
 }
-"""m of belt, a share of the bead, strain, kg/m2: at most a third of half a belt, and 1.8 kg of
+"""m of belt, strain, kg/m2: at most a third of half a belt, and 1.8 kg of
 sealant in a 205/60R15."""
 EVIDENT: Mapping[str, OwnLaw] = {
-    "parted_belts": OwnLaw(0.0, 0.06, parted_belts),
-    "unseated_bead": OUTSIDE["unseated_bead"],
+    "high_flange": OwnLaw(0.0, 0.010, high_flange),
+    "aged_skim": OwnLaw(0.0, 3.0, aged_skim),
+    "sticking_gauge": OwnLaw(0.0, 0.12, sticking_gauge),
 }
-"""Those that move modes enough to be seen, from `EVIDENT_FROM` of these ranges on: belts part by
-some centimetres before a tyre fails."""
+"""Those that move modes enough to be seen, from `EVIDENT_FROM` of these ranges on: m of sidewall,
+and shares. Belts that have parted by some centimetres do not."""
 EVIDENT_FROM = 0.6

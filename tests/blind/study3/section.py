@@ -60,7 +60,8 @@ class Mould:
     thinner_inside: tuple[float, ...] = (0.0, 0.0)
     worn: float = 0.0  # of skid and base, more towards the shoulder
     blown: float = 0.0  # share more outside the carcass about the widest point
-    unseated: float = 0.0  # share of the bead, from the flange's top, that the rim does not hold
+    unseated: float = 0.0  # share of the bead, from the flange's top, that the rim does not hold;
+    # negative: as much more of the sidewall that it does
 
     @property
     def crown_gauge(self) -> float:
@@ -191,10 +192,12 @@ def carcass(m: Mould) -> tuple[Array, Array, dict[str, float]]:
 
 
 def breaks(m: Mould, marks: dict[str, float]) -> list[float]:
-    """s where parts begin or end, from the crown on."""
-    half, tip, rim = max(m.belts), marks["filler"], marks["rim"]
+    """s where parts begin or end, from the crown on; where the rim does not hold the bead from
+    where its wires begin, both in place of the strip's end, as many."""
+    half, tip, rim, held = max(m.belts), marks["filler"], marks["rim"], marks["held"]
+    low = sorted([rim, held]) if m.unseated else [(tip + rim) / 2, held]
     edges = [*m.belts, m.cap, SKIM * half, TREAD * half]
-    ends = sorted([*edges, marks["turn_up"], tip, (tip + rim) / 2, marks["held"], marks["end"]])
+    ends = sorted([*edges, marks["turn_up"], tip, *low, marks["end"]])
     return [0.0, *(b for a, b in zip([0.0, *ends], ends, strict=False) if b - a > 1e-4)]
 
 

@@ -56,6 +56,7 @@ class Tyre:
     nominal_Pa: pressure of the case. The rest is 0 in a sound tyre: kelvin above the case's
     temperature, drift in kelvin per 100 kPa, gauge as a share of the pressure, cap N/m more, fan:
     A/s falls as (bead radius / r)^fan, parted: m of belt edge, lining: kg/m2 under the belt,
+    left_in: share more of a pressure below the case's,
     spindle: compliance by direction, m/N or rad/(N m); wheel: its mass, kg, and moments of inertia,
     polar and diametral, kg m2, which no other tyre feels."""
 
@@ -73,6 +74,7 @@ class Tyre:
     cap: float = 0.0
     fan: float = 0.0
     parted: float = 0.0
+    left_in: float = 0.0
     lining: float = 0.0
     spindle: Mapping[str, float] = field(default_factory=dict)
     wheel: tuple[float, float, float] = (15.0, 0.43, 0.27)
@@ -197,7 +199,8 @@ class Mesh:
 def _state(tyre: Tyre, mesh: Mesh, nominal: float) -> dict[str, Any]:
     """Constants of every cell, and of the line above it, at a pressure that a gauge shows."""
     m, marks, s = tyre.mould, mesh.section.marks, mesh.middle
-    pressure = (nominal + tyre.shift_Pa) * (1 + tyre.gauge)
+    below = nominal < tyre.nominal_Pa
+    pressure = (nominal + tyre.shift_Pa) * (1 + tyre.gauge + below * tyre.left_in)
     # a run of pressures warms the tyre, less and less
     kelvin = tyre.kelvin + 1.25 * tyre.drift * atan((nominal - tyre.nominal_Pa) / 1e5 / 1.25)
     names = material_names(mesh, tyre)

@@ -88,18 +88,19 @@ EFFECT = Effect(
     title="Bead seat",
     symbol="g",
     unit="",
-    # a bead that was mounted dry stops on its way up the rim; one that hardly holds leaks
+    # a bead that was mounted dry stops on its way up the rim; where less than half of it is held,
+    # what rolls presses the turned-up cords until they wrinkle, as finely as the mesh lets them
     low=0.0,
-    high=0.8,
+    high=0.5,
     changes=("*NODE", "*ELEMENT", "*BOUNDARY"),
     signature=(
-        "all down, [0,0] torsional and [1,1] 4 %, [0,0] lateral and [2,1] 3 %, the rest 1 to 2 %"
-        " at g = 0.8; a re-fit leaves [1,1] 2 % too low, [1,0] as much too high"
+        "all down, [0,0] torsional and [1,1] by 2.6 %, [0,0] lateral and [2,1] by 2 %, the rest by 1"
+        " at g = 0.5; a re-fit leaves [1,1] 1.2 % too low, [1,0] as much too high"
     ),
     toggle="let the air out, wet both beads with soap, inflate until they snap onto their seats,"
     " and look that the moulded line runs level with the flange all round",
     aliases=("rim_width",),
     add=add,
-    # how far a bead rolls about its wires: they are a ring here, as thin as their line
-    law=0.15,
+    # how far a bead rolls about its wires
+    law=0.08,
 )
