@@ -2,8 +2,8 @@
 
 Parameters mean what the catalogue's do and have its ranges; how they enter is the maker's own. Six
 families that no catalogue holds, each with what it is in a workshop's words. They were chosen
-before any diagnosis of theirs was run, and nothing was tuned on them. (A seventh was a bead that
-does not sit, over up to four fifths of it: outside in the series up to 6, and in the catalogue now.)
+before any diagnosis of theirs was run, and nothing was tuned on them. (A seventh was outside in the
+series up to 6 and is in the catalogue now: a bead that does not sit, there over up to four fifths.)
 """
 
 from __future__ import annotations

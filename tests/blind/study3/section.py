@@ -60,8 +60,7 @@ class Mould:
     thinner_inside: tuple[float, ...] = (0.0, 0.0)
     worn: float = 0.0  # of skid and base, more towards the shoulder
     blown: float = 0.0  # share more outside the carcass about the widest point
-    unseated: float = 0.0  # share of the bead, from the flange's top, that the rim does not hold;
-    # negative: as much more of the sidewall that it does
+    unseated: float = 0.0  # share of the bead, from its top, that the rim lets go; < 0: holds more
 
     @property
     def crown_gauge(self) -> float:

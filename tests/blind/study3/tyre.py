@@ -55,10 +55,10 @@ class Tyre:
     """wires: E A of a bead, N, and their kg/m; shift_Pa: what a gauge is off at all pressures;
     nominal_Pa: pressure of the case. The rest is 0 in a sound tyre: kelvin above the case's
     temperature, drift in kelvin per 100 kPa, gauge as a share of the pressure, cap N/m more, fan:
-    A/s falls as (bead radius / r)^fan, parted: m of belt edge, lining: kg/m2 under the belt,
-    left_in: share more of a pressure below the case's,
-    spindle: compliance by direction, m/N or rad/(N m); wheel: its mass, kg, and moments of inertia,
-    polar and diametral, kg m2, which no other tyre feels."""
+    A/s falls as (bead radius / r)^fan, parted: m of belt edge, left_in: share more of a pressure
+    below the case's, lining: kg/m2 under the belt, spindle: compliance by direction, m/N or
+    rad/(N m); wheel: its mass, kg, and moments of inertia, polar and diametral, kg m2, which no
+    other tyre feels."""
 
     mould: Mould
     columns: tuple[int, ...]

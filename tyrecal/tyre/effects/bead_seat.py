@@ -94,8 +94,8 @@ EFFECT = Effect(
     high=0.5,
     changes=("*NODE", "*ELEMENT", "*BOUNDARY"),
     signature=(
-        "all down, [0,0] torsional and [1,1] by 2.6 %, [0,0] lateral and [2,1] by 2 %, the rest by 1"
-        " at g = 0.5; a re-fit leaves [1,1] 1.2 % too low, [1,0] as much too high"
+        "all down, [0,0] torsional and [1,1] by 2.6 % at g = 0.5, [0,0] lateral and [2,1] by 2 %,"
+        " the rest by 1 %; a re-fit leaves [1,1] 1.2 % too low, [1,0] 1 % too high"
     ),
     toggle="let the air out, wet both beads with soap, inflate until they snap onto their seats,"
     " and look that the moulded line runs level with the flange all round",
