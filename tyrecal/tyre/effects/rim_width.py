@@ -91,7 +91,7 @@ EFFECT = Effect(
         "modes up 1 to 2 %; half of it is left after a re-fit"
     ),
     toggle="measure the rim between its flanges; mount the tyre on the next wider rim",
-    aliases=("carcass_turn_up",),
+    aliases=("carcass_turn_up", "bead_seat"),
     add=add,
     # how the sidewall bends where the flange holds it
     law=0.05,
