@@ -234,14 +234,15 @@ def test_nothing_depends_on_units_or_order() -> None:
 
 def test_twins_that_nothing_tells_apart_share_their_probability() -> None:
     """0.98 times an effect, its change with x included: the evidences are integrals of one function
-    over 0 to 0.98 and 0 to 1, of the same density, whatever was drawn."""
+    over 0 to 0.98 and 0 to 1, of the same density, whatever was drawn; by a rule that is right to
+    0.2 %."""
     toy = Toy(twin=True)
     toy.tilt["twin"] = 0.98 * toy.tilt["e0"]
     base = problem(toy)
     p = base.measured(drawn(toy, base, generator(10), {"e0": 0.6}, 0.3))
     found = weigh(p, pairs=False)
     share = probabilities(found)
-    assert share["twin"] / share["e0"] == pytest.approx(1 / 0.98, rel=1e-3)
+    assert share["twin"] / share["e0"] == pytest.approx(1 / 0.98, rel=2e-3)
     P, _, _ = projection(p, np.zeros(3))
     groups = separate(p, P, {"e0": 0.6, "twin": 0.6}).groups(["e0", "twin", "e1"])
     assert ["e0", "twin"] in groups
@@ -453,13 +454,13 @@ def test_a_refit_never_ends_above_where_it_began() -> None:
 
 
 def test_covariance_is_what_it_says() -> None:
-    """Model-form error: exp(-ln(1.5)^2 / (2 1.6^2)) between 160 and 240 kPa, 0.97 between runs,
+    """Model-form error: exp(-ln(1.5)^2 / (2 0.6^2)) between 160 and 240 kPa, 0.97 between runs,
     none between modes."""
     toy = Toy(pressures=(160.0, 240.0))
     p = problem(toy, changes=(Toggle("e0", 0.0),), noise=1e-9)
     S = covariance(p.observations, 0 * p.constants, 0.0, form=0.01) / 1e-4
     n = len(toy.base)
-    smooth = np.exp(-(np.log(1.5) ** 2) / (2 * 1.6**2))
+    smooth = np.exp(-(np.log(1.5) ** 2) / (2 * 0.6**2))
     assert S[0, len(LABELS)] == pytest.approx(smooth)
     assert S[0, n] == pytest.approx(0.97)
     assert S[0, n + len(LABELS)] == pytest.approx(0.97 * smooth)

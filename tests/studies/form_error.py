@@ -5,8 +5,9 @@
 For each variant: d = ln f_variant - ln f_default of all modes at three pressures; what the three
 design variables can absorb is taken out by least squares, as a calibration would; the rest is the
 error of form. Printed: its rms over variants and pressures, per mode, in per cent, times
-sqrt(n / (n - v)) for the directions that were taken out. Then the length of ln p over which d is
-alike: rho = sum d d' / sqrt(sum d^2 sum d'^2) of two pressures is exp(-(ln p - ln p')^2 / (2 l^2)).
+sqrt(n / (n - v)) for the directions that were taken out. Then the length l of ln p over which that
+rest r is alike: rho = sum r r' / sqrt(sum r^2 sum r'^2) of two pressures is
+exp(-(ln p - ln p')^2 / (2 l^2)).
 No measured data enter.
 """
 
@@ -85,8 +86,8 @@ def computed(tell: Callable[[str], None] = lambda line: None) -> tuple[dict[str,
     n, v = J.shape
     for name, variant in variants(case).items():
         d = answer(variant).eta - plain.eta
-        errors.append(d.reshape(len(PRESSURES), -1))
         rest = d - J @ np.linalg.lstsq(J, d, rcond=None)[0]
+        errors.append(rest.reshape(len(PRESSURES), -1))
         squares.append(rest.reshape(len(PRESSURES), -1) ** 2)
         raw, left = (100 * np.sqrt(np.mean(x**2)) for x in (d, rest))
         tell(f"{name}: rms {raw:.2f} %, {left:.2f} % after calibration")
@@ -95,11 +96,11 @@ def computed(tell: Callable[[str], None] = lambda line: None) -> tuple[dict[str,
     return percent, alike_over(np.concatenate(errors, axis=1))
 
 
-def alike_over(d: Array) -> float:
+def alike_over(rest: Array) -> float:
     """l by least squares of -ln rho = (ln p - ln p')^2 / (2 l^2), errors (pressures, n)."""
-    size = np.sqrt((d**2).sum(1))
-    rho = (d @ d.T) / np.outer(size, size)
-    pairs = np.triu_indices(len(d), 1)
+    size = np.sqrt((rest**2).sum(1))
+    rho = (rest @ rest.T) / np.outer(size, size)
+    pairs = np.triu_indices(len(rest), 1)
     half = np.log(np.divide.outer(PRESSURES, PRESSURES))[pairs] ** 2 / 2
     return float(np.sqrt(half @ half / (half @ -np.log(rho[pairs]))))
 

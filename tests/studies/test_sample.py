@@ -374,7 +374,7 @@ def test_predictions_are_the_conditional_of_the_joint_normal_distribution() -> N
     form = np.array([0.0018, 0.0015, 0.0010])  # of form_error
     scatter = np.diag([1e-4, 2e-4, 1e-4])
     ln_p = np.log([240.0, 200.0, 280.0])
-    smooth = np.exp(-((ln_p[:, None] - ln_p) ** 2) / (2 * 1.6**2))
+    smooth = np.exp(-((ln_p[:, None] - ln_p) ** 2) / (2 * 0.6**2))
     whole = np.kron(smooth, np.eye(3)) * np.outer(np.tile(form, 3), np.tile(form, 3))
     near = np.exp(-2 * (ln_p[:, None] - ln_p) ** 2)  # length 0.5
     in_plane = np.array([label.m == 0 for label in LABELS])

@@ -34,9 +34,8 @@ PERCENT = {
     "[6,1]": 0.16,
 }
 OTHERS = 0.44  # of modes that the study has not: as the worst of those that it has
-FORM_LENGTH = (
-    1.6  # l, of ln p, over which mesh and element do the same to a mode: likewise computed
-)
+# l, of ln p, over which that is alike, computed with them
+FORM_LENGTH = 0.6
 # of ln f of a tyre that is none of our own computing, by judgement, each: what all modes share,
 # what a family's do, and what is a mode's own
 MATERIAL_LAWS = 0.003
