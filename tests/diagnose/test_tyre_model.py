@@ -233,7 +233,6 @@ def test_the_mass_gives_the_hidden_away(plain: InverseProblem) -> None:
         shift = plain.added({id: full}, 1)[0][0]
         surprise = (shift[~light] - told @ shift[light]).item()
         assert gained[id] == pytest.approx(surprise**2 / variance, rel=1e-6)
-    assert min(gained.values()) > 0
     assert (
         find_gap(plain, np.zeros(len(X)), tuple(MODEL.variables)).absorbed["tread_density"] < 0.99
     )

@@ -414,12 +414,12 @@ def _assumptions(study: DiagnosedCase) -> Iterator[str]:
     yield f"Constants that nobody calibrates, one standard deviation each ({kind}): {words}."
     a = d.problem.assumed
     form = "as recorded for every mode" if a.form is None else f"{100 * a.form:g} % in every mode"
-    form += ", smooth over the pressure"
     if a.form is None and (material := d.problem.expansion.material_laws):
         form += (
-            f", and by material laws, smooth over the pressure, {100 * material:g} % in all modes"
+            f", and by material laws {100 * material:g} % in all modes"
             " alike, as much in each family and as much in every mode by itself"
         )
+    form += "; smooth over the pressure"
     spans = d.problem.spans
     laws = sorted({span.law for span in spans.values()})
     law = f"{100 * laws[0]:g} to {100 * laws[-1]:g}" if a.law is None and laws else "0"

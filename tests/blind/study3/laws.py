@@ -17,6 +17,7 @@ import numpy as np
 from tyrecal.tyre.case import LoadedCase
 from tyrecal.tyre.effects import catalogue
 
+from .section import columns, mould
 from .tyre import Tyre, tempered
 
 Law = Callable[[Tyre, float], Tyre]
@@ -134,7 +135,15 @@ def carcass_fanning(tyre: Tyre, e: float) -> Tyre:
 
 def bead_seat(tyre: Tyre, e: float) -> Tyre:
     """The rim does not touch the outside of a share e of the bead, from the flange's top on."""
-    return replace(tyre, mould=replace(tyre.mould, unseated=e))
+    return _held(tyre, e)
+
+
+def _held(tyre: Tyre, unseated: float) -> Tyre:
+    """With an element's end where the rim begins to hold."""
+    plain = replace(mould(tyre.mould.size), unseated=unseated)
+    return replace(
+        tyre, mould=replace(tyre.mould, unseated=unseated), columns=tuple(columns(plain))
+    )
 
 
 def _spindle(way: str) -> Law:
@@ -175,8 +184,7 @@ def sealant(tyre: Tyre, e: float) -> Tyre:
 def high_flange(tyre: Tyre, e: float) -> Tyre:
     """A rim whose flange holds the sidewall e m further up, as a ring that clamps beads does."""
     m = tyre.mould
-    bead = float(np.hypot(*np.subtract(m.rim, m.seat)))
-    return replace(tyre, mould=replace(m, unseated=-e / bead))
+    return _held(tyre, -e / float(np.hypot(*np.subtract(m.rim, m.seat))))
 
 
 def aged_skim(tyre: Tyre, e: float) -> Tyre:
@@ -186,8 +194,8 @@ def aged_skim(tyre: Tyre, e: float) -> Tyre:
 
 
 def sticking_gauge(tyre: Tyre, e: float) -> Tyre:
-    """Its pointer stays behind as air is let out to a test's lower pressures: right at the case's
-    pressure and above, below it a share e more is in the tyre than wanted."""
+    """Its pointer sticks low until the case's pressure is reached: right there and above; below, it
+    reads too little, so that a share e more is in the tyre than wanted."""
     return replace(tyre, left_in=e)
 
 

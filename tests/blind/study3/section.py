@@ -191,12 +191,10 @@ def carcass(m: Mould) -> tuple[Array, Array, dict[str, float]]:
 
 
 def breaks(m: Mould, marks: dict[str, float]) -> list[float]:
-    """s where parts begin or end, from the crown on; where the rim does not hold the bead from
-    where its wires begin, both in place of the strip's end, as many."""
+    """s where parts begin or end, from the crown on, and where the rim begins to hold."""
     half, tip, rim, held = max(m.belts), marks["filler"], marks["rim"], marks["held"]
-    low = sorted([rim, held]) if m.unseated else [(tip + rim) / 2, held]
     edges = [*m.belts, m.cap, SKIM * half, TREAD * half]
-    ends = sorted([*edges, marks["turn_up"], tip, *low, marks["end"]])
+    ends = sorted([*edges, marks["turn_up"], tip, (tip + rim) / 2, rim, held, marks["end"]])
     return [0.0, *(b for a, b in zip([0.0, *ends], ends, strict=False) if b - a > 1e-4)]
 
 

@@ -31,7 +31,7 @@ RULER_FILE = "ruler.json"
 CURVATURE_STEP = 0.05  # of ln x, for the curvature
 SHARES = (0.15, 0.5, 1.0)  # of each side of a range
 SIZE_POINTS = 61
-BETWEEN_PRESSURES = 0.9
+BETWEEN_PRESSURES = 0.9  # of form errors: as all studies on record were scored
 NUMBERS = ("x0", "spread", "eta", "jacobian", "hessian", "constants")
 SIGNATURE = ("sizes", "shift", "tilt", "split")
 

@@ -1,8 +1,8 @@
 """How many effects a tyre has, and which: hypotheses of one, two and three, built forwards.
 
 Before the data: none 0.25, outside the catalogue 0.10; of the rest two effects have the share
-``further`` of one's, three that of two's, and all sets of as many effects the same. Of 25 effects
-there are 300 pairs and 2300 triples; tried are the likeliest singles with every other effect, and,
+``further`` of one's, three that of two's, and all sets of as many effects the same. Of 26 effects
+there are 325 pairs and 2600 triples; tried are the likeliest singles with every other effect, and,
 where pairs carry weight, these with whatever the rest of the gap is most like.
 """
 
