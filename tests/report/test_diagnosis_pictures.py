@@ -18,6 +18,7 @@ from tyrecal.report.shape_data import DiagnosisSection, parts_data
 from tyrecal.studies.diagnose.diagnosis import Diagnosis
 from tyrecal.studies.diagnose.where import PartChange
 from tyrecal.tyre.load import load_case
+from tyrecal.tyre.values import with_values
 
 from ..conftest import CASES
 from ..diagnose.test_calibrated import exact
@@ -107,6 +108,14 @@ def test_no_gap_has_nothing_that_explains_it(tmp_path: Path) -> None:
     assert "hollow" not in residuals and "explains" not in probabilities
     assert "No gap is seen" in probabilities
     assert "with " not in held and len(figures[2].axes[0].patches) == 1
+
+
+def test_what_the_rim_lets_go_of_a_bead_is_drawn_as_the_bead() -> None:
+    case = load_case(CASES / "p235_75r17.yaml")
+    loose = with_values(case, {"effects.bead_seat": 0.3})
+    sits, gap = (parts_data(each, ["bead"]).areas for each in (case, loose))
+    assert gap.keys() == sits.keys() and len(gap["bead"]) > len(sits["bead"])
+    assert all(len(gap[name]) == len(areas) for name, areas in sits.items() if name != "bead")
 
 
 def test_section_map(tmp_path: Path) -> None:

@@ -18,6 +18,7 @@ from ..studies.loaded import LoadedTyre
 from ..studies.patch import patch_of
 from ..studies.result import Named, Result, ResultPart, Wave
 from ..tyre.case import LoadedCase
+from ..tyre.effects.bead_seat import GAP
 from ..tyre.own_deck.section_mesh import OwnDeckMesh
 from ..tyre.resolve import resolved
 from ..tyre.section.mesh import SectionMesh
@@ -237,12 +238,14 @@ def rubber_parts(
     case: LoadedCase, mesh: SectionMesh, named: set[str]
 ) -> dict[str, list[tuple[int, ...]]]:
     """Corner nodes of the elements of each part of the section, by the part's name in a map of
-    the parts ``named``."""
-    crown = case.section.regions[0][0]
+    the parts ``named``. What the rim lets go of a bead is of it."""
+    regions = [name for name, _ in case.section.regions]
+    crown = regions[0]
     rows = case.case.mesh.levels[case.case.mesh.level].rows
     found: dict[str, list[tuple[int, ...]]] = {}
     for number, (region, row) in mesh.cells.items():
-        name = region.replace("_", " ")
+        own = region if region in regions else region.removesuffix(GAP)
+        name = own.replace("_", " ")
         if region == crown and name not in named:
             name = "tread" if row >= sum(rows[:-1]) else f"{name} under the tread"
         found.setdefault(name, []).append(mesh.solids[number][:4])
