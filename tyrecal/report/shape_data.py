@@ -18,7 +18,7 @@ from ..studies.loaded import LoadedTyre
 from ..studies.patch import patch_of
 from ..studies.result import Named, Result, ResultPart, Wave
 from ..tyre.case import LoadedCase
-from ..tyre.effects.bead_seat import GAP
+from ..tyre.effects.bead_seat import GAP_ENDING
 from ..tyre.own_deck.section_mesh import OwnDeckMesh
 from ..tyre.resolve import resolved
 from ..tyre.section.mesh import SectionMesh
@@ -244,7 +244,7 @@ def rubber_parts(
     rows = case.case.mesh.levels[case.case.mesh.level].rows
     found: dict[str, list[tuple[int, ...]]] = {}
     for number, (region, row) in mesh.cells.items():
-        own = region if region in regions else region.removesuffix(GAP)
+        own = region if region in regions else region.removesuffix(GAP_ENDING)
         name = own.replace("_", " ")
         if region == crown and name not in named:
             name = "tread" if row >= sum(rows[:-1]) else f"{name} under the tread"

@@ -16,7 +16,7 @@ from .parts import carcass_line, held_regions, present, rim_edge, stations
 
 # of the bead: elements that are shorter yet are a finer mesh of the clamped edge, worth 0.4 %
 LEAST = 0.02
-GAP = "_gap"  # with which the region's name ends
+GAP_ENDING = "_gap"  # with which the region's name ends
 
 
 def add(case: LoadedCase, value: float) -> LoadedCase:
@@ -32,7 +32,7 @@ def add(case: LoadedCase, value: float) -> LoadedCase:
     for name, there in zip(section.names, present(section)[:, first + 1 : last + 1], strict=True):
         if there.any() and not there.all():
             raise ValueError(f"must be 0: line '{name}' ends within the bead")
-    gap = unused(f"{bead}{GAP}", [name for name, _ in section.regions])
+    gap = unused(f"{bead}{GAP_ENDING}", [name for name, _ in section.regions])
 
     def wider(regions: list[str] | None) -> list[str] | None:
         return [*regions, gap] if regions and bead in regions else regions
