@@ -286,6 +286,9 @@ def figures(
     return rows | {
         "named: right, or in part of several": shown(some(t) for t in named),
         "named: all of it is there": shown(every(t) for t in named),
+        "named: an effect that is there by its own id": shown(
+            bool({*(t.named or "").split("+")} & {*t.effects}) for t in named
+        ),
         "named and called robust: likewise": shown((some(t) for t in robust), least_robust),
         **{
             f"outside{words}: {said}": shown(t.verdict in verdicts for t in those)
