@@ -67,7 +67,7 @@ PLAN = (FIRST, "weigh", "240 kPa", "320 kPa", "calliper", "footprint", "clamp", 
 COST = {f"{p:g} kPa": HOURS["pressure"] for p in PRESSURES_kPa} | {
     **{
         name: HOURS[name]
-        for name in ("weigh", "calliper", "rim", "helium", "mount", "clamp", "cut")
+        for name in ("weigh", "calliper", "rim", "seat", "helium", "mount", "clamp", "cut")
     },
     "footprint": 2.0,
     "loaded modes": 4.0,
