@@ -61,7 +61,7 @@ class Group:
 
 GROUPS = [
     Group(size, own, series)
-    for series in (1, 2, 3, 4, 5, 6, 7, 8)
+    for series in (1, 2, 3, 4, 5, 6, 7)
     for size in SIZES
     for own in (True, False)
 ]

@@ -229,13 +229,12 @@ OUTSIDE: Mapping[str, OwnLaw] = {
     "shrunk_cords": OwnLaw(0.0, 0.01, shrunk_cords),
     "sealant": OwnLaw(0.0, 6.0, sealant),
 }
-"""m of belt, strain, kg/m2: at most a third of half a belt, and 1.8 kg of
-sealant in a 205/60R15."""
+"""m of belt, strain, kg/m2: at most a third of half a belt, 1.8 kg of sealant in a 205/60R15."""
 EVIDENT: Mapping[str, OwnLaw] = {
     "high_flange": OwnLaw(0.0, 0.010, high_flange),
     "aged_skim": OwnLaw(0.0, 3.0, aged_skim),
     "sticking_gauge": OwnLaw(0.0, 0.12, sticking_gauge),
 }
-"""Those that move modes enough to be seen, from `EVIDENT_FROM` of these ranges on: m of sidewall,
-and shares. Belts that have parted by some centimetres do not."""
+"""Those that may move modes enough to be seen, drawn from `EVIDENT_FROM` of these ranges on until
+they do: m of sidewall, and shares. In series 7 only the gauge did."""
 EVIDENT_FROM = 0.6

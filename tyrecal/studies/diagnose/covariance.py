@@ -3,9 +3,9 @@
     Sigma = Sigma_rep + Sigma_form + sum_k s_k^2 g_k g_k^T
 
 Sigma_rep: repeatability, with the part that all frequencies of a run share; Sigma_form: what our
-own model is uncertain by: mesh and element, mode by mode, smoothly over the pressure and alike
-on other rims (0.9), and material laws (`laws_alike`), both alike in all runs of the
-same tyre (0.97); s_k g_k: the constants that nobody calibrates, common to all runs.
+own model is uncertain by: mesh and element, mode by mode, smoothly over the pressure and alike on
+other rims (0.9), and material laws (`laws_alike`), both alike in all runs of the same tyre (0.97);
+s_k g_k: the constants that nobody calibrates, common to all runs.
 """
 
 from __future__ import annotations

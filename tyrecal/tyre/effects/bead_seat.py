@@ -12,7 +12,7 @@ from ..section.section import Section, fill_lines
 from ..section.spline import CubicSpline
 from .edit import changed, unused, with_part
 from .effect import Effect
-from .parts import carcass_line, held_regions, present, rim_edge, stations
+from .parts import carcass_line, held_regions, length_along, present, rim_edge, stations
 
 # of the bead: elements that are shorter yet are a finer mesh of the clamped edge, worth 0.4 %
 LEAST = 0.02
@@ -69,8 +69,7 @@ def _let_go(section: Section, carcass: str, bead: str, gap: str, share: float) -
     both have as many stations as the bead had."""
     first, last = stations(section, bead)
     whole = fill_lines(section)[:, first : last + 1].swapaxes(0, 1)
-    steps = np.diff(whole[:, section.names.index(carcass)], axis=0)
-    along = np.concatenate([[0.0], np.cumsum(np.hypot(*steps.T))])
+    along = length_along(whole[:, section.names.index(carcass)])
     count = last - first
     edge = (share + LEAST * (1 - share)) * along[-1]
     at = np.concatenate(

@@ -11,7 +11,7 @@ from ..case import LoadedCase
 from ..section.section import Section, fill_lines
 from ..section.spline import CubicSpline
 from .effect import Effect
-from .parts import belt_edge, carcass_line, rim_edge, stations
+from .parts import belt_edge, carcass_line, length_along, rim_edge, stations
 
 Array = np.ndarray
 
@@ -23,7 +23,7 @@ def add(case: LoadedCase, value: float) -> LoadedCase:
     ends = [stations(section, name)[1] for name, _ in section.regions]
     end = min((s for s in ends if s > edge), default=rim_edge(section))
     line = section.names.index(carcass_line(case))
-    length = _arc(section.points[line])
+    length = length_along(section.points[line])
     room = min(length[edge], length[end] - length[edge])
     if not abs(value) / 2 < 0.5 * room:
         raise ValueError(f"must be less than {room:.3g} m either way")
@@ -38,7 +38,7 @@ def _slid(section: Section, line: int, edge: int, end: int, distance: float) -> 
     distance from the carcass to the surface, so the tyre's shape and gauges stay.
     """
     filled = fill_lines(section)
-    at = _arc(section.points[line])
+    at = length_along(section.points[line])
     slid = at + distance * np.interp(at, [0, at[edge], at[end]], [0, 1, 0])
     whole = ~np.isnan(section.points).any((1, 2))
     move = np.zeros_like(filled)
@@ -50,11 +50,6 @@ def _slid(section: Section, line: int, edge: int, end: int, distance: float) -> 
         share = np.sum((filled[k] - filled[inner]) * span, -1) / np.sum(span * span, -1)
         move[k] = move[inner] + share[:, None] * (move[outer] - move[inner])
     return replace(section, points=section.points + move)
-
-
-def _arc(points: Array) -> Array:
-    """Length along a line to each station."""
-    return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
 
 
 EFFECT = Effect(
