@@ -325,8 +325,10 @@ def test_exchanged_labels_are_found_whatever_else_is_there(chance: Chance) -> No
         plain = base.measured(drawn(toy, base, chance.random, effects, 0.03))
         y = plain.observations.y
         swapped = replace(plain, observations=with_exchanged(plain.observations, *LABELS[6:8]))
-        quiet.append(exchanged(plain, weigh(plain)) is None)
-        found.append(exchanged(swapped, weigh(swapped)) == tuple(sorted(LABELS[6:8], key=str)))
+        quiet.append(exchanged(plain, weigh(plain), toy.rows) is None)
+        found.append(
+            exchanged(swapped, weigh(swapped), toy.rows) == tuple(sorted(LABELS[6:8], key=str))
+        )
         back = with_exchanged(swapped.observations, *LABELS[6:8])
         assert np.array_equal(back.y, y)
     chance.often(quiet, 0.99)

@@ -13,7 +13,7 @@ from tyrecal.studies.diagnose.diagnosis import Diagnosis, diagnose
 from tyrecal.studies.diagnose.evidence import refit
 from tyrecal.studies.diagnose.expansion import expand
 from tyrecal.studies.diagnose.inverse_problem import Assumed
-from tyrecal.studies.diagnose.label_swap import exchange_shifts, with_exchanged
+from tyrecal.studies.diagnose.label_swap import exchange_shifts, rows_if_exchanged, with_exchanged
 from tyrecal.studies.diagnose.model import Answer, Query, Span
 from tyrecal.studies.diagnose.plain_fit import plain_fit
 
@@ -96,6 +96,25 @@ def test_labels_that_are_exchanged_are_found_beside_a_strong_effect() -> None:
     wrong = with_exchanged(p.observations, a, b)
     d = diagnose(toy, toy.rows, wrong, assumed=ASSUMED)
     assert d.exchanged == (a, b) and d.verdict.key == "e0"
+
+
+def test_exchanged_labels_are_put_right_where_one_of_the_two_is_missing() -> None:
+    """A sound tyre is sound; exchanged twice its labels are what they were."""
+    toy, n = Toy(effects=2, bend=0.0), len(LABELS)
+    a, b = LABELS[6], LABELS[7]
+    toy.base[7::n] = toy.base[6::n] + 0.15
+    for missing in (6, 7 + n):
+        keep = np.arange(3 * n) != missing
+        y = toy.base + 1e-4 * np.sin(np.arange(3 * n))
+        given = problem(toy, y, assumed=ASSUMED).only(keep).observations
+        wrong = with_exchanged(given, a, b)
+        assert set(rows_if_exchanged(wrong)) == set(toy.rows) == set(rows_if_exchanged(given))
+        assert with_exchanged(wrong, a, b).rows == given.rows
+        off = np.array([0.15 * ((row.label == a) - (row.label == b)) for row in wrong.rows])
+        assert any(np.allclose(own, -off, atol=1e-3) for own in exchange_shifts(wrong).T)
+        d = diagnose(toy, toy.rows, wrong, assumed=ASSUMED)
+        assert d.exchanged == (a, b) and d.verdict.kind == "no_gap"
+        assert diagnose(toy, toy.rows, given, assumed=ASSUMED).exchanged is None
 
 
 class Springs(Toy):

@@ -136,7 +136,7 @@ def diagnose(
         bare = _calibrated(model, rows, reading.observations, changes, assumed, expansion, known)
         hypotheses = weigh(bare)
         enough = labelled and len(bare.places) > len(model.start)
-        labels = exchanged(bare, hypotheses) if enough else None
+        labels = exchanged(bare, hypotheses, rows) if enough else None
         if labels:
             there = with_exchanged(bare.observations, *labels)
             bare = _calibrated(model, rows, there, changes, assumed, None, known)

@@ -16,7 +16,8 @@ import numpy as np
 from ...simulate.modes.label import Label
 from ...tyre.state import TyreState
 from .evidence import NONE, OUTSIDE, Hypothesis, refit
-from .inverse_problem import InverseProblem
+from .inverse_problem import InverseProblem, places
+from .model import ModelRow
 from .observations import Observations
 from .several import weigh
 
@@ -27,51 +28,68 @@ MIN_GAIN = 3.0  # in ln of evidence without effects, from which a reading is wor
 
 
 def exchanged(
-    problem: InverseProblem, hypotheses: Sequence[Hypothesis]
+    problem: InverseProblem, hypotheses: Sequence[Hypothesis], rows: Sequence[ModelRow]
 ) -> tuple[Label, Label] | None:
     """The labels that have most probably taken each other's place at all pressures, None if none.
 
-    problem: expanded about a fit of the file as it is; hypotheses: of that file, all of them.
+    problem: expanded about a fit of the file as it is; hypotheses: of that file, all of them;
+    rows: of the model, see `rows_if_exchanged`.
     """
+
+    def read(a: Label, b: Label) -> InverseProblem:
+        there = with_exchanged(problem.observations, a, b)
+        return replace(problem, observations=there, places=places(there, rows))
+
     shifts = problem.expansion.range_shifts(problem.places)
     # without effects, and with any of them as scatter: neither sees every exchange
     scatters = None, shifts @ shifts.T
     seen = lambda p: np.array([refit(p, {}, 1, extra).ln_evidence[0] for extra in scatters])
     plain = seen(problem)
     readings = list(_near(problem.observations))
-    found: list[tuple[Label, Label]] = []
-    for a, b in readings:
-        other = replace(problem, observations=with_exchanged(problem.observations, a, b))
-        if np.any(seen(other) > plain + MIN_GAIN):
-            found.append((a, b))
+    found = [pair for pair in readings if np.any(seen(read(*pair)) > plain + MIN_GAIN)]
     if not found:
         return None
     # with sets of effects: two strong ones, beside which no single one fits, look like an exchange
     best, most = None, _all(hypotheses) + float(np.log(1 - SWAP_PROBABILITY))
-    for a, b in found:
-        other = replace(problem, observations=with_exchanged(problem.observations, a, b))
-        ln = _all(weigh(other)) + float(np.log(SWAP_PROBABILITY / len(readings)))
+    for pair in found:
+        ln = _all(weigh(read(*pair))) + float(np.log(SWAP_PROBABILITY / len(readings)))
         if ln > most:
-            best, most = (a, b), ln
+            best, most = pair, ln
     return best
 
 
+def rows_if_exchanged(observations: Observations) -> list[ModelRow]:
+    """All that a model is asked of the observations, whichever labels are exchanged."""
+    read = [observations, *(with_exchanged(observations, a, b) for a, b in _near(observations))]
+    return list(dict.fromkeys(row.row for each in read for row in each.rows))
+
+
 def exchange_shifts(observations: Observations) -> Array:
-    """What each exchange of labels near each other would have done to the observations, (n, k)."""
-    y = observations.y
-    found = [with_exchanged(observations, a, b).y - y for a, b in _near(observations)]
-    return np.array(found).reshape(-1, len(y)).T
+    """What each exchange of labels near each other would have done to the observations, (n, k);
+    where one of the two was not measured, what it does to the other elsewhere."""
+    labels = np.array([str(row.label) for row in observations.rows])
+    found = []
+    for a, b in _near(observations):
+        there = with_exchanged(observations, a, b)
+        shift = there.y - observations.y
+        alone = np.array([str(row.label) for row in there.rows]) != labels
+        for label in (str(a), str(b)):
+            shift[alone & (labels == label)] = shift[~alone & (labels == label)].mean()
+        found.append(shift)
+    return np.array(found).reshape(-1, len(labels)).T
 
 
 def with_exchanged(observations: Observations, a: Label, b: Label) -> Observations:
-    """The same values with labels a and b exchanged, wherever both were measured."""
-    where = {(row.label, row.state, row.run): i for i, row in enumerate(observations.rows)}
-    order = np.arange(len(observations.rows))
-    for (label, state, run), i in where.items():
-        if label == a and (b, state, run) in where:
-            j = where[b, state, run]
-            order[i], order[j] = j, i
-    return observations.at(order)
+    """The same values with labels a and b exchanged, wherever one of them was measured."""
+    other, rows = {a: b, b: a}, list(observations.rows)
+    where = {(row.label, row.state, row.run): i for i, row in enumerate(rows)}
+    order = np.arange(len(rows))
+    for i, row in enumerate(rows):
+        if row.label in other:
+            label = other[row.label]
+            order[i] = where.get((label, row.state, row.run), i)
+            rows[i] = row if order[i] != i else replace(row, label=label)
+    return replace(observations.at(order), rows=tuple(rows))
 
 
 def _near(observations: Observations) -> Iterator[tuple[Label, Label]]:

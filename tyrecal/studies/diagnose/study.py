@@ -23,6 +23,7 @@ from .calibrated import calibrated_variables
 from .diagnosis import Diagnosis, diagnose
 from .evidence import NONE
 from .inverse_problem import Assumed, Toggle
+from .label_swap import rows_if_exchanged
 from .labelings import Reading, likely, weighed_anew
 from .model import Answer, Query, Span
 from .observations import Observations, observe
@@ -117,7 +118,8 @@ def study(
     if any(each.is_unlabelled for each in given):
         told = label(case, evaluator, given, jobs=jobs)
         readings = likely(told, lambda run: observed(in_states(case, run)))
-    rows = list(dict.fromkeys(row.row for each in readings for row in each.observations.rows))
+    asked = [rows_if_exchanged(each.observations) for each in readings]
+    rows = list(dict.fromkeys(row for each in asked for row in each))
     spans, inexpressible = spans_of(case, evaluator, [id for id in ids if id not in fitted])
     changes = tuple(_counted_from(change, spans) for _, change in toggled)
     for change in changes:
