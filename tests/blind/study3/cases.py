@@ -61,13 +61,16 @@ class Group:
 
 GROUPS = [
     Group(size, own, series)
-    for series in (1, 2, 3, 4, 5, 6, 7)
+    for series in (1, 2, 3, 4, 5, 6, 7, 8, 9)
     for size in SIZES
     for own in (True, False)
 ]
 
 
 SURFACE_HELD = 4  # the series from which on cases hold the bead's surface, as the makers do
+# from which on a truck's by a size code does not: its turned-up cords, longer than the maker's,
+# would bear a compression at which [0,0] axial falls by 10 % in a finer mesh (`wrinkles`)
+AS_WRITTEN = 8
 KNOWN = {"C10": 5, "density": 1.0}  # percent, of one's own compounds
 
 
@@ -83,7 +86,8 @@ def written(group: Group, folder: Path) -> LoadedCase:
         (folder / draft.file).write_bytes(draft.content)
     path = folder / f"{group.name}.yaml"
     text = draft.text
-    if group.series >= SURFACE_HELD:
+    written_so = group.series >= AS_WRITTEN and size.truck and not group.own
+    if group.series >= SURFACE_HELD and not written_so:
         text = text.replace("holds: whole_bead", "holds: bead_surface")
         assert "holds: bead_surface" in text
     if group.own:
