@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from ...tyre.section.curve import length_along
 from ...tyre.section.mesh import SectionMesh, build_mesh
 from ...tyre.section.section import Section
 
@@ -112,7 +113,7 @@ def _normals(line: Array) -> Array:
         mirrored = abs(p[0, 1]) < 1e-9  # on the centre plane the line runs on by symmetry
         if mirrored:
             p = np.concatenate([p[1:2] * [1, -1], p])
-        length = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(p, axis=0).T))])
+        length = length_along(p)
         slope = np.gradient(p, length, axis=0)[int(mirrored) :]
         slope /= np.linalg.norm(slope, axis=1)[:, None]
         normals[run] = np.stack([slope[:, 1], -slope[:, 0]], -1)

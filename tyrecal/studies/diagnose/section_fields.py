@@ -29,6 +29,7 @@ from ...tyre.case.parts import SectionOrigin
 from ...tyre.case.schema import Rubber
 from ...tyre.effects.edit import with_part
 from ...tyre.effects.parts import belt_edge, carcass_line, rim_edge, stations, turned_up
+from ...tyre.section.curve import length_along
 from .regions import split_by_region
 
 Array = np.ndarray
@@ -189,8 +190,8 @@ def higher_hold(case: LoadedCase) -> Array:
 def arc_length(case: LoadedCase) -> Array:
     """s (stations,) of the carcass, 1 where the rim begins. Raises ValueError without a carcass."""
     line = case.section.points[case.section.names.index(carcass_line(case))]
-    length = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
-    return np.asarray(length / length[rim_edge(case.section)])
+    length = length_along(line)
+    return length / length[rim_edge(case.section)]
 
 
 def components(s: Array) -> Array:
@@ -215,7 +216,7 @@ def moved(case: LoadedCase, field: SectionField, amount: float) -> LoadedCase:
         points = carcass + (section.points - carcass) * (1 + amount * field.values)[:, None]
     elif field.kind in ALONG_CARCASS:
         # surfaces keep their shape, lines inside their distance from the carcass
-        arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(carcass, axis=0).T))])
+        arc = length_along(carcass)
         along = np.stack([np.gradient(carcass, arc, axis=0)] * len(section.names))
         along[[0, -1]] = np.gradient(section.points[[0, -1]], arc, axis=1)
         points = section.points - amount * field.values[:, None] * along

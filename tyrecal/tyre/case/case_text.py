@@ -8,9 +8,9 @@ import textwrap
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import numpy as np
 from ruamel.yaml import YAML
 
+from ..section.curve import length_along
 from ..section.section import Section
 from ..templates import environment, render
 from .made_of import MadeOf
@@ -97,7 +97,7 @@ def _short(value: float) -> str:
 def _level(section: Section, level: str) -> dict[str, Any]:
     """Elements of about the same length, at least one a region; rows thinner towards the road."""
     middle = section.points[0]
-    arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(middle, axis=0).T))])
+    arc = length_along(middle)
     elements, start = {}, 0
     for region, count in section.regions:
         share = (arc[start + count] - arc[start]) / arc[-1]

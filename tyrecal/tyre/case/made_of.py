@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..section.construction import BASE, CAP, TURN_UP, Compound, Construction, Ply
+from ..section.curve import length_along
 from ..section.section import Section, SectionError
 
 Keys = dict[str, Any]
@@ -151,7 +152,7 @@ def _uncertainties(made: Construction, belts: Mapping[str, Keys]) -> dict[str, K
 def _bead_wire(made: Construction, section: Section) -> Keys:
     """Wires round the bead, as close on the held carcass as all of them are on its length."""
     held = section.points[section.names.index("ply"), section.rigid]
-    length = float(np.hypot(*np.diff(held, axis=0).T).sum())
+    length = float(length_along(held)[-1])
     wires = Ply("steel_cord", made.wire, _three(length / made.wires), WIRE_ANGLE_DEG)
     return {**_layer("ply", wires), "regions": ["bead"]}
 

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from ..case import LoadedCase
+from ..section.curve import length_along
 from .deck_numbers import stiffer, with_compounds
 from .edit import with_part, with_rubbers_at
 from .effect import Effect
@@ -30,7 +29,7 @@ def higher(case: LoadedCase, value: float) -> LoadedCase:
         raise ValueError("must be 0: no region of the sidewall is above the filler")
     line = case.section.points[case.section.names.index(carcass_line(case))]
     first, last = stations(case.section, above[0])
-    length = float(np.hypot(*np.diff(line[first : last + 1], axis=0).T).sum())
+    length = float(length_along(line[first : last + 1])[-1])
     return _stiffer(add(case, value), above, 1 + value * min(HIGHER_m / length, 1.0))
 
 

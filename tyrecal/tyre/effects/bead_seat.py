@@ -8,11 +8,12 @@ from functools import lru_cache
 import numpy as np
 
 from ..case import LoadedCase
+from ..section.curve import length_along
 from ..section.section import Section, fill_lines
 from ..section.spline import CubicSpline
 from .edit import changed, unused, with_part
 from .effect import Effect
-from .parts import carcass_line, held_regions, length_along, present, rim_edge, stations
+from .parts import carcass_line, held_regions, present, rim_edge, stations
 
 # of the bead: elements that are shorter yet are a finer mesh of the clamped edge, worth 0.4 %
 LEAST = 0.02

@@ -8,10 +8,11 @@ from functools import lru_cache
 import numpy as np
 
 from ..case import LoadedCase
+from ..section.curve import length_along
 from ..section.section import Section, fill_lines
 from ..section.spline import CubicSpline
 from .effect import Effect
-from .parts import belt_edge, carcass_line, length_along, rim_edge, stations
+from .parts import belt_edge, carcass_line, rim_edge, stations
 
 Array = np.ndarray
 

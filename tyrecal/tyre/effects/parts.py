@@ -141,11 +141,6 @@ def stations(section: Section, region: str) -> tuple[int, int]:
     return next((first, last) for name, first, last in _regions(section) if name == region)
 
 
-def length_along(line: Array) -> Array:
-    """Length along a line (station, 2) to each of its stations, m."""
-    return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
-
-
 def _regions(section: Section) -> list[tuple[str, int, int]]:
     ends = np.cumsum([0, *(count for _, count in section.regions)])
     return [(name, int(ends[i]), int(ends[i + 1])) for i, (name, _) in enumerate(section.regions)]

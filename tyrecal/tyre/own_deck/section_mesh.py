@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ..section.curve import length_along
 from ..section.mesh import SectionMesh
 from ..section.section import Section
 from .flat import Flat, Ply
@@ -116,7 +117,7 @@ def section(flat: Flat) -> Section:
     for path in (mesh.inner, mesh.outer):
         points = np.array([mesh.nodes[n] for n in path])
         half = points[points[:, 1] >= 0]
-        arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(half, axis=0).T))])
+        arc = length_along(half)
         at = np.linspace(0.0, arc[-1], DRAWN_STATIONS)
         lines.append(np.column_stack([np.interp(at, arc, x) for x in half.T]))
     rim = np.array([mesh.nodes[n] for n in mesh.rim])

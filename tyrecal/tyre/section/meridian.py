@@ -24,6 +24,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import brentq
 
+from .curve import length_along
 from .section import SectionError
 from .spline import CubicSpline
 
@@ -86,7 +87,7 @@ def meridian(
     steps = np.diff(down, prepend=0.0)
     held = np.stack([rim[0] - down, z - np.cumsum(np.tan(turn) * steps)], -1)
     points = np.concatenate([upper, lower, held])
-    arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
+    arc = length_along(points)
     ends = np.cumsum([len(upper), len(lower), len(held)]) - 1
     return Meridian(arc, points, *(float(arc[i]) for i in ends))
 

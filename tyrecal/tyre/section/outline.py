@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
+from .curve import length_along
 from .section import Section, SectionError, millimetres, refuse_separators
 
 Array = np.ndarray
@@ -79,7 +80,7 @@ def section_of_outline(
     thickness = _thickness(inner, rays, outer)
     depth = np.minimum(carcass_depth, 0.4 * thickness)
     carcass = inner + depth[:, None] * rays
-    arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(carcass, axis=0).T))])
+    arc = length_along(carcass)
     widest = int(np.argmax(carcass[:, 1]))
     below = np.flatnonzero(carcass[:, 0] < rim_radius)
     edge = belt_width / 2
@@ -124,7 +125,7 @@ def section_of_outline(
 
 def _smooth(curve: Array) -> tuple[Array, Array]:
     """Points and unit tangents at equal steps of the curve's length, without new bumps."""
-    arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(curve, axis=0).T))])
+    arc = length_along(curve)
     through = PchipInterpolator(arc, curve)
     at = np.linspace(0, arc[-1], DENSE)
     tangent = through(at, 1)
