@@ -222,6 +222,7 @@ RULES: dict[str, Rule] = {
         once="parent",
         variants={"TYPE": "number..."},
     ),
+    "NO COMPRESSION": Rule("model", rows=NO_ROWS, under=OF_MATERIAL, once="parent"),
     "HYPERELASTIC": Rule(
         "model",
         (

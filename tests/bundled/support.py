@@ -75,6 +75,7 @@ class Layer:
     modulus: float
     density: float
     angle: float
+    tension_only: bool = False
 
 
 @dataclass(frozen=True)
@@ -133,6 +134,7 @@ def deck(
         out += [f"{rubber.C10!r}, {rubber.C01!r}, {rubber.D1!r}", "*DENSITY", f"{rubber.density!r}"]
     for k, layer in enumerate(layers, 1):
         out += [f"*MATERIAL, NAME=CORD{k}", "*ELASTIC", f"{layer.modulus!r}, 0.3"]
+        out += ["*NO COMPRESSION"] if layer.tension_only else []
         out += ["*DENSITY", f"{layer.density!r}"] if layer.density else []
     return "\n".join(out) + "\n"
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.linalg import qr
@@ -30,6 +32,18 @@ def test_force_and_tangent_by_complex_step(q: Array) -> None:
     D = np.stack([CORD.force(q + s).imag / H for s in steps], -1)
     close(CORD.tangent(q), D)
     close(CORD.tangent(q), D.swapaxes(1, 2))
+
+
+def test_a_cord_that_bears_no_compression_is_slack_below_its_length(q: Array) -> None:
+    """W, f and D are 0 there, and those of any cord above it, where both are in one layer."""
+    one = replace(CORD, tension_only=np.array([True, True, False, False]))
+    q *= (np.array([0.9, 1.1, 0.9, 1.1]) / np.sqrt((q * q).sum(-1)))[:, None]
+    for got, any_cord in ((one.energy, CORD.energy), (one.force, CORD.force), (one.tangent,) * 2):
+        assert not got(q)[0].any()
+        np.testing.assert_array_equal(got(q)[1:], any_cord(q)[1:])
+    steps = np.eye(3) * 1j * H
+    close(one.force(q), np.stack([one.energy(q + s).imag / H for s in steps], -1))
+    close(one.tangent(q), np.stack([one.force(q + s).imag / H for s in steps], -1))
 
 
 def test_an_artificial_tension_holds_every_direction_alike(q: Array) -> None:

@@ -213,6 +213,12 @@ def test_a_layer_is_smeared() -> None:
     assert (cords.mass == 0.0).all()
 
 
+def test_cords_may_bear_no_compression() -> None:
+    for more, wanted in (("", False), ("*NO COMPRESSION\n", True)):
+        *_, cords = support.model_of(SQUARE + LAYER + more).parts
+        assert (cords.law.tension_only == wanted).all()
+
+
 def test_a_layer_fans_out_with_the_radius() -> None:
     """GEOMETRY=ANGULAR: the spacing in degrees, a share of the circumference."""
     text = SQUARE + LAYER.replace("REBAR LAYER", "REBAR LAYER, GEOMETRY=ANGULAR")
@@ -231,6 +237,7 @@ def test_a_layer_fans_out_with_the_radius() -> None:
         ("1E-3, 0.0", "1E-3, 0.1", 23, "position of a layer in a surface element is 0.0"),
         ("4E-7", "0.0", 23, "area and spacing of a layer must be positive"),
         ("1E-3", "-1E-3", 23, "area and spacing of a layer must be positive"),
+        ("*ELASTIC", "*NO COMPRESSION\n*ELASTIC", 25, "*NO COMPRESSION must follow an *ELASTIC"),
         ("CORD, 90.0", "GUM, 90.0", 23, "material GUM of a rebar layer is not *ELASTIC"),
         ("CORD, 90.0", "GLUE, 90.0", 22, "material GLUE is not defined"),
         ("0.3\n", "0.3\n*VISCOELASTIC, TIME=PRONY\n.1, 0., 1.\n", 23, "cords do not relax"),

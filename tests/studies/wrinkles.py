@@ -1,12 +1,14 @@
 """Where cords are compressed a finer mesh is no better: a layer without bending stiffness wrinkles.
 
     python -m tests.studies.wrinkles 11R22.5 275/40R20
+    python -m tests.studies.wrinkles 11R22.5 --tension_only
 
 A layer under the compression N per width, in rubber of shear modulus G on both sides, gives way
 sideways in waves of the wave number q from N = 2 G / q on (the rubber resists with 2 G q): at any
 N, if the mesh has waves that are short enough. Printed: [0,0] axial and torsional, [1,1] and [4,0]
 of the tyre that `tyrecal init` writes, in Hz, at a twentieth of its pressure and at all of it, with
 the whole bead held and with its surface, with more and more elements and rows between the plies.
+With --tension_only cords bear no compression, which is what ever finer wrinkles come to.
 """
 
 from __future__ import annotations
@@ -22,7 +24,7 @@ from tyrecal.simulate.evaluate.failure import EvaluationFailed
 from tyrecal.studies.modes import modes_result
 from tyrecal.tyre.case import LoadedCase, start_values
 from tyrecal.tyre.case.new_case import from_size
-from tyrecal.tyre.case.parts import Level
+from tyrecal.tyre.case.parts import Cord, Level
 from tyrecal.tyre.effects.edit import changed, with_part
 from tyrecal.tyre.load import load_case
 from tyrecal.tyre.section.size import parse_size
@@ -45,37 +47,57 @@ def finer(case: LoadedCase, along: int, rows: int) -> LoadedCase:
     return changed(case, mesh=with_part(mesh, levels=levels, level="finer"))
 
 
-def told(case: LoadedCase, pressure_kPa: float) -> str:
+def tension_only(case: LoadedCase) -> LoadedCase:
+    """With cords that bear no compression."""
+    materials = {
+        name: with_part(m, bears_compression=False) if isinstance(m, Cord) else m
+        for name, m in case.case.materials.items()
+    }
+    return changed(case, materials=materials)
+
+
+def frequencies(case: LoadedCase, pressure_kPa: float) -> dict[tuple, float]:
+    """Hz by c, m and kind. Raises EvaluationFailed."""
     values = start_values(case)
-    question = Question(values | {"pressure_kPa": pressure_kPa})
+    found = Evaluator(TyreDesign(case)).evaluate(Question(values | {"pressure_kPa": pressure_kPa}))
+    return {(m.c, m.m, m.kind): m.frequency_Hz for m in modes_result(case, values, found)[0].modes}
+
+
+def told(case: LoadedCase, pressure_kPa: float) -> str:
     try:
-        found = Evaluator(TyreDesign(case)).evaluate(question)
+        modes = frequencies(case, pressure_kPa)
     except (EvaluationFailed, InputError) as failure:
         return str(failure)[:60]
-    modes = {(m.c, m.m, m.kind): m.frequency_Hz for m in modes_result(case, values, found)[0].modes}
     return " | ".join(f"{modes[label]:.2f}" if label in modes else "-" for label in LABELS)
 
 
-def main(codes: list[str]) -> None:
+def by_size(code: str) -> LoadedCase:
+    """What `tyrecal init` writes."""
+    draft = from_size(parse_size(code), {}, None, "tyre")
+    with TemporaryDirectory() as folder:
+        Path(folder, draft.file).write_bytes(draft.content)
+        Path(folder, "tyre.yaml").write_text(draft.text)
+        return load_case(Path(folder, "tyre.yaml"))
+
+
+def main(codes: list[str], slack: bool) -> None:
     print("| size | held | kPa | elements, rows | axial | torsional | [1,1] | [4,0] |")
     print("|---" * 8 + "|")
     for code in codes:
-        draft = from_size(parse_size(code), {}, None, "tyre")
-        with TemporaryDirectory() as folder:
-            Path(folder, draft.file).write_bytes(draft.content)
-            Path(folder, "tyre.yaml").write_text(draft.text)
-            case = load_case(Path(folder, "tyre.yaml"))
+        case = tension_only(by_size(code)) if slack else by_size(code)
         for holds in ("whole_bead", "bead_surface"):
             held = changed(case, rim=with_part(case.case.rim, holds=holds))
             for share in (LOW, 1.0):
                 kPa = share * case.case.pressure_kPa
                 for along, rows in MESHES:
-                    frequencies = told(finer(held, along, rows), kPa)
+                    line = told(finer(held, along, rows), kPa)
                     name = holds.replace("_", " ")
-                    print(f"| {code} | {name} | {kPa:.0f} | x {along}, x {rows} | {frequencies} |")
+                    print(f"| {code} | {name} | {kPa:.0f} | x {along}, x {rows} | {line} |")
 
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("codes", nargs="+")
-    main(parser.parse_args().codes)
+    parser.add_argument("--tension_only", action="store_true")
+    given = parser.parse_args()
+    main(given.codes, given.tension_only)

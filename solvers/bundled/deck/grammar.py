@@ -50,6 +50,7 @@ SECTION_JOB: dict[str, dict[str, ParameterValues]] = {
         "N": ("1", "2", "3"),
         "MODULI": ("LONG TERM", "INSTANTANEOUS"),
     },
+    "NO COMPRESSION": {},
     "VISCOELASTIC": {"TIME": ("PRONY",), "FREQUENCY": ("TABULAR",)},
     "ACOUSTIC MEDIUM": {"BULK MODULUS": ("",)},
     "BOUNDARY": {},

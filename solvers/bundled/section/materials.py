@@ -57,12 +57,16 @@ class Material:
     prony: list[tuple[Scalar, Scalar, Scalar]] = field(default_factory=list)  # g, k, tau in s
     table: ModulusTable | None = None  # in place of a Prony series
     bulk_modulus: Scalar | None = None  # Pa, of a gas
+    tension_only: bool = False  # a cord that bears no compression
 
     @property
     def law(self) -> Hyperelastic | None:
         """Of a solid: rubber's, or linear elasticity; None: it is neither. Raises DeckError."""
         if self.rubber is not None or self.youngs_modulus is None:
             return self.rubber
+        if self.tension_only:
+            words = f"*NO COMPRESSION of material {self.name} is honoured of cords only"
+            raise DeckError(self.line, words)
         E, nu = self.youngs_modulus, self.poissons_ratio
         if not -1 < np.real(nu) < 0.5:
             words = f"Poisson's ratio of material {self.name} must lie above -1 and below 0.5"
@@ -165,6 +169,12 @@ def _positive(k: Keyword, index: int, what: str) -> Scalar:
     return value
 
 
+def _no_compression(m: Material, k: Keyword) -> None:
+    if m.youngs_modulus is None:
+        raise DeckError(k.line, "*NO COMPRESSION must follow an *ELASTIC")
+    m.tension_only = True
+
+
 def _acoustic(m: Material, k: Keyword) -> None:
     m.bulk_modulus = _positive(k, 0, "bulk modulus")
 
@@ -174,5 +184,6 @@ _READERS = {
     "DENSITY": _density,
     "ELASTIC": _elastic,
     "HYPERELASTIC": _hyperelastic,
+    "NO COMPRESSION": _no_compression,
     "VISCOELASTIC": _viscoelastic,
 }

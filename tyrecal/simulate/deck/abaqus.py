@@ -130,6 +130,7 @@ def _material(material: Any, analysis: Analysis) -> dict[str, Any]:
             "youngs_modulus": material.youngs_modulus_Pa,
             "poissons_ratio": material.poissons_ratio,
             "density": material.density_kg_per_m3,
+            "bears_compression": material.bears_compression,
         }
     if material.frequency_exponent:
         return frequency_rubber(material, analysis)

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from ...tyre.case import Case
+from ...tyre.case.parts import Cord
 from ...tyre.resolve import Tyre
 from ...tyre.section.section import SectionError
 from ...tyre.templates import TemplateFailed
@@ -42,6 +43,12 @@ def calculix_context(tyre: Tyre) -> dict[str, Any]:
         )
     surfaces = tyre.section.names[0], tyre.section.names[-1]
     for name, layer in c.rebar_layers.items():
+        cord = c.materials[layer.material]
+        if isinstance(cord, Cord) and not cord.bears_compression:
+            raise TemplateFailed(
+                f"materials.{layer.material}.bears_compression must be true: for CalculiX a ply is"
+                " a thin solid, stiff both ways"
+            )
         if layer.line in surfaces:
             raise TemplateFailed(
                 f"rebar_layers.{name}.line must be inside the section: for CalculiX a ply is a thin"

@@ -119,12 +119,13 @@ class Rubber(Part):
 
 
 class Cord(Part):
-    """A linear elastic cord."""
+    """A linear elastic cord; one that does not bear compression goes slack."""
 
     kind: Literal["cord"]
     youngs_modulus_Pa: Positive
     poissons_ratio: Annotated[float, Field(ge=0, lt=0.5)]
     density_kg_per_m3: Positive
+    bears_compression: bool = True
 
 
 class Gauge(Part):

@@ -78,6 +78,7 @@ MATERIAL: dict[str, dict[str, Values]] = {
         "N": ("1", "2", "3", "4", "5", "6"),
         "MODULI": ("LONG TERM", "INSTANTANEOUS"),
     },
+    "NO COMPRESSION": {},
     "VISCOELASTIC": {"TIME": ("PRONY",), "FREQUENCY": ("TABULAR",)},
 }
 MODEL_LEVEL: dict[str, dict[str, Values]] = {

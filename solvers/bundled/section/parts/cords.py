@@ -4,6 +4,9 @@ A cord along the reference unit vector a is carried to q = F a, its stretch is l
 
     W = E A / (2 s) ln^2(lambda)            per reference area of the layer, J/m2
     dW/dq = W' t,  d2W/dqdq = (W'' - W'/lambda) t t^T + (W'/lambda) 1,   t = q / lambda
+
+One that bears no compression has W = 0 below lambda = 1: the least energy of a layer that may
+wrinkle as finely as it likes (Pipkin, IMA J. Appl. Math. 36, 1986, on relaxed energies).
 """
 
 from __future__ import annotations
@@ -29,20 +32,26 @@ class LogarithmicCord(EnergyLaw):
 
     stiffness: Array  # E A / s, N/m
     tension: float = 0.0  # artificial, N/m: no energy, but a tangent
+    tension_only: Array | bool = False  # bears no compression
+
+    def carried(self, length: Array) -> Array:
+        """E A / s (p,) at the stretches."""
+        return np.where(self.tension_only & (length.real < 1), 0.0, self.stiffness)
 
     def energy(self, z: Array) -> Array:
-        return self.stiffness * np.log(stretch(z)) ** 2 / 2
+        length = stretch(z)
+        return np.asarray(self.carried(length) * np.log(length) ** 2 / 2)
 
     def force(self, z: Array) -> Array:
         length = stretch(z)
-        return np.asarray((self.stiffness * np.log(length) / length**2)[:, None] * z)
+        return np.asarray((self.carried(length) * np.log(length) / length**2)[:, None] * z)
 
     def tangent(self, z: Array, weights: Array | float = 1.0) -> Array:
         length = stretch(z)
-        log = np.log(length)
-        along = self.stiffness * (1 - 2 * log) / length**4
+        log, stiffness = np.log(length), self.carried(length)
+        along = stiffness * (1 - 2 * log) / length**4
         D = along[:, None, None] * z[:, :, None] * z[:, None, :]
-        D += (self.stiffness * log / length**2)[:, None, None] * np.eye(3)
+        D += (stiffness * log / length**2)[:, None, None] * np.eye(3)
         if self.tension:
             D[:, range(3), range(3)] += self.tension
         return D * np.reshape(weights, (-1, 1, 1))
@@ -93,6 +102,7 @@ class _Layer:
     rows: Rows
     stiffness: Array  # E A / s (e, g), N/m
     mass: Array  # A rho / s (e, g), kg/m2
+    tension_only: bool
 
 
 def _layer(job: SectionJob, k: Keyword, row: DataLine, lines: Lines) -> _Layer:
@@ -114,7 +124,8 @@ def _layer(job: SectionJob, k: Keyword, row: DataLine, lines: Lines) -> _Layer:
         width = spacing * np.pi / 180 * lines.R
     smeared = area / width
     rows = cord_rows(lines, np.cos(angle), np.sin(angle))
-    return _Layer(lines, rows, material.youngs_modulus * smeared, material.density * smeared)
+    stiffness, mass = material.youngs_modulus * smeared, material.density * smeared
+    return _Layer(lines, rows, stiffness, mass, material.tension_only)
 
 
 def _cords(layers: list[_Layer]) -> Elastic:
@@ -132,6 +143,9 @@ def _cords(layers: list[_Layer]) -> Elastic:
     return Elastic(
         join(lambda layer: layer.lines.connectivity),
         rows,
-        LogarithmicCord(join(lambda layer: layer.stiffness).ravel()),
+        LogarithmicCord(
+            join(lambda layer: layer.stiffness).ravel(),
+            tension_only=join(lambda layer: np.full(layer.mass.size, layer.tension_only)),
+        ),
         consistent_mass(layers[0].lines.N if shared else join(lambda y: y.lines.N), per_radian),
     )

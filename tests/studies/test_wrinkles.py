@@ -1,0 +1,26 @@
+"""A truck whose cords bear no compression: one tyre, whatever the mesh."""
+
+from __future__ import annotations
+
+import pytest
+
+from tyrecal.tyre.effects.edit import changed, with_part
+
+from .wrinkles import by_size, finer, frequencies, tension_only
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("holds", ["whole_bead", "bead_surface"])
+def test_its_modes_do_not_hang_on_the_mesh_at_the_bead(holds: str) -> None:
+    """With twice the elements and rows within 1 %; where cords bear compression [0,0] axial of a
+    bead whose surface is held falls by more than 5 %."""
+    case = by_size("11R22.5")
+    case = changed(case, rim=with_part(case.case.rim, holds=holds))
+    moved = {}
+    for name, tyre in (("slack", tension_only(case)), ("stiff", case)):
+        coarse, fine = (frequencies(each, 500.0) for each in (tyre, finer(tyre, 2, 2)))
+        moved[name] = {label: fine[label] / coarse[label] - 1 for label in coarse if label in fine}
+    assert len(moved["slack"]) >= 9
+    assert max(map(abs, moved["slack"].values())) < 0.01
+    if holds == "bead_surface":
+        assert moved["stiff"][0, 0, "axial"] < -0.05
