@@ -17,6 +17,7 @@ LACKING = {
     "EMBEDDED ELEMENT": "it embeds no elements",
     "PARAMETER": "it has no parameters",
     "SYMMETRIC MODEL GENERATION": "it reflects and revolves nothing",
+    "NO COMPRESSION": "its elastic law bears compression, and it passes over the keyword",
     "VISCOELASTIC": "its hyperelastic rubber does not relax",
 }
 ELEMENTS = {

@@ -238,6 +238,7 @@ def test_a_layer_fans_out_with_the_radius() -> None:
         ("4E-7", "0.0", 23, "area and spacing of a layer must be positive"),
         ("1E-3", "-1E-3", 23, "area and spacing of a layer must be positive"),
         ("*ELASTIC", "*NO COMPRESSION\n*ELASTIC", 25, "*NO COMPRESSION must follow an *ELASTIC"),
+        ("0.3\n", "0.3\n*NO COMPRESSION\n1.\n", 28, "*NO COMPRESSION has no data"),
         ("CORD, 90.0", "GUM, 90.0", 23, "material GUM of a rebar layer is not *ELASTIC"),
         ("CORD, 90.0", "GLUE, 90.0", 22, "material GLUE is not defined"),
         ("0.3\n", "0.3\n*VISCOELASTIC, TIME=PRONY\n.1, 0., 1.\n", 23, "cords do not relax"),

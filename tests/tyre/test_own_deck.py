@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from tyrecal.cli.main import main
-from tyrecal.simulate.deck.own import asked_by_abaqus, trial
+from tyrecal.simulate.deck.own import asked_by_abaqus, lacking_in_calculix, trial
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.tyre.case import CaseError, LoadedCase, start_values
@@ -83,6 +83,16 @@ def test_what_abaqus_would_refuse(tmp_path: Path, capsys: pytest.CaptureFixture[
 def test_only_the_writing_differs(style: str, reference: np.ndarray, tmp_path: Path) -> None:
     found = frequencies(write(tmp_path, own_decks.STYLES[style]()))
     assert found == pytest.approx(reference, rel=1e-9)
+
+
+def test_cords_that_bear_no_compression(reference: np.ndarray, tmp_path: Path) -> None:
+    """Where all are taut they are as any. CalculiX has nothing for it."""
+    text, count = re.subn(r"(\*ELASTIC\n.*\n)", r"\1*NO COMPRESSION\n", own_decks.plain())
+    assert count == 1
+    assert frequencies(write(tmp_path, text)) == pytest.approx(reference, rel=1e-9)
+    blocks = read_own_deck(tmp_path / "tyre.inp", "m").with_numbers({})
+    assert not asked_by_abaqus(blocks)["refuses"]
+    assert any("it passes over the keyword" in words for words in lacking_in_calculix(blocks))
 
 
 def test_included_files(reference: np.ndarray, tmp_path: Path) -> None:

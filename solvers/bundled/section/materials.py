@@ -172,6 +172,8 @@ def _positive(k: Keyword, index: int, what: str) -> Scalar:
 def _no_compression(m: Material, k: Keyword) -> None:
     if m.youngs_modulus is None:
         raise DeckError(k.line, "*NO COMPRESSION must follow an *ELASTIC")
+    if k.rows:
+        raise DeckError(k.rows[0].line, "*NO COMPRESSION has no data")
     m.tension_only = True
 
 
