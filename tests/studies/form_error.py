@@ -1,6 +1,7 @@
 """Model-form error of every mode: mesh and element of our own model, at the fitted design.
 
     python -m tests.studies.form_error
+    python -m tests.studies.form_error 205/60R15 11R22.5  # of tyres as `tyrecal init` writes them
 
 For each variant: d = ln f_variant - ln f_default of all modes at three pressures; what the three
 design variables can absorb is taken out by least squares, as a calibration would; the rest is the
@@ -13,7 +14,8 @@ No measured data enter.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -24,11 +26,13 @@ from tyrecal.simulate.evaluate.evaluator import Evaluator
 from tyrecal.simulate.modes.label import Label
 from tyrecal.studies.diagnose.model import Answer, Query
 from tyrecal.studies.diagnose.tyre_model import TyreModel
-from tyrecal.tyre.case import LoadedCase
+from tyrecal.tyre.case import LoadedCase, start_values
 from tyrecal.tyre.case.parts import Level
 from tyrecal.tyre.load import load_case
 
-PRESSURES = (160.0, 240.0, 320.0)
+from .wrinkles import by_size
+
+PRESSURES = 2 / 3, 1.0, 4 / 3  # of the case's
 Array = np.ndarray
 LABELS = [Label(0, 0, "axial"), Label(0, 0, "torsional")]
 LABELS += [Label(c, m) for c in range(1, 7) for m in (0, 1)]
@@ -40,10 +44,9 @@ def variants(case: LoadedCase) -> dict[str, LoadedCase]:
     """The case with the refined mesh, with coarser ones, and with linear elements."""
     mesh = case.case.mesh
     default = mesh.levels["default"]
-    coarse = Level(
-        elements={k: max(1, v * 3 // 4) for k, v in default.elements.items()}, rows=[1, 1, 1, 2]
-    )
-    thick = Level(elements=default.elements, rows=[1, 1, 1, 2])
+    rows = [*default.rows[:-1], 2]
+    coarse = Level(elements={k: max(1, v * 3 // 4) for k, v in default.elements.items()}, rows=rows)
+    thick = Level(elements=default.elements, rows=rows)
     levels = {**mesh.levels, "coarse": coarse, "thick": thick}
     changed = {
         "refined": {"level": "refined"},
@@ -62,38 +65,53 @@ def variants(case: LoadedCase) -> dict[str, LoadedCase]:
     }
 
 
-def answer(case: LoadedCase) -> Answer:
-    """The model's answer at the fitted design."""
-    rows = [(label, p) for p in PRESSURES for label in LABELS]
+def answer(case: LoadedCase, labels: Sequence[Label], design: Mapping[str, float]) -> Answer:
+    """The model's answer at a design."""
+    rows = [(label, share * case.case.pressure_kPa) for share in PRESSURES for label in labels]
     model = TyreModel(case, Evaluator(TyreDesign(case)), rows, [], {})
-    (found,) = model.answers([Query(np.log([FITTED[name] for name in model.variables]))])
+    (found,) = model.answers([Query(np.log([design[name] for name in model.variables]))])
     assert isinstance(found, Answer), found
     return found
 
 
-def main() -> None:
-    by_mode, length = computed(print)
-    for label, percent in by_mode.items():
-        print(f'    "{label}": {percent:.2f},')
-    print(f"alike over {length:.1f} of ln p")
+def main(sizes: Sequence[str]) -> None:
+    if not sizes:
+        by_mode, length = computed(print)
+        for label, percent in by_mode.items():
+            print(f'    "{label}": {percent:.2f},')
+        print(f"alike over {length:.1f} of ln p")
+    for size in sizes:
+        case = by_size(size)
+        labels = [label for label in LABELS if label.c <= case.case.analysis.highest_harmonic]
+        own, _ = left(case, labels, start_values(case), print)
+        told = (f"{label} {100 * sigma:.2f}" for label, sigma in zip(labels, own, strict=True))
+        print(size, ", ".join(told))
 
 
 def computed(tell: Callable[[str], None] = lambda line: None) -> tuple[dict[str, float], float]:
     """Per cent by mode, and the length of ln p."""
-    case = load_case(CASES / "p235_75r17.yaml")
-    plain = answer(case)
-    J, squares, errors = plain.jacobian, [], []
+    own, errors = left(load_case(CASES / "p235_75r17.yaml"), LABELS, FITTED, tell)
+    percent = {str(x): max(FLOOR, 100 * sigma) for x, sigma in zip(LABELS, own, strict=True)}
+    return percent, alike_over(np.concatenate(errors, axis=1))
+
+
+def left(
+    case: LoadedCase,
+    labels: Sequence[Label],
+    design: Mapping[str, float],
+    tell: Callable[[str], None],
+) -> tuple[Array, list[Array]]:
+    """What calibration leaves: rms of ln f by mode (labels,), and by variant (pressures, labels)."""
+    plain = answer(case, labels, design)
+    J, errors = plain.jacobian, []
     n, v = J.shape
     for name, variant in variants(case).items():
-        d = answer(variant).eta - plain.eta
+        d = answer(variant, labels, design).eta - plain.eta
         rest = d - J @ np.linalg.lstsq(J, d, rcond=None)[0]
         errors.append(rest.reshape(len(PRESSURES), -1))
-        squares.append(rest.reshape(len(PRESSURES), -1) ** 2)
-        raw, left = (100 * np.sqrt(np.mean(x**2)) for x in (d, rest))
-        tell(f"{name}: rms {raw:.2f} %, {left:.2f} % after calibration")
-    per_mode = np.sqrt(np.mean(squares, axis=(0, 1)) * n / (n - v))
-    percent = {str(x): max(FLOOR, 100 * sigma) for x, sigma in zip(LABELS, per_mode, strict=True)}
-    return percent, alike_over(np.concatenate(errors, axis=1))
+        raw, after = (100 * np.sqrt(np.mean(x**2)) for x in (d, rest))
+        tell(f"{name}: rms {raw:.2f} %, {after:.2f} % after calibration")
+    return np.sqrt(np.mean(np.square(errors), axis=(0, 1)) * n / (n - v)), errors
 
 
 def alike_over(rest: Array) -> float:
@@ -106,4 +124,4 @@ def alike_over(rest: Array) -> float:
 
 
 if __name__ == "__main__":
-    main()
+    main(sys.argv[1:])
