@@ -101,7 +101,7 @@ def left(
     design: Mapping[str, float],
     tell: Callable[[str], None],
 ) -> tuple[Array, list[Array]]:
-    """What calibration leaves of ln f: rms by mode (labels,); each variant's (pressures, labels)."""
+    """What calibration leaves of ln f: rms by mode, and by variant (pressures, labels)."""
     plain = answer(case, labels, design)
     J, errors = plain.jacobian, []
     n, v = J.shape
