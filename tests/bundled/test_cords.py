@@ -36,7 +36,7 @@ def test_force_and_tangent_by_complex_step(q: Array) -> None:
 
 def test_a_cord_that_bears_no_compression_is_slack_below_its_length(q: Array) -> None:
     """W, f and D are 0 there, and those of any cord above it, where both are in one layer."""
-    one = replace(CORD, tension_only=np.array([True, True, False, False]))
+    one = replace(CORD, compressed=np.array([0.0, 0.0, 1.0, 1.0]))
     q *= (np.array([0.9, 1.1, 0.9, 1.1]) / np.sqrt((q * q).sum(-1)))[:, None]
     for got, any_cord in ((one.energy, CORD.energy), (one.force, CORD.force), (one.tangent,) * 2):
         assert not got(q)[0].any()

@@ -214,9 +214,9 @@ def test_a_layer_is_smeared() -> None:
 
 
 def test_cords_may_bear_no_compression() -> None:
-    for more, wanted in (("", False), ("*NO COMPRESSION\n", True)):
+    for more, wanted in (("", 1.0), ("*NO COMPRESSION\n", 0.0)):
         *_, cords = support.model_of(SQUARE + LAYER + more).parts
-        assert (cords.law.tension_only == wanted).all()
+        assert (cords.law.compressed == wanted).all()
 
 
 def test_a_layer_fans_out_with_the_radius() -> None:

@@ -32,11 +32,11 @@ class LogarithmicCord(EnergyLaw):
 
     stiffness: Array  # E A / s, N/m
     tension: float = 0.0  # artificial, N/m: no energy, but a tangent
-    tension_only: Array | bool = False  # bears no compression
+    compressed: Array | float = 1.0  # share of the stiffness that it has in compression: 1 or 0
 
     def carried(self, length: Array) -> Array:
         """E A / s (p,) at the stretches."""
-        return np.where(self.tension_only & (length.real < 1), 0.0, self.stiffness)
+        return self.stiffness * np.where(length.real < 1, self.compressed, 1.0)
 
     def energy(self, z: Array) -> Array:
         length = stretch(z)
@@ -145,7 +145,7 @@ def _cords(layers: list[_Layer]) -> Elastic:
         rows,
         LogarithmicCord(
             join(lambda layer: layer.stiffness).ravel(),
-            tension_only=join(lambda layer: np.full(layer.mass.size, layer.tension_only)),
+            compressed=join(lambda layer: np.full(layer.mass.size, float(not layer.tension_only))),
         ),
         consistent_mass(layers[0].lines.N if shared else join(lambda y: y.lines.N), per_radian),
     )
