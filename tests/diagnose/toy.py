@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from dataclasses import replace
 
 import numpy as np
+from numpy.polynomial import Polynomial
 
 from tyrecal.simulate.modes.label import Label
 from tyrecal.studies.diagnose.expansion import Expansion, expand
@@ -94,6 +96,29 @@ class Toy:
             J = J + e * self.tilt[id]
             split = split + e * self.splits[id]
         return Answer(eta, J, split, self.constants if point.constants else None)
+
+
+class Sloped(Toy):
+    """eta + 2e-4 e^power, with slopes by the effect, or the one where it is 0."""
+
+    def __init__(self, power: int, at_0: bool = False, span: Span | None = None):
+        super().__init__(effects=1, size=0.0, pressures=(240.0,))
+        self.curve, self.at_0 = 2e-4 * Polynomial([0.0] * power + [1.0]), at_0
+        self.spans = {"e0": span or Span(0.0, 1.0)}
+        self.sloped, self.sloped_at_0 = ((), ("e0",)) if at_0 else (("e0",), ())
+        self.points: list[Query] = []
+
+    def answers(self, points: Sequence[Query]) -> list[Answer | Exception]:
+        self.points += points
+        return super().answers(points)
+
+    def _answer(self, point: Query) -> Answer:
+        found, e = super()._answer(point), point.effects.get("e0", 0.0)
+        assert not point.slopes or (e == 0) == self.at_0
+        slope = np.full(len(found.eta), self.curve.deriv()(e))
+        slope[-1] = np.nan  # the last row has none
+        eta = found.eta + self.curve(e)
+        return replace(found, eta=eta, slopes=dict.fromkeys(point.slopes, slope))
 
 
 def problem(

@@ -1,0 +1,218 @@
+"""Where the model is asked of an effect, and what is made of its answers."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.polynomial import Polynomial
+
+from tyrecal.studies.diagnose.diagnosis import _asked_again
+from tyrecal.studies.diagnose.expansion import (
+    Expansion,
+    Nodes,
+    _more,
+    _nodes,
+    expand,
+    hermite,
+    lagrange,
+    node_values,
+)
+from tyrecal.studies.diagnose.inverse_problem import Assumed, Toggle
+from tyrecal.studies.diagnose.model import Answer, Query, Span
+from tyrecal.studies.diagnose.several import weigh
+from tyrecal.studies.diagnose.study import _reaching
+
+from .toy import Sloped, Toy, problem
+
+pytestmark = pytest.mark.numbers
+
+Array = np.ndarray
+
+
+def test_where_an_effect_is_asked() -> None:
+    """At Lobatto's points of a cubic to the farther end, or at two places on either side."""
+    assert node_values(Span(0.0, 2.0)) == pytest.approx([0.5, 1.5, 2.0])
+    assert node_values(Span(-2.0, 0.0)) == pytest.approx([-2.0, -1.5, -0.5])
+    assert node_values(Span(-3.0, -1.0)) == pytest.approx([-3.0, -2.25, -0.75])
+    assert node_values(Span(-2.0, 4.0)) == pytest.approx([-2.0, -1.0, 2.0, 4.0])
+    assert node_values(Span(0.0, 2.0, also=(3.0,))) == pytest.approx([0.5, 1.5, 2.0, 3.0])
+
+
+def test_an_effect_reaches_as_far_as_there_are_solutions() -> None:
+    """Nodes from 0 outwards to the first that fails; those beyond the range do not widen it."""
+    n, none = 4, np.zeros((4, 2))
+    answer = lambda e: Answer(np.full(n, e), np.full((n, 2), 3 * e), np.full(n, abs(e)))
+    plain = Expansion(np.zeros(2), np.zeros(n), none, np.zeros((n, 2, 2)), np.zeros(n), none, {})
+    failed = ValueError("no such tyre")
+    span = Span(-1.0, 1.0)
+    asked = {-1.0: answer(-1), -0.5: failed, 0.5: answer(0.5), 1.0: answer(1), 1.5: answer(1.5)}
+    made = _nodes("e0", plain, span, asked)
+    assert made and made.values.tolist() == [0.0, 0.5, 1.0, 1.5] and made.reach == (0.0, 1.0)
+    shift, tilt, split = made.at(np.array([0.25, 1.25]))
+    assert shift[:, 0] == pytest.approx([0.25, 1.25])
+    assert tilt[:, 0, 0] == pytest.approx([0.75, 3.75])
+    assert split[:, 0] == pytest.approx([0.25, 1.25])
+    assert _nodes("e0", plain, span, dict.fromkeys(asked, failed)) is None
+    assert isinstance(made, Nodes)
+
+
+def test_hermites_polynomials_take_values_and_slopes() -> None:
+    """Those of a polynomial of as many coefficients: that polynomial. Without slopes Lagrange's."""
+    nodes, sloped = np.array([-2.0, 0.0, 0.5, 3.0]), np.array([True, False, True, True])
+    made = Polynomial([0.3, -1.0, 0.5, 0.2, -0.4, 0.1, 0.02])
+    e = np.array([-1.5, 0.0, 0.2, 0.5, 2.0])
+    values, slopes = hermite(nodes, sloped, e)
+    assert values @ made(nodes) + slopes @ made.deriv()(nodes) == pytest.approx(made(e))
+    assert values[1] == pytest.approx([0, 1, 0, 0]) and abs(slopes[[1, 3]]).max() == 0
+    assert (slopes[:, 1] == 0).all()  # none is given there
+    cubic = Polynomial([0.3, -1.0, 0.5, 0.2])
+    assert lagrange(nodes, e) @ cubic(nodes) == pytest.approx(cubic(e))
+    values, slopes = hermite(nodes, np.zeros(4, bool), e)
+    assert values == pytest.approx(lagrange(nodes, e)) and (slopes == 0).all()
+
+
+@pytest.mark.parametrize(
+    ("at_0", "span", "power", "wanted"),
+    [
+        (False, Span(0.0, 1.0), 4, [0, 0.25, 1]),
+        (False, Span(-2.0, 0.0), 4, [-2, -0.5, 0]),
+        (False, Span(-0.5, 1.0), 4, [-0.5, 0, 1]),
+        (True, Span(0.0, 1.0), 3, [0, 0.25, 1]),
+    ],
+)
+def test_two_sizes_and_their_slopes_make_a_quartic(
+    at_0: bool, span: Span, power: int, wanted: list[float]
+) -> None:
+    """The slope where the effect is 0 and two sizes a cubic; no slope is asked in vain."""
+    toy = Sloped(power, at_0, span)
+    nodes = expand(toy, np.zeros(3)).nodes["e0"]
+    assert nodes.values.tolist() == pytest.approx(wanted)
+    e = np.linspace(span.low, span.high, 7)
+    assert nodes.at(e)[0][:, 0] == pytest.approx(toy.curve(e), abs=1e-12)
+    asked = [q for q in toy.points if q.slopes]
+    assert [q.constants for q in asked] == ([True] if at_0 else [False, False])
+    by_values = lagrange(nodes.values, e) @ toy.curve(nodes.values)
+    assert nodes.at(e)[0][:, -1] == pytest.approx(by_values, abs=1e-12)
+
+
+def test_where_splits_do_not_matter_one_size_and_the_slope_at_0_make_a_quadratic() -> None:
+    toy = Sloped(2, at_0=True)
+    nodes = expand(toy, np.zeros(3), splits=False).nodes["e0"]
+    assert nodes.values.tolist() == [0, 1] and nodes.sloped.tolist() == [True, False]
+    e = np.linspace(0, 1, 7)
+    assert nodes.at(e)[0][:, 0] == pytest.approx(toy.curve(e), abs=1e-12)
+    both = Sloped(2, at_0=True, span=Span(-1.0, 1.0))
+    assert expand(both, np.zeros(3), splits=False).nodes["e0"].values.tolist() == [-1, 0, 1]
+    own = Sloped(2)
+    assert expand(own, np.zeros(3), splits=False).nodes["e0"].values.tolist() == [0, 0.25, 1]
+
+
+def test_a_nearer_size_is_asked_where_the_far_end_has_no_solution() -> None:
+    class Stops(Sloped):
+        far = 0.5
+
+        def _answer(self, point: Query) -> Answer:
+            if point.effects.get("e0", 0.0) > self.far:
+                return ValueError("no such tyre")  # type: ignore[return-value]
+            return super()._answer(point)
+
+    toy = Stops(2, at_0=True)
+    nodes = expand(toy, np.zeros(3), splits=False).nodes["e0"]
+    assert nodes.values.tolist() == [0, 0.25] and nodes.reach == (0.0, 0.25)
+    toy.far = 0.1
+    found = expand(toy, np.zeros(3), splits=False)
+    assert not found.nodes and found.failed == {"e0": "no such tyre"}
+
+
+def test_an_effect_is_not_asked_again_where_it_was_asked() -> None:
+    """Near a node, or 0, and near x0: what was asked there is known; elsewhere it is asked."""
+    for size, move, wanted in (
+        (1.0, 0.0, False),
+        (0.74, 0.02, False),
+        (0.02, 0.2, False),
+        (1.0, 0.2, True),
+        (0.5, 0.0, True),
+        (0.64, 0.0, True),
+    ):
+        toy = Toy(effects=1, size=0.3, pressures=(160.0, 240.0), bend=0.0)
+        toy.tilt["e0"] *= 0
+        base = problem(toy, assumed=Assumed(form=1e-6, law=0.0), noise=1e-5)
+        p = base.measured(toy.base + toy.J @ np.array([move, 0.0, 0.0]) + size * toy.g["e0"])
+        hypotheses = weigh(p)
+        best = next(h for h in hypotheses if h.key == "e0")
+        assert best.values["e0"][best.best] == pytest.approx(size, abs=0.02)
+        assert best.fitted.d[best.best][0] == pytest.approx(move, abs=0.03)
+        before = toy.asked
+        again, changed = _asked_again(p, toy, hypotheses)
+        assert changed == wanted and toy.asked - before == wanted
+        anchor = again.expansion.nodes["e0"].anchor
+        assert (anchor is not None) == wanted
+        if wanted:  # and not a second time
+            assert not _asked_again(again, toy, weigh(again))[1]
+
+
+def test_more_sizes_where_two_and_their_slopes_are_not_enough() -> None:
+    """At 60 % of the range, where the far slope is worth 0.1 % and more half way to it, of the
+    fifth order at 0, 1/4 and 1 (double): e (e - 1/4)^2 (e - 1) / (3/4)^2 at 5/8."""
+    last = 0.625 * 0.375**3 / 0.75**2
+    for slope, more in ((0.00099, []), (0.00101, [0.6])):
+        toy = Sloped(4)
+        own = Polynomial([0, 1]) * Polynomial([-0.25, 1]) ** 2 * Polynomial([-1, 1]) / 0.75**2
+        toy.curve = slope / last * own
+        values = expand(toy, np.zeros(3)).nodes["e0"].values
+        assert values.tolist() == pytest.approx([0, 0.25, *more, 1])
+
+
+def test_more_nodes_where_a_cubic_is_not_enough() -> None:
+    """At 8 % and at half of the range, where Newton's last term is 0.3 % and more."""
+    last = 0.875 * 0.625 * 0.125  # the bend's own part half way between the last two nodes
+    for size, more in ((0.0, False), (0.0029 / last, False), (0.0031 / last, True)):
+        toy = Toy(effects=1, size=1e-3, pressures=(240.0,))
+        plain = toy._answer
+
+        def bent(point: Query, size: float = size, plain: Any = plain) -> Answer:
+            found = plain(point)
+            e = point.effects.get("e0", 0.0)
+            return replace(found, eta=found.eta + size * e * (e - 0.25) * (e - 0.75))
+
+        toy._answer = bent  # type: ignore[method-assign]
+        nodes = expand(toy, np.zeros(3)).nodes["e0"].values
+        wanted = [0, 0.08, 0.25, 0.5, 0.75, 1] if more else [0, 0.25, 0.75, 1]
+        assert nodes.tolist() == pytest.approx(wanted)
+
+
+def test_where_a_far_node_has_no_solution_the_rest_may_bend_too() -> None:
+    """Three nodes do, two cannot tell: asked more towards the farthest that has an answer."""
+    n, none = 2, np.zeros((2, 1))
+    answer = lambda e: Answer(np.full(n, e * e), none, np.zeros(n))
+    plain = Expansion(np.zeros(1), np.zeros(n), none, np.zeros((n, 1, 1)), np.zeros(n), none, {})
+    failed, span = ValueError("no such tyre"), Span(0.0, 1.0)
+    found = {0.25: answer(0.25), 0.75: answer(0.75), 1.0: failed}
+    more = lambda span, found: _more(_nodes("e0", plain, span, found))
+    assert more(span, found) == pytest.approx([0.75 * 0.08, 0.75 * 0.5])
+    assert more(span, {**found, 0.75: failed}) == []
+    back = {-e: each for e, each in found.items()}
+    assert more(Span(-1.0, 0.0), back) == pytest.approx([-0.75 * 0.08, -0.75 * 0.5])
+
+
+def test_curvature_is_that_of_two_slopes() -> None:
+    toy = Toy(effects=0, bend=0.1)
+    found = expand(toy, np.array([0.2, -0.1, 0.3]))
+    assert found.hessian == pytest.approx(2 * toy.bend[:, None, None] * np.eye(3), abs=1e-9)
+
+
+def test_a_change_beyond_the_range_is_asked_where_it_was_measured() -> None:
+    """Counted from what the case has; within the range, at 0, or as a factor nothing is added."""
+    span = Span(-0.3, 0.7, base=0.3)  # of an effect from 0 to 1
+    reached = lambda value, times=False: _reaching(span, Toggle("a", value, times, 0.3)).also
+    assert reached(1.5) == (pytest.approx(1.2),) and reached(-0.2) == (pytest.approx(-0.5),)
+    for value in (1.0, 0.0, 0.3, 0.65):
+        assert reached(value) == ()
+    assert reached(5.0, True) == ()
+    twice = _reaching(_reaching(span, Toggle("a", 1.5, base=0.3)), Toggle("a", 1.5, base=0.3))
+    assert len(twice.also) == 1
+    zero = _reaching(Span(0.5, 1.0), Toggle("a", 0.0))  # 0 is a node anyway
+    assert zero.also == ()
