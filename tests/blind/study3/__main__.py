@@ -78,8 +78,8 @@ def main() -> None:
     elif o.what == "power":
         print(power(Path(o.folder)))
     elif o.what == "rises":
-        made = [g for g in GROUPS if (Path(o.folder) / g.name / SEAL).exists()]
-        found = {g: rises(Path(o.folder) / g.name, sealed_in(o.folder) / g.name) for g in made}
+        answered = [g for g in GROUPS if (Path(o.folder) / g.name / ANSWERS).exists()]
+        found = {g: rises(Path(o.folder) / g.name, sealed_in(o.folder) / g.name) for g in answered}
         print(table_of_rises(found))
     elif o.what == "unpack":
         for group in (each for each in RECORDED.iterdir() if each.is_dir()):
