@@ -46,6 +46,10 @@ def test_a_rate_counts_its_own_trials_and_few_are_not_shown() -> None:
     assert said[name] == "45 of 60, 75 % (62 to 85)"
     assert said["named: right, or in part of several"].startswith("45 of 60")
     assert figures(pairs[1:], 60)[name] == "not shown (59)"
+    seen = "two, together from 25, too: one of them named first"
+    hidden = [replace(each, together=12.0) for each in pairs]
+    assert figures(pairs + hidden, 60)[seen] == figures(pairs, 60)[seen] == said[seen]
+    assert said[seen].startswith("45 of 60")
 
 
 def test_shrinkage_is_of_what_was_named_and_strong_and_exchanged_labels_count_for_nothing() -> None:

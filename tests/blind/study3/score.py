@@ -47,8 +47,9 @@ SIZES_TRIED = 41  # of an effect, for the one that errs least
 class Scored:
     """A trial and its answer. hard: of each effect, or of what is outside the catalogue; ranked:
     keys by falling probability, an id, ids joined by +, none or outside; stated: the first one's;
-    there: that of all that it names, whatever else there is; right: the first one is the truth by
-    groups; held: whether each named and true effect's interval holds what it is worth in the
+    there: that of all that it names, whatever else there is; together: lambda of what all of
+    several effects move, of which calibration may take up more than of each; right: the first one
+    is the truth by groups; held: whether each named and true effect's interval holds what it is worth in the
     catalogue's law; before, after: rms error held out, in ln f; usual: the same of least squares,
     without and with what is likeliest, None where labels are exchanged; least: with a strong single
     effect that is there, at the size that errs least, which nobody can know; foretold: whether each
@@ -74,6 +75,7 @@ class Scored:
     least: float = np.nan
     foretold: tuple[bool, ...] = ()
     there: float = 1.0
+    together: float = np.inf
     if_told: Scored | None = None
 
     def found(self, ids: Sequence[str]) -> int:
@@ -177,6 +179,10 @@ def one(
         truth["again"],
     )
     again = weighed_again(p, answer.get("further", Assumed.further), further(protocol.counts))
+    if len(effects) > 1:
+        moved, split = true_shift(truth, ruler, places, labels)
+        whole = difficulty(ruler, protocol, effects[0], d, places, counts, moved, split)
+        found = replace(found, together=whole.lam)
     found = replace(
         weighed(found, p),
         foretold=foretold(truth, out, protocol.held_out_kPa),
@@ -272,6 +278,9 @@ def figures(
             ),
             f"{words}: likeliest is the truth": shown(t.right for t in here),
             f"{words}: called outside": shown(t.verdict == "outside" for t in here),
+            f"{words}, together from {ONE:g}, too: one of them named first": shown(
+                t.found(t.ranked[0].split("+")[:1]) > 0 for t in here if t.together >= ONE
+            ),
         }
     robust = [t for t in named if t.robust]
     calibrated = lambda of, stated, right: _calibration(
