@@ -49,12 +49,13 @@ class Scored:
     keys by falling probability, an id, ids joined by +, none or outside; stated: the first one's;
     there: that of all that it names, whatever else there is; together: lambda of what all of
     several effects move, of which calibration may take up more than of each; right: the first one
-    is the truth by groups; held: whether each named and true effect's interval holds what it is worth in the
-    catalogue's law; before, after: rms error held out, in ln f; usual: the same of least squares,
-    without and with what is likeliest, None where labels are exchanged; least: with a strong single
-    effect that is there, at the size that errs least, which nobody can know; foretold: whether each
-    frequency held out lies in its interval, where the answer has any; if_told: the same, its
-    answer weighed again as if the rules had told it how many effects tyres have."""
+    is the truth by groups; held: whether each named and true effect's interval holds what it is
+    worth in the catalogue's law; before, after: rms error held out, in ln f; usual: the same of
+    least squares, without and with what is likeliest, None where labels are exchanged; least: with
+    a strong single effect that is there, at the size that errs least, which nobody can know;
+    foretold: whether each frequency held out lies in its interval, where the answer has any;
+    if_told: the same, its answer weighed again as if the rules had told it how many effects tyres
+    have."""
 
     id: str
     kind: str  # none, effect, several or outside
