@@ -150,6 +150,12 @@ def test_hourglass_stiffness_is_of_the_section_above_it() -> None:
             13,
             "material GUM of a solid is neither *HYPERELASTIC nor *ELASTIC",
         ),
+        (
+            "*HYPERELASTIC, MOONEY-RIVLIN\n1E6, 0., 5.085D-8\n",
+            "*ELASTIC\n1E6, 0.3\n*NO COMPRESSION\n",
+            14,
+            "*NO COMPRESSION of material GUM is honoured of cords only",
+        ),
         ("*MATERIAL, NAME=GUM\n", "", 14, "*HYPERELASTIC must follow a *MATERIAL"),
         ("1100.\n", "1100.\n*MATERIAL, NAME=GUM\n", 19, "material GUM is defined twice"),
         ("MOONEY-RIVLIN\n", "MOONEY-RIVLIN, MODULI=FAST\n", 15, "MODULI=FAST of *HYPERELASTIC"),
