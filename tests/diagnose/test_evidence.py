@@ -462,7 +462,7 @@ def test_covariance_is_what_it_says() -> None:
     p = problem(toy, changes=(Toggle("e0", 0.0),), noise=1e-9)
     S = covariance(p.observations, 0 * p.constants, 0.0, form=0.01) / 1e-4
     n = len(toy.base)
-    smooth = np.exp(-(np.log(1.5) ** 2) / (2 * 0.6**2))
+    smooth = np.exp(-(np.log(1.5) ** 2) / (2 * 0.54**2))
     assert S[0, len(LABELS)] == pytest.approx(smooth)
     assert S[0, n] == pytest.approx(0.97)
     assert S[0, n + len(LABELS)] == pytest.approx(0.97 * smooth)
@@ -470,7 +470,7 @@ def test_covariance_is_what_it_says() -> None:
 
 
 def test_material_laws_are_off_in_all_modes_by_family_and_by_mode_smoothly() -> None:
-    """3 % each beside the form on record, 0.4 in ln p apart: exp(-0.4^2 / (2 0.5^2)) alike; [0,0]
+    """3 % each beside the form on record, 0.4 in ln p apart: exp(-0.4^2 / (2 0.8^2)) alike; [0,0]
     torsional and [1,0] move in the plane, [1,1] does not; a stated form stands for both; the mass
     has neither."""
     toy = Toy(pressures=(160.0, 160.0 * np.exp(0.4)))
@@ -478,7 +478,7 @@ def test_material_laws_are_off_in_all_modes_by_family_and_by_mode_smoothly() -> 
     mass = Observable("mass_kg", None, 0.0)
     rows = (*p.observations.rows, mass)
     added = (model_form(rows, 0.03) - model_form(rows, 0.0)) / 0.03**2
-    n, near = len(LABELS), np.exp(-(0.4**2) / 0.5)
+    n, near = len(LABELS), np.exp(-(0.4**2) / (2 * 0.8**2))
     said = [str(label) for label in LABELS]
     torsional, lateral, vertical = map(said.index, ("[0,0] torsional", "[1,1]", "[1,0]"))
     assert added[0, 0] == added[n, n] == pytest.approx(3.0)

@@ -266,7 +266,7 @@ def test_the_gains_of_further_rows_by_their_formula() -> None:
             if rows[i][0] in LABELS:
                 mode = LABELS.index(rows[i][0])
                 same[9 + k, mode] = same[mode, 9 + k] = np.exp(
-                    -(np.log(rows[i][1] / 240.0) ** 2) / (2 * 0.6**2)
+                    -(np.log(rows[i][1] / 240.0) ** 2) / (2 * 0.54**2)
                 )
         S = np.diag(np.square(noise)) + same * np.outer(sizes, sizes) + constants @ constants.T
         S = S + 1e-12 * np.eye(len(S)) + whole @ np.diag(toy.spread**2) @ whole.T

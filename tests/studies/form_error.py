@@ -7,7 +7,7 @@ For each variant: d = ln f_variant - ln f_default of all modes at three pressure
 design variables can absorb is taken out by least squares, as a calibration would; the rest is the
 error of form. Printed: its rms over variants and pressures, per mode, in per cent, times
 sqrt(n / (n - v)) for the directions that were taken out. Then the length l of ln p over which that
-rest r is alike: rho = sum r r' / sqrt(sum r^2 sum r'^2) of two pressures is
+rest r is alike: rho = 2 sum r r' / (sum r^2 + sum r'^2) of two pressures is
 exp(-(ln p - ln p')^2 / (2 l^2)).
 No measured data enter.
 """
@@ -79,7 +79,7 @@ def main(sizes: Sequence[str]) -> None:
         by_mode, length = computed(print)
         for label, percent in by_mode.items():
             print(f'    "{label}": {percent:.2f},')
-        print(f"alike over {length:.1f} of ln p")
+        print(f"alike over {length:.2f} of ln p")
     for size in sizes:
         case = by_size(size)
         labels = [label for label in LABELS if label.c <= case.case.analysis.highest_harmonic]
@@ -116,8 +116,8 @@ def left(
 
 def alike_over(rest: Array) -> float:
     """l by least squares of -ln rho = (ln p - ln p')^2 / (2 l^2), errors (pressures, n)."""
-    size = np.sqrt((rest**2).sum(1))
-    rho = (rest @ rest.T) / np.outer(size, size)
+    square = (rest**2).sum(1)
+    rho = 2 * (rest @ rest.T) / np.add.outer(square, square)
     pairs = np.triu_indices(len(rest), 1)
     half = np.log(np.divide.outer(PRESSURES, PRESSURES))[pairs] ** 2 / 2
     return float(np.sqrt(half @ half / (half @ -np.log(rho[pairs]))))

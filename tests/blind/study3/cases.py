@@ -60,10 +60,7 @@ class Group:
 
 
 GROUPS = [
-    Group(size, own, series)
-    for series in (1, 2, 3, 4, 5, 6, 7, 8, 9)
-    for size in SIZES
-    for own in (True, False)
+    Group(size, own, series) for series in range(1, 11) for size in SIZES for own in (True, False)
 ]
 
 

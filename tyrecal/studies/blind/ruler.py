@@ -32,6 +32,7 @@ CURVATURE_STEP = 0.05  # of ln x, for the curvature
 SHARES = (0.15, 0.5, 1.0)  # of each side of a range
 SIZE_POINTS = 61
 BETWEEN_PRESSURES = 0.9  # of form errors: as all studies on record were scored
+EARLIER_LAWS_LENGTH = 0.5  # of ln p, over which laws were alike in rulers that do not say it
 NUMBERS = ("x0", "spread", "eta", "jacobian", "hessian", "constants")
 SIGNATURE = ("sizes", "shift", "tilt", "split")
 
@@ -74,6 +75,7 @@ class Ruler:
     signatures: Mapping[str, EffectShifts]
     material_laws: float = 0.0  # standard deviation of each part
     laws_shared: bool = False  # by a family, and by all modes, too
+    laws_length: float = LAWS_LENGTH  # of ln p, over which that is alike
 
     def sigma(
         self, places: Array, counts: Array, protocol: Protocol, constants: bool = True
@@ -90,7 +92,7 @@ class Ruler:
         alike = np.where(np.eye(len(rows), dtype=bool), 1.0, BETWEEN_PRESSURES) * same
         form = np.array([form_error(label) for label in labels])
         ln_p = np.log([state_of(where).pressure_kPa or 1.0 for _, where in rows])
-        near = np.exp(-(((ln_p[:, None] - ln_p) / LAWS_LENGTH) ** 2) / 2)
+        near = np.exp(-(((ln_p[:, None] - ln_p) / self.laws_length) ** 2) / 2)
         families = [label.family if label else None for label in labels]
         kin = np.array([[a is not None and a == b for b in families] for a in families])
         parts = same + (kin + 1.0 if self.laws_shared else 0.0)
@@ -204,6 +206,7 @@ def measure(model: ResponseModel, rows: Sequence[ModelRow]) -> dict[str, Any]:
         "signatures": signatures,
         "material_laws": model.material_laws,
         "laws_shared": True,
+        "laws_length": LAWS_LENGTH,
     }
 
 
@@ -232,7 +235,15 @@ def ruler_of(content: Mapping[str, Any], labels: Sequence[Label]) -> Ruler:
     rows = tuple((known[name], float(p)) for name, p in content["rows"])
     laws = float(content.get("material_laws", 0.0))  # none in rulers of earlier studies
     shared = bool(content.get("laws_shared"))
-    return Ruler(rows, signatures=signatures, material_laws=laws, laws_shared=shared, **numbers)
+    length = float(content.get("laws_length", EARLIER_LAWS_LENGTH))
+    return Ruler(
+        rows,
+        **numbers,
+        signatures=signatures,
+        material_laws=laws,
+        laws_shared=shared,
+        laws_length=length,
+    )
 
 
 def _words(label: Label | None) -> str:
