@@ -374,9 +374,9 @@ def test_predictions_are_the_conditional_of_the_joint_normal_distribution() -> N
     form = np.array([0.0018, 0.0015, 0.0010])  # of form_error
     scatter = np.diag([1e-4, 2e-4, 1e-4])
     ln_p = np.log([240.0, 200.0, 280.0])
-    smooth = np.exp(-((ln_p[:, None] - ln_p) ** 2) / (2 * 0.6**2))
+    smooth = np.exp(-((ln_p[:, None] - ln_p) ** 2) / (2 * 0.54**2))
     whole = np.kron(smooth, np.eye(3)) * np.outer(np.tile(form, 3), np.tile(form, 3))
-    near = np.exp(-2 * (ln_p[:, None] - ln_p) ** 2)  # length 0.5
+    near = np.exp(-((ln_p[:, None] - ln_p) ** 2) / (2 * 0.8**2))
     in_plane = np.array([label.m == 0 for label in LABELS])
     shared = 1.0 + (in_plane[:, None] == in_plane)  # by all modes, and by a family
     whole += 0.002**2 * np.kron(near, shared + np.eye(3))
