@@ -406,9 +406,9 @@ def test_the_tables_on_record_are_what_the_scorer_says(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_three_answers_on_record_are_given_again(tmp_path: Path) -> None:
-    """The first three by name of a group of series 8, by today's diagnosis."""
+    """The first three by name of a group of series 10, by today's diagnosis."""
     folder = tmp_path / "trials"
-    unpacked(RECORDED / "p235_75r17_own_8", folder)
+    unpacked(RECORDED / "205_60r15_own_10", folder)
     recorded = {}
     for place, path in enumerate(sorted((folder / "answers").glob("*.json"))):
         if place < 3:
