@@ -18,10 +18,11 @@ import os
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 from unittest.mock import patch
 
 import numpy as np
@@ -146,6 +147,18 @@ def common(law: bool = True, sides: bool = True) -> Iterator[None]:
             switched.enter_context(patch.object(resolve, "build_mesh", straight))
         yield
     resolve._mesh.cache_clear()
+
+
+@contextmanager
+def rewritten(deck: Callable[[str], str]) -> Iterator[None]:
+    """All decks as ``deck`` has their text."""
+    plain = TyreDesign.texts
+
+    def texts(design: TyreDesign, dialect: str, request: Mapping[str, Any]) -> dict[str, str]:
+        return {name: deck(text) for name, text in plain(design, dialect, request).items()}
+
+    with patch.object(TyreDesign, "texts", texts):
+        yield
 
 
 def on_common_nodes(a: HarmonicShape, b: HarmonicShape) -> tuple[HarmonicShape, HarmonicShape]:

@@ -14,14 +14,11 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import re
 import sys
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
-from unittest.mock import patch
 
-from tests.studies.calculix import Row, compare
-from tyrecal.simulate.deck.tyre_design import TyreDesign
+from tests.studies.calculix import Row, compare, rewritten
 from tyrecal.simulate.evaluate.failure import EvaluationFailed
 from tyrecal.simulate.evaluate.store import Store
 from tyrecal.tyre.case import LoadedCase
@@ -80,15 +77,9 @@ def lawed(text: str) -> str:
 
 
 def main(store: Store | None, level: str = "default") -> None:
-    plain = TyreDesign.texts
-
-    def texts(design: TyreDesign, dialect: str, request: Mapping[str, Any]) -> dict[str, str]:
-        written = plain(design, dialect, request)
-        return {name: lawed(text) for name, text in written.items()}
-
     every: list[Row] = []
     print("| kPa | mode | CalculiX, Hz | common problem | MAC | as shipped |\n" + 6 * "|---" + "|")
-    with patch.object(TyreDesign, "texts", texts):
+    with rewritten(lawed):
         for pressure in PRESSURES:
             try:
                 rows = compare(compounded(pressure, level), store)

@@ -16,10 +16,8 @@ No measured data enter.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from typing import Any
-from unittest.mock import patch
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager
 
 import numpy as np
 
@@ -31,7 +29,7 @@ from tyrecal.studies.diagnose.tyre_model import TyreModel
 from tyrecal.tyre.case import LoadedCase
 from tyrecal.tyre.load import load_case
 
-from .calculix import common
+from .calculix import common, rewritten
 from .form_error import FITTED, LABELS, PRESSURES, alike_over
 from .wrinkles import by_size
 
@@ -56,19 +54,7 @@ def with_law(
     return lambda text: RUBBER.sub(other, text)
 
 
-@contextmanager
-def rewritten(deck: Callable[[str], str]) -> Iterator[None]:
-    """All decks as ``deck`` has their text."""
-    plain = TyreDesign.texts
-
-    def texts(design: TyreDesign, dialect: str, request: Mapping[str, Any]) -> dict[str, str]:
-        return {name: deck(text) for name, text in plain(design, dialect, request).items()}
-
-    with patch.object(TyreDesign, "texts", texts):
-        yield
-
-
-def others() -> dict[str, Any]:
+def others() -> dict[str, AbstractContextManager[None]]:
     """Contexts in which the bundled solver has other laws, by what they are."""
     mooney = with_law("MOONEY-RIVLIN", lambda C, D1: ((1 - IN_C01) * C, IN_C01 * C, D1))
     yeoh = with_law("YEOH", lambda C, D1: (C, *(share * C for share in SOFTENING), D1, 0.0, 0.0))
