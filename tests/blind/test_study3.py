@@ -204,6 +204,8 @@ def test_trials_of_all_kinds_are_drawn_sealed_and_made_again_alike(
     assert again.pop("nonce") and again == truths[1]
     with pytest.raises(InputError, match="sealed trials already"):
         making.make(tmp_path / "a", tmp_path / "a-truth", group, counts)
+    with pytest.raises(InputError, match="one or two effects"):
+        making.make(tmp_path / "c", tmp_path / "c-truth", group, {"three": 8, "outside": 4})
 
 
 def test_what_the_rules_tell_of_further_effects_is_the_counts_mean_number() -> None:
@@ -211,7 +213,9 @@ def test_what_the_rules_tell_of_further_effects_is_the_counts_mean_number() -> N
         one, two, three = (int(10_000 * f**k) for k in range(3))
         counts = {"none": 7, "outside": 3, "one": one - 10, "again": 10, "two_strong": two}
         assert further({**counts, "three": three}) == pytest.approx(f, rel=1e-3)
-    assert further({"one": 5, "none": 2}) == 0.0
+    assert further({"one": 5, "none": 2}) == further({"none": 2, "three": 0}) == 0.0
+    with pytest.raises(InputError, match="one or two effects"):
+        further({"three_strong": 4, "outside": 1})
 
 
 def test_strong_effects_are_those_of_which_the_ruler_foresees_enough(chance: Chance) -> None:

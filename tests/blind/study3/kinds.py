@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from math import sqrt
 
+from tyrecal.errors import InputError
 from tyrecal.studies.diagnose.evidence import NONE, OUTSIDE
 from tyrecal.studies.diagnose.several import MOST_EFFECTS, priors
 
@@ -16,10 +17,14 @@ def further(counts: Mapping[str, int]) -> float:
     """Tyres with two effects over those with one, and with three over those with two, of which the
     mean number of effects is that of ``counts`` (`Protocol.counts`): what the rules tell whoever
     answers, f in (1 + 2 f + 3 f^2) / (1 + f + f^2) = mean. 0 in the studies before, whose tyres
-    have one effect at most."""
+    have one effect at most. Raises InputError where all have three, of which no f tells."""
     numbers = {**EFFECTS_OF, "again": 1, "effect": 1}
-    have = {kind: count for kind, count in counts.items() if numbers[kind]}
-    mean = sum(numbers[kind] * count for kind, count in have.items()) / sum(have.values())
+    have = [numbers[kind] for kind, count in counts.items() for _ in range(count) if numbers[kind]]
+    if not have:
+        return 0.0
+    if min(have) == MOST_EFFECTS:
+        raise InputError("add a tyre of one or two effects: that all have three no prior can tell")
+    mean = sum(have) / len(have)
     a, b, c = 3 - mean, 2 - mean, 1 - mean
     return (-b + sqrt(b * b - 4 * a * c)) / (2 * a)
 

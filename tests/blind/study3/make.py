@@ -36,6 +36,7 @@ from tyrecal.tyre.case import LoadedCase
 
 from .cases import LABELS, Group, written
 from .draw import Drawn, drawn, drawn_anew, evident, made
+from .kinds import further
 from .maker import ABOUT, Fenics, computed
 
 FENICS = Fenics()  # of this process
@@ -58,6 +59,7 @@ def make(
     Goes on where it was stopped. Raises InputError."""
     if (folder / SEAL).exists():
         raise InputError(f"{folder} holds sealed trials already; make others in another folder")
+    further(counts)  # or nobody could answer
     folder.mkdir(parents=True, exist_ok=True)
     sealed.mkdir(parents=True, exist_ok=True)
     case = written(group, sealed)
