@@ -16,7 +16,14 @@ from tyrecal.studies.diagnose.expansion import anchored
 from tyrecal.studies.diagnose.model import Query
 from tyrecal.studies.diagnose.result import diagnosis_result
 from tyrecal.studies.diagnose.robustness import robustness
-from tyrecal.studies.diagnose.several import before, most_like, present, probabilities, weigh
+from tyrecal.studies.diagnose.several import (
+    PARTNERS,
+    before,
+    most_like,
+    present,
+    probabilities,
+    weigh,
+)
 from tyrecal.studies.diagnose.study import DiagnosedCase
 from tyrecal.studies.diagnose.verdict import Further, decide, most_sure, perhaps
 
@@ -96,6 +103,24 @@ def test_a_third_effect_is_looked_for_where_the_rest_of_the_gap_is_like_it() -> 
     base = problem(toy)
     p = base.measured(toy.base + 0.8 * toy.g["e1"] + 0.5 * toy.g["e4"] + 0.6 * toy.g["e7"])
     assert most_like(p, explain(p, ["e1", "e4"], 1.0))[0] == "e7"
+
+
+def test_two_effects_that_hide_one_another_are_found() -> None:
+    """Of v + u and v - u, both seen by no calibration, orthogonal where Sigma is the measure, u six
+    times as long: of 2 v, which both move, either alone explains a part in 37, each of four others,
+    v and something of its own, more; both explain all."""
+    toy = Toy(effects=6, size=0.004, bend=0.0, pressures=(160.0, 240.0))
+    for id in toy.tilt:
+        toy.tilt[id] = 0 * toy.tilt[id]
+    root = np.linalg.cholesky(problem(toy).sigma)
+    Q, _ = np.linalg.qr(np.linalg.solve(root, np.column_stack([toy.J, toy.g["e0"], toy.g["e1"]])))
+    v, u = 5 * root @ Q[:, 3], 30 * root @ Q[:, 4]
+    toy.g = {id: v + g for id, g in toy.g.items()} | {"e0": v + u, "e1": v - u}
+    base = problem(toy)
+    found = weigh(base.measured(toy.base + 0.9 * (toy.g["e0"] + toy.g["e1"])))
+    alone = sorted((h for h in found if len(h.values) == 1), key=lambda h: -h.ln_evidence)
+    assert {h.key for h in alone[:PARTNERS]}.isdisjoint({"e0", "e1"})
+    assert decide(found, probabilities(found), len(base.places), 3).key == "e0+e1"
 
 
 def test_a_size_that_the_case_states_as_possible_is_a_constant() -> None:

@@ -2,14 +2,16 @@
 
 Before the data: none 0.25, outside the catalogue 0.10; of the rest two effects have the share
 ``further`` of one's, three that of two's, and all sets of as many effects the same. Of 26 effects
-there are 325 pairs and 2600 triples; tried are the likeliest singles with every other effect, and,
-where pairs carry weight, these with whatever the rest of the gap is most like.
+there are 325 pairs and 2600 triples; tried are the likeliest singles with every other effect, those
+that explain most together, and, where pairs carry weight, these with whatever the rest of the gap
+is most like.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import replace
+from itertools import combinations
 from math import comb
 from typing import Final
 
@@ -25,6 +27,7 @@ COUPLED_POINTS = 3  # of the rule in what couples modes, that stand for all from
 PARTNERS = 4  # singles that are tried with every other
 BASES, BASES_WITHIN = 3, 3.0  # pairs that a third is added to; ln probability behind the best
 THIRDS = 4  # effects that are added to each
+TOGETHER = 4  # pairs more, that explain most together
 FEW_ENOUGH = 8.0  # ln probability of a set behind the best of fewer, for few points to be enough
 
 
@@ -118,6 +121,7 @@ def _with_one_more(
     fewer = sorted(fewer, key=lambda h: -h.ln_evidence)
     if count == 2:
         wanted = {frozenset((h.key, id)) for h in fewer[:PARTNERS] for id in order if id != h.key}
+        wanted |= {*together_most_like(problem, found[0], wanted)}
     else:
         ln = {h.key: h.ln_evidence + np.log(h.prior) for h in found if h.key != OUTSIDE}
         likely = [h for h in fewer[:BASES] if ln[h.key] > max(ln.values()) - BASES_WITHIN]
@@ -156,10 +160,30 @@ def coupled_most(known: Sequence[Hypothesis]) -> dict[int, float]:
 
 
 def most_like(problem: InverseProblem, base: Hypothesis) -> list[str]:
-    """Effects by what they would gain beside those of ``base``, the first `THIRDS`.
+    """Effects by what they would gain beside those of ``base``, the first `THIRDS`."""
+    gains = {id: float(own.max()) for id, (own, *_) in _gains(problem, base).items()}
+    return sorted(gains, key=lambda id: -gains[id])[:THIRDS]
 
-    With r the residual of its likeliest fit and P what neither calibration nor the sizes that it
-    has already absorb, c of one more effect gains c^T P r - c^T P c / 2 in ln likelihood.
+
+def together_most_like(
+    problem: InverseProblem, none: Hypothesis, tried: Container[frozenset[str]]
+) -> list[frozenset[str]]:
+    """Pairs by what both gain together, the first `TOGETHER` that are not among ``tried``: two may
+    hide one another from calibration, a lateral and a tilting spring, of which neither looks likely
+    alone."""
+    gains = {}
+    for (a, (own, _, Pc)), (b, (other, c, _)) in combinations(_gains(problem, none).items(), 2):
+        if frozenset((a, b)) not in tried:
+            gains[frozenset((a, b))] = float((own[:, None] + other - Pc @ c.T).max())
+    return sorted(gains, key=lambda pair: -gains[pair])[:TOGETHER]
+
+
+def _gains(problem: InverseProblem, base: Hypothesis) -> dict[str, tuple[Array, Array, Array]]:
+    """Of each effect that is not in ``base``, over its range (q,): what it would gain in ln
+    likelihood, its shift c (q, n), and c P (q, n).
+
+    With r the residual of the base's likeliest fit and P what neither calibration nor the sizes
+    that it has already absorb, c gains c^T P r - c^T P c / 2, and one more, c', -c^T P c' besides.
     """
     best = base.best
     problem = replace(problem, zeta=float(base.fitted.zeta[best]))
@@ -181,10 +205,11 @@ def most_like(problem: InverseProblem, base: Hypothesis) -> list[str]:
     inner = J.T @ inverse @ J + np.diag(np.concatenate(information))
     P = inverse - inverse @ J @ np.linalg.solve(inner, J.T @ inverse)
     r = problem.observations.y - problem.predicted(at, d[None])[0]
-    gains = {}
+    found = {}
     for id, nodes in problem.expansion.nodes.items():
         if id not in sizes:
             points, _ = grid(nodes)
             c = problem.added({id: points}, len(points)).shift - problem.added({}, 1).shift
-            gains[id] = float((c @ P @ r - np.einsum("qn,nm,qm->q", c, P, c) / 2).max())
-    return sorted(gains, key=lambda id: -gains[id])[:THIRDS]
+            Pc = c @ P
+            found[id] = Pc @ r - (Pc * c).sum(1) / 2, c, Pc
+    return found
