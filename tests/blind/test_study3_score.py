@@ -38,6 +38,13 @@ def test_one_of_several_effects_is_named_for_its_group_and_for_one_truth_only() 
     assert not answered("a", "a+b").right
 
 
+def test_what_is_named_comes_before_what_is_likeliest_with_more() -> None:
+    """The verdict names b, which all explanations hold; without a name the likeliest says."""
+    named = answered("a+b", "b", ranked=("c+b", "b"))
+    assert named.first_right and not replace(named, named=None).first_right
+    assert not answered("a+b", "c", ranked=("b",)).first_right
+
+
 def test_a_rate_counts_its_own_trials_and_few_are_not_shown() -> None:
     pairs = [answered("a+b", "a+b")] * 45 + [answered("a+b", "c")] * 15
     weak = [answered("a+b", "none", lam=3.0)] * 100

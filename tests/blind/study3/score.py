@@ -100,6 +100,11 @@ class Scored:
         ids = self.ranked[0].split("+")
         return self.right or self.found(ids) == len(ids)
 
+    @property
+    def first_right(self) -> bool:
+        """The first effect that is named, or likeliest where none is, is there."""
+        return self.found((self.named or self.ranked[0]).split("+")[:1]) > 0
+
     def says(self, key: str) -> bool:
         """A key is the truth, by groups."""
         ids = key.split("+")
@@ -274,13 +279,11 @@ def figures(
             f"{words} effects, each lambda from {EACH:g}: all in the 90 % set": shown(
                 t.found(sorted(t.candidates)) == len(t.effects) for t in here
             ),
-            f"{words}: one of them named first": shown(
-                t.found(t.ranked[0].split("+")[:1]) > 0 for t in here
-            ),
+            f"{words}: one of them named first": shown(t.first_right for t in here),
             f"{words}: likeliest is the truth": shown(t.right for t in here),
             f"{words}: called outside": shown(t.verdict == "outside" for t in here),
             f"{words}, together from {ONE:g}, too: one of them named first": shown(
-                t.found(t.ranked[0].split("+")[:1]) > 0 for t in here if t.together >= ONE
+                t.first_right for t in here if t.together >= ONE
             ),
         }
     robust = [t for t in named if t.robust]
