@@ -54,6 +54,7 @@ from .tyre import tyre_of
 
 COUNTS = {"none": 12, "one": 12, "one_strong": 20, "two": 4, "two_strong": 14, "three": 4}
 COUNTS |= {"three_strong": 0, "outside": 6, "outside_strong": 0, "again": 2}
+COUNTS |= {"one_faint": 0, "one_weak": 0}
 COMMANDS = "groups", "make", "answer", "unpack", "score", "power", "rises", "mesh"
 
 

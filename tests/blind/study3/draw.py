@@ -24,11 +24,13 @@ from .section import columns, mould, off
 from .tyre import Tyre, tyre_of
 
 CLAMPED = 0.5  # share of effects of the wheel's clamp, which a doubtful section hides least
-LEAST = {
-    "one_strong": ONE,
-    "two_strong": EACH,
-    "three_strong": EACH,
-}  # lambda that is foreseen of each effect
+FORESEEN = {
+    "one_faint": (4.0, 10.0),
+    "one_weak": (10.0, ONE),
+    "one_strong": (ONE, np.inf),
+    "two_strong": (EACH, np.inf),
+    "three_strong": (EACH, np.inf),
+}  # from which lambda to which, of each effect
 MAX_DRAWS = 10_000
 SEAT_m, GAUGE_kPa, ROOM_K = 0.4e-3, 0.5, 1.0  # of a mounting: beads apart, pressure, temperature
 
@@ -63,7 +65,7 @@ def drawn(
     ruler: Ruler | None = None,
 ) -> list[Drawn]:
     """All trials by the order of their ids. counts: by kind (`EFFECTS_OF`), and "again": tyres of
-    one effect that are mounted and measured once more. ruler: for kinds that are strong."""
+    one effect that are mounted and measured once more. ruler: for those of `FORESEEN`."""
     random = np.random.default_rng(seed)
     kinds = [kind for kind in EFFECTS_OF for _ in range(counts.get(kind, 0))]
     found = [one_drawn(protocol, case, group, kind, random, ruler) for kind in kinds]
@@ -85,8 +87,8 @@ def one_drawn(
     random: np.random.Generator,
     ruler: Ruler | None,
 ) -> Drawn:
-    """A trial of a kind; a strong one's effects are drawn until the ruler foresees enough lambda of
-    each. Raises InputError where it never does."""
+    """A trial of a kind; one of `FORESEEN` has its effects drawn until the ruler foresees such a
+    lambda of each. Raises InputError where it never does."""
     rules, known_sources = replace(protocol, counts={"none": 1}), sources(with_exact_section(case))
     (truth,) = draw(rules, case, known_sources[0], {}, {}, int(random.integers(2**63)))
     effects, outside = known_laws(case, group)
@@ -101,11 +103,12 @@ def one_drawn(
     for _ in range(MAX_DRAWS):
         ids = sorted(random.choice(names, number, replace=False, p=chances).tolist())
         sizes = {id: known[id].drawn(random, smallest) for id in ids}
-        if kind not in LEAST:
+        if kind not in FORESEEN:
             break
         assert ruler is not None
         lam = [foreseen(ruler, protocol, truth, id, size) for id, size in sizes.items()]
-        if min(lam) >= LEAST[kind]:
+        low, high = FORESEEN[kind]
+        if low <= min(lam) < high:
             break
     else:
         raise InputError(f"no effects of kind {kind} could be seen, by the ruler")

@@ -11,6 +11,7 @@ from tyrecal.studies.diagnose.several import MOST_EFFECTS, priors
 
 EFFECTS_OF = {"none": 0, "one": 1, "two": 2, "three": 3, "outside": 0}
 EFFECTS_OF |= {"one_strong": 1, "two_strong": 2, "three_strong": 3, "outside_strong": 0}
+EFFECTS_OF |= {"one_faint": 1, "one_weak": 1}
 
 
 def further(counts: Mapping[str, int]) -> float:

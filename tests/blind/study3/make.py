@@ -35,7 +35,7 @@ from tyrecal.studies.blind.seal import SEAL, seal
 from tyrecal.tyre.case import LoadedCase
 
 from .cases import LABELS, Group, written
-from .draw import Drawn, drawn, drawn_anew, evident, made
+from .draw import FORESEEN, Drawn, drawn, drawn_anew, evident, made
 from .kinds import further
 from .maker import ABOUT, Fenics, computed
 
@@ -73,8 +73,8 @@ def make(
     if not (folder / RULER_FILE).exists():
         write_ruler(folder, (ruler or partial(measured, jobs=jobs))(case, protocol))
     seed = kept_seed(sealed, seed)
-    strong = any(count for kind, count in counts.items() if kind.endswith("_strong"))
-    known = read_ruler(folder, labels_of(case)) if strong else None
+    judged = any(counts.get(kind) for kind in (*FORESEEN, "outside_strong"))
+    known = read_ruler(folder, labels_of(case)) if judged else None
     every = drawn(protocol, case, group, counts, seed, known)
     work = partial(one, sealed, protocol, case, group, known)
     found = []
