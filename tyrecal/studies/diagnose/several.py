@@ -27,7 +27,7 @@ COUPLED_POINTS = 3  # of the rule in what couples modes, that stand for all from
 PARTNERS = 4  # singles that are tried with every other
 BASES, BASES_WITHIN = 3, 3.0  # pairs that a third is added to; ln probability behind the best
 THIRDS = 4  # effects that are added to each
-TOGETHER = 4  # pairs more, that explain most together
+HIDDEN_PAIRS = 4  # more, that explain most together
 FEW_ENOUGH = 8.0  # ln probability of a set behind the best of fewer, for few points to be enough
 
 
@@ -168,14 +168,14 @@ def most_like(problem: InverseProblem, base: Hypothesis) -> list[str]:
 def together_most_like(
     problem: InverseProblem, none: Hypothesis, tried: Container[frozenset[str]]
 ) -> list[frozenset[str]]:
-    """Pairs by what both gain together, the first `TOGETHER` that are not among ``tried``: two may
+    """Pairs by what both gain together, the first `HIDDEN_PAIRS` that are not among ``tried``: two may
     hide one another from calibration, a lateral and a tilting spring, of which neither looks likely
     alone."""
     gains = {}
     for (a, (own, _, Pc)), (b, (other, c, _)) in combinations(_gains(problem, none).items(), 2):
         if frozenset((a, b)) not in tried:
             gains[frozenset((a, b))] = float((own[:, None] + other - Pc @ c.T).max())
-    return sorted(gains, key=lambda pair: -gains[pair])[:TOGETHER]
+    return sorted(gains, key=lambda pair: -gains[pair])[:HIDDEN_PAIRS]
 
 
 def _gains(problem: InverseProblem, base: Hypothesis) -> dict[str, tuple[Array, Array, Array]]:
