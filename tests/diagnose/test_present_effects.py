@@ -24,7 +24,7 @@ from tyrecal.studies.diagnose.tyre_model import TyreModel
 from tyrecal.studies.diagnose.uncertainties import sources
 from tyrecal.tyre.values import with_values
 
-from .test_tyre_model import CASE, EFFECTS, MODEL, ROWS, X, asked, written
+from .coarse_model import CASE, EFFECTS, MODEL, ROWS, X, asked, written
 
 HELD = 0.9
 WITH_FILLER = with_values(CASE, {"effects.bead_filler": HELD})

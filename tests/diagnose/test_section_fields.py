@@ -40,8 +40,8 @@ from tyrecal.tyre.load import load_case
 from tyrecal.tyre.section.size import parse_size
 
 from ..chance import Chance
-from .test_tyre_model import CASE, LABELS
-from .toy import Toy, problem
+from .coarse_model import CASE
+from .toy import LABELS, Toy, problem
 
 Array = np.ndarray
 pytestmark = pytest.mark.numbers

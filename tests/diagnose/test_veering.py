@@ -20,7 +20,7 @@ from tyrecal.studies.diagnose.veering import Veering, coupling, partner
 from tyrecal.tyre.values import with_values
 
 from ..chance import Chance
-from .test_tyre_model import CASE, MODEL
+from .coarse_model import CASE, MODEL
 from .toy import LABELS, Toy, problem
 
 pytestmark = pytest.mark.numbers

@@ -1,0 +1,105 @@
+"""Constants that may be off: those that the case states, or what is assumed of them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from tyrecal.studies.diagnose.uncertainties import DENSITY_PERCENT, PRESSURE_kPa, sources, values_of
+from tyrecal.tyre.case.parts import Gauge
+from tyrecal.tyre.case.schema import Uncertainty
+
+from ..conftest import CASES
+from .coarse_model import CASE
+
+
+def test_sources_of_error_are_those_of_the_case_or_assumed_and_never_calibrated() -> None:
+    stated, assumed = sources(CASE)
+    assert not assumed and {"pressure", "belt_spacing", "rim_width"} <= {s.name for s in stated}
+    tied = next(s for s in stated if s.name == "belt_spacing")
+    assert tied.steps == pytest.approx(
+        {"rebar_layers.belt_1.spacing_m": 1.16e-5, "rebar_layers.belt_2.spacing_m": 1.16e-5}
+    )
+    words = {s.name: s.words for s in stated}
+    assert words["pressure"] == "pressure 1 kPa" and words["rim_width"] == "rim width 1 mm"
+    assert words["belt_1_angle"] == "belt 1 angle 1 degrees"
+    assert words["sidewall_gauge"] == "sidewall gauge 0.03"
+    bare = replace(CASE, case=CASE.case.model_copy(update={"uncertainties": {}}))
+    found, assumed = sources(bare)
+    assumed_words = {s.name: s.words for s in found}
+    assert assumed and assumed_words["rubber_density"] == f"rubber density {DENSITY_PERCENT:g} %"
+    assert set(assumed_words) == {
+        "pressure",
+        "rubber_density",
+        "belt_cord_modulus",
+        "carcass_cord_modulus",
+        *(f"{layer}_{what}" for layer in CASE.case.rebar_layers for what in ("spacing", "angle")),
+    }
+    assert assumed_words["pressure"] == f"pressure {PRESSURE_kPa:g} kPa"
+    paths = {path for s in (*found, *stated) for path in s.steps}
+    assert not paths & {path for v in CASE.case.variables.values() for path in v.sets}
+    variable = CASE.case.variables["C10"].model_copy(update={"sets": ["pressure_kPa"]})
+    moved = CASE.case.model_copy(update={"variables": {"p": variable}})
+    assert "pressure" not in {s.name for s in sources(replace(CASE, case=moved))[0]}
+
+
+def test_what_is_assumed_of_constants_is_what_the_guide_says() -> None:
+    guide = " ".join((CASES / "diagnosis.md").read_text().split())
+    assert (
+        "densities of rubber 1.5 %, moduli of cords 3 %, spacings 1 %, gauges 3 %, cord angles"
+        " 1 degree, pressure 1 kPa"
+    ) in guide
+    case = CASE
+    gauge = Gauge(between=["bead", "upper_sidewall"], factor=2.0)
+    section = case.case.section.model_copy(update={"gauges": [gauge]})
+    bare = case.case.model_copy(update={"uncertainties": {}, "section": section})
+    found, assumed = sources(replace(case, case=bare))
+    relative = {"density": 0.015, "modulus": 0.03, "spacing": 0.01}
+    assert assumed and len(found) >= 9
+    for source in found:
+        ((path, step),) = source.steps.items()
+        kind = source.name.rpartition("_")[2]
+        if kind in relative:
+            assert step == pytest.approx(relative[kind] * values_of(case, [source])[path])
+            assert source.words.endswith(f" {100 * relative[kind]:g} %")
+        elif source.name.startswith("gauge"):
+            assert step == pytest.approx(0.06) and path == "section.gauges.0.factor"
+        else:
+            assert step == 1.0 and (kind == "angle") == path.endswith("angle_deg")
+            assert source.words.endswith(" 1 degrees" if kind == "angle" else "pressure 1 kPa")
+
+
+def test_a_stated_source_moves_its_numbers_as_it_says() -> None:
+    """By per cent of each or by so much, up or down together; not what a variable sets."""
+    angles = [f"rebar_layers.belt_{k}.angle_deg" for k in (1, 2)]
+    density, layers = "materials.rubber.density_kg_per_m3", CASE.case.rebar_layers
+    stated = {
+        "both_angles": Uncertainty(sets=angles, percent=2.0, signs=[1, -1]),
+        "air": Uncertainty(sets=["pressure_kPa"], absolute=3.0, signs=[-1]),
+        "stuff": Uncertainty(sets=[density, "materials.rubber.C10_Pa"], percent=1.0),
+        "fitted": Uncertainty(sets=["materials.rubber.C10_Pa"], percent=1.0),
+        "rim": Uncertainty(sets=["effects.rim_width"], percent=5.0),
+    }
+    case = replace(CASE, case=CASE.case.model_copy(update={"uncertainties": stated}))
+    found, assumed = sources(case)
+    told = {source.name: (source.words, source.steps) for source in found}
+    assert not assumed and list(told) == ["both_angles", "air", "stuff", "rim"]
+    assert told["both_angles"] == (
+        "both angles 2 %",
+        pytest.approx(
+            {
+                angles[0]: 0.02 * layers["belt_1"].angle_deg,
+                angles[1]: -0.02 * layers["belt_2"].angle_deg,
+            }
+        ),
+    )
+    assert told["air"] == ("air 3 kPa", {"pressure_kPa": -3.0})
+    rho = CASE.case.materials["rubber"].density_kg_per_m3
+    assert told["stuff"] == ("stuff 1 %", pytest.approx({density: 0.01 * rho}))
+    assert told["rim"] == ("rim 5 %", {"effects.rim_width": 0.0})  # of what the case has not
+    assert values_of(case, found) == {
+        **{path: layers[path.split(".")[1]].angle_deg for path in angles},
+        "pressure_kPa": CASE.case.pressure_kPa,
+        density: rho,
+    }
