@@ -14,9 +14,8 @@ from tyrecal.studies.diagnose.several import weigh
 from tyrecal.studies.diagnose.unmeasured import expected, expected_by, likeliest
 
 from ..chance import Chance, generator
-from .test_evidence import flat
 from .test_veering import Near
-from .toy import LABELS, Toy, drawn, problem
+from .toy import LABELS, Toy, drawn, flat, problem
 
 pytestmark = pytest.mark.numbers
 HELD_kPa = 240.0

@@ -121,6 +121,14 @@ class Sloped(Toy):
         return replace(found, eta=eta, slopes=dict.fromkeys(point.slopes, slope))
 
 
+def flat(**keys: object) -> Toy:
+    """A toy that is linear in x and e together."""
+    toy = Toy(bend=0.0, **keys)  # type: ignore[arg-type]
+    for id in toy.tilt:
+        toy.tilt[id] = 0 * toy.tilt[id]
+    return toy
+
+
 def problem(
     toy: Toy,
     y: Array | None = None,
