@@ -1,4 +1,4 @@
-"""Fixtures: one small tyre, not inflated and inflated, for the whole folder."""
+"""Fixtures: one small tyre, not inflated and inflated, and its vibrations, for the whole folder."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 from threadpoolctl import threadpool_limits
+from tyrecal_solvers.bundled.modes.harmonics import Vibration
 from tyrecal_solvers.bundled.section.model import Model
 from tyrecal_solvers.bundled.section.parts.pressure import Pressure
 
@@ -41,6 +42,12 @@ def inflated() -> Inflated:
     model = support.model_of(tyre.deck)
     held, loads = support.held(model, tyre.rim), support.cavity(model, 240e3)
     return Inflated(tyre, model, held, loads, support.inflate(model, held, loads))
+
+
+@pytest.fixture(scope="module")
+def vibration(inflated: Inflated) -> Vibration:
+    number = support.numbering(inflated.model, inflated.held)
+    return Vibration(inflated.model, inflated.U, inflated.loads, number, 0.0)
 
 
 @pytest.fixture

@@ -205,6 +205,14 @@ def turning(m: Model, spin: float) -> Model:
     return replace(m, parts=m.parts + spinning(m.parts, m.mesh.X, spin**2))
 
 
+def stiffer(m: Model, share: float) -> Model:
+    """Rubber and cords (1 + share) times as stiff, and cords as heavy too."""
+    *rubbers, cords = m.with_laws(lambda law: law.stiffened(1 + share)).parts
+    law = replace(cords.law, stiffness=cords.law.stiffness * (1 + share))
+    cords = replace(cords, law=law, mass=cords.mass * (1 + share))
+    return replace(m, parts=[*rubbers, cords])
+
+
 def held(m: Model, rows: Array | list[int] = (), axial: bool = False) -> Array:
     """Mask (n, 3): the nodes ``rows`` wholly and, for plane strain, u_z everywhere."""
     mask = np.zeros((len(m.mesh.X), 3), bool)

@@ -43,7 +43,6 @@ from tyrecal.tyre.values import with_values
 
 from ..effects.support import CASE, decks
 from . import support
-from .test_nonuniform import stiffer
 
 Array = np.ndarray
 Edit = tuple[str, str]
@@ -441,7 +440,7 @@ class Circles:
     @classmethod
     def of(cls, model: Model, U: Array, loads: list[Pressure], coordinates: Any) -> Circles:
         top, around = 3, full_circle(3)
-        sector = SpliceSector(0.5, stiffer(model, 0.3))
+        sector = SpliceSector(0.5, support.stiffer(model, 0.3))
         share = sector.share(2 * np.pi * np.arange(13) / 13, 2 * top)
         vibration = Vibration(model, U, loads, coordinates, 0.0)
         tyre = Revolved(blended(model, sector.model, share), loads, around)

@@ -1,0 +1,147 @@
+"""A sector that is stiffer and heavier: the inflated state, and the modes of the whole tyre."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from tyrecal_solvers.bundled.modes.harmonics import Vibration
+from tyrecal_solvers.bundled.nonuniform import splice
+from tyrecal_solvers.bundled.nonuniform.splice import SpliceSector
+from tyrecal_solvers.bundled.section import mechanics
+from tyrecal_solvers.bundled.solid3d.revolved import Revolved
+
+from . import support
+from .conftest import Inflated
+from .split_modes import COUNT, WAVES, frequencies, plain
+
+Array = np.ndarray
+
+
+def test_a_heavier_sector_weighs_where_it_is(vibration: Vibration, inflated: Inflated) -> None:
+    """u M~ u of every wave up to the highest, by the integral over the sector of 0.4 rad."""
+    other, top, width = support.stiffer(inflated.model, 1.0), 3, 0.4
+    around = splice.full_circle(top)
+    tyre = Revolved(inflated.model, inflated.loads, around)
+    fields = splice.FullCircle(vibration, tyre, SpliceSector(width, other), top)
+    u = np.where(inflated.held, 0.0, 1.0)
+    plain, more = (float((u * (mechanics.mass(m) @ u)).sum()) for m in (inflated.model, other))
+    angle = np.linspace(-width / 2, width / 2, 4001)
+    for n in range(top + 1):
+        for wave in (1.0, 1j) if n else (1.0,):
+            field = fields.field(n, wave * u)
+            inside = np.trapezoid((wave * np.exp(1j * n * angle)).real ** 2, angle)
+            whole = np.pi if n else 2 * np.pi
+            wanted = plain * whole + (more - plain) * inside
+            assert (field * fields.inertia(field)).sum() == pytest.approx(wanted, rel=1e-6)
+            amplitude = fields.wave(field, n)
+            np.testing.assert_allclose(amplitude, wave * u, atol=1e-12)
+
+
+def test_an_equilibrium_with_a_splice_looks_at_the_time(
+    vibration: Vibration, inflated: Inflated
+) -> None:
+    """Once where the state is one already; more often with a stiffer sector, or it does not end."""
+    around = splice.full_circle(2)
+    looks: list[int] = []
+    for share, more in ((0.0, 1), (0.05, 2)):
+        other = support.stiffer(inflated.model, share)
+        sector = SpliceSector(2 * np.pi, other)
+        tyre = Revolved(splice.blended(inflated.model, other, np.ones(9)), inflated.loads, around)
+        fields = splice.FullCircle(vibration, tyre, sector, 2)
+        looks.clear()
+        splice.equilibrium(fields, inflated.U, lambda: looks.append(1))
+        assert more <= len(looks) <= 3 * more
+    with pytest.raises(TimeoutError):
+        splice.equilibrium(fields, inflated.U, timed_out)
+
+
+def timed_out() -> None:
+    raise TimeoutError
+
+
+def test_the_series_of_a_sector_is_one_in_it_and_zero_elsewhere() -> None:
+    sector = SpliceSector(0.5, None)  # type: ignore[arg-type]
+    angles = np.array([0.0, 0.15, -0.2, 0.3, 1.0, np.pi])
+    share = sector.share(angles, 4000)
+    np.testing.assert_allclose(share, [1, 1, 1, 0, 0, 0], atol=5e-3)
+    circle = np.arange(64) * np.pi / 32
+    for h in range(5):
+        part = (sector.share(circle, 5) * np.cos(h * circle)).mean()
+        assert part == pytest.approx(np.sinc(h * 0.5 / 2 / np.pi) * 0.5 / (2 * np.pi))
+    assert np.allclose(sector.share(circle, 2), sector.share(-circle, 2))
+
+
+def test_full_circle_is_exact_for_waves() -> None:
+    around = splice.full_circle(4)
+    stations = 2 * np.pi * np.arange(17) / 17
+    for n in range(5):
+        for wave, slope in ((np.cos, lambda x: -np.sin(x)), (np.sin, np.cos)):
+            values = wave(n * around.angles)
+            np.testing.assert_allclose(around.N @ values, wave(n * stations), atol=1e-12)
+            np.testing.assert_allclose(around.slope @ values, n * slope(n * stations), atol=1e-11)
+
+
+def test_a_sector_of_360_degrees_is_another_tyre(vibration: Vibration, inflated: Inflated) -> None:
+    """chi = 1 all round: modes and inflated state of the stiffer, heavier tyre, found from the
+    plain one's; no doublet splits."""
+    other = support.stiffer(inflated.model, 0.05)
+    waves = [0, 1, 2]
+    got = splice.sector_modes(
+        vibration,
+        inflated.U,
+        inflated.loads,
+        inflated.model,
+        SpliceSector(2 * np.pi, other),
+        waves,
+        COUNT,
+        beyond=1,
+    )
+    U = support.inflate(other, inflated.held, inflated.loads)
+    number = support.numbering(other, inflated.held)
+    there = Vibration(other, U, inflated.loads, number, 0.0)
+    for n, modes in zip(waves, got, strict=True):
+        wanted = np.repeat(there.modes(n, COUNT).eigenvalues, 2 if n else 1)
+        was = np.repeat(vibration.modes(n, COUNT).eigenvalues, 2 if n else 1)
+        assert abs(wanted / was - 1).max() > 1e-3
+        np.testing.assert_allclose(modes.eigenvalues, wanted, rtol=2e-6)
+
+
+def test_no_share_is_the_plain_tyre(vibration: Vibration, inflated: Inflated) -> None:
+    got = splice.sector_modes(
+        vibration,
+        inflated.U,
+        inflated.loads,
+        inflated.model,
+        SpliceSector(0.2, inflated.model),
+        WAVES,
+        COUNT,
+        beyond=1,
+    )
+    np.testing.assert_allclose(frequencies(got), plain(vibration), rtol=1e-8)
+    mass = lambda u: float((u.conj() * (vibration.mass @ u)).real.sum())
+    for n, modes in zip(WAVES, got, strict=True):
+        own = [mass(u) for u in vibration.modes(n, COUNT).shapes]
+        assert [mass(u) for u in modes.shapes] == pytest.approx(own[:1] * len(modes.shapes))
+
+
+def test_the_iteration_finds_the_lowest_and_looks_at_the_time() -> None:
+    """Of a diagonal problem, K over M known; the first fields' shares in the modes are theirs; time
+    is looked at for every field."""
+    k, m = np.arange(1.0, 41.0).reshape(4, 5, 2) ** 2, np.linspace(1, 2, 40).reshape(4, 5, 2)
+    fields: Any = SimpleNamespace(
+        inertia=lambda f: m * f, forces=lambda f: k * f, response=lambda f: f / k
+    )
+    start = list(np.eye(40)[:6].reshape(6, 4, 5, 2) + 0.05)
+    looks: list[int] = []
+    values, modes, first = splice.ritz_davidson(fields, start, 4, lambda: looks.append(1))
+    wanted = np.sort((k / m).ravel())[:4]
+    assert values[:4] == pytest.approx(wanted, rel=1e-4)
+    assert len(looks) >= len(start) + 4
+    for j in range(4):
+        assert (modes(j) * m * modes(j)).sum() == pytest.approx(1.0)
+        for i, field in enumerate(start):
+            size = np.sqrt((field * m * field).sum())
+            assert first[i, j] == pytest.approx((field * m * modes(j)).sum() / size)
