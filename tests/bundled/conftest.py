@@ -1,4 +1,5 @@
-"""Fixtures: one small tyre, not inflated and inflated, and its vibrations, for the whole folder."""
+"""Fixtures for the whole folder: one small tyre, not inflated and inflated, its vibrations, and one
+with a model of half of its section."""
 
 from __future__ import annotations
 
@@ -14,6 +15,7 @@ from tyrecal_solvers.bundled.section.parts.pressure import Pressure
 
 from ..chance import generator
 from . import support
+from .halves import Halves, inflated_halves
 
 Array = np.ndarray
 
@@ -48,6 +50,11 @@ def inflated() -> Inflated:
 def vibration(inflated: Inflated) -> Vibration:
     number = support.numbering(inflated.model, inflated.held)
     return Vibration(inflated.model, inflated.U, inflated.loads, number, 0.0)
+
+
+@pytest.fixture(scope="module")
+def halves() -> Halves:
+    return inflated_halves()
 
 
 @pytest.fixture
