@@ -1,22 +1,15 @@
-"""Modes of the pressed tyre: against its harmonics, the hold, what decks may ask."""
+"""Modes of the pressed tyre: against its harmonics, the whole problem, and what is held or free."""
 
 from __future__ import annotations
 
-import re
-from collections.abc import Callable
-from dataclasses import dataclass, replace
-from pathlib import Path
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
-from scipy.sparse import csr_matrix
-from tyrecal_solvers.bundled import job
-from tyrecal_solvers.bundled.deck.keywords import DeckError
-from tyrecal_solvers.bundled.modes.harmonics import HarmonicModes, Vibration
 from tyrecal_solvers.bundled.road import footprint_job, stick
 from tyrecal_solvers.bundled.road import loaded_modes as loaded_modes_module
-from tyrecal_solvers.bundled.road.contact_newton import ContactNewton, PressedState
+from tyrecal_solvers.bundled.road.contact_newton import ContactNewton
 from tyrecal_solvers.bundled.road.loaded_modes import (
     Inertia,
     LoadedModes,
@@ -25,66 +18,22 @@ from tyrecal_solvers.bundled.road.loaded_modes import (
 )
 from tyrecal_solvers.bundled.section.mechanics import mass
 from tyrecal_solvers.bundled.section.symmetry import HALF_TURN
-from tyrecal_solvers.bundled.solid3d.circumference import HalfCircle, half_circle
+from tyrecal_solvers.bundled.solid3d.circumference import half_circle
 from tyrecal_solvers.bundled.solid3d.revolved import Revolved
 from tyrecal_solvers.errors import RunFailed
 
-from tyrecal.simulate.deck.decks import Decks
-from tyrecal.simulate.deck.tyre_design import TyreDesign
-
 from ..chance import generator
 from . import support
-from .contact import Round, coarse_case, ring
+from .contact import Round
+from .soft_ring import LENGTHS, State, harmonic, held, modes, no_hold, press, soft_ring, start
 
 pytestmark = pytest.mark.numbers
-
 Array = np.ndarray
-LENGTHS = np.radians([5.0] * 4 + [20.0] * 8)
 
 
 @pytest.fixture(scope="module")
 def tyre() -> Round:
-    """A soft ring on a hub."""
-    return ring((0.08, 0.09, 0.1), 0.02, 2, support.Rubber(C10=2e5, D1=2.5e-7))
-
-
-def harmonic(work: Round, n: int, count: int = 2) -> HarmonicModes:
-    equations = support.numbering(work.model, ~work.free)
-    return Vibration(work.model, work.U, work.loads, equations, 0.0).modes(n, count)
-
-
-def start(work: Round) -> list[HarmonicModes]:
-    return [harmonic(work, n, 4) for n in range(5)]
-
-
-def modes(work: Round, U: Array, held: csr_matrix, around: HalfCircle, count: int) -> LoadedModes:
-    symmetry = work.symmetry(around)
-    (found,) = loaded_modes(
-        work.tyre(around), symmetry, U, [held], start(work), count, lambda: None
-    )
-    return found
-
-
-def no_hold(work: Round, around: HalfCircle) -> csr_matrix:
-    size = around.N.shape[1] * work.U.size
-    return csr_matrix((size, size))
-
-
-@dataclass
-class State:
-    """A pressed ring and what holds it."""
-
-    around: HalfCircle
-    U: Array
-    pressed: PressedState
-    hold: csr_matrix
-
-
-def press(work: Round, load: float, friction: float = 0.5, stiffness: float = 1e9) -> State:
-    stand = work.press(LENGTHS, stiffness, friction)
-    found = stand.to(load)
-    U = stand.symmetry.spread(found.parts)
-    return State(stand.tyre.around, U, found, stick.held(found.contact))
+    return soft_ring()
 
 
 @pytest.fixture(scope="module")
@@ -251,57 +200,6 @@ def test_a_hold_raises_every_frequency(tyre: Round, pressed: State, found: Loade
     assert (found.eigenvalues / free.eigenvalues).max() > 1.05
 
 
-def shifted(work: Round, around: HalfCircle, component: int) -> Array:
-    """The field (k, n, 3) of a unit shift of all down, along or across the road."""
-    c, s = np.cos(around.angles)[:, None], np.sin(around.angles)[:, None]
-    field = np.zeros((len(around.angles), len(work.U), 3))
-    if component == 2:
-        field[..., 2] = 1.0
-    else:
-        field[..., 0], field[..., 1] = ((c, -s), (s, c))[component]
-    return field
-
-
-def held(state: State, V: Array) -> Array:
-    return np.asarray((state.hold @ V.ravel()).reshape(V.shape))
-
-
-def test_the_hold_is_the_contacts_stiffness_over_the_patch(tyre: Round, pressed: State) -> None:
-    """Against a shift down, along or across it is k times the patch's area before deformation,
-    and nothing couples them; without friction nothing holds along the road."""
-    points = pressed.pressed.contact.points
-    shifts = [shifted(tyre, pressed.around, i) for i in range(3)]
-    forces = [held(pressed, V) for V in shifts]
-    total = np.array([[(V * F).sum() for F in forces] for V in shifts])
-    np.testing.assert_allclose(total, 1e9 * points.area.sum() * np.eye(3), rtol=1e-9, atol=1e-3)
-    smooth = press(tyre, 10.0, 0.0)
-    for i, V in enumerate(shifts):
-        assert bool(abs(held(smooth, V)).max() > 1e-3) == (i == 0)
-
-
-def test_the_hold_goes_to_nothing_with_the_load(tyre: Round) -> None:
-    """Over a patch as wide as the ring: its length, as a cylinder's on a rigid road, with the
-    square root of the load (Hertz) where the rubber gives way, with the cubic where the road's
-    stiffness alone does."""
-    loads = np.array([3.0, 1.0, 0.1, 0.01])
-    totals = np.array([press(tyre, load).pressed.contact.stiffness for load in loads])
-    powers = np.diff(np.log(totals)) / np.diff(np.log(loads))
-    assert (powers > 1 / 3 - 0.02).all() and (powers < 1 / 2 + 0.02).all()
-
-
-def test_light_loads_leave_the_unloaded_modes(tyre: Round) -> None:
-    """The least frequencies come down to those of the same mesh without a road."""
-    around = half_circle(LENGTHS)
-    unloaded = modes(tyre, tyre.everywhere(around), no_hold(tyre, around), around, 8)
-    away = []
-    for load in (1.0, 0.1, 0.01):
-        state = press(tyre, load, stiffness=1e7)
-        loaded = modes(tyre, state.U, state.hold, state.around, 8)
-        away.append(abs(loaded.eigenvalues / unloaded.eigenvalues - 1).max())
-    assert away[0] > away[1] > away[2]
-    assert away[2] < 0.4 * away[0]
-
-
 def test_the_same_bits_again(tyre: Round, pressed: State, found: LoadedModes) -> None:
     again = modes(tyre, pressed.U, pressed.hold, pressed.around, 10)
     np.testing.assert_array_equal(again.eigenvalues, found.eigenvalues)
@@ -347,64 +245,6 @@ def test_an_unstable_state_fails_by_its_name(tyre: Round, pressed: State) -> Non
         modes(tyre, pressed.U, pushed, pressed.around, 4)
 
 
-LOADS = (1000.0,)
-
-
-def texts(count: int = 6, **road: object) -> dict[str, str]:
-    design = TyreDesign(coarse_case(**road))
-    return Decks(design, loads_N=LOADS, loaded_modes=count).texts("abaqus")
-
-
-def refused(folder: Path, edit: Callable[[str], str]) -> str:
-    for name, text in texts().items():
-        (folder / name).write_text(edit(text) if name == "press.inp" else text)
-    with pytest.raises(DeckError) as error:
-        job.run(folder, "press", "inflate")
-    return str(error.value)
-
-
-@pytest.mark.parametrize(
-    ("pattern", "new", "words"),
-    [
-        (r"(?s)\*STEP, NAME=LOAD_1.*?\*END STEP\n", "", "come after a force"),
-        (r"(MASS\n6\n\*BOUNDARY, OP=NEW\n.*\n)900002, 1, 6\n", r"\1", "must hold the road"),
-        (r"(MASS\n6\n\*BOUNDARY, OP=NEW\n)900001, 1, 6\n", r"\g<1>900001, 3, 6\n", "held in 2, 6"),
-        (r"MASS\n6\n", "MASS\n6, , 100.0\n", "limits and shifts"),
-        (r"NSET=CROWN", "NSET=HUB", "a set of the section"),
-        (r"PERTURBATION", "INTERMITTENT", "INTERMITTENT"),
-        (r"LOAD_1, NLGEOM=YES", "LOAD_1, NLGEOM=YES, PERTURBATION", "no linear PERTURBATION"),
-    ],
-)
-def test_what_is_not_honoured(tmp_path: Path, pattern: str, new: str, words: str) -> None:
-    def edit(text: str) -> str:
-        changed, count = re.subn(pattern, new, text)
-        assert count
-        return changed
-
-    assert words in refused(tmp_path, edit)
-
-
-def test_the_deck_says_how_the_wheel_stands(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Held, or free along the load with the rim's mass, which no plain footprint's deck has."""
-    asked: list[Any] = []
-
-    def press(*given: Any) -> dict[str, Any]:
-        asked.extend(given[-2].values())
-        raise RunFailed("crashed", "enough")
-
-    monkeypatch.setattr(footprint_job, "press", press)
-    for wheel, kg in (("held", None), ("free_along_load", 15.0)):
-        for name, text in texts(wheel=wheel).items():
-            (tmp_path / name).write_text(text)
-        with pytest.raises(RunFailed, match="enough"):
-            job.run(tmp_path, "press", "inflate")
-        assert asked[-1].wheel_kg == kg
-    plain = Decks(TyreDesign(coarse_case(wheel="free_along_load")), loads_N=LOADS).texts("abaqus")
-    assert "MASS" not in plain["press.inp"]
-
-
 @pytest.mark.slow
 def test_results_hold_the_half_turn(tyre: Round, pressed: State, found: LoadedModes) -> None:
     """Shapes on the whole tyre, as the job writes them: each kept or reversed by the half turn."""
@@ -421,73 +261,6 @@ def test_results_hold_the_half_turn(tyre: Round, pressed: State, found: LoadedMo
     np.testing.assert_allclose(shapes, parity * image, atol=1e-6 * abs(shapes).max())
     hertz = np.sqrt(found.eigenvalues[:6]) / (2 * np.pi)
     np.testing.assert_allclose(written["mode_frequency_Hz"], hertz, rtol=1e-7)
-
-
-def test_what_the_job_asks_for_and_how_it_writes_it(
-    tyre: Round, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Modes about the pressed state with its hold, from twice so many and spare ones of the
-    inflated tyre; their shapes on the whole tyre, kept or reversed by the half turn."""
-    work = tyre.press(LENGTHS, 1e9, 0.5)
-    state = work.to(10.0)
-    k, nodes = len(work.tyre.around.angles), np.array([3, 0, 5])
-    shapes = generator(2).normal(size=(2, k, len(tyre.U), 3))
-    canned = LoadedModes(np.array([400.0, 900.0]) * np.pi**2, np.array([1, -1]), shapes)
-    asked: list[Any] = []
-
-    def lowest(vibration: Vibration, wanted: int, check: object) -> list[HarmonicModes]:
-        asked.append((vibration.shift, wanted, vibration.factor(0).solve(np.ones(free))))
-        return []
-
-    loose = LoadedModes(np.array([100.0]) * np.pi**2, np.array([-1]), shapes[1:])
-
-    def modes_(work_: Revolved, kept: Any, U: Array, holds: Any, *rest: Any) -> list[LoadedModes]:
-        work_.residual(U)
-        asked.append((work_.product(shapes[0]), holds, rest))
-        return [canned, loose]
-
-    monkeypatch.setattr(footprint_job, "lowest_of_all", lowest)
-    monkeypatch.setattr(footprint_job, "loaded_modes", modes_)
-    equations = support.numbering(tyre.model, ~tyre.free)
-    free = equations.size
-    wanted = footprint_job.ModesAtLoad(tyre.model, 2, nodes, 9.0)
-    work.tyre.residual(0 * shapes[0])  # a state that is not the wanted one
-    written = footprint_job._modes(work, state, wanted, equations, tyre.U, work.tyre.around.angles)
-    assert work._factor is None
-    (shift, started, solved), (product, (hold, smooth), rest) = asked
-    plain = Vibration(tyre.model, tyre.U, work.tyre.loads, equations, 0.0)
-    np.testing.assert_array_equal(solved, plain.factor(0).solve(np.ones(free)))
-    assert (shift, started) == (0.0, 2 * (2 + 6)) and rest[:2] == ([], 2)
-    here = press(tyre, 10.0)
-    assert abs(hold - here.hold).max() < 1e-9 * abs(here.hold).max()
-    V = shifted(tyre, here.around, 0)
-    assert abs(smooth @ V.ravel() - hold @ V.ravel()).max() < 1e-9 * abs(here.hold).max()
-    assert abs(smooth @ shifted(tyre, here.around, 1).ravel()).max() < 1e-3
-    assert rest[-1] == 9.0
-    again = tyre.tyre(work.tyre.around)
-    again.residual(here.U)
-    np.testing.assert_allclose(product, again.product(shapes[0]), rtol=1e-9, atol=1e-6)
-    assert written["mode_frequency_Hz"] == pytest.approx([10.0, 15.0])
-    assert written["mode_node"].tolist() == [3, 0, 5]
-    whole = written["mode_shape"]
-    assert whole.shape == (2, 2 * (k - 1), 3, 3)
-    np.testing.assert_allclose(whole[:, :k], shapes[:, :, nodes], atol=1e-12)
-    other = work.symmetry.other[nodes]
-    for ring_ in range(k, 2 * (k - 1)):
-        image = HALF_TURN * shapes[:, 2 * (k - 1) - ring_][:, other]
-        np.testing.assert_allclose(whole[:, ring_], [[[1.0]], [[-1.0]]] * image, atol=1e-12)
-
-
-def test_traction_of_a_patch_that_sticks() -> None:
-    """Sizes of the forces along the road, of both halves: down does not count, what is along at 30
-    degrees is turned there, waves are not nodes."""
-    around = half_circle(np.radians([30.0, 30.0]), 2)
-    force = np.zeros((around.N.shape[1], 3, 3))
-    force[0, 0] = 5.0, 3.0, -4.0
-    force[2, 1] = 2.0 * np.array([np.sin(np.pi / 6), np.cos(np.pi / 6), 0.0])
-    force[2, 2] = 7.0 * np.array([np.cos(np.pi / 6), -np.sin(np.pi / 6), 0.0])
-    force[5] = 1.0
-    assert footprint_job._traction(around, force) == pytest.approx(2 * (5.0 + 2.0))
 
 
 def test_the_vibration_modulus_counts(tyre: Round, pressed: State) -> None:
