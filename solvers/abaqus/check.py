@@ -9,7 +9,10 @@ from dataclasses import dataclass, field
 from functools import cache
 from typing import Protocol
 
-from .grammar import NODES_AND_SECTION, RULES, STEP_PROCEDURES, UNJUDGED, Rule
+from .element_types import NODES_AND_SECTION
+from .grammar import RULES, UNJUDGED
+from .rule import Rule
+from .step_rules import STEP_PROCEDURES
 
 LONGEST = {"number": 20, "integer": 10, "name": 80}  # characters of a field
 FORM = {
