@@ -168,9 +168,9 @@ def most_like(problem: InverseProblem, base: Hypothesis) -> list[str]:
 def together_most_like(
     problem: InverseProblem, none: Hypothesis, tried: Container[frozenset[str]]
 ) -> list[frozenset[str]]:
-    """Pairs by what both gain together, the first `HIDDEN_PAIRS` that are not among ``tried``: two may
-    hide one another from calibration, a lateral and a tilting spring, of which neither looks likely
-    alone."""
+    """Pairs that are not among ``tried`` by what both gain together, the first `HIDDEN_PAIRS`: two
+    may hide one another from calibration, as a lateral and a tilting spring do, of which neither
+    looks likely alone."""
     gains = {}
     for (a, (own, _, Pc)), (b, (other, c, _)) in combinations(_gains(problem, none).items(), 2):
         if frozenset((a, b)) not in tried:
