@@ -246,8 +246,8 @@ def test_the_plain_fit_ends_near_the_minimum_and_takes_no_leaps() -> None:
     steps = np.abs(np.diff(asked, axis=0)).max(1)
     assert steps[0] == pytest.approx(0.7) and steps.max() < 0.7 + 1e-9 and len(asked) <= 10
     value = lambda x: float(np.sum((toy._answer(Query(x)).eta - there.eta) ** 2))
-    assert np.array_equal(x, asked[-1])  # where the covariance was looked at again
-    assert abs(x - [1.5, -1.2, 0.8]).max() < 0.05 and value(x) < value(asked[-2]) / 2
+    assert np.array_equal(x, asked[-1]) and np.array_equal(x, asked[-2])  # for the covariance again
+    assert abs(x - [1.5, -1.2, 0.8]).max() < 0.05 and value(x) < value(asked[-3]) / 2
 
 
 def test_the_plain_fit_steps_back_from_what_has_no_solution() -> None:
