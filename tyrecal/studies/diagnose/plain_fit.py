@@ -26,7 +26,8 @@ def plain_fit(
 ) -> Array:
     """x (v,) by damped Gauss-Newton steps from the start; a step has at most ``MAX_STEP`` in any x.
 
-    It ends within ``CLOSE_ENOUGH`` of the minimum: the expansion about x goes the rest of the way.
+    It ends within ``CLOSE_ENOUGH`` of the minimum, where the model has answered: the expansion
+    about x goes the rest of the way.
     The covariance is that of the constants at the start and, where x has gone far, anew from there.
     known: of the model about its start, on which the fit goes first; moved (n, k): what else may
     have moved the observations, as more constants. Raises the model's own failure where the start
