@@ -59,6 +59,13 @@ def test_a_rate_counts_its_own_trials_and_few_are_not_shown() -> None:
     assert said[seen].startswith("45 of 60")
 
 
+def test_sizes_are_held_by_the_catalogues_law_and_springs_by_what_they_are() -> None:
+    spring = answered("a", "a", held=(False,), compliances=(True,))
+    said = figures([spring] * 60 + [answered("b", "b", held=(True,))] * 20, 60)
+    assert said["90 % interval holds the size"].startswith("20 of 80")
+    assert said["90 % interval holds a spring's own compliance"].startswith("60 of 60")
+
+
 def test_shrinkage_is_of_what_was_named_and_strong_and_exchanged_labels_count_for_nothing() -> None:
     """0.8 by least squares, 0.9 at most, 0.5 by the diagnosis' own fit; sound tyres by chance to
     0.25."""

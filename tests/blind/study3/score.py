@@ -31,6 +31,7 @@ from tyrecal.studies.diagnose.verdict import SET
 from ...studies.blind_least_squares import held_out, held_out_rms
 from .cases import Group
 from .kinds import further, weighed_again
+from .laws import CLAMP
 
 LEAST, LEAST_A_SIZE, LEAST_ROBUST = 60, 40, 100  # trials of a rate that is shown
 ONE, EACH = 25.0, 15.0  # lambda from which one effect, and each of a pair, should be found
@@ -50,12 +51,12 @@ class Scored:
     there: that of all that it names, whatever else there is; together: lambda of what all of
     several effects move, of which calibration may take up more than of each; right: the first one
     is the truth by groups; held: whether each named and true effect's interval holds what it is
-    worth in the catalogue's law; before, after: rms error held out, in ln f; usual: the same of
-    least squares, without and with what is likeliest, None where labels are exchanged; least: with
-    a strong single effect that is there, at the size that errs least, which nobody can know;
-    foretold: whether each frequency held out lies in its interval, where the answer has any;
-    if_told: the same, its answer weighed again as if the rules had told it how many effects tyres
-    have."""
+    worth in the catalogue's law; compliances: whether a spring's holds what it was made with;
+    before, after: rms error held out, in ln f; usual: the same of least squares, without and with
+    what is likeliest, None where labels are exchanged; least: with a strong single effect that is
+    there, at the size that errs least, which nobody can know; foretold: whether each frequency held
+    out lies in its interval, where the answer has any; if_told: the same, its answer weighed again
+    as if the rules had told it how many effects tyres have."""
 
     id: str
     kind: str  # none, effect, several or outside
@@ -75,6 +76,7 @@ class Scored:
     usual: tuple[float, float] | None = None
     least: float = np.nan
     foretold: tuple[bool, ...] = ()
+    compliances: tuple[bool, ...] = ()
     there: float = 1.0
     together: float = np.inf
     if_told: Scored | None = None
@@ -162,6 +164,11 @@ def one(
     p, named = said["probabilities"], said["effect"]
     sizes = said["parameters"] if named else {}
     equal = {id: h.equivalent for id, h in hard.items()}
+    held = lambda true: tuple(
+        sizes[id]["low"] <= value <= sizes[id]["high"]
+        for id, value in true.items()
+        if id in sizes and value is not None
+    )
     error = lambda key: held_out_error(truth["held_out"], out[key] or out["plain_Hz"])
     found = Scored(
         truth["id"],
@@ -175,14 +182,11 @@ def one(
         0.0,
         frozenset(),
         False,
-        tuple(
-            sizes[id]["low"] <= value <= sizes[id]["high"]
-            for id, value in equal.items()
-            if id in sizes and value is not None
-        ),
+        held(equal),
         error("plain_Hz"),
         error("with_effect_Hz"),
         truth["again"],
+        compliances=held({id: truth["effects"][id] for id in effects if id in CLAMP}),
     )
     again = weighed_again(p, answer.get("further", Assumed.further), further(protocol.counts))
     if len(effects) > 1:
@@ -323,6 +327,9 @@ def figures(
         "90 % set holds the truth": shown(t.in_set for t in trials),
         "90 % set holds the truth, told so": shown(t.in_set for t in if_told),
         "90 % interval holds the size": shown(held for t in trials for held in t.held),
+        "90 % interval holds a spring's own compliance": shown(
+            held for t in trials for held in t.compliances
+        ),
         "90 % intervals hold frequencies held out": _mean_share(
             [t.foretold for t in trials if t.foretold and t.kind != "outside"], least
         ),
