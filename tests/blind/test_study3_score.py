@@ -16,7 +16,8 @@ from tyrecal.studies.diagnose.several import priors
 from .study3.cases import Group
 from .study3.kinds import weighed_again
 from .study3.rises import risen
-from .study3.score import Scored, figures, foretold, misses, table
+from .study3.score import Scored, foretold
+from .study3.tables import figures, misses, table
 
 
 def answered(effects: str, top: str, lam: float = 30.0, **more: Any) -> Scored:

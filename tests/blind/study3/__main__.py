@@ -48,8 +48,9 @@ from .kinds import further
 from .make import FENICS, make
 from .maker import computed
 from .rises import rises, table_of_rises
-from .score import misses, scored, table
+from .score import scored
 from .section import columns, mould
+from .tables import misses, table
 from .tyre import tyre_of
 
 COUNTS = {"none": 12, "one": 12, "one_strong": 20, "two": 4, "two_strong": 14, "three": 4}
