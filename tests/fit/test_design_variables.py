@@ -1,0 +1,61 @@
+"""Design variables: their coordinates, how well a start is known, sizes of effects next to 0."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tyrecal.simulate.deck.tyre_design import NEAR_ZERO
+from tyrecal.studies.fit.variable import DesignVariable, read_variable
+from tyrecal.tyre.case.schema import Variable
+
+
+def test_a_variable_stays_next_to_0_where_it_moves_effects_alone() -> None:
+    """Most effects leave the deck at 0, and have no slope there; other numbers have one."""
+
+    def made(sets: list[str], lower: float, upper: float, start: float = 0.0) -> DesignVariable:
+        told = Variable(sets=sets, lower=lower, upper=upper, start=start, scale="linear")
+        return read_variable("x", told)
+
+    both, other = ["effects.a", "effects.b"], ["effects.a", "pressure_kPa"]
+    near = made(both, 0.0, 2.0)
+    assert near.lower == near.start == 2 * NEAR_ZERO > 0 and near.upper == 2.0
+    near = made(both, -3.0, 0.0)
+    assert near.upper == near.start == -3 * NEAR_ZERO and near.lower == -3.0
+    far = made(both, -3.0, 2.0, 0.5)
+    assert (far.lower, far.start, far.upper) == (-3.0, 0.5, 2.0)
+    for sets in (other, other[::-1], other[1:]):
+        assert made(sets, 0.0, 2.0).lower == made(sets, 0.0, 2.0).start == 0.0
+
+
+@pytest.mark.parametrize("log", [True, False])
+def test_a_variables_coordinate_and_back(log: bool) -> None:
+    """A logarithm, or the share of the way between the bounds; values stay within them, and the
+    start is met to the last bit."""
+    v = DesignVariable("x", 0.7, 0.3, 2.3, log)
+    for value in (0.3, 0.5, 0.7, 1.9, 2.3):
+        x = v.scaled(value)
+        assert x == pytest.approx(np.log(value) if log else (value - 0.3) / 2.0)
+        assert v.value(x) == pytest.approx(value, rel=1e-14)
+        rise = (v.value(x + 1e-6) - v.value(x - 1e-6)) / 2e-6
+        if 0.3 < value < 2.3:
+            assert v.slope(value) == pytest.approx(rise, rel=1e-6)
+    assert v.value(v.scaled(0.7)) == 0.7
+    assert v.value(v.scaled(2.3) + 1) == 2.3 and v.value(v.scaled(0.3) - 1) == 0.3
+
+
+def test_how_well_a_start_is_known() -> None:
+    """As stated, else by 0.5 of a logarithm; never worse than uniformly within the bounds, as of a
+    linear variable that says nothing."""
+    spread = lambda log, lower, upper, percent=None: (
+        DesignVariable("x", 2.0, lower, upper, log, percent).spread
+    )
+    assert spread(True, 0.2, 20.0) == 0.5
+    assert spread(True, 0.2, 20.0, 20.0) == pytest.approx(np.log(1.2))
+    assert spread(True, 0.2, 20.0, 900.0) == pytest.approx(np.log(100) / 12**0.5)
+    assert spread(True, 1.9, 2.1) == pytest.approx(np.log(2.1 / 1.9) / 12**0.5)
+    assert spread(False, 1.0, 5.0) == pytest.approx(1 / 12**0.5)
+    assert spread(False, 1.0, 5.0, 10.0) == pytest.approx(0.2 / 4)
+    assert (
+        read_variable("x", Variable(sets=["a"], start=2, lower=1, upper=5, percent=7)).percent == 7
+    )

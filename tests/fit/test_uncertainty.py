@@ -1,0 +1,62 @@
+"""Standard errors, correlations and noise of a fit, by their formulas."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tyrecal.studies.fit.problem import Point
+from tyrecal.studies.fit.uncertainty import uncertainty
+from tyrecal.studies.fit.variable import DesignVariable
+
+from ..chance import generator
+
+
+def test_uncertainty_by_its_formula() -> None:
+    """B diag(sigma^2) B^T with B = (J^T J)^-1 J^T W^(1/2), unequal weights and sigmas; the noise is
+    the root mean square of the frequencies' sigmas."""
+    random = generator("uncertainty")
+    slopes, scale = random.normal(size=(5, 2)), np.array([1.0, 4.0, 0.5, 0.0, 2.0])
+    sigmas = np.array([0.1, 0.4, 0.2, 0.3])
+    targets = [SimpleNamespace(sigma_Hz=s) for s in sigmas]
+    variables = [DesignVariable("a", 3.0, 1.0, 9.0), DesignVariable("b", 0.0, -1.0, 3.0, log=False)]
+    problem: Any = SimpleNamespace(
+        scale=scale, targets=targets, variables=variables, others=[SimpleNamespace(sigma=0.05)]
+    )
+    J, y = scale[:, None] * slopes, random.normal(size=5)
+    at = Point({"a": 3.0, "b": 0.5}, np.zeros(2), scale * y, J, {}, 1.0, 1.0, np.empty(0))
+    found = uncertainty(problem, at)
+    B = np.linalg.inv(J.T @ J) @ J.T * scale
+    covariance = (B * np.append(sigmas, 0.05) ** 2) @ B.T
+    spread = np.sqrt(np.diag(covariance))
+    assert found.standard_errors == pytest.approx(spread * [3.0, 4.0])
+    assert found.correlations == pytest.approx(covariance / np.outer(spread, spread))
+    assert found.singular_values == pytest.approx(np.linalg.svd(J, compute_uv=False))
+    assert found.noise_Hz == pytest.approx(np.sqrt(np.mean(sigmas[:3] ** 2)))
+
+
+def test_noise_is_what_is_left_over_the_freedom_that_is_left() -> None:
+    """Of four frequencies without sigma and two variables: two degrees; a fifth, known one takes
+    its leverage. Weights are none of the noise."""
+    random = generator("noise")
+    J, y = random.normal(size=(5, 2)), random.normal(size=5)
+    scale = np.array([1.0, 4.0, 0.5, 2.0, 3.0])
+    J = scale[:, None] * J
+    variables = [DesignVariable("a", 3.0, 1.0, 9.0), DesignVariable("b", 3.0, 1.0, 9.0)]
+    point_of = lambda n: Point(
+        {"a": 3.0, "b": 3.0}, np.zeros(2), (scale * y)[:n], J[:n], {}, 1.0, 1.0, np.empty(0)
+    )
+    none = [SimpleNamespace(sigma_Hz=None)] * 4
+    told: dict[str, Any] = {"variables": variables, "others": []}
+    problem: Any = SimpleNamespace(scale=scale[:4], targets=none, **told)
+    found = uncertainty(problem, point_of(4))
+    assert found.noise_Hz == pytest.approx(np.linalg.norm(y[:4]) / np.sqrt(2))
+    known = [*none, SimpleNamespace(sigma_Hz=0.3)]
+    problem = SimpleNamespace(scale=scale, targets=known, **told)
+    leverage = J[4] @ np.linalg.inv(J.T @ J) @ J[4]
+    noise = np.linalg.norm(y[:4]) / np.sqrt(4 - (2 - leverage))
+    sigma = np.sqrt((4 * noise**2 + 0.3**2) / 5)
+    assert uncertainty(problem, point_of(5)).noise_Hz == pytest.approx(sigma)
