@@ -15,7 +15,7 @@ from tyrecal.studies.fit.slsqp import AT_CROSSING
 from tyrecal.tyre.state import AS_THE_CASE
 
 from .fake import LABELS, POINTS, FakeEvaluator, shape
-from .test_calibration import CASE, START, evaluator
+from .known_truth import CASE, START, evaluator
 
 pytestmark = pytest.mark.numbers
 

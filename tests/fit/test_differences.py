@@ -1,4 +1,4 @@
-"""Slopes by differences to neighbouring designs: which are asked for, and where one fails."""
+"""Slopes by differences to neighbouring designs: which are asked for, how, and where one fails."""
 
 from __future__ import annotations
 
@@ -8,8 +8,12 @@ import numpy as np
 import pytest
 
 from tyrecal.simulate.evaluate.failure import EvaluationFailed
+from tyrecal.studies.fit.calibrate import calibrate
 from tyrecal.studies.fit.differences import differences
+from tyrecal.studies.fit.problem import Problem
 from tyrecal.studies.fit.variable import DesignVariable
+
+from .known_truth import CASE, START, START_X, evaluator
 
 
 def asked_slopes(ask: Any, start: dict[str, float], step: float = 0.1, **how: Any) -> Any:
@@ -60,3 +64,42 @@ def test_a_neighbour_without_a_solution_gives_way_to_the_other() -> None:
         assert len(seen) == count
     with pytest.raises(EvaluationFailed, match="not there"):
         asked_slopes(lambda v: EvaluationFailed("crashed", "not there"), {"a": 0.0})
+
+
+def test_a_neighbour_that_fails_gives_way_to_the_one_on_the_other_side() -> None:
+    edge = lambda values: values["C10"] > START["C10"] * 1.00005
+    there = Problem(CASE, evaluator(has_gradients=False, fails=edge)).evaluate(START_X)  # type: ignore[arg-type]
+    plain = Problem(CASE, evaluator(has_gradients=False)).evaluate(START_X)  # type: ignore[arg-type]
+    assert there.jacobian == pytest.approx(plain.jacobian, rel=1e-4)
+    assert not (there.jacobian == plain.jacobian).all()
+
+
+def test_a_point_without_neighbours_fails() -> None:
+    alone = lambda values: values["C10"] != START["C10"]
+    problem = Problem(CASE, evaluator(has_gradients=False, fails=alone))  # type: ignore[arg-type]
+    with pytest.raises(EvaluationFailed, match="12 of 240 kPa") as failure:
+        problem.evaluate(START_X)
+    assert failure.value.cause == "no_equilibrium"
+
+
+@pytest.mark.parametrize("bound", ["lower", "upper"])
+def test_differences_stay_within_the_bounds(bound: str) -> None:
+    """At a bound there is one neighbour only, and where it fails no other takes its place."""
+    at = getattr(CASE.case.variables["C10"], bound)
+    within = lambda values: not 1e5 <= values["C10"] <= 1e7
+    x = np.log([START["A_belt"], START["A_carcass"], at])
+    differ = Problem(CASE, evaluator(has_gradients=False, fails=within)).evaluate(x)  # type: ignore[arg-type]
+    exact = Problem(CASE, evaluator()).evaluate(x)  # type: ignore[arg-type]
+    assert differ.jacobian == pytest.approx(exact.jacobian, rel=1e-4)
+    alone = lambda values: values["C10"] != at
+    with pytest.raises(EvaluationFailed):
+        Problem(CASE, evaluator(has_gradients=False, fails=alone)).evaluate(x)  # type: ignore[arg-type]
+
+
+def test_jobs_go_to_the_neighbours_of_the_first_start() -> None:
+    tyre = evaluator(has_gradients=False)
+    plain = calibrate(CASE, tyre)  # type: ignore[arg-type]
+    assert set(tyre.jobs) == {1}
+    tyre = evaluator(has_gradients=False)
+    assert calibrate(CASE, tyre, jobs=8).result == plain.result  # type: ignore[arg-type]
+    assert set(tyre.jobs) == {1, 3}  # a point, and its three neighbours

@@ -1,4 +1,4 @@
-"""The search where the two [0, 0] modes cross: what bounds a step, and the designs beyond."""
+"""The search where the two [0, 0] modes cross: slopes, what bounds a step, designs beyond."""
 
 from __future__ import annotations
 
@@ -10,11 +10,13 @@ import numpy as np
 import pytest
 
 from tyrecal.studies.fit import slsqp
-from tyrecal.studies.fit.crossing import AXIAL, TORSIONAL, Crossing, crossing
-from tyrecal.studies.fit.problem import Point
+from tyrecal.studies.fit.crossing import AXIAL, TORSIONAL, Crossing, crossing, gap
+from tyrecal.studies.fit.problem import Point, Problem
+from tyrecal.studies.fit.slsqp import _beyond_crossing
 from tyrecal.studies.fit.targets import Target
 from tyrecal.tyre.state import AS_THE_CASE
 
+from .known_truth import START_X, evaluator, with_targets
 from .linear import Linear, linear, point
 
 Array = np.ndarray
@@ -104,3 +106,27 @@ def test_slopes_are_taken_from_where_labels_are_clear() -> None:
     found = crossing(problem, [farther, near, far], near)
     assert found and found.x is far.x and found.value == pytest.approx(0.31)
     assert found.slopes == pytest.approx(np.array([0.5, -1.0]) / 0.31)
+
+
+def test_no_crossing_is_looked_for_where_the_pair_has_no_weight() -> None:
+    problem = Problem(with_targets(weight=[0.0, 0.0] + [1.0] * 7), evaluator())  # type: ignore[arg-type]
+    assert list(_beyond_crossing(problem, problem.evaluate(problem.start()))) == []
+
+
+@pytest.mark.parametrize("weights", [[1.0] * 9, [4.0, 0.25, *[1.0] * 7]])
+def test_slopes_at_a_crossing_are_those_of_the_difference(weights: list[float]) -> None:
+    """Of axial less torsional frequency in Hz, whatever the targets weigh, on distinct modes."""
+    problem = Problem(with_targets(weight=weights), evaluator())  # type: ignore[arg-type]
+    far, point = problem.evaluate(START_X + 0.2), problem.evaluate(START_X)
+    found = crossing(problem, [far, point], point)
+    assert found is not None and found.x is point.x
+    assert found.value == pytest.approx(gap(point, AS_THE_CASE), rel=1e-6)
+    h = 1e-4
+    for k, e in enumerate(h * np.eye(len(START_X))):
+        wanted = gap(problem.evaluate(START_X + e), AS_THE_CASE) - gap(
+            problem.evaluate(START_X - e), AS_THE_CASE
+        )
+        assert found.slopes[k] == pytest.approx(wanted / (2 * h), rel=1e-5)
+    assert found.at(point.x + e) == pytest.approx(
+        gap(problem.evaluate(point.x + e), AS_THE_CASE), abs=1e-6
+    )

@@ -12,7 +12,7 @@ from tyrecal.simulate.modes.find import MORE_MODES, Found, find_modes
 from tyrecal.simulate.modes.label import labelled
 
 from ..fit.fake import LABELS, FakeEvaluator
-from ..fit.test_calibration import POWERS, START, TARGETS
+from ..fit.known_truth import POWERS, START, TARGETS
 
 
 class FewModes(FakeEvaluator):

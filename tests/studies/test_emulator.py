@@ -29,7 +29,7 @@ from tyrecal.studies.fit.variable import DesignVariable
 
 from ..chance import Chance, generator
 from ..fit.fake import LABELS, FakeEvaluator, shape
-from ..fit.test_calibration import START, evaluator
+from ..fit.known_truth import START, evaluator
 from ..fit.test_crossing import CoupledEvaluator
 
 pytestmark = pytest.mark.numbers
