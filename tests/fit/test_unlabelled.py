@@ -38,7 +38,7 @@ from tyrecal.studies.labels import FOREIGN_WORDS
 from tyrecal.tyre.state import TyreState
 
 from ..chance import generator
-from .test_states import CASE, TRUTH, TyreInStates, case_with, measured
+from .tyre_in_states import CASE, TRUTH, TyreInStates, case_with, measured
 
 Array = np.ndarray
 OWN = (Label(1, 0), Label(1, 1), Label(2, 0), Label(2, 1))
