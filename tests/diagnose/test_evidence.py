@@ -1,4 +1,4 @@
-"""Evidence on a tyre in closed form: against integration by brute force, and the size of an effect
+"""Evidence on a tyre in closed form: against integration by brute force, and the sizes of effects
 that it leaves."""
 
 from __future__ import annotations
@@ -10,9 +10,11 @@ import pytest
 from numpy.polynomial.hermite import hermgauss
 from scipy.stats import multivariate_normal
 
-from tyrecal.studies.diagnose.evidence import explain, refit
+from tyrecal.studies.diagnose.evidence import explain, grid, refit
+from tyrecal.studies.diagnose.expansion import expand
 from tyrecal.studies.diagnose.inverse_problem import Assumed
 from tyrecal.studies.diagnose.model import Answer, Query, Span
+from tyrecal.studies.diagnose.several import weigh
 
 from ..chance import Chance, generator
 from .toy import Toy, drawn, flat, problem
@@ -146,3 +148,54 @@ def test_the_interval_of_the_parameter_covers(chance: Chance) -> None:
         found = explain(base.measured(drawn(toy, base, chance.random, {"e0": e}, 1.0)), ["e0"], 1.0)
         inside.append(found.quantile("e0", 0.05) <= e <= found.quantile("e0", 0.95))
     chance.often(inside, 0.89, 0.91)
+
+
+def test_narrow_peaks_are_integrated() -> None:
+    """An effect seen 300 times over: ln Z against 200001 points, the interval as narrow."""
+    toy = Toy(size=0.3, bend=0.0, pressures=(240.0,), effects=1)
+    toy.tilt["e0"] *= 0
+    base = problem(toy)
+    p = base.measured(toy.base + 0.4321 * toy.g["e0"])
+    found = explain(p, ["e0"], 1.0)
+    S = np.linalg.inv(p.sigma + toy.J @ toy.J.T)
+    grid = (np.arange(200_001) + 0.5) / 200_001
+    a = toy.g["e0"] @ S @ toy.g["e0"]
+    ln = -a * (grid - 0.4321) ** 2 / 2
+    _, ln_det = np.linalg.slogdet(p.sigma + toy.J @ toy.J.T)
+    wanted = np.log(np.mean(np.exp(ln))) - (ln_det + len(p.places) * np.log(2 * np.pi)) / 2
+    assert a > 1e3
+    assert found.ln_evidence == pytest.approx(wanted, abs=0.02)
+    assert found.mean()["e0"] == pytest.approx(0.4321, abs=1e-3)
+    width = found.quantile("e0", 0.95) - found.quantile("e0", 0.05)
+    assert width == pytest.approx(2 * 1.645 / np.sqrt(a), rel=0.15)
+
+
+def test_the_intervals_of_a_pair_cover(chance: Chance) -> None:
+    """Each 90 % interval holds the truth, drawn from its prior, in 88 to 92 of 100 tyres.
+
+    False failures: 2e-7.
+    """
+    toy = Toy(effects=2, bend=0.0)
+    for id in toy.tilt:
+        toy.tilt[id] = 0 * toy.tilt[id]
+    base = problem(toy)
+    inside: dict[str, list[bool]] = {"e0": [], "e1": []}
+    for _ in range(30):
+        truth = {id: chance.random.uniform(0, 1) for id in inside}
+        there = base.measured(drawn(toy, base, chance.random, truth, 1.0))
+        (pair,) = (h for h in weigh(there) if h.key == "e0+e1")
+        for id, hits in inside.items():
+            low, high = (pair.quantile(id, share) for share in (0.05, 0.95))
+            hits.append(low <= truth[id] <= high)
+    for hits in inside.values():
+        chance.often(hits, 0.88, 0.92)
+
+
+def test_sizes_on_the_grid_have_a_density_of_one_over_the_range() -> None:
+    """Of polynomials the weighted sum is the mean over the range, wherever that lies."""
+    nodes = expand(Toy(effects=1), np.zeros(3)).nodes["e0"]
+    for low, high in ((0.0, 1.0), (-3.0, 1.0), (2.0, 7.0)):
+        e, ln = grid(replace(nodes, reach=(low, high)))
+        mean = (high**4 - low**4) / 4 / (high - low)
+        assert np.exp(ln) @ e**3 == pytest.approx(mean)
+        assert low < e.min() and e.max() < high and len(e) == 25

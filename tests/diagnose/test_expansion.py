@@ -15,6 +15,7 @@ from tyrecal.studies.diagnose.expansion import (
     Nodes,
     _more,
     _nodes,
+    anchored,
     expand,
     hermite,
     lagrange,
@@ -216,3 +217,49 @@ def test_a_change_beyond_the_range_is_asked_where_it_was_measured() -> None:
     assert len(twice.also) == 1
     zero = _reaching(Span(0.5, 1.0), Toggle("a", 0.0))  # 0 is a node anyway
     assert zero.also == ()
+
+
+def test_an_anchor_is_exact_where_it_was_asked_and_absent_without_the_effect() -> None:
+    toy = Toy(bend=0.3)
+    bare = expand(toy, np.zeros(3))
+    x = np.array([0.4, -0.3, 0.2])
+    toy.bend = toy.bend * 1.5  # the model at hand departs from what was expanded
+    found = anchored(bare, toy, [Query(x, {"e0": 0.6})])
+    (answer,) = toy.answers([Query(x, {"e0": 0.6})])
+    assert isinstance(answer, Answer)
+    eta, J = found.plain(x)
+    for e, wanted in ((0.6, answer), (0.0, None)):
+        a, B, _ = found.nodes["e0"].at(np.array([e]))
+        if wanted:
+            assert eta + a[0] + B[0] @ x == pytest.approx(wanted.eta, abs=1e-9)
+            assert J + B[0] == pytest.approx(wanted.jacobian, abs=1e-9)
+        else:
+            assert abs(a).max() == 0 and abs(B).max() == 0
+    far, _, _ = found.nodes["e0"].at(np.array([1.0]))
+    near, _, _ = bare.nodes["e0"].at(np.array([1.0]))
+    assert abs(far - near).max() <= abs(found.nodes["e0"].anchor.shift).max() * 3  # type: ignore[union-attr]
+
+
+def test_what_two_effects_do_together_is_asked() -> None:
+    """Exact where they were asked, what each is alone where the other is absent; and of effects
+    whose product shifts modes too, exact at all sizes up to there."""
+
+    class Product(Toy):
+        def _answer(self, point: Query) -> Answer:
+            found = super()._answer(point)
+            both = point.effects.get("e0", 0.0) * point.effects.get("e1", 0.0)
+            return replace(found, eta=found.eta + 0.02 * both)
+
+    toy, d = Product(effects=3, bend=0.0), np.array([0.2, -0.1, 0.1])
+    bare = expand(toy, np.zeros(3))
+    met = anchored(bare, toy, [Query(d, {"e0": 0.8, "e1": 0.5})])
+    asked = replace(problem(toy), expansion=met)
+    for e in ((0.8, 0.5), (0.4, 0.25), (0.8, 0.0), (0.0, 0.5)):
+        effects = dict(zip(("e0", "e1"), e, strict=True))
+        (answer,) = toy.answers([Query(d, effects)])
+        assert isinstance(answer, Answer)
+        at = {id: np.array([size]) for id, size in effects.items()}
+        assert asked.predicted(at, d[None])[0] == pytest.approx(answer.eta, abs=1e-9)
+    without = asked.added({"e0": np.array([0.8]), "e2": np.array([0.3])}, 1)[0]
+    plain = replace(asked, expansion=bare).added({"e0": np.array([0.8]), "e2": np.array([0.3])}, 1)
+    assert without == pytest.approx(plain[0])
