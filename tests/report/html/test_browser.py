@@ -15,6 +15,7 @@ import pytest
 from tyrecal.report.html.page import write_page
 
 from . import toy
+from .ring import TABLE_2
 from .test_page import HOSTILE
 
 selenium = pytest.importorskip("selenium")
@@ -237,7 +238,7 @@ def test_it_prints_on_a4_every_mode(browser: Any, address: str) -> None:
     assert sizes and all(abs(w - 595) < 2 and abs(h - 842) < 2 for _, _, w, h in sizes)
     small = "return [...document.querySelectorAll('.gallery canvas')].map((c) => c.toDataURL())"
     pictures = browser.execute_script(small)
-    assert len(pictures) == len(set(pictures)) == len(toy.TABLE_2) + 4
+    assert len(pictures) == len(set(pictures)) == len(TABLE_2) + 4
     shut = "return [...document.querySelectorAll('details')].filter((d) => !d.open).length"
     assert browser.execute_script(shut) == 0  # numbers are printed too
 

@@ -17,6 +17,7 @@ from tyrecal.report.html.page import page, write_page
 from tyrecal.report.html.results import read_results
 
 from . import toy
+from .ring import TABLE_2
 
 ROOT = Path(__file__).parents[3]
 TRIALS = 60
@@ -86,7 +87,7 @@ def test_tags_nest_ids_are_unique_and_links_lead_somewhere(folder: Path) -> None
 def test_table_2_is_there(folder: Path) -> None:
     """Each row of the paper's table, its figures in their order."""
     words = words_of(text_of(folder))
-    for c, m, kind, initial, fitted, target in toy.TABLE_2:
+    for c, m, kind, initial, fitted, target in TABLE_2:
         off = 100 * (fitted / target - 1)
         grade = "○" if abs(off) <= 2 else "◐" if abs(off) <= 5 else "●"
         figures = f"{initial:.2f}{fitted:.2f}{target:.2f}{grade} {off:+.2f}".replace("-", "\u2212")
