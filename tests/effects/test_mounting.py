@@ -13,12 +13,13 @@ from tyrecal.simulate.modes.label import Label, paired_labels
 from tyrecal.studies.diagnose.tyre_model import TyreModel
 from tyrecal.tyre.case import LoadedCase
 from tyrecal.tyre.effects import catalogue
-from tyrecal.tyre.effects.edit import changed, with_part
+from tyrecal.tyre.effects.edit import changed, with_part, with_rubbers_at
 from tyrecal.tyre.load import load_case
 from tyrecal.tyre.resolve import resolved
 from tyrecal.tyre.values import with_values
 
 from ..bundled import support
+from ..studies.wrinkles import by_size
 from .support import CASE, CASES
 
 Array = np.ndarray
@@ -98,3 +99,35 @@ def test_calculix_says_of_a_bead_that_does_not_sit_what_we_do(holds: str) -> Non
     assert ln_f[2:] == pytest.approx(ln_f[:2], abs=4e-3)
     assert ln_f[3] - ln_f[2] == pytest.approx(ln_f[1] - ln_f[0], abs=5e-4)
     assert (ln_f[1] - ln_f[0]).max() < 0
+
+
+@pytest.mark.parametrize("holds", ["whole_bead", "bead_surface"])
+def test_a_filler_is_stiffer_down_to_its_end_within_the_bead(holds: str) -> None:
+    """A truck's turn-up ends below its filler's tip, so that the effect is the filler's compound; a
+    rim that holds the bead's surface alone feels what lies within."""
+    case = by_size("11R22.5")
+    level = case.case.mesh.levels["default"]
+    few = {region: 1 + n // 4 for region, n in level.elements.items()}
+    levels = {"default": with_part(level, elements=few, rows=[1] * len(level.rows))}
+    case = changed(
+        case,
+        rim=with_part(case.case.rim, holds=holds),
+        mesh=with_part(case.case.mesh, levels=levels),
+    )
+    harder = lambda m: with_part(m, C10_Pa=2.5 * m.C10_Pa, D1_per_Pa=m.D1_per_Pa / 2.5)
+    own = case.case.materials
+    lines = "ply", "belt1_turn_up"
+    made = (
+        case,
+        catalogue()["bead_filler"].add(case, 1.5),
+        changed(case, materials={**own, "bead_filler": harder(own["bead_filler"])}),
+        with_rubbers_at(case, ["filler"], lines, "above_the_rim", harder),
+    )
+    rows = [(label, case.case.pressure_kPa) for label in RIGID.values()]
+    models = [TyreModel(each, Evaluator(TyreDesign(each)), rows, [], {}) for each in made]
+    plain, effect, compound, above = (model.values_at(model.start) for model in models)
+    assert effect == pytest.approx(compound, abs=1e-9)
+    if holds == "whole_bead":
+        assert effect == pytest.approx(above, abs=1e-9)
+    else:
+        assert (effect - above > 0.1 * (effect - plain)).all()

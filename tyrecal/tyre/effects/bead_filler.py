@@ -7,14 +7,15 @@ from ..section.curve import length_along
 from .deck_numbers import stiffer, with_compounds
 from .edit import with_part, with_rubbers_at
 from .effect import Effect
-from .parts import carcass_line, lower_sidewall, sidewall, stations, turned_up
+from .parts import carcass_line, held_regions, lower_sidewall, sidewall, stations, turned_up
 
 HIGHER_m = 0.010  # fillers of one size reach 30 to 60 mm above the rim
 
 
 def add(case: LoadedCase, value: float) -> LoadedCase:
-    """Shear and bulk modulus of the lower sidewall's rubber times 1 + value: of what lies between
-    the carcass and its turn-up, where it has one."""
+    """Shear and bulk modulus of the rubber of lower sidewall and bead times 1 + value: of what lies
+    between the carcass and its turn-up, where it has one. A rim that holds the bead's surface
+    alone leaves the filler within it to give way."""
     if not value > -1:
         raise ValueError("must be greater than -1")
     return _stiffer(case, _place(case)[0], 1 + value)
@@ -35,7 +36,7 @@ def higher(case: LoadedCase, value: float) -> LoadedCase:
 
 def _place(case: LoadedCase) -> tuple[list[str], tuple[str, str]]:
     """Regions, from the upper one down, and lines (inner, outer) that the filler lies in."""
-    regions = lower_sidewall(case)
+    regions = [*lower_sidewall(case), *held_regions(case.section)]
     if found := turned_up(case):
         line, up = found
         return [region for region in regions if region in up], (carcass_line(case), line)
