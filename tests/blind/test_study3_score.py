@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from math import exp, log
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,11 +14,13 @@ from tyrecal.simulate.modes.label import Label
 from tyrecal.studies.blind.ruler import Difficulty, Ruler
 from tyrecal.studies.diagnose.several import priors
 
-from .study3.cases import Group
+from ..studies.blind_least_squares import unpacked
+from .study3.cases import RECORDED, Group
 from .study3.kinds import weighed_again
 from .study3.rises import risen
 from .study3.score import Scored, foretold
 from .study3.tables import figures, misses, table
+from .study3.unlike import table_of_unlike, unlike
 
 
 def answered(effects: str, top: str, lam: float = 30.0, **more: Any) -> Scored:
@@ -182,3 +185,19 @@ def test_a_rise_is_the_tyre_s_own_beyond_the_model_s_at_its_numbers() -> None:
     ]
     truth = {"variables": {"A": exp(0.3)}, "constants": {"density": 0.5}, "without": table}
     assert risen(ruler, ["density"], truth) == {label: pytest.approx(0.01)}
+
+
+def test_makers_and_catalogue_mean_the_same_by_a_spring(tmp_path: Path) -> None:
+    """Of what one moves calibration and constants leave nothing that the other does not; the table
+    says of how many."""
+    group = Group("205/60R15", True, 15)
+    unpacked(RECORDED / group.name, tmp_path / "trials", tmp_path / "truth")
+    found = unlike(tmp_path / "trials", tmp_path / "truth")
+    springs = [
+        each for id, several in found.items() if id.startswith("spindle") for each in several
+    ]
+    left, ratio = np.array(springs).T
+    assert len(springs) > 5 and left.max() < 0.05 and abs(np.log(ratio)).max() < 0.4
+    count = len(found["bead_filler"])
+    said = table_of_unlike([(group, found), (Group("205/60R15", False, 15), {})])
+    assert f"({count}) |" in said and said.splitlines()[0] == "| effect | 205/60R15 own |"

@@ -9,6 +9,7 @@
     python -m tests.blind.study3 score DIR --series 4 5 --least 1  # of two series together
     python -m tests.blind.study3 power DIR > table.md        # what could be found, by its rulers
     python -m tests.blind.study3 rises DIR > table.md        # how far laws are off over the run
+    python -m tests.blind.study3 unlike DIR > table.md       # the makers' effects and ours
     python -m tests.blind.study3 mesh 205/60R15              # the maker's mesh error, and the model
 
 Trials lie in DIR/GROUP, their truth in DIR-truth/GROUP. `make` and `answer` go on where they were
@@ -52,11 +53,12 @@ from .score import scored
 from .section import columns, mould
 from .tables import misses, table
 from .tyre import tyre_of
+from .unlike import table_of_unlike, unlike
 
 COUNTS = {"none": 12, "one": 12, "one_strong": 20, "two": 4, "two_strong": 14, "three": 4}
 COUNTS |= {"three_strong": 0, "outside": 6, "outside_strong": 0, "again": 2}
 COUNTS |= {"one_faint": 0, "one_weak": 0}
-COMMANDS = "groups", "make", "answer", "unpack", "score", "power", "rises", "mesh"
+COMMANDS = "groups", "make", "answer", "unpack", "score", "power", "rises", "unlike", "mesh"
 
 
 def main() -> None:
@@ -79,10 +81,14 @@ def main() -> None:
         mesh(o.folder)
     elif o.what == "power":
         print(power(Path(o.folder)))
-    elif o.what == "rises":
+    elif o.what in ("rises", "unlike"):
         answered = [g for g in GROUPS if (Path(o.folder) / g.name / ANSWERS).exists()]
-        found = {g: rises(Path(o.folder) / g.name, sealed_in(o.folder) / g.name) for g in answered}
-        print(table_of_rises(found))
+        wanted = [g for g in answered if not o.series or g.series in o.series]
+        places = {g: (Path(o.folder) / g.name, sealed_in(o.folder) / g.name) for g in wanted}
+        if o.what == "rises":
+            print(table_of_rises({g: rises(*place) for g, place in places.items()}))
+        else:
+            print(table_of_unlike((g, unlike(*place)) for g, place in places.items()))
     elif o.what == "unpack":
         for group in (each for each in RECORDED.iterdir() if each.is_dir()):
             unpacked(group, Path(o.folder) / group.name, sealed_in(o.folder) / group.name)
