@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from tyrecal.studies.diagnose.evidence import INFLATION, UNKNOWN, explain, ln_splits, outside, refit
+from tyrecal.studies.diagnose.evidence import INFLATION, UNKNOWN, explain, outside, refit
 from tyrecal.studies.diagnose.gap import ResidualGroup, _chi2, _corrected, find_gap
 from tyrecal.studies.diagnose.inverse_problem import Assumed, Toggle
 from tyrecal.studies.diagnose.label_swap import _near
@@ -124,26 +124,6 @@ def test_parts_look_alike_from_a_cosine_of_095_on() -> None:
         parts = [SectionPart("a", one, 0 * one, ""), SectionPart("b", near(cosine), 0 * one, "")]
         found, _ = section_map(p, 1e4 * np.eye(n), one, parts)
         assert [bool(place.same_as) for place in found] == [same, same]
-
-
-def test_splits_are_folded_normal() -> None:
-    """s = |N(apart, tau^2)|: both signs, tau with the usual split of 0.3 %; it integrates to 1."""
-    toy = Toy(effects=1, pressures=(240.0,))
-    p = problem(toy)
-    n = len(p.places)
-
-    def ln(s: float, apart: float) -> float:
-        one = np.where(np.arange(n) == 4, s, np.nan)
-        seen = replace(p.observations, split=one, split_scatter=np.full(n, 0.004))
-        return float(ln_splits(replace(p, observations=seen), np.full((1, n), apart))[0])
-
-    tau = 0.005
-    for s, apart in ((0.0, 0.0), (0.01, 0.004), (0.003, 0.012)):
-        density = sum(np.exp(-(((s - x) / tau) ** 2) / 2) for x in (apart, -apart))
-        assert ln(s, apart) == pytest.approx(np.log(density / tau / np.sqrt(2 * np.pi)))
-    grid = np.linspace(0, 0.06, 2001)
-    total = np.trapezoid([np.exp(ln(s, 0.004)) for s in grid], grid)
-    assert total == pytest.approx(1, abs=1e-3)
 
 
 def test_outside_is_half_unknown_effects_and_half_errors_of_reading() -> None:

@@ -242,22 +242,8 @@ def refit_at(
     _, ln_normal = np.linalg.slogdet(normal * np.outer(problem.spread, problem.spread))
     n = len(y)
     ln_evidence = -(chi2 + ln_det + n * np.log(2 * np.pi) + (off**2).sum(1) + ln_normal) / 2
-    ln_evidence += ln_splits(problem, added.split) + told
+    ln_evidence += problem.splits.ln_likelihood(added.split) + told
     return Fitted(ln_evidence, d, chi2, np.linalg.inv(normal), np.zeros((len(d), 0)))
-
-
-def ln_splits(problem: InverseProblem, split: Array) -> Array:
-    """ln p(splits) (q,) where pairs should be ``split`` (q, n) apart.
-
-    Folded normal distribution: s = |N(split, tau^2)|, tau with the non-uniformity that every
-    tyre has.
-    """
-    s = problem.observations.split
-    seen = np.isfinite(s)
-    tau = np.hypot(problem.observations.split_scatter[seen], problem.assumed.split)
-    apart, s = split[:, seen], s[seen]
-    ln = np.logaddexp(-(((s - apart) / tau) ** 2) / 2, -(((s + apart) / tau) ** 2) / 2)
-    return np.asarray((ln - np.log(tau) - np.log(2 * np.pi) / 2).sum(1))
 
 
 class Family(NamedTuple):

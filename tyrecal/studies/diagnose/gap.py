@@ -86,11 +86,8 @@ def find_gap(problem: InverseProblem, d: Array, variables: tuple[str, ...]) -> G
     shift, tilt, *_ = problem.added({}, 1)  # of what was switched on purpose
     eta, _ = problem.plain(d)
     r = problem.observations.y - eta - shift[0] - tilt[0] @ d
-    s, tau = problem.observations.split, problem.observations.split_scatter
-    seen = np.isfinite(s)
-    splits = float((s[seen] ** 2 / (tau[seen] ** 2 + problem.assumed.split**2)).sum())
-    total = float(r @ P @ r) + splits
-    freedom = max(1, len(r) - len(d) + int(seen.sum()))
+    total = float(r @ P @ r) + problem.splits.chi2()
+    freedom = max(1, len(r) - len(d) + problem.splits.count)
     absorbed: dict[str, float] = {}
     bias: dict[str, dict[str, float]] = {name: {} for name in variables}
     for id, nodes in problem.expansion.nodes.items():

@@ -13,6 +13,7 @@ from .covariance import alike, covariance
 from .expansion import Expansion
 from .model import Span
 from .observations import Observations
+from .splits import Splits
 from .veering import Veering, rule, veering
 
 Array = np.ndarray
@@ -89,6 +90,11 @@ class InverseProblem:
         """The same of other observations, whose constants (m, k) are given."""
         laws = self.expansion.material_laws
         return covariance(observations, constants, laws, self.assumed.form, mixed)
+
+    @cached_property
+    def splits(self) -> Splits:
+        """Of the pairs."""
+        return Splits.of(self.observations, self.assumed.split)
 
     @cached_property
     def integrand(self) -> list[InverseProblem]:

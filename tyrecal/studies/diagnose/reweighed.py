@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .evidence import COUPLED_STEPS, ln_splits, model_of, over_zeta, refit_at
+from .evidence import COUPLED_STEPS, model_of, over_zeta, refit_at
 from .inverse_problem import Added, InverseProblem
 from .veering import rule
 
@@ -65,7 +65,7 @@ class Line:
         w = np.linalg.solve(T, r[:, :, None])
         whole, taken = (w[:, :, 0] * r).sum(1), (J.transpose(0, 2, 1) @ w)[:, :, 0]
         ln = -(whole + np.linalg.slogdet(T)[1] + keep.sum() * np.log(2 * np.pi)) / 2
-        ln += self.told + ln_splits(problem.only(keep), self.split[:, keep])
+        ln += self.told + problem.only(keep).splits.ln_likelihood(self.split[:, keep])
         return ln, whole - (taken**2).sum(1)
 
 

@@ -1,0 +1,106 @@
+"""Splits of pairs: what non-uniformity does to them, alike in all states of a tyre, and effects.
+
+A pair that an effect holds a_p apart in state p is measured s_p = |a_p + u + noise of tau_p| apart,
+u ~ N(0, w^2) the tyre's own non-uniformity, one number a pair. Over all signs
+
+    p(s) = integral N(u; 0, w^2) prod_p [N(s_p - a_p - u; tau_p^2) + N(s_p + a_p + u; tau_p^2)] du
+
+by the trapezoidal rule, whose error for a normal integrand of standard deviation sigma with steps
+h is 2 exp(-2 (pi sigma / h)^2).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from .observations import Observations
+
+Array = np.ndarray
+FAR_OUT = 6.0  # standard deviations of u, beyond what the splits ask for
+LEAST_WIDTH = 1e-9  # of u
+
+
+@dataclass(frozen=True)
+class Splits:
+    """Of m pairs in up to k states, empty places aside."""
+
+    places: Array  # (m, k) among the observations
+    there: Array  # (m, k) whether there is one
+    s: Array  # (m, k)
+    tau: Array  # (m, k)
+    width: float  # w
+    known: dict[bytes, float] = field(default_factory=dict, repr=False)  # ln p(s) by what is apart
+
+    @classmethod
+    def of(cls, observations: Observations, width: float) -> Splits:
+        """All pairs of which both members were measured."""
+        found: dict[str, list[int]] = {}
+        for i in np.flatnonzero(np.isfinite(observations.split)).tolist():
+            found.setdefault(str(observations.rows[i].label), []).append(i)
+        most = max(map(len, found.values()), default=0)
+        places = np.array([each + [0] * (most - len(each)) for each in found.values()], int)
+        places = places.reshape(len(found), most)
+        there = np.array([[j < len(each) for j in range(most)] for each in found.values()], bool)
+        there = there.reshape(len(found), most)
+        s = np.where(there, observations.split[places], 0.0)
+        tau = np.where(there, observations.split_scatter[places], 1.0)
+        return cls(places, there, s, tau, max(width, LEAST_WIDTH))
+
+    @property
+    def count(self) -> int:
+        return int(self.there.sum())
+
+    def ln_likelihood(self, apart: Array) -> Array:
+        """ln p(s) (q,) where effects hold all rows ``apart`` (q, n)."""
+        if not self.count:
+            return np.zeros(len(apart))
+        keys = [row.tobytes() for row in apart]
+        new = {key: row for key, row in zip(keys, apart, strict=True) if key not in self.known}
+        if new:  # most effects hold no pair apart, and the rest few sizes in many explanations
+            a = np.where(self.there, np.array([*new.values()])[:, self.places], 0.0)
+            u, h = self._grid(float(a.max()))
+            ln, _ = self._integrand(a, u)
+            found = (np.logaddexp.reduce(ln, axis=-1) + np.log(h)).sum(-1)
+            self.known.update(zip(new, found.tolist(), strict=True))
+        return np.array([self.known[key] for key in keys])
+
+    def chi2(self) -> float:
+        """s^T C^-1 s with C = tau^2 + w^2, the signs averaged by their probability: as many in the
+        mean as there are splits, where no effect holds a pair apart.
+
+        s^T C^-1 s = <u^2 / w^2 + sum (s_p - u)^2 / tau_p^2> - 1 over u that the splits leave.
+        """
+        if not self.count:
+            return 0.0
+        u, _ = self._grid(0.0)
+        ln, plus = self._integrand(np.zeros((1, *self.s.shape)), u)
+        weight = np.exp(ln - ln.max(-1, keepdims=True))
+        weight /= weight.sum(-1, keepdims=True)
+        near, far = (
+            ((self.s[..., None] + sign * u) / self.tau[..., None]) ** 2 for sign in (-1, 1)
+        )
+        squares = np.where(self.there[..., None], plus * near + (1 - plus) * far, 0.0)
+        total = (u / self.width) ** 2 + squares.sum(-2)
+        return float(((weight * total).sum(-1) - 1).sum())
+
+    def _grid(self, most_apart: float) -> tuple[Array, float]:
+        """u (g,), and the step between."""
+        precision = np.where(self.there, self.tau**-2.0, 0.0).sum(1).max() + self.width**-2.0
+        reach = FAR_OUT * self.width
+        if self.s.max() + most_apart > self.width:
+            reach += self.s.max() + most_apart
+        count = 2 * int(np.ceil(reach * np.sqrt(precision))) + 1
+        u = np.linspace(-reach, reach, count)
+        return u, float(u[1] - u[0])
+
+    def _integrand(self, a: Array, u: Array) -> tuple[Array, Array]:
+        """Its ln (q, m, g), and the probability (q, m, k, g) of s having the sign of a + u."""
+        s, tau = self.s[..., None], self.tau[..., None]
+        centre = a[..., None] + u
+        plus, minus = -(((s - centre) / tau) ** 2) / 2, -(((s + centre) / tau) ** 2) / 2
+        both = np.logaddexp(plus, minus)
+        ln = both - np.log(tau) - np.log(2 * np.pi) / 2
+        own = -((u / self.width) ** 2) / 2 - np.log(self.width) - np.log(2 * np.pi) / 2
+        return np.where(self.there[..., None], ln, 0.0).sum(-2) + own, np.exp(plus - both)
