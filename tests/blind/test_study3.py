@@ -415,7 +415,7 @@ def test_the_tables_on_record_are_what_the_scorer_says(tmp_path: Path) -> None:
 def test_three_answers_on_record_are_given_again(tmp_path: Path) -> None:
     """The first three by name of a group of series 16, by today's diagnosis."""
     folder = tmp_path / "trials"
-    unpacked(RECORDED / "205_60r15_own_16", folder)
+    unpacked(RECORDED / "175_70r13_own_16", folder)
     recorded = {}
     for place, path in enumerate(sorted((folder / "answers").glob("*.json"))):
         if place < 3:
