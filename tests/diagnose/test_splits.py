@@ -52,15 +52,17 @@ def test_one_split_is_folded_normal() -> None:
     grid = np.linspace(0, 0.06, 2001)
     total = np.trapezoid([np.exp(ln(s, 0.004)[0]) for s in grid], grid)
     assert total == pytest.approx(1, abs=1e-3)
+    none = Splits.of(observed(np.array([[0.05, 0.001]]), 0.004), 0.0)
+    assert none.chi2() == pytest.approx((0.05**2 + 0.001**2) / 16e-6)
     one = Splits.of(observed(np.array([[0.01]]), 0.004), 0.003)
     assert one.chi2() == pytest.approx(0.01**2 / 25e-6) and one.count == 1
 
 
 @pytest.mark.parametrize("tau", [3e-4, 2.8e-3])
-@pytest.mark.parametrize("width", [3e-3, 3e-4])
+@pytest.mark.parametrize("width", [3e-3, 3e-4, 1e-6])
 def test_several_states_share_the_tyre_s_own_split_over_all_signs(tau: float, width: float) -> None:
     """Every pair of signs by itself; a pair that misses a state; effects of two sizes."""
-    random = generator("splits", int(1e5 * tau), int(1e5 * width))
+    random = generator("splits", int(1e5 * tau), int(1e7 * width))
     s = abs(width * random.normal(size=(4, 1)) + tau * random.normal(size=(4, 3)))
     s[1, 2] = np.nan
     taus = tau * random.uniform(1, 2, s.shape)

@@ -87,10 +87,10 @@ class Splits:
 
     def _grid(self, most_apart: float) -> tuple[Array, float]:
         """u (g,), and the step between."""
-        precision = np.where(self.there, self.tau**-2.0, 0.0).sum(1).max() + self.width**-2.0
-        reach = FAR_OUT * self.width
-        if self.s.max() + most_apart > self.width:
-            reach += self.s.max() + most_apart
+        measured = np.where(self.there, self.tau**-2.0, 0.0).sum(1).max()
+        precision = measured + self.width**-2.0
+        # u that the splits leave has its middle at this share of what was measured at most
+        reach = FAR_OUT * self.width + measured / precision * (self.s.max() + most_apart)
         count = 2 * int(np.ceil(reach * np.sqrt(precision))) + 1
         u = np.linspace(-reach, reach, count)
         return u, float(u[1] - u[0])
