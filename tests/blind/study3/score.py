@@ -143,8 +143,7 @@ def one(
     hard = {}
     effects = tuple(sorted(truth["effects"])) if truth["kind"] != "outside" else ()
     for id in effects:
-        table = truth["members"].get(id, truth["without"])
-        shift, split = true_shift({**truth, "without": table}, ruler, places, labels)
+        shift, split = moved_by(id, truth, ruler, places, labels)
         hard[id] = difficulty(ruler, protocol, id, d, places, counts, shift, split)
     if truth["kind"] == "outside":
         shift, split = true_shift(truth, ruler, places, labels)
@@ -198,6 +197,14 @@ def one(
     (id,) = effects
     sizes = np.linspace(*ruler.signatures[id].sizes[[0, -1]], SIZES_TRIED)
     return replace(found, least=min(rms({id: float(e)}) for e in sizes))
+
+
+def moved_by(
+    id: str, truth: Mapping[str, Any], ruler: Ruler, places: np.ndarray, labels: Sequence[Any]
+) -> tuple[np.ndarray, np.ndarray]:
+    """`true_shift` of one effect, alone or beside the others that are there."""
+    table = truth["members"].get(id, truth["without"])
+    return true_shift({**truth, "without": table}, ruler, places, labels)
 
 
 def weighed(trial: Scored, p: Mapping[str, float]) -> Scored:

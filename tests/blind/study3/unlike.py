@@ -19,10 +19,11 @@ from tyrecal.studies.blind.answer import case_of
 from tyrecal.studies.blind.make import labels_of
 from tyrecal.studies.blind.protocol import read_protocol
 from tyrecal.studies.blind.ruler import read_ruler
-from tyrecal.studies.blind.score import means, true_shift
+from tyrecal.studies.blind.score import means
 from tyrecal.studies.blind.seal import open_truth
 
 from .cases import Group
+from .score import moved_by
 
 SEEN = 8.0  # lambda from which an effect's shape can be told
 Unlike = dict[str, list[tuple[float, float]]]  # by id: share of lambda left, and ratio of sizes
@@ -40,8 +41,7 @@ def unlike(folder: Path, sealed: Path) -> Unlike:
         for id, size in truth["effects"].items():
             if id not in ruler.signatures:
                 continue
-            table = truth["members"].get(id, truth["without"])
-            shift = true_shift({**truth, "without": table}, ruler, places, labels)[0]
+            shift, _ = moved_by(id, truth, ruler, places, labels)
             sizes, own, _ = ruler.signatures[id].grid(d, places)
             left = np.einsum("qn,nm,qm->q", own - shift, P, own - shift)
             lam = float(shift @ P @ shift)

@@ -78,9 +78,8 @@ class Splits:
         ln, plus = self._integrand(np.zeros((1, *self.s.shape)), u)
         weight = np.exp(ln - ln.max(-1, keepdims=True))
         weight /= weight.sum(-1, keepdims=True)
-        near, far = (
-            ((self.s[..., None] + sign * u) / self.tau[..., None]) ** 2 for sign in (-1, 1)
-        )
+        s, tau = self.s[..., None], self.tau[..., None]
+        near, far = ((s - u) / tau) ** 2, ((s + u) / tau) ** 2
         squares = np.where(self.there[..., None], plus * near + (1 - plus) * far, 0.0)
         total = (u / self.width) ** 2 + squares.sum(-2)
         return float(((weight * total).sum(-1) - 1).sum())
