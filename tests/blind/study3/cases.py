@@ -60,7 +60,7 @@ class Group:
 
 
 GROUPS = [
-    Group(size, own, series) for series in range(1, 17) for size in SIZES for own in (True, False)
+    Group(size, own, series) for series in range(1, 18) for size in SIZES for own in (True, False)
 ]
 
 
