@@ -14,7 +14,7 @@ from numpy.polynomial import Polynomial
 from tyrecal.simulate.modes.label import Label
 from tyrecal.studies.diagnose.inverse_problem import Toggle
 from tyrecal.studies.diagnose.model import Answer, Query, Span
-from tyrecal.studies.diagnose.next_measurement import CHECKED, Look, rank
+from tyrecal.studies.diagnose.next_measurement import CHECKED, Further, Look, offered_kPa, rank
 from tyrecal.studies.diagnose.observations import Observable
 from tyrecal.studies.diagnose.separability import separate
 
@@ -47,7 +47,14 @@ def test_the_menu_of_measurements() -> None:
         answers = lambda points: [answer, *map(moved, points[1:])]
         return SimpleNamespace(answers=answers, sloped_at_0=())
 
-    found = rank(p, np.zeros(3), likely, sizes, ("rubber_density", "section gauge 1"), further)
+    found = rank(
+        p,
+        np.zeros(3),
+        likely,
+        sizes,
+        ("rubber_density", "section gauge 1"),
+        Further(further, 240.0),
+    )
     assert {c.what: c.hours for c in found} == {
         "measure by itself: rubber density": 1.0,
         "cut the tyre and measure its section": 8.0,
@@ -55,6 +62,7 @@ def test_the_menu_of_measurements() -> None:
         "take e0 out": 4.0,
         "measure again without e1": 4.0,
         "measure again without e2": 4.0,
+        "measure the same modes at 100 kPa": 1.0,
         "measure the same modes at 320 kPa": 1.0,
         "measure [5,0] and [5,1], too": 1.0,
         "weigh the tyre": 0.1,
@@ -80,7 +88,9 @@ def test_what_further_rows_gain_from_an_effect_whose_slope_at_0_is_known() -> No
     asked: list[Query] = []
 
     def ranked(model: Any) -> float:
-        found = rank(p, np.zeros(3), likely, sizes, (), lambda rows: model(len(rows)))
+        found = rank(
+            p, np.zeros(3), likely, sizes, (), Further(lambda rows: model(len(rows)), 240.0)
+        )
         return next(c.gain for c in found if "[5,0]" in c.what)
 
     def answered(count: int, straight: bool) -> Any:
@@ -252,8 +262,8 @@ def test_the_gains_of_further_rows_by_their_formula() -> None:
         answers = lambda points: [answer(point) for point in points]
         return SimpleNamespace(answers=answers, sloped_at_0=())
 
-    found = {c.what: c for c in rank(p, np.zeros(3), likely, sizes, (), further)}
-    assert len(found) == 7  # repeats, two toggles, 160 and 320 kPa, harmonics, the mass
+    found = {c.what: c for c in rank(p, np.zeros(3), likely, sizes, (), Further(further, 240.0))}
+    assert len(found) == 8  # repeats, two toggles, 100, 160 and 320 kPa, harmonics, the mass
     assert found.keys() > {"measure the same modes at 160 kPa", "measure the same modes at 320 kPa"}
 
     def apart(at: list[int], form: float) -> Array:
@@ -296,8 +306,8 @@ def test_the_gains_of_further_rows_by_their_formula() -> None:
 
 
 def test_what_is_not_asked_twice_or_has_no_answer_is_not_offered() -> None:
-    """Pressures nearer than 60 kPa to one measured; the mass where it is known; nothing where the
-    model fails; ten explanations at most."""
+    """Pressures nearer than a quarter of the tyre's own to one measured; the mass where it is
+    known; nothing where the model fails; ten explanations at most."""
     toy = Toy(effects=12, pressures=(220.0, 260.0))
     p = problem(toy)
     sizes = {id: {id: np.array([0.5])} for id in toy.spans}
@@ -308,16 +318,24 @@ def test_what_is_not_asked_twice_or_has_no_answer_is_not_offered() -> None:
         asked.append(wanted)
         return SimpleNamespace(answers=lambda q: [ValueError("no")] * len(q), sloped_at_0=())
 
-    words = [c.what for c in rank(p, np.zeros(3), likely, sizes, (), further)]
+    words = [c.what for c in rank(p, np.zeros(3), likely, sizes, (), Further(further, 240.0))]
     assert sorted(what for what in words if "without" in what) == [
         *(f"measure again without e{i}" for i in (10, 11, *range(2, 10)))
     ]
     assert len(words) == 11  # and mounted again
     (rows,) = asked
-    assert {pressure for _, pressure in rows} == {160.0, 320.0, 220.0, 260.0, 0.0}
+    assert {pressure for _, pressure in rows} == {100.0, 160.0, 320.0, 220.0, 260.0, 0.0}
     o = p.observations
     weighed = replace(
         p, observations=replace(o, rows=(*o.rows[:-1], Observable("mass_kg", None, 0.0)))
     )
-    rank(weighed, np.zeros(3), likely, sizes, (), further)
+    rank(weighed, np.zeros(3), likely, sizes, (), Further(further, 240.0))
     assert (None, 0.0) not in asked[1]
+
+
+def test_pressures_that_are_offered_are_the_tyres() -> None:
+    """Of a car's and of a truck's, a quarter of its own apart from all that was measured."""
+    assert offered_kPa(240.0, []) == [100, 160, 200, 240, 280, 320]
+    assert offered_kPa(240.0, [160, 240, 320]) == [100]
+    assert offered_kPa(830.0, []) == [330, 550, 690, 830, 970, 1110]
+    assert offered_kPa(830.0, [700, 830]) == [330, 1110]

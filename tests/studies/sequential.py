@@ -7,7 +7,8 @@ laboratory may measure; tyres are then drawn by algebra: one effect, 20 to 100 %
 design variables within 5 %, and everything else (constants, section, form, law, scatter of 0.2 %)
 by the diagnosis' own covariance. A laboratory begins with the nine modes at 160 kPa, diagnoses
 (single effects), measures, and diagnoses again, until the likeliest explanation has 0.9. `next`
-takes the most information per hour (`Look.information`) of what is left; the plan has its order.
+takes the most information per hour (`Look.information`) of what is left, pressures as it offers
+them (`offered_kPa`); the plan has its order.
 Hours as `next_measurement.HOURS` has them; footprint and loaded modes cost hours and tell the
 diagnosis nothing, which uses neither as evidence: `next` never proposes them, and the plan is told
 without them, too. Where no verdict is reached all hours of the plan are counted. With --hindsight,
@@ -47,6 +48,7 @@ from tyrecal.studies.diagnose.next_measurement import (
     READING,
     SIZES,
     Look,
+    offered_kPa,
 )
 from tyrecal.studies.diagnose.observations import Observable, Observations
 from tyrecal.studies.diagnose.section_fields import SECTION
@@ -62,9 +64,10 @@ from ..effects.support import coarse
 
 Array = np.ndarray
 RESULT = Path(__file__).parents[1] / "benchmarks" / "sequential.jsonl"
-FIRST, PRESSURES_kPa, OWN_kPa = "160 kPa", (160.0, 240.0, 320.0), 240.0
+FIRST, OWN_kPa = "160 kPa", 240.0
+PRESSURE_kPa = {f"{p:g} kPa": p for p in offered_kPa(OWN_kPa, [])}
 PLAN = (FIRST, "weigh", "240 kPa", "320 kPa", "calliper", "footprint", "clamp", "loaded modes")
-COST = {f"{p:g} kPa": HOURS["pressure"] for p in PRESSURES_kPa} | {
+COST = dict.fromkeys(PRESSURE_kPa, HOURS["pressure"]) | {
     **{
         name: HOURS[name]
         for name in ("weigh", "calliper", "rim", "seat", "helium", "mount", "clamp", "cut")
@@ -128,6 +131,13 @@ class Course:
     done: tuple[str, ...]
 
 
+def offered(done: Sequence[str]) -> list[str]:
+    """What may be measured beside these."""
+    measured = [PRESSURE_kPa[name] for name in done if name in PRESSURE_kPa]
+    near = set(PRESSURE_kPa.values()) - set(offered_kPa(OWN_kPa, measured))
+    return [name for name in MENU if name not in done and PRESSURE_kPa.get(name) not in near]
+
+
 def by_next(tyre: Laboratory) -> Course:
     """The most information per hour first."""
     done, hours = [FIRST], COST[FIRST]
@@ -136,7 +146,7 @@ def by_next(tyre: Laboratory) -> Course:
         top = max(p, key=lambda key: p[key])
         if p[top] >= SURE:
             return Course(hours, top, tuple(done))
-        left = [name for name in MENU if name not in done and hours + COST[name] <= LIMIT]
+        left = [name for name in offered(done) if hours + COST[name] <= LIMIT]
         if not left:
             return Course(np.inf, top, tuple(done))
         gain = {name: tyre.information(found, p, done, name) / COST[name] for name in left}
@@ -159,7 +169,12 @@ def by_plan(tyre: Laboratory, plan: Sequence[str]) -> Course:
 
 def in_hindsight(tyre: Laboratory) -> Course:
     """The cheapest set, of up to four beside the first, after which the verdict stands."""
-    sets = [(FIRST, *each) for count in range(5) for each in combinations(MENU, count)]
+    sets = [
+        (FIRST, *each)
+        for count in range(5)
+        for each in combinations(offered([FIRST]), count)
+        if all(name in offered([FIRST, *each[:i]]) for i, name in enumerate(each))
+    ]
     for done in sorted(sets, key=lambda each: sum(COST[name] for name in each)):
         hours = sum(COST[name] for name in done)
         if hours > LIMIT:
@@ -176,7 +191,7 @@ def laboratory() -> Laboratory:
     case = coarse()
     case = changed(case, section=with_part(case.case.section, known_from=None))
     evaluator, labels = Evaluator(TyreDesign(case)), target_labels(case)
-    rows: list[ModelRow] = [(label, p) for p in PRESSURES_kPa for label in labels]
+    rows: list[ModelRow] = [(label, p) for p in PRESSURE_kPa.values() for label in labels]
     rows += [(label, TyreState(OWN_kPa, 0.0, "fixed")) for label in labels]
     rows.append((None, 0.0))
     found, spans = sources(case)[0], spans_of(case, evaluator)[0]

@@ -19,7 +19,7 @@ from .inverse_problem import Assumed, InverseProblem, Toggle, places
 from .label_swap import exchange_shifts, exchanged, with_exchanged
 from .labelings import REFUTED, Reading, averaged, over_labels, shares
 from .model import ModelRow, Query, ResponseModel
-from .next_measurement import SIZES, Choice, rank
+from .next_measurement import SIZES, Choice, Further, rank
 from .observations import Observations
 from .plain_fit import plain_fit
 from .regions import SectionPart
@@ -111,7 +111,7 @@ def diagnose(
     changes: tuple[Toggle, ...] = (),
     assumed: Assumed = Assumed(),  # noqa: B008
     parts: Callable[[Array], Sequence[SectionPart]] | None = None,
-    further: Callable[[list[ModelRow]], ResponseModel] | None = None,
+    further: Further | None = None,
     ranked: bool = True,
     expansion: Expansion | None = None,
     known: Expansion | None = None,
@@ -122,7 +122,7 @@ def diagnose(
 
     observations: or readings of them where frequencies came without labels, see `labelings`;
     changes: what was switched in runs 1, 2, ...; parts: slopes by the section's parts at x;
-    further: a model of other rows, for the next measurement; ranked: whether `choices` are wanted;
+    further: other rows of the tyre, for the next measurement; ranked: whether `choices` are wanted;
     expansion: of an earlier call with the same model, near whose x0 the fit lies; known: of the
     same model anywhere, from where effects are carried to the fit and only the likeliest are asked
     there; stage: hears of each of ``STAGES``. Raises the model's failure where the plain tyre has

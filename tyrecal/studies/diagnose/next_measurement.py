@@ -74,8 +74,8 @@ HELD_BY = {  # effects that a rigid clamp is without
 CAVITY_GAS, HELIUM = "cavity_air", 0.14  # a seventh of the mass
 READING = 0.1  # of an effect's range, by which such a reading may be off
 CHECKED = 0.25  # of a constant's standard deviation, likewise
-OFFERED_kPa = (160.0, 200.0, 240.0, 280.0, 320.0)
-FAR_kPa = 60.0  # from every pressure measured so far, for a new one to be offered
+OFFERED = (0.4, 2 / 3, 5 / 6, 1.0, 7 / 6, 4 / 3)  # of the tyre's inflation pressure
+LEAST_APART = 0.25  # of it, from every pressure measured so far, for a new one to be offered
 MASS_PERCENT = 0.5
 
 
@@ -86,6 +86,22 @@ class Choice:
     what: str
     hours: float  # an orientation
     gain: float  # information in nats per hour
+
+
+@dataclass(frozen=True)
+class Further:
+    """The same tyre in states that were not measured."""
+
+    model: Callable[[list[ModelRow]], ResponseModel]  # of other rows
+    inflation_kPa: float  # the tyre's own
+
+
+def offered_kPa(inflation_kPa: float, measured: Sequence[float]) -> list[float]:
+    """Pressures that may be measured beside these."""
+    rounded = [float(round(share * inflation_kPa, -1)) for share in OFFERED]
+    return [
+        p for p in rounded if all(abs(p - each) >= LEAST_APART * inflation_kPa for each in measured)
+    ]
 
 
 @dataclass(frozen=True)
@@ -118,12 +134,12 @@ def rank(
     probabilities: Mapping[str, float],
     sizes: Mapping[str, Sizes],
     sources: Sequence[str],
-    further: Callable[[list[ModelRow]], ResponseModel] | None = None,
+    further: Further | None = None,
 ) -> list[Choice]:
     """The menu by falling gain, at the plain fit x0 + d.
 
-    sizes: by explanation; sources: names of the sources of error; further: a model of other rows
-    of the same tyre. Empty where one explanation stands alone.
+    sizes: by explanation; sources: names of the sources of error. Empty where one explanation
+    stands alone.
     """
     likely = {
         key: p
@@ -258,11 +274,7 @@ def _grown(shifts: Array, mean: Array) -> Array:
 
 
 def _more_rows(
-    problem: InverseProblem,
-    now: Look,
-    d: Array,
-    sizes: Mapping[str, Sizes],
-    further: Callable[[list[ModelRow]], ResponseModel],
+    problem: InverseProblem, now: Look, d: Array, sizes: Mapping[str, Sizes], further: Further
 ) -> list[tuple[str, float, Look]]:
     """Other pressures, higher harmonics and the mass, as far as the model has an answer at the
     explanations' mean sizes."""
@@ -270,10 +282,9 @@ def _more_rows(
     labels = sorted({row.label for row in o.rows if row.label}, key=str)
     pressures = sorted({row.pressure_kPa for row in o.rows if row.label})
     offered: list[tuple[str, float, list[ModelRow]]] = []
-    for p in OFFERED_kPa:
-        if all(abs(p - q) >= FAR_kPa for q in pressures):
-            more: list[ModelRow] = [(label, p) for label in labels]
-            offered.append((f"measure the same modes at {p:g} kPa", HOURS["pressure"], more))
+    for p in offered_kPa(further.inflation_kPa, pressures):
+        more: list[ModelRow] = [(label, p) for label in labels]
+        offered.append((f"measure the same modes at {p:g} kPa", HOURS["pressure"], more))
     top = max(label.c for label in labels)
     higher = [Label(top + 1, 0), Label(top + 1, 1)]
     measured_in = dict.fromkeys(row.row[1] for row in o.rows if row.label)
@@ -282,7 +293,7 @@ def _more_rows(
     if all(row.label for row in o.rows):
         offered.append(("weigh the tyre", HOURS["weigh"], [(None, 0.0)]))
     rows = list(dict.fromkeys(row for _, _, more in offered for row in more))
-    model = further(rows)
+    model = further.model(rows)
     x = problem.expansion.x0 + d
     means = [{id: float(e.mean()) for id, e in each.items()} for each in sizes.values()]
     lines = tuple({id: 0.0 for each in means for id in each if id in model.sloped_at_0})

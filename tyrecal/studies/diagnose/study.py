@@ -26,6 +26,7 @@ from .inverse_problem import Assumed, Toggle
 from .label_swap import rows_if_exchanged
 from .labelings import Reading, likely, weighed_anew
 from .model import Answer, Query, Span
+from .next_measurement import Further
 from .observations import Observations, observe
 from .regions import regions
 from .section_told import section_told
@@ -134,7 +135,10 @@ def study(
         changes,
         assumed,
         parts=(lambda x: regions(model, x)) if section_map else None,
-        further=lambda more: TyreModel(case, evaluator, more, found, spans, jobs),
+        further=Further(
+            lambda more: TyreModel(case, evaluator, more, found, spans, jobs),
+            case.case.pressure_kPa,
+        ),
         stage=stage,
     )
     own = [runs[path] for path in (measured, *repeats)]
