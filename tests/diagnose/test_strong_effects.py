@@ -98,6 +98,18 @@ def test_labels_that_are_exchanged_are_found_beside_a_strong_effect() -> None:
     assert d.exchanged == (a, b) and d.verdict.key == "e0"
 
 
+def test_labels_that_lie_near_each_other_at_one_pressure_alone_may_be_exchanged() -> None:
+    """Read there, they are followed to others, where they lie 35 % apart."""
+    toy, n = Strong(), len(LABELS)
+    a, b = LABELS[6], LABELS[7]
+    y = toy.measured()
+    toy.base[7::n] += np.array([0.25, 0.35, 0.35]) + y[6::n] - y[7::n]
+    p = problem(toy, toy.measured(), assumed=ASSUMED)
+    wrong = with_exchanged(p.observations, a, b)
+    assert diagnose(toy, toy.rows, wrong, assumed=ASSUMED).exchanged == (a, b)
+    assert diagnose(toy, toy.rows, p.observations, assumed=ASSUMED).exchanged is None
+
+
 def test_exchanged_labels_are_put_right_where_one_of_the_two_is_missing() -> None:
     """A sound tyre is sound; exchanged twice its labels are what they were."""
     toy, n = Toy(effects=2, bend=0.0), len(LABELS)

@@ -93,14 +93,14 @@ def with_exchanged(observations: Observations, a: Label, b: Label) -> Observatio
 
 
 def _near(observations: Observations) -> Iterator[tuple[Label, Label]]:
-    """Pairs of labels that lie near each other wherever both were measured."""
+    """Pairs of labels near each other in a state: read there, they are followed to the others."""
     at: dict[Label, dict[tuple[TyreState, int], float]] = {}
     for row, y in zip(observations.rows, observations.y.tolist(), strict=True):
         if row.label:
             at.setdefault(row.label, {})[row.state, row.run] = y
     for a, b in combinations(sorted(at, key=str), 2):
         both = at[a].keys() & at[b].keys()
-        if both and max(abs(at[a][k] - at[b][k]) for k in both) < MAX_SWAP_DISTANCE:
+        if both and min(abs(at[a][k] - at[b][k]) for k in both) < MAX_SWAP_DISTANCE:
             yield a, b
 
 
