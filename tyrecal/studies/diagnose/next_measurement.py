@@ -74,8 +74,9 @@ HELD_BY = {  # effects that a rigid clamp is without
 CAVITY_GAS, HELIUM = "cavity_air", 0.14  # a seventh of the mass
 READING = 0.1  # of an effect's range, by which such a reading may be off
 CHECKED = 0.25  # of a constant's standard deviation, likewise
-OFFERED = (0.4, 2 / 3, 5 / 6, 1.0, 7 / 6, 4 / 3)  # of the tyre's inflation pressure
+OFFERED = (0.4, 2 / 3, 5 / 6, 1.0)  # of the tyre's inflation pressure
 LEAST_APART = 0.25  # of it, from every pressure measured so far, for a new one to be offered
+ABOVE_kPa = (40.0, 80.0)  # it, offered too: as much as any tyre bears
 MASS_PERCENT = 0.5
 
 
@@ -98,9 +99,10 @@ class Further:
 
 def offered_kPa(inflation_kPa: float, measured: Sequence[float]) -> list[float]:
     """Pressures that may be measured beside these."""
-    rounded = [float(round(share * inflation_kPa, -1)) for share in OFFERED]
+    there = [float(round(share * inflation_kPa, -1)) for share in OFFERED]
+    there += [inflation_kPa + more for more in ABOVE_kPa]
     return [
-        p for p in rounded if all(abs(p - each) >= LEAST_APART * inflation_kPa for each in measured)
+        p for p in there if all(abs(p - each) >= LEAST_APART * inflation_kPa for each in measured)
     ]
 
 
