@@ -14,7 +14,7 @@ from numpy.polynomial import Polynomial
 from tyrecal.simulate.modes.label import Label
 from tyrecal.studies.diagnose.inverse_problem import Toggle
 from tyrecal.studies.diagnose.model import Answer, Query, Span
-from tyrecal.studies.diagnose.next_measurement import CHECKED, Further, Look, offered_kPa, rank
+from tyrecal.studies.diagnose.next_measurement import CHECKED, Look, OtherStates, offered_kPa, rank
 from tyrecal.studies.diagnose.observations import Observable
 from tyrecal.studies.diagnose.separability import separate
 
@@ -53,7 +53,7 @@ def test_the_menu_of_measurements() -> None:
         likely,
         sizes,
         ("rubber_density", "section gauge 1"),
-        Further(further, 240.0),
+        OtherStates(further, 240.0),
     )
     assert {c.what: c.hours for c in found} == {
         "measure by itself: rubber density": 1.0,
@@ -89,7 +89,7 @@ def test_what_further_rows_gain_from_an_effect_whose_slope_at_0_is_known() -> No
 
     def ranked(model: Any) -> float:
         found = rank(
-            p, np.zeros(3), likely, sizes, (), Further(lambda rows: model(len(rows)), 240.0)
+            p, np.zeros(3), likely, sizes, (), OtherStates(lambda rows: model(len(rows)), 240.0)
         )
         return next(c.gain for c in found if "[5,0]" in c.what)
 
@@ -262,7 +262,9 @@ def test_the_gains_of_further_rows_by_their_formula() -> None:
         answers = lambda points: [answer(point) for point in points]
         return SimpleNamespace(answers=answers, sloped_at_0=())
 
-    found = {c.what: c for c in rank(p, np.zeros(3), likely, sizes, (), Further(further, 240.0))}
+    found = {
+        c.what: c for c in rank(p, np.zeros(3), likely, sizes, (), OtherStates(further, 240.0))
+    }
     assert len(found) == 8  # repeats, two toggles, 100, 160 and 320 kPa, harmonics, the mass
     assert found.keys() > {"measure the same modes at 160 kPa", "measure the same modes at 320 kPa"}
 
@@ -318,7 +320,7 @@ def test_what_is_not_asked_twice_or_has_no_answer_is_not_offered() -> None:
         asked.append(wanted)
         return SimpleNamespace(answers=lambda q: [ValueError("no")] * len(q), sloped_at_0=())
 
-    words = [c.what for c in rank(p, np.zeros(3), likely, sizes, (), Further(further, 240.0))]
+    words = [c.what for c in rank(p, np.zeros(3), likely, sizes, (), OtherStates(further, 240.0))]
     assert sorted(what for what in words if "without" in what) == [
         *(f"measure again without e{i}" for i in (10, 11, *range(2, 10)))
     ]
@@ -329,7 +331,7 @@ def test_what_is_not_asked_twice_or_has_no_answer_is_not_offered() -> None:
     weighed = replace(
         p, observations=replace(o, rows=(*o.rows[:-1], Observable("mass_kg", None, 0.0)))
     )
-    rank(weighed, np.zeros(3), likely, sizes, (), Further(further, 240.0))
+    rank(weighed, np.zeros(3), likely, sizes, (), OtherStates(further, 240.0))
     assert (None, 0.0) not in asked[1]
 
 

@@ -1,6 +1,6 @@
 """What to measure next, in a closed loop: hours to a verdict of 0.9, by `next` and by a fixed plan.
 
-    python -m tests.studies.sequential [--tyres 200] [--seed 1] [--hindsight 40]
+    python -m tests.studies.sequential [--tyres 600] [--seed 1] [--hindsight 60]
 
 The P235/75R17 (coarse mesh, section taken as drawn) is asked once, with every effect, in all that a
 laboratory may measure; tyres are then drawn by algebra: one effect, 20 to 100 % of its range,
@@ -279,9 +279,9 @@ def drawn(lab: Laboratory, random: np.random.Generator) -> tuple[str, float, Lab
 
 
 @click.command()
-@click.option("--tyres", default=200)
+@click.option("--tyres", default=600)
 @click.option("--seed", default=1)
-@click.option("--hindsight", default=40)
+@click.option("--hindsight", default=60)
 def main(tyres: int, seed: int, hindsight: int) -> None:
     """Draw, measure, and write a line a tyre."""
     lab, random, lines = laboratory(), np.random.default_rng(seed), []
@@ -305,7 +305,7 @@ def main(tyres: int, seed: int, hindsight: int) -> None:
         lines.append(json.dumps(line))
         print(lines[-1], flush=True)
     tell([json.loads(line) for line in lines])
-    if tyres >= 200:
+    if tyres >= 600:
         RESULT.write_text("\n".join(lines) + "\n")
 
 

@@ -19,7 +19,7 @@ from .inverse_problem import Assumed, InverseProblem, Toggle, places
 from .label_swap import exchange_shifts, exchanged, with_exchanged
 from .labelings import REFUTED, Reading, averaged, over_labels, shares
 from .model import ModelRow, Query, ResponseModel
-from .next_measurement import SIZES, Choice, Further, rank
+from .next_measurement import SIZES, Choice, OtherStates, rank
 from .observations import Observations
 from .plain_fit import plain_fit
 from .regions import SectionPart
@@ -111,7 +111,7 @@ def diagnose(
     changes: tuple[Toggle, ...] = (),
     assumed: Assumed = Assumed(),  # noqa: B008
     parts: Callable[[Array], Sequence[SectionPart]] | None = None,
-    further: Further | None = None,
+    further: OtherStates | None = None,
     ranked: bool = True,
     expansion: Expansion | None = None,
     known: Expansion | None = None,

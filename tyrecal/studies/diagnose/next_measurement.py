@@ -90,7 +90,7 @@ class Choice:
 
 
 @dataclass(frozen=True)
-class Further:
+class OtherStates:
     """The same tyre in states that were not measured."""
 
     model: Callable[[list[ModelRow]], ResponseModel]  # of other rows
@@ -136,7 +136,7 @@ def rank(
     probabilities: Mapping[str, float],
     sizes: Mapping[str, Sizes],
     sources: Sequence[str],
-    further: Further | None = None,
+    further: OtherStates | None = None,
 ) -> list[Choice]:
     """The menu by falling gain, at the plain fit x0 + d.
 
@@ -276,7 +276,7 @@ def _grown(shifts: Array, mean: Array) -> Array:
 
 
 def _more_rows(
-    problem: InverseProblem, now: Look, d: Array, sizes: Mapping[str, Sizes], further: Further
+    problem: InverseProblem, now: Look, d: Array, sizes: Mapping[str, Sizes], further: OtherStates
 ) -> list[tuple[str, float, Look]]:
     """Other pressures, higher harmonics and the mass, as far as the model has an answer at the
     explanations' mean sizes."""

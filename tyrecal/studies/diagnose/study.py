@@ -26,7 +26,7 @@ from .inverse_problem import Assumed, Toggle
 from .label_swap import rows_if_exchanged
 from .labelings import Reading, likely, weighed_anew
 from .model import Answer, Query, Span
-from .next_measurement import Further
+from .next_measurement import OtherStates
 from .observations import Observations, observe
 from .regions import regions
 from .section_told import section_told
@@ -135,7 +135,7 @@ def study(
         changes,
         assumed,
         parts=(lambda x: regions(model, x)) if section_map else None,
-        further=Further(
+        further=OtherStates(
             lambda more: TyreModel(case, evaluator, more, found, spans, jobs),
             case.case.pressure_kPa,
         ),
