@@ -73,7 +73,7 @@ def test_the_example_of(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
         (lambda case: tyrecal.evaluate_modes(case, {"C11": 1e6}), "did you mean 'C10'"),
         (lambda case: tyrecal.evaluate_modes(case, {"C10": "1e6"}), "must be a number"),
         (lambda case: tyrecal.evaluate_modes(case, {"C10": -1.0}), "must be greater than"),
-        (lambda case: tyrecal.fit_case(case, method="bfgs"), "none of slsqp, least-squares"),
+        (lambda case: tyrecal.fit_case(case, method="bfgs"), "none of slsqp, gauss-newton"),
         (lambda case: tyrecal.fit_case(case, starts=0), "starts must be at least 1, got 0"),
         (lambda case: tyrecal.fit_case(case, fixed={"X": 1.0}), "no variable 'X'"),
         (lambda case: tyrecal.sweep_pressure(case, [200, 24000]), "less than 2000"),

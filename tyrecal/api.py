@@ -131,9 +131,10 @@ def fit_case(
 ) -> Fit:
     """Calibrate the case's variables to its targets; ``fixed`` holds some at a value.
 
-    ``method`` is "slsqp" or "least-squares". ``result`` holds what fit.json does, ``provenance``
-    too, ``fitted`` the design: ``values``, ``objective`` in Hz, ``modes`` by label and, of targets
-    in several states, ``states``: modes of each.
+    ``method`` is "slsqp" (SciPy's) or "gauss-newton", which needs about a third of the designs.
+    ``result`` holds what fit.json does, ``provenance`` too, ``fitted`` the design: ``values``,
+    ``objective`` in Hz, ``modes`` by label and, of targets in several states, ``states``: modes of
+    each.
 
     >>> fit = fit_case(load_case("cases/p235_75r17.yaml", mesh="coarse"), fixed={"C10": 1e6})
     >>> fit.result["converged"], f"{fit.initial.objective:.0f} to {fit.fitted.objective:.0f} Hz"

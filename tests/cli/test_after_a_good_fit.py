@@ -6,6 +6,7 @@ import json
 import shutil
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -87,10 +88,10 @@ def no_picture(patch: pytest.MonkeyPatch) -> None:
 
 def unmoved(patch: pytest.MonkeyPatch) -> None:
     """The optimiser gives up where it starts."""
-    from tyrecal.studies.fit import calibrate, slsqp
+    from tyrecal.studies.fit import calibrate, search
 
-    def stays(problem: object, start: object, tolerance: float) -> slsqp.Descent:
-        return slsqp.Descent(problem.evaluate(start), "gave up")  # type: ignore[attr-defined]
+    def stays(problem: object, point: Any, *more: object) -> search.Descent:
+        return search.Descent(point, "gave up")
 
     patch.setitem(calibrate.METHODS, "slsqp", stays)
 

@@ -18,9 +18,10 @@ from tyrecal.simulate.evaluate.executor import Here
 from tyrecal.simulate.evaluate.failure import EvaluationFailed
 from tyrecal.simulate.evaluate.results import Evaluation
 from tyrecal.studies.fit import calibrate as calibrate_module
-from tyrecal.studies.fit.calibrate import calibrate
+from tyrecal.studies.fit.calibrate import METHODS, calibrate
 from tyrecal.studies.fit.problem import objective
 from tyrecal.studies.fit.targets import Target
+from tyrecal.tyre.case import with_level
 from tyrecal.tyre.case.schema import Targets
 from tyrecal.tyre.load import load_case
 
@@ -40,7 +41,7 @@ def test_objective_by_hand_from_the_papers_table_2() -> None:
     assert at([TARGETS[label] for label in LABELS]) == 0.0
 
 
-@pytest.mark.parametrize("method", ["slsqp", "least-squares"])
+@pytest.mark.parametrize("method", ["slsqp", "gauss-newton"])
 @pytest.mark.parametrize("has_gradients", [True, False])
 def test_finds_the_truth(method: str, has_gradients: bool) -> None:
     fit = calibrate(CASE, evaluator(has_gradients=has_gradients), method)  # type: ignore[arg-type]
@@ -51,7 +52,7 @@ def test_finds_the_truth(method: str, has_gradients: bool) -> None:
         assert not fit.result["variables"][name]["at_bound"]
 
 
-@pytest.mark.parametrize("method", ["slsqp", "least-squares"])
+@pytest.mark.parametrize("method", ["slsqp", "gauss-newton"])
 def test_converges_on_eigenvalues_of_seven_digits(method: str) -> None:
     """As CalculiX prints them; differences then leave noise in the gradient."""
     base = evaluator(has_gradients=False)
@@ -164,36 +165,33 @@ def test_starts_are_drawn_replaced_and_reproducible() -> None:
     assert first.result["evaluations"] == len(first.history)
 
 
+MOST_TO_0_05_HZ = {"slsqp": 25, "gauss-newton": 12}  # the paper's fmincon needs 25
+PAPER = ("slsqp", "p235_75r17", "default", 3.115, 0.01)
+MORE_FITS = [
+    ("gauss-newton", *PAPER[1:]),
+    *((method, "p235_75r17_narrow_rim", "default", 1.794, 0.01) for method in METHODS),
+    *((method, "205_60r15", "default", 0.612, 0.01) for method in METHODS),
+    ("slsqp", "p235_75r17", "refined", 3.08, 0.1),
+    ("slsqp", "p235_75r17_narrow_rim", "refined", 1.79, 0.1),
+]
+
+
 @pytest.mark.parametrize(
-    ("name", "level", "expected", "tolerance"),
-    [
-        ("p235_75r17", "default", 3.115, 0.01),
-        pytest.param("p235_75r17", "refined", 3.08, 0.1, marks=pytest.mark.slow),
-        ("p235_75r17_narrow_rim", "default", 1.794, 0.01),
-        pytest.param("p235_75r17_narrow_rim", "refined", 1.79, 0.1, marks=pytest.mark.slow),
-    ],
+    ("method", "name", "level", "expected", "tolerance"),
+    [PAPER, *(pytest.param(*fit, marks=pytest.mark.slow) for fit in MORE_FITS)],
 )
-def test_the_papers_case(name: str, level: str, expected: float, tolerance: float) -> None:
-    """An independent implementation ends at 3.08 and 1.79 Hz; the paper at 8.59 Hz."""
-    case = load_case(CASES / f"{name}.yaml")
-    mesh = case.case.mesh.model_copy(update={"level": level})
-    case = replace(case, case=case.case.model_copy(update={"mesh": mesh}))
-    fit = calibrate(case, Evaluator(TyreDesign(case)))
-    result = fit.result
+def test_shipped_cases_are_fitted(
+    method: str, name: str, level: str, expected: float, tolerance: float
+) -> None:
+    """An independent implementation ends the paper's at 3.08 and 1.79 Hz; the paper at 8.59 Hz."""
+    case = with_level(load_case(CASES / f"{name}.yaml"), level)
+    result = calibrate(case, Evaluator(TyreDesign(case)), method).result
     assert result["objective_Hz"] == pytest.approx(expected, abs=tolerance)
-    assert result["evaluations_to_0.05_Hz"] <= 12
+    assert result["evaluations_to_0.05_Hz"] <= MOST_TO_0_05_HZ[method]
     assert result["converged"] and result["projected_gradient_norm"] <= 1e-2
-    assert sum(mode["multiplicity"] for mode in result["modes"]) == 16
-    assert max(abs(m["deviation_percent"]) for m in result["modes"]) < 5.06
-
-
-@pytest.mark.slow
-def test_both_methods_agree_on_the_real_tyre() -> None:
-    slsqp = calibrate(CASE, Evaluator(TyreDesign(CASE))).result
-    other = calibrate(CASE, Evaluator(TyreDesign(CASE)), "least-squares").result
-    assert other["objective_Hz"] == pytest.approx(slsqp["objective_Hz"], abs=1e-4)
-    for name, variable in slsqp["variables"].items():
-        assert other["variables"][name]["value"] == pytest.approx(variable["value"], rel=1e-2)
+    if name != "205_60r15":  # which has four targets, with standard deviations
+        assert sum(mode["multiplicity"] for mode in result["modes"]) == 16
+        assert max(abs(m["deviation_percent"]) for m in result["modes"]) < 5.06
 
 
 def test_targets_that_do_not_count_are_none() -> None:

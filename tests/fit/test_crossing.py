@@ -11,7 +11,7 @@ from tyrecal.simulate.evaluate.results import Evaluation, HarmonicShape, RawMode
 from tyrecal.studies.fit.calibrate import calibrate
 from tyrecal.studies.fit.crossing import crossing, gap, order, pair_clarity
 from tyrecal.studies.fit.problem import Problem
-from tyrecal.studies.fit.slsqp import AT_CROSSING
+from tyrecal.studies.fit.search import AT_CROSSING
 from tyrecal.tyre.state import AS_THE_CASE
 
 from .fake import LABELS, POINTS, FakeEvaluator, shape

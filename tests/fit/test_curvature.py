@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tyrecal.studies.fit.curvature import curved_step, foreseen, with_secant
-from tyrecal.studies.fit.damped_step import damped_step
+from tyrecal.studies.fit.curvature import curved_step, foreseen, quadratic_step, with_secant
 
 from ..chance import generator
 
@@ -47,7 +46,9 @@ def test_a_step_without_curvature_is_the_damped_one() -> None:
         J, r, C = drawn(key)
         G, h = np.vstack([np.eye(3), -np.eye(3)]), np.full(6, -0.3)
         d = curved_step(J, r, 0 * C, 0.2, G, h)
-        assert d == pytest.approx(damped_step(J, r, 0.2, G, h), abs=1e-7)
+        H = J.T @ J + 0.2 * np.sum(J**2) / 3 * np.eye(3)
+        damped = quadratic_step(H, J.T @ r, float(np.linalg.norm(r)), G, h)
+        assert d == pytest.approx(damped, abs=1e-7)
         assert foreseen(J, r, 0 * C, d) == pytest.approx(r + J @ d)
 
 

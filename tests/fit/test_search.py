@@ -1,9 +1,8 @@
-"""The steps of both methods, where residuals are linear and every answer is known by hand."""
+"""The steps of both methods where residuals are linear and every answer is known by hand."""
 
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import pairwise
 from types import SimpleNamespace
 from typing import Any
 
@@ -11,8 +10,8 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
-from tyrecal.studies.fit import least_squares, slsqp
-from tyrecal.studies.fit.calibrate import _tolerance
+from tyrecal.studies.fit import gauss_newton, search
+from tyrecal.studies.fit.calibrate import METHODS, _tolerance
 from tyrecal.studies.fit.crossing import AXIAL, TORSIONAL
 from tyrecal.studies.fit.problem import Point
 from tyrecal.studies.fit.targets import Target
@@ -21,117 +20,89 @@ from ..chance import generator
 from .linear import Linear, linear, point
 
 Array = np.ndarray
-MINIMISE = {"slsqp": slsqp.minimise, "least-squares": least_squares.minimise}
 
 
-@pytest.mark.parametrize("method", MINIMISE)
+def minimise(method: str, problem: Any, start: Array, tolerance: float) -> search.Descent:
+    return search.minimise(problem, start, tolerance, METHODS[method])
+
+
+@pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("box", [10.0, 0.3])
 def test_a_linear_problem_in_a_box_is_solved_in_a_few_steps(method: str, box: float) -> None:
     """At the least sum of squares in the box, whether its sides hold or not."""
     counts = []
     for key in range(5):
         problem = linear(key, box)
-        found = MINIMISE[method](problem, np.zeros(3), 1e-3)
+        found = minimise(method, problem, np.zeros(3), 1e-3)
         exact = lsq_linear(problem.J, problem.y, (problem.lower, problem.upper), method="bvls").x
         assert found.message == "converged"
         assert found.point.x == pytest.approx(exact, abs=2e-3)
         lowest = np.linalg.norm(problem.J @ exact - problem.y)
         assert found.point.objective == pytest.approx(lowest, abs=1e-6)
-        assert slsqp.projected_gradient(problem, found.point) <= 1e-3
+        assert search.projected_gradient(problem, found.point) <= 1e-3
         counts.append(len(problem.asked))
     assert max(counts) <= 15, counts
 
 
-@pytest.mark.parametrize("method", MINIMISE)
+@pytest.mark.parametrize("method", METHODS)
 def test_an_exact_fit_is_enough(method: str) -> None:
     """An objective of 1e-3 Hz is below every resolution: no step is taken from there."""
     for size, steps in ((0.99e-3, False), (1.01e-3, True)):
         problem: Any = Linear(np.eye(3), np.array([size, 0, 0]))
-        MINIMISE[method](problem, np.zeros(3), 1e-12)
+        minimise(method, problem, np.zeros(3), 1e-12)
         assert (len(problem.asked) > 1) == steps
 
 
-@pytest.mark.parametrize("method", MINIMISE)
+@pytest.mark.parametrize("method", METHODS)
 def test_where_nothing_is_lower_the_search_ends_and_says_so(method: str) -> None:
     """Slopes that promise what no step holds: it stops before its steps are used up, where it
     began."""
     problem = linear()
     problem.added = lambda x: 1e3 * bool(x.any())
-    found = MINIMISE[method](problem, np.zeros(3), 1e-6)
+    found = minimise(method, problem, np.zeros(3), 1e-6)
     assert "no lower objective along" in found.message
     assert not found.point.x.any()
     assert min(np.linalg.norm(x) for x in problem.asked if x.any()) < 1e-3  # however short
 
 
-@pytest.mark.parametrize("method", MINIMISE)
+@pytest.mark.parametrize("method", METHODS)
 def test_what_is_as_high_as_before_is_not_lower(method: str) -> None:
     """Residuals that stay what they are, to the last bit, whatever their slopes promise."""
     problem = linear()
     answer = problem.evaluate
     problem.evaluate = lambda x: replace(answer(x), residuals=-problem.y)
-    found = MINIMISE[method](problem, np.zeros(3), 1e-6)
+    found = minimise(method, problem, np.zeros(3), 1e-6)
     assert "no lower objective along" in found.message and not found.point.x.any()
 
 
-@pytest.mark.parametrize("method", MINIMISE)
+@pytest.mark.parametrize("method", METHODS)
 def test_a_step_beyond_what_has_a_solution_is_taken_back(method: str) -> None:
     """To its sixteenth at least: the wall stands at a tenth of the way."""
     problem: Any = Linear(np.eye(3), np.array([0.8, 0.4, 0.2]))
     problem.wall = lambda x: x[0] > 0.08
-    found = MINIMISE[method](problem, np.zeros(3), 1e-6)
+    found = minimise(method, problem, np.zeros(3), 1e-6)
     assert 0 < found.point.x[0] <= 0.08
     assert found.point.objective < np.linalg.norm(problem.y) - 0.04
-
-
-def test_a_damped_step_is_that_of_its_equations() -> None:
-    """min |r + J d|^2 + mu |d|^2 tr(J^T J) / v, in the box: where a side holds, the slope pushes
-    against it, and vanishes along all others."""
-    mu = 0.7
-    for key in range(3):
-        problem = linear(key)
-        x = generator("damped", key).uniform(-0.1, 0.1, 3)
-        at, weight = problem.evaluate(x), mu * np.sum(problem.J**2) / 3
-        free = np.linalg.solve(
-            problem.J.T @ problem.J + weight * np.eye(3), -problem.J.T @ at.residuals
-        )
-        assert least_squares._step(problem, at, mu) == pytest.approx(free, rel=1e-6)
-        problem.lower, problem.upper = x - 0.5 * abs(free).max(), x + 0.5 * abs(free).max()
-        d = least_squares._step(problem, at, mu)
-        slope = problem.J.T @ (at.residuals + problem.J @ d) + weight * d
-        low, high = x + d <= problem.lower + 1e-9, x + d >= problem.upper - 1e-9
-        assert (low | high).any()
-        assert abs(slope[~low & ~high]).max(initial=0) < 1e-6
-        assert (slope[low] > 0).all() and (slope[high] < 0).all()
-
-
-def test_damping_falls_with_success_so_that_steps_become_whole() -> None:
-    """Each leaves a smaller share of what is left than the one before: 11, 5, 1.3 and 0.3 %."""
-    J = np.vstack([np.diag([1.0, 2.0, 3.0]), np.ones(3)])
-    problem: Any = Linear(J, np.array([1.0, -1.0, 2.0, 0.5]))
-    least_squares.minimise(problem, np.full(3, 9.0), 1e-3)
-    exact = np.linalg.lstsq(problem.J, problem.y, rcond=None)[0]
-    off = [np.linalg.norm(x - exact) for x in problem.asked]
-    left = [b / a for a, b in pairwise(off)]
-    assert len(left) >= 4 and all(b < 0.5 * a for a, b in pairwise(left))
 
 
 def test_the_first_step_is_gauss_and_newtons_damped() -> None:
     problem = linear()
     at, none = problem.evaluate(np.zeros(3)), np.zeros((7, 3, 3))
     for damping in (0.1, 3.0):
-        step = slsqp._step(problem, at, none, damping, None)
+        step = gauss_newton._step(problem, at, none, damping, None)
         H = problem.J.T @ problem.J
         H += damping * np.trace(H) / 3 * np.eye(3)
         assert step == pytest.approx(np.linalg.solve(H, problem.J.T @ problem.y), abs=1e-6)
         gain = at.objective**2 - problem.evaluate(step).objective ** 2
-        assert slsqp.promised(at, none, step) == pytest.approx(gain)
+        assert gauss_newton.promised(at, none, step) == pytest.approx(gain)
 
 
-def test_a_step_that_promised_too_much_is_taken_shorter() -> None:
+@pytest.mark.parametrize("method", METHODS)
+def test_a_step_that_promised_too_much_is_taken_shorter(method: str) -> None:
     """Were it taken whole, it would be far worse than a part of it."""
     problem: Any = Linear(np.eye(1), np.array([1.0]))
     problem.added = lambda x: 20 * x * abs(x)
-    found = slsqp.minimise(problem, np.zeros(1), 1e-3)
+    found = minimise(method, problem, np.zeros(1), 1e-3)
     assert 0 < found.point.x[0] < 0.3 and found.point.objective < 1
 
 
@@ -144,26 +115,26 @@ def test_steps_learn_the_curvature() -> None:
             self.asked.append(x)
             return point(x, self.J @ x + H @ x @ x / 2 - self.y, self.J + H @ x)
 
-    asked: dict[str, list[int]] = {method: [] for method in MINIMISE}
+    designs: dict[str, list[int]] = {method: [] for method in METHODS}
     for key in range(5):
         random = generator("curved", key)
         H = random.normal(size=(7, 3, 3))
         H = 0.2 * (H + H.swapaxes(1, 2))
         J, y = random.normal(size=(7, 3)), 2 * random.normal(size=7)
         ends = []
-        for method, minimise in MINIMISE.items():
+        for method in METHODS:
             problem: Any = Curved(J, y)
-            found = minimise(problem, np.zeros(3), 1e-6)
+            found = minimise(method, problem, np.zeros(3), 1e-6)
             ends.append(found.point.objective)
-            asked[method].append(len(problem.asked))
+            designs[method].append(len(problem.asked))
         assert ends[0] == pytest.approx(ends[1], rel=1e-9)
-    assert sum(asked["slsqp"]) < 0.7 * sum(asked["least-squares"]), asked
+    assert sum(designs["gauss-newton"]) < 0.7 * sum(designs["slsqp"]), designs
 
 
 def test_what_pushes_against_a_bound_does_not_count() -> None:
     """At a bound, to 1e-9 of a coordinate, the gradient counts where it leads inside alone."""
     problem: Any = SimpleNamespace(lower=np.full(2, -1.0), upper=np.full(2, 1.0))
-    norm = lambda x, g: slsqp.projected_gradient(problem, point(x, [1.0], [g]))
+    norm = lambda x, g: search.projected_gradient(problem, point(x, [1.0], [g]))
     assert norm([0.0, 0.0], [3.0, 4.0]) == pytest.approx(5.0)
     for side in (-1.0, 1.0):
         held = side * (1 - 0.9e-9), 0.0

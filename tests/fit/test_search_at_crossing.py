@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tyrecal.studies.fit import slsqp
+from tyrecal.studies.fit import gauss_newton, search, slsqp
 from tyrecal.studies.fit.crossing import AXIAL, TORSIONAL, Crossing, crossing, gap
 from tyrecal.studies.fit.problem import Point, Problem
-from tyrecal.studies.fit.slsqp import _beyond_crossing
+from tyrecal.studies.fit.search import CrossingWatch, _designs_beyond
 from tyrecal.studies.fit.targets import Target
 from tyrecal.tyre.state import AS_THE_CASE
 
@@ -32,11 +32,12 @@ def pair(difference: float, clarity: float) -> dict:
 def test_a_crossing_bounds_where_the_gradient_is_normal_to_it() -> None:
     """To a tenth, and where the labels are mixed."""
     edge = Crossing(np.zeros(2), 0.0, np.array([3.0, 4.0]))
+    watch = CrossingWatch(Paired(np.eye(2), np.zeros(2)), None, edge)  # type: ignore[arg-type]
     normal, along = np.array([0.6, 0.8]), np.array([-0.8, 0.6])
 
     def bounded(share: float, clarity: float) -> bool:
         g = np.sqrt(1 - share**2) * normal + share * along
-        return slsqp._is_bounded(point([0, 0], [7.0], [7.0 * g], pair(0.1, clarity)), edge)
+        return watch.bounds(point([0, 0], [7.0], [7.0 * g], pair(0.1, clarity)))
 
     assert bounded(0.09, 0.29) and bounded(-0.09, 0.0)
     assert not bounded(0.11, 0.29) and not bounded(-0.11, 0.29) and not bounded(0.09, 0.31)
@@ -48,8 +49,9 @@ class Paired(Linear):
     targets = (Target(AXIAL, 40.0), Target(TORSIONAL, 40.0))
 
 
+@pytest.mark.parametrize("method", [slsqp, gauss_newton])
 def test_no_crossing_is_looked_for_where_no_design_lies_beyond(
-    monkeypatch: pytest.MonkeyPatch,
+    method: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """However mixed the labels are."""
 
@@ -57,10 +59,11 @@ def test_no_crossing_is_looked_for_where_no_design_lies_beyond(
         def evaluate(self, x: Array) -> Point:
             return replace(super().evaluate(x), states=pair(3.0, 0.1))
 
-    monkeypatch.setattr(slsqp, "crossing", lambda *asked: pytest.fail("looked for one"))
+    for module in (search, gauss_newton):
+        monkeypatch.setattr(module, "crossing", lambda *given: pytest.fail("looked for one"))
     plain = linear()
     problem: Any = OneSided(plain.J, plain.J @ [1.0, 2.0, 3.0] - 0.3)
-    assert slsqp._descend(problem, problem.evaluate(np.zeros(3)), 1e-3).message == "converged"
+    assert method.descend(problem, problem.evaluate(np.zeros(3)), 1e-3).message == "converged"
 
 
 def test_a_step_that_meets_the_crossing_leaves_it_some_room() -> None:
@@ -69,9 +72,9 @@ def test_a_step_that_meets_the_crossing_leaves_it_some_room() -> None:
         problem: Any = Paired(np.eye(2), np.array([-4.0 * side, 1.0]))
         at = point([side, 0.0], problem.J @ [side, 0.0] - problem.y, problem.J, pair(2 * side, 0.1))
         edge = Crossing(at.x, 2 * side, np.array([2.0, 0.0]))
-        step = slsqp._step(problem, at, np.zeros((2, 2, 2)), 1e-6, edge)
+        step = gauss_newton._step(problem, at, np.zeros((2, 2, 2)), 1e-6, edge)
         assert side * edge.at(at.x + step) == pytest.approx(0.1 * 2, abs=1e-6)
-        free = slsqp._step(problem, at, np.zeros((2, 2, 2)), 1e-6, None)
+        free = gauss_newton._step(problem, at, np.zeros((2, 2, 2)), 1e-6, None)
         assert side * (at.x + free)[0] == pytest.approx(-4, rel=1e-3)
 
 
@@ -82,16 +85,16 @@ def test_designs_beyond_a_crossing_are_reached_by_the_least_change_of_the_residu
         problem: Any = Paired(linear().J, np.zeros(7))
         at = point([0.1, 0.2, 0.3], np.ones(7), problem.J, pair(3 * side, 0.1))
         edge = Crossing(np.zeros(3), 2.5 * side, np.array([1.0, -2.0, 3.0]))
-        found = list(slsqp._beyond_crossing(problem, at, edge))
+        found = list(_designs_beyond(problem, at, edge))
         assert [side * edge.at(x) for x in found] == pytest.approx([-1.0, -2.0, -4.0])
         for x in found:
             push = problem.J.T @ problem.J @ (x - at.x)
             cosine = push @ edge.slopes / np.linalg.norm(push) / np.linalg.norm(edge.slopes)
             assert abs(cosine) > 1 - 1e-4
         problem.upper = problem.lower + 10.3
-        assert all((x <= problem.upper).all() for x in slsqp._beyond_crossing(problem, at, edge))
+        assert all((x <= problem.upper).all() for x in _designs_beyond(problem, at, edge))
     nowhere = Crossing(np.zeros(3), 2.5, np.zeros(3))
-    assert list(slsqp._beyond_crossing(problem, at, nowhere)) == []
+    assert list(_designs_beyond(problem, at, nowhere)) == []
 
 
 def test_slopes_are_taken_from_where_labels_are_clear() -> None:
@@ -110,7 +113,7 @@ def test_slopes_are_taken_from_where_labels_are_clear() -> None:
 
 def test_no_crossing_is_looked_for_where_the_pair_has_no_weight() -> None:
     problem = Problem(with_targets(weight=[0.0, 0.0] + [1.0] * 7), evaluator())  # type: ignore[arg-type]
-    assert list(_beyond_crossing(problem, problem.evaluate(problem.start()))) == []
+    assert list(_designs_beyond(problem, problem.evaluate(problem.start()))) == []
 
 
 @pytest.mark.parametrize("weights", [[1.0] * 9, [4.0, 0.25, *[1.0] * 7]])

@@ -16,15 +16,13 @@ from ...tyre.case import LoadedCase
 from ...tyre.case.schema import cannot_fit
 from ..fitted import pressure_name
 from ..result import csv_text
-from . import least_squares, slsqp
+from . import gauss_newton, slsqp
 from .problem import Point, Problem
 from .result import FitResult, StartReport, fit_result
+from .search import AT_CROSSING, Descend, is_converged, minimise
 
 Array = np.ndarray
-METHODS: dict[str, Callable[[Problem, Array, float], slsqp.Descent]] = {
-    "slsqp": slsqp.minimise,
-    "least-squares": least_squares.minimise,
-}
+METHODS: dict[str, Descend] = {"slsqp": slsqp.descend, "gauss-newton": gauss_newton.descend}
 TOLERANCE = 1e-3  # projected gradient, Hz per unit of a logarithm: 1e-5 Hz for a change of 1 %
 SLOPE_NOISE_HZ = 50.0  # differences of a step that suits the digits: this times the step
 SLOPE_ERROR = 1e-4  # of d ln q / d x of areas and stiffnesses, by the curvature within a step
@@ -116,9 +114,9 @@ def check(problem: Problem) -> None:
 def _run(problem: Problem, start: Array, method: str) -> StartReport:
     first = problem.evaluate(start)
     tolerance = _tolerance(problem)
-    outcome = METHODS[method](problem, start, tolerance)
-    converged = slsqp.is_converged(problem, outcome.point, max(10 * TOLERANCE, tolerance))
-    converged = converged or outcome.message == slsqp.AT_CROSSING
+    outcome = minimise(problem, start, tolerance, METHODS[method])
+    converged = is_converged(problem, outcome.point, max(10 * TOLERANCE, tolerance))
+    converged = converged or outcome.message == AT_CROSSING
     values, history = dict(first.values), _history(problem)
     return StartReport(values, outcome.point, outcome.message, converged, history)
 

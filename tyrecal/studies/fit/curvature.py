@@ -1,4 +1,4 @@
-"""The residuals' curvature, from how their slopes change between designs, and the step with it.
+"""The step of `gauss_newton`, with the curvature that changes of the residuals' slopes tell.
 
     r(x + d) ~ r + J d + d^T C d / 2
 
@@ -12,13 +12,13 @@ the designs where a fit starts far off or its residuals do not vanish.
 from __future__ import annotations
 
 import numpy as np
-
-from .damped_step import quadratic_step
+from scipy.optimize import nnls
 
 Array = np.ndarray
 MOST_NEWTON_STEPS = 20  # on the model, which no evaluation is asked for
 LEAST_MOVE = 1e-7  # of a coordinate
 MOST_HALVINGS = 12
+ROUND_OFF = 1e-12  # of numbers of the order of 1
 
 
 def with_secant(C: Array, s: Array, change: Array) -> Array:
@@ -57,3 +57,23 @@ def curved_step(J: Array, r: Array, C: Array, damping: float, G: Array, h: Array
         if abs(move).max() < LEAST_MOVE:
             break
     return d
+
+
+def quadratic_step(H: Array, g: Array, size: float, G: Array, h: Array) -> Array:
+    """d (v,) of the least g . d + d . H d / 2 where G d >= h; ``size`` F of the residuals. In
+    coordinates y, d = F H^(-1/2) y, it is the point of the polyhedron nearest to the free step.
+
+    Raises LinAlgError where H is not positive definite."""
+    turn = size * np.linalg.inv(np.linalg.cholesky(H)).T
+    return np.asarray(turn @ nearest(-turn.T @ g / size**2, G @ turn, h))
+
+
+def nearest(to: Array, G: Array, h: Array) -> Array:
+    """y (n,) with G y >= h that is nearest to a point; 0 where there is none (Lawson and Hanson,
+    Solving Least Squares Problems, sec. 23.4, algorithm LDP)."""
+    E = np.vstack([G.T, h - G @ to])
+    last = np.eye(len(E))[-1]
+    residual = E @ nnls(E, last)[0] - last
+    if abs(residual[-1]) < ROUND_OFF:
+        return np.zeros(len(to))
+    return np.asarray(to - residual[:-1] / residual[-1])

@@ -26,8 +26,8 @@ from ..result import (
     in_lines,
     state_words,
 )
-from . import slsqp
 from .problem import Point, Problem
+from .search import projected_gradient
 from .states import next_states, plain, state_reports
 from .targets import objective_unit
 from .uncertainty import FitUncertainty, uncertainty
@@ -355,7 +355,7 @@ def fit_result(
         "converged": best.converged,
         "moved": float(abs(point.x - initial.x).max()) > MIN_STEP,
         "message": best.message,
-        "projected_gradient_norm": slsqp.projected_gradient(problem, point),
+        "projected_gradient_norm": projected_gradient(problem, point),
         "label_margin": point.clarity,
         "variables": _variables(problem, initial, point, known),
         "fixed": dict(problem.fixed),

@@ -1,185 +1,130 @@
-"""Sequential least-squares quadratic programming on the design variables.
+"""Sequential least-squares quadratic programming: SciPy's SLSQP, `scipy.optimize.minimize`.
 
-Each step minimises a model of second order of the residuals, with the curvature that the designs
-seen so far tell (`curvature`), within the bounds, damped as Levenberg and Marquardt's are, by how
-much of the promised decrease comes true (Nocedal and Wright, Numerical Optimization, ch. 10 and
-18). Its first Hessian is Gauss and Newton's: raw variables of sizes 1e-7 and 1e6 would stop a
-quasi-Newton method at its start, and an identity would send it to the bounds.
+SLSQP (Kraft, DFVLR-FB 88-28) starts with a unit matrix as Hessian. Here it minimises
+F^2 / (2 F0^2) by coordinates y with x = x0 + F0 L^-T y and L L^T = J0^T J0, whose Hessian at the
+start x0 is the unit matrix but for the residuals' curvature. Without this scaling its first steps
+lead to the bounds. The bounds and the crossing of the two [0, 0] modes are linear inequalities.
+
+A design that cannot be evaluated has an infinite objective, from which SLSQP's line search steps
+back. It is started again, from the best design, where a step has found the crossing in its way or
+the line search has come to an end.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
-
 import numpy as np
+from scipy.optimize import minimize
 
 from ...simulate.evaluate.failure import EvaluationFailed
-from .crossing import MIXED, TELLING, Crossing, crossing, gap, order, pair_clarity
-from .curvature import curved_step, foreseen, with_secant
 from .problem import Point, Problem
+from .search import (
+    AT_CROSSING,
+    CONVERGED,
+    DAMPING,
+    EXACT,
+    LEAST_GAIN,
+    MOST_DESIGNS,
+    NO_LOWER,
+    USED_UP,
+    CrossingWatch,
+    Descent,
+    is_converged,
+    room_to_move,
+)
 
 Array = np.ndarray
-MOST_DESIGNS = 100
-EXACT = 1e-3  # Hz, an objective below every measurement's resolution
-LEAST_GAIN = 1e-9  # of the squared objective, promised by a step: below, none is lower
-DAMPING, LEAST_DAMPING = 0.01, 1e-6  # mu over the mean diagonal of J^T J, at first and at last
-KEPT_WELL, KEPT_BADLY = 0.7, 0.25  # shares of a promised decrease: above mu falls, below it rises
-HALVINGS = 5  # of a step towards a design without a solution
-ROOM = 0.1  # of the gap of the [0, 0] modes, between a bounded step and where labels change places
-CREEPING = 3e-4  # of the objective, less than ROOM costs: a gain that is not worth another step
-ALONG = 0.1  # of the gradient: as much along the crossing counts as none
-AT_CROSSING = "the two [0,0] modes meet: beyond, labels change places and the objective is higher"
-CAME_BACK = "came back over the crossing of the two [0,0] modes"
+LEAST_CHANGE = 1e-15  # of F^2 / (2 F0^2), by which SLSQP stops: the gradient ends a search before
 
 
-@dataclass(frozen=True)
-class Descent:
-    """Where an optimiser stopped, in its own words why, and the crossing that bounds it."""
-
-    point: Point
-    message: str
-    edge: Crossing | None = None
+class _Ended(Exception):
+    """Ends a run of SLSQP before its own criteria do; the reason in words, "" to start again."""
 
 
-def minimise(problem: Problem, start: Array, tolerance: float) -> Descent:
-    """Minimise the objective from ``start`` until the projected gradient is below ``tolerance``.
+class _Run:
+    """One run of SLSQP from ``best``, which it moves; ``left``: designs that it may evaluate."""
 
-    Where the search ends with the two [0, 0] modes mixed, it is held by their crossing, at which
-    the labels change places and the objective jumps; then the other side is searched too. Where
-    that is higher, the design is a minimum: the jump bounds it.
+    def __init__(
+        self, problem: Problem, start: Point, tolerance: float, watch: CrossingWatch, left: int
+    ):
+        self.problem, self.tolerance, self.watch, self.left = problem, tolerance, watch, left
+        self.start = self.best = start
+        H = start.jacobian.T @ start.jacobian
+        H[np.diag_indices(len(H))] += DAMPING * np.trace(H) / len(H)
+        self.F0 = max(start.objective, EXACT)
+        self.T = self.F0 * np.linalg.inv(np.linalg.cholesky(H)).T  # dx/dy (variables, variables)
+        self.edge = watch.edge
+        self.now: Point | None = None
 
-    Raises EvaluationFailed when the start itself cannot be evaluated.
-    """
-    best = _descend(problem, problem.evaluate(start), tolerance)
-    if pair_clarity(best.point) < MIXED:
-        for across in _beyond_crossing(problem, best.point, best.edge):
-            try:
-                there = problem.evaluate(across)
-            except EvaluationFailed:
-                continue
-            other = _descend(problem, there, tolerance, best.point)
-            if other.message != CAME_BACK and other.point.objective < best.point.objective:
-                best = other
-                break
-    return best
+    def descend(self) -> str:
+        """Run SLSQP; why the search ends, "" where another run may go on from ``best``."""
+        G, h = room_to_move(self.problem, self.start, self.edge)
+        h = np.minimum(h, 0.0)  # the start is inside, whatever the crossing's model says
+        inside = {"type": "ineq", "fun": lambda y: G @ self.T @ y - h, "jac": lambda y: G @ self.T}
+        try:
+            minimize(
+                self.objective,
+                np.zeros(len(self.start.x)),
+                jac=self.gradient,
+                method="SLSQP",
+                constraints=[inside],
+                options={"ftol": LEAST_CHANGE, "maxiter": MOST_DESIGNS},
+            )
+        except _Ended as end:
+            return str(end)
+        return ""
+
+    def evaluate(self, y: Array) -> Point:
+        """Raises EvaluationFailed."""
+        x = self.start.x + self.T @ y
+        return self.problem.evaluate(np.clip(x, self.problem.lower, self.problem.upper))
+
+    def objective(self, y: Array) -> float:
+        """F^2 / (2 F0^2). Raises _Ended."""
+        self.left -= 1
+        try:
+            point = self.evaluate(y)
+        except EvaluationFailed:
+            if self.left <= 0:
+                raise _Ended(USED_UP) from None
+            return np.inf
+        end = self.watch.judge(self.best, point)
+        self.best = min(self.best, point, key=lambda p: p.objective)
+        if end or self.left <= 0:
+            raise _Ended(end or USED_UP)
+        edge_moved = self.watch.edge is not self.edge
+        if edge_moved or is_converged(self.problem, self.best, self.tolerance):
+            raise _Ended
+        return 0.5 * (point.objective / self.F0) ** 2
+
+    def gradient(self, y: Array) -> Array:
+        """The objective's gradient at a design that SLSQP accepts. Raises _Ended if it is no lower
+        than the one before."""
+        try:
+            point = self.evaluate(y)
+        except EvaluationFailed:  # the line search has given up
+            raise _Ended from None
+        if self.now and point.objective >= self.now.objective:
+            raise _Ended
+        self.now = point
+        return self.T.T @ point.jacobian.T @ point.residuals / self.F0**2
 
 
-def projected_gradient(problem: Problem, point: Point) -> float:
-    """Norm of dF/dx without what pushes against a bound, Hz per unit of x."""
-    g = point.gradient.copy()
-    g[(point.x <= problem.lower + 1e-9) & (g > 0)] = 0.0
-    g[(point.x >= problem.upper - 1e-9) & (g < 0)] = 0.0
-    return float(np.linalg.norm(g))
-
-
-def is_converged(problem: Problem, point: Point, tolerance: float) -> bool:
-    """Whether no admissible change lowers the objective, or the fit is exact for all purposes."""
-    return point.objective <= EXACT or projected_gradient(problem, point) <= tolerance
-
-
-def _descend(
+def descend(
     problem: Problem, point: Point, tolerance: float, known: Point | None = None
 ) -> Descent:
-    """SLSQP from ``point`` to its end, or back on the side of ``known``, no lower."""
-    damping, message = DAMPING, "designs used up"
-    curvature = np.zeros((*point.jacobian.shape, len(point.x)))
-    edge: Crossing | None = None
-    for _ in range(MOST_DESIGNS):
+    """Lower the objective from ``point``; ``known``: see `CrossingWatch`."""
+    watch, left = CrossingWatch(problem, known), MOST_DESIGNS
+    while not is_converged(problem, point, tolerance):
+        run = _Run(problem, point, tolerance, watch, left)
+        end = run.descend()
+        gain = point.objective**2 - run.best.objective**2
+        point, left = run.best, run.left
         if is_converged(problem, point, tolerance):
-            return Descent(point, "converged")
-        step = _step(problem, point, curvature, damping, edge)
-        if promised(point, curvature, step) <= LEAST_GAIN * max(point.objective, EXACT) ** 2:
-            return Descent(point, "no lower objective along the search direction", edge)
-        there = first_solvable(problem, point, step)
-        if there is None:
-            damping *= 4
-            continue
-        seen = [point, there]
-        reached = min(seen, key=lambda p: p.objective)
-        side = order(problem, reached)
-        back = known is not None and side == order(problem, known)
-        if known and back and reached.objective >= (1 - CREEPING) * known.objective:
-            return Descent(reached, CAME_BACK)
-        if side != order(problem, point):
-            edge = None
-        elif edge or (
-            any(order(problem, p) != side for p in seen) and min(map(pair_clarity, seen)) < MIXED
-        ):
-            edge = crossing(problem, seen, reached) or edge
-        creeping = point.objective - reached.objective <= CREEPING * point.objective
-        if edge and creeping and _is_bounded(reached, edge):
-            return Descent(reached, AT_CROSSING, edge)
-        change, gain = there.x - point.x, point.objective**2 - there.objective**2
-        wanted = promised(point, curvature, change)
-        if not gain >= KEPT_BADLY * wanted:
-            damping *= 4
-        elif gain > KEPT_WELL * wanted:
-            damping = max(0.1 * damping, LEAST_DAMPING)
-        curvature = with_secant(curvature, change, there.jacobian - point.jacobian)
-        point = reached
-    return Descent(point, message, edge)
-
-
-def _is_bounded(point: Point, edge: Crossing) -> bool:
-    """Whether the labels are about to change places and the gradient is normal to where they do,
-    as it is at any bound that holds."""
-    normal = edge.slopes / max(float(np.linalg.norm(edge.slopes)), 1e-300)
-    along = np.linalg.norm(point.gradient - (point.gradient @ normal) * normal)
-    near = pair_clarity(point, edge.state) < TELLING
-    return near and bool(along <= ALONG * np.linalg.norm(point.gradient))
-
-
-def promised(point: Point, curvature: Array, change: Array) -> float:
-    """By how much F^2 falls by the model."""
-    r = foreseen(point.jacobian, point.residuals, curvature, change)
-    return float(point.objective**2 - r @ r)
-
-
-def first_solvable(problem: Problem, point: Point, step: Array) -> Point | None:
-    """The first design with a solution on the way back along ``step``, halved each time."""
-    for halvings in range(HALVINGS):
-        x = point.x + step / 2**halvings
-        try:
-            return problem.evaluate(np.clip(x, problem.lower, problem.upper))
-        except EvaluationFailed:
-            continue
-    return None
-
-
-def _step(
-    problem: Problem, point: Point, curvature: Array, damping: float, edge: Crossing | None
-) -> Array:
-    """The step on this side of ``edge``."""
-    n = len(point.x)
-    G, h = np.vstack([np.eye(n), -np.eye(n)]), [problem.lower - point.x, point.x - problem.upper]
-    if edge:
-        apart = gap(point, edge.state)
-        side = np.sign(apart)
-        G = np.vstack([G, side * edge.slopes])
-        h.append(np.array([ROOM * abs(apart) - side * edge.at(point.x)]))
-    J, r = point.jacobian, point.residuals
-    return curved_step(J, r, curvature, damping, G, np.concatenate(h))
-
-
-def _beyond_crossing(
-    problem: Problem, point: Point, edge: Crossing | None = None
-) -> Iterator[Array]:
-    """Designs on the other side of the [0, 0] modes' crossing, the nearest in the metric first.
-
-    d of the crossing, see there, is carried to the other side of 0 with the least change of the
-    residuals: dx = -(d +- wanted) H^-1 grad d / (grad d . H^-1 grad d).
-    """
-    edge = edge or crossing(problem, [point], point)
-    if edge is None:
-        return
-    side = np.sign(gap(point, edge.state))
-    H = point.jacobian.T @ point.jacobian
-    H[np.diag_indices(len(H))] += 1e-3 * np.trace(H) / len(H)
-    direction = np.linalg.solve(H, edge.slopes)
-    rise = float(edge.slopes @ direction)
-    if rise < 1e-12 * (edge.slopes @ edge.slopes + 1e-300):
-        return
-    for wanted in (1.0, 2.0, 4.0):  # Hz beyond
-        change = -(edge.at(point.x) + side * wanted) * direction / rise
-        yield np.clip(point.x + change, problem.lower, problem.upper)
+            break
+        if not end and watch.bounds(point):
+            end = AT_CROSSING
+        if not end and gain <= LEAST_GAIN * point.objective**2 and watch.edge is run.edge:
+            end = NO_LOWER
+        if end:
+            return Descent(point, end, watch.edge)
+    return Descent(point, CONVERGED)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.optimize import minimize, nnls
+from scipy.optimize import minimize
 
-from tyrecal.studies.fit.damped_step import damped_step, nearest, non_negative
+from tyrecal.studies.fit.curvature import nearest, quadratic_step
 
 from ..chance import generator
 
@@ -26,15 +26,6 @@ def test_the_nearest_point_is_that_of_its_conditions() -> None:
         u = np.linalg.lstsq(G[on].T, y - to, rcond=None)[0]
         assert G[on].T @ u == pytest.approx(y - to, abs=1e-9) and (u > -1e-9).all()
     assert {0, 1, 2} <= held
-
-
-def test_multipliers_are_never_negative_and_the_rest_least() -> None:
-    for key in range(40):
-        random = generator("non-negative", key)
-        E, f = random.normal(size=(4, 7)), random.normal(size=4)
-        u = non_negative(E, f)
-        assert (u >= 0).all()
-        assert np.linalg.norm(E @ u - f) == pytest.approx(nnls(E, f)[1], abs=1e-9)
 
 
 def test_no_step_is_taken_where_no_point_is_inside() -> None:
@@ -61,5 +52,5 @@ def test_a_step_is_the_first_of_slsqp(size: float, key: int) -> None:
         constraints=[inside],
         options={"maxiter": 1, "ftol": 1e-15},
     )
-    step = damped_step(J * size, r * size, 0.2, G, h)
+    step = quadratic_step(H * size**2, J.T @ r * size**2, size * np.linalg.norm(r), G, h)
     assert step == pytest.approx(turn @ found.x, abs=1e-9)
