@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from importlib.resources import files
 from pathlib import Path
 
 import pytest
 
+from tyrecal.simulate.deck.apart import TO_START, Apart
 from tyrecal.simulate.deck.decks import Decks
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
@@ -216,6 +218,37 @@ def test_own_templates_give_the_same_bytes(
     plain = Decks(TyreDesign(load_case(CASES / "p235_75r17.yaml"))).texts("abaqus")
     own = case_with_template(case_folder, "inflate.inp.j2", "*HEADING\n", "*HEADING\n")
     assert Decks(TyreDesign(own)).texts("abaqus") == plain
+
+
+class Hole:
+    """A value that is computed in the process that renders, as by a way out of the sandbox."""
+
+    def __init__(self, expression: str):
+        self.expression = expression
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return eval, (self.expression,)
+
+
+@pytest.mark.parametrize(
+    "expression",
+    [
+        "str(dict(__import__('os').environ))",
+        "__import__('pathlib').Path('/proc/self/environ').read_text()",
+    ],
+)
+def test_a_template_that_leaves_its_sandbox_reads_no_environment(
+    case_folder: Path, monkeypatch: pytest.MonkeyPatch, expression: str
+) -> None:
+    monkeypatch.setenv("SECRET_TOKEN", "hunter2")
+    for name in TO_START:
+        monkeypatch.delenv(name, raising=False)
+    (case_folder / "environ.j2").write_text("{{ environ }}")
+    with ThreadPoolExecutor(1) as thread:  # which gets a process of its own
+        rendered = thread.submit(
+            Apart("abaqus", case_folder).render, "environ.j2", {"environ": Hole(expression)}
+        )
+        assert rendered.result() in ("", "{'OPENBLAS_NUM_THREADS': '1'}")
 
 
 @pytest.mark.parametrize(

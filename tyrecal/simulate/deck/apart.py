@@ -2,6 +2,8 @@
 
 A template may loop for ever, or ask for all memory in one expression: nothing in this process could
 end that, in a thread or on Windows. The process is kept for the next deck, and ends with this one.
+It inherits no environment variables: they may hold the user's passwords, and decks are sent to
+others.
 """
 
 from __future__ import annotations
@@ -22,6 +24,8 @@ CPU_S, WALL_S = 5, 60.0  # of one template; shipped ones take a tenth of a secon
 MEMORY = 2_000_000_000  # bytes of address space, where the system limits it
 MAX_TEXT_BYTES = 50_000_000  # bytes of text
 GOOD, BAD = b"+", b"-"
+# without these some interpreters do not start; the process forgets them before it renders
+TO_START = ("SYSTEMROOT", "LD_LIBRARY_PATH", "DYLD_LIBRARY_PATH", "PYTHONHOME")
 _own = threading.local()
 
 
@@ -65,13 +69,15 @@ def _process() -> subprocess.Popen[bytes]:
     """This thread's process; another one after a fork, or where it has ended."""
     process: subprocess.Popen[bytes] | None = getattr(_own, "process", None)
     if process is None or _own.pid != os.getpid() or process.poll() is not None:
+        places = sys.path if sys.flags.safe_path else sys.path[1:]  # PYTHONPATH is not inherited
+        code = f"import sys; sys.path = {places!r}; from {__name__} import serve; serve()"
         process = subprocess.Popen(
             # -P: what lies in the present folder, perhaps a stranger's, is not imported
-            [sys.executable, "-P", "-c", f"from {__name__} import serve; serve()"],
+            [sys.executable, "-P", "-c", code],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
-            env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
+            env={name: os.environ[name] for name in TO_START if name in os.environ},
             start_new_session=True,  # Ctrl-C is for this process, and ends that one too
         )
         _own.process, _own.pid = process, os.getpid()
@@ -105,6 +111,8 @@ def _exactly(stream: IO[bytes], count: int) -> bytes:
 
 def serve() -> None:
     """What the process apart does: texts of templates, until nobody asks any more."""
+    os.environ.clear()
+    os.environ["OPENBLAS_NUM_THREADS"] = "1"  # each thread reserves some of MEMORY
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # whatever is printed is no answer
     while True:
