@@ -16,7 +16,11 @@ import tyrecal
 
 from .conftest import ROOT
 
-SETUP = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]
+# tyrecal is on no package index: one that has the name would install a stranger's project
+BY_NAME = re.compile(r"""pip3? install(?: +-\S+)* +["']?tyrecal|["']tyrecal\[""")
+TEXTS = {".py", ".md", ".j2", ".yaml", ".yml", ".toml", ".sh", ".ipynb"}
+PYPROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
+PROJECT, SETUP = PYPROJECT["project"], PYPROJECT["tool"]["setuptools"]
 ASIDE = {"__pycache__", ".mypy_cache", ".ruff_cache"}
 FOLDERS = {name: ROOT / folder for name, folder in SETUP["package-dir"].items()}
 
@@ -52,7 +56,7 @@ def test_every_file_of_a_package_ships() -> None:
 
 
 def core() -> list[metadata.Distribution]:
-    """What 'pip install tyrecal' installs: tyrecal, all it needs, all that those need."""
+    """What `pip install .` installs: tyrecal, all it needs, all that those need."""
     found: dict[str, metadata.Distribution] = {}
     waiting = [Requirement("tyrecal")]
     while waiting:
@@ -80,6 +84,22 @@ def test_no_part_of_the_core_is_under_the_gpl(distribution: metadata.Distributio
     assert not re.search(r"\bA?GPL|(?<!Lesser )General Public License", said), said
 
 
+def test_no_text_installs_tyrecal_by_its_name() -> None:
+    assert BY_NAME.search("pip install -q tyrecal") and BY_NAME.search("'tyrecal[sample]'")
+    texts = [ROOT / "README.md", ROOT / "pyproject.toml", ROOT / "CHANGELOG.md", ROOT / ".ci/run"]
+    for folder in ("tyrecal", "solvers", "templates", "cases", "tests", ".github"):
+        texts += [p for p in (ROOT / folder).rglob("*") if p.suffix in TEXTS]
+    for path in texts:
+        if path != Path(__file__):
+            assert not BY_NAME.search(path.read_text(encoding="utf-8")), path
+
+
+def test_developers_have_every_extra() -> None:
+    extras = PROJECT["optional-dependencies"]
+    assert {"cluster", "sample", "dev"} == set(extras)
+    assert {*extras["cluster"], *extras["sample"]} <= set(extras["dev"])
+
+
 def test_the_core_takes_at_most_350_megabytes() -> None:
     """All files of the core, compiled ones too; pip and setuptools belong to the environment."""
     size = sum(
@@ -99,11 +119,10 @@ def test_heavy_packages_of_the_tests_are_not_in_the_core() -> None:
 def test_the_citation_is_one() -> None:
     """The fields that CFF 1.2.0 requires, and the facts of pyproject.toml."""
     told = YAML(typ="safe").load((ROOT / "CITATION.cff").read_text())
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     assert told["cff-version"] == "1.2.0" and told["message"] and told["type"] == "software"
-    assert told["title"].startswith(project["name"] + ":")
-    assert told["version"] == project["version"] == tyrecal.__version__
-    assert told["license"] == "MIT" == project["license"]["text"]
+    assert told["title"].startswith(PROJECT["name"] + ":")
+    assert told["version"] == PROJECT["version"] == tyrecal.__version__
+    assert told["license"] == "MIT" == PROJECT["license"]["text"]
     assert (ROOT / "LICENSE").read_text().startswith("MIT License\n")
     assert told["abstract"] and told["keywords"]
     for work in [told, *told["references"]]:

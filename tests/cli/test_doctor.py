@@ -47,7 +47,7 @@ def test_packages_that_are_missing_or_old(
     printed = capsys.readouterr()
     assert "numpy must be >=99, it is " in printed.err
     assert "no-such-package must be >=1, it is not installed" in printed.err
-    assert "missing no-such-either: pip install 'tyrecal[more]'" in printed.out
+    assert "missing no-such-either: pip install '.[more]' in a clone of tyrecal" in printed.out
 
 
 def test_a_solver_that_does_not_answer(capsys: pytest.CaptureFixture[str]) -> None:

@@ -133,5 +133,5 @@ def test_a_missing_emcee_is_one_sentence_before_anything_is_written(
     monkeypatch.setitem(sys.modules, "emcee", None)
     assert run("sample", CASE, "--output", str(tmp_path / "out")) == 2
     said = capsys.readouterr().err
-    assert said.count("\n") == 1 and "pip install 'tyrecal[sample]'" in said
+    assert said.count("\n") == 1 and "pip install '.[sample]'" in said
     assert not (tmp_path / "out").exists()

@@ -178,5 +178,5 @@ def test_an_optimum_at_the_edge_of_the_box_is_held_there() -> None:
 
 def test_a_missing_emcee_is_told_in_one_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "emcee", None)
-    with pytest.raises(InputError, match=r"needs the package emcee.*pip install 'tyrecal\[sample]"):
+    with pytest.raises(InputError, match=r"needs the package emcee.*pip install '\.\[sample]"):
         needs_emcee()

@@ -93,7 +93,7 @@ def _words(found: dict[str, Any]) -> list[str]:
         "packages: " + ", ".join(f"{p['name']} {p['version']}" for p in found["packages"]),
     ]
     for extra in found["extras"]:
-        there = f"missing {', '.join(extra['missing'])}: {extra['install']}"
+        there = f"missing {', '.join(extra['missing'])}: {extra['install']} in a clone of tyrecal"
         lines.append(f"  [{extra['name']}] " + (there if extra["missing"] else "installed"))
     lines += ["", f"settings: {settings_words(found['settings'])}", "", "solvers:"]
     for solver in found["solvers"]:

@@ -178,7 +178,7 @@ scheduler = click.option(
     default="",
     metavar="ADDRESS|FILE",
     help="Have the workers of a Dask scheduler do it: its address, or a settings file (.yaml) for"
-    " jobs of SLURM or PBS. Needs the extra tyrecal[cluster].",
+    " jobs of SLURM or PBS. Needs Dask: run pip install '.[cluster]' in a clone of tyrecal.",
 )
 
 

@@ -23,12 +23,13 @@ def packages() -> list[dict[str, Any]]:
 
 
 def extras() -> list[dict[str, Any]]:
-    """What can be added: ``name``, ``missing`` packages, ``install``, the command for them."""
+    """What can be added: ``name``, ``missing`` packages, ``install``, the command for
+    them in a clone of tyrecal: no package index has it."""
     named = {extra for text in _all() for extra in re.findall(r"extra == ['\"](.+?)['\"]", text)}
     entries = []
     for extra in sorted(named):
         missing = [e["name"] for e in map(_found, _required(extra)) if not e["ok"]]
-        install = f"pip install 'tyrecal[{extra}]'"
+        install = f"pip install '.[{extra}]'"
         entries.append({"name": extra, "missing": missing, "install": install})
     return entries
 

@@ -31,7 +31,7 @@ SPARE_STEPS = 1.5  # of draws that would be enough: a short chain's tau is too s
 TRIES = 100  # of walkers to begin within the box
 MISSING = (
     "tyrecal sample needs the package emcee, which is not installed here:"
-    " pip install 'tyrecal[sample]'"
+    " run pip install '.[sample]' in a clone of tyrecal"
 )
 
 
