@@ -217,5 +217,5 @@ def test_no_scheduler_there(
 
 def test_without_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)
-    with pytest.raises(SolverUnavailable, match=r"tyrecal\[cluster\]"), connected("tcp://x:1"):
+    with pytest.raises(SolverUnavailable, match=r"'\.\[cluster\]'"), connected("tcp://x:1"):
         pass

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -9,7 +10,9 @@ from typing import Any
 import pytest
 from ruamel.yaml import YAML
 
-from tyrecal.tyre.case import LoadedCase, number_at, with_level
+from tyrecal.errors import InputError
+from tyrecal.studies.fitted import read_fitted
+from tyrecal.tyre.case import LoadedCase, number_at, start_values, with_level
 from tyrecal.tyre.case.identity import is_of_tyre, tyre_sha256
 from tyrecal.tyre.effects import catalogue
 from tyrecal.tyre.load import load_case
@@ -253,3 +256,37 @@ def test_a_section_from_an_outline(tmp_path: Path) -> None:
     assert tyre_sha256(written(tmp_path, renamed, DRAWN)) == plain
     (tmp_path / "curves.csv").write_text(_nudged(curves.splitlines()))
     assert tyre_sha256(written(tmp_path, outlined, DRAWN)) != plain
+
+
+def test_the_text_of_own_templates(tmp_path: Path, case: LoadedCase) -> None:
+    """Every file that a template can include counts, and no other in their folder."""
+    own = tmp_path / "own"
+    (own / "parts").mkdir(parents=True)
+
+    loaded = written(tmp_path, lambda data: data.update(templates="own"))
+    assert tyre_sha256(loaded) == tyre_sha256(case)  # it has none yet
+    hashes = [tyre_sha256(case)]
+    for name in ("inflate.inp.j2", "parts/more.j2"):
+        (own / name).write_text("*HEADING\n")
+        hashes.append(tyre_sha256(loaded))
+        (own / name).write_text("*HEADING, SPARSE\n")
+        hashes.append(tyre_sha256(loaded))
+    assert len({*hashes}) == len(hashes)
+    (own / name).write_bytes(b"*HEADING, SPARSE\r\n")
+    (own / "README.md").write_text("ours")
+    assert tyre_sha256(loaded) == hashes[-1]
+
+
+def test_a_fit_with_other_templates_is_refused(tmp_path: Path) -> None:
+    template = tmp_path / "own" / "inflate.inp.j2"
+    template.parent.mkdir()
+    template.write_text("*HEADING\n")
+    case = written(tmp_path, lambda data: data.update(templates="own"))
+    values = start_values(case)
+    of = {"tyre_sha256": tyre_sha256(case), "mesh": "default"}
+    content = {"variables": {}, "fixed": values, "pressure_kPa": 240.0, "provenance": of}
+    (tmp_path / "fit.json").write_text(json.dumps(content))
+    assert read_fitted(tmp_path / "fit.json", case) == (values, [])
+    template.write_text("*HEADING\n** lighter\n")
+    with pytest.raises(InputError, match="or a file that it names, has been edited since"):
+        read_fitted(tmp_path / "fit.json", case)

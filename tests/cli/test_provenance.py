@@ -105,7 +105,12 @@ def test_several_measured_files_have_one_hash(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "more", "words"),
     [
-        ("angle_deg: 70.0", "angle_deg: 70.07", [], "or its section, has been edited since"),
+        (
+            "angle_deg: 70.0",
+            "angle_deg: 70.07",
+            [],
+            "or a file that it names, has been edited since",
+        ),
         ("D1_per_Pa: 5.085e-8", "D1_per_Pa: 5.09e-8", [], "has been edited since"),
         (
             "name",

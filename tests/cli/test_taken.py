@@ -12,6 +12,8 @@ import pytest
 from tyrecal.cli.options import Study
 from tyrecal.cli.taken import taken
 from tyrecal.cli.terminal import Terminal
+from tyrecal.simulate.case_folder import owner
+from tyrecal.tyre.load import load_case
 
 from ..conftest import CASES
 from .test_cli import run
@@ -30,7 +32,8 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def fit(folder: Path, case: Path, started: str, good: bool = True) -> None:
     """What tells a fit: its entry in run.json, and that it converged."""
     folder.mkdir(exist_ok=True)
-    entry = {"case": str(case), "command": "fit", "started": started, "finished": True}
+    loaded = load_case(case) if case.exists() else None
+    entry = {**owner(folder, case, loaded), "command": "fit", "started": started, "finished": True}
     (folder / "run.json").write_text(json.dumps({"fit": entry}))
     (folder / "fit.json").write_text(json.dumps({"converged": good, "moved": good}))
 
@@ -63,9 +66,47 @@ def test_the_last_fit_that_converged_is_taken_with_its_case(
     case, fitted, study = taken(None, None, STUDY)
     assert (case, fitted) == (Path("p235_75r17.yaml"), Path("new/fit.json"))
     assert study.output == Path("new")
-    assert "p235_75r17.yaml, with the fit in 'new'" in capsys.readouterr().err
+    notes = capsys.readouterr().err
+    assert "the fit in 'gone' is left out: its case is not here\n" in notes
+    assert "p235_75r17.yaml, with the fit in 'new'" in notes and "failed" not in notes
     assert taken(None, Path("old/fit.json"), STUDY)[:2] == (Path("b.yaml"), Path("old/fit.json"))
     assert taken(other, None, STUDY) == (other, None, STUDY)
+
+
+def test_the_case_of_a_fit_is_known_by_its_tyre_where_it_is_not_at_its_place(here: Path) -> None:
+    """The folder of results was moved alone, and the case renamed."""
+    case = here / "p235_75r17.yaml"
+    fit(here / "results", case, "2026-01-01T10:00:00+00:00")
+    renamed = case.rename(here / "renamed.yaml")
+    other = here / "other.yaml"
+    other.write_text(renamed.read_text().replace("angle_deg: 70.0", "angle_deg: 69.0"))
+    expected = (Path("renamed.yaml"), Path("results/fit.json"))
+    assert taken(None, None, STUDY)[:2] == expected
+    assert taken(None, Path("results"), STUDY)[0] == Path("renamed.yaml")
+    deeper = here / "archive"
+    deeper.mkdir()
+    (here / "results").rename(deeper / "results")
+    assert taken(None, Path("archive/results"), STUDY)[0] == Path("renamed.yaml")
+    shutil.copy(renamed, here / "again.yaml")
+    with pytest.raises(
+        click.UsageError, match=r"several have the tyre of .*, again\.yaml, renamed"
+    ):
+        taken(None, Path("archive/results"), STUDY)
+    shutil.copy(renamed, case)  # of the name that the fit knows
+    assert taken(None, Path("archive/results"), STUDY)[0] == Path("p235_75r17.yaml")
+    for path in here.glob("*.yaml"):
+        path.unlink()
+    with pytest.raises(click.UsageError, match="none is here that 'archive/results' is a fit of"):
+        taken(None, Path("archive/results"), STUDY)
+
+
+def test_a_case_of_an_own_deck_is_one(here: Path) -> None:
+    (here / "p235_75r17.yaml").unlink()
+    shutil.copytree(CASES / "ring_3d", here, dirs_exist_ok=True)
+    assert taken(None, None, STUDY)[0] == Path("ring.yaml")
+    fit(here / "results", here / "ring.yaml", "2026-01-01T10:00:00+00:00")
+    (here / "ring.yaml").rename(here / "renamed.yaml")
+    assert taken(None, None, STUDY)[0] == Path("renamed.yaml")
 
 
 @pytest.mark.slow

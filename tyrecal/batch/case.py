@@ -27,6 +27,7 @@ from typing import Any
 
 from ..errors import InputError
 from ..files import json_text, own_folder, read_bytes, read_json, set_aside, write_runs, write_text
+from ..simulate.case_folder import owner
 from ..simulate.deck.decks_design import design_of
 from ..simulate.evaluate.evaluator import Evaluator
 from ..simulate.evaluate.failure import DeckRefused, EvaluationFailed, SolverUnavailable
@@ -92,7 +93,7 @@ def run_case(task: CaseTask) -> Report:
     except Exception as error:  # whatever it is, the other cases go on
         with suppress(OSError):
             if task.folder.exists():
-                _write_runs(task, facts, (), {})
+                _write_runs(task, None, facts, (), {})
         report["studies"] = dict.fromkeys(task.studies, _entry(_failed(error), task))
     return report
 
@@ -109,7 +110,7 @@ def _studied(
 ) -> tuple[dict[str, Any], list[str]]:
     """Every study's entry in the report, and the names of the result files."""
     own_folder(task.folder)
-    _write_runs(task, facts, (), {})
+    _write_runs(task, loaded, facts, (), {})
     evaluator.store = Store(task.record) if task.record else None
     state = Studied(loaded, evaluator, {"initial": start_values(loaded)}, task.asked)
     entries: dict[str, Any] = {}
@@ -138,16 +139,21 @@ def _studied(
     facts["cpu_seconds"] = round(time.process_time() - used, 3)
     facts.update(solver_runs=evaluator.counts.runs, answered_from_record=evaluator.counts.recorded)
     ended = [name for name in task.studies if entries[name]["status"] in ENDED]
-    _write_runs(task, facts, ended, aside)
+    _write_runs(task, loaded, facts, ended, aside)
     return entries, files
 
 
 def _write_runs(
-    task: CaseTask, facts: dict[str, Any], ended: Collection[str], aside: Mapping[str, str]
+    task: CaseTask,
+    loaded: LoadedCase | None,
+    facts: dict[str, Any],
+    ended: Collection[str],
+    aside: Mapping[str, str],
 ) -> None:
     """The studies' entries in run.json; results of those that have not ended are earlier ones.
+    loaded: the case, None where it could not be read;
     aside: folders of results that did not take the place of earlier ones, by study."""
-    entry = {"case": str(task.path), "command": "batch", **facts}
+    entry = {**owner(task.folder, task.path, loaded), "command": "batch", **facts}
     new: dict[str, Any] = {name: {**entry, "finished": name in ended} for name in task.studies}
     for name, place in aside.items():
         new[name]["results"] = place
@@ -199,9 +205,7 @@ def _entry(outcome: StudyOutcome, task: CaseTask) -> dict[str, Any]:
 
 def _question(task: CaseTask, loaded: LoadedCase, evaluator: Evaluator) -> str:
     """Hash of all that the results depend on: the case and its files, what is asked, the tool."""
-    own = loaded.folder / loaded.case.templates if loaded.case.templates else None
-    files = [task.path, *loaded.files]
-    files += sorted(path for path in own.rglob("*") if path.is_file()) if own else []
+    files = [task.path, *loaded.files, *loaded.template_files]
     solver = [
         evaluator.solver.name,
         evaluator.solver.version,

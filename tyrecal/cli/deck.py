@@ -87,7 +87,8 @@ def command(
             written = adapter.write(decks, Path(fresh))
         except adapter.refusals as error:
             raise DeckRefused(str(error)) from None
-        run = Run(case, output, "deck", adapter)  # what is refused leaves the folder untouched
+        # what is refused leaves the folder untouched
+        run = Run(case, output, "deck", adapter, loaded=loaded)
         for path in written:
             place = run.folder / path.relative_to(fresh)  # what a deck includes may lie in folders
             for above in reversed(place.relative_to(run.folder).parents[:-1]):

@@ -288,7 +288,7 @@ class Study:
         from .output import Run
 
         block = provenance(loaded, evaluator.solver, measured, **state)
-        run = Run(loaded.path, self.output, command, evaluator.solver, study, block)
+        run = Run(loaded.path, self.output, command, evaluator.solver, study, block, loaded)
         evaluator.folder, evaluator.keep = run.runs, self.terminal.verbose
         evaluator.store = run.open_store(self.store, self.no_store)
         run.counts = counts = evaluator.counts

@@ -35,6 +35,7 @@ from ..files import (
     write_text,
 )
 from ..interrupt import interrupts_put_off
+from ..simulate.case_folder import belongs_to, named_case, owner
 from ..simulate.provenance import stamped
 from ..simulate.settings import root
 from ..studies.result import Result
@@ -46,6 +47,7 @@ if TYPE_CHECKING:
 
     from ..simulate.evaluate.evaluator import Counts
     from ..simulate.evaluate.store import Store
+    from ..tyre.case import LoadedCase
 
 # what is locked; who holds it, which Windows reads meanwhile
 LOCK_FILE, OWNER = ".lock", ".lock.json"
@@ -126,9 +128,10 @@ class Run:
         solver: Any = None,
         study: str = "",
         provenance: dict[str, Any] | None = None,
+        loaded: LoadedCase | None = None,
     ):
         self.case, self.command, self.solver = case.resolve(), command, solver
-        self.study, self.provenance = study or command, provenance
+        self.study, self.provenance, self.loaded = study or command, provenance, loaded
         self.folder = self.placed = output or root() / case.stem
         self.started = datetime.now(UTC).isoformat(timespec="seconds")
         self._clock, self._finished = time.monotonic(), False
@@ -221,7 +224,7 @@ class Run:
             "answered_from_record": self.counts.recorded,
         }
         entry = {
-            "case": str(self.case),
+            **owner(self.folder, self.case, self.loaded),
             "command": self.command,
             "arguments": sys.argv[1:],
             "started": self.started,
@@ -276,19 +279,11 @@ def refuse_other(folder: Path, case: Path) -> None:
     OSError where its run.json is no file."""
     if not os.path.lexists(folder / RUN):
         return
-    found = list(read_runs(folder).values())
-    if not any(facts.get("case") == str(case) or _moved(facts, case) for facts in found):
-        owner = next((facts.get("case") for facts in found), None)
+    entries = list(read_runs(folder).values())
+    if not belongs_to(entries, folder, case):
+        named = [file for entry in entries if (file := named_case(entry, folder))]
+        named.sort(key=lambda file: not file.exists())  # one that is there comes first
         raise InputError(
-            f"folder '{folder}' holds results of {owner or 'something else'};"
+            f"folder '{folder}' holds results of {named[0] if named else 'something else'};"
             " give another one with --output"
         )
-
-
-def _moved(facts: dict[str, Any], case: Path) -> bool:
-    """Whether ``case`` is what ``facts`` are of: nothing is at the old place any more, and it has
-    the same name, as after a project's folder was renamed, or is a batch's folder itself."""
-    owner = facts.get("case")
-    if not isinstance(owner, str) or Path(owner).exists():
-        return False
-    return Path(owner).name == case.name or ("cases" in facts and case.is_dir())

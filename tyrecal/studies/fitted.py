@@ -69,7 +69,7 @@ def _difference(theirs: Mapping[str, Any], case: LoadedCase) -> str:
         if is_of_tyre(name) and theirs.get(name) != ours.get(name)
     ]
     return "; ".join(told) or (
-        f"'{case.path}', or its section, has been edited since; run 'tyrecal fit' again"
+        f"'{case.path}', or a file that it names, has been edited since; run 'tyrecal fit' again"
     )
 
 

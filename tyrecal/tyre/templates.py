@@ -29,9 +29,11 @@ def number(value: Any) -> str:
 
 
 class _Inside(FileSystemLoader):
-    """Templates of a folder; a link that leads out of it is refused."""
+    """Templates of a folder; a link that leads out of it is refused, and any other file."""
 
     def get_source(self, environment: Environment, template: str) -> Any:
+        if not template.endswith(".j2"):  # the tyre's hash has the text of these files only
+            raise SecurityError(f"template '{template}' must have a name that ends in .j2")
         source = super().get_source(environment, template)
         root = Path(self.searchpath[0]).resolve()
         if not Path(source[1]).resolve().is_relative_to(root):

@@ -25,7 +25,7 @@ from .sources import sources
 
 SCHEDULER_PATIENCE_S = 20.0  # for a scheduler to answer
 log = logging.getLogger("tyrecal")
-MISSING = (
+NO_DASK = (
     "a cluster needs packages that are not installed here:"
     " run pip install '.[cluster]' in a clone of tyrecal"
 )
@@ -83,7 +83,7 @@ def connected(address: str) -> Iterator[Cluster]:
     try:
         from distributed import Client
     except ImportError:
-        raise SolverUnavailable(MISSING) from None
+        raise SolverUnavailable(NO_DASK) from None
     try:
         client = Client(address, timeout=SCHEDULER_PATIENCE_S, set_as_default=False)
     except (OSError, ValueError) as error:
@@ -138,7 +138,7 @@ def jobs_of(settings: QueueSettings) -> Any:
         from dask_jobqueue import PBSCluster, SLURMCluster
         from dask_jobqueue.local import LocalCluster
     except ImportError:
-        raise SolverUnavailable(MISSING) from None
+        raise SolverUnavailable(NO_DASK) from None
     for each, handler in handlers.items():  # dask-jobqueue makes Ctrl-C an exit with code 0
         signal.signal(each, handler)
     given: dict[str, Any] = {

@@ -9,13 +9,14 @@ from functools import lru_cache
 from hashlib import sha256
 from typing import Any
 
+from ...files import read_bytes
 from ..section.section import Section
 from .checks import find
 from .loaded import LoadedCase
 from .mistakes import Keys
 
 # of a case; not among them: what it is called, its mesh, pressure and road, what is asked of it,
-# its targets and uncertainties, solver and templates
+# its targets and uncertainties, and solver
 TYRE: dict[str, Any] = {
     "section": {"gauges": True, "outline": True},
     "deck": {"numbers": True, "parts": True, "gauges": True},
@@ -39,7 +40,7 @@ def tyre_sha256(loaded: LoadedCase) -> str:
     It changes with every number that is physics (in the unit of its key) and with what is a
     variable, by name and path; not with a variable's value, nor with the state: pressure, load,
     road, and whether the rim is held or free. Keys at their default, and effects of 0, count as
-    absent.
+    absent. It changes with the text of the case's own templates. Raises OSError.
     """
     text = json.dumps(_content(loaded), sort_keys=True, allow_nan=False)
     return sha256(text.encode()).hexdigest()
@@ -68,11 +69,23 @@ def _content(loaded: LoadedCase) -> dict[str, Any]:
         for path in variable.sets:
             with suppress(KeyError):  # a law may have divided the layer
                 _leave_out(data, find(case, path))
-    return {
+    content = {
         "tyre": _plain(data),
         "variables": {name: sorted(v.sets) for name, v in case.variables.items()},
         "drawn": own.sha256 if own else _drawn(loaded.section),
     }
+    templates = _templates(loaded)
+    return {**content, "templates": templates} if templates else content
+
+
+def _templates(loaded: LoadedCase) -> dict[str, str]:
+    """Hash of each of the case's own templates, by its place in their folder."""
+    hashes = {}
+    for path in loaded.template_files:
+        name = path.relative_to(loaded.folder / str(loaded.case.templates)).as_posix()
+        text = read_bytes(path).replace(b"\r\n", b"\n")
+        hashes[name] = sha256(text).hexdigest()
+    return hashes
 
 
 def _leave_out(data: Any, keys: Keys) -> None:

@@ -52,3 +52,11 @@ class LoadedCase:
         if own := self.deck or self.decks:
             return [own.path.parent / name for name in own.texts]
         return [self.folder / self.case.section.file]
+
+    @property
+    def template_files(self) -> list[Path]:
+        """The case's own templates, and all that they can include."""
+        if not self.case.templates:
+            return []
+        paths = (self.folder / self.case.templates).rglob("*.j2")
+        return sorted(path for path in paths if path.is_file())

@@ -1,0 +1,65 @@
+"""Which case a folder of results belongs to, by its entries in run.json.
+
+An entry names the case's file by its way from the folder (``case``), which stays right if a project
+is moved, copied or renamed as a whole. If no file is there any more, the hash of the file's tyre
+(``tyre_sha256``, without what the command line sets) decides.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from ..errors import InputError
+from ..tyre.case import LoadedCase
+from ..tyre.case.identity import tyre_sha256
+from ..tyre.load import load_case
+
+
+def owner(folder: Path, path: Path, loaded: LoadedCase | None = None) -> dict[str, str]:
+    """The part of an entry that says whose results are in ``folder``: those of the case at
+    ``path``, or of a batch, whose path is the folder itself. Raises OSError."""
+    try:
+        way = os.path.relpath(path.resolve(), folder.resolve())
+    except ValueError:  # on another drive of Windows
+        way = str(path.resolve())
+    entry = {"case": Path(way).as_posix()}
+    return {**entry, "tyre_sha256": tyre_sha256(loaded.as_read or loaded)} if loaded else entry
+
+
+def named_case(entry: Mapping[str, Any], folder: Path) -> Path | None:
+    """Where the case of an entry of ``folder`` should be; None where the entry names none."""
+    way = entry.get("case")
+    return Path(os.path.normpath(folder.resolve() / way)) if isinstance(way, str) else None
+
+
+def belongs_to(entries: Sequence[Mapping[str, Any]], folder: Path, path: Path) -> bool:
+    """Whether ``folder``, with these entries, is of the case, or batch, at ``path``.
+
+    Raises OSError."""
+    named = [(entry, file) for entry in entries if (file := named_case(entry, folder))]
+    there = [file for _, file in named if file.exists()]
+    if there:
+        return any(file.samefile(path) for file in there)
+    return any(
+        cases_with_tyre(entry, [path]) if "tyre_sha256" in entry else file.name == path.name
+        for entry, file in named
+    )
+
+
+def cases_with_tyre(entry: Mapping[str, Any], paths: Iterable[Path]) -> list[Path]:
+    """The case files among ``paths`` that have the tyre of an entry; those with the file name that
+    it gives, if there are any."""
+    same = [path for path in paths if entry.get("tyre_sha256", "") == _tyre_of(path)]
+    name = Path(str(entry.get("case"))).name
+    return [path for path in same if path.name == name] or same
+
+
+def _tyre_of(path: Path) -> str | None:
+    """Hash of the tyre of a case file, None where it is not a valid case."""
+    try:
+        return tyre_sha256(load_case(path, allow_unusual=True))
+    except (InputError, OSError):
+        return None
