@@ -14,6 +14,7 @@ from ruamel.yaml import YAML
 
 import tyrecal
 
+from . import versions
 from .conftest import ROOT
 
 # tyrecal is on no package index: one that has the name would install a stranger's project
@@ -92,6 +93,14 @@ def test_no_text_installs_tyrecal_by_its_name() -> None:
     for path in texts:
         if path != Path(__file__):
             assert not BY_NAME.search(path.read_text(encoding="utf-8")), path
+
+
+def test_every_requirement_states_its_lowest_version() -> None:
+    """`python -m tests.versions` installs and runs these."""
+    extras = PROJECT["optional-dependencies"]
+    for each in map(Requirement, sum(extras.values(), PROJECT["dependencies"])):
+        assert any(spec.operator in (">=", "==") for spec in each.specifier), each.name
+    assert all((ROOT / path).is_file() for path in versions.TESTS)
 
 
 def test_developers_have_every_extra() -> None:

@@ -184,7 +184,7 @@ def main(arguments: list[str] | None = None) -> None:
     except click.ClickException as wrong:
         context = getattr(wrong, "ctx", None)
         where = f" (see '{context.command_path} --help')" if context is not None else ""
-        error(f"{wrong.format_message()}{where}")
+        error(f"{_mistake(wrong)}{where}")
         sys.exit(EXIT_INPUT)
     except Interrupted as interrupted:
         say(f"\n{interrupted}", err=True)
@@ -197,6 +197,18 @@ def main(arguments: list[str] | None = None) -> None:
         for line in str(failure).splitlines():
             error(line)
         sys.exit(code)
+
+
+def _mistake(wrong: click.ClickException) -> str:
+    """The sentence on a wrong command line. Click's own on an unknown option differs from one
+    version to the next."""
+    if not isinstance(wrong, click.NoSuchOption):
+        return wrong.format_message()
+    from ..tyre.case.mistakes import suggestion
+
+    return f"no option '{wrong.option_name}'" + suggestion(
+        wrong.option_name, wrong.possibilities or (), otherwise=""
+    )
 
 
 def _exit_code(failure: Exception) -> int | None:
