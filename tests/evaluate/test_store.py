@@ -157,6 +157,18 @@ def test_only_failures_of_the_deck_are_recorded(cause: str, recorded: bool, tmp_
     assert bool(records(tmp_path)) == recorded
 
 
+def test_a_recorded_failure_names_its_run_after_a_move(tmp_path: Path) -> None:
+    (tmp_path / "old").mkdir()
+    with pytest.raises(EvaluationFailed) as failure:
+        ask(evaluator(tmp_path / "old", StandIn("unstable")))
+    first = failure.value.folder
+    moved = (tmp_path / "old").rename(tmp_path / "new")
+    with pytest.raises(EvaluationFailed) as failure:
+        ask(evaluator(moved, StandIn("unstable")))
+    assert first and failure.value.folder == moved / "runs" / first.name
+    assert len(list((moved / "runs").iterdir())) == 1
+
+
 def test_numbers_that_are_none_are_not_recorded(tmp_path: Path) -> None:
     class Zeros(StandIn):
         def read(self, folder: Path) -> dict:

@@ -1,8 +1,8 @@
 """Which case a folder of results belongs to, by its entries in run.json.
 
-An entry names the case's file by its way from the folder (``case``), which stays right if a project
-is moved, copied or renamed as a whole. If no file is there any more, the hash of the file's tyre
-(``tyre_sha256``, without what the command line sets) decides.
+An entry has the path of the case file relative to the folder (``case``), which stays right if a
+project is moved, copied or renamed as a whole. If no file is there any more, the hash of the file's
+tyre (``tyre_sha256``, without what the command line sets) decides.
 """
 
 from __future__ import annotations
@@ -22,17 +22,19 @@ def owner(folder: Path, path: Path, loaded: LoadedCase | None = None) -> dict[st
     """The part of an entry that says whose results are in ``folder``: those of the case at
     ``path``, or of a batch, whose path is the folder itself. Raises OSError."""
     try:
-        way = os.path.relpath(path.resolve(), folder.resolve())
+        relative = os.path.relpath(path.resolve(), folder.resolve())
     except ValueError:  # on another drive of Windows
-        way = str(path.resolve())
-    entry = {"case": Path(way).as_posix()}
+        relative = str(path.resolve())
+    entry = {"case": Path(relative).as_posix()}
     return {**entry, "tyre_sha256": tyre_sha256(loaded.as_read or loaded)} if loaded else entry
 
 
 def named_case(entry: Mapping[str, Any], folder: Path) -> Path | None:
     """Where the case of an entry of ``folder`` should be; None where the entry names none."""
-    way = entry.get("case")
-    return Path(os.path.normpath(folder.resolve() / way)) if isinstance(way, str) else None
+    relative = entry.get("case")
+    if not isinstance(relative, str):
+        return None
+    return Path(os.path.normpath(folder.resolve() / relative))
 
 
 def belongs_to(entries: Sequence[Mapping[str, Any]], folder: Path, path: Path) -> bool:

@@ -210,8 +210,8 @@ class Evaluator:
             cause = getattr(error, "cause", "crashed")
             failure = EvaluationFailed(cause, str(error), self._kept(folder, str(error)))
             if cause in SETTLED:
-                place = str(failure.folder.resolve()) if failure.folder else None
-                content = {"cause": cause, "words": failure.words, "folder": place}
+                name = failure.folder.name if failure.folder else None
+                content = {"cause": cause, "words": failure.words, "folder": name}
                 self._record(key, {"cause": cause}, content)
             raise failure from None
         except EvaluationFailed as failure:
@@ -315,11 +315,13 @@ class Evaluator:
         )
 
     def _known(self, folder: str | None) -> Path | None:
-        """A folder that a record names, where it is a run of ours that failed."""
-        if folder is None or self.folder is None or "\0" in folder:
+        """The folder of that name (older records: path), where it is a run of ours that failed."""
+        if not folder or self.folder is None or "\0" in folder:
             return None
-        path, parent = Path(folder), self.folder.resolve()
-        return path if path.parent == parent and (path / folders.OUTCOME).is_file() else None
+        path, parent = self.folder / Path(folder).name, self.folder.resolve()
+        return (
+            path if path.resolve().parent == parent and (path / folders.OUTCOME).is_file() else None
+        )
 
     def _run(self, folder: Path, time_limit_s: float) -> dict[str, Any]:
         self.counts.runs += 1
