@@ -5,6 +5,7 @@ from __future__ import annotations
 from contextlib import suppress
 from dataclasses import dataclass, field
 from difflib import get_close_matches
+from functools import lru_cache
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -56,12 +57,10 @@ def read_document(path: Path) -> Document:
     text = _text(path, document)
     if text is None:
         return document
-    yaml = YAML(typ="safe", pure=True)
-    yaml.Parser = _Harmless
     try:
-        root = yaml.compose(text)
+        root = _compose(text)
         if isinstance(root, MappingNode):
-            document.data = _Reader(document, yaml.constructor).mapping(root, ())
+            document.data = _Reader(document, _yaml().constructor).mapping(root, ())
         else:
             document.refuse(1, "the file must hold keys and values, as in 'format: 1'")
     except _Harmful as harmful:
@@ -74,6 +73,19 @@ def read_document(path: Path) -> Document:
         line = text.count("\n", 0, getattr(error, "position", 0)) + 1
         document.refuse(line, f"not YAML: {shortened(str(error), 100)}")
     return document
+
+
+def _yaml() -> YAML:
+    yaml = YAML(typ="safe", pure=True)
+    yaml.Parser = _Harmless
+    return yaml
+
+
+@lru_cache(maxsize=32)
+def _compose(text: str) -> Node | None:
+    """The nodes of a text, which nobody may change. Composing takes two thirds of the time to load
+    a case, and one command loads the same text several times. Raises YAMLError."""
+    return _yaml().compose(text)
 
 
 def _text(path: Path, document: Document) -> str | None:
