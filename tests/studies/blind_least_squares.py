@@ -89,25 +89,37 @@ def held_out_rms(
     """Error (rms, in ln f) of what least squares of the modes among y (n,), with effects at their
     sizes, say of the rows ``out``."""
     modal = np.array([ruler.rows[i][0] is not None for i in places])
-    y, places = y[modal], places[modal]
+    y, places, held = y[modal], places[modal], np.array(list(out))
     d, spread = np.zeros(len(ruler.x0)), np.diag(ruler.spread**-2.0) * 0.002**2
+    moved, tilt = _moved(ruler, np.concatenate([places, held]), effects)
+    n = len(places)
     for _ in range(STEPS):
         eta, J = ruler.plain(d, places)
-        off = y - eta - _shift(ruler, d, places, effects)
+        off = y - eta - moved[:n] - tilt[:n] @ d
         step = np.linalg.solve(J.T @ J + spread, J.T @ off - spread @ d)
         d = d + step * min(1.0, LONGEST / max(abs(step).max(), 1e-300))
-    held = np.array(list(out))
-    said = ruler.plain(d, held)[0] + _shift(ruler, d, held, effects)
-    return float(np.sqrt(np.mean((np.array(list(out.values())) - said) ** 2)))
+    foretold = ruler.plain(d, held)[0] + moved[n:] + tilt[n:] @ d
+    return float(np.sqrt(np.mean((np.array(list(out.values())) - foretold) ** 2)))
 
 
-def _shift(ruler: Ruler, d: Array, places: Array, effects: Mapping[str, float]) -> Array:
-    total = np.zeros(len(places))
+def _moved(ruler: Ruler, places: Array, effects: Mapping[str, float]) -> tuple[Array, Array]:
+    """Shift (n,) at x0 by effects at their sizes, and its slopes (n, v) by ln x."""
+    origin, units = np.zeros(len(ruler.x0)), np.eye(len(ruler.x0))
+    moved, tilt = np.zeros(len(places)), np.zeros((len(places), len(units)))
     for id, e in effects.items():
         signature: EffectShifts = ruler.signatures[id]
-        sizes, shift, _ = signature.grid(d, places)
-        total += [np.interp(e, sizes, column) for column in shift.T]
-    return total
+        at_x0 = _at(e, *signature.grid(origin, places)[:2])
+        moved += at_x0
+        tilt += np.stack([_at(e, *signature.grid(d, places)[:2]) - at_x0 for d in units], 1)
+    return moved, tilt
+
+
+def _at(e: float, sizes: Array, values: Array) -> Array:
+    """Values (q, n) at sizes (q,), between which they are straight, at the size e: (n,)."""
+    e = float(np.clip(e, sizes[0], sizes[-1]))
+    j = min(int(np.searchsorted(sizes, e, side="right")), len(sizes) - 1)
+    share = (e - sizes[j - 1]) / (sizes[j] - sizes[j - 1])
+    return np.asarray(values[j - 1] + share * (values[j] - values[j - 1]))
 
 
 def main() -> None:

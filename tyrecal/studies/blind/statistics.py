@@ -21,20 +21,21 @@ def clopper_pearson(right: int, count: int, level: float = 0.95) -> tuple[float,
 
 def calibration_error(stated: Array, right: Array) -> float:
     """ECE: mean over trials of |share right - mean stated| in ten bins of what was stated."""
-    if not len(stated):
-        return 0.0
+    return float(_calibration_errors(stated, right[None])[0])
+
+
+def _calibration_errors(stated: Array, right: Array) -> Array:
+    """ECE (k,) of each row of ``right`` (k, n), trials of one and the same ``stated`` (n,)."""
     place = np.minimum((stated * BINS).astype(int), BINS - 1)
-    total = sum(
-        abs(float((right[place == b] - stated[place == b]).sum())) for b in np.unique(place)
-    )
-    return total / len(stated)
+    in_bin = (place[:, None] == np.arange(BINS)).astype(float)
+    return np.asarray(abs((right - stated) @ in_bin).sum(1) / max(len(stated), 1))
 
 
 def calibration_quantile(stated: Array, quantile: float = 0.95, seed: int = 0) -> float:
     """That quantile of the ECE of as many trials whose stated probabilities are exactly right."""
     random = np.random.default_rng(seed)
     drawn = random.random((SIMULATIONS, len(stated))) < stated
-    return float(np.quantile([calibration_error(stated, each) for each in drawn], quantile))
+    return float(np.quantile(_calibration_errors(stated, drawn), quantile))
 
 
 def brier(probabilities: Sequence[Mapping[str, float]], truth: Sequence[str]) -> float:

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 from itertools import product
 from typing import Final, NamedTuple
 
@@ -384,8 +385,14 @@ def _grid(axes: Sequence[Array]) -> Array:
 
 def _rule(low: float, high: float, count: int) -> tuple[Array, Array]:
     """Gauss and Legendre's points and weights (count,) on an interval."""
-    points, weights = np.polynomial.legendre.leggauss(count)
+    points, weights = _gauss_legendre(count)
     return low + (high - low) * (points + 1) / 2, weights * (high - low) / 2
+
+
+@lru_cache
+def _gauss_legendre(count: int) -> tuple[Array, Array]:
+    """Points and weights (count,) on -1 to 1, not to be changed."""
+    return np.polynomial.legendre.leggauss(count)
 
 
 def grid(nodes: Nodes) -> tuple[Array, Array]:

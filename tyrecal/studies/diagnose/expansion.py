@@ -342,13 +342,12 @@ def hermite(nodes: Array, sloped: Array, e: Array) -> tuple[Array, Array]:
         l_i = product over j != i of ((e - e_j) / (e_i - e_j))^(1 or, with a slope at j, 2)
     """
     e = np.atleast_1d(e)[:, None]
-    values, slopes = np.ones((len(e), len(nodes))), np.zeros((len(e), len(nodes)))
-    for i, here in enumerate(nodes):
-        others, times = np.delete(nodes, i), 1 + np.delete(sloped, i)
-        values[:, i] = np.prod(((e - others) / (here - others)) ** times, axis=1)
-        if sloped[i]:
-            slopes[:, i] = values[:, i] * (e[:, 0] - here)
-            values[:, i] -= slopes[:, i] * np.sum(times / (here - others))
+    itself = np.eye(len(nodes), dtype=bool)
+    apart = nodes[:, None] - nodes + itself
+    times = np.where(itself, 0, 1 + np.asarray(sloped, int))
+    values = np.prod(((e[:, :, None] - nodes) / apart) ** times, axis=2)
+    slopes = values * (e - nodes) * sloped
+    values -= slopes * np.sum(times / apart, axis=1)
     return values, slopes
 
 
