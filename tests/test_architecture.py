@@ -30,8 +30,13 @@ def modules() -> dict[str, Path]:
     return {module_of(path): path for top in PACKAGES for path in (ROOT / top).rglob("*.py")}
 
 
-def imported(name: str) -> Iterator[str]:
+@cache
+def imported(name: str) -> tuple[str, ...]:
     """Modules that a module imports, late and for types only too."""
+    return tuple(_imported(name))
+
+
+def _imported(name: str) -> Iterator[str]:
     path = modules()[name]
     package = name if path.name == "__init__.py" else name.rpartition(".")[0]
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):

@@ -6,6 +6,7 @@ import ast
 import builtins
 import importlib
 import re
+from functools import cache
 
 import pytest
 import tyrecal_solvers.errors
@@ -32,6 +33,7 @@ def drawn(text: str) -> dict[str, tuple[str, str]]:
     return found
 
 
+@cache
 def exceptions() -> dict[str, tuple[str, str]]:
     """Name to module and first base of every class that is an exception, wherever it is defined."""
     classes: dict[str, tuple[str, str]] = {}

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +16,7 @@ from solvers.bundled.section.shapes import quad
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.studies.modes import modes_result
-from tyrecal.tyre.case import LoadedCase, start_values
+from tyrecal.tyre.case import LoadedCase, start_values, with_level
 from tyrecal.tyre.case.new_case import from_size
 from tyrecal.tyre.load import load_case
 from tyrecal.tyre.resolve import resolved
@@ -52,17 +54,28 @@ SIXTEEN = {
 MASSES = {"205/60R15": 9.3, "P235/75R17": 15.5, "11R22.5": 54.0, "315/80R22.5": 67.0}
 
 
+CaseOf = Callable[[str], LoadedCase]
+
+
+@cache
 def built(code: str) -> Section:
     size = parse_size(code)
     return build(size, usual(size)).section()
 
 
-def case_of(code: str, folder: Path, level: str = "coarse") -> LoadedCase:
-    draft = from_size(parse_size(code), {}, None, "tyre")
-    (folder / draft.file).write_bytes(draft.content)
-    path = folder / "tyre.yaml"
-    path.write_text(draft.text.replace("level: default", f"level: {level}"))
-    return load_case(path)
+@pytest.fixture(scope="module")
+def case_of(tmp_path_factory: pytest.TempPathFactory) -> CaseOf:
+    """The case of a size code, written and loaded once."""
+
+    @cache
+    def case(code: str) -> LoadedCase:
+        folder = tmp_path_factory.mktemp("size")
+        draft = from_size(parse_size(code), {}, None, "tyre")
+        (folder / draft.file).write_bytes(draft.content)
+        (folder / "tyre.yaml").write_text(draft.text)
+        return load_case(folder / "tyre.yaml")
+
+    return case
 
 
 @pytest.mark.parametrize(
@@ -77,8 +90,8 @@ def case_of(code: str, folder: Path, level: str = "coarse") -> LoadedCase:
         "315/80R22.5",
     ],
 )
-def test_the_size_code_gives_sixteen_modes(code: str, tmp_path: Path) -> None:
-    case = case_of(code, tmp_path)
+def test_the_size_code_gives_sixteen_modes(code: str, case_of: CaseOf) -> None:
+    case = with_level(case_of(code), "coarse")
     values = start_values(case)
     evaluation = Evaluator(TyreDesign(case)).evaluate(Question(values))
     result, _ = modes_result(case, values, evaluation)
@@ -102,9 +115,9 @@ def test_the_size_code_gives_sixteen_modes(code: str, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("code", [*TWELVE, "305/70R22.5", "315/70R22.5", "385/65R22.5"])
 @pytest.mark.parametrize("level", ["coarse", "default", "refined"])
-def test_every_mesh_that_is_written_unfolds(code: str, level: str, tmp_path: Path) -> None:
+def test_every_mesh_that_is_written_unfolds(code: str, level: str, case_of: CaseOf) -> None:
     """Held by the rim, too, where the surface outside a carcass that turns upright runs short."""
-    mesh = resolved(case_of(code, tmp_path, level)).mesh
+    mesh = resolved(with_level(case_of(code), level)).mesh
     corners = np.array([[mesh.nodes[n] for n in nodes] for nodes in mesh.solids.values()])
     jacobian = np.einsum("gax,eai->gexi", quad(8, 3).dN, corners)
     assert (np.linalg.det(jacobian) > 0).all()
@@ -122,7 +135,7 @@ def test_the_surface_of_a_bead_is_its_outside_and_its_end(quadratic: bool) -> No
     assert set(surface.rim) == set(whole.rim) & (ends | set(whole.outer_nodes))
 
 
-def test_mass_grows_with_the_tyre(tmp_path: Path) -> None:
+def test_mass_grows_with_the_tyre() -> None:
     masses = []
     for code in ("145/80R13", "205/55R16", "LT315/70R17", "315/80R22.5"):
         section = built(code)
