@@ -7,11 +7,15 @@ from typing import Any
 
 import pytest
 from markupsafe import Markup
+from matplotlib.figure import Figure
 
+from tyrecal.report import sample
 from tyrecal.report.html import page
+from tyrecal.studies.sample.result import SampleResult
 
 _drawn: dict[tuple[str, ...], Markup] = {}
-_picture = page._picture
+_corners: dict[str, Figure] = {}
+_picture, _draw_corner = page._picture, sample.draw_corner
 
 
 @pytest.fixture(autouse=True)
@@ -24,4 +28,12 @@ def drawn_once(monkeypatch: pytest.MonkeyPatch) -> None:
             _drawn[key] = _picture(found, prefix, name, words, file, draw)
         return _drawn[key]
 
+    def corner(found: SampleResult) -> Figure:
+        """Drawn before the page takes the picture of it."""
+        key = repr(found)
+        if key not in _corners:
+            _corners[key] = _draw_corner(found)
+        return _corners[key]
+
     monkeypatch.setattr(page, "_picture", picture)
+    monkeypatch.setattr(sample, "draw_corner", corner)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import shutil
+from functools import cache
 from html.parser import HTMLParser
 from pathlib import Path
 from random import Random
@@ -38,6 +39,17 @@ def copy(folder: Path, tmp_path: Path) -> Path:
 
 def text_of(*folders: Path) -> str:
     return page([read_results(each) for each in folders])
+
+
+@cache
+def kept_text_of(folder: Path) -> str:
+    """The page of a folder that no test changes, made once."""
+    return text_of(folder)
+
+
+@cache
+def kept_words_of(folder: Path) -> str:
+    return words_of(kept_text_of(folder))
 
 
 class Nesting(HTMLParser):
@@ -86,7 +98,7 @@ def test_tags_nest_ids_are_unique_and_links_lead_somewhere(folder: Path) -> None
 
 def test_table_2_is_there(folder: Path) -> None:
     """Each row of the paper's table, its figures in their order."""
-    words = words_of(text_of(folder))
+    words = kept_words_of(folder)
     for c, m, kind, initial, fitted, target in TABLE_2:
         off = 100 * (fitted / target - 1)
         grade = "○" if abs(off) <= 2 else "◐" if abs(off) <= 5 else "●"
@@ -121,11 +133,11 @@ def test_table_2_is_there(folder: Path) -> None:
     ],
 )
 def test_what_was_found_is_told(folder: Path, words: str) -> None:
-    assert words in words_of(text_of(folder))
+    assert words in kept_words_of(folder)
 
 
 def test_the_page_stands_alone(folder: Path) -> None:
-    text = text_of(folder)
+    text = kept_text_of(folder)
     assert not re.search(r"https?:|//[a-z]|\bsrc=|@import|fetch\(|XMLHttp|import\(", text)
     assert all(url.startswith("#") for url in re.findall(r"url\((.*?)\)", text))
     assert "default-src 'none'" in text
@@ -226,7 +238,7 @@ def test_several_folders_stand_side_by_side(folder: Path, copy: Path) -> None:
         "likeliest probabilityrim_width 0.71–",
     ):
         assert words in both, words
-    assert "Side by side" not in words_of(text_of(folder))
+    assert "Side by side" not in kept_words_of(folder)
     (copy / "fit.json").unlink()
     assert "Side by side" not in words_of(text_of(folder, copy))
 
