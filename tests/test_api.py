@@ -49,7 +49,7 @@ def test_all_that_is_offered_is_there_and_nothing_else() -> None:
         tyrecal.fit_everything  # noqa: B018
 
 
-SLOW = {"diagnose_case"}
+SLOW = {"diagnose_case", "evaluate_footprint"}
 
 
 @pytest.mark.parametrize(

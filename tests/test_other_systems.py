@@ -49,7 +49,7 @@ def results(folder: Path) -> dict[str, bytes]:
 @pytest.mark.parametrize(
     ("command", "processes"),
     [
-        (["modes", CASE, *COARSE, "--no-pictures", "--report"], 1),
+        (["modes", CASE, *COARSE, "--no-pictures"], 1),
         pytest.param(["batch", CASE, OTHER, "--studies", "modes", *COARSE, *TWO], 3, marks=slow),
         pytest.param(
             ["fit", CASE, *COARSE, *TWO, "--starts", "2", "--seed", "1", "--report"], 3, marks=slow

@@ -42,7 +42,7 @@ def pytest_of(folder: Path, *arguments: str, **environment: str) -> tuple[set[st
     return {first or second for first, second in ran}, done.stdout.partition("left out of")[2]
 
 
-@pytest.mark.parametrize("workers", [[], ["-n", "2"]])
+@pytest.mark.parametrize("workers", [[], pytest.param(["-n", "2"], marks=pytest.mark.slow)])
 def test_the_quick_set_is_run_and_the_rest_is_said(tests: Path, workers: list[str]) -> None:
     ran, said = pytest_of(tests, *workers, str(tests), PATH="")
     assert ran == {"test_quick"}
@@ -60,8 +60,8 @@ def test_the_quick_set_is_run_and_the_rest_is_said(tests: Path, workers: list[st
     [
         (["-m", "slow"], {"test_slow", "test_both"}),
         (["-m", "not quick"], OTHERS),
-        (["-m", "quick"], {"test_quick"}),
-        (["test_all.py::test_slow"], {"test_slow"}),
+        pytest.param(["-m", "quick"], {"test_quick"}, marks=pytest.mark.slow),
+        pytest.param(["test_all.py::test_slow"], {"test_slow"}, marks=pytest.mark.slow),
         (["test_all.py"], OTHERS | {"test_quick"}),
     ],
 )

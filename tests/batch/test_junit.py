@@ -5,7 +5,7 @@ from __future__ import annotations
 from xml.etree import ElementTree
 
 import xmlschema
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as some
 
 from tyrecal.batch.case import CaseTask, lost
@@ -81,6 +81,7 @@ def test_what_only_one_side_has_is_said() -> None:
     ]
 
 
+@settings(max_examples=25)  # each is held against the schema
 @given(some.text(min_size=1))
 def test_any_words_give_valid_xml(words: str) -> None:
     suites = parsed(junit([report("a", fit=entry("error", "crashed", words))], None, STARTED))

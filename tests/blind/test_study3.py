@@ -95,7 +95,9 @@ def own_frequencies(case: LoadedCase, pressures: list[float]) -> dict[float, dic
 
 
 @pytest.mark.parametrize(
-    "group", [g for g in GROUPS if g.series == 1], ids=lambda group: group.name
+    "group",
+    [pytest.param(g, marks=[] if g.own else [pytest.mark.slow]) for g in GROUPS if g.series == 1],
+    ids=lambda group: group.name,
 )
 def test_the_model_of_every_group_inflates_and_has_its_modes(group: Group, tmp_path: Path) -> None:
     """At all pressures of the study; a stiffer state has higher frequencies."""
@@ -218,6 +220,7 @@ def test_what_the_rules_tell_of_further_effects_is_the_counts_mean_number() -> N
         further({"three_strong": 4, "outside": 1})
 
 
+@pytest.mark.slow
 def test_effects_of_a_band_are_those_of_which_the_ruler_foresees_as_much(chance: Chance) -> None:
     """Of the recorded ruler: each strong one's lambda is 25 or more, each of a pair's 15, a weak
     one's 10 to 25, a faint one's 4 to 10; of any size some are below. A size of none moves nothing.
@@ -405,6 +408,7 @@ def test_recorded_trials_are_those_that_were_sealed(group: Path) -> None:
     assert trials == {trial["id"] for trial in json.loads(truth)["trials"]}
 
 
+@pytest.mark.slow
 def test_the_tables_on_record_are_what_the_scorer_says(tmp_path: Path) -> None:
     for group in ON_RECORD:
         unpacked(group, tmp_path / "all" / group.name, tmp_path / "all-truth" / group.name)

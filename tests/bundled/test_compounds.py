@@ -83,6 +83,7 @@ def test_half_the_section_is_the_whole(monkeypatch: pytest.MonkeyPatch) -> None:
         np.testing.assert_allclose(mine.eigenvalues, its.eigenvalues, rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_slopes_by_numbers_of_each_law(monkeypatch: pytest.MonkeyPatch) -> None:
     """d lambda / d ln of a constant of each against differences of fourth order, whose round-off is
     1e-10 of lambda over their step."""

@@ -120,7 +120,7 @@ def test_a_ball_on_the_road(depth: float) -> None:
     assert 2 * found.area.sum() == pytest.approx(np.pi * radius**2, rel=1e-2)
 
 
-@pytest.mark.parametrize("size", [1e-5, 3e-5, 3e-4])
+@pytest.mark.parametrize("size", [pytest.param(1e-5, marks=pytest.mark.slow), 3e-5, 3e-4])
 def test_patches_of_any_shape(work: Round, random: np.random.Generator, size: float) -> None:
     """Touching here and there, twice in an element or with a gap amid it: what many points add up
     to, but for their own error."""

@@ -325,8 +325,8 @@ def test_a_much_larger_load_after_a_small_one(solid: Round) -> None:
     np.testing.assert_allclose(found.parts, direct.parts, atol=1e-6 * abs(direct.parts).max())
 
 
-@pytest.mark.parametrize("slip", [1e-2, 1e-4, 1e-6])
-@pytest.mark.parametrize("friction", [0.5, 3.0])
+@pytest.mark.parametrize("slip", [1e-2, pytest.param(1e-4, marks=pytest.mark.slow), 1e-6])
+@pytest.mark.parametrize("friction", [0.5, pytest.param(3.0, marks=pytest.mark.slow)])
 def test_friction_of_any_size_converges(solid: Round, friction: float, slip: float) -> None:
     """From a soft to a hard stick, and more friction than rubber has."""
     press = solid.press(LENGTHS, 1e10, friction, slip)

@@ -31,6 +31,7 @@ def test_follows_the_contact(inflated: Inflated) -> None:
         assert used <= conjugate_gradients(problem.product, problem.factor.solve, b)[1] + 3
 
 
+@pytest.mark.slow
 def test_one_node_in_the_middle_of_the_patch(inflated: Inflated) -> None:
     """Both symmetries hold it but for its way down: a single column."""
     blocks, X = np.zeros_like(road_blocks(inflated, 1e6, 0.0)), inflated.model.mesh.X
@@ -42,6 +43,7 @@ def test_one_node_in_the_middle_of_the_patch(inflated: Inflated) -> None:
     np.testing.assert_allclose(touching.solve(x), expected, atol=1e-3 * abs(expected).max())
 
 
+@pytest.mark.slow
 def test_releases_what_the_factor_holds(inflated: Inflated) -> None:
     """Nodes on one side let go, others left: to the same inverse as the factor without them."""
     before = road_blocks(inflated, 1e6, 0.1)

@@ -242,6 +242,7 @@ def test_an_unreachable_load_keeps_the_others(
     )
 
 
+@pytest.mark.slow
 def test_an_absurd_load_is_not_tried(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A ton of tonnes: at the stiffness of the load before, many times the way down to the rim."""
     tried: list[float] = []

@@ -142,6 +142,7 @@ def test_each_rubber_has_its_own_table_or_none() -> None:
     assert (law.bulk_ratio == 1).all()
 
 
+@pytest.mark.slow
 def test_self_consistent_as_by_hand_through_the_door() -> None:
     """Each mode of beta = 0.15 about 20 Hz is that of one modulus for all modes, (f / 20)^beta
     times the static one, once f is the mode's own: an independent loop through decks."""
@@ -165,6 +166,7 @@ def test_a_tilt_about_the_reference_and_no_level() -> None:
         assert (tilted[label] > f) == (f > REFERENCE)
 
 
+@pytest.mark.slow
 def test_slopes_carry_the_implicit_term() -> None:
     """d f / d C10, where the modulus follows the frequency that C10 moves, and by the exponent."""
     case = with_values(CASE, {"effects.frequency_stiffening": 0.2})

@@ -31,7 +31,11 @@ def test_slopes_take_the_static_tangent_whatever_the_vibration_has() -> None:
     assert not np.allclose(shifted.factor.solve(right), wanted, rtol=1e-9, atol=0)
 
 
-@pytest.mark.parametrize("effects", [PLAIN, TURNING, WHEEL], ids=["plain", "turning", "wheel"])
+@pytest.mark.parametrize(
+    "effects",
+    [PLAIN, pytest.param(TURNING, marks=pytest.mark.slow), WHEEL],
+    ids=["plain", "turning", "wheel"],
+)
 def test_slopes_by_density_and_shape_against_differences(
     effects: tuple[tuple[str, float], ...],
 ) -> None:

@@ -94,7 +94,9 @@ def road_blocks(work: Inflated, stiffness: float, sideways: float) -> Array:
 
 
 @pytest.mark.parametrize("waves", [0, 3], ids=["elements", "waves"])
-@pytest.mark.parametrize("parity", [1, -1], ids=["kept", "reversed"])
+@pytest.mark.parametrize(
+    "parity", [1, pytest.param(-1, marks=pytest.mark.slow)], ids=["kept", "reversed"]
+)
 def test_few_iterations_on_the_inflated_tyre(inflated: Inflated, parity: int, waves: int) -> None:
     """Single precision and the dropped couplings cost at most eight iterations to 1e-6."""
     problem = Problem(inflated, parity, lengths=LENGTHS[:4] if waves else LENGTHS, waves=waves)
@@ -104,6 +106,7 @@ def test_few_iterations_on_the_inflated_tyre(inflated: Inflated, parity: int, wa
     assert used <= 8
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("stiffness", "sideways"),
     [

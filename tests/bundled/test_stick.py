@@ -45,6 +45,7 @@ def test_the_hold_goes_to_nothing_with_the_load(tyre: Round) -> None:
     assert (powers > 1 / 3 - 0.02).all() and (powers < 1 / 2 + 0.02).all()
 
 
+@pytest.mark.slow
 def test_light_loads_leave_the_unloaded_modes(tyre: Round) -> None:
     """The least frequencies come down to those of the same mesh without a road."""
     around = half_circle(LENGTHS)

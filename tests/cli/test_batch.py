@@ -59,6 +59,7 @@ def done(cases: list[Path], tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
+@pytest.mark.slow
 def test_a_poisoned_case_costs_itself_only(done: Path) -> None:
     found = result(done)
     assert found["counts"] == {"cases": 3, "error": 1, "failed": 0, "drifted": 0, "good": 2}
@@ -162,6 +163,7 @@ def test_what_changed_is_studied_again(tmp_path: Path) -> None:
     assert "answered" not in facts(out, "tyre_00")
 
 
+@pytest.mark.slow
 def test_a_fit_that_converged_stays(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """One that gives up stands in a folder of its own, and answers a second time, too."""
     (case,) = vary(tmp_path / "c", 1)

@@ -38,6 +38,7 @@ def test_help_imports_nothing_heavy() -> None:
         assert name in done.stdout
 
 
+@pytest.mark.slow
 def test_commands_import_what_they_use(tmp_path: Path) -> None:
     """One process runs all in turn: what one has imported, those after it have too."""
     out = ["--output", str(tmp_path / "out"), "--store", str(tmp_path / "store"), "--quiet"]
@@ -156,6 +157,8 @@ def test_a_failed_solver_run_is_kept_and_quoted(
 ) -> None:
     out = tmp_path / "out"
     arguments = [
+        "--mesh",
+        "coarse",
         "--allow-unusual",
         "--pressure-kPa",
         "1900",
@@ -354,6 +357,7 @@ def test_variables_that_start_at_zero(
     assert slopes["k"] == pytest.approx([1.0])
 
 
+@pytest.mark.slow
 def test_a_gauge_is_a_number_like_any_other(
     case_folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -29,6 +29,7 @@ def result(out: Path) -> dict[str, Any]:
     return json.loads((out / "footprint.json").read_text())
 
 
+@pytest.mark.slow
 def test_both_designs(
     hertz: type[Hertz], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -51,6 +51,7 @@ def _words(path: Path) -> list[str]:
     return path.read_text().replace(" null ", " ").split()  # as YAML also has it: nothing
 
 
+@pytest.mark.slow
 def test_fit_says_what_to_add_and_runs_when_it_is(
     here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -54,6 +54,7 @@ def identified(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_functions_become_the_true_frequencies(identified: Path) -> None:
     found, right = read_measurements(identified), truth(240.0)
     assert {each.label for each in found} == set(right)
@@ -304,6 +305,7 @@ def test_what_is_lacking_is_asked_for(
     assert words in printed and "Traceback" not in printed
 
 
+@pytest.mark.slow
 def test_help_and_tables_import_nothing_heavy() -> None:
     for command, kept_out in (
         (["measured", "import", "--help"], ("numpy", "pyuff", "matplotlib")),
@@ -318,6 +320,7 @@ def test_help_and_tables_import_nothing_heavy() -> None:
         assert done.stdout.splitlines()[-1] == "[]", done.stdout + done.stderr
 
 
+@pytest.mark.slow
 def test_the_shipped_files_are_the_scripts(tmp_path: Path) -> None:
     write_shapes(tmp_path, np.random.default_rng((20, 1)))
     write_table(tmp_path, np.random.default_rng((20, 2)))

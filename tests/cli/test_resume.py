@@ -146,6 +146,7 @@ def test_a_file_system_without_locks_is_told(
     assert str(tmp_path) in message and "cannot be locked" in message
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("most_bytes", "command"),
     [

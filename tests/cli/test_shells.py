@@ -90,6 +90,7 @@ def asked(end: int, keys: bytes, answer: Path) -> str:
     return text
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "shell",
     [pytest.param(shell, marks=() if shell == "bash" else pytest.mark.slow) for shell in START],

@@ -92,6 +92,7 @@ def test_the_solver_ends_with_all_that_it_started(
     assert not (tmp_path / "out" / "runs").exists()
 
 
+@pytest.mark.slow
 def test_workers_that_have_done_some_clear_up_too(tmp_path: Path) -> None:
     out = tmp_path / "out"
     command = [*SWEEP, "--steps", "40", "--jobs", "2", "--output", str(out)]
@@ -117,6 +118,7 @@ def test_what_a_worker_that_had_to_be_killed_leaves_goes_too(
     assert not (tmp_path / "out" / "runs").exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("how", [pytest.param("nohup", marks=pytest.mark.slow), "hang up"])
 def test_a_terminal_that_closes(how: str, tmp_path: Path) -> None:
     """It ends the command; under nohup it does not, which reads nothing from it."""
@@ -219,7 +221,14 @@ def test_nothing_was_changed_only_where_that_is_so(
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs Linux")
-@pytest.mark.parametrize("arguments", [["effects"], ["validate", "none.yaml"], ["no-such"]])
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        pytest.param(["effects"], marks=pytest.mark.slow),
+        ["validate", "none.yaml"],
+        pytest.param(["no-such"], marks=pytest.mark.slow),
+    ],
+)
 def test_nobody_can_be_told(arguments: list[str]) -> None:
     """Both outputs full: no traceback could be seen, so the exit code says it."""
     with Path("/dev/full").open("w") as full:

@@ -63,6 +63,7 @@ def test_help_is_help(typed: list[str], capsys: pytest.CaptureFixture[str]) -> N
     assert capsys.readouterr().out.split() == told.split()
 
 
+@pytest.mark.slow
 def test_a_results_folder_is_no_case_but_its_fit_is_known(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -54,6 +54,7 @@ def fit_of(point: dict[str, Any], path: Path, case: Path | str = CASE) -> str:
     return str(path)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name",
     [
@@ -200,6 +201,7 @@ def test_a_pressure_that_fails_costs_no_other(
     assert kept.name not in (out / "pressure_sweep.json").read_text()
 
 
+@pytest.mark.slow
 def test_a_failure_amid_the_sweep(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Findings go on over the gap: the bows of uneven steps are still those of concave curves."""
     evaluate = Evaluator.evaluate
@@ -273,6 +275,7 @@ def test_a_fit_of_another_case_is_refused(
     assert not out.exists()
 
 
+@pytest.mark.slow
 def test_a_fit_is_taken_as_it_is_written(tmp_path: Path) -> None:
     """The real fit.json, in the same folder; the sweep passes through its frequencies."""
     out = ["--output", str(tmp_path), "--quiet", "--mesh", "coarse"]

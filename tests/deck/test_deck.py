@@ -198,7 +198,7 @@ DOUBLED = (
         "{{ '%3000000000d' % 1 }}",
         "{{ '{:>3000000000}'.format(1) }}",
         "{{ 'a' | center(3000000000) }}",
-        "{{ 'a' * 60000000 }}",
+        pytest.param("{{ 'a' * 60000000 }}", marks=pytest.mark.slow),
     ],
 )
 def test_a_template_has_an_end(case_folder: Path, edit: str) -> None:

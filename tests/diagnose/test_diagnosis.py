@@ -95,7 +95,7 @@ class OtherUnits(Toy):
         return replace(found, jacobian=found.jacobian / self.x)
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [pytest.param(1, marks=pytest.mark.slow), 2])
 def test_a_diagnosis_does_not_depend_on_units(seed: int) -> None:
     """Of effects and of design variables: the same probabilities, gap, errors held out and gains,
     and sizes in the other unit."""

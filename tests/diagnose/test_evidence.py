@@ -170,6 +170,7 @@ def test_narrow_peaks_are_integrated() -> None:
     assert width == pytest.approx(2 * 1.645 / np.sqrt(a), rel=0.15)
 
 
+@pytest.mark.slow
 def test_the_intervals_of_a_pair_cover(chance: Chance) -> None:
     """Each 90 % interval holds the truth, drawn from its prior, in 88 to 92 of 100 tyres.
 

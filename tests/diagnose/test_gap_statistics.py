@@ -59,6 +59,7 @@ def test_lambda_is_the_noncentrality(chance: Chance) -> None:
     assert np.mean(np.array(values) > chi2(freedom).ppf(0.99)) > 0.5
 
 
+@pytest.mark.slow
 def test_a_known_change_is_in_every_hypothesis(chance: Chance) -> None:
     """The switched run has e1 = 0.5 on purpose: without any effect there is no gap.
 

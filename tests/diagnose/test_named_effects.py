@@ -20,6 +20,7 @@ from .toy import LABELS, Toy, drawn, flat, problem
 pytestmark = pytest.mark.numbers
 
 
+@pytest.mark.slow
 def test_probabilities_are_calibrated_where_the_truth_is_drawn_from_the_prior(
     chance: Chance,
 ) -> None:
@@ -74,6 +75,7 @@ def test_false_alarms_and_hits(chance: Chance) -> None:
     chance.often(right, 0.93)
 
 
+@pytest.mark.slow
 def test_nothing_depends_on_units_or_order() -> None:
     toy = Toy()
     base = problem(toy)
@@ -189,6 +191,7 @@ def test_a_toggled_run_cancels_what_both_share(chance: Chance) -> None:
     chance.often(close, 0.8)
 
 
+@pytest.mark.slow
 def test_an_effects_law_that_is_off_is_still_the_effect(chance: Chance) -> None:
     """A real effect 10 % off the catalogue's, far beyond the scatter: named with the stated
     looseness of laws in 9 of 10, judged outside without it in 9 of 10.

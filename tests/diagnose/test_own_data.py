@@ -96,6 +96,7 @@ def test_a_plain_tyre_has_no_gap(plain: InverseProblem, chance: Chance) -> None:
     chance.often(quarter, 0.85)
 
 
+@pytest.mark.slow
 def test_the_mass_gives_the_hidden_away(plain: InverseProblem) -> None:
     """One more row raises lambda by the square of what its shift is off from what the other rows
     tell of it, over its variance given them (exact: information adds up). At one design no draw is

@@ -148,6 +148,7 @@ def test_a_run_switched_beyond_the_range_is_asked_there(tmp_path: Path) -> None:
     assert d.verdict.kind in ("no_gap", "undecided") and d.probabilities["none"] > 0.25
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "words"),
     [

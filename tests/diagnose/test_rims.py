@@ -44,6 +44,7 @@ def model(rows: list[ModelRow] = ROWS, effects: tuple[str, ...] = EFFECTS) -> Ty
     return TyreModel(CASE, evaluator, rows, sources(CASE)[0], spans)
 
 
+@pytest.mark.slow
 def test_each_row_is_of_its_own_rim() -> None:
     """As two cases have them, one a rim; the spindle moves [0,0] lateral on it, nothing that hangs;
     slopes on both against differences."""

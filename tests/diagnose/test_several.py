@@ -63,6 +63,7 @@ def test_three_effects_are_found() -> None:
     assert best.mean() == pytest.approx(truth, abs=0.1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sizes", [{}, {"e1": 0.4}, {"e0": 0.8, "e2": 0.7}])
 def test_few_points_are_enough_for_sets_that_do_not_matter(sizes: dict[str, float]) -> None:
     """ln Z within 0.5 of that by the full rule, whose narrow peaks it finds; probabilities within
@@ -79,6 +80,7 @@ def test_few_points_are_enough_for_sets_that_do_not_matter(sizes: dict[str, floa
     assert probabilities(found) == pytest.approx(every, abs=1e-3)
 
 
+@pytest.mark.slow
 def test_what_the_model_was_asked_nothing_more_of_stands() -> None:
     """As weighed anew: after one effect was asked again, and after two were together."""
     toy = Toy(effects=3, bend=0.05)

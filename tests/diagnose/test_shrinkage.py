@@ -38,6 +38,7 @@ def test_what_is_held_out_follows_a_rule(pressures: tuple[float, ...], held: set
     assert all(row.label for row in chosen)
 
 
+@pytest.mark.slow
 def test_an_effect_shrinks_the_held_out_error(chance: Chance) -> None:
     """Beyond the placebo's quantile, and least squares' error too, in 17 of 20 tyres.
 
@@ -63,6 +64,7 @@ def test_an_effect_is_told_with_the_rung_that_its_shrinkage_gives() -> None:
     assert found.rung == 2 or not (named and s.effect == "e1" and s.fraction > s.placebo_95)
 
 
+@pytest.mark.slow
 def test_without_an_effect_the_error_shrinks_beyond_the_placebo_in_one_of_twenty(
     chance: Chance,
 ) -> None:

@@ -44,7 +44,7 @@ def diagnosed(toy: Toy, y: np.ndarray, known: bool) -> Diagnosis:
     return diagnose(toy, toy.rows, p.observations, assumed=ASSUMED, known=about)
 
 
-@pytest.mark.parametrize("known", [True, False])
+@pytest.mark.parametrize("known", [True, pytest.param(False, marks=pytest.mark.slow)])
 def test_a_strong_effect_does_not_drive_the_expansion_away(known: bool) -> None:
     """The plain fit is ten times as far from the truth as the tyre that the model is expanded
     about; the effect is named, at its size and with its variables."""
@@ -98,6 +98,7 @@ def test_labels_that_are_exchanged_are_found_beside_a_strong_effect() -> None:
     assert d.exchanged == (a, b) and d.verdict.key == "e0"
 
 
+@pytest.mark.slow
 def test_labels_that_lie_near_each_other_at_one_pressure_alone_may_be_exchanged() -> None:
     """Read there, they are followed to others, where they lie 35 % apart."""
     toy, n = Strong(), len(LABELS)
@@ -138,6 +139,7 @@ class Springs(Toy):
             self.g[id] = np.tile([-0.25 * (each == label) for each in LABELS], 3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("exchange", [False, True])
 def test_two_strong_effects_are_told_from_an_exchange_of_labels(exchange: bool) -> None:
     """Beside no single effect the file fits as it is; exchanged labels take off some of that."""

@@ -54,6 +54,7 @@ def test_slopes_against_differences() -> None:
         assert own.constants[-1, k] == pytest.approx(wanted[-1], rel=0.02, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_parts_of_the_section_make_the_whole() -> None:
     """All rubber heavier together is the density; all parts and the pressure stiffer by the same
     factor raise every frequency by half of it."""
@@ -122,6 +123,7 @@ def test_a_denied_licence_ends_the_study_and_is_no_answer_about_an_effect(
         own.answers(asked)
 
 
+@pytest.mark.slow
 def test_an_effect_without_slopes_takes_the_plain_tyres() -> None:
     """The solver gives none with a splice: all is asked once, together, and nothing in vain."""
     evaluator = Evaluator(TyreDesign(CASE))

@@ -51,6 +51,7 @@ def readings(case: LoadedCase) -> list[Measurement]:
     return [Measurement(q, None, "", 220.0, load, x, 0.02 * x) for q, load, x in found]
 
 
+@pytest.mark.slow
 def test_the_tyre_itself_is_found(case: LoadedCase, readings: list[Measurement]) -> None:
     tyres = {"none": start_values(case), "it": true_values(case)}
     found = compare(case, Evaluator(TyreDesign(case)), readings, tyres)

@@ -149,6 +149,7 @@ def test_the_evidence_is_the_integral_over_what_couples(z: float) -> None:
     assert refit(by_slopes(p), {}, 1).ln_evidence[0] < known - 2 or z < 1
 
 
+@pytest.mark.slow
 def test_turned_cords_are_no_effect(chance: Chance) -> None:
     """Cords uniformly within three standard deviations, the pair within 4 %, one of its values gone
     from every second tyre: p(none) falls short of 0.2 in 1 of 20; by slopes alone in more than

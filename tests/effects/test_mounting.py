@@ -101,7 +101,9 @@ def test_calculix_says_of_a_bead_that_does_not_sit_what_we_do(holds: str) -> Non
     assert (ln_f[1] - ln_f[0]).max() < 0
 
 
-@pytest.mark.parametrize("holds", ["whole_bead", "bead_surface"])
+@pytest.mark.parametrize(
+    "holds", [pytest.param("whole_bead", marks=pytest.mark.slow), "bead_surface"]
+)
 def test_a_filler_is_stiffer_down_to_its_end_within_the_bead(holds: str) -> None:
     """A truck's turn-up ends below its filler's tip, so that the effect is the filler's compound; a
     rim that holds the bead's surface alone feels what lies within."""

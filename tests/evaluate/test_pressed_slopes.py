@@ -39,6 +39,7 @@ def small_case(folder: Path) -> Path:
     return path
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "loads", [[1000.0], pytest.param([1000.0, 1500.0], marks=pytest.mark.slow)]
 )

@@ -29,18 +29,17 @@ def label(text: str) -> Label:
 
 def evaluate(name: str, point: dict, level: str, gradients: tuple[str, ...] = ()):
     """Evaluation and its modes by label at a reference point."""
-    case = load_case(CASES / f"{name}.yaml")
-    mesh = case.case.mesh.model_copy(update={"level": level})
-    from dataclasses import replace
-
-    case = replace(case, case=case.case.model_copy(update={"mesh": mesh}))
+    case = with_level(load_case(CASES / f"{name}.yaml"), level)
     case = with_values(case, {"pressure_kPa": point["pressure_kPa"]})
     values = {v: point[v] for v in VARIABLES}
     evaluation = Evaluator(TyreDesign(case)).evaluate(Question(values, gradients))
     return evaluation, match(label_modes(evaluation.modes), [label(k) for k in point["modes"]])
 
 
-@pytest.mark.parametrize(("name", "i"), POINTS)
+@pytest.mark.parametrize(
+    ("name", "i"),
+    [pytest.param(*each, marks=[pytest.mark.slow] * bool(k % 3)) for k, each in enumerate(POINTS)],
+)
 def test_frequencies_at_the_default_mesh(name: str, i: int) -> None:
     """Within 0.2 % (0.5 % asked for)."""
     point = REFERENCE["sections"][name][i]
@@ -50,6 +49,7 @@ def test_frequencies_at_the_default_mesh(name: str, i: int) -> None:
         assert modes[label(key)].frequency_Hz == pytest.approx(frequency, rel=2e-3), key
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "i"), POINTS[::5])
 def test_frequencies_at_the_refined_mesh(name: str, i: int) -> None:
     """Within 0.2 %."""
@@ -88,7 +88,7 @@ def test_derivatives(i: int, where: str) -> None:
         "materials.rubber.prony.0.g",
     ],
 )
-@pytest.mark.parametrize("vibration_Hz", [None, 50.0])
+@pytest.mark.parametrize("vibration_Hz", [None, pytest.param(50.0, marks=pytest.mark.slow)])
 def test_any_number_of_the_case_has_an_exact_derivative(
     path: str, vibration_Hz: float | None
 ) -> None:

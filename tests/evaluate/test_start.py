@@ -95,6 +95,7 @@ def test_the_case_as_it_stands_starts_at_rest_and_is_asked_once(
     assert named == [False, True]
 
 
+@pytest.mark.slow
 def test_where_the_nominal_tyre_fails_all_start_at_rest(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

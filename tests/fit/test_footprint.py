@@ -143,6 +143,7 @@ def test_footprints_alone_determine_as_many_variables_as_there_are() -> None:
         calibrate(case, evaluator(case))
 
 
+@pytest.mark.slow
 def test_standard_errors_with_footprints_by_the_normal_equations() -> None:
     """All sigmas stated, singlets and doublets alike: (J'^T J')^-1 where the weights are those of
     the noise; with footprints no error is larger than without."""
@@ -196,7 +197,7 @@ def test_numbers_are_those_of_a_footprint_at_the_cases_loads() -> None:
     ]
 
 
-@pytest.mark.parametrize("method", ["slsqp", "gauss-newton"])
+@pytest.mark.parametrize("method", ["slsqp", pytest.param("gauss-newton", marks=pytest.mark.slow)])
 def test_loads_out_of_reach_are_stepped_back_from(method: str) -> None:
     """The tyre bottoms out before the load where the fit would go first, and within 2 % of it."""
     case = case_with(exact_modes(0.5), FOOTPRINT)

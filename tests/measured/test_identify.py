@@ -36,6 +36,7 @@ def functions(
     return Responses(F, H, form, np.repeat(np.arange(signals // 3), 3)), phi
 
 
+@pytest.mark.slow
 def test_frequencies_are_off_by_what_they_state(chance: Chance) -> None:
     """All modes, within two sigma in 19 of 20; the mean square of error over sigma is above a
     twentieth: a bound that says nothing would cover, too.
@@ -95,6 +96,7 @@ def test_noise_alone_is_no_mode(chance: Chance) -> None:
     chance.often(np.array(modes) > 0, 0.0, 0.1)
 
 
+@pytest.mark.slow
 def test_nothing_hangs_on_rounding() -> None:
     """Any file, its band wide or narrow, every value off by half a million times rounding."""
     for key in range(8):

@@ -42,6 +42,7 @@ def waves(sensors: Sensors, c: int, phase: float = 0.3) -> np.ndarray:
     return np.sum(u * sensors.directions, axis=1)
 
 
+@pytest.mark.slow
 def test_random_layouts_give_the_true_labels(chance: Chance) -> None:
     """Of modes on layouts of their own: told in 24 of 25, wrong in 1 of 200 at most.
 
@@ -170,6 +171,7 @@ def test_motions_that_are_not_the_labels_are_smaller_still_of_the_other_parity(m
     assert energy / energy[shares.index(1.0)] == pytest.approx(shares, rel=0.1)
 
 
+@pytest.mark.slow
 def test_layouts_know_beforehand_what_they_cannot_tell() -> None:
     told = Labeller(ring(8, across=(-0.06, 0.06)), 8).told_apart()
     assert Label(5, 0) in told[Label(3, 0)] and Label(3, 0) in told[Label(5, 0)]

@@ -81,7 +81,9 @@ def test_signatures(id: str, pressures: tuple[float, ...], tmp_path: Path) -> No
     save(draw_signature(found), tmp_path / "effect.png")
 
 
-@pytest.mark.parametrize("designs", [("initial",), ("initial", "fitted")])
+@pytest.mark.parametrize(
+    "designs", [("initial",), pytest.param(("initial", "fitted"), marks=pytest.mark.slow)]
+)
 def test_crowded_lines_over_the_load(designs: tuple[str, ...], tmp_path: Path) -> None:
     """All modes within 12 Hz, both members of each."""
     rows = [
@@ -104,6 +106,7 @@ def test_crowded_lines_over_the_load(designs: tuple[str, ...], tmp_path: Path) -
     save(draw_load_sweep([LoadRow(**row, deflection_m=0.0) for row in rows]), tmp_path / "load.png")
 
 
+@pytest.mark.slow
 def test_crowded_lines_over_the_pressure(tmp_path: Path) -> None:
     rows = [
         {

@@ -24,6 +24,7 @@ def site(tmp_path: Path) -> Path:
     return install(GUIDE, "my_solver", tmp_path)
 
 
+@pytest.mark.slow
 def test_the_example_gives_the_bundled_solvers_frequencies(site: Path, tmp_path: Path) -> None:
     path = CASES / "p235_75r17.yaml"
     done = tyrecal(
