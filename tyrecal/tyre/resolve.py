@@ -11,7 +11,7 @@ from .effects import EffectRefused, catalogue
 from .own_deck.flat import Flat
 from .own_deck.section_mesh import section_mesh as own_deck_mesh
 from .plugins import IDS
-from .section.mesh import SectionMesh, build_mesh
+from .section.mesh import SectionMesh, kept_mesh
 from .section.section import Section, with_gauges
 
 # What parts of a tyre ask of a solver: the capability, and what it is for, in words.
@@ -96,7 +96,7 @@ def section_mesh(case: Case, gauged: Section) -> SectionMesh:
     grading = tuple(level.grading) if level.grading else None
     quadratic = case.mesh.element.startswith("CGAX8")
     rows, whole_bead = tuple(level.rows), case.rim.holds_whole_bead
-    return _mesh(gauged, elements, rows, quadratic, grading, whole_bead)
+    return kept_mesh(gauged, elements, rows, quadratic, grading, whole_bead)
 
 
 @lru_cache(maxsize=8)
@@ -110,16 +110,3 @@ def _gauged(case: Case, section: Section) -> Section:
         section,
         tuple((tuple(g.regions or ()), (g.between[0], g.between[1]), g.factor) for g in gauges),
     )
-
-
-@lru_cache(maxsize=32)  # of a tyre with as many fields of its section, each to either side
-def _mesh(
-    section: Section,
-    elements: tuple[int, ...],
-    rows: tuple[int, ...],
-    quadratic: bool,
-    grading: tuple[float, ...] | None,
-    whole_bead: bool,
-) -> SectionMesh:
-    grades = list(grading or ()) or None
-    return build_mesh(section, list(elements), list(rows), quadratic, grades, whole_bead)

@@ -15,7 +15,7 @@ from pydantic import BaseModel, ValidationError
 from ..own_deck.numbers import canonical
 from ..plugins import IDS
 from .mistakes import Keys, dotted, suggestion
-from .parts import WRONG, number
+from .parts import WHOLE_BEAD, WRONG, number
 from .schema import MEASURED_SIGMA, Analysis
 from .shape import KINDS, entries, explain, table, type_at, with_defaults
 
@@ -330,24 +330,27 @@ def folds(data: Mapping[str, Any], section: Section) -> str | None:
     """Why the section cannot be meshed at the chosen level of ``data``, which is right so far."""
     import numpy as np
 
-    from ..section.mesh import build_mesh
+    from ..section.mesh import kept_mesh
     from ..section.section import with_gauges
 
     mesh = data["mesh"]
     level = mesh["levels"][mesh["level"]]
-    elements = [level["elements"][region] for region, _ in section.regions]
+    elements = tuple(level["elements"][region] for region, _ in section.regions)
+    grading = tuple(level.get("grading") or ()) or None
+    whole_bead = table(data, "rim").get("holds", WHOLE_BEAD) == WHOLE_BEAD
     gauges = tuple(
         (tuple(g.get("regions") or ()), tuple(g["between"]), float(g["factor"]))
         for g in data["section"].get("gauges") or ()
     )
     try:
         with np.errstate(all="ignore"):
-            built = build_mesh(
+            built = kept_mesh(
                 with_gauges(section, gauges),
                 elements,
-                level["rows"],
+                tuple(level["rows"]),
                 "8" in mesh["element"],
-                level.get("grading"),
+                grading,
+                whole_bead,
             )
     except ValueError as error:
         return str(error)

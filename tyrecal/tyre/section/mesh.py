@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 import numpy as np
 
@@ -73,6 +74,20 @@ class SectionMesh:
         """Nodes of the outer surface from -z to +z, midside ones too."""
         faces = (self.solids[number] for number in self.outer)
         return sorted({nodes[k] for nodes in faces for k in (1, 2, 5) if k < len(nodes)})
+
+
+@lru_cache(maxsize=32)  # of a tyre with as many fields of its section, each to either side
+def kept_mesh(
+    section: Section,
+    elements: tuple[int, ...],
+    rows: tuple[int, ...],
+    quadratic: bool,
+    grading: tuple[float, ...] | None,
+    whole_bead: bool,
+) -> SectionMesh:
+    """`build_mesh`, kept: one mesh of a section for all who need it, who must not change it."""
+    grades = list(grading or ()) or None
+    return build_mesh(section, list(elements), list(rows), quadratic, grades, whole_bead)
 
 
 def build_mesh(

@@ -180,8 +180,9 @@ def millimetres(row: dict[str, str], column: str, line: int) -> float:
     return value
 
 
+@lru_cache(maxsize=32)
 def fill_lines(section: Section) -> Array:
-    """Lines (line, station, 2) made whole for a mesh.
+    """Lines (line, station, 2) made whole for a mesh; read-only, since they are kept.
 
     Where a line is absent it keeps the fraction of the thickness, between the nearest lines
     that exist, of the station where it ends, so that element rows run on without a step. Between
@@ -212,6 +213,7 @@ def fill_lines(section: Section) -> Array:
                 other = as_at(beyond[0], k, j)
                 if abs(other - points[k, j]).max() > STEPLESS:
                     points[k, j] += (j - near) / (beyond[0] - near) * (other - points[k, j])
+    points.flags.writeable = False
     return points
 
 
