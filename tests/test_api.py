@@ -30,6 +30,7 @@ def test_the_package_is_light() -> None:
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
+@pytest.mark.slow
 def test_a_part_of_the_package_is_found_before_the_rest() -> None:
     code = "from tyrecal import cli, report\nassert cli and report\n"
     subprocess.run([sys.executable, "-c", code], check=True)
@@ -49,7 +50,7 @@ def test_all_that_is_offered_is_there_and_nothing_else() -> None:
         tyrecal.fit_everything  # noqa: B018
 
 
-SLOW = {"diagnose_case", "evaluate_footprint"}
+SLOW = {"diagnose_case", "evaluate_footprint", "read_results", "emulate"}
 
 
 @pytest.mark.parametrize(

@@ -70,11 +70,13 @@ def test_what_is_chosen_is_run(tests: Path, arguments: list[str], expected: set[
     assert ran == expected and not said
 
 
+@pytest.mark.slow
 def test_words_choose_in_the_quick_set(tests: Path) -> None:
     ran, said = pytest_of(tests, "-k", "quick or slow")
     assert ran == {"test_quick"} and " 1 slow: " in said and "lint" not in said
 
 
+@pytest.mark.slow
 def test_what_is_missing_is_said_where_it_is_asked_for(tests: Path) -> None:
     assert pytest_of(tests, "-m", "ccx", PATH="")[0] == {"test_ccx"}
 

@@ -199,6 +199,7 @@ def test_another_edition_at_a_worker_is_refused(
         list(workers.each(square, [1.0]))
 
 
+@pytest.mark.slow
 def test_no_scheduler_there(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -141,7 +141,7 @@ def test_tyres_of_one_mould_differ_by_what_is_stated() -> None:
     assert np.sqrt(np.mean(apart)) == pytest.approx(1e-3, rel=0.4)
 
 
-@pytest.mark.parametrize("size", ["205/60R15", "11R22.5"])
+@pytest.mark.parametrize("size", ["205/60R15", pytest.param("11R22.5", marks=pytest.mark.slow)])
 def test_a_law_says_nothing_at_0_and_something_else_at_every_size(
     size: str, tmp_path: Path
 ) -> None:

@@ -40,12 +40,12 @@ def made(tmp_path: Path, rules: Protocol, seed: int = 3) -> tuple[Path, Path]:
 
 
 def test_files_say_nothing_of_the_kind(tmp_path: Path) -> None:
-    rules = protocol(8, 8, 8, missing=0)
+    rules = protocol(4, 4, 4, missing=0)
     folder, sealed = made(tmp_path, rules)
     truth = read_json(sealed / TRUTH)["trials"]
     kinds = {t["id"]: t["kind"] for t in truth}
     files = sorted((folder / "trials").iterdir())
-    assert {f.stem for f in files} == set(kinds) and Counter(kinds.values())["none"] == 8
+    assert {f.stem for f in files} == set(kinds) and Counter(kinds.values())["none"] == 4
     shapes = set()
     for file in files:
         assert file.stat().st_mtime == 0

@@ -38,6 +38,7 @@ def solid() -> Round:
 LENGTHS = np.radians([3.0] * 6 + [12.0, 30.0, 60.0, 60.0])
 
 
+@pytest.mark.slow
 def test_a_first_load_out_of_reach_fails(solid: Round) -> None:
     for load, why in ((1e7, "at its stiffness there it would go down"), (2e4, "flat on its rim")):
         with pytest.raises(NoEquilibrium, match=why):
@@ -151,6 +152,7 @@ def test_nearly_the_same_load_again(solid: Round) -> None:
     assert again.stiffness == pytest.approx(first.stiffness, rel=2e-3)
 
 
+@pytest.mark.slow
 def test_a_stiffness_that_is_not_found_is_no_number(
     solid: Round, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -325,7 +327,9 @@ def test_a_much_larger_load_after_a_small_one(solid: Round) -> None:
     np.testing.assert_allclose(found.parts, direct.parts, atol=1e-6 * abs(direct.parts).max())
 
 
-@pytest.mark.parametrize("slip", [1e-2, pytest.param(1e-4, marks=pytest.mark.slow), 1e-6])
+@pytest.mark.parametrize(
+    "slip", [1e-2, *(pytest.param(slip, marks=pytest.mark.slow) for slip in (1e-4, 1e-6))]
+)
 @pytest.mark.parametrize("friction", [0.5, pytest.param(3.0, marks=pytest.mark.slow)])
 def test_friction_of_any_size_converges(solid: Round, friction: float, slip: float) -> None:
     """From a soft to a hard stick, and more friction than rubber has."""
@@ -347,6 +351,7 @@ def test_a_ring_is_pressed_in_the_middle(solid: Round) -> None:
     assert abs(found.contact.traction).max() > 0.0  # friction is at work
 
 
+@pytest.mark.slow
 def test_a_softer_road_gives_more(solid: Round) -> None:
     """The overclosure is a spring in series: at 1e12 Pa/m it no longer matters."""
     heights = {k: solid.press(LENGTHS, k).to(100.0).height for k in (1e9, 1e10, 1e11, 1e12)}

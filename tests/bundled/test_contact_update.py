@@ -76,6 +76,7 @@ def test_friction_is_not_symmetric(inflated: Inflated) -> None:
     assert error["whole"] < 0.3 * error["symmetric"]
 
 
+@pytest.mark.slow
 def test_places_are_formed_once(inflated: Inflated) -> None:
     """Columns for the same nodes again cost nothing, and stay in place for more nodes."""
     blocks = road_blocks(inflated, 1e6, 0.1)

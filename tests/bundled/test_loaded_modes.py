@@ -151,6 +151,7 @@ def test_a_wheel_free_along_the_load(tyre: Round, pressed: State, found: LoadedM
     assert mine[0] < 0.1 * keeps[0]
 
 
+@pytest.mark.slow
 def test_a_second_hold_is_as_if_it_were_the_first(tyre: Round, pressed: State) -> None:
     """The factor's hold exchanged for none along the road: the same eigenvalues, below those of
     the patch that sticks."""

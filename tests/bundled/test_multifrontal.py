@@ -126,6 +126,7 @@ def test_contact_is_part_of_it(inflated: Inflated, stiffness: float, sideways: f
     assert conjugate_gradients(problem.product, without.solve, b)[1] > used + 10
 
 
+@pytest.mark.slow
 def test_approximate_inverse_is_symmetric(inflated: Inflated) -> None:
     """To single precision, and positive; what is held stays at rest."""
     for contact in (None, road_blocks(inflated, 1e6, 0.1)):

@@ -276,9 +276,7 @@ def _axis(i: int) -> Array:
     return W
 
 
-@pytest.mark.parametrize(
-    "n", [pytest.param(0, marks=pytest.mark.slow), 1, 2, pytest.param(3, marks=pytest.mark.slow)]
-)
+@pytest.mark.parametrize("n", [1, *(pytest.param(n, marks=pytest.mark.slow) for n in (0, 2, 3))])
 def test_harmonics_are_the_limit_of_many_elements(inflated: Inflated, n: int) -> None:
     """u = Re[phi exp(i n Theta)] and its quarter wave together cost pi phi^H K(n) phi (half the
     circle; twice that for n = 0). Exact for n < 2, to fourth order in the elements' length else."""

@@ -64,6 +64,7 @@ def test_neighbours_stand_nearly_as_near_as_scipy_puts_them() -> None:
     assert widths[0] <= 1.5 * widths[1] < 12
 
 
+@pytest.mark.slow
 def test_routines_are_scipys_whoever_comes_first() -> None:
     """The same module before and after its package is imported, and the package works with it."""
     ours = "from tyrecal_solvers.bundled.section.compiled import LAPACK, compiled"

@@ -15,7 +15,16 @@ def snapshot(folder: Path) -> dict[str, bytes]:
     return {str(p): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
 
 
-@pytest.mark.parametrize("name", sorted(bad_cases.BAD))
+LARGE = {"many_values", "deep_nest"}
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=[pytest.mark.slow] * (name in LARGE))
+        for name in sorted(bad_cases.BAD)
+    ],
+)
 def test_a_wrong_case(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = bad_cases.write(name, tmp_path)
     before, here = snapshot(tmp_path), set(os.listdir())  # noqa: PTH208

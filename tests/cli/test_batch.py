@@ -144,6 +144,7 @@ def test_again_it_is_answered_and_says_the_same_with_other_jobs(
     assert json.loads(capsys.readouterr().out) == json.loads(before)
 
 
+@pytest.mark.slow
 def test_what_changed_is_studied_again(tmp_path: Path) -> None:
     (case,) = vary(tmp_path / "c", 1)
     out = tmp_path / "out"
@@ -218,6 +219,7 @@ def test_drift_is_said_and_ends_in_5(
     assert batched(good, tmp_path / "a", *modes) == 0
 
 
+@pytest.mark.slow
 def test_a_footprint_in_a_batch(tmp_path: Path) -> None:
     (case,) = vary(tmp_path / "c", 1)
     out = tmp_path / "out"

@@ -137,6 +137,7 @@ def test_a_deck_that_the_solver_refuses(tmp_path: Path, capsys: pytest.CaptureFi
         assert not out.exists()
 
 
+@pytest.mark.slow
 def test_deck_runs_alone(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run("deck", CASE, "--output", str(tmp_path / "decks"), "--json") == 0
     paths = [Path(p) for p in json.loads(capsys.readouterr().out)]

@@ -241,7 +241,10 @@ def test_loads_show_on_the_bar(tmp_path: Path) -> None:
     assert "footprint, load 2 of 2" in said and "1/1" in said
 
 
-@pytest.mark.parametrize(("environment", "red"), [({}, True), ({"NO_COLOR": "1"}, False)])
+@pytest.mark.parametrize(
+    ("environment", "red"),
+    [pytest.param({}, True, marks=pytest.mark.slow), ({"NO_COLOR": "1"}, False)],
+)
 def test_colours(environment: dict[str, str], red: bool) -> None:
     said = on_a_terminal("validate", "none.yaml", **environment)
     assert "error: " in said and ("\x1b[31m" in said) == red

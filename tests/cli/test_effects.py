@@ -118,6 +118,7 @@ def test_words_and_signature_have_the_range_on_that_tyre(
     assert (entry["low"], entry["high"], entry["value"]) == pytest.approx((-3.0, 3.0, 3.0))
 
 
+@pytest.mark.slow
 def test_signatures_are_the_same_bytes_from_worker_processes(coarse: str, tmp_path: Path) -> None:
     arguments = ["effects", "rim_width", "--case", coarse, "--no-pictures", "--quiet"]
     for jobs in ("1", "2"):

@@ -86,6 +86,7 @@ def test_json_record_and_pictures(
     assert not list(tmp_path.glob("*.png")) and not list(tmp_path.glob("*.vtu"))
 
 
+@pytest.mark.slow
 def test_which_designs_and_loads(hertz: type[Hertz], tmp_path: Path) -> None:
     """The case's own loads; the fit of the results folder where a comparison asks for it."""
     out = tmp_path / "out"

@@ -135,6 +135,7 @@ def test_one_sentence_and_nothing_written(
     assert {p.name for p in here.iterdir()} == {"own.csv", "semi.csv"}
 
 
+@pytest.mark.slow
 def test_no_file_is_written_over(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for name in ("205_60r15.yaml", "205_60r15.csv", "205_60r15.png"):
         (here / name).write_text("mine")
@@ -174,6 +175,7 @@ def test_a_table_of_lines_with_other_names(here: Path) -> None:
     assert {"top", "bead"} < case.mesh.levels["default"].elements.keys()
 
 
+@pytest.mark.slow
 def test_an_outline(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     write_outline(here / "scan.csv", curves())
     options = ["--section", "scan.csv", "--belt-width-mm", "150", "--output", "mine.yaml"]

@@ -86,6 +86,7 @@ def test_every_result_file_carries_it(project: Path) -> None:
     assert files["pressure_sweep.json"]["provenance"]["state"]["pressure_kPa"] == [100.0, 320.0]
 
 
+@pytest.mark.slow
 def test_the_report_tells_the_modified_tyre_from_the_fit(project: Path) -> None:
     assert run("report", str(project / "out"), "--quiet") == 0
     page = (project / "out/report.html").read_text()

@@ -170,6 +170,7 @@ def test_a_full_disc_ends_in_one_sentence(most_bytes: int, command: str, tmp_pat
     assert left <= {"run.json", ".lock", "record"}
 
 
+@pytest.mark.slow
 def test_a_full_disc_under_the_results(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -100,6 +100,7 @@ def test_both_designs_against_the_reference(
     assert lines[0] == "design,pressure_kPa,c,m,kind,multiplicity,frequency_Hz,d_ln_f_d_ln_p"
 
 
+@pytest.mark.slow
 def test_exact_slopes_are_those_of_the_frequencies(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -75,6 +75,7 @@ def test_keywords_stand_where_the_manual_wants_them(values: str, loads: str) -> 
         assert [i for i, n in enumerate(names) if n == "HOURGLASS STIFFNESS"] == below
 
 
+@pytest.mark.slow
 def test_a_turning_tyre_is_as_stiff_as_the_frequency_says() -> None:
     """At next to no speed the frequencies are those of the tyre that does not turn, its rubber
     evaluated at the same frequency, not those of its static modulus."""

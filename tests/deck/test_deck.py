@@ -69,6 +69,7 @@ def test_a_number_edited_in_the_users_template_moves_the_frequencies(case_folder
     assert frequencies(edited) == pytest.approx([f / 1.1 for f in frequencies(plain)], rel=1e-9)
 
 
+@pytest.mark.slow
 def test_a_cord_angle_edited_in_the_users_template(case_folder: Path) -> None:
     plain = load_case(CASES / "p235_75r17.yaml")
     edited = case_with_template(

@@ -63,6 +63,7 @@ def test_the_fit_begins_with_what_is_known() -> None:
     assert counts[1] < counts[0]
 
 
+@pytest.mark.slow
 def test_a_diagnosis_with_known_effects_says_the_same() -> None:
     """Of a tyre with an effect that moves along with x, as its likeliest effects are asked again;
     probabilities within 0.01."""

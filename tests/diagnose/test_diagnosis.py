@@ -49,6 +49,7 @@ def test_a_toggle_that_parts_twins_comes_first_and_does() -> None:
     assert after.verdict.kind == "named" and after.verdict.key == "e0" and after.rung == 4
 
 
+@pytest.mark.slow
 def test_the_section_map_finds_the_part_and_joins_what_looks_alike(chance: Chance) -> None:
     """With its softness within its sigma.
 

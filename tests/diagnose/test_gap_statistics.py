@@ -39,6 +39,7 @@ def test_the_gap_is_chi2_where_there_is_none(chance: Chance) -> None:
         chance.distributed(values, "uniform")
 
 
+@pytest.mark.slow
 def test_lambda_is_the_noncentrality(chance: Chance) -> None:
     """r^T P r with an effect is noncentral chi2 with n - v degrees of freedom and lambda; without
     lambda it is not.

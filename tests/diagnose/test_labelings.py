@@ -88,6 +88,7 @@ def test_an_effect_makes_a_labeling_likelier() -> None:
     assert found.problem.observations.y == pytest.approx(y)
 
 
+@pytest.mark.slow
 def test_sure_labels_are_as_those_of_the_file() -> None:
     toy = Toy(effects=2)
     y = toy.base + 0.6 * toy.g["e1"]
@@ -99,6 +100,7 @@ def test_sure_labels_are_as_those_of_the_file() -> None:
     assert sure.verdict == labelled.verdict
 
 
+@pytest.mark.slow
 def test_several_effects_are_weighed_under_every_labeling() -> None:
     toy = Toy(effects=6, pressures=(240.0,))
     first = problem(toy, toy.base + 0.9 * toy.g["e1"])

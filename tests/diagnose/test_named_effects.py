@@ -116,6 +116,7 @@ def test_twins_that_nothing_tells_apart_share_their_probability() -> None:
     assert verdict.kind == "undecided" and {"e0", "twin"} <= set(verdict.candidates)
 
 
+@pytest.mark.slow
 def test_near_twins_have_the_probability_together(chance: Chance) -> None:
     """Twins that change a little otherwise with x are told apart by some tyres and not by others;
     the sum is sure in 19 of 20, and whichever is named is one of the two.

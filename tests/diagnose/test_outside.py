@@ -54,6 +54,7 @@ def test_exchanged_labels_are_found_whatever_else_is_there(chance: Chance) -> No
     chance.often(found, 0.99)
 
 
+@pytest.mark.slow
 def test_a_shift_of_modes_in_no_catalogue_is_not_named(chance: Chance) -> None:
     """Seen in 99 of 100 tyres, called outside in 8 of 10.
 
@@ -72,6 +73,7 @@ def test_a_shift_of_modes_in_no_catalogue_is_not_named(chance: Chance) -> None:
     chance.often(outside, 0.8)
 
 
+@pytest.mark.slow
 def test_a_trend_in_no_catalogue_is_not_named(chance: Chance) -> None:
     """Lateral modes off by 1 % a harmonic: seen in 99 of 100 tyres, named in 1 of 20; and likelier
     as a trend than mode by mode in 8 of 10.

@@ -241,6 +241,7 @@ def test_what_is_told_of_the_section_holds_within_its_standard_deviation(chance:
     chance.normal(off)
 
 
+@pytest.mark.slow
 def test_a_bead_that_yields_is_held_further_down(tmp_path: Path) -> None:
     """Whether the rim holds the whole bead or its surface is what two standard deviations of its
     hold are, in every mode to a quarter of the largest shift; the belt does not move."""

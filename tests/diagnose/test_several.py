@@ -174,6 +174,7 @@ def test_several_effects_are_told_with_what_each_shrinks() -> None:
     assert min(told["shrinkage"]["each"].values()) > 0.3
 
 
+@pytest.mark.slow
 def test_an_effect_that_others_may_stand_beside_has_one_size() -> None:
     """Over all explanations that have it, by their probabilities."""
     toy = Toy(effects=4, size=0.012, pressures=(240.0,))
@@ -186,6 +187,7 @@ def test_an_effect_that_others_may_stand_beside_has_one_size() -> None:
     assert d.parameter("e0")["value"] == pytest.approx(weights @ means / weights.sum())
 
 
+@pytest.mark.slow
 def test_what_a_strong_verdict_hangs_on() -> None:
     """On nothing; its probability over priors of none, half and twice as large, lies inside."""
     d = exact(Toy(effects=3, size=0.05, pressures=(160.0, 240.0)), {"e0": 0.8})

@@ -106,6 +106,7 @@ def test_a_calibration_as_usual_stands_beside(without: bool) -> None:
     assert got == pytest.approx(expected, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_the_placebo_is_what_tyres_without_an_effect_would_show() -> None:
     """Each drawn tyre by itself: the likeliest effect of the rows that are kept, at its likeliest
     size, lowers the error of those held out by R; 95 % of them show less."""

@@ -70,6 +70,7 @@ class Bounded(Strong):
         return super()._answer(point)
 
 
+@pytest.mark.slow
 def test_where_there_is_no_tyre_to_expand_about_the_first_expansion_stays() -> None:
     toy = Bounded()
     y = toy.measured(e0=0.9)
@@ -87,6 +88,7 @@ def test_a_tyre_that_fits_is_expanded_about_its_own_fit() -> None:
     assert d.problem.expansion.x0.tolist() == own.tolist()
 
 
+@pytest.mark.slow
 def test_labels_that_are_exchanged_are_found_beside_a_strong_effect() -> None:
     toy, n = Strong(), len(LABELS)
     a, b = LABELS[6], LABELS[7]
@@ -111,6 +113,7 @@ def test_labels_that_lie_near_each_other_at_one_pressure_alone_may_be_exchanged(
     assert diagnose(toy, toy.rows, p.observations, assumed=ASSUMED).exchanged is None
 
 
+@pytest.mark.slow
 def test_exchanged_labels_are_put_right_where_one_of_the_two_is_missing() -> None:
     """A sound tyre is sound; exchanged twice its labels are what they were."""
     toy, n = Toy(effects=2, bend=0.0), len(LABELS)

@@ -30,6 +30,7 @@ from .support import CASE, CASES, START, coarse, data, decks, frequencies, slope
 EFFECTS = list(catalogue().values())
 each = pytest.mark.parametrize("effect", EFFECTS, ids=[effect.id for effect in EFFECTS])
 EXACT = [effect for effect in EFFECTS if effect.id != "stiffness_splice"]  # it has differences
+DEAR = {"road_contact", "point_mass", "rotation"}  # whose modes are of several harmonics
 STEP = 1e-3  # of the parameter; central differences are then right to 1e-5 or so
 
 
@@ -75,7 +76,11 @@ def test_effect_is_written_in_the_case_and_none_is_left(effect: Effect) -> None:
     assert CASE.case.effects[effect.id] == 0
 
 
-@pytest.mark.parametrize("effect", EXACT, ids=[effect.id for effect in EXACT])
+@pytest.mark.parametrize(
+    "effect",
+    [pytest.param(e, marks=[pytest.mark.slow] * (e.id in DEAR)) for e in EXACT],
+    ids=[effect.id for effect in EXACT],
+)
 def test_slopes_are_those_of_the_frequencies(effect: Effect) -> None:
     at = 0.4 * effect.high
     name = f"effects.{effect.id}"
@@ -99,7 +104,10 @@ def test_slope_next_to_nothing(id: str) -> None:
     assert low == pytest.approx(high, rel=1e-2, abs=1e-3 * abs(high).max())
 
 
-@pytest.mark.parametrize(("method", "start"), [("slsqp", 0.0), ("gauss-newton", 1.0)])
+@pytest.mark.parametrize(
+    ("method", "start"),
+    [("slsqp", 0.0), pytest.param("gauss-newton", 1.0, marks=pytest.mark.slow)],
+)
 def test_a_fit_ends_where_an_effect_is_absent(method: str, start: float) -> None:
     """Frequencies lower than the plain tyre's want a filler softer than none: the bound 0."""
     modes = [
@@ -224,6 +232,7 @@ def test_other_shipped_case_has_a_deck_of_it(effect: Effect) -> None:
     assert decks(other, **{effect.id: effect.high / 2}) != decks(other)
 
 
+@pytest.mark.slow
 def test_a_new_file_is_all_that_a_new_effect_touches(tmp_path: Path) -> None:
     """In a copy: it is found, comes where it says, and writes itself into the case."""
     package = shutil.copytree(ROOT / "tyrecal", tmp_path / "tyrecal")

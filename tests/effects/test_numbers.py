@@ -201,6 +201,7 @@ def test_a_bead_that_does_not_sit_is_one_whose_table_says_so() -> None:
     assert list(found.values()) == pytest.approx(list(expected.values()), rel=1e-6)
 
 
+@pytest.mark.slow
 def test_a_bead_that_nearly_sits_is_one_that_does_and_weighs_the_same() -> None:
     """But for a fiftieth of the bead, whose elements make the mesh of its edge finer; the fewest
     that the deck's digits show is as good as twice that."""

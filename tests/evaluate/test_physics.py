@@ -73,6 +73,7 @@ def test_second_invariant_counts() -> None:
     assert np.any(abs(ratios - 1) > 1e-4)
 
 
+@pytest.mark.slow
 def test_angular_spacing_fans_the_cords_out(case_folder: Path) -> None:
     """Constant degrees between cords that equal the constant spacing at r = 0.35 m."""
     spacing = np.degrees(1e-3 / 0.35)

@@ -81,6 +81,7 @@ def test_sensors_on_a_rim_at_rest_change_nothing(chance: Chance) -> None:
     chance.often(right, 0.96)
 
 
+@pytest.mark.slow
 def test_poor_layouts_are_as_sure_as_they_are_right(chance: Chance) -> None:
     """Four sensors on the tread, three on a sidewall, a third of the directions missing: some are
     told, some are not; those told are right in 24 of 25, those in doubt as often as they say, by

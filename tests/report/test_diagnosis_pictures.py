@@ -83,6 +83,7 @@ def test_probabilities_and_held_out(found: Diagnosis, tmp_path: Path) -> None:
     assert heights == [found.shrinkage.before_percent, found.shrinkage.after_percent]
 
 
+@pytest.mark.slow
 def test_long_names_are_laid_out(found: Diagnosis, tmp_path: Path) -> None:
     """Of one family, of one pressure, with the catalogue's longest name; see `conftest`."""
     long = "temperature drift over the run of pressures, as the longest of titles"
@@ -100,6 +101,7 @@ def test_long_names_are_laid_out(found: Diagnosis, tmp_path: Path) -> None:
     save(figure, tmp_path / "alone.png")
 
 
+@pytest.mark.slow
 def test_no_gap_has_nothing_that_explains_it(tmp_path: Path) -> None:
     d = exact(Toy(effects=3), {})
     assert d.verdict.kind == "no_gap" and d.shrinkage

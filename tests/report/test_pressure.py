@@ -41,6 +41,7 @@ def rows(labels=LABELS, designs=("initial", "fitted"), pressures=(100.0, 200.0, 
     return [PressureRow.model_validate(row) for row in found]
 
 
+@pytest.mark.slow
 def test_each_mode_is_drawn_in_its_family_and_named_once(tmp_path):
     path = tmp_path / "sweep.png"
     figure = draw_pressure_sweep(rows(), [(Label(2, 0), 240.0, 79.5)])
@@ -60,6 +61,7 @@ def test_each_mode_is_drawn_in_its_family_and_named_once(tmp_path):
     assert list(cross.get_ydata()) == [79.5]
 
 
+@pytest.mark.slow
 def test_targets_of_another_pressure_do_not_stretch_the_axis(tmp_path):
     figure = draw_pressure_sweep(rows(), [(Label(2, 0), 500.0, 79.5)])
     save(figure, tmp_path / "sweep.png")

@@ -51,6 +51,7 @@ def swept_again(content: dict, mode: dict) -> tuple[np.ndarray, np.ndarray]:
     return R[:, None, None] * up + Z[:, None, None] * axle, r * up + t * round_ + z * axle
 
 
+@pytest.mark.slow
 def test_shapes_swept_again_are_the_modes(tyre) -> None:
     """Against the pictures' own sweep: alike but for scale, the turn of a pair and of the axes."""
     case, evaluation, modes = tyre

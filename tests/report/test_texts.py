@@ -69,7 +69,9 @@ def test_a_headline_takes_the_lines_that_it_needs(width: float, tmp_path: Path) 
     assert ("\n" in said) == (width < 8)
 
 
-@pytest.mark.parametrize("pressures", [(240.0,), (160.0, 240.0, 320.0)])
+@pytest.mark.parametrize(
+    "pressures", [(240.0,), pytest.param((160.0, 240.0, 320.0), marks=pytest.mark.slow)]
+)
 @pytest.mark.parametrize("id", ["temperature_drift", "spindle_torsional", "carcass_fanning"])
 def test_signatures(id: str, pressures: tuple[float, ...], tmp_path: Path) -> None:
     assert id in catalogue()

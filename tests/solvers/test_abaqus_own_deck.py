@@ -37,9 +37,8 @@ def case_of(folder: Path, text: str) -> Path:
     return case
 
 
-@pytest.mark.parametrize(
-    "style", [pytest.param(own_decks.plain, marks=pytest.mark.slow), own_decks.millimetres]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("style", [own_decks.plain, own_decks.millimetres])
 def test_modes_are_those_of_the_bundled_solver(
     style: object, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

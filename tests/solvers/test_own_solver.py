@@ -101,6 +101,7 @@ def test_it_is_as_short_as_the_guide_says() -> None:
     assert len([line for line in code.splitlines() if line.strip()]) <= 40
 
 
+@pytest.mark.slow
 def test_the_doctor_finds_it_sound(site: Path) -> None:
     done = tyrecal(site, "doctor", "--solver", "my-solver", "--json")
     assert done.returncode == 0, done.stderr

@@ -114,6 +114,7 @@ def test_families() -> None:
     assert [x.family for x in (Label(0, 1), Label(0, 2), Label(3, 2))] == [None] * 3
 
 
+@pytest.mark.slow
 def test_more_modes_are_asked_for_where_a_target_is_lost() -> None:
     case = load_case(CASES / "p235_75r17.yaml")
     few = case.case.analysis.model_copy(update={"modes_per_harmonic": 1})
@@ -131,6 +132,7 @@ def test_more_modes_are_asked_for_where_a_target_is_lost() -> None:
     assert result["findings"] == [] and len(result["rows"]) == 1
 
 
+@pytest.mark.slow
 def test_a_variable_that_sets_the_pressure_is_what_is_swept(case_folder: Path) -> None:
     path = case_folder / "p235_75r17.yaml"
     extra = (

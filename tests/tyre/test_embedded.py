@@ -20,6 +20,7 @@ from .own_decks import EMBEDDED, apart, plain
 from .test_own_deck import frequencies, write
 
 
+@pytest.mark.slow
 def test_with_finer_hosts_it_is_the_tyre_with_nodes_that_coincide(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -83,11 +83,11 @@ def case_of(tmp_path_factory: pytest.TempPathFactory) -> CaseOf:
     [
         "145/80R13",
         "205/60R15",
-        "255/40R17",
+        pytest.param("255/40R17", marks=pytest.mark.slow),
         "P235/75R17",
-        "31x10.50R15LT",
-        "11R22.5",
-        "315/80R22.5",
+        pytest.param("31x10.50R15LT", marks=pytest.mark.slow),
+        pytest.param("11R22.5", marks=pytest.mark.slow),
+        pytest.param("315/80R22.5", marks=pytest.mark.slow),
     ],
 )
 def test_the_size_code_gives_sixteen_modes(code: str, case_of: CaseOf) -> None:
