@@ -18,7 +18,6 @@ from pathlib import Path
 from zlib import crc32
 
 import numpy as np
-from scipy.stats import binom, chi2, kstest, norm
 
 Array = np.ndarray
 RATE = 1e-7  # of one claim
@@ -48,6 +47,8 @@ class Chance:
 
         Exact: binomial tails of RATE together.
         """
+        from scipy.stats import binom  # late, here and below: most runs claim nothing
+
         count, hit = len(hits), int(np.sum(hits))
         self.spent += RATE
         self.seen.append((hit, count, low, high))
@@ -58,6 +59,8 @@ class Chance:
 
     def distributed(self, values: Sequence[float] | Array, cdf: object) -> None:
         """Independent values of a distribution: Kolmogorov and Smirnov's distance, exact."""
+        from scipy.stats import kstest
+
         self.spent += RATE
         p = kstest(values, cdf, method="exact").pvalue
         assert p > RATE, f"p = {p:.1e}"
@@ -68,6 +71,8 @@ class Chance:
         By the normal distribution of a mean of many, at RATE / 100, since the tails of a mean of
         some hundred are heavier than normal.
         """
+        from scipy.stats import norm
+
         self.spent += RATE
         off = norm.isf(RATE / 200) * np.std(values, ddof=1) / sqrt(len(values))
         middle = float(np.mean(values))
@@ -75,6 +80,8 @@ class Chance:
 
     def scatter(self, values: Sequence[float] | Array, sigma: float) -> None:
         """Independent normal values of an unknown mean and this standard deviation: chi2, exact."""
+        from scipy.stats import chi2
+
         self.spent += RATE
         freedom = len(values) - 1
         ratio = float(np.var(values, ddof=1) / sigma**2)
@@ -83,6 +90,8 @@ class Chance:
 
     def normal(self, values: Sequence[float] | Array) -> None:
         """Standard normal values, independent or not, none of them too large."""
+        from scipy.stats import norm
+
         self.spent += RATE
         largest = float(np.max(np.abs(values)))
         assert largest <= norm.isf(RATE / 2 / len(values)), f"{largest:.2f} standard deviations"

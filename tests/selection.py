@@ -43,7 +43,7 @@ LEFT_OUT = {  # a test with two of them counts with the first
     "cluster": LeftOut("start Dask schedulers and workers"),
     "lint": LeftOut("ruff and mypy over all files"),
     "guide": LeftOut("command blocks of the guides"),
-    "slow": LeftOut("more than about 2 s each"),
+    "slow": LeftOut("take longer than those of the quick set that are as telling"),
 }
 COUNTS: pytest.StashKey[dict[str, int]] = pytest.StashKey()
 
